@@ -1,0 +1,22 @@
+"""Errors that are the user's to mend: one clear line each, with place, value and remedy."""
+
+import difflib
+from collections.abc import Iterable
+
+
+class EomgenError(Exception):
+    """A fault in what the user gave; its text is one line fit for the terminal."""
+
+
+class SceneError(EomgenError):
+    """A scene that cannot be read or makes no mechanism."""
+
+
+class RunError(EomgenError):
+    """A simulation, or a file it needs or writes, that cannot go on."""
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Return ``" (did you mean 'x'?)"`` for the known word nearest to `word`, or ``""``."""
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f" (did you mean '{close[0]}'?)" if close else ""
