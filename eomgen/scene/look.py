@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from eomgen.scene.base import Identifier, Number, Positive, Table
+from eomgen.language.base import Identifier, Number, Positive, Table
 
 
 def _colour(text: str) -> str:

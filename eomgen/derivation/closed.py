@@ -1,0 +1,97 @@
+"""The `closed` route: the handout's derivation from joint constraint to closed form, by SymPy."""
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from eomgen.derivation.elimination import (
+    Collected,
+    body_rows,
+    collect,
+    joint_forces,
+    symmetric,
+    trees,
+)
+from eomgen.derivation.free_bodies import FreeBodies, draw_free_bodies
+from eomgen.derivation.kinematics import Kinematics, differentiate_joints
+from eomgen.derivation.solution import Definition, Solution, solve
+from eomgen.derivation.symbols import Expr, Symbols, make_symbols
+from eomgen.joints import Free
+from eomgen.model import Model
+
+
+@dataclass(frozen=True)
+class Equations:
+    """A model's equations of motion, derived as the handout derives them.
+
+    `collected` is (24) in the handout's rows; `symmetric` the same equations in generalised forces,
+    with M = Mᵀ; `solution` the closed form; `joint_force` the recovered force f_j of every joint, as
+    definitions over the accelerations.
+    """
+
+    model: Model
+    symbols: Symbols
+    kinematics: Kinematics
+    free_bodies: FreeBodies
+    collected: Collected
+    symmetric: Collected
+    solution: Solution
+    joint_force: tuple[Definition, ...]
+
+
+def derive(model: Model) -> Equations:
+    """Derive, eliminate and solve; see the modules of this package for each step."""
+    symbols = make_symbols(model)
+    kinematics = differentiate_joints(model, symbols)
+    free_bodies = draw_free_bodies(model, symbols, kinematics)
+    collected = collect(model, symbols, kinematics, free_bodies)
+    generalised = Collected(
+        *(symmetric(model, symbols, kinematics, m) for m in
+          (collected.M, collected.V, collected.G, collected.F))
+    )  # fmt: skip
+    right_side = body_rows(model, kinematics, collected.F - collected.V - collected.G)
+    solution = solve(
+        model, symbols, kinematics, right_side + _generalised_forces(model, symbols)
+    )
+    return Equations(
+        model,
+        symbols,
+        kinematics,
+        free_bodies,
+        collected,
+        generalised,
+        solution,
+        _recovered_forces(model, symbols, free_bodies),
+    )
+
+
+def _generalised_forces(model: Model, symbols: Symbols) -> Expr:
+    """Forces τ on the coordinates as rows of the bodies: τ turns the child, -τ the parent."""
+    rows = list(symbols.tau)
+    i = 0
+    last: list[int] = []
+    for body in model.bodies:
+        i += len(body.coordinates)
+        last.append(i - 1)
+        if body.parent >= 0:
+            rows[last[body.parent]] -= symbols.tau[i - 1]
+    return sp.Matrix(rows)
+
+
+def _recovered_forces(
+    model: Model, symbols: Symbols, free_bodies: FreeBodies
+) -> tuple[Definition, ...]:
+    residuals = []
+    for k in range(len(model.bodies)):
+        (wx, wy), (fx, fy) = free_bodies.gravity[k][0], free_bodies.applied[k][0]
+        residuals.append(
+            (symbols.mass[k] * symbols.xdd[k] - wx - fx, symbols.mass[k] * symbols.ydd[k] - wy - fy)
+        )
+    found = joint_forces(model, residuals)
+    return tuple(
+        (symbol, expression)
+        for tree in trees(model)
+        for k in tree.bodies
+        if not isinstance(model.bodies[k].joint, Free)
+        for symbol, expression in zip(symbols.force[k], found[k], strict=True)
+    )

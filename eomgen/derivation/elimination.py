@@ -1,0 +1,203 @@
+"""Joint forces and dependent accelerations eliminated: M q̈ + V + G = F (handout (24)-(28), (36))."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from eomgen.derivation.free_bodies import FreeBodies, Wrench
+from eomgen.derivation.kinematics import Kinematics
+from eomgen.derivation.symbols import (
+    Expr,
+    Symbols,
+    Vec,
+    add,
+    cross,
+    over_bodies,
+    over_coordinates,
+    scale,
+    tidy,
+)
+from eomgen.joints import Free
+from eomgen.model import Model
+
+
+@dataclass(frozen=True)
+class Tree:
+    """The bodies of one tree: its root, all its bodies, and for each body its subtree."""
+
+    root: int
+    floating: bool
+    bodies: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Collected:
+    """M q̈ + V + G = F, one row a coordinate (24).
+
+    The handout's rows: for a floating tree the sum of all forces (x, y), and for every body its
+    torque about its own centre of mass.
+    """
+
+    M: Expr
+    V: Expr
+    G: Expr
+    F: Expr
+
+
+def trees(model: Model) -> tuple[Tree, ...]:
+    """The trees of a model, in the order of their roots."""
+    roots: list[int] = []
+    members: dict[int, list[int]] = {}
+    for k, body in enumerate(model.bodies):
+        root = k if body.parent < 0 else roots[body.parent]
+        roots.append(root)
+        members.setdefault(root, []).append(k)
+    return tuple(
+        Tree(root, isinstance(model.bodies[root].joint, Free), tuple(bodies))
+        for root, bodies in members.items()
+    )
+
+
+def subtree(model: Model, k: int) -> tuple[int, ...]:
+    """A body and all that hangs on it, in the order of the bodies."""
+    found = {k}
+    for i, body in enumerate(model.bodies):
+        if body.parent in found:
+            found.add(i)
+    return tuple(sorted(found))
+
+
+def joint_forces(model: Model, residuals: Sequence[Vec]) -> dict[int, Vec]:
+    """Force f_j of each revolute joint on its parent, from m ẍ - f of the bodies on one side of it.
+
+    A floating tree takes the inner side, as the handout takes f_j from body A (14), (15): all
+    bodies inside the joint accelerate by the forces on them and f_j. A tree that hangs on the world
+    takes the outer side, where no unknown force of the ground enters.
+    """
+    forces: dict[int, Vec] = {}
+    for tree in trees(model):
+        for k in tree.bodies:
+            if isinstance(model.bodies[k].joint, Free):
+                continue
+            outer = subtree(model, k)
+            total: Vec = (sp.Integer(0), sp.Integer(0))
+            if tree.floating:
+                for i in (i for i in tree.bodies if i not in outer):
+                    total = add(total, residuals[i])
+            else:
+                for i in outer:
+                    total = add(total, scale(-1, residuals[i]))
+            forces[k] = total
+    return forces
+
+
+def collect(
+    model: Model, symbols: Symbols, kinematics: Kinematics, free_bodies: FreeBodies
+) -> Collected:
+    """Eliminate f_j and the dependent accelerations, and collect (24)."""
+    inertial = tuple(
+        ((symbols.mass[k] * symbols.xdd[k], symbols.mass[k] * symbols.ydd[k]),
+         symbols.inertia[k] * kinematics.alpha[k])
+        for k in range(len(model.bodies))
+    )  # fmt: skip
+    # In the bodies' own angles and rates nothing like (θ̇ + φ̇)² is torn apart when terms are
+    # expanded; (22) and (23) are put in from the leaves inwards.
+    inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
+    rows = [row.xreplace(inward) for row in _rows(model, kinematics, inertial)]
+    for k in reversed(range(len(model.bodies))):
+        if not isinstance(model.bodies[k].joint, Free):
+            ddx, ddy = (e.xreplace(inward) for e in kinematics.acceleration[k])
+            rows = [row.xreplace({symbols.xdd[k]: ddx, symbols.ydd[k]: ddy}) for row in rows]
+    rows = [sp.expand(row) for row in rows]
+    unknowns = (*symbols.xdd, *symbols.ydd, *symbols.alpha)
+    still = dict.fromkeys(unknowns, sp.Integer(0))
+    velocity = sp.Matrix([row.xreplace(still).xreplace(outward) for row in rows])
+    slopes = {z: outward[z] for z in unknowns if any(row.has(z) for row in rows)}
+    mass = sp.zeros(len(rows), len(symbols.a))
+    for i, row in enumerate(rows):
+        for z, over in slopes.items():
+            slope = sp.diff(row, z).xreplace(outward)
+            for j, a in enumerate(symbols.a):
+                mass[i, j] += slope * over.coeff(a)
+    gravity = -sp.Matrix(_rows(model, kinematics, free_bodies.gravity))
+    applied = sp.Matrix(_rows(model, kinematics, free_bodies.applied))
+    return Collected(mass, velocity, gravity, applied)
+
+
+def _rows(model: Model, kinematics: Kinematics, wrenches: Sequence[Wrench]) -> list[Expr]:
+    """What the elimination makes of one wrench on each body: a row for every coordinate.
+
+    The elimination is linear, so inertia, gravity and applied forces pass through it one by one.
+    """
+    forces = joint_forces(model, [force for force, _ in wrenches])
+    rows: list[Expr] = []
+    for tree in trees(model):
+        for k in tree.bodies:
+            if isinstance(model.bodies[k].joint, Free):
+                total: Vec = (sp.Integer(0), sp.Integer(0))
+                for i in tree.bodies:
+                    total = add(total, wrenches[i][0])
+                rows += total
+            row = wrenches[k][1]
+            if k in forces:
+                row += cross(kinematics.arm_child[k], forces[k])
+            for c, child in enumerate(model.bodies):
+                if child.parent == k:
+                    row -= cross(kinematics.arm_parent[c], forces[c])
+            rows.append(row)
+    return rows
+
+
+def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
+    """The rows of (24) turned into the equations of virtual work, per body.
+
+    To each torque row of a floating tree the total force is added at the arm from the body's centre
+    of mass to where the rest of the tree hangs; then the row is the work done when this body alone
+    turns and everything outside it is carried along. For trees on the world nothing is to be added.
+    """
+    result = sp.Matrix(rows)
+    first = _first_coordinates(model)
+    for tree in trees(model):
+        if not tree.floating:
+            continue
+        x, y = first[tree.root], first[tree.root] + 1
+        for k in tree.bodies:
+            arm: Vec = (sp.Integer(0), sp.Integer(0))
+            if k != tree.root:
+                arm = add(arm, scale(-1, kinematics.arm_child[k]))
+            for c, child in enumerate(model.bodies):
+                if child.parent == k:
+                    arm = add(arm, kinematics.arm_parent[c])
+            turn = angle_index(model, k)
+            for j in range(result.cols):
+                result[turn, j] += cross(arm, (result[x, j], result[y, j]))
+    return result
+
+
+def symmetric(model: Model, symbols: Symbols, kinematics: Kinematics, rows: Expr) -> Expr:
+    """The rows of (24) as generalised forces: ½ q̇ᵀ M q̇ is the kinetic energy.
+
+    The coordinate of a joint turns its whole subtree, so its row is the sum of the subtree's.
+    """
+    inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
+    work = body_rows(model, kinematics, rows).applyfunc(lambda e: tidy(e.xreplace(inward)))
+    result = sp.Matrix(work)
+    for k in range(len(model.bodies)):
+        i = angle_index(model, k)
+        for j in range(work.cols):
+            result[i, j] = sum(work[angle_index(model, b), j] for b in subtree(model, k))
+    return result.xreplace(outward)
+
+
+def _first_coordinates(model: Model) -> list[int]:
+    first, n = [], 0
+    for body in model.bodies:
+        first.append(n)
+        n += len(body.coordinates)
+    return first
+
+
+def angle_index(model: Model, k: int) -> int:
+    """Index of the coordinate that turns body `k`: the last one of its joint."""
+    return _first_coordinates(model)[k] + len(model.bodies[k].coordinates) - 1

@@ -1,0 +1,228 @@
+"""The symbols of a derivation, and the trigonometry it needs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from eomgen.language.formula import Formula, Name, evaluate
+from eomgen.model import Model
+
+Expr = Any
+"""A SymPy expression (SymPy carries no types)."""
+Vec = tuple[Expr, Expr]
+
+
+class SympyScalars:
+    """SymPy expressions as scalars for formulas; decimals stay exact."""
+
+    def number(self, value: float) -> Expr:
+        """The exact rational that the scene's decimal says."""
+        return sp.Rational(repr(value))
+
+    def call(self, function: str, argument: Expr) -> Expr:
+        """sin, cos, tan or sqrt."""
+        return {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "sqrt": sp.sqrt}[function](argument)
+
+
+@dataclass(frozen=True)
+class Symbols:
+    """Symbols of a model: one list each over coordinates, bodies, or revolute joints.
+
+    `q`, `v`, `a` are coordinates with their first and second derivatives, `tau` generalised forces
+    beside those of the effects. Per body `x`, `y`, `angle` are the pose of the centre of mass in
+    world axes, `xd`, `yd`, `omega` its velocity, `xdd`, `ydd`, `alpha` its acceleration.
+    `force` holds the joint force of the body's own joint, acting on its parent (0 if free).
+    """
+
+    parameters: dict[str, Expr]
+    inputs: dict[str, Expr]
+    mass: tuple[Expr, ...]
+    inertia: tuple[Expr, ...]
+    q: tuple[Expr, ...]
+    v: tuple[Expr, ...]
+    a: tuple[Expr, ...]
+    tau: tuple[Expr, ...]
+    x: tuple[Expr, ...]
+    y: tuple[Expr, ...]
+    angle: tuple[Expr, ...]
+    xd: tuple[Expr, ...]
+    yd: tuple[Expr, ...]
+    omega: tuple[Expr, ...]
+    xdd: tuple[Expr, ...]
+    ydd: tuple[Expr, ...]
+    alpha: tuple[Expr, ...]
+    force: tuple[Vec, ...]
+
+    def value(self, formula: Formula) -> Expr:
+        """A quantity over the parameters' symbols."""
+        return evaluate(formula, self.parameters, SympyScalars())
+
+
+def make_symbols(model: Model) -> Symbols:
+    """Symbols for a model; masses and inertias that are one parameter are positive symbols."""
+    positive = {
+        quantity.name
+        for body in model.bodies
+        for quantity in (body.mass, body.inertia_com)
+        if isinstance(quantity, Name)
+    }
+    parameters = {
+        p.name: sp.Symbol(p.name, positive=True) if p.name in positive else _real(p.name)
+        for p in model.parameters
+    }
+
+    def quantity(formula: Formula) -> Expr:
+        return evaluate(formula, parameters, SympyScalars())
+
+    coordinates = [c.name for c in model.coordinates]
+    bodies = [body.name for body in model.bodies]
+
+    def each(names: Sequence[str], pattern: str) -> tuple[Expr, ...]:
+        return tuple(_real(pattern.format(name)) for name in names)
+
+    return Symbols(
+        parameters=parameters,
+        inputs={i.name: _real(i.name) for i in model.inputs},
+        mass=tuple(quantity(body.mass) for body in model.bodies),
+        inertia=tuple(quantity(body.inertia_com) for body in model.bodies),
+        q=each(coordinates, "{}"),
+        v=each(coordinates, "{}_dot"),
+        a=each(coordinates, "{}_ddot"),
+        tau=each(coordinates, "tau__{}"),
+        # Two underscores: no name of a scene may hold them, so these meet none of its symbols.
+        x=each(bodies, "x__{}"),
+        y=each(bodies, "y__{}"),
+        angle=each(bodies, "angle__{}"),
+        xd=each(bodies, "x__{}_dot"),
+        yd=each(bodies, "y__{}_dot"),
+        omega=each(bodies, "omega__{}"),
+        xdd=each(bodies, "x__{}_ddot"),
+        ydd=each(bodies, "y__{}_ddot"),
+        alpha=each(bodies, "alpha__{}"),
+        force=tuple(
+            (_real(f"f__{body.joint.name}_x"), _real(f"f__{body.joint.name}_y"))
+            for body in model.bodies
+        ),
+    )
+
+
+def _real(name: str) -> Expr:
+    return sp.Symbol(name, real=True)
+
+
+def rotate(vector: Vec, angle: Expr) -> Vec:
+    """A vector of body axes in world axes."""
+    c, s = sp.cos(angle), sp.sin(angle)
+    return (vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c)
+
+
+def cross(r: Vec, f: Vec) -> Expr:
+    """z component of r × f."""
+    return r[0] * f[1] - r[1] * f[0]
+
+
+def add(u: Vec, v: Vec) -> Vec:
+    """Sum of two vectors."""
+    return (u[0] + v[0], u[1] + v[1])
+
+
+def scale(k: Expr, v: Vec) -> Vec:
+    """A vector times a scalar."""
+    return (k * v[0], k * v[1])
+
+
+def tidy(expression: Expr) -> Expr:
+    """Expand, with products of sines and cosines as functions of sums of angles.
+
+    In this form terms that differ only by an identity of trigonometry are the same term, so what
+    cancels does cancel: no simplifier that searches is needed.
+    """
+    expanded = sp.expand(expression)
+    return sp.Add(*(_linear(term) for term in sp.Add.make_args(expanded)))
+
+
+def _linear(term: Expr) -> Expr:
+    """A product with at most one sine or cosine left in each of its terms."""
+    plain, waves = [], []
+    for factor in sp.Mul.make_args(term):
+        base, power = factor.as_base_exp()
+        if isinstance(base, sp.sin | sp.cos) and power.is_Integer and power > 0:
+            waves += [base] * int(power)
+        else:
+            plain.append(factor)
+    if len(waves) < 2:
+        return term
+    sums = waves[0]
+    for wave in waves[1:]:
+        sums = sp.Add(*(_product(part, wave) for part in sp.Add.make_args(sums)))
+    return sp.expand(sp.Mul(*plain) * sums)
+
+
+def _product(part: Expr, wave: Expr) -> Expr:
+    """k · wave₁ · wave₂ by the sum and difference of their angles."""
+    k, first = part.as_coeff_Mul()
+    if not isinstance(first, sp.sin | sp.cos):
+        return part * wave
+    a, b = first.args[0], wave.args[0]
+    match first, wave:
+        case sp.sin(), sp.sin():
+            pair = sp.cos(a - b) - sp.cos(a + b)
+        case sp.cos(), sp.cos():
+            pair = sp.cos(a - b) + sp.cos(a + b)
+        case sp.sin(), sp.cos():
+            pair = sp.sin(a + b) + sp.sin(a - b)
+        case _:
+            pair = sp.sin(a + b) - sp.sin(a - b)
+    return k / 2 * pair
+
+
+def over_bodies(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
+    """Coordinates, velocities and accelerations by those of the bodies: φ = ψ_B - ψ_A.
+
+    Put into an expression (`xreplace`), sums along the tree such as θ + φ become the one symbol of
+    a body, which keeps the algebra as small as the mechanism is.
+    """
+    result: dict[Expr, Expr] = {}
+    i = 0
+    for k, body in enumerate(model.bodies):
+        i += len(body.coordinates)
+        for coordinate, turning in (
+            (symbols.q, symbols.angle),
+            (symbols.v, symbols.omega),
+            (symbols.a, symbols.alpha),
+        ):
+            base = turning[body.parent] if body.parent >= 0 else sp.Integer(0)
+            result[coordinate[i - 1]] = turning[k] - base
+        if len(body.coordinates) > 1:
+            for coordinate, x, y in (
+                (symbols.q, symbols.x, symbols.y),
+                (symbols.v, symbols.xd, symbols.yd),
+                (symbols.a, symbols.xdd, symbols.ydd),
+            ):
+                result[coordinate[i - 3]], result[coordinate[i - 2]] = x[k], y[k]
+    return result
+
+
+def over_coordinates(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
+    """The way back: the bodies' angles and angular rates as sums of coordinates."""
+    result: dict[Expr, Expr] = {}
+    i = 0
+    for k, body in enumerate(model.bodies):
+        i += len(body.coordinates)
+        for coordinate, turning in (
+            (symbols.q, symbols.angle),
+            (symbols.v, symbols.omega),
+            (symbols.a, symbols.alpha),
+        ):
+            base = result[turning[body.parent]] if body.parent >= 0 else sp.Integer(0)
+            result[turning[k]] = base + coordinate[i - 1]
+        if len(body.coordinates) > 1:
+            for coordinate, x, y in (
+                (symbols.q, symbols.x, symbols.y),
+                (symbols.v, symbols.xd, symbols.yd),
+                (symbols.a, symbols.xdd, symbols.ydd),
+            ):
+                result[x[k]], result[y[k]] = coordinate[i - 3], coordinate[i - 2]
+    return result

@@ -1,0 +1,56 @@
+"""What effects share: the loads they put on free bodies, over any scalars."""
+
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from eomgen.language.formula import Formula
+
+Scalar = Any
+"""SymPy expressions, program nodes or floats; effects only add, subtract and multiply them."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """A commanded input `u` of the generated module; it is 0 unless given."""
+
+    name: str
+    unit: str
+    about: str
+
+
+@dataclass(frozen=True)
+class Load:
+    """A force and torque on one free body.
+
+    `force` in world axes (N) acts at `at`, measured from the centre of mass in body axes (m);
+    `torque` (N m) is about z. `kind` says on which side of M v̇ + V + G = F it stands.
+    """
+
+    body: str
+    force: tuple[Scalar, Scalar]
+    at: tuple[Scalar, Scalar]
+    torque: Scalar
+    kind: Literal["gravity", "applied"]
+
+
+class Mechanism(Protocol):
+    """What an effect may ask of the mechanism it acts on."""
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of all bodies."""
+
+    def mass(self, body: str) -> Scalar:
+        """Mass of a body, kg."""
+
+    def height(self, body: str) -> Scalar:
+        """World y of a body's centre of mass, m."""
+
+    def sides(self, joint: str) -> tuple[str, str]:
+        """Names of a joint's parent and child."""
+
+    def value(self, formula: Formula) -> Scalar:
+        """Value of a quantity."""
+
+    def input(self, name: str) -> Scalar:
+        """Value of an input."""

@@ -1,0 +1,46 @@
+"""A motor torque at a rotational joint."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from eomgen.effects.base import Input, Load, Mechanism, Scalar
+from eomgen.joints.base import WORLD
+from eomgen.language.base import Identifier, Table
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Quantity, quantity
+
+
+class Motor(Table):
+    """A torque τ, +τ on the joint's child and -τ on its parent (handout (35), (36)).
+
+    `torque = "input"` makes it the input `<name>`.
+    """
+
+    type: Literal["motor"]
+    name: Identifier
+    joint: Identifier = Field(description="rotational joint it drives")
+    torque: Literal["input"] | Quantity = quantity("N m", "torque", union_mode="left_to_right")
+
+    def inputs(self) -> tuple[Input, ...]:
+        """One input if the torque is one."""
+        if self.torque != "input":
+            return ()
+        return (Input(self.name, "N m", f"motor torque at {self.joint}"),)
+
+    def loads(self, mechanism: Mechanism) -> Iterator[Load]:
+        """Equal and opposite torques on the joint's two bodies; the world takes its own."""
+        zero = mechanism.value(ZERO)
+        if self.torque == "input":
+            torque = mechanism.input(self.name)
+        else:
+            torque = mechanism.value(self.torque)
+        parent, child = mechanism.sides(self.joint)
+        yield Load(child, (zero, zero), (zero, zero), torque, "applied")
+        if parent != WORLD:
+            yield Load(parent, (zero, zero), (zero, zero), -torque, "applied")
+
+    def potential_energy(self, mechanism: Mechanism) -> Scalar:
+        """None: a motor brings energy in or takes it out."""
+        return mechanism.value(ZERO)

@@ -1,0 +1,57 @@
+"""What every table of a scene shares: no unknown keys, no text taken for numbers, frozen once read."""
+
+import keyword
+import re
+from typing import Annotated, Any, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic_core import PydanticCustomError
+
+from eomgen.errors import nearest
+
+LONGEST_NAME = 40
+
+
+class Table(BaseModel):
+    """A table of the scene: unknown keys are errors, values are frozen once read."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_known_keys(cls, data: Any) -> Any:
+        if isinstance(data, dict):
+            for key in data:
+                if key not in cls.model_fields:
+                    hint = nearest(str(key), cls.model_fields)
+                    hint = hint or f"; known here: {', '.join(cls.model_fields)}"
+                    raise PydanticCustomError(
+                        "unknown_key", "unknown key{hint}", {"key": str(key), "hint": hint}
+                    )
+        return data
+
+    def replaced(self, **values: Any) -> Self:
+        """A copy with some fields replaced by values that are already of the right type."""
+        return self.model_copy(update=values)
+
+
+def _identifier(name: str) -> str:
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise ValueError("is no identifier; use letters a-z, digits and _, a letter first")
+    if keyword.iskeyword(name) or keyword.issoftkeyword(name):
+        raise ValueError("is a Python keyword; choose another name")
+    if len(name) > LONGEST_NAME:
+        raise ValueError(f"is longer than {LONGEST_NAME} characters; choose a shorter name")
+    if name.endswith("_") or "__" in name:
+        raise ValueError("ends in _ or contains __; choose another name")
+    return name
+
+
+Identifier = Annotated[str, AfterValidator(_identifier)]
+"""A name that may stand in Python, JavaScript and LaTeX alike."""
+
+Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
+"""A finite number; whole numbers are taken too, text and booleans are not."""
+
+Positive = Annotated[Number, Field(gt=0)]
+Text = Annotated[str, Field(max_length=400)]

@@ -1,0 +1,174 @@
+"""The safe expression reader: a formula of a scene becomes a small tree, and nothing is executed.
+
+Python's own parser splits the text; only the nodes, functions and names listed here pass. The tree
+is evaluated over any scalars: floats, SymPy expressions, the nodes of a program.
+"""
+
+import ast
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+LONGEST_TEXT = 500
+DEEPEST = 40
+LARGEST_POWER = 16
+FUNCTIONS = ("cos", "sin", "sqrt", "tan")
+CONSTANTS = {"pi": math.pi}
+_OPERATORS: dict[type[ast.operator], str] = {
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.Pow: "**",
+}
+
+
+class FormulaError(ValueError):
+    """A text that is no formula; says what is wrong and at which column."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number as it stands in the scene."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Name:
+    """A named parameter."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Apply:
+    """An operator (`+ - * / **`, `neg`) or function applied to formulas."""
+
+    operation: str
+    operands: tuple["Formula", ...]
+
+
+Formula = Constant | Name | Apply
+ZERO = Constant(0.0)
+
+
+class Scalars(Protocol):
+    """What a formula needs of the scalars it is evaluated over, besides + - * / and unary minus."""
+
+    def number(self, value: float) -> Any:
+        """The scalar that stands for a float."""
+
+    def call(self, function: str, argument: Any) -> Any:
+        """One of `FUNCTIONS` of a scalar."""
+
+
+class Floats:
+    """Plain floats as scalars."""
+
+    def number(self, value: float) -> float:
+        """Return the value itself."""
+        return value
+
+    def call(self, function: str, argument: float) -> float:
+        """Return the function's value, by `math`."""
+        return float(getattr(math, function)(argument))
+
+
+def parse(text: str) -> Formula:
+    """Read a formula: numbers, names, `+ - * / **` (small whole powers), sin, cos, tan, sqrt, pi.
+
+    Raises `FormulaError`, naming the column, for anything else.
+    """
+    if len(text) > LONGEST_TEXT:
+        raise FormulaError(f"is longer than {LONGEST_TEXT} characters")
+    if not text.isascii():
+        column = next(i for i, c in enumerate(text) if not c.isascii()) + 1
+        raise FormulaError(f"has a character at column {column} that is not plain ASCII")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise FormulaError("is no formula; write for example '2*m_A' or 'l_A/2'") from None
+    return _read(tree.body, 0)
+
+
+def _read(node: ast.expr, depth: int) -> Formula:
+    at = f"at column {node.col_offset + 1}"
+    if depth > DEEPEST:
+        raise FormulaError(f"is nested deeper than {DEEPEST}")
+    match node:
+        case ast.Constant(value=bool()):
+            raise FormulaError(f"has a truth value {at} where a number is wanted")
+        case ast.Constant(value=int() | float() as value):
+            try:
+                number = float(value)
+            except OverflowError:
+                number = math.inf
+            if not math.isfinite(number):
+                raise FormulaError(f"has a number {at} that is not finite")
+            return Constant(number)
+        case ast.Name(id=name):
+            return Constant(CONSTANTS[name]) if name in CONSTANTS else Name(name)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            inner = _read(operand, depth + 1)
+            return Constant(-inner.value) if isinstance(inner, Constant) else Apply("neg", (inner,))
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return _read(operand, depth + 1)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+            operands = (_read(left, depth + 1), _read(right, depth + 1))
+            if isinstance(op, ast.Pow) and not _small_whole(operands[1]):
+                raise FormulaError(f"has a power {at} that is not a whole number 0 to {LARGEST_POWER}")
+            return Apply(_OPERATORS[type(op)], operands)
+        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
+            return Apply(name, (_read(argument, depth + 1),))
+        case _:
+            raise FormulaError(f"has something {at} that no formula may hold")
+
+
+def _small_whole(power: Formula) -> bool:
+    return (
+        isinstance(power, Constant)
+        and power.value.is_integer()
+        and 0 <= power.value <= LARGEST_POWER
+    )
+
+
+def names_in(formula: Formula) -> Iterator[str]:
+    """The names a formula uses, in order of appearance, repeats included."""
+    match formula:
+        case Name(name):
+            yield name
+        case Apply(_, operands):
+            for operand in operands:
+                yield from names_in(operand)
+
+
+def evaluate(formula: Formula, names: Mapping[str, Any], scalars: Scalars) -> Any:
+    """The value of a formula over the given scalars. Raises `KeyError` for a name not in `names`."""
+    match formula:
+        case Constant(value):
+            return scalars.number(value)
+        case Name(name):
+            return names[name]
+        case Apply(operation, operands):
+            values = [evaluate(operand, names, scalars) for operand in operands]
+            if operation == "**":
+                power = operands[1]
+                assert isinstance(power, Constant)
+                result = scalars.number(1.0)
+                for _ in range(int(power.value)):
+                    result = result * values[0]
+                return result
+            if operation in _ARITHMETIC:
+                return _ARITHMETIC[operation](*values)
+            return scalars.call(operation, values[0])
+
+
+_ARITHMETIC: dict[str, Callable[..., Any]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": lambda a, b: a / b,
+    "neg": lambda a: -a,
+}

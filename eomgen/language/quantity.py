@@ -1,0 +1,129 @@
+"""Quantities: numbers of a scene that stay symbolic in the generated module.
+
+A bare number is the default of a parameter that is named after its place; a text is a formula over
+the scene's `[parameters]`; a bare 0 is structure: it is folded away and is no parameter.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainValidator, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from eomgen.errors import SceneError, nearest
+from eomgen.language.base import Table
+from eomgen.language.formula import (
+    CONSTANTS,
+    FUNCTIONS,
+    Constant,
+    Floats,
+    Formula,
+    FormulaError,
+    Name,
+    evaluate,
+    names_in,
+    parse,
+)
+
+
+def _read_quantity(value: Any) -> Formula:
+    if isinstance(value, Formula):
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise PydanticCustomError("quantity", "is neither a number nor a formula")
+    if isinstance(value, str):
+        try:
+            return parse(value)
+        except FormulaError as error:
+            raise PydanticCustomError("quantity", "{why}", {"why": str(error)}) from None
+    if not math.isfinite(value):
+        raise PydanticCustomError("quantity", "is not a finite number")
+    return Constant(float(value))
+
+
+Quantity = Annotated[
+    Formula,
+    PlainValidator(_read_quantity),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number"}, {"type": "string"}], "description": "number or formula"}
+    ),
+]
+Vector = tuple[Quantity, Quantity]
+Bound = Literal["any", "positive", "nonnegative"]
+
+
+def quantity(unit: str, about: str, bound: Bound = "any", **options: Any) -> Any:
+    """A field that holds a quantity: its unit, what it is, and the bound its value keeps."""
+    return Field(description=about, json_schema_extra={"unit": unit, "bound": bound}, **options)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A named number of the generated module."""
+
+    name: str
+    default: float
+    unit: str
+    about: str
+
+
+def name_quantities(
+    table: Table, prefix: str, place: str, known: Mapping[str, float]
+) -> tuple[dict[str, Any], list[Parameter]]:
+    """Give every bare nonzero number among a table's quantities a name.
+
+    Returns the replaced fields (for `Table.replaced`) and the new parameters. `known` holds the
+    values of the scene's own parameters. Raises `SceneError` for a name that is not there and for a
+    value outside the field's bound.
+    """
+    fields: dict[str, Any] = {}
+    parameters: list[Parameter] = []
+    for field, info in type(table).model_fields.items():
+        extra = info.json_schema_extra
+        if not isinstance(extra, dict) or "unit" not in extra:
+            continue
+        value = getattr(table, field)
+        named = []
+        for formula, suffix, spot in _parts(value, field):
+            where = f"{place}.{spot}"
+            _check(formula, where, str(extra["bound"]), str(extra["unit"]), known)
+            if isinstance(formula, Constant) and formula.value != 0.0:
+                about = f"{info.description} of {prefix}{suffix.replace('_', ', ')}"
+                name = f"{prefix}_{field}{suffix}"
+                parameters.append(Parameter(name, formula.value, str(extra["unit"]), about))
+                named.append(Name(name))
+            else:
+                named.append(formula)
+        if isinstance(value, tuple):
+            fields[field] = tuple(named)
+        elif named:
+            fields[field] = named[0]
+    return fields, parameters
+
+
+def _parts(value: Any, field: str) -> Iterator[tuple[Formula, str, str]]:
+    if isinstance(value, Formula):
+        yield value, "", field
+    elif isinstance(value, tuple):
+        for i, (part, axis) in enumerate(zip(value, ("_x", "_y"), strict=True)):
+            yield part, axis, f"{field}[{i}]"
+
+
+def _check(formula: Formula, where: str, bound: str, unit: str, known: Mapping[str, float]) -> None:
+    for name in names_in(formula):
+        if name not in known:
+            words = [*known, *FUNCTIONS, *CONSTANTS]
+            hint = nearest(name, words) or "; give it a value in [parameters]"
+            raise SceneError(f"{where}: unknown parameter '{name}'{hint}")
+    try:
+        value = evaluate(formula, known, Floats())
+    except (ArithmeticError, ValueError):
+        value = math.nan
+    if not math.isfinite(value):
+        raise SceneError(f"{where}: its value is not a finite number; change its parameters")
+    if bound == "positive" and not value > 0:
+        raise SceneError(f"{where}: {value:g} is not positive; give a number > 0 in {unit}")
+    if bound == "nonnegative" and value < 0:
+        raise SceneError(f"{where}: {value:g} is negative; give a number >= 0 in {unit}")

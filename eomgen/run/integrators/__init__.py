@@ -1,0 +1,43 @@
+"""The integrators by name."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from scipy.integrate import BDF, DOP853, LSODA, RK45, Radau
+
+from eomgen.errors import RunError, nearest
+from eomgen.run.integrators import euler, implicit_midpoint, runge_kutta_4, semi_implicit_euler
+from eomgen.run.integrators.interface import Adaptive, FixedStep, StepFailure
+
+__all__ = ["INTEGRATORS", "Adaptive", "FixedStep", "StepFailure", "find_integrator"]
+
+_SHORTER = "take a smaller --dt, or an implicit or adaptive method (--integrator Radau)"
+_LOOSER = "try another --integrator, or a looser --rtol and --atol"
+
+INTEGRATORS: Mapping[str, FixedStep | Adaptive] = MappingProxyType(
+    {
+        "euler": FixedStep(euler.step, euler.ORDER, _SHORTER),
+        "semi_implicit_euler": FixedStep(
+            semi_implicit_euler.step, semi_implicit_euler.ORDER, _SHORTER
+        ),
+        "rk4": FixedStep(runge_kutta_4.step, runge_kutta_4.ORDER, _SHORTER),
+        "implicit_midpoint": FixedStep(
+            implicit_midpoint.step, implicit_midpoint.ORDER, implicit_midpoint.REMEDY
+        ),
+        "RK45": Adaptive(RK45, uses_jacobian=False, remedy=_LOOSER),
+        "DOP853": Adaptive(DOP853, uses_jacobian=False, remedy=_LOOSER),
+        "Radau": Adaptive(Radau, uses_jacobian=True, remedy=_LOOSER),
+        "BDF": Adaptive(BDF, uses_jacobian=True, remedy=_LOOSER),
+        "LSODA": Adaptive(LSODA, uses_jacobian=True, remedy=_LOOSER),
+    }
+)
+
+
+def find_integrator(name: str) -> FixedStep | Adaptive:
+    """Return the integrator called exactly `name`; raises `RunError` if there is none."""
+    if name not in INTEGRATORS:
+        raise RunError(
+            f"integrator: unknown name '{name}'{nearest(name, INTEGRATORS)}; "
+            f"known: {', '.join(INTEGRATORS)}"
+        )
+    return INTEGRATORS[name]

@@ -1,0 +1,59 @@
+"""SciPy's adaptive methods, one step at a time, with the problem's exact Jacobian.
+
+RK45 and DOP853 are explicit (Dormand, Prince), Radau is Radau IIA of order 5, BDF and LSODA are
+multistep methods, LSODA switching between stiff and nonstiff by itself (Hindmarsh, Petzold).
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from eomgen.run.integrators.interface import Adaptive, Advance, StepFailure
+from eomgen.run.problem import Problem
+
+_STALLED = 100
+
+
+def advances(
+    method: Adaptive,
+    problem: Problem,
+    t_start: float,
+    t_end: float,
+    *,
+    rtol: float,
+    atol: float,
+    samples: int,
+    max_steps: int,
+) -> Iterator[Advance]:
+    """Yield the steps of `method`, with those of `samples` equally spaced times that each spans.
+
+    Between steps the method's own dense output is used, which is of its accuracy. The sample at
+    `t_start` is the caller's. Raises `StepFailure` if the method gives up, or after `max_steps`.
+    """
+    jacobian = {"jac": problem.jacobian} if method.uses_jacobian else {}
+    # A copy, since LSODA overwrites the state it is given.
+    start = problem.initial.copy()
+    solver = method.solver(
+        problem.derivative, t_start, start, t_end, rtol=rtol, atol=atol, **jacobian
+    )
+    times = np.linspace(t_start, t_end, samples)
+    sampled, stalled = 1, 0
+    for _ in range(max_steps):
+        complaint = solver.step()
+        if solver.status == "failed":
+            cause = (complaint or "the method gave up").rstrip(".")
+            raise StepFailure(f"{cause}; {method.remedy}")
+        t, y = float(solver.t), solver.y.copy()
+        # LSODA steps on and on where t + h rounds to t; the others notice by themselves. Far from
+        # zero its first few steps may do so and still grow.
+        stalled = 0 if t > solver.t_old else stalled + 1
+        if stalled == _STALLED:
+            raise StepFailure(f"the steps have shrunk to nothing; {method.remedy}")
+        passed = int(np.searchsorted(times, t, side="right"))
+        within = times[sampled:passed]
+        states = solver.dense_output()(within).T if within.size else ()
+        yield Advance(t, y, list(zip(within.tolist(), states, strict=True)))
+        sampled = passed
+        if solver.status == "finished":
+            return
+    raise StepFailure(f"{max_steps} steps did not suffice; {method.remedy}")

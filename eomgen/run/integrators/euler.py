@@ -1,0 +1,13 @@
+"""Euler's method: y_new = y + h f(t, y), explicit, order 1.
+
+Here as the yardstick: it feeds energy into every oscillation, at a rate proportional to h.
+"""
+
+from eomgen.run.problem import Floats, Problem
+
+ORDER = 1
+
+
+def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+    """Return y(t + h), shape (ny,). Hairer, Norsett, Wanner, Solving ODEs I, section I.7."""
+    return y + h * problem.derivative(t, y)

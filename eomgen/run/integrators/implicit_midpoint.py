@@ -1,0 +1,51 @@
+"""The implicit midpoint rule: order 2, A-stable, symplectic, time-reversible.
+
+It conserves every quadratic invariant (Hairer, Lubich, Wanner, Geometric Numerical
+Integration, theorem IV.2.1), but only as well as its equation is solved: hence Newton's method
+on the exact Jacobian, down to roundoff.
+"""
+
+import numpy as np
+
+from eomgen.run.integrators.interface import StepFailure
+from eomgen.run.problem import Floats, Problem
+
+ORDER = 2
+MAX_ITERATIONS = 20
+REMEDY = "take a smaller --dt or an adaptive method (--integrator Radau)"
+
+_ROUNDOFF = 4 * np.finfo(np.float64).eps
+# Updates that stop shrinking below this fraction of the state are the derivative's own rounding
+# noise: nothing is gained by iterating on. Above it, they are a method that does not converge.
+_NOISE = 1e-10
+
+
+def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+    """Return y(t + h), shape (ny,), from d = h f(t + h/2, y + d/2), y(t + h) = y + d.
+
+    Newton's method starts at d = 0, which, unlike an explicit predictor, does no harm on stiff
+    problems. Raises `StepFailure` if it does not converge.
+    """
+    middle = t + h / 2
+    identity = np.eye(len(y))
+    change = np.zeros_like(y)
+    previous = np.inf
+    for _ in range(MAX_ITERATIONS):
+        midpoint = y + change / 2
+        residual = change - h * problem.derivative(middle, midpoint)
+        matrix = identity - h / 2 * problem.jacobian(middle, midpoint)
+        try:
+            update = np.linalg.solve(matrix, -residual)
+        except np.linalg.LinAlgError:
+            raise StepFailure(f"Newton's matrix is singular; {REMEDY}") from None
+        change = change + update
+        size = np.max(np.abs(update))
+        if not np.isfinite(size):
+            raise StepFailure(f"Newton left the finite numbers; {REMEDY}")
+        scale = np.abs(y) + np.abs(change)
+        converged = np.all(np.abs(update) <= _ROUNDOFF * scale)
+        stagnant = size >= previous / 2 and size <= _NOISE * np.max(scale)
+        if converged or stagnant:
+            return y + change
+        previous = size
+    raise StepFailure(f"Newton did not converge in {MAX_ITERATIONS} iterations; {REMEDY}")

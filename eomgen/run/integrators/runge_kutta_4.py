@@ -1,0 +1,23 @@
+"""The classical Runge-Kutta method: explicit, four stages, order 4."""
+
+from eomgen.run.integrators.tableau import ButcherTableau
+from eomgen.run.problem import Floats, Problem
+
+# Hairer, Norsett, Wanner, Solving ODEs I, table II.1.2.
+TABLEAU = ButcherTableau(
+    a=(
+        (0, 0, 0, 0),
+        (1 / 2, 0, 0, 0),
+        (0, 1 / 2, 0, 0),
+        (0, 0, 1, 0),
+    ),
+    b=(1 / 6, 1 / 3, 1 / 3, 1 / 6),
+    c=(0, 1 / 2, 1 / 2, 1),
+    order=4,
+)
+ORDER = TABLEAU.order
+
+
+def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+    """Return y(t + h), shape (ny,)."""
+    return TABLEAU.step(problem.derivative, t, y, h)

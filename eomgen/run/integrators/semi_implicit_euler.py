@@ -1,0 +1,22 @@
+"""Semi-implicit (symplectic) Euler: kick the velocities, then drift with the new ones, order 1.
+
+Symplectic, hence without energy drift, where the energy separates into T(v) + V(q). With a
+mass matrix that depends on q it is an explicit first-order method and promises nothing more.
+"""
+
+from eomgen.run.problem import Floats, Problem
+
+ORDER = 1
+
+
+def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+    """Return y(t + h), shape (ny,). Hairer, Lubich, Wanner, Geometric Numerical Integration,
+    section VI.3, written with the derivative alone so that it serves every form of the state:
+    the drift is the position part of f at (old positions, new velocities).
+    """
+    positions = list(problem.positions)
+    kicked = y + h * problem.derivative(t, y)
+    kicked[positions] = y[positions]
+    drift = problem.derivative(t, kicked)[positions]
+    kicked[positions] += h * drift
+    return kicked

@@ -1,0 +1,50 @@
+"""What an integrator needs to know of a mechanism: its derivative, its Jacobian, its start."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.errors import RunError
+
+Floats = NDArray[np.float64]
+"""An array of 64-bit floats; every state vector is one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """The initial-value problem y' = f(t, y), y(t_start) = initial.
+
+    name        what messages and files call it
+    states      names of the ny states, in order
+    positions   indices of the states that are positions; the others, velocities, momenta and
+                the states of controllers, are what a force changes
+    derivative  f(t, y) -> (ny,), in SI units per second
+    jacobian    df/dy(t, y) -> (ny, ny), exact
+    initial     (ny,), kept as a read-only copy
+
+    Raises `RunError` if `initial` has not one finite number per state.
+    """
+
+    name: str
+    states: tuple[str, ...]
+    positions: tuple[int, ...]
+    derivative: Callable[[float, Floats], Floats]
+    jacobian: Callable[[float, Floats], Floats]
+    initial: Floats
+
+    def __post_init__(self) -> None:
+        initial = np.array(self.initial, dtype=np.float64)
+        if initial.shape != (len(self.states),):
+            raise RunError(
+                f"initial: has shape {initial.shape}, but {self.name} has "
+                f"{len(self.states)} states; give one number for each"
+            )
+        for state, value in zip(self.states, initial.tolist(), strict=True):
+            if not np.isfinite(value):
+                raise RunError(f"initial: {state} = {value} is not finite")
+        assert len(set(self.positions)) == len(self.positions)
+        assert all(0 <= index < len(self.states) for index in self.positions)
+        initial.flags.writeable = False
+        object.__setattr__(self, "initial", initial)

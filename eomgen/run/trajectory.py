@@ -1,0 +1,130 @@
+"""What a run leaves behind, and the files it is kept in."""
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from eomgen.errors import RunError
+from eomgen.files import MARK, MARK_WITHIN, write_whole
+from eomgen.run.problem import Floats
+
+FORMAT = "trajectory 1"
+COUNTS = ("steps", "derivatives", "jacobians")
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """The states of a mechanism at n times; arrays are read-only copies, in SI units.
+
+    name, states  of the problem that was integrated
+    t             (n,), n >= 1, in s, never decreasing
+    y             (n, ny), one row of finite numbers per time
+    integrator    the method that made it
+    finished      whether it reached the end time
+    message       why not, and what to change; "" if there is nothing to say
+    counts        how many `steps` were made and `derivatives` and `jacobians` evaluated
+
+    Raises `ValueError` if these do not fit together.
+    """
+
+    name: str
+    states: tuple[str, ...]
+    t: Floats
+    y: Floats
+    integrator: str
+    finished: bool
+    message: str
+    counts: Mapping[str, int]
+
+    def __post_init__(self) -> None:
+        t, y = np.array(self.t, dtype=np.float64), np.array(self.y, dtype=np.float64)
+        if t.ndim != 1 or not t.size:
+            raise ValueError(f"trajectory: t has shape {t.shape}, not (n,) with n >= 1")
+        if y.shape != (t.size, len(self.states)):
+            raise ValueError(f"trajectory: y has shape {y.shape}, not {(t.size, len(self.states))}")
+        if not (np.isfinite(t).all() and np.isfinite(y).all()):
+            raise ValueError("trajectory: t or y is not finite")
+        if np.any(np.diff(t) < 0):
+            raise ValueError("trajectory: t decreases")
+        if set(self.counts) != set(COUNTS):
+            raise ValueError(f"trajectory: counts are {sorted(self.counts)}, not {COUNTS}")
+        for array in (t, y):
+            array.flags.writeable = False
+        object.__setattr__(self, "t", t)
+        object.__setattr__(self, "y", y)
+        object.__setattr__(self, "counts", {key: int(self.counts[key]) for key in COUNTS})
+
+
+def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
+    """Write `trajectory` as NumPy's .npz, the same bytes for the same trajectory.
+
+    Raises `RunError` if `path` cannot be written or holds a foreign file (then give `force`).
+    """
+    buffer = io.BytesIO()
+    # Members keep this order: `eomgen` comes first, where it marks the file as ours.
+    np.savez(
+        buffer,
+        eomgen=np.array(FORMAT),
+        t=trajectory.t,
+        y=trajectory.y,
+        states=np.array(trajectory.states, dtype=np.str_),
+        name=np.array(trajectory.name),
+        integrator=np.array(trajectory.integrator),
+        finished=np.array(trajectory.finished),
+        message=np.array(trajectory.message),
+        counts=np.array([trajectory.counts[key] for key in COUNTS], dtype=np.int64),
+    )
+    write_whole(path, buffer.getvalue(), force=force)
+
+
+def load_npz(path: Path) -> Trajectory:
+    """Return the trajectory that `save_npz` wrote; runs no code that the file may hold.
+
+    Raises `RunError` if the file is missing, not a trajectory of ours, or damaged.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RunError(f"{path}: cannot be read: {error.strerror}") from None
+    if MARK not in data[:MARK_WITHIN]:
+        raise RunError(f"{path}: is no trajectory written by eomgen")
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as members:
+            form = str(members["eomgen"])
+            if form == FORMAT:
+                return Trajectory(
+                    name=str(members["name"]),
+                    states=tuple(members["states"].tolist()),
+                    t=members["t"],
+                    y=members["y"],
+                    integrator=str(members["integrator"]),
+                    finished=bool(members["finished"]),
+                    message=str(members["message"]),
+                    counts=dict(zip(COUNTS, members["counts"].tolist(), strict=True)),
+                )
+    # What a broken archive makes zipfile and NumPy raise has no common base.
+    except Exception as error:
+        text = " ".join(str(error).split())
+        raise RunError(f"{path}: is damaged ({text}); simulate again") from None
+    raise RunError(f"{path}: is in format '{form}', but this eomgen reads '{FORMAT}'")
+
+
+def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
+    """Write `trajectory` as a table: a comment line, the header, one row of t and y per time.
+
+    Numbers are the shortest that read back exactly; `np.loadtxt(path, delimiter=",",
+    skiprows=2)` loads them. Raises `RunError` as `save_npz` does.
+    """
+    comment = f"# eomgen trajectory of {trajectory.name}, integrator {trajectory.integrator}"
+    if not trajectory.finished:
+        comment += f", unfinished: {trajectory.message}"
+    buffer = io.StringIO()
+    buffer.write(" ".join(comment.split()) + "\n")
+    table = csv.writer(buffer, lineterminator="\n")
+    table.writerow(["t", *trajectory.states])
+    table.writerows(np.column_stack([trajectory.t, trajectory.y]).tolist())
+    write_whole(path, buffer.getvalue(), force=force)

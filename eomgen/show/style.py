@@ -1,0 +1,121 @@
+"""How every figure looks and is written: the same letters, colours and bytes on every machine."""
+
+import io
+import re
+import warnings
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import matplotlib
+import matplotlib.style
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from eomgen.errors import RunError
+from eomgen.files import check_writable, write_whole
+
+# Paul Tol's bright scheme: told apart by colour-blind eyes too, and in grey by most.
+PALETTE = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee")
+INK, FAINT, ALARM = "#222222", "#666666", "#a02c1c"
+
+STYLE = {
+    "font.family": ["DejaVu Sans"],  # comes with Matplotlib: the same letters on every machine
+    "font.size": 9.5,
+    "mathtext.fontset": "dejavusans",
+    "text.color": INK,
+    "axes.edgecolor": "#999999",
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.titlesize": 10.5,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.7,
+    "lines.linewidth": 1.4,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.major.size": 0,
+    "ytick.major.size": 0,
+    "ytick.minor.size": 0,
+    "legend.frameon": False,
+    "legend.handlelength": 1.2,
+    "savefig.dpi": 150,
+}
+
+# No PDF: Matplotlib writes its metadata last, too late for the mark that `files` looks for.
+METADATA = {".png": {"Software": "eomgen"}, ".svg": {"Creator": "eomgen", "Date": None}}
+
+
+def style() -> AbstractContextManager[None]:
+    """Our looks over Matplotlib's own defaults, whatever the user's settings; undone on leaving."""
+    return matplotlib.style.context(["default", STYLE])
+
+
+def check_figure(path: Path, *, force: bool = False) -> None:
+    """Raise `RunError` if `path` has no suffix we draw, or may not be written."""
+    if path.suffix.lower() not in METADATA:
+        raise RunError(f"{path}: a figure is written as .png or .svg; '{path.suffix}' is neither")
+    check_writable(path, force=force)
+
+
+def write_figure(figure: Figure, path: Path, *, force: bool = False) -> None:
+    """Write `figure` whole to `path`; raises `RunError` as `check_figure` and `write_whole` do."""
+    check_figure(path, force=force)
+    suffix = path.suffix.lower()
+    buffer = io.BytesIO()
+    # Ids within an SVG are random unless salted, and a style may not hold the salt.
+    with style(), matplotlib.rc_context({"svg.hashsalt": "eomgen"}), warnings.catch_warnings():
+        # A title in a script that the font lacks shows boxes; the figure is worth having still.
+        warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from font")
+        figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
+    write_whole(path, buffer.getvalue(), force=force)
+
+
+def colours(count: int) -> list[str]:
+    """Return `count` colours: of the palette if it has as many, else a ramp in their order."""
+    if count <= len(PALETTE):
+        return list(PALETTE[:count])
+    return [to_hex(colour) for colour in colormaps["viridis"](np.linspace(0.0, 0.92, count))]
+
+
+GREEK = re.compile(
+    "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|iota|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|"
+    "upsilon|phi|chi|psi|omega|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Upsilon|Phi|Psi|Omega"
+)
+
+
+def symbol(name: str) -> str:
+    r"""Return `name` as mathtext: `phi_dot` as $\dot{\phi}$, `x_A` as $x_{A}$, `q1` as $q_{1}$.
+
+    What is no identifier comes back as plain text with its dollar signs escaped.
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        return plain(name)
+    head, *subscripts = [part for part in name.split("_") if part]
+    accents = [part for part in subscripts[-1:] if part in ("dot", "ddot")]
+    subscripts = subscripts[: len(subscripts) - len(accents)]
+    split = re.fullmatch(r"([A-Za-z]+)(\d+)", head)
+    if split:
+        head, subscripts = split[1], [split[2], *subscripts]
+    text = _letters(head)
+    for accent in accents:
+        text = rf"\{accent}{{{text}}}"
+    if subscripts:
+        text += "_{" + ",".join(map(_letters, subscripts)) + "}"
+    return f"${text}$"
+
+
+def _letters(word: str) -> str:
+    if GREEK.fullmatch(word):
+        return rf"\{word}"
+    return word if len(word) == 1 or word.isdigit() else rf"\mathrm{{{word}}}"
+
+
+def plain(text: str) -> str:
+    """`text` for Matplotlib to show as it is, never as mathtext."""
+    return text.replace("$", r"\$")

@@ -1,0 +1,58 @@
+"""Templates: where they are, and how one is filled with no name missing and none left over."""
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, meta
+
+PACKAGE = Path(__file__).resolve().parent
+
+
+def templates_folder() -> Path:
+    """The folder of all templates: inside an installed package, beside it in a checkout."""
+    inside = PACKAGE / "templates"
+    return inside if inside.is_dir() else PACKAGE.parent / "templates"
+
+
+@cache
+def environment(folder: str, *, html: bool = False) -> Environment:
+    """The Jinja2 environment of the templates in `folder`; `html` escapes every value put in."""
+    return Environment(
+        loader=FileSystemLoader(templates_folder() / folder),
+        undefined=StrictUndefined,
+        autoescape=html,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def render(folder: str, template: str, context: Mapping[str, object], *, html: bool = False) -> str:
+    """Render `template` of `folder` with exactly the values it asks for.
+
+    Raises `AssertionError` if `context` lacks a name that the template or a file it includes reads,
+    or has one that none of them does: then the program and its template no longer fit, which is a
+    fault of this program and never of its user.
+    """
+    surroundings = environment(folder, html=html)
+    wanted = _names_read(surroundings, template)
+    missing, surplus = wanted - context.keys(), context.keys() - wanted
+    if missing or surplus:
+        raise AssertionError(
+            f"template {folder}/{template} and its context differ: "
+            f"missing {sorted(missing)}, surplus {sorted(surplus)}"
+        )
+    return surroundings.get_template(template).render(context)
+
+
+def _names_read(surroundings: Environment, template: str) -> set[str]:
+    """Names that `template` and whatever it includes read from the context."""
+    assert surroundings.loader is not None
+    source, _, _ = surroundings.loader.get_source(surroundings, template)
+    tree = surroundings.parse(source)
+    names = meta.find_undeclared_variables(tree)
+    for other in meta.find_referenced_templates(tree):
+        assert other is not None, f"{template} chooses what it includes only when it runs"
+        names |= _names_read(surroundings, other)
+    return names

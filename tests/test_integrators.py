@@ -1,0 +1,539 @@
+"""Integrators against exact solutions, invariants, and everything that can go wrong in a run."""
+
+import io
+import math
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipj, ellipk
+
+from eomgen.errors import RunError
+from eomgen.run.integrate import integrate
+from eomgen.run.integrators import INTEGRATORS, FixedStep, StepFailure, implicit_midpoint
+from eomgen.run.integrators.runge_kutta_4 import TABLEAU
+from eomgen.run.integrators.tableau import ButcherTableau
+from eomgen.run.problem import Problem
+from eomgen.run.progress import terminal_progress
+
+FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
+ADAPTIVE = [name for name in INTEGRATORS if name not in FIXED]
+ALL = [*FIXED, *ADAPTIVE]
+
+PENDULUM = Problem(
+    name="pendulum",
+    states=("angle", "rate"),
+    positions=(0,),
+    derivative=lambda t, y: np.array([y[1], -math.sin(y[0])]),
+    jacobian=lambda t, y: np.array([[0.0, 1.0], [-math.cos(y[0]), 0.0]]),
+    initial=np.array([1.2, 0.0]),
+)
+# The order of the states is nobody's business: velocity first here.
+OSCILLATOR = Problem(
+    name="oscillator",
+    states=("rate", "place"),
+    positions=(1,),
+    derivative=lambda t, y: np.array([-4 * y[1], y[0]]),
+    jacobian=lambda t, y: np.array([[0.0, -4.0], [1.0, 0.0]]),
+    initial=np.array([0.3, 1.0]),
+)
+INERTIA = np.array([1.0, 2.0, 3.0])
+GYRATION = np.array([-1.0, 1.0, -1 / 3])  # (I2 - I3) / I1 and so on, Euler's equations
+SPINNING_BODY = Problem(
+    name="spinning body",
+    states=("wx", "wy", "wz"),
+    positions=(),
+    derivative=lambda t, w: GYRATION * np.array([w[1] * w[2], w[2] * w[0], w[0] * w[1]]),
+    jacobian=lambda t, w: (
+        GYRATION[:, None] * np.array([[0, w[2], w[1]], [w[2], 0, w[0]], [w[1], w[0], 0]])
+    ),
+    initial=np.array([0.1, 2.0, 0.2]),
+)
+BLOW_UP = Problem(
+    name="blow-up",
+    states=("size",),
+    positions=(),
+    derivative=lambda t, y: y * y,
+    jacobian=lambda t, y: np.diag(2 * y),
+    initial=np.array([1.0]),
+)
+
+
+def stiff(rate):
+    return Problem(
+        name="stiff",
+        states=("x",),
+        positions=(),
+        derivative=lambda t, y: rate * y,
+        jacobian=lambda t, y: np.array([[rate]]),
+        initial=np.array([1.0]),
+    )
+
+
+def exact_pendulum(t):
+    """The pendulum released at rest, by Jacobi's elliptic functions."""
+    k = math.sin(PENDULUM.initial[0] / 2)
+    sn, cn, _, _ = ellipj(ellipk(k * k) - t, k * k)
+    return np.column_stack([2 * np.arcsin(k * sn), -2 * k * cn])
+
+
+def run(problem, integrator, t_end, dt=0.01, **options):
+    step = {"dt": dt} if integrator in FIXED else {}
+    return integrate(problem, integrator, t_end, **step, **options)
+
+
+def pendulum_energy(y):
+    return y[:, 1] ** 2 / 2 - np.cos(y[:, 0])
+
+
+# --- accuracy -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_order_is_the_stated_one(name):
+    t_end = 2.0
+    steps = np.array([40, 80, 160, 320]) * (1 if INTEGRATORS[name].order > 1 else 8)
+    errors = [
+        np.linalg.norm(run(PENDULUM, name, t_end, dt=t_end / n).y[-1] - exact_pendulum(t_end))
+        for n in steps
+    ]
+    order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert order == pytest.approx(INTEGRATORS[name].order, abs=0.1)
+
+
+def test_orders_are_the_textbook_ones():
+    assert {name: INTEGRATORS[name].order for name in FIXED} == {
+        "euler": 1,
+        "semi_implicit_euler": 1,
+        "rk4": 4,
+        "implicit_midpoint": 2,
+    }
+
+
+@pytest.mark.parametrize("name", ADAPTIVE)
+def test_adaptive_method_meets_its_tolerance(name):
+    errors = {}
+    for rtol in (1e-6, 1e-9):
+        trajectory = integrate(PENDULUM, name, 10.0, rtol=rtol, atol=rtol, samples=501)
+        assert trajectory.finished
+        assert trajectory.message == ""
+        assert trajectory.t == pytest.approx(np.linspace(0, 10, 501), abs=0)
+        # Dense output between the steps included; local errors add up over the run.
+        errors[rtol] = np.max(np.abs(trajectory.y - exact_pendulum(trajectory.t)))
+        assert errors[rtol] < 100 * rtol
+    assert errors[1e-9] < errors[1e-6] / 30
+
+
+@pytest.mark.parametrize("name", ["Radau", "BDF"])
+def test_the_jacobian_saves_derivative_calls(name):
+    calls = 0
+
+    def derivative(t, y):
+        nonlocal calls
+        calls += 1
+        return van_der_pol.derivative(t, y)
+
+    mu = 50.0
+    van_der_pol = Problem(
+        name="van der Pol",
+        states=("x", "v"),
+        positions=(0,),
+        derivative=lambda t, y: np.array([y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]]),
+        jacobian=lambda t, y: np.array([[0, 1], [-2 * mu * y[0] * y[1] - 1, mu * (1 - y[0] ** 2)]]),
+        initial=np.array([2.0, 0.0]),
+    )
+    trajectory = integrate(van_der_pol, name, 100.0, rtol=1e-5, atol=1e-7)
+    without = solve_ivp(
+        derivative, (0, 100), van_der_pol.initial, method=name, rtol=1e-5, atol=1e-7
+    )
+    assert trajectory.y[-1] == pytest.approx(without.y[:, -1], rel=1e-2)
+    assert trajectory.counts["jacobians"] > 10
+    assert trajectory.counts["derivatives"] < calls
+
+
+def test_the_jacobian_reaches_lsoda():
+    trajectory = integrate(stiff(-1e6), "LSODA", 10.0)
+    assert trajectory.finished
+    assert trajectory.counts["jacobians"] > 0
+
+
+# --- invariants ---------------------------------------------------------------------------------
+
+
+def test_implicit_midpoint_runs_backwards():
+    h, y = 0.1, PENDULUM.initial
+    for i in range(200):
+        y = implicit_midpoint.step(PENDULUM, i * h, y, h)
+    assert np.abs(y - PENDULUM.initial).max() > 0.1
+    for i in range(200, 0, -1):
+        y = implicit_midpoint.step(PENDULUM, i * h, y, -h)
+    assert y == pytest.approx(PENDULUM.initial, abs=1e-13)
+
+
+@pytest.mark.parametrize("name", ["semi_implicit_euler", "implicit_midpoint"])
+def test_symplectic_energy_is_bounded_without_trend(name):
+    trajectory = run(PENDULUM, name, 200.0, dt=0.05)
+    error = pendulum_energy(trajectory.y) - pendulum_energy(trajectory.y)[0]
+    drift = np.polyfit(trajectory.t, error, 1)[0] * trajectory.t[-1]
+    assert 0 < np.max(np.abs(error)) < 0.03
+    assert abs(drift) < np.max(np.abs(error)) / 20
+
+
+def test_euler_gains_energy():
+    energy = pendulum_energy(run(PENDULUM, "euler", 20.0, dt=0.01).y)
+    assert np.all(np.diff(energy[::100]) > 0)
+    assert energy[-1] - energy[0] > 0.05
+
+
+def test_implicit_midpoint_conserves_quadratic_invariants():
+    oscillator = run(OSCILLATOR, "implicit_midpoint", 100.0, dt=0.1)
+    energy = oscillator.y**2 @ [1, 4]
+    assert energy == pytest.approx(energy[0], rel=1e-13)
+
+    body = run(SPINNING_BODY, "implicit_midpoint", 50.0, dt=0.05)
+    assert np.ptp(np.sign(body.y[:, 1])) == 2, "it should tumble about its middle axis"
+    for weights in (INERTIA, INERTIA**2):  # twice the energy, and |angular momentum|^2
+        invariant = body.y**2 @ weights
+        assert invariant == pytest.approx(invariant[0], rel=1e-13)
+
+
+# --- Newton -------------------------------------------------------------------------------------
+
+
+def test_implicit_midpoint_is_stable_where_stiff():
+    problem = stiff(-1e6)
+    trajectory = run(problem, "implicit_midpoint", 10.0, dt=0.1)
+    # Its stability function tends to -1: bounded, halving nothing, and no growth.
+    z = -1e6 * 0.1
+    assert trajectory.y[-1, 0] == pytest.approx(((1 + z / 2) / (1 - z / 2)) ** 100, rel=1e-10)
+    # On a linear problem the first iteration is exact, and the second only sees that.
+    assert trajectory.counts["jacobians"] <= 2 * trajectory.counts["steps"]
+
+
+def test_newton_needs_the_right_jacobian():
+    rigid = stiff(-1e6)
+    blind = replace(rigid, jacobian=lambda t, y: np.array([[-4e5]]))
+    failed = run(blind, "implicit_midpoint", 10.0, dt=0.1)
+    assert failed.message == (
+        "stopped at t = 0, x=1: Newton did not converge in 20 iterations; "
+        "take a smaller --dt or an adaptive method (--integrator Radau)"
+    )
+    right = run(PENDULUM, "implicit_midpoint", 5.0, dt=0.1)
+    slow = replace(PENDULUM, jacobian=lambda t, y: PENDULUM.jacobian(t, y) * [[1], [1.1]])
+    wrong = run(slow, "implicit_midpoint", 5.0, dt=0.1)
+    # It still gets there, since only the residual decides; quadratic convergence is lost.
+    assert wrong.y[-1] == pytest.approx(right.y[-1], abs=1e-11)
+    assert right.counts["jacobians"] <= 4.5 * right.counts["steps"]
+    assert wrong.counts["jacobians"] > 1.3 * right.counts["jacobians"]
+
+
+def test_newton_stops_at_the_noise_of_the_derivative():
+    noise = np.random.default_rng(1)
+    grainy = replace(
+        PENDULUM,
+        derivative=lambda t, y: PENDULUM.derivative(t, y) * (1 + 1e-13 * noise.normal(size=2)),
+    )
+    trajectory = run(grainy, "implicit_midpoint", 5.0, dt=0.1)
+    assert trajectory.finished
+    assert trajectory.y == pytest.approx(
+        run(PENDULUM, "implicit_midpoint", 5.0, dt=0.1).y, abs=1e-10
+    )
+
+
+def test_singular_newton_matrix_says_what_to_change():
+    with pytest.raises(StepFailure, match=r"Newton's matrix is singular; take a smaller --dt"):
+        implicit_midpoint.step(stiff(2.0), 0.0, np.array([1.0]), 1.0)
+
+
+# --- steps, samples, times ----------------------------------------------------------------------
+
+
+def test_last_step_is_shortened_to_the_end():
+    trajectory = integrate(PENDULUM, "rk4", 1.05, t_start=0.5, dt=0.1)
+    assert trajectory.t == pytest.approx([0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05], abs=1e-15)
+    assert trajectory.t[-1] == 1.05
+    assert trajectory.y[-1] == pytest.approx(exact_pendulum(0.55)[0], abs=1e-5)
+    assert trajectory.counts == {"steps": 6, "derivatives": 24, "jacobians": 0}
+
+
+def test_times_do_not_gather_rounding():
+    trajectory = integrate(PENDULUM, "euler", 100.0, dt=0.1)
+    assert trajectory.t.tolist() == [i * 0.1 for i in range(1000)] + [100.0]
+    assert integrate(PENDULUM, "euler", 0.3, dt=0.1).counts["steps"] == 3  # 0.3 / 0.1 < 3
+
+
+def test_samples_thin_the_rows_and_keep_both_ends():
+    every = integrate(PENDULUM, "euler", 1.0, dt=0.001)
+    some = integrate(PENDULUM, "euler", 1.0, dt=0.001, samples=8)
+    assert every.t.size == 1001
+    assert some.t.tolist() == [*every.t[::143].tolist(), 1.0]
+    assert some.y[-1].tolist() == every.y[-1].tolist()
+    assert integrate(PENDULUM, "RK45", 1.0, samples=2).t.tolist() == [0.0, 1.0]
+    assert integrate(PENDULUM, "RK45", 1.0).t.size == 1001
+
+
+def test_forcing_is_evaluated_at_the_right_times():
+    forced = Problem(
+        "forced",
+        ("x",),
+        (),
+        lambda t, y: np.array([t**3]),
+        lambda t, y: np.zeros((1, 1)),
+        np.zeros(1),
+    )
+    assert run(forced, "rk4", 3.0, dt=0.5, t_start=1.0).y[-1, 0] == pytest.approx(20.0, abs=1e-13)
+    midpoint_sum = 0.5 * sum((1.25 + 0.5 * i) ** 3 for i in range(4))
+    assert run(forced, "implicit_midpoint", 3.0, dt=0.5, t_start=1.0).y[-1, 0] == pytest.approx(
+        midpoint_sum, abs=1e-13
+    )
+
+
+# --- what goes wrong ----------------------------------------------------------------------------
+
+REMEDY = {
+    name: "take a smaller --dt" if name in FIXED else "try another --integrator" for name in ALL
+}
+
+
+def raising(error):
+    def derivative(t, y):
+        if y[0] > 5:
+            raise error
+        return y * y
+
+    return replace(BLOW_UP, derivative=derivative)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_blow_up_keeps_the_finite_rows(name):
+    # LSODA gets stuck one rounding before t = 1; the others run into it or past it.
+    trajectory = run(BLOW_UP, name, 2.0, rtol=1e-6, atol=1e-6)
+    last_t, last_y = trajectory.t[-1], trajectory.y[-1, 0]
+    assert not trajectory.finished
+    assert 0.9 < last_t < 1.2
+    assert last_y > 10
+    assert np.all(np.diff(trajectory.t) > 0)
+    assert trajectory.message.startswith(f"stopped at t = {last_t:.6g}, size={last_y:.6g}: ")
+    assert REMEDY[name] in trajectory.message
+    assert "\n" not in trajectory.message
+    assert trajectory.counts["steps"] > 50
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(
+    "error",
+    [
+        OverflowError("math range error"),
+        ZeroDivisionError("division by zero"),
+        ValueError("math domain error"),
+        FloatingPointError("underflow"),
+    ],
+)
+def test_arithmetic_that_raises_keeps_the_rows(name, error):
+    trajectory = run(raising(error), name, 2.0)
+    last_t, last_y = trajectory.t[-1], trajectory.y[-1, 0]
+    assert not trajectory.finished
+    assert 0.7 < last_t < 0.83
+    assert last_y == pytest.approx(1 / (1 - last_t), rel=0.1)
+    assert trajectory.message.startswith(
+        f"stopped at t = {last_t:.6g}, size={last_y:.6g}: {type(error).__name__}: {error}; "
+    )
+    assert REMEDY[name] in trajectory.message
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_ctrl_c_keeps_the_rows(name):
+    trajectory = run(raising(KeyboardInterrupt()), name, 2.0)
+    assert not trajectory.finished
+    assert trajectory.t[-1] > 0.7
+    assert trajectory.message == f"interrupted at t = {trajectory.t[-1]:.6g}"
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_start_without_derivative_is_one_row(name):
+    nowhere = replace(BLOW_UP, derivative=lambda t, y: y * np.nan)
+    trajectory = run(nowhere, name, 2.0)
+    assert trajectory.t.tolist() == [0.0]
+    assert trajectory.message == (
+        "stopped at t = 0, size=1: the derivative there is not finite; change the initial state"
+    )
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_derivative_that_turns_nan_ends_the_run(name):
+    cliff = replace(BLOW_UP, derivative=lambda t, y: y * y + 0 * np.sqrt(5 - y))
+    trajectory = run(cliff, name, 2.0)
+    assert not trajectory.finished
+    assert 0.7 < trajectory.t[-1] < 0.83
+
+
+def test_what_lsoda_only_warns_of_is_in_the_message():
+    def jacobian(t, y):
+        return -1e9 * np.array([[0, 1], [-2000 * y[0] * y[1] - 1, 1000 * (1 - y[0] ** 2)]])
+
+    misled = Problem(
+        name="van der Pol",
+        states=("x", "v"),
+        positions=(0,),
+        derivative=lambda t, y: np.array([y[1], 1000 * (1 - y[0] ** 2) * y[1] - y[0]]),
+        jacobian=jacobian,
+        initial=np.array([2.0, 0.0]),
+    )
+    trajectory = integrate(misled, "LSODA", 200.0)
+    assert not trajectory.finished
+    assert "; try another --integrator" in trajectory.message
+    assert "lsoda: Repeated convergence failures" in trajectory.message
+
+
+def test_a_finished_run_passes_warnings_on():
+    def derivative(t, y):
+        warnings.warn("close to\nthe edge", stacklevel=1)
+        return -y
+
+    trajectory = run(replace(BLOW_UP, derivative=derivative), "rk4", 1.0)
+    assert trajectory.finished
+    assert trajectory.message == "close to the edge"
+
+
+def test_adaptive_run_stops_after_max_steps():
+    trajectory = integrate(PENDULUM, "RK45", 100.0, max_steps=20)
+    assert trajectory.counts["steps"] == 20
+    assert ": 20 steps did not suffice; try another" in trajectory.message
+    # The last step made is kept, though no sample falls on it.
+    assert trajectory.y[-1] == pytest.approx(exact_pendulum(trajectory.t[-1])[0], abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        (
+            "rk5",
+            {},
+            "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
+            "semi_implicit_euler, rk4, implicit_midpoint, RK45, DOP853, Radau, BDF, LSODA",
+        ),
+        (
+            "radau",
+            {},
+            "integrator: unknown name 'radau' (did you mean 'Radau'?); known: euler, "
+            "semi_implicit_euler, rk4, implicit_midpoint, RK45, DOP853, Radau, BDF, LSODA",
+        ),
+        ("euler", {}, "dt: euler needs a step; give e.g. --dt 0.001"),
+        ("euler", {"dt": -0.1}, "dt: -0.1 is not a positive step; give e.g. --dt 0.001"),
+        ("euler", {"dt": 0}, "dt: 0 is not a positive step; give e.g. --dt 0.001"),
+        ("euler", {"dt": math.nan}, "dt: nan is not a positive step; give e.g. --dt 0.001"),
+        ("euler", {"dt": math.inf}, "dt: inf is not a positive step; give e.g. --dt 0.001"),
+        ("euler", {"dt": 1e-9}, "dt: 1e-09 takes 1e+09 steps, but at most 10000000 are made"),
+        (
+            "euler",
+            {"dt": 5e-324},
+            "dt: 4.94066e-324 takes inf steps, but at most 10000000 are made",
+        ),
+        (
+            "BDF",
+            {"dt": 0.1},
+            "dt: BDF chooses its own steps; leave --dt out, or take one of euler, "
+            "semi_implicit_euler, rk4, implicit_midpoint",
+        ),
+        ("BDF", {"t_start": 1.0}, "t_end: 1 is not after t_start = 1"),
+        ("BDF", {"t_start": -math.inf}, "t_start: -inf is not a finite time"),
+        ("BDF", {"t_end": math.nan}, "t_end: nan is not a finite time"),
+        ("BDF", {"rtol": 0.0}, "rtol: 0 is not a positive number"),
+        ("BDF", {"rtol": 1e-15}, "rtol: 1e-15 is too small; the smallest allowed is 2.3e-14"),
+        ("BDF", {"atol": -1.0}, "atol: -1 is not a positive number"),
+        ("BDF", {"atol": math.inf}, "atol: inf is not a positive number"),
+        ("BDF", {"samples": 1}, "samples: 1 is too few; give at least 2, the first and the last"),
+    ],
+)
+def test_arguments_that_cannot_be_served(name, options, message):
+    with pytest.raises(RunError) as caught:
+        integrate(PENDULUM, name, **{"t_end": 1.0, **options})
+    assert str(caught.value) == message
+
+
+def test_smallest_tolerance_is_taken_without_a_warning():
+    assert integrate(PENDULUM, "DOP853", 1.0, rtol=2.3e-14).message == ""
+
+
+@pytest.mark.parametrize(
+    ("initial", "message"),
+    [
+        ([1.0], "initial: has shape (1,), but pendulum has 2 states; give one number for each"),
+        ([1.0, math.nan], "initial: rate = nan is not finite"),
+    ],
+)
+def test_initial_state_that_does_not_fit(initial, message):
+    with pytest.raises(RunError) as caught:
+        replace(PENDULUM, initial=initial)
+    assert str(caught.value) == message
+
+
+# --- tableau, progress, imports -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"b": (1 / 6, 1 / 3, 1 / 3, 1 / 5)}, "not of order 1, sum b = 1"),
+        ({"b": (1 / 3, 1 / 3, 1 / 6, 1 / 6)}, "not of order 2, b c = 1/2"),
+        ({"b": (1 / 6, 2 / 3, 0, 1 / 6)}, "not of order 3, b a c = 1/6"),
+        ({"c": (0, 1 / 2, 1 / 2, 0.9)}, "rows of a do not sum to c"),
+        ({"a": ((0, 0, 0, 0), (0.5, 0, 0, 0), (0.5, 0, 0, 0), (0, 0, 1, 0))}, "not of order 3"),
+        ({"a": ((0, 0, 0, 0), (0, 0.5, 0, 0), (0, 0.5, 0, 0), (0, 0, 1, 0))}, "not explicit"),
+        ({"order": 5}, "order 5 is not among 1, 2, 3, 4"),
+        ({"b": (1.0,)}, "do not fit"),
+    ],
+)
+def test_wrong_tableau_is_refused(change, message):
+    with pytest.raises(ValueError, match=message.replace("(", r"\(")):
+        replace(TABLEAU, **change)
+
+
+def test_tableau_of_lower_order_serves():
+    heun = ButcherTableau(a=((0, 0), (1, 0)), b=(1 / 2, 1 / 2), c=(0, 1), order=2)
+    assert heun.step(lambda t, y: y, 0.0, np.array([1.0]), 0.1) == pytest.approx([1.105])
+    with pytest.raises(ValueError, match="not of order 3"):
+        replace(heun, order=3)
+
+
+@pytest.mark.parametrize("name", ["rk4", "Radau"])
+def test_progress_grows_to_one_and_is_not_called_at_every_step(name):
+    heard = []
+    trajectory = run(PENDULUM, name, 5.0, dt=0.001, progress=heard.append)
+    assert heard == sorted(heard)
+    assert heard[-1] == 1.0
+    assert len(heard) < trajectory.counts["steps"] / 10
+
+
+class Screen(io.StringIO):
+    def __init__(self, terminal):
+        super().__init__()
+        self.terminal = terminal
+
+    def isatty(self):
+        return self.terminal
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_terminal_progress(terminal, monkeypatch):
+    screen = Screen(terminal)
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setenv("COLUMNS", "60")
+    with pytest.raises(KeyError), terminal_progress("simulate") as progress:
+        progress(0.5)
+        raise KeyError
+    if terminal:
+        drawn = screen.getvalue().split("\r")
+        assert drawn[1].rstrip() == f"simulate [{'#' * 15}{' ' * 15}]  50%"
+        assert drawn[2:] == [" " * 59, ""], "the line is wiped, also after an error"
+    else:
+        assert screen.getvalue() == ""
+
+
+def test_running_needs_no_sympy():
+    code = "import sys, eomgen.run.integrate; sys.exit('sympy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
