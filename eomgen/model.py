@@ -70,7 +70,7 @@ def build_model(scene: Scene) -> Model:
     effects = _effects(scene, known, parameters)
     coordinates = [c for body in bodies for c in body.coordinates]
     inputs = [i for effect in effects for i in effect.inputs()]
-    _check_symbols(parameters, coordinates, inputs, bodies)
+    _check_symbols(parameters, coordinates, inputs)
     if scene.camera.follow is not None:
         _known_body(scene.camera.follow, "camera.follow", [body.name for body in bodies])
     wanted = OUTPUTS if scene.outputs == "all" else (*scene.outputs, *SHOWN)
@@ -216,13 +216,13 @@ def _check_symbols(
     parameters: Sequence[Parameter],
     coordinates: Sequence[Coordinate],
     inputs: Sequence[Input],
-    bodies: Sequence[Body],
 ) -> None:
     """No name may stand for two things in the equations."""
     taken = {"t": "time", "pi": "the number π"}
     uses = [(p.name, "a parameter") for p in parameters]
     uses += [(c.name, "a coordinate") for c in coordinates]
     uses += [(c.rate, "a velocity") for c in coordinates]
+    uses += [(f"{c.name}_ddot", "an acceleration") for c in coordinates]
     uses += [(i.name, "an input") for i in inputs]
     for name, use in uses:
         if name in taken:

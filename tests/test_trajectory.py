@@ -1,5 +1,6 @@
 """Trajectories: what they refuse to be, and files that give back every bit."""
 
+import os
 from dataclasses import fields, replace
 
 import numpy as np
@@ -131,10 +132,25 @@ def test_damaged_npz_is_an_error_or_harmless(tmp_path):
             assert same(load_npz(path), RUN)  # a date, say
         except RunError as error:
             assert "\n" not in str(error)
+
+
+class Trap:
+    """Makes a folder when it is unpickled."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __reduce__(self):
+        return os.mkdir, (self.folder,)
+
+
+def test_code_in_npz_is_not_run(tmp_path):
+    path, sprung = tmp_path / "run.npz", tmp_path / "sprung"
     with path.open("wb") as file:
-        pickled = np.array([print], dtype=object)
-        np.savez(file, eomgen=np.array("trajectory 1"), name=pickled)
+        trap = np.array([Trap(str(sprung))], dtype=object)
+        np.savez(file, eomgen=np.array("trajectory 1"), name=trap)
     assert error_of(load_npz, path).endswith("; simulate again")
+    assert not sprung.exists()
 
 
 # --- .csv ---------------------------------------------------------------------------------------

@@ -6,12 +6,12 @@ import warnings
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-import matplotlib
 import matplotlib.style
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from eomgen.errors import RunError
 from eomgen.files import check_writable, write_whole
@@ -45,6 +45,7 @@ STYLE = {
     "legend.frameon": False,
     "legend.handlelength": 1.2,
     "savefig.dpi": 150,
+  # without a salt, ids within an SVG are random
 }
 
 # No PDF: Matplotlib writes its metadata last, too late for the mark that `files` looks for.
@@ -68,12 +69,27 @@ def write_figure(figure: Figure, path: Path, *, force: bool = False) -> None:
     check_figure(path, force=force)
     suffix = path.suffix.lower()
     buffer = io.BytesIO()
-    # Ids within an SVG are random unless salted, and a style may not hold the salt.
-    with style(), matplotlib.rc_context({"svg.hashsalt": "eomgen"}), warnings.catch_warnings():
+    with style(), warnings.catch_warnings():
         # A title in a script that the font lacks shows boxes; the figure is worth having still.
         warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from font")
+        _settle(figure)
         figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
     write_whole(path, buffer.getvalue(), force=force)
+
+
+def _settle(figure: Figure) -> None:
+    """Lay the panels out and keep them there.
+
+    The solver of the constrained layout ends in one of several last digits, depending on addresses
+    in memory; rounding far above that, and far below a pixel, makes files the same every time.
+    """
+    engine = figure.get_layout_engine()
+    if engine is None:
+        return
+    engine.execute(figure)
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        axes.set_position(Bbox(axes.get_position().get_points().round(6)))
 
 
 def colours(count: int) -> list[str]:

@@ -31,7 +31,7 @@ def advances(
     `t_start` is the caller's. Raises `StepFailure` if the method gives up, or after `max_steps`.
     """
     jacobian = {"jac": problem.jacobian} if method.uses_jacobian else {}
-    # A copy, since LSODA overwrites the state it is given.
+    # A copy: LSODA's compiled code works on state arrays in place.
     start = problem.initial.copy()
     solver = method.solver(
         problem.derivative, t_start, start, t_end, rtol=rtol, atol=atol, **jacobian

@@ -29,7 +29,7 @@ def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
     middle = t + h / 2
     identity = np.eye(len(y))
     change = np.zeros_like(y)
-    previous = np.inf
+    previous = 0.0
     for _ in range(MAX_ITERATIONS):
         midpoint = y + change / 2
         residual = change - h * problem.derivative(middle, midpoint)
@@ -43,8 +43,11 @@ def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
         if not np.isfinite(size):
             raise StepFailure(f"Newton left the finite numbers; {REMEDY}")
         scale = np.abs(y) + np.abs(change)
-        converged = np.all(np.abs(update) <= _ROUNDOFF * scale)
-        stagnant = size >= previous / 2 and size <= _NOISE * np.max(scale)
+        # What is still missing is about the next update: this one times the last contraction.
+        # Hairer, Wanner, Solving ODEs II, section IV.8.
+        contraction = size / previous if previous else 1.0
+        converged = np.all(contraction * np.abs(update) <= _ROUNDOFF * scale)
+        stagnant = 0 < previous <= 2 * size and size <= _NOISE * np.max(scale)
         if converged or stagnant:
             return y + change
         previous = size

@@ -1,0 +1,190 @@
+"""The NumPy backend: a system as a Python module that imports `math` and `numpy` only."""
+
+import json
+import keyword
+import textwrap
+from dataclasses import dataclass
+from typing import Any
+
+from eomgen.program.assemble import System
+from eomgen.program.printing import Block, Dialect, Names, print_block
+from eomgen.program.program import cost
+from eomgen.templating import render
+
+WIDTH = 100
+RESERVED = frozenset(
+    {"t", "y", "p", "u", "k", "extra", "np", "math", "sin", "cos", "tan", "sqrt", "values"}
+    | set(keyword.kwlist)
+    | {"float", "len", "list", "tuple", "ValueError", "zip"}
+)
+DIALECT = Dialect({name: name for name in ("sin", "cos", "tan", "sqrt")}, RESERVED)
+
+ABOUT = {
+    "derivative": "Time derivative of the state.",
+    "jacobian": "Exact Jacobian of `derivative` by the state.",
+    "forward_dynamics": "Accelerations (nv,) under generalised forces `tau` beside the effects.",
+    "inverse_dynamics": "Generalised forces (nv,) that give accelerations `vd`, beside the effects.",
+    "mass_matrix": "Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v.",
+    "velocity_force": "V(q, v) of M v̇ + V + G = F, (nv,).",
+    "gravity_force": "G(q) of M v̇ + V + G = F, (nv,).",
+    "applied_force": "F of M v̇ + V + G = F, (nv,): applied forces and torques.",
+    "kinetic_energy": "Kinetic energy, J.",
+    "potential_energy": "Potential energy, J.",
+    "momentum": "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
+    "joint_forces": "Force of each of `JOINTS` on its parent, world x and y, N.",
+    "body_poses": "World x, y (m) of each centre of mass, and angle (rad), a row for each of `BODIES`.",
+}
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """One output as the template writes it."""
+
+    name: str
+    about: str
+    shape: str
+    columns_shape: str
+    block: Block
+    state: str
+    inputs: str
+    extra: str
+    constants: str
+    functions: tuple[str, ...]
+    operations: str
+
+
+def python_module(system: System) -> str:
+    """The generated module's source. Same system, same bytes."""
+    program, model, states = system.program, system.model, system.form.states
+    names = Names(program, DIALECT)
+    blocks = {
+        name: print_block(program, output.nodes, names, DIALECT)
+        for name, output in program.outputs.items()
+    }
+    roots = sorted({i for block in blocks.values() for i in block.constants})
+    made = [i for i in roots if program.steps[i].operation != "input"]
+    checked = [node for _, node in program.checks]
+    fixed = print_block(
+        program, [*made, *checked], names, DIALECT, fixed=True, keep=made
+    )
+    parameters = [p.name for p in model.parameters]
+    inputs = [i.name for i in model.inputs]
+
+    def kernel(name: str) -> Kernel:
+        block, output = blocks[name], program.outputs[name]
+        shape = tuple(output.shape)
+        return Kernel(
+            name=name,
+            about=ABOUT.get(name, ""),
+            shape=repr(shape),
+            columns_shape=repr((*shape, -1)) if shape else "(-1,)",
+            block=block,
+            state=_unpacking([s.name for s in states], block, names),
+            inputs=_unpacking(inputs, block, names),
+            extra=_unpacking(system.extra.get(name, ()), block, names),
+            constants=_joined([names[i] for i in block.constants]),
+            functions=block.functions,
+            operations=_operations(cost(program, name)),
+        )
+
+    kernels = {name: kernel(name) for name in program.outputs}
+    special = ("initial_state", "derivative", "jacobian", "forward_dynamics", "inverse_dynamics")
+    context: dict[str, Any] = {
+        "title": _plain(model.title),
+        "scene": model.name,
+        "about": _document(system),
+        "form": model.form,
+        "states": states,
+        "ny": len(states),
+        "positions": repr(tuple(i for i, s in enumerate(states) if s.position)),
+        "parameters": model.parameters,
+        "parameter_names": _joined([names.safe(name) for name in parameters]),
+        "inputs": model.inputs,
+        "units": _units(system),
+        "effects": repr(tuple(effect.type for effect in model.effects)),
+        "bodies": repr(tuple(body.name for body in model.bodies)),
+        "joints": repr(tuple(b.joint.name for b in model.bodies if b.joint.type != "free")),
+        "costs": [(name, json.dumps(cost(program, name))) for name in kernels],
+        "fixed": fixed,
+        "checks": [
+            (_plain(about), source)
+            for (about, _), source in zip(program.checks, fixed.results[len(made) :], strict=True)
+        ],
+        "kernels": list(kernels.values()),
+        "outputs": [k for n, k in kernels.items() if n not in special],
+        "nv": len(model.coordinates),
+        "dynamics": [
+            (kernels[name], argument, default)
+            for name, argument, default in (
+                ("forward_dynamics", "tau", "=None"),
+                ("inverse_dynamics", "vd", ""),
+            )
+            if name in kernels
+        ],
+    }
+    return render("python", "module.py.jinja", context)
+
+
+def _unpacking(all_names: Any, block: Block, names: Names) -> str:
+    """`_, _, theta, phi` for the used ones among `all_names`, or nothing if none is used."""
+    used = [names.safe(name) if name in block.inputs else "_" for name in all_names]
+    return _joined(used) if any(word != "_" for word in used) else ""
+
+
+def _joined(words: list[str]) -> str:
+    """A tuple to unpack into; one word keeps its comma."""
+    return f"{words[0]}," if len(words) == 1 else ", ".join(words)
+
+
+def _operations(counts: dict[str, int]) -> str:
+    kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items() if kind not in _SUMS)
+    return f"{counts['total']} operations" + (f": {kinds}" if kinds else "")
+
+
+_SUMS = ("total", "parameters")
+
+
+def _plain(text: str) -> str:
+    """Text of a scene as it may stand in a docstring: no quotes that end it, no escapes."""
+    kept = "".join(c if c.isprintable() else " " for c in text)
+    return kept.replace("\\", "/").replace('"', "'")
+
+
+def _units(system: System) -> list[tuple[str, str]]:
+    entries = [(s.name, s.unit) for s in system.form.states]
+    entries += [(i.name, i.unit) for i in system.model.inputs]
+    return entries + [(p.name, _plain(p.unit)) for p in system.model.parameters]
+
+
+def _document(system: System) -> list[str]:
+    """The docstring's tables: states, inputs, parameters, effects, operations."""
+    model = system.model
+    lines = ["State y, in this order:"]
+    lines += _table([(s.name, s.unit, s.about) for s in system.form.states])
+    if model.inputs:
+        lines += ["", "Inputs u, each 0 unless given:"]
+        lines += _table([(i.name, i.unit, i.about) for i in model.inputs])
+    if model.parameters:
+        lines += ["", "Parameters p, with the scene's values:"]
+        lines += _table(
+            [(f"{p.name} = {p.default!r}", _plain(p.unit), _plain(p.about)) for p in model.parameters]
+        )
+    effects = ", ".join(effect.type for effect in model.effects) or "none"
+    lines += ["", f"Effects: {effects}."]
+    counts = cost(system.program, "derivative")
+    lines += textwrap.wrap(
+        f"One call of `derivative` takes {_operations(counts)}; "
+        f"{counts['parameters']} more on parameters alone are done once.",
+        WIDTH,
+    )
+    return lines
+
+
+def _table(rows: list[tuple[str, str, str]]) -> list[str]:
+    widths = [max(len(row[i]) for row in rows) for i in (0, 1)]
+    return [
+        f"    {name:<{widths[0]}}  {unit:<{widths[1]}}  {about}".rstrip()
+        for name, unit, about in rows
+    ]
+
+

@@ -1,0 +1,165 @@
+"""State forms: which numbers a state vector holds.
+
+`velocity` is [q, v]. `momentum` and `redundant` are the handout's: position, momentum, angle and
+angular momentum of the bodies, for all of them (1), or for the roots of floating trees with angle and
+angular momentum alone for the rest, since (21) gives what is left out.
+"""
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from eomgen.derivation.closed import Equations
+from eomgen.derivation.symbols import Expr, over_bodies, over_coordinates
+from eomgen.errors import SceneError
+from eomgen.joints import Free
+from eomgen.joints.base import WORLD
+from eomgen.language.formula import Constant
+
+
+@dataclass(frozen=True)
+class State:
+    """One number of the state vector; `position` tells positions and angles from their rates."""
+
+    name: str
+    unit: str
+    about: str
+    position: bool
+    symbol: Expr
+
+
+@dataclass(frozen=True)
+class StateForm:
+    """A state vector, what the body symbols are in it, and its time derivative.
+
+    `replaced` is put into expressions before they are lowered (angles, so that differences of
+    angles become one coordinate); `defined` is looked up when asked for. `rates` is ẏ over the
+    accelerations of the solution, `initial` the state over `q` and `v`.
+    """
+
+    states: tuple[State, ...]
+    replaced: dict[Expr, Expr]
+    defined: dict[Expr, Expr]
+    rates: tuple[Expr, ...]
+    initial: tuple[Expr, ...]
+
+
+def state_form(equations: Equations) -> StateForm:
+    """The form that the model asks for. Raises `SceneError` if the model has no such form."""
+    if equations.model.form == "velocity":
+        return _velocity_form(equations)
+    return _momentum_form(equations, redundant=equations.model.form == "redundant")
+
+
+def _velocity_form(equations: Equations) -> StateForm:
+    symbols, coordinates = equations.symbols, equations.model.coordinates
+    states = [
+        State(c.name, c.unit, c.about, True, q)
+        for c, q in zip(coordinates, symbols.q, strict=True)
+    ] + [
+        State(c.rate, f"{c.unit}/s", f"rate of {c.name}", False, v)
+        for c, v in zip(coordinates, symbols.v, strict=True)
+    ]
+    turned = over_coordinates(equations.model, symbols)
+    return StateForm(
+        states=tuple(states),
+        replaced={angle: turned[angle] for angle in symbols.angle},
+        defined={
+            **_places(equations),
+            **{omega: turned[omega] for omega in symbols.omega},
+        },
+        rates=(*symbols.v, *symbols.a),
+        initial=(*symbols.q, *symbols.v),
+    )
+
+
+def _places(equations: Equations) -> dict[Expr, Expr]:
+    """Position and velocity of every body by those of its parent: (21) and its derivative."""
+    symbols, kinematics = equations.symbols, equations.kinematics
+    inward = over_bodies(equations.model, symbols)
+    defined: dict[Expr, Expr] = {}
+    i = 0
+    for k, body in enumerate(equations.model.bodies):
+        if isinstance(body.joint, Free):
+            defined |= {symbols.x[k]: symbols.q[i], symbols.y[k]: symbols.q[i + 1]}
+            defined |= {symbols.xd[k]: symbols.v[i], symbols.yd[k]: symbols.v[i + 1]}
+        else:
+            x, y = (e.xreplace(inward) for e in kinematics.position[k])
+            xd, yd = (e.xreplace(inward) for e in kinematics.velocity[k])
+            defined |= {symbols.x[k]: x, symbols.y[k]: y, symbols.xd[k]: xd, symbols.yd[k]: yd}
+        i += len(body.coordinates)
+    return defined
+
+
+def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
+    model, symbols = equations.model, equations.symbols
+    places = _places(equations)
+    inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
+    states: list[State] = []
+    rates: list[Expr] = []
+    initial: list[Expr] = []
+    replaced: dict[Expr, Expr] = {}
+    defined = dict(places)
+    for k, body in enumerate(model.bodies):
+        if isinstance(body.inertia_com, Constant):
+            raise SceneError(
+                f"form: '{model.form}' needs an angular momentum of body '{body.name}', whose "
+                "inertia_com is 0; use form = 'velocity' or give it an inertia"
+            )
+        m, inertia, name = symbols.mass[k], symbols.inertia[k], body.name
+        free = isinstance(body.joint, Free)
+        if free or redundant:
+            own = [c.name for c in body.coordinates[:2]] if free else [f"x_{name}", f"y_{name}"]
+            x, y = (sp.Symbol(word, real=True) for word in own)
+            px, py = (sp.Symbol(f"P_{name}_{axis}", real=True) for axis in "xy")
+            states += [
+                State(x.name, "m", f"x of the centre of mass of {name}", True, x),
+                State(y.name, "m", f"y of the centre of mass of {name}", True, y),
+                State(px.name, "kg m/s", f"momentum of {name}, x", False, px),
+                State(py.name, "kg m/s", f"momentum of {name}, y", False, py),
+            ]
+            initial += [symbols.x[k], symbols.y[k], m * symbols.xd[k], m * symbols.yd[k]]
+            defined |= {symbols.x[k]: x, symbols.y[k]: y}
+            defined |= {symbols.xd[k]: px / m, symbols.yd[k]: py / m}
+            rates += [symbols.xd[k], symbols.yd[k], m * symbols.xdd[k], m * symbols.ydd[k]]
+        word = body.coordinates[-1].name if body.parent < 0 else f"angle_{name}"
+        angle, spin = sp.Symbol(word, real=True), sp.Symbol(f"L_{name}", real=True)
+        states += [
+            State(word, "rad", f"angle of {name} from the {WORLD}'s x axis", True, angle),
+            State(spin.name, "kg m^2/s", f"angular momentum of {name} about its centre", False, spin),
+        ]
+        initial += [symbols.angle[k].xreplace(outward), inertia * symbols.omega[k]]
+        replaced[symbols.angle[k]] = angle
+        defined[symbols.omega[k]] = spin / inertia
+        rates += [symbols.omega[k], inertia * symbols.alpha[k]]
+    _check_names(equations, states)
+    # A root's own coordinate is its state by the same symbol; the others follow from the bodies.
+    known = {state.symbol for state in states}
+    defined |= {s: e for s, e in inward.items() if s not in known}
+    defined = {s: e for s, e in defined.items() if s not in known}
+    return StateForm(tuple(states), replaced, defined, tuple(rates), _over_q(equations, initial))
+
+
+def _over_q(equations: Equations, expressions: list[Expr]) -> tuple[Expr, ...]:
+    """Expressions of body symbols over `q` and `v` alone."""
+    outward = over_coordinates(equations.model, equations.symbols)
+    places = _places(equations)
+    result = []
+    for expression in expressions:
+        for _ in equations.model.bodies:  # one substitution climbs one joint
+            expression = expression.xreplace(places)
+        result.append(expression.xreplace(outward))
+    return tuple(result)
+
+
+def _check_names(equations: Equations, states: list[State]) -> None:
+    model = equations.model
+    taken = {p.name: "a parameter" for p in model.parameters}
+    taken |= {i.name: "an input" for i in model.inputs}
+    for state in states:
+        if state.name in taken:
+            raise SceneError(
+                f"'{state.name}' is the name of {taken[state.name]} and would be that of a state of "
+                f"form '{model.form}'; rename the parameter or input"
+            )
+        taken[state.name] = "another state"

@@ -1,0 +1,158 @@
+"""From equations to a program: the state's derivative and every output the model asks for."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from eomgen.derivation.closed import Equations
+from eomgen.derivation.forms import StateForm, state_form
+from eomgen.joints import Free
+from eomgen.model import Model, is_zero
+from eomgen.program.differentiate import jacobian
+from eomgen.program.lower import Lowering
+from eomgen.program.passes import PassReport, optimise
+from eomgen.program.program import Output, Program, finish
+from eomgen.program.tape import Node, Stage, Tape
+
+NEEDS_VELOCITIES = (
+    "forward_dynamics",
+    "inverse_dynamics",
+    "mass_matrix",
+    "velocity_force",
+    "gravity_force",
+    "applied_force",
+)
+"""Outputs in generalised coordinates, made for the form [q, v] only."""
+
+
+@dataclass(frozen=True)
+class System:
+    """A program with the meaning of its inputs: what a backend needs to write a module.
+
+    `extra` names what some outputs take besides state, parameters and inputs: generalised forces or
+    accelerations, one a coordinate.
+    """
+
+    model: Model
+    form: StateForm
+    program: Program
+    extra: dict[str, tuple[str, ...]]
+    reports: tuple[PassReport, ...]
+
+
+def assemble(equations: Equations) -> System:
+    """Lower the equations, differentiate the derivative, run the passes."""
+    model, symbols, form = equations.model, equations.symbols, state_form(equations)
+    tape = Tape()
+    parameters = {s: tape.input(n, Stage.PARAMETERS) for n, s in symbols.parameters.items()}
+    states = {
+        s.symbol: tape.input(s.name, Stage.POSITIONS if s.position else Stage.VELOCITIES)
+        for s in form.states
+    }
+    inputs = {s: tape.input(n, Stage.INPUTS) for n, s in symbols.inputs.items()}
+    tau = {s: tape.input(s.name, Stage.INPUTS) for s in symbols.tau}
+    vd = {s: tape.input(s.name, Stage.INPUTS) for s in symbols.a}
+    definitions = (*equations.solution.definitions, *equations.joint_force)
+    defined = {
+        s: e.xreplace(form.replaced) for s, e in {**dict(definitions), **form.defined}.items()
+    }
+    given = parameters | states | inputs
+    zero = tape.constant(0.0)
+    passive = Lowering(tape, given | dict.fromkeys(tau, zero), defined)
+    pushed = Lowering(tape, given | tau, defined)
+    demanded = Lowering(tape, given | vd, defined)
+    start = {
+        s: tape.constant(value)
+        for s, value in zip(
+            (*symbols.q, *symbols.v), (*model.initial_q, *model.initial_v), strict=True
+        )
+    }
+    starting = Lowering(tape, parameters | start, {})
+
+    def rows(lowering: Lowering, expressions: Iterable[Any]) -> list[Node]:
+        return [lowering.lower(e.xreplace(form.replaced)) for e in expressions]
+
+    for pivot in equations.solution.pivots:  # so that they are named whoever meets them first
+        passive.lower(pivot)
+    nv, nb = len(symbols.a), len(model.bodies)
+    rates = rows(passive, form.rates)
+    slopes = jacobian(rates, list(states.values()))
+    made: dict[str, tuple[tuple[int, ...], list[Node]]] = {
+        "initial_state": ((len(form.states),), [starting.lower(e) for e in form.initial]),
+        "derivative": ((len(rates),), rates),
+        "jacobian": ((len(rates), len(rates)), [node for row in slopes for node in row]),
+    }
+    symmetric = equations.symmetric
+    balance = symmetric.M * sp.Matrix(symbols.a) + symmetric.V + symmetric.G - symmetric.F
+    holding = [k for k, body in enumerate(model.bodies) if not isinstance(body.joint, Free)]
+    recipes: dict[str, tuple[tuple[int, ...], Lowering, list[Any]]] = {
+        "forward_dynamics": ((nv,), pushed, list(symbols.a)),
+        "inverse_dynamics": ((nv,), demanded, list(balance)),
+        "mass_matrix": ((nv, nv), passive, list(symmetric.M)),
+        "velocity_force": ((nv,), passive, list(symmetric.V)),
+        "gravity_force": ((nv,), passive, list(symmetric.G)),
+        "applied_force": ((nv,), passive, list(symmetric.F)),
+        "kinetic_energy": ((), passive, [_kinetic_energy(equations)]),
+        "potential_energy": ((), passive, [equations.free_bodies.potential_energy]),
+        "momentum": ((3,), passive, _momentum(equations)),
+        "joint_forces": (
+            (len(holding), 2),
+            passive,
+            [component for k in holding for component in symbols.force[k]],
+        ),
+        "body_poses": (
+            (nb, 3),
+            passive,
+            [z for k in range(nb) for z in (symbols.x[k], symbols.y[k], symbols.angle[k])],
+        ),
+    }
+    for name in model.outputs:
+        if model.form == "velocity" or name not in NEEDS_VELOCITIES:
+            shape, lowering, expressions = recipes[name]
+            made[name] = (shape, rows(lowering, expressions))
+    program, reports = optimise(
+        finish(
+            tape,
+            {name: Output(shape, tuple(n.index for n in ns)) for name, (shape, ns) in made.items()},
+            _checks(equations, starting),
+        )
+    )
+    extra = {
+        "forward_dynamics": tuple(str(node.step.value) for node in tau.values()),
+        "inverse_dynamics": tuple(str(node.step.value) for node in vd.values()),
+    }
+    return System(model, form, program, extra, reports)
+
+
+def _kinetic_energy(equations: Equations) -> Any:
+    """Σ ½ m |ẋ|² + ½ I ω²."""
+    s = equations.symbols
+    return sp.Add(
+        *(m * (xd**2 + yd**2) / 2 for m, xd, yd in zip(s.mass, s.xd, s.yd, strict=True)),
+        *(i * w**2 / 2 for i, w in zip(s.inertia, s.omega, strict=True)),
+    )
+
+
+def _momentum(equations: Equations) -> list[Any]:
+    """Σ m ẋ, Σ m ẏ, and Σ m (x ẏ - y ẋ) + I ω about the world's origin."""
+    s = equations.symbols
+    bodies = list(zip(s.mass, s.inertia, s.x, s.y, s.xd, s.yd, s.omega, strict=True))
+    return [
+        sp.Add(*(m * xd for m, _, _, _, xd, _, _ in bodies)),
+        sp.Add(*(m * yd for m, _, _, _, _, yd, _ in bodies)),
+        sp.Add(*(m * (x * yd - y * xd) + i * w for m, i, x, y, xd, yd, w in bodies)),
+    ]
+
+
+def _checks(equations: Equations, lowering: Lowering) -> list[tuple[str, int]]:
+    """What a user's own parameters must keep positive for the closed form to hold."""
+    checks = []
+    for k, body in enumerate(equations.model.bodies):
+        mass = lowering.lower(equations.symbols.mass[k])
+        checks.append((f"mass of {body.name}", mass.index))
+        if not is_zero(body.inertia_com):
+            inertia = lowering.lower(equations.symbols.inertia[k])
+            checks.append((f"inertia_com of {body.name}", inertia.index))
+    return checks

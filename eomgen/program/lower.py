@@ -1,0 +1,104 @@
+"""From SymPy expressions to the tape.
+
+SymPy's sums and products have many operands and no order of work. Here they get one: what depends on
+parameters alone is multiplied together first, so that it is computed once, and terms that share such
+a coefficient are added before they are multiplied by it.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import sympy as sp
+
+from eomgen.program.tape import Node, Stage, Tape, power, total
+
+
+class Lowering:
+    """Lowers expressions over symbols that are known nodes, or are defined by expressions.
+
+    A definition is lowered when it is first asked for; what nothing asks for costs nothing.
+    """
+
+    def __init__(self, tape: Tape, known: Mapping[Any, Node], defined: Mapping[Any, Any]) -> None:
+        self._tape = tape
+        self._nodes: dict[Any, Node] = dict(known)
+        self._defined = defined
+
+    def lower(self, expression: Any) -> Node:
+        """The node of an expression. Raises `KeyError` for a symbol that is not known."""
+        node = self._nodes.get(expression)
+        if node is None:
+            node = self._nodes[expression] = self._lower(expression)
+        return node
+
+    def _lower(self, expression: Any) -> Node:
+        if expression.is_Number:
+            return self._tape.constant(float(expression))
+        if expression.is_Symbol:
+            node = self.lower(self._defined[expression])
+            if node.step.operation not in ("input", "constant", "neg"):
+                self._tape.named(node, expression.name.replace("__", "_"))
+            return node
+        if expression.is_Add:
+            return self._sum(expression)
+        if expression.is_Mul or expression.is_Pow:
+            fixed, moving = self._factors(expression)
+            return fixed * moving if fixed.step.stage <= Stage.PARAMETERS else moving
+        name = type(expression).__name__
+        return self._tape.apply(name, self.lower(expression.args[0]))
+
+    def _factors(self, expression: Any) -> tuple[Node, Node]:
+        """A product as (what depends on parameters alone, the rest)."""
+        one = self._tape.constant(1.0)
+        tops: dict[bool, list[Node]] = {True: [], False: []}
+        bottoms: dict[bool, list[Node]] = {True: [], False: []}
+        for factor in sp.Mul.make_args(expression):
+            base, exponent = factor.as_base_exp()
+            if factor.is_Rational and not factor.is_Integer:
+                tops[True].append(self._tape.constant(int(factor.p)))
+                bottoms[True].append(self._tape.constant(int(factor.q)))
+                continue
+            if not exponent.is_Integer:
+                node = self._root(base, exponent)
+                tops[node.step.stage <= Stage.PARAMETERS].append(node)
+                continue
+            node = self.lower(base)
+            side = tops if exponent > 0 else bottoms
+            fixed = node.step.stage <= Stage.PARAMETERS
+            side[fixed].append(power(node, abs(int(exponent))))
+        parts = []
+        for fixed in (True, False):
+            top, bottom = one, one
+            for node in sorted(tops[fixed], key=lambda n: (n.step.stage, n.index)):
+                top = top * node
+            for node in sorted(bottoms[fixed], key=lambda n: (n.step.stage, n.index)):
+                bottom = bottom * node
+            parts.append(top / bottom)
+        return parts[0], parts[1]
+
+    def _root(self, base: Any, exponent: Any) -> Node:
+        """A half-integer power."""
+        assert exponent.q == 2, "only square roots reach the program"
+        root = self._tape.apply("sqrt", self.lower(base))
+        raised = power(root, abs(int(exponent.p)))
+        return raised if exponent.p > 0 else self._tape.constant(1.0) / raised
+
+    def _sum(self, expression: Any) -> Node:
+        groups: dict[int, tuple[Node, list[Node]]] = {}
+        plain: list[Node] = []
+        for term in expression.args:
+            fixed, moving = self._factors(term)
+            if moving.step.stage <= Stage.PARAMETERS:
+                plain.append(fixed * moving)
+                continue
+            if fixed.step.operation == "neg":
+                fixed, moving = -fixed, -moving
+            groups.setdefault(fixed.index, (fixed, []))[1].append(moving)
+        terms = [fixed * _positive_first(parts, self._tape) for fixed, parts in groups.values()]
+        return _positive_first([total(plain, self._tape), *terms], self._tape)
+
+
+def _positive_first(nodes: list[Node], tape: Tape) -> Node:
+    """A sum begun with a term that is no negation, so that the others are subtracted from it."""
+    ordered = sorted(nodes, key=lambda node: node.step.operation == "neg")
+    return total(ordered, tape)

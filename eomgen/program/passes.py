@@ -1,0 +1,115 @@
+"""Passes: each takes a finished program and returns a better one with the same values."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from eomgen.program.program import Output, Program, cost, finish, live_steps
+from eomgen.program.tape import Node, Stage, Tape
+
+Rule = Callable[[Tape, str, list[Node]], Node]
+
+
+@dataclass(frozen=True)
+class PassReport:
+    """What a pass left: steps in all, and operations of `derivative` and `jacobian` at run time."""
+
+    name: str
+    steps: int
+    derivative: int
+    jacobian: int
+
+
+def optimise(program: Program) -> tuple[Program, tuple[PassReport, ...]]:
+    """Run all passes in order; the report has a line for the program as it came and one a pass."""
+    reports = [_report("as lowered", program)]
+    for run in PASSES:
+        program = run(program)
+        reports.append(_report(run.__name__.replace("_", " "), program))
+    return program, tuple(reports)
+
+
+def drop_dead_steps(program: Program) -> Program:
+    """Leave out what no output and no check needs."""
+    roots = [n for output in program.outputs.values() for n in output.nodes]
+    keep = live_steps(program, [*roots, *(n for _, n in program.checks)])
+    new = {old: i for i, old in enumerate(keep)}
+    steps = tuple(
+        type(step)(step.operation, tuple(new[o] for o in step.operands), step.stage, step.value)
+        for step in (program.steps[i] for i in keep)
+    )
+    return Program(
+        steps,
+        {k: Output(o.shape, tuple(new[n] for n in o.nodes)) for k, o in program.outputs.items()},
+        {new[i]: name for i, name in program.names.items() if i in new},
+        tuple((about, new[n]) for about, n in program.checks),
+    )
+
+
+def factor_sums(program: Program) -> Program:
+    """a·x ± a·y as a·(x ± y), where neither product is used elsewhere: one operation saved."""
+    uses = _uses(program)
+    lone: set[int] = set()
+
+    def rule(tape: Tape, operation: str, nodes: list[Node]) -> Node:
+        if operation in ("add", "sub") and all(n.index in lone for n in nodes):
+            a, b = (n.step.operands for n in nodes)
+            common = [i for i in a if i in b]
+            if common:
+                shared = common[0]
+                left, right = (
+                    Node(tape, o[0] if o[1] == shared else o[1]) for o in (a, b)
+                )
+                return Node(tape, shared) * tape.apply(operation, left, right)
+        return tape.apply(operation, *nodes)
+
+    def note(old: int, node: Node) -> None:
+        if node.step.operation == "mul" and uses[old] == 1:
+            lone.add(node.index)
+        else:
+            lone.discard(node.index)
+
+    return drop_dead_steps(_rebuilt(program, rule, note))
+
+
+PASSES: tuple[Callable[[Program], Program], ...] = (drop_dead_steps, factor_sums)
+
+
+def _uses(program: Program) -> list[int]:
+    uses = [0] * len(program.steps)
+    for step in program.steps:
+        for o in step.operands:
+            uses[o] += 1
+    for output in program.outputs.values():
+        for n in output.nodes:
+            uses[n] += 1
+    return uses
+
+
+def _rebuilt(
+    program: Program, rule: Rule, note: Callable[[int, Node], None] | None = None
+) -> Program:
+    """The program built again on a fresh tape, each operation through `rule`."""
+    tape = Tape()
+    nodes: list[Node] = []
+    for i, step in enumerate(program.steps):
+        if step.operation == "constant":
+            node = tape.constant(float(step.value or 0.0))
+        elif step.operation == "input":
+            node = tape.input(str(step.value), step.stage)
+        else:
+            node = rule(tape, step.operation, [nodes[o] for o in step.operands])
+        if i in program.names:
+            tape.named(node, program.names[i])
+        if note is not None:
+            note(i, node)
+        nodes.append(node)
+    outputs = {
+        name: Output(output.shape, tuple(nodes[n].index for n in output.nodes))
+        for name, output in program.outputs.items()
+    }
+    return finish(tape, outputs, ((about, nodes[n].index) for about, n in program.checks))
+
+
+def _report(name: str, program: Program) -> PassReport:
+    derivative, jacobian = (cost(program, output)["total"] for output in ("derivative", "jacobian"))
+    return PassReport(name, len(program.steps), derivative, jacobian)

@@ -1,0 +1,198 @@
+"""Outputs of a program as lines of source code: names, inlining, brackets. Languages differ little."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, count
+
+from eomgen.program.program import Program
+from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
+
+SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+LONGEST_INLINE = 72
+"""Length in characters up to which a value that is used once is written where it is used."""
+_SUM, _PRODUCT, _ATOM = 1, 2, 3
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a language writes numbers' functions, and the words that may not name a variable."""
+
+    functions: Mapping[str, str]
+    reserved: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Source of some results: assignments in order, then one expression a result.
+
+    `constants` are the nodes taken from the block of constants, `inputs` the names of the other
+    inputs used, `functions` the functions called; all in order of first appearance in the program.
+    """
+
+    lines: tuple[tuple[str, str], ...]
+    results: tuple[str, ...]
+    constants: tuple[int, ...]
+    inputs: tuple[str, ...]
+    functions: tuple[str, ...]
+
+
+class Names:
+    """Variable names of a module, one for each node that needs one; the same in all its blocks."""
+
+    def __init__(self, program: Program, dialect: Dialect) -> None:
+        self._program = program
+        self._dialect = dialect
+        self._names: dict[int, str] = {}
+        self._taken = {self.safe(str(s.value)) for s in program.steps if s.operation == "input"}
+
+    def safe(self, name: str) -> str:
+        """A name of the scene as a variable; no name of a scene ends in an underscore."""
+        return f"{name}_" if name in self._dialect.reserved else name
+
+    def __getitem__(self, node: int) -> str:
+        if node not in self._names:
+            step = self._program.steps[node]
+            if step.operation == "input":
+                self._names[node] = self.safe(str(step.value))
+            else:
+                self._names[node] = self._fresh(node)
+        return self._names[node]
+
+    def _fresh(self, node: int) -> str:
+        wanted = self._program.names.get(node) or self._described(node)
+        if wanted is None:
+            letter = "k" if self._program.steps[node].stage <= Stage.PARAMETERS else "s"
+            name = next(n for n in (f"{letter}{i}" for i in count(1)) if n not in self._taken)
+        else:
+            wanted = self.safe(wanted)
+            numbered = (f"{wanted}_{i}" for i in count(2))
+            name = next(n for n in chain((wanted,), numbered) if n not in self._taken)
+        self._taken.add(name)
+        return name
+
+    def _described(self, node: int) -> str | None:
+        """`sin_theta` or `theta_dot_squared` for what is that simple."""
+        step = self._program.steps[node]
+        if step.operation in FUNCTIONS:
+            words = self._angles(step.operands[0])
+            return None if words is None else "_".join((step.operation, *words))
+        if step.operation == "mul" and step.operands[0] == step.operands[1]:
+            factor = self._program.steps[step.operands[0]]
+            name = self._program.names.get(step.operands[0])
+            if factor.operation == "input":
+                name = str(factor.value)
+            return None if name is None else f"{name}_squared"
+        return None
+
+    def _angles(self, node: int) -> tuple[str, ...] | None:
+        step = self._program.steps[node]
+        if step.operation == "input":
+            return (str(step.value),)
+        if step.operation == "add":
+            left, right = (self._angles(o) for o in step.operands)
+            return None if left is None or right is None else left + right
+        return None
+
+
+def print_block(
+    program: Program,
+    nodes: Sequence[int],
+    names: Names,
+    dialect: Dialect,
+    *,
+    fixed: bool = False,
+    keep: Sequence[int] = (),
+) -> Block:
+    """Source that computes `nodes`.
+
+    What depends on parameters alone is taken from constants by name, unless `fixed` asks for the
+    block that computes those. Nodes in `keep` get a name even if they are used once.
+    """
+    steps = program.steps
+
+    def outside(i: int) -> bool:
+        if steps[i].operation == "constant":
+            return False
+        return steps[i].operation == "input" or (
+            not fixed and steps[i].stage <= Stage.PARAMETERS
+        )
+
+    live = _live_until(program, nodes, outside)
+    uses = dict.fromkeys(live, 0)
+    for i in live:
+        if not outside(i):
+            for o in steps[i].operands:
+                uses[o] += 1
+    for n in nodes:
+        uses[n] += 1
+
+    text: dict[int, tuple[str, int]] = {}
+    lines: list[tuple[str, str]] = []
+    functions: dict[str, None] = {}
+    for i in live:
+        step = steps[i]
+        if step.operation == "constant":
+            text[i] = (repr(float(step.value or 0.0)), _ATOM)
+            continue
+        if outside(i):
+            text[i] = (names[i], _ATOM)
+            continue
+        if step.operation in FUNCTIONS:
+            functions[step.operation] = None
+        source, level = _expression(step.operation, [text[o] for o in step.operands], dialect)
+        long = len(source) > LONGEST_INLINE and i not in nodes
+        if i in keep or uses[i] > 1 or long:
+            lines.append((names[i], source))
+            text[i] = (names[i], _ATOM)
+        else:
+            text[i] = (source, level)
+    return Block(
+        lines=tuple(lines),
+        results=tuple(text[n][0] for n in nodes),
+        constants=tuple(i for i in live if outside(i) and steps[i].stage <= Stage.PARAMETERS),
+        inputs=tuple(
+            str(steps[i].value)
+            for i in live
+            if steps[i].operation == "input" and steps[i].stage > Stage.PARAMETERS
+        ),
+        functions=tuple(functions),
+    )
+
+
+def _live_until(
+    program: Program, nodes: Sequence[int], outside: Callable[[int], bool]
+) -> list[int]:
+    """The steps that nodes need, in order, without what lies behind those outside the block."""
+    needed: set[int] = set()
+    stack = list(nodes)
+    while stack:
+        i = stack.pop()
+        if i not in needed:
+            needed.add(i)
+            if not outside(i):
+                stack += program.steps[i].operands
+    return sorted(needed)
+
+
+def _expression(
+    operation: str, operands: Sequence[tuple[str, int]], dialect: Dialect
+) -> tuple[str, int]:
+    """Source of one operation and how tightly it binds.
+
+    The order of evaluation is the program's: a right operand that is itself a sum in a sum, or a
+    product in a product, keeps its brackets.
+    """
+    if operation in FUNCTIONS:
+        return f"{dialect.functions[operation]}({operands[0][0]})", _ATOM
+    if operation == "neg":
+        source, level = operands[0]
+        return (f"-{source}" if level >= _PRODUCT else f"-({source})"), _PRODUCT
+    assert operation in ARITHMETIC
+    level = _SUM if operation in ("add", "sub") else _PRODUCT
+    (left, left_level), (right, right_level) = operands
+    if left_level < level:
+        left = f"({left})"
+    if right_level <= level:
+        right = f"({right})"
+    return f"{left} {SYMBOLS[operation]} {right}", level
+

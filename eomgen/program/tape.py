@@ -1,0 +1,257 @@
+"""The tape: straight-line arithmetic in which every operation is interned and folded at birth.
+
+A `Node` is an abstract scalar: it adds, subtracts, multiplies, divides, and has sin, cos, sqrt. What
+is written twice exists once, constants fold, 0·x and 1·x vanish, and minus signs move outwards until
+an addition swallows them. No expression tree ever exists.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+
+class Stage(IntEnum):
+    """What a step depends on, and so how often it must be repeated."""
+
+    CONSTANT = 0
+    PARAMETERS = 1
+    POSITIONS = 2
+    VELOCITIES = 3
+    INPUTS = 4
+
+
+FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "sin": math.sin,
+    "cos": math.cos,
+    "tan": math.tan,
+    "sqrt": math.sqrt,
+}
+ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+}
+COUNTED = (*ARITHMETIC, "neg", *FUNCTIONS)
+"""Operations that cost something, each counted one."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One operation on earlier steps. A constant holds its value, an input its name."""
+
+    operation: str
+    operands: tuple[int, ...]
+    stage: Stage
+    value: float | str | None = None
+
+
+class Node:
+    """A scalar on a tape, written with + - * / and unary minus."""
+
+    __slots__ = ("index", "tape")
+
+    def __init__(self, tape: "Tape", index: int) -> None:
+        self.tape = tape
+        self.index = index
+
+    @property
+    def step(self) -> Step:
+        """The step that computes this node."""
+        return self.tape.steps[self.index]
+
+    def __add__(self, other: "Node") -> "Node":
+        return self.tape.apply("add", self, other)
+
+    def __sub__(self, other: "Node") -> "Node":
+        return self.tape.apply("sub", self, other)
+
+    def __mul__(self, other: "Node") -> "Node":
+        return self.tape.apply("mul", self, other)
+
+    def __truediv__(self, other: "Node") -> "Node":
+        return self.tape.apply("div", self, other)
+
+    def __neg__(self) -> "Node":
+        return self.tape.apply("neg", self)
+
+
+class Tape:
+    """Steps in order; grows only through `constant`, `input` and `apply`."""
+
+    def __init__(self) -> None:
+        self.steps: list[Step] = []
+        self.names: dict[int, str] = {}
+        self._known: dict[Step, int] = {}
+
+    def _intern(self, step: Step) -> Node:
+        index = self._known.get(step)
+        if index is None:
+            index = self._known[step] = len(self.steps)
+            self.steps.append(step)
+        return Node(self, index)
+
+    def constant(self, value: float) -> Node:
+        """A number."""
+        return self._intern(Step("constant", (), Stage.CONSTANT, float(value) + 0.0))
+
+    def input(self, name: str, stage: Stage) -> Node:
+        """A named quantity that is given at run time."""
+        return self._intern(Step("input", (), stage, name))
+
+    def named(self, node: Node, name: str) -> Node:
+        """Suggest a name for the variable that will hold a node; the first suggestion stays."""
+        self.names.setdefault(node.index, name)
+        return node
+
+    def apply(self, operation: str, *nodes: Node) -> Node:
+        """An operation on nodes, folded if it can be."""
+        folded = _FOLD[operation](self, *nodes) if operation in _FOLD else None
+        if folded is not None:
+            return folded
+        values = [_value(node) for node in nodes]
+        if operation in FUNCTIONS and values[0] is not None:
+            return self.constant(FUNCTIONS[operation](values[0]))
+        operands = tuple(node.index for node in nodes)
+        if operation in ("add", "mul"):
+            operands = tuple(sorted(operands))
+        stage = max(node.step.stage for node in nodes)
+        return self._intern(Step(operation, operands, stage))
+
+
+def _value(node: Node) -> float | None:
+    step = node.step
+    return float(step.value) if step.operation == "constant" and step.value is not None else None
+
+
+def _negated(node: Node) -> Node | None:
+    """The node that this one is minus of, if it is a negation."""
+    step = node.step
+    return Node(node.tape, step.operands[0]) if step.operation == "neg" else None
+
+
+def _fold_add(tape: Tape, a: Node, b: Node) -> Node | None:
+    va, vb = _value(a), _value(b)
+    if va is not None and vb is not None:
+        return tape.constant(va + vb)
+    if va == 0.0:
+        return b
+    if vb == 0.0:
+        return a
+    minus_b, minus_a = _negated(b), _negated(a)
+    if minus_b is not None:
+        return a - minus_b
+    if minus_a is not None:
+        return b - minus_a
+    return None
+
+
+def _fold_sub(tape: Tape, a: Node, b: Node) -> Node | None:
+    va, vb = _value(a), _value(b)
+    if va is not None and vb is not None:
+        return tape.constant(va - vb)
+    if vb == 0.0:
+        return a
+    if va == 0.0:
+        return -b
+    if a.index == b.index:
+        return tape.constant(0.0)
+    minus_b, minus_a = _negated(b), _negated(a)
+    if minus_b is not None:
+        return a + minus_b
+    if minus_a is not None:
+        return -(minus_a + b)
+    return None
+
+
+def _fold_mul(tape: Tape, a: Node, b: Node) -> Node | None:
+    va, vb = _value(a), _value(b)
+    if va is not None and vb is not None:
+        return tape.constant(va * vb)
+    for value, other in ((va, b), (vb, a)):
+        if value == 0.0:
+            return tape.constant(0.0)
+        if value == 1.0:
+            return other
+        if value is not None and value < 0.0:
+            return -(tape.constant(-value) * other)
+    for x, other in ((a, b), (b, a)):
+        minus = _negated(x)
+        if minus is not None:
+            return -(minus * other)
+    return None
+
+
+def _fold_div(tape: Tape, a: Node, b: Node) -> Node | None:
+    va, vb = _value(a), _value(b)
+    if va is not None and vb is not None and vb != 0.0:
+        return tape.constant(va / vb)
+    if va == 0.0:
+        return tape.constant(0.0)
+    if vb == 1.0:
+        return a
+    if (vb is not None and vb < 0.0) or (va is not None and va < 0.0):
+        top, bottom = (a, tape.constant(-vb)) if vb is not None else (tape.constant(-va), b)  # type: ignore[operator]
+        return -(top / bottom)
+    for x, build in ((a, lambda m: m / b), (b, lambda m: a / m)):
+        minus = _negated(x)
+        if minus is not None:
+            return -build(minus)
+    return None
+
+
+def _fold_neg(tape: Tape, a: Node) -> Node | None:
+    value, minus = _value(a), _negated(a)
+    if value is not None:
+        return tape.constant(-value)
+    if minus is not None:
+        return minus
+    if a.step.operation == "sub":
+        left, right = a.step.operands
+        return Node(tape, right) - Node(tape, left)
+    return None
+
+
+def _fold_sin(tape: Tape, a: Node) -> Node | None:
+    minus = _negated(a)
+    return None if minus is None else -tape.apply("sin", minus)
+
+
+def _fold_cos(tape: Tape, a: Node) -> Node | None:
+    minus = _negated(a)
+    return None if minus is None else tape.apply("cos", minus)
+
+
+_FOLD: dict[str, Callable[..., Node | None]] = {
+    "add": _fold_add,
+    "sub": _fold_sub,
+    "mul": _fold_mul,
+    "div": _fold_div,
+    "neg": _fold_neg,
+    "sin": _fold_sin,
+    "cos": _fold_cos,
+}
+
+
+def power(node: Node, exponent: int) -> Node:
+    """A whole power >= 1 by repeated squaring."""
+    result: Node | None = None
+    square = node
+    while exponent:
+        if exponent & 1:
+            result = square if result is None else result * square
+        exponent >>= 1
+        if exponent:
+            square = square * square
+    assert result is not None
+    return result
+
+
+def total(nodes: Sequence[Node], tape: Tape) -> Node:
+    """The sum of nodes."""
+    result = tape.constant(0.0)
+    for node in nodes:
+        result = result + node
+    return result
