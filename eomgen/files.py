@@ -29,6 +29,16 @@ def check_writable(path: Path, *, force: bool = False) -> None:
         )
 
 
+def check_folder(path: Path) -> None:
+    """Make a folder for output. Raises `RunError` if it cannot be, or cannot be written to."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RunError(f"{path}: cannot be made a folder: {error.strerror}") from None
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise RunError(f"{path}: cannot be written to; choose another folder with -o")
+
+
 def write_whole(path: Path, data: bytes | str, *, force: bool = False) -> None:
     """Write `data` to a temporary file beside `path`, then rename it into place.
 

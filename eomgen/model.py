@@ -160,7 +160,14 @@ def _bodies(scene: Scene, known: dict[str, float], parameters: list[Parameter]) 
         for name in ready:
             order[name] = len(order)
     return [
-        _body(scene.bodies[names.index(name)], names.index(name), *holding[name], order, known, parameters)
+        _body(
+            scene.bodies[names.index(name)],
+            names.index(name),
+            *holding[name],
+            order,
+            known,
+            parameters,
+        )
         for name in order
     ]
 

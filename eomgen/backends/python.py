@@ -23,7 +23,7 @@ ABOUT = {
     "derivative": "Time derivative of the state.",
     "jacobian": "Exact Jacobian of `derivative` by the state.",
     "forward_dynamics": "Accelerations (nv,) under generalised forces `tau` beside the effects.",
-    "inverse_dynamics": "Generalised forces (nv,) that give accelerations `vd`, beside the effects.",
+    "inverse_dynamics": "Generalised forces (nv,) that give accelerations `vd` beside the effects.",
     "mass_matrix": "Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v.",
     "velocity_force": "V(q, v) of M v̇ + V + G = F, (nv,).",
     "gravity_force": "G(q) of M v̇ + V + G = F, (nv,).",
@@ -32,7 +32,7 @@ ABOUT = {
     "potential_energy": "Potential energy, J.",
     "momentum": "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
     "joint_forces": "Force of each of `JOINTS` on its parent, world x and y, N.",
-    "body_poses": "World x, y (m) of each centre of mass, and angle (rad), a row for each of `BODIES`.",
+    "body_poses": "World x, y (m) of each centre of mass and angle (rad), a row a body.",
 }
 
 
@@ -63,10 +63,10 @@ def python_module(system: System) -> str:
     }
     roots = sorted({i for block in blocks.values() for i in block.constants})
     made = [i for i in roots if program.steps[i].operation != "input"]
-    checked = [node for _, node in program.checks]
-    fixed = print_block(
-        program, [*made, *checked], names, DIALECT, fixed=True, keep=made
-    )
+    # Checked before anything divides by it; the blocks share names, so they may share lines.
+    checked = print_block(program, [n for _, n in program.checks], names, DIALECT, fixed=True)
+    fixed = print_block(program, made, names, DIALECT, fixed=True, keep=made)
+    known = {name for name, _ in checked.lines}
     parameters = [p.name for p in model.parameters]
     inputs = [i.name for i in model.inputs]
 
@@ -105,11 +105,12 @@ def python_module(system: System) -> str:
         "bodies": repr(tuple(body.name for body in model.bodies)),
         "joints": repr(tuple(b.joint.name for b in model.bodies if b.joint.type != "free")),
         "costs": [(name, json.dumps(cost(program, name))) for name in kernels],
-        "fixed": fixed,
+        "checked": checked.lines,
         "checks": [
             (_plain(about), source)
-            for (about, _), source in zip(program.checks, fixed.results[len(made) :], strict=True)
+            for (about, _), source in zip(program.checks, checked.results, strict=True)
         ],
+        "fixed": [(name, source) for name, source in fixed.lines if name not in known],
         "kernels": list(kernels.values()),
         "outputs": [k for n, k in kernels.items() if n not in special],
         "nv": len(model.coordinates),
@@ -167,7 +168,10 @@ def _document(system: System) -> list[str]:
     if model.parameters:
         lines += ["", "Parameters p, with the scene's values:"]
         lines += _table(
-            [(f"{p.name} = {p.default!r}", _plain(p.unit), _plain(p.about)) for p in model.parameters]
+            [
+                (f"{p.name} = {p.default!r}", _plain(p.unit), _plain(p.about))
+                for p in model.parameters
+            ]
         )
     effects = ", ".join(effect.type for effect in model.effects) or "none"
     lines += ["", f"Effects: {effects}."]
@@ -186,5 +190,3 @@ def _table(rows: list[tuple[str, str, str]]) -> list[str]:
         f"    {name:<{widths[0]}}  {unit:<{widths[1]}}  {about}".rstrip()
         for name, unit, about in rows
     ]
-
-

@@ -25,8 +25,8 @@ class Equations:
     """A model's equations of motion, derived as the handout derives them.
 
     `collected` is (24) in the handout's rows; `symmetric` the same equations in generalised forces,
-    with M = Mᵀ; `solution` the closed form; `joint_force` the recovered force f_j of every joint, as
-    definitions over the accelerations.
+    with M = Mᵀ; `solution` the closed form; `joint_force` the recovered force f_j of every joint,
+    as definitions over the accelerations.
     """
 
     model: Model
@@ -50,9 +50,7 @@ def derive(model: Model) -> Equations:
           (collected.M, collected.V, collected.G, collected.F))
     )  # fmt: skip
     right_side = body_rows(model, kinematics, collected.F - collected.V - collected.G)
-    solution = solve(
-        model, symbols, kinematics, right_side + _generalised_forces(model, symbols)
-    )
+    solution = solve(model, symbols, kinematics, right_side + _generalised_forces(model, symbols))
     return Equations(
         model,
         symbols,

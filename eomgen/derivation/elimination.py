@@ -1,4 +1,4 @@
-"""Joint forces and dependent accelerations eliminated: M q̈ + V + G = F (handout (24)-(28), (36))."""
+"""Joint forces and dependent accelerations eliminated: M q̈ + V + G = F (handout (24)-(36))."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

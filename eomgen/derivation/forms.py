@@ -1,8 +1,8 @@
 """State forms: which numbers a state vector holds.
 
 `velocity` is [q, v]. `momentum` and `redundant` are the handout's: position, momentum, angle and
-angular momentum of the bodies, for all of them (1), or for the roots of floating trees with angle and
-angular momentum alone for the rest, since (21) gives what is left out.
+angular momentum of the bodies, for all of them (1), or for the roots of floating trees, with angle
+and angular momentum alone for the rest, since (21) gives what is left out.
 """
 
 from dataclasses import dataclass
@@ -54,8 +54,7 @@ def state_form(equations: Equations) -> StateForm:
 def _velocity_form(equations: Equations) -> StateForm:
     symbols, coordinates = equations.symbols, equations.model.coordinates
     states = [
-        State(c.name, c.unit, c.about, True, q)
-        for c, q in zip(coordinates, symbols.q, strict=True)
+        State(c.name, c.unit, c.about, True, q) for c, q in zip(coordinates, symbols.q, strict=True)
     ] + [
         State(c.rate, f"{c.unit}/s", f"rate of {c.name}", False, v)
         for c, v in zip(coordinates, symbols.v, strict=True)
@@ -126,7 +125,9 @@ def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
         angle, spin = sp.Symbol(word, real=True), sp.Symbol(f"L_{name}", real=True)
         states += [
             State(word, "rad", f"angle of {name} from the {WORLD}'s x axis", True, angle),
-            State(spin.name, "kg m^2/s", f"angular momentum of {name} about its centre", False, spin),
+            State(
+                spin.name, "kg m^2/s", f"angular momentum of {name} about its centre", False, spin
+            ),
         ]
         initial += [symbols.angle[k].xreplace(outward), inertia * symbols.omega[k]]
         replaced[symbols.angle[k]] = angle
@@ -159,7 +160,7 @@ def _check_names(equations: Equations, states: list[State]) -> None:
     for state in states:
         if state.name in taken:
             raise SceneError(
-                f"'{state.name}' is the name of {taken[state.name]} and would be that of a state of "
+                f"'{state.name}' is the name of {taken[state.name]} and of a state of "
                 f"form '{model.form}'; rename the parameter or input"
             )
         taken[state.name] = "another state"

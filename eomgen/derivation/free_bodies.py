@@ -1,4 +1,4 @@
-"""Each body drawn free: Newton's and Euler's equations with unknown joint forces (handout (12)-(17))."""
+"""Each body drawn free: Newton and Euler with unknown joint forces (handout (12)-(17))."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -127,9 +127,7 @@ def _solve_tree(
                     entries[i] = (old[0] + slope[0], old[1] + slope[1])
         carried[k] = {i: e for i, e in entries.items() if e != (0, 0)}
     pairs = [_Pair(symbols.mass[k], carried[k]) for k in tree.bodies]
-    load = {
-        k: tidy(right_side[angle_index(model, k)].xreplace(absolute)) for k in tree.bodies
-    }
+    load = {k: tidy(right_side[angle_index(model, k)].xreplace(absolute)) for k in tree.bodies}
     root = model.bodies[tree.root].name
     if tree.floating:
         x = angle_index(model, tree.root) - 2
@@ -290,7 +288,11 @@ def positive_form(pivot: Expr, notes: _Notes) -> Expr:
     if len(cosines) != 1 or sp.count_ops(written) > LONGEST_REWRITTEN:
         return pivot
     angle = cosines[0].args[0]
-    parts = {sp.cos(angle) ** 2: [], sp.sin(angle) ** 2: [], sp.Integer(1): []}
+    parts: dict[Expr, list[Expr]] = {
+        sp.cos(angle) ** 2: [],
+        sp.sin(angle) ** 2: [],
+        sp.Integer(1): [],
+    }
     for term in sp.Add.make_args(written):
         coefficient, moving = term.as_independent(sp.sin, sp.cos)
         if moving not in parts:

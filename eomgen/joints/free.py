@@ -16,7 +16,8 @@ class Free(Table):
     parent: Literal["world"] = "world"
     child: Identifier = Field(description="body that moves freely")
     coordinates: tuple[Identifier, Identifier, Identifier] | None = Field(
-        default=None, description="names of x, y and angle; <child>_x, <child>_y, <child>_angle if absent"
+        default=None,
+        description="names of x, y and angle; <child>_x, <child>_y, <child>_angle if absent",
     )
 
     def named_coordinates(self) -> tuple[Coordinate, ...]:

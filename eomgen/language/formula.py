@@ -118,7 +118,9 @@ def _read(node: ast.expr, depth: int) -> Formula:
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
             operands = (_read(left, depth + 1), _read(right, depth + 1))
             if isinstance(op, ast.Pow) and not _small_whole(operands[1]):
-                raise FormulaError(f"has a power {at} that is not a whole number 0 to {LARGEST_POWER}")
+                raise FormulaError(
+                    f"has a power {at} that is not a whole number 0 to {LARGEST_POWER}"
+                )
             return Apply(_OPERATORS[type(op)], operands)
         case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
             return Apply(name, (_read(argument, depth + 1),))

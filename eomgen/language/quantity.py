@@ -85,7 +85,7 @@ def name_quantities(
         if not isinstance(extra, dict) or "unit" not in extra:
             continue
         value = getattr(table, field)
-        named = []
+        named: list[Formula] = []
         for formula, suffix, spot in _parts(value, field):
             where = f"{place}.{spot}"
             _check(formula, where, str(extra["bound"]), str(extra["unit"]), known)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from eomgen.program.program import Output, Program, cost, finish, live_steps
-from eomgen.program.tape import Node, Stage, Tape
+from eomgen.program.tape import Node, Tape
 
 Rule = Callable[[Tape, str, list[Node]], Node]
 
@@ -56,9 +56,7 @@ def factor_sums(program: Program) -> Program:
             common = [i for i in a if i in b]
             if common:
                 shared = common[0]
-                left, right = (
-                    Node(tape, o[0] if o[1] == shared else o[1]) for o in (a, b)
-                )
+                left, right = (Node(tape, o[0] if o[1] == shared else o[1]) for o in (a, b))
                 return Node(tape, shared) * tape.apply(operation, left, right)
         return tape.apply(operation, *nodes)
 

@@ -113,9 +113,7 @@ def print_block(
     def outside(i: int) -> bool:
         if steps[i].operation == "constant":
             return False
-        return steps[i].operation == "input" or (
-            not fixed and steps[i].stage <= Stage.PARAMETERS
-        )
+        return steps[i].operation == "input" or (not fixed and steps[i].stage <= Stage.PARAMETERS)
 
     live = _live_until(program, nodes, outside)
     uses = dict.fromkeys(live, 0)
@@ -195,4 +193,3 @@ def _expression(
     if right_level <= level:
         right = f"({right})"
     return f"{left} {SYMBOLS[operation]} {right}", level
-

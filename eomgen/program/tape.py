@@ -192,13 +192,15 @@ def _fold_div(tape: Tape, a: Node, b: Node) -> Node | None:
         return tape.constant(0.0)
     if vb == 1.0:
         return a
-    if (vb is not None and vb < 0.0) or (va is not None and va < 0.0):
-        top, bottom = (a, tape.constant(-vb)) if vb is not None else (tape.constant(-va), b)  # type: ignore[operator]
-        return -(top / bottom)
-    for x, build in ((a, lambda m: m / b), (b, lambda m: a / m)):
-        minus = _negated(x)
-        if minus is not None:
-            return -build(minus)
+    if vb is not None and vb < 0.0:
+        return -(a / tape.constant(-vb))
+    if va is not None and va < 0.0:
+        return -(tape.constant(-va) / b)
+    minus_a, minus_b = _negated(a), _negated(b)
+    if minus_a is not None:
+        return -(minus_a / b)
+    if minus_b is not None:
+        return -(a / minus_b)
     return None
 
 

@@ -9,7 +9,11 @@ from eomgen.language.base import Identifier, Number, Positive, Table
 
 def _colour(text: str) -> str:
     digits = text[1:]
-    if not (text.startswith("#") and len(digits) == 6 and all(c in "0123456789abcdefABCDEF" for c in digits)):
+    if not (
+        text.startswith("#")
+        and len(digits) == 6
+        and all(c in "0123456789abcdefABCDEF" for c in digits)
+    ):
         raise ValueError("is no colour: write #rrggbb, for example '#3366cc'")
     return text
 

@@ -91,7 +91,9 @@ def _line(detail: ErrorDetails) -> str:
         case "union_tag_not_found":
             return f"{place}.type: missing; it says what kind this is"
         case "literal_error":
-            known = [word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
+            known = [
+                word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")
+            ]
             hint = nearest(str(detail["input"]), known) or f"; known: {', '.join(known)}"
             return f"{place}: unknown value {value}{hint}"
         case "value_error":
@@ -113,7 +115,15 @@ def _line(detail: ErrorDetails) -> str:
             return f"{place}: {value}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
 
 
-_UNION_MEMBERS = ("literal[", "tuple[", "dict[", "function-plain", "tuple-", "float", "ParameterTable")
+_UNION_MEMBERS = (
+    "literal[",
+    "tuple[",
+    "dict[",
+    "function-plain",
+    "tuple-",
+    "float",
+    "ParameterTable",
+)
 _TAGGED = {"joints", "effects", "shapes"}
 
 

@@ -20,7 +20,6 @@ from eomgen.show.style import (
     FAINT,
     INK,
     PALETTE,
-    check_figure,
     colours,
     plain,
     style,
@@ -62,7 +61,6 @@ def save_figure(motion: Motion, path: Path, force: bool = False) -> None:
 
     Raises `RunError` as `draw_motion` and `write_figure` do.
     """
-    check_figure(path, force=force)
     write_figure(draw_motion(motion), path, force=force)
 
 

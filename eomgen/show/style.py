@@ -45,7 +45,7 @@ STYLE = {
     "legend.frameon": False,
     "legend.handlelength": 1.2,
     "savefig.dpi": 150,
-  # without a salt, ids within an SVG are random
+    "svg.hashsalt": "eomgen",  # without a salt, ids within an SVG are random
 }
 
 # No PDF: Matplotlib writes its metadata last, too late for the mark that `files` looks for.

@@ -1,0 +1,1 @@
+"""Generates equations of motion: from a scene to a NumPy module of straight-line arithmetic."""

@@ -1,0 +1,7 @@
+"""`python -m eomgen`."""
+
+import sys
+
+from eomgen.cli import main
+
+sys.exit(main())

@@ -1,0 +1,106 @@
+"""The command line: parse, call, say what was done; exit code 0 done, 1 at fault, 2 wrong usage."""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from eomgen import commands
+from eomgen.errors import EomgenError
+
+Arguments = argparse.Namespace
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit code."""
+    parser = _parser()
+    given = parser.parse_args(arguments)
+    try:
+        code: int = given.run(given)
+        sys.stdout.flush()
+    except EomgenError as error:
+        for line in str(error).splitlines():
+            print(f"eomgen: {line}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:  # the reader of our output has gone; nothing is left to say
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except KeyboardInterrupt:
+        print("eomgen: interrupted", file=sys.stderr)
+        return 130
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="eomgen",
+        description="Equations of motion from a scene: derived, solved once, written as code.",
+        epilog="SCENE is a file or the name of a built-in scene (eomgen list).",
+    )
+    parser.add_argument("--version", action="version", version=f"eomgen {commands.version()}")
+    sub = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    def command(
+        name: str, run: Callable[[Arguments], int], about: str, scenes: str | None = "scene"
+    ) -> argparse.ArgumentParser:
+        added = sub.add_parser(name, help=about, description=about)
+        added.set_defaults(run=run)
+        if scenes == "scene":
+            added.add_argument("scene", metavar="SCENE", help="file or built-in name")
+        elif scenes == "scenes":
+            added.add_argument("scenes", metavar="SCENE", nargs="*", help="file or built-in name")
+        return added
+
+    command("list", commands.list_scenes, "name the built-in scenes", None)
+    command("schema", commands.print_schema, "print the JSON Schema of scenes, for editors", None)
+    _form(command("check", commands.check, "validate a scene and say what it is made of"))
+    derive = _form(command("derive", commands.derive, "print the derivation, step by step"))
+    derive.add_argument("--format", choices=("text", "latex"), default="text")
+    derive.add_argument("-o", "--output", metavar="FILE", type=Path, help="write it to a file")
+    _force(derive)
+    generate = _form(
+        command("generate", commands.generate, "write the module of a scene", "scenes")
+    )
+    generate.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"))
+    generate.add_argument("--all", action="store_true", help="all built-in scenes")
+    generate.add_argument("--check", action="store_true", help="say which is stale, write nothing")
+    generate.add_argument("--report", action="store_true", help="say what each pass saved")
+    _force(generate)
+    _simulation(_form(command("simulate", commands.simulate, "integrate, and write what happened")))
+    _simulation(_form(command("view", commands.view, "integrate, and open the moving picture")))
+    return parser
+
+
+def _form(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    parser.add_argument(
+        "--form", choices=("velocity", "momentum", "redundant"), help="state form (the scene's)"
+    )
+    return parser
+
+
+def _force(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--force", action="store_true", help="overwrite files of others, too")
+
+
+def _simulation(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
+    parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
+    parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
+    parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
+    parser.add_argument("--t-end", metavar="S", type=float, help="end time")
+    parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
+    parser.add_argument(
+        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
+    )
+    parser.add_argument(
+        "--input", metavar="NAME=X", action="append", default=[], help="constant value of an input"
+    )
+    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
+    parser.add_argument("--plot", metavar="FILE", type=Path, help="figure (DIR/NAME.png)")
+    parser.add_argument("--view", action="store_true", help="open the page when done")
+    _force(parser)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

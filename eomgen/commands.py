@@ -1,0 +1,232 @@
+"""What each command does; what is heavy is imported by the command that needs it."""
+
+import argparse
+import importlib.metadata
+import math
+import os
+import sys
+import webbrowser
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+
+from eomgen.errors import RunError, nearest
+from eomgen.files import check_folder, check_writable, write_whole
+from eomgen.joints.base import WORLD
+from eomgen.model import Model, build_model
+from eomgen.scene.reader import built_in_names, read_scene
+from eomgen.scene.schema import Form
+from eomgen.store import generated_code
+
+Arguments = argparse.Namespace
+
+
+def version() -> str:
+    """This program's version."""
+    return importlib.metadata.version("eomgen")
+
+
+def list_scenes(given: Arguments) -> int:
+    """Names and titles of the built-in scenes."""
+    names = built_in_names()
+    for name in names:
+        print(f"{name:<{max(map(len, names))}}  {read_scene(name).title}")
+    return 0
+
+
+def print_schema(given: Arguments) -> int:
+    """The JSON Schema of the scene language."""
+    from eomgen.scene.json_schema import json_schema
+
+    print(json_schema(), end="")
+    return 0
+
+
+def check(given: Arguments) -> int:
+    """Validate; bodies, joints, degrees of freedom, effects in force."""
+    model = _model(given.scene, given.form)
+    print(f"{model.name}: {model.title}")
+    print(f"bodies      {', '.join(body.name for body in model.bodies)}")
+    for body in model.bodies:
+        joint = body.joint
+        parent = WORLD if body.parent < 0 else model.bodies[body.parent].name
+        names = ", ".join(c.name for c in body.coordinates)
+        print(f"joint       {joint.name}: {joint.type}, {parent} to {body.name}; {names}")
+    print(f"freedom     {len(model.coordinates)} degrees of freedom")
+    print(f"effects     {', '.join(effect.type for effect in model.effects) or 'none'}")
+    print(f"inputs      {', '.join(i.name for i in model.inputs) or 'none'}")
+    values = ", ".join(f"{p.name} = {p.default:g}" for p in model.parameters)
+    print(f"parameters  {values or 'none'}")
+    return 0
+
+
+def derive(given: Arguments) -> int:
+    """The derivation as text or LaTeX."""
+    model = _model(given.scene, given.form)
+    if given.output is not None:
+        check_writable(given.output, force=given.force)
+    from eomgen.derivation.closed import derive as derive_equations
+    from eomgen.derivation.steps import tell
+    from eomgen.show.derivation import as_latex, as_text
+
+    steps = tell(derive_equations(model))
+    text = (as_latex if given.format == "latex" else as_text)(model.title, steps)
+    if given.output is None:
+        print(text)
+    else:
+        write_whole(given.output, text, force=given.force)
+        print(f"wrote {given.output}")
+    return 0
+
+
+def generate(given: Arguments) -> int:
+    """Write modules, or with --check say which are stale."""
+    scenes = list(dict.fromkeys([*given.scenes, *(built_in_names() if given.all else ())]))
+    if not scenes:
+        raise RunError("generate: no scene; name one, or give --all for the built-in ones")
+    models = [_model(scene, given.form) for scene in scenes]
+    stale = 0
+    for model in models:
+        suffix = "" if given.form is None else f"_{given.form}"
+        path = given.output / f"{model.name}{suffix}.py"
+        if not given.check:
+            check_folder(given.output)
+            check_writable(path, force=given.force)
+        source, _, derived = generated_code(model, derive_again=given.report)
+        current = _text(path)
+        if given.check:
+            state = "fresh" if current == source else "missing" if current is None else "stale"
+            stale += state != "fresh"
+            print(f"{path}: {state}")
+        elif current == source:
+            print(f"{path}: fresh")
+        else:
+            write_whole(path, source, force=given.force)
+            print(f"{path}: written{'' if derived else ', not derived again'}")
+        if given.report:
+            _print_report(model)
+    if stale:
+        names = " ".join(scenes)
+        raise RunError(f"{stale} stale; run: eomgen generate {names} -o {given.output}")
+    return 0
+
+
+def _text(path: Path) -> str | None:
+    try:
+        return path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+def _print_report(model: Model) -> None:
+    from eomgen.pipeline import generate as generate_code
+
+    print(f"    {'pass':<20}{'steps':>8}{'derivative':>12}{'jacobian':>10}  (operations)")
+    for line in generate_code(model).reports:
+        print(f"    {line.name:<20}{line.steps:>8}{line.derivative:>12}{line.jacobian:>10}")
+
+
+def simulate(given: Arguments) -> int:
+    """Integrate; write trajectory, figure and page. A run that stops early writes what it has."""
+    model = _model(given.scene, given.form)
+    # Imported here: `check` and `generate` need neither SciPy nor Matplotlib.
+    from eomgen.run.integrate import integrate
+    from eomgen.run.integrators import FixedStep, find_integrator
+    from eomgen.run.module import as_problem, load_module
+    from eomgen.run.progress import terminal_progress
+    from eomgen.run.trajectory import save_csv, save_npz
+    from eomgen.show.figure import save_figure
+    from eomgen.show.observe import observe
+    from eomgen.show.page import save_page
+
+    wanted = model.simulation
+    integrator = given.integrator or wanted.integrator
+    fixed = isinstance(find_integrator(integrator), FixedStep)
+    parameters = _assignments(given.set, model.defaults, "parameter")
+    inputs = _assignments(given.input, [i.name for i in model.inputs], "input")
+    model = replace(
+        model,
+        parameters=tuple(
+            replace(p, default=parameters.get(p.name, p.default)) for p in model.parameters
+        ),
+    )
+    paths = {kind: given.output / f"{model.name}.{kind}" for kind in ("npz", "csv", "png", "html")}
+    paths["png"] = given.plot or paths["png"]
+    for path in paths.values():
+        check_folder(path.parent)
+        check_writable(path, force=given.force)
+
+    source, poses, derived = generated_code(_model(given.scene, given.form))
+    module = load_module(source, model.name)
+    with terminal_progress(f"simulating {model.name}") as progress:
+        trajectory = integrate(
+            as_problem(module, parameters or None, inputs or None),
+            integrator,
+            given.t_end if given.t_end is not None else wanted.t_end,
+            dt=(given.dt if given.dt is not None else wanted.dt) if fixed else given.dt,
+            rtol=given.rtol if given.rtol is not None else wanted.rtol,
+            atol=given.atol if given.atol is not None else wanted.atol,
+            samples=given.samples,
+            progress=progress,
+        )
+    motion = observe(model, module, trajectory)
+    values = tuple(p.default for p in model.parameters)
+    save_npz(trajectory, paths["npz"], force=given.force)
+    save_csv(trajectory, paths["csv"], force=given.force)
+    save_figure(motion, paths["png"], force=given.force)
+    save_page(motion, poses, values, paths["html"], force=given.force)
+
+    counts = trajectory.counts
+    how = "derived now" if derived else "module fresh, not derived again"
+    print(
+        f"{model.name}: {trajectory.t[-1]:g} s by {integrator}, {counts['steps']} steps, "
+        f"{counts['derivatives']} derivatives ({how})"
+    )
+    drift = float(motion.joint_drift.max(initial=0.0))
+    energy = motion.kinetic_energy + motion.potential_energy
+    print(f"    energy {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the end")
+    print(f"    largest gap in a joint {drift:.2g} m")
+    for path in paths.values():
+        print(f"    wrote {path}")
+    if not trajectory.finished:
+        raise RunError(f"{model.name}: {trajectory.message}")
+    if given.view:
+        _open(paths["html"])
+    return 0
+
+
+def view(given: Arguments) -> int:
+    """Simulate, then open the page."""
+    given.view = True
+    return simulate(given)
+
+
+def _open(page: Path) -> None:
+    """Show a page where there is a display; where there is none, say how."""
+    screen = sys.platform in ("win32", "darwin") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+    if not (screen and webbrowser.open(page.resolve().as_uri())):
+        print(f"    no display here; open {page} in a browser")
+
+
+def _model(scene: str, form: Form | None) -> Model:
+    model = build_model(read_scene(scene))
+    return model if form is None else replace(model, form=form)
+
+
+def _assignments(texts: list[str], known: Collection[str], what: str) -> dict[str, float]:
+    values = {}
+    for text in texts:
+        name, sign, number = text.partition("=")
+        if name not in known:
+            hint = nearest(name, known) or f"; known: {', '.join(known) or 'none'}"
+            raise RunError(f"--{'set' if what == 'parameter' else what}: no {what} '{name}'{hint}")
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if not (sign and math.isfinite(value)):
+            raise RunError(f"{text}: is no value; write {name}=1.5")
+        values[name] = value
+    return values

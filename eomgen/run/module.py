@@ -1,0 +1,66 @@
+"""A generated module as a loaded Python module."""
+
+import types
+from collections.abc import Callable
+from typing import Any, Protocol, cast
+
+from eomgen.errors import RunError
+from eomgen.run.problem import Floats, Problem
+
+
+class GeneratedModule(Protocol):
+    """The contract of a generated module, as far as running and showing need it."""
+
+    NAME: str
+    FORM: str
+    STATES: tuple[str, ...]
+    POSITIONS: tuple[int, ...]
+    INPUTS: dict[str, float]
+    PARAMETERS: dict[str, float]
+    UNITS: dict[str, str]
+    BODIES: tuple[str, ...]
+    JOINTS: tuple[str, ...]
+    COST: dict[str, dict[str, int]]
+    initial_state: Callable[..., Floats]
+    derivative: Callable[..., Floats]
+    jacobian: Callable[..., Floats]
+    kinetic_energy: Callable[..., Floats]
+    potential_energy: Callable[..., Floats]
+    body_poses: Callable[..., Floats]
+
+
+def load_module(source: str, name: str = "generated") -> GeneratedModule:
+    """Load a generated module from its source, which this program wrote itself."""
+    module: Any = types.ModuleType(name)
+    exec(compile(source, f"<generated {name}>", "exec"), module.__dict__)
+    return cast(GeneratedModule, module)
+
+
+def as_problem(module: GeneratedModule, parameters: Any = None, inputs: Any = None) -> Problem:
+    """The initial-value problem of a module, at given parameters and constant inputs.
+
+    Raises `RunError` if the module refuses them.
+    """
+    if parameters is None and inputs is None:  # the module's shortest way
+        derivative, jacobian = module.derivative, module.jacobian
+    else:
+
+        def derivative(t: float, y: Floats) -> Floats:
+            return module.derivative(t, y, parameters, inputs)
+
+        def jacobian(t: float, y: Floats) -> Floats:
+            return module.jacobian(t, y, parameters, inputs)
+
+    try:
+        initial = module.initial_state(parameters)
+        derivative(0.0, initial)
+    except ValueError as error:
+        raise RunError(f"{module.NAME}: {error}") from None
+    return Problem(
+        name=module.NAME,
+        states=module.STATES,
+        positions=module.POSITIONS,
+        derivative=derivative,
+        jacobian=jacobian,
+        initial=initial,
+    )

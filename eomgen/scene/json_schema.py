@@ -1,0 +1,28 @@
+"""The JSON Schema of the scene language, which editors read for completion and checks."""
+
+import json
+
+from eomgen.scene.schema import Scene
+
+
+def json_schema() -> str:
+    """The schema as JSON text, the same bytes each time."""
+    schema = Scene.model_json_schema()
+    _without_internals(schema)
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    return json.dumps(schema, indent=2) + "\n"
+
+
+def _without_internals(node: object) -> None:
+    """Drop what only this program reads; keep the unit, in words, where an editor shows it."""
+    if isinstance(node, dict):
+        unit = node.pop("unit", None)
+        if isinstance(unit, str):
+            node["description"] = f"{node.get('description', '')} ({unit})"
+        bound = node.pop("bound", None)
+        assert bound is None or isinstance(bound, str)
+        for value in node.values():
+            _without_internals(value)
+    elif isinstance(node, list):
+        for value in node:
+            _without_internals(value)
