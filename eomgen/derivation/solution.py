@@ -9,7 +9,8 @@ and weights w₁, w₂ leaves
     and one row    a · row₂ - b · row₁   of weight   w₁ w₂ / (w₁ a² + w₂ b²)
 
 (a Givens rotation without its square root: Gentleman 1973, Golub & Van Loan §5.3), so nothing is
-ever subtracted: every pivot is a sum of positive terms, and none can vanish while masses are positive.
+ever subtracted: every pivot is a sum of positive terms, none of which vanishes for positive
+masses.
 """
 
 from collections.abc import Sequence
@@ -288,11 +289,8 @@ def positive_form(pivot: Expr, notes: _Notes) -> Expr:
     if len(cosines) != 1 or sp.count_ops(written) > LONGEST_REWRITTEN:
         return pivot
     angle = cosines[0].args[0]
-    parts: dict[Expr, list[Expr]] = {
-        sp.cos(angle) ** 2: [],
-        sp.sin(angle) ** 2: [],
-        sp.Integer(1): [],
-    }
+    squares = (sp.cos(angle) ** 2, sp.sin(angle) ** 2, sp.Integer(1))
+    parts: dict[Expr, list[Expr]] = {square: [] for square in squares}
     for term in sp.Add.make_args(written):
         coefficient, moving = term.as_independent(sp.sin, sp.cos)
         if moving not in parts:

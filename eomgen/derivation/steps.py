@@ -53,7 +53,7 @@ def tell(equations: Equations) -> tuple[Step, ...]:
             "(1)",
             "State",
             "Each body has the position x, y of its centre of mass, its momentum P = m v, its "
-            "orientation and its angular momentum L = I ω. The joints leave the coordinates q free.",
+            "orientation and its angular momentum L = I ω. The joints leave the coordinates free.",
             lines([
                 *((s.angle[k], kin.angle[k]) for k in bodies),
                 *((s.omega[k], kin.omega[k]) for k in bodies),
@@ -106,10 +106,10 @@ def tell(equations: Equations) -> tuple[Step, ...]:
             f"{side}. Put into the torque equations, with the dependent "
             "accelerations replaced by (22) and (23), this leaves M a + V + G = F in the "
             "accelerations a of the coordinates"
-            + (", the first rows of a floating tree being the sum of its forces." if floating else "."),
+            + (", a floating tree's first rows being the sum of its forces." if floating else "."),
             lines([(_symbol("a"), sp.Matrix(s.a))]),
         ),
-        Step("(26)", "Mass matrix", "Not symmetric: the rows are torques about each centre of mass.",
+        Step("(26)", "Mass matrix", "Not symmetric: its rows are torques about the bodies' own centres.",
              lines([(_symbol("M"), collected.M)])),
         Step("(27)", "Velocity forces", "", lines([(_symbol("V"), collected.V)])),
         Step("(28)", "Gravity forces", "", lines([(_symbol("G"), collected.G)])),

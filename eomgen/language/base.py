@@ -1,4 +1,4 @@
-"""What every table of a scene shares: no unknown keys, no text taken for numbers, frozen once read."""
+"""What every table of a scene shares: no unknown keys, no text for numbers, frozen once read."""
 
 import keyword
 import re

@@ -147,7 +147,7 @@ def names_in(formula: Formula) -> Iterator[str]:
 
 
 def evaluate(formula: Formula, names: Mapping[str, Any], scalars: Scalars) -> Any:
-    """The value of a formula over the given scalars. Raises `KeyError` for a name not in `names`."""
+    """The value of a formula over given scalars. Raises `KeyError` for a name not in `names`."""
     match formula:
         case Constant(value):
             return scalars.number(value)

@@ -1,8 +1,8 @@
 """From SymPy expressions to the tape.
 
-SymPy's sums and products have many operands and no order of work. Here they get one: what depends on
-parameters alone is multiplied together first, so that it is computed once, and terms that share such
-a coefficient are added before they are multiplied by it.
+SymPy's sums and products have many operands and no order of work. Here they get one: what depends
+on parameters alone is multiplied together first, so that it is computed once, and terms that share
+such a coefficient are added before they are multiplied by it.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Outputs of a program as lines of source code: names, inlining, brackets. Languages differ little."""
+"""Outputs of a program as lines of source code: names, inlining, brackets."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """The tape: straight-line arithmetic in which every operation is interned and folded at birth.
 
-A `Node` is an abstract scalar: it adds, subtracts, multiplies, divides, and has sin, cos, sqrt. What
-is written twice exists once, constants fold, 0·x and 1·x vanish, and minus signs move outwards until
-an addition swallows them. No expression tree ever exists.
+A `Node` is an abstract scalar: it adds, subtracts, multiplies, divides, and has sin, cos, sqrt.
+What is written twice exists once, constants fold, 0·x and 1·x vanish, and minus signs move outwards
+until an addition swallows them. No expression tree ever exists.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What a scene says of its looks: shapes on bodies, and the camera. Nothing here enters an equation."""
+"""The looks of a scene: shapes on bodies, and the camera. Nothing here enters an equation."""
 
 from typing import Annotated, Literal
 

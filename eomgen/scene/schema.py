@@ -106,7 +106,9 @@ class Scene(Table):
     outputs: Literal["all"] | tuple[Output, ...] = Field(default=(), union_mode="left_to_right")
     form: Form = "velocity"
     route: Literal["auto", "closed"] = "auto"
-    parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = {}
+    parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
+        Field(default={})
+    )
     bodies: Annotated[tuple[BodyTable, ...], Field(min_length=1, max_length=MOST)]
     joints: Annotated[tuple[Joint, ...], Field(min_length=1, max_length=MOST)]
     effects: Annotated[tuple[Effect, ...], Field(max_length=MOST)] = ()

@@ -82,6 +82,6 @@ _LATEX = {
 
 
 def _escaped(text: str) -> str:
-    """Text as it may stand in LaTeX; what no font of a plain document has becomes a question mark."""
+    """Text as it may stand in LaTeX; a character no plain document has becomes a question mark."""
     safe = (_LATEX.get(c, c if c.isascii() and c.isprintable() else "?") for c in text)
     return "".join(safe)

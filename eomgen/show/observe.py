@@ -14,9 +14,16 @@ Floats = NDArray[np.float64]
 
 
 def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Motion:
-    """What a figure or a page shows of a run."""
+    """What a figure or a page shows of a run, at the values of the model's parameters."""
     columns = trajectory.y.T
-    poses = np.moveaxis(module.body_poses(0.0, columns), -1, 0)
+    p = {parameter.name: parameter.default for parameter in model.parameters}
+    with np.errstate(
+        all="ignore"
+    ):  # a run that was stopped may hold numbers whose squares overflow
+        poses = np.moveaxis(module.body_poses(0.0, columns, p), -1, 0)
+        kinetic = module.kinetic_energy(0.0, columns, p)
+        potential = module.potential_energy(0.0, columns, p)
+        drift = joint_drift(model, poses)
     return Motion(
         name=model.name,
         title=model.title,
@@ -29,9 +36,9 @@ def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Mo
         shapes=tuple(body.shapes for body in model.bodies),
         joints=module.JOINTS,
         poses=poses,
-        kinetic_energy=module.kinetic_energy(0.0, columns),
-        potential_energy=module.potential_energy(0.0, columns),
-        joint_drift=joint_drift(model, poses),
+        kinetic_energy=kinetic,
+        potential_energy=potential,
+        joint_drift=drift,
         camera=model.camera,
         integrator=trajectory.integrator,
         finished=trajectory.finished,
