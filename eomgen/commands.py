@@ -10,11 +10,11 @@ from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
-from eomgen.errors import RunError, nearest
+from eomgen.errors import RunError, SceneError, nearest
 from eomgen.files import check_folder, check_writable, write_whole
 from eomgen.joints.base import WORLD
 from eomgen.model import Model, build_model
-from eomgen.scene.reader import built_in_names, read_scene
+from eomgen.scene.reader import built_in_names, find_scene, read_scene
 from eomgen.scene.schema import Form
 from eomgen.store import generated_code
 
@@ -127,7 +127,7 @@ def _print_report(model: Model) -> None:
 
 
 def simulate(given: Arguments) -> int:
-    """Integrate; write trajectory, figure and page. A run that stops early writes what it has."""
+    """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
     model = _model(given.scene, given.form)
     # Imported here: `check` and `generate` need neither SciPy nor Matplotlib.
     from eomgen.run.integrate import integrate
@@ -150,7 +150,8 @@ def simulate(given: Arguments) -> int:
             replace(p, default=parameters.get(p.name, p.default)) for p in model.parameters
         ),
     )
-    paths = {kind: given.output / f"{model.name}.{kind}" for kind in ("npz", "csv", "png", "html")}
+    kinds = ("py", "npz", "csv", "png", "html")
+    paths = {kind: given.output / f"{model.name}.{kind}" for kind in kinds}
     paths["png"] = given.plot or paths["png"]
     for path in paths.values():
         check_folder(path.parent)
@@ -171,6 +172,7 @@ def simulate(given: Arguments) -> int:
         )
     motion = observe(model, module, trajectory)
     values = tuple(p.default for p in model.parameters)
+    write_whole(paths["py"], source, force=given.force)
     save_npz(trajectory, paths["npz"], force=given.force)
     save_csv(trajectory, paths["csv"], force=given.force)
     save_figure(motion, paths["png"], force=given.force)
@@ -211,7 +213,11 @@ def _open(page: Path) -> None:
 
 
 def _model(scene: str, form: Form | None) -> Model:
-    model = build_model(read_scene(scene))
+    tables = read_scene(scene)
+    try:
+        model = build_model(tables)
+    except SceneError as error:
+        raise SceneError(f"{find_scene(scene).name}: {error}") from None
     return model if form is None else replace(model, form=form)
 
 

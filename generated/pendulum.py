@@ -98,7 +98,7 @@ def _constants(values):
 def _initial_state(y, k, u=(), extra=()):
     """0 operations."""
     return (
-        0.0,
+        3.141592653589793,
         0.0,
     )
 

@@ -1,6 +1,7 @@
 """A generated module as a loaded Python module."""
 
-import types
+import importlib.abc
+import importlib.util
 from collections.abc import Callable
 from typing import Any, Protocol, cast
 
@@ -29,10 +30,22 @@ class GeneratedModule(Protocol):
     body_poses: Callable[..., Floats]
 
 
+class _FromSource(importlib.abc.InspectLoader):
+    """Loads a module from source that is at hand."""
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+
+    def get_source(self, fullname: str) -> str:
+        return self._source
+
+
 def load_module(source: str, name: str = "generated") -> GeneratedModule:
     """Load a generated module from its source, which this program wrote itself."""
-    module: Any = types.ModuleType(name)
-    exec(compile(source, f"<generated {name}>", "exec"), module.__dict__)
+    spec = importlib.util.spec_from_loader(name, _FromSource(source))
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
     return cast(GeneratedModule, module)
 
 

@@ -16,11 +16,10 @@ def json_schema() -> str:
 def _without_internals(node: object) -> None:
     """Drop what only this program reads; keep the unit, in words, where an editor shows it."""
     if isinstance(node, dict):
-        unit = node.pop("unit", None)
-        if isinstance(unit, str):
-            node["description"] = f"{node.get('description', '')} ({unit})"
-        bound = node.pop("bound", None)
-        assert bound is None or isinstance(bound, str)
+        if isinstance(node.get("unit"), str):  # a mark of ours, not a property of that name
+            node["description"] = f"{node.get('description', '')} ({node.pop('unit')})"
+        if isinstance(node.get("bound"), str):
+            del node["bound"]
         for value in node.values():
             _without_internals(value)
     elif isinstance(node, list):

@@ -63,12 +63,23 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
     try:
         return Scene.model_validate(table)
     except ValidationError as error:
-        # One mistake can fail several members of a union; each place is worth one line.
-        lines = list(dict.fromkeys(_line(detail) for detail in error.errors()))
+        lines = _lines(error.errors())
         more = len(lines) - MOST_MESSAGES
         tail = [f"{source}: and {more} more"] if more > 0 else []
         shown = [f"{source}: {line}" for line in lines[:MOST_MESSAGES]]
         raise SceneError("\n".join([*shown, *tail])) from None
+
+
+def _lines(details: list[ErrorDetails]) -> list[str]:
+    """One line for each place: a mistake fails every member of a union, the deepest says most."""
+    lines: dict[str, str] = {}
+    for detail in details:
+        lines.setdefault(_place(detail["loc"]), _line(detail))
+    return [
+        line
+        for place, line in lines.items()
+        if not any(other.startswith((f"{place}.", f"{place}[")) for other in lines)
+    ]
 
 
 def _line(detail: ErrorDetails) -> str:

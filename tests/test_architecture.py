@@ -1,0 +1,173 @@
+"""The shape of the code: imports go one way, the running half is light, promises of the README."""
+
+import ast
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import eomgen
+from eomgen.run.integrators import INTEGRATORS
+from eomgen.scene.json_schema import json_schema
+from eomgen.scene.reader import BUILT_IN, built_in_names, read_scene
+
+PACKAGE = Path(eomgen.__file__).parent
+ROOT = Path(__file__).parent.parent
+
+# Each room may import from itself and from those before it.
+ORDER = (
+    ("errors",),
+    ("files",),
+    ("language",),
+    ("joints",),
+    ("effects",),
+    ("scene",),
+    ("model",),
+    ("derivation",),
+    ("templating",),
+    ("program",),
+    ("backends",),
+    ("pipeline",),
+    ("store",),
+    ("run",),
+    ("show",),
+    ("commands",),
+    ("cli",),
+    ("__main__",),
+)
+
+
+def imports(path: Path) -> list[str]:
+    """The package's own modules that a module imports, wherever in it."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("eomgen"):
+            found += [f"{node.module}.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names if alias.name.startswith("eomgen")]
+    return found
+
+
+def room(module: str) -> str:
+    """`derivation` of `eomgen.derivation.closed`."""
+    return module.split(".")[1]
+
+
+def test_imports_go_one_way() -> None:
+    """A later stage is never imported by an earlier one, not even inside a function."""
+    rank = {name: i for i, names in enumerate(ORDER) for name in names}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        if parts == ("__init__",):
+            continue
+        for other in imports(path):
+            target = room(other) if "." in other else "cli"
+            if other == "eomgen.commands":
+                target = "commands"
+            assert rank[target] <= rank[parts[0]], f"{'/'.join(parts)} imports {other}"
+
+
+def test_no_import_cycle() -> None:
+    """No module reaches itself through what it imports."""
+    files = {}
+    for path in PACKAGE.rglob("*.py"):
+        parts = ("eomgen", *path.relative_to(PACKAGE).with_suffix("").parts)
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    edges = {
+        name: {m for i in imports(path) for m in (i, i.rpartition(".")[0]) if m in files} - {name}
+        for name, path in files.items()
+    }
+    for start in files:
+        seen: set[str] = set()
+        stack = list(edges[start])
+        while stack:
+            name = stack.pop()
+            if name not in seen:
+                seen.add(name)
+                stack += edges[name]
+        assert start not in seen, f"{start} imports itself"
+
+
+def test_the_running_half_does_without_sympy() -> None:
+    """Loading, integrating, drawing: SymPy is neither needed nor imported."""
+    code = (
+        "import sys, eomgen.store, eomgen.run.integrate, eomgen.run.module, eomgen.commands, "
+        "eomgen.show.observe, eomgen.show.figure, eomgen.show.page; "
+        "sys.exit('sympy' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_fresh_scene_is_simulated_without_sympy(tmp_path: Path) -> None:
+    """With its module in the store, `simulate` never loads SymPy."""
+    run = (
+        "import sys; from eomgen.cli import main; "
+        "code = main(['simulate', 'pendulum', '--t-end', '0.1', '-o', sys.argv[1]]); "
+        "sys.exit(code or 10 * ('sympy' in sys.modules))"
+    )
+    environment = {"EOMGEN_CACHE": str(tmp_path / "store"), "PATH": ""}
+    codes = [
+        subprocess.run(
+            [sys.executable, "-c", run, str(tmp_path)],
+            env=environment,
+            capture_output=True,
+            check=False,
+        ).returncode
+        for _ in range(2)
+    ]
+    assert codes == [10, 0]
+
+
+def test_generated_modules_import_math_and_numpy_only() -> None:
+    """`functools` of the standard library beside them; nothing that solves."""
+    for path in sorted((ROOT / "generated").glob("*.py")):
+        tree = ast.parse(path.read_text("utf-8"))
+        names = set()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                names |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                names.add(node.module)
+            elif isinstance(node, ast.Attribute):
+                assert node.attr not in ("linalg", "solve", "inv", "lstsq", "det"), path
+        assert names == {"functools", "math", "numpy"}, path
+
+
+def test_no_text_is_executed() -> None:
+    """Nothing in the package evaluates text: no eval, exec, sympify, parse_expr or lambdify."""
+    forbidden = {"eval", "exec", "sympify", "parse_expr", "lambdify", "S"}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Call):
+                called = node.func
+                name = getattr(called, "id", None) or getattr(called, "attr", "")
+                if isinstance(called, ast.Attribute) and called.attr in ("eval", "exec"):
+                    name = ""  # a method of that name; the builtins are plain names
+                assert name not in forbidden, f"{path}:{node.lineno}: {name}"
+
+
+def test_each_fact_lives_once() -> None:
+    """What two places must both know is the same in both."""
+    from eomgen.scene import schema
+
+    assert set(schema.Integrator.__args__) == set(INTEGRATORS)
+    assert schema.Output.__args__ == schema.OUTPUTS
+    assert (BUILT_IN / "scene.schema.json").read_text("utf-8") == json_schema()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    python = project["requires-python"].removeprefix(">=")
+    assert f"Python ≥ {python}" in (ROOT / "README.md").read_text("utf-8")
+
+
+def test_built_in_scenes_fit_the_json_schema() -> None:
+    """What editors are told agrees with what the reader takes."""
+    import json
+
+    import jsonschema
+
+    validator = jsonschema.Draft202012Validator(json.loads(json_schema()))
+    for name in built_in_names():
+        table = tomllib.loads((BUILT_IN / f"{name}.toml").read_text("utf-8"))
+        assert not list(validator.iter_errors(table)), name
+        assert read_scene(name).name == name
+        table["bodies"][0]["mas"] = table["bodies"][0].pop("mass")
+        assert list(validator.iter_errors(table)), name
