@@ -138,6 +138,7 @@ def simulate(given: Arguments) -> int:
     from eomgen.show.figure import save_figure
     from eomgen.show.observe import observe
     from eomgen.show.page import save_page
+    from eomgen.show.style import check_figure
 
     wanted = model.simulation
     integrator = given.integrator or wanted.integrator
@@ -156,6 +157,7 @@ def simulate(given: Arguments) -> int:
     for path in paths.values():
         check_folder(path.parent)
         check_writable(path, force=given.force)
+    check_figure(paths["png"], force=given.force)
 
     source, poses, derived = generated_code(_model(given.scene, given.form))
     module = load_module(source, model.name)

@@ -103,7 +103,8 @@ def assert_same(ours: object, handout: object) -> None:
     ours, handout = sp.Matrix([*ours]), sp.Matrix([*handout])
     assert ours.shape == handout.shape
     for i, difference in enumerate(ours - handout):
-        assert sp.simplify(difference) == 0, f"entry {i}: {ours[i]} is not {handout[i]}"
+        left = sp.expand(difference)
+        assert left == 0 or sp.trigsimp(left) == 0, f"entry {i}: {ours[i]} is not {handout[i]}"
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -244,7 +245,7 @@ def test_closed_form_solves_the_system_numerically(scene: str) -> None:
             for i, symbol in enumerate(inputs):
                 number = sp.Rational(3 + (37 * i + 11 * point) % 23, 7 + (5 * i + point) % 11)
                 values[symbol] = sp.Float(number, 60)
-            assert pushed == all(values[force] != 0 for force in tau)
+            assert pushed == all(values[force] > 0 for force in tau)
             place_bodies(eq, values)
             for symbol, meaning in eq.solution.definitions:
                 values[symbol] = meaning.xreplace(values)
@@ -262,11 +263,18 @@ def place_bodies(eq: Equations, values: dict[sp.Expr, sp.Expr]) -> None:
         values[body[1]] = values[body[0]] + values.get(coordinate[3], coordinate[3])
 
 
-def test_closed_form_solves_the_system_symbolically() -> None:
-    """The closed form in (24) is an identity: its numerators vanish by cos² + sin² = 1 alone."""
-    eq, h = equations("two_body_forced"), symbols("two_body_forced")
+@pytest.mark.parametrize("scene", SCENES)
+def test_closed_form_solves_the_system_symbolically(scene: str) -> None:
+    """The closed form put into (24) is an identity: cos² + sin² = 1 alone makes it vanish.
+
+    Forces and all make the polynomials large, so then the parameters are numbers.
+    """
+    eq, h = equations(scene), symbols(scene)
     M, V, G = handout_system(h)
     values = dict.fromkeys(eq.symbols.tau, sp.S.Zero)
+    if scene == "two_body_forced":
+        odd = (sp.Rational(k, 7) for k in range(9, 99, 2))
+        values |= dict(zip(eq.symbols.parameters.values(), odd, strict=False))
     place_bodies(eq, values)
     for symbol, meaning in eq.solution.definitions:
         values[symbol] = meaning.xreplace(values)

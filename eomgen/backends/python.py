@@ -3,6 +3,7 @@
 import json
 import keyword
 import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,7 +44,6 @@ class Kernel:
     name: str
     about: str
     shape: str
-    columns_shape: str
     block: Block
     state: str
     inputs: str
@@ -61,34 +61,9 @@ def python_module(system: System) -> str:
         name: print_block(program, output.nodes, names, DIALECT)
         for name, output in program.outputs.items()
     }
-    roots = sorted({i for block in blocks.values() for i in block.constants})
-    made = [i for i in roots if program.steps[i].operation != "input"]
-    # Checked before anything divides by it; the blocks share names, so they may share lines.
-    checked = print_block(program, [n for _, n in program.checks], names, DIALECT, fixed=True)
-    fixed = print_block(program, made, names, DIALECT, fixed=True, keep=made)
-    known = {name for name, _ in checked.lines}
-    parameters = [p.name for p in model.parameters]
-    inputs = [i.name for i in model.inputs]
-
-    def kernel(name: str) -> Kernel:
-        block, output = blocks[name], program.outputs[name]
-        shape = tuple(output.shape)
-        return Kernel(
-            name=name,
-            about=ABOUT.get(name, ""),
-            shape=repr(shape),
-            columns_shape=repr((*shape, -1)) if shape else "(-1,)",
-            block=block,
-            state=_unpacking([s.name for s in states], block, names),
-            inputs=_unpacking(inputs, block, names),
-            extra=_unpacking(system.extra.get(name, ()), block, names),
-            constants=_joined([names[i] for i in block.constants]),
-            functions=block.functions,
-            operations=_operations(cost(program, name)),
-        )
-
-    kernels = {name: kernel(name) for name in program.outputs}
-    special = ("initial_state", "derivative", "jacobian", "forward_dynamics", "inverse_dynamics")
+    kernels = {name: _kernel(system, name, block, names) for name, block in blocks.items()}
+    dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
+    special = {"initial_state", "derivative", "jacobian", *(name for name, _, _ in dynamics)}
     context: dict[str, Any] = {
         "title": _plain(model.title),
         "scene": model.name,
@@ -96,37 +71,60 @@ def python_module(system: System) -> str:
         "form": model.form,
         "states": states,
         "ny": len(states),
+        "nv": len(model.coordinates),
         "positions": repr(tuple(i for i, s in enumerate(states) if s.position)),
         "parameters": model.parameters,
-        "parameter_names": _joined([names.safe(name) for name in parameters]),
+        "parameter_names": _joined([names.safe(p.name) for p in model.parameters]),
         "inputs": model.inputs,
         "units": _units(system),
         "effects": repr(tuple(effect.type for effect in model.effects)),
         "bodies": repr(tuple(body.name for body in model.bodies)),
         "joints": repr(tuple(b.joint.name for b in model.bodies if b.joint.type != "free")),
         "costs": [(name, json.dumps(cost(program, name))) for name in kernels],
+        "kernels": list(kernels.values()),
+        "outputs": [kernel for name, kernel in kernels.items() if name not in special],
+        "dynamics": [(kernels[name], *rest) for name, *rest in dynamics if name in kernels],
+        **_fixed(system, blocks, names),
+    }
+    return render("python", "module.py.jinja", context)
+
+
+def _kernel(system: System, name: str, block: Block, names: Names) -> Kernel:
+    shape = tuple(system.program.outputs[name].shape)
+    return Kernel(
+        name=name,
+        about=ABOUT.get(name, ""),
+        shape=repr(shape),
+        block=block,
+        state=_unpacking([s.name for s in system.form.states], block, names),
+        inputs=_unpacking([i.name for i in system.model.inputs], block, names),
+        extra=_unpacking(system.extra.get(name, ()), block, names),
+        constants=_joined([names[i] for i in block.constants]),
+        functions=block.functions,
+        operations=_operations(cost(system.program, name)),
+    )
+
+
+def _fixed(system: System, blocks: Mapping[str, Block], names: Names) -> dict[str, Any]:
+    """What depends on parameters alone: lines, and what must be positive with the lines for it."""
+    program = system.program
+    roots = sorted({i for block in blocks.values() for i in block.constants})
+    made = [i for i in roots if program.steps[i].operation != "input"]
+    # Checked before anything divides by it; the blocks share names, so they may share lines.
+    checked = print_block(program, [n for _, n in program.checks], names, DIALECT, fixed=True)
+    fixed = print_block(program, made, names, DIALECT, fixed=True, keep=made)
+    known = {name for name, _ in checked.lines}
+    return {
         "checked": checked.lines,
         "checks": [
             (_plain(about), source)
             for (about, _), source in zip(program.checks, checked.results, strict=True)
         ],
         "fixed": [(name, source) for name, source in fixed.lines if name not in known],
-        "kernels": list(kernels.values()),
-        "outputs": [k for n, k in kernels.items() if n not in special],
-        "nv": len(model.coordinates),
-        "dynamics": [
-            (kernels[name], argument, default)
-            for name, argument, default in (
-                ("forward_dynamics", "tau", "=None"),
-                ("inverse_dynamics", "vd", ""),
-            )
-            if name in kernels
-        ],
     }
-    return render("python", "module.py.jinja", context)
 
 
-def _unpacking(all_names: Any, block: Block, names: Names) -> str:
+def _unpacking(all_names: Sequence[str], block: Block, names: Names) -> str:
     """`_, _, theta, phi` for the used ones among `all_names`, or nothing if none is used."""
     used = [names.safe(name) if name in block.inputs else "_" for name in all_names]
     return _joined(used) if any(word != "_" for word in used) else ""

@@ -8,7 +8,6 @@ import sympy as sp
 
 from eomgen.derivation.closed import Equations
 from eomgen.derivation.forms import StateForm, state_form
-from eomgen.joints import Free
 from eomgen.model import Model, is_zero
 from eomgen.program.differentiate import jacobian
 from eomgen.program.lower import Lowering
@@ -76,7 +75,6 @@ def assemble(equations: Equations) -> System:
 
     for pivot in equations.solution.pivots:  # so that they are named whoever meets them first
         passive.lower(pivot)
-    nv, nb = len(symbols.a), len(model.bodies)
     rates = rows(passive, form.rates)
     slopes = jacobian(rates, list(states.values()))
     made: dict[str, tuple[tuple[int, ...], list[Node]]] = {
@@ -84,34 +82,12 @@ def assemble(equations: Equations) -> System:
         "derivative": ((len(rates),), rates),
         "jacobian": ((len(rates), len(rates)), [node for row in slopes for node in row]),
     }
-    symmetric = equations.symmetric
-    balance = symmetric.M * sp.Matrix(symbols.a) + symmetric.V + symmetric.G - symmetric.F
-    holding = [k for k, body in enumerate(model.bodies) if not isinstance(body.joint, Free)]
-    recipes: dict[str, tuple[tuple[int, ...], Lowering, list[Any]]] = {
-        "forward_dynamics": ((nv,), pushed, list(symbols.a)),
-        "inverse_dynamics": ((nv,), demanded, list(balance)),
-        "mass_matrix": ((nv, nv), passive, list(symmetric.M)),
-        "velocity_force": ((nv,), passive, list(symmetric.V)),
-        "gravity_force": ((nv,), passive, list(symmetric.G)),
-        "applied_force": ((nv,), passive, list(symmetric.F)),
-        "kinetic_energy": ((), passive, [_kinetic_energy(equations)]),
-        "potential_energy": ((), passive, [equations.free_bodies.potential_energy]),
-        "momentum": ((3,), passive, _momentum(equations)),
-        "joint_forces": (
-            (len(holding), 2),
-            passive,
-            [component for k in holding for component in symbols.force[k]],
-        ),
-        "body_poses": (
-            (nb, 3),
-            passive,
-            [z for k in range(nb) for z in (symbols.x[k], symbols.y[k], symbols.angle[k])],
-        ),
-    }
+    recipes = _recipes(equations)
+    lowerings = {"forward_dynamics": pushed, "inverse_dynamics": demanded}
     for name in model.outputs:
         if model.form == "velocity" or name not in NEEDS_VELOCITIES:
-            shape, lowering, expressions = recipes[name]
-            made[name] = (shape, rows(lowering, expressions))
+            shape, expressions = recipes[name]
+            made[name] = (shape, rows(lowerings.get(name, passive), expressions))
     program, reports = optimise(
         finish(
             tape,
@@ -124,6 +100,30 @@ def assemble(equations: Equations) -> System:
         "inverse_dynamics": tuple(str(node.step.value) for node in vd.values()),
     }
     return System(model, form, program, extra, reports)
+
+
+def _recipes(equations: Equations) -> dict[str, tuple[tuple[int, ...], list[Any]]]:
+    """Shape and expressions of every output, over the symbols of bodies and coordinates."""
+    s, symmetric, bodies = equations.symbols, equations.symmetric, equations.model.bodies
+    balance = symmetric.M * sp.Matrix(s.a) + symmetric.V + symmetric.G - symmetric.F
+    pins = [force for body, force in zip(bodies, s.force, strict=True) if body.joint.type != "free"]
+    n = len(s.a)
+    return {
+        "forward_dynamics": ((n,), list(s.a)),
+        "inverse_dynamics": ((n,), list(balance)),
+        "mass_matrix": ((n, n), list(symmetric.M)),
+        "velocity_force": ((n,), list(symmetric.V)),
+        "gravity_force": ((n,), list(symmetric.G)),
+        "applied_force": ((n,), list(symmetric.F)),
+        "kinetic_energy": ((), [_kinetic_energy(equations)]),
+        "potential_energy": ((), [equations.free_bodies.potential_energy]),
+        "momentum": ((3,), _momentum(equations)),
+        "joint_forces": ((len(pins), 2), [component for force in pins for component in force]),
+        "body_poses": (
+            (len(bodies), 3),
+            [z for pose in zip(s.x, s.y, s.angle, strict=True) for z in pose],
+        ),
+    }
 
 
 def _kinetic_energy(equations: Equations) -> Any:

@@ -66,20 +66,10 @@ def integrate(
         dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
         advances = fixed_step.advances(method, counted, t_start, t_end, dt, every)
     else:
-        if dt is not None:
-            raise RunError(
-                f"dt: {integrator} chooses its own steps; leave --dt out, or take one of "
-                + ", ".join(name for name, of in INTEGRATORS.items() if isinstance(of, FixedStep))
-            )
+        _check_no_step(integrator, dt)
+        rows = samples or ADAPTIVE_SAMPLES
         advances = adaptive.advances(
-            method,
-            counted,
-            t_start,
-            t_end,
-            rtol=rtol,
-            atol=atol,
-            samples=samples or ADAPTIVE_SAMPLES,
-            max_steps=max_steps,
+            method, counted, t_start, t_end, rtol=rtol, atol=atol, samples=rows, max_steps=max_steps
         )
 
     run = _Run(t_start, problem.initial, [(t_start, problem.initial)])
@@ -89,6 +79,7 @@ def integrate(
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
     message = "; ".join(part for part in (trouble, remarks) if part)
+    calls = {"derivatives": derivative.calls, "jacobians": jacobian.calls}
     return Trajectory(
         name=problem.name,
         states=problem.states,
@@ -97,11 +88,7 @@ def integrate(
         integrator=integrator,
         finished=not trouble,
         message=" ".join(message.split()),
-        counts={
-            "steps": run.steps,
-            "derivatives": derivative.calls,
-            "jacobians": jacobian.calls,
-        },
+        counts={"steps": run.steps, **calls},
     )
 
 
@@ -202,6 +189,15 @@ def _check_tolerances(rtol: float, atol: float) -> None:
             raise RunError(f"{name}: {tolerance:g} is not a positive number")
     if rtol < SMALLEST_RTOL:
         raise RunError(f"rtol: {rtol:g} is too small; the smallest allowed is {SMALLEST_RTOL:g}")
+
+
+def _check_no_step(integrator: str, dt: float | None) -> None:
+    if dt is not None:
+        fixed = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
+        raise RunError(
+            f"dt: {integrator} chooses its own steps; leave --dt out, "
+            f"or take one of {', '.join(fixed)}"
+        )
 
 
 def _check_steps(
