@@ -9,6 +9,7 @@ import webbrowser
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.files import check_folder, check_writable, write_whole
@@ -128,7 +129,6 @@ def _print_report(model: Model) -> None:
 
 def simulate(given: Arguments) -> int:
     """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
-    model = _model(given.scene, given.form)
     # Imported here: `check` and `generate` need neither SciPy nor Matplotlib.
     from eomgen.run.integrate import integrate
     from eomgen.run.integrators import FixedStep, find_integrator
@@ -138,58 +138,43 @@ def simulate(given: Arguments) -> int:
     from eomgen.show.figure import save_figure
     from eomgen.show.observe import observe
     from eomgen.show.page import save_page
-    from eomgen.show.style import check_figure
 
-    wanted = model.simulation
-    integrator = given.integrator or wanted.integrator
-    fixed = isinstance(find_integrator(integrator), FixedStep)
+    model = _model(given.scene, given.form)
     parameters = _assignments(given.set, model.defaults, "parameter")
     inputs = _assignments(given.input, [i.name for i in model.inputs], "input")
-    model = replace(
-        model,
-        parameters=tuple(
-            replace(p, default=parameters.get(p.name, p.default)) for p in model.parameters
-        ),
-    )
-    kinds = ("py", "npz", "csv", "png", "html")
-    paths = {kind: given.output / f"{model.name}.{kind}" for kind in kinds}
-    paths["png"] = given.plot or paths["png"]
-    for path in paths.values():
-        check_folder(path.parent)
-        check_writable(path, force=given.force)
-    check_figure(paths["png"], force=given.force)
-
-    source, poses, derived = generated_code(_model(given.scene, given.form))
+    wanted = model.simulation
+    integrator = _or(given.integrator, wanted.integrator)
+    fixed = isinstance(find_integrator(integrator), FixedStep)
+    paths = _output_paths(given, model)
+    source, poses, derived = generated_code(model)
     module = load_module(source, model.name)
     with terminal_progress(f"simulating {model.name}") as progress:
         trajectory = integrate(
             as_problem(module, parameters or None, inputs or None),
             integrator,
-            given.t_end if given.t_end is not None else wanted.t_end,
-            dt=(given.dt if given.dt is not None else wanted.dt) if fixed else given.dt,
-            rtol=given.rtol if given.rtol is not None else wanted.rtol,
-            atol=given.atol if given.atol is not None else wanted.atol,
+            _or(given.t_end, wanted.t_end),
+            dt=_or(given.dt, wanted.dt) if fixed else given.dt,
+            rtol=_or(given.rtol, wanted.rtol),
+            atol=_or(given.atol, wanted.atol),
             samples=given.samples,
             progress=progress,
         )
-    motion = observe(model, module, trajectory)
-    values = tuple(p.default for p in model.parameters)
+    motion = observe(model.with_parameters(parameters), module, trajectory)
+    values = tuple({**model.defaults, **parameters}.values())
     write_whole(paths["py"], source, force=given.force)
     save_npz(trajectory, paths["npz"], force=given.force)
     save_csv(trajectory, paths["csv"], force=given.force)
     save_figure(motion, paths["png"], force=given.force)
     save_page(motion, poses, values, paths["html"], force=given.force)
 
-    counts = trajectory.counts
-    how = "derived now" if derived else "module fresh, not derived again"
-    print(
-        f"{model.name}: {trajectory.t[-1]:g} s by {integrator}, {counts['steps']} steps, "
-        f"{counts['derivatives']} derivatives ({how})"
-    )
-    drift = float(motion.joint_drift.max(initial=0.0))
     energy = motion.kinetic_energy + motion.potential_energy
+    print(
+        f"{model.name}: {trajectory.t[-1]:g} s by {integrator}, "
+        f"{trajectory.counts['steps']} steps, {trajectory.counts['derivatives']} derivatives "
+        f"({'derived now' if derived else 'module fresh, not derived again'})"
+    )
     print(f"    energy {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the end")
-    print(f"    largest gap in a joint {drift:.2g} m")
+    print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
     for path in paths.values():
         print(f"    wrote {path}")
     if not trajectory.finished:
@@ -197,6 +182,25 @@ def simulate(given: Arguments) -> int:
     if given.view:
         _open(paths["html"])
     return 0
+
+
+def _output_paths(given: Arguments, model: Model) -> dict[str, Path]:
+    """Where a simulation writes, by kind; raises `RunError` now for what could not be written."""
+    from eomgen.show.style import check_figure
+
+    kinds = ("py", "npz", "csv", "png", "html")
+    paths = {kind: given.output / f"{model.name}.{kind}" for kind in kinds}
+    paths["png"] = _or(given.plot, paths["png"])
+    check_figure(paths["png"], force=given.force)
+    for path in paths.values():
+        check_folder(path.parent)
+        check_writable(path, force=given.force)
+    return paths
+
+
+def _or(given: Any, default: Any) -> Any:
+    """What the command line gave, or the scene's own."""
+    return default if given is None else given
 
 
 def view(given: Arguments) -> int:

@@ -1,7 +1,7 @@
 """The model: a scene whose every name is resolved; bodies in a tree, parents before children."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from eomgen.effects import Effect, ExternalForce, Gravity, Motor
 from eomgen.effects.base import Input
@@ -53,6 +53,11 @@ class Model:
     def defaults(self) -> dict[str, float]:
         """Parameter values of the scene, by name."""
         return {p.name: p.default for p in self.parameters}
+
+    def with_parameters(self, values: Mapping[str, float]) -> "Model":
+        """The same model with other values for some parameters."""
+        parameters = (replace(p, default=values.get(p.name, p.default)) for p in self.parameters)
+        return replace(self, parameters=tuple(parameters))
 
     def value(self, formula: Formula) -> float:
         """A quantity's value at the scene's parameters."""

@@ -1,4 +1,4 @@
-"""Scenes for tests, in two tellings: as eomgen reads them, and as plain numbers for `newton_euler`."""
+"""Scenes for tests, told twice: as eomgen reads them, and as plain numbers for `newton_euler`."""
 
 import itertools
 import types
@@ -16,6 +16,8 @@ from eomgen.program.assemble import System, assemble
 from eomgen.scene.reader import parse_scene, read_scene
 
 BUILT_IN = ("double_pendulum", "pendulum", "two_body", "two_body_forced")
+SEEDS = (4, 9, 15, 17, 18, 20, 22, 27, 34, 37, 38, 39)
+"""Random trees that are quick to compile and of every kind; see `random_tree`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +25,9 @@ class Scene:
     """A scene in plain numbers, told without eomgen.
 
     `numbers` turns parameter values and inputs, by name, into a mechanism. `bodies`, `pins` (the
-    joint of each body that has one) and `coordinates` are names in the mechanism's order; `defaults`
-    are the parameters, `positive` those that make a mass or an inertia. `text` is TOML, or None for
-    a scene that comes with eomgen.
+    joint of each body that has one) and `coordinates` are names in the mechanism's order, `angles`
+    the coordinates that are angles; `defaults` are the parameters, `positive` those that make a
+    mass or an inertia. `text` is TOML, or None for a scene that comes with eomgen.
     """
 
     name: str

@@ -1,0 +1,412 @@
+"""Generated modules, executed, against an independent solver in maximal coordinates."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mechanisms import SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
+from newton_euler import Mechanism, Motion, solve
+
+from eomgen.errors import SceneError
+from eomgen.pipeline import compile_model, compile_scene
+from eomgen.scene.reader import parse_scene, read_scene
+
+TOLERANCE = 1e-12
+TREES = [random_tree(seed) for seed in SEEDS]
+
+
+def difference(actual: np.ndarray, expected: np.ndarray) -> float:
+    """Largest difference over the largest entry expected, or over 1 (m/s², N, …) if that is less.
+
+    Where everything balances, as for a pendulum that hangs still, what is expected is only the
+    rounding of a sum of terms of the size of g.
+    """
+    assert actual.shape == expected.shape
+    if expected.size == 0:
+        return 0.0
+    return float(np.max(np.abs(actual - expected)) / max(1.0, np.max(np.abs(expected))))
+
+
+def assert_agrees(
+    c: Compiled,
+    y: np.ndarray,
+    u: Mapping[str, float] | None = None,
+    p: Mapping[str, float] | None = None,
+) -> Motion:
+    """Accelerations, joint forces and poses of one state are the independent solver's."""
+    scene, module = c.scene, c.module
+    motion = scene.motion(module, y, p, u)
+    rates = module.derivative(0.0, y, p, u)
+    assert rates.shape == y.shape
+    assert np.array_equal(rates[scene.places(module)], y[scene.places(module, "_dot")])
+    accelerations = rates[scene.places(module, "_dot")]
+    assert difference(accelerations, motion.accelerations) <= TOLERANCE
+    forces = module.joint_forces(0.0, y, p, u)
+    assert difference(forces, motion.pin_forces[scene.pin_rows(module)]) <= TOLERANCE
+    poses = module.body_poses(0.0, y, p, u)
+    assert difference(poses, motion.poses[scene.body_rows(module)]) <= TOLERANCE
+    return motion
+
+
+def test_thousand_random_states(built_in: Compiled) -> None:
+    """At 1000 states, with forces and torques if there are any, one by one and as columns.
+
+    Inputs are given by name and in order; both mean the same.
+    """
+    scene, module = built_in.scene, built_in.module
+    rng = np.random.default_rng(20)
+    states, inputs, expected = [], [], []
+    assert tuple(module.INPUTS) == scene.inputs
+    for _ in range(1000):
+        y, u = scene.random_state(module, rng), scene.random_inputs(rng)
+        motion = assert_agrees(built_in, y, u or None)
+        ordered = np.array([u[name] for name in module.INPUTS])
+        assert np.array_equal(
+            module.derivative(0.0, y, u=ordered), module.derivative(0.0, y, None, u)
+        )
+        states.append(y)
+        inputs.append(ordered)
+        expected.append(motion)
+    columns, u = np.array(states).T, np.array(inputs).T
+    rates = module.derivative(0.0, columns, u=u)
+    assert rates.shape == (len(module.STATES), 1000)
+    forces = module.joint_forces(0.0, columns, u=u)
+    assert forces.shape == (len(module.JOINTS), 2, 1000)
+    for i, motion in enumerate(expected):
+        accelerations = rates[scene.places(module, "_dot"), i]
+        assert difference(accelerations, motion.accelerations) <= TOLERANCE
+        pins = motion.pin_forces[scene.pin_rows(module)]
+        assert difference(forces[:, :, i], pins) <= TOLERANCE
+
+
+def test_quarter_poses(built_in: Compiled) -> None:
+    """Every combination of angles at multiples of π/4, at rest and moving, without inputs and with."""
+    scene, module = built_in.scene, built_in.module
+    rng = np.random.default_rng(21)
+    angles = [module.STATES.index(name) for name in scene.angles]
+    poses = quarter_poses(len(angles))
+    assert len(poses) == 8 ** len(angles)
+    for pose in poses:
+        y = np.zeros(len(module.STATES))
+        y[angles] = pose
+        assert_agrees(built_in, y)
+        y[scene.places(module, "_dot")] = rng.uniform(-8.0, 8.0, len(scene.coordinates))
+        assert_agrees(built_in, y)
+        assert_agrees(built_in, y, scene.random_inputs(rng))
+
+
+@pytest.mark.parametrize("tree", TREES, ids=lambda tree: tree.name)
+def test_random_trees(tree: Scene) -> None:
+    """Chains, branches, several trees, point masses, pins anywhere: 20 states of each."""
+    c = compiled(tree)
+    rng = np.random.default_rng(22)
+    assert dict(c.module.PARAMETERS) == {name: tree.defaults[name] for name in c.module.PARAMETERS}
+    for _ in range(20):
+        assert_agrees(c, tree.random_state(c.module, rng), tree.random_inputs(rng))
+
+
+def test_random_trees_are_of_every_kind() -> None:
+    """The trees above leave out no kind of mechanism that the generator can make."""
+    kinds = set()
+    for tree in TREES:
+        m = tree.numbers(tree.defaults, dict.fromkeys(tree.inputs, 1.0))
+        children = [list(m.parent).count(k) for k in range(len(m.parent))]
+        kinds |= {
+            ("floating" if free else "grounded")
+            for free, p in zip(m.free, m.parent, strict=True)
+            if p < 0
+        }
+        kinds |= {"branch"} if max(children) > 1 else set()
+        kinds |= {"chain of three"} if any(p >= 0 and m.parent[p] >= 0 for p in m.parent) else set()
+        kinds |= {"several trees"} if list(m.parent).count(-1) > 1 else set()
+        order = [tree.bodies.index(name) for name in compiled(tree).module.BODIES]
+        kinds |= {"reordered"} if order != sorted(order) else set()
+        kinds |= {"point mass"} if 0.0 in m.inertia else set()
+        kinds |= {"motor"} if any(m.torque) else set()
+        kinds |= {"force"} if m.forces else set()
+        kinds |= {"no gravity"} if m.gravity == 0.0 else {"gravity"}
+        arms = [tuple(bool(x) for x in arm) for arm in (*m.r_parent, *m.r_child)]
+        kinds |= {"two components"} if (True, True) in arms else set()
+    assert kinds == {
+        "floating", "grounded", "branch", "chain of three", "several trees", "reordered",
+        "point mass", "motor", "force", "gravity", "no gravity", "two components",
+    }  # fmt: skip
+
+
+def test_trees_of_one_scene_do_not_mix() -> None:
+    """Two trees whose bodies alternate in the model's order move as each does alone."""
+    text = """
+    name = "two_trees"
+    outputs = "all"
+    bodies = [
+        { name = "A", mass = 1.0, inertia_com = 0.1 },
+        { name = "B", mass = 2.0, inertia_com = 0.2 },
+        { name = "C", mass = 3.0, inertia_com = 0.3 },
+    ]
+    joints = [
+        { name = "a", type = "revolute", parent = "world", child = "A", r_child = [-0.4, 0] },
+        { name = "b", type = "revolute", parent = "world", child = "B", r_child = [-0.5, 0] },
+        { name = "c", type = "revolute", parent = "A", child = "C", r_child = [-0.6, 0] },
+    ]
+    effects = [{ type = "gravity", g = 9.81 }]
+    """
+    module = load(compile_scene(parse_scene(text)))
+    mechanism = Mechanism(
+        mass=[1.0, 2.0, 3.0],
+        inertia=[0.1, 0.2, 0.3],
+        parent=[-1, -1, 0],
+        free=[False] * 3,
+        r_parent=np.zeros((3, 2)),
+        r_child=[[-0.4, 0.0], [-0.5, 0.0], [-0.6, 0.0]],
+        gravity=9.81,
+    )
+    q, v = np.array([0.3, 0.5, 0.7]), np.array([1.1, -1.3, 1.7])
+    rates = module.derivative(0.0, np.concatenate((q, v)))
+    assert difference(rates[3:], solve(mechanism, q, v).accelerations) <= TOLERANCE
+
+
+# State forms.
+
+
+def in_momentum_form(
+    scene: Scene, module: object, mechanism: Mechanism, motion: Motion
+) -> tuple[np.ndarray, np.ndarray]:
+    """A state and its derivative as a module in one of the handout's forms wants them."""
+    state, rate = {}, {}
+    coordinates = iter(scene.coordinates)
+    for k, body in enumerate(scene.bodies):
+        own = [next(coordinates) for _ in range(3 if mechanism.free[k] else 1)]
+        x, y = own[:2] if mechanism.free[k] else (f"x_{body}", f"y_{body}")
+        angle = own[-1] if mechanism.parent[k] < 0 else f"angle_{body}"
+        weights = (mechanism.mass[k], mechanism.mass[k], mechanism.inertia[k])
+        momenta = (f"P_{body}_x", f"P_{body}_y", f"L_{body}")
+        for i, (place, momentum) in enumerate(zip((x, y, angle), momenta, strict=True)):
+            state[place], rate[place] = motion.poses[k, i], motion.velocities[k, i]
+            state[momentum] = weights[i] * motion.velocities[k, i]
+            rate[momentum] = weights[i] * motion.body_accelerations[k, i]
+    wanted = module.STATES
+    return np.array([state[name] for name in wanted]), np.array([rate[name] for name in wanted])
+
+
+@pytest.mark.parametrize("form", ["momentum", "redundant"])
+@pytest.mark.parametrize(
+    "scene",
+    ["two_body", "two_body_forced", "double_pendulum", random_tree(4), random_tree(9)],
+    ids=str,
+)
+def test_momentum_forms(scene: str | Scene, form: str) -> None:
+    """The handout's states (1), reduced and redundant, of the same motion: same rates and outputs."""
+    plain, c = compiled(scene), compiled(scene, form)
+    scene, rng = plain.scene, np.random.default_rng(23)
+    starts = [(plain.module.initial_state(), dict.fromkeys(scene.inputs, 0.0))]
+    starts += [
+        (scene.random_state(plain.module, rng), scene.random_inputs(rng)) for _ in range(100)
+    ]
+    for i, (y, u) in enumerate(starts):
+        motion = scene.motion(plain.module, y, u=u)
+        mechanism = scene.numbers(scene.defaults, u)
+        state, rate = in_momentum_form(scene, c.module, mechanism, motion)
+        if i == 0:
+            assert difference(c.module.initial_state(), state) <= TOLERANCE
+        # The equations of a momentum are a mass times an acceleration: compare within each kind.
+        got = c.module.derivative(0.0, state, u=u)
+        positions = np.isin(np.arange(len(state)), c.module.POSITIONS)
+        assert difference(got[positions], rate[positions]) <= TOLERANCE
+        assert difference(got[~positions], rate[~positions]) <= TOLERANCE
+        for name in (
+            "kinetic_energy",
+            "potential_energy",
+            "momentum",
+            "joint_forces",
+            "body_poses",
+        ):
+            ours = getattr(c.module, name)(0.0, state, u=u)
+            assert difference(ours, getattr(plain.module, name)(0.0, y, u=u)) <= TOLERANCE
+
+
+def test_handouts_states_are_eight_and_twelve() -> None:
+    """(1): Y = [x_A, P_A, θ, L_A, x_B, P_B, θ+φ, L_B], and without x_B, P_B the eight of §3."""
+    twelve = "x_A y_A P_A_x P_A_y theta L_A x_B y_B P_B_x P_B_y angle_B L_B"
+    eight = "x_A y_A P_A_x P_A_y theta L_A angle_B L_B"
+    assert compiled("two_body", "redundant").module.STATES == tuple(twelve.split())
+    assert compiled("two_body", "momentum").module.STATES == tuple(eight.split())
+
+
+# Parameters.
+
+
+def test_other_parameter_values(built_in: Compiled) -> None:
+    """Values given through `p`, by name and in order, are the ones the equations use."""
+    scene, module = built_in.scene, built_in.module
+    rng = np.random.default_rng(24)
+    assert dict(module.PARAMETERS) == dict(scene.defaults)
+    for _ in range(40):
+        y, u = scene.random_state(module, rng), scene.random_inputs(rng)
+        p = {name: v * float(rng.uniform(0.5, 2.0)) for name, v in scene.defaults.items()}
+        assert_agrees(built_in, y, u, p)
+        ordered = [p[name] for name in module.PARAMETERS]
+        assert np.array_equal(
+            module.derivative(0.0, y, ordered, u), module.derivative(0.0, y, p, u)
+        )
+        one = str(rng.choice(list(p)))
+        assert_agrees(built_in, y, u, {one: p[one]})
+    assert_agrees(built_in, y, u)  # and none of them has stuck
+
+
+@pytest.mark.parametrize("tree", TREES[:4], ids=lambda tree: tree.name)
+def test_other_parameter_values_of_trees(tree: Scene) -> None:
+    """The same where parameters are shared, by name and by formula."""
+    c, rng = compiled(tree), np.random.default_rng(25)
+    used = c.module.PARAMETERS
+    for _ in range(10):
+        p = {name: tree.defaults[name] * float(rng.uniform(0.5, 2.0)) for name in used}
+        assert_agrees(c, tree.random_state(c.module, rng), tree.random_inputs(rng), p)
+
+
+Y = np.zeros(8)
+NAMES = "m_A, I_A, m_B, I_B, l_A, l_B, d_A, d_B, g"
+INPUTS = "f_A_x, f_A_y, f_B_x, f_B_y, tau"
+STATES = "x_A, y_A, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0.0, Y, {"m_C": 1.0}), f"unknown parameter 'm_C'; known: {NAMES}"),
+        ((0.0, Y, [1.0] * 8), f"parameters have shape (8,), not (9,): {NAMES}"),
+        ((0.0, Y, np.ones((9, 1))), f"parameters have shape (9, 1), not (9,): {NAMES}"),
+        ((0.0, Y, {"g": np.nan}), "parameter 'g' is nan, not a finite number"),
+        ((0.0, Y, {"l_A": -np.inf}), "parameter 'l_A' is -inf, not a finite number"),
+        ((0.0, Y, {"m_B": 0.0}), "mass of B is not positive: change the parameters"),
+        ((0.0, Y, {"m_A": -1.0}), "mass of A is not positive: change the parameters"),
+        ((0.0, Y, {"I_A": 0.0}), "inertia_com of A is not positive: change the parameters"),
+        ((0.0, Y, None, {"tau_": 1.0}), f"unknown input 'tau_'; known: {INPUTS}"),
+        ((0.0, Y, None, [1.0]), f"inputs have shape (1,), not (5,): {INPUTS}"),
+        ((0.0, Y, None, {"tau": np.inf}), "input 'tau' is inf, not a finite number"),
+        (
+            (0.0, np.zeros((8, 3)), None, np.zeros((5, 2))),
+            "inputs have shape (5, 2), not (5, 3)",
+        ),
+        ((0.0, np.zeros(7)), f"y has shape (7,), not (8,) or (8, k): {STATES}"),
+        ((0.0, np.zeros((7, 2))), f"y has shape (7, 2), not (8,) or (8, k): {STATES}"),
+        ((0.0, np.zeros((8, 2, 2))), f"y has shape (8, 2, 2), not (8,) or (8, k): {STATES}"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("function", ["derivative", "jacobian", "joint_forces"])
+def test_errors(function: str, arguments: tuple, message: str) -> None:
+    """What a user gives wrongly is told by name, shape and value, by every function alike."""
+    module = compiled("two_body_forced").module
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        getattr(module, function)(*arguments)
+
+
+def test_errors_of_dynamics() -> None:
+    """Forces and accelerations of the wrong length are told too."""
+    module = compiled("two_body").module
+    with pytest.raises(ValueError, match=r"^tau has shape \(3,\), not \(4,\)$"):
+        module.forward_dynamics(Y[:4], Y[4:], [0.0] * 3)
+    with pytest.raises(ValueError, match=r"^vd has shape \(5,\), not \(4,\)$"):
+        module.inverse_dynamics(Y[:4], Y[4:], [0.0] * 5)
+
+
+def test_inertia_that_is_zero_by_its_parameter() -> None:
+    """No scene that is accepted makes a module that refuses its own values."""
+    text = """
+    name = "bob"
+    parameters = { I = 0.0 }
+    bodies = [{ name = "A", mass = 2.0, inertia_com = "I" }]
+    joints = [{ name = "a", type = "revolute", parent = "world", child = "A", r_child = [-0.5, 0] }]
+    effects = [{ type = "gravity", g = 9.81 }]
+    """
+    try:
+        source = compile_scene(parse_scene(text))
+    except SceneError as error:
+        assert "inertia_com" in str(error)  # noqa: PT017
+        return
+    assert load(source).derivative(0.0, np.zeros(2))[1] == pytest.approx(-9.81 / 0.5, rel=1e-14)
+
+
+# The text of a module.
+
+
+def test_straight_line_arithmetic(built_in: Compiled) -> None:
+    """Nothing is solved, factored or inverted at run time, and only `math` and NumPy are needed.
+
+    Every kernel is assignments of + - * / and sin, cos, tan, sqrt; elsewhere only functions that
+    check and arrange arguments are called.
+    """
+    tree = ast.parse(built_in.source)
+    imported = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imported.add(node.module)
+    assert imported == {"math", "numpy", "functools"}
+    of_numpy = {
+        node.attr
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == "np"
+    }
+    assert of_numpy <= {
+        "array", "asarray", "concatenate", "empty", "ndarray", "ndim", "sin", "cos", "tan", "sqrt",
+    }  # fmt: skip
+    assert not {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)} & {
+        "eval", "exec", "open", "compile", "getattr", "globals", "__import__",
+    }  # fmt: skip
+    functions = {f.name: f for f in tree.body if isinstance(f, ast.FunctionDef)}
+    kernels = [functions[f"_{name}"] for name in built_in.system.program.outputs]
+    assert {"_derivative", "_jacobian"} <= {kernel.name for kernel in kernels}
+    for kernel in kernels:
+        *lines, last = kernel.body[1:]  # after the docstring
+        assert all(isinstance(line, ast.Assign) for line in lines)
+        assert isinstance(last, ast.Return)
+        for line in kernel.body[1:]:
+            for node in ast.walk(line):
+                assert isinstance(node, ALLOWED), ast.dump(node)
+                if isinstance(node, ast.Call):
+                    assert node.func.id in ("sin", "cos", "tan", "sqrt")
+
+
+ALLOWED = (
+    ast.Assign, ast.Return, ast.Tuple, ast.Name, ast.Load, ast.Store, ast.Constant, ast.Call,
+    ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub,
+)  # fmt: skip
+
+
+def test_same_bytes_whatever_the_hash_seed() -> None:
+    """Two processes with different hash seeds write the same module, and it is this one's too."""
+    program = (
+        "import sys; from eomgen.pipeline import compile_scene;"
+        "from eomgen.scene.reader import read_scene;"
+        "sys.stdout.buffer.write(compile_scene(read_scene('two_body')).encode())"
+    )
+    checkout = str(Path(__file__).parent.parent)
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-c", program],
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            cwd=checkout,
+        )
+        for seed in ("0", "1")
+    ]
+    first, second = (process.communicate(timeout=60)[0] for process in running)
+    assert all(process.returncode == 0 for process in running)
+    assert first == second == compile_scene(read_scene("two_body")).encode()
+
+
+def test_same_bytes_again(built_in: Compiled) -> None:
+    """Generating twice gives the same text, with no path and no date in it."""
+    assert compile_model(built_in.model) == built_in.source
+    assert "/home" not in built_in.source
+    assert str(Path(__file__).parent.parent) not in built_in.source
+    assert not re.search(r"\b20\d\d-\d\d", built_in.source)
