@@ -15,6 +15,7 @@ from eomgen.errors import RunError, SceneError, nearest
 from eomgen.files import check_folder, check_writable, write_whole
 from eomgen.joints.base import WORLD
 from eomgen.model import Model, build_model
+from eomgen.run.progress import terminal_notice, terminal_progress
 from eomgen.scene.reader import built_in_names, find_scene, read_scene
 from eomgen.scene.schema import Form
 from eomgen.store import generated_code
@@ -70,7 +71,8 @@ def derive(given: Arguments) -> int:
     from eomgen.derivation.steps import tell
     from eomgen.show.derivation import as_latex, as_text
 
-    steps = tell(derive_equations(model))
+    with terminal_notice(f"deriving {model.name} …"):
+        steps = tell(derive_equations(model))
     text = (as_latex if given.format == "latex" else as_text)(model.title, steps)
     if given.output is None:
         print(text)
@@ -93,7 +95,8 @@ def generate(given: Arguments) -> int:
         if not given.check:
             check_folder(given.output)
             check_writable(path, force=given.force)
-        source, _, derived = generated_code(model, derive_again=given.report)
+        with terminal_notice(f"deriving {model.name} …"):
+            source, _, derived = generated_code(model, derive_again=given.report)
         current = _text(path)
         if given.check:
             state = "fresh" if current == source else "missing" if current is None else "stale"
@@ -133,7 +136,6 @@ def simulate(given: Arguments) -> int:
     from eomgen.run.integrate import integrate
     from eomgen.run.integrators import FixedStep, find_integrator
     from eomgen.run.module import as_problem, load_module
-    from eomgen.run.progress import terminal_progress
     from eomgen.run.trajectory import save_csv, save_npz
     from eomgen.show.figure import save_figure
     from eomgen.show.observe import observe
@@ -146,7 +148,8 @@ def simulate(given: Arguments) -> int:
     integrator = _or(given.integrator, wanted.integrator)
     fixed = isinstance(find_integrator(integrator), FixedStep)
     paths = _output_paths(given, model)
-    source, poses, derived = generated_code(model)
+    with terminal_notice(f"deriving {model.name} …"):
+        source, poses, derived = generated_code(model)
     module = load_module(source, model.name)
     with terminal_progress(f"simulating {model.name}") as progress:
         trajectory = integrate(

@@ -16,11 +16,11 @@ from eomgen.program.assemble import System, assemble
 from eomgen.scene.reader import parse_scene, read_scene
 
 BUILT_IN = ("double_pendulum", "pendulum", "two_body", "two_body_forced")
-SEEDS = (4, 9, 15, 17, 18, 20, 22, 27, 34, 37, 38, 39)
+SEEDS = (4, 9, 15, 18, 20, 22, 27, 34, 36, 37, 38, 39)
 """Random trees that are quick to compile and of every kind; see `random_tree`."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scene:
     """A scene in plain numbers, told without eomgen.
 
@@ -76,7 +76,7 @@ class Scene:
         return {name: float(rng.uniform(-9.0, 9.0)) for name in self.inputs}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Compiled:
     """A scene after every stage of eomgen."""
 

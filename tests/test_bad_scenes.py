@@ -320,6 +320,22 @@ def test_an_unwritable_output(scene: Path, capsys: pytest.CaptureFixture[str]) -
     assert sorted(p.name for p in scene.parent.iterdir()) == ["swing.csv", "swing.toml"]
 
 
+def test_a_tree_too_large_for_the_closed_form(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A limit that is said at once, not a derivation that never ends."""
+    text = 'name = "chain"\n'
+    for i in range(13):
+        parent = f"b{i - 1}" if i else "world"
+        text += BODY.format(f"b{i}") + JOINT.format(f"j{i}", parent, f"b{i}")
+    scene.write_text(text)
+    assert main(["generate", str(scene), "-o", str(scene.parent / "made")]) == 1
+    assert capsys.readouterr().err == (
+        "eomgen: route: the tree at 'b0' has 13 bodies; "
+        "the closed form is for small trees, of up to 12\n"
+    )
+
+
 def test_wrong_usage_is_exit_code_2(capsys: pytest.CaptureFixture[str]) -> None:
     """An option that does not exist is the shell's matter, not the scene's."""
     with pytest.raises(SystemExit) as stop:

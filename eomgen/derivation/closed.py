@@ -16,8 +16,12 @@ from eomgen.derivation.free_bodies import FreeBodies, draw_free_bodies
 from eomgen.derivation.kinematics import Kinematics, differentiate_joints
 from eomgen.derivation.solution import Definition, Solution, solve
 from eomgen.derivation.symbols import Expr, Symbols, make_symbols
+from eomgen.errors import SceneError
 from eomgen.joints import Free
 from eomgen.model import Model
+
+MOST_BODIES = 12
+"""Bodies of one tree; twelve take about a minute, and each one more a third more."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,17 @@ class Equations:
 
 
 def derive(model: Model) -> Equations:
-    """Derive, eliminate and solve; see the modules of this package for each step."""
+    """Derive, eliminate and solve; see the modules of this package for each step.
+
+    Raises `SceneError` for a tree of more than `MOST_BODIES` bodies.
+    """
+    for tree in trees(model):
+        if len(tree.bodies) > MOST_BODIES:
+            root = model.bodies[tree.root].name
+            raise SceneError(
+                f"route: the tree at '{root}' has {len(tree.bodies)} bodies; "
+                f"the closed form is for small trees, of up to {MOST_BODIES}"
+            )
     symbols = make_symbols(model)
     kinematics = differentiate_joints(model, symbols)
     free_bodies = draw_free_bodies(model, symbols, kinematics)

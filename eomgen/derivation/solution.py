@@ -212,6 +212,7 @@ def _eliminate_angles(
 
 def _eliminate(k: int, rows: Sequence[_Row]) -> tuple[Expr, dict[int, Expr], list[_Row]]:
     """Eliminate unknown `k` from rows that all hold it: pivot, Σ w a j of the rest, rows left."""
+    zero = sp.Integer(0)
     first, *others = rows
     weight, a = first.weight, first.entries[k]
     p = {i: e for i, e in first.entries.items() if i != k}
@@ -220,12 +221,13 @@ def _eliminate(k: int, rows: Sequence[_Row]) -> tuple[Expr, dict[int, Expr], lis
         b = row.entries[k]
         pivot = weight * a**2 + row.weight * b**2
         columns = dict.fromkeys((*p, *(i for i in row.entries if i != k)))
-        rest = {i: tidy(a * row.entries.get(i, 0) - b * p.get(i, 0)) for i in columns}
+        rest = {i: a * row.entries.get(i, zero) - b * p.get(i, zero) for i in columns}
         rest = {i: e for i, e in rest.items() if e != 0}
         if rest:
             left.append(_Row(weight * row.weight / pivot, rest))
         coupling = {
-            i: weight * a * p.get(i, 0) + row.weight * b * row.entries.get(i, 0) for i in columns
+            i: weight * a * p.get(i, zero) + row.weight * b * row.entries.get(i, zero)
+            for i in columns
         }
         weight, a, p = pivot, sp.Integer(1), {i: h / pivot for i, h in coupling.items()}
     return weight * a**2, {i: sp.cancel(weight * a * e) for i, e in p.items()}, left

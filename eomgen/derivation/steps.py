@@ -64,7 +64,11 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
         "State",
         "Each body has the position x, y of its centre of mass, its momentum P = m v, its "
         "orientation and its angular momentum L = I ω. The joints leave the coordinates free.",
-        [*zip(s.angle, kin.angle, strict=True), *zip(s.omega, kin.omega, strict=True)],
+        [
+            (sp.Symbol("Y"), _redundant_state(equations)),
+            *zip(s.angle, kin.angle, strict=True),
+            *zip(s.omega, kin.omega, strict=True),
+        ],
     )
     yield (
         "(2)-(17)",
@@ -101,6 +105,15 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
             for pair in zip((s.xdd[k], s.ydd[k]), kin.acceleration[k], strict=True)
         ],
     )
+
+
+def _redundant_state(equations: Equations) -> Expr:
+    """All numbers of all bodies in a row (1): x, P, orientation, L."""
+    s, row = equations.symbols, []
+    for k, body in enumerate(equations.model.bodies):
+        momentum = [sp.Symbol(f"P_{body.name},{axis}") for axis in "xy"]
+        row += [s.x[k], s.y[k], *momentum, s.angle[k], sp.Symbol(f"L_{body.name}")]
+    return sp.Matrix([row])
 
 
 def _equations_of_motion(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:

@@ -32,21 +32,41 @@ def terminal_progress(label: str) -> Iterator[Progress]:
 
     Where standard error is no terminal the callable does nothing.
     """
+    with _line() as write:
+
+        def draw(fraction: float) -> None:
+            done = min(max(fraction, 0.0), 1.0)
+            bar = "#" * round(done * _BAR)
+            write(f"{label} [{bar:<{_BAR}}] {done:4.0%}")
+
+        yield draw
+
+
+@contextmanager
+def terminal_notice(text: str) -> Iterator[None]:
+    """Show a line on standard error while the block runs, if that is a terminal."""
+    with _line() as write:
+        write(text)
+        yield
+
+
+@contextmanager
+def _line() -> Iterator[Callable[[str], None]]:
+    """Give a function that rewrites one line of the terminal, wiped when the block ends."""
     stream = sys.stderr
     if not stream.isatty():
-        yield lambda fraction: None
+        yield lambda text: None
         return
     # One column short of the edge, or the line would wrap and \r could not come back over it.
     width = shutil.get_terminal_size().columns - 1
 
-    def draw(fraction: float) -> None:
-        done = min(max(fraction, 0.0), 1.0)
-        bar = "#" * round(done * _BAR)
-        stream.write("\r" + f"{label} [{bar:<{_BAR}}] {done:4.0%}"[:width].ljust(width))
+    def write(text: str) -> None:
+        stream.write("\r" + text[:width].ljust(width))
         stream.flush()
 
     try:
-        yield draw
+        yield write
     finally:
-        stream.write("\r" + " " * width + "\r")
+        write("")
+        stream.write("\r")
         stream.flush()
