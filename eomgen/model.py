@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeGuard
 
 from eomgen.effects import Effect, ExternalForce, Gravity, Motor
 from eomgen.effects.base import Input
 from eomgen.errors import SceneError, nearest
-from eomgen.joints import Free, Joint, Revolute
+from eomgen.joints import Joint, Revolute
 from eomgen.joints.base import WORLD, Coordinate
 from eomgen.language.formula import Constant, Floats, Formula, evaluate
 from eomgen.language.quantity import Parameter, name_quantities
@@ -278,11 +279,16 @@ def _check_regular(model: Model) -> None:
         if model.value(body.inertia_com) > 0:
             continue
         joint = body.joint
-        if isinstance(joint, Free) or all(model.value(r) == 0.0 for r in joint.r_child):
+        if not off_centre(joint) or all(model.value(r) == 0.0 for r in joint.r_child):
             raise SceneError(
                 f"body '{body.name}': inertia_com is 0 and nothing resists its rotation; "
                 "give it an inertia > 0, or hold it away from its centre of mass"
             )
+
+
+def off_centre(joint: Joint) -> TypeGuard[Revolute]:
+    """Whether a joint holds its child away from the centre of mass, as its structure says."""
+    return isinstance(joint, Revolute) and not all(is_zero(r) for r in joint.r_child)
 
 
 def is_zero(formula: Formula) -> bool:

@@ -85,12 +85,12 @@ def _constants(values):
     m_1, m_2, l_1, l_2, g = values
     if not m_1 > 0.0:
         raise ValueError("mass of upper is not positive: change the parameters")
-    if not m_1 * (l_1 * l_1) / 12.0 > 0.0:
-        raise ValueError("inertia_com of upper is not positive: change the parameters")
+    if not m_1 * (l_1 * l_1) / 12.0 >= 0.0:
+        raise ValueError("inertia_com of upper is negative: change the parameters")
     if not m_2 > 0.0:
         raise ValueError("mass of lower is not positive: change the parameters")
-    if not m_2 * (l_2 * l_2) / 12.0 > 0.0:
-        raise ValueError("inertia_com of lower is not positive: change the parameters")
+    if not m_2 * (l_2 * l_2) / 12.0 >= 0.0:
+        raise ValueError("inertia_com of lower is negative: change the parameters")
     k21 = m_2 * (l_2 * l_2)
     pivot_lower = k21 / 3.0
     l_1_squared = l_1 * l_1
@@ -303,10 +303,10 @@ def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     s3 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
     s19 = k10 * (theta_1_dot * sin(theta_1))
-    y_upper_dot = k10 * (theta_1_dot * cos(theta_1))
+    yd_upper = k10 * (theta_1_dot * cos(theta_1))
     s20 = k12 * (omega_lower * sin(s3)) + (s19 + s19)
-    y_lower_dot = k12 * (cos(s3) * omega_lower) + (y_upper_dot + y_upper_dot)
-    s21 = (s19 * s19 + y_upper_dot * y_upper_dot) * k11 + (s20 * s20 + y_lower_dot * y_lower_dot) * k13
+    yd_lower = k12 * (cos(s3) * omega_lower) + (yd_upper + yd_upper)
+    s21 = (s19 * s19 + yd_upper * yd_upper) * k11 + (s20 * s20 + yd_lower * yd_lower) * k13
     return (
         omega_lower * omega_lower * k15 + (theta_1_dot * theta_1_dot * k14 + s21),
     )
@@ -333,16 +333,16 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     sin_theta_1_theta_2 = sin(s3)
     sin_theta_1 = sin(theta_1)
     s19 = k10 * (theta_1_dot * sin_theta_1)
-    y_upper_dot = k10 * (theta_1_dot * cos_theta_1)
+    yd_upper = k10 * (theta_1_dot * cos_theta_1)
     s20 = k12 * (omega_lower * sin_theta_1_theta_2) + (s19 + s19)
-    y_lower_dot = k12 * (cos_theta_1_theta_2 * omega_lower) + (y_upper_dot + y_upper_dot)
+    yd_lower = k12 * (cos_theta_1_theta_2 * omega_lower) + (yd_upper + yd_upper)
     y_upper = sin_theta_1 * k10
     x_upper = cos_theta_1 * k10
-    s22 = y_lower_dot * (cos_theta_1_theta_2 * k12 + (x_upper + x_upper)) + s20 * (sin_theta_1_theta_2 * k12 + (y_upper + y_upper))
-    s23 = omega_lower * k18 + (m_1 * (y_upper_dot * x_upper + s19 * y_upper) + m_2 * s22)
+    s22 = yd_lower * (cos_theta_1_theta_2 * k12 + (x_upper + x_upper)) + s20 * (sin_theta_1_theta_2 * k12 + (y_upper + y_upper))
+    s23 = omega_lower * k18 + (m_1 * (yd_upper * x_upper + s19 * y_upper) + m_2 * s22)
     return (
         -(m_2 * s20 + m_1 * s19),
-        m_2 * y_lower_dot + m_1 * y_upper_dot,
+        m_2 * yd_lower + m_1 * yd_upper,
         theta_1_dot * k19 + s23,
     )
 
@@ -416,7 +416,10 @@ def _named(values, names, defaults, what):
 
 
 def _parameters(p):
-    return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+    try:
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+    except ZeroDivisionError:
+        raise ValueError("the mass matrix is singular: change the parameters") from None
 
 
 def _inputs(u, columns):

@@ -180,10 +180,10 @@ def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     """10 operations: 1 add, 7 mul, 1 sin, 1 cos."""
     pivot_r_child_x, k3 = k
     theta, theta_dot = y
-    x_bob_dot = pivot_r_child_x * (theta_dot * sin(theta))
+    xd_bob = pivot_r_child_x * (theta_dot * sin(theta))
     s1 = pivot_r_child_x * (theta_dot * cos(theta))
     return (
-        (x_bob_dot * x_bob_dot + s1 * s1) * k3,
+        (xd_bob * xd_bob + s1 * s1) * k3,
     )
 
 
@@ -202,11 +202,11 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     theta, theta_dot = y
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    x_bob_dot = pivot_r_child_x * (theta_dot * sin_theta)
+    xd_bob = pivot_r_child_x * (theta_dot * sin_theta)
     s1 = pivot_r_child_x * (theta_dot * cos_theta)
-    s2 = s1 * (pivot_r_child_x * cos_theta) + x_bob_dot * (pivot_r_child_x * sin_theta)
+    s2 = s1 * (pivot_r_child_x * cos_theta) + xd_bob * (pivot_r_child_x * sin_theta)
     return (
-        bob_mass * x_bob_dot,
+        bob_mass * xd_bob,
         -bob_mass * s1,
         bob_mass * s2,
     )
@@ -220,11 +220,11 @@ def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
     alpha_bob = cos_theta * k1 * k2
     sin_theta = sin(theta)
     theta_dot_squared = theta_dot * theta_dot
-    x_bob_ddot = pivot_r_child_x * (alpha_bob * sin_theta + cos_theta * theta_dot_squared)
-    y_bob_ddot = pivot_r_child_x * (sin_theta * theta_dot_squared - cos_theta * alpha_bob)
+    xdd_bob = pivot_r_child_x * (alpha_bob * sin_theta + cos_theta * theta_dot_squared)
+    ydd_bob = pivot_r_child_x * (sin_theta * theta_dot_squared - cos_theta * alpha_bob)
     return (
-        -bob_mass * x_bob_ddot,
-        -(k4 + bob_mass * y_bob_ddot),
+        -bob_mass * xdd_bob,
+        -(k4 + bob_mass * ydd_bob),
     )
 
 
@@ -257,7 +257,10 @@ def _named(values, names, defaults, what):
 
 
 def _parameters(p):
-    return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+    try:
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+    except ZeroDivisionError:
+        raise ValueError("the mass matrix is singular: change the parameters") from None
 
 
 def _inputs(u, columns):

@@ -107,8 +107,8 @@ def _constants(values):
         raise ValueError("inertia_com of A is not positive: change the parameters")
     if not m_B > 0.0:
         raise ValueError("mass of B is not positive: change the parameters")
-    if not I_B > 0.0:
-        raise ValueError("inertia_com of B is not positive: change the parameters")
+    if not I_B >= 0.0:
+        raise ValueError("inertia_com of B is negative: change the parameters")
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
     k23 = m_A * m_B
@@ -448,11 +448,11 @@ def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
-    x_B_dot = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
-    y_B_dot = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
+    xd_B = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
+    yd_B = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
     s40 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k19 + (theta_dot * theta_dot * k17 + omega_B * omega_B * k18)
     return (
-        (x_B_dot * x_B_dot + y_B_dot * y_B_dot) * k20 + s40,
+        (xd_B * xd_B + yd_B * yd_B) * k20 + s40,
     )
 
 
@@ -475,13 +475,13 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
-    x_B_dot = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
-    y_B_dot = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
-    s41 = y_B_dot * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - x_B_dot * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
+    xd_B = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
+    yd_B = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
+    s41 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
     s42 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
-        m_A * x_A_dot + m_B * x_B_dot,
-        m_A * y_A_dot + m_B * y_B_dot,
+        m_A * x_A_dot + m_B * xd_B,
+        m_A * y_A_dot + m_B * yd_B,
         m_B * s41 + s42,
     )
 
@@ -503,10 +503,10 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     omega_B_squared = omega_B * omega_B
     alpha_A = (k4 * (coupling_B_A * s2) + k3 * (sin_phi * omega_B_squared)) / (k1 + sin_phi * sin_phi * k2)
     s3 = k4 * (s2 + coupling_B_A * alpha_A)
-    x_A_ddot_2 = k5 * (sin_theta * alpha_A + theta_dot_squared * cos_theta) + k6 * (cos_theta_phi * omega_B_squared - sin_theta_phi * s3)
+    xdd_A = k5 * (sin_theta * alpha_A + theta_dot_squared * cos_theta) + k6 * (cos_theta_phi * omega_B_squared - sin_theta_phi * s3)
     s4 = k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A) + k6 * (sin_theta_phi * omega_B_squared + cos_theta_phi * s3)
     return (
-        m_A * x_A_ddot_2,
+        m_A * xdd_A,
         k21 + m_A * (s4 - g),
     )
 
@@ -544,7 +544,10 @@ def _named(values, names, defaults, what):
 
 
 def _parameters(p):
-    return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+    try:
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+    except ZeroDivisionError:
+        raise ValueError("the mass matrix is singular: change the parameters") from None
 
 
 def _inputs(u, columns):

@@ -130,8 +130,8 @@ def _constants(values):
         raise ValueError("inertia_com of A is not positive: change the parameters")
     if not m_B > 0.0:
         raise ValueError("mass of B is not positive: change the parameters")
-    if not I_B > 0.0:
-        raise ValueError("inertia_com of B is not positive: change the parameters")
+    if not I_B >= 0.0:
+        raise ValueError("inertia_com of B is negative: change the parameters")
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
     k27 = m_A * m_B
@@ -512,11 +512,11 @@ def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
-    x_B_dot = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
-    y_B_dot = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
+    xd_B = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
+    yd_B = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
     s60 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k23 + (theta_dot * theta_dot * k21 + omega_B * omega_B * k22)
     return (
-        (x_B_dot * x_B_dot + y_B_dot * y_B_dot) * k24 + s60,
+        (xd_B * xd_B + yd_B * yd_B) * k24 + s60,
     )
 
 
@@ -539,13 +539,13 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
-    x_B_dot = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
-    y_B_dot = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
-    s61 = y_B_dot * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - x_B_dot * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
+    xd_B = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
+    yd_B = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
+    s61 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
     s62 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
-        m_A * x_A_dot + m_B * x_B_dot,
-        m_A * y_A_dot + m_B * y_B_dot,
+        m_A * x_A_dot + m_B * xd_B,
+        m_A * y_A_dot + m_B * yd_B,
         m_B * s61 + s62,
     )
 
@@ -573,11 +573,11 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
     s4 = k3 * (f_A_x + f_B_x) + k11 * (sin_theta * alpha_A + theta_dot_squared * cos_theta)
     s5 = k3 * (f_A_y + f_B_y) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A)
-    y_A_ddot_2 = k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s5 - g
+    ydd_A = k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s5 - g
     s63 = m_A * (k6 * (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) + s4)
     return (
         s63 - f_A_x,
-        k25 + m_A * y_A_ddot_2 - f_A_y,
+        k25 + m_A * ydd_A - f_A_y,
     )
 
 
@@ -614,7 +614,10 @@ def _named(values, names, defaults, what):
 
 
 def _parameters(p):
-    return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+    try:
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+    except ZeroDivisionError:
+        raise ValueError("the mass matrix is singular: change the parameters") from None
 
 
 def _inputs(u, columns):

@@ -269,6 +269,17 @@ def test_other_parameter_values(built_in: Compiled) -> None:
     assert_agrees(built_in, y, u)  # and none of them has stuck
 
 
+def test_initial_momenta_follow_the_parameters() -> None:
+    """The scene gives velocities at the start; the momenta are the user's own masses times them."""
+    plain, c = compiled("two_body"), compiled("two_body", "redundant")
+    p = {**plain.scene.defaults, "m_A": 1.7, "I_B": 0.3, "l_A": 0.9}
+    y = plain.module.initial_state(p)
+    assert np.array_equal(y, plain.module.initial_state())
+    motion = plain.scene.motion(plain.module, y, p)
+    state, _ = in_momentum_form(plain.scene, c.module, plain.scene.numbers(p, {}), motion)
+    assert difference(c.module.initial_state(p), state) <= TOLERANCE
+
+
 @pytest.mark.parametrize("tree", TREES[:4], ids=lambda tree: tree.name)
 def test_other_parameter_values_of_trees(tree: Scene) -> None:
     """The same where parameters are shared, by name and by formula."""
@@ -334,12 +345,21 @@ def test_inertia_that_is_zero_by_its_parameter() -> None:
     joints = [{ name = "a", type = "revolute", parent = "world", child = "A", r_child = [-0.5, 0] }]
     effects = [{ type = "gravity", g = 9.81 }]
     """
-    try:
-        source = compile_scene(parse_scene(text))
-    except SceneError as error:
-        assert "inertia_com" in str(error)
-        return
-    assert load(source).derivative(0.0, np.zeros(2))[1] == pytest.approx(-9.81 / 0.5, rel=1e-14)
+    module = load(compile_scene(parse_scene(text)))
+    assert module.derivative(0.0, np.zeros(2))[1] == pytest.approx(-9.81 / 0.5, rel=1e-14)
+    heavy = module.derivative(0.0, np.zeros(2), {"I": 0.5})[1]
+    assert heavy == pytest.approx(-2.0 * 0.5 * 9.81 / (0.5 + 2.0 * 0.5**2), rel=1e-14)
+
+
+def test_inertia_that_may_vanish() -> None:
+    """A body held away from its centre of mass may be given no inertia of its own, but no less."""
+    c, rng = compiled("two_body"), np.random.default_rng(26)
+    for _ in range(20):
+        assert_agrees(c, c.scene.random_state(c.module, rng), p={"I_B": 0.0})
+    with pytest.raises(ValueError, match=r"^inertia_com of B is negative: change the parameters$"):
+        c.module.derivative(0.0, Y, {"I_B": -0.1})
+    with pytest.raises(ValueError, match=r"^the mass matrix is singular: change the parameters$"):
+        c.module.derivative(0.0, Y, {"I_B": 0.0, "l_B": 0.0})
 
 
 # The text of a module.

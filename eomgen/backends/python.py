@@ -111,17 +111,22 @@ def _fixed(system: System, blocks: Mapping[str, Block], names: Names) -> dict[st
     roots = sorted({i for block in blocks.values() for i in block.constants})
     made = [i for i in roots if program.steps[i].operation != "input"]
     # Checked before anything divides by it; the blocks share names, so they may share lines.
-    checked = print_block(program, [n for _, n in program.checks], names, DIALECT, fixed=True)
+    checked = print_block(
+        program, [check.node for check in program.checks], names, DIALECT, fixed=True
+    )
     fixed = print_block(program, made, names, DIALECT, fixed=True, keep=made)
     known = {name for name, _ in checked.lines}
     return {
         "checked": checked.lines,
         "checks": [
-            (_plain(about), source)
-            for (about, _), source in zip(program.checks, checked.results, strict=True)
+            (_plain(check.about), source, *_BOUNDS[check.may_vanish])
+            for check, source in zip(program.checks, checked.results, strict=True)
         ],
         "fixed": [(name, source) for name, source in fixed.lines if name not in known],
     }
+
+
+_BOUNDS = {False: (">", "not positive"), True: (">=", "negative")}
 
 
 def _unpacking(all_names: Sequence[str], block: Block, names: Names) -> str:

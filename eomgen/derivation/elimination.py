@@ -131,21 +131,21 @@ def _rows(model: Model, kinematics: Kinematics, wrenches: Sequence[Wrench]) -> l
     The elimination is linear, so inertia, gravity and applied forces pass through it one by one.
     """
     forces = joint_forces(model, [force for force, _ in wrenches])
+    floating = {tree.root: tree for tree in trees(model) if tree.floating}
     rows: list[Expr] = []
-    for tree in trees(model):
-        for k in tree.bodies:
-            if isinstance(model.bodies[k].joint, Free):
-                total: Vec = (sp.Integer(0), sp.Integer(0))
-                for i in tree.bodies:
-                    total = add(total, wrenches[i][0])
-                rows += total
-            row = wrenches[k][1]
-            if k in forces:
-                row += cross(kinematics.arm_child[k], forces[k])
-            for c, child in enumerate(model.bodies):
-                if child.parent == k:
-                    row -= cross(kinematics.arm_parent[c], forces[c])
-            rows.append(row)
+    for k in range(len(model.bodies)):  # in the order of the coordinates, whatever their tree
+        if k in floating:
+            total: Vec = (sp.Integer(0), sp.Integer(0))
+            for i in floating[k].bodies:
+                total = add(total, wrenches[i][0])
+            rows += total
+        row = wrenches[k][1]
+        if k in forces:
+            row += cross(kinematics.arm_child[k], forces[k])
+        for c, child in enumerate(model.bodies):
+            if child.parent == k:
+                row -= cross(kinematics.arm_parent[c], forces[c])
+        rows.append(row)
     return rows
 
 

@@ -14,7 +14,6 @@ from eomgen.derivation.symbols import Expr, over_bodies, over_coordinates
 from eomgen.errors import SceneError
 from eomgen.joints import Free
 from eomgen.joints.base import WORLD
-from eomgen.language.formula import Constant
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
     replaced: dict[Expr, Expr] = {}
     defined = dict(places)
     for k, body in enumerate(model.bodies):
-        if isinstance(body.inertia_com, Constant):
+        if model.value(body.inertia_com) == 0.0:
             raise SceneError(
                 f"form: '{model.form}' needs an angular momentum of body '{body.name}', whose "
                 "inertia_com is 0; use form = 'velocity' or give it an inertia"

@@ -204,7 +204,7 @@ def _eliminate_angles(
             if coupling.get(i, 0) != 0:
                 other = model.bodies[i].name
                 couplings[k][i] = notes.fresh(
-                    f"coupling__{name}_{other}", gathered(coupling[i], symbols)
+                    f"coupling__{name}__{other}", gathered(coupling[i], symbols)
                 )
                 load[i] = load[i] - couplings[k][i] / pivots[k] * load[k]
     return pivots, couplings
@@ -239,10 +239,10 @@ def _named_rows(rows: Sequence[_Row], name: str, notes: _Notes) -> list[_Row]:
     for n, row in enumerate(rows):
         weight, entries = row.weight, row.entries
         if sp.count_ops(weight) > 12:
-            weight = notes.fresh(f"weight__{name}_{n}", weight, positive=True)
+            weight = notes.fresh(f"weight__{name}__{n}", weight, positive=True)
         named.append(
             _Row(weight, {
-                i: notes.fresh(f"row__{name}_{n}_{i}", e) if sp.count_ops(e) > 12 else e
+                i: notes.fresh(f"row__{name}__{n}__{i}", e) if sp.count_ops(e) > 12 else e
                 for i, e in entries.items()
             })
         )  # fmt: skip
@@ -255,7 +255,7 @@ def gathered(expression: Expr, symbols: Symbols) -> Expr:
     What gravity and inertia share cancels here, as it does on paper: in a floating tree the weight
     drops out of every angular acceleration.
     """
-    fixed = {*symbols.parameters.values()}
+    fixed = {*symbols.parameters.values(), *symbols.formulas.values()}
     coefficients: dict[Expr, Expr] = {}
     for term in sp.Add.make_args(tidy(expression)):
         moving = [f for f in sp.Mul.make_args(term) if not f.free_symbols <= fixed]

@@ -9,6 +9,7 @@ from eomgen.derivation.closed import Equations
 from eomgen.derivation.elimination import trees
 from eomgen.derivation.symbols import Expr
 from eomgen.joints import Free
+from eomgen.language.formula import as_text
 
 
 @dataclass(frozen=True)
@@ -181,6 +182,8 @@ def _readable(equations: Equations) -> dict[Expr, Expr]:
     for body, (fx, fy) in zip(model.bodies, s.force, strict=True):
         shown[fx] = sp.Symbol(f"f_{body.joint.name},x")
         shown[fy] = sp.Symbol(f"f_{body.joint.name},y")
+    for formula, symbol in s.formulas.items():
+        shown[symbol] = sp.Symbol(as_text(formula))
     short = {"pivot": "d", "coupling": "c", "load": "b", "mass": "M", "weight": "w", "row": "j"}
     for body in model.bodies:
         for field, letter in (("mass", "m"), ("inertia_com", "I")):
@@ -190,7 +193,7 @@ def _readable(equations: Equations) -> dict[Expr, Expr]:
     for symbol, _ in equations.solution.definitions:
         kind, _, rest = symbol.name.partition("__")
         if symbol not in shown and kind in short:
-            shown[symbol] = sp.Symbol(f"{short[kind]}_{rest}")
+            shown[symbol] = sp.Symbol(f"{short[kind]}_{rest.replace('__', ',')}")
     return shown
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import sympy as sp
 
-from eomgen.language.formula import Formula, Name, evaluate
+from eomgen.language.formula import Formula, Name, calls_function, evaluate
 from eomgen.model import Model
 
 Expr = Any
@@ -22,8 +22,19 @@ class SympyScalars:
         return sp.Rational(repr(value))
 
     def call(self, function: str, argument: Expr) -> Expr:
-        """sin, cos, tan or sqrt."""
-        return {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "sqrt": sp.sqrt}[function](argument)
+        """No function is ever called: such a formula is one symbol, see `_quantity`."""
+        raise AssertionError(function)
+
+
+def _quantity(formula: Formula, parameters: dict[str, Expr], formulas: dict[Formula, Expr]) -> Expr:
+    """A quantity over the parameters' symbols.
+
+    A formula with a function in it becomes a symbol of its own: SymPy must not meet a sine that is
+    none of a pose's, nor a root, and none of them matters to the mechanics.
+    """
+    if calls_function(formula):
+        return formulas.setdefault(formula, _real(f"formula__{len(formulas) + 1}"))
+    return evaluate(formula, parameters, SympyScalars())
 
 
 @dataclass(frozen=True)
@@ -33,10 +44,12 @@ class Symbols:
     `q`, `v`, `a` are coordinates with their first and second derivatives, `tau` generalised forces
     beside those of the effects. Per body `x`, `y`, `angle` are the pose of the centre of mass in
     world axes, `xd`, `yd`, `omega` its velocity, `xdd`, `ydd`, `alpha` its acceleration.
+    `formulas` are quantities with functions in them, each one symbol to the derivation.
     `force` holds the joint force of the body's own joint, acting on its parent (0 if free).
     """
 
     parameters: dict[str, Expr]
+    formulas: dict[Formula, Expr]
     inputs: dict[str, Expr]
     mass: tuple[Expr, ...]
     inertia: tuple[Expr, ...]
@@ -57,7 +70,7 @@ class Symbols:
 
     def value(self, formula: Formula) -> Expr:
         """A quantity over the parameters' symbols."""
-        return evaluate(formula, self.parameters, SympyScalars())
+        return _quantity(formula, self.parameters, self.formulas)
 
 
 def make_symbols(model: Model) -> Symbols:
@@ -73,8 +86,10 @@ def make_symbols(model: Model) -> Symbols:
         for p in model.parameters
     }
 
+    formulas: dict[Formula, Expr] = {}
+
     def quantity(formula: Formula) -> Expr:
-        return evaluate(formula, parameters, SympyScalars())
+        return _quantity(formula, parameters, formulas)
 
     coordinates = [c.name for c in model.coordinates]
     bodies = [body.name for body in model.bodies]
@@ -84,6 +99,7 @@ def make_symbols(model: Model) -> Symbols:
 
     return Symbols(
         parameters=parameters,
+        formulas=formulas,
         inputs={i.name: _real(i.name) for i in model.inputs},
         mass=tuple(quantity(body.mass) for body in model.bodies),
         inertia=tuple(quantity(body.inertia_com) for body in model.bodies),
@@ -95,14 +111,14 @@ def make_symbols(model: Model) -> Symbols:
         x=each(bodies, "x__{}"),
         y=each(bodies, "y__{}"),
         angle=each(bodies, "angle__{}"),
-        xd=each(bodies, "x__{}_dot"),
-        yd=each(bodies, "y__{}_dot"),
+        xd=each(bodies, "xd__{}"),
+        yd=each(bodies, "yd__{}"),
         omega=each(bodies, "omega__{}"),
-        xdd=each(bodies, "x__{}_ddot"),
-        ydd=each(bodies, "y__{}_ddot"),
+        xdd=each(bodies, "xdd__{}"),
+        ydd=each(bodies, "ydd__{}"),
         alpha=each(bodies, "alpha__{}"),
         force=tuple(
-            (_real(f"f__{body.joint.name}_x"), _real(f"f__{body.joint.name}_y"))
+            (_real(f"fx__{body.joint.name}"), _real(f"fy__{body.joint.name}"))
             for body in model.bodies
         ),
     )

@@ -146,6 +146,30 @@ def names_in(formula: Formula) -> Iterator[str]:
                 yield from names_in(operand)
 
 
+def calls_function(formula: Formula) -> bool:
+    """Whether a formula has sin, cos, tan or sqrt in it."""
+    match formula:
+        case Apply(operation, operands):
+            return operation in FUNCTIONS or any(calls_function(part) for part in operands)
+    return False
+
+
+def as_text(formula: Formula) -> str:
+    """A formula as one may write it, every operation in brackets."""
+    match formula:
+        case Constant(value):
+            return f"{value:g}"
+        case Name(name):
+            return name
+        case Apply("neg", (operand,)):
+            return f"(-{as_text(operand)})"
+        case Apply(operation, (left, right)):
+            return f"({as_text(left)} {operation} {as_text(right)})"
+        case Apply(operation, (argument,)):
+            return f"{operation}({as_text(argument).removeprefix('(').removesuffix(')')})"
+    raise AssertionError(formula)
+
+
 def evaluate(formula: Formula, names: Mapping[str, Any], scalars: Scalars) -> Any:
     """The value of a formula over given scalars. Raises `KeyError` for a name not in `names`."""
     match formula:

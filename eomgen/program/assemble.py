@@ -8,11 +8,12 @@ import sympy as sp
 
 from eomgen.derivation.closed import Equations
 from eomgen.derivation.forms import StateForm, state_form
-from eomgen.model import Model, is_zero
+from eomgen.language.formula import evaluate
+from eomgen.model import Model, is_zero, off_centre
 from eomgen.program.differentiate import jacobian
-from eomgen.program.lower import Lowering
+from eomgen.program.lower import Lowering, TapeScalars
 from eomgen.program.passes import PassReport, optimise
-from eomgen.program.program import Output, Program, finish
+from eomgen.program.program import Check, Output, Program, finish
 from eomgen.program.tape import Node, Stage, Tape
 
 NEEDS_VELOCITIES = (
@@ -45,7 +46,10 @@ def assemble(equations: Equations) -> System:
     """Lower the equations, differentiate the derivative, run the passes."""
     model, symbols, form = equations.model, equations.symbols, state_form(equations)
     tape = Tape()
-    parameters = {s: tape.input(n, Stage.PARAMETERS) for n, s in symbols.parameters.items()}
+    named = {name: tape.input(name, Stage.PARAMETERS) for name in symbols.parameters}
+    parameters = {symbol: named[name] for name, symbol in symbols.parameters.items()}
+    for formula, symbol in symbols.formulas.items():
+        parameters[symbol] = evaluate(formula, named, TapeScalars(tape))
     states = {
         s.symbol: tape.input(s.name, Stage.POSITIONS if s.position else Stage.VELOCITIES)
         for s in form.states
@@ -146,13 +150,16 @@ def _momentum(equations: Equations) -> list[Any]:
     ]
 
 
-def _checks(equations: Equations, lowering: Lowering) -> list[tuple[str, int]]:
-    """What a user's own parameters must keep positive for the closed form to hold."""
+def _checks(equations: Equations, lowering: Lowering) -> list[Check]:
+    """What a user's own parameters must keep for the closed form to hold."""
+    model, symbols = equations.model, equations.symbols
     checks = []
-    for k, body in enumerate(equations.model.bodies):
-        mass = lowering.lower(equations.symbols.mass[k])
-        checks.append((f"mass of {body.name}", mass.index))
+    for k, body in enumerate(model.bodies):
+        mass = lowering.lower(symbols.mass[k])
+        checks.append(Check(f"mass of {body.name}", mass.index, may_vanish=False))
         if not is_zero(body.inertia_com):
-            inertia = lowering.lower(equations.symbols.inertia[k])
-            checks.append((f"inertia_com of {body.name}", inertia.index))
+            # A body held away from its centre of mass needs no inertia of its own to turn.
+            held = model.form == "velocity" and off_centre(body.joint)
+            inertia = lowering.lower(symbols.inertia[k])
+            checks.append(Check(f"inertia_com of {body.name}", inertia.index, may_vanish=held))
     return checks

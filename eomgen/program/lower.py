@@ -13,6 +13,21 @@ import sympy as sp
 from eomgen.program.tape import Node, Stage, Tape, power, total
 
 
+class TapeScalars:
+    """Nodes as scalars for formulas."""
+
+    def __init__(self, tape: Tape) -> None:
+        self._tape = tape
+
+    def number(self, value: float) -> Node:
+        """A constant."""
+        return self._tape.constant(value)
+
+    def call(self, function: str, argument: Node) -> Node:
+        """sin, cos, tan or sqrt."""
+        return self._tape.apply(function, argument)
+
+
 class Lowering:
     """Lowers expressions over symbols that are known nodes, or are defined by expressions.
 
@@ -58,10 +73,6 @@ class Lowering:
                 tops[True].append(self._tape.constant(int(factor.p)))
                 bottoms[True].append(self._tape.constant(int(factor.q)))
                 continue
-            if not exponent.is_Integer:
-                node = self._root(base, exponent)
-                tops[node.step.stage <= Stage.PARAMETERS].append(node)
-                continue
             node = self.lower(base)
             side = tops if exponent > 0 else bottoms
             fixed = node.step.stage <= Stage.PARAMETERS
@@ -75,13 +86,6 @@ class Lowering:
                 bottom = bottom * node
             parts.append(top / bottom)
         return parts[0], parts[1]
-
-    def _root(self, base: Any, exponent: Any) -> Node:
-        """A half-integer power."""
-        assert exponent.q == 2, "only square roots reach the program"
-        root = self._tape.apply("sqrt", self.lower(base))
-        raised = power(root, abs(int(exponent.p)))
-        return raised if exponent.p > 0 else self._tape.constant(1.0) / raised
 
     def _sum(self, expression: Any) -> Node:
         groups: dict[int, tuple[Node, list[Node]]] = {}

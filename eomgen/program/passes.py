@@ -1,7 +1,7 @@
 """Passes: each takes a finished program and returns a better one with the same values."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from eomgen.program.program import Output, Program, cost, finish, live_steps
 from eomgen.program.tape import Node, Tape
@@ -31,7 +31,7 @@ def optimise(program: Program) -> tuple[Program, tuple[PassReport, ...]]:
 def drop_dead_steps(program: Program) -> Program:
     """Leave out what no output and no check needs."""
     roots = [n for output in program.outputs.values() for n in output.nodes]
-    keep = live_steps(program, [*roots, *(n for _, n in program.checks)])
+    keep = live_steps(program, [*roots, *(check.node for check in program.checks)])
     new = {old: i for i, old in enumerate(keep)}
     steps = tuple(
         type(step)(step.operation, tuple(new[o] for o in step.operands), step.stage, step.value)
@@ -41,7 +41,7 @@ def drop_dead_steps(program: Program) -> Program:
         steps,
         {k: Output(o.shape, tuple(new[n] for n in o.nodes)) for k, o in program.outputs.items()},
         {new[i]: name for i, name in program.names.items() if i in new},
-        tuple((about, new[n]) for about, n in program.checks),
+        tuple(replace(check, node=new[check.node]) for check in program.checks),
     )
 
 
@@ -105,7 +105,8 @@ def _rebuilt(
         name: Output(output.shape, tuple(nodes[n].index for n in output.nodes))
         for name, output in program.outputs.items()
     }
-    return finish(tape, outputs, ((about, nodes[n].index) for about, n in program.checks))
+    checks = (replace(check, node=nodes[check.node].index) for check in program.checks)
+    return finish(tape, outputs, checks)
 
 
 def _report(name: str, program: Program) -> PassReport:

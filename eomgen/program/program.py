@@ -16,16 +16,25 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Check:
+    """A node that must be positive, or at least not negative where it `may_vanish`."""
+
+    about: str
+    node: int
+    may_vanish: bool
+
+
+@dataclass(frozen=True)
 class Program:
     """Straight-line arithmetic. `steps[i]` uses only steps before `i`.
 
-    `checks` are nodes that must be positive, with what they are: masses, inertias.
+    `checks` are what parameters of a user's own must keep: masses and inertias above zero.
     """
 
     steps: tuple[Step, ...]
     outputs: Mapping[str, Output]
     names: Mapping[int, str]
-    checks: tuple[tuple[str, int], ...]
+    checks: tuple[Check, ...]
 
     def __str__(self) -> str:
         """The program as pseudo-code, one line a step."""
@@ -40,7 +49,7 @@ class Program:
         return "\n".join(lines)
 
 
-def finish(tape: Tape, outputs: Mapping[str, Output], checks: Iterable[tuple[str, int]]) -> Program:
+def finish(tape: Tape, outputs: Mapping[str, Output], checks: Iterable[Check]) -> Program:
     """The program of a tape."""
     return Program(tuple(tape.steps), dict(outputs), dict(tape.names), tuple(checks))
 

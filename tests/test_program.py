@@ -1,0 +1,527 @@
+"""The straight-line program: folding, passes, the Jacobian transform, printing and names."""
+
+import ast
+import math
+from collections.abc import Callable
+from functools import cache
+from math import cos, sin, sqrt
+
+import mpmath
+import numpy as np
+import pytest
+from mechanisms import BUILT_IN, compiled, load, random_tree
+from newton_euler import Mechanism, solve
+
+from eomgen.pipeline import compile_scene
+from eomgen.program import assemble as assembling
+from eomgen.program.differentiate import jacobian
+from eomgen.program.passes import PASSES, optimise
+from eomgen.program.program import Output, Program, cost, finish, interpret, live_steps
+from eomgen.program.tape import Node, Stage, Tape, power, total
+from eomgen.scene.reader import parse_scene
+
+TREES = (4, 9, 22, 38)
+
+
+class Floats:
+    """Doubles as scalars of a program."""
+
+    def number(self, value: float) -> float:
+        """The double itself."""
+        return value
+
+    def call(self, function: str, argument: float) -> float:
+        """sin, cos, tan or sqrt, by `math`."""
+        return getattr(math, function)(argument)
+
+
+class Digits:
+    """mpmath numbers as scalars of a program."""
+
+    def number(self, value: float) -> mpmath.mpf:
+        """The double itself, exactly."""
+        return mpmath.mpf(value)
+
+    def call(self, function: str, argument: mpmath.mpf) -> mpmath.mpf:
+        """sin, cos, tan or sqrt."""
+        return getattr(mpmath, function)(argument)
+
+
+def fresh() -> tuple[Tape, Node, Node]:
+    """A tape with two inputs."""
+    tape = Tape()
+    return tape, tape.input("x", Stage.POSITIONS), tape.input("y", Stage.VELOCITIES)
+
+
+def same(a: Node, b: Node) -> bool:
+    """Whether two nodes are one step of one tape."""
+    return a.tape is b.tape and a.index == b.index
+
+
+# Folding.
+
+
+def test_folding() -> None:
+    """What arithmetic makes trivial becomes no step: x + 0, 1·x, 0·x, x - x, x/1, 0/x, --x."""
+    tape, x, y = fresh()
+    zero, one = tape.constant(0.0), tape.constant(1.0)
+    steps = len(tape.steps)
+    for node in (x + zero, zero + x, x - zero, x * one, one * x, x / one):
+        assert same(node, x)
+    for node in (x * zero, zero * x, x - x, zero / x, -zero, tape.constant(-0.0)):
+        assert same(node, zero)
+    assert len(tape.steps) == steps
+    minus = -x
+    assert same(-minus, x)
+    assert same(zero - x, minus)
+    assert math.copysign(1.0, tape.steps[zero.index].value) == 1.0
+    assert same(total([], tape), zero)
+    assert same(total([x, zero, y], tape), x + y)
+
+
+def test_constants_fold() -> None:
+    """Operations on numbers are done once and for all."""
+    tape, _, _ = fresh()
+    two, half = tape.constant(2.0), tape.constant(0.5)
+    folded = {
+        two + half: 2.5,
+        two - half: 1.5,
+        two * half: 1.0,
+        half / two: 0.25,
+        -two: -2.0,
+        tape.apply("sqrt", two): math.sqrt(2.0),
+        tape.apply("sin", half): math.sin(0.5),
+        tape.apply("cos", half): math.cos(0.5),
+        tape.apply("tan", half): math.tan(0.5),
+        power(two, 10): 1024.0,
+    }
+    for node, value in folded.items():
+        assert node.step.operation == "constant"
+        assert node.step.value == value
+        assert node.step.stage == Stage.CONSTANT
+
+
+def test_interning() -> None:
+    """What is written twice exists once; sums and products do not care about order."""
+    tape, x, y = fresh()
+    assert same(x * y, y * x)
+    assert same(x + y, y + x)
+    assert not same(x - y, y - x)
+    assert not same(x / y, y / x)
+    assert same(tape.apply("sin", x + y), tape.apply("sin", y + x))
+    assert not same(tape.apply("sin", x), tape.apply("cos", x))
+    assert same(tape.constant(3), tape.constant(3.0))
+    assert same(tape.input("x", Stage.POSITIONS), x)
+    assert same(power(x, 5), (x * x) * (x * x) * x)
+
+
+def test_minus_moves_outwards() -> None:
+    """A minus sign leaves products, quotients and odd functions, until a sum swallows it."""
+    tape, x, y = fresh()
+    minus_two = tape.constant(-2.0)
+    assert same(-x * y, -(x * y))
+    assert same(-x * -y, x * y)
+    assert same(-x / y, -(x / y))
+    assert same(x / -y, -(x / y))
+    assert same(x * minus_two, -(x * tape.constant(2.0)))
+    assert same(x / minus_two, -(x / tape.constant(2.0)))
+    assert same(minus_two / x, -(tape.constant(2.0) / x))
+    assert same(x + -y, x - y)
+    assert same(-x + y, y - x)
+    assert same(x - -y, x + y)
+    assert same(-x - y, -(x + y))
+    assert same(-(x - y), y - x)
+    assert same(tape.apply("sin", -x), -tape.apply("sin", x))
+    assert same(tape.apply("cos", -x), tape.apply("cos", x))
+
+
+def test_folding_keeps_values() -> None:
+    """Random expressions over few leaves, so that folds abound, keep their value."""
+    rng = np.random.default_rng(51)
+    binary: dict[str, Callable] = {
+        "add": lambda a, b: a + b,
+        "sub": lambda a, b: a - b,
+        "mul": lambda a, b: a * b,
+        "div": lambda a, b: a / b,
+    }
+    unary = {"neg": lambda a: -a, "sin": mpmath.sin, "cos": mpmath.cos}
+    with mpmath.workdps(60):
+        for _ in range(60):
+            tape, x, y = fresh()
+            inputs = {"x": mpmath.mpf("0.7"), "y": mpmath.mpf("-1.3")}
+            pairs = [(x, inputs["x"]), (y, inputs["y"])]
+            pairs += [(tape.constant(v), mpmath.mpf(v)) for v in (0.0, 1.0, -1.0, -2.0)]
+            for _ in range(40):
+                (a, va), (b, vb) = (pairs[i] for i in rng.integers(len(pairs), size=2))
+                name = str(rng.choice([*binary, *unary]))
+                if name in unary:
+                    pairs.append((tape.apply(name, a), unary[name](va)))
+                elif (name != "div" or abs(vb) > 1e-3) and abs(va * vb) < 1e6:
+                    pairs.append((tape.apply(name, a, b), binary[name](va, vb)))
+            nodes = tuple(node.index for node, _ in pairs)
+            program = finish(tape, {"all": Output((len(nodes),), nodes)}, ())
+            for value, (node, expected) in zip(
+                interpret(program, "all", inputs, Digits()), pairs, strict=True
+            ):
+                # Constants fold in double precision.
+                assert abs(value - expected) <= 1e-9 * (1 + abs(expected)), str(node.step)
+
+
+def test_stages() -> None:
+    """A step belongs to the latest of its operands' stages; constants are none's."""
+    tape = Tape()
+    p, q, v, u = (tape.input(stage.name, stage) for stage in list(Stage)[1:])
+    assert (p * p).step.stage == Stage.PARAMETERS
+    assert (p * q).step.stage == Stage.POSITIONS
+    assert tape.apply("cos", p * q + v).step.stage == Stage.VELOCITIES
+    assert (u / (v * v)).step.stage == Stage.INPUTS
+    assert (tape.constant(2.0) * p).step.stage == Stage.PARAMETERS
+
+
+def test_names_stay() -> None:
+    """The first name suggested for a node is the one it keeps."""
+    tape, x, y = fresh()
+    tape.named(x * y, "area")
+    tape.named(y * x, "product")
+    assert tape.names == {(x * y).index: "area"}
+
+
+# Passes, on the programs they really receive.
+
+
+@cache
+def lowered(case: str | int) -> Program:
+    """The program of a scene as it comes to the passes."""
+    received: list[Program] = []
+
+    def keep(program: Program) -> tuple:
+        received.append(program)
+        return optimise(program)
+
+    scene = compiled(case if isinstance(case, str) else random_tree(case))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(assembling, "optimise", keep)
+        system = assembling.assemble(scene.equations)
+    assert system.program == scene.system.program
+    return received[0]
+
+
+def some_inputs(program: Program, rng: np.random.Generator) -> dict[str, mpmath.mpf]:
+    """A value for every input of a program: positive ones, as masses must be."""
+    names = [str(step.value) for step in program.steps if step.operation == "input"]
+    return {name: mpmath.mpf(float(rng.uniform(0.3, 2.0))) for name in names}
+
+
+@pytest.mark.parametrize("case", [*BUILT_IN, *TREES])
+def test_passes_keep_values_and_save_work(case: str | int) -> None:
+    """After each pass every output has its value to 45 digits, and no more to do than before."""
+    program = lowered(case)
+    reports = compiled(case if isinstance(case, str) else random_tree(case)).system.reports
+    assert [report.name for report in reports[1:]] == [p.__name__.replace("_", " ") for p in PASSES]
+    rng = np.random.default_rng(52)
+    with mpmath.workdps(60):
+        inputs = some_inputs(program, rng)
+        before = {o: interpret(program, o, inputs, Digits()) for o in program.outputs}
+        for run, earlier, report in zip(PASSES, reports, reports[1:], strict=False):
+            costs = {output: cost(program, output)["total"] for output in program.outputs}
+            assert earlier.steps == len(program.steps)
+            program = run(program)
+            assert report.steps == len(program.steps) <= earlier.steps
+            assert report.derivative == cost(program, "derivative")["total"] <= earlier.derivative
+            assert report.jacobian == cost(program, "jacobian")["total"] <= earlier.jacobian
+            assert all(cost(program, o)["total"] <= costs[o] for o in program.outputs)
+            assert list(program.outputs) == list(before)
+            for output, expected in before.items():
+                values = interpret(program, output, inputs, Digits())
+                for value, wanted in zip(values, expected, strict=True):
+                    assert abs(value - wanted) <= mpmath.mpf("1e-45") * (1 + abs(wanted))
+    assert reports[-1].steps < reports[0].steps
+
+
+@pytest.mark.parametrize("case", ["two_body_forced", 38])
+def test_programs_are_well_formed(case: str | int) -> None:
+    """Steps use earlier steps only, none twice, none for nothing, at a stage not before theirs."""
+    program = compiled(case if isinstance(case, str) else random_tree(case)).system.program
+    for i, step in enumerate(program.steps):
+        assert all(o < i for o in step.operands)
+        assert all(program.steps[o].stage <= step.stage for o in step.operands)
+    assert len(set(program.steps)) == len(program.steps)
+    roots = [n for output in program.outputs.values() for n in output.nodes]
+    roots += [check.node for check in program.checks]
+    assert live_steps(program, roots) == list(range(len(program.steps)))
+    for output in program.outputs.values():
+        assert math.prod(output.shape) == len(output.nodes)
+
+
+def test_factored_sums() -> None:
+    """a·x ± a·y becomes a·(x ± y), but not where one of the products is needed elsewhere."""
+    tape, x, y = fresh()
+    a, b = tape.input("a", Stage.INPUTS), tape.input("b", Stage.INPUTS)
+    outputs = {
+        "derivative": Output((2,), ((a * x + y * a).index, (x * a - y * y).index)),
+        "jacobian": Output((2,), ((x * b - b * y).index, (b * b + a * b).index)),
+    }
+    better, reports = optimise(finish(tape, outputs, ()))
+    assert reports[0].derivative == reports[-1].derivative == 5  # a·x is used twice
+    assert reports[0].jacobian == 6
+    assert reports[-1].jacobian == 4  # (x - y)·b, (a + b)·b
+    inputs = {"a": 3.0, "b": 2.0, "x": 5.0, "y": 7.0}
+    assert interpret(better, "derivative", inputs, Floats()) == [36.0, -34.0]
+    assert interpret(better, "jacobian", inputs, Floats()) == [-4.0, 10.0]
+
+
+# The Jacobian transform.
+
+
+def call(function: str, x: Node) -> Node:
+    """A function of a node."""
+    return x.tape.apply(function, x)
+
+
+@pytest.mark.parametrize(
+    ("build", "slopes"),
+    [
+        (lambda x, y: x + y, lambda x, y: (1, 1)),
+        (lambda x, y: x - y, lambda x, y: (1, -1)),
+        (lambda x, y: x * y, lambda x, y: (y, x)),
+        (lambda x, y: x * x, lambda x, y: (2 * x, 0)),
+        (lambda x, y: x / y, lambda x, y: (1 / y, -x / y**2)),
+        (lambda x, y: x / x * y, lambda x, y: (0, 1)),
+        (lambda x, y: -(x * y), lambda x, y: (-y, -x)),
+        (lambda x, y: call("sin", x * y), lambda x, y: (y * cos(x * y), x * cos(x * y))),
+        (lambda x, y: call("cos", x * y), lambda x, y: (-y * sin(x * y), -x * sin(x * y))),
+        (lambda x, y: call("tan", x + y), lambda x, y: (1 / cos(x + y) ** 2,) * 2),
+        (lambda x, y: call("sqrt", x * y), lambda x, y: (sqrt(y / x) / 2, sqrt(x / y) / 2)),
+        (lambda x, y: x.tape.constant(3.0) * x, lambda x, y: (3, 0)),
+        (lambda x, y: x.tape.input("z", Stage.INPUTS) * x, lambda x, y: (0.25, 0)),
+        (lambda x, y: y, lambda x, y: (0, 1)),
+        (lambda x, y: x.tape.constant(7.0), lambda x, y: (0, 0)),
+    ],
+)
+def test_jacobian_of_each_operation(build: Callable, slopes: Callable) -> None:
+    """Every operation's derivative, by each of its operands, and the chain through them."""
+    tape, x, y = fresh()
+    [row] = jacobian([build(x, y)], [x, y])
+    program = finish(tape, {"row": Output((2,), tuple(node.index for node in row))}, ())
+    for a, b in ((0.6, 1.7), (1.1, 0.4)):
+        values = interpret(program, "row", {"x": a, "y": b, "z": 0.25}, Floats())
+        assert values == pytest.approx([float(s) for s in slopes(a, b)], rel=1e-14, abs=1e-14)
+
+
+def test_jacobian_knows_every_operation() -> None:
+    """An operation without a known derivative is a fault of this program, never a silent 0."""
+    tape, x, y = fresh()
+    odd = tape._intern(type(x.step)("cosh", (x.index,), Stage.POSITIONS))
+    with pytest.raises(AssertionError, match="cosh"):
+        jacobian([odd], [x])
+    assert jacobian([], [x, y]) == []
+
+
+# Printing.
+
+
+@pytest.mark.parametrize("case", [*BUILT_IN, *TREES])
+def test_printed_code_is_the_program(case: str | int) -> None:
+    """Scalar code does the program's operations in the program's order: equal to the last bit."""
+    c = compiled(case if isinstance(case, str) else random_tree(case))
+    rng = np.random.default_rng(53)
+    for _ in range(50):
+        y, u = c.scene.random_state(c.module, rng), c.scene.random_inputs(rng)
+        inputs = {**c.module.PARAMETERS, **dict(zip(c.module.STATES, y.tolist(), strict=True)), **u}
+        for output in ("derivative", "jacobian", "joint_forces", "momentum", "mass_matrix"):
+            ours = getattr(c.module, output)(0.0, y, u=u)
+            assert ours.ravel().tolist() == interpret(c.system.program, output, inputs, Floats())
+
+
+def test_columns_are_the_same_code() -> None:
+    """Columns of states give each state's own values, but for NumPy's own sine and cosine."""
+    c, rng = compiled("two_body_forced"), np.random.default_rng(54)
+    columns = np.array([c.scene.random_state(c.module, rng) for _ in range(7)]).T
+    u = c.scene.random_inputs(rng)
+    for name in c.system.program.outputs:
+        if name in ("initial_state", "forward_dynamics", "inverse_dynamics"):
+            continue
+        function = getattr(c.module, name)
+        together = function(0.0, columns, u=u)
+        apart = np.stack([function(0.0, y, u=u) for y in columns.T], axis=-1)
+        assert together.shape == apart.shape
+        assert np.allclose(together, apart, rtol=1e-13, atol=1e-13)
+    q, v = columns[:4], columns[4:]
+    tau = rng.uniform(-5.0, 5.0, (4, 7))
+    for function in (c.module.forward_dynamics, c.module.inverse_dynamics):
+        apart = [function(q[:, i], v[:, i], tau[:, i], u=u) for i in range(7)]
+        assert np.allclose(function(q, v, tau, u=u), np.transpose(apart), rtol=1e-12, atol=1e-12)
+        one = [function(q[:, i], v[:, i], tau[:, 0], u=u) for i in range(7)]
+        assert np.allclose(
+            function(q, v, tau[:, 0], u=u), np.transpose(one), rtol=1e-12, atol=1e-12
+        )
+
+
+def test_counted_operations_are_the_printed_ones() -> None:
+    """COST counts what the module's own text does: as many operators and calls as it says."""
+    c = compiled("two_body_forced")
+    tree = ast.parse(c.source)
+    functions = {f.name: f for f in tree.body if isinstance(f, ast.FunctionDef)}
+    for name in c.system.program.outputs:
+        function = functions[f"_{name}"]
+        counts = dict.fromkeys(c.module.COST[name], 0)
+        for node in ast.walk(ast.Module(function.body, [])):
+            match node:
+                case ast.BinOp(op=op):
+                    counts[type(op).__name__.lower().replace("mult", "mul")] += 1
+                case ast.Call(func=ast.Name(id=called)):
+                    counts[called] += 1
+                case ast.UnaryOp(operand=operand) if not isinstance(operand, ast.Constant):
+                    counts["neg"] += 1
+        counts["total"] = sum(counts.values())
+        counts["parameters"] = c.module.COST[name]["parameters"]
+        assert counts == c.module.COST[name]
+
+
+# Names.
+
+
+def chain(bodies: list[str], joints: list[str], words: list[str]) -> tuple[str, Mechanism]:
+    """A chain on the world whose parameters go by the given words, and the same in numbers."""
+    n = len(bodies)
+    value = {word: 0.4 + 0.1 * i for i, word in enumerate(words)}
+    mass, inertia, inner, outer = (words[i * n : (i + 1) * n] for i in range(4))
+    gravity = words[4 * n]
+    text = 'name = "awkward"\noutputs = "all"\n[parameters]\n'
+    text += "".join(f"{word} = {x!r}\n" for word, x in value.items())
+    for k, body in enumerate(bodies):
+        parent = "world" if k == 0 else bodies[k - 1]
+        text += f"""
+[[bodies]]
+name = "{body}"
+mass = "{mass[k]}"
+inertia_com = "{inertia[k]}"
+[[joints]]
+name = "j{k}"
+type = "revolute"
+parent = "{parent}"
+child = "{body}"
+coordinate = "{joints[k]}"
+r_parent = ["{inner[k]}", 0]
+r_child = ["-{outer[k]}", 0]
+"""
+    text += f'[[effects]]\ntype = "gravity"\ng = "{gravity}"\n'
+    return text, Mechanism(
+        mass=[value[word] for word in mass],
+        inertia=[value[word] for word in inertia],
+        parent=list(range(-1, n - 1)),
+        free=[False] * n,
+        r_parent=[[value[word], 0.0] for word in inner],
+        r_child=[[-value[word], 0.0] for word in outer],
+        gravity=value[gravity],
+    )
+
+
+AWKWARD = {
+    "words the module uses": (
+        "y p u k extra np math sin cos tan sqrt values float len zip ValueError tuple",
+        "list x hasattr",
+    ),
+    "names the printer makes": (
+        "s1 s2 s3 k1 k2 k3 sin_s4 cos_x sin_x x_dot_squared pivot_A alpha_A load_A load_B",
+        "x s4 x2",
+    ),
+    "names of its functions": (
+        "derivative jacobian momentum NAME STATES INPUTS isfinite lru_cache E I S N O Q",
+        "lambda_x e c",
+    ),
+    "letters and underscores": (
+        "beta gamma zeta pi2 x_y_z q v a tau_x f_x omega_A angle_A x_A y_A x_A_dot A B",
+        "theta phi t1",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", AWKWARD)
+def test_awkward_names(kind: str) -> None:
+    """A scene may call its quantities as it likes: the module means what the scene says."""
+    words, joints = (text.split() for text in AWKWARD[kind])
+    assert len(set(words)) == len(words) in range(9, 19)
+    for chosen, coordinates in ((words[:9], joints[:2]), (words[-9:][::-1], joints[-2:])):
+        text, mechanism = chain(["A", "B"], coordinates, chosen)
+        assert_module_is(text, mechanism, coordinates)
+
+
+@pytest.mark.parametrize(
+    "bodies", ["A A_dot A_ddot", "B_A A A_B", "derivative np", "x y", "A_0 A_0_1 A"]
+)
+def test_awkward_bodies(bodies: str) -> None:
+    """Bodies whose names read like one another's symbols put together are kept apart."""
+    names = bodies.split()
+    joints = [f"q{k}" for k in range(len(names))]
+    text, mechanism = chain(names, joints, [f"p{k}" for k in range(4 * len(names) + 1)])
+    assert_module_is(text, mechanism, joints)
+
+
+def assert_module_is(text: str, mechanism: Mechanism, joints: list[str]) -> None:
+    """The module of a scene, executed, against the independent solver and its energies."""
+    module = load(compile_scene(parse_scene(text)))
+    assert list(module.STATES) == [*joints, *(f"{joint}_dot" for joint in joints)]
+    rng, n = np.random.default_rng(55), len(joints)
+    for _ in range(5):
+        y = rng.uniform(-3.0, 3.0, 2 * n)
+        motion = solve(mechanism, y[:n], y[n:])
+        scale = np.max(np.abs(motion.accelerations))
+        rates = module.derivative(0.0, y)[n:]
+        assert np.max(np.abs(rates - motion.accelerations)) <= 1e-12 * scale
+        columns = module.derivative(0.0, np.column_stack((y, y)))[n:, 1]
+        assert np.max(np.abs(columns - motion.accelerations)) <= 1e-12 * scale
+        forces = module.joint_forces(0.0, y)
+        assert np.allclose(forces, motion.pin_forces, rtol=1e-11, atol=1e-11)
+        (dx, dy, w), (_, height, _) = motion.velocities.T, motion.poses.T
+        mass, inertia = np.array(mechanism.mass), np.array(mechanism.inertia)
+        kinetic = (mass @ (dx**2 + dy**2) + inertia @ w**2) / 2
+        assert module.kinetic_energy(0.0, y) == pytest.approx(kinetic, rel=1e-12)
+        potential = mechanism.gravity * (mass @ height)
+        assert module.potential_energy(0.0, y) == pytest.approx(potential, rel=1e-12)
+        given = dict(zip(module.PARAMETERS, module.PARAMETERS.values(), strict=True))
+        assert np.array_equal(module.derivative(0.0, y, given), module.derivative(0.0, y))
+
+
+# Formulas.
+
+
+@pytest.mark.parametrize(
+    ("formula", "value"),
+    [
+        ("l/3 + 1/8", lambda r: r / 3 + 1 / 8),
+        ("2*l**3 - l**0", lambda r: 2 * r**3 - 1),
+        ("-sin(l)*cos(2*l)", lambda r: -sin(r) * cos(2 * r)),
+        ("sin(l)/cos(l) - tan(l/2)", lambda r: math.tan(r) - math.tan(r / 2)),
+        ("1/tan(l)", lambda r: 1 / math.tan(r)),
+        ("sqrt(2)*sqrt(l)/l", lambda r: sqrt(2 / r)),
+        ("sqrt(l**2 + 1)", lambda r: sqrt(r**2 + 1)),
+        ("sqrt(l**3)", lambda r: sqrt(r**3)),
+        ("sqrt(l**2)", abs),
+        ("sqrt(sqrt(l))", lambda r: r**0.25),
+        ("pi*l/4 + 1e-3", lambda r: math.pi * r / 4 + 1e-3),
+        ("cos(pi/3)", lambda r: 0.5),
+    ],
+)
+def test_formulas(formula: str, value: Callable[[float], float]) -> None:
+    """Every formula of the scene language reaches the module with its value, for any parameters."""
+    text = f"""
+    name = "formula"
+    parameters = {{ l = 0.3 }}
+    bodies = [{{ name = "A", mass = 2.0, inertia_com = 0.1 }}]
+    effects = [{{ type = "gravity", g = 9.81 }}]
+    [[joints]]
+    name = "a"
+    type = "revolute"
+    parent = "world"
+    child = "A"
+    r_child = [0.5, "{formula}"]
+    """
+    module = load(compile_scene(parse_scene(text)))
+    y = np.array([0.4, 1.2])
+    for length in (0.3, 1.1):
+        mechanism = Mechanism(
+            [2.0], [0.1], [-1], [False], [[0.0, 0.0]], [[0.5, value(length)]], gravity=9.81
+        )
+        expected = solve(mechanism, y[:1], y[1:]).accelerations[0]
+        assert module.derivative(0.0, y, {"l": length})[1] == pytest.approx(expected, rel=1e-13)
