@@ -1,6 +1,6 @@
 """The model: a scene whose every name is resolved; bodies in a tree, parents before children."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeGuard
 
@@ -54,6 +54,17 @@ class Model:
     def defaults(self) -> dict[str, float]:
         """Parameter values of the scene, by name."""
         return {p.name: p.default for p in self.parameters}
+
+    def quantities(self) -> Iterator[Formula]:
+        """Every quantity of bodies, joints and effects, in order."""
+        for body in self.bodies:
+            yield from (body.mass, body.inertia_com)
+        for table in (*(body.joint for body in self.bodies), *self.effects):
+            for field in type(table).model_fields:
+                value = getattr(table, field)
+                for part in value if isinstance(value, tuple) else (value,):
+                    if isinstance(part, Formula):
+                        yield part
 
     def with_parameters(self, values: Mapping[str, float]) -> "Model":
         """The same model with other values for some parameters."""

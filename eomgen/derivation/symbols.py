@@ -32,8 +32,8 @@ def _quantity(formula: Formula, parameters: dict[str, Expr], formulas: dict[Form
     A formula with a function in it becomes a symbol of its own: SymPy must not meet a sine that is
     none of a pose's, nor a root, and none of them matters to the mechanics.
     """
-    if calls_function(formula):
-        return formulas.setdefault(formula, _real(f"formula__{len(formulas) + 1}"))
+    if formula in formulas:
+        return formulas[formula]
     return evaluate(formula, parameters, SympyScalars())
 
 
@@ -86,7 +86,8 @@ def make_symbols(model: Model) -> Symbols:
         for p in model.parameters
     }
 
-    formulas: dict[Formula, Expr] = {}
+    called = dict.fromkeys(f for f in model.quantities() if calls_function(f))
+    formulas = {formula: _real(f"formula__{i}") for i, formula in enumerate(called, 1)}
 
     def quantity(formula: Formula) -> Expr:
         return _quantity(formula, parameters, formulas)
