@@ -56,7 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     command("schema", commands.print_schema, "print the JSON Schema of scenes, for editors", None)
     _form(command("check", commands.check, "validate a scene and say what it is made of"))
     derive = _form(command("derive", commands.derive, "print the derivation, step by step"))
-    derive.add_argument("--format", choices=("text", "latex"), default="text")
+    derive.add_argument("--format", choices=("text", "latex", "html"), default="text")
     derive.add_argument("-o", "--output", metavar="FILE", type=Path, help="write it to a file")
     _force(derive)
     generate = _form(

@@ -63,17 +63,18 @@ def check(given: Arguments) -> int:
 
 
 def derive(given: Arguments) -> int:
-    """The derivation as text or LaTeX."""
+    """The derivation as text, LaTeX or a page."""
     model = _model(given.scene, given.form)
     if given.output is not None:
         check_writable(given.output, force=given.force)
     from eomgen.derivation.closed import derive as derive_equations
     from eomgen.derivation.steps import tell
-    from eomgen.show.derivation import as_latex, as_text
+    from eomgen.show.derivation import as_html, as_latex, as_text
 
     with terminal_notice(f"deriving {model.name} …"):
         steps = tell(derive_equations(model))
-    text = (as_latex if given.format == "latex" else as_text)(model.title, steps)
+    write = {"text": as_text, "latex": as_latex, "html": as_html}[given.format]
+    text = write(model.title, steps)
     if given.output is None:
         print(text)
     else:

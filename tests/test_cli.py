@@ -2,16 +2,18 @@
 
 import os
 import pty
+import re
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
 from eomgen.cli import main
 from eomgen.model import build_model
 from eomgen.pipeline import compile_scene
-from eomgen.scene.reader import built_in_names, read_scene
+from eomgen.scene.reader import BUILT_IN, built_in_names, read_scene
 
 ROOT = Path(__file__).parent.parent
 
@@ -80,6 +82,24 @@ def test_derive_prints_every_step_of_the_handout(
     assert r"\ddot{\theta}" in latex and r"\end{document}" in latex
     assert all(f"\\subsection*{{{number} " in latex for number in steps)
     assert latex.isascii()
+
+
+def test_derive_as_a_page(tmp_path: Path) -> None:
+    """One page of well-formed MathML that asks for nothing else, its text escaped."""
+    scene = tmp_path / "odd.toml"
+    text = (BUILT_IN / "two_body.toml").read_text("utf-8")
+    scene.write_text(text.replace('title = "Two', 'title = "<script>Two'), "utf-8")
+    target = tmp_path / "derivation.html"
+    assert main(["derive", str(scene), "--format", "html", "-o", str(target)]) == 0
+    page = target.read_text("utf-8")
+    assert "<script" not in page and "&lt;script&gt;Two" in page
+    assert "src=" not in page and "href=" not in page
+    formulas = re.findall(r"<math.*?</math>", page)
+    assert len(formulas) > 30
+    for formula in formulas:
+        ElementTree.fromstring(formula.replace("&InvisibleTimes;", ""))
+    assert "<mover><mi>θ</mi><mo>¨</mo></mover>" in page
+    assert "dot<" not in page
 
 
 def test_check_and_list(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,8 +1,11 @@
-"""The derivation as text for a terminal, or as a LaTeX document."""
+"""The derivation as text for a terminal, as a LaTeX document, or as a web page."""
 
 import textwrap
+from typing import Any
 
 import sympy as sp
+from markupsafe import Markup
+from sympy.printing.mathml import MathMLPresentationPrinter
 
 from eomgen.derivation.steps import Equation, Step
 from eomgen.templating import render
@@ -67,7 +70,51 @@ def as_latex(title: str, steps: tuple[Step, ...]) -> str:
         }
         for step in steps
     ]
-    return render("latex", "derivation.tex.jinja", {"title": _escaped(title), "steps": sections})
+    context = {"title": _escaped(title), "steps": sections}
+    return render("derivation", "derivation.tex.jinja", context)
+
+
+def as_html(title: str, steps: tuple[Step, ...]) -> str:
+    """All steps as one page; browsers draw its MathML themselves."""
+    sections = [
+        {
+            "number": step.number,
+            "title": step.title,
+            "words": step.words,
+            "equations": [Markup(_mathml(equation)) for equation in step.equations],
+        }
+        for step in steps
+    ]
+    context = {"title": title, "steps": sections}
+    return render("derivation", "derivation.html.jinja", context, html=True)
+
+
+class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
+    """SymPy's printer, with `thetaddot` as θ with two dots, as its other printers write it."""
+
+    def _print_Symbol(self, symbol: Any, style: str = "plain") -> Any:
+        base, underscore, rest = symbol.name.partition("_")
+        for ending, dots in (("ddot", "¨"), ("dot", "˙")):
+            letter = base.removesuffix(ending)
+            if letter and letter != base:
+                over = self.dom.createElement("mover")
+                over.appendChild(self._print(sp.Symbol(letter)))
+                accent = self.dom.createElement("mo")
+                accent.appendChild(self.dom.createTextNode(dots))
+                over.appendChild(accent)
+                if not underscore:
+                    return over
+                whole = self.dom.createElement("msub")
+                whole.appendChild(over)
+                whole.appendChild(self._print(sp.Symbol(rest)))
+                return whole
+        return super()._print_Symbol(symbol, style)
+
+
+def _mathml(equation: Equation) -> str:
+    printer = _MathML()
+    left, right = (printer._print(side).toxml() for side in (equation.left, equation.right))
+    return f"<mrow>{left}<mo>=</mo>{right}</mrow>"
 
 
 def _latex(equation: Equation) -> str:
