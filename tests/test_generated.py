@@ -257,7 +257,7 @@ def test_other_parameter_values(built_in: Compiled) -> None:
     rng = np.random.default_rng(24)
     assert dict(module.PARAMETERS) == dict(scene.defaults)
     for _ in range(40):
-        y, u = scene.random_state(module, rng), scene.random_inputs(rng)
+        y, u = scene.random_state(module, rng), scene.random_inputs(rng) or None
         p = {name: v * float(rng.uniform(0.5, 2.0)) for name, v in scene.defaults.items()}
         assert_agrees(built_in, y, u, p)
         ordered = [p[name] for name in module.PARAMETERS]

@@ -78,7 +78,7 @@ class BodyTable(Table):
 
 
 class Initial(Table):
-    """State at the start: lists in the order of the joints, or tables by coordinate name.
+    """State at the start: lists in the order that `eomgen check` shows, or tables by name.
 
     In a table what is not named is 0, and an angle may be given in degrees as `<name>_deg`.
     """
