@@ -133,10 +133,12 @@ def _solve_tree(
     if tree.floating:
         x = angle_index(model, tree.root) - 2
         push = tuple(tidy(right_side[x + i].xreplace(absolute)) for i in (0, 1))
-        tree_mass, mean, pairs = _eliminate_translation(pairs)
+        total, moment, pairs = _eliminate_translation(pairs)
+        tree_mass = notes.fresh(f"mass__{root}", total, positive=True)
+        notes.pivots.append(tree_mass)
+        mean = {k: scale(1 / tree_mass, e) for k, e in moment.items()}
         for k, (jx, jy) in mean.items():
-            load[k] = gathered(load[k] - jx * push[0] - jy * push[1], symbols)
-        notes.pivots.append(notes.fresh(f"mass__{root}", tree_mass, positive=True))
+            load[k] = gathered(load[k] - jx * push[0] - jy * push[1], symbols, {tree_mass: total})
     pivots, couplings = _eliminate_angles(model, symbols, tree, pairs, load, notes)
     for k in tree.bodies:  # the root was eliminated last and is known first
         known = sum((h * symbols.alpha[i] for i, h in couplings[k].items()), sp.Integer(0))
@@ -144,7 +146,8 @@ def _solve_tree(
     if tree.floating:
         for axis, result in ((0, symbols.xdd[tree.root]), (1, symbols.ydd[tree.root])):
             turning = sum((j[axis] * symbols.alpha[k] for k, j in mean.items()), sp.Integer(0))
-            notes.define(result, gathered(push[axis] / tree_mass - turning, symbols))
+            mean_force = push[axis] / tree_mass
+            notes.define(result, gathered(mean_force - turning, symbols, {tree_mass: total}))
 
 
 def _eliminate_translation(
@@ -152,8 +155,8 @@ def _eliminate_translation(
 ) -> tuple[Expr, dict[int, Vec], list[_Pair]]:
     """Eliminate a floating tree's translation, whose entry is 1 in every pair.
 
-    Returns the pivot (the tree's mass), the mean entries of its row, and the pairs that are left:
-    the differences of Jacobi's coordinates, of weight m₁ m₂ / (m₁ + m₂).
+    Returns the pivot (the tree's mass), the pivot times the entries of its row, and the pairs that
+    are left: the differences of Jacobi's coordinates, of weight m₁ m₂ / (m₁ + m₂).
     """
     zero = (sp.Integer(0), sp.Integer(0))
     total, left = pairs[0].weight, []
@@ -168,7 +171,7 @@ def _eliminate_translation(
             k: add(moment.get(k, zero), scale(pair.weight, pair.entries.get(k, zero))) for k in both
         }
         total += pair.weight
-    return total, {k: scale(1 / total, e) for k, e in moment.items()}, left
+    return total, moment, left
 
 
 def _eliminate_angles(
@@ -204,7 +207,7 @@ def _eliminate_angles(
             if coupling.get(i, 0) != 0:
                 other = model.bodies[i].name
                 couplings[k][i] = notes.fresh(
-                    f"coupling__{name}__{other}", gathered(coupling[i], symbols)
+                    f"coupling__{name}__{other}", gathered(coupling[i], symbols, {})
                 )
                 load[i] = load[i] - couplings[k][i] / pivots[k] * load[k]
     return pivots, couplings
@@ -249,19 +252,25 @@ def _named_rows(rows: Sequence[_Row], name: str, notes: _Notes) -> list[_Row]:
     return named
 
 
-def gathered(expression: Expr, symbols: Symbols) -> Expr:
+def gathered(expression: Expr, symbols: Symbols, sums: dict[Expr, Expr]) -> Expr:
     """One term for each product of moving quantities, its coefficient in parameters factored.
+
+    `sums` are symbols that stand for sums of parameters: coefficients are factored with the sums
+    written out, and then written with the symbols again.
 
     What gravity and inertia share cancels here, as it does on paper: in a floating tree the weight
     drops out of every angular acceleration.
     """
-    fixed = {*symbols.parameters.values(), *symbols.formulas.values()}
+    fixed = {*symbols.parameters.values(), *symbols.formulas.values(), *sums}
     coefficients: dict[Expr, Expr] = {}
     for term in sp.Add.make_args(tidy(expression)):
         moving = [f for f in sp.Mul.make_args(term) if not f.free_symbols <= fixed]
         key = sp.Mul(*moving)
         coefficients[key] = coefficients.get(key, sp.Integer(0)) + term / key
-    return sp.Add(*(_factored(c) * key for key, c in coefficients.items()))
+    names = {total: symbol for symbol, total in sums.items()}
+    return sp.Add(
+        *(_factored(c.xreplace(sums)).xreplace(names) * key for key, c in coefficients.items())
+    )
 
 
 def _factored(coefficient: Expr) -> Expr:
