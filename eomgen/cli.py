@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from eomgen import commands
 from eomgen.errors import EomgenError
 
 Arguments = argparse.Namespace
@@ -14,9 +13,11 @@ Arguments = argparse.Namespace
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    parser = _parser()
-    given = parser.parse_args(arguments)
     try:
+        parser = _parser()
+        given = parser.parse_args(arguments)
+        if "scenes" in given and not (given.scenes or given.all):
+            parser.error("generate: no scene; name one, or give --all for the built-in ones")
         code: int = given.run(given)
         sys.stdout.flush()
     except EomgenError as error:
@@ -33,6 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
+    from eomgen import commands  # here, where an interrupt during its imports is caught
+
     parser = argparse.ArgumentParser(
         prog="eomgen",
         description="Equations of motion from a scene: derived, solved once, written as code.",

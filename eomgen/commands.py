@@ -71,10 +71,13 @@ def derive(given: Arguments) -> int:
     from eomgen.derivation.steps import tell
     from eomgen.show.derivation import as_html, as_latex, as_text
 
-    with terminal_notice(f"deriving {model.name} …"):
-        steps = tell(derive_equations(model))
+    try:
+        with terminal_notice(f"deriving {model.name} …"):
+            steps = tell(derive_equations(model))
+    except SceneError as error:
+        raise SceneError(f"{find_scene(given.scene).name}: {error}") from None
     write = {"text": as_text, "latex": as_latex, "html": as_html}[given.format]
-    text = write(model.title, steps)
+    text = write(model.name, model.title, steps)
     if given.output is None:
         print(text)
     else:
@@ -86,22 +89,24 @@ def derive(given: Arguments) -> int:
 def generate(given: Arguments) -> int:
     """Write modules, or with --check say which are stale."""
     scenes = list(dict.fromkeys([*given.scenes, *(built_in_names() if given.all else ())]))
-    if not scenes:
-        raise RunError("generate: no scene; name one, or give --all for the built-in ones")
-    models = [_model(scene, given.form) for scene in scenes]
-    stale = 0
-    for model in models:
-        suffix = "" if given.form is None else f"_{given.form}"
-        path = given.output / f"{model.name}{suffix}.py"
+    paths: dict[Path, str] = {}
+    stale = []
+    for scene in scenes:
+        model = _model(scene, given.form)
+        path = given.output / f"{_file_name(model, given.form)}.py"
+        if path in paths:
+            raise RunError(
+                f"{path}: would be written for {paths[path]} and for {scene}; rename one"
+            )
+        paths[path] = scene
         if not given.check:
             check_folder(given.output)
             check_writable(path, force=given.force)
-        with terminal_notice(f"deriving {model.name} …"):
-            source, _, derived = generated_code(model, derive_again=given.report)
+        source, _, derived = _code(scene, model)
         current = _text(path)
         if given.check:
             state = "fresh" if current == source else "missing" if current is None else "stale"
-            stale += state != "fresh"
+            stale += [scene] if state != "fresh" else []
             print(f"{path}: {state}")
         elif current == source:
             print(f"{path}: fresh")
@@ -111,9 +116,29 @@ def generate(given: Arguments) -> int:
         if given.report:
             _print_report(model)
     if stale:
-        names = " ".join(scenes)
-        raise RunError(f"{stale} stale; run: eomgen generate {names} -o {given.output}")
+        form = f" --form {given.form}" if given.form else ""
+        raise RunError(
+            f"{len(stale)} stale; run: eomgen generate {' '.join(stale)} -o {given.output}{form}"
+        )
     return 0
+
+
+def _file_name(model: Model, form: Form | None) -> str:
+    """The scene's name, with the state form if it is not the scene's own."""
+    return model.name if form is None else f"{model.name}_{form}"
+
+
+def _code(scene: str, model: Model) -> tuple[str, str, bool]:
+    """A model's code, tried once. Raises `SceneError` if it cannot be evaluated as the scene is."""
+    from eomgen.run.module import as_problem, load_module
+
+    try:
+        with terminal_notice(f"deriving {model.name} …"):
+            source, poses, derived = generated_code(model)
+        as_problem(load_module(source, model.name))
+    except (SceneError, RunError) as error:
+        raise SceneError(f"{find_scene(scene).name}: {error}") from None
+    return source, poses, derived
 
 
 def _text(path: Path) -> str | None:
@@ -149,8 +174,7 @@ def simulate(given: Arguments) -> int:
     integrator = _or(given.integrator, wanted.integrator)
     fixed = isinstance(find_integrator(integrator), FixedStep)
     paths = _output_paths(given, model)
-    with terminal_notice(f"deriving {model.name} …"):
-        source, poses, derived = generated_code(model)
+    source, poses, derived = _code(given.scene, model)
     module = load_module(source, model.name)
     with terminal_progress(f"simulating {model.name}") as progress:
         trajectory = integrate(
@@ -168,8 +192,16 @@ def simulate(given: Arguments) -> int:
     write_whole(paths["py"], source, force=given.force)
     save_npz(trajectory, paths["npz"], force=given.force)
     save_csv(trajectory, paths["csv"], force=given.force)
-    save_figure(motion, paths["png"], force=given.force)
-    save_page(motion, poses, values, paths["html"], force=given.force)
+    try:
+        save_figure(motion, paths["png"], force=given.force)
+        save_page(motion, poses, values, paths["html"], force=given.force)
+    except RunError as error:
+        # Pictures of an earlier run must not stand beside the numbers of this one.
+        for kind in ("png", "html"):
+            paths.pop(kind).unlink(missing_ok=True)
+        drawing = str(error)
+    else:
+        drawing = ""
 
     energy = motion.kinetic_energy + motion.potential_energy
     print(
@@ -181,8 +213,9 @@ def simulate(given: Arguments) -> int:
     print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
     for path in paths.values():
         print(f"    wrote {path}")
-    if not trajectory.finished:
-        raise RunError(f"{model.name}: {trajectory.message}")
+    trouble = "" if trajectory.finished else f"{model.name}: {trajectory.message}"
+    if trouble or drawing:
+        raise RunError("\n".join(line for line in (trouble, drawing) if line))
     if given.view:
         _open(paths["html"])
     return 0
@@ -193,7 +226,8 @@ def _output_paths(given: Arguments, model: Model) -> dict[str, Path]:
     from eomgen.show.style import check_figure
 
     kinds = ("py", "npz", "csv", "png", "html")
-    paths = {kind: given.output / f"{model.name}.{kind}" for kind in kinds}
+    name = _file_name(model, given.form)
+    paths = {kind: given.output / f"{name}.{kind}" for kind in kinds}
     paths["png"] = _or(given.plot, paths["png"])
     check_figure(paths["png"], force=given.force)
     for path in paths.values():
@@ -232,17 +266,18 @@ def _model(scene: str, form: Form | None) -> Model:
 
 
 def _assignments(texts: list[str], known: Collection[str], what: str) -> dict[str, float]:
+    option = "--set" if what == "parameter" else "--input"
     values = {}
     for text in texts:
         name, sign, number = text.partition("=")
         if name not in known:
             hint = nearest(name, known) or f"; known: {', '.join(known) or 'none'}"
-            raise RunError(f"--{'set' if what == 'parameter' else what}: no {what} '{name}'{hint}")
+            raise RunError(f"{option}: no {what} '{name}'{hint}")
         try:
             value = float(number)
         except ValueError:
             value = math.nan
         if not (sign and math.isfinite(value)):
-            raise RunError(f"{text}: is no value; write {name}=1.5")
+            raise RunError(f"{option} {text}: gives no finite number; write {option} {name}=1.5")
         values[name] = value
     return values

@@ -1,5 +1,6 @@
 """The model: a scene whose every name is resolved; bodies in a tree, parents before children."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeGuard
@@ -277,7 +278,9 @@ def _initial(
         if key in values:
             values[key] = float(value)
         elif key in degrees:
-            values[degrees[key]] = float(value) * (3.141592653589793 / 180.0)
+            if degrees[key] in given:
+                raise SceneError(f"{place}.{key}: {degrees[key]} is given too; give one of them")
+            values[degrees[key]] = math.radians(value)
         else:
             hint = nearest(key, names) or f"; known: {', '.join(names)}"
             raise SceneError(f"{place}.{key}: no coordinate has this name{hint}")

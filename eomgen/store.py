@@ -1,12 +1,15 @@
 """Generated code kept by content, so that a scene whose module is fresh is not derived again.
 
-The key is a digest of the model and of every file that has a say in the code, this program's own
-included; what is found under it is what would be generated.
+The key is a digest of what enters the code: the model without its looks, and every file of this
+program that has a say. What is found under it is taken only if it is whole.
 """
 
 import hashlib
 import importlib.metadata
+import json
 import os
+from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -15,9 +18,13 @@ import platformdirs
 from eomgen.errors import RunError
 from eomgen.files import write_whole
 from eomgen.model import Model
+from eomgen.scene.look import Camera
+from eomgen.scene.schema import Simulation
 from eomgen.templating import PACKAGE, templates_folder
 
-NOT_IN_CODE = ("run", "show", "study", "scenes", "cli.py", "store.py", "__main__.py", "__init__.py")
+SOURCES = ("language", "joints", "effects", "derivation", "program", "backends")
+"""Folders of this program that have a say in the code; the single files are named below."""
+SINGLE = ("model.py", "pipeline.py", "templating.py")
 
 
 def folder() -> Path:
@@ -26,45 +33,57 @@ def folder() -> Path:
     return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("eomgen"))
 
 
-def generated_code(model: Model, *, derive_again: bool = False) -> tuple[str, str, bool]:
+def generated_code(model: Model) -> tuple[str, str, bool]:
     """A model's module and page source, and whether they had to be derived now.
 
-    A store that cannot be read or written is done without.
+    A store that cannot be read or written, or is damaged, is done without.
     """
-    key = _key(model)
-    module_path, poses_path = folder() / f"{key}.py", folder() / f"{key}.js"
-    if not derive_again:
-        try:
-            return module_path.read_text("utf-8"), poses_path.read_text("utf-8"), False
-        except (OSError, UnicodeDecodeError):
-            pass
+    path = folder() / f"{_key(model)}.json"
+    kept = _kept(path)
+    if kept is not None:
+        return *kept, False
     # Imported here because it brings SymPy, which takes longer than everything else together.
     from eomgen.pipeline import generate
 
     code = generate(model)
-    try:
-        write_whole(module_path, code.module, force=True)
-        write_whole(poses_path, code.poses, force=True)
-    except RunError:
-        pass
+    parts = [code.module, code.poses]
+    with suppress(RunError):
+        write_whole(path, json.dumps({"digest": _digest(parts), "parts": parts}), force=True)
     return code.module, code.poses, True
 
 
+def _kept(path: Path) -> tuple[str, str] | None:
+    """Module and page source of a file of the store, or None if it is not whole."""
+    try:
+        entry = json.loads(path.read_text("utf-8"))
+        module, poses = entry["parts"]
+        return (module, poses) if entry["digest"] == _digest([module, poses]) else None
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return None
+
+
+def _digest(parts: list[str]) -> str:
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
 def _key(model: Model) -> str:
+    bodies = tuple(replace(body, shapes=()) for body in model.bodies)
+    bare = replace(model, bodies=bodies, simulation=Simulation(), camera=Camera())
     digest = hashlib.sha256(_generator_digest())
-    digest.update(repr(model).encode())
+    digest.update(repr(bare).encode())
     return digest.hexdigest()[:32]
 
 
 @cache
 def _generator_digest() -> bytes:
     digest = hashlib.sha256(importlib.metadata.version("sympy").encode())
-    files = [
-        path
-        for path in PACKAGE.rglob("*.py")
-        if path.relative_to(PACKAGE).parts[0] not in NOT_IN_CODE
-    ]
-    files += templates_folder().rglob("*.jinja")
+    files = [PACKAGE / name for name in SINGLE]
+    files += [path for name in SOURCES for path in (PACKAGE / name).rglob("*.py")]
+    files += [path for name in ("python", "javascript") for path in _templates(name)]
     for path in sorted(files, key=lambda path: path.as_posix()):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.digest()
+
+
+def _templates(name: str) -> list[Path]:
+    return list((templates_folder() / name).rglob("*.jinja"))

@@ -74,7 +74,7 @@ COST = {
     "kinetic_energy": {"add": 11, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 10},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 4},
     "momentum": {"add": 17, "mul": 24, "neg": 1, "sin": 2, "cos": 2, "total": 46, "parameters": 8},
-    "joint_forces": {"add": 10, "sub": 12, "mul": 34, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 64, "parameters": 27},
+    "joint_forces": {"add": 12, "sub": 6, "mul": 30, "div": 1, "sin": 3, "cos": 3, "total": 55, "parameters": 30},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 2},
 }
 
@@ -91,32 +91,35 @@ def _constants(values):
         raise ValueError("mass of lower is not positive: change the parameters")
     if not m_2 * (l_2 * l_2) / 12.0 >= 0.0:
         raise ValueError("inertia_com of lower is negative: change the parameters")
-    k21 = m_2 * (l_2 * l_2)
-    pivot_lower = k21 / 3.0
+    k24 = m_2 * (l_2 * l_2)
+    pivot_lower = k24 / 3.0
     l_1_squared = l_1 * l_1
-    k22 = m_2 * 3.0
-    k1 = l_1_squared * (k22 + m_1 * 4.0) / 12.0
-    k2 = l_1_squared * k22 / 4.0
-    k23 = m_2 * l_1
-    k8 = l_2 * k23
+    k25 = m_2 * 3.0
+    k1 = l_1_squared * (k25 + m_1 * 4.0) / 12.0
+    k2 = l_1_squared * k25 / 4.0
+    k20 = m_2 * l_1
+    k8 = l_2 * k20
     k3 = k8 / 2.0
-    k4 = g * (m_2 * l_2) / 2.0
+    k26 = m_2 * l_2
+    k4 = g * k26 / 2.0
     k5 = 1.0 / pivot_lower
-    k6 = g * k23
+    k6 = g * k20
     k7 = g * (m_1 * l_1) / 2.0
-    k24 = m_1 * l_1_squared
-    k9 = pivot_lower + (m_2 * l_1_squared + k24 / 3.0)
+    k27 = m_1 * l_1_squared
+    k9 = pivot_lower + (m_2 * l_1_squared + k27 / 3.0)
     k10 = l_1 / 2.0
     k11 = m_1 / 2.0
     k12 = l_2 / 2.0
     k13 = m_2 / 2.0
-    k14 = k24 / 24.0
-    k15 = k21 / 24.0
+    k14 = k27 / 24.0
+    k15 = k24 / 24.0
     k16 = m_2 * g
     k17 = m_1 * g
-    k18 = k21 / 12.0
-    k19 = k24 / 12.0
-    k20 = k16 + k17
+    k18 = k24 / 12.0
+    k19 = k27 / 12.0
+    k21 = k26 / 2.0
+    k22 = l_1 * (m_1 + m_2 * 2.0) / 2.0
+    k23 = g * (m_1 + m_2)
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6, k7),
@@ -130,7 +133,7 @@ def _constants(values):
         "kinetic_energy": (k10, k11, k12, k13, k14, k15),
         "potential_energy": (k10, k12, k16, k17),
         "momentum": (m_1, m_2, k10, k12, k18, k19),
-        "joint_forces": (m_1, m_2, k1, k2, k3, k4, k5, k6, k7, k10, k12, k16, k20),
+        "joint_forces": (k1, k2, k20, k3, k4, k5, k6, k7, k16, k21, k22, k23),
         "body_poses": (k10, k12),
     }
 
@@ -348,8 +351,8 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """64 operations: 10 add, 12 sub, 34 mul, 1 div, 1 neg, 3 sin, 3 cos."""
-    m_1, m_2, k1, k2, k3, k4, k5, k6, k7, k10, k12, k16, k20 = k
+    """55 operations: 12 add, 6 sub, 30 mul, 1 div, 3 sin, 3 cos."""
+    k1, k2, k20, k3, k4, k5, k6, k7, k16, k21, k22, k23 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
@@ -365,19 +368,15 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     s24 = k5 * (s1 + coupling_lower_upper * alpha_upper)
     sin_theta_1_theta_2 = sin(s3)
     sin_theta_1 = sin(theta_1)
-    s25 = k10 * (alpha_upper * sin_theta_1 + theta_1_dot_squared * cos_theta_1)
-    s26 = k12 * (s24 * sin_theta_1_theta_2 - cos_theta_1_theta_2 * omega_lower_squared)
-    s27 = s26 - s25
-    s28 = theta_1_dot_squared * sin_theta_1
-    s29 = cos_theta_1 * alpha_upper
-    s30 = k10 * (s28 - s29)
-    s31 = k12 * (cos_theta_1_theta_2 * s24 + omega_lower_squared * sin_theta_1_theta_2)
-    s32 = m_2 * (s31 - (k10 * (s29 - s28) - s30))
+    s25 = k21 * (cos_theta_1_theta_2 * omega_lower_squared - s24 * sin_theta_1_theta_2)
+    s26 = alpha_upper * sin_theta_1 + theta_1_dot_squared * cos_theta_1
+    s27 = theta_1_dot_squared * sin_theta_1 - cos_theta_1 * alpha_upper
+    s28 = k21 * (omega_lower_squared * sin_theta_1_theta_2 + cos_theta_1_theta_2 * s24)
     return (
-        m_2 * (s25 - s27) + m_1 * s25,
-        s32 + m_1 * s30 - k20,
-        -m_2 * (s27 - s25),
-        s32 - k16,
+        s25 + k22 * s26,
+        k22 * s27 + s28 - k23,
+        s25 + k20 * s26,
+        s28 + k20 * s27 - k16,
     )
 
 
@@ -473,9 +472,17 @@ def jacobian(t, y, p=None, u=None):
     return _evaluate(_jacobian, "jacobian", (4, 4), ('sin', 'cos'), y, p, u)
 
 
+def _joined(q, v):
+    """[q, v], each of length 2 or with columns."""
+    q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
+    if q.shape != v.shape or q.shape[:1] != (2,) or q.ndim > 2:
+        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (2,) both")
+    return np.concatenate((q, v))
+
+
 def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
     """Accelerations (nv,) under generalised forces `tau` beside the effects."""
-    y = np.concatenate((np.asarray(q, dtype=float), np.asarray(v, dtype=float)))
+    y = _joined(q, v)
     extra = np.asarray(_NO_FORCE if tau is None else tau, dtype=float)
     if extra.shape not in ((2,), (2, *y.shape[1:])):
         raise ValueError(f"tau has shape {extra.shape}, not (2,)")
@@ -485,7 +492,7 @@ def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
 
 def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
     """Generalised forces (nv,) that give accelerations `vd` beside the effects."""
-    y = np.concatenate((np.asarray(q, dtype=float), np.asarray(v, dtype=float)))
+    y = _joined(q, v)
     extra = np.asarray(_NO_FORCE if vd is None else vd, dtype=float)
     if extra.shape not in ((2,), (2, *y.shape[1:])):
         raise ValueError(f"vd has shape {extra.shape}, not (2,)")

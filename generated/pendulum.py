@@ -61,7 +61,7 @@ COST = {
     "kinetic_energy": {"add": 1, "mul": 7, "sin": 1, "cos": 1, "total": 10, "parameters": 1},
     "potential_energy": {"mul": 2, "neg": 1, "sin": 1, "total": 4, "parameters": 1},
     "momentum": {"add": 1, "mul": 11, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 0},
-    "joint_forces": {"add": 2, "sub": 1, "mul": 11, "neg": 2, "sin": 1, "cos": 1, "total": 18, "parameters": 6},
+    "joint_forces": {"add": 1, "sub": 2, "mul": 9, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 6},
     "body_poses": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
 }
 
@@ -73,7 +73,8 @@ def _constants(values):
     if not bob_mass > 0.0:
         raise ValueError("mass of bob is not positive: change the parameters")
     pivot_bob = bob_mass * (pivot_r_child_x * pivot_r_child_x)
-    k1 = gravity_g * (bob_mass * pivot_r_child_x)
+    k5 = bob_mass * pivot_r_child_x
+    k1 = gravity_g * k5
     k2 = 1.0 / pivot_bob
     k3 = bob_mass / 2.0
     k4 = bob_mass * gravity_g
@@ -90,7 +91,7 @@ def _constants(values):
         "kinetic_energy": (pivot_r_child_x, k3),
         "potential_energy": (pivot_r_child_x, k4),
         "momentum": (bob_mass, pivot_r_child_x),
-        "joint_forces": (bob_mass, pivot_r_child_x, k1, k2, k4),
+        "joint_forces": (k5, k1, k2, k4),
         "body_poses": (pivot_r_child_x,),
     }
 
@@ -213,18 +214,16 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """18 operations: 2 add, 1 sub, 11 mul, 2 neg, 1 sin, 1 cos."""
-    bob_mass, pivot_r_child_x, k1, k2, k4 = k
+    """15 operations: 1 add, 2 sub, 9 mul, 1 neg, 1 sin, 1 cos."""
+    k5, k1, k2, k4 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
     alpha_bob = cos_theta * k1 * k2
     sin_theta = sin(theta)
     theta_dot_squared = theta_dot * theta_dot
-    xdd_bob = pivot_r_child_x * (alpha_bob * sin_theta + cos_theta * theta_dot_squared)
-    ydd_bob = pivot_r_child_x * (sin_theta * theta_dot_squared - cos_theta * alpha_bob)
     return (
-        -bob_mass * xdd_bob,
-        -(k4 + bob_mass * ydd_bob),
+        -k5 * (alpha_bob * sin_theta + cos_theta * theta_dot_squared),
+        k5 * (cos_theta * alpha_bob - sin_theta * theta_dot_squared) - k4,
     )
 
 
@@ -314,9 +313,17 @@ def jacobian(t, y, p=None, u=None):
     return _evaluate(_jacobian, "jacobian", (2, 2), ('sin',), y, p, u)
 
 
+def _joined(q, v):
+    """[q, v], each of length 1 or with columns."""
+    q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
+    if q.shape != v.shape or q.shape[:1] != (1,) or q.ndim > 2:
+        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (1,) both")
+    return np.concatenate((q, v))
+
+
 def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
     """Accelerations (nv,) under generalised forces `tau` beside the effects."""
-    y = np.concatenate((np.asarray(q, dtype=float), np.asarray(v, dtype=float)))
+    y = _joined(q, v)
     extra = np.asarray(_NO_FORCE if tau is None else tau, dtype=float)
     if extra.shape not in ((1,), (1, *y.shape[1:])):
         raise ValueError(f"tau has shape {extra.shape}, not (1,)")
@@ -326,7 +333,7 @@ def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
 
 def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
     """Generalised forces (nv,) that give accelerations `vd` beside the effects."""
-    y = np.concatenate((np.asarray(q, dtype=float), np.asarray(v, dtype=float)))
+    y = _joined(q, v)
     extra = np.asarray(_NO_FORCE if vd is None else vd, dtype=float)
     if extra.shape not in ((1,), (1, *y.shape[1:])):
         raise ValueError(f"vd has shape {extra.shape}, not (1,)")

@@ -92,7 +92,7 @@ COST = {
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
     "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
-    "joint_forces": {"add": 10, "sub": 3, "mul": 27, "div": 1, "sin": 3, "cos": 3, "total": 47, "parameters": 36},
+    "joint_forces": {"add": 9, "sub": 2, "mul": 25, "div": 1, "sin": 3, "cos": 3, "total": 43, "parameters": 34},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 0},
 }
 
@@ -111,16 +111,17 @@ def _constants(values):
         raise ValueError("inertia_com of B is negative: change the parameters")
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
-    k23 = m_A * m_B
-    k24 = l_B_squared * k23
-    k25 = k24 + I_B * mass_A
-    k26 = m_A * I_A
+    k25 = m_A * m_B
+    k26 = l_B_squared * k25
+    k27 = k26 + I_B * mass_A
+    k28 = m_A * I_A
     l_A_squared = l_A * l_A
-    k27 = l_A_squared * (I_B * k23) + (l_B_squared * (m_B * k26) + I_B * (k26 + I_A * m_B))
-    k1 = k27 / k25
-    k2 = m_B * m_B * (m_A * m_A * (l_B_squared * l_A_squared)) / (mass_A * k25)
-    k3 = l_B * (l_A * k23) / mass_A
-    k4 = 1.0 / (I_B + k24 / mass_A)
+    k29 = l_A_squared * (I_B * k25) + (l_B_squared * (m_B * k28) + I_B * (k28 + I_A * m_B))
+    k1 = k29 / k27
+    k2 = m_B * m_B * (m_A * m_A * (l_B_squared * l_A_squared)) / (mass_A * k27)
+    k30 = l_A * k25
+    k3 = l_B * k30 / mass_A
+    k4 = 1.0 / (I_B + k26 / mass_A)
     k8 = m_B * l_A
     k5 = k8 / mass_A
     k9 = m_B * l_B
@@ -129,17 +130,19 @@ def _constants(values):
     k21 = m_A * g
     k22 = m_B * g
     k10 = k21 + k22
-    k28 = m_B * l_B_squared
+    k31 = m_B * l_B_squared
     k11 = l_B * k8
-    k12 = I_B + k28
+    k12 = I_B + k31
     k13 = l_B * (l_A * (m_B * 2.0))
-    k14 = k28 + (m_B * l_A_squared + (I_A + I_B))
+    k14 = k31 + (m_B * l_A_squared + (I_A + I_B))
     k15 = g * k8
     k16 = g * k9
     k17 = I_A / 2.0
     k18 = I_B / 2.0
     k19 = m_A / 2.0
     k20 = m_B / 2.0
+    k23 = k30 / mass_A
+    k24 = l_B * k25 / mass_A
     return {
         "initial_state": (),
         "derivative": (g, k1, k2, k3, k4, k5, k6),
@@ -153,7 +156,7 @@ def _constants(values):
         "kinetic_energy": (l_A, l_B, k17, k18, k19, k20),
         "potential_energy": (l_A, l_B, k21, k22),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
-        "joint_forces": (m_A, g, k1, k2, k3, k4, k5, k6, k21),
+        "joint_forces": (k1, k2, k3, k4, k23, k24),
         "body_poses": (l_A, l_B),
     }
 
@@ -487,8 +490,8 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """47 operations: 10 add, 3 sub, 27 mul, 1 div, 3 sin, 3 cos."""
-    m_A, g, k1, k2, k3, k4, k5, k6, k21 = k
+    """43 operations: 9 add, 2 sub, 25 mul, 1 div, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k23, k24 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     coupling_B_A = cos(phi) * k3
@@ -503,11 +506,9 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     omega_B_squared = omega_B * omega_B
     alpha_A = (k4 * (coupling_B_A * s2) + k3 * (sin_phi * omega_B_squared)) / (k1 + sin_phi * sin_phi * k2)
     s3 = k4 * (s2 + coupling_B_A * alpha_A)
-    xdd_A = k5 * (sin_theta * alpha_A + theta_dot_squared * cos_theta) + k6 * (cos_theta_phi * omega_B_squared - sin_theta_phi * s3)
-    s4 = k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A) + k6 * (sin_theta_phi * omega_B_squared + cos_theta_phi * s3)
     return (
-        m_A * xdd_A,
-        k21 + m_A * (s4 - g),
+        (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k23 + (cos_theta_phi * omega_B_squared - sin_theta_phi * s3) * k24,
+        (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k23 + (sin_theta_phi * omega_B_squared + cos_theta_phi * s3) * k24,
     )
 
 
@@ -601,9 +602,17 @@ def jacobian(t, y, p=None, u=None):
     return _evaluate(_jacobian, "jacobian", (8, 8), ('sin', 'cos'), y, p, u)
 
 
+def _joined(q, v):
+    """[q, v], each of length 4 or with columns."""
+    q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
+    if q.shape != v.shape or q.shape[:1] != (4,) or q.ndim > 2:
+        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (4,) both")
+    return np.concatenate((q, v))
+
+
 def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
     """Accelerations (nv,) under generalised forces `tau` beside the effects."""
-    y = np.concatenate((np.asarray(q, dtype=float), np.asarray(v, dtype=float)))
+    y = _joined(q, v)
     extra = np.asarray(_NO_FORCE if tau is None else tau, dtype=float)
     if extra.shape not in ((4,), (4, *y.shape[1:])):
         raise ValueError(f"tau has shape {extra.shape}, not (4,)")
@@ -613,7 +622,7 @@ def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
 
 def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
     """Generalised forces (nv,) that give accelerations `vd` beside the effects."""
-    y = np.concatenate((np.asarray(q, dtype=float), np.asarray(v, dtype=float)))
+    y = _joined(q, v)
     extra = np.asarray(_NO_FORCE if vd is None else vd, dtype=float)
     if extra.shape not in ((4,), (4, *y.shape[1:])):
         raise ValueError(f"vd has shape {extra.shape}, not (4,)")

@@ -115,7 +115,7 @@ COST = {
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
     "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
-    "joint_forces": {"add": 17, "sub": 12, "mul": 42, "div": 1, "sin": 3, "cos": 3, "total": 78, "parameters": 48},
+    "joint_forces": {"add": 14, "sub": 11, "mul": 42, "div": 1, "sin": 3, "cos": 3, "total": 74, "parameters": 50},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 0},
 }
 
@@ -134,40 +134,45 @@ def _constants(values):
         raise ValueError("inertia_com of B is negative: change the parameters")
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
-    k27 = m_A * m_B
-    k28 = l_B_squared * k27
-    k29 = k28 + I_B * mass_A
-    k30 = m_A * I_A
+    k31 = m_A * m_B
+    k32 = l_B_squared * k31
+    k33 = k32 + I_B * mass_A
+    k34 = m_A * I_A
     l_A_squared = l_A * l_A
-    k31 = l_A_squared * (I_B * k27) + (l_B_squared * (m_B * k30) + I_B * (k30 + I_A * m_B))
-    k1 = k31 / k29
-    k2 = m_B * m_B * (m_A * m_A * (l_B_squared * l_A_squared)) / (mass_A * k29)
+    k35 = l_A_squared * (I_B * k31) + (l_B_squared * (m_B * k34) + I_B * (k34 + I_A * m_B))
+    k1 = k35 / k33
+    k2 = m_B * m_B * (m_A * m_A * (l_B_squared * l_A_squared)) / (mass_A * k33)
     k3 = 1.0 / mass_A
-    k4 = l_B * (l_A * k27) / mass_A
+    k36 = l_A * k31
+    k4 = l_B * k36 / mass_A
     k5 = (m_A * l_B + d_B * mass_A) / mass_A
     k12 = m_B * l_B
     k6 = k12 / mass_A
-    k7 = 1.0 / (I_B + k28 / mass_A)
+    k7 = 1.0 / (I_B + k32 / mass_A)
     k13 = m_B * l_A
-    k32 = d_A * mass_A
-    k8 = (k32 - k13) / mass_A
-    k9 = (k13 - k32) / mass_A
+    k37 = d_A * mass_A
+    k8 = (k37 - k13) / mass_A
+    k9 = (k13 - k37) / mass_A
     k10 = m_A * l_A / mass_A
     k11 = k13 / mass_A
     k25 = m_A * g
     k26 = m_B * g
     k14 = k25 + k26
-    k33 = m_B * l_B_squared
+    k38 = m_B * l_B_squared
     k15 = l_B * k13
-    k16 = I_B + k33
+    k16 = I_B + k38
     k17 = l_B * (l_A * (m_B * 2.0))
-    k18 = k33 + (m_B * l_A_squared + (I_A + I_B))
+    k18 = k38 + (m_B * l_A_squared + (I_A + I_B))
     k19 = g * k13
     k20 = g * k12
     k21 = I_A / 2.0
     k22 = I_B / 2.0
     k23 = m_A / 2.0
     k24 = m_B / 2.0
+    k27 = m_A / mass_A
+    k28 = m_B / mass_A
+    k29 = k36 / mass_A
+    k30 = l_B * k31 / mass_A
     return {
         "initial_state": (),
         "derivative": (g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
@@ -181,7 +186,7 @@ def _constants(values):
         "kinetic_energy": (l_A, l_B, k21, k22, k23, k24),
         "potential_energy": (l_A, l_B, k25, k26),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
-        "joint_forces": (m_A, g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11, k25),
+        "joint_forces": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k27, k28, k29, k30),
         "body_poses": (l_A, l_B),
     }
 
@@ -551,8 +556,8 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """78 operations: 17 add, 12 sub, 42 mul, 1 div, 3 sin, 3 cos."""
-    m_A, g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11, k25 = k
+    """74 operations: 14 add, 11 sub, 42 mul, 1 div, 3 sin, 3 cos."""
+    k1, k2, k4, k5, k6, k7, k8, k9, k10, k27, k28, k29, k30 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
@@ -571,13 +576,11 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     load_A = k4 * (sin_phi * omega_B_squared) + s3 - tau - k7 * (coupling_B_A * load_B)
     alpha_A = load_A / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
-    s4 = k3 * (f_A_x + f_B_x) + k11 * (sin_theta * alpha_A + theta_dot_squared * cos_theta)
-    s5 = k3 * (f_A_y + f_B_y) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A)
-    ydd_A = k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s5 - g
-    s63 = m_A * (k6 * (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) + s4)
+    s63 = f_B_x * k27 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k29
+    s64 = f_B_y * k27 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k29
     return (
-        s63 - f_A_x,
-        k25 + m_A * ydd_A - f_A_y,
+        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k30 + s63 - f_A_x * k28,
+        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k30 + s64 - f_A_y * k28,
     )
 
 
@@ -671,9 +674,17 @@ def jacobian(t, y, p=None, u=None):
     return _evaluate(_jacobian, "jacobian", (8, 8), ('sin', 'cos'), y, p, u)
 
 
+def _joined(q, v):
+    """[q, v], each of length 4 or with columns."""
+    q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
+    if q.shape != v.shape or q.shape[:1] != (4,) or q.ndim > 2:
+        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (4,) both")
+    return np.concatenate((q, v))
+
+
 def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
     """Accelerations (nv,) under generalised forces `tau` beside the effects."""
-    y = np.concatenate((np.asarray(q, dtype=float), np.asarray(v, dtype=float)))
+    y = _joined(q, v)
     extra = np.asarray(_NO_FORCE if tau is None else tau, dtype=float)
     if extra.shape not in ((4,), (4, *y.shape[1:])):
         raise ValueError(f"tau has shape {extra.shape}, not (4,)")
@@ -683,7 +694,7 @@ def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
 
 def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
     """Generalised forces (nv,) that give accelerations `vd` beside the effects."""
-    y = np.concatenate((np.asarray(q, dtype=float), np.asarray(v, dtype=float)))
+    y = _joined(q, v)
     extra = np.asarray(_NO_FORCE if vd is None else vd, dtype=float)
     if extra.shape not in ((4,), (4, *y.shape[1:])):
         raise ValueError(f"vd has shape {extra.shape}, not (4,)")

@@ -52,11 +52,13 @@ MISTAKES = [
     ("[initial]", "[inital]", "inital: unknown key (did you mean 'initial'?)"),
     ("mass = 0.5", "", "bodies[1].mass: missing; every such table needs it"),
     ("mass = 0.5", "mass = true", "bodies[1].mass: True is neither a number nor a formula"),
-    ("t_end = 1.0", 't_end = "1"', "simulation.t_end: '1' is not a number"),
-    ("mass = 0.5", "mass = nan", "bodies[1].mass: nan is not a finite number"),
-    ("mass = 0.5", "mass = -inf", "bodies[1].mass: -inf is not a finite number"),
-    ("t_end = 1.0", "t_end = inf", "simulation.t_end: inf is not a finite number"),
-    ("value = 1.0", "value = nan", "parameters.m.value: nan is not a finite number"),
+    ("t_end = 1.0", 't_end = "1"', "simulation.t_end: '1' is not a number; give one"),
+    ("mass = 0.5", "mass = nan", "bodies[1].mass: nan is not a finite number; give one that is"),
+    ("mass = 0.5", "mass = -inf", "bodies[1].mass: -inf is not a finite number; give one that is"),
+    ("t_end = 1.0", "t_end = inf", "simulation.t_end: inf is not a finite number; "
+     "give one that is"),
+    ("value = 1.0", "value = nan", "parameters.m.value: nan is not a finite number; "
+     "give one that is"),
     (
         "mass = 0.5",
         "mass = 0",
@@ -216,8 +218,23 @@ MISTAKES = [
         "camera.follow: no body is named 'head' (did you mean 'hand'?)",
     ),
     ("r_child = [-0.1, 0]", "r_child = [-0.1]", "joints[1].r_child[1]: missing; "
-     "every such table needs it"),
-    ("r_child = [-0.1, 0]", "r_child = 3", "joints[1].r_child: 3 is not a list"),
+     "the list is too short"),
+    ("mass = 0.5", f"mass = {'9' * 400}", f"bodies[1].mass: {'9' * 57}... is not a finite number; "
+     "give one that is"),
+    ("mass = 0.5", "mass = 1e101", "bodies[1].mass: 1e+101 is larger than 1e+100; "
+     "choose other units"),
+    ("t_end = 1.0", "t_end = 1e308", "simulation.t_end: 1e+308 is larger than 1e+100; "
+     "choose other units"),
+    ("r_child = [-0.5, 0]", "r_child = [1e-200, 0]\n[[effects]]\ntype = 'motor'\nname = 'tau'\n"
+     "joint = 'wrist'\ntorque = [1]",
+     "effects[0].torque: [1] is neither a number nor a formula"),
+    ('name = "swing"', 'name = "swing"\ntitle = "a\\u001b[31mb"',
+     "title: 'a\\x1b[31mb' has a character at 2 that cannot be printed; take it out"),
+    ("q = [0.1, 0.2]", "q = { wrist_angle = 0.1, wrist_angle_deg = 3.0 }",
+     "initial.q.wrist_angle_deg: wrist_angle is given too; give one of them"),
+    ('m = { value = 1.0, unit = "kg"', 'm = { value = 1.0, unti = "kg"',
+     "parameters.m.unti: unknown key (did you mean 'unit'?)"),
+    ("r_child = [-0.1, 0]", "r_child = 3", "joints[1].r_child: 3 is not a list; give one"),
 ]  # fmt: skip
 
 
@@ -283,8 +300,10 @@ def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: 
             "dt: -0.1 is not a positive step; give e.g. --dt 0.001",
         ),
         (["--set", "n=1"], "--set: no parameter 'n'; known: m, arm_inertia_com, "),
-        (["--set", "m=one"], "m=one: is no value; write m=1.5"),
-        (["--set", "m=-1"], "swing: mass of arm is not positive: change the parameters"),
+        (["--set", "m=one"], "--set m=one: gives no finite number; write --set m=1.5"),
+        (["--set", "m"], "--set m: gives no finite number; write --set m=1.5"),
+        (["--set", "m=-1"], "mass of arm is not positive: change the parameters"),
+        (["--samples", "100000000000"], "samples: 100000000000 is too many; give at most 1000000"),
         (["--input", "tau=1"], "--input: no input 'tau'; known: none"),
     ],
 )
@@ -320,6 +339,31 @@ def test_an_unwritable_output(scene: Path, capsys: pytest.CaptureFixture[str]) -
     assert sorted(p.name for p in scene.parent.iterdir()) == ["swing.csv", "swing.toml"]
 
 
+def test_a_point_mass_too_near_its_pin(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A mechanism whose mass matrix vanishes in double precision is refused, not written."""
+    text = GOOD.replace("inertia_com = 0.02", "inertia_com = 0").replace("[-0.1, 0]", "[1e-200, 0]")
+    scene.write_text(text)
+    output = scene.parent / "made"
+    assert main(["generate", str(scene), "-o", str(output)]) == 1
+    assert capsys.readouterr().err == (
+        "eomgen: swing.toml: the mass matrix is singular at these parameters: "
+        "change lengths, masses or inertias\n"
+    )
+    assert not list(output.iterdir())
+
+
+def test_two_scenes_of_one_name(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Neither overwrites the other."""
+    scene.write_text(GOOD)
+    other = scene.parent / "other.toml"
+    other.write_text(GOOD)
+    output = scene.parent / "made"
+    assert main(["generate", str(scene), str(other), "-o", str(output)]) == 1
+    assert capsys.readouterr().err == (
+        f"eomgen: {output}/swing.py: would be written for {scene} and for {other}; rename one\n"
+    )
+
+
 def test_a_tree_too_large_for_the_closed_form(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -331,7 +375,7 @@ def test_a_tree_too_large_for_the_closed_form(
     scene.write_text(text)
     assert main(["generate", str(scene), "-o", str(scene.parent / "made")]) == 1
     assert capsys.readouterr().err == (
-        "eomgen: route: the tree at 'b0' has 13 bodies; "
+        "eomgen: swing.toml: route: the tree at 'b0' has 13 bodies; "
         "the closed form is for small trees, of up to 12\n"
     )
 
@@ -342,3 +386,7 @@ def test_wrong_usage_is_exit_code_2(capsys: pytest.CaptureFixture[str]) -> None:
         main(["simulate", "two_body", "--nonsense"])
     assert stop.value.code == 2
     assert "--nonsense" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as stop:
+        main(["generate"])
+    assert stop.value.code == 2
+    assert "no scene; name one" in capsys.readouterr().err

@@ -20,7 +20,7 @@ from matplotlib.text import Text
 
 from eomgen import templating
 from eomgen.errors import RunError
-from eomgen.files import MARK, MARK_WITHIN
+from eomgen.files import is_ours
 from eomgen.scene.look import Box, Camera, Disc, Polygon, Rod
 from eomgen.show.figure import draw_motion, outline, save_figure
 from eomgen.show.motion import Motion, thinned
@@ -128,7 +128,7 @@ def test_figure_files_are_ours_and_reproducible(tmp_path: Path, suffix: str) -> 
         save_figure(swinging(), path)  # what is ours may be written again
         assert dict(matplotlib.rcParams) == before
     assert path.read_bytes() == first
-    assert MARK in first[:MARK_WITHIN]
+    assert is_ours(first)
     if suffix == ".svg":
         ElementTree.fromstring(first)
 
@@ -291,7 +291,7 @@ def test_page_size(tmp_path: Path) -> None:
     save_page(usual, POSES, (ARM,), tmp_path / "a.html")  # ours may be written again
     written = (tmp_path / "a.html").read_bytes()
     assert len(written) < 250_000
-    assert MARK in written[:MARK_WITHIN]
+    assert is_ours(written)
     assert written.decode() == render_page(usual, POSES, (ARM,))
     long = swinging(n=20_001)
     times = Page(render_page(long, POSES, (ARM,))).run()["t"]

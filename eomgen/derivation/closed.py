@@ -14,8 +14,8 @@ from eomgen.derivation.elimination import (
 )
 from eomgen.derivation.free_bodies import FreeBodies, draw_free_bodies
 from eomgen.derivation.kinematics import Kinematics, differentiate_joints
-from eomgen.derivation.solution import Definition, Solution, solve
-from eomgen.derivation.symbols import Expr, Symbols, make_symbols
+from eomgen.derivation.solution import Definition, Solution, gathered, solve
+from eomgen.derivation.symbols import Expr, Symbols, make_symbols, over_bodies
 from eomgen.errors import SceneError
 from eomgen.joints import Free
 from eomgen.model import Model
@@ -107,3 +107,26 @@ def _recovered_forces(
         if not isinstance(model.bodies[k].joint, Free)
         for symbol, expression in zip(symbols.force[k], found[k], strict=True)
     )
+
+
+def written_out_forces(equations: Equations) -> tuple[Definition, ...]:
+    """The joint forces over the bodies' angular motion alone.
+
+    As recovered, m ẍ + m g takes the weight off again that ẍ holds, and with it the digits of a
+    small force on a heavy body. Written out and gathered, what is the same cancels symbolically.
+    """
+    model, symbols, kinematics = equations.model, equations.symbols, equations.kinematics
+    inward = over_bodies(model, symbols)
+    found = dict(equations.solution.definitions)
+    sums = {s: e for s, e in found.items() if s.name.startswith("mass__")}
+    definitions = []
+    for symbol, expression in equations.joint_force:
+        for k in reversed(range(len(model.bodies))):
+            ddx, ddy = symbols.xdd[k], symbols.ydd[k]
+            if isinstance(model.bodies[k].joint, Free):
+                inner = (found[ddx], found[ddy])
+            else:
+                inner = tuple(e.xreplace(inward) for e in kinematics.acceleration[k])
+            expression = expression.xreplace({ddx: inner[0], ddy: inner[1]})
+        definitions.append((symbol, gathered(expression, symbols, sums)))
+    return tuple(definitions)

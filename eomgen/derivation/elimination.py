@@ -24,7 +24,7 @@ from eomgen.model import Model
 
 @dataclass(frozen=True)
 class Tree:
-    """The bodies of one tree: its root, all its bodies, and for each body its subtree."""
+    """The bodies of one tree: its root, whether that is free, and all bodies, parents first."""
 
     root: int
     floating: bool

@@ -9,7 +9,7 @@ from eomgen.derivation.closed import Equations
 from eomgen.derivation.elimination import trees
 from eomgen.derivation.symbols import Expr
 from eomgen.joints import Free
-from eomgen.language.formula import as_text
+from eomgen.language.formula import written
 
 
 @dataclass(frozen=True)
@@ -170,6 +170,7 @@ def _readable(equations: Equations) -> dict[Expr, Expr]:
     s, model = equations.symbols, equations.model
     names = [body.name for body in model.bodies]
     shown: dict[Expr, Expr] = {}
+    taken = {*s.parameters, *s.inputs, *(q.name for q in s.q)}
     for q, v, a in zip(s.q, s.v, s.a, strict=True):
         shown[v], shown[a] = _dotted(q.name, "dot"), _dotted(q.name, "ddot")
     words = (
@@ -183,17 +184,19 @@ def _readable(equations: Equations) -> dict[Expr, Expr]:
         shown[fx] = sp.Symbol(f"f_{body.joint.name},x")
         shown[fy] = sp.Symbol(f"f_{body.joint.name},y")
     for formula, symbol in s.formulas.items():
-        shown[symbol] = sp.Symbol(as_text(formula))
+        shown[symbol] = sp.Symbol(written(formula))
     short = {"pivot": "d", "coupling": "c", "load": "b", "mass": "M", "weight": "w", "row": "j"}
     for body in model.bodies:
         for field, letter in (("mass", "m"), ("inertia_com", "I")):
             named = s.parameters.get(f"{body.name}_{field}")
-            if named is not None:
+            if named is not None and f"{letter}_{body.name}" not in taken:
                 shown[named] = sp.Symbol(f"{letter}_{body.name}")
     for symbol, _ in equations.solution.definitions:
         kind, _, rest = symbol.name.partition("__")
         if symbol not in shown and kind in short:
-            shown[symbol] = sp.Symbol(f"{short[kind]}_{rest.replace('__', ',')}")
+            rest = rest.replace("__", ",")
+            brief = f"{short[kind]}_{rest}"
+            shown[symbol] = sp.Symbol(f"{kind}_{rest}" if brief in taken else brief)
     return shown
 
 

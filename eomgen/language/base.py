@@ -50,8 +50,25 @@ def _identifier(name: str) -> str:
 Identifier = Annotated[str, AfterValidator(_identifier)]
 """A name that may stand in Python, JavaScript and LaTeX alike."""
 
-Number = Annotated[float, Strict(), Field(allow_inf_nan=False)]
+LARGEST = 1e100
+"""Largest size of any number in a scene: its square is still a number."""
+
+
+def _size(value: float) -> float:
+    if abs(value) > LARGEST:
+        raise ValueError(f"is larger than {LARGEST:g}; choose other units")
+    return value
+
+
+def _line(text: str) -> str:
+    for i, character in enumerate(text):
+        if not character.isprintable():
+            raise ValueError(f"has a character at {i + 1} that cannot be printed; take it out")
+    return text
+
+
+Number = Annotated[float, Strict(), Field(allow_inf_nan=False), AfterValidator(_size)]
 """A finite number; whole numbers are taken too, text and booleans are not."""
 
 Positive = Annotated[Number, Field(gt=0)]
-Text = Annotated[str, Field(max_length=400)]
+Text = Annotated[str, Field(max_length=400), AfterValidator(_line)]

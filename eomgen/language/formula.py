@@ -6,12 +6,13 @@ is evaluated over any scalars: floats, SymPy expressions, the nodes of a program
 
 import ast
 import math
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 LONGEST_TEXT = 500
-DEEPEST = 40
+DEEPEST = 150
 LARGEST_POWER = 16
 FUNCTIONS = ("cos", "sin", "sqrt", "tan")
 CONSTANTS = {"pi": math.pi}
@@ -87,7 +88,9 @@ def parse(text: str) -> Formula:
         column = next(i for i, c in enumerate(text) if not c.isascii()) + 1
         raise FormulaError(f"has a character at column {column} that is not plain ASCII")
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        with warnings.catch_warnings():  # of Python about what is no Python of ours
+            warnings.simplefilter("ignore")
+            tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise FormulaError("is no formula; write for example '2*m_A' or 'l_A/2'") from None
     return _read(tree.body, 0)
@@ -154,19 +157,19 @@ def calls_function(formula: Formula) -> bool:
     return False
 
 
-def as_text(formula: Formula) -> str:
+def written(formula: Formula) -> str:
     """A formula as one may write it, every operation in brackets."""
     match formula:
         case Constant(value):
-            return f"{value:g}"
+            return repr(value)
         case Name(name):
             return name
         case Apply("neg", (operand,)):
-            return f"(-{as_text(operand)})"
+            return f"(-{written(operand)})"
         case Apply(operation, (left, right)):
-            return f"({as_text(left)} {operation} {as_text(right)})"
+            return f"({written(left)} {operation} {written(right)})"
         case Apply(operation, (argument,)):
-            return f"{operation}({as_text(argument).removeprefix('(').removesuffix(')')})"
+            return f"{operation}({written(argument)})"
     raise AssertionError(formula)
 
 

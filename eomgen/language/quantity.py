@@ -13,7 +13,7 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from eomgen.errors import SceneError, nearest
-from eomgen.language.base import Table
+from eomgen.language.base import LARGEST, Table
 from eomgen.language.formula import (
     CONSTANTS,
     FUNCTIONS,
@@ -38,9 +38,13 @@ def _read_quantity(value: Any) -> Formula:
             return parse(value)
         except FormulaError as error:
             raise PydanticCustomError("quantity", "{why}", {"why": str(error)}) from None
-    if not math.isfinite(value):
-        raise PydanticCustomError("quantity", "is not a finite number")
-    return Constant(float(value))
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise PydanticCustomError("quantity", "is not a finite number; give one that is")
+    return Constant(number)
 
 
 Quantity = Annotated[
@@ -123,6 +127,8 @@ def _check(formula: Formula, where: str, bound: str, unit: str, known: Mapping[s
         value = math.nan
     if not math.isfinite(value):
         raise SceneError(f"{where}: its value is not a finite number; change its parameters")
+    if abs(value) > LARGEST:
+        raise SceneError(f"{where}: {value:g} is larger than {LARGEST:g}; choose other units")
     if bound == "positive" and not value > 0:
         raise SceneError(f"{where}: {value:g} is not positive; give a number > 0 in {unit}")
     if bound == "nonnegative" and value < 0:

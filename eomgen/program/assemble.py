@@ -6,7 +6,7 @@ from typing import Any
 
 import sympy as sp
 
-from eomgen.derivation.closed import Equations
+from eomgen.derivation.closed import Equations, written_out_forces
 from eomgen.derivation.forms import StateForm, state_form
 from eomgen.language.formula import evaluate
 from eomgen.model import Model, is_zero, off_centre
@@ -57,7 +57,7 @@ def assemble(equations: Equations) -> System:
     inputs = {s: tape.input(n, Stage.INPUTS) for n, s in symbols.inputs.items()}
     tau = {s: tape.input(s.name, Stage.INPUTS) for s in symbols.tau}
     vd = {s: tape.input(s.name, Stage.INPUTS) for s in symbols.a}
-    definitions = (*equations.solution.definitions, *equations.joint_force)
+    definitions = (*equations.solution.definitions, *written_out_forces(equations))
     defined = {
         s: e.xreplace(form.replaced) for s, e in {**dict(definitions), **form.defined}.items()
     }

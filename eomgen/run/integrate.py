@@ -24,6 +24,7 @@ from eomgen.run.trajectory import Trajectory
 SMALLEST_RTOL = 2.3e-14
 """SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
 ADAPTIVE_SAMPLES = 1001
+MOST_SAMPLES = 1_000_000
 
 
 def integrate(
@@ -59,6 +60,8 @@ def integrate(
     _check_tolerances(rtol, atol)
     if samples is not None and samples < 2:
         raise RunError(f"samples: {samples} is too few; give at least 2, the first and the last")
+    if samples is not None and samples > MOST_SAMPLES:
+        raise RunError(f"samples: {samples} is too many; give at most {MOST_SAMPLES}")
 
     derivative, jacobian = _Counted(problem.derivative), _Counted(problem.jacobian)
     counted = replace(problem, derivative=derivative, jacobian=jacobian)

@@ -41,12 +41,24 @@ class _FromSource(importlib.abc.InspectLoader):
 
 
 def load_module(source: str, name: str = "generated") -> GeneratedModule:
-    """Load a generated module from its source, which this program wrote itself."""
+    """Load a generated module from its source, which this program wrote itself.
+
+    Raises `RunError` if the scene's own parameters leave its equations without a solution.
+    """
     spec = importlib.util.spec_from_loader(name, _FromSource(source))
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except (ValueError, ArithmeticError) as error:
+        raise RunError(_unsolvable(error)) from None
     return cast(GeneratedModule, module)
+
+
+def _unsolvable(error: Exception) -> str:
+    if isinstance(error, ArithmeticError):
+        return "the mass matrix is singular at these parameters: change lengths, masses or inertias"
+    return str(error)
 
 
 def as_problem(module: GeneratedModule, parameters: Any = None, inputs: Any = None) -> Problem:
@@ -67,8 +79,8 @@ def as_problem(module: GeneratedModule, parameters: Any = None, inputs: Any = No
     try:
         initial = module.initial_state(parameters)
         derivative(0.0, initial)
-    except ValueError as error:
-        raise RunError(f"{module.NAME}: {error}") from None
+    except (ValueError, ArithmeticError) as error:
+        raise RunError(_unsolvable(error)) from None
     return Problem(
         name=module.NAME,
         states=module.STATES,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.files import MARK, MARK_WITHIN, write_whole
+from eomgen.files import is_ours, write_whole
 from eomgen.run.problem import Floats
 
 FORMAT = "trajectory 1"
@@ -90,7 +90,7 @@ def load_npz(path: Path) -> Trajectory:
         data = path.read_bytes()
     except OSError as error:
         raise RunError(f"{path}: cannot be read: {error.strerror}") from None
-    if MARK not in data[:MARK_WITHIN]:
+    if not is_ours(data):
         raise RunError(f"{path}: is no trajectory written by eomgen")
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as members:

@@ -24,10 +24,16 @@ def find_scene(scene: str) -> Path:
     """The file of a scene given by path or built-in name. Raises `SceneError` if there is none."""
     if scene in built_in_names():
         return BUILT_IN / f"{scene}.toml"
+    if not scene:
+        raise SceneError("the scene's name is empty; give a file or a built-in name")
     path = Path(scene)
-    if path.is_dir():
+    try:
+        folder, there = path.is_dir(), path.exists()
+    except OSError as error:
+        raise SceneError(f"{_shown(scene)}: cannot be read: {error.strerror}") from None
+    if folder:
         raise SceneError(f"{scene}: is a folder; give a scene file in it")
-    if not path.exists():
+    if not there:
         hint = nearest(scene, built_in_names()) or f"; known: {', '.join(built_in_names())}"
         raise SceneError(f"{scene}: no such file, nor a built-in scene{hint}")
     return path
@@ -47,7 +53,7 @@ def read_scene(scene: str | Path) -> Scene:
     if len(data) > LARGEST_FILE:
         raise SceneError(f"{path.name}: is larger than {LARGEST_FILE} bytes")
     try:
-        text = data.decode("utf-8")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SceneError(f"{path.name}: is not UTF-8 text (byte {error.start})") from None
     return parse_scene(text, path.name)
@@ -74,7 +80,12 @@ def _lines(details: list[ErrorDetails]) -> list[str]:
     """One line for each place: a mistake fails every member of a union, the deepest says most."""
     lines: dict[str, str] = {}
     for detail in details:
-        lines.setdefault(_place(detail["loc"]), _line(detail))
+        place = _place(detail["loc"])
+        if detail["type"] == "unknown_key":
+            place = f"{place}.{detail['ctx']['key']}"
+        # That a value is none of a few words says less than what else is wrong with it.
+        if place not in lines or detail["type"] != "literal_error":
+            lines[place] = _line(detail)
     return [
         line
         for place, line in lines.items()
@@ -91,6 +102,8 @@ def _line(detail: ErrorDetails) -> str:
             place = f"{place}.{context['key']}" if place else str(context["key"])
             return f"{place}: unknown key{context['hint']}"
         case "missing":
+            if place.endswith("]"):
+                return f"{place}: missing; the list is too short"
             return f"{place}: missing; every such table needs it"
         case "quantity":
             return f"{place}: {value} {detail['msg']}"
@@ -110,9 +123,9 @@ def _line(detail: ErrorDetails) -> str:
         case "value_error":
             return f"{place}: {value} {context['error']}"
         case "finite_number":
-            return f"{place}: {value} is not a finite number"
+            return f"{place}: {value} is not a finite number; give one that is"
         case "float_type":
-            return f"{place}: {value} is not a number"
+            return f"{place}: {value} is not a number; give one"
         case "greater_than":
             return f"{place}: {value} is not positive; give a number > 0"
         case "too_long":
@@ -120,8 +133,8 @@ def _line(detail: ErrorDetails) -> str:
         case "too_short" | "missing_required":
             return f"{place}: has too few entries; it needs {context.get('min_length', 1)}"
         case "string_type" | "tuple_type" | "dict_type" | "model_type" | "model_attributes_type":
-            wanted = {"string_type": "text", "tuple_type": "a list"}.get(kind, "a table")
-            return f"{place}: {value} is not {wanted}"
+            wanted = {"string_type": "a text", "tuple_type": "a list"}.get(kind, "a table")
+            return f"{place}: {value} is not {wanted}; give one"
         case _:
             return f"{place}: {value}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
 
@@ -131,6 +144,7 @@ _UNION_MEMBERS = (
     "tuple[",
     "dict[",
     "function-plain",
+    "function-after[",
     "tuple-",
     "float",
     "ParameterTable",
@@ -155,5 +169,8 @@ def _place(location: tuple[int | str, ...]) -> str:
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except RecursionError:
+        text = "what is nested so deep"
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,6 +1,6 @@
 """The scene: every table and key of the language, as data."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
@@ -12,24 +12,6 @@ from eomgen.scene.look import Camera, Shape
 
 MOST = 1000
 """Most bodies, joints, effects or parameters a scene may list."""
-
-OUTPUTS = (
-    "forward_dynamics",
-    "inverse_dynamics",
-    "mass_matrix",
-    "velocity_force",
-    "gravity_force",
-    "applied_force",
-    "kinetic_energy",
-    "potential_energy",
-    "momentum",
-    "joint_forces",
-    "body_poses",
-)
-"""What a generated module can compute beside `derivative` and `jacobian`."""
-
-SHOWN = ("kinetic_energy", "potential_energy", "body_poses")
-"""The outputs that figures and pages are drawn from; generated always."""
 
 Output = Literal[
     "forward_dynamics",
@@ -44,6 +26,12 @@ Output = Literal[
     "joint_forces",
     "body_poses",
 ]
+OUTPUTS: tuple[Output, ...] = get_args(Output)
+"""What a generated module can compute beside `derivative` and `jacobian`."""
+
+SHOWN = ("kinetic_energy", "potential_energy", "body_poses")
+"""The outputs that figures and pages are drawn from; generated always."""
+
 Integrator = Literal[
     "euler",
     "semi_implicit_euler",
@@ -102,10 +90,8 @@ class Scene(Table):
 
     name: Identifier
     title: Text = ""
-    space: Literal["planar"] = "planar"
     outputs: Literal["all"] | tuple[Output, ...] = Field(default=(), union_mode="left_to_right")
     form: Form = "velocity"
-    route: Literal["auto", "closed"] = "auto"
     parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
         Field(default={})
     )

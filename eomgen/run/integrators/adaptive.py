@@ -12,6 +12,8 @@ from eomgen.run.integrators.interface import Adaptive, Advance, StepFailure
 from eomgen.run.problem import Problem
 
 _STALLED = 100
+_ENOUGH_TO_JUDGE = 100_000
+"""Steps after which the pace so far tells whether the end will ever be reached."""
 
 
 def advances(
@@ -38,7 +40,12 @@ def advances(
     )
     times = np.linspace(t_start, t_end, samples)
     sampled, stalled = 1, 0
-    for _ in range(max_steps):
+    for made in range(max_steps):
+        if made == _ENOUGH_TO_JUDGE and (solver.t - t_start) * max_steps < (t_end - t_start) * made:
+            raise StepFailure(
+                f"{made} steps came to {solver.t:g} s only, at which pace the end is more than "
+                f"{max_steps} steps away; take a shorter --t-end, or {method.remedy}"
+            )
         complaint = solver.step()
         if solver.status == "failed":
             cause = (complaint or "the method gave up").rstrip(".")
