@@ -531,3 +531,25 @@ def test_formulas(formula: str, value: Callable[[float], float]) -> None:
         )
         expected = solve(mechanism, y[:1], y[1:]).accelerations[0]
         assert module.derivative(0.0, y, {"l": length})[1] == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 1e-3, 1.0, 1e3, 1e6])
+def test_digits_at_mass_ratios(ratio: float) -> None:
+    """Accelerations and joint forces keep their digits whichever of the two bodies is heavy.
+
+    The same program in 60 digits is the reference, so what is measured is rounding alone.
+    """
+    c = compiled("two_body")
+    rng = np.random.default_rng(17)
+    p = dict(c.module.PARAMETERS)
+    p["m_A"], p["I_A"] = ratio * p["m_A"], ratio * p["I_A"]
+    for _ in range(40):
+        y = rng.uniform(-3.0, 3.0, len(c.module.STATES))
+        inputs = {**p, **dict(zip(c.module.STATES, y, strict=True))}
+        exact = {name: mpmath.mpf(float(value)) for name, value in inputs.items()}
+        for output in ("derivative", "joint_forces"):
+            with mpmath.workdps(60):
+                values = interpret(c.system.program, output, exact, Digits())
+            expected = np.array([float(value) for value in values])
+            actual = np.ravel(getattr(c.module, output)(0.0, y, p))
+            assert np.max(np.abs(actual - expected)) <= 1e-13 * np.max(np.abs(expected))
