@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import TypeGuard
 
 from eomgen.effects import Effect, ExternalForce, Gravity, Motor
@@ -50,6 +51,11 @@ class Model:
     def coordinates(self) -> tuple[Coordinate, ...]:
         """All coordinates, in the order of `q`."""
         return tuple(c for body in self.bodies for c in body.coordinates)
+
+    @property
+    def turning(self) -> tuple[int, ...]:
+        """For each body the index of the coordinate that turns it: the last one of its joint."""
+        return tuple(accumulate((len(body.coordinates) for body in self.bodies), initial=-1))[1:]
 
     @property
     def defaults(self) -> dict[str, float]:

@@ -80,13 +80,9 @@ def derive(model: Model) -> Equations:
 def _generalised_forces(model: Model, symbols: Symbols) -> Expr:
     """Forces τ on the coordinates as rows of the bodies: τ turns the child, -τ the parent."""
     rows = list(symbols.tau)
-    i = 0
-    last: list[int] = []
-    for body in model.bodies:
-        i += len(body.coordinates)
-        last.append(i - 1)
+    for body, last in zip(model.bodies, model.turning, strict=True):
         if body.parent >= 0:
-            rows[last[body.parent]] -= symbols.tau[i - 1]
+            rows[model.turning[body.parent]] -= symbols.tau[last]
     return sp.Matrix(rows)
 
 

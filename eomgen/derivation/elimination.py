@@ -157,11 +157,11 @@ def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
     turns and everything outside it is carried along. For trees on the world nothing is to be added.
     """
     result = sp.Matrix(rows)
-    first = _first_coordinates(model)
     for tree in trees(model):
         if not tree.floating:
             continue
-        x, y = first[tree.root], first[tree.root] + 1
+        y = model.turning[tree.root] - 1
+        x = y - 1
         for k in tree.bodies:
             arm: Vec = (sp.Integer(0), sp.Integer(0))
             if k != tree.root:
@@ -169,7 +169,7 @@ def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
             for c, child in enumerate(model.bodies):
                 if child.parent == k:
                     arm = add(arm, kinematics.arm_parent[c])
-            turn = angle_index(model, k)
+            turn = model.turning[k]
             for j in range(result.cols):
                 result[turn, j] += cross(arm, (result[x, j], result[y, j]))
     return result
@@ -183,21 +183,7 @@ def symmetric(model: Model, symbols: Symbols, kinematics: Kinematics, rows: Expr
     inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
     work = body_rows(model, kinematics, rows).applyfunc(lambda e: tidy(e.xreplace(inward)))
     result = sp.Matrix(work)
-    for k in range(len(model.bodies)):
-        i = angle_index(model, k)
+    for k, i in enumerate(model.turning):
         for j in range(work.cols):
-            result[i, j] = sum(work[angle_index(model, b), j] for b in subtree(model, k))
+            result[i, j] = sum(work[model.turning[b], j] for b in subtree(model, k))
     return result.xreplace(outward)
-
-
-def _first_coordinates(model: Model) -> list[int]:
-    first, n = [], 0
-    for body in model.bodies:
-        first.append(n)
-        n += len(body.coordinates)
-    return first
-
-
-def angle_index(model: Model, k: int) -> int:
-    """Index of the coordinate that turns body `k`: the last one of its joint."""
-    return _first_coordinates(model)[k] + len(model.bodies[k].coordinates) - 1

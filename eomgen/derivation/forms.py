@@ -76,16 +76,15 @@ def _places(equations: Equations) -> dict[Expr, Expr]:
     symbols, kinematics = equations.symbols, equations.kinematics
     inward = over_bodies(equations.model, symbols)
     defined: dict[Expr, Expr] = {}
-    i = 0
-    for k, body in enumerate(equations.model.bodies):
+    model = equations.model
+    for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
         if isinstance(body.joint, Free):
-            defined |= {symbols.x[k]: symbols.q[i], symbols.y[k]: symbols.q[i + 1]}
-            defined |= {symbols.xd[k]: symbols.v[i], symbols.yd[k]: symbols.v[i + 1]}
+            defined |= {symbols.x[k]: symbols.q[last - 2], symbols.y[k]: symbols.q[last - 1]}
+            defined |= {symbols.xd[k]: symbols.v[last - 2], symbols.yd[k]: symbols.v[last - 1]}
         else:
             x, y = (e.xreplace(inward) for e in kinematics.position[k])
             xd, yd = (e.xreplace(inward) for e in kinematics.velocity[k])
             defined |= {symbols.x[k]: x, symbols.y[k]: y, symbols.xd[k]: xd, symbols.yd[k]: yd}
-        i += len(body.coordinates)
     return defined
 
 

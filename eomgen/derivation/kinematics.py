@@ -52,11 +52,9 @@ def differentiate_joints(model: Model, symbols: Symbols) -> Kinematics:
     arms_parent: list[Vec] = []
     arms_child: list[Vec] = []
     positions: list[Vec] = []
-    first = 0
     zero = sp.Integer(0)
-    for body in model.bodies:
-        q = [functions[s] for s in symbols.q[first : first + len(body.coordinates)]]
-        first += len(body.coordinates)
+    for body, last in zip(model.bodies, model.turning, strict=True):
+        q = [functions[s] for s in symbols.q[last + 1 - len(body.coordinates) : last + 1]]
         base = angles[body.parent] if body.parent >= 0 else zero
         angle = base + q[-1]
         if isinstance(body.joint, Free):

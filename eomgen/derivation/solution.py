@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
-from eomgen.derivation.elimination import Tree, angle_index, trees
+from eomgen.derivation.elimination import Tree, trees
 from eomgen.derivation.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, over_bodies, scale, tidy
 from eomgen.model import Model
@@ -91,17 +91,16 @@ def solve(model: Model, symbols: Symbols, kinematics: Kinematics, right_side: Ex
     absolute = over_bodies(model, symbols)
     for tree in trees(model):
         _solve_tree(model, symbols, kinematics, tree, right_side, absolute, notes)
-    for k, body in enumerate(model.bodies):
-        first = angle_index(model, k) - len(body.coordinates) + 1
+    for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
         if len(body.coordinates) > 1:
-            notes.define(symbols.a[first], symbols.xdd[k])
-            notes.define(symbols.a[first + 1], symbols.ydd[k])
+            notes.define(symbols.a[last - 2], symbols.xdd[k])
+            notes.define(symbols.a[last - 1], symbols.ydd[k])
         else:
             ddx, ddy = (e.xreplace(absolute) for e in kinematics.acceleration[k])
             notes.define(symbols.xdd[k], ddx)
             notes.define(symbols.ydd[k], ddy)
         base = symbols.alpha[body.parent] if body.parent >= 0 else sp.Integer(0)
-        notes.define(symbols.a[angle_index(model, k)], symbols.alpha[k] - base)
+        notes.define(symbols.a[last], symbols.alpha[k] - base)
     return Solution(tuple(notes.definitions), tuple(notes.pivots))
 
 
@@ -128,10 +127,10 @@ def _solve_tree(
                     entries[i] = (old[0] + slope[0], old[1] + slope[1])
         carried[k] = {i: e for i, e in entries.items() if e != (0, 0)}
     pairs = [_Pair(symbols.mass[k], carried[k]) for k in tree.bodies]
-    load = {k: tidy(right_side[angle_index(model, k)].xreplace(absolute)) for k in tree.bodies}
+    load = {k: tidy(right_side[model.turning[k]].xreplace(absolute)) for k in tree.bodies}
     root = model.bodies[tree.root].name
     if tree.floating:
-        x = angle_index(model, tree.root) - 2
+        x = model.turning[tree.root] - 2
         push = tuple(tidy(right_side[x + i].xreplace(absolute)) for i in (0, 1))
         total, moment, pairs = _eliminate_translation(pairs)
         tree_mass = notes.fresh(f"mass__{root}", total, positive=True)

@@ -202,44 +202,31 @@ def over_bodies(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
     a body, which keeps the algebra as small as the mechanism is.
     """
     result: dict[Expr, Expr] = {}
-    i = 0
-    for k, body in enumerate(model.bodies):
-        i += len(body.coordinates)
-        for coordinate, turning in (
-            (symbols.q, symbols.angle),
-            (symbols.v, symbols.omega),
-            (symbols.a, symbols.alpha),
-        ):
-            base = turning[body.parent] if body.parent >= 0 else sp.Integer(0)
-            result[coordinate[i - 1]] = turning[k] - base
-        if len(body.coordinates) > 1:
-            for coordinate, x, y in (
-                (symbols.q, symbols.x, symbols.y),
-                (symbols.v, symbols.xd, symbols.yd),
-                (symbols.a, symbols.xdd, symbols.ydd),
-            ):
-                result[coordinate[i - 3]], result[coordinate[i - 2]] = x[k], y[k]
+    for coordinates, x, y, angle in _orders(symbols):
+        for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
+            base = angle[body.parent] if body.parent >= 0 else sp.Integer(0)
+            result[coordinates[last]] = angle[k] - base
+            if len(body.coordinates) > 1:
+                result[coordinates[last - 2]], result[coordinates[last - 1]] = x[k], y[k]
     return result
 
 
 def over_coordinates(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
     """The way back: the bodies' angles and angular rates as sums of coordinates."""
     result: dict[Expr, Expr] = {}
-    i = 0
-    for k, body in enumerate(model.bodies):
-        i += len(body.coordinates)
-        for coordinate, turning in (
-            (symbols.q, symbols.angle),
-            (symbols.v, symbols.omega),
-            (symbols.a, symbols.alpha),
-        ):
-            base = result[turning[body.parent]] if body.parent >= 0 else sp.Integer(0)
-            result[turning[k]] = base + coordinate[i - 1]
-        if len(body.coordinates) > 1:
-            for coordinate, x, y in (
-                (symbols.q, symbols.x, symbols.y),
-                (symbols.v, symbols.xd, symbols.yd),
-                (symbols.a, symbols.xdd, symbols.ydd),
-            ):
-                result[x[k]], result[y[k]] = coordinate[i - 3], coordinate[i - 2]
+    for coordinates, x, y, angle in _orders(symbols):
+        for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
+            base = result[angle[body.parent]] if body.parent >= 0 else sp.Integer(0)
+            result[angle[k]] = base + coordinates[last]
+            if len(body.coordinates) > 1:
+                result[x[k]], result[y[k]] = coordinates[last - 2], coordinates[last - 1]
     return result
+
+
+def _orders(symbols: Symbols) -> tuple[tuple[tuple[Expr, ...], ...], ...]:
+    """Coordinates with the bodies' x, y and angle: pose, first and second derivative."""
+    return (
+        (symbols.q, symbols.x, symbols.y, symbols.angle),
+        (symbols.v, symbols.xd, symbols.yd, symbols.omega),
+        (symbols.a, symbols.xdd, symbols.ydd, symbols.alpha),
+    )

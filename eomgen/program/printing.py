@@ -1,10 +1,10 @@
 """Outputs of a program as lines of source code: names, inlining, brackets."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 
-from eomgen.program.program import Program
+from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
 
 SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -115,7 +115,7 @@ def print_block(
             return False
         return steps[i].operation == "input" or (not fixed and steps[i].stage <= Stage.PARAMETERS)
 
-    live = _live_until(program, nodes, outside)
+    live = live_steps(program, nodes, outside)
     uses = dict.fromkeys(live, 0)
     for i in live:
         if not outside(i):
@@ -155,21 +155,6 @@ def print_block(
         ),
         functions=tuple(functions),
     )
-
-
-def _live_until(
-    program: Program, nodes: Sequence[int], outside: Callable[[int], bool]
-) -> list[int]:
-    """The steps that nodes need, in order, without what lies behind those outside the block."""
-    needed: set[int] = set()
-    stack = list(nodes)
-    while stack:
-        i = stack.pop()
-        if i not in needed:
-            needed.add(i)
-            if not outside(i):
-                stack += program.steps[i].operands
-    return sorted(needed)
 
 
 def _expression(

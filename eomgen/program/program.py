@@ -1,6 +1,6 @@
 """A finished program: steps in order and the named outputs they compute."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -54,15 +54,18 @@ def finish(tape: Tape, outputs: Mapping[str, Output], checks: Iterable[Check]) -
     return Program(tuple(tape.steps), dict(outputs), dict(tape.names), tuple(checks))
 
 
-def live_steps(program: Program, nodes: Iterable[int]) -> list[int]:
-    """The steps that some nodes need, in order."""
+def live_steps(
+    program: Program, nodes: Iterable[int], outside: Callable[[int], bool] | None = None
+) -> list[int]:
+    """The steps that some nodes need, in order; what lies behind those `outside` is left out."""
     needed: set[int] = set()
     stack = list(nodes)
     while stack:
         i = stack.pop()
         if i not in needed:
             needed.add(i)
-            stack += program.steps[i].operands
+            if outside is None or not outside(i):
+                stack += program.steps[i].operands
     return sorted(needed)
 
 
