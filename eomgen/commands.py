@@ -6,15 +6,17 @@ import math
 import os
 import sys
 import webbrowser
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from eomgen.errors import RunError, SceneError, nearest
-from eomgen.files import check_folder, check_writable, write_whole
+from eomgen.errors import EomgenError, RunError, SceneError, nearest
+from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.joints.base import WORLD
 from eomgen.model import Model, build_model
+from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import terminal_notice, terminal_progress
 from eomgen.scene.reader import built_in_names, find_scene, read_scene
 from eomgen.scene.schema import Form
@@ -71,11 +73,8 @@ def derive(given: Arguments) -> int:
     from eomgen.derivation.steps import tell
     from eomgen.show.derivation import as_html, as_latex, as_text
 
-    try:
-        with terminal_notice(f"deriving {model.name} …"):
-            steps = tell(derive_equations(model))
-    except SceneError as error:
-        raise SceneError(f"{find_scene(given.scene).name}: {error}") from None
+    with _located(given.scene), terminal_notice(f"deriving {model.name} …"):
+        steps = tell(derive_equations(model))
     write = {"text": as_text, "latex": as_latex, "html": as_html}[given.format]
     text = write(model.name, model.title, steps)
     if given.output is None:
@@ -102,7 +101,7 @@ def generate(given: Arguments) -> int:
         if not given.check:
             check_folder(given.output)
             check_writable(path, force=given.force)
-        source, _, derived = _code(scene, model)
+        source, _, derived, _ = _code(scene, model)
         current = _text(path)
         if given.check:
             state = "fresh" if current == source else "missing" if current is None else "stale"
@@ -128,17 +127,26 @@ def _file_name(model: Model, form: Form | None) -> str:
     return model.name if form is None else f"{model.name}_{form}"
 
 
-def _code(scene: str, model: Model) -> tuple[str, str, bool]:
-    """A model's code, tried once. Raises `SceneError` if it cannot be evaluated as the scene is."""
-    from eomgen.run.module import as_problem, load_module
+def _code(scene: str, model: Model) -> tuple[str, str, bool, GeneratedModule]:
+    """A model's module and page source, whether derived now, and the module, loaded and tried.
 
-    try:
+    Raises `SceneError` if it cannot be evaluated as the scene is.
+    """
+    with _located(scene):
         with terminal_notice(f"deriving {model.name} …"):
             source, poses, derived = generated_code(model)
-        as_problem(load_module(source, model.name))
-    except (SceneError, RunError) as error:
+        module = load_module(source, model.name)
+        as_problem(module)
+    return source, poses, derived, module
+
+
+@contextmanager
+def _located(scene: str) -> Iterator[None]:
+    """Name the scene's file in front of what is said of the scene."""
+    try:
+        yield
+    except EomgenError as error:
         raise SceneError(f"{find_scene(scene).name}: {error}") from None
-    return source, poses, derived
 
 
 def _text(path: Path) -> str | None:
@@ -161,7 +169,6 @@ def simulate(given: Arguments) -> int:
     # Imported here: `check` and `generate` need neither SciPy nor Matplotlib.
     from eomgen.run.integrate import integrate
     from eomgen.run.integrators import FixedStep, find_integrator
-    from eomgen.run.module import as_problem, load_module
     from eomgen.run.trajectory import save_csv, save_npz
     from eomgen.show.figure import save_figure
     from eomgen.show.observe import observe
@@ -174,8 +181,7 @@ def simulate(given: Arguments) -> int:
     integrator = _or(given.integrator, wanted.integrator)
     fixed = isinstance(find_integrator(integrator), FixedStep)
     paths = _output_paths(given, model)
-    source, poses, derived = _code(given.scene, model)
-    module = load_module(source, model.name)
+    source, poses, derived, module = _code(given.scene, model)
     with terminal_progress(f"simulating {model.name}") as progress:
         trajectory = integrate(
             as_problem(module, parameters or None, inputs or None),
@@ -187,8 +193,9 @@ def simulate(given: Arguments) -> int:
             samples=given.samples,
             progress=progress,
         )
-    motion = observe(model.with_parameters(parameters), module, trajectory)
-    values = tuple({**model.defaults, **parameters}.values())
+    model = model.with_parameters(parameters)
+    motion = observe(model, module, trajectory)
+    values = tuple(model.defaults.values())
     write_whole(paths["py"], source, force=given.force)
     save_npz(trajectory, paths["npz"], force=given.force)
     save_csv(trajectory, paths["csv"], force=given.force)
@@ -198,7 +205,7 @@ def simulate(given: Arguments) -> int:
     except RunError as error:
         # Pictures of an earlier run must not stand beside the numbers of this one.
         for kind in ("png", "html"):
-            paths.pop(kind).unlink(missing_ok=True)
+            remove_ours(paths.pop(kind))
         drawing = str(error)
     else:
         drawing = ""
@@ -258,10 +265,8 @@ def _open(page: Path) -> None:
 
 def _model(scene: str, form: Form | None) -> Model:
     tables = read_scene(scene)
-    try:
+    with _located(scene):
         model = build_model(tables)
-    except SceneError as error:
-        raise SceneError(f"{find_scene(scene).name}: {error}") from None
     return model if form is None else replace(model, form=form)
 
 

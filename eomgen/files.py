@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 from eomgen.errors import RunError
@@ -77,6 +78,15 @@ def write_whole(path: Path, data: bytes | str, *, force: bool = False) -> None:
         if isinstance(error, OSError):
             raise RunError(f"{_short(path)}: cannot be written: {error.strerror}") from None
         raise
+
+
+def remove_ours(path: Path) -> None:
+    """Remove a file if this program wrote it; leave anything else, or nothing, as it is."""
+    with suppress(OSError):
+        with path.open("rb") as file:
+            ours = is_ours(file.read(SIGNED_WITHIN))
+        if ours:
+            path.unlink()
 
 
 def _short(path: Path) -> str:

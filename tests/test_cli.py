@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import pytest
 
 from eomgen.cli import main
+from eomgen.files import remove_ours
 from eomgen.model import build_model
 from eomgen.pipeline import compile_scene
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
@@ -80,6 +81,16 @@ def test_a_file_that_only_mentions_this_program_is_not_ours(
         target = str(tmp_path / f"pendulum.{form}")
         for _ in range(2):
             assert main(["derive", "pendulum", "--format", form, "-o", target]) == 0
+
+
+def test_only_our_own_files_are_removed(tmp_path: Path) -> None:
+    """Pictures of an earlier run go; a stranger's file, or none, is left alone."""
+    ours, theirs = tmp_path / "ours.html", tmp_path / "theirs.html"
+    ours.write_text('<meta name="generator" content="eomgen">')
+    theirs.write_text("<title>mine</title>")
+    for path in (ours, theirs, tmp_path / "none.html", tmp_path):
+        remove_ours(path)
+    assert [path.name for path in tmp_path.iterdir()] == ["theirs.html"]
 
 
 def test_a_damaged_store_is_done_without(

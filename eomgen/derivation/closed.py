@@ -114,7 +114,7 @@ def written_out_forces(equations: Equations) -> tuple[Definition, ...]:
     model, symbols, kinematics = equations.model, equations.symbols, equations.kinematics
     inward = over_bodies(model, symbols)
     found = dict(equations.solution.definitions)
-    sums = {s: e for s, e in found.items() if s.name.startswith("mass__")}
+    sums = dict(equations.solution.masses)
     definitions = []
     for symbol, expression in equations.joint_force:
         for k in reversed(range(len(model.bodies))):

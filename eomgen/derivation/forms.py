@@ -90,13 +90,12 @@ def _places(equations: Equations) -> dict[Expr, Expr]:
 
 def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
     model, symbols = equations.model, equations.symbols
-    places = _places(equations)
     inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
     states: list[State] = []
     rates: list[Expr] = []
     initial: list[Expr] = []
     replaced: dict[Expr, Expr] = {}
-    defined = dict(places)
+    defined = _places(equations)
     for k, body in enumerate(model.bodies):
         if model.value(body.inertia_com) == 0.0:
             raise SceneError(

@@ -31,11 +31,13 @@ Definition = tuple[Expr, Expr]
 class Solution:
     """The closed form: definitions in order, the last of them the accelerations themselves.
 
-    `pivots` are the symbols that the solution divides by, masses of whole trees included.
+    `pivots` are the symbols that the solution divides by; `masses`, of whole floating trees, are
+    among them.
     """
 
     definitions: tuple[Definition, ...]
     pivots: tuple[Expr, ...]
+    masses: tuple[Definition, ...]
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class _Notes:
 
     definitions: list[Definition] = field(default_factory=list)
     pivots: list[Expr] = field(default_factory=list)
+    masses: list[Definition] = field(default_factory=list)
 
     def define(self, symbol: Expr, expression: Expr) -> Expr:
         self.definitions.append((symbol, expression))
@@ -101,7 +104,7 @@ def solve(model: Model, symbols: Symbols, kinematics: Kinematics, right_side: Ex
             notes.define(symbols.ydd[k], ddy)
         base = symbols.alpha[body.parent] if body.parent >= 0 else sp.Integer(0)
         notes.define(symbols.a[last], symbols.alpha[k] - base)
-    return Solution(tuple(notes.definitions), tuple(notes.pivots))
+    return Solution(tuple(notes.definitions), tuple(notes.pivots), tuple(notes.masses))
 
 
 def _solve_tree(
@@ -135,6 +138,7 @@ def _solve_tree(
         total, moment, pairs = _eliminate_translation(pairs)
         tree_mass = notes.fresh(f"mass__{root}", total, positive=True)
         notes.pivots.append(tree_mass)
+        notes.masses.append((tree_mass, total))
         mean = {k: scale(1 / tree_mass, e) for k, e in moment.items()}
         for k, (jx, jy) in mean.items():
             load[k] = gathered(load[k] - jx * push[0] - jy * push[1], symbols, {tree_mass: total})

@@ -57,7 +57,8 @@ def assemble(equations: Equations) -> System:
     inputs = {s: tape.input(n, Stage.INPUTS) for n, s in symbols.inputs.items()}
     tau = {s: tape.input(s.name, Stage.INPUTS) for s in symbols.tau}
     vd = {s: tape.input(s.name, Stage.INPUTS) for s in symbols.a}
-    definitions = (*equations.solution.definitions, *written_out_forces(equations))
+    forces = written_out_forces(equations) if "joint_forces" in model.outputs else ()
+    definitions = (*equations.solution.definitions, *forces)
     defined = {
         s: e.xreplace(form.replaced) for s, e in {**dict(definitions), **form.defined}.items()
     }

@@ -73,6 +73,7 @@ class Lowering:
                 tops[True].append(self._tape.constant(int(factor.p)))
                 bottoms[True].append(self._tape.constant(int(factor.q)))
                 continue
+            assert exponent.is_Integer, "roots stand in formulas only, which are no expressions"
             node = self.lower(base)
             side = tops if exponent > 0 else bottoms
             fixed = node.step.stage <= Stage.PARAMETERS

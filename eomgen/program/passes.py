@@ -34,7 +34,7 @@ def drop_dead_steps(program: Program) -> Program:
     keep = live_steps(program, [*roots, *(check.node for check in program.checks)])
     new = {old: i for i, old in enumerate(keep)}
     steps = tuple(
-        type(step)(step.operation, tuple(new[o] for o in step.operands), step.stage, step.value)
+        replace(step, operands=tuple(new[o] for o in step.operands))
         for step in (program.steps[i] for i in keep)
     )
     return Program(
