@@ -57,21 +57,27 @@ def _parser() -> argparse.ArgumentParser:
 
     command("list", commands.list_scenes, "name the built-in scenes", None)
     command("schema", commands.print_schema, "print the JSON Schema of scenes, for editors", None)
-    _form(command("check", commands.check, "validate a scene and say what it is made of"))
+    check = command("check", commands.check, "validate a scene and say what it is made of")
+    check.add_argument("--long", action="store_true", help="list everything, however much")
+    _form(check)
     derive = _form(command("derive", commands.derive, "print the derivation, step by step"))
     derive.add_argument("--format", choices=("text", "latex", "html"), default="text")
     derive.add_argument("-o", "--output", metavar="FILE", type=Path, help="write it to a file")
     _force(derive)
-    generate = _form(
-        command("generate", commands.generate, "write the module of a scene", "scenes")
-    )
+    generate = command("generate", commands.generate, "write the module of a scene", "scenes")
+    _code(_form(generate))
     generate.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"))
     generate.add_argument("--all", action="store_true", help="all built-in scenes")
     generate.add_argument("--check", action="store_true", help="say which is stale, write nothing")
+    generate.add_argument("--explain", action="store_true", help="say why its route was taken")
     generate.add_argument("--report", action="store_true", help="say what each pass saved")
     _force(generate)
-    _simulation(_form(command("simulate", commands.simulate, "integrate, and write what happened")))
-    _simulation(_form(command("view", commands.view, "integrate, and open the moving picture")))
+    for name, run, about in (
+        ("simulate", commands.simulate, "integrate, and write what happened"),
+        ("view", commands.view, "integrate, and open the moving picture"),
+    ):
+        _simulation(_code(_form(command(name, run, about))))
+    _linearisation(command("linearise", commands.linearise, "A, B and modes about an equilibrium"))
     return parser
 
 
@@ -80,6 +86,31 @@ def _form(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
         "--form", choices=("velocity", "momentum", "redundant"), help="state form (the scene's)"
     )
     return parser
+
+
+def _route(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--route",
+        choices=("auto", "closed", "ldl", "aba"),
+        help="way to the equations (the scene's; auto is the one of the fewest operations)",
+    )
+
+
+def _code(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    _route(parser)
+    parser.add_argument(
+        "--outputs", metavar="A,B,…", help="what the module computes, or all (the scene's)"
+    )
+    return parser
+
+
+def _values(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
+    )
+    parser.add_argument(
+        "--input", metavar="NAME=X", action="append", default=[], help="constant value of an input"
+    )
 
 
 def _force(parser: argparse.ArgumentParser) -> None:
@@ -93,15 +124,46 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
-    parser.add_argument(
-        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
-    )
-    parser.add_argument(
-        "--input", metavar="NAME=X", action="append", default=[], help="constant value of an input"
-    )
+    _values(parser)
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     parser.add_argument("--plot", metavar="FILE", type=Path, help="figure (DIR/NAME.png)")
     parser.add_argument("--view", action="store_true", help="open the page when done")
+    _force(parser)
+
+
+def _linearisation(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--at",
+        choices=("equilibrium", "rest", "initial"),
+        default="equilibrium",
+        help="the nearest equilibrium, where it comes to rest, or the state itself",
+    )
+    parser.add_argument(
+        "--state",
+        metavar="NAME=X",
+        action="append",
+        default=[],
+        help="value of a state to start from; NAME_deg in degrees (the scene's initial state)",
+    )
+    parser.add_argument(
+        "--hold",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="a coordinate that stays as it is while an equilibrium is sought",
+    )
+    parser.add_argument(
+        "--trim",
+        metavar="INPUT",
+        action="append",
+        default=[],
+        help="an input whose value is sought, too",
+    )
+    _values(parser)
+    _route(parser)
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, help="write A and B to FILE.npz or FILE.csv"
+    )
     _force(parser)
 
 

@@ -4,27 +4,39 @@ from dataclasses import dataclass
 
 from eomgen.backends.javascript import javascript_poses
 from eomgen.backends.python import python_module
-from eomgen.derivation.closed import derive
-from eomgen.model import Model, build_model
-from eomgen.program.assemble import assemble
+from eomgen.build import build_model
+from eomgen.derivation.recursive.regular import check_regular
+from eomgen.model import Model
 from eomgen.program.passes import PassReport
+from eomgen.program.route import routed
 from eomgen.scene.schema import Scene
 
 
 @dataclass(frozen=True)
 class Generated:
-    """What a model is compiled to: a Python module, the page's `bodyPoses`, what passes saved."""
+    """What a model is compiled to: a Python module, the page's `bodyPoses`, what passes saved, and
+    why its route was taken.
+    """
 
     module: str
     poses: str
     reports: tuple[PassReport, ...]
+    explanation: tuple[str, ...]
 
 
 def generate(model: Model) -> Generated:
-    """Derive a model's equations and write them as code. Same model, same bytes."""
-    equations = derive(model)
-    system = assemble(equations)
-    return Generated(python_module(system), javascript_poses(system), system.reports)
+    """Derive a model's equations and write them as code. Same model, same bytes.
+
+    Raises `SceneError` if the mass matrix is singular or the route is not for the model.
+    """
+    check_regular(model)
+    choice = routed(model)
+    return Generated(
+        python_module(choice.system),
+        javascript_poses(choice.system),
+        choice.system.reports,
+        tuple(choice.explanation()),
+    )
 
 
 def compile_model(model: Model) -> str:

@@ -9,15 +9,17 @@ import importlib.metadata
 import json
 import os
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import astuple, dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import platformdirs
 
 from eomgen.errors import RunError
 from eomgen.files import write_whole
 from eomgen.model import Model
+from eomgen.program.passes import PassReport
 from eomgen.scene.look import Camera
 from eomgen.scene.schema import Simulation
 from eomgen.templating import PACKAGE, templates_folder
@@ -33,42 +35,56 @@ def folder() -> Path:
     return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("eomgen"))
 
 
-def generated_code(model: Model) -> tuple[str, str, bool]:
-    """A model's module and page source, and whether they had to be derived now.
+@dataclass(frozen=True)
+class Code:
+    """What a model is compiled to, as `eomgen.pipeline.Generated`, and whether only just now."""
+
+    module: str
+    poses: str
+    reports: tuple[PassReport, ...]
+    explanation: tuple[str, ...]
+    derived: bool
+
+
+def generated_code(model: Model) -> Code:
+    """A model's code, from the store or derived now.
 
     A store that cannot be read or written, or is damaged, is done without.
     """
     path = folder() / f"{_key(model)}.json"
     kept = _kept(path)
     if kept is not None:
-        return *kept, False
-    # Imported here because it brings SymPy, which takes longer than everything else together.
+        return kept
+    # Imported here because it brings what derives, which takes long to load.
     from eomgen.pipeline import generate
 
-    code = generate(model)
-    parts = [code.module, code.poses]
+    made = generate(model)
+    parts = [made.module, made.poses, [astuple(r) for r in made.reports], made.explanation]
     with suppress(RunError):
         write_whole(path, json.dumps({"digest": _digest(parts), "parts": parts}), force=True)
-    return code.module, code.poses, True
+    return Code(made.module, made.poses, made.reports, made.explanation, derived=True)
 
 
-def _kept(path: Path) -> tuple[str, str] | None:
-    """Module and page source of a file of the store, or None if it is not whole."""
+def _kept(path: Path) -> Code | None:
+    """What a file of the store holds, or None if it is not whole."""
     try:
         entry = json.loads(path.read_text("utf-8"))
-        module, poses = entry["parts"]
-        return (module, poses) if entry["digest"] == _digest([module, poses]) else None
+        module, poses, reports, explanation = entry["parts"]
+        if entry["digest"] != _digest(entry["parts"]):
+            return None
+        reports = tuple(PassReport(*report) for report in reports)
+        return Code(module, poses, reports, tuple(explanation), derived=False)
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None
 
 
-def _digest(parts: list[str]) -> str:
+def _digest(parts: list[Any]) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
 def _key(model: Model) -> str:
     bodies = tuple(replace(body, shapes=()) for body in model.bodies)
-    bare = replace(model, bodies=bodies, simulation=Simulation(), camera=Camera())
+    bare = replace(model, bodies=bodies, simulation=Simulation(), camera=Camera(), notices=())
     digest = hashlib.sha256(_generator_digest())
     digest.update(repr(bare).encode())
     return digest.hexdigest()[:32]

@@ -31,6 +31,7 @@ import numpy as np
 
 NAME = "double_pendulum"
 FORM = "velocity"
+DIMENSIONS = 2
 STATES = (
     "theta_1",
     "theta_2",
@@ -38,6 +39,7 @@ STATES = (
     "theta_2_dot",
 )
 POSITIONS = (0, 1)
+QUATERNIONS = ()
 INPUTS = {
 }
 PARAMETERS = {
@@ -61,21 +63,26 @@ UNITS = {
 EFFECTS = ('gravity',)
 BODIES = ('upper', 'lower')
 JOINTS = ('shoulder', 'elbow')
+POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 7, "sub": 2, "mul": 16, "div": 1, "neg": 1, "sin": 1, "cos": 3, "total": 31, "parameters": 22},
-    "jacobian": {"add": 14, "sub": 8, "mul": 48, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 85, "parameters": 22},
+    "jacobian": {"add": 14, "sub": 8, "mul": 45, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 82, "parameters": 24},
     "forward_dynamics": {"add": 4, "sub": 8, "mul": 16, "div": 1, "sin": 1, "cos": 3, "total": 33, "parameters": 22},
     "inverse_dynamics": {"add": 12, "sub": 1, "mul": 15, "sin": 1, "cos": 3, "total": 32, "parameters": 19},
     "mass_matrix": {"add": 2, "mul": 2, "cos": 1, "total": 5, "parameters": 12},
     "velocity_force": {"add": 1, "sub": 1, "mul": 6, "sin": 1, "total": 9, "parameters": 3},
     "gravity_force": {"add": 3, "mul": 3, "cos": 2, "total": 8, "parameters": 8},
+    "bias_force": {"add": 6, "sub": 1, "mul": 9, "sin": 1, "cos": 2, "total": 19, "parameters": 10},
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 11, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 10},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 4},
     "momentum": {"add": 17, "mul": 24, "neg": 1, "sin": 2, "cos": 2, "total": 46, "parameters": 8},
+    "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 4},
     "joint_forces": {"add": 12, "sub": 6, "mul": 30, "div": 1, "sin": 3, "cos": 3, "total": 55, "parameters": 30},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 2},
+    "body_velocities": {"add": 6, "mul": 8, "neg": 2, "sin": 2, "cos": 2, "total": 20, "parameters": 2},
+    "parameter_jacobian": {"add": 29, "sub": 13, "mul": 66, "div": 6, "neg": 5, "sin": 1, "cos": 3, "total": 123, "parameters": 53},
 }
 
 
@@ -91,50 +98,78 @@ def _constants(values):
         raise ValueError("mass of lower is not positive: change the parameters")
     if not m_2 * (l_2 * l_2) / 12.0 >= 0.0:
         raise ValueError("inertia_com of lower is negative: change the parameters")
-    k24 = m_2 * (l_2 * l_2)
-    pivot_lower = k24 / 3.0
+    l_2_squared = l_2 * l_2
+    k42 = m_2 * l_2_squared
+    pivot_lower = k42 / 3.0
     l_1_squared = l_1 * l_1
-    k25 = m_2 * 3.0
-    k1 = l_1_squared * (k25 + m_1 * 4.0) / 12.0
-    k2 = l_1_squared * k25 / 4.0
-    k20 = m_2 * l_1
-    k8 = l_2 * k20
-    k3 = k8 / 2.0
-    k26 = m_2 * l_2
-    k4 = g * k26 / 2.0
+    k43 = m_2 * 3.0
+    k44 = k43 + m_1 * 4.0
+    k1 = l_1_squared * k44 / 12.0
+    k2 = l_1_squared * k43 / 4.0
+    k23 = m_2 * l_1
+    k10 = l_2 * k23
+    k3 = k10 / 2.0
+    k45 = m_2 * l_2
+    k4 = g * k45 / 2.0
     k5 = 1.0 / pivot_lower
-    k6 = g * k20
-    k7 = g * (m_1 * l_1) / 2.0
-    k27 = m_1 * l_1_squared
-    k9 = pivot_lower + (m_2 * l_1_squared + k27 / 3.0)
-    k10 = l_1 / 2.0
-    k11 = m_1 / 2.0
-    k12 = l_2 / 2.0
-    k13 = m_2 / 2.0
-    k14 = k27 / 24.0
-    k15 = k24 / 24.0
-    k16 = m_2 * g
-    k17 = m_1 * g
-    k18 = k24 / 12.0
-    k19 = k27 / 12.0
-    k21 = k26 / 2.0
-    k22 = l_1 * (m_1 + m_2 * 2.0) / 2.0
-    k23 = g * (m_1 + m_2)
+    k6 = g * k23
+    k46 = m_1 * l_1
+    k7 = g * k46 / 2.0
+    k8 = k2 * 2.0
+    k9 = 2.0 * k3
+    k47 = m_1 * l_1_squared
+    k11 = k47 / 3.0 + (pivot_lower + m_2 * l_1_squared)
+    k12 = l_1 / 2.0
+    k13 = m_1 / 2.0
+    k14 = l_2 / 2.0
+    k15 = m_2 / 2.0
+    k16 = k47 / 24.0
+    k17 = k42 / 24.0
+    k18 = m_2 * g
+    k19 = m_1 * g
+    k20 = k42 / 12.0
+    k21 = k47 / 12.0
+    k48 = m_1 + m_2
+    k22 = 1.0 / k48
+    k24 = k45 / 2.0
+    k25 = l_1 * (m_1 + m_2 * 2.0) / 2.0
+    k26 = g * k48
+    k27 = l_1_squared * 4.0 / 12.0
+    k28 = l_1 * g
+    k29 = k28 / 2.0
+    k49 = 3.0 * l_1_squared
+    k30 = k49 / 12.0
+    k31 = k49 / 4.0
+    k32 = l_1 * l_2 / 2.0
+    k33 = l_2 * g / 2.0
+    k34 = k5 * (l_2_squared / 3.0) / pivot_lower
+    k50 = l_1 * 2.0
+    k35 = k44 * k50 / 12.0
+    k36 = k43 * k50 / 4.0
+    k37 = k19 / 2.0
+    k38 = k23 / 2.0
+    k39 = k18 / 2.0
+    k40 = k5 * (m_2 * (l_2 * 2.0) / 3.0) / pivot_lower
+    k41 = k46 / 2.0
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6, k7),
-        "jacobian": (k1, k2, k3, k4, k5, k6, k7),
+        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8, k9),
         "forward_dynamics": (k1, k2, k3, k4, k5, k6, k7),
-        "inverse_dynamics": (pivot_lower, k8, k3, k4, k6, k7, k9),
-        "mass_matrix": (pivot_lower, k8, k3, k9),
+        "inverse_dynamics": (pivot_lower, k10, k3, k4, k6, k7, k11),
+        "mass_matrix": (pivot_lower, k10, k3, k11),
         "velocity_force": (k3,),
         "gravity_force": (k4, k6, k7),
+        "bias_force": (k3, k4, k6, k7),
         "applied_force": (),
-        "kinetic_energy": (k10, k11, k12, k13, k14, k15),
-        "potential_energy": (k10, k12, k16, k17),
-        "momentum": (m_1, m_2, k10, k12, k18, k19),
-        "joint_forces": (k1, k2, k20, k3, k4, k5, k6, k7, k16, k21, k22, k23),
-        "body_poses": (k10, k12),
+        "kinetic_energy": (k12, k13, k14, k15, k16, k17),
+        "potential_energy": (k12, k14, k18, k19),
+        "momentum": (m_1, m_2, k12, k14, k20, k21),
+        "centre_of_mass": (m_1, m_2, k12, k14, k22),
+        "joint_forces": (k1, k2, k23, k3, k4, k5, k6, k7, k18, k24, k25, k26),
+        "body_poses": (k12, k14),
+        "body_velocities": (k12, k14),
+        "parameter_jacobian": (k1, k2, k23, k3, k4, k5, k6, k7, k18, k24, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41),
     }
 
 
@@ -168,8 +203,8 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """85 operations: 14 add, 8 sub, 48 mul, 5 div, 4 neg, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6, k7 = k
+    """82 operations: 14 add, 8 sub, 45 mul, 5 div, 4 neg, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k7, k8, k9 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     pivot_upper = k1 + sin_theta_2 * sin_theta_2 * k2
@@ -189,9 +224,9 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     s6 = sin_theta_2 * k3
     s7 = k3 * (cos_theta_2 * theta_1_dot_squared) - s4
     s8 = k5 * (coupling_lower_upper * s7 - s1 * s6) + k3 * (cos_theta_2 * omega_lower_squared)
-    s9 = (s8 - alpha_upper * (k2 * (2.0 * (sin_theta_2 * cos_theta_2)))) / pivot_upper
-    s10 = k3 * (sin_theta_2 * (theta_1_dot * 2.0))
-    s11 = k3 * (sin_theta_2 * (2.0 * omega_lower))
+    s9 = (s8 - alpha_upper * (sin_theta_2 * cos_theta_2 * k8)) / pivot_upper
+    s10 = k9 * (theta_1_dot * sin_theta_2)
+    s11 = k9 * (sin_theta_2 * omega_lower)
     s12 = (k5 * (coupling_lower_upper * s10) + s11) / pivot_upper
     s13 = s11 / pivot_upper
     return (
@@ -235,7 +270,7 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """32 operations: 12 add, 1 sub, 15 mul, 1 sin, 3 cos."""
-    pivot_lower, k8, k3, k4, k6, k7, k9 = k
+    pivot_lower, k10, k3, k4, k6, k7, k11 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     theta_1_ddot, theta_2_ddot = extra
     sin_theta_2 = sin(theta_2)
@@ -245,7 +280,7 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     s17 = pivot_lower + cos_theta_2 * k3
-    s18 = cos_theta_1 * k6 + (theta_1_ddot * (cos_theta_2 * k8 + k9) + theta_2_ddot * s17)
+    s18 = cos_theta_1 * k6 + (theta_1_ddot * (cos_theta_2 * k10 + k11) + theta_2_ddot * s17)
     return (
         k3 * (s15 - sin_theta_2 * (omega_lower * omega_lower)) + (s16 + (cos_theta_1 * k7 + s18)),
         k3 * s15 + (s16 + (theta_1_ddot * s17 + theta_2_ddot * pivot_lower)),
@@ -254,12 +289,12 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     """5 operations: 2 add, 2 mul, 1 cos."""
-    pivot_lower, k8, k3, k9 = k
+    pivot_lower, k10, k3, k11 = k
     _, theta_2, _, _ = y
     cos_theta_2 = cos(theta_2)
     s17 = pivot_lower + cos_theta_2 * k3
     return (
-        cos_theta_2 * k8 + k9,
+        cos_theta_2 * k10 + k11,
         s17,
         s17,
         pivot_lower,
@@ -291,6 +326,21 @@ def _gravity_force(y, k, u=(), extra=(), cos=cos):
     )
 
 
+def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """19 operations: 6 add, 1 sub, 9 mul, 1 sin, 2 cos."""
+    k3, k4, k6, k7 = k
+    theta_1, theta_2, theta_1_dot, theta_2_dot = y
+    sin_theta_2 = sin(theta_2)
+    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    s16 = cos(theta_1 + theta_2) * k4
+    cos_theta_1 = cos(theta_1)
+    omega_lower = theta_1_dot + theta_2_dot
+    return (
+        k3 * (s15 - sin_theta_2 * (omega_lower * omega_lower)) + (s16 + (cos_theta_1 * k6 + cos_theta_1 * k7)),
+        s16 + k3 * s15,
+    )
+
+
 def _applied_force(y, k, u=(), extra=()):
     """0 operations."""
     return (
@@ -301,33 +351,33 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     """33 operations: 11 add, 18 mul, 2 sin, 2 cos."""
-    k10, k11, k12, k13, k14, k15 = k
+    k12, k13, k14, k15, k16, k17 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s3 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s19 = k10 * (theta_1_dot * sin(theta_1))
-    yd_upper = k10 * (theta_1_dot * cos(theta_1))
-    s20 = k12 * (omega_lower * sin(s3)) + (s19 + s19)
-    yd_lower = k12 * (cos(s3) * omega_lower) + (yd_upper + yd_upper)
-    s21 = (s19 * s19 + yd_upper * yd_upper) * k11 + (s20 * s20 + yd_lower * yd_lower) * k13
+    s19 = k12 * (theta_1_dot * sin(theta_1))
+    yd_upper = k12 * (theta_1_dot * cos(theta_1))
+    s20 = k14 * (omega_lower * sin(s3)) + (s19 + s19)
+    yd_lower = k14 * (cos(s3) * omega_lower) + (yd_upper + yd_upper)
+    s21 = (s19 * s19 + yd_upper * yd_upper) * k13 + (s20 * s20 + yd_lower * yd_lower) * k15
     return (
-        omega_lower * omega_lower * k15 + (theta_1_dot * theta_1_dot * k14 + s21),
+        omega_lower * omega_lower * k17 + (theta_1_dot * theta_1_dot * k16 + s21),
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """10 operations: 4 add, 4 mul, 2 sin."""
-    k10, k12, k16, k17 = k
+    k12, k14, k18, k19 = k
     theta_1, theta_2, _, _ = y
-    y_upper = sin(theta_1) * k10
+    y_upper = sin(theta_1) * k12
     return (
-        (sin(theta_1 + theta_2) * k12 + (y_upper + y_upper)) * k16 + y_upper * k17,
+        (sin(theta_1 + theta_2) * k14 + (y_upper + y_upper)) * k18 + y_upper * k19,
     )
 
 
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """46 operations: 17 add, 24 mul, 1 neg, 2 sin, 2 cos."""
-    m_1, m_2, k10, k12, k18, k19 = k
+    m_1, m_2, k12, k14, k20, k21 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s3 = theta_1 + theta_2
     cos_theta_1_theta_2 = cos(s3)
@@ -335,24 +385,37 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     omega_lower = theta_1_dot + theta_2_dot
     sin_theta_1_theta_2 = sin(s3)
     sin_theta_1 = sin(theta_1)
-    s19 = k10 * (theta_1_dot * sin_theta_1)
-    yd_upper = k10 * (theta_1_dot * cos_theta_1)
-    s20 = k12 * (omega_lower * sin_theta_1_theta_2) + (s19 + s19)
-    yd_lower = k12 * (cos_theta_1_theta_2 * omega_lower) + (yd_upper + yd_upper)
-    y_upper = sin_theta_1 * k10
-    x_upper = cos_theta_1 * k10
-    s22 = yd_lower * (cos_theta_1_theta_2 * k12 + (x_upper + x_upper)) + s20 * (sin_theta_1_theta_2 * k12 + (y_upper + y_upper))
-    s23 = omega_lower * k18 + (m_1 * (yd_upper * x_upper + s19 * y_upper) + m_2 * s22)
+    s19 = k12 * (theta_1_dot * sin_theta_1)
+    yd_upper = k12 * (theta_1_dot * cos_theta_1)
+    s20 = k14 * (omega_lower * sin_theta_1_theta_2) + (s19 + s19)
+    yd_lower = k14 * (cos_theta_1_theta_2 * omega_lower) + (yd_upper + yd_upper)
+    y_upper = sin_theta_1 * k12
+    x_upper = cos_theta_1 * k12
+    s22 = yd_lower * (cos_theta_1_theta_2 * k14 + (x_upper + x_upper)) + s20 * (sin_theta_1_theta_2 * k14 + (y_upper + y_upper))
+    s23 = omega_lower * k20 + (m_1 * (yd_upper * x_upper + s19 * y_upper) + m_2 * s22)
     return (
         -(m_2 * s20 + m_1 * s19),
         m_2 * yd_lower + m_1 * yd_upper,
-        theta_1_dot * k19 + s23,
+        theta_1_dot * k21 + s23,
+    )
+
+
+def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """21 operations: 7 add, 10 mul, 2 sin, 2 cos."""
+    m_1, m_2, k12, k14, k22 = k
+    theta_1, theta_2, _, _ = y
+    s3 = theta_1 + theta_2
+    y_upper = sin(theta_1) * k12
+    x_upper = cos(theta_1) * k12
+    return (
+        (m_2 * (cos(s3) * k14 + (x_upper + x_upper)) + m_1 * x_upper) * k22,
+        k22 * (m_2 * (sin(s3) * k14 + (y_upper + y_upper)) + m_1 * y_upper),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """55 operations: 12 add, 6 sub, 30 mul, 1 div, 3 sin, 3 cos."""
-    k1, k2, k20, k3, k4, k5, k6, k7, k16, k21, k22, k23 = k
+    k1, k2, k23, k3, k4, k5, k6, k7, k18, k24, k25, k26 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
@@ -368,32 +431,111 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     s24 = k5 * (s1 + coupling_lower_upper * alpha_upper)
     sin_theta_1_theta_2 = sin(s3)
     sin_theta_1 = sin(theta_1)
-    s25 = k21 * (cos_theta_1_theta_2 * omega_lower_squared - s24 * sin_theta_1_theta_2)
+    s25 = k24 * (cos_theta_1_theta_2 * omega_lower_squared - s24 * sin_theta_1_theta_2)
     s26 = alpha_upper * sin_theta_1 + theta_1_dot_squared * cos_theta_1
     s27 = theta_1_dot_squared * sin_theta_1 - cos_theta_1 * alpha_upper
-    s28 = k21 * (omega_lower_squared * sin_theta_1_theta_2 + cos_theta_1_theta_2 * s24)
+    s28 = k24 * (omega_lower_squared * sin_theta_1_theta_2 + cos_theta_1_theta_2 * s24)
     return (
-        s25 + k22 * s26,
-        k22 * s27 + s28 - k23,
-        s25 + k20 * s26,
-        s28 + k20 * s27 - k16,
+        s25 + k25 * s26,
+        k25 * s27 + s28 - k26,
+        0.0,
+        s25 + k23 * s26,
+        s28 + k23 * s27 - k18,
+        0.0,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     """13 operations: 5 add, 4 mul, 2 sin, 2 cos."""
-    k10, k12 = k
+    k12, k14 = k
     theta_1, theta_2, _, _ = y
     s3 = theta_1 + theta_2
-    y_upper = sin(theta_1) * k10
-    x_upper = cos(theta_1) * k10
+    y_upper = sin(theta_1) * k12
+    x_upper = cos(theta_1) * k12
     return (
         x_upper,
         y_upper,
         theta_1,
-        cos(s3) * k12 + (x_upper + x_upper),
-        sin(s3) * k12 + (y_upper + y_upper),
+        cos(s3) * k14 + (x_upper + x_upper),
+        sin(s3) * k14 + (y_upper + y_upper),
         s3,
+    )
+
+
+def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """20 operations: 6 add, 8 mul, 2 neg, 2 sin, 2 cos."""
+    k12, k14 = k
+    theta_1, theta_2, theta_1_dot, theta_2_dot = y
+    s3 = theta_1 + theta_2
+    omega_lower = theta_1_dot + theta_2_dot
+    s19 = k12 * (theta_1_dot * sin(theta_1))
+    yd_upper = k12 * (theta_1_dot * cos(theta_1))
+    return (
+        -s19,
+        yd_upper,
+        theta_1_dot,
+        -(k14 * (omega_lower * sin(s3)) + (s19 + s19)),
+        k14 * (cos(s3) * omega_lower) + (yd_upper + yd_upper),
+        omega_lower,
+    )
+
+
+def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """123 operations: 29 add, 13 sub, 66 mul, 6 div, 5 neg, 1 sin, 3 cos."""
+    k1, k2, k23, k3, k4, k5, k6, k7, k18, k24, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41 = k
+    theta_1, theta_2, theta_1_dot, theta_2_dot = y
+    sin_theta_2 = sin(theta_2)
+    s29 = sin_theta_2 * sin_theta_2
+    pivot_upper = k1 + s29 * k2
+    cos_theta_2 = cos(theta_2)
+    coupling_lower_upper = cos_theta_2 * k3
+    cos_theta_1_theta_2 = cos(theta_1 + theta_2)
+    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    s1 = cos_theta_1_theta_2 * k4 + k3 * s15
+    s30 = coupling_lower_upper * s1
+    cos_theta_1 = cos(theta_1)
+    omega_lower = theta_1_dot + theta_2_dot
+    s31 = sin_theta_2 * (omega_lower * omega_lower)
+    alpha_upper = (k5 * s30 + k3 * s31 - cos_theta_1 * k6 - cos_theta_1 * k7) / pivot_upper
+    s32 = s1 + coupling_lower_upper * alpha_upper
+    s33 = (cos_theta_1 * k29 + alpha_upper * k27) / pivot_upper
+    s34 = cos_theta_2 * k32
+    s35 = cos_theta_1_theta_2 * k33 + s15 * k32
+    s36 = k5 * (s1 * s34 + coupling_lower_upper * s35) - s30 * k34 + s31 * k32 - cos_theta_1 * k28
+    s37 = (s36 - alpha_upper * (k30 + s29 * k31)) / pivot_upper
+    s38 = k5 * (s35 + (alpha_upper * s34 + coupling_lower_upper * s37)) - s32 * k34
+    s39 = cos_theta_2 * k24
+    s40 = s15 * k24
+    s41 = k5 * (s1 * s39 + coupling_lower_upper * s40) + s31 * k24 - cos_theta_1 * k18
+    s42 = (s41 - cos_theta_1 * k37 - alpha_upper * (k35 + s29 * k36)) / pivot_upper
+    s43 = cos_theta_2 * k38
+    s44 = cos_theta_1_theta_2 * k39 + s15 * k38
+    s45 = (k5 * (s1 * s43 + coupling_lower_upper * s44) - s30 * k40 + s31 * k38) / pivot_upper
+    s46 = k5 * (s44 + (alpha_upper * s43 + coupling_lower_upper * s45)) - s32 * k40
+    s47 = cos_theta_1_theta_2 * k24
+    s48 = k5 * (coupling_lower_upper * s47) - k23 * cos_theta_1 - cos_theta_1 * k41
+    s49 = s48 / pivot_upper
+    return (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        -s33,
+        s37,
+        s42,
+        s45,
+        s49,
+        s33 + k5 * (coupling_lower_upper * s33),
+        -(s37 + s38),
+        -(s42 + k5 * (s40 + (alpha_upper * s39 + coupling_lower_upper * s42))),
+        -(s45 + s46),
+        -(s49 + k5 * (s47 + coupling_lower_upper * s49)),
     )
 
 
@@ -468,15 +610,20 @@ def derivative(t, y, p=None, u=None):
 
 
 def jacobian(t, y, p=None, u=None):
-    """Exact Jacobian of `derivative` by the state: (4, 4), or (4, 4, k)."""
+    """Exact Jacobian of `derivative` by the state."""
     return _evaluate(_jacobian, "jacobian", (4, 4), ('sin', 'cos'), y, p, u)
 
 
+def parameter_jacobian(t, y, p=None, u=None):
+    """Exact Jacobian of `derivative` by the parameters."""
+    return _evaluate(_parameter_jacobian, "parameter_jacobian", (4, 5), ('sin', 'cos'), y, p, u)
+
+
 def _joined(q, v):
-    """[q, v], each of length 2 or with columns."""
+    """[q, v] of lengths 2 and 2, or with columns."""
     q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
-    if q.shape != v.shape or q.shape[:1] != (2,) or q.ndim > 2:
-        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (2,) both")
+    if q.shape != (2, *q.shape[1:]) or v.shape != (2, *q.shape[1:]) or q.ndim > 2:
+        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (2,) and (2,)")
     return np.concatenate((q, v))
 
 
@@ -515,6 +662,11 @@ def gravity_force(t, y, p=None, u=None):
     return _evaluate(_gravity_force, "gravity_force", (2,), ('cos',), y, p, u)
 
 
+def bias_force(t, y, p=None, u=None):
+    """h = V + G of M v̇ + h = F, (nv,)."""
+    return _evaluate(_bias_force, "bias_force", (2,), ('sin', 'cos'), y, p, u)
+
+
 def applied_force(t, y, p=None, u=None):
     """F of M v̇ + V + G = F, (nv,): applied forces and torques."""
     return _evaluate(_applied_force, "applied_force", (2,), (), y, p, u)
@@ -535,11 +687,21 @@ def momentum(t, y, p=None, u=None):
     return _evaluate(_momentum, "momentum", (3,), ('cos', 'sin'), y, p, u)
 
 
+def centre_of_mass(t, y, p=None, u=None):
+    """World place of the centre of mass of all bodies, m."""
+    return _evaluate(_centre_of_mass, "centre_of_mass", (2,), ('cos', 'sin'), y, p, u)
+
+
 def joint_forces(t, y, p=None, u=None):
-    """Force of each of `JOINTS` on its parent, world x and y, N."""
-    return _evaluate(_joint_forces, "joint_forces", (2, 2), ('sin', 'cos'), y, p, u)
+    """What each of `JOINTS` puts on its parent: world x, y (N), moment (N m)."""
+    return _evaluate(_joint_forces, "joint_forces", (2, 3), ('sin', 'cos'), y, p, u)
 
 
 def body_poses(t, y, p=None, u=None):
     """World x, y (m) of each centre of mass and angle (rad), a row a body."""
     return _evaluate(_body_poses, "body_poses", (2, 3), ('cos', 'sin'), y, p, u)
+
+
+def body_velocities(t, y, p=None, u=None):
+    """World velocity x, y (m/s) of each centre of mass and rate of turn (rad/s)."""
+    return _evaluate(_body_velocities, "body_velocities", (2, 3), ('cos', 'sin'), y, p, u)

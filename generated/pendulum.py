@@ -8,8 +8,8 @@ State y, in this order:
 
 Parameters p, with the scene's values:
     bob_mass = 1.0          kg     mass of bob
-    pivot_r_child_x = -1.0  m      pin from the child's centre of mass of pivot, x
-    gravity_g = 9.81        m/s^2  gravitational acceleration, along -y of gravity
+    pivot_r_child_x = -1.0  m      joint from the child's centre of mass of pivot, x
+    gravity_g = 9.81        m/s^2  gravitational acceleration, downwards of gravity
 
 Effects: gravity.
 One call of `derivative` takes 3 operations: 2 mul, 1 cos; 5 more on parameters alone are done once.
@@ -26,11 +26,13 @@ import numpy as np
 
 NAME = "pendulum"
 FORM = "velocity"
+DIMENSIONS = 2
 STATES = (
     "theta",
     "theta_dot",
 )
 POSITIONS = (0,)
+QUATERNIONS = ()
 INPUTS = {
 }
 PARAMETERS = {
@@ -48,21 +50,26 @@ UNITS = {
 EFFECTS = ('gravity',)
 BODIES = ('bob',)
 JOINTS = ('pivot',)
+POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"mul": 2, "cos": 1, "total": 3, "parameters": 5},
-    "jacobian": {"mul": 2, "neg": 1, "sin": 1, "total": 4, "parameters": 5},
+    "jacobian": {"mul": 1, "neg": 1, "sin": 1, "total": 3, "parameters": 6},
     "forward_dynamics": {"add": 1, "mul": 2, "cos": 1, "total": 4, "parameters": 5},
     "inverse_dynamics": {"sub": 1, "mul": 2, "cos": 1, "total": 4, "parameters": 4},
     "mass_matrix": {"total": 0, "parameters": 2},
     "velocity_force": {"total": 0, "parameters": 0},
     "gravity_force": {"mul": 1, "neg": 1, "cos": 1, "total": 3, "parameters": 2},
+    "bias_force": {"mul": 1, "neg": 1, "cos": 1, "total": 3, "parameters": 2},
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 1, "mul": 7, "sin": 1, "cos": 1, "total": 10, "parameters": 1},
     "potential_energy": {"mul": 2, "neg": 1, "sin": 1, "total": 4, "parameters": 1},
     "momentum": {"add": 1, "mul": 11, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 0},
+    "centre_of_mass": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
     "joint_forces": {"add": 1, "sub": 2, "mul": 9, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 6},
     "body_poses": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
+    "body_velocities": {"mul": 4, "neg": 1, "sin": 1, "cos": 1, "total": 7, "parameters": 0},
+    "parameter_jacobian": {"sub": 2, "mul": 6, "cos": 1, "total": 9, "parameters": 16},
 }
 
 
@@ -72,27 +79,38 @@ def _constants(values):
     bob_mass, pivot_r_child_x, gravity_g = values
     if not bob_mass > 0.0:
         raise ValueError("mass of bob is not positive: change the parameters")
-    pivot_bob = bob_mass * (pivot_r_child_x * pivot_r_child_x)
-    k5 = bob_mass * pivot_r_child_x
-    k1 = gravity_g * k5
+    pivot_r_child_x_squared = pivot_r_child_x * pivot_r_child_x
+    pivot_bob = bob_mass * pivot_r_child_x_squared
+    k6 = bob_mass * pivot_r_child_x
+    k1 = gravity_g * k6
     k2 = 1.0 / pivot_bob
-    k3 = bob_mass / 2.0
-    k4 = bob_mass * gravity_g
+    k3 = k1 * k2
+    k4 = bob_mass / 2.0
+    k5 = bob_mass * gravity_g
+    k7 = pivot_r_child_x_squared * k2 / pivot_bob
+    k8 = gravity_g * (pivot_r_child_x * k2)
+    k9 = k2 * (bob_mass * (pivot_r_child_x * 2.0)) / pivot_bob
+    k10 = k2 * k5
+    k11 = k6 * k2
     return {
         "initial_state": (),
         "derivative": (k1, k2),
-        "jacobian": (k1, k2),
+        "jacobian": (k3,),
         "forward_dynamics": (k1, k2),
         "inverse_dynamics": (pivot_bob, k1),
         "mass_matrix": (pivot_bob,),
         "velocity_force": (),
         "gravity_force": (k1,),
+        "bias_force": (k1,),
         "applied_force": (),
-        "kinetic_energy": (pivot_r_child_x, k3),
-        "potential_energy": (pivot_r_child_x, k4),
+        "kinetic_energy": (pivot_r_child_x, k4),
+        "potential_energy": (pivot_r_child_x, k5),
         "momentum": (bob_mass, pivot_r_child_x),
-        "joint_forces": (k5, k1, k2, k4),
+        "centre_of_mass": (pivot_r_child_x,),
+        "joint_forces": (k6, k1, k2, k5),
         "body_poses": (pivot_r_child_x,),
+        "body_velocities": (pivot_r_child_x,),
+        "parameter_jacobian": (k1, k7, k8, k9, k10, k11),
     }
 
 
@@ -115,13 +133,13 @@ def _derivative(y, k, u=(), extra=(), cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin):
-    """4 operations: 2 mul, 1 neg, 1 sin."""
-    k1, k2 = k
+    """3 operations: 1 mul, 1 neg, 1 sin."""
+    k3, = k
     theta, _ = y
     return (
         0.0,
         1.0,
-        -k2 * (k1 * sin(theta)),
+        -sin(theta) * k3,
         0.0,
     )
 
@@ -170,6 +188,15 @@ def _gravity_force(y, k, u=(), extra=(), cos=cos):
     )
 
 
+def _bias_force(y, k, u=(), extra=(), cos=cos):
+    """3 operations: 1 mul, 1 neg, 1 cos."""
+    k1, = k
+    theta, _ = y
+    return (
+        -cos(theta) * k1,
+    )
+
+
 def _applied_force(y, k, u=(), extra=()):
     """0 operations."""
     return (
@@ -179,21 +206,21 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     """10 operations: 1 add, 7 mul, 1 sin, 1 cos."""
-    pivot_r_child_x, k3 = k
+    pivot_r_child_x, k4 = k
     theta, theta_dot = y
     xd_bob = pivot_r_child_x * (theta_dot * sin(theta))
     s1 = pivot_r_child_x * (theta_dot * cos(theta))
     return (
-        (xd_bob * xd_bob + s1 * s1) * k3,
+        (xd_bob * xd_bob + s1 * s1) * k4,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """4 operations: 2 mul, 1 neg, 1 sin."""
-    pivot_r_child_x, k4 = k
+    pivot_r_child_x, k5 = k
     theta, _ = y
     return (
-        -pivot_r_child_x * sin(theta) * k4,
+        -pivot_r_child_x * sin(theta) * k5,
     )
 
 
@@ -213,17 +240,28 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
+def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """6 operations: 2 mul, 2 neg, 1 sin, 1 cos."""
+    pivot_r_child_x, = k
+    theta, _ = y
+    return (
+        -pivot_r_child_x * cos(theta),
+        -pivot_r_child_x * sin(theta),
+    )
+
+
 def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
     """15 operations: 1 add, 2 sub, 9 mul, 1 neg, 1 sin, 1 cos."""
-    k5, k1, k2, k4 = k
+    k6, k1, k2, k5 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
     alpha_bob = cos_theta * k1 * k2
     sin_theta = sin(theta)
     theta_dot_squared = theta_dot * theta_dot
     return (
-        -k5 * (alpha_bob * sin_theta + cos_theta * theta_dot_squared),
-        k5 * (cos_theta * alpha_bob - sin_theta * theta_dot_squared) - k4,
+        -k6 * (alpha_bob * sin_theta + cos_theta * theta_dot_squared),
+        k6 * (cos_theta * alpha_bob - sin_theta * theta_dot_squared) - k5,
+        0.0,
     )
 
 
@@ -235,6 +273,33 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         -pivot_r_child_x * cos(theta),
         -pivot_r_child_x * sin(theta),
         theta,
+    )
+
+
+def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """7 operations: 4 mul, 1 neg, 1 sin, 1 cos."""
+    pivot_r_child_x, = k
+    theta, theta_dot = y
+    return (
+        pivot_r_child_x * (theta_dot * sin(theta)),
+        -pivot_r_child_x * (theta_dot * cos(theta)),
+        theta_dot,
+    )
+
+
+def _parameter_jacobian(y, k, u=(), extra=(), cos=cos):
+    """9 operations: 2 sub, 6 mul, 1 cos."""
+    k1, k7, k8, k9, k10, k11 = k
+    theta, _ = y
+    cos_theta = cos(theta)
+    load_bob = cos_theta * k1
+    return (
+        0.0,
+        0.0,
+        0.0,
+        cos_theta * k8 - load_bob * k7,
+        cos_theta * k10 - load_bob * k9,
+        cos_theta * k11,
     )
 
 
@@ -309,15 +374,20 @@ def derivative(t, y, p=None, u=None):
 
 
 def jacobian(t, y, p=None, u=None):
-    """Exact Jacobian of `derivative` by the state: (2, 2), or (2, 2, k)."""
+    """Exact Jacobian of `derivative` by the state."""
     return _evaluate(_jacobian, "jacobian", (2, 2), ('sin',), y, p, u)
 
 
+def parameter_jacobian(t, y, p=None, u=None):
+    """Exact Jacobian of `derivative` by the parameters."""
+    return _evaluate(_parameter_jacobian, "parameter_jacobian", (2, 3), ('cos',), y, p, u)
+
+
 def _joined(q, v):
-    """[q, v], each of length 1 or with columns."""
+    """[q, v] of lengths 1 and 1, or with columns."""
     q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
-    if q.shape != v.shape or q.shape[:1] != (1,) or q.ndim > 2:
-        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (1,) both")
+    if q.shape != (1, *q.shape[1:]) or v.shape != (1, *q.shape[1:]) or q.ndim > 2:
+        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (1,) and (1,)")
     return np.concatenate((q, v))
 
 
@@ -356,6 +426,11 @@ def gravity_force(t, y, p=None, u=None):
     return _evaluate(_gravity_force, "gravity_force", (1,), ('cos',), y, p, u)
 
 
+def bias_force(t, y, p=None, u=None):
+    """h = V + G of M v̇ + h = F, (nv,)."""
+    return _evaluate(_bias_force, "bias_force", (1,), ('cos',), y, p, u)
+
+
 def applied_force(t, y, p=None, u=None):
     """F of M v̇ + V + G = F, (nv,): applied forces and torques."""
     return _evaluate(_applied_force, "applied_force", (1,), (), y, p, u)
@@ -376,11 +451,21 @@ def momentum(t, y, p=None, u=None):
     return _evaluate(_momentum, "momentum", (3,), ('cos', 'sin'), y, p, u)
 
 
+def centre_of_mass(t, y, p=None, u=None):
+    """World place of the centre of mass of all bodies, m."""
+    return _evaluate(_centre_of_mass, "centre_of_mass", (2,), ('cos', 'sin'), y, p, u)
+
+
 def joint_forces(t, y, p=None, u=None):
-    """Force of each of `JOINTS` on its parent, world x and y, N."""
-    return _evaluate(_joint_forces, "joint_forces", (1, 2), ('cos', 'sin'), y, p, u)
+    """What each of `JOINTS` puts on its parent: world x, y (N), moment (N m)."""
+    return _evaluate(_joint_forces, "joint_forces", (1, 3), ('cos', 'sin'), y, p, u)
 
 
 def body_poses(t, y, p=None, u=None):
     """World x, y (m) of each centre of mass and angle (rad), a row a body."""
     return _evaluate(_body_poses, "body_poses", (1, 3), ('cos', 'sin'), y, p, u)
+
+
+def body_velocities(t, y, p=None, u=None):
+    """World velocity x, y (m/s) of each centre of mass and rate of turn (rad/s)."""
+    return _evaluate(_body_velocities, "body_velocities", (1, 3), ('cos', 'sin'), y, p, u)

@@ -22,7 +22,7 @@ Parameters p, with the scene's values:
     g = 9.81    m/s^2   gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 46 operations: 10 add, 3 sub, 25 mul, 1 div, 1 neg, 3 sin, 3 cos; 35
+One call of `derivative` takes 46 operations: 10 add, 3 sub, 25 mul, 1 div, 1 neg, 3 sin, 3 cos; 37
 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -37,6 +37,7 @@ import numpy as np
 
 NAME = "two_body"
 FORM = "velocity"
+DIMENSIONS = 2
 STATES = (
     "x_A",
     "y_A",
@@ -48,6 +49,7 @@ STATES = (
     "phi_dot",
 )
 POSITIONS = (0, 1, 2, 3)
+QUATERNIONS = ()
 INPUTS = {
 }
 PARAMETERS = {
@@ -79,21 +81,26 @@ UNITS = {
 EFFECTS = ('gravity',)
 BODIES = ('A', 'B')
 JOINTS = ('hinge',)
+POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 10, "sub": 3, "mul": 25, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 46, "parameters": 35},
-    "jacobian": {"add": 24, "sub": 13, "mul": 80, "div": 4, "neg": 3, "sin": 3, "cos": 3, "total": 130, "parameters": 35},
-    "forward_dynamics": {"add": 12, "sub": 10, "mul": 33, "div": 1, "sin": 3, "cos": 3, "total": 62, "parameters": 36},
+    "derivative": {"add": 10, "sub": 3, "mul": 25, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 46, "parameters": 37},
+    "jacobian": {"add": 24, "sub": 13, "mul": 79, "div": 4, "neg": 3, "sin": 3, "cos": 3, "total": 129, "parameters": 38},
+    "forward_dynamics": {"add": 12, "sub": 10, "mul": 33, "div": 1, "sin": 3, "cos": 3, "total": 62, "parameters": 38},
     "inverse_dynamics": {"add": 19, "sub": 8, "mul": 37, "sin": 3, "cos": 3, "total": 70, "parameters": 20},
     "mass_matrix": {"add": 5, "mul": 6, "neg": 2, "sin": 2, "cos": 3, "total": 18, "parameters": 15},
     "velocity_force": {"add": 4, "sub": 1, "mul": 14, "neg": 2, "sin": 3, "cos": 2, "total": 26, "parameters": 3},
     "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 7},
+    "bias_force": {"add": 6, "sub": 3, "mul": 16, "neg": 1, "sin": 3, "cos": 2, "total": 31, "parameters": 8},
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
     "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
-    "joint_forces": {"add": 9, "sub": 2, "mul": 25, "div": 1, "sin": 3, "cos": 3, "total": 43, "parameters": 34},
+    "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
+    "joint_forces": {"add": 9, "sub": 2, "mul": 25, "div": 1, "sin": 3, "cos": 3, "total": 43, "parameters": 36},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 0},
+    "body_velocities": {"add": 4, "sub": 2, "mul": 8, "sin": 2, "cos": 2, "total": 18, "parameters": 0},
+    "parameter_jacobian": {"add": 45, "sub": 27, "mul": 140, "div": 7, "neg": 6, "sin": 3, "cos": 3, "total": 231, "parameters": 129},
 }
 
 
@@ -111,53 +118,99 @@ def _constants(values):
         raise ValueError("inertia_com of B is negative: change the parameters")
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
-    k25 = m_A * m_B
-    k26 = l_B_squared * k25
-    k27 = k26 + I_B * mass_A
-    k28 = m_A * I_A
+    k48 = m_A * m_B
+    k49 = l_B_squared * k48
+    k50 = k49 / mass_A
+    pivot_B = I_B + k50
+    k51 = m_A * I_B
+    k52 = m_B * I_B
+    k53 = k49 + (k51 + k52)
+    k54 = m_A * I_A
+    k55 = I_A * m_B
+    k56 = m_B * k54
     l_A_squared = l_A * l_A
-    k29 = l_A_squared * (I_B * k25) + (l_B_squared * (m_B * k28) + I_B * (k28 + I_A * m_B))
-    k1 = k29 / k27
-    k2 = m_B * m_B * (m_A * m_A * (l_B_squared * l_A_squared)) / (mass_A * k27)
-    k30 = l_A * k25
-    k3 = l_B * k30 / mass_A
-    k4 = 1.0 / (I_B + k26 / mass_A)
-    k8 = m_B * l_A
-    k5 = k8 / mass_A
-    k9 = m_B * l_B
-    k6 = k9 / mass_A
-    k7 = 1.0 / mass_A
-    k21 = m_A * g
-    k22 = m_B * g
-    k10 = k21 + k22
-    k31 = m_B * l_B_squared
-    k11 = l_B * k8
-    k12 = I_B + k31
-    k13 = l_B * (l_A * (m_B * 2.0))
-    k14 = k31 + (m_B * l_A_squared + (I_A + I_B))
-    k15 = g * k8
+    k57 = I_B * k48
+    k58 = k54 + k55
+    k1 = (l_A_squared * k57 + (l_B_squared * k56 + I_B * k58)) / k53
+    m_A_squared = m_A * m_A
+    m_B_squared = m_B * m_B
+    k59 = l_B_squared * l_A_squared
+    k60 = m_A_squared * k59
+    k61 = mass_A * k53
+    k2 = m_B_squared * k60 / k61
+    k62 = l_A * k48
+    k3 = l_B * k62 / mass_A
+    k4 = 1.0 / pivot_B
+    k9 = m_B * l_A
+    k5 = k9 / mass_A
+    k10 = m_B * l_B
+    k6 = k10 / mass_A
+    k7 = k2 * 2.0
+    k8 = 1.0 / mass_A
+    k22 = m_A * g
+    k23 = m_B * g
+    k11 = k22 + k23
+    k63 = m_B * l_B_squared
+    k12 = l_B * k9
+    k13 = I_B + k63
+    k64 = m_B * 2.0
+    k14 = k64 * (l_A * l_B)
+    k15 = I_B + (I_A + (k63 + m_B * l_A_squared))
     k16 = g * k9
-    k17 = I_A / 2.0
-    k18 = I_B / 2.0
-    k19 = m_A / 2.0
-    k20 = m_B / 2.0
-    k23 = k30 / mass_A
-    k24 = l_B * k25 / mass_A
+    k17 = g * k10
+    k18 = I_A / 2.0
+    k19 = I_B / 2.0
+    k20 = m_A / 2.0
+    k21 = m_B / 2.0
+    k24 = k62 / mass_A
+    k25 = l_B * k48 / mass_A
+    k65 = I_A * I_B
+    k26 = (k52 * l_A_squared + (k65 + l_B_squared * k55) - k1 * k13) / k53
+    k27 = (m_B_squared * (k59 * (m_A * 2.0)) - k2 * (k53 + mass_A * k13)) / k61
+    k28 = (k12 - k3) / mass_A
+    k29 = k4 * ((k63 - k50) / mass_A) / pivot_B
+    k30 = k5 / mass_A
+    k31 = k6 / mass_A
+    k32 = k53 / k53
+    k66 = m_A * l_B_squared
+    k67 = I_B + k66
+    k33 = (k51 * l_A_squared + (k65 + l_B_squared * k54) - k1 * k67) / k53
+    k34 = (k60 * k64 - k2 * (k53 + mass_A * k67)) / k61
+    k35 = (l_B * (m_A * l_A) - k3) / mass_A
+    k36 = k4 * ((k66 - k50) / mass_A) / pivot_B
+    k37 = (l_A - k5) / mass_A
+    k38 = (l_B - k6) / mass_A
+    k39 = (k58 + k48 * l_A_squared - mass_A * k1) / k53
+    k40 = k2 * (mass_A * mass_A) / k61
+    k41 = k4 / pivot_B
+    k68 = l_A * 2.0
+    k42 = k57 * k68 / k53
+    k43 = m_B_squared * (m_A_squared * (l_B_squared * k68)) / k61
+    k44 = m_B / mass_A
+    k69 = l_B * 2.0
+    k70 = k48 * k69
+    k45 = (k56 * k69 - k1 * k70) / k53
+    k46 = (m_B_squared * (m_A_squared * (l_A_squared * k69)) - k2 * (mass_A * k70)) / k61
+    k47 = k4 * (k70 / mass_A) / pivot_B
     return {
         "initial_state": (),
         "derivative": (g, k1, k2, k3, k4, k5, k6),
-        "jacobian": (k1, k2, k3, k4, k5, k6),
-        "forward_dynamics": (g, k1, k2, k3, k4, k5, k6, k7),
-        "inverse_dynamics": (mass_A, k8, k9, k10, k11, k12, k13, k14, k15, k16),
-        "mass_matrix": (mass_A, k8, k9, k11, k12, k13, k14),
-        "velocity_force": (k8, k9, k11),
-        "gravity_force": (k10, k15, k16),
+        "jacobian": (k1, k2, k3, k4, k5, k6, k7),
+        "forward_dynamics": (g, k1, k2, k3, k4, k5, k6, k8),
+        "inverse_dynamics": (mass_A, k9, k10, k11, k12, k13, k14, k15, k16, k17),
+        "mass_matrix": (mass_A, k9, k10, k12, k13, k14, k15),
+        "velocity_force": (k9, k10, k12),
+        "gravity_force": (k11, k16, k17),
+        "bias_force": (k9, k10, k11, k12, k16, k17),
         "applied_force": (),
-        "kinetic_energy": (l_A, l_B, k17, k18, k19, k20),
-        "potential_energy": (l_A, l_B, k21, k22),
+        "kinetic_energy": (l_A, l_B, k18, k19, k20, k21),
+        "potential_energy": (l_A, l_B, k22, k23),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
-        "joint_forces": (k1, k2, k3, k4, k23, k24),
+        "centre_of_mass": (m_A, m_B, l_A, l_B, k8),
+        "joint_forces": (k1, k2, k3, k4, k24, k25),
         "body_poses": (l_A, l_B),
+        "body_velocities": (l_A, l_B),
+        "parameter_jacobian": (k1, k2, k3, k4, k5, k6, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47),
     }
 
 
@@ -206,8 +259,8 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """130 operations: 24 add, 13 sub, 80 mul, 4 div, 3 neg, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6 = k
+    """129 operations: 24 add, 13 sub, 79 mul, 4 div, 3 neg, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k7 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     pivot_A = k1 + sin_phi * sin_phi * k2
@@ -230,7 +283,7 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     s8 = cos_theta_phi * s3
     s9 = sin_phi * k3
     s10 = k3 * (cos_phi * theta_dot_squared)
-    s11 = k4 * (coupling_B_A * s10 - s2 * s9) + k3 * (cos_phi * omega_B_squared) - alpha_A * (k2 * (2.0 * (sin_phi * cos_phi)))
+    s11 = k4 * (coupling_B_A * s10 - s2 * s9) + k3 * (cos_phi * omega_B_squared) - alpha_A * (sin_phi * cos_phi * k7)
     s12 = s11 / pivot_A
     s13 = k4 * (s10 + (coupling_B_A * s12 - alpha_A * s9))
     s14 = theta_dot * 2.0
@@ -313,7 +366,7 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """62 operations: 12 add, 10 sub, 33 mul, 1 div, 3 sin, 3 cos."""
-    g, k1, k2, k3, k4, k5, k6, k7 = k
+    g, k1, k2, k3, k4, k5, k6, k8 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     tau__x_A, tau__y_A, tau__theta, tau__phi = extra
     sin_phi = sin(phi)
@@ -330,8 +383,8 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     s24 = k3 * (sin_phi * omega_B_squared) + (tau__theta + k5 * (tau__x_A * sin_theta - tau__y_A * cos_theta))
     alpha_A_2 = (s24 - tau__phi - k4 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k4 * (load_B - coupling_B_A * alpha_A_2)
-    s25 = tau__x_A * k7 + k5 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_2)
-    s26 = tau__y_A * k7 + k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_2)
+    s25 = tau__x_A * k8 + k5 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_2)
+    s26 = tau__y_A * k8 + k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_2)
     return (
         k6 * (cos_theta_phi * omega_B_squared + sin_theta_phi * alpha_B) + s25,
         k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s26 - g,
@@ -342,7 +395,7 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """70 operations: 19 add, 8 sub, 37 mul, 3 sin, 3 cos."""
-    mass_A, k8, k9, k10, k11, k12, k13, k14, k15, k16 = k
+    mass_A, k9, k10, k11, k12, k13, k14, k15, k16, k17 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     x_A_ddot, y_A_ddot, theta_ddot, phi_ddot = extra
     sin_phi = sin(phi)
@@ -356,34 +409,34 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s28 = sin_theta * k8 + sin_theta_phi * k9
-    s29 = x_A_ddot * mass_A - theta_ddot * s28 - k8 * (theta_dot_squared * cos_theta)
-    s30 = cos_theta * k8 + cos_theta_phi * k9
-    s31 = k9 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s30 + k10))
-    s32 = cos_phi * k11 + k12
-    s33 = y_A_ddot * s30 + (phi_ddot * s32 + theta_ddot * (cos_phi * k13 + k14)) - x_A_ddot * s28
-    s34 = cos_theta_phi * k16
-    s35 = k9 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s34 + (theta_ddot * s32 + phi_ddot * k12))
+    s28 = sin_theta * k9 + sin_theta_phi * k10
+    s29 = x_A_ddot * mass_A - theta_ddot * s28 - k9 * (theta_dot_squared * cos_theta)
+    s30 = cos_theta * k9 + cos_theta_phi * k10
+    s31 = k10 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s30 + k11))
+    s32 = cos_phi * k12 + k13
+    s33 = y_A_ddot * s30 + (phi_ddot * s32 + theta_ddot * (cos_phi * k14 + k15)) - x_A_ddot * s28
+    s34 = cos_theta_phi * k17
+    s35 = k10 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s34 + (theta_ddot * s32 + phi_ddot * k13))
     return (
-        s29 - k9 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
-        s31 - k8 * (theta_dot_squared * sin_theta),
-        k11 * (s27 - sin_phi * omega_B_squared) + (s34 + (s33 + cos_theta * k15)),
-        s27 * k11 + s35,
+        s29 - k10 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
+        s31 - k9 * (theta_dot_squared * sin_theta),
+        k12 * (s27 - sin_phi * omega_B_squared) + (s34 + (s33 + cos_theta * k16)),
+        s27 * k12 + s35,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
     """18 operations: 5 add, 6 mul, 2 neg, 2 sin, 3 cos."""
-    mass_A, k8, k9, k11, k12, k13, k14 = k
+    mass_A, k9, k10, k12, k13, k14, k15 = k
     _, _, theta, phi, _, _, _, _ = y
     cos_phi = cos(phi)
     s1 = theta + phi
-    s36 = sin(s1) * k9
+    s36 = sin(s1) * k10
     s37 = -s36
-    s38 = -(sin(theta) * k8 + s36)
-    s39 = cos(s1) * k9
-    s30 = cos(theta) * k8 + s39
-    s32 = cos_phi * k11 + k12
+    s38 = -(sin(theta) * k9 + s36)
+    s39 = cos(s1) * k10
+    s30 = cos(theta) * k9 + s39
+    s32 = cos_phi * k12 + k13
     return (
         mass_A,
         0.0,
@@ -395,18 +448,18 @@ def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
         s39,
         s38,
         s30,
-        cos_phi * k13 + k14,
+        cos_phi * k14 + k15,
         s32,
         s37,
         s39,
         s32,
-        k12,
+        k13,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     """26 operations: 4 add, 1 sub, 14 mul, 2 neg, 3 sin, 2 cos."""
-    k8, k9, k11 = k
+    k9, k10, k12 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     s1 = theta + phi
@@ -414,24 +467,48 @@ def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     s27 = sin_phi * theta_dot_squared
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
+    s40 = k9 * (theta_dot_squared * cos(theta)) + k10 * (cos(s1) * omega_B_squared)
+    s41 = k9 * (theta_dot_squared * sin(theta)) + k10 * (sin(s1) * omega_B_squared)
     return (
-        -(k8 * (theta_dot_squared * cos(theta)) + k9 * (cos(s1) * omega_B_squared)),
-        -(k8 * (theta_dot_squared * sin(theta)) + k9 * (sin(s1) * omega_B_squared)),
-        k11 * (s27 - sin_phi * omega_B_squared),
-        s27 * k11,
+        -s40,
+        -s41,
+        k12 * (s27 - sin_phi * omega_B_squared),
+        s27 * k12,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
-    k10, k15, k16 = k
+    k11, k16, k17 = k
     _, _, theta, phi, _, _, _, _ = y
-    s34 = cos(theta + phi) * k16
+    s34 = cos(theta + phi) * k17
     return (
         0.0,
-        k10,
-        cos(theta) * k15 + s34,
+        k11,
+        cos(theta) * k16 + s34,
         s34,
+    )
+
+
+def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """31 operations: 6 add, 3 sub, 16 mul, 1 neg, 3 sin, 2 cos."""
+    k9, k10, k11, k12, k16, k17 = k
+    _, _, theta, phi, _, _, theta_dot, phi_dot = y
+    sin_phi = sin(phi)
+    s1 = theta + phi
+    cos_theta_phi = cos(s1)
+    theta_dot_squared = theta_dot * theta_dot
+    s27 = sin_phi * theta_dot_squared
+    cos_theta = cos(theta)
+    omega_B = theta_dot + phi_dot
+    omega_B_squared = omega_B * omega_B
+    s34 = cos_theta_phi * k17
+    s40 = k9 * (theta_dot_squared * cos_theta) + k10 * (cos_theta_phi * omega_B_squared)
+    return (
+        -s40,
+        k11 - k9 * (theta_dot_squared * sin(theta)) - k10 * (sin(s1) * omega_B_squared),
+        k12 * (s27 - sin_phi * omega_B_squared) + (cos_theta * k16 + s34),
+        s34 + s27 * k12,
     )
 
 
@@ -447,24 +524,24 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
     """33 operations: 9 add, 2 sub, 18 mul, 2 sin, 2 cos."""
-    l_A, l_B, k17, k18, k19, k20 = k
+    l_A, l_B, k18, k19, k20, k21 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
     xd_B = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
     yd_B = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
-    s40 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k19 + (theta_dot * theta_dot * k17 + omega_B * omega_B * k18)
+    s42 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k20 + (theta_dot * theta_dot * k18 + omega_B * omega_B * k19)
     return (
-        (xd_B * xd_B + yd_B * yd_B) * k20 + s40,
+        (xd_B * xd_B + yd_B * yd_B) * k21 + s42,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """10 operations: 4 add, 4 mul, 2 sin."""
-    l_A, l_B, k21, k22 = k
+    l_A, l_B, k22, k23 = k
     _, y_A, theta, phi, _, _, _, _ = y
     return (
-        y_A * k21 + k22 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
+        y_A * k22 + k23 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
     )
 
 
@@ -480,18 +557,29 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     omega_B = theta_dot + phi_dot
     xd_B = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
     yd_B = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
-    s41 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
-    s42 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
+    s43 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
+    s44 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
         m_A * x_A_dot + m_B * xd_B,
         m_A * y_A_dot + m_B * yd_B,
-        m_B * s41 + s42,
+        m_B * s43 + s44,
+    )
+
+
+def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """21 operations: 7 add, 10 mul, 2 sin, 2 cos."""
+    m_A, m_B, l_A, l_B, k8 = k
+    x_A, y_A, theta, phi, _, _, _, _ = y
+    s1 = theta + phi
+    return (
+        k8 * (m_A * x_A + m_B * (l_B * cos(s1) + (x_A + l_A * cos(theta)))),
+        k8 * (m_A * y_A + m_B * (l_B * sin(s1) + (y_A + l_A * sin(theta)))),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """43 operations: 9 add, 2 sub, 25 mul, 1 div, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k23, k24 = k
+    k1, k2, k3, k4, k24, k25 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     coupling_B_A = cos(phi) * k3
@@ -507,8 +595,9 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     alpha_A = (k4 * (coupling_B_A * s2) + k3 * (sin_phi * omega_B_squared)) / (k1 + sin_phi * sin_phi * k2)
     s3 = k4 * (s2 + coupling_B_A * alpha_A)
     return (
-        (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k23 + (cos_theta_phi * omega_B_squared - sin_theta_phi * s3) * k24,
-        (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k23 + (sin_theta_phi * omega_B_squared + cos_theta_phi * s3) * k24,
+        (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k24 + (cos_theta_phi * omega_B_squared - sin_theta_phi * s3) * k25,
+        (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k24 + (sin_theta_phi * omega_B_squared + cos_theta_phi * s3) * k25,
+        0.0,
     )
 
 
@@ -524,6 +613,134 @@ def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
         l_B * cos(s1) + (x_A + l_A * cos(theta)),
         l_B * sin(s1) + (y_A + l_A * sin(theta)),
         s1,
+    )
+
+
+def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """18 operations: 4 add, 2 sub, 8 mul, 2 sin, 2 cos."""
+    l_A, l_B = k
+    _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
+    s1 = theta + phi
+    omega_B = theta_dot + phi_dot
+    return (
+        x_A_dot,
+        y_A_dot,
+        theta_dot,
+        x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B),
+        l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta))),
+        omega_B,
+    )
+
+
+def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """231 operations: 45 add, 27 sub, 140 mul, 7 div, 6 neg, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47 = k
+    _, _, theta, phi, _, _, theta_dot, phi_dot = y
+    sin_phi = sin(phi)
+    s45 = sin_phi * sin_phi
+    pivot_A = k1 + s45 * k2
+    cos_phi = cos(phi)
+    coupling_B_A = cos_phi * k3
+    s1 = theta + phi
+    sin_theta_phi = sin(s1)
+    cos_theta_phi = cos(s1)
+    theta_dot_squared = theta_dot * theta_dot
+    s27 = sin_phi * theta_dot_squared
+    s2 = k3 * s27
+    s46 = coupling_B_A * s2
+    sin_theta = sin(theta)
+    cos_theta = cos(theta)
+    omega_B = theta_dot + phi_dot
+    omega_B_squared = omega_B * omega_B
+    s47 = sin_phi * omega_B_squared
+    alpha_A = (k4 * s46 + k3 * s47) / pivot_A
+    s48 = s2 + coupling_B_A * alpha_A
+    s3 = k4 * s48
+    s49 = sin_theta * alpha_A + theta_dot_squared * cos_theta
+    s50 = cos_theta_phi * omega_B_squared - sin_theta_phi * s3
+    s51 = theta_dot_squared * sin_theta - cos_theta * alpha_A
+    s52 = sin_theta_phi * omega_B_squared + cos_theta_phi * s3
+    s53 = cos_phi * k28
+    s54 = s27 * k28
+    s55 = k4 * (s2 * s53 + coupling_B_A * s54) - s46 * k29 + s47 * k28 - alpha_A * (k26 + s45 * k27)
+    s56 = s55 / pivot_A
+    s57 = k4 * (s54 + (alpha_A * s53 + coupling_B_A * s56)) - s48 * k29
+    s58 = alpha_A * k32 / pivot_A
+    s59 = k4 * (coupling_B_A * s58)
+    s60 = cos_phi * k35
+    s61 = s27 * k35
+    s62 = k4 * (s2 * s60 + coupling_B_A * s61) - s46 * k36 + s47 * k35 - alpha_A * (k33 + s45 * k34)
+    s63 = s62 / pivot_A
+    s64 = k4 * (s61 + (alpha_A * s60 + coupling_B_A * s63)) - s48 * k36
+    s65 = (s46 * k41 + alpha_A * (k39 - s45 * k40)) / pivot_A
+    s66 = s48 * k41 + k4 * (coupling_B_A * s65)
+    s67 = cos_phi * k25
+    s68 = s27 * k25
+    s69 = k4 * (s2 * s67 + coupling_B_A * s68) + s47 * k25 - alpha_A * (k42 + s45 * k43)
+    s70 = s69 / pivot_A
+    s71 = k4 * (s68 + (alpha_A * s67 + coupling_B_A * s70))
+    s72 = cos_phi * k24
+    s73 = s27 * k24
+    s74 = k4 * (s2 * s72 + coupling_B_A * s73) - s46 * k47 + s47 * k24 - alpha_A * (k45 + s45 * k46)
+    s75 = s74 / pivot_A
+    s76 = k4 * (s73 + (alpha_A * s72 + coupling_B_A * s75)) - s48 * k47
+    return (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        k5 * (sin_theta * s56) - s49 * k30 - (s50 * k31 + k6 * (sin_theta_phi * s57)),
+        k6 * (sin_theta_phi * s59) - k5 * (sin_theta * s58),
+        s49 * k37 + k5 * (sin_theta * s63) + (s50 * k38 - k6 * (sin_theta_phi * s64)),
+        k6 * (sin_theta_phi * s66) - k5 * (sin_theta * s65),
+        s49 * k44 + k5 * (sin_theta * s70) - k6 * (sin_theta_phi * s71),
+        k5 * (sin_theta * s75) + (s50 * k44 - k6 * (sin_theta_phi * s76)),
+        0.0,
+        k6 * (cos_theta_phi * s57) - s52 * k31 - (s51 * k30 + k5 * (cos_theta * s56)),
+        k5 * (cos_theta * s58) - k6 * (cos_theta_phi * s59),
+        s51 * k37 - k5 * (cos_theta * s63) + (s52 * k38 + k6 * (cos_theta_phi * s64)),
+        k5 * (cos_theta * s65) - k6 * (cos_theta_phi * s66),
+        s51 * k44 - k5 * (cos_theta * s70) + k6 * (cos_theta_phi * s71),
+        s52 * k44 + k6 * (cos_theta_phi * s76) - k5 * (cos_theta * s75),
+        -1.0,
+        s56,
+        -s58,
+        s63,
+        -s65,
+        s70,
+        s75,
+        0.0,
+        -(s56 + s57),
+        s58 + s59,
+        -(s63 + s64),
+        s65 + s66,
+        -(s70 + s71),
+        -(s75 + s76),
+        0.0,
     )
 
 
@@ -598,15 +815,20 @@ def derivative(t, y, p=None, u=None):
 
 
 def jacobian(t, y, p=None, u=None):
-    """Exact Jacobian of `derivative` by the state: (8, 8), or (8, 8, k)."""
+    """Exact Jacobian of `derivative` by the state."""
     return _evaluate(_jacobian, "jacobian", (8, 8), ('sin', 'cos'), y, p, u)
 
 
+def parameter_jacobian(t, y, p=None, u=None):
+    """Exact Jacobian of `derivative` by the parameters."""
+    return _evaluate(_parameter_jacobian, "parameter_jacobian", (8, 7), ('sin', 'cos'), y, p, u)
+
+
 def _joined(q, v):
-    """[q, v], each of length 4 or with columns."""
+    """[q, v] of lengths 4 and 4, or with columns."""
     q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
-    if q.shape != v.shape or q.shape[:1] != (4,) or q.ndim > 2:
-        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (4,) both")
+    if q.shape != (4, *q.shape[1:]) or v.shape != (4, *q.shape[1:]) or q.ndim > 2:
+        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (4,) and (4,)")
     return np.concatenate((q, v))
 
 
@@ -645,6 +867,11 @@ def gravity_force(t, y, p=None, u=None):
     return _evaluate(_gravity_force, "gravity_force", (4,), ('cos',), y, p, u)
 
 
+def bias_force(t, y, p=None, u=None):
+    """h = V + G of M v̇ + h = F, (nv,)."""
+    return _evaluate(_bias_force, "bias_force", (4,), ('sin', 'cos'), y, p, u)
+
+
 def applied_force(t, y, p=None, u=None):
     """F of M v̇ + V + G = F, (nv,): applied forces and torques."""
     return _evaluate(_applied_force, "applied_force", (4,), (), y, p, u)
@@ -665,11 +892,21 @@ def momentum(t, y, p=None, u=None):
     return _evaluate(_momentum, "momentum", (3,), ('sin', 'cos'), y, p, u)
 
 
+def centre_of_mass(t, y, p=None, u=None):
+    """World place of the centre of mass of all bodies, m."""
+    return _evaluate(_centre_of_mass, "centre_of_mass", (2,), ('sin', 'cos'), y, p, u)
+
+
 def joint_forces(t, y, p=None, u=None):
-    """Force of each of `JOINTS` on its parent, world x and y, N."""
-    return _evaluate(_joint_forces, "joint_forces", (1, 2), ('sin', 'cos'), y, p, u)
+    """What each of `JOINTS` puts on its parent: world x, y (N), moment (N m)."""
+    return _evaluate(_joint_forces, "joint_forces", (1, 3), ('sin', 'cos'), y, p, u)
 
 
 def body_poses(t, y, p=None, u=None):
     """World x, y (m) of each centre of mass and angle (rad), a row a body."""
     return _evaluate(_body_poses, "body_poses", (2, 3), ('sin', 'cos'), y, p, u)
+
+
+def body_velocities(t, y, p=None, u=None):
+    """World velocity x, y (m/s) of each centre of mass and rate of turn (rad/s)."""
+    return _evaluate(_body_velocities, "body_velocities", (2, 3), ('sin', 'cos'), y, p, u)

@@ -31,7 +31,7 @@ Parameters p, with the scene's values:
     g = 9.81    m/s^2   gravitational acceleration
 
 Effects: gravity, external_force, external_force, motor.
-One call of `derivative` takes 74 operations: 16 add, 11 sub, 40 mul, 1 div, 3 sin, 3 cos; 47 more
+One call of `derivative` takes 74 operations: 16 add, 11 sub, 40 mul, 1 div, 3 sin, 3 cos; 49 more
 on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -46,6 +46,7 @@ import numpy as np
 
 NAME = "two_body_forced"
 FORM = "velocity"
+DIMENSIONS = 2
 STATES = (
     "x_A",
     "y_A",
@@ -57,6 +58,7 @@ STATES = (
     "phi_dot",
 )
 POSITIONS = (0, 1, 2, 3)
+QUATERNIONS = ()
 INPUTS = {
     "f_A_x": 0.0,
     "f_A_y": 0.0,
@@ -102,21 +104,27 @@ UNITS = {
 EFFECTS = ('gravity', 'external_force', 'external_force', 'motor')
 BODIES = ('A', 'B')
 JOINTS = ('hinge',)
+POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 16, "sub": 11, "mul": 40, "div": 1, "sin": 3, "cos": 3, "total": 74, "parameters": 47},
-    "jacobian": {"add": 27, "sub": 34, "mul": 114, "div": 5, "neg": 2, "sin": 3, "cos": 3, "total": 188, "parameters": 46},
-    "forward_dynamics": {"add": 22, "sub": 13, "mul": 45, "div": 1, "sin": 3, "cos": 3, "total": 87, "parameters": 47},
+    "derivative": {"add": 16, "sub": 11, "mul": 40, "div": 1, "sin": 3, "cos": 3, "total": 74, "parameters": 49},
+    "jacobian": {"add": 27, "sub": 34, "mul": 113, "div": 5, "neg": 2, "sin": 3, "cos": 3, "total": 187, "parameters": 49},
+    "forward_dynamics": {"add": 22, "sub": 13, "mul": 45, "div": 1, "sin": 3, "cos": 3, "total": 87, "parameters": 49},
     "inverse_dynamics": {"add": 27, "sub": 14, "mul": 47, "sin": 3, "cos": 3, "total": 94, "parameters": 20},
     "mass_matrix": {"add": 5, "mul": 6, "neg": 2, "sin": 2, "cos": 3, "total": 18, "parameters": 15},
     "velocity_force": {"add": 4, "sub": 1, "mul": 14, "neg": 2, "sin": 3, "cos": 2, "total": 26, "parameters": 3},
     "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 7},
+    "bias_force": {"add": 6, "sub": 3, "mul": 16, "neg": 1, "sin": 3, "cos": 2, "total": 31, "parameters": 8},
     "applied_force": {"add": 8, "sub": 3, "mul": 10, "sin": 2, "cos": 2, "total": 25, "parameters": 0},
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
     "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
-    "joint_forces": {"add": 14, "sub": 11, "mul": 42, "div": 1, "sin": 3, "cos": 3, "total": 74, "parameters": 50},
+    "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
+    "joint_forces": {"add": 14, "sub": 11, "mul": 42, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 75, "parameters": 52},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 0},
+    "body_velocities": {"add": 4, "sub": 2, "mul": 8, "sin": 2, "cos": 2, "total": 18, "parameters": 0},
+    "input_jacobian": {"add": 15, "sub": 16, "mul": 70, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 116, "parameters": 49},
+    "parameter_jacobian": {"add": 52, "sub": 59, "mul": 193, "div": 9, "neg": 6, "sin": 3, "cos": 3, "total": 325, "parameters": 161},
 }
 
 
@@ -134,60 +142,117 @@ def _constants(values):
         raise ValueError("inertia_com of B is negative: change the parameters")
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
-    k31 = m_A * m_B
-    k32 = l_B_squared * k31
-    k33 = k32 + I_B * mass_A
-    k34 = m_A * I_A
+    k63 = m_A * m_B
+    k64 = l_B_squared * k63
+    k65 = k64 / mass_A
+    pivot_B = I_B + k65
+    k66 = m_A * I_B
+    k67 = m_B * I_B
+    k68 = k64 + (k66 + k67)
+    k69 = m_A * I_A
+    k70 = I_A * m_B
+    k71 = m_B * k69
     l_A_squared = l_A * l_A
-    k35 = l_A_squared * (I_B * k31) + (l_B_squared * (m_B * k34) + I_B * (k34 + I_A * m_B))
-    k1 = k35 / k33
-    k2 = m_B * m_B * (m_A * m_A * (l_B_squared * l_A_squared)) / (mass_A * k33)
+    k72 = I_B * k63
+    k73 = k69 + k70
+    k1 = (l_A_squared * k72 + (l_B_squared * k71 + I_B * k73)) / k68
+    m_A_squared = m_A * m_A
+    m_B_squared = m_B * m_B
+    k74 = l_B_squared * l_A_squared
+    k75 = m_A_squared * k74
+    k76 = mass_A * k68
+    k2 = m_B_squared * k75 / k76
     k3 = 1.0 / mass_A
-    k36 = l_A * k31
-    k4 = l_B * k36 / mass_A
+    k77 = l_A * k63
+    k4 = l_B * k77 / mass_A
     k5 = (m_A * l_B + d_B * mass_A) / mass_A
-    k12 = m_B * l_B
-    k6 = k12 / mass_A
-    k7 = 1.0 / (I_B + k32 / mass_A)
-    k13 = m_B * l_A
-    k37 = d_A * mass_A
-    k8 = (k37 - k13) / mass_A
-    k9 = (k13 - k37) / mass_A
-    k10 = m_A * l_A / mass_A
-    k11 = k13 / mass_A
-    k25 = m_A * g
-    k26 = m_B * g
-    k14 = k25 + k26
-    k38 = m_B * l_B_squared
-    k15 = l_B * k13
-    k16 = I_B + k38
-    k17 = l_B * (l_A * (m_B * 2.0))
-    k18 = k38 + (m_B * l_A_squared + (I_A + I_B))
-    k19 = g * k13
-    k20 = g * k12
-    k21 = I_A / 2.0
-    k22 = I_B / 2.0
-    k23 = m_A / 2.0
-    k24 = m_B / 2.0
-    k27 = m_A / mass_A
-    k28 = m_B / mass_A
-    k29 = k36 / mass_A
-    k30 = l_B * k31 / mass_A
+    k13 = m_B * l_B
+    k6 = k13 / mass_A
+    k7 = 1.0 / pivot_B
+    k14 = m_B * l_A
+    k78 = d_A * mass_A
+    k8 = (k78 - k14) / mass_A
+    k9 = (k14 - k78) / mass_A
+    k79 = m_A * l_A
+    k10 = k79 / mass_A
+    k11 = k14 / mass_A
+    k12 = k2 * 2.0
+    k26 = m_A * g
+    k27 = m_B * g
+    k15 = k26 + k27
+    k80 = m_B * l_B_squared
+    k16 = l_B * k14
+    k17 = I_B + k80
+    k81 = m_B * 2.0
+    k18 = k81 * (l_A * l_B)
+    k19 = I_B + (I_A + (k80 + m_B * l_A_squared))
+    k20 = g * k14
+    k21 = g * k13
+    k22 = I_A / 2.0
+    k23 = I_B / 2.0
+    k24 = m_A / 2.0
+    k25 = m_B / 2.0
+    k28 = m_A / mass_A
+    k29 = m_B / mass_A
+    k30 = k77 / mass_A
+    k31 = l_B * k63 / mass_A
+    k82 = I_A * I_B
+    k32 = (k67 * l_A_squared + (k82 + l_B_squared * k70) - k1 * k17) / k68
+    k33 = (m_B_squared * (k74 * (m_A * 2.0)) - k2 * (k68 + mass_A * k17)) / k76
+    k34 = k3 / mass_A
+    k35 = (k16 - k4) / mass_A
+    k36 = (l_B + d_B - k5) / mass_A
+    k37 = k6 / mass_A
+    k38 = k7 * ((k80 - k65) / mass_A) / pivot_B
+    k39 = (d_A - k8) / mass_A
+    k40 = (d_A + k9) / mass_A
+    k41 = (l_A - k10) / mass_A
+    k42 = k11 / mass_A
+    k43 = k68 / k68
+    k83 = m_A * l_B_squared
+    k84 = I_B + k83
+    k44 = (k66 * l_A_squared + (k82 + l_B_squared * k69) - k1 * k84) / k68
+    k45 = (k75 * k81 - k2 * (k68 + mass_A * k84)) / k76
+    k46 = (l_B * k79 - k4) / mass_A
+    k47 = (d_B - k5) / mass_A
+    k48 = (l_B - k6) / mass_A
+    k49 = k7 * ((k83 - k65) / mass_A) / pivot_B
+    k50 = (d_A - l_A - k8) / mass_A
+    k51 = (l_A - d_A - k9) / mass_A
+    k52 = k10 / mass_A
+    k53 = (l_A - k11) / mass_A
+    k54 = (k73 + k63 * l_A_squared - mass_A * k1) / k68
+    k55 = k2 * (mass_A * mass_A) / k76
+    k56 = k7 / pivot_B
+    k85 = l_A * 2.0
+    k57 = k72 * k85 / k68
+    k58 = m_B_squared * (m_A_squared * (l_B_squared * k85)) / k76
+    k86 = l_B * 2.0
+    k87 = k63 * k86
+    k59 = (k71 * k86 - k1 * k87) / k68
+    k60 = (m_B_squared * (m_A_squared * (l_A_squared * k86)) - k2 * (mass_A * k87)) / k76
+    k61 = k7 * (k87 / mass_A) / pivot_B
+    k62 = mass_A / mass_A
     return {
         "initial_state": (),
         "derivative": (g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
-        "jacobian": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k11),
+        "jacobian": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k11, k12),
         "forward_dynamics": (g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
-        "inverse_dynamics": (l_A, l_B, d_A, d_B, mass_A, k12, k13, k14, k15, k16, k17, k18, k19, k20),
-        "mass_matrix": (mass_A, k12, k13, k15, k16, k17, k18),
-        "velocity_force": (k12, k13, k15),
-        "gravity_force": (k14, k19, k20),
+        "inverse_dynamics": (l_A, l_B, d_A, d_B, mass_A, k13, k14, k15, k16, k17, k18, k19, k20, k21),
+        "mass_matrix": (mass_A, k13, k14, k16, k17, k18, k19),
+        "velocity_force": (k13, k14, k16),
+        "gravity_force": (k15, k20, k21),
+        "bias_force": (k13, k14, k15, k16, k20, k21),
         "applied_force": (l_A, l_B, d_A, d_B),
-        "kinetic_energy": (l_A, l_B, k21, k22, k23, k24),
-        "potential_energy": (l_A, l_B, k25, k26),
+        "kinetic_energy": (l_A, l_B, k22, k23, k24, k25),
+        "potential_energy": (l_A, l_B, k26, k27),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
-        "joint_forces": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k27, k28, k29, k30),
+        "centre_of_mass": (m_A, m_B, l_A, l_B, k3),
+        "joint_forces": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k28, k29, k30, k31),
         "body_poses": (l_A, l_B),
+        "body_velocities": (l_A, l_B),
+        "input_jacobian": (k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
+        "parameter_jacobian": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k11, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62),
     }
 
 
@@ -241,8 +306,8 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """188 operations: 27 add, 34 sub, 114 mul, 5 div, 2 neg, 3 sin, 3 cos."""
-    k1, k2, k4, k5, k6, k7, k8, k9, k10, k11 = k
+    """187 operations: 27 add, 34 sub, 113 mul, 5 div, 2 neg, 3 sin, 3 cos."""
+    k1, k2, k4, k5, k6, k7, k8, k9, k10, k11, k12 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
@@ -276,7 +341,7 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     s16 = sin_phi * k4
     s17 = s10 - k4 * (cos_phi * theta_dot_squared)
     s18 = k4 * (cos_phi * omega_B_squared) - k7 * (coupling_B_A * s17 - load_B * s16)
-    s19 = (s18 - alpha_A * (k2 * (2.0 * (sin_phi * cos_phi)))) / pivot_A
+    s19 = (s18 - alpha_A * (sin_phi * cos_phi * k12)) / pivot_A
     s20 = k7 * (s17 - (coupling_B_A * s19 - alpha_A * s16))
     s21 = theta_dot * 2.0
     s22 = k4 * (sin_phi * s21)
@@ -391,7 +456,7 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """94 operations: 27 add, 14 sub, 47 mul, 3 sin, 3 cos."""
-    l_A, l_B, d_A, d_B, mass_A, k12, k13, k14, k15, k16, k17, k18, k19, k20 = k
+    l_A, l_B, d_A, d_B, mass_A, k13, k14, k15, k16, k17, k18, k19, k20, k21 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     x_A_ddot, y_A_ddot, theta_ddot, phi_ddot = extra
@@ -406,38 +471,38 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s38 = k13 * sin_theta + sin_theta_phi * k12
-    s39 = x_A_ddot * mass_A - (f_A_x + f_B_x) - theta_ddot * s38 - k13 * (theta_dot_squared * cos_theta)
-    s40 = k13 * cos_theta + cos_theta_phi * k12
-    s41 = k12 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s40 + k14))
-    s42 = cos_phi * k15 + k16
-    s43 = y_A_ddot * s40 + (phi_ddot * s42 + theta_ddot * (cos_phi * k17 + k18)) - x_A_ddot * s38
+    s38 = k14 * sin_theta + sin_theta_phi * k13
+    s39 = x_A_ddot * mass_A - (f_A_x + f_B_x) - theta_ddot * s38 - k14 * (theta_dot_squared * cos_theta)
+    s40 = k14 * cos_theta + cos_theta_phi * k13
+    s41 = k13 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s40 + k15))
+    s42 = cos_phi * k16 + k17
+    s43 = y_A_ddot * s40 + (phi_ddot * s42 + theta_ddot * (cos_phi * k18 + k19)) - x_A_ddot * s38
     s44 = f_B_x * sin_theta_phi - f_B_y * cos_theta_phi
     s45 = d_B * s44
     s46 = l_B * s44
-    s47 = cos_theta_phi * k20
+    s47 = cos_theta_phi * k21
     s48 = l_A * (f_B_x * sin_theta - f_B_y * cos_theta) + (s45 + (s43 + d_A * (f_A_x * sin_theta - f_A_y * cos_theta)))
-    s49 = k12 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s47 + (s46 + (s45 + (theta_ddot * s42 + phi_ddot * k16))))
+    s49 = k13 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s47 + (s46 + (s45 + (theta_ddot * s42 + phi_ddot * k17))))
     return (
-        s39 - k12 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
-        s41 - (f_A_y + f_B_y) - k13 * (theta_dot_squared * sin_theta),
-        k15 * (s37 - sin_phi * omega_B_squared) + (s47 + (cos_theta * k19 + (s46 + s48))),
-        s37 * k15 + s49 - tau,
+        s39 - k13 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
+        s41 - (f_A_y + f_B_y) - k14 * (theta_dot_squared * sin_theta),
+        k16 * (s37 - sin_phi * omega_B_squared) + (s47 + (cos_theta * k20 + (s46 + s48))),
+        s37 * k16 + s49 - tau,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
     """18 operations: 5 add, 6 mul, 2 neg, 2 sin, 3 cos."""
-    mass_A, k12, k13, k15, k16, k17, k18 = k
+    mass_A, k13, k14, k16, k17, k18, k19 = k
     _, _, theta, phi, _, _, _, _ = y
     cos_phi = cos(phi)
     s1 = theta + phi
-    s50 = sin(s1) * k12
+    s50 = sin(s1) * k13
     s51 = -s50
-    s52 = -(k13 * sin(theta) + s50)
-    s53 = cos(s1) * k12
-    s40 = k13 * cos(theta) + s53
-    s42 = cos_phi * k15 + k16
+    s52 = -(k14 * sin(theta) + s50)
+    s53 = cos(s1) * k13
+    s40 = k14 * cos(theta) + s53
+    s42 = cos_phi * k16 + k17
     return (
         mass_A,
         0.0,
@@ -449,18 +514,18 @@ def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
         s53,
         s52,
         s40,
-        cos_phi * k17 + k18,
+        cos_phi * k18 + k19,
         s42,
         s51,
         s53,
         s42,
-        k16,
+        k17,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     """26 operations: 4 add, 1 sub, 14 mul, 2 neg, 3 sin, 2 cos."""
-    k12, k13, k15 = k
+    k13, k14, k16 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     s1 = theta + phi
@@ -468,26 +533,48 @@ def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     s37 = sin_phi * theta_dot_squared
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s54 = k13 * (theta_dot_squared * cos(theta)) + k12 * (cos(s1) * omega_B_squared)
-    s55 = k13 * (theta_dot_squared * sin(theta)) + k12 * (sin(s1) * omega_B_squared)
+    s54 = k14 * (theta_dot_squared * cos(theta)) + k13 * (cos(s1) * omega_B_squared)
+    s55 = k14 * (theta_dot_squared * sin(theta)) + k13 * (sin(s1) * omega_B_squared)
     return (
         -s54,
         -s55,
-        k15 * (s37 - sin_phi * omega_B_squared),
-        s37 * k15,
+        k16 * (s37 - sin_phi * omega_B_squared),
+        s37 * k16,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
-    k14, k19, k20 = k
+    k15, k20, k21 = k
     _, _, theta, phi, _, _, _, _ = y
-    s47 = cos(theta + phi) * k20
+    s47 = cos(theta + phi) * k21
     return (
         0.0,
-        k14,
-        cos(theta) * k19 + s47,
+        k15,
+        cos(theta) * k20 + s47,
         s47,
+    )
+
+
+def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """31 operations: 6 add, 3 sub, 16 mul, 1 neg, 3 sin, 2 cos."""
+    k13, k14, k15, k16, k20, k21 = k
+    _, _, theta, phi, _, _, theta_dot, phi_dot = y
+    sin_phi = sin(phi)
+    s1 = theta + phi
+    cos_theta_phi = cos(s1)
+    theta_dot_squared = theta_dot * theta_dot
+    s37 = sin_phi * theta_dot_squared
+    cos_theta = cos(theta)
+    omega_B = theta_dot + phi_dot
+    omega_B_squared = omega_B * omega_B
+    s47 = cos_theta_phi * k21
+    s54 = k14 * (theta_dot_squared * cos_theta) + k13 * (cos_theta_phi * omega_B_squared)
+    return (
+        -s54,
+        k15 - k14 * (theta_dot_squared * sin(theta)) - k13 * (sin(s1) * omega_B_squared),
+        k16 * (s37 - sin_phi * omega_B_squared) + (cos_theta * k20 + s47),
+        s47 + s37 * k16,
     )
 
 
@@ -513,24 +600,24 @@ def _applied_force(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     """33 operations: 9 add, 2 sub, 18 mul, 2 sin, 2 cos."""
-    l_A, l_B, k21, k22, k23, k24 = k
+    l_A, l_B, k22, k23, k24, k25 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
     xd_B = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
     yd_B = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
-    s60 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k23 + (theta_dot * theta_dot * k21 + omega_B * omega_B * k22)
+    s60 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k24 + (theta_dot * theta_dot * k22 + omega_B * omega_B * k23)
     return (
-        (xd_B * xd_B + yd_B * yd_B) * k24 + s60,
+        (xd_B * xd_B + yd_B * yd_B) * k25 + s60,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """10 operations: 4 add, 4 mul, 2 sin."""
-    l_A, l_B, k25, k26 = k
+    l_A, l_B, k26, k27 = k
     _, y_A, theta, phi, _, _, _, _ = y
     return (
-        y_A * k25 + k26 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
+        y_A * k26 + k27 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
     )
 
 
@@ -555,9 +642,20 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
+def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """21 operations: 7 add, 10 mul, 2 sin, 2 cos."""
+    m_A, m_B, l_A, l_B, k3 = k
+    x_A, y_A, theta, phi, _, _, _, _ = y
+    s1 = theta + phi
+    return (
+        k3 * (m_A * x_A + m_B * (l_B * cos(s1) + (x_A + l_A * cos(theta)))),
+        k3 * (m_A * y_A + m_B * (l_B * sin(s1) + (y_A + l_A * sin(theta)))),
+    )
+
+
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """74 operations: 14 add, 11 sub, 42 mul, 1 div, 3 sin, 3 cos."""
-    k1, k2, k4, k5, k6, k7, k8, k9, k10, k27, k28, k29, k30 = k
+    """75 operations: 14 add, 11 sub, 42 mul, 1 div, 1 neg, 3 sin, 3 cos."""
+    k1, k2, k4, k5, k6, k7, k8, k9, k10, k28, k29, k30, k31 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
@@ -576,11 +674,12 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     load_A = k4 * (sin_phi * omega_B_squared) + s3 - tau - k7 * (coupling_B_A * load_B)
     alpha_A = load_A / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
-    s63 = f_B_x * k27 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k29
-    s64 = f_B_y * k27 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k29
+    s63 = f_B_x * k28 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k30
+    s64 = f_B_y * k28 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k30
     return (
-        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k30 + s63 - f_A_x * k28,
-        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k30 + s64 - f_A_y * k28,
+        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k31 + s63 - f_A_x * k29,
+        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k31 + s64 - f_A_y * k29,
+        -tau,
     )
 
 
@@ -596,6 +695,234 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         l_B * cos(s1) + (x_A + l_A * cos(theta)),
         l_B * sin(s1) + (y_A + l_A * sin(theta)),
         s1,
+    )
+
+
+def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """18 operations: 4 add, 2 sub, 8 mul, 2 sin, 2 cos."""
+    l_A, l_B = k
+    _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
+    s1 = theta + phi
+    omega_B = theta_dot + phi_dot
+    return (
+        x_A_dot,
+        y_A_dot,
+        theta_dot,
+        x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B),
+        l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta))),
+        omega_B,
+    )
+
+
+def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """116 operations: 15 add, 16 sub, 70 mul, 5 div, 4 neg, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11 = k
+    _, _, theta, phi, _, _, _, _ = y
+    sin_phi = sin(phi)
+    pivot_A = k1 + sin_phi * sin_phi * k2
+    coupling_B_A = cos(phi) * k4
+    s1 = theta + phi
+    cos_theta_phi = cos(s1)
+    sin_theta_phi = sin(s1)
+    cos_theta = cos(theta)
+    sin_theta = sin(theta)
+    s65 = sin_theta_phi * k6
+    s66 = (sin_theta * k9 - k7 * (coupling_B_A * s65)) / pivot_A
+    s67 = k7 * (s65 - coupling_B_A * s66)
+    s68 = cos_theta_phi * k6
+    s69 = (k7 * (coupling_B_A * s68) + cos_theta * k8) / pivot_A
+    s70 = k7 * (s68 + coupling_B_A * s69)
+    s71 = k5 * sin_theta_phi
+    s72 = (k7 * (coupling_B_A * s71) - sin_theta * k10) / pivot_A
+    s73 = k7 * (s71 + coupling_B_A * s72)
+    s74 = cos_theta_phi * k5
+    s75 = (cos_theta * k10 - k7 * (coupling_B_A * s74)) / pivot_A
+    s76 = k7 * (s74 - coupling_B_A * s75)
+    s77 = (-1.0 - coupling_B_A * k7) / pivot_A
+    s78 = k7 * (1.0 - coupling_B_A * s77)
+    return (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        k6 * (sin_theta_phi * s67) + (k3 + k11 * (sin_theta * s66)),
+        k11 * (sin_theta * s69) - k6 * (sin_theta_phi * s70),
+        k3 + k11 * (sin_theta * s72) - k6 * (sin_theta_phi * s73),
+        k11 * (sin_theta * s75) + k6 * (sin_theta_phi * s76),
+        k11 * (sin_theta * s77) + k6 * (sin_theta_phi * s78),
+        -(k11 * (cos_theta * s66) + k6 * (cos_theta_phi * s67)),
+        k6 * (cos_theta_phi * s70) + (k3 - k11 * (cos_theta * s69)),
+        k6 * (cos_theta_phi * s73) - k11 * (cos_theta * s72),
+        k3 - k11 * (cos_theta * s75) - k6 * (cos_theta_phi * s76),
+        -(k11 * (cos_theta * s77) + k6 * (cos_theta_phi * s78)),
+        s66,
+        s69,
+        s72,
+        s75,
+        s77,
+        s67 - s66,
+        -(s69 + s70),
+        -(s72 + s73),
+        s76 - s75,
+        s78 - s77,
+    )
+
+
+def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """325 operations: 52 add, 59 sub, 193 mul, 9 div, 6 neg, 3 sin, 3 cos."""
+    k1, k2, k4, k5, k6, k7, k8, k9, k10, k11, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62 = k
+    _, _, theta, phi, _, _, theta_dot, phi_dot = y
+    f_A_x, f_A_y, f_B_x, f_B_y, tau = u
+    sin_phi = sin(phi)
+    s79 = sin_phi * sin_phi
+    pivot_A = k1 + s79 * k2
+    cos_phi = cos(phi)
+    coupling_B_A = cos_phi * k4
+    s1 = theta + phi
+    cos_theta_phi = cos(s1)
+    sin_theta_phi = sin(s1)
+    theta_dot_squared = theta_dot * theta_dot
+    s37 = sin_phi * theta_dot_squared
+    s56 = f_B_y * cos_theta_phi - f_B_x * sin_theta_phi
+    s80 = f_A_x * sin_theta_phi - f_A_y * cos_theta_phi
+    load_B = k6 * s80 + (tau + k5 * s56) - k4 * s37
+    s81 = coupling_B_A * load_B
+    cos_theta = cos(theta)
+    s82 = f_A_y * cos_theta
+    sin_theta = sin(theta)
+    s83 = f_A_x * sin_theta
+    omega_B = theta_dot + phi_dot
+    omega_B_squared = omega_B * omega_B
+    s84 = sin_phi * omega_B_squared
+    s85 = f_B_y * cos_theta - f_B_x * sin_theta
+    alpha_A = (k4 * s84 + (k10 * s85 + (k8 * s82 + k9 * s83)) - tau - k7 * s81) / pivot_A
+    s86 = load_B - coupling_B_A * alpha_A
+    alpha_B = k7 * s86
+    s87 = sin_theta * alpha_A + theta_dot_squared * cos_theta
+    s88 = sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared
+    s89 = theta_dot_squared * sin_theta - cos_theta * alpha_A
+    s90 = sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B
+    s91 = cos_phi * k35
+    s92 = s56 * k36 - s80 * k37 - s37 * k35
+    s93 = s84 * k35 + (s85 * k41 + (s82 * k39 - s83 * k40)) - (k7 * (load_B * s91 + coupling_B_A * s92) - s81 * k38)
+    s94 = (s93 - alpha_A * (k32 + s79 * k33)) / pivot_A
+    s95 = k7 * (s92 - (alpha_A * s91 + coupling_B_A * s94)) - s86 * k38
+    s96 = (f_A_x + f_B_x) * k34
+    s97 = (f_A_y + f_B_y) * k34
+    s98 = s90 * k37 + k6 * (cos_theta_phi * s95) + (s97 + (s89 * k42 + k11 * (cos_theta * s94)))
+    s99 = alpha_A * k43 / pivot_A
+    s100 = k7 * (coupling_B_A * s99)
+    s101 = cos_phi * k46
+    s102 = s56 * k47 + s80 * k48 - s37 * k46
+    s103 = s84 * k46 + (s82 * k50 + s83 * k51 - s85 * k52) - (k7 * (load_B * s101 + coupling_B_A * s102) - s81 * k49)
+    s104 = (s103 - alpha_A * (k44 + s79 * k45)) / pivot_A
+    s105 = k7 * (s102 - (alpha_A * s101 + coupling_B_A * s104)) - s86 * k49
+    s106 = (s81 * k56 - alpha_A * (k54 - s79 * k55)) / pivot_A
+    s107 = s86 * k56 + k7 * (coupling_B_A * s106)
+    s108 = cos_phi * k31
+    s109 = s37 * k31
+    s110 = s84 * k31 + (s85 * k28 + (s83 - s82) * k29) - k7 * (load_B * s108 - coupling_B_A * s109)
+    s111 = (s110 - alpha_A * (k57 + s79 * k58)) / pivot_A
+    s112 = k7 * (s109 + (alpha_A * s108 + coupling_B_A * s111))
+    s113 = cos_phi * k30
+    s114 = s56 * k28 + s80 * k29 - s37 * k30
+    s115 = s84 * k30 - (k7 * (load_B * s113 + coupling_B_A * s114) - s81 * k61) - alpha_A * (k59 + s79 * k60)
+    s116 = s115 / pivot_A
+    s117 = k7 * (s114 - (alpha_A * s113 + coupling_B_A * s116)) - s86 * k61
+    s118 = (s82 - s83) * k62 / pivot_A
+    s119 = k7 * (coupling_B_A * s118)
+    s120 = s56 * k62
+    s121 = k7 * (coupling_B_A * s120) / pivot_A
+    s122 = k7 * (s120 + coupling_B_A * s121)
+    return (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        k6 * (sin_theta_phi * s95) - s88 * k37 + (k11 * (sin_theta * s94) - s87 * k42 - s96),
+        k6 * (sin_theta_phi * s100) - k11 * (sin_theta * s99),
+        s88 * k48 + k6 * (sin_theta_phi * s105) + (s87 * k53 + k11 * (sin_theta * s104) - s96),
+        k11 * (sin_theta * s106) - k6 * (sin_theta_phi * s107),
+        s87 * k29 + k11 * (sin_theta * s111) - k6 * (sin_theta_phi * s112),
+        k11 * (sin_theta * s116) + (s88 * k29 + k6 * (sin_theta_phi * s117)),
+        k11 * (sin_theta * s118) - k6 * (sin_theta_phi * s119),
+        k6 * (sin_theta_phi * s122) - k11 * (sin_theta * s121),
+        0.0,
+        -s98,
+        k11 * (cos_theta * s99) - k6 * (cos_theta_phi * s100),
+        s90 * k48 - k6 * (cos_theta_phi * s105) + (s89 * k53 - k11 * (cos_theta * s104) - s97),
+        k6 * (cos_theta_phi * s107) - k11 * (cos_theta * s106),
+        s89 * k29 - k11 * (cos_theta * s111) + k6 * (cos_theta_phi * s112),
+        s90 * k29 - k6 * (cos_theta_phi * s117) - k11 * (cos_theta * s116),
+        k6 * (cos_theta_phi * s119) - k11 * (cos_theta * s118),
+        k11 * (cos_theta * s121) - k6 * (cos_theta_phi * s122),
+        -1.0,
+        s94,
+        -s99,
+        s104,
+        s106,
+        s111,
+        s116,
+        s118,
+        -s121,
+        0.0,
+        s95 - s94,
+        s99 + s100,
+        s105 - s104,
+        -(s106 + s107),
+        -(s111 + s112),
+        s117 - s116,
+        -(s118 + s119),
+        s121 + s122,
+        0.0,
     )
 
 
@@ -670,15 +997,25 @@ def derivative(t, y, p=None, u=None):
 
 
 def jacobian(t, y, p=None, u=None):
-    """Exact Jacobian of `derivative` by the state: (8, 8), or (8, 8, k)."""
+    """Exact Jacobian of `derivative` by the state."""
     return _evaluate(_jacobian, "jacobian", (8, 8), ('sin', 'cos'), y, p, u)
 
 
+def input_jacobian(t, y, p=None, u=None):
+    """Exact Jacobian of `derivative` by the inputs."""
+    return _evaluate(_input_jacobian, "input_jacobian", (8, 5), ('sin', 'cos'), y, p, u)
+
+
+def parameter_jacobian(t, y, p=None, u=None):
+    """Exact Jacobian of `derivative` by the parameters."""
+    return _evaluate(_parameter_jacobian, "parameter_jacobian", (8, 9), ('sin', 'cos'), y, p, u)
+
+
 def _joined(q, v):
-    """[q, v], each of length 4 or with columns."""
+    """[q, v] of lengths 4 and 4, or with columns."""
     q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
-    if q.shape != v.shape or q.shape[:1] != (4,) or q.ndim > 2:
-        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (4,) both")
+    if q.shape != (4, *q.shape[1:]) or v.shape != (4, *q.shape[1:]) or q.ndim > 2:
+        raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (4,) and (4,)")
     return np.concatenate((q, v))
 
 
@@ -717,6 +1054,11 @@ def gravity_force(t, y, p=None, u=None):
     return _evaluate(_gravity_force, "gravity_force", (4,), ('cos',), y, p, u)
 
 
+def bias_force(t, y, p=None, u=None):
+    """h = V + G of M v̇ + h = F, (nv,)."""
+    return _evaluate(_bias_force, "bias_force", (4,), ('sin', 'cos'), y, p, u)
+
+
 def applied_force(t, y, p=None, u=None):
     """F of M v̇ + V + G = F, (nv,): applied forces and torques."""
     return _evaluate(_applied_force, "applied_force", (4,), ('cos', 'sin'), y, p, u)
@@ -737,11 +1079,21 @@ def momentum(t, y, p=None, u=None):
     return _evaluate(_momentum, "momentum", (3,), ('cos', 'sin'), y, p, u)
 
 
+def centre_of_mass(t, y, p=None, u=None):
+    """World place of the centre of mass of all bodies, m."""
+    return _evaluate(_centre_of_mass, "centre_of_mass", (2,), ('cos', 'sin'), y, p, u)
+
+
 def joint_forces(t, y, p=None, u=None):
-    """Force of each of `JOINTS` on its parent, world x and y, N."""
-    return _evaluate(_joint_forces, "joint_forces", (1, 2), ('sin', 'cos'), y, p, u)
+    """What each of `JOINTS` puts on its parent: world x, y (N), moment (N m)."""
+    return _evaluate(_joint_forces, "joint_forces", (1, 3), ('sin', 'cos'), y, p, u)
 
 
 def body_poses(t, y, p=None, u=None):
     """World x, y (m) of each centre of mass and angle (rad), a row a body."""
     return _evaluate(_body_poses, "body_poses", (2, 3), ('cos', 'sin'), y, p, u)
+
+
+def body_velocities(t, y, p=None, u=None):
+    """World velocity x, y (m/s) of each centre of mass and rate of turn (rad/s)."""
+    return _evaluate(_body_velocities, "body_velocities", (2, 3), ('cos', 'sin'), y, p, u)

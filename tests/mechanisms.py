@@ -10,12 +10,15 @@ import numpy as np
 from newton_euler import Mechanism, Motion, solve
 
 from eomgen.backends.python import python_module
+from eomgen.build import build_model
 from eomgen.derivation.closed import Equations, derive
-from eomgen.model import Model, build_model
-from eomgen.program.assemble import System, assemble
+from eomgen.model import Model
+from eomgen.program.from_equations import from_equations
+from eomgen.program.system import System
 from eomgen.scene.reader import parse_scene, read_scene
 
 BUILT_IN = ("double_pendulum", "pendulum", "two_body", "two_body_forced")
+"""The built-in scenes whose route is `closed`: SymPy's equations are there to be looked into."""
 SEEDS = (4, 9, 15, 18, 20, 22, 27, 34, 36, 37, 38, 39)
 """Random trees that are quick to compile and of every kind; see `random_tree`."""
 
@@ -27,7 +30,8 @@ class Scene:
     `numbers` turns parameter values and inputs, by name, into a mechanism. `bodies`, `pins` (the
     joint of each body that has one) and `coordinates` are names in the mechanism's order, `angles`
     the coordinates that are angles; `defaults` are the parameters, `positive` those that make a
-    mass or an inertia. `text` is TOML, or None for a scene that comes with eomgen.
+    mass or an inertia. `text` is TOML, or None for a scene that comes with eomgen. `points` turns
+    parameter values into the named points: a body, and a place from its centre of mass.
     """
 
     name: str
@@ -40,6 +44,7 @@ class Scene:
     positive: frozenset[str]
     numbers: Callable[[Mapping[str, float], Mapping[str, float]], Mechanism]
     text: str | None = None
+    points: Callable[[Mapping[str, float]], tuple[tuple[int, list[float]], ...]] = lambda p: ()
 
     def motion(
         self,
@@ -49,8 +54,15 @@ class Scene:
         u: Mapping[str, float] | None = None,
     ) -> Motion:
         """The independent solver's word on the state `y` of a module in velocity form."""
+        q, v = y[self.places(module)], y[self.places(module, "_dot")]
+        return solve(self.mechanism(p, u), q, v)
+
+    def mechanism(
+        self, p: Mapping[str, float] | None = None, u: Mapping[str, float] | None = None
+    ) -> Mechanism:
+        """The mechanism where some parameters are not the scene's own, and some inputs not 0."""
         p, u = {**self.defaults, **(p or {})}, {**dict.fromkeys(self.inputs, 0.0), **(u or {})}
-        return solve(self.numbers(p, u), y[self.places(module)], y[self.places(module, "_dot")])
+        return self.numbers(p, u)
 
     def places(self, module: types.ModuleType, suffix: str = "") -> list[int]:
         """Where a module's state holds the coordinates, or with `_dot` the velocities."""
@@ -90,13 +102,14 @@ class Compiled:
 
 @cache
 def compiled(scene: "Scene | str", form: str = "velocity") -> Compiled:
-    """Compile a scene, or a built-in one by name, once; all outputs on."""
+    """Compile a scene, or a built-in one by name, once; all outputs on; by the route `closed`."""
     if isinstance(scene, str):
         scene = TOLD[scene]
     read = read_scene(scene.name) if scene.text is None else parse_scene(scene.text)
     model = replace(build_model(read), form=form)
     equations = derive(model)
-    system = assemble(equations)
+    system = from_equations(equations)
+    assert system.route == "closed"
     source = python_module(system)
     return Compiled(scene, model, equations, system, source, load(source))
 
@@ -269,7 +282,8 @@ def random_tree(seed: int, most: int = 4) -> Scene:
 
     Chains and branches, one tree or several, on the world or floating; pins at points with one, two
     or no nonzero components; numbers bare, shared by name and by formula; with chance gravity, a
-    motor, and a force from outside. The scene lists bodies and joints in any order.
+    motor, a force from outside, and up to two named points. The scene lists bodies and joints in
+    any order.
     """
     rng = np.random.default_rng([seed, most])
     writer = _Writer(rng)
@@ -355,9 +369,19 @@ def random_tree(seed: int, most: int = 4) -> Scene:
             forces=forces,
         )
 
+    tables = [*rng.permutation(bodies), *rng.permutation(joints), *effects]
+    marked: list[tuple[int, list[Value]]] = []
+    for i in range(int(rng.integers(3))):
+        body = int(rng.integers(n))
+        at, value = writer.point(f"p{i}_at")
+        marked.append((body, value))
+        tables.append(f'[[points]]\nname = "p{i}"\nbody = "b{body}"\nat = {at}\n')
     head = f'name = "tree_{seed}"\noutputs = "all"\n\n[parameters]\n'
     head += "".join(f"{name} = {value}\n" for name, value in writer.shared.items())
-    tables = [*rng.permutation(bodies), *rng.permutation(joints), *effects]
+
+    def points(p: Mapping[str, float]) -> tuple[tuple[int, list[float]], ...]:
+        return tuple((body, [x(p) for x in place]) for body, place in marked)
+
     return Scene(
         name=f"tree_{seed}",
         bodies=tuple(f"b{k}" for k in range(n)),
@@ -369,6 +393,7 @@ def random_tree(seed: int, most: int = 4) -> Scene:
         positive=frozenset(writer.positive),
         numbers=numbers,
         text="\n".join([head, *tables]),
+        points=points,
     )
 
 

@@ -1,10 +1,19 @@
 """Each row a scene with one mistake, and the exact message a user gets for it."""
 
+import math
+import re
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from mechanisms import load
+from newton_euler import Mechanism, solve
 
+from eomgen.build import build_model
 from eomgen.cli import main
+from eomgen.pipeline import compile_scene
+from eomgen.scene.reader import parse_scene
 
 GOOD = """\
 name = "swing"
@@ -44,6 +53,33 @@ integrator = "RK45"
 
 BODY = '[[bodies]]\nname = "{}"\nmass = 1.0\ninertia_com = 1.0\n'
 JOINT = '[[joints]]\nname = "{}"\ntype = "revolute"\nparent = "{}"\nchild = "{}"\n'
+FORCE = '[[effects]]\ntype = "external_force"\nname = "push"\nbody = "arm"\n'
+CHAIN = """\
+[[chains]]
+name = "links"
+count = 3
+mass = 0.1
+inertia_com = 1e-4
+start = [0.1, 0]
+r_parent = [0.1, 0]
+r_child = [0.1, 0]
+"""
+WRIST = 'name = "wrist"\ntype = "revolute"'
+SLIDE = 'name = "wrist"\ntype = "prismatic"\n'
+SHOULDER = """\
+[[joints]]
+name = "shoulder"
+type = "revolute"
+parent = "world"
+child = "arm"
+r_child = [-0.5, 0]
+[[joints]]
+"""
+HELD_AWAY = '\nparent = "arm"\nchild = "hand"\nr_parent = [0.5, 0]\nr_child = [-0.1, 0]'
+SINGULAR = (
+    "body '{}': nothing resists '{}', neither its mass or inertia nor what it carries; "
+    "give it some, or a joint that does not move so"
+)
 
 # What is replaced, by what (or None: appended), and the message without the file's name.
 MISTAKES = [
@@ -51,7 +87,8 @@ MISTAKES = [
     ("mass = 0.5", "mas = 0.5", "bodies[1].mas: unknown key (did you mean 'mass'?)"),
     ("[initial]", "[inital]", "inital: unknown key (did you mean 'initial'?)"),
     ("mass = 0.5", "", "bodies[1].mass: missing; every such table needs it"),
-    ("mass = 0.5", "mass = true", "bodies[1].mass: True is neither a number nor a formula"),
+    ("mass = 0.5", "mass = true", "bodies[1].mass: True is neither a number nor a formula; "
+     "give one"),
     ("t_end = 1.0", 't_end = "1"', "simulation.t_end: '1' is not a number; give one"),
     ("mass = 0.5", "mass = nan", "bodies[1].mass: nan is not a finite number; give one that is"),
     ("mass = 0.5", "mass = -inf", "bodies[1].mass: -inf is not a finite number; give one that is"),
@@ -62,17 +99,18 @@ MISTAKES = [
     (
         "mass = 0.5",
         "mass = 0",
-        "bodies[1].mass: 0 is not positive; give a number > 0 in kg",
+        "bodies[1].inertia_com: body 'hand' has inertia but no mass; "
+        "give it a mass, or inertia_com = 0",
     ),
     (
         "mass = 0.5",
         "mass = -2.5",
-        "bodies[1].mass: -2.5 is not positive; give a number > 0 in kg",
+        "bodies[1].mass: -2.5 is negative; give a number >= 0 in kg",
     ),
     (
         'mass = "m"',
         'mass = "m - 3"',
-        "bodies[0].mass: -2 is not positive; give a number > 0 in kg",
+        "bodies[0].mass: -2 is negative; give a number >= 0 in kg",
     ),
     (
         "inertia_com = 0.02",
@@ -205,7 +243,8 @@ MISTAKES = [
     (
         None,
         '[[effects]]\ntype = "motor"\nname = "tau"\njoint = "elbow"\ntorque = "input"\n',
-        "effects[1].joint: no revolute joint is named 'elbow'; known: shoulder, wrist",
+        "effects[1].joint: no revolute or prismatic joint is named 'elbow'; "
+        "known: shoulder, wrist",
     ),
     (
         None,
@@ -217,8 +256,8 @@ MISTAKES = [
         '[camera]\nfollow = "head"\n',
         "camera.follow: no body is named 'head' (did you mean 'hand'?)",
     ),
-    ("r_child = [-0.1, 0]", "r_child = [-0.1]", "joints[1].r_child[1]: missing; "
-     "the list is too short"),
+    ("r_child = [-0.1, 0]", "r_child = [-0.1]", "joints[1].r_child: has 1 entry; "
+     "give at least 2"),
     ("mass = 0.5", f"mass = {'9' * 400}", f"bodies[1].mass: {'9' * 57}... is not a finite number; "
      "give one that is"),
     ("mass = 0.5", "mass = 1e101", "bodies[1].mass: 1e+101 is larger than 1e+100; "
@@ -227,7 +266,7 @@ MISTAKES = [
      "choose other units"),
     ("r_child = [-0.5, 0]", "r_child = [1e-200, 0]\n[[effects]]\ntype = 'motor'\nname = 'tau'\n"
      "joint = 'wrist'\ntorque = [1]",
-     "effects[0].torque: [1] is neither a number nor a formula"),
+     "effects[0].torque: [1] is neither a number nor a formula; give one"),
     ('name = "swing"', 'name = "swing"\ntitle = "a\\u001b[31mb"',
      "title: 'a\\x1b[31mb' has a character at 2 that cannot be printed; take it out"),
     ("q = [0.1, 0.2]", "q = { wrist_angle = 0.1, wrist_angle_deg = 3.0 }",
@@ -235,6 +274,339 @@ MISTAKES = [
     ('m = { value = 1.0, unit = "kg"', 'm = { value = 1.0, unti = "kg"',
      "parameters.m.unti: unknown key (did you mean 'unit'?)"),
     ("r_child = [-0.1, 0]", "r_child = 3", "joints[1].r_child: 3 is not a list; give one"),
+
+    # Masses and inertias that are none.
+    (
+        "inertia_com = 0.02",
+        "inertia_com = 0.02\nshapes = 3",
+        "bodies[1].shapes: 3 is not a list; give one",
+    ),
+    ("inertia_com = 0.02", "inertia_com = true",
+     "bodies[1].inertia_com: True is neither a number nor a formula; give one"),
+    ("inertia_com = 0.02", "inertia_com = { xx = 1 }",
+     "bodies[1].inertia_com: {'xx': 1} is neither a number nor a formula; give one"),
+    ("inertia_com = 0.02", 'inertia_com = "m*"',
+     "bodies[1].inertia_com: 'm*' is no formula; write for example '2*m_A' or 'l_A/2'"),
+    ("inertia_com = 0.02", 'inertia_com = "I"',
+     "bodies[1].inertia_com: unknown parameter 'I'; give it a value in [parameters]"),
+    ("inertia_com = 0.02", "inertia_com = [0.02]",
+     "bodies[1].inertia_com: has 1 entry; give one number in the plane, in space [xx, yy, zz] "
+     "or those and xy, xz, yz"),
+    ("inertia_com = 0.02", "inertia_com = [0.02, 0.02, 0.02]",
+     "bodies[1].inertia_com: body 'hand' has 3 entries; the plane takes one number"),
+    # Vectors and joints of space.
+    ("r_parent = [0.5, 0]", "r_parent = [0.5, 0, 0]",
+     "joints[1].r_parent: has 3 components; the plane takes 2"),
+    ("r_child = [-0.1, 0]", "r_child = [-0.1, 0, 0]",
+     "joints[1].r_child: has 3 components; the plane takes 2"),
+    ("r_child = [-0.1, 0]", "r_child = [-0.1, 0, 0, 0]",
+     "joints[1].r_child: has 4 entries; give at most 3"),
+    ("r_child = [-0.1, 0]", "r_child = []", "joints[1].r_child: has 0 entries; give at least 2"),
+    ("r_child = [-0.1, 0]", "r_child = [[-0.1, 0]]",
+     "joints[1].r_child: has lists in it; give everything in one list"),
+    (None, '[[points]]\nname = "tip"\nbody = "hand"\nat = [1, 2, 3]\n',
+     "points[0].at: has 3 components; the plane takes 2"),
+    (None, FORCE + "force = [1, 2, 3]\n", "effects[1].force: has 3 components; the plane takes 2"),
+    (None, FORCE + 'at = [1, 2, 3]\nforce = "input"\n',
+     "effects[1].at: has 3 components; the plane takes 2"),
+    (WRIST, SLIDE + "axis = [1, 0, 0]", "joints[1].axis: has 3 components; the plane takes 2"),
+    (WRIST, SLIDE + "axis = [0, 0.0]",
+     "joints[1].axis: has no length; give a direction, for example [1.0, 0.0]"),
+    (WRIST, SLIDE, "joints[1].axis: missing; every such table needs it"),
+    *((WRIST, f'name = "wrist"\ntype = "{kind}"',
+       f"joints[1].type: a '{kind}' joint is one of space; give dimensions = 3")
+      for kind in ("ball", "cylindrical", "universal")),
+    (WRIST, WRIST + "\naxis = [0, 0, 1]",
+     "joints[1].axis: in the plane a pin turns about z; leave it out"),
+    (WRIST, WRIST + "\norientation_deg = [0, 0, 90]",
+     "joints[1].orientation_deg: has 3 components; the plane takes one angle"),
+    (WRIST, WRIST + '\norientation_deg = "90"',
+     "joints[1].orientation_deg: '90' is not a number; give one"),
+    (WRIST, WRIST + "\norientation_deg = inf",
+     "joints[1].orientation_deg: inf is not a finite number; give one that is"),
+    ('name = "swing"', 'name = "swing"\ndimensions = 4',
+     "dimensions: unknown value 4; known: 2, 3"),
+    ('name = "swing"', 'name = "swing"\ndimensions = "3"',
+     "dimensions: unknown value '3'; known: 2, 3"),
+    ('name = "swing"', 'name = "swing"\ndimensions = 3',
+     "joints[0].r_child: has 2 components; space takes 3"),
+    # What else a joint may say.
+    (WRIST, WRIST + "\nlimits = [1, -1]", "joints[1].limits: 1 is not below -1; give [low, high]"),
+    (WRIST, WRIST + "\nlimits = [1, 1]", "joints[1].limits: 1 is not below 1; give [low, high]"),
+    (WRIST, WRIST + "\nlimits = [1]", "joints[1].limits[1]: missing; the list is too short"),
+    (WRIST, WRIST + "\ngear_ratio = 50",
+     "joints[1].gear_ratio: does nothing without a motor_inertia; give one"),
+    (WRIST, WRIST + "\nmotor_inertia = 1e-5\ngear_ratio = 0",
+     "joints[1].gear_ratio: is 0, so that no rotor turns; give another"),
+    (WRIST, WRIST + "\nmotor_inertia = -1e-5",
+     "joints[1].motor_inertia: -1e-05 is negative; give a number >= 0 in kg m^2"),
+    (WRIST, 'name = "wrist"\ntype = "weld"\nmotor_inertia = 1e-5',
+     "joints[1].motor_inertia: unknown key; known here: name, parent, child, r_parent, r_child, "
+     "orientation_deg, type"),
+    (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b"]',
+     "joints[1].coordinates[2]: missing; the list is too short"),
+    (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b", "a"]\n',
+     "'a' would be the name of a coordinate and of another; rename one of them"),
+    (None, FORCE + "force = 3\n", "effects[1].force: 3 is not a list; give one"),
+    (None, FORCE + 'force = "inptu"\n',
+     "effects[1].force: unknown value 'inptu' (did you mean 'input'?)"),
+    (None, FORCE + "force = [1, true]\n",
+     "effects[1].force[1]: True is neither a number nor a formula; give one"),
+    (None, FORCE, "effects[1].force: missing; every such table needs it"),
+    # Chains.
+    *((None, CHAIN.replace("count = 3", f"count = {count}"), f"chains[0].count: {message}")
+      for count, message in (
+        ("0", "0 is too small; give at least 1"),
+        ("-1", "-1 is too small; give at least 1"),
+        ("1001", "1001 is too large; give at most 1000"),
+        ("100000", "100000 is too large; give at most 1000"),
+        ("1.5", "1.5 is not a whole number; give one"),
+        ('"many"', "'many' is not a whole number; give one"),
+    )),
+    (None, CHAIN.replace("count = 3", "count = 999"),
+     "chains: make 1001 bodies in all; the most is 1000"),
+    (None, "".join(CHAIN.replace("count = 3", "count = 1000").replace("links", f"links{i}")
+                   for i in range(1000)),
+     "chains: make 1000002 bodies in all; the most is 1000"),
+    *((None, CHAIN.replace(f"{field} = [0.1, 0]", f"{field} = [0.1, 0, 0]"),
+       f"chains[0].{field}: has 3 components; the plane takes 2")
+      for field in ("start", "r_parent", "r_child")),
+    (None, CHAIN + "axis = [0, 0, 1]\n",
+     "chains[0].axis: in the plane a pin turns about z; leave it out"),
+    (None, CHAIN.replace("mass = 0.1", "mass = -0.1"),
+     "chains[0].mass: -0.1 is negative; give a number >= 0 in kg"),
+    (None, CHAIN + 'parent = "arn"\n',
+     "chains[0].parent: no body is named 'arn' (did you mean 'arm'?)"),
+    (None, CHAIN.replace("links", "l" * 33),
+     f"chains[0].name: makes the name '{'l' * 33}_joint_3', which is longer than 40 characters; "
+     "choose a shorter name"),
+    (None, CHAIN + CHAIN, "chains[1].name: 'links_1' is the name of chains[0] too; "
+     "give each its own"),
+    (None, BODY.format("links_2") + JOINT.format("extra", "world", "links_2") + CHAIN,
+     "chains[0].name: 'links_2' is the name of bodies[2] too; give each its own"),
+    (None, BODY.format("extra") + JOINT.format("links_joint_2", "world", "extra") + CHAIN,
+     "chains[0].name: 'links_joint_2' is the name of joints[2] too; give each its own"),
+    # Points and outputs.
+    (None, '[[points]]\nname = "tip"\nbody = "amr"\n',
+     "points[0].body: no body is named 'amr' (did you mean 'arm'?)"),
+    (None, 2 * '[[points]]\nname = "tip"\nbody = "arm"\n',
+     "points[1].name: 'tip' is the name of points[0] too; give each its own"),
+    *(('name = "swing"', f'name = "swing"\noutputs = ["momentum", "{name}"]',
+       f"outputs[1]: '{name}' is about {what}, and there are none")
+      for name, what in (("point_positions", "points"), ("point_velocities", "points"),
+                         ("point_jacobians", "points"), ("input_jacobian", "inputs"))),
+    ('name = "swing"', 'name = "swing"\noutputs = ["momentun"]',
+     "outputs[0]: unknown value 'momentun' (did you mean 'momentum'?)"),
+    ('name = "swing"', 'name = "swing"\noutputs = "momentum"',
+     "outputs: 'momentum' is not a list; give one"),
+    # Routes and forms.
+    ('name = "swing"', 'name = "swing"\nroute = "abba"',
+     "route: unknown value 'abba' (did you mean 'aba'?)"),
+    *(('name = "swing"', f'name = "swing"\nroute = "{route}"\nform = "{form}"',
+       f"route: '{route}' is for form = 'velocity'; the form '{form}' comes from the closed form")
+      for route, form in (("aba", "momentum"), ("ldl", "redundant"))),
+    # Nesting without end, and too much of everything.
+    (GOOD, 'name = "swing"\na = ' + 10**5 * "[" + 10**5 * "]", "is not TOML: nested too deep"),
+    (GOOD, 'name = "swing"\na = ' + 5000 * "{ a = " + "1" + 5000 * "}",
+     "is not TOML: nested too deep"),
+    (GOOD, 'name = "swing"\n' + 10**5 * "a." + "a = 1",
+     "is not read: a key has more than 50 parts"),
+    (GOOD, 'name = "swing"\n[' + 10**5 * "'a b' . \"c\"." + "d]",
+     "is not read: a key has more than 50 parts"),
+    ("mass = 0.5", f"mass = {300 * '['}{300 * ']'}",
+     f"bodies[1].mass: {57 * '['}... is neither a number nor a formula; give one"),
+    ("mass = 0.5", f'mass = "{151 * "-"}m"', f"bodies[1].mass: '{56 * '-'}... "
+     "is nested deeper than 150"),
+    *((GOOD, 'name = "swing"\n' + "".join(line.format(i) for i in range(10**5)),
+       f"{key}: has 100000 entries; give at most 1000")
+      for key, line in (("bodies", '[[bodies]]\nname = "b{}"\n'),
+                        ("parameters", "parameters.p{} = 1\n"))),
+    (None, 125_000 * BODY.format("extra"), "is larger than 4000000 bytes"),
+    (GOOD, 'name = "swing"\n', "bodies: missing; a scene needs at least one body, or a chain"),
+    (GOOD, "", "name: missing; every such table needs it"),
+    (GOOD, 'name = "swing"\nbodies = 3', "bodies: 3 is not a list; give one"),
+    (GOOD, 'name = "swing"\nbodies = [3]', "bodies[0]: 3 is not a table; give one"),
+    ("q = [0.1, 0.2]", "q = [[0.1], [0.2]]",
+     "initial.q: has lists in it; give everything in one list"),
+    # Motions that move no mass.
+    ("mass = 0.5\ninertia_com = 0.02", "mass = 0\ninertia_com = 0",
+     SINGULAR.format("hand", "wrist_angle_dot")),
+    (f"mass = 0.5\ninertia_com = 0.02\n{SHOULDER}{WRIST}",
+     f"mass = 0\ninertia_com = 0\n{SHOULDER}{SLIDE}axis = [1, 0]",
+     SINGULAR.format("hand", "wrist_slide_dot")),
+    (GOOD, 'name = "swing"\n' + CHAIN.replace("= 0.1\n", "= 0\n").replace("1e-4", "0"),
+     SINGULAR.format("links_3", "links_joint_3_angle_dot")),
+    ("inertia_com = 0.02\n" + SHOULDER + WRIST + HELD_AWAY,
+     "inertia_com = 0\n" + SHOULDER + WRIST + HELD_AWAY.replace("-0.1", "0"),
+     SINGULAR.format("hand", "wrist_angle_dot")),
+]  # fmt: skip
+
+SPACE = """\
+name = "robot"
+dimensions = 3
+[parameters]
+m = 1.0
+[[bodies]]
+name = "arm"
+mass = "m"
+inertia_com = [0.1, 0.1, 0.05]
+[[bodies]]
+name = "hand"
+mass = 0.5
+inertia_com = [0.02, 0.03, 0.04, 0.001, 0, 0]
+[[joints]]
+name = "shoulder"
+type = "revolute"
+parent = "world"
+child = "arm"
+axis = [0, 1, 0]
+r_child = [-0.5, 0, 0]
+[[joints]]
+name = "wrist"
+type = "ball"
+parent = "arm"
+child = "hand"
+r_parent = [0.5, 0, 0]
+r_child = [-0.1, 0, 0]
+[[effects]]
+type = "gravity"
+g = 9.81
+[initial]
+q = [0.1, 1.0, 0.0, 0.0, 0.0]
+"""
+INERTIA = "inertia_com = [0.02, 0.03, 0.04, 0.001, 0, 0]"
+AXIS = "axis = [0, 1, 0]"
+BALL = 'name = "wrist"\ntype = "ball"'
+UNIVERSAL = 'name = "wrist"\ntype = "universal"\naxes = '
+WHAT_INERTIA = "give one number in the plane, in space [xx, yy, zz] or those and xy, xz, yz"
+LINKS = """\
+name = "robot"
+dimensions = 3
+[[chains]]
+name = "links"
+count = 6
+mass = 0.1
+inertia_com = [1e-4, 1e-4, 1e-4]
+r_parent = [0.1, 0, 0]
+r_child = [0.1, 0, 0]
+"""
+
+MISTAKES_IN_SPACE = [
+    # Masses and inertias that are none.
+    ("mass = 0.5", "mass = 0", "bodies[1].inertia_com: body 'hand' has inertia but no mass; "
+     "give it a mass, or inertia_com = 0"),
+    ("mass = 0.5", "mass = -1", "bodies[1].mass: -1 is negative; give a number >= 0 in kg"),
+    (INERTIA, "inertia_com = 0.1", "bodies[1].inertia_com: body 'hand' has one number; "
+     "space takes [xx, yy, zz], or 0 for a particle"),
+    (INERTIA, "inertia_com = []", f"bodies[1].inertia_com: has 0 entries; {WHAT_INERTIA}"),
+    (INERTIA, "inertia_com = [1, 1]", f"bodies[1].inertia_com: has 2 entries; {WHAT_INERTIA}"),
+    (INERTIA, "inertia_com = [1, 0, 0, 0, 1, 0, 0, 0, 1]",
+     f"bodies[1].inertia_com: has 9 entries; {WHAT_INERTIA}"),
+    *((INERTIA, f"inertia_com = {entries}", f"bodies[1].inertia_com: body 'hand' has {count} "
+       "entries; give [xx, yy, zz], or those and xy, xz, yz")
+      for count, entries in ((4, "[1, 1, 1, 0]"), (5, "[1, 1, 1, 0, 0]"))),
+    (INERTIA, "inertia_com = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+     "bodies[1].inertia_com: has lists in it; give everything in one list"),
+    (INERTIA, "inertia_com = [1, nan, 1]",
+     "bodies[1].inertia_com[1]: nan is not a finite number; give one that is"),
+    (INERTIA, "inertia_com = [1, true, 1]",
+     "bodies[1].inertia_com[1]: True is neither a number nor a formula; give one"),
+    (INERTIA, 'inertia_com = [1, "mm", 1]',
+     "bodies[1].inertia_com[1]: unknown parameter 'mm' (did you mean 'm'?)"),
+    (INERTIA, "inertia_com = [1, -1, 1]",
+     "bodies[1].inertia_com[1]: -1 is negative; give a number >= 0 in kg m^2"),
+    (INERTIA, "inertia_com = [1, 1, 1, 2, 0, 0]",
+     "bodies[1].inertia_com: body 'hand' has principal moments -1, 1, 3; none may be negative: "
+     "make the products xy, xz, yz smaller"),
+    (INERTIA, 'inertia_com = [1, "m", "3*m"]',
+     "bodies[1].inertia_com: body 'hand' has principal moments 1, 1, 3; no body has one larger "
+     "than the other two together: change xx, yy or zz"),
+    (INERTIA, "inertia_com = [2, 2, 1.5, -1.2, 0, 0]",
+     "bodies[1].inertia_com: body 'hand' has principal moments 0.8, 1.5, 3.2; no body has one "
+     "larger than the other two together: change xx, yy or zz"),
+    (INERTIA, "", "bodies[1].inertia_com: missing; every such table needs it"),
+    # Directions.
+    (AXIS, "axis = [0, 0, 0]",
+     "joints[0].axis: has no length; give a direction, for example [1.0, 0.0, 0.0]"),
+    (AXIS, "axis = [0, 1]", "joints[0].axis: has 2 components; space takes 3"),
+    (AXIS, "axis = [0, 1, 0, 0]", "joints[0].axis: has 4 entries; give at most 3"),
+    (AXIS, "axis = [1]", "joints[0].axis: has 1 entry; give at least 2"),
+    (AXIS, "axis = 1", "joints[0].axis: 1 is not a list; give one"),
+    (AXIS, 'axis = "y"', "joints[0].axis: 'y' is not a list; give one"),
+    (AXIS, 'axis = ["m", 0, 0]', "joints[0].axis[0]: 'm' is not a number; give one"),
+    (AXIS, "axis = [0, inf, 0]",
+     "joints[0].axis[1]: inf is not a finite number; give one that is"),
+    (BALL, UNIVERSAL + "[[1, 0, 0], [-2, 0, 1e-9]]",
+     "joints[1].axes: are parallel; give two that cross, or a revolute"),
+    (BALL, UNIVERSAL + "[[1, 0, 0], [0, 0, 0]]",
+     "joints[1].axes[1]: has no length; give a direction, for example [1.0, 0.0, 0.0]"),
+    (BALL, UNIVERSAL + "[[1, 0, 0]]", "joints[1].axes[1]: missing; the list is too short"),
+    (BALL, UNIVERSAL + "[1, 0]",
+     "joints[1].axes: has entries that are no lists; give a list of lists"),
+    (BALL, UNIVERSAL + "[[1, 0, 0], [0, 1]]",
+     "joints[1].axes[1]: has 2 components; space takes 3"),
+    (BALL, BALL + "\norientation_deg = 90",
+     "joints[1].orientation_deg: is one angle; space takes 3, about x, y and z"),
+    (BALL, BALL + "\norientation_deg = [90, 0]",
+     "joints[1].orientation_deg[2]: missing; the list is too short"),
+    (BALL, BALL + '\norientation_deg = [0, "m", 0]',
+     "joints[1].orientation_deg[1]: 'm' is not a number; give one"),
+    # Vectors of the plane.
+    ("r_parent = [0.5, 0, 0]", "r_parent = [0.5, 0]",
+     "joints[1].r_parent: has 2 components; space takes 3"),
+    ("r_child = [-0.1, 0, 0]", "r_child = [-0.1, 0]",
+     "joints[1].r_child: has 2 components; space takes 3"),
+    (None, '[[points]]\nname = "tip"\nbody = "hand"\nat = [1, 2]\n',
+     "points[0].at: has 2 components; space takes 3"),
+    (None, FORCE + "force = [1, 2]\n", "effects[1].force: has 2 components; space takes 3"),
+    (None, FORCE + 'at = [1, 2]\nforce = "input"\n',
+     "effects[1].at: has 2 components; space takes 3"),
+    *((SPACE, LINKS.replace("r_child", f"{field} = [0.1, 0]\nr_child").replace(twice, ""),
+       f"chains[0].{field}: has 2 components; space takes 3")
+      for field, twice in (("start", "-"), ("r_parent", "r_parent = [0.1, 0, 0]\n"))),
+    (SPACE, LINKS.replace("r_child = [0.1, 0, 0]", "r_child = [0.1, 0]"),
+     "chains[0].r_child: has 2 components; space takes 3"),
+    (SPACE, LINKS + "axis = [1, 0]\n", "chains[0].axis: has 2 components; space takes 3"),
+    (SPACE, LINKS + "axis = [0, 0, 0]\n",
+     "chains[0].axis: has no length; give a direction, for example [1.0, 0.0, 0.0]"),
+    # Joints that cannot do what is asked.
+    (None, '[[effects]]\ntype = "motor"\nname = "tau"\njoint = "wrist"\ntorque = "input"\n',
+     "effects[1].joint: no revolute or prismatic joint is named 'wrist'; known: shoulder"),
+    (BALL, BALL + "\nmotor_inertia = 1e-5",
+     "joints[1].motor_inertia: unknown key; known here: name, parent, child, r_parent, r_child, "
+     "orientation_deg, type"),
+    (BALL, BALL + '\ncoordinate = "a"',
+     "joints[1].coordinate: unknown key; known here: name, parent, child, r_parent, r_child, "
+     "orientation_deg, type"),
+    (f'{BALL}\nparent = "arm"\nchild = "hand"\nr_parent = [0.5, 0, 0]\nr_child = [-0.1, 0, 0]',
+     'name = "wrist"\ntype = "free"\nparent = "arm"\nchild = "hand"',
+     "joints[1].parent: unknown value 'arm'; known: world"),
+    # States at the start.
+    ("[0.1, 1.0, 0.0, 0.0, 0.0]", "[0.1, 0, 0, 0, 0]",
+     "initial.q: the quaternion from wrist_qw on has no length; give 1, 0, 0, 0 for no turn"),
+    ("[0.1, 1.0, 0.0, 0.0, 0.0]", "{ wrist_qw = 0 }",
+     "initial.q: the quaternion from wrist_qw on has no length; give 1, 0, 0, 0 for no turn"),
+    ("[0.1, 1.0, 0.0, 0.0, 0.0]", "[0.1]",
+     "initial.q: has 1 numbers for 5 coordinates; give one each for shoulder_angle, wrist_qw, "
+     "wrist_qx, wrist_qy, wrist_qz"),
+    ("[0.1, 1.0, 0.0, 0.0, 0.0]", "{ wrist_qx_deg = 30 }",
+     "initial.q.wrist_qx_deg: no coordinate has this name (did you mean 'wrist_qx'?)"),
+    (None, "v = { wrist_angle_dot = 1.0 }\n",
+     "initial.v.wrist_angle_dot: no coordinate has this name (did you mean 'shoulder_angle_dot'?)"),
+    # Motions that move no mass: a particle on a ball joint spins about the line to it.
+    (f"mass = 0.5\n{INERTIA}", "mass = 0\ninertia_com = 0", SINGULAR.format("hand", "wrist_wz")),
+    (INERTIA, "inertia_com = 0", SINGULAR.format("hand", "wrist_wx")),
+    (SPACE, SPACE.replace(INERTIA, "inertia_com = 0").replace("[-0.1, 0, 0]", "[0, 0, 0]"),
+     SINGULAR.format("hand", "wrist_wz")),
+    (INERTIA, "inertia_com = [0, 0.01, 0.01]", SINGULAR.format("hand", "wrist_wx")),
+    # Routes and forms.
+    (SPACE, 'route = "closed"\n' + LINKS.replace("count = 6", "count = 7"),
+     "route: 'closed' needs the closed form, and it is for 6 bodies at most, or 12 in a tree of "
+     "pins and free bodies in the plane; leave it out"),
+    ("dimensions = 3", 'dimensions = 3\nform = "momentum"',
+     "form: 'momentum' needs the closed form, and it is derived in the plane; leave it out"),
+    ("dimensions = 3", "dimensions = 2", "joints[0].r_child: has 3 components; the plane takes 2"),
+    ("dimensions = 3", "dimensions = true", "dimensions: unknown value True; known: 2, 3"),
 ]  # fmt: skip
 
 
@@ -253,19 +625,142 @@ def test_the_scene_without_a_mistake_is_good(
     assert "2 degrees of freedom" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("old", "new", "message"), MISTAKES, ids=[row[2] for row in MISTAKES])
+ROWS = [(GOOD, *row) for row in MISTAKES] + [(SPACE, *row) for row in MISTAKES_IN_SPACE]
+
+
+@pytest.mark.parametrize(("good", "old", "new", "message"), ROWS, ids=[row[3] for row in ROWS])
 def test_one_mistake_one_line(
-    scene: Path, capsys: pytest.CaptureFixture[str], old: str | None, new: str, message: str
+    scene: Path,
+    capsys: pytest.CaptureFixture[str],
+    good: str,
+    old: str | None,
+    new: str,
+    message: str,
 ) -> None:
-    """Place, value and remedy on one line of standard error; exit code 1; nothing written."""
-    assert old is None or old in GOOD
-    scene.write_text(GOOD + new if old is None else GOOD.replace(old, new, 1))
+    """Place, value and remedy on one line of standard error; exit code 1; nothing written.
+
+    And soon: what is too large or nested without end is not worked through first.
+    """
+    assert old is None or old in good
+    scene.write_text(good + new if old is None else good.replace(old, new, 1))
     output = scene.parent / "made"
+    start = time.perf_counter()
     assert main(["generate", str(scene), "-o", str(output)]) == 1
+    assert time.perf_counter() - start < 20.0
     out, err = capsys.readouterr()
     assert err == f"eomgen: swing.toml: {message}\n"
     assert out == ""
-    assert not output.exists()
+    if message.startswith(("body '", "route: '", "form: '")):  # found in a scene that reads well
+        assert not output.exists() or not list(output.iterdir())
+    else:
+        assert not output.exists()
+
+
+NOTICES = [
+    (GOOD, WRIST, SLIDE + "axis = [3, -4]",
+     "joints[1].axis: has length 5; taken as a direction of length 1"),
+    (SPACE, AXIS, "axis = [0, 2, 0]",
+     "joints[0].axis: has length 2; taken as a direction of length 1"),
+    (SPACE, AXIS, "axis = [1e-200, 1e-200, 0]",
+     "joints[0].axis: has length 1.41421e-200; taken as a direction of length 1"),
+    (SPACE, "[0.1, 1.0, 0.0, 0.0, 0.0]", "[0.1, 0.0, 2.0, 0.0, 0.0]",
+     "initial.q: the quaternion from wrist_qw on has length 2; scaled to 1"),
+    (SPACE, "[0.1, 1.0, 0.0, 0.0, 0.0]", "{ wrist_qx = 0.5 }",
+     "initial.q: the quaternion from wrist_qw on has length 0.5; scaled to 1"),
+    (SPACE, SPACE, LINKS + "axis = [1, 1, 0]",
+     "chains[0].axis: has length 1.41421; taken as a direction of length 1"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("good", "old", "new", "notice"), NOTICES, ids=[n[3] for n in NOTICES])
+def test_what_is_put_right_is_said(
+    scene: Path, capsys: pytest.CaptureFixture[str], good: str, old: str, new: str, notice: str
+) -> None:
+    """An axis or a quaternion that is not of length 1 is scaled, with one line to say so."""
+    assert old in good
+    text = good.replace(old, new, 1)
+    model = build_model(parse_scene(text))
+    assert model.notices == (notice,)
+    for body in model.bodies:
+        axis = getattr(body.joint, "axis", None)
+        assert axis is None or math.hypot(*axis) == pytest.approx(1.0, rel=1e-15)
+    for indices in model.quaternions:
+        parts = [model.initial_q[i] for i in indices]
+        assert math.hypot(*parts) == pytest.approx(1.0, rel=1e-15)
+    scene.write_text(text)
+    assert main(["check", str(scene)]) == 0
+    assert capsys.readouterr().err == f"eomgen: note: swing.toml: {notice}\n"
+
+
+@pytest.mark.parametrize("good", [GOOD, SPACE])
+def test_what_is_right_is_not_touched(good: str) -> None:
+    """No notice, and no number of a scene changed, where axes and quaternions are of length 1."""
+    model = build_model(parse_scene(good.replace(AXIS, "axis = [0.6, 0.0, -0.8]")))
+    assert model.notices == ()
+    axis = getattr(model.bodies[0].joint, "axis", None)
+    assert axis in (None, (0.6, 0.0, -0.8))
+    assert len(model.initial_q) == (2 if good is GOOD else 5)
+
+
+def test_a_quaternion_that_is_not_given() -> None:
+    """It is no turn, and needs no notice."""
+    model = build_model(parse_scene(SPACE.replace("q = [0.1, 1.0, 0.0, 0.0, 0.0]", "")))
+    assert model.initial_q == (0.0, 1.0, 0.0, 0.0, 0.0)
+    assert model.notices == ()
+
+
+def test_a_massless_body_in_a_chain() -> None:
+    """It is allowed where M stays regular, and moves as the independent solver says."""
+    text = GOOD.replace('mass = "m"\ninertia_com = 0.1', "mass = 0\ninertia_com = 0")
+    module = load(compile_scene(parse_scene(text)))
+    mechanism = Mechanism(
+        mass=[0.0, 0.5],
+        inertia=[0.0, 0.02],
+        parent=[-1, 0],
+        free=[False, False],
+        r_parent=[[0.0, 0.0], [0.5, 0.0]],
+        r_child=[[-0.5, 0.0], [-0.1, 0.0]],
+        gravity=9.81,
+    )
+    q, v = np.array([0.3, 0.8]), np.array([1.1, -1.3])
+    expected = solve(mechanism, q, v).accelerations
+    rates = module.derivative(0.0, np.concatenate((q, v)))[2:]
+    assert rates == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("good", "start", "wrist", "inertia"),
+    [
+        (GOOD, "[0.1, 0.2]", WRIST, "inertia_com = 0.02"),
+        (SPACE, "[0.1, 1.0, 0.0, 0.0, 0.0]", BALL, INERTIA),
+    ],
+    ids=["plane", "space"],
+)
+def test_a_massless_body_that_is_welded(good: str, start: str, wrist: str, inertia: str) -> None:
+    """A tool or a sensor without mass changes nothing about the motion, but has its own pose."""
+    text = good.replace(f"mass = 0.5\n{inertia}", "mass = 0\ninertia_com = 0")
+    text = text.replace(wrist, 'name = "wrist"\ntype = "weld"')
+    text = text.replace(start, "[0.1]").replace("v = [0.0, 0.0]", "")
+    module = load(compile_scene(parse_scene(text)))
+    tables = re.split(r"^(?=\[)", text, flags=re.MULTILINE)
+    kept = [table for table in tables if not re.search(r'name = "(hand|wrist)"', table)]
+    assert len(kept) == len(tables) - 2
+    alone = load(compile_scene(parse_scene("".join(kept))))
+    assert (alone.BODIES, module.BODIES) == (("arm",), ("arm", "hand"))
+    y = np.array([0.4, 1.7])
+    assert alone.derivative(0.0, y)[1] != 0.0
+    assert module.derivative(0.0, y) == pytest.approx(alone.derivative(0.0, y), rel=1e-14)
+
+
+def test_a_rotor_makes_a_massless_body_move() -> None:
+    """What a joint's own rotor resists needs no mass, as long as it turns along."""
+    text = GOOD.replace("mass = 0.5\ninertia_com = 0.02", "mass = 0\ninertia_com = 0")
+    text = text.replace('name = "swing"', 'name = "swing"\noutputs = ["forward_dynamics"]')
+    geared = text.replace(WRIST, WRIST + "\nmotor_inertia = 1e-3\ngear_ratio = 10")
+    module = load(compile_scene(parse_scene(geared)))
+    pushed = module.forward_dynamics([0.4, 0.3], [0.0, 0.0], [0.0, 0.7])
+    still = module.forward_dynamics([0.4, 0.3], [0.0, 0.0])
+    assert pushed - still == pytest.approx([0.0, 0.7 / (10**2 * 1e-3)], rel=1e-12)
 
 
 def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -346,8 +841,7 @@ def test_a_point_mass_too_near_its_pin(scene: Path, capsys: pytest.CaptureFixtur
     output = scene.parent / "made"
     assert main(["generate", str(scene), "-o", str(output)]) == 1
     assert capsys.readouterr().err == (
-        "eomgen: swing.toml: the mass matrix is singular at these parameters: "
-        "change lengths, masses or inertias\n"
+        f"eomgen: swing.toml: {SINGULAR.format('hand', 'wrist_angle_dot')}\n"
     )
     assert not list(output.iterdir())
 
@@ -368,15 +862,11 @@ def test_a_tree_too_large_for_the_closed_form(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A limit that is said at once, not a derivation that never ends."""
-    text = 'name = "chain"\n'
-    for i in range(13):
-        parent = f"b{i - 1}" if i else "world"
-        text += BODY.format(f"b{i}") + JOINT.format(f"j{i}", parent, f"b{i}")
-    scene.write_text(text)
+    scene.write_text('name = "swing"\nroute = "closed"\n' + CHAIN.replace("= 3", "= 13"))
     assert main(["generate", str(scene), "-o", str(scene.parent / "made")]) == 1
     assert capsys.readouterr().err == (
-        "eomgen: swing.toml: route: the tree at 'b0' has 13 bodies; "
-        "the closed form is for small trees, of up to 12\n"
+        "eomgen: swing.toml: route: 'closed' needs the closed form, and it is for 6 bodies at most, "
+        "or 12 in a tree of pins and free bodies in the plane; leave it out\n"
     )
 
 

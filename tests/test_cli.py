@@ -8,25 +8,29 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
+from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.files import remove_ours
-from eomgen.model import build_model
-from eomgen.pipeline import compile_scene
-from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
+from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene
 from eomgen.store import generated_code
 
 ROOT = Path(__file__).parent.parent
 
 
-def test_committed_modules_are_what_is_generated(capsys: pytest.CaptureFixture[str]) -> None:
-    """Every built-in scene derived anew gives the committed bytes."""
-    for name in built_in_names():
-        committed = (ROOT / "generated" / f"{name}.py").read_text("utf-8")
-        assert compile_scene(read_scene(name)) == committed, f"eomgen generate {name}"
-    assert main(["generate", "--all", "--check", "-o", str(ROOT / "generated")]) == 0
-    assert capsys.readouterr().out.count(": fresh\n") == len(built_in_names())
+def test_committed_modules_are_what_is_generated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every built-in scene derived anew gives the committed bytes; nothing else is there."""
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
+    committed = ROOT / "generated"
+    code = main(["generate", "--all", "--check", "-o", str(committed)])
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if not line.endswith(": fresh")] == []
+    assert code == 0 and len(lines) == len(built_in_names())
+    assert sorted(path.stem for path in committed.glob("*.py")) == sorted(built_in_names())
 
 
 def test_check_says_which_module_is_stale(
@@ -158,10 +162,211 @@ def test_check_and_list(capsys: pytest.CaptureFixture[str]) -> None:
         built_in_names()
     )
     assert main(["check", "two_body_forced"]) == 0
+    shown = capsys.readouterr()
+    lines = shown.out.splitlines()
+    assert "dimensions  2: the plane" in lines
+    assert "freedom     4 degrees of freedom" in lines
+    assert "joint       hinge: revolute, A to B; phi" in lines
+    assert "effects     gravity, 2 external_force, motor" in lines
+    assert "inputs      f_A_x, f_A_y, f_B_x, f_B_y, tau" in lines
+    assert shown.err == ""
+    assert main(["check", "human_figure"]) == 0
     out = capsys.readouterr().out
-    assert "4 degrees of freedom" in out
-    assert "joint       hinge: revolute, A to B; phi" in out
-    assert "inputs      f_A_x, f_A_y, f_B_x, f_B_y, tau" in out
+    assert "dimensions  3: space\n" in out
+    assert "41 degrees of freedom, 49 coordinates with 8 unit quaternions\n" in out
+    assert max(map(len, out.splitlines())) <= 100
+
+
+def test_check_of_a_long_chain_is_short(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The first few and the last of a hundred links; all of them on request."""
+    scene = tmp_path / "long.toml"
+    text = (BUILT_IN / "chain.toml").read_text("utf-8")
+    scene.write_text(text.replace("count = 10", "count = 100"), "utf-8")
+    assert main(["check", str(scene)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) < 30 and max(map(len, lines[:-1])) <= 100
+    assert "joint       … 89 more …" in lines
+    assert any("link_joint_100: revolute, link_99 to link_100" in line for line in lines)
+    assert lines[-1].endswith("--long lists all")
+    assert main(["check", str(scene), "--long"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("joint       ") == 100 and "more …" not in out
+    assert "link_50_mass = 0.1" in out
+
+
+ARM = """
+name = "arm"
+dimensions = 3
+bodies = [
+    { name = "upper", mass = 1, inertia_com = [0.1, 0.1, 0.1] },
+    { name = "lower", mass = 1, inertia_com = [0.1, 0.2, 0.2] },
+]
+joints = [
+    { name = "s", type = "revolute", parent = "world", child = "upper", axis = [0, 2, 0], r_child = [-0.5, 0, 0], limits = [-0.5, 1.0] },
+    { name = "w", type = "ball", parent = "upper", child = "lower", r_child = [-0.5, 0, 0], r_parent = [0.5, 0, 0] },
+]
+effects = [{ type = "gravity", g = 9.81 }]
+initial = { q = { w_qw = 2.0 } }
+route = "aba"
+"""  # noqa: E501
+
+
+def test_notices_and_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What was put right is said on standard error; who left its limits, and when, at the end."""
+    scene = tmp_path / "arm.toml"
+    scene.write_text(ARM, "utf-8")
+    notices = [
+        "eomgen: note: arm.toml: joints[0].axis: has length 2; taken as a direction of length 1",
+        "eomgen: note: arm.toml: initial.q: the quaternion from w_qw on has length 2; scaled to 1",
+    ]
+    out = str(tmp_path / "out")
+    for command in (
+        ["check", str(scene)],
+        ["generate", str(scene), "-o", out],
+        ["simulate", str(scene), "-o", out, "--t-end", "1"],
+    ):
+        assert main(command) == 0
+        shown = capsys.readouterr()
+        assert shown.err.splitlines() == notices
+        if command[0] == "check":
+            assert "s: revolute, world to upper; s_angle from -0.5 to 1 rad\n" in shown.out
+            assert "4 degrees of freedom, 5 coordinates with 1 unit quaternion\n" in shown.out
+    said = re.search(
+        r"    s_angle leaves its limits -0.5 to 1 rad at t = (\S+) s; "
+        r"farthest (\S+) rad at t = (\S+) s\n    limits are reported, not enforced\n",
+        shown.out,
+    )
+    assert said
+    since, farthest, at = map(float, said.groups())
+    rows = np.loadtxt(tmp_path / "out" / "arm.csv", delimiter=",", skiprows=2)
+    outside = (rows[:, 1] < -0.5) | (rows[:, 1] > 1.0)
+    assert since == pytest.approx(rows[outside][0, 0], rel=1e-3)
+    assert farthest == pytest.approx(rows[:, 1].max(), rel=1e-3)
+    assert at == pytest.approx(rows[np.argmax(rows[:, 1]), 0], rel=1e-3)
+    assert main(["simulate", str(scene), "-o", out, "--t-end", "0.1"]) == 0
+    assert " limits" not in capsys.readouterr().out
+    scene.write_text(ARM.replace("[-0.5, 1.0]", "[0.5, 1.0]"), "utf-8")
+    assert main(["simulate", str(scene), "-o", out, "--t-end", "0.1"]) == 0
+    assert "s_angle starts outside its limits 0.5 to 1 rad; " in capsys.readouterr().out
+
+
+def test_check_refuses_a_singular_mass_matrix(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As generating does, and naming the body."""
+    scene = tmp_path / "arm.toml"
+    scene.write_text(
+        ARM.replace("mass = 1, inertia_com = [0.1, 0.2, 0.2]", "mass = 0, inertia_com = 0"), "utf-8"
+    )
+    for command in ("check", "generate"):
+        assert main([command, str(scene), *(["-o", str(tmp_path)] if command != "check" else [])])
+        err = capsys.readouterr().err.splitlines()[-1]
+        assert err.startswith("eomgen: arm.toml: body 'lower': nothing resists")
+    assert not list(tmp_path.glob("*.py"))
+
+
+def test_routes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file of each, named after it where it is not the scene's own; why one was taken."""
+    out = str(tmp_path)
+    base = ["generate", "cart_pole", "-o", out]
+    for route, name in (("auto", "cart_pole"), ("ldl", "cart_pole_ldl"), ("aba", "cart_pole_aba")):
+        assert main([*base, "--route", route]) == 0
+        assert capsys.readouterr().out == f"{tmp_path}/{name}.py: written\n"
+    assert main([*base, "--route", "aba", "--check"]) == 0
+    assert main(["generate", "acrobot", "-o", out, "--route", "ldl", "--check"]) == 1
+    assert capsys.readouterr().err == (
+        f"eomgen: 1 stale; run: eomgen generate acrobot -o {tmp_path} --route ldl\n"
+    )
+    assert main(["generate", "two_body", "--form", "momentum", "-o", out]) == 0
+    assert main(["generate", "two_body", "--form", "velocity", "-o", out]) == 0
+    assert {"two_body.py", "two_body_momentum.py"} < {path.name for path in tmp_path.iterdir()}
+    options = ["--route", "ldl", "--t-end", "0.01"]
+    assert main(["simulate", "cart_pole", "-o", out, *options]) == 0
+    assert (tmp_path / "cart_pole_ldl.csv").exists()
+    capsys.readouterr()
+    assert main(["generate", "human_figure", "--route", "closed", "-o", out]) == 1
+    assert capsys.readouterr().err.startswith(
+        "eomgen: human_figure.toml: route: 'closed' needs the closed form, and "
+    )
+    assert main(["generate", "two_body", "--form", "momentum", "--route", "aba", "-o", out]) == 1
+    assert "route: 'aba' is for form = 'velocity'" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as stop:
+        main([*base, "--route", "abba"])
+    assert stop.value.code == 2
+
+
+def test_the_route_is_explained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The routes with their costs, the one taken marked; kept with a module that is fresh."""
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path / "store"))
+    command = ["generate", "quadruped", "--explain", "--report", "-o", str(tmp_path)]
+    assert main(command) == 0
+    first = capsys.readouterr().out.splitlines()
+    assert first[0] == f"{tmp_path}/quadruped.py: written"
+    assert first[1].split()[:2] == ["route", "cost"]
+    taken = [line.split() for line in first if line.endswith("<- taken")]
+    assert len(taken) == 1
+    told = {line.split()[0]: line.split()[1] for line in first[2:5]}
+    assert set(told) == {"closed", "aba", "ldl"} and told["closed"] == "-"
+    docstring = (tmp_path / "quadruped.py").read_text("utf-8")
+    assert int(taken[0][1]) == min(int(cost) for cost in told.values() if cost != "-")
+    assert re.search(r"One call of `derivative` takes \d+ operations", docstring)
+
+    def never(model: object) -> None:
+        raise AssertionError("derived again")
+
+    monkeypatch.setattr("eomgen.pipeline.generate", never)
+    assert main(command) == 0
+    again = capsys.readouterr().out.splitlines()
+    assert again[0] == f"{tmp_path}/quadruped.py: fresh" and again[1:] == first[1:]
+
+
+def test_outputs_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What is named is generated beside what pictures need, by the rules of the scene's own key."""
+    out = str(tmp_path)
+    base = ["generate", "cart_pole", "--route", "aba", "-o", out]
+    target = tmp_path / "cart_pole_aba.py"
+    assert main([*base, "--outputs", "momentum, input_jacobian"]) == 0
+    text = target.read_text("utf-8")
+    shown = {"kinetic_energy", "potential_energy", "body_poses"}
+    always = {"initial_state", "derivative", "jacobian"}
+    assert set(re.findall(r"^def ([a-z]\w+)\(", text, re.MULTILINE)) == {
+        "momentum",
+        "input_jacobian",
+        *shown,
+        *always,
+    }
+    assert main([*base, "--outputs", "all"]) == 0
+    assert "def point_jacobians(" in target.read_text("utf-8")
+    capsys.readouterr()
+    for scene, outputs, said in (
+        (
+            "cart_pole",
+            "momentm",
+            "eomgen: --outputs: no output 'momentm' (did you mean 'momentum'?)",
+        ),
+        (
+            "cart_pole",
+            "momentum,",
+            "eomgen: --outputs: no output ''; known: all, forward_dynamics, ",
+        ),
+        ("cart_pole", "jacobian", "eomgen: --outputs: 'jacobian' is always there; leave it out"),
+        (
+            "chain",
+            "momentum,input_jacobian",
+            "eomgen: chain.toml: --outputs: 'input_jacobian' is about inputs, and there are none",
+        ),
+    ):
+        command = ["generate", scene, "--outputs", outputs, "-o", out]
+        assert main(command) == 1
+        assert capsys.readouterr().err.startswith(said)
+    options = ["--form", "momentum", "--outputs", "mass_matrix"]
+    assert main(["generate", "two_body", *options, "-o", out]) == 1
+    assert "'mass_matrix' is made for form = 'velocity' only" in capsys.readouterr().err
+    options = ["--outputs", "centre_of_mass", "--t-end", "0.01", "--route", "aba"]
+    assert main(["simulate", "cart_pole", *options, "-o", out]) == 0
+    assert "def centre_of_mass(" in target.read_text("utf-8")
 
 
 def test_passes_report_what_they_save(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -203,7 +408,7 @@ def test_looks_and_times_are_not_derived_again(
     monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
     text = (BUILT_IN / "pendulum.toml").read_text("utf-8")
     derived = [
-        generated_code(build_model(parse_scene(text.replace(old, new))))[2]
+        generated_code(build_model(parse_scene(text.replace(old, new)))).derived
         for old, new in (
             ("", ""),
             ("#33658a", "#000000"),

@@ -10,14 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
+from mechanisms import BUILT_IN, SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
 from newton_euler import Mechanism, Motion, solve
 
 from eomgen.errors import SceneError
 from eomgen.pipeline import compile_model, compile_scene
-from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 
 TOLERANCE = 1e-12
+GENERATED = Path(__file__).parent.parent / "generated"
 TREES = [random_tree(seed) for seed in SEEDS]
 
 
@@ -48,10 +49,22 @@ def assert_agrees(
     accelerations = rates[scene.places(module, "_dot")]
     assert difference(accelerations, motion.accelerations) <= TOLERANCE
     forces = module.joint_forces(0.0, y, p, u)
-    assert difference(forces, motion.pin_forces[scene.pin_rows(module)]) <= TOLERANCE
+    assert difference(forces, pin_wrenches(c, motion, u, p)) <= TOLERANCE
     poses = module.body_poses(0.0, y, p, u)
     assert difference(poses, motion.poses[scene.body_rows(module)]) <= TOLERANCE
     return motion
+
+
+def pin_wrenches(
+    c: Compiled,
+    motion: Motion,
+    u: Mapping[str, float] | None = None,
+    p: Mapping[str, float] | None = None,
+) -> np.ndarray:
+    """What each of a module's JOINTS puts on its parent: the pin's force, and the motor's -τ."""
+    torque = c.scene.mechanism(p, u).torque
+    moments = np.zeros(len(motion.poses)) if torque is None else -np.asarray(torque, float)
+    return np.column_stack((motion.pin_forces, moments))[c.scene.pin_rows(c.module)]
 
 
 def test_thousand_random_states(built_in: Compiled) -> None:
@@ -77,12 +90,12 @@ def test_thousand_random_states(built_in: Compiled) -> None:
     rates = module.derivative(0.0, columns, u=u)
     assert rates.shape == (len(module.STATES), 1000)
     forces = module.joint_forces(0.0, columns, u=u)
-    assert forces.shape == (len(module.JOINTS), 2, 1000)
+    assert forces.shape == (len(module.JOINTS), 3, 1000)
     for i, motion in enumerate(expected):
         accelerations = rates[scene.places(module, "_dot"), i]
         assert difference(accelerations, motion.accelerations) <= TOLERANCE
-        pins = motion.pin_forces[scene.pin_rows(module)]
-        assert difference(forces[:, :, i], pins) <= TOLERANCE
+        given = dict(zip(module.INPUTS, inputs[i].tolist(), strict=True))
+        assert difference(forces[:, :, i], pin_wrenches(built_in, motion, given)) <= TOLERANCE
 
 
 def test_quarter_poses(built_in: Compiled) -> None:
@@ -111,6 +124,101 @@ def test_random_trees(tree: Scene) -> None:
         assert_agrees(c, tree.random_state(c.module, rng), tree.random_inputs(rng))
 
 
+# What is observed of a motion.
+
+
+@pytest.fixture(params=[*BUILT_IN, *TREES], ids=lambda case: getattr(case, "name", case))
+def c(request: pytest.FixtureRequest) -> Compiled:
+    """The built-in scenes of the closed form, and the random trees."""
+    return compiled(request.param)
+
+
+def test_bodies_and_the_whole(c: Compiled) -> None:
+    """Velocities of bodies, centre of mass, momentum and energies, from the other solver's motion.
+
+    With the scene's parameters and with others.
+    """
+    scene, module = c.scene, c.module
+    rng = np.random.default_rng(27)
+    for k in range(20):
+        y, u = scene.random_state(module, rng), scene.random_inputs(rng)
+        p = {name: v * float(rng.uniform(0.5, 2.0)) for name, v in scene.defaults.items()}
+        p = p if k % 2 else None
+        mechanism, motion = scene.mechanism(p, u), scene.motion(module, y, p, u)
+        m, inertia = np.asarray(mechanism.mass), np.asarray(mechanism.inertia)
+        (x, height, _), (xd, yd, w) = motion.poses.T, motion.velocities.T
+        velocities = module.body_velocities(0.0, y, p, u)
+        assert difference(velocities, motion.velocities[scene.body_rows(module)]) <= TOLERANCE
+        centre = np.array([m @ x, m @ height]) / np.sum(m)
+        assert difference(module.centre_of_mass(0.0, y, p, u), centre) <= TOLERANCE
+        momentum = np.array([m @ xd, m @ yd, m @ (x * yd - height * xd) + inertia @ w])
+        assert difference(module.momentum(0.0, y, p, u), momentum) <= TOLERANCE
+        kinetic = (m @ (xd**2 + yd**2) + inertia @ w**2) / 2
+        assert difference(module.kinetic_energy(0.0, y, p, u), kinetic) <= TOLERANCE
+        potential = np.asarray(mechanism.gravity * (m @ height))
+        assert difference(module.potential_energy(0.0, y, p, u), potential) <= TOLERANCE
+
+
+def test_bias_force(c: Compiled) -> None:
+    """h = V + G, and with the applied forces it is what holds the accelerations at 0."""
+    scene, module = c.scene, c.module
+    rng, n = np.random.default_rng(28), len(scene.coordinates)
+    for _ in range(20):
+        y, u = scene.random_state(module, rng), scene.random_inputs(rng)
+        V, G, h, F = (
+            getattr(module, f"{kind}_force")(0.0, y, u=u)
+            for kind in ("velocity", "gravity", "bias", "applied")
+        )
+        terms = max(1.0, *(float(np.max(np.abs(part))) for part in (V, G, F)))
+        assert difference(h / terms, (V + G) / terms) <= TOLERANCE
+        needed = module.inverse_dynamics(y[:n], y[n:], np.zeros(n), u=u)
+        assert difference(needed / terms, (h - F) / terms) <= TOLERANCE
+        still = np.concatenate((y[:n], np.zeros(n)))
+        assert difference(module.bias_force(0.0, still), G) <= TOLERANCE
+
+
+def test_points(c: Compiled) -> None:
+    """Places, velocities and Jacobians of named points; a scene without any has no such output."""
+    scene, module = c.scene, c.module
+    marked = scene.points(scene.defaults)
+    assert list(module.POINTS) == [f"p{i}" for i in range(len(marked))]
+    if not marked:
+        assert not any(name.startswith("point") for name in module.COST)
+        return
+    rng, n = np.random.default_rng(29), len(scene.coordinates)
+    columns = [scene.random_state(module, rng) for _ in range(6)]
+    for y in columns:
+        p = {name: v * float(rng.uniform(0.5, 2.0)) for name, v in scene.defaults.items()}
+        motion = scene.motion(module, y, p)
+        placed = [at_point(motion, *point) for point in scene.points(p)]
+        places, rates = (np.array(parts) for parts in zip(*placed, strict=True))
+        assert difference(module.point_positions(0.0, y, p), places) <= TOLERANCE
+        assert difference(module.point_velocities(0.0, y, p), rates) <= TOLERANCE
+        J = module.point_jacobians(0.0, y, p)
+        assert J.shape == (len(marked), 2, n)
+        for i, name in enumerate(module.STATES[n:]):  # each velocity alone
+            unit = y.copy()
+            unit[n:] = [float(other == name) for other in module.STATES[n:]]
+            alone = scene.motion(module, unit, p)
+            column = np.array([at_point(alone, *point)[1] for point in scene.points(p)])
+            assert difference(J[:, :, i], column) <= TOLERANCE
+        assert difference(J @ y[n:], rates) <= TOLERANCE
+    for name in ("point_positions", "point_velocities", "point_jacobians"):
+        function = getattr(module, name)
+        together = function(0.0, np.array(columns).T)
+        apart = np.stack([function(0.0, y) for y in columns], axis=-1)
+        assert difference(together, apart) <= TOLERANCE
+
+
+def at_point(motion: Motion, body: int, at: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Place and velocity of a point of a body."""
+    x, y, angle = motion.poses[body]
+    xd, yd, w = motion.velocities[body]
+    rx = np.cos(angle) * at[0] - np.sin(angle) * at[1]
+    ry = np.sin(angle) * at[0] + np.cos(angle) * at[1]
+    return np.array([x + rx, y + ry]), np.array([xd - w * ry, yd + w * rx])
+
+
 def test_random_trees_are_of_every_kind() -> None:
     """The trees above leave out no kind of mechanism that the generator can make."""
     kinds = set()
@@ -133,9 +241,15 @@ def test_random_trees_are_of_every_kind() -> None:
         kinds |= {"no gravity"} if m.gravity == 0.0 else {"gravity"}
         arms = [tuple(bool(x) for x in arm) for arm in (*m.r_parent, *m.r_child)]
         kinds |= {"two components"} if (True, True) in arms else set()
+        points = tree.points(tree.defaults)
+        kinds |= {"no point", "one point", "two points"} & {
+            ("no point", "one point", "two points")[len(points)]
+        }
+        kinds |= {"point off an axis"} if any(all(at) for _, at in points) else set()
     assert kinds == {
         "floating", "grounded", "branch", "chain of three", "several trees", "reordered",
         "point mass", "motor", "force", "gravity", "no gravity", "two components",
+        "no point", "one point", "two points", "point off an axis",
     }  # fmt: skip
 
 
@@ -412,26 +526,43 @@ ALLOWED = (
 )  # fmt: skip
 
 
+def test_generated_holds_every_scene() -> None:
+    """One module for each scene that comes with eomgen, and no other."""
+    assert sorted(path.stem for path in GENERATED.glob("*.py")) == list(built_in_names())
+
+
+@pytest.mark.parametrize("name", built_in_names())
+def test_generated_is_what_is_generated(name: str) -> None:
+    """The committed modules, byte for byte: a change of equations or of their cost shows."""
+    fresh = compile_scene(read_scene(name)).encode() == (GENERATED / f"{name}.py").read_bytes()
+    assert fresh, f"stale; run: eomgen generate {name} -o generated"
+
+
 def test_same_bytes_whatever_the_hash_seed() -> None:
-    """Two processes with different hash seeds write the same module, and it is this one's too."""
+    """Two processes with different hash seeds write the committed modules, by every route."""
     program = (
         "import sys; from eomgen.pipeline import compile_scene;"
         "from eomgen.scene.reader import read_scene;"
-        "sys.stdout.buffer.write(compile_scene(read_scene('two_body')).encode())"
+        "sys.stdout.buffer.write("
+        "b'\\0'.join(compile_scene(read_scene(name)).encode() for name in sys.argv[1:]))"
     )
-    checkout = str(Path(__file__).parent.parent)
+    names = ("two_body_forced", "acrobot", "chain", "furuta_pendulum", "puma560", "spinning_top")
     running = [
         subprocess.Popen(
-            [sys.executable, "-c", program],
+            [sys.executable, "-c", program, *names],
             stdout=subprocess.PIPE,
             env={**os.environ, "PYTHONHASHSEED": seed},
-            cwd=checkout,
+            cwd=GENERATED.parent,
         )
         for seed in ("0", "1")
     ]
     first, second = (process.communicate(timeout=60)[0] for process in running)
     assert all(process.returncode == 0 for process in running)
-    assert first == second == compile_scene(read_scene("two_body")).encode()
+    same = first == second
+    assert same
+    modules = dict(zip(names, first.split(b"\0"), strict=True))
+    stale = [n for n, module in modules.items() if module != (GENERATED / f"{n}.py").read_bytes()]
+    assert stale == []
 
 
 def test_same_bytes_again(built_in: Compiled) -> None:

@@ -10,8 +10,8 @@ import sympy as sp
 from mechanisms import BUILT_IN, SEEDS, TOLD, Scene, compiled, random_tree
 from newton_euler import Mechanism, solve
 
+from eomgen.build import build_model
 from eomgen.derivation.closed import Equations, derive
-from eomgen.model import build_model
 from eomgen.scene.reader import parse_scene
 
 POSITIVE, NONNEGATIVE = "positive", "nonnegative"
@@ -134,7 +134,7 @@ def pivots(equations: Equations, scene: Scene, poses: np.ndarray) -> np.ndarray:
     angle: list[np.ndarray] = []
     for body, symbol in zip(equations.model.bodies, s.angle, strict=True):
         base = angle[body.parent] if body.parent >= 0 else 0.0
-        angle.append(base + turned[body.coordinates[-1].name])
+        angle.append(base + turned[body.positions[-1].name])
         values[symbol] = angle[-1]
     meaning = dict(equations.solution.definitions)
 

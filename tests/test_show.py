@@ -22,9 +22,10 @@ from eomgen import templating
 from eomgen.errors import RunError
 from eomgen.files import is_ours
 from eomgen.scene.look import Box, Camera, Disc, Polygon, Rod
-from eomgen.show.figure import draw_motion, outline, save_figure
+from eomgen.show.figure import draw_motion, save_figure
 from eomgen.show.motion import Motion, thinned
 from eomgen.show.page import render_page, save_page
+from eomgen.show.plane import outline
 from eomgen.show.style import GREEK, symbol, write_figure
 
 NASTY = "</script><img src=x onerror=alert(1)> <!-- $x^2$ \u2028 鎖 \x01 {{ t }}"
@@ -245,7 +246,10 @@ def test_page_holds_the_motion() -> None:
     assert run["states"] == list(motion.states) and run["units"] == list(motion.units)
     assert run["parameters"] == [ARM] and run["anchors"] == [[1, 0.0, ARM]]
     assert run["camera"]["follow"] == 1 and run["camera"]["height"] == 3.0
-    assert run["shapes"] == [[shape.model_dump(mode="json") for shape in s] for s in motion.shapes]
+    box = {"type": "box", "size": [0.5, 0.2], "center": [0.0, 0.0], "angle": 0.0}
+    assert run["shapes"][0] == [{**box, "color": "#4477aa"}]
+    assert run["shapes"][1] == [shape.model_dump(mode="json") for shape in motion.shapes[1]]
+    assert run["colors"] == ["#4477aa", "#4477aa"] and run["traced"] == [0, 1]
     assert page.scripts[1].strip() == POSES
     assert "run stopped" not in page.text
     stopped = replace(motion, finished=False, message="<b>too fast</b>")

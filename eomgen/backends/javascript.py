@@ -1,7 +1,9 @@
 """The JavaScript backend: poses of the bodies from the state, for the page that plays a motion."""
 
-from eomgen.program.assemble import System
+from collections.abc import Sequence
+
 from eomgen.program.printing import Dialect, Names, print_block
+from eomgen.program.system import System
 from eomgen.templating import render
 
 RESERVED = frozenset(
@@ -14,18 +16,30 @@ DIALECT = Dialect({name: f"Math.{name}" for name in ("sin", "cos", "tan", "sqrt"
 
 
 def javascript_poses(system: System) -> str:
-    """`function bodyPoses(y, p)`: [[x, y, angle], …] in m and rad, from state and parameters."""
+    """`function bodyPoses(y, p)`: the poses of all bodies from state and parameters.
+
+    For each body [x, y, angle] in the plane, m and rad; in space the three rows, four numbers each,
+    of [world_R_body | position], 1 and m.
+    """
     program = system.program
     names = Names(program, DIALECT)
-    nodes = program.outputs["body_poses"].nodes
-    block = print_block(program, nodes, names, DIALECT, fixed=True)
-    states = [s.name for s in system.form.states]
+    poses = program.outputs["body_poses"]
+    block = print_block(program, poses.nodes, names, DIALECT, fixed=True)
+    states = [s.name for s in system.states]
     parameters = [p.name for p in system.model.parameters]
     used = {names[i] for i in block.constants}
     given = [
         *((names.safe(n), f"p[{i}]") for i, n in enumerate(parameters) if names.safe(n) in used),
         *((names.safe(n), f"y[{i}]") for i, n in enumerate(states) if n in block.inputs),
     ]
-    rows = [block.results[i : i + 3] for i in range(0, len(block.results), 3)]
+    rows = _bracketed(block.results, poses.shape[-1], ", ")
+    if len(poses.shape) == 3:  # rows of a matrix each body
+        rows = _bracketed(rows, poses.shape[-2], ",\n     ")
     context = {"given": given, "lines": block.lines, "rows": rows}
     return render("javascript", "poses.js.jinja", context)
+
+
+def _bracketed(parts: Sequence[str], width: int, between: str) -> list[str]:
+    """Arrays of `width` parts each."""
+    groups = (parts[i : i + width] for i in range(0, len(parts), width))
+    return [f"[{between.join(group)}]" for group in groups]

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from eomgen.program.assemble import System
 from eomgen.program.printing import Block, Dialect, Names, print_block
 from eomgen.program.program import cost
+from eomgen.program.system import System
 from eomgen.templating import render
 
 WIDTH = 100
@@ -23,18 +23,35 @@ DIALECT = Dialect({name: name for name in ("sin", "cos", "tan", "sqrt")}, RESERV
 ABOUT = {
     "derivative": "Time derivative of the state.",
     "jacobian": "Exact Jacobian of `derivative` by the state.",
+    "input_jacobian": "Exact Jacobian of `derivative` by the inputs.",
+    "parameter_jacobian": "Exact Jacobian of `derivative` by the parameters.",
     "forward_dynamics": "Accelerations (nv,) under generalised forces `tau` beside the effects.",
     "inverse_dynamics": "Generalised forces (nv,) that give accelerations `vd` beside the effects.",
     "mass_matrix": "Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v.",
     "velocity_force": "V(q, v) of M v̇ + V + G = F, (nv,).",
     "gravity_force": "G(q) of M v̇ + V + G = F, (nv,).",
+    "bias_force": "h = V + G of M v̇ + h = F, (nv,).",
     "applied_force": "F of M v̇ + V + G = F, (nv,): applied forces and torques.",
     "kinetic_energy": "Kinetic energy, J.",
     "potential_energy": "Potential energy, J.",
-    "momentum": "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
-    "joint_forces": "Force of each of `JOINTS` on its parent, world x and y, N.",
-    "body_poses": "World x, y (m) of each centre of mass and angle (rad), a row a body.",
+    "centre_of_mass": "World place of the centre of mass of all bodies, m.",
+    "point_positions": "World place of each of `POINTS`, m.",
+    "point_velocities": "World velocity of each of `POINTS`, m/s.",
+    "point_jacobians": "J of each of `POINTS`: its world velocity is J v.",
 }
+ABOUT_PLANE = {
+    "momentum": "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
+    "joint_forces": "What each of `JOINTS` puts on its parent: world x, y (N), moment (N m).",
+    "body_poses": "World x, y (m) of each centre of mass and angle (rad), a row a body.",
+    "body_velocities": "World velocity x, y (m/s) of each centre of mass and rate of turn (rad/s).",
+}
+ABOUT_SPACE = {
+    "momentum": "Momentum x, y, z (kg m/s), angular about the world's origin (kg m^2/s).",
+    "joint_forces": "Force (N) and moment (N m) of each of `JOINTS` on its parent, world axes.",
+    "body_poses": "[world_R_body | centre of mass (m)] of each body, 3 x 4.",
+    "body_velocities": "Velocity of each centre of mass (m/s) and angular velocity (rad/s), world.",
+}
+DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 
 
 @dataclass(frozen=True)
@@ -51,11 +68,12 @@ class Kernel:
     constants: str
     functions: tuple[str, ...]
     operations: str
+    tangent: bool
 
 
 def python_module(system: System) -> str:
     """The generated module's source. Same system, same bytes."""
-    program, model, states = system.program, system.model, system.form.states
+    program, model, states = system.program, system.model, system.states
     names = Names(program, DIALECT)
     blocks = {
         name: print_block(program, output.nodes, names, DIALECT)
@@ -63,16 +81,20 @@ def python_module(system: System) -> str:
     }
     kernels = {name: _kernel(system, name, block, names) for name, block in blocks.items()}
     dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
-    special = {"initial_state", "derivative", "jacobian", *(name for name, _, _ in dynamics)}
+    special = {"initial_state", "derivative", *DERIVATIVES, *(name for name, _, _ in dynamics)}
+    quaternions = tuple(model.quaternions) if model.form == "velocity" else ()
     context: dict[str, Any] = {
         "title": _plain(model.title),
         "scene": model.name,
         "about": _document(system),
         "form": model.form,
+        "dimensions": model.dimensions,
         "states": states,
         "ny": len(states),
-        "nv": len(model.coordinates),
+        "nq": len(model.coordinates),
+        "nv": len(model.velocities),
         "positions": repr(tuple(i for i, s in enumerate(states) if s.position)),
+        "quaternions": repr(quaternions),
         "parameters": model.parameters,
         "parameter_names": _joined([names.safe(p.name) for p in model.parameters]),
         "inputs": model.inputs,
@@ -80,9 +102,12 @@ def python_module(system: System) -> str:
         "effects": repr(tuple(effect.type for effect in model.effects)),
         "bodies": repr(tuple(body.name for body in model.bodies)),
         "joints": repr(tuple(b.joint.name for b in model.bodies if b.joint.type != "free")),
+        "points": repr(tuple(point.name for point in model.points)),
         "costs": [(name, json.dumps(cost(program, name))) for name in kernels],
         "kernels": list(kernels.values()),
+        "derivative": kernels["derivative"],
         "outputs": [kernel for name, kernel in kernels.items() if name not in special],
+        "derivatives": [kernel for name, kernel in kernels.items() if name in DERIVATIVES],
         "dynamics": [(kernels[name], *rest) for name, *rest in dynamics if name in kernels],
         **_fixed(system, blocks, names),
     }
@@ -91,17 +116,19 @@ def python_module(system: System) -> str:
 
 def _kernel(system: System, name: str, block: Block, names: Names) -> Kernel:
     shape = tuple(system.program.outputs[name].shape)
+    special = ABOUT_PLANE if system.model.dimensions == 2 else ABOUT_SPACE
     return Kernel(
         name=name,
-        about=ABOUT.get(name, ""),
+        about=special.get(name, ABOUT.get(name, "")),
         shape=repr(shape),
         block=block,
-        state=_unpacking([s.name for s in system.form.states], block, names),
+        state=_unpacking([s.name for s in system.states], block, names),
         inputs=_unpacking([i.name for i in system.model.inputs], block, names),
         extra=_unpacking(system.extra.get(name, ()), block, names),
         constants=_joined([names[i] for i in block.constants]),
         functions=block.functions,
         operations=_operations(cost(system.program, name)),
+        tangent=name in system.tangents,
     )
 
 
@@ -155,7 +182,7 @@ def _plain(text: str) -> str:
 
 
 def _units(system: System) -> list[tuple[str, str]]:
-    entries = [(s.name, s.unit) for s in system.form.states]
+    entries = [(s.name, s.unit) for s in system.states]
     entries += [(i.name, i.unit) for i in system.model.inputs]
     return entries + [(p.name, _plain(p.unit)) for p in system.model.parameters]
 
@@ -164,7 +191,7 @@ def _document(system: System) -> list[str]:
     """The docstring's tables: states, inputs, parameters, effects, operations."""
     model = system.model
     lines = ["State y, in this order:"]
-    lines += _table([(s.name, s.unit, s.about) for s in system.form.states])
+    lines += _table([(s.name, s.unit, s.about) for s in system.states])
     if model.inputs:
         lines += ["", "Inputs u, each 0 unless given:"]
         lines += _table([(i.name, i.unit, i.about) for i in model.inputs])

@@ -15,13 +15,11 @@ from eomgen.derivation.elimination import (
 from eomgen.derivation.free_bodies import FreeBodies, draw_free_bodies
 from eomgen.derivation.kinematics import Kinematics, differentiate_joints
 from eomgen.derivation.solution import Definition, Solution, gathered, solve
+from eomgen.derivation.supported import why_not_pins
 from eomgen.derivation.symbols import Expr, Symbols, make_symbols, over_bodies
 from eomgen.errors import SceneError
 from eomgen.joints import Free
 from eomgen.model import Model
-
-MOST_BODIES = 12
-"""Bodies of one tree; twelve take about a minute, and each one more a third more."""
 
 
 @dataclass(frozen=True)
@@ -46,15 +44,10 @@ class Equations:
 def derive(model: Model) -> Equations:
     """Derive, eliminate and solve; see the modules of this package for each step.
 
-    Raises `SceneError` for a tree of more than `MOST_BODIES` bodies.
+    Raises `SceneError` for a model that the closed form is not for.
     """
-    for tree in trees(model):
-        if len(tree.bodies) > MOST_BODIES:
-            root = model.bodies[tree.root].name
-            raise SceneError(
-                f"route: the tree at '{root}' has {len(tree.bodies)} bodies; "
-                f"the closed form is for small trees, of up to {MOST_BODIES}"
-            )
+    if why_not := why_not_pins(model):
+        raise SceneError(f"route: no closed form of this scene: {why_not}")
     symbols = make_symbols(model)
     kinematics = differentiate_joints(model, symbols)
     free_bodies = draw_free_bodies(model, symbols, kinematics)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.closed import Equations
+from eomgen.derivation.states import State, velocity_states
 from eomgen.derivation.symbols import Expr, over_bodies, over_coordinates
 from eomgen.errors import SceneError
 from eomgen.joints import Free
@@ -17,26 +18,17 @@ from eomgen.joints.base import WORLD
 
 
 @dataclass(frozen=True)
-class State:
-    """One number of the state vector; `position` tells positions and angles from their rates."""
-
-    name: str
-    unit: str
-    about: str
-    position: bool
-    symbol: Expr
-
-
-@dataclass(frozen=True)
 class StateForm:
     """A state vector, what the body symbols are in it, and its time derivative.
 
+    `symbols` stand for the states in order.
     `replaced` is put into expressions before they are lowered (angles, so that differences of
     angles become one coordinate); `defined` is looked up when asked for. `rates` is ẏ over the
     accelerations of the solution, `initial` the state over `q` and `v`.
     """
 
     states: tuple[State, ...]
+    symbols: tuple[Expr, ...]
     replaced: dict[Expr, Expr]
     defined: dict[Expr, Expr]
     rates: tuple[Expr, ...]
@@ -51,16 +43,11 @@ def state_form(equations: Equations) -> StateForm:
 
 
 def _velocity_form(equations: Equations) -> StateForm:
-    symbols, coordinates = equations.symbols, equations.model.coordinates
-    states = [
-        State(c.name, c.unit, c.about, True, q) for c, q in zip(coordinates, symbols.q, strict=True)
-    ] + [
-        State(c.rate, f"{c.unit}/s", f"rate of {c.name}", False, v)
-        for c, v in zip(coordinates, symbols.v, strict=True)
-    ]
+    symbols = equations.symbols
     turned = over_coordinates(equations.model, symbols)
     return StateForm(
-        states=tuple(states),
+        states=velocity_states(equations.model),
+        symbols=(*symbols.q, *symbols.v),
         replaced={angle: turned[angle] for angle in symbols.angle},
         defined={
             **_places(equations),
@@ -92,12 +79,13 @@ def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
     model, symbols = equations.model, equations.symbols
     inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
     states: list[State] = []
+    own: list[Expr] = []
     rates: list[Expr] = []
     initial: list[Expr] = []
     replaced: dict[Expr, Expr] = {}
     defined = _places(equations)
     for k, body in enumerate(model.bodies):
-        if model.value(body.inertia_com) == 0.0:
+        if model.value(body.moment) == 0.0:
             raise SceneError(
                 f"form: '{model.form}' needs an angular momentum of body '{body.name}', whose "
                 "inertia_com is 0; use form = 'velocity' or give it an inertia"
@@ -105,37 +93,39 @@ def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
         m, inertia, name = symbols.mass[k], symbols.inertia[k], body.name
         free = isinstance(body.joint, Free)
         if free or redundant:
-            own = [c.name for c in body.coordinates[:2]] if free else [f"x_{name}", f"y_{name}"]
-            x, y = (sp.Symbol(word, real=True) for word in own)
+            words = [c.name for c in body.positions[:2]] if free else [f"x_{name}", f"y_{name}"]
+            x, y = (sp.Symbol(word, real=True) for word in words)
             px, py = (sp.Symbol(f"P_{name}_{axis}", real=True) for axis in "xy")
             states += [
-                State(x.name, "m", f"x of the centre of mass of {name}", True, x),
-                State(y.name, "m", f"y of the centre of mass of {name}", True, y),
-                State(px.name, "kg m/s", f"momentum of {name}, x", False, px),
-                State(py.name, "kg m/s", f"momentum of {name}, y", False, py),
+                State(x.name, "m", f"x of the centre of mass of {name}", True),
+                State(y.name, "m", f"y of the centre of mass of {name}", True),
+                State(px.name, "kg m/s", f"momentum of {name}, x", False),
+                State(py.name, "kg m/s", f"momentum of {name}, y", False),
             ]
+            own += [x, y, px, py]
             initial += [symbols.x[k], symbols.y[k], m * symbols.xd[k], m * symbols.yd[k]]
             defined |= {symbols.x[k]: x, symbols.y[k]: y}
             defined |= {symbols.xd[k]: px / m, symbols.yd[k]: py / m}
             rates += [symbols.xd[k], symbols.yd[k], m * symbols.xdd[k], m * symbols.ydd[k]]
-        word = body.coordinates[-1].name if body.parent < 0 else f"angle_{name}"
+        word = body.positions[-1].name if body.parent < 0 else f"angle_{name}"
         angle, spin = sp.Symbol(word, real=True), sp.Symbol(f"L_{name}", real=True)
         states += [
-            State(word, "rad", f"angle of {name} from the {WORLD}'s x axis", True, angle),
-            State(
-                spin.name, "kg m^2/s", f"angular momentum of {name} about its centre", False, spin
-            ),
+            State(word, "rad", f"angle of {name} from the {WORLD}'s x axis", True),
+            State(spin.name, "kg m^2/s", f"angular momentum of {name} about its centre", False),
         ]
+        own += [angle, spin]
         initial += [symbols.angle[k].xreplace(outward), inertia * symbols.omega[k]]
         replaced[symbols.angle[k]] = angle
         defined[symbols.omega[k]] = spin / inertia
         rates += [symbols.omega[k], inertia * symbols.alpha[k]]
     _check_names(equations, states)
     # A root's own coordinate is its state by the same symbol; the others follow from the bodies.
-    known = {state.symbol for state in states}
+    known = set(own)
     defined |= {s: e for s, e in inward.items() if s not in known}
     defined = {s: e for s, e in defined.items() if s not in known}
-    return StateForm(tuple(states), replaced, defined, tuple(rates), _over_q(equations, initial))
+    return StateForm(
+        tuple(states), tuple(own), replaced, defined, tuple(rates), _over_q(equations, initial)
+    )
 
 
 def _over_q(equations: Equations, expressions: list[Expr]) -> tuple[Expr, ...]:

@@ -1,13 +1,13 @@
 """Each body drawn free: Newton and Euler with unknown joint forces (handout (12)-(17))."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
 
 from eomgen.derivation.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, cross, rotate, scale
-from eomgen.effects.base import Load
+from eomgen.effects.base import JointLoad, Load
 from eomgen.joints import Free
 from eomgen.language.formula import Formula
 from eomgen.model import Model
@@ -21,7 +21,7 @@ class SymbolicMechanism:
 
     def __init__(self, model: Model, symbols: Symbols) -> None:
         self._symbols = symbols
-        self._joints = {body.joint.name: body.joint for body in model.bodies}
+        self.dimensions = model.dimensions
         self.bodies = tuple(body.name for body in model.bodies)
 
     def mass(self, body: str) -> Expr:
@@ -31,10 +31,6 @@ class SymbolicMechanism:
     def height(self, body: str) -> Expr:
         """World y symbol of a body."""
         return self._symbols.y[self.bodies.index(body)]
-
-    def sides(self, joint: str) -> tuple[str, str]:
-        """Parent and child of a joint."""
-        return (self._joints[joint].parent, self._joints[joint].child)
 
     def value(self, formula: Formula) -> Expr:
         """A quantity over parameter symbols."""
@@ -50,11 +46,13 @@ class FreeBodies:
     """What acts on each body besides its joints, and the free-body equations as (left, right).
 
     `gravity` and `applied` are the wrenches of the effects; `equations` are three a body: x, y and
-    torque about the centre of mass, with the joint forces f_j as unknowns.
+    torque about the centre of mass, with the joint forces f_j as unknowns. `motor` is the torque at
+    each body's own joint, on the body.
     """
 
     gravity: tuple[Wrench, ...]
     applied: tuple[Wrench, ...]
+    motor: tuple[Expr, ...]
     equations: tuple[tuple[Expr, Expr], ...]
     potential_energy: Expr
 
@@ -66,8 +64,11 @@ def draw_free_bodies(model: Model, symbols: Symbols, kinematics: Kinematics) -> 
     """
     mechanism = SymbolicMechanism(model, symbols)
     loads = [load for effect in model.effects for load in effect.loads(mechanism)]
-    gravity = _wrenches(model, kinematics, (load for load in loads if load.kind == "gravity"))
-    applied = _wrenches(model, kinematics, (load for load in loads if load.kind == "applied"))
+    forces = [load for load in loads if isinstance(load, Load)]
+    motor = _motors(model, [load for load in loads if isinstance(load, JointLoad)])
+    still = (sp.Integer(0),) * len(model.bodies)
+    gravity = _wrenches(model, kinematics, (f for f in forces if f.kind == "gravity"), still)
+    applied = _wrenches(model, kinematics, (f for f in forces if f.kind == "applied"), motor)
     equations = []
     for k, body in enumerate(model.bodies):
         force, torque = add(gravity[k][0], applied[k][0]), gravity[k][1] + applied[k][1]
@@ -85,18 +86,28 @@ def draw_free_bodies(model: Model, symbols: Symbols, kinematics: Kinematics) -> 
             (symbols.inertia[k] * kinematics.alpha[k], torque),
         ]
     potential = sum((e.potential_energy(mechanism) for e in model.effects), sp.Integer(0))
-    return FreeBodies(gravity, applied, tuple(equations), potential)
+    return FreeBodies(gravity, applied, motor, tuple(equations), potential)
 
 
-def _wrenches(model: Model, kinematics: Kinematics, loads: Iterable[Load]) -> tuple[Wrench, ...]:
-    zero = sp.Integer(0)
-    wrenches: dict[str, Wrench] = {body.name: ((zero, zero), zero) for body in model.bodies}
-    angles = {body.name: kinematics.angle[k] for k, body in enumerate(model.bodies)}
+def _motors(model: Model, loads: Iterable[JointLoad]) -> tuple[Expr, ...]:
+    """The torque at each body's own joint: +τ on the body, -τ on its parent (35)."""
+    torque = {body.joint.name: sp.Integer(0) for body in model.bodies}
     for load in loads:
-        force, torque = wrenches[load.body]
-        arm = rotate(load.at, angles[load.body])
-        wrenches[load.body] = (
-            add(force, load.force),
-            torque + load.torque + cross(arm, load.force),
-        )
-    return tuple(wrenches.values())
+        torque[load.joint] += load.force
+    return tuple(torque.values())
+
+
+def _wrenches(
+    model: Model, kinematics: Kinematics, loads: Iterable[Load], motor: Sequence[Expr]
+) -> tuple[Wrench, ...]:
+    forces = {body.name: (sp.Integer(0), sp.Integer(0)) for body in model.bodies}
+    torques = {body.name: torque for body, torque in zip(model.bodies, motor, strict=True)}
+    angles = {body.name: kinematics.angle[k] for k, body in enumerate(model.bodies)}
+    for k, body in enumerate(model.bodies):
+        if body.parent >= 0:
+            torques[model.bodies[body.parent].name] -= motor[k]
+    for load in loads:
+        force, at = (load.force[0], load.force[1]), (load.at[0], load.at[1])
+        forces[load.body] = add(forces[load.body], force)
+        torques[load.body] += cross(rotate(at, angles[load.body]), force)
+    return tuple((forces[body.name], torques[body.name]) for body in model.bodies)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, rotate, scale
-from eomgen.joints import Free, Revolute
+from eomgen.joints import Revolute
 from eomgen.model import Model
 
 
@@ -54,10 +54,10 @@ def differentiate_joints(model: Model, symbols: Symbols) -> Kinematics:
     positions: list[Vec] = []
     zero = sp.Integer(0)
     for body, last in zip(model.bodies, model.turning, strict=True):
-        q = [functions[s] for s in symbols.q[last + 1 - len(body.coordinates) : last + 1]]
+        q = [functions[s] for s in symbols.q[last + 1 - len(body.positions) : last + 1]]
         base = angles[body.parent] if body.parent >= 0 else zero
         angle = base + q[-1]
-        if isinstance(body.joint, Free):
+        if not isinstance(body.joint, Revolute):
             r_parent, r_child, position = (zero, zero), (zero, zero), (q[0], q[1])
         else:
             parent = (zero, zero)

@@ -95,7 +95,7 @@ def solve(model: Model, symbols: Symbols, kinematics: Kinematics, right_side: Ex
     for tree in trees(model):
         _solve_tree(model, symbols, kinematics, tree, right_side, absolute, notes)
     for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
-        if len(body.coordinates) > 1:
+        if len(body.positions) > 1:
             notes.define(symbols.a[last - 2], symbols.xdd[k])
             notes.define(symbols.a[last - 1], symbols.ydd[k])
         else:

@@ -78,7 +78,7 @@ def make_symbols(model: Model) -> Symbols:
     positive = {
         quantity.name
         for body in model.bodies
-        for quantity in (body.mass, body.inertia_com)
+        for quantity in (body.mass, body.moment)
         if isinstance(quantity, Name)
     }
     parameters = {
@@ -103,7 +103,7 @@ def make_symbols(model: Model) -> Symbols:
         formulas=formulas,
         inputs={i.name: _real(i.name) for i in model.inputs},
         mass=tuple(quantity(body.mass) for body in model.bodies),
-        inertia=tuple(quantity(body.inertia_com) for body in model.bodies),
+        inertia=tuple(quantity(body.moment) for body in model.bodies),
         q=each(coordinates, "{}"),
         v=each(coordinates, "{}_dot"),
         a=each(coordinates, "{}_ddot"),
@@ -206,7 +206,7 @@ def over_bodies(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
         for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
             base = angle[body.parent] if body.parent >= 0 else sp.Integer(0)
             result[coordinates[last]] = angle[k] - base
-            if len(body.coordinates) > 1:
+            if len(body.positions) > 1:
                 result[coordinates[last - 2]], result[coordinates[last - 1]] = x[k], y[k]
     return result
 
@@ -218,7 +218,7 @@ def over_coordinates(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
         for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
             base = result[angle[body.parent]] if body.parent >= 0 else sp.Integer(0)
             result[angle[k]] = base + coordinates[last]
-            if len(body.coordinates) > 1:
+            if len(body.positions) > 1:
                 result[x[k]], result[y[k]] = coordinates[last - 2], coordinates[last - 1]
     return result
 

@@ -1,4 +1,4 @@
-"""What effects share: the loads they put on free bodies, over any scalars."""
+"""What effects share: the loads they put on free bodies and joints, over any scalars."""
 
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
@@ -20,21 +20,32 @@ class Input:
 
 @dataclass(frozen=True)
 class Load:
-    """A force and torque on one free body.
+    """A force on one free body: two components in the plane, three in space.
 
-    `force` in world axes (N) acts at `at`, measured from the centre of mass in body axes (m);
-    `torque` (N m) is about z. `kind` says on which side of M v̇ + V + G = F it stands.
+    `force` in world axes (N) acts at `at`, measured from the centre of mass in body axes (m).
+    `kind` says on which side of M v̇ + V + G = F it stands.
     """
 
     body: str
-    force: tuple[Scalar, Scalar]
-    at: tuple[Scalar, Scalar]
-    torque: Scalar
+    force: tuple[Scalar, ...]
+    at: tuple[Scalar, ...]
     kind: Literal["gravity", "applied"]
+
+
+@dataclass(frozen=True)
+class JointLoad:
+    """A force on the one coordinate of a joint (N m or N): on the child, and back on the parent."""
+
+    joint: str
+    force: Scalar
 
 
 class Mechanism(Protocol):
     """What an effect may ask of the mechanism it acts on."""
+
+    @property
+    def dimensions(self) -> int:
+        """2 in the plane, 3 in space."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -44,10 +55,7 @@ class Mechanism(Protocol):
         """Mass of a body, kg."""
 
     def height(self, body: str) -> Scalar:
-        """World y of a body's centre of mass, m."""
-
-    def sides(self, joint: str) -> tuple[str, str]:
-        """Names of a joint's parent and child."""
+        """World y of a body's centre of mass in the plane, z in space, m."""
 
     def value(self, formula: Formula) -> Scalar:
         """Value of a quantity."""

@@ -1,4 +1,4 @@
-"""Uniform gravity along -y."""
+"""Uniform gravity, downwards."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -10,25 +10,26 @@ from eomgen.language.quantity import Quantity, quantity
 
 
 class Gravity(Table):
-    """Weight m g of every body, along -y (handout (5), (9))."""
+    """Weight m g of every body, along -y in the plane (handout (5), (9)), along -z in space."""
 
     type: Literal["gravity"]
     name: Identifier = "gravity"
-    g: Quantity = quantity("m/s^2", "gravitational acceleration, along -y")
+    g: Quantity = quantity("m/s^2", "gravitational acceleration, downwards")
 
-    def inputs(self) -> tuple[Input, ...]:
+    def inputs(self, dimensions: int) -> tuple[Input, ...]:
         """Gravity takes no input."""
         return ()
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """The weight of each body, at its centre of mass."""
-        zero = mechanism.value(ZERO)
+        zeros = (mechanism.value(ZERO),) * mechanism.dimensions
         g = mechanism.value(self.g)
         for body in mechanism.bodies:
-            weight = -mechanism.mass(body) * g
-            yield Load(body, (zero, weight), (zero, zero), zero, "gravity")
+            yield Load(body, (*zeros[1:], -mechanism.mass(body) * g), zeros, "gravity")
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """Σ m g y, J, zero at the world's origin."""
-        g = mechanism.value(self.g)
-        return sum(mechanism.mass(body) * g * mechanism.height(body) for body in mechanism.bodies)
+        """Σ m g times height, J, zero at the world's origin."""
+        g, total = mechanism.value(self.g), mechanism.value(ZERO)
+        for body in mechanism.bodies:
+            total = total + mechanism.mass(body) * g * mechanism.height(body)
+        return total

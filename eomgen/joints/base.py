@@ -1,6 +1,13 @@
-"""What joint types share."""
+"""What joint types share: their table, their coordinates, and the elementary moves they are of."""
 
 from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from eomgen.language.base import Identifier, Number, Table
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Quantity, Vector, quantity
 
 WORLD = "world"
 """The name of the ground: the parent of every tree's first joint."""
@@ -8,13 +15,77 @@ WORLD = "world"
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One coordinate of a joint. Its velocity is called `<name>_dot`."""
+    """One coordinate or one velocity of a joint."""
 
     name: str
     unit: str
     about: str
 
     @property
-    def rate(self) -> str:
-        """Name of the coordinate's time derivative."""
-        return f"{self.name}_dot"
+    def rate(self) -> "Coordinate":
+        """The velocity of a coordinate that has one of its own."""
+        return Coordinate(f"{self.name}_dot", f"{self.unit}/s", f"rate of {self.name}")
+
+    @property
+    def acceleration(self) -> str:
+        """What the rate of a velocity is called: theta_ddot of theta_dot, hip_wx_dot of hip_wx."""
+        stem = self.name.removesuffix("_dot")
+        return f"{self.name}_dot" if stem == self.name else f"{stem}_ddot"
+
+
+@dataclass(frozen=True)
+class Move:
+    """An elementary motion of the child against the parent, in the axes the moves before it left.
+
+    `turn` and `slide` go about or along the unit vector `axis` by one coordinate. `spin` turns by a
+    unit quaternion w, x, y, z; its velocities are the angular velocity in the turned axes.
+    """
+
+    kind: Literal["turn", "slide", "spin"]
+    axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+Z_AXIS = (0.0, 0.0, 1.0)
+
+
+class JointTable(Table):
+    """What every joint but the free one has: two bodies, a point on each, a fixed rotation."""
+
+    spaces: ClassVar[tuple[int, ...]] = (2, 3)
+    """The dimensions in which there is such a joint."""
+
+    name: Identifier
+    parent: Identifier = Field(description="body on the inner side, or 'world'")
+    child: Identifier = Field(description="body on the outer side")
+    r_parent: Vector = quantity(
+        "m", "joint from the parent's centre of mass", default=(), validate_default=False
+    )
+    r_child: Vector = quantity(
+        "m", "joint from the child's centre of mass", default=(), validate_default=False
+    )
+    orientation_deg: Number | tuple[Number, Number, Number] = Field(
+        default=0.0,
+        union_mode="left_to_right",
+        description="child's axes in the parent's at zero: an angle; in space about x, then y, z",
+    )
+
+
+class Geared(JointTable):
+    """A joint of one coordinate that a motor's rotor may turn along with."""
+
+    coordinate: Identifier | None = Field(default=None, description="name of the coordinate")
+    motor_inertia: Quantity = quantity(
+        "kg m^2", "rotor inertia", "nonnegative", default=ZERO, validate_default=False
+    )
+    gear_ratio: Quantity | None = quantity(
+        "", "turns of the rotor to one of the joint", default=None
+    )
+    limits: tuple[Number, Number] | None = Field(
+        default=None, description="range of the coordinate; reported, not enforced"
+    )
+
+
+def spatial(vector: tuple[float, ...]) -> tuple[float, float, float]:
+    """A vector of the plane or of space as one of space."""
+    x, y, *z = vector
+    return (x, y, z[0] if z else 0.0)

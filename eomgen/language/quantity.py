@@ -13,7 +13,7 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from eomgen.errors import SceneError, nearest
-from eomgen.language.base import LARGEST, Table
+from eomgen.language.base import LARGEST, Number, Table
 from eomgen.language.formula import (
     CONSTANTS,
     FUNCTIONS,
@@ -32,7 +32,7 @@ def _read_quantity(value: Any) -> Formula:
     if isinstance(value, Formula):
         return value
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise PydanticCustomError("quantity", "is neither a number nor a formula")
+        raise PydanticCustomError("quantity", "is neither a number nor a formula; give one")
     if isinstance(value, str):
         try:
             return parse(value)
@@ -54,7 +54,10 @@ Quantity = Annotated[
         {"anyOf": [{"type": "number"}, {"type": "string"}], "description": "number or formula"}
     ),
 ]
-Vector = tuple[Quantity, Quantity]
+Vector = Annotated[tuple[Quantity, ...], Field(min_length=2, max_length=3)]
+"""Two components in the plane, three in space; see `with_components`."""
+Numbers = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
+"""The same of plain numbers: structure, never a parameter."""
 Bound = Literal["any", "positive", "nonnegative"]
 
 
@@ -71,6 +74,21 @@ class Parameter:
     default: float
     unit: str
     about: str
+
+
+def with_components(
+    value: tuple[Any, ...], zero: Any, dimensions: int, place: str
+) -> tuple[Any, ...]:
+    """A vector of a scene, or zeros where it is left out (an empty tuple).
+
+    Raises `SceneError` if it has not one component for each dimension.
+    """
+    if not value:
+        return (zero,) * dimensions
+    if len(value) != dimensions:
+        space = "the plane" if dimensions == 2 else "space"
+        raise SceneError(f"{place}: has {len(value)} components; {space} takes {dimensions}")
+    return value
 
 
 def name_quantities(
@@ -90,9 +108,10 @@ def name_quantities(
             continue
         value = getattr(table, field)
         named: list[Formula] = []
-        for formula, suffix, spot in _parts(value, field):
+        for formula, suffix, spot, off_diagonal in _parts(value, field):
             where = f"{place}.{spot}"
-            _check(formula, where, str(extra["bound"]), str(extra["unit"]), known)
+            bound = "any" if off_diagonal else str(extra["bound"])
+            _check(formula, where, bound, str(extra["unit"]), known)
             if isinstance(formula, Constant) and formula.value != 0.0:
                 about = f"{info.description} of {prefix}{suffix.replace('_', ', ')}"
                 name = f"{prefix}_{field}{suffix}"
@@ -107,12 +126,19 @@ def name_quantities(
     return fields, parameters
 
 
-def _parts(value: Any, field: str) -> Iterator[tuple[Formula, str, str]]:
+INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
+"""The entries of a symmetric 3 x 3 matrix as scenes list them."""
+
+
+def _parts(value: Any, field: str) -> Iterator[tuple[Formula, str, str, bool]]:
+    """Each quantity of a field with the end of its name, its place, and if it is off a diagonal."""
     if isinstance(value, Formula):
-        yield value, "", field
+        yield value, "", field, False
     elif isinstance(value, tuple):
-        for i, (part, axis) in enumerate(zip(value, ("_x", "_y"), strict=True)):
-            yield part, axis, f"{field}[{i}]"
+        matrix = field == "inertia_com"
+        for i, part in enumerate(value):
+            end = INERTIA[i] if matrix and len(value) > 1 else "xyz"[i] if not matrix else ""
+            yield part, f"_{end}" if end else "", f"{field}[{i}]", matrix and i >= 3
 
 
 def _check(formula: Formula, where: str, bound: str, unit: str, known: Mapping[str, float]) -> None:

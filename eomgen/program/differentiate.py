@@ -1,6 +1,6 @@
 """Exact derivatives on the tape, forward mode."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from eomgen.program.tape import Node, Step, Tape
 
@@ -9,27 +9,52 @@ def jacobian(outputs: Sequence[Node], inputs: Sequence[Node]) -> list[list[Node]
     """∂outputs/∂inputs, as new nodes on the same tape: one row an output."""
     if not outputs:
         return []
+    one = outputs[0].tape.constant(1.0)
+    columns = [tangent(outputs, {x.index: one}) for x in inputs]
+    return [list(row) for row in zip(*columns, strict=True)] or [[] for _ in outputs]
+
+
+def tangent(outputs: Sequence[Node], directions: Mapping[int, Node]) -> list[Node]:
+    """How outputs change along directions, given for inputs by their index: a node an output."""
+    if not outputs:
+        return []
     tape = outputs[0].tape
-    steps = tuple(tape.steps)
-    columns = []
-    for x in inputs:
-        slopes = _slopes(tape, steps, x.index)
-        zero = tape.constant(0.0)
-        columns.append([slopes.get(node.index, zero) for node in outputs])
-    return [list(row) for row in zip(*columns, strict=True)]
+    zero = tape.constant(0.0)
+    slopes = dict(directions)
+    for i in _between(tape, outputs, slopes):
+        step = tape.steps[i]
+        if any(o in slopes for o in step.operands):
+            slopes[i] = _slope(tape, i, step, slopes)
+    return [slopes.get(node.index, zero) for node in outputs]
 
 
-def _slopes(tape: Tape, steps: Sequence[Step], x: int) -> dict[int, Node]:
-    """The derivative of every step by one input, where it is not zero."""
-    slopes = {x: tape.constant(1.0)}
-    for i, step in enumerate(steps):
-        if not any(o in slopes for o in step.operands):
-            continue
-        slopes[i] = _slope(tape, i, step, slopes)
-    return slopes
+def substituted(outputs: Sequence[Node], replacements: Mapping[int, Node]) -> list[Node]:
+    """The outputs computed anew with other nodes in place of some inputs, given by their index."""
+    if not outputs:
+        return []
+    tape = outputs[0].tape
+    nodes = dict(replacements)
+    for i in _between(tape, outputs, replacements):
+        step = tape.steps[i]
+        if any(o in nodes for o in step.operands):
+            operands = [nodes.get(o) or Node(tape, o) for o in step.operands]
+            nodes[i] = tape.apply(step.operation, *operands)
+    return [nodes.get(node.index) or node for node in outputs]
 
 
-def _slope(tape: Tape, i: int, step: Step, slopes: dict[int, Node]) -> Node:
+def _between(tape: Tape, outputs: Sequence[Node], inputs: Collection[int]) -> list[int]:
+    """The steps that outputs need, in order, up to some inputs."""
+    needed: set[int] = set()
+    stack = [node.index for node in outputs]
+    while stack:
+        i = stack.pop()
+        if i not in needed and i not in inputs:
+            needed.add(i)
+            stack += tape.steps[i].operands
+    return sorted(needed)
+
+
+def _slope(tape: Tape, i: int, step: Step, slopes: Mapping[int, Node]) -> Node:
     zero, two = tape.constant(0.0), tape.constant(2.0)
     value = Node(tape, i)
     nodes = [Node(tape, o) for o in step.operands]

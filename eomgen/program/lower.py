@@ -13,21 +13,6 @@ import sympy as sp
 from eomgen.program.tape import Node, Stage, Tape, power, total
 
 
-class TapeScalars:
-    """Nodes as scalars for formulas."""
-
-    def __init__(self, tape: Tape) -> None:
-        self._tape = tape
-
-    def number(self, value: float) -> Node:
-        """A constant."""
-        return self._tape.constant(value)
-
-    def call(self, function: str, argument: Node) -> Node:
-        """sin, cos, tan or sqrt."""
-        return self._tape.apply(function, argument)
-
-
 class Lowering:
     """Lowers expressions over symbols that are known nodes, or are defined by expressions.
 

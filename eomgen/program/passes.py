@@ -1,10 +1,10 @@
 """Passes: each takes a finished program and returns a better one with the same values."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 from eomgen.program.program import Output, Program, cost, finish, live_steps
-from eomgen.program.tape import Node, Tape
+from eomgen.program.tape import Node, Stage, Tape
 
 Rule = Callable[[Tape, str, list[Node]], Node]
 
@@ -34,7 +34,7 @@ def drop_dead_steps(program: Program) -> Program:
     keep = live_steps(program, [*roots, *(check.node for check in program.checks)])
     new = {old: i for i, old in enumerate(keep)}
     steps = tuple(
-        replace(step, operands=tuple(new[o] for o in step.operands))
+        step._replace(operands=tuple(new[o] for o in step.operands))
         for step in (program.steps[i] for i in keep)
     )
     return Program(
@@ -45,13 +45,52 @@ def drop_dead_steps(program: Program) -> Program:
     )
 
 
-def factor_sums(program: Program) -> Program:
-    """a·x ± a·y as a·(x ± y), where neither product is used elsewhere: one operation saved."""
-    uses = _uses(program)
-    lone: set[int] = set()
+def gather_parameters(program: Program) -> Program:
+    """k·(x·(l·y)) as (k·l)·(x·y), k + (x + l) as (k + l) + x where the inner result is used once:
+    what depends on parameters alone is computed once, ahead of every call.
+    """
+    lone = _Lone(program, ("mul", "add"))
 
     def rule(tape: Tape, operation: str, nodes: list[Node]) -> Node:
-        if operation in ("add", "sub") and all(n.index in lone for n in nodes):
+        if operation in ("mul", "add"):
+            parts = _flattened(tape, operation, nodes, lone.results)
+            fixed = [n for n in parts if n.step.stage <= Stage.PARAMETERS]
+            if len(fixed) > 1 and len(parts) > len(fixed):
+                rest = [n for n in parts if n.step.stage > Stage.PARAMETERS]
+                return tape.apply(
+                    operation, _all(tape, operation, fixed), _all(tape, operation, rest)
+                )
+        return tape.apply(operation, *nodes)
+
+    return drop_dead_steps(_rebuilt(program, rule, lone.note))
+
+
+def _flattened(tape: Tape, operation: str, nodes: list[Node], lone: Collection[int]) -> list[Node]:
+    """The operands of a product of products, or sum of sums, where nothing else uses the inner."""
+    parts: list[Node] = []
+    stack = nodes[::-1]
+    while stack:
+        node = stack.pop()
+        if node.index in lone and node.step.operation == operation:
+            stack += [Node(tape, o) for o in reversed(node.step.operands)]
+        else:
+            parts.append(node)
+    return parts
+
+
+def _all(tape: Tape, operation: str, nodes: list[Node]) -> Node:
+    result = nodes[0]
+    for node in nodes[1:]:
+        result = tape.apply(operation, result, node)
+    return result
+
+
+def factor_sums(program: Program) -> Program:
+    """a·x ± a·y as a·(x ± y), where neither product is used elsewhere: one operation saved."""
+    lone = _Lone(program, ("mul",))
+
+    def rule(tape: Tape, operation: str, nodes: list[Node]) -> Node:
+        if operation in ("add", "sub") and all(n.index in lone.results for n in nodes):
             a, b = (n.step.operands for n in nodes)
             common = [i for i in a if i in b]
             if common:
@@ -60,16 +99,30 @@ def factor_sums(program: Program) -> Program:
                 return Node(tape, shared) * tape.apply(operation, left, right)
         return tape.apply(operation, *nodes)
 
-    def note(old: int, node: Node) -> None:
-        if node.step.operation == "mul" and uses[old] == 1:
-            lone.add(node.index)
+    return drop_dead_steps(_rebuilt(program, rule, lone.note))
+
+
+class _Lone:
+    """Results of some operations that one other step uses and nothing else."""
+
+    def __init__(self, program: Program, operations: Collection[str]) -> None:
+        self.results: set[int] = set()
+        self._uses = _uses(program)
+        self._operations = operations
+
+    def note(self, old: int, node: Node) -> None:
+        """Step `old` of the program has become `node`."""
+        if node.step.operation in self._operations and self._uses[old] == 1:
+            self.results.add(node.index)
         else:
-            lone.discard(node.index)
-
-    return drop_dead_steps(_rebuilt(program, rule, note))
+            self.results.discard(node.index)
 
 
-PASSES: tuple[Callable[[Program], Program], ...] = (drop_dead_steps, factor_sums)
+PASSES: tuple[Callable[[Program], Program], ...] = (
+    drop_dead_steps,
+    gather_parameters,
+    factor_sums,
+)
 
 
 def _uses(program: Program) -> list[int]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, count
+from itertools import count
 
 from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
@@ -43,6 +43,7 @@ class Names:
         self._program = program
         self._dialect = dialect
         self._names: dict[int, str] = {}
+        self._next: dict[str, int] = {}
         self._taken = {self.safe(str(s.value)) for s in program.steps if s.operation == "input"}
 
     def safe(self, name: str) -> str:
@@ -61,12 +62,18 @@ class Names:
     def _fresh(self, node: int) -> str:
         wanted = self._program.names.get(node) or self._described(node)
         if wanted is None:
-            letter = "k" if self._program.steps[node].stage <= Stage.PARAMETERS else "s"
-            name = next(n for n in (f"{letter}{i}" for i in count(1)) if n not in self._taken)
+            stem, number = ("k" if self._program.steps[node].stage <= Stage.PARAMETERS else "s"), 1
         else:
-            wanted = self.safe(wanted)
-            numbered = (f"{wanted}_{i}" for i in count(2))
-            name = next(n for n in chain((wanted,), numbered) if n not in self._taken)
+            stem, number = self.safe(wanted), 2
+            if stem not in self._taken:
+                self._taken.add(stem)
+                return stem
+            stem += "_"
+        # Counting goes on where it stopped: a large program has thousands of such names.
+        numbers = count(self._next.get(stem, number))
+        found = next(n for n in numbers if f"{stem}{n}" not in self._taken)
+        self._next[stem] = found + 1
+        name = f"{stem}{found}"
         self._taken.add(name)
         return name
 
@@ -88,6 +95,8 @@ class Names:
         step = self._program.steps[node]
         if step.operation == "input":
             return (str(step.value),)
+        if node in self._program.names:
+            return (self._program.names[node],)
         if step.operation == "add":
             left, right = (self._angles(o) for o in step.operands)
             return None if left is None or right is None else left + right

@@ -7,9 +7,8 @@ until an addition swallows them. No expression tree ever exists.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 
 class Stage(IntEnum):
@@ -38,8 +37,7 @@ COUNTED = (*ARITHMETIC, "neg", *FUNCTIONS)
 """Operations that cost something, each counted one."""
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """One operation on earlier steps. A constant holds its value, an input its name."""
 
     operation: str
@@ -84,22 +82,27 @@ class Tape:
     def __init__(self) -> None:
         self.steps: list[Step] = []
         self.names: dict[int, str] = {}
-        self._known: dict[Step, int] = {}
+        self.values: list[float | None] = []
+        """The number that a step is, if it is a constant."""
+        self._known: dict[tuple[Any, ...], int] = {}
 
-    def _intern(self, step: Step) -> Node:
-        index = self._known.get(step)
+    def _intern(self, key: tuple[Any, ...], stage: Stage, value: float | str | None) -> Node:
+        index = self._known.get(key)
         if index is None:
-            index = self._known[step] = len(self.steps)
-            self.steps.append(step)
+            index = self._known[key] = len(self.steps)
+            operands = key[1:] if value is None else ()
+            self.steps.append(Step(key[0], operands, stage, value))
+            self.values.append(value if key[0] == "constant" else None)  # type: ignore[arg-type]
         return Node(self, index)
 
     def constant(self, value: float) -> Node:
         """A number."""
-        return self._intern(Step("constant", (), Stage.CONSTANT, float(value) + 0.0))
+        number = float(value) + 0.0
+        return self._intern(("constant", number), Stage.CONSTANT, number)
 
     def input(self, name: str, stage: Stage) -> Node:
         """A named quantity that is given at run time."""
-        return self._intern(Step("input", (), stage, name))
+        return self._intern(("input", name), stage, name)
 
     def named(self, node: Node, name: str) -> Node:
         """Suggest a name for the variable that will hold a node; the first suggestion stays."""
@@ -108,22 +111,25 @@ class Tape:
 
     def apply(self, operation: str, *nodes: Node) -> Node:
         """An operation on nodes, folded if it can be."""
-        folded = _FOLD[operation](self, *nodes) if operation in _FOLD else None
+        fold = _FOLD.get(operation)
+        folded = fold(self, *nodes) if fold is not None else None
         if folded is not None:
             return folded
-        values = [_value(node) for node in nodes]
-        if operation in FUNCTIONS and values[0] is not None:
-            return self.constant(FUNCTIONS[operation](values[0]))
-        operands = tuple(node.index for node in nodes)
-        if operation in ("add", "mul"):
-            operands = tuple(sorted(operands))
-        stage = max(node.step.stage for node in nodes)
-        return self._intern(Step(operation, operands, stage))
+        if len(nodes) == 1:
+            node = nodes[0]
+            value = self.values[node.index]
+            if value is not None and operation in FUNCTIONS:
+                return self.constant(FUNCTIONS[operation](value))
+            return self._intern((operation, node.index), self.steps[node.index].stage, None)
+        a, b = nodes[0].index, nodes[1].index
+        if a > b and operation in ("add", "mul"):
+            a, b = b, a
+        left, right = self.steps[a].stage, self.steps[b].stage
+        return self._intern((operation, a, b), left if left >= right else right, None)
 
 
 def _value(node: Node) -> float | None:
-    step = node.step
-    return float(step.value) if step.operation == "constant" and step.value is not None else None
+    return node.tape.values[node.index]
 
 
 def _negated(node: Node) -> Node | None:

@@ -14,8 +14,10 @@ class GeneratedModule(Protocol):
 
     NAME: str
     FORM: str
+    DIMENSIONS: int
     STATES: tuple[str, ...]
     POSITIONS: tuple[int, ...]
+    QUATERNIONS: tuple[tuple[int, int, int, int], ...]
     INPUTS: dict[str, float]
     PARAMETERS: dict[str, float]
     UNITS: dict[str, str]
@@ -88,4 +90,5 @@ def as_problem(module: GeneratedModule, parameters: Any = None, inputs: Any = No
         derivative=derivative,
         jacobian=jacobian,
         initial=initial,
+        quaternions=module.QUATERNIONS,
     )

@@ -1,5 +1,6 @@
 """What an integrator needs to know of a mechanism: its derivative, its Jacobian, its start."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -23,6 +24,7 @@ class Problem:
     derivative  f(t, y) -> (ny,), in SI units per second
     jacobian    df/dy(t, y) -> (ny, ny), exact
     initial     (ny,), kept as a read-only copy
+    quaternions indices of the four components of each unit quaternion among the states
 
     Raises `RunError` if `initial` has not one finite number per state.
     """
@@ -33,6 +35,7 @@ class Problem:
     derivative: Callable[[float, Floats], Floats]
     jacobian: Callable[[float, Floats], Floats]
     initial: Floats
+    quaternions: tuple[tuple[int, int, int, int], ...] = ()
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)
@@ -48,3 +51,20 @@ class Problem:
         assert all(0 <= index < len(self.states) for index in self.positions)
         initial.flags.writeable = False
         object.__setattr__(self, "initial", initial)
+
+    def unit(self, y: Floats) -> Floats:
+        """Return the state `y` (ny,) with its quaternions scaled to unit length.
+
+        The exact motion stays on that sphere; a step leaves it by its own error, and scaling, which
+        goes back to the nearest point, keeps the order of the method: Hairer, Lubich, Wanner,
+        Geometric Numerical Integration, section IV.4. What is not finite is left as it is.
+        """
+        if not self.quaternions:
+            return y
+        values = y.tolist()
+        for indices in self.quaternions:
+            length = math.hypot(*(values[i] for i in indices))
+            if math.isfinite(length):
+                for i in indices:
+                    values[i] /= length
+        return np.array(values)

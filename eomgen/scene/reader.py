@@ -1,5 +1,6 @@
 """From a file or a built-in name to a `Scene`, or to messages that say what to mend and where."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -8,11 +9,15 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from eomgen.errors import SceneError, nearest
-from eomgen.scene.schema import Scene
+from eomgen.scene.schema import MOST, Scene
 
 BUILT_IN = Path(__file__).parent.parent / "scenes"
 LARGEST_FILE = 4_000_000
 MOST_MESSAGES = 10
+DEEPEST_KEY = 50
+_DEEP_KEY = re.compile(
+    rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}"""
+)
 
 
 def built_in_names() -> tuple[str, ...]:
@@ -61,11 +66,15 @@ def read_scene(scene: str | Path) -> Scene:
 
 def parse_scene(text: str, source: str = "scene") -> Scene:
     """Read a scene from TOML text; `source` names it in messages. Raises `SceneError`."""
+    # The time that `tomllib` takes for a dotted key grows with the square of its length and more.
+    if _DEEP_KEY.search(text):
+        raise SceneError(f"{source}: is not read: a key has more than {DEEPEST_KEY} parts")
     try:
         table = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         why = "nested too deep" if isinstance(error, RecursionError) else str(error)
         raise SceneError(f"{source}: is not TOML: {why}") from None
+    _check_sizes(table, source)
     try:
         return Scene.model_validate(table)
     except ValidationError as error:
@@ -76,21 +85,62 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
         raise SceneError("\n".join([*shown, *tail])) from None
 
 
+def _check_sizes(table: dict[str, Any], source: str) -> None:
+    """Refuse lists that are too long before each of their entries is looked at."""
+    for key, value in table.items():
+        if key in Scene.model_fields and isinstance(value, list | dict) and len(value) > MOST:
+            raise SceneError(f"{source}: {key}: has {len(value)} entries; give at most {MOST}")
+
+
 def _lines(details: list[ErrorDetails]) -> list[str]:
     """One line for each place: a mistake fails every member of a union, the deepest says most."""
-    lines: dict[str, str] = {}
+    lines: dict[str, tuple[int, str]] = {}
+    outer: set[str] = set()
     for detail in details:
-        place = _place(detail["loc"])
+        detail = _of_the_whole_list(detail)
+        place, weight = _place(detail["loc"]), _weight(detail)
         if detail["type"] == "unknown_key":
             place = f"{place}.{detail['ctx']['key']}"
-        # That a value is none of a few words says less than what else is wrong with it.
-        if place not in lines or detail["type"] != "literal_error":
-            lines[place] = _line(detail)
-    return [
-        line
-        for place, line in lines.items()
-        if not any(other.startswith((f"{place}.", f"{place}[")) for other in lines)
-    ]
+        outer |= {place[:i] for i, character in enumerate(place) if character in ".["}
+        if place not in lines or weight >= lines[place][0]:
+            lines[place] = weight, _line(detail)
+    return [line for place, (_, line) in lines.items() if place not in outer]
+
+
+def _of_the_whole_list(detail: ErrorDetails) -> ErrorDetails:
+    """One error of the list, not one of each entry, where lists stand for numbers or reversely."""
+    location = detail["loc"]
+    nested = detail["type"] in ("quantity", "float_type") and isinstance(detail["input"], list)
+    flat = detail["type"] == "tuple_type"
+    if not (location and isinstance(location[-1], int) and (nested or flat)):
+        return detail
+    kind = "list_of_lists" if nested else "list_of_no_lists"
+    return {**detail, "type": kind, "loc": location[:-1]}
+
+
+_SHAPES = ("tuple_type", "dict_type", "model_type", "model_attributes_type")
+
+
+def _weight(detail: ErrorDetails) -> int:
+    """How much an error says: least that a value is none of a few words, or is no list or table.
+
+    A word that is nearly one of the few was meant to be it.
+    """
+    if detail["type"] == "literal_error":
+        return 1 + isinstance(detail["input"], str) * bool(_hint(detail))
+    return {"list_of_lists": 3, **dict.fromkeys(_SHAPES, 1)}.get(detail["type"], 2)
+
+
+def _hint(detail: ErrorDetails) -> str:
+    """The word that was nearly given, if one was; the text of a number is not nearly the number."""
+    given, known = str(detail["input"]), _expected(detail)
+    return "" if given in known else nearest(given, known)
+
+
+def _expected(detail: ErrorDetails) -> list[str]:
+    """The words that a literal may be."""
+    text = str(detail.get("ctx", {})["expected"])
+    return [word.strip("'") for word in text.replace(" or ", ", ").split(", ")]
 
 
 def _line(detail: ErrorDetails) -> str:
@@ -115,10 +165,7 @@ def _line(detail: ErrorDetails) -> str:
         case "union_tag_not_found":
             return f"{place}.type: missing; it says what kind this is"
         case "literal_error":
-            known = [
-                word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")
-            ]
-            hint = nearest(str(detail["input"]), known) or f"; known: {', '.join(known)}"
+            hint = _hint(detail) or f"; known: {', '.join(_expected(detail))}"
             return f"{place}: unknown value {value}{hint}"
         case "value_error":
             return f"{place}: {value} {context['error']}"
@@ -128,15 +175,36 @@ def _line(detail: ErrorDetails) -> str:
             return f"{place}: {value} is not a number; give one"
         case "greater_than":
             return f"{place}: {value} is not positive; give a number > 0"
-        case "too_long":
-            return f"{place}: has more than {context['max_length']} entries"
-        case "too_short" | "missing_required":
-            return f"{place}: has too few entries; it needs {context.get('min_length', 1)}"
+        case "greater_than_equal":
+            return f"{place}: {value} is too small; give at least {context['ge']}"
+        case "less_than_equal":
+            return f"{place}: {value} is too large; give at most {context['le']}"
+        case "int_type" | "int_from_float" | "int_parsing":
+            return f"{place}: {value} is not a whole number; give one"
+        case "too_long" | "too_short":
+            return f"{place}: has {_entries(detail)}; give {_wanted_entries(place, context)}"
+        case "list_of_lists":
+            return f"{place}: has lists in it; give everything in one list"
+        case "list_of_no_lists":
+            return f"{place}: has entries that are no lists; give a list of lists"
         case "string_type" | "tuple_type" | "dict_type" | "model_type" | "model_attributes_type":
             wanted = {"string_type": "a text", "tuple_type": "a list"}.get(kind, "a table")
             return f"{place}: {value} is not {wanted}; give one"
         case _:
             return f"{place}: {value}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
+
+
+def _entries(detail: ErrorDetails) -> str:
+    count = len(detail["input"])
+    return "1 entry" if count == 1 else f"{count} entries"
+
+
+def _wanted_entries(place: str, context: dict[str, Any]) -> str:
+    if place.endswith("inertia_com"):
+        return "one number in the plane, in space [xx, yy, zz] or those and xy, xz, yz"
+    if "min_length" in context:
+        return f"at least {context['min_length']}"
+    return f"at most {context['max_length']}"
 
 
 _UNION_MEMBERS = (

@@ -2,12 +2,12 @@
 
 from typing import Annotated, Literal, get_args
 
-from pydantic import Field
+from pydantic import Field, Strict
 
 from eomgen.effects import Effect
 from eomgen.joints import Joint
 from eomgen.language.base import Identifier, Number, Positive, Table, Text
-from eomgen.language.quantity import Quantity, quantity
+from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.scene.look import Camera, Shape
 
 MOST = 1000
@@ -19,12 +19,20 @@ Output = Literal[
     "mass_matrix",
     "velocity_force",
     "gravity_force",
+    "bias_force",
     "applied_force",
     "kinetic_energy",
     "potential_energy",
     "momentum",
+    "centre_of_mass",
     "joint_forces",
     "body_poses",
+    "body_velocities",
+    "point_positions",
+    "point_velocities",
+    "point_jacobians",
+    "input_jacobian",
+    "parameter_jacobian",
 ]
 OUTPUTS: tuple[Output, ...] = get_args(Output)
 """What a generated module can compute beside `derivative` and `jacobian`."""
@@ -44,6 +52,7 @@ Integrator = Literal[
     "LSODA",
 ]
 Form = Literal["velocity", "momentum", "redundant"]
+Route = Literal["auto", "closed", "ldl", "aba"]
 
 
 class ParameterTable(Table):
@@ -55,14 +64,57 @@ class ParameterTable(Table):
 
 
 class BodyTable(Table):
-    """A rigid body; a point mass has `inertia_com = 0`."""
+    """A rigid body; a particle has `inertia_com = 0`.
+
+    In the plane the inertia is a number; in space [xx, yy, zz], or [xx, yy, zz, xy, xz, yz], the
+    entries of the matrix about the centre of mass in body axes.
+    """
 
     name: Identifier
-    mass: Quantity = quantity("kg", "mass", "positive")
-    inertia_com: Quantity = quantity(
-        "kg m^2", "moment of inertia about the centre of mass", "nonnegative"
+    mass: Quantity = quantity("kg", "mass", "nonnegative")
+    inertia_com: Quantity | Annotated[tuple[Quantity, ...], Field(min_length=3, max_length=6)] = (
+        quantity(
+            "kg m^2",
+            "moment of inertia about the centre of mass",
+            "nonnegative",
+            union_mode="left_to_right",
+        )
     )
     shapes: tuple[Shape, ...] = ()
+
+
+class ChainTable(Table):
+    """A chain of equal links in one line: bodies <name>_1, …, on pins <name>_joint_1, …
+
+    `r_parent` is the pin on the link before, `r_child` that on the link itself, each from the
+    link's centre of mass; `start` is the first pin on `parent`.
+    """
+
+    name: Identifier
+    count: Annotated[int, Strict(), Field(ge=1, le=MOST)]
+    parent: Identifier = "world"
+    mass: Quantity = quantity("kg", "mass", "nonnegative")
+    inertia_com: Quantity | Annotated[tuple[Quantity, ...], Field(min_length=3, max_length=6)] = (
+        quantity(
+            "kg m^2",
+            "moment of inertia about the centre of mass",
+            "nonnegative",
+            union_mode="left_to_right",
+        )
+    )
+    start: Vector = quantity("m", "first pin on the parent", default=(), validate_default=False)
+    r_parent: Vector = quantity("m", "pin on the link before")
+    r_child: Vector = quantity("m", "pin on the link itself")
+    axis: Numbers | None = None
+    shapes: tuple[Shape, ...] = ()
+
+
+class PointTable(Table):
+    """A named point of a body."""
+
+    name: Identifier
+    body: Identifier
+    at: Vector = quantity("m", "point from the centre of mass", default=(), validate_default=False)
 
 
 class Initial(Table):
@@ -95,8 +147,12 @@ class Scene(Table):
     parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
         Field(default={})
     )
-    bodies: Annotated[tuple[BodyTable, ...], Field(min_length=1, max_length=MOST)]
-    joints: Annotated[tuple[Joint, ...], Field(min_length=1, max_length=MOST)]
+    dimensions: Literal[2, 3] = 2
+    route: Route = "auto"
+    bodies: Annotated[tuple[BodyTable, ...], Field(max_length=MOST)] = ()
+    joints: Annotated[tuple[Joint, ...], Field(max_length=MOST)] = ()
+    chains: Annotated[tuple[ChainTable, ...], Field(max_length=MOST)] = ()
+    points: Annotated[tuple[PointTable, ...], Field(max_length=MOST)] = ()
     effects: Annotated[tuple[Effect, ...], Field(max_length=MOST)] = ()
     initial: Initial = Initial()
     simulation: Simulation = Simulation()

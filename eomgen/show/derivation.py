@@ -141,7 +141,7 @@ def _mathml(equation: Equation) -> str:
 _LATEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
     "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
-    "ω": r"$\omega$", "α": r"$\alpha$",
+    "ω": r"$\omega$", "α": r"$\alpha$", "β": r"$\beta$", "×": r"$\times$",
 }  # fmt: skip
 
 

@@ -1,16 +1,34 @@
 """From a trajectory to a motion: poses, energies and joint gaps, by the generated code."""
 
+from collections.abc import Sequence
+from typing import Protocol, cast
+
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.joints import Revolute
 from eomgen.joints.base import WORLD
+from eomgen.language.formula import Formula
 from eomgen.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.trajectory import Trajectory
-from eomgen.show.motion import Motion
+from eomgen.show.motion import Anchor, Motion
 
 Floats = NDArray[np.float64]
+
+HOLDING = frozenset({"ball", "revolute", "universal", "weld"})
+"""Joints whose point on the parent is one with that on the child; the others let them part."""
+
+MARKED = frozenset({"ball", "cylindrical", "prismatic", "revolute", "universal"})
+"""Joints that are marked in a picture, at their point on the child."""
+
+
+class _Joint(Protocol):
+    """What every joint but the free one has; none of the sets above names that one."""
+
+    name: str
+    parent: str
+    r_parent: tuple[Formula, ...]
+    r_child: tuple[Formula, ...]
 
 
 def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Motion:
@@ -34,7 +52,7 @@ def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Mo
         positions=module.POSITIONS,
         bodies=module.BODIES,
         shapes=tuple(body.shapes for body in model.bodies),
-        joints=module.JOINTS,
+        joints=tuple(joint.name for _, joint in _joints(model, HOLDING)),
         poses=poses,
         kinetic_energy=kinetic,
         potential_energy=potential,
@@ -43,39 +61,57 @@ def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Mo
         integrator=trajectory.integrator,
         finished=trajectory.finished,
         message=trajectory.message,
-        anchors=tuple(
-            (k, model.value(joint.r_child[0]), model.value(joint.r_child[1]))
-            for k, joint in _pins(model)
-        ),
+        anchors=_anchors(model, poses.ndim - 1),
+        quaternions=tuple(getattr(module, "QUATERNIONS", ())),
     )
 
 
 def joint_drift(model: Model, poses: Floats) -> Floats:
-    """Distance of each pin's point on its parent from that on its child, (n, nj), m.
+    """Distance of each joint's point on its parent from that on its child, (n, nj), m.
 
-    `poses` (n, nb, 3) as `body_poses` gives them. Measured from the poses alone, whatever the state
+    Of the joints of the types `HOLDING`, in the order of the bodies they hold. `poses` (n, nb, 3)
+    or (n, nb, 3, 4) as `body_poses` gives them. Measured from the poses alone, whatever the state
     form: a form that keeps each body's place for itself can pull its joints apart.
     """
-    names = [body.name for body in model.bodies]
+    names = {body.name: k for k, body in enumerate(model.bodies)}
+    dimensions = poses.ndim - 1
     gaps = []
-    for k, joint in _pins(model):
-        parent = None if joint.parent == WORLD else poses[:, names.index(joint.parent)]
-        on_parent = _point(parent, [model.value(r) for r in joint.r_parent], len(poses))
-        on_child = _point(poses[:, k], [model.value(r) for r in joint.r_child], len(poses))
-        gaps.append(np.hypot(*(on_parent - on_child)))
+    for k, joint in _joints(model, HOLDING):
+        on_parent = _values(model, joint.r_parent, dimensions)
+        if joint.parent != WORLD:
+            on_parent = _point(poses[:, names[joint.parent]], on_parent)
+        on_child = _point(poses[:, k], _values(model, joint.r_child, dimensions))
+        gap = on_parent - on_child
+        gaps.append(np.hypot(np.hypot(gap[..., 0], gap[..., 1]), gap[..., -1] * (dimensions == 3)))
     return np.array(gaps).reshape(len(gaps), len(poses)).T
 
 
-def _pins(model: Model) -> list[tuple[int, Revolute]]:
-    return [
-        (k, body.joint) for k, body in enumerate(model.bodies) if isinstance(body.joint, Revolute)
-    ]
+def _joints(model: Model, types: frozenset[str]) -> list[tuple[int, _Joint]]:
+    """Joints of some types, each with the index of the body that it holds."""
+    found: list[tuple[int, _Joint]] = []
+    for k, body in enumerate(model.bodies):
+        if body.joint.type in types:
+            found.append((k, cast(_Joint, body.joint)))
+    return found
 
 
-def _point(pose: Floats | None, r: list[float], n: int) -> Floats:
-    """World place of a point of a body (2, n); of the world itself where `pose` is None."""
-    if pose is None:
-        return np.repeat(np.array(r)[:, np.newaxis], n, axis=1)
-    x, y, angle = pose.T
+def _anchors(model: Model, dimensions: int) -> tuple[Anchor, ...]:
+    anchors: list[Anchor] = []
+    for k, joint in _joints(model, MARKED):
+        x, y, *z = _values(model, joint.r_child, dimensions).tolist()
+        anchors.append((k, x, y, z[0]) if z else (k, x, y))
+    return tuple(anchors)
+
+
+def _values(model: Model, r: Sequence[Formula], dimensions: int) -> Floats:
+    """A vector of the scene as numbers; zero where the scene leaves it out."""
+    return np.array([model.value(part) for part in r] if r else [0.0] * dimensions)
+
+
+def _point(poses: Floats, r: Floats) -> Floats:
+    """World place (n, 2) or (n, 3) of a point `r` of a body, body axes."""
+    if poses.ndim == 3:
+        return np.asarray(poses[..., :3] @ r + poses[..., 3])
+    x, y, angle = poses.T
     c, s = np.cos(angle), np.sin(angle)
-    return np.array([x + c * r[0] - s * r[1], y + s * r[0] + c * r[1]])
+    return np.stack([x + c * r[0] - s * r[1], y + s * r[0] + c * r[1]], axis=-1)

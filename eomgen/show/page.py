@@ -3,30 +3,41 @@
 import base64
 import re
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from eomgen.files import write_whole
+from eomgen.scene.look import Shape
 from eomgen.show.motion import Array, Motion, thinned
+from eomgen.show.solid import Indices, solids
+from eomgen.show.view import AMBIENT, GLOSS, LIGHT, cast_of, floor_under
 from eomgen.templating import render
+
+BUDGET = 4000
+"""Faces of all bodies in space, about: what a browser paints many times a second."""
 
 
 def render_page(motion: Motion, poses_source: str, parameters: tuple[float, ...]) -> str:
     """Return the page that plays `motion` from its state vector.
 
-    `poses_source` is the JavaScript text of `function bodyPoses(y, p)`, which returns
-    `[[x, y, angle], …]` (m, m, rad) of the bodies from the state `y` (ny,) and `parameters` `p`;
-    the page calls it for every picture it draws. Arrays lie in the page as float64, bit for bit.
-    Raises `RunError` if no sample is finite.
+    `poses_source` is the JavaScript text of `function bodyPoses(y, p)`, which returns the poses of
+    the bodies from the state `y` (ny,) and `parameters` `p`: in the plane `[[x, y, angle], …]` (m,
+    m, rad), in space `[[[r11, r12, r13, x], […], […]], …]`, rows of [world_R_body | position] (1,
+    m). The page calls it for every picture it draws. Arrays lie in the page as float64, bit for
+    bit. Raises `RunError` if no sample is finite.
     """
     assert not re.search(r"</script|<!--", poses_source, re.IGNORECASE), "would end its script"
     shown = thinned(motion)
     kept, camera = len(shown.t), motion.camera
-    run = {
+    run: dict[str, Any] = {
         "states": motion.states,
         "units": motion.units,
-        "shapes": [[shape.model_dump() for shape in shapes] for shapes in motion.shapes],
+        "colors": motion.colours,
+        "traced": motion.traced,
         "anchors": motion.anchors,
         "camera": {
-            "center": camera.center,
+            "center": motion.center.tolist(),
             "height": camera.height,
             "follow": None if camera.follow is None else motion.bodies.index(camera.follow),
             "background": camera.background,
@@ -37,10 +48,16 @@ def render_page(motion: Motion, poses_source: str, parameters: tuple[float, ...]
         "kinetic": _packed(shown.kinetic_energy),
         "potential": _packed(shown.potential_energy),
     }
+    if motion.dimensions == 2:
+        run["shapes"] = [[_in_plane(shape) for shape in shapes] for shapes in motion.shapes]
+    else:
+        run["camera"] |= {"azimuth": camera.azimuth_deg, "elevation": camera.elevation_deg}
+        run |= _in_space(shown)
     context = {
         "heading": motion.heading,
         "summary": motion.summary + (f", {kept} of them here" if kept < len(motion.t) else ""),
         "stopped": motion.stopped,
+        "space": motion.dimensions == 3,
         "run": run,
         "poses_source": poses_source,
     }
@@ -58,6 +75,53 @@ def save_page(
     write_whole(path, render_page(motion, poses_source, parameters), force=force)
 
 
+def _in_plane(shape: Shape) -> dict[str, Any]:
+    """A shape with the center that it has where the scene gives none."""
+    table = shape.model_dump(exclude={"orientation_deg"})
+    if "center" in table:
+        table["center"] = table["center"] or (0.0, 0.0)
+    return table
+
+
+def _in_space(motion: Motion) -> dict[str, Any]:
+    """Faces of the bodies, floor, light: worked out here, as for the figure."""
+    parts = solids(motion.shapes, motion.camera.height, BUDGET)
+    floor = floor_under(motion, cast_of(parts))
+    return {
+        "quaternions": motion.quaternions,
+        "meshes": [
+            {
+                "vertices": _packed_single(mesh.vertices),
+                "faces": _packed_indices(mesh.faces),
+                "across": _packed_indices(mesh.across),
+                "thickness": mesh.thickness,
+            }
+            for mesh in parts.meshes
+        ],
+        "solids": parts.bodies,
+        "floor": {
+            "z": floor.z,
+            "step": floor.step,
+            "lines": floor.lines().tolist(),
+            "through_origin": floor.through_origin().tolist(),
+        },
+        "light": {"toward": LIGHT.tolist(), "ambient": AMBIENT, "gloss": GLOSS},
+    }
+
+
 def _packed(values: Array) -> str:
     """Base64 of the float64 values, row after row, least byte first."""
     return base64.b64encode(values.astype("<f8").tobytes()).decode("ascii")
+
+
+def _packed_single(values: Array) -> str:
+    """Base64 of the values as float32, finer than any screen."""
+    most = float(np.finfo(np.float32).max)
+    single = np.clip(values, -most, most).astype("<f4")
+    return base64.b64encode(single.tobytes()).decode("ascii")
+
+
+def _packed_indices(values: Indices) -> str:
+    """Base64 of the indices as int16; no mesh has as many faces as that."""
+    assert np.abs(values).max(initial=0) < 2**15
+    return base64.b64encode(values.astype("<i2").tobytes()).decode("ascii")

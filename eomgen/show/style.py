@@ -9,7 +9,7 @@ from pathlib import Path
 import matplotlib.style
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
@@ -97,6 +97,18 @@ def colours(count: int) -> list[str]:
     if count <= len(PALETTE):
         return list(PALETTE[:count])
     return [to_hex(colour) for colour in colormaps["viridis"](np.linspace(0.0, 0.92, count))]
+
+
+def mixed(paper: str, colour: str, share: float) -> str:
+    """A colour of which `share` is `colour` and the rest `paper`."""
+    pairs = zip(to_rgb(paper), to_rgb(colour), strict=True)
+    red, green, blue = ((1 - share) * below + share * above for below, above in pairs)
+    return to_hex((red, green, blue))
+
+
+def ink_on(paper: str) -> str:
+    """What is read well on `paper`."""
+    return INK if np.dot(to_rgb(paper), (0.2126, 0.7152, 0.0722)) > 0.4 else "#eeeeee"
 
 
 GREEK = re.compile(

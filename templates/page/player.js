@@ -30,9 +30,18 @@ const stateCells = run.states.map((name, k) => row("values", name, run.units[k])
 const energyCells = ["kinetic", "potential", "total"].map((name) =>
   row("energies", name, "J", `var(--${name})`));
 
+// So many numbers are not read while they run: a few times a second will do, and leaves the picture
+// its time.
+const RUNNING = 40;
+const PAUSE = 150; // ms
+
 function showValues(state, where) {
+  const now = performance.now();
+  if (!clock.playing || state.length <= RUNNING || now - clock.shown > PAUSE) {
+    clock.shown = now;
+    state.forEach((value, k) => { stateCells[k].textContent = inWords(value); });
+  }
   timeCell.textContent = inWords(clock.time);
-  state.forEach((value, k) => { stateCells[k].textContent = inWords(value); });
   const [T, V] = [between(kinetic, where), between(potential, where)];
   [T, V, T + V].forEach((value, k) => { energyCells[k].textContent = inWords(value); });
   slider.value = clock.time;
@@ -74,7 +83,7 @@ const cursor = drawStrip();
 
 // ---- Time ----
 
-const clock = { time: t[0], playing: false, stamp: 0 };
+const clock = { time: t[0], playing: false, stamp: 0, shown: 0 };
 const slider = byId("time");
 slider.min = t[0];
 slider.max = t[last];
@@ -136,7 +145,7 @@ function move(dx, dy) {
 }
 
 function resetView() {
-  Object.assign(view, { zoom: 1, x: 0, y: 0 });
+  Object.assign(view, HOME);
   requestAnimationFrame(draw);
 }
 
@@ -160,8 +169,11 @@ strip.addEventListener("pointerdown", (event) => {
 strip.addEventListener("pointermove", (event) => { if (event.buttons) scrub(event); });
 canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
 canvas.addEventListener("pointermove", (event) => {
-  if (event.buttons) move(event.movementX, event.movementY);
+  if (!event.buttons) return;
+  const turns = turn && event.buttons === 1 && !event.shiftKey;
+  (turns ? turn : move)(event.movementX, event.movementY);
 });
+if (turn) canvas.addEventListener("contextmenu", (event) => event.preventDefault()); // it moves too
 canvas.addEventListener("wheel", (event) => {
   event.preventDefault();
   zoom(Math.exp(-0.0015 * event.deltaY), event.offsetX, event.offsetY);
@@ -178,11 +190,23 @@ const keys = {
   "-": () => zoom(0.8),
   0: resetView,
 };
+if (turn) {
+  Object.assign(keys, {
+    a: () => move(40, 0),
+    d: () => move(-40, 0),
+    w: () => move(0, 40),
+    s: () => move(0, -40),
+    1: () => lookFrom(-90, 0),
+    2: () => lookFrom(0, 0),
+    3: () => lookFrom(-90, 90),
+  });
+}
+const shifted = turn ?? move;
 const shiftKeys = {
-  ArrowLeft: () => move(40, 0),
-  ArrowRight: () => move(-40, 0),
-  ArrowUp: () => move(0, 40),
-  ArrowDown: () => move(0, -40),
+  ArrowLeft: () => shifted(40, 0),
+  ArrowRight: () => shifted(-40, 0),
+  ArrowUp: () => shifted(0, 40),
+  ArrowDown: () => shifted(0, -40),
 };
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select")) return;

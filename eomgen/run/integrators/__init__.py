@@ -24,11 +24,11 @@ INTEGRATORS: Mapping[str, FixedStep | Adaptive] = MappingProxyType(
         "implicit_midpoint": FixedStep(
             implicit_midpoint.step, implicit_midpoint.ORDER, implicit_midpoint.REMEDY
         ),
-        "RK45": Adaptive(RK45, uses_jacobian=False, remedy=_LOOSER),
-        "DOP853": Adaptive(DOP853, uses_jacobian=False, remedy=_LOOSER),
-        "Radau": Adaptive(Radau, uses_jacobian=True, remedy=_LOOSER),
-        "BDF": Adaptive(BDF, uses_jacobian=True, remedy=_LOOSER),
-        "LSODA": Adaptive(LSODA, uses_jacobian=True, remedy=_LOOSER),
+        "RK45": Adaptive(RK45, uses_jacobian=False, one_step=True, remedy=_LOOSER),
+        "DOP853": Adaptive(DOP853, uses_jacobian=False, one_step=True, remedy=_LOOSER),
+        "Radau": Adaptive(Radau, uses_jacobian=True, one_step=True, remedy=_LOOSER),
+        "BDF": Adaptive(BDF, uses_jacobian=True, one_step=False, remedy=_LOOSER),
+        "LSODA": Adaptive(LSODA, uses_jacobian=True, one_step=False, remedy=_LOOSER),
     }
 )
 

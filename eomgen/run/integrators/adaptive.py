@@ -30,7 +30,9 @@ def advances(
     """Yield the steps of `method`, with those of `samples` equally spaced times that each spans.
 
     Between steps the method's own dense output is used, which is of its accuracy. The sample at
-    `t_start` is the caller's. Raises `StepFailure` if the method gives up, or after `max_steps`.
+    `t_start` is the caller's. Quaternions are scaled to unit length in every state that is yielded;
+    one-step methods go on from there, multistep ones from their own history.
+    Raises `StepFailure` if the method gives up, or after `max_steps`.
     """
     jacobian = {"jac": problem.jacobian} if method.uses_jacobian else {}
     # A copy: LSODA's compiled code works on state arrays in place.
@@ -50,7 +52,7 @@ def advances(
         if solver.status == "failed":
             cause = (complaint or "the method gave up").rstrip(".")
             raise StepFailure(f"{cause}; {method.remedy}")
-        t, y = float(solver.t), solver.y.copy()
+        t, y = float(solver.t), problem.unit(solver.y.copy())
         # LSODA steps on and on where t + h rounds to t; the others notice by themselves. Far from
         # zero its first few steps may do so and still grow.
         stalled = 0 if t > solver.t_old else stalled + 1
@@ -59,8 +61,14 @@ def advances(
         passed = int(np.searchsorted(times, t, side="right"))
         within = times[sampled:passed]
         states = solver.dense_output()(within).T if within.size else ()
-        yield Advance(t, y, list(zip(within.tolist(), states, strict=True)))
+        samples_within = zip(within.tolist(), map(problem.unit, states), strict=True)
+        yield Advance(t, y, list(samples_within))
         sampled = passed
         if solver.status == "finished":
             return
+        if method.one_step:
+            # The slope that the next step takes over stays: what it is off is of the size of this
+            # step's error, and the next step multiplies that by its length. Measured: evaluating
+            # it again changes no error, and costs a derivative a step.
+            solver.y = y.copy()
     raise StepFailure(f"{max_steps} steps did not suffice; {method.remedy}")

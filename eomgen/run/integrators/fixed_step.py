@@ -20,12 +20,15 @@ def count_steps(span: float, dt: float) -> float:
 def advances(
     method: FixedStep, problem: Problem, t_start: float, t_end: float, dt: float, every: int
 ) -> Iterator[Advance]:
-    """Yield the steps of `method`, with a sample at every `every`-th and at the last one."""
+    """Yield the steps of `method`, with a sample at every `every`-th and at the last one.
+
+    Quaternions are scaled back to unit length after every step.
+    """
     steps = int(count_steps(t_end - t_start, dt))
     t, y = t_start, problem.initial
     for i in range(1, steps + 1):
         last = i == steps
-        y = method.step(problem, t, y, t_end - t if last else dt)
+        y = problem.unit(method.step(problem, t, y, t_end - t if last else dt))
         # From the start each time: adding up dt would gather rounding.
         t = t_end if last else min(t_start + i * dt, t_end)
         yield Advance(t, y, [(t, y)] if last or i % every == 0 else [])

@@ -35,11 +35,13 @@ class Adaptive:
     """A SciPy method that chooses its own steps to meet rtol and atol.
 
     uses_jacobian  whether it is implicit, and so is given the problem's Jacobian
+    one_step       whether it steps on from a state alone, which then may be put right between steps
     remedy         what to change when a run goes astray
     """
 
     solver: "Callable[..., OdeSolver[Any]]"
     uses_jacobian: bool
+    one_step: bool
     remedy: str
 
 

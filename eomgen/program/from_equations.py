@@ -1,19 +1,20 @@
-"""From equations to a program: the state's derivative and every output the model asks for."""
+"""SymPy's equations lowered to the tape: the state's derivative and every output asked for."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
 
 from eomgen.derivation.closed import Equations, written_out_forces
-from eomgen.derivation.forms import StateForm, state_form
+from eomgen.derivation.forms import state_form
+from eomgen.derivation.symbols import Vec, rotate
 from eomgen.language.formula import evaluate
-from eomgen.model import Model, is_zero, off_centre
+from eomgen.model import Point, is_zero, off_centre
 from eomgen.program.differentiate import jacobian
-from eomgen.program.lower import Lowering, TapeScalars
-from eomgen.program.passes import PassReport, optimise
-from eomgen.program.program import Check, Output, Program, finish
+from eomgen.program.lower import Lowering
+from eomgen.program.program import Check
+from eomgen.program.scalars import TapeScalars
+from eomgen.program.system import Made, System, make_system
 from eomgen.program.tape import Node, Stage, Tape
 
 NEEDS_VELOCITIES = (
@@ -22,27 +23,14 @@ NEEDS_VELOCITIES = (
     "mass_matrix",
     "velocity_force",
     "gravity_force",
+    "bias_force",
     "applied_force",
+    "point_jacobians",
 )
 """Outputs in generalised coordinates, made for the form [q, v] only."""
 
 
-@dataclass(frozen=True)
-class System:
-    """A program with the meaning of its inputs: what a backend needs to write a module.
-
-    `extra` names what some outputs take besides state, parameters and inputs: generalised forces or
-    accelerations, one a coordinate.
-    """
-
-    model: Model
-    form: StateForm
-    program: Program
-    extra: dict[str, tuple[str, ...]]
-    reports: tuple[PassReport, ...]
-
-
-def assemble(equations: Equations) -> System:
+def from_equations(equations: Equations) -> System:
     """Lower the equations, differentiate the derivative, run the passes."""
     model, symbols, form = equations.model, equations.symbols, state_form(equations)
     tape = Tape()
@@ -51,8 +39,8 @@ def assemble(equations: Equations) -> System:
     for formula, symbol in symbols.formulas.items():
         parameters[symbol] = evaluate(formula, named, TapeScalars(tape))
     states = {
-        s.symbol: tape.input(s.name, Stage.POSITIONS if s.position else Stage.VELOCITIES)
-        for s in form.states
+        symbol: tape.input(s.name, Stage.POSITIONS if s.position else Stage.VELOCITIES)
+        for symbol, s in zip(form.symbols, form.states, strict=True)
     }
     inputs = {s: tape.input(n, Stage.INPUTS) for n, s in symbols.inputs.items()}
     tau = {s: tape.input(s.name, Stage.INPUTS) for s in symbols.tau}
@@ -81,54 +69,81 @@ def assemble(equations: Equations) -> System:
     for pivot in equations.solution.pivots:  # so that they are named whoever meets them first
         passive.lower(pivot)
     rates = rows(passive, form.rates)
-    slopes = jacobian(rates, list(states.values()))
-    made: dict[str, tuple[tuple[int, ...], list[Node]]] = {
+    by = {
+        "jacobian": list(states.values()),
+        "input_jacobian": list(inputs.values()),
+        "parameter_jacobian": list(named.values()),
+    }
+    made: Made = {
         "initial_state": ((len(form.states),), [starting.lower(e) for e in form.initial]),
         "derivative": ((len(rates),), rates),
-        "jacobian": ((len(rates), len(rates)), [node for row in slopes for node in row]),
     }
     recipes = _recipes(equations)
     lowerings = {"forward_dynamics": pushed, "inverse_dynamics": demanded}
-    for name in model.outputs:
-        if model.form == "velocity" or name not in NEEDS_VELOCITIES:
+    for name in ("jacobian", *model.outputs):
+        if name in by:
+            slopes = jacobian(rates, by[name])
+            made[name] = ((len(rates), len(by[name])), [node for row in slopes for node in row])
+        elif name == "point_jacobians" and model.form == "velocity":
+            shape, expressions = recipes["point_velocities"]
+            slopes = jacobian(rows(passive, expressions), [states[s] for s in symbols.v])
+            made[name] = ((*shape, len(symbols.v)), [node for row in slopes for node in row])
+        elif model.form == "velocity" or name not in NEEDS_VELOCITIES:
             shape, expressions = recipes[name]
             made[name] = (shape, rows(lowerings.get(name, passive), expressions))
-    program, reports = optimise(
-        finish(
-            tape,
-            {name: Output(shape, tuple(n.index for n in ns)) for name, (shape, ns) in made.items()},
-            _checks(equations, starting),
-        )
-    )
     extra = {
         "forward_dynamics": tuple(str(node.step.value) for node in tau.values()),
         "inverse_dynamics": tuple(str(node.step.value) for node in vd.values()),
     }
-    return System(model, form, program, extra, reports)
+    checks = _checks(equations, starting)
+    return make_system(model, "closed", form.states, tape, made, checks, extra, frozenset())
 
 
 def _recipes(equations: Equations) -> dict[str, tuple[tuple[int, ...], list[Any]]]:
     """Shape and expressions of every output, over the symbols of bodies and coordinates."""
     s, symmetric, bodies = equations.symbols, equations.symmetric, equations.model.bodies
     balance = symmetric.M * sp.Matrix(s.a) + symmetric.V + symmetric.G - symmetric.F
-    pins = [force for body, force in zip(bodies, s.force, strict=True) if body.joint.type != "free"]
-    n = len(s.a)
+    held = [k for k, body in enumerate(bodies) if body.joint.type != "free"]
+    pins = [(*s.force[k], -equations.free_bodies.motor[k]) for k in held]
+    n, nb, np = len(s.a), len(bodies), len(equations.model.points)
+    points = [_point(equations, point) for point in equations.model.points]
     return {
         "forward_dynamics": ((n,), list(s.a)),
         "inverse_dynamics": ((n,), list(balance)),
         "mass_matrix": ((n, n), list(symmetric.M)),
         "velocity_force": ((n,), list(symmetric.V)),
         "gravity_force": ((n,), list(symmetric.G)),
+        "bias_force": ((n,), list(symmetric.V + symmetric.G)),
         "applied_force": ((n,), list(symmetric.F)),
         "kinetic_energy": ((), [_kinetic_energy(equations)]),
         "potential_energy": ((), [equations.free_bodies.potential_energy]),
         "momentum": ((3,), _momentum(equations)),
-        "joint_forces": ((len(pins), 2), [component for force in pins for component in force]),
-        "body_poses": (
-            (len(bodies), 3),
-            [z for pose in zip(s.x, s.y, s.angle, strict=True) for z in pose],
+        "centre_of_mass": ((2,), _centre_of_mass(equations)),
+        "joint_forces": ((len(pins), 3), [component for force in pins for component in force]),
+        "body_poses": ((nb, 3), [z for k in range(nb) for z in (s.x[k], s.y[k], s.angle[k])]),
+        "body_velocities": (
+            (nb, 3),
+            [z for k in range(nb) for z in (s.xd[k], s.yd[k], s.omega[k])],
         ),
+        "point_positions": ((np, 2), [z for place, _ in points for z in place]),
+        "point_velocities": ((np, 2), [z for _, rate in points for z in rate]),
     }
+
+
+def _point(equations: Equations, point: Point) -> tuple[Vec, Vec]:
+    """Place and velocity of a named point."""
+    s, k = equations.symbols, point.body
+    rx, ry = rotate((s.value(point.at[0]), s.value(point.at[1])), s.angle[k])
+    return (s.x[k] + rx, s.y[k] + ry), (s.xd[k] - s.omega[k] * ry, s.yd[k] + s.omega[k] * rx)
+
+
+def _centre_of_mass(equations: Equations) -> list[Any]:
+    """Σ m x / Σ m."""
+    s = equations.symbols
+    return [
+        sp.Add(*(m * z for m, z in zip(s.mass, places, strict=True))) / sp.Add(*s.mass)
+        for places in (s.x, s.y)
+    ]
 
 
 def _kinetic_energy(equations: Equations) -> Any:
@@ -158,7 +173,7 @@ def _checks(equations: Equations, lowering: Lowering) -> list[Check]:
     for k, body in enumerate(model.bodies):
         mass = lowering.lower(symbols.mass[k])
         checks.append(Check(f"mass of {body.name}", mass.index, may_vanish=False))
-        if not is_zero(body.inertia_com):
+        if not is_zero(body.moment):
             # A body held away from its centre of mass needs no inertia of its own to turn.
             held = model.form == "velocity" and off_centre(body.joint)
             inertia = lowering.lower(symbols.inertia[k])

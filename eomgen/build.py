@@ -1,0 +1,298 @@
+"""From a scene to a model: every name resolved, bodies in a tree, everything checked."""
+
+import math
+from collections.abc import Collection, Sequence
+from typing import Literal, TypeVar
+
+from eomgen.effects import Effect, ExternalForce, Gravity, Motor
+from eomgen.effects.base import Input
+from eomgen.errors import SceneError, nearest
+from eomgen.joints import Joint, Prismatic, Revolute
+from eomgen.joints.base import WORLD, Coordinate
+from eomgen.language.base import Table
+from eomgen.language.formula import ZERO, Formula
+from eomgen.language.quantity import Parameter, name_quantities, with_components
+from eomgen.model import Body, Model, Point
+from eomgen.scene.chains import written_out
+from eomgen.scene.look import check_look
+from eomgen.scene.schema import OUTPUTS, SHOWN, Scene
+from eomgen.straighten import checked_inertia, straightened_joint, unit_quaternions
+
+AnyTable = TypeVar("AnyTable", bound=Table)
+
+
+def build_model(scene: Scene) -> Model:
+    """Resolve a scene's names into a tree of bodies.
+
+    Raises `SceneError`, naming place, value and remedy, if the scene makes no mechanism.
+    """
+    parameters, known = _scene_parameters(scene)
+    bodies = _bodies(scene, known, parameters)
+    names = {body.name: i for i, body in enumerate(bodies[0])}
+    effects = _effects(scene, bodies[0], known, parameters)
+    points = _points(scene, names, known, parameters)
+    coordinates = [c for body in bodies[0] for c in body.positions]
+    velocities = [c for body in bodies[0] for c in body.velocities]
+    if not velocities:
+        raise SceneError("joints: nothing can move; give at least one that is no weld")
+    inputs = [i for effect in effects for i in effect.inputs(scene.dimensions)]
+    _check_symbols(parameters, coordinates, velocities, inputs)
+    check_look((), scene.camera, scene.dimensions, "camera")
+    if scene.camera.follow is not None:
+        _known_body(scene.camera.follow, "camera.follow", names)
+    model = Model(
+        name=scene.name,
+        title=scene.title or scene.name,
+        dimensions=scene.dimensions,
+        parameters=tuple(parameters),
+        inputs=tuple(inputs),
+        bodies=tuple(bodies[0]),
+        points=tuple(points),
+        effects=tuple(effects),
+        initial_q=_initial(scene.initial.q, coordinates, "initial.q"),
+        initial_v=_initial(scene.initial.v, velocities, "initial.v"),
+        outputs=outputs_for(scene.outputs, "outputs[{}]", scene.points, inputs, parameters),
+        form=scene.form,
+        route=scene.route,
+        simulation=scene.simulation,
+        camera=scene.camera,
+        notices=bodies[1],
+    )
+    return unit_quaternions(model, scene.initial.q)
+
+
+def outputs_for(
+    wanted: Literal["all"] | Sequence[str],
+    place: str,
+    points: Collection[object],
+    inputs: Collection[object],
+    parameters: Collection[object],
+) -> tuple[str, ...]:
+    """What is to be generated, in the order of `OUTPUTS`; "all" is all that there can be.
+
+    `wanted` holds names in `OUTPUTS`; `place` says where the one of number `{}` was asked for.
+    """
+    needs = {
+        **dict.fromkeys(("point_positions", "point_velocities", "point_jacobians"), "points"),
+        "input_jacobian": "inputs",
+        "parameter_jacobian": "parameters",
+    }
+    there = {"points": points, "inputs": inputs, "parameters": parameters}
+    if wanted == "all":
+        return tuple(name for name in OUTPUTS if name not in needs or there[needs[name]])
+    for i, name in enumerate(wanted):
+        if name in needs and not there[needs[name]]:
+            raise SceneError(
+                f"{place.format(i)}: '{name}' is about {needs[name]}, and there are none"
+            )
+    return tuple(name for name in OUTPUTS if name in (*wanted, *SHOWN))
+
+
+def _scene_parameters(scene: Scene) -> tuple[list[Parameter], dict[str, float]]:
+    parameters = []
+    for name, entry in scene.parameters.items():
+        if isinstance(entry, float | int):
+            parameters.append(Parameter(name, float(entry), "", ""))
+        else:
+            parameters.append(Parameter(name, float(entry.value), entry.unit, entry.about))
+    return parameters, {p.name: p.default for p in parameters}
+
+
+def _check_names(tables: Sequence[tuple[str, str]]) -> None:
+    """Names, each with its place, are given once; none is the world's."""
+    seen: dict[str, str] = {}
+    for name, place in tables:
+        if name in seen:
+            raise SceneError(
+                f"{place}.name: '{name}' is the name of {seen[name]} too; give each its own"
+            )
+        seen[name] = place
+        if name == WORLD and place.startswith("bodies"):
+            raise SceneError(f"{place}.name: '{WORLD}' is the ground; choose another name")
+
+
+def _known_body(name: str, place: str, known: Sequence[str] | dict[str, int]) -> None:
+    if name not in known:
+        hint = nearest(name, known) or f"; known: {_listed(known)}"
+        raise SceneError(f"{place}: no body is named '{name}'{hint}")
+
+
+def _listed(names: Sequence[str] | dict[str, int]) -> str:
+    """Names in a message, the first few of many."""
+    words = list(names)
+    return ", ".join(words[:12]) + (f" and {len(words) - 12} more" if len(words) > 12 else "")
+
+
+def _bodies(
+    scene: Scene, known: dict[str, float], parameters: list[Parameter]
+) -> tuple[list[Body], tuple[str, ...]]:
+    """Bodies with their joints, parents first and otherwise in the scene's order; and notices."""
+    bodies, joints = written_out(scene)
+    _check_names([(body.name, place) for body, place in bodies])
+    _check_names([(joint.name, place) for joint, place in joints])
+    names = {body.name: i for i, (body, _) in enumerate(bodies)}
+    holding: dict[str, tuple[Joint, str]] = {}
+    for joint, place in joints:
+        _known_body(joint.child, f"{place}.child", names)
+        if joint.parent != WORLD:
+            _known_body(joint.parent, f"{place}.parent", [WORLD, *names])
+        if joint.child in holding:
+            raise SceneError(
+                f"{place}.child: '{joint.child}' is the child of {holding[joint.child][1]} too; "
+                "in a tree each body has one joint to its parent"
+            )
+        holding[joint.child] = (joint, place)
+    for body, place in bodies:
+        if body.name not in holding:
+            raise SceneError(
+                f"{place}.name: '{body.name}' is attached to nothing; "
+                "give it a joint, of type 'free' if nothing holds it"
+            )
+    depth = _depths(holding)
+    order = sorted(names, key=lambda name: (depth[name], names[name]))
+    index = {name: k for k, name in enumerate(order)}
+    built: list[Body] = []
+    notices: list[str] = []
+    for name in order:
+        body, place = bodies[names[name]]
+        joint, joint_place = holding[name]
+        joint = straightened_joint(joint, joint_place, scene.dimensions, notices)
+        check_look(body.shapes, None, scene.dimensions, place)
+        body = _named(body, body.name, place, known, parameters)
+        joint = _named(joint, joint.name, joint_place, known, parameters)
+        built.append(
+            Body(
+                name=name,
+                mass=body.mass,
+                inertia_com=checked_inertia(body, place, scene.dimensions, parameters),
+                joint=joint,
+                parent=-1 if joint.parent == WORLD else index[joint.parent],
+                positions=joint.positions(scene.dimensions),
+                velocities=joint.velocities(scene.dimensions),
+                shapes=body.shapes,
+            )
+        )
+    return built, tuple(dict.fromkeys(notices))
+
+
+def _named(
+    table: AnyTable, prefix: str, place: str, known: dict[str, float], parameters: list[Parameter]
+) -> AnyTable:
+    """A table with its bare numbers as parameters, which are added to `parameters`."""
+    fields, new = name_quantities(table, prefix, place, known)
+    parameters += new
+    return table.replaced(**fields)
+
+
+def _depths(holding: dict[str, tuple[Joint, str]]) -> dict[str, int]:
+    """How many joints lie between each body and the world. Raises `SceneError` for a cycle."""
+    depth: dict[str, int] = {WORLD: 0}
+    for start in holding:
+        path: dict[str, None] = {}
+        name = start
+        while name not in depth:
+            if name in path:
+                joint, place = holding[name]
+                raise SceneError(
+                    f"{place}.parent: '{joint.parent}' hangs on its own child '{name}': "
+                    "the joints make a cycle; let one tree start at the world"
+                )
+            path[name] = None
+            name = holding[name][0].parent
+        for name in reversed(path):
+            depth[name] = depth[holding[name][0].parent] + 1
+    return depth
+
+
+def _points(
+    scene: Scene, names: dict[str, int], known: dict[str, float], parameters: list[Parameter]
+) -> list[Point]:
+    _check_names([(point.name, f"points[{i}]") for i, point in enumerate(scene.points)])
+    points = []
+    for i, point in enumerate(scene.points):
+        place = f"points[{i}]"
+        _known_body(point.body, f"{place}.body", names)
+        at = with_components(point.at, ZERO, scene.dimensions, f"{place}.at")
+        named = _named(point.replaced(at=at), point.name, place, known, parameters)
+        points.append(Point(point.name, names[point.body], named.at))
+    return points
+
+
+def _effects(
+    scene: Scene, bodies: Sequence[Body], known: dict[str, float], parameters: list[Parameter]
+) -> list[Effect]:
+    names = [body.name for body in bodies]
+    driven = [b.joint.name for b in bodies if isinstance(b.joint, Revolute | Prismatic)]
+    _check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
+    effects: list[Effect] = []
+    for i, effect in enumerate(scene.effects):
+        place = f"effects[{i}]"
+        match effect:
+            case Gravity() if any(isinstance(other, Gravity) for other in effects):
+                raise SceneError(f"{place}.type: a second 'gravity'; give one")
+            case ExternalForce():
+                _known_body(effect.body, f"{place}.body", names)
+                vectors: dict[str, tuple[Formula, ...]] = {
+                    "at": with_components(effect.at, ZERO, scene.dimensions, f"{place}.at")
+                }
+                if effect.force != "input":
+                    force = effect.force
+                    vectors["force"] = with_components(
+                        force, ZERO, scene.dimensions, f"{place}.force"
+                    )
+                effect = effect.replaced(**vectors)
+            case Motor() if effect.joint not in driven:
+                hint = nearest(effect.joint, driven) or f"; known: {_listed(driven) or 'none'}"
+                raise SceneError(
+                    f"{place}.joint: no revolute or prismatic joint is named '{effect.joint}'{hint}"
+                )
+        effects.append(_named(effect, effect.name, place, known, parameters))
+    return effects
+
+
+def _check_symbols(
+    parameters: Sequence[Parameter],
+    coordinates: Sequence[Coordinate],
+    velocities: Sequence[Coordinate],
+    inputs: Sequence[Input],
+) -> None:
+    """No name may stand for two things in the equations."""
+    taken = {"t": "time", "pi": "the number π"}
+    uses = [(p.name, "a parameter") for p in parameters]
+    uses += [(c.name, "a coordinate") for c in coordinates]
+    uses += [(c.name, "a velocity") for c in velocities]
+    uses += [(c.acceleration, "an acceleration") for c in velocities]
+    uses += [(i.name, "an input") for i in inputs]
+    for name, use in uses:
+        if name in taken:
+            other = "another" if use == taken[name] else taken[name]
+            raise SceneError(
+                f"'{name}' would be the name of {use} and of {other}; rename one of them"
+            )
+        taken[name] = use
+
+
+def _initial(
+    given: Sequence[float] | dict[str, float], coordinates: Sequence[Coordinate], place: str
+) -> tuple[float, ...]:
+    names = [c.name for c in coordinates]
+    if not isinstance(given, dict):
+        if len(given) != len(names):
+            raise SceneError(
+                f"{place}: has {len(given)} numbers for {len(names)} coordinates; "
+                f"give one each for {_listed(names)}"
+            )
+        return tuple(float(x) for x in given)
+    values = dict.fromkeys(names, 0.0)
+    degrees = {f"{c.name}_deg": c.name for c in coordinates if c.unit in ("rad", "rad/s")}
+    for key, value in given.items():
+        if key in values:
+            values[key] = float(value)
+        elif key in degrees:
+            if degrees[key] in given:
+                raise SceneError(f"{place}.{key}: {degrees[key]} is given too; give one of them")
+            values[degrees[key]] = math.radians(value)
+        else:
+            hint = nearest(key, names) or f"; known: {_listed(names)}"
+            raise SceneError(f"{place}.{key}: no coordinate has this name{hint}")
+    return tuple(values.values())

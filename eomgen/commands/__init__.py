@@ -1,0 +1,26 @@
+"""What each command does; what is heavy is imported by the command that needs it."""
+
+import importlib.metadata
+
+from eomgen.commands.deriving import derive
+from eomgen.commands.describing import check, list_scenes, print_schema
+from eomgen.commands.generating import generate
+from eomgen.commands.linearising import linearise
+from eomgen.commands.running import simulate, view
+
+__all__ = [
+    "check",
+    "derive",
+    "generate",
+    "linearise",
+    "list_scenes",
+    "print_schema",
+    "simulate",
+    "version",
+    "view",
+]
+
+
+def version() -> str:
+    """This program's version."""
+    return importlib.metadata.version("eomgen")

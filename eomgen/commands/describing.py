@@ -1,0 +1,77 @@
+"""What there is and what a scene is made of: `list`, `schema`, `check`."""
+
+import sys
+
+from eomgen.commands.shared import (
+    FEW,
+    Arguments,
+    located,
+    print_listed,
+    print_wrapped,
+    read_model,
+    shortened,
+)
+from eomgen.derivation.recursive.regular import check_regular
+from eomgen.joints.base import WORLD, Geared
+from eomgen.model import Body, Model
+from eomgen.scene.reader import built_in_names, read_scene
+
+
+def list_scenes(given: Arguments) -> int:
+    """Names and titles of the built-in scenes."""
+    names = built_in_names()
+    for name in names:
+        print(f"{name:<{max(map(len, names))}}  {read_scene(name).title}")
+    return 0
+
+
+def print_schema(given: Arguments) -> int:
+    """The JSON Schema of the scene language."""
+    from eomgen.scene.json_schema import json_schema
+
+    print(json_schema(), end="")
+    return 0
+
+
+def check(given: Arguments) -> int:
+    """Validate; bodies, joints, degrees of freedom, limits, effects in force."""
+    model, _ = read_model(given.scene, given)
+    with located(given.scene):
+        check_regular(model)
+    most = sys.maxsize if given.long else FEW
+    nq, nv = len(model.coordinates), len(model.velocities)
+    freedom = f"{nv} degree{'s' if nv != 1 else ''} of freedom"
+    if nq != nv:
+        balls = len(model.quaternions)
+        freedom += f", {nq} coordinates with {balls} unit quaternion{'s' if balls > 1 else ''}"
+    print(f"{model.name}: {model.title}")
+    print(f"dimensions  {model.dimensions}: {'the plane' if model.dimensions == 2 else 'space'}")
+    print_listed("bodies      ", shortened([body.name for body in model.bodies], most))
+    for line in shortened([_joint(model, body) for body in model.bodies], most):
+        print_wrapped("joint       ", line)
+    print(f"freedom     {freedom}")
+    print_listed("points      ", shortened([point.name for point in model.points], most))
+    effects = [effect.type for effect in model.effects]
+    counted = [
+        f"{effects.count(name)} {name}" if effects.count(name) > 1 else name
+        for name in dict.fromkeys(effects)
+    ]
+    print_listed("effects     ", counted)
+    print_listed("inputs      ", shortened([i.name for i in model.inputs], most))
+    values = [f"{p.name} = {p.default:g}" for p in model.parameters]
+    print_listed("parameters  ", shortened(values, most))
+    if max(len(values), len(model.bodies), len(model.points), len(model.inputs)) > most:
+        print(f"            eomgen check {given.scene} --long lists all")
+    return 0
+
+
+def _joint(model: Model, body: Body) -> str:
+    """Name, type, bodies, coordinates and limits of the joint that holds a body."""
+    joint = body.joint
+    parent = WORLD if body.parent < 0 else model.bodies[body.parent].name
+    names = ", ".join(c.name for c in body.positions) or "holds fast"
+    line = f"{joint.name}: {joint.type}, {parent} to {body.name}; {names}"
+    if isinstance(joint, Geared) and joint.limits is not None:
+        low, high = joint.limits
+        line += f" from {low:g} to {high:g} {body.positions[0].unit}"
+    return line

@@ -1,0 +1,72 @@
+"""Modules written and compared: `generate`."""
+
+import shlex
+from pathlib import Path
+
+from eomgen.commands.shared import Arguments, code_of, read_model
+from eomgen.errors import RunError
+from eomgen.files import check_folder, check_writable, write_whole
+from eomgen.scene.reader import built_in_names
+from eomgen.store import Code
+
+
+def generate(given: Arguments) -> int:
+    """Write modules, or with --check say which are stale."""
+    scenes = list(dict.fromkeys([*given.scenes, *(built_in_names() if given.all else ())]))
+    paths: dict[Path, str] = {}
+    stale = []
+    for scene in scenes:
+        model, name = read_model(scene, given)
+        path = given.output / f"{name}.py"
+        if path in paths:
+            raise RunError(
+                f"{path}: would be written for {paths[path]} and for {scene}; rename one"
+            )
+        paths[path] = scene
+        if not given.check:
+            check_folder(given.output)
+            check_writable(path, force=given.force)
+        code, _ = code_of(scene, model, given)
+        current = _text(path)
+        if given.check:
+            state = "fresh" if current == code.module else "missing" if current is None else "stale"
+            stale += [scene] if state != "fresh" else []
+            print(f"{path}: {state}")
+        elif current == code.module:
+            print(f"{path}: fresh")
+        else:
+            write_whole(path, code.module, force=given.force)
+            print(f"{path}: written{'' if code.derived else ', not derived again'}")
+        if given.explain:
+            _print_explanation(code)
+        if given.report:
+            _print_report(code)
+    if stale:
+        raise RunError(
+            f"{len(stale)} stale; run: eomgen generate {' '.join(stale)} -o {given.output}"
+            + "".join(
+                f" --{option} {shlex.quote(value)}"
+                for option in ("form", "route", "outputs")
+                if (value := getattr(given, option)) is not None
+            )
+        )
+    return 0
+
+
+def _text(path: Path) -> str | None:
+    try:
+        return path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+def _print_explanation(code: Code) -> None:
+    print(f"    {'route':<8}{'cost':>8}  (operations of derivative)")
+    for line in code.explanation:
+        print(f"    {line}")
+
+
+def _print_report(code: Code) -> None:
+    print(f"    {'pass':<20}{'steps':>8}{'derivative':>12}{'jacobian':>10}  (operations)")
+    for line in code.reports:
+        print(f"    {line.name:<20}{line.steps:>8}{line.derivative:>12}{line.jacobian:>10}")

@@ -1,0 +1,195 @@
+"""A mechanism linearised, with what control engineers ask of it: `linearise`."""
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from eomgen.commands.shared import (
+    Arguments,
+    assignments,
+    code_of,
+    located,
+    print_listed,
+    print_wrapped,
+    read_model,
+    shortened,
+)
+from eomgen.errors import RunError
+from eomgen.files import check_writable
+from eomgen.model import Model
+from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.problem import Floats
+from eomgen.scene.reader import find_scene
+from eomgen.scene.schema import SHOWN
+from eomgen.study.equilibrium import equilibrium
+from eomgen.study.linearise import Linearisation, save
+from eomgen.study.linearise import linearise as linearised
+from eomgen.study.modes import Mode, controllable_rank, modes, stability
+
+WIDEST = 12
+"""States up to which A and B are printed."""
+STILL = 1e-9
+"""Positions and accelerations below this, in SI units, are rounding."""
+
+
+def linearise(given: Arguments) -> int:
+    """Print A and B about an equilibrium or a state, modes, and what the inputs can do."""
+    model, _ = read_model(given.scene, given)
+    wanted = "input_jacobian" if model.inputs else ""
+    # Forms other than [q, v] have states that move with the parameters.
+    model = replace(
+        model, form="velocity", outputs=tuple(name for name in (*SHOWN, wanted) if name)
+    )
+    parameters = assignments(given.set, model.defaults, "--set")
+    inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
+    if given.output is not None:
+        check_writable(given.output, force=given.force)
+        if given.output.suffix not in (".npz", ".csv"):
+            raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
+    _, module = code_of(given.scene, model, given)
+    with located(given.scene):
+        y = _state(given, model, as_problem(module, parameters or None, inputs or None).initial)
+        u: Mapping[str, float] | Floats = inputs
+        if given.at != "initial":
+            y, u = equilibrium(
+                module,
+                y,
+                inputs,
+                parameters,
+                hold=given.hold,
+                trim=given.trim,
+                settle=given.at == "rest",
+            )
+        elif given.hold or given.trim:
+            raise RunError("--hold, --trim: are for finding an equilibrium; leave out --at initial")
+        whole = linearised(module, y, u, parameters)
+    least = whole.reduced()
+    found = modes(least.A)
+    _print_place(module, whole, given.at)
+    _print_matrices(least)
+    _print_modes(found)
+    verdict = {
+        "unstable": "unstable: a small deviation grows",
+        "stable": "stable: every small deviation dies out",
+        "marginal": "marginal: to first order some small deviation neither dies out nor grows fast",
+    }
+    print(f"stability   {verdict[stability(found)]}")
+    if least.input_names:
+        rank, n = controllable_rank(least.A, least.B), len(least.A)
+        print(f"control     rank {rank} of {n}: {'' if rank == n else 'not '}controllable")
+    if given.output is not None:
+        save(whole, model.name, given.output, force=given.force)
+        print(f"wrote {given.output}")
+    return 0
+
+
+def _state(given: Arguments, model: Model, initial: Floats) -> Floats:
+    """The scene's initial state with what `--state` changes, quaternions scaled with a notice."""
+    names = [c.name for c in (*model.coordinates, *model.velocities)]
+    units = [c.unit for c in (*model.coordinates, *model.velocities)]
+    degrees = {f"{n}_deg": n for n, unit in zip(names, units, strict=True) if "rad" in unit}
+    y = initial.copy()
+    for name, value in assignments(given.state, [*names, *degrees], "--state").items():
+        index = names.index(degrees.get(name, name))
+        if given.at != "initial" and index >= len(model.coordinates):
+            raise RunError(
+                f"--state {name}: an equilibrium is at rest; leave it out, or give --at initial"
+            )
+        y[index] = math.radians(value) if name in degrees else value
+    for quaternion in model.quaternions:
+        indices = list(quaternion)
+        length = float(np.linalg.norm(y[indices]))
+        if not length:
+            raise RunError(f"--state: the quaternion from {names[indices[0]]} on has no length")
+        if abs(length - 1) > STILL:
+            print(
+                f"eomgen: note: {find_scene(given.scene).name}: --state: the quaternion from "
+                f"{names[indices[0]]} on has length {length:g}; scaled to 1",
+                file=sys.stderr,
+            )
+        y[indices] /= length
+    return y
+
+
+def _print_place(module: GeneratedModule, whole: Linearisation, at: str) -> None:
+    nq = len(module.POSITIONS)
+    kind = {
+        "equilibrium": "an equilibrium",
+        "rest": "where it comes to rest",
+        "initial": "the state given",
+    }
+    print(f"{module.NAME}: linearised about {kind[at]}")
+    shown = nq if at != "initial" else len(whole.y)
+    values = []
+    for name, value in zip(whole.state_names[:shown], whole.y[:shown].tolist(), strict=True):
+        value = value if abs(value) > STILL else 0.0
+        angle = module.UNITS[name] == "rad" and value
+        degrees = f" ({_number(math.degrees(value))} deg)" if angle else ""
+        values.append(f"{name} = {_number(value)}{degrees}")
+    print_listed("state       ", shortened(values, 80))
+    inputs = zip(whole.input_names, whole.u.tolist(), strict=True)
+    print_listed("inputs      ", [f"{name} = {_number(value)}" for name, value in inputs])
+    changes = whole.rates[nq:]
+    if at == "initial" and np.max(np.abs(changes), initial=0.0) > STILL:
+        worst = int(np.argmax(np.abs(changes)))
+        name = whole.state_names[nq + worst]
+        unit = module.UNITS[name].replace("/s", "/s^2")
+        print_wrapped(
+            "note        ",
+            f"no equilibrium: {name} changes by {_number(changes[worst])} {unit}; A and B are for "
+            "deviations from this motion, at this instant",
+        )
+
+
+def _print_matrices(least: Linearisation) -> None:
+    n, names = len(least.A), least.state_names
+    if n > WIDEST:
+        shape = f"A is {n} x {n}" + (f", B {n} x {least.B.shape[1]}" if least.B.size else "")
+        print(f"matrices    {shape}; -o FILE.npz or -o FILE.csv writes them")
+        return
+    _print_matrix("A", least.A, names, names)
+    if least.B.size:
+        _print_matrix("B", least.B, names, least.input_names)
+
+
+def _print_matrix(label: str, matrix: Floats, rows: Sequence[str], columns: Sequence[str]) -> None:
+    rounding = 1e-14 * float(np.max(np.abs(matrix), initial=0.0))
+    cells = [[_number(x if abs(x) > rounding else 0.0) for x in row] for row in matrix.tolist()]
+    widths = [max(map(len, (name, *texts))) for name, *texts in zip(columns, *cells, strict=True)]
+    first = max(map(len, (label, *rows)))
+    lines = [(label, columns), *zip(rows, cells, strict=True)]
+    for name, texts in lines:
+        padded = (text.rjust(width) for text, width in zip(texts, widths, strict=True))
+        print(f"    {name:<{first}}  {'  '.join(padded)}")
+
+
+def _print_modes(found: Sequence[Mode]) -> None:
+    """A line for each mode; modes that read the same are counted."""
+    counts: dict[tuple[str, str], int] = {}
+    for mode in found:
+        counts[_mode(mode)] = counts.get(_mode(mode), 0) + 1
+    width = max((len(value) for value, _ in counts), default=0)
+    lines = [
+        f"    {value:<{width}}  {text}" + (f", {count} times" if count > 1 else "")
+        for (value, text), count in counts.items()
+    ]
+    print("eigenvalues, 1/s")
+    print("\n".join(shortened(lines)))
+
+
+def _mode(mode: Mode) -> tuple[str, str]:
+    """An eigenvalue or a pair as a number, and what it means."""
+    if mode.turn:
+        value = f"{_number(mode.rate)} ± {_number(mode.turn)}i"
+        return value, f"{mode.frequency:.4g} Hz, damping {_number(mode.damping)}"
+    if mode.rate:
+        time = math.log(2) / abs(mode.rate)
+        return _number(mode.rate), f"{'doubles' if mode.rate > 0 else 'halves'} in {time:.4g} s"
+    return "0", "stays, or drifts"
+
+
+def _number(x: float) -> str:
+    return f"{x + 0.0:.6g}"

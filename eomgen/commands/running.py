@@ -1,0 +1,145 @@
+"""Motions computed and shown: `simulate`, `view`."""
+
+import os
+import sys
+import webbrowser
+from pathlib import Path
+from typing import Any
+
+from eomgen.commands.shared import Arguments, assignments, code_of, read_model, shortened
+from eomgen.errors import RunError
+from eomgen.files import check_folder, check_writable, remove_ours, write_whole
+from eomgen.joints.base import Geared
+from eomgen.model import Model
+from eomgen.run.limits import excursions
+from eomgen.run.module import as_problem
+from eomgen.run.progress import terminal_progress
+from eomgen.run.trajectory import Trajectory
+
+
+def simulate(given: Arguments) -> int:
+    """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
+    # Imported here: `check` and `generate` need neither SciPy nor Matplotlib.
+    from eomgen.run.integrate import integrate
+    from eomgen.run.integrators import FixedStep, find_integrator
+    from eomgen.run.trajectory import save_csv, save_npz
+    from eomgen.show.figure import save_figure
+    from eomgen.show.observe import observe
+    from eomgen.show.page import save_page
+
+    model, name = read_model(given.scene, given)
+    parameters = assignments(given.set, model.defaults, "--set")
+    inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
+    wanted = model.simulation
+    integrator = _or(given.integrator, wanted.integrator)
+    fixed = isinstance(find_integrator(integrator), FixedStep)
+    paths = _output_paths(given, name)
+    code, module = code_of(given.scene, model, given)
+    with terminal_progress(f"simulating {model.name}") as progress:
+        trajectory = integrate(
+            as_problem(module, parameters or None, inputs or None),
+            integrator,
+            _or(given.t_end, wanted.t_end),
+            dt=_or(given.dt, wanted.dt) if fixed else given.dt,
+            rtol=_or(given.rtol, wanted.rtol),
+            atol=_or(given.atol, wanted.atol),
+            samples=given.samples,
+            progress=progress,
+        )
+    model = model.with_parameters(parameters)
+    motion = observe(model, module, trajectory)
+    values = tuple(model.defaults.values())
+    write_whole(paths["py"], code.module, force=given.force)
+    save_npz(trajectory, paths["npz"], force=given.force)
+    save_csv(trajectory, paths["csv"], force=given.force)
+    try:
+        save_figure(motion, paths["png"], force=given.force)
+        save_page(motion, code.poses, values, paths["html"], force=given.force)
+    except RunError as error:
+        # Pictures of an earlier run must not stand beside the numbers of this one.
+        for kind in ("png", "html"):
+            remove_ours(paths.pop(kind))
+        drawing = str(error)
+    else:
+        drawing = ""
+
+    energy = motion.kinetic_energy + motion.potential_energy
+    print(
+        f"{model.name}: {trajectory.t[-1]:g} s by {integrator}, "
+        f"{trajectory.counts['steps']} steps, {trajectory.counts['derivatives']} derivatives "
+        f"({'derived now' if code.derived else 'module fresh, not derived again'})"
+    )
+    print(f"    energy {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the end")
+    print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
+    _print_excursions(model, trajectory)
+    for path in paths.values():
+        print(f"    wrote {path}")
+    trouble = "" if trajectory.finished else f"{model.name}: {trajectory.message}"
+    if trouble or drawing:
+        raise RunError("\n".join(line for line in (trouble, drawing) if line))
+    if given.view:
+        _open(paths["html"])
+    return 0
+
+
+def _print_excursions(model: Model, trajectory: Trajectory) -> None:
+    """Say which coordinates left the limits of their joints, which nothing enforces."""
+    limits, units = {}, {}
+    for body in model.bodies:
+        if isinstance(body.joint, Geared) and body.joint.limits is not None:
+            coordinate = body.positions[0]
+            limits[coordinate.name], units[coordinate.name] = body.joint.limits, coordinate.unit
+    start = float(trajectory.t[0])
+    lines = []
+    for out in excursions(trajectory, limits):
+        unit = units[out.state]
+        first = out.since == start
+        when = "" if first else f" at t = {out.since:.4g} s"
+        lines.append(
+            f"{out.state} {'starts outside' if first else 'leaves'} its limits "
+            f"{out.low:g} to {out.high:g} {unit}{when}; "
+            f"farthest {out.farthest:.4g} {unit} at t = {out.at:.4g} s"
+        )
+    lines += [
+        f"{name} has limits, but is no state of the form '{model.form}'"
+        for name in limits
+        if name not in trajectory.states
+    ]
+    for line in shortened(lines):
+        print(f"    {line}")
+    if lines:
+        print("    limits are reported, not enforced")
+
+
+def _output_paths(given: Arguments, name: str) -> dict[str, Path]:
+    """Where a simulation writes, by kind; raises `RunError` now for what could not be written."""
+    from eomgen.show.style import check_figure
+
+    kinds = ("py", "npz", "csv", "png", "html")
+    paths = {kind: given.output / f"{name}.{kind}" for kind in kinds}
+    paths["png"] = _or(given.plot, paths["png"])
+    check_figure(paths["png"], force=given.force)
+    for path in paths.values():
+        check_folder(path.parent)
+        check_writable(path, force=given.force)
+    return paths
+
+
+def _or(given: Any, default: Any) -> Any:
+    """What the command line gave, or the scene's own."""
+    return default if given is None else given
+
+
+def view(given: Arguments) -> int:
+    """Simulate, then open the page."""
+    given.view = True
+    return simulate(given)
+
+
+def _open(page: Path) -> None:
+    """Show a page where there is a display; where there is none, say how."""
+    screen = sys.platform in ("win32", "darwin") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+    if not (screen and webbrowser.open(page.resolve().as_uri())):
+        print(f"    no display here; open {page} in a browser")

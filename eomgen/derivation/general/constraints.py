@@ -1,0 +1,259 @@
+"""The joints as constraints on the poses of bodies, differentiated twice by SymPy.
+
+Vectors have three components in the axes of the body they belong to; ' is the derivative of
+components. A point that is fixed in axes turning at ω moves by r' + ω x r.
+
+    joint's axes   world_R_joint = world_R_parent E
+    rotation       world_R_child = world_R_joint Q(q)
+    constraint     x_child + r_child = x_parent + r_parent + E s(q)
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+
+from eomgen.derivation.general.symbols import Ledger, Symbols, rate, real, triple
+from eomgen.derivation.symbols import Expr
+from eomgen.joints import Free, Joint
+from eomgen.joints.base import Move
+from eomgen.model import Body, Model
+
+
+@dataclass(frozen=True)
+class Moving:
+    """Symbols of one body's motion in its own axes.
+
+    `omega`, `velocity`: angular velocity and velocity of the centre of mass; `alpha`,
+    `acceleration`: their derivatives in the world.
+    """
+
+    omega: Expr
+    velocity: Expr
+    alpha: Expr
+    acceleration: Expr
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """One body's joint, and its motion by that of its parent.
+
+    `axes` is E and `rotation` Q; `reach` runs from the parent's centre of mass to the joint's point
+    on the child in the joint's axes, `arm` from the child's to it in the child's. `turning` is the
+    angular velocity relative to the parent. `turn` is the coordinate axis and the angle of the
+    whole rotation E Q, if it has one. The last four fields are the components of `own` over
+    the symbols of `parent`, of `own` before them, of coordinates, and of v and v̇.
+    """
+
+    axes: Expr
+    rotation: Expr
+    reach: Expr
+    arm: Expr
+    turning: Expr
+    turn: tuple[Expr, Expr] | None
+    parent: Moving
+    own: Moving
+    omega: Expr
+    velocity: Expr
+    alpha: Expr
+    acceleration: Expr
+
+
+def state_joints(model: Model, symbols: Symbols, ledger: Ledger) -> tuple[Constraint, ...]:
+    """State every joint and differentiate it; rotations that are long get definitions."""
+    found: list[Constraint] = []
+    nothing = Moving(*(sp.zeros(3, 1) for _ in range(4)))
+    starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
+    for body, i, j in starts:
+        q = symbols.q[i : i + len(body.positions)]
+        v = symbols.v[j : j + len(body.velocities)]
+        a = symbols.a[j : j + len(body.velocities)]
+        parent = found[body.parent].own if body.parent >= 0 else nothing
+        words = ("omega", "u", "alpha", "a")
+        own = Moving(*(triple(word, body.name) for word in words))
+        ledger.rates.update(zip(v, a, strict=True))
+        ledger.rates.update(zip(own.omega, own.alpha, strict=True))
+        found.append(_differentiated(body, model, symbols, q, v, parent, own, ledger))
+    return tuple(found)
+
+
+def _differentiated(
+    body: Body,
+    model: Model,
+    symbols: Symbols,
+    q: Sequence[Expr],
+    v: Sequence[Expr],
+    parent: Moving,
+    own: Moving,
+    ledger: Ledger,
+) -> Constraint:
+    joint = body.joint
+    axes, r_parent, arm = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
+    if not isinstance(joint, Free):
+        axes = _orientation(joint.orientation_deg)
+        r_parent, arm = symbols.vector(joint.r_parent), symbols.vector(joint.r_child)
+    moves = joint.moves(model.dimensions)
+    rotation, turning, slide = _moved(body.name, moves, q, v, ledger)
+    if moves and not all(_simple(move) for move in moves):
+        rotation = _entries(body.name, rotation, turning, ledger)
+    inward, back = axes.T, rotation.T
+    reach = inward * r_parent + slide
+    base = inward * parent.omega
+
+    def in_joint(vector: Expr) -> Expr:
+        return rate(vector, ledger.rates) + base.cross(vector)
+
+    def in_child(vector: Expr) -> Expr:
+        return rate(vector, ledger.rates) + own.omega.cross(vector)
+
+    moved = in_joint(reach)
+    omega = back * base + turning
+    return Constraint(
+        axes=axes,
+        rotation=rotation,
+        reach=reach,
+        arm=arm,
+        turning=turning,
+        turn=_turn_of(joint, moves, q, model.dimensions),
+        parent=parent,
+        own=own,
+        omega=omega,
+        velocity=back * (inward * parent.velocity + moved) - in_child(arm),
+        alpha=rate(omega, ledger.rates),
+        acceleration=back * (inward * parent.acceleration + in_joint(moved))
+        - in_child(in_child(arm)),
+    )
+
+
+def _moved(
+    name: str, moves: Sequence[Move], q: Sequence[Expr], v: Sequence[Expr], ledger: Ledger
+) -> tuple[Expr, Expr, Expr]:
+    """Rotation, angular velocity in the turned axes, and slide of a row of moves; q' by the way."""
+    rotation, turning, slide = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
+    q, v = list(q), list(v)
+    for move in moves:
+        if move.kind == "spin":
+            w, x, y, z = q[:4]
+            a, b, c = v[:3]
+            half = sp.Rational(1, 2)
+            ledger.rates[w] = -half * (x * a + y * b + z * c)
+            ledger.rates[x] = half * (w * a + y * c - z * b)
+            ledger.rates[y] = half * (w * b + z * a - x * c)
+            ledger.rates[z] = half * (w * c + x * b - y * a)
+            # |q|² stays as it is, so that this needs no rate.
+            k = ledger.define(real(f"k__{name}"), 2 / (w**2 + x**2 + y**2 + z**2))
+            turn, spin = of_quaternion(q[:4], k), sp.Matrix(v[:3])
+            rotation, turning = rotation * turn, turn.T * turning + spin
+            q, v = q[4:], v[3:]
+            continue
+        ledger.rates[q[0]] = v[0]
+        axis = sp.Matrix([number(part) for part in move.axis])
+        if move.kind == "slide":
+            slide += rotation * axis * q[0]
+        else:
+            turn = about(axis, q[0])
+            rotation, turning = rotation * turn, turn.T * turning + axis * v[0]
+        q, v = q[1:], v[1:]
+    return rotation, turning, slide
+
+
+def _turn_of(
+    joint: Joint, moves: Sequence[Move], q: Sequence[Expr], dimensions: int
+) -> tuple[Expr, Expr] | None:
+    """Coordinate axis and angle of a joint whose turns are all about one; the angle is 0 of none.
+
+    Angles about one axis add up, however many joints are between.
+    """
+    axis, angle = sp.zeros(3, 1), sp.Integer(0)
+    degrees = 0.0 if isinstance(joint, Free) else joint.orientation_deg
+    if dimensions == 2 and not isinstance(degrees, tuple) and degrees != 0.0:
+        quarters, rest = divmod(degrees, 90.0)
+        axis = sp.Matrix([0, 0, 1])
+        angle = sp.Float(math.radians(degrees)) if rest else int(quarters) * sp.pi / 2
+    elif degrees not in (0.0, (0.0, 0.0, 0.0)):
+        return None
+    for move, coordinate in zip(moves, q, strict=False):  # a spin has four
+        if move.kind == "slide":
+            continue
+        along = sp.Matrix([abs(number(part)) for part in move.axis])
+        if not _simple(move) or (any(axis) and along != axis):
+            return None
+        axis, angle = along, angle + sum(number(part) for part in move.axis) * coordinate
+    return axis, angle
+
+
+def _simple(move: Move) -> bool:
+    """Whether a move's rotation has one sine or cosine in an entry: slides, and coordinate axes."""
+    along = sorted(map(abs, move.axis)) == [0.0, 0.0, 1.0]
+    return move.kind == "slide" or (move.kind == "turn" and along)
+
+
+def _entries(name: str, rotation: Expr, turning: Expr, ledger: Ledger) -> Expr:
+    """A rotation by symbols for its entries, whose rates are those of Q' = Q [ω]x."""
+    symbols = sp.Matrix(3, 3, lambda i, j: real(f"R__{name}__{'xyz'[i]}{'xyz'[j]}"))
+    symbols = symbols.applyfunc(lambda s: rotation[_place(s)] if rotation[_place(s)].is_Atom else s)
+    for i in range(3):
+        for j in range(3):
+            if symbols[i, j] != rotation[i, j]:
+                ledger.define(symbols[i, j], rotation[i, j])
+    rates = symbols * hat(turning)
+    for i in range(3):
+        for j in range(3):
+            if symbols[i, j] != rotation[i, j]:
+                ledger.rates[symbols[i, j]] = rates[i, j]
+    return symbols
+
+
+def _place(symbol: Expr) -> tuple[int, int]:
+    row, column = symbol.name[-2:]
+    return "xyz".index(row), "xyz".index(column)
+
+
+def number(value: float) -> Expr:
+    """A number of the scene's structure: whole ones exact, so that what they make zero vanishes."""
+    return sp.Integer(int(value)) if value.is_integer() else sp.Float(value)
+
+
+def about(axis: Expr, angle: Expr) -> Expr:
+    """The rotation about a unit vector: n nᵀ + cos (1 - n nᵀ) + sin [n]x."""
+    along = axis * axis.T
+    return along + sp.cos(angle) * (sp.eye(3) - along) + sp.sin(angle) * hat(axis)
+
+
+def hat(a: Expr) -> Expr:
+    """The matrix of a x."""
+    x, y, z = a
+    return sp.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def of_quaternion(q: Sequence[Expr], k: Expr) -> Expr:
+    """The rotation of w, x, y, z with k = 2/|q|²: 1 + k (w [v]x + [v]x²), whatever its length."""
+    w, x, y, z = q
+    return sp.Matrix(
+        [
+            [1 - k * (y**2 + z**2), k * (x * y - w * z), k * (x * z + w * y)],
+            [k * (x * y + w * z), 1 - k * (x**2 + z**2), k * (y * z - w * x)],
+            [k * (x * z - w * y), k * (y * z + w * x), 1 - k * (x**2 + y**2)],
+        ]
+    )
+
+
+def _orientation(degrees: float | tuple[float, float, float]) -> Expr:
+    """E = Rz Ry Rx of three angles; exact for quarter turns."""
+    x, y, z = degrees if isinstance(degrees, tuple) else (0.0, 0.0, degrees)
+    matrix = _turn(2, z) @ _turn(1, y) @ _turn(0, x)
+    return sp.Matrix(3, 3, lambda i, j: number(float(matrix[i, j])))
+
+
+def _turn(k: int, degrees: float) -> np.ndarray:
+    quarters, rest = divmod(degrees, 90.0)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    if rest == 0.0:
+        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
+    i, j = (k + 1) % 3, (k + 2) % 3
+    matrix = np.eye(3)
+    matrix[i, i] = matrix[j, j] = c
+    matrix[i, j], matrix[j, i] = -s, s
+    return matrix

@@ -1,0 +1,65 @@
+"""The general closed route from a model to its equations of motion."""
+
+from dataclasses import dataclass
+
+from eomgen.derivation.general.constraints import Constraint, state_joints
+from eomgen.derivation.general.equations import (
+    Balance,
+    Inertia,
+    Loads,
+    Motion,
+    World,
+    balance,
+    inertias,
+    loads,
+    set_in_motion,
+)
+from eomgen.derivation.general.solution import Solution, solve
+from eomgen.derivation.general.symbols import Ledger, Symbols, make_symbols
+from eomgen.derivation.supported import FEW_VELOCITIES, why_not_closed
+from eomgen.errors import SceneError
+from eomgen.model import Model
+
+WRITTEN, NAMED = (20, 160), (6, 40)
+"""`inline` and `longest` of a `Ledger` for few velocities and for many."""
+
+
+@dataclass(frozen=True)
+class GeneralEquations:
+    """A model's equations of motion: constraints, motions, M v̇ + V + G = F, and v̇.
+
+    `balance` is written over the first `motion_definitions` of `solution`.
+    """
+
+    model: Model
+    symbols: Symbols
+    bodies: tuple[Inertia, ...]
+    constraints: tuple[Constraint, ...]
+    motions: tuple[Motion, ...]
+    loads: Loads
+    balance: Balance
+    motion_definitions: int
+    solution: Solution
+
+
+def derive_general(model: Model) -> GeneralEquations:
+    """Derive and solve; see the modules of this package for each step.
+
+    Raises `SceneError` for a model that is too large to be read or derived.
+    """
+    if why_not := why_not_closed(model):
+        raise SceneError(f"route: no closed form of this scene: {why_not}")
+    symbols = make_symbols(model)
+    few = len(model.velocities) <= FEW_VELOCITIES
+    ledger = Ledger(symbols.fixed, *(WRITTEN if few else NAMED))
+    bodies = inertias(model, symbols)
+    constraints = state_joints(model, symbols, ledger)
+    acting = loads(model, symbols, bodies)
+    world = World(model, constraints, ledger)
+    motions = set_in_motion(model, constraints, acting.uniform, world, ledger, symbols)
+    equations = balance(model, symbols, bodies, motions, acting, world, ledger)
+    before = len(ledger.definitions)
+    solution = solve(model, symbols, bodies, motions, acting, world, ledger)
+    return GeneralEquations(
+        model, symbols, bodies, constraints, motions, acting, equations, before, solution
+    )

@@ -1,0 +1,368 @@
+"""D'Alembert's principle over the partial velocities: M v̇ + V + G = F.
+
+The partial velocity of a body in v_j is its velocity while v_j = 1 and all others are 0. Forces of
+constraint do no work in them, so that each row is what all bodies' inertia and loads do in one.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from eomgen.derivation.general.constraints import Constraint, Moving, about
+from eomgen.derivation.general.simplify import gathered
+from eomgen.derivation.general.symbols import Ledger, Symbols
+from eomgen.derivation.symbols import Expr
+from eomgen.effects.base import JointLoad, Load
+from eomgen.joints.base import Geared
+from eomgen.language.formula import Formula
+from eomgen.model import Model
+
+ROTATIONS = ("R__", "k__", "W__")
+"""How names of entries of rotations begin: these stay."""
+SLACK = 1.5
+"""How much longer than the shortest form one may be that says which terms there are."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One body's motion in its own axes, over coordinates and velocities and what is defined.
+
+    `turns` and `moves` are the partial velocities by index in v: of rotation and of the centre of
+    mass. `omega` is the angular velocity, `alpha` and `acceleration` what v alone makes of the
+    accelerations, at v̇ = 0; `gravity` is the acceleration of gravity.
+    """
+
+    turns: Mapping[int, Expr]
+    moves: Mapping[int, Expr]
+    omega: Expr
+    alpha: Expr
+    acceleration: Expr
+    gravity: Expr
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Mass, and the inertia about the centre of mass in body axes."""
+
+    mass: Expr
+    moments: Expr
+
+
+@dataclass(frozen=True)
+class Loads:
+    """What acts: forces in world axes with their points, and forces on joints' coordinates by v.
+
+    `uniform` is the acceleration of gravity in world axes, if all gravity is one; then `gravity`
+    holds no forces.
+    """
+
+    uniform: Expr
+    gravity: tuple[tuple[int, Expr, Expr], ...]
+    applied: tuple[tuple[int, Expr, Expr], ...]
+    motors: Mapping[int, Expr]
+
+
+@dataclass(frozen=True)
+class Balance:
+    """M v̇ + V + G = F."""
+
+    M: Expr
+    V: Expr
+    G: Expr
+    F: Expr
+
+
+class Mechanism:
+    """The model as effects see it while they put their loads on it."""
+
+    def __init__(self, model: Model, symbols: Symbols) -> None:
+        self._symbols = symbols
+        self._mass = {body.name: symbols.value(body.mass) for body in model.bodies}
+        self.dimensions = model.dimensions
+        self.bodies = tuple(self._mass)
+
+    def mass(self, body: str) -> Expr:
+        """Mass of a body."""
+        return self._mass[body]
+
+    def height(self, body: str) -> Expr:
+        """No load depends on where a body is."""
+        raise NotImplementedError
+
+    def value(self, formula: Formula) -> Expr:
+        """A quantity over parameter symbols."""
+        return self._symbols.value(formula)
+
+    def input(self, name: str) -> Expr:
+        """Symbol of an input."""
+        return self._symbols.inputs[name]
+
+
+def inertias(model: Model, symbols: Symbols) -> tuple[Inertia, ...]:
+    """Mass and inertia of every body; in the plane the moment about z alone is one."""
+    found = []
+    for body in model.bodies:
+        entries = [symbols.value(entry) for entry in body.inertia_com]
+        if len(entries) == 1:
+            entries = [0, 0, entries[0], 0, 0, 0]
+        xx, yy, zz, xy, xz, yz = entries
+        moments = sp.Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        found.append(Inertia(symbols.value(body.mass), moments))
+    return tuple(found)
+
+
+def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...]) -> Loads:
+    """What the effects put on bodies and joints."""
+    mechanism = Mechanism(model, symbols)
+    given = [load for effect in model.effects for load in effect.loads(mechanism)]
+    first = {body.joint.name: j for body, j in zip(model.bodies, model.first_velocity, strict=True)}
+    motors: dict[int, Expr] = {}
+    for load in given:
+        if isinstance(load, JointLoad):
+            j = first[load.joint]
+            motors[j] = motors.get(j, sp.Integer(0)) + load.force
+
+    def forces(kind: str) -> tuple[tuple[int, Expr, Expr], ...]:
+        return tuple(
+            (mechanism.bodies.index(load.body), _spatial(load.at), _spatial(load.force))
+            for load in given
+            if isinstance(load, Load) and load.kind == kind and any(f != 0 for f in load.force)
+        )
+
+    gravity = forces("gravity")
+    uniform = _uniform(gravity, bodies)
+    return Loads(uniform, () if any(uniform) else gravity, forces("applied"), motors)
+
+
+def _spatial(vector: tuple[Expr, ...]) -> Expr:
+    return sp.Matrix([*vector, *([0] * (3 - len(vector)))])
+
+
+def _uniform(forces: tuple[tuple[int, Expr, Expr], ...], bodies: tuple[Inertia, ...]) -> Expr:
+    """The one acceleration that forces at centres of mass give all bodies, or 0."""
+    none = sp.zeros(3, 1)
+    if len(forces) != sum(body.mass != 0 for body in bodies) or not forces:
+        return none
+    k, _, force = forces[0]
+    shared = (force / bodies[k].mass).applyfunc(sp.cancel)
+    same = all(
+        not any(at) and not any((f - bodies[k].mass * shared).applyfunc(sp.expand))
+        for k, at, f in forces
+    )
+    return shared if same else none
+
+
+def set_in_motion(
+    model: Model,
+    constraints: tuple[Constraint, ...],
+    uniform: Expr,
+    world: "World",
+    ledger: Ledger,
+    symbols: Symbols,
+) -> tuple[Motion, ...]:
+    """Every body's motion by its parent's, joint after joint; what is long gets a name."""
+    still = dict.fromkeys(symbols.a, sp.Integer(0))
+    rest = sp.zeros(3, 1)
+    ground = Motion({}, {}, omega=rest, alpha=rest, acceleration=rest, gravity=uniform)
+    found: list[Motion] = []
+
+    starts = zip(model.bodies, model.first_velocity, constraints, strict=True)
+    for k, (body, first, c) in enumerate(starts):
+        name = body.name
+        parent = found[body.parent] if body.parent >= 0 else ground
+        turns: dict[int, Expr] = {}
+        moves: dict[int, Expr] = {}
+        own = range(first, first + len(body.velocities))
+        for j in dict.fromkeys((*parent.turns, *parent.moves, *own)):
+            none = sp.zeros(3, 1)
+            unit = {v: sp.Integer(int(i == j)) for i, v in enumerate(symbols.v)}
+            given = unit | _by(c.parent, parent.turns.get(j, none), parent.moves.get(j, none))
+            of = symbols.v[j].name
+            turn = ledger.vector(f"turn__{of}", name, ledger.short(c.omega.xreplace(given)))
+            given |= dict(zip(c.own.omega, turn, strict=True))
+            move = ledger.vector(f"move__{of}", name, ledger.short(c.velocity.xreplace(given)))
+            if any(turn):
+                turns[j] = turn
+            if any(move):
+                moves[j] = move
+        given = still | dict(zip(c.parent.omega, parent.omega, strict=True))
+        given |= dict(zip(c.parent.alpha, parent.alpha, strict=True))
+        given |= dict(zip(c.parent.acceleration, parent.acceleration, strict=True))
+        omega = ledger.vector("omega", name, ledger.short(c.omega.xreplace(given)))
+        alpha = ledger.vector("alpha", name, ledger.short(c.alpha.xreplace(given)))
+        given |= dict(zip(c.own.omega, omega, strict=True))
+        given |= dict(zip(c.own.alpha, alpha, strict=True))
+        acceleration = ledger.short(c.acceleration.xreplace(given))
+        if world.turn(k) is None:
+            gravity = ledger.short(c.rotation.T * (c.axes.T * parent.gravity))
+        else:
+            gravity = world.rotation(k).T * uniform
+        found.append(
+            Motion(
+                turns,
+                moves,
+                omega,
+                alpha,
+                ledger.vector("a", name, acceleration),
+                ledger.vector("g", name, gravity),
+            )
+        )
+    return tuple(found)
+
+
+def _by(moving: Moving, turn: Expr, move: Expr) -> dict[Expr, Expr]:
+    pairs = (*zip(moving.omega, turn, strict=True), *zip(moving.velocity, move, strict=True))
+    return {symbol: e for symbol, e in pairs if symbol != 0}
+
+
+class World:
+    """Rotations from a body's axes to the world's, or to those of a body further in."""
+
+    def __init__(self, model: Model, constraints: tuple[Constraint, ...], ledger: Ledger) -> None:
+        self._model, self._constraints, self._ledger = model, constraints, ledger
+        self._known: dict[tuple[int, int], Expr] = {}
+
+    def rotation(self, body: int, base: int = -1) -> Expr:
+        """Axes of `body` in those of `base`, -1 the world."""
+        if body == base:
+            return sp.eye(3)
+        if (body, base) not in self._known:
+            self._known[body, base] = self._rotation(body, base)
+        return self._known[body, base]
+
+    def turn(self, body: int, base: int = -1) -> tuple[Expr, Expr] | None:
+        """Coordinate axis and angle between two bodies, if all joints between turn about one."""
+        axis, angle = sp.zeros(3, 1), sp.Integer(0)
+        while body != base:
+            turn = self._constraints[body].turn
+            if turn is None or (any(axis) and any(turn[0]) and turn[0] != axis):
+                return None
+            axis, angle = (turn[0] if any(turn[0]) else axis), turn[1] + angle
+            body = self._model.bodies[body].parent
+        return axis, angle
+
+    def _rotation(self, body: int, base: int) -> Expr:
+        turn = self.turn(body, base)
+        if turn is not None:
+            return about(*turn)
+        c, parent = self._constraints[body], self._model.bodies[body].parent
+        whole = self.rotation(parent, base) * (c.axes * c.rotation)
+        if parent == base and c.axes == sp.eye(3):
+            return whole
+        name = self._model.bodies[body].name
+        where = f"{name}__{self._model.bodies[base].name}" if base >= 0 else name
+        return sp.Matrix(
+            3,
+            3,
+            lambda i, j: self._ledger.named(
+                f"W__{where}__{'xyz'[i]}{'xyz'[j]}", self._ledger.short(whole[i, j])
+            ),
+        )
+
+
+def balance(
+    model: Model,
+    symbols: Symbols,
+    bodies: tuple[Inertia, ...],
+    motions: tuple[Motion, ...],
+    acting: Loads,
+    world: World,
+    ledger: Ledger,
+) -> Balance:
+    """Collect M, V, G and F."""
+    n = len(symbols.v)
+    M, V, G, F = sp.zeros(n, n), sp.zeros(n, 1), sp.zeros(n, 1), sp.zeros(n, 1)
+    floating = carried_along(model)
+    for body, motion in zip(bodies, motions, strict=True):
+        inertial = body.mass * motion.acceleration
+        torque = body.moments * motion.alpha
+        torque += motion.omega.cross(body.moments * motion.omega)
+        weight = body.mass * motion.gravity
+        for i, move in motion.moves.items():
+            V[i] += move.dot(inertial)
+            # Right angles and length 1: directions of the world, that carry a floating tree.
+            fall = body.mass * acting.uniform[floating[i]] if i in floating else move.dot(weight)
+            G[i] -= fall
+            for j, other in motion.moves.items():
+                straight = i in floating and j in floating
+                M[i, j] += body.mass * (int(i == j) if straight else move.dot(other))
+        for i, turn in motion.turns.items():
+            V[i] += turn.dot(torque)
+            for j, other in motion.turns.items():
+                M[i, j] += turn.dot(body.moments * other)
+    for j, armature in armatures(model, symbols).items():
+        M[j, j] += armature
+    for load in acting.gravity:
+        for i, part in generalised(model, motions, world, load).items():
+            G[i] -= part
+    for load in acting.applied:
+        for i, part in generalised(model, motions, world, load).items():
+            F[i] += part
+    for j, force in acting.motors.items():
+        F[j] += force
+
+    def short(matrix: Expr) -> Expr:
+        return matrix.applyfunc(lambda e: _written_out(e, ledger))
+
+    for i in range(n):
+        for j in range(i + 1):
+            M[i, j] = M[j, i] = _written_out(M[i, j], ledger)
+    return Balance(M, short(V), short(G), short(F))
+
+
+def _written_out(entry: Expr, ledger: Ledger) -> Expr:
+    """An entry of the balance without names for parts of motions, where that stays short."""
+    whole = entry
+    while True:
+        motions = {
+            s: ledger.definitions[s]
+            for s in whole.free_symbols
+            if s in ledger.definitions and not s.name.startswith(ROTATIONS)
+        }
+        if not motions:
+            break
+        whole = whole.xreplace(motions)
+        if sp.count_ops(whole) > ledger.longest:
+            return ledger.short(entry)
+    return gathered(whole, ledger.fixed, slack=SLACK)
+
+
+def generalised(
+    model: Model, motions: Sequence[Motion], world: World, load: tuple[int, Expr, Expr]
+) -> dict[int, Expr]:
+    """What a force in world axes at a point of a body does in each velocity."""
+    k, at, outside = load
+    motion, floating = motions[k], carried_along(model)
+    force = world.rotation(k).T * outside
+    torque = at.cross(force)
+    found: dict[int, Expr] = {}
+    for i, move in motion.moves.items():
+        found[i] = outside[floating[i]] if i in floating else move.dot(force)
+    for i, turn in motion.turns.items():
+        found[i] = found.get(i, sp.Integer(0)) + turn.dot(torque)
+    return found
+
+
+def armatures(model: Model, symbols: Symbols) -> dict[int, Expr]:
+    """gear_ratio² motor_inertia by velocity."""
+    found = {}
+    for body, j in zip(model.bodies, model.first_velocity, strict=True):
+        joint = body.joint
+        if isinstance(joint, Geared):
+            inertia = symbols.value(joint.motor_inertia)
+            if joint.gear_ratio is not None:
+                inertia *= symbols.value(joint.gear_ratio) ** 2
+            if inertia != 0:
+                found[j] = inertia
+    return found
+
+
+def carried_along(model: Model) -> dict[int, int]:
+    """The velocities that carry floating trees along the world's axes, and the axis of each."""
+    return {
+        first + i: i
+        for body, first in zip(model.bodies, model.first_velocity, strict=True)
+        if body.joint.type == "free"
+        for i in range(model.dimensions)
+    }

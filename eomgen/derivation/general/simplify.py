@@ -1,0 +1,170 @@
+"""Shorter forms of expressions, where they are cheap to find."""
+
+from collections.abc import Collection, Mapping
+
+import sympy as sp
+
+from eomgen.derivation.solution import is_sum_of_positive_terms
+from eomgen.derivation.symbols import Expr, tidy
+
+MOST_TERMS = 400
+"""Terms of an expanded expression beyond which it is left as it was."""
+MOST_FACTORED = 24
+"""Terms of a numerator beyond which factoring it would cost more than it saves."""
+
+
+def canonical(expression: Expr) -> Expr:
+    """Expanded, with cos² written as 1 - sin²: terms that cancel by Pythagoras do cancel."""
+    expanded = sp.expand(expression)
+    if not any(p.base.func is sp.cos and p.exp.is_Integer for p in expanded.atoms(sp.Pow)):
+        return expanded
+    return sp.expand(sp.Add(*(_no_even_cosines(t) for t in sp.Add.make_args(expanded))))
+
+
+def _no_even_cosines(term: Expr) -> Expr:
+    factors = []
+    for factor in sp.Mul.make_args(term):
+        base, power = factor.as_base_exp()
+        if isinstance(base, sp.cos) and power.is_Integer and power > 1:
+            half, odd = divmod(int(power), 2)
+            factors += [(1 - sp.sin(base.args[0]) ** 2) ** half, base**odd]
+        else:
+            factors.append(factor)
+    return sp.Mul(*factors)
+
+
+def gathered(
+    expression: Expr,
+    fixed: Collection[Expr],
+    sums: Mapping[Expr, Expr] | None = None,
+    *,
+    slack: float = 1.0,
+) -> Expr:
+    """One term for each product of moving quantities, its coefficient in parameters factored.
+
+    `sums` are symbols that stand for sums of parameters; they are written out before coefficients
+    are factored, and written as symbols again after it. An expression that this makes more than
+    `slack` times as long stays as it is.
+    """
+    if expression.is_Atom:
+        return expression
+    flats = [canonical(expression)]
+    if any(wave.args[0].is_Add for wave in expression.atoms(sp.sin, sp.cos)):
+        flats.append(tidy(expression))  # θ + φ, and a product of waves that θ is left of
+    flat = min(flats, key=sp.count_ops)
+    terms = sp.Add.make_args(flat)
+    if flat == 0 or len(terms) > MOST_TERMS:
+        return flat if flat == 0 else expression
+    sums = sums or {}
+    still = {*fixed, *sums}
+    coefficients: dict[Expr, Expr] = {}
+    for term in terms:
+        moving = sp.Mul(*(f for f in sp.Mul.make_args(term) if not f.free_symbols <= still))
+        coefficients[moving] = coefficients.get(moving, sp.Integer(0)) + term / moving
+    coefficients = _with_cosines(coefficients)
+    used = {s: e for s, e in sums.items() if any(c.has(s) for c in coefficients.values())}
+    names = {total: symbol for symbol, total in used.items()}
+    parts = [
+        _factored(c.xreplace(used)).xreplace(names) * moving for moving, c in coefficients.items()
+    ]
+    whole = sp.Add(*parts)
+    least = min((whole, flat, expression), key=sp.count_ops)
+    return whole if sp.count_ops(whole) <= slack * sp.count_ops(least) else least
+
+
+def _with_cosines(coefficients: dict[Expr, Expr]) -> dict[Expr, Expr]:
+    """c w - c w sin² as c w cos²."""
+    found = dict(coefficients)
+    for moving in coefficients:
+        for factor in sp.Mul.make_args(moving):
+            base, power = factor.as_base_exp()
+            if not (isinstance(base, sp.sin) and power.is_Integer and power > 1):
+                continue
+            low = moving / base**2
+            if {low, moving} <= {*found} and sp.expand(found[low] + found[moving]) == 0:
+                found[low * sp.cos(base.args[0]) ** 2] = found.pop(low)
+                del found[moving]
+                break
+    return found
+
+
+def nested(expression: Expr) -> Expr:
+    """A sum with the sine or cosine that most of its terms share taken out, if that is shorter."""
+    return min((expression, _nested(expression)), key=sp.count_ops)
+
+
+def _nested(expression: Expr) -> Expr:
+    terms = sp.Add.make_args(expression)
+    counts: dict[Expr, int] = {}
+    for term in terms:
+        for factor in sp.Mul.make_args(term):
+            base = factor.as_base_exp()[0]
+            if isinstance(base, sp.sin | sp.cos) and factor.as_base_exp()[1].is_positive:
+                counts[base] = counts.get(base, 0) + 1
+    wave = max(sorted(counts, key=sp.default_sort_key), key=lambda w: counts[w], default=None)
+    if wave is None or counts[wave] < 2:
+        return expression
+    parts: dict[bool, list[Expr]] = {True: [], False: []}
+    for term in terms:
+        inside = any(f.as_base_exp()[0] == wave for f in sp.Mul.make_args(term))
+        parts[inside].append(term / wave if inside else term)
+    return wave * _nested(sp.Add(*parts[True])) + _nested(sp.Add(*parts[False]))
+
+
+def _factored(coefficient: Expr) -> Expr:
+    """A coefficient over one denominator, its numerator factored where that is quick."""
+    if coefficient.is_Atom or coefficient.has(sp.Float):
+        return coefficient
+    top, bottom = sp.fraction(sp.together(coefficient))
+    top = sp.expand(top)
+    if len(sp.Add.make_args(top)) > MOST_FACTORED:
+        return top / bottom
+    whole = sp.factor(top / bottom)
+    if bottom.is_Number and sp.fraction(whole)[0].is_Add:
+        return sp.expand(coefficient)  # m/3 + M, no (m + 3 M)/3
+    return whole
+
+
+def sum_of_squares(
+    total: Expr, fixed: Collection[Expr], sums: Mapping[Expr, Expr], longest: int
+) -> Expr:
+    """A pivot, a sum of weighted squares, in its shortest form that is positive at sight.
+
+    A + B sin² + C cos² of one angle may be written with fewer terms; which of them is chosen by
+    what is plainly positive, and if nothing is, or it is long, the sum of squares stays.
+    """
+    if sp.count_ops(total) > longest:
+        return total
+    short = gathered(total, fixed, sums)
+    written = canonical(short.xreplace(dict(sums)))
+    angles = {wave.args[0] for wave in written.atoms(sp.sin, sp.cos)}
+    names = {e: s for s, e in sums.items()}
+
+    def tight(e: Expr) -> Expr:
+        return _factored(e).xreplace(names)
+
+    if len(angles) == 1:
+        sine = sp.sin(angles.pop())
+        constant, slope = written.coeff(sine, 0), written.coeff(sine, 2)
+        if sp.expand(constant + slope * sine**2 - written) == 0:
+            both = _factored(constant + slope)
+            cosine = sp.cos(sine.args[0])
+            forms = (
+                _joined(tight(constant), tight(slope), sine**2),
+                _joined(tight(both), tight(-slope), cosine**2),
+                tight(constant) * cosine**2 + tight(both) * sine**2,
+            )
+            for form in forms:
+                if is_sum_of_positive_terms(form):
+                    return form
+    if is_sum_of_positive_terms(short):
+        return short
+    return total
+
+
+def _joined(constant: Expr, slope: Expr, square: Expr) -> Expr:
+    """constant + slope square, over one denominator if they share one."""
+    (top, bottom), (rise, under) = sp.fraction(constant), sp.fraction(slope)
+    if bottom == under and not bottom.is_Number:
+        return (top + rise * square) / bottom
+    return constant + slope * square

@@ -1,0 +1,347 @@
+"""M v̇ = F - V - G solved on pivots that are sums of weighted squares.
+
+By Gauss's principle the accelerations v̇ minimise Σ w (j v̇ + b)²: three squares a body for its
+centre of mass, with its mass as weight, three for its rotation, with its moments of inertia, and
+one for each rotor. b is what the velocities and gravity make of the acceleration; all other forces
+Q stand beside the sum. Eliminating an unknown k, of entry a in each row, takes
+
+    pivot       d = Σ w a²
+    coupling    c_j = Σ w a j / d       and   β = Σ w a b / d
+    rows        j - a c_j,   b - a β    forces   Q_j - c_j Q_k
+    leaving     v̇_k = Q_k / d - β - Σ c_j v̇_j, or f / d - Σ c_j v̇_j with f = Q_k - d β
+
+(weighted Gram-Schmidt, Golub & Van Loan §5.2), so that no pivot is ever a difference of large
+numbers. A floating tree's translation goes first, in the axes of its root; then all other
+velocities from the leaves inwards.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+from eomgen.derivation.general.equations import (
+    Inertia,
+    Loads,
+    Motion,
+    World,
+    armatures,
+    generalised,
+)
+from eomgen.derivation.general.simplify import nested, sum_of_squares
+from eomgen.derivation.general.symbols import Ledger, Symbols
+from eomgen.derivation.solution import is_sum_of_positive_terms
+from eomgen.derivation.symbols import Expr
+from eomgen.joints import Free
+from eomgen.model import Model
+
+
+@dataclass
+class Row:
+    """One weighted square: entries by index of velocity, and what the acceleration is without."""
+
+    weight: Expr
+    entries: dict[int, Expr]
+    bias: Expr
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A floating tree's translation, eliminated: root, whole mass, and in axes of the root the mean
+    of the centres' partial velocities and of their accelerations at v̇ = 0; the force in the world.
+    """
+
+    root: int
+    mass: Expr
+    mean: dict[int, Expr]
+    bias: Expr
+    force: Expr
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Definitions in order, the last of them v̇.
+
+    They divide by `pivots`, and by `divisors`, moments of inertia by the name of their body.
+    """
+
+    definitions: dict[Expr, Expr]
+    pivots: tuple[Expr, ...]
+    divisors: tuple[tuple[str, Expr], ...]
+
+
+@dataclass
+class Elimination:
+    """The state of an elimination: rows, forces on the velocities, and what is known so far."""
+
+    symbols: Symbols
+    ledger: Ledger
+    rows: list[Row]
+    forces: dict[int, Expr]
+    sums: dict[Expr, Expr] = field(default_factory=dict)
+    pivots: list[Expr] = field(default_factory=list)
+    weights: list[Expr] = field(default_factory=list)
+    divisors: list[tuple[str, Expr]] = field(default_factory=list)
+
+    def short(self, expression: Expr) -> Expr:
+        """Gathered, with constant pivots written out where that lets something cancel."""
+        return self.ledger.short(expression, self.sums)
+
+    def named(self, name: str, expression: Expr) -> Expr:
+        """The short form, by a name if it is still long."""
+        return self.ledger.named(name, self.short(expression))
+
+    def pivot(self, name: str, total: Expr) -> Expr:
+        """A pivot's symbol; constant ones are remembered by what they are."""
+        fixed, longest = self.ledger.fixed, self.ledger.longest
+        form = sum_of_squares(total, fixed, self.sums, longest)
+        if form.is_Atom:
+            symbol = form
+        else:
+            symbol = self.ledger.define(sp.Symbol(name, positive=True), form)
+            if form.free_symbols <= {*self.symbols.fixed, *self.sums, *self.weights}:
+                self.sums[symbol] = form.xreplace(self.sums)
+        self.pivots.append(symbol)
+        return symbol
+
+
+def solve(
+    model: Model,
+    symbols: Symbols,
+    bodies: Sequence[Inertia],
+    motions: Sequence[Motion],
+    acting: Loads,
+    world: World,
+    ledger: Ledger,
+) -> Solution:
+    """Solve for v̇, under the effects and forces `tau` beside them."""
+    work = Elimination(symbols, ledger, [], {})
+    _set_forces(model, symbols, bodies, motions, acting, world, work)
+    roots = _roots(model)
+    drifts = []
+    for k, (body, motion) in enumerate(zip(bodies, motions, strict=True)):
+        floats = isinstance(model.bodies[roots[k]].joint, Free)
+        work.rows += _turning_rows(model, k, body, motion, work)
+        if not floats:
+            work.rows += _moving_rows(body, motion, work)
+        elif roots[k] == k:
+            tree = [i for i, root in enumerate(roots) if root == k]
+            drifts.append(_drift(model, tree, bodies, motions, world, work))
+    for j, inertia in armatures(model, symbols).items():
+        work.rows.append(Row(inertia, {j: sp.Integer(1)}, sp.Integer(0)))
+    carried = {
+        model.first_velocity[drift.root] + i for drift in drifts for i in range(model.dimensions)
+    }
+    answers = {}
+    for j in _inwards(model):
+        if j not in carried:
+            answers[j] = _eliminate(j, work)
+    for j in reversed(answers):  # the innermost was eliminated last and is known first
+        ledger.define(symbols.a[j], answers[j])
+    for drift in drifts:
+        _fall(model, symbols, drift, acting.uniform, world, ledger)
+    return Solution(ledger.definitions, tuple(work.pivots), tuple(work.divisors))
+
+
+def _inwards(model: Model) -> list[int]:
+    """The velocities from the leaves inwards; of one joint the slides first, which are cheaper."""
+    order: list[int] = []
+    for body, first in reversed([*zip(model.bodies, model.first_velocity, strict=True)]):
+        units = [c.unit for c in body.velocities]
+        own = reversed(range(len(units)))
+        order += [first + i for i in sorted(own, key=lambda i: units[i] == "rad/s")]
+    return order
+
+
+def _roots(model: Model) -> list[int]:
+    roots: list[int] = []
+    for k, body in enumerate(model.bodies):
+        roots.append(k if body.parent < 0 else roots[body.parent])
+    return roots
+
+
+def _set_forces(
+    model: Model,
+    symbols: Symbols,
+    bodies: Sequence[Inertia],
+    motions: Sequence[Motion],
+    acting: Loads,
+    world: World,
+    work: Elimination,
+) -> None:
+    """All forces but uniform gravity, and less the gyroscopic torques ω x I ω."""
+    forces = dict(enumerate(symbols.tau))
+    for j, force in acting.motors.items():
+        forces[j] += force
+    for load in (*acting.gravity, *acting.applied):
+        for j, part in generalised(model, motions, world, load).items():
+            forces[j] += part
+    for body, motion in zip(bodies, motions, strict=True):
+        torque = motion.omega.cross(body.moments * motion.omega)
+        for j, turn in motion.turns.items():
+            forces[j] -= work.short(turn.dot(torque))
+    work.forces = forces
+
+
+def _turning_rows(
+    model: Model, k: int, body: Inertia, motion: Motion, work: Elimination
+) -> list[Row]:
+    """Three squares of a body's rotation: I = Lᵀ D L, weights D, entries L times the turns."""
+    name = model.bodies[k].name
+    values = [model.value(entry) for entry in model.bodies[k].inertia_com[:3]]
+    # From the largest moment down: it is not 0 unless all are.
+    order = sorted(range(3), key=lambda i: -values[i]) if len(values) == 3 else [2]
+    left, rows = sp.Matrix(body.moments), []
+    for i in order:
+        others = [h for h in order[order.index(i) + 1 :] if left[i, h] != 0]
+        weight = left[i, i]
+        if weight == 0 and not others:
+            continue
+        if not is_sum_of_positive_terms(weight):  # by its form; an inertia's moments are positive
+            symbol = sp.Symbol(f"weight__{name}__{'xyz'[i]}", positive=True)
+            weight = work.ledger.define(symbol, weight)
+            work.weights.append(weight)
+        if others:
+            work.divisors.append((name, weight))
+        slopes = {h: left[i, h] / weight for h in others}
+        mixed = {i: sp.Integer(1)} | {
+            h: work.ledger.named(f"ratio__{name}__{'xyz'[i]}{'xyz'[h]}", slope)
+            for h, slope in slopes.items()
+        }
+        for h in others:
+            for g in others:
+                left[h, g] -= mixed[h] * left[i, g]
+        entries = {
+            j: work.short(sum(part * turn[h] for h, part in mixed.items()))
+            for j, turn in motion.turns.items()
+        }
+        bias = work.short(sum(part * motion.alpha[h] for h, part in mixed.items()))
+        rows.append(Row(weight, {j: e for j, e in entries.items() if e != 0}, bias))
+    return [row for row in rows if row.entries]
+
+
+def _moving_rows(body: Inertia, motion: Motion, work: Elimination) -> list[Row]:
+    """Three squares of a body's centre of mass, in its axes."""
+    if body.mass == 0:
+        return []
+    rows = []
+    for i in range(3):
+        entries = {j: move[i] for j, move in motion.moves.items() if move[i] != 0}
+        if entries:
+            bias = work.short(motion.acceleration[i] - motion.gravity[i])
+            rows.append(Row(body.mass, entries, bias))
+    return rows
+
+
+def _drift(
+    model: Model,
+    tree: Sequence[int],
+    bodies: Sequence[Inertia],
+    motions: Sequence[Motion],
+    world: World,
+    work: Elimination,
+) -> Drift:
+    """Eliminate a floating tree's translation, which all its bodies share; adds their rows."""
+    root, ledger, name = tree[0], work.ledger, model.bodies[tree[0]].name
+    first = model.first_velocity[root]
+    carried = range(first, first + model.dimensions)
+    total = sum((bodies[k].mass for k in tree), sp.Integer(0))
+    mass = work.pivot(f"mass__{name}", total)
+    whole = {mass: total} if mass != total else {}
+    work.sums |= whole
+    columns = dict.fromkeys(j for k in tree for j in motions[k].moves if j not in carried)
+    none = sp.zeros(3, 1)
+
+    def mean(word: str, vectors: dict[int, Expr]) -> Expr:
+        joined = sp.zeros(3, 1)
+        for k, vector in vectors.items():
+            joined += bodies[k].mass / mass * (world.rotation(k, root) * vector)
+        return ledger.vector(word, name, joined.applyfunc(work.short))
+
+    means = {
+        j: mean(f"mean__{work.symbols.v[j].name}", {k: motions[k].moves.get(j, none) for k in tree})
+        for j in columns
+    }
+    bias = mean("bias", {k: motions[k].acceleration for k in tree})
+    force = sp.Matrix([*(work.forces[j] for j in carried), *([0] * (3 - len(carried)))])
+    pushed = world.rotation(root).T * force
+    for j, part in means.items():
+        work.forces[j] -= part.dot(pushed)
+    for k in (k for k in tree if bodies[k].mass != 0):
+        back = world.rotation(k, root).T
+        body = model.bodies[k].name
+        apart = {
+            j: ledger.vector(
+                f"apart__{work.symbols.v[j].name}",
+                body,
+                (motions[k].moves.get(j, none) - back * means[j]).applyfunc(work.short),
+            )
+            for j in columns
+        }
+        rest = (motions[k].acceleration - back * bias).applyfunc(work.short)
+        for i in range(3):
+            entries = {j: vector[i] for j, vector in apart.items() if vector[i] != 0}
+            if entries:
+                work.rows.append(Row(bodies[k].mass, entries, rest[i]))
+    return Drift(root, mass, {j: m for j, m in means.items() if any(m)}, bias, force)
+
+
+def _fall(
+    model: Model, symbols: Symbols, drift: Drift, uniform: Expr, world: World, ledger: Ledger
+) -> None:
+    """The acceleration of a floating tree's root: that of the whole, less what the rest does."""
+    inside = -drift.bias
+    for j, part in drift.mean.items():
+        inside -= part * symbols.a[j]
+    first = model.first_velocity[drift.root]
+    outside = uniform + drift.force / drift.mass + world.rotation(drift.root) * inside
+    for i in range(model.dimensions):
+        ledger.define(symbols.a[first + i], outside[i])
+
+
+def _eliminate(k: int, work: Elimination) -> Expr:
+    """Eliminate v̇_k; returns it over the v̇ that are left."""
+    name = work.symbols.v[k].name
+    here = [row for row in work.rows if k in row.entries]
+    pivot = work.pivot(f"pivot__{name}", sum(row.weight * row.entries[k] ** 2 for row in here))
+    columns = sorted({j for row in here for j in row.entries if j != k})
+    coupling = {}
+    for j in columns:
+        joint = sum(
+            row.weight * row.entries[k] * row.entries[j] for row in here if j in row.entries
+        )
+        found = work.named(f"coupling__{name}__{work.symbols.v[j].name}", joint / pivot)
+        if found != 0:
+            coupling[j] = found
+    held = work.short(sum(row.weight * row.entries[k] * row.bias for row in here))
+    known = sum((c * work.symbols.a[j] for j, c in coupling.items()), sp.Integer(0))
+    force = work.forces[k]
+    if not coupling:  # no row is left that would need β
+        for row in here:
+            row.entries.pop(k)
+        work.rows = [row for row in work.rows if row.entries]
+        return _driven(name, force - held, pivot, work)
+    force = work.forces[k] = work.named(f"load__{name}", force)
+    bias = work.named(f"bias__{name}", held / pivot)
+    for n, row in enumerate(here):
+        a = row.entries.pop(k)
+        for j, c in coupling.items():
+            rest = work.short(row.entries.get(j, sp.Integer(0)) - a * c)
+            row.entries[j] = work.ledger.named(f"row__{name}__{n}__{work.symbols.v[j].name}", rest)
+        row.entries = {j: e for j, e in row.entries.items() if e != 0}
+        if row.entries:
+            row.bias = work.named(f"rest__{name}__{n}", row.bias - a * bias)
+    work.rows = [row for row in work.rows if row.entries]
+    for j, c in coupling.items():
+        work.forces[j] -= c * force
+    if bias in work.ledger.definitions:
+        return force / pivot - bias - known
+    return _driven(name, force - held, pivot, work) - known
+
+
+def _driven(name: str, force: Expr, pivot: Expr, work: Elimination) -> Expr:
+    """What the force that is left for a velocity makes of it; a long force gets a name."""
+    force = nested(work.short(force))
+    if pivot in work.sums:  # f / d is a constant times what moves
+        return sp.Add(*(work.short(term / pivot) for term in sp.Add.make_args(force)))
+    return work.ledger.named(f"drive__{name}", force) / pivot

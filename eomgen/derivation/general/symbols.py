@@ -1,0 +1,127 @@
+"""The symbols of a derivation, the definitions it makes, and derivatives by time."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+from eomgen.derivation.general.simplify import gathered
+from eomgen.derivation.symbols import Expr, SympyScalars
+from eomgen.joints.base import Geared
+from eomgen.language.formula import Formula, Name, calls_function, evaluate
+from eomgen.model import Model
+
+
+@dataclass(frozen=True)
+class Symbols:
+    """Symbols of a model.
+
+    `q`, `v`, `a` are coordinates, velocities and their derivatives v̇, `tau` generalised forces
+    beside those of the effects. `formulas` are quantities with functions in them, each one symbol
+    to the derivation. `fixed` holds all symbols that depend on parameters alone.
+    """
+
+    parameters: dict[str, Expr]
+    formulas: dict[Formula, Expr]
+    inputs: dict[str, Expr]
+    q: tuple[Expr, ...]
+    v: tuple[Expr, ...]
+    a: tuple[Expr, ...]
+    tau: tuple[Expr, ...]
+
+    @property
+    def fixed(self) -> frozenset[Expr]:
+        """What does not change with time."""
+        return frozenset((*self.parameters.values(), *self.formulas.values()))
+
+    def value(self, formula: Formula) -> Expr:
+        """A quantity over the parameters' symbols."""
+        if formula in self.formulas:
+            return self.formulas[formula]
+        return evaluate(formula, self.parameters, SympyScalars())
+
+    def vector(self, parts: tuple[Formula, ...]) -> Expr:
+        """A vector of the plane or of space as one of space."""
+        x, y, *z = (self.value(part) for part in parts)
+        return sp.Matrix([x, y, *(z or [0])])
+
+
+def real(name: str) -> Expr:
+    """A real symbol. No name of a scene holds two underscores: names with them meet none."""
+    return sp.Symbol(name, real=True)
+
+
+def triple(word: str, name: str) -> Expr:
+    """Three symbols of a vector."""
+    return sp.Matrix([real(f"{word}__{name}__{axis}") for axis in "xyz"])
+
+
+def make_symbols(model: Model) -> Symbols:
+    """Symbols for a model; masses, moments, rotors that are one parameter are positive symbols."""
+    quantities = [q for body in model.bodies for q in (body.mass, *body.inertia_com[:3])]
+    quantities += [b.joint.motor_inertia for b in model.bodies if isinstance(b.joint, Geared)]
+    positive = {quantity.name for quantity in quantities if isinstance(quantity, Name)}
+    called = dict.fromkeys(f for f in model.quantities() if calls_function(f))
+    velocities = [c.name for c in model.velocities]
+    return Symbols(
+        parameters={
+            p.name: sp.Symbol(p.name, positive=True) if p.name in positive else real(p.name)
+            for p in model.parameters
+        },
+        formulas={formula: real(f"formula__{i}") for i, formula in enumerate(called, 1)},
+        inputs={i.name: real(i.name) for i in model.inputs},
+        q=tuple(real(c.name) for c in model.coordinates),
+        v=tuple(real(name) for name in velocities),
+        a=tuple(real(f"{name.removesuffix('_dot')}_ddot") for name in velocities),
+        tau=tuple(real(f"tau__{name}") for name in velocities),
+    )
+
+
+@dataclass
+class Ledger:
+    """Definitions in the order they are made; the one thing of a derivation that grows.
+
+    `fixed` are symbols of parameters. `inline` is the number of operations up to which an
+    expression stands where it is used and gets no name of its own, `longest` that up to which it is
+    worth making shorter. `rates` are time derivatives of symbols that have one.
+    """
+
+    fixed: frozenset[Expr]
+    inline: int
+    longest: int
+    definitions: dict[Expr, Expr] = field(default_factory=dict)
+    rates: dict[Expr, Expr] = field(default_factory=dict)
+
+    def define(self, symbol: Expr, expression: Expr) -> Expr:
+        """A definition, whatever its length."""
+        self.definitions[symbol] = expression
+        return symbol
+
+    def named(self, name: str, expression: Expr, *, positive: bool = False) -> Expr:
+        """A symbol for an expression that is long; a short one itself."""
+        if expression.is_Atom or sp.count_ops(expression) <= self.inline:
+            return expression
+        if positive:
+            return self.define(sp.Symbol(name, positive=True), expression)
+        return self.define(real(name), expression)
+
+    def short(self, expression: Expr, sums: Mapping[Expr, Expr] | None = None) -> Expr:
+        """Gathered (see there), if it is not too long; of a vector each component."""
+        if isinstance(expression, sp.MatrixBase):
+            return expression.applyfunc(self.short)
+        if expression.is_Atom or sp.count_ops(expression) > self.longest:
+            return expression
+        return gathered(expression, self.fixed, sums)
+
+    def vector(self, word: str, name: str, expressions: Expr) -> Expr:
+        """The same for the components of a vector."""
+        pairs = zip("xyz", expressions, strict=True)
+        return sp.Matrix([self.named(f"{word}__{name}__{axis}", e) for axis, e in pairs])
+
+
+def rate(expression: Expr, rates: Mapping[Expr, Expr]) -> Expr:
+    """Time derivative of an expression or vector; symbols without a rate are constant."""
+    if isinstance(expression, sp.MatrixBase):
+        return expression.applyfunc(lambda e: rate(e, rates))
+    moving = sorted((s for s in expression.free_symbols if s in rates), key=str)
+    return sp.Add(*(sp.diff(expression, s) * rates[s] for s in moving))

@@ -1,0 +1,264 @@
+"""The general derivation told step by step, like the handout's by `derivation.steps`."""
+
+from collections.abc import Iterator
+
+import sympy as sp
+
+from eomgen.derivation.general.constraints import Constraint
+from eomgen.derivation.general.derive import GeneralEquations
+from eomgen.derivation.general.simplify import gathered
+from eomgen.derivation.steps import Equation, Pairs, Step
+from eomgen.derivation.symbols import Expr
+from eomgen.joints.base import WORLD
+from eomgen.language.formula import written
+
+DIGITS = 6
+"""Digits of a number of the scene as it is shown."""
+LONGEST = 160
+"""Operations of an expression up to which it is gathered for reading."""
+SLACK = 2.5
+"""How much longer than its shortest form a sum may be whose terms are to be seen."""
+ROTATIONS = ("R__", "k__")
+"""How names of entries of rotations begin, which are told with their joint."""
+
+
+def tell_general(equations: GeneralEquations) -> tuple[Step, ...]:
+    """Every step from the state to the closed form, in symbols meant for reading."""
+    shown = _readable(equations)
+
+    def read(expression: Expr) -> Expr:
+        numbers = {x: sp.Float(x, DIGITS) for x in expression.atoms(sp.Float)}
+        return expression.xreplace(numbers).xreplace(shown)
+
+    steps = []
+    parts = (*_joints(equations), *_balance(equations), *_solution(equations))
+    for number, (title, words, pairs) in enumerate(parts, 1):
+        lines = [Equation(read(left), read(right)) for left, right in pairs]
+        kept = tuple(line for line in lines if line.left != line.right)
+        steps.append(Step(f"({number})", title, words, kept))
+    return tuple(steps)
+
+
+def _joints(equations: GeneralEquations) -> Iterator[tuple[str, str, Pairs]]:
+    """The state, and each joint as a constraint with its derivatives."""
+    s, model = equations.symbols, equations.model
+    plane = model.dimensions == 2
+    yield (
+        "State",
+        "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
+        "axes of its own body.",
+        [
+            (sp.Symbol("q"), sp.Matrix([s.q])),
+            (sp.Symbol("v"), sp.Matrix([s.v])),
+            (sp.Symbol("vdot"), sp.Matrix([s.a])),
+        ],
+    )
+    definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
+    still = _zeros(equations)
+    for body, c in zip(model.bodies, equations.constraints, strict=True):
+        parent = WORLD if body.parent < 0 else model.bodies[body.parent].name
+        own = [(symbol, e) for symbol, e in definitions if symbol.name.split("__")[1] == body.name]
+        whole = c.axes * c.rotation
+        place = c.axes * c.reach - whole * c.arm
+        pairs: Pairs = [(symbol, e) for symbol, e in own if symbol.name.startswith(ROTATIONS)]
+        size = 2 if plane else 3
+        if whole != sp.eye(3):
+            pairs.append((sp.Symbol(f"R_{body.name}"), whole[:size, :size]))
+        pairs.append((sp.Symbol(f"r_{body.name}"), place[:size, :].applyfunc(_short)))
+        yield (
+            f"Joint {body.joint.name}: {body.joint.type}, {parent} to {body.name}",
+            f"R_{body.name} turns axes of {body.name} into those of {parent}, and r_{body.name} "
+            f"runs from the centre of mass of {parent} to that of {body.name}, axes of {parent}."
+            if body.parent >= 0
+            else f"R_{body.name} turns axes of {body.name} into the world's, and r_{body.name} is "
+            f"the place of the centre of mass of {body.name} in the world.",
+            pairs,
+        )
+        yield (
+            f"Joint {body.joint.name}, differentiated twice",
+            f"Angular velocity ω and velocity u of the centre of mass of {body.name}, and their "
+            f"derivatives α and a, in axes of {body.name}"
+            + (f", by those of {parent}." if body.parent >= 0 else "."),
+            _differentiated(c, still),
+        )
+
+
+def _differentiated(c: Constraint, still: dict[Expr, Expr]) -> Pairs:
+    """Components of the child's motion that do not vanish."""
+    pairs: Pairs = []
+    for symbols, vector in (
+        (c.own.omega, c.omega),
+        (c.own.velocity, c.velocity),
+        (c.own.alpha, c.alpha),
+        (c.own.acceleration, c.acceleration),
+    ):
+        for symbol, e in zip(symbols, vector, strict=True):
+            if symbol not in still:
+                pairs.append((symbol, _short(e.xreplace(still))))
+    return pairs
+
+
+def _zeros(equations: GeneralEquations) -> dict[Expr, Expr]:
+    """Components of motion that are always 0, such as those out of the plane."""
+    zero = sp.Integer(0)
+    found: dict[Expr, Expr] = {}
+    for c, motion in zip(equations.constraints, equations.motions, strict=True):
+        for i in range(3):
+            turns = any(vector[i] != 0 for vector in motion.turns.values())
+            moves = any(vector[i] != 0 for vector in motion.moves.values())
+            if not turns:
+                found[c.own.omega[i]] = zero
+                if motion.alpha[i] == 0:
+                    found[c.own.alpha[i]] = zero
+            if not moves:
+                found[c.own.velocity[i]] = zero
+                if motion.acceleration[i] == 0:
+                    found[c.own.acceleration[i]] = zero
+    return found
+
+
+def _flat(expression: Expr, fixed: frozenset[Expr]) -> Expr:
+    """A sum as one term for each product of what moves, unless it is long; quotients stay."""
+    if not expression.is_Add or sp.count_ops(expression) > LONGEST:
+        return expression
+    return gathered(expression, fixed, slack=SLACK)
+
+
+def _short(expression: Expr) -> Expr:
+    if sp.count_ops(expression) > LONGEST:
+        return expression
+    return gathered(expression, frozenset())
+
+
+def _balance(equations: GeneralEquations) -> Iterator[tuple[str, str, Pairs]]:
+    """M, V, G, F."""
+    terms, model = equations.balance, equations.model
+    definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
+    needed = _needed(equations, [*terms.M, *terms.V, *terms.G, *terms.F])
+    named = [
+        (symbol, e)
+        for symbol, e in definitions
+        if symbol in needed and not symbol.name.startswith(ROTATIONS)
+    ]
+    if named:
+        yield (
+            "Parts of the motion",
+            "Named to keep what follows short: ω, u with a velocity as index are the partial "
+            "velocities, the motion of a body while this velocity is 1 and all others are 0; α, a "
+            "the accelerations that are left while all derivatives of velocities are 0; g is the "
+            "acceleration of gravity; W turns axes of a body into the world's.",
+            named,
+        )
+    weights = "" if model.dimensions == 2 else ", and I α + ω × I ω for its torque"
+    yield (
+        "Virtual power",
+        "In every velocity that the joints leave free the forces of inertia do the work of the "
+        f"loads: m a for each body's force{weights}. Forces in the joints do none. This is "
+        "M dv/dt + V + G = F; first the mass matrix,",
+        [(sp.Symbol("M"), terms.M)],
+    )
+    yield "Velocity forces", "", [(sp.Symbol("V"), terms.V)]
+    yield "Gravity forces", "", [(sp.Symbol("G"), terms.G)]
+    yield "Applied forces", "", [(sp.Symbol("F"), terms.F)]
+
+
+def _solution(equations: GeneralEquations) -> Iterator[tuple[str, str, Pairs]]:
+    """The closed form without the generalised forces, which only `forward_dynamics` has."""
+    s, definitions = equations.symbols, equations.solution.definitions
+    still = dict.fromkeys(s.tau, sp.Integer(0))
+    needed = _needed(equations, s.a, still)
+    told = {*[*definitions][: equations.motion_definitions]}
+    known = _needed(equations, [e for m in (equations.balance.M, equations.balance.V) for e in m])
+    pairs = []
+    for symbol, e in definitions.items():
+        before = symbol.name.startswith(ROTATIONS) or (symbol in told and symbol in known)
+        if symbol in needed and not before:
+            pairs.append((symbol, _flat(e.xreplace(still), s.fixed)))
+    yield (
+        "Closed form",
+        "Gauss: of all motions that the joints allow, the true one has the least sum of weighted "
+        "squares of the bodies' accelerations from free ones. Eliminated velocity by velocity, "
+        "from the leaves inwards, each pivot d is a sum of weighted squares: it vanishes at no "
+        "pose at which the mass matrix is regular. c couples a velocity to another, β is the "
+        "acceleration that it would need to stay behind, Q the force on it, f what of it is left.",
+        pairs,
+    )
+
+
+def _needed(
+    equations: GeneralEquations,
+    expressions: list[Expr] | tuple[Expr, ...],
+    still: dict[Expr, Expr] | None = None,
+) -> set[Expr]:
+    """The defined symbols that expressions need, directly or by others."""
+    definitions, needed = equations.solution.definitions, set[Expr]()
+    stack = [symbol for e in expressions for symbol in e.free_symbols]
+    while stack:
+        symbol = stack.pop()
+        if symbol in definitions and symbol not in needed:
+            needed.add(symbol)
+            stack += definitions[symbol].xreplace(still or {}).free_symbols
+    return needed
+
+
+KINDS = {
+    "omega": "omega", "alpha": "alpha", "a": "a", "u": "u", "g": "g", "R": "R", "k": "k", "W": "W",
+    "turn": "omega", "move": "u", "pivot": "d", "coupling": "c", "bias": "beta", "rest": "b",
+    "row": "j", "load": "Q", "drive": "f",
+    "mass": "M", "mean": "h", "apart": "j", "weight": "w", "ratio": "l",
+}  # fmt: skip
+"""What the kinds of derived symbols are written with."""
+
+
+def _readable(equations: GeneralEquations) -> dict[Expr, Expr]:
+    """Symbols by ones whose names SymPy's printers know how to write: `thetadot` is θ̇."""
+    s, model = equations.symbols, equations.model
+    taken = {*s.parameters, *s.inputs}
+    shown: dict[Expr, Expr] = {}
+    words: dict[str, str] = {}
+
+    def show(symbol: Expr, name: str) -> None:
+        while name in taken:
+            name = f"{name},own"
+        taken.add(name)
+        shown[symbol] = sp.Symbol(name)
+
+    quaternions = {i: "wxyz"[n] for four in model.quaternions for n, i in enumerate(four)}
+    for i, q in enumerate(s.q):
+        if i in quaternions:
+            show(q, f"q_{q.name.rpartition('_')[0]},{quaternions[i]}")
+        else:
+            taken.add(q.name)
+    single = {
+        first: body.name
+        for body, first in zip(model.bodies, model.first_velocity, strict=True)
+        if len(body.velocities) == 1
+    }
+    for i, (v, a) in enumerate(zip(s.v, s.a, strict=True)):
+        name = v.name.removesuffix("_dot")
+        words[v.name] = single.get(i, name)
+        if name != v.name:
+            base, underscore, rest = name.partition("_")
+            show(v, f"{base}dot{underscore}{rest}")
+            show(a, f"{base}ddot{underscore}{rest}")
+        else:
+            prefix, _, axis = name.rpartition("_w")
+            show(v, f"omega_{prefix},{axis}")
+            show(a, f"omegadot_{prefix},{axis}")
+    for formula, symbol in s.formulas.items():
+        shown[symbol] = sp.Symbol(written(formula))
+    for c in equations.constraints:  # a body that turns freely in the world
+        for symbol, e in zip(c.own.omega, c.omega, strict=True):
+            if e in shown:
+                shown[symbol] = shown[e]
+    moving = [x for c in equations.constraints for m in (c.own,) for vector in
+              (m.omega, m.velocity, m.alpha, m.acceleration) for x in vector]  # fmt: skip
+    for symbol in (*moving, *equations.solution.definitions):
+        kind, _, rest = symbol.name.partition("__")
+        if symbol in shown or kind not in KINDS:
+            continue
+        parts = [words.get(part, part) for part in rest.split("__")]
+        if kind in ("turn", "move", "mean", "apart"):  # the body first, then the velocity
+            parts = [*parts[1:], parts[0]]
+        show(symbol, f"{KINDS[kind]}_{','.join(parts)}")
+    return shown

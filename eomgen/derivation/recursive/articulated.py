@@ -1,0 +1,245 @@
+"""The articulated-body algorithm: accelerations in one sweep inwards and one outwards.
+
+What a subtree resists with at its frame's origin is, for an angular acceleration α and an
+acceleration a of the origin,
+
+    n = J α + G a + p_n,    f = Gᵀ α + H a + p_f          (Featherstone 2008, 7.1-7.4),
+
+where accelerations are counted from those that the mechanism would have if its velocities did not
+change, so that p is made of forces alone. Eliminating the acceleration along an axis of motion
+leaves a form of the same kind; along a coordinate axis it also leaves that row zero, and then the
+acceleration found is the absolute one, from which the parent's is taken off.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from eomgen.derivation.recursive.forces import Force, at_parent, total
+from eomgen.derivation.recursive.instant import Axis, Instant, Link
+from eomgen.derivation.recursive.vectors import (
+    AXES,
+    Mat,
+    Scalar,
+    Scalars,
+    Symmetric,
+    Vec,
+    add,
+    cross,
+    dot,
+    named,
+    plus,
+    replaced,
+    scale,
+    skew,
+    symmetric,
+    times,
+    transposed,
+)
+
+
+@dataclass(frozen=True)
+class Resistance:
+    """J, G and H of a subtree."""
+
+    J: Symmetric
+    G: Mat
+    H: Symmetric
+
+
+@dataclass(frozen=True)
+class Pivot:
+    """One elimination: the pivot d and, over d, the column it stood in (moment u, force w).
+
+    `absolute` if the acceleration that it solves for is that of the frame, not of the joint.
+    """
+
+    d: Scalar
+    u: Vec
+    w: Vec
+    absolute: bool
+
+
+Pivots = tuple[tuple[Pivot, ...], ...]
+"""Of every link, in the order of its axes."""
+
+
+def articulate(instant: Instant, scalars: Scalars) -> Pivots:
+    """Eliminate every axis of motion, leaves first."""
+    links = instant.links
+    sums = [resistance_of(link, scalars.number(0.0)) for link in links]
+    pivots: list[tuple[Pivot, ...]] = [()] * len(links)
+    for k in reversed(range(len(links))):
+        link, p = links[k], sums[k]
+        found = []
+        for axis in link.axes:
+            pivot, p = eliminated(p, axis, link, scalars)
+            found.append(pivot)
+        pivots[k] = tuple(found)
+        if link.parent >= 0:
+            sums[link.parent] = joined(sums[link.parent], moved_to_parent(link, p, scalars))
+    return tuple(pivots)
+
+
+def respond(
+    instant: Instant,
+    pivots: Pivots,
+    forces: Sequence[Force],
+    tau: Sequence[Scalar],
+    scalars: Scalars,
+) -> list[Scalar]:
+    """The v̇ that `tau` on the velocities and the wrenches -`forces` on the frames give."""
+    shares = _inwards(instant, pivots, forces, tau)
+    return _outwards(instant, pivots, shares, scalars)
+
+
+def _inwards(
+    instant: Instant, pivots: Pivots, forces: Sequence[Force], tau: Sequence[Scalar]
+) -> list[Scalar]:
+    """For each velocity what the forces on what it carries do to it, over its pivot."""
+    links, sums = instant.links, list(forces)
+    shares = list(tau)
+    for k in reversed(range(len(links))):
+        link, p = links[k], sums[k]
+        for axis, pivot, i in zip(link.axes, pivots[k], link.v, strict=True):
+            left = tau[i] - along(axis, p.moment, p.force)
+            shares[i] = left / pivot.d
+            p = Force(add(p.moment, scale(left, pivot.u)), add(p.force, scale(left, pivot.w)))
+            if pivot.absolute:
+                # A free axis transmits the force put on it, and nothing else.
+                p = Force(*with_component(axis, p.moment, p.force, tau[i]))
+        if link.parent >= 0:
+            sums[link.parent] = total(sums[link.parent], at_parent(link, p))
+    return shares
+
+
+def _outwards(
+    instant: Instant, pivots: Pivots, shares: Sequence[Scalar], scalars: Scalars
+) -> list[Scalar]:
+    """Accelerations of the velocities, each from that of the frame that carries it."""
+    zero = scalars.number(0.0)
+    nothing = (zero, zero, zero)
+    result = list(shares)
+    reached: list[tuple[Vec, Vec]] = []
+    for k, link in enumerate(instant.links):
+        angular, linear = nothing, nothing
+        if link.parent >= 0:
+            base_angular, base_linear = reached[link.parent]
+            angular = link.turn.into(base_angular)
+            linear = link.turn.into(add(base_linear, cross(base_angular, link.arm)))
+        for axis, pivot, i in reversed(list(zip(link.axes, pivots[k], link.v, strict=True))):
+            value = shares[i] - (dot(pivot.u, angular) + dot(pivot.w, linear))
+            if pivot.absolute:
+                result[i] = value - along(axis, angular, linear)
+                angular, linear = with_component(axis, angular, linear, value)
+            else:
+                result[i] = value
+                more = scale(value, axis.direction)
+                angular = add(angular, more) if axis.angular else angular
+                linear = linear if axis.angular else add(linear, more)
+        angular = named(angular, f"alpha_{link.name}", scalars)
+        reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
+    return result
+
+
+def along(axis: Axis, angular: Vec, linear: Vec) -> Scalar:
+    """The component of a motion or force along an axis of motion."""
+    part = angular if axis.angular else linear
+    return dot(axis.direction, part) if axis.unit is None else part[axis.unit]
+
+
+def with_component(axis: Axis, angular: Vec, linear: Vec, value: Scalar) -> tuple[Vec, Vec]:
+    """The same with another component along a coordinate axis."""
+    assert axis.unit is not None
+    if axis.angular:
+        return replaced(angular, axis.unit, value), linear
+    return angular, replaced(linear, axis.unit, value)
+
+
+def resistance_of(link: Link, zero: Scalar) -> Resistance:
+    """What a link's own mass resists with."""
+    m = link.rigid.mass
+    mass = ((m, zero, zero), (zero, m, zero), (zero, zero, m))
+    return Resistance(link.rigid.inertia, skew(link.rigid.first, zero), mass)
+
+
+def joined(a: Resistance, b: Resistance) -> Resistance:
+    """Both together."""
+    return Resistance(plus(a.J, b.J), plus(a.G, b.G), plus(a.H, b.H))
+
+
+def moved_to_parent(link: Link, p: Resistance, scalars: Scalars) -> Resistance:
+    """The same resistance at the parent's origin, in its axes: G' = G + [r]x H and
+    J' = J - G [r]x + [r]x G'ᵀ, six entries of it.
+    """
+    r = link.arm
+    J, G, H = link.turn.out_symmetric(p.J), link.turn.out_matrix(p.G), link.turn.out_symmetric(p.H)
+    columns = [cross(r, (H[0][j], H[1][j], H[2][j])) for j in AXES]
+    moved = plus(G, transposed((columns[0], columns[1], columns[2])))
+    old, new = [cross(r, row) for row in G], [cross(r, row) for row in moved]
+    empty = [all(scalars.is_zero(x) for x in row) for row in G]
+
+    def entry(i: int, j: int) -> Scalar:
+        if empty[j] and not empty[i]:
+            i, j = j, i
+        return J[i][j] + (old[i][j] + new[j][i])
+
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    return Resistance(symmetric([entry(i, j) for i, j in pairs]), moved, H)
+
+
+def inertia_along(p: Resistance, axis: Axis) -> Scalar:
+    """What resists an acceleration along an axis of motion."""
+    z = axis.direction
+    return dot(z, times(p.J if axis.angular else p.H, z))
+
+
+def eliminated(p: Resistance, axis: Axis, link: Link, scalars: Scalars) -> tuple[Pivot, Resistance]:
+    """Take one axis of motion out of a resistance."""
+    k = axis.unit
+    if k is not None:
+        moment = p.J[k] if axis.angular else (p.G[0][k], p.G[1][k], p.G[2][k])
+        force = p.G[k] if axis.angular else p.H[k]
+        d = p.J[k][k] if axis.angular else p.H[k][k]
+    else:
+        z = axis.direction
+        moment = times(p.J, z) if axis.angular else times(p.G, z)
+        force = times(transposed(p.G), z) if axis.angular else times(p.H, z)
+        d = dot(z, moment if axis.angular else force)
+    d = scalars.named(d + link.armature, f"pivot_{link.name}")
+    zero = scalars.number(0.0)
+    absolute = k is not None and scalars.is_zero(link.armature)
+    if absolute:
+        moment, force = with_component(axis, moment, force, zero)
+    u = (moment[0] / d, moment[1] / d, moment[2] / d)
+    w = (force[0] / d, force[1] / d, force[2] / d)
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    J = symmetric([p.J[i][j] - u[i] * moment[j] for i, j in pairs])
+    H = symmetric([p.H[i][j] - w[i] * force[j] for i, j in pairs])
+    G = _less_outer(p.G, u, force)
+    if absolute:
+        J, G, H = _without(J, G, H, axis, zero)
+    return Pivot(d, u, w, absolute), Resistance(J, G, H)
+
+
+def _less_outer(g: Mat, u: Vec, f: Vec) -> Mat:
+    """g - u fᵀ."""
+    a, b, c = ((g[i][0] - u[i] * f[0], g[i][1] - u[i] * f[1], g[i][2] - u[i] * f[2]) for i in AXES)
+    return (a, b, c)
+
+
+def _without(
+    J: Symmetric, G: Mat, H: Symmetric, axis: Axis, zero: Scalar
+) -> tuple[Symmetric, Mat, Symmetric]:
+    """Row and column of an eliminated coordinate axis, which are zero by construction."""
+    k = axis.unit
+
+    def cleared(m: Mat, rows: bool, columns: bool) -> Mat:
+        a, b, c = (
+            tuple(zero if (rows and i == k) or (columns and j == k) else m[i][j] for j in AXES)
+            for i in AXES
+        )
+        return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))
+
+    if axis.angular:
+        return cleared(J, True, True), cleared(G, True, False), H
+    return J, cleared(G, False, True), cleared(H, True, True)

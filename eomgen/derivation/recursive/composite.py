@@ -1,0 +1,156 @@
+"""The mass matrix by composite bodies, and its LᵀDL factors over the tree's own sparsity."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from eomgen.derivation.recursive.forces import Force, at_parent
+from eomgen.derivation.recursive.frames import Rigid
+from eomgen.derivation.recursive.instant import Instant, Link
+from eomgen.derivation.recursive.vectors import (
+    Scalar,
+    Scalars,
+    Vec,
+    add,
+    cross,
+    dot,
+    plus,
+    scale,
+    symmetric,
+    times,
+)
+
+Entries = Mapping[tuple[int, int], Scalar]
+"""Entries (i, j) of a symmetric matrix over the tree of velocities: j carries i, or is i."""
+
+
+def composite_bodies(instant: Instant, scalars: Scalars) -> tuple[Rigid, ...]:
+    """Each frame's rigid body with all that it carries frozen to it (Featherstone 2008, 6.2)."""
+    sums = [link.rigid for link in instant.links]
+    for k in reversed(range(len(sums))):
+        link = instant.links[k]
+        if link.parent >= 0:
+            sums[link.parent] = _joined(sums[link.parent], _at_parent(link, sums[k], scalars))
+    return tuple(sums)
+
+
+def _joined(a: Rigid, b: Rigid) -> Rigid:
+    return Rigid(a.mass + b.mass, add(a.first, b.first), plus(a.inertia, b.inertia))
+
+
+def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:
+    """A rigid body at the parent's origin: with first moments h before and h' = h + m r after,
+    J' = J + (r·h + r·h') 1 - r h'ᵀ - h rᵀ.
+    """
+    r, h = link.arm, link.turn.out(body.first)
+    J = link.turn.out_symmetric(body.inertia)
+    moved = add(h, scale(body.mass, r))
+    both = [r[i] * (h[i] + moved[i]) for i in range(3)]
+    if scalars.is_zero(J[0][0]) and scalars.is_zero(J[1][1]):  # a planar body
+        zero = scalars.number(0.0)
+        entries = [zero, zero, J[2][2] + (both[0] + both[1]), zero, zero, zero]
+        return Rigid(body.mass, moved, symmetric(entries))
+    diagonal = [both[1] + both[2], both[0] + both[2], both[0] + both[1]]
+    off = [-(r[i] * moved[j] + h[i] * r[j]) for i, j in ((0, 1), (0, 2), (1, 2))]
+    entries = [
+        J[i][j] + more
+        for (i, j), more in zip(
+            ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)), [*diagonal, *off], strict=True
+        )
+    ]
+    return Rigid(body.mass, moved, symmetric(entries))
+
+
+def force_to_move(body: Rigid, angular: Vec, linear: Vec) -> Force:
+    """The wrench that accelerates a rigid body so, from rest."""
+    momentum = add(scale(body.mass, linear), cross(angular, body.first))
+    return Force(add(times(body.inertia, angular), cross(body.first, linear)), momentum)
+
+
+def mass_entries(instant: Instant, scalars: Scalars) -> Entries:
+    """The entries of M at and below the diagonal that are not zero by the tree's shape."""
+    bodies = composite_bodies(instant, scalars)
+    zero = scalars.number(0.0)
+    nothing = (zero, zero, zero)
+    entries: dict[tuple[int, int], Scalar] = {}
+    for k, link in enumerate(instant.links):
+        for n, (axis, i) in enumerate(zip(link.axes, link.v, strict=True)):
+            angular, linear = (
+                (axis.direction, nothing) if axis.angular else (nothing, axis.direction)
+            )
+            force = force_to_move(bodies[k], angular, linear)
+            for other, j in zip(link.axes[: n + 1], link.v[: n + 1], strict=True):
+                entries[i, j] = dot(other.direction, force.moment if other.angular else force.force)
+            entries[i, i] = entries[i, i] + link.armature
+            above, inner = k, force
+            while instant.links[above].parent >= 0:
+                inner = at_parent(instant.links[above], inner)
+                above = instant.links[above].parent
+                outer = instant.links[above]
+                for other, j in zip(outer.axes, outer.v, strict=True):
+                    part = inner.moment if other.angular else inner.force
+                    entries[i, j] = dot(other.direction, part)
+    return entries
+
+
+def full(entries: Entries, nv: int, scalars: Scalars) -> list[Scalar]:
+    """M row by row."""
+    zero = scalars.number(0.0)
+    return [
+        entries.get((max(i, j), min(i, j)), entries.get((min(i, j), max(i, j)), zero))
+        for i in range(nv)
+        for j in range(nv)
+    ]
+
+
+def ancestors(instant: Instant) -> tuple[tuple[int, ...], ...]:
+    """For each velocity those that carry it, nearest first; itself left out."""
+    found: dict[int, tuple[int, ...]] = {}
+    for link in instant.links:
+        above: tuple[int, ...] = ()
+        if link.parent >= 0:
+            last = instant.links[link.parent].v[-1]
+            above = (last, *found[last])
+        for i in link.v:
+            found[i] = above
+            above = (i, *above)
+    return tuple(found[i] for i in sorted(found))
+
+
+@dataclass(frozen=True)
+class Factors:
+    """M = Lᵀ D L with L unit lower triangular and as sparse as M (Featherstone 2008, 6.5)."""
+
+    d: tuple[Scalar, ...]
+    lower: Entries
+    above: tuple[tuple[int, ...], ...]
+
+
+def factorised(
+    entries: Entries, above: tuple[tuple[int, ...], ...], names: Sequence[str], scalars: Scalars
+) -> Factors:
+    """Factor M from the leaves to the root: no fill-in, no pivoting, since M is positive."""
+    work = dict(entries)
+    lower: dict[tuple[int, int], Scalar] = {}
+    order = sorted(range(len(above)), key=lambda i: len(above[i]), reverse=True)
+    for k in order:
+        d = work[k, k] = scalars.named(work[k, k], f"pivot_{names[k]}")
+        for i in above[k]:
+            lower[k, i] = work[k, i] / d
+        for n, i in enumerate(above[k]):
+            for j in above[k][n:]:
+                work[i, j] = work[i, j] - lower[k, i] * work[k, j]
+    return Factors(tuple(work[k, k] for k in range(len(above))), lower, above)
+
+
+def solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
+    """The x with M x = right."""
+    x = list(right)
+    order = sorted(range(len(x)), key=lambda i: len(factors.above[i]), reverse=True)
+    for k in order:
+        for i in factors.above[k]:
+            x[i] = x[i] - factors.lower[k, i] * x[k]
+    for k in reversed(order):
+        x[k] = x[k] / factors.d[k]
+        for i in factors.above[k]:
+            x[k] = x[k] - factors.lower[k, i] * x[i]
+    return x

@@ -1,0 +1,111 @@
+"""Forces from the leaves inwards: loads on bodies, inverse dynamics, what joints transmit."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from eomgen.derivation.recursive.frames import Linkage
+from eomgen.derivation.recursive.instant import Instant, Link
+from eomgen.derivation.recursive.motion import Acceleration, inertial_force
+from eomgen.derivation.recursive.vectors import (
+    Scalar,
+    Scalars,
+    Vec,
+    add,
+    constant,
+    cross,
+    dot,
+    sub,
+    times,
+    zeros,
+)
+
+
+@dataclass(frozen=True)
+class Force:
+    """A wrench on a frame, in its link's axes: moment about the origin, and force."""
+
+    moment: Vec
+    force: Vec
+
+
+@dataclass(frozen=True)
+class PointForce:
+    """A force in world axes at a point of a body, given from its centre of mass in body axes."""
+
+    body: int
+    at: Vec
+    force: Vec
+
+
+def no_force(scalars: Scalars) -> Force:
+    """Nothing."""
+    return Force(zeros(scalars), zeros(scalars))
+
+
+def total(a: Force, b: Force) -> Force:
+    """a + b."""
+    return Force(add(a.moment, b.moment), add(a.force, b.force))
+
+
+def less(a: Force, b: Force) -> Force:
+    """a - b."""
+    return Force(sub(a.moment, b.moment), sub(a.force, b.force))
+
+
+def at_parent(link: Link, f: Force) -> Force:
+    """A wrench on a link as one on its parent."""
+    force = link.turn.out(f.force)
+    return Force(add(link.turn.out(f.moment), cross(link.arm, force)), force)
+
+
+def wrenches(
+    linkage: Linkage, instant: Instant, loads: Sequence[PointForce], scalars: Scalars
+) -> tuple[Force, ...]:
+    """The loads as a wrench on each frame."""
+    found = [no_force(scalars)] * len(instant.links)
+    for load in loads:
+        mount = linkage.mounts[load.body]
+        if mount.frame >= 0:
+            at = add(mount.at, times(constant(mount.axes, scalars), load.at))
+            force = instant.from_world(mount.frame, load.force)
+            arm = instant.of_frame(mount.frame, at)
+            found[mount.frame] = total(found[mount.frame], Force(cross(arm, force), force))
+    return tuple(found)
+
+
+def inertial(
+    instant: Instant, moving: Sequence[Acceleration], scalars: Scalars
+) -> tuple[Force, ...]:
+    """The wrench that each frame's own mass takes."""
+    return tuple(
+        Force(*inertial_force(link, a, scalars))
+        for link, a in zip(instant.links, moving, strict=True)
+    )
+
+
+def carried(instant: Instant, forces: Sequence[Force]) -> tuple[Force, ...]:
+    """Each frame's wrench together with those of all frames it carries."""
+    sums = list(forces)
+    for k in reversed(range(len(sums))):
+        link = instant.links[k]
+        if link.parent >= 0:
+            sums[link.parent] = total(sums[link.parent], at_parent(link, sums[k]))
+    return tuple(sums)
+
+
+def generalised(instant: Instant, sums: Sequence[Force], nv: int) -> list[Scalar]:
+    """The parts of carried wrenches that do work on the velocities, in the order of `v`."""
+    parts: list[Scalar] = [None] * nv
+    for link, f in zip(instant.links, sums, strict=True):
+        for axis, i in zip(link.axes, link.v, strict=True):
+            parts[i] = dot(axis.direction, f.moment if axis.angular else f.force)
+    return parts
+
+
+def rotor_forces(instant: Instant, vd: Sequence[Scalar], nv: int, scalars: Scalars) -> list[Scalar]:
+    """What it takes to accelerate the motors' rotors."""
+    parts = [scalars.number(0.0)] * nv
+    for link in instant.links:
+        for i in link.v:
+            parts[i] = link.armature * vd[i]
+    return parts

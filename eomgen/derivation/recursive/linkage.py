@@ -1,0 +1,215 @@
+"""A model as a tree of frames, each of which makes one elementary move against its parent.
+
+A joint of several coordinates is a row of frames, all but the last without mass. A weld adds no
+frame: its body is carried by the frame of its parent. The axes of a frame are those of the body it
+carries, turned by a fixed rotation where that makes the axis of the move a coordinate axis.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from eomgen.derivation.recursive.axes import with_simple_axes, with_simple_origins
+from eomgen.derivation.recursive.frames import (
+    Array,
+    Frame,
+    Linkage,
+    Mount,
+    Rigid,
+    turn_matrix,
+    turn_of,
+)
+from eomgen.derivation.recursive.vectors import (
+    Scalar,
+    Scalars,
+    Symmetric,
+    Vec,
+    add,
+    congruent,
+    constant,
+    no_matrix,
+    plus,
+    scale,
+    sub,
+    symmetric,
+    times,
+    zeros,
+)
+from eomgen.joints import Free
+from eomgen.joints.base import Geared, Move
+from eomgen.language.formula import Formula, evaluate
+from eomgen.model import Body, Model
+
+
+def make_linkage(model: Model, parameters: Mapping[str, Scalar], scalars: Scalars) -> Linkage:
+    """The frames of a model, its quantities over given values of its parameters."""
+    frames, mounts = _drafted(model, parameters, scalars)
+    if model.dimensions == 3:
+        frames, mounts = with_simple_axes(frames, mounts, scalars)
+    frames, mounts = with_simple_origins(frames, mounts, scalars)
+    rigids = [_nothing(scalars)] * len(frames)
+    for mount in mounts:
+        if mount.frame >= 0:
+            rigids[mount.frame] = _joined(rigids[mount.frame], _about_origin(mount, model, scalars))
+    finished = (
+        replace(frame, rigid=_named(rigid, frame.name, scalars))
+        for frame, rigid in zip(frames, rigids, strict=True)
+    )
+    return Linkage(tuple(finished), tuple(mounts), model.dimensions == 2)
+
+
+def _drafted(
+    model: Model, parameters: Mapping[str, Scalar], scalars: Scalars
+) -> tuple[list[Frame], list[Mount]]:
+    """Frames without mass, and mounts."""
+
+    def value(formula: Formula) -> Scalar:
+        return evaluate(formula, parameters, scalars)
+
+    def vector(parts: tuple[Formula, ...]) -> Vec:
+        x, y, *z = (value(part) for part in parts)
+        return (x, y, z[0] if z else scalars.number(0.0))
+
+    drafts: list[Frame] = []
+    mounts: list[Mount] = []
+    starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
+    for body, first_q, first_v in starts:
+        frame, axes, angle, at = -1, np.eye(3), 0.0, zeros(scalars)
+        if body.parent >= 0:
+            parent = mounts[body.parent]
+            frame, axes, angle, at = parent.frame, parent.axes, parent.angle, parent.at
+        joint, point, armature = body.joint, zeros(scalars), scalars.number(0.0)
+        if not isinstance(joint, Free):
+            at = add(at, times(constant(axes, scalars), vector(joint.r_parent)))
+            axes = axes @ _orientation(joint.orientation_deg)
+            if model.dimensions == 2:
+                assert isinstance(joint.orientation_deg, float | int)
+                angle += math.radians(joint.orientation_deg)
+            point = vector(joint.r_child)
+            if isinstance(joint, Geared):
+                armature = value(joint.motor_inertia)
+                if joint.gear_ratio is not None:
+                    armature = value(joint.gear_ratio) * value(joint.gear_ratio) * armature
+        q, v = first_q, first_v
+        moves = joint.moves(model.dimensions)
+        for i, move in enumerate(moves):
+            to_axis, k = _to_coordinate_axis(move)
+            tilt = math.atan2(to_axis[1, 0], to_axis[0, 0])
+            n_q, n_v = (4, 3) if move.kind == "spin" else (1, 1)
+            drafts.append(
+                Frame(
+                    name=body.name if i == len(moves) - 1 else f"{body.name}_{i + 1}",
+                    parent=frame,
+                    offset=at,
+                    fixed=axes @ to_axis,
+                    kind=move.kind,
+                    axis=k,
+                    angle=angle + tilt,
+                    lead=0.0,
+                    q=tuple(range(q, q + n_q)),
+                    v=tuple(range(v, v + n_v)),
+                    armature=armature,
+                    rigid=_nothing(scalars),
+                )
+            )
+            frame, axes, angle, at = len(drafts) - 1, to_axis.T, -tilt, zeros(scalars)
+            q, v = q + n_q, v + n_v
+        at = sub(at, times(constant(axes, scalars), point))
+        mounts.append(
+            Mount(
+                frame,
+                axes,
+                angle,
+                at,
+                point,
+                value(body.mass),
+                _inertia(body, [value(entry) for entry in body.inertia_com], scalars),
+            )
+        )
+    return drafts, mounts
+
+
+def _inertia(body: Body, entries: list[Scalar], scalars: Scalars) -> Symmetric:
+    zero = scalars.number(0.0)
+    if len(entries) == 1:  # in the plane only the moment about z is ever asked for
+        entries = [zero, zero, entries[0], zero, zero, zero]
+    return symmetric(entries)
+
+
+def _nothing(scalars: Scalars) -> Rigid:
+    return Rigid(scalars.number(0.0), zeros(scalars), no_matrix(scalars))
+
+
+def _about_origin(mount: Mount, model: Model, scalars: Scalars) -> Rigid:
+    """Mass, first moment and inertia of a body about the origin of its frame (parallel axes)."""
+    m, (x, y, z) = mount.mass, mount.at
+    zero = scalars.number(0.0)
+    first = scale(m, mount.at)
+    if model.dimensions == 2:
+        moved = symmetric([zero, zero, first[0] * x + first[1] * y, zero, zero, zero])
+        return Rigid(m, first, plus(mount.inertia, moved))
+    xx, yy, zz = first[0] * x, first[1] * y, first[2] * z
+    moved = symmetric(
+        [yy + zz, xx + zz, xx + yy, -(first[0] * y), -(first[0] * z), -(first[1] * z)]
+    )
+    turned = congruent(constant(mount.axes, scalars), mount.inertia)
+    return Rigid(m, first, plus(turned, moved))
+
+
+def _joined(a: Rigid, b: Rigid) -> Rigid:
+    return Rigid(a.mass + b.mass, add(a.first, b.first), plus(a.inertia, b.inertia))
+
+
+def _named(rigid: Rigid, name: str, scalars: Scalars) -> Rigid:
+    """The same, with names for the numbers that a program computes once."""
+    m = scalars.named(rigid.mass, f"mass_{name}")
+    first = [
+        scalars.named(h, f"moment_{name}_{axis}")
+        for h, axis in zip(rigid.first, "xyz", strict=True)
+    ]
+    entries = [
+        scalars.named(rigid.inertia[i][j], f"inertia_{name}_{word}") for i, j, word in _ENTRIES
+    ]
+    return Rigid(m, (first[0], first[1], first[2]), symmetric(entries))
+
+
+_ENTRIES = ((0, 0, "xx"), (1, 1, "yy"), (2, 2, "zz"), (0, 1, "xy"), (0, 2, "xz"), (1, 2, "yz"))
+
+
+def _orientation(degrees: float | tuple[float, float, float]) -> Array:
+    """The fixed rotation of a joint: Rz Ry Rx of three angles; exact for quarter turns."""
+    x, y, z = degrees if isinstance(degrees, tuple) else (0.0, 0.0, degrees)
+    turned: Array = _turn(2, z) @ _turn(1, y) @ _turn(0, x)
+    return turned
+
+
+def _turn(k: int, degrees: float) -> Array:
+    quarters, rest = divmod(degrees, 90.0)
+    if rest == 0.0:
+        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
+        return turn_of(k, c, s)
+    return turn_matrix(k, math.radians(degrees))
+
+
+def _to_coordinate_axis(move: Move) -> tuple[Array, int]:
+    """A rotation R and a coordinate axis k with R e_k = the axis of the move."""
+    if move.kind == "spin":
+        return np.eye(3), 2
+    axis = np.array(move.axis)
+    for k in range(3):
+        if axis[k] == 1.0:
+            return np.eye(3), k
+        if axis[k] == -1.0:  # half a turn, about z where that will do: the plane stays the plane
+            return np.diag([-1.0, -1.0, 1.0] if k < 2 else [1.0, -1.0, -1.0]), k
+    if axis[2] == 0.0:  # stay in the plane
+        c, s = axis[0], axis[1]
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), 0
+    # The shortest turn from z to the axis (Rodrigues), or from -z if that is nearer.
+    x, y, z = axis if axis[2] > 0 else -axis
+    k = 1.0 / (1.0 + z)
+    matrix = np.array(
+        [[1.0 - k * x * x, -k * x * y, x], [-k * x * y, 1.0 - k * y * y, y], [-x, -y, z]]
+    )
+    return (matrix if axis[2] > 0 else matrix @ np.diag([1.0, -1.0, -1.0])), 2

@@ -1,0 +1,167 @@
+"""Velocities and accelerations from the world outwards (Featherstone 2008, table 5.1)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from eomgen.derivation.recursive.instant import Instant, Link
+from eomgen.derivation.recursive.vectors import (
+    Mat,
+    Scalar,
+    Scalars,
+    Vec,
+    add,
+    cross,
+    dot,
+    named,
+    scale,
+    times,
+    zeros,
+)
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """Of a frame, in its link's axes: angular velocity, and velocity of its origin."""
+
+    angular: Vec
+    linear: Vec
+
+
+@dataclass(frozen=True)
+class Acceleration:
+    """Of a frame: angular acceleration, acceleration of its origin, and the matrix W with
+    a_p = a + W (p - origin) for every point p fixed in the frame: W = [α]x + [ω]x².
+
+    `spread` is W_zz - W_yy, W_xx - W_zz, W_yy - W_xx, where squares cancel.
+    """
+
+    angular: Vec
+    linear: Vec
+    field: Mat
+    spread: Vec
+
+
+def velocities(instant: Instant, v: Sequence[Scalar], scalars: Scalars) -> tuple[Velocity, ...]:
+    """The velocity of every frame."""
+    found: list[Velocity] = []
+    for link in instant.links:
+        angular, linear = zeros(scalars), zeros(scalars)
+        if link.parent >= 0:
+            parent = found[link.parent]
+            angular = link.turn.into(parent.angular)
+            linear = link.turn.into(add(parent.linear, cross(parent.angular, link.arm)))
+        own_angular, own_linear = own_motion(link, v, scalars)
+        angular = named(add(angular, own_angular), f"omega_{link.name}", scalars)
+        linear = named(add(linear, own_linear), f"velocity_{link.name}", scalars)
+        found.append(Velocity(angular, linear))
+    return tuple(found)
+
+
+def own_motion(link: Link, rates: Sequence[Scalar], scalars: Scalars) -> tuple[Vec, Vec]:
+    """What the link's own velocities, or accelerations, add to its motion: angular, linear."""
+    angular, linear = zeros(scalars), zeros(scalars)
+    for axis, i in zip(link.axes, link.v, strict=True):
+        part = scale(rates[i], axis.direction)
+        if axis.angular:
+            angular = add(angular, part)
+        else:
+            linear = add(linear, part)
+    return angular, linear
+
+
+def accelerations(
+    instant: Instant,
+    moving: Sequence[Velocity],
+    v: Sequence[Scalar],
+    vd: Sequence[Scalar] | None,
+    base: Vec,
+    scalars: Scalars,
+) -> tuple[Acceleration, ...]:
+    """The acceleration of every frame if the velocities change at `vd` (None: not at all).
+
+    `base` is the world's acceleration, in world axes: uniform gravity g acts like a world that
+    accelerates by -g.
+    """
+    found: list[Acceleration] = []
+    two = scalars.number(2.0)
+    for k, link in enumerate(instant.links):
+        if link.parent >= 0:
+            parent = found[link.parent]
+            angular = link.turn.into(parent.angular)
+            linear = link.turn.into(add(parent.linear, times(parent.field, link.arm)))
+            spin = link.turn.into(moving[link.parent].angular)
+        else:
+            angular, linear, spin = zeros(scalars), link.turn.into(base), zeros(scalars)
+        own_angular, own_linear = own_motion(link, v, scalars)
+        # The axes of motion turn with the parent; a slide feels twice that (Coriolis).
+        angular = add(angular, cross(spin, own_angular))
+        linear = add(linear, cross(scale(two, spin), own_linear))
+        if vd is not None:
+            more_angular, more_linear = own_motion(link, vd, scalars)
+            angular, linear = add(angular, more_angular), add(linear, more_linear)
+        linear = named(linear, f"bias_{link.name}" if vd is None else f"a_{link.name}", scalars)
+        found.append(Acceleration(angular, linear, *_field(moving[k].angular, angular)))
+    return tuple(found)
+
+
+def _field(w: Vec, a: Vec) -> tuple[Mat, Vec]:
+    """W and its spread."""
+    xx, yy, zz = w[0] * w[0], w[1] * w[1], w[2] * w[2]
+    xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
+    field = (
+        (-(yy + zz), xy - a[2], xz + a[1]),
+        (xy + a[2], -(xx + zz), yz - a[0]),
+        (xz - a[1], yz + a[0], -(xx + yy)),
+    )
+    return field, (zz - yy, xx - zz, yy - xx)
+
+
+def inertial_force(link: Link, a: Acceleration, scalars: Scalars) -> tuple[Vec, Vec]:
+    """Moment about the origin and force that give the link's mass its acceleration.
+
+    f = m a + W h with the first moment h; n = h x a + Σ m r x (W r), where the last sum is that of
+    W's entries with Σ m r rᵀ = ½ tr(J) 1 - J, written in J: what multiplies the trace cancels.
+    """
+    m, h, inertia = link.rigid.mass, link.rigid.first, link.rigid.inertia
+    force = add(scale(m, a.linear), times(a.field, h))
+    moment = add(cross(h, a.linear), _moment(inertia, a, scalars))
+    return moment, force
+
+
+def _moment(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
+    """Σ m r x (W r) from the inertia matrix."""
+    w = a.field
+    half, zero = scalars.number(0.5), scalars.number(0.0)
+    xx, yy, zz = inertia[0][0], inertia[1][1], inertia[2][2]
+    if scalars.is_zero(xx) and scalars.is_zero(yy):  # a planar body: J α
+        return (zero, zero, zz * w[1][0])
+    total = half * (xx + yy + zz)
+    # E = Σ m r rᵀ; its entries depend on parameters alone in own axes.
+    ex, ey, ez = total - xx, total - yy, total - zz
+    exy, exz, eyz = -inertia[0][1], -inertia[0][2], -inertia[1][2]
+    x = w[2][0] * exy - w[1][0] * exz + a.spread[0] * eyz + w[2][1] * ey - w[1][2] * ez
+    y = w[0][1] * eyz - w[2][1] * exy + a.spread[1] * exz + w[0][2] * ez - w[2][0] * ex
+    z = w[1][2] * exz - w[0][2] * eyz + a.spread[2] * exy + w[1][0] * ex - w[0][1] * ey
+    return (x, y, z)
+
+
+def kinetic_energy(
+    instant: Instant, moving: Sequence[Velocity], v: Sequence[Scalar], scalars: Scalars
+) -> Scalar:
+    """Σ ½ m |v|² + v · (ω x h) + ½ ω · J ω, and ½ A q̇² of the motors' rotors."""
+    half, twice = scalars.number(0.5), scalars.number(0.0)
+    energy = scalars.number(0.0)
+    for link, motion in zip(instant.links, moving, strict=True):
+        w, u, rigid = motion.angular, motion.linear, link.rigid
+        twice = twice + rigid.mass * dot(u, u) + dot(w, times(rigid.inertia, w))
+        energy = energy + dot(u, cross(w, rigid.first))
+        for i in link.v:
+            twice = twice + link.armature * (v[i] * v[i])
+    return half * twice + energy
+
+
+def momentum_of(link: Link, motion: Velocity) -> tuple[Vec, Vec]:
+    """Angular momentum about the link's origin, and momentum."""
+    rigid = link.rigid
+    momentum = add(scale(rigid.mass, motion.linear), cross(motion.angular, rigid.first))
+    return add(times(rigid.inertia, motion.angular), cross(rigid.first, motion.linear)), momentum

@@ -1,0 +1,25 @@
+"""Plain floats as scalars of the recursions."""
+
+import math
+
+from eomgen.derivation.recursive.vectors import Scalar
+
+
+class FloatScalars:
+    """What `Scalars` asks for, by `math`."""
+
+    def number(self, value: float) -> float:
+        """The value itself."""
+        return value
+
+    def call(self, function: str, argument: float) -> float:
+        """sin, cos, tan or sqrt."""
+        return float(getattr(math, function)(argument))
+
+    def is_zero(self, value: Scalar) -> bool:
+        """Whether it is 0 here; then the shorter of two ways that agree is taken."""
+        return bool(value == 0.0)
+
+    def named(self, value: Scalar, name: str) -> Scalar:
+        """A float has no name."""
+        return value

@@ -1,0 +1,120 @@
+"""What one may ask of a mechanism besides its motion: places, velocities, momentum, energy."""
+
+from collections.abc import Sequence
+
+from eomgen.derivation.recursive.frames import Linkage
+from eomgen.derivation.recursive.instant import Instant
+from eomgen.derivation.recursive.motion import Velocity, momentum_of
+from eomgen.derivation.recursive.vectors import (
+    Mat,
+    Scalars,
+    Vec,
+    add,
+    constant,
+    cross,
+    product,
+    scale,
+    sub,
+    times,
+    zeros,
+)
+
+Places = tuple[Vec, ...]
+"""The origin of every frame in the world."""
+
+
+def places(instant: Instant, scalars: Scalars) -> Places:
+    """Where the frames' origins are."""
+    origins: list[Vec] = []
+    for link in instant.links:
+        base = origins[link.parent] if link.parent >= 0 else zeros(scalars)
+        origins.append(add(base, instant.to_world(link.parent, link.arm)))
+    return tuple(origins)
+
+
+def orientation(linkage: Linkage, instant: Instant, body: int, scalars: Scalars) -> Mat:
+    """world_R_body."""
+    mount = linkage.mounts[body]
+    axes = constant(mount.axes, scalars)
+    return product(instant.world[mount.frame], axes) if mount.frame >= 0 else axes
+
+
+def arm(linkage: Linkage, instant: Instant, body: int, at: Vec, scalars: Scalars) -> Vec:
+    """A point of a body, given from its centre of mass in body axes, from its frame's origin; in
+    world axes.
+    """
+    mount = linkage.mounts[body]
+    own = add(mount.at, times(constant(mount.axes, scalars), at))
+    return times(instant.world[mount.frame], own) if mount.frame >= 0 else own
+
+
+def position(
+    linkage: Linkage, instant: Instant, where: Places, body: int, at: Vec, scalars: Scalars
+) -> Vec:
+    """The place of a point of a body in the world."""
+    frame = linkage.mounts[body].frame
+    reach = arm(linkage, instant, body, at, scalars)
+    return add(where[frame], reach) if frame >= 0 else reach
+
+
+def velocity(
+    linkage: Linkage,
+    instant: Instant,
+    moving: Sequence[Velocity],
+    body: int,
+    at: Vec,
+    scalars: Scalars,
+) -> tuple[Vec, Vec]:
+    """Velocity of a point of a body and the body's angular velocity, world axes."""
+    frame = linkage.mounts[body].frame
+    if frame < 0:
+        return zeros(scalars), zeros(scalars)
+    angular = instant.to_world(frame, moving[frame].angular)
+    linear = instant.to_world(frame, moving[frame].linear)
+    reach = arm(linkage, instant, body, at, scalars)
+    return add(linear, cross(angular, reach)), angular
+
+
+def centre_of_mass(linkage: Linkage, instant: Instant, where: Places, scalars: Scalars) -> Vec:
+    """Of all bodies together; a body that is part of the world counts like any other."""
+    moment, mass = zeros(scalars), scalars.number(0.0)
+    for k, mount in enumerate(linkage.mounts):
+        place = position(linkage, instant, where, k, zeros(scalars), scalars)
+        moment, mass = add(moment, scale(mount.mass, place)), mass + mount.mass
+    return (moment[0] / mass, moment[1] / mass, moment[2] / mass)
+
+
+def momentum(
+    instant: Instant, where: Places, moving: Sequence[Velocity], scalars: Scalars
+) -> tuple[Vec, Vec]:
+    """Momentum, and angular momentum about the world's origin, in world axes."""
+    linear, angular = zeros(scalars), zeros(scalars)
+    for k, link in enumerate(instant.links):
+        about, p = momentum_of(link, moving[k])
+        p = instant.to_world(k, p)
+        linear = add(linear, p)
+        angular = add(angular, add(instant.to_world(k, about), cross(where[k], p)))
+    return linear, angular
+
+
+def point_jacobian(
+    linkage: Linkage,
+    instant: Instant,
+    where: Places,
+    body: int,
+    at: Vec,
+    nv: int,
+    scalars: Scalars,
+) -> list[Vec]:
+    """For each velocity what it adds to the velocity of a point, in world axes."""
+    columns = [zeros(scalars)] * nv
+    frame = linkage.mounts[body].frame
+    place = position(linkage, instant, where, body, at, scalars)
+    while frame >= 0:
+        link = instant.links[frame]
+        for axis, i in zip(link.axes, link.v, strict=True):
+            direction = instant.to_world(frame, axis.direction)
+            reach = sub(place, where[frame])
+            columns[i] = cross(direction, reach) if axis.angular else direction
+        frame = link.parent
+    return columns

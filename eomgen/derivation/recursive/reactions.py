@@ -1,0 +1,74 @@
+"""What joints transmit: all six components, from the motion of everything they carry."""
+
+from collections.abc import Sequence
+
+from eomgen.derivation.recursive import observe
+from eomgen.derivation.recursive.dynamics import Dynamics
+from eomgen.derivation.recursive.forces import Force
+from eomgen.derivation.recursive.vectors import (
+    Scalar,
+    Vec,
+    add,
+    cross,
+    product,
+    scale,
+    sub,
+    times,
+    transposed,
+    zeros,
+)
+from eomgen.joints import Free
+
+
+def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
+    """The wrench of each joint but the free ones on its parent, at the joint's point on the child,
+    in world axes.
+
+    By Newton and Euler for each body, leaves first: a joint gives its child what the child and all
+    that hangs on it need beyond weight and loads. A motor acts between the two bodies of its joint,
+    and its rotor belongs to the joint: both are in what the joint transmits.
+    """
+    model, linkage, instant = dynamics.model, dynamics.linkage, dynamics.instant
+    scalars = dynamics.scalars
+    moving = dynamics.moving
+    accelerating = dynamics.accelerating(vd)
+    nothing = zeros(scalars)
+    sums: list[Force] = []  # about each body's joint point, in world axes
+    joints: list[Vec] = []
+    for k, mount in enumerate(linkage.mounts):
+        centre = dynamics.centre(k)
+        point = dynamics.position(k, mount.joint)
+        joints.append(point)
+        if mount.frame < 0:
+            sums.append(Force(nothing, scale(mount.mass, sub(nothing, dynamics.down))))
+            arm = sub(centre, point)
+            sums[-1] = Force(cross(arm, sums[-1].force), sums[-1].force)
+            continue
+        frame = mount.frame
+        world_R_body = observe.orientation(linkage, instant, k, scalars)
+        w = instant.to_world(frame, moving[frame].angular)
+        a = accelerating[frame]
+        reach = instant.of_frame(frame, mount.at)
+        there = instant.to_world(frame, add(a.linear, times(a.field, reach)))
+        alpha = instant.to_world(frame, a.angular)
+        inertia = product(product(world_R_body, mount.inertia), transposed(world_R_body))
+        force = scale(mount.mass, there)
+        moment = add(times(inertia, alpha), cross(w, times(inertia, w)))
+        sums.append(Force(add(moment, cross(sub(centre, point), force)), force))
+    for load in dynamics.loads[0]:
+        k = load.body
+        arm = sub(dynamics.position(k, load.at), joints[k])
+        f = sums[k]
+        sums[k] = Force(sub(f.moment, cross(arm, load.force)), sub(f.force, load.force))
+    for k in reversed(range(len(sums))):
+        parent = model.bodies[k].parent
+        if parent >= 0:
+            arm = sub(joints[k], joints[parent])
+            f, g = sums[parent], sums[k]
+            moment = add(f.moment, add(g.moment, cross(arm, g.force)))
+            sums[parent] = Force(moment, add(f.force, g.force))
+    return [
+        Force(sub(nothing, f.moment), sub(nothing, f.force))
+        for body, f in zip(model.bodies, sums, strict=True)
+        if not isinstance(body.joint, Free)
+    ]

@@ -1,0 +1,98 @@
+"""Is there inertia against every motion? Asked before code is written, in numbers."""
+
+import random
+from dataclasses import replace
+
+from eomgen.derivation.recursive.articulated import (
+    eliminated,
+    inertia_along,
+    joined,
+    moved_to_parent,
+    resistance_of,
+)
+from eomgen.derivation.recursive.composite import composite_bodies
+from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.errors import SceneError
+from eomgen.joints.base import Geared
+from eomgen.language.formula import Constant, Formula
+from eomgen.model import Body, Model
+
+TRIALS = 3
+VANISHED = 1e-12
+"""A pivot below this share of the diagonal entry it came from is rounding."""
+
+
+def check_regular(model: Model) -> None:
+    """Raise `SceneError`, naming the body and what to change, if the mass matrix is singular.
+
+    M is singular where some motion moves no mass, however large the masses are; so all of them are
+    taken as 1, which leaves no question of rounding. A pivot of the articulated-body algorithm is
+    the inertia that a velocity feels when all that it carries is free; one that vanishes at seeded
+    random poses vanishes at all, or at almost all.
+    """
+    even = replace(model, bodies=tuple(_evened(body, model) for body in model.bodies))
+    rng = random.Random(20)
+    largest: dict[int, float] = {}
+    for _ in range(TRIALS):
+        q = [rng.uniform(-1.5, 1.5) for _ in model.coordinates]
+        for i, share in _shares(even, q).items():
+            largest[i] = max(largest.get(i, 0.0), share)
+    for i in sorted(largest, reverse=True):
+        if largest[i] < VANISHED:
+            raise SceneError(_singular(model, i))
+
+
+def _evened(body: Body, model: Model) -> Body:
+    """A body with mass 1 for any, inertia of size 1 for any, a rotor of 1 for any."""
+
+    def size(formula: Formula, unit: float = 1.0) -> Constant:
+        return Constant(model.value(formula) / unit if unit else 0.0)
+
+    entries = [abs(model.value(entry)) for entry in body.inertia_com]
+    joint = body.joint
+    if isinstance(joint, Geared):
+        turns = 1.0 if joint.gear_ratio is None else model.value(joint.gear_ratio)
+        rotor = Constant(float(model.value(joint.motor_inertia) > 0 and turns != 0.0))
+        joint = joint.replaced(motor_inertia=rotor, gear_ratio=None)
+    return replace(
+        body,
+        mass=Constant(float(model.value(body.mass) > 0)),
+        inertia_com=tuple(size(entry, max(entries)) for entry in body.inertia_com),
+        joint=joint,
+    )
+
+
+def _shares(model: Model, q: list[float]) -> dict[int, float]:
+    """For each velocity its pivot over its entry of M; one that is nothing frees nothing more."""
+    scalars = FloatScalars()
+    values = Values(model.defaults, dict.fromkeys((i.name for i in model.inputs), 0.0), q, [])
+    instant = Dynamics(model, values, scalars).instant
+    bodies = composite_bodies(instant, scalars)
+    sums = [resistance_of(link, 0.0) for link in instant.links]
+    shares: dict[int, float] = {}
+    for k in reversed(range(len(sums))):
+        link, left = instant.links[k], sums[k]
+        whole = resistance_of(replace(link, rigid=bodies[k]), 0.0)
+        for axis, i in zip(link.axes, link.v, strict=True):
+            pivot, entry = inertia_along(left, axis), inertia_along(whole, axis) + link.armature
+            shares[i] = (pivot + link.armature) / entry if entry > 0 else 0.0
+            if shares[i] >= VANISHED:
+                _, left = eliminated(left, axis, link, scalars)
+        if link.parent >= 0:
+            moved = moved_to_parent(link, left, scalars)
+            sums[link.parent] = joined(sums[link.parent], moved)
+    return shares
+
+
+def _singular(model: Model, i: int) -> str:
+    name = model.velocities[i].name
+    body = next(
+        body
+        for body, first in zip(model.bodies, model.first_velocity, strict=True)
+        if first <= i < first + len(body.velocities)
+    )
+    return (
+        f"body '{body.name}': nothing resists '{name}', neither its mass or inertia nor what it "
+        "carries; give it some, or a joint that does not move so"
+    )

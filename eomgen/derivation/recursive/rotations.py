@@ -1,0 +1,203 @@
+"""Rotations between the axes of a frame and those of its parent, each as cheap as it can be."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from eomgen.derivation.recursive.vectors import (
+    Mat,
+    Scalar,
+    Scalars,
+    Symmetric,
+    Vec,
+    congruent,
+    product,
+    times,
+    transposed,
+)
+
+
+class Rotation(Protocol):
+    """Own axes to the parent's (`out`) and back (`into`)."""
+
+    def out(self, a: Vec) -> Vec:
+        """A vector of own axes in the parent's."""
+
+    def into(self, a: Vec) -> Vec:
+        """A vector of the parent's axes in own."""
+
+    def out_symmetric(self, a: Symmetric) -> Symmetric:
+        """R a Rᵀ for a symmetric matrix of own axes."""
+
+    def out_matrix(self, a: Mat) -> Mat:
+        """R a Rᵀ for any matrix of own axes."""
+
+    def after(self, world: Mat) -> Mat:
+        """world R: own axes in the world's, given the parent's."""
+
+
+class Unturned:
+    """No rotation."""
+
+    def out(self, a: Vec) -> Vec:
+        """The same vector."""
+        return a
+
+    def into(self, a: Vec) -> Vec:
+        """The same vector."""
+        return a
+
+    def out_symmetric(self, a: Symmetric) -> Symmetric:
+        """The same matrix."""
+        return a
+
+    def out_matrix(self, a: Mat) -> Mat:
+        """The same matrix."""
+        return a
+
+    def after(self, world: Mat) -> Mat:
+        """The parent's axes."""
+        return world
+
+
+@dataclass(frozen=True)
+class AxisTurn:
+    """A turn about coordinate axis k by an angle of cosine c and sine s."""
+
+    k: int
+    c: Scalar
+    s: Scalar
+    two_c: Scalar
+
+    def out(self, a: Vec) -> Vec:
+        """Two components turn."""
+        i, j = (self.k + 1) % 3, (self.k + 2) % 3
+        result = list(a)
+        result[i], result[j] = self.c * a[i] - self.s * a[j], self.s * a[i] + self.c * a[j]
+        return (result[0], result[1], result[2])
+
+    def into(self, a: Vec) -> Vec:
+        """Two components turn back."""
+        i, j = (self.k + 1) % 3, (self.k + 2) % 3
+        result = list(a)
+        result[i], result[j] = self.c * a[i] + self.s * a[j], self.c * a[j] - self.s * a[i]
+        return (result[0], result[1], result[2])
+
+    def out_symmetric(self, a: Symmetric) -> Symmetric:
+        """Nine operations for the block that turns: with w = s (a - c) + 2 c b,
+        [a b; b c] becomes [a - s w, c w - b; c w - b, c + s w].
+        """
+        i, j, k = (self.k + 1) % 3, (self.k + 2) % 3, self.k
+        w = self.s * (a[i][i] - a[j][j]) + self.two_c * a[i][j]
+        sw = self.s * w
+        edge = self.out(a[k])
+        m = [list(row) for row in a]
+        m[i][i], m[j][j] = a[i][i] - sw, a[j][j] + sw
+        m[i][j] = m[j][i] = self.c * w - a[i][j]
+        m[k][i] = m[i][k] = edge[i]
+        m[k][j] = m[j][k] = edge[j]
+        return _matrix(m)
+
+    def out_matrix(self, a: Mat) -> Mat:
+        """Like `out_symmetric`; the antisymmetric part of the block stays as it is."""
+        i, j, k = (self.k + 1) % 3, (self.k + 2) % 3, self.k
+        w = self.s * (a[i][i] - a[j][j]) + self.c * (a[i][j] + a[j][i])
+        sw, cw = self.s * w, self.c * w
+        row = self.out(a[k])
+        column = self.out((a[0][k], a[1][k], a[2][k]))
+        m = [list(r) for r in a]
+        m[i][i], m[j][j] = a[i][i] - sw, a[j][j] + sw
+        m[i][j], m[j][i] = cw - a[j][i], cw - a[i][j]
+        m[k][i], m[k][j], m[i][k], m[j][k] = row[i], row[j], column[i], column[j]
+        return _matrix(m)
+
+    def after(self, world: Mat) -> Mat:
+        """Two columns turn: each row of `world` as a row vector times R."""
+        return (self.into(world[0]), self.into(world[1]), self.into(world[2]))
+
+
+@dataclass(frozen=True)
+class Turned:
+    """Any rotation, by its matrix: own axes as columns."""
+
+    matrix: Mat
+
+    def out(self, a: Vec) -> Vec:
+        """R a."""
+        return times(self.matrix, a)
+
+    def into(self, a: Vec) -> Vec:
+        """Rᵀ a."""
+        return times(transposed(self.matrix), a)
+
+    def out_symmetric(self, a: Symmetric) -> Symmetric:
+        """R a Rᵀ."""
+        return congruent(self.matrix, a)
+
+    def out_matrix(self, a: Mat) -> Mat:
+        """R a Rᵀ."""
+        return product(product(self.matrix, a), transposed(self.matrix))
+
+    def after(self, world: Mat) -> Mat:
+        """world R."""
+        return product(world, self.matrix)
+
+
+@dataclass(frozen=True)
+class Both:
+    """A fixed rotation, then one that moves: R = outer inner."""
+
+    outer: Rotation
+    inner: Rotation
+
+    def out(self, a: Vec) -> Vec:
+        """Inner first."""
+        return self.outer.out(self.inner.out(a))
+
+    def into(self, a: Vec) -> Vec:
+        """Outer first."""
+        return self.inner.into(self.outer.into(a))
+
+    def out_symmetric(self, a: Symmetric) -> Symmetric:
+        """Inner first."""
+        return self.outer.out_symmetric(self.inner.out_symmetric(a))
+
+    def out_matrix(self, a: Mat) -> Mat:
+        """Inner first."""
+        return self.outer.out_matrix(self.inner.out_matrix(a))
+
+    def after(self, world: Mat) -> Mat:
+        """world outer inner."""
+        return self.inner.after(self.outer.after(world))
+
+
+def axis_turn(k: int, angle: Scalar, scalars: Scalars) -> AxisTurn:
+    """A turn about coordinate axis k."""
+    c, s = scalars.call("cos", angle), scalars.call("sin", angle)
+    return AxisTurn(k, c, s, scalars.number(2.0) * c)
+
+
+def from_quaternion(q: Sequence[Scalar], scalars: Scalars) -> Turned:
+    """The rotation of w, x, y, z, whatever the quaternion's length.
+
+    R = 1 + (2/|q|²) (w [v]x + [v]x²), so that rounding in the length turns nothing.
+    """
+    w, x, y, z = q
+    one = scalars.number(1.0)
+    k = scalars.number(2.0) / (w * w + x * x + y * y + z * z)
+    kx, ky, kz = k * x, k * y, k * z
+    wx, wy, wz = kx * w, ky * w, kz * w
+    xx, yy, zz = kx * x, ky * y, kz * z
+    xy, xz, yz = kx * y, kx * z, ky * z
+    return Turned(
+        (
+            (one - (yy + zz), xy - wz, xz + wy),
+            (xy + wz, one - (xx + zz), yz - wx),
+            (xz - wy, yz + wx, one - (xx + yy)),
+        )
+    )
+
+
+def _matrix(m: list[list[Scalar]]) -> Mat:
+    a, b, c = m
+    return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))

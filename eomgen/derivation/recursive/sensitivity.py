@@ -1,0 +1,242 @@
+"""How inverse dynamics changes with coordinates and velocities, exactly.
+
+Differentiating the recursion step by step costs a whole sweep for each column. Instead every pair
+of velocities gets its numbers by a few products, all in world axes at the frames' own origins. To
+turn what hangs on axis j by a small angle is to turn all forces in it rigidly, which does no work
+on the axes below; what remains is due to the motion that j does not carry along (S. Singh,
+R. Russo, P. Wensing, "Efficient analytical derivatives of rigid-body dynamics using spatial vector
+algebra", IEEE RA-L 7, 2022; here with the three axes of a spin, too). With S the axis j, v_p and
+a_p the motion of the frame that carries it, v that of its own,
+
+    ψ' = v_p x S,   ψ'' = a_p x S + v_p x ψ',   S' = v x S,
+
+    ∂τ_i/∂q_j = S_i · (I ψ'' + B ψ'),          ∂τ_i/∂v_j = S_i · (I (ψ' + S') + B S),   j carries i,
+    ∂τ_i/∂q_j = S_i · (S x* F + I ψ'' + B ψ'), ∂τ_i/∂v_j as before,                     i carries j,
+
+where I, F and B x = v x* I x - I (v x x) + x x* I v are summed over what the inner one of both
+carries. B takes nothing but the angular part of x: its force is 2 x x p with the momentum p, its
+moment 2 A x with A = (h·v) 1 - v hᵀ - [ω]x E, where h = Σ m r and E = Σ m r rᵀ.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from eomgen.derivation.recursive.composite import Entries, composite_bodies, force_to_move
+from eomgen.derivation.recursive.forces import Force, at_parent, carried, inertial, total
+from eomgen.derivation.recursive.frames import Rigid
+from eomgen.derivation.recursive.instant import Instant, Link
+from eomgen.derivation.recursive.motion import Acceleration, Velocity, momentum_of
+from eomgen.derivation.recursive.vectors import (
+    AXES,
+    Mat,
+    Scalar,
+    Scalars,
+    Vec,
+    add,
+    cross,
+    dot,
+    plus,
+    product,
+    scale,
+    skew,
+    sub,
+    symmetric,
+    times,
+    transposed,
+    zeros,
+)
+
+
+@dataclass(frozen=True)
+class Twist:
+    """A motion at a frame's origin: angular and linear part."""
+
+    angular: Vec
+    linear: Vec
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Matrices of nv x nv, entries that are not zero by the tree's shape.
+
+    `mass` at and below the diagonal; `by_position` ∂τ/∂q, where q of a spin is the small angle in
+    its own axes; `by_velocity` ∂τ/∂v.
+    """
+
+    mass: Entries
+    by_position: Entries
+    by_velocity: Entries
+
+
+@dataclass(frozen=True)
+class _Column:
+    """What one axis j does: S, ψ', ψ'' and ψ' + S'."""
+
+    axis: Twist
+    first: Twist
+    second: Twist
+    both: Twist
+
+
+def sensitivity(
+    instant: Instant,
+    moving: Sequence[Velocity],
+    accelerating: Sequence[Acceleration],
+    base: Vec,
+    scalars: Scalars,
+) -> Sensitivity:
+    """Of M v̇ + V + G at the given motion; `instant` and the motion are in world axes.
+
+    `base` is the acceleration of the world.
+    """
+    assert instant.axes == "world"
+    links = instant.links
+    bodies = composite_bodies(instant, scalars)
+    forces = carried(instant, inertial(instant, accelerating, scalars))
+    drags = _composite_drags(instant, moving, scalars)
+    columns = [_columns(instant, k, moving, accelerating, base, scalars) for k in range(len(links))]
+    mass: dict[tuple[int, int], Scalar] = {}
+    by_q: dict[tuple[int, int], Scalar] = {}
+    by_v: dict[tuple[int, int], Scalar] = {}
+    for k, link in enumerate(links):
+        drag = drags[k]
+        for own, i in zip(columns[k], link.v, strict=True):
+            reach = force_to_move(bodies[k], own.axis.angular, own.axis.linear)
+            pull = drag.transposed_times(own.axis)
+            turned = total(
+                _turned(own.axis, forces[k]),
+                total(_moved(bodies[k], own.second), drag.times(own.first)),
+            )
+            sped = total(_moved(bodies[k], own.both), drag.times(own.axis))
+            above = k
+            while above >= 0:
+                for other, j in zip(columns[above], links[above].v, strict=True):
+                    if j <= i:
+                        mass[i, j] = _work(other.axis, reach)
+                    by_q[i, j] = _work(other.second, reach) + dot(pull, other.first.angular)
+                    by_v[i, j] = _work(other.both, reach) + dot(pull, other.axis.angular)
+                    if above != k:
+                        by_q[j, i] = _work(other.axis, turned)
+                        by_v[j, i] = _work(other.axis, sped)
+                outer = links[above]
+                reach, turned, sped = (at_parent(outer, f) for f in (reach, turned, sped))
+                above = outer.parent
+            mass[i, i] = mass[i, i] + link.armature
+    return Sensitivity(mass, by_q, by_v)
+
+
+def _columns(
+    instant: Instant,
+    k: int,
+    moving: Sequence[Velocity],
+    accelerating: Sequence[Acceleration],
+    base: Vec,
+    scalars: Scalars,
+) -> list[_Column]:
+    link = instant.links[k]
+    nothing = zeros(scalars)
+    carrier, pushed = Twist(nothing, nothing), Twist(nothing, base)
+    if link.parent >= 0:
+        v, a = moving[link.parent], accelerating[link.parent]
+        linear = add(v.linear, cross(v.angular, link.arm))
+        carrier = Twist(v.angular, linear)
+        # Of a point fixed in space, not of one that moves along (Featherstone 2008, 2.11).
+        reached = add(a.linear, times(a.field, link.arm))
+        pushed = Twist(a.angular, sub(reached, cross(v.angular, linear)))
+    own = Twist(moving[k].angular, moving[k].linear)
+    columns = []
+    for axis in link.axes:
+        s = Twist(axis.direction, nothing) if axis.angular else Twist(nothing, axis.direction)
+        first = _crossed(carrier, s)
+        second = _plus(_crossed(pushed, s), _crossed(carrier, first))
+        # A single axis is carried by its own motion as by its parent's.
+        rate = first if len(link.axes) == 1 else _crossed(own, s)
+        columns.append(_Column(s, first, second, _plus(first, rate)))
+    return columns
+
+
+@dataclass(frozen=True)
+class _Drag:
+    """B / 2 of a subtree: its momentum p and its matrix A."""
+
+    momentum: Vec
+    matrix: Mat
+    two: Scalar
+
+    def times(self, x: Twist) -> Force:
+        """B x."""
+        w = scale(self.two, x.angular)
+        return Force(times(self.matrix, w), cross(w, self.momentum))
+
+    def transposed_times(self, s: Twist) -> Vec:
+        """The angular part of Bᵀ s; the linear part is zero."""
+        w, u = scale(self.two, s.angular), scale(self.two, s.linear)
+        return add(times(transposed(self.matrix), w), cross(self.momentum, u))
+
+
+def _composite_drags(instant: Instant, moving: Sequence[Velocity], scalars: Scalars) -> list[_Drag]:
+    two = scalars.number(2.0)
+    found = []
+    for link, motion in zip(instant.links, moving, strict=True):
+        _, p = momentum_of(link, motion)
+        field = product(skew(motion.angular, scalars.number(0.0)), _second_moment(link, scalars))
+        matrix = plus(_outer(link.rigid.first, motion.linear), _negated(field))
+        found.append(_Drag(p, matrix, two))
+    for k in reversed(range(len(found))):
+        link = instant.links[k]
+        if link.parent >= 0:
+            outer, inner = found[link.parent], found[k]
+            moved = plus(inner.matrix, _outer(link.arm, inner.momentum))
+            found[link.parent] = _Drag(
+                add(outer.momentum, inner.momentum), plus(outer.matrix, moved), two
+            )
+    return found
+
+
+def _second_moment(link: Link, scalars: Scalars) -> Mat:
+    """Σ m r rᵀ = ½ tr(J) 1 - J."""
+    J = link.rigid.inertia
+    half = scalars.number(0.5) * (J[0][0] + J[1][1] + J[2][2])
+    return symmetric([half - J[0][0], half - J[1][1], half - J[2][2], -J[0][1], -J[0][2], -J[1][2]])
+
+
+def _outer(h: Vec, v: Vec) -> Mat:
+    """(h·v) 1 - v hᵀ."""
+    hv = [h[i] * v[i] for i in AXES]
+    a, b, c = (
+        tuple(hv[(i + 1) % 3] + hv[(i + 2) % 3] if i == j else -(v[i] * h[j]) for j in AXES)
+        for i in AXES
+    )
+    return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))
+
+
+def _negated(m: Mat) -> Mat:
+    a, b, c = ((-row[0], -row[1], -row[2]) for row in m)
+    return (a, b, c)
+
+
+def _plus(a: Twist, b: Twist) -> Twist:
+    return Twist(add(a.angular, b.angular), add(a.linear, b.linear))
+
+
+def _crossed(a: Twist, b: Twist) -> Twist:
+    """a x b of motions."""
+    return Twist(
+        cross(a.angular, b.angular),
+        add(cross(a.linear, b.angular), cross(a.angular, b.linear)),
+    )
+
+
+def _turned(s: Twist, f: Force) -> Force:
+    """s x* f of a motion and a force."""
+    return Force(
+        add(cross(s.angular, f.moment), cross(s.linear, f.force)), cross(s.angular, f.force)
+    )
+
+
+def _moved(body: Rigid, x: Twist) -> Force:
+    return force_to_move(body, x.angular, x.linear)
+
+
+def _work(x: Twist, f: Force) -> Scalar:
+    return dot(x.angular, f.moment) + dot(x.linear, f.force)

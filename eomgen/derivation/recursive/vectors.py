@@ -1,0 +1,146 @@
+"""Vectors and 3 x 3 matrices over any scalars; they only add, subtract, multiply and divide."""
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Scalar = Any
+"""Program nodes, floats, SymPy expressions, mpmath numbers."""
+Vec = tuple[Scalar, Scalar, Scalar]
+Mat = tuple[Vec, Vec, Vec]
+"""Rows."""
+Symmetric = Mat
+"""A matrix whose entries (i, j) and (j, i) are the same."""
+
+AXES = (0, 1, 2)
+
+
+class Scalars(Protocol):
+    """What the recursions need of scalars, besides + - * / and unary minus."""
+
+    def number(self, value: float) -> Scalar:
+        """The scalar that stands for a float."""
+
+    def call(self, function: str, argument: Scalar) -> Scalar:
+        """sin, cos or sqrt of a scalar."""
+
+    def is_zero(self, value: Scalar) -> bool:
+        """Whether a scalar is known to be 0 whatever its inputs."""
+
+    def named(self, value: Scalar, name: str) -> Scalar:
+        """The same scalar; programs remember the name."""
+
+
+def add(a: Vec, b: Vec) -> Vec:
+    """a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def sub(a: Vec, b: Vec) -> Vec:
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def scale(k: Scalar, a: Vec) -> Vec:
+    """k a."""
+    return (k * a[0], k * a[1], k * a[2])
+
+
+def dot(a: Vec, b: Vec) -> Scalar:
+    """a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vec, b: Vec) -> Vec:
+    """a x b."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def times(m: Mat, a: Vec) -> Vec:
+    """m a."""
+    return (dot(m[0], a), dot(m[1], a), dot(m[2], a))
+
+
+def transposed(m: Mat) -> Mat:
+    """mᵀ."""
+    return (
+        (m[0][0], m[1][0], m[2][0]),
+        (m[0][1], m[1][1], m[2][1]),
+        (m[0][2], m[1][2], m[2][2]),
+    )
+
+
+def plus(a: Mat, b: Mat) -> Mat:
+    """a + b."""
+    return (add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2]))
+
+
+def product(a: Mat, b: Mat) -> Mat:
+    """a b."""
+    columns = transposed(b)
+    return (
+        (dot(a[0], columns[0]), dot(a[0], columns[1]), dot(a[0], columns[2])),
+        (dot(a[1], columns[0]), dot(a[1], columns[1]), dot(a[1], columns[2])),
+        (dot(a[2], columns[0]), dot(a[2], columns[1]), dot(a[2], columns[2])),
+    )
+
+
+def symmetric(entries: Sequence[Scalar]) -> Symmetric:
+    """The matrix of xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = entries
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def congruent(r: Mat, a: Symmetric) -> Symmetric:
+    """r a rᵀ, six entries computed."""
+    half = product(r, a)
+    return symmetric(
+        [dot(half[i], r[j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    )
+
+
+def skew(a: Vec, zero: Scalar) -> Mat:
+    """The matrix of a x."""
+    x, y, z = a
+    return ((zero, -z, y), (z, zero, -x), (-y, x, zero))
+
+
+def unit(k: int, scalars: Scalars) -> Vec:
+    """The k-th coordinate direction."""
+    zero, one = scalars.number(0.0), scalars.number(1.0)
+    return (one if k == 0 else zero, one if k == 1 else zero, one if k == 2 else zero)
+
+
+def replaced(a: Vec, k: int, value: Scalar) -> Vec:
+    """a with another k-th component."""
+    return (value if k == 0 else a[0], value if k == 1 else a[1], value if k == 2 else a[2])
+
+
+def named(a: Vec, name: str, scalars: Scalars) -> Vec:
+    """a, its components known as <name>_x, <name>_y and <name>_z."""
+    x, y, z = (scalars.named(part, f"{name}_{axis}") for part, axis in zip(a, "xyz", strict=True))
+    return (x, y, z)
+
+
+def zeros(scalars: Scalars) -> Vec:
+    """The zero vector."""
+    zero = scalars.number(0.0)
+    return (zero, zero, zero)
+
+
+def no_matrix(scalars: Scalars) -> Mat:
+    """The zero matrix."""
+    row = zeros(scalars)
+    return (row, row, row)
+
+
+def constant(matrix: NDArray[np.float64], scalars: Scalars) -> Mat:
+    """A 3 x 3 matrix of numbers."""
+    a, b, c = ([scalars.number(x) for x in row] for row in matrix.tolist())
+    return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))

@@ -1,0 +1,24 @@
+"""What the numbers of a state vector are."""
+
+from dataclasses import dataclass
+
+from eomgen.model import Model
+
+
+@dataclass(frozen=True)
+class State:
+    """One number of the state vector; `position` tells positions and angles from their rates."""
+
+    name: str
+    unit: str
+    about: str
+    position: bool
+
+
+def velocity_states(model: Model) -> tuple[State, ...]:
+    """The form [q, v]: coordinates, then velocities."""
+    return tuple(
+        State(c.name, c.unit, c.about, position)
+        for group, position in ((model.coordinates, True), (model.velocities, False))
+        for c in group
+    )

@@ -1,0 +1,68 @@
+"""Which models the closed form is for, and which of its two derivations."""
+
+from eomgen.joints import Free, Revolute
+from eomgen.language.formula import ZERO
+from eomgen.model import Model, off_centre
+
+MOST_BODIES = 12
+"""Bodies of one tree of pins in the plane; twelve take about a minute, one more a third more."""
+MOST_GENERAL_BODIES = 6
+"""Bodies of any other model; six take up to ten seconds."""
+FEW_BODIES, FEW_VELOCITIES = 3, 3
+"""Up to so many the closed form takes about a second, and is worth a try."""
+
+
+def why_not_closed(model: Model) -> str:
+    """What keeps a model from route `closed`, in a few words; "" if nothing does."""
+    why_not = why_not_pins(model)
+    if not why_not or len(model.bodies) <= MOST_GENERAL_BODIES:
+        return ""
+    return (
+        f"it is for {MOST_GENERAL_BODIES} bodies at most, or {MOST_BODIES} in a tree of pins and "
+        "free bodies in the plane"
+    )
+
+
+def why_not_tried(model: Model) -> str:
+    """What makes a closed form, where there is one, too long a try; "" if nothing does."""
+    if len(model.bodies) > FEW_BODIES:
+        return f"not tried on more than {FEW_BODIES} bodies; --route closed does"
+    if not why_not_pins(model) or len(model.bodies) == 1:
+        return ""
+    if len(model.velocities) > FEW_VELOCITIES:
+        return f"not tried on more than {FEW_VELOCITIES} velocities; --route closed does"
+    return ""
+
+
+def why_not_pins(model: Model) -> str:
+    """What keeps a model from the handout's own derivation, for pins and free bodies in the plane.
+
+    The state forms of momenta are of that one alone.
+    """
+    if model.dimensions != 2:
+        return "it is derived in the plane"
+    for body in model.bodies:
+        joint = body.joint
+        if not isinstance(joint, Free | Revolute):
+            return f"it is for pins and free bodies, and '{joint.name}' is {joint.type}"
+        if isinstance(joint, Revolute) and joint.motor_inertia != ZERO:
+            return f"it takes no motor_inertia, and '{joint.name}' has one"
+        if isinstance(joint, Revolute) and joint.orientation_deg != 0.0:
+            return f"it takes no orientation_deg, and '{joint.name}' has one"
+        if model.value(body.mass) == 0.0:
+            return f"it divides by masses, and that of '{body.name}' is 0"
+        if model.value(body.moment) == 0.0 and (
+            not off_centre(joint) or all(model.value(r) == 0.0 for r in joint.r_child)
+        ):
+            return f"nothing in it resists the rotation of '{body.name}', whose inertia_com is 0"
+    size = max(_tree_sizes(model))
+    if size > MOST_BODIES:
+        return f"it is for trees of up to {MOST_BODIES} bodies, and one has {size}"
+    return ""
+
+
+def _tree_sizes(model: Model) -> list[int]:
+    roots: list[int] = []
+    for k, body in enumerate(model.bodies):
+        roots.append(k if body.parent < 0 else roots[body.parent])
+    return [roots.count(root) for root in dict.fromkeys(roots)]

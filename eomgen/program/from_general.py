@@ -1,0 +1,129 @@
+"""SymPy's equations of any small tree lowered to the tape.
+
+v̇ and the terms of M v̇ + V + G = F are SymPy's; what only observes the motion, energies, places,
+forces in the joints, comes from the recursions over the same tape.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from eomgen.derivation.general.derive import GeneralEquations
+from eomgen.derivation.states import velocity_states
+from eomgen.language.formula import evaluate
+from eomgen.program.differentiate import jacobian
+from eomgen.program.from_recursion import (
+    DERIVATIVES,
+    Recording,
+    along_directions,
+    checks,
+    output,
+    variables,
+)
+from eomgen.program.lower import Lowering
+from eomgen.program.program import Check
+from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system
+from eomgen.program.tape import Node
+
+
+class Lowered:
+    """The equations over the nodes of a recording."""
+
+    def __init__(self, equations: GeneralEquations, record: Recording) -> None:
+        self.equations = equations
+        s = equations.symbols
+        self._tape, self._record = record.tape, record
+        self._given: dict[Any, Node] = {
+            symbol: record.parameters[name] for name, symbol in s.parameters.items()
+        }
+        for formula, symbol in s.formulas.items():
+            self._given[symbol] = evaluate(formula, record.parameters, record.scalars)
+        self._given |= dict(zip((*s.q, *s.v), (*record.q, *record.v), strict=True))
+        self._given |= {symbol: record.inputs[name] for name, symbol in s.inputs.items()}
+
+    def forward(self, tau: Sequence[Node] | None = None) -> list[Node]:
+        """v̇ under the effects and forces `tau` beside them."""
+        zero = self._tape.constant(0.0)
+        s = self.equations.symbols
+        forces = [zero] * len(s.tau) if tau is None else tau
+        return self.rows(s.a, dict(zip(s.tau, forces, strict=True)))
+
+    def rows(self, expressions: Sequence[Any], given: dict[Any, Node] | None = None) -> list[Node]:
+        """Expressions over the equations' symbols; `given` are further ones."""
+        definitions = self.equations.solution.definitions
+        lowering = Lowering(self._tape, self._given | (given or {}), definitions)
+        for symbol in self._needed(expressions, given or {}):  # in order: no deep recursion
+            lowering.lower(symbol)
+        return [lowering.lower(expression) for expression in expressions]
+
+    def _needed(self, expressions: Sequence[Any], given: dict[Any, Node]) -> list[Any]:
+        definitions = self.equations.solution.definitions
+        needed: set[Any] = set()
+        stack = [s for e in expressions for s in e.free_symbols]
+        while stack:
+            symbol = stack.pop()
+            if symbol in definitions and symbol not in needed and symbol not in given:
+                needed.add(symbol)
+                stack += definitions[symbol].free_symbols
+        return [symbol for symbol in definitions if symbol in needed]
+
+
+def from_general(equations: GeneralEquations) -> System:
+    """The whole system of a model by route `closed`."""
+    model = equations.model
+    record = Recording(model, "closed", lambda record: Lowered(equations, record).forward)
+    lowered, tape, ny = Lowered(equations, record), record.tape, len(record.q) + len(record.v)
+    start = [tape.constant(x) for x in (*model.initial_q, *model.initial_v)]
+    made: Made = {"initial_state": ((ny,), start), "derivative": ((ny,), record.rates)}
+    extra: dict[str, tuple[str, ...]] = {}
+    tangents: set[str] = set()
+    for name in ("jacobian", *(name for name in model.outputs if name in DERIVATIVES)):
+        by, before = variables(record, name), len(tape.steps)
+        rows = jacobian(record.rates, by)
+        if len(tape.steps) - before > LARGEST_JACOBIAN:
+            rows, extra[name] = along_directions(record, by)
+            tangents.add(name)
+        made[name] = ((ny, len(by)), [node for row in rows for node in row])
+    for name in model.outputs:
+        if name not in DERIVATIVES:
+            found = _dynamics(lowered, record, name, extra)
+            made[name] = output(record, name, extra) if found is None else found
+    divisors = [
+        Check(f"inertia_com of {body}", lowered.rows([moment])[0].index, may_vanish=False)
+        for body, moment in equations.solution.divisors
+    ]
+    return make_system(
+        model,
+        "closed",
+        velocity_states(model),
+        tape,
+        made,
+        [*checks(record), *divisors],
+        extra,
+        frozenset(tangents),
+    )
+
+
+def _dynamics(
+    lowered: Lowered, record: Recording, name: str, extra: dict[str, tuple[str, ...]]
+) -> tuple[tuple[int, ...], list[Node]] | None:
+    """Shape and nodes of an output that SymPy's equations give."""
+    terms, symbols = lowered.equations.balance, lowered.equations.symbols
+    n = len(record.v)
+    match name:
+        case "inverse_dynamics":
+            vd = record.beside("vd")
+            extra[name] = tuple(str(node.step.value) for node in vd)
+            unknown = type(terms.V)(n, 1, symbols.a)
+            needed = terms.M * unknown + terms.V + terms.G - terms.F
+            return (n,), lowered.rows(list(needed), dict(zip(symbols.a, vd, strict=True)))
+        case "mass_matrix":
+            return (n, n), lowered.rows(list(terms.M))
+        case "velocity_force":
+            return (n,), lowered.rows(list(terms.V))
+        case "gravity_force":
+            return (n,), lowered.rows(list(terms.G))
+        case "bias_force":
+            return (n,), lowered.rows(list(terms.V + terms.G))
+        case "applied_force":
+            return (n,), lowered.rows(list(terms.F))
+    return None

@@ -1,0 +1,315 @@
+"""The recursions run over the tape: the state's derivative and every output a model asks for."""
+
+from collections.abc import Callable, Sequence
+
+from eomgen.derivation.recursive import observe
+from eomgen.derivation.recursive.composite import full, solved
+from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.derivation.recursive.reactions import reactions
+from eomgen.derivation.recursive.sensitivity import sensitivity
+from eomgen.derivation.recursive.vectors import Vec, sub, zeros
+from eomgen.derivation.states import velocity_states
+from eomgen.model import Model, is_zero
+from eomgen.program.differentiate import jacobian, substituted, tangent
+from eomgen.program.program import Check
+from eomgen.program.scalars import TapeScalars
+from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system
+from eomgen.program.tape import Node, Stage, Tape
+
+DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
+
+
+Forward = Callable[[Sequence[Node] | None], list[Node]]
+"""v̇ under the effects and, if given, forces beside them, one a velocity."""
+
+
+class Recording:
+    """A model's dynamics on a tape by a route, and the nodes that are given to it.
+
+    v̇ comes from the recursion of the route, `aba` or `ldl`, or from what `forward` makes.
+    """
+
+    def __init__(
+        self, model: Model, route: str, forward: Callable[["Recording"], Forward] | None = None
+    ) -> None:
+        self.model = model
+        self.route = route
+        self.tape = Tape()
+        self.scalars = TapeScalars(self.tape)
+        self.parameters = {p.name: self.given(p.name, Stage.PARAMETERS) for p in model.parameters}
+        self.q = [self.given(c.name, Stage.POSITIONS) for c in model.coordinates]
+        self.v = [self.given(c.name, Stage.VELOCITIES) for c in model.velocities]
+        self.inputs = {i.name: self.given(i.name, Stage.INPUTS) for i in model.inputs}
+        values = Values(self.parameters, self.inputs, self.q, self.v)
+        self.dynamics = Dynamics(model, values, self.scalars)
+        recursions = {
+            "aba": self.dynamics.articulated_forward,
+            "ldl": self.dynamics.factored_forward,
+        }
+        self.forward: Forward = forward(self) if forward is not None else recursions[route]
+        self.vd = self.forward(None)
+        self.rates = [*position_rates(model, self.q, self.v, self.tape), *self.vd]
+
+    def given(self, name: str, stage: Stage) -> Node:
+        """An input of the program."""
+        return self.tape.input(name, stage)
+
+    def beside(self, prefix: str) -> list[Node]:
+        """Inputs of an output of its own, one a velocity."""
+        names = (f"{prefix}__{c.name}" for c in self.model.velocities)
+        return [self.given(name, Stage.INPUTS) for name in names]
+
+
+def position_rates(model: Model, q: Sequence[Node], v: Sequence[Node], tape: Tape) -> list[Node]:
+    """q̇ of every coordinate: its own velocity, or ½ q ∘ ω of a quaternion (ω in its own axes)."""
+    rates: list[Node] = []
+    half = tape.constant(0.5)
+    starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
+    for body, first_q, first_v in starts:
+        plain = len(body.positions) - (4 if len(body.positions) != len(body.velocities) else 0)
+        rates += v[first_v : first_v + plain]
+        if plain != len(body.positions):
+            w, x, y, z = q[first_q + plain : first_q + plain + 4]
+            a, b, c = (half * part for part in v[first_v + plain : first_v + plain + 3])
+            rates += [
+                -(x * a + y * b + z * c),
+                w * a + y * c - z * b,
+                w * b + z * a - x * c,
+                w * c + x * b - y * a,
+            ]
+    return rates
+
+
+def from_recursion(record: Recording) -> System:
+    """The whole system of a recorded model."""
+    model = record.model
+    nq, nv, ny = len(record.q), len(record.v), len(record.q) + len(record.v)
+    tape = record.tape
+    start = [tape.constant(x) for x in (*model.initial_q, *model.initial_v)]
+    made: Made = {
+        "initial_state": ((ny,), start),
+        "derivative": ((ny,), record.rates),
+    }
+    extra: dict[str, tuple[str, ...]] = {}
+    tangents: set[str] = set()
+    for name in ("jacobian", *(name for name in model.outputs if name in DERIVATIVES)):
+        by = variables(record, name)
+        if _is_small(record, name):
+            rows = _matrix(record, name)
+        else:
+            rows, extra[name] = along_directions(record, by)
+            tangents.add(name)
+        made[name] = ((ny, len(by)), [node for row in rows for node in row])
+    for name in model.outputs:
+        if name not in DERIVATIVES:
+            made[name] = output(record, name, extra)
+    assert nq + nv == ny
+    return make_system(
+        model,
+        record.route,
+        velocity_states(model),
+        tape,
+        made,
+        checks(record),
+        extra,
+        frozenset(tangents),
+    )
+
+
+def output(
+    record: Recording, name: str, extra: dict[str, tuple[str, ...]]
+) -> tuple[tuple[int, ...], list[Node]]:
+    """Shape and nodes of one output that is no matrix of derivatives."""
+    d, model, scalars = record.dynamics, record.model, record.scalars
+    nv, nb, dims = len(record.v), len(model.bodies), model.dimensions
+    match name:
+        case "forward_dynamics":
+            tau = record.beside("tau")
+            extra[name] = tuple(str(node.step.value) for node in tau)
+            return (nv,), record.forward(tau)
+        case "inverse_dynamics":
+            vd = record.beside("vd")
+            extra[name] = tuple(str(node.step.value) for node in vd)
+            pairs = zip(d.inverse(vd), d.applied_force, strict=True)
+            return (nv,), [needed - applied for needed, applied in pairs]
+        case "mass_matrix":
+            return (nv, nv), full(d.mass_entries, nv, scalars)
+        case "velocity_force":
+            return (nv,), d.bias(weightless=True)
+        case "gravity_force":
+            return (nv,), d.bias(still=True)
+        case "bias_force":
+            return (nv,), d.bias()
+        case "applied_force":
+            return (nv,), d.applied_force
+        case "kinetic_energy":
+            return (), [d.kinetic_energy]
+        case "potential_energy":
+            return (), [d.potential_energy]
+        case "momentum":
+            p, about = observe.momentum(d.instant, d.places, d.moving, scalars)
+            return ((3,), [p[0], p[1], about[2]]) if dims == 2 else ((6,), [*p, *about])
+        case "centre_of_mass":
+            place = observe.centre_of_mass(d.linkage, d.instant, d.places, scalars)
+            return (dims,), list(place[:dims])
+        case "body_poses":
+            return _poses(record)
+        case "body_velocities":
+            moved = [_velocity(record, k, zeros(scalars)) for k in range(nb)]
+            if dims == 2:
+                return (nb, 3), [x for u, w in moved for x in (u[0], u[1], w[2])]
+            return (nb, 6), [x for u, w in moved for x in (*u, *w)]
+        case "joint_forces":
+            found = reactions(d, record.vd)
+            width = 3 if dims == 2 else 6
+            rows = [
+                (f.force[0], f.force[1], f.moment[2]) if dims == 2 else (*f.force, *f.moment)
+                for f in found
+            ]
+            return (len(found), width), [x for row in rows for x in row]
+        case _:
+            return _points(record, name)
+
+
+def _poses(record: Recording) -> tuple[tuple[int, ...], list[Node]]:
+    d, scalars = record.dynamics, record.scalars
+    count = len(record.model.bodies)
+    nodes: list[Node] = []
+    for k in range(count):
+        place = d.centre(k)
+        if record.model.dimensions == 2:
+            nodes += [place[0], place[1], d.angle(k)]
+        else:
+            matrix = observe.orientation(d.linkage, d.instant, k, scalars)
+            nodes += [x for row, y in zip(matrix, place, strict=True) for x in (*row, y)]
+    return ((count, 3) if record.model.dimensions == 2 else (count, 3, 4)), nodes
+
+
+def _velocity(record: Recording, body: int, at: Vec) -> tuple[Vec, Vec]:
+    d = record.dynamics
+    return observe.velocity(d.linkage, d.instant, d.moving, body, at, record.scalars)
+
+
+def _points(record: Recording, name: str) -> tuple[tuple[int, ...], list[Node]]:
+    """Places, velocities or Jacobians of the named points."""
+    d, model, scalars = record.dynamics, record.model, record.scalars
+    dims, nv = model.dimensions, len(record.v)
+    nodes: list[Node] = []
+    for point in model.points:
+        x, y, *z = (d.value(part) for part in point.at)
+        at = (x, y, z[0] if z else scalars.number(0.0))
+        if name == "point_positions":
+            nodes += d.position(point.body, at)[:dims]
+        elif name == "point_velocities":
+            nodes += _velocity(record, point.body, at)[0][:dims]
+        else:
+            columns = observe.point_jacobian(
+                d.linkage, d.instant, d.places, point.body, at, nv, scalars
+            )
+            nodes += [column[i] for i in range(dims) for column in columns]
+    shape = (len(model.points), dims)
+    return (shape if name != "point_jacobians" else (*shape, nv)), nodes
+
+
+def along_directions(
+    record: Recording, by: Sequence[Node]
+) -> tuple[list[list[Node]], tuple[str, ...]]:
+    """How the rates change along directions of `by`, and the names of those."""
+    directions = [record.given(f"d__{node.step.value}", Stage.INPUTS) for node in by]
+    seeds = {x.index: d for x, d in zip(by, directions, strict=True)}
+    rows = [[node] for node in tangent(record.rates, seeds)]
+    return rows, tuple(str(d.step.value) for d in directions)
+
+
+def variables(record: Recording, name: str) -> list[Node]:
+    return {
+        "jacobian": [*record.q, *record.v],
+        "input_jacobian": list(record.inputs.values()),
+        "parameter_jacobian": list(record.parameters.values()),
+    }[name]
+
+
+def _is_small(record: Recording, name: str) -> bool:
+    """Whether a matrix is worth writing out: what its columns take to be solved for."""
+    factors = record.dynamics.factors.above if len(record.v) <= 60 else None
+    if factors is None:
+        return False
+    pairs = sum(len(above) for above in factors)
+    products = 100 if record.model.dimensions == 3 else 20
+    return 4 * pairs * len(variables(record, name)) + products * pairs <= LARGEST_JACOBIAN
+
+
+def _matrix(record: Recording, name: str) -> list[list[Node]]:
+    """∂f by state, inputs or parameters: inverse dynamics is differentiated at the accelerations
+    found, and M solved for them, ∂v̇ = -M⁻¹ ∂τ.
+    """
+    d, tape = record.dynamics, record.tape
+    zero = tape.constant(0.0)
+    by = variables(record, name)
+    moved = jacobian(d.applied_force, by)
+    if name == "jacobian":
+        columns = _state_columns(record)
+    elif name == "parameter_jacobian":
+        # Accelerations as inputs, so that nothing of what they depend on is differentiated.
+        inputs = record.beside("vd")
+        found = {x.index: vd for x, vd in zip(inputs, record.vd, strict=True)}
+        rows = [substituted(row, found) for row in jacobian(d.inverse(inputs), by)]
+        columns = [list(column) for column in zip(*rows, strict=True)]
+    else:
+        columns = [[zero] * len(record.v) for _ in by]
+    answers = [
+        solved(d.factors, [row[k] - part for row, part in zip(moved, column, strict=True)])
+        for k, column in enumerate(columns)
+    ]
+    below = [list(row) for row in zip(*answers, strict=True)] or [[] for _ in record.v]
+    return [*jacobian(record.rates[: len(record.q)], by), *below]
+
+
+def _state_columns(record: Recording) -> list[list[Node]]:
+    """∂τ/∂q and ∂τ/∂v as columns; small angles of a spin as changes of its quaternion."""
+    d, model, tape = record.dynamics, record.model, record.tape
+    base = sub(zeros(record.scalars), d.down)
+    moving, accelerating = d.motion_in_world(record.vd)
+    slopes = sensitivity(d.in_world, moving, accelerating, base, record.scalars)
+    nv, zero, two = len(record.v), tape.constant(0.0), tape.constant(2.0)
+
+    def column(entries: object, j: int) -> list[Node]:
+        return [entries.get((i, j), zero) for i in range(nv)]  # type: ignore[attr-defined]
+
+    columns: list[list[Node]] = []
+    starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
+    for body, first_q, first_v in starts:
+        plain = len(body.positions) - (4 if len(body.positions) != len(body.velocities) else 0)
+        columns += [column(slopes.by_position, first_v + i) for i in range(plain)]
+        if plain == len(body.positions):
+            continue
+        w, x, y, z = record.q[first_q + plain : first_q + plain + 4]
+        k = two / (w * w + x * x + y * y + z * z)
+        turns = [column(slopes.by_position, first_v + plain + i) for i in range(3)]
+        # δ = (2/|q|²) Im(q* dq): the small angle in own axes that a change of q is.
+        for signs in ((-x, -y, -z), (w, -z, y), (z, w, -x), (-y, x, w)):
+            weights = [k * sign for sign in signs]
+            columns.append(
+                [
+                    weights[0] * a + weights[1] * b + weights[2] * c
+                    for a, b, c in zip(*turns, strict=True)
+                ]
+            )
+    return columns + [column(slopes.by_velocity, j) for j in range(nv)]
+
+
+def checks(record: Recording) -> list[Check]:
+    """What a user's own parameters must keep: masses and moments of inertia not negative."""
+    found = []
+    model, d = record.model, record.dynamics
+    for body in model.bodies:
+        if not is_zero(body.mass):
+            may_vanish = model.value(body.mass) == 0.0
+            node = d.value(body.mass)
+            found.append(Check(f"mass of {body.name}", node.index, may_vanish))
+        for entry, word in zip(body.inertia_com[:3], ("xx", "yy", "zz"), strict=False):
+            if not is_zero(entry):
+                what = f" {word}" if model.dimensions == 3 else ""
+                about = f"inertia_com{what} of {body.name}"
+                found.append(Check(about, d.value(entry).index, may_vanish=True))
+    return found

@@ -1,0 +1,125 @@
+"""Which route a model's equations take, and why."""
+
+from dataclasses import dataclass
+
+from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
+from eomgen.errors import SceneError
+from eomgen.model import Model
+from eomgen.program.from_recursion import Recording, from_recursion
+from eomgen.program.program import Output, cost, finish
+from eomgen.program.system import System
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A route with the operations of its `derivative`, or None and why it was not tried."""
+
+    route: str
+    operations: int | None
+    words: str
+
+
+@dataclass(frozen=True)
+class Routed:
+    """A system, and the routes it was chosen from."""
+
+    system: System
+    candidates: tuple[Candidate, ...]
+
+    def explanation(self) -> list[str]:
+        """Lines for a reader: each route, its operations, and why the one taken was taken."""
+        lines = []
+        for candidate in self.candidates:
+            count = "-" if candidate.operations is None else str(candidate.operations)
+            taken = " <- taken" if candidate.route == self.system.route else ""
+            lines.append(f"{candidate.route:<8}{count:>8}  {candidate.words}{taken}".rstrip())
+        return lines
+
+
+def routed(model: Model) -> Routed:
+    """The system of a model by the route it names, or by the one of the fewest operations.
+
+    Raises `SceneError` if it names one that is not for it.
+    """
+    velocity = model.form == "velocity"
+    why_not = why_not_closed(model) if velocity else why_not_pins(model)
+    if not velocity or model.route == "closed":
+        if why_not:
+            asked = "route: 'closed'" if velocity else f"form: '{model.form}'"
+            raise SceneError(f"{asked} needs the closed form, and {why_not}; leave it out")
+        if model.route not in ("auto", "closed"):
+            raise SceneError(
+                f"route: '{model.route}' is for form = 'velocity'; the form '{model.form}' comes "
+                "from the closed form"
+            )
+        words = "named" if model.route == "closed" else f"form '{model.form}' comes from it alone"
+        return _taken(_closed(model), words)
+    if model.route != "auto":
+        return _taken(from_recursion(Recording(model, model.route)), "named")
+    candidates = []
+    closed: System | None = None
+    if why_not:
+        candidates.append(Candidate("closed", None, why_not))
+    elif words := why_not_tried(model):
+        candidates.append(Candidate("closed", None, words))
+    else:
+        closed = _closed(model)
+        candidates.append(_candidate("closed", _operations(closed)))
+    records = {"aba": Recording(model, "aba")}
+    aba, least = _recorded(records["aba"]), least_factoring(model)
+    candidates.append(_candidate("aba", aba))
+    if least > aba:
+        words = f"not tried: factoring alone takes {least} operations"
+        candidates.append(Candidate("ldl", None, words))
+    else:
+        records["ldl"] = Recording(model, "ldl")
+        candidates.append(_candidate("ldl", _recorded(records["ldl"])))
+    tried = [c for c in candidates if c.operations is not None]
+    best = min(tried, key=lambda c: c.operations or 0)
+    system = closed if closed and best.route == "closed" else from_recursion(records[best.route])
+    return Routed(system, tuple(candidates))
+
+
+def least_factoring(model: Model) -> int:
+    """Operations of LᵀDL at least: for each velocity a division and a product and a difference for
+    every pair of velocities that carry it.
+    """
+    depth: list[int] = []
+    total = 0
+    for body in model.bodies:
+        start = depth[body.parent] if body.parent >= 0 else 0
+        for above in range(start, start + len(body.velocities)):
+            total += above + above * (above + 1)
+        depth.append(start + len(body.velocities))
+    return total
+
+
+def _closed(model: Model) -> System:
+    # Imported here because SymPy takes longer to load than everything else together.
+    if why_not_pins(model):
+        from eomgen.derivation.general.derive import derive_general
+        from eomgen.program.from_general import from_general
+
+        return from_general(derive_general(model))
+    from eomgen.derivation.closed import derive
+    from eomgen.program.from_equations import from_equations
+
+    return from_equations(derive(model))
+
+
+def _taken(system: System, words: str) -> Routed:
+    return Routed(system, (Candidate(system.route, _operations(system), words),))
+
+
+def _candidate(route: str, operations: int) -> Candidate:
+    return Candidate(route, operations, "operations a call of derivative")
+
+
+def _operations(system: System) -> int:
+    return cost(system.program, "derivative")["total"]
+
+
+def _recorded(record: Recording) -> int:
+    rates = record.rates
+    outputs = {"derivative": Output((len(rates),), tuple(node.index for node in rates))}
+    return cost(finish(record.tape, outputs, ()), "derivative")["total"]

@@ -1,0 +1,28 @@
+"""The tape's nodes as the abstract scalars of formulas and recursions."""
+
+from eomgen.program.tape import Node, Tape
+
+
+class TapeScalars:
+    """Nodes as scalars for formulas and recursions."""
+
+    def __init__(self, tape: Tape) -> None:
+        self._tape = tape
+
+    def number(self, value: float) -> Node:
+        """A constant."""
+        return self._tape.constant(value)
+
+    def call(self, function: str, argument: Node) -> Node:
+        """sin, cos, tan or sqrt."""
+        return self._tape.apply(function, argument)
+
+    def is_zero(self, value: Node) -> bool:
+        """Whether a node has folded to 0."""
+        return self._tape.values[value.index] == 0.0
+
+    def named(self, value: Node, name: str) -> Node:
+        """The same node, with a name unless it is an input, a constant or a negation."""
+        if value.step.operation not in ("input", "constant", "neg"):
+            self._tape.named(value, name)
+        return value

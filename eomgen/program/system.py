@@ -1,0 +1,53 @@
+"""A program with the meaning of its inputs: what a backend needs to write a module."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from eomgen.derivation.states import State
+from eomgen.model import Model
+from eomgen.program.passes import PassReport, optimise
+from eomgen.program.program import Check, Output, Program, finish
+from eomgen.program.tape import Node, Tape
+
+LARGEST_JACOBIAN = 30_000
+"""Operations up to which a matrix of derivatives is written out entry by entry."""
+
+Made = dict[str, tuple[tuple[int, ...], list[Node]]]
+"""Shape and nodes of each output."""
+
+
+@dataclass(frozen=True)
+class System:
+    """A model's program.
+
+    `extra` names what some outputs take besides state, parameters and inputs: generalised forces or
+    accelerations, one a velocity; or directions, for those of `tangents`, which compute how
+    something changes along a direction in place of a matrix of derivatives.
+    """
+
+    model: Model
+    route: str
+    states: tuple[State, ...]
+    program: Program
+    extra: Mapping[str, tuple[str, ...]]
+    tangents: frozenset[str]
+    reports: tuple[PassReport, ...]
+
+
+def make_system(
+    model: Model,
+    route: str,
+    states: Sequence[State],
+    tape: Tape,
+    made: Made,
+    checks: Sequence[Check],
+    extra: Mapping[str, tuple[str, ...]],
+    tangents: frozenset[str],
+) -> System:
+    """Finish a tape's program and run the passes over it."""
+    outputs = {
+        name: Output(shape, tuple(node.index for node in nodes))
+        for name, (shape, nodes) in made.items()
+    }
+    program, reports = optimise(finish(tape, outputs, checks))
+    return System(model, route, tuple(states), program, extra, tangents, reports)

@@ -1,0 +1,60 @@
+"""Chains written out: one line of a scene becomes its links and pins."""
+
+from eomgen.errors import SceneError
+from eomgen.joints import Joint, Revolute
+from eomgen.language.base import LONGEST_NAME
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import with_components
+from eomgen.scene.schema import MOST, BodyTable, ChainTable, Scene
+
+
+def written_out(scene: Scene) -> tuple[list[tuple[BodyTable, str]], list[tuple[Joint, str]]]:
+    """Bodies and joints of a scene with those of its chains, each with its place.
+
+    Raises `SceneError` if there is no body, or more than `MOST`, or a chain cannot be written out.
+    """
+    count = len(scene.bodies) + sum(chain.count for chain in scene.chains)
+    if count > MOST:
+        raise SceneError(f"chains: make {count} bodies in all; the most is {MOST}")
+    bodies = [(body, f"bodies[{i}]") for i, body in enumerate(scene.bodies)]
+    joints = [(joint, f"joints[{i}]") for i, joint in enumerate(scene.joints)]
+    for i, chain in enumerate(scene.chains):
+        for body, joint in _links(chain, f"chains[{i}]", scene.dimensions):
+            bodies.append((body, f"chains[{i}]"))
+            joints.append((joint, f"chains[{i}]"))
+    if not bodies:
+        raise SceneError("bodies: missing; a scene needs at least one body, or a chain")
+    return bodies, joints
+
+
+def _links(chain: ChainTable, place: str, dimensions: int) -> list[tuple[BodyTable, Joint]]:
+    longest = f"{chain.name}_joint_{chain.count}"
+    if len(longest) > LONGEST_NAME:
+        raise SceneError(
+            f"{place}.name: makes the name '{longest}', which is longer than {LONGEST_NAME} "
+            "characters; choose a shorter name"
+        )
+    # Checked here, where what is wrong still has the name that the scene gives it.
+    start, r_parent, r_child = (
+        with_components(getattr(chain, field), ZERO, dimensions, f"{place}.{field}")
+        for field in ("start", "r_parent", "r_child")
+    )
+    links: list[tuple[BodyTable, Joint]] = []
+    parent, pin = chain.parent, start
+    for k in range(1, chain.count + 1):
+        name = f"{chain.name}_{k}"
+        body = BodyTable(
+            name=name, mass=chain.mass, inertia_com=chain.inertia_com, shapes=chain.shapes
+        )
+        joint = Revolute(
+            type="revolute",
+            name=f"{chain.name}_joint_{k}",
+            parent=parent,
+            child=name,
+            r_parent=pin,
+            r_child=r_child,
+            axis=chain.axis,
+        )
+        links.append((body, joint))
+        parent, pin = name, r_parent
+    return links

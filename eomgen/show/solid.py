@@ -1,0 +1,224 @@
+"""Shapes of space as faces: what the figure and the page both paint.
+
+All faces have four corners, counter-clockwise seen from outside; a triangle repeats one of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eomgen.scene.look import Box, Cylinder, Ellipsoid, Rod, Shape, Sphere
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FEWEST, MOST = 8, 32
+"""Sides of what is round: fewer would show creases, more would show nothing."""
+
+SHARP = np.cos(np.radians(50))
+"""Faces that meet at a larger angle than this (45 degrees lie within an octagon) have an edge."""
+
+FINEST = 200
+"""Faces across a picture, at most; each try after the first has fewer by `COARSER`."""
+
+COARSER = 1.25
+TRIES = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A solid's surface in body axes, m.
+
+    `across` names for each side of each face, from corner k to k + 1, the face beyond it, or -1
+    where the surface bends so sharply that the side is always drawn as an edge.
+    """
+
+    vertices: Array  # (k, 3)
+    faces: Indices  # (f, 4), into vertices
+    smooth: bool = False  # no edges, however coarse
+
+    @cached_property
+    def thickness(self) -> float:
+        """How thin the surface is where it is thinnest, about, m."""
+        about = self.vertices - self.vertices.mean(axis=0)
+        _, _, own_axes = np.linalg.svd(about, full_matrices=False)
+        return float(np.ptp(about @ own_axes.T, axis=0).min())
+
+    @cached_property
+    def normals(self) -> Array:
+        """Outward normals (f, 3), of unit length."""
+        a, b, c, d = np.moveaxis(self.vertices[self.faces], 1, 0)
+        return unit(np.cross(c - a, d - b))
+
+    @cached_property
+    def across(self) -> Indices:
+        """Faces beyond each side (f, 4); the face itself for the empty side of a triangle."""
+        count = len(self.vertices)
+        start, end = self.faces, np.roll(self.faces, -1, axis=1)
+        own = np.repeat(np.arange(len(self.faces)), 4)
+        keys, wanted = (start * count + end).ravel(), (end * count + start).ravel()
+        order = np.argsort(keys, kind="stable")
+        spot = order[np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)]
+        beyond = np.where((keys[spot] == wanted) & (keys != wanted), own[spot], own)
+        bend = np.einsum("fi,fi->f", self.normals[own], self.normals[beyond])
+        edge = (bend < SHARP) & (not self.smooth)
+        return np.where(edge, -1, beyond).reshape(-1, 4)
+
+
+def mesh(shape: Shape, grain: float) -> Mesh:
+    """The surface of a shape of space, with faces about `grain` m long where it can be."""
+    match shape:
+        case Box():
+            return _box(shape)
+        case Sphere() | Ellipsoid():
+            radii = shape.radii if isinstance(shape, Ellipsoid) else (shape.radius,) * 3
+            ball = _revolved(_arc(_sides(max(radii), grain) // 2), _sides(max(radii), grain))
+            turned = ball @ np.diag(radii)
+            if isinstance(shape, Ellipsoid):
+                turned = turned @ rotation(shape.orientation_deg).T
+            return _joined([turned + _center(shape.center)], smooth=True)
+        case Cylinder():
+            radius = shape.radius
+            profile = [(0.0, 0.0), (radius, 0.0), (radius, 1.0), (0.0, 1.0)]
+            return _around(shape, profile, radius, grain)
+        case Rod():
+            return _rod(shape, grain)
+    raise AssertionError(f"{shape.type} is no shape of space")
+
+
+@dataclass(frozen=True)
+class Solids:
+    """All shapes of all bodies; shapes that are alike share one mesh."""
+
+    meshes: tuple[Mesh, ...]
+    bodies: tuple[tuple[tuple[int, str], ...], ...]
+    """For each body the index of each of its shapes' meshes, and the shape's colour."""
+
+
+def solids(shapes: Sequence[Sequence[Shape]], height: float, budget: int) -> Solids:
+    """Meshes as fine as a picture `height` m high shows, coarser where they would be many.
+
+    `budget` is the number of faces in all that should not be passed; many shapes pass it still.
+    """
+    alike: dict[str, list[Shape]] = {}
+    for group in shapes:
+        for shape in group:
+            key = shape.model_dump_json(exclude={"color"})
+            alike.setdefault(key, []).append(shape)
+    grain = height / FINEST
+    for _ in range(TRIES):
+        meshes = [mesh(group[0], grain) for group in alike.values()]
+        sizes = (len(m.faces) * len(g) for m, g in zip(meshes, alike.values(), strict=True))
+        if sum(sizes) <= budget:
+            break
+        grain *= COARSER
+    number = {key: k for k, key in enumerate(alike)}
+    placed = (
+        tuple((number[s.model_dump_json(exclude={"color"})], s.color) for s in g) for g in shapes
+    )
+    return Solids(tuple(meshes) if alike else (), tuple(placed))
+
+
+def rotation(turns_deg: Sequence[float]) -> Array:
+    """R = Rz Ry Rx of three angles about x, then y, then z of fixed axes."""
+    cx, cy, cz = np.cos(np.radians(turns_deg))
+    sx, sy, sz = np.sin(np.radians(turns_deg))
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return np.asarray(about_z @ about_y @ about_x, dtype=float)
+
+
+def unit(vectors: Array) -> Array:
+    """Vectors along the last axis with length 1; zero stays zero."""
+    # Divided by the largest component first, for squares of tiny numbers are no numbers.
+    largest = np.abs(vectors).max(axis=-1, keepdims=True)
+    scaled = vectors / np.where(largest > 0, largest, 1.0)
+    length = np.linalg.norm(scaled, axis=-1, keepdims=True)
+    return np.asarray(scaled / np.where(length > 0, length, 1.0))
+
+
+def _center(center: tuple[float, ...] | None) -> Array:
+    return np.zeros(3) if center is None else np.array(center, dtype=float)
+
+
+def _sides(radius: float, grain: float) -> int:
+    """Sides of a circle, a multiple of four."""
+    return 4 * int(np.clip(np.ceil(2 * np.pi * radius / grain / 4), FEWEST // 4, MOST // 4))
+
+
+def _box(box: Box) -> Mesh:
+    half = np.array(box.size) / 2
+    sheets = []
+    for axis in range(3):
+        # The two axes after this one, in turn, make a right-handed system with it.
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        sheet = np.zeros((2, 2, 3))
+        sheet[..., first] = half[first] * np.array([[-1], [1]])
+        sheet[..., second] = half[second] * np.array([[-1, 1]])
+        sheet[..., axis] = half[axis]
+        sheets += [sheet, -sheet.swapaxes(0, 1)]
+    turned = rotation(box.orientation_deg)
+    return _joined([sheet @ turned.T + _center(box.center) for sheet in sheets])
+
+
+def _rod(rod: Rod, grain: float) -> Mesh:
+    """A straight round side between two half balls."""
+    length, radius = float(np.linalg.norm(np.subtract(rod.end, rod.start))), rod.width / 2
+    ball = _arc(_sides(radius, grain) // 2) * radius
+    half = len(ball) // 2
+    below, above = ball[: half + 1], ball[half + (length == 0.0) :] + np.array([0.0, length])
+    profile = np.concatenate([below, above]) / [1.0, length or 1.0]
+    return _around(rod, profile, radius, grain)
+
+
+def _arc(parts: int) -> Array:
+    """Half a circle of radius 1 from (0, -1) to (0, 1), as rows of radius and height."""
+    angles = np.linspace(-np.pi / 2, np.pi / 2, parts + 1)
+    arc = np.column_stack([np.cos(angles), np.sin(angles)])
+    arc[[0, -1], 0] = 0.0
+    return arc
+
+
+def _revolved(profile: Array, sides: int) -> Array:
+    """A profile of radii and heights, upwards, turned about z: points (sides + 1, rows, 3)."""
+    angles = np.linspace(0.0, 2 * np.pi, sides + 1)[:, np.newaxis]
+    radius, height = profile.T
+    ones = np.ones_like(angles)
+    return np.stack([radius * np.cos(angles), radius * np.sin(angles), height * ones], axis=-1)
+
+
+def _around(shape: Cylinder | Rod, profile: ArrayLike, radius: float, grain: float) -> Mesh:
+    """A profile of radii (m) and heights (parts of the length) turned about start to end."""
+    along = np.subtract(shape.end, shape.start)
+    axis = unit(along) if along.any() else np.array([0.0, 0.0, 1.0])
+    scale = float(np.linalg.norm(along)) or 1.0
+    aside = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
+    frame = np.array([aside, np.cross(axis, aside), axis * scale])
+    surface = _revolved(np.array(profile), _sides(radius, grain)) @ frame + shape.start
+    return _joined([surface], smooth=isinstance(shape, Rod))
+
+
+def _joined(sheets: Sequence[Array], *, smooth: bool = False) -> Mesh:
+    """One mesh of sheets (a, b, 3) of points whose borders meet, faces counter-clockwise.
+
+    A sheet's normal is along its first index's direction crossed with its second's.
+    """
+    points, faces = [], []
+    first = 0
+    for sheet in sheets:
+        rows, columns = sheet.shape[:2]
+        index = first + np.arange(rows * columns).reshape(rows, columns)
+        corners = (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
+        faces.append(np.stack(corners, axis=-1).reshape(-1, 4))
+        points.append(sheet.reshape(-1, 3))
+        first += rows * columns
+    every = np.concatenate(points)
+    size = float(np.abs(every - every[0]).max()) or 1.0
+    _, kept, place = np.unique(
+        np.round((every - every[0]) / size, 9), axis=0, return_index=True, return_inverse=True
+    )
+    return Mesh(every[kept], place.reshape(-1)[np.concatenate(faces)], smooth)

@@ -1,0 +1,188 @@
+"""How space is seen: the eye's axes, light, the floor, and which faces look at the eye.
+
+The eye stands infinitely far off (an orthographic view): equal lengths look equal everywhere, a
+ball is a circle, and the scale bar holds for the whole picture.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.show.motion import Array, Motion
+from eomgen.show.solid import Indices, Solids, unit
+
+LIGHT = unit(np.array([-0.45, 0.75, 0.65]))
+"""Towards the light, in the eye's axes: it comes over the left shoulder wherever the eye stands."""
+
+AMBIENT, GLOSS = 0.56, 0.1
+"""The part of a colour that shadow leaves, and the part of white that full light adds."""
+
+LINES = 40
+"""Lines of the floor's grid in each direction, at most."""
+
+NEAR_ZERO, NEAR_FLOOR = 0.02, 0.5
+"""What floats so little below z = 0, or above it, in heights of the picture, stands on z = 0."""
+
+
+SOUNDINGS = 300
+"""Samples at which the lowest point of all is looked for, at most."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A grid at height `z`, m, `step` m apart, over x from low to high and y from low to high."""
+
+    z: float
+    step: float
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    def lines(self) -> Array:
+        """Ends (lines, 2, 3) of the grid's lines."""
+        ends = []
+        for axis, (low, high) in enumerate((self.x, self.y)):
+            first, last = round(low / self.step), round(high / self.step)
+            for value in np.arange(first, last + 1) * self.step:
+                pair = np.full((2, 3), self.z)
+                pair[:, axis] = value
+                pair[:, 1 - axis] = (self.y, self.x)[axis]
+                ends.append(pair)
+        return np.array(ends)
+
+    def through_origin(self) -> NDArray[np.bool_]:
+        """Which of the lines is at x = 0 or at y = 0."""
+        flat = self.lines()[..., :2]
+        return np.asarray((flat == 0.0).all(axis=1).any(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Cast:
+    """The faces of all bodies, each in its own body's axes, m."""
+
+    vertices: Array  # (k, 3)
+    bodies: Indices  # (k,) whose vertex it is
+    faces: Indices  # (f, 4)
+    across: Indices  # (f, 4) as in a `Mesh`
+    colours: Array  # (f, 3) red, green, blue from 0 to 1
+    thickness: Array  # (f,) of the solid a face belongs to, m
+
+    def placed(self, pose: Array) -> Array:
+        """World places (k, 3) of the vertices at a pose (nb, 3, 4)."""
+        of = pose[self.bodies]
+        return np.asarray(np.einsum("kij,kj->ki", of[..., :3], self.vertices) + of[..., 3])
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """Faces and edges that look at the eye, along its axes: right, up, and near, m."""
+
+    faces: Array  # (f, 4, 3) convex and flat, counter-clockwise
+    colours: Array  # (f, 3) as the light falls
+    edges: Array  # (e, 2, 3)
+    edge_colours: Array  # (e, 3) without light
+    edge_thickness: Array  # (e,) of the solid that an edge belongs to
+
+
+def eye_axes(azimuth_deg: float, elevation_deg: float) -> Array:
+    """The picture's right and up and the way to the eye, as rows in world axes.
+
+    The eye stands where `azimuth_deg` turns from x towards y and `elevation_deg` lifts towards z.
+    A world point times the transpose is its place in the picture and its nearness, m.
+    """
+    azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
+    ca, sa, ce, se = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
+    return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
+
+
+def cast_of(solids: Solids) -> Cast:
+    """All bodies' faces in one table."""
+    none = np.zeros((0, 4), dtype=np.int64)
+    tables = [(np.zeros((0, 3)), none[:, 0], none, none, np.zeros((0, 3)), np.zeros(0))]
+    corners = sides = 0
+    for body, shapes in enumerate(solids.bodies):
+        for index, colour in shapes:
+            mesh = solids.meshes[index]
+            rgb = np.array([[int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]])
+            tables.append(
+                (
+                    mesh.vertices,
+                    np.full(len(mesh.vertices), body),
+                    mesh.faces + corners,
+                    np.where(mesh.across < 0, -1, mesh.across + sides),
+                    rgb.repeat(len(mesh.faces), axis=0),
+                    np.full(len(mesh.faces), mesh.thickness),
+                )
+            )
+            corners, sides = corners + len(mesh.vertices), sides + len(mesh.faces)
+    return Cast(*map(np.concatenate, zip(*tables, strict=True)))
+
+
+def look(cast: Cast, pose: Array, axes: Array) -> Sight:
+    """What of the bodies at a pose looks at the eye with these `axes`, hidden or not."""
+    corners = (cast.placed(pose) @ axes.T)[cast.faces]  # (f, 4, 3)
+    normals = unit(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
+    front = normals[:, 2] > 0
+    # An edge is where the surface bends sharply, or where it turns away from the eye.
+    drawn = front[:, np.newaxis] & ((cast.across < 0) | ~front[cast.across])
+    face, side = np.nonzero(drawn)
+    return Sight(
+        faces=corners[front],
+        colours=lit(cast.colours[front], normals[front] @ LIGHT),
+        edges=np.stack([corners[face, side], corners[face, (side + 1) % 4]], axis=1),
+        edge_colours=cast.colours[face],
+        edge_thickness=cast.thickness[face],
+    )
+
+
+def lit(colours: Array, toward_light: Array) -> Array:
+    """Colours (f, 3) as light falls on them, by the cosine of its angle to each normal."""
+    light = np.maximum(toward_light, 0.0)[:, np.newaxis]
+    return np.asarray(np.minimum(colours * (AMBIENT + (1 - AMBIENT) * light) + GLOSS * light**4, 1))
+
+
+def floor_under(motion: Motion, cast: Cast) -> Floor:
+    """The floor that a motion happens above: z = 0, or where its lowest point comes.
+
+    A body that falls for ever takes no floor with it: the floor stays in the first picture.
+    """
+    low, high = _bounds(motion, cast)
+    height = motion.camera.height
+    looks = motion.center[2]
+    if motion.camera.follow is not None:
+        looks = motion.places[0, motion.bodies.index(motion.camera.follow), 2]
+    z = float(low[2])
+    if -NEAR_ZERO * height <= z <= NEAR_FLOOR * height:
+        z = 0.0
+    z = max(z, float(looks) - height / 2)
+    step = round_length(height / 8)
+    widest = float(max(high[:2] - low[:2]))
+    if widest > LINES * step:
+        step = round_length(2 * widest / LINES)
+    # Not too narrow beside its length, for a strip says little of depth.
+    spare = np.maximum(0.6 * widest - (high - low)[:2], 0.0) / 2
+    x_low, y_low = np.floor((low[:2] - spare) / step - 0.2) * step
+    x_high, y_high = np.ceil((high[:2] + spare) / step + 0.2) * step
+    return Floor(z, step, (float(x_low), float(x_high)), (float(y_low), float(y_high)))
+
+
+def _bounds(motion: Motion, cast: Cast) -> tuple[Array, Array]:
+    """The lowest and the highest x, y, z that anything reaches."""
+    rows = np.linspace(0, len(motion.t) - 1, min(len(motion.t), SOUNDINGS)).round().astype(int)
+    poses = motion.poses[rows]
+    places = poses[..., 3].reshape(-1, 3)
+    low, high = places.min(axis=0), places.max(axis=0)
+    for body in range(len(motion.bodies)):
+        own = cast.vertices[cast.bodies == body]
+        if len(own):
+            for axis in range(3):
+                reach = poses[:, body, axis, :3] @ own.T + poses[:, body, axis, 3:]
+                low[axis] = min(low[axis], reach.min())
+                high[axis] = max(high[axis], reach.max())
+    return low, high
+
+
+def round_length(length: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that does not exceed `length`."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(max(digit * power for digit in (1, 2, 5) if digit * power <= length * 1.0000001))

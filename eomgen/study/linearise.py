@@ -1,0 +1,210 @@
+"""A module linearised about a state: δẏ = A δy + B δu, exactly, from its generated Jacobians."""
+
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eomgen.errors import RunError
+from eomgen.files import write_whole
+from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import Floats
+
+FORMAT = "linearisation 1"
+BOUND = 1e100
+"""Numbers from here on are taken for infinite: their squares nearly are."""
+_UNIT = 1e-9
+"""How far from 1 a quaternion's length may be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """δẏ = A δy + B δu for small deviations from the motion through `y` under `u`.
+
+    A (n, n), B (n, nu)  derivatives of the rates by the states and by the inputs
+    state_names          of the n deviations: the states themselves, or see `reduced`
+    input_names          of the nu inputs
+    y (ny,), u (nu,)     where: a state and constant inputs, SI units
+    rates (ny,)          ẏ there, zero at an equilibrium
+    quaternions          indices into the deviations of each unit quaternion among them
+    """
+
+    A: Floats
+    B: Floats
+    state_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    y: Floats
+    u: Floats
+    rates: Floats
+    quaternions: tuple[tuple[int, int, int, int], ...]
+
+    def reduced(self) -> "Linearisation":
+        """The same in as few numbers as there are degrees of freedom, twice.
+
+        Four deviations of a quaternion are three of rotation, rad, about the body's own axes, named
+        `<prefix>_rx`, … : q + δq = q (1, δr/2). With δy = T δx it is ẋ = T⁺ (A T - Ṫ) x + T⁺ B u,
+        where Ṫ follows the motion and is zero at rest. Without quaternions nothing changes.
+        """
+        if not self.quaternions:
+            return self
+        basis = tangents(self.y, self.quaternions)
+        turning = tangents(self.rates, self.quaternions, plain=0.0)
+        inverse = basis.T / np.sum(basis**2, axis=0)[:, np.newaxis]  # its columns are orthogonal
+        return Linearisation(
+            A=inverse @ (self.A @ basis - turning),
+            B=inverse @ self.B,
+            state_names=_deviations(self.state_names, self.quaternions),
+            input_names=self.input_names,
+            y=self.y,
+            u=self.u,
+            rates=self.rates,
+            quaternions=(),
+        )
+
+
+def linearise(module: GeneratedModule, y: Floats, u: Any = None, p: Any = None) -> Linearisation:
+    """Linearise a module in the form [q, v] about the state `y` (ny,).
+
+    `u` and `p` are inputs and parameters as the module takes them: None, by name, or in order.
+    Raises `RunError` if the module is of another form, lacks `input_jacobian`, or refuses them, or
+    if a quaternion is not of unit length.
+    """
+    if module.FORM != "velocity":
+        raise RunError(f"linearise: needs the form 'velocity', not '{module.FORM}'")
+    y = np.array(y, dtype=np.float64)
+    if y.shape != (len(module.STATES),):
+        raise RunError(f"linearise: y has shape {y.shape}, not ({len(module.STATES)},)")
+    for indices in module.QUATERNIONS:
+        length = float(np.linalg.norm(y[list(indices)]))
+        if not abs(length - 1) < _UNIT:
+            name = module.STATES[indices[0]]
+            raise RunError(
+                f"linearise: the quaternion from {name} on has length {length:g}; scale it to 1"
+            )
+    inputs = input_values(module, u)
+    rates, by_state, by_input = (
+        evaluated(function, y, p, inputs, "linearise")
+        for function in (module.derivative, module.jacobian, input_jacobian(module))
+    )
+    return Linearisation(
+        A=by_state,
+        B=by_input,
+        state_names=module.STATES,
+        input_names=tuple(module.INPUTS),
+        y=y,
+        u=inputs,
+        rates=rates,
+        quaternions=module.QUATERNIONS,
+    )
+
+
+def evaluated(function: Callable[..., Floats], y: Floats, p: Any, u: Floats, what: str) -> Floats:
+    """A function of a module at a state. Raises `RunError` if it refuses or knows no bounds."""
+    try:
+        with np.errstate(all="ignore"):
+            result = function(0.0, y, p, u)
+    except (ValueError, ArithmeticError) as error:
+        raise RunError(f"{what}: {error}") from None
+    if not np.all(np.abs(result) < BOUND):
+        raise RunError(f"{what}: the numbers grow past all bounds here; change state or parameters")
+    return result
+
+
+def input_jacobian(module: GeneratedModule) -> Callable[..., Floats]:
+    """∂ẏ/∂u of a module as a function of t, y, p, u. Raises `RunError` if it has none."""
+    if not module.INPUTS:
+        return lambda t, y, p, u: np.zeros((len(y), 0))
+    function: Callable[..., Floats] | None = getattr(module, "input_jacobian", None)
+    if function is None:
+        raise RunError(
+            "linearise: the module has no input_jacobian; generate it with --outputs input_jacobian"
+        )
+    return function
+
+
+def input_values(module: GeneratedModule, u: Any) -> Floats:
+    """Inputs as an array (nu,) in the module's order: from None (all 0), a mapping, or an array."""
+    if u is None:
+        u = {}
+    if isinstance(u, Mapping):
+        for name in u:
+            if name not in module.INPUTS:
+                known = ", ".join(module.INPUTS) or "none"
+                raise RunError(f"inputs: no input '{name}'; known: {known}")
+        u = [u.get(name, 0.0) for name in module.INPUTS]
+    values = np.array(u, dtype=np.float64)
+    if values.shape != (len(module.INPUTS),):
+        raise RunError(f"inputs: have shape {values.shape}, not ({len(module.INPUTS)},)")
+    return values
+
+
+def tangents(
+    y: Floats, quaternions: tuple[tuple[int, int, int, int], ...], plain: float = 1.0
+) -> Floats:
+    """T (ny, n) of δy = T δx: `plain` for each plain state, and q (0, δr)/2 for each quaternion."""
+    firsts = {indices[0]: indices for indices in quaternions}
+    rest = {i for indices in quaternions for i in indices}
+    result = np.zeros((len(y), len(y) - len(quaternions)))
+    column = 0
+    for i in range(len(y)):
+        if i in firsts:
+            a, b, c, d = (0.5 * y[list(firsts[i])]).tolist()
+            block = [[-b, -c, -d], [a, -d, c], [d, a, -b], [-c, b, a]]
+            result[list(firsts[i]), column : column + 3] = block
+            column += 3
+        elif i not in rest:
+            result[i, column] = plain
+            column += 1
+    return result
+
+
+def _deviations(
+    names: tuple[str, ...], quaternions: tuple[tuple[int, int, int, int], ...]
+) -> tuple[str, ...]:
+    """Names of the columns of `tangents`."""
+    firsts = {indices[0] for indices in quaternions}
+    rest = {i for indices in quaternions for i in indices}
+    found: list[str] = []
+    for i, name in enumerate(names):
+        if i in firsts:
+            found += [f"{name.removesuffix('qw')}r{axis}" for axis in "xyz"]
+        elif i not in rest:
+            found.append(name)
+    return tuple(found)
+
+
+def save(linearisation: Linearisation, name: str, path: Path, force: bool = False) -> None:
+    """Write A and B with their names as NumPy's .npz, or as a table if `path` ends in .csv.
+
+    Both hold the `reduced` ones; the .npz also `A_states` and `B_states` by the states themselves,
+    `y` and `u`. Raises `RunError` if `path` cannot be written or holds a foreign file.
+    """
+    least = linearisation.reduced()
+    if path.suffix == ".csv":
+        lines = [f"# eomgen linearisation of {name}: rates of the rows by the columns"]
+        lines.append(",".join(["", *least.state_names, *least.input_names]))
+        for row, numbers in zip(least.state_names, np.hstack([least.A, least.B]), strict=True):
+            lines.append(",".join([row, *map(repr, numbers.tolist())]))
+        write_whole(path, "\n".join(lines) + "\n", force=force)
+        return
+    buffer = io.BytesIO()
+    # Members keep this order: `eomgen` comes first, where it marks the file as ours.
+    np.savez(
+        buffer,
+        eomgen=np.array(FORMAT),
+        name=np.array(name),
+        A=least.A,
+        B=least.B,
+        state_names=np.array(least.state_names, dtype=np.str_),
+        input_names=np.array(least.input_names, dtype=np.str_),
+        states=np.array(linearisation.state_names, dtype=np.str_),
+        A_states=linearisation.A,
+        B_states=linearisation.B,
+        y=linearisation.y,
+        u=linearisation.u,
+        rates=linearisation.rates,
+    )
+    write_whole(path, buffer.getvalue(), force=force)

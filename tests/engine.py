@@ -1,0 +1,133 @@
+"""Scenes compiled by a given route, for tests: as loaded modules, and as programs in 60 digits."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+from eomgen.backends.python import python_module
+from eomgen.build import build_model
+from eomgen.model import Model
+from eomgen.program import from_recursion as recording
+from eomgen.program.program import interpret
+from eomgen.program.route import routed
+from eomgen.program.system import System
+from eomgen.run.module import load_module
+from eomgen.scene.reader import built_in_names, parse_scene, read_scene
+from eomgen.scene.schema import Scene
+
+MP = mpmath.MPContext()
+"""Numbers of this context work in 60 digits, wherever they are."""
+MP.dps = 60
+STEP = MP.mpf(10) ** -20
+"""Of central differences, which are off by its square."""
+
+
+class Digits:
+    """60-digit numbers as scalars of a program."""
+
+    def number(self, value: float) -> Any:
+        """The double itself, exactly."""
+        return MP.mpf(value)
+
+    def call(self, function: str, argument: Any) -> Any:
+        """sin, cos, tan or sqrt."""
+        return getattr(MP, function)(argument)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Engine:
+    """A scene's model, its program by one route, and the module written of it."""
+
+    model: Model
+    system: System
+    source: str
+    module: Any
+
+    def exactly(
+        self,
+        output: str,
+        y: Sequence[Any],
+        u: Mapping[str, Any] | None = None,
+        p: Mapping[str, Any] | None = None,
+        extra: Sequence[Any] = (),
+    ) -> np.ndarray:
+        """An output in 60 digits, in its shape; `extra` are tau or vd, one a velocity."""
+        given = {**self.module.PARAMETERS, **(p or {}), **self.module.INPUTS, **(u or {})}
+        given |= dict(zip(self.module.STATES, y, strict=True))
+        names = self.system.extra.get(output, ())
+        if output not in self.system.tangents:
+            given |= dict(zip(names, extra or [0.0] * len(names), strict=True))
+            return self._run(output, given).reshape(self.system.program.outputs[output].shape)
+        columns = []
+        for i in range(len(names)):  # what is written computes a change along a direction
+            ahead = {name: float(i == j) for j, name in enumerate(names)}
+            columns.append(self._run(output, given | ahead))
+        return np.array(columns, dtype=object).T
+
+    def _run(self, output: str, given: Mapping[str, Any]) -> np.ndarray:
+        inputs = {name: MP.mpf(value) for name, value in given.items()}
+        found = interpret(self.system.program, output, inputs, Digits())
+        return np.array(found, dtype=object)
+
+    def random_state(self, rng: np.random.Generator) -> np.ndarray:
+        """Angles over two turns, slides within 0.6 m, unit quaternions; 3 rad/s, 1 m/s."""
+        reach = {"rad": 2 * np.pi, "m": 0.6, "rad/s": 3.0, "m/s": 1.0, "": 1.0}
+        y = np.array([reach[s.unit] * rng.uniform(-1.0, 1.0) for s in self.system.states])
+        for indices in map(list, self.module.QUATERNIONS):
+            parts = rng.normal(size=4)
+            y[indices] = parts / np.linalg.norm(parts)
+        return y
+
+    def random_inputs(self, rng: np.random.Generator) -> dict[str, float]:
+        """A value for every input."""
+        return {name: float(rng.uniform(-9.0, 9.0)) for name in self.module.INPUTS}
+
+
+def read(scene: str) -> Scene:
+    """A built-in scene by its name, or one from its text."""
+    return read_scene(scene) if scene in built_in_names() else parse_scene(scene)
+
+
+@cache
+def engine(
+    scene: str, route: str = "", *, leave_out: tuple[str, ...] = (), tangents: bool = False
+) -> Engine:
+    """Compile a scene with all outputs but some, by a route or by its own.
+
+    `tangents`: as large models have it, no matrix of derivatives is written out.
+    """
+    model = build_model(read(scene).replaced(outputs="all"))
+    outputs = tuple(name for name in model.outputs if name not in leave_out)
+    model = replace(model, outputs=outputs, route=route or model.route)
+    with pytest.MonkeyPatch.context() as patch:
+        if tangents:
+            patch.setattr(recording, "LARGEST_JACOBIAN", -1)
+        system = routed(model).system
+    source = python_module(system)
+    return Engine(model, system, source, load_module(source, f"tested_{model.name}"))
+
+
+def exact(values: Any) -> np.ndarray:
+    """Doubles as 60-digit numbers."""
+    array = np.asarray(values)
+    return np.array([MP.mpf(x) for x in array.ravel()], dtype=object).reshape(array.shape)
+
+
+def along(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """The derivative of f at x in a direction: a central difference, some 40 digits."""
+    return (f(x + STEP * way) - f(x - STEP * way)) / (2 * STEP)
+
+
+def apart(actual: Any, expected: Any, *terms: Any) -> float:
+    """Greatest difference, relative to the greatest value, of terms too if given, or to 1."""
+    actual, expected = np.asarray(actual), np.asarray(expected)
+    assert actual.shape == expected.shape, f"{actual.shape} is not {expected.shape}"
+    sizes = (np.max(np.abs(x), initial=0) for x in (expected, *(np.asarray(t) for t in terms)))
+    difference = np.max(np.abs(actual - expected), initial=0)
+    assert difference == difference, "not a number"
+    return float(difference / max(1, *sizes))

@@ -1,0 +1,235 @@
+"""What MuJoCo and Pinocchio say of a `SpatialTree`; neither is imported before it is asked.
+
+Both take and give the scene language's conventions: linear velocities of free bodies in world axes,
+angular ones and those of balls in the body's axes, quaternions w, x, y, z. The plane is motion in
+space: its free body has two slides and a hinge.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from spatial_trees import PLANE, SpatialTree, TreeJoint
+
+Inputs = Mapping[str, float] | None
+Move = tuple[str, tuple[float, ...]]
+
+
+class Unsuitable(Exception):
+    """The judge cannot speak on this tree in this state; the message says why."""
+
+
+def _moves(tree: SpatialTree, joint: TreeJoint) -> list[Move]:
+    """A joint as elementary moves, each in the axes that the one before it left."""
+    axis = joint.axes[0]
+    x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    match joint.kind:
+        case "weld":
+            return []
+        case "revolute":
+            return [("hinge", axis)]
+        case "prismatic":
+            return [("slide", axis)]
+        case "cylindrical":
+            return [("slide", axis), ("hinge", axis)]
+        case "universal":
+            return [("hinge", axis), ("hinge", joint.axes[1])]
+        case "ball":
+            return [("ball", z)]
+        case "free" if tree.dimensions != PLANE:
+            return [("free", z)]
+    return [("slide", x), ("slide", y), ("hinge", z)]
+
+
+# MuJoCo.
+
+
+@dataclass
+class _MuJoCo:
+    """A model, its data, and where it keeps our bodies, coordinates and velocities."""
+
+    model: Any
+    data: Any
+    bodies: list[int]
+    q: list[int]
+    v: list[int]
+
+
+@lru_cache(maxsize=4)
+def _mujoco_model(tree: SpatialTree) -> _MuJoCo:
+    """MuJoCo's model; the frame of a body is at its centre of mass.
+
+    MuJoCo compiles no particle or massless body that moves, and finds principal axes to 1e-12 only.
+    So every body is compiled with mass and inertia 1, away from its frame lest MuJoCo thinks it
+    simple and keeps no room for the rest of its mass matrix, and gets its own numbers afterwards.
+    """
+    import mujoco
+
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = True
+    spec.compiler.eulerseq = "XYZ"  # capitals: about fixed axes
+    spec.option.gravity = tree.gravity_vector()
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    skew = {"ipos": [0.1, 0.2, 0.3], "iquat": [0.5, 0.5, -0.5, 0.5]}
+    made: list[Any] = []
+    for body in tree.bodies:
+        joint = body.joint
+        parent = spec.worldbody if joint.parent < 0 else made[joint.parent]
+        own = parent.add_body(name=body.name, mass=1.0, inertia=[1.0, 1.0, 1.0], **skew)
+        own.alt.type = mujoco.mjtOrientation.mjORIENTATION_EULER
+        own.alt.euler = joint.orientation_deg
+        own.pos = joint.r_parent  # less the turned r_child; see below
+        for i, (kind, axis) in enumerate(_moves(tree, joint)):
+            own.add_joint(
+                name=f"{joint.name}_{i}",
+                type=getattr(mujoco.mjtJoint, f"mjJNT_{kind.upper()}"),
+                axis=axis,
+                pos=joint.r_child,
+                armature=joint.armature,
+            )
+        made.append(own)
+    model = spec.compile()
+    own_bodies, own_q, own_v = [], [], []
+    for body in tree.bodies:
+        k = model.body(body.name).id
+        own_bodies.append(k)
+        shift = np.zeros(3)
+        mujoco.mju_rotVecQuat(shift, np.array(body.joint.r_child), model.body_quat[k])
+        model.body_pos[k] -= shift
+        moments, axes = np.linalg.eigh(body.inertia_matrix)
+        axes[:, 0] *= np.linalg.det(axes)
+        model.body_mass[k], model.body_inertia[k] = body.mass, moments
+        model.body_ipos[k] = 0.0
+        mujoco.mju_mat2Quat(model.body_iquat[k], axes.ravel())
+        if body.joint.coordinates:
+            first, dof = model.jnt_qposadr[model.body_jntadr[k]], model.body_dofadr[k]
+            own_q += [first + i for i in range(len(body.joint.coordinates))]
+            own_v += [dof + i for i in range(len(body.joint.velocities))]
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    return _MuJoCo(model, data, own_bodies, own_q, own_v)
+
+
+def _mujoco_run(tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Inputs) -> _MuJoCo:
+    """MuJoCo after forward dynamics; q and v mean the same there, in another order."""
+    import mujoco
+
+    made = _mujoco_model(tree)
+    model, data = made.model, made.data
+    mujoco.mj_resetData(model, data)
+    data.qpos[made.q], data.qvel[made.v] = q, v
+    data.qfrc_applied[made.v] = tree.torques(u)
+    if tree.push is not None:
+        k, at = made.bodies[tree.push[0]], tree.push[1]
+        mujoco.mj_kinematics(model, data)
+        arm, force = data.xmat[k].reshape(3, 3) @ at, tree.push_force(u)
+        data.xfrc_applied[k] = [*force, *np.cross(arm, force)]
+    warnings: list[str] = []
+    mujoco.set_mju_user_warning(warnings.append)  # in place of MUJOCO_LOG.TXT
+    mujoco.mj_forward(model, data)
+    mujoco.set_mju_user_warning(None)
+    if warnings or not np.isfinite(data.qacc).all():
+        raise Unsuitable(f"{tree.name}: MuJoCo warns: {warnings}")
+    return made
+
+
+def mujoco_accelerations(
+    tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Inputs = None
+) -> np.ndarray:
+    """Rates of the velocities `v`, in their order. Raises `Unsuitable` if MuJoCo warns."""
+    made = _mujoco_run(tree, q, v, u)
+    return made.data.qacc[made.v]
+
+
+def mujoco_wrenches(
+    tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Inputs = None
+) -> np.ndarray:
+    """Force and moment of each of the tree's `joints` on its parent, as the scene language has it.
+
+    At the joint's point on the child, in world axes, (nj, 6) in the plane too.
+    """
+    import mujoco
+
+    made = _mujoco_run(tree, q, v, u)
+    model, data = made.model, made.data
+    mujoco.mj_rnePostConstraint(model, data)
+    wrenches = []
+    for body, k in zip(tree.bodies, made.bodies, strict=True):
+        if body.joint.kind != "free":
+            moment, force = data.cfrc_int[k, :3], data.cfrc_int[k, 3:]  # on the child, at `about`
+            about = data.subtree_com[model.body_rootid[k]]
+            point = data.xpos[k] + data.xmat[k].reshape(3, 3) @ body.joint.r_child
+            wrenches.append([*-force, *-(moment + np.cross(about - point, force))])
+    return np.array(wrenches).reshape(-1, 6)
+
+
+# Pinocchio.
+
+
+@lru_cache(maxsize=4)
+def _pinocchio_model(tree: SpatialTree) -> Any:
+    """Pinocchio's model, and for each body its joint there and its centre of mass in that.
+
+    A joint of several moves is as many joints with massless bodies between them; a welded body is
+    a part of the body it is welded to.
+    """
+    import pinocchio as pin
+
+    model = pin.Model()
+    model.gravity.linear = tree.gravity_vector()
+    makers = {
+        "hinge": lambda axis: pin.JointModelRevoluteUnaligned(np.array(axis)),
+        "slide": lambda axis: pin.JointModelPrismaticUnaligned(np.array(axis)),
+        "ball": lambda axis: pin.JointModelSpherical(),
+        "free": lambda axis: pin.JointModelFreeFlyer(),
+    }
+    armature: list[float] = []
+    held: list[tuple[int, Any]] = []
+    for body in tree.bodies:
+        joint = body.joint
+        at, frame = (0, pin.SE3.Identity()) if joint.parent < 0 else held[joint.parent]
+        turned = pin.rpy.rpyToMatrix(*np.radians(joint.orientation_deg))
+        frame = frame * pin.SE3(turned, np.array(joint.r_parent))
+        for i, (kind, axis) in enumerate(_moves(tree, joint)):
+            at = model.addJoint(at, makers[kind](axis), frame, f"{joint.name}_{i}")
+            frame = pin.SE3.Identity()
+            armature += [joint.armature] * model.joints[at].nv
+        frame = frame * pin.SE3(np.eye(3), -np.array(joint.r_child))
+        inertia = pin.Inertia(body.mass, np.zeros(3), body.inertia_matrix)
+        model.appendBodyToJoint(at, inertia, frame)
+        held.append((at, frame))
+    model.armature = np.array(armature)
+    return model, model.createData(), held
+
+
+def pinocchio_accelerations(
+    tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Inputs = None
+) -> np.ndarray:
+    """Rates of the velocities `v`, in their order, by the articulated-body algorithm."""
+    import pinocchio as pin
+
+    model, data, held = _pinocchio_model(tree)
+    q, v = np.array(q, float), np.array(v, float)
+    free = []  # where a free body's velocities are, and its rotation
+    for body, at, rate in zip(tree.bodies, tree.q_slices(), tree.v_slices(), strict=True):
+        if at.stop - at.start > rate.stop - rate.start:
+            last = slice(at.stop - 4, at.stop)
+            q[last] = np.roll(q[last], -1)
+            if body.joint.kind == "free":
+                linear = slice(rate.start, rate.start + 3)
+                rotation = pin.Quaternion(q[last]).matrix()
+                free.append((linear, slice(linear.stop, linear.stop + 3), rotation))
+                v[linear] = rotation.T @ v[linear]
+    pin.forwardKinematics(model, data, q)
+    forces = [pin.Force.Zero() for _ in range(model.njoints)]
+    if tree.push is not None:
+        k, place = tree.push
+        at, frame = held[k]
+        force = data.oMi[at].rotation.T @ tree.push_force(u)
+        forces[at] = pin.Force(force, np.cross(frame.act(np.array(place)), force))
+    found = pin.aba(model, data, q, v, tree.torques(u), forces).copy()
+    for linear, angular, rotation in free:
+        found[linear] = rotation @ (found[linear] + np.cross(v[angular], v[linear]))
+    return found

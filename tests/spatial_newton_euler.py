@@ -1,0 +1,349 @@
+"""A numeric solver of trees in space that shares nothing with eomgen: one linear system.
+
+The unknowns are the accelerations of every body's centre of mass, every body's angular
+acceleration, and one multiplier for each direction that a joint blocks. The equations are Newton's
+and Euler's for every body and the second time derivative of every blocked direction. A direction is
+blocked by one of two kinds of equation, n fixed in the parent and m in the child:
+
+    n · (joint's point on the child - joint's point on the parent) = 0        n · m = constant
+
+Nothing is eliminated and no mass matrix is formed. The plane is motion in space with z = 0.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from spatial_trees import PLANE, SpatialTree, TreeJoint
+
+CHILD, PARENT = slice(0, 6), slice(6, 12)
+"""Where a row has the accelerations (linear, angular) of the child and of the parent."""
+
+
+@dataclass(frozen=True)
+class SpatialMotion:
+    """What the solver finds, in the shapes and axes of a generated module's outputs.
+
+    `accelerations` (nv,) are the rates of the velocities, `rates` (nq,) those of the coordinates.
+    In the plane | in space: `body_poses` (nb, 3) x, y, angle | (nb, 3, 4) rotation and place;
+    `body_velocities` (nb, 3) | (nb, 6), `body_accelerations` alike: linear of the centre of mass,
+    then angular, world axes; `momentum` (3,) | (6,) about the world's origin, of the bodies alone;
+    `centre_of_mass`, `point_positions`, `point_velocities` with 2 | 3 components.
+
+    `joint_forces` (nj, 3) | (nj, 6), one for each of the tree's `joints`: force and moment of the
+    whole wrench that the joint puts on its parent, at the joint's point on the child, world axes.
+    It is what the child and all it carries need to move as they do, turned round: reactions of
+    blocked directions, the motor's torque and the rotor's inertia torque (-armature q̈ on the child)
+    included. Along a free direction the wrench on the child is hence torque - armature q̈.
+
+    `kinetic_energy` has the rotors' ½ armature q̇². `external_power` is that of push and motor;
+    `external_wrench` (6,), about the world's origin, is all that acts from outside: gravity, the
+    push, and the joints of the world.
+    """
+
+    accelerations: np.ndarray
+    rates: np.ndarray
+    body_poses: np.ndarray
+    body_velocities: np.ndarray
+    body_accelerations: np.ndarray
+    joint_forces: np.ndarray
+    kinetic_energy: float
+    potential_energy: float
+    momentum: np.ndarray
+    centre_of_mass: np.ndarray
+    point_positions: np.ndarray
+    point_velocities: np.ndarray
+    external_power: float
+    external_wrench: np.ndarray
+
+
+@dataclass
+class _Body:
+    """Where a body is and how it moves, in world axes; `angle` has a meaning in the plane alone."""
+
+    place: np.ndarray
+    axes: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    angle: float = 0.0
+
+
+def solve(
+    tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Mapping[str, float] | None = None
+) -> SpatialMotion:
+    """Everything about the tree at coordinates `q`, velocities `v` and inputs `u` by name."""
+    n = len(tree.bodies)
+    still = _Body(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+    moving: list[_Body] = []
+    pairs: list[_Pair] = []
+    for body, at, rate in zip(tree.bodies, tree.q_slices(), tree.v_slices(), strict=True):
+        base = still if body.joint.parent < 0 else moving[body.joint.parent]
+        pairs.append(_Pair(tree, body.joint, base, q[at], v[rate]))
+        moving.append(pairs[-1].child)
+
+    blocked = [pair.blocked() for pair in pairs]
+    free = [pair.free() for pair in pairs]
+    ends = 6 * n + np.cumsum([0] + [len(rows) for rows, _ in blocked])
+    matrix, right = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
+    inertias: list[np.ndarray] = []
+    outside = np.zeros(6)
+    for k, (body, moved) in enumerate(zip(tree.bodies, moving, strict=True)):
+        inertia = moved.axes @ body.inertia_matrix @ moved.axes.T
+        inertias.append(inertia)
+        weight = body.mass * tree.gravity_vector()
+        linear, angular = slice(6 * k, 6 * k + 3), slice(6 * k + 3, 6 * k + 6)
+        matrix[linear, linear], matrix[angular, angular] = body.mass * np.eye(3), inertia
+        right[linear], right[angular] = weight, -_cross(moved.spin, inertia @ moved.spin)
+        outside += [*weight, *_cross(moved.place, weight)]
+    torques = tree.torques(u)
+    power = float(torques @ v)
+    if tree.push is not None:
+        k, at = tree.push
+        arm, force = moving[k].axes @ at, tree.push_force(u)
+        right[6 * k : 6 * k + 6] += [*force, *_cross(arm, force)]
+        power += float(force @ (moving[k].velocity + _cross(moving[k].spin, arm)))
+        outside += [*force, *_cross(moving[k].place + arm, force)]
+    for k, (body, rate) in enumerate(zip(tree.bodies, tree.v_slices(), strict=True)):
+        parent = body.joint.parent
+        touched = [*range(6 * k, 6 * k + 6), *range(6 * parent, 6 * parent + 6)]
+        if parent < 0:
+            del touched[6:]
+        rows, lack = blocked[k][0][:, : len(touched)], blocked[k][1]
+        own = np.arange(ends[k], ends[k + 1])
+        matrix[np.ix_(own, touched)], matrix[np.ix_(touched, own)] = rows, -rows.T
+        right[own] = -lack
+        rows, lack = free[k][0][:, : len(touched)], free[k][1]
+        matrix[np.ix_(touched, touched)] += body.joint.armature * rows.T @ rows
+        right[touched] += rows.T @ (torques[rate] - body.joint.armature * lack)
+
+    found = np.linalg.solve(matrix, right)
+
+    changes = found[: 6 * n].reshape(n, 6)
+    accelerations = np.zeros(len(v))
+    wrenches = np.zeros((n, 6))
+    for k, (body, rate) in enumerate(zip(tree.bodies, tree.v_slices(), strict=True)):
+        rows, lack = free[k]
+        accelerations[rate] = rows[:, CHILD] @ changes[k] + lack
+        if body.joint.parent >= 0:
+            accelerations[rate] += rows[:, PARENT] @ changes[body.joint.parent]
+        along = torques[rate] - body.joint.armature * accelerations[rate]
+        wrench = found[ends[k] : ends[k + 1]] @ blocked[k][0][:, CHILD] + along @ rows[:, CHILD]
+        force, arm = wrench[:3], pairs[k].arm_child
+        wrenches[k] = [*-force, *(_cross(arm, force) - wrench[3:])]
+        if body.joint.parent < 0:
+            outside += [*force, *(_cross(moving[k].place, force) + wrench[3:])]
+    return _report(tree, v, pairs, inertias, changes, accelerations, wrenches, power, outside)
+
+
+class _Pair:
+    """A joint with its two bodies: how the child moves, and what is blocked."""
+
+    def __init__(
+        self, tree: SpatialTree, joint: TreeJoint, base: _Body, q: np.ndarray, v: np.ndarray
+    ) -> None:
+        self.joint, self.base, self.q, self.v = joint, base, q, v
+        plane = tree.dimensions == PLANE
+        self.flat = joint.kind == "planar" or (joint.kind == "free" and plane)
+        about_x, about_y, about_z = np.radians(joint.orientation_deg)
+        turn = _turn((0, 0, 1), about_z) @ _turn((0, 1, 0), about_y) @ _turn((1, 0, 0), about_x)
+        self.frame = base.axes @ turn
+        self.arm_parent = base.axes @ joint.r_parent
+        self.axis = self.frame @ joint.axes[0]
+        slide, slide_rate, spin = np.zeros(3), np.zeros(3), np.zeros(3)
+        turn, angle = np.eye(3), 0.0
+        match joint.kind:
+            case "revolute":
+                turn, spin, angle = _turn(joint.axes[0], q[0]), self.axis * v[0], q[0]
+            case "prismatic":
+                slide, slide_rate = self.axis * q[0], self.axis * v[0]
+            case "cylindrical":
+                slide, slide_rate = self.axis * q[0], self.axis * v[0]
+                turn, spin = _turn(joint.axes[0], q[1]), self.axis * v[1]
+            case "universal":
+                cross = _turn(joint.axes[0], q[0])
+                turn = cross @ _turn(joint.axes[1], q[1])
+                spin = self.axis * v[0] + self.frame @ cross @ joint.axes[1] * v[1]
+            case _ if self.flat:
+                slide, slide_rate = self.frame[:, :2] @ q[:2], self.frame[:, :2] @ v[:2]
+                turn, spin, angle = _turn((0, 0, 1), q[2]), self.frame[:, 2] * v[2], q[2]
+            case "ball":
+                turn = _of_quaternion(q)
+                spin = self.frame @ turn @ v
+            case "free":
+                slide, slide_rate, turn = q[:3], v[:3], _of_quaternion(q[3:])
+                spin = turn @ v[3:]
+        axes = self.frame @ turn
+        self.arm_child = axes @ joint.r_child
+        self.spin = base.spin + spin
+        self.gap, self.gap_rate = slide, slide_rate + _cross(base.spin, slide)
+        place = base.place + self.arm_parent + slide - self.arm_child
+        velocity = base.velocity + _cross(base.spin, self.arm_parent) + self.gap_rate
+        velocity = velocity - _cross(self.spin, self.arm_child)
+        self.child = _Body(place, axes, velocity, self.spin, base.angle + about_z + angle)
+
+    def along(self, n: np.ndarray) -> tuple[np.ndarray, float]:
+        """Second time derivative of n · gap, n fixed in the parent: a row and what it lacks."""
+        row = np.zeros(12)
+        row[CHILD] = [*n, *_cross(self.arm_child, n)]
+        row[PARENT] = [*-n, *-_cross(self.arm_parent + self.gap, n)]
+        inner, outer = self.base.spin, self.spin
+        rest = _whirl(outer, self.arm_child) - _whirl(inner, self.arm_parent)
+        turning = 2 * _cross(inner, n) @ self.gap_rate + _whirl(inner, n) @ self.gap
+        return row, float(n @ rest + turning)
+
+    def between(self, n: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, float]:
+        """The same of n · m, m fixed in the child."""
+        row = np.zeros(12)
+        row[3:6], row[9:12] = _cross(m, n), _cross(n, m)
+        inner, outer = self.base.spin, self.spin
+        rest = n @ _whirl(outer, m) + 2 * _cross(inner, n) @ _cross(outer, m)
+        return row, float(rest + _whirl(inner, n) @ m)
+
+    def blocked(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the directions that the joint blocks, and what they lack to be zero."""
+        kind, axis, own = self.joint.kind, self.axis, self.child.axes
+        x, y, z = self.frame.T
+        beside = np.linalg.svd(axis[None])[2][1:]  # two unit vectors across the axis
+        points, pairs = [], []  # n; n and m
+        match kind:
+            case "weld" | "revolute" | "universal" | "ball":
+                points = [x, y, z]
+            case "prismatic" | "cylindrical":
+                points = [*beside]
+        match kind:
+            case "weld" | "prismatic":
+                pairs = [(x, own[:, 1]), (y, own[:, 2]), (z, own[:, 0])]
+            case "revolute" | "cylindrical":
+                pairs = [(n, own @ self.joint.axes[0]) for n in beside]
+            case "universal":
+                pairs = [(axis, own @ self.joint.axes[1])]
+        if self.flat:
+            points, pairs = [z], [(x, own[:, 2]), (y, own[:, 2])]
+        return _stacked([self.along(n) for n in points] + [self.between(*nm) for nm in pairs])
+
+    def free(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows that give the accelerations of the joint's velocities, and what they lack."""
+        x, y, z = self.frame.T
+        own = self.child.axes
+        match self.joint.kind:
+            case "weld":
+                return _stacked([])
+            case "revolute":
+                return _stacked([self.about(self.axis)])
+            case "prismatic":
+                return _stacked([self.along(self.axis)])
+            case "cylindrical":
+                return _stacked([self.along(self.axis), self.about(self.axis)])
+            case "universal":
+                second = own @ self.joint.axes[1]
+                rest = _cross(self.base.spin, self.axis) * self.v[0]
+                rest += _cross(self.spin, second) * self.v[1]
+                inverse = np.linalg.pinv(np.column_stack([self.axis, second]))
+                return _stacked([self.about(n, rest) for n in inverse])
+            case "ball":
+                rest = _cross(self.spin, self.spin - self.base.spin)
+                return _stacked([self.about(n, rest) for n in own.T])
+            case "free" if not self.flat:
+                rows = np.zeros((6, 12))
+                rows[:3, :3], rows[3:, 3:6] = np.eye(3), own.T
+                return rows, np.zeros(6)
+        return _stacked([self.along(x), self.along(y), self.about(z)])
+
+    def about(self, n: np.ndarray, rest: np.ndarray | None = None) -> tuple[np.ndarray, float]:
+        """n · (angular acceleration of the child less the parent's, less `rest`)."""
+        row = np.zeros(12)
+        row[3:6], row[9:12] = n, -n
+        return row, 0.0 if rest is None else -float(n @ rest)
+
+
+def _report(
+    tree: SpatialTree,
+    v: np.ndarray,
+    pairs: list[_Pair],
+    inertias: list[np.ndarray],
+    changes: np.ndarray,
+    accelerations: np.ndarray,
+    wrenches: np.ndarray,
+    power: float,
+    outside: np.ndarray,
+) -> SpatialMotion:
+    """The results in the shapes of the plane or of space."""
+    moving = [pair.child for pair in pairs]
+    mass = np.array([body.mass for body in tree.bodies])
+    places = np.array([body.place for body in moving])
+    speeds = np.array([[*body.velocity, *body.spin] for body in moving])
+    kinetic = 0.0
+    momentum = np.zeros(6)
+    for m, inertia, body in zip(mass, inertias, moving, strict=True):
+        linear, angular = m * body.velocity, inertia @ body.spin
+        kinetic += 0.5 * (linear @ body.velocity + angular @ body.spin)
+        momentum += [*linear, *(_cross(body.place, linear) + angular)]
+    rates = []
+    for pair, rate in zip(pairs, tree.v_slices(), strict=True):
+        kinetic += 0.5 * pair.joint.armature * float(v[rate] @ v[rate])
+        plain = len(pair.q) - 4 if len(pair.q) > len(pair.v) else len(pair.q)
+        rates += [*pair.v[:plain], *_quaternion_rate(pair.q[plain:], pair.v[plain:])]
+    poses = np.array([np.column_stack([body.axes, body.place]) for body in moving])
+    components, kept = slice(0, 3), [0, 1, 2, 3, 4, 5]
+    if tree.dimensions == PLANE:
+        components, kept = slice(0, 2), [0, 1, 5]
+        poses = np.array([[*body.place[:2], body.angle] for body in moving])
+    arms = [(moving[k], moving[k].axes @ at) for _, k, at in tree.points]
+    held = [k for k, body in enumerate(tree.bodies) if body.joint.kind != "free"]
+    shown = np.array([body.place + arm for body, arm in arms]).reshape(-1, 3)
+    shown_rate = [body.velocity + _cross(body.spin, arm) for body, arm in arms]
+    return SpatialMotion(
+        accelerations=accelerations,
+        rates=np.array(rates),
+        body_poses=poses,
+        body_velocities=speeds[:, kept],
+        body_accelerations=changes[:, kept],
+        joint_forces=wrenches[held][:, kept],
+        kinetic_energy=kinetic,
+        potential_energy=-float(mass @ places @ tree.gravity_vector()),
+        momentum=momentum[kept],
+        centre_of_mass=(mass @ places / mass.sum())[components],
+        point_positions=shown[:, components],
+        point_velocities=np.array(shown_rate).reshape(-1, 3)[:, components],
+        external_power=power,
+        external_wrench=outside,
+    )
+
+
+def _stacked(rows: list[tuple[np.ndarray, float]]) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([row for row, _ in rows]).reshape(-1, 12), np.array([rest for _, rest in rows])
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a × b; `np.cross` takes ten times as long."""
+    (a1, a2, a3), (b1, b2, b3) = a, b
+    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])
+
+
+def _whirl(spin: np.ndarray, arm: np.ndarray) -> np.ndarray:
+    """Second time derivative of a vector that turns steadily."""
+    return _cross(spin, _cross(spin, arm))
+
+
+def _turn(axis: ArrayLike, angle: float) -> np.ndarray:
+    """Rotation about a unit vector, by Rodrigues."""
+    x, y, z = np.asarray(axis, float)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def _of_quaternion(quaternion: np.ndarray) -> np.ndarray:
+    """Rotation of a unit quaternion w, x, y, z."""
+    w, axis = quaternion[0], quaternion[1:]
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return (w * w - axis @ axis) * np.eye(3) + 2 * np.outer(axis, axis) + 2 * w * cross
+
+
+def _quaternion_rate(quaternion: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """½ quaternion ∘ (0, spin), spin in the turned axes; nothing of nothing."""
+    if not len(quaternion):
+        return quaternion
+    w, axis = quaternion[0], quaternion[1:]
+    return 0.5 * np.array([-axis @ spin, *(w * spin + _cross(axis, spin))])

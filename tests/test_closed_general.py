@@ -1,0 +1,472 @@
+"""The closed form of any small tree: what SymPy derives is what the recursions compute."""
+
+import ast
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
+
+import eomgen.derivation.general
+from eomgen.build import build_model
+from eomgen.cli import main
+from eomgen.derivation.general.constraints import about, hat, of_quaternion, state_joints
+from eomgen.derivation.general.derive import GeneralEquations, derive_general
+from eomgen.derivation.general.simplify import gathered, sum_of_squares
+from eomgen.derivation.general.symbols import Ledger, make_symbols, rate
+from eomgen.derivation.general.tell import tell_general
+from eomgen.derivation.recursive.regular import check_regular
+from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
+from eomgen.errors import SceneError
+from eomgen.joints import Free
+from eomgen.model import Model
+from eomgen.pipeline import compile_model
+from eomgen.program.from_general import from_general
+from eomgen.program.from_recursion import Recording, from_recursion
+from eomgen.program.program import interpret
+from eomgen.program.route import routed
+from eomgen.program.system import System
+from eomgen.run.module import load_module
+from eomgen.scene.reader import parse_scene, read_scene
+
+TOLD = ("cart_pole", "furuta_pendulum", "spinning_top", "babyboot", "tumbling_body")
+DYNAMICS = (
+    "forward_dynamics",
+    "inverse_dynamics",
+    "mass_matrix",
+    "velocity_force",
+    "gravity_force",
+    "applied_force",
+)
+DIGITS = 50
+EXACT, ROUNDED = 1e-42, 1e-13
+"""Relative errors: of exact rotations at 50 digits, and of those that doubles only come near to."""
+
+
+class HighPrecision:
+    """Numbers of mpmath as scalars of a program."""
+
+    def number(self, value: float) -> mpmath.mpf:
+        """Exact."""
+        return mpmath.mpf(value)
+
+    def call(self, function: str, argument: mpmath.mpf) -> mpmath.mpf:
+        """By its name in mpmath."""
+        return getattr(mpmath, function)(argument)
+
+
+def values(model: Model, rng: np.random.Generator) -> dict[str, mpmath.mpf]:
+    """A random state, random inputs and forces, at the scene's parameters."""
+    found = {p.name: mpmath.mpf(p.default) for p in model.parameters}
+    for c in (*model.coordinates, *model.velocities, *model.inputs):
+        found[c.name] = mpmath.mpf(float(rng.uniform(-2.0, 2.0)))
+    for indices in model.quaternions:
+        names = [model.coordinates[i].name for i in indices]
+        length = mpmath.sqrt(sum(found[name] ** 2 for name in names))
+        found |= {name: found[name] / length for name in names}
+    for c in model.velocities:
+        for prefix in ("tau", "vd"):
+            found[f"{prefix}__{c.name}"] = mpmath.mpf(float(rng.uniform(-2.0, 2.0)))
+    return found
+
+
+def apart(one: System, other: System, output: str, given: dict[str, mpmath.mpf]) -> float:
+    """Largest difference of an output over its largest entry."""
+    a, b = (interpret(s.program, output, given, HighPrecision()) for s in (one, other))
+    assert len(a) == len(b)
+    size = max(map(abs, b), default=1) or 1
+    return float(max((abs(x - y) for x, y in zip(a, b, strict=True)), default=0) / size)
+
+
+def squared(model: Model) -> Model:
+    """The same tree with axes and orientations along coordinate axes: its rotations are exact.
+
+    In the plane the recursions add angles, and no double is π/2: there nothing is turned at rest.
+    """
+    plane = model.dimensions == PLANE
+    bodies = []
+    for body in model.bodies:
+        joint, changes = body.joint, {}
+        if not isinstance(joint, Free):
+            turned = joint.orientation_deg
+            angles = turned if isinstance(turned, tuple) else (turned,)
+            quarters = tuple(0.0 if plane else 90.0 * round(x / 90.0) for x in angles)
+            changes["orientation_deg"] = quarters if isinstance(turned, tuple) else quarters[0]
+            if getattr(joint, "axis", None) is not None:
+                changes["axis"] = along(np.abs(joint.axis) if plane else joint.axis)
+            if getattr(joint, "axes", None) is not None:
+                first = along(joint.axes[0])
+                rest = [0.0 if a else b for a, b in zip(first, joint.axes[1], strict=True)]
+                changes["axes"] = (first, along(rest))
+            joint = joint.replaced(**changes)
+        bodies.append(replace(body, joint=joint))
+    return replace(model, bodies=tuple(bodies))
+
+
+def along(axis: Sequence[float] | np.ndarray) -> tuple[float, ...]:
+    """The coordinate axis, or its opposite, that is nearest."""
+    k = int(np.argmax(np.abs(axis)))
+    return tuple(float(np.copysign(i == k, axis[k])) if i == k else 0.0 for i in range(len(axis)))
+
+
+@cache
+def tree(seed: int, dimensions: int, most: int) -> Model:
+    """A random tree that asks for all of the dynamics."""
+    model = build_model(parse_scene(random_spatial_tree(seed, dimensions, most)[1]))
+    return replace(model, route="auto", outputs=DYNAMICS)
+
+
+def agree(model: Model, seed: int, error: float) -> None:
+    """Closed form and articulated bodies: every output of the dynamics."""
+    closed = from_general(derive_general(model))
+    aba = from_recursion(Recording(model, "aba"))
+    with mpmath.workdps(DIGITS):
+        given = values(model, np.random.default_rng(seed))
+        for output in ("derivative", *DYNAMICS):
+            assert apart(closed, aba, output, given) < error, output
+
+
+# All but trees with inertias like -I/5, whose quotients the tape must round to doubles.
+SMALL = [(seed, dims, 3) for seed in range(8) for dims in (PLANE, SPACE)]
+QUARTERS = [(9, PLANE, 3), (22, PLANE, 3)]
+FIVE = [(seed, dims, 5) for seed in (2, 6, 11) for dims in (PLANE, SPACE)]
+
+
+@pytest.mark.parametrize(("seed", "dimensions", "most"), [*SMALL, *FIVE])
+def test_closed_is_aba_at_50_digits(seed: int, dimensions: int, most: int) -> None:
+    """Every joint type, rotations that are exact: to all digits but a few."""
+    model = squared(tree(seed, dimensions, most))
+    try:
+        check_regular(model)
+    except SceneError:
+        pytest.skip("moved onto one axis, a massless body has nothing left to resist it")
+    agree(model, seed, EXACT)
+
+
+@pytest.mark.parametrize(("seed", "dimensions", "most"), [*SMALL[1:8:2], *QUARTERS, *FIVE[4:]])
+def test_closed_is_aba_about_any_axis(seed: int, dimensions: int, most: int) -> None:
+    """Axes and orientations that no double is exactly: to what they are rounded to."""
+    agree(tree(seed, dimensions, most), seed, ROUNDED)
+
+
+def test_the_trees_are_of_every_kind() -> None:
+    """All joints, massless bodies, rotors, several trees, inputs, five bodies."""
+    models = [tree(*case) for case in (*SMALL, *FIVE)]
+    bodies = [body for model in models for body in model.bodies]
+    kinds = {"weld", "revolute", "prismatic", "cylindrical", "universal", "planar", "ball", "free"}
+    assert {body.joint.type for body in bodies} == kinds
+    masses = [model.value(body.mass) for model in models for body in model.bodies]
+    assert 0.0 in masses
+    assert any(getattr(body.joint, "motor_inertia", None) for body in bodies)
+    assert any(sum(body.parent < 0 for body in model.bodies) > 1 for model in models)
+    assert any(model.inputs for model in models)
+    assert max(len(model.bodies) for model in models) == 5
+
+
+@cache
+def scene(name: str) -> GeneralEquations:
+    """A built-in scene's equations."""
+    return derive_general(replace(build_model(read_scene(name)), route="auto"))
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_built_in_scenes(name: str) -> None:
+    """They too, exactly; and their Jacobian."""
+    equations = scene(name)
+    closed = from_general(equations)
+    aba = from_recursion(Recording(equations.model, "aba"))
+    with mpmath.workdps(DIGITS):
+        given = values(equations.model, np.random.default_rng(1))
+        for output in ("derivative", "jacobian", *DYNAMICS):
+            assert apart(closed, aba, output, given) < EXACT, output
+
+
+# What is published.
+
+
+def accelerations(equations: GeneralEquations) -> list[sp.Expr]:
+    """v̇ with all definitions put in, without forces beside the effects."""
+    s, definitions = equations.symbols, equations.solution.definitions
+    found = []
+    for a in s.a:
+        e = definitions[a]
+        while not e.free_symbols.isdisjoint(definitions):
+            e = e.xreplace(definitions)
+        found.append(e.xreplace(dict.fromkeys(s.tau, sp.Integer(0))))
+    return found
+
+
+def named(equations: GeneralEquations, names: str) -> list[sp.Expr]:
+    """Symbols by name."""
+    s = equations.symbols
+    known = {x.name: x for x in (*s.parameters.values(), *s.inputs.values(), *s.q, *s.v)}
+    return [known[name] for name in names.split()]
+
+
+def test_cart_pole_as_published() -> None:
+    """R. Tedrake, Underactuated Robotics, chapter 3: a particle on a massless rod."""
+    equations = scene("cart_pole")
+    mc, mp, inertia, length, g, f, theta, rate_ = named(
+        equations, "m_cart m_pole I_pole l g push theta theta_dot"
+    )
+    sin, cos = sp.sin(theta), sp.cos(theta)
+    terms = equations.balance
+    assert terms.M.subs(inertia, 0) == sp.Matrix(
+        [[mc + mp, mp * length * cos], [mp * length * cos, mp * length**2]]
+    )
+    assert sp.Matrix([-mp * length * sin * rate_**2, 0]) == terms.V
+    assert sp.Matrix([0, mp * g * length * sin]) == terms.G
+    assert sp.Matrix([f, 0]) == terms.F
+    below = mc + mp * sin**2
+    published = [
+        (f + mp * sin * (length * rate_**2 + g * cos)) / below,
+        (-f * cos - mp * length * rate_**2 * cos * sin - (mc + mp) * g * sin) / (length * below),
+    ]
+    for found, expected in zip(accelerations(equations), published, strict=True):
+        assert sp.simplify(found.subs(inertia, 0) - expected) == 0
+
+
+def test_furuta_pendulum_as_published() -> None:
+    """B. S. Cazzolato and Z. Prime, On the Dynamics of the Furuta Pendulum, J. Control Sci. Eng.
+    (2011), (33), (34): slender links, without friction; here with the motor's rotor.
+    """
+    equations = scene("furuta_pendulum")
+    m1, l1, m2, l2, rotor, gear, g, tau, phi, w1, w2 = named(
+        equations,
+        "m_arm l_arm m_pendulum l_pendulum J_rotor gear g tau phi theta_dot phi_dot",
+    )
+    sin, cos = sp.sin(phi), sp.cos(phi)
+    arm = m1 * l1**2 / 3 + rotor * gear**2  # Ĵ₁
+    pendulum = m2 * l2**2 / 3  # Ĵ₂
+    root = arm + m2 * l1**2  # Ĵ₀
+    half = l2 / 2
+    M = sp.Matrix(
+        [
+            [root + pendulum * sin**2, m2 * l1 * half * cos],
+            [m2 * l1 * half * cos, pendulum],
+        ]
+    )
+    V = sp.Matrix(
+        [
+            w1 * w2 * sp.sin(2 * phi) * pendulum - m2 * l1 * half * sin * w2**2,
+            -(w1**2) * sp.sin(2 * phi) * pendulum / 2,
+        ]
+    )
+    G = sp.Matrix([0, g * m2 * half * sin])
+    F = sp.Matrix([tau, 0])
+    terms = equations.balance
+    for found, expected in ((terms.M, M), (terms.V, V), (terms.G, G), (terms.F, F)):
+        assert (found - expected).applyfunc(sp.simplify).is_zero_matrix
+    residual = M * sp.Matrix(accelerations(equations)) + V + G - F
+    s, c = sp.symbols("s c")
+    for row in residual:
+        top = sp.fraction(sp.together(sp.expand_trig(row).xreplace({sin: s, cos: c})))[0]
+        assert sp.reduced(sp.expand(top), [c**2 + s**2 - 1], c)[1] == 0
+
+
+def test_tumbling_body_is_eulers() -> None:
+    """I₁ ω̇₁ = (I₂ - I₃) ω₂ ω₃ and so on, and no force on its centre."""
+    equations = scene("tumbling_body")
+    i1, i2, i3, x, y, z = named(equations, "I_1 I_2 I_3 nut_wx nut_wy nut_wz")
+    euler = [(i2 - i3) * y * z / i1, (i3 - i1) * z * x / i2, (i1 - i2) * x * y / i3]
+    for found, expected in zip(accelerations(equations), [0, 0, 0, *euler], strict=True):
+        assert sp.simplify(found - expected) == 0
+
+
+# What the solution divides by.
+
+
+def is_positive(expression: sp.Expr, given: dict[sp.Expr, sp.Expr], masses: set[str]) -> bool:
+    """Built of masses, moments and even powers by sums, products and quotients alone."""
+    e = given.get(expression, expression)
+    if e.is_Number:
+        return bool(e > 0)
+    if e.is_Symbol:
+        return e.name in masses
+    if e.is_Add or e.is_Mul:
+        return all(is_positive(part, given, masses) for part in e.args)
+    if e.is_Pow and e.exp.is_Integer:
+        return e.exp % 2 == 0 or is_positive(e.base, given, masses)
+    return False
+
+
+@pytest.mark.parametrize("case", [*TOLD, *SMALL[:12:2], *SMALL[11:16:2]], ids=str)
+def test_pivots_are_sums_of_weighted_squares(case: str | tuple[int, int, int]) -> None:
+    """No pivot is a difference; weights of rotation are those of LᵀDL of a body's inertia."""
+    equations = scene(case) if isinstance(case, str) else derive_general(tree(*case))
+    model, definitions = equations.model, dict(equations.solution.definitions)
+    masses = {p.name for p in model.parameters if "mass" in p.name or "inertia" in p.name}
+    masses |= {symbol.name for symbol in definitions if symbol.name.startswith("weight__")}
+    masses |= {"m", "I"} | {"m_cart", "m_pole", "m_arm", "m_pendulum", "m_A", "m_B", "J_rotor"}
+    masses |= {"I_pole", "I_1", "I_2", "I_3", "I_A", "I_Bx", "I_By", "I_Bz"}
+    definitions = {s: e for s, e in definitions.items() if not s.name.startswith("weight__")}
+    assert equations.solution.pivots or not model.velocities
+    for pivot in equations.solution.pivots:
+        assert is_positive(pivot, definitions, masses), (pivot, definitions.get(pivot))
+
+
+def test_light_cart() -> None:
+    """A cart of a millionth of the pole's mass: no digit is lost where the recursions lose six."""
+    model = build_model(read_scene("cart_pole"))
+    light = {"m_cart": 0.3e-6, "I_pole": 1e-9}
+    model = model.with_parameters(light)
+    exact = from_recursion(Recording(model, "aba"))
+    worst = {}
+    for route in ("closed", "aba"):
+        module = load_module(compile_model(replace(model, route=route)))
+        worst[route] = 0.0
+        rng = np.random.default_rng(5)
+        for _ in range(40):
+            y = rng.uniform(-3.0, 3.0, 4)
+            y[1] = np.pi * rng.integers(0, 2) + 1e-4 * rng.normal()
+            given = {p.name: mpmath.mpf(p.default) for p in model.parameters}
+            given |= dict(zip(module.STATES, map(mpmath.mpf, y.tolist()), strict=True))
+            given["push"] = mpmath.mpf(0)
+            with mpmath.workdps(DIGITS):
+                truth = interpret(exact.program, "derivative", given, HighPrecision())
+            truth = np.array([float(x) for x in truth])
+            error = np.abs(module.derivative(0.0, y) - truth).max() / np.abs(truth).max()
+            worst[route] = max(worst[route], float(error))
+    assert worst["closed"] < 2e-15 < 1e-11 < worst["aba"]
+
+
+# Parts.
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rotations_turn_as_they_are_said_to(seed: int) -> None:
+    """[ω]x = Qᵀ Q', with Q' by the coordinates' own rates, for every joint of a random tree."""
+    model = tree(seed, SPACE, 3)
+    symbols = make_symbols(model)
+    ledger = Ledger(symbols.fixed, 20, 160)
+    rng = np.random.default_rng(seed)
+    numbers = {s: float(rng.uniform(-1, 1)) for s in (*symbols.q, *symbols.v)}
+    for four in model.quaternions:
+        length = np.sqrt(sum(numbers[symbols.q[i]] ** 2 for i in four))
+        for i in four:
+            numbers[symbols.q[i]] /= length
+    coordinates = {*symbols.q}
+    for c in state_joints(model, symbols, ledger):
+        written = c.rotation
+        while not written.free_symbols <= coordinates:
+            written = written.xreplace(ledger.definitions)
+        rates = {s: r for s, r in ledger.rates.items() if s in coordinates}
+        moved = (written.T * rate(written, rates)).xreplace(numbers)
+        turning = hat(c.turning).xreplace(numbers)
+        np.testing.assert_allclose(np.array(moved, float), np.array(turning, float), atol=1e-14)
+
+
+def test_rotations() -> None:
+    """About an axis, and by a quaternion of any length."""
+    angle = sp.Symbol("angle", real=True)
+    axis = sp.Matrix([2, -1, 2]) / 3
+    turn = about(axis, angle)
+    assert (turn * turn.T - sp.eye(3)).applyfunc(sp.simplify).is_zero_matrix
+    assert (turn * axis - axis).applyfunc(sp.simplify).is_zero_matrix
+    quarter = about(sp.Matrix([0, 0, 1]), sp.pi / 2) * sp.Matrix([1, 0, 0])
+    assert quarter == sp.Matrix([0, 1, 0])
+    q = [3, 0, 0, 3]  # a quarter turn about z, far from unit length
+    turned = of_quaternion(q, sp.Rational(2, 18))
+    assert turned == about(sp.Matrix([0, 0, 1]), sp.pi / 2)
+
+
+def test_gathering() -> None:
+    """Pythagoras, constants that cancel, and pivots that are positive at sight."""
+    x, y, arm = sp.symbols("x y arm", real=True)
+    m, i = sp.symbols("m i", positive=True)
+    fixed = {arm, m, i}
+    assert gathered(m * sp.cos(x) ** 2 + m * sp.sin(x) ** 2, fixed) == m
+    assert gathered(arm * y - arm * y * sp.sin(x) ** 2, fixed) == arm * y * sp.cos(x) ** 2
+    d = sp.Symbol("d", positive=True)
+    sums = {d: i + m * arm**2}
+    assert gathered(y - m * arm**2 * y / d, fixed, sums) == i * y / d
+    total = i * sp.cos(x) ** 2 + m * sp.cos(x) ** 2 + m * sp.sin(x) ** 2
+    assert sum_of_squares(total, fixed, {}, 100) == m + i * sp.cos(x) ** 2
+
+
+def test_independent_of_the_recursions() -> None:
+    """Nothing of the derivation comes from the routes that it is to prove."""
+    for path in sorted(Path(eomgen.derivation.general.__file__).parent.glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                assert "recursive" not in str(node.module), path
+                assert not str(node.module).startswith("eomgen.program"), path
+
+
+# Routes, modules, and the derivation told.
+
+
+def test_route_closed_and_auto() -> None:
+    """`closed` takes any small tree; `auto` tries it on few velocities and takes what is least."""
+    for name in TOLD:
+        choice = routed(build_model(read_scene(name)))
+        assert choice.system.route == "closed", name
+    puma = build_model(read_scene("puma560"))
+    assert why_not_closed(puma) == "" and "velocities" not in why_not_tried(puma)
+    assert routed(puma).system.route == "aba"
+    figure = build_model(read_scene("quadruped"))
+    assert why_not_closed(figure).startswith(f"it is for {MOST_GENERAL_BODIES} bodies at most")
+    with pytest.raises(SceneError, match="needs the closed form"):
+        routed(replace(figure, route="closed"))
+    with pytest.raises(SceneError, match="form: 'momentum' needs the closed form"):
+        routed(replace(build_model(read_scene("cart_pole")), form="momentum"))
+
+
+def test_a_module_observes_what_the_recursions_do() -> None:
+    """Energies, places, joint forces and Jacobians of a generated module, in doubles."""
+    drawn, text = random_spatial_tree(1, SPACE, 3)
+    model = replace(build_model(parse_scene(text.replace("outputs =", "# outputs ="))))
+    closed, aba = (load_module(compile_model(replace(model, route=r))) for r in ("closed", "aba"))
+    rng = np.random.default_rng(3)
+    q, v = random_state(drawn, rng)
+    y = np.empty(len(closed.STATES))
+    y[drawn.places(closed.STATES)] = [*q, *v]
+    u = drawn.random_inputs(rng)
+    for output in ("derivative", "jacobian", *model.outputs):
+        if output in ("forward_dynamics", "inverse_dynamics"):
+            continue
+        a, b = (getattr(module, output)(0.0, y, None, u) for module in (closed, aba))
+        np.testing.assert_allclose(a, b, rtol=1e-10, atol=1e-10, err_msg=output)
+    doubled = y.copy()
+    for four in closed.QUATERNIONS:
+        doubled[list(four)] *= 2.0
+    names = [s for s in closed.STATES if s.endswith(("_dot", "_wx", "_wy", "_wz"))]
+    rows = [closed.STATES.index(name) for name in names]
+    np.testing.assert_allclose(
+        closed.derivative(0.0, doubled, None, u)[rows],
+        closed.derivative(0.0, y, None, u)[rows],
+        rtol=1e-11,
+        atol=1e-11,
+    )
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_every_symbol_is_told(name: str) -> None:
+    """What stands on the right of an equation is given, or stands on the left of one before."""
+    equations = scene(name)
+    s = equations.symbols
+    known = {x.name for x in (*s.parameters.values(), *s.inputs.values(), *s.q)}
+    steps = tell_general(equations)
+    assert steps[-1].title == "Closed form"
+    for step in steps:
+        for equation in step.equations:
+            used = {x.name for x in equation.right.free_symbols}
+            assert not any("__" in x for x in (*used, equation.left.name))
+            if step.title == "State":
+                known |= used
+            assert used <= known, (step.title, equation.left, used - known)
+            known.add(equation.left.name)
+
+
+@pytest.mark.parametrize("format_", ["text", "latex", "html"])
+def test_derive(format_: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The command writes it in every format."""
+    assert main(["derive", "furuta_pendulum", "--format", format_]) == 0
+    text = capsys.readouterr().out
+    for words in ("Joint hinge: revolute, arm to pendulum", "Virtual power", "Closed form"):
+        assert words in text

@@ -1,0 +1,340 @@
+"""Linearisation, equilibria, modes: against textbooks and closed forms."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from eomgen.build import build_model
+from eomgen.cli import main
+from eomgen.errors import RunError
+from eomgen.pipeline import compile_model
+from eomgen.run.integrate import integrate
+from eomgen.run.module import GeneratedModule, as_problem, load_module
+from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.scene.schema import SHOWN
+from eomgen.study.equilibrium import equilibrium
+from eomgen.study.linearise import linearise
+from eomgen.study.modes import controllable_rank, modes, stability
+
+
+@cache
+def module_of(scene: str, text: str = "", outputs: bool = True) -> GeneratedModule:
+    """The module of a built-in scene, or of a text; by `aba`, which is quick to derive."""
+    model = build_model(parse_scene(text) if text else read_scene(scene))
+    wanted = ("input_jacobian",) if outputs and model.inputs else ()
+    model = replace(model, outputs=(*SHOWN, *wanted), route="aba")
+    return load_module(compile_model(model), scene)
+
+
+def accelerations(module: GeneratedModule, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """v̇ of the state."""
+    return module.derivative(0.0, y, None, u)[len(module.POSITIONS) :]
+
+
+def test_cart_and_pole_as_in_textbooks() -> None:
+    """Upright, from a bad guess: A and B as Franklin, Powell, Emami-Naeini have them, rank 4."""
+    module = module_of("cart_pole")
+    p = module.PARAMETERS
+    m, cart, inertia, arm, g = (p[name] for name in ("m_pole", "m_cart", "I_pole", "l", "g"))
+    found = equilibrium(module, np.array([0.7, 2.6, 0.3, -1.0]))
+    np.testing.assert_allclose(found.y, [0.7, math.pi, 0.0, 0.0], atol=1e-12)
+    linear = linearise(module, found.y)
+    assert linear.state_names == ("x", "theta", "x_dot", "theta_dot")
+    assert linear.input_names == ("push",)
+    total = inertia * (m + cart) + cart * m * arm**2
+    a = np.zeros((4, 4))
+    a[0, 2] = a[1, 3] = 1.0
+    a[2, 1] = m**2 * arm**2 * g / total
+    a[3, 1] = m * g * arm * (m + cart) / total
+    b = np.array([[0.0], [0.0], [inertia + m * arm**2], [m * arm]]) / total
+    np.testing.assert_allclose(linear.A, a, atol=1e-12)
+    np.testing.assert_allclose(linear.B, b, atol=1e-12)
+    assert linear.reduced() is linear
+    found_modes = modes(linear.A)
+    assert stability(found_modes) == "unstable"
+    assert found_modes[0].rate == pytest.approx(math.sqrt(a[3, 1]))
+    assert controllable_rank(linear.A, linear.B) == 4
+
+
+def test_normal_modes_of_a_double_pendulum() -> None:
+    """Both frequencies of the hanging acrobot from the quadratic of M ω² = K, absolute angles."""
+    module = module_of("acrobot")
+    p = module.PARAMETERS
+    m_1, m_2, i_1, i_2 = (p[name] for name in ("m_1", "m_2", "I_1", "I_2"))
+    l_1, c_1, c_2, g = (p[name] for name in ("l_1", "c_1", "c_2", "g"))
+    m_11, m_12, m_22 = i_1 + m_1 * c_1**2 + m_2 * l_1**2, m_2 * l_1 * c_2, i_2 + m_2 * c_2**2
+    k_1, k_2 = (m_1 * c_1 + m_2 * l_1) * g, m_2 * c_2 * g
+    a, b, c = m_11 * m_22 - m_12**2, -(m_11 * k_2 + m_22 * k_1), k_1 * k_2
+    squares = [(-b - sign * math.sqrt(b**2 - 4 * a * c)) / (2 * a) for sign in (1, -1)]
+    resting = equilibrium(module, module.initial_state(), settle=True)
+    found = modes(linearise(module, resting.y).A)
+    assert stability(found) == "marginal"
+    assert [mode.turn for mode in found] == pytest.approx(np.sqrt(squares), rel=1e-10)
+    assert [mode.damping for mode in found] == [0.0, 0.0]
+    assert found[0].frequency == pytest.approx(math.sqrt(squares[0]) / (2 * math.pi))
+
+
+def test_a_hanging_chain_has_the_roots_of_laguerre() -> None:
+    """Ten equal beads on massless links: ω² = (g/l) x over the roots of L_10(x)."""
+    text = """
+    name = "beads"
+    effects = [{ type = "gravity", g = 9.81 }]
+    [[chains]]
+    name = "bead"
+    count = 10
+    mass = 0.3
+    inertia_com = 0
+    r_parent = [0, 0]
+    r_child = [-0.2, 0]
+    """
+    module = module_of("beads", text)
+    start = np.random.default_rng(7).uniform(-1.0, 1.0, 20)
+    resting = equilibrium(module, start, settle=True)
+    np.testing.assert_allclose(resting.y[0], -math.pi / 2, atol=1e-9)
+    np.testing.assert_allclose(resting.y[1:], 0.0, atol=1e-9)
+    roots = np.polynomial.laguerre.lagroots([0.0] * 10 + [1.0])
+    turns = [mode.turn for mode in modes(linearise(module, resting.y).A)]
+    np.testing.assert_allclose(turns, np.sqrt(9.81 / 0.2 * roots), rtol=1e-8)
+
+
+@pytest.mark.parametrize("scene", ["cart_pole", "acrobot", "furuta_pendulum", "spinning_top"])
+def test_equilibria_from_bad_guesses(scene: str) -> None:
+    """Twenty wild ones each: at rest, cyclic coordinates untouched; settled, never unstable."""
+    module = module_of(scene)
+    rng = np.random.default_rng(11)
+    for _ in range(20):
+        guess = rng.uniform(-6.0, 6.0, len(module.STATES))
+        for settle in (False, True):
+            y, u = equilibrium(module, guess, settle=settle)
+            assert np.max(np.abs(accelerations(module, y, u))) < 1e-8
+            assert not y[len(module.POSITIONS) :].any()
+            if settle:
+                assert stability(modes(linearise(module, y).reduced().A)) == "marginal"
+            elif scene in ("cart_pole", "furuta_pendulum"):
+                assert abs(y[0] - guess[0]) < 1e-12
+
+
+def test_the_nearest_equilibrium_is_near() -> None:
+    """Half a radian away from either, a pendulum's is found without passing over others."""
+    module = module_of("acrobot")
+    for upright in (0.0, math.pi):
+        for turn in (-0.5, 0.5):
+            y, _ = equilibrium(module, np.array([upright + turn, 0.0, 0.0, 0.0]))
+            np.testing.assert_allclose(y, [upright, 0.0, 0.0, 0.0], atol=1e-9)
+
+
+def test_the_hanging_figure_comes_to_rest() -> None:
+    """38 degrees of freedom, 6 quaternions: nothing lowers its centre of mass, nothing grows."""
+    module = module_of("hanging_figure")
+    start = module.initial_state()
+    y, _ = equilibrium(module, start, settle=True)
+    for indices in module.QUATERNIONS:
+        assert np.linalg.norm(y[list(indices)]) == pytest.approx(1.0, abs=1e-15)
+    least = linearise(module, y).reduced()
+    assert least.A.shape == (76, 76) and len(least.state_names) == 76
+    assert {"grip_rx", "grip_ry", "grip_rz"} < set(least.state_names)
+    assert stability(modes(least.A)) == "marginal"
+    rng = np.random.default_rng(3)
+    low = float(module.potential_energy(0.0, y))
+    assert low < module.potential_energy(0.0, start)
+    problem = as_problem(module)
+    for size in (1e-3, 1e-1, 1.0):
+        for _ in range(10):
+            other = y.copy()
+            other[: len(module.POSITIONS)] += size * rng.normal(size=len(module.POSITIONS))
+            assert module.potential_energy(0.0, problem.unit(other)) > low - 1e-9
+
+
+def test_the_sleeping_top() -> None:
+    """Upright it sleeps while I_3 ω > 2 √(I m g h): Goldstein, Classical Mechanics, section 5.7."""
+    module = module_of("spinning_top")
+    p = module.PARAMETERS
+    about_tip = p["I_1"] + p["m"] * p["h"] ** 2
+    critical = 2 * math.sqrt(about_tip * p["m"] * p["g"] * p["h"]) / p["I_3"]
+    for factor, verdict in ((0.99, "unstable"), (1.01, "marginal")):
+        y = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, factor * critical])
+        assert stability(modes(linearise(module, y).reduced().A)) == verdict
+
+
+def test_reduced_linearisation_against_the_motion_itself() -> None:
+    """Neighbours of a top that spins upright, which is steady, part from it as exp(A t) says."""
+    module = module_of("spinning_top")
+    y = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 70.0])
+    a = linearise(module, y).reduced().A
+    problem = as_problem(module)
+
+    def after(start: np.ndarray) -> np.ndarray:
+        moved = replace(problem, initial=start)
+        return integrate(moved, "DOP853", 0.05, rtol=1e-13, atol=1e-15, samples=2).y[-1]
+
+    def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        w, v = a[0] * b[0] - a[1:] @ b[1:], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
+        return np.concatenate([[w], v])
+
+    steady, step = after(y), 1e-5
+    columns = []
+    for i in range(6):
+        ends = []
+        for sign in (1, -1):
+            start = y.copy()
+            if i < 3:
+                turn = np.zeros(4)
+                turn[0], turn[1 + i] = math.cos(step / 2), sign * math.sin(step / 2)
+                start[:4] = times(y[:4], turn)
+            else:
+                start[4 + i - 3] += sign * step
+            end = after(start)
+            conjugate = steady[:4] * [1, -1, -1, -1]
+            turned = 2 * times(conjugate, end[:4])[1:]
+            ends.append(np.concatenate([turned, end[4:] - steady[4:]]))
+        columns.append((ends[0] - ends[1]) / (2 * step))
+    np.testing.assert_allclose(np.array(columns).T, expm(0.05 * a), atol=1e-8)
+
+
+def test_inputs_are_trimmed_and_coordinates_held() -> None:
+    """The elbow motor holds the acrobot with its shoulder at 20 degrees, its mass below the pin."""
+    module = module_of("acrobot")
+    guess = np.array([math.radians(20.0), 0.0, 0.0, 0.0])
+    y, u = equilibrium(module, guess, hold=("theta_1",), trim=("tau",))
+    assert y[0] == guess[0]
+    p = module.PARAMETERS
+    below = p["m_1"] * p["c_1"] + p["m_2"] * p["l_1"]
+    offset = below * math.sin(y[0]) + p["m_2"] * p["c_2"] * math.sin(y[0] + y[1])
+    assert offset == pytest.approx(0.0, abs=1e-10)
+    torque = p["m_2"] * p["c_2"] * p["g"] * math.sin(y[0] + y[1])
+    assert u == pytest.approx([torque], abs=1e-8)
+    np.testing.assert_allclose(accelerations(module, y, u), 0.0, atol=1e-9)
+
+
+def test_messages() -> None:
+    """Each names what is wrong and what to do."""
+    cart, top = module_of("cart_pole"), module_of("spinning_top")
+    falling = module_of("quadruped")
+    cases = [
+        (
+            lambda: equilibrium(falling, falling.initial_state()),
+            "trunk_z_dot still changes by -9.8",
+        ),
+        (lambda: equilibrium(cart, cart.initial_state(), hold=("thta",)), "did you mean 'theta'"),
+        (lambda: equilibrium(cart, cart.initial_state(), trim=("pus",)), "did you mean 'push'"),
+        (lambda: equilibrium(cart, cart.initial_state(), {"push": 1.0}), "no equilibrium"),
+        (lambda: equilibrium(cart, np.full(4, np.nan)), "not finite"),
+        (
+            lambda: equilibrium(cart, cart.initial_state(), trim=("push",), settle=True),
+            "for the nearest",
+        ),
+        (lambda: linearise(cart, np.zeros(3)), "shape"),
+        (lambda: linearise(cart, np.zeros(4), {"pull": 1.0}), "no input 'pull'; known: push"),
+        (lambda: linearise(cart, np.zeros(4), [1.0, 2.0]), "shape"),
+        (lambda: linearise(cart, np.zeros(4), p={"m_cart": -1.0}), "linearise: "),
+        (lambda: linearise(top, np.zeros(7)), "tip_qw on has length 0"),
+        (
+            lambda: linearise(module_of("cart_pole", outputs=False), np.zeros(4)),
+            "--outputs input_jacobian",
+        ),
+    ]
+    for call, text in cases:
+        with pytest.raises(RunError) as error:
+            call()
+        assert text in str(error.value) and "\n" not in str(error.value)
+
+
+def test_modes_and_control_of_plain_matrices() -> None:
+    """An oscillator with damping, an unstable real mode, drift; and what an input cannot reach."""
+    assert modes(np.zeros((0, 0))) == [] and stability([]) == "stable"
+    (mode,) = modes(np.array([[0.0, 1.0], [-4.0, -0.4]]))
+    assert (mode.rate, mode.damping) == pytest.approx((-0.2, 0.1))
+    assert mode.turn == pytest.approx(2 * math.sqrt(1 - 0.01))
+    assert stability([mode]) == "stable"
+    rates = [mode.rate for mode in modes(np.diag([-3.0, 0.0, 2.0]))]
+    assert rates == [2.0, 0.0, -3.0]
+    double = modes(np.array([[0.0, 1.0], [0.0, 0.0]]))
+    assert [(mode.rate, mode.turn) for mode in double] == [(0.0, 0.0)] * 2
+    chain = np.diag([1.0] * 5, k=1)  # six integrators in a row, driven at the end or the start
+    assert controllable_rank(chain, np.eye(6)[:, 5:]) == 6
+    assert controllable_rank(chain, np.eye(6)[:, :1]) == 1
+    twins = np.diag([-1.0, -1.0])
+    assert controllable_rank(twins, np.ones((2, 1))) == 1
+    assert controllable_rank(twins, np.zeros((2, 0))) == 0
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What it prints, and what it writes, which other programs can load."""
+    command = ["linearise", "furuta_pendulum", "--route", "aba"]
+    target = tmp_path / "furuta.npz"
+    assert main([*command, "-o", str(target)]) == 0
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    lines = shown.out.splitlines()
+    assert lines[0] == "furuta_pendulum: linearised about an equilibrium"
+    assert lines[1] == "state       theta = 0, phi = 3.14159 (180 deg)"
+    assert lines[3].split() == ["A", "theta", "phi", "theta_dot", "phi_dot"]
+    assert lines[8].split() == ["B", "tau"]
+    assert "stability   unstable: a small deviation grows" in lines
+    assert "control     rank 4 of 4: controllable" in lines
+    with np.load(target, allow_pickle=False) as kept:
+        assert kept["state_names"].tolist() == ["theta", "phi", "theta_dot", "phi_dot"]
+        assert kept["input_names"].tolist() == ["tau"]
+        assert kept["A"].shape == (4, 4) and kept["B"].shape == (4, 1)
+        a = kept["A"]
+    table = tmp_path / "furuta.csv"
+    for _ in range(2):  # its own file it replaces
+        assert main([*command, "-o", str(table)]) == 0
+    rows = [line.split(",") for line in table.read_text("utf-8").splitlines()[1:]]
+    assert rows[0] == ["", "theta", "phi", "theta_dot", "phi_dot", "tau"]
+    np.testing.assert_array_equal([[float(x) for x in row[1:5]] for row in rows[1:]], a)
+    capsys.readouterr()
+    table.write_text("mine")
+    assert main([*command, "-o", str(table)]) == 1
+    assert "was not written by eomgen" in capsys.readouterr().err
+
+
+def test_the_command_on_quaternions_and_states(capsys: pytest.CaptureFixture[str]) -> None:
+    """Small rotations for quaternions; a notice for one that was scaled; degrees."""
+    options = ["--state", "tip_qw=2", "--state", "tip_qx=0", "--at", "initial"]
+    assert main(["linearise", "spinning_top", "--route", "aba", *options]) == 0
+    shown = capsys.readouterr()
+    assert shown.err.startswith("eomgen: note: spinning_top.toml: --state: the quaternion from")
+    assert "    A       tip_rx  tip_ry  tip_rz  tip_wx  tip_wy  tip_wz" in shown.out
+    assert "control" not in shown.out
+    options = ["--state", "theta_deg=90", "--state", "x_dot=2", "--at", "initial"]
+    assert main(["linearise", "cart_pole", "--route", "aba", *options]) == 0
+    assert "note        no equilibrium: theta_dot changes by -" in capsys.readouterr().out
+    options = ["--state", "theta_1_deg=20", "--hold", "theta_1", "--trim", "tau"]
+    assert main(["linearise", "acrobot", "--route", "aba", *options]) == 0
+    assert "inputs      tau = -5.0277" in capsys.readouterr().out
+
+
+def test_a_figure_is_told_in_short(capsys: pytest.CaptureFixture[str]) -> None:
+    """76 states: no matrix on the screen, lines of at most 100 columns, modes counted."""
+    assert main(["linearise", "hanging_figure", "--at", "rest"]) == 0
+    out = capsys.readouterr().out
+    assert "A is 76 x 76; -o FILE.npz or -o FILE.csv writes them" in out
+    assert "stays, or drifts, " in out and "stability   marginal" in out
+    assert max(map(len, out.splitlines())) <= 100
+
+
+def test_faults_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Exit code 1, one line, what to do."""
+    for words, text in (
+        ("quadruped", "eomgen: quadruped.toml: no equilibrium"),
+        ("cart_pole --state thta=3", "--state: no state 'thta' (did you mean 'theta'?)"),
+        ("cart_pole --state x_dot=3", "an equilibrium is at rest"),
+        ("cart_pole --state theta=up", "gives no finite number"),
+        ("acrobot --set g=1e308", "past all bounds"),
+        ("cart_pole --hold phi", "hold: no coordinate 'phi'; known: x, theta"),
+        ("cart_pole --hold x --at initial", "leave out --at initial"),
+        ("cart_pole --trim tau", "trim: no input 'tau'; known: push"),
+        ("cart_pole --at rest --trim push", "trimmed for the nearest equilibrium only"),
+        (f"cart_pole -o {tmp_path}/a.txt", "ends in .npz or .csv"),
+        ("spinning_top --state tip_qw=0 --state tip_qx=0", "has no length"),
+    ):
+        assert main(["linearise", *words.split(), "--route", "aba"]) == 1, words
+        err = capsys.readouterr().err
+        assert text in err and err.count("\n") == 1, err
+    assert not list(tmp_path.iterdir())

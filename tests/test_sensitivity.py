@@ -1,0 +1,335 @@
+"""Exact derivatives: of v̇ by states, inputs and parameters, and of points by velocities.
+
+What a program says is compared with central differences of its own `derivative` in 60 digits; what
+a module says, with those too, to 1e-12 of the largest entry.
+"""
+
+import numpy as np
+import pytest
+from engine import Engine, along, apart, engine, exact
+from mechanisms import random_tree
+from spatial_trees import random_spatial_tree
+
+from eomgen.scene.schema import OUTPUTS
+
+ROUNDING = 1e-12
+EXACT = 1e-13
+"""For 60 digits; what is left are doubles that should be sines or directions."""
+DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
+
+MACHINE = """
+name = "machine"
+dimensions = 3
+
+[parameters]
+m = 0.8
+l = 0.35
+
+[[bodies]]
+name = "base"
+mass = 2.5
+inertia_com = [0.11, 0.12, 0.17, 0.01, -0.02, 0.015]
+[[joints]]
+name = "fly"
+type = "free"
+child = "base"
+
+[[bodies]]
+name = "arm"
+mass = "m"
+inertia_com = ["m*l**2/12", "m*l**2/10", "m*l**2/11", "m*l**2/90", 0, 0.0007]
+[[joints]]
+name = "shoulder"
+type = "ball"
+parent = "base"
+child = "arm"
+r_parent = [0.2, -0.1, 0.15]
+r_child = ["-l/2", 0, 0.05]
+orientation_deg = [20, -35, 50]
+
+[[bodies]]
+name = "hand"
+mass = "m/2"
+inertia_com = [0.003, 0.004, 0.0035]
+[[joints]]
+name = "wrist"
+type = "revolute"
+parent = "arm"
+child = "hand"
+axis = [0.6, 0.0, 0.8]
+r_parent = ["l/2", 0, 0]
+r_child = [0.02, -0.06, 0.04]
+motor_inertia = 0.0004
+gear_ratio = 7.5
+
+[[bodies]]
+name = "tail"
+mass = 0.6
+inertia_com = 0
+[[joints]]
+name = "rail"
+type = "prismatic"
+parent = "base"
+child = "tail"
+axis = [0, 1, 0]
+r_parent = [-0.1, 0, 0.1]
+orientation_deg = [0, 90, 0]
+motor_inertia = 0.02
+
+[[bodies]]
+name = "head"
+mass = 0.7
+inertia_com = [0.004, 0.005, 0.006]
+[[joints]]
+name = "neck"
+type = "universal"
+parent = "base"
+child = "head"
+axes = [[1, 0, 0], [0, 1, 0]]
+r_parent = [0, 0.1, 0.3]
+r_child = [0, 0.03, -0.1]
+
+[[points]]
+name = "finger"
+body = "hand"
+at = [0.05, "l/3", -0.02]
+
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+name = "push"
+type = "external_force"
+body = "hand"
+at = [0.03, -0.02, "l/4"]
+force = "input"
+[[effects]]
+name = "pull"
+type = "external_force"
+body = "head"
+at = [0.0, 0.0, 0.1]
+force = ["2*m", 0, -3.0]
+[[effects]]
+name = "twist"
+type = "motor"
+joint = "wrist"
+torque = "input"
+[[effects]]
+name = "drive"
+type = "motor"
+joint = "rail"
+torque = "input"
+"""
+
+
+def tree(seed: int, dimensions: int) -> str:
+    """A random tree of up to 4 bodies."""
+    return random_spatial_tree(seed, dimensions, 4)[1]
+
+
+def flat(seed: int) -> str:
+    """A tree that `closed` is for too."""
+    text = random_tree(seed).text
+    assert text is not None
+    return text
+
+
+ASIDE = tuple(o for o in OUTPUTS if o not in (*DERIVATIVES, "point_jacobians", "point_velocities"))
+"""Outputs that this is not about."""
+TREES = {f"space_{seed}": (seed, 3) for seed in (3, 11, 24)} | {"plane_5": (5, 2)}
+CASES = [("chain", route) for route in ("aba", "ldl")]
+CASES += [("machine", route) for route in ("aba", "ldl")]
+CASES += [(name, ("aba", "ldl")[i % 2]) for i, name in enumerate(TREES)]
+CASES += [("furuta_pendulum", "aba"), ("tumbling_body", ""), ("spinning_top", "ldl")]
+CASES += [("two_body_forced", route) for route in ("closed", "aba", "ldl")]
+every_case = pytest.mark.parametrize(("name", "route"), CASES)
+
+
+def made(name: str, route: str, *, tangents: bool = False) -> Engine:
+    """A case; all outputs but those that this is not about."""
+    text = MACHINE if name == "machine" else tree(*TREES[name]) if name in TREES else name
+    return engine(text, route, leave_out=ASIDE, tangents=tangents)
+
+
+def differences(e: Engine, output: str, y: np.ndarray, u: dict, p: dict) -> np.ndarray:
+    """The same matrix by central differences of `derivative`, in 60 digits."""
+    given = {"jacobian": dict(zip(e.module.STATES, y, strict=True))}
+    given |= {"input_jacobian": u, "parameter_jacobian": p}
+    start = exact(np.array(list(given[output].values())))
+
+    def f(x: np.ndarray) -> np.ndarray:
+        match output:
+            case "jacobian":
+                return e.exactly("derivative", x, u, p)
+            case "input_jacobian":
+                return e.exactly("derivative", y, dict(zip(u, x, strict=True)), p)
+        return e.exactly("derivative", y, u, dict(zip(p, x, strict=True)))
+
+    columns = [along(f, start, exact(way)) for way in np.eye(len(start))]
+    return np.array(columns, dtype=object).T
+
+
+def state(e: Engine, seed: int) -> tuple[np.ndarray, dict, dict]:
+    """A state with quaternions of any length, inputs, and parameters off the scene's own."""
+    rng = np.random.default_rng(seed)
+    y, u = e.random_state(rng), e.random_inputs(rng)
+    for indices in map(list, e.module.QUATERNIONS):
+        y[indices] *= rng.uniform(0.7, 1.5)
+    p = {name: value * rng.uniform(0.9, 1.1) for name, value in e.module.PARAMETERS.items()}
+    return y, u, p
+
+
+@every_case
+def test_derivatives_are_exact(name: str, route: str) -> None:
+    """Written out, and along directions as for large models, by the program and by the module."""
+    forms = [made(name, route)]
+    if forms[0].system.route != "closed":
+        forms.append(made(name, route, tangents=True))
+    outputs = [name for name in DERIVATIVES if name in forms[0].system.program.outputs]
+    assert [bool(e.system.tangents) for e in forms] == [False, True][: len(forms)]
+    y, u, p = state(forms[0], 71)
+    for output in outputs:
+        expected = differences(forms[0], output, y, u, p)
+        assert expected.shape == forms[0].system.program.outputs[output].shape
+        for e in forms:
+            assert apart(e.exactly(output, y, u, p), expected) < EXACT, output
+            assert apart(getattr(e.module, output)(0.0, y, p, u), expected) < ROUNDING, output
+
+
+@every_case
+def test_entries_are_exact_one_by_one(name: str, route: str) -> None:
+    """Small entries beside large ones too: each to 1e-12 of the largest in its own row."""
+    e = made(name, route)
+    y, u, p = state(e, 72)
+    for output in DERIVATIVES:
+        if output in e.system.program.outputs:
+            expected = differences(e, output, y, u, p)
+            for row, wanted in zip(e.exactly(output, y, u, p), expected, strict=True):
+                size = np.max(np.abs(wanted), initial=0)
+                assert np.max(np.abs(row - wanted), initial=0) <= 1e-12 * size + 1e-30, output
+
+
+@every_case
+def test_both_forms_for_columns_of_states(name: str, route: str) -> None:
+    """Many states at once give each one's own matrix, written out or not; so does no input."""
+    e = made(name, route)
+    forms = [e] if e.system.route == "closed" else [e, made(name, route, tangents=True)]
+    several = [state(e, seed) for seed in (73, 74, 75)]
+    p = several[0][2]
+    columns = np.array([y for y, _, _ in several]).T
+    inputs = np.array([list(u.values()) for _, u, _ in several]).reshape(3, -1).T
+    for output in DERIVATIVES:
+        if output not in e.system.program.outputs:
+            continue
+        alone = [getattr(e.module, output)(0.0, y, p, u) for y, u, _ in several]
+        unforced = getattr(e.module, output)(0.0, several[0][0])
+        for other in forms:
+            function = getattr(other.module, output)
+            assert apart(function(0.0, columns, p, inputs), np.stack(alone, axis=-1)) < ROUNDING
+            assert apart(function(0.0, several[0][0]), unforced) < ROUNDING
+            for (y, u, _), wanted in zip(several, alone, strict=True):
+                assert apart(function(0.0, y, p, u), wanted) < ROUNDING
+
+
+@pytest.mark.parametrize(("name", "route"), [("machine", "aba"), ("chain", "ldl"), ("space_3", "")])
+def test_routes_have_one_derivative(name: str, route: str) -> None:
+    """Both routes write down the same matrices."""
+    first, other = made(name, "aba"), made(name, "ldl")
+    y, u, p = state(first, 76)
+    for output in DERIVATIVES:
+        if output in first.system.program.outputs:
+            found = [getattr(e.module, output)(0.0, y, p, u) for e in (first, other)]
+            assert apart(*found) < ROUNDING
+
+
+def test_what_must_vanish() -> None:
+    """Of the state's rates: q̇ by nothing but q and v, and nothing by the place of a free body."""
+    e = made("machine", "aba")
+    y, u, p = state(e, 77)
+    nv = len(e.model.velocities)
+    nq = len(y) - nv
+    place = [e.module.STATES.index(f"base_{axis}") for axis in "xyz"]
+    J = e.module.jacobian(0.0, y, p, u)
+    assert not np.any(J[:, place])
+    assert not np.any(e.module.input_jacobian(0.0, y, p, u)[:nq])
+    assert not np.any(e.module.parameter_jacobian(0.0, y, p, u)[:nq])
+    for indices in map(list, e.module.QUATERNIONS):  # a longer quaternion is the same rotation
+        assert np.max(np.abs(J[nq:, indices] @ y[indices])) < 1e-9
+    M = engine(MACHINE, "aba").module.mass_matrix(0.0, y, p, u)
+    drive = list(e.module.INPUTS).index("drive")
+    row = [c.name for c in e.model.velocities].index("rail_slide_dot")
+    answer = e.module.input_jacobian(0.0, y, p, u)[nq:, drive]
+    assert apart(answer, np.linalg.solve(M, np.eye(nv)[row])) < 1e-11
+
+
+@pytest.mark.parametrize("route", ["aba", "ldl"])
+@pytest.mark.parametrize("name", ["machine", "furuta_pendulum", "spinning_top", "acrobot"])
+def test_jacobians_of_points(name: str, route: str) -> None:
+    """J v is the velocity of each point, whatever v; and J is how that changes with v."""
+    e = made(name, route)
+    assert e.module.POINTS
+    rng = np.random.default_rng(78)
+    y, _, p = state(e, 78)
+    nv = len(e.model.velocities)
+    J = e.module.point_jacobians(0.0, y, p)
+    assert J.shape == (len(e.module.POINTS), e.model.dimensions, nv)
+    for _ in range(3):
+        y[-nv:] = rng.uniform(-3.0, 3.0, nv)
+        assert apart(J @ y[-nv:], e.module.point_velocities(0.0, y, p)) < ROUNDING
+        assert np.array_equal(e.module.point_jacobians(0.0, y, p), J)
+    for i in range(nv):
+        y[-nv:] = np.eye(nv)[i]
+        assert apart(J[:, :, i], e.module.point_velocities(0.0, y, p)) < ROUNDING
+
+
+@pytest.mark.parametrize("route", ["aba", "ldl"])
+def test_an_acceleration_that_is_a_parameter(route: str) -> None:
+    """A weight on a post falls with g: what is solved for is a parameter too."""
+    text = """
+name = "weight"
+dimensions = 3
+[[bodies]]
+name = "stone"
+mass = 2.0
+inertia_com = 0
+[[joints]]
+name = "post"
+type = "prismatic"
+parent = "world"
+child = "stone"
+axis = [0, 0, 1]
+[[effects]]
+type = "gravity"
+g = 9.81
+"""
+    for tangents in (False, True):
+        e = made(text, route, tangents=tangents)
+        assert list(e.module.PARAMETERS) == ["stone_mass", "gravity_g"]
+        assert e.module.derivative(0.0, np.zeros(2)).tolist() == [0.0, -9.81]
+        slopes = e.module.parameter_jacobian(0.0, np.zeros(2))
+        assert slopes.tolist() == [[0.0, 0.0], [0.0, -1.0]]
+
+
+def test_large_models_are_not_written_out() -> None:
+    """A chain of 70 links: tangents of its own accord, and as exact."""
+    text = """
+name = "long"
+[[chains]]
+name = "link"
+count = 70
+mass = 0.3
+inertia_com = 0.002
+r_parent = [0.1, 0]
+r_child = [-0.1, 0.01]
+[[effects]]
+type = "gravity"
+g = 9.81
+"""
+    e = engine(text, "aba", leave_out=OUTPUTS)
+    assert e.system.tangents == {"jacobian"}
+    y = e.random_state(np.random.default_rng(79)) * 0.5
+    J = e.module.jacobian(0.0, y)
+    for i in (0, 3, 69, 70, 100, 139):
+        way = exact(np.eye(len(y))[i])
+        column = along(lambda x: e.exactly("derivative", x), exact(y), way)
+        assert apart(J[:, i], column) < ROUNDING
