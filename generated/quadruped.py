@@ -76,7 +76,7 @@ Parameters p, with the scene's values:
     g = 9.81              m/s^2   gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 3056 operations: 775 add, 694 sub, 1476 mul, 74 div, 13 neg, 12 sin,
+One call of `derivative` takes 3034 operations: 762 add, 693 sub, 1468 mul, 74 div, 13 neg, 12 sin,
 12 cos; 69 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -246,8 +246,8 @@ JOINTS = ('front_left_abduction', 'front_right_abduction', 'hind_left_abduction'
 POINTS = ('front_left_foot', 'front_right_foot', 'hind_left_foot', 'hind_right_foot')
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 775, "sub": 694, "mul": 1476, "div": 74, "neg": 13, "sin": 12, "cos": 12, "total": 3056, "parameters": 69},
-    "jacobian": {"add": 5644, "sub": 6293, "mul": 12792, "div": 515, "neg": 122, "sin": 12, "cos": 12, "total": 25390, "parameters": 73},
+    "derivative": {"add": 762, "sub": 693, "mul": 1468, "div": 74, "neg": 13, "sin": 12, "cos": 12, "total": 3034, "parameters": 69},
+    "jacobian": {"add": 5631, "sub": 6292, "mul": 12784, "div": 515, "neg": 122, "sin": 12, "cos": 12, "total": 25368, "parameters": 73},
     "kinetic_energy": {"add": 192, "sub": 69, "mul": 382, "div": 1, "sin": 12, "cos": 12, "total": 668, "parameters": 27},
     "potential_energy": {"add": 47, "sub": 23, "mul": 91, "div": 1, "sin": 12, "cos": 12, "total": 186, "parameters": 10},
     "body_poses": {"add": 99, "sub": 81, "mul": 238, "div": 1, "sin": 12, "cos": 12, "total": 443, "parameters": 6},
@@ -383,46 +383,46 @@ def _constants(values):
     k38 = c_shank * k6
     inertia_front_left_shank_xx = I_shank_x + k38
     inertia_front_left_shank_yy = I_shank_y + k38
+    pivot_hind_right_shank = k28 + inertia_front_left_shank_yy
+    k7 = inertia_front_left_shank_yy / pivot_hind_right_shank
+    k8 = k6 / pivot_hind_right_shank
+    k9 = m_shank - k6 * k8
+    k10 = k6 * k7 - k6
+    k11 = I_shank_z - inertia_front_left_shank_xx
+    k12 = m_shank - k9
+    k13 = m_shank * k4
+    k14 = inertia_front_left_thigh_yy + (inertia_front_left_shank_yy - inertia_front_left_shank_yy * k7)
+    k29 = m_thigh + m_shank
+    k15 = m_hip + k29
     k39 = 0.5 * (I_trunk_z + (I_trunk_x + I_trunk_y))
     k40 = k39 - I_trunk_x
     k41 = k39 - I_trunk_y
     k42 = k39 - I_trunk_z
-    k7 = k41 - k42
-    k8 = k42 - k40
-    k9 = k40 - k41
+    k16 = k41 - k42
+    k17 = k42 - k40
+    k18 = k40 - k41
     k43 = 0.5 * (inertia_front_left_hip_zz + (I_hip_yy + inertia_front_left_hip_xx))
-    k10 = k43 - inertia_front_left_hip_xx
-    k11 = k43 - I_hip_yy
-    k12 = k43 - inertia_front_left_hip_zz
+    k19 = k43 - inertia_front_left_hip_xx
+    k20 = k43 - I_hip_yy
+    k21 = k43 - inertia_front_left_hip_zz
     k44 = inertia_front_left_thigh_zz + (inertia_front_left_thigh_xx + inertia_front_left_thigh_yy)
     k45 = 0.5 * k44
-    k13 = k45 - inertia_front_left_thigh_xx
-    k14 = k45 - inertia_front_left_thigh_yy
-    k15 = k45 - inertia_front_left_thigh_zz
+    k22 = k45 - inertia_front_left_thigh_xx
+    k23 = k45 - inertia_front_left_thigh_yy
+    k24 = k45 - inertia_front_left_thigh_zz
     k46 = 0.5 * (I_shank_z + (inertia_front_left_shank_xx + inertia_front_left_shank_yy))
-    k16 = k46 - inertia_front_left_shank_xx
-    k17 = k46 - inertia_front_left_shank_yy
-    k18 = k46 - I_shank_z
-    pivot_hind_right_shank = k28 + inertia_front_left_shank_yy
-    k19 = inertia_front_left_shank_yy / pivot_hind_right_shank
-    k20 = k6 / pivot_hind_right_shank
-    k21 = m_shank - k6 * k20
-    k22 = k6 * k19 - k6
-    k23 = I_shank_z - inertia_front_left_shank_xx
-    k24 = m_shank - k21
-    k25 = m_shank * k4
-    k26 = inertia_front_left_thigh_yy + (inertia_front_left_shank_yy - inertia_front_left_shank_yy * k19)
-    k29 = m_thigh + m_shank
-    k27 = m_hip + k29
-    k30 = k27 + (k27 + (k27 + (m_trunk + k27)))
+    k25 = k46 - inertia_front_left_shank_xx
+    k26 = k46 - inertia_front_left_shank_yy
+    k27 = k46 - I_shank_z
+    k30 = k15 + (k15 + (k15 + (m_trunk + k15)))
     k31 = m_trunk * g
     k32 = m_hip * g
     k33 = m_thigh * g
     k34 = m_shank * g
     return {
         "initial_state": (),
-        "derivative": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, pivot_hind_right_shank, k19, k20, k21, k22, k23, k24, k25, k26, k27),
-        "jacobian": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, k28, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, pivot_hind_right_shank, k19, k20, k21, k22, k23, k24, k25, k26, k29, k27, k30),
+        "derivative": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27),
+        "jacobian": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, k28, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k29, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k30),
         "kinetic_energy": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, k1, k2, k3, k4, k28, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy),
         "potential_energy": (x_hip, y_hip, c_hip, y_thigh, c_thigh, c_shank, k2, k3, k4, k31, k32, k33, k34),
         "body_poses": (x_hip, y_hip, c_hip, y_thigh, c_thigh, c_shank, k2, k3, k4),
@@ -473,8 +473,8 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """3056 operations: 775 add, 694 sub, 1476 mul, 74 div, 13 neg, 12 sin, 12 cos."""
-    m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, pivot_hind_right_shank, k19, k20, k21, k22, k23, k24, k25, k26, k27 = k
+    """3034 operations: 762 add, 693 sub, 1468 mul, 74 div, 13 neg, 12 sin, 12 cos."""
+    m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27 = k
     _, _, _, trunk_qw, trunk_qx, trunk_qy, trunk_qz, front_left_abduction_angle, front_right_abduction_angle, hind_left_abduction_angle, hind_right_abduction_angle, front_left_swing_angle, front_right_swing_angle, hind_left_swing_angle, hind_right_swing_angle, front_left_knee_angle, front_right_knee_angle, hind_left_knee_angle, hind_right_knee_angle, trunk_x_dot, trunk_y_dot, trunk_z_dot, trunk_wx, trunk_wy, trunk_wz, front_left_abduction_angle_dot, front_right_abduction_angle_dot, hind_left_abduction_angle_dot, hind_right_abduction_angle_dot, front_left_swing_angle_dot, front_right_swing_angle_dot, hind_left_swing_angle_dot, hind_right_swing_angle_dot, front_left_knee_angle_dot, front_right_knee_angle_dot, hind_left_knee_angle_dot, hind_right_knee_angle_dot = y
     s1 = trunk_qw * trunk_qw + trunk_qx * trunk_qx + trunk_qy * trunk_qy + trunk_qz * trunk_qz
     s2 = 2.0 / s1
@@ -531,6 +531,508 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
     sin_hind_left_knee_angle = sin(hind_left_knee_angle)
     cos_hind_right_knee_angle = cos(hind_right_knee_angle)
     sin_hind_right_knee_angle = sin(hind_right_knee_angle)
+    s32 = sin_hind_right_knee_angle * k11
+    s33 = sin_hind_right_knee_angle * s32
+    s34 = cos_hind_right_knee_angle * k10
+    s35 = k6 * sin_hind_right_knee_angle
+    s36 = k6 * cos_hind_right_knee_angle
+    s37 = sin_hind_right_knee_angle * k12
+    s38 = sin_hind_right_knee_angle * s37
+    s39 = k9 + s38
+    s40 = cos_hind_right_knee_angle * s37
+    s41 = s36 - k13
+    s42 = s34 + k4 * s39
+    s43 = k4 * s40 - sin_hind_right_knee_angle * k10
+    s44 = cos_hind_right_knee_angle * s32 + k4 * s35
+    s45 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s33 - k4 * (s36 + s41))
+    s46 = k4 * (s34 + s42) + k14
+    s47 = k5 + s41
+    s48 = s42 - k5
+    s49 = sin_hind_left_knee_angle * k11
+    s50 = sin_hind_left_knee_angle * s49
+    s51 = cos_hind_left_knee_angle * k10
+    s52 = k6 * sin_hind_left_knee_angle
+    s53 = k6 * cos_hind_left_knee_angle
+    s54 = sin_hind_left_knee_angle * k12
+    s55 = sin_hind_left_knee_angle * s54
+    s56 = k9 + s55
+    s57 = cos_hind_left_knee_angle * s54
+    s58 = s53 - k13
+    s59 = s51 + k4 * s56
+    s60 = k4 * s57 - sin_hind_left_knee_angle * k10
+    s61 = cos_hind_left_knee_angle * s49 + k4 * s52
+    s62 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s50 - k4 * (s53 + s58))
+    s63 = k14 + k4 * (s51 + s59)
+    s64 = k5 + s58
+    s65 = s59 - k5
+    s66 = sin_front_right_knee_angle * k11
+    s67 = sin_front_right_knee_angle * s66
+    s68 = cos_front_right_knee_angle * k10
+    s69 = k6 * sin_front_right_knee_angle
+    s70 = k6 * cos_front_right_knee_angle
+    s71 = sin_front_right_knee_angle * k12
+    s72 = sin_front_right_knee_angle * s71
+    s73 = k9 + s72
+    s74 = cos_front_right_knee_angle * s71
+    s75 = s70 - k13
+    s76 = s68 + k4 * s73
+    s77 = k4 * s74 - sin_front_right_knee_angle * k10
+    s78 = cos_front_right_knee_angle * s66 + k4 * s69
+    s79 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s67 - k4 * (s70 + s75))
+    s80 = k14 + k4 * (s68 + s76)
+    s81 = k5 + s75
+    s82 = s76 - k5
+    s83 = sin_front_left_knee_angle * k11
+    s84 = sin_front_left_knee_angle * s83
+    s85 = cos_front_left_knee_angle * k10
+    s86 = k6 * sin_front_left_knee_angle
+    s87 = k6 * cos_front_left_knee_angle
+    s88 = sin_front_left_knee_angle * k12
+    s89 = sin_front_left_knee_angle * s88
+    s90 = k9 + s89
+    s91 = cos_front_left_knee_angle * s88
+    s92 = s87 - k13
+    s93 = s85 + k4 * s90
+    s94 = k4 * s91 - sin_front_left_knee_angle * k10
+    s95 = cos_front_left_knee_angle * s83 + k4 * s86
+    s96 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s84 - k4 * (s87 + s92))
+    s97 = k14 + k4 * (s85 + s93)
+    s98 = k5 + s92
+    s99 = s93 - k5
+    pivot_hind_right_thigh = k1 + s46
+    s100 = s46 / pivot_hind_right_thigh
+    s101 = inertia_front_left_thigh_yz / pivot_hind_right_thigh
+    s102 = s48 / pivot_hind_right_thigh
+    s103 = s43 / pivot_hind_right_thigh
+    s104 = inertia_front_left_thigh_zz + (I_shank_z - s33) - inertia_front_left_thigh_yz * s101
+    s105 = inertia_front_left_thigh_yz * s100 - inertia_front_left_thigh_yz
+    s106 = m_thigh + s39 - s48 * s102
+    s107 = m_thigh + (m_shank - s38) - s43 * s103
+    s108 = s40 - s43 * s102
+    s109 = s48 - s48 * s100
+    s110 = s43 - s43 * s100
+    s111 = moment_front_left_thigh_y + s48 * s101
+    s112 = s43 * s101
+    s113 = sin_hind_right_swing_angle * (s104 - s45) + s31 * s44
+    s114 = sin_hind_right_swing_angle * s113
+    s115 = sin_hind_right_swing_angle * s112 + cos_hind_right_swing_angle * (s111 - moment_front_left_thigh_y)
+    s116 = sin_hind_right_swing_angle * s115
+    s117 = cos_hind_right_swing_angle * s115
+    s118 = cos_hind_right_swing_angle * s110 - sin_hind_right_swing_angle * s109
+    s119 = sin_hind_right_swing_angle * s110 + cos_hind_right_swing_angle * s109
+    s120 = cos_hind_right_swing_angle * s47 - sin_hind_right_swing_angle * s35
+    s121 = moment_front_left_thigh_y + s117
+    s122 = s117 - s111
+    s123 = sin_hind_right_swing_angle * (s107 - s106) + s31 * s108
+    s124 = sin_hind_right_swing_angle * s123
+    s125 = s107 - s124
+    s126 = s106 + s124
+    s127 = cos_hind_right_swing_angle * s123 - s108
+    s128 = k3 * s127
+    s129 = s116 + s128
+    s130 = s122 + k3 * s125
+    s131 = s121 - k3 * s126
+    s132 = s112 - s116 - s128
+    s133 = inertia_front_left_hip_xx + (s45 + s114 + k3 * (s122 + s130))
+    s134 = sin_hind_right_swing_angle * s105 + k3 * s118 - I_hip_xy
+    s135 = I_hip_xz + (cos_hind_right_swing_angle * s113 - s44 + k3 * (s132 - s116))
+    s136 = s130 - moment_front_left_hip_y
+    pivot_hind_left_thigh = k1 + s63
+    s137 = s63 / pivot_hind_left_thigh
+    s138 = inertia_front_left_thigh_yz / pivot_hind_left_thigh
+    s139 = s65 / pivot_hind_left_thigh
+    s140 = s60 / pivot_hind_left_thigh
+    s141 = inertia_front_left_thigh_zz + (I_shank_z - s50) - inertia_front_left_thigh_yz * s138
+    s142 = inertia_front_left_thigh_yz - inertia_front_left_thigh_yz * s137
+    s143 = m_thigh + s56 - s65 * s139
+    s144 = m_thigh + (m_shank - s55) - s60 * s140
+    s145 = s57 - s60 * s139
+    s146 = s65 - s65 * s137
+    s147 = s60 - s60 * s137
+    s148 = moment_front_left_thigh_y + s65 * s138
+    s149 = s60 * s138
+    s150 = sin_hind_left_swing_angle * (s141 - s62) + s30 * s61
+    s151 = sin_hind_left_swing_angle * s150
+    s152 = cos_hind_left_swing_angle * (moment_front_left_thigh_y - s148) - sin_hind_left_swing_angle * s149
+    s153 = sin_hind_left_swing_angle * s152
+    s154 = cos_hind_left_swing_angle * s152
+    s155 = cos_hind_left_swing_angle * s147 - sin_hind_left_swing_angle * s146
+    s156 = sin_hind_left_swing_angle * s147 + cos_hind_left_swing_angle * s146
+    s157 = cos_hind_left_swing_angle * s64 - sin_hind_left_swing_angle * s52
+    s158 = s154 - moment_front_left_thigh_y
+    s159 = s148 + s154
+    s160 = sin_hind_left_swing_angle * (s144 - s143) + s30 * s145
+    s161 = sin_hind_left_swing_angle * s160
+    s162 = s144 - s161
+    s163 = s143 + s161
+    s164 = cos_hind_left_swing_angle * s160 - s145
+    s165 = k2 * s164
+    s166 = s153 + s165
+    s167 = s159 + k2 * s162
+    s168 = s158 - k2 * s163
+    s169 = s149 + s153 + s165
+    s170 = inertia_front_left_hip_xx + (s62 + s151 + k2 * (s159 + s167))
+    s171 = I_hip_xy + (sin_hind_left_swing_angle * s142 + k2 * s155)
+    s172 = I_hip_xz + (cos_hind_left_swing_angle * s150 - s61 - k2 * (s153 + s169))
+    s173 = moment_front_left_hip_y + s167
+    pivot_front_right_thigh = k1 + s80
+    s174 = s80 / pivot_front_right_thigh
+    s175 = inertia_front_left_thigh_yz / pivot_front_right_thigh
+    s176 = s82 / pivot_front_right_thigh
+    s177 = s77 / pivot_front_right_thigh
+    s178 = inertia_front_left_thigh_zz + (I_shank_z - s67) - inertia_front_left_thigh_yz * s175
+    s179 = inertia_front_left_thigh_yz * s174 - inertia_front_left_thigh_yz
+    s180 = m_thigh + s73 - s82 * s176
+    s181 = m_thigh + (m_shank - s72) - s77 * s177
+    s182 = s74 - s77 * s176
+    s183 = s82 - s82 * s174
+    s184 = s77 - s77 * s174
+    s185 = moment_front_left_thigh_y + s82 * s175
+    s186 = s77 * s175
+    s187 = sin_front_right_swing_angle * (s178 - s79) + s29 * s78
+    s188 = sin_front_right_swing_angle * s187
+    s189 = sin_front_right_swing_angle * s186 + cos_front_right_swing_angle * (s185 - moment_front_left_thigh_y)
+    s190 = sin_front_right_swing_angle * s189
+    s191 = cos_front_right_swing_angle * s189
+    s192 = cos_front_right_swing_angle * s184 - sin_front_right_swing_angle * s183
+    s193 = sin_front_right_swing_angle * s184 + cos_front_right_swing_angle * s183
+    s194 = cos_front_right_swing_angle * s81 - sin_front_right_swing_angle * s69
+    s195 = moment_front_left_thigh_y + s191
+    s196 = s191 - s185
+    s197 = sin_front_right_swing_angle * (s181 - s180) + s29 * s182
+    s198 = sin_front_right_swing_angle * s197
+    s199 = s181 - s198
+    s200 = s180 + s198
+    s201 = cos_front_right_swing_angle * s197 - s182
+    s202 = k3 * s201
+    s203 = s190 + s202
+    s204 = s196 + k3 * s199
+    s205 = s195 - k3 * s200
+    s206 = s186 - s190 - s202
+    s207 = inertia_front_left_hip_xx + (s79 + s188 + k3 * (s196 + s204))
+    s208 = sin_front_right_swing_angle * s179 + k3 * s192 - I_hip_xy
+    s209 = I_hip_xz + (cos_front_right_swing_angle * s187 - s78 + k3 * (s206 - s190))
+    s210 = s204 - moment_front_left_hip_y
+    pivot_front_left_thigh = k1 + s97
+    s211 = s97 / pivot_front_left_thigh
+    s212 = inertia_front_left_thigh_yz / pivot_front_left_thigh
+    s213 = s99 / pivot_front_left_thigh
+    s214 = s94 / pivot_front_left_thigh
+    s215 = inertia_front_left_thigh_zz + (I_shank_z - s84) - inertia_front_left_thigh_yz * s212
+    s216 = inertia_front_left_thigh_yz - inertia_front_left_thigh_yz * s211
+    s217 = m_thigh + s90 - s99 * s213
+    s218 = m_thigh + (m_shank - s89) - s94 * s214
+    s219 = s91 - s94 * s213
+    s220 = s99 - s99 * s211
+    s221 = s94 - s94 * s211
+    s222 = moment_front_left_thigh_y + s99 * s212
+    s223 = s94 * s212
+    s224 = sin_front_left_swing_angle * (s215 - s96) + s28 * s95
+    s225 = sin_front_left_swing_angle * s224
+    s226 = cos_front_left_swing_angle * (moment_front_left_thigh_y - s222) - sin_front_left_swing_angle * s223
+    s227 = sin_front_left_swing_angle * s226
+    s228 = cos_front_left_swing_angle * s226
+    s229 = cos_front_left_swing_angle * s221 - sin_front_left_swing_angle * s220
+    s230 = sin_front_left_swing_angle * s221 + cos_front_left_swing_angle * s220
+    s231 = cos_front_left_swing_angle * s98 - sin_front_left_swing_angle * s86
+    s232 = s228 - moment_front_left_thigh_y
+    s233 = s222 + s228
+    s234 = sin_front_left_swing_angle * (s218 - s217) + s28 * s219
+    s235 = sin_front_left_swing_angle * s234
+    s236 = s218 - s235
+    s237 = s217 + s235
+    s238 = cos_front_left_swing_angle * s234 - s219
+    s239 = k2 * s238
+    s240 = s227 + s239
+    s241 = s233 + k2 * s236
+    s242 = s232 - k2 * s237
+    s243 = s223 + s227 + s239
+    s244 = inertia_front_left_hip_xx + (s96 + s225 + k2 * (s233 + s241))
+    s245 = I_hip_xy + (sin_front_left_swing_angle * s216 + k2 * s229)
+    s246 = I_hip_xz + (cos_front_left_swing_angle * s224 - s95 - k2 * (s227 + s243))
+    s247 = moment_front_left_hip_y + s241
+    pivot_hind_right_hip = k1 + s133
+    s248 = s133 / pivot_hind_right_hip
+    s249 = s134 / pivot_hind_right_hip
+    s250 = s135 / pivot_hind_right_hip
+    s251 = s129 / pivot_hind_right_hip
+    s252 = s120 / pivot_hind_right_hip
+    s253 = s136 / pivot_hind_right_hip
+    s254 = I_hip_yy + (s46 - s46 * s100) - s134 * s249
+    s255 = inertia_front_left_hip_zz + (s104 - s114 - k3 * (s121 + s131)) - s135 * s250
+    s256 = s134 - s134 * s248
+    s257 = s135 - s135 * s248
+    s258 = cos_hind_right_swing_angle * s105 - k3 * s119 - I_hip_yz - s135 * s249
+    s259 = m_hip + s126 - s129 * s251
+    s260 = k15 - s120 * s252
+    s261 = m_hip + s125 - s136 * s253
+    s262 = s120 * s251
+    s263 = s127 - s136 * s251
+    s264 = s136 * s252
+    s265 = s129 - s129 * s248
+    s266 = s120 - s120 * s248
+    s267 = s136 - s136 * s248
+    s268 = s119 - s129 * s249
+    s269 = s120 * s249
+    s270 = s118 - s136 * s249
+    s271 = moment_front_left_hip_y + s131 - s129 * s250
+    s272 = cos_hind_right_swing_angle * s35 + sin_hind_right_swing_angle * s47 + s120 * s250
+    s273 = s132 - s136 * s250
+    s274 = sin_hind_right_abduction_angle * (s254 - s255) + s27 * s258
+    s275 = sin_hind_right_abduction_angle * s274
+    s276 = cos_hind_right_abduction_angle * s256 - sin_hind_right_abduction_angle * s257
+    s277 = sin_hind_right_abduction_angle * s256 + cos_hind_right_abduction_angle * s257
+    s278 = cos_hind_right_abduction_angle * (s270 - s272) - sin_hind_right_abduction_angle * (s269 + s273)
+    s279 = sin_hind_right_abduction_angle * s278
+    s280 = cos_hind_right_abduction_angle * s278
+    s281 = cos_hind_right_abduction_angle * s266 - sin_hind_right_abduction_angle * s267
+    s282 = sin_hind_right_abduction_angle * s266 + cos_hind_right_abduction_angle * s267
+    s283 = cos_hind_right_abduction_angle * s268 - sin_hind_right_abduction_angle * s271
+    s284 = sin_hind_right_abduction_angle * s268 + cos_hind_right_abduction_angle * s271
+    s285 = s269 + s279
+    s286 = s272 + s280
+    s287 = s280 - s270
+    s288 = sin_hind_right_abduction_angle * (s260 - s261) - s27 * s264
+    s289 = sin_hind_right_abduction_angle * s288
+    s290 = cos_hind_right_abduction_angle * s262 + sin_hind_right_abduction_angle * s263
+    s291 = cos_hind_right_abduction_angle * s263 - sin_hind_right_abduction_angle * s262
+    s292 = s260 - s289
+    s293 = s261 + s289
+    s294 = s264 + cos_hind_right_abduction_angle * s288
+    s295 = y_hip * s291
+    s296 = x_hip * s294
+    s297 = s282 - y_hip * s293
+    s298 = s286 + x_hip * s293
+    s299 = s284 + (x_hip * s290 + y_hip * s259)
+    s300 = s287 - (x_hip * s292 + y_hip * s290)
+    s301 = s273 + s279 + (s295 - s296)
+    s302 = s255 + s275 + (y_hip * s284 - x_hip * s287 + (y_hip * s299 - x_hip * s300))
+    s303 = cos_hind_right_abduction_angle * s274 - s258 + (x_hip * s285 + y_hip * s283 + x_hip * s301)
+    pivot_hind_left_hip = k1 + s170
+    s304 = s170 / pivot_hind_left_hip
+    s305 = s171 / pivot_hind_left_hip
+    s306 = s172 / pivot_hind_left_hip
+    s307 = s166 / pivot_hind_left_hip
+    s308 = s157 / pivot_hind_left_hip
+    s309 = s173 / pivot_hind_left_hip
+    s310 = I_hip_yy + (s63 - s63 * s137) - s171 * s305
+    s311 = inertia_front_left_hip_zz + (s141 - s151 - k2 * (s158 + s168)) - s172 * s306
+    s312 = s171 - s171 * s304
+    s313 = s172 - s172 * s304
+    s314 = I_hip_yz + (cos_hind_left_swing_angle * s142 - k2 * s156) - s172 * s305
+    s315 = m_hip + s163 - s166 * s307
+    s316 = k15 - s157 * s308
+    s317 = m_hip + s162 - s173 * s309
+    s318 = s157 * s307
+    s319 = s164 - s173 * s307
+    s320 = s173 * s308
+    s321 = s166 - s166 * s304
+    s322 = s157 - s157 * s304
+    s323 = s173 - s173 * s304
+    s324 = s156 - s166 * s305
+    s325 = s157 * s305
+    s326 = s155 - s173 * s305
+    s327 = s168 - moment_front_left_hip_y - s166 * s306
+    s328 = cos_hind_left_swing_angle * s52 + sin_hind_left_swing_angle * s64 + s157 * s306
+    s329 = s169 + s173 * s306
+    s330 = sin_hind_left_abduction_angle * (s310 - s311) + s26 * s314
+    s331 = sin_hind_left_abduction_angle * s330
+    s332 = cos_hind_left_abduction_angle * s312 - sin_hind_left_abduction_angle * s313
+    s333 = sin_hind_left_abduction_angle * s312 + cos_hind_left_abduction_angle * s313
+    s334 = sin_hind_left_abduction_angle * (s329 - s325) + cos_hind_left_abduction_angle * (s326 - s328)
+    s335 = sin_hind_left_abduction_angle * s334
+    s336 = cos_hind_left_abduction_angle * s334
+    s337 = cos_hind_left_abduction_angle * s322 - sin_hind_left_abduction_angle * s323
+    s338 = sin_hind_left_abduction_angle * s322 + cos_hind_left_abduction_angle * s323
+    s339 = cos_hind_left_abduction_angle * s324 - sin_hind_left_abduction_angle * s327
+    s340 = sin_hind_left_abduction_angle * s324 + cos_hind_left_abduction_angle * s327
+    s341 = s325 + s335
+    s342 = s328 + s336
+    s343 = s336 - s326
+    s344 = sin_hind_left_abduction_angle * (s316 - s317) - s26 * s320
+    s345 = sin_hind_left_abduction_angle * s344
+    s346 = cos_hind_left_abduction_angle * s318 + sin_hind_left_abduction_angle * s319
+    s347 = cos_hind_left_abduction_angle * s319 - sin_hind_left_abduction_angle * s318
+    s348 = s316 - s345
+    s349 = s317 + s345
+    s350 = s320 + cos_hind_left_abduction_angle * s344
+    s351 = y_hip * s347
+    s352 = x_hip * s350
+    s353 = s338 + y_hip * s349
+    s354 = s342 + x_hip * s349
+    s355 = s340 + (x_hip * s346 - y_hip * s315)
+    s356 = s343 + (y_hip * s346 - x_hip * s348)
+    s357 = s335 - s329 - (s351 + s352)
+    s358 = s311 + s331 - (x_hip * s343 + y_hip * s340 + (x_hip * s356 + y_hip * s355))
+    s359 = cos_hind_left_abduction_angle * s330 - s314 + (x_hip * s341 - y_hip * s339 + x_hip * s357)
+    s360 = I_trunk_x + (s133 - s133 * s248 - y_hip * (s282 + s297)) + (s170 - s170 * s304 + y_hip * (s338 + s353))
+    s361 = s276 + (x_hip * s282 - y_hip * s298) + (s332 + (x_hip * s338 + y_hip * s354))
+    s362 = s277 + (y_hip * s265 - x_hip * s281 - y_hip * s301) + (s333 + (y_hip * s357 - (x_hip * s337 + y_hip * s321)))
+    s363 = I_trunk_y + (s254 - s275 + x_hip * (s286 + s298)) + (s310 - s331 + x_hip * (s342 + s354))
+    pivot_front_right_hip = k1 + s207
+    s364 = s207 / pivot_front_right_hip
+    s365 = s208 / pivot_front_right_hip
+    s366 = s209 / pivot_front_right_hip
+    s367 = s203 / pivot_front_right_hip
+    s368 = s194 / pivot_front_right_hip
+    s369 = s210 / pivot_front_right_hip
+    s370 = I_hip_yy + (s80 - s80 * s174) - s208 * s365
+    s371 = inertia_front_left_hip_zz + (s178 - s188 - k3 * (s195 + s205)) - s209 * s366
+    s372 = s208 - s208 * s364
+    s373 = s209 - s209 * s364
+    s374 = cos_front_right_swing_angle * s179 - k3 * s193 - I_hip_yz - s209 * s365
+    s375 = m_hip + s200 - s203 * s367
+    s376 = k15 - s194 * s368
+    s377 = m_hip + s199 - s210 * s369
+    s378 = s194 * s367
+    s379 = s201 - s210 * s367
+    s380 = s210 * s368
+    s381 = s203 - s203 * s364
+    s382 = s194 - s194 * s364
+    s383 = s210 - s210 * s364
+    s384 = s193 - s203 * s365
+    s385 = s194 * s365
+    s386 = s192 - s210 * s365
+    s387 = moment_front_left_hip_y + s205 - s203 * s366
+    s388 = cos_front_right_swing_angle * s69 + sin_front_right_swing_angle * s81 + s194 * s366
+    s389 = s206 - s210 * s366
+    s390 = sin_front_right_abduction_angle * (s370 - s371) + s25 * s374
+    s391 = sin_front_right_abduction_angle * s390
+    s392 = cos_front_right_abduction_angle * s372 - sin_front_right_abduction_angle * s373
+    s393 = sin_front_right_abduction_angle * s372 + cos_front_right_abduction_angle * s373
+    s394 = cos_front_right_abduction_angle * (s386 - s388) - sin_front_right_abduction_angle * (s385 + s389)
+    s395 = sin_front_right_abduction_angle * s394
+    s396 = cos_front_right_abduction_angle * s394
+    s397 = cos_front_right_abduction_angle * s382 - sin_front_right_abduction_angle * s383
+    s398 = sin_front_right_abduction_angle * s382 + cos_front_right_abduction_angle * s383
+    s399 = cos_front_right_abduction_angle * s384 - sin_front_right_abduction_angle * s387
+    s400 = sin_front_right_abduction_angle * s384 + cos_front_right_abduction_angle * s387
+    s401 = s385 + s395
+    s402 = s388 + s396
+    s403 = s396 - s386
+    s404 = sin_front_right_abduction_angle * (s376 - s377) - s25 * s380
+    s405 = sin_front_right_abduction_angle * s404
+    s406 = cos_front_right_abduction_angle * s378 + sin_front_right_abduction_angle * s379
+    s407 = cos_front_right_abduction_angle * s379 - sin_front_right_abduction_angle * s378
+    s408 = s376 - s405
+    s409 = s377 + s405
+    s410 = s380 + cos_front_right_abduction_angle * s404
+    s411 = y_hip * s407
+    s412 = x_hip * s410
+    s413 = s398 - y_hip * s409
+    s414 = s402 - x_hip * s409
+    s415 = s400 + (y_hip * s375 - x_hip * s406)
+    s416 = s403 + (x_hip * s408 - y_hip * s406)
+    s417 = s389 + s395 + (s411 + s412)
+    s418 = s371 + s391 + (x_hip * s403 + y_hip * s400 + (x_hip * s416 + y_hip * s415))
+    s419 = cos_front_right_abduction_angle * s390 - s374 + (y_hip * s399 - x_hip * s401 - x_hip * s417)
+    pivot_front_left_hip = k1 + s244
+    s420 = s244 / pivot_front_left_hip
+    s421 = s245 / pivot_front_left_hip
+    s422 = s246 / pivot_front_left_hip
+    s423 = s240 / pivot_front_left_hip
+    s424 = s231 / pivot_front_left_hip
+    s425 = s247 / pivot_front_left_hip
+    s426 = I_hip_yy + (s97 - s97 * s211) - s245 * s421
+    s427 = inertia_front_left_hip_zz + (s215 - s225 - k2 * (s232 + s242)) - s246 * s422
+    s428 = s245 - s245 * s420
+    s429 = s246 - s246 * s420
+    s430 = I_hip_yz + (cos_front_left_swing_angle * s216 - k2 * s230) - s246 * s421
+    s431 = m_hip + s237 - s240 * s423
+    s432 = k15 - s231 * s424
+    s433 = m_hip + s236 - s247 * s425
+    s434 = s231 * s423
+    s435 = s238 - s247 * s423
+    s436 = s247 * s424
+    s437 = s240 - s240 * s420
+    s438 = s231 - s231 * s420
+    s439 = s247 - s247 * s420
+    s440 = s230 - s240 * s421
+    s441 = s231 * s421
+    s442 = s229 - s247 * s421
+    s443 = s242 - moment_front_left_hip_y - s240 * s422
+    s444 = cos_front_left_swing_angle * s86 + sin_front_left_swing_angle * s98 + s231 * s422
+    s445 = s243 + s247 * s422
+    s446 = sin_front_left_abduction_angle * (s426 - s427) + s24 * s430
+    s447 = sin_front_left_abduction_angle * s446
+    s448 = cos_front_left_abduction_angle * s428 - sin_front_left_abduction_angle * s429
+    s449 = sin_front_left_abduction_angle * s428 + cos_front_left_abduction_angle * s429
+    s450 = sin_front_left_abduction_angle * (s445 - s441) + cos_front_left_abduction_angle * (s442 - s444)
+    s451 = sin_front_left_abduction_angle * s450
+    s452 = cos_front_left_abduction_angle * s450
+    s453 = cos_front_left_abduction_angle * s438 - sin_front_left_abduction_angle * s439
+    s454 = sin_front_left_abduction_angle * s438 + cos_front_left_abduction_angle * s439
+    s455 = cos_front_left_abduction_angle * s440 - sin_front_left_abduction_angle * s443
+    s456 = sin_front_left_abduction_angle * s440 + cos_front_left_abduction_angle * s443
+    s457 = s441 + s451
+    s458 = s444 + s452
+    s459 = s452 - s442
+    s460 = sin_front_left_abduction_angle * (s432 - s433) - s24 * s436
+    s461 = sin_front_left_abduction_angle * s460
+    s462 = cos_front_left_abduction_angle * s434 + sin_front_left_abduction_angle * s435
+    s463 = cos_front_left_abduction_angle * s435 - sin_front_left_abduction_angle * s434
+    s464 = s432 - s461
+    s465 = s433 + s461
+    s466 = s436 + cos_front_left_abduction_angle * s460
+    s467 = y_hip * s463
+    s468 = x_hip * s466
+    s469 = s454 + y_hip * s465
+    s470 = s458 - x_hip * s465
+    s471 = s456 - (x_hip * s462 + y_hip * s431)
+    s472 = s459 + (x_hip * s464 + y_hip * s462)
+    s473 = s451 - s445 + (s468 - s467)
+    s474 = s427 + s447 + (x_hip * s459 - y_hip * s456 + (x_hip * s472 - y_hip * s471))
+    s475 = cos_front_left_abduction_angle * s446 - s430 - (x_hip * s457 + y_hip * s455 + x_hip * s473)
+    pivot_trunk = s360 + (s207 - s207 * s364 - y_hip * (s398 + s413)) + (s244 - s244 * s420 + y_hip * (s454 + s469))
+    s476 = s361 + (s392 - (x_hip * s398 + y_hip * s414)) + (s448 + (y_hip * s470 - x_hip * s454))
+    s477 = s362 + (s393 + (x_hip * s397 + y_hip * s381 - y_hip * s417)) + (s449 + (x_hip * s453 - y_hip * s437 + y_hip * s473))
+    s478 = s363 + (s370 - s391 - x_hip * (s402 + s414)) + (s426 - s447 - x_hip * (s458 + s470))
+    s479 = s265 - s295 + (s321 + s351) + (s381 - s411) + (s437 + s467)
+    s480 = s281 - y_hip * s294 + (s337 + y_hip * s350) + (s397 - y_hip * s410) + (s453 + y_hip * s466)
+    s481 = s297 + s353 + s413 + s469
+    s482 = s283 + x_hip * s291 + (s339 + x_hip * s347) + (s399 - x_hip * s407) + (s455 - x_hip * s463)
+    s483 = s476 / pivot_trunk
+    s484 = s477 / pivot_trunk
+    s485 = s479 / pivot_trunk
+    s486 = s480 / pivot_trunk
+    s487 = s481 / pivot_trunk
+    pivot_trunk_2 = s478 - s476 * s483
+    s488 = s303 + s359 + s419 + s475 - s477 * s483
+    s489 = s482 - s479 * s483
+    s490 = s296 - s285 + (s352 - s341) - (s401 + s412) - (s457 + s468) - s480 * s483
+    s491 = s298 + s354 + s414 + s470 - s481 * s483
+    s492 = s488 / pivot_trunk_2
+    s493 = s489 / pivot_trunk_2
+    s494 = s490 / pivot_trunk_2
+    s495 = s491 / pivot_trunk_2
+    pivot_trunk_3 = I_trunk_z + s302 + s358 + s418 + s474 - s477 * s484 - s488 * s492
+    s496 = s299 + s355 + s415 + s471 - s479 * s484 - s489 * s492
+    s497 = s300 + s356 + s416 + s472 - s480 * s484 - s490 * s492
+    s498 = s301 + s357 + s417 + s473 - s481 * s484 - s491 * s492
+    s499 = s496 / pivot_trunk_3
+    s500 = s497 / pivot_trunk_3
+    s501 = s498 / pivot_trunk_3
+    s502 = m_trunk + s259 + s315 + s375 + s431 - s479 * s485 - s489 * s493 - s496 * s499
+    s503 = m_trunk + s292 + s348 + s408 + s464 - s480 * s486 - s490 * s494 - s497 * s500
+    s504 = m_trunk + s293 + s349 + s409 + s465 - s481 * s487 - s491 * s495 - s498 * s501
+    s505 = s290 + s346 + s406 + s462 + s480 * s485 + s490 * s493 + s497 * s499
+    s506 = s291 + s347 + s407 + s463 - s481 * s485 - s491 * s493 - s498 * s499
+    s507 = s294 + s350 + s410 + s466 - s481 * s486 - s491 * s494 - s498 * s500
+    s508 = s15 * s502 - s16 * s505 + s17 * s506
+    s509 = s16 * s503 - s15 * s505 + s17 * s507
+    s510 = s15 * s506 + s16 * s507 + s17 * s504
+    s511 = s18 * s502 - s19 * s505 + s20 * s506
+    s512 = s19 * s503 - s18 * s505 + s20 * s507
+    s513 = s18 * s506 + s19 * s507 + s20 * s504
+    s514 = s21 * (s21 * s502 - s22 * s505 + s23 * s506) + s22 * (s22 * s503 - s21 * s505 + s23 * s507)
+    pivot_trunk_3_2 = s514 + s23 * (s21 * s506 + s22 * s507 + s23 * s504)
+    s515 = s21 * s508 + s22 * s509 + s23 * s510
+    s516 = s21 * s511 + s22 * s512 + s23 * s513
+    s517 = s515 / pivot_trunk_3_2
+    s518 = s516 / pivot_trunk_3_2
+    pivot_trunk_2_2 = s18 * s511 + s19 * s512 + s20 * s513 - s516 * s518
+    s519 = s18 * s508 + s19 * s509 + s20 * s510 - s516 * s517
+    s520 = s519 / pivot_trunk_2_2
     omega_front_left_hip_y = trunk_wy * cos_front_left_abduction_angle + trunk_wz * sin_front_left_abduction_angle
     omega_front_left_hip_z = trunk_wz * cos_front_left_abduction_angle - trunk_wy * sin_front_left_abduction_angle
     omega_front_left_hip_x = trunk_wx + front_left_abduction_angle_dot
@@ -567,1018 +1069,506 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
     omega_hind_right_shank_z = cos_hind_right_knee_angle * omega_hind_right_thigh_z + sin_hind_right_knee_angle * omega_hind_right_thigh_x
     omega_hind_right_shank_x = cos_hind_right_knee_angle * omega_hind_right_thigh_x - sin_hind_right_knee_angle * omega_hind_right_thigh_z
     omega_hind_right_shank_y = hind_right_knee_angle_dot + omega_hind_right_thigh_y
-    bias_trunk_x = g * s21
-    bias_trunk_y = g * s22
-    bias_trunk_z = g * s23
     trunk_wz_squared = trunk_wz * trunk_wz
-    s32 = trunk_wx * trunk_wy
-    s33 = trunk_wx * trunk_wz
-    s34 = trunk_wy * trunk_wz
-    s35 = x_hip * (trunk_wy * trunk_wy + trunk_wz_squared)
-    s36 = y_hip * s32
-    s37 = x_hip * s32
-    s38 = y_hip * (trunk_wx * trunk_wx + trunk_wz_squared)
-    s39 = x_hip * s33
-    s40 = y_hip * s34
-    s41 = s39 + s40
-    bias_front_left_hip_x = bias_trunk_x + (s36 - s35)
-    s42 = bias_trunk_y + (s37 - s38)
-    s43 = bias_trunk_z + s41
-    bias_front_left_hip_y = cos_front_left_abduction_angle * s42 + sin_front_left_abduction_angle * s43
-    bias_front_left_hip_z = cos_front_left_abduction_angle * s43 - sin_front_left_abduction_angle * s42
-    s44 = front_left_abduction_angle_dot * omega_front_left_hip_z
-    s45 = front_left_abduction_angle_dot * omega_front_left_hip_y
+    s521 = trunk_wx * trunk_wy
+    s522 = trunk_wx * trunk_wz
+    s523 = trunk_wy * trunk_wz
+    s524 = x_hip * (trunk_wy * trunk_wy + trunk_wz_squared)
+    s525 = y_hip * s521
+    bias_front_left_hip_x = s525 - s524
+    s526 = x_hip * s521
+    s527 = y_hip * (trunk_wx * trunk_wx + trunk_wz_squared)
+    s528 = s526 - s527
+    s529 = x_hip * s522
+    s530 = y_hip * s523
+    s531 = s529 + s530
+    bias_front_left_hip_y = cos_front_left_abduction_angle * s528 + sin_front_left_abduction_angle * s531
+    bias_front_left_hip_z = cos_front_left_abduction_angle * s531 - sin_front_left_abduction_angle * s528
+    s532 = front_left_abduction_angle_dot * omega_front_left_hip_z
+    s533 = front_left_abduction_angle_dot * omega_front_left_hip_y
     omega_front_left_hip_x_squared = omega_front_left_hip_x * omega_front_left_hip_x
     omega_front_left_hip_y_squared = omega_front_left_hip_y * omega_front_left_hip_y
     omega_front_left_hip_z_squared = omega_front_left_hip_z * omega_front_left_hip_z
-    s46 = omega_front_left_hip_y * omega_front_left_hip_x
-    s47 = omega_front_left_hip_z * omega_front_left_hip_x
-    s48 = omega_front_left_hip_y * omega_front_left_hip_z
-    s49 = s45 + s46
-    s50 = s44 + s47
-    s51 = s46 - s45
-    s52 = omega_front_left_hip_x_squared + omega_front_left_hip_z_squared
-    s53 = s47 - s44
-    s54 = s35 + s36
-    s55 = s37 + s38
-    bias_front_right_hip_x = bias_trunk_x - s54
-    s56 = bias_trunk_y + s55
-    s57 = bias_trunk_z + (s39 - s40)
-    bias_front_right_hip_y = cos_front_right_abduction_angle * s56 + sin_front_right_abduction_angle * s57
-    bias_front_right_hip_z = cos_front_right_abduction_angle * s57 - sin_front_right_abduction_angle * s56
-    s58 = front_right_abduction_angle_dot * omega_front_right_hip_z
-    s59 = front_right_abduction_angle_dot * omega_front_right_hip_y
+    s534 = omega_front_left_hip_y * omega_front_left_hip_x
+    s535 = omega_front_left_hip_z * omega_front_left_hip_x
+    s536 = omega_front_left_hip_y * omega_front_left_hip_z
+    s537 = s533 + s534
+    s538 = s532 + s535
+    s539 = s534 - s533
+    s540 = omega_front_left_hip_x_squared + omega_front_left_hip_z_squared
+    s541 = s535 - s532
+    bias_hind_left_hip_x = s524 + s525
+    s542 = s526 + s527
+    s543 = s529 - s530
+    bias_front_right_hip_y = cos_front_right_abduction_angle * s542 + sin_front_right_abduction_angle * s543
+    bias_front_right_hip_z = cos_front_right_abduction_angle * s543 - sin_front_right_abduction_angle * s542
+    s544 = front_right_abduction_angle_dot * omega_front_right_hip_z
+    s545 = front_right_abduction_angle_dot * omega_front_right_hip_y
     omega_front_right_hip_x_squared = omega_front_right_hip_x * omega_front_right_hip_x
     omega_front_right_hip_y_squared = omega_front_right_hip_y * omega_front_right_hip_y
     omega_front_right_hip_z_squared = omega_front_right_hip_z * omega_front_right_hip_z
-    s60 = omega_front_right_hip_y * omega_front_right_hip_x
-    s61 = omega_front_right_hip_z * omega_front_right_hip_x
-    s62 = omega_front_right_hip_y * omega_front_right_hip_z
-    s63 = s59 + s60
-    s64 = s58 + s61
-    s65 = s60 - s59
-    s66 = omega_front_right_hip_x_squared + omega_front_right_hip_z_squared
-    s67 = s61 - s58
-    bias_hind_left_hip_x = bias_trunk_x + s54
-    s68 = bias_trunk_y - s55
-    s69 = bias_trunk_z + (s40 - s39)
-    bias_hind_left_hip_y = cos_hind_left_abduction_angle * s68 + sin_hind_left_abduction_angle * s69
-    bias_hind_left_hip_z = cos_hind_left_abduction_angle * s69 - sin_hind_left_abduction_angle * s68
-    s70 = hind_left_abduction_angle_dot * omega_hind_left_hip_z
-    s71 = hind_left_abduction_angle_dot * omega_hind_left_hip_y
+    s546 = omega_front_right_hip_y * omega_front_right_hip_x
+    s547 = omega_front_right_hip_z * omega_front_right_hip_x
+    s548 = omega_front_right_hip_y * omega_front_right_hip_z
+    s549 = s545 + s546
+    s550 = s544 + s547
+    s551 = s546 - s545
+    s552 = omega_front_right_hip_x_squared + omega_front_right_hip_z_squared
+    s553 = s547 - s544
+    s554 = s530 - s529
+    bias_hind_left_hip_y = sin_hind_left_abduction_angle * s554 - cos_hind_left_abduction_angle * s542
+    bias_hind_left_hip_z = cos_hind_left_abduction_angle * s554 + sin_hind_left_abduction_angle * s542
+    s555 = hind_left_abduction_angle_dot * omega_hind_left_hip_z
+    s556 = hind_left_abduction_angle_dot * omega_hind_left_hip_y
     omega_hind_left_hip_x_squared = omega_hind_left_hip_x * omega_hind_left_hip_x
     omega_hind_left_hip_y_squared = omega_hind_left_hip_y * omega_hind_left_hip_y
     omega_hind_left_hip_z_squared = omega_hind_left_hip_z * omega_hind_left_hip_z
-    s72 = omega_hind_left_hip_y * omega_hind_left_hip_x
-    s73 = omega_hind_left_hip_z * omega_hind_left_hip_x
-    s74 = omega_hind_left_hip_y * omega_hind_left_hip_z
-    s75 = s71 + s72
-    s76 = s70 + s73
-    s77 = s72 - s71
-    s78 = omega_hind_left_hip_x_squared + omega_hind_left_hip_z_squared
-    s79 = s73 - s70
-    bias_hind_right_hip_x = bias_trunk_x + (s35 - s36)
-    s80 = bias_trunk_y + (s38 - s37)
-    s81 = bias_trunk_z - s41
-    bias_hind_right_hip_y = cos_hind_right_abduction_angle * s80 + sin_hind_right_abduction_angle * s81
-    bias_hind_right_hip_z = cos_hind_right_abduction_angle * s81 - sin_hind_right_abduction_angle * s80
-    s82 = hind_right_abduction_angle_dot * omega_hind_right_hip_z
-    s83 = hind_right_abduction_angle_dot * omega_hind_right_hip_y
+    s557 = omega_hind_left_hip_y * omega_hind_left_hip_x
+    s558 = omega_hind_left_hip_z * omega_hind_left_hip_x
+    s559 = omega_hind_left_hip_y * omega_hind_left_hip_z
+    s560 = s556 + s557
+    s561 = s555 + s558
+    s562 = s557 - s556
+    s563 = omega_hind_left_hip_x_squared + omega_hind_left_hip_z_squared
+    s564 = s558 - s555
+    bias_hind_right_hip_x = s524 - s525
+    s565 = s527 - s526
+    bias_hind_right_hip_y = cos_hind_right_abduction_angle * s565 - sin_hind_right_abduction_angle * s531
+    s566 = cos_hind_right_abduction_angle * s531 + sin_hind_right_abduction_angle * s565
+    s567 = hind_right_abduction_angle_dot * omega_hind_right_hip_z
+    s568 = hind_right_abduction_angle_dot * omega_hind_right_hip_y
     omega_hind_right_hip_x_squared = omega_hind_right_hip_x * omega_hind_right_hip_x
     omega_hind_right_hip_y_squared = omega_hind_right_hip_y * omega_hind_right_hip_y
     omega_hind_right_hip_z_squared = omega_hind_right_hip_z * omega_hind_right_hip_z
-    s84 = omega_hind_right_hip_y * omega_hind_right_hip_x
-    s85 = omega_hind_right_hip_z * omega_hind_right_hip_x
-    s86 = omega_hind_right_hip_y * omega_hind_right_hip_z
-    s87 = s83 + s84
-    s88 = s82 + s85
-    s89 = s84 - s83
-    s90 = omega_hind_right_hip_x_squared + omega_hind_right_hip_z_squared
-    s91 = s85 - s82
-    s92 = bias_front_left_hip_x + k2 * s49
-    bias_front_left_thigh_y = bias_front_left_hip_y - k2 * s52
-    s93 = bias_front_left_hip_z + k2 * s48
-    bias_front_left_thigh_z = cos_front_left_swing_angle * s93 + sin_front_left_swing_angle * s92
-    bias_front_left_thigh_x = cos_front_left_swing_angle * s92 - sin_front_left_swing_angle * s93
-    s94 = sin_front_left_swing_angle * s45 - front_left_swing_angle_dot * omega_front_left_thigh_z
-    s95 = front_left_swing_angle_dot * omega_front_left_thigh_x - cos_front_left_swing_angle * s45
+    s569 = omega_hind_right_hip_y * omega_hind_right_hip_x
+    s570 = omega_hind_right_hip_z * omega_hind_right_hip_x
+    s571 = omega_hind_right_hip_y * omega_hind_right_hip_z
+    s572 = s568 + s569
+    s573 = s567 + s570
+    s574 = s569 - s568
+    s575 = omega_hind_right_hip_x_squared + omega_hind_right_hip_z_squared
+    s576 = s570 - s567
+    s577 = bias_front_left_hip_x + k2 * s537
+    bias_front_left_thigh_y = bias_front_left_hip_y - k2 * s540
+    s578 = bias_front_left_hip_z + k2 * s536
+    bias_front_left_thigh_z = cos_front_left_swing_angle * s578 + sin_front_left_swing_angle * s577
+    bias_front_left_thigh_x = cos_front_left_swing_angle * s577 - sin_front_left_swing_angle * s578
+    s579 = sin_front_left_swing_angle * s533 - front_left_swing_angle_dot * omega_front_left_thigh_z
+    s580 = front_left_swing_angle_dot * omega_front_left_thigh_x - cos_front_left_swing_angle * s533
     omega_front_left_thigh_x_squared = omega_front_left_thigh_x * omega_front_left_thigh_x
     omega_front_left_thigh_y_squared = omega_front_left_thigh_y * omega_front_left_thigh_y
     omega_front_left_thigh_z_squared = omega_front_left_thigh_z * omega_front_left_thigh_z
-    s96 = omega_front_left_thigh_x * omega_front_left_thigh_y
-    s97 = omega_front_left_thigh_z * omega_front_left_thigh_x
-    s98 = omega_front_left_thigh_z * omega_front_left_thigh_y
-    s99 = s96 - s95
-    s100 = s44 + s97
-    s101 = s98 - s94
-    s102 = s94 + s98
-    s103 = omega_front_left_thigh_x_squared + omega_front_left_thigh_y_squared
-    s104 = bias_front_right_hip_x + k3 * s63
-    bias_front_right_thigh_y = bias_front_right_hip_y - k3 * s66
-    s105 = bias_front_right_hip_z + k3 * s62
-    bias_front_right_thigh_z = cos_front_right_swing_angle * s105 + sin_front_right_swing_angle * s104
-    bias_front_right_thigh_x = cos_front_right_swing_angle * s104 - sin_front_right_swing_angle * s105
-    s106 = sin_front_right_swing_angle * s59 - front_right_swing_angle_dot * omega_front_right_thigh_z
-    s107 = front_right_swing_angle_dot * omega_front_right_thigh_x - cos_front_right_swing_angle * s59
+    s581 = omega_front_left_thigh_x * omega_front_left_thigh_y
+    s582 = omega_front_left_thigh_z * omega_front_left_thigh_x
+    s583 = omega_front_left_thigh_z * omega_front_left_thigh_y
+    s584 = s581 - s580
+    s585 = s532 + s582
+    s586 = s583 - s579
+    s587 = s579 + s583
+    s588 = omega_front_left_thigh_x_squared + omega_front_left_thigh_y_squared
+    s589 = k3 * s549 - bias_hind_left_hip_x
+    bias_front_right_thigh_y = bias_front_right_hip_y - k3 * s552
+    s590 = bias_front_right_hip_z + k3 * s548
+    bias_front_right_thigh_z = cos_front_right_swing_angle * s590 + sin_front_right_swing_angle * s589
+    bias_front_right_thigh_x = cos_front_right_swing_angle * s589 - sin_front_right_swing_angle * s590
+    s591 = sin_front_right_swing_angle * s545 - front_right_swing_angle_dot * omega_front_right_thigh_z
+    s592 = front_right_swing_angle_dot * omega_front_right_thigh_x - cos_front_right_swing_angle * s545
     omega_front_right_thigh_x_squared = omega_front_right_thigh_x * omega_front_right_thigh_x
     omega_front_right_thigh_y_squared = omega_front_right_thigh_y * omega_front_right_thigh_y
     omega_front_right_thigh_z_squared = omega_front_right_thigh_z * omega_front_right_thigh_z
-    s108 = omega_front_right_thigh_x * omega_front_right_thigh_y
-    s109 = omega_front_right_thigh_z * omega_front_right_thigh_x
-    s110 = omega_front_right_thigh_z * omega_front_right_thigh_y
-    s111 = s108 - s107
-    s112 = s58 + s109
-    s113 = s110 - s106
-    s114 = s106 + s110
-    s115 = omega_front_right_thigh_x_squared + omega_front_right_thigh_y_squared
-    s116 = bias_hind_left_hip_x + k2 * s75
-    bias_hind_left_thigh_y = bias_hind_left_hip_y - k2 * s78
-    s117 = bias_hind_left_hip_z + k2 * s74
-    bias_hind_left_thigh_z = cos_hind_left_swing_angle * s117 + sin_hind_left_swing_angle * s116
-    bias_hind_left_thigh_x = cos_hind_left_swing_angle * s116 - sin_hind_left_swing_angle * s117
-    s118 = sin_hind_left_swing_angle * s71 - hind_left_swing_angle_dot * omega_hind_left_thigh_z
-    s119 = hind_left_swing_angle_dot * omega_hind_left_thigh_x - cos_hind_left_swing_angle * s71
+    s593 = omega_front_right_thigh_x * omega_front_right_thigh_y
+    s594 = omega_front_right_thigh_z * omega_front_right_thigh_x
+    s595 = omega_front_right_thigh_z * omega_front_right_thigh_y
+    s596 = s593 - s592
+    s597 = s544 + s594
+    s598 = s595 - s591
+    s599 = s591 + s595
+    s600 = omega_front_right_thigh_x_squared + omega_front_right_thigh_y_squared
+    s601 = bias_hind_left_hip_x + k2 * s560
+    bias_hind_left_thigh_y = bias_hind_left_hip_y - k2 * s563
+    s602 = bias_hind_left_hip_z + k2 * s559
+    bias_hind_left_thigh_z = cos_hind_left_swing_angle * s602 + sin_hind_left_swing_angle * s601
+    bias_hind_left_thigh_x = cos_hind_left_swing_angle * s601 - sin_hind_left_swing_angle * s602
+    s603 = sin_hind_left_swing_angle * s556 - hind_left_swing_angle_dot * omega_hind_left_thigh_z
+    s604 = hind_left_swing_angle_dot * omega_hind_left_thigh_x - cos_hind_left_swing_angle * s556
     omega_hind_left_thigh_x_squared = omega_hind_left_thigh_x * omega_hind_left_thigh_x
     omega_hind_left_thigh_y_squared = omega_hind_left_thigh_y * omega_hind_left_thigh_y
     omega_hind_left_thigh_z_squared = omega_hind_left_thigh_z * omega_hind_left_thigh_z
-    s120 = omega_hind_left_thigh_x * omega_hind_left_thigh_y
-    s121 = omega_hind_left_thigh_z * omega_hind_left_thigh_x
-    s122 = omega_hind_left_thigh_z * omega_hind_left_thigh_y
-    s123 = s120 - s119
-    s124 = s70 + s121
-    s125 = s122 - s118
-    s126 = s118 + s122
-    s127 = omega_hind_left_thigh_x_squared + omega_hind_left_thigh_y_squared
-    s128 = bias_hind_right_hip_x + k3 * s87
-    bias_hind_right_thigh_y = bias_hind_right_hip_y - k3 * s90
-    s129 = bias_hind_right_hip_z + k3 * s86
-    bias_hind_right_thigh_z = cos_hind_right_swing_angle * s129 + sin_hind_right_swing_angle * s128
-    bias_hind_right_thigh_x = cos_hind_right_swing_angle * s128 - sin_hind_right_swing_angle * s129
-    s130 = sin_hind_right_swing_angle * s83 - hind_right_swing_angle_dot * omega_hind_right_thigh_z
-    s131 = hind_right_swing_angle_dot * omega_hind_right_thigh_x - cos_hind_right_swing_angle * s83
+    s605 = omega_hind_left_thigh_x * omega_hind_left_thigh_y
+    s606 = omega_hind_left_thigh_z * omega_hind_left_thigh_x
+    s607 = omega_hind_left_thigh_z * omega_hind_left_thigh_y
+    s608 = s605 - s604
+    s609 = s555 + s606
+    s610 = s607 - s603
+    s611 = s603 + s607
+    s612 = omega_hind_left_thigh_x_squared + omega_hind_left_thigh_y_squared
+    s613 = bias_hind_right_hip_x + k3 * s572
+    bias_hind_right_thigh_y = bias_hind_right_hip_y - k3 * s575
+    s614 = k3 * s571 - s566
+    bias_hind_right_thigh_z = cos_hind_right_swing_angle * s614 + sin_hind_right_swing_angle * s613
+    bias_hind_right_thigh_x = cos_hind_right_swing_angle * s613 - sin_hind_right_swing_angle * s614
+    s615 = sin_hind_right_swing_angle * s568 - hind_right_swing_angle_dot * omega_hind_right_thigh_z
+    s616 = hind_right_swing_angle_dot * omega_hind_right_thigh_x - cos_hind_right_swing_angle * s568
     omega_hind_right_thigh_x_squared = omega_hind_right_thigh_x * omega_hind_right_thigh_x
     omega_hind_right_thigh_y_squared = omega_hind_right_thigh_y * omega_hind_right_thigh_y
     omega_hind_right_thigh_z_squared = omega_hind_right_thigh_z * omega_hind_right_thigh_z
-    s132 = omega_hind_right_thigh_x * omega_hind_right_thigh_y
-    s133 = omega_hind_right_thigh_z * omega_hind_right_thigh_x
-    s134 = omega_hind_right_thigh_z * omega_hind_right_thigh_y
-    s135 = s132 - s131
-    s136 = s82 + s133
-    s137 = s134 - s130
-    s138 = s130 + s134
-    s139 = omega_hind_right_thigh_x_squared + omega_hind_right_thigh_y_squared
-    s140 = bias_front_left_thigh_x + k4 * s100
-    bias_front_left_shank_y = bias_front_left_thigh_y + k4 * s101
-    s141 = bias_front_left_thigh_z - k4 * s103
-    bias_front_left_shank_x = cos_front_left_knee_angle * s140 - sin_front_left_knee_angle * s141
-    s142 = cos_front_left_knee_angle * s94 - sin_front_left_knee_angle * s95 - front_left_knee_angle_dot * omega_front_left_shank_z
-    s143 = cos_front_left_knee_angle * s95 + sin_front_left_knee_angle * s94 + front_left_knee_angle_dot * omega_front_left_shank_x
-    s144 = omega_front_left_shank_x * omega_front_left_shank_y
-    s145 = omega_front_left_shank_z * omega_front_left_shank_x
-    s146 = omega_front_left_shank_z * omega_front_left_shank_y
-    s147 = s44 + s145
-    s148 = s146 - s142
-    s149 = omega_front_left_shank_x * omega_front_left_shank_x + omega_front_left_shank_y * omega_front_left_shank_y
-    s150 = bias_front_right_thigh_x + k4 * s112
-    bias_front_right_shank_y = bias_front_right_thigh_y + k4 * s113
-    s151 = bias_front_right_thigh_z - k4 * s115
-    bias_front_right_shank_x = cos_front_right_knee_angle * s150 - sin_front_right_knee_angle * s151
-    s152 = cos_front_right_knee_angle * s106 - sin_front_right_knee_angle * s107 - front_right_knee_angle_dot * omega_front_right_shank_z
-    s153 = cos_front_right_knee_angle * s107 + sin_front_right_knee_angle * s106 + front_right_knee_angle_dot * omega_front_right_shank_x
-    s154 = omega_front_right_shank_x * omega_front_right_shank_y
-    s155 = omega_front_right_shank_z * omega_front_right_shank_x
-    s156 = omega_front_right_shank_z * omega_front_right_shank_y
-    s157 = s58 + s155
-    s158 = s156 - s152
-    s159 = omega_front_right_shank_x * omega_front_right_shank_x + omega_front_right_shank_y * omega_front_right_shank_y
-    s160 = bias_hind_left_thigh_x + k4 * s124
-    bias_hind_left_shank_y = bias_hind_left_thigh_y + k4 * s125
-    s161 = bias_hind_left_thigh_z - k4 * s127
-    bias_hind_left_shank_x = cos_hind_left_knee_angle * s160 - sin_hind_left_knee_angle * s161
-    s162 = cos_hind_left_knee_angle * s118 - sin_hind_left_knee_angle * s119 - hind_left_knee_angle_dot * omega_hind_left_shank_z
-    s163 = cos_hind_left_knee_angle * s119 + sin_hind_left_knee_angle * s118 + hind_left_knee_angle_dot * omega_hind_left_shank_x
-    s164 = omega_hind_left_shank_x * omega_hind_left_shank_y
-    s165 = omega_hind_left_shank_z * omega_hind_left_shank_x
-    s166 = omega_hind_left_shank_z * omega_hind_left_shank_y
-    s167 = s70 + s165
-    s168 = s166 - s162
-    s169 = omega_hind_left_shank_x * omega_hind_left_shank_x + omega_hind_left_shank_y * omega_hind_left_shank_y
-    s170 = bias_hind_right_thigh_x + k4 * s136
-    bias_hind_right_shank_y = bias_hind_right_thigh_y + k4 * s137
-    s171 = bias_hind_right_thigh_z - k4 * s139
-    bias_hind_right_shank_x = cos_hind_right_knee_angle * s170 - sin_hind_right_knee_angle * s171
-    s172 = cos_hind_right_knee_angle * s130 - sin_hind_right_knee_angle * s131 - hind_right_knee_angle_dot * omega_hind_right_shank_z
-    s173 = cos_hind_right_knee_angle * s131 + sin_hind_right_knee_angle * s130 + hind_right_knee_angle_dot * omega_hind_right_shank_x
-    s174 = omega_hind_right_shank_x * omega_hind_right_shank_y
-    s175 = omega_hind_right_shank_z * omega_hind_right_shank_x
-    s176 = omega_hind_right_shank_z * omega_hind_right_shank_y
-    s177 = s82 + s175
-    s178 = s176 - s172
-    s179 = omega_hind_right_shank_x * omega_hind_right_shank_x + omega_hind_right_shank_y * omega_hind_right_shank_y
-    s180 = I_hip_yz * (omega_front_left_hip_z_squared - omega_front_left_hip_y_squared)
-    s181 = I_hip_xz * (omega_front_left_hip_x_squared - omega_front_left_hip_z_squared)
-    s182 = I_hip_xy * (omega_front_left_hip_y_squared - omega_front_left_hip_x_squared)
-    s183 = moment_front_left_hip_y * bias_front_left_hip_z + (I_hip_xz * s51 - I_hip_xy * s53 - s180 + s48 * k11 - s48 * k12)
-    s184 = I_hip_yz * s50 - I_hip_xz * s48 - s182 + s51 * k10 - s49 * k11 - moment_front_left_hip_y * bias_front_left_hip_x
-    s185 = I_hip_yz * (omega_front_right_hip_z_squared - omega_front_right_hip_y_squared)
-    s186 = I_hip_xz * (omega_front_right_hip_x_squared - omega_front_right_hip_z_squared)
-    s187 = I_hip_xy * (omega_front_right_hip_y_squared - omega_front_right_hip_x_squared)
-    s188 = I_hip_xy * s67 + I_hip_xz * s65 + s185 + s62 * k11 - s62 * k12 - moment_front_left_hip_y * bias_front_right_hip_z
-    s189 = moment_front_left_hip_y * bias_front_right_hip_x + (s187 - (I_hip_xz * s62 + I_hip_yz * s64) + s65 * k10 - s63 * k11)
-    s190 = I_hip_yz * (omega_hind_left_hip_z_squared - omega_hind_left_hip_y_squared)
-    s191 = I_hip_xz * (omega_hind_left_hip_x_squared - omega_hind_left_hip_z_squared)
-    s192 = I_hip_xy * (omega_hind_left_hip_y_squared - omega_hind_left_hip_x_squared)
-    s193 = moment_front_left_hip_y * bias_hind_left_hip_z + (I_hip_xz * s77 - I_hip_xy * s79 - s190 + s74 * k11 - s74 * k12)
-    s194 = I_hip_yz * s76 - I_hip_xz * s74 - s192 + s77 * k10 - s75 * k11 - moment_front_left_hip_y * bias_hind_left_hip_x
-    s195 = I_hip_yz * (omega_hind_right_hip_z_squared - omega_hind_right_hip_y_squared)
-    s196 = I_hip_xz * (omega_hind_right_hip_x_squared - omega_hind_right_hip_z_squared)
-    s197 = I_hip_xy * (omega_hind_right_hip_y_squared - omega_hind_right_hip_x_squared)
-    s198 = I_hip_xy * s91 + I_hip_xz * s89 + s195 + s86 * k11 - s86 * k12 - moment_front_left_hip_y * bias_hind_right_hip_z
-    s199 = moment_front_left_hip_y * bias_hind_right_hip_x + (s197 - (I_hip_xz * s86 + I_hip_yz * s88) + s89 * k10 - s87 * k11)
-    s200 = moment_front_left_thigh_y * (omega_front_left_thigh_x_squared + omega_front_left_thigh_z_squared)
-    s201 = m_thigh * bias_front_left_thigh_x + (moment_front_left_thigh_y * s99 - k5 * s100)
-    s202 = m_thigh * bias_front_left_thigh_z + (moment_front_left_thigh_y * s102 + k5 * s103)
-    s203 = moment_front_left_thigh_y * bias_front_left_thigh_z + k5 * bias_front_left_thigh_y
-    s204 = inertia_front_left_thigh_yz * (omega_front_left_thigh_z_squared - omega_front_left_thigh_y_squared)
-    s205 = s100 * k15 - inertia_front_left_thigh_yz * s99 - (s97 - s44) * k13 - k5 * bias_front_left_thigh_x
-    s206 = inertia_front_left_thigh_yz * s100 + (s95 + s96) * k13 - s99 * k14 - moment_front_left_thigh_y * bias_front_left_thigh_x
-    s207 = moment_front_left_thigh_y * (omega_front_right_thigh_x_squared + omega_front_right_thigh_z_squared)
-    s208 = m_thigh * bias_front_right_thigh_x - (moment_front_left_thigh_y * s111 + k5 * s112)
-    s209 = m_thigh * bias_front_right_thigh_z + (k5 * s115 - moment_front_left_thigh_y * s114)
-    s210 = k5 * bias_front_right_thigh_y - moment_front_left_thigh_y * bias_front_right_thigh_z
-    s211 = inertia_front_left_thigh_yz * (omega_front_right_thigh_z_squared - omega_front_right_thigh_y_squared)
-    s212 = inertia_front_left_thigh_yz * s111 + s112 * k15 - (s109 - s58) * k13 - k5 * bias_front_right_thigh_x
-    s213 = moment_front_left_thigh_y * bias_front_right_thigh_x + ((s107 + s108) * k13 - inertia_front_left_thigh_yz * s112 - s111 * k14)
-    s214 = moment_front_left_thigh_y * (omega_hind_left_thigh_x_squared + omega_hind_left_thigh_z_squared)
-    s215 = m_thigh * bias_hind_left_thigh_x + (moment_front_left_thigh_y * s123 - k5 * s124)
-    s216 = m_thigh * bias_hind_left_thigh_z + (moment_front_left_thigh_y * s126 + k5 * s127)
-    s217 = moment_front_left_thigh_y * bias_hind_left_thigh_z + k5 * bias_hind_left_thigh_y
-    s218 = inertia_front_left_thigh_yz * (omega_hind_left_thigh_z_squared - omega_hind_left_thigh_y_squared)
-    s219 = s124 * k15 - inertia_front_left_thigh_yz * s123 - (s121 - s70) * k13 - k5 * bias_hind_left_thigh_x
-    s220 = inertia_front_left_thigh_yz * s124 + (s119 + s120) * k13 - s123 * k14 - moment_front_left_thigh_y * bias_hind_left_thigh_x
-    s221 = moment_front_left_thigh_y * (omega_hind_right_thigh_x_squared + omega_hind_right_thigh_z_squared)
-    s222 = m_thigh * bias_hind_right_thigh_x - (moment_front_left_thigh_y * s135 + k5 * s136)
-    s223 = m_thigh * bias_hind_right_thigh_z + (k5 * s139 - moment_front_left_thigh_y * s138)
-    s224 = k5 * bias_hind_right_thigh_y - moment_front_left_thigh_y * bias_hind_right_thigh_z
-    s225 = inertia_front_left_thigh_yz * (omega_hind_right_thigh_z_squared - omega_hind_right_thigh_y_squared)
-    s226 = inertia_front_left_thigh_yz * s135 + s136 * k15 - (s133 - s82) * k13 - k5 * bias_hind_right_thigh_x
-    s227 = moment_front_left_thigh_y * bias_hind_right_thigh_x + ((s131 + s132) * k13 - inertia_front_left_thigh_yz * s136 - s135 * k14)
-    s228 = m_shank * (cos_front_left_knee_angle * s141 + sin_front_left_knee_angle * s140)
-    s229 = m_shank * bias_front_left_shank_y - k6 * s148
-    s230 = s228 + k6 * s149
-    s231 = k6 * bias_front_left_shank_x
-    s232 = s147 * k18 - (s145 - s44) * k16
-    s233 = (s143 + s144) * k16 - (s144 - s143) * k17
-    s234 = k6 * bias_front_left_shank_y + ((s142 + s146) * k17 - s148 * k18)
-    s235 = m_shank * (cos_front_right_knee_angle * s151 + sin_front_right_knee_angle * s150)
-    s236 = m_shank * bias_front_right_shank_y - k6 * s158
-    s237 = s235 + k6 * s159
-    s238 = k6 * bias_front_right_shank_x
-    s239 = s157 * k18 - (s155 - s58) * k16
-    s240 = (s153 + s154) * k16 - (s154 - s153) * k17
-    s241 = k6 * bias_front_right_shank_y + ((s152 + s156) * k17 - s158 * k18)
-    s242 = m_shank * (cos_hind_left_knee_angle * s161 + sin_hind_left_knee_angle * s160)
-    s243 = m_shank * bias_hind_left_shank_y - k6 * s168
-    s244 = s242 + k6 * s169
-    s245 = k6 * bias_hind_left_shank_x
-    s246 = s167 * k18 - (s165 - s70) * k16
-    s247 = (s163 + s164) * k16 - (s164 - s163) * k17
-    s248 = k6 * bias_hind_left_shank_y + ((s162 + s166) * k17 - s168 * k18)
-    s249 = m_shank * (cos_hind_right_knee_angle * s171 + sin_hind_right_knee_angle * s170)
-    s250 = m_shank * bias_hind_right_shank_y - k6 * s178
-    s251 = s249 + k6 * s179
-    s252 = k6 * bias_hind_right_shank_x
-    s253 = s177 * k18 - (s175 - s82) * k16
-    s254 = (s173 + s174) * k16 - (s174 - s173) * k17
-    s255 = k6 * bias_hind_right_shank_y + ((s172 + s176) * k17 - s178 * k18)
-    s256 = sin_hind_right_knee_angle * k23
-    s257 = sin_hind_right_knee_angle * s256
-    s258 = cos_hind_right_knee_angle * k22
-    s259 = k6 * sin_hind_right_knee_angle
-    s260 = k6 * cos_hind_right_knee_angle
-    s261 = sin_hind_right_knee_angle * k24
-    s262 = sin_hind_right_knee_angle * s261
-    s263 = k21 + s262
-    s264 = cos_hind_right_knee_angle * s261
-    s265 = s260 - k25
-    s266 = s258 + k4 * s263
-    s267 = k4 * s264 - sin_hind_right_knee_angle * k22
-    s268 = cos_hind_right_knee_angle * s256 + k4 * s259
-    s269 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s257 - k4 * (s260 + s265))
-    s270 = k4 * (s258 + s266) + k26
-    s271 = k5 + s265
-    s272 = s266 - k5
-    s273 = sin_hind_left_knee_angle * k23
-    s274 = sin_hind_left_knee_angle * s273
-    s275 = cos_hind_left_knee_angle * k22
-    s276 = k6 * sin_hind_left_knee_angle
-    s277 = k6 * cos_hind_left_knee_angle
-    s278 = sin_hind_left_knee_angle * k24
-    s279 = sin_hind_left_knee_angle * s278
-    s280 = k21 + s279
-    s281 = cos_hind_left_knee_angle * s278
-    s282 = s277 - k25
-    s283 = s275 + k4 * s280
-    s284 = k4 * s281 - sin_hind_left_knee_angle * k22
-    s285 = cos_hind_left_knee_angle * s273 + k4 * s276
-    s286 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s274 - k4 * (s277 + s282))
-    s287 = k26 + k4 * (s275 + s283)
-    s288 = k5 + s282
-    s289 = s283 - k5
-    s290 = sin_front_right_knee_angle * k23
-    s291 = sin_front_right_knee_angle * s290
-    s292 = cos_front_right_knee_angle * k22
-    s293 = k6 * sin_front_right_knee_angle
-    s294 = k6 * cos_front_right_knee_angle
-    s295 = sin_front_right_knee_angle * k24
-    s296 = sin_front_right_knee_angle * s295
-    s297 = k21 + s296
-    s298 = cos_front_right_knee_angle * s295
-    s299 = s294 - k25
-    s300 = s292 + k4 * s297
-    s301 = k4 * s298 - sin_front_right_knee_angle * k22
-    s302 = cos_front_right_knee_angle * s290 + k4 * s293
-    s303 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s291 - k4 * (s294 + s299))
-    s304 = k26 + k4 * (s292 + s300)
-    s305 = k5 + s299
-    s306 = s300 - k5
-    s307 = sin_front_left_knee_angle * k23
-    s308 = sin_front_left_knee_angle * s307
-    s309 = cos_front_left_knee_angle * k22
-    s310 = k6 * sin_front_left_knee_angle
-    s311 = k6 * cos_front_left_knee_angle
-    s312 = sin_front_left_knee_angle * k24
-    s313 = sin_front_left_knee_angle * s312
-    s314 = k21 + s313
-    s315 = cos_front_left_knee_angle * s312
-    s316 = s311 - k25
-    s317 = s309 + k4 * s314
-    s318 = k4 * s315 - sin_front_left_knee_angle * k22
-    s319 = cos_front_left_knee_angle * s307 + k4 * s310
-    s320 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s308 - k4 * (s311 + s316))
-    s321 = k26 + k4 * (s309 + s317)
-    s322 = k5 + s316
-    s323 = s317 - k5
-    pivot_hind_right_thigh = k1 + s270
-    s324 = s270 / pivot_hind_right_thigh
-    s325 = inertia_front_left_thigh_yz / pivot_hind_right_thigh
-    s326 = s272 / pivot_hind_right_thigh
-    s327 = s267 / pivot_hind_right_thigh
-    s328 = inertia_front_left_thigh_zz + (I_shank_z - s257) - inertia_front_left_thigh_yz * s325
-    s329 = inertia_front_left_thigh_yz * s324 - inertia_front_left_thigh_yz
-    s330 = m_thigh + s263 - s272 * s326
-    s331 = m_thigh + (m_shank - s262) - s267 * s327
-    s332 = s264 - s267 * s326
-    s333 = s272 - s272 * s324
-    s334 = s267 - s267 * s324
-    s335 = moment_front_left_thigh_y + s272 * s325
-    s336 = s267 * s325
-    s337 = sin_hind_right_swing_angle * (s328 - s269) + s31 * s268
-    s338 = sin_hind_right_swing_angle * s337
-    s339 = sin_hind_right_swing_angle * s336 + cos_hind_right_swing_angle * (s335 - moment_front_left_thigh_y)
-    s340 = sin_hind_right_swing_angle * s339
-    s341 = cos_hind_right_swing_angle * s339
-    s342 = cos_hind_right_swing_angle * s334 - sin_hind_right_swing_angle * s333
-    s343 = sin_hind_right_swing_angle * s334 + cos_hind_right_swing_angle * s333
-    s344 = cos_hind_right_swing_angle * s271 - sin_hind_right_swing_angle * s259
-    s345 = moment_front_left_thigh_y + s341
-    s346 = s341 - s335
-    s347 = sin_hind_right_swing_angle * (s331 - s330) + s31 * s332
-    s348 = sin_hind_right_swing_angle * s347
-    s349 = s331 - s348
-    s350 = s330 + s348
-    s351 = cos_hind_right_swing_angle * s347 - s332
-    s352 = k3 * s351
-    s353 = s340 + s352
-    s354 = s346 + k3 * s349
-    s355 = s345 - k3 * s350
-    s356 = s336 - s340 - s352
-    s357 = inertia_front_left_hip_xx + (s269 + s338 + k3 * (s346 + s354))
-    s358 = sin_hind_right_swing_angle * s329 + k3 * s342 - I_hip_xy
-    s359 = I_hip_xz + (cos_hind_right_swing_angle * s337 - s268 + k3 * (s356 - s340))
-    s360 = s354 - moment_front_left_hip_y
-    pivot_hind_left_thigh = k1 + s287
-    s361 = s287 / pivot_hind_left_thigh
-    s362 = inertia_front_left_thigh_yz / pivot_hind_left_thigh
-    s363 = s289 / pivot_hind_left_thigh
-    s364 = s284 / pivot_hind_left_thigh
-    s365 = inertia_front_left_thigh_zz + (I_shank_z - s274) - inertia_front_left_thigh_yz * s362
-    s366 = inertia_front_left_thigh_yz - inertia_front_left_thigh_yz * s361
-    s367 = m_thigh + s280 - s289 * s363
-    s368 = m_thigh + (m_shank - s279) - s284 * s364
-    s369 = s281 - s284 * s363
-    s370 = s289 - s289 * s361
-    s371 = s284 - s284 * s361
-    s372 = moment_front_left_thigh_y + s289 * s362
-    s373 = s284 * s362
-    s374 = sin_hind_left_swing_angle * (s365 - s286) + s30 * s285
-    s375 = sin_hind_left_swing_angle * s374
-    s376 = cos_hind_left_swing_angle * (moment_front_left_thigh_y - s372) - sin_hind_left_swing_angle * s373
-    s377 = sin_hind_left_swing_angle * s376
-    s378 = cos_hind_left_swing_angle * s376
-    s379 = cos_hind_left_swing_angle * s371 - sin_hind_left_swing_angle * s370
-    s380 = sin_hind_left_swing_angle * s371 + cos_hind_left_swing_angle * s370
-    s381 = cos_hind_left_swing_angle * s288 - sin_hind_left_swing_angle * s276
-    s382 = s378 - moment_front_left_thigh_y
-    s383 = s372 + s378
-    s384 = sin_hind_left_swing_angle * (s368 - s367) + s30 * s369
-    s385 = sin_hind_left_swing_angle * s384
-    s386 = s368 - s385
-    s387 = s367 + s385
-    s388 = cos_hind_left_swing_angle * s384 - s369
-    s389 = k2 * s388
-    s390 = s377 + s389
-    s391 = s383 + k2 * s386
-    s392 = s382 - k2 * s387
-    s393 = s373 + s377 + s389
-    s394 = inertia_front_left_hip_xx + (s286 + s375 + k2 * (s383 + s391))
-    s395 = I_hip_xy + (sin_hind_left_swing_angle * s366 + k2 * s379)
-    s396 = I_hip_xz + (cos_hind_left_swing_angle * s374 - s285 - k2 * (s377 + s393))
-    s397 = moment_front_left_hip_y + s391
-    pivot_front_right_thigh = k1 + s304
-    s398 = s304 / pivot_front_right_thigh
-    s399 = inertia_front_left_thigh_yz / pivot_front_right_thigh
-    s400 = s306 / pivot_front_right_thigh
-    s401 = s301 / pivot_front_right_thigh
-    s402 = inertia_front_left_thigh_zz + (I_shank_z - s291) - inertia_front_left_thigh_yz * s399
-    s403 = inertia_front_left_thigh_yz * s398 - inertia_front_left_thigh_yz
-    s404 = m_thigh + s297 - s306 * s400
-    s405 = m_thigh + (m_shank - s296) - s301 * s401
-    s406 = s298 - s301 * s400
-    s407 = s306 - s306 * s398
-    s408 = s301 - s301 * s398
-    s409 = moment_front_left_thigh_y + s306 * s399
-    s410 = s301 * s399
-    s411 = sin_front_right_swing_angle * (s402 - s303) + s29 * s302
-    s412 = sin_front_right_swing_angle * s411
-    s413 = sin_front_right_swing_angle * s410 + cos_front_right_swing_angle * (s409 - moment_front_left_thigh_y)
-    s414 = sin_front_right_swing_angle * s413
-    s415 = cos_front_right_swing_angle * s413
-    s416 = cos_front_right_swing_angle * s408 - sin_front_right_swing_angle * s407
-    s417 = sin_front_right_swing_angle * s408 + cos_front_right_swing_angle * s407
-    s418 = cos_front_right_swing_angle * s305 - sin_front_right_swing_angle * s293
-    s419 = moment_front_left_thigh_y + s415
-    s420 = s415 - s409
-    s421 = sin_front_right_swing_angle * (s405 - s404) + s29 * s406
-    s422 = sin_front_right_swing_angle * s421
-    s423 = s405 - s422
-    s424 = s404 + s422
-    s425 = cos_front_right_swing_angle * s421 - s406
-    s426 = k3 * s425
-    s427 = s414 + s426
-    s428 = s420 + k3 * s423
-    s429 = s419 - k3 * s424
-    s430 = s410 - s414 - s426
-    s431 = inertia_front_left_hip_xx + (s303 + s412 + k3 * (s420 + s428))
-    s432 = sin_front_right_swing_angle * s403 + k3 * s416 - I_hip_xy
-    s433 = I_hip_xz + (cos_front_right_swing_angle * s411 - s302 + k3 * (s430 - s414))
-    s434 = s428 - moment_front_left_hip_y
-    pivot_front_left_thigh = k1 + s321
-    s435 = s321 / pivot_front_left_thigh
-    s436 = inertia_front_left_thigh_yz / pivot_front_left_thigh
-    s437 = s323 / pivot_front_left_thigh
-    s438 = s318 / pivot_front_left_thigh
-    s439 = inertia_front_left_thigh_zz + (I_shank_z - s308) - inertia_front_left_thigh_yz * s436
-    s440 = inertia_front_left_thigh_yz - inertia_front_left_thigh_yz * s435
-    s441 = m_thigh + s314 - s323 * s437
-    s442 = m_thigh + (m_shank - s313) - s318 * s438
-    s443 = s315 - s318 * s437
-    s444 = s323 - s323 * s435
-    s445 = s318 - s318 * s435
-    s446 = moment_front_left_thigh_y + s323 * s436
-    s447 = s318 * s436
-    s448 = sin_front_left_swing_angle * (s439 - s320) + s28 * s319
-    s449 = sin_front_left_swing_angle * s448
-    s450 = cos_front_left_swing_angle * (moment_front_left_thigh_y - s446) - sin_front_left_swing_angle * s447
-    s451 = sin_front_left_swing_angle * s450
-    s452 = cos_front_left_swing_angle * s450
-    s453 = cos_front_left_swing_angle * s445 - sin_front_left_swing_angle * s444
-    s454 = sin_front_left_swing_angle * s445 + cos_front_left_swing_angle * s444
-    s455 = cos_front_left_swing_angle * s322 - sin_front_left_swing_angle * s310
-    s456 = s452 - moment_front_left_thigh_y
-    s457 = s446 + s452
-    s458 = sin_front_left_swing_angle * (s442 - s441) + s28 * s443
-    s459 = sin_front_left_swing_angle * s458
-    s460 = s442 - s459
-    s461 = s441 + s459
-    s462 = cos_front_left_swing_angle * s458 - s443
-    s463 = k2 * s462
-    s464 = s451 + s463
-    s465 = s457 + k2 * s460
-    s466 = s456 - k2 * s461
-    s467 = s447 + s451 + s463
-    s468 = inertia_front_left_hip_xx + (s320 + s449 + k2 * (s457 + s465))
-    s469 = I_hip_xy + (sin_front_left_swing_angle * s440 + k2 * s453)
-    s470 = I_hip_xz + (cos_front_left_swing_angle * s448 - s319 - k2 * (s451 + s467))
-    s471 = moment_front_left_hip_y + s465
-    pivot_hind_right_hip = k1 + s357
-    s472 = s357 / pivot_hind_right_hip
-    s473 = s358 / pivot_hind_right_hip
-    s474 = s359 / pivot_hind_right_hip
-    s475 = s353 / pivot_hind_right_hip
-    s476 = s344 / pivot_hind_right_hip
-    s477 = s360 / pivot_hind_right_hip
-    s478 = I_hip_yy + (s270 - s270 * s324) - s358 * s473
-    s479 = inertia_front_left_hip_zz + (s328 - s338 - k3 * (s345 + s355)) - s359 * s474
-    s480 = s358 - s358 * s472
-    s481 = s359 - s359 * s472
-    s482 = cos_hind_right_swing_angle * s329 - k3 * s343 - I_hip_yz - s359 * s473
-    s483 = m_hip + s350 - s353 * s475
-    s484 = k27 - s344 * s476
-    s485 = m_hip + s349 - s360 * s477
-    s486 = s344 * s475
-    s487 = s351 - s360 * s475
-    s488 = s360 * s476
-    s489 = s353 - s353 * s472
-    s490 = s344 - s344 * s472
-    s491 = s360 - s360 * s472
-    s492 = s343 - s353 * s473
-    s493 = s344 * s473
-    s494 = s342 - s360 * s473
-    s495 = moment_front_left_hip_y + s355 - s353 * s474
-    s496 = cos_hind_right_swing_angle * s259 + sin_hind_right_swing_angle * s271 + s344 * s474
-    s497 = s356 - s360 * s474
-    s498 = sin_hind_right_abduction_angle * (s478 - s479) + s27 * s482
-    s499 = sin_hind_right_abduction_angle * s498
-    s500 = cos_hind_right_abduction_angle * s480 - sin_hind_right_abduction_angle * s481
-    s501 = sin_hind_right_abduction_angle * s480 + cos_hind_right_abduction_angle * s481
-    s502 = cos_hind_right_abduction_angle * (s494 - s496) - sin_hind_right_abduction_angle * (s493 + s497)
-    s503 = sin_hind_right_abduction_angle * s502
-    s504 = cos_hind_right_abduction_angle * s502
-    s505 = cos_hind_right_abduction_angle * s490 - sin_hind_right_abduction_angle * s491
-    s506 = sin_hind_right_abduction_angle * s490 + cos_hind_right_abduction_angle * s491
-    s507 = cos_hind_right_abduction_angle * s492 - sin_hind_right_abduction_angle * s495
-    s508 = sin_hind_right_abduction_angle * s492 + cos_hind_right_abduction_angle * s495
-    s509 = s493 + s503
-    s510 = s496 + s504
-    s511 = s504 - s494
-    s512 = sin_hind_right_abduction_angle * (s484 - s485) - s27 * s488
-    s513 = sin_hind_right_abduction_angle * s512
-    s514 = cos_hind_right_abduction_angle * s486 + sin_hind_right_abduction_angle * s487
-    s515 = cos_hind_right_abduction_angle * s487 - sin_hind_right_abduction_angle * s486
-    s516 = s484 - s513
-    s517 = s485 + s513
-    s518 = s488 + cos_hind_right_abduction_angle * s512
-    s519 = y_hip * s515
-    s520 = x_hip * s518
-    s521 = s506 - y_hip * s517
-    s522 = s510 + x_hip * s517
-    s523 = s508 + (x_hip * s514 + y_hip * s483)
-    s524 = s511 - (x_hip * s516 + y_hip * s514)
-    s525 = s497 + s503 + (s519 - s520)
-    s526 = s479 + s499 + (y_hip * s508 - x_hip * s511 + (y_hip * s523 - x_hip * s524))
-    s527 = cos_hind_right_abduction_angle * s498 - s482 + (x_hip * s509 + y_hip * s507 + x_hip * s525)
-    pivot_hind_left_hip = k1 + s394
-    s528 = s394 / pivot_hind_left_hip
-    s529 = s395 / pivot_hind_left_hip
-    s530 = s396 / pivot_hind_left_hip
-    s531 = s390 / pivot_hind_left_hip
-    s532 = s381 / pivot_hind_left_hip
-    s533 = s397 / pivot_hind_left_hip
-    s534 = I_hip_yy + (s287 - s287 * s361) - s395 * s529
-    s535 = inertia_front_left_hip_zz + (s365 - s375 - k2 * (s382 + s392)) - s396 * s530
-    s536 = s395 - s395 * s528
-    s537 = s396 - s396 * s528
-    s538 = I_hip_yz + (cos_hind_left_swing_angle * s366 - k2 * s380) - s396 * s529
-    s539 = m_hip + s387 - s390 * s531
-    s540 = k27 - s381 * s532
-    s541 = m_hip + s386 - s397 * s533
-    s542 = s381 * s531
-    s543 = s388 - s397 * s531
-    s544 = s397 * s532
-    s545 = s390 - s390 * s528
-    s546 = s381 - s381 * s528
-    s547 = s397 - s397 * s528
-    s548 = s380 - s390 * s529
-    s549 = s381 * s529
-    s550 = s379 - s397 * s529
-    s551 = s392 - moment_front_left_hip_y - s390 * s530
-    s552 = cos_hind_left_swing_angle * s276 + sin_hind_left_swing_angle * s288 + s381 * s530
-    s553 = s393 + s397 * s530
-    s554 = sin_hind_left_abduction_angle * (s534 - s535) + s26 * s538
-    s555 = sin_hind_left_abduction_angle * s554
-    s556 = cos_hind_left_abduction_angle * s536 - sin_hind_left_abduction_angle * s537
-    s557 = sin_hind_left_abduction_angle * s536 + cos_hind_left_abduction_angle * s537
-    s558 = sin_hind_left_abduction_angle * (s553 - s549) + cos_hind_left_abduction_angle * (s550 - s552)
-    s559 = sin_hind_left_abduction_angle * s558
-    s560 = cos_hind_left_abduction_angle * s558
-    s561 = cos_hind_left_abduction_angle * s546 - sin_hind_left_abduction_angle * s547
-    s562 = sin_hind_left_abduction_angle * s546 + cos_hind_left_abduction_angle * s547
-    s563 = cos_hind_left_abduction_angle * s548 - sin_hind_left_abduction_angle * s551
-    s564 = sin_hind_left_abduction_angle * s548 + cos_hind_left_abduction_angle * s551
-    s565 = s549 + s559
-    s566 = s552 + s560
-    s567 = s560 - s550
-    s568 = sin_hind_left_abduction_angle * (s540 - s541) - s26 * s544
-    s569 = sin_hind_left_abduction_angle * s568
-    s570 = cos_hind_left_abduction_angle * s542 + sin_hind_left_abduction_angle * s543
-    s571 = cos_hind_left_abduction_angle * s543 - sin_hind_left_abduction_angle * s542
-    s572 = s540 - s569
-    s573 = s541 + s569
-    s574 = s544 + cos_hind_left_abduction_angle * s568
-    s575 = y_hip * s571
-    s576 = x_hip * s574
-    s577 = s562 + y_hip * s573
-    s578 = s566 + x_hip * s573
-    s579 = s564 + (x_hip * s570 - y_hip * s539)
-    s580 = s567 + (y_hip * s570 - x_hip * s572)
-    s581 = s559 - s553 - (s575 + s576)
-    s582 = s535 + s555 - (x_hip * s567 + y_hip * s564 + (x_hip * s580 + y_hip * s579))
-    s583 = cos_hind_left_abduction_angle * s554 - s538 + (x_hip * s565 - y_hip * s563 + x_hip * s581)
-    s584 = I_trunk_x + (s357 - s357 * s472 - y_hip * (s506 + s521)) + (s394 - s394 * s528 + y_hip * (s562 + s577))
-    s585 = s500 + (x_hip * s506 - y_hip * s522) + (s556 + (x_hip * s562 + y_hip * s578))
-    s586 = s501 + (y_hip * s489 - x_hip * s505 - y_hip * s525) + (s557 + (y_hip * s581 - (x_hip * s561 + y_hip * s545)))
-    s587 = I_trunk_y + (s478 - s499 + x_hip * (s510 + s522)) + (s534 - s555 + x_hip * (s566 + s578))
-    pivot_front_right_hip = k1 + s431
-    s588 = s431 / pivot_front_right_hip
-    s589 = s432 / pivot_front_right_hip
-    s590 = s433 / pivot_front_right_hip
-    s591 = s427 / pivot_front_right_hip
-    s592 = s418 / pivot_front_right_hip
-    s593 = s434 / pivot_front_right_hip
-    s594 = I_hip_yy + (s304 - s304 * s398) - s432 * s589
-    s595 = inertia_front_left_hip_zz + (s402 - s412 - k3 * (s419 + s429)) - s433 * s590
-    s596 = s432 - s432 * s588
-    s597 = s433 - s433 * s588
-    s598 = cos_front_right_swing_angle * s403 - k3 * s417 - I_hip_yz - s433 * s589
-    s599 = m_hip + s424 - s427 * s591
-    s600 = k27 - s418 * s592
-    s601 = m_hip + s423 - s434 * s593
-    s602 = s418 * s591
-    s603 = s425 - s434 * s591
-    s604 = s434 * s592
-    s605 = s427 - s427 * s588
-    s606 = s418 - s418 * s588
-    s607 = s434 - s434 * s588
-    s608 = s417 - s427 * s589
-    s609 = s418 * s589
-    s610 = s416 - s434 * s589
-    s611 = moment_front_left_hip_y + s429 - s427 * s590
-    s612 = cos_front_right_swing_angle * s293 + sin_front_right_swing_angle * s305 + s418 * s590
-    s613 = s430 - s434 * s590
-    s614 = sin_front_right_abduction_angle * (s594 - s595) + s25 * s598
-    s615 = sin_front_right_abduction_angle * s614
-    s616 = cos_front_right_abduction_angle * s596 - sin_front_right_abduction_angle * s597
-    s617 = sin_front_right_abduction_angle * s596 + cos_front_right_abduction_angle * s597
-    s618 = cos_front_right_abduction_angle * (s610 - s612) - sin_front_right_abduction_angle * (s609 + s613)
-    s619 = sin_front_right_abduction_angle * s618
-    s620 = cos_front_right_abduction_angle * s618
-    s621 = cos_front_right_abduction_angle * s606 - sin_front_right_abduction_angle * s607
-    s622 = sin_front_right_abduction_angle * s606 + cos_front_right_abduction_angle * s607
-    s623 = cos_front_right_abduction_angle * s608 - sin_front_right_abduction_angle * s611
-    s624 = sin_front_right_abduction_angle * s608 + cos_front_right_abduction_angle * s611
-    s625 = s609 + s619
-    s626 = s612 + s620
-    s627 = s620 - s610
-    s628 = sin_front_right_abduction_angle * (s600 - s601) - s25 * s604
-    s629 = sin_front_right_abduction_angle * s628
-    s630 = cos_front_right_abduction_angle * s602 + sin_front_right_abduction_angle * s603
-    s631 = cos_front_right_abduction_angle * s603 - sin_front_right_abduction_angle * s602
-    s632 = s600 - s629
-    s633 = s601 + s629
-    s634 = s604 + cos_front_right_abduction_angle * s628
-    s635 = y_hip * s631
-    s636 = x_hip * s634
-    s637 = s622 - y_hip * s633
-    s638 = s626 - x_hip * s633
-    s639 = s624 + (y_hip * s599 - x_hip * s630)
-    s640 = s627 + (x_hip * s632 - y_hip * s630)
-    s641 = s613 + s619 + (s635 + s636)
-    s642 = s595 + s615 + (x_hip * s627 + y_hip * s624 + (x_hip * s640 + y_hip * s639))
-    s643 = cos_front_right_abduction_angle * s614 - s598 + (y_hip * s623 - x_hip * s625 - x_hip * s641)
-    pivot_front_left_hip = k1 + s468
-    s644 = s468 / pivot_front_left_hip
-    s645 = s469 / pivot_front_left_hip
-    s646 = s470 / pivot_front_left_hip
-    s647 = s464 / pivot_front_left_hip
-    s648 = s455 / pivot_front_left_hip
-    s649 = s471 / pivot_front_left_hip
-    s650 = I_hip_yy + (s321 - s321 * s435) - s469 * s645
-    s651 = inertia_front_left_hip_zz + (s439 - s449 - k2 * (s456 + s466)) - s470 * s646
-    s652 = s469 - s469 * s644
-    s653 = s470 - s470 * s644
-    s654 = I_hip_yz + (cos_front_left_swing_angle * s440 - k2 * s454) - s470 * s645
-    s655 = m_hip + s461 - s464 * s647
-    s656 = k27 - s455 * s648
-    s657 = m_hip + s460 - s471 * s649
-    s658 = s455 * s647
-    s659 = s462 - s471 * s647
-    s660 = s471 * s648
-    s661 = s464 - s464 * s644
-    s662 = s455 - s455 * s644
-    s663 = s471 - s471 * s644
-    s664 = s454 - s464 * s645
-    s665 = s455 * s645
-    s666 = s453 - s471 * s645
-    s667 = s466 - moment_front_left_hip_y - s464 * s646
-    s668 = cos_front_left_swing_angle * s310 + sin_front_left_swing_angle * s322 + s455 * s646
-    s669 = s467 + s471 * s646
-    s670 = sin_front_left_abduction_angle * (s650 - s651) + s24 * s654
-    s671 = sin_front_left_abduction_angle * s670
-    s672 = cos_front_left_abduction_angle * s652 - sin_front_left_abduction_angle * s653
-    s673 = sin_front_left_abduction_angle * s652 + cos_front_left_abduction_angle * s653
-    s674 = sin_front_left_abduction_angle * (s669 - s665) + cos_front_left_abduction_angle * (s666 - s668)
-    s675 = sin_front_left_abduction_angle * s674
-    s676 = cos_front_left_abduction_angle * s674
-    s677 = cos_front_left_abduction_angle * s662 - sin_front_left_abduction_angle * s663
-    s678 = sin_front_left_abduction_angle * s662 + cos_front_left_abduction_angle * s663
-    s679 = cos_front_left_abduction_angle * s664 - sin_front_left_abduction_angle * s667
-    s680 = sin_front_left_abduction_angle * s664 + cos_front_left_abduction_angle * s667
-    s681 = s665 + s675
-    s682 = s668 + s676
-    s683 = s676 - s666
-    s684 = sin_front_left_abduction_angle * (s656 - s657) - s24 * s660
-    s685 = sin_front_left_abduction_angle * s684
-    s686 = cos_front_left_abduction_angle * s658 + sin_front_left_abduction_angle * s659
-    s687 = cos_front_left_abduction_angle * s659 - sin_front_left_abduction_angle * s658
-    s688 = s656 - s685
-    s689 = s657 + s685
-    s690 = s660 + cos_front_left_abduction_angle * s684
-    s691 = y_hip * s687
-    s692 = x_hip * s690
-    s693 = s678 + y_hip * s689
-    s694 = s682 - x_hip * s689
-    s695 = s680 - (x_hip * s686 + y_hip * s655)
-    s696 = s683 + (x_hip * s688 + y_hip * s686)
-    s697 = s675 - s669 + (s692 - s691)
-    s698 = s651 + s671 + (x_hip * s683 - y_hip * s680 + (x_hip * s696 - y_hip * s695))
-    s699 = cos_front_left_abduction_angle * s670 - s654 - (x_hip * s681 + y_hip * s679 + x_hip * s697)
-    pivot_trunk = s584 + (s431 - s431 * s588 - y_hip * (s622 + s637)) + (s468 - s468 * s644 + y_hip * (s678 + s693))
-    s700 = s585 + (s616 - (x_hip * s622 + y_hip * s638)) + (s672 + (y_hip * s694 - x_hip * s678))
-    s701 = s586 + (s617 + (x_hip * s621 + y_hip * s605 - y_hip * s641)) + (s673 + (x_hip * s677 - y_hip * s661 + y_hip * s697))
-    s702 = s587 + (s594 - s615 - x_hip * (s626 + s638)) + (s650 - s671 - x_hip * (s682 + s694))
-    s703 = s489 - s519 + (s545 + s575) + (s605 - s635) + (s661 + s691)
-    s704 = s505 - y_hip * s518 + (s561 + y_hip * s574) + (s621 - y_hip * s634) + (s677 + y_hip * s690)
-    s705 = s521 + s577 + s637 + s693
-    s706 = s507 + x_hip * s515 + (s563 + x_hip * s571) + (s623 - x_hip * s631) + (s679 - x_hip * s687)
-    s707 = s700 / pivot_trunk
-    s708 = s701 / pivot_trunk
-    s709 = s703 / pivot_trunk
-    s710 = s704 / pivot_trunk
-    s711 = s705 / pivot_trunk
-    pivot_trunk_2 = s702 - s700 * s707
-    s712 = s527 + s583 + s643 + s699 - s701 * s707
-    s713 = s706 - s703 * s707
-    s714 = s520 - s509 + (s576 - s565) - (s625 + s636) - (s681 + s692) - s704 * s707
-    s715 = s522 + s578 + s638 + s694 - s705 * s707
-    s716 = s712 / pivot_trunk_2
-    s717 = s713 / pivot_trunk_2
-    s718 = s714 / pivot_trunk_2
-    s719 = s715 / pivot_trunk_2
-    pivot_trunk_3 = I_trunk_z + s526 + s582 + s642 + s698 - s701 * s708 - s712 * s716
-    s720 = s523 + s579 + s639 + s695 - s703 * s708 - s713 * s716
-    s721 = s524 + s580 + s640 + s696 - s704 * s708 - s714 * s716
-    s722 = s525 + s581 + s641 + s697 - s705 * s708 - s715 * s716
-    s723 = s720 / pivot_trunk_3
-    s724 = s721 / pivot_trunk_3
-    s725 = s722 / pivot_trunk_3
-    s726 = m_trunk + s483 + s539 + s599 + s655 - s703 * s709 - s713 * s717 - s720 * s723
-    s727 = m_trunk + s516 + s572 + s632 + s688 - s704 * s710 - s714 * s718 - s721 * s724
-    s728 = m_trunk + s517 + s573 + s633 + s689 - s705 * s711 - s715 * s719 - s722 * s725
-    s729 = s514 + s570 + s630 + s686 + s704 * s709 + s714 * s717 + s721 * s723
-    s730 = s515 + s571 + s631 + s687 - s705 * s709 - s715 * s717 - s722 * s723
-    s731 = s518 + s574 + s634 + s690 - s705 * s710 - s715 * s718 - s722 * s724
-    s732 = s15 * s726 - s16 * s729 + s17 * s730
-    s733 = s16 * s727 - s15 * s729 + s17 * s731
-    s734 = s15 * s730 + s16 * s731 + s17 * s728
-    s735 = s18 * s726 - s19 * s729 + s20 * s730
-    s736 = s19 * s727 - s18 * s729 + s20 * s731
-    s737 = s18 * s730 + s19 * s731 + s20 * s728
-    s738 = s21 * (s21 * s726 - s22 * s729 + s23 * s730) + s22 * (s22 * s727 - s21 * s729 + s23 * s731)
-    pivot_trunk_3_2 = s738 + s23 * (s21 * s730 + s22 * s731 + s23 * s728)
-    s739 = s21 * s732 + s22 * s733 + s23 * s734
-    s740 = s21 * s735 + s22 * s736 + s23 * s737
-    s741 = s739 / pivot_trunk_3_2
-    s742 = s740 / pivot_trunk_3_2
-    pivot_trunk_2_2 = s18 * s735 + s19 * s736 + s20 * s737 - s740 * s742
-    s743 = s18 * s732 + s19 * s733 + s20 * s734 - s740 * s741
-    s744 = s743 / pivot_trunk_2_2
-    s745 = s252 - s253
-    s746 = m_shank * bias_hind_right_shank_x - k6 * s177 - k20 * s745
-    s747 = sin_hind_right_knee_angle * s251 + cos_hind_right_knee_angle * s746
-    s748 = sin_hind_right_knee_angle * s254 + cos_hind_right_knee_angle * s255 - k4 * s250
-    s749 = s224 + (s225 + s138 * k14 - s137 * k15) + s748
-    s750 = s226 + (s253 - s252 + k19 * s745 + k4 * s747)
-    s751 = s227 + (cos_hind_right_knee_angle * s254 - sin_hind_right_knee_angle * s255)
-    s752 = s223 + (cos_hind_right_knee_angle * s251 - sin_hind_right_knee_angle * s746)
-    s753 = s245 - s246
-    s754 = m_shank * bias_hind_left_shank_x - k6 * s167 - k20 * s753
-    s755 = sin_hind_left_knee_angle * s244 + cos_hind_left_knee_angle * s754
-    s756 = sin_hind_left_knee_angle * s247 + cos_hind_left_knee_angle * s248 - k4 * s243
-    s757 = s217 + (s126 * k14 - s218 - s125 * k15) + s756
-    s758 = s219 + (s246 - s245 + k19 * s753 + k4 * s755)
-    s759 = s220 + (cos_hind_left_knee_angle * s247 - sin_hind_left_knee_angle * s248)
-    s760 = s216 + (cos_hind_left_knee_angle * s244 - sin_hind_left_knee_angle * s754)
-    s761 = s238 - s239
-    s762 = m_shank * bias_front_right_shank_x - k6 * s157 - k20 * s761
-    s763 = sin_front_right_knee_angle * s237 + cos_front_right_knee_angle * s762
-    s764 = sin_front_right_knee_angle * s240 + cos_front_right_knee_angle * s241 - k4 * s236
-    s765 = s210 + (s211 + s114 * k14 - s113 * k15) + s764
-    s766 = s212 + (s239 - s238 + k19 * s761 + k4 * s763)
-    s767 = s213 + (cos_front_right_knee_angle * s240 - sin_front_right_knee_angle * s241)
-    s768 = s209 + (cos_front_right_knee_angle * s237 - sin_front_right_knee_angle * s762)
-    s769 = s231 - s232
-    s770 = m_shank * bias_front_left_shank_x - k6 * s147 - k20 * s769
-    s771 = sin_front_left_knee_angle * s230 + cos_front_left_knee_angle * s770
-    s772 = sin_front_left_knee_angle * s233 + cos_front_left_knee_angle * s234 - k4 * s229
-    s773 = s203 + (s102 * k14 - s204 - s101 * k15) + s772
-    s774 = s205 + (s232 - s231 + k19 * s769 + k4 * s771)
-    s775 = s206 + (cos_front_left_knee_angle * s233 - sin_front_left_knee_angle * s234)
-    s776 = s202 + (cos_front_left_knee_angle * s230 - sin_front_left_knee_angle * s770)
-    s777 = s751 + s325 * s750
-    s778 = s222 + s747 - s326 * s750
-    s779 = s752 - s327 * s750
-    s780 = cos_hind_right_swing_angle * s779 - sin_hind_right_swing_angle * s778
-    s781 = sin_hind_right_swing_angle * s779 + cos_hind_right_swing_angle * s778
-    s782 = sin_hind_right_swing_angle * s777 + cos_hind_right_swing_angle * s749 + k3 * s780
-    s783 = cos_hind_right_swing_angle * s777 - sin_hind_right_swing_angle * s749 - k3 * s781
-    s784 = s198 + s782
-    s785 = I_hip_yz * s87 - I_hip_xy * s86 - s196 + s88 * k12 - s91 * k10 + (s750 - s324 * s750)
-    s786 = m_hip * bias_hind_right_hip_y + moment_front_left_hip_y * s90 + (m_thigh * bias_hind_right_thigh_y + (s221 - k5 * s137) + s250)
-    s787 = s759 - s362 * s758
-    s788 = s215 + s755 - s363 * s758
-    s789 = s760 - s364 * s758
-    s790 = cos_hind_left_swing_angle * s789 - sin_hind_left_swing_angle * s788
-    s791 = sin_hind_left_swing_angle * s789 + cos_hind_left_swing_angle * s788
-    s792 = sin_hind_left_swing_angle * s787 + cos_hind_left_swing_angle * s757 + k2 * s790
-    s793 = cos_hind_left_swing_angle * s787 - sin_hind_left_swing_angle * s757 - k2 * s791
-    s794 = s193 + s792
-    s795 = I_hip_xy * s74 - I_hip_yz * s75 - s191 + s76 * k12 - s79 * k10 + (s758 - s361 * s758)
-    s796 = m_hip * bias_hind_left_hip_y - moment_front_left_hip_y * s78 + (m_thigh * bias_hind_left_thigh_y - (s214 + k5 * s125) + s243)
-    s797 = s767 + s399 * s766
-    s798 = s208 + s763 - s400 * s766
-    s799 = s768 - s401 * s766
-    s800 = cos_front_right_swing_angle * s799 - sin_front_right_swing_angle * s798
-    s801 = sin_front_right_swing_angle * s799 + cos_front_right_swing_angle * s798
-    s802 = sin_front_right_swing_angle * s797 + cos_front_right_swing_angle * s765 + k3 * s800
-    s803 = cos_front_right_swing_angle * s797 - sin_front_right_swing_angle * s765 - k3 * s801
-    s804 = s188 + s802
-    s805 = I_hip_yz * s63 - I_hip_xy * s62 - s186 + s64 * k12 - s67 * k10 + (s766 - s398 * s766)
-    s806 = m_hip * bias_front_right_hip_y + moment_front_left_hip_y * s66 + (m_thigh * bias_front_right_thigh_y + (s207 - k5 * s113) + s236)
-    s807 = s775 - s436 * s774
-    s808 = s201 + s771 - s437 * s774
-    s809 = s776 - s438 * s774
-    s810 = cos_front_left_swing_angle * s809 - sin_front_left_swing_angle * s808
-    s811 = sin_front_left_swing_angle * s809 + cos_front_left_swing_angle * s808
-    s812 = sin_front_left_swing_angle * s807 + cos_front_left_swing_angle * s773 + k2 * s810
-    s813 = cos_front_left_swing_angle * s807 - sin_front_left_swing_angle * s773 - k2 * s811
-    s814 = s183 + s812
-    s815 = I_hip_xy * s48 - I_hip_yz * s49 - s181 + s50 * k12 - s53 * k10 + (s774 - s435 * s774)
-    s816 = m_hip * bias_front_left_hip_y - moment_front_left_hip_y * s52 + (m_thigh * bias_front_left_thigh_y - (s200 + k5 * s101) + s229)
-    s817 = s785 - s473 * s784
-    s818 = s199 + s783 - s474 * s784
-    s819 = m_hip * bias_hind_right_hip_x - moment_front_left_hip_y * s87 + s781 - s475 * s784
-    s820 = s786 - s476 * s784
-    s821 = m_hip * bias_hind_right_hip_z - moment_front_left_hip_y * s86 + s780 - s477 * s784
-    s822 = cos_hind_right_abduction_angle * s820 - sin_hind_right_abduction_angle * s821
-    s823 = sin_hind_right_abduction_angle * s820 + cos_hind_right_abduction_angle * s821
-    s824 = cos_hind_right_abduction_angle * s817 - sin_hind_right_abduction_angle * s818
-    s825 = sin_hind_right_abduction_angle * s817 + cos_hind_right_abduction_angle * s818
-    s826 = s795 - s529 * s794
-    s827 = s194 + s793 - s530 * s794
-    s828 = m_hip * bias_hind_left_hip_x + moment_front_left_hip_y * s75 + s791 - s531 * s794
-    s829 = s796 - s532 * s794
-    s830 = m_hip * bias_hind_left_hip_z + moment_front_left_hip_y * s74 + s790 - s533 * s794
-    s831 = cos_hind_left_abduction_angle * s829 - sin_hind_left_abduction_angle * s830
-    s832 = sin_hind_left_abduction_angle * s829 + cos_hind_left_abduction_angle * s830
-    s833 = cos_hind_left_abduction_angle * s826 - sin_hind_left_abduction_angle * s827
-    s834 = sin_hind_left_abduction_angle * s826 + cos_hind_left_abduction_angle * s827
-    s835 = s34 * k7 + (s784 - s472 * s784 - y_hip * s823) + (s794 - s528 * s794 + y_hip * s832)
-    s836 = s32 * k9 + (s825 + (y_hip * s819 - x_hip * s822)) + (s834 - (x_hip * s831 + y_hip * s828))
-    s837 = s805 - s589 * s804
-    s838 = s189 + s803 - s590 * s804
-    s839 = m_hip * bias_front_right_hip_x - moment_front_left_hip_y * s63 + s801 - s591 * s804
-    s840 = s806 - s592 * s804
-    s841 = m_hip * bias_front_right_hip_z - moment_front_left_hip_y * s62 + s800 - s593 * s804
-    s842 = cos_front_right_abduction_angle * s840 - sin_front_right_abduction_angle * s841
-    s843 = sin_front_right_abduction_angle * s840 + cos_front_right_abduction_angle * s841
-    s844 = cos_front_right_abduction_angle * s837 - sin_front_right_abduction_angle * s838
-    s845 = sin_front_right_abduction_angle * s837 + cos_front_right_abduction_angle * s838
-    s846 = s33 * k8 + (s824 + x_hip * s823) + (s833 + x_hip * s832) + (s844 - x_hip * s843)
-    s847 = s815 - s645 * s814
-    s848 = s184 + s813 - s646 * s814
-    s849 = m_hip * bias_front_left_hip_x + moment_front_left_hip_y * s49 + s811 - s647 * s814
-    s850 = s816 - s648 * s814
-    s851 = m_hip * bias_front_left_hip_z + moment_front_left_hip_y * s48 + s810 - s649 * s814
-    s852 = cos_front_left_abduction_angle * s850 - sin_front_left_abduction_angle * s851
-    s853 = sin_front_left_abduction_angle * s850 + cos_front_left_abduction_angle * s851
-    s854 = cos_front_left_abduction_angle * s847 - sin_front_left_abduction_angle * s848
-    s855 = sin_front_left_abduction_angle * s847 + cos_front_left_abduction_angle * s848
-    s856 = s835 + (s804 - s588 * s804 - y_hip * s843) + (s814 - s644 * s814 + y_hip * s853)
-    s857 = s836 + (s845 + (x_hip * s842 + y_hip * s839)) + (s855 + (x_hip * s852 - y_hip * s849))
-    s858 = s707 * s856 - (s846 + (s854 - x_hip * s853))
-    s859 = s857 - s708 * s856 + s716 * s858
-    s860 = m_trunk * bias_trunk_x + s819 + s828 + s839 + s849 - s709 * s856 + s717 * s858
-    s861 = m_trunk * bias_trunk_y + s822 + s831 + s842 + s852 - s710 * s856 + s718 * s858
-    s862 = m_trunk * bias_trunk_z + s823 + s832 + s843 + s853 - s711 * s856 + s719 * s858
-    s863 = s860 - s723 * s859
-    s864 = s861 - s724 * s859
-    s865 = s862 - s725 * s859
-    s866 = s21 * s863 + s22 * s864 + s23 * s865
-    s867 = s742 * s866 - (s18 * s863 + s19 * s864 + s20 * s865)
-    s868 = (s15 * s863 + s16 * s864 + s17 * s865 - s741 * s866 + s744 * s867) / (s15 * s732 + s16 * s733 + s17 * s734 - s739 * s741 - s743 * s744)
-    delta_trunk_2_y = s867 / pivot_trunk_2_2 + s744 * s868
-    s869 = s866 / pivot_trunk_3_2 + (s742 * delta_trunk_2_y - s741 * s868)
-    delta_trunk_x = s18 * delta_trunk_2_y - s15 * s868 - s21 * s869
-    delta_trunk_y = s19 * delta_trunk_2_y - s16 * s868 - s22 * s869
-    delta_trunk_z = s20 * delta_trunk_2_y - s17 * s868 - s23 * s869
-    s870 = s859 / pivot_trunk_3 + (s723 * delta_trunk_x + s724 * delta_trunk_y + s725 * delta_trunk_z)
-    s871 = s717 * delta_trunk_x + s718 * delta_trunk_y + s719 * delta_trunk_z - s716 * s870
-    alpha_trunk_y = s858 / pivot_trunk_2 - s871
-    s872 = s707 * alpha_trunk_y - s708 * s870 + (s709 * delta_trunk_x + s710 * delta_trunk_y + s711 * delta_trunk_z)
-    s873 = s856 / pivot_trunk + s872
-    alpha_front_left_hip_y = cos_front_left_abduction_angle * alpha_trunk_y - sin_front_left_abduction_angle * s870
-    s874 = cos_front_left_abduction_angle * s870 + sin_front_left_abduction_angle * alpha_trunk_y
-    s875 = y_hip * s870
-    s876 = x_hip * s870
-    s877 = y_hip * s873
-    s878 = x_hip * alpha_trunk_y
-    s879 = s877 + s878
-    delta_front_left_hip_x = delta_trunk_x + s875
-    s880 = delta_trunk_y - s876
-    s881 = delta_trunk_z - s879
-    delta_front_left_hip_y = cos_front_left_abduction_angle * s880 + sin_front_left_abduction_angle * s881
-    delta_front_left_hip_z = cos_front_left_abduction_angle * s881 - sin_front_left_abduction_angle * s880
-    s882 = s647 * delta_front_left_hip_x + s648 * delta_front_left_hip_y + s649 * delta_front_left_hip_z
-    s883 = s814 / pivot_front_left_hip + (s645 * alpha_front_left_hip_y - s644 * s873 - s646 * s874 + s882)
-    s884 = s873 + s883
-    alpha_front_right_hip_y = cos_front_right_abduction_angle * alpha_trunk_y - sin_front_right_abduction_angle * s870
-    s885 = cos_front_right_abduction_angle * s870 + sin_front_right_abduction_angle * alpha_trunk_y
-    delta_front_right_hip_x = delta_trunk_x - s875
-    s886 = delta_trunk_z + (s877 - s878)
-    delta_front_right_hip_y = cos_front_right_abduction_angle * s880 + sin_front_right_abduction_angle * s886
-    delta_front_right_hip_z = cos_front_right_abduction_angle * s886 - sin_front_right_abduction_angle * s880
-    s887 = s591 * delta_front_right_hip_x + s592 * delta_front_right_hip_y + s593 * delta_front_right_hip_z
-    s888 = s804 / pivot_front_right_hip + (s589 * alpha_front_right_hip_y - s588 * s873 - s590 * s885 + s887)
-    s889 = s873 + s888
-    alpha_hind_left_hip_y = cos_hind_left_abduction_angle * alpha_trunk_y - sin_hind_left_abduction_angle * s870
-    s890 = cos_hind_left_abduction_angle * s870 + sin_hind_left_abduction_angle * alpha_trunk_y
-    s891 = delta_trunk_y + s876
-    s892 = delta_trunk_z + (s878 - s877)
-    delta_hind_left_hip_y = cos_hind_left_abduction_angle * s891 + sin_hind_left_abduction_angle * s892
-    delta_hind_left_hip_z = cos_hind_left_abduction_angle * s892 - sin_hind_left_abduction_angle * s891
-    s893 = s531 * delta_front_left_hip_x + s532 * delta_hind_left_hip_y + s533 * delta_hind_left_hip_z
-    s894 = s794 / pivot_hind_left_hip + (s529 * alpha_hind_left_hip_y - s528 * s873 - s530 * s890 + s893)
-    s895 = s873 + s894
-    alpha_hind_right_hip_y = cos_hind_right_abduction_angle * alpha_trunk_y - sin_hind_right_abduction_angle * s870
-    s896 = cos_hind_right_abduction_angle * s870 + sin_hind_right_abduction_angle * alpha_trunk_y
-    s897 = delta_trunk_z + s879
-    delta_hind_right_hip_y = cos_hind_right_abduction_angle * s891 + sin_hind_right_abduction_angle * s897
-    delta_hind_right_hip_z = cos_hind_right_abduction_angle * s897 - sin_hind_right_abduction_angle * s891
-    s898 = s475 * delta_front_right_hip_x + s476 * delta_hind_right_hip_y + s477 * delta_hind_right_hip_z
-    s899 = s784 / pivot_hind_right_hip + (s473 * alpha_hind_right_hip_y - s472 * s873 - s474 * s896 + s898)
-    s900 = s873 + s899
-    s901 = delta_front_left_hip_x + k2 * s874
-    s902 = delta_front_left_hip_z - k2 * s884
-    delta_front_left_thigh_z = cos_front_left_swing_angle * s902 + sin_front_left_swing_angle * s901
-    delta_front_left_thigh_x = cos_front_left_swing_angle * s901 - sin_front_left_swing_angle * s902
-    s903 = s436 * (cos_front_left_swing_angle * s874 + sin_front_left_swing_angle * s884)
-    s904 = s435 * alpha_front_left_hip_y - s903 + (s437 * delta_front_left_thigh_x + s438 * delta_front_left_thigh_z)
-    s905 = s774 / pivot_front_left_thigh + s904
-    alpha_front_left_thigh_y = alpha_front_left_hip_y - s905
-    s906 = delta_front_right_hip_x + k3 * s885
-    s907 = delta_front_right_hip_z - k3 * s889
-    delta_front_right_thigh_z = cos_front_right_swing_angle * s907 + sin_front_right_swing_angle * s906
-    delta_front_right_thigh_x = cos_front_right_swing_angle * s906 - sin_front_right_swing_angle * s907
-    s908 = s399 * (cos_front_right_swing_angle * s885 + sin_front_right_swing_angle * s889)
-    s909 = s398 * alpha_front_right_hip_y + s908 + (s400 * delta_front_right_thigh_x + s401 * delta_front_right_thigh_z)
-    s910 = s766 / pivot_front_right_thigh + s909
-    alpha_front_right_thigh_y = alpha_front_right_hip_y - s910
-    s911 = delta_front_left_hip_x + k2 * s890
-    s912 = delta_hind_left_hip_z - k2 * s895
-    delta_hind_left_thigh_z = cos_hind_left_swing_angle * s912 + sin_hind_left_swing_angle * s911
-    delta_hind_left_thigh_x = cos_hind_left_swing_angle * s911 - sin_hind_left_swing_angle * s912
-    s913 = s362 * (cos_hind_left_swing_angle * s890 + sin_hind_left_swing_angle * s895)
-    s914 = s361 * alpha_hind_left_hip_y - s913 + (s363 * delta_hind_left_thigh_x + s364 * delta_hind_left_thigh_z)
-    s915 = s758 / pivot_hind_left_thigh + s914
-    alpha_hind_left_thigh_y = alpha_hind_left_hip_y - s915
-    s916 = delta_front_right_hip_x + k3 * s896
-    s917 = delta_hind_right_hip_z - k3 * s900
-    delta_hind_right_thigh_z = cos_hind_right_swing_angle * s917 + sin_hind_right_swing_angle * s916
-    delta_hind_right_thigh_x = cos_hind_right_swing_angle * s916 - sin_hind_right_swing_angle * s917
-    s918 = s325 * (cos_hind_right_swing_angle * s896 + sin_hind_right_swing_angle * s900)
-    s919 = s324 * alpha_hind_right_hip_y + s918 + (s326 * delta_hind_right_thigh_x + s327 * delta_hind_right_thigh_z)
-    s920 = s750 / pivot_hind_right_thigh + s919
-    alpha_hind_right_thigh_y = alpha_hind_right_hip_y - s920
-    s921 = cos_front_left_knee_angle * (delta_front_left_thigh_x + k4 * alpha_front_left_thigh_y)
-    s922 = k19 * alpha_front_left_thigh_y - k20 * (s921 - sin_front_left_knee_angle * delta_front_left_thigh_z)
-    s923 = cos_front_right_knee_angle * (delta_front_right_thigh_x + k4 * alpha_front_right_thigh_y)
-    s924 = k19 * alpha_front_right_thigh_y - k20 * (s923 - sin_front_right_knee_angle * delta_front_right_thigh_z)
-    s925 = cos_hind_left_knee_angle * (delta_hind_left_thigh_x + k4 * alpha_hind_left_thigh_y)
-    s926 = k19 * alpha_hind_left_thigh_y - k20 * (s925 - sin_hind_left_knee_angle * delta_hind_left_thigh_z)
-    s927 = cos_hind_right_knee_angle * (delta_hind_right_thigh_x + k4 * alpha_hind_right_thigh_y)
-    s928 = k19 * alpha_hind_right_thigh_y - k20 * (s927 - sin_hind_right_knee_angle * delta_hind_right_thigh_z)
-    s929 = trunk_wx * 0.5
-    s930 = trunk_wy * 0.5
-    s931 = trunk_wz * 0.5
+    s617 = omega_hind_right_thigh_x * omega_hind_right_thigh_y
+    s618 = omega_hind_right_thigh_z * omega_hind_right_thigh_x
+    s619 = omega_hind_right_thigh_z * omega_hind_right_thigh_y
+    s620 = s617 - s616
+    s621 = s567 + s618
+    s622 = s619 - s615
+    s623 = s615 + s619
+    s624 = omega_hind_right_thigh_x_squared + omega_hind_right_thigh_y_squared
+    s625 = bias_front_left_thigh_x + k4 * s585
+    bias_front_left_shank_y = bias_front_left_thigh_y + k4 * s586
+    s626 = bias_front_left_thigh_z - k4 * s588
+    bias_front_left_shank_x = cos_front_left_knee_angle * s625 - sin_front_left_knee_angle * s626
+    s627 = cos_front_left_knee_angle * s579 - sin_front_left_knee_angle * s580 - front_left_knee_angle_dot * omega_front_left_shank_z
+    s628 = cos_front_left_knee_angle * s580 + sin_front_left_knee_angle * s579 + front_left_knee_angle_dot * omega_front_left_shank_x
+    s629 = omega_front_left_shank_x * omega_front_left_shank_y
+    s630 = omega_front_left_shank_z * omega_front_left_shank_x
+    s631 = omega_front_left_shank_z * omega_front_left_shank_y
+    s632 = s532 + s630
+    s633 = s631 - s627
+    s634 = omega_front_left_shank_x * omega_front_left_shank_x + omega_front_left_shank_y * omega_front_left_shank_y
+    s635 = bias_front_right_thigh_x + k4 * s597
+    bias_front_right_shank_y = bias_front_right_thigh_y + k4 * s598
+    s636 = bias_front_right_thigh_z - k4 * s600
+    bias_front_right_shank_x = cos_front_right_knee_angle * s635 - sin_front_right_knee_angle * s636
+    s637 = cos_front_right_knee_angle * s591 - sin_front_right_knee_angle * s592 - front_right_knee_angle_dot * omega_front_right_shank_z
+    s638 = cos_front_right_knee_angle * s592 + sin_front_right_knee_angle * s591 + front_right_knee_angle_dot * omega_front_right_shank_x
+    s639 = omega_front_right_shank_x * omega_front_right_shank_y
+    s640 = omega_front_right_shank_z * omega_front_right_shank_x
+    s641 = omega_front_right_shank_z * omega_front_right_shank_y
+    s642 = s544 + s640
+    s643 = s641 - s637
+    s644 = omega_front_right_shank_x * omega_front_right_shank_x + omega_front_right_shank_y * omega_front_right_shank_y
+    s645 = bias_hind_left_thigh_x + k4 * s609
+    bias_hind_left_shank_y = bias_hind_left_thigh_y + k4 * s610
+    s646 = bias_hind_left_thigh_z - k4 * s612
+    bias_hind_left_shank_x = cos_hind_left_knee_angle * s645 - sin_hind_left_knee_angle * s646
+    s647 = cos_hind_left_knee_angle * s603 - sin_hind_left_knee_angle * s604 - hind_left_knee_angle_dot * omega_hind_left_shank_z
+    s648 = cos_hind_left_knee_angle * s604 + sin_hind_left_knee_angle * s603 + hind_left_knee_angle_dot * omega_hind_left_shank_x
+    s649 = omega_hind_left_shank_x * omega_hind_left_shank_y
+    s650 = omega_hind_left_shank_z * omega_hind_left_shank_x
+    s651 = omega_hind_left_shank_z * omega_hind_left_shank_y
+    s652 = s555 + s650
+    s653 = s651 - s647
+    s654 = omega_hind_left_shank_x * omega_hind_left_shank_x + omega_hind_left_shank_y * omega_hind_left_shank_y
+    s655 = bias_hind_right_thigh_x + k4 * s621
+    bias_hind_right_shank_y = bias_hind_right_thigh_y + k4 * s622
+    s656 = bias_hind_right_thigh_z - k4 * s624
+    bias_hind_right_shank_x = cos_hind_right_knee_angle * s655 - sin_hind_right_knee_angle * s656
+    s657 = cos_hind_right_knee_angle * s615 - sin_hind_right_knee_angle * s616 - hind_right_knee_angle_dot * omega_hind_right_shank_z
+    s658 = cos_hind_right_knee_angle * s616 + sin_hind_right_knee_angle * s615 + hind_right_knee_angle_dot * omega_hind_right_shank_x
+    s659 = omega_hind_right_shank_x * omega_hind_right_shank_y
+    s660 = omega_hind_right_shank_z * omega_hind_right_shank_x
+    s661 = omega_hind_right_shank_z * omega_hind_right_shank_y
+    s662 = s567 + s660
+    s663 = s661 - s657
+    s664 = omega_hind_right_shank_x * omega_hind_right_shank_x + omega_hind_right_shank_y * omega_hind_right_shank_y
+    s665 = I_hip_yz * (omega_front_left_hip_z_squared - omega_front_left_hip_y_squared)
+    s666 = I_hip_xz * (omega_front_left_hip_x_squared - omega_front_left_hip_z_squared)
+    s667 = I_hip_xy * (omega_front_left_hip_y_squared - omega_front_left_hip_x_squared)
+    s668 = moment_front_left_hip_y * bias_front_left_hip_z + (I_hip_xz * s539 - I_hip_xy * s541 - s665 + s536 * k20 - s536 * k21)
+    s669 = I_hip_yz * s538 - I_hip_xz * s536 - s667 + s539 * k19 - s537 * k20 - moment_front_left_hip_y * bias_front_left_hip_x
+    s670 = m_hip * bias_hind_left_hip_x
+    s671 = moment_front_left_hip_y * bias_hind_left_hip_x
+    s672 = I_hip_yz * (omega_front_right_hip_z_squared - omega_front_right_hip_y_squared)
+    s673 = I_hip_xz * (omega_front_right_hip_x_squared - omega_front_right_hip_z_squared)
+    s674 = I_hip_xy * (omega_front_right_hip_y_squared - omega_front_right_hip_x_squared)
+    s675 = I_hip_xy * s553 + I_hip_xz * s551 + s672 + s548 * k20 - s548 * k21 - moment_front_left_hip_y * bias_front_right_hip_z
+    s676 = s674 - (I_hip_xz * s548 + I_hip_yz * s550) + s551 * k19 - s549 * k20 - s671
+    s677 = I_hip_yz * (omega_hind_left_hip_z_squared - omega_hind_left_hip_y_squared)
+    s678 = I_hip_xz * (omega_hind_left_hip_x_squared - omega_hind_left_hip_z_squared)
+    s679 = I_hip_xy * (omega_hind_left_hip_y_squared - omega_hind_left_hip_x_squared)
+    s680 = moment_front_left_hip_y * bias_hind_left_hip_z + (I_hip_xz * s562 - I_hip_xy * s564 - s677 + s559 * k20 - s559 * k21)
+    s681 = I_hip_yz * s561 - I_hip_xz * s559 - s679 + s562 * k19 - s560 * k20 - s671
+    s682 = I_hip_yz * (omega_hind_right_hip_z_squared - omega_hind_right_hip_y_squared)
+    s683 = I_hip_xz * (omega_hind_right_hip_x_squared - omega_hind_right_hip_z_squared)
+    s684 = I_hip_xy * (omega_hind_right_hip_y_squared - omega_hind_right_hip_x_squared)
+    s685 = moment_front_left_hip_y * s566 + (I_hip_xy * s576 + I_hip_xz * s574 + s682 + s571 * k20 - s571 * k21)
+    s686 = moment_front_left_hip_y * bias_hind_right_hip_x + (s684 - (I_hip_xz * s571 + I_hip_yz * s573) + s574 * k19 - s572 * k20)
+    s687 = moment_front_left_thigh_y * (omega_front_left_thigh_x_squared + omega_front_left_thigh_z_squared)
+    s688 = m_thigh * bias_front_left_thigh_x + (moment_front_left_thigh_y * s584 - k5 * s585)
+    s689 = m_thigh * bias_front_left_thigh_z + (moment_front_left_thigh_y * s587 + k5 * s588)
+    s690 = moment_front_left_thigh_y * bias_front_left_thigh_z + k5 * bias_front_left_thigh_y
+    s691 = inertia_front_left_thigh_yz * (omega_front_left_thigh_z_squared - omega_front_left_thigh_y_squared)
+    s692 = s585 * k24 - inertia_front_left_thigh_yz * s584 - (s582 - s532) * k22 - k5 * bias_front_left_thigh_x
+    s693 = inertia_front_left_thigh_yz * s585 + (s580 + s581) * k22 - s584 * k23 - moment_front_left_thigh_y * bias_front_left_thigh_x
+    s694 = moment_front_left_thigh_y * (omega_front_right_thigh_x_squared + omega_front_right_thigh_z_squared)
+    s695 = m_thigh * bias_front_right_thigh_x - (moment_front_left_thigh_y * s596 + k5 * s597)
+    s696 = m_thigh * bias_front_right_thigh_z + (k5 * s600 - moment_front_left_thigh_y * s599)
+    s697 = k5 * bias_front_right_thigh_y - moment_front_left_thigh_y * bias_front_right_thigh_z
+    s698 = inertia_front_left_thigh_yz * (omega_front_right_thigh_z_squared - omega_front_right_thigh_y_squared)
+    s699 = inertia_front_left_thigh_yz * s596 + s597 * k24 - (s594 - s544) * k22 - k5 * bias_front_right_thigh_x
+    s700 = moment_front_left_thigh_y * bias_front_right_thigh_x + ((s592 + s593) * k22 - inertia_front_left_thigh_yz * s597 - s596 * k23)
+    s701 = moment_front_left_thigh_y * (omega_hind_left_thigh_x_squared + omega_hind_left_thigh_z_squared)
+    s702 = m_thigh * bias_hind_left_thigh_x + (moment_front_left_thigh_y * s608 - k5 * s609)
+    s703 = m_thigh * bias_hind_left_thigh_z + (moment_front_left_thigh_y * s611 + k5 * s612)
+    s704 = moment_front_left_thigh_y * bias_hind_left_thigh_z + k5 * bias_hind_left_thigh_y
+    s705 = inertia_front_left_thigh_yz * (omega_hind_left_thigh_z_squared - omega_hind_left_thigh_y_squared)
+    s706 = s609 * k24 - inertia_front_left_thigh_yz * s608 - (s606 - s555) * k22 - k5 * bias_hind_left_thigh_x
+    s707 = inertia_front_left_thigh_yz * s609 + (s604 + s605) * k22 - s608 * k23 - moment_front_left_thigh_y * bias_hind_left_thigh_x
+    s708 = moment_front_left_thigh_y * (omega_hind_right_thigh_x_squared + omega_hind_right_thigh_z_squared)
+    s709 = m_thigh * bias_hind_right_thigh_x - (moment_front_left_thigh_y * s620 + k5 * s621)
+    s710 = m_thigh * bias_hind_right_thigh_z + (k5 * s624 - moment_front_left_thigh_y * s623)
+    s711 = k5 * bias_hind_right_thigh_y - moment_front_left_thigh_y * bias_hind_right_thigh_z
+    s712 = inertia_front_left_thigh_yz * (omega_hind_right_thigh_z_squared - omega_hind_right_thigh_y_squared)
+    s713 = inertia_front_left_thigh_yz * s620 + s621 * k24 - (s618 - s567) * k22 - k5 * bias_hind_right_thigh_x
+    s714 = moment_front_left_thigh_y * bias_hind_right_thigh_x + ((s616 + s617) * k22 - inertia_front_left_thigh_yz * s621 - s620 * k23)
+    s715 = m_shank * (cos_front_left_knee_angle * s626 + sin_front_left_knee_angle * s625)
+    s716 = m_shank * bias_front_left_shank_y - k6 * s633
+    s717 = s715 + k6 * s634
+    s718 = k6 * bias_front_left_shank_x
+    s719 = s632 * k27 - (s630 - s532) * k25
+    s720 = (s628 + s629) * k25 - (s629 - s628) * k26
+    s721 = k6 * bias_front_left_shank_y + ((s627 + s631) * k26 - s633 * k27)
+    s722 = m_shank * (cos_front_right_knee_angle * s636 + sin_front_right_knee_angle * s635)
+    s723 = m_shank * bias_front_right_shank_y - k6 * s643
+    s724 = s722 + k6 * s644
+    s725 = k6 * bias_front_right_shank_x
+    s726 = s642 * k27 - (s640 - s544) * k25
+    s727 = (s638 + s639) * k25 - (s639 - s638) * k26
+    s728 = k6 * bias_front_right_shank_y + ((s637 + s641) * k26 - s643 * k27)
+    s729 = m_shank * (cos_hind_left_knee_angle * s646 + sin_hind_left_knee_angle * s645)
+    s730 = m_shank * bias_hind_left_shank_y - k6 * s653
+    s731 = s729 + k6 * s654
+    s732 = k6 * bias_hind_left_shank_x
+    s733 = s652 * k27 - (s650 - s555) * k25
+    s734 = (s648 + s649) * k25 - (s649 - s648) * k26
+    s735 = k6 * bias_hind_left_shank_y + ((s647 + s651) * k26 - s653 * k27)
+    s736 = m_shank * (cos_hind_right_knee_angle * s656 + sin_hind_right_knee_angle * s655)
+    s737 = m_shank * bias_hind_right_shank_y - k6 * s663
+    s738 = s736 + k6 * s664
+    s739 = k6 * bias_hind_right_shank_x
+    s740 = s662 * k27 - (s660 - s567) * k25
+    s741 = (s658 + s659) * k25 - (s659 - s658) * k26
+    s742 = k6 * bias_hind_right_shank_y + ((s657 + s661) * k26 - s663 * k27)
+    s743 = s739 - s740
+    s744 = m_shank * bias_hind_right_shank_x - k6 * s662 - k8 * s743
+    s745 = sin_hind_right_knee_angle * s738 + cos_hind_right_knee_angle * s744
+    s746 = sin_hind_right_knee_angle * s741 + cos_hind_right_knee_angle * s742 - k4 * s737
+    s747 = s711 + (s712 + s623 * k23 - s622 * k24) + s746
+    s748 = s713 + (s740 - s739 + k7 * s743 + k4 * s745)
+    s749 = s714 + (cos_hind_right_knee_angle * s741 - sin_hind_right_knee_angle * s742)
+    s750 = s710 + (cos_hind_right_knee_angle * s738 - sin_hind_right_knee_angle * s744)
+    s751 = s732 - s733
+    s752 = m_shank * bias_hind_left_shank_x - k6 * s652 - k8 * s751
+    s753 = sin_hind_left_knee_angle * s731 + cos_hind_left_knee_angle * s752
+    s754 = sin_hind_left_knee_angle * s734 + cos_hind_left_knee_angle * s735 - k4 * s730
+    s755 = s704 + (s611 * k23 - s705 - s610 * k24) + s754
+    s756 = s706 + (s733 - s732 + k7 * s751 + k4 * s753)
+    s757 = s707 + (cos_hind_left_knee_angle * s734 - sin_hind_left_knee_angle * s735)
+    s758 = s703 + (cos_hind_left_knee_angle * s731 - sin_hind_left_knee_angle * s752)
+    s759 = s725 - s726
+    s760 = m_shank * bias_front_right_shank_x - k6 * s642 - k8 * s759
+    s761 = sin_front_right_knee_angle * s724 + cos_front_right_knee_angle * s760
+    s762 = sin_front_right_knee_angle * s727 + cos_front_right_knee_angle * s728 - k4 * s723
+    s763 = s697 + (s698 + s599 * k23 - s598 * k24) + s762
+    s764 = s699 + (s726 - s725 + k7 * s759 + k4 * s761)
+    s765 = s700 + (cos_front_right_knee_angle * s727 - sin_front_right_knee_angle * s728)
+    s766 = s696 + (cos_front_right_knee_angle * s724 - sin_front_right_knee_angle * s760)
+    s767 = s718 - s719
+    s768 = m_shank * bias_front_left_shank_x - k6 * s632 - k8 * s767
+    s769 = sin_front_left_knee_angle * s717 + cos_front_left_knee_angle * s768
+    s770 = sin_front_left_knee_angle * s720 + cos_front_left_knee_angle * s721 - k4 * s716
+    s771 = s690 + (s587 * k23 - s691 - s586 * k24) + s770
+    s772 = s692 + (s719 - s718 + k7 * s767 + k4 * s769)
+    s773 = s693 + (cos_front_left_knee_angle * s720 - sin_front_left_knee_angle * s721)
+    s774 = s689 + (cos_front_left_knee_angle * s717 - sin_front_left_knee_angle * s768)
+    s775 = s749 + s101 * s748
+    s776 = s709 + s745 - s102 * s748
+    s777 = s750 - s103 * s748
+    s778 = cos_hind_right_swing_angle * s777 - sin_hind_right_swing_angle * s776
+    s779 = sin_hind_right_swing_angle * s777 + cos_hind_right_swing_angle * s776
+    s780 = sin_hind_right_swing_angle * s775 + cos_hind_right_swing_angle * s747 + k3 * s778
+    s781 = cos_hind_right_swing_angle * s775 - sin_hind_right_swing_angle * s747 - k3 * s779
+    s782 = s685 + s780
+    s783 = I_hip_yz * s572 - I_hip_xy * s571 - s683 + s573 * k21 - s576 * k19 + (s748 - s100 * s748)
+    s784 = m_hip * bias_hind_right_hip_y + moment_front_left_hip_y * s575 + (m_thigh * bias_hind_right_thigh_y + (s708 - k5 * s622) + s737)
+    s785 = s757 - s138 * s756
+    s786 = s702 + s753 - s139 * s756
+    s787 = s758 - s140 * s756
+    s788 = cos_hind_left_swing_angle * s787 - sin_hind_left_swing_angle * s786
+    s789 = sin_hind_left_swing_angle * s787 + cos_hind_left_swing_angle * s786
+    s790 = sin_hind_left_swing_angle * s785 + cos_hind_left_swing_angle * s755 + k2 * s788
+    s791 = cos_hind_left_swing_angle * s785 - sin_hind_left_swing_angle * s755 - k2 * s789
+    s792 = s680 + s790
+    s793 = I_hip_xy * s559 - I_hip_yz * s560 - s678 + s561 * k21 - s564 * k19 + (s756 - s137 * s756)
+    s794 = m_hip * bias_hind_left_hip_y - moment_front_left_hip_y * s563 + (m_thigh * bias_hind_left_thigh_y - (s701 + k5 * s610) + s730)
+    s795 = s765 + s175 * s764
+    s796 = s695 + s761 - s176 * s764
+    s797 = s766 - s177 * s764
+    s798 = cos_front_right_swing_angle * s797 - sin_front_right_swing_angle * s796
+    s799 = sin_front_right_swing_angle * s797 + cos_front_right_swing_angle * s796
+    s800 = sin_front_right_swing_angle * s795 + cos_front_right_swing_angle * s763 + k3 * s798
+    s801 = cos_front_right_swing_angle * s795 - sin_front_right_swing_angle * s763 - k3 * s799
+    s802 = s675 + s800
+    s803 = I_hip_yz * s549 - I_hip_xy * s548 - s673 + s550 * k21 - s553 * k19 + (s764 - s174 * s764)
+    s804 = m_hip * bias_front_right_hip_y + moment_front_left_hip_y * s552 + (m_thigh * bias_front_right_thigh_y + (s694 - k5 * s598) + s723)
+    s805 = s773 - s212 * s772
+    s806 = s688 + s769 - s213 * s772
+    s807 = s774 - s214 * s772
+    s808 = cos_front_left_swing_angle * s807 - sin_front_left_swing_angle * s806
+    s809 = sin_front_left_swing_angle * s807 + cos_front_left_swing_angle * s806
+    s810 = sin_front_left_swing_angle * s805 + cos_front_left_swing_angle * s771 + k2 * s808
+    s811 = cos_front_left_swing_angle * s805 - sin_front_left_swing_angle * s771 - k2 * s809
+    s812 = s668 + s810
+    s813 = I_hip_xy * s536 - I_hip_yz * s537 - s666 + s538 * k21 - s541 * k19 + (s772 - s211 * s772)
+    s814 = m_hip * bias_front_left_hip_y - moment_front_left_hip_y * s540 + (m_thigh * bias_front_left_thigh_y - (s687 + k5 * s586) + s716)
+    s815 = s783 - s249 * s782
+    s816 = s686 + s781 - s250 * s782
+    s817 = m_hip * bias_hind_right_hip_x - moment_front_left_hip_y * s572 + s779 - s251 * s782
+    s818 = s784 - s252 * s782
+    s819 = s778 - (m_hip * s566 + moment_front_left_hip_y * s571) - s253 * s782
+    s820 = cos_hind_right_abduction_angle * s818 - sin_hind_right_abduction_angle * s819
+    s821 = sin_hind_right_abduction_angle * s818 + cos_hind_right_abduction_angle * s819
+    s822 = cos_hind_right_abduction_angle * s815 - sin_hind_right_abduction_angle * s816
+    s823 = sin_hind_right_abduction_angle * s815 + cos_hind_right_abduction_angle * s816
+    s824 = s793 - s305 * s792
+    s825 = s681 + s791 - s306 * s792
+    s826 = s670 + moment_front_left_hip_y * s560 + s789 - s307 * s792
+    s827 = s794 - s308 * s792
+    s828 = m_hip * bias_hind_left_hip_z + moment_front_left_hip_y * s559 + s788 - s309 * s792
+    s829 = cos_hind_left_abduction_angle * s827 - sin_hind_left_abduction_angle * s828
+    s830 = sin_hind_left_abduction_angle * s827 + cos_hind_left_abduction_angle * s828
+    s831 = cos_hind_left_abduction_angle * s824 - sin_hind_left_abduction_angle * s825
+    s832 = sin_hind_left_abduction_angle * s824 + cos_hind_left_abduction_angle * s825
+    s833 = s523 * k16 + (s782 - s248 * s782 - y_hip * s821) + (s792 - s304 * s792 + y_hip * s830)
+    s834 = s521 * k18 + (s823 + (y_hip * s817 - x_hip * s820)) + (s832 - (x_hip * s829 + y_hip * s826))
+    s835 = s803 - s365 * s802
+    s836 = s676 + s801 - s366 * s802
+    s837 = s799 - (s670 + moment_front_left_hip_y * s549) - s367 * s802
+    s838 = s804 - s368 * s802
+    s839 = m_hip * bias_front_right_hip_z - moment_front_left_hip_y * s548 + s798 - s369 * s802
+    s840 = cos_front_right_abduction_angle * s838 - sin_front_right_abduction_angle * s839
+    s841 = sin_front_right_abduction_angle * s838 + cos_front_right_abduction_angle * s839
+    s842 = cos_front_right_abduction_angle * s835 - sin_front_right_abduction_angle * s836
+    s843 = sin_front_right_abduction_angle * s835 + cos_front_right_abduction_angle * s836
+    s844 = s522 * k17 + (s822 + x_hip * s821) + (s831 + x_hip * s830) + (s842 - x_hip * s841)
+    s845 = s813 - s421 * s812
+    s846 = s669 + s811 - s422 * s812
+    s847 = m_hip * bias_front_left_hip_x + moment_front_left_hip_y * s537 + s809 - s423 * s812
+    s848 = s814 - s424 * s812
+    s849 = m_hip * bias_front_left_hip_z + moment_front_left_hip_y * s536 + s808 - s425 * s812
+    s850 = cos_front_left_abduction_angle * s848 - sin_front_left_abduction_angle * s849
+    s851 = sin_front_left_abduction_angle * s848 + cos_front_left_abduction_angle * s849
+    s852 = cos_front_left_abduction_angle * s845 - sin_front_left_abduction_angle * s846
+    s853 = sin_front_left_abduction_angle * s845 + cos_front_left_abduction_angle * s846
+    s854 = s833 + (s802 - s364 * s802 - y_hip * s841) + (s812 - s420 * s812 + y_hip * s851)
+    s855 = s834 + (s843 + (x_hip * s840 + y_hip * s837)) + (s853 + (x_hip * s850 - y_hip * s847))
+    s856 = s483 * s854 - (s844 + (s852 - x_hip * s851))
+    s857 = s855 - s484 * s854 + s492 * s856
+    s858 = s817 + s826 + s837 + s847 - s485 * s854 + s493 * s856 - s499 * s857
+    s859 = s820 + s829 + s840 + s850 - s486 * s854 + s494 * s856 - s500 * s857
+    s860 = s821 + s830 + s841 + s851 - s487 * s854 + s495 * s856 - s501 * s857
+    s861 = s21 * s858 + s22 * s859 + s23 * s860
+    s862 = s518 * s861 - (s18 * s858 + s19 * s859 + s20 * s860)
+    s863 = (s15 * s858 + s16 * s859 + s17 * s860 - s517 * s861 + s520 * s862) / (s15 * s508 + s16 * s509 + s17 * s510 - s515 * s517 - s519 * s520)
+    delta_trunk_2_y = s862 / pivot_trunk_2_2 + s520 * s863
+    s864 = s861 / pivot_trunk_3_2 + (s518 * delta_trunk_2_y - s517 * s863)
+    delta_trunk_x = s18 * delta_trunk_2_y - s15 * s863 - s21 * s864
+    delta_trunk_y = s19 * delta_trunk_2_y - s16 * s863 - s22 * s864
+    delta_trunk_z = s20 * delta_trunk_2_y - s17 * s863 - s23 * s864
+    s865 = s857 / pivot_trunk_3 + (s499 * delta_trunk_x + s500 * delta_trunk_y + s501 * delta_trunk_z)
+    s866 = s493 * delta_trunk_x + s494 * delta_trunk_y + s495 * delta_trunk_z - s492 * s865
+    alpha_trunk_y = s856 / pivot_trunk_2 - s866
+    s867 = s483 * alpha_trunk_y - s484 * s865 + (s485 * delta_trunk_x + s486 * delta_trunk_y + s487 * delta_trunk_z)
+    s868 = s854 / pivot_trunk + s867
+    alpha_front_left_hip_y = cos_front_left_abduction_angle * alpha_trunk_y - sin_front_left_abduction_angle * s865
+    s869 = cos_front_left_abduction_angle * s865 + sin_front_left_abduction_angle * alpha_trunk_y
+    s870 = y_hip * s865
+    s871 = x_hip * s865
+    s872 = y_hip * s868
+    s873 = x_hip * alpha_trunk_y
+    s874 = s872 + s873
+    delta_front_left_hip_x = delta_trunk_x + s870
+    s875 = delta_trunk_y - s871
+    s876 = delta_trunk_z - s874
+    delta_front_left_hip_y = cos_front_left_abduction_angle * s875 + sin_front_left_abduction_angle * s876
+    delta_front_left_hip_z = cos_front_left_abduction_angle * s876 - sin_front_left_abduction_angle * s875
+    s877 = s423 * delta_front_left_hip_x + s424 * delta_front_left_hip_y + s425 * delta_front_left_hip_z
+    s878 = s812 / pivot_front_left_hip + (s421 * alpha_front_left_hip_y - s420 * s868 - s422 * s869 + s877)
+    s879 = s868 + s878
+    alpha_front_right_hip_y = cos_front_right_abduction_angle * alpha_trunk_y - sin_front_right_abduction_angle * s865
+    s880 = cos_front_right_abduction_angle * s865 + sin_front_right_abduction_angle * alpha_trunk_y
+    delta_front_right_hip_x = delta_trunk_x - s870
+    s881 = delta_trunk_z + (s872 - s873)
+    delta_front_right_hip_y = cos_front_right_abduction_angle * s875 + sin_front_right_abduction_angle * s881
+    delta_front_right_hip_z = cos_front_right_abduction_angle * s881 - sin_front_right_abduction_angle * s875
+    s882 = s367 * delta_front_right_hip_x + s368 * delta_front_right_hip_y + s369 * delta_front_right_hip_z
+    s883 = s802 / pivot_front_right_hip + (s365 * alpha_front_right_hip_y - s364 * s868 - s366 * s880 + s882)
+    s884 = s868 + s883
+    alpha_hind_left_hip_y = cos_hind_left_abduction_angle * alpha_trunk_y - sin_hind_left_abduction_angle * s865
+    s885 = cos_hind_left_abduction_angle * s865 + sin_hind_left_abduction_angle * alpha_trunk_y
+    s886 = delta_trunk_y + s871
+    s887 = delta_trunk_z + (s873 - s872)
+    delta_hind_left_hip_y = cos_hind_left_abduction_angle * s886 + sin_hind_left_abduction_angle * s887
+    delta_hind_left_hip_z = cos_hind_left_abduction_angle * s887 - sin_hind_left_abduction_angle * s886
+    s888 = s307 * delta_front_left_hip_x + s308 * delta_hind_left_hip_y + s309 * delta_hind_left_hip_z
+    s889 = s792 / pivot_hind_left_hip + (s305 * alpha_hind_left_hip_y - s304 * s868 - s306 * s885 + s888)
+    s890 = s868 + s889
+    alpha_hind_right_hip_y = cos_hind_right_abduction_angle * alpha_trunk_y - sin_hind_right_abduction_angle * s865
+    s891 = cos_hind_right_abduction_angle * s865 + sin_hind_right_abduction_angle * alpha_trunk_y
+    s892 = delta_trunk_z + s874
+    delta_hind_right_hip_y = cos_hind_right_abduction_angle * s886 + sin_hind_right_abduction_angle * s892
+    delta_hind_right_hip_z = cos_hind_right_abduction_angle * s892 - sin_hind_right_abduction_angle * s886
+    s893 = s251 * delta_front_right_hip_x + s252 * delta_hind_right_hip_y + s253 * delta_hind_right_hip_z
+    s894 = s782 / pivot_hind_right_hip + (s249 * alpha_hind_right_hip_y - s248 * s868 - s250 * s891 + s893)
+    s895 = s868 + s894
+    s896 = delta_front_left_hip_x + k2 * s869
+    s897 = delta_front_left_hip_z - k2 * s879
+    delta_front_left_thigh_z = cos_front_left_swing_angle * s897 + sin_front_left_swing_angle * s896
+    delta_front_left_thigh_x = cos_front_left_swing_angle * s896 - sin_front_left_swing_angle * s897
+    s898 = s212 * (cos_front_left_swing_angle * s869 + sin_front_left_swing_angle * s879)
+    s899 = s211 * alpha_front_left_hip_y - s898 + (s213 * delta_front_left_thigh_x + s214 * delta_front_left_thigh_z)
+    s900 = s772 / pivot_front_left_thigh + s899
+    alpha_front_left_thigh_y = alpha_front_left_hip_y - s900
+    s901 = delta_front_right_hip_x + k3 * s880
+    s902 = delta_front_right_hip_z - k3 * s884
+    delta_front_right_thigh_z = cos_front_right_swing_angle * s902 + sin_front_right_swing_angle * s901
+    delta_front_right_thigh_x = cos_front_right_swing_angle * s901 - sin_front_right_swing_angle * s902
+    s903 = s175 * (cos_front_right_swing_angle * s880 + sin_front_right_swing_angle * s884)
+    s904 = s174 * alpha_front_right_hip_y + s903 + (s176 * delta_front_right_thigh_x + s177 * delta_front_right_thigh_z)
+    s905 = s764 / pivot_front_right_thigh + s904
+    alpha_front_right_thigh_y = alpha_front_right_hip_y - s905
+    s906 = delta_front_left_hip_x + k2 * s885
+    s907 = delta_hind_left_hip_z - k2 * s890
+    delta_hind_left_thigh_z = cos_hind_left_swing_angle * s907 + sin_hind_left_swing_angle * s906
+    delta_hind_left_thigh_x = cos_hind_left_swing_angle * s906 - sin_hind_left_swing_angle * s907
+    s908 = s138 * (cos_hind_left_swing_angle * s885 + sin_hind_left_swing_angle * s890)
+    s909 = s137 * alpha_hind_left_hip_y - s908 + (s139 * delta_hind_left_thigh_x + s140 * delta_hind_left_thigh_z)
+    s910 = s756 / pivot_hind_left_thigh + s909
+    alpha_hind_left_thigh_y = alpha_hind_left_hip_y - s910
+    s911 = delta_front_right_hip_x + k3 * s891
+    s912 = delta_hind_right_hip_z - k3 * s895
+    delta_hind_right_thigh_z = cos_hind_right_swing_angle * s912 + sin_hind_right_swing_angle * s911
+    delta_hind_right_thigh_x = cos_hind_right_swing_angle * s911 - sin_hind_right_swing_angle * s912
+    s913 = s101 * (cos_hind_right_swing_angle * s891 + sin_hind_right_swing_angle * s895)
+    s914 = s100 * alpha_hind_right_hip_y + s913 + (s102 * delta_hind_right_thigh_x + s103 * delta_hind_right_thigh_z)
+    s915 = s748 / pivot_hind_right_thigh + s914
+    alpha_hind_right_thigh_y = alpha_hind_right_hip_y - s915
+    s916 = cos_front_left_knee_angle * (delta_front_left_thigh_x + k4 * alpha_front_left_thigh_y)
+    s917 = k7 * alpha_front_left_thigh_y - k8 * (s916 - sin_front_left_knee_angle * delta_front_left_thigh_z)
+    s918 = cos_front_right_knee_angle * (delta_front_right_thigh_x + k4 * alpha_front_right_thigh_y)
+    s919 = k7 * alpha_front_right_thigh_y - k8 * (s918 - sin_front_right_knee_angle * delta_front_right_thigh_z)
+    s920 = cos_hind_left_knee_angle * (delta_hind_left_thigh_x + k4 * alpha_hind_left_thigh_y)
+    s921 = k7 * alpha_hind_left_thigh_y - k8 * (s920 - sin_hind_left_knee_angle * delta_hind_left_thigh_z)
+    s922 = cos_hind_right_knee_angle * (delta_hind_right_thigh_x + k4 * alpha_hind_right_thigh_y)
+    s923 = k7 * alpha_hind_right_thigh_y - k8 * (s922 - sin_hind_right_knee_angle * delta_hind_right_thigh_z)
+    s924 = trunk_wx * 0.5
+    s925 = trunk_wy * 0.5
+    s926 = trunk_wz * 0.5
     return (
         trunk_x_dot,
         trunk_y_dot,
         trunk_z_dot,
-        -(trunk_qx * s929 + trunk_qy * s930 + trunk_qz * s931),
-        trunk_qw * s929 + trunk_qy * s931 - trunk_qz * s930,
-        trunk_qw * s930 + trunk_qz * s929 - trunk_qx * s931,
-        trunk_qw * s931 + trunk_qx * s930 - trunk_qy * s929,
+        -(trunk_qx * s924 + trunk_qy * s925 + trunk_qz * s926),
+        trunk_qw * s924 + trunk_qy * s926 - trunk_qz * s925,
+        trunk_qw * s925 + trunk_qz * s924 - trunk_qx * s926,
+        trunk_qw * s926 + trunk_qx * s925 - trunk_qy * s924,
         front_left_abduction_angle_dot,
         front_right_abduction_angle_dot,
         hind_left_abduction_angle_dot,
@@ -1591,30 +1581,30 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
         front_right_knee_angle_dot,
         hind_left_knee_angle_dot,
         hind_right_knee_angle_dot,
-        -s868,
+        -s863,
         delta_trunk_2_y,
-        -s869,
-        -s873,
+        -(g + s864),
+        -s868,
         alpha_trunk_y,
-        -s870,
+        -s865,
+        -s878,
         -s883,
-        -s888,
+        -s889,
         -s894,
-        -s899,
+        -s900,
         -s905,
         -s910,
         -s915,
-        -s920,
-        s769 / pivot_hind_right_shank - s922,
-        s761 / pivot_hind_right_shank - s924,
-        s753 / pivot_hind_right_shank - s926,
-        s745 / pivot_hind_right_shank - s928,
+        s767 / pivot_hind_right_shank - s917,
+        s759 / pivot_hind_right_shank - s919,
+        s751 / pivot_hind_right_shank - s921,
+        s743 / pivot_hind_right_shank - s923,
     )
 
 
 def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """25390 operations: 5644 add, 6293 sub, 12792 mul, 515 div, 122 neg, 12 sin, 12 cos."""
-    m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, k28, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, pivot_hind_right_shank, k19, k20, k21, k22, k23, k24, k25, k26, k29, k27, k30 = k
+    """25368 operations: 5631 add, 6292 sub, 12784 mul, 515 div, 122 neg, 12 sin, 12 cos."""
+    m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, k28, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k29, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k30 = k
     _, _, _, trunk_qw, trunk_qx, trunk_qy, trunk_qz, front_left_abduction_angle, front_right_abduction_angle, hind_left_abduction_angle, hind_right_abduction_angle, front_left_swing_angle, front_right_swing_angle, hind_left_swing_angle, hind_right_swing_angle, front_left_knee_angle, front_right_knee_angle, hind_left_knee_angle, hind_right_knee_angle, trunk_x_dot, trunk_y_dot, trunk_z_dot, trunk_wx, trunk_wy, trunk_wz, front_left_abduction_angle_dot, front_right_abduction_angle_dot, hind_left_abduction_angle_dot, hind_right_abduction_angle_dot, front_left_swing_angle_dot, front_right_swing_angle_dot, hind_left_swing_angle_dot, hind_right_swing_angle_dot, front_left_knee_angle_dot, front_right_knee_angle_dot, hind_left_knee_angle_dot, hind_right_knee_angle_dot = y
     s1 = trunk_qw * trunk_qw + trunk_qx * trunk_qx + trunk_qy * trunk_qy + trunk_qz * trunk_qz
     s2 = 2.0 / s1
@@ -1642,107 +1632,609 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_front_left_abduction_angle = cos(front_left_abduction_angle)
     sin_front_left_abduction_angle = sin(front_left_abduction_angle)
     s24 = 2.0 * cos_front_left_abduction_angle
-    s932 = s16 * cos_front_left_abduction_angle + s17 * sin_front_left_abduction_angle
-    s933 = s17 * cos_front_left_abduction_angle - s16 * sin_front_left_abduction_angle
-    s934 = s19 * cos_front_left_abduction_angle + s20 * sin_front_left_abduction_angle
-    s935 = s20 * cos_front_left_abduction_angle - s19 * sin_front_left_abduction_angle
-    s936 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
-    s937 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
+    s927 = s16 * cos_front_left_abduction_angle + s17 * sin_front_left_abduction_angle
+    s928 = s17 * cos_front_left_abduction_angle - s16 * sin_front_left_abduction_angle
+    s929 = s19 * cos_front_left_abduction_angle + s20 * sin_front_left_abduction_angle
+    s930 = s20 * cos_front_left_abduction_angle - s19 * sin_front_left_abduction_angle
+    s931 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
+    s932 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
     cos_front_right_abduction_angle = cos(front_right_abduction_angle)
     sin_front_right_abduction_angle = sin(front_right_abduction_angle)
     s25 = 2.0 * cos_front_right_abduction_angle
-    s938 = s16 * cos_front_right_abduction_angle + s17 * sin_front_right_abduction_angle
-    s939 = s17 * cos_front_right_abduction_angle - s16 * sin_front_right_abduction_angle
-    s940 = s19 * cos_front_right_abduction_angle + s20 * sin_front_right_abduction_angle
-    s941 = s20 * cos_front_right_abduction_angle - s19 * sin_front_right_abduction_angle
-    s942 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
-    s943 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
+    s933 = s16 * cos_front_right_abduction_angle + s17 * sin_front_right_abduction_angle
+    s934 = s17 * cos_front_right_abduction_angle - s16 * sin_front_right_abduction_angle
+    s935 = s19 * cos_front_right_abduction_angle + s20 * sin_front_right_abduction_angle
+    s936 = s20 * cos_front_right_abduction_angle - s19 * sin_front_right_abduction_angle
+    s937 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
+    s938 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
     cos_hind_left_abduction_angle = cos(hind_left_abduction_angle)
     sin_hind_left_abduction_angle = sin(hind_left_abduction_angle)
     s26 = 2.0 * cos_hind_left_abduction_angle
-    s944 = s16 * cos_hind_left_abduction_angle + s17 * sin_hind_left_abduction_angle
-    s945 = s17 * cos_hind_left_abduction_angle - s16 * sin_hind_left_abduction_angle
-    s946 = s19 * cos_hind_left_abduction_angle + s20 * sin_hind_left_abduction_angle
-    s947 = s20 * cos_hind_left_abduction_angle - s19 * sin_hind_left_abduction_angle
-    s948 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
-    s949 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
+    s939 = s16 * cos_hind_left_abduction_angle + s17 * sin_hind_left_abduction_angle
+    s940 = s17 * cos_hind_left_abduction_angle - s16 * sin_hind_left_abduction_angle
+    s941 = s19 * cos_hind_left_abduction_angle + s20 * sin_hind_left_abduction_angle
+    s942 = s20 * cos_hind_left_abduction_angle - s19 * sin_hind_left_abduction_angle
+    s943 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
+    s944 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
     cos_hind_right_abduction_angle = cos(hind_right_abduction_angle)
     sin_hind_right_abduction_angle = sin(hind_right_abduction_angle)
     s27 = 2.0 * cos_hind_right_abduction_angle
-    s950 = s16 * cos_hind_right_abduction_angle + s17 * sin_hind_right_abduction_angle
-    s951 = s17 * cos_hind_right_abduction_angle - s16 * sin_hind_right_abduction_angle
-    s952 = s19 * cos_hind_right_abduction_angle + s20 * sin_hind_right_abduction_angle
-    s953 = s20 * cos_hind_right_abduction_angle - s19 * sin_hind_right_abduction_angle
-    s954 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
-    s955 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
+    s945 = s16 * cos_hind_right_abduction_angle + s17 * sin_hind_right_abduction_angle
+    s946 = s17 * cos_hind_right_abduction_angle - s16 * sin_hind_right_abduction_angle
+    s947 = s19 * cos_hind_right_abduction_angle + s20 * sin_hind_right_abduction_angle
+    s948 = s20 * cos_hind_right_abduction_angle - s19 * sin_hind_right_abduction_angle
+    s949 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
+    s950 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
     cos_front_left_swing_angle = cos(front_left_swing_angle)
     sin_front_left_swing_angle = sin(front_left_swing_angle)
     s28 = 2.0 * cos_front_left_swing_angle
-    s956 = s933 * cos_front_left_swing_angle + s15 * sin_front_left_swing_angle
-    s957 = s15 * cos_front_left_swing_angle - s933 * sin_front_left_swing_angle
-    s958 = s935 * cos_front_left_swing_angle + s18 * sin_front_left_swing_angle
-    s959 = s18 * cos_front_left_swing_angle - s935 * sin_front_left_swing_angle
-    s960 = s937 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
-    s961 = s21 * cos_front_left_swing_angle - s937 * sin_front_left_swing_angle
+    s951 = s928 * cos_front_left_swing_angle + s15 * sin_front_left_swing_angle
+    s952 = s15 * cos_front_left_swing_angle - s928 * sin_front_left_swing_angle
+    s953 = s930 * cos_front_left_swing_angle + s18 * sin_front_left_swing_angle
+    s954 = s18 * cos_front_left_swing_angle - s930 * sin_front_left_swing_angle
+    s955 = s932 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
+    s956 = s21 * cos_front_left_swing_angle - s932 * sin_front_left_swing_angle
     cos_front_right_swing_angle = cos(front_right_swing_angle)
     sin_front_right_swing_angle = sin(front_right_swing_angle)
     s29 = 2.0 * cos_front_right_swing_angle
-    s962 = s939 * cos_front_right_swing_angle + s15 * sin_front_right_swing_angle
-    s963 = s15 * cos_front_right_swing_angle - s939 * sin_front_right_swing_angle
-    s964 = s941 * cos_front_right_swing_angle + s18 * sin_front_right_swing_angle
-    s965 = s18 * cos_front_right_swing_angle - s941 * sin_front_right_swing_angle
-    s966 = s943 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
-    s967 = s21 * cos_front_right_swing_angle - s943 * sin_front_right_swing_angle
+    s957 = s934 * cos_front_right_swing_angle + s15 * sin_front_right_swing_angle
+    s958 = s15 * cos_front_right_swing_angle - s934 * sin_front_right_swing_angle
+    s959 = s936 * cos_front_right_swing_angle + s18 * sin_front_right_swing_angle
+    s960 = s18 * cos_front_right_swing_angle - s936 * sin_front_right_swing_angle
+    s961 = s938 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
+    s962 = s21 * cos_front_right_swing_angle - s938 * sin_front_right_swing_angle
     cos_hind_left_swing_angle = cos(hind_left_swing_angle)
     sin_hind_left_swing_angle = sin(hind_left_swing_angle)
     s30 = 2.0 * cos_hind_left_swing_angle
-    s968 = s945 * cos_hind_left_swing_angle + s15 * sin_hind_left_swing_angle
-    s969 = s15 * cos_hind_left_swing_angle - s945 * sin_hind_left_swing_angle
-    s970 = s947 * cos_hind_left_swing_angle + s18 * sin_hind_left_swing_angle
-    s971 = s18 * cos_hind_left_swing_angle - s947 * sin_hind_left_swing_angle
-    s972 = s949 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
-    s973 = s21 * cos_hind_left_swing_angle - s949 * sin_hind_left_swing_angle
+    s963 = s940 * cos_hind_left_swing_angle + s15 * sin_hind_left_swing_angle
+    s964 = s15 * cos_hind_left_swing_angle - s940 * sin_hind_left_swing_angle
+    s965 = s942 * cos_hind_left_swing_angle + s18 * sin_hind_left_swing_angle
+    s966 = s18 * cos_hind_left_swing_angle - s942 * sin_hind_left_swing_angle
+    s967 = s944 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
+    s968 = s21 * cos_hind_left_swing_angle - s944 * sin_hind_left_swing_angle
     cos_hind_right_swing_angle = cos(hind_right_swing_angle)
     sin_hind_right_swing_angle = sin(hind_right_swing_angle)
     s31 = 2.0 * cos_hind_right_swing_angle
-    s974 = s951 * cos_hind_right_swing_angle + s15 * sin_hind_right_swing_angle
-    s975 = s15 * cos_hind_right_swing_angle - s951 * sin_hind_right_swing_angle
-    s976 = s953 * cos_hind_right_swing_angle + s18 * sin_hind_right_swing_angle
-    s977 = s18 * cos_hind_right_swing_angle - s953 * sin_hind_right_swing_angle
-    s978 = s955 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
-    s979 = s21 * cos_hind_right_swing_angle - s955 * sin_hind_right_swing_angle
+    s969 = s946 * cos_hind_right_swing_angle + s15 * sin_hind_right_swing_angle
+    s970 = s15 * cos_hind_right_swing_angle - s946 * sin_hind_right_swing_angle
+    s971 = s948 * cos_hind_right_swing_angle + s18 * sin_hind_right_swing_angle
+    s972 = s18 * cos_hind_right_swing_angle - s948 * sin_hind_right_swing_angle
+    s973 = s950 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
+    s974 = s21 * cos_hind_right_swing_angle - s950 * sin_hind_right_swing_angle
     cos_front_left_knee_angle = cos(front_left_knee_angle)
     sin_front_left_knee_angle = sin(front_left_knee_angle)
-    s980 = s956 * cos_front_left_knee_angle + s957 * sin_front_left_knee_angle
-    s981 = s957 * cos_front_left_knee_angle - s956 * sin_front_left_knee_angle
-    s982 = s958 * cos_front_left_knee_angle + s959 * sin_front_left_knee_angle
-    s983 = s959 * cos_front_left_knee_angle - s958 * sin_front_left_knee_angle
-    s984 = s960 * cos_front_left_knee_angle + s961 * sin_front_left_knee_angle
-    s985 = s961 * cos_front_left_knee_angle - s960 * sin_front_left_knee_angle
+    s975 = s951 * cos_front_left_knee_angle + s952 * sin_front_left_knee_angle
+    s976 = s952 * cos_front_left_knee_angle - s951 * sin_front_left_knee_angle
+    s977 = s953 * cos_front_left_knee_angle + s954 * sin_front_left_knee_angle
+    s978 = s954 * cos_front_left_knee_angle - s953 * sin_front_left_knee_angle
+    s979 = s955 * cos_front_left_knee_angle + s956 * sin_front_left_knee_angle
+    s980 = s956 * cos_front_left_knee_angle - s955 * sin_front_left_knee_angle
     cos_front_right_knee_angle = cos(front_right_knee_angle)
     sin_front_right_knee_angle = sin(front_right_knee_angle)
-    s986 = s962 * cos_front_right_knee_angle + s963 * sin_front_right_knee_angle
-    s987 = s963 * cos_front_right_knee_angle - s962 * sin_front_right_knee_angle
-    s988 = s964 * cos_front_right_knee_angle + s965 * sin_front_right_knee_angle
-    s989 = s965 * cos_front_right_knee_angle - s964 * sin_front_right_knee_angle
-    s990 = s966 * cos_front_right_knee_angle + s967 * sin_front_right_knee_angle
-    s991 = s967 * cos_front_right_knee_angle - s966 * sin_front_right_knee_angle
+    s981 = s957 * cos_front_right_knee_angle + s958 * sin_front_right_knee_angle
+    s982 = s958 * cos_front_right_knee_angle - s957 * sin_front_right_knee_angle
+    s983 = s959 * cos_front_right_knee_angle + s960 * sin_front_right_knee_angle
+    s984 = s960 * cos_front_right_knee_angle - s959 * sin_front_right_knee_angle
+    s985 = s961 * cos_front_right_knee_angle + s962 * sin_front_right_knee_angle
+    s986 = s962 * cos_front_right_knee_angle - s961 * sin_front_right_knee_angle
     cos_hind_left_knee_angle = cos(hind_left_knee_angle)
     sin_hind_left_knee_angle = sin(hind_left_knee_angle)
-    s992 = s968 * cos_hind_left_knee_angle + s969 * sin_hind_left_knee_angle
-    s993 = s969 * cos_hind_left_knee_angle - s968 * sin_hind_left_knee_angle
-    s994 = s970 * cos_hind_left_knee_angle + s971 * sin_hind_left_knee_angle
-    s995 = s971 * cos_hind_left_knee_angle - s970 * sin_hind_left_knee_angle
-    s996 = s972 * cos_hind_left_knee_angle + s973 * sin_hind_left_knee_angle
-    s997 = s973 * cos_hind_left_knee_angle - s972 * sin_hind_left_knee_angle
+    s987 = s963 * cos_hind_left_knee_angle + s964 * sin_hind_left_knee_angle
+    s988 = s964 * cos_hind_left_knee_angle - s963 * sin_hind_left_knee_angle
+    s989 = s965 * cos_hind_left_knee_angle + s966 * sin_hind_left_knee_angle
+    s990 = s966 * cos_hind_left_knee_angle - s965 * sin_hind_left_knee_angle
+    s991 = s967 * cos_hind_left_knee_angle + s968 * sin_hind_left_knee_angle
+    s992 = s968 * cos_hind_left_knee_angle - s967 * sin_hind_left_knee_angle
     cos_hind_right_knee_angle = cos(hind_right_knee_angle)
     sin_hind_right_knee_angle = sin(hind_right_knee_angle)
-    s998 = s974 * cos_hind_right_knee_angle + s975 * sin_hind_right_knee_angle
-    s999 = s975 * cos_hind_right_knee_angle - s974 * sin_hind_right_knee_angle
-    s1000 = s976 * cos_hind_right_knee_angle + s977 * sin_hind_right_knee_angle
-    s1001 = s977 * cos_hind_right_knee_angle - s976 * sin_hind_right_knee_angle
-    s1002 = s978 * cos_hind_right_knee_angle + s979 * sin_hind_right_knee_angle
-    s1003 = s979 * cos_hind_right_knee_angle - s978 * sin_hind_right_knee_angle
+    s993 = s969 * cos_hind_right_knee_angle + s970 * sin_hind_right_knee_angle
+    s994 = s970 * cos_hind_right_knee_angle - s969 * sin_hind_right_knee_angle
+    s995 = s971 * cos_hind_right_knee_angle + s972 * sin_hind_right_knee_angle
+    s996 = s972 * cos_hind_right_knee_angle - s971 * sin_hind_right_knee_angle
+    s997 = s973 * cos_hind_right_knee_angle + s974 * sin_hind_right_knee_angle
+    s998 = s974 * cos_hind_right_knee_angle - s973 * sin_hind_right_knee_angle
+    s32 = sin_hind_right_knee_angle * k11
+    s33 = sin_hind_right_knee_angle * s32
+    s34 = cos_hind_right_knee_angle * k10
+    s35 = k6 * sin_hind_right_knee_angle
+    s36 = k6 * cos_hind_right_knee_angle
+    s37 = sin_hind_right_knee_angle * k12
+    s38 = sin_hind_right_knee_angle * s37
+    s39 = k9 + s38
+    s40 = cos_hind_right_knee_angle * s37
+    s41 = s36 - k13
+    s42 = s34 + k4 * s39
+    s43 = k4 * s40 - sin_hind_right_knee_angle * k10
+    s44 = cos_hind_right_knee_angle * s32 + k4 * s35
+    s45 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s33 - k4 * (s36 + s41))
+    s46 = k4 * (s34 + s42) + k14
+    s47 = k5 + s41
+    s48 = s42 - k5
+    s49 = sin_hind_left_knee_angle * k11
+    s50 = sin_hind_left_knee_angle * s49
+    s51 = cos_hind_left_knee_angle * k10
+    s52 = k6 * sin_hind_left_knee_angle
+    s53 = k6 * cos_hind_left_knee_angle
+    s54 = sin_hind_left_knee_angle * k12
+    s55 = sin_hind_left_knee_angle * s54
+    s56 = k9 + s55
+    s57 = cos_hind_left_knee_angle * s54
+    s58 = s53 - k13
+    s59 = s51 + k4 * s56
+    s60 = k4 * s57 - sin_hind_left_knee_angle * k10
+    s61 = cos_hind_left_knee_angle * s49 + k4 * s52
+    s62 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s50 - k4 * (s53 + s58))
+    s63 = k14 + k4 * (s51 + s59)
+    s64 = k5 + s58
+    s65 = s59 - k5
+    s66 = sin_front_right_knee_angle * k11
+    s67 = sin_front_right_knee_angle * s66
+    s68 = cos_front_right_knee_angle * k10
+    s69 = k6 * sin_front_right_knee_angle
+    s70 = k6 * cos_front_right_knee_angle
+    s71 = sin_front_right_knee_angle * k12
+    s72 = sin_front_right_knee_angle * s71
+    s73 = k9 + s72
+    s74 = cos_front_right_knee_angle * s71
+    s75 = s70 - k13
+    s76 = s68 + k4 * s73
+    s77 = k4 * s74 - sin_front_right_knee_angle * k10
+    s78 = cos_front_right_knee_angle * s66 + k4 * s69
+    s79 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s67 - k4 * (s70 + s75))
+    s80 = k14 + k4 * (s68 + s76)
+    s81 = k5 + s75
+    s82 = s76 - k5
+    s83 = sin_front_left_knee_angle * k11
+    s84 = sin_front_left_knee_angle * s83
+    s85 = cos_front_left_knee_angle * k10
+    s86 = k6 * sin_front_left_knee_angle
+    s87 = k6 * cos_front_left_knee_angle
+    s88 = sin_front_left_knee_angle * k12
+    s89 = sin_front_left_knee_angle * s88
+    s90 = k9 + s89
+    s91 = cos_front_left_knee_angle * s88
+    s92 = s87 - k13
+    s93 = s85 + k4 * s90
+    s94 = k4 * s91 - sin_front_left_knee_angle * k10
+    s95 = cos_front_left_knee_angle * s83 + k4 * s86
+    s96 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s84 - k4 * (s87 + s92))
+    s97 = k14 + k4 * (s85 + s93)
+    s98 = k5 + s92
+    s99 = s93 - k5
+    pivot_hind_right_thigh = k1 + s46
+    s100 = s46 / pivot_hind_right_thigh
+    s101 = inertia_front_left_thigh_yz / pivot_hind_right_thigh
+    s102 = s48 / pivot_hind_right_thigh
+    s103 = s43 / pivot_hind_right_thigh
+    s104 = inertia_front_left_thigh_zz + (I_shank_z - s33) - inertia_front_left_thigh_yz * s101
+    s105 = inertia_front_left_thigh_yz * s100 - inertia_front_left_thigh_yz
+    s106 = m_thigh + s39 - s48 * s102
+    s107 = m_thigh + (m_shank - s38) - s43 * s103
+    s108 = s40 - s43 * s102
+    s109 = s48 - s48 * s100
+    s110 = s43 - s43 * s100
+    s111 = moment_front_left_thigh_y + s48 * s101
+    s112 = s43 * s101
+    s113 = sin_hind_right_swing_angle * (s104 - s45) + s31 * s44
+    s114 = sin_hind_right_swing_angle * s113
+    s115 = sin_hind_right_swing_angle * s112 + cos_hind_right_swing_angle * (s111 - moment_front_left_thigh_y)
+    s116 = sin_hind_right_swing_angle * s115
+    s117 = cos_hind_right_swing_angle * s115
+    s118 = cos_hind_right_swing_angle * s110 - sin_hind_right_swing_angle * s109
+    s119 = sin_hind_right_swing_angle * s110 + cos_hind_right_swing_angle * s109
+    s120 = cos_hind_right_swing_angle * s47 - sin_hind_right_swing_angle * s35
+    s121 = moment_front_left_thigh_y + s117
+    s122 = s117 - s111
+    s123 = sin_hind_right_swing_angle * (s107 - s106) + s31 * s108
+    s124 = sin_hind_right_swing_angle * s123
+    s125 = s107 - s124
+    s126 = s106 + s124
+    s127 = cos_hind_right_swing_angle * s123 - s108
+    s128 = k3 * s127
+    s129 = s116 + s128
+    s130 = s122 + k3 * s125
+    s131 = s121 - k3 * s126
+    s132 = s112 - s116 - s128
+    s133 = inertia_front_left_hip_xx + (s45 + s114 + k3 * (s122 + s130))
+    s134 = sin_hind_right_swing_angle * s105 + k3 * s118 - I_hip_xy
+    s135 = I_hip_xz + (cos_hind_right_swing_angle * s113 - s44 + k3 * (s132 - s116))
+    s136 = s130 - moment_front_left_hip_y
+    pivot_hind_left_thigh = k1 + s63
+    s137 = s63 / pivot_hind_left_thigh
+    s138 = inertia_front_left_thigh_yz / pivot_hind_left_thigh
+    s139 = s65 / pivot_hind_left_thigh
+    s140 = s60 / pivot_hind_left_thigh
+    s141 = inertia_front_left_thigh_zz + (I_shank_z - s50) - inertia_front_left_thigh_yz * s138
+    s142 = inertia_front_left_thigh_yz - inertia_front_left_thigh_yz * s137
+    s143 = m_thigh + s56 - s65 * s139
+    s144 = m_thigh + (m_shank - s55) - s60 * s140
+    s145 = s57 - s60 * s139
+    s146 = s65 - s65 * s137
+    s147 = s60 - s60 * s137
+    s148 = moment_front_left_thigh_y + s65 * s138
+    s149 = s60 * s138
+    s150 = sin_hind_left_swing_angle * (s141 - s62) + s30 * s61
+    s151 = sin_hind_left_swing_angle * s150
+    s152 = cos_hind_left_swing_angle * (moment_front_left_thigh_y - s148) - sin_hind_left_swing_angle * s149
+    s153 = sin_hind_left_swing_angle * s152
+    s154 = cos_hind_left_swing_angle * s152
+    s155 = cos_hind_left_swing_angle * s147 - sin_hind_left_swing_angle * s146
+    s156 = sin_hind_left_swing_angle * s147 + cos_hind_left_swing_angle * s146
+    s157 = cos_hind_left_swing_angle * s64 - sin_hind_left_swing_angle * s52
+    s158 = s154 - moment_front_left_thigh_y
+    s159 = s148 + s154
+    s160 = sin_hind_left_swing_angle * (s144 - s143) + s30 * s145
+    s161 = sin_hind_left_swing_angle * s160
+    s162 = s144 - s161
+    s163 = s143 + s161
+    s164 = cos_hind_left_swing_angle * s160 - s145
+    s165 = k2 * s164
+    s166 = s153 + s165
+    s167 = s159 + k2 * s162
+    s168 = s158 - k2 * s163
+    s169 = s149 + s153 + s165
+    s170 = inertia_front_left_hip_xx + (s62 + s151 + k2 * (s159 + s167))
+    s171 = I_hip_xy + (sin_hind_left_swing_angle * s142 + k2 * s155)
+    s172 = I_hip_xz + (cos_hind_left_swing_angle * s150 - s61 - k2 * (s153 + s169))
+    s173 = moment_front_left_hip_y + s167
+    pivot_front_right_thigh = k1 + s80
+    s174 = s80 / pivot_front_right_thigh
+    s175 = inertia_front_left_thigh_yz / pivot_front_right_thigh
+    s176 = s82 / pivot_front_right_thigh
+    s177 = s77 / pivot_front_right_thigh
+    s178 = inertia_front_left_thigh_zz + (I_shank_z - s67) - inertia_front_left_thigh_yz * s175
+    s179 = inertia_front_left_thigh_yz * s174 - inertia_front_left_thigh_yz
+    s180 = m_thigh + s73 - s82 * s176
+    s181 = m_thigh + (m_shank - s72) - s77 * s177
+    s182 = s74 - s77 * s176
+    s183 = s82 - s82 * s174
+    s184 = s77 - s77 * s174
+    s185 = moment_front_left_thigh_y + s82 * s175
+    s186 = s77 * s175
+    s187 = sin_front_right_swing_angle * (s178 - s79) + s29 * s78
+    s188 = sin_front_right_swing_angle * s187
+    s189 = sin_front_right_swing_angle * s186 + cos_front_right_swing_angle * (s185 - moment_front_left_thigh_y)
+    s190 = sin_front_right_swing_angle * s189
+    s191 = cos_front_right_swing_angle * s189
+    s192 = cos_front_right_swing_angle * s184 - sin_front_right_swing_angle * s183
+    s193 = sin_front_right_swing_angle * s184 + cos_front_right_swing_angle * s183
+    s194 = cos_front_right_swing_angle * s81 - sin_front_right_swing_angle * s69
+    s195 = moment_front_left_thigh_y + s191
+    s196 = s191 - s185
+    s197 = sin_front_right_swing_angle * (s181 - s180) + s29 * s182
+    s198 = sin_front_right_swing_angle * s197
+    s199 = s181 - s198
+    s200 = s180 + s198
+    s201 = cos_front_right_swing_angle * s197 - s182
+    s202 = k3 * s201
+    s203 = s190 + s202
+    s204 = s196 + k3 * s199
+    s205 = s195 - k3 * s200
+    s206 = s186 - s190 - s202
+    s207 = inertia_front_left_hip_xx + (s79 + s188 + k3 * (s196 + s204))
+    s208 = sin_front_right_swing_angle * s179 + k3 * s192 - I_hip_xy
+    s209 = I_hip_xz + (cos_front_right_swing_angle * s187 - s78 + k3 * (s206 - s190))
+    s210 = s204 - moment_front_left_hip_y
+    pivot_front_left_thigh = k1 + s97
+    s211 = s97 / pivot_front_left_thigh
+    s212 = inertia_front_left_thigh_yz / pivot_front_left_thigh
+    s213 = s99 / pivot_front_left_thigh
+    s214 = s94 / pivot_front_left_thigh
+    s215 = inertia_front_left_thigh_zz + (I_shank_z - s84) - inertia_front_left_thigh_yz * s212
+    s216 = inertia_front_left_thigh_yz - inertia_front_left_thigh_yz * s211
+    s217 = m_thigh + s90 - s99 * s213
+    s218 = m_thigh + (m_shank - s89) - s94 * s214
+    s219 = s91 - s94 * s213
+    s220 = s99 - s99 * s211
+    s221 = s94 - s94 * s211
+    s222 = moment_front_left_thigh_y + s99 * s212
+    s223 = s94 * s212
+    s224 = sin_front_left_swing_angle * (s215 - s96) + s28 * s95
+    s225 = sin_front_left_swing_angle * s224
+    s226 = cos_front_left_swing_angle * (moment_front_left_thigh_y - s222) - sin_front_left_swing_angle * s223
+    s227 = sin_front_left_swing_angle * s226
+    s228 = cos_front_left_swing_angle * s226
+    s229 = cos_front_left_swing_angle * s221 - sin_front_left_swing_angle * s220
+    s230 = sin_front_left_swing_angle * s221 + cos_front_left_swing_angle * s220
+    s231 = cos_front_left_swing_angle * s98 - sin_front_left_swing_angle * s86
+    s232 = s228 - moment_front_left_thigh_y
+    s233 = s222 + s228
+    s234 = sin_front_left_swing_angle * (s218 - s217) + s28 * s219
+    s235 = sin_front_left_swing_angle * s234
+    s236 = s218 - s235
+    s237 = s217 + s235
+    s238 = cos_front_left_swing_angle * s234 - s219
+    s239 = k2 * s238
+    s240 = s227 + s239
+    s241 = s233 + k2 * s236
+    s242 = s232 - k2 * s237
+    s243 = s223 + s227 + s239
+    s244 = inertia_front_left_hip_xx + (s96 + s225 + k2 * (s233 + s241))
+    s245 = I_hip_xy + (sin_front_left_swing_angle * s216 + k2 * s229)
+    s246 = I_hip_xz + (cos_front_left_swing_angle * s224 - s95 - k2 * (s227 + s243))
+    s247 = moment_front_left_hip_y + s241
+    pivot_hind_right_hip = k1 + s133
+    s248 = s133 / pivot_hind_right_hip
+    s249 = s134 / pivot_hind_right_hip
+    s250 = s135 / pivot_hind_right_hip
+    s251 = s129 / pivot_hind_right_hip
+    s252 = s120 / pivot_hind_right_hip
+    s253 = s136 / pivot_hind_right_hip
+    s254 = I_hip_yy + (s46 - s46 * s100) - s134 * s249
+    s255 = inertia_front_left_hip_zz + (s104 - s114 - k3 * (s121 + s131)) - s135 * s250
+    s256 = s134 - s134 * s248
+    s257 = s135 - s135 * s248
+    s258 = cos_hind_right_swing_angle * s105 - k3 * s119 - I_hip_yz - s135 * s249
+    s259 = m_hip + s126 - s129 * s251
+    s260 = k15 - s120 * s252
+    s261 = m_hip + s125 - s136 * s253
+    s262 = s120 * s251
+    s263 = s127 - s136 * s251
+    s264 = s136 * s252
+    s265 = s129 - s129 * s248
+    s266 = s120 - s120 * s248
+    s267 = s136 - s136 * s248
+    s268 = s119 - s129 * s249
+    s269 = s120 * s249
+    s270 = s118 - s136 * s249
+    s271 = moment_front_left_hip_y + s131 - s129 * s250
+    s272 = cos_hind_right_swing_angle * s35 + sin_hind_right_swing_angle * s47 + s120 * s250
+    s273 = s132 - s136 * s250
+    s274 = sin_hind_right_abduction_angle * (s254 - s255) + s27 * s258
+    s275 = sin_hind_right_abduction_angle * s274
+    s276 = cos_hind_right_abduction_angle * s256 - sin_hind_right_abduction_angle * s257
+    s277 = sin_hind_right_abduction_angle * s256 + cos_hind_right_abduction_angle * s257
+    s278 = cos_hind_right_abduction_angle * (s270 - s272) - sin_hind_right_abduction_angle * (s269 + s273)
+    s279 = sin_hind_right_abduction_angle * s278
+    s280 = cos_hind_right_abduction_angle * s278
+    s281 = cos_hind_right_abduction_angle * s266 - sin_hind_right_abduction_angle * s267
+    s282 = sin_hind_right_abduction_angle * s266 + cos_hind_right_abduction_angle * s267
+    s283 = cos_hind_right_abduction_angle * s268 - sin_hind_right_abduction_angle * s271
+    s284 = sin_hind_right_abduction_angle * s268 + cos_hind_right_abduction_angle * s271
+    s285 = s269 + s279
+    s286 = s272 + s280
+    s287 = s280 - s270
+    s288 = sin_hind_right_abduction_angle * (s260 - s261) - s27 * s264
+    s289 = sin_hind_right_abduction_angle * s288
+    s290 = cos_hind_right_abduction_angle * s262 + sin_hind_right_abduction_angle * s263
+    s291 = cos_hind_right_abduction_angle * s263 - sin_hind_right_abduction_angle * s262
+    s292 = s260 - s289
+    s293 = s261 + s289
+    s294 = s264 + cos_hind_right_abduction_angle * s288
+    s295 = y_hip * s291
+    s296 = x_hip * s294
+    s297 = s282 - y_hip * s293
+    s298 = s286 + x_hip * s293
+    s299 = s284 + (x_hip * s290 + y_hip * s259)
+    s300 = s287 - (x_hip * s292 + y_hip * s290)
+    s301 = s273 + s279 + (s295 - s296)
+    s302 = s255 + s275 + (y_hip * s284 - x_hip * s287 + (y_hip * s299 - x_hip * s300))
+    s303 = cos_hind_right_abduction_angle * s274 - s258 + (x_hip * s285 + y_hip * s283 + x_hip * s301)
+    pivot_hind_left_hip = k1 + s170
+    s304 = s170 / pivot_hind_left_hip
+    s305 = s171 / pivot_hind_left_hip
+    s306 = s172 / pivot_hind_left_hip
+    s307 = s166 / pivot_hind_left_hip
+    s308 = s157 / pivot_hind_left_hip
+    s309 = s173 / pivot_hind_left_hip
+    s310 = I_hip_yy + (s63 - s63 * s137) - s171 * s305
+    s311 = inertia_front_left_hip_zz + (s141 - s151 - k2 * (s158 + s168)) - s172 * s306
+    s312 = s171 - s171 * s304
+    s313 = s172 - s172 * s304
+    s314 = I_hip_yz + (cos_hind_left_swing_angle * s142 - k2 * s156) - s172 * s305
+    s315 = m_hip + s163 - s166 * s307
+    s316 = k15 - s157 * s308
+    s317 = m_hip + s162 - s173 * s309
+    s318 = s157 * s307
+    s319 = s164 - s173 * s307
+    s320 = s173 * s308
+    s321 = s166 - s166 * s304
+    s322 = s157 - s157 * s304
+    s323 = s173 - s173 * s304
+    s324 = s156 - s166 * s305
+    s325 = s157 * s305
+    s326 = s155 - s173 * s305
+    s327 = s168 - moment_front_left_hip_y - s166 * s306
+    s328 = cos_hind_left_swing_angle * s52 + sin_hind_left_swing_angle * s64 + s157 * s306
+    s329 = s169 + s173 * s306
+    s330 = sin_hind_left_abduction_angle * (s310 - s311) + s26 * s314
+    s331 = sin_hind_left_abduction_angle * s330
+    s332 = cos_hind_left_abduction_angle * s312 - sin_hind_left_abduction_angle * s313
+    s333 = sin_hind_left_abduction_angle * s312 + cos_hind_left_abduction_angle * s313
+    s334 = sin_hind_left_abduction_angle * (s329 - s325) + cos_hind_left_abduction_angle * (s326 - s328)
+    s335 = sin_hind_left_abduction_angle * s334
+    s336 = cos_hind_left_abduction_angle * s334
+    s337 = cos_hind_left_abduction_angle * s322 - sin_hind_left_abduction_angle * s323
+    s338 = sin_hind_left_abduction_angle * s322 + cos_hind_left_abduction_angle * s323
+    s339 = cos_hind_left_abduction_angle * s324 - sin_hind_left_abduction_angle * s327
+    s340 = sin_hind_left_abduction_angle * s324 + cos_hind_left_abduction_angle * s327
+    s341 = s325 + s335
+    s342 = s328 + s336
+    s343 = s336 - s326
+    s344 = sin_hind_left_abduction_angle * (s316 - s317) - s26 * s320
+    s345 = sin_hind_left_abduction_angle * s344
+    s346 = cos_hind_left_abduction_angle * s318 + sin_hind_left_abduction_angle * s319
+    s347 = cos_hind_left_abduction_angle * s319 - sin_hind_left_abduction_angle * s318
+    s348 = s316 - s345
+    s349 = s317 + s345
+    s350 = s320 + cos_hind_left_abduction_angle * s344
+    s351 = y_hip * s347
+    s352 = x_hip * s350
+    s353 = s338 + y_hip * s349
+    s354 = s342 + x_hip * s349
+    s355 = s340 + (x_hip * s346 - y_hip * s315)
+    s356 = s343 + (y_hip * s346 - x_hip * s348)
+    s357 = s335 - s329 - (s351 + s352)
+    s358 = s311 + s331 - (x_hip * s343 + y_hip * s340 + (x_hip * s356 + y_hip * s355))
+    s359 = cos_hind_left_abduction_angle * s330 - s314 + (x_hip * s341 - y_hip * s339 + x_hip * s357)
+    s360 = I_trunk_x + (s133 - s133 * s248 - y_hip * (s282 + s297)) + (s170 - s170 * s304 + y_hip * (s338 + s353))
+    s361 = s276 + (x_hip * s282 - y_hip * s298) + (s332 + (x_hip * s338 + y_hip * s354))
+    s362 = s277 + (y_hip * s265 - x_hip * s281 - y_hip * s301) + (s333 + (y_hip * s357 - (x_hip * s337 + y_hip * s321)))
+    s363 = I_trunk_y + (s254 - s275 + x_hip * (s286 + s298)) + (s310 - s331 + x_hip * (s342 + s354))
+    pivot_front_right_hip = k1 + s207
+    s364 = s207 / pivot_front_right_hip
+    s365 = s208 / pivot_front_right_hip
+    s366 = s209 / pivot_front_right_hip
+    s367 = s203 / pivot_front_right_hip
+    s368 = s194 / pivot_front_right_hip
+    s369 = s210 / pivot_front_right_hip
+    s370 = I_hip_yy + (s80 - s80 * s174) - s208 * s365
+    s371 = inertia_front_left_hip_zz + (s178 - s188 - k3 * (s195 + s205)) - s209 * s366
+    s372 = s208 - s208 * s364
+    s373 = s209 - s209 * s364
+    s374 = cos_front_right_swing_angle * s179 - k3 * s193 - I_hip_yz - s209 * s365
+    s375 = m_hip + s200 - s203 * s367
+    s376 = k15 - s194 * s368
+    s377 = m_hip + s199 - s210 * s369
+    s378 = s194 * s367
+    s379 = s201 - s210 * s367
+    s380 = s210 * s368
+    s381 = s203 - s203 * s364
+    s382 = s194 - s194 * s364
+    s383 = s210 - s210 * s364
+    s384 = s193 - s203 * s365
+    s385 = s194 * s365
+    s386 = s192 - s210 * s365
+    s387 = moment_front_left_hip_y + s205 - s203 * s366
+    s388 = cos_front_right_swing_angle * s69 + sin_front_right_swing_angle * s81 + s194 * s366
+    s389 = s206 - s210 * s366
+    s390 = sin_front_right_abduction_angle * (s370 - s371) + s25 * s374
+    s391 = sin_front_right_abduction_angle * s390
+    s392 = cos_front_right_abduction_angle * s372 - sin_front_right_abduction_angle * s373
+    s393 = sin_front_right_abduction_angle * s372 + cos_front_right_abduction_angle * s373
+    s394 = cos_front_right_abduction_angle * (s386 - s388) - sin_front_right_abduction_angle * (s385 + s389)
+    s395 = sin_front_right_abduction_angle * s394
+    s396 = cos_front_right_abduction_angle * s394
+    s397 = cos_front_right_abduction_angle * s382 - sin_front_right_abduction_angle * s383
+    s398 = sin_front_right_abduction_angle * s382 + cos_front_right_abduction_angle * s383
+    s399 = cos_front_right_abduction_angle * s384 - sin_front_right_abduction_angle * s387
+    s400 = sin_front_right_abduction_angle * s384 + cos_front_right_abduction_angle * s387
+    s401 = s385 + s395
+    s402 = s388 + s396
+    s403 = s396 - s386
+    s404 = sin_front_right_abduction_angle * (s376 - s377) - s25 * s380
+    s405 = sin_front_right_abduction_angle * s404
+    s406 = cos_front_right_abduction_angle * s378 + sin_front_right_abduction_angle * s379
+    s407 = cos_front_right_abduction_angle * s379 - sin_front_right_abduction_angle * s378
+    s408 = s376 - s405
+    s409 = s377 + s405
+    s410 = s380 + cos_front_right_abduction_angle * s404
+    s411 = y_hip * s407
+    s412 = x_hip * s410
+    s413 = s398 - y_hip * s409
+    s414 = s402 - x_hip * s409
+    s415 = s400 + (y_hip * s375 - x_hip * s406)
+    s416 = s403 + (x_hip * s408 - y_hip * s406)
+    s417 = s389 + s395 + (s411 + s412)
+    s418 = s371 + s391 + (x_hip * s403 + y_hip * s400 + (x_hip * s416 + y_hip * s415))
+    s419 = cos_front_right_abduction_angle * s390 - s374 + (y_hip * s399 - x_hip * s401 - x_hip * s417)
+    pivot_front_left_hip = k1 + s244
+    s420 = s244 / pivot_front_left_hip
+    s421 = s245 / pivot_front_left_hip
+    s422 = s246 / pivot_front_left_hip
+    s423 = s240 / pivot_front_left_hip
+    s424 = s231 / pivot_front_left_hip
+    s425 = s247 / pivot_front_left_hip
+    s426 = I_hip_yy + (s97 - s97 * s211) - s245 * s421
+    s427 = inertia_front_left_hip_zz + (s215 - s225 - k2 * (s232 + s242)) - s246 * s422
+    s428 = s245 - s245 * s420
+    s429 = s246 - s246 * s420
+    s430 = I_hip_yz + (cos_front_left_swing_angle * s216 - k2 * s230) - s246 * s421
+    s431 = m_hip + s237 - s240 * s423
+    s432 = k15 - s231 * s424
+    s433 = m_hip + s236 - s247 * s425
+    s434 = s231 * s423
+    s435 = s238 - s247 * s423
+    s436 = s247 * s424
+    s437 = s240 - s240 * s420
+    s438 = s231 - s231 * s420
+    s439 = s247 - s247 * s420
+    s440 = s230 - s240 * s421
+    s441 = s231 * s421
+    s442 = s229 - s247 * s421
+    s443 = s242 - moment_front_left_hip_y - s240 * s422
+    s444 = cos_front_left_swing_angle * s86 + sin_front_left_swing_angle * s98 + s231 * s422
+    s445 = s243 + s247 * s422
+    s446 = sin_front_left_abduction_angle * (s426 - s427) + s24 * s430
+    s447 = sin_front_left_abduction_angle * s446
+    s448 = cos_front_left_abduction_angle * s428 - sin_front_left_abduction_angle * s429
+    s449 = sin_front_left_abduction_angle * s428 + cos_front_left_abduction_angle * s429
+    s450 = sin_front_left_abduction_angle * (s445 - s441) + cos_front_left_abduction_angle * (s442 - s444)
+    s451 = sin_front_left_abduction_angle * s450
+    s452 = cos_front_left_abduction_angle * s450
+    s453 = cos_front_left_abduction_angle * s438 - sin_front_left_abduction_angle * s439
+    s454 = sin_front_left_abduction_angle * s438 + cos_front_left_abduction_angle * s439
+    s455 = cos_front_left_abduction_angle * s440 - sin_front_left_abduction_angle * s443
+    s456 = sin_front_left_abduction_angle * s440 + cos_front_left_abduction_angle * s443
+    s457 = s441 + s451
+    s458 = s444 + s452
+    s459 = s452 - s442
+    s460 = sin_front_left_abduction_angle * (s432 - s433) - s24 * s436
+    s461 = sin_front_left_abduction_angle * s460
+    s462 = cos_front_left_abduction_angle * s434 + sin_front_left_abduction_angle * s435
+    s463 = cos_front_left_abduction_angle * s435 - sin_front_left_abduction_angle * s434
+    s464 = s432 - s461
+    s465 = s433 + s461
+    s466 = s436 + cos_front_left_abduction_angle * s460
+    s467 = y_hip * s463
+    s468 = x_hip * s466
+    s469 = s454 + y_hip * s465
+    s470 = s458 - x_hip * s465
+    s471 = s456 - (x_hip * s462 + y_hip * s431)
+    s472 = s459 + (x_hip * s464 + y_hip * s462)
+    s473 = s451 - s445 + (s468 - s467)
+    s474 = s427 + s447 + (x_hip * s459 - y_hip * s456 + (x_hip * s472 - y_hip * s471))
+    s475 = cos_front_left_abduction_angle * s446 - s430 - (x_hip * s457 + y_hip * s455 + x_hip * s473)
+    pivot_trunk = s360 + (s207 - s207 * s364 - y_hip * (s398 + s413)) + (s244 - s244 * s420 + y_hip * (s454 + s469))
+    s476 = s361 + (s392 - (x_hip * s398 + y_hip * s414)) + (s448 + (y_hip * s470 - x_hip * s454))
+    s477 = s362 + (s393 + (x_hip * s397 + y_hip * s381 - y_hip * s417)) + (s449 + (x_hip * s453 - y_hip * s437 + y_hip * s473))
+    s478 = s363 + (s370 - s391 - x_hip * (s402 + s414)) + (s426 - s447 - x_hip * (s458 + s470))
+    s479 = s265 - s295 + (s321 + s351) + (s381 - s411) + (s437 + s467)
+    s480 = s281 - y_hip * s294 + (s337 + y_hip * s350) + (s397 - y_hip * s410) + (s453 + y_hip * s466)
+    s481 = s297 + s353 + s413 + s469
+    s482 = s283 + x_hip * s291 + (s339 + x_hip * s347) + (s399 - x_hip * s407) + (s455 - x_hip * s463)
+    s483 = s476 / pivot_trunk
+    s484 = s477 / pivot_trunk
+    s485 = s479 / pivot_trunk
+    s486 = s480 / pivot_trunk
+    s487 = s481 / pivot_trunk
+    pivot_trunk_2 = s478 - s476 * s483
+    s488 = s303 + s359 + s419 + s475 - s477 * s483
+    s489 = s482 - s479 * s483
+    s490 = s296 - s285 + (s352 - s341) - (s401 + s412) - (s457 + s468) - s480 * s483
+    s491 = s298 + s354 + s414 + s470 - s481 * s483
+    s492 = s488 / pivot_trunk_2
+    s493 = s489 / pivot_trunk_2
+    s494 = s490 / pivot_trunk_2
+    s495 = s491 / pivot_trunk_2
+    pivot_trunk_3 = I_trunk_z + s302 + s358 + s418 + s474 - s477 * s484 - s488 * s492
+    s496 = s299 + s355 + s415 + s471 - s479 * s484 - s489 * s492
+    s497 = s300 + s356 + s416 + s472 - s480 * s484 - s490 * s492
+    s498 = s301 + s357 + s417 + s473 - s481 * s484 - s491 * s492
+    s499 = s496 / pivot_trunk_3
+    s500 = s497 / pivot_trunk_3
+    s501 = s498 / pivot_trunk_3
+    s502 = m_trunk + s259 + s315 + s375 + s431 - s479 * s485 - s489 * s493 - s496 * s499
+    s503 = m_trunk + s292 + s348 + s408 + s464 - s480 * s486 - s490 * s494 - s497 * s500
+    s504 = m_trunk + s293 + s349 + s409 + s465 - s481 * s487 - s491 * s495 - s498 * s501
+    s505 = s290 + s346 + s406 + s462 + s480 * s485 + s490 * s493 + s497 * s499
+    s506 = s291 + s347 + s407 + s463 - s481 * s485 - s491 * s493 - s498 * s499
+    s507 = s294 + s350 + s410 + s466 - s481 * s486 - s491 * s494 - s498 * s500
+    s508 = s15 * s502 - s16 * s505 + s17 * s506
+    s509 = s16 * s503 - s15 * s505 + s17 * s507
+    s510 = s15 * s506 + s16 * s507 + s17 * s504
+    s511 = s18 * s502 - s19 * s505 + s20 * s506
+    s512 = s19 * s503 - s18 * s505 + s20 * s507
+    s513 = s18 * s506 + s19 * s507 + s20 * s504
+    s514 = s21 * (s21 * s502 - s22 * s505 + s23 * s506) + s22 * (s22 * s503 - s21 * s505 + s23 * s507)
+    pivot_trunk_3_2 = s514 + s23 * (s21 * s506 + s22 * s507 + s23 * s504)
+    s515 = s21 * s508 + s22 * s509 + s23 * s510
+    s516 = s21 * s511 + s22 * s512 + s23 * s513
+    s517 = s515 / pivot_trunk_3_2
+    s518 = s516 / pivot_trunk_3_2
+    pivot_trunk_2_2 = s18 * s511 + s19 * s512 + s20 * s513 - s516 * s518
+    s519 = s18 * s508 + s19 * s509 + s20 * s510 - s516 * s517
+    s520 = s519 / pivot_trunk_2_2
     omega_front_left_hip_y = trunk_wy * cos_front_left_abduction_angle + trunk_wz * sin_front_left_abduction_angle
     omega_front_left_hip_z = trunk_wz * cos_front_left_abduction_angle - trunk_wy * sin_front_left_abduction_angle
     omega_front_left_hip_x = trunk_wx + front_left_abduction_angle_dot
@@ -1779,5316 +2271,4804 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     omega_hind_right_shank_z = cos_hind_right_knee_angle * omega_hind_right_thigh_z + sin_hind_right_knee_angle * omega_hind_right_thigh_x
     omega_hind_right_shank_x = cos_hind_right_knee_angle * omega_hind_right_thigh_x - sin_hind_right_knee_angle * omega_hind_right_thigh_z
     omega_hind_right_shank_y = hind_right_knee_angle_dot + omega_hind_right_thigh_y
-    bias_trunk_x = g * s21
-    bias_trunk_y = g * s22
-    bias_trunk_z = g * s23
     trunk_wz_squared = trunk_wz * trunk_wz
-    s32 = trunk_wx * trunk_wy
-    s33 = trunk_wx * trunk_wz
-    s34 = trunk_wy * trunk_wz
-    s35 = x_hip * (trunk_wy * trunk_wy + trunk_wz_squared)
-    s36 = y_hip * s32
-    s37 = x_hip * s32
-    s38 = y_hip * (trunk_wx * trunk_wx + trunk_wz_squared)
-    s39 = x_hip * s33
-    s40 = y_hip * s34
-    s41 = s39 + s40
-    bias_front_left_hip_x = bias_trunk_x + (s36 - s35)
-    s42 = bias_trunk_y + (s37 - s38)
-    s43 = bias_trunk_z + s41
-    bias_front_left_hip_y = cos_front_left_abduction_angle * s42 + sin_front_left_abduction_angle * s43
-    bias_front_left_hip_z = cos_front_left_abduction_angle * s43 - sin_front_left_abduction_angle * s42
-    s44 = front_left_abduction_angle_dot * omega_front_left_hip_z
-    s45 = front_left_abduction_angle_dot * omega_front_left_hip_y
+    s521 = trunk_wx * trunk_wy
+    s522 = trunk_wx * trunk_wz
+    s523 = trunk_wy * trunk_wz
+    s524 = x_hip * (trunk_wy * trunk_wy + trunk_wz_squared)
+    s525 = y_hip * s521
+    bias_front_left_hip_x = s525 - s524
+    s526 = x_hip * s521
+    s527 = y_hip * (trunk_wx * trunk_wx + trunk_wz_squared)
+    s528 = s526 - s527
+    s529 = x_hip * s522
+    s530 = y_hip * s523
+    s531 = s529 + s530
+    bias_front_left_hip_y = cos_front_left_abduction_angle * s528 + sin_front_left_abduction_angle * s531
+    bias_front_left_hip_z = cos_front_left_abduction_angle * s531 - sin_front_left_abduction_angle * s528
+    s532 = front_left_abduction_angle_dot * omega_front_left_hip_z
+    s533 = front_left_abduction_angle_dot * omega_front_left_hip_y
     omega_front_left_hip_x_squared = omega_front_left_hip_x * omega_front_left_hip_x
     omega_front_left_hip_y_squared = omega_front_left_hip_y * omega_front_left_hip_y
     omega_front_left_hip_z_squared = omega_front_left_hip_z * omega_front_left_hip_z
-    s46 = omega_front_left_hip_y * omega_front_left_hip_x
-    s47 = omega_front_left_hip_z * omega_front_left_hip_x
-    s48 = omega_front_left_hip_y * omega_front_left_hip_z
-    s49 = s45 + s46
-    s50 = s44 + s47
-    s51 = s46 - s45
-    s52 = omega_front_left_hip_x_squared + omega_front_left_hip_z_squared
-    s53 = s47 - s44
-    s54 = s35 + s36
-    s55 = s37 + s38
-    bias_front_right_hip_x = bias_trunk_x - s54
-    s56 = bias_trunk_y + s55
-    s57 = bias_trunk_z + (s39 - s40)
-    bias_front_right_hip_y = cos_front_right_abduction_angle * s56 + sin_front_right_abduction_angle * s57
-    bias_front_right_hip_z = cos_front_right_abduction_angle * s57 - sin_front_right_abduction_angle * s56
-    s58 = front_right_abduction_angle_dot * omega_front_right_hip_z
-    s59 = front_right_abduction_angle_dot * omega_front_right_hip_y
+    s534 = omega_front_left_hip_y * omega_front_left_hip_x
+    s535 = omega_front_left_hip_z * omega_front_left_hip_x
+    s536 = omega_front_left_hip_y * omega_front_left_hip_z
+    s537 = s533 + s534
+    s538 = s532 + s535
+    s539 = s534 - s533
+    s540 = omega_front_left_hip_x_squared + omega_front_left_hip_z_squared
+    s541 = s535 - s532
+    bias_hind_left_hip_x = s524 + s525
+    s542 = s526 + s527
+    s543 = s529 - s530
+    bias_front_right_hip_y = cos_front_right_abduction_angle * s542 + sin_front_right_abduction_angle * s543
+    bias_front_right_hip_z = cos_front_right_abduction_angle * s543 - sin_front_right_abduction_angle * s542
+    s544 = front_right_abduction_angle_dot * omega_front_right_hip_z
+    s545 = front_right_abduction_angle_dot * omega_front_right_hip_y
     omega_front_right_hip_x_squared = omega_front_right_hip_x * omega_front_right_hip_x
     omega_front_right_hip_y_squared = omega_front_right_hip_y * omega_front_right_hip_y
     omega_front_right_hip_z_squared = omega_front_right_hip_z * omega_front_right_hip_z
-    s60 = omega_front_right_hip_y * omega_front_right_hip_x
-    s61 = omega_front_right_hip_z * omega_front_right_hip_x
-    s62 = omega_front_right_hip_y * omega_front_right_hip_z
-    s63 = s59 + s60
-    s64 = s58 + s61
-    s65 = s60 - s59
-    s66 = omega_front_right_hip_x_squared + omega_front_right_hip_z_squared
-    s67 = s61 - s58
-    bias_hind_left_hip_x = bias_trunk_x + s54
-    s68 = bias_trunk_y - s55
-    s69 = bias_trunk_z + (s40 - s39)
-    bias_hind_left_hip_y = cos_hind_left_abduction_angle * s68 + sin_hind_left_abduction_angle * s69
-    bias_hind_left_hip_z = cos_hind_left_abduction_angle * s69 - sin_hind_left_abduction_angle * s68
-    s70 = hind_left_abduction_angle_dot * omega_hind_left_hip_z
-    s71 = hind_left_abduction_angle_dot * omega_hind_left_hip_y
+    s546 = omega_front_right_hip_y * omega_front_right_hip_x
+    s547 = omega_front_right_hip_z * omega_front_right_hip_x
+    s548 = omega_front_right_hip_y * omega_front_right_hip_z
+    s549 = s545 + s546
+    s550 = s544 + s547
+    s551 = s546 - s545
+    s552 = omega_front_right_hip_x_squared + omega_front_right_hip_z_squared
+    s553 = s547 - s544
+    s554 = s530 - s529
+    bias_hind_left_hip_y = sin_hind_left_abduction_angle * s554 - cos_hind_left_abduction_angle * s542
+    bias_hind_left_hip_z = cos_hind_left_abduction_angle * s554 + sin_hind_left_abduction_angle * s542
+    s555 = hind_left_abduction_angle_dot * omega_hind_left_hip_z
+    s556 = hind_left_abduction_angle_dot * omega_hind_left_hip_y
     omega_hind_left_hip_x_squared = omega_hind_left_hip_x * omega_hind_left_hip_x
     omega_hind_left_hip_y_squared = omega_hind_left_hip_y * omega_hind_left_hip_y
     omega_hind_left_hip_z_squared = omega_hind_left_hip_z * omega_hind_left_hip_z
-    s72 = omega_hind_left_hip_y * omega_hind_left_hip_x
-    s73 = omega_hind_left_hip_z * omega_hind_left_hip_x
-    s74 = omega_hind_left_hip_y * omega_hind_left_hip_z
-    s75 = s71 + s72
-    s76 = s70 + s73
-    s77 = s72 - s71
-    s78 = omega_hind_left_hip_x_squared + omega_hind_left_hip_z_squared
-    s79 = s73 - s70
-    bias_hind_right_hip_x = bias_trunk_x + (s35 - s36)
-    s80 = bias_trunk_y + (s38 - s37)
-    s81 = bias_trunk_z - s41
-    bias_hind_right_hip_y = cos_hind_right_abduction_angle * s80 + sin_hind_right_abduction_angle * s81
-    bias_hind_right_hip_z = cos_hind_right_abduction_angle * s81 - sin_hind_right_abduction_angle * s80
-    s82 = hind_right_abduction_angle_dot * omega_hind_right_hip_z
-    s83 = hind_right_abduction_angle_dot * omega_hind_right_hip_y
+    s557 = omega_hind_left_hip_y * omega_hind_left_hip_x
+    s558 = omega_hind_left_hip_z * omega_hind_left_hip_x
+    s559 = omega_hind_left_hip_y * omega_hind_left_hip_z
+    s560 = s556 + s557
+    s561 = s555 + s558
+    s562 = s557 - s556
+    s563 = omega_hind_left_hip_x_squared + omega_hind_left_hip_z_squared
+    s564 = s558 - s555
+    bias_hind_right_hip_x = s524 - s525
+    s565 = s527 - s526
+    bias_hind_right_hip_y = cos_hind_right_abduction_angle * s565 - sin_hind_right_abduction_angle * s531
+    s566 = cos_hind_right_abduction_angle * s531 + sin_hind_right_abduction_angle * s565
+    s567 = hind_right_abduction_angle_dot * omega_hind_right_hip_z
+    s568 = hind_right_abduction_angle_dot * omega_hind_right_hip_y
     omega_hind_right_hip_x_squared = omega_hind_right_hip_x * omega_hind_right_hip_x
     omega_hind_right_hip_y_squared = omega_hind_right_hip_y * omega_hind_right_hip_y
     omega_hind_right_hip_z_squared = omega_hind_right_hip_z * omega_hind_right_hip_z
-    s84 = omega_hind_right_hip_y * omega_hind_right_hip_x
-    s85 = omega_hind_right_hip_z * omega_hind_right_hip_x
-    s86 = omega_hind_right_hip_y * omega_hind_right_hip_z
-    s87 = s83 + s84
-    s88 = s82 + s85
-    s89 = s84 - s83
-    s90 = omega_hind_right_hip_x_squared + omega_hind_right_hip_z_squared
-    s91 = s85 - s82
-    s92 = bias_front_left_hip_x + k2 * s49
-    bias_front_left_thigh_y = bias_front_left_hip_y - k2 * s52
-    s93 = bias_front_left_hip_z + k2 * s48
-    bias_front_left_thigh_z = cos_front_left_swing_angle * s93 + sin_front_left_swing_angle * s92
-    bias_front_left_thigh_x = cos_front_left_swing_angle * s92 - sin_front_left_swing_angle * s93
-    s94 = sin_front_left_swing_angle * s45 - front_left_swing_angle_dot * omega_front_left_thigh_z
-    s95 = front_left_swing_angle_dot * omega_front_left_thigh_x - cos_front_left_swing_angle * s45
+    s569 = omega_hind_right_hip_y * omega_hind_right_hip_x
+    s570 = omega_hind_right_hip_z * omega_hind_right_hip_x
+    s571 = omega_hind_right_hip_y * omega_hind_right_hip_z
+    s572 = s568 + s569
+    s573 = s567 + s570
+    s574 = s569 - s568
+    s575 = omega_hind_right_hip_x_squared + omega_hind_right_hip_z_squared
+    s576 = s570 - s567
+    s577 = bias_front_left_hip_x + k2 * s537
+    bias_front_left_thigh_y = bias_front_left_hip_y - k2 * s540
+    s578 = bias_front_left_hip_z + k2 * s536
+    bias_front_left_thigh_z = cos_front_left_swing_angle * s578 + sin_front_left_swing_angle * s577
+    bias_front_left_thigh_x = cos_front_left_swing_angle * s577 - sin_front_left_swing_angle * s578
+    s579 = sin_front_left_swing_angle * s533 - front_left_swing_angle_dot * omega_front_left_thigh_z
+    s580 = front_left_swing_angle_dot * omega_front_left_thigh_x - cos_front_left_swing_angle * s533
     omega_front_left_thigh_x_squared = omega_front_left_thigh_x * omega_front_left_thigh_x
     omega_front_left_thigh_y_squared = omega_front_left_thigh_y * omega_front_left_thigh_y
     omega_front_left_thigh_z_squared = omega_front_left_thigh_z * omega_front_left_thigh_z
-    s96 = omega_front_left_thigh_x * omega_front_left_thigh_y
-    s97 = omega_front_left_thigh_z * omega_front_left_thigh_x
-    s98 = omega_front_left_thigh_z * omega_front_left_thigh_y
-    s99 = s96 - s95
-    s100 = s44 + s97
-    s101 = s98 - s94
-    s102 = s94 + s98
-    s103 = omega_front_left_thigh_x_squared + omega_front_left_thigh_y_squared
-    s104 = bias_front_right_hip_x + k3 * s63
-    bias_front_right_thigh_y = bias_front_right_hip_y - k3 * s66
-    s105 = bias_front_right_hip_z + k3 * s62
-    bias_front_right_thigh_z = cos_front_right_swing_angle * s105 + sin_front_right_swing_angle * s104
-    bias_front_right_thigh_x = cos_front_right_swing_angle * s104 - sin_front_right_swing_angle * s105
-    s106 = sin_front_right_swing_angle * s59 - front_right_swing_angle_dot * omega_front_right_thigh_z
-    s107 = front_right_swing_angle_dot * omega_front_right_thigh_x - cos_front_right_swing_angle * s59
+    s581 = omega_front_left_thigh_x * omega_front_left_thigh_y
+    s582 = omega_front_left_thigh_z * omega_front_left_thigh_x
+    s583 = omega_front_left_thigh_z * omega_front_left_thigh_y
+    s584 = s581 - s580
+    s585 = s532 + s582
+    s586 = s583 - s579
+    s587 = s579 + s583
+    s588 = omega_front_left_thigh_x_squared + omega_front_left_thigh_y_squared
+    s589 = k3 * s549 - bias_hind_left_hip_x
+    bias_front_right_thigh_y = bias_front_right_hip_y - k3 * s552
+    s590 = bias_front_right_hip_z + k3 * s548
+    bias_front_right_thigh_z = cos_front_right_swing_angle * s590 + sin_front_right_swing_angle * s589
+    bias_front_right_thigh_x = cos_front_right_swing_angle * s589 - sin_front_right_swing_angle * s590
+    s591 = sin_front_right_swing_angle * s545 - front_right_swing_angle_dot * omega_front_right_thigh_z
+    s592 = front_right_swing_angle_dot * omega_front_right_thigh_x - cos_front_right_swing_angle * s545
     omega_front_right_thigh_x_squared = omega_front_right_thigh_x * omega_front_right_thigh_x
     omega_front_right_thigh_y_squared = omega_front_right_thigh_y * omega_front_right_thigh_y
     omega_front_right_thigh_z_squared = omega_front_right_thigh_z * omega_front_right_thigh_z
-    s108 = omega_front_right_thigh_x * omega_front_right_thigh_y
-    s109 = omega_front_right_thigh_z * omega_front_right_thigh_x
-    s110 = omega_front_right_thigh_z * omega_front_right_thigh_y
-    s111 = s108 - s107
-    s112 = s58 + s109
-    s113 = s110 - s106
-    s114 = s106 + s110
-    s115 = omega_front_right_thigh_x_squared + omega_front_right_thigh_y_squared
-    s116 = bias_hind_left_hip_x + k2 * s75
-    bias_hind_left_thigh_y = bias_hind_left_hip_y - k2 * s78
-    s117 = bias_hind_left_hip_z + k2 * s74
-    bias_hind_left_thigh_z = cos_hind_left_swing_angle * s117 + sin_hind_left_swing_angle * s116
-    bias_hind_left_thigh_x = cos_hind_left_swing_angle * s116 - sin_hind_left_swing_angle * s117
-    s118 = sin_hind_left_swing_angle * s71 - hind_left_swing_angle_dot * omega_hind_left_thigh_z
-    s119 = hind_left_swing_angle_dot * omega_hind_left_thigh_x - cos_hind_left_swing_angle * s71
+    s593 = omega_front_right_thigh_x * omega_front_right_thigh_y
+    s594 = omega_front_right_thigh_z * omega_front_right_thigh_x
+    s595 = omega_front_right_thigh_z * omega_front_right_thigh_y
+    s596 = s593 - s592
+    s597 = s544 + s594
+    s598 = s595 - s591
+    s599 = s591 + s595
+    s600 = omega_front_right_thigh_x_squared + omega_front_right_thigh_y_squared
+    s601 = bias_hind_left_hip_x + k2 * s560
+    bias_hind_left_thigh_y = bias_hind_left_hip_y - k2 * s563
+    s602 = bias_hind_left_hip_z + k2 * s559
+    bias_hind_left_thigh_z = cos_hind_left_swing_angle * s602 + sin_hind_left_swing_angle * s601
+    bias_hind_left_thigh_x = cos_hind_left_swing_angle * s601 - sin_hind_left_swing_angle * s602
+    s603 = sin_hind_left_swing_angle * s556 - hind_left_swing_angle_dot * omega_hind_left_thigh_z
+    s604 = hind_left_swing_angle_dot * omega_hind_left_thigh_x - cos_hind_left_swing_angle * s556
     omega_hind_left_thigh_x_squared = omega_hind_left_thigh_x * omega_hind_left_thigh_x
     omega_hind_left_thigh_y_squared = omega_hind_left_thigh_y * omega_hind_left_thigh_y
     omega_hind_left_thigh_z_squared = omega_hind_left_thigh_z * omega_hind_left_thigh_z
-    s120 = omega_hind_left_thigh_x * omega_hind_left_thigh_y
-    s121 = omega_hind_left_thigh_z * omega_hind_left_thigh_x
-    s122 = omega_hind_left_thigh_z * omega_hind_left_thigh_y
-    s123 = s120 - s119
-    s124 = s70 + s121
-    s125 = s122 - s118
-    s126 = s118 + s122
-    s127 = omega_hind_left_thigh_x_squared + omega_hind_left_thigh_y_squared
-    s128 = bias_hind_right_hip_x + k3 * s87
-    bias_hind_right_thigh_y = bias_hind_right_hip_y - k3 * s90
-    s129 = bias_hind_right_hip_z + k3 * s86
-    bias_hind_right_thigh_z = cos_hind_right_swing_angle * s129 + sin_hind_right_swing_angle * s128
-    bias_hind_right_thigh_x = cos_hind_right_swing_angle * s128 - sin_hind_right_swing_angle * s129
-    s130 = sin_hind_right_swing_angle * s83 - hind_right_swing_angle_dot * omega_hind_right_thigh_z
-    s131 = hind_right_swing_angle_dot * omega_hind_right_thigh_x - cos_hind_right_swing_angle * s83
+    s605 = omega_hind_left_thigh_x * omega_hind_left_thigh_y
+    s606 = omega_hind_left_thigh_z * omega_hind_left_thigh_x
+    s607 = omega_hind_left_thigh_z * omega_hind_left_thigh_y
+    s608 = s605 - s604
+    s609 = s555 + s606
+    s610 = s607 - s603
+    s611 = s603 + s607
+    s612 = omega_hind_left_thigh_x_squared + omega_hind_left_thigh_y_squared
+    s613 = bias_hind_right_hip_x + k3 * s572
+    bias_hind_right_thigh_y = bias_hind_right_hip_y - k3 * s575
+    s614 = k3 * s571 - s566
+    bias_hind_right_thigh_z = cos_hind_right_swing_angle * s614 + sin_hind_right_swing_angle * s613
+    bias_hind_right_thigh_x = cos_hind_right_swing_angle * s613 - sin_hind_right_swing_angle * s614
+    s615 = sin_hind_right_swing_angle * s568 - hind_right_swing_angle_dot * omega_hind_right_thigh_z
+    s616 = hind_right_swing_angle_dot * omega_hind_right_thigh_x - cos_hind_right_swing_angle * s568
     omega_hind_right_thigh_x_squared = omega_hind_right_thigh_x * omega_hind_right_thigh_x
     omega_hind_right_thigh_y_squared = omega_hind_right_thigh_y * omega_hind_right_thigh_y
     omega_hind_right_thigh_z_squared = omega_hind_right_thigh_z * omega_hind_right_thigh_z
-    s132 = omega_hind_right_thigh_x * omega_hind_right_thigh_y
-    s133 = omega_hind_right_thigh_z * omega_hind_right_thigh_x
-    s134 = omega_hind_right_thigh_z * omega_hind_right_thigh_y
-    s135 = s132 - s131
-    s136 = s82 + s133
-    s137 = s134 - s130
-    s138 = s130 + s134
-    s139 = omega_hind_right_thigh_x_squared + omega_hind_right_thigh_y_squared
-    s140 = bias_front_left_thigh_x + k4 * s100
-    bias_front_left_shank_y = bias_front_left_thigh_y + k4 * s101
-    s141 = bias_front_left_thigh_z - k4 * s103
-    bias_front_left_shank_x = cos_front_left_knee_angle * s140 - sin_front_left_knee_angle * s141
-    s142 = cos_front_left_knee_angle * s94 - sin_front_left_knee_angle * s95 - front_left_knee_angle_dot * omega_front_left_shank_z
-    s143 = cos_front_left_knee_angle * s95 + sin_front_left_knee_angle * s94 + front_left_knee_angle_dot * omega_front_left_shank_x
-    s144 = omega_front_left_shank_x * omega_front_left_shank_y
-    s145 = omega_front_left_shank_z * omega_front_left_shank_x
-    s146 = omega_front_left_shank_z * omega_front_left_shank_y
-    s147 = s44 + s145
-    s148 = s146 - s142
-    s149 = omega_front_left_shank_x * omega_front_left_shank_x + omega_front_left_shank_y * omega_front_left_shank_y
-    s150 = bias_front_right_thigh_x + k4 * s112
-    bias_front_right_shank_y = bias_front_right_thigh_y + k4 * s113
-    s151 = bias_front_right_thigh_z - k4 * s115
-    bias_front_right_shank_x = cos_front_right_knee_angle * s150 - sin_front_right_knee_angle * s151
-    s152 = cos_front_right_knee_angle * s106 - sin_front_right_knee_angle * s107 - front_right_knee_angle_dot * omega_front_right_shank_z
-    s153 = cos_front_right_knee_angle * s107 + sin_front_right_knee_angle * s106 + front_right_knee_angle_dot * omega_front_right_shank_x
-    s154 = omega_front_right_shank_x * omega_front_right_shank_y
-    s155 = omega_front_right_shank_z * omega_front_right_shank_x
-    s156 = omega_front_right_shank_z * omega_front_right_shank_y
-    s157 = s58 + s155
-    s158 = s156 - s152
-    s159 = omega_front_right_shank_x * omega_front_right_shank_x + omega_front_right_shank_y * omega_front_right_shank_y
-    s160 = bias_hind_left_thigh_x + k4 * s124
-    bias_hind_left_shank_y = bias_hind_left_thigh_y + k4 * s125
-    s161 = bias_hind_left_thigh_z - k4 * s127
-    bias_hind_left_shank_x = cos_hind_left_knee_angle * s160 - sin_hind_left_knee_angle * s161
-    s162 = cos_hind_left_knee_angle * s118 - sin_hind_left_knee_angle * s119 - hind_left_knee_angle_dot * omega_hind_left_shank_z
-    s163 = cos_hind_left_knee_angle * s119 + sin_hind_left_knee_angle * s118 + hind_left_knee_angle_dot * omega_hind_left_shank_x
-    s164 = omega_hind_left_shank_x * omega_hind_left_shank_y
-    s165 = omega_hind_left_shank_z * omega_hind_left_shank_x
-    s166 = omega_hind_left_shank_z * omega_hind_left_shank_y
-    s167 = s70 + s165
-    s168 = s166 - s162
-    s169 = omega_hind_left_shank_x * omega_hind_left_shank_x + omega_hind_left_shank_y * omega_hind_left_shank_y
-    s170 = bias_hind_right_thigh_x + k4 * s136
-    bias_hind_right_shank_y = bias_hind_right_thigh_y + k4 * s137
-    s171 = bias_hind_right_thigh_z - k4 * s139
-    bias_hind_right_shank_x = cos_hind_right_knee_angle * s170 - sin_hind_right_knee_angle * s171
-    s172 = cos_hind_right_knee_angle * s130 - sin_hind_right_knee_angle * s131 - hind_right_knee_angle_dot * omega_hind_right_shank_z
-    s173 = cos_hind_right_knee_angle * s131 + sin_hind_right_knee_angle * s130 + hind_right_knee_angle_dot * omega_hind_right_shank_x
-    s174 = omega_hind_right_shank_x * omega_hind_right_shank_y
-    s175 = omega_hind_right_shank_z * omega_hind_right_shank_x
-    s176 = omega_hind_right_shank_z * omega_hind_right_shank_y
-    s177 = s82 + s175
-    s178 = s176 - s172
-    s179 = omega_hind_right_shank_x * omega_hind_right_shank_x + omega_hind_right_shank_y * omega_hind_right_shank_y
-    s180 = I_hip_yz * (omega_front_left_hip_z_squared - omega_front_left_hip_y_squared)
-    s181 = I_hip_xz * (omega_front_left_hip_x_squared - omega_front_left_hip_z_squared)
-    s182 = I_hip_xy * (omega_front_left_hip_y_squared - omega_front_left_hip_x_squared)
-    s183 = moment_front_left_hip_y * bias_front_left_hip_z + (I_hip_xz * s51 - I_hip_xy * s53 - s180 + s48 * k11 - s48 * k12)
-    s184 = I_hip_yz * s50 - I_hip_xz * s48 - s182 + s51 * k10 - s49 * k11 - moment_front_left_hip_y * bias_front_left_hip_x
-    s185 = I_hip_yz * (omega_front_right_hip_z_squared - omega_front_right_hip_y_squared)
-    s186 = I_hip_xz * (omega_front_right_hip_x_squared - omega_front_right_hip_z_squared)
-    s187 = I_hip_xy * (omega_front_right_hip_y_squared - omega_front_right_hip_x_squared)
-    s188 = I_hip_xy * s67 + I_hip_xz * s65 + s185 + s62 * k11 - s62 * k12 - moment_front_left_hip_y * bias_front_right_hip_z
-    s189 = moment_front_left_hip_y * bias_front_right_hip_x + (s187 - (I_hip_xz * s62 + I_hip_yz * s64) + s65 * k10 - s63 * k11)
-    s190 = I_hip_yz * (omega_hind_left_hip_z_squared - omega_hind_left_hip_y_squared)
-    s191 = I_hip_xz * (omega_hind_left_hip_x_squared - omega_hind_left_hip_z_squared)
-    s192 = I_hip_xy * (omega_hind_left_hip_y_squared - omega_hind_left_hip_x_squared)
-    s193 = moment_front_left_hip_y * bias_hind_left_hip_z + (I_hip_xz * s77 - I_hip_xy * s79 - s190 + s74 * k11 - s74 * k12)
-    s194 = I_hip_yz * s76 - I_hip_xz * s74 - s192 + s77 * k10 - s75 * k11 - moment_front_left_hip_y * bias_hind_left_hip_x
-    s195 = I_hip_yz * (omega_hind_right_hip_z_squared - omega_hind_right_hip_y_squared)
-    s196 = I_hip_xz * (omega_hind_right_hip_x_squared - omega_hind_right_hip_z_squared)
-    s197 = I_hip_xy * (omega_hind_right_hip_y_squared - omega_hind_right_hip_x_squared)
-    s198 = I_hip_xy * s91 + I_hip_xz * s89 + s195 + s86 * k11 - s86 * k12 - moment_front_left_hip_y * bias_hind_right_hip_z
-    s199 = moment_front_left_hip_y * bias_hind_right_hip_x + (s197 - (I_hip_xz * s86 + I_hip_yz * s88) + s89 * k10 - s87 * k11)
-    s200 = moment_front_left_thigh_y * (omega_front_left_thigh_x_squared + omega_front_left_thigh_z_squared)
-    s201 = m_thigh * bias_front_left_thigh_x + (moment_front_left_thigh_y * s99 - k5 * s100)
-    s202 = m_thigh * bias_front_left_thigh_z + (moment_front_left_thigh_y * s102 + k5 * s103)
-    s203 = moment_front_left_thigh_y * bias_front_left_thigh_z + k5 * bias_front_left_thigh_y
-    s204 = inertia_front_left_thigh_yz * (omega_front_left_thigh_z_squared - omega_front_left_thigh_y_squared)
-    s205 = s100 * k15 - inertia_front_left_thigh_yz * s99 - (s97 - s44) * k13 - k5 * bias_front_left_thigh_x
-    s206 = inertia_front_left_thigh_yz * s100 + (s95 + s96) * k13 - s99 * k14 - moment_front_left_thigh_y * bias_front_left_thigh_x
-    s207 = moment_front_left_thigh_y * (omega_front_right_thigh_x_squared + omega_front_right_thigh_z_squared)
-    s208 = m_thigh * bias_front_right_thigh_x - (moment_front_left_thigh_y * s111 + k5 * s112)
-    s209 = m_thigh * bias_front_right_thigh_z + (k5 * s115 - moment_front_left_thigh_y * s114)
-    s210 = k5 * bias_front_right_thigh_y - moment_front_left_thigh_y * bias_front_right_thigh_z
-    s211 = inertia_front_left_thigh_yz * (omega_front_right_thigh_z_squared - omega_front_right_thigh_y_squared)
-    s212 = inertia_front_left_thigh_yz * s111 + s112 * k15 - (s109 - s58) * k13 - k5 * bias_front_right_thigh_x
-    s213 = moment_front_left_thigh_y * bias_front_right_thigh_x + ((s107 + s108) * k13 - inertia_front_left_thigh_yz * s112 - s111 * k14)
-    s214 = moment_front_left_thigh_y * (omega_hind_left_thigh_x_squared + omega_hind_left_thigh_z_squared)
-    s215 = m_thigh * bias_hind_left_thigh_x + (moment_front_left_thigh_y * s123 - k5 * s124)
-    s216 = m_thigh * bias_hind_left_thigh_z + (moment_front_left_thigh_y * s126 + k5 * s127)
-    s217 = moment_front_left_thigh_y * bias_hind_left_thigh_z + k5 * bias_hind_left_thigh_y
-    s218 = inertia_front_left_thigh_yz * (omega_hind_left_thigh_z_squared - omega_hind_left_thigh_y_squared)
-    s219 = s124 * k15 - inertia_front_left_thigh_yz * s123 - (s121 - s70) * k13 - k5 * bias_hind_left_thigh_x
-    s220 = inertia_front_left_thigh_yz * s124 + (s119 + s120) * k13 - s123 * k14 - moment_front_left_thigh_y * bias_hind_left_thigh_x
-    s221 = moment_front_left_thigh_y * (omega_hind_right_thigh_x_squared + omega_hind_right_thigh_z_squared)
-    s222 = m_thigh * bias_hind_right_thigh_x - (moment_front_left_thigh_y * s135 + k5 * s136)
-    s223 = m_thigh * bias_hind_right_thigh_z + (k5 * s139 - moment_front_left_thigh_y * s138)
-    s224 = k5 * bias_hind_right_thigh_y - moment_front_left_thigh_y * bias_hind_right_thigh_z
-    s225 = inertia_front_left_thigh_yz * (omega_hind_right_thigh_z_squared - omega_hind_right_thigh_y_squared)
-    s226 = inertia_front_left_thigh_yz * s135 + s136 * k15 - (s133 - s82) * k13 - k5 * bias_hind_right_thigh_x
-    s227 = moment_front_left_thigh_y * bias_hind_right_thigh_x + ((s131 + s132) * k13 - inertia_front_left_thigh_yz * s136 - s135 * k14)
-    s228 = m_shank * (cos_front_left_knee_angle * s141 + sin_front_left_knee_angle * s140)
-    s229 = m_shank * bias_front_left_shank_y - k6 * s148
-    s230 = s228 + k6 * s149
-    s231 = k6 * bias_front_left_shank_x
-    s232 = s147 * k18 - (s145 - s44) * k16
-    s233 = (s143 + s144) * k16 - (s144 - s143) * k17
-    s234 = k6 * bias_front_left_shank_y + ((s142 + s146) * k17 - s148 * k18)
-    s235 = m_shank * (cos_front_right_knee_angle * s151 + sin_front_right_knee_angle * s150)
-    s236 = m_shank * bias_front_right_shank_y - k6 * s158
-    s237 = s235 + k6 * s159
-    s238 = k6 * bias_front_right_shank_x
-    s239 = s157 * k18 - (s155 - s58) * k16
-    s240 = (s153 + s154) * k16 - (s154 - s153) * k17
-    s241 = k6 * bias_front_right_shank_y + ((s152 + s156) * k17 - s158 * k18)
-    s242 = m_shank * (cos_hind_left_knee_angle * s161 + sin_hind_left_knee_angle * s160)
-    s243 = m_shank * bias_hind_left_shank_y - k6 * s168
-    s244 = s242 + k6 * s169
-    s245 = k6 * bias_hind_left_shank_x
-    s246 = s167 * k18 - (s165 - s70) * k16
-    s247 = (s163 + s164) * k16 - (s164 - s163) * k17
-    s248 = k6 * bias_hind_left_shank_y + ((s162 + s166) * k17 - s168 * k18)
-    s249 = m_shank * (cos_hind_right_knee_angle * s171 + sin_hind_right_knee_angle * s170)
-    s250 = m_shank * bias_hind_right_shank_y - k6 * s178
-    s251 = s249 + k6 * s179
-    s252 = k6 * bias_hind_right_shank_x
-    s253 = s177 * k18 - (s175 - s82) * k16
-    s254 = (s173 + s174) * k16 - (s174 - s173) * k17
-    s255 = k6 * bias_hind_right_shank_y + ((s172 + s176) * k17 - s178 * k18)
-    s256 = sin_hind_right_knee_angle * k23
-    s257 = sin_hind_right_knee_angle * s256
-    s258 = cos_hind_right_knee_angle * k22
-    s259 = k6 * sin_hind_right_knee_angle
-    s260 = k6 * cos_hind_right_knee_angle
-    s261 = sin_hind_right_knee_angle * k24
-    s262 = sin_hind_right_knee_angle * s261
-    s263 = k21 + s262
-    s264 = cos_hind_right_knee_angle * s261
-    s265 = s260 - k25
-    s266 = s258 + k4 * s263
-    s267 = k4 * s264 - sin_hind_right_knee_angle * k22
-    s268 = cos_hind_right_knee_angle * s256 + k4 * s259
-    s269 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s257 - k4 * (s260 + s265))
-    s270 = k4 * (s258 + s266) + k26
-    s271 = k5 + s265
-    s272 = s266 - k5
-    s273 = sin_hind_left_knee_angle * k23
-    s274 = sin_hind_left_knee_angle * s273
-    s275 = cos_hind_left_knee_angle * k22
-    s276 = k6 * sin_hind_left_knee_angle
-    s277 = k6 * cos_hind_left_knee_angle
-    s278 = sin_hind_left_knee_angle * k24
-    s279 = sin_hind_left_knee_angle * s278
-    s280 = k21 + s279
-    s281 = cos_hind_left_knee_angle * s278
-    s282 = s277 - k25
-    s283 = s275 + k4 * s280
-    s284 = k4 * s281 - sin_hind_left_knee_angle * k22
-    s285 = cos_hind_left_knee_angle * s273 + k4 * s276
-    s286 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s274 - k4 * (s277 + s282))
-    s287 = k26 + k4 * (s275 + s283)
-    s288 = k5 + s282
-    s289 = s283 - k5
-    s290 = sin_front_right_knee_angle * k23
-    s291 = sin_front_right_knee_angle * s290
-    s292 = cos_front_right_knee_angle * k22
-    s293 = k6 * sin_front_right_knee_angle
-    s294 = k6 * cos_front_right_knee_angle
-    s295 = sin_front_right_knee_angle * k24
-    s296 = sin_front_right_knee_angle * s295
-    s297 = k21 + s296
-    s298 = cos_front_right_knee_angle * s295
-    s299 = s294 - k25
-    s300 = s292 + k4 * s297
-    s301 = k4 * s298 - sin_front_right_knee_angle * k22
-    s302 = cos_front_right_knee_angle * s290 + k4 * s293
-    s303 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s291 - k4 * (s294 + s299))
-    s304 = k26 + k4 * (s292 + s300)
-    s305 = k5 + s299
-    s306 = s300 - k5
-    s307 = sin_front_left_knee_angle * k23
-    s308 = sin_front_left_knee_angle * s307
-    s309 = cos_front_left_knee_angle * k22
-    s310 = k6 * sin_front_left_knee_angle
-    s311 = k6 * cos_front_left_knee_angle
-    s312 = sin_front_left_knee_angle * k24
-    s313 = sin_front_left_knee_angle * s312
-    s314 = k21 + s313
-    s315 = cos_front_left_knee_angle * s312
-    s316 = s311 - k25
-    s317 = s309 + k4 * s314
-    s318 = k4 * s315 - sin_front_left_knee_angle * k22
-    s319 = cos_front_left_knee_angle * s307 + k4 * s310
-    s320 = inertia_front_left_thigh_xx + (inertia_front_left_shank_xx + s308 - k4 * (s311 + s316))
-    s321 = k26 + k4 * (s309 + s317)
-    s322 = k5 + s316
-    s323 = s317 - k5
-    pivot_hind_right_thigh = k1 + s270
-    s324 = s270 / pivot_hind_right_thigh
-    s325 = inertia_front_left_thigh_yz / pivot_hind_right_thigh
-    s326 = s272 / pivot_hind_right_thigh
-    s327 = s267 / pivot_hind_right_thigh
-    s328 = inertia_front_left_thigh_zz + (I_shank_z - s257) - inertia_front_left_thigh_yz * s325
-    s329 = inertia_front_left_thigh_yz * s324 - inertia_front_left_thigh_yz
-    s330 = m_thigh + s263 - s272 * s326
-    s331 = m_thigh + (m_shank - s262) - s267 * s327
-    s332 = s264 - s267 * s326
-    s333 = s272 - s272 * s324
-    s334 = s267 - s267 * s324
-    s335 = moment_front_left_thigh_y + s272 * s325
-    s336 = s267 * s325
-    s337 = sin_hind_right_swing_angle * (s328 - s269) + s31 * s268
-    s338 = sin_hind_right_swing_angle * s337
-    s339 = sin_hind_right_swing_angle * s336 + cos_hind_right_swing_angle * (s335 - moment_front_left_thigh_y)
-    s340 = sin_hind_right_swing_angle * s339
-    s341 = cos_hind_right_swing_angle * s339
-    s342 = cos_hind_right_swing_angle * s334 - sin_hind_right_swing_angle * s333
-    s343 = sin_hind_right_swing_angle * s334 + cos_hind_right_swing_angle * s333
-    s344 = cos_hind_right_swing_angle * s271 - sin_hind_right_swing_angle * s259
-    s345 = moment_front_left_thigh_y + s341
-    s346 = s341 - s335
-    s347 = sin_hind_right_swing_angle * (s331 - s330) + s31 * s332
-    s348 = sin_hind_right_swing_angle * s347
-    s349 = s331 - s348
-    s350 = s330 + s348
-    s351 = cos_hind_right_swing_angle * s347 - s332
-    s352 = k3 * s351
-    s353 = s340 + s352
-    s354 = s346 + k3 * s349
-    s355 = s345 - k3 * s350
-    s356 = s336 - s340 - s352
-    s357 = inertia_front_left_hip_xx + (s269 + s338 + k3 * (s346 + s354))
-    s358 = sin_hind_right_swing_angle * s329 + k3 * s342 - I_hip_xy
-    s359 = I_hip_xz + (cos_hind_right_swing_angle * s337 - s268 + k3 * (s356 - s340))
-    s360 = s354 - moment_front_left_hip_y
-    pivot_hind_left_thigh = k1 + s287
-    s361 = s287 / pivot_hind_left_thigh
-    s362 = inertia_front_left_thigh_yz / pivot_hind_left_thigh
-    s363 = s289 / pivot_hind_left_thigh
-    s364 = s284 / pivot_hind_left_thigh
-    s365 = inertia_front_left_thigh_zz + (I_shank_z - s274) - inertia_front_left_thigh_yz * s362
-    s366 = inertia_front_left_thigh_yz - inertia_front_left_thigh_yz * s361
-    s367 = m_thigh + s280 - s289 * s363
-    s368 = m_thigh + (m_shank - s279) - s284 * s364
-    s369 = s281 - s284 * s363
-    s370 = s289 - s289 * s361
-    s371 = s284 - s284 * s361
-    s372 = moment_front_left_thigh_y + s289 * s362
-    s373 = s284 * s362
-    s374 = sin_hind_left_swing_angle * (s365 - s286) + s30 * s285
-    s375 = sin_hind_left_swing_angle * s374
-    s376 = cos_hind_left_swing_angle * (moment_front_left_thigh_y - s372) - sin_hind_left_swing_angle * s373
-    s377 = sin_hind_left_swing_angle * s376
-    s378 = cos_hind_left_swing_angle * s376
-    s379 = cos_hind_left_swing_angle * s371 - sin_hind_left_swing_angle * s370
-    s380 = sin_hind_left_swing_angle * s371 + cos_hind_left_swing_angle * s370
-    s381 = cos_hind_left_swing_angle * s288 - sin_hind_left_swing_angle * s276
-    s382 = s378 - moment_front_left_thigh_y
-    s383 = s372 + s378
-    s384 = sin_hind_left_swing_angle * (s368 - s367) + s30 * s369
-    s385 = sin_hind_left_swing_angle * s384
-    s386 = s368 - s385
-    s387 = s367 + s385
-    s388 = cos_hind_left_swing_angle * s384 - s369
-    s389 = k2 * s388
-    s390 = s377 + s389
-    s391 = s383 + k2 * s386
-    s392 = s382 - k2 * s387
-    s393 = s373 + s377 + s389
-    s394 = inertia_front_left_hip_xx + (s286 + s375 + k2 * (s383 + s391))
-    s395 = I_hip_xy + (sin_hind_left_swing_angle * s366 + k2 * s379)
-    s396 = I_hip_xz + (cos_hind_left_swing_angle * s374 - s285 - k2 * (s377 + s393))
-    s397 = moment_front_left_hip_y + s391
-    pivot_front_right_thigh = k1 + s304
-    s398 = s304 / pivot_front_right_thigh
-    s399 = inertia_front_left_thigh_yz / pivot_front_right_thigh
-    s400 = s306 / pivot_front_right_thigh
-    s401 = s301 / pivot_front_right_thigh
-    s402 = inertia_front_left_thigh_zz + (I_shank_z - s291) - inertia_front_left_thigh_yz * s399
-    s403 = inertia_front_left_thigh_yz * s398 - inertia_front_left_thigh_yz
-    s404 = m_thigh + s297 - s306 * s400
-    s405 = m_thigh + (m_shank - s296) - s301 * s401
-    s406 = s298 - s301 * s400
-    s407 = s306 - s306 * s398
-    s408 = s301 - s301 * s398
-    s409 = moment_front_left_thigh_y + s306 * s399
-    s410 = s301 * s399
-    s411 = sin_front_right_swing_angle * (s402 - s303) + s29 * s302
-    s412 = sin_front_right_swing_angle * s411
-    s413 = sin_front_right_swing_angle * s410 + cos_front_right_swing_angle * (s409 - moment_front_left_thigh_y)
-    s414 = sin_front_right_swing_angle * s413
-    s415 = cos_front_right_swing_angle * s413
-    s416 = cos_front_right_swing_angle * s408 - sin_front_right_swing_angle * s407
-    s417 = sin_front_right_swing_angle * s408 + cos_front_right_swing_angle * s407
-    s418 = cos_front_right_swing_angle * s305 - sin_front_right_swing_angle * s293
-    s419 = moment_front_left_thigh_y + s415
-    s420 = s415 - s409
-    s421 = sin_front_right_swing_angle * (s405 - s404) + s29 * s406
-    s422 = sin_front_right_swing_angle * s421
-    s423 = s405 - s422
-    s424 = s404 + s422
-    s425 = cos_front_right_swing_angle * s421 - s406
-    s426 = k3 * s425
-    s427 = s414 + s426
-    s428 = s420 + k3 * s423
-    s429 = s419 - k3 * s424
-    s430 = s410 - s414 - s426
-    s431 = inertia_front_left_hip_xx + (s303 + s412 + k3 * (s420 + s428))
-    s432 = sin_front_right_swing_angle * s403 + k3 * s416 - I_hip_xy
-    s433 = I_hip_xz + (cos_front_right_swing_angle * s411 - s302 + k3 * (s430 - s414))
-    s434 = s428 - moment_front_left_hip_y
-    pivot_front_left_thigh = k1 + s321
-    s435 = s321 / pivot_front_left_thigh
-    s436 = inertia_front_left_thigh_yz / pivot_front_left_thigh
-    s437 = s323 / pivot_front_left_thigh
-    s438 = s318 / pivot_front_left_thigh
-    s439 = inertia_front_left_thigh_zz + (I_shank_z - s308) - inertia_front_left_thigh_yz * s436
-    s440 = inertia_front_left_thigh_yz - inertia_front_left_thigh_yz * s435
-    s441 = m_thigh + s314 - s323 * s437
-    s442 = m_thigh + (m_shank - s313) - s318 * s438
-    s443 = s315 - s318 * s437
-    s444 = s323 - s323 * s435
-    s445 = s318 - s318 * s435
-    s446 = moment_front_left_thigh_y + s323 * s436
-    s447 = s318 * s436
-    s448 = sin_front_left_swing_angle * (s439 - s320) + s28 * s319
-    s449 = sin_front_left_swing_angle * s448
-    s450 = cos_front_left_swing_angle * (moment_front_left_thigh_y - s446) - sin_front_left_swing_angle * s447
-    s451 = sin_front_left_swing_angle * s450
-    s452 = cos_front_left_swing_angle * s450
-    s453 = cos_front_left_swing_angle * s445 - sin_front_left_swing_angle * s444
-    s454 = sin_front_left_swing_angle * s445 + cos_front_left_swing_angle * s444
-    s455 = cos_front_left_swing_angle * s322 - sin_front_left_swing_angle * s310
-    s456 = s452 - moment_front_left_thigh_y
-    s457 = s446 + s452
-    s458 = sin_front_left_swing_angle * (s442 - s441) + s28 * s443
-    s459 = sin_front_left_swing_angle * s458
-    s460 = s442 - s459
-    s461 = s441 + s459
-    s462 = cos_front_left_swing_angle * s458 - s443
-    s463 = k2 * s462
-    s464 = s451 + s463
-    s465 = s457 + k2 * s460
-    s466 = s456 - k2 * s461
-    s467 = s447 + s451 + s463
-    s468 = inertia_front_left_hip_xx + (s320 + s449 + k2 * (s457 + s465))
-    s469 = I_hip_xy + (sin_front_left_swing_angle * s440 + k2 * s453)
-    s470 = I_hip_xz + (cos_front_left_swing_angle * s448 - s319 - k2 * (s451 + s467))
-    s471 = moment_front_left_hip_y + s465
-    pivot_hind_right_hip = k1 + s357
-    s472 = s357 / pivot_hind_right_hip
-    s473 = s358 / pivot_hind_right_hip
-    s474 = s359 / pivot_hind_right_hip
-    s475 = s353 / pivot_hind_right_hip
-    s476 = s344 / pivot_hind_right_hip
-    s477 = s360 / pivot_hind_right_hip
-    s478 = I_hip_yy + (s270 - s270 * s324) - s358 * s473
-    s479 = inertia_front_left_hip_zz + (s328 - s338 - k3 * (s345 + s355)) - s359 * s474
-    s480 = s358 - s358 * s472
-    s481 = s359 - s359 * s472
-    s482 = cos_hind_right_swing_angle * s329 - k3 * s343 - I_hip_yz - s359 * s473
-    s483 = m_hip + s350 - s353 * s475
-    s484 = k27 - s344 * s476
-    s485 = m_hip + s349 - s360 * s477
-    s486 = s344 * s475
-    s487 = s351 - s360 * s475
-    s488 = s360 * s476
-    s489 = s353 - s353 * s472
-    s490 = s344 - s344 * s472
-    s491 = s360 - s360 * s472
-    s492 = s343 - s353 * s473
-    s493 = s344 * s473
-    s494 = s342 - s360 * s473
-    s495 = moment_front_left_hip_y + s355 - s353 * s474
-    s496 = cos_hind_right_swing_angle * s259 + sin_hind_right_swing_angle * s271 + s344 * s474
-    s497 = s356 - s360 * s474
-    s498 = sin_hind_right_abduction_angle * (s478 - s479) + s27 * s482
-    s499 = sin_hind_right_abduction_angle * s498
-    s500 = cos_hind_right_abduction_angle * s480 - sin_hind_right_abduction_angle * s481
-    s501 = sin_hind_right_abduction_angle * s480 + cos_hind_right_abduction_angle * s481
-    s502 = cos_hind_right_abduction_angle * (s494 - s496) - sin_hind_right_abduction_angle * (s493 + s497)
-    s503 = sin_hind_right_abduction_angle * s502
-    s504 = cos_hind_right_abduction_angle * s502
-    s505 = cos_hind_right_abduction_angle * s490 - sin_hind_right_abduction_angle * s491
-    s506 = sin_hind_right_abduction_angle * s490 + cos_hind_right_abduction_angle * s491
-    s507 = cos_hind_right_abduction_angle * s492 - sin_hind_right_abduction_angle * s495
-    s508 = sin_hind_right_abduction_angle * s492 + cos_hind_right_abduction_angle * s495
-    s509 = s493 + s503
-    s510 = s496 + s504
-    s511 = s504 - s494
-    s512 = sin_hind_right_abduction_angle * (s484 - s485) - s27 * s488
-    s513 = sin_hind_right_abduction_angle * s512
-    s514 = cos_hind_right_abduction_angle * s486 + sin_hind_right_abduction_angle * s487
-    s515 = cos_hind_right_abduction_angle * s487 - sin_hind_right_abduction_angle * s486
-    s516 = s484 - s513
-    s517 = s485 + s513
-    s518 = s488 + cos_hind_right_abduction_angle * s512
-    s519 = y_hip * s515
-    s520 = x_hip * s518
-    s521 = s506 - y_hip * s517
-    s522 = s510 + x_hip * s517
-    s523 = s508 + (x_hip * s514 + y_hip * s483)
-    s524 = s511 - (x_hip * s516 + y_hip * s514)
-    s525 = s497 + s503 + (s519 - s520)
-    s526 = s479 + s499 + (y_hip * s508 - x_hip * s511 + (y_hip * s523 - x_hip * s524))
-    s527 = cos_hind_right_abduction_angle * s498 - s482 + (x_hip * s509 + y_hip * s507 + x_hip * s525)
-    pivot_hind_left_hip = k1 + s394
-    s528 = s394 / pivot_hind_left_hip
-    s529 = s395 / pivot_hind_left_hip
-    s530 = s396 / pivot_hind_left_hip
-    s531 = s390 / pivot_hind_left_hip
-    s532 = s381 / pivot_hind_left_hip
-    s533 = s397 / pivot_hind_left_hip
-    s534 = I_hip_yy + (s287 - s287 * s361) - s395 * s529
-    s535 = inertia_front_left_hip_zz + (s365 - s375 - k2 * (s382 + s392)) - s396 * s530
-    s536 = s395 - s395 * s528
-    s537 = s396 - s396 * s528
-    s538 = I_hip_yz + (cos_hind_left_swing_angle * s366 - k2 * s380) - s396 * s529
-    s539 = m_hip + s387 - s390 * s531
-    s540 = k27 - s381 * s532
-    s541 = m_hip + s386 - s397 * s533
-    s542 = s381 * s531
-    s543 = s388 - s397 * s531
-    s544 = s397 * s532
-    s545 = s390 - s390 * s528
-    s546 = s381 - s381 * s528
-    s547 = s397 - s397 * s528
-    s548 = s380 - s390 * s529
-    s549 = s381 * s529
-    s550 = s379 - s397 * s529
-    s551 = s392 - moment_front_left_hip_y - s390 * s530
-    s552 = cos_hind_left_swing_angle * s276 + sin_hind_left_swing_angle * s288 + s381 * s530
-    s553 = s393 + s397 * s530
-    s554 = sin_hind_left_abduction_angle * (s534 - s535) + s26 * s538
-    s555 = sin_hind_left_abduction_angle * s554
-    s556 = cos_hind_left_abduction_angle * s536 - sin_hind_left_abduction_angle * s537
-    s557 = sin_hind_left_abduction_angle * s536 + cos_hind_left_abduction_angle * s537
-    s558 = sin_hind_left_abduction_angle * (s553 - s549) + cos_hind_left_abduction_angle * (s550 - s552)
-    s559 = sin_hind_left_abduction_angle * s558
-    s560 = cos_hind_left_abduction_angle * s558
-    s561 = cos_hind_left_abduction_angle * s546 - sin_hind_left_abduction_angle * s547
-    s562 = sin_hind_left_abduction_angle * s546 + cos_hind_left_abduction_angle * s547
-    s563 = cos_hind_left_abduction_angle * s548 - sin_hind_left_abduction_angle * s551
-    s564 = sin_hind_left_abduction_angle * s548 + cos_hind_left_abduction_angle * s551
-    s565 = s549 + s559
-    s566 = s552 + s560
-    s567 = s560 - s550
-    s568 = sin_hind_left_abduction_angle * (s540 - s541) - s26 * s544
-    s569 = sin_hind_left_abduction_angle * s568
-    s570 = cos_hind_left_abduction_angle * s542 + sin_hind_left_abduction_angle * s543
-    s571 = cos_hind_left_abduction_angle * s543 - sin_hind_left_abduction_angle * s542
-    s572 = s540 - s569
-    s573 = s541 + s569
-    s574 = s544 + cos_hind_left_abduction_angle * s568
-    s575 = y_hip * s571
-    s576 = x_hip * s574
-    s577 = s562 + y_hip * s573
-    s578 = s566 + x_hip * s573
-    s579 = s564 + (x_hip * s570 - y_hip * s539)
-    s580 = s567 + (y_hip * s570 - x_hip * s572)
-    s581 = s559 - s553 - (s575 + s576)
-    s582 = s535 + s555 - (x_hip * s567 + y_hip * s564 + (x_hip * s580 + y_hip * s579))
-    s583 = cos_hind_left_abduction_angle * s554 - s538 + (x_hip * s565 - y_hip * s563 + x_hip * s581)
-    s584 = I_trunk_x + (s357 - s357 * s472 - y_hip * (s506 + s521)) + (s394 - s394 * s528 + y_hip * (s562 + s577))
-    s585 = s500 + (x_hip * s506 - y_hip * s522) + (s556 + (x_hip * s562 + y_hip * s578))
-    s586 = s501 + (y_hip * s489 - x_hip * s505 - y_hip * s525) + (s557 + (y_hip * s581 - (x_hip * s561 + y_hip * s545)))
-    s587 = I_trunk_y + (s478 - s499 + x_hip * (s510 + s522)) + (s534 - s555 + x_hip * (s566 + s578))
-    pivot_front_right_hip = k1 + s431
-    s588 = s431 / pivot_front_right_hip
-    s589 = s432 / pivot_front_right_hip
-    s590 = s433 / pivot_front_right_hip
-    s591 = s427 / pivot_front_right_hip
-    s592 = s418 / pivot_front_right_hip
-    s593 = s434 / pivot_front_right_hip
-    s594 = I_hip_yy + (s304 - s304 * s398) - s432 * s589
-    s595 = inertia_front_left_hip_zz + (s402 - s412 - k3 * (s419 + s429)) - s433 * s590
-    s596 = s432 - s432 * s588
-    s597 = s433 - s433 * s588
-    s598 = cos_front_right_swing_angle * s403 - k3 * s417 - I_hip_yz - s433 * s589
-    s599 = m_hip + s424 - s427 * s591
-    s600 = k27 - s418 * s592
-    s601 = m_hip + s423 - s434 * s593
-    s602 = s418 * s591
-    s603 = s425 - s434 * s591
-    s604 = s434 * s592
-    s605 = s427 - s427 * s588
-    s606 = s418 - s418 * s588
-    s607 = s434 - s434 * s588
-    s608 = s417 - s427 * s589
-    s609 = s418 * s589
-    s610 = s416 - s434 * s589
-    s611 = moment_front_left_hip_y + s429 - s427 * s590
-    s612 = cos_front_right_swing_angle * s293 + sin_front_right_swing_angle * s305 + s418 * s590
-    s613 = s430 - s434 * s590
-    s614 = sin_front_right_abduction_angle * (s594 - s595) + s25 * s598
-    s615 = sin_front_right_abduction_angle * s614
-    s616 = cos_front_right_abduction_angle * s596 - sin_front_right_abduction_angle * s597
-    s617 = sin_front_right_abduction_angle * s596 + cos_front_right_abduction_angle * s597
-    s618 = cos_front_right_abduction_angle * (s610 - s612) - sin_front_right_abduction_angle * (s609 + s613)
-    s619 = sin_front_right_abduction_angle * s618
-    s620 = cos_front_right_abduction_angle * s618
-    s621 = cos_front_right_abduction_angle * s606 - sin_front_right_abduction_angle * s607
-    s622 = sin_front_right_abduction_angle * s606 + cos_front_right_abduction_angle * s607
-    s623 = cos_front_right_abduction_angle * s608 - sin_front_right_abduction_angle * s611
-    s624 = sin_front_right_abduction_angle * s608 + cos_front_right_abduction_angle * s611
-    s625 = s609 + s619
-    s626 = s612 + s620
-    s627 = s620 - s610
-    s628 = sin_front_right_abduction_angle * (s600 - s601) - s25 * s604
-    s629 = sin_front_right_abduction_angle * s628
-    s630 = cos_front_right_abduction_angle * s602 + sin_front_right_abduction_angle * s603
-    s631 = cos_front_right_abduction_angle * s603 - sin_front_right_abduction_angle * s602
-    s632 = s600 - s629
-    s633 = s601 + s629
-    s634 = s604 + cos_front_right_abduction_angle * s628
-    s635 = y_hip * s631
-    s636 = x_hip * s634
-    s637 = s622 - y_hip * s633
-    s638 = s626 - x_hip * s633
-    s639 = s624 + (y_hip * s599 - x_hip * s630)
-    s640 = s627 + (x_hip * s632 - y_hip * s630)
-    s641 = s613 + s619 + (s635 + s636)
-    s642 = s595 + s615 + (x_hip * s627 + y_hip * s624 + (x_hip * s640 + y_hip * s639))
-    s643 = cos_front_right_abduction_angle * s614 - s598 + (y_hip * s623 - x_hip * s625 - x_hip * s641)
-    pivot_front_left_hip = k1 + s468
-    s644 = s468 / pivot_front_left_hip
-    s645 = s469 / pivot_front_left_hip
-    s646 = s470 / pivot_front_left_hip
-    s647 = s464 / pivot_front_left_hip
-    s648 = s455 / pivot_front_left_hip
-    s649 = s471 / pivot_front_left_hip
-    s650 = I_hip_yy + (s321 - s321 * s435) - s469 * s645
-    s651 = inertia_front_left_hip_zz + (s439 - s449 - k2 * (s456 + s466)) - s470 * s646
-    s652 = s469 - s469 * s644
-    s653 = s470 - s470 * s644
-    s654 = I_hip_yz + (cos_front_left_swing_angle * s440 - k2 * s454) - s470 * s645
-    s655 = m_hip + s461 - s464 * s647
-    s656 = k27 - s455 * s648
-    s657 = m_hip + s460 - s471 * s649
-    s658 = s455 * s647
-    s659 = s462 - s471 * s647
-    s660 = s471 * s648
-    s661 = s464 - s464 * s644
-    s662 = s455 - s455 * s644
-    s663 = s471 - s471 * s644
-    s664 = s454 - s464 * s645
-    s665 = s455 * s645
-    s666 = s453 - s471 * s645
-    s667 = s466 - moment_front_left_hip_y - s464 * s646
-    s668 = cos_front_left_swing_angle * s310 + sin_front_left_swing_angle * s322 + s455 * s646
-    s669 = s467 + s471 * s646
-    s670 = sin_front_left_abduction_angle * (s650 - s651) + s24 * s654
-    s671 = sin_front_left_abduction_angle * s670
-    s672 = cos_front_left_abduction_angle * s652 - sin_front_left_abduction_angle * s653
-    s673 = sin_front_left_abduction_angle * s652 + cos_front_left_abduction_angle * s653
-    s674 = sin_front_left_abduction_angle * (s669 - s665) + cos_front_left_abduction_angle * (s666 - s668)
-    s675 = sin_front_left_abduction_angle * s674
-    s676 = cos_front_left_abduction_angle * s674
-    s677 = cos_front_left_abduction_angle * s662 - sin_front_left_abduction_angle * s663
-    s678 = sin_front_left_abduction_angle * s662 + cos_front_left_abduction_angle * s663
-    s679 = cos_front_left_abduction_angle * s664 - sin_front_left_abduction_angle * s667
-    s680 = sin_front_left_abduction_angle * s664 + cos_front_left_abduction_angle * s667
-    s681 = s665 + s675
-    s682 = s668 + s676
-    s683 = s676 - s666
-    s684 = sin_front_left_abduction_angle * (s656 - s657) - s24 * s660
-    s685 = sin_front_left_abduction_angle * s684
-    s686 = cos_front_left_abduction_angle * s658 + sin_front_left_abduction_angle * s659
-    s687 = cos_front_left_abduction_angle * s659 - sin_front_left_abduction_angle * s658
-    s688 = s656 - s685
-    s689 = s657 + s685
-    s690 = s660 + cos_front_left_abduction_angle * s684
-    s691 = y_hip * s687
-    s692 = x_hip * s690
-    s693 = s678 + y_hip * s689
-    s694 = s682 - x_hip * s689
-    s695 = s680 - (x_hip * s686 + y_hip * s655)
-    s696 = s683 + (x_hip * s688 + y_hip * s686)
-    s697 = s675 - s669 + (s692 - s691)
-    s698 = s651 + s671 + (x_hip * s683 - y_hip * s680 + (x_hip * s696 - y_hip * s695))
-    s699 = cos_front_left_abduction_angle * s670 - s654 - (x_hip * s681 + y_hip * s679 + x_hip * s697)
-    pivot_trunk = s584 + (s431 - s431 * s588 - y_hip * (s622 + s637)) + (s468 - s468 * s644 + y_hip * (s678 + s693))
-    s700 = s585 + (s616 - (x_hip * s622 + y_hip * s638)) + (s672 + (y_hip * s694 - x_hip * s678))
-    s701 = s586 + (s617 + (x_hip * s621 + y_hip * s605 - y_hip * s641)) + (s673 + (x_hip * s677 - y_hip * s661 + y_hip * s697))
-    s702 = s587 + (s594 - s615 - x_hip * (s626 + s638)) + (s650 - s671 - x_hip * (s682 + s694))
-    s703 = s489 - s519 + (s545 + s575) + (s605 - s635) + (s661 + s691)
-    s704 = s505 - y_hip * s518 + (s561 + y_hip * s574) + (s621 - y_hip * s634) + (s677 + y_hip * s690)
-    s705 = s521 + s577 + s637 + s693
-    s706 = s507 + x_hip * s515 + (s563 + x_hip * s571) + (s623 - x_hip * s631) + (s679 - x_hip * s687)
-    s707 = s700 / pivot_trunk
-    s708 = s701 / pivot_trunk
-    s709 = s703 / pivot_trunk
-    s710 = s704 / pivot_trunk
-    s711 = s705 / pivot_trunk
-    pivot_trunk_2 = s702 - s700 * s707
-    s712 = s527 + s583 + s643 + s699 - s701 * s707
-    s713 = s706 - s703 * s707
-    s714 = s520 - s509 + (s576 - s565) - (s625 + s636) - (s681 + s692) - s704 * s707
-    s715 = s522 + s578 + s638 + s694 - s705 * s707
-    s716 = s712 / pivot_trunk_2
-    s717 = s713 / pivot_trunk_2
-    s718 = s714 / pivot_trunk_2
-    s719 = s715 / pivot_trunk_2
-    pivot_trunk_3 = I_trunk_z + s526 + s582 + s642 + s698 - s701 * s708 - s712 * s716
-    s720 = s523 + s579 + s639 + s695 - s703 * s708 - s713 * s716
-    s721 = s524 + s580 + s640 + s696 - s704 * s708 - s714 * s716
-    s722 = s525 + s581 + s641 + s697 - s705 * s708 - s715 * s716
-    s723 = s720 / pivot_trunk_3
-    s724 = s721 / pivot_trunk_3
-    s725 = s722 / pivot_trunk_3
-    s726 = m_trunk + s483 + s539 + s599 + s655 - s703 * s709 - s713 * s717 - s720 * s723
-    s727 = m_trunk + s516 + s572 + s632 + s688 - s704 * s710 - s714 * s718 - s721 * s724
-    s728 = m_trunk + s517 + s573 + s633 + s689 - s705 * s711 - s715 * s719 - s722 * s725
-    s729 = s514 + s570 + s630 + s686 + s704 * s709 + s714 * s717 + s721 * s723
-    s730 = s515 + s571 + s631 + s687 - s705 * s709 - s715 * s717 - s722 * s723
-    s731 = s518 + s574 + s634 + s690 - s705 * s710 - s715 * s718 - s722 * s724
-    s732 = s15 * s726 - s16 * s729 + s17 * s730
-    s733 = s16 * s727 - s15 * s729 + s17 * s731
-    s734 = s15 * s730 + s16 * s731 + s17 * s728
-    s735 = s18 * s726 - s19 * s729 + s20 * s730
-    s736 = s19 * s727 - s18 * s729 + s20 * s731
-    s737 = s18 * s730 + s19 * s731 + s20 * s728
-    s738 = s21 * (s21 * s726 - s22 * s729 + s23 * s730) + s22 * (s22 * s727 - s21 * s729 + s23 * s731)
-    pivot_trunk_3_2 = s738 + s23 * (s21 * s730 + s22 * s731 + s23 * s728)
-    s739 = s21 * s732 + s22 * s733 + s23 * s734
-    s740 = s21 * s735 + s22 * s736 + s23 * s737
-    s741 = s739 / pivot_trunk_3_2
-    s742 = s740 / pivot_trunk_3_2
-    pivot_trunk_2_2 = s18 * s735 + s19 * s736 + s20 * s737 - s740 * s742
-    s743 = s18 * s732 + s19 * s733 + s20 * s734 - s740 * s741
-    s744 = s743 / pivot_trunk_2_2
-    s745 = s252 - s253
-    s746 = m_shank * bias_hind_right_shank_x - k6 * s177 - k20 * s745
-    s747 = sin_hind_right_knee_angle * s251 + cos_hind_right_knee_angle * s746
-    s748 = sin_hind_right_knee_angle * s254 + cos_hind_right_knee_angle * s255 - k4 * s250
-    s749 = s224 + (s225 + s138 * k14 - s137 * k15) + s748
-    s750 = s226 + (s253 - s252 + k19 * s745 + k4 * s747)
-    s751 = s227 + (cos_hind_right_knee_angle * s254 - sin_hind_right_knee_angle * s255)
-    s752 = s223 + (cos_hind_right_knee_angle * s251 - sin_hind_right_knee_angle * s746)
-    s753 = s245 - s246
-    s754 = m_shank * bias_hind_left_shank_x - k6 * s167 - k20 * s753
-    s755 = sin_hind_left_knee_angle * s244 + cos_hind_left_knee_angle * s754
-    s756 = sin_hind_left_knee_angle * s247 + cos_hind_left_knee_angle * s248 - k4 * s243
-    s757 = s217 + (s126 * k14 - s218 - s125 * k15) + s756
-    s758 = s219 + (s246 - s245 + k19 * s753 + k4 * s755)
-    s759 = s220 + (cos_hind_left_knee_angle * s247 - sin_hind_left_knee_angle * s248)
-    s760 = s216 + (cos_hind_left_knee_angle * s244 - sin_hind_left_knee_angle * s754)
-    s761 = s238 - s239
-    s762 = m_shank * bias_front_right_shank_x - k6 * s157 - k20 * s761
-    s763 = sin_front_right_knee_angle * s237 + cos_front_right_knee_angle * s762
-    s764 = sin_front_right_knee_angle * s240 + cos_front_right_knee_angle * s241 - k4 * s236
-    s765 = s210 + (s211 + s114 * k14 - s113 * k15) + s764
-    s766 = s212 + (s239 - s238 + k19 * s761 + k4 * s763)
-    s767 = s213 + (cos_front_right_knee_angle * s240 - sin_front_right_knee_angle * s241)
-    s768 = s209 + (cos_front_right_knee_angle * s237 - sin_front_right_knee_angle * s762)
-    s769 = s231 - s232
-    s770 = m_shank * bias_front_left_shank_x - k6 * s147 - k20 * s769
-    s771 = sin_front_left_knee_angle * s230 + cos_front_left_knee_angle * s770
-    s772 = sin_front_left_knee_angle * s233 + cos_front_left_knee_angle * s234 - k4 * s229
-    s773 = s203 + (s102 * k14 - s204 - s101 * k15) + s772
-    s774 = s205 + (s232 - s231 + k19 * s769 + k4 * s771)
-    s775 = s206 + (cos_front_left_knee_angle * s233 - sin_front_left_knee_angle * s234)
-    s776 = s202 + (cos_front_left_knee_angle * s230 - sin_front_left_knee_angle * s770)
-    s777 = s751 + s325 * s750
-    s778 = s222 + s747 - s326 * s750
-    s779 = s752 - s327 * s750
-    s780 = cos_hind_right_swing_angle * s779 - sin_hind_right_swing_angle * s778
-    s781 = sin_hind_right_swing_angle * s779 + cos_hind_right_swing_angle * s778
-    s782 = sin_hind_right_swing_angle * s777 + cos_hind_right_swing_angle * s749 + k3 * s780
-    s783 = cos_hind_right_swing_angle * s777 - sin_hind_right_swing_angle * s749 - k3 * s781
-    s784 = s198 + s782
-    s785 = I_hip_yz * s87 - I_hip_xy * s86 - s196 + s88 * k12 - s91 * k10 + (s750 - s324 * s750)
-    s786 = m_hip * bias_hind_right_hip_y + moment_front_left_hip_y * s90 + (m_thigh * bias_hind_right_thigh_y + (s221 - k5 * s137) + s250)
-    s787 = s759 - s362 * s758
-    s788 = s215 + s755 - s363 * s758
-    s789 = s760 - s364 * s758
-    s790 = cos_hind_left_swing_angle * s789 - sin_hind_left_swing_angle * s788
-    s791 = sin_hind_left_swing_angle * s789 + cos_hind_left_swing_angle * s788
-    s792 = sin_hind_left_swing_angle * s787 + cos_hind_left_swing_angle * s757 + k2 * s790
-    s793 = cos_hind_left_swing_angle * s787 - sin_hind_left_swing_angle * s757 - k2 * s791
-    s794 = s193 + s792
-    s795 = I_hip_xy * s74 - I_hip_yz * s75 - s191 + s76 * k12 - s79 * k10 + (s758 - s361 * s758)
-    s796 = m_hip * bias_hind_left_hip_y - moment_front_left_hip_y * s78 + (m_thigh * bias_hind_left_thigh_y - (s214 + k5 * s125) + s243)
-    s797 = s767 + s399 * s766
-    s798 = s208 + s763 - s400 * s766
-    s799 = s768 - s401 * s766
-    s800 = cos_front_right_swing_angle * s799 - sin_front_right_swing_angle * s798
-    s801 = sin_front_right_swing_angle * s799 + cos_front_right_swing_angle * s798
-    s802 = sin_front_right_swing_angle * s797 + cos_front_right_swing_angle * s765 + k3 * s800
-    s803 = cos_front_right_swing_angle * s797 - sin_front_right_swing_angle * s765 - k3 * s801
-    s804 = s188 + s802
-    s805 = I_hip_yz * s63 - I_hip_xy * s62 - s186 + s64 * k12 - s67 * k10 + (s766 - s398 * s766)
-    s806 = m_hip * bias_front_right_hip_y + moment_front_left_hip_y * s66 + (m_thigh * bias_front_right_thigh_y + (s207 - k5 * s113) + s236)
-    s807 = s775 - s436 * s774
-    s808 = s201 + s771 - s437 * s774
-    s809 = s776 - s438 * s774
-    s810 = cos_front_left_swing_angle * s809 - sin_front_left_swing_angle * s808
-    s811 = sin_front_left_swing_angle * s809 + cos_front_left_swing_angle * s808
-    s812 = sin_front_left_swing_angle * s807 + cos_front_left_swing_angle * s773 + k2 * s810
-    s813 = cos_front_left_swing_angle * s807 - sin_front_left_swing_angle * s773 - k2 * s811
-    s814 = s183 + s812
-    s815 = I_hip_xy * s48 - I_hip_yz * s49 - s181 + s50 * k12 - s53 * k10 + (s774 - s435 * s774)
-    s816 = m_hip * bias_front_left_hip_y - moment_front_left_hip_y * s52 + (m_thigh * bias_front_left_thigh_y - (s200 + k5 * s101) + s229)
-    s817 = s785 - s473 * s784
-    s818 = s199 + s783 - s474 * s784
-    s819 = m_hip * bias_hind_right_hip_x - moment_front_left_hip_y * s87 + s781 - s475 * s784
-    s820 = s786 - s476 * s784
-    s821 = m_hip * bias_hind_right_hip_z - moment_front_left_hip_y * s86 + s780 - s477 * s784
-    s822 = cos_hind_right_abduction_angle * s820 - sin_hind_right_abduction_angle * s821
-    s823 = sin_hind_right_abduction_angle * s820 + cos_hind_right_abduction_angle * s821
-    s824 = cos_hind_right_abduction_angle * s817 - sin_hind_right_abduction_angle * s818
-    s825 = sin_hind_right_abduction_angle * s817 + cos_hind_right_abduction_angle * s818
-    s826 = s795 - s529 * s794
-    s827 = s194 + s793 - s530 * s794
-    s828 = m_hip * bias_hind_left_hip_x + moment_front_left_hip_y * s75 + s791 - s531 * s794
-    s829 = s796 - s532 * s794
-    s830 = m_hip * bias_hind_left_hip_z + moment_front_left_hip_y * s74 + s790 - s533 * s794
-    s831 = cos_hind_left_abduction_angle * s829 - sin_hind_left_abduction_angle * s830
-    s832 = sin_hind_left_abduction_angle * s829 + cos_hind_left_abduction_angle * s830
-    s833 = cos_hind_left_abduction_angle * s826 - sin_hind_left_abduction_angle * s827
-    s834 = sin_hind_left_abduction_angle * s826 + cos_hind_left_abduction_angle * s827
-    s835 = s34 * k7 + (s784 - s472 * s784 - y_hip * s823) + (s794 - s528 * s794 + y_hip * s832)
-    s836 = s32 * k9 + (s825 + (y_hip * s819 - x_hip * s822)) + (s834 - (x_hip * s831 + y_hip * s828))
-    s837 = s805 - s589 * s804
-    s838 = s189 + s803 - s590 * s804
-    s839 = m_hip * bias_front_right_hip_x - moment_front_left_hip_y * s63 + s801 - s591 * s804
-    s840 = s806 - s592 * s804
-    s841 = m_hip * bias_front_right_hip_z - moment_front_left_hip_y * s62 + s800 - s593 * s804
-    s842 = cos_front_right_abduction_angle * s840 - sin_front_right_abduction_angle * s841
-    s843 = sin_front_right_abduction_angle * s840 + cos_front_right_abduction_angle * s841
-    s844 = cos_front_right_abduction_angle * s837 - sin_front_right_abduction_angle * s838
-    s845 = sin_front_right_abduction_angle * s837 + cos_front_right_abduction_angle * s838
-    s846 = s33 * k8 + (s824 + x_hip * s823) + (s833 + x_hip * s832) + (s844 - x_hip * s843)
-    s847 = s815 - s645 * s814
-    s848 = s184 + s813 - s646 * s814
-    s849 = m_hip * bias_front_left_hip_x + moment_front_left_hip_y * s49 + s811 - s647 * s814
-    s850 = s816 - s648 * s814
-    s851 = m_hip * bias_front_left_hip_z + moment_front_left_hip_y * s48 + s810 - s649 * s814
-    s852 = cos_front_left_abduction_angle * s850 - sin_front_left_abduction_angle * s851
-    s853 = sin_front_left_abduction_angle * s850 + cos_front_left_abduction_angle * s851
-    s854 = cos_front_left_abduction_angle * s847 - sin_front_left_abduction_angle * s848
-    s855 = sin_front_left_abduction_angle * s847 + cos_front_left_abduction_angle * s848
-    s856 = s835 + (s804 - s588 * s804 - y_hip * s843) + (s814 - s644 * s814 + y_hip * s853)
-    s857 = s836 + (s845 + (x_hip * s842 + y_hip * s839)) + (s855 + (x_hip * s852 - y_hip * s849))
-    s858 = s707 * s856 - (s846 + (s854 - x_hip * s853))
-    s859 = s857 - s708 * s856 + s716 * s858
-    s860 = m_trunk * bias_trunk_x + s819 + s828 + s839 + s849 - s709 * s856 + s717 * s858
-    s861 = m_trunk * bias_trunk_y + s822 + s831 + s842 + s852 - s710 * s856 + s718 * s858
-    s862 = m_trunk * bias_trunk_z + s823 + s832 + s843 + s853 - s711 * s856 + s719 * s858
-    s863 = s860 - s723 * s859
-    s864 = s861 - s724 * s859
-    s865 = s862 - s725 * s859
-    s866 = s21 * s863 + s22 * s864 + s23 * s865
-    s867 = s742 * s866 - (s18 * s863 + s19 * s864 + s20 * s865)
-    s868 = (s15 * s863 + s16 * s864 + s17 * s865 - s741 * s866 + s744 * s867) / (s15 * s732 + s16 * s733 + s17 * s734 - s739 * s741 - s743 * s744)
-    delta_trunk_2_y = s867 / pivot_trunk_2_2 + s744 * s868
-    s869 = s866 / pivot_trunk_3_2 + (s742 * delta_trunk_2_y - s741 * s868)
-    delta_trunk_x = s18 * delta_trunk_2_y - s15 * s868 - s21 * s869
-    delta_trunk_y = s19 * delta_trunk_2_y - s16 * s868 - s22 * s869
-    delta_trunk_z = s20 * delta_trunk_2_y - s17 * s868 - s23 * s869
-    s870 = s859 / pivot_trunk_3 + (s723 * delta_trunk_x + s724 * delta_trunk_y + s725 * delta_trunk_z)
-    s871 = s717 * delta_trunk_x + s718 * delta_trunk_y + s719 * delta_trunk_z - s716 * s870
-    alpha_trunk_y = s858 / pivot_trunk_2 - s871
-    s872 = s707 * alpha_trunk_y - s708 * s870 + (s709 * delta_trunk_x + s710 * delta_trunk_y + s711 * delta_trunk_z)
-    s873 = s856 / pivot_trunk + s872
-    alpha_front_left_hip_y = cos_front_left_abduction_angle * alpha_trunk_y - sin_front_left_abduction_angle * s870
-    s874 = cos_front_left_abduction_angle * s870 + sin_front_left_abduction_angle * alpha_trunk_y
-    s875 = y_hip * s870
-    s876 = x_hip * s870
-    s877 = y_hip * s873
-    s878 = x_hip * alpha_trunk_y
-    s879 = s877 + s878
-    delta_front_left_hip_x = delta_trunk_x + s875
-    s880 = delta_trunk_y - s876
-    s881 = delta_trunk_z - s879
-    delta_front_left_hip_y = cos_front_left_abduction_angle * s880 + sin_front_left_abduction_angle * s881
-    delta_front_left_hip_z = cos_front_left_abduction_angle * s881 - sin_front_left_abduction_angle * s880
-    s882 = s647 * delta_front_left_hip_x + s648 * delta_front_left_hip_y + s649 * delta_front_left_hip_z
-    s883 = s814 / pivot_front_left_hip + (s645 * alpha_front_left_hip_y - s644 * s873 - s646 * s874 + s882)
-    s884 = s873 + s883
-    alpha_front_right_hip_y = cos_front_right_abduction_angle * alpha_trunk_y - sin_front_right_abduction_angle * s870
-    s885 = cos_front_right_abduction_angle * s870 + sin_front_right_abduction_angle * alpha_trunk_y
-    delta_front_right_hip_x = delta_trunk_x - s875
-    s886 = delta_trunk_z + (s877 - s878)
-    delta_front_right_hip_y = cos_front_right_abduction_angle * s880 + sin_front_right_abduction_angle * s886
-    delta_front_right_hip_z = cos_front_right_abduction_angle * s886 - sin_front_right_abduction_angle * s880
-    s887 = s591 * delta_front_right_hip_x + s592 * delta_front_right_hip_y + s593 * delta_front_right_hip_z
-    s888 = s804 / pivot_front_right_hip + (s589 * alpha_front_right_hip_y - s588 * s873 - s590 * s885 + s887)
-    s889 = s873 + s888
-    alpha_hind_left_hip_y = cos_hind_left_abduction_angle * alpha_trunk_y - sin_hind_left_abduction_angle * s870
-    s890 = cos_hind_left_abduction_angle * s870 + sin_hind_left_abduction_angle * alpha_trunk_y
-    s891 = delta_trunk_y + s876
-    s892 = delta_trunk_z + (s878 - s877)
-    delta_hind_left_hip_y = cos_hind_left_abduction_angle * s891 + sin_hind_left_abduction_angle * s892
-    delta_hind_left_hip_z = cos_hind_left_abduction_angle * s892 - sin_hind_left_abduction_angle * s891
-    s893 = s531 * delta_front_left_hip_x + s532 * delta_hind_left_hip_y + s533 * delta_hind_left_hip_z
-    s894 = s794 / pivot_hind_left_hip + (s529 * alpha_hind_left_hip_y - s528 * s873 - s530 * s890 + s893)
-    s895 = s873 + s894
-    alpha_hind_right_hip_y = cos_hind_right_abduction_angle * alpha_trunk_y - sin_hind_right_abduction_angle * s870
-    s896 = cos_hind_right_abduction_angle * s870 + sin_hind_right_abduction_angle * alpha_trunk_y
-    s897 = delta_trunk_z + s879
-    delta_hind_right_hip_y = cos_hind_right_abduction_angle * s891 + sin_hind_right_abduction_angle * s897
-    delta_hind_right_hip_z = cos_hind_right_abduction_angle * s897 - sin_hind_right_abduction_angle * s891
-    s898 = s475 * delta_front_right_hip_x + s476 * delta_hind_right_hip_y + s477 * delta_hind_right_hip_z
-    s899 = s784 / pivot_hind_right_hip + (s473 * alpha_hind_right_hip_y - s472 * s873 - s474 * s896 + s898)
-    s900 = s873 + s899
-    s901 = delta_front_left_hip_x + k2 * s874
-    s902 = delta_front_left_hip_z - k2 * s884
-    delta_front_left_thigh_z = cos_front_left_swing_angle * s902 + sin_front_left_swing_angle * s901
-    delta_front_left_thigh_x = cos_front_left_swing_angle * s901 - sin_front_left_swing_angle * s902
-    s903 = s436 * (cos_front_left_swing_angle * s874 + sin_front_left_swing_angle * s884)
-    s904 = s435 * alpha_front_left_hip_y - s903 + (s437 * delta_front_left_thigh_x + s438 * delta_front_left_thigh_z)
-    s905 = s774 / pivot_front_left_thigh + s904
-    alpha_front_left_thigh_y = alpha_front_left_hip_y - s905
-    s906 = delta_front_right_hip_x + k3 * s885
-    s907 = delta_front_right_hip_z - k3 * s889
-    delta_front_right_thigh_z = cos_front_right_swing_angle * s907 + sin_front_right_swing_angle * s906
-    delta_front_right_thigh_x = cos_front_right_swing_angle * s906 - sin_front_right_swing_angle * s907
-    s908 = s399 * (cos_front_right_swing_angle * s885 + sin_front_right_swing_angle * s889)
-    s909 = s398 * alpha_front_right_hip_y + s908 + (s400 * delta_front_right_thigh_x + s401 * delta_front_right_thigh_z)
-    s910 = s766 / pivot_front_right_thigh + s909
-    alpha_front_right_thigh_y = alpha_front_right_hip_y - s910
-    s911 = delta_front_left_hip_x + k2 * s890
-    s912 = delta_hind_left_hip_z - k2 * s895
-    delta_hind_left_thigh_z = cos_hind_left_swing_angle * s912 + sin_hind_left_swing_angle * s911
-    delta_hind_left_thigh_x = cos_hind_left_swing_angle * s911 - sin_hind_left_swing_angle * s912
-    s913 = s362 * (cos_hind_left_swing_angle * s890 + sin_hind_left_swing_angle * s895)
-    s914 = s361 * alpha_hind_left_hip_y - s913 + (s363 * delta_hind_left_thigh_x + s364 * delta_hind_left_thigh_z)
-    s915 = s758 / pivot_hind_left_thigh + s914
-    alpha_hind_left_thigh_y = alpha_hind_left_hip_y - s915
-    s916 = delta_front_right_hip_x + k3 * s896
-    s917 = delta_hind_right_hip_z - k3 * s900
-    delta_hind_right_thigh_z = cos_hind_right_swing_angle * s917 + sin_hind_right_swing_angle * s916
-    delta_hind_right_thigh_x = cos_hind_right_swing_angle * s916 - sin_hind_right_swing_angle * s917
-    s918 = s325 * (cos_hind_right_swing_angle * s896 + sin_hind_right_swing_angle * s900)
-    s919 = s324 * alpha_hind_right_hip_y + s918 + (s326 * delta_hind_right_thigh_x + s327 * delta_hind_right_thigh_z)
-    s920 = s750 / pivot_hind_right_thigh + s919
-    alpha_hind_right_thigh_y = alpha_hind_right_hip_y - s920
-    s921 = cos_front_left_knee_angle * (delta_front_left_thigh_x + k4 * alpha_front_left_thigh_y)
-    s922 = k19 * alpha_front_left_thigh_y - k20 * (s921 - sin_front_left_knee_angle * delta_front_left_thigh_z)
-    front_left_knee_angle_ddot = s769 / pivot_hind_right_shank - s922
-    s923 = cos_front_right_knee_angle * (delta_front_right_thigh_x + k4 * alpha_front_right_thigh_y)
-    s924 = k19 * alpha_front_right_thigh_y - k20 * (s923 - sin_front_right_knee_angle * delta_front_right_thigh_z)
-    front_right_knee_angle_ddot = s761 / pivot_hind_right_shank - s924
-    s925 = cos_hind_left_knee_angle * (delta_hind_left_thigh_x + k4 * alpha_hind_left_thigh_y)
-    s926 = k19 * alpha_hind_left_thigh_y - k20 * (s925 - sin_hind_left_knee_angle * delta_hind_left_thigh_z)
-    hind_left_knee_angle_ddot = s753 / pivot_hind_right_shank - s926
-    s927 = cos_hind_right_knee_angle * (delta_hind_right_thigh_x + k4 * alpha_hind_right_thigh_y)
-    s928 = k19 * alpha_hind_right_thigh_y - k20 * (s927 - sin_hind_right_knee_angle * delta_hind_right_thigh_z)
-    hind_right_knee_angle_ddot = s745 / pivot_hind_right_shank - s928
-    s929 = trunk_wx * 0.5
-    s930 = trunk_wy * 0.5
-    s931 = trunk_wz * 0.5
-    s1004 = I_trunk_x * s15
-    s1005 = I_trunk_y * s16
-    s1006 = I_trunk_z * s17
-    s1007 = I_trunk_x * s18
-    s1008 = I_trunk_y * s19
-    s1009 = I_trunk_z * s20
-    s1010 = s15 * s1004 + s16 * s1005 + s17 * s1006
-    s1011 = s18 * s1007 + s19 * s1008 + s20 * s1009
-    s1012 = s21 * (I_trunk_x * s21) + s22 * (I_trunk_y * s22) + s23 * (I_trunk_z * s23)
-    s1013 = s18 * s1004 + s19 * s1005 + s20 * s1006
-    s1014 = s21 * s1004 + s22 * s1005 + s23 * s1006
-    s1015 = s21 * s1007 + s22 * s1008 + s23 * s1009
-    s1016 = x_hip * s15
-    s1017 = y_hip * s16
-    s1018 = s1016 + s1017
-    s1019 = x_hip * s18
-    s1020 = y_hip * s19
-    s1021 = s1019 + s1020
-    s1022 = x_hip * s21
-    s1023 = y_hip * s22
-    s1024 = s1022 + s1023
-    s1025 = moment_front_left_hip_y * s932
-    s1026 = moment_front_left_hip_y * s934
-    s1027 = moment_front_left_hip_y * s936
-    s1028 = inertia_front_left_hip_xx * s15
-    s1029 = s1028 + I_hip_xy * s932 + I_hip_xz * s933
-    s1030 = I_hip_xy * s15
-    s1031 = s1030 + I_hip_yy * s932 + I_hip_yz * s933
-    s1032 = I_hip_xz * s15
-    s1033 = s1032 + I_hip_yz * s932 + inertia_front_left_hip_zz * s933
-    s1034 = inertia_front_left_hip_xx * s18
-    s1035 = s1034 + I_hip_xy * s934 + I_hip_xz * s935
-    s1036 = I_hip_xy * s18
-    s1037 = s1036 + I_hip_yy * s934 + I_hip_yz * s935
-    s1038 = I_hip_xz * s18
-    s1039 = s1038 + I_hip_yz * s934 + inertia_front_left_hip_zz * s935
-    s1040 = inertia_front_left_hip_xx * s21
-    s1041 = I_hip_xy * s21
-    s1042 = I_hip_xz * s21
-    s1043 = s15 * s1029 + s932 * s1031 + s933 * s1033
-    s1044 = s18 * s1035 + s934 * s1037 + s935 * s1039
-    s1045 = s21 * (s1040 + I_hip_xy * s936 + I_hip_xz * s937) + s936 * (s1041 + I_hip_yy * s936 + I_hip_yz * s937)
-    s1046 = s1045 + s937 * (s1042 + I_hip_yz * s936 + inertia_front_left_hip_zz * s937)
-    s1047 = s18 * s1029 + s934 * s1031 + s935 * s1033
-    s1048 = s21 * s1029 + s936 * s1031 + s937 * s1033
-    s1049 = s21 * s1035 + s936 * s1037 + s937 * s1039
-    s1050 = s1016 - s1017
-    s1051 = s1019 - s1020
-    s1052 = s1022 - s1023
-    s1053 = moment_front_left_hip_y * s938
-    s1054 = moment_front_left_hip_y * s940
-    s1055 = moment_front_left_hip_y * s942
-    s1056 = s1028 - I_hip_xy * s938 + I_hip_xz * s939
-    s1057 = I_hip_yy * s938 - s1030 - I_hip_yz * s939
-    s1058 = s1032 - I_hip_yz * s938 + inertia_front_left_hip_zz * s939
-    s1059 = s1034 - I_hip_xy * s940 + I_hip_xz * s941
-    s1060 = I_hip_yy * s940 - s1036 - I_hip_yz * s941
-    s1061 = s1038 - I_hip_yz * s940 + inertia_front_left_hip_zz * s941
-    s1062 = s15 * s1056 + s938 * s1057 + s939 * s1058
-    s1063 = s18 * s1059 + s940 * s1060 + s941 * s1061
-    s1064 = s21 * (s1040 - I_hip_xy * s942 + I_hip_xz * s943) + s942 * (I_hip_yy * s942 - s1041 - I_hip_yz * s943)
-    s1065 = s1064 + s943 * (s1042 - I_hip_yz * s942 + inertia_front_left_hip_zz * s943)
-    s1066 = s18 * s1056 + s940 * s1057 + s941 * s1058
-    s1067 = s21 * s1056 + s942 * s1057 + s943 * s1058
-    s1068 = s21 * s1059 + s942 * s1060 + s943 * s1061
-    s1069 = s1017 - s1016
-    s1070 = s1020 - s1019
-    s1071 = s1023 - s1022
-    s1072 = moment_front_left_hip_y * s944
-    s1073 = moment_front_left_hip_y * s946
-    s1074 = moment_front_left_hip_y * s948
-    s1075 = s1028 + I_hip_xy * s944 + I_hip_xz * s945
-    s1076 = s1030 + I_hip_yy * s944 + I_hip_yz * s945
-    s1077 = s1032 + I_hip_yz * s944 + inertia_front_left_hip_zz * s945
-    s1078 = s1034 + I_hip_xy * s946 + I_hip_xz * s947
-    s1079 = s1036 + I_hip_yy * s946 + I_hip_yz * s947
-    s1080 = s1038 + I_hip_yz * s946 + inertia_front_left_hip_zz * s947
-    s1081 = s15 * s1075 + s944 * s1076 + s945 * s1077
-    s1082 = s18 * s1078 + s946 * s1079 + s947 * s1080
-    s1083 = s21 * (s1040 + I_hip_xy * s948 + I_hip_xz * s949) + s948 * (s1041 + I_hip_yy * s948 + I_hip_yz * s949)
-    s1084 = s1083 + s949 * (s1042 + I_hip_yz * s948 + inertia_front_left_hip_zz * s949)
-    s1085 = s18 * s1075 + s946 * s1076 + s947 * s1077
-    s1086 = s21 * s1075 + s948 * s1076 + s949 * s1077
-    s1087 = s21 * s1078 + s948 * s1079 + s949 * s1080
-    s1088 = moment_front_left_hip_y * s950
-    s1089 = moment_front_left_hip_y * s952
-    s1090 = moment_front_left_hip_y * s954
-    s1091 = s1028 - I_hip_xy * s950 + I_hip_xz * s951
-    s1092 = I_hip_yy * s950 - s1030 - I_hip_yz * s951
-    s1093 = s1032 - I_hip_yz * s950 + inertia_front_left_hip_zz * s951
-    s1094 = s1034 - I_hip_xy * s952 + I_hip_xz * s953
-    s1095 = I_hip_yy * s952 - s1036 - I_hip_yz * s953
-    s1096 = s1038 - I_hip_yz * s952 + inertia_front_left_hip_zz * s953
-    s1097 = s15 * s1091 + s950 * s1092 + s951 * s1093
-    s1098 = s18 * s1094 + s952 * s1095 + s953 * s1096
-    s1099 = s21 * (s1040 - I_hip_xy * s954 + I_hip_xz * s955) + s954 * (I_hip_yy * s954 - s1041 - I_hip_yz * s955)
-    s1100 = s1099 + s955 * (s1042 - I_hip_yz * s954 + inertia_front_left_hip_zz * s955)
-    s1101 = s18 * s1091 + s952 * s1092 + s953 * s1093
-    s1102 = s21 * s1091 + s954 * s1092 + s955 * s1093
-    s1103 = s21 * s1094 + s954 * s1095 + s955 * s1096
-    s1104 = k2 * s932
-    s1105 = k2 * s934
-    s1106 = k2 * s936
-    s1107 = moment_front_left_thigh_y * s932 - k5 * s956
-    s1108 = moment_front_left_thigh_y * s934 - k5 * s958
-    s1109 = moment_front_left_thigh_y * s936 - k5 * s960
-    s1110 = inertia_front_left_thigh_xx * s957
-    s1111 = inertia_front_left_thigh_yy * s932 + inertia_front_left_thigh_yz * s956
-    s1112 = inertia_front_left_thigh_yz * s932 + inertia_front_left_thigh_zz * s956
-    s1113 = inertia_front_left_thigh_xx * s959
-    s1114 = inertia_front_left_thigh_yy * s934 + inertia_front_left_thigh_yz * s958
-    s1115 = inertia_front_left_thigh_yz * s934 + inertia_front_left_thigh_zz * s958
-    s1116 = s957 * s1110 + s932 * s1111 + s956 * s1112
-    s1117 = s959 * s1113 + s934 * s1114 + s958 * s1115
-    s1118 = s936 * (inertia_front_left_thigh_yy * s936 + inertia_front_left_thigh_yz * s960)
-    s1119 = s960 * (inertia_front_left_thigh_yz * s936 + inertia_front_left_thigh_zz * s960)
-    s1120 = s961 * (inertia_front_left_thigh_xx * s961) + s1118 + s1119
-    s1121 = s959 * s1110 + s934 * s1111 + s958 * s1112
-    s1122 = s961 * s1110 + s936 * s1111 + s960 * s1112
-    s1123 = s961 * s1113 + s936 * s1114 + s960 * s1115
-    s1124 = k3 * s938
-    s1125 = k3 * s940
-    s1126 = k3 * s942
-    s1127 = moment_front_left_thigh_y * s938 + k5 * s962
-    s1128 = moment_front_left_thigh_y * s940 + k5 * s964
-    s1129 = moment_front_left_thigh_y * s942 + k5 * s966
-    s1130 = inertia_front_left_thigh_xx * s963
-    s1131 = inertia_front_left_thigh_yy * s938 - inertia_front_left_thigh_yz * s962
-    s1132 = inertia_front_left_thigh_zz * s962 - inertia_front_left_thigh_yz * s938
-    s1133 = inertia_front_left_thigh_xx * s965
-    s1134 = inertia_front_left_thigh_yy * s940 - inertia_front_left_thigh_yz * s964
-    s1135 = inertia_front_left_thigh_zz * s964 - inertia_front_left_thigh_yz * s940
-    s1136 = s963 * s1130 + s938 * s1131 + s962 * s1132
-    s1137 = s965 * s1133 + s940 * s1134 + s964 * s1135
-    s1138 = s942 * (inertia_front_left_thigh_yy * s942 - inertia_front_left_thigh_yz * s966)
-    s1139 = s966 * (inertia_front_left_thigh_zz * s966 - inertia_front_left_thigh_yz * s942)
-    s1140 = s967 * (inertia_front_left_thigh_xx * s967) + s1138 + s1139
-    s1141 = s965 * s1130 + s940 * s1131 + s964 * s1132
-    s1142 = s967 * s1130 + s942 * s1131 + s966 * s1132
-    s1143 = s967 * s1133 + s942 * s1134 + s966 * s1135
-    s1144 = k2 * s944
-    s1145 = k2 * s946
-    s1146 = k2 * s948
-    s1147 = moment_front_left_thigh_y * s944 - k5 * s968
-    s1148 = moment_front_left_thigh_y * s946 - k5 * s970
-    s1149 = moment_front_left_thigh_y * s948 - k5 * s972
-    s1150 = inertia_front_left_thigh_xx * s969
-    s1151 = inertia_front_left_thigh_yy * s944 + inertia_front_left_thigh_yz * s968
-    s1152 = inertia_front_left_thigh_yz * s944 + inertia_front_left_thigh_zz * s968
-    s1153 = inertia_front_left_thigh_xx * s971
-    s1154 = inertia_front_left_thigh_yy * s946 + inertia_front_left_thigh_yz * s970
-    s1155 = inertia_front_left_thigh_yz * s946 + inertia_front_left_thigh_zz * s970
-    s1156 = s969 * s1150 + s944 * s1151 + s968 * s1152
-    s1157 = s971 * s1153 + s946 * s1154 + s970 * s1155
-    s1158 = s948 * (inertia_front_left_thigh_yy * s948 + inertia_front_left_thigh_yz * s972)
-    s1159 = s972 * (inertia_front_left_thigh_yz * s948 + inertia_front_left_thigh_zz * s972)
-    s1160 = s973 * (inertia_front_left_thigh_xx * s973) + s1158 + s1159
-    s1161 = s971 * s1150 + s946 * s1151 + s970 * s1152
-    s1162 = s973 * s1150 + s948 * s1151 + s972 * s1152
-    s1163 = s973 * s1153 + s948 * s1154 + s972 * s1155
-    s1164 = k3 * s950
-    s1165 = k3 * s952
-    s1166 = k3 * s954
-    s1167 = moment_front_left_thigh_y * s950 + k5 * s974
-    s1168 = moment_front_left_thigh_y * s952 + k5 * s976
-    s1169 = moment_front_left_thigh_y * s954 + k5 * s978
-    s1170 = inertia_front_left_thigh_xx * s975
-    s1171 = inertia_front_left_thigh_yy * s950 - inertia_front_left_thigh_yz * s974
-    s1172 = inertia_front_left_thigh_zz * s974 - inertia_front_left_thigh_yz * s950
-    s1173 = inertia_front_left_thigh_xx * s977
-    s1174 = inertia_front_left_thigh_yy * s952 - inertia_front_left_thigh_yz * s976
-    s1175 = inertia_front_left_thigh_zz * s976 - inertia_front_left_thigh_yz * s952
-    s1176 = s975 * s1170 + s950 * s1171 + s974 * s1172
-    s1177 = s977 * s1173 + s952 * s1174 + s976 * s1175
-    s1178 = s954 * (inertia_front_left_thigh_yy * s954 - inertia_front_left_thigh_yz * s978)
-    s1179 = s978 * (inertia_front_left_thigh_zz * s978 - inertia_front_left_thigh_yz * s954)
-    s1180 = s979 * (inertia_front_left_thigh_xx * s979) + s1178 + s1179
-    s1181 = s977 * s1170 + s952 * s1171 + s976 * s1172
-    s1182 = s979 * s1170 + s954 * s1171 + s978 * s1172
-    s1183 = s979 * s1173 + s954 * s1174 + s978 * s1175
-    s1184 = k4 * s956
-    s1185 = k4 * s958
-    s1186 = k4 * s960
-    s1187 = k6 * s980
-    s1188 = k6 * s982
-    s1189 = k6 * s984
-    s1190 = inertia_front_left_shank_xx * s981
-    s1191 = inertia_front_left_shank_yy * s932
-    s1192 = I_shank_z * s980
-    s1193 = inertia_front_left_shank_xx * s983
-    s1194 = inertia_front_left_shank_yy * s934
-    s1195 = I_shank_z * s982
-    s1196 = s981 * s1190 + s932 * s1191 + s980 * s1192
-    s1197 = s983 * s1193 + s934 * s1194 + s982 * s1195
-    s1198 = s985 * (inertia_front_left_shank_xx * s985) + s936 * (inertia_front_left_shank_yy * s936)
-    s1199 = s1198 + s984 * (I_shank_z * s984)
-    s1200 = s983 * s1190 + s934 * s1191 + s982 * s1192
-    s1201 = s985 * s1190 + s936 * s1191 + s984 * s1192
-    s1202 = s985 * s1193 + s936 * s1194 + s984 * s1195
-    s1203 = k4 * s962
-    s1204 = k4 * s964
-    s1205 = k4 * s966
-    s1206 = k6 * s986
-    s1207 = k6 * s988
-    s1208 = k6 * s990
-    s1209 = inertia_front_left_shank_xx * s987
-    s1210 = inertia_front_left_shank_yy * s938
-    s1211 = I_shank_z * s986
-    s1212 = inertia_front_left_shank_xx * s989
-    s1213 = inertia_front_left_shank_yy * s940
-    s1214 = I_shank_z * s988
-    s1215 = s987 * s1209 + s938 * s1210 + s986 * s1211
-    s1216 = s989 * s1212 + s940 * s1213 + s988 * s1214
-    s1217 = s991 * (inertia_front_left_shank_xx * s991) + s942 * (inertia_front_left_shank_yy * s942)
-    s1218 = s1217 + s990 * (I_shank_z * s990)
-    s1219 = s989 * s1209 + s940 * s1210 + s988 * s1211
-    s1220 = s991 * s1209 + s942 * s1210 + s990 * s1211
-    s1221 = s991 * s1212 + s942 * s1213 + s990 * s1214
-    s1222 = k4 * s968
-    s1223 = k4 * s970
-    s1224 = k4 * s972
-    s1225 = k6 * s992
-    s1226 = k6 * s994
-    s1227 = k6 * s996
-    s1228 = inertia_front_left_shank_xx * s993
-    s1229 = inertia_front_left_shank_yy * s944
-    s1230 = I_shank_z * s992
-    s1231 = inertia_front_left_shank_xx * s995
-    s1232 = inertia_front_left_shank_yy * s946
-    s1233 = I_shank_z * s994
-    s1234 = s993 * s1228 + s944 * s1229 + s992 * s1230
-    s1235 = s995 * s1231 + s946 * s1232 + s994 * s1233
-    s1236 = s997 * (inertia_front_left_shank_xx * s997) + s948 * (inertia_front_left_shank_yy * s948)
-    s1237 = s1236 + s996 * (I_shank_z * s996)
-    s1238 = s995 * s1228 + s946 * s1229 + s994 * s1230
-    s1239 = s997 * s1228 + s948 * s1229 + s996 * s1230
-    s1240 = s997 * s1231 + s948 * s1232 + s996 * s1233
-    s1241 = k4 * s974
-    s1242 = k4 * s976
-    s1243 = k4 * s978
-    s1244 = k6 * s998
-    s1245 = k6 * s1000
-    s1246 = k6 * s1002
-    s1247 = inertia_front_left_shank_xx * s999
-    s1248 = inertia_front_left_shank_yy * s950
-    s1249 = I_shank_z * s998
-    s1250 = inertia_front_left_shank_xx * s1001
-    s1251 = inertia_front_left_shank_yy * s952
-    s1252 = I_shank_z * s1000
-    s1253 = s999 * s1247 + s950 * s1248 + s998 * s1249
-    s1254 = s1001 * s1250 + s952 * s1251 + s1000 * s1252
-    s1255 = s1003 * (inertia_front_left_shank_xx * s1003) + s954 * (inertia_front_left_shank_yy * s954)
-    s1256 = s1255 + s1002 * (I_shank_z * s1002)
-    s1257 = s1001 * s1247 + s952 * s1248 + s1000 * s1249
-    s1258 = s1003 * s1247 + s954 * s1248 + s1002 * s1249
-    s1259 = s1003 * s1250 + s954 * s1251 + s1002 * s1252
-    s1260 = m_shank * s1241 - s1244
-    s1261 = m_shank * s1242 - s1245
-    s1262 = m_shank * s1243 - s1246
-    s1263 = s1241 * (s1260 - s1244)
-    s1264 = s1242 * (s1261 - s1245)
-    s1265 = s1243 * (s1262 - s1246)
-    s1266 = s1260 - s1167
-    s1267 = s1261 - s1168
-    s1268 = s1262 - s1169
-    s1269 = s1176 + (s1253 + (s1264 + s1265))
-    s1270 = s1181 + (s1257 + (s1242 * s1244 - s1241 * s1261))
-    s1271 = s1182 + (s1258 + (s1243 * s1244 - s1241 * s1262))
-    s1272 = s1177 + (s1254 + (s1263 + s1265))
-    s1273 = s1183 + (s1259 + (s1243 * s1245 - s1242 * s1262))
-    s1274 = s1180 + (s1256 + (s1263 + s1264))
-    s1275 = m_shank * s1222 - s1225
-    s1276 = m_shank * s1223 - s1226
-    s1277 = m_shank * s1224 - s1227
-    s1278 = s1222 * (s1275 - s1225)
-    s1279 = s1223 * (s1276 - s1226)
-    s1280 = s1224 * (s1277 - s1227)
-    s1281 = s1147 + s1275
-    s1282 = s1148 + s1276
-    s1283 = s1149 + s1277
-    s1284 = s1156 + (s1234 + (s1279 + s1280))
-    s1285 = s1161 + (s1238 + (s1223 * s1225 - s1222 * s1276))
-    s1286 = s1162 + (s1239 + (s1224 * s1225 - s1222 * s1277))
-    s1287 = s1157 + (s1235 + (s1278 + s1280))
-    s1288 = s1163 + (s1240 + (s1224 * s1226 - s1223 * s1277))
-    s1289 = s1160 + (s1237 + (s1278 + s1279))
-    s1290 = m_shank * s1203 - s1206
-    s1291 = m_shank * s1204 - s1207
-    s1292 = m_shank * s1205 - s1208
-    s1293 = s1203 * (s1290 - s1206)
-    s1294 = s1204 * (s1291 - s1207)
-    s1295 = s1205 * (s1292 - s1208)
-    s1296 = s1290 - s1127
-    s1297 = s1291 - s1128
-    s1298 = s1292 - s1129
-    s1299 = s1136 + (s1215 + (s1294 + s1295))
-    s1300 = s1141 + (s1219 + (s1204 * s1206 - s1203 * s1291))
-    s1301 = s1142 + (s1220 + (s1205 * s1206 - s1203 * s1292))
-    s1302 = s1137 + (s1216 + (s1293 + s1295))
-    s1303 = s1143 + (s1221 + (s1205 * s1207 - s1204 * s1292))
-    s1304 = s1140 + (s1218 + (s1293 + s1294))
-    s1305 = m_shank * s1184 - s1187
-    s1306 = m_shank * s1185 - s1188
-    s1307 = m_shank * s1186 - s1189
-    s1308 = s1184 * (s1305 - s1187)
-    s1309 = s1185 * (s1306 - s1188)
-    s1310 = s1186 * (s1307 - s1189)
-    s1311 = s1107 + s1305
-    s1312 = s1108 + s1306
-    s1313 = s1109 + s1307
-    s1314 = s1116 + (s1196 + (s1309 + s1310))
-    s1315 = s1121 + (s1200 + (s1185 * s1187 - s1184 * s1306))
-    s1316 = s1122 + (s1201 + (s1186 * s1187 - s1184 * s1307))
-    s1317 = s1117 + (s1197 + (s1308 + s1310))
-    s1318 = s1123 + (s1202 + (s1186 * s1188 - s1185 * s1307))
-    s1319 = s1120 + (s1199 + (s1308 + s1309))
-    s1320 = s1266 + k29 * s1164
-    s1321 = s1267 + k29 * s1165
-    s1322 = s1268 + k29 * s1166
-    s1323 = s1164 * (s1266 + s1320)
-    s1324 = s1165 * (s1267 + s1321)
-    s1325 = s1166 * (s1268 + s1322)
-    s1326 = s1320 - s1088
-    s1327 = s1321 - s1089
-    s1328 = s1322 - s1090
-    s1329 = s1097 + (s1269 + (s1324 + s1325))
-    s1330 = s1101 + (s1270 - (s1164 * s1321 + s1165 * s1266))
-    s1331 = s1102 + (s1271 - (s1164 * s1322 + s1166 * s1266))
-    s1332 = s1098 + (s1272 + (s1323 + s1325))
-    s1333 = s1103 + (s1273 - (s1165 * s1322 + s1166 * s1267))
-    s1334 = s1100 + (s1274 + (s1323 + s1324))
-    s1335 = s1281 + k29 * s1144
-    s1336 = s1282 + k29 * s1145
-    s1337 = s1283 + k29 * s1146
-    s1338 = s1144 * (s1281 + s1335)
-    s1339 = s1145 * (s1282 + s1336)
-    s1340 = s1146 * (s1283 + s1337)
-    s1341 = s1072 + s1335
-    s1342 = s1073 + s1336
-    s1343 = s1074 + s1337
-    s1344 = s1081 + (s1284 + (s1339 + s1340))
-    s1345 = s1085 + (s1285 - (s1144 * s1336 + s1145 * s1281))
-    s1346 = s1086 + (s1286 - (s1144 * s1337 + s1146 * s1281))
-    s1347 = s1082 + (s1287 + (s1338 + s1340))
-    s1348 = s1087 + (s1288 - (s1145 * s1337 + s1146 * s1282))
-    s1349 = s1084 + (s1289 + (s1338 + s1339))
-    s1350 = s1296 + k29 * s1124
-    s1351 = s1297 + k29 * s1125
-    s1352 = s1298 + k29 * s1126
-    s1353 = s1124 * (s1296 + s1350)
-    s1354 = s1125 * (s1297 + s1351)
-    s1355 = s1126 * (s1298 + s1352)
-    s1356 = s1350 - s1053
-    s1357 = s1351 - s1054
-    s1358 = s1352 - s1055
-    s1359 = s1062 + (s1299 + (s1354 + s1355))
-    s1360 = s1066 + (s1300 - (s1124 * s1351 + s1125 * s1296))
-    s1361 = s1067 + (s1301 - (s1124 * s1352 + s1126 * s1296))
-    s1362 = s1063 + (s1302 + (s1353 + s1355))
-    s1363 = s1068 + (s1303 - (s1125 * s1352 + s1126 * s1297))
-    s1364 = s1065 + (s1304 + (s1353 + s1354))
-    s1365 = s1311 + k29 * s1104
-    s1366 = s1312 + k29 * s1105
-    s1367 = s1313 + k29 * s1106
-    s1368 = s1104 * (s1311 + s1365)
-    s1369 = s1105 * (s1312 + s1366)
-    s1370 = s1106 * (s1313 + s1367)
-    s1371 = s1025 + s1365
-    s1372 = s1026 + s1366
-    s1373 = s1027 + s1367
-    s1374 = s1043 + (s1314 + (s1369 + s1370))
-    s1375 = s1047 + (s1315 - (s1104 * s1366 + s1105 * s1311))
-    s1376 = s1048 + (s1316 - (s1104 * s1367 + s1106 * s1311))
-    s1377 = s1044 + (s1317 + (s1368 + s1370))
-    s1378 = s1049 + (s1318 - (s1105 * s1367 + s1106 * s1312))
-    s1379 = s1046 + (s1319 + (s1368 + s1369))
-    s1380 = k27 * s1018
-    s1381 = k27 * s1021
-    s1382 = k27 * s1024
-    s1383 = s1326 - s1380
-    s1384 = s1327 - s1381
-    s1385 = s1328 - s1382
-    s1386 = s1018 * (s1326 + s1383)
-    s1387 = s1021 * (s1327 + s1384)
-    s1388 = s1024 * (s1328 + s1385)
-    s1389 = s1341 + k27 * s1069
-    s1390 = s1342 + k27 * s1070
-    s1391 = s1343 + k27 * s1071
-    s1392 = s1069 * (s1341 + s1389)
-    s1393 = s1070 * (s1342 + s1390)
-    s1394 = s1071 * (s1343 + s1391)
-    s1395 = s1013 + (s1330 + (s1018 * s1384 + s1021 * s1326)) + (s1345 - (s1069 * s1390 + s1070 * s1341))
-    s1396 = s1014 + (s1331 + (s1018 * s1385 + s1024 * s1326)) + (s1346 - (s1069 * s1391 + s1071 * s1341))
-    s1397 = s1015 + (s1333 + (s1021 * s1385 + s1024 * s1327)) + (s1348 - (s1070 * s1391 + s1071 * s1342))
-    s1398 = s1356 + k27 * s1050
-    s1399 = s1357 + k27 * s1051
-    s1400 = s1358 + k27 * s1052
-    s1401 = s1050 * (s1356 + s1398)
-    s1402 = s1051 * (s1357 + s1399)
-    s1403 = s1052 * (s1358 + s1400)
-    s1404 = s1010 + (s1329 - (s1387 + s1388)) + (s1344 + (s1393 + s1394)) + (s1359 + (s1402 + s1403))
-    s1405 = s1011 + (s1332 - (s1386 + s1388)) + (s1347 + (s1392 + s1394)) + (s1362 + (s1401 + s1403))
-    s1406 = s1012 + (s1334 - (s1386 + s1387)) + (s1349 + (s1392 + s1393)) + (s1364 + (s1401 + s1402))
-    s1407 = s1371 + s1380
-    s1408 = s1372 + s1381
-    s1409 = s1373 + s1382
-    s1410 = s1018 * (s1371 + s1407)
-    s1411 = s1021 * (s1372 + s1408)
-    s1412 = s1024 * (s1373 + s1409)
-    s1413 = s1383 + s1389 + s1398 + s1407
-    s1414 = s1384 + s1390 + s1399 + s1408
-    s1415 = s1385 + s1391 + s1400 + s1409
-    s1416 = s1404 + (s1374 + (s1411 + s1412))
-    s1417 = s1395 + (s1360 - (s1050 * s1399 + s1051 * s1356)) + (s1375 - (s1018 * s1408 + s1021 * s1371))
-    s1418 = s1396 + (s1361 - (s1050 * s1400 + s1052 * s1356)) + (s1376 - (s1018 * s1409 + s1024 * s1371))
-    s1419 = s1405 + (s1377 + (s1410 + s1412))
-    s1420 = s1397 + (s1363 - (s1051 * s1400 + s1052 * s1357)) + (s1378 - (s1021 * s1409 + s1024 * s1372))
-    s1421 = s1406 + (s1379 + (s1410 + s1411))
-    s1422 = s18 * s1415 - s21 * s1414
-    s1423 = s21 * s1413 - s15 * s1415
-    s1424 = s15 * s1414 - s18 * s1413
-    s1425 = s15 * s1416 + s18 * s1417 + s21 * s1418
-    s1426 = s15 * s1417 + s18 * s1419 + s21 * s1420
-    s1427 = s15 * s1418 + s18 * s1420 + s21 * s1421
-    s1428 = s19 * s1415 - s22 * s1414
-    s1429 = s22 * s1413 - s16 * s1415
-    s1430 = s16 * s1414 - s19 * s1413
-    s1431 = s16 * s1416 + s19 * s1417 + s22 * s1418
-    s1432 = s16 * s1417 + s19 * s1419 + s22 * s1420
-    s1433 = s16 * s1418 + s19 * s1420 + s22 * s1421
-    s1434 = s20 * s1415 - s23 * s1414
-    s1435 = s23 * s1413 - s17 * s1415
-    s1436 = s17 * s1414 - s20 * s1413
-    s1437 = s17 * s1416 + s20 * s1417 + s23 * s1418
-    s1438 = s17 * s1417 + s20 * s1419 + s23 * s1420
-    s1439 = s17 * s1418 + s20 * s1420 + s23 * s1421
-    s1440 = s18 * s1373 - s21 * s1372
-    s1441 = s21 * s1371 - s15 * s1373
-    s1442 = s15 * s1372 - s18 * s1371
-    s1443 = s15 * s1374 + s18 * s1375 + s21 * s1376
-    s1444 = s15 * s1375 + s18 * s1377 + s21 * s1378
-    s1445 = s15 * s1376 + s18 * s1378 + s21 * s1379
-    s1446 = s1443 + (s1021 * s1442 - s1024 * s1441)
-    s1447 = s1444 + (s1024 * s1440 - s1018 * s1442)
-    s1448 = s1445 + (s1018 * s1441 - s1021 * s1440)
-    s1449 = s18 * s1358 - s21 * s1357
-    s1450 = s21 * s1356 - s15 * s1358
-    s1451 = s15 * s1357 - s18 * s1356
-    s1452 = s15 * s1359 + s18 * s1360 + s21 * s1361
-    s1453 = s15 * s1360 + s18 * s1362 + s21 * s1363
-    s1454 = s15 * s1361 + s18 * s1363 + s21 * s1364
-    s1455 = s1452 + (s1051 * s1451 - s1052 * s1450)
-    s1456 = s1453 + (s1052 * s1449 - s1050 * s1451)
-    s1457 = s1454 + (s1050 * s1450 - s1051 * s1449)
-    s1458 = s18 * s1343 - s21 * s1342
-    s1459 = s21 * s1341 - s15 * s1343
-    s1460 = s15 * s1342 - s18 * s1341
-    s1461 = s15 * s1344 + s18 * s1345 + s21 * s1346
-    s1462 = s15 * s1345 + s18 * s1347 + s21 * s1348
-    s1463 = s15 * s1346 + s18 * s1348 + s21 * s1349
-    s1464 = s1461 + (s1070 * s1460 - s1071 * s1459)
-    s1465 = s1462 + (s1071 * s1458 - s1069 * s1460)
-    s1466 = s1463 + (s1069 * s1459 - s1070 * s1458)
-    s1467 = s18 * s1328 - s21 * s1327
-    s1468 = s21 * s1326 - s15 * s1328
-    s1469 = s15 * s1327 - s18 * s1326
-    s1470 = s15 * s1329 + s18 * s1330 + s21 * s1331
-    s1471 = s15 * s1330 + s18 * s1332 + s21 * s1333
-    s1472 = s15 * s1331 + s18 * s1333 + s21 * s1334
-    s1473 = s1470 + (s1024 * s1468 - s1021 * s1469)
-    s1474 = s1471 + (s1018 * s1469 - s1024 * s1467)
-    s1475 = s1472 + (s1021 * s1467 - s1018 * s1468)
-    s1476 = s934 * s1313 - s936 * s1312
-    s1477 = s936 * s1311 - s932 * s1313
-    s1478 = s932 * s1312 - s934 * s1311
-    s1479 = s932 * s1314 + s934 * s1315 + s936 * s1316
-    s1480 = s932 * s1315 + s934 * s1317 + s936 * s1318
-    s1481 = s932 * s1316 + s934 * s1318 + s936 * s1319
-    s1482 = s1479 + (s1105 * s1478 - s1106 * s1477)
-    s1483 = s1480 + (s1106 * s1476 - s1104 * s1478)
-    s1484 = s1481 + (s1104 * s1477 - s1105 * s1476)
-    s1485 = s1482 + (s1021 * s1478 - s1024 * s1477)
-    s1486 = s1483 + (s1024 * s1476 - s1018 * s1478)
-    s1487 = s1484 + (s1018 * s1477 - s1021 * s1476)
-    s1488 = s940 * s1298 - s942 * s1297
-    s1489 = s942 * s1296 - s938 * s1298
-    s1490 = s938 * s1297 - s940 * s1296
-    s1491 = s938 * s1299 + s940 * s1300 + s942 * s1301
-    s1492 = s938 * s1300 + s940 * s1302 + s942 * s1303
-    s1493 = s938 * s1301 + s940 * s1303 + s942 * s1304
-    s1494 = s1491 + (s1125 * s1490 - s1126 * s1489)
-    s1495 = s1492 + (s1126 * s1488 - s1124 * s1490)
-    s1496 = s1493 + (s1124 * s1489 - s1125 * s1488)
-    s1497 = s1494 + (s1051 * s1490 - s1052 * s1489)
-    s1498 = s1495 + (s1052 * s1488 - s1050 * s1490)
-    s1499 = s1496 + (s1050 * s1489 - s1051 * s1488)
-    s1500 = s946 * s1283 - s948 * s1282
-    s1501 = s948 * s1281 - s944 * s1283
-    s1502 = s944 * s1282 - s946 * s1281
-    s1503 = s944 * s1284 + s946 * s1285 + s948 * s1286
-    s1504 = s944 * s1285 + s946 * s1287 + s948 * s1288
-    s1505 = s944 * s1286 + s946 * s1288 + s948 * s1289
-    s1506 = s1503 + (s1145 * s1502 - s1146 * s1501)
-    s1507 = s1504 + (s1146 * s1500 - s1144 * s1502)
-    s1508 = s1505 + (s1144 * s1501 - s1145 * s1500)
-    s1509 = s1506 + (s1070 * s1502 - s1071 * s1501)
-    s1510 = s1507 + (s1071 * s1500 - s1069 * s1502)
-    s1511 = s1508 + (s1069 * s1501 - s1070 * s1500)
-    s1512 = s952 * s1268 - s954 * s1267
-    s1513 = s954 * s1266 - s950 * s1268
-    s1514 = s950 * s1267 - s952 * s1266
-    s1515 = s950 * s1269 + s952 * s1270 + s954 * s1271
-    s1516 = s950 * s1270 + s952 * s1272 + s954 * s1273
-    s1517 = s950 * s1271 + s952 * s1273 + s954 * s1274
-    s1518 = s1515 + (s1165 * s1514 - s1166 * s1513)
-    s1519 = s1516 + (s1166 * s1512 - s1164 * s1514)
-    s1520 = s1517 + (s1164 * s1513 - s1165 * s1512)
-    s1521 = s1518 + (s1024 * s1513 - s1021 * s1514)
-    s1522 = s1519 + (s1018 * s1514 - s1024 * s1512)
-    s1523 = s1520 + (s1021 * s1512 - s1018 * s1513)
-    s1524 = s936 * s1188 - s934 * s1189
-    s1525 = s932 * s1189 - s936 * s1187
-    s1526 = s934 * s1187 - s932 * s1188
-    s1527 = s932 * s1196 + s934 * s1200 + s936 * s1201
-    s1528 = s932 * s1200 + s934 * s1197 + s936 * s1202
-    s1529 = s932 * s1201 + s934 * s1202 + s936 * s1199
-    pivot_front_left_knee_angle_dot = k28 + (s932 * s1527 + s934 * s1528 + s936 * s1529)
-    s1530 = s1527 + (s1185 * s1526 - s1186 * s1525)
-    s1531 = s1528 + (s1186 * s1524 - s1184 * s1526)
-    s1532 = s1529 + (s1184 * s1525 - s1185 * s1524)
-    s1533 = s932 * s1530 + s934 * s1531 + s936 * s1532
-    s1534 = s1530 + (s1105 * s1526 - s1106 * s1525)
-    s1535 = s1531 + (s1106 * s1524 - s1104 * s1526)
-    s1536 = s1532 + (s1104 * s1525 - s1105 * s1524)
-    s1537 = s15 * s1534 + s18 * s1535 + s21 * s1536
-    s1538 = s1534 + (s1021 * s1526 - s1024 * s1525)
-    s1539 = s1535 + (s1024 * s1524 - s1018 * s1526)
-    s1540 = s1536 + (s1018 * s1525 - s1021 * s1524)
-    s1541 = s15 * s1538 + s18 * s1539 + s21 * s1540
-    s1542 = s16 * s1538 + s19 * s1539 + s22 * s1540
-    s1543 = s17 * s1538 + s20 * s1539 + s23 * s1540
-    s1544 = s942 * s1207 - s940 * s1208
-    s1545 = s938 * s1208 - s942 * s1206
-    s1546 = s940 * s1206 - s938 * s1207
-    s1547 = s938 * s1215 + s940 * s1219 + s942 * s1220
-    s1548 = s938 * s1219 + s940 * s1216 + s942 * s1221
-    s1549 = s938 * s1220 + s940 * s1221 + s942 * s1218
-    pivot_front_right_knee_angle_dot = k28 + (s938 * s1547 + s940 * s1548 + s942 * s1549)
-    s1550 = s1547 + (s1204 * s1546 - s1205 * s1545)
-    s1551 = s1548 + (s1205 * s1544 - s1203 * s1546)
-    s1552 = s1549 + (s1203 * s1545 - s1204 * s1544)
-    s1553 = s938 * s1550 + s940 * s1551 + s942 * s1552
-    s1554 = s1550 + (s1125 * s1546 - s1126 * s1545)
-    s1555 = s1551 + (s1126 * s1544 - s1124 * s1546)
-    s1556 = s1552 + (s1124 * s1545 - s1125 * s1544)
-    s1557 = s15 * s1554 + s18 * s1555 + s21 * s1556
-    s1558 = s1554 + (s1051 * s1546 - s1052 * s1545)
-    s1559 = s1555 + (s1052 * s1544 - s1050 * s1546)
-    s1560 = s1556 + (s1050 * s1545 - s1051 * s1544)
-    s1561 = s15 * s1558 + s18 * s1559 + s21 * s1560
-    s1562 = s16 * s1558 + s19 * s1559 + s22 * s1560
-    s1563 = s17 * s1558 + s20 * s1559 + s23 * s1560
-    s1564 = s948 * s1226 - s946 * s1227
-    s1565 = s944 * s1227 - s948 * s1225
-    s1566 = s946 * s1225 - s944 * s1226
-    s1567 = s944 * s1234 + s946 * s1238 + s948 * s1239
-    s1568 = s944 * s1238 + s946 * s1235 + s948 * s1240
-    s1569 = s944 * s1239 + s946 * s1240 + s948 * s1237
-    pivot_hind_left_knee_angle_dot = k28 + (s944 * s1567 + s946 * s1568 + s948 * s1569)
-    s1570 = s1567 + (s1223 * s1566 - s1224 * s1565)
-    s1571 = s1568 + (s1224 * s1564 - s1222 * s1566)
-    s1572 = s1569 + (s1222 * s1565 - s1223 * s1564)
-    s1573 = s944 * s1570 + s946 * s1571 + s948 * s1572
-    s1574 = s1570 + (s1145 * s1566 - s1146 * s1565)
-    s1575 = s1571 + (s1146 * s1564 - s1144 * s1566)
-    s1576 = s1572 + (s1144 * s1565 - s1145 * s1564)
-    s1577 = s15 * s1574 + s18 * s1575 + s21 * s1576
-    s1578 = s1574 + (s1070 * s1566 - s1071 * s1565)
-    s1579 = s1575 + (s1071 * s1564 - s1069 * s1566)
-    s1580 = s1576 + (s1069 * s1565 - s1070 * s1564)
-    s1581 = s15 * s1578 + s18 * s1579 + s21 * s1580
-    s1582 = s16 * s1578 + s19 * s1579 + s22 * s1580
-    s1583 = s17 * s1578 + s20 * s1579 + s23 * s1580
-    s1584 = s954 * s1245 - s952 * s1246
-    s1585 = s950 * s1246 - s954 * s1244
-    s1586 = s952 * s1244 - s950 * s1245
-    s1587 = s950 * s1253 + s952 * s1257 + s954 * s1258
-    s1588 = s950 * s1257 + s952 * s1254 + s954 * s1259
-    s1589 = s950 * s1258 + s952 * s1259 + s954 * s1256
-    pivot_hind_right_knee_angle_dot = k28 + (s950 * s1587 + s952 * s1588 + s954 * s1589)
-    s1590 = s1587 + (s1242 * s1586 - s1243 * s1585)
-    s1591 = s1588 + (s1243 * s1584 - s1241 * s1586)
-    s1592 = s1589 + (s1241 * s1585 - s1242 * s1584)
-    s1593 = s950 * s1590 + s952 * s1591 + s954 * s1592
-    s1594 = s1590 + (s1165 * s1586 - s1166 * s1585)
-    s1595 = s1591 + (s1166 * s1584 - s1164 * s1586)
-    s1596 = s1592 + (s1164 * s1585 - s1165 * s1584)
-    s1597 = s15 * s1594 + s18 * s1595 + s21 * s1596
-    s1598 = s1594 + (s1024 * s1585 - s1021 * s1586)
-    s1599 = s1595 + (s1018 * s1586 - s1024 * s1584)
-    s1600 = s1596 + (s1021 * s1584 - s1018 * s1585)
-    s1601 = s15 * s1598 + s18 * s1599 + s21 * s1600
-    s1602 = s16 * s1598 + s19 * s1599 + s22 * s1600
-    s1603 = s17 * s1598 + s20 * s1599 + s23 * s1600
-    s1604 = s1533 / pivot_front_left_knee_angle_dot
-    s1605 = s1537 / pivot_front_left_knee_angle_dot
-    s1606 = s1543 / pivot_front_left_knee_angle_dot
-    s1607 = s1542 / pivot_front_left_knee_angle_dot
-    s1608 = s1541 / pivot_front_left_knee_angle_dot
-    s1609 = s1526 / pivot_front_left_knee_angle_dot
-    s1610 = s1525 / pivot_front_left_knee_angle_dot
-    s1611 = s1524 / pivot_front_left_knee_angle_dot
-    pivot_front_left_swing_angle_dot = k1 + (s932 * s1479 + s934 * s1480 + s936 * s1481) - s1533 * s1604
-    s1612 = s15 * s1482 + s18 * s1483 + s21 * s1484 - s1537 * s1604
-    s1613 = s17 * s1485 + s20 * s1486 + s23 * s1487 - s1543 * s1604
-    s1614 = s16 * s1485 + s19 * s1486 + s22 * s1487 - s1542 * s1604
-    s1615 = s15 * s1485 + s18 * s1486 + s21 * s1487 - s1541 * s1604
-    s1616 = s1478 - s1526 * s1604
-    s1617 = s1477 - s1525 * s1604
-    s1618 = s1476 - s1524 * s1604
-    s1619 = s1553 / pivot_front_right_knee_angle_dot
-    s1620 = s1557 / pivot_front_right_knee_angle_dot
-    s1621 = s1563 / pivot_front_right_knee_angle_dot
-    s1622 = s1562 / pivot_front_right_knee_angle_dot
-    s1623 = s1561 / pivot_front_right_knee_angle_dot
-    s1624 = s1546 / pivot_front_right_knee_angle_dot
-    s1625 = s1545 / pivot_front_right_knee_angle_dot
-    s1626 = s1544 / pivot_front_right_knee_angle_dot
-    pivot_front_right_swing_angle_dot = k1 + (s938 * s1491 + s940 * s1492 + s942 * s1493) - s1553 * s1619
-    s1627 = s15 * s1494 + s18 * s1495 + s21 * s1496 - s1557 * s1619
-    s1628 = s17 * s1497 + s20 * s1498 + s23 * s1499 - s1563 * s1619
-    s1629 = s16 * s1497 + s19 * s1498 + s22 * s1499 - s1562 * s1619
-    s1630 = s15 * s1497 + s18 * s1498 + s21 * s1499 - s1561 * s1619
-    s1631 = s1490 - s1546 * s1619
-    s1632 = s1489 - s1545 * s1619
-    s1633 = s1488 - s1544 * s1619
-    s1634 = s1573 / pivot_hind_left_knee_angle_dot
-    s1635 = s1577 / pivot_hind_left_knee_angle_dot
-    s1636 = s1583 / pivot_hind_left_knee_angle_dot
-    s1637 = s1582 / pivot_hind_left_knee_angle_dot
-    s1638 = s1581 / pivot_hind_left_knee_angle_dot
-    s1639 = s1566 / pivot_hind_left_knee_angle_dot
-    s1640 = s1565 / pivot_hind_left_knee_angle_dot
-    s1641 = s1564 / pivot_hind_left_knee_angle_dot
-    pivot_hind_left_swing_angle_dot = k1 + (s944 * s1503 + s946 * s1504 + s948 * s1505) - s1573 * s1634
-    s1642 = s15 * s1506 + s18 * s1507 + s21 * s1508 - s1577 * s1634
-    s1643 = s17 * s1509 + s20 * s1510 + s23 * s1511 - s1583 * s1634
-    s1644 = s16 * s1509 + s19 * s1510 + s22 * s1511 - s1582 * s1634
-    s1645 = s15 * s1509 + s18 * s1510 + s21 * s1511 - s1581 * s1634
-    s1646 = s1502 - s1566 * s1634
-    s1647 = s1501 - s1565 * s1634
-    s1648 = s1500 - s1564 * s1634
-    s1649 = s17 * s1437 + s20 * s1438 + s23 * s1439 - s1543 * s1606 - s1563 * s1621 - s1583 * s1636
-    s1650 = s16 * s1437 + s19 * s1438 + s22 * s1439 - s1542 * s1606 - s1562 * s1621 - s1582 * s1636
-    s1651 = s15 * s1437 + s18 * s1438 + s21 * s1439 - s1541 * s1606 - s1561 * s1621 - s1581 * s1636
-    s1652 = s16 * s1431 + s19 * s1432 + s22 * s1433 - s1542 * s1607 - s1562 * s1622 - s1582 * s1637
-    s1653 = s15 * s1431 + s18 * s1432 + s21 * s1433 - s1541 * s1607 - s1561 * s1622 - s1581 * s1637
-    s1654 = s15 * s1425 + s18 * s1426 + s21 * s1427 - s1541 * s1608 - s1561 * s1623 - s1581 * s1638
-    s1655 = s1593 / pivot_hind_right_knee_angle_dot
-    s1656 = s1597 / pivot_hind_right_knee_angle_dot
-    s1657 = s1603 / pivot_hind_right_knee_angle_dot
-    s1658 = s1602 / pivot_hind_right_knee_angle_dot
-    s1659 = s1601 / pivot_hind_right_knee_angle_dot
-    s1660 = s1586 / pivot_hind_right_knee_angle_dot
-    s1661 = s1585 / pivot_hind_right_knee_angle_dot
-    s1662 = s1584 / pivot_hind_right_knee_angle_dot
-    pivot_hind_right_swing_angle_dot = k1 + (s950 * s1515 + s952 * s1516 + s954 * s1517) - s1593 * s1655
-    s1663 = s15 * s1518 + s18 * s1519 + s21 * s1520 - s1597 * s1655
-    s1664 = s17 * s1521 + s20 * s1522 + s23 * s1523 - s1603 * s1655
-    s1665 = s16 * s1521 + s19 * s1522 + s22 * s1523 - s1602 * s1655
-    s1666 = s15 * s1521 + s18 * s1522 + s21 * s1523 - s1601 * s1655
-    s1667 = s1514 - s1586 * s1655
-    s1668 = s1513 - s1585 * s1655
-    s1669 = s1512 - s1584 * s1655
+    s617 = omega_hind_right_thigh_x * omega_hind_right_thigh_y
+    s618 = omega_hind_right_thigh_z * omega_hind_right_thigh_x
+    s619 = omega_hind_right_thigh_z * omega_hind_right_thigh_y
+    s620 = s617 - s616
+    s621 = s567 + s618
+    s622 = s619 - s615
+    s623 = s615 + s619
+    s624 = omega_hind_right_thigh_x_squared + omega_hind_right_thigh_y_squared
+    s625 = bias_front_left_thigh_x + k4 * s585
+    bias_front_left_shank_y = bias_front_left_thigh_y + k4 * s586
+    s626 = bias_front_left_thigh_z - k4 * s588
+    bias_front_left_shank_x = cos_front_left_knee_angle * s625 - sin_front_left_knee_angle * s626
+    s627 = cos_front_left_knee_angle * s579 - sin_front_left_knee_angle * s580 - front_left_knee_angle_dot * omega_front_left_shank_z
+    s628 = cos_front_left_knee_angle * s580 + sin_front_left_knee_angle * s579 + front_left_knee_angle_dot * omega_front_left_shank_x
+    s629 = omega_front_left_shank_x * omega_front_left_shank_y
+    s630 = omega_front_left_shank_z * omega_front_left_shank_x
+    s631 = omega_front_left_shank_z * omega_front_left_shank_y
+    s632 = s532 + s630
+    s633 = s631 - s627
+    s634 = omega_front_left_shank_x * omega_front_left_shank_x + omega_front_left_shank_y * omega_front_left_shank_y
+    s635 = bias_front_right_thigh_x + k4 * s597
+    bias_front_right_shank_y = bias_front_right_thigh_y + k4 * s598
+    s636 = bias_front_right_thigh_z - k4 * s600
+    bias_front_right_shank_x = cos_front_right_knee_angle * s635 - sin_front_right_knee_angle * s636
+    s637 = cos_front_right_knee_angle * s591 - sin_front_right_knee_angle * s592 - front_right_knee_angle_dot * omega_front_right_shank_z
+    s638 = cos_front_right_knee_angle * s592 + sin_front_right_knee_angle * s591 + front_right_knee_angle_dot * omega_front_right_shank_x
+    s639 = omega_front_right_shank_x * omega_front_right_shank_y
+    s640 = omega_front_right_shank_z * omega_front_right_shank_x
+    s641 = omega_front_right_shank_z * omega_front_right_shank_y
+    s642 = s544 + s640
+    s643 = s641 - s637
+    s644 = omega_front_right_shank_x * omega_front_right_shank_x + omega_front_right_shank_y * omega_front_right_shank_y
+    s645 = bias_hind_left_thigh_x + k4 * s609
+    bias_hind_left_shank_y = bias_hind_left_thigh_y + k4 * s610
+    s646 = bias_hind_left_thigh_z - k4 * s612
+    bias_hind_left_shank_x = cos_hind_left_knee_angle * s645 - sin_hind_left_knee_angle * s646
+    s647 = cos_hind_left_knee_angle * s603 - sin_hind_left_knee_angle * s604 - hind_left_knee_angle_dot * omega_hind_left_shank_z
+    s648 = cos_hind_left_knee_angle * s604 + sin_hind_left_knee_angle * s603 + hind_left_knee_angle_dot * omega_hind_left_shank_x
+    s649 = omega_hind_left_shank_x * omega_hind_left_shank_y
+    s650 = omega_hind_left_shank_z * omega_hind_left_shank_x
+    s651 = omega_hind_left_shank_z * omega_hind_left_shank_y
+    s652 = s555 + s650
+    s653 = s651 - s647
+    s654 = omega_hind_left_shank_x * omega_hind_left_shank_x + omega_hind_left_shank_y * omega_hind_left_shank_y
+    s655 = bias_hind_right_thigh_x + k4 * s621
+    bias_hind_right_shank_y = bias_hind_right_thigh_y + k4 * s622
+    s656 = bias_hind_right_thigh_z - k4 * s624
+    bias_hind_right_shank_x = cos_hind_right_knee_angle * s655 - sin_hind_right_knee_angle * s656
+    s657 = cos_hind_right_knee_angle * s615 - sin_hind_right_knee_angle * s616 - hind_right_knee_angle_dot * omega_hind_right_shank_z
+    s658 = cos_hind_right_knee_angle * s616 + sin_hind_right_knee_angle * s615 + hind_right_knee_angle_dot * omega_hind_right_shank_x
+    s659 = omega_hind_right_shank_x * omega_hind_right_shank_y
+    s660 = omega_hind_right_shank_z * omega_hind_right_shank_x
+    s661 = omega_hind_right_shank_z * omega_hind_right_shank_y
+    s662 = s567 + s660
+    s663 = s661 - s657
+    s664 = omega_hind_right_shank_x * omega_hind_right_shank_x + omega_hind_right_shank_y * omega_hind_right_shank_y
+    s665 = I_hip_yz * (omega_front_left_hip_z_squared - omega_front_left_hip_y_squared)
+    s666 = I_hip_xz * (omega_front_left_hip_x_squared - omega_front_left_hip_z_squared)
+    s667 = I_hip_xy * (omega_front_left_hip_y_squared - omega_front_left_hip_x_squared)
+    s668 = moment_front_left_hip_y * bias_front_left_hip_z + (I_hip_xz * s539 - I_hip_xy * s541 - s665 + s536 * k20 - s536 * k21)
+    s669 = I_hip_yz * s538 - I_hip_xz * s536 - s667 + s539 * k19 - s537 * k20 - moment_front_left_hip_y * bias_front_left_hip_x
+    s670 = m_hip * bias_hind_left_hip_x
+    s671 = moment_front_left_hip_y * bias_hind_left_hip_x
+    s672 = I_hip_yz * (omega_front_right_hip_z_squared - omega_front_right_hip_y_squared)
+    s673 = I_hip_xz * (omega_front_right_hip_x_squared - omega_front_right_hip_z_squared)
+    s674 = I_hip_xy * (omega_front_right_hip_y_squared - omega_front_right_hip_x_squared)
+    s675 = I_hip_xy * s553 + I_hip_xz * s551 + s672 + s548 * k20 - s548 * k21 - moment_front_left_hip_y * bias_front_right_hip_z
+    s676 = s674 - (I_hip_xz * s548 + I_hip_yz * s550) + s551 * k19 - s549 * k20 - s671
+    s677 = I_hip_yz * (omega_hind_left_hip_z_squared - omega_hind_left_hip_y_squared)
+    s678 = I_hip_xz * (omega_hind_left_hip_x_squared - omega_hind_left_hip_z_squared)
+    s679 = I_hip_xy * (omega_hind_left_hip_y_squared - omega_hind_left_hip_x_squared)
+    s680 = moment_front_left_hip_y * bias_hind_left_hip_z + (I_hip_xz * s562 - I_hip_xy * s564 - s677 + s559 * k20 - s559 * k21)
+    s681 = I_hip_yz * s561 - I_hip_xz * s559 - s679 + s562 * k19 - s560 * k20 - s671
+    s682 = I_hip_yz * (omega_hind_right_hip_z_squared - omega_hind_right_hip_y_squared)
+    s683 = I_hip_xz * (omega_hind_right_hip_x_squared - omega_hind_right_hip_z_squared)
+    s684 = I_hip_xy * (omega_hind_right_hip_y_squared - omega_hind_right_hip_x_squared)
+    s685 = moment_front_left_hip_y * s566 + (I_hip_xy * s576 + I_hip_xz * s574 + s682 + s571 * k20 - s571 * k21)
+    s686 = moment_front_left_hip_y * bias_hind_right_hip_x + (s684 - (I_hip_xz * s571 + I_hip_yz * s573) + s574 * k19 - s572 * k20)
+    s687 = moment_front_left_thigh_y * (omega_front_left_thigh_x_squared + omega_front_left_thigh_z_squared)
+    s688 = m_thigh * bias_front_left_thigh_x + (moment_front_left_thigh_y * s584 - k5 * s585)
+    s689 = m_thigh * bias_front_left_thigh_z + (moment_front_left_thigh_y * s587 + k5 * s588)
+    s690 = moment_front_left_thigh_y * bias_front_left_thigh_z + k5 * bias_front_left_thigh_y
+    s691 = inertia_front_left_thigh_yz * (omega_front_left_thigh_z_squared - omega_front_left_thigh_y_squared)
+    s692 = s585 * k24 - inertia_front_left_thigh_yz * s584 - (s582 - s532) * k22 - k5 * bias_front_left_thigh_x
+    s693 = inertia_front_left_thigh_yz * s585 + (s580 + s581) * k22 - s584 * k23 - moment_front_left_thigh_y * bias_front_left_thigh_x
+    s694 = moment_front_left_thigh_y * (omega_front_right_thigh_x_squared + omega_front_right_thigh_z_squared)
+    s695 = m_thigh * bias_front_right_thigh_x - (moment_front_left_thigh_y * s596 + k5 * s597)
+    s696 = m_thigh * bias_front_right_thigh_z + (k5 * s600 - moment_front_left_thigh_y * s599)
+    s697 = k5 * bias_front_right_thigh_y - moment_front_left_thigh_y * bias_front_right_thigh_z
+    s698 = inertia_front_left_thigh_yz * (omega_front_right_thigh_z_squared - omega_front_right_thigh_y_squared)
+    s699 = inertia_front_left_thigh_yz * s596 + s597 * k24 - (s594 - s544) * k22 - k5 * bias_front_right_thigh_x
+    s700 = moment_front_left_thigh_y * bias_front_right_thigh_x + ((s592 + s593) * k22 - inertia_front_left_thigh_yz * s597 - s596 * k23)
+    s701 = moment_front_left_thigh_y * (omega_hind_left_thigh_x_squared + omega_hind_left_thigh_z_squared)
+    s702 = m_thigh * bias_hind_left_thigh_x + (moment_front_left_thigh_y * s608 - k5 * s609)
+    s703 = m_thigh * bias_hind_left_thigh_z + (moment_front_left_thigh_y * s611 + k5 * s612)
+    s704 = moment_front_left_thigh_y * bias_hind_left_thigh_z + k5 * bias_hind_left_thigh_y
+    s705 = inertia_front_left_thigh_yz * (omega_hind_left_thigh_z_squared - omega_hind_left_thigh_y_squared)
+    s706 = s609 * k24 - inertia_front_left_thigh_yz * s608 - (s606 - s555) * k22 - k5 * bias_hind_left_thigh_x
+    s707 = inertia_front_left_thigh_yz * s609 + (s604 + s605) * k22 - s608 * k23 - moment_front_left_thigh_y * bias_hind_left_thigh_x
+    s708 = moment_front_left_thigh_y * (omega_hind_right_thigh_x_squared + omega_hind_right_thigh_z_squared)
+    s709 = m_thigh * bias_hind_right_thigh_x - (moment_front_left_thigh_y * s620 + k5 * s621)
+    s710 = m_thigh * bias_hind_right_thigh_z + (k5 * s624 - moment_front_left_thigh_y * s623)
+    s711 = k5 * bias_hind_right_thigh_y - moment_front_left_thigh_y * bias_hind_right_thigh_z
+    s712 = inertia_front_left_thigh_yz * (omega_hind_right_thigh_z_squared - omega_hind_right_thigh_y_squared)
+    s713 = inertia_front_left_thigh_yz * s620 + s621 * k24 - (s618 - s567) * k22 - k5 * bias_hind_right_thigh_x
+    s714 = moment_front_left_thigh_y * bias_hind_right_thigh_x + ((s616 + s617) * k22 - inertia_front_left_thigh_yz * s621 - s620 * k23)
+    s715 = m_shank * (cos_front_left_knee_angle * s626 + sin_front_left_knee_angle * s625)
+    s716 = m_shank * bias_front_left_shank_y - k6 * s633
+    s717 = s715 + k6 * s634
+    s718 = k6 * bias_front_left_shank_x
+    s719 = s632 * k27 - (s630 - s532) * k25
+    s720 = (s628 + s629) * k25 - (s629 - s628) * k26
+    s721 = k6 * bias_front_left_shank_y + ((s627 + s631) * k26 - s633 * k27)
+    s722 = m_shank * (cos_front_right_knee_angle * s636 + sin_front_right_knee_angle * s635)
+    s723 = m_shank * bias_front_right_shank_y - k6 * s643
+    s724 = s722 + k6 * s644
+    s725 = k6 * bias_front_right_shank_x
+    s726 = s642 * k27 - (s640 - s544) * k25
+    s727 = (s638 + s639) * k25 - (s639 - s638) * k26
+    s728 = k6 * bias_front_right_shank_y + ((s637 + s641) * k26 - s643 * k27)
+    s729 = m_shank * (cos_hind_left_knee_angle * s646 + sin_hind_left_knee_angle * s645)
+    s730 = m_shank * bias_hind_left_shank_y - k6 * s653
+    s731 = s729 + k6 * s654
+    s732 = k6 * bias_hind_left_shank_x
+    s733 = s652 * k27 - (s650 - s555) * k25
+    s734 = (s648 + s649) * k25 - (s649 - s648) * k26
+    s735 = k6 * bias_hind_left_shank_y + ((s647 + s651) * k26 - s653 * k27)
+    s736 = m_shank * (cos_hind_right_knee_angle * s656 + sin_hind_right_knee_angle * s655)
+    s737 = m_shank * bias_hind_right_shank_y - k6 * s663
+    s738 = s736 + k6 * s664
+    s739 = k6 * bias_hind_right_shank_x
+    s740 = s662 * k27 - (s660 - s567) * k25
+    s741 = (s658 + s659) * k25 - (s659 - s658) * k26
+    s742 = k6 * bias_hind_right_shank_y + ((s657 + s661) * k26 - s663 * k27)
+    s743 = s739 - s740
+    s744 = m_shank * bias_hind_right_shank_x - k6 * s662 - k8 * s743
+    s745 = sin_hind_right_knee_angle * s738 + cos_hind_right_knee_angle * s744
+    s746 = sin_hind_right_knee_angle * s741 + cos_hind_right_knee_angle * s742 - k4 * s737
+    s747 = s711 + (s712 + s623 * k23 - s622 * k24) + s746
+    s748 = s713 + (s740 - s739 + k7 * s743 + k4 * s745)
+    s749 = s714 + (cos_hind_right_knee_angle * s741 - sin_hind_right_knee_angle * s742)
+    s750 = s710 + (cos_hind_right_knee_angle * s738 - sin_hind_right_knee_angle * s744)
+    s751 = s732 - s733
+    s752 = m_shank * bias_hind_left_shank_x - k6 * s652 - k8 * s751
+    s753 = sin_hind_left_knee_angle * s731 + cos_hind_left_knee_angle * s752
+    s754 = sin_hind_left_knee_angle * s734 + cos_hind_left_knee_angle * s735 - k4 * s730
+    s755 = s704 + (s611 * k23 - s705 - s610 * k24) + s754
+    s756 = s706 + (s733 - s732 + k7 * s751 + k4 * s753)
+    s757 = s707 + (cos_hind_left_knee_angle * s734 - sin_hind_left_knee_angle * s735)
+    s758 = s703 + (cos_hind_left_knee_angle * s731 - sin_hind_left_knee_angle * s752)
+    s759 = s725 - s726
+    s760 = m_shank * bias_front_right_shank_x - k6 * s642 - k8 * s759
+    s761 = sin_front_right_knee_angle * s724 + cos_front_right_knee_angle * s760
+    s762 = sin_front_right_knee_angle * s727 + cos_front_right_knee_angle * s728 - k4 * s723
+    s763 = s697 + (s698 + s599 * k23 - s598 * k24) + s762
+    s764 = s699 + (s726 - s725 + k7 * s759 + k4 * s761)
+    s765 = s700 + (cos_front_right_knee_angle * s727 - sin_front_right_knee_angle * s728)
+    s766 = s696 + (cos_front_right_knee_angle * s724 - sin_front_right_knee_angle * s760)
+    s767 = s718 - s719
+    s768 = m_shank * bias_front_left_shank_x - k6 * s632 - k8 * s767
+    s769 = sin_front_left_knee_angle * s717 + cos_front_left_knee_angle * s768
+    s770 = sin_front_left_knee_angle * s720 + cos_front_left_knee_angle * s721 - k4 * s716
+    s771 = s690 + (s587 * k23 - s691 - s586 * k24) + s770
+    s772 = s692 + (s719 - s718 + k7 * s767 + k4 * s769)
+    s773 = s693 + (cos_front_left_knee_angle * s720 - sin_front_left_knee_angle * s721)
+    s774 = s689 + (cos_front_left_knee_angle * s717 - sin_front_left_knee_angle * s768)
+    s775 = s749 + s101 * s748
+    s776 = s709 + s745 - s102 * s748
+    s777 = s750 - s103 * s748
+    s778 = cos_hind_right_swing_angle * s777 - sin_hind_right_swing_angle * s776
+    s779 = sin_hind_right_swing_angle * s777 + cos_hind_right_swing_angle * s776
+    s780 = sin_hind_right_swing_angle * s775 + cos_hind_right_swing_angle * s747 + k3 * s778
+    s781 = cos_hind_right_swing_angle * s775 - sin_hind_right_swing_angle * s747 - k3 * s779
+    s782 = s685 + s780
+    s783 = I_hip_yz * s572 - I_hip_xy * s571 - s683 + s573 * k21 - s576 * k19 + (s748 - s100 * s748)
+    s784 = m_hip * bias_hind_right_hip_y + moment_front_left_hip_y * s575 + (m_thigh * bias_hind_right_thigh_y + (s708 - k5 * s622) + s737)
+    s785 = s757 - s138 * s756
+    s786 = s702 + s753 - s139 * s756
+    s787 = s758 - s140 * s756
+    s788 = cos_hind_left_swing_angle * s787 - sin_hind_left_swing_angle * s786
+    s789 = sin_hind_left_swing_angle * s787 + cos_hind_left_swing_angle * s786
+    s790 = sin_hind_left_swing_angle * s785 + cos_hind_left_swing_angle * s755 + k2 * s788
+    s791 = cos_hind_left_swing_angle * s785 - sin_hind_left_swing_angle * s755 - k2 * s789
+    s792 = s680 + s790
+    s793 = I_hip_xy * s559 - I_hip_yz * s560 - s678 + s561 * k21 - s564 * k19 + (s756 - s137 * s756)
+    s794 = m_hip * bias_hind_left_hip_y - moment_front_left_hip_y * s563 + (m_thigh * bias_hind_left_thigh_y - (s701 + k5 * s610) + s730)
+    s795 = s765 + s175 * s764
+    s796 = s695 + s761 - s176 * s764
+    s797 = s766 - s177 * s764
+    s798 = cos_front_right_swing_angle * s797 - sin_front_right_swing_angle * s796
+    s799 = sin_front_right_swing_angle * s797 + cos_front_right_swing_angle * s796
+    s800 = sin_front_right_swing_angle * s795 + cos_front_right_swing_angle * s763 + k3 * s798
+    s801 = cos_front_right_swing_angle * s795 - sin_front_right_swing_angle * s763 - k3 * s799
+    s802 = s675 + s800
+    s803 = I_hip_yz * s549 - I_hip_xy * s548 - s673 + s550 * k21 - s553 * k19 + (s764 - s174 * s764)
+    s804 = m_hip * bias_front_right_hip_y + moment_front_left_hip_y * s552 + (m_thigh * bias_front_right_thigh_y + (s694 - k5 * s598) + s723)
+    s805 = s773 - s212 * s772
+    s806 = s688 + s769 - s213 * s772
+    s807 = s774 - s214 * s772
+    s808 = cos_front_left_swing_angle * s807 - sin_front_left_swing_angle * s806
+    s809 = sin_front_left_swing_angle * s807 + cos_front_left_swing_angle * s806
+    s810 = sin_front_left_swing_angle * s805 + cos_front_left_swing_angle * s771 + k2 * s808
+    s811 = cos_front_left_swing_angle * s805 - sin_front_left_swing_angle * s771 - k2 * s809
+    s812 = s668 + s810
+    s813 = I_hip_xy * s536 - I_hip_yz * s537 - s666 + s538 * k21 - s541 * k19 + (s772 - s211 * s772)
+    s814 = m_hip * bias_front_left_hip_y - moment_front_left_hip_y * s540 + (m_thigh * bias_front_left_thigh_y - (s687 + k5 * s586) + s716)
+    s815 = s783 - s249 * s782
+    s816 = s686 + s781 - s250 * s782
+    s817 = m_hip * bias_hind_right_hip_x - moment_front_left_hip_y * s572 + s779 - s251 * s782
+    s818 = s784 - s252 * s782
+    s819 = s778 - (m_hip * s566 + moment_front_left_hip_y * s571) - s253 * s782
+    s820 = cos_hind_right_abduction_angle * s818 - sin_hind_right_abduction_angle * s819
+    s821 = sin_hind_right_abduction_angle * s818 + cos_hind_right_abduction_angle * s819
+    s822 = cos_hind_right_abduction_angle * s815 - sin_hind_right_abduction_angle * s816
+    s823 = sin_hind_right_abduction_angle * s815 + cos_hind_right_abduction_angle * s816
+    s824 = s793 - s305 * s792
+    s825 = s681 + s791 - s306 * s792
+    s826 = s670 + moment_front_left_hip_y * s560 + s789 - s307 * s792
+    s827 = s794 - s308 * s792
+    s828 = m_hip * bias_hind_left_hip_z + moment_front_left_hip_y * s559 + s788 - s309 * s792
+    s829 = cos_hind_left_abduction_angle * s827 - sin_hind_left_abduction_angle * s828
+    s830 = sin_hind_left_abduction_angle * s827 + cos_hind_left_abduction_angle * s828
+    s831 = cos_hind_left_abduction_angle * s824 - sin_hind_left_abduction_angle * s825
+    s832 = sin_hind_left_abduction_angle * s824 + cos_hind_left_abduction_angle * s825
+    s833 = s523 * k16 + (s782 - s248 * s782 - y_hip * s821) + (s792 - s304 * s792 + y_hip * s830)
+    s834 = s521 * k18 + (s823 + (y_hip * s817 - x_hip * s820)) + (s832 - (x_hip * s829 + y_hip * s826))
+    s835 = s803 - s365 * s802
+    s836 = s676 + s801 - s366 * s802
+    s837 = s799 - (s670 + moment_front_left_hip_y * s549) - s367 * s802
+    s838 = s804 - s368 * s802
+    s839 = m_hip * bias_front_right_hip_z - moment_front_left_hip_y * s548 + s798 - s369 * s802
+    s840 = cos_front_right_abduction_angle * s838 - sin_front_right_abduction_angle * s839
+    s841 = sin_front_right_abduction_angle * s838 + cos_front_right_abduction_angle * s839
+    s842 = cos_front_right_abduction_angle * s835 - sin_front_right_abduction_angle * s836
+    s843 = sin_front_right_abduction_angle * s835 + cos_front_right_abduction_angle * s836
+    s844 = s522 * k17 + (s822 + x_hip * s821) + (s831 + x_hip * s830) + (s842 - x_hip * s841)
+    s845 = s813 - s421 * s812
+    s846 = s669 + s811 - s422 * s812
+    s847 = m_hip * bias_front_left_hip_x + moment_front_left_hip_y * s537 + s809 - s423 * s812
+    s848 = s814 - s424 * s812
+    s849 = m_hip * bias_front_left_hip_z + moment_front_left_hip_y * s536 + s808 - s425 * s812
+    s850 = cos_front_left_abduction_angle * s848 - sin_front_left_abduction_angle * s849
+    s851 = sin_front_left_abduction_angle * s848 + cos_front_left_abduction_angle * s849
+    s852 = cos_front_left_abduction_angle * s845 - sin_front_left_abduction_angle * s846
+    s853 = sin_front_left_abduction_angle * s845 + cos_front_left_abduction_angle * s846
+    s854 = s833 + (s802 - s364 * s802 - y_hip * s841) + (s812 - s420 * s812 + y_hip * s851)
+    s855 = s834 + (s843 + (x_hip * s840 + y_hip * s837)) + (s853 + (x_hip * s850 - y_hip * s847))
+    s856 = s483 * s854 - (s844 + (s852 - x_hip * s851))
+    s857 = s855 - s484 * s854 + s492 * s856
+    s858 = s817 + s826 + s837 + s847 - s485 * s854 + s493 * s856 - s499 * s857
+    s859 = s820 + s829 + s840 + s850 - s486 * s854 + s494 * s856 - s500 * s857
+    s860 = s821 + s830 + s841 + s851 - s487 * s854 + s495 * s856 - s501 * s857
+    s861 = s21 * s858 + s22 * s859 + s23 * s860
+    s862 = s518 * s861 - (s18 * s858 + s19 * s859 + s20 * s860)
+    s863 = (s15 * s858 + s16 * s859 + s17 * s860 - s517 * s861 + s520 * s862) / (s15 * s508 + s16 * s509 + s17 * s510 - s515 * s517 - s519 * s520)
+    delta_trunk_2_y = s862 / pivot_trunk_2_2 + s520 * s863
+    s864 = s861 / pivot_trunk_3_2 + (s518 * delta_trunk_2_y - s517 * s863)
+    delta_trunk_x = s18 * delta_trunk_2_y - s15 * s863 - s21 * s864
+    delta_trunk_y = s19 * delta_trunk_2_y - s16 * s863 - s22 * s864
+    delta_trunk_z = s20 * delta_trunk_2_y - s17 * s863 - s23 * s864
+    s865 = s857 / pivot_trunk_3 + (s499 * delta_trunk_x + s500 * delta_trunk_y + s501 * delta_trunk_z)
+    s866 = s493 * delta_trunk_x + s494 * delta_trunk_y + s495 * delta_trunk_z - s492 * s865
+    alpha_trunk_y = s856 / pivot_trunk_2 - s866
+    s867 = s483 * alpha_trunk_y - s484 * s865 + (s485 * delta_trunk_x + s486 * delta_trunk_y + s487 * delta_trunk_z)
+    s868 = s854 / pivot_trunk + s867
+    alpha_front_left_hip_y = cos_front_left_abduction_angle * alpha_trunk_y - sin_front_left_abduction_angle * s865
+    s869 = cos_front_left_abduction_angle * s865 + sin_front_left_abduction_angle * alpha_trunk_y
+    s870 = y_hip * s865
+    s871 = x_hip * s865
+    s872 = y_hip * s868
+    s873 = x_hip * alpha_trunk_y
+    s874 = s872 + s873
+    delta_front_left_hip_x = delta_trunk_x + s870
+    s875 = delta_trunk_y - s871
+    s876 = delta_trunk_z - s874
+    delta_front_left_hip_y = cos_front_left_abduction_angle * s875 + sin_front_left_abduction_angle * s876
+    delta_front_left_hip_z = cos_front_left_abduction_angle * s876 - sin_front_left_abduction_angle * s875
+    s877 = s423 * delta_front_left_hip_x + s424 * delta_front_left_hip_y + s425 * delta_front_left_hip_z
+    s878 = s812 / pivot_front_left_hip + (s421 * alpha_front_left_hip_y - s420 * s868 - s422 * s869 + s877)
+    s879 = s868 + s878
+    alpha_front_right_hip_y = cos_front_right_abduction_angle * alpha_trunk_y - sin_front_right_abduction_angle * s865
+    s880 = cos_front_right_abduction_angle * s865 + sin_front_right_abduction_angle * alpha_trunk_y
+    delta_front_right_hip_x = delta_trunk_x - s870
+    s881 = delta_trunk_z + (s872 - s873)
+    delta_front_right_hip_y = cos_front_right_abduction_angle * s875 + sin_front_right_abduction_angle * s881
+    delta_front_right_hip_z = cos_front_right_abduction_angle * s881 - sin_front_right_abduction_angle * s875
+    s882 = s367 * delta_front_right_hip_x + s368 * delta_front_right_hip_y + s369 * delta_front_right_hip_z
+    s883 = s802 / pivot_front_right_hip + (s365 * alpha_front_right_hip_y - s364 * s868 - s366 * s880 + s882)
+    s884 = s868 + s883
+    alpha_hind_left_hip_y = cos_hind_left_abduction_angle * alpha_trunk_y - sin_hind_left_abduction_angle * s865
+    s885 = cos_hind_left_abduction_angle * s865 + sin_hind_left_abduction_angle * alpha_trunk_y
+    s886 = delta_trunk_y + s871
+    s887 = delta_trunk_z + (s873 - s872)
+    delta_hind_left_hip_y = cos_hind_left_abduction_angle * s886 + sin_hind_left_abduction_angle * s887
+    delta_hind_left_hip_z = cos_hind_left_abduction_angle * s887 - sin_hind_left_abduction_angle * s886
+    s888 = s307 * delta_front_left_hip_x + s308 * delta_hind_left_hip_y + s309 * delta_hind_left_hip_z
+    s889 = s792 / pivot_hind_left_hip + (s305 * alpha_hind_left_hip_y - s304 * s868 - s306 * s885 + s888)
+    s890 = s868 + s889
+    alpha_hind_right_hip_y = cos_hind_right_abduction_angle * alpha_trunk_y - sin_hind_right_abduction_angle * s865
+    s891 = cos_hind_right_abduction_angle * s865 + sin_hind_right_abduction_angle * alpha_trunk_y
+    s892 = delta_trunk_z + s874
+    delta_hind_right_hip_y = cos_hind_right_abduction_angle * s886 + sin_hind_right_abduction_angle * s892
+    delta_hind_right_hip_z = cos_hind_right_abduction_angle * s892 - sin_hind_right_abduction_angle * s886
+    s893 = s251 * delta_front_right_hip_x + s252 * delta_hind_right_hip_y + s253 * delta_hind_right_hip_z
+    s894 = s782 / pivot_hind_right_hip + (s249 * alpha_hind_right_hip_y - s248 * s868 - s250 * s891 + s893)
+    s895 = s868 + s894
+    s896 = delta_front_left_hip_x + k2 * s869
+    s897 = delta_front_left_hip_z - k2 * s879
+    delta_front_left_thigh_z = cos_front_left_swing_angle * s897 + sin_front_left_swing_angle * s896
+    delta_front_left_thigh_x = cos_front_left_swing_angle * s896 - sin_front_left_swing_angle * s897
+    s898 = s212 * (cos_front_left_swing_angle * s869 + sin_front_left_swing_angle * s879)
+    s899 = s211 * alpha_front_left_hip_y - s898 + (s213 * delta_front_left_thigh_x + s214 * delta_front_left_thigh_z)
+    s900 = s772 / pivot_front_left_thigh + s899
+    alpha_front_left_thigh_y = alpha_front_left_hip_y - s900
+    s901 = delta_front_right_hip_x + k3 * s880
+    s902 = delta_front_right_hip_z - k3 * s884
+    delta_front_right_thigh_z = cos_front_right_swing_angle * s902 + sin_front_right_swing_angle * s901
+    delta_front_right_thigh_x = cos_front_right_swing_angle * s901 - sin_front_right_swing_angle * s902
+    s903 = s175 * (cos_front_right_swing_angle * s880 + sin_front_right_swing_angle * s884)
+    s904 = s174 * alpha_front_right_hip_y + s903 + (s176 * delta_front_right_thigh_x + s177 * delta_front_right_thigh_z)
+    s905 = s764 / pivot_front_right_thigh + s904
+    alpha_front_right_thigh_y = alpha_front_right_hip_y - s905
+    s906 = delta_front_left_hip_x + k2 * s885
+    s907 = delta_hind_left_hip_z - k2 * s890
+    delta_hind_left_thigh_z = cos_hind_left_swing_angle * s907 + sin_hind_left_swing_angle * s906
+    delta_hind_left_thigh_x = cos_hind_left_swing_angle * s906 - sin_hind_left_swing_angle * s907
+    s908 = s138 * (cos_hind_left_swing_angle * s885 + sin_hind_left_swing_angle * s890)
+    s909 = s137 * alpha_hind_left_hip_y - s908 + (s139 * delta_hind_left_thigh_x + s140 * delta_hind_left_thigh_z)
+    s910 = s756 / pivot_hind_left_thigh + s909
+    alpha_hind_left_thigh_y = alpha_hind_left_hip_y - s910
+    s911 = delta_front_right_hip_x + k3 * s891
+    s912 = delta_hind_right_hip_z - k3 * s895
+    delta_hind_right_thigh_z = cos_hind_right_swing_angle * s912 + sin_hind_right_swing_angle * s911
+    delta_hind_right_thigh_x = cos_hind_right_swing_angle * s911 - sin_hind_right_swing_angle * s912
+    s913 = s101 * (cos_hind_right_swing_angle * s891 + sin_hind_right_swing_angle * s895)
+    s914 = s100 * alpha_hind_right_hip_y + s913 + (s102 * delta_hind_right_thigh_x + s103 * delta_hind_right_thigh_z)
+    s915 = s748 / pivot_hind_right_thigh + s914
+    alpha_hind_right_thigh_y = alpha_hind_right_hip_y - s915
+    s916 = cos_front_left_knee_angle * (delta_front_left_thigh_x + k4 * alpha_front_left_thigh_y)
+    s917 = k7 * alpha_front_left_thigh_y - k8 * (s916 - sin_front_left_knee_angle * delta_front_left_thigh_z)
+    front_left_knee_angle_ddot = s767 / pivot_hind_right_shank - s917
+    s918 = cos_front_right_knee_angle * (delta_front_right_thigh_x + k4 * alpha_front_right_thigh_y)
+    s919 = k7 * alpha_front_right_thigh_y - k8 * (s918 - sin_front_right_knee_angle * delta_front_right_thigh_z)
+    front_right_knee_angle_ddot = s759 / pivot_hind_right_shank - s919
+    s920 = cos_hind_left_knee_angle * (delta_hind_left_thigh_x + k4 * alpha_hind_left_thigh_y)
+    s921 = k7 * alpha_hind_left_thigh_y - k8 * (s920 - sin_hind_left_knee_angle * delta_hind_left_thigh_z)
+    hind_left_knee_angle_ddot = s751 / pivot_hind_right_shank - s921
+    s922 = cos_hind_right_knee_angle * (delta_hind_right_thigh_x + k4 * alpha_hind_right_thigh_y)
+    s923 = k7 * alpha_hind_right_thigh_y - k8 * (s922 - sin_hind_right_knee_angle * delta_hind_right_thigh_z)
+    hind_right_knee_angle_ddot = s743 / pivot_hind_right_shank - s923
+    s924 = trunk_wx * 0.5
+    s925 = trunk_wy * 0.5
+    s926 = trunk_wz * 0.5
+    s999 = I_trunk_x * s15
+    s1000 = I_trunk_y * s16
+    s1001 = I_trunk_z * s17
+    s1002 = I_trunk_x * s18
+    s1003 = I_trunk_y * s19
+    s1004 = I_trunk_z * s20
+    s1005 = s15 * s999 + s16 * s1000 + s17 * s1001
+    s1006 = s18 * s1002 + s19 * s1003 + s20 * s1004
+    s1007 = s21 * (I_trunk_x * s21) + s22 * (I_trunk_y * s22) + s23 * (I_trunk_z * s23)
+    s1008 = s18 * s999 + s19 * s1000 + s20 * s1001
+    s1009 = s21 * s999 + s22 * s1000 + s23 * s1001
+    s1010 = s21 * s1002 + s22 * s1003 + s23 * s1004
+    s1011 = x_hip * s15
+    s1012 = y_hip * s16
+    s1013 = s1011 + s1012
+    s1014 = x_hip * s18
+    s1015 = y_hip * s19
+    s1016 = s1014 + s1015
+    s1017 = x_hip * s21
+    s1018 = y_hip * s22
+    s1019 = s1017 + s1018
+    s1020 = moment_front_left_hip_y * s927
+    s1021 = moment_front_left_hip_y * s929
+    s1022 = moment_front_left_hip_y * s931
+    s1023 = inertia_front_left_hip_xx * s15
+    s1024 = s1023 + I_hip_xy * s927 + I_hip_xz * s928
+    s1025 = I_hip_xy * s15
+    s1026 = s1025 + I_hip_yy * s927 + I_hip_yz * s928
+    s1027 = I_hip_xz * s15
+    s1028 = s1027 + I_hip_yz * s927 + inertia_front_left_hip_zz * s928
+    s1029 = inertia_front_left_hip_xx * s18
+    s1030 = s1029 + I_hip_xy * s929 + I_hip_xz * s930
+    s1031 = I_hip_xy * s18
+    s1032 = s1031 + I_hip_yy * s929 + I_hip_yz * s930
+    s1033 = I_hip_xz * s18
+    s1034 = s1033 + I_hip_yz * s929 + inertia_front_left_hip_zz * s930
+    s1035 = inertia_front_left_hip_xx * s21
+    s1036 = I_hip_xy * s21
+    s1037 = I_hip_xz * s21
+    s1038 = s15 * s1024 + s927 * s1026 + s928 * s1028
+    s1039 = s18 * s1030 + s929 * s1032 + s930 * s1034
+    s1040 = s21 * (s1035 + I_hip_xy * s931 + I_hip_xz * s932) + s931 * (s1036 + I_hip_yy * s931 + I_hip_yz * s932)
+    s1041 = s1040 + s932 * (s1037 + I_hip_yz * s931 + inertia_front_left_hip_zz * s932)
+    s1042 = s18 * s1024 + s929 * s1026 + s930 * s1028
+    s1043 = s21 * s1024 + s931 * s1026 + s932 * s1028
+    s1044 = s21 * s1030 + s931 * s1032 + s932 * s1034
+    s1045 = s1011 - s1012
+    s1046 = s1014 - s1015
+    s1047 = s1017 - s1018
+    s1048 = moment_front_left_hip_y * s933
+    s1049 = moment_front_left_hip_y * s935
+    s1050 = moment_front_left_hip_y * s937
+    s1051 = s1023 - I_hip_xy * s933 + I_hip_xz * s934
+    s1052 = I_hip_yy * s933 - s1025 - I_hip_yz * s934
+    s1053 = s1027 - I_hip_yz * s933 + inertia_front_left_hip_zz * s934
+    s1054 = s1029 - I_hip_xy * s935 + I_hip_xz * s936
+    s1055 = I_hip_yy * s935 - s1031 - I_hip_yz * s936
+    s1056 = s1033 - I_hip_yz * s935 + inertia_front_left_hip_zz * s936
+    s1057 = s15 * s1051 + s933 * s1052 + s934 * s1053
+    s1058 = s18 * s1054 + s935 * s1055 + s936 * s1056
+    s1059 = s21 * (s1035 - I_hip_xy * s937 + I_hip_xz * s938) + s937 * (I_hip_yy * s937 - s1036 - I_hip_yz * s938)
+    s1060 = s1059 + s938 * (s1037 - I_hip_yz * s937 + inertia_front_left_hip_zz * s938)
+    s1061 = s18 * s1051 + s935 * s1052 + s936 * s1053
+    s1062 = s21 * s1051 + s937 * s1052 + s938 * s1053
+    s1063 = s21 * s1054 + s937 * s1055 + s938 * s1056
+    s1064 = s1012 - s1011
+    s1065 = s1015 - s1014
+    s1066 = s1018 - s1017
+    s1067 = moment_front_left_hip_y * s939
+    s1068 = moment_front_left_hip_y * s941
+    s1069 = moment_front_left_hip_y * s943
+    s1070 = s1023 + I_hip_xy * s939 + I_hip_xz * s940
+    s1071 = s1025 + I_hip_yy * s939 + I_hip_yz * s940
+    s1072 = s1027 + I_hip_yz * s939 + inertia_front_left_hip_zz * s940
+    s1073 = s1029 + I_hip_xy * s941 + I_hip_xz * s942
+    s1074 = s1031 + I_hip_yy * s941 + I_hip_yz * s942
+    s1075 = s1033 + I_hip_yz * s941 + inertia_front_left_hip_zz * s942
+    s1076 = s15 * s1070 + s939 * s1071 + s940 * s1072
+    s1077 = s18 * s1073 + s941 * s1074 + s942 * s1075
+    s1078 = s21 * (s1035 + I_hip_xy * s943 + I_hip_xz * s944) + s943 * (s1036 + I_hip_yy * s943 + I_hip_yz * s944)
+    s1079 = s1078 + s944 * (s1037 + I_hip_yz * s943 + inertia_front_left_hip_zz * s944)
+    s1080 = s18 * s1070 + s941 * s1071 + s942 * s1072
+    s1081 = s21 * s1070 + s943 * s1071 + s944 * s1072
+    s1082 = s21 * s1073 + s943 * s1074 + s944 * s1075
+    s1083 = moment_front_left_hip_y * s945
+    s1084 = moment_front_left_hip_y * s947
+    s1085 = moment_front_left_hip_y * s949
+    s1086 = s1023 - I_hip_xy * s945 + I_hip_xz * s946
+    s1087 = I_hip_yy * s945 - s1025 - I_hip_yz * s946
+    s1088 = s1027 - I_hip_yz * s945 + inertia_front_left_hip_zz * s946
+    s1089 = s1029 - I_hip_xy * s947 + I_hip_xz * s948
+    s1090 = I_hip_yy * s947 - s1031 - I_hip_yz * s948
+    s1091 = s1033 - I_hip_yz * s947 + inertia_front_left_hip_zz * s948
+    s1092 = s15 * s1086 + s945 * s1087 + s946 * s1088
+    s1093 = s18 * s1089 + s947 * s1090 + s948 * s1091
+    s1094 = s21 * (s1035 - I_hip_xy * s949 + I_hip_xz * s950) + s949 * (I_hip_yy * s949 - s1036 - I_hip_yz * s950)
+    s1095 = s1094 + s950 * (s1037 - I_hip_yz * s949 + inertia_front_left_hip_zz * s950)
+    s1096 = s18 * s1086 + s947 * s1087 + s948 * s1088
+    s1097 = s21 * s1086 + s949 * s1087 + s950 * s1088
+    s1098 = s21 * s1089 + s949 * s1090 + s950 * s1091
+    s1099 = k2 * s927
+    s1100 = k2 * s929
+    s1101 = k2 * s931
+    s1102 = moment_front_left_thigh_y * s927 - k5 * s951
+    s1103 = moment_front_left_thigh_y * s929 - k5 * s953
+    s1104 = moment_front_left_thigh_y * s931 - k5 * s955
+    s1105 = inertia_front_left_thigh_xx * s952
+    s1106 = inertia_front_left_thigh_yy * s927 + inertia_front_left_thigh_yz * s951
+    s1107 = inertia_front_left_thigh_yz * s927 + inertia_front_left_thigh_zz * s951
+    s1108 = inertia_front_left_thigh_xx * s954
+    s1109 = inertia_front_left_thigh_yy * s929 + inertia_front_left_thigh_yz * s953
+    s1110 = inertia_front_left_thigh_yz * s929 + inertia_front_left_thigh_zz * s953
+    s1111 = s952 * s1105 + s927 * s1106 + s951 * s1107
+    s1112 = s954 * s1108 + s929 * s1109 + s953 * s1110
+    s1113 = s931 * (inertia_front_left_thigh_yy * s931 + inertia_front_left_thigh_yz * s955)
+    s1114 = s955 * (inertia_front_left_thigh_yz * s931 + inertia_front_left_thigh_zz * s955)
+    s1115 = s956 * (inertia_front_left_thigh_xx * s956) + s1113 + s1114
+    s1116 = s954 * s1105 + s929 * s1106 + s953 * s1107
+    s1117 = s956 * s1105 + s931 * s1106 + s955 * s1107
+    s1118 = s956 * s1108 + s931 * s1109 + s955 * s1110
+    s1119 = k3 * s933
+    s1120 = k3 * s935
+    s1121 = k3 * s937
+    s1122 = moment_front_left_thigh_y * s933 + k5 * s957
+    s1123 = moment_front_left_thigh_y * s935 + k5 * s959
+    s1124 = moment_front_left_thigh_y * s937 + k5 * s961
+    s1125 = inertia_front_left_thigh_xx * s958
+    s1126 = inertia_front_left_thigh_yy * s933 - inertia_front_left_thigh_yz * s957
+    s1127 = inertia_front_left_thigh_zz * s957 - inertia_front_left_thigh_yz * s933
+    s1128 = inertia_front_left_thigh_xx * s960
+    s1129 = inertia_front_left_thigh_yy * s935 - inertia_front_left_thigh_yz * s959
+    s1130 = inertia_front_left_thigh_zz * s959 - inertia_front_left_thigh_yz * s935
+    s1131 = s958 * s1125 + s933 * s1126 + s957 * s1127
+    s1132 = s960 * s1128 + s935 * s1129 + s959 * s1130
+    s1133 = s937 * (inertia_front_left_thigh_yy * s937 - inertia_front_left_thigh_yz * s961)
+    s1134 = s961 * (inertia_front_left_thigh_zz * s961 - inertia_front_left_thigh_yz * s937)
+    s1135 = s962 * (inertia_front_left_thigh_xx * s962) + s1133 + s1134
+    s1136 = s960 * s1125 + s935 * s1126 + s959 * s1127
+    s1137 = s962 * s1125 + s937 * s1126 + s961 * s1127
+    s1138 = s962 * s1128 + s937 * s1129 + s961 * s1130
+    s1139 = k2 * s939
+    s1140 = k2 * s941
+    s1141 = k2 * s943
+    s1142 = moment_front_left_thigh_y * s939 - k5 * s963
+    s1143 = moment_front_left_thigh_y * s941 - k5 * s965
+    s1144 = moment_front_left_thigh_y * s943 - k5 * s967
+    s1145 = inertia_front_left_thigh_xx * s964
+    s1146 = inertia_front_left_thigh_yy * s939 + inertia_front_left_thigh_yz * s963
+    s1147 = inertia_front_left_thigh_yz * s939 + inertia_front_left_thigh_zz * s963
+    s1148 = inertia_front_left_thigh_xx * s966
+    s1149 = inertia_front_left_thigh_yy * s941 + inertia_front_left_thigh_yz * s965
+    s1150 = inertia_front_left_thigh_yz * s941 + inertia_front_left_thigh_zz * s965
+    s1151 = s964 * s1145 + s939 * s1146 + s963 * s1147
+    s1152 = s966 * s1148 + s941 * s1149 + s965 * s1150
+    s1153 = s943 * (inertia_front_left_thigh_yy * s943 + inertia_front_left_thigh_yz * s967)
+    s1154 = s967 * (inertia_front_left_thigh_yz * s943 + inertia_front_left_thigh_zz * s967)
+    s1155 = s968 * (inertia_front_left_thigh_xx * s968) + s1153 + s1154
+    s1156 = s966 * s1145 + s941 * s1146 + s965 * s1147
+    s1157 = s968 * s1145 + s943 * s1146 + s967 * s1147
+    s1158 = s968 * s1148 + s943 * s1149 + s967 * s1150
+    s1159 = k3 * s945
+    s1160 = k3 * s947
+    s1161 = k3 * s949
+    s1162 = moment_front_left_thigh_y * s945 + k5 * s969
+    s1163 = moment_front_left_thigh_y * s947 + k5 * s971
+    s1164 = moment_front_left_thigh_y * s949 + k5 * s973
+    s1165 = inertia_front_left_thigh_xx * s970
+    s1166 = inertia_front_left_thigh_yy * s945 - inertia_front_left_thigh_yz * s969
+    s1167 = inertia_front_left_thigh_zz * s969 - inertia_front_left_thigh_yz * s945
+    s1168 = inertia_front_left_thigh_xx * s972
+    s1169 = inertia_front_left_thigh_yy * s947 - inertia_front_left_thigh_yz * s971
+    s1170 = inertia_front_left_thigh_zz * s971 - inertia_front_left_thigh_yz * s947
+    s1171 = s970 * s1165 + s945 * s1166 + s969 * s1167
+    s1172 = s972 * s1168 + s947 * s1169 + s971 * s1170
+    s1173 = s949 * (inertia_front_left_thigh_yy * s949 - inertia_front_left_thigh_yz * s973)
+    s1174 = s973 * (inertia_front_left_thigh_zz * s973 - inertia_front_left_thigh_yz * s949)
+    s1175 = s974 * (inertia_front_left_thigh_xx * s974) + s1173 + s1174
+    s1176 = s972 * s1165 + s947 * s1166 + s971 * s1167
+    s1177 = s974 * s1165 + s949 * s1166 + s973 * s1167
+    s1178 = s974 * s1168 + s949 * s1169 + s973 * s1170
+    s1179 = k4 * s951
+    s1180 = k4 * s953
+    s1181 = k4 * s955
+    s1182 = k6 * s975
+    s1183 = k6 * s977
+    s1184 = k6 * s979
+    s1185 = inertia_front_left_shank_xx * s976
+    s1186 = inertia_front_left_shank_yy * s927
+    s1187 = I_shank_z * s975
+    s1188 = inertia_front_left_shank_xx * s978
+    s1189 = inertia_front_left_shank_yy * s929
+    s1190 = I_shank_z * s977
+    s1191 = s976 * s1185 + s927 * s1186 + s975 * s1187
+    s1192 = s978 * s1188 + s929 * s1189 + s977 * s1190
+    s1193 = s980 * (inertia_front_left_shank_xx * s980) + s931 * (inertia_front_left_shank_yy * s931)
+    s1194 = s1193 + s979 * (I_shank_z * s979)
+    s1195 = s978 * s1185 + s929 * s1186 + s977 * s1187
+    s1196 = s980 * s1185 + s931 * s1186 + s979 * s1187
+    s1197 = s980 * s1188 + s931 * s1189 + s979 * s1190
+    s1198 = k4 * s957
+    s1199 = k4 * s959
+    s1200 = k4 * s961
+    s1201 = k6 * s981
+    s1202 = k6 * s983
+    s1203 = k6 * s985
+    s1204 = inertia_front_left_shank_xx * s982
+    s1205 = inertia_front_left_shank_yy * s933
+    s1206 = I_shank_z * s981
+    s1207 = inertia_front_left_shank_xx * s984
+    s1208 = inertia_front_left_shank_yy * s935
+    s1209 = I_shank_z * s983
+    s1210 = s982 * s1204 + s933 * s1205 + s981 * s1206
+    s1211 = s984 * s1207 + s935 * s1208 + s983 * s1209
+    s1212 = s986 * (inertia_front_left_shank_xx * s986) + s937 * (inertia_front_left_shank_yy * s937)
+    s1213 = s1212 + s985 * (I_shank_z * s985)
+    s1214 = s984 * s1204 + s935 * s1205 + s983 * s1206
+    s1215 = s986 * s1204 + s937 * s1205 + s985 * s1206
+    s1216 = s986 * s1207 + s937 * s1208 + s985 * s1209
+    s1217 = k4 * s963
+    s1218 = k4 * s965
+    s1219 = k4 * s967
+    s1220 = k6 * s987
+    s1221 = k6 * s989
+    s1222 = k6 * s991
+    s1223 = inertia_front_left_shank_xx * s988
+    s1224 = inertia_front_left_shank_yy * s939
+    s1225 = I_shank_z * s987
+    s1226 = inertia_front_left_shank_xx * s990
+    s1227 = inertia_front_left_shank_yy * s941
+    s1228 = I_shank_z * s989
+    s1229 = s988 * s1223 + s939 * s1224 + s987 * s1225
+    s1230 = s990 * s1226 + s941 * s1227 + s989 * s1228
+    s1231 = s992 * (inertia_front_left_shank_xx * s992) + s943 * (inertia_front_left_shank_yy * s943)
+    s1232 = s1231 + s991 * (I_shank_z * s991)
+    s1233 = s990 * s1223 + s941 * s1224 + s989 * s1225
+    s1234 = s992 * s1223 + s943 * s1224 + s991 * s1225
+    s1235 = s992 * s1226 + s943 * s1227 + s991 * s1228
+    s1236 = k4 * s969
+    s1237 = k4 * s971
+    s1238 = k4 * s973
+    s1239 = k6 * s993
+    s1240 = k6 * s995
+    s1241 = k6 * s997
+    s1242 = inertia_front_left_shank_xx * s994
+    s1243 = inertia_front_left_shank_yy * s945
+    s1244 = I_shank_z * s993
+    s1245 = inertia_front_left_shank_xx * s996
+    s1246 = inertia_front_left_shank_yy * s947
+    s1247 = I_shank_z * s995
+    s1248 = s994 * s1242 + s945 * s1243 + s993 * s1244
+    s1249 = s996 * s1245 + s947 * s1246 + s995 * s1247
+    s1250 = s998 * (inertia_front_left_shank_xx * s998) + s949 * (inertia_front_left_shank_yy * s949)
+    s1251 = s1250 + s997 * (I_shank_z * s997)
+    s1252 = s996 * s1242 + s947 * s1243 + s995 * s1244
+    s1253 = s998 * s1242 + s949 * s1243 + s997 * s1244
+    s1254 = s998 * s1245 + s949 * s1246 + s997 * s1247
+    s1255 = m_shank * s1236 - s1239
+    s1256 = m_shank * s1237 - s1240
+    s1257 = m_shank * s1238 - s1241
+    s1258 = s1236 * (s1255 - s1239)
+    s1259 = s1237 * (s1256 - s1240)
+    s1260 = s1238 * (s1257 - s1241)
+    s1261 = s1255 - s1162
+    s1262 = s1256 - s1163
+    s1263 = s1257 - s1164
+    s1264 = s1171 + (s1248 + (s1259 + s1260))
+    s1265 = s1176 + (s1252 + (s1237 * s1239 - s1236 * s1256))
+    s1266 = s1177 + (s1253 + (s1238 * s1239 - s1236 * s1257))
+    s1267 = s1172 + (s1249 + (s1258 + s1260))
+    s1268 = s1178 + (s1254 + (s1238 * s1240 - s1237 * s1257))
+    s1269 = s1175 + (s1251 + (s1258 + s1259))
+    s1270 = m_shank * s1217 - s1220
+    s1271 = m_shank * s1218 - s1221
+    s1272 = m_shank * s1219 - s1222
+    s1273 = s1217 * (s1270 - s1220)
+    s1274 = s1218 * (s1271 - s1221)
+    s1275 = s1219 * (s1272 - s1222)
+    s1276 = s1142 + s1270
+    s1277 = s1143 + s1271
+    s1278 = s1144 + s1272
+    s1279 = s1151 + (s1229 + (s1274 + s1275))
+    s1280 = s1156 + (s1233 + (s1218 * s1220 - s1217 * s1271))
+    s1281 = s1157 + (s1234 + (s1219 * s1220 - s1217 * s1272))
+    s1282 = s1152 + (s1230 + (s1273 + s1275))
+    s1283 = s1158 + (s1235 + (s1219 * s1221 - s1218 * s1272))
+    s1284 = s1155 + (s1232 + (s1273 + s1274))
+    s1285 = m_shank * s1198 - s1201
+    s1286 = m_shank * s1199 - s1202
+    s1287 = m_shank * s1200 - s1203
+    s1288 = s1198 * (s1285 - s1201)
+    s1289 = s1199 * (s1286 - s1202)
+    s1290 = s1200 * (s1287 - s1203)
+    s1291 = s1285 - s1122
+    s1292 = s1286 - s1123
+    s1293 = s1287 - s1124
+    s1294 = s1131 + (s1210 + (s1289 + s1290))
+    s1295 = s1136 + (s1214 + (s1199 * s1201 - s1198 * s1286))
+    s1296 = s1137 + (s1215 + (s1200 * s1201 - s1198 * s1287))
+    s1297 = s1132 + (s1211 + (s1288 + s1290))
+    s1298 = s1138 + (s1216 + (s1200 * s1202 - s1199 * s1287))
+    s1299 = s1135 + (s1213 + (s1288 + s1289))
+    s1300 = m_shank * s1179 - s1182
+    s1301 = m_shank * s1180 - s1183
+    s1302 = m_shank * s1181 - s1184
+    s1303 = s1179 * (s1300 - s1182)
+    s1304 = s1180 * (s1301 - s1183)
+    s1305 = s1181 * (s1302 - s1184)
+    s1306 = s1102 + s1300
+    s1307 = s1103 + s1301
+    s1308 = s1104 + s1302
+    s1309 = s1111 + (s1191 + (s1304 + s1305))
+    s1310 = s1116 + (s1195 + (s1180 * s1182 - s1179 * s1301))
+    s1311 = s1117 + (s1196 + (s1181 * s1182 - s1179 * s1302))
+    s1312 = s1112 + (s1192 + (s1303 + s1305))
+    s1313 = s1118 + (s1197 + (s1181 * s1183 - s1180 * s1302))
+    s1314 = s1115 + (s1194 + (s1303 + s1304))
+    s1315 = s1261 + k29 * s1159
+    s1316 = s1262 + k29 * s1160
+    s1317 = s1263 + k29 * s1161
+    s1318 = s1159 * (s1261 + s1315)
+    s1319 = s1160 * (s1262 + s1316)
+    s1320 = s1161 * (s1263 + s1317)
+    s1321 = s1315 - s1083
+    s1322 = s1316 - s1084
+    s1323 = s1317 - s1085
+    s1324 = s1092 + (s1264 + (s1319 + s1320))
+    s1325 = s1096 + (s1265 - (s1159 * s1316 + s1160 * s1261))
+    s1326 = s1097 + (s1266 - (s1159 * s1317 + s1161 * s1261))
+    s1327 = s1093 + (s1267 + (s1318 + s1320))
+    s1328 = s1098 + (s1268 - (s1160 * s1317 + s1161 * s1262))
+    s1329 = s1095 + (s1269 + (s1318 + s1319))
+    s1330 = s1276 + k29 * s1139
+    s1331 = s1277 + k29 * s1140
+    s1332 = s1278 + k29 * s1141
+    s1333 = s1139 * (s1276 + s1330)
+    s1334 = s1140 * (s1277 + s1331)
+    s1335 = s1141 * (s1278 + s1332)
+    s1336 = s1067 + s1330
+    s1337 = s1068 + s1331
+    s1338 = s1069 + s1332
+    s1339 = s1076 + (s1279 + (s1334 + s1335))
+    s1340 = s1080 + (s1280 - (s1139 * s1331 + s1140 * s1276))
+    s1341 = s1081 + (s1281 - (s1139 * s1332 + s1141 * s1276))
+    s1342 = s1077 + (s1282 + (s1333 + s1335))
+    s1343 = s1082 + (s1283 - (s1140 * s1332 + s1141 * s1277))
+    s1344 = s1079 + (s1284 + (s1333 + s1334))
+    s1345 = s1291 + k29 * s1119
+    s1346 = s1292 + k29 * s1120
+    s1347 = s1293 + k29 * s1121
+    s1348 = s1119 * (s1291 + s1345)
+    s1349 = s1120 * (s1292 + s1346)
+    s1350 = s1121 * (s1293 + s1347)
+    s1351 = s1345 - s1048
+    s1352 = s1346 - s1049
+    s1353 = s1347 - s1050
+    s1354 = s1057 + (s1294 + (s1349 + s1350))
+    s1355 = s1061 + (s1295 - (s1119 * s1346 + s1120 * s1291))
+    s1356 = s1062 + (s1296 - (s1119 * s1347 + s1121 * s1291))
+    s1357 = s1058 + (s1297 + (s1348 + s1350))
+    s1358 = s1063 + (s1298 - (s1120 * s1347 + s1121 * s1292))
+    s1359 = s1060 + (s1299 + (s1348 + s1349))
+    s1360 = s1306 + k29 * s1099
+    s1361 = s1307 + k29 * s1100
+    s1362 = s1308 + k29 * s1101
+    s1363 = s1099 * (s1306 + s1360)
+    s1364 = s1100 * (s1307 + s1361)
+    s1365 = s1101 * (s1308 + s1362)
+    s1366 = s1020 + s1360
+    s1367 = s1021 + s1361
+    s1368 = s1022 + s1362
+    s1369 = s1038 + (s1309 + (s1364 + s1365))
+    s1370 = s1042 + (s1310 - (s1099 * s1361 + s1100 * s1306))
+    s1371 = s1043 + (s1311 - (s1099 * s1362 + s1101 * s1306))
+    s1372 = s1039 + (s1312 + (s1363 + s1365))
+    s1373 = s1044 + (s1313 - (s1100 * s1362 + s1101 * s1307))
+    s1374 = s1041 + (s1314 + (s1363 + s1364))
+    s1375 = k15 * s1013
+    s1376 = k15 * s1016
+    s1377 = k15 * s1019
+    s1378 = s1321 - s1375
+    s1379 = s1322 - s1376
+    s1380 = s1323 - s1377
+    s1381 = s1013 * (s1321 + s1378)
+    s1382 = s1016 * (s1322 + s1379)
+    s1383 = s1019 * (s1323 + s1380)
+    s1384 = s1336 + k15 * s1064
+    s1385 = s1337 + k15 * s1065
+    s1386 = s1338 + k15 * s1066
+    s1387 = s1064 * (s1336 + s1384)
+    s1388 = s1065 * (s1337 + s1385)
+    s1389 = s1066 * (s1338 + s1386)
+    s1390 = s1008 + (s1325 + (s1013 * s1379 + s1016 * s1321)) + (s1340 - (s1064 * s1385 + s1065 * s1336))
+    s1391 = s1009 + (s1326 + (s1013 * s1380 + s1019 * s1321)) + (s1341 - (s1064 * s1386 + s1066 * s1336))
+    s1392 = s1010 + (s1328 + (s1016 * s1380 + s1019 * s1322)) + (s1343 - (s1065 * s1386 + s1066 * s1337))
+    s1393 = s1351 + k15 * s1045
+    s1394 = s1352 + k15 * s1046
+    s1395 = s1353 + k15 * s1047
+    s1396 = s1045 * (s1351 + s1393)
+    s1397 = s1046 * (s1352 + s1394)
+    s1398 = s1047 * (s1353 + s1395)
+    s1399 = s1005 + (s1324 - (s1382 + s1383)) + (s1339 + (s1388 + s1389)) + (s1354 + (s1397 + s1398))
+    s1400 = s1006 + (s1327 - (s1381 + s1383)) + (s1342 + (s1387 + s1389)) + (s1357 + (s1396 + s1398))
+    s1401 = s1007 + (s1329 - (s1381 + s1382)) + (s1344 + (s1387 + s1388)) + (s1359 + (s1396 + s1397))
+    s1402 = s1366 + s1375
+    s1403 = s1367 + s1376
+    s1404 = s1368 + s1377
+    s1405 = s1013 * (s1366 + s1402)
+    s1406 = s1016 * (s1367 + s1403)
+    s1407 = s1019 * (s1368 + s1404)
+    s1408 = s1378 + s1384 + s1393 + s1402
+    s1409 = s1379 + s1385 + s1394 + s1403
+    s1410 = s1380 + s1386 + s1395 + s1404
+    s1411 = s1399 + (s1369 + (s1406 + s1407))
+    s1412 = s1390 + (s1355 - (s1045 * s1394 + s1046 * s1351)) + (s1370 - (s1013 * s1403 + s1016 * s1366))
+    s1413 = s1391 + (s1356 - (s1045 * s1395 + s1047 * s1351)) + (s1371 - (s1013 * s1404 + s1019 * s1366))
+    s1414 = s1400 + (s1372 + (s1405 + s1407))
+    s1415 = s1392 + (s1358 - (s1046 * s1395 + s1047 * s1352)) + (s1373 - (s1016 * s1404 + s1019 * s1367))
+    s1416 = s1401 + (s1374 + (s1405 + s1406))
+    s1417 = s18 * s1410 - s21 * s1409
+    s1418 = s21 * s1408 - s15 * s1410
+    s1419 = s15 * s1409 - s18 * s1408
+    s1420 = s15 * s1411 + s18 * s1412 + s21 * s1413
+    s1421 = s15 * s1412 + s18 * s1414 + s21 * s1415
+    s1422 = s15 * s1413 + s18 * s1415 + s21 * s1416
+    s1423 = s19 * s1410 - s22 * s1409
+    s1424 = s22 * s1408 - s16 * s1410
+    s1425 = s16 * s1409 - s19 * s1408
+    s1426 = s16 * s1411 + s19 * s1412 + s22 * s1413
+    s1427 = s16 * s1412 + s19 * s1414 + s22 * s1415
+    s1428 = s16 * s1413 + s19 * s1415 + s22 * s1416
+    s1429 = s20 * s1410 - s23 * s1409
+    s1430 = s23 * s1408 - s17 * s1410
+    s1431 = s17 * s1409 - s20 * s1408
+    s1432 = s17 * s1411 + s20 * s1412 + s23 * s1413
+    s1433 = s17 * s1412 + s20 * s1414 + s23 * s1415
+    s1434 = s17 * s1413 + s20 * s1415 + s23 * s1416
+    s1435 = s18 * s1368 - s21 * s1367
+    s1436 = s21 * s1366 - s15 * s1368
+    s1437 = s15 * s1367 - s18 * s1366
+    s1438 = s15 * s1369 + s18 * s1370 + s21 * s1371
+    s1439 = s15 * s1370 + s18 * s1372 + s21 * s1373
+    s1440 = s15 * s1371 + s18 * s1373 + s21 * s1374
+    s1441 = s1438 + (s1016 * s1437 - s1019 * s1436)
+    s1442 = s1439 + (s1019 * s1435 - s1013 * s1437)
+    s1443 = s1440 + (s1013 * s1436 - s1016 * s1435)
+    s1444 = s18 * s1353 - s21 * s1352
+    s1445 = s21 * s1351 - s15 * s1353
+    s1446 = s15 * s1352 - s18 * s1351
+    s1447 = s15 * s1354 + s18 * s1355 + s21 * s1356
+    s1448 = s15 * s1355 + s18 * s1357 + s21 * s1358
+    s1449 = s15 * s1356 + s18 * s1358 + s21 * s1359
+    s1450 = s1447 + (s1046 * s1446 - s1047 * s1445)
+    s1451 = s1448 + (s1047 * s1444 - s1045 * s1446)
+    s1452 = s1449 + (s1045 * s1445 - s1046 * s1444)
+    s1453 = s18 * s1338 - s21 * s1337
+    s1454 = s21 * s1336 - s15 * s1338
+    s1455 = s15 * s1337 - s18 * s1336
+    s1456 = s15 * s1339 + s18 * s1340 + s21 * s1341
+    s1457 = s15 * s1340 + s18 * s1342 + s21 * s1343
+    s1458 = s15 * s1341 + s18 * s1343 + s21 * s1344
+    s1459 = s1456 + (s1065 * s1455 - s1066 * s1454)
+    s1460 = s1457 + (s1066 * s1453 - s1064 * s1455)
+    s1461 = s1458 + (s1064 * s1454 - s1065 * s1453)
+    s1462 = s18 * s1323 - s21 * s1322
+    s1463 = s21 * s1321 - s15 * s1323
+    s1464 = s15 * s1322 - s18 * s1321
+    s1465 = s15 * s1324 + s18 * s1325 + s21 * s1326
+    s1466 = s15 * s1325 + s18 * s1327 + s21 * s1328
+    s1467 = s15 * s1326 + s18 * s1328 + s21 * s1329
+    s1468 = s1465 + (s1019 * s1463 - s1016 * s1464)
+    s1469 = s1466 + (s1013 * s1464 - s1019 * s1462)
+    s1470 = s1467 + (s1016 * s1462 - s1013 * s1463)
+    s1471 = s929 * s1308 - s931 * s1307
+    s1472 = s931 * s1306 - s927 * s1308
+    s1473 = s927 * s1307 - s929 * s1306
+    s1474 = s927 * s1309 + s929 * s1310 + s931 * s1311
+    s1475 = s927 * s1310 + s929 * s1312 + s931 * s1313
+    s1476 = s927 * s1311 + s929 * s1313 + s931 * s1314
+    s1477 = s1474 + (s1100 * s1473 - s1101 * s1472)
+    s1478 = s1475 + (s1101 * s1471 - s1099 * s1473)
+    s1479 = s1476 + (s1099 * s1472 - s1100 * s1471)
+    s1480 = s1477 + (s1016 * s1473 - s1019 * s1472)
+    s1481 = s1478 + (s1019 * s1471 - s1013 * s1473)
+    s1482 = s1479 + (s1013 * s1472 - s1016 * s1471)
+    s1483 = s935 * s1293 - s937 * s1292
+    s1484 = s937 * s1291 - s933 * s1293
+    s1485 = s933 * s1292 - s935 * s1291
+    s1486 = s933 * s1294 + s935 * s1295 + s937 * s1296
+    s1487 = s933 * s1295 + s935 * s1297 + s937 * s1298
+    s1488 = s933 * s1296 + s935 * s1298 + s937 * s1299
+    s1489 = s1486 + (s1120 * s1485 - s1121 * s1484)
+    s1490 = s1487 + (s1121 * s1483 - s1119 * s1485)
+    s1491 = s1488 + (s1119 * s1484 - s1120 * s1483)
+    s1492 = s1489 + (s1046 * s1485 - s1047 * s1484)
+    s1493 = s1490 + (s1047 * s1483 - s1045 * s1485)
+    s1494 = s1491 + (s1045 * s1484 - s1046 * s1483)
+    s1495 = s941 * s1278 - s943 * s1277
+    s1496 = s943 * s1276 - s939 * s1278
+    s1497 = s939 * s1277 - s941 * s1276
+    s1498 = s939 * s1279 + s941 * s1280 + s943 * s1281
+    s1499 = s939 * s1280 + s941 * s1282 + s943 * s1283
+    s1500 = s939 * s1281 + s941 * s1283 + s943 * s1284
+    s1501 = s1498 + (s1140 * s1497 - s1141 * s1496)
+    s1502 = s1499 + (s1141 * s1495 - s1139 * s1497)
+    s1503 = s1500 + (s1139 * s1496 - s1140 * s1495)
+    s1504 = s1501 + (s1065 * s1497 - s1066 * s1496)
+    s1505 = s1502 + (s1066 * s1495 - s1064 * s1497)
+    s1506 = s1503 + (s1064 * s1496 - s1065 * s1495)
+    s1507 = s947 * s1263 - s949 * s1262
+    s1508 = s949 * s1261 - s945 * s1263
+    s1509 = s945 * s1262 - s947 * s1261
+    s1510 = s945 * s1264 + s947 * s1265 + s949 * s1266
+    s1511 = s945 * s1265 + s947 * s1267 + s949 * s1268
+    s1512 = s945 * s1266 + s947 * s1268 + s949 * s1269
+    s1513 = s1510 + (s1160 * s1509 - s1161 * s1508)
+    s1514 = s1511 + (s1161 * s1507 - s1159 * s1509)
+    s1515 = s1512 + (s1159 * s1508 - s1160 * s1507)
+    s1516 = s1513 + (s1019 * s1508 - s1016 * s1509)
+    s1517 = s1514 + (s1013 * s1509 - s1019 * s1507)
+    s1518 = s1515 + (s1016 * s1507 - s1013 * s1508)
+    s1519 = s931 * s1183 - s929 * s1184
+    s1520 = s927 * s1184 - s931 * s1182
+    s1521 = s929 * s1182 - s927 * s1183
+    s1522 = s927 * s1191 + s929 * s1195 + s931 * s1196
+    s1523 = s927 * s1195 + s929 * s1192 + s931 * s1197
+    s1524 = s927 * s1196 + s929 * s1197 + s931 * s1194
+    pivot_front_left_knee_angle_dot = k28 + (s927 * s1522 + s929 * s1523 + s931 * s1524)
+    s1525 = s1522 + (s1180 * s1521 - s1181 * s1520)
+    s1526 = s1523 + (s1181 * s1519 - s1179 * s1521)
+    s1527 = s1524 + (s1179 * s1520 - s1180 * s1519)
+    s1528 = s927 * s1525 + s929 * s1526 + s931 * s1527
+    s1529 = s1525 + (s1100 * s1521 - s1101 * s1520)
+    s1530 = s1526 + (s1101 * s1519 - s1099 * s1521)
+    s1531 = s1527 + (s1099 * s1520 - s1100 * s1519)
+    s1532 = s15 * s1529 + s18 * s1530 + s21 * s1531
+    s1533 = s1529 + (s1016 * s1521 - s1019 * s1520)
+    s1534 = s1530 + (s1019 * s1519 - s1013 * s1521)
+    s1535 = s1531 + (s1013 * s1520 - s1016 * s1519)
+    s1536 = s15 * s1533 + s18 * s1534 + s21 * s1535
+    s1537 = s16 * s1533 + s19 * s1534 + s22 * s1535
+    s1538 = s17 * s1533 + s20 * s1534 + s23 * s1535
+    s1539 = s937 * s1202 - s935 * s1203
+    s1540 = s933 * s1203 - s937 * s1201
+    s1541 = s935 * s1201 - s933 * s1202
+    s1542 = s933 * s1210 + s935 * s1214 + s937 * s1215
+    s1543 = s933 * s1214 + s935 * s1211 + s937 * s1216
+    s1544 = s933 * s1215 + s935 * s1216 + s937 * s1213
+    pivot_front_right_knee_angle_dot = k28 + (s933 * s1542 + s935 * s1543 + s937 * s1544)
+    s1545 = s1542 + (s1199 * s1541 - s1200 * s1540)
+    s1546 = s1543 + (s1200 * s1539 - s1198 * s1541)
+    s1547 = s1544 + (s1198 * s1540 - s1199 * s1539)
+    s1548 = s933 * s1545 + s935 * s1546 + s937 * s1547
+    s1549 = s1545 + (s1120 * s1541 - s1121 * s1540)
+    s1550 = s1546 + (s1121 * s1539 - s1119 * s1541)
+    s1551 = s1547 + (s1119 * s1540 - s1120 * s1539)
+    s1552 = s15 * s1549 + s18 * s1550 + s21 * s1551
+    s1553 = s1549 + (s1046 * s1541 - s1047 * s1540)
+    s1554 = s1550 + (s1047 * s1539 - s1045 * s1541)
+    s1555 = s1551 + (s1045 * s1540 - s1046 * s1539)
+    s1556 = s15 * s1553 + s18 * s1554 + s21 * s1555
+    s1557 = s16 * s1553 + s19 * s1554 + s22 * s1555
+    s1558 = s17 * s1553 + s20 * s1554 + s23 * s1555
+    s1559 = s943 * s1221 - s941 * s1222
+    s1560 = s939 * s1222 - s943 * s1220
+    s1561 = s941 * s1220 - s939 * s1221
+    s1562 = s939 * s1229 + s941 * s1233 + s943 * s1234
+    s1563 = s939 * s1233 + s941 * s1230 + s943 * s1235
+    s1564 = s939 * s1234 + s941 * s1235 + s943 * s1232
+    pivot_hind_left_knee_angle_dot = k28 + (s939 * s1562 + s941 * s1563 + s943 * s1564)
+    s1565 = s1562 + (s1218 * s1561 - s1219 * s1560)
+    s1566 = s1563 + (s1219 * s1559 - s1217 * s1561)
+    s1567 = s1564 + (s1217 * s1560 - s1218 * s1559)
+    s1568 = s939 * s1565 + s941 * s1566 + s943 * s1567
+    s1569 = s1565 + (s1140 * s1561 - s1141 * s1560)
+    s1570 = s1566 + (s1141 * s1559 - s1139 * s1561)
+    s1571 = s1567 + (s1139 * s1560 - s1140 * s1559)
+    s1572 = s15 * s1569 + s18 * s1570 + s21 * s1571
+    s1573 = s1569 + (s1065 * s1561 - s1066 * s1560)
+    s1574 = s1570 + (s1066 * s1559 - s1064 * s1561)
+    s1575 = s1571 + (s1064 * s1560 - s1065 * s1559)
+    s1576 = s15 * s1573 + s18 * s1574 + s21 * s1575
+    s1577 = s16 * s1573 + s19 * s1574 + s22 * s1575
+    s1578 = s17 * s1573 + s20 * s1574 + s23 * s1575
+    s1579 = s949 * s1240 - s947 * s1241
+    s1580 = s945 * s1241 - s949 * s1239
+    s1581 = s947 * s1239 - s945 * s1240
+    s1582 = s945 * s1248 + s947 * s1252 + s949 * s1253
+    s1583 = s945 * s1252 + s947 * s1249 + s949 * s1254
+    s1584 = s945 * s1253 + s947 * s1254 + s949 * s1251
+    pivot_hind_right_knee_angle_dot = k28 + (s945 * s1582 + s947 * s1583 + s949 * s1584)
+    s1585 = s1582 + (s1237 * s1581 - s1238 * s1580)
+    s1586 = s1583 + (s1238 * s1579 - s1236 * s1581)
+    s1587 = s1584 + (s1236 * s1580 - s1237 * s1579)
+    s1588 = s945 * s1585 + s947 * s1586 + s949 * s1587
+    s1589 = s1585 + (s1160 * s1581 - s1161 * s1580)
+    s1590 = s1586 + (s1161 * s1579 - s1159 * s1581)
+    s1591 = s1587 + (s1159 * s1580 - s1160 * s1579)
+    s1592 = s15 * s1589 + s18 * s1590 + s21 * s1591
+    s1593 = s1589 + (s1019 * s1580 - s1016 * s1581)
+    s1594 = s1590 + (s1013 * s1581 - s1019 * s1579)
+    s1595 = s1591 + (s1016 * s1579 - s1013 * s1580)
+    s1596 = s15 * s1593 + s18 * s1594 + s21 * s1595
+    s1597 = s16 * s1593 + s19 * s1594 + s22 * s1595
+    s1598 = s17 * s1593 + s20 * s1594 + s23 * s1595
+    s1599 = s1528 / pivot_front_left_knee_angle_dot
+    s1600 = s1532 / pivot_front_left_knee_angle_dot
+    s1601 = s1538 / pivot_front_left_knee_angle_dot
+    s1602 = s1537 / pivot_front_left_knee_angle_dot
+    s1603 = s1536 / pivot_front_left_knee_angle_dot
+    s1604 = s1521 / pivot_front_left_knee_angle_dot
+    s1605 = s1520 / pivot_front_left_knee_angle_dot
+    s1606 = s1519 / pivot_front_left_knee_angle_dot
+    pivot_front_left_swing_angle_dot = k1 + (s927 * s1474 + s929 * s1475 + s931 * s1476) - s1528 * s1599
+    s1607 = s15 * s1477 + s18 * s1478 + s21 * s1479 - s1532 * s1599
+    s1608 = s17 * s1480 + s20 * s1481 + s23 * s1482 - s1538 * s1599
+    s1609 = s16 * s1480 + s19 * s1481 + s22 * s1482 - s1537 * s1599
+    s1610 = s15 * s1480 + s18 * s1481 + s21 * s1482 - s1536 * s1599
+    s1611 = s1473 - s1521 * s1599
+    s1612 = s1472 - s1520 * s1599
+    s1613 = s1471 - s1519 * s1599
+    s1614 = s1548 / pivot_front_right_knee_angle_dot
+    s1615 = s1552 / pivot_front_right_knee_angle_dot
+    s1616 = s1558 / pivot_front_right_knee_angle_dot
+    s1617 = s1557 / pivot_front_right_knee_angle_dot
+    s1618 = s1556 / pivot_front_right_knee_angle_dot
+    s1619 = s1541 / pivot_front_right_knee_angle_dot
+    s1620 = s1540 / pivot_front_right_knee_angle_dot
+    s1621 = s1539 / pivot_front_right_knee_angle_dot
+    pivot_front_right_swing_angle_dot = k1 + (s933 * s1486 + s935 * s1487 + s937 * s1488) - s1548 * s1614
+    s1622 = s15 * s1489 + s18 * s1490 + s21 * s1491 - s1552 * s1614
+    s1623 = s17 * s1492 + s20 * s1493 + s23 * s1494 - s1558 * s1614
+    s1624 = s16 * s1492 + s19 * s1493 + s22 * s1494 - s1557 * s1614
+    s1625 = s15 * s1492 + s18 * s1493 + s21 * s1494 - s1556 * s1614
+    s1626 = s1485 - s1541 * s1614
+    s1627 = s1484 - s1540 * s1614
+    s1628 = s1483 - s1539 * s1614
+    s1629 = s1568 / pivot_hind_left_knee_angle_dot
+    s1630 = s1572 / pivot_hind_left_knee_angle_dot
+    s1631 = s1578 / pivot_hind_left_knee_angle_dot
+    s1632 = s1577 / pivot_hind_left_knee_angle_dot
+    s1633 = s1576 / pivot_hind_left_knee_angle_dot
+    s1634 = s1561 / pivot_hind_left_knee_angle_dot
+    s1635 = s1560 / pivot_hind_left_knee_angle_dot
+    s1636 = s1559 / pivot_hind_left_knee_angle_dot
+    pivot_hind_left_swing_angle_dot = k1 + (s939 * s1498 + s941 * s1499 + s943 * s1500) - s1568 * s1629
+    s1637 = s15 * s1501 + s18 * s1502 + s21 * s1503 - s1572 * s1629
+    s1638 = s17 * s1504 + s20 * s1505 + s23 * s1506 - s1578 * s1629
+    s1639 = s16 * s1504 + s19 * s1505 + s22 * s1506 - s1577 * s1629
+    s1640 = s15 * s1504 + s18 * s1505 + s21 * s1506 - s1576 * s1629
+    s1641 = s1497 - s1561 * s1629
+    s1642 = s1496 - s1560 * s1629
+    s1643 = s1495 - s1559 * s1629
+    s1644 = s17 * s1432 + s20 * s1433 + s23 * s1434 - s1538 * s1601 - s1558 * s1616 - s1578 * s1631
+    s1645 = s16 * s1432 + s19 * s1433 + s22 * s1434 - s1537 * s1601 - s1557 * s1616 - s1577 * s1631
+    s1646 = s15 * s1432 + s18 * s1433 + s21 * s1434 - s1536 * s1601 - s1556 * s1616 - s1576 * s1631
+    s1647 = s16 * s1426 + s19 * s1427 + s22 * s1428 - s1537 * s1602 - s1557 * s1617 - s1577 * s1632
+    s1648 = s15 * s1426 + s18 * s1427 + s21 * s1428 - s1536 * s1602 - s1556 * s1617 - s1576 * s1632
+    s1649 = s15 * s1420 + s18 * s1421 + s21 * s1422 - s1536 * s1603 - s1556 * s1618 - s1576 * s1633
+    s1650 = s1588 / pivot_hind_right_knee_angle_dot
+    s1651 = s1592 / pivot_hind_right_knee_angle_dot
+    s1652 = s1598 / pivot_hind_right_knee_angle_dot
+    s1653 = s1597 / pivot_hind_right_knee_angle_dot
+    s1654 = s1596 / pivot_hind_right_knee_angle_dot
+    s1655 = s1581 / pivot_hind_right_knee_angle_dot
+    s1656 = s1580 / pivot_hind_right_knee_angle_dot
+    s1657 = s1579 / pivot_hind_right_knee_angle_dot
+    pivot_hind_right_swing_angle_dot = k1 + (s945 * s1510 + s947 * s1511 + s949 * s1512) - s1588 * s1650
+    s1658 = s15 * s1513 + s18 * s1514 + s21 * s1515 - s1592 * s1650
+    s1659 = s17 * s1516 + s20 * s1517 + s23 * s1518 - s1598 * s1650
+    s1660 = s16 * s1516 + s19 * s1517 + s22 * s1518 - s1597 * s1650
+    s1661 = s15 * s1516 + s18 * s1517 + s21 * s1518 - s1596 * s1650
+    s1662 = s1509 - s1581 * s1650
+    s1663 = s1508 - s1580 * s1650
+    s1664 = s1507 - s1579 * s1650
+    s1665 = s1607 / pivot_front_left_swing_angle_dot
+    s1666 = s1608 / pivot_front_left_swing_angle_dot
+    s1667 = s1609 / pivot_front_left_swing_angle_dot
+    s1668 = s1610 / pivot_front_left_swing_angle_dot
+    s1669 = s1611 / pivot_front_left_swing_angle_dot
     s1670 = s1612 / pivot_front_left_swing_angle_dot
     s1671 = s1613 / pivot_front_left_swing_angle_dot
-    s1672 = s1614 / pivot_front_left_swing_angle_dot
-    s1673 = s1615 / pivot_front_left_swing_angle_dot
-    s1674 = s1616 / pivot_front_left_swing_angle_dot
-    s1675 = s1617 / pivot_front_left_swing_angle_dot
-    s1676 = s1618 / pivot_front_left_swing_angle_dot
-    pivot_front_left_abduction_angle_dot = k1 + (s15 * s1443 + s18 * s1444 + s21 * s1445) - s1537 * s1605 - s1612 * s1670
-    s1677 = s17 * s1446 + s20 * s1447 + s23 * s1448 - s1543 * s1605 - s1613 * s1670
-    s1678 = s16 * s1446 + s19 * s1447 + s22 * s1448 - s1542 * s1605 - s1614 * s1670
-    s1679 = s15 * s1446 + s18 * s1447 + s21 * s1448 - s1541 * s1605 - s1615 * s1670
-    s1680 = s1442 - s1526 * s1605 - s1616 * s1670
-    s1681 = s1441 - s1525 * s1605 - s1617 * s1670
-    s1682 = s1440 - s1524 * s1605 - s1618 * s1670
-    s1683 = s1436 - s1526 * s1606 - s1546 * s1621 - s1566 * s1636 - s1586 * s1657 - s1616 * s1671
-    s1684 = s1435 - s1525 * s1606 - s1545 * s1621 - s1565 * s1636 - s1585 * s1657 - s1617 * s1671
-    s1685 = s1434 - s1524 * s1606 - s1544 * s1621 - s1564 * s1636 - s1584 * s1657 - s1618 * s1671
-    s1686 = s1430 - s1526 * s1607 - s1546 * s1622 - s1566 * s1637 - s1586 * s1658 - s1616 * s1672
-    s1687 = s1429 - s1525 * s1607 - s1545 * s1622 - s1565 * s1637 - s1585 * s1658 - s1617 * s1672
-    s1688 = s1428 - s1524 * s1607 - s1544 * s1622 - s1564 * s1637 - s1584 * s1658 - s1618 * s1672
-    s1689 = s1424 - s1526 * s1608 - s1546 * s1623 - s1566 * s1638 - s1586 * s1659 - s1616 * s1673
-    s1690 = s1423 - s1525 * s1608 - s1545 * s1623 - s1565 * s1638 - s1585 * s1659 - s1617 * s1673
-    s1691 = s1422 - s1524 * s1608 - s1544 * s1623 - s1564 * s1638 - s1584 * s1659 - s1618 * s1673
-    s1692 = k30 - s1526 * s1609 - s1546 * s1624 - s1566 * s1639 - s1586 * s1660 - s1616 * s1674
-    s1693 = s1525 * s1609 + s1545 * s1624 + s1565 * s1639 + s1585 * s1660 + s1617 * s1674
-    s1694 = s1524 * s1609 + s1544 * s1624 + s1564 * s1639 + s1584 * s1660 + s1618 * s1674
-    s1695 = k30 - s1525 * s1610 - s1545 * s1625 - s1565 * s1640 - s1585 * s1661 - s1617 * s1675
-    s1696 = s1524 * s1610 + s1544 * s1625 + s1564 * s1640 + s1584 * s1661 + s1618 * s1675
-    s1697 = k30 - s1524 * s1611 - s1544 * s1626 - s1564 * s1641 - s1584 * s1662 - s1618 * s1676
+    pivot_front_left_abduction_angle_dot = k1 + (s15 * s1438 + s18 * s1439 + s21 * s1440) - s1532 * s1600 - s1607 * s1665
+    s1672 = s17 * s1441 + s20 * s1442 + s23 * s1443 - s1538 * s1600 - s1608 * s1665
+    s1673 = s16 * s1441 + s19 * s1442 + s22 * s1443 - s1537 * s1600 - s1609 * s1665
+    s1674 = s15 * s1441 + s18 * s1442 + s21 * s1443 - s1536 * s1600 - s1610 * s1665
+    s1675 = s1437 - s1521 * s1600 - s1611 * s1665
+    s1676 = s1436 - s1520 * s1600 - s1612 * s1665
+    s1677 = s1435 - s1519 * s1600 - s1613 * s1665
+    s1678 = s1431 - s1521 * s1601 - s1541 * s1616 - s1561 * s1631 - s1581 * s1652 - s1611 * s1666
+    s1679 = s1430 - s1520 * s1601 - s1540 * s1616 - s1560 * s1631 - s1580 * s1652 - s1612 * s1666
+    s1680 = s1429 - s1519 * s1601 - s1539 * s1616 - s1559 * s1631 - s1579 * s1652 - s1613 * s1666
+    s1681 = s1425 - s1521 * s1602 - s1541 * s1617 - s1561 * s1632 - s1581 * s1653 - s1611 * s1667
+    s1682 = s1424 - s1520 * s1602 - s1540 * s1617 - s1560 * s1632 - s1580 * s1653 - s1612 * s1667
+    s1683 = s1423 - s1519 * s1602 - s1539 * s1617 - s1559 * s1632 - s1579 * s1653 - s1613 * s1667
+    s1684 = s1419 - s1521 * s1603 - s1541 * s1618 - s1561 * s1633 - s1581 * s1654 - s1611 * s1668
+    s1685 = s1418 - s1520 * s1603 - s1540 * s1618 - s1560 * s1633 - s1580 * s1654 - s1612 * s1668
+    s1686 = s1417 - s1519 * s1603 - s1539 * s1618 - s1559 * s1633 - s1579 * s1654 - s1613 * s1668
+    s1687 = k30 - s1521 * s1604 - s1541 * s1619 - s1561 * s1634 - s1581 * s1655 - s1611 * s1669
+    s1688 = s1520 * s1604 + s1540 * s1619 + s1560 * s1634 + s1580 * s1655 + s1612 * s1669
+    s1689 = s1519 * s1604 + s1539 * s1619 + s1559 * s1634 + s1579 * s1655 + s1613 * s1669
+    s1690 = k30 - s1520 * s1605 - s1540 * s1620 - s1560 * s1635 - s1580 * s1656 - s1612 * s1670
+    s1691 = s1519 * s1605 + s1539 * s1620 + s1559 * s1635 + s1579 * s1656 + s1613 * s1670
+    s1692 = k30 - s1519 * s1606 - s1539 * s1621 - s1559 * s1636 - s1579 * s1657 - s1613 * s1671
+    s1693 = s1622 / pivot_front_right_swing_angle_dot
+    s1694 = s1623 / pivot_front_right_swing_angle_dot
+    s1695 = s1624 / pivot_front_right_swing_angle_dot
+    s1696 = s1625 / pivot_front_right_swing_angle_dot
+    s1697 = s1626 / pivot_front_right_swing_angle_dot
     s1698 = s1627 / pivot_front_right_swing_angle_dot
     s1699 = s1628 / pivot_front_right_swing_angle_dot
-    s1700 = s1629 / pivot_front_right_swing_angle_dot
-    s1701 = s1630 / pivot_front_right_swing_angle_dot
-    s1702 = s1631 / pivot_front_right_swing_angle_dot
-    s1703 = s1632 / pivot_front_right_swing_angle_dot
-    s1704 = s1633 / pivot_front_right_swing_angle_dot
-    pivot_front_right_abduction_angle_dot = k1 + (s15 * s1452 + s18 * s1453 + s21 * s1454) - s1557 * s1620 - s1627 * s1698
-    s1705 = s17 * s1455 + s20 * s1456 + s23 * s1457 - s1563 * s1620 - s1628 * s1698
-    s1706 = s16 * s1455 + s19 * s1456 + s22 * s1457 - s1562 * s1620 - s1629 * s1698
-    s1707 = s15 * s1455 + s18 * s1456 + s21 * s1457 - s1561 * s1620 - s1630 * s1698
-    s1708 = s1451 - s1546 * s1620 - s1631 * s1698
-    s1709 = s1450 - s1545 * s1620 - s1632 * s1698
-    s1710 = s1449 - s1544 * s1620 - s1633 * s1698
+    pivot_front_right_abduction_angle_dot = k1 + (s15 * s1447 + s18 * s1448 + s21 * s1449) - s1552 * s1615 - s1622 * s1693
+    s1700 = s17 * s1450 + s20 * s1451 + s23 * s1452 - s1558 * s1615 - s1623 * s1693
+    s1701 = s16 * s1450 + s19 * s1451 + s22 * s1452 - s1557 * s1615 - s1624 * s1693
+    s1702 = s15 * s1450 + s18 * s1451 + s21 * s1452 - s1556 * s1615 - s1625 * s1693
+    s1703 = s1446 - s1541 * s1615 - s1626 * s1693
+    s1704 = s1445 - s1540 * s1615 - s1627 * s1693
+    s1705 = s1444 - s1539 * s1615 - s1628 * s1693
+    s1706 = s1637 / pivot_hind_left_swing_angle_dot
+    s1707 = s1638 / pivot_hind_left_swing_angle_dot
+    s1708 = s1639 / pivot_hind_left_swing_angle_dot
+    s1709 = s1640 / pivot_hind_left_swing_angle_dot
+    s1710 = s1641 / pivot_hind_left_swing_angle_dot
     s1711 = s1642 / pivot_hind_left_swing_angle_dot
     s1712 = s1643 / pivot_hind_left_swing_angle_dot
-    s1713 = s1644 / pivot_hind_left_swing_angle_dot
-    s1714 = s1645 / pivot_hind_left_swing_angle_dot
-    s1715 = s1646 / pivot_hind_left_swing_angle_dot
-    s1716 = s1647 / pivot_hind_left_swing_angle_dot
-    s1717 = s1648 / pivot_hind_left_swing_angle_dot
-    pivot_hind_left_abduction_angle_dot = k1 + (s15 * s1461 + s18 * s1462 + s21 * s1463) - s1577 * s1635 - s1642 * s1711
-    s1718 = s17 * s1464 + s20 * s1465 + s23 * s1466 - s1583 * s1635 - s1643 * s1711
-    s1719 = s16 * s1464 + s19 * s1465 + s22 * s1466 - s1582 * s1635 - s1644 * s1711
-    s1720 = s15 * s1464 + s18 * s1465 + s21 * s1466 - s1581 * s1635 - s1645 * s1711
-    s1721 = s1460 - s1566 * s1635 - s1646 * s1711
-    s1722 = s1459 - s1565 * s1635 - s1647 * s1711
-    s1723 = s1458 - s1564 * s1635 - s1648 * s1711
+    pivot_hind_left_abduction_angle_dot = k1 + (s15 * s1456 + s18 * s1457 + s21 * s1458) - s1572 * s1630 - s1637 * s1706
+    s1713 = s17 * s1459 + s20 * s1460 + s23 * s1461 - s1578 * s1630 - s1638 * s1706
+    s1714 = s16 * s1459 + s19 * s1460 + s22 * s1461 - s1577 * s1630 - s1639 * s1706
+    s1715 = s15 * s1459 + s18 * s1460 + s21 * s1461 - s1576 * s1630 - s1640 * s1706
+    s1716 = s1455 - s1561 * s1630 - s1641 * s1706
+    s1717 = s1454 - s1560 * s1630 - s1642 * s1706
+    s1718 = s1453 - s1559 * s1630 - s1643 * s1706
+    s1719 = s1658 / pivot_hind_right_swing_angle_dot
+    s1720 = s1659 / pivot_hind_right_swing_angle_dot
+    s1721 = s1660 / pivot_hind_right_swing_angle_dot
+    s1722 = s1661 / pivot_hind_right_swing_angle_dot
+    s1723 = s1662 / pivot_hind_right_swing_angle_dot
     s1724 = s1663 / pivot_hind_right_swing_angle_dot
     s1725 = s1664 / pivot_hind_right_swing_angle_dot
-    s1726 = s1665 / pivot_hind_right_swing_angle_dot
-    s1727 = s1666 / pivot_hind_right_swing_angle_dot
-    s1728 = s1667 / pivot_hind_right_swing_angle_dot
-    s1729 = s1668 / pivot_hind_right_swing_angle_dot
-    s1730 = s1669 / pivot_hind_right_swing_angle_dot
-    pivot_hind_right_abduction_angle_dot = k1 + (s15 * s1470 + s18 * s1471 + s21 * s1472) - s1597 * s1656 - s1663 * s1724
-    s1731 = s17 * s1473 + s20 * s1474 + s23 * s1475 - s1603 * s1656 - s1664 * s1724
-    s1732 = s16 * s1473 + s19 * s1474 + s22 * s1475 - s1602 * s1656 - s1665 * s1724
-    s1733 = s15 * s1473 + s18 * s1474 + s21 * s1475 - s1601 * s1656 - s1666 * s1724
-    s1734 = s1469 - s1586 * s1656 - s1667 * s1724
-    s1735 = s1468 - s1585 * s1656 - s1668 * s1724
-    s1736 = s1467 - s1584 * s1656 - s1669 * s1724
-    s1737 = s1649 - s1603 * s1657 - s1613 * s1671 - s1628 * s1699 - s1643 * s1712 - s1664 * s1725
-    s1738 = s1650 - s1602 * s1657 - s1614 * s1671 - s1629 * s1699 - s1644 * s1712 - s1665 * s1725
-    s1739 = s1651 - s1601 * s1657 - s1615 * s1671 - s1630 * s1699 - s1645 * s1712 - s1666 * s1725
-    s1740 = s1652 - s1602 * s1658 - s1614 * s1672 - s1629 * s1700 - s1644 * s1713 - s1665 * s1726
-    s1741 = s1653 - s1601 * s1658 - s1615 * s1672 - s1630 * s1700 - s1645 * s1713 - s1666 * s1726
-    s1742 = s1654 - s1601 * s1659 - s1615 * s1673 - s1630 * s1701 - s1645 * s1714 - s1666 * s1727
+    pivot_hind_right_abduction_angle_dot = k1 + (s15 * s1465 + s18 * s1466 + s21 * s1467) - s1592 * s1651 - s1658 * s1719
+    s1726 = s17 * s1468 + s20 * s1469 + s23 * s1470 - s1598 * s1651 - s1659 * s1719
+    s1727 = s16 * s1468 + s19 * s1469 + s22 * s1470 - s1597 * s1651 - s1660 * s1719
+    s1728 = s15 * s1468 + s18 * s1469 + s21 * s1470 - s1596 * s1651 - s1661 * s1719
+    s1729 = s1464 - s1581 * s1651 - s1662 * s1719
+    s1730 = s1463 - s1580 * s1651 - s1663 * s1719
+    s1731 = s1462 - s1579 * s1651 - s1664 * s1719
+    s1732 = s1644 - s1598 * s1652 - s1608 * s1666 - s1623 * s1694 - s1638 * s1707 - s1659 * s1720
+    s1733 = s1645 - s1597 * s1652 - s1609 * s1666 - s1624 * s1694 - s1639 * s1707 - s1660 * s1720
+    s1734 = s1646 - s1596 * s1652 - s1610 * s1666 - s1625 * s1694 - s1640 * s1707 - s1661 * s1720
+    s1735 = s1647 - s1597 * s1653 - s1609 * s1667 - s1624 * s1695 - s1639 * s1708 - s1660 * s1721
+    s1736 = s1648 - s1596 * s1653 - s1610 * s1667 - s1625 * s1695 - s1640 * s1708 - s1661 * s1721
+    s1737 = s1649 - s1596 * s1654 - s1610 * s1668 - s1625 * s1696 - s1640 * s1709 - s1661 * s1722
+    s1738 = s1672 / pivot_front_left_abduction_angle_dot
+    s1739 = s1673 / pivot_front_left_abduction_angle_dot
+    s1740 = s1674 / pivot_front_left_abduction_angle_dot
+    s1741 = s1675 / pivot_front_left_abduction_angle_dot
+    s1742 = s1676 / pivot_front_left_abduction_angle_dot
     s1743 = s1677 / pivot_front_left_abduction_angle_dot
-    s1744 = s1678 / pivot_front_left_abduction_angle_dot
-    s1745 = s1679 / pivot_front_left_abduction_angle_dot
-    s1746 = s1680 / pivot_front_left_abduction_angle_dot
-    s1747 = s1681 / pivot_front_left_abduction_angle_dot
-    s1748 = s1682 / pivot_front_left_abduction_angle_dot
+    s1744 = s1700 / pivot_front_right_abduction_angle_dot
+    s1745 = s1701 / pivot_front_right_abduction_angle_dot
+    s1746 = s1702 / pivot_front_right_abduction_angle_dot
+    s1747 = s1703 / pivot_front_right_abduction_angle_dot
+    s1748 = s1704 / pivot_front_right_abduction_angle_dot
     s1749 = s1705 / pivot_front_right_abduction_angle_dot
-    s1750 = s1706 / pivot_front_right_abduction_angle_dot
-    s1751 = s1707 / pivot_front_right_abduction_angle_dot
-    s1752 = s1708 / pivot_front_right_abduction_angle_dot
-    s1753 = s1709 / pivot_front_right_abduction_angle_dot
-    s1754 = s1710 / pivot_front_right_abduction_angle_dot
-    s1755 = s1683 - s1631 * s1699 - s1646 * s1712 - s1667 * s1725 - s1680 * s1743 - s1708 * s1749
-    s1756 = s1684 - s1632 * s1699 - s1647 * s1712 - s1668 * s1725 - s1681 * s1743 - s1709 * s1749
-    s1757 = s1685 - s1633 * s1699 - s1648 * s1712 - s1669 * s1725 - s1682 * s1743 - s1710 * s1749
-    s1758 = s1686 - s1631 * s1700 - s1646 * s1713 - s1667 * s1726 - s1680 * s1744 - s1708 * s1750
-    s1759 = s1687 - s1632 * s1700 - s1647 * s1713 - s1668 * s1726 - s1681 * s1744 - s1709 * s1750
-    s1760 = s1688 - s1633 * s1700 - s1648 * s1713 - s1669 * s1726 - s1682 * s1744 - s1710 * s1750
-    s1761 = s1689 - s1631 * s1701 - s1646 * s1714 - s1667 * s1727 - s1680 * s1745 - s1708 * s1751
-    s1762 = s1690 - s1632 * s1701 - s1647 * s1714 - s1668 * s1727 - s1681 * s1745 - s1709 * s1751
-    s1763 = s1691 - s1633 * s1701 - s1648 * s1714 - s1669 * s1727 - s1682 * s1745 - s1710 * s1751
-    s1764 = s1692 - s1631 * s1702 - s1646 * s1715 - s1667 * s1728 - s1680 * s1746 - s1708 * s1752
-    s1765 = s1693 + s1632 * s1702 + s1647 * s1715 + s1668 * s1728 + s1681 * s1746 + s1709 * s1752
-    s1766 = s1694 + s1633 * s1702 + s1648 * s1715 + s1669 * s1728 + s1682 * s1746 + s1710 * s1752
-    s1767 = s1695 - s1632 * s1703 - s1647 * s1716 - s1668 * s1729 - s1681 * s1747 - s1709 * s1753
-    s1768 = s1696 + s1633 * s1703 + s1648 * s1716 + s1669 * s1729 + s1682 * s1747 + s1710 * s1753
-    s1769 = s1697 - s1633 * s1704 - s1648 * s1717 - s1669 * s1730 - s1682 * s1748 - s1710 * s1754
+    s1750 = s1678 - s1626 * s1694 - s1641 * s1707 - s1662 * s1720 - s1675 * s1738 - s1703 * s1744
+    s1751 = s1679 - s1627 * s1694 - s1642 * s1707 - s1663 * s1720 - s1676 * s1738 - s1704 * s1744
+    s1752 = s1680 - s1628 * s1694 - s1643 * s1707 - s1664 * s1720 - s1677 * s1738 - s1705 * s1744
+    s1753 = s1681 - s1626 * s1695 - s1641 * s1708 - s1662 * s1721 - s1675 * s1739 - s1703 * s1745
+    s1754 = s1682 - s1627 * s1695 - s1642 * s1708 - s1663 * s1721 - s1676 * s1739 - s1704 * s1745
+    s1755 = s1683 - s1628 * s1695 - s1643 * s1708 - s1664 * s1721 - s1677 * s1739 - s1705 * s1745
+    s1756 = s1684 - s1626 * s1696 - s1641 * s1709 - s1662 * s1722 - s1675 * s1740 - s1703 * s1746
+    s1757 = s1685 - s1627 * s1696 - s1642 * s1709 - s1663 * s1722 - s1676 * s1740 - s1704 * s1746
+    s1758 = s1686 - s1628 * s1696 - s1643 * s1709 - s1664 * s1722 - s1677 * s1740 - s1705 * s1746
+    s1759 = s1687 - s1626 * s1697 - s1641 * s1710 - s1662 * s1723 - s1675 * s1741 - s1703 * s1747
+    s1760 = s1688 + s1627 * s1697 + s1642 * s1710 + s1663 * s1723 + s1676 * s1741 + s1704 * s1747
+    s1761 = s1689 + s1628 * s1697 + s1643 * s1710 + s1664 * s1723 + s1677 * s1741 + s1705 * s1747
+    s1762 = s1690 - s1627 * s1698 - s1642 * s1711 - s1663 * s1724 - s1676 * s1742 - s1704 * s1748
+    s1763 = s1691 + s1628 * s1698 + s1643 * s1711 + s1664 * s1724 + s1677 * s1742 + s1705 * s1748
+    s1764 = s1692 - s1628 * s1699 - s1643 * s1712 - s1664 * s1725 - s1677 * s1743 - s1705 * s1749
+    s1765 = s1713 / pivot_hind_left_abduction_angle_dot
+    s1766 = s1714 / pivot_hind_left_abduction_angle_dot
+    s1767 = s1715 / pivot_hind_left_abduction_angle_dot
+    s1768 = s1716 / pivot_hind_left_abduction_angle_dot
+    s1769 = s1717 / pivot_hind_left_abduction_angle_dot
     s1770 = s1718 / pivot_hind_left_abduction_angle_dot
-    s1771 = s1719 / pivot_hind_left_abduction_angle_dot
-    s1772 = s1720 / pivot_hind_left_abduction_angle_dot
-    s1773 = s1721 / pivot_hind_left_abduction_angle_dot
-    s1774 = s1722 / pivot_hind_left_abduction_angle_dot
-    s1775 = s1723 / pivot_hind_left_abduction_angle_dot
+    s1771 = s1726 / pivot_hind_right_abduction_angle_dot
+    s1772 = s1727 / pivot_hind_right_abduction_angle_dot
+    s1773 = s1728 / pivot_hind_right_abduction_angle_dot
+    s1774 = s1729 / pivot_hind_right_abduction_angle_dot
+    s1775 = s1730 / pivot_hind_right_abduction_angle_dot
     s1776 = s1731 / pivot_hind_right_abduction_angle_dot
-    s1777 = s1732 / pivot_hind_right_abduction_angle_dot
-    s1778 = s1733 / pivot_hind_right_abduction_angle_dot
-    s1779 = s1734 / pivot_hind_right_abduction_angle_dot
-    s1780 = s1735 / pivot_hind_right_abduction_angle_dot
-    s1781 = s1736 / pivot_hind_right_abduction_angle_dot
-    pivot_trunk_wz = s1737 - s1677 * s1743 - s1705 * s1749 - s1718 * s1770 - s1731 * s1776
-    s1782 = s1738 - s1678 * s1743 - s1706 * s1749 - s1719 * s1770 - s1732 * s1776
-    s1783 = s1739 - s1679 * s1743 - s1707 * s1749 - s1720 * s1770 - s1733 * s1776
-    s1784 = s1755 - s1721 * s1770 - s1734 * s1776
-    s1785 = s1756 - s1722 * s1770 - s1735 * s1776
-    s1786 = s1757 - s1723 * s1770 - s1736 * s1776
-    s1787 = s1782 / pivot_trunk_wz
-    s1788 = s1783 / pivot_trunk_wz
-    s1789 = s1784 / pivot_trunk_wz
-    s1790 = s1785 / pivot_trunk_wz
-    s1791 = s1786 / pivot_trunk_wz
-    pivot_trunk_wy = s1740 - s1678 * s1744 - s1706 * s1750 - s1719 * s1771 - s1732 * s1777 - s1782 * s1787
-    s1792 = s1741 - s1679 * s1744 - s1707 * s1750 - s1720 * s1771 - s1733 * s1777 - s1783 * s1787
-    s1793 = s1758 - s1721 * s1771 - s1734 * s1777 - s1784 * s1787
-    s1794 = s1759 - s1722 * s1771 - s1735 * s1777 - s1785 * s1787
-    s1795 = s1760 - s1723 * s1771 - s1736 * s1777 - s1786 * s1787
-    s1796 = s1742 - s1679 * s1745 - s1707 * s1751 - s1720 * s1772 - s1733 * s1778 - s1783 * s1788
-    s1797 = s1792 / pivot_trunk_wy
-    s1798 = s1793 / pivot_trunk_wy
-    s1799 = s1794 / pivot_trunk_wy
-    s1800 = s1795 / pivot_trunk_wy
-    pivot_trunk_wx = s1796 - s1792 * s1797
-    s1801 = s1761 - s1721 * s1772 - s1734 * s1778 - s1784 * s1788 - s1793 * s1797
-    s1802 = s1762 - s1722 * s1772 - s1735 * s1778 - s1785 * s1788 - s1794 * s1797
-    s1803 = s1763 - s1723 * s1772 - s1736 * s1778 - s1786 * s1788 - s1795 * s1797
-    s1804 = s1801 / pivot_trunk_wx
-    s1805 = s1802 / pivot_trunk_wx
-    s1806 = s1803 / pivot_trunk_wx
-    pivot_trunk_z_dot = s1764 - s1721 * s1773 - s1734 * s1779 - s1784 * s1789 - s1793 * s1798 - s1801 * s1804
-    s1807 = s1765 + s1722 * s1773 + s1735 * s1779 + s1785 * s1789 + s1794 * s1798 + s1802 * s1804
-    s1808 = s1766 + s1723 * s1773 + s1736 * s1779 + s1786 * s1789 + s1795 * s1798 + s1803 * s1804
-    s1809 = s1767 - s1722 * s1774 - s1735 * s1780 - s1785 * s1790 - s1794 * s1799 - s1802 * s1805
-    s1810 = s1768 + s1723 * s1774 + s1736 * s1780 + s1786 * s1790 + s1795 * s1799 + s1803 * s1805
-    s1811 = s1769 - s1723 * s1775 - s1736 * s1781 - s1786 * s1791 - s1795 * s1800 - s1803 * s1806
-    s1812 = s1807 / pivot_trunk_z_dot
-    s1813 = s1808 / pivot_trunk_z_dot
-    pivot_trunk_y_dot = s1809 - s1807 * s1812
-    s1814 = s1810 + s1808 * s1812
-    s1815 = s1814 / pivot_trunk_y_dot
-    pivot_trunk_x_dot = s1811 - s1808 * s1813 - s1814 * s1815
+    pivot_trunk_wz = s1732 - s1672 * s1738 - s1700 * s1744 - s1713 * s1765 - s1726 * s1771
+    s1777 = s1733 - s1673 * s1738 - s1701 * s1744 - s1714 * s1765 - s1727 * s1771
+    s1778 = s1734 - s1674 * s1738 - s1702 * s1744 - s1715 * s1765 - s1728 * s1771
+    s1779 = s1750 - s1716 * s1765 - s1729 * s1771
+    s1780 = s1751 - s1717 * s1765 - s1730 * s1771
+    s1781 = s1752 - s1718 * s1765 - s1731 * s1771
+    s1782 = s1777 / pivot_trunk_wz
+    s1783 = s1778 / pivot_trunk_wz
+    s1784 = s1779 / pivot_trunk_wz
+    s1785 = s1780 / pivot_trunk_wz
+    s1786 = s1781 / pivot_trunk_wz
+    pivot_trunk_wy = s1735 - s1673 * s1739 - s1701 * s1745 - s1714 * s1766 - s1727 * s1772 - s1777 * s1782
+    s1787 = s1736 - s1674 * s1739 - s1702 * s1745 - s1715 * s1766 - s1728 * s1772 - s1778 * s1782
+    s1788 = s1753 - s1716 * s1766 - s1729 * s1772 - s1779 * s1782
+    s1789 = s1754 - s1717 * s1766 - s1730 * s1772 - s1780 * s1782
+    s1790 = s1755 - s1718 * s1766 - s1731 * s1772 - s1781 * s1782
+    s1791 = s1737 - s1674 * s1740 - s1702 * s1746 - s1715 * s1767 - s1728 * s1773 - s1778 * s1783
+    s1792 = s1787 / pivot_trunk_wy
+    s1793 = s1788 / pivot_trunk_wy
+    s1794 = s1789 / pivot_trunk_wy
+    s1795 = s1790 / pivot_trunk_wy
+    pivot_trunk_wx = s1791 - s1787 * s1792
+    s1796 = s1756 - s1716 * s1767 - s1729 * s1773 - s1779 * s1783 - s1788 * s1792
+    s1797 = s1757 - s1717 * s1767 - s1730 * s1773 - s1780 * s1783 - s1789 * s1792
+    s1798 = s1758 - s1718 * s1767 - s1731 * s1773 - s1781 * s1783 - s1790 * s1792
+    s1799 = s1796 / pivot_trunk_wx
+    s1800 = s1797 / pivot_trunk_wx
+    s1801 = s1798 / pivot_trunk_wx
+    pivot_trunk_z_dot = s1759 - s1716 * s1768 - s1729 * s1774 - s1779 * s1784 - s1788 * s1793 - s1796 * s1799
+    s1802 = s1760 + s1717 * s1768 + s1730 * s1774 + s1780 * s1784 + s1789 * s1793 + s1797 * s1799
+    s1803 = s1761 + s1718 * s1768 + s1731 * s1774 + s1781 * s1784 + s1790 * s1793 + s1798 * s1799
+    s1804 = s1762 - s1717 * s1769 - s1730 * s1775 - s1780 * s1785 - s1789 * s1794 - s1797 * s1800
+    s1805 = s1763 + s1718 * s1769 + s1731 * s1775 + s1781 * s1785 + s1790 * s1794 + s1798 * s1800
+    s1806 = s1764 - s1718 * s1770 - s1731 * s1776 - s1781 * s1786 - s1790 * s1795 - s1798 * s1801
+    s1807 = s1802 / pivot_trunk_z_dot
+    s1808 = s1803 / pivot_trunk_z_dot
+    pivot_trunk_y_dot = s1804 - s1802 * s1807
+    s1809 = s1805 + s1803 * s1807
+    s1810 = s1809 / pivot_trunk_y_dot
+    pivot_trunk_x_dot = s1806 - s1803 * s1808 - s1809 * s1810
     omega_trunk_x = trunk_wx * s15 + trunk_wy * s16 + trunk_wz * s17
     omega_trunk_y = trunk_wx * s18 + trunk_wy * s19 + trunk_wz * s20
     omega_trunk_z = trunk_wx * s21 + trunk_wy * s22 + trunk_wz * s23
-    s1816 = s1024 * omega_trunk_y
-    s1817 = s1021 * omega_trunk_z
-    s1818 = s1018 * omega_trunk_z
-    s1819 = s1024 * omega_trunk_x
-    s1820 = s1021 * omega_trunk_x
-    s1821 = s1018 * omega_trunk_y
-    velocity_front_left_hip_x = trunk_x_dot + (s1816 - s1817)
-    velocity_front_left_hip_y = trunk_y_dot + (s1818 - s1819)
-    velocity_front_left_hip_z = trunk_z_dot + (s1820 - s1821)
-    s1822 = front_left_abduction_angle_dot * s15
-    s1823 = front_left_abduction_angle_dot * s18
-    s1824 = front_left_abduction_angle_dot * s21
-    omega_front_left_hip_x_2 = omega_trunk_x + s1822
-    omega_front_left_hip_y_2 = omega_trunk_y + s1823
-    omega_front_left_hip_z_2 = omega_trunk_z + s1824
-    velocity_front_right_hip_x = trunk_x_dot + (s1052 * omega_trunk_y - s1051 * omega_trunk_z)
-    velocity_front_right_hip_y = trunk_y_dot + (s1050 * omega_trunk_z - s1052 * omega_trunk_x)
-    velocity_front_right_hip_z = trunk_z_dot + (s1051 * omega_trunk_x - s1050 * omega_trunk_y)
-    s1825 = front_right_abduction_angle_dot * s15
-    s1826 = front_right_abduction_angle_dot * s18
-    s1827 = front_right_abduction_angle_dot * s21
-    omega_front_right_hip_x_2 = omega_trunk_x + s1825
-    omega_front_right_hip_y_2 = omega_trunk_y + s1826
-    omega_front_right_hip_z_2 = omega_trunk_z + s1827
-    velocity_hind_left_hip_x = trunk_x_dot + (s1071 * omega_trunk_y - s1070 * omega_trunk_z)
-    velocity_hind_left_hip_y = trunk_y_dot + (s1069 * omega_trunk_z - s1071 * omega_trunk_x)
-    velocity_hind_left_hip_z = trunk_z_dot + (s1070 * omega_trunk_x - s1069 * omega_trunk_y)
-    s1828 = hind_left_abduction_angle_dot * s15
-    s1829 = hind_left_abduction_angle_dot * s18
-    s1830 = hind_left_abduction_angle_dot * s21
-    omega_hind_left_hip_x_2 = omega_trunk_x + s1828
-    omega_hind_left_hip_y_2 = omega_trunk_y + s1829
-    omega_hind_left_hip_z_2 = omega_trunk_z + s1830
-    velocity_hind_right_hip_x = trunk_x_dot + (s1817 - s1816)
-    velocity_hind_right_hip_y = trunk_y_dot + (s1819 - s1818)
-    velocity_hind_right_hip_z = trunk_z_dot + (s1821 - s1820)
-    s1831 = hind_right_abduction_angle_dot * s15
-    s1832 = hind_right_abduction_angle_dot * s18
-    s1833 = hind_right_abduction_angle_dot * s21
-    omega_hind_right_hip_x_2 = omega_trunk_x + s1831
-    omega_hind_right_hip_y_2 = omega_trunk_y + s1832
-    omega_hind_right_hip_z_2 = omega_trunk_z + s1833
-    velocity_front_left_thigh_x = velocity_front_left_hip_x + (s1106 * omega_front_left_hip_y_2 - s1105 * omega_front_left_hip_z_2)
-    velocity_front_left_thigh_y = velocity_front_left_hip_y + (s1104 * omega_front_left_hip_z_2 - s1106 * omega_front_left_hip_x_2)
-    velocity_front_left_thigh_z = velocity_front_left_hip_z + (s1105 * omega_front_left_hip_x_2 - s1104 * omega_front_left_hip_y_2)
-    s1834 = front_left_swing_angle_dot * s932
-    s1835 = front_left_swing_angle_dot * s934
-    s1836 = front_left_swing_angle_dot * s936
-    omega_front_left_thigh_x_2 = omega_front_left_hip_x_2 + s1834
-    omega_front_left_thigh_y_2 = omega_front_left_hip_y_2 + s1835
-    omega_front_left_thigh_z_2 = omega_front_left_hip_z_2 + s1836
-    velocity_front_right_thigh_x = velocity_front_right_hip_x + (s1126 * omega_front_right_hip_y_2 - s1125 * omega_front_right_hip_z_2)
-    velocity_front_right_thigh_y = velocity_front_right_hip_y + (s1124 * omega_front_right_hip_z_2 - s1126 * omega_front_right_hip_x_2)
-    velocity_front_right_thigh_z = velocity_front_right_hip_z + (s1125 * omega_front_right_hip_x_2 - s1124 * omega_front_right_hip_y_2)
-    s1837 = front_right_swing_angle_dot * s938
-    s1838 = front_right_swing_angle_dot * s940
-    s1839 = front_right_swing_angle_dot * s942
-    omega_front_right_thigh_x_2 = omega_front_right_hip_x_2 + s1837
-    omega_front_right_thigh_y_2 = omega_front_right_hip_y_2 + s1838
-    omega_front_right_thigh_z_2 = omega_front_right_hip_z_2 + s1839
-    velocity_hind_left_thigh_x = velocity_hind_left_hip_x + (s1146 * omega_hind_left_hip_y_2 - s1145 * omega_hind_left_hip_z_2)
-    velocity_hind_left_thigh_y = velocity_hind_left_hip_y + (s1144 * omega_hind_left_hip_z_2 - s1146 * omega_hind_left_hip_x_2)
-    velocity_hind_left_thigh_z = velocity_hind_left_hip_z + (s1145 * omega_hind_left_hip_x_2 - s1144 * omega_hind_left_hip_y_2)
-    s1840 = hind_left_swing_angle_dot * s944
-    s1841 = hind_left_swing_angle_dot * s946
-    s1842 = hind_left_swing_angle_dot * s948
-    omega_hind_left_thigh_x_2 = omega_hind_left_hip_x_2 + s1840
-    omega_hind_left_thigh_y_2 = omega_hind_left_hip_y_2 + s1841
-    omega_hind_left_thigh_z_2 = omega_hind_left_hip_z_2 + s1842
-    velocity_hind_right_thigh_x = velocity_hind_right_hip_x + (s1166 * omega_hind_right_hip_y_2 - s1165 * omega_hind_right_hip_z_2)
-    velocity_hind_right_thigh_y = velocity_hind_right_hip_y + (s1164 * omega_hind_right_hip_z_2 - s1166 * omega_hind_right_hip_x_2)
-    velocity_hind_right_thigh_z = velocity_hind_right_hip_z + (s1165 * omega_hind_right_hip_x_2 - s1164 * omega_hind_right_hip_y_2)
-    s1843 = hind_right_swing_angle_dot * s950
-    s1844 = hind_right_swing_angle_dot * s952
-    s1845 = hind_right_swing_angle_dot * s954
-    omega_hind_right_thigh_x_2 = omega_hind_right_hip_x_2 + s1843
-    omega_hind_right_thigh_y_2 = omega_hind_right_hip_y_2 + s1844
-    omega_hind_right_thigh_z_2 = omega_hind_right_hip_z_2 + s1845
-    velocity_front_left_shank_x = velocity_front_left_thigh_x + (s1186 * omega_front_left_thigh_y_2 - s1185 * omega_front_left_thigh_z_2)
-    velocity_front_left_shank_y = velocity_front_left_thigh_y + (s1184 * omega_front_left_thigh_z_2 - s1186 * omega_front_left_thigh_x_2)
-    velocity_front_left_shank_z = velocity_front_left_thigh_z + (s1185 * omega_front_left_thigh_x_2 - s1184 * omega_front_left_thigh_y_2)
-    s1846 = front_left_knee_angle_dot * s932
-    s1847 = front_left_knee_angle_dot * s934
-    s1848 = front_left_knee_angle_dot * s936
-    omega_front_left_shank_x_2 = omega_front_left_thigh_x_2 + s1846
-    omega_front_left_shank_y_2 = omega_front_left_thigh_y_2 + s1847
-    omega_front_left_shank_z_2 = omega_front_left_thigh_z_2 + s1848
-    s1849 = s1205 * omega_front_right_thigh_y_2 - s1204 * omega_front_right_thigh_z_2
-    s1850 = s1203 * omega_front_right_thigh_z_2 - s1205 * omega_front_right_thigh_x_2
-    s1851 = s1204 * omega_front_right_thigh_x_2 - s1203 * omega_front_right_thigh_y_2
-    velocity_front_right_shank_x = velocity_front_right_thigh_x + s1849
-    velocity_front_right_shank_y = velocity_front_right_thigh_y + s1850
-    velocity_front_right_shank_z = velocity_front_right_thigh_z + s1851
-    s1852 = front_right_knee_angle_dot * s938
-    s1853 = front_right_knee_angle_dot * s940
-    s1854 = front_right_knee_angle_dot * s942
-    omega_front_right_shank_x_2 = omega_front_right_thigh_x_2 + s1852
-    omega_front_right_shank_y_2 = omega_front_right_thigh_y_2 + s1853
-    omega_front_right_shank_z_2 = omega_front_right_thigh_z_2 + s1854
-    velocity_hind_left_shank_x = velocity_hind_left_thigh_x + (s1224 * omega_hind_left_thigh_y_2 - s1223 * omega_hind_left_thigh_z_2)
-    velocity_hind_left_shank_y = velocity_hind_left_thigh_y + (s1222 * omega_hind_left_thigh_z_2 - s1224 * omega_hind_left_thigh_x_2)
-    velocity_hind_left_shank_z = velocity_hind_left_thigh_z + (s1223 * omega_hind_left_thigh_x_2 - s1222 * omega_hind_left_thigh_y_2)
-    s1855 = hind_left_knee_angle_dot * s944
-    s1856 = hind_left_knee_angle_dot * s946
-    s1857 = hind_left_knee_angle_dot * s948
-    omega_hind_left_shank_x_2 = omega_hind_left_thigh_x_2 + s1855
-    omega_hind_left_shank_y_2 = omega_hind_left_thigh_y_2 + s1856
-    omega_hind_left_shank_z_2 = omega_hind_left_thigh_z_2 + s1857
-    velocity_hind_right_shank_x = velocity_hind_right_thigh_x + (s1243 * omega_hind_right_thigh_y_2 - s1242 * omega_hind_right_thigh_z_2)
-    velocity_hind_right_shank_y = velocity_hind_right_thigh_y + (s1241 * omega_hind_right_thigh_z_2 - s1243 * omega_hind_right_thigh_x_2)
-    velocity_hind_right_shank_z = velocity_hind_right_thigh_z + (s1242 * omega_hind_right_thigh_x_2 - s1241 * omega_hind_right_thigh_y_2)
-    s1858 = hind_right_knee_angle_dot * s950
-    s1859 = hind_right_knee_angle_dot * s952
-    s1860 = hind_right_knee_angle_dot * s954
-    omega_hind_right_shank_x_2 = omega_hind_right_thigh_x_2 + s1858
-    omega_hind_right_shank_y_2 = omega_hind_right_thigh_y_2 + s1859
-    omega_hind_right_shank_z_2 = omega_hind_right_thigh_z_2 + s1860
-    a_trunk_3_z = g - s869
-    s1861 = s16 * alpha_trunk_y - s15 * s873 - s17 * s870
-    s1862 = s19 * alpha_trunk_y - s18 * s873 - s20 * s870
-    s1863 = s22 * alpha_trunk_y - s21 * s873 - s23 * s870
+    s1811 = s1019 * omega_trunk_y
+    s1812 = s1016 * omega_trunk_z
+    s1813 = s1013 * omega_trunk_z
+    s1814 = s1019 * omega_trunk_x
+    s1815 = s1016 * omega_trunk_x
+    s1816 = s1013 * omega_trunk_y
+    velocity_front_left_hip_x = trunk_x_dot + (s1811 - s1812)
+    velocity_front_left_hip_y = trunk_y_dot + (s1813 - s1814)
+    velocity_front_left_hip_z = trunk_z_dot + (s1815 - s1816)
+    s1817 = front_left_abduction_angle_dot * s15
+    s1818 = front_left_abduction_angle_dot * s18
+    s1819 = front_left_abduction_angle_dot * s21
+    omega_front_left_hip_x_2 = omega_trunk_x + s1817
+    omega_front_left_hip_y_2 = omega_trunk_y + s1818
+    omega_front_left_hip_z_2 = omega_trunk_z + s1819
+    velocity_front_right_hip_x = trunk_x_dot + (s1047 * omega_trunk_y - s1046 * omega_trunk_z)
+    velocity_front_right_hip_y = trunk_y_dot + (s1045 * omega_trunk_z - s1047 * omega_trunk_x)
+    velocity_front_right_hip_z = trunk_z_dot + (s1046 * omega_trunk_x - s1045 * omega_trunk_y)
+    s1820 = front_right_abduction_angle_dot * s15
+    s1821 = front_right_abduction_angle_dot * s18
+    s1822 = front_right_abduction_angle_dot * s21
+    omega_front_right_hip_x_2 = omega_trunk_x + s1820
+    omega_front_right_hip_y_2 = omega_trunk_y + s1821
+    omega_front_right_hip_z_2 = omega_trunk_z + s1822
+    velocity_hind_left_hip_x = trunk_x_dot + (s1066 * omega_trunk_y - s1065 * omega_trunk_z)
+    velocity_hind_left_hip_y = trunk_y_dot + (s1064 * omega_trunk_z - s1066 * omega_trunk_x)
+    velocity_hind_left_hip_z = trunk_z_dot + (s1065 * omega_trunk_x - s1064 * omega_trunk_y)
+    s1823 = hind_left_abduction_angle_dot * s15
+    s1824 = hind_left_abduction_angle_dot * s18
+    s1825 = hind_left_abduction_angle_dot * s21
+    omega_hind_left_hip_x_2 = omega_trunk_x + s1823
+    omega_hind_left_hip_y_2 = omega_trunk_y + s1824
+    omega_hind_left_hip_z_2 = omega_trunk_z + s1825
+    velocity_hind_right_hip_x = trunk_x_dot + (s1812 - s1811)
+    velocity_hind_right_hip_y = trunk_y_dot + (s1814 - s1813)
+    velocity_hind_right_hip_z = trunk_z_dot + (s1816 - s1815)
+    s1826 = hind_right_abduction_angle_dot * s15
+    s1827 = hind_right_abduction_angle_dot * s18
+    s1828 = hind_right_abduction_angle_dot * s21
+    omega_hind_right_hip_x_2 = omega_trunk_x + s1826
+    omega_hind_right_hip_y_2 = omega_trunk_y + s1827
+    omega_hind_right_hip_z_2 = omega_trunk_z + s1828
+    velocity_front_left_thigh_x = velocity_front_left_hip_x + (s1101 * omega_front_left_hip_y_2 - s1100 * omega_front_left_hip_z_2)
+    velocity_front_left_thigh_y = velocity_front_left_hip_y + (s1099 * omega_front_left_hip_z_2 - s1101 * omega_front_left_hip_x_2)
+    velocity_front_left_thigh_z = velocity_front_left_hip_z + (s1100 * omega_front_left_hip_x_2 - s1099 * omega_front_left_hip_y_2)
+    s1829 = front_left_swing_angle_dot * s927
+    s1830 = front_left_swing_angle_dot * s929
+    s1831 = front_left_swing_angle_dot * s931
+    omega_front_left_thigh_x_2 = omega_front_left_hip_x_2 + s1829
+    omega_front_left_thigh_y_2 = omega_front_left_hip_y_2 + s1830
+    omega_front_left_thigh_z_2 = omega_front_left_hip_z_2 + s1831
+    velocity_front_right_thigh_x = velocity_front_right_hip_x + (s1121 * omega_front_right_hip_y_2 - s1120 * omega_front_right_hip_z_2)
+    velocity_front_right_thigh_y = velocity_front_right_hip_y + (s1119 * omega_front_right_hip_z_2 - s1121 * omega_front_right_hip_x_2)
+    velocity_front_right_thigh_z = velocity_front_right_hip_z + (s1120 * omega_front_right_hip_x_2 - s1119 * omega_front_right_hip_y_2)
+    s1832 = front_right_swing_angle_dot * s933
+    s1833 = front_right_swing_angle_dot * s935
+    s1834 = front_right_swing_angle_dot * s937
+    omega_front_right_thigh_x_2 = omega_front_right_hip_x_2 + s1832
+    omega_front_right_thigh_y_2 = omega_front_right_hip_y_2 + s1833
+    omega_front_right_thigh_z_2 = omega_front_right_hip_z_2 + s1834
+    velocity_hind_left_thigh_x = velocity_hind_left_hip_x + (s1141 * omega_hind_left_hip_y_2 - s1140 * omega_hind_left_hip_z_2)
+    velocity_hind_left_thigh_y = velocity_hind_left_hip_y + (s1139 * omega_hind_left_hip_z_2 - s1141 * omega_hind_left_hip_x_2)
+    velocity_hind_left_thigh_z = velocity_hind_left_hip_z + (s1140 * omega_hind_left_hip_x_2 - s1139 * omega_hind_left_hip_y_2)
+    s1835 = hind_left_swing_angle_dot * s939
+    s1836 = hind_left_swing_angle_dot * s941
+    s1837 = hind_left_swing_angle_dot * s943
+    omega_hind_left_thigh_x_2 = omega_hind_left_hip_x_2 + s1835
+    omega_hind_left_thigh_y_2 = omega_hind_left_hip_y_2 + s1836
+    omega_hind_left_thigh_z_2 = omega_hind_left_hip_z_2 + s1837
+    velocity_hind_right_thigh_x = velocity_hind_right_hip_x + (s1161 * omega_hind_right_hip_y_2 - s1160 * omega_hind_right_hip_z_2)
+    velocity_hind_right_thigh_y = velocity_hind_right_hip_y + (s1159 * omega_hind_right_hip_z_2 - s1161 * omega_hind_right_hip_x_2)
+    velocity_hind_right_thigh_z = velocity_hind_right_hip_z + (s1160 * omega_hind_right_hip_x_2 - s1159 * omega_hind_right_hip_y_2)
+    s1838 = hind_right_swing_angle_dot * s945
+    s1839 = hind_right_swing_angle_dot * s947
+    s1840 = hind_right_swing_angle_dot * s949
+    omega_hind_right_thigh_x_2 = omega_hind_right_hip_x_2 + s1838
+    omega_hind_right_thigh_y_2 = omega_hind_right_hip_y_2 + s1839
+    omega_hind_right_thigh_z_2 = omega_hind_right_hip_z_2 + s1840
+    velocity_front_left_shank_x = velocity_front_left_thigh_x + (s1181 * omega_front_left_thigh_y_2 - s1180 * omega_front_left_thigh_z_2)
+    velocity_front_left_shank_y = velocity_front_left_thigh_y + (s1179 * omega_front_left_thigh_z_2 - s1181 * omega_front_left_thigh_x_2)
+    velocity_front_left_shank_z = velocity_front_left_thigh_z + (s1180 * omega_front_left_thigh_x_2 - s1179 * omega_front_left_thigh_y_2)
+    s1841 = front_left_knee_angle_dot * s927
+    s1842 = front_left_knee_angle_dot * s929
+    s1843 = front_left_knee_angle_dot * s931
+    omega_front_left_shank_x_2 = omega_front_left_thigh_x_2 + s1841
+    omega_front_left_shank_y_2 = omega_front_left_thigh_y_2 + s1842
+    omega_front_left_shank_z_2 = omega_front_left_thigh_z_2 + s1843
+    s1844 = s1200 * omega_front_right_thigh_y_2 - s1199 * omega_front_right_thigh_z_2
+    s1845 = s1198 * omega_front_right_thigh_z_2 - s1200 * omega_front_right_thigh_x_2
+    s1846 = s1199 * omega_front_right_thigh_x_2 - s1198 * omega_front_right_thigh_y_2
+    velocity_front_right_shank_x = velocity_front_right_thigh_x + s1844
+    velocity_front_right_shank_y = velocity_front_right_thigh_y + s1845
+    velocity_front_right_shank_z = velocity_front_right_thigh_z + s1846
+    s1847 = front_right_knee_angle_dot * s933
+    s1848 = front_right_knee_angle_dot * s935
+    s1849 = front_right_knee_angle_dot * s937
+    omega_front_right_shank_x_2 = omega_front_right_thigh_x_2 + s1847
+    omega_front_right_shank_y_2 = omega_front_right_thigh_y_2 + s1848
+    omega_front_right_shank_z_2 = omega_front_right_thigh_z_2 + s1849
+    velocity_hind_left_shank_x = velocity_hind_left_thigh_x + (s1219 * omega_hind_left_thigh_y_2 - s1218 * omega_hind_left_thigh_z_2)
+    velocity_hind_left_shank_y = velocity_hind_left_thigh_y + (s1217 * omega_hind_left_thigh_z_2 - s1219 * omega_hind_left_thigh_x_2)
+    velocity_hind_left_shank_z = velocity_hind_left_thigh_z + (s1218 * omega_hind_left_thigh_x_2 - s1217 * omega_hind_left_thigh_y_2)
+    s1850 = hind_left_knee_angle_dot * s939
+    s1851 = hind_left_knee_angle_dot * s941
+    s1852 = hind_left_knee_angle_dot * s943
+    omega_hind_left_shank_x_2 = omega_hind_left_thigh_x_2 + s1850
+    omega_hind_left_shank_y_2 = omega_hind_left_thigh_y_2 + s1851
+    omega_hind_left_shank_z_2 = omega_hind_left_thigh_z_2 + s1852
+    velocity_hind_right_shank_x = velocity_hind_right_thigh_x + (s1238 * omega_hind_right_thigh_y_2 - s1237 * omega_hind_right_thigh_z_2)
+    velocity_hind_right_shank_y = velocity_hind_right_thigh_y + (s1236 * omega_hind_right_thigh_z_2 - s1238 * omega_hind_right_thigh_x_2)
+    velocity_hind_right_shank_z = velocity_hind_right_thigh_z + (s1237 * omega_hind_right_thigh_x_2 - s1236 * omega_hind_right_thigh_y_2)
+    s1853 = hind_right_knee_angle_dot * s945
+    s1854 = hind_right_knee_angle_dot * s947
+    s1855 = hind_right_knee_angle_dot * s949
+    omega_hind_right_shank_x_2 = omega_hind_right_thigh_x_2 + s1853
+    omega_hind_right_shank_y_2 = omega_hind_right_thigh_y_2 + s1854
+    omega_hind_right_shank_z_2 = omega_hind_right_thigh_z_2 + s1855
+    a_trunk_3_z = g - (g + s864)
+    s1856 = s16 * alpha_trunk_y - s15 * s868 - s17 * s865
+    s1857 = s19 * alpha_trunk_y - s18 * s868 - s20 * s865
+    s1858 = s22 * alpha_trunk_y - s21 * s868 - s23 * s865
     omega_trunk_x_squared = omega_trunk_x * omega_trunk_x
     omega_trunk_y_squared = omega_trunk_y * omega_trunk_y
     omega_trunk_z_squared = omega_trunk_z * omega_trunk_z
-    s1864 = omega_trunk_x * omega_trunk_y
-    s1865 = omega_trunk_x * omega_trunk_z
-    s1866 = omega_trunk_y * omega_trunk_z
-    s1867 = omega_trunk_y_squared + omega_trunk_z_squared
-    s1868 = s1864 - s1863
-    s1869 = s1862 + s1865
-    s1870 = s1863 + s1864
-    s1871 = omega_trunk_x_squared + omega_trunk_z_squared
-    s1872 = s1866 - s1861
-    s1873 = s1865 - s1862
-    s1874 = s1861 + s1866
-    s1875 = omega_trunk_x_squared + omega_trunk_y_squared
-    s1876 = s1018 * s1867
-    s1877 = s1021 * s1868
-    s1878 = s1024 * s1869
-    s1879 = s1018 * s1870
-    s1880 = s1021 * s1871
-    s1881 = s1024 * s1872
-    s1882 = s1018 * s1873 + s1021 * s1874
-    s1883 = s1024 * s1875
-    a_front_left_hip_x = s1877 - s1876 + s1878 - s868
-    a_front_left_hip_y = delta_trunk_2_y + (s1879 - s1880 + s1881)
-    a_front_left_hip_z = a_trunk_3_z + (s1882 - s1883)
-    s1884 = s1861 + (omega_trunk_y * s1824 - omega_trunk_z * s1823) - s15 * s883
-    s1885 = s1862 + (omega_trunk_z * s1822 - omega_trunk_x * s1824) - s18 * s883
-    s1886 = s1863 + (omega_trunk_x * s1823 - omega_trunk_y * s1822) - s21 * s883
+    s1859 = omega_trunk_x * omega_trunk_y
+    s1860 = omega_trunk_x * omega_trunk_z
+    s1861 = omega_trunk_y * omega_trunk_z
+    s1862 = omega_trunk_y_squared + omega_trunk_z_squared
+    s1863 = s1859 - s1858
+    s1864 = s1857 + s1860
+    s1865 = s1858 + s1859
+    s1866 = omega_trunk_x_squared + omega_trunk_z_squared
+    s1867 = s1861 - s1856
+    s1868 = s1860 - s1857
+    s1869 = s1856 + s1861
+    s1870 = omega_trunk_x_squared + omega_trunk_y_squared
+    s1871 = s1013 * s1862
+    s1872 = s1016 * s1863
+    s1873 = s1019 * s1864
+    s1874 = s1013 * s1865
+    s1875 = s1016 * s1866
+    s1876 = s1019 * s1867
+    s1877 = s1013 * s1868 + s1016 * s1869
+    s1878 = s1019 * s1870
+    a_front_left_hip_x = s1872 - s1871 + s1873 - s863
+    a_front_left_hip_y = delta_trunk_2_y + (s1874 - s1875 + s1876)
+    a_front_left_hip_z = a_trunk_3_z + (s1877 - s1878)
+    s1879 = s1856 + (omega_trunk_y * s1819 - omega_trunk_z * s1818) - s15 * s878
+    s1880 = s1857 + (omega_trunk_z * s1817 - omega_trunk_x * s1819) - s18 * s878
+    s1881 = s1858 + (omega_trunk_x * s1818 - omega_trunk_y * s1817) - s21 * s878
     omega_front_left_hip_x_squared_2 = omega_front_left_hip_x_2 * omega_front_left_hip_x_2
     omega_front_left_hip_y_squared_2 = omega_front_left_hip_y_2 * omega_front_left_hip_y_2
     omega_front_left_hip_z_squared_2 = omega_front_left_hip_z_2 * omega_front_left_hip_z_2
-    s1887 = omega_front_left_hip_x_2 * omega_front_left_hip_y_2
-    s1888 = omega_front_left_hip_x_2 * omega_front_left_hip_z_2
-    s1889 = omega_front_left_hip_y_2 * omega_front_left_hip_z_2
-    s1890 = omega_front_left_hip_y_squared_2 + omega_front_left_hip_z_squared_2
-    s1891 = s1887 - s1886
-    s1892 = s1885 + s1888
-    s1893 = s1886 + s1887
-    s1894 = omega_front_left_hip_x_squared_2 + omega_front_left_hip_z_squared_2
-    s1895 = s1889 - s1884
-    s1896 = s1888 - s1885
-    s1897 = s1884 + s1889
-    s1898 = omega_front_left_hip_x_squared_2 + omega_front_left_hip_y_squared_2
-    a_front_right_hip_x = s1051 * s1868 - s1050 * s1867 + s1052 * s1869 - s868
-    a_front_right_hip_y = delta_trunk_2_y + (s1050 * s1870 - s1051 * s1871 + s1052 * s1872)
-    a_front_right_hip_z = a_trunk_3_z + (s1050 * s1873 + s1051 * s1874 - s1052 * s1875)
-    s1899 = s1861 + (omega_trunk_y * s1827 - omega_trunk_z * s1826) - s15 * s888
-    s1900 = s1862 + (omega_trunk_z * s1825 - omega_trunk_x * s1827) - s18 * s888
-    s1901 = s1863 + (omega_trunk_x * s1826 - omega_trunk_y * s1825) - s21 * s888
+    s1882 = omega_front_left_hip_x_2 * omega_front_left_hip_y_2
+    s1883 = omega_front_left_hip_x_2 * omega_front_left_hip_z_2
+    s1884 = omega_front_left_hip_y_2 * omega_front_left_hip_z_2
+    s1885 = omega_front_left_hip_y_squared_2 + omega_front_left_hip_z_squared_2
+    s1886 = s1882 - s1881
+    s1887 = s1880 + s1883
+    s1888 = s1881 + s1882
+    s1889 = omega_front_left_hip_x_squared_2 + omega_front_left_hip_z_squared_2
+    s1890 = s1884 - s1879
+    s1891 = s1883 - s1880
+    s1892 = s1879 + s1884
+    s1893 = omega_front_left_hip_x_squared_2 + omega_front_left_hip_y_squared_2
+    a_front_right_hip_x = s1046 * s1863 - s1045 * s1862 + s1047 * s1864 - s863
+    a_front_right_hip_y = delta_trunk_2_y + (s1045 * s1865 - s1046 * s1866 + s1047 * s1867)
+    a_front_right_hip_z = a_trunk_3_z + (s1045 * s1868 + s1046 * s1869 - s1047 * s1870)
+    s1894 = s1856 + (omega_trunk_y * s1822 - omega_trunk_z * s1821) - s15 * s883
+    s1895 = s1857 + (omega_trunk_z * s1820 - omega_trunk_x * s1822) - s18 * s883
+    s1896 = s1858 + (omega_trunk_x * s1821 - omega_trunk_y * s1820) - s21 * s883
     omega_front_right_hip_x_squared_2 = omega_front_right_hip_x_2 * omega_front_right_hip_x_2
     omega_front_right_hip_y_squared_2 = omega_front_right_hip_y_2 * omega_front_right_hip_y_2
     omega_front_right_hip_z_squared_2 = omega_front_right_hip_z_2 * omega_front_right_hip_z_2
-    s1902 = omega_front_right_hip_x_2 * omega_front_right_hip_y_2
-    s1903 = omega_front_right_hip_x_2 * omega_front_right_hip_z_2
-    s1904 = omega_front_right_hip_y_2 * omega_front_right_hip_z_2
-    s1905 = omega_front_right_hip_y_squared_2 + omega_front_right_hip_z_squared_2
-    s1906 = s1902 - s1901
-    s1907 = s1900 + s1903
-    s1908 = s1901 + s1902
-    s1909 = omega_front_right_hip_x_squared_2 + omega_front_right_hip_z_squared_2
-    s1910 = s1904 - s1899
-    s1911 = s1903 - s1900
-    s1912 = s1899 + s1904
-    s1913 = omega_front_right_hip_x_squared_2 + omega_front_right_hip_y_squared_2
-    a_hind_left_hip_x = s1070 * s1868 - s1069 * s1867 + s1071 * s1869 - s868
-    a_hind_left_hip_y = delta_trunk_2_y + (s1069 * s1870 - s1070 * s1871 + s1071 * s1872)
-    a_hind_left_hip_z = a_trunk_3_z + (s1069 * s1873 + s1070 * s1874 - s1071 * s1875)
-    s1914 = s1861 + (omega_trunk_y * s1830 - omega_trunk_z * s1829) - s15 * s894
-    s1915 = s1862 + (omega_trunk_z * s1828 - omega_trunk_x * s1830) - s18 * s894
-    s1916 = s1863 + (omega_trunk_x * s1829 - omega_trunk_y * s1828) - s21 * s894
+    s1897 = omega_front_right_hip_x_2 * omega_front_right_hip_y_2
+    s1898 = omega_front_right_hip_x_2 * omega_front_right_hip_z_2
+    s1899 = omega_front_right_hip_y_2 * omega_front_right_hip_z_2
+    s1900 = omega_front_right_hip_y_squared_2 + omega_front_right_hip_z_squared_2
+    s1901 = s1897 - s1896
+    s1902 = s1895 + s1898
+    s1903 = s1896 + s1897
+    s1904 = omega_front_right_hip_x_squared_2 + omega_front_right_hip_z_squared_2
+    s1905 = s1899 - s1894
+    s1906 = s1898 - s1895
+    s1907 = s1894 + s1899
+    s1908 = omega_front_right_hip_x_squared_2 + omega_front_right_hip_y_squared_2
+    a_hind_left_hip_x = s1065 * s1863 - s1064 * s1862 + s1066 * s1864 - s863
+    a_hind_left_hip_y = delta_trunk_2_y + (s1064 * s1865 - s1065 * s1866 + s1066 * s1867)
+    a_hind_left_hip_z = a_trunk_3_z + (s1064 * s1868 + s1065 * s1869 - s1066 * s1870)
+    s1909 = s1856 + (omega_trunk_y * s1825 - omega_trunk_z * s1824) - s15 * s889
+    s1910 = s1857 + (omega_trunk_z * s1823 - omega_trunk_x * s1825) - s18 * s889
+    s1911 = s1858 + (omega_trunk_x * s1824 - omega_trunk_y * s1823) - s21 * s889
     omega_hind_left_hip_x_squared_2 = omega_hind_left_hip_x_2 * omega_hind_left_hip_x_2
     omega_hind_left_hip_y_squared_2 = omega_hind_left_hip_y_2 * omega_hind_left_hip_y_2
     omega_hind_left_hip_z_squared_2 = omega_hind_left_hip_z_2 * omega_hind_left_hip_z_2
-    s1917 = omega_hind_left_hip_x_2 * omega_hind_left_hip_y_2
-    s1918 = omega_hind_left_hip_x_2 * omega_hind_left_hip_z_2
-    s1919 = omega_hind_left_hip_y_2 * omega_hind_left_hip_z_2
-    s1920 = omega_hind_left_hip_y_squared_2 + omega_hind_left_hip_z_squared_2
-    s1921 = s1917 - s1916
-    s1922 = s1915 + s1918
-    s1923 = s1916 + s1917
-    s1924 = omega_hind_left_hip_x_squared_2 + omega_hind_left_hip_z_squared_2
-    s1925 = s1919 - s1914
-    s1926 = s1918 - s1915
-    s1927 = s1914 + s1919
-    s1928 = omega_hind_left_hip_x_squared_2 + omega_hind_left_hip_y_squared_2
-    a_hind_right_hip_x = s1876 - s1877 - s1878 - s868
-    a_hind_right_hip_y = delta_trunk_2_y + (s1880 - s1879 - s1881)
-    a_hind_right_hip_z = a_trunk_3_z + (s1883 - s1882)
-    s1929 = s1861 + (omega_trunk_y * s1833 - omega_trunk_z * s1832) - s15 * s899
-    s1930 = s1862 + (omega_trunk_z * s1831 - omega_trunk_x * s1833) - s18 * s899
-    s1931 = s1863 + (omega_trunk_x * s1832 - omega_trunk_y * s1831) - s21 * s899
+    s1912 = omega_hind_left_hip_x_2 * omega_hind_left_hip_y_2
+    s1913 = omega_hind_left_hip_x_2 * omega_hind_left_hip_z_2
+    s1914 = omega_hind_left_hip_y_2 * omega_hind_left_hip_z_2
+    s1915 = omega_hind_left_hip_y_squared_2 + omega_hind_left_hip_z_squared_2
+    s1916 = s1912 - s1911
+    s1917 = s1910 + s1913
+    s1918 = s1911 + s1912
+    s1919 = omega_hind_left_hip_x_squared_2 + omega_hind_left_hip_z_squared_2
+    s1920 = s1914 - s1909
+    s1921 = s1913 - s1910
+    s1922 = s1909 + s1914
+    s1923 = omega_hind_left_hip_x_squared_2 + omega_hind_left_hip_y_squared_2
+    a_hind_right_hip_x = s1871 - s1872 - s1873 - s863
+    a_hind_right_hip_y = delta_trunk_2_y + (s1875 - s1874 - s1876)
+    a_hind_right_hip_z = a_trunk_3_z + (s1878 - s1877)
+    s1924 = s1856 + (omega_trunk_y * s1828 - omega_trunk_z * s1827) - s15 * s894
+    s1925 = s1857 + (omega_trunk_z * s1826 - omega_trunk_x * s1828) - s18 * s894
+    s1926 = s1858 + (omega_trunk_x * s1827 - omega_trunk_y * s1826) - s21 * s894
     omega_hind_right_hip_x_squared_2 = omega_hind_right_hip_x_2 * omega_hind_right_hip_x_2
     omega_hind_right_hip_y_squared_2 = omega_hind_right_hip_y_2 * omega_hind_right_hip_y_2
     omega_hind_right_hip_z_squared_2 = omega_hind_right_hip_z_2 * omega_hind_right_hip_z_2
-    s1932 = omega_hind_right_hip_x_2 * omega_hind_right_hip_y_2
-    s1933 = omega_hind_right_hip_x_2 * omega_hind_right_hip_z_2
-    s1934 = omega_hind_right_hip_y_2 * omega_hind_right_hip_z_2
-    s1935 = omega_hind_right_hip_y_squared_2 + omega_hind_right_hip_z_squared_2
-    s1936 = s1932 - s1931
-    s1937 = s1930 + s1933
-    s1938 = s1931 + s1932
-    s1939 = omega_hind_right_hip_x_squared_2 + omega_hind_right_hip_z_squared_2
-    s1940 = s1934 - s1929
-    s1941 = s1933 - s1930
-    s1942 = s1929 + s1934
-    s1943 = omega_hind_right_hip_x_squared_2 + omega_hind_right_hip_y_squared_2
-    a_front_left_thigh_x = a_front_left_hip_x + (s1105 * s1891 - s1104 * s1890 + s1106 * s1892)
-    a_front_left_thigh_y = a_front_left_hip_y + (s1104 * s1893 - s1105 * s1894 + s1106 * s1895)
-    a_front_left_thigh_z = a_front_left_hip_z + (s1104 * s1896 + s1105 * s1897 - s1106 * s1898)
-    s1944 = s1884 + (omega_front_left_hip_y_2 * s1836 - omega_front_left_hip_z_2 * s1835)
-    s1945 = s1885 + (omega_front_left_hip_z_2 * s1834 - omega_front_left_hip_x_2 * s1836)
-    s1946 = s1886 + (omega_front_left_hip_x_2 * s1835 - omega_front_left_hip_y_2 * s1834)
-    s1947 = s1944 - s932 * s905
-    s1948 = s1945 - s934 * s905
-    s1949 = s1946 - s936 * s905
+    s1927 = omega_hind_right_hip_x_2 * omega_hind_right_hip_y_2
+    s1928 = omega_hind_right_hip_x_2 * omega_hind_right_hip_z_2
+    s1929 = omega_hind_right_hip_y_2 * omega_hind_right_hip_z_2
+    s1930 = omega_hind_right_hip_y_squared_2 + omega_hind_right_hip_z_squared_2
+    s1931 = s1927 - s1926
+    s1932 = s1925 + s1928
+    s1933 = s1926 + s1927
+    s1934 = omega_hind_right_hip_x_squared_2 + omega_hind_right_hip_z_squared_2
+    s1935 = s1929 - s1924
+    s1936 = s1928 - s1925
+    s1937 = s1924 + s1929
+    s1938 = omega_hind_right_hip_x_squared_2 + omega_hind_right_hip_y_squared_2
+    a_front_left_thigh_x = a_front_left_hip_x + (s1100 * s1886 - s1099 * s1885 + s1101 * s1887)
+    a_front_left_thigh_y = a_front_left_hip_y + (s1099 * s1888 - s1100 * s1889 + s1101 * s1890)
+    a_front_left_thigh_z = a_front_left_hip_z + (s1099 * s1891 + s1100 * s1892 - s1101 * s1893)
+    s1939 = s1879 + (omega_front_left_hip_y_2 * s1831 - omega_front_left_hip_z_2 * s1830)
+    s1940 = s1880 + (omega_front_left_hip_z_2 * s1829 - omega_front_left_hip_x_2 * s1831)
+    s1941 = s1881 + (omega_front_left_hip_x_2 * s1830 - omega_front_left_hip_y_2 * s1829)
+    s1942 = s1939 - s927 * s900
+    s1943 = s1940 - s929 * s900
+    s1944 = s1941 - s931 * s900
     omega_front_left_thigh_x_squared_2 = omega_front_left_thigh_x_2 * omega_front_left_thigh_x_2
     omega_front_left_thigh_y_squared_2 = omega_front_left_thigh_y_2 * omega_front_left_thigh_y_2
     omega_front_left_thigh_z_squared_2 = omega_front_left_thigh_z_2 * omega_front_left_thigh_z_2
-    s1950 = omega_front_left_thigh_x_2 * omega_front_left_thigh_y_2
-    s1951 = omega_front_left_thigh_x_2 * omega_front_left_thigh_z_2
-    s1952 = omega_front_left_thigh_y_2 * omega_front_left_thigh_z_2
-    s1953 = omega_front_left_thigh_y_squared_2 + omega_front_left_thigh_z_squared_2
-    s1954 = s1950 - s1949
-    s1955 = s1948 + s1951
-    s1956 = s1949 + s1950
-    s1957 = omega_front_left_thigh_x_squared_2 + omega_front_left_thigh_z_squared_2
-    s1958 = s1952 - s1947
-    s1959 = s1951 - s1948
-    s1960 = s1947 + s1952
-    s1961 = omega_front_left_thigh_x_squared_2 + omega_front_left_thigh_y_squared_2
-    a_front_right_thigh_x = a_front_right_hip_x + (s1125 * s1906 - s1124 * s1905 + s1126 * s1907)
-    a_front_right_thigh_y = a_front_right_hip_y + (s1124 * s1908 - s1125 * s1909 + s1126 * s1910)
-    a_front_right_thigh_z = a_front_right_hip_z + (s1124 * s1911 + s1125 * s1912 - s1126 * s1913)
-    s1962 = s1899 + (omega_front_right_hip_y_2 * s1839 - omega_front_right_hip_z_2 * s1838)
-    s1963 = s1900 + (omega_front_right_hip_z_2 * s1837 - omega_front_right_hip_x_2 * s1839)
-    s1964 = s1901 + (omega_front_right_hip_x_2 * s1838 - omega_front_right_hip_y_2 * s1837)
-    s1965 = s1962 - s938 * s910
-    s1966 = s1963 - s940 * s910
-    s1967 = s1964 - s942 * s910
+    s1945 = omega_front_left_thigh_x_2 * omega_front_left_thigh_y_2
+    s1946 = omega_front_left_thigh_x_2 * omega_front_left_thigh_z_2
+    s1947 = omega_front_left_thigh_y_2 * omega_front_left_thigh_z_2
+    s1948 = omega_front_left_thigh_y_squared_2 + omega_front_left_thigh_z_squared_2
+    s1949 = s1945 - s1944
+    s1950 = s1943 + s1946
+    s1951 = s1944 + s1945
+    s1952 = omega_front_left_thigh_x_squared_2 + omega_front_left_thigh_z_squared_2
+    s1953 = s1947 - s1942
+    s1954 = s1946 - s1943
+    s1955 = s1942 + s1947
+    s1956 = omega_front_left_thigh_x_squared_2 + omega_front_left_thigh_y_squared_2
+    a_front_right_thigh_x = a_front_right_hip_x + (s1120 * s1901 - s1119 * s1900 + s1121 * s1902)
+    a_front_right_thigh_y = a_front_right_hip_y + (s1119 * s1903 - s1120 * s1904 + s1121 * s1905)
+    a_front_right_thigh_z = a_front_right_hip_z + (s1119 * s1906 + s1120 * s1907 - s1121 * s1908)
+    s1957 = s1894 + (omega_front_right_hip_y_2 * s1834 - omega_front_right_hip_z_2 * s1833)
+    s1958 = s1895 + (omega_front_right_hip_z_2 * s1832 - omega_front_right_hip_x_2 * s1834)
+    s1959 = s1896 + (omega_front_right_hip_x_2 * s1833 - omega_front_right_hip_y_2 * s1832)
+    s1960 = s1957 - s933 * s905
+    s1961 = s1958 - s935 * s905
+    s1962 = s1959 - s937 * s905
     omega_front_right_thigh_x_squared_2 = omega_front_right_thigh_x_2 * omega_front_right_thigh_x_2
     omega_front_right_thigh_y_squared_2 = omega_front_right_thigh_y_2 * omega_front_right_thigh_y_2
     omega_front_right_thigh_z_squared_2 = omega_front_right_thigh_z_2 * omega_front_right_thigh_z_2
-    s1968 = omega_front_right_thigh_x_2 * omega_front_right_thigh_y_2
-    s1969 = omega_front_right_thigh_x_2 * omega_front_right_thigh_z_2
-    s1970 = omega_front_right_thigh_y_2 * omega_front_right_thigh_z_2
-    s1971 = omega_front_right_thigh_y_squared_2 + omega_front_right_thigh_z_squared_2
-    s1972 = s1968 - s1967
-    s1973 = s1966 + s1969
-    s1974 = s1967 + s1968
-    s1975 = omega_front_right_thigh_x_squared_2 + omega_front_right_thigh_z_squared_2
-    s1976 = s1970 - s1965
-    s1977 = s1969 - s1966
-    s1978 = s1965 + s1970
-    s1979 = omega_front_right_thigh_x_squared_2 + omega_front_right_thigh_y_squared_2
-    s1980 = omega_front_right_thigh_z_squared_2 - omega_front_right_thigh_y_squared_2
-    s1981 = omega_front_right_thigh_x_squared_2 - omega_front_right_thigh_z_squared_2
-    s1982 = omega_front_right_thigh_y_squared_2 - omega_front_right_thigh_x_squared_2
-    a_hind_left_thigh_x = a_hind_left_hip_x + (s1145 * s1921 - s1144 * s1920 + s1146 * s1922)
-    a_hind_left_thigh_y = a_hind_left_hip_y + (s1144 * s1923 - s1145 * s1924 + s1146 * s1925)
-    a_hind_left_thigh_z = a_hind_left_hip_z + (s1144 * s1926 + s1145 * s1927 - s1146 * s1928)
-    s1983 = s1914 + (omega_hind_left_hip_y_2 * s1842 - omega_hind_left_hip_z_2 * s1841)
-    s1984 = s1915 + (omega_hind_left_hip_z_2 * s1840 - omega_hind_left_hip_x_2 * s1842)
-    s1985 = s1916 + (omega_hind_left_hip_x_2 * s1841 - omega_hind_left_hip_y_2 * s1840)
-    s1986 = s1983 - s944 * s915
-    s1987 = s1984 - s946 * s915
-    s1988 = s1985 - s948 * s915
+    s1963 = omega_front_right_thigh_x_2 * omega_front_right_thigh_y_2
+    s1964 = omega_front_right_thigh_x_2 * omega_front_right_thigh_z_2
+    s1965 = omega_front_right_thigh_y_2 * omega_front_right_thigh_z_2
+    s1966 = omega_front_right_thigh_y_squared_2 + omega_front_right_thigh_z_squared_2
+    s1967 = s1963 - s1962
+    s1968 = s1961 + s1964
+    s1969 = s1962 + s1963
+    s1970 = omega_front_right_thigh_x_squared_2 + omega_front_right_thigh_z_squared_2
+    s1971 = s1965 - s1960
+    s1972 = s1964 - s1961
+    s1973 = s1960 + s1965
+    s1974 = omega_front_right_thigh_x_squared_2 + omega_front_right_thigh_y_squared_2
+    s1975 = omega_front_right_thigh_z_squared_2 - omega_front_right_thigh_y_squared_2
+    s1976 = omega_front_right_thigh_x_squared_2 - omega_front_right_thigh_z_squared_2
+    s1977 = omega_front_right_thigh_y_squared_2 - omega_front_right_thigh_x_squared_2
+    a_hind_left_thigh_x = a_hind_left_hip_x + (s1140 * s1916 - s1139 * s1915 + s1141 * s1917)
+    a_hind_left_thigh_y = a_hind_left_hip_y + (s1139 * s1918 - s1140 * s1919 + s1141 * s1920)
+    a_hind_left_thigh_z = a_hind_left_hip_z + (s1139 * s1921 + s1140 * s1922 - s1141 * s1923)
+    s1978 = s1909 + (omega_hind_left_hip_y_2 * s1837 - omega_hind_left_hip_z_2 * s1836)
+    s1979 = s1910 + (omega_hind_left_hip_z_2 * s1835 - omega_hind_left_hip_x_2 * s1837)
+    s1980 = s1911 + (omega_hind_left_hip_x_2 * s1836 - omega_hind_left_hip_y_2 * s1835)
+    s1981 = s1978 - s939 * s910
+    s1982 = s1979 - s941 * s910
+    s1983 = s1980 - s943 * s910
     omega_hind_left_thigh_x_squared_2 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_x_2
     omega_hind_left_thigh_y_squared_2 = omega_hind_left_thigh_y_2 * omega_hind_left_thigh_y_2
     omega_hind_left_thigh_z_squared_2 = omega_hind_left_thigh_z_2 * omega_hind_left_thigh_z_2
-    s1989 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_y_2
-    s1990 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_z_2
-    s1991 = omega_hind_left_thigh_y_2 * omega_hind_left_thigh_z_2
-    s1992 = omega_hind_left_thigh_y_squared_2 + omega_hind_left_thigh_z_squared_2
-    s1993 = s1989 - s1988
-    s1994 = s1987 + s1990
-    s1995 = s1988 + s1989
-    s1996 = omega_hind_left_thigh_x_squared_2 + omega_hind_left_thigh_z_squared_2
-    s1997 = s1991 - s1986
-    s1998 = s1990 - s1987
-    s1999 = s1986 + s1991
-    s2000 = omega_hind_left_thigh_x_squared_2 + omega_hind_left_thigh_y_squared_2
-    a_hind_right_thigh_x = a_hind_right_hip_x + (s1165 * s1936 - s1164 * s1935 + s1166 * s1937)
-    a_hind_right_thigh_y = a_hind_right_hip_y + (s1164 * s1938 - s1165 * s1939 + s1166 * s1940)
-    a_hind_right_thigh_z = a_hind_right_hip_z + (s1164 * s1941 + s1165 * s1942 - s1166 * s1943)
-    s2001 = s1929 + (omega_hind_right_hip_y_2 * s1845 - omega_hind_right_hip_z_2 * s1844)
-    s2002 = s1930 + (omega_hind_right_hip_z_2 * s1843 - omega_hind_right_hip_x_2 * s1845)
-    s2003 = s1931 + (omega_hind_right_hip_x_2 * s1844 - omega_hind_right_hip_y_2 * s1843)
-    s2004 = s2001 - s950 * s920
-    s2005 = s2002 - s952 * s920
-    s2006 = s2003 - s954 * s920
+    s1984 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_y_2
+    s1985 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_z_2
+    s1986 = omega_hind_left_thigh_y_2 * omega_hind_left_thigh_z_2
+    s1987 = omega_hind_left_thigh_y_squared_2 + omega_hind_left_thigh_z_squared_2
+    s1988 = s1984 - s1983
+    s1989 = s1982 + s1985
+    s1990 = s1983 + s1984
+    s1991 = omega_hind_left_thigh_x_squared_2 + omega_hind_left_thigh_z_squared_2
+    s1992 = s1986 - s1981
+    s1993 = s1985 - s1982
+    s1994 = s1981 + s1986
+    s1995 = omega_hind_left_thigh_x_squared_2 + omega_hind_left_thigh_y_squared_2
+    a_hind_right_thigh_x = a_hind_right_hip_x + (s1160 * s1931 - s1159 * s1930 + s1161 * s1932)
+    a_hind_right_thigh_y = a_hind_right_hip_y + (s1159 * s1933 - s1160 * s1934 + s1161 * s1935)
+    a_hind_right_thigh_z = a_hind_right_hip_z + (s1159 * s1936 + s1160 * s1937 - s1161 * s1938)
+    s1996 = s1924 + (omega_hind_right_hip_y_2 * s1840 - omega_hind_right_hip_z_2 * s1839)
+    s1997 = s1925 + (omega_hind_right_hip_z_2 * s1838 - omega_hind_right_hip_x_2 * s1840)
+    s1998 = s1926 + (omega_hind_right_hip_x_2 * s1839 - omega_hind_right_hip_y_2 * s1838)
+    s1999 = s1996 - s945 * s915
+    s2000 = s1997 - s947 * s915
+    s2001 = s1998 - s949 * s915
     omega_hind_right_thigh_x_squared_2 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_x_2
     omega_hind_right_thigh_y_squared_2 = omega_hind_right_thigh_y_2 * omega_hind_right_thigh_y_2
     omega_hind_right_thigh_z_squared_2 = omega_hind_right_thigh_z_2 * omega_hind_right_thigh_z_2
-    s2007 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_y_2
-    s2008 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_z_2
-    s2009 = omega_hind_right_thigh_y_2 * omega_hind_right_thigh_z_2
-    s2010 = omega_hind_right_thigh_y_squared_2 + omega_hind_right_thigh_z_squared_2
-    s2011 = s2007 - s2006
-    s2012 = s2005 + s2008
-    s2013 = s2006 + s2007
-    s2014 = omega_hind_right_thigh_x_squared_2 + omega_hind_right_thigh_z_squared_2
-    s2015 = s2009 - s2004
-    s2016 = s2008 - s2005
-    s2017 = s2004 + s2009
-    s2018 = omega_hind_right_thigh_x_squared_2 + omega_hind_right_thigh_y_squared_2
-    a_front_left_shank_x = a_front_left_thigh_x + (s1185 * s1954 - s1184 * s1953 + s1186 * s1955)
-    a_front_left_shank_y = a_front_left_thigh_y + (s1184 * s1956 - s1185 * s1957 + s1186 * s1958)
-    a_front_left_shank_z = a_front_left_thigh_z + (s1184 * s1959 + s1185 * s1960 - s1186 * s1961)
-    s2019 = s1947 + (omega_front_left_thigh_y_2 * s1848 - omega_front_left_thigh_z_2 * s1847)
-    s2020 = s1948 + (omega_front_left_thigh_z_2 * s1846 - omega_front_left_thigh_x_2 * s1848)
-    s2021 = s1949 + (omega_front_left_thigh_x_2 * s1847 - omega_front_left_thigh_y_2 * s1846)
-    s2022 = s2019 + s932 * front_left_knee_angle_ddot
-    s2023 = s2020 + s934 * front_left_knee_angle_ddot
-    s2024 = s2021 + s936 * front_left_knee_angle_ddot
+    s2002 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_y_2
+    s2003 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_z_2
+    s2004 = omega_hind_right_thigh_y_2 * omega_hind_right_thigh_z_2
+    s2005 = omega_hind_right_thigh_y_squared_2 + omega_hind_right_thigh_z_squared_2
+    s2006 = s2002 - s2001
+    s2007 = s2000 + s2003
+    s2008 = s2001 + s2002
+    s2009 = omega_hind_right_thigh_x_squared_2 + omega_hind_right_thigh_z_squared_2
+    s2010 = s2004 - s1999
+    s2011 = s2003 - s2000
+    s2012 = s1999 + s2004
+    s2013 = omega_hind_right_thigh_x_squared_2 + omega_hind_right_thigh_y_squared_2
+    a_front_left_shank_x = a_front_left_thigh_x + (s1180 * s1949 - s1179 * s1948 + s1181 * s1950)
+    a_front_left_shank_y = a_front_left_thigh_y + (s1179 * s1951 - s1180 * s1952 + s1181 * s1953)
+    a_front_left_shank_z = a_front_left_thigh_z + (s1179 * s1954 + s1180 * s1955 - s1181 * s1956)
+    s2014 = s1942 + (omega_front_left_thigh_y_2 * s1843 - omega_front_left_thigh_z_2 * s1842)
+    s2015 = s1943 + (omega_front_left_thigh_z_2 * s1841 - omega_front_left_thigh_x_2 * s1843)
+    s2016 = s1944 + (omega_front_left_thigh_x_2 * s1842 - omega_front_left_thigh_y_2 * s1841)
+    s2017 = s2014 + s927 * front_left_knee_angle_ddot
+    s2018 = s2015 + s929 * front_left_knee_angle_ddot
+    s2019 = s2016 + s931 * front_left_knee_angle_ddot
     omega_front_left_shank_x_squared = omega_front_left_shank_x_2 * omega_front_left_shank_x_2
     omega_front_left_shank_y_squared = omega_front_left_shank_y_2 * omega_front_left_shank_y_2
     omega_front_left_shank_z_squared = omega_front_left_shank_z_2 * omega_front_left_shank_z_2
-    s2025 = omega_front_left_shank_x_2 * omega_front_left_shank_y_2
-    s2026 = omega_front_left_shank_x_2 * omega_front_left_shank_z_2
-    s2027 = omega_front_left_shank_y_2 * omega_front_left_shank_z_2
-    s2028 = s2025 - s2024
-    s2029 = s2023 + s2026
-    s2030 = s2024 + s2025
-    s2031 = s2027 - s2022
-    s2032 = s2026 - s2023
-    s2033 = s2022 + s2027
-    a_front_right_shank_x = a_front_right_thigh_x + (s1204 * s1972 - s1203 * s1971 + s1205 * s1973)
-    a_front_right_shank_y = a_front_right_thigh_y + (s1203 * s1974 - s1204 * s1975 + s1205 * s1976)
-    a_front_right_shank_z = a_front_right_thigh_z + (s1203 * s1977 + s1204 * s1978 - s1205 * s1979)
-    s2034 = omega_front_right_thigh_y_2 * s1854 - omega_front_right_thigh_z_2 * s1853
-    s2035 = omega_front_right_thigh_z_2 * s1852 - omega_front_right_thigh_x_2 * s1854
-    s2036 = omega_front_right_thigh_x_2 * s1853 - omega_front_right_thigh_y_2 * s1852
-    s2037 = s1965 + s2034 + s938 * front_right_knee_angle_ddot
-    s2038 = s1966 + s2035 + s940 * front_right_knee_angle_ddot
-    s2039 = s1967 + s2036 + s942 * front_right_knee_angle_ddot
+    s2020 = omega_front_left_shank_x_2 * omega_front_left_shank_y_2
+    s2021 = omega_front_left_shank_x_2 * omega_front_left_shank_z_2
+    s2022 = omega_front_left_shank_y_2 * omega_front_left_shank_z_2
+    s2023 = s2020 - s2019
+    s2024 = s2018 + s2021
+    s2025 = s2019 + s2020
+    s2026 = s2022 - s2017
+    s2027 = s2021 - s2018
+    s2028 = s2017 + s2022
+    a_front_right_shank_x = a_front_right_thigh_x + (s1199 * s1967 - s1198 * s1966 + s1200 * s1968)
+    a_front_right_shank_y = a_front_right_thigh_y + (s1198 * s1969 - s1199 * s1970 + s1200 * s1971)
+    a_front_right_shank_z = a_front_right_thigh_z + (s1198 * s1972 + s1199 * s1973 - s1200 * s1974)
+    s2029 = omega_front_right_thigh_y_2 * s1849 - omega_front_right_thigh_z_2 * s1848
+    s2030 = omega_front_right_thigh_z_2 * s1847 - omega_front_right_thigh_x_2 * s1849
+    s2031 = omega_front_right_thigh_x_2 * s1848 - omega_front_right_thigh_y_2 * s1847
+    s2032 = s1960 + s2029 + s933 * front_right_knee_angle_ddot
+    s2033 = s1961 + s2030 + s935 * front_right_knee_angle_ddot
+    s2034 = s1962 + s2031 + s937 * front_right_knee_angle_ddot
     omega_front_right_shank_x_squared = omega_front_right_shank_x_2 * omega_front_right_shank_x_2
     omega_front_right_shank_y_squared = omega_front_right_shank_y_2 * omega_front_right_shank_y_2
     omega_front_right_shank_z_squared = omega_front_right_shank_z_2 * omega_front_right_shank_z_2
-    s2040 = omega_front_right_shank_x_2 * omega_front_right_shank_y_2
-    s2041 = omega_front_right_shank_x_2 * omega_front_right_shank_z_2
-    s2042 = omega_front_right_shank_y_2 * omega_front_right_shank_z_2
-    s2043 = s2040 - s2039
-    s2044 = s2038 + s2041
-    s2045 = s2039 + s2040
-    s2046 = s2042 - s2037
-    s2047 = s2041 - s2038
-    s2048 = s2037 + s2042
-    a_hind_left_shank_x = a_hind_left_thigh_x + (s1223 * s1993 - s1222 * s1992 + s1224 * s1994)
-    a_hind_left_shank_y = a_hind_left_thigh_y + (s1222 * s1995 - s1223 * s1996 + s1224 * s1997)
-    a_hind_left_shank_z = a_hind_left_thigh_z + (s1222 * s1998 + s1223 * s1999 - s1224 * s2000)
-    s2049 = s1986 + (omega_hind_left_thigh_y_2 * s1857 - omega_hind_left_thigh_z_2 * s1856)
-    s2050 = s1987 + (omega_hind_left_thigh_z_2 * s1855 - omega_hind_left_thigh_x_2 * s1857)
-    s2051 = s1988 + (omega_hind_left_thigh_x_2 * s1856 - omega_hind_left_thigh_y_2 * s1855)
-    s2052 = s2049 + s944 * hind_left_knee_angle_ddot
-    s2053 = s2050 + s946 * hind_left_knee_angle_ddot
-    s2054 = s2051 + s948 * hind_left_knee_angle_ddot
+    s2035 = omega_front_right_shank_x_2 * omega_front_right_shank_y_2
+    s2036 = omega_front_right_shank_x_2 * omega_front_right_shank_z_2
+    s2037 = omega_front_right_shank_y_2 * omega_front_right_shank_z_2
+    s2038 = s2035 - s2034
+    s2039 = s2033 + s2036
+    s2040 = s2034 + s2035
+    s2041 = s2037 - s2032
+    s2042 = s2036 - s2033
+    s2043 = s2032 + s2037
+    a_hind_left_shank_x = a_hind_left_thigh_x + (s1218 * s1988 - s1217 * s1987 + s1219 * s1989)
+    a_hind_left_shank_y = a_hind_left_thigh_y + (s1217 * s1990 - s1218 * s1991 + s1219 * s1992)
+    a_hind_left_shank_z = a_hind_left_thigh_z + (s1217 * s1993 + s1218 * s1994 - s1219 * s1995)
+    s2044 = s1981 + (omega_hind_left_thigh_y_2 * s1852 - omega_hind_left_thigh_z_2 * s1851)
+    s2045 = s1982 + (omega_hind_left_thigh_z_2 * s1850 - omega_hind_left_thigh_x_2 * s1852)
+    s2046 = s1983 + (omega_hind_left_thigh_x_2 * s1851 - omega_hind_left_thigh_y_2 * s1850)
+    s2047 = s2044 + s939 * hind_left_knee_angle_ddot
+    s2048 = s2045 + s941 * hind_left_knee_angle_ddot
+    s2049 = s2046 + s943 * hind_left_knee_angle_ddot
     omega_hind_left_shank_x_squared = omega_hind_left_shank_x_2 * omega_hind_left_shank_x_2
     omega_hind_left_shank_y_squared = omega_hind_left_shank_y_2 * omega_hind_left_shank_y_2
     omega_hind_left_shank_z_squared = omega_hind_left_shank_z_2 * omega_hind_left_shank_z_2
-    s2055 = omega_hind_left_shank_x_2 * omega_hind_left_shank_y_2
-    s2056 = omega_hind_left_shank_x_2 * omega_hind_left_shank_z_2
-    s2057 = omega_hind_left_shank_y_2 * omega_hind_left_shank_z_2
-    s2058 = s2055 - s2054
-    s2059 = s2053 + s2056
-    s2060 = s2054 + s2055
-    s2061 = s2057 - s2052
-    s2062 = s2056 - s2053
-    s2063 = s2052 + s2057
-    a_hind_right_shank_x = a_hind_right_thigh_x + (s1242 * s2011 - s1241 * s2010 + s1243 * s2012)
-    a_hind_right_shank_y = a_hind_right_thigh_y + (s1241 * s2013 - s1242 * s2014 + s1243 * s2015)
-    a_hind_right_shank_z = a_hind_right_thigh_z + (s1241 * s2016 + s1242 * s2017 - s1243 * s2018)
-    s2064 = s2004 + (omega_hind_right_thigh_y_2 * s1860 - omega_hind_right_thigh_z_2 * s1859)
-    s2065 = s2005 + (omega_hind_right_thigh_z_2 * s1858 - omega_hind_right_thigh_x_2 * s1860)
-    s2066 = s2006 + (omega_hind_right_thigh_x_2 * s1859 - omega_hind_right_thigh_y_2 * s1858)
-    s2067 = s2064 + s950 * hind_right_knee_angle_ddot
-    s2068 = s2065 + s952 * hind_right_knee_angle_ddot
-    s2069 = s2066 + s954 * hind_right_knee_angle_ddot
+    s2050 = omega_hind_left_shank_x_2 * omega_hind_left_shank_y_2
+    s2051 = omega_hind_left_shank_x_2 * omega_hind_left_shank_z_2
+    s2052 = omega_hind_left_shank_y_2 * omega_hind_left_shank_z_2
+    s2053 = s2050 - s2049
+    s2054 = s2048 + s2051
+    s2055 = s2049 + s2050
+    s2056 = s2052 - s2047
+    s2057 = s2051 - s2048
+    s2058 = s2047 + s2052
+    a_hind_right_shank_x = a_hind_right_thigh_x + (s1237 * s2006 - s1236 * s2005 + s1238 * s2007)
+    a_hind_right_shank_y = a_hind_right_thigh_y + (s1236 * s2008 - s1237 * s2009 + s1238 * s2010)
+    a_hind_right_shank_z = a_hind_right_thigh_z + (s1236 * s2011 + s1237 * s2012 - s1238 * s2013)
+    s2059 = s1999 + (omega_hind_right_thigh_y_2 * s1855 - omega_hind_right_thigh_z_2 * s1854)
+    s2060 = s2000 + (omega_hind_right_thigh_z_2 * s1853 - omega_hind_right_thigh_x_2 * s1855)
+    s2061 = s2001 + (omega_hind_right_thigh_x_2 * s1854 - omega_hind_right_thigh_y_2 * s1853)
+    s2062 = s2059 + s945 * hind_right_knee_angle_ddot
+    s2063 = s2060 + s947 * hind_right_knee_angle_ddot
+    s2064 = s2061 + s949 * hind_right_knee_angle_ddot
     omega_hind_right_shank_x_squared = omega_hind_right_shank_x_2 * omega_hind_right_shank_x_2
     omega_hind_right_shank_y_squared = omega_hind_right_shank_y_2 * omega_hind_right_shank_y_2
     omega_hind_right_shank_z_squared = omega_hind_right_shank_z_2 * omega_hind_right_shank_z_2
-    s2070 = omega_hind_right_shank_x_2 * omega_hind_right_shank_y_2
-    s2071 = omega_hind_right_shank_x_2 * omega_hind_right_shank_z_2
-    s2072 = omega_hind_right_shank_y_2 * omega_hind_right_shank_z_2
-    s2073 = s2070 - s2069
-    s2074 = s2068 + s2071
-    s2075 = s2069 + s2070
-    s2076 = s2072 - s2067
-    s2077 = s2071 - s2068
-    s2078 = s2067 + s2072
-    s2079 = 0.5 * (s1012 + (s1010 + s1011))
-    s2080 = s2079 - s1010
-    s2081 = s2079 - s1011
-    s2082 = s2079 - s1012
-    s2083 = m_hip * a_front_left_hip_x + (s1026 * s1891 - s1025 * s1890 + s1027 * s1892)
-    s2084 = m_hip * a_front_left_hip_y + (s1025 * s1893 - s1026 * s1894 + s1027 * s1895)
-    s2085 = m_hip * a_front_left_hip_z + (s1025 * s1896 + s1026 * s1897 - s1027 * s1898)
-    s2086 = 0.5 * (s1046 + (s1043 + s1044))
-    s2087 = s2086 - s1043
-    s2088 = s2086 - s1044
-    s2089 = s2086 - s1046
-    s2090 = s1049 * (omega_front_left_hip_z_squared_2 - omega_front_left_hip_y_squared_2)
-    s2091 = s1048 * (omega_front_left_hip_x_squared_2 - omega_front_left_hip_z_squared_2)
-    s2092 = s1047 * (omega_front_left_hip_y_squared_2 - omega_front_left_hip_x_squared_2)
-    s2093 = s1026 * a_front_left_hip_z - s1027 * a_front_left_hip_y + (s1048 * s1893 - s1047 * s1896 - s2090 + s1897 * s2088 - s1895 * s2089)
-    s2094 = s1027 * a_front_left_hip_x - s1025 * a_front_left_hip_z + (s1047 * s1897 - s1049 * s1891 - s2091 + s1892 * s2089 - s1896 * s2087)
-    s2095 = s1025 * a_front_left_hip_y - s1026 * a_front_left_hip_x + (s1049 * s1892 - s1048 * s1895 - s2092 + s1893 * s2087 - s1891 * s2088)
-    s2096 = m_hip * a_front_right_hip_x + (s1053 * s1905 - s1054 * s1906 - s1055 * s1907)
-    s2097 = m_hip * a_front_right_hip_y + (s1054 * s1909 - s1053 * s1908 - s1055 * s1910)
-    s2098 = m_hip * a_front_right_hip_z + (s1055 * s1913 - (s1053 * s1911 + s1054 * s1912))
-    s2099 = 0.5 * (s1065 + (s1062 + s1063))
-    s2100 = s2099 - s1062
-    s2101 = s2099 - s1063
-    s2102 = s2099 - s1065
-    s2103 = s1068 * (omega_front_right_hip_z_squared_2 - omega_front_right_hip_y_squared_2)
-    s2104 = s1067 * (omega_front_right_hip_x_squared_2 - omega_front_right_hip_z_squared_2)
-    s2105 = s1066 * (omega_front_right_hip_y_squared_2 - omega_front_right_hip_x_squared_2)
-    s2106 = s1055 * a_front_right_hip_y - s1054 * a_front_right_hip_z + (s1067 * s1908 - s1066 * s1911 - s2103 + s1912 * s2101 - s1910 * s2102)
-    s2107 = s1053 * a_front_right_hip_z - s1055 * a_front_right_hip_x + (s1066 * s1912 - s1068 * s1906 - s2104 + s1907 * s2102 - s1911 * s2100)
-    s2108 = s1054 * a_front_right_hip_x - s1053 * a_front_right_hip_y + (s1068 * s1907 - s1067 * s1910 - s2105 + s1908 * s2100 - s1906 * s2101)
-    s2109 = m_hip * a_hind_left_hip_x + (s1073 * s1921 - s1072 * s1920 + s1074 * s1922)
-    s2110 = m_hip * a_hind_left_hip_y + (s1072 * s1923 - s1073 * s1924 + s1074 * s1925)
-    s2111 = m_hip * a_hind_left_hip_z + (s1072 * s1926 + s1073 * s1927 - s1074 * s1928)
-    s2112 = 0.5 * (s1084 + (s1081 + s1082))
-    s2113 = s2112 - s1081
-    s2114 = s2112 - s1082
-    s2115 = s2112 - s1084
-    s2116 = s1087 * (omega_hind_left_hip_z_squared_2 - omega_hind_left_hip_y_squared_2)
-    s2117 = s1086 * (omega_hind_left_hip_x_squared_2 - omega_hind_left_hip_z_squared_2)
-    s2118 = s1085 * (omega_hind_left_hip_y_squared_2 - omega_hind_left_hip_x_squared_2)
-    s2119 = s1073 * a_hind_left_hip_z - s1074 * a_hind_left_hip_y + (s1086 * s1923 - s1085 * s1926 - s2116 + s1927 * s2114 - s1925 * s2115)
-    s2120 = s1074 * a_hind_left_hip_x - s1072 * a_hind_left_hip_z + (s1085 * s1927 - s1087 * s1921 - s2117 + s1922 * s2115 - s1926 * s2113)
-    s2121 = s1072 * a_hind_left_hip_y - s1073 * a_hind_left_hip_x + (s1087 * s1922 - s1086 * s1925 - s2118 + s1923 * s2113 - s1921 * s2114)
-    s2122 = m_hip * a_hind_right_hip_x + (s1088 * s1935 - s1089 * s1936 - s1090 * s1937)
-    s2123 = m_hip * a_hind_right_hip_y + (s1089 * s1939 - s1088 * s1938 - s1090 * s1940)
-    s2124 = m_hip * a_hind_right_hip_z + (s1090 * s1943 - (s1088 * s1941 + s1089 * s1942))
-    s2125 = 0.5 * (s1100 + (s1097 + s1098))
-    s2126 = s2125 - s1097
-    s2127 = s2125 - s1098
-    s2128 = s2125 - s1100
-    s2129 = s1103 * (omega_hind_right_hip_z_squared_2 - omega_hind_right_hip_y_squared_2)
-    s2130 = s1102 * (omega_hind_right_hip_x_squared_2 - omega_hind_right_hip_z_squared_2)
-    s2131 = s1101 * (omega_hind_right_hip_y_squared_2 - omega_hind_right_hip_x_squared_2)
-    s2132 = s1090 * a_hind_right_hip_y - s1089 * a_hind_right_hip_z + (s1102 * s1938 - s1101 * s1941 - s2129 + s1942 * s2127 - s1940 * s2128)
-    s2133 = s1088 * a_hind_right_hip_z - s1090 * a_hind_right_hip_x + (s1101 * s1942 - s1103 * s1936 - s2130 + s1937 * s2128 - s1941 * s2126)
-    s2134 = s1089 * a_hind_right_hip_x - s1088 * a_hind_right_hip_y + (s1103 * s1937 - s1102 * s1940 - s2131 + s1938 * s2126 - s1936 * s2127)
-    s2135 = m_thigh * a_front_left_thigh_x + (s1108 * s1954 - s1107 * s1953 + s1109 * s1955)
-    s2136 = m_thigh * a_front_left_thigh_y + (s1107 * s1956 - s1108 * s1957 + s1109 * s1958)
-    s2137 = m_thigh * a_front_left_thigh_z + (s1107 * s1959 + s1108 * s1960 - s1109 * s1961)
-    s2138 = 0.5 * (s1120 + (s1116 + s1117))
-    s2139 = s2138 - s1116
-    s2140 = s2138 - s1117
-    s2141 = s2138 - s1120
-    s2142 = s1123 * (omega_front_left_thigh_z_squared_2 - omega_front_left_thigh_y_squared_2)
-    s2143 = s1122 * (omega_front_left_thigh_x_squared_2 - omega_front_left_thigh_z_squared_2)
-    s2144 = s1121 * (omega_front_left_thigh_y_squared_2 - omega_front_left_thigh_x_squared_2)
-    s2145 = s1108 * a_front_left_thigh_z - s1109 * a_front_left_thigh_y + (s1122 * s1956 - s1121 * s1959 - s2142 + s1960 * s2140 - s1958 * s2141)
-    s2146 = s1109 * a_front_left_thigh_x - s1107 * a_front_left_thigh_z + (s1121 * s1960 - s1123 * s1954 - s2143 + s1955 * s2141 - s1959 * s2139)
-    s2147 = s1107 * a_front_left_thigh_y - s1108 * a_front_left_thigh_x + (s1123 * s1955 - s1122 * s1958 - s2144 + s1956 * s2139 - s1954 * s2140)
-    s2148 = m_thigh * a_front_right_thigh_x + (s1127 * s1971 - s1128 * s1972 - s1129 * s1973)
-    s2149 = m_thigh * a_front_right_thigh_y + (s1128 * s1975 - s1127 * s1974 - s1129 * s1976)
-    s2150 = m_thigh * a_front_right_thigh_z + (s1129 * s1979 - (s1127 * s1977 + s1128 * s1978))
-    s2151 = 0.5 * (s1140 + (s1136 + s1137))
-    s2152 = s2151 - s1136
-    s2153 = s2151 - s1137
-    s2154 = s2151 - s1140
-    s2155 = s1142 * s1974 - s1141 * s1977 - s1143 * s1980 + s1978 * s2153 - s1976 * s2154
-    s2156 = s1141 * s1978 - s1143 * s1972 - s1142 * s1981 + s1973 * s2154 - s1977 * s2152
-    s2157 = s1143 * s1973 - s1142 * s1976 - s1141 * s1982 + s1974 * s2152 - s1972 * s2153
-    s2158 = m_thigh * a_hind_left_thigh_x + (s1148 * s1993 - s1147 * s1992 + s1149 * s1994)
-    s2159 = m_thigh * a_hind_left_thigh_y + (s1147 * s1995 - s1148 * s1996 + s1149 * s1997)
-    s2160 = m_thigh * a_hind_left_thigh_z + (s1147 * s1998 + s1148 * s1999 - s1149 * s2000)
-    s2161 = 0.5 * (s1160 + (s1156 + s1157))
-    s2162 = s2161 - s1156
-    s2163 = s2161 - s1157
-    s2164 = s2161 - s1160
-    s2165 = s1163 * (omega_hind_left_thigh_z_squared_2 - omega_hind_left_thigh_y_squared_2)
-    s2166 = s1162 * (omega_hind_left_thigh_x_squared_2 - omega_hind_left_thigh_z_squared_2)
-    s2167 = s1161 * (omega_hind_left_thigh_y_squared_2 - omega_hind_left_thigh_x_squared_2)
-    s2168 = s1148 * a_hind_left_thigh_z - s1149 * a_hind_left_thigh_y + (s1162 * s1995 - s1161 * s1998 - s2165 + s1999 * s2163 - s1997 * s2164)
-    s2169 = s1149 * a_hind_left_thigh_x - s1147 * a_hind_left_thigh_z + (s1161 * s1999 - s1163 * s1993 - s2166 + s1994 * s2164 - s1998 * s2162)
-    s2170 = s1147 * a_hind_left_thigh_y - s1148 * a_hind_left_thigh_x + (s1163 * s1994 - s1162 * s1997 - s2167 + s1995 * s2162 - s1993 * s2163)
-    s2171 = m_thigh * a_hind_right_thigh_x + (s1167 * s2010 - s1168 * s2011 - s1169 * s2012)
-    s2172 = m_thigh * a_hind_right_thigh_y + (s1168 * s2014 - s1167 * s2013 - s1169 * s2015)
-    s2173 = m_thigh * a_hind_right_thigh_z + (s1169 * s2018 - (s1167 * s2016 + s1168 * s2017))
-    s2174 = 0.5 * (s1180 + (s1176 + s1177))
-    s2175 = s2174 - s1176
-    s2176 = s2174 - s1177
-    s2177 = s2174 - s1180
-    s2178 = s1183 * (omega_hind_right_thigh_z_squared_2 - omega_hind_right_thigh_y_squared_2)
-    s2179 = s1182 * (omega_hind_right_thigh_x_squared_2 - omega_hind_right_thigh_z_squared_2)
-    s2180 = s1181 * (omega_hind_right_thigh_y_squared_2 - omega_hind_right_thigh_x_squared_2)
-    s2181 = s1169 * a_hind_right_thigh_y - s1168 * a_hind_right_thigh_z + (s1182 * s2013 - s1181 * s2016 - s2178 + s2017 * s2176 - s2015 * s2177)
-    s2182 = s1167 * a_hind_right_thigh_z - s1169 * a_hind_right_thigh_x + (s1181 * s2017 - s1183 * s2011 - s2179 + s2012 * s2177 - s2016 * s2175)
-    s2183 = s1168 * a_hind_right_thigh_x - s1167 * a_hind_right_thigh_y + (s1183 * s2012 - s1182 * s2015 - s2180 + s2013 * s2175 - s2011 * s2176)
-    s2184 = s1187 * (omega_front_left_shank_y_squared + omega_front_left_shank_z_squared)
-    s2185 = s1188 * (omega_front_left_shank_x_squared + omega_front_left_shank_z_squared)
-    s2186 = s1189 * (omega_front_left_shank_x_squared + omega_front_left_shank_y_squared)
-    s2187 = m_shank * a_front_left_shank_x + (s2184 - s1188 * s2028 - s1189 * s2029)
-    s2188 = m_shank * a_front_left_shank_y + (s2185 - s1187 * s2030 - s1189 * s2031)
-    s2189 = m_shank * a_front_left_shank_z + (s2186 - (s1187 * s2032 + s1188 * s2033))
-    s2190 = 0.5 * (s1199 + (s1196 + s1197))
-    s2191 = s2190 - s1196
-    s2192 = s2190 - s1197
-    s2193 = s2190 - s1199
-    s2194 = s1202 * (omega_front_left_shank_z_squared - omega_front_left_shank_y_squared)
-    s2195 = s1201 * (omega_front_left_shank_x_squared - omega_front_left_shank_z_squared)
-    s2196 = s1200 * (omega_front_left_shank_y_squared - omega_front_left_shank_x_squared)
-    s2197 = s1189 * a_front_left_shank_y - s1188 * a_front_left_shank_z + (s1201 * s2030 - s1200 * s2032 - s2194 + s2033 * s2192 - s2031 * s2193)
-    s2198 = s1187 * a_front_left_shank_z - s1189 * a_front_left_shank_x + (s1200 * s2033 - s1202 * s2028 - s2195 + s2029 * s2193 - s2032 * s2191)
-    s2199 = s1188 * a_front_left_shank_x - s1187 * a_front_left_shank_y + (s1202 * s2029 - s1201 * s2031 - s2196 + s2030 * s2191 - s2028 * s2192)
-    s2200 = s1206 * (omega_front_right_shank_y_squared + omega_front_right_shank_z_squared)
-    s2201 = s1207 * (omega_front_right_shank_x_squared + omega_front_right_shank_z_squared)
-    s2202 = s1208 * (omega_front_right_shank_x_squared + omega_front_right_shank_y_squared)
-    s2203 = m_shank * a_front_right_shank_x + (s2200 - s1207 * s2043 - s1208 * s2044)
-    s2204 = m_shank * a_front_right_shank_y + (s2201 - s1206 * s2045 - s1208 * s2046)
-    s2205 = m_shank * a_front_right_shank_z + (s2202 - (s1206 * s2047 + s1207 * s2048))
-    s2206 = 0.5 * (s1218 + (s1215 + s1216))
-    s2207 = s2206 - s1215
-    s2208 = s2206 - s1216
-    s2209 = s2206 - s1218
-    s2210 = s1221 * (omega_front_right_shank_z_squared - omega_front_right_shank_y_squared)
-    s2211 = s1220 * (omega_front_right_shank_x_squared - omega_front_right_shank_z_squared)
-    s2212 = s1219 * (omega_front_right_shank_y_squared - omega_front_right_shank_x_squared)
-    s2213 = s1208 * a_front_right_shank_y - s1207 * a_front_right_shank_z + (s1220 * s2045 - s1219 * s2047 - s2210 + s2048 * s2208 - s2046 * s2209)
-    s2214 = s1206 * a_front_right_shank_z - s1208 * a_front_right_shank_x + (s1219 * s2048 - s1221 * s2043 - s2211 + s2044 * s2209 - s2047 * s2207)
-    s2215 = s1207 * a_front_right_shank_x - s1206 * a_front_right_shank_y + (s1221 * s2044 - s1220 * s2046 - s2212 + s2045 * s2207 - s2043 * s2208)
-    s2216 = s1225 * (omega_hind_left_shank_y_squared + omega_hind_left_shank_z_squared)
-    s2217 = s1226 * (omega_hind_left_shank_x_squared + omega_hind_left_shank_z_squared)
-    s2218 = s1227 * (omega_hind_left_shank_x_squared + omega_hind_left_shank_y_squared)
-    s2219 = m_shank * a_hind_left_shank_x + (s2216 - s1226 * s2058 - s1227 * s2059)
-    s2220 = m_shank * a_hind_left_shank_y + (s2217 - s1225 * s2060 - s1227 * s2061)
-    s2221 = m_shank * a_hind_left_shank_z + (s2218 - (s1225 * s2062 + s1226 * s2063))
-    s2222 = 0.5 * (s1237 + (s1234 + s1235))
-    s2223 = s2222 - s1234
-    s2224 = s2222 - s1235
-    s2225 = s2222 - s1237
-    s2226 = s1240 * (omega_hind_left_shank_z_squared - omega_hind_left_shank_y_squared)
-    s2227 = s1239 * (omega_hind_left_shank_x_squared - omega_hind_left_shank_z_squared)
-    s2228 = s1238 * (omega_hind_left_shank_y_squared - omega_hind_left_shank_x_squared)
-    s2229 = s1227 * a_hind_left_shank_y - s1226 * a_hind_left_shank_z + (s1239 * s2060 - s1238 * s2062 - s2226 + s2063 * s2224 - s2061 * s2225)
-    s2230 = s1225 * a_hind_left_shank_z - s1227 * a_hind_left_shank_x + (s1238 * s2063 - s1240 * s2058 - s2227 + s2059 * s2225 - s2062 * s2223)
-    s2231 = s1226 * a_hind_left_shank_x - s1225 * a_hind_left_shank_y + (s1240 * s2059 - s1239 * s2061 - s2228 + s2060 * s2223 - s2058 * s2224)
-    s2232 = s1244 * (omega_hind_right_shank_y_squared + omega_hind_right_shank_z_squared)
-    s2233 = s1245 * (omega_hind_right_shank_x_squared + omega_hind_right_shank_z_squared)
-    s2234 = s1246 * (omega_hind_right_shank_x_squared + omega_hind_right_shank_y_squared)
-    s2235 = m_shank * a_hind_right_shank_x + (s2232 - s1245 * s2073 - s1246 * s2074)
-    s2236 = m_shank * a_hind_right_shank_y + (s2233 - s1244 * s2075 - s1246 * s2076)
-    s2237 = m_shank * a_hind_right_shank_z + (s2234 - (s1244 * s2077 + s1245 * s2078))
-    s2238 = 0.5 * (s1256 + (s1253 + s1254))
-    s2239 = s2238 - s1253
-    s2240 = s2238 - s1254
-    s2241 = s2238 - s1256
-    s2242 = s1259 * (omega_hind_right_shank_z_squared - omega_hind_right_shank_y_squared)
-    s2243 = s1258 * (omega_hind_right_shank_x_squared - omega_hind_right_shank_z_squared)
-    s2244 = s1257 * (omega_hind_right_shank_y_squared - omega_hind_right_shank_x_squared)
-    s2245 = s1246 * a_hind_right_shank_y - s1245 * a_hind_right_shank_z + (s1258 * s2075 - s1257 * s2077 - s2242 + s2078 * s2240 - s2076 * s2241)
-    s2246 = s1244 * a_hind_right_shank_z - s1246 * a_hind_right_shank_x + (s1257 * s2078 - s1259 * s2073 - s2243 + s2074 * s2241 - s2077 * s2239)
-    s2247 = s1245 * a_hind_right_shank_x - s1244 * a_hind_right_shank_y + (s1259 * s2074 - s1258 * s2076 - s2244 + s2075 * s2239 - s2073 * s2240)
-    s2248 = s2181 + (s2245 + (s1242 * s2237 - s1243 * s2236))
-    s2249 = s2182 + (s2246 + (s1243 * s2235 - s1241 * s2237))
-    s2250 = s2183 + (s2247 + (s1241 * s2236 - s1242 * s2235))
-    s2251 = s2171 + s2235
-    s2252 = s2172 + s2236
-    s2253 = s2173 + s2237
-    s2254 = s2168 + (s2229 + (s1223 * s2221 - s1224 * s2220))
-    s2255 = s2169 + (s2230 + (s1224 * s2219 - s1222 * s2221))
-    s2256 = s2170 + (s2231 + (s1222 * s2220 - s1223 * s2219))
-    s2257 = s2158 + s2219
-    s2258 = s2159 + s2220
-    s2259 = s2160 + s2221
-    s2260 = s1129 * a_front_right_thigh_y - s1128 * a_front_right_thigh_z + s2155 + (s2213 + (s1204 * s2205 - s1205 * s2204))
-    s2261 = s1127 * a_front_right_thigh_z - s1129 * a_front_right_thigh_x + s2156 + (s2214 + (s1205 * s2203 - s1203 * s2205))
-    s2262 = s1128 * a_front_right_thigh_x - s1127 * a_front_right_thigh_y + s2157 + (s2215 + (s1203 * s2204 - s1204 * s2203))
-    s2263 = s2148 + s2203
-    s2264 = s2149 + s2204
-    s2265 = s2150 + s2205
-    s2266 = s2145 + (s2197 + (s1185 * s2189 - s1186 * s2188))
-    s2267 = s2146 + (s2198 + (s1186 * s2187 - s1184 * s2189))
-    s2268 = s2147 + (s2199 + (s1184 * s2188 - s1185 * s2187))
-    s2269 = s2135 + s2187
-    s2270 = s2136 + s2188
-    s2271 = s2137 + s2189
-    s2272 = s2132 + (s2248 + (s1165 * s2253 - s1166 * s2252))
-    s2273 = s2133 + (s2249 + (s1166 * s2251 - s1164 * s2253))
-    s2274 = s2134 + (s2250 + (s1164 * s2252 - s1165 * s2251))
-    s2275 = s2122 + s2251
-    s2276 = s2123 + s2252
-    s2277 = s2124 + s2253
-    s2278 = s2119 + (s2254 + (s1145 * s2259 - s1146 * s2258))
-    s2279 = s2120 + (s2255 + (s1146 * s2257 - s1144 * s2259))
-    s2280 = s2121 + (s2256 + (s1144 * s2258 - s1145 * s2257))
-    s2281 = s2109 + s2257
-    s2282 = s2110 + s2258
-    s2283 = s2111 + s2259
-    s2284 = s2106 + (s2260 + (s1125 * s2265 - s1126 * s2264))
-    s2285 = s2107 + (s2261 + (s1126 * s2263 - s1124 * s2265))
-    s2286 = s2108 + (s2262 + (s1124 * s2264 - s1125 * s2263))
-    s2287 = s2096 + s2263
-    s2288 = s2097 + s2264
-    s2289 = s2098 + s2265
-    s2290 = s2093 + (s2266 + (s1105 * s2271 - s1106 * s2270))
-    s2291 = s2094 + (s2267 + (s1106 * s2269 - s1104 * s2271))
-    s2292 = s2095 + (s2268 + (s1104 * s2270 - s1105 * s2269))
-    s2293 = s2083 + s2269
-    s2294 = s2084 + s2270
-    s2295 = s2085 + s2271
-    s2296 = s2293 + (s2287 + (s2281 + (s2275 - m_trunk * s868)))
-    s2297 = s2294 + (s2288 + (s2282 + (m_trunk * delta_trunk_2_y + s2276)))
-    s2298 = s2295 + (s2289 + (s2283 + (m_trunk * a_trunk_3_z + s2277)))
-    s2299 = s1013 * omega_trunk_z
-    s2300 = s1014 * omega_trunk_y
-    s2301 = s1015 * omega_trunk_x
-    s2302 = m_hip * velocity_front_left_hip_x + (s1027 * omega_front_left_hip_y_2 - s1026 * omega_front_left_hip_z_2)
-    s2303 = m_hip * velocity_front_left_hip_y + (s1025 * omega_front_left_hip_z_2 - s1027 * omega_front_left_hip_x_2)
-    s2304 = m_hip * velocity_front_left_hip_z + (s1026 * omega_front_left_hip_x_2 - s1025 * omega_front_left_hip_y_2)
-    s2305 = s1047 * omega_front_left_hip_z_2
-    s2306 = s1048 * omega_front_left_hip_y_2
-    s2307 = s1049 * omega_front_left_hip_x_2
-    s2308 = s1025 * velocity_front_left_hip_x
-    s2309 = s1026 * velocity_front_left_hip_y
-    s2310 = s1027 * velocity_front_left_hip_z
-    s2311 = s1049 * omega_front_left_hip_y_2 + omega_front_left_hip_z_2 * s2088 - s1026 * velocity_front_left_hip_x
-    s2312 = s1027 * velocity_front_left_hip_x + (s1049 * omega_front_left_hip_z_2 + omega_front_left_hip_y_2 * s2089)
-    s2313 = s1025 * velocity_front_left_hip_y + (s1048 * omega_front_left_hip_x_2 + omega_front_left_hip_z_2 * s2087)
-    s2314 = s1048 * omega_front_left_hip_z_2 + omega_front_left_hip_x_2 * s2089 - s1027 * velocity_front_left_hip_y
-    s2315 = s1047 * omega_front_left_hip_x_2 + omega_front_left_hip_y_2 * s2087 - s1025 * velocity_front_left_hip_z
-    s2316 = s1026 * velocity_front_left_hip_z + (s1047 * omega_front_left_hip_y_2 + omega_front_left_hip_x_2 * s2088)
-    s2317 = m_hip * velocity_front_right_hip_x + (s1054 * omega_front_right_hip_z_2 - s1055 * omega_front_right_hip_y_2)
-    s2318 = m_hip * velocity_front_right_hip_y + (s1055 * omega_front_right_hip_x_2 - s1053 * omega_front_right_hip_z_2)
-    s2319 = m_hip * velocity_front_right_hip_z + (s1053 * omega_front_right_hip_y_2 - s1054 * omega_front_right_hip_x_2)
-    s2320 = s1066 * omega_front_right_hip_z_2
-    s2321 = s1067 * omega_front_right_hip_y_2
-    s2322 = s1068 * omega_front_right_hip_x_2
-    s2323 = s1053 * velocity_front_right_hip_x
-    s2324 = s1054 * velocity_front_right_hip_y
-    s2325 = s1055 * velocity_front_right_hip_z
-    s2326 = s1054 * velocity_front_right_hip_x + (s1068 * omega_front_right_hip_y_2 + omega_front_right_hip_z_2 * s2101)
-    s2327 = s1055 * velocity_front_right_hip_x - (s1068 * omega_front_right_hip_z_2 + omega_front_right_hip_y_2 * s2102)
-    s2328 = s1053 * velocity_front_right_hip_y - (s1067 * omega_front_right_hip_x_2 + omega_front_right_hip_z_2 * s2100)
-    s2329 = s1055 * velocity_front_right_hip_y + (s1067 * omega_front_right_hip_z_2 + omega_front_right_hip_x_2 * s2102)
-    s2330 = s1053 * velocity_front_right_hip_z + (s1066 * omega_front_right_hip_x_2 + omega_front_right_hip_y_2 * s2100)
-    s2331 = s1054 * velocity_front_right_hip_z - (s1066 * omega_front_right_hip_y_2 + omega_front_right_hip_x_2 * s2101)
-    s2332 = m_hip * velocity_hind_left_hip_x + (s1074 * omega_hind_left_hip_y_2 - s1073 * omega_hind_left_hip_z_2)
-    s2333 = m_hip * velocity_hind_left_hip_y + (s1072 * omega_hind_left_hip_z_2 - s1074 * omega_hind_left_hip_x_2)
-    s2334 = m_hip * velocity_hind_left_hip_z + (s1073 * omega_hind_left_hip_x_2 - s1072 * omega_hind_left_hip_y_2)
-    s2335 = s1085 * omega_hind_left_hip_z_2
-    s2336 = s1086 * omega_hind_left_hip_y_2
-    s2337 = s1087 * omega_hind_left_hip_x_2
-    s2338 = s1072 * velocity_hind_left_hip_x
-    s2339 = s1073 * velocity_hind_left_hip_y
-    s2340 = s1074 * velocity_hind_left_hip_z
-    s2341 = s1087 * omega_hind_left_hip_y_2 + omega_hind_left_hip_z_2 * s2114 - s1073 * velocity_hind_left_hip_x
-    s2342 = s1074 * velocity_hind_left_hip_x + (s1087 * omega_hind_left_hip_z_2 + omega_hind_left_hip_y_2 * s2115)
-    s2343 = s1072 * velocity_hind_left_hip_y + (s1086 * omega_hind_left_hip_x_2 + omega_hind_left_hip_z_2 * s2113)
-    s2344 = s1086 * omega_hind_left_hip_z_2 + omega_hind_left_hip_x_2 * s2115 - s1074 * velocity_hind_left_hip_y
-    s2345 = s1085 * omega_hind_left_hip_x_2 + omega_hind_left_hip_y_2 * s2113 - s1072 * velocity_hind_left_hip_z
-    s2346 = s1073 * velocity_hind_left_hip_z + (s1085 * omega_hind_left_hip_y_2 + omega_hind_left_hip_x_2 * s2114)
-    s2347 = m_hip * velocity_hind_right_hip_x + (s1089 * omega_hind_right_hip_z_2 - s1090 * omega_hind_right_hip_y_2)
-    s2348 = m_hip * velocity_hind_right_hip_y + (s1090 * omega_hind_right_hip_x_2 - s1088 * omega_hind_right_hip_z_2)
-    s2349 = m_hip * velocity_hind_right_hip_z + (s1088 * omega_hind_right_hip_y_2 - s1089 * omega_hind_right_hip_x_2)
-    s2350 = s1101 * omega_hind_right_hip_z_2
-    s2351 = s1102 * omega_hind_right_hip_y_2
-    s2352 = s1103 * omega_hind_right_hip_x_2
-    s2353 = s1088 * velocity_hind_right_hip_x
-    s2354 = s1089 * velocity_hind_right_hip_y
-    s2355 = s1090 * velocity_hind_right_hip_z
-    s2356 = s1089 * velocity_hind_right_hip_x + (s1103 * omega_hind_right_hip_y_2 + omega_hind_right_hip_z_2 * s2127)
-    s2357 = s1090 * velocity_hind_right_hip_x - (s1103 * omega_hind_right_hip_z_2 + omega_hind_right_hip_y_2 * s2128)
-    s2358 = s1088 * velocity_hind_right_hip_y - (s1102 * omega_hind_right_hip_x_2 + omega_hind_right_hip_z_2 * s2126)
-    s2359 = s1090 * velocity_hind_right_hip_y + (s1102 * omega_hind_right_hip_z_2 + omega_hind_right_hip_x_2 * s2128)
-    s2360 = s1088 * velocity_hind_right_hip_z + (s1101 * omega_hind_right_hip_x_2 + omega_hind_right_hip_y_2 * s2126)
-    s2361 = s1089 * velocity_hind_right_hip_z - (s1101 * omega_hind_right_hip_y_2 + omega_hind_right_hip_x_2 * s2127)
-    s2362 = m_thigh * velocity_front_left_thigh_x + (s1109 * omega_front_left_thigh_y_2 - s1108 * omega_front_left_thigh_z_2)
-    s2363 = m_thigh * velocity_front_left_thigh_y + (s1107 * omega_front_left_thigh_z_2 - s1109 * omega_front_left_thigh_x_2)
-    s2364 = m_thigh * velocity_front_left_thigh_z + (s1108 * omega_front_left_thigh_x_2 - s1107 * omega_front_left_thigh_y_2)
-    s2365 = s1121 * omega_front_left_thigh_z_2
-    s2366 = s1122 * omega_front_left_thigh_y_2
-    s2367 = s1123 * omega_front_left_thigh_x_2
-    s2368 = s1107 * velocity_front_left_thigh_x
-    s2369 = s1108 * velocity_front_left_thigh_y
-    s2370 = s1109 * velocity_front_left_thigh_z
-    s2371 = s1123 * omega_front_left_thigh_y_2 + omega_front_left_thigh_z_2 * s2140 - s1108 * velocity_front_left_thigh_x
-    s2372 = s1109 * velocity_front_left_thigh_x + (s1123 * omega_front_left_thigh_z_2 + omega_front_left_thigh_y_2 * s2141)
-    s2373 = s1107 * velocity_front_left_thigh_y + (s1122 * omega_front_left_thigh_x_2 + omega_front_left_thigh_z_2 * s2139)
-    s2374 = s1122 * omega_front_left_thigh_z_2 + omega_front_left_thigh_x_2 * s2141 - s1109 * velocity_front_left_thigh_y
-    s2375 = s1121 * omega_front_left_thigh_x_2 + omega_front_left_thigh_y_2 * s2139 - s1107 * velocity_front_left_thigh_z
-    s2376 = s1108 * velocity_front_left_thigh_z + (s1121 * omega_front_left_thigh_y_2 + omega_front_left_thigh_x_2 * s2140)
-    s2377 = s1128 * omega_front_right_thigh_z_2 - s1129 * omega_front_right_thigh_y_2
-    s2378 = s1129 * omega_front_right_thigh_x_2 - s1127 * omega_front_right_thigh_z_2
-    s2379 = s1127 * omega_front_right_thigh_y_2 - s1128 * omega_front_right_thigh_x_2
-    s2380 = s1141 * omega_front_right_thigh_z_2
-    s2381 = s1142 * omega_front_right_thigh_y_2
-    s2382 = s1143 * omega_front_right_thigh_y_2 + omega_front_right_thigh_z_2 * s2153
-    s2383 = s1143 * omega_front_right_thigh_z_2 + omega_front_right_thigh_y_2 * s2154
-    s2384 = s1142 * omega_front_right_thigh_x_2 + omega_front_right_thigh_z_2 * s2152
-    s2385 = s1143 * omega_front_right_thigh_x_2
-    s2386 = s1142 * omega_front_right_thigh_z_2 + omega_front_right_thigh_x_2 * s2154
-    s2387 = s1141 * omega_front_right_thigh_x_2 + omega_front_right_thigh_y_2 * s2152
-    s2388 = s1141 * omega_front_right_thigh_y_2 + omega_front_right_thigh_x_2 * s2153
-    s2389 = s1127 * velocity_front_right_thigh_x
-    s2390 = s1128 * velocity_front_right_thigh_y
-    s2391 = s1129 * velocity_front_right_thigh_z
-    s2392 = m_thigh * velocity_hind_left_thigh_x + (s1149 * omega_hind_left_thigh_y_2 - s1148 * omega_hind_left_thigh_z_2)
-    s2393 = m_thigh * velocity_hind_left_thigh_y + (s1147 * omega_hind_left_thigh_z_2 - s1149 * omega_hind_left_thigh_x_2)
-    s2394 = m_thigh * velocity_hind_left_thigh_z + (s1148 * omega_hind_left_thigh_x_2 - s1147 * omega_hind_left_thigh_y_2)
-    s2395 = s1161 * omega_hind_left_thigh_z_2
-    s2396 = s1162 * omega_hind_left_thigh_y_2
-    s2397 = s1163 * omega_hind_left_thigh_x_2
-    s2398 = s1147 * velocity_hind_left_thigh_x
-    s2399 = s1148 * velocity_hind_left_thigh_y
-    s2400 = s1149 * velocity_hind_left_thigh_z
-    s2401 = s1163 * omega_hind_left_thigh_y_2 + omega_hind_left_thigh_z_2 * s2163 - s1148 * velocity_hind_left_thigh_x
-    s2402 = s1149 * velocity_hind_left_thigh_x + (s1163 * omega_hind_left_thigh_z_2 + omega_hind_left_thigh_y_2 * s2164)
-    s2403 = s1147 * velocity_hind_left_thigh_y + (s1162 * omega_hind_left_thigh_x_2 + omega_hind_left_thigh_z_2 * s2162)
-    s2404 = s1162 * omega_hind_left_thigh_z_2 + omega_hind_left_thigh_x_2 * s2164 - s1149 * velocity_hind_left_thigh_y
-    s2405 = s1161 * omega_hind_left_thigh_x_2 + omega_hind_left_thigh_y_2 * s2162 - s1147 * velocity_hind_left_thigh_z
-    s2406 = s1148 * velocity_hind_left_thigh_z + (s1161 * omega_hind_left_thigh_y_2 + omega_hind_left_thigh_x_2 * s2163)
-    s2407 = m_thigh * velocity_hind_right_thigh_x + (s1168 * omega_hind_right_thigh_z_2 - s1169 * omega_hind_right_thigh_y_2)
-    s2408 = m_thigh * velocity_hind_right_thigh_y + (s1169 * omega_hind_right_thigh_x_2 - s1167 * omega_hind_right_thigh_z_2)
-    s2409 = m_thigh * velocity_hind_right_thigh_z + (s1167 * omega_hind_right_thigh_y_2 - s1168 * omega_hind_right_thigh_x_2)
-    s2410 = s1181 * omega_hind_right_thigh_z_2
-    s2411 = s1182 * omega_hind_right_thigh_y_2
-    s2412 = s1183 * omega_hind_right_thigh_x_2
-    s2413 = s1167 * velocity_hind_right_thigh_x
-    s2414 = s1168 * velocity_hind_right_thigh_y
-    s2415 = s1169 * velocity_hind_right_thigh_z
-    s2416 = s1168 * velocity_hind_right_thigh_x + (s1183 * omega_hind_right_thigh_y_2 + omega_hind_right_thigh_z_2 * s2176)
-    s2417 = s1169 * velocity_hind_right_thigh_x - (s1183 * omega_hind_right_thigh_z_2 + omega_hind_right_thigh_y_2 * s2177)
-    s2418 = s1167 * velocity_hind_right_thigh_y - (s1182 * omega_hind_right_thigh_x_2 + omega_hind_right_thigh_z_2 * s2175)
-    s2419 = s1169 * velocity_hind_right_thigh_y + (s1182 * omega_hind_right_thigh_z_2 + omega_hind_right_thigh_x_2 * s2177)
-    s2420 = s1167 * velocity_hind_right_thigh_z + (s1181 * omega_hind_right_thigh_x_2 + omega_hind_right_thigh_y_2 * s2175)
-    s2421 = s1168 * velocity_hind_right_thigh_z - (s1181 * omega_hind_right_thigh_y_2 + omega_hind_right_thigh_x_2 * s2176)
-    s2422 = m_shank * velocity_front_left_shank_x + (s1188 * omega_front_left_shank_z_2 - s1189 * omega_front_left_shank_y_2)
-    s2423 = m_shank * velocity_front_left_shank_y + (s1189 * omega_front_left_shank_x_2 - s1187 * omega_front_left_shank_z_2)
-    s2424 = m_shank * velocity_front_left_shank_z + (s1187 * omega_front_left_shank_y_2 - s1188 * omega_front_left_shank_x_2)
-    s2425 = s1200 * omega_front_left_shank_z_2
-    s2426 = s1201 * omega_front_left_shank_y_2
-    s2427 = s1202 * omega_front_left_shank_x_2
-    s2428 = s1187 * velocity_front_left_shank_x
-    s2429 = s1188 * velocity_front_left_shank_y
-    s2430 = s1189 * velocity_front_left_shank_z
-    s2431 = s2426 - s2425 - (s2429 + s2430)
-    s2432 = s1188 * velocity_front_left_shank_x + (s1202 * omega_front_left_shank_y_2 + omega_front_left_shank_z_2 * s2192)
-    s2433 = s1189 * velocity_front_left_shank_x - (s1202 * omega_front_left_shank_z_2 + omega_front_left_shank_y_2 * s2193)
-    s2434 = s1187 * velocity_front_left_shank_y - (s1201 * omega_front_left_shank_x_2 + omega_front_left_shank_z_2 * s2191)
-    s2435 = s2425 - s2427 - (s2428 + s2430)
-    s2436 = s1189 * velocity_front_left_shank_y + (s1201 * omega_front_left_shank_z_2 + omega_front_left_shank_x_2 * s2193)
-    s2437 = s1187 * velocity_front_left_shank_z + (s1200 * omega_front_left_shank_x_2 + omega_front_left_shank_y_2 * s2191)
-    s2438 = s1188 * velocity_front_left_shank_z - (s1200 * omega_front_left_shank_y_2 + omega_front_left_shank_x_2 * s2192)
-    s2439 = s2427 - s2426 - (s2428 + s2429)
-    s2440 = s1207 * omega_front_right_shank_z_2 - s1208 * omega_front_right_shank_y_2
-    s2441 = s1208 * omega_front_right_shank_x_2 - s1206 * omega_front_right_shank_z_2
-    s2442 = s1206 * omega_front_right_shank_y_2 - s1207 * omega_front_right_shank_x_2
-    s2443 = m_shank * velocity_front_right_shank_x + s2440
-    s2444 = m_shank * velocity_front_right_shank_y + s2441
-    s2445 = m_shank * velocity_front_right_shank_z + s2442
-    s2446 = s1219 * omega_front_right_shank_z_2
-    s2447 = s1220 * omega_front_right_shank_y_2
-    s2448 = s1221 * omega_front_right_shank_y_2 + omega_front_right_shank_z_2 * s2208
-    s2449 = s1221 * omega_front_right_shank_z_2 + omega_front_right_shank_y_2 * s2209
-    s2450 = s1220 * omega_front_right_shank_x_2 + omega_front_right_shank_z_2 * s2207
-    s2451 = s1221 * omega_front_right_shank_x_2
-    s2452 = s1220 * omega_front_right_shank_z_2 + omega_front_right_shank_x_2 * s2209
-    s2453 = s1219 * omega_front_right_shank_x_2 + omega_front_right_shank_y_2 * s2207
-    s2454 = s1219 * omega_front_right_shank_y_2 + omega_front_right_shank_x_2 * s2208
-    s2455 = s1206 * velocity_front_right_shank_x
-    s2456 = s1207 * velocity_front_right_shank_y
-    s2457 = s1208 * velocity_front_right_shank_z
-    s2458 = s2447 - s2446 - (s2456 + s2457)
-    s2459 = s1207 * velocity_front_right_shank_x + s2448
-    s2460 = s1208 * velocity_front_right_shank_x - s2449
-    s2461 = s1206 * velocity_front_right_shank_y - s2450
-    s2462 = s2446 - s2451 - (s2455 + s2457)
-    s2463 = s1208 * velocity_front_right_shank_y + s2452
-    s2464 = s1206 * velocity_front_right_shank_z + s2453
-    s2465 = s1207 * velocity_front_right_shank_z - s2454
-    s2466 = s2451 - s2447 - (s2455 + s2456)
-    s2467 = m_shank * velocity_hind_left_shank_x + (s1226 * omega_hind_left_shank_z_2 - s1227 * omega_hind_left_shank_y_2)
-    s2468 = m_shank * velocity_hind_left_shank_y + (s1227 * omega_hind_left_shank_x_2 - s1225 * omega_hind_left_shank_z_2)
-    s2469 = m_shank * velocity_hind_left_shank_z + (s1225 * omega_hind_left_shank_y_2 - s1226 * omega_hind_left_shank_x_2)
-    s2470 = s1238 * omega_hind_left_shank_z_2
-    s2471 = s1239 * omega_hind_left_shank_y_2
-    s2472 = s1240 * omega_hind_left_shank_x_2
-    s2473 = s1225 * velocity_hind_left_shank_x
-    s2474 = s1226 * velocity_hind_left_shank_y
-    s2475 = s1227 * velocity_hind_left_shank_z
-    s2476 = s2471 - s2470 - (s2474 + s2475)
-    s2477 = s1226 * velocity_hind_left_shank_x + (s1240 * omega_hind_left_shank_y_2 + omega_hind_left_shank_z_2 * s2224)
-    s2478 = s1227 * velocity_hind_left_shank_x - (s1240 * omega_hind_left_shank_z_2 + omega_hind_left_shank_y_2 * s2225)
-    s2479 = s1225 * velocity_hind_left_shank_y - (s1239 * omega_hind_left_shank_x_2 + omega_hind_left_shank_z_2 * s2223)
-    s2480 = s2470 - s2472 - (s2473 + s2475)
-    s2481 = s1227 * velocity_hind_left_shank_y + (s1239 * omega_hind_left_shank_z_2 + omega_hind_left_shank_x_2 * s2225)
-    s2482 = s1225 * velocity_hind_left_shank_z + (s1238 * omega_hind_left_shank_x_2 + omega_hind_left_shank_y_2 * s2223)
-    s2483 = s1226 * velocity_hind_left_shank_z - (s1238 * omega_hind_left_shank_y_2 + omega_hind_left_shank_x_2 * s2224)
-    s2484 = s2472 - s2471 - (s2473 + s2474)
-    s2485 = m_shank * velocity_hind_right_shank_x + (s1245 * omega_hind_right_shank_z_2 - s1246 * omega_hind_right_shank_y_2)
-    s2486 = m_shank * velocity_hind_right_shank_y + (s1246 * omega_hind_right_shank_x_2 - s1244 * omega_hind_right_shank_z_2)
-    s2487 = m_shank * velocity_hind_right_shank_z + (s1244 * omega_hind_right_shank_y_2 - s1245 * omega_hind_right_shank_x_2)
-    s2488 = s1257 * omega_hind_right_shank_z_2
-    s2489 = s1258 * omega_hind_right_shank_y_2
-    s2490 = s1259 * omega_hind_right_shank_x_2
-    s2491 = s1244 * velocity_hind_right_shank_x
-    s2492 = s1245 * velocity_hind_right_shank_y
-    s2493 = s1246 * velocity_hind_right_shank_z
-    s2494 = s2489 - s2488 - (s2492 + s2493)
-    s2495 = s1245 * velocity_hind_right_shank_x + (s1259 * omega_hind_right_shank_y_2 + omega_hind_right_shank_z_2 * s2240)
-    s2496 = s1246 * velocity_hind_right_shank_x - (s1259 * omega_hind_right_shank_z_2 + omega_hind_right_shank_y_2 * s2241)
-    s2497 = s1244 * velocity_hind_right_shank_y - (s1258 * omega_hind_right_shank_x_2 + omega_hind_right_shank_z_2 * s2239)
-    s2498 = s2488 - s2490 - (s2491 + s2493)
-    s2499 = s1246 * velocity_hind_right_shank_y + (s1258 * omega_hind_right_shank_z_2 + omega_hind_right_shank_x_2 * s2241)
-    s2500 = s1244 * velocity_hind_right_shank_z + (s1257 * omega_hind_right_shank_x_2 + omega_hind_right_shank_y_2 * s2239)
-    s2501 = s1245 * velocity_hind_right_shank_z - (s1257 * omega_hind_right_shank_y_2 + omega_hind_right_shank_x_2 * s2240)
-    s2502 = s2490 - s2489 - (s2491 + s2492)
-    s2503 = s1241 * s2485
-    s2504 = s1242 * s2486
-    s2505 = s1243 * s2487
-    s2506 = s2407 + s2485
-    s2507 = s2408 + s2486
-    s2508 = s2409 + s2487
-    s2509 = s2411 - s2410 - (s2414 + s2415) + (s2494 + (s2504 + s2505))
-    s2510 = s2416 + (s2495 - s1242 * s2485)
-    s2511 = s2417 + (s2496 - s1243 * s2485)
-    s2512 = s2418 + (s2497 - s1241 * s2486)
-    s2513 = s2410 - s2412 - (s2413 + s2415) + (s2498 + (s2503 + s2505))
-    s2514 = s2419 + (s2499 - s1243 * s2486)
-    s2515 = s2420 + (s2500 - s1241 * s2487)
-    s2516 = s2421 + (s2501 - s1242 * s2487)
-    s2517 = s2412 - s2411 - (s2413 + s2414) + (s2502 + (s2503 + s2504))
-    s2518 = s1222 * s2467
-    s2519 = s1223 * s2468
-    s2520 = s1224 * s2469
-    s2521 = s2392 + s2467
-    s2522 = s2393 + s2468
-    s2523 = s2394 + s2469
-    s2524 = s2399 + s2400 + (s2396 - s2395) + (s2476 + (s2519 + s2520))
-    s2525 = s2401 + (s2477 - s1223 * s2467)
-    s2526 = s2478 - s1224 * s2467 - s2402
-    s2527 = s2479 - s1222 * s2468 - s2403
-    s2528 = s2398 + s2400 + (s2395 - s2397) + (s2480 + (s2518 + s2520))
-    s2529 = s2404 + (s2481 - s1224 * s2468)
-    s2530 = s2405 + (s2482 - s1222 * s2469)
-    s2531 = s2483 - s1223 * s2469 - s2406
-    s2532 = s2398 + s2399 + (s2397 - s2396) + (s2484 + (s2518 + s2519))
-    s2533 = s1203 * s2443
-    s2534 = s1204 * s2444
-    s2535 = s1205 * s2445
-    s2536 = m_thigh * velocity_front_right_thigh_x + s2377 + s2443
-    s2537 = m_thigh * velocity_front_right_thigh_y + s2378 + s2444
-    s2538 = m_thigh * velocity_front_right_thigh_z + s2379 + s2445
-    s2539 = s2381 - s2380 - (s2390 + s2391) + (s2458 + (s2534 + s2535))
-    s2540 = s1128 * velocity_front_right_thigh_x + s2382 + (s2459 - s1204 * s2443)
-    s2541 = s1129 * velocity_front_right_thigh_x - s2383 + (s2460 - s1205 * s2443)
-    s2542 = s1127 * velocity_front_right_thigh_y - s2384 + (s2461 - s1203 * s2444)
-    s2543 = s2380 - s2385 - (s2389 + s2391) + (s2462 + (s2533 + s2535))
-    s2544 = s1129 * velocity_front_right_thigh_y + s2386 + (s2463 - s1205 * s2444)
-    s2545 = s1127 * velocity_front_right_thigh_z + s2387 + (s2464 - s1203 * s2445)
-    s2546 = s1128 * velocity_front_right_thigh_z - s2388 + (s2465 - s1204 * s2445)
-    s2547 = s2385 - s2381 - (s2389 + s2390) + (s2466 + (s2533 + s2534))
-    s2548 = s1184 * s2422
-    s2549 = s1185 * s2423
-    s2550 = s1186 * s2424
-    s2551 = s2362 + s2422
-    s2552 = s2363 + s2423
-    s2553 = s2364 + s2424
-    s2554 = s2369 + s2370 + (s2366 - s2365) + (s2431 + (s2549 + s2550))
-    s2555 = s2371 + (s2432 - s1185 * s2422)
-    s2556 = s2433 - s1186 * s2422 - s2372
-    s2557 = s2434 - s1184 * s2423 - s2373
-    s2558 = s2368 + s2370 + (s2365 - s2367) + (s2435 + (s2548 + s2550))
-    s2559 = s2374 + (s2436 - s1186 * s2423)
-    s2560 = s2375 + (s2437 - s1184 * s2424)
-    s2561 = s2438 - s1185 * s2424 - s2376
-    s2562 = s2368 + s2369 + (s2367 - s2366) + (s2439 + (s2548 + s2549))
-    s2563 = s1164 * s2506
-    s2564 = s1165 * s2507
-    s2565 = s1166 * s2508
-    s2566 = s2347 + s2506
-    s2567 = s2348 + s2507
-    s2568 = s2349 + s2508
-    s2569 = s2351 - s2350 - (s2354 + s2355) + (s2509 + (s2564 + s2565))
-    s2570 = s2356 + (s2510 - s1165 * s2506)
-    s2571 = s2357 + (s2511 - s1166 * s2506)
-    s2572 = s2358 + (s2512 - s1164 * s2507)
-    s2573 = s2350 - s2352 - (s2353 + s2355) + (s2513 + (s2563 + s2565))
-    s2574 = s2359 + (s2514 - s1166 * s2507)
-    s2575 = s2360 + (s2515 - s1164 * s2508)
-    s2576 = s2361 + (s2516 - s1165 * s2508)
-    s2577 = s2352 - s2351 - (s2353 + s2354) + (s2517 + (s2563 + s2564))
-    s2578 = s1144 * s2521
-    s2579 = s1145 * s2522
-    s2580 = s1146 * s2523
-    s2581 = s2332 + s2521
-    s2582 = s2333 + s2522
-    s2583 = s2334 + s2523
-    s2584 = s2339 + s2340 + (s2336 - s2335) + (s2524 + (s2579 + s2580))
-    s2585 = s2341 + (s2525 - s1145 * s2521)
-    s2586 = s2526 - s1146 * s2521 - s2342
-    s2587 = s2527 - s1144 * s2522 - s2343
-    s2588 = s2338 + s2340 + (s2335 - s2337) + (s2528 + (s2578 + s2580))
-    s2589 = s2344 + (s2529 - s1146 * s2522)
-    s2590 = s2345 + (s2530 - s1144 * s2523)
-    s2591 = s2531 - s1145 * s2523 - s2346
-    s2592 = s2338 + s2339 + (s2337 - s2336) + (s2532 + (s2578 + s2579))
-    s2593 = s1124 * s2536
-    s2594 = s1125 * s2537
-    s2595 = s1126 * s2538
-    s2596 = s2317 + s2536
-    s2597 = s2318 + s2537
-    s2598 = s2319 + s2538
-    s2599 = s2321 - s2320 - (s2324 + s2325) + (s2539 + (s2594 + s2595))
-    s2600 = s2326 + (s2540 - s1125 * s2536)
-    s2601 = s2327 + (s2541 - s1126 * s2536)
-    s2602 = s2328 + (s2542 - s1124 * s2537)
-    s2603 = s2320 - s2322 - (s2323 + s2325) + (s2543 + (s2593 + s2595))
-    s2604 = s2329 + (s2544 - s1126 * s2537)
-    s2605 = s2330 + (s2545 - s1124 * s2538)
-    s2606 = s2331 + (s2546 - s1125 * s2538)
-    s2607 = s2322 - s2321 - (s2323 + s2324) + (s2547 + (s2593 + s2594))
-    s2608 = s1104 * s2551
-    s2609 = s1105 * s2552
-    s2610 = s1106 * s2553
-    s2611 = s2302 + s2551
-    s2612 = s2303 + s2552
-    s2613 = s2304 + s2553
-    s2614 = s2309 + s2310 + (s2306 - s2305) + (s2554 + (s2609 + s2610))
-    s2615 = s2311 + (s2555 - s1105 * s2551)
-    s2616 = s2556 - s1106 * s2551 - s2312
-    s2617 = s2557 - s1104 * s2552 - s2313
-    s2618 = s2308 + s2310 + (s2305 - s2307) + (s2558 + (s2608 + s2610))
-    s2619 = s2314 + (s2559 - s1106 * s2552)
-    s2620 = s2315 + (s2560 - s1104 * s2553)
-    s2621 = s2561 - s1105 * s2553 - s2316
-    s2622 = s2308 + s2309 + (s2307 - s2306) + (s2562 + (s2608 + s2609))
-    s2623 = s1018 * s2566
-    s2624 = s1021 * s2567
-    s2625 = s1024 * s2568
-    s2626 = s1069 * s2581
-    s2627 = s1070 * s2582
-    s2628 = s1071 * s2583
-    s2629 = s1015 * omega_trunk_y + omega_trunk_z * s2081 + (s2570 + s1021 * s2566) + (s2585 - s1070 * s2581)
-    s2630 = s2571 + s1024 * s2566 - (s1015 * omega_trunk_z + omega_trunk_y * s2082) + (s2586 - s1071 * s2581)
-    s2631 = s2572 + s1018 * s2567 - (s1014 * omega_trunk_x + omega_trunk_z * s2080) + (s2587 - s1069 * s2582)
-    s2632 = s1014 * omega_trunk_z + omega_trunk_x * s2082 + (s2574 + s1024 * s2567) + (s2589 - s1071 * s2582)
-    s2633 = s1013 * omega_trunk_x + omega_trunk_y * s2080 + (s2575 + s1018 * s2568) + (s2590 - s1069 * s2583)
-    s2634 = s2576 + s1021 * s2568 - (s1013 * omega_trunk_y + omega_trunk_x * s2081) + (s2591 - s1070 * s2583)
-    s2635 = s1050 * s2596
-    s2636 = s1051 * s2597
-    s2637 = s1052 * s2598
-    s2638 = s2300 - s2299 + (s2569 - (s2624 + s2625)) + (s2584 + (s2627 + s2628)) + (s2599 + (s2636 + s2637))
-    s2639 = s2299 - s2301 + (s2573 - (s2623 + s2625)) + (s2588 + (s2626 + s2628)) + (s2603 + (s2635 + s2637))
-    s2640 = s2301 - s2300 + (s2577 - (s2623 + s2624)) + (s2592 + (s2626 + s2627)) + (s2607 + (s2635 + s2636))
-    s2641 = s1018 * s2611
-    s2642 = s1021 * s2612
-    s2643 = s1024 * s2613
-    s2644 = s2611 + (s2596 + (s2581 + (m_trunk * trunk_x_dot + s2566)))
-    s2645 = s2612 + (s2597 + (s2582 + (m_trunk * trunk_y_dot + s2567)))
-    s2646 = s2613 + (s2598 + (s2583 + (m_trunk * trunk_z_dot + s2568)))
-    s2647 = s2638 + (s2614 + (s2642 + s2643))
-    s2648 = s2629 + (s2600 - s1051 * s2596) + (s2615 - s1021 * s2611)
-    s2649 = s2630 + (s2601 - s1052 * s2596) + (s2616 - s1024 * s2611)
-    s2650 = s2631 + (s2602 - s1050 * s2597) + (s2617 - s1018 * s2612)
-    s2651 = s2639 + (s2618 + (s2641 + s2643))
-    s2652 = s2632 + (s2604 - s1052 * s2597) + (s2619 - s1024 * s2612)
-    s2653 = s2633 + (s2605 - s1050 * s2598) + (s2620 - s1018 * s2613)
-    s2654 = s2634 + (s2606 - s1051 * s2598) + (s2621 - s1021 * s2613)
-    s2655 = s2640 + (s2622 + (s2641 + s2642))
-    s2656 = trunk_y_dot * s21 - trunk_z_dot * s18
-    s2657 = trunk_z_dot * s15 - trunk_x_dot * s21
-    s2658 = trunk_x_dot * s18 - trunk_y_dot * s15
-    s2659 = s21 * delta_trunk_2_y - s18 * a_trunk_3_z
-    s2660 = s15 * a_trunk_3_z + s21 * s868
-    s2661 = s18 * s868 + s15 * delta_trunk_2_y
-    s2662 = s21 * omega_trunk_y - s18 * omega_trunk_z
-    s2663 = s15 * omega_trunk_z - s21 * omega_trunk_x
-    s2664 = s18 * omega_trunk_x - s15 * omega_trunk_y
-    s2665 = s2656 + s2656
-    s2666 = s2657 + s2657
-    s2667 = s2658 + s2658
-    s2668 = trunk_y_dot * s22 - trunk_z_dot * s19
-    s2669 = trunk_z_dot * s16 - trunk_x_dot * s22
-    s2670 = trunk_x_dot * s19 - trunk_y_dot * s16
-    s2671 = s22 * delta_trunk_2_y - s19 * a_trunk_3_z
-    s2672 = s16 * a_trunk_3_z + s22 * s868
-    s2673 = s19 * s868 + s16 * delta_trunk_2_y
-    s2674 = s22 * omega_trunk_y - s19 * omega_trunk_z
-    s2675 = s16 * omega_trunk_z - s22 * omega_trunk_x
-    s2676 = s19 * omega_trunk_x - s16 * omega_trunk_y
-    s2677 = s2668 + s2668
-    s2678 = s2669 + s2669
-    s2679 = s2670 + s2670
-    s2680 = trunk_y_dot * s23 - trunk_z_dot * s20
-    s2681 = trunk_z_dot * s17 - trunk_x_dot * s23
-    s2682 = trunk_x_dot * s20 - trunk_y_dot * s17
-    s2683 = s23 * delta_trunk_2_y - s20 * a_trunk_3_z
-    s2684 = s17 * a_trunk_3_z + s23 * s868
-    s2685 = s20 * s868 + s17 * delta_trunk_2_y
-    s2686 = s23 * omega_trunk_y - s20 * omega_trunk_z
-    s2687 = s17 * omega_trunk_z - s23 * omega_trunk_x
-    s2688 = s20 * omega_trunk_x - s17 * omega_trunk_y
-    s2689 = s2680 + s2680
-    s2690 = s2681 + s2681
-    s2691 = s2682 + s2682
-    s2692 = omega_trunk_y * velocity_front_left_hip_z - omega_trunk_z * velocity_front_left_hip_y
-    s2693 = omega_trunk_z * velocity_front_left_hip_x - omega_trunk_x * velocity_front_left_hip_z
-    s2694 = omega_trunk_x * velocity_front_left_hip_y - omega_trunk_y * velocity_front_left_hip_x
-    s2695 = a_front_left_hip_x - s2692
-    s2696 = a_front_left_hip_y - s2693
-    s2697 = a_front_left_hip_z - s2694
-    s2698 = s21 * velocity_front_left_hip_y - s18 * velocity_front_left_hip_z
-    s2699 = s15 * velocity_front_left_hip_z - s21 * velocity_front_left_hip_x
-    s2700 = s18 * velocity_front_left_hip_x - s15 * velocity_front_left_hip_y
-    s2701 = velocity_front_left_hip_y * s2664 - velocity_front_left_hip_z * s2663 + (omega_trunk_y * s2700 - omega_trunk_z * s2699)
-    s2702 = velocity_front_left_hip_z * s2662 - velocity_front_left_hip_x * s2664 + (omega_trunk_z * s2698 - omega_trunk_x * s2700)
-    s2703 = velocity_front_left_hip_x * s2663 - velocity_front_left_hip_y * s2662 + (omega_trunk_x * s2699 - omega_trunk_y * s2698)
-    s2704 = s21 * s1862 - s18 * s1863 + (omega_trunk_y * s2664 - omega_trunk_z * s2663)
-    s2705 = s15 * s1863 - s21 * s1861 + (omega_trunk_z * s2662 - omega_trunk_x * s2664)
-    s2706 = s18 * s1861 - s15 * s1862 + (omega_trunk_x * s2663 - omega_trunk_y * s2662)
-    s2707 = s21 * s2696 - s18 * s2697 + s2701
-    s2708 = s15 * s2697 - s21 * s2695 + s2702
-    s2709 = s18 * s2695 - s15 * s2696 + s2703
-    s2710 = s2662 + s2662
-    s2711 = s2663 + s2663
-    s2712 = s2664 + s2664
-    s2713 = s2698 + s2698
-    s2714 = s2699 + s2699
-    s2715 = s2700 + s2700
-    s2716 = omega_trunk_y * velocity_front_right_hip_z - omega_trunk_z * velocity_front_right_hip_y
-    s2717 = omega_trunk_z * velocity_front_right_hip_x - omega_trunk_x * velocity_front_right_hip_z
-    s2718 = omega_trunk_x * velocity_front_right_hip_y - omega_trunk_y * velocity_front_right_hip_x
-    s2719 = a_front_right_hip_x - s2716
-    s2720 = a_front_right_hip_y - s2717
-    s2721 = a_front_right_hip_z - s2718
-    s2722 = s21 * velocity_front_right_hip_y - s18 * velocity_front_right_hip_z
-    s2723 = s15 * velocity_front_right_hip_z - s21 * velocity_front_right_hip_x
-    s2724 = s18 * velocity_front_right_hip_x - s15 * velocity_front_right_hip_y
-    s2725 = velocity_front_right_hip_y * s2664 - velocity_front_right_hip_z * s2663 + (omega_trunk_y * s2724 - omega_trunk_z * s2723)
-    s2726 = velocity_front_right_hip_z * s2662 - velocity_front_right_hip_x * s2664 + (omega_trunk_z * s2722 - omega_trunk_x * s2724)
-    s2727 = velocity_front_right_hip_x * s2663 - velocity_front_right_hip_y * s2662 + (omega_trunk_x * s2723 - omega_trunk_y * s2722)
-    s2728 = s21 * s2720 - s18 * s2721 + s2725
-    s2729 = s15 * s2721 - s21 * s2719 + s2726
-    s2730 = s18 * s2719 - s15 * s2720 + s2727
-    s2731 = s2722 + s2722
-    s2732 = s2723 + s2723
-    s2733 = s2724 + s2724
-    s2734 = omega_trunk_y * velocity_hind_left_hip_z - omega_trunk_z * velocity_hind_left_hip_y
-    s2735 = omega_trunk_z * velocity_hind_left_hip_x - omega_trunk_x * velocity_hind_left_hip_z
-    s2736 = omega_trunk_x * velocity_hind_left_hip_y - omega_trunk_y * velocity_hind_left_hip_x
-    s2737 = a_hind_left_hip_x - s2734
-    s2738 = a_hind_left_hip_y - s2735
-    s2739 = a_hind_left_hip_z - s2736
-    s2740 = s21 * velocity_hind_left_hip_y - s18 * velocity_hind_left_hip_z
-    s2741 = s15 * velocity_hind_left_hip_z - s21 * velocity_hind_left_hip_x
-    s2742 = s18 * velocity_hind_left_hip_x - s15 * velocity_hind_left_hip_y
-    s2743 = velocity_hind_left_hip_y * s2664 - velocity_hind_left_hip_z * s2663 + (omega_trunk_y * s2742 - omega_trunk_z * s2741)
-    s2744 = velocity_hind_left_hip_z * s2662 - velocity_hind_left_hip_x * s2664 + (omega_trunk_z * s2740 - omega_trunk_x * s2742)
-    s2745 = velocity_hind_left_hip_x * s2663 - velocity_hind_left_hip_y * s2662 + (omega_trunk_x * s2741 - omega_trunk_y * s2740)
-    s2746 = s21 * s2738 - s18 * s2739 + s2743
-    s2747 = s15 * s2739 - s21 * s2737 + s2744
-    s2748 = s18 * s2737 - s15 * s2738 + s2745
-    s2749 = s2740 + s2740
-    s2750 = s2741 + s2741
-    s2751 = s2742 + s2742
-    s2752 = omega_trunk_y * velocity_hind_right_hip_z - omega_trunk_z * velocity_hind_right_hip_y
-    s2753 = omega_trunk_z * velocity_hind_right_hip_x - omega_trunk_x * velocity_hind_right_hip_z
-    s2754 = omega_trunk_x * velocity_hind_right_hip_y - omega_trunk_y * velocity_hind_right_hip_x
-    s2755 = a_hind_right_hip_x - s2752
-    s2756 = a_hind_right_hip_y - s2753
-    s2757 = a_hind_right_hip_z - s2754
-    s2758 = s21 * velocity_hind_right_hip_y - s18 * velocity_hind_right_hip_z
-    s2759 = s15 * velocity_hind_right_hip_z - s21 * velocity_hind_right_hip_x
-    s2760 = s18 * velocity_hind_right_hip_x - s15 * velocity_hind_right_hip_y
-    s2761 = velocity_hind_right_hip_y * s2664 - velocity_hind_right_hip_z * s2663 + (omega_trunk_y * s2760 - omega_trunk_z * s2759)
-    s2762 = velocity_hind_right_hip_z * s2662 - velocity_hind_right_hip_x * s2664 + (omega_trunk_z * s2758 - omega_trunk_x * s2760)
-    s2763 = velocity_hind_right_hip_x * s2663 - velocity_hind_right_hip_y * s2662 + (omega_trunk_x * s2759 - omega_trunk_y * s2758)
-    s2764 = s21 * s2756 - s18 * s2757 + s2761
-    s2765 = s15 * s2757 - s21 * s2755 + s2762
-    s2766 = s18 * s2755 - s15 * s2756 + s2763
-    s2767 = s2758 + s2758
-    s2768 = s2759 + s2759
-    s2769 = s2760 + s2760
-    s2770 = omega_front_left_hip_y_2 * velocity_front_left_thigh_z - omega_front_left_hip_z_2 * velocity_front_left_thigh_y
-    s2771 = omega_front_left_hip_z_2 * velocity_front_left_thigh_x - omega_front_left_hip_x_2 * velocity_front_left_thigh_z
-    s2772 = omega_front_left_hip_x_2 * velocity_front_left_thigh_y - omega_front_left_hip_y_2 * velocity_front_left_thigh_x
-    s2773 = a_front_left_thigh_x - s2770
-    s2774 = a_front_left_thigh_y - s2771
-    s2775 = a_front_left_thigh_z - s2772
-    s2776 = s936 * omega_front_left_hip_y_2 - s934 * omega_front_left_hip_z_2
-    s2777 = s932 * omega_front_left_hip_z_2 - s936 * omega_front_left_hip_x_2
-    s2778 = s934 * omega_front_left_hip_x_2 - s932 * omega_front_left_hip_y_2
-    s2779 = s936 * velocity_front_left_thigh_y - s934 * velocity_front_left_thigh_z
-    s2780 = s932 * velocity_front_left_thigh_z - s936 * velocity_front_left_thigh_x
-    s2781 = s934 * velocity_front_left_thigh_x - s932 * velocity_front_left_thigh_y
-    s2782 = velocity_front_left_thigh_y * s2778 - velocity_front_left_thigh_z * s2777
-    s2783 = velocity_front_left_thigh_z * s2776 - velocity_front_left_thigh_x * s2778
-    s2784 = velocity_front_left_thigh_x * s2777 - velocity_front_left_thigh_y * s2776
-    s2785 = s2782 + (omega_front_left_hip_y_2 * s2781 - omega_front_left_hip_z_2 * s2780)
-    s2786 = s2783 + (omega_front_left_hip_z_2 * s2779 - omega_front_left_hip_x_2 * s2781)
-    s2787 = s2784 + (omega_front_left_hip_x_2 * s2780 - omega_front_left_hip_y_2 * s2779)
-    s2788 = s936 * s1885 - s934 * s1886 + (omega_front_left_hip_y_2 * s2778 - omega_front_left_hip_z_2 * s2777)
-    s2789 = s932 * s1886 - s936 * s1884 + (omega_front_left_hip_z_2 * s2776 - omega_front_left_hip_x_2 * s2778)
-    s2790 = s934 * s1884 - s932 * s1885 + (omega_front_left_hip_x_2 * s2777 - omega_front_left_hip_y_2 * s2776)
-    s2791 = s936 * s2774 - s934 * s2775 + s2785
-    s2792 = s932 * s2775 - s936 * s2773 + s2786
-    s2793 = s934 * s2773 - s932 * s2774 + s2787
+    s2065 = omega_hind_right_shank_x_2 * omega_hind_right_shank_y_2
+    s2066 = omega_hind_right_shank_x_2 * omega_hind_right_shank_z_2
+    s2067 = omega_hind_right_shank_y_2 * omega_hind_right_shank_z_2
+    s2068 = s2065 - s2064
+    s2069 = s2063 + s2066
+    s2070 = s2064 + s2065
+    s2071 = s2067 - s2062
+    s2072 = s2066 - s2063
+    s2073 = s2062 + s2067
+    s2074 = 0.5 * (s1007 + (s1005 + s1006))
+    s2075 = s2074 - s1005
+    s2076 = s2074 - s1006
+    s2077 = s2074 - s1007
+    s2078 = m_hip * a_front_left_hip_x + (s1021 * s1886 - s1020 * s1885 + s1022 * s1887)
+    s2079 = m_hip * a_front_left_hip_y + (s1020 * s1888 - s1021 * s1889 + s1022 * s1890)
+    s2080 = m_hip * a_front_left_hip_z + (s1020 * s1891 + s1021 * s1892 - s1022 * s1893)
+    s2081 = 0.5 * (s1041 + (s1038 + s1039))
+    s2082 = s2081 - s1038
+    s2083 = s2081 - s1039
+    s2084 = s2081 - s1041
+    s2085 = s1044 * (omega_front_left_hip_z_squared_2 - omega_front_left_hip_y_squared_2)
+    s2086 = s1043 * (omega_front_left_hip_x_squared_2 - omega_front_left_hip_z_squared_2)
+    s2087 = s1042 * (omega_front_left_hip_y_squared_2 - omega_front_left_hip_x_squared_2)
+    s2088 = s1021 * a_front_left_hip_z - s1022 * a_front_left_hip_y + (s1043 * s1888 - s1042 * s1891 - s2085 + s1892 * s2083 - s1890 * s2084)
+    s2089 = s1022 * a_front_left_hip_x - s1020 * a_front_left_hip_z + (s1042 * s1892 - s1044 * s1886 - s2086 + s1887 * s2084 - s1891 * s2082)
+    s2090 = s1020 * a_front_left_hip_y - s1021 * a_front_left_hip_x + (s1044 * s1887 - s1043 * s1890 - s2087 + s1888 * s2082 - s1886 * s2083)
+    s2091 = m_hip * a_front_right_hip_x + (s1048 * s1900 - s1049 * s1901 - s1050 * s1902)
+    s2092 = m_hip * a_front_right_hip_y + (s1049 * s1904 - s1048 * s1903 - s1050 * s1905)
+    s2093 = m_hip * a_front_right_hip_z + (s1050 * s1908 - (s1048 * s1906 + s1049 * s1907))
+    s2094 = 0.5 * (s1060 + (s1057 + s1058))
+    s2095 = s2094 - s1057
+    s2096 = s2094 - s1058
+    s2097 = s2094 - s1060
+    s2098 = s1063 * (omega_front_right_hip_z_squared_2 - omega_front_right_hip_y_squared_2)
+    s2099 = s1062 * (omega_front_right_hip_x_squared_2 - omega_front_right_hip_z_squared_2)
+    s2100 = s1061 * (omega_front_right_hip_y_squared_2 - omega_front_right_hip_x_squared_2)
+    s2101 = s1050 * a_front_right_hip_y - s1049 * a_front_right_hip_z + (s1062 * s1903 - s1061 * s1906 - s2098 + s1907 * s2096 - s1905 * s2097)
+    s2102 = s1048 * a_front_right_hip_z - s1050 * a_front_right_hip_x + (s1061 * s1907 - s1063 * s1901 - s2099 + s1902 * s2097 - s1906 * s2095)
+    s2103 = s1049 * a_front_right_hip_x - s1048 * a_front_right_hip_y + (s1063 * s1902 - s1062 * s1905 - s2100 + s1903 * s2095 - s1901 * s2096)
+    s2104 = m_hip * a_hind_left_hip_x + (s1068 * s1916 - s1067 * s1915 + s1069 * s1917)
+    s2105 = m_hip * a_hind_left_hip_y + (s1067 * s1918 - s1068 * s1919 + s1069 * s1920)
+    s2106 = m_hip * a_hind_left_hip_z + (s1067 * s1921 + s1068 * s1922 - s1069 * s1923)
+    s2107 = 0.5 * (s1079 + (s1076 + s1077))
+    s2108 = s2107 - s1076
+    s2109 = s2107 - s1077
+    s2110 = s2107 - s1079
+    s2111 = s1082 * (omega_hind_left_hip_z_squared_2 - omega_hind_left_hip_y_squared_2)
+    s2112 = s1081 * (omega_hind_left_hip_x_squared_2 - omega_hind_left_hip_z_squared_2)
+    s2113 = s1080 * (omega_hind_left_hip_y_squared_2 - omega_hind_left_hip_x_squared_2)
+    s2114 = s1068 * a_hind_left_hip_z - s1069 * a_hind_left_hip_y + (s1081 * s1918 - s1080 * s1921 - s2111 + s1922 * s2109 - s1920 * s2110)
+    s2115 = s1069 * a_hind_left_hip_x - s1067 * a_hind_left_hip_z + (s1080 * s1922 - s1082 * s1916 - s2112 + s1917 * s2110 - s1921 * s2108)
+    s2116 = s1067 * a_hind_left_hip_y - s1068 * a_hind_left_hip_x + (s1082 * s1917 - s1081 * s1920 - s2113 + s1918 * s2108 - s1916 * s2109)
+    s2117 = m_hip * a_hind_right_hip_x + (s1083 * s1930 - s1084 * s1931 - s1085 * s1932)
+    s2118 = m_hip * a_hind_right_hip_y + (s1084 * s1934 - s1083 * s1933 - s1085 * s1935)
+    s2119 = m_hip * a_hind_right_hip_z + (s1085 * s1938 - (s1083 * s1936 + s1084 * s1937))
+    s2120 = 0.5 * (s1095 + (s1092 + s1093))
+    s2121 = s2120 - s1092
+    s2122 = s2120 - s1093
+    s2123 = s2120 - s1095
+    s2124 = s1098 * (omega_hind_right_hip_z_squared_2 - omega_hind_right_hip_y_squared_2)
+    s2125 = s1097 * (omega_hind_right_hip_x_squared_2 - omega_hind_right_hip_z_squared_2)
+    s2126 = s1096 * (omega_hind_right_hip_y_squared_2 - omega_hind_right_hip_x_squared_2)
+    s2127 = s1085 * a_hind_right_hip_y - s1084 * a_hind_right_hip_z + (s1097 * s1933 - s1096 * s1936 - s2124 + s1937 * s2122 - s1935 * s2123)
+    s2128 = s1083 * a_hind_right_hip_z - s1085 * a_hind_right_hip_x + (s1096 * s1937 - s1098 * s1931 - s2125 + s1932 * s2123 - s1936 * s2121)
+    s2129 = s1084 * a_hind_right_hip_x - s1083 * a_hind_right_hip_y + (s1098 * s1932 - s1097 * s1935 - s2126 + s1933 * s2121 - s1931 * s2122)
+    s2130 = m_thigh * a_front_left_thigh_x + (s1103 * s1949 - s1102 * s1948 + s1104 * s1950)
+    s2131 = m_thigh * a_front_left_thigh_y + (s1102 * s1951 - s1103 * s1952 + s1104 * s1953)
+    s2132 = m_thigh * a_front_left_thigh_z + (s1102 * s1954 + s1103 * s1955 - s1104 * s1956)
+    s2133 = 0.5 * (s1115 + (s1111 + s1112))
+    s2134 = s2133 - s1111
+    s2135 = s2133 - s1112
+    s2136 = s2133 - s1115
+    s2137 = s1118 * (omega_front_left_thigh_z_squared_2 - omega_front_left_thigh_y_squared_2)
+    s2138 = s1117 * (omega_front_left_thigh_x_squared_2 - omega_front_left_thigh_z_squared_2)
+    s2139 = s1116 * (omega_front_left_thigh_y_squared_2 - omega_front_left_thigh_x_squared_2)
+    s2140 = s1103 * a_front_left_thigh_z - s1104 * a_front_left_thigh_y + (s1117 * s1951 - s1116 * s1954 - s2137 + s1955 * s2135 - s1953 * s2136)
+    s2141 = s1104 * a_front_left_thigh_x - s1102 * a_front_left_thigh_z + (s1116 * s1955 - s1118 * s1949 - s2138 + s1950 * s2136 - s1954 * s2134)
+    s2142 = s1102 * a_front_left_thigh_y - s1103 * a_front_left_thigh_x + (s1118 * s1950 - s1117 * s1953 - s2139 + s1951 * s2134 - s1949 * s2135)
+    s2143 = m_thigh * a_front_right_thigh_x + (s1122 * s1966 - s1123 * s1967 - s1124 * s1968)
+    s2144 = m_thigh * a_front_right_thigh_y + (s1123 * s1970 - s1122 * s1969 - s1124 * s1971)
+    s2145 = m_thigh * a_front_right_thigh_z + (s1124 * s1974 - (s1122 * s1972 + s1123 * s1973))
+    s2146 = 0.5 * (s1135 + (s1131 + s1132))
+    s2147 = s2146 - s1131
+    s2148 = s2146 - s1132
+    s2149 = s2146 - s1135
+    s2150 = s1137 * s1969 - s1136 * s1972 - s1138 * s1975 + s1973 * s2148 - s1971 * s2149
+    s2151 = s1136 * s1973 - s1138 * s1967 - s1137 * s1976 + s1968 * s2149 - s1972 * s2147
+    s2152 = s1138 * s1968 - s1137 * s1971 - s1136 * s1977 + s1969 * s2147 - s1967 * s2148
+    s2153 = m_thigh * a_hind_left_thigh_x + (s1143 * s1988 - s1142 * s1987 + s1144 * s1989)
+    s2154 = m_thigh * a_hind_left_thigh_y + (s1142 * s1990 - s1143 * s1991 + s1144 * s1992)
+    s2155 = m_thigh * a_hind_left_thigh_z + (s1142 * s1993 + s1143 * s1994 - s1144 * s1995)
+    s2156 = 0.5 * (s1155 + (s1151 + s1152))
+    s2157 = s2156 - s1151
+    s2158 = s2156 - s1152
+    s2159 = s2156 - s1155
+    s2160 = s1158 * (omega_hind_left_thigh_z_squared_2 - omega_hind_left_thigh_y_squared_2)
+    s2161 = s1157 * (omega_hind_left_thigh_x_squared_2 - omega_hind_left_thigh_z_squared_2)
+    s2162 = s1156 * (omega_hind_left_thigh_y_squared_2 - omega_hind_left_thigh_x_squared_2)
+    s2163 = s1143 * a_hind_left_thigh_z - s1144 * a_hind_left_thigh_y + (s1157 * s1990 - s1156 * s1993 - s2160 + s1994 * s2158 - s1992 * s2159)
+    s2164 = s1144 * a_hind_left_thigh_x - s1142 * a_hind_left_thigh_z + (s1156 * s1994 - s1158 * s1988 - s2161 + s1989 * s2159 - s1993 * s2157)
+    s2165 = s1142 * a_hind_left_thigh_y - s1143 * a_hind_left_thigh_x + (s1158 * s1989 - s1157 * s1992 - s2162 + s1990 * s2157 - s1988 * s2158)
+    s2166 = m_thigh * a_hind_right_thigh_x + (s1162 * s2005 - s1163 * s2006 - s1164 * s2007)
+    s2167 = m_thigh * a_hind_right_thigh_y + (s1163 * s2009 - s1162 * s2008 - s1164 * s2010)
+    s2168 = m_thigh * a_hind_right_thigh_z + (s1164 * s2013 - (s1162 * s2011 + s1163 * s2012))
+    s2169 = 0.5 * (s1175 + (s1171 + s1172))
+    s2170 = s2169 - s1171
+    s2171 = s2169 - s1172
+    s2172 = s2169 - s1175
+    s2173 = s1178 * (omega_hind_right_thigh_z_squared_2 - omega_hind_right_thigh_y_squared_2)
+    s2174 = s1177 * (omega_hind_right_thigh_x_squared_2 - omega_hind_right_thigh_z_squared_2)
+    s2175 = s1176 * (omega_hind_right_thigh_y_squared_2 - omega_hind_right_thigh_x_squared_2)
+    s2176 = s1164 * a_hind_right_thigh_y - s1163 * a_hind_right_thigh_z + (s1177 * s2008 - s1176 * s2011 - s2173 + s2012 * s2171 - s2010 * s2172)
+    s2177 = s1162 * a_hind_right_thigh_z - s1164 * a_hind_right_thigh_x + (s1176 * s2012 - s1178 * s2006 - s2174 + s2007 * s2172 - s2011 * s2170)
+    s2178 = s1163 * a_hind_right_thigh_x - s1162 * a_hind_right_thigh_y + (s1178 * s2007 - s1177 * s2010 - s2175 + s2008 * s2170 - s2006 * s2171)
+    s2179 = s1182 * (omega_front_left_shank_y_squared + omega_front_left_shank_z_squared)
+    s2180 = s1183 * (omega_front_left_shank_x_squared + omega_front_left_shank_z_squared)
+    s2181 = s1184 * (omega_front_left_shank_x_squared + omega_front_left_shank_y_squared)
+    s2182 = m_shank * a_front_left_shank_x + (s2179 - s1183 * s2023 - s1184 * s2024)
+    s2183 = m_shank * a_front_left_shank_y + (s2180 - s1182 * s2025 - s1184 * s2026)
+    s2184 = m_shank * a_front_left_shank_z + (s2181 - (s1182 * s2027 + s1183 * s2028))
+    s2185 = 0.5 * (s1194 + (s1191 + s1192))
+    s2186 = s2185 - s1191
+    s2187 = s2185 - s1192
+    s2188 = s2185 - s1194
+    s2189 = s1197 * (omega_front_left_shank_z_squared - omega_front_left_shank_y_squared)
+    s2190 = s1196 * (omega_front_left_shank_x_squared - omega_front_left_shank_z_squared)
+    s2191 = s1195 * (omega_front_left_shank_y_squared - omega_front_left_shank_x_squared)
+    s2192 = s1184 * a_front_left_shank_y - s1183 * a_front_left_shank_z + (s1196 * s2025 - s1195 * s2027 - s2189 + s2028 * s2187 - s2026 * s2188)
+    s2193 = s1182 * a_front_left_shank_z - s1184 * a_front_left_shank_x + (s1195 * s2028 - s1197 * s2023 - s2190 + s2024 * s2188 - s2027 * s2186)
+    s2194 = s1183 * a_front_left_shank_x - s1182 * a_front_left_shank_y + (s1197 * s2024 - s1196 * s2026 - s2191 + s2025 * s2186 - s2023 * s2187)
+    s2195 = s1201 * (omega_front_right_shank_y_squared + omega_front_right_shank_z_squared)
+    s2196 = s1202 * (omega_front_right_shank_x_squared + omega_front_right_shank_z_squared)
+    s2197 = s1203 * (omega_front_right_shank_x_squared + omega_front_right_shank_y_squared)
+    s2198 = m_shank * a_front_right_shank_x + (s2195 - s1202 * s2038 - s1203 * s2039)
+    s2199 = m_shank * a_front_right_shank_y + (s2196 - s1201 * s2040 - s1203 * s2041)
+    s2200 = m_shank * a_front_right_shank_z + (s2197 - (s1201 * s2042 + s1202 * s2043))
+    s2201 = 0.5 * (s1213 + (s1210 + s1211))
+    s2202 = s2201 - s1210
+    s2203 = s2201 - s1211
+    s2204 = s2201 - s1213
+    s2205 = s1216 * (omega_front_right_shank_z_squared - omega_front_right_shank_y_squared)
+    s2206 = s1215 * (omega_front_right_shank_x_squared - omega_front_right_shank_z_squared)
+    s2207 = s1214 * (omega_front_right_shank_y_squared - omega_front_right_shank_x_squared)
+    s2208 = s1203 * a_front_right_shank_y - s1202 * a_front_right_shank_z + (s1215 * s2040 - s1214 * s2042 - s2205 + s2043 * s2203 - s2041 * s2204)
+    s2209 = s1201 * a_front_right_shank_z - s1203 * a_front_right_shank_x + (s1214 * s2043 - s1216 * s2038 - s2206 + s2039 * s2204 - s2042 * s2202)
+    s2210 = s1202 * a_front_right_shank_x - s1201 * a_front_right_shank_y + (s1216 * s2039 - s1215 * s2041 - s2207 + s2040 * s2202 - s2038 * s2203)
+    s2211 = s1220 * (omega_hind_left_shank_y_squared + omega_hind_left_shank_z_squared)
+    s2212 = s1221 * (omega_hind_left_shank_x_squared + omega_hind_left_shank_z_squared)
+    s2213 = s1222 * (omega_hind_left_shank_x_squared + omega_hind_left_shank_y_squared)
+    s2214 = m_shank * a_hind_left_shank_x + (s2211 - s1221 * s2053 - s1222 * s2054)
+    s2215 = m_shank * a_hind_left_shank_y + (s2212 - s1220 * s2055 - s1222 * s2056)
+    s2216 = m_shank * a_hind_left_shank_z + (s2213 - (s1220 * s2057 + s1221 * s2058))
+    s2217 = 0.5 * (s1232 + (s1229 + s1230))
+    s2218 = s2217 - s1229
+    s2219 = s2217 - s1230
+    s2220 = s2217 - s1232
+    s2221 = s1235 * (omega_hind_left_shank_z_squared - omega_hind_left_shank_y_squared)
+    s2222 = s1234 * (omega_hind_left_shank_x_squared - omega_hind_left_shank_z_squared)
+    s2223 = s1233 * (omega_hind_left_shank_y_squared - omega_hind_left_shank_x_squared)
+    s2224 = s1222 * a_hind_left_shank_y - s1221 * a_hind_left_shank_z + (s1234 * s2055 - s1233 * s2057 - s2221 + s2058 * s2219 - s2056 * s2220)
+    s2225 = s1220 * a_hind_left_shank_z - s1222 * a_hind_left_shank_x + (s1233 * s2058 - s1235 * s2053 - s2222 + s2054 * s2220 - s2057 * s2218)
+    s2226 = s1221 * a_hind_left_shank_x - s1220 * a_hind_left_shank_y + (s1235 * s2054 - s1234 * s2056 - s2223 + s2055 * s2218 - s2053 * s2219)
+    s2227 = s1239 * (omega_hind_right_shank_y_squared + omega_hind_right_shank_z_squared)
+    s2228 = s1240 * (omega_hind_right_shank_x_squared + omega_hind_right_shank_z_squared)
+    s2229 = s1241 * (omega_hind_right_shank_x_squared + omega_hind_right_shank_y_squared)
+    s2230 = m_shank * a_hind_right_shank_x + (s2227 - s1240 * s2068 - s1241 * s2069)
+    s2231 = m_shank * a_hind_right_shank_y + (s2228 - s1239 * s2070 - s1241 * s2071)
+    s2232 = m_shank * a_hind_right_shank_z + (s2229 - (s1239 * s2072 + s1240 * s2073))
+    s2233 = 0.5 * (s1251 + (s1248 + s1249))
+    s2234 = s2233 - s1248
+    s2235 = s2233 - s1249
+    s2236 = s2233 - s1251
+    s2237 = s1254 * (omega_hind_right_shank_z_squared - omega_hind_right_shank_y_squared)
+    s2238 = s1253 * (omega_hind_right_shank_x_squared - omega_hind_right_shank_z_squared)
+    s2239 = s1252 * (omega_hind_right_shank_y_squared - omega_hind_right_shank_x_squared)
+    s2240 = s1241 * a_hind_right_shank_y - s1240 * a_hind_right_shank_z + (s1253 * s2070 - s1252 * s2072 - s2237 + s2073 * s2235 - s2071 * s2236)
+    s2241 = s1239 * a_hind_right_shank_z - s1241 * a_hind_right_shank_x + (s1252 * s2073 - s1254 * s2068 - s2238 + s2069 * s2236 - s2072 * s2234)
+    s2242 = s1240 * a_hind_right_shank_x - s1239 * a_hind_right_shank_y + (s1254 * s2069 - s1253 * s2071 - s2239 + s2070 * s2234 - s2068 * s2235)
+    s2243 = s2176 + (s2240 + (s1237 * s2232 - s1238 * s2231))
+    s2244 = s2177 + (s2241 + (s1238 * s2230 - s1236 * s2232))
+    s2245 = s2178 + (s2242 + (s1236 * s2231 - s1237 * s2230))
+    s2246 = s2166 + s2230
+    s2247 = s2167 + s2231
+    s2248 = s2168 + s2232
+    s2249 = s2163 + (s2224 + (s1218 * s2216 - s1219 * s2215))
+    s2250 = s2164 + (s2225 + (s1219 * s2214 - s1217 * s2216))
+    s2251 = s2165 + (s2226 + (s1217 * s2215 - s1218 * s2214))
+    s2252 = s2153 + s2214
+    s2253 = s2154 + s2215
+    s2254 = s2155 + s2216
+    s2255 = s1124 * a_front_right_thigh_y - s1123 * a_front_right_thigh_z + s2150 + (s2208 + (s1199 * s2200 - s1200 * s2199))
+    s2256 = s1122 * a_front_right_thigh_z - s1124 * a_front_right_thigh_x + s2151 + (s2209 + (s1200 * s2198 - s1198 * s2200))
+    s2257 = s1123 * a_front_right_thigh_x - s1122 * a_front_right_thigh_y + s2152 + (s2210 + (s1198 * s2199 - s1199 * s2198))
+    s2258 = s2143 + s2198
+    s2259 = s2144 + s2199
+    s2260 = s2145 + s2200
+    s2261 = s2140 + (s2192 + (s1180 * s2184 - s1181 * s2183))
+    s2262 = s2141 + (s2193 + (s1181 * s2182 - s1179 * s2184))
+    s2263 = s2142 + (s2194 + (s1179 * s2183 - s1180 * s2182))
+    s2264 = s2130 + s2182
+    s2265 = s2131 + s2183
+    s2266 = s2132 + s2184
+    s2267 = s2127 + (s2243 + (s1160 * s2248 - s1161 * s2247))
+    s2268 = s2128 + (s2244 + (s1161 * s2246 - s1159 * s2248))
+    s2269 = s2129 + (s2245 + (s1159 * s2247 - s1160 * s2246))
+    s2270 = s2117 + s2246
+    s2271 = s2118 + s2247
+    s2272 = s2119 + s2248
+    s2273 = s2114 + (s2249 + (s1140 * s2254 - s1141 * s2253))
+    s2274 = s2115 + (s2250 + (s1141 * s2252 - s1139 * s2254))
+    s2275 = s2116 + (s2251 + (s1139 * s2253 - s1140 * s2252))
+    s2276 = s2104 + s2252
+    s2277 = s2105 + s2253
+    s2278 = s2106 + s2254
+    s2279 = s2101 + (s2255 + (s1120 * s2260 - s1121 * s2259))
+    s2280 = s2102 + (s2256 + (s1121 * s2258 - s1119 * s2260))
+    s2281 = s2103 + (s2257 + (s1119 * s2259 - s1120 * s2258))
+    s2282 = s2091 + s2258
+    s2283 = s2092 + s2259
+    s2284 = s2093 + s2260
+    s2285 = s2088 + (s2261 + (s1100 * s2266 - s1101 * s2265))
+    s2286 = s2089 + (s2262 + (s1101 * s2264 - s1099 * s2266))
+    s2287 = s2090 + (s2263 + (s1099 * s2265 - s1100 * s2264))
+    s2288 = s2078 + s2264
+    s2289 = s2079 + s2265
+    s2290 = s2080 + s2266
+    s2291 = s2288 + (s2282 + (s2276 + (s2270 - m_trunk * s863)))
+    s2292 = s2289 + (s2283 + (s2277 + (m_trunk * delta_trunk_2_y + s2271)))
+    s2293 = s2290 + (s2284 + (s2278 + (m_trunk * a_trunk_3_z + s2272)))
+    s2294 = s1008 * omega_trunk_z
+    s2295 = s1009 * omega_trunk_y
+    s2296 = s1010 * omega_trunk_x
+    s2297 = m_hip * velocity_front_left_hip_x + (s1022 * omega_front_left_hip_y_2 - s1021 * omega_front_left_hip_z_2)
+    s2298 = m_hip * velocity_front_left_hip_y + (s1020 * omega_front_left_hip_z_2 - s1022 * omega_front_left_hip_x_2)
+    s2299 = m_hip * velocity_front_left_hip_z + (s1021 * omega_front_left_hip_x_2 - s1020 * omega_front_left_hip_y_2)
+    s2300 = s1042 * omega_front_left_hip_z_2
+    s2301 = s1043 * omega_front_left_hip_y_2
+    s2302 = s1044 * omega_front_left_hip_x_2
+    s2303 = s1020 * velocity_front_left_hip_x
+    s2304 = s1021 * velocity_front_left_hip_y
+    s2305 = s1022 * velocity_front_left_hip_z
+    s2306 = s1044 * omega_front_left_hip_y_2 + omega_front_left_hip_z_2 * s2083 - s1021 * velocity_front_left_hip_x
+    s2307 = s1022 * velocity_front_left_hip_x + (s1044 * omega_front_left_hip_z_2 + omega_front_left_hip_y_2 * s2084)
+    s2308 = s1020 * velocity_front_left_hip_y + (s1043 * omega_front_left_hip_x_2 + omega_front_left_hip_z_2 * s2082)
+    s2309 = s1043 * omega_front_left_hip_z_2 + omega_front_left_hip_x_2 * s2084 - s1022 * velocity_front_left_hip_y
+    s2310 = s1042 * omega_front_left_hip_x_2 + omega_front_left_hip_y_2 * s2082 - s1020 * velocity_front_left_hip_z
+    s2311 = s1021 * velocity_front_left_hip_z + (s1042 * omega_front_left_hip_y_2 + omega_front_left_hip_x_2 * s2083)
+    s2312 = m_hip * velocity_front_right_hip_x + (s1049 * omega_front_right_hip_z_2 - s1050 * omega_front_right_hip_y_2)
+    s2313 = m_hip * velocity_front_right_hip_y + (s1050 * omega_front_right_hip_x_2 - s1048 * omega_front_right_hip_z_2)
+    s2314 = m_hip * velocity_front_right_hip_z + (s1048 * omega_front_right_hip_y_2 - s1049 * omega_front_right_hip_x_2)
+    s2315 = s1061 * omega_front_right_hip_z_2
+    s2316 = s1062 * omega_front_right_hip_y_2
+    s2317 = s1063 * omega_front_right_hip_x_2
+    s2318 = s1048 * velocity_front_right_hip_x
+    s2319 = s1049 * velocity_front_right_hip_y
+    s2320 = s1050 * velocity_front_right_hip_z
+    s2321 = s1049 * velocity_front_right_hip_x + (s1063 * omega_front_right_hip_y_2 + omega_front_right_hip_z_2 * s2096)
+    s2322 = s1050 * velocity_front_right_hip_x - (s1063 * omega_front_right_hip_z_2 + omega_front_right_hip_y_2 * s2097)
+    s2323 = s1048 * velocity_front_right_hip_y - (s1062 * omega_front_right_hip_x_2 + omega_front_right_hip_z_2 * s2095)
+    s2324 = s1050 * velocity_front_right_hip_y + (s1062 * omega_front_right_hip_z_2 + omega_front_right_hip_x_2 * s2097)
+    s2325 = s1048 * velocity_front_right_hip_z + (s1061 * omega_front_right_hip_x_2 + omega_front_right_hip_y_2 * s2095)
+    s2326 = s1049 * velocity_front_right_hip_z - (s1061 * omega_front_right_hip_y_2 + omega_front_right_hip_x_2 * s2096)
+    s2327 = m_hip * velocity_hind_left_hip_x + (s1069 * omega_hind_left_hip_y_2 - s1068 * omega_hind_left_hip_z_2)
+    s2328 = m_hip * velocity_hind_left_hip_y + (s1067 * omega_hind_left_hip_z_2 - s1069 * omega_hind_left_hip_x_2)
+    s2329 = m_hip * velocity_hind_left_hip_z + (s1068 * omega_hind_left_hip_x_2 - s1067 * omega_hind_left_hip_y_2)
+    s2330 = s1080 * omega_hind_left_hip_z_2
+    s2331 = s1081 * omega_hind_left_hip_y_2
+    s2332 = s1082 * omega_hind_left_hip_x_2
+    s2333 = s1067 * velocity_hind_left_hip_x
+    s2334 = s1068 * velocity_hind_left_hip_y
+    s2335 = s1069 * velocity_hind_left_hip_z
+    s2336 = s1082 * omega_hind_left_hip_y_2 + omega_hind_left_hip_z_2 * s2109 - s1068 * velocity_hind_left_hip_x
+    s2337 = s1069 * velocity_hind_left_hip_x + (s1082 * omega_hind_left_hip_z_2 + omega_hind_left_hip_y_2 * s2110)
+    s2338 = s1067 * velocity_hind_left_hip_y + (s1081 * omega_hind_left_hip_x_2 + omega_hind_left_hip_z_2 * s2108)
+    s2339 = s1081 * omega_hind_left_hip_z_2 + omega_hind_left_hip_x_2 * s2110 - s1069 * velocity_hind_left_hip_y
+    s2340 = s1080 * omega_hind_left_hip_x_2 + omega_hind_left_hip_y_2 * s2108 - s1067 * velocity_hind_left_hip_z
+    s2341 = s1068 * velocity_hind_left_hip_z + (s1080 * omega_hind_left_hip_y_2 + omega_hind_left_hip_x_2 * s2109)
+    s2342 = m_hip * velocity_hind_right_hip_x + (s1084 * omega_hind_right_hip_z_2 - s1085 * omega_hind_right_hip_y_2)
+    s2343 = m_hip * velocity_hind_right_hip_y + (s1085 * omega_hind_right_hip_x_2 - s1083 * omega_hind_right_hip_z_2)
+    s2344 = m_hip * velocity_hind_right_hip_z + (s1083 * omega_hind_right_hip_y_2 - s1084 * omega_hind_right_hip_x_2)
+    s2345 = s1096 * omega_hind_right_hip_z_2
+    s2346 = s1097 * omega_hind_right_hip_y_2
+    s2347 = s1098 * omega_hind_right_hip_x_2
+    s2348 = s1083 * velocity_hind_right_hip_x
+    s2349 = s1084 * velocity_hind_right_hip_y
+    s2350 = s1085 * velocity_hind_right_hip_z
+    s2351 = s1084 * velocity_hind_right_hip_x + (s1098 * omega_hind_right_hip_y_2 + omega_hind_right_hip_z_2 * s2122)
+    s2352 = s1085 * velocity_hind_right_hip_x - (s1098 * omega_hind_right_hip_z_2 + omega_hind_right_hip_y_2 * s2123)
+    s2353 = s1083 * velocity_hind_right_hip_y - (s1097 * omega_hind_right_hip_x_2 + omega_hind_right_hip_z_2 * s2121)
+    s2354 = s1085 * velocity_hind_right_hip_y + (s1097 * omega_hind_right_hip_z_2 + omega_hind_right_hip_x_2 * s2123)
+    s2355 = s1083 * velocity_hind_right_hip_z + (s1096 * omega_hind_right_hip_x_2 + omega_hind_right_hip_y_2 * s2121)
+    s2356 = s1084 * velocity_hind_right_hip_z - (s1096 * omega_hind_right_hip_y_2 + omega_hind_right_hip_x_2 * s2122)
+    s2357 = m_thigh * velocity_front_left_thigh_x + (s1104 * omega_front_left_thigh_y_2 - s1103 * omega_front_left_thigh_z_2)
+    s2358 = m_thigh * velocity_front_left_thigh_y + (s1102 * omega_front_left_thigh_z_2 - s1104 * omega_front_left_thigh_x_2)
+    s2359 = m_thigh * velocity_front_left_thigh_z + (s1103 * omega_front_left_thigh_x_2 - s1102 * omega_front_left_thigh_y_2)
+    s2360 = s1116 * omega_front_left_thigh_z_2
+    s2361 = s1117 * omega_front_left_thigh_y_2
+    s2362 = s1118 * omega_front_left_thigh_x_2
+    s2363 = s1102 * velocity_front_left_thigh_x
+    s2364 = s1103 * velocity_front_left_thigh_y
+    s2365 = s1104 * velocity_front_left_thigh_z
+    s2366 = s1118 * omega_front_left_thigh_y_2 + omega_front_left_thigh_z_2 * s2135 - s1103 * velocity_front_left_thigh_x
+    s2367 = s1104 * velocity_front_left_thigh_x + (s1118 * omega_front_left_thigh_z_2 + omega_front_left_thigh_y_2 * s2136)
+    s2368 = s1102 * velocity_front_left_thigh_y + (s1117 * omega_front_left_thigh_x_2 + omega_front_left_thigh_z_2 * s2134)
+    s2369 = s1117 * omega_front_left_thigh_z_2 + omega_front_left_thigh_x_2 * s2136 - s1104 * velocity_front_left_thigh_y
+    s2370 = s1116 * omega_front_left_thigh_x_2 + omega_front_left_thigh_y_2 * s2134 - s1102 * velocity_front_left_thigh_z
+    s2371 = s1103 * velocity_front_left_thigh_z + (s1116 * omega_front_left_thigh_y_2 + omega_front_left_thigh_x_2 * s2135)
+    s2372 = s1123 * omega_front_right_thigh_z_2 - s1124 * omega_front_right_thigh_y_2
+    s2373 = s1124 * omega_front_right_thigh_x_2 - s1122 * omega_front_right_thigh_z_2
+    s2374 = s1122 * omega_front_right_thigh_y_2 - s1123 * omega_front_right_thigh_x_2
+    s2375 = s1136 * omega_front_right_thigh_z_2
+    s2376 = s1137 * omega_front_right_thigh_y_2
+    s2377 = s1138 * omega_front_right_thigh_y_2 + omega_front_right_thigh_z_2 * s2148
+    s2378 = s1138 * omega_front_right_thigh_z_2 + omega_front_right_thigh_y_2 * s2149
+    s2379 = s1137 * omega_front_right_thigh_x_2 + omega_front_right_thigh_z_2 * s2147
+    s2380 = s1138 * omega_front_right_thigh_x_2
+    s2381 = s1137 * omega_front_right_thigh_z_2 + omega_front_right_thigh_x_2 * s2149
+    s2382 = s1136 * omega_front_right_thigh_x_2 + omega_front_right_thigh_y_2 * s2147
+    s2383 = s1136 * omega_front_right_thigh_y_2 + omega_front_right_thigh_x_2 * s2148
+    s2384 = s1122 * velocity_front_right_thigh_x
+    s2385 = s1123 * velocity_front_right_thigh_y
+    s2386 = s1124 * velocity_front_right_thigh_z
+    s2387 = m_thigh * velocity_hind_left_thigh_x + (s1144 * omega_hind_left_thigh_y_2 - s1143 * omega_hind_left_thigh_z_2)
+    s2388 = m_thigh * velocity_hind_left_thigh_y + (s1142 * omega_hind_left_thigh_z_2 - s1144 * omega_hind_left_thigh_x_2)
+    s2389 = m_thigh * velocity_hind_left_thigh_z + (s1143 * omega_hind_left_thigh_x_2 - s1142 * omega_hind_left_thigh_y_2)
+    s2390 = s1156 * omega_hind_left_thigh_z_2
+    s2391 = s1157 * omega_hind_left_thigh_y_2
+    s2392 = s1158 * omega_hind_left_thigh_x_2
+    s2393 = s1142 * velocity_hind_left_thigh_x
+    s2394 = s1143 * velocity_hind_left_thigh_y
+    s2395 = s1144 * velocity_hind_left_thigh_z
+    s2396 = s1158 * omega_hind_left_thigh_y_2 + omega_hind_left_thigh_z_2 * s2158 - s1143 * velocity_hind_left_thigh_x
+    s2397 = s1144 * velocity_hind_left_thigh_x + (s1158 * omega_hind_left_thigh_z_2 + omega_hind_left_thigh_y_2 * s2159)
+    s2398 = s1142 * velocity_hind_left_thigh_y + (s1157 * omega_hind_left_thigh_x_2 + omega_hind_left_thigh_z_2 * s2157)
+    s2399 = s1157 * omega_hind_left_thigh_z_2 + omega_hind_left_thigh_x_2 * s2159 - s1144 * velocity_hind_left_thigh_y
+    s2400 = s1156 * omega_hind_left_thigh_x_2 + omega_hind_left_thigh_y_2 * s2157 - s1142 * velocity_hind_left_thigh_z
+    s2401 = s1143 * velocity_hind_left_thigh_z + (s1156 * omega_hind_left_thigh_y_2 + omega_hind_left_thigh_x_2 * s2158)
+    s2402 = m_thigh * velocity_hind_right_thigh_x + (s1163 * omega_hind_right_thigh_z_2 - s1164 * omega_hind_right_thigh_y_2)
+    s2403 = m_thigh * velocity_hind_right_thigh_y + (s1164 * omega_hind_right_thigh_x_2 - s1162 * omega_hind_right_thigh_z_2)
+    s2404 = m_thigh * velocity_hind_right_thigh_z + (s1162 * omega_hind_right_thigh_y_2 - s1163 * omega_hind_right_thigh_x_2)
+    s2405 = s1176 * omega_hind_right_thigh_z_2
+    s2406 = s1177 * omega_hind_right_thigh_y_2
+    s2407 = s1178 * omega_hind_right_thigh_x_2
+    s2408 = s1162 * velocity_hind_right_thigh_x
+    s2409 = s1163 * velocity_hind_right_thigh_y
+    s2410 = s1164 * velocity_hind_right_thigh_z
+    s2411 = s1163 * velocity_hind_right_thigh_x + (s1178 * omega_hind_right_thigh_y_2 + omega_hind_right_thigh_z_2 * s2171)
+    s2412 = s1164 * velocity_hind_right_thigh_x - (s1178 * omega_hind_right_thigh_z_2 + omega_hind_right_thigh_y_2 * s2172)
+    s2413 = s1162 * velocity_hind_right_thigh_y - (s1177 * omega_hind_right_thigh_x_2 + omega_hind_right_thigh_z_2 * s2170)
+    s2414 = s1164 * velocity_hind_right_thigh_y + (s1177 * omega_hind_right_thigh_z_2 + omega_hind_right_thigh_x_2 * s2172)
+    s2415 = s1162 * velocity_hind_right_thigh_z + (s1176 * omega_hind_right_thigh_x_2 + omega_hind_right_thigh_y_2 * s2170)
+    s2416 = s1163 * velocity_hind_right_thigh_z - (s1176 * omega_hind_right_thigh_y_2 + omega_hind_right_thigh_x_2 * s2171)
+    s2417 = m_shank * velocity_front_left_shank_x + (s1183 * omega_front_left_shank_z_2 - s1184 * omega_front_left_shank_y_2)
+    s2418 = m_shank * velocity_front_left_shank_y + (s1184 * omega_front_left_shank_x_2 - s1182 * omega_front_left_shank_z_2)
+    s2419 = m_shank * velocity_front_left_shank_z + (s1182 * omega_front_left_shank_y_2 - s1183 * omega_front_left_shank_x_2)
+    s2420 = s1195 * omega_front_left_shank_z_2
+    s2421 = s1196 * omega_front_left_shank_y_2
+    s2422 = s1197 * omega_front_left_shank_x_2
+    s2423 = s1182 * velocity_front_left_shank_x
+    s2424 = s1183 * velocity_front_left_shank_y
+    s2425 = s1184 * velocity_front_left_shank_z
+    s2426 = s2421 - s2420 - (s2424 + s2425)
+    s2427 = s1183 * velocity_front_left_shank_x + (s1197 * omega_front_left_shank_y_2 + omega_front_left_shank_z_2 * s2187)
+    s2428 = s1184 * velocity_front_left_shank_x - (s1197 * omega_front_left_shank_z_2 + omega_front_left_shank_y_2 * s2188)
+    s2429 = s1182 * velocity_front_left_shank_y - (s1196 * omega_front_left_shank_x_2 + omega_front_left_shank_z_2 * s2186)
+    s2430 = s2420 - s2422 - (s2423 + s2425)
+    s2431 = s1184 * velocity_front_left_shank_y + (s1196 * omega_front_left_shank_z_2 + omega_front_left_shank_x_2 * s2188)
+    s2432 = s1182 * velocity_front_left_shank_z + (s1195 * omega_front_left_shank_x_2 + omega_front_left_shank_y_2 * s2186)
+    s2433 = s1183 * velocity_front_left_shank_z - (s1195 * omega_front_left_shank_y_2 + omega_front_left_shank_x_2 * s2187)
+    s2434 = s2422 - s2421 - (s2423 + s2424)
+    s2435 = s1202 * omega_front_right_shank_z_2 - s1203 * omega_front_right_shank_y_2
+    s2436 = s1203 * omega_front_right_shank_x_2 - s1201 * omega_front_right_shank_z_2
+    s2437 = s1201 * omega_front_right_shank_y_2 - s1202 * omega_front_right_shank_x_2
+    s2438 = m_shank * velocity_front_right_shank_x + s2435
+    s2439 = m_shank * velocity_front_right_shank_y + s2436
+    s2440 = m_shank * velocity_front_right_shank_z + s2437
+    s2441 = s1214 * omega_front_right_shank_z_2
+    s2442 = s1215 * omega_front_right_shank_y_2
+    s2443 = s1216 * omega_front_right_shank_y_2 + omega_front_right_shank_z_2 * s2203
+    s2444 = s1216 * omega_front_right_shank_z_2 + omega_front_right_shank_y_2 * s2204
+    s2445 = s1215 * omega_front_right_shank_x_2 + omega_front_right_shank_z_2 * s2202
+    s2446 = s1216 * omega_front_right_shank_x_2
+    s2447 = s1215 * omega_front_right_shank_z_2 + omega_front_right_shank_x_2 * s2204
+    s2448 = s1214 * omega_front_right_shank_x_2 + omega_front_right_shank_y_2 * s2202
+    s2449 = s1214 * omega_front_right_shank_y_2 + omega_front_right_shank_x_2 * s2203
+    s2450 = s1201 * velocity_front_right_shank_x
+    s2451 = s1202 * velocity_front_right_shank_y
+    s2452 = s1203 * velocity_front_right_shank_z
+    s2453 = s2442 - s2441 - (s2451 + s2452)
+    s2454 = s1202 * velocity_front_right_shank_x + s2443
+    s2455 = s1203 * velocity_front_right_shank_x - s2444
+    s2456 = s1201 * velocity_front_right_shank_y - s2445
+    s2457 = s2441 - s2446 - (s2450 + s2452)
+    s2458 = s1203 * velocity_front_right_shank_y + s2447
+    s2459 = s1201 * velocity_front_right_shank_z + s2448
+    s2460 = s1202 * velocity_front_right_shank_z - s2449
+    s2461 = s2446 - s2442 - (s2450 + s2451)
+    s2462 = m_shank * velocity_hind_left_shank_x + (s1221 * omega_hind_left_shank_z_2 - s1222 * omega_hind_left_shank_y_2)
+    s2463 = m_shank * velocity_hind_left_shank_y + (s1222 * omega_hind_left_shank_x_2 - s1220 * omega_hind_left_shank_z_2)
+    s2464 = m_shank * velocity_hind_left_shank_z + (s1220 * omega_hind_left_shank_y_2 - s1221 * omega_hind_left_shank_x_2)
+    s2465 = s1233 * omega_hind_left_shank_z_2
+    s2466 = s1234 * omega_hind_left_shank_y_2
+    s2467 = s1235 * omega_hind_left_shank_x_2
+    s2468 = s1220 * velocity_hind_left_shank_x
+    s2469 = s1221 * velocity_hind_left_shank_y
+    s2470 = s1222 * velocity_hind_left_shank_z
+    s2471 = s2466 - s2465 - (s2469 + s2470)
+    s2472 = s1221 * velocity_hind_left_shank_x + (s1235 * omega_hind_left_shank_y_2 + omega_hind_left_shank_z_2 * s2219)
+    s2473 = s1222 * velocity_hind_left_shank_x - (s1235 * omega_hind_left_shank_z_2 + omega_hind_left_shank_y_2 * s2220)
+    s2474 = s1220 * velocity_hind_left_shank_y - (s1234 * omega_hind_left_shank_x_2 + omega_hind_left_shank_z_2 * s2218)
+    s2475 = s2465 - s2467 - (s2468 + s2470)
+    s2476 = s1222 * velocity_hind_left_shank_y + (s1234 * omega_hind_left_shank_z_2 + omega_hind_left_shank_x_2 * s2220)
+    s2477 = s1220 * velocity_hind_left_shank_z + (s1233 * omega_hind_left_shank_x_2 + omega_hind_left_shank_y_2 * s2218)
+    s2478 = s1221 * velocity_hind_left_shank_z - (s1233 * omega_hind_left_shank_y_2 + omega_hind_left_shank_x_2 * s2219)
+    s2479 = s2467 - s2466 - (s2468 + s2469)
+    s2480 = m_shank * velocity_hind_right_shank_x + (s1240 * omega_hind_right_shank_z_2 - s1241 * omega_hind_right_shank_y_2)
+    s2481 = m_shank * velocity_hind_right_shank_y + (s1241 * omega_hind_right_shank_x_2 - s1239 * omega_hind_right_shank_z_2)
+    s2482 = m_shank * velocity_hind_right_shank_z + (s1239 * omega_hind_right_shank_y_2 - s1240 * omega_hind_right_shank_x_2)
+    s2483 = s1252 * omega_hind_right_shank_z_2
+    s2484 = s1253 * omega_hind_right_shank_y_2
+    s2485 = s1254 * omega_hind_right_shank_x_2
+    s2486 = s1239 * velocity_hind_right_shank_x
+    s2487 = s1240 * velocity_hind_right_shank_y
+    s2488 = s1241 * velocity_hind_right_shank_z
+    s2489 = s2484 - s2483 - (s2487 + s2488)
+    s2490 = s1240 * velocity_hind_right_shank_x + (s1254 * omega_hind_right_shank_y_2 + omega_hind_right_shank_z_2 * s2235)
+    s2491 = s1241 * velocity_hind_right_shank_x - (s1254 * omega_hind_right_shank_z_2 + omega_hind_right_shank_y_2 * s2236)
+    s2492 = s1239 * velocity_hind_right_shank_y - (s1253 * omega_hind_right_shank_x_2 + omega_hind_right_shank_z_2 * s2234)
+    s2493 = s2483 - s2485 - (s2486 + s2488)
+    s2494 = s1241 * velocity_hind_right_shank_y + (s1253 * omega_hind_right_shank_z_2 + omega_hind_right_shank_x_2 * s2236)
+    s2495 = s1239 * velocity_hind_right_shank_z + (s1252 * omega_hind_right_shank_x_2 + omega_hind_right_shank_y_2 * s2234)
+    s2496 = s1240 * velocity_hind_right_shank_z - (s1252 * omega_hind_right_shank_y_2 + omega_hind_right_shank_x_2 * s2235)
+    s2497 = s2485 - s2484 - (s2486 + s2487)
+    s2498 = s1236 * s2480
+    s2499 = s1237 * s2481
+    s2500 = s1238 * s2482
+    s2501 = s2402 + s2480
+    s2502 = s2403 + s2481
+    s2503 = s2404 + s2482
+    s2504 = s2406 - s2405 - (s2409 + s2410) + (s2489 + (s2499 + s2500))
+    s2505 = s2411 + (s2490 - s1237 * s2480)
+    s2506 = s2412 + (s2491 - s1238 * s2480)
+    s2507 = s2413 + (s2492 - s1236 * s2481)
+    s2508 = s2405 - s2407 - (s2408 + s2410) + (s2493 + (s2498 + s2500))
+    s2509 = s2414 + (s2494 - s1238 * s2481)
+    s2510 = s2415 + (s2495 - s1236 * s2482)
+    s2511 = s2416 + (s2496 - s1237 * s2482)
+    s2512 = s2407 - s2406 - (s2408 + s2409) + (s2497 + (s2498 + s2499))
+    s2513 = s1217 * s2462
+    s2514 = s1218 * s2463
+    s2515 = s1219 * s2464
+    s2516 = s2387 + s2462
+    s2517 = s2388 + s2463
+    s2518 = s2389 + s2464
+    s2519 = s2394 + s2395 + (s2391 - s2390) + (s2471 + (s2514 + s2515))
+    s2520 = s2396 + (s2472 - s1218 * s2462)
+    s2521 = s2473 - s1219 * s2462 - s2397
+    s2522 = s2474 - s1217 * s2463 - s2398
+    s2523 = s2393 + s2395 + (s2390 - s2392) + (s2475 + (s2513 + s2515))
+    s2524 = s2399 + (s2476 - s1219 * s2463)
+    s2525 = s2400 + (s2477 - s1217 * s2464)
+    s2526 = s2478 - s1218 * s2464 - s2401
+    s2527 = s2393 + s2394 + (s2392 - s2391) + (s2479 + (s2513 + s2514))
+    s2528 = s1198 * s2438
+    s2529 = s1199 * s2439
+    s2530 = s1200 * s2440
+    s2531 = m_thigh * velocity_front_right_thigh_x + s2372 + s2438
+    s2532 = m_thigh * velocity_front_right_thigh_y + s2373 + s2439
+    s2533 = m_thigh * velocity_front_right_thigh_z + s2374 + s2440
+    s2534 = s2376 - s2375 - (s2385 + s2386) + (s2453 + (s2529 + s2530))
+    s2535 = s1123 * velocity_front_right_thigh_x + s2377 + (s2454 - s1199 * s2438)
+    s2536 = s1124 * velocity_front_right_thigh_x - s2378 + (s2455 - s1200 * s2438)
+    s2537 = s1122 * velocity_front_right_thigh_y - s2379 + (s2456 - s1198 * s2439)
+    s2538 = s2375 - s2380 - (s2384 + s2386) + (s2457 + (s2528 + s2530))
+    s2539 = s1124 * velocity_front_right_thigh_y + s2381 + (s2458 - s1200 * s2439)
+    s2540 = s1122 * velocity_front_right_thigh_z + s2382 + (s2459 - s1198 * s2440)
+    s2541 = s1123 * velocity_front_right_thigh_z - s2383 + (s2460 - s1199 * s2440)
+    s2542 = s2380 - s2376 - (s2384 + s2385) + (s2461 + (s2528 + s2529))
+    s2543 = s1179 * s2417
+    s2544 = s1180 * s2418
+    s2545 = s1181 * s2419
+    s2546 = s2357 + s2417
+    s2547 = s2358 + s2418
+    s2548 = s2359 + s2419
+    s2549 = s2364 + s2365 + (s2361 - s2360) + (s2426 + (s2544 + s2545))
+    s2550 = s2366 + (s2427 - s1180 * s2417)
+    s2551 = s2428 - s1181 * s2417 - s2367
+    s2552 = s2429 - s1179 * s2418 - s2368
+    s2553 = s2363 + s2365 + (s2360 - s2362) + (s2430 + (s2543 + s2545))
+    s2554 = s2369 + (s2431 - s1181 * s2418)
+    s2555 = s2370 + (s2432 - s1179 * s2419)
+    s2556 = s2433 - s1180 * s2419 - s2371
+    s2557 = s2363 + s2364 + (s2362 - s2361) + (s2434 + (s2543 + s2544))
+    s2558 = s1159 * s2501
+    s2559 = s1160 * s2502
+    s2560 = s1161 * s2503
+    s2561 = s2342 + s2501
+    s2562 = s2343 + s2502
+    s2563 = s2344 + s2503
+    s2564 = s2346 - s2345 - (s2349 + s2350) + (s2504 + (s2559 + s2560))
+    s2565 = s2351 + (s2505 - s1160 * s2501)
+    s2566 = s2352 + (s2506 - s1161 * s2501)
+    s2567 = s2353 + (s2507 - s1159 * s2502)
+    s2568 = s2345 - s2347 - (s2348 + s2350) + (s2508 + (s2558 + s2560))
+    s2569 = s2354 + (s2509 - s1161 * s2502)
+    s2570 = s2355 + (s2510 - s1159 * s2503)
+    s2571 = s2356 + (s2511 - s1160 * s2503)
+    s2572 = s2347 - s2346 - (s2348 + s2349) + (s2512 + (s2558 + s2559))
+    s2573 = s1139 * s2516
+    s2574 = s1140 * s2517
+    s2575 = s1141 * s2518
+    s2576 = s2327 + s2516
+    s2577 = s2328 + s2517
+    s2578 = s2329 + s2518
+    s2579 = s2334 + s2335 + (s2331 - s2330) + (s2519 + (s2574 + s2575))
+    s2580 = s2336 + (s2520 - s1140 * s2516)
+    s2581 = s2521 - s1141 * s2516 - s2337
+    s2582 = s2522 - s1139 * s2517 - s2338
+    s2583 = s2333 + s2335 + (s2330 - s2332) + (s2523 + (s2573 + s2575))
+    s2584 = s2339 + (s2524 - s1141 * s2517)
+    s2585 = s2340 + (s2525 - s1139 * s2518)
+    s2586 = s2526 - s1140 * s2518 - s2341
+    s2587 = s2333 + s2334 + (s2332 - s2331) + (s2527 + (s2573 + s2574))
+    s2588 = s1119 * s2531
+    s2589 = s1120 * s2532
+    s2590 = s1121 * s2533
+    s2591 = s2312 + s2531
+    s2592 = s2313 + s2532
+    s2593 = s2314 + s2533
+    s2594 = s2316 - s2315 - (s2319 + s2320) + (s2534 + (s2589 + s2590))
+    s2595 = s2321 + (s2535 - s1120 * s2531)
+    s2596 = s2322 + (s2536 - s1121 * s2531)
+    s2597 = s2323 + (s2537 - s1119 * s2532)
+    s2598 = s2315 - s2317 - (s2318 + s2320) + (s2538 + (s2588 + s2590))
+    s2599 = s2324 + (s2539 - s1121 * s2532)
+    s2600 = s2325 + (s2540 - s1119 * s2533)
+    s2601 = s2326 + (s2541 - s1120 * s2533)
+    s2602 = s2317 - s2316 - (s2318 + s2319) + (s2542 + (s2588 + s2589))
+    s2603 = s1099 * s2546
+    s2604 = s1100 * s2547
+    s2605 = s1101 * s2548
+    s2606 = s2297 + s2546
+    s2607 = s2298 + s2547
+    s2608 = s2299 + s2548
+    s2609 = s2304 + s2305 + (s2301 - s2300) + (s2549 + (s2604 + s2605))
+    s2610 = s2306 + (s2550 - s1100 * s2546)
+    s2611 = s2551 - s1101 * s2546 - s2307
+    s2612 = s2552 - s1099 * s2547 - s2308
+    s2613 = s2303 + s2305 + (s2300 - s2302) + (s2553 + (s2603 + s2605))
+    s2614 = s2309 + (s2554 - s1101 * s2547)
+    s2615 = s2310 + (s2555 - s1099 * s2548)
+    s2616 = s2556 - s1100 * s2548 - s2311
+    s2617 = s2303 + s2304 + (s2302 - s2301) + (s2557 + (s2603 + s2604))
+    s2618 = s1013 * s2561
+    s2619 = s1016 * s2562
+    s2620 = s1019 * s2563
+    s2621 = s1064 * s2576
+    s2622 = s1065 * s2577
+    s2623 = s1066 * s2578
+    s2624 = s1010 * omega_trunk_y + omega_trunk_z * s2076 + (s2565 + s1016 * s2561) + (s2580 - s1065 * s2576)
+    s2625 = s2566 + s1019 * s2561 - (s1010 * omega_trunk_z + omega_trunk_y * s2077) + (s2581 - s1066 * s2576)
+    s2626 = s2567 + s1013 * s2562 - (s1009 * omega_trunk_x + omega_trunk_z * s2075) + (s2582 - s1064 * s2577)
+    s2627 = s1009 * omega_trunk_z + omega_trunk_x * s2077 + (s2569 + s1019 * s2562) + (s2584 - s1066 * s2577)
+    s2628 = s1008 * omega_trunk_x + omega_trunk_y * s2075 + (s2570 + s1013 * s2563) + (s2585 - s1064 * s2578)
+    s2629 = s2571 + s1016 * s2563 - (s1008 * omega_trunk_y + omega_trunk_x * s2076) + (s2586 - s1065 * s2578)
+    s2630 = s1045 * s2591
+    s2631 = s1046 * s2592
+    s2632 = s1047 * s2593
+    s2633 = s2295 - s2294 + (s2564 - (s2619 + s2620)) + (s2579 + (s2622 + s2623)) + (s2594 + (s2631 + s2632))
+    s2634 = s2294 - s2296 + (s2568 - (s2618 + s2620)) + (s2583 + (s2621 + s2623)) + (s2598 + (s2630 + s2632))
+    s2635 = s2296 - s2295 + (s2572 - (s2618 + s2619)) + (s2587 + (s2621 + s2622)) + (s2602 + (s2630 + s2631))
+    s2636 = s1013 * s2606
+    s2637 = s1016 * s2607
+    s2638 = s1019 * s2608
+    s2639 = s2606 + (s2591 + (s2576 + (m_trunk * trunk_x_dot + s2561)))
+    s2640 = s2607 + (s2592 + (s2577 + (m_trunk * trunk_y_dot + s2562)))
+    s2641 = s2608 + (s2593 + (s2578 + (m_trunk * trunk_z_dot + s2563)))
+    s2642 = s2633 + (s2609 + (s2637 + s2638))
+    s2643 = s2624 + (s2595 - s1046 * s2591) + (s2610 - s1016 * s2606)
+    s2644 = s2625 + (s2596 - s1047 * s2591) + (s2611 - s1019 * s2606)
+    s2645 = s2626 + (s2597 - s1045 * s2592) + (s2612 - s1013 * s2607)
+    s2646 = s2634 + (s2613 + (s2636 + s2638))
+    s2647 = s2627 + (s2599 - s1047 * s2592) + (s2614 - s1019 * s2607)
+    s2648 = s2628 + (s2600 - s1045 * s2593) + (s2615 - s1013 * s2608)
+    s2649 = s2629 + (s2601 - s1046 * s2593) + (s2616 - s1016 * s2608)
+    s2650 = s2635 + (s2617 + (s2636 + s2637))
+    s2651 = trunk_y_dot * s21 - trunk_z_dot * s18
+    s2652 = trunk_z_dot * s15 - trunk_x_dot * s21
+    s2653 = trunk_x_dot * s18 - trunk_y_dot * s15
+    s2654 = s21 * delta_trunk_2_y - s18 * a_trunk_3_z
+    s2655 = s15 * a_trunk_3_z + s21 * s863
+    s2656 = s18 * s863 + s15 * delta_trunk_2_y
+    s2657 = s21 * omega_trunk_y - s18 * omega_trunk_z
+    s2658 = s15 * omega_trunk_z - s21 * omega_trunk_x
+    s2659 = s18 * omega_trunk_x - s15 * omega_trunk_y
+    s2660 = s2651 + s2651
+    s2661 = s2652 + s2652
+    s2662 = s2653 + s2653
+    s2663 = trunk_y_dot * s22 - trunk_z_dot * s19
+    s2664 = trunk_z_dot * s16 - trunk_x_dot * s22
+    s2665 = trunk_x_dot * s19 - trunk_y_dot * s16
+    s2666 = s22 * delta_trunk_2_y - s19 * a_trunk_3_z
+    s2667 = s16 * a_trunk_3_z + s22 * s863
+    s2668 = s19 * s863 + s16 * delta_trunk_2_y
+    s2669 = s22 * omega_trunk_y - s19 * omega_trunk_z
+    s2670 = s16 * omega_trunk_z - s22 * omega_trunk_x
+    s2671 = s19 * omega_trunk_x - s16 * omega_trunk_y
+    s2672 = s2663 + s2663
+    s2673 = s2664 + s2664
+    s2674 = s2665 + s2665
+    s2675 = trunk_y_dot * s23 - trunk_z_dot * s20
+    s2676 = trunk_z_dot * s17 - trunk_x_dot * s23
+    s2677 = trunk_x_dot * s20 - trunk_y_dot * s17
+    s2678 = s23 * delta_trunk_2_y - s20 * a_trunk_3_z
+    s2679 = s17 * a_trunk_3_z + s23 * s863
+    s2680 = s20 * s863 + s17 * delta_trunk_2_y
+    s2681 = s23 * omega_trunk_y - s20 * omega_trunk_z
+    s2682 = s17 * omega_trunk_z - s23 * omega_trunk_x
+    s2683 = s20 * omega_trunk_x - s17 * omega_trunk_y
+    s2684 = s2675 + s2675
+    s2685 = s2676 + s2676
+    s2686 = s2677 + s2677
+    s2687 = omega_trunk_y * velocity_front_left_hip_z - omega_trunk_z * velocity_front_left_hip_y
+    s2688 = omega_trunk_z * velocity_front_left_hip_x - omega_trunk_x * velocity_front_left_hip_z
+    s2689 = omega_trunk_x * velocity_front_left_hip_y - omega_trunk_y * velocity_front_left_hip_x
+    s2690 = a_front_left_hip_x - s2687
+    s2691 = a_front_left_hip_y - s2688
+    s2692 = a_front_left_hip_z - s2689
+    s2693 = s21 * velocity_front_left_hip_y - s18 * velocity_front_left_hip_z
+    s2694 = s15 * velocity_front_left_hip_z - s21 * velocity_front_left_hip_x
+    s2695 = s18 * velocity_front_left_hip_x - s15 * velocity_front_left_hip_y
+    s2696 = velocity_front_left_hip_y * s2659 - velocity_front_left_hip_z * s2658 + (omega_trunk_y * s2695 - omega_trunk_z * s2694)
+    s2697 = velocity_front_left_hip_z * s2657 - velocity_front_left_hip_x * s2659 + (omega_trunk_z * s2693 - omega_trunk_x * s2695)
+    s2698 = velocity_front_left_hip_x * s2658 - velocity_front_left_hip_y * s2657 + (omega_trunk_x * s2694 - omega_trunk_y * s2693)
+    s2699 = s21 * s1857 - s18 * s1858 + (omega_trunk_y * s2659 - omega_trunk_z * s2658)
+    s2700 = s15 * s1858 - s21 * s1856 + (omega_trunk_z * s2657 - omega_trunk_x * s2659)
+    s2701 = s18 * s1856 - s15 * s1857 + (omega_trunk_x * s2658 - omega_trunk_y * s2657)
+    s2702 = s21 * s2691 - s18 * s2692 + s2696
+    s2703 = s15 * s2692 - s21 * s2690 + s2697
+    s2704 = s18 * s2690 - s15 * s2691 + s2698
+    s2705 = s2657 + s2657
+    s2706 = s2658 + s2658
+    s2707 = s2659 + s2659
+    s2708 = s2693 + s2693
+    s2709 = s2694 + s2694
+    s2710 = s2695 + s2695
+    s2711 = omega_trunk_y * velocity_front_right_hip_z - omega_trunk_z * velocity_front_right_hip_y
+    s2712 = omega_trunk_z * velocity_front_right_hip_x - omega_trunk_x * velocity_front_right_hip_z
+    s2713 = omega_trunk_x * velocity_front_right_hip_y - omega_trunk_y * velocity_front_right_hip_x
+    s2714 = a_front_right_hip_x - s2711
+    s2715 = a_front_right_hip_y - s2712
+    s2716 = a_front_right_hip_z - s2713
+    s2717 = s21 * velocity_front_right_hip_y - s18 * velocity_front_right_hip_z
+    s2718 = s15 * velocity_front_right_hip_z - s21 * velocity_front_right_hip_x
+    s2719 = s18 * velocity_front_right_hip_x - s15 * velocity_front_right_hip_y
+    s2720 = velocity_front_right_hip_y * s2659 - velocity_front_right_hip_z * s2658 + (omega_trunk_y * s2719 - omega_trunk_z * s2718)
+    s2721 = velocity_front_right_hip_z * s2657 - velocity_front_right_hip_x * s2659 + (omega_trunk_z * s2717 - omega_trunk_x * s2719)
+    s2722 = velocity_front_right_hip_x * s2658 - velocity_front_right_hip_y * s2657 + (omega_trunk_x * s2718 - omega_trunk_y * s2717)
+    s2723 = s21 * s2715 - s18 * s2716 + s2720
+    s2724 = s15 * s2716 - s21 * s2714 + s2721
+    s2725 = s18 * s2714 - s15 * s2715 + s2722
+    s2726 = s2717 + s2717
+    s2727 = s2718 + s2718
+    s2728 = s2719 + s2719
+    s2729 = omega_trunk_y * velocity_hind_left_hip_z - omega_trunk_z * velocity_hind_left_hip_y
+    s2730 = omega_trunk_z * velocity_hind_left_hip_x - omega_trunk_x * velocity_hind_left_hip_z
+    s2731 = omega_trunk_x * velocity_hind_left_hip_y - omega_trunk_y * velocity_hind_left_hip_x
+    s2732 = a_hind_left_hip_x - s2729
+    s2733 = a_hind_left_hip_y - s2730
+    s2734 = a_hind_left_hip_z - s2731
+    s2735 = s21 * velocity_hind_left_hip_y - s18 * velocity_hind_left_hip_z
+    s2736 = s15 * velocity_hind_left_hip_z - s21 * velocity_hind_left_hip_x
+    s2737 = s18 * velocity_hind_left_hip_x - s15 * velocity_hind_left_hip_y
+    s2738 = velocity_hind_left_hip_y * s2659 - velocity_hind_left_hip_z * s2658 + (omega_trunk_y * s2737 - omega_trunk_z * s2736)
+    s2739 = velocity_hind_left_hip_z * s2657 - velocity_hind_left_hip_x * s2659 + (omega_trunk_z * s2735 - omega_trunk_x * s2737)
+    s2740 = velocity_hind_left_hip_x * s2658 - velocity_hind_left_hip_y * s2657 + (omega_trunk_x * s2736 - omega_trunk_y * s2735)
+    s2741 = s21 * s2733 - s18 * s2734 + s2738
+    s2742 = s15 * s2734 - s21 * s2732 + s2739
+    s2743 = s18 * s2732 - s15 * s2733 + s2740
+    s2744 = s2735 + s2735
+    s2745 = s2736 + s2736
+    s2746 = s2737 + s2737
+    s2747 = omega_trunk_y * velocity_hind_right_hip_z - omega_trunk_z * velocity_hind_right_hip_y
+    s2748 = omega_trunk_z * velocity_hind_right_hip_x - omega_trunk_x * velocity_hind_right_hip_z
+    s2749 = omega_trunk_x * velocity_hind_right_hip_y - omega_trunk_y * velocity_hind_right_hip_x
+    s2750 = a_hind_right_hip_x - s2747
+    s2751 = a_hind_right_hip_y - s2748
+    s2752 = a_hind_right_hip_z - s2749
+    s2753 = s21 * velocity_hind_right_hip_y - s18 * velocity_hind_right_hip_z
+    s2754 = s15 * velocity_hind_right_hip_z - s21 * velocity_hind_right_hip_x
+    s2755 = s18 * velocity_hind_right_hip_x - s15 * velocity_hind_right_hip_y
+    s2756 = velocity_hind_right_hip_y * s2659 - velocity_hind_right_hip_z * s2658 + (omega_trunk_y * s2755 - omega_trunk_z * s2754)
+    s2757 = velocity_hind_right_hip_z * s2657 - velocity_hind_right_hip_x * s2659 + (omega_trunk_z * s2753 - omega_trunk_x * s2755)
+    s2758 = velocity_hind_right_hip_x * s2658 - velocity_hind_right_hip_y * s2657 + (omega_trunk_x * s2754 - omega_trunk_y * s2753)
+    s2759 = s21 * s2751 - s18 * s2752 + s2756
+    s2760 = s15 * s2752 - s21 * s2750 + s2757
+    s2761 = s18 * s2750 - s15 * s2751 + s2758
+    s2762 = s2753 + s2753
+    s2763 = s2754 + s2754
+    s2764 = s2755 + s2755
+    s2765 = omega_front_left_hip_y_2 * velocity_front_left_thigh_z - omega_front_left_hip_z_2 * velocity_front_left_thigh_y
+    s2766 = omega_front_left_hip_z_2 * velocity_front_left_thigh_x - omega_front_left_hip_x_2 * velocity_front_left_thigh_z
+    s2767 = omega_front_left_hip_x_2 * velocity_front_left_thigh_y - omega_front_left_hip_y_2 * velocity_front_left_thigh_x
+    s2768 = a_front_left_thigh_x - s2765
+    s2769 = a_front_left_thigh_y - s2766
+    s2770 = a_front_left_thigh_z - s2767
+    s2771 = s931 * omega_front_left_hip_y_2 - s929 * omega_front_left_hip_z_2
+    s2772 = s927 * omega_front_left_hip_z_2 - s931 * omega_front_left_hip_x_2
+    s2773 = s929 * omega_front_left_hip_x_2 - s927 * omega_front_left_hip_y_2
+    s2774 = s931 * velocity_front_left_thigh_y - s929 * velocity_front_left_thigh_z
+    s2775 = s927 * velocity_front_left_thigh_z - s931 * velocity_front_left_thigh_x
+    s2776 = s929 * velocity_front_left_thigh_x - s927 * velocity_front_left_thigh_y
+    s2777 = velocity_front_left_thigh_y * s2773 - velocity_front_left_thigh_z * s2772
+    s2778 = velocity_front_left_thigh_z * s2771 - velocity_front_left_thigh_x * s2773
+    s2779 = velocity_front_left_thigh_x * s2772 - velocity_front_left_thigh_y * s2771
+    s2780 = s2777 + (omega_front_left_hip_y_2 * s2776 - omega_front_left_hip_z_2 * s2775)
+    s2781 = s2778 + (omega_front_left_hip_z_2 * s2774 - omega_front_left_hip_x_2 * s2776)
+    s2782 = s2779 + (omega_front_left_hip_x_2 * s2775 - omega_front_left_hip_y_2 * s2774)
+    s2783 = s931 * s1880 - s929 * s1881 + (omega_front_left_hip_y_2 * s2773 - omega_front_left_hip_z_2 * s2772)
+    s2784 = s927 * s1881 - s931 * s1879 + (omega_front_left_hip_z_2 * s2771 - omega_front_left_hip_x_2 * s2773)
+    s2785 = s929 * s1879 - s927 * s1880 + (omega_front_left_hip_x_2 * s2772 - omega_front_left_hip_y_2 * s2771)
+    s2786 = s931 * s2769 - s929 * s2770 + s2780
+    s2787 = s927 * s2770 - s931 * s2768 + s2781
+    s2788 = s929 * s2768 - s927 * s2769 + s2782
+    s2789 = s2771 + s2771
+    s2790 = s2772 + s2772
+    s2791 = s2773 + s2773
+    s2792 = s2774 + s2774
+    s2793 = s2775 + s2775
     s2794 = s2776 + s2776
-    s2795 = s2777 + s2777
-    s2796 = s2778 + s2778
-    s2797 = s2779 + s2779
-    s2798 = s2780 + s2780
-    s2799 = s2781 + s2781
-    s2800 = omega_front_right_hip_y_2 * velocity_front_right_thigh_z - omega_front_right_hip_z_2 * velocity_front_right_thigh_y
-    s2801 = omega_front_right_hip_z_2 * velocity_front_right_thigh_x - omega_front_right_hip_x_2 * velocity_front_right_thigh_z
-    s2802 = omega_front_right_hip_x_2 * velocity_front_right_thigh_y - omega_front_right_hip_y_2 * velocity_front_right_thigh_x
-    s2803 = a_front_right_thigh_x - s2800
-    s2804 = a_front_right_thigh_y - s2801
-    s2805 = a_front_right_thigh_z - s2802
-    s2806 = s942 * omega_front_right_hip_y_2 - s940 * omega_front_right_hip_z_2
-    s2807 = s938 * omega_front_right_hip_z_2 - s942 * omega_front_right_hip_x_2
-    s2808 = s940 * omega_front_right_hip_x_2 - s938 * omega_front_right_hip_y_2
-    s2809 = s942 * velocity_front_right_thigh_y - s940 * velocity_front_right_thigh_z
-    s2810 = s938 * velocity_front_right_thigh_z - s942 * velocity_front_right_thigh_x
-    s2811 = s940 * velocity_front_right_thigh_x - s938 * velocity_front_right_thigh_y
-    s2812 = velocity_front_right_thigh_y * s2808 - velocity_front_right_thigh_z * s2807
-    s2813 = velocity_front_right_thigh_z * s2806 - velocity_front_right_thigh_x * s2808
-    s2814 = velocity_front_right_thigh_x * s2807 - velocity_front_right_thigh_y * s2806
-    s2815 = s2812 + (omega_front_right_hip_y_2 * s2811 - omega_front_right_hip_z_2 * s2810)
-    s2816 = s2813 + (omega_front_right_hip_z_2 * s2809 - omega_front_right_hip_x_2 * s2811)
-    s2817 = s2814 + (omega_front_right_hip_x_2 * s2810 - omega_front_right_hip_y_2 * s2809)
-    s2818 = s942 * s1900 - s940 * s1901 + (omega_front_right_hip_y_2 * s2808 - omega_front_right_hip_z_2 * s2807)
-    s2819 = s938 * s1901 - s942 * s1899 + (omega_front_right_hip_z_2 * s2806 - omega_front_right_hip_x_2 * s2808)
-    s2820 = s940 * s1899 - s938 * s1900 + (omega_front_right_hip_x_2 * s2807 - omega_front_right_hip_y_2 * s2806)
-    s2821 = s942 * s2804 - s940 * s2805 + s2815
-    s2822 = s938 * s2805 - s942 * s2803 + s2816
-    s2823 = s940 * s2803 - s938 * s2804 + s2817
+    s2795 = omega_front_right_hip_y_2 * velocity_front_right_thigh_z - omega_front_right_hip_z_2 * velocity_front_right_thigh_y
+    s2796 = omega_front_right_hip_z_2 * velocity_front_right_thigh_x - omega_front_right_hip_x_2 * velocity_front_right_thigh_z
+    s2797 = omega_front_right_hip_x_2 * velocity_front_right_thigh_y - omega_front_right_hip_y_2 * velocity_front_right_thigh_x
+    s2798 = a_front_right_thigh_x - s2795
+    s2799 = a_front_right_thigh_y - s2796
+    s2800 = a_front_right_thigh_z - s2797
+    s2801 = s937 * omega_front_right_hip_y_2 - s935 * omega_front_right_hip_z_2
+    s2802 = s933 * omega_front_right_hip_z_2 - s937 * omega_front_right_hip_x_2
+    s2803 = s935 * omega_front_right_hip_x_2 - s933 * omega_front_right_hip_y_2
+    s2804 = s937 * velocity_front_right_thigh_y - s935 * velocity_front_right_thigh_z
+    s2805 = s933 * velocity_front_right_thigh_z - s937 * velocity_front_right_thigh_x
+    s2806 = s935 * velocity_front_right_thigh_x - s933 * velocity_front_right_thigh_y
+    s2807 = velocity_front_right_thigh_y * s2803 - velocity_front_right_thigh_z * s2802
+    s2808 = velocity_front_right_thigh_z * s2801 - velocity_front_right_thigh_x * s2803
+    s2809 = velocity_front_right_thigh_x * s2802 - velocity_front_right_thigh_y * s2801
+    s2810 = s2807 + (omega_front_right_hip_y_2 * s2806 - omega_front_right_hip_z_2 * s2805)
+    s2811 = s2808 + (omega_front_right_hip_z_2 * s2804 - omega_front_right_hip_x_2 * s2806)
+    s2812 = s2809 + (omega_front_right_hip_x_2 * s2805 - omega_front_right_hip_y_2 * s2804)
+    s2813 = s937 * s1895 - s935 * s1896 + (omega_front_right_hip_y_2 * s2803 - omega_front_right_hip_z_2 * s2802)
+    s2814 = s933 * s1896 - s937 * s1894 + (omega_front_right_hip_z_2 * s2801 - omega_front_right_hip_x_2 * s2803)
+    s2815 = s935 * s1894 - s933 * s1895 + (omega_front_right_hip_x_2 * s2802 - omega_front_right_hip_y_2 * s2801)
+    s2816 = s937 * s2799 - s935 * s2800 + s2810
+    s2817 = s933 * s2800 - s937 * s2798 + s2811
+    s2818 = s935 * s2798 - s933 * s2799 + s2812
+    s2819 = s2801 + s2801
+    s2820 = s2802 + s2802
+    s2821 = s2803 + s2803
+    s2822 = s2804 + s2804
+    s2823 = s2805 + s2805
     s2824 = s2806 + s2806
-    s2825 = s2807 + s2807
-    s2826 = s2808 + s2808
-    s2827 = s2809 + s2809
-    s2828 = s2810 + s2810
-    s2829 = s2811 + s2811
-    s2830 = omega_hind_left_hip_y_2 * velocity_hind_left_thigh_z - omega_hind_left_hip_z_2 * velocity_hind_left_thigh_y
-    s2831 = omega_hind_left_hip_z_2 * velocity_hind_left_thigh_x - omega_hind_left_hip_x_2 * velocity_hind_left_thigh_z
-    s2832 = omega_hind_left_hip_x_2 * velocity_hind_left_thigh_y - omega_hind_left_hip_y_2 * velocity_hind_left_thigh_x
-    s2833 = a_hind_left_thigh_x - s2830
-    s2834 = a_hind_left_thigh_y - s2831
-    s2835 = a_hind_left_thigh_z - s2832
-    s2836 = s948 * omega_hind_left_hip_y_2 - s946 * omega_hind_left_hip_z_2
-    s2837 = s944 * omega_hind_left_hip_z_2 - s948 * omega_hind_left_hip_x_2
-    s2838 = s946 * omega_hind_left_hip_x_2 - s944 * omega_hind_left_hip_y_2
-    s2839 = s948 * velocity_hind_left_thigh_y - s946 * velocity_hind_left_thigh_z
-    s2840 = s944 * velocity_hind_left_thigh_z - s948 * velocity_hind_left_thigh_x
-    s2841 = s946 * velocity_hind_left_thigh_x - s944 * velocity_hind_left_thigh_y
-    s2842 = velocity_hind_left_thigh_y * s2838 - velocity_hind_left_thigh_z * s2837 + (omega_hind_left_hip_y_2 * s2841 - omega_hind_left_hip_z_2 * s2840)
-    s2843 = velocity_hind_left_thigh_z * s2836 - velocity_hind_left_thigh_x * s2838 + (omega_hind_left_hip_z_2 * s2839 - omega_hind_left_hip_x_2 * s2841)
-    s2844 = velocity_hind_left_thigh_x * s2837 - velocity_hind_left_thigh_y * s2836 + (omega_hind_left_hip_x_2 * s2840 - omega_hind_left_hip_y_2 * s2839)
-    s2845 = s948 * s1915 - s946 * s1916 + (omega_hind_left_hip_y_2 * s2838 - omega_hind_left_hip_z_2 * s2837)
-    s2846 = s944 * s1916 - s948 * s1914 + (omega_hind_left_hip_z_2 * s2836 - omega_hind_left_hip_x_2 * s2838)
-    s2847 = s946 * s1914 - s944 * s1915 + (omega_hind_left_hip_x_2 * s2837 - omega_hind_left_hip_y_2 * s2836)
-    s2848 = s948 * s2834 - s946 * s2835 + s2842
-    s2849 = s944 * s2835 - s948 * s2833 + s2843
-    s2850 = s946 * s2833 - s944 * s2834 + s2844
+    s2825 = omega_hind_left_hip_y_2 * velocity_hind_left_thigh_z - omega_hind_left_hip_z_2 * velocity_hind_left_thigh_y
+    s2826 = omega_hind_left_hip_z_2 * velocity_hind_left_thigh_x - omega_hind_left_hip_x_2 * velocity_hind_left_thigh_z
+    s2827 = omega_hind_left_hip_x_2 * velocity_hind_left_thigh_y - omega_hind_left_hip_y_2 * velocity_hind_left_thigh_x
+    s2828 = a_hind_left_thigh_x - s2825
+    s2829 = a_hind_left_thigh_y - s2826
+    s2830 = a_hind_left_thigh_z - s2827
+    s2831 = s943 * omega_hind_left_hip_y_2 - s941 * omega_hind_left_hip_z_2
+    s2832 = s939 * omega_hind_left_hip_z_2 - s943 * omega_hind_left_hip_x_2
+    s2833 = s941 * omega_hind_left_hip_x_2 - s939 * omega_hind_left_hip_y_2
+    s2834 = s943 * velocity_hind_left_thigh_y - s941 * velocity_hind_left_thigh_z
+    s2835 = s939 * velocity_hind_left_thigh_z - s943 * velocity_hind_left_thigh_x
+    s2836 = s941 * velocity_hind_left_thigh_x - s939 * velocity_hind_left_thigh_y
+    s2837 = velocity_hind_left_thigh_y * s2833 - velocity_hind_left_thigh_z * s2832 + (omega_hind_left_hip_y_2 * s2836 - omega_hind_left_hip_z_2 * s2835)
+    s2838 = velocity_hind_left_thigh_z * s2831 - velocity_hind_left_thigh_x * s2833 + (omega_hind_left_hip_z_2 * s2834 - omega_hind_left_hip_x_2 * s2836)
+    s2839 = velocity_hind_left_thigh_x * s2832 - velocity_hind_left_thigh_y * s2831 + (omega_hind_left_hip_x_2 * s2835 - omega_hind_left_hip_y_2 * s2834)
+    s2840 = s943 * s1910 - s941 * s1911 + (omega_hind_left_hip_y_2 * s2833 - omega_hind_left_hip_z_2 * s2832)
+    s2841 = s939 * s1911 - s943 * s1909 + (omega_hind_left_hip_z_2 * s2831 - omega_hind_left_hip_x_2 * s2833)
+    s2842 = s941 * s1909 - s939 * s1910 + (omega_hind_left_hip_x_2 * s2832 - omega_hind_left_hip_y_2 * s2831)
+    s2843 = s943 * s2829 - s941 * s2830 + s2837
+    s2844 = s939 * s2830 - s943 * s2828 + s2838
+    s2845 = s941 * s2828 - s939 * s2829 + s2839
+    s2846 = s2831 + s2831
+    s2847 = s2832 + s2832
+    s2848 = s2833 + s2833
+    s2849 = s2834 + s2834
+    s2850 = s2835 + s2835
     s2851 = s2836 + s2836
-    s2852 = s2837 + s2837
-    s2853 = s2838 + s2838
-    s2854 = s2839 + s2839
-    s2855 = s2840 + s2840
-    s2856 = s2841 + s2841
-    s2857 = omega_hind_right_hip_y_2 * velocity_hind_right_thigh_z - omega_hind_right_hip_z_2 * velocity_hind_right_thigh_y
-    s2858 = omega_hind_right_hip_z_2 * velocity_hind_right_thigh_x - omega_hind_right_hip_x_2 * velocity_hind_right_thigh_z
-    s2859 = omega_hind_right_hip_x_2 * velocity_hind_right_thigh_y - omega_hind_right_hip_y_2 * velocity_hind_right_thigh_x
-    s2860 = a_hind_right_thigh_x - s2857
-    s2861 = a_hind_right_thigh_y - s2858
-    s2862 = a_hind_right_thigh_z - s2859
-    s2863 = s954 * omega_hind_right_hip_y_2 - s952 * omega_hind_right_hip_z_2
-    s2864 = s950 * omega_hind_right_hip_z_2 - s954 * omega_hind_right_hip_x_2
-    s2865 = s952 * omega_hind_right_hip_x_2 - s950 * omega_hind_right_hip_y_2
-    s2866 = s954 * velocity_hind_right_thigh_y - s952 * velocity_hind_right_thigh_z
-    s2867 = s950 * velocity_hind_right_thigh_z - s954 * velocity_hind_right_thigh_x
-    s2868 = s952 * velocity_hind_right_thigh_x - s950 * velocity_hind_right_thigh_y
-    s2869 = velocity_hind_right_thigh_y * s2865 - velocity_hind_right_thigh_z * s2864
-    s2870 = velocity_hind_right_thigh_z * s2863 - velocity_hind_right_thigh_x * s2865
-    s2871 = velocity_hind_right_thigh_x * s2864 - velocity_hind_right_thigh_y * s2863
-    s2872 = s2869 + (omega_hind_right_hip_y_2 * s2868 - omega_hind_right_hip_z_2 * s2867)
-    s2873 = s2870 + (omega_hind_right_hip_z_2 * s2866 - omega_hind_right_hip_x_2 * s2868)
-    s2874 = s2871 + (omega_hind_right_hip_x_2 * s2867 - omega_hind_right_hip_y_2 * s2866)
-    s2875 = s954 * s1930 - s952 * s1931 + (omega_hind_right_hip_y_2 * s2865 - omega_hind_right_hip_z_2 * s2864)
-    s2876 = s950 * s1931 - s954 * s1929 + (omega_hind_right_hip_z_2 * s2863 - omega_hind_right_hip_x_2 * s2865)
-    s2877 = s952 * s1929 - s950 * s1930 + (omega_hind_right_hip_x_2 * s2864 - omega_hind_right_hip_y_2 * s2863)
-    s2878 = s954 * s2861 - s952 * s2862 + s2872
-    s2879 = s950 * s2862 - s954 * s2860 + s2873
-    s2880 = s952 * s2860 - s950 * s2861 + s2874
+    s2852 = omega_hind_right_hip_y_2 * velocity_hind_right_thigh_z - omega_hind_right_hip_z_2 * velocity_hind_right_thigh_y
+    s2853 = omega_hind_right_hip_z_2 * velocity_hind_right_thigh_x - omega_hind_right_hip_x_2 * velocity_hind_right_thigh_z
+    s2854 = omega_hind_right_hip_x_2 * velocity_hind_right_thigh_y - omega_hind_right_hip_y_2 * velocity_hind_right_thigh_x
+    s2855 = a_hind_right_thigh_x - s2852
+    s2856 = a_hind_right_thigh_y - s2853
+    s2857 = a_hind_right_thigh_z - s2854
+    s2858 = s949 * omega_hind_right_hip_y_2 - s947 * omega_hind_right_hip_z_2
+    s2859 = s945 * omega_hind_right_hip_z_2 - s949 * omega_hind_right_hip_x_2
+    s2860 = s947 * omega_hind_right_hip_x_2 - s945 * omega_hind_right_hip_y_2
+    s2861 = s949 * velocity_hind_right_thigh_y - s947 * velocity_hind_right_thigh_z
+    s2862 = s945 * velocity_hind_right_thigh_z - s949 * velocity_hind_right_thigh_x
+    s2863 = s947 * velocity_hind_right_thigh_x - s945 * velocity_hind_right_thigh_y
+    s2864 = velocity_hind_right_thigh_y * s2860 - velocity_hind_right_thigh_z * s2859
+    s2865 = velocity_hind_right_thigh_z * s2858 - velocity_hind_right_thigh_x * s2860
+    s2866 = velocity_hind_right_thigh_x * s2859 - velocity_hind_right_thigh_y * s2858
+    s2867 = s2864 + (omega_hind_right_hip_y_2 * s2863 - omega_hind_right_hip_z_2 * s2862)
+    s2868 = s2865 + (omega_hind_right_hip_z_2 * s2861 - omega_hind_right_hip_x_2 * s2863)
+    s2869 = s2866 + (omega_hind_right_hip_x_2 * s2862 - omega_hind_right_hip_y_2 * s2861)
+    s2870 = s949 * s1925 - s947 * s1926 + (omega_hind_right_hip_y_2 * s2860 - omega_hind_right_hip_z_2 * s2859)
+    s2871 = s945 * s1926 - s949 * s1924 + (omega_hind_right_hip_z_2 * s2858 - omega_hind_right_hip_x_2 * s2860)
+    s2872 = s947 * s1924 - s945 * s1925 + (omega_hind_right_hip_x_2 * s2859 - omega_hind_right_hip_y_2 * s2858)
+    s2873 = s949 * s2856 - s947 * s2857 + s2867
+    s2874 = s945 * s2857 - s949 * s2855 + s2868
+    s2875 = s947 * s2855 - s945 * s2856 + s2869
+    s2876 = s2858 + s2858
+    s2877 = s2859 + s2859
+    s2878 = s2860 + s2860
+    s2879 = s2861 + s2861
+    s2880 = s2862 + s2862
     s2881 = s2863 + s2863
-    s2882 = s2864 + s2864
-    s2883 = s2865 + s2865
-    s2884 = s2866 + s2866
-    s2885 = s2867 + s2867
-    s2886 = s2868 + s2868
-    s2887 = omega_front_left_thigh_y_2 * velocity_front_left_shank_z - omega_front_left_thigh_z_2 * velocity_front_left_shank_y
-    s2888 = omega_front_left_thigh_z_2 * velocity_front_left_shank_x - omega_front_left_thigh_x_2 * velocity_front_left_shank_z
-    s2889 = omega_front_left_thigh_x_2 * velocity_front_left_shank_y - omega_front_left_thigh_y_2 * velocity_front_left_shank_x
-    s2890 = a_front_left_shank_x - s2887
-    s2891 = a_front_left_shank_y - s2888
-    s2892 = a_front_left_shank_z - s2889
-    s2893 = s936 * omega_front_left_thigh_y_2 - s934 * omega_front_left_thigh_z_2
-    s2894 = s932 * omega_front_left_thigh_z_2 - s936 * omega_front_left_thigh_x_2
-    s2895 = s934 * omega_front_left_thigh_x_2 - s932 * omega_front_left_thigh_y_2
-    s2896 = s936 * velocity_front_left_shank_y - s934 * velocity_front_left_shank_z
-    s2897 = s932 * velocity_front_left_shank_z - s936 * velocity_front_left_shank_x
-    s2898 = s934 * velocity_front_left_shank_x - s932 * velocity_front_left_shank_y
-    s2899 = velocity_front_left_shank_y * s2895 - velocity_front_left_shank_z * s2894
-    s2900 = velocity_front_left_shank_z * s2893 - velocity_front_left_shank_x * s2895
-    s2901 = velocity_front_left_shank_x * s2894 - velocity_front_left_shank_y * s2893
-    s2902 = s2899 + (omega_front_left_thigh_y_2 * s2898 - omega_front_left_thigh_z_2 * s2897)
-    s2903 = s2900 + (omega_front_left_thigh_z_2 * s2896 - omega_front_left_thigh_x_2 * s2898)
-    s2904 = s2901 + (omega_front_left_thigh_x_2 * s2897 - omega_front_left_thigh_y_2 * s2896)
-    s2905 = s936 * s1948 - s934 * s1949 + (omega_front_left_thigh_y_2 * s2895 - omega_front_left_thigh_z_2 * s2894)
-    s2906 = s932 * s1949 - s936 * s1947 + (omega_front_left_thigh_z_2 * s2893 - omega_front_left_thigh_x_2 * s2895)
-    s2907 = s934 * s1947 - s932 * s1948 + (omega_front_left_thigh_x_2 * s2894 - omega_front_left_thigh_y_2 * s2893)
-    s2908 = s936 * s2891 - s934 * s2892 + s2902
-    s2909 = s932 * s2892 - s936 * s2890 + s2903
-    s2910 = s934 * s2890 - s932 * s2891 + s2904
+    s2882 = omega_front_left_thigh_y_2 * velocity_front_left_shank_z - omega_front_left_thigh_z_2 * velocity_front_left_shank_y
+    s2883 = omega_front_left_thigh_z_2 * velocity_front_left_shank_x - omega_front_left_thigh_x_2 * velocity_front_left_shank_z
+    s2884 = omega_front_left_thigh_x_2 * velocity_front_left_shank_y - omega_front_left_thigh_y_2 * velocity_front_left_shank_x
+    s2885 = a_front_left_shank_x - s2882
+    s2886 = a_front_left_shank_y - s2883
+    s2887 = a_front_left_shank_z - s2884
+    s2888 = s931 * omega_front_left_thigh_y_2 - s929 * omega_front_left_thigh_z_2
+    s2889 = s927 * omega_front_left_thigh_z_2 - s931 * omega_front_left_thigh_x_2
+    s2890 = s929 * omega_front_left_thigh_x_2 - s927 * omega_front_left_thigh_y_2
+    s2891 = s931 * velocity_front_left_shank_y - s929 * velocity_front_left_shank_z
+    s2892 = s927 * velocity_front_left_shank_z - s931 * velocity_front_left_shank_x
+    s2893 = s929 * velocity_front_left_shank_x - s927 * velocity_front_left_shank_y
+    s2894 = velocity_front_left_shank_y * s2890 - velocity_front_left_shank_z * s2889
+    s2895 = velocity_front_left_shank_z * s2888 - velocity_front_left_shank_x * s2890
+    s2896 = velocity_front_left_shank_x * s2889 - velocity_front_left_shank_y * s2888
+    s2897 = s2894 + (omega_front_left_thigh_y_2 * s2893 - omega_front_left_thigh_z_2 * s2892)
+    s2898 = s2895 + (omega_front_left_thigh_z_2 * s2891 - omega_front_left_thigh_x_2 * s2893)
+    s2899 = s2896 + (omega_front_left_thigh_x_2 * s2892 - omega_front_left_thigh_y_2 * s2891)
+    s2900 = s931 * s1943 - s929 * s1944 + (omega_front_left_thigh_y_2 * s2890 - omega_front_left_thigh_z_2 * s2889)
+    s2901 = s927 * s1944 - s931 * s1942 + (omega_front_left_thigh_z_2 * s2888 - omega_front_left_thigh_x_2 * s2890)
+    s2902 = s929 * s1942 - s927 * s1943 + (omega_front_left_thigh_x_2 * s2889 - omega_front_left_thigh_y_2 * s2888)
+    s2903 = s931 * s2886 - s929 * s2887 + s2897
+    s2904 = s927 * s2887 - s931 * s2885 + s2898
+    s2905 = s929 * s2885 - s927 * s2886 + s2899
+    s2906 = s2888 + s2888
+    s2907 = s2889 + s2889
+    s2908 = s2890 + s2890
+    s2909 = s2891 + s2891
+    s2910 = s2892 + s2892
     s2911 = s2893 + s2893
-    s2912 = s2894 + s2894
-    s2913 = s2895 + s2895
-    s2914 = s2896 + s2896
-    s2915 = s2897 + s2897
-    s2916 = s2898 + s2898
-    s2917 = omega_front_right_thigh_y_2 * velocity_front_right_shank_z - omega_front_right_thigh_z_2 * velocity_front_right_shank_y
-    s2918 = omega_front_right_thigh_z_2 * velocity_front_right_shank_x - omega_front_right_thigh_x_2 * velocity_front_right_shank_z
-    s2919 = omega_front_right_thigh_x_2 * velocity_front_right_shank_y - omega_front_right_thigh_y_2 * velocity_front_right_shank_x
-    s2920 = a_front_right_shank_x - s2917
-    s2921 = a_front_right_shank_y - s2918
-    s2922 = a_front_right_shank_z - s2919
-    s2923 = s942 * omega_front_right_thigh_y_2 - s940 * omega_front_right_thigh_z_2
-    s2924 = s938 * omega_front_right_thigh_z_2 - s942 * omega_front_right_thigh_x_2
-    s2925 = s940 * omega_front_right_thigh_x_2 - s938 * omega_front_right_thigh_y_2
-    s2926 = s942 * velocity_front_right_shank_y - s940 * velocity_front_right_shank_z
-    s2927 = s938 * velocity_front_right_shank_z - s942 * velocity_front_right_shank_x
-    s2928 = s940 * velocity_front_right_shank_x - s938 * velocity_front_right_shank_y
-    s2929 = omega_front_right_thigh_y_2 * s2925 - omega_front_right_thigh_z_2 * s2924
-    s2930 = omega_front_right_thigh_z_2 * s2923 - omega_front_right_thigh_x_2 * s2925
-    s2931 = omega_front_right_thigh_x_2 * s2924 - omega_front_right_thigh_y_2 * s2923
-    s2932 = velocity_front_right_shank_y * s2925 - velocity_front_right_shank_z * s2924
-    s2933 = velocity_front_right_shank_z * s2923 - velocity_front_right_shank_x * s2925
-    s2934 = velocity_front_right_shank_x * s2924 - velocity_front_right_shank_y * s2923
-    s2935 = omega_front_right_thigh_y_2 * s2928 - omega_front_right_thigh_z_2 * s2927
-    s2936 = omega_front_right_thigh_z_2 * s2926 - omega_front_right_thigh_x_2 * s2928
-    s2937 = omega_front_right_thigh_x_2 * s2927 - omega_front_right_thigh_y_2 * s2926
-    s2938 = s942 * s1966 - s940 * s1967 + s2929
-    s2939 = s938 * s1967 - s942 * s1965 + s2930
-    s2940 = s940 * s1965 - s938 * s1966 + s2931
-    s2941 = s942 * s2921 - s940 * s2922 + (s2932 + s2935)
-    s2942 = s938 * s2922 - s942 * s2920 + (s2933 + s2936)
-    s2943 = s940 * s2920 - s938 * s2921 + (s2934 + s2937)
+    s2912 = omega_front_right_thigh_y_2 * velocity_front_right_shank_z - omega_front_right_thigh_z_2 * velocity_front_right_shank_y
+    s2913 = omega_front_right_thigh_z_2 * velocity_front_right_shank_x - omega_front_right_thigh_x_2 * velocity_front_right_shank_z
+    s2914 = omega_front_right_thigh_x_2 * velocity_front_right_shank_y - omega_front_right_thigh_y_2 * velocity_front_right_shank_x
+    s2915 = a_front_right_shank_x - s2912
+    s2916 = a_front_right_shank_y - s2913
+    s2917 = a_front_right_shank_z - s2914
+    s2918 = s937 * omega_front_right_thigh_y_2 - s935 * omega_front_right_thigh_z_2
+    s2919 = s933 * omega_front_right_thigh_z_2 - s937 * omega_front_right_thigh_x_2
+    s2920 = s935 * omega_front_right_thigh_x_2 - s933 * omega_front_right_thigh_y_2
+    s2921 = s937 * velocity_front_right_shank_y - s935 * velocity_front_right_shank_z
+    s2922 = s933 * velocity_front_right_shank_z - s937 * velocity_front_right_shank_x
+    s2923 = s935 * velocity_front_right_shank_x - s933 * velocity_front_right_shank_y
+    s2924 = omega_front_right_thigh_y_2 * s2920 - omega_front_right_thigh_z_2 * s2919
+    s2925 = omega_front_right_thigh_z_2 * s2918 - omega_front_right_thigh_x_2 * s2920
+    s2926 = omega_front_right_thigh_x_2 * s2919 - omega_front_right_thigh_y_2 * s2918
+    s2927 = velocity_front_right_shank_y * s2920 - velocity_front_right_shank_z * s2919
+    s2928 = velocity_front_right_shank_z * s2918 - velocity_front_right_shank_x * s2920
+    s2929 = velocity_front_right_shank_x * s2919 - velocity_front_right_shank_y * s2918
+    s2930 = omega_front_right_thigh_y_2 * s2923 - omega_front_right_thigh_z_2 * s2922
+    s2931 = omega_front_right_thigh_z_2 * s2921 - omega_front_right_thigh_x_2 * s2923
+    s2932 = omega_front_right_thigh_x_2 * s2922 - omega_front_right_thigh_y_2 * s2921
+    s2933 = s937 * s1961 - s935 * s1962 + s2924
+    s2934 = s933 * s1962 - s937 * s1960 + s2925
+    s2935 = s935 * s1960 - s933 * s1961 + s2926
+    s2936 = s937 * s2916 - s935 * s2917 + (s2927 + s2930)
+    s2937 = s933 * s2917 - s937 * s2915 + (s2928 + s2931)
+    s2938 = s935 * s2915 - s933 * s2916 + (s2929 + s2932)
+    s2939 = s2918 + s2918
+    s2940 = s2919 + s2919
+    s2941 = s2920 + s2920
+    s2942 = s2921 + s2921
+    s2943 = s2922 + s2922
     s2944 = s2923 + s2923
-    s2945 = s2924 + s2924
-    s2946 = s2925 + s2925
-    s2947 = s2926 + s2926
-    s2948 = s2927 + s2927
-    s2949 = s2928 + s2928
-    s2950 = omega_hind_left_thigh_y_2 * velocity_hind_left_shank_z - omega_hind_left_thigh_z_2 * velocity_hind_left_shank_y
-    s2951 = omega_hind_left_thigh_z_2 * velocity_hind_left_shank_x - omega_hind_left_thigh_x_2 * velocity_hind_left_shank_z
-    s2952 = omega_hind_left_thigh_x_2 * velocity_hind_left_shank_y - omega_hind_left_thigh_y_2 * velocity_hind_left_shank_x
-    s2953 = a_hind_left_shank_x - s2950
-    s2954 = a_hind_left_shank_y - s2951
-    s2955 = a_hind_left_shank_z - s2952
-    s2956 = s948 * omega_hind_left_thigh_y_2 - s946 * omega_hind_left_thigh_z_2
-    s2957 = s944 * omega_hind_left_thigh_z_2 - s948 * omega_hind_left_thigh_x_2
-    s2958 = s946 * omega_hind_left_thigh_x_2 - s944 * omega_hind_left_thigh_y_2
-    s2959 = s948 * velocity_hind_left_shank_y - s946 * velocity_hind_left_shank_z
-    s2960 = s944 * velocity_hind_left_shank_z - s948 * velocity_hind_left_shank_x
-    s2961 = s946 * velocity_hind_left_shank_x - s944 * velocity_hind_left_shank_y
-    s2962 = velocity_hind_left_shank_y * s2958 - velocity_hind_left_shank_z * s2957 + (omega_hind_left_thigh_y_2 * s2961 - omega_hind_left_thigh_z_2 * s2960)
-    s2963 = velocity_hind_left_shank_z * s2956 - velocity_hind_left_shank_x * s2958 + (omega_hind_left_thigh_z_2 * s2959 - omega_hind_left_thigh_x_2 * s2961)
-    s2964 = velocity_hind_left_shank_x * s2957 - velocity_hind_left_shank_y * s2956 + (omega_hind_left_thigh_x_2 * s2960 - omega_hind_left_thigh_y_2 * s2959)
-    s2965 = s948 * s1987 - s946 * s1988 + (omega_hind_left_thigh_y_2 * s2958 - omega_hind_left_thigh_z_2 * s2957)
-    s2966 = s944 * s1988 - s948 * s1986 + (omega_hind_left_thigh_z_2 * s2956 - omega_hind_left_thigh_x_2 * s2958)
-    s2967 = s946 * s1986 - s944 * s1987 + (omega_hind_left_thigh_x_2 * s2957 - omega_hind_left_thigh_y_2 * s2956)
-    s2968 = s948 * s2954 - s946 * s2955 + s2962
-    s2969 = s944 * s2955 - s948 * s2953 + s2963
-    s2970 = s946 * s2953 - s944 * s2954 + s2964
+    s2945 = omega_hind_left_thigh_y_2 * velocity_hind_left_shank_z - omega_hind_left_thigh_z_2 * velocity_hind_left_shank_y
+    s2946 = omega_hind_left_thigh_z_2 * velocity_hind_left_shank_x - omega_hind_left_thigh_x_2 * velocity_hind_left_shank_z
+    s2947 = omega_hind_left_thigh_x_2 * velocity_hind_left_shank_y - omega_hind_left_thigh_y_2 * velocity_hind_left_shank_x
+    s2948 = a_hind_left_shank_x - s2945
+    s2949 = a_hind_left_shank_y - s2946
+    s2950 = a_hind_left_shank_z - s2947
+    s2951 = s943 * omega_hind_left_thigh_y_2 - s941 * omega_hind_left_thigh_z_2
+    s2952 = s939 * omega_hind_left_thigh_z_2 - s943 * omega_hind_left_thigh_x_2
+    s2953 = s941 * omega_hind_left_thigh_x_2 - s939 * omega_hind_left_thigh_y_2
+    s2954 = s943 * velocity_hind_left_shank_y - s941 * velocity_hind_left_shank_z
+    s2955 = s939 * velocity_hind_left_shank_z - s943 * velocity_hind_left_shank_x
+    s2956 = s941 * velocity_hind_left_shank_x - s939 * velocity_hind_left_shank_y
+    s2957 = velocity_hind_left_shank_y * s2953 - velocity_hind_left_shank_z * s2952 + (omega_hind_left_thigh_y_2 * s2956 - omega_hind_left_thigh_z_2 * s2955)
+    s2958 = velocity_hind_left_shank_z * s2951 - velocity_hind_left_shank_x * s2953 + (omega_hind_left_thigh_z_2 * s2954 - omega_hind_left_thigh_x_2 * s2956)
+    s2959 = velocity_hind_left_shank_x * s2952 - velocity_hind_left_shank_y * s2951 + (omega_hind_left_thigh_x_2 * s2955 - omega_hind_left_thigh_y_2 * s2954)
+    s2960 = s943 * s1982 - s941 * s1983 + (omega_hind_left_thigh_y_2 * s2953 - omega_hind_left_thigh_z_2 * s2952)
+    s2961 = s939 * s1983 - s943 * s1981 + (omega_hind_left_thigh_z_2 * s2951 - omega_hind_left_thigh_x_2 * s2953)
+    s2962 = s941 * s1981 - s939 * s1982 + (omega_hind_left_thigh_x_2 * s2952 - omega_hind_left_thigh_y_2 * s2951)
+    s2963 = s943 * s2949 - s941 * s2950 + s2957
+    s2964 = s939 * s2950 - s943 * s2948 + s2958
+    s2965 = s941 * s2948 - s939 * s2949 + s2959
+    s2966 = s2951 + s2951
+    s2967 = s2952 + s2952
+    s2968 = s2953 + s2953
+    s2969 = s2954 + s2954
+    s2970 = s2955 + s2955
     s2971 = s2956 + s2956
-    s2972 = s2957 + s2957
-    s2973 = s2958 + s2958
-    s2974 = s2959 + s2959
-    s2975 = s2960 + s2960
-    s2976 = s2961 + s2961
-    s2977 = omega_hind_right_thigh_y_2 * velocity_hind_right_shank_z - omega_hind_right_thigh_z_2 * velocity_hind_right_shank_y
-    s2978 = omega_hind_right_thigh_z_2 * velocity_hind_right_shank_x - omega_hind_right_thigh_x_2 * velocity_hind_right_shank_z
-    s2979 = omega_hind_right_thigh_x_2 * velocity_hind_right_shank_y - omega_hind_right_thigh_y_2 * velocity_hind_right_shank_x
-    s2980 = a_hind_right_shank_x - s2977
-    s2981 = a_hind_right_shank_y - s2978
-    s2982 = a_hind_right_shank_z - s2979
-    s2983 = s954 * omega_hind_right_thigh_y_2 - s952 * omega_hind_right_thigh_z_2
-    s2984 = s950 * omega_hind_right_thigh_z_2 - s954 * omega_hind_right_thigh_x_2
-    s2985 = s952 * omega_hind_right_thigh_x_2 - s950 * omega_hind_right_thigh_y_2
-    s2986 = s954 * velocity_hind_right_shank_y - s952 * velocity_hind_right_shank_z
-    s2987 = s950 * velocity_hind_right_shank_z - s954 * velocity_hind_right_shank_x
-    s2988 = s952 * velocity_hind_right_shank_x - s950 * velocity_hind_right_shank_y
-    s2989 = velocity_hind_right_shank_y * s2985 - velocity_hind_right_shank_z * s2984
-    s2990 = velocity_hind_right_shank_z * s2983 - velocity_hind_right_shank_x * s2985
-    s2991 = velocity_hind_right_shank_x * s2984 - velocity_hind_right_shank_y * s2983
-    s2992 = s2989 + (omega_hind_right_thigh_y_2 * s2988 - omega_hind_right_thigh_z_2 * s2987)
-    s2993 = s2990 + (omega_hind_right_thigh_z_2 * s2986 - omega_hind_right_thigh_x_2 * s2988)
-    s2994 = s2991 + (omega_hind_right_thigh_x_2 * s2987 - omega_hind_right_thigh_y_2 * s2986)
-    s2995 = s954 * s2005 - s952 * s2006 + (omega_hind_right_thigh_y_2 * s2985 - omega_hind_right_thigh_z_2 * s2984)
-    s2996 = s950 * s2006 - s954 * s2004 + (omega_hind_right_thigh_z_2 * s2983 - omega_hind_right_thigh_x_2 * s2985)
-    s2997 = s952 * s2004 - s950 * s2005 + (omega_hind_right_thigh_x_2 * s2984 - omega_hind_right_thigh_y_2 * s2983)
-    s2998 = s954 * s2981 - s952 * s2982 + s2992
-    s2999 = s950 * s2982 - s954 * s2980 + s2993
-    s3000 = s952 * s2980 - s950 * s2981 + s2994
+    s2972 = omega_hind_right_thigh_y_2 * velocity_hind_right_shank_z - omega_hind_right_thigh_z_2 * velocity_hind_right_shank_y
+    s2973 = omega_hind_right_thigh_z_2 * velocity_hind_right_shank_x - omega_hind_right_thigh_x_2 * velocity_hind_right_shank_z
+    s2974 = omega_hind_right_thigh_x_2 * velocity_hind_right_shank_y - omega_hind_right_thigh_y_2 * velocity_hind_right_shank_x
+    s2975 = a_hind_right_shank_x - s2972
+    s2976 = a_hind_right_shank_y - s2973
+    s2977 = a_hind_right_shank_z - s2974
+    s2978 = s949 * omega_hind_right_thigh_y_2 - s947 * omega_hind_right_thigh_z_2
+    s2979 = s945 * omega_hind_right_thigh_z_2 - s949 * omega_hind_right_thigh_x_2
+    s2980 = s947 * omega_hind_right_thigh_x_2 - s945 * omega_hind_right_thigh_y_2
+    s2981 = s949 * velocity_hind_right_shank_y - s947 * velocity_hind_right_shank_z
+    s2982 = s945 * velocity_hind_right_shank_z - s949 * velocity_hind_right_shank_x
+    s2983 = s947 * velocity_hind_right_shank_x - s945 * velocity_hind_right_shank_y
+    s2984 = velocity_hind_right_shank_y * s2980 - velocity_hind_right_shank_z * s2979
+    s2985 = velocity_hind_right_shank_z * s2978 - velocity_hind_right_shank_x * s2980
+    s2986 = velocity_hind_right_shank_x * s2979 - velocity_hind_right_shank_y * s2978
+    s2987 = s2984 + (omega_hind_right_thigh_y_2 * s2983 - omega_hind_right_thigh_z_2 * s2982)
+    s2988 = s2985 + (omega_hind_right_thigh_z_2 * s2981 - omega_hind_right_thigh_x_2 * s2983)
+    s2989 = s2986 + (omega_hind_right_thigh_x_2 * s2982 - omega_hind_right_thigh_y_2 * s2981)
+    s2990 = s949 * s2000 - s947 * s2001 + (omega_hind_right_thigh_y_2 * s2980 - omega_hind_right_thigh_z_2 * s2979)
+    s2991 = s945 * s2001 - s949 * s1999 + (omega_hind_right_thigh_z_2 * s2978 - omega_hind_right_thigh_x_2 * s2980)
+    s2992 = s947 * s1999 - s945 * s2000 + (omega_hind_right_thigh_x_2 * s2979 - omega_hind_right_thigh_y_2 * s2978)
+    s2993 = s949 * s2976 - s947 * s2977 + s2987
+    s2994 = s945 * s2977 - s949 * s2975 + s2988
+    s2995 = s947 * s2975 - s945 * s2976 + s2989
+    s2996 = s2978 + s2978
+    s2997 = s2979 + s2979
+    s2998 = s2980 + s2980
+    s2999 = s2981 + s2981
+    s3000 = s2982 + s2982
     s3001 = s2983 + s2983
-    s3002 = s2984 + s2984
-    s3003 = s2985 + s2985
-    s3004 = s2986 + s2986
-    s3005 = s2987 + s2987
-    s3006 = s2988 + s2988
-    s3007 = 2.0 * s15
-    s3008 = 2.0 * s18
-    s3009 = 2.0 * s21
-    s3010 = s2647 * s3007 + s2650 * s3008 + s2653 * s3009
-    s3011 = s2648 * s3007 + s2651 * s3008 + s2654 * s3009
-    s3012 = s2649 * s3007 + s2652 * s3008 + s2655 * s3009
-    s3013 = s18 * s2298 - s21 * s2297 + k30 * s2659
-    s3014 = s21 * s2296 - s15 * s2298 + k30 * s2660
-    s3015 = s15 * s2297 - s18 * s2296 - k30 * s2661
-    s3016 = k30 * s2665 + (s1415 * s2663 - s1414 * s2664) + (s2646 * s3008 - s2645 * s3009)
-    s3017 = k30 * s2666 + (s1413 * s2664 - s1415 * s2662) + (s2644 * s3009 - s2646 * s3007)
-    s3018 = k30 * s2667 + (s1414 * s2662 - s1413 * s2663) + (s2645 * s3007 - s2644 * s3008)
-    s3019 = s1422 * s2659 + s1423 * s2660 - s1424 * s2661
-    s3020 = s1425 * s2662 + s1426 * s2663 + s1427 * s2664 + (s1422 * s2665 + s1423 * s2666 + s1424 * s2667)
-    s3021 = s1422 * s2671 + s1423 * s2672 - s1424 * s2673
-    s3022 = s1425 * s2674 + s1426 * s2675 + s1427 * s2676 + (s1422 * s2677 + s1423 * s2678 + s1424 * s2679)
-    s3023 = s1422 * s2683 + s1423 * s2684 - s1424 * s2685
-    s3024 = s1425 * s2686 + s1426 * s2687 + s1427 * s2688 + (s1422 * s2689 + s1423 * s2690 + s1424 * s2691)
-    s3025 = 2.0 * s16
-    s3026 = 2.0 * s19
-    s3027 = 2.0 * s22
-    s3028 = s2647 * s3025 + s2650 * s3026 + s2653 * s3027
-    s3029 = s2648 * s3025 + s2651 * s3026 + s2654 * s3027
-    s3030 = s2649 * s3025 + s2652 * s3026 + s2655 * s3027
-    s3031 = s19 * s2298 - s22 * s2297 + k30 * s2671
-    s3032 = s22 * s2296 - s16 * s2298 + k30 * s2672
-    s3033 = s16 * s2297 - s19 * s2296 - k30 * s2673
-    s3034 = k30 * s2677 + (s1415 * s2675 - s1414 * s2676) + (s2646 * s3026 - s2645 * s3027)
-    s3035 = k30 * s2678 + (s1413 * s2676 - s1415 * s2674) + (s2644 * s3027 - s2646 * s3025)
-    s3036 = k30 * s2679 + (s1414 * s2674 - s1413 * s2675) + (s2645 * s3025 - s2644 * s3026)
-    s3037 = s1428 * s2659 + s1429 * s2660 - s1430 * s2661
-    s3038 = s1431 * s2662 + s1432 * s2663 + s1433 * s2664 + (s1428 * s2665 + s1429 * s2666 + s1430 * s2667)
-    s3039 = s1428 * s2671 + s1429 * s2672 - s1430 * s2673
-    s3040 = s1431 * s2674 + s1432 * s2675 + s1433 * s2676 + (s1428 * s2677 + s1429 * s2678 + s1430 * s2679)
-    s3041 = s1428 * s2683 + s1429 * s2684 - s1430 * s2685
-    s3042 = s1431 * s2686 + s1432 * s2687 + s1433 * s2688 + (s1428 * s2689 + s1429 * s2690 + s1430 * s2691)
-    s3043 = 2.0 * s17
-    s3044 = 2.0 * s20
-    s3045 = 2.0 * s23
-    s3046 = s2647 * s3043 + s2650 * s3044 + s2653 * s3045
-    s3047 = s2648 * s3043 + s2651 * s3044 + s2654 * s3045
-    s3048 = s2649 * s3043 + s2652 * s3044 + s2655 * s3045
-    s3049 = s20 * s2298 - s23 * s2297 + k30 * s2683
-    s3050 = s23 * s2296 - s17 * s2298 + k30 * s2684
-    s3051 = s17 * s2297 - s20 * s2296 - k30 * s2685
-    s3052 = k30 * s2689 + (s1415 * s2687 - s1414 * s2688) + (s2646 * s3044 - s2645 * s3045)
-    s3053 = k30 * s2690 + (s1413 * s2688 - s1415 * s2686) + (s2644 * s3045 - s2646 * s3043)
-    s3054 = k30 * s2691 + (s1414 * s2686 - s1413 * s2687) + (s2645 * s3043 - s2644 * s3044)
-    s3055 = s1434 * s2659 + s1435 * s2660 - s1436 * s2661
-    s3056 = s1437 * s2662 + s1438 * s2663 + s1439 * s2664 + (s1434 * s2665 + s1435 * s2666 + s1436 * s2667)
-    s3057 = s1434 * s2671 + s1435 * s2672 - s1436 * s2673
-    s3058 = s1437 * s2674 + s1438 * s2675 + s1439 * s2676 + (s1434 * s2677 + s1435 * s2678 + s1436 * s2679)
-    s3059 = s1434 * s2683 + s1435 * s2684 - s1436 * s2685
-    s3060 = s1437 * s2686 + s1438 * s2687 + s1439 * s2688 + (s1434 * s2689 + s1435 * s2690 + s1436 * s2691)
-    s3061 = s2614 * s3007
-    s3062 = s3061 + s2617 * s3008 + s2620 * s3009
-    s3063 = s2618 * s3008
-    s3064 = s2615 * s3007 + s3063 + s2621 * s3009
-    s3065 = s2622 * s3009
-    s3066 = s2616 * s3007 + s2619 * s3008 + s3065
-    s3067 = s1374 * s2704 + s1375 * s2705 + s1376 * s2706 + (s1372 * s2709 - s1373 * s2708)
-    s3068 = s1375 * s2704 + s1377 * s2705 + s1378 * s2706 + (s1373 * s2707 - s1371 * s2709)
-    s3069 = s1376 * s2704 + s1378 * s2705 + s1379 * s2706 + (s1371 * s2708 - s1372 * s2707)
-    s3070 = 2.0 * s2662
-    s3071 = 2.0 * s2663
-    s3072 = 2.0 * s2664
-    s3073 = k27 * s2707 + (s1373 * s2705 - s1372 * s2706) + (s2613 * s3071 - s2612 * s3072)
-    s3074 = k27 * s2708 + (s1371 * s2706 - s1373 * s2704) + (s2611 * s3072 - s2613 * s3070)
-    s3075 = k27 * s2709 + (s1372 * s2704 - s1371 * s2705) + (s2612 * s3070 - s2611 * s3071)
-    s3076 = s18 * s2292 - s21 * s2291 + (s3067 + (s2614 * s3070 + s2615 * s3071 + s2616 * s3072))
-    s3077 = s21 * s2290 - s15 * s2292 + (s3068 + (s2617 * s3070 + s2618 * s3071 + s2619 * s3072))
-    s3078 = s15 * s2291 - s18 * s2290 + (s3069 + (s2620 * s3070 + s2621 * s3071 + s2622 * s3072))
-    s3079 = s18 * s2295 - s21 * s2294 + s3073
-    s3080 = s21 * s2293 - s15 * s2295 + s3074
-    s3081 = s15 * s2294 - s18 * s2293 + s3075
-    s3082 = s1374 * s2710 + s1375 * s2711 + s1376 * s2712 + (s1372 * s2715 - s1373 * s2714)
-    s3083 = s1375 * s2710 + s1377 * s2711 + s1378 * s2712 + (s1373 * s2713 - s1371 * s2715)
-    s3084 = s1376 * s2710 + s1378 * s2711 + s1379 * s2712 + (s1371 * s2714 - s1372 * s2713)
-    s3085 = k27 * s2713 + (s1373 * s2711 - s1372 * s2712) + (s2613 * s3008 - s2612 * s3009)
-    s3086 = k27 * s2714 + (s1371 * s2712 - s1373 * s2710) + (s2611 * s3009 - s2613 * s3007)
-    s3087 = k27 * s2715 + (s1372 * s2710 - s1371 * s2711) + (s2612 * s3007 - s2611 * s3008)
-    s3088 = s1443 * s2704 + s1444 * s2705 + s1445 * s2706 + (s1440 * s2707 + s1441 * s2708 + s1442 * s2709)
-    s3089 = s1443 * s2710 + s1444 * s2711 + s1445 * s2712 + (s1440 * s2713 + s1441 * s2714 + s1442 * s2715)
-    s3090 = s15 * s3062 + s18 * s3064 + s21 * s3066
-    s3091 = s3076 + (s1021 * s3081 - s1024 * s3080)
-    s3092 = s3077 + (s1024 * s3079 - s1018 * s3081)
-    s3093 = s3078 + (s1018 * s3080 - s1021 * s3079)
-    s3094 = s3082 + (s3061 + s2615 * s3008 + s2616 * s3009) + (s1021 * s3087 - s1024 * s3086)
-    s3095 = s3083 + (s3063 + s2617 * s3007 + s2619 * s3009) + (s1024 * s3085 - s1018 * s3087)
-    s3096 = s3084 + (s3065 + (s2620 * s3007 + s2621 * s3008)) + (s1018 * s3086 - s1021 * s3085)
-    s3097 = s1440 * s2659 + s1441 * s2660 - s1442 * s2661
-    s3098 = s1446 * s2662 + s1447 * s2663 + s1448 * s2664 + (s1440 * s2665 + s1441 * s2666 + s1442 * s2667)
-    s3099 = s1440 * s2671 + s1441 * s2672 - s1442 * s2673
-    s3100 = s1446 * s2674 + s1447 * s2675 + s1448 * s2676 + (s1440 * s2677 + s1441 * s2678 + s1442 * s2679)
-    s3101 = s1440 * s2683 + s1441 * s2684 - s1442 * s2685
-    s3102 = s1446 * s2686 + s1447 * s2687 + s1448 * s2688 + (s1440 * s2689 + s1441 * s2690 + s1442 * s2691)
-    s3103 = s2599 * s3007
-    s3104 = s3103 + s2602 * s3008 + s2605 * s3009
-    s3105 = s2603 * s3008
-    s3106 = s2600 * s3007 + s3105 + s2606 * s3009
-    s3107 = s2607 * s3009
-    s3108 = s2601 * s3007 + s2604 * s3008 + s3107
-    s3109 = s1359 * s2704 + s1360 * s2705 + s1361 * s2706 + (s1357 * s2730 - s1358 * s2729)
-    s3110 = s1360 * s2704 + s1362 * s2705 + s1363 * s2706 + (s1358 * s2728 - s1356 * s2730)
-    s3111 = s1361 * s2704 + s1363 * s2705 + s1364 * s2706 + (s1356 * s2729 - s1357 * s2728)
-    s3112 = k27 * s2728 + (s1358 * s2705 - s1357 * s2706) + (s2598 * s3071 - s2597 * s3072)
-    s3113 = k27 * s2729 + (s1356 * s2706 - s1358 * s2704) + (s2596 * s3072 - s2598 * s3070)
-    s3114 = k27 * s2730 + (s1357 * s2704 - s1356 * s2705) + (s2597 * s3070 - s2596 * s3071)
-    s3115 = s18 * s2286 - s21 * s2285 + (s3109 + (s2599 * s3070 + s2600 * s3071 + s2601 * s3072))
-    s3116 = s21 * s2284 - s15 * s2286 + (s3110 + (s2602 * s3070 + s2603 * s3071 + s2604 * s3072))
-    s3117 = s15 * s2285 - s18 * s2284 + (s3111 + (s2605 * s3070 + s2606 * s3071 + s2607 * s3072))
-    s3118 = s18 * s2289 - s21 * s2288 + s3112
-    s3119 = s21 * s2287 - s15 * s2289 + s3113
-    s3120 = s15 * s2288 - s18 * s2287 + s3114
-    s3121 = s1359 * s2710 + s1360 * s2711 + s1361 * s2712 + (s1357 * s2733 - s1358 * s2732)
-    s3122 = s1360 * s2710 + s1362 * s2711 + s1363 * s2712 + (s1358 * s2731 - s1356 * s2733)
-    s3123 = s1361 * s2710 + s1363 * s2711 + s1364 * s2712 + (s1356 * s2732 - s1357 * s2731)
-    s3124 = k27 * s2731 + (s1358 * s2711 - s1357 * s2712) + (s2598 * s3008 - s2597 * s3009)
-    s3125 = k27 * s2732 + (s1356 * s2712 - s1358 * s2710) + (s2596 * s3009 - s2598 * s3007)
-    s3126 = k27 * s2733 + (s1357 * s2710 - s1356 * s2711) + (s2597 * s3007 - s2596 * s3008)
-    s3127 = s1452 * s2704 + s1453 * s2705 + s1454 * s2706 + (s1449 * s2728 + s1450 * s2729 + s1451 * s2730)
-    s3128 = s1452 * s2710 + s1453 * s2711 + s1454 * s2712 + (s1449 * s2731 + s1450 * s2732 + s1451 * s2733)
-    s3129 = s15 * s3104 + s18 * s3106 + s21 * s3108
-    s3130 = s3115 + (s1051 * s3120 - s1052 * s3119)
-    s3131 = s3116 + (s1052 * s3118 - s1050 * s3120)
-    s3132 = s3117 + (s1050 * s3119 - s1051 * s3118)
-    s3133 = s3121 + (s3103 + s2600 * s3008 + s2601 * s3009) + (s1051 * s3126 - s1052 * s3125)
-    s3134 = s3122 + (s3105 + s2602 * s3007 + s2604 * s3009) + (s1052 * s3124 - s1050 * s3126)
-    s3135 = s3123 + (s3107 + (s2605 * s3007 + s2606 * s3008)) + (s1050 * s3125 - s1051 * s3124)
-    s3136 = s1449 * s2659 + s1450 * s2660 - s1451 * s2661
-    s3137 = s1455 * s2662 + s1456 * s2663 + s1457 * s2664 + (s1449 * s2665 + s1450 * s2666 + s1451 * s2667)
-    s3138 = s1449 * s2671 + s1450 * s2672 - s1451 * s2673
-    s3139 = s1455 * s2674 + s1456 * s2675 + s1457 * s2676 + (s1449 * s2677 + s1450 * s2678 + s1451 * s2679)
-    s3140 = s1449 * s2683 + s1450 * s2684 - s1451 * s2685
-    s3141 = s1455 * s2686 + s1456 * s2687 + s1457 * s2688 + (s1449 * s2689 + s1450 * s2690 + s1451 * s2691)
-    s3142 = s2584 * s3007
-    s3143 = s3142 + s2587 * s3008 + s2590 * s3009
-    s3144 = s2588 * s3008
-    s3145 = s2585 * s3007 + s3144 + s2591 * s3009
-    s3146 = s2592 * s3009
-    s3147 = s2586 * s3007 + s2589 * s3008 + s3146
-    s3148 = s1344 * s2704 + s1345 * s2705 + s1346 * s2706 + (s1342 * s2748 - s1343 * s2747)
-    s3149 = s1345 * s2704 + s1347 * s2705 + s1348 * s2706 + (s1343 * s2746 - s1341 * s2748)
-    s3150 = s1346 * s2704 + s1348 * s2705 + s1349 * s2706 + (s1341 * s2747 - s1342 * s2746)
-    s3151 = k27 * s2746 + (s1343 * s2705 - s1342 * s2706) + (s2583 * s3071 - s2582 * s3072)
-    s3152 = k27 * s2747 + (s1341 * s2706 - s1343 * s2704) + (s2581 * s3072 - s2583 * s3070)
-    s3153 = k27 * s2748 + (s1342 * s2704 - s1341 * s2705) + (s2582 * s3070 - s2581 * s3071)
-    s3154 = s18 * s2280 - s21 * s2279 + (s3148 + (s2584 * s3070 + s2585 * s3071 + s2586 * s3072))
-    s3155 = s21 * s2278 - s15 * s2280 + (s3149 + (s2587 * s3070 + s2588 * s3071 + s2589 * s3072))
-    s3156 = s15 * s2279 - s18 * s2278 + (s3150 + (s2590 * s3070 + s2591 * s3071 + s2592 * s3072))
-    s3157 = s18 * s2283 - s21 * s2282 + s3151
-    s3158 = s21 * s2281 - s15 * s2283 + s3152
-    s3159 = s15 * s2282 - s18 * s2281 + s3153
-    s3160 = s1344 * s2710 + s1345 * s2711 + s1346 * s2712 + (s1342 * s2751 - s1343 * s2750)
-    s3161 = s1345 * s2710 + s1347 * s2711 + s1348 * s2712 + (s1343 * s2749 - s1341 * s2751)
-    s3162 = s1346 * s2710 + s1348 * s2711 + s1349 * s2712 + (s1341 * s2750 - s1342 * s2749)
-    s3163 = k27 * s2749 + (s1343 * s2711 - s1342 * s2712) + (s2583 * s3008 - s2582 * s3009)
-    s3164 = k27 * s2750 + (s1341 * s2712 - s1343 * s2710) + (s2581 * s3009 - s2583 * s3007)
-    s3165 = k27 * s2751 + (s1342 * s2710 - s1341 * s2711) + (s2582 * s3007 - s2581 * s3008)
-    s3166 = s1461 * s2704 + s1462 * s2705 + s1463 * s2706 + (s1458 * s2746 + s1459 * s2747 + s1460 * s2748)
-    s3167 = s1461 * s2710 + s1462 * s2711 + s1463 * s2712 + (s1458 * s2749 + s1459 * s2750 + s1460 * s2751)
-    s3168 = s15 * s3143 + s18 * s3145 + s21 * s3147
-    s3169 = s3154 + (s1070 * s3159 - s1071 * s3158)
-    s3170 = s3155 + (s1071 * s3157 - s1069 * s3159)
-    s3171 = s3156 + (s1069 * s3158 - s1070 * s3157)
-    s3172 = s3160 + (s3142 + s2585 * s3008 + s2586 * s3009) + (s1070 * s3165 - s1071 * s3164)
-    s3173 = s3161 + (s3144 + s2587 * s3007 + s2589 * s3009) + (s1071 * s3163 - s1069 * s3165)
-    s3174 = s3162 + (s3146 + (s2590 * s3007 + s2591 * s3008)) + (s1069 * s3164 - s1070 * s3163)
-    s3175 = s1458 * s2659 + s1459 * s2660 - s1460 * s2661
-    s3176 = s1464 * s2662 + s1465 * s2663 + s1466 * s2664 + (s1458 * s2665 + s1459 * s2666 + s1460 * s2667)
-    s3177 = s1458 * s2671 + s1459 * s2672 - s1460 * s2673
-    s3178 = s1464 * s2674 + s1465 * s2675 + s1466 * s2676 + (s1458 * s2677 + s1459 * s2678 + s1460 * s2679)
-    s3179 = s1458 * s2683 + s1459 * s2684 - s1460 * s2685
-    s3180 = s1464 * s2686 + s1465 * s2687 + s1466 * s2688 + (s1458 * s2689 + s1459 * s2690 + s1460 * s2691)
-    s3181 = s2569 * s3007
-    s3182 = s3181 + s2572 * s3008 + s2575 * s3009
-    s3183 = s2573 * s3008
-    s3184 = s2570 * s3007 + s3183 + s2576 * s3009
-    s3185 = s2577 * s3009
-    s3186 = s2571 * s3007 + s2574 * s3008 + s3185
-    s3187 = s1329 * s2704 + s1330 * s2705 + s1331 * s2706 + (s1327 * s2766 - s1328 * s2765)
-    s3188 = s1330 * s2704 + s1332 * s2705 + s1333 * s2706 + (s1328 * s2764 - s1326 * s2766)
-    s3189 = s1331 * s2704 + s1333 * s2705 + s1334 * s2706 + (s1326 * s2765 - s1327 * s2764)
-    s3190 = k27 * s2764 + (s1328 * s2705 - s1327 * s2706) + (s2568 * s3071 - s2567 * s3072)
-    s3191 = k27 * s2765 + (s1326 * s2706 - s1328 * s2704) + (s2566 * s3072 - s2568 * s3070)
-    s3192 = k27 * s2766 + (s1327 * s2704 - s1326 * s2705) + (s2567 * s3070 - s2566 * s3071)
-    s3193 = s18 * s2274 - s21 * s2273 + (s3187 + (s2569 * s3070 + s2570 * s3071 + s2571 * s3072))
-    s3194 = s21 * s2272 - s15 * s2274 + (s3188 + (s2572 * s3070 + s2573 * s3071 + s2574 * s3072))
-    s3195 = s15 * s2273 - s18 * s2272 + (s3189 + (s2575 * s3070 + s2576 * s3071 + s2577 * s3072))
-    s3196 = s18 * s2277 - s21 * s2276 + s3190
-    s3197 = s21 * s2275 - s15 * s2277 + s3191
-    s3198 = s15 * s2276 - s18 * s2275 + s3192
-    s3199 = s1329 * s2710 + s1330 * s2711 + s1331 * s2712 + (s1327 * s2769 - s1328 * s2768)
-    s3200 = s1330 * s2710 + s1332 * s2711 + s1333 * s2712 + (s1328 * s2767 - s1326 * s2769)
-    s3201 = s1331 * s2710 + s1333 * s2711 + s1334 * s2712 + (s1326 * s2768 - s1327 * s2767)
-    s3202 = k27 * s2767 + (s1328 * s2711 - s1327 * s2712) + (s2568 * s3008 - s2567 * s3009)
-    s3203 = k27 * s2768 + (s1326 * s2712 - s1328 * s2710) + (s2566 * s3009 - s2568 * s3007)
-    s3204 = k27 * s2769 + (s1327 * s2710 - s1326 * s2711) + (s2567 * s3007 - s2566 * s3008)
-    s3205 = s1470 * s2704 + s1471 * s2705 + s1472 * s2706 + (s1467 * s2764 + s1468 * s2765 + s1469 * s2766)
-    s3206 = s1470 * s2710 + s1471 * s2711 + s1472 * s2712 + (s1467 * s2767 + s1468 * s2768 + s1469 * s2769)
-    s3207 = s15 * s3182 + s18 * s3184 + s21 * s3186
-    s3208 = s3193 + (s1024 * s3197 - s1021 * s3198)
-    s3209 = s3194 + (s1018 * s3198 - s1024 * s3196)
-    s3210 = s3195 + (s1021 * s3196 - s1018 * s3197)
-    s3211 = s3199 + (s3181 + s2570 * s3008 + s2571 * s3009) + (s1024 * s3203 - s1021 * s3204)
-    s3212 = s3200 + (s3183 + s2572 * s3007 + s2574 * s3009) + (s1018 * s3204 - s1024 * s3202)
-    s3213 = s3201 + (s3185 + (s2575 * s3007 + s2576 * s3008)) + (s1021 * s3202 - s1018 * s3203)
-    s3214 = s1467 * s2659 + s1468 * s2660 - s1469 * s2661
-    s3215 = s1473 * s2662 + s1474 * s2663 + s1475 * s2664 + (s1467 * s2665 + s1468 * s2666 + s1469 * s2667)
-    s3216 = s1467 * s2671 + s1468 * s2672 - s1469 * s2673
-    s3217 = s1473 * s2674 + s1474 * s2675 + s1475 * s2676 + (s1467 * s2677 + s1468 * s2678 + s1469 * s2679)
-    s3218 = s1467 * s2683 + s1468 * s2684 - s1469 * s2685
-    s3219 = s1473 * s2686 + s1474 * s2687 + s1475 * s2688 + (s1467 * s2689 + s1468 * s2690 + s1469 * s2691)
-    s3220 = 2.0 * s932
-    s3221 = 2.0 * s934
-    s3222 = 2.0 * s936
-    s3223 = s2554 * s3220
-    s3224 = s3223 + s2557 * s3221 + s2560 * s3222
-    s3225 = s2558 * s3221
-    s3226 = s2555 * s3220 + s3225 + s2561 * s3222
-    s3227 = s2562 * s3222
-    s3228 = s2556 * s3220 + s2559 * s3221 + s3227
-    s3229 = s1314 * s2788 + s1315 * s2789 + s1316 * s2790 + (s1312 * s2793 - s1313 * s2792)
-    s3230 = s1315 * s2788 + s1317 * s2789 + s1318 * s2790 + (s1313 * s2791 - s1311 * s2793)
-    s3231 = s1316 * s2788 + s1318 * s2789 + s1319 * s2790 + (s1311 * s2792 - s1312 * s2791)
-    s3232 = 2.0 * s2776
-    s3233 = 2.0 * s2777
-    s3234 = 2.0 * s2778
-    s3235 = k29 * s2791 + (s1313 * s2789 - s1312 * s2790) + (s2553 * s3233 - s2552 * s3234)
-    s3236 = k29 * s2792 + (s1311 * s2790 - s1313 * s2788) + (s2551 * s3234 - s2553 * s3232)
-    s3237 = k29 * s2793 + (s1312 * s2788 - s1311 * s2789) + (s2552 * s3232 - s2551 * s3233)
-    s3238 = s934 * s2268 - s936 * s2267 + (s3229 + (s2554 * s3232 + s2555 * s3233 + s2556 * s3234))
-    s3239 = s936 * s2266 - s932 * s2268 + (s3230 + (s2557 * s3232 + s2558 * s3233 + s2559 * s3234))
-    s3240 = s932 * s2267 - s934 * s2266 + (s3231 + (s2560 * s3232 + s2561 * s3233 + s2562 * s3234))
-    s3241 = s934 * s2271 - s936 * s2270 + s3235
-    s3242 = s936 * s2269 - s932 * s2271 + s3236
-    s3243 = s932 * s2270 - s934 * s2269 + s3237
-    s3244 = s1314 * s2794 + s1315 * s2795 + s1316 * s2796 + (s1312 * s2799 - s1313 * s2798)
-    s3245 = s1315 * s2794 + s1317 * s2795 + s1318 * s2796 + (s1313 * s2797 - s1311 * s2799)
-    s3246 = s1316 * s2794 + s1318 * s2795 + s1319 * s2796 + (s1311 * s2798 - s1312 * s2797)
-    s3247 = k29 * s2797 + (s1313 * s2795 - s1312 * s2796) + (s2553 * s3221 - s2552 * s3222)
-    s3248 = k29 * s2798 + (s1311 * s2796 - s1313 * s2794) + (s2551 * s3222 - s2553 * s3220)
-    s3249 = k29 * s2799 + (s1312 * s2794 - s1311 * s2795) + (s2552 * s3220 - s2551 * s3221)
-    s3250 = s1479 * s2788 + s1480 * s2789 + s1481 * s2790 + (s1476 * s2791 + s1477 * s2792 + s1478 * s2793)
-    s3251 = s1479 * s2794 + s1480 * s2795 + s1481 * s2796 + (s1476 * s2797 + s1477 * s2798 + s1478 * s2799)
-    s3252 = s3238 + (s1105 * s3243 - s1106 * s3242)
-    s3253 = s3239 + (s1106 * s3241 - s1104 * s3243)
-    s3254 = s3240 + (s1104 * s3242 - s1105 * s3241)
-    s3255 = s3244 + (s3223 + s2555 * s3221 + s2556 * s3222) + (s1105 * s3249 - s1106 * s3248)
-    s3256 = s3245 + (s3225 + s2557 * s3220 + s2559 * s3222) + (s1106 * s3247 - s1104 * s3249)
-    s3257 = s3246 + (s3227 + (s2560 * s3220 + s2561 * s3221)) + (s1104 * s3248 - s1105 * s3247)
-    s3258 = s1482 * s2704 + s1483 * s2705 + s1484 * s2706 + (s1476 * s2707 + s1477 * s2708 + s1478 * s2709)
-    s3259 = s1482 * s2710 + s1483 * s2711 + s1484 * s2712 + (s1476 * s2713 + s1477 * s2714 + s1478 * s2715)
-    s3260 = s15 * s3224 + s18 * s3226 + s21 * s3228
-    s3261 = s3252 + (s1021 * s3243 - s1024 * s3242)
-    s3262 = s3253 + (s1024 * s3241 - s1018 * s3243)
-    s3263 = s3254 + (s1018 * s3242 - s1021 * s3241)
-    s3264 = s3255 + (s1021 * s3249 - s1024 * s3248)
-    s3265 = s3256 + (s1024 * s3247 - s1018 * s3249)
-    s3266 = s3257 + (s1018 * s3248 - s1021 * s3247)
-    s3267 = s1476 * s2659 + s1477 * s2660 - s1478 * s2661
-    s3268 = s1485 * s2662 + s1486 * s2663 + s1487 * s2664 + (s1476 * s2665 + s1477 * s2666 + s1478 * s2667)
-    s3269 = s1476 * s2671 + s1477 * s2672 - s1478 * s2673
-    s3270 = s1485 * s2674 + s1486 * s2675 + s1487 * s2676 + (s1476 * s2677 + s1477 * s2678 + s1478 * s2679)
-    s3271 = s1476 * s2683 + s1477 * s2684 - s1478 * s2685
-    s3272 = s1485 * s2686 + s1486 * s2687 + s1487 * s2688 + (s1476 * s2689 + s1477 * s2690 + s1478 * s2691)
-    s3273 = 2.0 * s938
-    s3274 = 2.0 * s940
-    s3275 = 2.0 * s942
-    s3276 = s2539 * s3273
-    s3277 = s3276 + s2542 * s3274 + s2545 * s3275
-    s3278 = s2543 * s3274
-    s3279 = s2540 * s3273 + s3278 + s2546 * s3275
-    s3280 = s2547 * s3275
-    s3281 = s2541 * s3273 + s2544 * s3274 + s3280
-    s3282 = s1299 * s2818 + s1300 * s2819 + s1301 * s2820 + (s1297 * s2823 - s1298 * s2822)
-    s3283 = s1300 * s2818 + s1302 * s2819 + s1303 * s2820 + (s1298 * s2821 - s1296 * s2823)
-    s3284 = s1301 * s2818 + s1303 * s2819 + s1304 * s2820 + (s1296 * s2822 - s1297 * s2821)
-    s3285 = 2.0 * s2806
-    s3286 = 2.0 * s2807
-    s3287 = 2.0 * s2808
-    s3288 = k29 * s2821 + (s1298 * s2819 - s1297 * s2820) + (s2538 * s3286 - s2537 * s3287)
-    s3289 = k29 * s2822 + (s1296 * s2820 - s1298 * s2818) + (s2536 * s3287 - s2538 * s3285)
-    s3290 = k29 * s2823 + (s1297 * s2818 - s1296 * s2819) + (s2537 * s3285 - s2536 * s3286)
-    s3291 = s940 * s2262 - s942 * s2261 + (s3282 + (s2539 * s3285 + s2540 * s3286 + s2541 * s3287))
-    s3292 = s942 * s2260 - s938 * s2262 + (s3283 + (s2542 * s3285 + s2543 * s3286 + s2544 * s3287))
-    s3293 = s938 * s2261 - s940 * s2260 + (s3284 + (s2545 * s3285 + s2546 * s3286 + s2547 * s3287))
-    s3294 = s940 * s2265 - s942 * s2264 + s3288
-    s3295 = s942 * s2263 - s938 * s2265 + s3289
-    s3296 = s938 * s2264 - s940 * s2263 + s3290
-    s3297 = s1299 * s2824 + s1300 * s2825 + s1301 * s2826 + (s1297 * s2829 - s1298 * s2828)
-    s3298 = s1300 * s2824 + s1302 * s2825 + s1303 * s2826 + (s1298 * s2827 - s1296 * s2829)
-    s3299 = s1301 * s2824 + s1303 * s2825 + s1304 * s2826 + (s1296 * s2828 - s1297 * s2827)
-    s3300 = k29 * s2827 + (s1298 * s2825 - s1297 * s2826) + (s2538 * s3274 - s2537 * s3275)
-    s3301 = k29 * s2828 + (s1296 * s2826 - s1298 * s2824) + (s2536 * s3275 - s2538 * s3273)
-    s3302 = k29 * s2829 + (s1297 * s2824 - s1296 * s2825) + (s2537 * s3273 - s2536 * s3274)
-    s3303 = s1491 * s2818 + s1492 * s2819 + s1493 * s2820 + (s1488 * s2821 + s1489 * s2822 + s1490 * s2823)
-    s3304 = s1491 * s2824 + s1492 * s2825 + s1493 * s2826 + (s1488 * s2827 + s1489 * s2828 + s1490 * s2829)
-    s3305 = s3291 + (s1125 * s3296 - s1126 * s3295)
-    s3306 = s3292 + (s1126 * s3294 - s1124 * s3296)
-    s3307 = s3293 + (s1124 * s3295 - s1125 * s3294)
-    s3308 = s3297 + (s3276 + s2540 * s3274 + s2541 * s3275) + (s1125 * s3302 - s1126 * s3301)
-    s3309 = s3298 + (s3278 + s2542 * s3273 + s2544 * s3275) + (s1126 * s3300 - s1124 * s3302)
-    s3310 = s3299 + (s3280 + (s2545 * s3273 + s2546 * s3274)) + (s1124 * s3301 - s1125 * s3300)
-    s3311 = s1494 * s2704 + s1495 * s2705 + s1496 * s2706 + (s1488 * s2728 + s1489 * s2729 + s1490 * s2730)
-    s3312 = s1494 * s2710 + s1495 * s2711 + s1496 * s2712 + (s1488 * s2731 + s1489 * s2732 + s1490 * s2733)
-    s3313 = s15 * s3277 + s18 * s3279 + s21 * s3281
-    s3314 = s3305 + (s1051 * s3296 - s1052 * s3295)
-    s3315 = s3306 + (s1052 * s3294 - s1050 * s3296)
-    s3316 = s3307 + (s1050 * s3295 - s1051 * s3294)
-    s3317 = s3308 + (s1051 * s3302 - s1052 * s3301)
-    s3318 = s3309 + (s1052 * s3300 - s1050 * s3302)
-    s3319 = s3310 + (s1050 * s3301 - s1051 * s3300)
-    s3320 = s1488 * s2659 + s1489 * s2660 - s1490 * s2661
-    s3321 = s1497 * s2662 + s1498 * s2663 + s1499 * s2664 + (s1488 * s2665 + s1489 * s2666 + s1490 * s2667)
-    s3322 = s1488 * s2671 + s1489 * s2672 - s1490 * s2673
-    s3323 = s1497 * s2674 + s1498 * s2675 + s1499 * s2676 + (s1488 * s2677 + s1489 * s2678 + s1490 * s2679)
-    s3324 = s1488 * s2683 + s1489 * s2684 - s1490 * s2685
-    s3325 = s1497 * s2686 + s1498 * s2687 + s1499 * s2688 + (s1488 * s2689 + s1489 * s2690 + s1490 * s2691)
-    s3326 = 2.0 * s944
-    s3327 = 2.0 * s946
-    s3328 = 2.0 * s948
-    s3329 = s2524 * s3326
-    s3330 = s3329 + s2527 * s3327 + s2530 * s3328
-    s3331 = s2528 * s3327
-    s3332 = s2525 * s3326 + s3331 + s2531 * s3328
-    s3333 = s2532 * s3328
-    s3334 = s2526 * s3326 + s2529 * s3327 + s3333
-    s3335 = s1284 * s2845 + s1285 * s2846 + s1286 * s2847 + (s1282 * s2850 - s1283 * s2849)
-    s3336 = s1285 * s2845 + s1287 * s2846 + s1288 * s2847 + (s1283 * s2848 - s1281 * s2850)
-    s3337 = s1286 * s2845 + s1288 * s2846 + s1289 * s2847 + (s1281 * s2849 - s1282 * s2848)
-    s3338 = 2.0 * s2836
-    s3339 = 2.0 * s2837
-    s3340 = 2.0 * s2838
-    s3341 = k29 * s2848 + (s1283 * s2846 - s1282 * s2847) + (s2523 * s3339 - s2522 * s3340)
-    s3342 = k29 * s2849 + (s1281 * s2847 - s1283 * s2845) + (s2521 * s3340 - s2523 * s3338)
-    s3343 = k29 * s2850 + (s1282 * s2845 - s1281 * s2846) + (s2522 * s3338 - s2521 * s3339)
-    s3344 = s946 * s2256 - s948 * s2255 + (s3335 + (s2524 * s3338 + s2525 * s3339 + s2526 * s3340))
-    s3345 = s948 * s2254 - s944 * s2256 + (s3336 + (s2527 * s3338 + s2528 * s3339 + s2529 * s3340))
-    s3346 = s944 * s2255 - s946 * s2254 + (s3337 + (s2530 * s3338 + s2531 * s3339 + s2532 * s3340))
-    s3347 = s946 * s2259 - s948 * s2258 + s3341
-    s3348 = s948 * s2257 - s944 * s2259 + s3342
-    s3349 = s944 * s2258 - s946 * s2257 + s3343
-    s3350 = s1284 * s2851 + s1285 * s2852 + s1286 * s2853 + (s1282 * s2856 - s1283 * s2855)
-    s3351 = s1285 * s2851 + s1287 * s2852 + s1288 * s2853 + (s1283 * s2854 - s1281 * s2856)
-    s3352 = s1286 * s2851 + s1288 * s2852 + s1289 * s2853 + (s1281 * s2855 - s1282 * s2854)
-    s3353 = k29 * s2854 + (s1283 * s2852 - s1282 * s2853) + (s2523 * s3327 - s2522 * s3328)
-    s3354 = k29 * s2855 + (s1281 * s2853 - s1283 * s2851) + (s2521 * s3328 - s2523 * s3326)
-    s3355 = k29 * s2856 + (s1282 * s2851 - s1281 * s2852) + (s2522 * s3326 - s2521 * s3327)
-    s3356 = s1503 * s2845 + s1504 * s2846 + s1505 * s2847 + (s1500 * s2848 + s1501 * s2849 + s1502 * s2850)
-    s3357 = s1503 * s2851 + s1504 * s2852 + s1505 * s2853 + (s1500 * s2854 + s1501 * s2855 + s1502 * s2856)
-    s3358 = s3344 + (s1145 * s3349 - s1146 * s3348)
-    s3359 = s3345 + (s1146 * s3347 - s1144 * s3349)
-    s3360 = s3346 + (s1144 * s3348 - s1145 * s3347)
-    s3361 = s3350 + (s3329 + s2525 * s3327 + s2526 * s3328) + (s1145 * s3355 - s1146 * s3354)
-    s3362 = s3351 + (s3331 + s2527 * s3326 + s2529 * s3328) + (s1146 * s3353 - s1144 * s3355)
-    s3363 = s3352 + (s3333 + (s2530 * s3326 + s2531 * s3327)) + (s1144 * s3354 - s1145 * s3353)
-    s3364 = s1506 * s2704 + s1507 * s2705 + s1508 * s2706 + (s1500 * s2746 + s1501 * s2747 + s1502 * s2748)
-    s3365 = s1506 * s2710 + s1507 * s2711 + s1508 * s2712 + (s1500 * s2749 + s1501 * s2750 + s1502 * s2751)
-    s3366 = s15 * s3330 + s18 * s3332 + s21 * s3334
-    s3367 = s3358 + (s1070 * s3349 - s1071 * s3348)
-    s3368 = s3359 + (s1071 * s3347 - s1069 * s3349)
-    s3369 = s3360 + (s1069 * s3348 - s1070 * s3347)
-    s3370 = s3361 + (s1070 * s3355 - s1071 * s3354)
-    s3371 = s3362 + (s1071 * s3353 - s1069 * s3355)
-    s3372 = s3363 + (s1069 * s3354 - s1070 * s3353)
-    s3373 = s1500 * s2659 + s1501 * s2660 - s1502 * s2661
-    s3374 = s1509 * s2662 + s1510 * s2663 + s1511 * s2664 + (s1500 * s2665 + s1501 * s2666 + s1502 * s2667)
-    s3375 = s1500 * s2671 + s1501 * s2672 - s1502 * s2673
-    s3376 = s1509 * s2674 + s1510 * s2675 + s1511 * s2676 + (s1500 * s2677 + s1501 * s2678 + s1502 * s2679)
-    s3377 = s1500 * s2683 + s1501 * s2684 - s1502 * s2685
-    s3378 = s1509 * s2686 + s1510 * s2687 + s1511 * s2688 + (s1500 * s2689 + s1501 * s2690 + s1502 * s2691)
-    s3379 = 2.0 * s950
-    s3380 = 2.0 * s952
-    s3381 = 2.0 * s954
-    s3382 = s2509 * s3379
-    s3383 = s3382 + s2512 * s3380 + s2515 * s3381
-    s3384 = s2513 * s3380
-    s3385 = s2510 * s3379 + s3384 + s2516 * s3381
-    s3386 = s2517 * s3381
-    s3387 = s2511 * s3379 + s2514 * s3380 + s3386
-    s3388 = s1269 * s2875 + s1270 * s2876 + s1271 * s2877 + (s1267 * s2880 - s1268 * s2879)
-    s3389 = s1270 * s2875 + s1272 * s2876 + s1273 * s2877 + (s1268 * s2878 - s1266 * s2880)
-    s3390 = s1271 * s2875 + s1273 * s2876 + s1274 * s2877 + (s1266 * s2879 - s1267 * s2878)
-    s3391 = 2.0 * s2863
-    s3392 = 2.0 * s2864
-    s3393 = 2.0 * s2865
-    s3394 = k29 * s2878 + (s1268 * s2876 - s1267 * s2877) + (s2508 * s3392 - s2507 * s3393)
-    s3395 = k29 * s2879 + (s1266 * s2877 - s1268 * s2875) + (s2506 * s3393 - s2508 * s3391)
-    s3396 = k29 * s2880 + (s1267 * s2875 - s1266 * s2876) + (s2507 * s3391 - s2506 * s3392)
-    s3397 = s952 * s2250 - s954 * s2249 + (s3388 + (s2509 * s3391 + s2510 * s3392 + s2511 * s3393))
-    s3398 = s954 * s2248 - s950 * s2250 + (s3389 + (s2512 * s3391 + s2513 * s3392 + s2514 * s3393))
-    s3399 = s950 * s2249 - s952 * s2248 + (s3390 + (s2515 * s3391 + s2516 * s3392 + s2517 * s3393))
-    s3400 = s952 * s2253 - s954 * s2252 + s3394
-    s3401 = s954 * s2251 - s950 * s2253 + s3395
-    s3402 = s950 * s2252 - s952 * s2251 + s3396
-    s3403 = s1269 * s2881 + s1270 * s2882 + s1271 * s2883 + (s1267 * s2886 - s1268 * s2885)
-    s3404 = s1270 * s2881 + s1272 * s2882 + s1273 * s2883 + (s1268 * s2884 - s1266 * s2886)
-    s3405 = s1271 * s2881 + s1273 * s2882 + s1274 * s2883 + (s1266 * s2885 - s1267 * s2884)
-    s3406 = k29 * s2884 + (s1268 * s2882 - s1267 * s2883) + (s2508 * s3380 - s2507 * s3381)
-    s3407 = k29 * s2885 + (s1266 * s2883 - s1268 * s2881) + (s2506 * s3381 - s2508 * s3379)
-    s3408 = k29 * s2886 + (s1267 * s2881 - s1266 * s2882) + (s2507 * s3379 - s2506 * s3380)
-    s3409 = s1515 * s2875 + s1516 * s2876 + s1517 * s2877 + (s1512 * s2878 + s1513 * s2879 + s1514 * s2880)
-    s3410 = s1515 * s2881 + s1516 * s2882 + s1517 * s2883 + (s1512 * s2884 + s1513 * s2885 + s1514 * s2886)
-    s3411 = s3397 + (s1165 * s3402 - s1166 * s3401)
-    s3412 = s3398 + (s1166 * s3400 - s1164 * s3402)
-    s3413 = s3399 + (s1164 * s3401 - s1165 * s3400)
-    s3414 = s3403 + (s3382 + s2510 * s3380 + s2511 * s3381) + (s1165 * s3408 - s1166 * s3407)
-    s3415 = s3404 + (s3384 + s2512 * s3379 + s2514 * s3381) + (s1166 * s3406 - s1164 * s3408)
-    s3416 = s3405 + (s3386 + (s2515 * s3379 + s2516 * s3380)) + (s1164 * s3407 - s1165 * s3406)
-    s3417 = s1518 * s2704 + s1519 * s2705 + s1520 * s2706 + (s1512 * s2764 + s1513 * s2765 + s1514 * s2766)
-    s3418 = s1518 * s2710 + s1519 * s2711 + s1520 * s2712 + (s1512 * s2767 + s1513 * s2768 + s1514 * s2769)
-    s3419 = s15 * s3383 + s18 * s3385 + s21 * s3387
-    s3420 = s3411 + (s1024 * s3401 - s1021 * s3402)
-    s3421 = s3412 + (s1018 * s3402 - s1024 * s3400)
-    s3422 = s3413 + (s1021 * s3400 - s1018 * s3401)
-    s3423 = s3414 + (s1024 * s3407 - s1021 * s3408)
-    s3424 = s3415 + (s1018 * s3408 - s1024 * s3406)
-    s3425 = s3416 + (s1021 * s3406 - s1018 * s3407)
-    s3426 = s1512 * s2659 + s1513 * s2660 - s1514 * s2661
-    s3427 = s1521 * s2662 + s1522 * s2663 + s1523 * s2664 + (s1512 * s2665 + s1513 * s2666 + s1514 * s2667)
-    s3428 = s1512 * s2671 + s1513 * s2672 - s1514 * s2673
-    s3429 = s1521 * s2674 + s1522 * s2675 + s1523 * s2676 + (s1512 * s2677 + s1513 * s2678 + s1514 * s2679)
-    s3430 = s1512 * s2683 + s1513 * s2684 - s1514 * s2685
-    s3431 = s1521 * s2686 + s1522 * s2687 + s1523 * s2688 + (s1512 * s2689 + s1513 * s2690 + s1514 * s2691)
-    s3432 = s2431 * s3220
-    s3433 = s3432 + s2434 * s3221 + s2437 * s3222
-    s3434 = s2435 * s3221
-    s3435 = s2432 * s3220 + s3434 + s2438 * s3222
-    s3436 = s2439 * s3222
-    s3437 = s2433 * s3220 + s2436 * s3221 + s3436
-    s3438 = s1196 * s2905 + s1200 * s2906 + s1201 * s2907 + (s1189 * s2909 - s1188 * s2910)
-    s3439 = s1200 * s2905 + s1197 * s2906 + s1202 * s2907 + (s1187 * s2910 - s1189 * s2908)
-    s3440 = s1201 * s2905 + s1202 * s2906 + s1199 * s2907 + (s1188 * s2908 - s1187 * s2909)
-    s3441 = 2.0 * s2893
-    s3442 = 2.0 * s2894
-    s3443 = 2.0 * s2895
-    s3444 = m_shank * s2908 + (s1188 * s2907 - s1189 * s2906) + (s2424 * s3442 - s2423 * s3443)
-    s3445 = m_shank * s2909 + (s1189 * s2905 - s1187 * s2907) + (s2422 * s3443 - s2424 * s3441)
-    s3446 = m_shank * s2910 + (s1187 * s2906 - s1188 * s2905) + (s2423 * s3441 - s2422 * s3442)
-    s3447 = s934 * s2199 - s936 * s2198 + (s3438 + (s2431 * s3441 + s2432 * s3442 + s2433 * s3443))
-    s3448 = s936 * s2197 - s932 * s2199 + (s3439 + (s2434 * s3441 + s2435 * s3442 + s2436 * s3443))
-    s3449 = s932 * s2198 - s934 * s2197 + (s3440 + (s2437 * s3441 + s2438 * s3442 + s2439 * s3443))
-    s3450 = s934 * s2189 - s936 * s2188 + s3444
-    s3451 = s936 * s2187 - s932 * s2189 + s3445
-    s3452 = s932 * s2188 - s934 * s2187 + s3446
-    s3453 = s1196 * s2911 + s1200 * s2912 + s1201 * s2913 + (s1189 * s2915 - s1188 * s2916)
-    s3454 = s1200 * s2911 + s1197 * s2912 + s1202 * s2913 + (s1187 * s2916 - s1189 * s2914)
-    s3455 = s1201 * s2911 + s1202 * s2912 + s1199 * s2913 + (s1188 * s2914 - s1187 * s2915)
-    s3456 = m_shank * s2914 + (s1188 * s2913 - s1189 * s2912) + (s2424 * s3221 - s2423 * s3222)
-    s3457 = m_shank * s2915 + (s1189 * s2911 - s1187 * s2913) + (s2422 * s3222 - s2424 * s3220)
-    s3458 = m_shank * s2916 + (s1187 * s2912 - s1188 * s2911) + (s2423 * s3220 - s2422 * s3221)
-    s3459 = s1527 * s2905 + s1528 * s2906 + s1529 * s2907 + (s1524 * s2908 + s1525 * s2909 + s1526 * s2910)
-    s3460 = s3459 + (s2893 * s3433 + s2894 * s3435 + s2895 * s3437)
-    s3461 = s1527 * s2911 + s1528 * s2912 + s1529 * s2913 + (s1524 * s2914 + s1525 * s2915 + s1526 * s2916)
-    s3462 = s932 * s3433 + s934 * s3435 + s936 * s3437
-    s3463 = s3461 + s3462
-    s3464 = s3447 + (s1185 * s3452 - s1186 * s3451)
-    s3465 = s3448 + (s1186 * s3450 - s1184 * s3452)
-    s3466 = s3449 + (s1184 * s3451 - s1185 * s3450)
-    s3467 = s3453 + (s3432 + s2432 * s3221 + s2433 * s3222) + (s1185 * s3458 - s1186 * s3457)
-    s3468 = s3454 + (s3434 + s2434 * s3220 + s2436 * s3222) + (s1186 * s3456 - s1184 * s3458)
-    s3469 = s3455 + (s3436 + (s2437 * s3220 + s2438 * s3221)) + (s1184 * s3457 - s1185 * s3456)
-    s3470 = s1530 * s2788 + s1531 * s2789 + s1532 * s2790 + (s1524 * s2791 + s1525 * s2792 + s1526 * s2793)
-    s3471 = s3470 + (s2776 * s3433 + s2777 * s3435 + s2778 * s3437)
-    s3472 = s1530 * s2794 + s1531 * s2795 + s1532 * s2796 + (s1524 * s2797 + s1525 * s2798 + s1526 * s2799)
-    s3473 = s3462 + s3472
-    s3474 = s3464 + (s1105 * s3452 - s1106 * s3451)
-    s3475 = s3465 + (s1106 * s3450 - s1104 * s3452)
-    s3476 = s3466 + (s1104 * s3451 - s1105 * s3450)
-    s3477 = s3467 + (s1105 * s3458 - s1106 * s3457)
-    s3478 = s3468 + (s1106 * s3456 - s1104 * s3458)
-    s3479 = s3469 + (s1104 * s3457 - s1105 * s3456)
-    s3480 = s1534 * s2704 + s1535 * s2705 + s1536 * s2706 + (s1524 * s2707 + s1525 * s2708 + s1526 * s2709)
-    s3481 = s3480 + (s2662 * s3433 + s2663 * s3435 + s2664 * s3437)
-    s3482 = s1534 * s2710 + s1535 * s2711 + s1536 * s2712 + (s1524 * s2713 + s1525 * s2714 + s1526 * s2715)
-    s3483 = s15 * s3433 + s18 * s3435 + s21 * s3437
-    s3484 = s3482 + s3483
-    s3485 = s3474 + (s1021 * s3452 - s1024 * s3451)
-    s3486 = s3475 + (s1024 * s3450 - s1018 * s3452)
-    s3487 = s3476 + (s1018 * s3451 - s1021 * s3450)
-    s3488 = s3477 + (s1021 * s3458 - s1024 * s3457)
-    s3489 = s3478 + (s1024 * s3456 - s1018 * s3458)
-    s3490 = s3479 + (s1018 * s3457 - s1021 * s3456)
-    s3491 = s1524 * s2659 + s1525 * s2660 - s1526 * s2661
-    s3492 = s1538 * s2662 + s1539 * s2663 + s1540 * s2664 + (s1524 * s2665 + s1525 * s2666 + s1526 * s2667)
-    s3493 = s3483 + s3492
-    s3494 = s1524 * s2671 + s1525 * s2672 - s1526 * s2673
-    s3495 = s1538 * s2674 + s1539 * s2675 + s1540 * s2676 + (s1524 * s2677 + s1525 * s2678 + s1526 * s2679)
-    s3496 = s3495 + (s16 * s3433 + s19 * s3435 + s22 * s3437)
-    s3497 = s1524 * s2683 + s1525 * s2684 - s1526 * s2685
-    s3498 = s1538 * s2686 + s1539 * s2687 + s1540 * s2688 + (s1524 * s2689 + s1525 * s2690 + s1526 * s2691)
-    s3499 = s3498 + (s17 * s3433 + s20 * s3435 + s23 * s3437)
-    s3500 = s2458 * s3273
-    s3501 = s3500 + s2461 * s3274 + s2464 * s3275
-    s3502 = s2462 * s3274
-    s3503 = s2459 * s3273 + s3502 + s2465 * s3275
-    s3504 = s2466 * s3275
-    s3505 = s2460 * s3273 + s2463 * s3274 + s3504
-    s3506 = s1215 * s2938 + s1219 * s2939 + s1220 * s2940 + (s1208 * s2942 - s1207 * s2943)
-    s3507 = s1219 * s2938 + s1216 * s2939 + s1221 * s2940 + (s1206 * s2943 - s1208 * s2941)
-    s3508 = s1220 * s2938 + s1221 * s2939 + s1218 * s2940 + (s1207 * s2941 - s1206 * s2942)
-    s3509 = 2.0 * s2923
-    s3510 = 2.0 * s2924
-    s3511 = 2.0 * s2925
-    s3512 = m_shank * s2941 + (s1207 * s2940 - s1208 * s2939) + (s2445 * s3510 - s2444 * s3511)
-    s3513 = m_shank * s2942 + (s1208 * s2938 - s1206 * s2940) + (s2443 * s3511 - s2445 * s3509)
-    s3514 = m_shank * s2943 + (s1206 * s2939 - s1207 * s2938) + (s2444 * s3509 - s2443 * s3510)
-    s3515 = s940 * s2215 - s942 * s2214 + (s3506 + (s2458 * s3509 + s2459 * s3510 + s2460 * s3511))
-    s3516 = s942 * s2213 - s938 * s2215 + (s3507 + (s2461 * s3509 + s2462 * s3510 + s2463 * s3511))
-    s3517 = s938 * s2214 - s940 * s2213 + (s3508 + (s2464 * s3509 + s2465 * s3510 + s2466 * s3511))
-    s3518 = s940 * s2205 - s942 * s2204 + s3512
-    s3519 = s942 * s2203 - s938 * s2205 + s3513
-    s3520 = s938 * s2204 - s940 * s2203 + s3514
-    s3521 = s1215 * s2944 + s1219 * s2945 + s1220 * s2946 + (s1208 * s2948 - s1207 * s2949)
-    s3522 = s1219 * s2944 + s1216 * s2945 + s1221 * s2946 + (s1206 * s2949 - s1208 * s2947)
-    s3523 = s1220 * s2944 + s1221 * s2945 + s1218 * s2946 + (s1207 * s2947 - s1206 * s2948)
-    s3524 = m_shank * s2947 + (s1207 * s2946 - s1208 * s2945) + (s2445 * s3274 - s2444 * s3275)
-    s3525 = m_shank * s2948 + (s1208 * s2944 - s1206 * s2946) + (s2443 * s3275 - s2445 * s3273)
-    s3526 = m_shank * s2949 + (s1206 * s2945 - s1207 * s2944) + (s2444 * s3273 - s2443 * s3274)
-    s3527 = s1547 * s2938 + s1548 * s2939 + s1549 * s2940 + (s1544 * s2941 + s1545 * s2942 + s1546 * s2943)
-    s3528 = s3527 + (s2923 * s3501 + s2924 * s3503 + s2925 * s3505)
-    s3529 = s1547 * s2944 + s1548 * s2945 + s1549 * s2946 + (s1544 * s2947 + s1545 * s2948 + s1546 * s2949)
-    s3530 = s938 * s3501 + s940 * s3503 + s942 * s3505
-    s3531 = s3529 + s3530
-    s3532 = s3515 + (s1204 * s3520 - s1205 * s3519)
-    s3533 = s3516 + (s1205 * s3518 - s1203 * s3520)
-    s3534 = s3517 + (s1203 * s3519 - s1204 * s3518)
-    s3535 = s3521 + (s3500 + s2459 * s3274 + s2460 * s3275) + (s1204 * s3526 - s1205 * s3525)
-    s3536 = s3522 + (s3502 + s2461 * s3273 + s2463 * s3275) + (s1205 * s3524 - s1203 * s3526)
-    s3537 = s3523 + (s3504 + (s2464 * s3273 + s2465 * s3274)) + (s1203 * s3525 - s1204 * s3524)
-    s3538 = s1550 * s2818 + s1551 * s2819 + s1552 * s2820 + (s1544 * s2821 + s1545 * s2822 + s1546 * s2823)
-    s3539 = s3538 + (s2806 * s3501 + s2807 * s3503 + s2808 * s3505)
-    s3540 = s1550 * s2824 + s1551 * s2825 + s1552 * s2826 + (s1544 * s2827 + s1545 * s2828 + s1546 * s2829)
-    s3541 = s3530 + s3540
-    s3542 = s3532 + (s1125 * s3520 - s1126 * s3519)
-    s3543 = s3533 + (s1126 * s3518 - s1124 * s3520)
-    s3544 = s3534 + (s1124 * s3519 - s1125 * s3518)
-    s3545 = s3535 + (s1125 * s3526 - s1126 * s3525)
-    s3546 = s3536 + (s1126 * s3524 - s1124 * s3526)
-    s3547 = s3537 + (s1124 * s3525 - s1125 * s3524)
-    s3548 = s1554 * s2704 + s1555 * s2705 + s1556 * s2706 + (s1544 * s2728 + s1545 * s2729 + s1546 * s2730)
-    s3549 = s3548 + (s2662 * s3501 + s2663 * s3503 + s2664 * s3505)
-    s3550 = s1554 * s2710 + s1555 * s2711 + s1556 * s2712 + (s1544 * s2731 + s1545 * s2732 + s1546 * s2733)
-    s3551 = s15 * s3501 + s18 * s3503 + s21 * s3505
-    s3552 = s3550 + s3551
-    s3553 = s3542 + (s1051 * s3520 - s1052 * s3519)
-    s3554 = s3543 + (s1052 * s3518 - s1050 * s3520)
-    s3555 = s3544 + (s1050 * s3519 - s1051 * s3518)
-    s3556 = s3545 + (s1051 * s3526 - s1052 * s3525)
-    s3557 = s3546 + (s1052 * s3524 - s1050 * s3526)
-    s3558 = s3547 + (s1050 * s3525 - s1051 * s3524)
-    s3559 = s1544 * s2659 + s1545 * s2660 - s1546 * s2661
-    s3560 = s1558 * s2662 + s1559 * s2663 + s1560 * s2664 + (s1544 * s2665 + s1545 * s2666 + s1546 * s2667)
-    s3561 = s3551 + s3560
-    s3562 = s1544 * s2671 + s1545 * s2672 - s1546 * s2673
-    s3563 = s1558 * s2674 + s1559 * s2675 + s1560 * s2676 + (s1544 * s2677 + s1545 * s2678 + s1546 * s2679)
-    s3564 = s3563 + (s16 * s3501 + s19 * s3503 + s22 * s3505)
-    s3565 = s1544 * s2683 + s1545 * s2684 - s1546 * s2685
-    s3566 = s1558 * s2686 + s1559 * s2687 + s1560 * s2688 + (s1544 * s2689 + s1545 * s2690 + s1546 * s2691)
-    s3567 = s3566 + (s17 * s3501 + s20 * s3503 + s23 * s3505)
-    s3568 = s2476 * s3326
-    s3569 = s3568 + s2479 * s3327 + s2482 * s3328
-    s3570 = s2480 * s3327
-    s3571 = s2477 * s3326 + s3570 + s2483 * s3328
-    s3572 = s2484 * s3328
-    s3573 = s2478 * s3326 + s2481 * s3327 + s3572
-    s3574 = s1234 * s2965 + s1238 * s2966 + s1239 * s2967 + (s1227 * s2969 - s1226 * s2970)
-    s3575 = s1238 * s2965 + s1235 * s2966 + s1240 * s2967 + (s1225 * s2970 - s1227 * s2968)
-    s3576 = s1239 * s2965 + s1240 * s2966 + s1237 * s2967 + (s1226 * s2968 - s1225 * s2969)
-    s3577 = 2.0 * s2956
-    s3578 = 2.0 * s2957
-    s3579 = 2.0 * s2958
-    s3580 = m_shank * s2968 + (s1226 * s2967 - s1227 * s2966) + (s2469 * s3578 - s2468 * s3579)
-    s3581 = m_shank * s2969 + (s1227 * s2965 - s1225 * s2967) + (s2467 * s3579 - s2469 * s3577)
-    s3582 = m_shank * s2970 + (s1225 * s2966 - s1226 * s2965) + (s2468 * s3577 - s2467 * s3578)
-    s3583 = s946 * s2231 - s948 * s2230 + (s3574 + (s2476 * s3577 + s2477 * s3578 + s2478 * s3579))
-    s3584 = s948 * s2229 - s944 * s2231 + (s3575 + (s2479 * s3577 + s2480 * s3578 + s2481 * s3579))
-    s3585 = s944 * s2230 - s946 * s2229 + (s3576 + (s2482 * s3577 + s2483 * s3578 + s2484 * s3579))
-    s3586 = s946 * s2221 - s948 * s2220 + s3580
-    s3587 = s948 * s2219 - s944 * s2221 + s3581
-    s3588 = s944 * s2220 - s946 * s2219 + s3582
-    s3589 = s1234 * s2971 + s1238 * s2972 + s1239 * s2973 + (s1227 * s2975 - s1226 * s2976)
-    s3590 = s1238 * s2971 + s1235 * s2972 + s1240 * s2973 + (s1225 * s2976 - s1227 * s2974)
-    s3591 = s1239 * s2971 + s1240 * s2972 + s1237 * s2973 + (s1226 * s2974 - s1225 * s2975)
-    s3592 = m_shank * s2974 + (s1226 * s2973 - s1227 * s2972) + (s2469 * s3327 - s2468 * s3328)
-    s3593 = m_shank * s2975 + (s1227 * s2971 - s1225 * s2973) + (s2467 * s3328 - s2469 * s3326)
-    s3594 = m_shank * s2976 + (s1225 * s2972 - s1226 * s2971) + (s2468 * s3326 - s2467 * s3327)
-    s3595 = s1567 * s2965 + s1568 * s2966 + s1569 * s2967 + (s1564 * s2968 + s1565 * s2969 + s1566 * s2970)
-    s3596 = s3595 + (s2956 * s3569 + s2957 * s3571 + s2958 * s3573)
-    s3597 = s1567 * s2971 + s1568 * s2972 + s1569 * s2973 + (s1564 * s2974 + s1565 * s2975 + s1566 * s2976)
-    s3598 = s944 * s3569 + s946 * s3571 + s948 * s3573
-    s3599 = s3597 + s3598
-    s3600 = s3583 + (s1223 * s3588 - s1224 * s3587)
-    s3601 = s3584 + (s1224 * s3586 - s1222 * s3588)
-    s3602 = s3585 + (s1222 * s3587 - s1223 * s3586)
-    s3603 = s3589 + (s3568 + s2477 * s3327 + s2478 * s3328) + (s1223 * s3594 - s1224 * s3593)
-    s3604 = s3590 + (s3570 + s2479 * s3326 + s2481 * s3328) + (s1224 * s3592 - s1222 * s3594)
-    s3605 = s3591 + (s3572 + (s2482 * s3326 + s2483 * s3327)) + (s1222 * s3593 - s1223 * s3592)
-    s3606 = s1570 * s2845 + s1571 * s2846 + s1572 * s2847 + (s1564 * s2848 + s1565 * s2849 + s1566 * s2850)
-    s3607 = s3606 + (s2836 * s3569 + s2837 * s3571 + s2838 * s3573)
-    s3608 = s1570 * s2851 + s1571 * s2852 + s1572 * s2853 + (s1564 * s2854 + s1565 * s2855 + s1566 * s2856)
-    s3609 = s3598 + s3608
-    s3610 = s3600 + (s1145 * s3588 - s1146 * s3587)
-    s3611 = s3601 + (s1146 * s3586 - s1144 * s3588)
-    s3612 = s3602 + (s1144 * s3587 - s1145 * s3586)
-    s3613 = s3603 + (s1145 * s3594 - s1146 * s3593)
-    s3614 = s3604 + (s1146 * s3592 - s1144 * s3594)
-    s3615 = s3605 + (s1144 * s3593 - s1145 * s3592)
-    s3616 = s1574 * s2704 + s1575 * s2705 + s1576 * s2706 + (s1564 * s2746 + s1565 * s2747 + s1566 * s2748)
-    s3617 = s3616 + (s2662 * s3569 + s2663 * s3571 + s2664 * s3573)
-    s3618 = s1574 * s2710 + s1575 * s2711 + s1576 * s2712 + (s1564 * s2749 + s1565 * s2750 + s1566 * s2751)
-    s3619 = s15 * s3569 + s18 * s3571 + s21 * s3573
-    s3620 = s3618 + s3619
-    s3621 = s3610 + (s1070 * s3588 - s1071 * s3587)
-    s3622 = s3611 + (s1071 * s3586 - s1069 * s3588)
-    s3623 = s3612 + (s1069 * s3587 - s1070 * s3586)
-    s3624 = s3613 + (s1070 * s3594 - s1071 * s3593)
-    s3625 = s3614 + (s1071 * s3592 - s1069 * s3594)
-    s3626 = s3615 + (s1069 * s3593 - s1070 * s3592)
-    s3627 = s1564 * s2659 + s1565 * s2660 - s1566 * s2661
-    s3628 = s1578 * s2662 + s1579 * s2663 + s1580 * s2664 + (s1564 * s2665 + s1565 * s2666 + s1566 * s2667)
-    s3629 = s3619 + s3628
-    s3630 = s1564 * s2671 + s1565 * s2672 - s1566 * s2673
-    s3631 = s1578 * s2674 + s1579 * s2675 + s1580 * s2676 + (s1564 * s2677 + s1565 * s2678 + s1566 * s2679)
-    s3632 = s3631 + (s16 * s3569 + s19 * s3571 + s22 * s3573)
-    s3633 = s1564 * s2683 + s1565 * s2684 - s1566 * s2685
-    s3634 = s1578 * s2686 + s1579 * s2687 + s1580 * s2688 + (s1564 * s2689 + s1565 * s2690 + s1566 * s2691)
-    s3635 = s3634 + (s17 * s3569 + s20 * s3571 + s23 * s3573)
-    s3636 = s2494 * s3379
-    s3637 = s3636 + s2497 * s3380 + s2500 * s3381
-    s3638 = s2498 * s3380
-    s3639 = s2495 * s3379 + s3638 + s2501 * s3381
-    s3640 = s2502 * s3381
-    s3641 = s2496 * s3379 + s2499 * s3380 + s3640
-    s3642 = s1253 * s2995 + s1257 * s2996 + s1258 * s2997 + (s1246 * s2999 - s1245 * s3000)
-    s3643 = s1257 * s2995 + s1254 * s2996 + s1259 * s2997 + (s1244 * s3000 - s1246 * s2998)
-    s3644 = s1258 * s2995 + s1259 * s2996 + s1256 * s2997 + (s1245 * s2998 - s1244 * s2999)
-    s3645 = 2.0 * s2983
-    s3646 = 2.0 * s2984
-    s3647 = 2.0 * s2985
-    s3648 = m_shank * s2998 + (s1245 * s2997 - s1246 * s2996) + (s2487 * s3646 - s2486 * s3647)
-    s3649 = m_shank * s2999 + (s1246 * s2995 - s1244 * s2997) + (s2485 * s3647 - s2487 * s3645)
-    s3650 = m_shank * s3000 + (s1244 * s2996 - s1245 * s2995) + (s2486 * s3645 - s2485 * s3646)
-    s3651 = s952 * s2247 - s954 * s2246 + (s3642 + (s2494 * s3645 + s2495 * s3646 + s2496 * s3647))
-    s3652 = s954 * s2245 - s950 * s2247 + (s3643 + (s2497 * s3645 + s2498 * s3646 + s2499 * s3647))
-    s3653 = s950 * s2246 - s952 * s2245 + (s3644 + (s2500 * s3645 + s2501 * s3646 + s2502 * s3647))
-    s3654 = s952 * s2237 - s954 * s2236 + s3648
-    s3655 = s954 * s2235 - s950 * s2237 + s3649
-    s3656 = s950 * s2236 - s952 * s2235 + s3650
-    s3657 = s1253 * s3001 + s1257 * s3002 + s1258 * s3003 + (s1246 * s3005 - s1245 * s3006)
-    s3658 = s1257 * s3001 + s1254 * s3002 + s1259 * s3003 + (s1244 * s3006 - s1246 * s3004)
-    s3659 = s1258 * s3001 + s1259 * s3002 + s1256 * s3003 + (s1245 * s3004 - s1244 * s3005)
-    s3660 = m_shank * s3004 + (s1245 * s3003 - s1246 * s3002) + (s2487 * s3380 - s2486 * s3381)
-    s3661 = m_shank * s3005 + (s1246 * s3001 - s1244 * s3003) + (s2485 * s3381 - s2487 * s3379)
-    s3662 = m_shank * s3006 + (s1244 * s3002 - s1245 * s3001) + (s2486 * s3379 - s2485 * s3380)
-    s3663 = s1587 * s2995 + s1588 * s2996 + s1589 * s2997 + (s1584 * s2998 + s1585 * s2999 + s1586 * s3000)
-    s3664 = s3663 + (s2983 * s3637 + s2984 * s3639 + s2985 * s3641)
-    s3665 = s1587 * s3001 + s1588 * s3002 + s1589 * s3003 + (s1584 * s3004 + s1585 * s3005 + s1586 * s3006)
-    s3666 = s950 * s3637 + s952 * s3639 + s954 * s3641
-    s3667 = s3665 + s3666
-    s3668 = s3651 + (s1242 * s3656 - s1243 * s3655)
-    s3669 = s3652 + (s1243 * s3654 - s1241 * s3656)
-    s3670 = s3653 + (s1241 * s3655 - s1242 * s3654)
-    s3671 = s3657 + (s3636 + s2495 * s3380 + s2496 * s3381) + (s1242 * s3662 - s1243 * s3661)
-    s3672 = s3658 + (s3638 + s2497 * s3379 + s2499 * s3381) + (s1243 * s3660 - s1241 * s3662)
-    s3673 = s3659 + (s3640 + (s2500 * s3379 + s2501 * s3380)) + (s1241 * s3661 - s1242 * s3660)
-    s3674 = s1590 * s2875 + s1591 * s2876 + s1592 * s2877 + (s1584 * s2878 + s1585 * s2879 + s1586 * s2880)
-    s3675 = s3674 + (s2863 * s3637 + s2864 * s3639 + s2865 * s3641)
-    s3676 = s1590 * s2881 + s1591 * s2882 + s1592 * s2883 + (s1584 * s2884 + s1585 * s2885 + s1586 * s2886)
-    s3677 = s3666 + s3676
-    s3678 = s3668 + (s1165 * s3656 - s1166 * s3655)
-    s3679 = s3669 + (s1166 * s3654 - s1164 * s3656)
-    s3680 = s3670 + (s1164 * s3655 - s1165 * s3654)
-    s3681 = s3671 + (s1165 * s3662 - s1166 * s3661)
-    s3682 = s3672 + (s1166 * s3660 - s1164 * s3662)
-    s3683 = s3673 + (s1164 * s3661 - s1165 * s3660)
-    s3684 = s1594 * s2704 + s1595 * s2705 + s1596 * s2706 + (s1584 * s2764 + s1585 * s2765 + s1586 * s2766)
-    s3685 = s3684 + (s2662 * s3637 + s2663 * s3639 + s2664 * s3641)
-    s3686 = s1594 * s2710 + s1595 * s2711 + s1596 * s2712 + (s1584 * s2767 + s1585 * s2768 + s1586 * s2769)
-    s3687 = s15 * s3637 + s18 * s3639 + s21 * s3641
-    s3688 = s3686 + s3687
-    s3689 = s3678 + (s1024 * s3655 - s1021 * s3656)
-    s3690 = s3679 + (s1018 * s3656 - s1024 * s3654)
-    s3691 = s3680 + (s1021 * s3654 - s1018 * s3655)
-    s3692 = s3681 + (s1024 * s3661 - s1021 * s3662)
-    s3693 = s3682 + (s1018 * s3662 - s1024 * s3660)
-    s3694 = s3683 + (s1021 * s3660 - s1018 * s3661)
-    s3695 = s1584 * s2659 + s1585 * s2660 - s1586 * s2661
-    s3696 = s1598 * s2662 + s1599 * s2663 + s1600 * s2664 + (s1584 * s2665 + s1585 * s2666 + s1586 * s2667)
-    s3697 = s3687 + s3696
-    s3698 = s1584 * s2671 + s1585 * s2672 - s1586 * s2673
-    s3699 = s1598 * s2674 + s1599 * s2675 + s1600 * s2676 + (s1584 * s2677 + s1585 * s2678 + s1586 * s2679)
-    s3700 = s3699 + (s16 * s3637 + s19 * s3639 + s22 * s3641)
-    s3701 = s1584 * s2683 + s1585 * s2684 - s1586 * s2685
-    s3702 = s1598 * s2686 + s1599 * s2687 + s1600 * s2688 + (s1584 * s2689 + s1585 * s2690 + s1586 * s2691)
-    s3703 = s3702 + (s17 * s3637 + s20 * s3639 + s23 * s3641)
-    s3704 = s3 * s3491 + s4 * s3494 + s5 * s3497
-    s3705 = s3 * s3559 + s4 * s3562 + s5 * s3565
-    s3706 = s3 * s3627 + s4 * s3630 + s5 * s3633
-    s3707 = s3 * s3695 + s4 * s3698 + s5 * s3701
-    s3708 = trunk_qw * s2
-    s3709 = s3491 * s3708 - s5 * s3494 + s4 * s3497
-    s3710 = s3559 * s3708 - s5 * s3562 + s4 * s3565
-    s3711 = s3627 * s3708 - s5 * s3630 + s4 * s3633
-    s3712 = s3695 * s3708 - s5 * s3698 + s4 * s3701
-    s3713 = s3 * s3494 - s4 * s3491 + s3497 * s3708
-    s3714 = s3 * s3562 - s4 * s3559 + s3565 * s3708
-    s3715 = s3 * s3630 - s4 * s3627 + s3633 * s3708
-    s3716 = s3 * s3698 - s4 * s3695 + s3701 * s3708
-    s3717 = s3 * s3267 + s4 * s3269 + s5 * s3271 - s1604 * s3704
-    s3718 = s3 * s3320 + s4 * s3322 + s5 * s3324 - s1619 * s3705
-    s3719 = s3 * s3373 + s4 * s3375 + s5 * s3377 - s1634 * s3706
-    s3720 = s3 * s3055 + s4 * s3057 + s5 * s3059 - s1606 * s3704 - s1621 * s3705 - s1636 * s3706
-    s3721 = s3 * s3037 + s4 * s3039 + s5 * s3041 - s1607 * s3704 - s1622 * s3705 - s1637 * s3706
-    s3722 = s3 * s3019 + s4 * s3021 + s5 * s3023 - s1608 * s3704 - s1623 * s3705 - s1638 * s3706
-    s3723 = s3 * s3015 + s4 * s3033 + s5 * s3051 - s1609 * s3704 - s1624 * s3705 - s1639 * s3706
-    s3724 = s3 * s3014 + s4 * s3032 + s5 * s3050 - s1610 * s3704 - s1625 * s3705 - s1640 * s3706
-    s3725 = s3 * s3013 + s4 * s3031 + s5 * s3049 - s1611 * s3704 - s1626 * s3705 - s1641 * s3706
-    s3726 = s3 * s3426 + s4 * s3428 + s5 * s3430 - s1655 * s3707
-    s3727 = s3 * s3097 + s4 * s3099 + s5 * s3101 - s1605 * s3704 - s1670 * s3717
-    s3728 = s3 * s3136 + s4 * s3138 + s5 * s3140 - s1620 * s3705 - s1698 * s3718
-    s3729 = s3 * s3175 + s4 * s3177 + s5 * s3179 - s1635 * s3706 - s1711 * s3719
-    s3730 = s3 * s3214 + s4 * s3216 + s5 * s3218 - s1656 * s3707 - s1724 * s3726
-    s3731 = s3720 - s1657 * s3707 - s1671 * s3717 - s1699 * s3718 - s1712 * s3719 - s1725 * s3726
-    s3732 = s3721 - s1658 * s3707 - s1672 * s3717 - s1700 * s3718 - s1713 * s3719 - s1726 * s3726
-    s3733 = s3722 - s1659 * s3707 - s1673 * s3717 - s1701 * s3718 - s1714 * s3719 - s1727 * s3726
-    s3734 = s3723 - s1660 * s3707 - s1674 * s3717 - s1702 * s3718 - s1715 * s3719 - s1728 * s3726
-    s3735 = s3724 - s1661 * s3707 - s1675 * s3717 - s1703 * s3718 - s1716 * s3719 - s1729 * s3726
-    s3736 = s3725 - s1662 * s3707 - s1676 * s3717 - s1704 * s3718 - s1717 * s3719 - s1730 * s3726
-    s3737 = s3731 - s1743 * s3727 - s1749 * s3728 - s1770 * s3729 - s1776 * s3730
-    s3738 = s3732 - s1744 * s3727 - s1750 * s3728 - s1771 * s3729 - s1777 * s3730 - s1787 * s3737
-    s3739 = s3733 - s1745 * s3727 - s1751 * s3728 - s1772 * s3729 - s1778 * s3730 - s1788 * s3737
-    s3740 = s3734 - s1746 * s3727 - s1752 * s3728 - s1773 * s3729 - s1779 * s3730 - s1789 * s3737
-    s3741 = s3735 - s1747 * s3727 - s1753 * s3728 - s1774 * s3729 - s1780 * s3730 - s1790 * s3737
-    s3742 = s3736 - s1748 * s3727 - s1754 * s3728 - s1775 * s3729 - s1781 * s3730 - s1791 * s3737
-    s3743 = s3739 - s1797 * s3738
-    s3744 = s3740 - s1798 * s3738 - s1804 * s3743
-    s3745 = s3741 - s1799 * s3738 - s1805 * s3743 + s1812 * s3744
-    s3746 = (s3742 - s1800 * s3738 - s1806 * s3743 + s1813 * s3744 + s1815 * s3745) / pivot_trunk_x_dot
-    s3747 = s3745 / pivot_trunk_y_dot + s1815 * s3746
-    s3748 = s3744 / pivot_trunk_z_dot + s1812 * s3747 + s1813 * s3746
-    s3749 = s3743 / pivot_trunk_wx - s1804 * s3748 - s1805 * s3747 - s1806 * s3746
-    s3750 = s3738 / pivot_trunk_wy - s1797 * s3749 - s1798 * s3748 - s1799 * s3747 - s1800 * s3746
-    s3751 = s3737 / pivot_trunk_wz - s1787 * s3750 - s1788 * s3749 - s1789 * s3748 - s1790 * s3747
-    s3752 = s3751 - s1791 * s3746
-    s3753 = s3730 / pivot_hind_right_abduction_angle_dot - s1776 * s3752 - s1777 * s3750
-    s3754 = s3753 - s1778 * s3749 - s1779 * s3748 - s1780 * s3747 - s1781 * s3746
-    s3755 = s3729 / pivot_hind_left_abduction_angle_dot - s1770 * s3752 - s1771 * s3750
-    s3756 = s3755 - s1772 * s3749 - s1773 * s3748 - s1774 * s3747 - s1775 * s3746
-    s3757 = s3728 / pivot_front_right_abduction_angle_dot - s1749 * s3752 - s1750 * s3750
-    s3758 = s3757 - s1751 * s3749 - s1752 * s3748 - s1753 * s3747 - s1754 * s3746
-    s3759 = s3727 / pivot_front_left_abduction_angle_dot - s1743 * s3752 - s1744 * s3750
-    s3760 = s3759 - s1745 * s3749 - s1746 * s3748 - s1747 * s3747 - s1748 * s3746
-    s3761 = s3726 / pivot_hind_right_swing_angle_dot - s1724 * s3754 - s1725 * s3752 - s1726 * s3750
-    s3762 = s3761 - s1727 * s3749 - s1728 * s3748 - s1729 * s3747 - s1730 * s3746
-    s3763 = s3719 / pivot_hind_left_swing_angle_dot - s1711 * s3756 - s1712 * s3752 - s1713 * s3750
-    s3764 = s3763 - s1714 * s3749 - s1715 * s3748 - s1716 * s3747 - s1717 * s3746
-    s3765 = s3718 / pivot_front_right_swing_angle_dot - s1698 * s3758 - s1699 * s3752
-    s3766 = s3765 - s1700 * s3750 - s1701 * s3749 - s1702 * s3748 - s1703 * s3747 - s1704 * s3746
-    s3767 = s3717 / pivot_front_left_swing_angle_dot - s1670 * s3760 - s1671 * s3752 - s1672 * s3750
-    s3768 = s3767 - s1673 * s3749 - s1674 * s3748 - s1675 * s3747 - s1676 * s3746
-    s3769 = s3707 / pivot_hind_right_knee_angle_dot - s1655 * s3762 - s1656 * s3754 - s1657 * s3752
-    s3770 = s3706 / pivot_hind_left_knee_angle_dot - s1634 * s3764 - s1635 * s3756 - s1636 * s3752
-    s3771 = s3705 / pivot_front_right_knee_angle_dot - s1619 * s3766 - s1620 * s3758 - s1621 * s3752
-    s3772 = s3704 / pivot_front_left_knee_angle_dot - s1604 * s3768 - s1605 * s3760 - s1606 * s3752
-    s3773 = s1604 * s3709 - (s3267 * s3708 - s5 * s3269 + s4 * s3271)
-    s3774 = s1619 * s3710 - (s3320 * s3708 - s5 * s3322 + s4 * s3324)
-    s3775 = s1606 * s3709 - (s3055 * s3708 - s5 * s3057 + s4 * s3059) + s1621 * s3710
-    s3776 = s1607 * s3709 - (s3037 * s3708 - s5 * s3039 + s4 * s3041) + s1622 * s3710
-    s3777 = s1608 * s3709 - (s3019 * s3708 - s5 * s3021 + s4 * s3023) + s1623 * s3710
-    s3778 = s1609 * s3709 - (s3015 * s3708 - s5 * s3033 + s4 * s3051) + s1624 * s3710
-    s3779 = s1610 * s3709 - (s3014 * s3708 - s5 * s3032 + s4 * s3050) + s1625 * s3710
-    s3780 = s1611 * s3709 - (s3013 * s3708 - s5 * s3031 + s4 * s3049) + s1626 * s3710
-    s3781 = s1634 * s3711 - (s3373 * s3708 - s5 * s3375 + s4 * s3377)
-    s3782 = s1655 * s3712 - (s3426 * s3708 - s5 * s3428 + s4 * s3430)
-    s3783 = s1605 * s3709 - (s3097 * s3708 - s5 * s3099 + s4 * s3101) - s1670 * s3773
-    s3784 = s1620 * s3710 - (s3136 * s3708 - s5 * s3138 + s4 * s3140) - s1698 * s3774
-    s3785 = s1635 * s3711 - (s3175 * s3708 - s5 * s3177 + s4 * s3179) - s1711 * s3781
-    s3786 = s3775 + s1636 * s3711 + s1657 * s3712 - s1671 * s3773 - s1699 * s3774 - s1712 * s3781
-    s3787 = s3776 + s1637 * s3711 + s1658 * s3712 - s1672 * s3773 - s1700 * s3774 - s1713 * s3781
-    s3788 = s3777 + s1638 * s3711 + s1659 * s3712 - s1673 * s3773 - s1701 * s3774 - s1714 * s3781
-    s3789 = s3778 + s1639 * s3711 + s1660 * s3712 - s1674 * s3773 - s1702 * s3774 - s1715 * s3781
-    s3790 = s3779 + s1640 * s3711 + s1661 * s3712 - s1675 * s3773 - s1703 * s3774 - s1716 * s3781
-    s3791 = s3780 + s1641 * s3711 + s1662 * s3712 - s1676 * s3773 - s1704 * s3774 - s1717 * s3781
-    s3792 = s1656 * s3712 - (s3214 * s3708 - s5 * s3216 + s4 * s3218) - s1724 * s3782
-    s3793 = s3786 - s1725 * s3782 - s1743 * s3783 - s1749 * s3784 - s1770 * s3785 - s1776 * s3792
-    s3794 = s3787 - s1726 * s3782 - s1744 * s3783 - s1750 * s3784 - s1771 * s3785 - s1777 * s3792
-    s3795 = s3788 - s1727 * s3782 - s1745 * s3783 - s1751 * s3784 - s1772 * s3785 - s1778 * s3792
-    s3796 = s3789 - s1728 * s3782 - s1746 * s3783 - s1752 * s3784 - s1773 * s3785 - s1779 * s3792
-    s3797 = s3790 - s1729 * s3782 - s1747 * s3783 - s1753 * s3784 - s1774 * s3785 - s1780 * s3792
-    s3798 = s3791 - s1730 * s3782 - s1748 * s3783 - s1754 * s3784 - s1775 * s3785 - s1781 * s3792
-    s3799 = s3794 - s1787 * s3793
-    s3800 = s3795 - s1788 * s3793 - s1797 * s3799
-    s3801 = s3796 - s1789 * s3793 - s1798 * s3799 - s1804 * s3800
-    s3802 = s3797 - s1790 * s3793 - s1799 * s3799 - s1805 * s3800 + s1812 * s3801
-    s3803 = s3798 - s1791 * s3793 - s1800 * s3799 - s1806 * s3800 + s1813 * s3801 + s1815 * s3802
-    s3804 = s3803 / pivot_trunk_x_dot
-    s3805 = s3802 / pivot_trunk_y_dot + s1815 * s3804
-    s3806 = s3801 / pivot_trunk_z_dot + s1812 * s3805 + s1813 * s3804
-    s3807 = s3800 / pivot_trunk_wx - s1804 * s3806 - s1805 * s3805 - s1806 * s3804
-    s3808 = s3799 / pivot_trunk_wy - s1797 * s3807 - s1798 * s3806 - s1799 * s3805 - s1800 * s3804
-    s3809 = s3793 / pivot_trunk_wz - s1787 * s3808 - s1788 * s3807 - s1789 * s3806 - s1790 * s3805
-    s3810 = s3809 - s1791 * s3804
-    s3811 = s3792 / pivot_hind_right_abduction_angle_dot - s1776 * s3810 - s1777 * s3808
-    s3812 = s3811 - s1778 * s3807 - s1779 * s3806 - s1780 * s3805 - s1781 * s3804
-    s3813 = s3785 / pivot_hind_left_abduction_angle_dot - s1770 * s3810 - s1771 * s3808
-    s3814 = s3813 - s1772 * s3807 - s1773 * s3806 - s1774 * s3805 - s1775 * s3804
-    s3815 = s3784 / pivot_front_right_abduction_angle_dot - s1749 * s3810 - s1750 * s3808
-    s3816 = s3815 - s1751 * s3807 - s1752 * s3806 - s1753 * s3805 - s1754 * s3804
-    s3817 = s3783 / pivot_front_left_abduction_angle_dot - s1743 * s3810 - s1744 * s3808
-    s3818 = s3817 - s1745 * s3807 - s1746 * s3806 - s1747 * s3805 - s1748 * s3804
-    s3819 = s3782 / pivot_hind_right_swing_angle_dot - s1724 * s3812 - s1725 * s3810 - s1726 * s3808
-    s3820 = s3819 - s1727 * s3807 - s1728 * s3806 - s1729 * s3805 - s1730 * s3804
-    s3821 = s3781 / pivot_hind_left_swing_angle_dot - s1711 * s3814 - s1712 * s3810 - s1713 * s3808
-    s3822 = s3821 - s1714 * s3807 - s1715 * s3806 - s1716 * s3805 - s1717 * s3804
-    s3823 = s3774 / pivot_front_right_swing_angle_dot - s1698 * s3816 - s1699 * s3810
-    s3824 = s3823 - s1700 * s3808 - s1701 * s3807 - s1702 * s3806 - s1703 * s3805 - s1704 * s3804
-    s3825 = s3773 / pivot_front_left_swing_angle_dot - s1670 * s3818 - s1671 * s3810 - s1672 * s3808
-    s3826 = s3825 - s1673 * s3807 - s1674 * s3806 - s1675 * s3805 - s1676 * s3804
-    s3827 = s3712 / pivot_hind_right_knee_angle_dot + s1655 * s3820 + s1656 * s3812 + s1657 * s3810
-    s3828 = s3827 + s1658 * s3808 + s1659 * s3807 + s1660 * s3806 + s1661 * s3805 + s1662 * s3804
-    s3829 = s3711 / pivot_hind_left_knee_angle_dot + s1634 * s3822 + s1635 * s3814 + s1636 * s3810
-    s3830 = s3829 + s1637 * s3808 + s1638 * s3807 + s1639 * s3806 + s1640 * s3805 + s1641 * s3804
-    s3831 = s3710 / pivot_front_right_knee_angle_dot + s1619 * s3824 + s1620 * s3816 + s1621 * s3810
-    s3832 = s3831 + s1622 * s3808 + s1623 * s3807 + s1624 * s3806 + s1625 * s3805 + s1626 * s3804
-    s3833 = s3709 / pivot_front_left_knee_angle_dot + s1604 * s3826 + s1605 * s3818 + s1606 * s3810
-    s3834 = s3833 + s1607 * s3808 + s1608 * s3807 + s1609 * s3806 + s1610 * s3805 + s1611 * s3804
-    s3835 = s3 * s3497 - (s5 * s3491 + s3494 * s3708)
-    s3836 = s3 * s3565 - (s5 * s3559 + s3562 * s3708)
-    s3837 = s3 * s3633 - (s5 * s3627 + s3630 * s3708)
-    s3838 = s3 * s3701 - (s5 * s3695 + s3698 * s3708)
-    s3839 = s3 * s3271 - (s5 * s3267 + s3269 * s3708) - s1604 * s3835
-    s3840 = s3 * s3324 - (s5 * s3320 + s3322 * s3708) - s1619 * s3836
-    s3841 = s3 * s3059 - (s5 * s3055 + s3057 * s3708) - s1606 * s3835 - s1621 * s3836
-    s3842 = s3 * s3041 - (s5 * s3037 + s3039 * s3708) - s1607 * s3835 - s1622 * s3836
-    s3843 = s3 * s3023 - (s5 * s3019 + s3021 * s3708) - s1608 * s3835 - s1623 * s3836
-    s3844 = s3 * s3051 - (s5 * s3015 + s3033 * s3708) - s1609 * s3835 - s1624 * s3836
-    s3845 = s3 * s3050 - (s5 * s3014 + s3032 * s3708) - s1610 * s3835 - s1625 * s3836
-    s3846 = s3 * s3049 - (s5 * s3013 + s3031 * s3708) - s1611 * s3835 - s1626 * s3836
-    s3847 = s3 * s3377 - (s5 * s3373 + s3375 * s3708) - s1634 * s3837
-    s3848 = s3 * s3430 - (s5 * s3426 + s3428 * s3708) - s1655 * s3838
-    s3849 = s3 * s3101 - (s5 * s3097 + s3099 * s3708) - s1605 * s3835 - s1670 * s3839
-    s3850 = s3 * s3140 - (s5 * s3136 + s3138 * s3708) - s1620 * s3836 - s1698 * s3840
-    s3851 = s3 * s3179 - (s5 * s3175 + s3177 * s3708) - s1635 * s3837 - s1711 * s3847
-    s3852 = s3841 - s1636 * s3837 - s1657 * s3838 - s1671 * s3839 - s1699 * s3840 - s1712 * s3847
-    s3853 = s3842 - s1637 * s3837 - s1658 * s3838 - s1672 * s3839 - s1700 * s3840 - s1713 * s3847
-    s3854 = s3843 - s1638 * s3837 - s1659 * s3838 - s1673 * s3839 - s1701 * s3840 - s1714 * s3847
-    s3855 = s3844 - s1639 * s3837 - s1660 * s3838 - s1674 * s3839 - s1702 * s3840 - s1715 * s3847
-    s3856 = s3845 - s1640 * s3837 - s1661 * s3838 - s1675 * s3839 - s1703 * s3840 - s1716 * s3847
-    s3857 = s3846 - s1641 * s3837 - s1662 * s3838 - s1676 * s3839 - s1704 * s3840 - s1717 * s3847
-    s3858 = s3 * s3218 - (s5 * s3214 + s3216 * s3708) - s1656 * s3838 - s1724 * s3848
-    s3859 = s3852 - s1725 * s3848 - s1743 * s3849 - s1749 * s3850 - s1770 * s3851 - s1776 * s3858
-    s3860 = s3853 - s1726 * s3848 - s1744 * s3849 - s1750 * s3850 - s1771 * s3851 - s1777 * s3858
-    s3861 = s3854 - s1727 * s3848 - s1745 * s3849 - s1751 * s3850 - s1772 * s3851 - s1778 * s3858
-    s3862 = s3855 - s1728 * s3848 - s1746 * s3849 - s1752 * s3850 - s1773 * s3851 - s1779 * s3858
-    s3863 = s3856 - s1729 * s3848 - s1747 * s3849 - s1753 * s3850 - s1774 * s3851 - s1780 * s3858
-    s3864 = s3857 - s1730 * s3848 - s1748 * s3849 - s1754 * s3850 - s1775 * s3851 - s1781 * s3858
-    s3865 = s3860 - s1787 * s3859
-    s3866 = s3861 - s1788 * s3859 - s1797 * s3865
-    s3867 = s3862 - s1789 * s3859 - s1798 * s3865 - s1804 * s3866
-    s3868 = s3863 - s1790 * s3859 - s1799 * s3865 - s1805 * s3866 + s1812 * s3867
-    s3869 = s3864 - s1791 * s3859 - s1800 * s3865 - s1806 * s3866 + s1813 * s3867 + s1815 * s3868
-    s3870 = s3869 / pivot_trunk_x_dot
-    s3871 = s3868 / pivot_trunk_y_dot + s1815 * s3870
-    s3872 = s3867 / pivot_trunk_z_dot + s1812 * s3871 + s1813 * s3870
-    s3873 = s3866 / pivot_trunk_wx - s1804 * s3872 - s1805 * s3871 - s1806 * s3870
-    s3874 = s3865 / pivot_trunk_wy - s1797 * s3873 - s1798 * s3872 - s1799 * s3871 - s1800 * s3870
-    s3875 = s3859 / pivot_trunk_wz - s1787 * s3874 - s1788 * s3873 - s1789 * s3872 - s1790 * s3871
-    s3876 = s3875 - s1791 * s3870
-    s3877 = s3858 / pivot_hind_right_abduction_angle_dot - s1776 * s3876 - s1777 * s3874
-    s3878 = s3877 - s1778 * s3873 - s1779 * s3872 - s1780 * s3871 - s1781 * s3870
-    s3879 = s3851 / pivot_hind_left_abduction_angle_dot - s1770 * s3876 - s1771 * s3874
-    s3880 = s3879 - s1772 * s3873 - s1773 * s3872 - s1774 * s3871 - s1775 * s3870
-    s3881 = s3850 / pivot_front_right_abduction_angle_dot - s1749 * s3876 - s1750 * s3874
-    s3882 = s3881 - s1751 * s3873 - s1752 * s3872 - s1753 * s3871 - s1754 * s3870
-    s3883 = s3849 / pivot_front_left_abduction_angle_dot - s1743 * s3876 - s1744 * s3874
-    s3884 = s3883 - s1745 * s3873 - s1746 * s3872 - s1747 * s3871 - s1748 * s3870
-    s3885 = s3848 / pivot_hind_right_swing_angle_dot - s1724 * s3878 - s1725 * s3876 - s1726 * s3874
-    s3886 = s3885 - s1727 * s3873 - s1728 * s3872 - s1729 * s3871 - s1730 * s3870
-    s3887 = s3847 / pivot_hind_left_swing_angle_dot - s1711 * s3880 - s1712 * s3876 - s1713 * s3874
-    s3888 = s3887 - s1714 * s3873 - s1715 * s3872 - s1716 * s3871 - s1717 * s3870
-    s3889 = s3840 / pivot_front_right_swing_angle_dot - s1698 * s3882 - s1699 * s3876
-    s3890 = s3889 - s1700 * s3874 - s1701 * s3873 - s1702 * s3872 - s1703 * s3871 - s1704 * s3870
-    s3891 = s3839 / pivot_front_left_swing_angle_dot - s1670 * s3884 - s1671 * s3876 - s1672 * s3874
-    s3892 = s3891 - s1673 * s3873 - s1674 * s3872 - s1675 * s3871 - s1676 * s3870
-    s3893 = s3838 / pivot_hind_right_knee_angle_dot - s1655 * s3886 - s1656 * s3878 - s1657 * s3876
-    s3894 = s3837 / pivot_hind_left_knee_angle_dot - s1634 * s3888 - s1635 * s3880 - s1636 * s3876
-    s3895 = s3836 / pivot_front_right_knee_angle_dot - s1619 * s3890 - s1620 * s3882 - s1621 * s3876
-    s3896 = s3835 / pivot_front_left_knee_angle_dot - s1604 * s3892 - s1605 * s3884 - s1606 * s3876
-    s3897 = s1604 * s3713 - (s3 * s3269 - s4 * s3267 + s3271 * s3708)
-    s3898 = s1619 * s3714 - (s3 * s3322 - s4 * s3320 + s3324 * s3708)
-    s3899 = s1606 * s3713 - (s3 * s3057 - s4 * s3055 + s3059 * s3708) + s1621 * s3714
-    s3900 = s1607 * s3713 - (s3 * s3039 - s4 * s3037 + s3041 * s3708) + s1622 * s3714
-    s3901 = s1608 * s3713 - (s3 * s3021 - s4 * s3019 + s3023 * s3708) + s1623 * s3714
-    s3902 = s1609 * s3713 - (s3 * s3033 - s4 * s3015 + s3051 * s3708) + s1624 * s3714
-    s3903 = s1610 * s3713 - (s3 * s3032 - s4 * s3014 + s3050 * s3708) + s1625 * s3714
-    s3904 = s1611 * s3713 - (s3 * s3031 - s4 * s3013 + s3049 * s3708) + s1626 * s3714
-    s3905 = s1634 * s3715 - (s3 * s3375 - s4 * s3373 + s3377 * s3708)
-    s3906 = s1655 * s3716 - (s3 * s3428 - s4 * s3426 + s3430 * s3708)
-    s3907 = s1605 * s3713 - (s3 * s3099 - s4 * s3097 + s3101 * s3708) - s1670 * s3897
-    s3908 = s1620 * s3714 - (s3 * s3138 - s4 * s3136 + s3140 * s3708) - s1698 * s3898
-    s3909 = s1635 * s3715 - (s3 * s3177 - s4 * s3175 + s3179 * s3708) - s1711 * s3905
-    s3910 = s3899 + s1636 * s3715 + s1657 * s3716 - s1671 * s3897 - s1699 * s3898 - s1712 * s3905
-    s3911 = s3900 + s1637 * s3715 + s1658 * s3716 - s1672 * s3897 - s1700 * s3898 - s1713 * s3905
-    s3912 = s3901 + s1638 * s3715 + s1659 * s3716 - s1673 * s3897 - s1701 * s3898 - s1714 * s3905
-    s3913 = s3902 + s1639 * s3715 + s1660 * s3716 - s1674 * s3897 - s1702 * s3898 - s1715 * s3905
-    s3914 = s3903 + s1640 * s3715 + s1661 * s3716 - s1675 * s3897 - s1703 * s3898 - s1716 * s3905
-    s3915 = s3904 + s1641 * s3715 + s1662 * s3716 - s1676 * s3897 - s1704 * s3898 - s1717 * s3905
-    s3916 = s1656 * s3716 - (s3 * s3216 - s4 * s3214 + s3218 * s3708) - s1724 * s3906
-    s3917 = s3910 - s1725 * s3906 - s1743 * s3907 - s1749 * s3908 - s1770 * s3909 - s1776 * s3916
-    s3918 = s3911 - s1726 * s3906 - s1744 * s3907 - s1750 * s3908 - s1771 * s3909 - s1777 * s3916
-    s3919 = s3912 - s1727 * s3906 - s1745 * s3907 - s1751 * s3908 - s1772 * s3909 - s1778 * s3916
-    s3920 = s3913 - s1728 * s3906 - s1746 * s3907 - s1752 * s3908 - s1773 * s3909 - s1779 * s3916
-    s3921 = s3914 - s1729 * s3906 - s1747 * s3907 - s1753 * s3908 - s1774 * s3909 - s1780 * s3916
-    s3922 = s3915 - s1730 * s3906 - s1748 * s3907 - s1754 * s3908 - s1775 * s3909 - s1781 * s3916
-    s3923 = s3918 - s1787 * s3917
-    s3924 = s3919 - s1788 * s3917 - s1797 * s3923
-    s3925 = s3920 - s1789 * s3917 - s1798 * s3923 - s1804 * s3924
-    s3926 = s3921 - s1790 * s3917 - s1799 * s3923 - s1805 * s3924 + s1812 * s3925
-    s3927 = s3922 - s1791 * s3917 - s1800 * s3923 - s1806 * s3924 + s1813 * s3925 + s1815 * s3926
-    s3928 = s3927 / pivot_trunk_x_dot
-    s3929 = s3926 / pivot_trunk_y_dot + s1815 * s3928
-    s3930 = s3925 / pivot_trunk_z_dot + s1812 * s3929 + s1813 * s3928
-    s3931 = s3924 / pivot_trunk_wx - s1804 * s3930 - s1805 * s3929 - s1806 * s3928
-    s3932 = s3923 / pivot_trunk_wy - s1797 * s3931 - s1798 * s3930 - s1799 * s3929 - s1800 * s3928
-    s3933 = s3917 / pivot_trunk_wz - s1787 * s3932 - s1788 * s3931 - s1789 * s3930 - s1790 * s3929
-    s3934 = s3933 - s1791 * s3928
-    s3935 = s3916 / pivot_hind_right_abduction_angle_dot - s1776 * s3934 - s1777 * s3932
-    s3936 = s3935 - s1778 * s3931 - s1779 * s3930 - s1780 * s3929 - s1781 * s3928
-    s3937 = s3909 / pivot_hind_left_abduction_angle_dot - s1770 * s3934 - s1771 * s3932
-    s3938 = s3937 - s1772 * s3931 - s1773 * s3930 - s1774 * s3929 - s1775 * s3928
-    s3939 = s3908 / pivot_front_right_abduction_angle_dot - s1749 * s3934 - s1750 * s3932
-    s3940 = s3939 - s1751 * s3931 - s1752 * s3930 - s1753 * s3929 - s1754 * s3928
-    s3941 = s3907 / pivot_front_left_abduction_angle_dot - s1743 * s3934 - s1744 * s3932
-    s3942 = s3941 - s1745 * s3931 - s1746 * s3930 - s1747 * s3929 - s1748 * s3928
-    s3943 = s3906 / pivot_hind_right_swing_angle_dot - s1724 * s3936 - s1725 * s3934 - s1726 * s3932
-    s3944 = s3943 - s1727 * s3931 - s1728 * s3930 - s1729 * s3929 - s1730 * s3928
-    s3945 = s3905 / pivot_hind_left_swing_angle_dot - s1711 * s3938 - s1712 * s3934 - s1713 * s3932
-    s3946 = s3945 - s1714 * s3931 - s1715 * s3930 - s1716 * s3929 - s1717 * s3928
-    s3947 = s3898 / pivot_front_right_swing_angle_dot - s1698 * s3940 - s1699 * s3934
-    s3948 = s3947 - s1700 * s3932 - s1701 * s3931 - s1702 * s3930 - s1703 * s3929 - s1704 * s3928
-    s3949 = s3897 / pivot_front_left_swing_angle_dot - s1670 * s3942 - s1671 * s3934 - s1672 * s3932
-    s3950 = s3949 - s1673 * s3931 - s1674 * s3930 - s1675 * s3929 - s1676 * s3928
-    s3951 = s3716 / pivot_hind_right_knee_angle_dot + s1655 * s3944 + s1656 * s3936 + s1657 * s3934
-    s3952 = s3951 + s1658 * s3932 + s1659 * s3931 + s1660 * s3930 + s1661 * s3929 + s1662 * s3928
-    s3953 = s3715 / pivot_hind_left_knee_angle_dot + s1634 * s3946 + s1635 * s3938 + s1636 * s3934
-    s3954 = s3953 + s1637 * s3932 + s1638 * s3931 + s1639 * s3930 + s1640 * s3929 + s1641 * s3928
-    s3955 = s3714 / pivot_front_right_knee_angle_dot + s1619 * s3948 + s1620 * s3940 + s1621 * s3934
-    s3956 = s3955 + s1622 * s3932 + s1623 * s3931 + s1624 * s3930 + s1625 * s3929 + s1626 * s3928
-    s3957 = s3713 / pivot_front_left_knee_angle_dot + s1604 * s3950 + s1605 * s3942 + s1606 * s3934
-    s3958 = s3957 + s1607 * s3932 + s1608 * s3931 + s1609 * s3930 + s1610 * s3929 + s1611 * s3928
-    s3959 = s1604 * s3481 - (s3258 + (s2662 * s3224 + s2663 * s3226 + s2664 * s3228))
-    s3960 = s1605 * s3481 - (s3088 + (s2662 * s3062 + s2663 * s3064 + s2664 * s3066))
-    s3961 = s3960 - s1670 * s3959
-    s3962 = s1606 * s3481 - (s17 * s3091 + s20 * s3092 + s23 * s3093) - s1671 * s3959
-    s3963 = s1607 * s3481 - (s16 * s3091 + s19 * s3092 + s22 * s3093) - s1672 * s3959
-    s3964 = s1608 * s3481 - (s15 * s3091 + s18 * s3092 + s21 * s3093) - s1673 * s3959
-    s3965 = s3962 - s1743 * s3961
-    s3966 = s3963 - s1744 * s3961 - s1787 * s3965
-    s3967 = s3964 - s1745 * s3961 - s1788 * s3965 - s1797 * s3966
-    s3968 = s1609 * s3481 - s3081 - s1674 * s3959 - s1746 * s3961 - s1789 * s3965 - s1798 * s3966
-    s3969 = s1610 * s3481 - s3080 - s1675 * s3959 - s1747 * s3961 - s1790 * s3965 - s1799 * s3966
-    s3970 = s1611 * s3481 - s3079 - s1676 * s3959 - s1748 * s3961 - s1791 * s3965 - s1800 * s3966
-    s3971 = s3968 - s1804 * s3967
-    s3972 = s3969 - s1805 * s3967 + s1812 * s3971
-    s3973 = (s3970 - s1806 * s3967 + s1813 * s3971 + s1815 * s3972) / pivot_trunk_x_dot
-    s3974 = s3972 / pivot_trunk_y_dot + s1815 * s3973
-    s3975 = s3971 / pivot_trunk_z_dot + s1812 * s3974 + s1813 * s3973
-    s3976 = s3967 / pivot_trunk_wx - s1804 * s3975 - s1805 * s3974 - s1806 * s3973
-    s3977 = s3966 / pivot_trunk_wy - s1797 * s3976 - s1798 * s3975 - s1799 * s3974 - s1800 * s3973
-    s3978 = s3965 / pivot_trunk_wz - s1787 * s3977 - s1788 * s3976 - s1789 * s3975 - s1790 * s3974
-    s3979 = s3978 - s1791 * s3973
-    s3980 = s1776 * s3979 + s1777 * s3977 + s1778 * s3976 + s1779 * s3975 + s1780 * s3974
-    s3981 = s3980 + s1781 * s3973
-    s3982 = s1770 * s3979 + s1771 * s3977 + s1772 * s3976 + s1773 * s3975 + s1774 * s3974
-    s3983 = s3982 + s1775 * s3973
-    s3984 = s1749 * s3979 + s1750 * s3977 + s1751 * s3976 + s1752 * s3975 + s1753 * s3974
-    s3985 = s3984 + s1754 * s3973
-    s3986 = s3961 / pivot_front_left_abduction_angle_dot - s1743 * s3979 - s1744 * s3977
-    s3987 = s3986 - s1745 * s3976 - s1746 * s3975 - s1747 * s3974 - s1748 * s3973
-    s3988 = s1724 * s3981 - s1725 * s3979 - s1726 * s3977 - s1727 * s3976 - s1728 * s3975
-    s3989 = s3988 - s1729 * s3974 - s1730 * s3973
-    s3990 = s1711 * s3983 - s1712 * s3979 - s1713 * s3977 - s1714 * s3976 - s1715 * s3975
-    s3991 = s3990 - s1716 * s3974 - s1717 * s3973
-    s3992 = s1698 * s3985 - s1699 * s3979 - s1700 * s3977 - s1701 * s3976 - s1702 * s3975
-    s3993 = s3992 - s1703 * s3974 - s1704 * s3973
-    s3994 = s3959 / pivot_front_left_swing_angle_dot - s1670 * s3987 - s1671 * s3979 - s1672 * s3977
-    s3995 = s3994 - s1673 * s3976 - s1674 * s3975 - s1675 * s3974 - s1676 * s3973
-    s3996 = s1656 * s3981 - s1655 * s3989 - s1657 * s3979 - s1658 * s3977 - s1659 * s3976
-    s3997 = s1635 * s3983 - s1634 * s3991 - s1636 * s3979 - s1637 * s3977 - s1638 * s3976
-    s3998 = s1620 * s3985 - s1619 * s3993 - s1621 * s3979 - s1622 * s3977 - s1623 * s3976
-    s3999 = s3481 / pivot_front_left_knee_angle_dot + s1604 * s3995 + s1605 * s3987 + s1606 * s3979
-    s4000 = s3999 + s1607 * s3977 + s1608 * s3976 + s1609 * s3975 + s1610 * s3974 + s1611 * s3973
-    s4001 = s1619 * s3549 - (s3311 + (s2662 * s3277 + s2663 * s3279 + s2664 * s3281))
-    s4002 = s1620 * s3549 - (s3127 + (s2662 * s3104 + s2663 * s3106 + s2664 * s3108))
-    s4003 = s4002 - s1698 * s4001
-    s4004 = s1621 * s3549 - (s17 * s3130 + s20 * s3131 + s23 * s3132) - s1699 * s4001
-    s4005 = s1622 * s3549 - (s16 * s3130 + s19 * s3131 + s22 * s3132) - s1700 * s4001
-    s4006 = s1623 * s3549 - (s15 * s3130 + s18 * s3131 + s21 * s3132) - s1701 * s4001
-    s4007 = s4004 - s1749 * s4003
-    s4008 = s4005 - s1750 * s4003 - s1787 * s4007
-    s4009 = s4006 - s1751 * s4003 - s1788 * s4007 - s1797 * s4008
-    s4010 = s1624 * s3549 - s3120 - s1702 * s4001 - s1752 * s4003 - s1789 * s4007 - s1798 * s4008
-    s4011 = s1625 * s3549 - s3119 - s1703 * s4001 - s1753 * s4003 - s1790 * s4007 - s1799 * s4008
-    s4012 = s1626 * s3549 - s3118 - s1704 * s4001 - s1754 * s4003 - s1791 * s4007 - s1800 * s4008
-    s4013 = s4010 - s1804 * s4009
-    s4014 = s4011 - s1805 * s4009 + s1812 * s4013
-    s4015 = (s4012 - s1806 * s4009 + s1813 * s4013 + s1815 * s4014) / pivot_trunk_x_dot
-    s4016 = s4014 / pivot_trunk_y_dot + s1815 * s4015
-    s4017 = s4013 / pivot_trunk_z_dot + s1812 * s4016 + s1813 * s4015
-    s4018 = s4009 / pivot_trunk_wx - s1804 * s4017 - s1805 * s4016 - s1806 * s4015
-    s4019 = s4008 / pivot_trunk_wy - s1797 * s4018 - s1798 * s4017 - s1799 * s4016 - s1800 * s4015
-    s4020 = s4007 / pivot_trunk_wz - s1787 * s4019 - s1788 * s4018 - s1789 * s4017 - s1790 * s4016
-    s4021 = s4020 - s1791 * s4015
-    s4022 = s1776 * s4021 + s1777 * s4019 + s1778 * s4018 + s1779 * s4017 + s1780 * s4016
-    s4023 = s4022 + s1781 * s4015
-    s4024 = s1770 * s4021 + s1771 * s4019 + s1772 * s4018 + s1773 * s4017 + s1774 * s4016
-    s4025 = s4024 + s1775 * s4015
-    s4026 = s4003 / pivot_front_right_abduction_angle_dot - s1749 * s4021 - s1750 * s4019
-    s4027 = s4026 - s1751 * s4018 - s1752 * s4017 - s1753 * s4016 - s1754 * s4015
-    s4028 = s1743 * s4021 + s1744 * s4019 + s1745 * s4018 + s1746 * s4017 + s1747 * s4016
-    s4029 = s4028 + s1748 * s4015
-    s4030 = s1724 * s4023 - s1725 * s4021 - s1726 * s4019 - s1727 * s4018 - s1728 * s4017
-    s4031 = s4030 - s1729 * s4016 - s1730 * s4015
-    s4032 = s1711 * s4025 - s1712 * s4021 - s1713 * s4019 - s1714 * s4018 - s1715 * s4017
-    s4033 = s4032 - s1716 * s4016 - s1717 * s4015
-    s4034 = s4001 / pivot_front_right_swing_angle_dot - s1698 * s4027 - s1699 * s4021
-    s4035 = s4034 - s1700 * s4019 - s1701 * s4018 - s1702 * s4017 - s1703 * s4016 - s1704 * s4015
-    s4036 = s1670 * s4029 - s1671 * s4021 - s1672 * s4019 - s1673 * s4018 - s1674 * s4017
-    s4037 = s4036 - s1675 * s4016 - s1676 * s4015
-    s4038 = s1656 * s4023 - s1655 * s4031 - s1657 * s4021 - s1658 * s4019 - s1659 * s4018
-    s4039 = s1635 * s4025 - s1634 * s4033 - s1636 * s4021 - s1637 * s4019 - s1638 * s4018
-    s4040 = s3549 / pivot_front_right_knee_angle_dot + s1619 * s4035 + s1620 * s4027 + s1621 * s4021
-    s4041 = s4040 + s1622 * s4019 + s1623 * s4018 + s1624 * s4017 + s1625 * s4016 + s1626 * s4015
-    s4042 = s1605 * s4029 - s1604 * s4037 - s1606 * s4021 - s1607 * s4019 - s1608 * s4018
-    s4043 = s1634 * s3617 - (s3364 + (s2662 * s3330 + s2663 * s3332 + s2664 * s3334))
-    s4044 = s1635 * s3617 - (s3166 + (s2662 * s3143 + s2663 * s3145 + s2664 * s3147))
-    s4045 = s4044 - s1711 * s4043
-    s4046 = s1636 * s3617 - (s17 * s3169 + s20 * s3170 + s23 * s3171) - s1712 * s4043
-    s4047 = s1637 * s3617 - (s16 * s3169 + s19 * s3170 + s22 * s3171) - s1713 * s4043
-    s4048 = s1638 * s3617 - (s15 * s3169 + s18 * s3170 + s21 * s3171) - s1714 * s4043
-    s4049 = s4046 - s1770 * s4045
-    s4050 = s4047 - s1771 * s4045 - s1787 * s4049
-    s4051 = s4048 - s1772 * s4045 - s1788 * s4049 - s1797 * s4050
-    s4052 = s1639 * s3617 - s3159 - s1715 * s4043 - s1773 * s4045 - s1789 * s4049 - s1798 * s4050
-    s4053 = s1640 * s3617 - s3158 - s1716 * s4043 - s1774 * s4045 - s1790 * s4049 - s1799 * s4050
-    s4054 = s1641 * s3617 - s3157 - s1717 * s4043 - s1775 * s4045 - s1791 * s4049 - s1800 * s4050
-    s4055 = s4052 - s1804 * s4051
-    s4056 = s4053 - s1805 * s4051 + s1812 * s4055
-    s4057 = (s4054 - s1806 * s4051 + s1813 * s4055 + s1815 * s4056) / pivot_trunk_x_dot
-    s4058 = s4056 / pivot_trunk_y_dot + s1815 * s4057
-    s4059 = s4055 / pivot_trunk_z_dot + s1812 * s4058 + s1813 * s4057
-    s4060 = s4051 / pivot_trunk_wx - s1804 * s4059 - s1805 * s4058 - s1806 * s4057
-    s4061 = s4050 / pivot_trunk_wy - s1797 * s4060 - s1798 * s4059 - s1799 * s4058 - s1800 * s4057
-    s4062 = s4049 / pivot_trunk_wz - s1787 * s4061 - s1788 * s4060 - s1789 * s4059 - s1790 * s4058
-    s4063 = s4062 - s1791 * s4057
-    s4064 = s1776 * s4063 + s1777 * s4061 + s1778 * s4060 + s1779 * s4059 + s1780 * s4058
-    s4065 = s4064 + s1781 * s4057
-    s4066 = s4045 / pivot_hind_left_abduction_angle_dot - s1770 * s4063 - s1771 * s4061
-    s4067 = s4066 - s1772 * s4060 - s1773 * s4059 - s1774 * s4058 - s1775 * s4057
-    s4068 = s1749 * s4063 + s1750 * s4061 + s1751 * s4060 + s1752 * s4059 + s1753 * s4058
-    s4069 = s4068 + s1754 * s4057
-    s4070 = s1743 * s4063 + s1744 * s4061 + s1745 * s4060 + s1746 * s4059 + s1747 * s4058
-    s4071 = s4070 + s1748 * s4057
-    s4072 = s1724 * s4065 - s1725 * s4063 - s1726 * s4061 - s1727 * s4060 - s1728 * s4059
-    s4073 = s4072 - s1729 * s4058 - s1730 * s4057
-    s4074 = s4043 / pivot_hind_left_swing_angle_dot - s1711 * s4067 - s1712 * s4063 - s1713 * s4061
-    s4075 = s4074 - s1714 * s4060 - s1715 * s4059 - s1716 * s4058 - s1717 * s4057
-    s4076 = s1698 * s4069 - s1699 * s4063 - s1700 * s4061 - s1701 * s4060 - s1702 * s4059
-    s4077 = s4076 - s1703 * s4058 - s1704 * s4057
-    s4078 = s1670 * s4071 - s1671 * s4063 - s1672 * s4061 - s1673 * s4060 - s1674 * s4059
-    s4079 = s4078 - s1675 * s4058 - s1676 * s4057
-    s4080 = s1656 * s4065 - s1655 * s4073 - s1657 * s4063 - s1658 * s4061 - s1659 * s4060
-    s4081 = s3617 / pivot_hind_left_knee_angle_dot + s1634 * s4075 + s1635 * s4067 + s1636 * s4063
-    s4082 = s4081 + s1637 * s4061 + s1638 * s4060 + s1639 * s4059 + s1640 * s4058 + s1641 * s4057
-    s4083 = s1620 * s4069 - s1619 * s4077 - s1621 * s4063 - s1622 * s4061 - s1623 * s4060
-    s4084 = s1605 * s4071 - s1604 * s4079 - s1606 * s4063 - s1607 * s4061 - s1608 * s4060
-    s4085 = s1655 * s3685 - (s3417 + (s2662 * s3383 + s2663 * s3385 + s2664 * s3387))
-    s4086 = s1656 * s3685 - (s3205 + (s2662 * s3182 + s2663 * s3184 + s2664 * s3186))
-    s4087 = s4086 - s1724 * s4085
-    s4088 = s1657 * s3685 - (s17 * s3208 + s20 * s3209 + s23 * s3210) - s1725 * s4085
-    s4089 = s1658 * s3685 - (s16 * s3208 + s19 * s3209 + s22 * s3210) - s1726 * s4085
-    s4090 = s1659 * s3685 - (s15 * s3208 + s18 * s3209 + s21 * s3210) - s1727 * s4085
-    s4091 = s4088 - s1776 * s4087
-    s4092 = s4089 - s1777 * s4087 - s1787 * s4091
-    s4093 = s4090 - s1778 * s4087 - s1788 * s4091 - s1797 * s4092
-    s4094 = s1660 * s3685 - s3198 - s1728 * s4085 - s1779 * s4087 - s1789 * s4091 - s1798 * s4092
-    s4095 = s1661 * s3685 - s3197 - s1729 * s4085 - s1780 * s4087 - s1790 * s4091 - s1799 * s4092
-    s4096 = s1662 * s3685 - s3196 - s1730 * s4085 - s1781 * s4087 - s1791 * s4091 - s1800 * s4092
-    s4097 = s4094 - s1804 * s4093
-    s4098 = s4095 - s1805 * s4093 + s1812 * s4097
-    s4099 = (s4096 - s1806 * s4093 + s1813 * s4097 + s1815 * s4098) / pivot_trunk_x_dot
-    s4100 = s4098 / pivot_trunk_y_dot + s1815 * s4099
-    s4101 = s4097 / pivot_trunk_z_dot + s1812 * s4100 + s1813 * s4099
-    s4102 = s4093 / pivot_trunk_wx - s1804 * s4101 - s1805 * s4100 - s1806 * s4099
-    s4103 = s4092 / pivot_trunk_wy - s1797 * s4102 - s1798 * s4101 - s1799 * s4100 - s1800 * s4099
-    s4104 = s4091 / pivot_trunk_wz - s1787 * s4103 - s1788 * s4102 - s1789 * s4101 - s1790 * s4100
-    s4105 = s4104 - s1791 * s4099
-    s4106 = s4087 / pivot_hind_right_abduction_angle_dot - s1776 * s4105 - s1777 * s4103
-    s4107 = s4106 - s1778 * s4102 - s1779 * s4101 - s1780 * s4100 - s1781 * s4099
-    s4108 = s1770 * s4105 + s1771 * s4103 + s1772 * s4102 + s1773 * s4101 + s1774 * s4100
-    s4109 = s4108 + s1775 * s4099
-    s4110 = s1749 * s4105 + s1750 * s4103 + s1751 * s4102 + s1752 * s4101 + s1753 * s4100
-    s4111 = s4110 + s1754 * s4099
-    s4112 = s1743 * s4105 + s1744 * s4103 + s1745 * s4102 + s1746 * s4101 + s1747 * s4100
-    s4113 = s4112 + s1748 * s4099
-    s4114 = s4085 / pivot_hind_right_swing_angle_dot - s1724 * s4107 - s1725 * s4105 - s1726 * s4103
-    s4115 = s4114 - s1727 * s4102 - s1728 * s4101 - s1729 * s4100 - s1730 * s4099
-    s4116 = s1711 * s4109 - s1712 * s4105 - s1713 * s4103 - s1714 * s4102 - s1715 * s4101
-    s4117 = s4116 - s1716 * s4100 - s1717 * s4099
-    s4118 = s1698 * s4111 - s1699 * s4105 - s1700 * s4103 - s1701 * s4102 - s1702 * s4101
-    s4119 = s4118 - s1703 * s4100 - s1704 * s4099
-    s4120 = s1670 * s4113 - s1671 * s4105 - s1672 * s4103 - s1673 * s4102 - s1674 * s4101
-    s4121 = s4120 - s1675 * s4100 - s1676 * s4099
-    s4122 = s3685 / pivot_hind_right_knee_angle_dot + s1655 * s4115 + s1656 * s4107 + s1657 * s4105
-    s4123 = s4122 + s1658 * s4103 + s1659 * s4102 + s1660 * s4101 + s1661 * s4100 + s1662 * s4099
-    s4124 = s1635 * s4109 - s1634 * s4117 - s1636 * s4105 - s1637 * s4103 - s1638 * s4102
-    s4125 = s1620 * s4111 - s1619 * s4119 - s1621 * s4105 - s1622 * s4103 - s1623 * s4102
-    s4126 = s1605 * s4113 - s1604 * s4121 - s1606 * s4105 - s1607 * s4103 - s1608 * s4102
-    s4127 = s1604 * s3471 - (s3250 + (s2776 * s3224 + s2777 * s3226 + s2778 * s3228))
-    s4128 = s1605 * s3471 - (s15 * s3252 + s18 * s3253 + s21 * s3254) - s1670 * s4127
-    s4129 = s1606 * s3471 - (s17 * s3261 + s20 * s3262 + s23 * s3263) - s1671 * s4127
-    s4130 = s1607 * s3471 - (s16 * s3261 + s19 * s3262 + s22 * s3263) - s1672 * s4127
-    s4131 = s1608 * s3471 - (s15 * s3261 + s18 * s3262 + s21 * s3263) - s1673 * s4127
-    s4132 = s4129 - s1743 * s4128
-    s4133 = s4130 - s1744 * s4128 - s1787 * s4132
-    s4134 = s4131 - s1745 * s4128 - s1788 * s4132 - s1797 * s4133
-    s4135 = s1609 * s3471 - s3243 - s1674 * s4127 - s1746 * s4128 - s1789 * s4132 - s1798 * s4133
-    s4136 = s1610 * s3471 - s3242 - s1675 * s4127 - s1747 * s4128 - s1790 * s4132 - s1799 * s4133
-    s4137 = s1611 * s3471 - s3241 - s1676 * s4127 - s1748 * s4128 - s1791 * s4132 - s1800 * s4133
-    s4138 = s4135 - s1804 * s4134
-    s4139 = s4136 - s1805 * s4134 + s1812 * s4138
-    s4140 = (s4137 - s1806 * s4134 + s1813 * s4138 + s1815 * s4139) / pivot_trunk_x_dot
-    s4141 = s4139 / pivot_trunk_y_dot + s1815 * s4140
-    s4142 = s4138 / pivot_trunk_z_dot + s1812 * s4141 + s1813 * s4140
-    s4143 = s4134 / pivot_trunk_wx - s1804 * s4142 - s1805 * s4141 - s1806 * s4140
-    s4144 = s4133 / pivot_trunk_wy - s1797 * s4143 - s1798 * s4142 - s1799 * s4141 - s1800 * s4140
-    s4145 = s4132 / pivot_trunk_wz - s1787 * s4144 - s1788 * s4143 - s1789 * s4142 - s1790 * s4141
-    s4146 = s4145 - s1791 * s4140
-    s4147 = s1776 * s4146 + s1777 * s4144 + s1778 * s4143 + s1779 * s4142 + s1780 * s4141
-    s4148 = s4147 + s1781 * s4140
-    s4149 = s1770 * s4146 + s1771 * s4144 + s1772 * s4143 + s1773 * s4142 + s1774 * s4141
-    s4150 = s4149 + s1775 * s4140
-    s4151 = s1749 * s4146 + s1750 * s4144 + s1751 * s4143 + s1752 * s4142 + s1753 * s4141
-    s4152 = s4151 + s1754 * s4140
-    s4153 = s4128 / pivot_front_left_abduction_angle_dot - s1743 * s4146 - s1744 * s4144
-    s4154 = s4153 - s1745 * s4143 - s1746 * s4142 - s1747 * s4141 - s1748 * s4140
-    s4155 = s1724 * s4148 - s1725 * s4146 - s1726 * s4144 - s1727 * s4143 - s1728 * s4142
-    s4156 = s4155 - s1729 * s4141 - s1730 * s4140
-    s4157 = s1711 * s4150 - s1712 * s4146 - s1713 * s4144 - s1714 * s4143 - s1715 * s4142
-    s4158 = s4157 - s1716 * s4141 - s1717 * s4140
-    s4159 = s1698 * s4152 - s1699 * s4146 - s1700 * s4144 - s1701 * s4143 - s1702 * s4142
-    s4160 = s4159 - s1703 * s4141 - s1704 * s4140
-    s4161 = s4127 / pivot_front_left_swing_angle_dot - s1670 * s4154 - s1671 * s4146 - s1672 * s4144
-    s4162 = s4161 - s1673 * s4143 - s1674 * s4142 - s1675 * s4141 - s1676 * s4140
-    s4163 = s1656 * s4148 - s1655 * s4156 - s1657 * s4146 - s1658 * s4144 - s1659 * s4143
-    s4164 = s1635 * s4150 - s1634 * s4158 - s1636 * s4146 - s1637 * s4144 - s1638 * s4143
-    s4165 = s1620 * s4152 - s1619 * s4160 - s1621 * s4146 - s1622 * s4144 - s1623 * s4143
-    s4166 = s3471 / pivot_front_left_knee_angle_dot + s1604 * s4162 + s1605 * s4154 + s1606 * s4146
-    s4167 = s4166 + s1607 * s4144 + s1608 * s4143 + s1609 * s4142 + s1610 * s4141 + s1611 * s4140
-    s4168 = s1619 * s3539 - (s3303 + (s2806 * s3277 + s2807 * s3279 + s2808 * s3281))
-    s4169 = s1620 * s3539 - (s15 * s3305 + s18 * s3306 + s21 * s3307) - s1698 * s4168
-    s4170 = s1621 * s3539 - (s17 * s3314 + s20 * s3315 + s23 * s3316) - s1699 * s4168
-    s4171 = s1622 * s3539 - (s16 * s3314 + s19 * s3315 + s22 * s3316) - s1700 * s4168
-    s4172 = s1623 * s3539 - (s15 * s3314 + s18 * s3315 + s21 * s3316) - s1701 * s4168
-    s4173 = s4170 - s1749 * s4169
-    s4174 = s4171 - s1750 * s4169 - s1787 * s4173
-    s4175 = s4172 - s1751 * s4169 - s1788 * s4173 - s1797 * s4174
-    s4176 = s1624 * s3539 - s3296 - s1702 * s4168 - s1752 * s4169 - s1789 * s4173 - s1798 * s4174
-    s4177 = s1625 * s3539 - s3295 - s1703 * s4168 - s1753 * s4169 - s1790 * s4173 - s1799 * s4174
-    s4178 = s1626 * s3539 - s3294 - s1704 * s4168 - s1754 * s4169 - s1791 * s4173 - s1800 * s4174
-    s4179 = s4176 - s1804 * s4175
-    s4180 = s4177 - s1805 * s4175 + s1812 * s4179
-    s4181 = (s4178 - s1806 * s4175 + s1813 * s4179 + s1815 * s4180) / pivot_trunk_x_dot
-    s4182 = s4180 / pivot_trunk_y_dot + s1815 * s4181
-    s4183 = s4179 / pivot_trunk_z_dot + s1812 * s4182 + s1813 * s4181
-    s4184 = s4175 / pivot_trunk_wx - s1804 * s4183 - s1805 * s4182 - s1806 * s4181
-    s4185 = s4174 / pivot_trunk_wy - s1797 * s4184 - s1798 * s4183 - s1799 * s4182 - s1800 * s4181
-    s4186 = s4173 / pivot_trunk_wz - s1787 * s4185 - s1788 * s4184 - s1789 * s4183 - s1790 * s4182
-    s4187 = s4186 - s1791 * s4181
-    s4188 = s1776 * s4187 + s1777 * s4185 + s1778 * s4184 + s1779 * s4183 + s1780 * s4182
-    s4189 = s4188 + s1781 * s4181
-    s4190 = s1770 * s4187 + s1771 * s4185 + s1772 * s4184 + s1773 * s4183 + s1774 * s4182
-    s4191 = s4190 + s1775 * s4181
-    s4192 = s4169 / pivot_front_right_abduction_angle_dot - s1749 * s4187 - s1750 * s4185
-    s4193 = s4192 - s1751 * s4184 - s1752 * s4183 - s1753 * s4182 - s1754 * s4181
-    s4194 = s1743 * s4187 + s1744 * s4185 + s1745 * s4184 + s1746 * s4183 + s1747 * s4182
-    s4195 = s4194 + s1748 * s4181
-    s4196 = s1724 * s4189 - s1725 * s4187 - s1726 * s4185 - s1727 * s4184 - s1728 * s4183
-    s4197 = s4196 - s1729 * s4182 - s1730 * s4181
-    s4198 = s1711 * s4191 - s1712 * s4187 - s1713 * s4185 - s1714 * s4184 - s1715 * s4183
-    s4199 = s4198 - s1716 * s4182 - s1717 * s4181
-    s4200 = s4168 / pivot_front_right_swing_angle_dot - s1698 * s4193 - s1699 * s4187
-    s4201 = s4200 - s1700 * s4185 - s1701 * s4184 - s1702 * s4183 - s1703 * s4182 - s1704 * s4181
-    s4202 = s1670 * s4195 - s1671 * s4187 - s1672 * s4185 - s1673 * s4184 - s1674 * s4183
-    s4203 = s4202 - s1675 * s4182 - s1676 * s4181
-    s4204 = s1656 * s4189 - s1655 * s4197 - s1657 * s4187 - s1658 * s4185 - s1659 * s4184
-    s4205 = s1635 * s4191 - s1634 * s4199 - s1636 * s4187 - s1637 * s4185 - s1638 * s4184
-    s4206 = s3539 / pivot_front_right_knee_angle_dot + s1619 * s4201 + s1620 * s4193 + s1621 * s4187
-    s4207 = s4206 + s1622 * s4185 + s1623 * s4184 + s1624 * s4183 + s1625 * s4182 + s1626 * s4181
-    s4208 = s1605 * s4195 - s1604 * s4203 - s1606 * s4187 - s1607 * s4185 - s1608 * s4184
-    s4209 = s1634 * s3607 - (s3356 + (s2836 * s3330 + s2837 * s3332 + s2838 * s3334))
-    s4210 = s1635 * s3607 - (s15 * s3358 + s18 * s3359 + s21 * s3360) - s1711 * s4209
-    s4211 = s1636 * s3607 - (s17 * s3367 + s20 * s3368 + s23 * s3369) - s1712 * s4209
-    s4212 = s1637 * s3607 - (s16 * s3367 + s19 * s3368 + s22 * s3369) - s1713 * s4209
-    s4213 = s1638 * s3607 - (s15 * s3367 + s18 * s3368 + s21 * s3369) - s1714 * s4209
-    s4214 = s4211 - s1770 * s4210
-    s4215 = s4212 - s1771 * s4210 - s1787 * s4214
-    s4216 = s4213 - s1772 * s4210 - s1788 * s4214 - s1797 * s4215
-    s4217 = s1639 * s3607 - s3349 - s1715 * s4209 - s1773 * s4210 - s1789 * s4214 - s1798 * s4215
-    s4218 = s1640 * s3607 - s3348 - s1716 * s4209 - s1774 * s4210 - s1790 * s4214 - s1799 * s4215
-    s4219 = s1641 * s3607 - s3347 - s1717 * s4209 - s1775 * s4210 - s1791 * s4214 - s1800 * s4215
-    s4220 = s4217 - s1804 * s4216
-    s4221 = s4218 - s1805 * s4216 + s1812 * s4220
-    s4222 = (s4219 - s1806 * s4216 + s1813 * s4220 + s1815 * s4221) / pivot_trunk_x_dot
-    s4223 = s4221 / pivot_trunk_y_dot + s1815 * s4222
-    s4224 = s4220 / pivot_trunk_z_dot + s1812 * s4223 + s1813 * s4222
-    s4225 = s4216 / pivot_trunk_wx - s1804 * s4224 - s1805 * s4223 - s1806 * s4222
-    s4226 = s4215 / pivot_trunk_wy - s1797 * s4225 - s1798 * s4224 - s1799 * s4223 - s1800 * s4222
-    s4227 = s4214 / pivot_trunk_wz - s1787 * s4226 - s1788 * s4225 - s1789 * s4224 - s1790 * s4223
-    s4228 = s4227 - s1791 * s4222
-    s4229 = s1776 * s4228 + s1777 * s4226 + s1778 * s4225 + s1779 * s4224 + s1780 * s4223
-    s4230 = s4229 + s1781 * s4222
-    s4231 = s4210 / pivot_hind_left_abduction_angle_dot - s1770 * s4228 - s1771 * s4226
-    s4232 = s4231 - s1772 * s4225 - s1773 * s4224 - s1774 * s4223 - s1775 * s4222
-    s4233 = s1749 * s4228 + s1750 * s4226 + s1751 * s4225 + s1752 * s4224 + s1753 * s4223
-    s4234 = s4233 + s1754 * s4222
-    s4235 = s1743 * s4228 + s1744 * s4226 + s1745 * s4225 + s1746 * s4224 + s1747 * s4223
-    s4236 = s4235 + s1748 * s4222
-    s4237 = s1724 * s4230 - s1725 * s4228 - s1726 * s4226 - s1727 * s4225 - s1728 * s4224
-    s4238 = s4237 - s1729 * s4223 - s1730 * s4222
-    s4239 = s4209 / pivot_hind_left_swing_angle_dot - s1711 * s4232 - s1712 * s4228 - s1713 * s4226
-    s4240 = s4239 - s1714 * s4225 - s1715 * s4224 - s1716 * s4223 - s1717 * s4222
-    s4241 = s1698 * s4234 - s1699 * s4228 - s1700 * s4226 - s1701 * s4225 - s1702 * s4224
-    s4242 = s4241 - s1703 * s4223 - s1704 * s4222
-    s4243 = s1670 * s4236 - s1671 * s4228 - s1672 * s4226 - s1673 * s4225 - s1674 * s4224
-    s4244 = s4243 - s1675 * s4223 - s1676 * s4222
-    s4245 = s1656 * s4230 - s1655 * s4238 - s1657 * s4228 - s1658 * s4226 - s1659 * s4225
-    s4246 = s3607 / pivot_hind_left_knee_angle_dot + s1634 * s4240 + s1635 * s4232 + s1636 * s4228
-    s4247 = s4246 + s1637 * s4226 + s1638 * s4225 + s1639 * s4224 + s1640 * s4223 + s1641 * s4222
-    s4248 = s1620 * s4234 - s1619 * s4242 - s1621 * s4228 - s1622 * s4226 - s1623 * s4225
-    s4249 = s1605 * s4236 - s1604 * s4244 - s1606 * s4228 - s1607 * s4226 - s1608 * s4225
-    s4250 = s1655 * s3675 - (s3409 + (s2863 * s3383 + s2864 * s3385 + s2865 * s3387))
-    s4251 = s1656 * s3675 - (s15 * s3411 + s18 * s3412 + s21 * s3413) - s1724 * s4250
-    s4252 = s1657 * s3675 - (s17 * s3420 + s20 * s3421 + s23 * s3422) - s1725 * s4250
-    s4253 = s1658 * s3675 - (s16 * s3420 + s19 * s3421 + s22 * s3422) - s1726 * s4250
-    s4254 = s1659 * s3675 - (s15 * s3420 + s18 * s3421 + s21 * s3422) - s1727 * s4250
-    s4255 = s4252 - s1776 * s4251
-    s4256 = s4253 - s1777 * s4251 - s1787 * s4255
-    s4257 = s4254 - s1778 * s4251 - s1788 * s4255 - s1797 * s4256
-    s4258 = s1660 * s3675 - s3402 - s1728 * s4250 - s1779 * s4251 - s1789 * s4255 - s1798 * s4256
-    s4259 = s1661 * s3675 - s3401 - s1729 * s4250 - s1780 * s4251 - s1790 * s4255 - s1799 * s4256
-    s4260 = s1662 * s3675 - s3400 - s1730 * s4250 - s1781 * s4251 - s1791 * s4255 - s1800 * s4256
-    s4261 = s4258 - s1804 * s4257
-    s4262 = s4259 - s1805 * s4257 + s1812 * s4261
-    s4263 = (s4260 - s1806 * s4257 + s1813 * s4261 + s1815 * s4262) / pivot_trunk_x_dot
-    s4264 = s4262 / pivot_trunk_y_dot + s1815 * s4263
-    s4265 = s4261 / pivot_trunk_z_dot + s1812 * s4264 + s1813 * s4263
-    s4266 = s4257 / pivot_trunk_wx - s1804 * s4265 - s1805 * s4264 - s1806 * s4263
-    s4267 = s4256 / pivot_trunk_wy - s1797 * s4266 - s1798 * s4265 - s1799 * s4264 - s1800 * s4263
-    s4268 = s4255 / pivot_trunk_wz - s1787 * s4267 - s1788 * s4266 - s1789 * s4265 - s1790 * s4264
-    s4269 = s4268 - s1791 * s4263
-    s4270 = s4251 / pivot_hind_right_abduction_angle_dot - s1776 * s4269 - s1777 * s4267
-    s4271 = s4270 - s1778 * s4266 - s1779 * s4265 - s1780 * s4264 - s1781 * s4263
-    s4272 = s1770 * s4269 + s1771 * s4267 + s1772 * s4266 + s1773 * s4265 + s1774 * s4264
-    s4273 = s4272 + s1775 * s4263
-    s4274 = s1749 * s4269 + s1750 * s4267 + s1751 * s4266 + s1752 * s4265 + s1753 * s4264
-    s4275 = s4274 + s1754 * s4263
-    s4276 = s1743 * s4269 + s1744 * s4267 + s1745 * s4266 + s1746 * s4265 + s1747 * s4264
-    s4277 = s4276 + s1748 * s4263
-    s4278 = s4250 / pivot_hind_right_swing_angle_dot - s1724 * s4271 - s1725 * s4269 - s1726 * s4267
-    s4279 = s4278 - s1727 * s4266 - s1728 * s4265 - s1729 * s4264 - s1730 * s4263
-    s4280 = s1711 * s4273 - s1712 * s4269 - s1713 * s4267 - s1714 * s4266 - s1715 * s4265
-    s4281 = s4280 - s1716 * s4264 - s1717 * s4263
-    s4282 = s1698 * s4275 - s1699 * s4269 - s1700 * s4267 - s1701 * s4266 - s1702 * s4265
-    s4283 = s4282 - s1703 * s4264 - s1704 * s4263
-    s4284 = s1670 * s4277 - s1671 * s4269 - s1672 * s4267 - s1673 * s4266 - s1674 * s4265
-    s4285 = s4284 - s1675 * s4264 - s1676 * s4263
-    s4286 = s3675 / pivot_hind_right_knee_angle_dot + s1655 * s4279 + s1656 * s4271 + s1657 * s4269
-    s4287 = s4286 + s1658 * s4267 + s1659 * s4266 + s1660 * s4265 + s1661 * s4264 + s1662 * s4263
-    s4288 = s1635 * s4273 - s1634 * s4281 - s1636 * s4269 - s1637 * s4267 - s1638 * s4266
-    s4289 = s1620 * s4275 - s1619 * s4283 - s1621 * s4269 - s1622 * s4267 - s1623 * s4266
-    s4290 = s1605 * s4277 - s1604 * s4285 - s1606 * s4269 - s1607 * s4267 - s1608 * s4266
-    s4291 = s1604 * s3460 - (s932 * s3464 + s934 * s3465 + s936 * s3466)
-    s4292 = s1605 * s3460 - (s15 * s3474 + s18 * s3475 + s21 * s3476) - s1670 * s4291
-    s4293 = s1606 * s3460 - (s17 * s3485 + s20 * s3486 + s23 * s3487) - s1671 * s4291
-    s4294 = s1607 * s3460 - (s16 * s3485 + s19 * s3486 + s22 * s3487) - s1672 * s4291
-    s4295 = s1608 * s3460 - (s15 * s3485 + s18 * s3486 + s21 * s3487) - s1673 * s4291
-    s4296 = s4293 - s1743 * s4292
-    s4297 = s4294 - s1744 * s4292 - s1787 * s4296
-    s4298 = s4295 - s1745 * s4292 - s1788 * s4296 - s1797 * s4297
-    s4299 = s1609 * s3460 - s3452 - s1674 * s4291 - s1746 * s4292 - s1789 * s4296 - s1798 * s4297
-    s4300 = s1610 * s3460 - s3451 - s1675 * s4291 - s1747 * s4292 - s1790 * s4296 - s1799 * s4297
-    s4301 = s1611 * s3460 - s3450 - s1676 * s4291 - s1748 * s4292 - s1791 * s4296 - s1800 * s4297
-    s4302 = s4299 - s1804 * s4298
-    s4303 = s4300 - s1805 * s4298 + s1812 * s4302
-    s4304 = (s4301 - s1806 * s4298 + s1813 * s4302 + s1815 * s4303) / pivot_trunk_x_dot
-    s4305 = s4303 / pivot_trunk_y_dot + s1815 * s4304
-    s4306 = s4302 / pivot_trunk_z_dot + s1812 * s4305 + s1813 * s4304
-    s4307 = s4298 / pivot_trunk_wx - s1804 * s4306 - s1805 * s4305 - s1806 * s4304
-    s4308 = s4297 / pivot_trunk_wy - s1797 * s4307 - s1798 * s4306 - s1799 * s4305 - s1800 * s4304
-    s4309 = s4296 / pivot_trunk_wz - s1787 * s4308 - s1788 * s4307 - s1789 * s4306 - s1790 * s4305
-    s4310 = s4309 - s1791 * s4304
-    s4311 = s1776 * s4310 + s1777 * s4308 + s1778 * s4307 + s1779 * s4306 + s1780 * s4305
-    s4312 = s4311 + s1781 * s4304
-    s4313 = s1770 * s4310 + s1771 * s4308 + s1772 * s4307 + s1773 * s4306 + s1774 * s4305
-    s4314 = s4313 + s1775 * s4304
-    s4315 = s1749 * s4310 + s1750 * s4308 + s1751 * s4307 + s1752 * s4306 + s1753 * s4305
-    s4316 = s4315 + s1754 * s4304
-    s4317 = s4292 / pivot_front_left_abduction_angle_dot - s1743 * s4310 - s1744 * s4308
-    s4318 = s4317 - s1745 * s4307 - s1746 * s4306 - s1747 * s4305 - s1748 * s4304
-    s4319 = s1724 * s4312 - s1725 * s4310 - s1726 * s4308 - s1727 * s4307 - s1728 * s4306
-    s4320 = s4319 - s1729 * s4305 - s1730 * s4304
-    s4321 = s1711 * s4314 - s1712 * s4310 - s1713 * s4308 - s1714 * s4307 - s1715 * s4306
-    s4322 = s4321 - s1716 * s4305 - s1717 * s4304
-    s4323 = s1698 * s4316 - s1699 * s4310 - s1700 * s4308 - s1701 * s4307 - s1702 * s4306
-    s4324 = s4323 - s1703 * s4305 - s1704 * s4304
-    s4325 = s4291 / pivot_front_left_swing_angle_dot - s1670 * s4318 - s1671 * s4310 - s1672 * s4308
-    s4326 = s4325 - s1673 * s4307 - s1674 * s4306 - s1675 * s4305 - s1676 * s4304
-    s4327 = s1656 * s4312 - s1655 * s4320 - s1657 * s4310 - s1658 * s4308 - s1659 * s4307
-    s4328 = s1635 * s4314 - s1634 * s4322 - s1636 * s4310 - s1637 * s4308 - s1638 * s4307
-    s4329 = s1620 * s4316 - s1619 * s4324 - s1621 * s4310 - s1622 * s4308 - s1623 * s4307
-    s4330 = s3460 / pivot_front_left_knee_angle_dot + s1604 * s4326 + s1605 * s4318 + s1606 * s4310
-    s4331 = s4330 + s1607 * s4308 + s1608 * s4307 + s1609 * s4306 + s1610 * s4305 + s1611 * s4304
-    s4332 = s1619 * s3528 - (s938 * s3532 + s940 * s3533 + s942 * s3534)
-    s4333 = s1620 * s3528 - (s15 * s3542 + s18 * s3543 + s21 * s3544) - s1698 * s4332
-    s4334 = s1621 * s3528 - (s17 * s3553 + s20 * s3554 + s23 * s3555) - s1699 * s4332
-    s4335 = s1622 * s3528 - (s16 * s3553 + s19 * s3554 + s22 * s3555) - s1700 * s4332
-    s4336 = s1623 * s3528 - (s15 * s3553 + s18 * s3554 + s21 * s3555) - s1701 * s4332
-    s4337 = s4334 - s1749 * s4333
-    s4338 = s4335 - s1750 * s4333 - s1787 * s4337
-    s4339 = s4336 - s1751 * s4333 - s1788 * s4337 - s1797 * s4338
-    s4340 = s1624 * s3528 - s3520 - s1702 * s4332 - s1752 * s4333 - s1789 * s4337 - s1798 * s4338
-    s4341 = s1625 * s3528 - s3519 - s1703 * s4332 - s1753 * s4333 - s1790 * s4337 - s1799 * s4338
-    s4342 = s1626 * s3528 - s3518 - s1704 * s4332 - s1754 * s4333 - s1791 * s4337 - s1800 * s4338
-    s4343 = s4340 - s1804 * s4339
-    s4344 = s4341 - s1805 * s4339 + s1812 * s4343
-    s4345 = (s4342 - s1806 * s4339 + s1813 * s4343 + s1815 * s4344) / pivot_trunk_x_dot
-    s4346 = s4344 / pivot_trunk_y_dot + s1815 * s4345
-    s4347 = s4343 / pivot_trunk_z_dot + s1812 * s4346 + s1813 * s4345
-    s4348 = s4339 / pivot_trunk_wx - s1804 * s4347 - s1805 * s4346 - s1806 * s4345
-    s4349 = s4338 / pivot_trunk_wy - s1797 * s4348 - s1798 * s4347 - s1799 * s4346 - s1800 * s4345
-    s4350 = s4337 / pivot_trunk_wz - s1787 * s4349 - s1788 * s4348 - s1789 * s4347 - s1790 * s4346
-    s4351 = s4350 - s1791 * s4345
-    s4352 = s1776 * s4351 + s1777 * s4349 + s1778 * s4348 + s1779 * s4347 + s1780 * s4346
-    s4353 = s4352 + s1781 * s4345
-    s4354 = s1770 * s4351 + s1771 * s4349 + s1772 * s4348 + s1773 * s4347 + s1774 * s4346
-    s4355 = s4354 + s1775 * s4345
-    s4356 = s4333 / pivot_front_right_abduction_angle_dot - s1749 * s4351 - s1750 * s4349
-    s4357 = s4356 - s1751 * s4348 - s1752 * s4347 - s1753 * s4346 - s1754 * s4345
-    s4358 = s1743 * s4351 + s1744 * s4349 + s1745 * s4348 + s1746 * s4347 + s1747 * s4346
-    s4359 = s4358 + s1748 * s4345
-    s4360 = s1724 * s4353 - s1725 * s4351 - s1726 * s4349 - s1727 * s4348 - s1728 * s4347
-    s4361 = s4360 - s1729 * s4346 - s1730 * s4345
-    s4362 = s1711 * s4355 - s1712 * s4351 - s1713 * s4349 - s1714 * s4348 - s1715 * s4347
-    s4363 = s4362 - s1716 * s4346 - s1717 * s4345
-    s4364 = s4332 / pivot_front_right_swing_angle_dot - s1698 * s4357 - s1699 * s4351
-    s4365 = s4364 - s1700 * s4349 - s1701 * s4348 - s1702 * s4347 - s1703 * s4346 - s1704 * s4345
-    s4366 = s1670 * s4359 - s1671 * s4351 - s1672 * s4349 - s1673 * s4348 - s1674 * s4347
-    s4367 = s4366 - s1675 * s4346 - s1676 * s4345
-    s4368 = s1656 * s4353 - s1655 * s4361 - s1657 * s4351 - s1658 * s4349 - s1659 * s4348
-    s4369 = s1635 * s4355 - s1634 * s4363 - s1636 * s4351 - s1637 * s4349 - s1638 * s4348
-    s4370 = s3528 / pivot_front_right_knee_angle_dot + s1619 * s4365 + s1620 * s4357 + s1621 * s4351
-    s4371 = s4370 + s1622 * s4349 + s1623 * s4348 + s1624 * s4347 + s1625 * s4346 + s1626 * s4345
-    s4372 = s1605 * s4359 - s1604 * s4367 - s1606 * s4351 - s1607 * s4349 - s1608 * s4348
-    s4373 = s1634 * s3596 - (s944 * s3600 + s946 * s3601 + s948 * s3602)
-    s4374 = s1635 * s3596 - (s15 * s3610 + s18 * s3611 + s21 * s3612) - s1711 * s4373
-    s4375 = s1636 * s3596 - (s17 * s3621 + s20 * s3622 + s23 * s3623) - s1712 * s4373
-    s4376 = s1637 * s3596 - (s16 * s3621 + s19 * s3622 + s22 * s3623) - s1713 * s4373
-    s4377 = s1638 * s3596 - (s15 * s3621 + s18 * s3622 + s21 * s3623) - s1714 * s4373
-    s4378 = s4375 - s1770 * s4374
-    s4379 = s4376 - s1771 * s4374 - s1787 * s4378
-    s4380 = s4377 - s1772 * s4374 - s1788 * s4378 - s1797 * s4379
-    s4381 = s1639 * s3596 - s3588 - s1715 * s4373 - s1773 * s4374 - s1789 * s4378 - s1798 * s4379
-    s4382 = s1640 * s3596 - s3587 - s1716 * s4373 - s1774 * s4374 - s1790 * s4378 - s1799 * s4379
-    s4383 = s1641 * s3596 - s3586 - s1717 * s4373 - s1775 * s4374 - s1791 * s4378 - s1800 * s4379
-    s4384 = s4381 - s1804 * s4380
-    s4385 = s4382 - s1805 * s4380 + s1812 * s4384
-    s4386 = (s4383 - s1806 * s4380 + s1813 * s4384 + s1815 * s4385) / pivot_trunk_x_dot
-    s4387 = s4385 / pivot_trunk_y_dot + s1815 * s4386
-    s4388 = s4384 / pivot_trunk_z_dot + s1812 * s4387 + s1813 * s4386
-    s4389 = s4380 / pivot_trunk_wx - s1804 * s4388 - s1805 * s4387 - s1806 * s4386
-    s4390 = s4379 / pivot_trunk_wy - s1797 * s4389 - s1798 * s4388 - s1799 * s4387 - s1800 * s4386
-    s4391 = s4378 / pivot_trunk_wz - s1787 * s4390 - s1788 * s4389 - s1789 * s4388 - s1790 * s4387
-    s4392 = s4391 - s1791 * s4386
-    s4393 = s1776 * s4392 + s1777 * s4390 + s1778 * s4389 + s1779 * s4388 + s1780 * s4387
-    s4394 = s4393 + s1781 * s4386
-    s4395 = s4374 / pivot_hind_left_abduction_angle_dot - s1770 * s4392 - s1771 * s4390
-    s4396 = s4395 - s1772 * s4389 - s1773 * s4388 - s1774 * s4387 - s1775 * s4386
-    s4397 = s1749 * s4392 + s1750 * s4390 + s1751 * s4389 + s1752 * s4388 + s1753 * s4387
-    s4398 = s4397 + s1754 * s4386
-    s4399 = s1743 * s4392 + s1744 * s4390 + s1745 * s4389 + s1746 * s4388 + s1747 * s4387
-    s4400 = s4399 + s1748 * s4386
-    s4401 = s1724 * s4394 - s1725 * s4392 - s1726 * s4390 - s1727 * s4389 - s1728 * s4388
-    s4402 = s4401 - s1729 * s4387 - s1730 * s4386
-    s4403 = s4373 / pivot_hind_left_swing_angle_dot - s1711 * s4396 - s1712 * s4392 - s1713 * s4390
-    s4404 = s4403 - s1714 * s4389 - s1715 * s4388 - s1716 * s4387 - s1717 * s4386
-    s4405 = s1698 * s4398 - s1699 * s4392 - s1700 * s4390 - s1701 * s4389 - s1702 * s4388
-    s4406 = s4405 - s1703 * s4387 - s1704 * s4386
-    s4407 = s1670 * s4400 - s1671 * s4392 - s1672 * s4390 - s1673 * s4389 - s1674 * s4388
-    s4408 = s4407 - s1675 * s4387 - s1676 * s4386
-    s4409 = s1656 * s4394 - s1655 * s4402 - s1657 * s4392 - s1658 * s4390 - s1659 * s4389
-    s4410 = s3596 / pivot_hind_left_knee_angle_dot + s1634 * s4404 + s1635 * s4396 + s1636 * s4392
-    s4411 = s4410 + s1637 * s4390 + s1638 * s4389 + s1639 * s4388 + s1640 * s4387 + s1641 * s4386
-    s4412 = s1620 * s4398 - s1619 * s4406 - s1621 * s4392 - s1622 * s4390 - s1623 * s4389
-    s4413 = s1605 * s4400 - s1604 * s4408 - s1606 * s4392 - s1607 * s4390 - s1608 * s4389
-    s4414 = s1655 * s3664 - (s950 * s3668 + s952 * s3669 + s954 * s3670)
-    s4415 = s1656 * s3664 - (s15 * s3678 + s18 * s3679 + s21 * s3680) - s1724 * s4414
-    s4416 = s1657 * s3664 - (s17 * s3689 + s20 * s3690 + s23 * s3691) - s1725 * s4414
-    s4417 = s1658 * s3664 - (s16 * s3689 + s19 * s3690 + s22 * s3691) - s1726 * s4414
-    s4418 = s1659 * s3664 - (s15 * s3689 + s18 * s3690 + s21 * s3691) - s1727 * s4414
-    s4419 = s4416 - s1776 * s4415
-    s4420 = s4417 - s1777 * s4415 - s1787 * s4419
-    s4421 = s4418 - s1778 * s4415 - s1788 * s4419 - s1797 * s4420
-    s4422 = s1660 * s3664 - s3656 - s1728 * s4414 - s1779 * s4415 - s1789 * s4419 - s1798 * s4420
-    s4423 = s1661 * s3664 - s3655 - s1729 * s4414 - s1780 * s4415 - s1790 * s4419 - s1799 * s4420
-    s4424 = s1662 * s3664 - s3654 - s1730 * s4414 - s1781 * s4415 - s1791 * s4419 - s1800 * s4420
-    s4425 = s4422 - s1804 * s4421
-    s4426 = s4423 - s1805 * s4421 + s1812 * s4425
-    s4427 = (s4424 - s1806 * s4421 + s1813 * s4425 + s1815 * s4426) / pivot_trunk_x_dot
-    s4428 = s4426 / pivot_trunk_y_dot + s1815 * s4427
-    s4429 = s4425 / pivot_trunk_z_dot + s1812 * s4428 + s1813 * s4427
-    s4430 = s4421 / pivot_trunk_wx - s1804 * s4429 - s1805 * s4428 - s1806 * s4427
-    s4431 = s4420 / pivot_trunk_wy - s1797 * s4430 - s1798 * s4429 - s1799 * s4428 - s1800 * s4427
-    s4432 = s4419 / pivot_trunk_wz - s1787 * s4431 - s1788 * s4430 - s1789 * s4429 - s1790 * s4428
-    s4433 = s4432 - s1791 * s4427
-    s4434 = s4415 / pivot_hind_right_abduction_angle_dot - s1776 * s4433 - s1777 * s4431
-    s4435 = s4434 - s1778 * s4430 - s1779 * s4429 - s1780 * s4428 - s1781 * s4427
-    s4436 = s1770 * s4433 + s1771 * s4431 + s1772 * s4430 + s1773 * s4429 + s1774 * s4428
-    s4437 = s4436 + s1775 * s4427
-    s4438 = s1749 * s4433 + s1750 * s4431 + s1751 * s4430 + s1752 * s4429 + s1753 * s4428
-    s4439 = s4438 + s1754 * s4427
-    s4440 = s1743 * s4433 + s1744 * s4431 + s1745 * s4430 + s1746 * s4429 + s1747 * s4428
-    s4441 = s4440 + s1748 * s4427
-    s4442 = s4414 / pivot_hind_right_swing_angle_dot - s1724 * s4435 - s1725 * s4433 - s1726 * s4431
-    s4443 = s4442 - s1727 * s4430 - s1728 * s4429 - s1729 * s4428 - s1730 * s4427
-    s4444 = s1711 * s4437 - s1712 * s4433 - s1713 * s4431 - s1714 * s4430 - s1715 * s4429
-    s4445 = s4444 - s1716 * s4428 - s1717 * s4427
-    s4446 = s1698 * s4439 - s1699 * s4433 - s1700 * s4431 - s1701 * s4430 - s1702 * s4429
-    s4447 = s4446 - s1703 * s4428 - s1704 * s4427
-    s4448 = s1670 * s4441 - s1671 * s4433 - s1672 * s4431 - s1673 * s4430 - s1674 * s4429
-    s4449 = s4448 - s1675 * s4428 - s1676 * s4427
-    s4450 = s3664 / pivot_hind_right_knee_angle_dot + s1655 * s4443 + s1656 * s4435 + s1657 * s4433
-    s4451 = s4450 + s1658 * s4431 + s1659 * s4430 + s1660 * s4429 + s1661 * s4428 + s1662 * s4427
-    s4452 = s1635 * s4437 - s1634 * s4445 - s1636 * s4433 - s1637 * s4431 - s1638 * s4430
-    s4453 = s1620 * s4439 - s1619 * s4447 - s1621 * s4433 - s1622 * s4431 - s1623 * s4430
-    s4454 = s1605 * s4441 - s1604 * s4449 - s1606 * s4433 - s1607 * s4431 - s1608 * s4430
-    s4455 = s1604 * s3493 - (s3260 + s3268)
-    s4456 = s1619 * s3561 - (s3313 + s3321)
-    s4457 = s1606 * s3493 - (s3056 + (s15 * s3046 + s18 * s3047 + s21 * s3048)) + s1621 * s3561
-    s4458 = s1607 * s3493 - (s3038 + (s15 * s3028 + s18 * s3029 + s21 * s3030)) + s1622 * s3561
-    s4459 = s1608 * s3493 - (s3020 + (s15 * s3010 + s18 * s3011 + s21 * s3012)) + s1623 * s3561
-    s4460 = s1634 * s3629 - (s3366 + s3374)
-    s4461 = s1655 * s3697 - (s3419 + s3427)
-    s4462 = s1605 * s3493 - (s3090 + s3098) - s1670 * s4455
-    s4463 = s1609 * s3493 - s3018 + s1624 * s3561 + s1639 * s3629 + s1660 * s3697 - s1674 * s4455
-    s4464 = s1610 * s3493 - s3017 + s1625 * s3561 + s1640 * s3629 + s1661 * s3697 - s1675 * s4455
-    s4465 = s1611 * s3493 - s3016 + s1626 * s3561 + s1641 * s3629 + s1662 * s3697 - s1676 * s4455
-    s4466 = s1620 * s3561 - (s3129 + s3137) - s1698 * s4456
-    s4467 = s1635 * s3629 - (s3168 + s3176) - s1711 * s4460
-    s4468 = s4457 + s1636 * s3629 + s1657 * s3697 - s1671 * s4455 - s1699 * s4456 - s1712 * s4460
-    s4469 = s4458 + s1637 * s3629 + s1658 * s3697 - s1672 * s4455 - s1700 * s4456 - s1713 * s4460
-    s4470 = s4459 + s1638 * s3629 + s1659 * s3697 - s1673 * s4455 - s1701 * s4456 - s1714 * s4460
-    s4471 = s1656 * s3697 - (s3207 + s3215) - s1724 * s4461
-    s4472 = s4463 - s1702 * s4456 - s1715 * s4460 - s1728 * s4461 - s1746 * s4462 - s1752 * s4466
-    s4473 = s4464 - s1703 * s4456 - s1716 * s4460 - s1729 * s4461 - s1747 * s4462 - s1753 * s4466
-    s4474 = s4465 - s1704 * s4456 - s1717 * s4460 - s1730 * s4461 - s1748 * s4462 - s1754 * s4466
-    s4475 = s4468 - s1725 * s4461 - s1743 * s4462 - s1749 * s4466 - s1770 * s4467 - s1776 * s4471
-    s4476 = s4469 - s1726 * s4461 - s1744 * s4462 - s1750 * s4466 - s1771 * s4467 - s1777 * s4471
-    s4477 = s4470 - s1727 * s4461 - s1745 * s4462 - s1751 * s4466 - s1772 * s4467 - s1778 * s4471
-    s4478 = s4476 - s1787 * s4475
-    s4479 = s4477 - s1788 * s4475 - s1797 * s4478
-    s4480 = s4472 - s1773 * s4467 - s1779 * s4471 - s1789 * s4475 - s1798 * s4478 - s1804 * s4479
-    s4481 = s4473 - s1774 * s4467 - s1780 * s4471 - s1790 * s4475 - s1799 * s4478 - s1805 * s4479
-    s4482 = s4474 - s1775 * s4467 - s1781 * s4471 - s1791 * s4475 - s1800 * s4478 - s1806 * s4479
-    s4483 = s4481 + s1812 * s4480
-    s4484 = (s4482 + s1813 * s4480 + s1815 * s4483) / pivot_trunk_x_dot
-    s4485 = s4483 / pivot_trunk_y_dot + s1815 * s4484
-    s4486 = s4480 / pivot_trunk_z_dot + s1812 * s4485 + s1813 * s4484
-    s4487 = s4479 / pivot_trunk_wx - s1804 * s4486 - s1805 * s4485 - s1806 * s4484
-    s4488 = s4478 / pivot_trunk_wy - s1797 * s4487 - s1798 * s4486 - s1799 * s4485 - s1800 * s4484
-    s4489 = s4475 / pivot_trunk_wz - s1787 * s4488 - s1788 * s4487 - s1789 * s4486 - s1790 * s4485
-    s4490 = s4489 - s1791 * s4484
-    s4491 = s4471 / pivot_hind_right_abduction_angle_dot - s1776 * s4490 - s1777 * s4488
-    s4492 = s4491 - s1778 * s4487 - s1779 * s4486 - s1780 * s4485 - s1781 * s4484
-    s4493 = s4467 / pivot_hind_left_abduction_angle_dot - s1770 * s4490 - s1771 * s4488
-    s4494 = s4493 - s1772 * s4487 - s1773 * s4486 - s1774 * s4485 - s1775 * s4484
-    s4495 = s4466 / pivot_front_right_abduction_angle_dot - s1749 * s4490 - s1750 * s4488
-    s4496 = s4495 - s1751 * s4487 - s1752 * s4486 - s1753 * s4485 - s1754 * s4484
-    s4497 = s4462 / pivot_front_left_abduction_angle_dot - s1743 * s4490 - s1744 * s4488
-    s4498 = s4497 - s1745 * s4487 - s1746 * s4486 - s1747 * s4485 - s1748 * s4484
-    s4499 = s4461 / pivot_hind_right_swing_angle_dot - s1724 * s4492 - s1725 * s4490 - s1726 * s4488
-    s4500 = s4499 - s1727 * s4487 - s1728 * s4486 - s1729 * s4485 - s1730 * s4484
-    s4501 = s4460 / pivot_hind_left_swing_angle_dot - s1711 * s4494 - s1712 * s4490 - s1713 * s4488
-    s4502 = s4501 - s1714 * s4487 - s1715 * s4486 - s1716 * s4485 - s1717 * s4484
-    s4503 = s4456 / pivot_front_right_swing_angle_dot - s1698 * s4496 - s1699 * s4490
-    s4504 = s4503 - s1700 * s4488 - s1701 * s4487 - s1702 * s4486 - s1703 * s4485 - s1704 * s4484
-    s4505 = s4455 / pivot_front_left_swing_angle_dot - s1670 * s4498 - s1671 * s4490 - s1672 * s4488
-    s4506 = s4505 - s1673 * s4487 - s1674 * s4486 - s1675 * s4485 - s1676 * s4484
-    s4507 = s3697 / pivot_hind_right_knee_angle_dot + s1655 * s4500 + s1656 * s4492 + s1657 * s4490
-    s4508 = s4507 + s1658 * s4488 + s1659 * s4487 + s1660 * s4486 + s1661 * s4485 + s1662 * s4484
-    s4509 = s3629 / pivot_hind_left_knee_angle_dot + s1634 * s4502 + s1635 * s4494 + s1636 * s4490
-    s4510 = s4509 + s1637 * s4488 + s1638 * s4487 + s1639 * s4486 + s1640 * s4485 + s1641 * s4484
-    s4511 = s3561 / pivot_front_right_knee_angle_dot + s1619 * s4504 + s1620 * s4496 + s1621 * s4490
-    s4512 = s4511 + s1622 * s4488 + s1623 * s4487 + s1624 * s4486 + s1625 * s4485 + s1626 * s4484
-    s4513 = s3493 / pivot_front_left_knee_angle_dot + s1604 * s4506 + s1605 * s4498 + s1606 * s4490
-    s4514 = s4513 + s1607 * s4488 + s1608 * s4487 + s1609 * s4486 + s1610 * s4485 + s1611 * s4484
-    s4515 = s1604 * s3496 - (s3270 + (s16 * s3224 + s19 * s3226 + s22 * s3228))
-    s4516 = s1619 * s3564 - (s3323 + (s16 * s3277 + s19 * s3279 + s22 * s3281))
-    s4517 = s1606 * s3496 - (s3058 + (s16 * s3046 + s19 * s3047 + s22 * s3048)) + s1621 * s3564
-    s4518 = s1607 * s3496 - (s3040 + (s16 * s3028 + s19 * s3029 + s22 * s3030)) + s1622 * s3564
-    s4519 = s1608 * s3496 - (s3022 + (s16 * s3010 + s19 * s3011 + s22 * s3012)) + s1623 * s3564
-    s4520 = s1634 * s3632 - (s3376 + (s16 * s3330 + s19 * s3332 + s22 * s3334))
-    s4521 = s1655 * s3700 - (s3429 + (s16 * s3383 + s19 * s3385 + s22 * s3387))
-    s4522 = s1605 * s3496 - (s3100 + (s16 * s3062 + s19 * s3064 + s22 * s3066)) - s1670 * s4515
-    s4523 = s1609 * s3496 - s3036 + s1624 * s3564 + s1639 * s3632 + s1660 * s3700 - s1674 * s4515
-    s4524 = s1610 * s3496 - s3035 + s1625 * s3564 + s1640 * s3632 + s1661 * s3700 - s1675 * s4515
-    s4525 = s1611 * s3496 - s3034 + s1626 * s3564 + s1641 * s3632 + s1662 * s3700 - s1676 * s4515
-    s4526 = s1620 * s3564 - (s3139 + (s16 * s3104 + s19 * s3106 + s22 * s3108)) - s1698 * s4516
-    s4527 = s1635 * s3632 - (s3178 + (s16 * s3143 + s19 * s3145 + s22 * s3147)) - s1711 * s4520
-    s4528 = s4517 + s1636 * s3632 + s1657 * s3700 - s1671 * s4515 - s1699 * s4516 - s1712 * s4520
-    s4529 = s4518 + s1637 * s3632 + s1658 * s3700 - s1672 * s4515 - s1700 * s4516 - s1713 * s4520
-    s4530 = s4519 + s1638 * s3632 + s1659 * s3700 - s1673 * s4515 - s1701 * s4516 - s1714 * s4520
-    s4531 = s1656 * s3700 - (s3217 + (s16 * s3182 + s19 * s3184 + s22 * s3186)) - s1724 * s4521
-    s4532 = s4523 - s1702 * s4516 - s1715 * s4520 - s1728 * s4521 - s1746 * s4522 - s1752 * s4526
-    s4533 = s4524 - s1703 * s4516 - s1716 * s4520 - s1729 * s4521 - s1747 * s4522 - s1753 * s4526
-    s4534 = s4525 - s1704 * s4516 - s1717 * s4520 - s1730 * s4521 - s1748 * s4522 - s1754 * s4526
-    s4535 = s4528 - s1725 * s4521 - s1743 * s4522 - s1749 * s4526 - s1770 * s4527 - s1776 * s4531
-    s4536 = s4529 - s1726 * s4521 - s1744 * s4522 - s1750 * s4526 - s1771 * s4527 - s1777 * s4531
-    s4537 = s4530 - s1727 * s4521 - s1745 * s4522 - s1751 * s4526 - s1772 * s4527 - s1778 * s4531
-    s4538 = s4536 - s1787 * s4535
-    s4539 = s4537 - s1788 * s4535 - s1797 * s4538
-    s4540 = s4532 - s1773 * s4527 - s1779 * s4531 - s1789 * s4535 - s1798 * s4538 - s1804 * s4539
-    s4541 = s4533 - s1774 * s4527 - s1780 * s4531 - s1790 * s4535 - s1799 * s4538 - s1805 * s4539
-    s4542 = s4534 - s1775 * s4527 - s1781 * s4531 - s1791 * s4535 - s1800 * s4538 - s1806 * s4539
-    s4543 = s4541 + s1812 * s4540
-    s4544 = (s4542 + s1813 * s4540 + s1815 * s4543) / pivot_trunk_x_dot
-    s4545 = s4543 / pivot_trunk_y_dot + s1815 * s4544
-    s4546 = s4540 / pivot_trunk_z_dot + s1812 * s4545 + s1813 * s4544
-    s4547 = s4539 / pivot_trunk_wx - s1804 * s4546 - s1805 * s4545 - s1806 * s4544
-    s4548 = s4538 / pivot_trunk_wy - s1797 * s4547 - s1798 * s4546 - s1799 * s4545 - s1800 * s4544
-    s4549 = s4535 / pivot_trunk_wz - s1787 * s4548 - s1788 * s4547 - s1789 * s4546 - s1790 * s4545
-    s4550 = s4549 - s1791 * s4544
-    s4551 = s4531 / pivot_hind_right_abduction_angle_dot - s1776 * s4550 - s1777 * s4548
-    s4552 = s4551 - s1778 * s4547 - s1779 * s4546 - s1780 * s4545 - s1781 * s4544
-    s4553 = s4527 / pivot_hind_left_abduction_angle_dot - s1770 * s4550 - s1771 * s4548
-    s4554 = s4553 - s1772 * s4547 - s1773 * s4546 - s1774 * s4545 - s1775 * s4544
-    s4555 = s4526 / pivot_front_right_abduction_angle_dot - s1749 * s4550 - s1750 * s4548
-    s4556 = s4555 - s1751 * s4547 - s1752 * s4546 - s1753 * s4545 - s1754 * s4544
-    s4557 = s4522 / pivot_front_left_abduction_angle_dot - s1743 * s4550 - s1744 * s4548
-    s4558 = s4557 - s1745 * s4547 - s1746 * s4546 - s1747 * s4545 - s1748 * s4544
-    s4559 = s4521 / pivot_hind_right_swing_angle_dot - s1724 * s4552 - s1725 * s4550 - s1726 * s4548
-    s4560 = s4559 - s1727 * s4547 - s1728 * s4546 - s1729 * s4545 - s1730 * s4544
-    s4561 = s4520 / pivot_hind_left_swing_angle_dot - s1711 * s4554 - s1712 * s4550 - s1713 * s4548
-    s4562 = s4561 - s1714 * s4547 - s1715 * s4546 - s1716 * s4545 - s1717 * s4544
-    s4563 = s4516 / pivot_front_right_swing_angle_dot - s1698 * s4556 - s1699 * s4550
-    s4564 = s4563 - s1700 * s4548 - s1701 * s4547 - s1702 * s4546 - s1703 * s4545 - s1704 * s4544
-    s4565 = s4515 / pivot_front_left_swing_angle_dot - s1670 * s4558 - s1671 * s4550 - s1672 * s4548
-    s4566 = s4565 - s1673 * s4547 - s1674 * s4546 - s1675 * s4545 - s1676 * s4544
-    s4567 = s3700 / pivot_hind_right_knee_angle_dot + s1655 * s4560 + s1656 * s4552 + s1657 * s4550
-    s4568 = s4567 + s1658 * s4548 + s1659 * s4547 + s1660 * s4546 + s1661 * s4545 + s1662 * s4544
-    s4569 = s3632 / pivot_hind_left_knee_angle_dot + s1634 * s4562 + s1635 * s4554 + s1636 * s4550
-    s4570 = s4569 + s1637 * s4548 + s1638 * s4547 + s1639 * s4546 + s1640 * s4545 + s1641 * s4544
-    s4571 = s3564 / pivot_front_right_knee_angle_dot + s1619 * s4564 + s1620 * s4556 + s1621 * s4550
-    s4572 = s4571 + s1622 * s4548 + s1623 * s4547 + s1624 * s4546 + s1625 * s4545 + s1626 * s4544
-    s4573 = s3496 / pivot_front_left_knee_angle_dot + s1604 * s4566 + s1605 * s4558 + s1606 * s4550
-    s4574 = s4573 + s1607 * s4548 + s1608 * s4547 + s1609 * s4546 + s1610 * s4545 + s1611 * s4544
-    s4575 = s1604 * s3499 - (s3272 + (s17 * s3224 + s20 * s3226 + s23 * s3228))
-    s4576 = s1619 * s3567 - (s3325 + (s17 * s3277 + s20 * s3279 + s23 * s3281))
-    s4577 = s1606 * s3499 - (s3060 + (s17 * s3046 + s20 * s3047 + s23 * s3048)) + s1621 * s3567
-    s4578 = s1607 * s3499 - (s3042 + (s17 * s3028 + s20 * s3029 + s23 * s3030)) + s1622 * s3567
-    s4579 = s1608 * s3499 - (s3024 + (s17 * s3010 + s20 * s3011 + s23 * s3012)) + s1623 * s3567
-    s4580 = s1634 * s3635 - (s3378 + (s17 * s3330 + s20 * s3332 + s23 * s3334))
-    s4581 = s1655 * s3703 - (s3431 + (s17 * s3383 + s20 * s3385 + s23 * s3387))
-    s4582 = s1605 * s3499 - (s3102 + (s17 * s3062 + s20 * s3064 + s23 * s3066)) - s1670 * s4575
-    s4583 = s1609 * s3499 - s3054 + s1624 * s3567 + s1639 * s3635 + s1660 * s3703 - s1674 * s4575
-    s4584 = s1610 * s3499 - s3053 + s1625 * s3567 + s1640 * s3635 + s1661 * s3703 - s1675 * s4575
-    s4585 = s1611 * s3499 - s3052 + s1626 * s3567 + s1641 * s3635 + s1662 * s3703 - s1676 * s4575
-    s4586 = s1620 * s3567 - (s3141 + (s17 * s3104 + s20 * s3106 + s23 * s3108)) - s1698 * s4576
-    s4587 = s1635 * s3635 - (s3180 + (s17 * s3143 + s20 * s3145 + s23 * s3147)) - s1711 * s4580
-    s4588 = s4577 + s1636 * s3635 + s1657 * s3703 - s1671 * s4575 - s1699 * s4576 - s1712 * s4580
-    s4589 = s4578 + s1637 * s3635 + s1658 * s3703 - s1672 * s4575 - s1700 * s4576 - s1713 * s4580
-    s4590 = s4579 + s1638 * s3635 + s1659 * s3703 - s1673 * s4575 - s1701 * s4576 - s1714 * s4580
-    s4591 = s1656 * s3703 - (s3219 + (s17 * s3182 + s20 * s3184 + s23 * s3186)) - s1724 * s4581
-    s4592 = s4583 - s1702 * s4576 - s1715 * s4580 - s1728 * s4581 - s1746 * s4582 - s1752 * s4586
-    s4593 = s4584 - s1703 * s4576 - s1716 * s4580 - s1729 * s4581 - s1747 * s4582 - s1753 * s4586
-    s4594 = s4585 - s1704 * s4576 - s1717 * s4580 - s1730 * s4581 - s1748 * s4582 - s1754 * s4586
-    s4595 = s4588 - s1725 * s4581 - s1743 * s4582 - s1749 * s4586 - s1770 * s4587 - s1776 * s4591
-    s4596 = s4589 - s1726 * s4581 - s1744 * s4582 - s1750 * s4586 - s1771 * s4587 - s1777 * s4591
-    s4597 = s4590 - s1727 * s4581 - s1745 * s4582 - s1751 * s4586 - s1772 * s4587 - s1778 * s4591
-    s4598 = s4596 - s1787 * s4595
-    s4599 = s4597 - s1788 * s4595 - s1797 * s4598
-    s4600 = s4592 - s1773 * s4587 - s1779 * s4591 - s1789 * s4595 - s1798 * s4598 - s1804 * s4599
-    s4601 = s4593 - s1774 * s4587 - s1780 * s4591 - s1790 * s4595 - s1799 * s4598 - s1805 * s4599
-    s4602 = s4594 - s1775 * s4587 - s1781 * s4591 - s1791 * s4595 - s1800 * s4598 - s1806 * s4599
-    s4603 = s4601 + s1812 * s4600
-    s4604 = (s4602 + s1813 * s4600 + s1815 * s4603) / pivot_trunk_x_dot
-    s4605 = s4603 / pivot_trunk_y_dot + s1815 * s4604
-    s4606 = s4600 / pivot_trunk_z_dot + s1812 * s4605 + s1813 * s4604
-    s4607 = s4599 / pivot_trunk_wx - s1804 * s4606 - s1805 * s4605 - s1806 * s4604
-    s4608 = s4598 / pivot_trunk_wy - s1797 * s4607 - s1798 * s4606 - s1799 * s4605 - s1800 * s4604
-    s4609 = s4595 / pivot_trunk_wz - s1787 * s4608 - s1788 * s4607 - s1789 * s4606 - s1790 * s4605
-    s4610 = s4609 - s1791 * s4604
-    s4611 = s4591 / pivot_hind_right_abduction_angle_dot - s1776 * s4610 - s1777 * s4608
-    s4612 = s4611 - s1778 * s4607 - s1779 * s4606 - s1780 * s4605 - s1781 * s4604
-    s4613 = s4587 / pivot_hind_left_abduction_angle_dot - s1770 * s4610 - s1771 * s4608
-    s4614 = s4613 - s1772 * s4607 - s1773 * s4606 - s1774 * s4605 - s1775 * s4604
-    s4615 = s4586 / pivot_front_right_abduction_angle_dot - s1749 * s4610 - s1750 * s4608
-    s4616 = s4615 - s1751 * s4607 - s1752 * s4606 - s1753 * s4605 - s1754 * s4604
-    s4617 = s4582 / pivot_front_left_abduction_angle_dot - s1743 * s4610 - s1744 * s4608
-    s4618 = s4617 - s1745 * s4607 - s1746 * s4606 - s1747 * s4605 - s1748 * s4604
-    s4619 = s4581 / pivot_hind_right_swing_angle_dot - s1724 * s4612 - s1725 * s4610 - s1726 * s4608
-    s4620 = s4619 - s1727 * s4607 - s1728 * s4606 - s1729 * s4605 - s1730 * s4604
-    s4621 = s4580 / pivot_hind_left_swing_angle_dot - s1711 * s4614 - s1712 * s4610 - s1713 * s4608
-    s4622 = s4621 - s1714 * s4607 - s1715 * s4606 - s1716 * s4605 - s1717 * s4604
-    s4623 = s4576 / pivot_front_right_swing_angle_dot - s1698 * s4616 - s1699 * s4610
-    s4624 = s4623 - s1700 * s4608 - s1701 * s4607 - s1702 * s4606 - s1703 * s4605 - s1704 * s4604
-    s4625 = s4575 / pivot_front_left_swing_angle_dot - s1670 * s4618 - s1671 * s4610 - s1672 * s4608
-    s4626 = s4625 - s1673 * s4607 - s1674 * s4606 - s1675 * s4605 - s1676 * s4604
-    s4627 = s3703 / pivot_hind_right_knee_angle_dot + s1655 * s4620 + s1656 * s4612 + s1657 * s4610
-    s4628 = s4627 + s1658 * s4608 + s1659 * s4607 + s1660 * s4606 + s1661 * s4605 + s1662 * s4604
-    s4629 = s3635 / pivot_hind_left_knee_angle_dot + s1634 * s4622 + s1635 * s4614 + s1636 * s4610
-    s4630 = s4629 + s1637 * s4608 + s1638 * s4607 + s1639 * s4606 + s1640 * s4605 + s1641 * s4604
-    s4631 = s3567 / pivot_front_right_knee_angle_dot + s1619 * s4624 + s1620 * s4616 + s1621 * s4610
-    s4632 = s4631 + s1622 * s4608 + s1623 * s4607 + s1624 * s4606 + s1625 * s4605 + s1626 * s4604
-    s4633 = s3499 / pivot_front_left_knee_angle_dot + s1604 * s4626 + s1605 * s4618 + s1606 * s4610
-    s4634 = s4633 + s1607 * s4608 + s1608 * s4607 + s1609 * s4606 + s1610 * s4605 + s1611 * s4604
-    s4635 = s1604 * s3484 - (s3259 + s3260)
-    s4636 = s1605 * s3484 - (s3089 + s3090) - s1670 * s4635
-    s4637 = s1606 * s3484 - (s17 * s3094 + s20 * s3095 + s23 * s3096) - s1671 * s4635
-    s4638 = s1607 * s3484 - (s16 * s3094 + s19 * s3095 + s22 * s3096) - s1672 * s4635
-    s4639 = s1608 * s3484 - (s15 * s3094 + s18 * s3095 + s21 * s3096) - s1673 * s4635
-    s4640 = s4637 - s1743 * s4636
-    s4641 = s4638 - s1744 * s4636 - s1787 * s4640
-    s4642 = s4639 - s1745 * s4636 - s1788 * s4640 - s1797 * s4641
-    s4643 = s1609 * s3484 - s3087 - s1674 * s4635 - s1746 * s4636 - s1789 * s4640 - s1798 * s4641
-    s4644 = s1610 * s3484 - s3086 - s1675 * s4635 - s1747 * s4636 - s1790 * s4640 - s1799 * s4641
-    s4645 = s1611 * s3484 - s3085 - s1676 * s4635 - s1748 * s4636 - s1791 * s4640 - s1800 * s4641
-    s4646 = s4643 - s1804 * s4642
-    s4647 = s4644 - s1805 * s4642 + s1812 * s4646
-    s4648 = (s4645 - s1806 * s4642 + s1813 * s4646 + s1815 * s4647) / pivot_trunk_x_dot
-    s4649 = s4647 / pivot_trunk_y_dot + s1815 * s4648
-    s4650 = s4646 / pivot_trunk_z_dot + s1812 * s4649 + s1813 * s4648
-    s4651 = s4642 / pivot_trunk_wx - s1804 * s4650 - s1805 * s4649 - s1806 * s4648
-    s4652 = s4641 / pivot_trunk_wy - s1797 * s4651 - s1798 * s4650 - s1799 * s4649 - s1800 * s4648
-    s4653 = s4640 / pivot_trunk_wz - s1787 * s4652 - s1788 * s4651 - s1789 * s4650 - s1790 * s4649
-    s4654 = s4653 - s1791 * s4648
-    s4655 = s1776 * s4654 + s1777 * s4652 + s1778 * s4651 + s1779 * s4650 + s1780 * s4649
-    s4656 = s4655 + s1781 * s4648
-    s4657 = s1770 * s4654 + s1771 * s4652 + s1772 * s4651 + s1773 * s4650 + s1774 * s4649
-    s4658 = s4657 + s1775 * s4648
-    s4659 = s1749 * s4654 + s1750 * s4652 + s1751 * s4651 + s1752 * s4650 + s1753 * s4649
-    s4660 = s4659 + s1754 * s4648
-    s4661 = s4636 / pivot_front_left_abduction_angle_dot - s1743 * s4654 - s1744 * s4652
-    s4662 = s4661 - s1745 * s4651 - s1746 * s4650 - s1747 * s4649 - s1748 * s4648
-    s4663 = s1724 * s4656 - s1725 * s4654 - s1726 * s4652 - s1727 * s4651 - s1728 * s4650
-    s4664 = s4663 - s1729 * s4649 - s1730 * s4648
-    s4665 = s1711 * s4658 - s1712 * s4654 - s1713 * s4652 - s1714 * s4651 - s1715 * s4650
-    s4666 = s4665 - s1716 * s4649 - s1717 * s4648
-    s4667 = s1698 * s4660 - s1699 * s4654 - s1700 * s4652 - s1701 * s4651 - s1702 * s4650
-    s4668 = s4667 - s1703 * s4649 - s1704 * s4648
-    s4669 = s4635 / pivot_front_left_swing_angle_dot - s1670 * s4662 - s1671 * s4654 - s1672 * s4652
-    s4670 = s4669 - s1673 * s4651 - s1674 * s4650 - s1675 * s4649 - s1676 * s4648
-    s4671 = s1656 * s4656 - s1655 * s4664 - s1657 * s4654 - s1658 * s4652 - s1659 * s4651
-    s4672 = s1635 * s4658 - s1634 * s4666 - s1636 * s4654 - s1637 * s4652 - s1638 * s4651
-    s4673 = s1620 * s4660 - s1619 * s4668 - s1621 * s4654 - s1622 * s4652 - s1623 * s4651
-    s4674 = s3484 / pivot_front_left_knee_angle_dot + s1604 * s4670 + s1605 * s4662 + s1606 * s4654
-    s4675 = s4674 + s1607 * s4652 + s1608 * s4651 + s1609 * s4650 + s1610 * s4649 + s1611 * s4648
-    s4676 = s1619 * s3552 - (s3312 + s3313)
-    s4677 = s1620 * s3552 - (s3128 + s3129) - s1698 * s4676
-    s4678 = s1621 * s3552 - (s17 * s3133 + s20 * s3134 + s23 * s3135) - s1699 * s4676
-    s4679 = s1622 * s3552 - (s16 * s3133 + s19 * s3134 + s22 * s3135) - s1700 * s4676
-    s4680 = s1623 * s3552 - (s15 * s3133 + s18 * s3134 + s21 * s3135) - s1701 * s4676
-    s4681 = s4678 - s1749 * s4677
-    s4682 = s4679 - s1750 * s4677 - s1787 * s4681
-    s4683 = s4680 - s1751 * s4677 - s1788 * s4681 - s1797 * s4682
-    s4684 = s1624 * s3552 - s3126 - s1702 * s4676 - s1752 * s4677 - s1789 * s4681 - s1798 * s4682
-    s4685 = s1625 * s3552 - s3125 - s1703 * s4676 - s1753 * s4677 - s1790 * s4681 - s1799 * s4682
-    s4686 = s1626 * s3552 - s3124 - s1704 * s4676 - s1754 * s4677 - s1791 * s4681 - s1800 * s4682
-    s4687 = s4684 - s1804 * s4683
-    s4688 = s4685 - s1805 * s4683 + s1812 * s4687
-    s4689 = (s4686 - s1806 * s4683 + s1813 * s4687 + s1815 * s4688) / pivot_trunk_x_dot
-    s4690 = s4688 / pivot_trunk_y_dot + s1815 * s4689
-    s4691 = s4687 / pivot_trunk_z_dot + s1812 * s4690 + s1813 * s4689
-    s4692 = s4683 / pivot_trunk_wx - s1804 * s4691 - s1805 * s4690 - s1806 * s4689
-    s4693 = s4682 / pivot_trunk_wy - s1797 * s4692 - s1798 * s4691 - s1799 * s4690 - s1800 * s4689
-    s4694 = s4681 / pivot_trunk_wz - s1787 * s4693 - s1788 * s4692 - s1789 * s4691 - s1790 * s4690
-    s4695 = s4694 - s1791 * s4689
-    s4696 = s1776 * s4695 + s1777 * s4693 + s1778 * s4692 + s1779 * s4691 + s1780 * s4690
-    s4697 = s4696 + s1781 * s4689
-    s4698 = s1770 * s4695 + s1771 * s4693 + s1772 * s4692 + s1773 * s4691 + s1774 * s4690
-    s4699 = s4698 + s1775 * s4689
-    s4700 = s4677 / pivot_front_right_abduction_angle_dot - s1749 * s4695 - s1750 * s4693
-    s4701 = s4700 - s1751 * s4692 - s1752 * s4691 - s1753 * s4690 - s1754 * s4689
-    s4702 = s1743 * s4695 + s1744 * s4693 + s1745 * s4692 + s1746 * s4691 + s1747 * s4690
-    s4703 = s4702 + s1748 * s4689
-    s4704 = s1724 * s4697 - s1725 * s4695 - s1726 * s4693 - s1727 * s4692 - s1728 * s4691
-    s4705 = s4704 - s1729 * s4690 - s1730 * s4689
-    s4706 = s1711 * s4699 - s1712 * s4695 - s1713 * s4693 - s1714 * s4692 - s1715 * s4691
-    s4707 = s4706 - s1716 * s4690 - s1717 * s4689
-    s4708 = s4676 / pivot_front_right_swing_angle_dot - s1698 * s4701 - s1699 * s4695
-    s4709 = s4708 - s1700 * s4693 - s1701 * s4692 - s1702 * s4691 - s1703 * s4690 - s1704 * s4689
-    s4710 = s1670 * s4703 - s1671 * s4695 - s1672 * s4693 - s1673 * s4692 - s1674 * s4691
-    s4711 = s4710 - s1675 * s4690 - s1676 * s4689
-    s4712 = s1656 * s4697 - s1655 * s4705 - s1657 * s4695 - s1658 * s4693 - s1659 * s4692
-    s4713 = s1635 * s4699 - s1634 * s4707 - s1636 * s4695 - s1637 * s4693 - s1638 * s4692
-    s4714 = s3552 / pivot_front_right_knee_angle_dot + s1619 * s4709 + s1620 * s4701 + s1621 * s4695
-    s4715 = s4714 + s1622 * s4693 + s1623 * s4692 + s1624 * s4691 + s1625 * s4690 + s1626 * s4689
-    s4716 = s1605 * s4703 - s1604 * s4711 - s1606 * s4695 - s1607 * s4693 - s1608 * s4692
-    s4717 = s1634 * s3620 - (s3365 + s3366)
-    s4718 = s1635 * s3620 - (s3167 + s3168) - s1711 * s4717
-    s4719 = s1636 * s3620 - (s17 * s3172 + s20 * s3173 + s23 * s3174) - s1712 * s4717
-    s4720 = s1637 * s3620 - (s16 * s3172 + s19 * s3173 + s22 * s3174) - s1713 * s4717
-    s4721 = s1638 * s3620 - (s15 * s3172 + s18 * s3173 + s21 * s3174) - s1714 * s4717
-    s4722 = s4719 - s1770 * s4718
-    s4723 = s4720 - s1771 * s4718 - s1787 * s4722
-    s4724 = s4721 - s1772 * s4718 - s1788 * s4722 - s1797 * s4723
-    s4725 = s1639 * s3620 - s3165 - s1715 * s4717 - s1773 * s4718 - s1789 * s4722 - s1798 * s4723
-    s4726 = s1640 * s3620 - s3164 - s1716 * s4717 - s1774 * s4718 - s1790 * s4722 - s1799 * s4723
-    s4727 = s1641 * s3620 - s3163 - s1717 * s4717 - s1775 * s4718 - s1791 * s4722 - s1800 * s4723
-    s4728 = s4725 - s1804 * s4724
-    s4729 = s4726 - s1805 * s4724 + s1812 * s4728
-    s4730 = (s4727 - s1806 * s4724 + s1813 * s4728 + s1815 * s4729) / pivot_trunk_x_dot
-    s4731 = s4729 / pivot_trunk_y_dot + s1815 * s4730
-    s4732 = s4728 / pivot_trunk_z_dot + s1812 * s4731 + s1813 * s4730
-    s4733 = s4724 / pivot_trunk_wx - s1804 * s4732 - s1805 * s4731 - s1806 * s4730
-    s4734 = s4723 / pivot_trunk_wy - s1797 * s4733 - s1798 * s4732 - s1799 * s4731 - s1800 * s4730
-    s4735 = s4722 / pivot_trunk_wz - s1787 * s4734 - s1788 * s4733 - s1789 * s4732 - s1790 * s4731
-    s4736 = s4735 - s1791 * s4730
-    s4737 = s1776 * s4736 + s1777 * s4734 + s1778 * s4733 + s1779 * s4732 + s1780 * s4731
-    s4738 = s4737 + s1781 * s4730
-    s4739 = s4718 / pivot_hind_left_abduction_angle_dot - s1770 * s4736 - s1771 * s4734
-    s4740 = s4739 - s1772 * s4733 - s1773 * s4732 - s1774 * s4731 - s1775 * s4730
-    s4741 = s1749 * s4736 + s1750 * s4734 + s1751 * s4733 + s1752 * s4732 + s1753 * s4731
-    s4742 = s4741 + s1754 * s4730
-    s4743 = s1743 * s4736 + s1744 * s4734 + s1745 * s4733 + s1746 * s4732 + s1747 * s4731
-    s4744 = s4743 + s1748 * s4730
-    s4745 = s1724 * s4738 - s1725 * s4736 - s1726 * s4734 - s1727 * s4733 - s1728 * s4732
-    s4746 = s4745 - s1729 * s4731 - s1730 * s4730
-    s4747 = s4717 / pivot_hind_left_swing_angle_dot - s1711 * s4740 - s1712 * s4736 - s1713 * s4734
-    s4748 = s4747 - s1714 * s4733 - s1715 * s4732 - s1716 * s4731 - s1717 * s4730
-    s4749 = s1698 * s4742 - s1699 * s4736 - s1700 * s4734 - s1701 * s4733 - s1702 * s4732
-    s4750 = s4749 - s1703 * s4731 - s1704 * s4730
-    s4751 = s1670 * s4744 - s1671 * s4736 - s1672 * s4734 - s1673 * s4733 - s1674 * s4732
-    s4752 = s4751 - s1675 * s4731 - s1676 * s4730
-    s4753 = s1656 * s4738 - s1655 * s4746 - s1657 * s4736 - s1658 * s4734 - s1659 * s4733
-    s4754 = s3620 / pivot_hind_left_knee_angle_dot + s1634 * s4748 + s1635 * s4740 + s1636 * s4736
-    s4755 = s4754 + s1637 * s4734 + s1638 * s4733 + s1639 * s4732 + s1640 * s4731 + s1641 * s4730
-    s4756 = s1620 * s4742 - s1619 * s4750 - s1621 * s4736 - s1622 * s4734 - s1623 * s4733
-    s4757 = s1605 * s4744 - s1604 * s4752 - s1606 * s4736 - s1607 * s4734 - s1608 * s4733
-    s4758 = s1655 * s3688 - (s3418 + s3419)
-    s4759 = s1656 * s3688 - (s3206 + s3207) - s1724 * s4758
-    s4760 = s1657 * s3688 - (s17 * s3211 + s20 * s3212 + s23 * s3213) - s1725 * s4758
-    s4761 = s1658 * s3688 - (s16 * s3211 + s19 * s3212 + s22 * s3213) - s1726 * s4758
-    s4762 = s1659 * s3688 - (s15 * s3211 + s18 * s3212 + s21 * s3213) - s1727 * s4758
-    s4763 = s4760 - s1776 * s4759
-    s4764 = s4761 - s1777 * s4759 - s1787 * s4763
-    s4765 = s4762 - s1778 * s4759 - s1788 * s4763 - s1797 * s4764
-    s4766 = s1660 * s3688 - s3204 - s1728 * s4758 - s1779 * s4759 - s1789 * s4763 - s1798 * s4764
-    s4767 = s1661 * s3688 - s3203 - s1729 * s4758 - s1780 * s4759 - s1790 * s4763 - s1799 * s4764
-    s4768 = s1662 * s3688 - s3202 - s1730 * s4758 - s1781 * s4759 - s1791 * s4763 - s1800 * s4764
-    s4769 = s4766 - s1804 * s4765
-    s4770 = s4767 - s1805 * s4765 + s1812 * s4769
-    s4771 = (s4768 - s1806 * s4765 + s1813 * s4769 + s1815 * s4770) / pivot_trunk_x_dot
-    s4772 = s4770 / pivot_trunk_y_dot + s1815 * s4771
-    s4773 = s4769 / pivot_trunk_z_dot + s1812 * s4772 + s1813 * s4771
-    s4774 = s4765 / pivot_trunk_wx - s1804 * s4773 - s1805 * s4772 - s1806 * s4771
-    s4775 = s4764 / pivot_trunk_wy - s1797 * s4774 - s1798 * s4773 - s1799 * s4772 - s1800 * s4771
-    s4776 = s4763 / pivot_trunk_wz - s1787 * s4775 - s1788 * s4774 - s1789 * s4773 - s1790 * s4772
-    s4777 = s4776 - s1791 * s4771
-    s4778 = s4759 / pivot_hind_right_abduction_angle_dot - s1776 * s4777 - s1777 * s4775
-    s4779 = s4778 - s1778 * s4774 - s1779 * s4773 - s1780 * s4772 - s1781 * s4771
-    s4780 = s1770 * s4777 + s1771 * s4775 + s1772 * s4774 + s1773 * s4773 + s1774 * s4772
-    s4781 = s4780 + s1775 * s4771
-    s4782 = s1749 * s4777 + s1750 * s4775 + s1751 * s4774 + s1752 * s4773 + s1753 * s4772
-    s4783 = s4782 + s1754 * s4771
-    s4784 = s1743 * s4777 + s1744 * s4775 + s1745 * s4774 + s1746 * s4773 + s1747 * s4772
-    s4785 = s4784 + s1748 * s4771
-    s4786 = s4758 / pivot_hind_right_swing_angle_dot - s1724 * s4779 - s1725 * s4777 - s1726 * s4775
-    s4787 = s4786 - s1727 * s4774 - s1728 * s4773 - s1729 * s4772 - s1730 * s4771
-    s4788 = s1711 * s4781 - s1712 * s4777 - s1713 * s4775 - s1714 * s4774 - s1715 * s4773
-    s4789 = s4788 - s1716 * s4772 - s1717 * s4771
-    s4790 = s1698 * s4783 - s1699 * s4777 - s1700 * s4775 - s1701 * s4774 - s1702 * s4773
-    s4791 = s4790 - s1703 * s4772 - s1704 * s4771
-    s4792 = s1670 * s4785 - s1671 * s4777 - s1672 * s4775 - s1673 * s4774 - s1674 * s4773
-    s4793 = s4792 - s1675 * s4772 - s1676 * s4771
-    s4794 = s3688 / pivot_hind_right_knee_angle_dot + s1655 * s4787 + s1656 * s4779 + s1657 * s4777
-    s4795 = s4794 + s1658 * s4775 + s1659 * s4774 + s1660 * s4773 + s1661 * s4772 + s1662 * s4771
-    s4796 = s1635 * s4781 - s1634 * s4789 - s1636 * s4777 - s1637 * s4775 - s1638 * s4774
-    s4797 = s1620 * s4783 - s1619 * s4791 - s1621 * s4777 - s1622 * s4775 - s1623 * s4774
-    s4798 = s1605 * s4785 - s1604 * s4793 - s1606 * s4777 - s1607 * s4775 - s1608 * s4774
-    s4799 = s1604 * s3473 - (s3251 + (s932 * s3224 + s934 * s3226 + s936 * s3228))
-    s4800 = s1605 * s3473 - (s15 * s3255 + s18 * s3256 + s21 * s3257) - s1670 * s4799
-    s4801 = s1606 * s3473 - (s17 * s3264 + s20 * s3265 + s23 * s3266) - s1671 * s4799
-    s4802 = s1607 * s3473 - (s16 * s3264 + s19 * s3265 + s22 * s3266) - s1672 * s4799
-    s4803 = s1608 * s3473 - (s15 * s3264 + s18 * s3265 + s21 * s3266) - s1673 * s4799
-    s4804 = s4801 - s1743 * s4800
-    s4805 = s4802 - s1744 * s4800 - s1787 * s4804
-    s4806 = s4803 - s1745 * s4800 - s1788 * s4804 - s1797 * s4805
-    s4807 = s1609 * s3473 - s3249 - s1674 * s4799 - s1746 * s4800 - s1789 * s4804 - s1798 * s4805
-    s4808 = s1610 * s3473 - s3248 - s1675 * s4799 - s1747 * s4800 - s1790 * s4804 - s1799 * s4805
-    s4809 = s1611 * s3473 - s3247 - s1676 * s4799 - s1748 * s4800 - s1791 * s4804 - s1800 * s4805
-    s4810 = s4807 - s1804 * s4806
-    s4811 = s4808 - s1805 * s4806 + s1812 * s4810
-    s4812 = (s4809 - s1806 * s4806 + s1813 * s4810 + s1815 * s4811) / pivot_trunk_x_dot
-    s4813 = s4811 / pivot_trunk_y_dot + s1815 * s4812
-    s4814 = s4810 / pivot_trunk_z_dot + s1812 * s4813 + s1813 * s4812
-    s4815 = s4806 / pivot_trunk_wx - s1804 * s4814 - s1805 * s4813 - s1806 * s4812
-    s4816 = s4805 / pivot_trunk_wy - s1797 * s4815 - s1798 * s4814 - s1799 * s4813 - s1800 * s4812
-    s4817 = s4804 / pivot_trunk_wz - s1787 * s4816 - s1788 * s4815 - s1789 * s4814 - s1790 * s4813
-    s4818 = s4817 - s1791 * s4812
-    s4819 = s1776 * s4818 + s1777 * s4816 + s1778 * s4815 + s1779 * s4814 + s1780 * s4813
-    s4820 = s4819 + s1781 * s4812
-    s4821 = s1770 * s4818 + s1771 * s4816 + s1772 * s4815 + s1773 * s4814 + s1774 * s4813
-    s4822 = s4821 + s1775 * s4812
-    s4823 = s1749 * s4818 + s1750 * s4816 + s1751 * s4815 + s1752 * s4814 + s1753 * s4813
-    s4824 = s4823 + s1754 * s4812
-    s4825 = s4800 / pivot_front_left_abduction_angle_dot - s1743 * s4818 - s1744 * s4816
-    s4826 = s4825 - s1745 * s4815 - s1746 * s4814 - s1747 * s4813 - s1748 * s4812
-    s4827 = s1724 * s4820 - s1725 * s4818 - s1726 * s4816 - s1727 * s4815 - s1728 * s4814
-    s4828 = s4827 - s1729 * s4813 - s1730 * s4812
-    s4829 = s1711 * s4822 - s1712 * s4818 - s1713 * s4816 - s1714 * s4815 - s1715 * s4814
-    s4830 = s4829 - s1716 * s4813 - s1717 * s4812
-    s4831 = s1698 * s4824 - s1699 * s4818 - s1700 * s4816 - s1701 * s4815 - s1702 * s4814
-    s4832 = s4831 - s1703 * s4813 - s1704 * s4812
-    s4833 = s4799 / pivot_front_left_swing_angle_dot - s1670 * s4826 - s1671 * s4818 - s1672 * s4816
-    s4834 = s4833 - s1673 * s4815 - s1674 * s4814 - s1675 * s4813 - s1676 * s4812
-    s4835 = s1656 * s4820 - s1655 * s4828 - s1657 * s4818 - s1658 * s4816 - s1659 * s4815
-    s4836 = s1635 * s4822 - s1634 * s4830 - s1636 * s4818 - s1637 * s4816 - s1638 * s4815
-    s4837 = s1620 * s4824 - s1619 * s4832 - s1621 * s4818 - s1622 * s4816 - s1623 * s4815
-    s4838 = s3473 / pivot_front_left_knee_angle_dot + s1604 * s4834 + s1605 * s4826 + s1606 * s4818
-    s4839 = s4838 + s1607 * s4816 + s1608 * s4815 + s1609 * s4814 + s1610 * s4813 + s1611 * s4812
-    s4840 = s1619 * s3541 - (s3304 + (s938 * s3277 + s940 * s3279 + s942 * s3281))
-    s4841 = s1620 * s3541 - (s15 * s3308 + s18 * s3309 + s21 * s3310) - s1698 * s4840
-    s4842 = s1621 * s3541 - (s17 * s3317 + s20 * s3318 + s23 * s3319) - s1699 * s4840
-    s4843 = s1622 * s3541 - (s16 * s3317 + s19 * s3318 + s22 * s3319) - s1700 * s4840
-    s4844 = s1623 * s3541 - (s15 * s3317 + s18 * s3318 + s21 * s3319) - s1701 * s4840
-    s4845 = s4842 - s1749 * s4841
-    s4846 = s4843 - s1750 * s4841 - s1787 * s4845
-    s4847 = s4844 - s1751 * s4841 - s1788 * s4845 - s1797 * s4846
-    s4848 = s1624 * s3541 - s3302 - s1702 * s4840 - s1752 * s4841 - s1789 * s4845 - s1798 * s4846
-    s4849 = s1625 * s3541 - s3301 - s1703 * s4840 - s1753 * s4841 - s1790 * s4845 - s1799 * s4846
-    s4850 = s1626 * s3541 - s3300 - s1704 * s4840 - s1754 * s4841 - s1791 * s4845 - s1800 * s4846
-    s4851 = s4848 - s1804 * s4847
-    s4852 = s4849 - s1805 * s4847 + s1812 * s4851
-    s4853 = (s4850 - s1806 * s4847 + s1813 * s4851 + s1815 * s4852) / pivot_trunk_x_dot
-    s4854 = s4852 / pivot_trunk_y_dot + s1815 * s4853
-    s4855 = s4851 / pivot_trunk_z_dot + s1812 * s4854 + s1813 * s4853
-    s4856 = s4847 / pivot_trunk_wx - s1804 * s4855 - s1805 * s4854 - s1806 * s4853
-    s4857 = s4846 / pivot_trunk_wy - s1797 * s4856 - s1798 * s4855 - s1799 * s4854 - s1800 * s4853
-    s4858 = s4845 / pivot_trunk_wz - s1787 * s4857 - s1788 * s4856 - s1789 * s4855 - s1790 * s4854
-    s4859 = s4858 - s1791 * s4853
-    s4860 = s1776 * s4859 + s1777 * s4857 + s1778 * s4856 + s1779 * s4855 + s1780 * s4854
-    s4861 = s4860 + s1781 * s4853
-    s4862 = s1770 * s4859 + s1771 * s4857 + s1772 * s4856 + s1773 * s4855 + s1774 * s4854
-    s4863 = s4862 + s1775 * s4853
-    s4864 = s4841 / pivot_front_right_abduction_angle_dot - s1749 * s4859 - s1750 * s4857
-    s4865 = s4864 - s1751 * s4856 - s1752 * s4855 - s1753 * s4854 - s1754 * s4853
-    s4866 = s1743 * s4859 + s1744 * s4857 + s1745 * s4856 + s1746 * s4855 + s1747 * s4854
-    s4867 = s4866 + s1748 * s4853
-    s4868 = s1724 * s4861 - s1725 * s4859 - s1726 * s4857 - s1727 * s4856 - s1728 * s4855
-    s4869 = s4868 - s1729 * s4854 - s1730 * s4853
-    s4870 = s1711 * s4863 - s1712 * s4859 - s1713 * s4857 - s1714 * s4856 - s1715 * s4855
-    s4871 = s4870 - s1716 * s4854 - s1717 * s4853
-    s4872 = s4840 / pivot_front_right_swing_angle_dot - s1698 * s4865 - s1699 * s4859
-    s4873 = s4872 - s1700 * s4857 - s1701 * s4856 - s1702 * s4855 - s1703 * s4854 - s1704 * s4853
-    s4874 = s1670 * s4867 - s1671 * s4859 - s1672 * s4857 - s1673 * s4856 - s1674 * s4855
-    s4875 = s4874 - s1675 * s4854 - s1676 * s4853
-    s4876 = s1656 * s4861 - s1655 * s4869 - s1657 * s4859 - s1658 * s4857 - s1659 * s4856
-    s4877 = s1635 * s4863 - s1634 * s4871 - s1636 * s4859 - s1637 * s4857 - s1638 * s4856
-    s4878 = s3541 / pivot_front_right_knee_angle_dot + s1619 * s4873 + s1620 * s4865 + s1621 * s4859
-    s4879 = s4878 + s1622 * s4857 + s1623 * s4856 + s1624 * s4855 + s1625 * s4854 + s1626 * s4853
-    s4880 = s1605 * s4867 - s1604 * s4875 - s1606 * s4859 - s1607 * s4857 - s1608 * s4856
-    s4881 = s1634 * s3609 - (s3357 + (s944 * s3330 + s946 * s3332 + s948 * s3334))
-    s4882 = s1635 * s3609 - (s15 * s3361 + s18 * s3362 + s21 * s3363) - s1711 * s4881
-    s4883 = s1636 * s3609 - (s17 * s3370 + s20 * s3371 + s23 * s3372) - s1712 * s4881
-    s4884 = s1637 * s3609 - (s16 * s3370 + s19 * s3371 + s22 * s3372) - s1713 * s4881
-    s4885 = s1638 * s3609 - (s15 * s3370 + s18 * s3371 + s21 * s3372) - s1714 * s4881
-    s4886 = s4883 - s1770 * s4882
-    s4887 = s4884 - s1771 * s4882 - s1787 * s4886
-    s4888 = s4885 - s1772 * s4882 - s1788 * s4886 - s1797 * s4887
-    s4889 = s1639 * s3609 - s3355 - s1715 * s4881 - s1773 * s4882 - s1789 * s4886 - s1798 * s4887
-    s4890 = s1640 * s3609 - s3354 - s1716 * s4881 - s1774 * s4882 - s1790 * s4886 - s1799 * s4887
-    s4891 = s1641 * s3609 - s3353 - s1717 * s4881 - s1775 * s4882 - s1791 * s4886 - s1800 * s4887
-    s4892 = s4889 - s1804 * s4888
-    s4893 = s4890 - s1805 * s4888 + s1812 * s4892
-    s4894 = (s4891 - s1806 * s4888 + s1813 * s4892 + s1815 * s4893) / pivot_trunk_x_dot
-    s4895 = s4893 / pivot_trunk_y_dot + s1815 * s4894
-    s4896 = s4892 / pivot_trunk_z_dot + s1812 * s4895 + s1813 * s4894
-    s4897 = s4888 / pivot_trunk_wx - s1804 * s4896 - s1805 * s4895 - s1806 * s4894
-    s4898 = s4887 / pivot_trunk_wy - s1797 * s4897 - s1798 * s4896 - s1799 * s4895 - s1800 * s4894
-    s4899 = s4886 / pivot_trunk_wz - s1787 * s4898 - s1788 * s4897 - s1789 * s4896 - s1790 * s4895
-    s4900 = s4899 - s1791 * s4894
-    s4901 = s1776 * s4900 + s1777 * s4898 + s1778 * s4897 + s1779 * s4896 + s1780 * s4895
-    s4902 = s4901 + s1781 * s4894
-    s4903 = s4882 / pivot_hind_left_abduction_angle_dot - s1770 * s4900 - s1771 * s4898
-    s4904 = s4903 - s1772 * s4897 - s1773 * s4896 - s1774 * s4895 - s1775 * s4894
-    s4905 = s1749 * s4900 + s1750 * s4898 + s1751 * s4897 + s1752 * s4896 + s1753 * s4895
-    s4906 = s4905 + s1754 * s4894
-    s4907 = s1743 * s4900 + s1744 * s4898 + s1745 * s4897 + s1746 * s4896 + s1747 * s4895
-    s4908 = s4907 + s1748 * s4894
-    s4909 = s1724 * s4902 - s1725 * s4900 - s1726 * s4898 - s1727 * s4897 - s1728 * s4896
-    s4910 = s4909 - s1729 * s4895 - s1730 * s4894
-    s4911 = s4881 / pivot_hind_left_swing_angle_dot - s1711 * s4904 - s1712 * s4900 - s1713 * s4898
-    s4912 = s4911 - s1714 * s4897 - s1715 * s4896 - s1716 * s4895 - s1717 * s4894
-    s4913 = s1698 * s4906 - s1699 * s4900 - s1700 * s4898 - s1701 * s4897 - s1702 * s4896
-    s4914 = s4913 - s1703 * s4895 - s1704 * s4894
-    s4915 = s1670 * s4908 - s1671 * s4900 - s1672 * s4898 - s1673 * s4897 - s1674 * s4896
-    s4916 = s4915 - s1675 * s4895 - s1676 * s4894
-    s4917 = s1656 * s4902 - s1655 * s4910 - s1657 * s4900 - s1658 * s4898 - s1659 * s4897
-    s4918 = s3609 / pivot_hind_left_knee_angle_dot + s1634 * s4912 + s1635 * s4904 + s1636 * s4900
-    s4919 = s4918 + s1637 * s4898 + s1638 * s4897 + s1639 * s4896 + s1640 * s4895 + s1641 * s4894
-    s4920 = s1620 * s4906 - s1619 * s4914 - s1621 * s4900 - s1622 * s4898 - s1623 * s4897
-    s4921 = s1605 * s4908 - s1604 * s4916 - s1606 * s4900 - s1607 * s4898 - s1608 * s4897
-    s4922 = s1655 * s3677 - (s3410 + (s950 * s3383 + s952 * s3385 + s954 * s3387))
-    s4923 = s1656 * s3677 - (s15 * s3414 + s18 * s3415 + s21 * s3416) - s1724 * s4922
-    s4924 = s1657 * s3677 - (s17 * s3423 + s20 * s3424 + s23 * s3425) - s1725 * s4922
-    s4925 = s1658 * s3677 - (s16 * s3423 + s19 * s3424 + s22 * s3425) - s1726 * s4922
-    s4926 = s1659 * s3677 - (s15 * s3423 + s18 * s3424 + s21 * s3425) - s1727 * s4922
-    s4927 = s4924 - s1776 * s4923
-    s4928 = s4925 - s1777 * s4923 - s1787 * s4927
-    s4929 = s4926 - s1778 * s4923 - s1788 * s4927 - s1797 * s4928
-    s4930 = s1660 * s3677 - s3408 - s1728 * s4922 - s1779 * s4923 - s1789 * s4927 - s1798 * s4928
-    s4931 = s1661 * s3677 - s3407 - s1729 * s4922 - s1780 * s4923 - s1790 * s4927 - s1799 * s4928
-    s4932 = s1662 * s3677 - s3406 - s1730 * s4922 - s1781 * s4923 - s1791 * s4927 - s1800 * s4928
-    s4933 = s4930 - s1804 * s4929
-    s4934 = s4931 - s1805 * s4929 + s1812 * s4933
-    s4935 = (s4932 - s1806 * s4929 + s1813 * s4933 + s1815 * s4934) / pivot_trunk_x_dot
-    s4936 = s4934 / pivot_trunk_y_dot + s1815 * s4935
-    s4937 = s4933 / pivot_trunk_z_dot + s1812 * s4936 + s1813 * s4935
-    s4938 = s4929 / pivot_trunk_wx - s1804 * s4937 - s1805 * s4936 - s1806 * s4935
-    s4939 = s4928 / pivot_trunk_wy - s1797 * s4938 - s1798 * s4937 - s1799 * s4936 - s1800 * s4935
-    s4940 = s4927 / pivot_trunk_wz - s1787 * s4939 - s1788 * s4938 - s1789 * s4937 - s1790 * s4936
-    s4941 = s4940 - s1791 * s4935
-    s4942 = s4923 / pivot_hind_right_abduction_angle_dot - s1776 * s4941 - s1777 * s4939
-    s4943 = s4942 - s1778 * s4938 - s1779 * s4937 - s1780 * s4936 - s1781 * s4935
-    s4944 = s1770 * s4941 + s1771 * s4939 + s1772 * s4938 + s1773 * s4937 + s1774 * s4936
-    s4945 = s4944 + s1775 * s4935
-    s4946 = s1749 * s4941 + s1750 * s4939 + s1751 * s4938 + s1752 * s4937 + s1753 * s4936
-    s4947 = s4946 + s1754 * s4935
-    s4948 = s1743 * s4941 + s1744 * s4939 + s1745 * s4938 + s1746 * s4937 + s1747 * s4936
-    s4949 = s4948 + s1748 * s4935
-    s4950 = s4922 / pivot_hind_right_swing_angle_dot - s1724 * s4943 - s1725 * s4941 - s1726 * s4939
-    s4951 = s4950 - s1727 * s4938 - s1728 * s4937 - s1729 * s4936 - s1730 * s4935
-    s4952 = s1711 * s4945 - s1712 * s4941 - s1713 * s4939 - s1714 * s4938 - s1715 * s4937
-    s4953 = s4952 - s1716 * s4936 - s1717 * s4935
-    s4954 = s1698 * s4947 - s1699 * s4941 - s1700 * s4939 - s1701 * s4938 - s1702 * s4937
-    s4955 = s4954 - s1703 * s4936 - s1704 * s4935
-    s4956 = s1670 * s4949 - s1671 * s4941 - s1672 * s4939 - s1673 * s4938 - s1674 * s4937
-    s4957 = s4956 - s1675 * s4936 - s1676 * s4935
-    s4958 = s3677 / pivot_hind_right_knee_angle_dot + s1655 * s4951 + s1656 * s4943 + s1657 * s4941
-    s4959 = s4958 + s1658 * s4939 + s1659 * s4938 + s1660 * s4937 + s1661 * s4936 + s1662 * s4935
-    s4960 = s1635 * s4945 - s1634 * s4953 - s1636 * s4941 - s1637 * s4939 - s1638 * s4938
-    s4961 = s1620 * s4947 - s1619 * s4955 - s1621 * s4941 - s1622 * s4939 - s1623 * s4938
-    s4962 = s1605 * s4949 - s1604 * s4957 - s1606 * s4941 - s1607 * s4939 - s1608 * s4938
-    s4963 = s1604 * s3463 - (s932 * s3467 + s934 * s3468 + s936 * s3469)
-    s4964 = s1605 * s3463 - (s15 * s3477 + s18 * s3478 + s21 * s3479) - s1670 * s4963
-    s4965 = s1606 * s3463 - (s17 * s3488 + s20 * s3489 + s23 * s3490) - s1671 * s4963
-    s4966 = s1607 * s3463 - (s16 * s3488 + s19 * s3489 + s22 * s3490) - s1672 * s4963
-    s4967 = s1608 * s3463 - (s15 * s3488 + s18 * s3489 + s21 * s3490) - s1673 * s4963
-    s4968 = s4965 - s1743 * s4964
-    s4969 = s4966 - s1744 * s4964 - s1787 * s4968
-    s4970 = s4967 - s1745 * s4964 - s1788 * s4968 - s1797 * s4969
-    s4971 = s1609 * s3463 - s3458 - s1674 * s4963 - s1746 * s4964 - s1789 * s4968 - s1798 * s4969
-    s4972 = s1610 * s3463 - s3457 - s1675 * s4963 - s1747 * s4964 - s1790 * s4968 - s1799 * s4969
-    s4973 = s1611 * s3463 - s3456 - s1676 * s4963 - s1748 * s4964 - s1791 * s4968 - s1800 * s4969
-    s4974 = s4971 - s1804 * s4970
-    s4975 = s4972 - s1805 * s4970 + s1812 * s4974
-    s4976 = (s4973 - s1806 * s4970 + s1813 * s4974 + s1815 * s4975) / pivot_trunk_x_dot
-    s4977 = s4975 / pivot_trunk_y_dot + s1815 * s4976
-    s4978 = s4974 / pivot_trunk_z_dot + s1812 * s4977 + s1813 * s4976
-    s4979 = s4970 / pivot_trunk_wx - s1804 * s4978 - s1805 * s4977 - s1806 * s4976
-    s4980 = s4969 / pivot_trunk_wy - s1797 * s4979 - s1798 * s4978 - s1799 * s4977 - s1800 * s4976
-    s4981 = s4968 / pivot_trunk_wz - s1787 * s4980 - s1788 * s4979 - s1789 * s4978 - s1790 * s4977
-    s4982 = s4981 - s1791 * s4976
-    s4983 = s1776 * s4982 + s1777 * s4980 + s1778 * s4979 + s1779 * s4978 + s1780 * s4977
-    s4984 = s4983 + s1781 * s4976
-    s4985 = s1770 * s4982 + s1771 * s4980 + s1772 * s4979 + s1773 * s4978 + s1774 * s4977
-    s4986 = s4985 + s1775 * s4976
-    s4987 = s1749 * s4982 + s1750 * s4980 + s1751 * s4979 + s1752 * s4978 + s1753 * s4977
-    s4988 = s4987 + s1754 * s4976
-    s4989 = s4964 / pivot_front_left_abduction_angle_dot - s1743 * s4982 - s1744 * s4980
-    s4990 = s4989 - s1745 * s4979 - s1746 * s4978 - s1747 * s4977 - s1748 * s4976
-    s4991 = s1724 * s4984 - s1725 * s4982 - s1726 * s4980 - s1727 * s4979 - s1728 * s4978
-    s4992 = s4991 - s1729 * s4977 - s1730 * s4976
-    s4993 = s1711 * s4986 - s1712 * s4982 - s1713 * s4980 - s1714 * s4979 - s1715 * s4978
-    s4994 = s4993 - s1716 * s4977 - s1717 * s4976
-    s4995 = s1698 * s4988 - s1699 * s4982 - s1700 * s4980 - s1701 * s4979 - s1702 * s4978
-    s4996 = s4995 - s1703 * s4977 - s1704 * s4976
-    s4997 = s4963 / pivot_front_left_swing_angle_dot - s1670 * s4990 - s1671 * s4982 - s1672 * s4980
-    s4998 = s4997 - s1673 * s4979 - s1674 * s4978 - s1675 * s4977 - s1676 * s4976
-    s4999 = s1656 * s4984 - s1655 * s4992 - s1657 * s4982 - s1658 * s4980 - s1659 * s4979
-    s5000 = s1635 * s4986 - s1634 * s4994 - s1636 * s4982 - s1637 * s4980 - s1638 * s4979
-    s5001 = s1620 * s4988 - s1619 * s4996 - s1621 * s4982 - s1622 * s4980 - s1623 * s4979
-    s5002 = s3463 / pivot_front_left_knee_angle_dot + s1604 * s4998 + s1605 * s4990 + s1606 * s4982
-    s5003 = s5002 + s1607 * s4980 + s1608 * s4979 + s1609 * s4978 + s1610 * s4977 + s1611 * s4976
-    s5004 = s1619 * s3531 - (s938 * s3535 + s940 * s3536 + s942 * s3537)
-    s5005 = s1620 * s3531 - (s15 * s3545 + s18 * s3546 + s21 * s3547) - s1698 * s5004
-    s5006 = s1621 * s3531 - (s17 * s3556 + s20 * s3557 + s23 * s3558) - s1699 * s5004
-    s5007 = s1622 * s3531 - (s16 * s3556 + s19 * s3557 + s22 * s3558) - s1700 * s5004
-    s5008 = s1623 * s3531 - (s15 * s3556 + s18 * s3557 + s21 * s3558) - s1701 * s5004
-    s5009 = s5006 - s1749 * s5005
-    s5010 = s5007 - s1750 * s5005 - s1787 * s5009
-    s5011 = s5008 - s1751 * s5005 - s1788 * s5009 - s1797 * s5010
-    s5012 = s1624 * s3531 - s3526 - s1702 * s5004 - s1752 * s5005 - s1789 * s5009 - s1798 * s5010
-    s5013 = s1625 * s3531 - s3525 - s1703 * s5004 - s1753 * s5005 - s1790 * s5009 - s1799 * s5010
-    s5014 = s1626 * s3531 - s3524 - s1704 * s5004 - s1754 * s5005 - s1791 * s5009 - s1800 * s5010
-    s5015 = s5012 - s1804 * s5011
-    s5016 = s5013 - s1805 * s5011 + s1812 * s5015
-    s5017 = (s5014 - s1806 * s5011 + s1813 * s5015 + s1815 * s5016) / pivot_trunk_x_dot
-    s5018 = s5016 / pivot_trunk_y_dot + s1815 * s5017
-    s5019 = s5015 / pivot_trunk_z_dot + s1812 * s5018 + s1813 * s5017
-    s5020 = s5011 / pivot_trunk_wx - s1804 * s5019 - s1805 * s5018 - s1806 * s5017
-    s5021 = s5010 / pivot_trunk_wy - s1797 * s5020 - s1798 * s5019 - s1799 * s5018 - s1800 * s5017
-    s5022 = s5009 / pivot_trunk_wz - s1787 * s5021 - s1788 * s5020 - s1789 * s5019 - s1790 * s5018
-    s5023 = s5022 - s1791 * s5017
-    s5024 = s1776 * s5023 + s1777 * s5021 + s1778 * s5020 + s1779 * s5019 + s1780 * s5018
-    s5025 = s5024 + s1781 * s5017
-    s5026 = s1770 * s5023 + s1771 * s5021 + s1772 * s5020 + s1773 * s5019 + s1774 * s5018
-    s5027 = s5026 + s1775 * s5017
-    s5028 = s5005 / pivot_front_right_abduction_angle_dot - s1749 * s5023 - s1750 * s5021
-    s5029 = s5028 - s1751 * s5020 - s1752 * s5019 - s1753 * s5018 - s1754 * s5017
-    s5030 = s1743 * s5023 + s1744 * s5021 + s1745 * s5020 + s1746 * s5019 + s1747 * s5018
-    s5031 = s5030 + s1748 * s5017
-    s5032 = s1724 * s5025 - s1725 * s5023 - s1726 * s5021 - s1727 * s5020 - s1728 * s5019
-    s5033 = s5032 - s1729 * s5018 - s1730 * s5017
-    s5034 = s1711 * s5027 - s1712 * s5023 - s1713 * s5021 - s1714 * s5020 - s1715 * s5019
-    s5035 = s5034 - s1716 * s5018 - s1717 * s5017
-    s5036 = s5004 / pivot_front_right_swing_angle_dot - s1698 * s5029 - s1699 * s5023
-    s5037 = s5036 - s1700 * s5021 - s1701 * s5020 - s1702 * s5019 - s1703 * s5018 - s1704 * s5017
-    s5038 = s1670 * s5031 - s1671 * s5023 - s1672 * s5021 - s1673 * s5020 - s1674 * s5019
-    s5039 = s5038 - s1675 * s5018 - s1676 * s5017
-    s5040 = s1656 * s5025 - s1655 * s5033 - s1657 * s5023 - s1658 * s5021 - s1659 * s5020
-    s5041 = s1635 * s5027 - s1634 * s5035 - s1636 * s5023 - s1637 * s5021 - s1638 * s5020
-    s5042 = s3531 / pivot_front_right_knee_angle_dot + s1619 * s5037 + s1620 * s5029 + s1621 * s5023
-    s5043 = s5042 + s1622 * s5021 + s1623 * s5020 + s1624 * s5019 + s1625 * s5018 + s1626 * s5017
-    s5044 = s1605 * s5031 - s1604 * s5039 - s1606 * s5023 - s1607 * s5021 - s1608 * s5020
-    s5045 = s1634 * s3599 - (s944 * s3603 + s946 * s3604 + s948 * s3605)
-    s5046 = s1635 * s3599 - (s15 * s3613 + s18 * s3614 + s21 * s3615) - s1711 * s5045
-    s5047 = s1636 * s3599 - (s17 * s3624 + s20 * s3625 + s23 * s3626) - s1712 * s5045
-    s5048 = s1637 * s3599 - (s16 * s3624 + s19 * s3625 + s22 * s3626) - s1713 * s5045
-    s5049 = s1638 * s3599 - (s15 * s3624 + s18 * s3625 + s21 * s3626) - s1714 * s5045
-    s5050 = s5047 - s1770 * s5046
-    s5051 = s5048 - s1771 * s5046 - s1787 * s5050
-    s5052 = s5049 - s1772 * s5046 - s1788 * s5050 - s1797 * s5051
-    s5053 = s1639 * s3599 - s3594 - s1715 * s5045 - s1773 * s5046 - s1789 * s5050 - s1798 * s5051
-    s5054 = s1640 * s3599 - s3593 - s1716 * s5045 - s1774 * s5046 - s1790 * s5050 - s1799 * s5051
-    s5055 = s1641 * s3599 - s3592 - s1717 * s5045 - s1775 * s5046 - s1791 * s5050 - s1800 * s5051
-    s5056 = s5053 - s1804 * s5052
-    s5057 = s5054 - s1805 * s5052 + s1812 * s5056
-    s5058 = (s5055 - s1806 * s5052 + s1813 * s5056 + s1815 * s5057) / pivot_trunk_x_dot
-    s5059 = s5057 / pivot_trunk_y_dot + s1815 * s5058
-    s5060 = s5056 / pivot_trunk_z_dot + s1812 * s5059 + s1813 * s5058
-    s5061 = s5052 / pivot_trunk_wx - s1804 * s5060 - s1805 * s5059 - s1806 * s5058
-    s5062 = s5051 / pivot_trunk_wy - s1797 * s5061 - s1798 * s5060 - s1799 * s5059 - s1800 * s5058
-    s5063 = s5050 / pivot_trunk_wz - s1787 * s5062 - s1788 * s5061 - s1789 * s5060 - s1790 * s5059
-    s5064 = s5063 - s1791 * s5058
-    s5065 = s1776 * s5064 + s1777 * s5062 + s1778 * s5061 + s1779 * s5060 + s1780 * s5059
-    s5066 = s5065 + s1781 * s5058
-    s5067 = s5046 / pivot_hind_left_abduction_angle_dot - s1770 * s5064 - s1771 * s5062
-    s5068 = s5067 - s1772 * s5061 - s1773 * s5060 - s1774 * s5059 - s1775 * s5058
-    s5069 = s1749 * s5064 + s1750 * s5062 + s1751 * s5061 + s1752 * s5060 + s1753 * s5059
-    s5070 = s5069 + s1754 * s5058
-    s5071 = s1743 * s5064 + s1744 * s5062 + s1745 * s5061 + s1746 * s5060 + s1747 * s5059
-    s5072 = s5071 + s1748 * s5058
-    s5073 = s1724 * s5066 - s1725 * s5064 - s1726 * s5062 - s1727 * s5061 - s1728 * s5060
-    s5074 = s5073 - s1729 * s5059 - s1730 * s5058
-    s5075 = s5045 / pivot_hind_left_swing_angle_dot - s1711 * s5068 - s1712 * s5064 - s1713 * s5062
-    s5076 = s5075 - s1714 * s5061 - s1715 * s5060 - s1716 * s5059 - s1717 * s5058
-    s5077 = s1698 * s5070 - s1699 * s5064 - s1700 * s5062 - s1701 * s5061 - s1702 * s5060
-    s5078 = s5077 - s1703 * s5059 - s1704 * s5058
-    s5079 = s1670 * s5072 - s1671 * s5064 - s1672 * s5062 - s1673 * s5061 - s1674 * s5060
-    s5080 = s5079 - s1675 * s5059 - s1676 * s5058
-    s5081 = s1656 * s5066 - s1655 * s5074 - s1657 * s5064 - s1658 * s5062 - s1659 * s5061
-    s5082 = s3599 / pivot_hind_left_knee_angle_dot + s1634 * s5076 + s1635 * s5068 + s1636 * s5064
-    s5083 = s5082 + s1637 * s5062 + s1638 * s5061 + s1639 * s5060 + s1640 * s5059 + s1641 * s5058
-    s5084 = s1620 * s5070 - s1619 * s5078 - s1621 * s5064 - s1622 * s5062 - s1623 * s5061
-    s5085 = s1605 * s5072 - s1604 * s5080 - s1606 * s5064 - s1607 * s5062 - s1608 * s5061
-    s5086 = s1655 * s3667 - (s950 * s3671 + s952 * s3672 + s954 * s3673)
-    s5087 = s1656 * s3667 - (s15 * s3681 + s18 * s3682 + s21 * s3683) - s1724 * s5086
-    s5088 = s1657 * s3667 - (s17 * s3692 + s20 * s3693 + s23 * s3694) - s1725 * s5086
-    s5089 = s1658 * s3667 - (s16 * s3692 + s19 * s3693 + s22 * s3694) - s1726 * s5086
-    s5090 = s1659 * s3667 - (s15 * s3692 + s18 * s3693 + s21 * s3694) - s1727 * s5086
-    s5091 = s5088 - s1776 * s5087
-    s5092 = s5089 - s1777 * s5087 - s1787 * s5091
-    s5093 = s5090 - s1778 * s5087 - s1788 * s5091 - s1797 * s5092
-    s5094 = s1660 * s3667 - s3662 - s1728 * s5086 - s1779 * s5087 - s1789 * s5091 - s1798 * s5092
-    s5095 = s1661 * s3667 - s3661 - s1729 * s5086 - s1780 * s5087 - s1790 * s5091 - s1799 * s5092
-    s5096 = s1662 * s3667 - s3660 - s1730 * s5086 - s1781 * s5087 - s1791 * s5091 - s1800 * s5092
-    s5097 = s5094 - s1804 * s5093
-    s5098 = s5095 - s1805 * s5093 + s1812 * s5097
-    s5099 = (s5096 - s1806 * s5093 + s1813 * s5097 + s1815 * s5098) / pivot_trunk_x_dot
-    s5100 = s5098 / pivot_trunk_y_dot + s1815 * s5099
-    s5101 = s5097 / pivot_trunk_z_dot + s1812 * s5100 + s1813 * s5099
-    s5102 = s5093 / pivot_trunk_wx - s1804 * s5101 - s1805 * s5100 - s1806 * s5099
-    s5103 = s5092 / pivot_trunk_wy - s1797 * s5102 - s1798 * s5101 - s1799 * s5100 - s1800 * s5099
-    s5104 = s5091 / pivot_trunk_wz - s1787 * s5103 - s1788 * s5102 - s1789 * s5101 - s1790 * s5100
-    s5105 = s5104 - s1791 * s5099
-    s5106 = s5087 / pivot_hind_right_abduction_angle_dot - s1776 * s5105 - s1777 * s5103
-    s5107 = s5106 - s1778 * s5102 - s1779 * s5101 - s1780 * s5100 - s1781 * s5099
-    s5108 = s1770 * s5105 + s1771 * s5103 + s1772 * s5102 + s1773 * s5101 + s1774 * s5100
-    s5109 = s5108 + s1775 * s5099
-    s5110 = s1749 * s5105 + s1750 * s5103 + s1751 * s5102 + s1752 * s5101 + s1753 * s5100
-    s5111 = s5110 + s1754 * s5099
-    s5112 = s1743 * s5105 + s1744 * s5103 + s1745 * s5102 + s1746 * s5101 + s1747 * s5100
-    s5113 = s5112 + s1748 * s5099
-    s5114 = s5086 / pivot_hind_right_swing_angle_dot - s1724 * s5107 - s1725 * s5105 - s1726 * s5103
-    s5115 = s5114 - s1727 * s5102 - s1728 * s5101 - s1729 * s5100 - s1730 * s5099
-    s5116 = s1711 * s5109 - s1712 * s5105 - s1713 * s5103 - s1714 * s5102 - s1715 * s5101
-    s5117 = s5116 - s1716 * s5100 - s1717 * s5099
-    s5118 = s1698 * s5111 - s1699 * s5105 - s1700 * s5103 - s1701 * s5102 - s1702 * s5101
-    s5119 = s5118 - s1703 * s5100 - s1704 * s5099
-    s5120 = s1670 * s5113 - s1671 * s5105 - s1672 * s5103 - s1673 * s5102 - s1674 * s5101
-    s5121 = s5120 - s1675 * s5100 - s1676 * s5099
-    s5122 = s3667 / pivot_hind_right_knee_angle_dot + s1655 * s5115 + s1656 * s5107 + s1657 * s5105
-    s5123 = s5122 + s1658 * s5103 + s1659 * s5102 + s1660 * s5101 + s1661 * s5100 + s1662 * s5099
-    s5124 = s1635 * s5109 - s1634 * s5117 - s1636 * s5105 - s1637 * s5103 - s1638 * s5102
-    s5125 = s1620 * s5111 - s1619 * s5119 - s1621 * s5105 - s1622 * s5103 - s1623 * s5102
-    s5126 = s1605 * s5113 - s1604 * s5121 - s1606 * s5105 - s1607 * s5103 - s1608 * s5102
-    s5127 = -s929
-    s5128 = -s931
-    s5129 = -s930
-    s5130 = trunk_qx * 0.5
-    s5131 = -s5130
-    s5132 = trunk_qw * 0.5
-    s5133 = trunk_qz * 0.5
-    s5134 = trunk_qy * 0.5
-    s5135 = -s5134
-    s5136 = -s5133
+    s3002 = 2.0 * s15
+    s3003 = 2.0 * s18
+    s3004 = 2.0 * s21
+    s3005 = s2642 * s3002 + s2645 * s3003 + s2648 * s3004
+    s3006 = s2643 * s3002 + s2646 * s3003 + s2649 * s3004
+    s3007 = s2644 * s3002 + s2647 * s3003 + s2650 * s3004
+    s3008 = s18 * s2293 - s21 * s2292 + k30 * s2654
+    s3009 = s21 * s2291 - s15 * s2293 + k30 * s2655
+    s3010 = s15 * s2292 - s18 * s2291 - k30 * s2656
+    s3011 = k30 * s2660 + (s1410 * s2658 - s1409 * s2659) + (s2641 * s3003 - s2640 * s3004)
+    s3012 = k30 * s2661 + (s1408 * s2659 - s1410 * s2657) + (s2639 * s3004 - s2641 * s3002)
+    s3013 = k30 * s2662 + (s1409 * s2657 - s1408 * s2658) + (s2640 * s3002 - s2639 * s3003)
+    s3014 = s1417 * s2654 + s1418 * s2655 - s1419 * s2656
+    s3015 = s1420 * s2657 + s1421 * s2658 + s1422 * s2659 + (s1417 * s2660 + s1418 * s2661 + s1419 * s2662)
+    s3016 = s1417 * s2666 + s1418 * s2667 - s1419 * s2668
+    s3017 = s1420 * s2669 + s1421 * s2670 + s1422 * s2671 + (s1417 * s2672 + s1418 * s2673 + s1419 * s2674)
+    s3018 = s1417 * s2678 + s1418 * s2679 - s1419 * s2680
+    s3019 = s1420 * s2681 + s1421 * s2682 + s1422 * s2683 + (s1417 * s2684 + s1418 * s2685 + s1419 * s2686)
+    s3020 = 2.0 * s16
+    s3021 = 2.0 * s19
+    s3022 = 2.0 * s22
+    s3023 = s2642 * s3020 + s2645 * s3021 + s2648 * s3022
+    s3024 = s2643 * s3020 + s2646 * s3021 + s2649 * s3022
+    s3025 = s2644 * s3020 + s2647 * s3021 + s2650 * s3022
+    s3026 = s19 * s2293 - s22 * s2292 + k30 * s2666
+    s3027 = s22 * s2291 - s16 * s2293 + k30 * s2667
+    s3028 = s16 * s2292 - s19 * s2291 - k30 * s2668
+    s3029 = k30 * s2672 + (s1410 * s2670 - s1409 * s2671) + (s2641 * s3021 - s2640 * s3022)
+    s3030 = k30 * s2673 + (s1408 * s2671 - s1410 * s2669) + (s2639 * s3022 - s2641 * s3020)
+    s3031 = k30 * s2674 + (s1409 * s2669 - s1408 * s2670) + (s2640 * s3020 - s2639 * s3021)
+    s3032 = s1423 * s2654 + s1424 * s2655 - s1425 * s2656
+    s3033 = s1426 * s2657 + s1427 * s2658 + s1428 * s2659 + (s1423 * s2660 + s1424 * s2661 + s1425 * s2662)
+    s3034 = s1423 * s2666 + s1424 * s2667 - s1425 * s2668
+    s3035 = s1426 * s2669 + s1427 * s2670 + s1428 * s2671 + (s1423 * s2672 + s1424 * s2673 + s1425 * s2674)
+    s3036 = s1423 * s2678 + s1424 * s2679 - s1425 * s2680
+    s3037 = s1426 * s2681 + s1427 * s2682 + s1428 * s2683 + (s1423 * s2684 + s1424 * s2685 + s1425 * s2686)
+    s3038 = 2.0 * s17
+    s3039 = 2.0 * s20
+    s3040 = 2.0 * s23
+    s3041 = s2642 * s3038 + s2645 * s3039 + s2648 * s3040
+    s3042 = s2643 * s3038 + s2646 * s3039 + s2649 * s3040
+    s3043 = s2644 * s3038 + s2647 * s3039 + s2650 * s3040
+    s3044 = s20 * s2293 - s23 * s2292 + k30 * s2678
+    s3045 = s23 * s2291 - s17 * s2293 + k30 * s2679
+    s3046 = s17 * s2292 - s20 * s2291 - k30 * s2680
+    s3047 = k30 * s2684 + (s1410 * s2682 - s1409 * s2683) + (s2641 * s3039 - s2640 * s3040)
+    s3048 = k30 * s2685 + (s1408 * s2683 - s1410 * s2681) + (s2639 * s3040 - s2641 * s3038)
+    s3049 = k30 * s2686 + (s1409 * s2681 - s1408 * s2682) + (s2640 * s3038 - s2639 * s3039)
+    s3050 = s1429 * s2654 + s1430 * s2655 - s1431 * s2656
+    s3051 = s1432 * s2657 + s1433 * s2658 + s1434 * s2659 + (s1429 * s2660 + s1430 * s2661 + s1431 * s2662)
+    s3052 = s1429 * s2666 + s1430 * s2667 - s1431 * s2668
+    s3053 = s1432 * s2669 + s1433 * s2670 + s1434 * s2671 + (s1429 * s2672 + s1430 * s2673 + s1431 * s2674)
+    s3054 = s1429 * s2678 + s1430 * s2679 - s1431 * s2680
+    s3055 = s1432 * s2681 + s1433 * s2682 + s1434 * s2683 + (s1429 * s2684 + s1430 * s2685 + s1431 * s2686)
+    s3056 = s2609 * s3002
+    s3057 = s3056 + s2612 * s3003 + s2615 * s3004
+    s3058 = s2613 * s3003
+    s3059 = s2610 * s3002 + s3058 + s2616 * s3004
+    s3060 = s2617 * s3004
+    s3061 = s2611 * s3002 + s2614 * s3003 + s3060
+    s3062 = s1369 * s2699 + s1370 * s2700 + s1371 * s2701 + (s1367 * s2704 - s1368 * s2703)
+    s3063 = s1370 * s2699 + s1372 * s2700 + s1373 * s2701 + (s1368 * s2702 - s1366 * s2704)
+    s3064 = s1371 * s2699 + s1373 * s2700 + s1374 * s2701 + (s1366 * s2703 - s1367 * s2702)
+    s3065 = 2.0 * s2657
+    s3066 = 2.0 * s2658
+    s3067 = 2.0 * s2659
+    s3068 = k15 * s2702 + (s1368 * s2700 - s1367 * s2701) + (s2608 * s3066 - s2607 * s3067)
+    s3069 = k15 * s2703 + (s1366 * s2701 - s1368 * s2699) + (s2606 * s3067 - s2608 * s3065)
+    s3070 = k15 * s2704 + (s1367 * s2699 - s1366 * s2700) + (s2607 * s3065 - s2606 * s3066)
+    s3071 = s18 * s2287 - s21 * s2286 + (s3062 + (s2609 * s3065 + s2610 * s3066 + s2611 * s3067))
+    s3072 = s21 * s2285 - s15 * s2287 + (s3063 + (s2612 * s3065 + s2613 * s3066 + s2614 * s3067))
+    s3073 = s15 * s2286 - s18 * s2285 + (s3064 + (s2615 * s3065 + s2616 * s3066 + s2617 * s3067))
+    s3074 = s18 * s2290 - s21 * s2289 + s3068
+    s3075 = s21 * s2288 - s15 * s2290 + s3069
+    s3076 = s15 * s2289 - s18 * s2288 + s3070
+    s3077 = s1369 * s2705 + s1370 * s2706 + s1371 * s2707 + (s1367 * s2710 - s1368 * s2709)
+    s3078 = s1370 * s2705 + s1372 * s2706 + s1373 * s2707 + (s1368 * s2708 - s1366 * s2710)
+    s3079 = s1371 * s2705 + s1373 * s2706 + s1374 * s2707 + (s1366 * s2709 - s1367 * s2708)
+    s3080 = k15 * s2708 + (s1368 * s2706 - s1367 * s2707) + (s2608 * s3003 - s2607 * s3004)
+    s3081 = k15 * s2709 + (s1366 * s2707 - s1368 * s2705) + (s2606 * s3004 - s2608 * s3002)
+    s3082 = k15 * s2710 + (s1367 * s2705 - s1366 * s2706) + (s2607 * s3002 - s2606 * s3003)
+    s3083 = s1438 * s2699 + s1439 * s2700 + s1440 * s2701 + (s1435 * s2702 + s1436 * s2703 + s1437 * s2704)
+    s3084 = s1438 * s2705 + s1439 * s2706 + s1440 * s2707 + (s1435 * s2708 + s1436 * s2709 + s1437 * s2710)
+    s3085 = s15 * s3057 + s18 * s3059 + s21 * s3061
+    s3086 = s3071 + (s1016 * s3076 - s1019 * s3075)
+    s3087 = s3072 + (s1019 * s3074 - s1013 * s3076)
+    s3088 = s3073 + (s1013 * s3075 - s1016 * s3074)
+    s3089 = s3077 + (s3056 + s2610 * s3003 + s2611 * s3004) + (s1016 * s3082 - s1019 * s3081)
+    s3090 = s3078 + (s3058 + s2612 * s3002 + s2614 * s3004) + (s1019 * s3080 - s1013 * s3082)
+    s3091 = s3079 + (s3060 + (s2615 * s3002 + s2616 * s3003)) + (s1013 * s3081 - s1016 * s3080)
+    s3092 = s1435 * s2654 + s1436 * s2655 - s1437 * s2656
+    s3093 = s1441 * s2657 + s1442 * s2658 + s1443 * s2659 + (s1435 * s2660 + s1436 * s2661 + s1437 * s2662)
+    s3094 = s1435 * s2666 + s1436 * s2667 - s1437 * s2668
+    s3095 = s1441 * s2669 + s1442 * s2670 + s1443 * s2671 + (s1435 * s2672 + s1436 * s2673 + s1437 * s2674)
+    s3096 = s1435 * s2678 + s1436 * s2679 - s1437 * s2680
+    s3097 = s1441 * s2681 + s1442 * s2682 + s1443 * s2683 + (s1435 * s2684 + s1436 * s2685 + s1437 * s2686)
+    s3098 = s2594 * s3002
+    s3099 = s3098 + s2597 * s3003 + s2600 * s3004
+    s3100 = s2598 * s3003
+    s3101 = s2595 * s3002 + s3100 + s2601 * s3004
+    s3102 = s2602 * s3004
+    s3103 = s2596 * s3002 + s2599 * s3003 + s3102
+    s3104 = s1354 * s2699 + s1355 * s2700 + s1356 * s2701 + (s1352 * s2725 - s1353 * s2724)
+    s3105 = s1355 * s2699 + s1357 * s2700 + s1358 * s2701 + (s1353 * s2723 - s1351 * s2725)
+    s3106 = s1356 * s2699 + s1358 * s2700 + s1359 * s2701 + (s1351 * s2724 - s1352 * s2723)
+    s3107 = k15 * s2723 + (s1353 * s2700 - s1352 * s2701) + (s2593 * s3066 - s2592 * s3067)
+    s3108 = k15 * s2724 + (s1351 * s2701 - s1353 * s2699) + (s2591 * s3067 - s2593 * s3065)
+    s3109 = k15 * s2725 + (s1352 * s2699 - s1351 * s2700) + (s2592 * s3065 - s2591 * s3066)
+    s3110 = s18 * s2281 - s21 * s2280 + (s3104 + (s2594 * s3065 + s2595 * s3066 + s2596 * s3067))
+    s3111 = s21 * s2279 - s15 * s2281 + (s3105 + (s2597 * s3065 + s2598 * s3066 + s2599 * s3067))
+    s3112 = s15 * s2280 - s18 * s2279 + (s3106 + (s2600 * s3065 + s2601 * s3066 + s2602 * s3067))
+    s3113 = s18 * s2284 - s21 * s2283 + s3107
+    s3114 = s21 * s2282 - s15 * s2284 + s3108
+    s3115 = s15 * s2283 - s18 * s2282 + s3109
+    s3116 = s1354 * s2705 + s1355 * s2706 + s1356 * s2707 + (s1352 * s2728 - s1353 * s2727)
+    s3117 = s1355 * s2705 + s1357 * s2706 + s1358 * s2707 + (s1353 * s2726 - s1351 * s2728)
+    s3118 = s1356 * s2705 + s1358 * s2706 + s1359 * s2707 + (s1351 * s2727 - s1352 * s2726)
+    s3119 = k15 * s2726 + (s1353 * s2706 - s1352 * s2707) + (s2593 * s3003 - s2592 * s3004)
+    s3120 = k15 * s2727 + (s1351 * s2707 - s1353 * s2705) + (s2591 * s3004 - s2593 * s3002)
+    s3121 = k15 * s2728 + (s1352 * s2705 - s1351 * s2706) + (s2592 * s3002 - s2591 * s3003)
+    s3122 = s1447 * s2699 + s1448 * s2700 + s1449 * s2701 + (s1444 * s2723 + s1445 * s2724 + s1446 * s2725)
+    s3123 = s1447 * s2705 + s1448 * s2706 + s1449 * s2707 + (s1444 * s2726 + s1445 * s2727 + s1446 * s2728)
+    s3124 = s15 * s3099 + s18 * s3101 + s21 * s3103
+    s3125 = s3110 + (s1046 * s3115 - s1047 * s3114)
+    s3126 = s3111 + (s1047 * s3113 - s1045 * s3115)
+    s3127 = s3112 + (s1045 * s3114 - s1046 * s3113)
+    s3128 = s3116 + (s3098 + s2595 * s3003 + s2596 * s3004) + (s1046 * s3121 - s1047 * s3120)
+    s3129 = s3117 + (s3100 + s2597 * s3002 + s2599 * s3004) + (s1047 * s3119 - s1045 * s3121)
+    s3130 = s3118 + (s3102 + (s2600 * s3002 + s2601 * s3003)) + (s1045 * s3120 - s1046 * s3119)
+    s3131 = s1444 * s2654 + s1445 * s2655 - s1446 * s2656
+    s3132 = s1450 * s2657 + s1451 * s2658 + s1452 * s2659 + (s1444 * s2660 + s1445 * s2661 + s1446 * s2662)
+    s3133 = s1444 * s2666 + s1445 * s2667 - s1446 * s2668
+    s3134 = s1450 * s2669 + s1451 * s2670 + s1452 * s2671 + (s1444 * s2672 + s1445 * s2673 + s1446 * s2674)
+    s3135 = s1444 * s2678 + s1445 * s2679 - s1446 * s2680
+    s3136 = s1450 * s2681 + s1451 * s2682 + s1452 * s2683 + (s1444 * s2684 + s1445 * s2685 + s1446 * s2686)
+    s3137 = s2579 * s3002
+    s3138 = s3137 + s2582 * s3003 + s2585 * s3004
+    s3139 = s2583 * s3003
+    s3140 = s2580 * s3002 + s3139 + s2586 * s3004
+    s3141 = s2587 * s3004
+    s3142 = s2581 * s3002 + s2584 * s3003 + s3141
+    s3143 = s1339 * s2699 + s1340 * s2700 + s1341 * s2701 + (s1337 * s2743 - s1338 * s2742)
+    s3144 = s1340 * s2699 + s1342 * s2700 + s1343 * s2701 + (s1338 * s2741 - s1336 * s2743)
+    s3145 = s1341 * s2699 + s1343 * s2700 + s1344 * s2701 + (s1336 * s2742 - s1337 * s2741)
+    s3146 = k15 * s2741 + (s1338 * s2700 - s1337 * s2701) + (s2578 * s3066 - s2577 * s3067)
+    s3147 = k15 * s2742 + (s1336 * s2701 - s1338 * s2699) + (s2576 * s3067 - s2578 * s3065)
+    s3148 = k15 * s2743 + (s1337 * s2699 - s1336 * s2700) + (s2577 * s3065 - s2576 * s3066)
+    s3149 = s18 * s2275 - s21 * s2274 + (s3143 + (s2579 * s3065 + s2580 * s3066 + s2581 * s3067))
+    s3150 = s21 * s2273 - s15 * s2275 + (s3144 + (s2582 * s3065 + s2583 * s3066 + s2584 * s3067))
+    s3151 = s15 * s2274 - s18 * s2273 + (s3145 + (s2585 * s3065 + s2586 * s3066 + s2587 * s3067))
+    s3152 = s18 * s2278 - s21 * s2277 + s3146
+    s3153 = s21 * s2276 - s15 * s2278 + s3147
+    s3154 = s15 * s2277 - s18 * s2276 + s3148
+    s3155 = s1339 * s2705 + s1340 * s2706 + s1341 * s2707 + (s1337 * s2746 - s1338 * s2745)
+    s3156 = s1340 * s2705 + s1342 * s2706 + s1343 * s2707 + (s1338 * s2744 - s1336 * s2746)
+    s3157 = s1341 * s2705 + s1343 * s2706 + s1344 * s2707 + (s1336 * s2745 - s1337 * s2744)
+    s3158 = k15 * s2744 + (s1338 * s2706 - s1337 * s2707) + (s2578 * s3003 - s2577 * s3004)
+    s3159 = k15 * s2745 + (s1336 * s2707 - s1338 * s2705) + (s2576 * s3004 - s2578 * s3002)
+    s3160 = k15 * s2746 + (s1337 * s2705 - s1336 * s2706) + (s2577 * s3002 - s2576 * s3003)
+    s3161 = s1456 * s2699 + s1457 * s2700 + s1458 * s2701 + (s1453 * s2741 + s1454 * s2742 + s1455 * s2743)
+    s3162 = s1456 * s2705 + s1457 * s2706 + s1458 * s2707 + (s1453 * s2744 + s1454 * s2745 + s1455 * s2746)
+    s3163 = s15 * s3138 + s18 * s3140 + s21 * s3142
+    s3164 = s3149 + (s1065 * s3154 - s1066 * s3153)
+    s3165 = s3150 + (s1066 * s3152 - s1064 * s3154)
+    s3166 = s3151 + (s1064 * s3153 - s1065 * s3152)
+    s3167 = s3155 + (s3137 + s2580 * s3003 + s2581 * s3004) + (s1065 * s3160 - s1066 * s3159)
+    s3168 = s3156 + (s3139 + s2582 * s3002 + s2584 * s3004) + (s1066 * s3158 - s1064 * s3160)
+    s3169 = s3157 + (s3141 + (s2585 * s3002 + s2586 * s3003)) + (s1064 * s3159 - s1065 * s3158)
+    s3170 = s1453 * s2654 + s1454 * s2655 - s1455 * s2656
+    s3171 = s1459 * s2657 + s1460 * s2658 + s1461 * s2659 + (s1453 * s2660 + s1454 * s2661 + s1455 * s2662)
+    s3172 = s1453 * s2666 + s1454 * s2667 - s1455 * s2668
+    s3173 = s1459 * s2669 + s1460 * s2670 + s1461 * s2671 + (s1453 * s2672 + s1454 * s2673 + s1455 * s2674)
+    s3174 = s1453 * s2678 + s1454 * s2679 - s1455 * s2680
+    s3175 = s1459 * s2681 + s1460 * s2682 + s1461 * s2683 + (s1453 * s2684 + s1454 * s2685 + s1455 * s2686)
+    s3176 = s2564 * s3002
+    s3177 = s3176 + s2567 * s3003 + s2570 * s3004
+    s3178 = s2568 * s3003
+    s3179 = s2565 * s3002 + s3178 + s2571 * s3004
+    s3180 = s2572 * s3004
+    s3181 = s2566 * s3002 + s2569 * s3003 + s3180
+    s3182 = s1324 * s2699 + s1325 * s2700 + s1326 * s2701 + (s1322 * s2761 - s1323 * s2760)
+    s3183 = s1325 * s2699 + s1327 * s2700 + s1328 * s2701 + (s1323 * s2759 - s1321 * s2761)
+    s3184 = s1326 * s2699 + s1328 * s2700 + s1329 * s2701 + (s1321 * s2760 - s1322 * s2759)
+    s3185 = k15 * s2759 + (s1323 * s2700 - s1322 * s2701) + (s2563 * s3066 - s2562 * s3067)
+    s3186 = k15 * s2760 + (s1321 * s2701 - s1323 * s2699) + (s2561 * s3067 - s2563 * s3065)
+    s3187 = k15 * s2761 + (s1322 * s2699 - s1321 * s2700) + (s2562 * s3065 - s2561 * s3066)
+    s3188 = s18 * s2269 - s21 * s2268 + (s3182 + (s2564 * s3065 + s2565 * s3066 + s2566 * s3067))
+    s3189 = s21 * s2267 - s15 * s2269 + (s3183 + (s2567 * s3065 + s2568 * s3066 + s2569 * s3067))
+    s3190 = s15 * s2268 - s18 * s2267 + (s3184 + (s2570 * s3065 + s2571 * s3066 + s2572 * s3067))
+    s3191 = s18 * s2272 - s21 * s2271 + s3185
+    s3192 = s21 * s2270 - s15 * s2272 + s3186
+    s3193 = s15 * s2271 - s18 * s2270 + s3187
+    s3194 = s1324 * s2705 + s1325 * s2706 + s1326 * s2707 + (s1322 * s2764 - s1323 * s2763)
+    s3195 = s1325 * s2705 + s1327 * s2706 + s1328 * s2707 + (s1323 * s2762 - s1321 * s2764)
+    s3196 = s1326 * s2705 + s1328 * s2706 + s1329 * s2707 + (s1321 * s2763 - s1322 * s2762)
+    s3197 = k15 * s2762 + (s1323 * s2706 - s1322 * s2707) + (s2563 * s3003 - s2562 * s3004)
+    s3198 = k15 * s2763 + (s1321 * s2707 - s1323 * s2705) + (s2561 * s3004 - s2563 * s3002)
+    s3199 = k15 * s2764 + (s1322 * s2705 - s1321 * s2706) + (s2562 * s3002 - s2561 * s3003)
+    s3200 = s1465 * s2699 + s1466 * s2700 + s1467 * s2701 + (s1462 * s2759 + s1463 * s2760 + s1464 * s2761)
+    s3201 = s1465 * s2705 + s1466 * s2706 + s1467 * s2707 + (s1462 * s2762 + s1463 * s2763 + s1464 * s2764)
+    s3202 = s15 * s3177 + s18 * s3179 + s21 * s3181
+    s3203 = s3188 + (s1019 * s3192 - s1016 * s3193)
+    s3204 = s3189 + (s1013 * s3193 - s1019 * s3191)
+    s3205 = s3190 + (s1016 * s3191 - s1013 * s3192)
+    s3206 = s3194 + (s3176 + s2565 * s3003 + s2566 * s3004) + (s1019 * s3198 - s1016 * s3199)
+    s3207 = s3195 + (s3178 + s2567 * s3002 + s2569 * s3004) + (s1013 * s3199 - s1019 * s3197)
+    s3208 = s3196 + (s3180 + (s2570 * s3002 + s2571 * s3003)) + (s1016 * s3197 - s1013 * s3198)
+    s3209 = s1462 * s2654 + s1463 * s2655 - s1464 * s2656
+    s3210 = s1468 * s2657 + s1469 * s2658 + s1470 * s2659 + (s1462 * s2660 + s1463 * s2661 + s1464 * s2662)
+    s3211 = s1462 * s2666 + s1463 * s2667 - s1464 * s2668
+    s3212 = s1468 * s2669 + s1469 * s2670 + s1470 * s2671 + (s1462 * s2672 + s1463 * s2673 + s1464 * s2674)
+    s3213 = s1462 * s2678 + s1463 * s2679 - s1464 * s2680
+    s3214 = s1468 * s2681 + s1469 * s2682 + s1470 * s2683 + (s1462 * s2684 + s1463 * s2685 + s1464 * s2686)
+    s3215 = 2.0 * s927
+    s3216 = 2.0 * s929
+    s3217 = 2.0 * s931
+    s3218 = s2549 * s3215
+    s3219 = s3218 + s2552 * s3216 + s2555 * s3217
+    s3220 = s2553 * s3216
+    s3221 = s2550 * s3215 + s3220 + s2556 * s3217
+    s3222 = s2557 * s3217
+    s3223 = s2551 * s3215 + s2554 * s3216 + s3222
+    s3224 = s1309 * s2783 + s1310 * s2784 + s1311 * s2785 + (s1307 * s2788 - s1308 * s2787)
+    s3225 = s1310 * s2783 + s1312 * s2784 + s1313 * s2785 + (s1308 * s2786 - s1306 * s2788)
+    s3226 = s1311 * s2783 + s1313 * s2784 + s1314 * s2785 + (s1306 * s2787 - s1307 * s2786)
+    s3227 = 2.0 * s2771
+    s3228 = 2.0 * s2772
+    s3229 = 2.0 * s2773
+    s3230 = k29 * s2786 + (s1308 * s2784 - s1307 * s2785) + (s2548 * s3228 - s2547 * s3229)
+    s3231 = k29 * s2787 + (s1306 * s2785 - s1308 * s2783) + (s2546 * s3229 - s2548 * s3227)
+    s3232 = k29 * s2788 + (s1307 * s2783 - s1306 * s2784) + (s2547 * s3227 - s2546 * s3228)
+    s3233 = s929 * s2263 - s931 * s2262 + (s3224 + (s2549 * s3227 + s2550 * s3228 + s2551 * s3229))
+    s3234 = s931 * s2261 - s927 * s2263 + (s3225 + (s2552 * s3227 + s2553 * s3228 + s2554 * s3229))
+    s3235 = s927 * s2262 - s929 * s2261 + (s3226 + (s2555 * s3227 + s2556 * s3228 + s2557 * s3229))
+    s3236 = s929 * s2266 - s931 * s2265 + s3230
+    s3237 = s931 * s2264 - s927 * s2266 + s3231
+    s3238 = s927 * s2265 - s929 * s2264 + s3232
+    s3239 = s1309 * s2789 + s1310 * s2790 + s1311 * s2791 + (s1307 * s2794 - s1308 * s2793)
+    s3240 = s1310 * s2789 + s1312 * s2790 + s1313 * s2791 + (s1308 * s2792 - s1306 * s2794)
+    s3241 = s1311 * s2789 + s1313 * s2790 + s1314 * s2791 + (s1306 * s2793 - s1307 * s2792)
+    s3242 = k29 * s2792 + (s1308 * s2790 - s1307 * s2791) + (s2548 * s3216 - s2547 * s3217)
+    s3243 = k29 * s2793 + (s1306 * s2791 - s1308 * s2789) + (s2546 * s3217 - s2548 * s3215)
+    s3244 = k29 * s2794 + (s1307 * s2789 - s1306 * s2790) + (s2547 * s3215 - s2546 * s3216)
+    s3245 = s1474 * s2783 + s1475 * s2784 + s1476 * s2785 + (s1471 * s2786 + s1472 * s2787 + s1473 * s2788)
+    s3246 = s1474 * s2789 + s1475 * s2790 + s1476 * s2791 + (s1471 * s2792 + s1472 * s2793 + s1473 * s2794)
+    s3247 = s3233 + (s1100 * s3238 - s1101 * s3237)
+    s3248 = s3234 + (s1101 * s3236 - s1099 * s3238)
+    s3249 = s3235 + (s1099 * s3237 - s1100 * s3236)
+    s3250 = s3239 + (s3218 + s2550 * s3216 + s2551 * s3217) + (s1100 * s3244 - s1101 * s3243)
+    s3251 = s3240 + (s3220 + s2552 * s3215 + s2554 * s3217) + (s1101 * s3242 - s1099 * s3244)
+    s3252 = s3241 + (s3222 + (s2555 * s3215 + s2556 * s3216)) + (s1099 * s3243 - s1100 * s3242)
+    s3253 = s1477 * s2699 + s1478 * s2700 + s1479 * s2701 + (s1471 * s2702 + s1472 * s2703 + s1473 * s2704)
+    s3254 = s1477 * s2705 + s1478 * s2706 + s1479 * s2707 + (s1471 * s2708 + s1472 * s2709 + s1473 * s2710)
+    s3255 = s15 * s3219 + s18 * s3221 + s21 * s3223
+    s3256 = s3247 + (s1016 * s3238 - s1019 * s3237)
+    s3257 = s3248 + (s1019 * s3236 - s1013 * s3238)
+    s3258 = s3249 + (s1013 * s3237 - s1016 * s3236)
+    s3259 = s3250 + (s1016 * s3244 - s1019 * s3243)
+    s3260 = s3251 + (s1019 * s3242 - s1013 * s3244)
+    s3261 = s3252 + (s1013 * s3243 - s1016 * s3242)
+    s3262 = s1471 * s2654 + s1472 * s2655 - s1473 * s2656
+    s3263 = s1480 * s2657 + s1481 * s2658 + s1482 * s2659 + (s1471 * s2660 + s1472 * s2661 + s1473 * s2662)
+    s3264 = s1471 * s2666 + s1472 * s2667 - s1473 * s2668
+    s3265 = s1480 * s2669 + s1481 * s2670 + s1482 * s2671 + (s1471 * s2672 + s1472 * s2673 + s1473 * s2674)
+    s3266 = s1471 * s2678 + s1472 * s2679 - s1473 * s2680
+    s3267 = s1480 * s2681 + s1481 * s2682 + s1482 * s2683 + (s1471 * s2684 + s1472 * s2685 + s1473 * s2686)
+    s3268 = 2.0 * s933
+    s3269 = 2.0 * s935
+    s3270 = 2.0 * s937
+    s3271 = s2534 * s3268
+    s3272 = s3271 + s2537 * s3269 + s2540 * s3270
+    s3273 = s2538 * s3269
+    s3274 = s2535 * s3268 + s3273 + s2541 * s3270
+    s3275 = s2542 * s3270
+    s3276 = s2536 * s3268 + s2539 * s3269 + s3275
+    s3277 = s1294 * s2813 + s1295 * s2814 + s1296 * s2815 + (s1292 * s2818 - s1293 * s2817)
+    s3278 = s1295 * s2813 + s1297 * s2814 + s1298 * s2815 + (s1293 * s2816 - s1291 * s2818)
+    s3279 = s1296 * s2813 + s1298 * s2814 + s1299 * s2815 + (s1291 * s2817 - s1292 * s2816)
+    s3280 = 2.0 * s2801
+    s3281 = 2.0 * s2802
+    s3282 = 2.0 * s2803
+    s3283 = k29 * s2816 + (s1293 * s2814 - s1292 * s2815) + (s2533 * s3281 - s2532 * s3282)
+    s3284 = k29 * s2817 + (s1291 * s2815 - s1293 * s2813) + (s2531 * s3282 - s2533 * s3280)
+    s3285 = k29 * s2818 + (s1292 * s2813 - s1291 * s2814) + (s2532 * s3280 - s2531 * s3281)
+    s3286 = s935 * s2257 - s937 * s2256 + (s3277 + (s2534 * s3280 + s2535 * s3281 + s2536 * s3282))
+    s3287 = s937 * s2255 - s933 * s2257 + (s3278 + (s2537 * s3280 + s2538 * s3281 + s2539 * s3282))
+    s3288 = s933 * s2256 - s935 * s2255 + (s3279 + (s2540 * s3280 + s2541 * s3281 + s2542 * s3282))
+    s3289 = s935 * s2260 - s937 * s2259 + s3283
+    s3290 = s937 * s2258 - s933 * s2260 + s3284
+    s3291 = s933 * s2259 - s935 * s2258 + s3285
+    s3292 = s1294 * s2819 + s1295 * s2820 + s1296 * s2821 + (s1292 * s2824 - s1293 * s2823)
+    s3293 = s1295 * s2819 + s1297 * s2820 + s1298 * s2821 + (s1293 * s2822 - s1291 * s2824)
+    s3294 = s1296 * s2819 + s1298 * s2820 + s1299 * s2821 + (s1291 * s2823 - s1292 * s2822)
+    s3295 = k29 * s2822 + (s1293 * s2820 - s1292 * s2821) + (s2533 * s3269 - s2532 * s3270)
+    s3296 = k29 * s2823 + (s1291 * s2821 - s1293 * s2819) + (s2531 * s3270 - s2533 * s3268)
+    s3297 = k29 * s2824 + (s1292 * s2819 - s1291 * s2820) + (s2532 * s3268 - s2531 * s3269)
+    s3298 = s1486 * s2813 + s1487 * s2814 + s1488 * s2815 + (s1483 * s2816 + s1484 * s2817 + s1485 * s2818)
+    s3299 = s1486 * s2819 + s1487 * s2820 + s1488 * s2821 + (s1483 * s2822 + s1484 * s2823 + s1485 * s2824)
+    s3300 = s3286 + (s1120 * s3291 - s1121 * s3290)
+    s3301 = s3287 + (s1121 * s3289 - s1119 * s3291)
+    s3302 = s3288 + (s1119 * s3290 - s1120 * s3289)
+    s3303 = s3292 + (s3271 + s2535 * s3269 + s2536 * s3270) + (s1120 * s3297 - s1121 * s3296)
+    s3304 = s3293 + (s3273 + s2537 * s3268 + s2539 * s3270) + (s1121 * s3295 - s1119 * s3297)
+    s3305 = s3294 + (s3275 + (s2540 * s3268 + s2541 * s3269)) + (s1119 * s3296 - s1120 * s3295)
+    s3306 = s1489 * s2699 + s1490 * s2700 + s1491 * s2701 + (s1483 * s2723 + s1484 * s2724 + s1485 * s2725)
+    s3307 = s1489 * s2705 + s1490 * s2706 + s1491 * s2707 + (s1483 * s2726 + s1484 * s2727 + s1485 * s2728)
+    s3308 = s15 * s3272 + s18 * s3274 + s21 * s3276
+    s3309 = s3300 + (s1046 * s3291 - s1047 * s3290)
+    s3310 = s3301 + (s1047 * s3289 - s1045 * s3291)
+    s3311 = s3302 + (s1045 * s3290 - s1046 * s3289)
+    s3312 = s3303 + (s1046 * s3297 - s1047 * s3296)
+    s3313 = s3304 + (s1047 * s3295 - s1045 * s3297)
+    s3314 = s3305 + (s1045 * s3296 - s1046 * s3295)
+    s3315 = s1483 * s2654 + s1484 * s2655 - s1485 * s2656
+    s3316 = s1492 * s2657 + s1493 * s2658 + s1494 * s2659 + (s1483 * s2660 + s1484 * s2661 + s1485 * s2662)
+    s3317 = s1483 * s2666 + s1484 * s2667 - s1485 * s2668
+    s3318 = s1492 * s2669 + s1493 * s2670 + s1494 * s2671 + (s1483 * s2672 + s1484 * s2673 + s1485 * s2674)
+    s3319 = s1483 * s2678 + s1484 * s2679 - s1485 * s2680
+    s3320 = s1492 * s2681 + s1493 * s2682 + s1494 * s2683 + (s1483 * s2684 + s1484 * s2685 + s1485 * s2686)
+    s3321 = 2.0 * s939
+    s3322 = 2.0 * s941
+    s3323 = 2.0 * s943
+    s3324 = s2519 * s3321
+    s3325 = s3324 + s2522 * s3322 + s2525 * s3323
+    s3326 = s2523 * s3322
+    s3327 = s2520 * s3321 + s3326 + s2526 * s3323
+    s3328 = s2527 * s3323
+    s3329 = s2521 * s3321 + s2524 * s3322 + s3328
+    s3330 = s1279 * s2840 + s1280 * s2841 + s1281 * s2842 + (s1277 * s2845 - s1278 * s2844)
+    s3331 = s1280 * s2840 + s1282 * s2841 + s1283 * s2842 + (s1278 * s2843 - s1276 * s2845)
+    s3332 = s1281 * s2840 + s1283 * s2841 + s1284 * s2842 + (s1276 * s2844 - s1277 * s2843)
+    s3333 = 2.0 * s2831
+    s3334 = 2.0 * s2832
+    s3335 = 2.0 * s2833
+    s3336 = k29 * s2843 + (s1278 * s2841 - s1277 * s2842) + (s2518 * s3334 - s2517 * s3335)
+    s3337 = k29 * s2844 + (s1276 * s2842 - s1278 * s2840) + (s2516 * s3335 - s2518 * s3333)
+    s3338 = k29 * s2845 + (s1277 * s2840 - s1276 * s2841) + (s2517 * s3333 - s2516 * s3334)
+    s3339 = s941 * s2251 - s943 * s2250 + (s3330 + (s2519 * s3333 + s2520 * s3334 + s2521 * s3335))
+    s3340 = s943 * s2249 - s939 * s2251 + (s3331 + (s2522 * s3333 + s2523 * s3334 + s2524 * s3335))
+    s3341 = s939 * s2250 - s941 * s2249 + (s3332 + (s2525 * s3333 + s2526 * s3334 + s2527 * s3335))
+    s3342 = s941 * s2254 - s943 * s2253 + s3336
+    s3343 = s943 * s2252 - s939 * s2254 + s3337
+    s3344 = s939 * s2253 - s941 * s2252 + s3338
+    s3345 = s1279 * s2846 + s1280 * s2847 + s1281 * s2848 + (s1277 * s2851 - s1278 * s2850)
+    s3346 = s1280 * s2846 + s1282 * s2847 + s1283 * s2848 + (s1278 * s2849 - s1276 * s2851)
+    s3347 = s1281 * s2846 + s1283 * s2847 + s1284 * s2848 + (s1276 * s2850 - s1277 * s2849)
+    s3348 = k29 * s2849 + (s1278 * s2847 - s1277 * s2848) + (s2518 * s3322 - s2517 * s3323)
+    s3349 = k29 * s2850 + (s1276 * s2848 - s1278 * s2846) + (s2516 * s3323 - s2518 * s3321)
+    s3350 = k29 * s2851 + (s1277 * s2846 - s1276 * s2847) + (s2517 * s3321 - s2516 * s3322)
+    s3351 = s1498 * s2840 + s1499 * s2841 + s1500 * s2842 + (s1495 * s2843 + s1496 * s2844 + s1497 * s2845)
+    s3352 = s1498 * s2846 + s1499 * s2847 + s1500 * s2848 + (s1495 * s2849 + s1496 * s2850 + s1497 * s2851)
+    s3353 = s3339 + (s1140 * s3344 - s1141 * s3343)
+    s3354 = s3340 + (s1141 * s3342 - s1139 * s3344)
+    s3355 = s3341 + (s1139 * s3343 - s1140 * s3342)
+    s3356 = s3345 + (s3324 + s2520 * s3322 + s2521 * s3323) + (s1140 * s3350 - s1141 * s3349)
+    s3357 = s3346 + (s3326 + s2522 * s3321 + s2524 * s3323) + (s1141 * s3348 - s1139 * s3350)
+    s3358 = s3347 + (s3328 + (s2525 * s3321 + s2526 * s3322)) + (s1139 * s3349 - s1140 * s3348)
+    s3359 = s1501 * s2699 + s1502 * s2700 + s1503 * s2701 + (s1495 * s2741 + s1496 * s2742 + s1497 * s2743)
+    s3360 = s1501 * s2705 + s1502 * s2706 + s1503 * s2707 + (s1495 * s2744 + s1496 * s2745 + s1497 * s2746)
+    s3361 = s15 * s3325 + s18 * s3327 + s21 * s3329
+    s3362 = s3353 + (s1065 * s3344 - s1066 * s3343)
+    s3363 = s3354 + (s1066 * s3342 - s1064 * s3344)
+    s3364 = s3355 + (s1064 * s3343 - s1065 * s3342)
+    s3365 = s3356 + (s1065 * s3350 - s1066 * s3349)
+    s3366 = s3357 + (s1066 * s3348 - s1064 * s3350)
+    s3367 = s3358 + (s1064 * s3349 - s1065 * s3348)
+    s3368 = s1495 * s2654 + s1496 * s2655 - s1497 * s2656
+    s3369 = s1504 * s2657 + s1505 * s2658 + s1506 * s2659 + (s1495 * s2660 + s1496 * s2661 + s1497 * s2662)
+    s3370 = s1495 * s2666 + s1496 * s2667 - s1497 * s2668
+    s3371 = s1504 * s2669 + s1505 * s2670 + s1506 * s2671 + (s1495 * s2672 + s1496 * s2673 + s1497 * s2674)
+    s3372 = s1495 * s2678 + s1496 * s2679 - s1497 * s2680
+    s3373 = s1504 * s2681 + s1505 * s2682 + s1506 * s2683 + (s1495 * s2684 + s1496 * s2685 + s1497 * s2686)
+    s3374 = 2.0 * s945
+    s3375 = 2.0 * s947
+    s3376 = 2.0 * s949
+    s3377 = s2504 * s3374
+    s3378 = s3377 + s2507 * s3375 + s2510 * s3376
+    s3379 = s2508 * s3375
+    s3380 = s2505 * s3374 + s3379 + s2511 * s3376
+    s3381 = s2512 * s3376
+    s3382 = s2506 * s3374 + s2509 * s3375 + s3381
+    s3383 = s1264 * s2870 + s1265 * s2871 + s1266 * s2872 + (s1262 * s2875 - s1263 * s2874)
+    s3384 = s1265 * s2870 + s1267 * s2871 + s1268 * s2872 + (s1263 * s2873 - s1261 * s2875)
+    s3385 = s1266 * s2870 + s1268 * s2871 + s1269 * s2872 + (s1261 * s2874 - s1262 * s2873)
+    s3386 = 2.0 * s2858
+    s3387 = 2.0 * s2859
+    s3388 = 2.0 * s2860
+    s3389 = k29 * s2873 + (s1263 * s2871 - s1262 * s2872) + (s2503 * s3387 - s2502 * s3388)
+    s3390 = k29 * s2874 + (s1261 * s2872 - s1263 * s2870) + (s2501 * s3388 - s2503 * s3386)
+    s3391 = k29 * s2875 + (s1262 * s2870 - s1261 * s2871) + (s2502 * s3386 - s2501 * s3387)
+    s3392 = s947 * s2245 - s949 * s2244 + (s3383 + (s2504 * s3386 + s2505 * s3387 + s2506 * s3388))
+    s3393 = s949 * s2243 - s945 * s2245 + (s3384 + (s2507 * s3386 + s2508 * s3387 + s2509 * s3388))
+    s3394 = s945 * s2244 - s947 * s2243 + (s3385 + (s2510 * s3386 + s2511 * s3387 + s2512 * s3388))
+    s3395 = s947 * s2248 - s949 * s2247 + s3389
+    s3396 = s949 * s2246 - s945 * s2248 + s3390
+    s3397 = s945 * s2247 - s947 * s2246 + s3391
+    s3398 = s1264 * s2876 + s1265 * s2877 + s1266 * s2878 + (s1262 * s2881 - s1263 * s2880)
+    s3399 = s1265 * s2876 + s1267 * s2877 + s1268 * s2878 + (s1263 * s2879 - s1261 * s2881)
+    s3400 = s1266 * s2876 + s1268 * s2877 + s1269 * s2878 + (s1261 * s2880 - s1262 * s2879)
+    s3401 = k29 * s2879 + (s1263 * s2877 - s1262 * s2878) + (s2503 * s3375 - s2502 * s3376)
+    s3402 = k29 * s2880 + (s1261 * s2878 - s1263 * s2876) + (s2501 * s3376 - s2503 * s3374)
+    s3403 = k29 * s2881 + (s1262 * s2876 - s1261 * s2877) + (s2502 * s3374 - s2501 * s3375)
+    s3404 = s1510 * s2870 + s1511 * s2871 + s1512 * s2872 + (s1507 * s2873 + s1508 * s2874 + s1509 * s2875)
+    s3405 = s1510 * s2876 + s1511 * s2877 + s1512 * s2878 + (s1507 * s2879 + s1508 * s2880 + s1509 * s2881)
+    s3406 = s3392 + (s1160 * s3397 - s1161 * s3396)
+    s3407 = s3393 + (s1161 * s3395 - s1159 * s3397)
+    s3408 = s3394 + (s1159 * s3396 - s1160 * s3395)
+    s3409 = s3398 + (s3377 + s2505 * s3375 + s2506 * s3376) + (s1160 * s3403 - s1161 * s3402)
+    s3410 = s3399 + (s3379 + s2507 * s3374 + s2509 * s3376) + (s1161 * s3401 - s1159 * s3403)
+    s3411 = s3400 + (s3381 + (s2510 * s3374 + s2511 * s3375)) + (s1159 * s3402 - s1160 * s3401)
+    s3412 = s1513 * s2699 + s1514 * s2700 + s1515 * s2701 + (s1507 * s2759 + s1508 * s2760 + s1509 * s2761)
+    s3413 = s1513 * s2705 + s1514 * s2706 + s1515 * s2707 + (s1507 * s2762 + s1508 * s2763 + s1509 * s2764)
+    s3414 = s15 * s3378 + s18 * s3380 + s21 * s3382
+    s3415 = s3406 + (s1019 * s3396 - s1016 * s3397)
+    s3416 = s3407 + (s1013 * s3397 - s1019 * s3395)
+    s3417 = s3408 + (s1016 * s3395 - s1013 * s3396)
+    s3418 = s3409 + (s1019 * s3402 - s1016 * s3403)
+    s3419 = s3410 + (s1013 * s3403 - s1019 * s3401)
+    s3420 = s3411 + (s1016 * s3401 - s1013 * s3402)
+    s3421 = s1507 * s2654 + s1508 * s2655 - s1509 * s2656
+    s3422 = s1516 * s2657 + s1517 * s2658 + s1518 * s2659 + (s1507 * s2660 + s1508 * s2661 + s1509 * s2662)
+    s3423 = s1507 * s2666 + s1508 * s2667 - s1509 * s2668
+    s3424 = s1516 * s2669 + s1517 * s2670 + s1518 * s2671 + (s1507 * s2672 + s1508 * s2673 + s1509 * s2674)
+    s3425 = s1507 * s2678 + s1508 * s2679 - s1509 * s2680
+    s3426 = s1516 * s2681 + s1517 * s2682 + s1518 * s2683 + (s1507 * s2684 + s1508 * s2685 + s1509 * s2686)
+    s3427 = s2426 * s3215
+    s3428 = s3427 + s2429 * s3216 + s2432 * s3217
+    s3429 = s2430 * s3216
+    s3430 = s2427 * s3215 + s3429 + s2433 * s3217
+    s3431 = s2434 * s3217
+    s3432 = s2428 * s3215 + s2431 * s3216 + s3431
+    s3433 = s1191 * s2900 + s1195 * s2901 + s1196 * s2902 + (s1184 * s2904 - s1183 * s2905)
+    s3434 = s1195 * s2900 + s1192 * s2901 + s1197 * s2902 + (s1182 * s2905 - s1184 * s2903)
+    s3435 = s1196 * s2900 + s1197 * s2901 + s1194 * s2902 + (s1183 * s2903 - s1182 * s2904)
+    s3436 = 2.0 * s2888
+    s3437 = 2.0 * s2889
+    s3438 = 2.0 * s2890
+    s3439 = m_shank * s2903 + (s1183 * s2902 - s1184 * s2901) + (s2419 * s3437 - s2418 * s3438)
+    s3440 = m_shank * s2904 + (s1184 * s2900 - s1182 * s2902) + (s2417 * s3438 - s2419 * s3436)
+    s3441 = m_shank * s2905 + (s1182 * s2901 - s1183 * s2900) + (s2418 * s3436 - s2417 * s3437)
+    s3442 = s929 * s2194 - s931 * s2193 + (s3433 + (s2426 * s3436 + s2427 * s3437 + s2428 * s3438))
+    s3443 = s931 * s2192 - s927 * s2194 + (s3434 + (s2429 * s3436 + s2430 * s3437 + s2431 * s3438))
+    s3444 = s927 * s2193 - s929 * s2192 + (s3435 + (s2432 * s3436 + s2433 * s3437 + s2434 * s3438))
+    s3445 = s929 * s2184 - s931 * s2183 + s3439
+    s3446 = s931 * s2182 - s927 * s2184 + s3440
+    s3447 = s927 * s2183 - s929 * s2182 + s3441
+    s3448 = s1191 * s2906 + s1195 * s2907 + s1196 * s2908 + (s1184 * s2910 - s1183 * s2911)
+    s3449 = s1195 * s2906 + s1192 * s2907 + s1197 * s2908 + (s1182 * s2911 - s1184 * s2909)
+    s3450 = s1196 * s2906 + s1197 * s2907 + s1194 * s2908 + (s1183 * s2909 - s1182 * s2910)
+    s3451 = m_shank * s2909 + (s1183 * s2908 - s1184 * s2907) + (s2419 * s3216 - s2418 * s3217)
+    s3452 = m_shank * s2910 + (s1184 * s2906 - s1182 * s2908) + (s2417 * s3217 - s2419 * s3215)
+    s3453 = m_shank * s2911 + (s1182 * s2907 - s1183 * s2906) + (s2418 * s3215 - s2417 * s3216)
+    s3454 = s1522 * s2900 + s1523 * s2901 + s1524 * s2902 + (s1519 * s2903 + s1520 * s2904 + s1521 * s2905)
+    s3455 = s3454 + (s2888 * s3428 + s2889 * s3430 + s2890 * s3432)
+    s3456 = s1522 * s2906 + s1523 * s2907 + s1524 * s2908 + (s1519 * s2909 + s1520 * s2910 + s1521 * s2911)
+    s3457 = s927 * s3428 + s929 * s3430 + s931 * s3432
+    s3458 = s3456 + s3457
+    s3459 = s3442 + (s1180 * s3447 - s1181 * s3446)
+    s3460 = s3443 + (s1181 * s3445 - s1179 * s3447)
+    s3461 = s3444 + (s1179 * s3446 - s1180 * s3445)
+    s3462 = s3448 + (s3427 + s2427 * s3216 + s2428 * s3217) + (s1180 * s3453 - s1181 * s3452)
+    s3463 = s3449 + (s3429 + s2429 * s3215 + s2431 * s3217) + (s1181 * s3451 - s1179 * s3453)
+    s3464 = s3450 + (s3431 + (s2432 * s3215 + s2433 * s3216)) + (s1179 * s3452 - s1180 * s3451)
+    s3465 = s1525 * s2783 + s1526 * s2784 + s1527 * s2785 + (s1519 * s2786 + s1520 * s2787 + s1521 * s2788)
+    s3466 = s3465 + (s2771 * s3428 + s2772 * s3430 + s2773 * s3432)
+    s3467 = s1525 * s2789 + s1526 * s2790 + s1527 * s2791 + (s1519 * s2792 + s1520 * s2793 + s1521 * s2794)
+    s3468 = s3457 + s3467
+    s3469 = s3459 + (s1100 * s3447 - s1101 * s3446)
+    s3470 = s3460 + (s1101 * s3445 - s1099 * s3447)
+    s3471 = s3461 + (s1099 * s3446 - s1100 * s3445)
+    s3472 = s3462 + (s1100 * s3453 - s1101 * s3452)
+    s3473 = s3463 + (s1101 * s3451 - s1099 * s3453)
+    s3474 = s3464 + (s1099 * s3452 - s1100 * s3451)
+    s3475 = s1529 * s2699 + s1530 * s2700 + s1531 * s2701 + (s1519 * s2702 + s1520 * s2703 + s1521 * s2704)
+    s3476 = s3475 + (s2657 * s3428 + s2658 * s3430 + s2659 * s3432)
+    s3477 = s1529 * s2705 + s1530 * s2706 + s1531 * s2707 + (s1519 * s2708 + s1520 * s2709 + s1521 * s2710)
+    s3478 = s15 * s3428 + s18 * s3430 + s21 * s3432
+    s3479 = s3477 + s3478
+    s3480 = s3469 + (s1016 * s3447 - s1019 * s3446)
+    s3481 = s3470 + (s1019 * s3445 - s1013 * s3447)
+    s3482 = s3471 + (s1013 * s3446 - s1016 * s3445)
+    s3483 = s3472 + (s1016 * s3453 - s1019 * s3452)
+    s3484 = s3473 + (s1019 * s3451 - s1013 * s3453)
+    s3485 = s3474 + (s1013 * s3452 - s1016 * s3451)
+    s3486 = s1519 * s2654 + s1520 * s2655 - s1521 * s2656
+    s3487 = s1533 * s2657 + s1534 * s2658 + s1535 * s2659 + (s1519 * s2660 + s1520 * s2661 + s1521 * s2662)
+    s3488 = s3478 + s3487
+    s3489 = s1519 * s2666 + s1520 * s2667 - s1521 * s2668
+    s3490 = s1533 * s2669 + s1534 * s2670 + s1535 * s2671 + (s1519 * s2672 + s1520 * s2673 + s1521 * s2674)
+    s3491 = s3490 + (s16 * s3428 + s19 * s3430 + s22 * s3432)
+    s3492 = s1519 * s2678 + s1520 * s2679 - s1521 * s2680
+    s3493 = s1533 * s2681 + s1534 * s2682 + s1535 * s2683 + (s1519 * s2684 + s1520 * s2685 + s1521 * s2686)
+    s3494 = s3493 + (s17 * s3428 + s20 * s3430 + s23 * s3432)
+    s3495 = s2453 * s3268
+    s3496 = s3495 + s2456 * s3269 + s2459 * s3270
+    s3497 = s2457 * s3269
+    s3498 = s2454 * s3268 + s3497 + s2460 * s3270
+    s3499 = s2461 * s3270
+    s3500 = s2455 * s3268 + s2458 * s3269 + s3499
+    s3501 = s1210 * s2933 + s1214 * s2934 + s1215 * s2935 + (s1203 * s2937 - s1202 * s2938)
+    s3502 = s1214 * s2933 + s1211 * s2934 + s1216 * s2935 + (s1201 * s2938 - s1203 * s2936)
+    s3503 = s1215 * s2933 + s1216 * s2934 + s1213 * s2935 + (s1202 * s2936 - s1201 * s2937)
+    s3504 = 2.0 * s2918
+    s3505 = 2.0 * s2919
+    s3506 = 2.0 * s2920
+    s3507 = m_shank * s2936 + (s1202 * s2935 - s1203 * s2934) + (s2440 * s3505 - s2439 * s3506)
+    s3508 = m_shank * s2937 + (s1203 * s2933 - s1201 * s2935) + (s2438 * s3506 - s2440 * s3504)
+    s3509 = m_shank * s2938 + (s1201 * s2934 - s1202 * s2933) + (s2439 * s3504 - s2438 * s3505)
+    s3510 = s935 * s2210 - s937 * s2209 + (s3501 + (s2453 * s3504 + s2454 * s3505 + s2455 * s3506))
+    s3511 = s937 * s2208 - s933 * s2210 + (s3502 + (s2456 * s3504 + s2457 * s3505 + s2458 * s3506))
+    s3512 = s933 * s2209 - s935 * s2208 + (s3503 + (s2459 * s3504 + s2460 * s3505 + s2461 * s3506))
+    s3513 = s935 * s2200 - s937 * s2199 + s3507
+    s3514 = s937 * s2198 - s933 * s2200 + s3508
+    s3515 = s933 * s2199 - s935 * s2198 + s3509
+    s3516 = s1210 * s2939 + s1214 * s2940 + s1215 * s2941 + (s1203 * s2943 - s1202 * s2944)
+    s3517 = s1214 * s2939 + s1211 * s2940 + s1216 * s2941 + (s1201 * s2944 - s1203 * s2942)
+    s3518 = s1215 * s2939 + s1216 * s2940 + s1213 * s2941 + (s1202 * s2942 - s1201 * s2943)
+    s3519 = m_shank * s2942 + (s1202 * s2941 - s1203 * s2940) + (s2440 * s3269 - s2439 * s3270)
+    s3520 = m_shank * s2943 + (s1203 * s2939 - s1201 * s2941) + (s2438 * s3270 - s2440 * s3268)
+    s3521 = m_shank * s2944 + (s1201 * s2940 - s1202 * s2939) + (s2439 * s3268 - s2438 * s3269)
+    s3522 = s1542 * s2933 + s1543 * s2934 + s1544 * s2935 + (s1539 * s2936 + s1540 * s2937 + s1541 * s2938)
+    s3523 = s3522 + (s2918 * s3496 + s2919 * s3498 + s2920 * s3500)
+    s3524 = s1542 * s2939 + s1543 * s2940 + s1544 * s2941 + (s1539 * s2942 + s1540 * s2943 + s1541 * s2944)
+    s3525 = s933 * s3496 + s935 * s3498 + s937 * s3500
+    s3526 = s3524 + s3525
+    s3527 = s3510 + (s1199 * s3515 - s1200 * s3514)
+    s3528 = s3511 + (s1200 * s3513 - s1198 * s3515)
+    s3529 = s3512 + (s1198 * s3514 - s1199 * s3513)
+    s3530 = s3516 + (s3495 + s2454 * s3269 + s2455 * s3270) + (s1199 * s3521 - s1200 * s3520)
+    s3531 = s3517 + (s3497 + s2456 * s3268 + s2458 * s3270) + (s1200 * s3519 - s1198 * s3521)
+    s3532 = s3518 + (s3499 + (s2459 * s3268 + s2460 * s3269)) + (s1198 * s3520 - s1199 * s3519)
+    s3533 = s1545 * s2813 + s1546 * s2814 + s1547 * s2815 + (s1539 * s2816 + s1540 * s2817 + s1541 * s2818)
+    s3534 = s3533 + (s2801 * s3496 + s2802 * s3498 + s2803 * s3500)
+    s3535 = s1545 * s2819 + s1546 * s2820 + s1547 * s2821 + (s1539 * s2822 + s1540 * s2823 + s1541 * s2824)
+    s3536 = s3525 + s3535
+    s3537 = s3527 + (s1120 * s3515 - s1121 * s3514)
+    s3538 = s3528 + (s1121 * s3513 - s1119 * s3515)
+    s3539 = s3529 + (s1119 * s3514 - s1120 * s3513)
+    s3540 = s3530 + (s1120 * s3521 - s1121 * s3520)
+    s3541 = s3531 + (s1121 * s3519 - s1119 * s3521)
+    s3542 = s3532 + (s1119 * s3520 - s1120 * s3519)
+    s3543 = s1549 * s2699 + s1550 * s2700 + s1551 * s2701 + (s1539 * s2723 + s1540 * s2724 + s1541 * s2725)
+    s3544 = s3543 + (s2657 * s3496 + s2658 * s3498 + s2659 * s3500)
+    s3545 = s1549 * s2705 + s1550 * s2706 + s1551 * s2707 + (s1539 * s2726 + s1540 * s2727 + s1541 * s2728)
+    s3546 = s15 * s3496 + s18 * s3498 + s21 * s3500
+    s3547 = s3545 + s3546
+    s3548 = s3537 + (s1046 * s3515 - s1047 * s3514)
+    s3549 = s3538 + (s1047 * s3513 - s1045 * s3515)
+    s3550 = s3539 + (s1045 * s3514 - s1046 * s3513)
+    s3551 = s3540 + (s1046 * s3521 - s1047 * s3520)
+    s3552 = s3541 + (s1047 * s3519 - s1045 * s3521)
+    s3553 = s3542 + (s1045 * s3520 - s1046 * s3519)
+    s3554 = s1539 * s2654 + s1540 * s2655 - s1541 * s2656
+    s3555 = s1553 * s2657 + s1554 * s2658 + s1555 * s2659 + (s1539 * s2660 + s1540 * s2661 + s1541 * s2662)
+    s3556 = s3546 + s3555
+    s3557 = s1539 * s2666 + s1540 * s2667 - s1541 * s2668
+    s3558 = s1553 * s2669 + s1554 * s2670 + s1555 * s2671 + (s1539 * s2672 + s1540 * s2673 + s1541 * s2674)
+    s3559 = s3558 + (s16 * s3496 + s19 * s3498 + s22 * s3500)
+    s3560 = s1539 * s2678 + s1540 * s2679 - s1541 * s2680
+    s3561 = s1553 * s2681 + s1554 * s2682 + s1555 * s2683 + (s1539 * s2684 + s1540 * s2685 + s1541 * s2686)
+    s3562 = s3561 + (s17 * s3496 + s20 * s3498 + s23 * s3500)
+    s3563 = s2471 * s3321
+    s3564 = s3563 + s2474 * s3322 + s2477 * s3323
+    s3565 = s2475 * s3322
+    s3566 = s2472 * s3321 + s3565 + s2478 * s3323
+    s3567 = s2479 * s3323
+    s3568 = s2473 * s3321 + s2476 * s3322 + s3567
+    s3569 = s1229 * s2960 + s1233 * s2961 + s1234 * s2962 + (s1222 * s2964 - s1221 * s2965)
+    s3570 = s1233 * s2960 + s1230 * s2961 + s1235 * s2962 + (s1220 * s2965 - s1222 * s2963)
+    s3571 = s1234 * s2960 + s1235 * s2961 + s1232 * s2962 + (s1221 * s2963 - s1220 * s2964)
+    s3572 = 2.0 * s2951
+    s3573 = 2.0 * s2952
+    s3574 = 2.0 * s2953
+    s3575 = m_shank * s2963 + (s1221 * s2962 - s1222 * s2961) + (s2464 * s3573 - s2463 * s3574)
+    s3576 = m_shank * s2964 + (s1222 * s2960 - s1220 * s2962) + (s2462 * s3574 - s2464 * s3572)
+    s3577 = m_shank * s2965 + (s1220 * s2961 - s1221 * s2960) + (s2463 * s3572 - s2462 * s3573)
+    s3578 = s941 * s2226 - s943 * s2225 + (s3569 + (s2471 * s3572 + s2472 * s3573 + s2473 * s3574))
+    s3579 = s943 * s2224 - s939 * s2226 + (s3570 + (s2474 * s3572 + s2475 * s3573 + s2476 * s3574))
+    s3580 = s939 * s2225 - s941 * s2224 + (s3571 + (s2477 * s3572 + s2478 * s3573 + s2479 * s3574))
+    s3581 = s941 * s2216 - s943 * s2215 + s3575
+    s3582 = s943 * s2214 - s939 * s2216 + s3576
+    s3583 = s939 * s2215 - s941 * s2214 + s3577
+    s3584 = s1229 * s2966 + s1233 * s2967 + s1234 * s2968 + (s1222 * s2970 - s1221 * s2971)
+    s3585 = s1233 * s2966 + s1230 * s2967 + s1235 * s2968 + (s1220 * s2971 - s1222 * s2969)
+    s3586 = s1234 * s2966 + s1235 * s2967 + s1232 * s2968 + (s1221 * s2969 - s1220 * s2970)
+    s3587 = m_shank * s2969 + (s1221 * s2968 - s1222 * s2967) + (s2464 * s3322 - s2463 * s3323)
+    s3588 = m_shank * s2970 + (s1222 * s2966 - s1220 * s2968) + (s2462 * s3323 - s2464 * s3321)
+    s3589 = m_shank * s2971 + (s1220 * s2967 - s1221 * s2966) + (s2463 * s3321 - s2462 * s3322)
+    s3590 = s1562 * s2960 + s1563 * s2961 + s1564 * s2962 + (s1559 * s2963 + s1560 * s2964 + s1561 * s2965)
+    s3591 = s3590 + (s2951 * s3564 + s2952 * s3566 + s2953 * s3568)
+    s3592 = s1562 * s2966 + s1563 * s2967 + s1564 * s2968 + (s1559 * s2969 + s1560 * s2970 + s1561 * s2971)
+    s3593 = s939 * s3564 + s941 * s3566 + s943 * s3568
+    s3594 = s3592 + s3593
+    s3595 = s3578 + (s1218 * s3583 - s1219 * s3582)
+    s3596 = s3579 + (s1219 * s3581 - s1217 * s3583)
+    s3597 = s3580 + (s1217 * s3582 - s1218 * s3581)
+    s3598 = s3584 + (s3563 + s2472 * s3322 + s2473 * s3323) + (s1218 * s3589 - s1219 * s3588)
+    s3599 = s3585 + (s3565 + s2474 * s3321 + s2476 * s3323) + (s1219 * s3587 - s1217 * s3589)
+    s3600 = s3586 + (s3567 + (s2477 * s3321 + s2478 * s3322)) + (s1217 * s3588 - s1218 * s3587)
+    s3601 = s1565 * s2840 + s1566 * s2841 + s1567 * s2842 + (s1559 * s2843 + s1560 * s2844 + s1561 * s2845)
+    s3602 = s3601 + (s2831 * s3564 + s2832 * s3566 + s2833 * s3568)
+    s3603 = s1565 * s2846 + s1566 * s2847 + s1567 * s2848 + (s1559 * s2849 + s1560 * s2850 + s1561 * s2851)
+    s3604 = s3593 + s3603
+    s3605 = s3595 + (s1140 * s3583 - s1141 * s3582)
+    s3606 = s3596 + (s1141 * s3581 - s1139 * s3583)
+    s3607 = s3597 + (s1139 * s3582 - s1140 * s3581)
+    s3608 = s3598 + (s1140 * s3589 - s1141 * s3588)
+    s3609 = s3599 + (s1141 * s3587 - s1139 * s3589)
+    s3610 = s3600 + (s1139 * s3588 - s1140 * s3587)
+    s3611 = s1569 * s2699 + s1570 * s2700 + s1571 * s2701 + (s1559 * s2741 + s1560 * s2742 + s1561 * s2743)
+    s3612 = s3611 + (s2657 * s3564 + s2658 * s3566 + s2659 * s3568)
+    s3613 = s1569 * s2705 + s1570 * s2706 + s1571 * s2707 + (s1559 * s2744 + s1560 * s2745 + s1561 * s2746)
+    s3614 = s15 * s3564 + s18 * s3566 + s21 * s3568
+    s3615 = s3613 + s3614
+    s3616 = s3605 + (s1065 * s3583 - s1066 * s3582)
+    s3617 = s3606 + (s1066 * s3581 - s1064 * s3583)
+    s3618 = s3607 + (s1064 * s3582 - s1065 * s3581)
+    s3619 = s3608 + (s1065 * s3589 - s1066 * s3588)
+    s3620 = s3609 + (s1066 * s3587 - s1064 * s3589)
+    s3621 = s3610 + (s1064 * s3588 - s1065 * s3587)
+    s3622 = s1559 * s2654 + s1560 * s2655 - s1561 * s2656
+    s3623 = s1573 * s2657 + s1574 * s2658 + s1575 * s2659 + (s1559 * s2660 + s1560 * s2661 + s1561 * s2662)
+    s3624 = s3614 + s3623
+    s3625 = s1559 * s2666 + s1560 * s2667 - s1561 * s2668
+    s3626 = s1573 * s2669 + s1574 * s2670 + s1575 * s2671 + (s1559 * s2672 + s1560 * s2673 + s1561 * s2674)
+    s3627 = s3626 + (s16 * s3564 + s19 * s3566 + s22 * s3568)
+    s3628 = s1559 * s2678 + s1560 * s2679 - s1561 * s2680
+    s3629 = s1573 * s2681 + s1574 * s2682 + s1575 * s2683 + (s1559 * s2684 + s1560 * s2685 + s1561 * s2686)
+    s3630 = s3629 + (s17 * s3564 + s20 * s3566 + s23 * s3568)
+    s3631 = s2489 * s3374
+    s3632 = s3631 + s2492 * s3375 + s2495 * s3376
+    s3633 = s2493 * s3375
+    s3634 = s2490 * s3374 + s3633 + s2496 * s3376
+    s3635 = s2497 * s3376
+    s3636 = s2491 * s3374 + s2494 * s3375 + s3635
+    s3637 = s1248 * s2990 + s1252 * s2991 + s1253 * s2992 + (s1241 * s2994 - s1240 * s2995)
+    s3638 = s1252 * s2990 + s1249 * s2991 + s1254 * s2992 + (s1239 * s2995 - s1241 * s2993)
+    s3639 = s1253 * s2990 + s1254 * s2991 + s1251 * s2992 + (s1240 * s2993 - s1239 * s2994)
+    s3640 = 2.0 * s2978
+    s3641 = 2.0 * s2979
+    s3642 = 2.0 * s2980
+    s3643 = m_shank * s2993 + (s1240 * s2992 - s1241 * s2991) + (s2482 * s3641 - s2481 * s3642)
+    s3644 = m_shank * s2994 + (s1241 * s2990 - s1239 * s2992) + (s2480 * s3642 - s2482 * s3640)
+    s3645 = m_shank * s2995 + (s1239 * s2991 - s1240 * s2990) + (s2481 * s3640 - s2480 * s3641)
+    s3646 = s947 * s2242 - s949 * s2241 + (s3637 + (s2489 * s3640 + s2490 * s3641 + s2491 * s3642))
+    s3647 = s949 * s2240 - s945 * s2242 + (s3638 + (s2492 * s3640 + s2493 * s3641 + s2494 * s3642))
+    s3648 = s945 * s2241 - s947 * s2240 + (s3639 + (s2495 * s3640 + s2496 * s3641 + s2497 * s3642))
+    s3649 = s947 * s2232 - s949 * s2231 + s3643
+    s3650 = s949 * s2230 - s945 * s2232 + s3644
+    s3651 = s945 * s2231 - s947 * s2230 + s3645
+    s3652 = s1248 * s2996 + s1252 * s2997 + s1253 * s2998 + (s1241 * s3000 - s1240 * s3001)
+    s3653 = s1252 * s2996 + s1249 * s2997 + s1254 * s2998 + (s1239 * s3001 - s1241 * s2999)
+    s3654 = s1253 * s2996 + s1254 * s2997 + s1251 * s2998 + (s1240 * s2999 - s1239 * s3000)
+    s3655 = m_shank * s2999 + (s1240 * s2998 - s1241 * s2997) + (s2482 * s3375 - s2481 * s3376)
+    s3656 = m_shank * s3000 + (s1241 * s2996 - s1239 * s2998) + (s2480 * s3376 - s2482 * s3374)
+    s3657 = m_shank * s3001 + (s1239 * s2997 - s1240 * s2996) + (s2481 * s3374 - s2480 * s3375)
+    s3658 = s1582 * s2990 + s1583 * s2991 + s1584 * s2992 + (s1579 * s2993 + s1580 * s2994 + s1581 * s2995)
+    s3659 = s3658 + (s2978 * s3632 + s2979 * s3634 + s2980 * s3636)
+    s3660 = s1582 * s2996 + s1583 * s2997 + s1584 * s2998 + (s1579 * s2999 + s1580 * s3000 + s1581 * s3001)
+    s3661 = s945 * s3632 + s947 * s3634 + s949 * s3636
+    s3662 = s3660 + s3661
+    s3663 = s3646 + (s1237 * s3651 - s1238 * s3650)
+    s3664 = s3647 + (s1238 * s3649 - s1236 * s3651)
+    s3665 = s3648 + (s1236 * s3650 - s1237 * s3649)
+    s3666 = s3652 + (s3631 + s2490 * s3375 + s2491 * s3376) + (s1237 * s3657 - s1238 * s3656)
+    s3667 = s3653 + (s3633 + s2492 * s3374 + s2494 * s3376) + (s1238 * s3655 - s1236 * s3657)
+    s3668 = s3654 + (s3635 + (s2495 * s3374 + s2496 * s3375)) + (s1236 * s3656 - s1237 * s3655)
+    s3669 = s1585 * s2870 + s1586 * s2871 + s1587 * s2872 + (s1579 * s2873 + s1580 * s2874 + s1581 * s2875)
+    s3670 = s3669 + (s2858 * s3632 + s2859 * s3634 + s2860 * s3636)
+    s3671 = s1585 * s2876 + s1586 * s2877 + s1587 * s2878 + (s1579 * s2879 + s1580 * s2880 + s1581 * s2881)
+    s3672 = s3661 + s3671
+    s3673 = s3663 + (s1160 * s3651 - s1161 * s3650)
+    s3674 = s3664 + (s1161 * s3649 - s1159 * s3651)
+    s3675 = s3665 + (s1159 * s3650 - s1160 * s3649)
+    s3676 = s3666 + (s1160 * s3657 - s1161 * s3656)
+    s3677 = s3667 + (s1161 * s3655 - s1159 * s3657)
+    s3678 = s3668 + (s1159 * s3656 - s1160 * s3655)
+    s3679 = s1589 * s2699 + s1590 * s2700 + s1591 * s2701 + (s1579 * s2759 + s1580 * s2760 + s1581 * s2761)
+    s3680 = s3679 + (s2657 * s3632 + s2658 * s3634 + s2659 * s3636)
+    s3681 = s1589 * s2705 + s1590 * s2706 + s1591 * s2707 + (s1579 * s2762 + s1580 * s2763 + s1581 * s2764)
+    s3682 = s15 * s3632 + s18 * s3634 + s21 * s3636
+    s3683 = s3681 + s3682
+    s3684 = s3673 + (s1019 * s3650 - s1016 * s3651)
+    s3685 = s3674 + (s1013 * s3651 - s1019 * s3649)
+    s3686 = s3675 + (s1016 * s3649 - s1013 * s3650)
+    s3687 = s3676 + (s1019 * s3656 - s1016 * s3657)
+    s3688 = s3677 + (s1013 * s3657 - s1019 * s3655)
+    s3689 = s3678 + (s1016 * s3655 - s1013 * s3656)
+    s3690 = s1579 * s2654 + s1580 * s2655 - s1581 * s2656
+    s3691 = s1593 * s2657 + s1594 * s2658 + s1595 * s2659 + (s1579 * s2660 + s1580 * s2661 + s1581 * s2662)
+    s3692 = s3682 + s3691
+    s3693 = s1579 * s2666 + s1580 * s2667 - s1581 * s2668
+    s3694 = s1593 * s2669 + s1594 * s2670 + s1595 * s2671 + (s1579 * s2672 + s1580 * s2673 + s1581 * s2674)
+    s3695 = s3694 + (s16 * s3632 + s19 * s3634 + s22 * s3636)
+    s3696 = s1579 * s2678 + s1580 * s2679 - s1581 * s2680
+    s3697 = s1593 * s2681 + s1594 * s2682 + s1595 * s2683 + (s1579 * s2684 + s1580 * s2685 + s1581 * s2686)
+    s3698 = s3697 + (s17 * s3632 + s20 * s3634 + s23 * s3636)
+    s3699 = s3 * s3486 + s4 * s3489 + s5 * s3492
+    s3700 = s3 * s3554 + s4 * s3557 + s5 * s3560
+    s3701 = s3 * s3622 + s4 * s3625 + s5 * s3628
+    s3702 = s3 * s3690 + s4 * s3693 + s5 * s3696
+    s3703 = trunk_qw * s2
+    s3704 = s3486 * s3703 - s5 * s3489 + s4 * s3492
+    s3705 = s3554 * s3703 - s5 * s3557 + s4 * s3560
+    s3706 = s3622 * s3703 - s5 * s3625 + s4 * s3628
+    s3707 = s3690 * s3703 - s5 * s3693 + s4 * s3696
+    s3708 = s3 * s3489 - s4 * s3486 + s3492 * s3703
+    s3709 = s3 * s3557 - s4 * s3554 + s3560 * s3703
+    s3710 = s3 * s3625 - s4 * s3622 + s3628 * s3703
+    s3711 = s3 * s3693 - s4 * s3690 + s3696 * s3703
+    s3712 = s3 * s3262 + s4 * s3264 + s5 * s3266 - s1599 * s3699
+    s3713 = s3 * s3315 + s4 * s3317 + s5 * s3319 - s1614 * s3700
+    s3714 = s3 * s3368 + s4 * s3370 + s5 * s3372 - s1629 * s3701
+    s3715 = s3 * s3050 + s4 * s3052 + s5 * s3054 - s1601 * s3699 - s1616 * s3700 - s1631 * s3701
+    s3716 = s3 * s3032 + s4 * s3034 + s5 * s3036 - s1602 * s3699 - s1617 * s3700 - s1632 * s3701
+    s3717 = s3 * s3014 + s4 * s3016 + s5 * s3018 - s1603 * s3699 - s1618 * s3700 - s1633 * s3701
+    s3718 = s3 * s3010 + s4 * s3028 + s5 * s3046 - s1604 * s3699 - s1619 * s3700 - s1634 * s3701
+    s3719 = s3 * s3009 + s4 * s3027 + s5 * s3045 - s1605 * s3699 - s1620 * s3700 - s1635 * s3701
+    s3720 = s3 * s3008 + s4 * s3026 + s5 * s3044 - s1606 * s3699 - s1621 * s3700 - s1636 * s3701
+    s3721 = s3 * s3421 + s4 * s3423 + s5 * s3425 - s1650 * s3702
+    s3722 = s3 * s3092 + s4 * s3094 + s5 * s3096 - s1600 * s3699 - s1665 * s3712
+    s3723 = s3 * s3131 + s4 * s3133 + s5 * s3135 - s1615 * s3700 - s1693 * s3713
+    s3724 = s3 * s3170 + s4 * s3172 + s5 * s3174 - s1630 * s3701 - s1706 * s3714
+    s3725 = s3 * s3209 + s4 * s3211 + s5 * s3213 - s1651 * s3702 - s1719 * s3721
+    s3726 = s3715 - s1652 * s3702 - s1666 * s3712 - s1694 * s3713 - s1707 * s3714 - s1720 * s3721
+    s3727 = s3716 - s1653 * s3702 - s1667 * s3712 - s1695 * s3713 - s1708 * s3714 - s1721 * s3721
+    s3728 = s3717 - s1654 * s3702 - s1668 * s3712 - s1696 * s3713 - s1709 * s3714 - s1722 * s3721
+    s3729 = s3718 - s1655 * s3702 - s1669 * s3712 - s1697 * s3713 - s1710 * s3714 - s1723 * s3721
+    s3730 = s3719 - s1656 * s3702 - s1670 * s3712 - s1698 * s3713 - s1711 * s3714 - s1724 * s3721
+    s3731 = s3720 - s1657 * s3702 - s1671 * s3712 - s1699 * s3713 - s1712 * s3714 - s1725 * s3721
+    s3732 = s3726 - s1738 * s3722 - s1744 * s3723 - s1765 * s3724 - s1771 * s3725
+    s3733 = s3727 - s1739 * s3722 - s1745 * s3723 - s1766 * s3724 - s1772 * s3725 - s1782 * s3732
+    s3734 = s3728 - s1740 * s3722 - s1746 * s3723 - s1767 * s3724 - s1773 * s3725 - s1783 * s3732
+    s3735 = s3729 - s1741 * s3722 - s1747 * s3723 - s1768 * s3724 - s1774 * s3725 - s1784 * s3732
+    s3736 = s3730 - s1742 * s3722 - s1748 * s3723 - s1769 * s3724 - s1775 * s3725 - s1785 * s3732
+    s3737 = s3731 - s1743 * s3722 - s1749 * s3723 - s1770 * s3724 - s1776 * s3725 - s1786 * s3732
+    s3738 = s3734 - s1792 * s3733
+    s3739 = s3735 - s1793 * s3733 - s1799 * s3738
+    s3740 = s3736 - s1794 * s3733 - s1800 * s3738 + s1807 * s3739
+    s3741 = (s3737 - s1795 * s3733 - s1801 * s3738 + s1808 * s3739 + s1810 * s3740) / pivot_trunk_x_dot
+    s3742 = s3740 / pivot_trunk_y_dot + s1810 * s3741
+    s3743 = s3739 / pivot_trunk_z_dot + s1807 * s3742 + s1808 * s3741
+    s3744 = s3738 / pivot_trunk_wx - s1799 * s3743 - s1800 * s3742 - s1801 * s3741
+    s3745 = s3733 / pivot_trunk_wy - s1792 * s3744 - s1793 * s3743 - s1794 * s3742 - s1795 * s3741
+    s3746 = s3732 / pivot_trunk_wz - s1782 * s3745 - s1783 * s3744 - s1784 * s3743 - s1785 * s3742
+    s3747 = s3746 - s1786 * s3741
+    s3748 = s3725 / pivot_hind_right_abduction_angle_dot - s1771 * s3747 - s1772 * s3745
+    s3749 = s3748 - s1773 * s3744 - s1774 * s3743 - s1775 * s3742 - s1776 * s3741
+    s3750 = s3724 / pivot_hind_left_abduction_angle_dot - s1765 * s3747 - s1766 * s3745
+    s3751 = s3750 - s1767 * s3744 - s1768 * s3743 - s1769 * s3742 - s1770 * s3741
+    s3752 = s3723 / pivot_front_right_abduction_angle_dot - s1744 * s3747 - s1745 * s3745
+    s3753 = s3752 - s1746 * s3744 - s1747 * s3743 - s1748 * s3742 - s1749 * s3741
+    s3754 = s3722 / pivot_front_left_abduction_angle_dot - s1738 * s3747 - s1739 * s3745
+    s3755 = s3754 - s1740 * s3744 - s1741 * s3743 - s1742 * s3742 - s1743 * s3741
+    s3756 = s3721 / pivot_hind_right_swing_angle_dot - s1719 * s3749 - s1720 * s3747 - s1721 * s3745
+    s3757 = s3756 - s1722 * s3744 - s1723 * s3743 - s1724 * s3742 - s1725 * s3741
+    s3758 = s3714 / pivot_hind_left_swing_angle_dot - s1706 * s3751 - s1707 * s3747 - s1708 * s3745
+    s3759 = s3758 - s1709 * s3744 - s1710 * s3743 - s1711 * s3742 - s1712 * s3741
+    s3760 = s3713 / pivot_front_right_swing_angle_dot - s1693 * s3753 - s1694 * s3747
+    s3761 = s3760 - s1695 * s3745 - s1696 * s3744 - s1697 * s3743 - s1698 * s3742 - s1699 * s3741
+    s3762 = s3712 / pivot_front_left_swing_angle_dot - s1665 * s3755 - s1666 * s3747 - s1667 * s3745
+    s3763 = s3762 - s1668 * s3744 - s1669 * s3743 - s1670 * s3742 - s1671 * s3741
+    s3764 = s3702 / pivot_hind_right_knee_angle_dot - s1650 * s3757 - s1651 * s3749 - s1652 * s3747
+    s3765 = s3701 / pivot_hind_left_knee_angle_dot - s1629 * s3759 - s1630 * s3751 - s1631 * s3747
+    s3766 = s3700 / pivot_front_right_knee_angle_dot - s1614 * s3761 - s1615 * s3753 - s1616 * s3747
+    s3767 = s3699 / pivot_front_left_knee_angle_dot - s1599 * s3763 - s1600 * s3755 - s1601 * s3747
+    s3768 = s1599 * s3704 - (s3262 * s3703 - s5 * s3264 + s4 * s3266)
+    s3769 = s1614 * s3705 - (s3315 * s3703 - s5 * s3317 + s4 * s3319)
+    s3770 = s1601 * s3704 - (s3050 * s3703 - s5 * s3052 + s4 * s3054) + s1616 * s3705
+    s3771 = s1602 * s3704 - (s3032 * s3703 - s5 * s3034 + s4 * s3036) + s1617 * s3705
+    s3772 = s1603 * s3704 - (s3014 * s3703 - s5 * s3016 + s4 * s3018) + s1618 * s3705
+    s3773 = s1604 * s3704 - (s3010 * s3703 - s5 * s3028 + s4 * s3046) + s1619 * s3705
+    s3774 = s1605 * s3704 - (s3009 * s3703 - s5 * s3027 + s4 * s3045) + s1620 * s3705
+    s3775 = s1606 * s3704 - (s3008 * s3703 - s5 * s3026 + s4 * s3044) + s1621 * s3705
+    s3776 = s1629 * s3706 - (s3368 * s3703 - s5 * s3370 + s4 * s3372)
+    s3777 = s1650 * s3707 - (s3421 * s3703 - s5 * s3423 + s4 * s3425)
+    s3778 = s1600 * s3704 - (s3092 * s3703 - s5 * s3094 + s4 * s3096) - s1665 * s3768
+    s3779 = s1615 * s3705 - (s3131 * s3703 - s5 * s3133 + s4 * s3135) - s1693 * s3769
+    s3780 = s1630 * s3706 - (s3170 * s3703 - s5 * s3172 + s4 * s3174) - s1706 * s3776
+    s3781 = s3770 + s1631 * s3706 + s1652 * s3707 - s1666 * s3768 - s1694 * s3769 - s1707 * s3776
+    s3782 = s3771 + s1632 * s3706 + s1653 * s3707 - s1667 * s3768 - s1695 * s3769 - s1708 * s3776
+    s3783 = s3772 + s1633 * s3706 + s1654 * s3707 - s1668 * s3768 - s1696 * s3769 - s1709 * s3776
+    s3784 = s3773 + s1634 * s3706 + s1655 * s3707 - s1669 * s3768 - s1697 * s3769 - s1710 * s3776
+    s3785 = s3774 + s1635 * s3706 + s1656 * s3707 - s1670 * s3768 - s1698 * s3769 - s1711 * s3776
+    s3786 = s3775 + s1636 * s3706 + s1657 * s3707 - s1671 * s3768 - s1699 * s3769 - s1712 * s3776
+    s3787 = s1651 * s3707 - (s3209 * s3703 - s5 * s3211 + s4 * s3213) - s1719 * s3777
+    s3788 = s3781 - s1720 * s3777 - s1738 * s3778 - s1744 * s3779 - s1765 * s3780 - s1771 * s3787
+    s3789 = s3782 - s1721 * s3777 - s1739 * s3778 - s1745 * s3779 - s1766 * s3780 - s1772 * s3787
+    s3790 = s3783 - s1722 * s3777 - s1740 * s3778 - s1746 * s3779 - s1767 * s3780 - s1773 * s3787
+    s3791 = s3784 - s1723 * s3777 - s1741 * s3778 - s1747 * s3779 - s1768 * s3780 - s1774 * s3787
+    s3792 = s3785 - s1724 * s3777 - s1742 * s3778 - s1748 * s3779 - s1769 * s3780 - s1775 * s3787
+    s3793 = s3786 - s1725 * s3777 - s1743 * s3778 - s1749 * s3779 - s1770 * s3780 - s1776 * s3787
+    s3794 = s3789 - s1782 * s3788
+    s3795 = s3790 - s1783 * s3788 - s1792 * s3794
+    s3796 = s3791 - s1784 * s3788 - s1793 * s3794 - s1799 * s3795
+    s3797 = s3792 - s1785 * s3788 - s1794 * s3794 - s1800 * s3795 + s1807 * s3796
+    s3798 = s3793 - s1786 * s3788 - s1795 * s3794 - s1801 * s3795 + s1808 * s3796 + s1810 * s3797
+    s3799 = s3798 / pivot_trunk_x_dot
+    s3800 = s3797 / pivot_trunk_y_dot + s1810 * s3799
+    s3801 = s3796 / pivot_trunk_z_dot + s1807 * s3800 + s1808 * s3799
+    s3802 = s3795 / pivot_trunk_wx - s1799 * s3801 - s1800 * s3800 - s1801 * s3799
+    s3803 = s3794 / pivot_trunk_wy - s1792 * s3802 - s1793 * s3801 - s1794 * s3800 - s1795 * s3799
+    s3804 = s3788 / pivot_trunk_wz - s1782 * s3803 - s1783 * s3802 - s1784 * s3801 - s1785 * s3800
+    s3805 = s3804 - s1786 * s3799
+    s3806 = s3787 / pivot_hind_right_abduction_angle_dot - s1771 * s3805 - s1772 * s3803
+    s3807 = s3806 - s1773 * s3802 - s1774 * s3801 - s1775 * s3800 - s1776 * s3799
+    s3808 = s3780 / pivot_hind_left_abduction_angle_dot - s1765 * s3805 - s1766 * s3803
+    s3809 = s3808 - s1767 * s3802 - s1768 * s3801 - s1769 * s3800 - s1770 * s3799
+    s3810 = s3779 / pivot_front_right_abduction_angle_dot - s1744 * s3805 - s1745 * s3803
+    s3811 = s3810 - s1746 * s3802 - s1747 * s3801 - s1748 * s3800 - s1749 * s3799
+    s3812 = s3778 / pivot_front_left_abduction_angle_dot - s1738 * s3805 - s1739 * s3803
+    s3813 = s3812 - s1740 * s3802 - s1741 * s3801 - s1742 * s3800 - s1743 * s3799
+    s3814 = s3777 / pivot_hind_right_swing_angle_dot - s1719 * s3807 - s1720 * s3805 - s1721 * s3803
+    s3815 = s3814 - s1722 * s3802 - s1723 * s3801 - s1724 * s3800 - s1725 * s3799
+    s3816 = s3776 / pivot_hind_left_swing_angle_dot - s1706 * s3809 - s1707 * s3805 - s1708 * s3803
+    s3817 = s3816 - s1709 * s3802 - s1710 * s3801 - s1711 * s3800 - s1712 * s3799
+    s3818 = s3769 / pivot_front_right_swing_angle_dot - s1693 * s3811 - s1694 * s3805
+    s3819 = s3818 - s1695 * s3803 - s1696 * s3802 - s1697 * s3801 - s1698 * s3800 - s1699 * s3799
+    s3820 = s3768 / pivot_front_left_swing_angle_dot - s1665 * s3813 - s1666 * s3805 - s1667 * s3803
+    s3821 = s3820 - s1668 * s3802 - s1669 * s3801 - s1670 * s3800 - s1671 * s3799
+    s3822 = s3707 / pivot_hind_right_knee_angle_dot + s1650 * s3815 + s1651 * s3807 + s1652 * s3805
+    s3823 = s3822 + s1653 * s3803 + s1654 * s3802 + s1655 * s3801 + s1656 * s3800 + s1657 * s3799
+    s3824 = s3706 / pivot_hind_left_knee_angle_dot + s1629 * s3817 + s1630 * s3809 + s1631 * s3805
+    s3825 = s3824 + s1632 * s3803 + s1633 * s3802 + s1634 * s3801 + s1635 * s3800 + s1636 * s3799
+    s3826 = s3705 / pivot_front_right_knee_angle_dot + s1614 * s3819 + s1615 * s3811 + s1616 * s3805
+    s3827 = s3826 + s1617 * s3803 + s1618 * s3802 + s1619 * s3801 + s1620 * s3800 + s1621 * s3799
+    s3828 = s3704 / pivot_front_left_knee_angle_dot + s1599 * s3821 + s1600 * s3813 + s1601 * s3805
+    s3829 = s3828 + s1602 * s3803 + s1603 * s3802 + s1604 * s3801 + s1605 * s3800 + s1606 * s3799
+    s3830 = s3 * s3492 - (s5 * s3486 + s3489 * s3703)
+    s3831 = s3 * s3560 - (s5 * s3554 + s3557 * s3703)
+    s3832 = s3 * s3628 - (s5 * s3622 + s3625 * s3703)
+    s3833 = s3 * s3696 - (s5 * s3690 + s3693 * s3703)
+    s3834 = s3 * s3266 - (s5 * s3262 + s3264 * s3703) - s1599 * s3830
+    s3835 = s3 * s3319 - (s5 * s3315 + s3317 * s3703) - s1614 * s3831
+    s3836 = s3 * s3054 - (s5 * s3050 + s3052 * s3703) - s1601 * s3830 - s1616 * s3831
+    s3837 = s3 * s3036 - (s5 * s3032 + s3034 * s3703) - s1602 * s3830 - s1617 * s3831
+    s3838 = s3 * s3018 - (s5 * s3014 + s3016 * s3703) - s1603 * s3830 - s1618 * s3831
+    s3839 = s3 * s3046 - (s5 * s3010 + s3028 * s3703) - s1604 * s3830 - s1619 * s3831
+    s3840 = s3 * s3045 - (s5 * s3009 + s3027 * s3703) - s1605 * s3830 - s1620 * s3831
+    s3841 = s3 * s3044 - (s5 * s3008 + s3026 * s3703) - s1606 * s3830 - s1621 * s3831
+    s3842 = s3 * s3372 - (s5 * s3368 + s3370 * s3703) - s1629 * s3832
+    s3843 = s3 * s3425 - (s5 * s3421 + s3423 * s3703) - s1650 * s3833
+    s3844 = s3 * s3096 - (s5 * s3092 + s3094 * s3703) - s1600 * s3830 - s1665 * s3834
+    s3845 = s3 * s3135 - (s5 * s3131 + s3133 * s3703) - s1615 * s3831 - s1693 * s3835
+    s3846 = s3 * s3174 - (s5 * s3170 + s3172 * s3703) - s1630 * s3832 - s1706 * s3842
+    s3847 = s3836 - s1631 * s3832 - s1652 * s3833 - s1666 * s3834 - s1694 * s3835 - s1707 * s3842
+    s3848 = s3837 - s1632 * s3832 - s1653 * s3833 - s1667 * s3834 - s1695 * s3835 - s1708 * s3842
+    s3849 = s3838 - s1633 * s3832 - s1654 * s3833 - s1668 * s3834 - s1696 * s3835 - s1709 * s3842
+    s3850 = s3839 - s1634 * s3832 - s1655 * s3833 - s1669 * s3834 - s1697 * s3835 - s1710 * s3842
+    s3851 = s3840 - s1635 * s3832 - s1656 * s3833 - s1670 * s3834 - s1698 * s3835 - s1711 * s3842
+    s3852 = s3841 - s1636 * s3832 - s1657 * s3833 - s1671 * s3834 - s1699 * s3835 - s1712 * s3842
+    s3853 = s3 * s3213 - (s5 * s3209 + s3211 * s3703) - s1651 * s3833 - s1719 * s3843
+    s3854 = s3847 - s1720 * s3843 - s1738 * s3844 - s1744 * s3845 - s1765 * s3846 - s1771 * s3853
+    s3855 = s3848 - s1721 * s3843 - s1739 * s3844 - s1745 * s3845 - s1766 * s3846 - s1772 * s3853
+    s3856 = s3849 - s1722 * s3843 - s1740 * s3844 - s1746 * s3845 - s1767 * s3846 - s1773 * s3853
+    s3857 = s3850 - s1723 * s3843 - s1741 * s3844 - s1747 * s3845 - s1768 * s3846 - s1774 * s3853
+    s3858 = s3851 - s1724 * s3843 - s1742 * s3844 - s1748 * s3845 - s1769 * s3846 - s1775 * s3853
+    s3859 = s3852 - s1725 * s3843 - s1743 * s3844 - s1749 * s3845 - s1770 * s3846 - s1776 * s3853
+    s3860 = s3855 - s1782 * s3854
+    s3861 = s3856 - s1783 * s3854 - s1792 * s3860
+    s3862 = s3857 - s1784 * s3854 - s1793 * s3860 - s1799 * s3861
+    s3863 = s3858 - s1785 * s3854 - s1794 * s3860 - s1800 * s3861 + s1807 * s3862
+    s3864 = s3859 - s1786 * s3854 - s1795 * s3860 - s1801 * s3861 + s1808 * s3862 + s1810 * s3863
+    s3865 = s3864 / pivot_trunk_x_dot
+    s3866 = s3863 / pivot_trunk_y_dot + s1810 * s3865
+    s3867 = s3862 / pivot_trunk_z_dot + s1807 * s3866 + s1808 * s3865
+    s3868 = s3861 / pivot_trunk_wx - s1799 * s3867 - s1800 * s3866 - s1801 * s3865
+    s3869 = s3860 / pivot_trunk_wy - s1792 * s3868 - s1793 * s3867 - s1794 * s3866 - s1795 * s3865
+    s3870 = s3854 / pivot_trunk_wz - s1782 * s3869 - s1783 * s3868 - s1784 * s3867 - s1785 * s3866
+    s3871 = s3870 - s1786 * s3865
+    s3872 = s3853 / pivot_hind_right_abduction_angle_dot - s1771 * s3871 - s1772 * s3869
+    s3873 = s3872 - s1773 * s3868 - s1774 * s3867 - s1775 * s3866 - s1776 * s3865
+    s3874 = s3846 / pivot_hind_left_abduction_angle_dot - s1765 * s3871 - s1766 * s3869
+    s3875 = s3874 - s1767 * s3868 - s1768 * s3867 - s1769 * s3866 - s1770 * s3865
+    s3876 = s3845 / pivot_front_right_abduction_angle_dot - s1744 * s3871 - s1745 * s3869
+    s3877 = s3876 - s1746 * s3868 - s1747 * s3867 - s1748 * s3866 - s1749 * s3865
+    s3878 = s3844 / pivot_front_left_abduction_angle_dot - s1738 * s3871 - s1739 * s3869
+    s3879 = s3878 - s1740 * s3868 - s1741 * s3867 - s1742 * s3866 - s1743 * s3865
+    s3880 = s3843 / pivot_hind_right_swing_angle_dot - s1719 * s3873 - s1720 * s3871 - s1721 * s3869
+    s3881 = s3880 - s1722 * s3868 - s1723 * s3867 - s1724 * s3866 - s1725 * s3865
+    s3882 = s3842 / pivot_hind_left_swing_angle_dot - s1706 * s3875 - s1707 * s3871 - s1708 * s3869
+    s3883 = s3882 - s1709 * s3868 - s1710 * s3867 - s1711 * s3866 - s1712 * s3865
+    s3884 = s3835 / pivot_front_right_swing_angle_dot - s1693 * s3877 - s1694 * s3871
+    s3885 = s3884 - s1695 * s3869 - s1696 * s3868 - s1697 * s3867 - s1698 * s3866 - s1699 * s3865
+    s3886 = s3834 / pivot_front_left_swing_angle_dot - s1665 * s3879 - s1666 * s3871 - s1667 * s3869
+    s3887 = s3886 - s1668 * s3868 - s1669 * s3867 - s1670 * s3866 - s1671 * s3865
+    s3888 = s3833 / pivot_hind_right_knee_angle_dot - s1650 * s3881 - s1651 * s3873 - s1652 * s3871
+    s3889 = s3832 / pivot_hind_left_knee_angle_dot - s1629 * s3883 - s1630 * s3875 - s1631 * s3871
+    s3890 = s3831 / pivot_front_right_knee_angle_dot - s1614 * s3885 - s1615 * s3877 - s1616 * s3871
+    s3891 = s3830 / pivot_front_left_knee_angle_dot - s1599 * s3887 - s1600 * s3879 - s1601 * s3871
+    s3892 = s1599 * s3708 - (s3 * s3264 - s4 * s3262 + s3266 * s3703)
+    s3893 = s1614 * s3709 - (s3 * s3317 - s4 * s3315 + s3319 * s3703)
+    s3894 = s1601 * s3708 - (s3 * s3052 - s4 * s3050 + s3054 * s3703) + s1616 * s3709
+    s3895 = s1602 * s3708 - (s3 * s3034 - s4 * s3032 + s3036 * s3703) + s1617 * s3709
+    s3896 = s1603 * s3708 - (s3 * s3016 - s4 * s3014 + s3018 * s3703) + s1618 * s3709
+    s3897 = s1604 * s3708 - (s3 * s3028 - s4 * s3010 + s3046 * s3703) + s1619 * s3709
+    s3898 = s1605 * s3708 - (s3 * s3027 - s4 * s3009 + s3045 * s3703) + s1620 * s3709
+    s3899 = s1606 * s3708 - (s3 * s3026 - s4 * s3008 + s3044 * s3703) + s1621 * s3709
+    s3900 = s1629 * s3710 - (s3 * s3370 - s4 * s3368 + s3372 * s3703)
+    s3901 = s1650 * s3711 - (s3 * s3423 - s4 * s3421 + s3425 * s3703)
+    s3902 = s1600 * s3708 - (s3 * s3094 - s4 * s3092 + s3096 * s3703) - s1665 * s3892
+    s3903 = s1615 * s3709 - (s3 * s3133 - s4 * s3131 + s3135 * s3703) - s1693 * s3893
+    s3904 = s1630 * s3710 - (s3 * s3172 - s4 * s3170 + s3174 * s3703) - s1706 * s3900
+    s3905 = s3894 + s1631 * s3710 + s1652 * s3711 - s1666 * s3892 - s1694 * s3893 - s1707 * s3900
+    s3906 = s3895 + s1632 * s3710 + s1653 * s3711 - s1667 * s3892 - s1695 * s3893 - s1708 * s3900
+    s3907 = s3896 + s1633 * s3710 + s1654 * s3711 - s1668 * s3892 - s1696 * s3893 - s1709 * s3900
+    s3908 = s3897 + s1634 * s3710 + s1655 * s3711 - s1669 * s3892 - s1697 * s3893 - s1710 * s3900
+    s3909 = s3898 + s1635 * s3710 + s1656 * s3711 - s1670 * s3892 - s1698 * s3893 - s1711 * s3900
+    s3910 = s3899 + s1636 * s3710 + s1657 * s3711 - s1671 * s3892 - s1699 * s3893 - s1712 * s3900
+    s3911 = s1651 * s3711 - (s3 * s3211 - s4 * s3209 + s3213 * s3703) - s1719 * s3901
+    s3912 = s3905 - s1720 * s3901 - s1738 * s3902 - s1744 * s3903 - s1765 * s3904 - s1771 * s3911
+    s3913 = s3906 - s1721 * s3901 - s1739 * s3902 - s1745 * s3903 - s1766 * s3904 - s1772 * s3911
+    s3914 = s3907 - s1722 * s3901 - s1740 * s3902 - s1746 * s3903 - s1767 * s3904 - s1773 * s3911
+    s3915 = s3908 - s1723 * s3901 - s1741 * s3902 - s1747 * s3903 - s1768 * s3904 - s1774 * s3911
+    s3916 = s3909 - s1724 * s3901 - s1742 * s3902 - s1748 * s3903 - s1769 * s3904 - s1775 * s3911
+    s3917 = s3910 - s1725 * s3901 - s1743 * s3902 - s1749 * s3903 - s1770 * s3904 - s1776 * s3911
+    s3918 = s3913 - s1782 * s3912
+    s3919 = s3914 - s1783 * s3912 - s1792 * s3918
+    s3920 = s3915 - s1784 * s3912 - s1793 * s3918 - s1799 * s3919
+    s3921 = s3916 - s1785 * s3912 - s1794 * s3918 - s1800 * s3919 + s1807 * s3920
+    s3922 = s3917 - s1786 * s3912 - s1795 * s3918 - s1801 * s3919 + s1808 * s3920 + s1810 * s3921
+    s3923 = s3922 / pivot_trunk_x_dot
+    s3924 = s3921 / pivot_trunk_y_dot + s1810 * s3923
+    s3925 = s3920 / pivot_trunk_z_dot + s1807 * s3924 + s1808 * s3923
+    s3926 = s3919 / pivot_trunk_wx - s1799 * s3925 - s1800 * s3924 - s1801 * s3923
+    s3927 = s3918 / pivot_trunk_wy - s1792 * s3926 - s1793 * s3925 - s1794 * s3924 - s1795 * s3923
+    s3928 = s3912 / pivot_trunk_wz - s1782 * s3927 - s1783 * s3926 - s1784 * s3925 - s1785 * s3924
+    s3929 = s3928 - s1786 * s3923
+    s3930 = s3911 / pivot_hind_right_abduction_angle_dot - s1771 * s3929 - s1772 * s3927
+    s3931 = s3930 - s1773 * s3926 - s1774 * s3925 - s1775 * s3924 - s1776 * s3923
+    s3932 = s3904 / pivot_hind_left_abduction_angle_dot - s1765 * s3929 - s1766 * s3927
+    s3933 = s3932 - s1767 * s3926 - s1768 * s3925 - s1769 * s3924 - s1770 * s3923
+    s3934 = s3903 / pivot_front_right_abduction_angle_dot - s1744 * s3929 - s1745 * s3927
+    s3935 = s3934 - s1746 * s3926 - s1747 * s3925 - s1748 * s3924 - s1749 * s3923
+    s3936 = s3902 / pivot_front_left_abduction_angle_dot - s1738 * s3929 - s1739 * s3927
+    s3937 = s3936 - s1740 * s3926 - s1741 * s3925 - s1742 * s3924 - s1743 * s3923
+    s3938 = s3901 / pivot_hind_right_swing_angle_dot - s1719 * s3931 - s1720 * s3929 - s1721 * s3927
+    s3939 = s3938 - s1722 * s3926 - s1723 * s3925 - s1724 * s3924 - s1725 * s3923
+    s3940 = s3900 / pivot_hind_left_swing_angle_dot - s1706 * s3933 - s1707 * s3929 - s1708 * s3927
+    s3941 = s3940 - s1709 * s3926 - s1710 * s3925 - s1711 * s3924 - s1712 * s3923
+    s3942 = s3893 / pivot_front_right_swing_angle_dot - s1693 * s3935 - s1694 * s3929
+    s3943 = s3942 - s1695 * s3927 - s1696 * s3926 - s1697 * s3925 - s1698 * s3924 - s1699 * s3923
+    s3944 = s3892 / pivot_front_left_swing_angle_dot - s1665 * s3937 - s1666 * s3929 - s1667 * s3927
+    s3945 = s3944 - s1668 * s3926 - s1669 * s3925 - s1670 * s3924 - s1671 * s3923
+    s3946 = s3711 / pivot_hind_right_knee_angle_dot + s1650 * s3939 + s1651 * s3931 + s1652 * s3929
+    s3947 = s3946 + s1653 * s3927 + s1654 * s3926 + s1655 * s3925 + s1656 * s3924 + s1657 * s3923
+    s3948 = s3710 / pivot_hind_left_knee_angle_dot + s1629 * s3941 + s1630 * s3933 + s1631 * s3929
+    s3949 = s3948 + s1632 * s3927 + s1633 * s3926 + s1634 * s3925 + s1635 * s3924 + s1636 * s3923
+    s3950 = s3709 / pivot_front_right_knee_angle_dot + s1614 * s3943 + s1615 * s3935 + s1616 * s3929
+    s3951 = s3950 + s1617 * s3927 + s1618 * s3926 + s1619 * s3925 + s1620 * s3924 + s1621 * s3923
+    s3952 = s3708 / pivot_front_left_knee_angle_dot + s1599 * s3945 + s1600 * s3937 + s1601 * s3929
+    s3953 = s3952 + s1602 * s3927 + s1603 * s3926 + s1604 * s3925 + s1605 * s3924 + s1606 * s3923
+    s3954 = s1599 * s3476 - (s3253 + (s2657 * s3219 + s2658 * s3221 + s2659 * s3223))
+    s3955 = s1600 * s3476 - (s3083 + (s2657 * s3057 + s2658 * s3059 + s2659 * s3061))
+    s3956 = s3955 - s1665 * s3954
+    s3957 = s1601 * s3476 - (s17 * s3086 + s20 * s3087 + s23 * s3088) - s1666 * s3954
+    s3958 = s1602 * s3476 - (s16 * s3086 + s19 * s3087 + s22 * s3088) - s1667 * s3954
+    s3959 = s1603 * s3476 - (s15 * s3086 + s18 * s3087 + s21 * s3088) - s1668 * s3954
+    s3960 = s3957 - s1738 * s3956
+    s3961 = s3958 - s1739 * s3956 - s1782 * s3960
+    s3962 = s3959 - s1740 * s3956 - s1783 * s3960 - s1792 * s3961
+    s3963 = s1604 * s3476 - s3076 - s1669 * s3954 - s1741 * s3956 - s1784 * s3960 - s1793 * s3961
+    s3964 = s1605 * s3476 - s3075 - s1670 * s3954 - s1742 * s3956 - s1785 * s3960 - s1794 * s3961
+    s3965 = s1606 * s3476 - s3074 - s1671 * s3954 - s1743 * s3956 - s1786 * s3960 - s1795 * s3961
+    s3966 = s3963 - s1799 * s3962
+    s3967 = s3964 - s1800 * s3962 + s1807 * s3966
+    s3968 = (s3965 - s1801 * s3962 + s1808 * s3966 + s1810 * s3967) / pivot_trunk_x_dot
+    s3969 = s3967 / pivot_trunk_y_dot + s1810 * s3968
+    s3970 = s3966 / pivot_trunk_z_dot + s1807 * s3969 + s1808 * s3968
+    s3971 = s3962 / pivot_trunk_wx - s1799 * s3970 - s1800 * s3969 - s1801 * s3968
+    s3972 = s3961 / pivot_trunk_wy - s1792 * s3971 - s1793 * s3970 - s1794 * s3969 - s1795 * s3968
+    s3973 = s3960 / pivot_trunk_wz - s1782 * s3972 - s1783 * s3971 - s1784 * s3970 - s1785 * s3969
+    s3974 = s3973 - s1786 * s3968
+    s3975 = s1771 * s3974 + s1772 * s3972 + s1773 * s3971 + s1774 * s3970 + s1775 * s3969
+    s3976 = s3975 + s1776 * s3968
+    s3977 = s1765 * s3974 + s1766 * s3972 + s1767 * s3971 + s1768 * s3970 + s1769 * s3969
+    s3978 = s3977 + s1770 * s3968
+    s3979 = s1744 * s3974 + s1745 * s3972 + s1746 * s3971 + s1747 * s3970 + s1748 * s3969
+    s3980 = s3979 + s1749 * s3968
+    s3981 = s3956 / pivot_front_left_abduction_angle_dot - s1738 * s3974 - s1739 * s3972
+    s3982 = s3981 - s1740 * s3971 - s1741 * s3970 - s1742 * s3969 - s1743 * s3968
+    s3983 = s1719 * s3976 - s1720 * s3974 - s1721 * s3972 - s1722 * s3971 - s1723 * s3970
+    s3984 = s3983 - s1724 * s3969 - s1725 * s3968
+    s3985 = s1706 * s3978 - s1707 * s3974 - s1708 * s3972 - s1709 * s3971 - s1710 * s3970
+    s3986 = s3985 - s1711 * s3969 - s1712 * s3968
+    s3987 = s1693 * s3980 - s1694 * s3974 - s1695 * s3972 - s1696 * s3971 - s1697 * s3970
+    s3988 = s3987 - s1698 * s3969 - s1699 * s3968
+    s3989 = s3954 / pivot_front_left_swing_angle_dot - s1665 * s3982 - s1666 * s3974 - s1667 * s3972
+    s3990 = s3989 - s1668 * s3971 - s1669 * s3970 - s1670 * s3969 - s1671 * s3968
+    s3991 = s1651 * s3976 - s1650 * s3984 - s1652 * s3974 - s1653 * s3972 - s1654 * s3971
+    s3992 = s1630 * s3978 - s1629 * s3986 - s1631 * s3974 - s1632 * s3972 - s1633 * s3971
+    s3993 = s1615 * s3980 - s1614 * s3988 - s1616 * s3974 - s1617 * s3972 - s1618 * s3971
+    s3994 = s3476 / pivot_front_left_knee_angle_dot + s1599 * s3990 + s1600 * s3982 + s1601 * s3974
+    s3995 = s3994 + s1602 * s3972 + s1603 * s3971 + s1604 * s3970 + s1605 * s3969 + s1606 * s3968
+    s3996 = s1614 * s3544 - (s3306 + (s2657 * s3272 + s2658 * s3274 + s2659 * s3276))
+    s3997 = s1615 * s3544 - (s3122 + (s2657 * s3099 + s2658 * s3101 + s2659 * s3103))
+    s3998 = s3997 - s1693 * s3996
+    s3999 = s1616 * s3544 - (s17 * s3125 + s20 * s3126 + s23 * s3127) - s1694 * s3996
+    s4000 = s1617 * s3544 - (s16 * s3125 + s19 * s3126 + s22 * s3127) - s1695 * s3996
+    s4001 = s1618 * s3544 - (s15 * s3125 + s18 * s3126 + s21 * s3127) - s1696 * s3996
+    s4002 = s3999 - s1744 * s3998
+    s4003 = s4000 - s1745 * s3998 - s1782 * s4002
+    s4004 = s4001 - s1746 * s3998 - s1783 * s4002 - s1792 * s4003
+    s4005 = s1619 * s3544 - s3115 - s1697 * s3996 - s1747 * s3998 - s1784 * s4002 - s1793 * s4003
+    s4006 = s1620 * s3544 - s3114 - s1698 * s3996 - s1748 * s3998 - s1785 * s4002 - s1794 * s4003
+    s4007 = s1621 * s3544 - s3113 - s1699 * s3996 - s1749 * s3998 - s1786 * s4002 - s1795 * s4003
+    s4008 = s4005 - s1799 * s4004
+    s4009 = s4006 - s1800 * s4004 + s1807 * s4008
+    s4010 = (s4007 - s1801 * s4004 + s1808 * s4008 + s1810 * s4009) / pivot_trunk_x_dot
+    s4011 = s4009 / pivot_trunk_y_dot + s1810 * s4010
+    s4012 = s4008 / pivot_trunk_z_dot + s1807 * s4011 + s1808 * s4010
+    s4013 = s4004 / pivot_trunk_wx - s1799 * s4012 - s1800 * s4011 - s1801 * s4010
+    s4014 = s4003 / pivot_trunk_wy - s1792 * s4013 - s1793 * s4012 - s1794 * s4011 - s1795 * s4010
+    s4015 = s4002 / pivot_trunk_wz - s1782 * s4014 - s1783 * s4013 - s1784 * s4012 - s1785 * s4011
+    s4016 = s4015 - s1786 * s4010
+    s4017 = s1771 * s4016 + s1772 * s4014 + s1773 * s4013 + s1774 * s4012 + s1775 * s4011
+    s4018 = s4017 + s1776 * s4010
+    s4019 = s1765 * s4016 + s1766 * s4014 + s1767 * s4013 + s1768 * s4012 + s1769 * s4011
+    s4020 = s4019 + s1770 * s4010
+    s4021 = s3998 / pivot_front_right_abduction_angle_dot - s1744 * s4016 - s1745 * s4014
+    s4022 = s4021 - s1746 * s4013 - s1747 * s4012 - s1748 * s4011 - s1749 * s4010
+    s4023 = s1738 * s4016 + s1739 * s4014 + s1740 * s4013 + s1741 * s4012 + s1742 * s4011
+    s4024 = s4023 + s1743 * s4010
+    s4025 = s1719 * s4018 - s1720 * s4016 - s1721 * s4014 - s1722 * s4013 - s1723 * s4012
+    s4026 = s4025 - s1724 * s4011 - s1725 * s4010
+    s4027 = s1706 * s4020 - s1707 * s4016 - s1708 * s4014 - s1709 * s4013 - s1710 * s4012
+    s4028 = s4027 - s1711 * s4011 - s1712 * s4010
+    s4029 = s3996 / pivot_front_right_swing_angle_dot - s1693 * s4022 - s1694 * s4016
+    s4030 = s4029 - s1695 * s4014 - s1696 * s4013 - s1697 * s4012 - s1698 * s4011 - s1699 * s4010
+    s4031 = s1665 * s4024 - s1666 * s4016 - s1667 * s4014 - s1668 * s4013 - s1669 * s4012
+    s4032 = s4031 - s1670 * s4011 - s1671 * s4010
+    s4033 = s1651 * s4018 - s1650 * s4026 - s1652 * s4016 - s1653 * s4014 - s1654 * s4013
+    s4034 = s1630 * s4020 - s1629 * s4028 - s1631 * s4016 - s1632 * s4014 - s1633 * s4013
+    s4035 = s3544 / pivot_front_right_knee_angle_dot + s1614 * s4030 + s1615 * s4022 + s1616 * s4016
+    s4036 = s4035 + s1617 * s4014 + s1618 * s4013 + s1619 * s4012 + s1620 * s4011 + s1621 * s4010
+    s4037 = s1600 * s4024 - s1599 * s4032 - s1601 * s4016 - s1602 * s4014 - s1603 * s4013
+    s4038 = s1629 * s3612 - (s3359 + (s2657 * s3325 + s2658 * s3327 + s2659 * s3329))
+    s4039 = s1630 * s3612 - (s3161 + (s2657 * s3138 + s2658 * s3140 + s2659 * s3142))
+    s4040 = s4039 - s1706 * s4038
+    s4041 = s1631 * s3612 - (s17 * s3164 + s20 * s3165 + s23 * s3166) - s1707 * s4038
+    s4042 = s1632 * s3612 - (s16 * s3164 + s19 * s3165 + s22 * s3166) - s1708 * s4038
+    s4043 = s1633 * s3612 - (s15 * s3164 + s18 * s3165 + s21 * s3166) - s1709 * s4038
+    s4044 = s4041 - s1765 * s4040
+    s4045 = s4042 - s1766 * s4040 - s1782 * s4044
+    s4046 = s4043 - s1767 * s4040 - s1783 * s4044 - s1792 * s4045
+    s4047 = s1634 * s3612 - s3154 - s1710 * s4038 - s1768 * s4040 - s1784 * s4044 - s1793 * s4045
+    s4048 = s1635 * s3612 - s3153 - s1711 * s4038 - s1769 * s4040 - s1785 * s4044 - s1794 * s4045
+    s4049 = s1636 * s3612 - s3152 - s1712 * s4038 - s1770 * s4040 - s1786 * s4044 - s1795 * s4045
+    s4050 = s4047 - s1799 * s4046
+    s4051 = s4048 - s1800 * s4046 + s1807 * s4050
+    s4052 = (s4049 - s1801 * s4046 + s1808 * s4050 + s1810 * s4051) / pivot_trunk_x_dot
+    s4053 = s4051 / pivot_trunk_y_dot + s1810 * s4052
+    s4054 = s4050 / pivot_trunk_z_dot + s1807 * s4053 + s1808 * s4052
+    s4055 = s4046 / pivot_trunk_wx - s1799 * s4054 - s1800 * s4053 - s1801 * s4052
+    s4056 = s4045 / pivot_trunk_wy - s1792 * s4055 - s1793 * s4054 - s1794 * s4053 - s1795 * s4052
+    s4057 = s4044 / pivot_trunk_wz - s1782 * s4056 - s1783 * s4055 - s1784 * s4054 - s1785 * s4053
+    s4058 = s4057 - s1786 * s4052
+    s4059 = s1771 * s4058 + s1772 * s4056 + s1773 * s4055 + s1774 * s4054 + s1775 * s4053
+    s4060 = s4059 + s1776 * s4052
+    s4061 = s4040 / pivot_hind_left_abduction_angle_dot - s1765 * s4058 - s1766 * s4056
+    s4062 = s4061 - s1767 * s4055 - s1768 * s4054 - s1769 * s4053 - s1770 * s4052
+    s4063 = s1744 * s4058 + s1745 * s4056 + s1746 * s4055 + s1747 * s4054 + s1748 * s4053
+    s4064 = s4063 + s1749 * s4052
+    s4065 = s1738 * s4058 + s1739 * s4056 + s1740 * s4055 + s1741 * s4054 + s1742 * s4053
+    s4066 = s4065 + s1743 * s4052
+    s4067 = s1719 * s4060 - s1720 * s4058 - s1721 * s4056 - s1722 * s4055 - s1723 * s4054
+    s4068 = s4067 - s1724 * s4053 - s1725 * s4052
+    s4069 = s4038 / pivot_hind_left_swing_angle_dot - s1706 * s4062 - s1707 * s4058 - s1708 * s4056
+    s4070 = s4069 - s1709 * s4055 - s1710 * s4054 - s1711 * s4053 - s1712 * s4052
+    s4071 = s1693 * s4064 - s1694 * s4058 - s1695 * s4056 - s1696 * s4055 - s1697 * s4054
+    s4072 = s4071 - s1698 * s4053 - s1699 * s4052
+    s4073 = s1665 * s4066 - s1666 * s4058 - s1667 * s4056 - s1668 * s4055 - s1669 * s4054
+    s4074 = s4073 - s1670 * s4053 - s1671 * s4052
+    s4075 = s1651 * s4060 - s1650 * s4068 - s1652 * s4058 - s1653 * s4056 - s1654 * s4055
+    s4076 = s3612 / pivot_hind_left_knee_angle_dot + s1629 * s4070 + s1630 * s4062 + s1631 * s4058
+    s4077 = s4076 + s1632 * s4056 + s1633 * s4055 + s1634 * s4054 + s1635 * s4053 + s1636 * s4052
+    s4078 = s1615 * s4064 - s1614 * s4072 - s1616 * s4058 - s1617 * s4056 - s1618 * s4055
+    s4079 = s1600 * s4066 - s1599 * s4074 - s1601 * s4058 - s1602 * s4056 - s1603 * s4055
+    s4080 = s1650 * s3680 - (s3412 + (s2657 * s3378 + s2658 * s3380 + s2659 * s3382))
+    s4081 = s1651 * s3680 - (s3200 + (s2657 * s3177 + s2658 * s3179 + s2659 * s3181))
+    s4082 = s4081 - s1719 * s4080
+    s4083 = s1652 * s3680 - (s17 * s3203 + s20 * s3204 + s23 * s3205) - s1720 * s4080
+    s4084 = s1653 * s3680 - (s16 * s3203 + s19 * s3204 + s22 * s3205) - s1721 * s4080
+    s4085 = s1654 * s3680 - (s15 * s3203 + s18 * s3204 + s21 * s3205) - s1722 * s4080
+    s4086 = s4083 - s1771 * s4082
+    s4087 = s4084 - s1772 * s4082 - s1782 * s4086
+    s4088 = s4085 - s1773 * s4082 - s1783 * s4086 - s1792 * s4087
+    s4089 = s1655 * s3680 - s3193 - s1723 * s4080 - s1774 * s4082 - s1784 * s4086 - s1793 * s4087
+    s4090 = s1656 * s3680 - s3192 - s1724 * s4080 - s1775 * s4082 - s1785 * s4086 - s1794 * s4087
+    s4091 = s1657 * s3680 - s3191 - s1725 * s4080 - s1776 * s4082 - s1786 * s4086 - s1795 * s4087
+    s4092 = s4089 - s1799 * s4088
+    s4093 = s4090 - s1800 * s4088 + s1807 * s4092
+    s4094 = (s4091 - s1801 * s4088 + s1808 * s4092 + s1810 * s4093) / pivot_trunk_x_dot
+    s4095 = s4093 / pivot_trunk_y_dot + s1810 * s4094
+    s4096 = s4092 / pivot_trunk_z_dot + s1807 * s4095 + s1808 * s4094
+    s4097 = s4088 / pivot_trunk_wx - s1799 * s4096 - s1800 * s4095 - s1801 * s4094
+    s4098 = s4087 / pivot_trunk_wy - s1792 * s4097 - s1793 * s4096 - s1794 * s4095 - s1795 * s4094
+    s4099 = s4086 / pivot_trunk_wz - s1782 * s4098 - s1783 * s4097 - s1784 * s4096 - s1785 * s4095
+    s4100 = s4099 - s1786 * s4094
+    s4101 = s4082 / pivot_hind_right_abduction_angle_dot - s1771 * s4100 - s1772 * s4098
+    s4102 = s4101 - s1773 * s4097 - s1774 * s4096 - s1775 * s4095 - s1776 * s4094
+    s4103 = s1765 * s4100 + s1766 * s4098 + s1767 * s4097 + s1768 * s4096 + s1769 * s4095
+    s4104 = s4103 + s1770 * s4094
+    s4105 = s1744 * s4100 + s1745 * s4098 + s1746 * s4097 + s1747 * s4096 + s1748 * s4095
+    s4106 = s4105 + s1749 * s4094
+    s4107 = s1738 * s4100 + s1739 * s4098 + s1740 * s4097 + s1741 * s4096 + s1742 * s4095
+    s4108 = s4107 + s1743 * s4094
+    s4109 = s4080 / pivot_hind_right_swing_angle_dot - s1719 * s4102 - s1720 * s4100 - s1721 * s4098
+    s4110 = s4109 - s1722 * s4097 - s1723 * s4096 - s1724 * s4095 - s1725 * s4094
+    s4111 = s1706 * s4104 - s1707 * s4100 - s1708 * s4098 - s1709 * s4097 - s1710 * s4096
+    s4112 = s4111 - s1711 * s4095 - s1712 * s4094
+    s4113 = s1693 * s4106 - s1694 * s4100 - s1695 * s4098 - s1696 * s4097 - s1697 * s4096
+    s4114 = s4113 - s1698 * s4095 - s1699 * s4094
+    s4115 = s1665 * s4108 - s1666 * s4100 - s1667 * s4098 - s1668 * s4097 - s1669 * s4096
+    s4116 = s4115 - s1670 * s4095 - s1671 * s4094
+    s4117 = s3680 / pivot_hind_right_knee_angle_dot + s1650 * s4110 + s1651 * s4102 + s1652 * s4100
+    s4118 = s4117 + s1653 * s4098 + s1654 * s4097 + s1655 * s4096 + s1656 * s4095 + s1657 * s4094
+    s4119 = s1630 * s4104 - s1629 * s4112 - s1631 * s4100 - s1632 * s4098 - s1633 * s4097
+    s4120 = s1615 * s4106 - s1614 * s4114 - s1616 * s4100 - s1617 * s4098 - s1618 * s4097
+    s4121 = s1600 * s4108 - s1599 * s4116 - s1601 * s4100 - s1602 * s4098 - s1603 * s4097
+    s4122 = s1599 * s3466 - (s3245 + (s2771 * s3219 + s2772 * s3221 + s2773 * s3223))
+    s4123 = s1600 * s3466 - (s15 * s3247 + s18 * s3248 + s21 * s3249) - s1665 * s4122
+    s4124 = s1601 * s3466 - (s17 * s3256 + s20 * s3257 + s23 * s3258) - s1666 * s4122
+    s4125 = s1602 * s3466 - (s16 * s3256 + s19 * s3257 + s22 * s3258) - s1667 * s4122
+    s4126 = s1603 * s3466 - (s15 * s3256 + s18 * s3257 + s21 * s3258) - s1668 * s4122
+    s4127 = s4124 - s1738 * s4123
+    s4128 = s4125 - s1739 * s4123 - s1782 * s4127
+    s4129 = s4126 - s1740 * s4123 - s1783 * s4127 - s1792 * s4128
+    s4130 = s1604 * s3466 - s3238 - s1669 * s4122 - s1741 * s4123 - s1784 * s4127 - s1793 * s4128
+    s4131 = s1605 * s3466 - s3237 - s1670 * s4122 - s1742 * s4123 - s1785 * s4127 - s1794 * s4128
+    s4132 = s1606 * s3466 - s3236 - s1671 * s4122 - s1743 * s4123 - s1786 * s4127 - s1795 * s4128
+    s4133 = s4130 - s1799 * s4129
+    s4134 = s4131 - s1800 * s4129 + s1807 * s4133
+    s4135 = (s4132 - s1801 * s4129 + s1808 * s4133 + s1810 * s4134) / pivot_trunk_x_dot
+    s4136 = s4134 / pivot_trunk_y_dot + s1810 * s4135
+    s4137 = s4133 / pivot_trunk_z_dot + s1807 * s4136 + s1808 * s4135
+    s4138 = s4129 / pivot_trunk_wx - s1799 * s4137 - s1800 * s4136 - s1801 * s4135
+    s4139 = s4128 / pivot_trunk_wy - s1792 * s4138 - s1793 * s4137 - s1794 * s4136 - s1795 * s4135
+    s4140 = s4127 / pivot_trunk_wz - s1782 * s4139 - s1783 * s4138 - s1784 * s4137 - s1785 * s4136
+    s4141 = s4140 - s1786 * s4135
+    s4142 = s1771 * s4141 + s1772 * s4139 + s1773 * s4138 + s1774 * s4137 + s1775 * s4136
+    s4143 = s4142 + s1776 * s4135
+    s4144 = s1765 * s4141 + s1766 * s4139 + s1767 * s4138 + s1768 * s4137 + s1769 * s4136
+    s4145 = s4144 + s1770 * s4135
+    s4146 = s1744 * s4141 + s1745 * s4139 + s1746 * s4138 + s1747 * s4137 + s1748 * s4136
+    s4147 = s4146 + s1749 * s4135
+    s4148 = s4123 / pivot_front_left_abduction_angle_dot - s1738 * s4141 - s1739 * s4139
+    s4149 = s4148 - s1740 * s4138 - s1741 * s4137 - s1742 * s4136 - s1743 * s4135
+    s4150 = s1719 * s4143 - s1720 * s4141 - s1721 * s4139 - s1722 * s4138 - s1723 * s4137
+    s4151 = s4150 - s1724 * s4136 - s1725 * s4135
+    s4152 = s1706 * s4145 - s1707 * s4141 - s1708 * s4139 - s1709 * s4138 - s1710 * s4137
+    s4153 = s4152 - s1711 * s4136 - s1712 * s4135
+    s4154 = s1693 * s4147 - s1694 * s4141 - s1695 * s4139 - s1696 * s4138 - s1697 * s4137
+    s4155 = s4154 - s1698 * s4136 - s1699 * s4135
+    s4156 = s4122 / pivot_front_left_swing_angle_dot - s1665 * s4149 - s1666 * s4141 - s1667 * s4139
+    s4157 = s4156 - s1668 * s4138 - s1669 * s4137 - s1670 * s4136 - s1671 * s4135
+    s4158 = s1651 * s4143 - s1650 * s4151 - s1652 * s4141 - s1653 * s4139 - s1654 * s4138
+    s4159 = s1630 * s4145 - s1629 * s4153 - s1631 * s4141 - s1632 * s4139 - s1633 * s4138
+    s4160 = s1615 * s4147 - s1614 * s4155 - s1616 * s4141 - s1617 * s4139 - s1618 * s4138
+    s4161 = s3466 / pivot_front_left_knee_angle_dot + s1599 * s4157 + s1600 * s4149 + s1601 * s4141
+    s4162 = s4161 + s1602 * s4139 + s1603 * s4138 + s1604 * s4137 + s1605 * s4136 + s1606 * s4135
+    s4163 = s1614 * s3534 - (s3298 + (s2801 * s3272 + s2802 * s3274 + s2803 * s3276))
+    s4164 = s1615 * s3534 - (s15 * s3300 + s18 * s3301 + s21 * s3302) - s1693 * s4163
+    s4165 = s1616 * s3534 - (s17 * s3309 + s20 * s3310 + s23 * s3311) - s1694 * s4163
+    s4166 = s1617 * s3534 - (s16 * s3309 + s19 * s3310 + s22 * s3311) - s1695 * s4163
+    s4167 = s1618 * s3534 - (s15 * s3309 + s18 * s3310 + s21 * s3311) - s1696 * s4163
+    s4168 = s4165 - s1744 * s4164
+    s4169 = s4166 - s1745 * s4164 - s1782 * s4168
+    s4170 = s4167 - s1746 * s4164 - s1783 * s4168 - s1792 * s4169
+    s4171 = s1619 * s3534 - s3291 - s1697 * s4163 - s1747 * s4164 - s1784 * s4168 - s1793 * s4169
+    s4172 = s1620 * s3534 - s3290 - s1698 * s4163 - s1748 * s4164 - s1785 * s4168 - s1794 * s4169
+    s4173 = s1621 * s3534 - s3289 - s1699 * s4163 - s1749 * s4164 - s1786 * s4168 - s1795 * s4169
+    s4174 = s4171 - s1799 * s4170
+    s4175 = s4172 - s1800 * s4170 + s1807 * s4174
+    s4176 = (s4173 - s1801 * s4170 + s1808 * s4174 + s1810 * s4175) / pivot_trunk_x_dot
+    s4177 = s4175 / pivot_trunk_y_dot + s1810 * s4176
+    s4178 = s4174 / pivot_trunk_z_dot + s1807 * s4177 + s1808 * s4176
+    s4179 = s4170 / pivot_trunk_wx - s1799 * s4178 - s1800 * s4177 - s1801 * s4176
+    s4180 = s4169 / pivot_trunk_wy - s1792 * s4179 - s1793 * s4178 - s1794 * s4177 - s1795 * s4176
+    s4181 = s4168 / pivot_trunk_wz - s1782 * s4180 - s1783 * s4179 - s1784 * s4178 - s1785 * s4177
+    s4182 = s4181 - s1786 * s4176
+    s4183 = s1771 * s4182 + s1772 * s4180 + s1773 * s4179 + s1774 * s4178 + s1775 * s4177
+    s4184 = s4183 + s1776 * s4176
+    s4185 = s1765 * s4182 + s1766 * s4180 + s1767 * s4179 + s1768 * s4178 + s1769 * s4177
+    s4186 = s4185 + s1770 * s4176
+    s4187 = s4164 / pivot_front_right_abduction_angle_dot - s1744 * s4182 - s1745 * s4180
+    s4188 = s4187 - s1746 * s4179 - s1747 * s4178 - s1748 * s4177 - s1749 * s4176
+    s4189 = s1738 * s4182 + s1739 * s4180 + s1740 * s4179 + s1741 * s4178 + s1742 * s4177
+    s4190 = s4189 + s1743 * s4176
+    s4191 = s1719 * s4184 - s1720 * s4182 - s1721 * s4180 - s1722 * s4179 - s1723 * s4178
+    s4192 = s4191 - s1724 * s4177 - s1725 * s4176
+    s4193 = s1706 * s4186 - s1707 * s4182 - s1708 * s4180 - s1709 * s4179 - s1710 * s4178
+    s4194 = s4193 - s1711 * s4177 - s1712 * s4176
+    s4195 = s4163 / pivot_front_right_swing_angle_dot - s1693 * s4188 - s1694 * s4182
+    s4196 = s4195 - s1695 * s4180 - s1696 * s4179 - s1697 * s4178 - s1698 * s4177 - s1699 * s4176
+    s4197 = s1665 * s4190 - s1666 * s4182 - s1667 * s4180 - s1668 * s4179 - s1669 * s4178
+    s4198 = s4197 - s1670 * s4177 - s1671 * s4176
+    s4199 = s1651 * s4184 - s1650 * s4192 - s1652 * s4182 - s1653 * s4180 - s1654 * s4179
+    s4200 = s1630 * s4186 - s1629 * s4194 - s1631 * s4182 - s1632 * s4180 - s1633 * s4179
+    s4201 = s3534 / pivot_front_right_knee_angle_dot + s1614 * s4196 + s1615 * s4188 + s1616 * s4182
+    s4202 = s4201 + s1617 * s4180 + s1618 * s4179 + s1619 * s4178 + s1620 * s4177 + s1621 * s4176
+    s4203 = s1600 * s4190 - s1599 * s4198 - s1601 * s4182 - s1602 * s4180 - s1603 * s4179
+    s4204 = s1629 * s3602 - (s3351 + (s2831 * s3325 + s2832 * s3327 + s2833 * s3329))
+    s4205 = s1630 * s3602 - (s15 * s3353 + s18 * s3354 + s21 * s3355) - s1706 * s4204
+    s4206 = s1631 * s3602 - (s17 * s3362 + s20 * s3363 + s23 * s3364) - s1707 * s4204
+    s4207 = s1632 * s3602 - (s16 * s3362 + s19 * s3363 + s22 * s3364) - s1708 * s4204
+    s4208 = s1633 * s3602 - (s15 * s3362 + s18 * s3363 + s21 * s3364) - s1709 * s4204
+    s4209 = s4206 - s1765 * s4205
+    s4210 = s4207 - s1766 * s4205 - s1782 * s4209
+    s4211 = s4208 - s1767 * s4205 - s1783 * s4209 - s1792 * s4210
+    s4212 = s1634 * s3602 - s3344 - s1710 * s4204 - s1768 * s4205 - s1784 * s4209 - s1793 * s4210
+    s4213 = s1635 * s3602 - s3343 - s1711 * s4204 - s1769 * s4205 - s1785 * s4209 - s1794 * s4210
+    s4214 = s1636 * s3602 - s3342 - s1712 * s4204 - s1770 * s4205 - s1786 * s4209 - s1795 * s4210
+    s4215 = s4212 - s1799 * s4211
+    s4216 = s4213 - s1800 * s4211 + s1807 * s4215
+    s4217 = (s4214 - s1801 * s4211 + s1808 * s4215 + s1810 * s4216) / pivot_trunk_x_dot
+    s4218 = s4216 / pivot_trunk_y_dot + s1810 * s4217
+    s4219 = s4215 / pivot_trunk_z_dot + s1807 * s4218 + s1808 * s4217
+    s4220 = s4211 / pivot_trunk_wx - s1799 * s4219 - s1800 * s4218 - s1801 * s4217
+    s4221 = s4210 / pivot_trunk_wy - s1792 * s4220 - s1793 * s4219 - s1794 * s4218 - s1795 * s4217
+    s4222 = s4209 / pivot_trunk_wz - s1782 * s4221 - s1783 * s4220 - s1784 * s4219 - s1785 * s4218
+    s4223 = s4222 - s1786 * s4217
+    s4224 = s1771 * s4223 + s1772 * s4221 + s1773 * s4220 + s1774 * s4219 + s1775 * s4218
+    s4225 = s4224 + s1776 * s4217
+    s4226 = s4205 / pivot_hind_left_abduction_angle_dot - s1765 * s4223 - s1766 * s4221
+    s4227 = s4226 - s1767 * s4220 - s1768 * s4219 - s1769 * s4218 - s1770 * s4217
+    s4228 = s1744 * s4223 + s1745 * s4221 + s1746 * s4220 + s1747 * s4219 + s1748 * s4218
+    s4229 = s4228 + s1749 * s4217
+    s4230 = s1738 * s4223 + s1739 * s4221 + s1740 * s4220 + s1741 * s4219 + s1742 * s4218
+    s4231 = s4230 + s1743 * s4217
+    s4232 = s1719 * s4225 - s1720 * s4223 - s1721 * s4221 - s1722 * s4220 - s1723 * s4219
+    s4233 = s4232 - s1724 * s4218 - s1725 * s4217
+    s4234 = s4204 / pivot_hind_left_swing_angle_dot - s1706 * s4227 - s1707 * s4223 - s1708 * s4221
+    s4235 = s4234 - s1709 * s4220 - s1710 * s4219 - s1711 * s4218 - s1712 * s4217
+    s4236 = s1693 * s4229 - s1694 * s4223 - s1695 * s4221 - s1696 * s4220 - s1697 * s4219
+    s4237 = s4236 - s1698 * s4218 - s1699 * s4217
+    s4238 = s1665 * s4231 - s1666 * s4223 - s1667 * s4221 - s1668 * s4220 - s1669 * s4219
+    s4239 = s4238 - s1670 * s4218 - s1671 * s4217
+    s4240 = s1651 * s4225 - s1650 * s4233 - s1652 * s4223 - s1653 * s4221 - s1654 * s4220
+    s4241 = s3602 / pivot_hind_left_knee_angle_dot + s1629 * s4235 + s1630 * s4227 + s1631 * s4223
+    s4242 = s4241 + s1632 * s4221 + s1633 * s4220 + s1634 * s4219 + s1635 * s4218 + s1636 * s4217
+    s4243 = s1615 * s4229 - s1614 * s4237 - s1616 * s4223 - s1617 * s4221 - s1618 * s4220
+    s4244 = s1600 * s4231 - s1599 * s4239 - s1601 * s4223 - s1602 * s4221 - s1603 * s4220
+    s4245 = s1650 * s3670 - (s3404 + (s2858 * s3378 + s2859 * s3380 + s2860 * s3382))
+    s4246 = s1651 * s3670 - (s15 * s3406 + s18 * s3407 + s21 * s3408) - s1719 * s4245
+    s4247 = s1652 * s3670 - (s17 * s3415 + s20 * s3416 + s23 * s3417) - s1720 * s4245
+    s4248 = s1653 * s3670 - (s16 * s3415 + s19 * s3416 + s22 * s3417) - s1721 * s4245
+    s4249 = s1654 * s3670 - (s15 * s3415 + s18 * s3416 + s21 * s3417) - s1722 * s4245
+    s4250 = s4247 - s1771 * s4246
+    s4251 = s4248 - s1772 * s4246 - s1782 * s4250
+    s4252 = s4249 - s1773 * s4246 - s1783 * s4250 - s1792 * s4251
+    s4253 = s1655 * s3670 - s3397 - s1723 * s4245 - s1774 * s4246 - s1784 * s4250 - s1793 * s4251
+    s4254 = s1656 * s3670 - s3396 - s1724 * s4245 - s1775 * s4246 - s1785 * s4250 - s1794 * s4251
+    s4255 = s1657 * s3670 - s3395 - s1725 * s4245 - s1776 * s4246 - s1786 * s4250 - s1795 * s4251
+    s4256 = s4253 - s1799 * s4252
+    s4257 = s4254 - s1800 * s4252 + s1807 * s4256
+    s4258 = (s4255 - s1801 * s4252 + s1808 * s4256 + s1810 * s4257) / pivot_trunk_x_dot
+    s4259 = s4257 / pivot_trunk_y_dot + s1810 * s4258
+    s4260 = s4256 / pivot_trunk_z_dot + s1807 * s4259 + s1808 * s4258
+    s4261 = s4252 / pivot_trunk_wx - s1799 * s4260 - s1800 * s4259 - s1801 * s4258
+    s4262 = s4251 / pivot_trunk_wy - s1792 * s4261 - s1793 * s4260 - s1794 * s4259 - s1795 * s4258
+    s4263 = s4250 / pivot_trunk_wz - s1782 * s4262 - s1783 * s4261 - s1784 * s4260 - s1785 * s4259
+    s4264 = s4263 - s1786 * s4258
+    s4265 = s4246 / pivot_hind_right_abduction_angle_dot - s1771 * s4264 - s1772 * s4262
+    s4266 = s4265 - s1773 * s4261 - s1774 * s4260 - s1775 * s4259 - s1776 * s4258
+    s4267 = s1765 * s4264 + s1766 * s4262 + s1767 * s4261 + s1768 * s4260 + s1769 * s4259
+    s4268 = s4267 + s1770 * s4258
+    s4269 = s1744 * s4264 + s1745 * s4262 + s1746 * s4261 + s1747 * s4260 + s1748 * s4259
+    s4270 = s4269 + s1749 * s4258
+    s4271 = s1738 * s4264 + s1739 * s4262 + s1740 * s4261 + s1741 * s4260 + s1742 * s4259
+    s4272 = s4271 + s1743 * s4258
+    s4273 = s4245 / pivot_hind_right_swing_angle_dot - s1719 * s4266 - s1720 * s4264 - s1721 * s4262
+    s4274 = s4273 - s1722 * s4261 - s1723 * s4260 - s1724 * s4259 - s1725 * s4258
+    s4275 = s1706 * s4268 - s1707 * s4264 - s1708 * s4262 - s1709 * s4261 - s1710 * s4260
+    s4276 = s4275 - s1711 * s4259 - s1712 * s4258
+    s4277 = s1693 * s4270 - s1694 * s4264 - s1695 * s4262 - s1696 * s4261 - s1697 * s4260
+    s4278 = s4277 - s1698 * s4259 - s1699 * s4258
+    s4279 = s1665 * s4272 - s1666 * s4264 - s1667 * s4262 - s1668 * s4261 - s1669 * s4260
+    s4280 = s4279 - s1670 * s4259 - s1671 * s4258
+    s4281 = s3670 / pivot_hind_right_knee_angle_dot + s1650 * s4274 + s1651 * s4266 + s1652 * s4264
+    s4282 = s4281 + s1653 * s4262 + s1654 * s4261 + s1655 * s4260 + s1656 * s4259 + s1657 * s4258
+    s4283 = s1630 * s4268 - s1629 * s4276 - s1631 * s4264 - s1632 * s4262 - s1633 * s4261
+    s4284 = s1615 * s4270 - s1614 * s4278 - s1616 * s4264 - s1617 * s4262 - s1618 * s4261
+    s4285 = s1600 * s4272 - s1599 * s4280 - s1601 * s4264 - s1602 * s4262 - s1603 * s4261
+    s4286 = s1599 * s3455 - (s927 * s3459 + s929 * s3460 + s931 * s3461)
+    s4287 = s1600 * s3455 - (s15 * s3469 + s18 * s3470 + s21 * s3471) - s1665 * s4286
+    s4288 = s1601 * s3455 - (s17 * s3480 + s20 * s3481 + s23 * s3482) - s1666 * s4286
+    s4289 = s1602 * s3455 - (s16 * s3480 + s19 * s3481 + s22 * s3482) - s1667 * s4286
+    s4290 = s1603 * s3455 - (s15 * s3480 + s18 * s3481 + s21 * s3482) - s1668 * s4286
+    s4291 = s4288 - s1738 * s4287
+    s4292 = s4289 - s1739 * s4287 - s1782 * s4291
+    s4293 = s4290 - s1740 * s4287 - s1783 * s4291 - s1792 * s4292
+    s4294 = s1604 * s3455 - s3447 - s1669 * s4286 - s1741 * s4287 - s1784 * s4291 - s1793 * s4292
+    s4295 = s1605 * s3455 - s3446 - s1670 * s4286 - s1742 * s4287 - s1785 * s4291 - s1794 * s4292
+    s4296 = s1606 * s3455 - s3445 - s1671 * s4286 - s1743 * s4287 - s1786 * s4291 - s1795 * s4292
+    s4297 = s4294 - s1799 * s4293
+    s4298 = s4295 - s1800 * s4293 + s1807 * s4297
+    s4299 = (s4296 - s1801 * s4293 + s1808 * s4297 + s1810 * s4298) / pivot_trunk_x_dot
+    s4300 = s4298 / pivot_trunk_y_dot + s1810 * s4299
+    s4301 = s4297 / pivot_trunk_z_dot + s1807 * s4300 + s1808 * s4299
+    s4302 = s4293 / pivot_trunk_wx - s1799 * s4301 - s1800 * s4300 - s1801 * s4299
+    s4303 = s4292 / pivot_trunk_wy - s1792 * s4302 - s1793 * s4301 - s1794 * s4300 - s1795 * s4299
+    s4304 = s4291 / pivot_trunk_wz - s1782 * s4303 - s1783 * s4302 - s1784 * s4301 - s1785 * s4300
+    s4305 = s4304 - s1786 * s4299
+    s4306 = s1771 * s4305 + s1772 * s4303 + s1773 * s4302 + s1774 * s4301 + s1775 * s4300
+    s4307 = s4306 + s1776 * s4299
+    s4308 = s1765 * s4305 + s1766 * s4303 + s1767 * s4302 + s1768 * s4301 + s1769 * s4300
+    s4309 = s4308 + s1770 * s4299
+    s4310 = s1744 * s4305 + s1745 * s4303 + s1746 * s4302 + s1747 * s4301 + s1748 * s4300
+    s4311 = s4310 + s1749 * s4299
+    s4312 = s4287 / pivot_front_left_abduction_angle_dot - s1738 * s4305 - s1739 * s4303
+    s4313 = s4312 - s1740 * s4302 - s1741 * s4301 - s1742 * s4300 - s1743 * s4299
+    s4314 = s1719 * s4307 - s1720 * s4305 - s1721 * s4303 - s1722 * s4302 - s1723 * s4301
+    s4315 = s4314 - s1724 * s4300 - s1725 * s4299
+    s4316 = s1706 * s4309 - s1707 * s4305 - s1708 * s4303 - s1709 * s4302 - s1710 * s4301
+    s4317 = s4316 - s1711 * s4300 - s1712 * s4299
+    s4318 = s1693 * s4311 - s1694 * s4305 - s1695 * s4303 - s1696 * s4302 - s1697 * s4301
+    s4319 = s4318 - s1698 * s4300 - s1699 * s4299
+    s4320 = s4286 / pivot_front_left_swing_angle_dot - s1665 * s4313 - s1666 * s4305 - s1667 * s4303
+    s4321 = s4320 - s1668 * s4302 - s1669 * s4301 - s1670 * s4300 - s1671 * s4299
+    s4322 = s1651 * s4307 - s1650 * s4315 - s1652 * s4305 - s1653 * s4303 - s1654 * s4302
+    s4323 = s1630 * s4309 - s1629 * s4317 - s1631 * s4305 - s1632 * s4303 - s1633 * s4302
+    s4324 = s1615 * s4311 - s1614 * s4319 - s1616 * s4305 - s1617 * s4303 - s1618 * s4302
+    s4325 = s3455 / pivot_front_left_knee_angle_dot + s1599 * s4321 + s1600 * s4313 + s1601 * s4305
+    s4326 = s4325 + s1602 * s4303 + s1603 * s4302 + s1604 * s4301 + s1605 * s4300 + s1606 * s4299
+    s4327 = s1614 * s3523 - (s933 * s3527 + s935 * s3528 + s937 * s3529)
+    s4328 = s1615 * s3523 - (s15 * s3537 + s18 * s3538 + s21 * s3539) - s1693 * s4327
+    s4329 = s1616 * s3523 - (s17 * s3548 + s20 * s3549 + s23 * s3550) - s1694 * s4327
+    s4330 = s1617 * s3523 - (s16 * s3548 + s19 * s3549 + s22 * s3550) - s1695 * s4327
+    s4331 = s1618 * s3523 - (s15 * s3548 + s18 * s3549 + s21 * s3550) - s1696 * s4327
+    s4332 = s4329 - s1744 * s4328
+    s4333 = s4330 - s1745 * s4328 - s1782 * s4332
+    s4334 = s4331 - s1746 * s4328 - s1783 * s4332 - s1792 * s4333
+    s4335 = s1619 * s3523 - s3515 - s1697 * s4327 - s1747 * s4328 - s1784 * s4332 - s1793 * s4333
+    s4336 = s1620 * s3523 - s3514 - s1698 * s4327 - s1748 * s4328 - s1785 * s4332 - s1794 * s4333
+    s4337 = s1621 * s3523 - s3513 - s1699 * s4327 - s1749 * s4328 - s1786 * s4332 - s1795 * s4333
+    s4338 = s4335 - s1799 * s4334
+    s4339 = s4336 - s1800 * s4334 + s1807 * s4338
+    s4340 = (s4337 - s1801 * s4334 + s1808 * s4338 + s1810 * s4339) / pivot_trunk_x_dot
+    s4341 = s4339 / pivot_trunk_y_dot + s1810 * s4340
+    s4342 = s4338 / pivot_trunk_z_dot + s1807 * s4341 + s1808 * s4340
+    s4343 = s4334 / pivot_trunk_wx - s1799 * s4342 - s1800 * s4341 - s1801 * s4340
+    s4344 = s4333 / pivot_trunk_wy - s1792 * s4343 - s1793 * s4342 - s1794 * s4341 - s1795 * s4340
+    s4345 = s4332 / pivot_trunk_wz - s1782 * s4344 - s1783 * s4343 - s1784 * s4342 - s1785 * s4341
+    s4346 = s4345 - s1786 * s4340
+    s4347 = s1771 * s4346 + s1772 * s4344 + s1773 * s4343 + s1774 * s4342 + s1775 * s4341
+    s4348 = s4347 + s1776 * s4340
+    s4349 = s1765 * s4346 + s1766 * s4344 + s1767 * s4343 + s1768 * s4342 + s1769 * s4341
+    s4350 = s4349 + s1770 * s4340
+    s4351 = s4328 / pivot_front_right_abduction_angle_dot - s1744 * s4346 - s1745 * s4344
+    s4352 = s4351 - s1746 * s4343 - s1747 * s4342 - s1748 * s4341 - s1749 * s4340
+    s4353 = s1738 * s4346 + s1739 * s4344 + s1740 * s4343 + s1741 * s4342 + s1742 * s4341
+    s4354 = s4353 + s1743 * s4340
+    s4355 = s1719 * s4348 - s1720 * s4346 - s1721 * s4344 - s1722 * s4343 - s1723 * s4342
+    s4356 = s4355 - s1724 * s4341 - s1725 * s4340
+    s4357 = s1706 * s4350 - s1707 * s4346 - s1708 * s4344 - s1709 * s4343 - s1710 * s4342
+    s4358 = s4357 - s1711 * s4341 - s1712 * s4340
+    s4359 = s4327 / pivot_front_right_swing_angle_dot - s1693 * s4352 - s1694 * s4346
+    s4360 = s4359 - s1695 * s4344 - s1696 * s4343 - s1697 * s4342 - s1698 * s4341 - s1699 * s4340
+    s4361 = s1665 * s4354 - s1666 * s4346 - s1667 * s4344 - s1668 * s4343 - s1669 * s4342
+    s4362 = s4361 - s1670 * s4341 - s1671 * s4340
+    s4363 = s1651 * s4348 - s1650 * s4356 - s1652 * s4346 - s1653 * s4344 - s1654 * s4343
+    s4364 = s1630 * s4350 - s1629 * s4358 - s1631 * s4346 - s1632 * s4344 - s1633 * s4343
+    s4365 = s3523 / pivot_front_right_knee_angle_dot + s1614 * s4360 + s1615 * s4352 + s1616 * s4346
+    s4366 = s4365 + s1617 * s4344 + s1618 * s4343 + s1619 * s4342 + s1620 * s4341 + s1621 * s4340
+    s4367 = s1600 * s4354 - s1599 * s4362 - s1601 * s4346 - s1602 * s4344 - s1603 * s4343
+    s4368 = s1629 * s3591 - (s939 * s3595 + s941 * s3596 + s943 * s3597)
+    s4369 = s1630 * s3591 - (s15 * s3605 + s18 * s3606 + s21 * s3607) - s1706 * s4368
+    s4370 = s1631 * s3591 - (s17 * s3616 + s20 * s3617 + s23 * s3618) - s1707 * s4368
+    s4371 = s1632 * s3591 - (s16 * s3616 + s19 * s3617 + s22 * s3618) - s1708 * s4368
+    s4372 = s1633 * s3591 - (s15 * s3616 + s18 * s3617 + s21 * s3618) - s1709 * s4368
+    s4373 = s4370 - s1765 * s4369
+    s4374 = s4371 - s1766 * s4369 - s1782 * s4373
+    s4375 = s4372 - s1767 * s4369 - s1783 * s4373 - s1792 * s4374
+    s4376 = s1634 * s3591 - s3583 - s1710 * s4368 - s1768 * s4369 - s1784 * s4373 - s1793 * s4374
+    s4377 = s1635 * s3591 - s3582 - s1711 * s4368 - s1769 * s4369 - s1785 * s4373 - s1794 * s4374
+    s4378 = s1636 * s3591 - s3581 - s1712 * s4368 - s1770 * s4369 - s1786 * s4373 - s1795 * s4374
+    s4379 = s4376 - s1799 * s4375
+    s4380 = s4377 - s1800 * s4375 + s1807 * s4379
+    s4381 = (s4378 - s1801 * s4375 + s1808 * s4379 + s1810 * s4380) / pivot_trunk_x_dot
+    s4382 = s4380 / pivot_trunk_y_dot + s1810 * s4381
+    s4383 = s4379 / pivot_trunk_z_dot + s1807 * s4382 + s1808 * s4381
+    s4384 = s4375 / pivot_trunk_wx - s1799 * s4383 - s1800 * s4382 - s1801 * s4381
+    s4385 = s4374 / pivot_trunk_wy - s1792 * s4384 - s1793 * s4383 - s1794 * s4382 - s1795 * s4381
+    s4386 = s4373 / pivot_trunk_wz - s1782 * s4385 - s1783 * s4384 - s1784 * s4383 - s1785 * s4382
+    s4387 = s4386 - s1786 * s4381
+    s4388 = s1771 * s4387 + s1772 * s4385 + s1773 * s4384 + s1774 * s4383 + s1775 * s4382
+    s4389 = s4388 + s1776 * s4381
+    s4390 = s4369 / pivot_hind_left_abduction_angle_dot - s1765 * s4387 - s1766 * s4385
+    s4391 = s4390 - s1767 * s4384 - s1768 * s4383 - s1769 * s4382 - s1770 * s4381
+    s4392 = s1744 * s4387 + s1745 * s4385 + s1746 * s4384 + s1747 * s4383 + s1748 * s4382
+    s4393 = s4392 + s1749 * s4381
+    s4394 = s1738 * s4387 + s1739 * s4385 + s1740 * s4384 + s1741 * s4383 + s1742 * s4382
+    s4395 = s4394 + s1743 * s4381
+    s4396 = s1719 * s4389 - s1720 * s4387 - s1721 * s4385 - s1722 * s4384 - s1723 * s4383
+    s4397 = s4396 - s1724 * s4382 - s1725 * s4381
+    s4398 = s4368 / pivot_hind_left_swing_angle_dot - s1706 * s4391 - s1707 * s4387 - s1708 * s4385
+    s4399 = s4398 - s1709 * s4384 - s1710 * s4383 - s1711 * s4382 - s1712 * s4381
+    s4400 = s1693 * s4393 - s1694 * s4387 - s1695 * s4385 - s1696 * s4384 - s1697 * s4383
+    s4401 = s4400 - s1698 * s4382 - s1699 * s4381
+    s4402 = s1665 * s4395 - s1666 * s4387 - s1667 * s4385 - s1668 * s4384 - s1669 * s4383
+    s4403 = s4402 - s1670 * s4382 - s1671 * s4381
+    s4404 = s1651 * s4389 - s1650 * s4397 - s1652 * s4387 - s1653 * s4385 - s1654 * s4384
+    s4405 = s3591 / pivot_hind_left_knee_angle_dot + s1629 * s4399 + s1630 * s4391 + s1631 * s4387
+    s4406 = s4405 + s1632 * s4385 + s1633 * s4384 + s1634 * s4383 + s1635 * s4382 + s1636 * s4381
+    s4407 = s1615 * s4393 - s1614 * s4401 - s1616 * s4387 - s1617 * s4385 - s1618 * s4384
+    s4408 = s1600 * s4395 - s1599 * s4403 - s1601 * s4387 - s1602 * s4385 - s1603 * s4384
+    s4409 = s1650 * s3659 - (s945 * s3663 + s947 * s3664 + s949 * s3665)
+    s4410 = s1651 * s3659 - (s15 * s3673 + s18 * s3674 + s21 * s3675) - s1719 * s4409
+    s4411 = s1652 * s3659 - (s17 * s3684 + s20 * s3685 + s23 * s3686) - s1720 * s4409
+    s4412 = s1653 * s3659 - (s16 * s3684 + s19 * s3685 + s22 * s3686) - s1721 * s4409
+    s4413 = s1654 * s3659 - (s15 * s3684 + s18 * s3685 + s21 * s3686) - s1722 * s4409
+    s4414 = s4411 - s1771 * s4410
+    s4415 = s4412 - s1772 * s4410 - s1782 * s4414
+    s4416 = s4413 - s1773 * s4410 - s1783 * s4414 - s1792 * s4415
+    s4417 = s1655 * s3659 - s3651 - s1723 * s4409 - s1774 * s4410 - s1784 * s4414 - s1793 * s4415
+    s4418 = s1656 * s3659 - s3650 - s1724 * s4409 - s1775 * s4410 - s1785 * s4414 - s1794 * s4415
+    s4419 = s1657 * s3659 - s3649 - s1725 * s4409 - s1776 * s4410 - s1786 * s4414 - s1795 * s4415
+    s4420 = s4417 - s1799 * s4416
+    s4421 = s4418 - s1800 * s4416 + s1807 * s4420
+    s4422 = (s4419 - s1801 * s4416 + s1808 * s4420 + s1810 * s4421) / pivot_trunk_x_dot
+    s4423 = s4421 / pivot_trunk_y_dot + s1810 * s4422
+    s4424 = s4420 / pivot_trunk_z_dot + s1807 * s4423 + s1808 * s4422
+    s4425 = s4416 / pivot_trunk_wx - s1799 * s4424 - s1800 * s4423 - s1801 * s4422
+    s4426 = s4415 / pivot_trunk_wy - s1792 * s4425 - s1793 * s4424 - s1794 * s4423 - s1795 * s4422
+    s4427 = s4414 / pivot_trunk_wz - s1782 * s4426 - s1783 * s4425 - s1784 * s4424 - s1785 * s4423
+    s4428 = s4427 - s1786 * s4422
+    s4429 = s4410 / pivot_hind_right_abduction_angle_dot - s1771 * s4428 - s1772 * s4426
+    s4430 = s4429 - s1773 * s4425 - s1774 * s4424 - s1775 * s4423 - s1776 * s4422
+    s4431 = s1765 * s4428 + s1766 * s4426 + s1767 * s4425 + s1768 * s4424 + s1769 * s4423
+    s4432 = s4431 + s1770 * s4422
+    s4433 = s1744 * s4428 + s1745 * s4426 + s1746 * s4425 + s1747 * s4424 + s1748 * s4423
+    s4434 = s4433 + s1749 * s4422
+    s4435 = s1738 * s4428 + s1739 * s4426 + s1740 * s4425 + s1741 * s4424 + s1742 * s4423
+    s4436 = s4435 + s1743 * s4422
+    s4437 = s4409 / pivot_hind_right_swing_angle_dot - s1719 * s4430 - s1720 * s4428 - s1721 * s4426
+    s4438 = s4437 - s1722 * s4425 - s1723 * s4424 - s1724 * s4423 - s1725 * s4422
+    s4439 = s1706 * s4432 - s1707 * s4428 - s1708 * s4426 - s1709 * s4425 - s1710 * s4424
+    s4440 = s4439 - s1711 * s4423 - s1712 * s4422
+    s4441 = s1693 * s4434 - s1694 * s4428 - s1695 * s4426 - s1696 * s4425 - s1697 * s4424
+    s4442 = s4441 - s1698 * s4423 - s1699 * s4422
+    s4443 = s1665 * s4436 - s1666 * s4428 - s1667 * s4426 - s1668 * s4425 - s1669 * s4424
+    s4444 = s4443 - s1670 * s4423 - s1671 * s4422
+    s4445 = s3659 / pivot_hind_right_knee_angle_dot + s1650 * s4438 + s1651 * s4430 + s1652 * s4428
+    s4446 = s4445 + s1653 * s4426 + s1654 * s4425 + s1655 * s4424 + s1656 * s4423 + s1657 * s4422
+    s4447 = s1630 * s4432 - s1629 * s4440 - s1631 * s4428 - s1632 * s4426 - s1633 * s4425
+    s4448 = s1615 * s4434 - s1614 * s4442 - s1616 * s4428 - s1617 * s4426 - s1618 * s4425
+    s4449 = s1600 * s4436 - s1599 * s4444 - s1601 * s4428 - s1602 * s4426 - s1603 * s4425
+    s4450 = s1599 * s3488 - (s3255 + s3263)
+    s4451 = s1614 * s3556 - (s3308 + s3316)
+    s4452 = s1601 * s3488 - (s3051 + (s15 * s3041 + s18 * s3042 + s21 * s3043)) + s1616 * s3556
+    s4453 = s1602 * s3488 - (s3033 + (s15 * s3023 + s18 * s3024 + s21 * s3025)) + s1617 * s3556
+    s4454 = s1603 * s3488 - (s3015 + (s15 * s3005 + s18 * s3006 + s21 * s3007)) + s1618 * s3556
+    s4455 = s1629 * s3624 - (s3361 + s3369)
+    s4456 = s1650 * s3692 - (s3414 + s3422)
+    s4457 = s1600 * s3488 - (s3085 + s3093) - s1665 * s4450
+    s4458 = s1604 * s3488 - s3013 + s1619 * s3556 + s1634 * s3624 + s1655 * s3692 - s1669 * s4450
+    s4459 = s1605 * s3488 - s3012 + s1620 * s3556 + s1635 * s3624 + s1656 * s3692 - s1670 * s4450
+    s4460 = s1606 * s3488 - s3011 + s1621 * s3556 + s1636 * s3624 + s1657 * s3692 - s1671 * s4450
+    s4461 = s1615 * s3556 - (s3124 + s3132) - s1693 * s4451
+    s4462 = s1630 * s3624 - (s3163 + s3171) - s1706 * s4455
+    s4463 = s4452 + s1631 * s3624 + s1652 * s3692 - s1666 * s4450 - s1694 * s4451 - s1707 * s4455
+    s4464 = s4453 + s1632 * s3624 + s1653 * s3692 - s1667 * s4450 - s1695 * s4451 - s1708 * s4455
+    s4465 = s4454 + s1633 * s3624 + s1654 * s3692 - s1668 * s4450 - s1696 * s4451 - s1709 * s4455
+    s4466 = s1651 * s3692 - (s3202 + s3210) - s1719 * s4456
+    s4467 = s4458 - s1697 * s4451 - s1710 * s4455 - s1723 * s4456 - s1741 * s4457 - s1747 * s4461
+    s4468 = s4459 - s1698 * s4451 - s1711 * s4455 - s1724 * s4456 - s1742 * s4457 - s1748 * s4461
+    s4469 = s4460 - s1699 * s4451 - s1712 * s4455 - s1725 * s4456 - s1743 * s4457 - s1749 * s4461
+    s4470 = s4463 - s1720 * s4456 - s1738 * s4457 - s1744 * s4461 - s1765 * s4462 - s1771 * s4466
+    s4471 = s4464 - s1721 * s4456 - s1739 * s4457 - s1745 * s4461 - s1766 * s4462 - s1772 * s4466
+    s4472 = s4465 - s1722 * s4456 - s1740 * s4457 - s1746 * s4461 - s1767 * s4462 - s1773 * s4466
+    s4473 = s4471 - s1782 * s4470
+    s4474 = s4472 - s1783 * s4470 - s1792 * s4473
+    s4475 = s4467 - s1768 * s4462 - s1774 * s4466 - s1784 * s4470 - s1793 * s4473 - s1799 * s4474
+    s4476 = s4468 - s1769 * s4462 - s1775 * s4466 - s1785 * s4470 - s1794 * s4473 - s1800 * s4474
+    s4477 = s4469 - s1770 * s4462 - s1776 * s4466 - s1786 * s4470 - s1795 * s4473 - s1801 * s4474
+    s4478 = s4476 + s1807 * s4475
+    s4479 = (s4477 + s1808 * s4475 + s1810 * s4478) / pivot_trunk_x_dot
+    s4480 = s4478 / pivot_trunk_y_dot + s1810 * s4479
+    s4481 = s4475 / pivot_trunk_z_dot + s1807 * s4480 + s1808 * s4479
+    s4482 = s4474 / pivot_trunk_wx - s1799 * s4481 - s1800 * s4480 - s1801 * s4479
+    s4483 = s4473 / pivot_trunk_wy - s1792 * s4482 - s1793 * s4481 - s1794 * s4480 - s1795 * s4479
+    s4484 = s4470 / pivot_trunk_wz - s1782 * s4483 - s1783 * s4482 - s1784 * s4481 - s1785 * s4480
+    s4485 = s4484 - s1786 * s4479
+    s4486 = s4466 / pivot_hind_right_abduction_angle_dot - s1771 * s4485 - s1772 * s4483
+    s4487 = s4486 - s1773 * s4482 - s1774 * s4481 - s1775 * s4480 - s1776 * s4479
+    s4488 = s4462 / pivot_hind_left_abduction_angle_dot - s1765 * s4485 - s1766 * s4483
+    s4489 = s4488 - s1767 * s4482 - s1768 * s4481 - s1769 * s4480 - s1770 * s4479
+    s4490 = s4461 / pivot_front_right_abduction_angle_dot - s1744 * s4485 - s1745 * s4483
+    s4491 = s4490 - s1746 * s4482 - s1747 * s4481 - s1748 * s4480 - s1749 * s4479
+    s4492 = s4457 / pivot_front_left_abduction_angle_dot - s1738 * s4485 - s1739 * s4483
+    s4493 = s4492 - s1740 * s4482 - s1741 * s4481 - s1742 * s4480 - s1743 * s4479
+    s4494 = s4456 / pivot_hind_right_swing_angle_dot - s1719 * s4487 - s1720 * s4485 - s1721 * s4483
+    s4495 = s4494 - s1722 * s4482 - s1723 * s4481 - s1724 * s4480 - s1725 * s4479
+    s4496 = s4455 / pivot_hind_left_swing_angle_dot - s1706 * s4489 - s1707 * s4485 - s1708 * s4483
+    s4497 = s4496 - s1709 * s4482 - s1710 * s4481 - s1711 * s4480 - s1712 * s4479
+    s4498 = s4451 / pivot_front_right_swing_angle_dot - s1693 * s4491 - s1694 * s4485
+    s4499 = s4498 - s1695 * s4483 - s1696 * s4482 - s1697 * s4481 - s1698 * s4480 - s1699 * s4479
+    s4500 = s4450 / pivot_front_left_swing_angle_dot - s1665 * s4493 - s1666 * s4485 - s1667 * s4483
+    s4501 = s4500 - s1668 * s4482 - s1669 * s4481 - s1670 * s4480 - s1671 * s4479
+    s4502 = s3692 / pivot_hind_right_knee_angle_dot + s1650 * s4495 + s1651 * s4487 + s1652 * s4485
+    s4503 = s4502 + s1653 * s4483 + s1654 * s4482 + s1655 * s4481 + s1656 * s4480 + s1657 * s4479
+    s4504 = s3624 / pivot_hind_left_knee_angle_dot + s1629 * s4497 + s1630 * s4489 + s1631 * s4485
+    s4505 = s4504 + s1632 * s4483 + s1633 * s4482 + s1634 * s4481 + s1635 * s4480 + s1636 * s4479
+    s4506 = s3556 / pivot_front_right_knee_angle_dot + s1614 * s4499 + s1615 * s4491 + s1616 * s4485
+    s4507 = s4506 + s1617 * s4483 + s1618 * s4482 + s1619 * s4481 + s1620 * s4480 + s1621 * s4479
+    s4508 = s3488 / pivot_front_left_knee_angle_dot + s1599 * s4501 + s1600 * s4493 + s1601 * s4485
+    s4509 = s4508 + s1602 * s4483 + s1603 * s4482 + s1604 * s4481 + s1605 * s4480 + s1606 * s4479
+    s4510 = s1599 * s3491 - (s3265 + (s16 * s3219 + s19 * s3221 + s22 * s3223))
+    s4511 = s1614 * s3559 - (s3318 + (s16 * s3272 + s19 * s3274 + s22 * s3276))
+    s4512 = s1601 * s3491 - (s3053 + (s16 * s3041 + s19 * s3042 + s22 * s3043)) + s1616 * s3559
+    s4513 = s1602 * s3491 - (s3035 + (s16 * s3023 + s19 * s3024 + s22 * s3025)) + s1617 * s3559
+    s4514 = s1603 * s3491 - (s3017 + (s16 * s3005 + s19 * s3006 + s22 * s3007)) + s1618 * s3559
+    s4515 = s1629 * s3627 - (s3371 + (s16 * s3325 + s19 * s3327 + s22 * s3329))
+    s4516 = s1650 * s3695 - (s3424 + (s16 * s3378 + s19 * s3380 + s22 * s3382))
+    s4517 = s1600 * s3491 - (s3095 + (s16 * s3057 + s19 * s3059 + s22 * s3061)) - s1665 * s4510
+    s4518 = s1604 * s3491 - s3031 + s1619 * s3559 + s1634 * s3627 + s1655 * s3695 - s1669 * s4510
+    s4519 = s1605 * s3491 - s3030 + s1620 * s3559 + s1635 * s3627 + s1656 * s3695 - s1670 * s4510
+    s4520 = s1606 * s3491 - s3029 + s1621 * s3559 + s1636 * s3627 + s1657 * s3695 - s1671 * s4510
+    s4521 = s1615 * s3559 - (s3134 + (s16 * s3099 + s19 * s3101 + s22 * s3103)) - s1693 * s4511
+    s4522 = s1630 * s3627 - (s3173 + (s16 * s3138 + s19 * s3140 + s22 * s3142)) - s1706 * s4515
+    s4523 = s4512 + s1631 * s3627 + s1652 * s3695 - s1666 * s4510 - s1694 * s4511 - s1707 * s4515
+    s4524 = s4513 + s1632 * s3627 + s1653 * s3695 - s1667 * s4510 - s1695 * s4511 - s1708 * s4515
+    s4525 = s4514 + s1633 * s3627 + s1654 * s3695 - s1668 * s4510 - s1696 * s4511 - s1709 * s4515
+    s4526 = s1651 * s3695 - (s3212 + (s16 * s3177 + s19 * s3179 + s22 * s3181)) - s1719 * s4516
+    s4527 = s4518 - s1697 * s4511 - s1710 * s4515 - s1723 * s4516 - s1741 * s4517 - s1747 * s4521
+    s4528 = s4519 - s1698 * s4511 - s1711 * s4515 - s1724 * s4516 - s1742 * s4517 - s1748 * s4521
+    s4529 = s4520 - s1699 * s4511 - s1712 * s4515 - s1725 * s4516 - s1743 * s4517 - s1749 * s4521
+    s4530 = s4523 - s1720 * s4516 - s1738 * s4517 - s1744 * s4521 - s1765 * s4522 - s1771 * s4526
+    s4531 = s4524 - s1721 * s4516 - s1739 * s4517 - s1745 * s4521 - s1766 * s4522 - s1772 * s4526
+    s4532 = s4525 - s1722 * s4516 - s1740 * s4517 - s1746 * s4521 - s1767 * s4522 - s1773 * s4526
+    s4533 = s4531 - s1782 * s4530
+    s4534 = s4532 - s1783 * s4530 - s1792 * s4533
+    s4535 = s4527 - s1768 * s4522 - s1774 * s4526 - s1784 * s4530 - s1793 * s4533 - s1799 * s4534
+    s4536 = s4528 - s1769 * s4522 - s1775 * s4526 - s1785 * s4530 - s1794 * s4533 - s1800 * s4534
+    s4537 = s4529 - s1770 * s4522 - s1776 * s4526 - s1786 * s4530 - s1795 * s4533 - s1801 * s4534
+    s4538 = s4536 + s1807 * s4535
+    s4539 = (s4537 + s1808 * s4535 + s1810 * s4538) / pivot_trunk_x_dot
+    s4540 = s4538 / pivot_trunk_y_dot + s1810 * s4539
+    s4541 = s4535 / pivot_trunk_z_dot + s1807 * s4540 + s1808 * s4539
+    s4542 = s4534 / pivot_trunk_wx - s1799 * s4541 - s1800 * s4540 - s1801 * s4539
+    s4543 = s4533 / pivot_trunk_wy - s1792 * s4542 - s1793 * s4541 - s1794 * s4540 - s1795 * s4539
+    s4544 = s4530 / pivot_trunk_wz - s1782 * s4543 - s1783 * s4542 - s1784 * s4541 - s1785 * s4540
+    s4545 = s4544 - s1786 * s4539
+    s4546 = s4526 / pivot_hind_right_abduction_angle_dot - s1771 * s4545 - s1772 * s4543
+    s4547 = s4546 - s1773 * s4542 - s1774 * s4541 - s1775 * s4540 - s1776 * s4539
+    s4548 = s4522 / pivot_hind_left_abduction_angle_dot - s1765 * s4545 - s1766 * s4543
+    s4549 = s4548 - s1767 * s4542 - s1768 * s4541 - s1769 * s4540 - s1770 * s4539
+    s4550 = s4521 / pivot_front_right_abduction_angle_dot - s1744 * s4545 - s1745 * s4543
+    s4551 = s4550 - s1746 * s4542 - s1747 * s4541 - s1748 * s4540 - s1749 * s4539
+    s4552 = s4517 / pivot_front_left_abduction_angle_dot - s1738 * s4545 - s1739 * s4543
+    s4553 = s4552 - s1740 * s4542 - s1741 * s4541 - s1742 * s4540 - s1743 * s4539
+    s4554 = s4516 / pivot_hind_right_swing_angle_dot - s1719 * s4547 - s1720 * s4545 - s1721 * s4543
+    s4555 = s4554 - s1722 * s4542 - s1723 * s4541 - s1724 * s4540 - s1725 * s4539
+    s4556 = s4515 / pivot_hind_left_swing_angle_dot - s1706 * s4549 - s1707 * s4545 - s1708 * s4543
+    s4557 = s4556 - s1709 * s4542 - s1710 * s4541 - s1711 * s4540 - s1712 * s4539
+    s4558 = s4511 / pivot_front_right_swing_angle_dot - s1693 * s4551 - s1694 * s4545
+    s4559 = s4558 - s1695 * s4543 - s1696 * s4542 - s1697 * s4541 - s1698 * s4540 - s1699 * s4539
+    s4560 = s4510 / pivot_front_left_swing_angle_dot - s1665 * s4553 - s1666 * s4545 - s1667 * s4543
+    s4561 = s4560 - s1668 * s4542 - s1669 * s4541 - s1670 * s4540 - s1671 * s4539
+    s4562 = s3695 / pivot_hind_right_knee_angle_dot + s1650 * s4555 + s1651 * s4547 + s1652 * s4545
+    s4563 = s4562 + s1653 * s4543 + s1654 * s4542 + s1655 * s4541 + s1656 * s4540 + s1657 * s4539
+    s4564 = s3627 / pivot_hind_left_knee_angle_dot + s1629 * s4557 + s1630 * s4549 + s1631 * s4545
+    s4565 = s4564 + s1632 * s4543 + s1633 * s4542 + s1634 * s4541 + s1635 * s4540 + s1636 * s4539
+    s4566 = s3559 / pivot_front_right_knee_angle_dot + s1614 * s4559 + s1615 * s4551 + s1616 * s4545
+    s4567 = s4566 + s1617 * s4543 + s1618 * s4542 + s1619 * s4541 + s1620 * s4540 + s1621 * s4539
+    s4568 = s3491 / pivot_front_left_knee_angle_dot + s1599 * s4561 + s1600 * s4553 + s1601 * s4545
+    s4569 = s4568 + s1602 * s4543 + s1603 * s4542 + s1604 * s4541 + s1605 * s4540 + s1606 * s4539
+    s4570 = s1599 * s3494 - (s3267 + (s17 * s3219 + s20 * s3221 + s23 * s3223))
+    s4571 = s1614 * s3562 - (s3320 + (s17 * s3272 + s20 * s3274 + s23 * s3276))
+    s4572 = s1601 * s3494 - (s3055 + (s17 * s3041 + s20 * s3042 + s23 * s3043)) + s1616 * s3562
+    s4573 = s1602 * s3494 - (s3037 + (s17 * s3023 + s20 * s3024 + s23 * s3025)) + s1617 * s3562
+    s4574 = s1603 * s3494 - (s3019 + (s17 * s3005 + s20 * s3006 + s23 * s3007)) + s1618 * s3562
+    s4575 = s1629 * s3630 - (s3373 + (s17 * s3325 + s20 * s3327 + s23 * s3329))
+    s4576 = s1650 * s3698 - (s3426 + (s17 * s3378 + s20 * s3380 + s23 * s3382))
+    s4577 = s1600 * s3494 - (s3097 + (s17 * s3057 + s20 * s3059 + s23 * s3061)) - s1665 * s4570
+    s4578 = s1604 * s3494 - s3049 + s1619 * s3562 + s1634 * s3630 + s1655 * s3698 - s1669 * s4570
+    s4579 = s1605 * s3494 - s3048 + s1620 * s3562 + s1635 * s3630 + s1656 * s3698 - s1670 * s4570
+    s4580 = s1606 * s3494 - s3047 + s1621 * s3562 + s1636 * s3630 + s1657 * s3698 - s1671 * s4570
+    s4581 = s1615 * s3562 - (s3136 + (s17 * s3099 + s20 * s3101 + s23 * s3103)) - s1693 * s4571
+    s4582 = s1630 * s3630 - (s3175 + (s17 * s3138 + s20 * s3140 + s23 * s3142)) - s1706 * s4575
+    s4583 = s4572 + s1631 * s3630 + s1652 * s3698 - s1666 * s4570 - s1694 * s4571 - s1707 * s4575
+    s4584 = s4573 + s1632 * s3630 + s1653 * s3698 - s1667 * s4570 - s1695 * s4571 - s1708 * s4575
+    s4585 = s4574 + s1633 * s3630 + s1654 * s3698 - s1668 * s4570 - s1696 * s4571 - s1709 * s4575
+    s4586 = s1651 * s3698 - (s3214 + (s17 * s3177 + s20 * s3179 + s23 * s3181)) - s1719 * s4576
+    s4587 = s4578 - s1697 * s4571 - s1710 * s4575 - s1723 * s4576 - s1741 * s4577 - s1747 * s4581
+    s4588 = s4579 - s1698 * s4571 - s1711 * s4575 - s1724 * s4576 - s1742 * s4577 - s1748 * s4581
+    s4589 = s4580 - s1699 * s4571 - s1712 * s4575 - s1725 * s4576 - s1743 * s4577 - s1749 * s4581
+    s4590 = s4583 - s1720 * s4576 - s1738 * s4577 - s1744 * s4581 - s1765 * s4582 - s1771 * s4586
+    s4591 = s4584 - s1721 * s4576 - s1739 * s4577 - s1745 * s4581 - s1766 * s4582 - s1772 * s4586
+    s4592 = s4585 - s1722 * s4576 - s1740 * s4577 - s1746 * s4581 - s1767 * s4582 - s1773 * s4586
+    s4593 = s4591 - s1782 * s4590
+    s4594 = s4592 - s1783 * s4590 - s1792 * s4593
+    s4595 = s4587 - s1768 * s4582 - s1774 * s4586 - s1784 * s4590 - s1793 * s4593 - s1799 * s4594
+    s4596 = s4588 - s1769 * s4582 - s1775 * s4586 - s1785 * s4590 - s1794 * s4593 - s1800 * s4594
+    s4597 = s4589 - s1770 * s4582 - s1776 * s4586 - s1786 * s4590 - s1795 * s4593 - s1801 * s4594
+    s4598 = s4596 + s1807 * s4595
+    s4599 = (s4597 + s1808 * s4595 + s1810 * s4598) / pivot_trunk_x_dot
+    s4600 = s4598 / pivot_trunk_y_dot + s1810 * s4599
+    s4601 = s4595 / pivot_trunk_z_dot + s1807 * s4600 + s1808 * s4599
+    s4602 = s4594 / pivot_trunk_wx - s1799 * s4601 - s1800 * s4600 - s1801 * s4599
+    s4603 = s4593 / pivot_trunk_wy - s1792 * s4602 - s1793 * s4601 - s1794 * s4600 - s1795 * s4599
+    s4604 = s4590 / pivot_trunk_wz - s1782 * s4603 - s1783 * s4602 - s1784 * s4601 - s1785 * s4600
+    s4605 = s4604 - s1786 * s4599
+    s4606 = s4586 / pivot_hind_right_abduction_angle_dot - s1771 * s4605 - s1772 * s4603
+    s4607 = s4606 - s1773 * s4602 - s1774 * s4601 - s1775 * s4600 - s1776 * s4599
+    s4608 = s4582 / pivot_hind_left_abduction_angle_dot - s1765 * s4605 - s1766 * s4603
+    s4609 = s4608 - s1767 * s4602 - s1768 * s4601 - s1769 * s4600 - s1770 * s4599
+    s4610 = s4581 / pivot_front_right_abduction_angle_dot - s1744 * s4605 - s1745 * s4603
+    s4611 = s4610 - s1746 * s4602 - s1747 * s4601 - s1748 * s4600 - s1749 * s4599
+    s4612 = s4577 / pivot_front_left_abduction_angle_dot - s1738 * s4605 - s1739 * s4603
+    s4613 = s4612 - s1740 * s4602 - s1741 * s4601 - s1742 * s4600 - s1743 * s4599
+    s4614 = s4576 / pivot_hind_right_swing_angle_dot - s1719 * s4607 - s1720 * s4605 - s1721 * s4603
+    s4615 = s4614 - s1722 * s4602 - s1723 * s4601 - s1724 * s4600 - s1725 * s4599
+    s4616 = s4575 / pivot_hind_left_swing_angle_dot - s1706 * s4609 - s1707 * s4605 - s1708 * s4603
+    s4617 = s4616 - s1709 * s4602 - s1710 * s4601 - s1711 * s4600 - s1712 * s4599
+    s4618 = s4571 / pivot_front_right_swing_angle_dot - s1693 * s4611 - s1694 * s4605
+    s4619 = s4618 - s1695 * s4603 - s1696 * s4602 - s1697 * s4601 - s1698 * s4600 - s1699 * s4599
+    s4620 = s4570 / pivot_front_left_swing_angle_dot - s1665 * s4613 - s1666 * s4605 - s1667 * s4603
+    s4621 = s4620 - s1668 * s4602 - s1669 * s4601 - s1670 * s4600 - s1671 * s4599
+    s4622 = s3698 / pivot_hind_right_knee_angle_dot + s1650 * s4615 + s1651 * s4607 + s1652 * s4605
+    s4623 = s4622 + s1653 * s4603 + s1654 * s4602 + s1655 * s4601 + s1656 * s4600 + s1657 * s4599
+    s4624 = s3630 / pivot_hind_left_knee_angle_dot + s1629 * s4617 + s1630 * s4609 + s1631 * s4605
+    s4625 = s4624 + s1632 * s4603 + s1633 * s4602 + s1634 * s4601 + s1635 * s4600 + s1636 * s4599
+    s4626 = s3562 / pivot_front_right_knee_angle_dot + s1614 * s4619 + s1615 * s4611 + s1616 * s4605
+    s4627 = s4626 + s1617 * s4603 + s1618 * s4602 + s1619 * s4601 + s1620 * s4600 + s1621 * s4599
+    s4628 = s3494 / pivot_front_left_knee_angle_dot + s1599 * s4621 + s1600 * s4613 + s1601 * s4605
+    s4629 = s4628 + s1602 * s4603 + s1603 * s4602 + s1604 * s4601 + s1605 * s4600 + s1606 * s4599
+    s4630 = s1599 * s3479 - (s3254 + s3255)
+    s4631 = s1600 * s3479 - (s3084 + s3085) - s1665 * s4630
+    s4632 = s1601 * s3479 - (s17 * s3089 + s20 * s3090 + s23 * s3091) - s1666 * s4630
+    s4633 = s1602 * s3479 - (s16 * s3089 + s19 * s3090 + s22 * s3091) - s1667 * s4630
+    s4634 = s1603 * s3479 - (s15 * s3089 + s18 * s3090 + s21 * s3091) - s1668 * s4630
+    s4635 = s4632 - s1738 * s4631
+    s4636 = s4633 - s1739 * s4631 - s1782 * s4635
+    s4637 = s4634 - s1740 * s4631 - s1783 * s4635 - s1792 * s4636
+    s4638 = s1604 * s3479 - s3082 - s1669 * s4630 - s1741 * s4631 - s1784 * s4635 - s1793 * s4636
+    s4639 = s1605 * s3479 - s3081 - s1670 * s4630 - s1742 * s4631 - s1785 * s4635 - s1794 * s4636
+    s4640 = s1606 * s3479 - s3080 - s1671 * s4630 - s1743 * s4631 - s1786 * s4635 - s1795 * s4636
+    s4641 = s4638 - s1799 * s4637
+    s4642 = s4639 - s1800 * s4637 + s1807 * s4641
+    s4643 = (s4640 - s1801 * s4637 + s1808 * s4641 + s1810 * s4642) / pivot_trunk_x_dot
+    s4644 = s4642 / pivot_trunk_y_dot + s1810 * s4643
+    s4645 = s4641 / pivot_trunk_z_dot + s1807 * s4644 + s1808 * s4643
+    s4646 = s4637 / pivot_trunk_wx - s1799 * s4645 - s1800 * s4644 - s1801 * s4643
+    s4647 = s4636 / pivot_trunk_wy - s1792 * s4646 - s1793 * s4645 - s1794 * s4644 - s1795 * s4643
+    s4648 = s4635 / pivot_trunk_wz - s1782 * s4647 - s1783 * s4646 - s1784 * s4645 - s1785 * s4644
+    s4649 = s4648 - s1786 * s4643
+    s4650 = s1771 * s4649 + s1772 * s4647 + s1773 * s4646 + s1774 * s4645 + s1775 * s4644
+    s4651 = s4650 + s1776 * s4643
+    s4652 = s1765 * s4649 + s1766 * s4647 + s1767 * s4646 + s1768 * s4645 + s1769 * s4644
+    s4653 = s4652 + s1770 * s4643
+    s4654 = s1744 * s4649 + s1745 * s4647 + s1746 * s4646 + s1747 * s4645 + s1748 * s4644
+    s4655 = s4654 + s1749 * s4643
+    s4656 = s4631 / pivot_front_left_abduction_angle_dot - s1738 * s4649 - s1739 * s4647
+    s4657 = s4656 - s1740 * s4646 - s1741 * s4645 - s1742 * s4644 - s1743 * s4643
+    s4658 = s1719 * s4651 - s1720 * s4649 - s1721 * s4647 - s1722 * s4646 - s1723 * s4645
+    s4659 = s4658 - s1724 * s4644 - s1725 * s4643
+    s4660 = s1706 * s4653 - s1707 * s4649 - s1708 * s4647 - s1709 * s4646 - s1710 * s4645
+    s4661 = s4660 - s1711 * s4644 - s1712 * s4643
+    s4662 = s1693 * s4655 - s1694 * s4649 - s1695 * s4647 - s1696 * s4646 - s1697 * s4645
+    s4663 = s4662 - s1698 * s4644 - s1699 * s4643
+    s4664 = s4630 / pivot_front_left_swing_angle_dot - s1665 * s4657 - s1666 * s4649 - s1667 * s4647
+    s4665 = s4664 - s1668 * s4646 - s1669 * s4645 - s1670 * s4644 - s1671 * s4643
+    s4666 = s1651 * s4651 - s1650 * s4659 - s1652 * s4649 - s1653 * s4647 - s1654 * s4646
+    s4667 = s1630 * s4653 - s1629 * s4661 - s1631 * s4649 - s1632 * s4647 - s1633 * s4646
+    s4668 = s1615 * s4655 - s1614 * s4663 - s1616 * s4649 - s1617 * s4647 - s1618 * s4646
+    s4669 = s3479 / pivot_front_left_knee_angle_dot + s1599 * s4665 + s1600 * s4657 + s1601 * s4649
+    s4670 = s4669 + s1602 * s4647 + s1603 * s4646 + s1604 * s4645 + s1605 * s4644 + s1606 * s4643
+    s4671 = s1614 * s3547 - (s3307 + s3308)
+    s4672 = s1615 * s3547 - (s3123 + s3124) - s1693 * s4671
+    s4673 = s1616 * s3547 - (s17 * s3128 + s20 * s3129 + s23 * s3130) - s1694 * s4671
+    s4674 = s1617 * s3547 - (s16 * s3128 + s19 * s3129 + s22 * s3130) - s1695 * s4671
+    s4675 = s1618 * s3547 - (s15 * s3128 + s18 * s3129 + s21 * s3130) - s1696 * s4671
+    s4676 = s4673 - s1744 * s4672
+    s4677 = s4674 - s1745 * s4672 - s1782 * s4676
+    s4678 = s4675 - s1746 * s4672 - s1783 * s4676 - s1792 * s4677
+    s4679 = s1619 * s3547 - s3121 - s1697 * s4671 - s1747 * s4672 - s1784 * s4676 - s1793 * s4677
+    s4680 = s1620 * s3547 - s3120 - s1698 * s4671 - s1748 * s4672 - s1785 * s4676 - s1794 * s4677
+    s4681 = s1621 * s3547 - s3119 - s1699 * s4671 - s1749 * s4672 - s1786 * s4676 - s1795 * s4677
+    s4682 = s4679 - s1799 * s4678
+    s4683 = s4680 - s1800 * s4678 + s1807 * s4682
+    s4684 = (s4681 - s1801 * s4678 + s1808 * s4682 + s1810 * s4683) / pivot_trunk_x_dot
+    s4685 = s4683 / pivot_trunk_y_dot + s1810 * s4684
+    s4686 = s4682 / pivot_trunk_z_dot + s1807 * s4685 + s1808 * s4684
+    s4687 = s4678 / pivot_trunk_wx - s1799 * s4686 - s1800 * s4685 - s1801 * s4684
+    s4688 = s4677 / pivot_trunk_wy - s1792 * s4687 - s1793 * s4686 - s1794 * s4685 - s1795 * s4684
+    s4689 = s4676 / pivot_trunk_wz - s1782 * s4688 - s1783 * s4687 - s1784 * s4686 - s1785 * s4685
+    s4690 = s4689 - s1786 * s4684
+    s4691 = s1771 * s4690 + s1772 * s4688 + s1773 * s4687 + s1774 * s4686 + s1775 * s4685
+    s4692 = s4691 + s1776 * s4684
+    s4693 = s1765 * s4690 + s1766 * s4688 + s1767 * s4687 + s1768 * s4686 + s1769 * s4685
+    s4694 = s4693 + s1770 * s4684
+    s4695 = s4672 / pivot_front_right_abduction_angle_dot - s1744 * s4690 - s1745 * s4688
+    s4696 = s4695 - s1746 * s4687 - s1747 * s4686 - s1748 * s4685 - s1749 * s4684
+    s4697 = s1738 * s4690 + s1739 * s4688 + s1740 * s4687 + s1741 * s4686 + s1742 * s4685
+    s4698 = s4697 + s1743 * s4684
+    s4699 = s1719 * s4692 - s1720 * s4690 - s1721 * s4688 - s1722 * s4687 - s1723 * s4686
+    s4700 = s4699 - s1724 * s4685 - s1725 * s4684
+    s4701 = s1706 * s4694 - s1707 * s4690 - s1708 * s4688 - s1709 * s4687 - s1710 * s4686
+    s4702 = s4701 - s1711 * s4685 - s1712 * s4684
+    s4703 = s4671 / pivot_front_right_swing_angle_dot - s1693 * s4696 - s1694 * s4690
+    s4704 = s4703 - s1695 * s4688 - s1696 * s4687 - s1697 * s4686 - s1698 * s4685 - s1699 * s4684
+    s4705 = s1665 * s4698 - s1666 * s4690 - s1667 * s4688 - s1668 * s4687 - s1669 * s4686
+    s4706 = s4705 - s1670 * s4685 - s1671 * s4684
+    s4707 = s1651 * s4692 - s1650 * s4700 - s1652 * s4690 - s1653 * s4688 - s1654 * s4687
+    s4708 = s1630 * s4694 - s1629 * s4702 - s1631 * s4690 - s1632 * s4688 - s1633 * s4687
+    s4709 = s3547 / pivot_front_right_knee_angle_dot + s1614 * s4704 + s1615 * s4696 + s1616 * s4690
+    s4710 = s4709 + s1617 * s4688 + s1618 * s4687 + s1619 * s4686 + s1620 * s4685 + s1621 * s4684
+    s4711 = s1600 * s4698 - s1599 * s4706 - s1601 * s4690 - s1602 * s4688 - s1603 * s4687
+    s4712 = s1629 * s3615 - (s3360 + s3361)
+    s4713 = s1630 * s3615 - (s3162 + s3163) - s1706 * s4712
+    s4714 = s1631 * s3615 - (s17 * s3167 + s20 * s3168 + s23 * s3169) - s1707 * s4712
+    s4715 = s1632 * s3615 - (s16 * s3167 + s19 * s3168 + s22 * s3169) - s1708 * s4712
+    s4716 = s1633 * s3615 - (s15 * s3167 + s18 * s3168 + s21 * s3169) - s1709 * s4712
+    s4717 = s4714 - s1765 * s4713
+    s4718 = s4715 - s1766 * s4713 - s1782 * s4717
+    s4719 = s4716 - s1767 * s4713 - s1783 * s4717 - s1792 * s4718
+    s4720 = s1634 * s3615 - s3160 - s1710 * s4712 - s1768 * s4713 - s1784 * s4717 - s1793 * s4718
+    s4721 = s1635 * s3615 - s3159 - s1711 * s4712 - s1769 * s4713 - s1785 * s4717 - s1794 * s4718
+    s4722 = s1636 * s3615 - s3158 - s1712 * s4712 - s1770 * s4713 - s1786 * s4717 - s1795 * s4718
+    s4723 = s4720 - s1799 * s4719
+    s4724 = s4721 - s1800 * s4719 + s1807 * s4723
+    s4725 = (s4722 - s1801 * s4719 + s1808 * s4723 + s1810 * s4724) / pivot_trunk_x_dot
+    s4726 = s4724 / pivot_trunk_y_dot + s1810 * s4725
+    s4727 = s4723 / pivot_trunk_z_dot + s1807 * s4726 + s1808 * s4725
+    s4728 = s4719 / pivot_trunk_wx - s1799 * s4727 - s1800 * s4726 - s1801 * s4725
+    s4729 = s4718 / pivot_trunk_wy - s1792 * s4728 - s1793 * s4727 - s1794 * s4726 - s1795 * s4725
+    s4730 = s4717 / pivot_trunk_wz - s1782 * s4729 - s1783 * s4728 - s1784 * s4727 - s1785 * s4726
+    s4731 = s4730 - s1786 * s4725
+    s4732 = s1771 * s4731 + s1772 * s4729 + s1773 * s4728 + s1774 * s4727 + s1775 * s4726
+    s4733 = s4732 + s1776 * s4725
+    s4734 = s4713 / pivot_hind_left_abduction_angle_dot - s1765 * s4731 - s1766 * s4729
+    s4735 = s4734 - s1767 * s4728 - s1768 * s4727 - s1769 * s4726 - s1770 * s4725
+    s4736 = s1744 * s4731 + s1745 * s4729 + s1746 * s4728 + s1747 * s4727 + s1748 * s4726
+    s4737 = s4736 + s1749 * s4725
+    s4738 = s1738 * s4731 + s1739 * s4729 + s1740 * s4728 + s1741 * s4727 + s1742 * s4726
+    s4739 = s4738 + s1743 * s4725
+    s4740 = s1719 * s4733 - s1720 * s4731 - s1721 * s4729 - s1722 * s4728 - s1723 * s4727
+    s4741 = s4740 - s1724 * s4726 - s1725 * s4725
+    s4742 = s4712 / pivot_hind_left_swing_angle_dot - s1706 * s4735 - s1707 * s4731 - s1708 * s4729
+    s4743 = s4742 - s1709 * s4728 - s1710 * s4727 - s1711 * s4726 - s1712 * s4725
+    s4744 = s1693 * s4737 - s1694 * s4731 - s1695 * s4729 - s1696 * s4728 - s1697 * s4727
+    s4745 = s4744 - s1698 * s4726 - s1699 * s4725
+    s4746 = s1665 * s4739 - s1666 * s4731 - s1667 * s4729 - s1668 * s4728 - s1669 * s4727
+    s4747 = s4746 - s1670 * s4726 - s1671 * s4725
+    s4748 = s1651 * s4733 - s1650 * s4741 - s1652 * s4731 - s1653 * s4729 - s1654 * s4728
+    s4749 = s3615 / pivot_hind_left_knee_angle_dot + s1629 * s4743 + s1630 * s4735 + s1631 * s4731
+    s4750 = s4749 + s1632 * s4729 + s1633 * s4728 + s1634 * s4727 + s1635 * s4726 + s1636 * s4725
+    s4751 = s1615 * s4737 - s1614 * s4745 - s1616 * s4731 - s1617 * s4729 - s1618 * s4728
+    s4752 = s1600 * s4739 - s1599 * s4747 - s1601 * s4731 - s1602 * s4729 - s1603 * s4728
+    s4753 = s1650 * s3683 - (s3413 + s3414)
+    s4754 = s1651 * s3683 - (s3201 + s3202) - s1719 * s4753
+    s4755 = s1652 * s3683 - (s17 * s3206 + s20 * s3207 + s23 * s3208) - s1720 * s4753
+    s4756 = s1653 * s3683 - (s16 * s3206 + s19 * s3207 + s22 * s3208) - s1721 * s4753
+    s4757 = s1654 * s3683 - (s15 * s3206 + s18 * s3207 + s21 * s3208) - s1722 * s4753
+    s4758 = s4755 - s1771 * s4754
+    s4759 = s4756 - s1772 * s4754 - s1782 * s4758
+    s4760 = s4757 - s1773 * s4754 - s1783 * s4758 - s1792 * s4759
+    s4761 = s1655 * s3683 - s3199 - s1723 * s4753 - s1774 * s4754 - s1784 * s4758 - s1793 * s4759
+    s4762 = s1656 * s3683 - s3198 - s1724 * s4753 - s1775 * s4754 - s1785 * s4758 - s1794 * s4759
+    s4763 = s1657 * s3683 - s3197 - s1725 * s4753 - s1776 * s4754 - s1786 * s4758 - s1795 * s4759
+    s4764 = s4761 - s1799 * s4760
+    s4765 = s4762 - s1800 * s4760 + s1807 * s4764
+    s4766 = (s4763 - s1801 * s4760 + s1808 * s4764 + s1810 * s4765) / pivot_trunk_x_dot
+    s4767 = s4765 / pivot_trunk_y_dot + s1810 * s4766
+    s4768 = s4764 / pivot_trunk_z_dot + s1807 * s4767 + s1808 * s4766
+    s4769 = s4760 / pivot_trunk_wx - s1799 * s4768 - s1800 * s4767 - s1801 * s4766
+    s4770 = s4759 / pivot_trunk_wy - s1792 * s4769 - s1793 * s4768 - s1794 * s4767 - s1795 * s4766
+    s4771 = s4758 / pivot_trunk_wz - s1782 * s4770 - s1783 * s4769 - s1784 * s4768 - s1785 * s4767
+    s4772 = s4771 - s1786 * s4766
+    s4773 = s4754 / pivot_hind_right_abduction_angle_dot - s1771 * s4772 - s1772 * s4770
+    s4774 = s4773 - s1773 * s4769 - s1774 * s4768 - s1775 * s4767 - s1776 * s4766
+    s4775 = s1765 * s4772 + s1766 * s4770 + s1767 * s4769 + s1768 * s4768 + s1769 * s4767
+    s4776 = s4775 + s1770 * s4766
+    s4777 = s1744 * s4772 + s1745 * s4770 + s1746 * s4769 + s1747 * s4768 + s1748 * s4767
+    s4778 = s4777 + s1749 * s4766
+    s4779 = s1738 * s4772 + s1739 * s4770 + s1740 * s4769 + s1741 * s4768 + s1742 * s4767
+    s4780 = s4779 + s1743 * s4766
+    s4781 = s4753 / pivot_hind_right_swing_angle_dot - s1719 * s4774 - s1720 * s4772 - s1721 * s4770
+    s4782 = s4781 - s1722 * s4769 - s1723 * s4768 - s1724 * s4767 - s1725 * s4766
+    s4783 = s1706 * s4776 - s1707 * s4772 - s1708 * s4770 - s1709 * s4769 - s1710 * s4768
+    s4784 = s4783 - s1711 * s4767 - s1712 * s4766
+    s4785 = s1693 * s4778 - s1694 * s4772 - s1695 * s4770 - s1696 * s4769 - s1697 * s4768
+    s4786 = s4785 - s1698 * s4767 - s1699 * s4766
+    s4787 = s1665 * s4780 - s1666 * s4772 - s1667 * s4770 - s1668 * s4769 - s1669 * s4768
+    s4788 = s4787 - s1670 * s4767 - s1671 * s4766
+    s4789 = s3683 / pivot_hind_right_knee_angle_dot + s1650 * s4782 + s1651 * s4774 + s1652 * s4772
+    s4790 = s4789 + s1653 * s4770 + s1654 * s4769 + s1655 * s4768 + s1656 * s4767 + s1657 * s4766
+    s4791 = s1630 * s4776 - s1629 * s4784 - s1631 * s4772 - s1632 * s4770 - s1633 * s4769
+    s4792 = s1615 * s4778 - s1614 * s4786 - s1616 * s4772 - s1617 * s4770 - s1618 * s4769
+    s4793 = s1600 * s4780 - s1599 * s4788 - s1601 * s4772 - s1602 * s4770 - s1603 * s4769
+    s4794 = s1599 * s3468 - (s3246 + (s927 * s3219 + s929 * s3221 + s931 * s3223))
+    s4795 = s1600 * s3468 - (s15 * s3250 + s18 * s3251 + s21 * s3252) - s1665 * s4794
+    s4796 = s1601 * s3468 - (s17 * s3259 + s20 * s3260 + s23 * s3261) - s1666 * s4794
+    s4797 = s1602 * s3468 - (s16 * s3259 + s19 * s3260 + s22 * s3261) - s1667 * s4794
+    s4798 = s1603 * s3468 - (s15 * s3259 + s18 * s3260 + s21 * s3261) - s1668 * s4794
+    s4799 = s4796 - s1738 * s4795
+    s4800 = s4797 - s1739 * s4795 - s1782 * s4799
+    s4801 = s4798 - s1740 * s4795 - s1783 * s4799 - s1792 * s4800
+    s4802 = s1604 * s3468 - s3244 - s1669 * s4794 - s1741 * s4795 - s1784 * s4799 - s1793 * s4800
+    s4803 = s1605 * s3468 - s3243 - s1670 * s4794 - s1742 * s4795 - s1785 * s4799 - s1794 * s4800
+    s4804 = s1606 * s3468 - s3242 - s1671 * s4794 - s1743 * s4795 - s1786 * s4799 - s1795 * s4800
+    s4805 = s4802 - s1799 * s4801
+    s4806 = s4803 - s1800 * s4801 + s1807 * s4805
+    s4807 = (s4804 - s1801 * s4801 + s1808 * s4805 + s1810 * s4806) / pivot_trunk_x_dot
+    s4808 = s4806 / pivot_trunk_y_dot + s1810 * s4807
+    s4809 = s4805 / pivot_trunk_z_dot + s1807 * s4808 + s1808 * s4807
+    s4810 = s4801 / pivot_trunk_wx - s1799 * s4809 - s1800 * s4808 - s1801 * s4807
+    s4811 = s4800 / pivot_trunk_wy - s1792 * s4810 - s1793 * s4809 - s1794 * s4808 - s1795 * s4807
+    s4812 = s4799 / pivot_trunk_wz - s1782 * s4811 - s1783 * s4810 - s1784 * s4809 - s1785 * s4808
+    s4813 = s4812 - s1786 * s4807
+    s4814 = s1771 * s4813 + s1772 * s4811 + s1773 * s4810 + s1774 * s4809 + s1775 * s4808
+    s4815 = s4814 + s1776 * s4807
+    s4816 = s1765 * s4813 + s1766 * s4811 + s1767 * s4810 + s1768 * s4809 + s1769 * s4808
+    s4817 = s4816 + s1770 * s4807
+    s4818 = s1744 * s4813 + s1745 * s4811 + s1746 * s4810 + s1747 * s4809 + s1748 * s4808
+    s4819 = s4818 + s1749 * s4807
+    s4820 = s4795 / pivot_front_left_abduction_angle_dot - s1738 * s4813 - s1739 * s4811
+    s4821 = s4820 - s1740 * s4810 - s1741 * s4809 - s1742 * s4808 - s1743 * s4807
+    s4822 = s1719 * s4815 - s1720 * s4813 - s1721 * s4811 - s1722 * s4810 - s1723 * s4809
+    s4823 = s4822 - s1724 * s4808 - s1725 * s4807
+    s4824 = s1706 * s4817 - s1707 * s4813 - s1708 * s4811 - s1709 * s4810 - s1710 * s4809
+    s4825 = s4824 - s1711 * s4808 - s1712 * s4807
+    s4826 = s1693 * s4819 - s1694 * s4813 - s1695 * s4811 - s1696 * s4810 - s1697 * s4809
+    s4827 = s4826 - s1698 * s4808 - s1699 * s4807
+    s4828 = s4794 / pivot_front_left_swing_angle_dot - s1665 * s4821 - s1666 * s4813 - s1667 * s4811
+    s4829 = s4828 - s1668 * s4810 - s1669 * s4809 - s1670 * s4808 - s1671 * s4807
+    s4830 = s1651 * s4815 - s1650 * s4823 - s1652 * s4813 - s1653 * s4811 - s1654 * s4810
+    s4831 = s1630 * s4817 - s1629 * s4825 - s1631 * s4813 - s1632 * s4811 - s1633 * s4810
+    s4832 = s1615 * s4819 - s1614 * s4827 - s1616 * s4813 - s1617 * s4811 - s1618 * s4810
+    s4833 = s3468 / pivot_front_left_knee_angle_dot + s1599 * s4829 + s1600 * s4821 + s1601 * s4813
+    s4834 = s4833 + s1602 * s4811 + s1603 * s4810 + s1604 * s4809 + s1605 * s4808 + s1606 * s4807
+    s4835 = s1614 * s3536 - (s3299 + (s933 * s3272 + s935 * s3274 + s937 * s3276))
+    s4836 = s1615 * s3536 - (s15 * s3303 + s18 * s3304 + s21 * s3305) - s1693 * s4835
+    s4837 = s1616 * s3536 - (s17 * s3312 + s20 * s3313 + s23 * s3314) - s1694 * s4835
+    s4838 = s1617 * s3536 - (s16 * s3312 + s19 * s3313 + s22 * s3314) - s1695 * s4835
+    s4839 = s1618 * s3536 - (s15 * s3312 + s18 * s3313 + s21 * s3314) - s1696 * s4835
+    s4840 = s4837 - s1744 * s4836
+    s4841 = s4838 - s1745 * s4836 - s1782 * s4840
+    s4842 = s4839 - s1746 * s4836 - s1783 * s4840 - s1792 * s4841
+    s4843 = s1619 * s3536 - s3297 - s1697 * s4835 - s1747 * s4836 - s1784 * s4840 - s1793 * s4841
+    s4844 = s1620 * s3536 - s3296 - s1698 * s4835 - s1748 * s4836 - s1785 * s4840 - s1794 * s4841
+    s4845 = s1621 * s3536 - s3295 - s1699 * s4835 - s1749 * s4836 - s1786 * s4840 - s1795 * s4841
+    s4846 = s4843 - s1799 * s4842
+    s4847 = s4844 - s1800 * s4842 + s1807 * s4846
+    s4848 = (s4845 - s1801 * s4842 + s1808 * s4846 + s1810 * s4847) / pivot_trunk_x_dot
+    s4849 = s4847 / pivot_trunk_y_dot + s1810 * s4848
+    s4850 = s4846 / pivot_trunk_z_dot + s1807 * s4849 + s1808 * s4848
+    s4851 = s4842 / pivot_trunk_wx - s1799 * s4850 - s1800 * s4849 - s1801 * s4848
+    s4852 = s4841 / pivot_trunk_wy - s1792 * s4851 - s1793 * s4850 - s1794 * s4849 - s1795 * s4848
+    s4853 = s4840 / pivot_trunk_wz - s1782 * s4852 - s1783 * s4851 - s1784 * s4850 - s1785 * s4849
+    s4854 = s4853 - s1786 * s4848
+    s4855 = s1771 * s4854 + s1772 * s4852 + s1773 * s4851 + s1774 * s4850 + s1775 * s4849
+    s4856 = s4855 + s1776 * s4848
+    s4857 = s1765 * s4854 + s1766 * s4852 + s1767 * s4851 + s1768 * s4850 + s1769 * s4849
+    s4858 = s4857 + s1770 * s4848
+    s4859 = s4836 / pivot_front_right_abduction_angle_dot - s1744 * s4854 - s1745 * s4852
+    s4860 = s4859 - s1746 * s4851 - s1747 * s4850 - s1748 * s4849 - s1749 * s4848
+    s4861 = s1738 * s4854 + s1739 * s4852 + s1740 * s4851 + s1741 * s4850 + s1742 * s4849
+    s4862 = s4861 + s1743 * s4848
+    s4863 = s1719 * s4856 - s1720 * s4854 - s1721 * s4852 - s1722 * s4851 - s1723 * s4850
+    s4864 = s4863 - s1724 * s4849 - s1725 * s4848
+    s4865 = s1706 * s4858 - s1707 * s4854 - s1708 * s4852 - s1709 * s4851 - s1710 * s4850
+    s4866 = s4865 - s1711 * s4849 - s1712 * s4848
+    s4867 = s4835 / pivot_front_right_swing_angle_dot - s1693 * s4860 - s1694 * s4854
+    s4868 = s4867 - s1695 * s4852 - s1696 * s4851 - s1697 * s4850 - s1698 * s4849 - s1699 * s4848
+    s4869 = s1665 * s4862 - s1666 * s4854 - s1667 * s4852 - s1668 * s4851 - s1669 * s4850
+    s4870 = s4869 - s1670 * s4849 - s1671 * s4848
+    s4871 = s1651 * s4856 - s1650 * s4864 - s1652 * s4854 - s1653 * s4852 - s1654 * s4851
+    s4872 = s1630 * s4858 - s1629 * s4866 - s1631 * s4854 - s1632 * s4852 - s1633 * s4851
+    s4873 = s3536 / pivot_front_right_knee_angle_dot + s1614 * s4868 + s1615 * s4860 + s1616 * s4854
+    s4874 = s4873 + s1617 * s4852 + s1618 * s4851 + s1619 * s4850 + s1620 * s4849 + s1621 * s4848
+    s4875 = s1600 * s4862 - s1599 * s4870 - s1601 * s4854 - s1602 * s4852 - s1603 * s4851
+    s4876 = s1629 * s3604 - (s3352 + (s939 * s3325 + s941 * s3327 + s943 * s3329))
+    s4877 = s1630 * s3604 - (s15 * s3356 + s18 * s3357 + s21 * s3358) - s1706 * s4876
+    s4878 = s1631 * s3604 - (s17 * s3365 + s20 * s3366 + s23 * s3367) - s1707 * s4876
+    s4879 = s1632 * s3604 - (s16 * s3365 + s19 * s3366 + s22 * s3367) - s1708 * s4876
+    s4880 = s1633 * s3604 - (s15 * s3365 + s18 * s3366 + s21 * s3367) - s1709 * s4876
+    s4881 = s4878 - s1765 * s4877
+    s4882 = s4879 - s1766 * s4877 - s1782 * s4881
+    s4883 = s4880 - s1767 * s4877 - s1783 * s4881 - s1792 * s4882
+    s4884 = s1634 * s3604 - s3350 - s1710 * s4876 - s1768 * s4877 - s1784 * s4881 - s1793 * s4882
+    s4885 = s1635 * s3604 - s3349 - s1711 * s4876 - s1769 * s4877 - s1785 * s4881 - s1794 * s4882
+    s4886 = s1636 * s3604 - s3348 - s1712 * s4876 - s1770 * s4877 - s1786 * s4881 - s1795 * s4882
+    s4887 = s4884 - s1799 * s4883
+    s4888 = s4885 - s1800 * s4883 + s1807 * s4887
+    s4889 = (s4886 - s1801 * s4883 + s1808 * s4887 + s1810 * s4888) / pivot_trunk_x_dot
+    s4890 = s4888 / pivot_trunk_y_dot + s1810 * s4889
+    s4891 = s4887 / pivot_trunk_z_dot + s1807 * s4890 + s1808 * s4889
+    s4892 = s4883 / pivot_trunk_wx - s1799 * s4891 - s1800 * s4890 - s1801 * s4889
+    s4893 = s4882 / pivot_trunk_wy - s1792 * s4892 - s1793 * s4891 - s1794 * s4890 - s1795 * s4889
+    s4894 = s4881 / pivot_trunk_wz - s1782 * s4893 - s1783 * s4892 - s1784 * s4891 - s1785 * s4890
+    s4895 = s4894 - s1786 * s4889
+    s4896 = s1771 * s4895 + s1772 * s4893 + s1773 * s4892 + s1774 * s4891 + s1775 * s4890
+    s4897 = s4896 + s1776 * s4889
+    s4898 = s4877 / pivot_hind_left_abduction_angle_dot - s1765 * s4895 - s1766 * s4893
+    s4899 = s4898 - s1767 * s4892 - s1768 * s4891 - s1769 * s4890 - s1770 * s4889
+    s4900 = s1744 * s4895 + s1745 * s4893 + s1746 * s4892 + s1747 * s4891 + s1748 * s4890
+    s4901 = s4900 + s1749 * s4889
+    s4902 = s1738 * s4895 + s1739 * s4893 + s1740 * s4892 + s1741 * s4891 + s1742 * s4890
+    s4903 = s4902 + s1743 * s4889
+    s4904 = s1719 * s4897 - s1720 * s4895 - s1721 * s4893 - s1722 * s4892 - s1723 * s4891
+    s4905 = s4904 - s1724 * s4890 - s1725 * s4889
+    s4906 = s4876 / pivot_hind_left_swing_angle_dot - s1706 * s4899 - s1707 * s4895 - s1708 * s4893
+    s4907 = s4906 - s1709 * s4892 - s1710 * s4891 - s1711 * s4890 - s1712 * s4889
+    s4908 = s1693 * s4901 - s1694 * s4895 - s1695 * s4893 - s1696 * s4892 - s1697 * s4891
+    s4909 = s4908 - s1698 * s4890 - s1699 * s4889
+    s4910 = s1665 * s4903 - s1666 * s4895 - s1667 * s4893 - s1668 * s4892 - s1669 * s4891
+    s4911 = s4910 - s1670 * s4890 - s1671 * s4889
+    s4912 = s1651 * s4897 - s1650 * s4905 - s1652 * s4895 - s1653 * s4893 - s1654 * s4892
+    s4913 = s3604 / pivot_hind_left_knee_angle_dot + s1629 * s4907 + s1630 * s4899 + s1631 * s4895
+    s4914 = s4913 + s1632 * s4893 + s1633 * s4892 + s1634 * s4891 + s1635 * s4890 + s1636 * s4889
+    s4915 = s1615 * s4901 - s1614 * s4909 - s1616 * s4895 - s1617 * s4893 - s1618 * s4892
+    s4916 = s1600 * s4903 - s1599 * s4911 - s1601 * s4895 - s1602 * s4893 - s1603 * s4892
+    s4917 = s1650 * s3672 - (s3405 + (s945 * s3378 + s947 * s3380 + s949 * s3382))
+    s4918 = s1651 * s3672 - (s15 * s3409 + s18 * s3410 + s21 * s3411) - s1719 * s4917
+    s4919 = s1652 * s3672 - (s17 * s3418 + s20 * s3419 + s23 * s3420) - s1720 * s4917
+    s4920 = s1653 * s3672 - (s16 * s3418 + s19 * s3419 + s22 * s3420) - s1721 * s4917
+    s4921 = s1654 * s3672 - (s15 * s3418 + s18 * s3419 + s21 * s3420) - s1722 * s4917
+    s4922 = s4919 - s1771 * s4918
+    s4923 = s4920 - s1772 * s4918 - s1782 * s4922
+    s4924 = s4921 - s1773 * s4918 - s1783 * s4922 - s1792 * s4923
+    s4925 = s1655 * s3672 - s3403 - s1723 * s4917 - s1774 * s4918 - s1784 * s4922 - s1793 * s4923
+    s4926 = s1656 * s3672 - s3402 - s1724 * s4917 - s1775 * s4918 - s1785 * s4922 - s1794 * s4923
+    s4927 = s1657 * s3672 - s3401 - s1725 * s4917 - s1776 * s4918 - s1786 * s4922 - s1795 * s4923
+    s4928 = s4925 - s1799 * s4924
+    s4929 = s4926 - s1800 * s4924 + s1807 * s4928
+    s4930 = (s4927 - s1801 * s4924 + s1808 * s4928 + s1810 * s4929) / pivot_trunk_x_dot
+    s4931 = s4929 / pivot_trunk_y_dot + s1810 * s4930
+    s4932 = s4928 / pivot_trunk_z_dot + s1807 * s4931 + s1808 * s4930
+    s4933 = s4924 / pivot_trunk_wx - s1799 * s4932 - s1800 * s4931 - s1801 * s4930
+    s4934 = s4923 / pivot_trunk_wy - s1792 * s4933 - s1793 * s4932 - s1794 * s4931 - s1795 * s4930
+    s4935 = s4922 / pivot_trunk_wz - s1782 * s4934 - s1783 * s4933 - s1784 * s4932 - s1785 * s4931
+    s4936 = s4935 - s1786 * s4930
+    s4937 = s4918 / pivot_hind_right_abduction_angle_dot - s1771 * s4936 - s1772 * s4934
+    s4938 = s4937 - s1773 * s4933 - s1774 * s4932 - s1775 * s4931 - s1776 * s4930
+    s4939 = s1765 * s4936 + s1766 * s4934 + s1767 * s4933 + s1768 * s4932 + s1769 * s4931
+    s4940 = s4939 + s1770 * s4930
+    s4941 = s1744 * s4936 + s1745 * s4934 + s1746 * s4933 + s1747 * s4932 + s1748 * s4931
+    s4942 = s4941 + s1749 * s4930
+    s4943 = s1738 * s4936 + s1739 * s4934 + s1740 * s4933 + s1741 * s4932 + s1742 * s4931
+    s4944 = s4943 + s1743 * s4930
+    s4945 = s4917 / pivot_hind_right_swing_angle_dot - s1719 * s4938 - s1720 * s4936 - s1721 * s4934
+    s4946 = s4945 - s1722 * s4933 - s1723 * s4932 - s1724 * s4931 - s1725 * s4930
+    s4947 = s1706 * s4940 - s1707 * s4936 - s1708 * s4934 - s1709 * s4933 - s1710 * s4932
+    s4948 = s4947 - s1711 * s4931 - s1712 * s4930
+    s4949 = s1693 * s4942 - s1694 * s4936 - s1695 * s4934 - s1696 * s4933 - s1697 * s4932
+    s4950 = s4949 - s1698 * s4931 - s1699 * s4930
+    s4951 = s1665 * s4944 - s1666 * s4936 - s1667 * s4934 - s1668 * s4933 - s1669 * s4932
+    s4952 = s4951 - s1670 * s4931 - s1671 * s4930
+    s4953 = s3672 / pivot_hind_right_knee_angle_dot + s1650 * s4946 + s1651 * s4938 + s1652 * s4936
+    s4954 = s4953 + s1653 * s4934 + s1654 * s4933 + s1655 * s4932 + s1656 * s4931 + s1657 * s4930
+    s4955 = s1630 * s4940 - s1629 * s4948 - s1631 * s4936 - s1632 * s4934 - s1633 * s4933
+    s4956 = s1615 * s4942 - s1614 * s4950 - s1616 * s4936 - s1617 * s4934 - s1618 * s4933
+    s4957 = s1600 * s4944 - s1599 * s4952 - s1601 * s4936 - s1602 * s4934 - s1603 * s4933
+    s4958 = s1599 * s3458 - (s927 * s3462 + s929 * s3463 + s931 * s3464)
+    s4959 = s1600 * s3458 - (s15 * s3472 + s18 * s3473 + s21 * s3474) - s1665 * s4958
+    s4960 = s1601 * s3458 - (s17 * s3483 + s20 * s3484 + s23 * s3485) - s1666 * s4958
+    s4961 = s1602 * s3458 - (s16 * s3483 + s19 * s3484 + s22 * s3485) - s1667 * s4958
+    s4962 = s1603 * s3458 - (s15 * s3483 + s18 * s3484 + s21 * s3485) - s1668 * s4958
+    s4963 = s4960 - s1738 * s4959
+    s4964 = s4961 - s1739 * s4959 - s1782 * s4963
+    s4965 = s4962 - s1740 * s4959 - s1783 * s4963 - s1792 * s4964
+    s4966 = s1604 * s3458 - s3453 - s1669 * s4958 - s1741 * s4959 - s1784 * s4963 - s1793 * s4964
+    s4967 = s1605 * s3458 - s3452 - s1670 * s4958 - s1742 * s4959 - s1785 * s4963 - s1794 * s4964
+    s4968 = s1606 * s3458 - s3451 - s1671 * s4958 - s1743 * s4959 - s1786 * s4963 - s1795 * s4964
+    s4969 = s4966 - s1799 * s4965
+    s4970 = s4967 - s1800 * s4965 + s1807 * s4969
+    s4971 = (s4968 - s1801 * s4965 + s1808 * s4969 + s1810 * s4970) / pivot_trunk_x_dot
+    s4972 = s4970 / pivot_trunk_y_dot + s1810 * s4971
+    s4973 = s4969 / pivot_trunk_z_dot + s1807 * s4972 + s1808 * s4971
+    s4974 = s4965 / pivot_trunk_wx - s1799 * s4973 - s1800 * s4972 - s1801 * s4971
+    s4975 = s4964 / pivot_trunk_wy - s1792 * s4974 - s1793 * s4973 - s1794 * s4972 - s1795 * s4971
+    s4976 = s4963 / pivot_trunk_wz - s1782 * s4975 - s1783 * s4974 - s1784 * s4973 - s1785 * s4972
+    s4977 = s4976 - s1786 * s4971
+    s4978 = s1771 * s4977 + s1772 * s4975 + s1773 * s4974 + s1774 * s4973 + s1775 * s4972
+    s4979 = s4978 + s1776 * s4971
+    s4980 = s1765 * s4977 + s1766 * s4975 + s1767 * s4974 + s1768 * s4973 + s1769 * s4972
+    s4981 = s4980 + s1770 * s4971
+    s4982 = s1744 * s4977 + s1745 * s4975 + s1746 * s4974 + s1747 * s4973 + s1748 * s4972
+    s4983 = s4982 + s1749 * s4971
+    s4984 = s4959 / pivot_front_left_abduction_angle_dot - s1738 * s4977 - s1739 * s4975
+    s4985 = s4984 - s1740 * s4974 - s1741 * s4973 - s1742 * s4972 - s1743 * s4971
+    s4986 = s1719 * s4979 - s1720 * s4977 - s1721 * s4975 - s1722 * s4974 - s1723 * s4973
+    s4987 = s4986 - s1724 * s4972 - s1725 * s4971
+    s4988 = s1706 * s4981 - s1707 * s4977 - s1708 * s4975 - s1709 * s4974 - s1710 * s4973
+    s4989 = s4988 - s1711 * s4972 - s1712 * s4971
+    s4990 = s1693 * s4983 - s1694 * s4977 - s1695 * s4975 - s1696 * s4974 - s1697 * s4973
+    s4991 = s4990 - s1698 * s4972 - s1699 * s4971
+    s4992 = s4958 / pivot_front_left_swing_angle_dot - s1665 * s4985 - s1666 * s4977 - s1667 * s4975
+    s4993 = s4992 - s1668 * s4974 - s1669 * s4973 - s1670 * s4972 - s1671 * s4971
+    s4994 = s1651 * s4979 - s1650 * s4987 - s1652 * s4977 - s1653 * s4975 - s1654 * s4974
+    s4995 = s1630 * s4981 - s1629 * s4989 - s1631 * s4977 - s1632 * s4975 - s1633 * s4974
+    s4996 = s1615 * s4983 - s1614 * s4991 - s1616 * s4977 - s1617 * s4975 - s1618 * s4974
+    s4997 = s3458 / pivot_front_left_knee_angle_dot + s1599 * s4993 + s1600 * s4985 + s1601 * s4977
+    s4998 = s4997 + s1602 * s4975 + s1603 * s4974 + s1604 * s4973 + s1605 * s4972 + s1606 * s4971
+    s4999 = s1614 * s3526 - (s933 * s3530 + s935 * s3531 + s937 * s3532)
+    s5000 = s1615 * s3526 - (s15 * s3540 + s18 * s3541 + s21 * s3542) - s1693 * s4999
+    s5001 = s1616 * s3526 - (s17 * s3551 + s20 * s3552 + s23 * s3553) - s1694 * s4999
+    s5002 = s1617 * s3526 - (s16 * s3551 + s19 * s3552 + s22 * s3553) - s1695 * s4999
+    s5003 = s1618 * s3526 - (s15 * s3551 + s18 * s3552 + s21 * s3553) - s1696 * s4999
+    s5004 = s5001 - s1744 * s5000
+    s5005 = s5002 - s1745 * s5000 - s1782 * s5004
+    s5006 = s5003 - s1746 * s5000 - s1783 * s5004 - s1792 * s5005
+    s5007 = s1619 * s3526 - s3521 - s1697 * s4999 - s1747 * s5000 - s1784 * s5004 - s1793 * s5005
+    s5008 = s1620 * s3526 - s3520 - s1698 * s4999 - s1748 * s5000 - s1785 * s5004 - s1794 * s5005
+    s5009 = s1621 * s3526 - s3519 - s1699 * s4999 - s1749 * s5000 - s1786 * s5004 - s1795 * s5005
+    s5010 = s5007 - s1799 * s5006
+    s5011 = s5008 - s1800 * s5006 + s1807 * s5010
+    s5012 = (s5009 - s1801 * s5006 + s1808 * s5010 + s1810 * s5011) / pivot_trunk_x_dot
+    s5013 = s5011 / pivot_trunk_y_dot + s1810 * s5012
+    s5014 = s5010 / pivot_trunk_z_dot + s1807 * s5013 + s1808 * s5012
+    s5015 = s5006 / pivot_trunk_wx - s1799 * s5014 - s1800 * s5013 - s1801 * s5012
+    s5016 = s5005 / pivot_trunk_wy - s1792 * s5015 - s1793 * s5014 - s1794 * s5013 - s1795 * s5012
+    s5017 = s5004 / pivot_trunk_wz - s1782 * s5016 - s1783 * s5015 - s1784 * s5014 - s1785 * s5013
+    s5018 = s5017 - s1786 * s5012
+    s5019 = s1771 * s5018 + s1772 * s5016 + s1773 * s5015 + s1774 * s5014 + s1775 * s5013
+    s5020 = s5019 + s1776 * s5012
+    s5021 = s1765 * s5018 + s1766 * s5016 + s1767 * s5015 + s1768 * s5014 + s1769 * s5013
+    s5022 = s5021 + s1770 * s5012
+    s5023 = s5000 / pivot_front_right_abduction_angle_dot - s1744 * s5018 - s1745 * s5016
+    s5024 = s5023 - s1746 * s5015 - s1747 * s5014 - s1748 * s5013 - s1749 * s5012
+    s5025 = s1738 * s5018 + s1739 * s5016 + s1740 * s5015 + s1741 * s5014 + s1742 * s5013
+    s5026 = s5025 + s1743 * s5012
+    s5027 = s1719 * s5020 - s1720 * s5018 - s1721 * s5016 - s1722 * s5015 - s1723 * s5014
+    s5028 = s5027 - s1724 * s5013 - s1725 * s5012
+    s5029 = s1706 * s5022 - s1707 * s5018 - s1708 * s5016 - s1709 * s5015 - s1710 * s5014
+    s5030 = s5029 - s1711 * s5013 - s1712 * s5012
+    s5031 = s4999 / pivot_front_right_swing_angle_dot - s1693 * s5024 - s1694 * s5018
+    s5032 = s5031 - s1695 * s5016 - s1696 * s5015 - s1697 * s5014 - s1698 * s5013 - s1699 * s5012
+    s5033 = s1665 * s5026 - s1666 * s5018 - s1667 * s5016 - s1668 * s5015 - s1669 * s5014
+    s5034 = s5033 - s1670 * s5013 - s1671 * s5012
+    s5035 = s1651 * s5020 - s1650 * s5028 - s1652 * s5018 - s1653 * s5016 - s1654 * s5015
+    s5036 = s1630 * s5022 - s1629 * s5030 - s1631 * s5018 - s1632 * s5016 - s1633 * s5015
+    s5037 = s3526 / pivot_front_right_knee_angle_dot + s1614 * s5032 + s1615 * s5024 + s1616 * s5018
+    s5038 = s5037 + s1617 * s5016 + s1618 * s5015 + s1619 * s5014 + s1620 * s5013 + s1621 * s5012
+    s5039 = s1600 * s5026 - s1599 * s5034 - s1601 * s5018 - s1602 * s5016 - s1603 * s5015
+    s5040 = s1629 * s3594 - (s939 * s3598 + s941 * s3599 + s943 * s3600)
+    s5041 = s1630 * s3594 - (s15 * s3608 + s18 * s3609 + s21 * s3610) - s1706 * s5040
+    s5042 = s1631 * s3594 - (s17 * s3619 + s20 * s3620 + s23 * s3621) - s1707 * s5040
+    s5043 = s1632 * s3594 - (s16 * s3619 + s19 * s3620 + s22 * s3621) - s1708 * s5040
+    s5044 = s1633 * s3594 - (s15 * s3619 + s18 * s3620 + s21 * s3621) - s1709 * s5040
+    s5045 = s5042 - s1765 * s5041
+    s5046 = s5043 - s1766 * s5041 - s1782 * s5045
+    s5047 = s5044 - s1767 * s5041 - s1783 * s5045 - s1792 * s5046
+    s5048 = s1634 * s3594 - s3589 - s1710 * s5040 - s1768 * s5041 - s1784 * s5045 - s1793 * s5046
+    s5049 = s1635 * s3594 - s3588 - s1711 * s5040 - s1769 * s5041 - s1785 * s5045 - s1794 * s5046
+    s5050 = s1636 * s3594 - s3587 - s1712 * s5040 - s1770 * s5041 - s1786 * s5045 - s1795 * s5046
+    s5051 = s5048 - s1799 * s5047
+    s5052 = s5049 - s1800 * s5047 + s1807 * s5051
+    s5053 = (s5050 - s1801 * s5047 + s1808 * s5051 + s1810 * s5052) / pivot_trunk_x_dot
+    s5054 = s5052 / pivot_trunk_y_dot + s1810 * s5053
+    s5055 = s5051 / pivot_trunk_z_dot + s1807 * s5054 + s1808 * s5053
+    s5056 = s5047 / pivot_trunk_wx - s1799 * s5055 - s1800 * s5054 - s1801 * s5053
+    s5057 = s5046 / pivot_trunk_wy - s1792 * s5056 - s1793 * s5055 - s1794 * s5054 - s1795 * s5053
+    s5058 = s5045 / pivot_trunk_wz - s1782 * s5057 - s1783 * s5056 - s1784 * s5055 - s1785 * s5054
+    s5059 = s5058 - s1786 * s5053
+    s5060 = s1771 * s5059 + s1772 * s5057 + s1773 * s5056 + s1774 * s5055 + s1775 * s5054
+    s5061 = s5060 + s1776 * s5053
+    s5062 = s5041 / pivot_hind_left_abduction_angle_dot - s1765 * s5059 - s1766 * s5057
+    s5063 = s5062 - s1767 * s5056 - s1768 * s5055 - s1769 * s5054 - s1770 * s5053
+    s5064 = s1744 * s5059 + s1745 * s5057 + s1746 * s5056 + s1747 * s5055 + s1748 * s5054
+    s5065 = s5064 + s1749 * s5053
+    s5066 = s1738 * s5059 + s1739 * s5057 + s1740 * s5056 + s1741 * s5055 + s1742 * s5054
+    s5067 = s5066 + s1743 * s5053
+    s5068 = s1719 * s5061 - s1720 * s5059 - s1721 * s5057 - s1722 * s5056 - s1723 * s5055
+    s5069 = s5068 - s1724 * s5054 - s1725 * s5053
+    s5070 = s5040 / pivot_hind_left_swing_angle_dot - s1706 * s5063 - s1707 * s5059 - s1708 * s5057
+    s5071 = s5070 - s1709 * s5056 - s1710 * s5055 - s1711 * s5054 - s1712 * s5053
+    s5072 = s1693 * s5065 - s1694 * s5059 - s1695 * s5057 - s1696 * s5056 - s1697 * s5055
+    s5073 = s5072 - s1698 * s5054 - s1699 * s5053
+    s5074 = s1665 * s5067 - s1666 * s5059 - s1667 * s5057 - s1668 * s5056 - s1669 * s5055
+    s5075 = s5074 - s1670 * s5054 - s1671 * s5053
+    s5076 = s1651 * s5061 - s1650 * s5069 - s1652 * s5059 - s1653 * s5057 - s1654 * s5056
+    s5077 = s3594 / pivot_hind_left_knee_angle_dot + s1629 * s5071 + s1630 * s5063 + s1631 * s5059
+    s5078 = s5077 + s1632 * s5057 + s1633 * s5056 + s1634 * s5055 + s1635 * s5054 + s1636 * s5053
+    s5079 = s1615 * s5065 - s1614 * s5073 - s1616 * s5059 - s1617 * s5057 - s1618 * s5056
+    s5080 = s1600 * s5067 - s1599 * s5075 - s1601 * s5059 - s1602 * s5057 - s1603 * s5056
+    s5081 = s1650 * s3662 - (s945 * s3666 + s947 * s3667 + s949 * s3668)
+    s5082 = s1651 * s3662 - (s15 * s3676 + s18 * s3677 + s21 * s3678) - s1719 * s5081
+    s5083 = s1652 * s3662 - (s17 * s3687 + s20 * s3688 + s23 * s3689) - s1720 * s5081
+    s5084 = s1653 * s3662 - (s16 * s3687 + s19 * s3688 + s22 * s3689) - s1721 * s5081
+    s5085 = s1654 * s3662 - (s15 * s3687 + s18 * s3688 + s21 * s3689) - s1722 * s5081
+    s5086 = s5083 - s1771 * s5082
+    s5087 = s5084 - s1772 * s5082 - s1782 * s5086
+    s5088 = s5085 - s1773 * s5082 - s1783 * s5086 - s1792 * s5087
+    s5089 = s1655 * s3662 - s3657 - s1723 * s5081 - s1774 * s5082 - s1784 * s5086 - s1793 * s5087
+    s5090 = s1656 * s3662 - s3656 - s1724 * s5081 - s1775 * s5082 - s1785 * s5086 - s1794 * s5087
+    s5091 = s1657 * s3662 - s3655 - s1725 * s5081 - s1776 * s5082 - s1786 * s5086 - s1795 * s5087
+    s5092 = s5089 - s1799 * s5088
+    s5093 = s5090 - s1800 * s5088 + s1807 * s5092
+    s5094 = (s5091 - s1801 * s5088 + s1808 * s5092 + s1810 * s5093) / pivot_trunk_x_dot
+    s5095 = s5093 / pivot_trunk_y_dot + s1810 * s5094
+    s5096 = s5092 / pivot_trunk_z_dot + s1807 * s5095 + s1808 * s5094
+    s5097 = s5088 / pivot_trunk_wx - s1799 * s5096 - s1800 * s5095 - s1801 * s5094
+    s5098 = s5087 / pivot_trunk_wy - s1792 * s5097 - s1793 * s5096 - s1794 * s5095 - s1795 * s5094
+    s5099 = s5086 / pivot_trunk_wz - s1782 * s5098 - s1783 * s5097 - s1784 * s5096 - s1785 * s5095
+    s5100 = s5099 - s1786 * s5094
+    s5101 = s5082 / pivot_hind_right_abduction_angle_dot - s1771 * s5100 - s1772 * s5098
+    s5102 = s5101 - s1773 * s5097 - s1774 * s5096 - s1775 * s5095 - s1776 * s5094
+    s5103 = s1765 * s5100 + s1766 * s5098 + s1767 * s5097 + s1768 * s5096 + s1769 * s5095
+    s5104 = s5103 + s1770 * s5094
+    s5105 = s1744 * s5100 + s1745 * s5098 + s1746 * s5097 + s1747 * s5096 + s1748 * s5095
+    s5106 = s5105 + s1749 * s5094
+    s5107 = s1738 * s5100 + s1739 * s5098 + s1740 * s5097 + s1741 * s5096 + s1742 * s5095
+    s5108 = s5107 + s1743 * s5094
+    s5109 = s5081 / pivot_hind_right_swing_angle_dot - s1719 * s5102 - s1720 * s5100 - s1721 * s5098
+    s5110 = s5109 - s1722 * s5097 - s1723 * s5096 - s1724 * s5095 - s1725 * s5094
+    s5111 = s1706 * s5104 - s1707 * s5100 - s1708 * s5098 - s1709 * s5097 - s1710 * s5096
+    s5112 = s5111 - s1711 * s5095 - s1712 * s5094
+    s5113 = s1693 * s5106 - s1694 * s5100 - s1695 * s5098 - s1696 * s5097 - s1697 * s5096
+    s5114 = s5113 - s1698 * s5095 - s1699 * s5094
+    s5115 = s1665 * s5108 - s1666 * s5100 - s1667 * s5098 - s1668 * s5097 - s1669 * s5096
+    s5116 = s5115 - s1670 * s5095 - s1671 * s5094
+    s5117 = s3662 / pivot_hind_right_knee_angle_dot + s1650 * s5110 + s1651 * s5102 + s1652 * s5100
+    s5118 = s5117 + s1653 * s5098 + s1654 * s5097 + s1655 * s5096 + s1656 * s5095 + s1657 * s5094
+    s5119 = s1630 * s5104 - s1629 * s5112 - s1631 * s5100 - s1632 * s5098 - s1633 * s5097
+    s5120 = s1615 * s5106 - s1614 * s5114 - s1616 * s5100 - s1617 * s5098 - s1618 * s5097
+    s5121 = s1600 * s5108 - s1599 * s5116 - s1601 * s5100 - s1602 * s5098 - s1603 * s5097
+    s5122 = -s924
+    s5123 = -s926
+    s5124 = -s925
+    s5125 = trunk_qx * 0.5
+    s5126 = -s5125
+    s5127 = trunk_qw * 0.5
+    s5128 = trunk_qz * 0.5
+    s5129 = trunk_qy * 0.5
+    s5130 = -s5129
+    s5131 = -s5128
     return (
         0.0,
         0.0,
@@ -7205,9 +7185,9 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s5127,
-        s5129,
-        s5128,
+        s5122,
+        s5124,
+        s5123,
         0.0,
         0.0,
         0.0,
@@ -7223,120 +7203,120 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s5131,
-        s5135,
-        s5136,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        s929,
-        0.0,
-        s931,
-        s5129,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        s5132,
-        s5136,
-        s5134,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        s930,
-        s5128,
-        0.0,
-        s929,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        s5133,
-        s5132,
-        s5131,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        s931,
-        s930,
-        s5127,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        s5135,
+        s5126,
         s5130,
-        s5132,
+        s5131,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        s924,
+        0.0,
+        s926,
+        s5124,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        s5127,
+        s5131,
+        s5129,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        s925,
+        s5123,
+        0.0,
+        s924,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        s5128,
+        s5127,
+        s5126,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        s926,
+        s925,
+        s5122,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        s5130,
+        s5125,
+        s5127,
         0.0,
         0.0,
         0.0,
@@ -7796,40 +7776,188 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s3746,
-        s3804,
-        s3870,
-        s3928,
-        s3973,
-        s4015,
-        s4057,
-        s4099,
-        s4140,
-        s4181,
-        s4222,
-        s4263,
-        s4304,
-        s4345,
-        s4386,
-        s4427,
+        s3741,
+        s3799,
+        s3865,
+        s3923,
+        s3968,
+        s4010,
+        s4052,
+        s4094,
+        s4135,
+        s4176,
+        s4217,
+        s4258,
+        s4299,
+        s4340,
+        s4381,
+        s4422,
         0.0,
         0.0,
         0.0,
-        s4484,
-        s4544,
-        s4604,
-        s4648,
-        s4689,
-        s4730,
-        s4771,
-        s4812,
-        s4853,
-        s4894,
-        s4935,
-        s4976,
-        s5017,
-        s5058,
-        s5099,
+        s4479,
+        s4539,
+        s4599,
+        s4643,
+        s4684,
+        s4725,
+        s4766,
+        s4807,
+        s4848,
+        s4889,
+        s4930,
+        s4971,
+        s5012,
+        s5053,
+        s5094,
+        0.0,
+        0.0,
+        0.0,
+        s3742,
+        s3800,
+        s3866,
+        s3924,
+        s3969,
+        s4011,
+        s4053,
+        s4095,
+        s4136,
+        s4177,
+        s4218,
+        s4259,
+        s4300,
+        s4341,
+        s4382,
+        s4423,
+        0.0,
+        0.0,
+        0.0,
+        s4480,
+        s4540,
+        s4600,
+        s4644,
+        s4685,
+        s4726,
+        s4767,
+        s4808,
+        s4849,
+        s4890,
+        s4931,
+        s4972,
+        s5013,
+        s5054,
+        s5095,
+        0.0,
+        0.0,
+        0.0,
+        s3743,
+        s3801,
+        s3867,
+        s3925,
+        s3970,
+        s4012,
+        s4054,
+        s4096,
+        s4137,
+        s4178,
+        s4219,
+        s4260,
+        s4301,
+        s4342,
+        s4383,
+        s4424,
+        0.0,
+        0.0,
+        0.0,
+        s4481,
+        s4541,
+        s4601,
+        s4645,
+        s4686,
+        s4727,
+        s4768,
+        s4809,
+        s4850,
+        s4891,
+        s4932,
+        s4973,
+        s5014,
+        s5055,
+        s5096,
+        0.0,
+        0.0,
+        0.0,
+        s3744,
+        s3802,
+        s3868,
+        s3926,
+        s3971,
+        s4013,
+        s4055,
+        s4097,
+        s4138,
+        s4179,
+        s4220,
+        s4261,
+        s4302,
+        s4343,
+        s4384,
+        s4425,
+        0.0,
+        0.0,
+        0.0,
+        s4482,
+        s4542,
+        s4602,
+        s4646,
+        s4687,
+        s4728,
+        s4769,
+        s4810,
+        s4851,
+        s4892,
+        s4933,
+        s4974,
+        s5015,
+        s5056,
+        s5097,
+        0.0,
+        0.0,
+        0.0,
+        s3745,
+        s3803,
+        s3869,
+        s3927,
+        s3972,
+        s4014,
+        s4056,
+        s4098,
+        s4139,
+        s4180,
+        s4221,
+        s4262,
+        s4303,
+        s4344,
+        s4385,
+        s4426,
+        0.0,
+        0.0,
+        0.0,
+        s4483,
+        s4543,
+        s4603,
+        s4647,
+        s4688,
+        s4729,
+        s4770,
+        s4811,
+        s4852,
+        s4893,
+        s4934,
+        s4975,
+        s5016,
+        s5057,
+        s5098,
         0.0,
         0.0,
         0.0,
@@ -7870,40 +7998,114 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s3748,
-        s3806,
-        s3872,
-        s3930,
-        s3975,
-        s4017,
-        s4059,
-        s4101,
-        s4142,
-        s4183,
-        s4224,
-        s4265,
-        s4306,
-        s4347,
-        s4388,
-        s4429,
+        s3755,
+        s3813,
+        s3879,
+        s3937,
+        s3982,
+        -s4024,
+        -s4066,
+        -s4108,
+        s4149,
+        -s4190,
+        -s4231,
+        -s4272,
+        s4313,
+        -s4354,
+        -s4395,
+        -s4436,
         0.0,
         0.0,
         0.0,
-        s4486,
-        s4546,
-        s4606,
-        s4650,
-        s4691,
-        s4732,
-        s4773,
-        s4814,
-        s4855,
-        s4896,
-        s4937,
-        s4978,
-        s5019,
-        s5060,
-        s5101,
+        s4493,
+        s4553,
+        s4613,
+        s4657,
+        -s4698,
+        -s4739,
+        -s4780,
+        s4821,
+        -s4862,
+        -s4903,
+        -s4944,
+        s4985,
+        -s5026,
+        -s5067,
+        -s5108,
+        0.0,
+        0.0,
+        0.0,
+        s3753,
+        s3811,
+        s3877,
+        s3935,
+        -s3980,
+        s4022,
+        -s4064,
+        -s4106,
+        -s4147,
+        s4188,
+        -s4229,
+        -s4270,
+        -s4311,
+        s4352,
+        -s4393,
+        -s4434,
+        0.0,
+        0.0,
+        0.0,
+        s4491,
+        s4551,
+        s4611,
+        -s4655,
+        s4696,
+        -s4737,
+        -s4778,
+        -s4819,
+        s4860,
+        -s4901,
+        -s4942,
+        -s4983,
+        s5024,
+        -s5065,
+        -s5106,
+        0.0,
+        0.0,
+        0.0,
+        s3751,
+        s3809,
+        s3875,
+        s3933,
+        -s3978,
+        -s4020,
+        s4062,
+        -s4104,
+        -s4145,
+        -s4186,
+        s4227,
+        -s4268,
+        -s4309,
+        -s4350,
+        s4391,
+        -s4432,
+        0.0,
+        0.0,
+        0.0,
+        s4489,
+        s4549,
+        s4609,
+        -s4653,
+        -s4694,
+        s4735,
+        -s4776,
+        -s4817,
+        -s4858,
+        s4899,
+        -s4940,
+        -s4981,
+        -s5022,
+        s5063,
+        -s5104,
         0.0,
         0.0,
         0.0,
@@ -7911,17 +8113,17 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         s3807,
         s3873,
         s3931,
-        s3976,
-        s4018,
-        s4060,
+        -s3976,
+        -s4018,
+        -s4060,
         s4102,
-        s4143,
-        s4184,
-        s4225,
+        -s4143,
+        -s4184,
+        -s4225,
         s4266,
-        s4307,
-        s4348,
-        s4389,
+        -s4307,
+        -s4348,
+        -s4389,
         s4430,
         0.0,
         0.0,
@@ -7929,536 +8131,314 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         s4487,
         s4547,
         s4607,
-        s4651,
-        s4692,
-        s4733,
+        -s4651,
+        -s4692,
+        -s4733,
         s4774,
-        s4815,
-        s4856,
-        s4897,
+        -s4815,
+        -s4856,
+        -s4897,
         s4938,
-        s4979,
-        s5020,
-        s5061,
+        -s4979,
+        -s5020,
+        -s5061,
         s5102,
         0.0,
         0.0,
         0.0,
-        s3750,
-        s3808,
-        s3874,
-        s3932,
-        s3977,
-        s4019,
-        s4061,
-        s4103,
-        s4144,
-        s4185,
-        s4226,
-        s4267,
-        s4308,
-        s4349,
-        s4390,
-        s4431,
-        0.0,
-        0.0,
-        0.0,
-        s4488,
-        s4548,
-        s4608,
-        s4652,
-        s4693,
-        s4734,
-        s4775,
-        s4816,
-        s4857,
-        s4898,
-        s4939,
-        s4980,
-        s5021,
-        s5062,
-        s5103,
-        0.0,
-        0.0,
-        0.0,
-        s3752,
-        s3810,
-        s3876,
-        s3934,
-        s3979,
-        s4021,
-        s4063,
-        s4105,
-        s4146,
-        s4187,
-        s4228,
-        s4269,
-        s4310,
-        s4351,
-        s4392,
-        s4433,
-        0.0,
-        0.0,
-        0.0,
-        s4490,
-        s4550,
-        s4610,
-        s4654,
-        s4695,
-        s4736,
-        s4777,
-        s4818,
-        s4859,
-        s4900,
-        s4941,
-        s4982,
-        s5023,
-        s5064,
-        s5105,
-        0.0,
-        0.0,
-        0.0,
-        s3760,
-        s3818,
-        s3884,
-        s3942,
-        s3987,
-        -s4029,
-        -s4071,
-        -s4113,
-        s4154,
-        -s4195,
-        -s4236,
-        -s4277,
-        s4318,
-        -s4359,
-        -s4400,
-        -s4441,
-        0.0,
-        0.0,
-        0.0,
-        s4498,
-        s4558,
-        s4618,
-        s4662,
-        -s4703,
-        -s4744,
-        -s4785,
-        s4826,
-        -s4867,
-        -s4908,
-        -s4949,
-        s4990,
-        -s5031,
-        -s5072,
-        -s5113,
-        0.0,
-        0.0,
-        0.0,
-        s3758,
-        s3816,
-        s3882,
-        s3940,
-        -s3985,
-        s4027,
-        -s4069,
-        -s4111,
-        -s4152,
-        s4193,
-        -s4234,
-        -s4275,
-        -s4316,
-        s4357,
-        -s4398,
-        -s4439,
-        0.0,
-        0.0,
-        0.0,
-        s4496,
-        s4556,
-        s4616,
-        -s4660,
-        s4701,
-        -s4742,
-        -s4783,
-        -s4824,
-        s4865,
-        -s4906,
-        -s4947,
-        -s4988,
-        s5029,
-        -s5070,
-        -s5111,
-        0.0,
-        0.0,
-        0.0,
-        s3756,
-        s3814,
-        s3880,
-        s3938,
-        -s3983,
-        -s4025,
-        s4067,
-        -s4109,
-        -s4150,
-        -s4191,
-        s4232,
-        -s4273,
-        -s4314,
-        -s4355,
-        s4396,
-        -s4437,
-        0.0,
-        0.0,
-        0.0,
-        s4494,
-        s4554,
-        s4614,
-        -s4658,
-        -s4699,
-        s4740,
-        -s4781,
-        -s4822,
-        -s4863,
-        s4904,
-        -s4945,
-        -s4986,
-        -s5027,
-        s5068,
-        -s5109,
-        0.0,
-        0.0,
-        0.0,
-        s3754,
-        s3812,
-        s3878,
-        s3936,
-        -s3981,
-        -s4023,
-        -s4065,
-        s4107,
-        -s4148,
-        -s4189,
-        -s4230,
-        s4271,
-        -s4312,
-        -s4353,
-        -s4394,
-        s4435,
-        0.0,
-        0.0,
-        0.0,
-        s4492,
-        s4552,
-        s4612,
-        -s4656,
-        -s4697,
-        -s4738,
-        s4779,
-        -s4820,
-        -s4861,
-        -s4902,
-        s4943,
-        -s4984,
-        -s5025,
-        -s5066,
-        s5107,
-        0.0,
-        0.0,
-        0.0,
-        s3768,
-        s3826,
-        s3892,
-        s3950,
-        s3995,
-        s4037,
-        s4079,
-        s4121,
-        s4162,
-        s4203,
-        s4244,
-        s4285,
-        s4326,
-        s4367,
-        s4408,
-        s4449,
-        0.0,
-        0.0,
-        0.0,
-        s4506,
-        s4566,
-        s4626,
-        s4670,
-        s4711,
-        s4752,
-        s4793,
-        s4834,
-        s4875,
-        s4916,
-        s4957,
-        s4998,
-        s5039,
-        s5080,
-        s5121,
-        0.0,
-        0.0,
-        0.0,
-        s3766,
-        s3824,
-        s3890,
-        s3948,
-        s3993,
-        s4035,
-        s4077,
-        s4119,
-        s4160,
-        s4201,
-        s4242,
-        s4283,
-        s4324,
-        s4365,
-        s4406,
-        s4447,
-        0.0,
-        0.0,
-        0.0,
-        s4504,
-        s4564,
-        s4624,
-        s4668,
-        s4709,
-        s4750,
-        s4791,
-        s4832,
-        s4873,
-        s4914,
-        s4955,
-        s4996,
-        s5037,
-        s5078,
-        s5119,
-        0.0,
-        0.0,
-        0.0,
-        s3764,
-        s3822,
-        s3888,
-        s3946,
-        s3991,
-        s4033,
-        s4075,
-        s4117,
-        s4158,
-        s4199,
-        s4240,
-        s4281,
-        s4322,
-        s4363,
-        s4404,
-        s4445,
-        0.0,
-        0.0,
-        0.0,
-        s4502,
-        s4562,
-        s4622,
-        s4666,
-        s4707,
-        s4748,
-        s4789,
-        s4830,
-        s4871,
-        s4912,
-        s4953,
-        s4994,
-        s5035,
-        s5076,
-        s5117,
-        0.0,
-        0.0,
-        0.0,
-        s3762,
-        s3820,
-        s3886,
-        s3944,
-        s3989,
-        s4031,
-        s4073,
-        s4115,
-        s4156,
-        s4197,
-        s4238,
-        s4279,
-        s4320,
-        s4361,
-        s4402,
-        s4443,
-        0.0,
-        0.0,
-        0.0,
-        s4500,
-        s4560,
-        s4620,
-        s4664,
-        s4705,
-        s4746,
-        s4787,
-        s4828,
-        s4869,
-        s4910,
-        s4951,
-        s4992,
-        s5033,
-        s5074,
-        s5115,
-        0.0,
-        0.0,
-        0.0,
-        s3772 - s1607 * s3750 - s1608 * s3749 - s1609 * s3748 - s1610 * s3747 - s1611 * s3746,
-        -s3834,
-        s3896 - s1607 * s3874 - s1608 * s3873 - s1609 * s3872 - s1610 * s3871 - s1611 * s3870,
-        -s3958,
-        -s4000,
-        s4042 - s1609 * s4017 - s1610 * s4016 - s1611 * s4015,
-        s4084 - s1609 * s4059 - s1610 * s4058 - s1611 * s4057,
-        s4126 - s1609 * s4101 - s1610 * s4100 - s1611 * s4099,
-        -s4167,
-        s4208 - s1609 * s4183 - s1610 * s4182 - s1611 * s4181,
-        s4249 - s1609 * s4224 - s1610 * s4223 - s1611 * s4222,
-        s4290 - s1609 * s4265 - s1610 * s4264 - s1611 * s4263,
-        -s4331,
-        s4372 - s1609 * s4347 - s1610 * s4346 - s1611 * s4345,
-        s4413 - s1609 * s4388 - s1610 * s4387 - s1611 * s4386,
-        s4454 - s1609 * s4429 - s1610 * s4428 - s1611 * s4427,
-        0.0,
-        0.0,
-        0.0,
-        -s4514,
-        -s4574,
-        -s4634,
-        -s4675,
-        s4716 - s1609 * s4691 - s1610 * s4690 - s1611 * s4689,
-        s4757 - s1609 * s4732 - s1610 * s4731 - s1611 * s4730,
-        s4798 - s1609 * s4773 - s1610 * s4772 - s1611 * s4771,
-        -s4839,
-        s4880 - s1609 * s4855 - s1610 * s4854 - s1611 * s4853,
-        s4921 - s1609 * s4896 - s1610 * s4895 - s1611 * s4894,
-        s4962 - s1609 * s4937 - s1610 * s4936 - s1611 * s4935,
-        -s5003,
-        s5044 - s1609 * s5019 - s1610 * s5018 - s1611 * s5017,
-        s5085 - s1609 * s5060 - s1610 * s5059 - s1611 * s5058,
-        s5126 - s1609 * s5101 - s1610 * s5100 - s1611 * s5099,
-        0.0,
-        0.0,
-        0.0,
-        s3771 - s1622 * s3750 - s1623 * s3749 - s1624 * s3748 - s1625 * s3747 - s1626 * s3746,
-        -s3832,
-        s3895 - s1622 * s3874 - s1623 * s3873 - s1624 * s3872 - s1625 * s3871 - s1626 * s3870,
-        -s3956,
-        s3998 - s1624 * s3975 - s1625 * s3974 - s1626 * s3973,
-        -s4041,
-        s4083 - s1624 * s4059 - s1625 * s4058 - s1626 * s4057,
-        s4125 - s1624 * s4101 - s1625 * s4100 - s1626 * s4099,
-        s4165 - s1624 * s4142 - s1625 * s4141 - s1626 * s4140,
-        -s4207,
-        s4248 - s1624 * s4224 - s1625 * s4223 - s1626 * s4222,
-        s4289 - s1624 * s4265 - s1625 * s4264 - s1626 * s4263,
-        s4329 - s1624 * s4306 - s1625 * s4305 - s1626 * s4304,
-        -s4371,
-        s4412 - s1624 * s4388 - s1625 * s4387 - s1626 * s4386,
-        s4453 - s1624 * s4429 - s1625 * s4428 - s1626 * s4427,
-        0.0,
-        0.0,
-        0.0,
-        -s4512,
-        -s4572,
-        -s4632,
-        s4673 - s1624 * s4650 - s1625 * s4649 - s1626 * s4648,
-        -s4715,
-        s4756 - s1624 * s4732 - s1625 * s4731 - s1626 * s4730,
-        s4797 - s1624 * s4773 - s1625 * s4772 - s1626 * s4771,
-        s4837 - s1624 * s4814 - s1625 * s4813 - s1626 * s4812,
-        -s4879,
-        s4920 - s1624 * s4896 - s1625 * s4895 - s1626 * s4894,
-        s4961 - s1624 * s4937 - s1625 * s4936 - s1626 * s4935,
-        s5001 - s1624 * s4978 - s1625 * s4977 - s1626 * s4976,
-        -s5043,
-        s5084 - s1624 * s5060 - s1625 * s5059 - s1626 * s5058,
-        s5125 - s1624 * s5101 - s1625 * s5100 - s1626 * s5099,
-        0.0,
-        0.0,
-        0.0,
-        s3770 - s1637 * s3750 - s1638 * s3749 - s1639 * s3748 - s1640 * s3747 - s1641 * s3746,
-        -s3830,
-        s3894 - s1637 * s3874 - s1638 * s3873 - s1639 * s3872 - s1640 * s3871 - s1641 * s3870,
-        -s3954,
-        s3997 - s1639 * s3975 - s1640 * s3974 - s1641 * s3973,
-        s4039 - s1639 * s4017 - s1640 * s4016 - s1641 * s4015,
-        -s4082,
-        s4124 - s1639 * s4101 - s1640 * s4100 - s1641 * s4099,
-        s4164 - s1639 * s4142 - s1640 * s4141 - s1641 * s4140,
-        s4205 - s1639 * s4183 - s1640 * s4182 - s1641 * s4181,
-        -s4247,
-        s4288 - s1639 * s4265 - s1640 * s4264 - s1641 * s4263,
-        s4328 - s1639 * s4306 - s1640 * s4305 - s1641 * s4304,
-        s4369 - s1639 * s4347 - s1640 * s4346 - s1641 * s4345,
-        -s4411,
-        s4452 - s1639 * s4429 - s1640 * s4428 - s1641 * s4427,
-        0.0,
-        0.0,
-        0.0,
-        -s4510,
-        -s4570,
-        -s4630,
-        s4672 - s1639 * s4650 - s1640 * s4649 - s1641 * s4648,
-        s4713 - s1639 * s4691 - s1640 * s4690 - s1641 * s4689,
-        -s4755,
-        s4796 - s1639 * s4773 - s1640 * s4772 - s1641 * s4771,
-        s4836 - s1639 * s4814 - s1640 * s4813 - s1641 * s4812,
-        s4877 - s1639 * s4855 - s1640 * s4854 - s1641 * s4853,
-        -s4919,
-        s4960 - s1639 * s4937 - s1640 * s4936 - s1641 * s4935,
-        s5000 - s1639 * s4978 - s1640 * s4977 - s1641 * s4976,
-        s5041 - s1639 * s5019 - s1640 * s5018 - s1641 * s5017,
-        -s5083,
-        s5124 - s1639 * s5101 - s1640 * s5100 - s1641 * s5099,
-        0.0,
-        0.0,
-        0.0,
-        s3769 - s1658 * s3750 - s1659 * s3749 - s1660 * s3748 - s1661 * s3747 - s1662 * s3746,
-        -s3828,
-        s3893 - s1658 * s3874 - s1659 * s3873 - s1660 * s3872 - s1661 * s3871 - s1662 * s3870,
-        -s3952,
-        s3996 - s1660 * s3975 - s1661 * s3974 - s1662 * s3973,
-        s4038 - s1660 * s4017 - s1661 * s4016 - s1662 * s4015,
-        s4080 - s1660 * s4059 - s1661 * s4058 - s1662 * s4057,
-        -s4123,
-        s4163 - s1660 * s4142 - s1661 * s4141 - s1662 * s4140,
-        s4204 - s1660 * s4183 - s1661 * s4182 - s1662 * s4181,
-        s4245 - s1660 * s4224 - s1661 * s4223 - s1662 * s4222,
-        -s4287,
-        s4327 - s1660 * s4306 - s1661 * s4305 - s1662 * s4304,
-        s4368 - s1660 * s4347 - s1661 * s4346 - s1662 * s4345,
-        s4409 - s1660 * s4388 - s1661 * s4387 - s1662 * s4386,
-        -s4451,
-        0.0,
-        0.0,
-        0.0,
-        -s4508,
-        -s4568,
-        -s4628,
-        s4671 - s1660 * s4650 - s1661 * s4649 - s1662 * s4648,
-        s4712 - s1660 * s4691 - s1661 * s4690 - s1662 * s4689,
-        s4753 - s1660 * s4732 - s1661 * s4731 - s1662 * s4730,
-        -s4795,
-        s4835 - s1660 * s4814 - s1661 * s4813 - s1662 * s4812,
-        s4876 - s1660 * s4855 - s1661 * s4854 - s1662 * s4853,
-        s4917 - s1660 * s4896 - s1661 * s4895 - s1662 * s4894,
-        -s4959,
-        s4999 - s1660 * s4978 - s1661 * s4977 - s1662 * s4976,
-        s5040 - s1660 * s5019 - s1661 * s5018 - s1662 * s5017,
-        s5081 - s1660 * s5060 - s1661 * s5059 - s1662 * s5058,
-        -s5123,
+        s3763,
+        s3821,
+        s3887,
+        s3945,
+        s3990,
+        s4032,
+        s4074,
+        s4116,
+        s4157,
+        s4198,
+        s4239,
+        s4280,
+        s4321,
+        s4362,
+        s4403,
+        s4444,
+        0.0,
+        0.0,
+        0.0,
+        s4501,
+        s4561,
+        s4621,
+        s4665,
+        s4706,
+        s4747,
+        s4788,
+        s4829,
+        s4870,
+        s4911,
+        s4952,
+        s4993,
+        s5034,
+        s5075,
+        s5116,
+        0.0,
+        0.0,
+        0.0,
+        s3761,
+        s3819,
+        s3885,
+        s3943,
+        s3988,
+        s4030,
+        s4072,
+        s4114,
+        s4155,
+        s4196,
+        s4237,
+        s4278,
+        s4319,
+        s4360,
+        s4401,
+        s4442,
+        0.0,
+        0.0,
+        0.0,
+        s4499,
+        s4559,
+        s4619,
+        s4663,
+        s4704,
+        s4745,
+        s4786,
+        s4827,
+        s4868,
+        s4909,
+        s4950,
+        s4991,
+        s5032,
+        s5073,
+        s5114,
+        0.0,
+        0.0,
+        0.0,
+        s3759,
+        s3817,
+        s3883,
+        s3941,
+        s3986,
+        s4028,
+        s4070,
+        s4112,
+        s4153,
+        s4194,
+        s4235,
+        s4276,
+        s4317,
+        s4358,
+        s4399,
+        s4440,
+        0.0,
+        0.0,
+        0.0,
+        s4497,
+        s4557,
+        s4617,
+        s4661,
+        s4702,
+        s4743,
+        s4784,
+        s4825,
+        s4866,
+        s4907,
+        s4948,
+        s4989,
+        s5030,
+        s5071,
+        s5112,
+        0.0,
+        0.0,
+        0.0,
+        s3757,
+        s3815,
+        s3881,
+        s3939,
+        s3984,
+        s4026,
+        s4068,
+        s4110,
+        s4151,
+        s4192,
+        s4233,
+        s4274,
+        s4315,
+        s4356,
+        s4397,
+        s4438,
+        0.0,
+        0.0,
+        0.0,
+        s4495,
+        s4555,
+        s4615,
+        s4659,
+        s4700,
+        s4741,
+        s4782,
+        s4823,
+        s4864,
+        s4905,
+        s4946,
+        s4987,
+        s5028,
+        s5069,
+        s5110,
+        0.0,
+        0.0,
+        0.0,
+        s3767 - s1602 * s3745 - s1603 * s3744 - s1604 * s3743 - s1605 * s3742 - s1606 * s3741,
+        -s3829,
+        s3891 - s1602 * s3869 - s1603 * s3868 - s1604 * s3867 - s1605 * s3866 - s1606 * s3865,
+        -s3953,
+        -s3995,
+        s4037 - s1604 * s4012 - s1605 * s4011 - s1606 * s4010,
+        s4079 - s1604 * s4054 - s1605 * s4053 - s1606 * s4052,
+        s4121 - s1604 * s4096 - s1605 * s4095 - s1606 * s4094,
+        -s4162,
+        s4203 - s1604 * s4178 - s1605 * s4177 - s1606 * s4176,
+        s4244 - s1604 * s4219 - s1605 * s4218 - s1606 * s4217,
+        s4285 - s1604 * s4260 - s1605 * s4259 - s1606 * s4258,
+        -s4326,
+        s4367 - s1604 * s4342 - s1605 * s4341 - s1606 * s4340,
+        s4408 - s1604 * s4383 - s1605 * s4382 - s1606 * s4381,
+        s4449 - s1604 * s4424 - s1605 * s4423 - s1606 * s4422,
+        0.0,
+        0.0,
+        0.0,
+        -s4509,
+        -s4569,
+        -s4629,
+        -s4670,
+        s4711 - s1604 * s4686 - s1605 * s4685 - s1606 * s4684,
+        s4752 - s1604 * s4727 - s1605 * s4726 - s1606 * s4725,
+        s4793 - s1604 * s4768 - s1605 * s4767 - s1606 * s4766,
+        -s4834,
+        s4875 - s1604 * s4850 - s1605 * s4849 - s1606 * s4848,
+        s4916 - s1604 * s4891 - s1605 * s4890 - s1606 * s4889,
+        s4957 - s1604 * s4932 - s1605 * s4931 - s1606 * s4930,
+        -s4998,
+        s5039 - s1604 * s5014 - s1605 * s5013 - s1606 * s5012,
+        s5080 - s1604 * s5055 - s1605 * s5054 - s1606 * s5053,
+        s5121 - s1604 * s5096 - s1605 * s5095 - s1606 * s5094,
+        0.0,
+        0.0,
+        0.0,
+        s3766 - s1617 * s3745 - s1618 * s3744 - s1619 * s3743 - s1620 * s3742 - s1621 * s3741,
+        -s3827,
+        s3890 - s1617 * s3869 - s1618 * s3868 - s1619 * s3867 - s1620 * s3866 - s1621 * s3865,
+        -s3951,
+        s3993 - s1619 * s3970 - s1620 * s3969 - s1621 * s3968,
+        -s4036,
+        s4078 - s1619 * s4054 - s1620 * s4053 - s1621 * s4052,
+        s4120 - s1619 * s4096 - s1620 * s4095 - s1621 * s4094,
+        s4160 - s1619 * s4137 - s1620 * s4136 - s1621 * s4135,
+        -s4202,
+        s4243 - s1619 * s4219 - s1620 * s4218 - s1621 * s4217,
+        s4284 - s1619 * s4260 - s1620 * s4259 - s1621 * s4258,
+        s4324 - s1619 * s4301 - s1620 * s4300 - s1621 * s4299,
+        -s4366,
+        s4407 - s1619 * s4383 - s1620 * s4382 - s1621 * s4381,
+        s4448 - s1619 * s4424 - s1620 * s4423 - s1621 * s4422,
+        0.0,
+        0.0,
+        0.0,
+        -s4507,
+        -s4567,
+        -s4627,
+        s4668 - s1619 * s4645 - s1620 * s4644 - s1621 * s4643,
+        -s4710,
+        s4751 - s1619 * s4727 - s1620 * s4726 - s1621 * s4725,
+        s4792 - s1619 * s4768 - s1620 * s4767 - s1621 * s4766,
+        s4832 - s1619 * s4809 - s1620 * s4808 - s1621 * s4807,
+        -s4874,
+        s4915 - s1619 * s4891 - s1620 * s4890 - s1621 * s4889,
+        s4956 - s1619 * s4932 - s1620 * s4931 - s1621 * s4930,
+        s4996 - s1619 * s4973 - s1620 * s4972 - s1621 * s4971,
+        -s5038,
+        s5079 - s1619 * s5055 - s1620 * s5054 - s1621 * s5053,
+        s5120 - s1619 * s5096 - s1620 * s5095 - s1621 * s5094,
+        0.0,
+        0.0,
+        0.0,
+        s3765 - s1632 * s3745 - s1633 * s3744 - s1634 * s3743 - s1635 * s3742 - s1636 * s3741,
+        -s3825,
+        s3889 - s1632 * s3869 - s1633 * s3868 - s1634 * s3867 - s1635 * s3866 - s1636 * s3865,
+        -s3949,
+        s3992 - s1634 * s3970 - s1635 * s3969 - s1636 * s3968,
+        s4034 - s1634 * s4012 - s1635 * s4011 - s1636 * s4010,
+        -s4077,
+        s4119 - s1634 * s4096 - s1635 * s4095 - s1636 * s4094,
+        s4159 - s1634 * s4137 - s1635 * s4136 - s1636 * s4135,
+        s4200 - s1634 * s4178 - s1635 * s4177 - s1636 * s4176,
+        -s4242,
+        s4283 - s1634 * s4260 - s1635 * s4259 - s1636 * s4258,
+        s4323 - s1634 * s4301 - s1635 * s4300 - s1636 * s4299,
+        s4364 - s1634 * s4342 - s1635 * s4341 - s1636 * s4340,
+        -s4406,
+        s4447 - s1634 * s4424 - s1635 * s4423 - s1636 * s4422,
+        0.0,
+        0.0,
+        0.0,
+        -s4505,
+        -s4565,
+        -s4625,
+        s4667 - s1634 * s4645 - s1635 * s4644 - s1636 * s4643,
+        s4708 - s1634 * s4686 - s1635 * s4685 - s1636 * s4684,
+        -s4750,
+        s4791 - s1634 * s4768 - s1635 * s4767 - s1636 * s4766,
+        s4831 - s1634 * s4809 - s1635 * s4808 - s1636 * s4807,
+        s4872 - s1634 * s4850 - s1635 * s4849 - s1636 * s4848,
+        -s4914,
+        s4955 - s1634 * s4932 - s1635 * s4931 - s1636 * s4930,
+        s4995 - s1634 * s4973 - s1635 * s4972 - s1636 * s4971,
+        s5036 - s1634 * s5014 - s1635 * s5013 - s1636 * s5012,
+        -s5078,
+        s5119 - s1634 * s5096 - s1635 * s5095 - s1636 * s5094,
+        0.0,
+        0.0,
+        0.0,
+        s3764 - s1653 * s3745 - s1654 * s3744 - s1655 * s3743 - s1656 * s3742 - s1657 * s3741,
+        -s3823,
+        s3888 - s1653 * s3869 - s1654 * s3868 - s1655 * s3867 - s1656 * s3866 - s1657 * s3865,
+        -s3947,
+        s3991 - s1655 * s3970 - s1656 * s3969 - s1657 * s3968,
+        s4033 - s1655 * s4012 - s1656 * s4011 - s1657 * s4010,
+        s4075 - s1655 * s4054 - s1656 * s4053 - s1657 * s4052,
+        -s4118,
+        s4158 - s1655 * s4137 - s1656 * s4136 - s1657 * s4135,
+        s4199 - s1655 * s4178 - s1656 * s4177 - s1657 * s4176,
+        s4240 - s1655 * s4219 - s1656 * s4218 - s1657 * s4217,
+        -s4282,
+        s4322 - s1655 * s4301 - s1656 * s4300 - s1657 * s4299,
+        s4363 - s1655 * s4342 - s1656 * s4341 - s1657 * s4340,
+        s4404 - s1655 * s4383 - s1656 * s4382 - s1657 * s4381,
+        -s4446,
+        0.0,
+        0.0,
+        0.0,
+        -s4503,
+        -s4563,
+        -s4623,
+        s4666 - s1655 * s4645 - s1656 * s4644 - s1657 * s4643,
+        s4707 - s1655 * s4686 - s1656 * s4685 - s1657 * s4684,
+        s4748 - s1655 * s4727 - s1656 * s4726 - s1657 * s4725,
+        -s4790,
+        s4830 - s1655 * s4809 - s1656 * s4808 - s1657 * s4807,
+        s4871 - s1655 * s4850 - s1656 * s4849 - s1657 * s4848,
+        s4912 - s1655 * s4891 - s1656 * s4890 - s1657 * s4889,
+        -s4954,
+        s4994 - s1655 * s4973 - s1656 * s4972 - s1657 * s4971,
+        s5035 - s1655 * s5014 - s1656 * s5013 - s1657 * s5012,
+        s5076 - s1655 * s5055 - s1656 * s5054 - s1657 * s5053,
+        -s5118,
     )
 
 
@@ -8509,206 +8489,206 @@ def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     velocity_trunk_z = trunk_x_dot * (s7 + s13) + trunk_y_dot * (s14 - s6) + trunk_z_dot * (1.0 - (s9 + s10))
     omega_front_left_hip_y = trunk_wy * cos_front_left_abduction_angle + trunk_wz * sin_front_left_abduction_angle
     omega_front_left_hip_z = trunk_wz * cos_front_left_abduction_angle - trunk_wy * sin_front_left_abduction_angle
-    s5137 = y_hip * trunk_wz
-    s5138 = x_hip * trunk_wz
-    s5139 = y_hip * trunk_wx
-    s5140 = x_hip * trunk_wy
-    velocity_front_left_hip_x_2 = velocity_trunk_x - s5137
-    s5141 = velocity_trunk_y + s5138
-    s5142 = velocity_trunk_z + (s5139 - s5140)
-    velocity_front_left_hip_y_2 = cos_front_left_abduction_angle * s5141 + sin_front_left_abduction_angle * s5142
-    velocity_front_left_hip_z_2 = cos_front_left_abduction_angle * s5142 - sin_front_left_abduction_angle * s5141
+    s5132 = y_hip * trunk_wz
+    s5133 = x_hip * trunk_wz
+    s5134 = y_hip * trunk_wx
+    s5135 = x_hip * trunk_wy
+    velocity_front_left_hip_x_2 = velocity_trunk_x - s5132
+    s5136 = velocity_trunk_y + s5133
+    s5137 = velocity_trunk_z + (s5134 - s5135)
+    velocity_front_left_hip_y_2 = cos_front_left_abduction_angle * s5136 + sin_front_left_abduction_angle * s5137
+    velocity_front_left_hip_z_2 = cos_front_left_abduction_angle * s5137 - sin_front_left_abduction_angle * s5136
     omega_front_left_hip_x = trunk_wx + front_left_abduction_angle_dot
     omega_front_right_hip_y = trunk_wy * cos_front_right_abduction_angle + trunk_wz * sin_front_right_abduction_angle
     omega_front_right_hip_z = trunk_wz * cos_front_right_abduction_angle - trunk_wy * sin_front_right_abduction_angle
-    s5143 = s5139 + s5140
-    velocity_front_right_hip_x_2 = velocity_trunk_x + s5137
-    s5144 = velocity_trunk_z - s5143
-    velocity_front_right_hip_y_2 = cos_front_right_abduction_angle * s5141 + sin_front_right_abduction_angle * s5144
-    velocity_front_right_hip_z_2 = cos_front_right_abduction_angle * s5144 - sin_front_right_abduction_angle * s5141
+    s5138 = s5134 + s5135
+    velocity_front_right_hip_x_2 = velocity_trunk_x + s5132
+    s5139 = velocity_trunk_z - s5138
+    velocity_front_right_hip_y_2 = cos_front_right_abduction_angle * s5136 + sin_front_right_abduction_angle * s5139
+    velocity_front_right_hip_z_2 = cos_front_right_abduction_angle * s5139 - sin_front_right_abduction_angle * s5136
     omega_front_right_hip_x = trunk_wx + front_right_abduction_angle_dot
     omega_hind_left_hip_y = trunk_wy * cos_hind_left_abduction_angle + trunk_wz * sin_hind_left_abduction_angle
     omega_hind_left_hip_z = trunk_wz * cos_hind_left_abduction_angle - trunk_wy * sin_hind_left_abduction_angle
-    s5145 = velocity_trunk_y - s5138
-    s5146 = velocity_trunk_z + s5143
-    velocity_hind_left_hip_y_2 = cos_hind_left_abduction_angle * s5145 + sin_hind_left_abduction_angle * s5146
-    velocity_hind_left_hip_z_2 = cos_hind_left_abduction_angle * s5146 - sin_hind_left_abduction_angle * s5145
+    s5140 = velocity_trunk_y - s5133
+    s5141 = velocity_trunk_z + s5138
+    velocity_hind_left_hip_y_2 = cos_hind_left_abduction_angle * s5140 + sin_hind_left_abduction_angle * s5141
+    velocity_hind_left_hip_z_2 = cos_hind_left_abduction_angle * s5141 - sin_hind_left_abduction_angle * s5140
     omega_hind_left_hip_x = trunk_wx + hind_left_abduction_angle_dot
     omega_hind_right_hip_y = trunk_wy * cos_hind_right_abduction_angle + trunk_wz * sin_hind_right_abduction_angle
     omega_hind_right_hip_z = trunk_wz * cos_hind_right_abduction_angle - trunk_wy * sin_hind_right_abduction_angle
-    s5147 = velocity_trunk_z + (s5140 - s5139)
-    velocity_hind_right_hip_y_2 = cos_hind_right_abduction_angle * s5145 + sin_hind_right_abduction_angle * s5147
-    velocity_hind_right_hip_z_2 = cos_hind_right_abduction_angle * s5147 - sin_hind_right_abduction_angle * s5145
+    s5142 = velocity_trunk_z + (s5135 - s5134)
+    velocity_hind_right_hip_y_2 = cos_hind_right_abduction_angle * s5140 + sin_hind_right_abduction_angle * s5142
+    velocity_hind_right_hip_z_2 = cos_hind_right_abduction_angle * s5142 - sin_hind_right_abduction_angle * s5140
     omega_hind_right_hip_x = trunk_wx + hind_right_abduction_angle_dot
     omega_front_left_thigh_z = cos_front_left_swing_angle * omega_front_left_hip_z + sin_front_left_swing_angle * omega_front_left_hip_x
     omega_front_left_thigh_x = cos_front_left_swing_angle * omega_front_left_hip_x - sin_front_left_swing_angle * omega_front_left_hip_z
-    s5148 = velocity_front_left_hip_x_2 - k2 * omega_front_left_hip_z
-    s5149 = velocity_front_left_hip_z_2 + k2 * omega_front_left_hip_x
-    velocity_front_left_thigh_z_2 = cos_front_left_swing_angle * s5149 + sin_front_left_swing_angle * s5148
-    velocity_front_left_thigh_x_2 = cos_front_left_swing_angle * s5148 - sin_front_left_swing_angle * s5149
+    s5143 = velocity_front_left_hip_x_2 - k2 * omega_front_left_hip_z
+    s5144 = velocity_front_left_hip_z_2 + k2 * omega_front_left_hip_x
+    velocity_front_left_thigh_z_2 = cos_front_left_swing_angle * s5144 + sin_front_left_swing_angle * s5143
+    velocity_front_left_thigh_x_2 = cos_front_left_swing_angle * s5143 - sin_front_left_swing_angle * s5144
     omega_front_left_thigh_y = front_left_swing_angle_dot + omega_front_left_hip_y
     omega_front_right_thigh_z = cos_front_right_swing_angle * omega_front_right_hip_z + sin_front_right_swing_angle * omega_front_right_hip_x
     omega_front_right_thigh_x = cos_front_right_swing_angle * omega_front_right_hip_x - sin_front_right_swing_angle * omega_front_right_hip_z
-    s5150 = velocity_front_right_hip_x_2 - k3 * omega_front_right_hip_z
-    s5151 = velocity_front_right_hip_z_2 + k3 * omega_front_right_hip_x
-    velocity_front_right_thigh_z_2 = cos_front_right_swing_angle * s5151 + sin_front_right_swing_angle * s5150
-    velocity_front_right_thigh_x_2 = cos_front_right_swing_angle * s5150 - sin_front_right_swing_angle * s5151
+    s5145 = velocity_front_right_hip_x_2 - k3 * omega_front_right_hip_z
+    s5146 = velocity_front_right_hip_z_2 + k3 * omega_front_right_hip_x
+    velocity_front_right_thigh_z_2 = cos_front_right_swing_angle * s5146 + sin_front_right_swing_angle * s5145
+    velocity_front_right_thigh_x_2 = cos_front_right_swing_angle * s5145 - sin_front_right_swing_angle * s5146
     omega_front_right_thigh_y = front_right_swing_angle_dot + omega_front_right_hip_y
     omega_hind_left_thigh_z = cos_hind_left_swing_angle * omega_hind_left_hip_z + sin_hind_left_swing_angle * omega_hind_left_hip_x
     omega_hind_left_thigh_x = cos_hind_left_swing_angle * omega_hind_left_hip_x - sin_hind_left_swing_angle * omega_hind_left_hip_z
-    s5152 = velocity_front_left_hip_x_2 - k2 * omega_hind_left_hip_z
-    s5153 = velocity_hind_left_hip_z_2 + k2 * omega_hind_left_hip_x
-    velocity_hind_left_thigh_z_2 = cos_hind_left_swing_angle * s5153 + sin_hind_left_swing_angle * s5152
-    velocity_hind_left_thigh_x_2 = cos_hind_left_swing_angle * s5152 - sin_hind_left_swing_angle * s5153
+    s5147 = velocity_front_left_hip_x_2 - k2 * omega_hind_left_hip_z
+    s5148 = velocity_hind_left_hip_z_2 + k2 * omega_hind_left_hip_x
+    velocity_hind_left_thigh_z_2 = cos_hind_left_swing_angle * s5148 + sin_hind_left_swing_angle * s5147
+    velocity_hind_left_thigh_x_2 = cos_hind_left_swing_angle * s5147 - sin_hind_left_swing_angle * s5148
     omega_hind_left_thigh_y = hind_left_swing_angle_dot + omega_hind_left_hip_y
     omega_hind_right_thigh_z = cos_hind_right_swing_angle * omega_hind_right_hip_z + sin_hind_right_swing_angle * omega_hind_right_hip_x
     omega_hind_right_thigh_x = cos_hind_right_swing_angle * omega_hind_right_hip_x - sin_hind_right_swing_angle * omega_hind_right_hip_z
-    s5154 = velocity_front_right_hip_x_2 - k3 * omega_hind_right_hip_z
-    s5155 = velocity_hind_right_hip_z_2 + k3 * omega_hind_right_hip_x
-    velocity_hind_right_thigh_z_2 = cos_hind_right_swing_angle * s5155 + sin_hind_right_swing_angle * s5154
-    velocity_hind_right_thigh_x_2 = cos_hind_right_swing_angle * s5154 - sin_hind_right_swing_angle * s5155
+    s5149 = velocity_front_right_hip_x_2 - k3 * omega_hind_right_hip_z
+    s5150 = velocity_hind_right_hip_z_2 + k3 * omega_hind_right_hip_x
+    velocity_hind_right_thigh_z_2 = cos_hind_right_swing_angle * s5150 + sin_hind_right_swing_angle * s5149
+    velocity_hind_right_thigh_x_2 = cos_hind_right_swing_angle * s5149 - sin_hind_right_swing_angle * s5150
     omega_hind_right_thigh_y = hind_right_swing_angle_dot + omega_hind_right_hip_y
     omega_front_left_shank_z = cos_front_left_knee_angle * omega_front_left_thigh_z + sin_front_left_knee_angle * omega_front_left_thigh_x
     omega_front_left_shank_x = cos_front_left_knee_angle * omega_front_left_thigh_x - sin_front_left_knee_angle * omega_front_left_thigh_z
-    s5156 = velocity_front_left_thigh_x_2 + k4 * omega_front_left_thigh_y
+    s5151 = velocity_front_left_thigh_x_2 + k4 * omega_front_left_thigh_y
     velocity_front_left_shank_y_2 = velocity_front_left_hip_y_2 - k4 * omega_front_left_thigh_x
-    velocity_front_left_shank_z_2 = cos_front_left_knee_angle * velocity_front_left_thigh_z_2 + sin_front_left_knee_angle * s5156
-    velocity_front_left_shank_x_2 = cos_front_left_knee_angle * s5156 - sin_front_left_knee_angle * velocity_front_left_thigh_z_2
+    velocity_front_left_shank_z_2 = cos_front_left_knee_angle * velocity_front_left_thigh_z_2 + sin_front_left_knee_angle * s5151
+    velocity_front_left_shank_x_2 = cos_front_left_knee_angle * s5151 - sin_front_left_knee_angle * velocity_front_left_thigh_z_2
     omega_front_left_shank_y = front_left_knee_angle_dot + omega_front_left_thigh_y
     omega_front_right_shank_z = cos_front_right_knee_angle * omega_front_right_thigh_z + sin_front_right_knee_angle * omega_front_right_thigh_x
     omega_front_right_shank_x = cos_front_right_knee_angle * omega_front_right_thigh_x - sin_front_right_knee_angle * omega_front_right_thigh_z
-    s5157 = velocity_front_right_thigh_x_2 + k4 * omega_front_right_thigh_y
+    s5152 = velocity_front_right_thigh_x_2 + k4 * omega_front_right_thigh_y
     velocity_front_right_shank_y_2 = velocity_front_right_hip_y_2 - k4 * omega_front_right_thigh_x
-    velocity_front_right_shank_z_2 = cos_front_right_knee_angle * velocity_front_right_thigh_z_2 + sin_front_right_knee_angle * s5157
-    velocity_front_right_shank_x_2 = cos_front_right_knee_angle * s5157 - sin_front_right_knee_angle * velocity_front_right_thigh_z_2
+    velocity_front_right_shank_z_2 = cos_front_right_knee_angle * velocity_front_right_thigh_z_2 + sin_front_right_knee_angle * s5152
+    velocity_front_right_shank_x_2 = cos_front_right_knee_angle * s5152 - sin_front_right_knee_angle * velocity_front_right_thigh_z_2
     omega_front_right_shank_y = front_right_knee_angle_dot + omega_front_right_thigh_y
     omega_hind_left_shank_z = cos_hind_left_knee_angle * omega_hind_left_thigh_z + sin_hind_left_knee_angle * omega_hind_left_thigh_x
     omega_hind_left_shank_x = cos_hind_left_knee_angle * omega_hind_left_thigh_x - sin_hind_left_knee_angle * omega_hind_left_thigh_z
-    s5158 = velocity_hind_left_thigh_x_2 + k4 * omega_hind_left_thigh_y
+    s5153 = velocity_hind_left_thigh_x_2 + k4 * omega_hind_left_thigh_y
     velocity_hind_left_shank_y_2 = velocity_hind_left_hip_y_2 - k4 * omega_hind_left_thigh_x
-    velocity_hind_left_shank_z_2 = cos_hind_left_knee_angle * velocity_hind_left_thigh_z_2 + sin_hind_left_knee_angle * s5158
-    velocity_hind_left_shank_x_2 = cos_hind_left_knee_angle * s5158 - sin_hind_left_knee_angle * velocity_hind_left_thigh_z_2
+    velocity_hind_left_shank_z_2 = cos_hind_left_knee_angle * velocity_hind_left_thigh_z_2 + sin_hind_left_knee_angle * s5153
+    velocity_hind_left_shank_x_2 = cos_hind_left_knee_angle * s5153 - sin_hind_left_knee_angle * velocity_hind_left_thigh_z_2
     omega_hind_left_shank_y = hind_left_knee_angle_dot + omega_hind_left_thigh_y
     omega_hind_right_shank_z = cos_hind_right_knee_angle * omega_hind_right_thigh_z + sin_hind_right_knee_angle * omega_hind_right_thigh_x
     omega_hind_right_shank_x = cos_hind_right_knee_angle * omega_hind_right_thigh_x - sin_hind_right_knee_angle * omega_hind_right_thigh_z
-    s5159 = velocity_hind_right_thigh_x_2 + k4 * omega_hind_right_thigh_y
+    s5154 = velocity_hind_right_thigh_x_2 + k4 * omega_hind_right_thigh_y
     velocity_hind_right_shank_y_2 = velocity_hind_right_hip_y_2 - k4 * omega_hind_right_thigh_x
-    velocity_hind_right_shank_z_2 = cos_hind_right_knee_angle * velocity_hind_right_thigh_z_2 + sin_hind_right_knee_angle * s5159
-    velocity_hind_right_shank_x_2 = cos_hind_right_knee_angle * s5159 - sin_hind_right_knee_angle * velocity_hind_right_thigh_z_2
+    velocity_hind_right_shank_z_2 = cos_hind_right_knee_angle * velocity_hind_right_thigh_z_2 + sin_hind_right_knee_angle * s5154
+    velocity_hind_right_shank_x_2 = cos_hind_right_knee_angle * s5154 - sin_hind_right_knee_angle * velocity_hind_right_thigh_z_2
     omega_hind_right_shank_y = hind_right_knee_angle_dot + omega_hind_right_thigh_y
-    s5160 = velocity_trunk_x * velocity_trunk_x + velocity_trunk_y * velocity_trunk_y
-    s5161 = trunk_wx * (I_trunk_x * trunk_wx) + trunk_wy * (I_trunk_y * trunk_wy) + trunk_wz * (I_trunk_z * trunk_wz)
+    s5155 = velocity_trunk_x * velocity_trunk_x + velocity_trunk_y * velocity_trunk_y
+    s5156 = trunk_wx * (I_trunk_x * trunk_wx) + trunk_wy * (I_trunk_y * trunk_wy) + trunk_wz * (I_trunk_z * trunk_wz)
     velocity_front_left_hip_x_squared = velocity_front_left_hip_x_2 * velocity_front_left_hip_x_2
     velocity_front_left_hip_y_squared = velocity_front_left_hip_y_2 * velocity_front_left_hip_y_2
-    s5162 = velocity_front_left_hip_x_squared + velocity_front_left_hip_y_squared + velocity_front_left_hip_z_2 * velocity_front_left_hip_z_2
-    s5163 = m_trunk * (s5160 + velocity_trunk_z * velocity_trunk_z) + s5161 + m_hip * s5162
-    s5164 = inertia_front_left_hip_xx * omega_front_left_hip_x + I_hip_xy * omega_front_left_hip_y
-    s5165 = I_hip_xy * omega_front_left_hip_x + I_hip_yy * omega_front_left_hip_y + I_hip_yz * omega_front_left_hip_z
-    s5166 = I_hip_xz * omega_front_left_hip_x + I_hip_yz * omega_front_left_hip_y + inertia_front_left_hip_zz * omega_front_left_hip_z
-    s5167 = omega_front_left_hip_x * (s5164 + I_hip_xz * omega_front_left_hip_z) + omega_front_left_hip_y * s5165
-    s5168 = velocity_front_left_hip_x_2 * (moment_front_left_hip_y * omega_front_left_hip_z)
-    s5169 = velocity_front_left_hip_z_2 * (moment_front_left_hip_y * omega_front_left_hip_x)
-    s5170 = s5163 + (s5167 + omega_front_left_hip_z * s5166) + k1 * (front_left_abduction_angle_dot * front_left_abduction_angle_dot)
+    s5157 = velocity_front_left_hip_x_squared + velocity_front_left_hip_y_squared + velocity_front_left_hip_z_2 * velocity_front_left_hip_z_2
+    s5158 = m_trunk * (s5155 + velocity_trunk_z * velocity_trunk_z) + s5156 + m_hip * s5157
+    s5159 = inertia_front_left_hip_xx * omega_front_left_hip_x + I_hip_xy * omega_front_left_hip_y
+    s5160 = I_hip_xy * omega_front_left_hip_x + I_hip_yy * omega_front_left_hip_y + I_hip_yz * omega_front_left_hip_z
+    s5161 = I_hip_xz * omega_front_left_hip_x + I_hip_yz * omega_front_left_hip_y + inertia_front_left_hip_zz * omega_front_left_hip_z
+    s5162 = omega_front_left_hip_x * (s5159 + I_hip_xz * omega_front_left_hip_z) + omega_front_left_hip_y * s5160
+    s5163 = velocity_front_left_hip_x_2 * (moment_front_left_hip_y * omega_front_left_hip_z)
+    s5164 = velocity_front_left_hip_z_2 * (moment_front_left_hip_y * omega_front_left_hip_x)
+    s5165 = s5158 + (s5162 + omega_front_left_hip_z * s5161) + k1 * (front_left_abduction_angle_dot * front_left_abduction_angle_dot)
     velocity_front_right_hip_x_squared = velocity_front_right_hip_x_2 * velocity_front_right_hip_x_2
     velocity_front_right_hip_y_squared = velocity_front_right_hip_y_2 * velocity_front_right_hip_y_2
-    s5171 = velocity_front_right_hip_x_squared + velocity_front_right_hip_y_squared + velocity_front_right_hip_z_2 * velocity_front_right_hip_z_2
-    s5172 = inertia_front_left_hip_xx * omega_front_right_hip_x - I_hip_xy * omega_front_right_hip_y
-    s5173 = I_hip_yy * omega_front_right_hip_y - I_hip_xy * omega_front_right_hip_x - I_hip_yz * omega_front_right_hip_z
-    s5174 = I_hip_xz * omega_front_right_hip_x - I_hip_yz * omega_front_right_hip_y + inertia_front_left_hip_zz * omega_front_right_hip_z
-    s5175 = omega_front_right_hip_x * (s5172 + I_hip_xz * omega_front_right_hip_z) + omega_front_right_hip_y * s5173
-    s5176 = velocity_front_right_hip_x_2 * (moment_front_left_hip_y * omega_front_right_hip_z)
-    s5177 = velocity_front_right_hip_z_2 * (moment_front_left_hip_y * omega_front_right_hip_x)
-    s5178 = s5170 + m_hip * s5171 + (s5175 + omega_front_right_hip_z * s5174) + k1 * (front_right_abduction_angle_dot * front_right_abduction_angle_dot)
+    s5166 = velocity_front_right_hip_x_squared + velocity_front_right_hip_y_squared + velocity_front_right_hip_z_2 * velocity_front_right_hip_z_2
+    s5167 = inertia_front_left_hip_xx * omega_front_right_hip_x - I_hip_xy * omega_front_right_hip_y
+    s5168 = I_hip_yy * omega_front_right_hip_y - I_hip_xy * omega_front_right_hip_x - I_hip_yz * omega_front_right_hip_z
+    s5169 = I_hip_xz * omega_front_right_hip_x - I_hip_yz * omega_front_right_hip_y + inertia_front_left_hip_zz * omega_front_right_hip_z
+    s5170 = omega_front_right_hip_x * (s5167 + I_hip_xz * omega_front_right_hip_z) + omega_front_right_hip_y * s5168
+    s5171 = velocity_front_right_hip_x_2 * (moment_front_left_hip_y * omega_front_right_hip_z)
+    s5172 = velocity_front_right_hip_z_2 * (moment_front_left_hip_y * omega_front_right_hip_x)
+    s5173 = s5165 + m_hip * s5166 + (s5170 + omega_front_right_hip_z * s5169) + k1 * (front_right_abduction_angle_dot * front_right_abduction_angle_dot)
     velocity_hind_left_hip_y_squared = velocity_hind_left_hip_y_2 * velocity_hind_left_hip_y_2
-    s5179 = velocity_front_left_hip_x_squared + velocity_hind_left_hip_y_squared + velocity_hind_left_hip_z_2 * velocity_hind_left_hip_z_2
-    s5180 = inertia_front_left_hip_xx * omega_hind_left_hip_x + I_hip_xy * omega_hind_left_hip_y
-    s5181 = I_hip_xy * omega_hind_left_hip_x + I_hip_yy * omega_hind_left_hip_y + I_hip_yz * omega_hind_left_hip_z
-    s5182 = I_hip_xz * omega_hind_left_hip_x + I_hip_yz * omega_hind_left_hip_y + inertia_front_left_hip_zz * omega_hind_left_hip_z
-    s5183 = omega_hind_left_hip_x * (s5180 + I_hip_xz * omega_hind_left_hip_z) + omega_hind_left_hip_y * s5181
-    s5184 = velocity_front_left_hip_x_2 * (moment_front_left_hip_y * omega_hind_left_hip_z)
-    s5185 = velocity_hind_left_hip_z_2 * (moment_front_left_hip_y * omega_hind_left_hip_x)
-    s5186 = s5178 + m_hip * s5179 + (s5183 + omega_hind_left_hip_z * s5182) + k1 * (hind_left_abduction_angle_dot * hind_left_abduction_angle_dot)
+    s5174 = velocity_front_left_hip_x_squared + velocity_hind_left_hip_y_squared + velocity_hind_left_hip_z_2 * velocity_hind_left_hip_z_2
+    s5175 = inertia_front_left_hip_xx * omega_hind_left_hip_x + I_hip_xy * omega_hind_left_hip_y
+    s5176 = I_hip_xy * omega_hind_left_hip_x + I_hip_yy * omega_hind_left_hip_y + I_hip_yz * omega_hind_left_hip_z
+    s5177 = I_hip_xz * omega_hind_left_hip_x + I_hip_yz * omega_hind_left_hip_y + inertia_front_left_hip_zz * omega_hind_left_hip_z
+    s5178 = omega_hind_left_hip_x * (s5175 + I_hip_xz * omega_hind_left_hip_z) + omega_hind_left_hip_y * s5176
+    s5179 = velocity_front_left_hip_x_2 * (moment_front_left_hip_y * omega_hind_left_hip_z)
+    s5180 = velocity_hind_left_hip_z_2 * (moment_front_left_hip_y * omega_hind_left_hip_x)
+    s5181 = s5173 + m_hip * s5174 + (s5178 + omega_hind_left_hip_z * s5177) + k1 * (hind_left_abduction_angle_dot * hind_left_abduction_angle_dot)
     velocity_hind_right_hip_y_squared = velocity_hind_right_hip_y_2 * velocity_hind_right_hip_y_2
-    s5187 = velocity_front_right_hip_x_squared + velocity_hind_right_hip_y_squared + velocity_hind_right_hip_z_2 * velocity_hind_right_hip_z_2
-    s5188 = inertia_front_left_hip_xx * omega_hind_right_hip_x - I_hip_xy * omega_hind_right_hip_y
-    s5189 = I_hip_yy * omega_hind_right_hip_y - I_hip_xy * omega_hind_right_hip_x - I_hip_yz * omega_hind_right_hip_z
-    s5190 = I_hip_xz * omega_hind_right_hip_x - I_hip_yz * omega_hind_right_hip_y + inertia_front_left_hip_zz * omega_hind_right_hip_z
-    s5191 = omega_hind_right_hip_x * (s5188 + I_hip_xz * omega_hind_right_hip_z) + omega_hind_right_hip_y * s5189
-    s5192 = velocity_front_right_hip_x_2 * (moment_front_left_hip_y * omega_hind_right_hip_z)
-    s5193 = velocity_hind_right_hip_z_2 * (moment_front_left_hip_y * omega_hind_right_hip_x)
-    s5194 = s5186 + m_hip * s5187 + (s5191 + omega_hind_right_hip_z * s5190) + k1 * (hind_right_abduction_angle_dot * hind_right_abduction_angle_dot)
-    s5195 = velocity_front_left_hip_y_squared + velocity_front_left_thigh_x_2 * velocity_front_left_thigh_x_2
-    s5196 = m_thigh * (s5195 + velocity_front_left_thigh_z_2 * velocity_front_left_thigh_z_2)
-    s5197 = inertia_front_left_thigh_yy * omega_front_left_thigh_y + inertia_front_left_thigh_yz * omega_front_left_thigh_z
-    s5198 = inertia_front_left_thigh_yz * omega_front_left_thigh_y + inertia_front_left_thigh_zz * omega_front_left_thigh_z
-    s5199 = omega_front_left_thigh_x * (inertia_front_left_thigh_xx * omega_front_left_thigh_x)
-    s5200 = s5199 + omega_front_left_thigh_y * s5197 + omega_front_left_thigh_z * s5198
-    s5201 = k5 * omega_front_left_thigh_y + moment_front_left_thigh_y * omega_front_left_thigh_z
-    s5202 = velocity_front_left_hip_y_2 * (k5 * omega_front_left_thigh_x) - velocity_front_left_thigh_x_2 * s5201
-    s5203 = velocity_front_left_thigh_z_2 * (moment_front_left_thigh_y * omega_front_left_thigh_x)
-    s5204 = s5169 - s5168 + (s5176 - s5177) + (s5185 - s5184) + (s5192 - s5193) + (s5202 + s5203)
-    s5205 = s5194 + s5196 + s5200 + k1 * (front_left_swing_angle_dot * front_left_swing_angle_dot)
-    s5206 = velocity_front_right_hip_y_squared + velocity_front_right_thigh_x_2 * velocity_front_right_thigh_x_2
-    s5207 = m_thigh * (s5206 + velocity_front_right_thigh_z_2 * velocity_front_right_thigh_z_2)
-    s5208 = inertia_front_left_thigh_yy * omega_front_right_thigh_y - inertia_front_left_thigh_yz * omega_front_right_thigh_z
-    s5209 = inertia_front_left_thigh_zz * omega_front_right_thigh_z - inertia_front_left_thigh_yz * omega_front_right_thigh_y
-    s5210 = omega_front_right_thigh_x * (inertia_front_left_thigh_xx * omega_front_right_thigh_x)
-    s5211 = s5210 + omega_front_right_thigh_y * s5208 + omega_front_right_thigh_z * s5209
-    s5212 = moment_front_left_thigh_y * omega_front_right_thigh_z - k5 * omega_front_right_thigh_y
-    s5213 = velocity_front_right_thigh_x_2 * s5212 + velocity_front_right_hip_y_2 * (k5 * omega_front_right_thigh_x)
-    s5214 = velocity_front_right_thigh_z_2 * (moment_front_left_thigh_y * omega_front_right_thigh_x)
-    s5215 = s5205 + s5207 + s5211 + k1 * (front_right_swing_angle_dot * front_right_swing_angle_dot)
-    s5216 = velocity_hind_left_hip_y_squared + velocity_hind_left_thigh_x_2 * velocity_hind_left_thigh_x_2
-    s5217 = m_thigh * (s5216 + velocity_hind_left_thigh_z_2 * velocity_hind_left_thigh_z_2)
-    s5218 = inertia_front_left_thigh_yy * omega_hind_left_thigh_y + inertia_front_left_thigh_yz * omega_hind_left_thigh_z
-    s5219 = inertia_front_left_thigh_yz * omega_hind_left_thigh_y + inertia_front_left_thigh_zz * omega_hind_left_thigh_z
-    s5220 = omega_hind_left_thigh_x * (inertia_front_left_thigh_xx * omega_hind_left_thigh_x)
-    s5221 = s5220 + omega_hind_left_thigh_y * s5218 + omega_hind_left_thigh_z * s5219
-    s5222 = k5 * omega_hind_left_thigh_y + moment_front_left_thigh_y * omega_hind_left_thigh_z
-    s5223 = velocity_hind_left_hip_y_2 * (k5 * omega_hind_left_thigh_x) - velocity_hind_left_thigh_x_2 * s5222
-    s5224 = velocity_hind_left_thigh_z_2 * (moment_front_left_thigh_y * omega_hind_left_thigh_x)
-    s5225 = s5215 + s5217 + s5221 + k1 * (hind_left_swing_angle_dot * hind_left_swing_angle_dot)
-    s5226 = velocity_hind_right_hip_y_squared + velocity_hind_right_thigh_x_2 * velocity_hind_right_thigh_x_2
-    s5227 = m_thigh * (s5226 + velocity_hind_right_thigh_z_2 * velocity_hind_right_thigh_z_2)
-    s5228 = inertia_front_left_thigh_yy * omega_hind_right_thigh_y - inertia_front_left_thigh_yz * omega_hind_right_thigh_z
-    s5229 = inertia_front_left_thigh_zz * omega_hind_right_thigh_z - inertia_front_left_thigh_yz * omega_hind_right_thigh_y
-    s5230 = omega_hind_right_thigh_x * (inertia_front_left_thigh_xx * omega_hind_right_thigh_x)
-    s5231 = s5230 + omega_hind_right_thigh_y * s5228 + omega_hind_right_thigh_z * s5229
-    s5232 = moment_front_left_thigh_y * omega_hind_right_thigh_z - k5 * omega_hind_right_thigh_y
-    s5233 = velocity_hind_right_thigh_x_2 * s5232 + velocity_hind_right_hip_y_2 * (k5 * omega_hind_right_thigh_x)
-    s5234 = velocity_hind_right_thigh_z_2 * (moment_front_left_thigh_y * omega_hind_right_thigh_x)
-    s5235 = s5225 + s5227 + s5231 + k1 * (hind_right_swing_angle_dot * hind_right_swing_angle_dot)
-    s5236 = velocity_front_left_shank_x_2 * velocity_front_left_shank_x_2 + velocity_front_left_shank_y_2 * velocity_front_left_shank_y_2
-    s5237 = m_shank * (s5236 + velocity_front_left_shank_z_2 * velocity_front_left_shank_z_2)
-    s5238 = omega_front_left_shank_x * (inertia_front_left_shank_xx * omega_front_left_shank_x)
-    s5239 = omega_front_left_shank_y * (inertia_front_left_shank_yy * omega_front_left_shank_y)
-    s5240 = s5238 + s5239 + omega_front_left_shank_z * (I_shank_z * omega_front_left_shank_z)
-    s5241 = velocity_front_left_shank_y_2 * (k6 * omega_front_left_shank_x) - velocity_front_left_shank_x_2 * (k6 * omega_front_left_shank_y)
-    s5242 = s5235 + s5237 + s5240 + k28 * (front_left_knee_angle_dot * front_left_knee_angle_dot)
-    s5243 = velocity_front_right_shank_x_2 * velocity_front_right_shank_x_2 + velocity_front_right_shank_y_2 * velocity_front_right_shank_y_2
-    s5244 = m_shank * (s5243 + velocity_front_right_shank_z_2 * velocity_front_right_shank_z_2)
-    s5245 = omega_front_right_shank_x * (inertia_front_left_shank_xx * omega_front_right_shank_x)
-    s5246 = omega_front_right_shank_y * (inertia_front_left_shank_yy * omega_front_right_shank_y)
-    s5247 = s5245 + s5246 + omega_front_right_shank_z * (I_shank_z * omega_front_right_shank_z)
-    s5248 = velocity_front_right_shank_y_2 * (k6 * omega_front_right_shank_x) - velocity_front_right_shank_x_2 * (k6 * omega_front_right_shank_y)
-    s5249 = s5204 + (s5213 - s5214) + (s5223 + s5224) + (s5233 - s5234) + s5241 + s5248
-    s5250 = s5242 + s5244 + s5247 + k28 * (front_right_knee_angle_dot * front_right_knee_angle_dot)
-    s5251 = velocity_hind_left_shank_x_2 * velocity_hind_left_shank_x_2 + velocity_hind_left_shank_y_2 * velocity_hind_left_shank_y_2
-    s5252 = m_shank * (s5251 + velocity_hind_left_shank_z_2 * velocity_hind_left_shank_z_2)
-    s5253 = omega_hind_left_shank_x * (inertia_front_left_shank_xx * omega_hind_left_shank_x)
-    s5254 = omega_hind_left_shank_y * (inertia_front_left_shank_yy * omega_hind_left_shank_y)
-    s5255 = s5253 + s5254 + omega_hind_left_shank_z * (I_shank_z * omega_hind_left_shank_z)
-    s5256 = velocity_hind_left_shank_y_2 * (k6 * omega_hind_left_shank_x) - velocity_hind_left_shank_x_2 * (k6 * omega_hind_left_shank_y)
-    s5257 = s5250 + s5252 + s5255 + k28 * (hind_left_knee_angle_dot * hind_left_knee_angle_dot)
-    s5258 = velocity_hind_right_shank_x_2 * velocity_hind_right_shank_x_2 + velocity_hind_right_shank_y_2 * velocity_hind_right_shank_y_2
-    s5259 = m_shank * (s5258 + velocity_hind_right_shank_z_2 * velocity_hind_right_shank_z_2)
-    s5260 = omega_hind_right_shank_x * (inertia_front_left_shank_xx * omega_hind_right_shank_x)
-    s5261 = omega_hind_right_shank_y * (inertia_front_left_shank_yy * omega_hind_right_shank_y)
-    s5262 = s5260 + s5261 + omega_hind_right_shank_z * (I_shank_z * omega_hind_right_shank_z)
-    s5263 = velocity_hind_right_shank_y_2 * (k6 * omega_hind_right_shank_x) - velocity_hind_right_shank_x_2 * (k6 * omega_hind_right_shank_y)
-    s5264 = s5257 + s5259 + s5262 + k28 * (hind_right_knee_angle_dot * hind_right_knee_angle_dot)
+    s5182 = velocity_front_right_hip_x_squared + velocity_hind_right_hip_y_squared + velocity_hind_right_hip_z_2 * velocity_hind_right_hip_z_2
+    s5183 = inertia_front_left_hip_xx * omega_hind_right_hip_x - I_hip_xy * omega_hind_right_hip_y
+    s5184 = I_hip_yy * omega_hind_right_hip_y - I_hip_xy * omega_hind_right_hip_x - I_hip_yz * omega_hind_right_hip_z
+    s5185 = I_hip_xz * omega_hind_right_hip_x - I_hip_yz * omega_hind_right_hip_y + inertia_front_left_hip_zz * omega_hind_right_hip_z
+    s5186 = omega_hind_right_hip_x * (s5183 + I_hip_xz * omega_hind_right_hip_z) + omega_hind_right_hip_y * s5184
+    s5187 = velocity_front_right_hip_x_2 * (moment_front_left_hip_y * omega_hind_right_hip_z)
+    s5188 = velocity_hind_right_hip_z_2 * (moment_front_left_hip_y * omega_hind_right_hip_x)
+    s5189 = s5181 + m_hip * s5182 + (s5186 + omega_hind_right_hip_z * s5185) + k1 * (hind_right_abduction_angle_dot * hind_right_abduction_angle_dot)
+    s5190 = velocity_front_left_hip_y_squared + velocity_front_left_thigh_x_2 * velocity_front_left_thigh_x_2
+    s5191 = m_thigh * (s5190 + velocity_front_left_thigh_z_2 * velocity_front_left_thigh_z_2)
+    s5192 = inertia_front_left_thigh_yy * omega_front_left_thigh_y + inertia_front_left_thigh_yz * omega_front_left_thigh_z
+    s5193 = inertia_front_left_thigh_yz * omega_front_left_thigh_y + inertia_front_left_thigh_zz * omega_front_left_thigh_z
+    s5194 = omega_front_left_thigh_x * (inertia_front_left_thigh_xx * omega_front_left_thigh_x)
+    s5195 = s5194 + omega_front_left_thigh_y * s5192 + omega_front_left_thigh_z * s5193
+    s5196 = k5 * omega_front_left_thigh_y + moment_front_left_thigh_y * omega_front_left_thigh_z
+    s5197 = velocity_front_left_hip_y_2 * (k5 * omega_front_left_thigh_x) - velocity_front_left_thigh_x_2 * s5196
+    s5198 = velocity_front_left_thigh_z_2 * (moment_front_left_thigh_y * omega_front_left_thigh_x)
+    s5199 = s5164 - s5163 + (s5171 - s5172) + (s5180 - s5179) + (s5187 - s5188) + (s5197 + s5198)
+    s5200 = s5189 + s5191 + s5195 + k1 * (front_left_swing_angle_dot * front_left_swing_angle_dot)
+    s5201 = velocity_front_right_hip_y_squared + velocity_front_right_thigh_x_2 * velocity_front_right_thigh_x_2
+    s5202 = m_thigh * (s5201 + velocity_front_right_thigh_z_2 * velocity_front_right_thigh_z_2)
+    s5203 = inertia_front_left_thigh_yy * omega_front_right_thigh_y - inertia_front_left_thigh_yz * omega_front_right_thigh_z
+    s5204 = inertia_front_left_thigh_zz * omega_front_right_thigh_z - inertia_front_left_thigh_yz * omega_front_right_thigh_y
+    s5205 = omega_front_right_thigh_x * (inertia_front_left_thigh_xx * omega_front_right_thigh_x)
+    s5206 = s5205 + omega_front_right_thigh_y * s5203 + omega_front_right_thigh_z * s5204
+    s5207 = moment_front_left_thigh_y * omega_front_right_thigh_z - k5 * omega_front_right_thigh_y
+    s5208 = velocity_front_right_thigh_x_2 * s5207 + velocity_front_right_hip_y_2 * (k5 * omega_front_right_thigh_x)
+    s5209 = velocity_front_right_thigh_z_2 * (moment_front_left_thigh_y * omega_front_right_thigh_x)
+    s5210 = s5200 + s5202 + s5206 + k1 * (front_right_swing_angle_dot * front_right_swing_angle_dot)
+    s5211 = velocity_hind_left_hip_y_squared + velocity_hind_left_thigh_x_2 * velocity_hind_left_thigh_x_2
+    s5212 = m_thigh * (s5211 + velocity_hind_left_thigh_z_2 * velocity_hind_left_thigh_z_2)
+    s5213 = inertia_front_left_thigh_yy * omega_hind_left_thigh_y + inertia_front_left_thigh_yz * omega_hind_left_thigh_z
+    s5214 = inertia_front_left_thigh_yz * omega_hind_left_thigh_y + inertia_front_left_thigh_zz * omega_hind_left_thigh_z
+    s5215 = omega_hind_left_thigh_x * (inertia_front_left_thigh_xx * omega_hind_left_thigh_x)
+    s5216 = s5215 + omega_hind_left_thigh_y * s5213 + omega_hind_left_thigh_z * s5214
+    s5217 = k5 * omega_hind_left_thigh_y + moment_front_left_thigh_y * omega_hind_left_thigh_z
+    s5218 = velocity_hind_left_hip_y_2 * (k5 * omega_hind_left_thigh_x) - velocity_hind_left_thigh_x_2 * s5217
+    s5219 = velocity_hind_left_thigh_z_2 * (moment_front_left_thigh_y * omega_hind_left_thigh_x)
+    s5220 = s5210 + s5212 + s5216 + k1 * (hind_left_swing_angle_dot * hind_left_swing_angle_dot)
+    s5221 = velocity_hind_right_hip_y_squared + velocity_hind_right_thigh_x_2 * velocity_hind_right_thigh_x_2
+    s5222 = m_thigh * (s5221 + velocity_hind_right_thigh_z_2 * velocity_hind_right_thigh_z_2)
+    s5223 = inertia_front_left_thigh_yy * omega_hind_right_thigh_y - inertia_front_left_thigh_yz * omega_hind_right_thigh_z
+    s5224 = inertia_front_left_thigh_zz * omega_hind_right_thigh_z - inertia_front_left_thigh_yz * omega_hind_right_thigh_y
+    s5225 = omega_hind_right_thigh_x * (inertia_front_left_thigh_xx * omega_hind_right_thigh_x)
+    s5226 = s5225 + omega_hind_right_thigh_y * s5223 + omega_hind_right_thigh_z * s5224
+    s5227 = moment_front_left_thigh_y * omega_hind_right_thigh_z - k5 * omega_hind_right_thigh_y
+    s5228 = velocity_hind_right_thigh_x_2 * s5227 + velocity_hind_right_hip_y_2 * (k5 * omega_hind_right_thigh_x)
+    s5229 = velocity_hind_right_thigh_z_2 * (moment_front_left_thigh_y * omega_hind_right_thigh_x)
+    s5230 = s5220 + s5222 + s5226 + k1 * (hind_right_swing_angle_dot * hind_right_swing_angle_dot)
+    s5231 = velocity_front_left_shank_x_2 * velocity_front_left_shank_x_2 + velocity_front_left_shank_y_2 * velocity_front_left_shank_y_2
+    s5232 = m_shank * (s5231 + velocity_front_left_shank_z_2 * velocity_front_left_shank_z_2)
+    s5233 = omega_front_left_shank_x * (inertia_front_left_shank_xx * omega_front_left_shank_x)
+    s5234 = omega_front_left_shank_y * (inertia_front_left_shank_yy * omega_front_left_shank_y)
+    s5235 = s5233 + s5234 + omega_front_left_shank_z * (I_shank_z * omega_front_left_shank_z)
+    s5236 = velocity_front_left_shank_y_2 * (k6 * omega_front_left_shank_x) - velocity_front_left_shank_x_2 * (k6 * omega_front_left_shank_y)
+    s5237 = s5230 + s5232 + s5235 + k28 * (front_left_knee_angle_dot * front_left_knee_angle_dot)
+    s5238 = velocity_front_right_shank_x_2 * velocity_front_right_shank_x_2 + velocity_front_right_shank_y_2 * velocity_front_right_shank_y_2
+    s5239 = m_shank * (s5238 + velocity_front_right_shank_z_2 * velocity_front_right_shank_z_2)
+    s5240 = omega_front_right_shank_x * (inertia_front_left_shank_xx * omega_front_right_shank_x)
+    s5241 = omega_front_right_shank_y * (inertia_front_left_shank_yy * omega_front_right_shank_y)
+    s5242 = s5240 + s5241 + omega_front_right_shank_z * (I_shank_z * omega_front_right_shank_z)
+    s5243 = velocity_front_right_shank_y_2 * (k6 * omega_front_right_shank_x) - velocity_front_right_shank_x_2 * (k6 * omega_front_right_shank_y)
+    s5244 = s5199 + (s5208 - s5209) + (s5218 + s5219) + (s5228 - s5229) + s5236 + s5243
+    s5245 = s5237 + s5239 + s5242 + k28 * (front_right_knee_angle_dot * front_right_knee_angle_dot)
+    s5246 = velocity_hind_left_shank_x_2 * velocity_hind_left_shank_x_2 + velocity_hind_left_shank_y_2 * velocity_hind_left_shank_y_2
+    s5247 = m_shank * (s5246 + velocity_hind_left_shank_z_2 * velocity_hind_left_shank_z_2)
+    s5248 = omega_hind_left_shank_x * (inertia_front_left_shank_xx * omega_hind_left_shank_x)
+    s5249 = omega_hind_left_shank_y * (inertia_front_left_shank_yy * omega_hind_left_shank_y)
+    s5250 = s5248 + s5249 + omega_hind_left_shank_z * (I_shank_z * omega_hind_left_shank_z)
+    s5251 = velocity_hind_left_shank_y_2 * (k6 * omega_hind_left_shank_x) - velocity_hind_left_shank_x_2 * (k6 * omega_hind_left_shank_y)
+    s5252 = s5245 + s5247 + s5250 + k28 * (hind_left_knee_angle_dot * hind_left_knee_angle_dot)
+    s5253 = velocity_hind_right_shank_x_2 * velocity_hind_right_shank_x_2 + velocity_hind_right_shank_y_2 * velocity_hind_right_shank_y_2
+    s5254 = m_shank * (s5253 + velocity_hind_right_shank_z_2 * velocity_hind_right_shank_z_2)
+    s5255 = omega_hind_right_shank_x * (inertia_front_left_shank_xx * omega_hind_right_shank_x)
+    s5256 = omega_hind_right_shank_y * (inertia_front_left_shank_yy * omega_hind_right_shank_y)
+    s5257 = s5255 + s5256 + omega_hind_right_shank_z * (I_shank_z * omega_hind_right_shank_z)
+    s5258 = velocity_hind_right_shank_y_2 * (k6 * omega_hind_right_shank_x) - velocity_hind_right_shank_x_2 * (k6 * omega_hind_right_shank_y)
+    s5259 = s5252 + s5254 + s5257 + k28 * (hind_right_knee_angle_dot * hind_right_knee_angle_dot)
     return (
-        s5249 + s5256 + s5263 + 0.5 * s5264,
+        s5244 + s5251 + s5258 + 0.5 * s5259,
     )
 
 
@@ -8725,57 +8705,57 @@ def _potential_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     s23 = 1.0 - (trunk_qx * s3 + trunk_qy * s4)
     cos_front_left_abduction_angle = cos(front_left_abduction_angle)
     sin_front_left_abduction_angle = sin(front_left_abduction_angle)
-    s936 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
-    s937 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
+    s931 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
+    s932 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
     cos_front_right_abduction_angle = cos(front_right_abduction_angle)
     sin_front_right_abduction_angle = sin(front_right_abduction_angle)
-    s942 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
-    s943 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
+    s937 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
+    s938 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
     cos_hind_left_abduction_angle = cos(hind_left_abduction_angle)
     sin_hind_left_abduction_angle = sin(hind_left_abduction_angle)
-    s948 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
-    s949 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
+    s943 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
+    s944 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
     cos_hind_right_abduction_angle = cos(hind_right_abduction_angle)
     sin_hind_right_abduction_angle = sin(hind_right_abduction_angle)
-    s954 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
-    s955 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
+    s949 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
+    s950 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
     cos_front_left_swing_angle = cos(front_left_swing_angle)
     sin_front_left_swing_angle = sin(front_left_swing_angle)
-    s960 = s937 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
+    s955 = s932 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
     cos_front_right_swing_angle = cos(front_right_swing_angle)
     sin_front_right_swing_angle = sin(front_right_swing_angle)
-    s966 = s943 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
+    s961 = s938 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
     cos_hind_left_swing_angle = cos(hind_left_swing_angle)
     sin_hind_left_swing_angle = sin(hind_left_swing_angle)
-    s972 = s949 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
+    s967 = s944 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
     cos_hind_right_swing_angle = cos(hind_right_swing_angle)
     sin_hind_right_swing_angle = sin(hind_right_swing_angle)
-    s978 = s955 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
-    s5265 = (s21 * cos_front_left_swing_angle - s937 * sin_front_left_swing_angle) * sin(front_left_knee_angle)
-    s5266 = (s21 * cos_front_right_swing_angle - s943 * sin_front_right_swing_angle) * sin(front_right_knee_angle)
-    s5267 = (s21 * cos_hind_left_swing_angle - s949 * sin_hind_left_swing_angle) * sin(hind_left_knee_angle)
-    s5268 = (s21 * cos_hind_right_swing_angle - s955 * sin_hind_right_swing_angle) * sin(hind_right_knee_angle)
-    s1022 = x_hip * s21
-    s1023 = y_hip * s22
-    s1024 = s1022 + s1023
-    s5269 = trunk_z + s1024
-    s5270 = trunk_z + (s1022 - s1023)
-    s5271 = trunk_z + (s1023 - s1022)
-    s5272 = trunk_z - s1024
-    s5273 = k2 * s936 + s5269
-    s5274 = k3 * s942 + s5270
-    s5275 = k2 * s948 + s5271
-    s5276 = k3 * s954 + s5272
-    s5277 = trunk_z * k31 + k32 * (s5269 + c_hip * s936) + k32 * (s5270 - c_hip * s942)
-    s5278 = s5277 + k32 * (s5271 + c_hip * s948) + k32 * (s5272 - c_hip * s954) + k33 * (s5273 + (y_thigh * s936 - c_thigh * s960))
-    s5279 = s5278 + k33 * (s5274 - (y_thigh * s942 + c_thigh * s966)) + k33 * (s5275 + (y_thigh * s948 - c_thigh * s972))
-    s5280 = k4 * s960 + s5273 - c_shank * (s960 * cos(front_left_knee_angle) + s5265)
-    s5281 = k4 * s966 + s5274 - c_shank * (s966 * cos(front_right_knee_angle) + s5266)
-    s5282 = s5279 + k33 * (s5276 - (y_thigh * s954 + c_thigh * s978)) + k34 * s5280 + k34 * s5281
-    s5283 = k34 * (k4 * s972 + s5275 - c_shank * (s972 * cos(hind_left_knee_angle) + s5267))
-    s5284 = k4 * s978 + s5276 - c_shank * (s978 * cos(hind_right_knee_angle) + s5268)
+    s973 = s950 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
+    s5260 = (s21 * cos_front_left_swing_angle - s932 * sin_front_left_swing_angle) * sin(front_left_knee_angle)
+    s5261 = (s21 * cos_front_right_swing_angle - s938 * sin_front_right_swing_angle) * sin(front_right_knee_angle)
+    s5262 = (s21 * cos_hind_left_swing_angle - s944 * sin_hind_left_swing_angle) * sin(hind_left_knee_angle)
+    s5263 = (s21 * cos_hind_right_swing_angle - s950 * sin_hind_right_swing_angle) * sin(hind_right_knee_angle)
+    s1017 = x_hip * s21
+    s1018 = y_hip * s22
+    s1019 = s1017 + s1018
+    s5264 = trunk_z + s1019
+    s5265 = trunk_z + (s1017 - s1018)
+    s5266 = trunk_z + (s1018 - s1017)
+    s5267 = trunk_z - s1019
+    s5268 = k2 * s931 + s5264
+    s5269 = k3 * s937 + s5265
+    s5270 = k2 * s943 + s5266
+    s5271 = k3 * s949 + s5267
+    s5272 = trunk_z * k31 + k32 * (s5264 + c_hip * s931) + k32 * (s5265 - c_hip * s937)
+    s5273 = s5272 + k32 * (s5266 + c_hip * s943) + k32 * (s5267 - c_hip * s949) + k33 * (s5268 + (y_thigh * s931 - c_thigh * s955))
+    s5274 = s5273 + k33 * (s5269 - (y_thigh * s937 + c_thigh * s961)) + k33 * (s5270 + (y_thigh * s943 - c_thigh * s967))
+    s5275 = k4 * s955 + s5268 - c_shank * (s955 * cos(front_left_knee_angle) + s5260)
+    s5276 = k4 * s961 + s5269 - c_shank * (s961 * cos(front_right_knee_angle) + s5261)
+    s5277 = s5274 + k33 * (s5271 - (y_thigh * s949 + c_thigh * s973)) + k34 * s5275 + k34 * s5276
+    s5278 = k34 * (k4 * s967 + s5270 - c_shank * (s967 * cos(hind_left_knee_angle) + s5262))
+    s5279 = k4 * s973 + s5271 - c_shank * (s973 * cos(hind_right_knee_angle) + s5263)
     return (
-        s5282 + s5283 + k34 * s5284,
+        s5277 + s5278 + k34 * s5279,
     )
 
 
@@ -8808,121 +8788,121 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     s23 = 1.0 - (s9 + s10)
     cos_front_left_abduction_angle = cos(front_left_abduction_angle)
     sin_front_left_abduction_angle = sin(front_left_abduction_angle)
-    s932 = s16 * cos_front_left_abduction_angle + s17 * sin_front_left_abduction_angle
-    s933 = s17 * cos_front_left_abduction_angle - s16 * sin_front_left_abduction_angle
-    s934 = s19 * cos_front_left_abduction_angle + s20 * sin_front_left_abduction_angle
-    s935 = s20 * cos_front_left_abduction_angle - s19 * sin_front_left_abduction_angle
-    s936 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
-    s937 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
+    s927 = s16 * cos_front_left_abduction_angle + s17 * sin_front_left_abduction_angle
+    s928 = s17 * cos_front_left_abduction_angle - s16 * sin_front_left_abduction_angle
+    s929 = s19 * cos_front_left_abduction_angle + s20 * sin_front_left_abduction_angle
+    s930 = s20 * cos_front_left_abduction_angle - s19 * sin_front_left_abduction_angle
+    s931 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
+    s932 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
     cos_front_right_abduction_angle = cos(front_right_abduction_angle)
     sin_front_right_abduction_angle = sin(front_right_abduction_angle)
-    s938 = s16 * cos_front_right_abduction_angle + s17 * sin_front_right_abduction_angle
-    s939 = s17 * cos_front_right_abduction_angle - s16 * sin_front_right_abduction_angle
-    s940 = s19 * cos_front_right_abduction_angle + s20 * sin_front_right_abduction_angle
-    s941 = s20 * cos_front_right_abduction_angle - s19 * sin_front_right_abduction_angle
-    s942 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
-    s943 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
+    s933 = s16 * cos_front_right_abduction_angle + s17 * sin_front_right_abduction_angle
+    s934 = s17 * cos_front_right_abduction_angle - s16 * sin_front_right_abduction_angle
+    s935 = s19 * cos_front_right_abduction_angle + s20 * sin_front_right_abduction_angle
+    s936 = s20 * cos_front_right_abduction_angle - s19 * sin_front_right_abduction_angle
+    s937 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
+    s938 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
     cos_hind_left_abduction_angle = cos(hind_left_abduction_angle)
     sin_hind_left_abduction_angle = sin(hind_left_abduction_angle)
-    s944 = s16 * cos_hind_left_abduction_angle + s17 * sin_hind_left_abduction_angle
-    s945 = s17 * cos_hind_left_abduction_angle - s16 * sin_hind_left_abduction_angle
-    s946 = s19 * cos_hind_left_abduction_angle + s20 * sin_hind_left_abduction_angle
-    s947 = s20 * cos_hind_left_abduction_angle - s19 * sin_hind_left_abduction_angle
-    s948 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
-    s949 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
+    s939 = s16 * cos_hind_left_abduction_angle + s17 * sin_hind_left_abduction_angle
+    s940 = s17 * cos_hind_left_abduction_angle - s16 * sin_hind_left_abduction_angle
+    s941 = s19 * cos_hind_left_abduction_angle + s20 * sin_hind_left_abduction_angle
+    s942 = s20 * cos_hind_left_abduction_angle - s19 * sin_hind_left_abduction_angle
+    s943 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
+    s944 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
     cos_hind_right_abduction_angle = cos(hind_right_abduction_angle)
     sin_hind_right_abduction_angle = sin(hind_right_abduction_angle)
-    s950 = s16 * cos_hind_right_abduction_angle + s17 * sin_hind_right_abduction_angle
-    s951 = s17 * cos_hind_right_abduction_angle - s16 * sin_hind_right_abduction_angle
-    s952 = s19 * cos_hind_right_abduction_angle + s20 * sin_hind_right_abduction_angle
-    s953 = s20 * cos_hind_right_abduction_angle - s19 * sin_hind_right_abduction_angle
-    s954 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
-    s955 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
+    s945 = s16 * cos_hind_right_abduction_angle + s17 * sin_hind_right_abduction_angle
+    s946 = s17 * cos_hind_right_abduction_angle - s16 * sin_hind_right_abduction_angle
+    s947 = s19 * cos_hind_right_abduction_angle + s20 * sin_hind_right_abduction_angle
+    s948 = s20 * cos_hind_right_abduction_angle - s19 * sin_hind_right_abduction_angle
+    s949 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
+    s950 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
     cos_front_left_swing_angle = cos(front_left_swing_angle)
     sin_front_left_swing_angle = sin(front_left_swing_angle)
-    s956 = s933 * cos_front_left_swing_angle + s15 * sin_front_left_swing_angle
-    s957 = s15 * cos_front_left_swing_angle - s933 * sin_front_left_swing_angle
-    s958 = s935 * cos_front_left_swing_angle + s18 * sin_front_left_swing_angle
-    s959 = s18 * cos_front_left_swing_angle - s935 * sin_front_left_swing_angle
-    s960 = s937 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
-    s961 = s21 * cos_front_left_swing_angle - s937 * sin_front_left_swing_angle
+    s951 = s928 * cos_front_left_swing_angle + s15 * sin_front_left_swing_angle
+    s952 = s15 * cos_front_left_swing_angle - s928 * sin_front_left_swing_angle
+    s953 = s930 * cos_front_left_swing_angle + s18 * sin_front_left_swing_angle
+    s954 = s18 * cos_front_left_swing_angle - s930 * sin_front_left_swing_angle
+    s955 = s932 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
+    s956 = s21 * cos_front_left_swing_angle - s932 * sin_front_left_swing_angle
     cos_front_right_swing_angle = cos(front_right_swing_angle)
     sin_front_right_swing_angle = sin(front_right_swing_angle)
-    s962 = s939 * cos_front_right_swing_angle + s15 * sin_front_right_swing_angle
-    s963 = s15 * cos_front_right_swing_angle - s939 * sin_front_right_swing_angle
-    s964 = s941 * cos_front_right_swing_angle + s18 * sin_front_right_swing_angle
-    s965 = s18 * cos_front_right_swing_angle - s941 * sin_front_right_swing_angle
-    s966 = s943 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
-    s967 = s21 * cos_front_right_swing_angle - s943 * sin_front_right_swing_angle
+    s957 = s934 * cos_front_right_swing_angle + s15 * sin_front_right_swing_angle
+    s958 = s15 * cos_front_right_swing_angle - s934 * sin_front_right_swing_angle
+    s959 = s936 * cos_front_right_swing_angle + s18 * sin_front_right_swing_angle
+    s960 = s18 * cos_front_right_swing_angle - s936 * sin_front_right_swing_angle
+    s961 = s938 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
+    s962 = s21 * cos_front_right_swing_angle - s938 * sin_front_right_swing_angle
     cos_hind_left_swing_angle = cos(hind_left_swing_angle)
     sin_hind_left_swing_angle = sin(hind_left_swing_angle)
-    s968 = s945 * cos_hind_left_swing_angle + s15 * sin_hind_left_swing_angle
-    s969 = s15 * cos_hind_left_swing_angle - s945 * sin_hind_left_swing_angle
-    s970 = s947 * cos_hind_left_swing_angle + s18 * sin_hind_left_swing_angle
-    s971 = s18 * cos_hind_left_swing_angle - s947 * sin_hind_left_swing_angle
-    s972 = s949 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
-    s973 = s21 * cos_hind_left_swing_angle - s949 * sin_hind_left_swing_angle
+    s963 = s940 * cos_hind_left_swing_angle + s15 * sin_hind_left_swing_angle
+    s964 = s15 * cos_hind_left_swing_angle - s940 * sin_hind_left_swing_angle
+    s965 = s942 * cos_hind_left_swing_angle + s18 * sin_hind_left_swing_angle
+    s966 = s18 * cos_hind_left_swing_angle - s942 * sin_hind_left_swing_angle
+    s967 = s944 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
+    s968 = s21 * cos_hind_left_swing_angle - s944 * sin_hind_left_swing_angle
     cos_hind_right_swing_angle = cos(hind_right_swing_angle)
     sin_hind_right_swing_angle = sin(hind_right_swing_angle)
-    s974 = s951 * cos_hind_right_swing_angle + s15 * sin_hind_right_swing_angle
-    s975 = s15 * cos_hind_right_swing_angle - s951 * sin_hind_right_swing_angle
-    s976 = s953 * cos_hind_right_swing_angle + s18 * sin_hind_right_swing_angle
-    s977 = s18 * cos_hind_right_swing_angle - s953 * sin_hind_right_swing_angle
-    s978 = s955 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
-    s979 = s21 * cos_hind_right_swing_angle - s955 * sin_hind_right_swing_angle
+    s969 = s946 * cos_hind_right_swing_angle + s15 * sin_hind_right_swing_angle
+    s970 = s15 * cos_hind_right_swing_angle - s946 * sin_hind_right_swing_angle
+    s971 = s948 * cos_hind_right_swing_angle + s18 * sin_hind_right_swing_angle
+    s972 = s18 * cos_hind_right_swing_angle - s948 * sin_hind_right_swing_angle
+    s973 = s950 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
+    s974 = s21 * cos_hind_right_swing_angle - s950 * sin_hind_right_swing_angle
     cos_front_left_knee_angle = cos(front_left_knee_angle)
     sin_front_left_knee_angle = sin(front_left_knee_angle)
-    s980 = s956 * cos_front_left_knee_angle + s957 * sin_front_left_knee_angle
-    s982 = s958 * cos_front_left_knee_angle + s959 * sin_front_left_knee_angle
-    s984 = s960 * cos_front_left_knee_angle + s961 * sin_front_left_knee_angle
+    s975 = s951 * cos_front_left_knee_angle + s952 * sin_front_left_knee_angle
+    s977 = s953 * cos_front_left_knee_angle + s954 * sin_front_left_knee_angle
+    s979 = s955 * cos_front_left_knee_angle + s956 * sin_front_left_knee_angle
     cos_front_right_knee_angle = cos(front_right_knee_angle)
     sin_front_right_knee_angle = sin(front_right_knee_angle)
-    s986 = s962 * cos_front_right_knee_angle + s963 * sin_front_right_knee_angle
-    s988 = s964 * cos_front_right_knee_angle + s965 * sin_front_right_knee_angle
-    s990 = s966 * cos_front_right_knee_angle + s967 * sin_front_right_knee_angle
+    s981 = s957 * cos_front_right_knee_angle + s958 * sin_front_right_knee_angle
+    s983 = s959 * cos_front_right_knee_angle + s960 * sin_front_right_knee_angle
+    s985 = s961 * cos_front_right_knee_angle + s962 * sin_front_right_knee_angle
     cos_hind_left_knee_angle = cos(hind_left_knee_angle)
     sin_hind_left_knee_angle = sin(hind_left_knee_angle)
-    s992 = s968 * cos_hind_left_knee_angle + s969 * sin_hind_left_knee_angle
-    s994 = s970 * cos_hind_left_knee_angle + s971 * sin_hind_left_knee_angle
-    s996 = s972 * cos_hind_left_knee_angle + s973 * sin_hind_left_knee_angle
+    s987 = s963 * cos_hind_left_knee_angle + s964 * sin_hind_left_knee_angle
+    s989 = s965 * cos_hind_left_knee_angle + s966 * sin_hind_left_knee_angle
+    s991 = s967 * cos_hind_left_knee_angle + s968 * sin_hind_left_knee_angle
     cos_hind_right_knee_angle = cos(hind_right_knee_angle)
     sin_hind_right_knee_angle = sin(hind_right_knee_angle)
-    s998 = s974 * cos_hind_right_knee_angle + s975 * sin_hind_right_knee_angle
-    s1000 = s976 * cos_hind_right_knee_angle + s977 * sin_hind_right_knee_angle
-    s1002 = s978 * cos_hind_right_knee_angle + s979 * sin_hind_right_knee_angle
-    s1016 = x_hip * s15
-    s1017 = y_hip * s16
-    s1018 = s1016 + s1017
-    s1019 = x_hip * s18
-    s1020 = y_hip * s19
-    s1021 = s1019 + s1020
-    s1022 = x_hip * s21
-    s1023 = y_hip * s22
-    s1024 = s1022 + s1023
-    s5285 = trunk_x + s1018
-    s5286 = trunk_y + s1021
-    s5269 = trunk_z + s1024
-    s5287 = trunk_x + (s1016 - s1017)
-    s5288 = trunk_y + (s1019 - s1020)
-    s5270 = trunk_z + (s1022 - s1023)
-    s5289 = trunk_x + (s1017 - s1016)
-    s5290 = trunk_y + (s1020 - s1019)
-    s5271 = trunk_z + (s1023 - s1022)
-    s5291 = trunk_x - s1018
-    s5292 = trunk_y - s1021
-    s5272 = trunk_z - s1024
-    s5293 = k2 * s932 + s5285
-    s5294 = k2 * s934 + s5286
-    s5273 = k2 * s936 + s5269
-    s5295 = k3 * s938 + s5287
-    s5296 = k3 * s940 + s5288
-    s5274 = k3 * s942 + s5270
-    s5297 = k2 * s944 + s5289
-    s5298 = k2 * s946 + s5290
-    s5275 = k2 * s948 + s5271
-    s5299 = k3 * s950 + s5291
-    s5300 = k3 * s952 + s5292
-    s5276 = k3 * s954 + s5272
+    s993 = s969 * cos_hind_right_knee_angle + s970 * sin_hind_right_knee_angle
+    s995 = s971 * cos_hind_right_knee_angle + s972 * sin_hind_right_knee_angle
+    s997 = s973 * cos_hind_right_knee_angle + s974 * sin_hind_right_knee_angle
+    s1011 = x_hip * s15
+    s1012 = y_hip * s16
+    s1013 = s1011 + s1012
+    s1014 = x_hip * s18
+    s1015 = y_hip * s19
+    s1016 = s1014 + s1015
+    s1017 = x_hip * s21
+    s1018 = y_hip * s22
+    s1019 = s1017 + s1018
+    s5280 = trunk_x + s1013
+    s5281 = trunk_y + s1016
+    s5264 = trunk_z + s1019
+    s5282 = trunk_x + (s1011 - s1012)
+    s5283 = trunk_y + (s1014 - s1015)
+    s5265 = trunk_z + (s1017 - s1018)
+    s5284 = trunk_x + (s1012 - s1011)
+    s5285 = trunk_y + (s1015 - s1014)
+    s5266 = trunk_z + (s1018 - s1017)
+    s5286 = trunk_x - s1013
+    s5287 = trunk_y - s1016
+    s5267 = trunk_z - s1019
+    s5288 = k2 * s927 + s5280
+    s5289 = k2 * s929 + s5281
+    s5268 = k2 * s931 + s5264
+    s5290 = k3 * s933 + s5282
+    s5291 = k3 * s935 + s5283
+    s5269 = k3 * s937 + s5265
+    s5292 = k2 * s939 + s5284
+    s5293 = k2 * s941 + s5285
+    s5270 = k2 * s943 + s5266
+    s5294 = k3 * s945 + s5286
+    s5295 = k3 * s947 + s5287
+    s5271 = k3 * s949 + s5267
     return (
         s15,
         s16,
@@ -8937,149 +8917,149 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         s23,
         trunk_z,
         s15,
+        s927,
+        s928,
+        s5280 + c_hip * s927,
+        s18,
+        s929,
+        s930,
+        s5281 + c_hip * s929,
+        s21,
+        s931,
         s932,
+        s5264 + c_hip * s931,
+        s15,
         s933,
-        s5285 + c_hip * s932,
-        s18,
         s934,
+        s5282 - c_hip * s933,
+        s18,
         s935,
-        s5286 + c_hip * s934,
-        s21,
         s936,
+        s5283 - c_hip * s935,
+        s21,
         s937,
-        s5269 + c_hip * s936,
-        s15,
         s938,
+        s5265 - c_hip * s937,
+        s15,
         s939,
-        s5287 - c_hip * s938,
-        s18,
         s940,
+        s5284 + c_hip * s939,
+        s18,
         s941,
-        s5288 - c_hip * s940,
-        s21,
         s942,
+        s5285 + c_hip * s941,
+        s21,
         s943,
-        s5270 - c_hip * s942,
-        s15,
         s944,
+        s5266 + c_hip * s943,
+        s15,
         s945,
-        s5289 + c_hip * s944,
-        s18,
         s946,
+        s5286 - c_hip * s945,
+        s18,
         s947,
-        s5290 + c_hip * s946,
-        s21,
         s948,
+        s5287 - c_hip * s947,
+        s21,
         s949,
-        s5271 + c_hip * s948,
-        s15,
         s950,
+        s5267 - c_hip * s949,
+        s952,
+        s927,
         s951,
-        s5291 - c_hip * s950,
-        s18,
-        s952,
+        s5288 + (y_thigh * s927 - c_thigh * s951),
+        s954,
+        s929,
         s953,
-        s5292 - c_hip * s952,
-        s21,
-        s954,
-        s955,
-        s5272 - c_hip * s954,
-        s957,
-        s932,
+        s5289 + (y_thigh * s929 - c_thigh * s953),
         s956,
-        s5293 + (y_thigh * s932 - c_thigh * s956),
-        s959,
-        s934,
+        s931,
+        s955,
+        s5268 + (y_thigh * s931 - c_thigh * s955),
         s958,
-        s5294 + (y_thigh * s934 - c_thigh * s958),
-        s961,
-        s936,
+        s933,
+        s957,
+        s5290 - (y_thigh * s933 + c_thigh * s957),
         s960,
-        s5273 + (y_thigh * s936 - c_thigh * s960),
-        s963,
-        s938,
+        s935,
+        s959,
+        s5291 - (y_thigh * s935 + c_thigh * s959),
         s962,
-        s5295 - (y_thigh * s938 + c_thigh * s962),
-        s965,
-        s940,
+        s937,
+        s961,
+        s5269 - (y_thigh * s937 + c_thigh * s961),
         s964,
-        s5296 - (y_thigh * s940 + c_thigh * s964),
-        s967,
-        s942,
+        s939,
+        s963,
+        s5292 + (y_thigh * s939 - c_thigh * s963),
         s966,
-        s5274 - (y_thigh * s942 + c_thigh * s966),
-        s969,
-        s944,
+        s941,
+        s965,
+        s5293 + (y_thigh * s941 - c_thigh * s965),
         s968,
-        s5297 + (y_thigh * s944 - c_thigh * s968),
-        s971,
-        s946,
+        s943,
+        s967,
+        s5270 + (y_thigh * s943 - c_thigh * s967),
         s970,
-        s5298 + (y_thigh * s946 - c_thigh * s970),
-        s973,
-        s948,
+        s945,
+        s969,
+        s5294 - (y_thigh * s945 + c_thigh * s969),
         s972,
-        s5275 + (y_thigh * s948 - c_thigh * s972),
-        s975,
-        s950,
+        s947,
+        s971,
+        s5295 - (y_thigh * s947 + c_thigh * s971),
         s974,
-        s5299 - (y_thigh * s950 + c_thigh * s974),
+        s949,
+        s973,
+        s5271 - (y_thigh * s949 + c_thigh * s973),
+        s952 * cos_front_left_knee_angle - s951 * sin_front_left_knee_angle,
+        s927,
+        s975,
+        k4 * s951 + s5288 - c_shank * s975,
+        s954 * cos_front_left_knee_angle - s953 * sin_front_left_knee_angle,
+        s929,
         s977,
-        s952,
-        s976,
-        s5300 - (y_thigh * s952 + c_thigh * s976),
+        k4 * s953 + s5289 - c_shank * s977,
+        s956 * cos_front_left_knee_angle - s955 * sin_front_left_knee_angle,
+        s931,
         s979,
-        s954,
-        s978,
-        s5276 - (y_thigh * s954 + c_thigh * s978),
-        s957 * cos_front_left_knee_angle - s956 * sin_front_left_knee_angle,
-        s932,
-        s980,
-        k4 * s956 + s5293 - c_shank * s980,
-        s959 * cos_front_left_knee_angle - s958 * sin_front_left_knee_angle,
-        s934,
-        s982,
-        k4 * s958 + s5294 - c_shank * s982,
-        s961 * cos_front_left_knee_angle - s960 * sin_front_left_knee_angle,
-        s936,
-        s984,
-        k4 * s960 + s5273 - c_shank * s984,
-        s963 * cos_front_right_knee_angle - s962 * sin_front_right_knee_angle,
-        s938,
-        s986,
-        k4 * s962 + s5295 - c_shank * s986,
-        s965 * cos_front_right_knee_angle - s964 * sin_front_right_knee_angle,
-        s940,
-        s988,
-        k4 * s964 + s5296 - c_shank * s988,
-        s967 * cos_front_right_knee_angle - s966 * sin_front_right_knee_angle,
-        s942,
-        s990,
-        k4 * s966 + s5274 - c_shank * s990,
-        s969 * cos_hind_left_knee_angle - s968 * sin_hind_left_knee_angle,
-        s944,
-        s992,
-        k4 * s968 + s5297 - c_shank * s992,
-        s971 * cos_hind_left_knee_angle - s970 * sin_hind_left_knee_angle,
-        s946,
-        s994,
-        k4 * s970 + s5298 - c_shank * s994,
-        s973 * cos_hind_left_knee_angle - s972 * sin_hind_left_knee_angle,
-        s948,
-        s996,
-        k4 * s972 + s5275 - c_shank * s996,
-        s975 * cos_hind_right_knee_angle - s974 * sin_hind_right_knee_angle,
-        s950,
-        s998,
-        k4 * s974 + s5299 - c_shank * s998,
-        s977 * cos_hind_right_knee_angle - s976 * sin_hind_right_knee_angle,
-        s952,
-        s1000,
-        k4 * s976 + s5300 - c_shank * s1000,
-        s979 * cos_hind_right_knee_angle - s978 * sin_hind_right_knee_angle,
-        s954,
-        s1002,
-        k4 * s978 + s5276 - c_shank * s1002,
+        k4 * s955 + s5268 - c_shank * s979,
+        s958 * cos_front_right_knee_angle - s957 * sin_front_right_knee_angle,
+        s933,
+        s981,
+        k4 * s957 + s5290 - c_shank * s981,
+        s960 * cos_front_right_knee_angle - s959 * sin_front_right_knee_angle,
+        s935,
+        s983,
+        k4 * s959 + s5291 - c_shank * s983,
+        s962 * cos_front_right_knee_angle - s961 * sin_front_right_knee_angle,
+        s937,
+        s985,
+        k4 * s961 + s5269 - c_shank * s985,
+        s964 * cos_hind_left_knee_angle - s963 * sin_hind_left_knee_angle,
+        s939,
+        s987,
+        k4 * s963 + s5292 - c_shank * s987,
+        s966 * cos_hind_left_knee_angle - s965 * sin_hind_left_knee_angle,
+        s941,
+        s989,
+        k4 * s965 + s5293 - c_shank * s989,
+        s968 * cos_hind_left_knee_angle - s967 * sin_hind_left_knee_angle,
+        s943,
+        s991,
+        k4 * s967 + s5270 - c_shank * s991,
+        s970 * cos_hind_right_knee_angle - s969 * sin_hind_right_knee_angle,
+        s945,
+        s993,
+        k4 * s969 + s5294 - c_shank * s993,
+        s972 * cos_hind_right_knee_angle - s971 * sin_hind_right_knee_angle,
+        s947,
+        s995,
+        k4 * s971 + s5295 - c_shank * s995,
+        s974 * cos_hind_right_knee_angle - s973 * sin_hind_right_knee_angle,
+        s949,
+        s997,
+        k4 * s973 + s5271 - c_shank * s997,
     )
 
 

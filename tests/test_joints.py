@@ -645,7 +645,7 @@ def upright(tree: SpatialTree) -> str:
     return "\n".join((head, *tables))
 
 
-@pytest.mark.parametrize("seed", [*range(12), 60, 379])
+@pytest.mark.parametrize("seed", [*range(9), 60, 379])
 def test_the_plane_is_a_part_of_space(route: str, seed: int) -> None:
     """A planar scene stood upright in space: the same motion, forces, energies."""
     tree, text = random_spatial_tree(seed, PLANE, 5)
@@ -687,7 +687,7 @@ def test_the_plane_does_not_pay_for_space(route: str, name: str) -> None:
 def test_the_plane_is_cheaper_than_space(route: str) -> None:
     """Pins and free bodies take fewer operations in the plane than upright in space."""
     paid = []
-    for seed in range(30):
+    for seed in range(24):
         tree, text = random_spatial_tree(seed, PLANE, 5)
         if all(b.joint.kind in ("revolute", "free", "weld") for b in tree.bodies):
             costs = [load(t, route).COST["derivative"]["total"] for t in (text, upright(tree))]

@@ -310,8 +310,8 @@ def test_columns_are_one_by_one(dimensions: int, seed: int, route: str) -> None:
 
 # In 60 digits.
 
-FEW = range(20, 26)
-CLOSED = [(seed, 4) for seed in (4, 9, 15, 22, 27, 36, 38)] + [(13, 5), (20, 5)]
+FEW = range(20, 25)
+CLOSED = [(seed, 4) for seed in (4, 9, 15, 22, 27, 36)] + [(13, 5), (20, 5)]
 OUTPUTS = (
     "derivative mass_matrix velocity_force gravity_force bias_force applied_force kinetic_energy "
     "potential_energy momentum centre_of_mass joint_forces body_poses body_velocities "

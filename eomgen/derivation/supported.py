@@ -6,21 +6,25 @@ from eomgen.model import Model, off_centre
 
 MOST_BODIES = 12
 """Bodies of one tree of pins in the plane; twelve take about a minute, one more a third more."""
-MOST_GENERAL_BODIES = 6
-"""Bodies of any other model; six take up to ten seconds."""
+MOST_GENERAL_BODIES, MOST_GENERAL_VELOCITIES = 6, 15
+"""Of any other model: six pins in space take two seconds, five ball joints some twenty."""
 FEW_BODIES, FEW_VELOCITIES = 3, 3
 """Up to so many the closed form takes about a second, and is worth a try."""
 
 
 def why_not_closed(model: Model) -> str:
     """What keeps a model from route `closed`, in a few words; "" if nothing does."""
-    why_not = why_not_pins(model)
-    if not why_not or len(model.bodies) <= MOST_GENERAL_BODIES:
+    if not why_not_pins(model):
         return ""
-    return (
-        f"it is for {MOST_GENERAL_BODIES} bodies at most, or {MOST_BODIES} in a tree of pins and "
-        "free bodies in the plane"
-    )
+    if len(model.bodies) > MOST_GENERAL_BODIES:
+        return (
+            f"it is for {MOST_GENERAL_BODIES} bodies at most, or {MOST_BODIES} in a tree of pins "
+            "and free bodies in the plane"
+        )
+    size = len(model.velocities)
+    if size > MOST_GENERAL_VELOCITIES:
+        return f"it is for {MOST_GENERAL_VELOCITIES} velocities at most, and there are {size}"
+    return ""
 
 
 def why_not_tried(model: Model) -> str:

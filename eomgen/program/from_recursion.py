@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from eomgen.derivation.recursive import observe
 from eomgen.derivation.recursive.composite import full, solved
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.reactions import reactions
 from eomgen.derivation.recursive.sensitivity import sensitivity
 from eomgen.derivation.recursive.vectors import Vec, sub, zeros
@@ -26,11 +27,16 @@ Forward = Callable[[Sequence[Node] | None], list[Node]]
 class Recording:
     """A model's dynamics on a tape by a route, and the nodes that are given to it.
 
-    v̇ comes from the recursion of the route, `aba` or `ldl`, or from what `forward` makes.
+    v̇ comes from the recursion of the route, `aba` or `ldl`, or from what `forward` makes. `axes`
+    are those that the recursion works in, if not the usual ones.
     """
 
     def __init__(
-        self, model: Model, route: str, forward: Callable[["Recording"], Forward] | None = None
+        self,
+        model: Model,
+        route: str,
+        forward: Callable[["Recording"], Forward] | None = None,
+        axes: Axes | None = None,
     ) -> None:
         self.model = model
         self.route = route
@@ -41,7 +47,7 @@ class Recording:
         self.v = [self.given(c.name, Stage.VELOCITIES) for c in model.velocities]
         self.inputs = {i.name: self.given(i.name, Stage.INPUTS) for i in model.inputs}
         values = Values(self.parameters, self.inputs, self.q, self.v)
-        self.dynamics = Dynamics(model, values, self.scalars)
+        self.dynamics = Dynamics(model, values, self.scalars, axes)
         recursions = {
             "aba": self.dynamics.articulated_forward,
             "ldl": self.dynamics.factored_forward,
@@ -222,6 +228,7 @@ def along_directions(
 
 
 def variables(record: Recording, name: str) -> list[Node]:
+    """What a matrix of derivatives is taken by: state, inputs or parameters."""
     return {
         "jacobian": [*record.q, *record.v],
         "input_jacobian": list(record.inputs.values()),

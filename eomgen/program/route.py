@@ -55,7 +55,7 @@ def routed(model: Model) -> Routed:
         words = "named" if model.route == "closed" else f"form '{model.form}' comes from it alone"
         return _taken(_closed(model), words)
     if model.route != "auto":
-        return _taken(from_recursion(Recording(model, model.route)), "named")
+        return _taken(from_recursion(recorded(model, model.route)), "named")
     candidates = []
     closed: System | None = None
     if why_not:
@@ -65,19 +65,36 @@ def routed(model: Model) -> Routed:
     else:
         closed = _closed(model)
         candidates.append(_candidate("closed", _operations(closed)))
-    records = {"aba": Recording(model, "aba")}
-    aba, least = _recorded(records["aba"]), least_factoring(model)
+    records = {"aba": recorded(model, "aba")}
+    aba, least = _operations_of(records["aba"]), least_factoring(model)
     candidates.append(_candidate("aba", aba))
     if least > aba:
         words = f"not tried: factoring alone takes {least} operations"
         candidates.append(Candidate("ldl", None, words))
     else:
-        records["ldl"] = Recording(model, "ldl")
-        candidates.append(_candidate("ldl", _recorded(records["ldl"])))
+        records["ldl"] = recorded(model, "ldl")
+        candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
     tried = [c for c in candidates if c.operations is not None]
     best = min(tried, key=lambda c: c.operations or 0)
     system = closed if closed and best.route == "closed" else from_recursion(records[best.route])
     return Routed(system, tuple(candidates))
+
+
+def recorded(model: Model, route: str) -> Recording:
+    """A model on a tape by `aba` or `ldl`, in the axes that take the fewest operations.
+
+    In the plane those are the world's, in which angles add up, unless bodies that turn carry
+    slides; in space they are the frames' own.
+    """
+    record = Recording(model, route)
+    if model.dimensions == 2 and any(
+        move.kind == "slide"
+        for body in model.bodies
+        if body.parent >= 0
+        for move in body.joint.moves(2)
+    ):
+        return min(record, Recording(model, route, axes="own"), key=_operations_of)
+    return record
 
 
 def least_factoring(model: Model) -> int:
@@ -119,7 +136,7 @@ def _operations(system: System) -> int:
     return cost(system.program, "derivative")["total"]
 
 
-def _recorded(record: Recording) -> int:
+def _operations_of(record: Recording) -> int:
     rates = record.rates
     outputs = {"derivative": Output((len(rates),), tuple(node.index for node in rates))}
     return cost(finish(record.tape, outputs, ()), "derivative")["total"]

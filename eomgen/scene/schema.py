@@ -1,6 +1,6 @@
 """The scene: every table and key of the language, as data."""
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, Strict
 
@@ -63,6 +63,16 @@ class ParameterTable(Table):
     about: Text = ""
 
 
+Inertia = Quantity | Annotated[tuple[Quantity, ...], Field(min_length=3, max_length=6)]
+"""A number in the plane, 3 or 6 entries of a matrix in space."""
+
+
+def inertia() -> Any:
+    """A field that holds the inertia of a body."""
+    about = "moment of inertia about the centre of mass"
+    return quantity("kg m^2", about, "nonnegative", union_mode="left_to_right")
+
+
 class BodyTable(Table):
     """A rigid body; a particle has `inertia_com = 0`.
 
@@ -72,14 +82,7 @@ class BodyTable(Table):
 
     name: Identifier
     mass: Quantity = quantity("kg", "mass", "nonnegative")
-    inertia_com: Quantity | Annotated[tuple[Quantity, ...], Field(min_length=3, max_length=6)] = (
-        quantity(
-            "kg m^2",
-            "moment of inertia about the centre of mass",
-            "nonnegative",
-            union_mode="left_to_right",
-        )
-    )
+    inertia_com: Inertia = inertia()
     shapes: tuple[Shape, ...] = ()
 
 
@@ -94,14 +97,7 @@ class ChainTable(Table):
     count: Annotated[int, Strict(), Field(ge=1, le=MOST)]
     parent: Identifier = "world"
     mass: Quantity = quantity("kg", "mass", "nonnegative")
-    inertia_com: Quantity | Annotated[tuple[Quantity, ...], Field(min_length=3, max_length=6)] = (
-        quantity(
-            "kg m^2",
-            "moment of inertia about the centre of mass",
-            "nonnegative",
-            union_mode="left_to_right",
-        )
-    )
+    inertia_com: Inertia = inertia()
     start: Vector = quantity("m", "first pin on the parent", default=(), validate_default=False)
     r_parent: Vector = quantity("m", "pin on the link before")
     r_child: Vector = quantity("m", "pin on the link itself")

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from eomgen.derivation.recursive.forces import Force, at_parent
-from eomgen.derivation.recursive.frames import Rigid
+from eomgen.derivation.recursive.frames import Rigid, joined
 from eomgen.derivation.recursive.instant import Instant, Link
 from eomgen.derivation.recursive.vectors import (
     Scalar,
@@ -13,7 +13,6 @@ from eomgen.derivation.recursive.vectors import (
     add,
     cross,
     dot,
-    plus,
     scale,
     symmetric,
     times,
@@ -29,12 +28,8 @@ def composite_bodies(instant: Instant, scalars: Scalars) -> tuple[Rigid, ...]:
     for k in reversed(range(len(sums))):
         link = instant.links[k]
         if link.parent >= 0:
-            sums[link.parent] = _joined(sums[link.parent], _at_parent(link, sums[k], scalars))
+            sums[link.parent] = joined(sums[link.parent], _at_parent(link, sums[k], scalars))
     return tuple(sums)
-
-
-def _joined(a: Rigid, b: Rigid) -> Rigid:
-    return Rigid(a.mass + b.mass, add(a.first, b.first), plus(a.inertia, b.inertia))
 
 
 def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:

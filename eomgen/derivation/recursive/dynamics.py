@@ -24,7 +24,7 @@ from eomgen.derivation.recursive.instant import Axes, Instant, at_instant
 from eomgen.derivation.recursive.linkage import make_linkage
 from eomgen.derivation.recursive.motion import (
     Acceleration,
-    Velocity,
+    Twist,
     accelerations,
     kinetic_energy,
     velocities,
@@ -33,6 +33,7 @@ from eomgen.derivation.recursive.observe import Places, places, position
 from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, sub, zeros
 from eomgen.effects import Gravity
 from eomgen.effects.base import JointLoad
+from eomgen.joints import Free
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model import Model
 
@@ -118,7 +119,7 @@ class Dynamics:
         return angle + self.scalars.number(mount.angle)
 
     @cached_property
-    def moving(self) -> tuple[Velocity, ...]:
+    def moving(self) -> tuple[Twist, ...]:
         """Velocities of the frames."""
         return velocities(self.instant, self.values.v, self.scalars)
 
@@ -144,7 +145,7 @@ class Dynamics:
 
     def motion_in_world(
         self, vd: Sequence[Scalar]
-    ) -> tuple[tuple[Velocity, ...], tuple[Acceleration, ...]]:
+    ) -> tuple[tuple[Twist, ...], tuple[Acceleration, ...]]:
         """Velocities and accelerations of the frames at v̇, in world axes."""
         v, base = self.values.v, sub(zeros(self.scalars), self.down)
         moving = velocities(self.in_world, v, self.scalars)
@@ -220,23 +221,43 @@ class Dynamics:
 
     def articulated_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """v̇ under the effects and forces `tau` beside them, by articulated bodies."""
-        inertial = fc.inertial(self.instant, self.accelerating(None), self.scalars)
-        forces = [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
         driven = self._driven(tau)
-        return self._named(respond(self.instant, self.articulated, forces, driven, self.scalars))
+        found = respond(self.instant, self.articulated, self._at_rest, driven, self.scalars)
+        return self._fallen(found)
 
     def factored_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by LᵀDL factors of the mass matrix."""
-        inertial = fc.inertial(self.instant, self.accelerating(None), self.scalars)
-        forces = [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
-        carried = fc.carried(self.instant, forces)
+        carried = fc.carried(self.instant, self._at_rest)
         bias = fc.generalised(self.instant, carried, self.nv)
-        driven = self._driven(tau)
-        right = [a - b for a, b in zip(driven, bias, strict=True)]
-        return self._named(solved(self.factors, right))
+        right = [a - b for a, b in zip(self._driven(tau), bias, strict=True)]
+        return self._fallen(solved(self.factors, right))
 
-    def _named(self, vd: Sequence[Scalar]) -> list[Scalar]:
-        rates = zip(vd, self.model.velocities, strict=True)
+    @cached_property
+    def _free_roots(self) -> list[int]:
+        """Of each body that nothing holds the index of its first velocity."""
+        starts = zip(self.model.bodies, self.model.first_velocity, strict=True)
+        return [i for body, i in starts if isinstance(body.joint, Free)]
+
+    @cached_property
+    def _at_rest(self) -> list[fc.Force]:
+        """The wrenches that would keep the velocities as they are, but for the fall of trees that
+        nothing holds: their weight changes nothing else, and is put in at the end.
+        """
+        falling = [k for k, link in enumerate(self.instant.links) if link.v[0] in self._free_roots]
+        base = sub(zeros(self.scalars), self.down)
+        moving = accelerations(
+            self.instant, self.moving, self.values.v, None, base, self.scalars, falling
+        )
+        inertial = fc.inertial(self.instant, moving, self.scalars)
+        return [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
+
+    def _fallen(self, vd: Sequence[Scalar]) -> list[Scalar]:
+        """v̇ with the fall of free trees, and with its names."""
+        found = list(vd)
+        for i in self._free_roots:
+            for axis in range(self.dimensions):
+                found[i + axis] = found[i + axis] + self.down[axis]
+        rates = zip(found, self.model.velocities, strict=True)
         return [self.scalars.named(x, c.acceleration) for x, c in rates]
 
     def _driven(self, tau: Sequence[Scalar] | None) -> list[Scalar]:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.derivation.recursive.vectors import Scalar, Symmetric, Vec
+from eomgen.derivation.recursive.vectors import Scalar, Symmetric, Vec, add, plus
 
 Array = NDArray[np.float64]
 
@@ -19,6 +19,11 @@ class Rigid:
     mass: Scalar
     first: Vec
     inertia: Symmetric
+
+
+def joined(a: Rigid, b: Rigid) -> Rigid:
+    """Two bodies about the same origin as one."""
+    return Rigid(a.mass + b.mass, add(a.first, b.first), plus(a.inertia, b.inertia))
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from eomgen.derivation.recursive.frames import (
     Linkage,
     Mount,
     Rigid,
+    joined,
     turn_matrix,
     turn_of,
 )
@@ -52,7 +53,7 @@ def make_linkage(model: Model, parameters: Mapping[str, Scalar], scalars: Scalar
     rigids = [_nothing(scalars)] * len(frames)
     for mount in mounts:
         if mount.frame >= 0:
-            rigids[mount.frame] = _joined(rigids[mount.frame], _about_origin(mount, model, scalars))
+            rigids[mount.frame] = joined(rigids[mount.frame], _about_origin(mount, model, scalars))
     finished = (
         replace(frame, rigid=_named(rigid, frame.name, scalars))
         for frame, rigid in zip(frames, rigids, strict=True)
@@ -156,10 +157,6 @@ def _about_origin(mount: Mount, model: Model, scalars: Scalars) -> Rigid:
     )
     turned = congruent(constant(mount.axes, scalars), mount.inertia)
     return Rigid(m, first, plus(turned, moved))
-
-
-def _joined(a: Rigid, b: Rigid) -> Rigid:
-    return Rigid(a.mass + b.mass, add(a.first, b.first), plus(a.inertia, b.inertia))
 
 
 def _named(rigid: Rigid, name: str, scalars: Scalars) -> Rigid:

@@ -1,6 +1,6 @@
 """Velocities and accelerations from the world outwards (Featherstone 2008, table 5.1)."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from eomgen.derivation.recursive.instant import Instant, Link
@@ -20,8 +20,8 @@ from eomgen.derivation.recursive.vectors import (
 
 
 @dataclass(frozen=True)
-class Velocity:
-    """Of a frame, in its link's axes: angular velocity, and velocity of its origin."""
+class Twist:
+    """A motion in a link's axes: angular part, and linear part at the link's origin."""
 
     angular: Vec
     linear: Vec
@@ -41,9 +41,9 @@ class Acceleration:
     spread: Vec
 
 
-def velocities(instant: Instant, v: Sequence[Scalar], scalars: Scalars) -> tuple[Velocity, ...]:
+def velocities(instant: Instant, v: Sequence[Scalar], scalars: Scalars) -> tuple[Twist, ...]:
     """The velocity of every frame."""
-    found: list[Velocity] = []
+    found: list[Twist] = []
     for link in instant.links:
         angular, linear = zeros(scalars), zeros(scalars)
         if link.parent >= 0:
@@ -53,7 +53,7 @@ def velocities(instant: Instant, v: Sequence[Scalar], scalars: Scalars) -> tuple
         own_angular, own_linear = own_motion(link, v, scalars)
         angular = named(add(angular, own_angular), f"omega_{link.name}", scalars)
         linear = named(add(linear, own_linear), f"velocity_{link.name}", scalars)
-        found.append(Velocity(angular, linear))
+        found.append(Twist(angular, linear))
     return tuple(found)
 
 
@@ -71,16 +71,17 @@ def own_motion(link: Link, rates: Sequence[Scalar], scalars: Scalars) -> tuple[V
 
 def accelerations(
     instant: Instant,
-    moving: Sequence[Velocity],
+    moving: Sequence[Twist],
     v: Sequence[Scalar],
     vd: Sequence[Scalar] | None,
     base: Vec,
     scalars: Scalars,
+    falling: Collection[int] = (),
 ) -> tuple[Acceleration, ...]:
     """The acceleration of every frame if the velocities change at `vd` (None: not at all).
 
     `base` is the world's acceleration, in world axes: uniform gravity g acts like a world that
-    accelerates by -g.
+    accelerates by -g. The frames `falling`, which the world carries, do not feel it.
     """
     found: list[Acceleration] = []
     two = scalars.number(2.0)
@@ -91,7 +92,9 @@ def accelerations(
             linear = link.turn.into(add(parent.linear, times(parent.field, link.arm)))
             spin = link.turn.into(moving[link.parent].angular)
         else:
-            angular, linear, spin = zeros(scalars), link.turn.into(base), zeros(scalars)
+            angular, linear, spin = zeros(scalars), zeros(scalars), zeros(scalars)
+            if k not in falling:
+                linear = link.turn.into(base)
         own_angular, own_linear = own_motion(link, v, scalars)
         # The axes of motion turn with the parent; a slide feels twice that (Coriolis).
         angular = add(angular, cross(spin, own_angular))
@@ -146,7 +149,7 @@ def _moment(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
 
 
 def kinetic_energy(
-    instant: Instant, moving: Sequence[Velocity], v: Sequence[Scalar], scalars: Scalars
+    instant: Instant, moving: Sequence[Twist], v: Sequence[Scalar], scalars: Scalars
 ) -> Scalar:
     """Σ ½ m |v|² + v · (ω x h) + ½ ω · J ω, and ½ A q̇² of the motors' rotors."""
     half, twice = scalars.number(0.5), scalars.number(0.0)
@@ -160,7 +163,7 @@ def kinetic_energy(
     return half * twice + energy
 
 
-def momentum_of(link: Link, motion: Velocity) -> tuple[Vec, Vec]:
+def momentum_of(link: Link, motion: Twist) -> tuple[Vec, Vec]:
     """Angular momentum about the link's origin, and momentum."""
     rigid = link.rigid
     momentum = add(scale(rigid.mass, motion.linear), cross(motion.angular, rigid.first))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from eomgen.derivation.recursive.frames import Linkage
 from eomgen.derivation.recursive.instant import Instant
-from eomgen.derivation.recursive.motion import Velocity, momentum_of
+from eomgen.derivation.recursive.motion import Twist, momentum_of
 from eomgen.derivation.recursive.vectors import (
     Mat,
     Scalars,
@@ -60,7 +60,7 @@ def position(
 def velocity(
     linkage: Linkage,
     instant: Instant,
-    moving: Sequence[Velocity],
+    moving: Sequence[Twist],
     body: int,
     at: Vec,
     scalars: Scalars,
@@ -85,7 +85,7 @@ def centre_of_mass(linkage: Linkage, instant: Instant, where: Places, scalars: S
 
 
 def momentum(
-    instant: Instant, where: Places, moving: Sequence[Velocity], scalars: Scalars
+    instant: Instant, where: Places, moving: Sequence[Twist], scalars: Scalars
 ) -> tuple[Vec, Vec]:
     """Momentum, and angular momentum about the world's origin, in world axes."""
     linear, angular = zeros(scalars), zeros(scalars)

@@ -25,7 +25,7 @@ from eomgen.derivation.recursive.composite import Entries, composite_bodies, for
 from eomgen.derivation.recursive.forces import Force, at_parent, carried, inertial, total
 from eomgen.derivation.recursive.frames import Rigid
 from eomgen.derivation.recursive.instant import Instant, Link
-from eomgen.derivation.recursive.motion import Acceleration, Velocity, momentum_of
+from eomgen.derivation.recursive.motion import Acceleration, Twist, momentum_of
 from eomgen.derivation.recursive.vectors import (
     AXES,
     Mat,
@@ -48,22 +48,13 @@ from eomgen.derivation.recursive.vectors import (
 
 
 @dataclass(frozen=True)
-class Twist:
-    """A motion at a frame's origin: angular and linear part."""
-
-    angular: Vec
-    linear: Vec
-
-
-@dataclass(frozen=True)
 class Sensitivity:
     """Matrices of nv x nv, entries that are not zero by the tree's shape.
 
-    `mass` at and below the diagonal; `by_position` ∂τ/∂q, where q of a spin is the small angle in
-    its own axes; `by_velocity` ∂τ/∂v.
+    `by_position` is ∂τ/∂q, where q of a spin is the small angle in its own axes, `by_velocity`
+    ∂τ/∂v.
     """
 
-    mass: Entries
     by_position: Entries
     by_velocity: Entries
 
@@ -80,7 +71,7 @@ class _Column:
 
 def sensitivity(
     instant: Instant,
-    moving: Sequence[Velocity],
+    moving: Sequence[Twist],
     accelerating: Sequence[Acceleration],
     base: Vec,
     scalars: Scalars,
@@ -95,7 +86,6 @@ def sensitivity(
     forces = carried(instant, inertial(instant, accelerating, scalars))
     drags = _composite_drags(instant, moving, scalars)
     columns = [_columns(instant, k, moving, accelerating, base, scalars) for k in range(len(links))]
-    mass: dict[tuple[int, int], Scalar] = {}
     by_q: dict[tuple[int, int], Scalar] = {}
     by_v: dict[tuple[int, int], Scalar] = {}
     for k, link in enumerate(links):
@@ -111,8 +101,6 @@ def sensitivity(
             above = k
             while above >= 0:
                 for other, j in zip(columns[above], links[above].v, strict=True):
-                    if j <= i:
-                        mass[i, j] = _work(other.axis, reach)
                     by_q[i, j] = _work(other.second, reach) + dot(pull, other.first.angular)
                     by_v[i, j] = _work(other.both, reach) + dot(pull, other.axis.angular)
                     if above != k:
@@ -121,14 +109,13 @@ def sensitivity(
                 outer = links[above]
                 reach, turned, sped = (at_parent(outer, f) for f in (reach, turned, sped))
                 above = outer.parent
-            mass[i, i] = mass[i, i] + link.armature
-    return Sensitivity(mass, by_q, by_v)
+    return Sensitivity(by_q, by_v)
 
 
 def _columns(
     instant: Instant,
     k: int,
-    moving: Sequence[Velocity],
+    moving: Sequence[Twist],
     accelerating: Sequence[Acceleration],
     base: Vec,
     scalars: Scalars,
@@ -174,7 +161,7 @@ class _Drag:
         return add(times(transposed(self.matrix), w), cross(self.momentum, u))
 
 
-def _composite_drags(instant: Instant, moving: Sequence[Velocity], scalars: Scalars) -> list[_Drag]:
+def _composite_drags(instant: Instant, moving: Sequence[Twist], scalars: Scalars) -> list[_Drag]:
     two = scalars.number(2.0)
     found = []
     for link, motion in zip(instant.links, moving, strict=True):
