@@ -865,8 +865,8 @@ def test_a_tree_too_large_for_the_closed_form(
     scene.write_text('name = "swing"\nroute = "closed"\n' + CHAIN.replace("= 3", "= 13"))
     assert main(["generate", str(scene), "-o", str(scene.parent / "made")]) == 1
     assert capsys.readouterr().err == (
-        "eomgen: swing.toml: route: 'closed' needs the closed form, and it is for 6 bodies at most, "
-        "or 12 in a tree of pins and free bodies in the plane; leave it out\n"
+        "eomgen: swing.toml: route: 'closed' needs the closed form, and it is for 6 bodies at "
+        "most, or 12 in a tree of pins and free bodies in the plane; leave it out\n"
     )
 
 

@@ -51,7 +51,7 @@ def test_commands_exist(capsys: pytest.CaptureFixture[str]) -> None:
     known = capsys.readouterr().out
     for call in calls:
         words = shlex.split(call)[1:]
-        assert f"    {words[0]} " in known, call
+        assert re.search(rf"^    {words[0]}\b", known, re.MULTILINE), call
         with pytest.raises(SystemExit) as stop:
             main([*words, "--help"])
         assert stop.value.code == 0, call
