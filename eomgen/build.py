@@ -15,7 +15,7 @@ from eomgen.language.quantity import Parameter, name_quantities, with_components
 from eomgen.model import Body, Model, Point
 from eomgen.scene.chains import written_out
 from eomgen.scene.look import check_look
-from eomgen.scene.schema import OUTPUTS, SHOWN, Scene
+from eomgen.scene.schema import OUTPUTS, Scene
 from eomgen.straighten import checked_inertia, straightened_joint, unit_quaternions
 
 AnyTable = TypeVar("AnyTable", bound=Table)
@@ -35,7 +35,7 @@ def build_model(scene: Scene) -> Model:
     velocities = [c for body in bodies[0] for c in body.velocities]
     if not velocities:
         raise SceneError("joints: nothing can move; give at least one that is no weld")
-    inputs = [i for effect in effects for i in effect.inputs(scene.dimensions)]
+    inputs = _inputs(effects, bodies[0], scene.dimensions)
     _check_symbols(parameters, coordinates, velocities, inputs)
     check_look((), scene.camera, scene.dimensions, "camera")
     if scene.camera.follow is not None:
@@ -85,7 +85,19 @@ def outputs_for(
             raise SceneError(
                 f"{place.format(i)}: '{name}' is about {needs[name]}, and there are none"
             )
-    return tuple(name for name in OUTPUTS if name in (*wanted, *SHOWN))
+    return tuple(name for name in OUTPUTS if name in wanted)
+
+
+def _inputs(effects: Sequence[Effect], bodies: Sequence[Body], dimensions: int) -> list[Input]:
+    """All inputs in order; that of a motor at a sliding joint is a force."""
+    slides = {body.joint.name for body in bodies if isinstance(body.joint, Prismatic)}
+    inputs: list[Input] = []
+    for effect in effects:
+        for given in effect.inputs(dimensions):
+            if isinstance(effect, Motor) and effect.joint in slides:
+                given = Input(given.name, "N", f"motor force at {effect.joint}")
+            inputs.append(given)
+    return inputs
 
 
 def _scene_parameters(scene: Scene) -> tuple[list[Parameter], dict[str, float]]:

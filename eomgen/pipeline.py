@@ -33,7 +33,7 @@ def generate(model: Model) -> Generated:
     choice = routed(model)
     return Generated(
         python_module(choice.system),
-        javascript_poses(choice.system),
+        javascript_poses(choice.system) if "body_poses" in model.outputs else "",
         choice.system.reports,
         tuple(choice.explanation()),
     )

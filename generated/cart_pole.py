@@ -9,7 +9,7 @@ State y, in this order:
     theta_dot  rad/s  rate of theta
 
 Inputs u, each 0 unless given:
-    push  N m  motor torque at rail
+    push  N  motor force at rail
 
 Parameters p, with the scene's values:
     m_cart = 1.0    kg      mass of the cart
@@ -58,7 +58,7 @@ UNITS = {
     "theta": "rad",
     "x_dot": "m/s",
     "theta_dot": "rad/s",
-    "push": "N m",
+    "push": "N",
     "m_cart": "kg",
     "m_pole": "kg",
     "I_pole": "kg m^2",

@@ -221,9 +221,6 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 128, "sub": 123, "mul": 272, "div": 28, "sin": 10, "cos": 10, "total": 571, "parameters": 40},
     "jacobian": {"add": 888, "sub": 2116, "mul": 2974, "div": 273, "neg": 20, "sin": 10, "cos": 10, "total": 6291, "parameters": 49},
-    "kinetic_energy": {"add": 78, "sub": 1, "mul": 138, "sin": 10, "cos": 10, "total": 237, "parameters": 39},
-    "potential_energy": {"add": 25, "sub": 10, "mul": 29, "sin": 10, "total": 74, "parameters": 19},
-    "body_poses": {"add": 25, "sub": 18, "mul": 38, "neg": 2, "sin": 10, "cos": 10, "total": 103, "parameters": 9},
 }
 
 
@@ -308,25 +305,12 @@ def _constants(values):
     k26 = link_4_mass + k25
     k27 = link_3_mass + k26
     k28 = link_2_mass + k27
-    k30 = link_1_mass * gravity_g
     k19 = gravity_g * k20
     k29 = inertia_link_9_zz + inertia_link_10_zz
-    k31 = link_2_mass * gravity_g
-    k32 = link_3_mass * gravity_g
-    k33 = link_4_mass * gravity_g
-    k34 = link_5_mass * gravity_g
-    k35 = link_6_mass * gravity_g
-    k36 = link_7_mass * gravity_g
-    k37 = link_8_mass * gravity_g
-    k38 = link_9_mass * gravity_g
-    k39 = link_10_mass * gravity_g
     return {
         "initial_state": (),
         "derivative": (link_2_mass, link_3_mass, link_4_mass, link_5_mass, link_6_mass, link_7_mass, link_8_mass, link_9_mass, link_10_mass, gravity_g, k1, k2, k3, k4, k5, k6, k7, k8, k9, inertia_link_1_zz, k10, inertia_link_2_zz, k11, inertia_link_3_zz, k12, inertia_link_4_zz, k13, inertia_link_5_zz, k14, inertia_link_6_zz, k15, inertia_link_7_zz, k16, inertia_link_8_zz, k17, inertia_link_9_zz, k18, inertia_link_10_zz, k19),
         "jacobian": (link_2_mass, link_3_mass, link_4_mass, link_5_mass, link_6_mass, link_7_mass, link_8_mass, link_9_mass, link_10_mass, gravity_g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k20, inertia_link_1_zz, k10, inertia_link_2_zz, k11, inertia_link_3_zz, k12, inertia_link_4_zz, k13, inertia_link_5_zz, k14, inertia_link_6_zz, k15, inertia_link_7_zz, k16, inertia_link_8_zz, k17, inertia_link_9_zz, k18, inertia_link_10_zz, k21, k22, k23, k24, k25, k26, k27, k28, k19, k29),
-        "kinetic_energy": (link_2_mass, link_3_mass, link_4_mass, link_5_mass, link_6_mass, link_7_mass, link_8_mass, link_9_mass, link_10_mass, k1, k2, k3, k4, k5, k6, k7, k8, k9, inertia_link_1_zz, k10, inertia_link_2_zz, k11, inertia_link_3_zz, k12, inertia_link_4_zz, k13, inertia_link_5_zz, k14, inertia_link_6_zz, k15, inertia_link_7_zz, k16, inertia_link_8_zz, k17, inertia_link_9_zz, k18, inertia_link_10_zz),
-        "potential_energy": (link_joint_1_r_child_x, link_joint_2_r_child_x, link_joint_3_r_child_x, link_joint_4_r_child_x, link_joint_5_r_child_x, link_joint_6_r_child_x, link_joint_7_r_child_x, link_joint_8_r_child_x, link_joint_9_r_child_x, link_joint_10_r_child_x, k1, k2, k3, k4, k5, k6, k7, k8, k9, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39),
-        "body_poses": (link_joint_1_r_child_x, link_joint_2_r_child_x, link_joint_3_r_child_x, link_joint_4_r_child_x, link_joint_5_r_child_x, link_joint_6_r_child_x, link_joint_7_r_child_x, link_joint_8_r_child_x, link_joint_9_r_child_x, link_joint_10_r_child_x, k1, k2, k3, k4, k5, k6, k7, k8, k9),
     }
 
 
@@ -2364,205 +2348,6 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
-def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """237 operations: 78 add, 1 sub, 138 mul, 10 sin, 10 cos."""
-    link_2_mass, link_3_mass, link_4_mass, link_5_mass, link_6_mass, link_7_mass, link_8_mass, link_9_mass, link_10_mass, k1, k2, k3, k4, k5, k6, k7, k8, k9, inertia_link_1_zz, k10, inertia_link_2_zz, k11, inertia_link_3_zz, k12, inertia_link_4_zz, k13, inertia_link_5_zz, k14, inertia_link_6_zz, k15, inertia_link_7_zz, k16, inertia_link_8_zz, k17, inertia_link_9_zz, k18, inertia_link_10_zz = k
-    link_joint_1_angle, link_joint_2_angle, link_joint_3_angle, link_joint_4_angle, link_joint_5_angle, link_joint_6_angle, link_joint_7_angle, link_joint_8_angle, link_joint_9_angle, link_joint_10_angle, link_joint_1_angle_dot, link_joint_2_angle_dot, link_joint_3_angle_dot, link_joint_4_angle_dot, link_joint_5_angle_dot, link_joint_6_angle_dot, link_joint_7_angle_dot, link_joint_8_angle_dot, link_joint_9_angle_dot, link_joint_10_angle_dot = y
-    angle_link_2 = link_joint_1_angle + link_joint_2_angle
-    cos_angle_link_2 = cos(angle_link_2)
-    sin_angle_link_2 = sin(angle_link_2)
-    angle_link_3 = link_joint_3_angle + angle_link_2
-    cos_angle_link_3 = cos(angle_link_3)
-    sin_angle_link_3 = sin(angle_link_3)
-    angle_link_4 = link_joint_4_angle + angle_link_3
-    cos_angle_link_4 = cos(angle_link_4)
-    sin_angle_link_4 = sin(angle_link_4)
-    angle_link_5 = link_joint_5_angle + angle_link_4
-    cos_angle_link_5 = cos(angle_link_5)
-    sin_angle_link_5 = sin(angle_link_5)
-    angle_link_6 = link_joint_6_angle + angle_link_5
-    cos_angle_link_6 = cos(angle_link_6)
-    sin_angle_link_6 = sin(angle_link_6)
-    angle_link_7 = link_joint_7_angle + angle_link_6
-    cos_angle_link_7 = cos(angle_link_7)
-    sin_angle_link_7 = sin(angle_link_7)
-    angle_link_8 = link_joint_8_angle + angle_link_7
-    cos_angle_link_8 = cos(angle_link_8)
-    sin_angle_link_8 = sin(angle_link_8)
-    angle_link_9 = link_joint_9_angle + angle_link_8
-    cos_angle_link_9 = cos(angle_link_9)
-    sin_angle_link_9 = sin(angle_link_9)
-    angle_link_10 = link_joint_10_angle + angle_link_9
-    s175 = link_joint_1_angle_dot * (k1 * sin(link_joint_1_angle))
-    velocity_link_2_y = link_joint_1_angle_dot * (k1 * cos(link_joint_1_angle))
-    omega_link_2_z = link_joint_1_angle_dot + link_joint_2_angle_dot
-    s176 = s175 + k2 * sin_angle_link_2 * omega_link_2_z
-    velocity_link_3_y = velocity_link_2_y + k2 * cos_angle_link_2 * omega_link_2_z
-    omega_link_3_z = link_joint_3_angle_dot + omega_link_2_z
-    s177 = s176 + k3 * sin_angle_link_3 * omega_link_3_z
-    velocity_link_4_y = velocity_link_3_y + k3 * cos_angle_link_3 * omega_link_3_z
-    omega_link_4_z = link_joint_4_angle_dot + omega_link_3_z
-    s178 = s177 + k4 * sin_angle_link_4 * omega_link_4_z
-    velocity_link_5_y = velocity_link_4_y + k4 * cos_angle_link_4 * omega_link_4_z
-    omega_link_5_z = link_joint_5_angle_dot + omega_link_4_z
-    s179 = s178 + k5 * sin_angle_link_5 * omega_link_5_z
-    velocity_link_6_y = velocity_link_5_y + k5 * cos_angle_link_5 * omega_link_5_z
-    omega_link_6_z = link_joint_6_angle_dot + omega_link_5_z
-    s180 = s179 + k6 * sin_angle_link_6 * omega_link_6_z
-    velocity_link_7_y = velocity_link_6_y + k6 * cos_angle_link_6 * omega_link_6_z
-    omega_link_7_z = link_joint_7_angle_dot + omega_link_6_z
-    s181 = s180 + k7 * sin_angle_link_7 * omega_link_7_z
-    velocity_link_8_y = velocity_link_7_y + k7 * cos_angle_link_7 * omega_link_7_z
-    omega_link_8_z = link_joint_8_angle_dot + omega_link_7_z
-    s182 = s181 + k8 * sin_angle_link_8 * omega_link_8_z
-    velocity_link_9_y = velocity_link_8_y + k8 * cos_angle_link_8 * omega_link_8_z
-    omega_link_9_z = link_joint_9_angle_dot + omega_link_8_z
-    s183 = s182 + k9 * sin_angle_link_9 * omega_link_9_z
-    velocity_link_10_y = velocity_link_9_y + k9 * cos_angle_link_9 * omega_link_9_z
-    omega_link_10_z = link_joint_10_angle_dot + omega_link_9_z
-    s1232 = link_joint_1_angle_dot * (link_joint_1_angle_dot * inertia_link_1_zz) + link_2_mass * (s175 * s175 + velocity_link_2_y * velocity_link_2_y)
-    s1233 = s175 * (k10 * sin_angle_link_2 * omega_link_2_z) + velocity_link_2_y * (k10 * cos_angle_link_2 * omega_link_2_z)
-    s1234 = s1232 + omega_link_2_z * (inertia_link_2_zz * omega_link_2_z) + link_3_mass * (s176 * s176 + velocity_link_3_y * velocity_link_3_y)
-    s1235 = s176 * (k11 * sin_angle_link_3 * omega_link_3_z) + velocity_link_3_y * (k11 * cos_angle_link_3 * omega_link_3_z)
-    s1236 = s1234 + omega_link_3_z * (inertia_link_3_zz * omega_link_3_z) + link_4_mass * (s177 * s177 + velocity_link_4_y * velocity_link_4_y)
-    s1237 = s177 * (k12 * sin_angle_link_4 * omega_link_4_z) + velocity_link_4_y * (k12 * cos_angle_link_4 * omega_link_4_z)
-    s1238 = s1236 + omega_link_4_z * (inertia_link_4_zz * omega_link_4_z) + link_5_mass * (s178 * s178 + velocity_link_5_y * velocity_link_5_y)
-    s1239 = s178 * (k13 * sin_angle_link_5 * omega_link_5_z) + velocity_link_5_y * (k13 * cos_angle_link_5 * omega_link_5_z)
-    s1240 = s1238 + omega_link_5_z * (inertia_link_5_zz * omega_link_5_z) + link_6_mass * (s179 * s179 + velocity_link_6_y * velocity_link_6_y)
-    s1241 = s179 * (k14 * sin_angle_link_6 * omega_link_6_z) + velocity_link_6_y * (k14 * cos_angle_link_6 * omega_link_6_z)
-    s1242 = s1240 + omega_link_6_z * (inertia_link_6_zz * omega_link_6_z) + link_7_mass * (s180 * s180 + velocity_link_7_y * velocity_link_7_y)
-    s1243 = s180 * (k15 * sin_angle_link_7 * omega_link_7_z) + velocity_link_7_y * (k15 * cos_angle_link_7 * omega_link_7_z)
-    s1244 = s1242 + omega_link_7_z * (inertia_link_7_zz * omega_link_7_z) + link_8_mass * (s181 * s181 + velocity_link_8_y * velocity_link_8_y)
-    s1245 = s181 * (k16 * sin_angle_link_8 * omega_link_8_z) + velocity_link_8_y * (k16 * cos_angle_link_8 * omega_link_8_z)
-    s1246 = s1244 + omega_link_8_z * (inertia_link_8_zz * omega_link_8_z) + link_9_mass * (s182 * s182 + velocity_link_9_y * velocity_link_9_y)
-    s1247 = s182 * (k17 * sin_angle_link_9 * omega_link_9_z) + velocity_link_9_y * (k17 * cos_angle_link_9 * omega_link_9_z)
-    s1248 = s1246 + omega_link_9_z * (inertia_link_9_zz * omega_link_9_z) + link_10_mass * (s183 * s183 + velocity_link_10_y * velocity_link_10_y)
-    s1249 = s183 * (k18 * sin(angle_link_10) * omega_link_10_z) + velocity_link_10_y * (k18 * cos(angle_link_10) * omega_link_10_z)
-    return (
-        0.5 * (s1248 + omega_link_10_z * (inertia_link_10_zz * omega_link_10_z)) - (s1233 + s1235 + s1237 + s1239 + s1241 + s1243 + s1245 + s1247 + s1249),
-    )
-
-
-def _potential_energy(y, k, u=(), extra=(), sin=sin):
-    """74 operations: 25 add, 10 sub, 29 mul, 10 sin."""
-    link_joint_1_r_child_x, link_joint_2_r_child_x, link_joint_3_r_child_x, link_joint_4_r_child_x, link_joint_5_r_child_x, link_joint_6_r_child_x, link_joint_7_r_child_x, link_joint_8_r_child_x, link_joint_9_r_child_x, link_joint_10_r_child_x, k1, k2, k3, k4, k5, k6, k7, k8, k9, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39 = k
-    link_joint_1_angle, link_joint_2_angle, link_joint_3_angle, link_joint_4_angle, link_joint_5_angle, link_joint_6_angle, link_joint_7_angle, link_joint_8_angle, link_joint_9_angle, link_joint_10_angle, _, _, _, _, _, _, _, _, _, _ = y
-    sin_link_joint_1_angle = sin(link_joint_1_angle)
-    angle_link_2 = link_joint_1_angle + link_joint_2_angle
-    sin_angle_link_2 = sin(angle_link_2)
-    s2 = k1 * sin_link_joint_1_angle
-    angle_link_3 = link_joint_3_angle + angle_link_2
-    sin_angle_link_3 = sin(angle_link_3)
-    angle_link_4 = link_joint_4_angle + angle_link_3
-    sin_angle_link_4 = sin(angle_link_4)
-    angle_link_5 = link_joint_5_angle + angle_link_4
-    sin_angle_link_5 = sin(angle_link_5)
-    angle_link_6 = link_joint_6_angle + angle_link_5
-    sin_angle_link_6 = sin(angle_link_6)
-    angle_link_7 = link_joint_7_angle + angle_link_6
-    sin_angle_link_7 = sin(angle_link_7)
-    angle_link_8 = link_joint_8_angle + angle_link_7
-    sin_angle_link_8 = sin(angle_link_8)
-    angle_link_9 = link_joint_9_angle + angle_link_8
-    sin_angle_link_9 = sin(angle_link_9)
-    s1250 = s2 + k2 * sin_angle_link_2
-    s1251 = k3 * sin_angle_link_3 + s1250
-    s1252 = k4 * sin_angle_link_4 + s1251
-    s1253 = k5 * sin_angle_link_5 + s1252
-    s1254 = k6 * sin_angle_link_6 + s1253
-    s1255 = k7 * sin_angle_link_7 + s1254
-    s1256 = k8 * sin_angle_link_8 + s1255
-    s1257 = k31 * (s2 - link_joint_2_r_child_x * sin_angle_link_2) - k30 * (link_joint_1_r_child_x * sin_link_joint_1_angle)
-    s1258 = s1257 + k32 * (s1250 - link_joint_3_r_child_x * sin_angle_link_3) + k33 * (s1251 - link_joint_4_r_child_x * sin_angle_link_4)
-    s1259 = s1258 + k34 * (s1252 - link_joint_5_r_child_x * sin_angle_link_5) + k35 * (s1253 - link_joint_6_r_child_x * sin_angle_link_6)
-    s1260 = s1259 + k36 * (s1254 - link_joint_7_r_child_x * sin_angle_link_7) + k37 * (s1255 - link_joint_8_r_child_x * sin_angle_link_8)
-    s1261 = k9 * sin_angle_link_9 + s1256 - link_joint_10_r_child_x * sin(link_joint_10_angle + angle_link_9)
-    return (
-        s1260 + k38 * (s1256 - link_joint_9_r_child_x * sin_angle_link_9) + k39 * s1261,
-    )
-
-
-def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """103 operations: 25 add, 18 sub, 38 mul, 2 neg, 10 sin, 10 cos."""
-    link_joint_1_r_child_x, link_joint_2_r_child_x, link_joint_3_r_child_x, link_joint_4_r_child_x, link_joint_5_r_child_x, link_joint_6_r_child_x, link_joint_7_r_child_x, link_joint_8_r_child_x, link_joint_9_r_child_x, link_joint_10_r_child_x, k1, k2, k3, k4, k5, k6, k7, k8, k9 = k
-    link_joint_1_angle, link_joint_2_angle, link_joint_3_angle, link_joint_4_angle, link_joint_5_angle, link_joint_6_angle, link_joint_7_angle, link_joint_8_angle, link_joint_9_angle, link_joint_10_angle, _, _, _, _, _, _, _, _, _, _ = y
-    cos_link_joint_1_angle = cos(link_joint_1_angle)
-    sin_link_joint_1_angle = sin(link_joint_1_angle)
-    angle_link_2 = link_joint_1_angle + link_joint_2_angle
-    cos_angle_link_2 = cos(angle_link_2)
-    sin_angle_link_2 = sin(angle_link_2)
-    s1 = k1 * cos_link_joint_1_angle
-    s2 = k1 * sin_link_joint_1_angle
-    angle_link_3 = link_joint_3_angle + angle_link_2
-    cos_angle_link_3 = cos(angle_link_3)
-    sin_angle_link_3 = sin(angle_link_3)
-    angle_link_4 = link_joint_4_angle + angle_link_3
-    cos_angle_link_4 = cos(angle_link_4)
-    sin_angle_link_4 = sin(angle_link_4)
-    angle_link_5 = link_joint_5_angle + angle_link_4
-    cos_angle_link_5 = cos(angle_link_5)
-    sin_angle_link_5 = sin(angle_link_5)
-    angle_link_6 = link_joint_6_angle + angle_link_5
-    cos_angle_link_6 = cos(angle_link_6)
-    sin_angle_link_6 = sin(angle_link_6)
-    angle_link_7 = link_joint_7_angle + angle_link_6
-    cos_angle_link_7 = cos(angle_link_7)
-    sin_angle_link_7 = sin(angle_link_7)
-    angle_link_8 = link_joint_8_angle + angle_link_7
-    cos_angle_link_8 = cos(angle_link_8)
-    sin_angle_link_8 = sin(angle_link_8)
-    angle_link_9 = link_joint_9_angle + angle_link_8
-    cos_angle_link_9 = cos(angle_link_9)
-    sin_angle_link_9 = sin(angle_link_9)
-    angle_link_10 = link_joint_10_angle + angle_link_9
-    s1262 = s1 + k2 * cos_angle_link_2
-    s1250 = s2 + k2 * sin_angle_link_2
-    s1263 = k3 * cos_angle_link_3 + s1262
-    s1251 = k3 * sin_angle_link_3 + s1250
-    s1264 = k4 * cos_angle_link_4 + s1263
-    s1252 = k4 * sin_angle_link_4 + s1251
-    s1265 = k5 * cos_angle_link_5 + s1264
-    s1253 = k5 * sin_angle_link_5 + s1252
-    s1266 = k6 * cos_angle_link_6 + s1265
-    s1254 = k6 * sin_angle_link_6 + s1253
-    s1267 = k7 * cos_angle_link_7 + s1266
-    s1255 = k7 * sin_angle_link_7 + s1254
-    s1268 = k8 * cos_angle_link_8 + s1267
-    s1256 = k8 * sin_angle_link_8 + s1255
-    return (
-        -link_joint_1_r_child_x * cos_link_joint_1_angle,
-        -link_joint_1_r_child_x * sin_link_joint_1_angle,
-        link_joint_1_angle,
-        s1 - link_joint_2_r_child_x * cos_angle_link_2,
-        s2 - link_joint_2_r_child_x * sin_angle_link_2,
-        angle_link_2,
-        s1262 - link_joint_3_r_child_x * cos_angle_link_3,
-        s1250 - link_joint_3_r_child_x * sin_angle_link_3,
-        angle_link_3,
-        s1263 - link_joint_4_r_child_x * cos_angle_link_4,
-        s1251 - link_joint_4_r_child_x * sin_angle_link_4,
-        angle_link_4,
-        s1264 - link_joint_5_r_child_x * cos_angle_link_5,
-        s1252 - link_joint_5_r_child_x * sin_angle_link_5,
-        angle_link_5,
-        s1265 - link_joint_6_r_child_x * cos_angle_link_6,
-        s1253 - link_joint_6_r_child_x * sin_angle_link_6,
-        angle_link_6,
-        s1266 - link_joint_7_r_child_x * cos_angle_link_7,
-        s1254 - link_joint_7_r_child_x * sin_angle_link_7,
-        angle_link_7,
-        s1267 - link_joint_8_r_child_x * cos_angle_link_8,
-        s1255 - link_joint_8_r_child_x * sin_angle_link_8,
-        angle_link_8,
-        s1268 - link_joint_9_r_child_x * cos_angle_link_9,
-        s1256 - link_joint_9_r_child_x * sin_angle_link_9,
-        angle_link_9,
-        k9 * cos_angle_link_9 + s1268 - link_joint_10_r_child_x * cos(angle_link_10),
-        k9 * sin_angle_link_9 + s1256 - link_joint_10_r_child_x * sin(angle_link_10),
-        angle_link_10,
-    )
-
-
 def _named(values, names, defaults, what):
     """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
@@ -2636,18 +2421,3 @@ def derivative(t, y, p=None, u=None):
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
     return _evaluate(_jacobian, "jacobian", (20, 20), ('cos', 'sin'), y, p, u)
-
-
-def kinetic_energy(t, y, p=None, u=None):
-    """Kinetic energy, J."""
-    return _evaluate(_kinetic_energy, "kinetic_energy", (), ('cos', 'sin'), y, p, u)[()]
-
-
-def potential_energy(t, y, p=None, u=None):
-    """Potential energy, J."""
-    return _evaluate(_potential_energy, "potential_energy", (), ('sin',), y, p, u)[()]
-
-
-def body_poses(t, y, p=None, u=None):
-    """World x, y (m) of each centre of mass and angle (rad), a row a body."""
-    return _evaluate(_body_poses, "body_poses", (10, 3), ('cos', 'sin'), y, p, u)

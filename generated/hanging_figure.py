@@ -497,9 +497,6 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 1314, "sub": 1012, "mul": 2742, "div": 160, "neg": 25, "sin": 14, "cos": 14, "total": 5281, "parameters": 309},
     "jacobian": {"add": 3970, "sub": 2558, "mul": 7533, "div": 314, "neg": 25, "sin": 14, "cos": 14, "total": 14428, "parameters": 309},
-    "kinetic_energy": {"add": 339, "sub": 110, "mul": 614, "div": 7, "sin": 14, "cos": 14, "total": 1098, "parameters": 205},
-    "potential_energy": {"add": 149, "sub": 69, "mul": 276, "div": 8, "sin": 14, "cos": 14, "total": 530, "parameters": 63},
-    "body_poses": {"add": 306, "sub": 138, "mul": 590, "div": 8, "neg": 2, "sin": 14, "cos": 14, "total": 1072, "parameters": 43},
 }
 
 
@@ -508,282 +505,282 @@ def _constants(values):
     """Everything that depends on parameters alone, once for each set of them."""
     body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, l_grip, g = values
     mass_hand_right = body_mass * m_hand
-    k106 = l_hand * kx_hand
-    k107 = mass_hand_right * (k106 * k106)
-    k108 = l_hand * ky_hand
-    k109 = mass_hand_right * (k108 * k108)
-    k110 = l_hand * kz_hand
-    inertia_hand_right_zz = mass_hand_right * (k110 * k110)
+    k82 = l_hand * kx_hand
+    k83 = mass_hand_right * (k82 * k82)
+    k84 = l_hand * ky_hand
+    k85 = mass_hand_right * (k84 * k84)
+    k86 = l_hand * kz_hand
+    inertia_hand_right_zz = mass_hand_right * (k86 * k86)
     mass_forearm_right = body_mass * m_forearm
-    k111 = l_forearm * kx_forearm
-    k112 = mass_forearm_right * (k111 * k111)
-    k113 = l_forearm * ky_forearm
-    k114 = mass_forearm_right * (k113 * k113)
-    k115 = l_forearm * kz_forearm
-    inertia_forearm_right_zz = mass_forearm_right * (k115 * k115)
+    k87 = l_forearm * kx_forearm
+    k88 = mass_forearm_right * (k87 * k87)
+    k89 = l_forearm * ky_forearm
+    k90 = mass_forearm_right * (k89 * k89)
+    k91 = l_forearm * kz_forearm
+    inertia_forearm_right_zz = mass_forearm_right * (k91 * k91)
     mass_upper_arm_right = body_mass * m_upper_arm
-    k116 = l_upper_arm * kx_upper_arm
-    k117 = mass_upper_arm_right * (k116 * k116)
-    k118 = l_upper_arm * ky_upper_arm
-    k119 = mass_upper_arm_right * (k118 * k118)
-    k120 = l_upper_arm * kz_upper_arm
-    inertia_upper_arm_right_zz = mass_upper_arm_right * (k120 * k120)
+    k92 = l_upper_arm * kx_upper_arm
+    k93 = mass_upper_arm_right * (k92 * k92)
+    k94 = l_upper_arm * ky_upper_arm
+    k95 = mass_upper_arm_right * (k94 * k94)
+    k96 = l_upper_arm * kz_upper_arm
+    inertia_upper_arm_right_zz = mass_upper_arm_right * (k96 * k96)
     mass_thorax = body_mass * m_thorax
-    k121 = l_thorax * kx_thorax
-    k122 = l_thorax * ky_thorax
-    k123 = l_thorax * kz_thorax
+    k97 = l_thorax * kx_thorax
+    k98 = l_thorax * ky_thorax
+    k99 = l_thorax * kz_thorax
     mass_head = body_mass * m_head
-    k124 = l_head * kx_head
-    k125 = l_head * ky_head
-    k126 = l_head * kz_head
+    k100 = l_head * kx_head
+    k101 = l_head * ky_head
+    k102 = l_head * kz_head
     mass_abdomen = body_mass * m_abdomen
-    k127 = l_abdomen * kx_abdomen
-    k128 = l_abdomen * ky_abdomen
-    k129 = l_abdomen * kz_abdomen
+    k103 = l_abdomen * kx_abdomen
+    k104 = l_abdomen * ky_abdomen
+    k105 = l_abdomen * kz_abdomen
     mass_pelvis = body_mass * m_pelvis
-    k130 = l_pelvis * kx_pelvis
-    k131 = l_pelvis * ky_pelvis
-    k132 = l_pelvis * kz_pelvis
+    k106 = l_pelvis * kx_pelvis
+    k107 = l_pelvis * ky_pelvis
+    k108 = l_pelvis * kz_pelvis
     mass_thigh_left = body_mass * m_thigh
-    k133 = l_thigh * kx_thigh
-    k134 = mass_thigh_left * (k133 * k133)
-    k135 = l_thigh * ky_thigh
-    k136 = mass_thigh_left * (k135 * k135)
-    k137 = l_thigh * kz_thigh
-    inertia_thigh_left_zz = mass_thigh_left * (k137 * k137)
+    k109 = l_thigh * kx_thigh
+    k110 = mass_thigh_left * (k109 * k109)
+    k111 = l_thigh * ky_thigh
+    k112 = mass_thigh_left * (k111 * k111)
+    k113 = l_thigh * kz_thigh
+    inertia_thigh_left_zz = mass_thigh_left * (k113 * k113)
     mass_shank_left = body_mass * m_shank
-    k138 = l_shank * kx_shank
-    k139 = mass_shank_left * (k138 * k138)
-    k140 = l_shank * ky_shank
-    k141 = mass_shank_left * (k140 * k140)
-    k142 = l_shank * kz_shank
-    inertia_shank_left_zz = mass_shank_left * (k142 * k142)
+    k114 = l_shank * kx_shank
+    k115 = mass_shank_left * (k114 * k114)
+    k116 = l_shank * ky_shank
+    k117 = mass_shank_left * (k116 * k116)
+    k118 = l_shank * kz_shank
+    inertia_shank_left_zz = mass_shank_left * (k118 * k118)
     mass_foot_left = body_mass * m_foot
-    k143 = l_foot * kx_foot
-    k144 = mass_foot_left * (k143 * k143)
-    k145 = l_foot * ky_foot
-    k146 = mass_foot_left * (k145 * k145)
-    k147 = l_foot * kz_foot
-    k148 = mass_foot_left * (k147 * k147)
+    k119 = l_foot * kx_foot
+    k120 = mass_foot_left * (k119 * k119)
+    k121 = l_foot * ky_foot
+    k122 = mass_foot_left * (k121 * k121)
+    k123 = l_foot * kz_foot
+    k124 = mass_foot_left * (k123 * k123)
     if not mass_hand_right > 0.0:
         raise ValueError("mass of hand_right is not positive: change the parameters")
-    if not k107 >= 0.0:
+    if not k83 >= 0.0:
         raise ValueError("inertia_com xx of hand_right is negative: change the parameters")
-    if not k109 >= 0.0:
+    if not k85 >= 0.0:
         raise ValueError("inertia_com yy of hand_right is negative: change the parameters")
     if not inertia_hand_right_zz >= 0.0:
         raise ValueError("inertia_com zz of hand_right is negative: change the parameters")
     if not mass_forearm_right > 0.0:
         raise ValueError("mass of forearm_right is not positive: change the parameters")
-    if not k112 >= 0.0:
+    if not k88 >= 0.0:
         raise ValueError("inertia_com xx of forearm_right is negative: change the parameters")
-    if not k114 >= 0.0:
+    if not k90 >= 0.0:
         raise ValueError("inertia_com yy of forearm_right is negative: change the parameters")
     if not inertia_forearm_right_zz >= 0.0:
         raise ValueError("inertia_com zz of forearm_right is negative: change the parameters")
     if not mass_upper_arm_right > 0.0:
         raise ValueError("mass of upper_arm_right is not positive: change the parameters")
-    if not k117 >= 0.0:
+    if not k93 >= 0.0:
         raise ValueError("inertia_com xx of upper_arm_right is negative: change the parameters")
-    if not k119 >= 0.0:
+    if not k95 >= 0.0:
         raise ValueError("inertia_com yy of upper_arm_right is negative: change the parameters")
     if not inertia_upper_arm_right_zz >= 0.0:
         raise ValueError("inertia_com zz of upper_arm_right is negative: change the parameters")
     if not mass_thorax > 0.0:
         raise ValueError("mass of thorax is not positive: change the parameters")
-    if not mass_thorax * (k121 * k121) >= 0.0:
+    if not mass_thorax * (k97 * k97) >= 0.0:
         raise ValueError("inertia_com xx of thorax is negative: change the parameters")
-    if not mass_thorax * (k122 * k122) >= 0.0:
+    if not mass_thorax * (k98 * k98) >= 0.0:
         raise ValueError("inertia_com yy of thorax is negative: change the parameters")
-    if not mass_thorax * (k123 * k123) >= 0.0:
+    if not mass_thorax * (k99 * k99) >= 0.0:
         raise ValueError("inertia_com zz of thorax is negative: change the parameters")
     if not mass_head > 0.0:
         raise ValueError("mass of head is not positive: change the parameters")
-    if not mass_head * (k124 * k124) >= 0.0:
+    if not mass_head * (k100 * k100) >= 0.0:
         raise ValueError("inertia_com xx of head is negative: change the parameters")
-    if not mass_head * (k125 * k125) >= 0.0:
+    if not mass_head * (k101 * k101) >= 0.0:
         raise ValueError("inertia_com yy of head is negative: change the parameters")
-    if not mass_head * (k126 * k126) >= 0.0:
+    if not mass_head * (k102 * k102) >= 0.0:
         raise ValueError("inertia_com zz of head is negative: change the parameters")
     if not mass_upper_arm_right > 0.0:
         raise ValueError("mass of upper_arm_left is not positive: change the parameters")
-    if not k117 >= 0.0:
+    if not k93 >= 0.0:
         raise ValueError("inertia_com xx of upper_arm_left is negative: change the parameters")
-    if not k119 >= 0.0:
+    if not k95 >= 0.0:
         raise ValueError("inertia_com yy of upper_arm_left is negative: change the parameters")
     if not inertia_upper_arm_right_zz >= 0.0:
         raise ValueError("inertia_com zz of upper_arm_left is negative: change the parameters")
     if not mass_abdomen > 0.0:
         raise ValueError("mass of abdomen is not positive: change the parameters")
-    if not mass_abdomen * (k127 * k127) >= 0.0:
+    if not mass_abdomen * (k103 * k103) >= 0.0:
         raise ValueError("inertia_com xx of abdomen is negative: change the parameters")
-    if not mass_abdomen * (k128 * k128) >= 0.0:
+    if not mass_abdomen * (k104 * k104) >= 0.0:
         raise ValueError("inertia_com yy of abdomen is negative: change the parameters")
-    if not mass_abdomen * (k129 * k129) >= 0.0:
+    if not mass_abdomen * (k105 * k105) >= 0.0:
         raise ValueError("inertia_com zz of abdomen is negative: change the parameters")
     if not mass_forearm_right > 0.0:
         raise ValueError("mass of forearm_left is not positive: change the parameters")
-    if not k112 >= 0.0:
+    if not k88 >= 0.0:
         raise ValueError("inertia_com xx of forearm_left is negative: change the parameters")
-    if not k114 >= 0.0:
+    if not k90 >= 0.0:
         raise ValueError("inertia_com yy of forearm_left is negative: change the parameters")
     if not inertia_forearm_right_zz >= 0.0:
         raise ValueError("inertia_com zz of forearm_left is negative: change the parameters")
     if not mass_pelvis > 0.0:
         raise ValueError("mass of pelvis is not positive: change the parameters")
-    if not mass_pelvis * (k130 * k130) >= 0.0:
+    if not mass_pelvis * (k106 * k106) >= 0.0:
         raise ValueError("inertia_com xx of pelvis is negative: change the parameters")
-    if not mass_pelvis * (k131 * k131) >= 0.0:
+    if not mass_pelvis * (k107 * k107) >= 0.0:
         raise ValueError("inertia_com yy of pelvis is negative: change the parameters")
-    if not mass_pelvis * (k132 * k132) >= 0.0:
+    if not mass_pelvis * (k108 * k108) >= 0.0:
         raise ValueError("inertia_com zz of pelvis is negative: change the parameters")
     if not mass_hand_right > 0.0:
         raise ValueError("mass of hand_left is not positive: change the parameters")
-    if not k107 >= 0.0:
+    if not k83 >= 0.0:
         raise ValueError("inertia_com xx of hand_left is negative: change the parameters")
-    if not k109 >= 0.0:
+    if not k85 >= 0.0:
         raise ValueError("inertia_com yy of hand_left is negative: change the parameters")
     if not inertia_hand_right_zz >= 0.0:
         raise ValueError("inertia_com zz of hand_left is negative: change the parameters")
     if not mass_thigh_left > 0.0:
         raise ValueError("mass of thigh_left is not positive: change the parameters")
-    if not k134 >= 0.0:
+    if not k110 >= 0.0:
         raise ValueError("inertia_com xx of thigh_left is negative: change the parameters")
-    if not k136 >= 0.0:
+    if not k112 >= 0.0:
         raise ValueError("inertia_com yy of thigh_left is negative: change the parameters")
     if not inertia_thigh_left_zz >= 0.0:
         raise ValueError("inertia_com zz of thigh_left is negative: change the parameters")
     if not mass_thigh_left > 0.0:
         raise ValueError("mass of thigh_right is not positive: change the parameters")
-    if not k134 >= 0.0:
+    if not k110 >= 0.0:
         raise ValueError("inertia_com xx of thigh_right is negative: change the parameters")
-    if not k136 >= 0.0:
+    if not k112 >= 0.0:
         raise ValueError("inertia_com yy of thigh_right is negative: change the parameters")
     if not inertia_thigh_left_zz >= 0.0:
         raise ValueError("inertia_com zz of thigh_right is negative: change the parameters")
     if not mass_shank_left > 0.0:
         raise ValueError("mass of shank_left is not positive: change the parameters")
-    if not k139 >= 0.0:
+    if not k115 >= 0.0:
         raise ValueError("inertia_com xx of shank_left is negative: change the parameters")
-    if not k141 >= 0.0:
+    if not k117 >= 0.0:
         raise ValueError("inertia_com yy of shank_left is negative: change the parameters")
     if not inertia_shank_left_zz >= 0.0:
         raise ValueError("inertia_com zz of shank_left is negative: change the parameters")
     if not mass_shank_left > 0.0:
         raise ValueError("mass of shank_right is not positive: change the parameters")
-    if not k139 >= 0.0:
+    if not k115 >= 0.0:
         raise ValueError("inertia_com xx of shank_right is negative: change the parameters")
-    if not k141 >= 0.0:
+    if not k117 >= 0.0:
         raise ValueError("inertia_com yy of shank_right is negative: change the parameters")
     if not inertia_shank_left_zz >= 0.0:
         raise ValueError("inertia_com zz of shank_right is negative: change the parameters")
     if not mass_foot_left > 0.0:
         raise ValueError("mass of foot_left is not positive: change the parameters")
-    if not k144 >= 0.0:
+    if not k120 >= 0.0:
         raise ValueError("inertia_com xx of foot_left is negative: change the parameters")
-    if not k146 >= 0.0:
+    if not k122 >= 0.0:
         raise ValueError("inertia_com yy of foot_left is negative: change the parameters")
-    if not k148 >= 0.0:
+    if not k124 >= 0.0:
         raise ValueError("inertia_com zz of foot_left is negative: change the parameters")
     if not mass_foot_left > 0.0:
         raise ValueError("mass of foot_right is not positive: change the parameters")
-    if not k144 >= 0.0:
+    if not k120 >= 0.0:
         raise ValueError("inertia_com xx of foot_right is negative: change the parameters")
-    if not k146 >= 0.0:
+    if not k122 >= 0.0:
         raise ValueError("inertia_com yy of foot_right is negative: change the parameters")
-    if not k148 >= 0.0:
+    if not k124 >= 0.0:
         raise ValueError("inertia_com zz of foot_right is negative: change the parameters")
-    k82 = l_hand * c_hand
-    k83 = l_grip - k82
-    k1 = k82 + k83
-    k84 = l_forearm * (c_forearm - 1.0)
-    k85 = l_forearm * c_forearm
-    k2 = k85 - k84
-    k86 = l_upper_arm * (c_upper_arm - 1.0)
-    k87 = l_upper_arm * c_upper_arm
-    k3 = k87 - k86
-    k149 = l_thorax * c_thorax
-    k88 = d_shoulder - k149
-    k4 = k149 + k88
-    k89 = l_head * (c_head - 1.0)
-    inertia_head_zz = mass_head * (k126 * k126)
+    k125 = l_hand * c_hand
+    k126 = l_grip - k125
+    k1 = k125 + k126
+    k127 = l_forearm * (c_forearm - 1.0)
+    k128 = l_forearm * c_forearm
+    k2 = k128 - k127
+    k129 = l_upper_arm * (c_upper_arm - 1.0)
+    k130 = l_upper_arm * c_upper_arm
+    k3 = k130 - k129
+    k131 = l_thorax * c_thorax
+    k132 = d_shoulder - k131
+    k4 = k131 + k132
+    k133 = l_head * (c_head - 1.0)
+    inertia_head_zz = mass_head * (k102 * k102)
     k5 = w_shoulder + w_shoulder
-    k6 = k149 - d_shoulder + k88
-    k7 = k88 + l_thorax * (c_thorax - 1.0)
-    k90 = l_abdomen * c_abdomen
-    inertia_abdomen_zz = mass_abdomen * (k129 * k129)
-    k8 = k86 - k87
-    k9 = l_abdomen * (c_abdomen - 1.0) - k90
-    k91 = l_pelvis * c_pelvis
-    inertia_pelvis_zz = mass_pelvis * (k132 * k132)
-    k10 = k84 - k85
-    k11 = l_pelvis * (c_pelvis - 1.0) - k91
-    k92 = l_thigh * c_thigh
-    k12 = l_thigh * (c_thigh - 1.0) - k92
-    k93 = l_shank * c_shank
-    k13 = l_shank * (c_shank - 1.0) - k93
-    k94 = h_ankle / 2.0
-    k95 = l_foot * c_foot - d_ankle
-    moment_hand_right_z = k83 * mass_hand_right
-    k150 = k83 * moment_hand_right_z
-    inertia_hand_right_xx = k107 + k150
-    inertia_hand_right_yy = k109 + k150
-    k14 = k84 * mass_forearm_right
-    k151 = k84 * k14
-    inertia_forearm_right_xx = k112 + k151
-    inertia_forearm_right_yy = k114 + k151
-    k15 = k86 * mass_upper_arm_right
-    k152 = k86 * k15
-    inertia_upper_arm_right_xx = k117 + k152
-    inertia_upper_arm_right_yy = k119 + k152
+    k6 = k131 - d_shoulder + k132
+    k7 = k132 + l_thorax * (c_thorax - 1.0)
+    k134 = l_abdomen * c_abdomen
+    inertia_abdomen_zz = mass_abdomen * (k105 * k105)
+    k8 = k129 - k130
+    k9 = l_abdomen * (c_abdomen - 1.0) - k134
+    k135 = l_pelvis * c_pelvis
+    inertia_pelvis_zz = mass_pelvis * (k108 * k108)
+    k10 = k127 - k128
+    k11 = l_pelvis * (c_pelvis - 1.0) - k135
+    k136 = l_thigh * c_thigh
+    k12 = l_thigh * (c_thigh - 1.0) - k136
+    k137 = l_shank * c_shank
+    k13 = l_shank * (c_shank - 1.0) - k137
+    k138 = h_ankle / 2.0
+    k139 = l_foot * c_foot - d_ankle
+    moment_hand_right_z = k126 * mass_hand_right
+    k140 = k126 * moment_hand_right_z
+    inertia_hand_right_xx = k83 + k140
+    inertia_hand_right_yy = k85 + k140
+    k14 = k127 * mass_forearm_right
+    k141 = k127 * k14
+    inertia_forearm_right_xx = k88 + k141
+    inertia_forearm_right_yy = k90 + k141
+    k15 = k129 * mass_upper_arm_right
+    k142 = k129 * k15
+    inertia_upper_arm_right_xx = k93 + k142
+    inertia_upper_arm_right_yy = k95 + k142
     moment_thorax_y = w_shoulder * mass_thorax
-    moment_thorax_z = k88 * mass_thorax
-    k153 = w_shoulder * moment_thorax_y
-    k154 = k88 * moment_thorax_z
-    k16 = k88 * moment_thorax_y
-    inertia_thorax_xx = mass_thorax * (k121 * k121) + (k153 + k154)
-    inertia_thorax_yy = mass_thorax * (k122 * k122) + k154
-    inertia_thorax_zz = mass_thorax * (k123 * k123) + k153
-    k17 = k89 * mass_head
-    k155 = k89 * k17
-    inertia_head_xx = mass_head * (k124 * k124) + k155
-    inertia_head_yy = mass_head * (k125 * k125) + k155
-    k18 = mass_upper_arm_right * k87
-    k156 = k87 * k18
-    inertia_upper_arm_left_xx = k117 + k156
-    inertia_upper_arm_left_yy = k119 + k156
-    k19 = k90 * mass_abdomen
-    k157 = k90 * k19
-    inertia_abdomen_xx = mass_abdomen * (k127 * k127) + k157
-    inertia_abdomen_yy = mass_abdomen * (k128 * k128) + k157
-    k20 = mass_forearm_right * k85
-    k158 = k85 * k20
-    inertia_forearm_left_xx = k112 + k158
-    inertia_forearm_left_yy = k114 + k158
-    k21 = k91 * mass_pelvis
-    k159 = k91 * k21
-    inertia_pelvis_xx = mass_pelvis * (k130 * k130) + k159
-    inertia_pelvis_yy = mass_pelvis * (k131 * k131) + k159
-    k22 = k82 * mass_hand_right
-    k160 = k82 * k22
-    inertia_hand_left_xx = k107 + k160
-    inertia_hand_left_yy = k109 + k160
-    k23 = k92 * mass_thigh_left
-    k161 = k92 * k23
-    inertia_thigh_left_xx = mass_thigh_left * (k133 * k133) + k161
-    inertia_thigh_left_yy = mass_thigh_left * (k135 * k135) + k161
-    k24 = k93 * mass_shank_left
-    k162 = k93 * k24
-    inertia_shank_left_xx = mass_shank_left * (k138 * k138) + k162
-    inertia_shank_left_yy = mass_shank_left * (k140 * k140) + k162
-    moment_foot_left_x = k95 * mass_foot_left
-    k25 = k94 * mass_foot_left
-    k163 = k95 * moment_foot_left_x
-    k164 = k94 * k25
-    inertia_foot_left_xz = k94 * moment_foot_left_x
-    inertia_foot_left_xx = mass_foot_left * (k143 * k143) + k164
-    inertia_foot_left_yy = mass_foot_left * (k145 * k145) + (k163 + k164)
-    inertia_foot_left_zz = mass_foot_left * (k147 * k147) + k163
+    moment_thorax_z = k132 * mass_thorax
+    k143 = w_shoulder * moment_thorax_y
+    k144 = k132 * moment_thorax_z
+    k16 = k132 * moment_thorax_y
+    inertia_thorax_xx = mass_thorax * (k97 * k97) + (k143 + k144)
+    inertia_thorax_yy = mass_thorax * (k98 * k98) + k144
+    inertia_thorax_zz = mass_thorax * (k99 * k99) + k143
+    k17 = k133 * mass_head
+    k145 = k133 * k17
+    inertia_head_xx = mass_head * (k100 * k100) + k145
+    inertia_head_yy = mass_head * (k101 * k101) + k145
+    k18 = mass_upper_arm_right * k130
+    k146 = k130 * k18
+    inertia_upper_arm_left_xx = k93 + k146
+    inertia_upper_arm_left_yy = k95 + k146
+    k19 = k134 * mass_abdomen
+    k147 = k134 * k19
+    inertia_abdomen_xx = mass_abdomen * (k103 * k103) + k147
+    inertia_abdomen_yy = mass_abdomen * (k104 * k104) + k147
+    k20 = mass_forearm_right * k128
+    k148 = k128 * k20
+    inertia_forearm_left_xx = k88 + k148
+    inertia_forearm_left_yy = k90 + k148
+    k21 = k135 * mass_pelvis
+    k149 = k135 * k21
+    inertia_pelvis_xx = mass_pelvis * (k106 * k106) + k149
+    inertia_pelvis_yy = mass_pelvis * (k107 * k107) + k149
+    k22 = k125 * mass_hand_right
+    k150 = k125 * k22
+    inertia_hand_left_xx = k83 + k150
+    inertia_hand_left_yy = k85 + k150
+    k23 = k136 * mass_thigh_left
+    k151 = k136 * k23
+    inertia_thigh_left_xx = mass_thigh_left * (k109 * k109) + k151
+    inertia_thigh_left_yy = mass_thigh_left * (k111 * k111) + k151
+    k24 = k137 * mass_shank_left
+    k152 = k137 * k24
+    inertia_shank_left_xx = mass_shank_left * (k114 * k114) + k152
+    inertia_shank_left_yy = mass_shank_left * (k116 * k116) + k152
+    moment_foot_left_x = k139 * mass_foot_left
+    k25 = k138 * mass_foot_left
+    k153 = k139 * moment_foot_left_x
+    k154 = k138 * k25
+    inertia_foot_left_xz = k138 * moment_foot_left_x
+    inertia_foot_left_xx = mass_foot_left * (k119 * k119) + k154
+    inertia_foot_left_yy = mass_foot_left * (k121 * k121) + (k153 + k154)
+    inertia_foot_left_zz = mass_foot_left * (k123 * k123) + k153
     k26 = inertia_foot_left_xz / inertia_foot_left_xx
     k27 = k25 / inertia_foot_left_xx
     k28 = inertia_foot_left_zz - inertia_foot_left_xz * k26
@@ -801,82 +798,69 @@ def _constants(values):
     k40 = k17 / inertia_head_yy
     k41 = mass_head - k17 * k40
     k42 = k1 * k1
-    k165 = 0.5 * (inertia_hand_right_zz + (inertia_hand_right_xx + inertia_hand_right_yy))
-    k166 = k165 - inertia_hand_right_xx
-    k167 = k165 - inertia_hand_right_yy
-    k168 = k165 - inertia_hand_right_zz
-    k43 = k167 - k168
-    k44 = k168 - k166
-    k45 = k166 - k167
-    k169 = inertia_forearm_right_zz + (inertia_forearm_right_xx + inertia_forearm_right_yy)
-    k170 = 0.5 * k169
-    k46 = k170 - inertia_forearm_right_xx
-    k47 = k170 - inertia_forearm_right_yy
-    k48 = k170 - inertia_forearm_right_zz
-    k171 = inertia_upper_arm_right_zz + (inertia_upper_arm_right_xx + inertia_upper_arm_right_yy)
-    k172 = 0.5 * k171
-    k49 = k172 - inertia_upper_arm_right_xx
-    k50 = k172 - inertia_upper_arm_right_yy
-    k51 = k172 - inertia_upper_arm_right_zz
-    k173 = 0.5 * (inertia_thorax_zz + (inertia_thorax_xx + inertia_thorax_yy))
-    k52 = k173 - inertia_thorax_xx
-    k53 = k173 - inertia_thorax_yy
-    k54 = k173 - inertia_thorax_zz
-    k174 = 0.5 * (inertia_head_zz + (inertia_head_xx + inertia_head_yy))
-    k55 = k174 - inertia_head_xx
-    k56 = k174 - inertia_head_yy
-    k57 = k174 - inertia_head_zz
-    k175 = inertia_upper_arm_right_zz + (inertia_upper_arm_left_xx + inertia_upper_arm_left_yy)
-    k176 = 0.5 * k175
-    k58 = k176 - inertia_upper_arm_left_xx
-    k59 = k176 - inertia_upper_arm_left_yy
-    k60 = k176 - inertia_upper_arm_right_zz
-    k177 = 0.5 * (inertia_abdomen_zz + (inertia_abdomen_xx + inertia_abdomen_yy))
-    k61 = k177 - inertia_abdomen_xx
-    k62 = k177 - inertia_abdomen_yy
-    k63 = k177 - inertia_abdomen_zz
-    k178 = inertia_forearm_right_zz + (inertia_forearm_left_xx + inertia_forearm_left_yy)
-    k179 = 0.5 * k178
-    k64 = k179 - inertia_forearm_left_xx
-    k65 = k179 - inertia_forearm_left_yy
-    k66 = k179 - inertia_forearm_right_zz
-    k180 = 0.5 * (inertia_pelvis_zz + (inertia_pelvis_xx + inertia_pelvis_yy))
-    k67 = k180 - inertia_pelvis_xx
-    k68 = k180 - inertia_pelvis_yy
-    k69 = k180 - inertia_pelvis_zz
-    k181 = 0.5 * (inertia_hand_right_zz + (inertia_hand_left_xx + inertia_hand_left_yy))
-    k70 = k181 - inertia_hand_left_xx
-    k71 = k181 - inertia_hand_left_yy
-    k72 = k181 - inertia_hand_right_zz
-    k182 = 0.5 * (inertia_thigh_left_zz + (inertia_thigh_left_xx + inertia_thigh_left_yy))
-    k73 = k182 - inertia_thigh_left_xx
-    k74 = k182 - inertia_thigh_left_yy
-    k75 = k182 - inertia_thigh_left_zz
-    k183 = 0.5 * (inertia_shank_left_zz + (inertia_shank_left_xx + inertia_shank_left_yy))
-    k76 = k183 - inertia_shank_left_xx
-    k77 = k183 - inertia_shank_left_yy
-    k78 = k183 - inertia_shank_left_zz
-    k184 = 0.5 * (inertia_foot_left_zz + (inertia_foot_left_xx + inertia_foot_left_yy))
-    k79 = k184 - inertia_foot_left_xx
-    k80 = k184 - inertia_foot_left_yy
-    k81 = k184 - inertia_foot_left_zz
-    k96 = g * mass_hand_right
-    k97 = g * mass_forearm_right
-    k98 = g * mass_upper_arm_right
-    k99 = g * mass_thorax
-    k100 = g * mass_head
-    k101 = g * mass_abdomen
-    k102 = g * mass_pelvis
-    k103 = g * mass_thigh_left
-    k104 = g * mass_shank_left
-    k105 = g * mass_foot_left
+    k155 = 0.5 * (inertia_hand_right_zz + (inertia_hand_right_xx + inertia_hand_right_yy))
+    k156 = k155 - inertia_hand_right_xx
+    k157 = k155 - inertia_hand_right_yy
+    k158 = k155 - inertia_hand_right_zz
+    k43 = k157 - k158
+    k44 = k158 - k156
+    k45 = k156 - k157
+    k159 = inertia_forearm_right_zz + (inertia_forearm_right_xx + inertia_forearm_right_yy)
+    k160 = 0.5 * k159
+    k46 = k160 - inertia_forearm_right_xx
+    k47 = k160 - inertia_forearm_right_yy
+    k48 = k160 - inertia_forearm_right_zz
+    k161 = inertia_upper_arm_right_zz + (inertia_upper_arm_right_xx + inertia_upper_arm_right_yy)
+    k162 = 0.5 * k161
+    k49 = k162 - inertia_upper_arm_right_xx
+    k50 = k162 - inertia_upper_arm_right_yy
+    k51 = k162 - inertia_upper_arm_right_zz
+    k163 = 0.5 * (inertia_thorax_zz + (inertia_thorax_xx + inertia_thorax_yy))
+    k52 = k163 - inertia_thorax_xx
+    k53 = k163 - inertia_thorax_yy
+    k54 = k163 - inertia_thorax_zz
+    k164 = 0.5 * (inertia_head_zz + (inertia_head_xx + inertia_head_yy))
+    k55 = k164 - inertia_head_xx
+    k56 = k164 - inertia_head_yy
+    k57 = k164 - inertia_head_zz
+    k165 = inertia_upper_arm_right_zz + (inertia_upper_arm_left_xx + inertia_upper_arm_left_yy)
+    k166 = 0.5 * k165
+    k58 = k166 - inertia_upper_arm_left_xx
+    k59 = k166 - inertia_upper_arm_left_yy
+    k60 = k166 - inertia_upper_arm_right_zz
+    k167 = 0.5 * (inertia_abdomen_zz + (inertia_abdomen_xx + inertia_abdomen_yy))
+    k61 = k167 - inertia_abdomen_xx
+    k62 = k167 - inertia_abdomen_yy
+    k63 = k167 - inertia_abdomen_zz
+    k168 = inertia_forearm_right_zz + (inertia_forearm_left_xx + inertia_forearm_left_yy)
+    k169 = 0.5 * k168
+    k64 = k169 - inertia_forearm_left_xx
+    k65 = k169 - inertia_forearm_left_yy
+    k66 = k169 - inertia_forearm_right_zz
+    k170 = 0.5 * (inertia_pelvis_zz + (inertia_pelvis_xx + inertia_pelvis_yy))
+    k67 = k170 - inertia_pelvis_xx
+    k68 = k170 - inertia_pelvis_yy
+    k69 = k170 - inertia_pelvis_zz
+    k171 = 0.5 * (inertia_hand_right_zz + (inertia_hand_left_xx + inertia_hand_left_yy))
+    k70 = k171 - inertia_hand_left_xx
+    k71 = k171 - inertia_hand_left_yy
+    k72 = k171 - inertia_hand_right_zz
+    k172 = 0.5 * (inertia_thigh_left_zz + (inertia_thigh_left_xx + inertia_thigh_left_yy))
+    k73 = k172 - inertia_thigh_left_xx
+    k74 = k172 - inertia_thigh_left_yy
+    k75 = k172 - inertia_thigh_left_zz
+    k173 = 0.5 * (inertia_shank_left_zz + (inertia_shank_left_xx + inertia_shank_left_yy))
+    k76 = k173 - inertia_shank_left_xx
+    k77 = k173 - inertia_shank_left_yy
+    k78 = k173 - inertia_shank_left_zz
+    k174 = 0.5 * (inertia_foot_left_zz + (inertia_foot_left_xx + inertia_foot_left_yy))
+    k79 = k174 - inertia_foot_left_xx
+    k80 = k174 - inertia_foot_left_yy
+    k81 = k174 - inertia_foot_left_zz
     return {
         "initial_state": (),
         "derivative": (w_shoulder, w_hip, g, mass_hand_right, inertia_hand_right_zz, k1, mass_forearm_right, inertia_forearm_right_zz, k2, mass_upper_arm_right, inertia_upper_arm_right_zz, k3, mass_thorax, k4, mass_head, inertia_head_zz, k5, k6, k7, mass_abdomen, inertia_abdomen_zz, k8, k9, mass_pelvis, inertia_pelvis_zz, k10, k11, mass_thigh_left, inertia_thigh_left_zz, k12, mass_shank_left, inertia_shank_left_zz, k13, mass_foot_left, moment_hand_right_z, inertia_hand_right_xx, inertia_hand_right_yy, k14, inertia_forearm_right_xx, inertia_forearm_right_yy, k15, inertia_upper_arm_right_xx, inertia_upper_arm_right_yy, moment_thorax_y, moment_thorax_z, k16, inertia_thorax_xx, inertia_thorax_yy, inertia_thorax_zz, k17, inertia_head_xx, inertia_head_yy, k18, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, k19, inertia_abdomen_xx, inertia_abdomen_yy, k20, inertia_forearm_left_xx, inertia_forearm_left_yy, k21, inertia_pelvis_xx, inertia_pelvis_yy, k22, inertia_hand_left_xx, inertia_hand_left_yy, k23, inertia_thigh_left_xx, inertia_thigh_left_yy, k24, inertia_shank_left_xx, inertia_shank_left_yy, moment_foot_left_x, k25, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73, k74, k75, k76, k77, k78, k79, k80, k81),
         "jacobian": (w_shoulder, w_hip, g, mass_hand_right, inertia_hand_right_zz, k1, mass_forearm_right, inertia_forearm_right_zz, k2, mass_upper_arm_right, inertia_upper_arm_right_zz, k3, mass_thorax, k4, mass_head, inertia_head_zz, k5, k6, k7, mass_abdomen, inertia_abdomen_zz, k8, k9, mass_pelvis, inertia_pelvis_zz, k10, k11, mass_thigh_left, inertia_thigh_left_zz, k12, mass_shank_left, inertia_shank_left_zz, k13, mass_foot_left, moment_hand_right_z, inertia_hand_right_xx, inertia_hand_right_yy, k14, inertia_forearm_right_xx, inertia_forearm_right_yy, k15, inertia_upper_arm_right_xx, inertia_upper_arm_right_yy, moment_thorax_y, moment_thorax_z, k16, inertia_thorax_xx, inertia_thorax_yy, inertia_thorax_zz, k17, inertia_head_xx, inertia_head_yy, k18, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, k19, inertia_abdomen_xx, inertia_abdomen_yy, k20, inertia_forearm_left_xx, inertia_forearm_left_yy, k21, inertia_pelvis_xx, inertia_pelvis_yy, k22, inertia_hand_left_xx, inertia_hand_left_yy, k23, inertia_thigh_left_xx, inertia_thigh_left_yy, k24, inertia_shank_left_xx, inertia_shank_left_yy, moment_foot_left_x, k25, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73, k74, k75, k76, k77, k78, k79, k80, k81),
-        "kinetic_energy": (w_shoulder, w_hip, mass_hand_right, inertia_hand_right_zz, k1, mass_forearm_right, inertia_forearm_right_zz, k2, mass_upper_arm_right, inertia_upper_arm_right_zz, k3, mass_thorax, k4, mass_head, inertia_head_zz, k5, k6, k7, mass_abdomen, inertia_abdomen_zz, k8, k9, mass_pelvis, inertia_pelvis_zz, k10, k11, mass_thigh_left, inertia_thigh_left_zz, k12, mass_shank_left, inertia_shank_left_zz, k13, mass_foot_left, inertia_hand_right_xx, inertia_hand_right_yy, k14, inertia_forearm_right_xx, inertia_forearm_right_yy, k15, inertia_upper_arm_right_xx, inertia_upper_arm_right_yy, moment_thorax_y, moment_thorax_z, k16, inertia_thorax_xx, inertia_thorax_yy, inertia_thorax_zz, k17, inertia_head_xx, inertia_head_yy, k18, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, k19, inertia_abdomen_xx, inertia_abdomen_yy, k20, inertia_forearm_left_xx, inertia_forearm_left_yy, k21, inertia_pelvis_xx, inertia_pelvis_yy, k22, inertia_hand_left_xx, inertia_hand_left_yy, k23, inertia_thigh_left_xx, inertia_thigh_left_yy, k24, inertia_shank_left_xx, inertia_shank_left_yy, moment_foot_left_x, k25, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, inertia_foot_left_zz),
-        "potential_energy": (w_shoulder, w_hip, k82, k83, k1, k84, k85, k2, k86, k87, k3, k88, k4, k89, k5, k6, k7, k90, k8, k9, k91, k10, k11, k92, k12, k93, k13, k94, k95, k96, k97, k98, k99, k100, k101, k102, k103, k104, k105),
-        "body_poses": (w_shoulder, w_hip, k82, k83, k1, k84, k85, k2, k86, k87, k3, k88, k4, k89, k5, k6, k7, k90, k8, k9, k91, k10, k11, k92, k12, k93, k13, k94, k95),
     }
 
 
@@ -6423,1220 +6407,6 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
-def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """1098 operations: 339 add, 110 sub, 614 mul, 7 div, 14 sin, 14 cos."""
-    w_shoulder, w_hip, mass_hand_right, inertia_hand_right_zz, k1, mass_forearm_right, inertia_forearm_right_zz, k2, mass_upper_arm_right, inertia_upper_arm_right_zz, k3, mass_thorax, k4, mass_head, inertia_head_zz, k5, k6, k7, mass_abdomen, inertia_abdomen_zz, k8, k9, mass_pelvis, inertia_pelvis_zz, k10, k11, mass_thigh_left, inertia_thigh_left_zz, k12, mass_shank_left, inertia_shank_left_zz, k13, mass_foot_left, inertia_hand_right_xx, inertia_hand_right_yy, k14, inertia_forearm_right_xx, inertia_forearm_right_yy, k15, inertia_upper_arm_right_xx, inertia_upper_arm_right_yy, moment_thorax_y, moment_thorax_z, k16, inertia_thorax_xx, inertia_thorax_yy, inertia_thorax_zz, k17, inertia_head_xx, inertia_head_yy, k18, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, k19, inertia_abdomen_xx, inertia_abdomen_yy, k20, inertia_forearm_left_xx, inertia_forearm_left_yy, k21, inertia_pelvis_xx, inertia_pelvis_yy, k22, inertia_hand_left_xx, inertia_hand_left_yy, k23, inertia_thigh_left_xx, inertia_thigh_left_yy, k24, inertia_shank_left_xx, inertia_shank_left_yy, moment_foot_left_x, k25, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, inertia_foot_left_zz = k
-    _, _, _, _, wrist_right_deviation, wrist_right_flexion, elbow_right_pronation, elbow_right_flexion, shoulder_right_qw, shoulder_right_qx, shoulder_right_qy, shoulder_right_qz, neck_qw, neck_qx, neck_qy, neck_qz, shoulder_left_qw, shoulder_left_qx, shoulder_left_qy, shoulder_left_qz, thoracic_qw, thoracic_qx, thoracic_qy, thoracic_qz, elbow_left_flexion, elbow_left_pronation, lumbar_qw, lumbar_qx, lumbar_qy, lumbar_qz, wrist_left_flexion, wrist_left_deviation, hip_left_qw, hip_left_qx, hip_left_qy, hip_left_qz, hip_right_qw, hip_right_qx, hip_right_qy, hip_right_qz, knee_left_flexion, knee_right_flexion, ankle_left_flexion, ankle_left_inversion, ankle_right_flexion, ankle_right_inversion, grip_wx, grip_wy, grip_wz, wrist_right_deviation_dot, wrist_right_flexion_dot, elbow_right_pronation_dot, elbow_right_flexion_dot, shoulder_right_wx, shoulder_right_wy, shoulder_right_wz, neck_wx, neck_wy, neck_wz, shoulder_left_wx, shoulder_left_wy, shoulder_left_wz, thoracic_wx, thoracic_wy, thoracic_wz, elbow_left_flexion_dot, elbow_left_pronation_dot, lumbar_wx, lumbar_wy, lumbar_wz, wrist_left_flexion_dot, wrist_left_deviation_dot, hip_left_wx, hip_left_wy, hip_left_wz, hip_right_wx, hip_right_wy, hip_right_wz, knee_left_flexion_dot, knee_right_flexion_dot, ankle_left_flexion_dot, ankle_left_inversion_dot, ankle_right_flexion_dot, ankle_right_inversion_dot = y
-    cos_wrist_right_deviation = cos(wrist_right_deviation)
-    sin_wrist_right_deviation = sin(wrist_right_deviation)
-    cos_wrist_right_flexion = cos(wrist_right_flexion)
-    sin_wrist_right_flexion = sin(wrist_right_flexion)
-    cos_elbow_right_pronation = cos(elbow_right_pronation)
-    sin_elbow_right_pronation = sin(elbow_right_pronation)
-    cos_elbow_right_flexion = cos(elbow_right_flexion)
-    sin_elbow_right_flexion = sin(elbow_right_flexion)
-    s5 = shoulder_right_qw * shoulder_right_qw + shoulder_right_qx * shoulder_right_qx
-    s6 = s5 + shoulder_right_qy * shoulder_right_qy + shoulder_right_qz * shoulder_right_qz
-    s7 = 2.0 / s6
-    s8 = shoulder_right_qx * s7
-    s9 = shoulder_right_qy * s7
-    s10 = shoulder_right_qz * s7
-    s11 = shoulder_right_qw * s8
-    s12 = shoulder_right_qw * s9
-    s13 = shoulder_right_qw * s10
-    s14 = shoulder_right_qx * s8
-    s15 = shoulder_right_qy * s9
-    s16 = shoulder_right_qz * s10
-    s17 = shoulder_right_qy * s8
-    s18 = shoulder_right_qz * s8
-    s19 = shoulder_right_qz * s9
-    s20 = 1.0 - (s15 + s16)
-    s21 = s17 - s13
-    s22 = s12 + s18
-    s23 = s13 + s17
-    s24 = 1.0 - (s14 + s16)
-    s25 = s19 - s11
-    s26 = s18 - s12
-    s27 = s11 + s19
-    s28 = 1.0 - (s14 + s15)
-    s29 = neck_qw * neck_qw + neck_qx * neck_qx + neck_qy * neck_qy + neck_qz * neck_qz
-    s30 = 2.0 / s29
-    s31 = neck_qx * s30
-    s32 = neck_qy * s30
-    s33 = neck_qz * s30
-    s34 = neck_qw * s31
-    s35 = neck_qw * s32
-    s36 = neck_qw * s33
-    s37 = neck_qx * s31
-    s38 = neck_qy * s32
-    s39 = neck_qz * s33
-    s40 = neck_qy * s31
-    s41 = neck_qz * s31
-    s42 = neck_qz * s32
-    s43 = 1.0 - (s38 + s39)
-    s44 = s40 - s36
-    s45 = s35 + s41
-    s46 = s36 + s40
-    s47 = 1.0 - (s37 + s39)
-    s48 = s42 - s34
-    s49 = s41 - s35
-    s50 = s34 + s42
-    s51 = 1.0 - (s37 + s38)
-    s52 = shoulder_left_qw * shoulder_left_qw + shoulder_left_qx * shoulder_left_qx
-    s53 = s52 + shoulder_left_qy * shoulder_left_qy + shoulder_left_qz * shoulder_left_qz
-    s54 = 2.0 / s53
-    s55 = shoulder_left_qx * s54
-    s56 = shoulder_left_qy * s54
-    s57 = shoulder_left_qz * s54
-    s58 = shoulder_left_qw * s55
-    s59 = shoulder_left_qw * s56
-    s60 = shoulder_left_qw * s57
-    s61 = shoulder_left_qx * s55
-    s62 = shoulder_left_qy * s56
-    s63 = shoulder_left_qz * s57
-    s64 = shoulder_left_qy * s55
-    s65 = shoulder_left_qz * s55
-    s66 = shoulder_left_qz * s56
-    s67 = 1.0 - (s62 + s63)
-    s68 = s64 - s60
-    s69 = s59 + s65
-    s70 = s60 + s64
-    s71 = 1.0 - (s61 + s63)
-    s72 = s66 - s58
-    s73 = s65 - s59
-    s74 = s58 + s66
-    s75 = 1.0 - (s61 + s62)
-    s76 = thoracic_qw * thoracic_qw + thoracic_qx * thoracic_qx + thoracic_qy * thoracic_qy
-    s77 = 2.0 / (s76 + thoracic_qz * thoracic_qz)
-    s78 = thoracic_qx * s77
-    s79 = thoracic_qy * s77
-    s80 = thoracic_qz * s77
-    s81 = thoracic_qw * s78
-    s82 = thoracic_qw * s79
-    s83 = thoracic_qw * s80
-    s84 = thoracic_qx * s78
-    s85 = thoracic_qy * s79
-    s86 = thoracic_qz * s80
-    s87 = thoracic_qy * s78
-    s88 = thoracic_qz * s78
-    s89 = thoracic_qz * s79
-    s90 = 1.0 - (s85 + s86)
-    s91 = s87 - s83
-    s92 = s82 + s88
-    s93 = s83 + s87
-    s94 = 1.0 - (s84 + s86)
-    s95 = s89 - s81
-    s96 = s88 - s82
-    s97 = s81 + s89
-    s98 = 1.0 - (s84 + s85)
-    cos_elbow_left_flexion = cos(elbow_left_flexion)
-    sin_elbow_left_flexion = sin(elbow_left_flexion)
-    cos_elbow_left_pronation = cos(elbow_left_pronation)
-    sin_elbow_left_pronation = sin(elbow_left_pronation)
-    s100 = lumbar_qw * lumbar_qw + lumbar_qx * lumbar_qx + lumbar_qy * lumbar_qy + lumbar_qz * lumbar_qz
-    s101 = 2.0 / s100
-    s102 = lumbar_qx * s101
-    s103 = lumbar_qy * s101
-    s104 = lumbar_qz * s101
-    s105 = lumbar_qw * s102
-    s106 = lumbar_qw * s103
-    s107 = lumbar_qw * s104
-    s108 = lumbar_qx * s102
-    s109 = lumbar_qy * s103
-    s110 = lumbar_qz * s104
-    s111 = lumbar_qy * s102
-    s112 = lumbar_qz * s102
-    s113 = lumbar_qz * s103
-    s114 = 1.0 - (s109 + s110)
-    s115 = s111 - s107
-    s116 = s106 + s112
-    s117 = s107 + s111
-    s118 = 1.0 - (s108 + s110)
-    s119 = s113 - s105
-    s120 = s112 - s106
-    s121 = s105 + s113
-    s122 = 1.0 - (s108 + s109)
-    cos_wrist_left_flexion = cos(wrist_left_flexion)
-    sin_wrist_left_flexion = sin(wrist_left_flexion)
-    cos_wrist_left_deviation = cos(wrist_left_deviation)
-    sin_wrist_left_deviation = sin(wrist_left_deviation)
-    s123 = hip_left_qw * hip_left_qw + hip_left_qx * hip_left_qx + hip_left_qy * hip_left_qy
-    s124 = 2.0 / (s123 + hip_left_qz * hip_left_qz)
-    s125 = hip_left_qx * s124
-    s126 = hip_left_qy * s124
-    s127 = hip_left_qz * s124
-    s128 = hip_left_qw * s125
-    s129 = hip_left_qw * s126
-    s130 = hip_left_qw * s127
-    s131 = hip_left_qx * s125
-    s132 = hip_left_qy * s126
-    s133 = hip_left_qz * s127
-    s134 = hip_left_qy * s125
-    s135 = hip_left_qz * s125
-    s136 = hip_left_qz * s126
-    s137 = 1.0 - (s132 + s133)
-    s138 = s134 - s130
-    s139 = s129 + s135
-    s140 = s130 + s134
-    s141 = 1.0 - (s131 + s133)
-    s142 = s136 - s128
-    s143 = s135 - s129
-    s144 = s128 + s136
-    s145 = 1.0 - (s131 + s132)
-    s146 = hip_right_qw * hip_right_qw + hip_right_qx * hip_right_qx + hip_right_qy * hip_right_qy
-    s147 = 2.0 / (s146 + hip_right_qz * hip_right_qz)
-    s148 = hip_right_qx * s147
-    s149 = hip_right_qy * s147
-    s150 = hip_right_qz * s147
-    s151 = hip_right_qw * s148
-    s152 = hip_right_qw * s149
-    s153 = hip_right_qw * s150
-    s154 = hip_right_qx * s148
-    s155 = hip_right_qy * s149
-    s156 = hip_right_qz * s150
-    s157 = hip_right_qy * s148
-    s158 = hip_right_qz * s148
-    s159 = hip_right_qz * s149
-    s160 = 1.0 - (s155 + s156)
-    s161 = s157 - s153
-    s162 = s152 + s158
-    s163 = s153 + s157
-    s164 = 1.0 - (s154 + s156)
-    s165 = s159 - s151
-    s166 = s158 - s152
-    s167 = s151 + s159
-    s168 = 1.0 - (s154 + s155)
-    cos_knee_left_flexion = cos(knee_left_flexion)
-    sin_knee_left_flexion = sin(knee_left_flexion)
-    cos_knee_right_flexion = cos(knee_right_flexion)
-    sin_knee_right_flexion = sin(knee_right_flexion)
-    cos_ankle_left_flexion = cos(ankle_left_flexion)
-    sin_ankle_left_flexion = sin(ankle_left_flexion)
-    cos_ankle_left_inversion = cos(ankle_left_inversion)
-    sin_ankle_left_inversion = sin(ankle_left_inversion)
-    cos_ankle_right_flexion = cos(ankle_right_flexion)
-    sin_ankle_right_flexion = sin(ankle_right_flexion)
-    cos_ankle_right_inversion = cos(ankle_right_inversion)
-    sin_ankle_right_inversion = sin(ankle_right_inversion)
-    omega_forearm_right_1_z = grip_wz * cos_wrist_right_deviation + grip_wy * sin_wrist_right_deviation
-    s3386 = grip_wy * k1
-    s3387 = grip_wx * k1
-    velocity_forearm_right_1_y = cos_wrist_right_deviation * s3387
-    s3388 = sin_wrist_right_deviation * s3387
-    s854 = grip_wx - wrist_right_deviation_dot
-    s3389 = grip_wy * cos_wrist_right_deviation - grip_wz * sin_wrist_right_deviation
-    omega_forearm_right_z = cos_wrist_right_flexion * omega_forearm_right_1_z + sin_wrist_right_flexion * s854
-    omega_forearm_right_x = cos_wrist_right_flexion * s854 - sin_wrist_right_flexion * omega_forearm_right_1_z
-    velocity_forearm_right_z = sin_wrist_right_flexion * s3386 - cos_wrist_right_flexion * s3388
-    velocity_forearm_right_x = cos_wrist_right_flexion * s3386 + sin_wrist_right_flexion * s3388
-    omega_forearm_right_y = wrist_right_flexion_dot + s3389
-    omega_upper_arm_right_1_x = cos_elbow_right_pronation * omega_forearm_right_x - sin_elbow_right_pronation * omega_forearm_right_y
-    s855 = cos_elbow_right_pronation * omega_forearm_right_y + sin_elbow_right_pronation * omega_forearm_right_x
-    s3390 = velocity_forearm_right_x + k2 * omega_forearm_right_y
-    s3391 = velocity_forearm_right_1_y + k2 * omega_forearm_right_x
-    velocity_upper_arm_right_1_x = cos_elbow_right_pronation * s3390 + sin_elbow_right_pronation * s3391
-    s856 = omega_forearm_right_z - elbow_right_pronation_dot
-    omega_upper_arm_right_z = cos_elbow_right_flexion * s856 + sin_elbow_right_flexion * omega_upper_arm_right_1_x
-    omega_upper_arm_right_x = cos_elbow_right_flexion * omega_upper_arm_right_1_x - sin_elbow_right_flexion * s856
-    velocity_upper_arm_right_y = sin_elbow_right_pronation * s3390 - cos_elbow_right_pronation * s3391
-    velocity_upper_arm_right_z = cos_elbow_right_flexion * velocity_forearm_right_z + sin_elbow_right_flexion * velocity_upper_arm_right_1_x
-    velocity_upper_arm_right_x = cos_elbow_right_flexion * velocity_upper_arm_right_1_x - sin_elbow_right_flexion * velocity_forearm_right_z
-    omega_upper_arm_right_y = elbow_right_flexion_dot + s855
-    s857 = s20 * omega_upper_arm_right_x + s23 * omega_upper_arm_right_y + s26 * omega_upper_arm_right_z
-    s858 = s21 * omega_upper_arm_right_x + s24 * omega_upper_arm_right_y + s27 * omega_upper_arm_right_z
-    s859 = s22 * omega_upper_arm_right_x + s25 * omega_upper_arm_right_y + s28 * omega_upper_arm_right_z
-    s3392 = velocity_upper_arm_right_x + k3 * omega_upper_arm_right_y
-    s3393 = velocity_upper_arm_right_y - k3 * omega_upper_arm_right_x
-    velocity_thorax_x = s20 * s3392 + s23 * s3393 + s26 * velocity_upper_arm_right_z
-    velocity_thorax_y = s21 * s3392 + s24 * s3393 + s27 * velocity_upper_arm_right_z
-    velocity_thorax_z = s22 * s3392 + s25 * s3393 + s28 * velocity_upper_arm_right_z
-    omega_thorax_x = shoulder_right_wx + s857
-    omega_thorax_y = shoulder_right_wy + s858
-    omega_thorax_z = shoulder_right_wz + s859
-    s3394 = w_shoulder * omega_thorax_z
-    s3395 = velocity_thorax_x + (k4 * omega_thorax_y - s3394)
-    s3396 = velocity_thorax_y - k4 * omega_thorax_x
-    s3397 = velocity_thorax_z + w_shoulder * omega_thorax_x
-    velocity_head_x = s43 * s3395 + s46 * s3396 + s49 * s3397
-    velocity_head_y = s44 * s3395 + s47 * s3396 + s50 * s3397
-    velocity_head_z = s45 * s3395 + s48 * s3396 + s51 * s3397
-    omega_head_x = neck_wx + (s43 * omega_thorax_x + s46 * omega_thorax_y + s49 * omega_thorax_z)
-    omega_head_y = neck_wy + (s44 * omega_thorax_x + s47 * omega_thorax_y + s50 * omega_thorax_z)
-    omega_head_z = neck_wz + (s45 * omega_thorax_x + s48 * omega_thorax_y + s51 * omega_thorax_z)
-    s3398 = velocity_thorax_x + (k6 * omega_thorax_y - k5 * omega_thorax_z)
-    s3399 = velocity_thorax_y - k6 * omega_thorax_x
-    s3400 = velocity_thorax_z + k5 * omega_thorax_x
-    velocity_upper_arm_left_x = s67 * s3398 + s70 * s3399 + s73 * s3400
-    velocity_upper_arm_left_y = s68 * s3398 + s71 * s3399 + s74 * s3400
-    velocity_upper_arm_left_z = s69 * s3398 + s72 * s3399 + s75 * s3400
-    omega_upper_arm_left_x = shoulder_left_wx + (s67 * omega_thorax_x + s70 * omega_thorax_y + s73 * omega_thorax_z)
-    omega_upper_arm_left_y = shoulder_left_wy + (s68 * omega_thorax_x + s71 * omega_thorax_y + s74 * omega_thorax_z)
-    omega_upper_arm_left_z = shoulder_left_wz + (s69 * omega_thorax_x + s72 * omega_thorax_y + s75 * omega_thorax_z)
-    s3401 = velocity_thorax_x + (k7 * omega_thorax_y - s3394)
-    s3402 = velocity_thorax_y - k7 * omega_thorax_x
-    velocity_abdomen_x = s90 * s3401 + s93 * s3402 + s96 * s3397
-    velocity_abdomen_y = s91 * s3401 + s94 * s3402 + s97 * s3397
-    velocity_abdomen_z = s92 * s3401 + s95 * s3402 + s98 * s3397
-    omega_abdomen_x = thoracic_wx + (s90 * omega_thorax_x + s93 * omega_thorax_y + s96 * omega_thorax_z)
-    omega_abdomen_y = thoracic_wy + (s91 * omega_thorax_x + s94 * omega_thorax_y + s97 * omega_thorax_z)
-    omega_abdomen_z = thoracic_wz + (s92 * omega_thorax_x + s95 * omega_thorax_y + s98 * omega_thorax_z)
-    omega_forearm_left_1_z = cos_elbow_left_flexion * omega_upper_arm_left_z - sin_elbow_left_flexion * omega_upper_arm_left_x
-    s869 = cos_elbow_left_flexion * omega_upper_arm_left_x + sin_elbow_left_flexion * omega_upper_arm_left_z
-    s3403 = velocity_upper_arm_left_x + k8 * omega_upper_arm_left_y
-    s3404 = velocity_upper_arm_left_y - k8 * omega_upper_arm_left_x
-    velocity_forearm_left_1_z = cos_elbow_left_flexion * velocity_upper_arm_left_z - sin_elbow_left_flexion * s3403
-    s3405 = cos_elbow_left_flexion * s3403 + sin_elbow_left_flexion * velocity_upper_arm_left_z
-    s870 = omega_upper_arm_left_y - elbow_left_flexion_dot
-    omega_forearm_left_x = cos_elbow_left_pronation * s869 + sin_elbow_left_pronation * s870
-    s871 = cos_elbow_left_pronation * s870
-    s872 = sin_elbow_left_pronation * s869
-    omega_forearm_left_y = s871 - s872
-    velocity_forearm_left_x = cos_elbow_left_pronation * s3405 + sin_elbow_left_pronation * s3404
-    velocity_forearm_left_y = cos_elbow_left_pronation * s3404 - sin_elbow_left_pronation * s3405
-    omega_forearm_left_z = elbow_left_pronation_dot + omega_forearm_left_1_z
-    s3406 = velocity_abdomen_x + k9 * omega_abdomen_y
-    s3407 = velocity_abdomen_y - k9 * omega_abdomen_x
-    velocity_pelvis_x = s114 * s3406 + s117 * s3407 + s120 * velocity_abdomen_z
-    velocity_pelvis_y = s115 * s3406 + s118 * s3407 + s121 * velocity_abdomen_z
-    velocity_pelvis_z = s116 * s3406 + s119 * s3407 + s122 * velocity_abdomen_z
-    omega_pelvis_x = lumbar_wx + (s114 * omega_abdomen_x + s117 * omega_abdomen_y + s120 * omega_abdomen_z)
-    omega_pelvis_y = lumbar_wy + (s115 * omega_abdomen_x + s118 * omega_abdomen_y + s121 * omega_abdomen_z)
-    omega_pelvis_z = lumbar_wz + (s116 * omega_abdomen_x + s119 * omega_abdomen_y + s122 * omega_abdomen_z)
-    omega_hand_left_1_z = cos_wrist_left_flexion * omega_forearm_left_z - sin_wrist_left_flexion * omega_forearm_left_x
-    s876 = cos_wrist_left_flexion * omega_forearm_left_x + sin_wrist_left_flexion * omega_forearm_left_z
-    s3408 = velocity_forearm_left_x + k10 * omega_forearm_left_y
-    s3409 = velocity_forearm_left_y - k10 * omega_forearm_left_x
-    velocity_hand_left_1_z = cos_wrist_left_flexion * velocity_forearm_left_1_z - sin_wrist_left_flexion * s3408
-    velocity_hand_left_x = cos_wrist_left_flexion * s3408 + sin_wrist_left_flexion * velocity_forearm_left_1_z
-    omega_hand_left_1_y = wrist_left_flexion_dot + (s872 - s871)
-    omega_hand_left_y = sin_wrist_left_deviation * omega_hand_left_1_z - cos_wrist_left_deviation * omega_hand_left_1_y
-    omega_hand_left_z = cos_wrist_left_deviation * omega_hand_left_1_z + sin_wrist_left_deviation * omega_hand_left_1_y
-    velocity_hand_left_y = cos_wrist_left_deviation * s3409 + sin_wrist_left_deviation * velocity_hand_left_1_z
-    velocity_hand_left_z = cos_wrist_left_deviation * velocity_hand_left_1_z - sin_wrist_left_deviation * s3409
-    omega_hand_left_x = wrist_left_deviation_dot + s876
-    s3410 = k11 * omega_pelvis_y
-    s3411 = w_hip * omega_pelvis_z
-    s3412 = w_hip * omega_pelvis_x
-    s3413 = velocity_pelvis_x + (s3410 - s3411)
-    s3414 = velocity_pelvis_y - k11 * omega_pelvis_x
-    s3415 = velocity_pelvis_z + s3412
-    velocity_thigh_left_x = s137 * s3413 + s140 * s3414 + s143 * s3415
-    velocity_thigh_left_y = s138 * s3413 + s141 * s3414 + s144 * s3415
-    velocity_thigh_left_z = s139 * s3413 + s142 * s3414 + s145 * s3415
-    omega_thigh_left_x = hip_left_wx + (s137 * omega_pelvis_x + s140 * omega_pelvis_y + s143 * omega_pelvis_z)
-    omega_thigh_left_y = hip_left_wy + (s138 * omega_pelvis_x + s141 * omega_pelvis_y + s144 * omega_pelvis_z)
-    omega_thigh_left_z = hip_left_wz + (s139 * omega_pelvis_x + s142 * omega_pelvis_y + s145 * omega_pelvis_z)
-    s3416 = velocity_pelvis_x + (s3410 + s3411)
-    s3417 = velocity_pelvis_z - s3412
-    velocity_thigh_right_x = s160 * s3416 + s163 * s3414 + s166 * s3417
-    velocity_thigh_right_y = s161 * s3416 + s164 * s3414 + s167 * s3417
-    velocity_thigh_right_z = s162 * s3416 + s165 * s3414 + s168 * s3417
-    omega_thigh_right_x = hip_right_wx + (s160 * omega_pelvis_x + s163 * omega_pelvis_y + s166 * omega_pelvis_z)
-    omega_thigh_right_y = hip_right_wy + (s161 * omega_pelvis_x + s164 * omega_pelvis_y + s167 * omega_pelvis_z)
-    omega_thigh_right_z = hip_right_wz + (s162 * omega_pelvis_x + s165 * omega_pelvis_y + s168 * omega_pelvis_z)
-    omega_shank_left_z = cos_knee_left_flexion * omega_thigh_left_z + sin_knee_left_flexion * omega_thigh_left_x
-    omega_shank_left_x = cos_knee_left_flexion * omega_thigh_left_x - sin_knee_left_flexion * omega_thigh_left_z
-    s3418 = velocity_thigh_left_x + k12 * omega_thigh_left_y
-    velocity_shank_left_y = velocity_thigh_left_y - k12 * omega_thigh_left_x
-    velocity_shank_left_z = cos_knee_left_flexion * velocity_thigh_left_z + sin_knee_left_flexion * s3418
-    velocity_shank_left_x = cos_knee_left_flexion * s3418 - sin_knee_left_flexion * velocity_thigh_left_z
-    omega_shank_left_y = knee_left_flexion_dot + omega_thigh_left_y
-    omega_shank_right_z = cos_knee_right_flexion * omega_thigh_right_z + sin_knee_right_flexion * omega_thigh_right_x
-    omega_shank_right_x = cos_knee_right_flexion * omega_thigh_right_x - sin_knee_right_flexion * omega_thigh_right_z
-    s3419 = velocity_thigh_right_x + k12 * omega_thigh_right_y
-    velocity_shank_right_y = velocity_thigh_right_y - k12 * omega_thigh_right_x
-    velocity_shank_right_z = cos_knee_right_flexion * velocity_thigh_right_z + sin_knee_right_flexion * s3419
-    velocity_shank_right_x = cos_knee_right_flexion * s3419 - sin_knee_right_flexion * velocity_thigh_right_z
-    omega_shank_right_y = knee_right_flexion_dot + omega_thigh_right_y
-    omega_foot_left_1_z = cos_ankle_left_flexion * omega_shank_left_z + sin_ankle_left_flexion * omega_shank_left_x
-    omega_foot_left_1_x = cos_ankle_left_flexion * omega_shank_left_x - sin_ankle_left_flexion * omega_shank_left_z
-    s3420 = velocity_shank_left_x + k13 * omega_shank_left_y
-    velocity_foot_left_1_y = velocity_shank_left_y - k13 * omega_shank_left_x
-    velocity_foot_left_1_z = cos_ankle_left_flexion * velocity_shank_left_z + sin_ankle_left_flexion * s3420
-    velocity_foot_left_1_x = cos_ankle_left_flexion * s3420 - sin_ankle_left_flexion * velocity_shank_left_z
-    omega_foot_left_1_y = ankle_left_flexion_dot + omega_shank_left_y
-    omega_foot_left_y = cos_ankle_left_inversion * omega_foot_left_1_y + sin_ankle_left_inversion * omega_foot_left_1_z
-    omega_foot_left_z = cos_ankle_left_inversion * omega_foot_left_1_z - sin_ankle_left_inversion * omega_foot_left_1_y
-    velocity_foot_left_y = cos_ankle_left_inversion * velocity_foot_left_1_y + sin_ankle_left_inversion * velocity_foot_left_1_z
-    velocity_foot_left_z = cos_ankle_left_inversion * velocity_foot_left_1_z - sin_ankle_left_inversion * velocity_foot_left_1_y
-    omega_foot_left_x = ankle_left_inversion_dot + omega_foot_left_1_x
-    omega_foot_right_1_z = cos_ankle_right_flexion * omega_shank_right_z + sin_ankle_right_flexion * omega_shank_right_x
-    omega_foot_right_1_x = cos_ankle_right_flexion * omega_shank_right_x - sin_ankle_right_flexion * omega_shank_right_z
-    s3421 = velocity_shank_right_x + k13 * omega_shank_right_y
-    velocity_foot_right_1_y = velocity_shank_right_y - k13 * omega_shank_right_x
-    velocity_foot_right_1_z = cos_ankle_right_flexion * velocity_shank_right_z + sin_ankle_right_flexion * s3421
-    velocity_foot_right_1_x = cos_ankle_right_flexion * s3421 - sin_ankle_right_flexion * velocity_shank_right_z
-    omega_foot_right_1_y = ankle_right_flexion_dot + omega_shank_right_y
-    omega_foot_right_y = cos_ankle_right_inversion * omega_foot_right_1_y + sin_ankle_right_inversion * omega_foot_right_1_z
-    omega_foot_right_z = cos_ankle_right_inversion * omega_foot_right_1_z - sin_ankle_right_inversion * omega_foot_right_1_y
-    velocity_foot_right_y = cos_ankle_right_inversion * velocity_foot_right_1_y + sin_ankle_right_inversion * velocity_foot_right_1_z
-    velocity_foot_right_z = cos_ankle_right_inversion * velocity_foot_right_1_z - sin_ankle_right_inversion * velocity_foot_right_1_y
-    omega_foot_right_x = ankle_right_inversion_dot + omega_foot_right_1_x
-    s3422 = grip_wx * (grip_wx * inertia_hand_right_xx) + grip_wy * (grip_wy * inertia_hand_right_yy)
-    s3423 = velocity_forearm_right_1_y * velocity_forearm_right_1_y + velocity_forearm_right_x * velocity_forearm_right_x
-    s3424 = mass_forearm_right * (s3423 + velocity_forearm_right_z * velocity_forearm_right_z)
-    s3425 = omega_forearm_right_x * (inertia_forearm_right_xx * omega_forearm_right_x)
-    s3426 = omega_forearm_right_y * (inertia_forearm_right_yy * omega_forearm_right_y)
-    s3427 = omega_forearm_right_z * (inertia_forearm_right_zz * omega_forearm_right_z)
-    s3428 = s3422 + grip_wz * (grip_wz * inertia_hand_right_zz) + s3424 + (s3425 + s3426 + s3427)
-    s3429 = velocity_forearm_right_x * (k14 * omega_forearm_right_y) + velocity_forearm_right_1_y * (k14 * omega_forearm_right_x)
-    s3430 = velocity_upper_arm_right_x * velocity_upper_arm_right_x + velocity_upper_arm_right_y * velocity_upper_arm_right_y
-    s3431 = mass_upper_arm_right * (s3430 + velocity_upper_arm_right_z * velocity_upper_arm_right_z)
-    s3432 = omega_upper_arm_right_x * (inertia_upper_arm_right_xx * omega_upper_arm_right_x)
-    s3433 = omega_upper_arm_right_y * (inertia_upper_arm_right_yy * omega_upper_arm_right_y)
-    s3434 = omega_upper_arm_right_z * (inertia_upper_arm_right_zz * omega_upper_arm_right_z)
-    s3435 = velocity_upper_arm_right_y * (k15 * omega_upper_arm_right_x) - velocity_upper_arm_right_x * (k15 * omega_upper_arm_right_y)
-    s3436 = velocity_thorax_x * velocity_thorax_x + velocity_thorax_y * velocity_thorax_y
-    s3437 = s3428 + s3431 + (s3432 + s3433 + s3434) + mass_thorax * (s3436 + velocity_thorax_z * velocity_thorax_z)
-    s3438 = omega_thorax_y * (inertia_thorax_yy * omega_thorax_y - k16 * omega_thorax_z)
-    s3439 = omega_thorax_z * (inertia_thorax_zz * omega_thorax_z - k16 * omega_thorax_y)
-    s3440 = s3437 + (omega_thorax_x * (inertia_thorax_xx * omega_thorax_x) + s3438 + s3439)
-    s3441 = velocity_thorax_x * (moment_thorax_z * omega_thorax_y - moment_thorax_y * omega_thorax_z)
-    s3442 = s3441 - velocity_thorax_y * (moment_thorax_z * omega_thorax_x) + velocity_thorax_z * (moment_thorax_y * omega_thorax_x)
-    s3443 = velocity_head_x * velocity_head_x + velocity_head_y * velocity_head_y + velocity_head_z * velocity_head_z
-    s3444 = omega_head_x * (inertia_head_xx * omega_head_x) + omega_head_y * (inertia_head_yy * omega_head_y)
-    s3445 = s3440 + mass_head * s3443 + (s3444 + omega_head_z * (inertia_head_zz * omega_head_z))
-    s3446 = velocity_head_y * (k17 * omega_head_x) - velocity_head_x * (k17 * omega_head_y)
-    s3447 = velocity_upper_arm_left_x * velocity_upper_arm_left_x + velocity_upper_arm_left_y * velocity_upper_arm_left_y
-    s3448 = mass_upper_arm_right * (s3447 + velocity_upper_arm_left_z * velocity_upper_arm_left_z)
-    s3449 = omega_upper_arm_left_x * (inertia_upper_arm_left_xx * omega_upper_arm_left_x)
-    s3450 = omega_upper_arm_left_y * (inertia_upper_arm_left_yy * omega_upper_arm_left_y)
-    s3451 = omega_upper_arm_left_z * (inertia_upper_arm_right_zz * omega_upper_arm_left_z)
-    s3452 = velocity_upper_arm_left_y * (k18 * omega_upper_arm_left_x) - velocity_upper_arm_left_x * (k18 * omega_upper_arm_left_y)
-    s3453 = velocity_abdomen_x * velocity_abdomen_x + velocity_abdomen_y * velocity_abdomen_y
-    s3454 = s3445 + s3448 + (s3449 + s3450 + s3451) + mass_abdomen * (s3453 + velocity_abdomen_z * velocity_abdomen_z)
-    s3455 = omega_abdomen_x * (inertia_abdomen_xx * omega_abdomen_x) + omega_abdomen_y * (inertia_abdomen_yy * omega_abdomen_y)
-    s3456 = s3454 + (s3455 + omega_abdomen_z * (inertia_abdomen_zz * omega_abdomen_z))
-    s3457 = velocity_abdomen_y * (k19 * omega_abdomen_x) - velocity_abdomen_x * (k19 * omega_abdomen_y)
-    s3458 = velocity_forearm_left_x * velocity_forearm_left_x + velocity_forearm_left_y * velocity_forearm_left_y
-    s3459 = mass_forearm_right * (velocity_forearm_left_1_z * velocity_forearm_left_1_z + s3458)
-    s3460 = omega_forearm_left_x * (inertia_forearm_left_xx * omega_forearm_left_x) + omega_forearm_left_y * (inertia_forearm_left_yy * omega_forearm_left_y)
-    s3461 = s3460 + omega_forearm_left_z * (inertia_forearm_right_zz * omega_forearm_left_z)
-    s3462 = velocity_forearm_left_y * (k20 * omega_forearm_left_x) - velocity_forearm_left_x * (k20 * omega_forearm_left_y)
-    s3463 = velocity_pelvis_x * velocity_pelvis_x + velocity_pelvis_y * velocity_pelvis_y
-    s3464 = s3456 + s3459 + s3461 + mass_pelvis * (s3463 + velocity_pelvis_z * velocity_pelvis_z)
-    s3465 = omega_pelvis_x * (inertia_pelvis_xx * omega_pelvis_x) + omega_pelvis_y * (inertia_pelvis_yy * omega_pelvis_y)
-    s3466 = velocity_pelvis_y * (k21 * omega_pelvis_x) - velocity_pelvis_x * (k21 * omega_pelvis_y)
-    s3467 = velocity_hand_left_x * velocity_hand_left_x + velocity_hand_left_y * velocity_hand_left_y
-    s3468 = s3464 + (s3465 + omega_pelvis_z * (inertia_pelvis_zz * omega_pelvis_z)) + mass_hand_right * (s3467 + velocity_hand_left_z * velocity_hand_left_z)
-    s3469 = omega_hand_left_x * (inertia_hand_left_xx * omega_hand_left_x) + omega_hand_left_y * (inertia_hand_left_yy * omega_hand_left_y)
-    s3470 = s3468 + (s3469 + omega_hand_left_z * (inertia_hand_right_zz * omega_hand_left_z))
-    s3471 = velocity_hand_left_y * (k22 * omega_hand_left_x) - velocity_hand_left_x * (k22 * omega_hand_left_y)
-    s3472 = velocity_thigh_left_x * velocity_thigh_left_x + velocity_thigh_left_y * velocity_thigh_left_y
-    s3473 = mass_thigh_left * (s3472 + velocity_thigh_left_z * velocity_thigh_left_z)
-    s3474 = omega_thigh_left_x * (inertia_thigh_left_xx * omega_thigh_left_x) + omega_thigh_left_y * (inertia_thigh_left_yy * omega_thigh_left_y)
-    s3475 = s3474 + omega_thigh_left_z * (inertia_thigh_left_zz * omega_thigh_left_z)
-    s3476 = velocity_thigh_left_y * (k23 * omega_thigh_left_x) - velocity_thigh_left_x * (k23 * omega_thigh_left_y)
-    s3477 = s3435 - s3429 + s3442 + s3446 + s3452 + s3457 + s3462 + s3466 + s3471 + s3476
-    s3478 = velocity_thigh_right_x * velocity_thigh_right_x + velocity_thigh_right_y * velocity_thigh_right_y
-    s3479 = mass_thigh_left * (s3478 + velocity_thigh_right_z * velocity_thigh_right_z)
-    s3480 = omega_thigh_right_x * (inertia_thigh_left_xx * omega_thigh_right_x) + omega_thigh_right_y * (inertia_thigh_left_yy * omega_thigh_right_y)
-    s3481 = s3480 + omega_thigh_right_z * (inertia_thigh_left_zz * omega_thigh_right_z)
-    s3482 = velocity_thigh_right_y * (k23 * omega_thigh_right_x) - velocity_thigh_right_x * (k23 * omega_thigh_right_y)
-    s3483 = velocity_shank_left_x * velocity_shank_left_x + velocity_shank_left_y * velocity_shank_left_y
-    s3484 = mass_shank_left * (s3483 + velocity_shank_left_z * velocity_shank_left_z)
-    s3485 = omega_shank_left_x * (inertia_shank_left_xx * omega_shank_left_x) + omega_shank_left_y * (inertia_shank_left_yy * omega_shank_left_y)
-    s3486 = s3485 + omega_shank_left_z * (inertia_shank_left_zz * omega_shank_left_z)
-    s3487 = velocity_shank_left_y * (k24 * omega_shank_left_x) - velocity_shank_left_x * (k24 * omega_shank_left_y)
-    s3488 = velocity_shank_right_x * velocity_shank_right_x + velocity_shank_right_y * velocity_shank_right_y
-    s3489 = mass_shank_left * (s3488 + velocity_shank_right_z * velocity_shank_right_z)
-    s3490 = omega_shank_right_x * (inertia_shank_left_xx * omega_shank_right_x) + omega_shank_right_y * (inertia_shank_left_yy * omega_shank_right_y)
-    s3491 = s3490 + omega_shank_right_z * (inertia_shank_left_zz * omega_shank_right_z)
-    s3492 = velocity_shank_right_y * (k24 * omega_shank_right_x) - velocity_shank_right_x * (k24 * omega_shank_right_y)
-    s3493 = velocity_foot_left_1_x * velocity_foot_left_1_x + velocity_foot_left_y * velocity_foot_left_y
-    s3494 = s3470 + s3473 + s3475 + s3479 + s3481 + s3484 + s3486 + s3489 + s3491 + mass_foot_left * (s3493 + velocity_foot_left_z * velocity_foot_left_z)
-    s3495 = inertia_foot_left_xx * omega_foot_left_x + inertia_foot_left_xz * omega_foot_left_z
-    s3496 = inertia_foot_left_xz * omega_foot_left_x + inertia_foot_left_zz * omega_foot_left_z
-    s3497 = omega_foot_left_x * s3495 + omega_foot_left_y * (inertia_foot_left_yy * omega_foot_left_y)
-    s3498 = velocity_foot_left_y * (moment_foot_left_x * omega_foot_left_z + k25 * omega_foot_left_x)
-    s3499 = s3498 - velocity_foot_left_1_x * (k25 * omega_foot_left_y) - velocity_foot_left_z * (moment_foot_left_x * omega_foot_left_y)
-    s3500 = velocity_foot_right_1_x * velocity_foot_right_1_x + velocity_foot_right_y * velocity_foot_right_y
-    s3501 = s3494 + (s3497 + omega_foot_left_z * s3496) + mass_foot_left * (s3500 + velocity_foot_right_z * velocity_foot_right_z)
-    s3502 = inertia_foot_left_xx * omega_foot_right_x + inertia_foot_left_xz * omega_foot_right_z
-    s3503 = inertia_foot_left_xz * omega_foot_right_x + inertia_foot_left_zz * omega_foot_right_z
-    s3504 = omega_foot_right_x * s3502 + omega_foot_right_y * (inertia_foot_left_yy * omega_foot_right_y)
-    s3505 = velocity_foot_right_y * (moment_foot_left_x * omega_foot_right_z + k25 * omega_foot_right_x)
-    s3506 = s3505 - velocity_foot_right_1_x * (k25 * omega_foot_right_y) - velocity_foot_right_z * (moment_foot_left_x * omega_foot_right_y)
-    return (
-        s3477 + s3482 + s3487 + s3492 + s3499 + s3506 + 0.5 * (s3501 + (s3504 + omega_foot_right_z * s3503)),
-    )
-
-
-def _potential_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """530 operations: 149 add, 69 sub, 276 mul, 8 div, 14 sin, 14 cos."""
-    w_shoulder, w_hip, k82, k83, k1, k84, k85, k2, k86, k87, k3, k88, k4, k89, k5, k6, k7, k90, k8, k9, k91, k10, k11, k92, k12, k93, k13, k94, k95, k96, k97, k98, k99, k100, k101, k102, k103, k104, k105 = k
-    grip_qw, grip_qx, grip_qy, grip_qz, wrist_right_deviation, wrist_right_flexion, elbow_right_pronation, elbow_right_flexion, shoulder_right_qw, shoulder_right_qx, shoulder_right_qy, shoulder_right_qz, neck_qw, neck_qx, neck_qy, neck_qz, shoulder_left_qw, shoulder_left_qx, shoulder_left_qy, shoulder_left_qz, thoracic_qw, thoracic_qx, thoracic_qy, thoracic_qz, elbow_left_flexion, elbow_left_pronation, lumbar_qw, lumbar_qx, lumbar_qy, lumbar_qz, wrist_left_flexion, wrist_left_deviation, hip_left_qw, hip_left_qx, hip_left_qy, hip_left_qz, hip_right_qw, hip_right_qx, hip_right_qy, hip_right_qz, knee_left_flexion, knee_right_flexion, ankle_left_flexion, ankle_left_inversion, ankle_right_flexion, ankle_right_inversion, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _ = y
-    s1 = grip_qw * grip_qw + grip_qx * grip_qx + grip_qy * grip_qy + grip_qz * grip_qz
-    s2 = 2.0 / s1
-    s3 = grip_qx * s2
-    s4 = grip_qy * s2
-    s3507 = grip_qz * s3 - grip_qw * s4
-    s3508 = grip_qw * s3 + grip_qz * s4
-    s3509 = 1.0 - (grip_qx * s3 + grip_qy * s4)
-    cos_wrist_right_deviation = cos(wrist_right_deviation)
-    sin_wrist_right_deviation = sin(wrist_right_deviation)
-    s3510 = s3509 * sin_wrist_right_deviation - s3508 * cos_wrist_right_deviation
-    s3511 = s3509 * cos_wrist_right_deviation + s3508 * sin_wrist_right_deviation
-    cos_wrist_right_flexion = cos(wrist_right_flexion)
-    sin_wrist_right_flexion = sin(wrist_right_flexion)
-    s3512 = s3511 * cos_wrist_right_flexion + s3507 * sin_wrist_right_flexion
-    s3513 = s3507 * cos_wrist_right_flexion - s3511 * sin_wrist_right_flexion
-    cos_elbow_right_pronation = cos(elbow_right_pronation)
-    sin_elbow_right_pronation = sin(elbow_right_pronation)
-    s3514 = s3513 * cos_elbow_right_pronation + s3510 * sin_elbow_right_pronation
-    cos_elbow_right_flexion = cos(elbow_right_flexion)
-    sin_elbow_right_flexion = sin(elbow_right_flexion)
-    s3515 = s3513 * sin_elbow_right_pronation - s3510 * cos_elbow_right_pronation
-    s3516 = s3512 * cos_elbow_right_flexion + s3514 * sin_elbow_right_flexion
-    s3517 = s3514 * cos_elbow_right_flexion - s3512 * sin_elbow_right_flexion
-    s5 = shoulder_right_qw * shoulder_right_qw + shoulder_right_qx * shoulder_right_qx
-    s6 = s5 + shoulder_right_qy * shoulder_right_qy + shoulder_right_qz * shoulder_right_qz
-    s7 = 2.0 / s6
-    s8 = shoulder_right_qx * s7
-    s9 = shoulder_right_qy * s7
-    s10 = shoulder_right_qz * s7
-    s11 = shoulder_right_qw * s8
-    s12 = shoulder_right_qw * s9
-    s13 = shoulder_right_qw * s10
-    s14 = shoulder_right_qx * s8
-    s15 = shoulder_right_qy * s9
-    s16 = shoulder_right_qz * s10
-    s17 = shoulder_right_qy * s8
-    s18 = shoulder_right_qz * s8
-    s19 = shoulder_right_qz * s9
-    s3518 = s3517 * (1.0 - (s15 + s16)) + s3515 * (s13 + s17) + s3516 * (s18 - s12)
-    s3519 = s3517 * (s17 - s13) + s3515 * (1.0 - (s14 + s16)) + s3516 * (s11 + s19)
-    s3520 = s3517 * (s12 + s18) + s3515 * (s19 - s11) + s3516 * (1.0 - (s14 + s15))
-    s29 = neck_qw * neck_qw + neck_qx * neck_qx + neck_qy * neck_qy + neck_qz * neck_qz
-    s30 = 2.0 / s29
-    s31 = neck_qx * s30
-    s32 = neck_qy * s30
-    s3521 = s3518 * (neck_qw * s32 + neck_qz * s31) + s3519 * (neck_qz * s32 - neck_qw * s31)
-    s52 = shoulder_left_qw * shoulder_left_qw + shoulder_left_qx * shoulder_left_qx
-    s53 = s52 + shoulder_left_qy * shoulder_left_qy + shoulder_left_qz * shoulder_left_qz
-    s54 = 2.0 / s53
-    s55 = shoulder_left_qx * s54
-    s56 = shoulder_left_qy * s54
-    s57 = shoulder_left_qz * s54
-    s58 = shoulder_left_qw * s55
-    s59 = shoulder_left_qw * s56
-    s60 = shoulder_left_qw * s57
-    s61 = shoulder_left_qx * s55
-    s62 = shoulder_left_qy * s56
-    s63 = shoulder_left_qz * s57
-    s64 = shoulder_left_qy * s55
-    s65 = shoulder_left_qz * s55
-    s66 = shoulder_left_qz * s56
-    s3522 = s3518 * (1.0 - (s62 + s63)) + s3519 * (s60 + s64) + s3520 * (s65 - s59)
-    s3523 = s3518 * (s64 - s60) + s3519 * (1.0 - (s61 + s63)) + s3520 * (s58 + s66)
-    s3524 = s3518 * (s59 + s65) + s3519 * (s66 - s58) + s3520 * (1.0 - (s61 + s62))
-    s76 = thoracic_qw * thoracic_qw + thoracic_qx * thoracic_qx + thoracic_qy * thoracic_qy
-    s77 = 2.0 / (s76 + thoracic_qz * thoracic_qz)
-    s78 = thoracic_qx * s77
-    s79 = thoracic_qy * s77
-    s80 = thoracic_qz * s77
-    s81 = thoracic_qw * s78
-    s82 = thoracic_qw * s79
-    s83 = thoracic_qw * s80
-    s84 = thoracic_qx * s78
-    s85 = thoracic_qy * s79
-    s86 = thoracic_qz * s80
-    s87 = thoracic_qy * s78
-    s88 = thoracic_qz * s78
-    s89 = thoracic_qz * s79
-    s3525 = s3518 * (1.0 - (s85 + s86)) + s3519 * (s83 + s87) + s3520 * (s88 - s82)
-    s3526 = s3518 * (s87 - s83) + s3519 * (1.0 - (s84 + s86)) + s3520 * (s81 + s89)
-    s3527 = s3518 * (s82 + s88) + s3519 * (s89 - s81) + s3520 * (1.0 - (s84 + s85))
-    cos_elbow_left_flexion = cos(elbow_left_flexion)
-    sin_elbow_left_flexion = sin(elbow_left_flexion)
-    s3528 = s3524 * cos_elbow_left_flexion - s3522 * sin_elbow_left_flexion
-    s3529 = s3522 * cos_elbow_left_flexion + s3524 * sin_elbow_left_flexion
-    cos_elbow_left_pronation = cos(elbow_left_pronation)
-    sin_elbow_left_pronation = sin(elbow_left_pronation)
-    s100 = lumbar_qw * lumbar_qw + lumbar_qx * lumbar_qx + lumbar_qy * lumbar_qy + lumbar_qz * lumbar_qz
-    s101 = 2.0 / s100
-    s102 = lumbar_qx * s101
-    s103 = lumbar_qy * s101
-    s104 = lumbar_qz * s101
-    s105 = lumbar_qw * s102
-    s106 = lumbar_qw * s103
-    s107 = lumbar_qw * s104
-    s108 = lumbar_qx * s102
-    s109 = lumbar_qy * s103
-    s110 = lumbar_qz * s104
-    s111 = lumbar_qy * s102
-    s112 = lumbar_qz * s102
-    s113 = lumbar_qz * s103
-    s3530 = s3525 * (1.0 - (s109 + s110)) + s3526 * (s107 + s111) + s3527 * (s112 - s106)
-    s3531 = s3525 * (s111 - s107) + s3526 * (1.0 - (s108 + s110)) + s3527 * (s105 + s113)
-    s3532 = s3525 * (s106 + s112) + s3526 * (s113 - s105) + s3527 * (1.0 - (s108 + s109))
-    s3533 = (s3529 * cos_elbow_left_pronation + s3523 * sin_elbow_left_pronation) * sin(wrist_left_flexion)
-    s3534 = (s3523 * cos_elbow_left_pronation - s3529 * sin_elbow_left_pronation) * sin(wrist_left_deviation)
-    s3535 = (s3528 * cos(wrist_left_flexion) - s3533) * cos(wrist_left_deviation) - s3534
-    s123 = hip_left_qw * hip_left_qw + hip_left_qx * hip_left_qx + hip_left_qy * hip_left_qy
-    s124 = 2.0 / (s123 + hip_left_qz * hip_left_qz)
-    s125 = hip_left_qx * s124
-    s126 = hip_left_qy * s124
-    s127 = hip_left_qz * s124
-    s128 = hip_left_qw * s125
-    s129 = hip_left_qw * s126
-    s130 = hip_left_qw * s127
-    s131 = hip_left_qx * s125
-    s132 = hip_left_qy * s126
-    s133 = hip_left_qz * s127
-    s134 = hip_left_qy * s125
-    s135 = hip_left_qz * s125
-    s136 = hip_left_qz * s126
-    s3536 = s3530 * (1.0 - (s132 + s133)) + s3531 * (s130 + s134) + s3532 * (s135 - s129)
-    s3537 = s3530 * (s134 - s130) + s3531 * (1.0 - (s131 + s133)) + s3532 * (s128 + s136)
-    s3538 = s3530 * (s129 + s135) + s3531 * (s136 - s128) + s3532 * (1.0 - (s131 + s132))
-    s146 = hip_right_qw * hip_right_qw + hip_right_qx * hip_right_qx + hip_right_qy * hip_right_qy
-    s147 = 2.0 / (s146 + hip_right_qz * hip_right_qz)
-    s148 = hip_right_qx * s147
-    s149 = hip_right_qy * s147
-    s150 = hip_right_qz * s147
-    s151 = hip_right_qw * s148
-    s152 = hip_right_qw * s149
-    s153 = hip_right_qw * s150
-    s154 = hip_right_qx * s148
-    s155 = hip_right_qy * s149
-    s156 = hip_right_qz * s150
-    s157 = hip_right_qy * s148
-    s158 = hip_right_qz * s148
-    s159 = hip_right_qz * s149
-    s3539 = s3530 * (1.0 - (s155 + s156)) + s3531 * (s153 + s157) + s3532 * (s158 - s152)
-    s3540 = s3530 * (s157 - s153) + s3531 * (1.0 - (s154 + s156)) + s3532 * (s151 + s159)
-    s3541 = s3530 * (s152 + s158) + s3531 * (s159 - s151) + s3532 * (1.0 - (s154 + s155))
-    cos_knee_left_flexion = cos(knee_left_flexion)
-    sin_knee_left_flexion = sin(knee_left_flexion)
-    s3542 = s3538 * cos_knee_left_flexion + s3536 * sin_knee_left_flexion
-    s3543 = s3536 * cos_knee_left_flexion - s3538 * sin_knee_left_flexion
-    cos_knee_right_flexion = cos(knee_right_flexion)
-    sin_knee_right_flexion = sin(knee_right_flexion)
-    s3544 = s3541 * cos_knee_right_flexion + s3539 * sin_knee_right_flexion
-    s3545 = s3539 * cos_knee_right_flexion - s3541 * sin_knee_right_flexion
-    cos_ankle_left_flexion = cos(ankle_left_flexion)
-    sin_ankle_left_flexion = sin(ankle_left_flexion)
-    s3546 = (s3542 * cos_ankle_left_flexion + s3543 * sin_ankle_left_flexion) * cos(ankle_left_inversion)
-    cos_ankle_right_flexion = cos(ankle_right_flexion)
-    sin_ankle_right_flexion = sin(ankle_right_flexion)
-    s3547 = (s3544 * cos_ankle_right_flexion + s3545 * sin_ankle_right_flexion) * cos(ankle_right_inversion)
-    s3548 = k1 * s3509
-    s3549 = w_shoulder * s3519
-    s3550 = w_hip * s3531
-    s3551 = k11 * s3532
-    s3552 = s3548 + k2 * s3512
-    s3553 = k3 * s3516 + s3552
-    s3554 = k5 * s3519 + k6 * s3520 + s3553
-    s3555 = s3549 + k7 * s3520 + s3553
-    s3556 = k8 * s3524 + s3554
-    s3557 = k9 * s3527 + s3555
-    s3558 = s3550 + s3551 + s3557
-    s3559 = s3551 - s3550 + s3557
-    s3560 = k12 * s3538 + s3558
-    s3561 = k12 * s3541 + s3559
-    s3562 = k96 * (k83 * s3509) + k97 * (s3548 - k84 * s3512) + k98 * (s3552 - k86 * s3516)
-    s3563 = s3549 + k4 * s3520 + s3553 - k89 * (s3521 + s3520 * (1.0 - (neck_qx * s31 + neck_qy * s32)))
-    s3564 = s3562 + k99 * (s3553 + (s3549 + k88 * s3520)) + k100 * s3563 + k98 * (s3554 - k87 * s3524)
-    s3565 = s3564 + k101 * (s3555 - k90 * s3527) + k97 * (s3556 - k85 * s3528) + k102 * (s3557 - k91 * s3532)
-    s3566 = s3565 + k96 * (k10 * s3528 + s3556 - k82 * s3535) + k103 * (s3558 - k92 * s3538)
-    s3567 = s3566 + k103 * (s3559 - k92 * s3541) + k104 * (s3560 - k93 * s3542) + k104 * (s3561 - k93 * s3544)
-    s3568 = k95 * (s3543 * cos_ankle_left_flexion - s3542 * sin_ankle_left_flexion) - k94 * (s3546 - s3537 * sin(ankle_left_inversion))
-    s3569 = k95 * (s3545 * cos_ankle_right_flexion - s3544 * sin_ankle_right_flexion)
-    s3570 = k13 * s3544 + s3561 + (s3569 - k94 * (s3547 - s3540 * sin(ankle_right_inversion)))
-    return (
-        s3567 + k105 * (k13 * s3542 + s3560 + s3568) + k105 * s3570,
-    )
-
-
-def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """1072 operations: 306 add, 138 sub, 590 mul, 8 div, 2 neg, 14 sin, 14 cos."""
-    w_shoulder, w_hip, k82, k83, k1, k84, k85, k2, k86, k87, k3, k88, k4, k89, k5, k6, k7, k90, k8, k9, k91, k10, k11, k92, k12, k93, k13, k94, k95 = k
-    grip_qw, grip_qx, grip_qy, grip_qz, wrist_right_deviation, wrist_right_flexion, elbow_right_pronation, elbow_right_flexion, shoulder_right_qw, shoulder_right_qx, shoulder_right_qy, shoulder_right_qz, neck_qw, neck_qx, neck_qy, neck_qz, shoulder_left_qw, shoulder_left_qx, shoulder_left_qy, shoulder_left_qz, thoracic_qw, thoracic_qx, thoracic_qy, thoracic_qz, elbow_left_flexion, elbow_left_pronation, lumbar_qw, lumbar_qx, lumbar_qy, lumbar_qz, wrist_left_flexion, wrist_left_deviation, hip_left_qw, hip_left_qx, hip_left_qy, hip_left_qz, hip_right_qw, hip_right_qx, hip_right_qy, hip_right_qz, knee_left_flexion, knee_right_flexion, ankle_left_flexion, ankle_left_inversion, ankle_right_flexion, ankle_right_inversion, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _ = y
-    s1 = grip_qw * grip_qw + grip_qx * grip_qx + grip_qy * grip_qy + grip_qz * grip_qz
-    s2 = 2.0 / s1
-    s3 = grip_qx * s2
-    s4 = grip_qy * s2
-    s3571 = grip_qz * s2
-    s3572 = grip_qw * s3
-    s3573 = grip_qw * s4
-    s3574 = grip_qw * s3571
-    s3575 = grip_qx * s3
-    s3576 = grip_qy * s4
-    s3577 = grip_qz * s3571
-    s3578 = grip_qy * s3
-    s3579 = grip_qz * s3
-    s3580 = grip_qz * s4
-    s3581 = 1.0 - (s3576 + s3577)
-    s3582 = s3573 + s3579
-    s3583 = s3574 + s3578
-    s3584 = s3575 + s3577
-    s3585 = s3580 - s3572
-    s3507 = s3579 - s3573
-    s3508 = s3572 + s3580
-    s3509 = 1.0 - (s3575 + s3576)
-    cos_wrist_right_deviation = cos(wrist_right_deviation)
-    sin_wrist_right_deviation = sin(wrist_right_deviation)
-    s3586 = s3574 - s3578
-    s3587 = s3584 - 1.0
-    s3588 = cos_wrist_right_deviation * s3586 + s3582 * sin_wrist_right_deviation
-    s3589 = s3582 * cos_wrist_right_deviation - sin_wrist_right_deviation * s3586
-    s3590 = cos_wrist_right_deviation * s3587 + s3585 * sin_wrist_right_deviation
-    s3591 = s3585 * cos_wrist_right_deviation - sin_wrist_right_deviation * s3587
-    s3592 = s3508 * cos_wrist_right_deviation
-    s3593 = s3509 * sin_wrist_right_deviation
-    s3510 = s3593 - s3592
-    s3511 = s3509 * cos_wrist_right_deviation + s3508 * sin_wrist_right_deviation
-    cos_wrist_right_flexion = cos(wrist_right_flexion)
-    sin_wrist_right_flexion = sin(wrist_right_flexion)
-    s3594 = s3589 * cos_wrist_right_flexion + s3581 * sin_wrist_right_flexion
-    s3595 = s3581 * cos_wrist_right_flexion - s3589 * sin_wrist_right_flexion
-    s3596 = s3591 * cos_wrist_right_flexion + s3583 * sin_wrist_right_flexion
-    s3597 = s3583 * cos_wrist_right_flexion - s3591 * sin_wrist_right_flexion
-    s3512 = s3511 * cos_wrist_right_flexion + s3507 * sin_wrist_right_flexion
-    s3513 = s3507 * cos_wrist_right_flexion - s3511 * sin_wrist_right_flexion
-    cos_elbow_right_pronation = cos(elbow_right_pronation)
-    sin_elbow_right_pronation = sin(elbow_right_pronation)
-    s3598 = s3595 * cos_elbow_right_pronation + s3588 * sin_elbow_right_pronation
-    s3599 = s3597 * cos_elbow_right_pronation + s3590 * sin_elbow_right_pronation
-    s3514 = s3513 * cos_elbow_right_pronation + s3510 * sin_elbow_right_pronation
-    cos_elbow_right_flexion = cos(elbow_right_flexion)
-    sin_elbow_right_flexion = sin(elbow_right_flexion)
-    s3600 = s3595 * sin_elbow_right_pronation - s3588 * cos_elbow_right_pronation
-    s3601 = s3597 * sin_elbow_right_pronation - s3590 * cos_elbow_right_pronation
-    s3515 = s3513 * sin_elbow_right_pronation - s3510 * cos_elbow_right_pronation
-    s3602 = s3594 * cos_elbow_right_flexion + s3598 * sin_elbow_right_flexion
-    s3603 = s3598 * cos_elbow_right_flexion - s3594 * sin_elbow_right_flexion
-    s3604 = s3596 * cos_elbow_right_flexion + s3599 * sin_elbow_right_flexion
-    s3605 = s3599 * cos_elbow_right_flexion - s3596 * sin_elbow_right_flexion
-    s3516 = s3512 * cos_elbow_right_flexion + s3514 * sin_elbow_right_flexion
-    s3517 = s3514 * cos_elbow_right_flexion - s3512 * sin_elbow_right_flexion
-    s5 = shoulder_right_qw * shoulder_right_qw + shoulder_right_qx * shoulder_right_qx
-    s6 = s5 + shoulder_right_qy * shoulder_right_qy + shoulder_right_qz * shoulder_right_qz
-    s7 = 2.0 / s6
-    s8 = shoulder_right_qx * s7
-    s9 = shoulder_right_qy * s7
-    s10 = shoulder_right_qz * s7
-    s11 = shoulder_right_qw * s8
-    s12 = shoulder_right_qw * s9
-    s13 = shoulder_right_qw * s10
-    s14 = shoulder_right_qx * s8
-    s15 = shoulder_right_qy * s9
-    s16 = shoulder_right_qz * s10
-    s17 = shoulder_right_qy * s8
-    s18 = shoulder_right_qz * s8
-    s19 = shoulder_right_qz * s9
-    s20 = 1.0 - (s15 + s16)
-    s21 = s17 - s13
-    s22 = s12 + s18
-    s23 = s13 + s17
-    s24 = 1.0 - (s14 + s16)
-    s25 = s19 - s11
-    s26 = s18 - s12
-    s27 = s11 + s19
-    s28 = 1.0 - (s14 + s15)
-    s3606 = s3603 * s20 + s3600 * s23 + s3602 * s26
-    s3607 = s3603 * s21 + s3600 * s24 + s3602 * s27
-    s3608 = s3603 * s22 + s3600 * s25 + s3602 * s28
-    s3609 = s3605 * s20 + s3601 * s23 + s3604 * s26
-    s3610 = s3605 * s21 + s3601 * s24 + s3604 * s27
-    s3611 = s3605 * s22 + s3601 * s25 + s3604 * s28
-    s3518 = s3517 * s20 + s3515 * s23 + s3516 * s26
-    s3519 = s3517 * s21 + s3515 * s24 + s3516 * s27
-    s3520 = s3517 * s22 + s3515 * s25 + s3516 * s28
-    s29 = neck_qw * neck_qw + neck_qx * neck_qx + neck_qy * neck_qy + neck_qz * neck_qz
-    s30 = 2.0 / s29
-    s31 = neck_qx * s30
-    s32 = neck_qy * s30
-    s33 = neck_qz * s30
-    s34 = neck_qw * s31
-    s35 = neck_qw * s32
-    s36 = neck_qw * s33
-    s37 = neck_qx * s31
-    s38 = neck_qy * s32
-    s39 = neck_qz * s33
-    s40 = neck_qy * s31
-    s41 = neck_qz * s31
-    s42 = neck_qz * s32
-    s43 = 1.0 - (s38 + s39)
-    s44 = s40 - s36
-    s45 = s35 + s41
-    s46 = s36 + s40
-    s47 = 1.0 - (s37 + s39)
-    s48 = s42 - s34
-    s49 = s41 - s35
-    s50 = s34 + s42
-    s51 = 1.0 - (s37 + s38)
-    s3612 = s3606 * s45 + s3607 * s48 + s3608 * s51
-    s3613 = s3609 * s45 + s3610 * s48 + s3611 * s51
-    s3614 = s3518 * s45 + s3519 * s48 + s3520 * s51
-    s52 = shoulder_left_qw * shoulder_left_qw + shoulder_left_qx * shoulder_left_qx
-    s53 = s52 + shoulder_left_qy * shoulder_left_qy + shoulder_left_qz * shoulder_left_qz
-    s54 = 2.0 / s53
-    s55 = shoulder_left_qx * s54
-    s56 = shoulder_left_qy * s54
-    s57 = shoulder_left_qz * s54
-    s58 = shoulder_left_qw * s55
-    s59 = shoulder_left_qw * s56
-    s60 = shoulder_left_qw * s57
-    s61 = shoulder_left_qx * s55
-    s62 = shoulder_left_qy * s56
-    s63 = shoulder_left_qz * s57
-    s64 = shoulder_left_qy * s55
-    s65 = shoulder_left_qz * s55
-    s66 = shoulder_left_qz * s56
-    s67 = 1.0 - (s62 + s63)
-    s68 = s64 - s60
-    s69 = s59 + s65
-    s70 = s60 + s64
-    s71 = 1.0 - (s61 + s63)
-    s72 = s66 - s58
-    s73 = s65 - s59
-    s74 = s58 + s66
-    s75 = 1.0 - (s61 + s62)
-    s3615 = s3606 * s67 + s3607 * s70 + s3608 * s73
-    s3616 = s3606 * s68 + s3607 * s71 + s3608 * s74
-    s3617 = s3606 * s69 + s3607 * s72 + s3608 * s75
-    s3618 = s3609 * s67 + s3610 * s70 + s3611 * s73
-    s3619 = s3609 * s68 + s3610 * s71 + s3611 * s74
-    s3620 = s3609 * s69 + s3610 * s72 + s3611 * s75
-    s3522 = s3518 * s67 + s3519 * s70 + s3520 * s73
-    s3523 = s3518 * s68 + s3519 * s71 + s3520 * s74
-    s3524 = s3518 * s69 + s3519 * s72 + s3520 * s75
-    s76 = thoracic_qw * thoracic_qw + thoracic_qx * thoracic_qx + thoracic_qy * thoracic_qy
-    s77 = 2.0 / (s76 + thoracic_qz * thoracic_qz)
-    s78 = thoracic_qx * s77
-    s79 = thoracic_qy * s77
-    s80 = thoracic_qz * s77
-    s81 = thoracic_qw * s78
-    s82 = thoracic_qw * s79
-    s83 = thoracic_qw * s80
-    s84 = thoracic_qx * s78
-    s85 = thoracic_qy * s79
-    s86 = thoracic_qz * s80
-    s87 = thoracic_qy * s78
-    s88 = thoracic_qz * s78
-    s89 = thoracic_qz * s79
-    s90 = 1.0 - (s85 + s86)
-    s91 = s87 - s83
-    s92 = s82 + s88
-    s93 = s83 + s87
-    s94 = 1.0 - (s84 + s86)
-    s95 = s89 - s81
-    s96 = s88 - s82
-    s97 = s81 + s89
-    s98 = 1.0 - (s84 + s85)
-    s3621 = s3606 * s90 + s3607 * s93 + s3608 * s96
-    s3622 = s3606 * s91 + s3607 * s94 + s3608 * s97
-    s3623 = s3606 * s92 + s3607 * s95 + s3608 * s98
-    s3624 = s3609 * s90 + s3610 * s93 + s3611 * s96
-    s3625 = s3609 * s91 + s3610 * s94 + s3611 * s97
-    s3626 = s3609 * s92 + s3610 * s95 + s3611 * s98
-    s3525 = s3518 * s90 + s3519 * s93 + s3520 * s96
-    s3526 = s3518 * s91 + s3519 * s94 + s3520 * s97
-    s3527 = s3518 * s92 + s3519 * s95 + s3520 * s98
-    cos_elbow_left_flexion = cos(elbow_left_flexion)
-    sin_elbow_left_flexion = sin(elbow_left_flexion)
-    s3627 = s3617 * cos_elbow_left_flexion - s3615 * sin_elbow_left_flexion
-    s3628 = s3615 * cos_elbow_left_flexion + s3617 * sin_elbow_left_flexion
-    s3629 = s3620 * cos_elbow_left_flexion - s3618 * sin_elbow_left_flexion
-    s3630 = s3618 * cos_elbow_left_flexion + s3620 * sin_elbow_left_flexion
-    s3528 = s3524 * cos_elbow_left_flexion - s3522 * sin_elbow_left_flexion
-    s3529 = s3522 * cos_elbow_left_flexion + s3524 * sin_elbow_left_flexion
-    cos_elbow_left_pronation = cos(elbow_left_pronation)
-    sin_elbow_left_pronation = sin(elbow_left_pronation)
-    s3631 = s3628 * cos_elbow_left_pronation + s3616 * sin_elbow_left_pronation
-    s3632 = s3616 * cos_elbow_left_pronation - s3628 * sin_elbow_left_pronation
-    s3633 = s3630 * cos_elbow_left_pronation + s3619 * sin_elbow_left_pronation
-    s3634 = s3619 * cos_elbow_left_pronation - s3630 * sin_elbow_left_pronation
-    s3635 = s3529 * cos_elbow_left_pronation + s3523 * sin_elbow_left_pronation
-    s3636 = s3523 * cos_elbow_left_pronation - s3529 * sin_elbow_left_pronation
-    s100 = lumbar_qw * lumbar_qw + lumbar_qx * lumbar_qx + lumbar_qy * lumbar_qy + lumbar_qz * lumbar_qz
-    s101 = 2.0 / s100
-    s102 = lumbar_qx * s101
-    s103 = lumbar_qy * s101
-    s104 = lumbar_qz * s101
-    s105 = lumbar_qw * s102
-    s106 = lumbar_qw * s103
-    s107 = lumbar_qw * s104
-    s108 = lumbar_qx * s102
-    s109 = lumbar_qy * s103
-    s110 = lumbar_qz * s104
-    s111 = lumbar_qy * s102
-    s112 = lumbar_qz * s102
-    s113 = lumbar_qz * s103
-    s114 = 1.0 - (s109 + s110)
-    s115 = s111 - s107
-    s116 = s106 + s112
-    s117 = s107 + s111
-    s118 = 1.0 - (s108 + s110)
-    s119 = s113 - s105
-    s120 = s112 - s106
-    s121 = s105 + s113
-    s122 = 1.0 - (s108 + s109)
-    s3637 = s3621 * s114 + s3622 * s117 + s3623 * s120
-    s3638 = s3621 * s115 + s3622 * s118 + s3623 * s121
-    s3639 = s3621 * s116 + s3622 * s119 + s3623 * s122
-    s3640 = s3624 * s114 + s3625 * s117 + s3626 * s120
-    s3641 = s3624 * s115 + s3625 * s118 + s3626 * s121
-    s3642 = s3624 * s116 + s3625 * s119 + s3626 * s122
-    s3530 = s3525 * s114 + s3526 * s117 + s3527 * s120
-    s3531 = s3525 * s115 + s3526 * s118 + s3527 * s121
-    s3532 = s3525 * s116 + s3526 * s119 + s3527 * s122
-    cos_wrist_left_flexion = cos(wrist_left_flexion)
-    sin_wrist_left_flexion = sin(wrist_left_flexion)
-    s3643 = s3627 * cos_wrist_left_flexion - s3631 * sin_wrist_left_flexion
-    s3644 = s3629 * cos_wrist_left_flexion - s3633 * sin_wrist_left_flexion
-    s3645 = s3528 * cos_wrist_left_flexion - s3635 * sin_wrist_left_flexion
-    cos_wrist_left_deviation = cos(wrist_left_deviation)
-    sin_wrist_left_deviation = sin(wrist_left_deviation)
-    s3646 = s3643 * cos_wrist_left_deviation - s3632 * sin_wrist_left_deviation
-    s3647 = s3644 * cos_wrist_left_deviation - s3634 * sin_wrist_left_deviation
-    s3535 = s3645 * cos_wrist_left_deviation - s3636 * sin_wrist_left_deviation
-    s123 = hip_left_qw * hip_left_qw + hip_left_qx * hip_left_qx + hip_left_qy * hip_left_qy
-    s124 = 2.0 / (s123 + hip_left_qz * hip_left_qz)
-    s125 = hip_left_qx * s124
-    s126 = hip_left_qy * s124
-    s127 = hip_left_qz * s124
-    s128 = hip_left_qw * s125
-    s129 = hip_left_qw * s126
-    s130 = hip_left_qw * s127
-    s131 = hip_left_qx * s125
-    s132 = hip_left_qy * s126
-    s133 = hip_left_qz * s127
-    s134 = hip_left_qy * s125
-    s135 = hip_left_qz * s125
-    s136 = hip_left_qz * s126
-    s137 = 1.0 - (s132 + s133)
-    s138 = s134 - s130
-    s139 = s129 + s135
-    s140 = s130 + s134
-    s141 = 1.0 - (s131 + s133)
-    s142 = s136 - s128
-    s143 = s135 - s129
-    s144 = s128 + s136
-    s145 = 1.0 - (s131 + s132)
-    s3648 = s3637 * s137 + s3638 * s140 + s3639 * s143
-    s3649 = s3637 * s138 + s3638 * s141 + s3639 * s144
-    s3650 = s3637 * s139 + s3638 * s142 + s3639 * s145
-    s3651 = s3640 * s137 + s3641 * s140 + s3642 * s143
-    s3652 = s3640 * s138 + s3641 * s141 + s3642 * s144
-    s3653 = s3640 * s139 + s3641 * s142 + s3642 * s145
-    s3536 = s3530 * s137 + s3531 * s140 + s3532 * s143
-    s3537 = s3530 * s138 + s3531 * s141 + s3532 * s144
-    s3538 = s3530 * s139 + s3531 * s142 + s3532 * s145
-    s146 = hip_right_qw * hip_right_qw + hip_right_qx * hip_right_qx + hip_right_qy * hip_right_qy
-    s147 = 2.0 / (s146 + hip_right_qz * hip_right_qz)
-    s148 = hip_right_qx * s147
-    s149 = hip_right_qy * s147
-    s150 = hip_right_qz * s147
-    s151 = hip_right_qw * s148
-    s152 = hip_right_qw * s149
-    s153 = hip_right_qw * s150
-    s154 = hip_right_qx * s148
-    s155 = hip_right_qy * s149
-    s156 = hip_right_qz * s150
-    s157 = hip_right_qy * s148
-    s158 = hip_right_qz * s148
-    s159 = hip_right_qz * s149
-    s160 = 1.0 - (s155 + s156)
-    s161 = s157 - s153
-    s162 = s152 + s158
-    s163 = s153 + s157
-    s164 = 1.0 - (s154 + s156)
-    s165 = s159 - s151
-    s166 = s158 - s152
-    s167 = s151 + s159
-    s168 = 1.0 - (s154 + s155)
-    s3654 = s3637 * s160 + s3638 * s163 + s3639 * s166
-    s3655 = s3637 * s161 + s3638 * s164 + s3639 * s167
-    s3656 = s3637 * s162 + s3638 * s165 + s3639 * s168
-    s3657 = s3640 * s160 + s3641 * s163 + s3642 * s166
-    s3658 = s3640 * s161 + s3641 * s164 + s3642 * s167
-    s3659 = s3640 * s162 + s3641 * s165 + s3642 * s168
-    s3539 = s3530 * s160 + s3531 * s163 + s3532 * s166
-    s3540 = s3530 * s161 + s3531 * s164 + s3532 * s167
-    s3541 = s3530 * s162 + s3531 * s165 + s3532 * s168
-    cos_knee_left_flexion = cos(knee_left_flexion)
-    sin_knee_left_flexion = sin(knee_left_flexion)
-    s3660 = s3650 * cos_knee_left_flexion + s3648 * sin_knee_left_flexion
-    s3661 = s3648 * cos_knee_left_flexion - s3650 * sin_knee_left_flexion
-    s3662 = s3653 * cos_knee_left_flexion + s3651 * sin_knee_left_flexion
-    s3663 = s3651 * cos_knee_left_flexion - s3653 * sin_knee_left_flexion
-    s3542 = s3538 * cos_knee_left_flexion + s3536 * sin_knee_left_flexion
-    s3543 = s3536 * cos_knee_left_flexion - s3538 * sin_knee_left_flexion
-    cos_knee_right_flexion = cos(knee_right_flexion)
-    sin_knee_right_flexion = sin(knee_right_flexion)
-    s3664 = s3656 * cos_knee_right_flexion + s3654 * sin_knee_right_flexion
-    s3665 = s3654 * cos_knee_right_flexion - s3656 * sin_knee_right_flexion
-    s3666 = s3659 * cos_knee_right_flexion + s3657 * sin_knee_right_flexion
-    s3667 = s3657 * cos_knee_right_flexion - s3659 * sin_knee_right_flexion
-    s3544 = s3541 * cos_knee_right_flexion + s3539 * sin_knee_right_flexion
-    s3545 = s3539 * cos_knee_right_flexion - s3541 * sin_knee_right_flexion
-    cos_ankle_left_flexion = cos(ankle_left_flexion)
-    sin_ankle_left_flexion = sin(ankle_left_flexion)
-    s3668 = s3660 * cos_ankle_left_flexion + s3661 * sin_ankle_left_flexion
-    s3669 = s3661 * cos_ankle_left_flexion - s3660 * sin_ankle_left_flexion
-    s3670 = s3662 * cos_ankle_left_flexion + s3663 * sin_ankle_left_flexion
-    s3671 = s3663 * cos_ankle_left_flexion - s3662 * sin_ankle_left_flexion
-    s3672 = s3542 * cos_ankle_left_flexion + s3543 * sin_ankle_left_flexion
-    s3673 = s3543 * cos_ankle_left_flexion - s3542 * sin_ankle_left_flexion
-    cos_ankle_left_inversion = cos(ankle_left_inversion)
-    sin_ankle_left_inversion = sin(ankle_left_inversion)
-    s3674 = s3668 * cos_ankle_left_inversion - s3649 * sin_ankle_left_inversion
-    s3675 = s3670 * cos_ankle_left_inversion - s3652 * sin_ankle_left_inversion
-    s3676 = s3672 * cos_ankle_left_inversion - s3537 * sin_ankle_left_inversion
-    cos_ankle_right_flexion = cos(ankle_right_flexion)
-    sin_ankle_right_flexion = sin(ankle_right_flexion)
-    s3677 = s3664 * cos_ankle_right_flexion + s3665 * sin_ankle_right_flexion
-    s3678 = s3665 * cos_ankle_right_flexion - s3664 * sin_ankle_right_flexion
-    s3679 = s3666 * cos_ankle_right_flexion + s3667 * sin_ankle_right_flexion
-    s3680 = s3667 * cos_ankle_right_flexion - s3666 * sin_ankle_right_flexion
-    s3681 = s3544 * cos_ankle_right_flexion + s3545 * sin_ankle_right_flexion
-    s3682 = s3545 * cos_ankle_right_flexion - s3544 * sin_ankle_right_flexion
-    cos_ankle_right_inversion = cos(ankle_right_inversion)
-    sin_ankle_right_inversion = sin(ankle_right_inversion)
-    s3683 = s3677 * cos_ankle_right_inversion - s3655 * sin_ankle_right_inversion
-    s3684 = s3679 * cos_ankle_right_inversion - s3658 * sin_ankle_right_inversion
-    s3685 = s3681 * cos_ankle_right_inversion - s3540 * sin_ankle_right_inversion
-    s3686 = k1 * s3582
-    s3687 = k1 * s3585
-    s3548 = k1 * s3509
-    s3688 = w_shoulder * s3607
-    s3689 = w_shoulder * s3610
-    s3549 = w_shoulder * s3519
-    s3690 = w_hip * s3638
-    s3691 = k11 * s3639
-    s3692 = w_hip * s3641
-    s3693 = k11 * s3642
-    s3550 = w_hip * s3531
-    s3551 = k11 * s3532
-    s3694 = s3686 + k2 * s3594
-    s3695 = s3687 + k2 * s3596
-    s3552 = s3548 + k2 * s3512
-    s3696 = k3 * s3602 + s3694
-    s3697 = k3 * s3604 + s3695
-    s3553 = k3 * s3516 + s3552
-    s3698 = k5 * s3607 + k6 * s3608 + s3696
-    s3699 = k5 * s3610 + k6 * s3611 + s3697
-    s3554 = k5 * s3519 + k6 * s3520 + s3553
-    s3700 = s3688 + k7 * s3608 + s3696
-    s3701 = s3689 + k7 * s3611 + s3697
-    s3555 = s3549 + k7 * s3520 + s3553
-    s3702 = k8 * s3617 + s3698
-    s3703 = k8 * s3620 + s3699
-    s3556 = k8 * s3524 + s3554
-    s3704 = k9 * s3623 + s3700
-    s3705 = k9 * s3626 + s3701
-    s3557 = k9 * s3527 + s3555
-    s3706 = s3690 + s3691 + s3704
-    s3707 = s3692 + s3693 + s3705
-    s3558 = s3550 + s3551 + s3557
-    s3708 = s3691 - s3690 + s3704
-    s3709 = s3693 - s3692 + s3705
-    s3559 = s3551 - s3550 + s3557
-    s3710 = k12 * s3650 + s3706
-    s3711 = k12 * s3653 + s3707
-    s3560 = k12 * s3538 + s3558
-    s3712 = k12 * s3656 + s3708
-    s3713 = k12 * s3659 + s3709
-    s3561 = k12 * s3541 + s3559
-    return (
-        s3581,
-        s3578 - s3574,
-        s3582,
-        k83 * s3582,
-        s3583,
-        1.0 - s3584,
-        s3585,
-        k83 * s3585,
-        s3507,
-        s3508,
-        s3509,
-        k83 * s3509,
-        s3595,
-        -s3588,
-        s3594,
-        s3686 - k84 * s3594,
-        s3597,
-        -s3590,
-        s3596,
-        s3687 - k84 * s3596,
-        s3513,
-        s3592 - s3593,
-        s3512,
-        s3548 - k84 * s3512,
-        s3603,
-        s3600,
-        s3602,
-        s3694 - k86 * s3602,
-        s3605,
-        s3601,
-        s3604,
-        s3695 - k86 * s3604,
-        s3517,
-        s3515,
-        s3516,
-        s3552 - k86 * s3516,
-        s3606,
-        s3607,
-        s3608,
-        s3696 + (s3688 + k88 * s3608),
-        s3609,
-        s3610,
-        s3611,
-        s3697 + (s3689 + k88 * s3611),
-        s3518,
-        s3519,
-        s3520,
-        s3553 + (s3549 + k88 * s3520),
-        s3606 * s43 + s3607 * s46 + s3608 * s49,
-        s3606 * s44 + s3607 * s47 + s3608 * s50,
-        s3612,
-        s3688 + k4 * s3608 + s3696 - k89 * s3612,
-        s3609 * s43 + s3610 * s46 + s3611 * s49,
-        s3609 * s44 + s3610 * s47 + s3611 * s50,
-        s3613,
-        s3689 + k4 * s3611 + s3697 - k89 * s3613,
-        s3518 * s43 + s3519 * s46 + s3520 * s49,
-        s3518 * s44 + s3519 * s47 + s3520 * s50,
-        s3614,
-        s3549 + k4 * s3520 + s3553 - k89 * s3614,
-        s3615,
-        s3616,
-        s3617,
-        s3698 - k87 * s3617,
-        s3618,
-        s3619,
-        s3620,
-        s3699 - k87 * s3620,
-        s3522,
-        s3523,
-        s3524,
-        s3554 - k87 * s3524,
-        s3621,
-        s3622,
-        s3623,
-        s3700 - k90 * s3623,
-        s3624,
-        s3625,
-        s3626,
-        s3701 - k90 * s3626,
-        s3525,
-        s3526,
-        s3527,
-        s3555 - k90 * s3527,
-        s3631,
-        s3632,
-        s3627,
-        s3702 - k85 * s3627,
-        s3633,
-        s3634,
-        s3629,
-        s3703 - k85 * s3629,
-        s3635,
-        s3636,
-        s3528,
-        s3556 - k85 * s3528,
-        s3637,
-        s3638,
-        s3639,
-        s3704 - k91 * s3639,
-        s3640,
-        s3641,
-        s3642,
-        s3705 - k91 * s3642,
-        s3530,
-        s3531,
-        s3532,
-        s3557 - k91 * s3532,
-        s3631 * cos_wrist_left_flexion + s3627 * sin_wrist_left_flexion,
-        s3632 * cos_wrist_left_deviation + s3643 * sin_wrist_left_deviation,
-        s3646,
-        k10 * s3627 + s3702 - k82 * s3646,
-        s3633 * cos_wrist_left_flexion + s3629 * sin_wrist_left_flexion,
-        s3634 * cos_wrist_left_deviation + s3644 * sin_wrist_left_deviation,
-        s3647,
-        k10 * s3629 + s3703 - k82 * s3647,
-        s3635 * cos_wrist_left_flexion + s3528 * sin_wrist_left_flexion,
-        s3636 * cos_wrist_left_deviation + s3645 * sin_wrist_left_deviation,
-        s3535,
-        k10 * s3528 + s3556 - k82 * s3535,
-        s3648,
-        s3649,
-        s3650,
-        s3706 - k92 * s3650,
-        s3651,
-        s3652,
-        s3653,
-        s3707 - k92 * s3653,
-        s3536,
-        s3537,
-        s3538,
-        s3558 - k92 * s3538,
-        s3654,
-        s3655,
-        s3656,
-        s3708 - k92 * s3656,
-        s3657,
-        s3658,
-        s3659,
-        s3709 - k92 * s3659,
-        s3539,
-        s3540,
-        s3541,
-        s3559 - k92 * s3541,
-        s3661,
-        s3649,
-        s3660,
-        s3710 - k93 * s3660,
-        s3663,
-        s3652,
-        s3662,
-        s3711 - k93 * s3662,
-        s3543,
-        s3537,
-        s3542,
-        s3560 - k93 * s3542,
-        s3665,
-        s3655,
-        s3664,
-        s3712 - k93 * s3664,
-        s3667,
-        s3658,
-        s3666,
-        s3713 - k93 * s3666,
-        s3545,
-        s3540,
-        s3544,
-        s3561 - k93 * s3544,
-        s3669,
-        s3649 * cos_ankle_left_inversion + s3668 * sin_ankle_left_inversion,
-        s3674,
-        k13 * s3660 + s3710 + (k95 * s3669 - k94 * s3674),
-        s3671,
-        s3652 * cos_ankle_left_inversion + s3670 * sin_ankle_left_inversion,
-        s3675,
-        k13 * s3662 + s3711 + (k95 * s3671 - k94 * s3675),
-        s3673,
-        s3537 * cos_ankle_left_inversion + s3672 * sin_ankle_left_inversion,
-        s3676,
-        k13 * s3542 + s3560 + (k95 * s3673 - k94 * s3676),
-        s3678,
-        s3655 * cos_ankle_right_inversion + s3677 * sin_ankle_right_inversion,
-        s3683,
-        k13 * s3664 + s3712 + (k95 * s3678 - k94 * s3683),
-        s3680,
-        s3658 * cos_ankle_right_inversion + s3679 * sin_ankle_right_inversion,
-        s3684,
-        k13 * s3666 + s3713 + (k95 * s3680 - k94 * s3684),
-        s3682,
-        s3540 * cos_ankle_right_inversion + s3681 * sin_ankle_right_inversion,
-        s3685,
-        k13 * s3544 + s3561 + (k95 * s3682 - k94 * s3685),
-    )
-
-
 def _named(values, names, defaults, what):
     """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
@@ -7730,18 +6500,3 @@ def derivative(t, y, p=None, u=None):
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
     return _along(_jacobian, "jacobian", (84, 84), ('cos', 'sin'), y, p, u)
-
-
-def kinetic_energy(t, y, p=None, u=None):
-    """Kinetic energy, J."""
-    return _evaluate(_kinetic_energy, "kinetic_energy", (), ('cos', 'sin'), y, p, u)[()]
-
-
-def potential_energy(t, y, p=None, u=None):
-    """Potential energy, J."""
-    return _evaluate(_potential_energy, "potential_energy", (), ('cos', 'sin'), y, p, u)[()]
-
-
-def body_poses(t, y, p=None, u=None):
-    """[world_R_body | centre of mass (m)] of each body, 3 x 4."""
-    return _evaluate(_body_poses, "body_poses", (16, 3, 4), ('cos', 'sin'), y, p, u)

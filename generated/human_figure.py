@@ -512,9 +512,6 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 1314, "sub": 1035, "mul": 2770, "div": 169, "neg": 25, "sin": 14, "cos": 14, "total": 5341, "parameters": 261},
     "jacobian": {"add": 4016, "sub": 2619, "mul": 7649, "div": 331, "neg": 25, "sin": 14, "cos": 14, "total": 14668, "parameters": 261},
-    "kinetic_energy": {"add": 358, "sub": 114, "mul": 636, "div": 8, "sin": 14, "cos": 14, "total": 1144, "parameters": 176},
-    "potential_energy": {"add": 144, "sub": 71, "mul": 269, "div": 8, "sin": 14, "cos": 14, "total": 520, "parameters": 55},
-    "body_poses": {"add": 297, "sub": 141, "mul": 581, "div": 8, "sin": 14, "cos": 14, "total": 1055, "parameters": 35},
 }
 
 
@@ -523,257 +520,257 @@ def _constants(values):
     """Everything that depends on parameters alone, once for each set of them."""
     body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, g = values
     mass_pelvis = body_mass * m_pelvis
-    k85 = l_pelvis * kx_pelvis
-    k86 = l_pelvis * ky_pelvis
-    k87 = l_pelvis * kz_pelvis
+    k65 = l_pelvis * kx_pelvis
+    k66 = l_pelvis * ky_pelvis
+    k67 = l_pelvis * kz_pelvis
     mass_abdomen = body_mass * m_abdomen
-    k88 = l_abdomen * kx_abdomen
-    k89 = l_abdomen * ky_abdomen
-    k90 = l_abdomen * kz_abdomen
+    k68 = l_abdomen * kx_abdomen
+    k69 = l_abdomen * ky_abdomen
+    k70 = l_abdomen * kz_abdomen
     mass_thigh_left = body_mass * m_thigh
-    k91 = l_thigh * kx_thigh
-    k92 = mass_thigh_left * (k91 * k91)
-    k93 = l_thigh * ky_thigh
-    k94 = mass_thigh_left * (k93 * k93)
-    k95 = l_thigh * kz_thigh
-    inertia_thigh_left_zz = mass_thigh_left * (k95 * k95)
+    k71 = l_thigh * kx_thigh
+    k72 = mass_thigh_left * (k71 * k71)
+    k73 = l_thigh * ky_thigh
+    k74 = mass_thigh_left * (k73 * k73)
+    k75 = l_thigh * kz_thigh
+    inertia_thigh_left_zz = mass_thigh_left * (k75 * k75)
     mass_thorax = body_mass * m_thorax
-    k96 = l_thorax * kx_thorax
-    k97 = l_thorax * ky_thorax
-    k98 = l_thorax * kz_thorax
+    k76 = l_thorax * kx_thorax
+    k77 = l_thorax * ky_thorax
+    k78 = l_thorax * kz_thorax
     mass_shank_left = body_mass * m_shank
-    k99 = l_shank * kx_shank
-    k100 = mass_shank_left * (k99 * k99)
-    k101 = l_shank * ky_shank
-    k102 = mass_shank_left * (k101 * k101)
-    k103 = l_shank * kz_shank
-    inertia_shank_left_zz = mass_shank_left * (k103 * k103)
+    k79 = l_shank * kx_shank
+    k80 = mass_shank_left * (k79 * k79)
+    k81 = l_shank * ky_shank
+    k82 = mass_shank_left * (k81 * k81)
+    k83 = l_shank * kz_shank
+    inertia_shank_left_zz = mass_shank_left * (k83 * k83)
     mass_head = body_mass * m_head
-    k104 = l_head * kx_head
-    k105 = l_head * ky_head
-    k106 = l_head * kz_head
+    k84 = l_head * kx_head
+    k85 = l_head * ky_head
+    k86 = l_head * kz_head
     mass_upper_arm_left = body_mass * m_upper_arm
-    k107 = l_upper_arm * kx_upper_arm
-    k108 = mass_upper_arm_left * (k107 * k107)
-    k109 = l_upper_arm * ky_upper_arm
-    k110 = mass_upper_arm_left * (k109 * k109)
-    k111 = l_upper_arm * kz_upper_arm
-    inertia_upper_arm_left_zz = mass_upper_arm_left * (k111 * k111)
+    k87 = l_upper_arm * kx_upper_arm
+    k88 = mass_upper_arm_left * (k87 * k87)
+    k89 = l_upper_arm * ky_upper_arm
+    k90 = mass_upper_arm_left * (k89 * k89)
+    k91 = l_upper_arm * kz_upper_arm
+    inertia_upper_arm_left_zz = mass_upper_arm_left * (k91 * k91)
     mass_foot_left = body_mass * m_foot
-    k112 = l_foot * kx_foot
-    k113 = mass_foot_left * (k112 * k112)
-    k114 = l_foot * ky_foot
-    k115 = mass_foot_left * (k114 * k114)
-    k116 = l_foot * kz_foot
-    k117 = mass_foot_left * (k116 * k116)
+    k92 = l_foot * kx_foot
+    k93 = mass_foot_left * (k92 * k92)
+    k94 = l_foot * ky_foot
+    k95 = mass_foot_left * (k94 * k94)
+    k96 = l_foot * kz_foot
+    k97 = mass_foot_left * (k96 * k96)
     mass_forearm_left = body_mass * m_forearm
-    k118 = l_forearm * kx_forearm
-    k119 = mass_forearm_left * (k118 * k118)
-    k120 = l_forearm * ky_forearm
-    k121 = mass_forearm_left * (k120 * k120)
-    k122 = l_forearm * kz_forearm
-    inertia_forearm_left_zz = mass_forearm_left * (k122 * k122)
+    k98 = l_forearm * kx_forearm
+    k99 = mass_forearm_left * (k98 * k98)
+    k100 = l_forearm * ky_forearm
+    k101 = mass_forearm_left * (k100 * k100)
+    k102 = l_forearm * kz_forearm
+    inertia_forearm_left_zz = mass_forearm_left * (k102 * k102)
     mass_hand_left = body_mass * m_hand
-    k123 = l_hand * kx_hand
-    k124 = mass_hand_left * (k123 * k123)
-    k125 = l_hand * ky_hand
-    k126 = mass_hand_left * (k125 * k125)
-    k127 = l_hand * kz_hand
-    inertia_hand_left_zz = mass_hand_left * (k127 * k127)
+    k103 = l_hand * kx_hand
+    k104 = mass_hand_left * (k103 * k103)
+    k105 = l_hand * ky_hand
+    k106 = mass_hand_left * (k105 * k105)
+    k107 = l_hand * kz_hand
+    inertia_hand_left_zz = mass_hand_left * (k107 * k107)
     if not mass_pelvis > 0.0:
         raise ValueError("mass of pelvis is not positive: change the parameters")
-    if not mass_pelvis * (k85 * k85) >= 0.0:
+    if not mass_pelvis * (k65 * k65) >= 0.0:
         raise ValueError("inertia_com xx of pelvis is negative: change the parameters")
-    if not mass_pelvis * (k86 * k86) >= 0.0:
+    if not mass_pelvis * (k66 * k66) >= 0.0:
         raise ValueError("inertia_com yy of pelvis is negative: change the parameters")
-    if not mass_pelvis * (k87 * k87) >= 0.0:
+    if not mass_pelvis * (k67 * k67) >= 0.0:
         raise ValueError("inertia_com zz of pelvis is negative: change the parameters")
     if not mass_abdomen > 0.0:
         raise ValueError("mass of abdomen is not positive: change the parameters")
-    if not mass_abdomen * (k88 * k88) >= 0.0:
+    if not mass_abdomen * (k68 * k68) >= 0.0:
         raise ValueError("inertia_com xx of abdomen is negative: change the parameters")
-    if not mass_abdomen * (k89 * k89) >= 0.0:
+    if not mass_abdomen * (k69 * k69) >= 0.0:
         raise ValueError("inertia_com yy of abdomen is negative: change the parameters")
-    if not mass_abdomen * (k90 * k90) >= 0.0:
+    if not mass_abdomen * (k70 * k70) >= 0.0:
         raise ValueError("inertia_com zz of abdomen is negative: change the parameters")
     if not mass_thigh_left > 0.0:
         raise ValueError("mass of thigh_left is not positive: change the parameters")
-    if not k92 >= 0.0:
+    if not k72 >= 0.0:
         raise ValueError("inertia_com xx of thigh_left is negative: change the parameters")
-    if not k94 >= 0.0:
+    if not k74 >= 0.0:
         raise ValueError("inertia_com yy of thigh_left is negative: change the parameters")
     if not inertia_thigh_left_zz >= 0.0:
         raise ValueError("inertia_com zz of thigh_left is negative: change the parameters")
     if not mass_thigh_left > 0.0:
         raise ValueError("mass of thigh_right is not positive: change the parameters")
-    if not k92 >= 0.0:
+    if not k72 >= 0.0:
         raise ValueError("inertia_com xx of thigh_right is negative: change the parameters")
-    if not k94 >= 0.0:
+    if not k74 >= 0.0:
         raise ValueError("inertia_com yy of thigh_right is negative: change the parameters")
     if not inertia_thigh_left_zz >= 0.0:
         raise ValueError("inertia_com zz of thigh_right is negative: change the parameters")
     if not mass_thorax > 0.0:
         raise ValueError("mass of thorax is not positive: change the parameters")
-    if not mass_thorax * (k96 * k96) >= 0.0:
+    if not mass_thorax * (k76 * k76) >= 0.0:
         raise ValueError("inertia_com xx of thorax is negative: change the parameters")
-    if not mass_thorax * (k97 * k97) >= 0.0:
+    if not mass_thorax * (k77 * k77) >= 0.0:
         raise ValueError("inertia_com yy of thorax is negative: change the parameters")
-    if not mass_thorax * (k98 * k98) >= 0.0:
+    if not mass_thorax * (k78 * k78) >= 0.0:
         raise ValueError("inertia_com zz of thorax is negative: change the parameters")
     if not mass_shank_left > 0.0:
         raise ValueError("mass of shank_left is not positive: change the parameters")
-    if not k100 >= 0.0:
+    if not k80 >= 0.0:
         raise ValueError("inertia_com xx of shank_left is negative: change the parameters")
-    if not k102 >= 0.0:
+    if not k82 >= 0.0:
         raise ValueError("inertia_com yy of shank_left is negative: change the parameters")
     if not inertia_shank_left_zz >= 0.0:
         raise ValueError("inertia_com zz of shank_left is negative: change the parameters")
     if not mass_shank_left > 0.0:
         raise ValueError("mass of shank_right is not positive: change the parameters")
-    if not k100 >= 0.0:
+    if not k80 >= 0.0:
         raise ValueError("inertia_com xx of shank_right is negative: change the parameters")
-    if not k102 >= 0.0:
+    if not k82 >= 0.0:
         raise ValueError("inertia_com yy of shank_right is negative: change the parameters")
     if not inertia_shank_left_zz >= 0.0:
         raise ValueError("inertia_com zz of shank_right is negative: change the parameters")
     if not mass_head > 0.0:
         raise ValueError("mass of head is not positive: change the parameters")
-    if not mass_head * (k104 * k104) >= 0.0:
+    if not mass_head * (k84 * k84) >= 0.0:
         raise ValueError("inertia_com xx of head is negative: change the parameters")
-    if not mass_head * (k105 * k105) >= 0.0:
+    if not mass_head * (k85 * k85) >= 0.0:
         raise ValueError("inertia_com yy of head is negative: change the parameters")
-    if not mass_head * (k106 * k106) >= 0.0:
+    if not mass_head * (k86 * k86) >= 0.0:
         raise ValueError("inertia_com zz of head is negative: change the parameters")
     if not mass_upper_arm_left > 0.0:
         raise ValueError("mass of upper_arm_left is not positive: change the parameters")
-    if not k108 >= 0.0:
+    if not k88 >= 0.0:
         raise ValueError("inertia_com xx of upper_arm_left is negative: change the parameters")
-    if not k110 >= 0.0:
+    if not k90 >= 0.0:
         raise ValueError("inertia_com yy of upper_arm_left is negative: change the parameters")
     if not inertia_upper_arm_left_zz >= 0.0:
         raise ValueError("inertia_com zz of upper_arm_left is negative: change the parameters")
     if not mass_upper_arm_left > 0.0:
         raise ValueError("mass of upper_arm_right is not positive: change the parameters")
-    if not k108 >= 0.0:
+    if not k88 >= 0.0:
         raise ValueError("inertia_com xx of upper_arm_right is negative: change the parameters")
-    if not k110 >= 0.0:
+    if not k90 >= 0.0:
         raise ValueError("inertia_com yy of upper_arm_right is negative: change the parameters")
     if not inertia_upper_arm_left_zz >= 0.0:
         raise ValueError("inertia_com zz of upper_arm_right is negative: change the parameters")
     if not mass_foot_left > 0.0:
         raise ValueError("mass of foot_left is not positive: change the parameters")
-    if not k113 >= 0.0:
+    if not k93 >= 0.0:
         raise ValueError("inertia_com xx of foot_left is negative: change the parameters")
-    if not k115 >= 0.0:
+    if not k95 >= 0.0:
         raise ValueError("inertia_com yy of foot_left is negative: change the parameters")
-    if not k117 >= 0.0:
+    if not k97 >= 0.0:
         raise ValueError("inertia_com zz of foot_left is negative: change the parameters")
     if not mass_foot_left > 0.0:
         raise ValueError("mass of foot_right is not positive: change the parameters")
-    if not k113 >= 0.0:
+    if not k93 >= 0.0:
         raise ValueError("inertia_com xx of foot_right is negative: change the parameters")
-    if not k115 >= 0.0:
+    if not k95 >= 0.0:
         raise ValueError("inertia_com yy of foot_right is negative: change the parameters")
-    if not k117 >= 0.0:
+    if not k97 >= 0.0:
         raise ValueError("inertia_com zz of foot_right is negative: change the parameters")
     if not mass_forearm_left > 0.0:
         raise ValueError("mass of forearm_left is not positive: change the parameters")
-    if not k119 >= 0.0:
+    if not k99 >= 0.0:
         raise ValueError("inertia_com xx of forearm_left is negative: change the parameters")
-    if not k121 >= 0.0:
+    if not k101 >= 0.0:
         raise ValueError("inertia_com yy of forearm_left is negative: change the parameters")
     if not inertia_forearm_left_zz >= 0.0:
         raise ValueError("inertia_com zz of forearm_left is negative: change the parameters")
     if not mass_forearm_left > 0.0:
         raise ValueError("mass of forearm_right is not positive: change the parameters")
-    if not k119 >= 0.0:
+    if not k99 >= 0.0:
         raise ValueError("inertia_com xx of forearm_right is negative: change the parameters")
-    if not k121 >= 0.0:
+    if not k101 >= 0.0:
         raise ValueError("inertia_com yy of forearm_right is negative: change the parameters")
     if not inertia_forearm_left_zz >= 0.0:
         raise ValueError("inertia_com zz of forearm_right is negative: change the parameters")
     if not mass_hand_left > 0.0:
         raise ValueError("mass of hand_left is not positive: change the parameters")
-    if not k124 >= 0.0:
+    if not k104 >= 0.0:
         raise ValueError("inertia_com xx of hand_left is negative: change the parameters")
-    if not k126 >= 0.0:
+    if not k106 >= 0.0:
         raise ValueError("inertia_com yy of hand_left is negative: change the parameters")
     if not inertia_hand_left_zz >= 0.0:
         raise ValueError("inertia_com zz of hand_left is negative: change the parameters")
     if not mass_hand_left > 0.0:
         raise ValueError("mass of hand_right is not positive: change the parameters")
-    if not k124 >= 0.0:
+    if not k104 >= 0.0:
         raise ValueError("inertia_com xx of hand_right is negative: change the parameters")
-    if not k126 >= 0.0:
+    if not k106 >= 0.0:
         raise ValueError("inertia_com yy of hand_right is negative: change the parameters")
     if not inertia_hand_left_zz >= 0.0:
         raise ValueError("inertia_com zz of hand_right is negative: change the parameters")
-    inertia_pelvis_xx = mass_pelvis * (k85 * k85)
-    inertia_pelvis_yy = mass_pelvis * (k86 * k86)
-    inertia_pelvis_zz = mass_pelvis * (k87 * k87)
+    inertia_pelvis_xx = mass_pelvis * (k65 * k65)
+    inertia_pelvis_yy = mass_pelvis * (k66 * k66)
+    inertia_pelvis_zz = mass_pelvis * (k67 * k67)
     k1 = l_pelvis * c_pelvis
-    k65 = l_abdomen * (c_abdomen - 1.0)
-    inertia_abdomen_zz = mass_abdomen * (k90 * k90)
+    k108 = l_abdomen * (c_abdomen - 1.0)
+    inertia_abdomen_zz = mass_abdomen * (k70 * k70)
     k2 = l_pelvis * (c_pelvis - 1.0)
-    k66 = l_thigh * c_thigh
-    k3 = l_abdomen * c_abdomen - k65
-    k67 = l_thorax * (c_thorax - 1.0)
-    inertia_thorax_zz = mass_thorax * (k98 * k98)
-    k4 = l_thigh * (c_thigh - 1.0) - k66
-    k68 = l_shank * c_shank
-    k128 = l_thorax * c_thorax
-    k5 = k128 - k67
-    k69 = l_head * (c_head - 1.0)
-    inertia_head_zz = mass_head * (k106 * k106)
-    k6 = k128 - d_shoulder - k67
-    k70 = l_upper_arm * c_upper_arm
-    k7 = l_shank * (c_shank - 1.0) - k68
-    k71 = h_ankle / 2.0
-    k72 = l_foot * c_foot - d_ankle
-    k8 = l_upper_arm * (c_upper_arm - 1.0) - k70
-    k73 = l_forearm * c_forearm
-    k9 = l_forearm * (c_forearm - 1.0) - k73
-    k74 = l_hand * c_hand
-    k10 = k65 * mass_abdomen
-    k129 = k65 * k10
-    inertia_abdomen_xx = mass_abdomen * (k88 * k88) + k129
-    inertia_abdomen_yy = mass_abdomen * (k89 * k89) + k129
-    k11 = k66 * mass_thigh_left
-    k130 = k66 * k11
-    inertia_thigh_left_xx = mass_thigh_left * (k91 * k91) + k130
-    inertia_thigh_left_yy = mass_thigh_left * (k93 * k93) + k130
-    k12 = k67 * mass_thorax
-    k131 = k67 * k12
-    inertia_thorax_xx = mass_thorax * (k96 * k96) + k131
-    inertia_thorax_yy = mass_thorax * (k97 * k97) + k131
-    k13 = k68 * mass_shank_left
-    k132 = k68 * k13
-    inertia_shank_left_xx = mass_shank_left * (k99 * k99) + k132
-    inertia_shank_left_yy = mass_shank_left * (k101 * k101) + k132
-    k14 = k69 * mass_head
-    k133 = k69 * k14
-    inertia_head_xx = mass_head * (k104 * k104) + k133
-    inertia_head_yy = mass_head * (k105 * k105) + k133
-    k15 = k70 * mass_upper_arm_left
-    k134 = k70 * k15
-    inertia_upper_arm_left_xx = mass_upper_arm_left * (k107 * k107) + k134
-    inertia_upper_arm_left_yy = mass_upper_arm_left * (k109 * k109) + k134
-    moment_foot_left_x = k72 * mass_foot_left
-    k16 = k71 * mass_foot_left
-    k135 = k72 * moment_foot_left_x
-    k136 = k71 * k16
-    inertia_foot_left_xz = k71 * moment_foot_left_x
-    inertia_foot_left_xx = mass_foot_left * (k112 * k112) + k136
-    inertia_foot_left_yy = mass_foot_left * (k114 * k114) + (k135 + k136)
-    inertia_foot_left_zz = mass_foot_left * (k116 * k116) + k135
-    k17 = k73 * mass_forearm_left
-    k137 = k73 * k17
-    inertia_forearm_left_xx = mass_forearm_left * (k118 * k118) + k137
-    inertia_forearm_left_yy = mass_forearm_left * (k120 * k120) + k137
-    k18 = k74 * mass_hand_left
-    k138 = k74 * k18
-    inertia_hand_left_xx = mass_hand_left * (k123 * k123) + k138
-    inertia_hand_left_yy = mass_hand_left * (k125 * k125) + k138
+    k109 = l_thigh * c_thigh
+    k3 = l_abdomen * c_abdomen - k108
+    k110 = l_thorax * (c_thorax - 1.0)
+    inertia_thorax_zz = mass_thorax * (k78 * k78)
+    k4 = l_thigh * (c_thigh - 1.0) - k109
+    k111 = l_shank * c_shank
+    k112 = l_thorax * c_thorax
+    k5 = k112 - k110
+    k113 = l_head * (c_head - 1.0)
+    inertia_head_zz = mass_head * (k86 * k86)
+    k6 = k112 - d_shoulder - k110
+    k114 = l_upper_arm * c_upper_arm
+    k7 = l_shank * (c_shank - 1.0) - k111
+    k115 = h_ankle / 2.0
+    k116 = l_foot * c_foot - d_ankle
+    k8 = l_upper_arm * (c_upper_arm - 1.0) - k114
+    k117 = l_forearm * c_forearm
+    k9 = l_forearm * (c_forearm - 1.0) - k117
+    k118 = l_hand * c_hand
+    k10 = k108 * mass_abdomen
+    k119 = k108 * k10
+    inertia_abdomen_xx = mass_abdomen * (k68 * k68) + k119
+    inertia_abdomen_yy = mass_abdomen * (k69 * k69) + k119
+    k11 = k109 * mass_thigh_left
+    k120 = k109 * k11
+    inertia_thigh_left_xx = mass_thigh_left * (k71 * k71) + k120
+    inertia_thigh_left_yy = mass_thigh_left * (k73 * k73) + k120
+    k12 = k110 * mass_thorax
+    k121 = k110 * k12
+    inertia_thorax_xx = mass_thorax * (k76 * k76) + k121
+    inertia_thorax_yy = mass_thorax * (k77 * k77) + k121
+    k13 = k111 * mass_shank_left
+    k122 = k111 * k13
+    inertia_shank_left_xx = mass_shank_left * (k79 * k79) + k122
+    inertia_shank_left_yy = mass_shank_left * (k81 * k81) + k122
+    k14 = k113 * mass_head
+    k123 = k113 * k14
+    inertia_head_xx = mass_head * (k84 * k84) + k123
+    inertia_head_yy = mass_head * (k85 * k85) + k123
+    k15 = k114 * mass_upper_arm_left
+    k124 = k114 * k15
+    inertia_upper_arm_left_xx = mass_upper_arm_left * (k87 * k87) + k124
+    inertia_upper_arm_left_yy = mass_upper_arm_left * (k89 * k89) + k124
+    moment_foot_left_x = k116 * mass_foot_left
+    k16 = k115 * mass_foot_left
+    k125 = k116 * moment_foot_left_x
+    k126 = k115 * k16
+    inertia_foot_left_xz = k115 * moment_foot_left_x
+    inertia_foot_left_xx = mass_foot_left * (k92 * k92) + k126
+    inertia_foot_left_yy = mass_foot_left * (k94 * k94) + (k125 + k126)
+    inertia_foot_left_zz = mass_foot_left * (k96 * k96) + k125
+    k17 = k117 * mass_forearm_left
+    k127 = k117 * k17
+    inertia_forearm_left_xx = mass_forearm_left * (k98 * k98) + k127
+    inertia_forearm_left_yy = mass_forearm_left * (k100 * k100) + k127
+    k18 = k118 * mass_hand_left
+    k128 = k118 * k18
+    inertia_hand_left_xx = mass_hand_left * (k103 * k103) + k128
+    inertia_hand_left_yy = mass_hand_left * (k105 * k105) + k128
     k19 = k18 / inertia_hand_left_xx
     k20 = mass_hand_left - k18 * k19
     k21 = inertia_hand_left_yy - inertia_hand_left_zz
@@ -790,68 +787,55 @@ def _constants(values):
     k32 = mass_head - k14 * k31
     k33 = k14 / inertia_head_yy
     k34 = mass_head - k14 * k33
-    k139 = 0.5 * (inertia_pelvis_zz + (inertia_pelvis_xx + inertia_pelvis_yy))
-    k140 = k139 - inertia_pelvis_xx
-    k141 = k139 - inertia_pelvis_yy
-    k142 = k139 - inertia_pelvis_zz
-    k35 = k141 - k142
-    k36 = k142 - k140
-    k37 = k140 - k141
-    k143 = 0.5 * (inertia_abdomen_zz + (inertia_abdomen_xx + inertia_abdomen_yy))
-    k38 = k143 - inertia_abdomen_xx
-    k39 = k143 - inertia_abdomen_yy
-    k40 = k143 - inertia_abdomen_zz
-    k144 = 0.5 * (inertia_thigh_left_zz + (inertia_thigh_left_xx + inertia_thigh_left_yy))
-    k41 = k144 - inertia_thigh_left_xx
-    k42 = k144 - inertia_thigh_left_yy
-    k43 = k144 - inertia_thigh_left_zz
-    k145 = 0.5 * (inertia_thorax_zz + (inertia_thorax_xx + inertia_thorax_yy))
-    k44 = k145 - inertia_thorax_xx
-    k45 = k145 - inertia_thorax_yy
-    k46 = k145 - inertia_thorax_zz
-    k146 = 0.5 * (inertia_shank_left_zz + (inertia_shank_left_xx + inertia_shank_left_yy))
-    k47 = k146 - inertia_shank_left_xx
-    k48 = k146 - inertia_shank_left_yy
-    k49 = k146 - inertia_shank_left_zz
-    k147 = 0.5 * (inertia_head_zz + (inertia_head_xx + inertia_head_yy))
-    k50 = k147 - inertia_head_xx
-    k51 = k147 - inertia_head_yy
-    k52 = k147 - inertia_head_zz
-    k148 = inertia_upper_arm_left_zz + (inertia_upper_arm_left_xx + inertia_upper_arm_left_yy)
-    k149 = 0.5 * k148
-    k53 = k149 - inertia_upper_arm_left_xx
-    k54 = k149 - inertia_upper_arm_left_yy
-    k55 = k149 - inertia_upper_arm_left_zz
-    k150 = 0.5 * (inertia_foot_left_zz + (inertia_foot_left_xx + inertia_foot_left_yy))
-    k56 = k150 - inertia_foot_left_xx
-    k57 = k150 - inertia_foot_left_yy
-    k58 = k150 - inertia_foot_left_zz
-    k151 = inertia_forearm_left_zz + (inertia_forearm_left_xx + inertia_forearm_left_yy)
-    k152 = 0.5 * k151
-    k59 = k152 - inertia_forearm_left_xx
-    k60 = k152 - inertia_forearm_left_yy
-    k61 = k152 - inertia_forearm_left_zz
-    k153 = 0.5 * (inertia_hand_left_zz + (inertia_hand_left_xx + inertia_hand_left_yy))
-    k62 = k153 - inertia_hand_left_xx
-    k63 = k153 - inertia_hand_left_yy
-    k64 = k153 - inertia_hand_left_zz
-    k75 = g * mass_pelvis
-    k76 = g * mass_abdomen
-    k77 = g * mass_thigh_left
-    k78 = g * mass_thorax
-    k79 = g * mass_shank_left
-    k80 = g * mass_head
-    k81 = g * mass_upper_arm_left
-    k82 = g * mass_foot_left
-    k83 = g * mass_forearm_left
-    k84 = g * mass_hand_left
+    k129 = 0.5 * (inertia_pelvis_zz + (inertia_pelvis_xx + inertia_pelvis_yy))
+    k130 = k129 - inertia_pelvis_xx
+    k131 = k129 - inertia_pelvis_yy
+    k132 = k129 - inertia_pelvis_zz
+    k35 = k131 - k132
+    k36 = k132 - k130
+    k37 = k130 - k131
+    k133 = 0.5 * (inertia_abdomen_zz + (inertia_abdomen_xx + inertia_abdomen_yy))
+    k38 = k133 - inertia_abdomen_xx
+    k39 = k133 - inertia_abdomen_yy
+    k40 = k133 - inertia_abdomen_zz
+    k134 = 0.5 * (inertia_thigh_left_zz + (inertia_thigh_left_xx + inertia_thigh_left_yy))
+    k41 = k134 - inertia_thigh_left_xx
+    k42 = k134 - inertia_thigh_left_yy
+    k43 = k134 - inertia_thigh_left_zz
+    k135 = 0.5 * (inertia_thorax_zz + (inertia_thorax_xx + inertia_thorax_yy))
+    k44 = k135 - inertia_thorax_xx
+    k45 = k135 - inertia_thorax_yy
+    k46 = k135 - inertia_thorax_zz
+    k136 = 0.5 * (inertia_shank_left_zz + (inertia_shank_left_xx + inertia_shank_left_yy))
+    k47 = k136 - inertia_shank_left_xx
+    k48 = k136 - inertia_shank_left_yy
+    k49 = k136 - inertia_shank_left_zz
+    k137 = 0.5 * (inertia_head_zz + (inertia_head_xx + inertia_head_yy))
+    k50 = k137 - inertia_head_xx
+    k51 = k137 - inertia_head_yy
+    k52 = k137 - inertia_head_zz
+    k138 = inertia_upper_arm_left_zz + (inertia_upper_arm_left_xx + inertia_upper_arm_left_yy)
+    k139 = 0.5 * k138
+    k53 = k139 - inertia_upper_arm_left_xx
+    k54 = k139 - inertia_upper_arm_left_yy
+    k55 = k139 - inertia_upper_arm_left_zz
+    k140 = 0.5 * (inertia_foot_left_zz + (inertia_foot_left_xx + inertia_foot_left_yy))
+    k56 = k140 - inertia_foot_left_xx
+    k57 = k140 - inertia_foot_left_yy
+    k58 = k140 - inertia_foot_left_zz
+    k141 = inertia_forearm_left_zz + (inertia_forearm_left_xx + inertia_forearm_left_yy)
+    k142 = 0.5 * k141
+    k59 = k142 - inertia_forearm_left_xx
+    k60 = k142 - inertia_forearm_left_yy
+    k61 = k142 - inertia_forearm_left_zz
+    k143 = 0.5 * (inertia_hand_left_zz + (inertia_hand_left_xx + inertia_hand_left_yy))
+    k62 = k143 - inertia_hand_left_xx
+    k63 = k143 - inertia_hand_left_yy
+    k64 = k143 - inertia_hand_left_zz
     return {
         "initial_state": (),
         "derivative": (w_shoulder, w_hip, g, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k1, mass_abdomen, inertia_abdomen_zz, k2, mass_thigh_left, inertia_thigh_left_zz, k3, mass_thorax, inertia_thorax_zz, k4, mass_shank_left, inertia_shank_left_zz, k5, mass_head, inertia_head_zz, k6, mass_upper_arm_left, inertia_upper_arm_left_zz, k7, mass_foot_left, k8, mass_forearm_left, inertia_forearm_left_zz, k9, mass_hand_left, inertia_hand_left_zz, k10, inertia_abdomen_xx, inertia_abdomen_yy, k11, inertia_thigh_left_xx, inertia_thigh_left_yy, k12, inertia_thorax_xx, inertia_thorax_yy, k13, inertia_shank_left_xx, inertia_shank_left_yy, k14, inertia_head_xx, inertia_head_yy, k15, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k16, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k17, inertia_forearm_left_xx, inertia_forearm_left_yy, k18, inertia_hand_left_xx, inertia_hand_left_yy, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64),
         "jacobian": (w_shoulder, w_hip, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k1, mass_abdomen, inertia_abdomen_zz, k2, mass_thigh_left, inertia_thigh_left_zz, k3, mass_thorax, inertia_thorax_zz, k4, mass_shank_left, inertia_shank_left_zz, k5, mass_head, inertia_head_zz, k6, mass_upper_arm_left, inertia_upper_arm_left_zz, k7, mass_foot_left, k8, mass_forearm_left, inertia_forearm_left_zz, k9, mass_hand_left, inertia_hand_left_zz, k10, inertia_abdomen_xx, inertia_abdomen_yy, k11, inertia_thigh_left_xx, inertia_thigh_left_yy, k12, inertia_thorax_xx, inertia_thorax_yy, k13, inertia_shank_left_xx, inertia_shank_left_yy, k14, inertia_head_xx, inertia_head_yy, k15, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k16, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k17, inertia_forearm_left_xx, inertia_forearm_left_yy, k18, inertia_hand_left_xx, inertia_hand_left_yy, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64),
-        "kinetic_energy": (w_shoulder, w_hip, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k1, mass_abdomen, inertia_abdomen_zz, k2, mass_thigh_left, inertia_thigh_left_zz, k3, mass_thorax, inertia_thorax_zz, k4, mass_shank_left, inertia_shank_left_zz, k5, mass_head, inertia_head_zz, k6, mass_upper_arm_left, inertia_upper_arm_left_zz, k7, mass_foot_left, k8, mass_forearm_left, inertia_forearm_left_zz, k9, mass_hand_left, inertia_hand_left_zz, k10, inertia_abdomen_xx, inertia_abdomen_yy, k11, inertia_thigh_left_xx, inertia_thigh_left_yy, k12, inertia_thorax_xx, inertia_thorax_yy, k13, inertia_shank_left_xx, inertia_shank_left_yy, k14, inertia_head_xx, inertia_head_yy, k15, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k16, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, inertia_foot_left_zz, k17, inertia_forearm_left_xx, inertia_forearm_left_yy, k18, inertia_hand_left_xx, inertia_hand_left_yy),
-        "potential_energy": (w_shoulder, w_hip, k1, k65, k2, k66, k3, k67, k4, k68, k5, k69, k6, k70, k7, k71, k72, k8, k73, k9, k74, k75, k76, k77, k78, k79, k80, k81, k82, k83, k84),
-        "body_poses": (w_shoulder, w_hip, k1, k65, k2, k66, k3, k67, k4, k68, k5, k69, k6, k70, k7, k71, k72, k8, k73, k9, k74),
     }
 
 
@@ -6545,1221 +6529,6 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
-def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """1144 operations: 358 add, 114 sub, 636 mul, 8 div, 14 sin, 14 cos."""
-    w_shoulder, w_hip, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k1, mass_abdomen, inertia_abdomen_zz, k2, mass_thigh_left, inertia_thigh_left_zz, k3, mass_thorax, inertia_thorax_zz, k4, mass_shank_left, inertia_shank_left_zz, k5, mass_head, inertia_head_zz, k6, mass_upper_arm_left, inertia_upper_arm_left_zz, k7, mass_foot_left, k8, mass_forearm_left, inertia_forearm_left_zz, k9, mass_hand_left, inertia_hand_left_zz, k10, inertia_abdomen_xx, inertia_abdomen_yy, k11, inertia_thigh_left_xx, inertia_thigh_left_yy, k12, inertia_thorax_xx, inertia_thorax_yy, k13, inertia_shank_left_xx, inertia_shank_left_yy, k14, inertia_head_xx, inertia_head_yy, k15, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k16, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, inertia_foot_left_zz, k17, inertia_forearm_left_xx, inertia_forearm_left_yy, k18, inertia_hand_left_xx, inertia_hand_left_yy = k
-    _, _, _, pelvis_qw, pelvis_qx, pelvis_qy, pelvis_qz, lumbar_qw, lumbar_qx, lumbar_qy, lumbar_qz, hip_left_qw, hip_left_qx, hip_left_qy, hip_left_qz, hip_right_qw, hip_right_qx, hip_right_qy, hip_right_qz, thoracic_qw, thoracic_qx, thoracic_qy, thoracic_qz, knee_left_flexion, knee_right_flexion, neck_qw, neck_qx, neck_qy, neck_qz, shoulder_left_qw, shoulder_left_qx, shoulder_left_qy, shoulder_left_qz, shoulder_right_qw, shoulder_right_qx, shoulder_right_qy, shoulder_right_qz, ankle_left_flexion, ankle_left_inversion, ankle_right_flexion, ankle_right_inversion, elbow_left_flexion, elbow_left_pronation, elbow_right_flexion, elbow_right_pronation, wrist_left_flexion, wrist_left_deviation, wrist_right_flexion, wrist_right_deviation, pelvis_x_dot, pelvis_y_dot, pelvis_z_dot, pelvis_wx, pelvis_wy, pelvis_wz, lumbar_wx, lumbar_wy, lumbar_wz, hip_left_wx, hip_left_wy, hip_left_wz, hip_right_wx, hip_right_wy, hip_right_wz, thoracic_wx, thoracic_wy, thoracic_wz, knee_left_flexion_dot, knee_right_flexion_dot, neck_wx, neck_wy, neck_wz, shoulder_left_wx, shoulder_left_wy, shoulder_left_wz, shoulder_right_wx, shoulder_right_wy, shoulder_right_wz, ankle_left_flexion_dot, ankle_left_inversion_dot, ankle_right_flexion_dot, ankle_right_inversion_dot, elbow_left_flexion_dot, elbow_left_pronation_dot, elbow_right_flexion_dot, elbow_right_pronation_dot, wrist_left_flexion_dot, wrist_left_deviation_dot, wrist_right_flexion_dot, wrist_right_deviation_dot = y
-    s1 = pelvis_qw * pelvis_qw + pelvis_qx * pelvis_qx + pelvis_qy * pelvis_qy + pelvis_qz * pelvis_qz
-    s2 = 2.0 / s1
-    s3 = pelvis_qx * s2
-    s4 = pelvis_qy * s2
-    s5 = pelvis_qz * s2
-    s6 = pelvis_qw * s3
-    s7 = pelvis_qw * s4
-    s8 = pelvis_qw * s5
-    s9 = pelvis_qx * s3
-    s10 = pelvis_qy * s4
-    s11 = pelvis_qz * s5
-    s12 = pelvis_qy * s3
-    s13 = pelvis_qz * s3
-    s14 = pelvis_qz * s4
-    s24 = lumbar_qw * lumbar_qw + lumbar_qx * lumbar_qx + lumbar_qy * lumbar_qy + lumbar_qz * lumbar_qz
-    s25 = 2.0 / s24
-    s26 = lumbar_qx * s25
-    s27 = lumbar_qy * s25
-    s28 = lumbar_qz * s25
-    s29 = lumbar_qw * s26
-    s30 = lumbar_qw * s27
-    s31 = lumbar_qw * s28
-    s32 = lumbar_qx * s26
-    s33 = lumbar_qy * s27
-    s34 = lumbar_qz * s28
-    s35 = lumbar_qy * s26
-    s36 = lumbar_qz * s26
-    s37 = lumbar_qz * s27
-    s38 = 1.0 - (s33 + s34)
-    s39 = s35 - s31
-    s40 = s30 + s36
-    s41 = s31 + s35
-    s42 = 1.0 - (s32 + s34)
-    s43 = s37 - s29
-    s44 = s36 - s30
-    s45 = s29 + s37
-    s46 = 1.0 - (s32 + s33)
-    s47 = hip_left_qw * hip_left_qw + hip_left_qx * hip_left_qx + hip_left_qy * hip_left_qy
-    s48 = 2.0 / (s47 + hip_left_qz * hip_left_qz)
-    s49 = hip_left_qx * s48
-    s50 = hip_left_qy * s48
-    s51 = hip_left_qz * s48
-    s52 = hip_left_qw * s49
-    s53 = hip_left_qw * s50
-    s54 = hip_left_qw * s51
-    s55 = hip_left_qx * s49
-    s56 = hip_left_qy * s50
-    s57 = hip_left_qz * s51
-    s58 = hip_left_qy * s49
-    s59 = hip_left_qz * s49
-    s60 = hip_left_qz * s50
-    s61 = 1.0 - (s56 + s57)
-    s62 = s58 - s54
-    s63 = s53 + s59
-    s64 = s54 + s58
-    s65 = 1.0 - (s55 + s57)
-    s66 = s60 - s52
-    s67 = s59 - s53
-    s68 = s52 + s60
-    s69 = 1.0 - (s55 + s56)
-    s70 = hip_right_qw * hip_right_qw + hip_right_qx * hip_right_qx + hip_right_qy * hip_right_qy
-    s71 = 2.0 / (s70 + hip_right_qz * hip_right_qz)
-    s72 = hip_right_qx * s71
-    s73 = hip_right_qy * s71
-    s74 = hip_right_qz * s71
-    s75 = hip_right_qw * s72
-    s76 = hip_right_qw * s73
-    s77 = hip_right_qw * s74
-    s78 = hip_right_qx * s72
-    s79 = hip_right_qy * s73
-    s80 = hip_right_qz * s74
-    s81 = hip_right_qy * s72
-    s82 = hip_right_qz * s72
-    s83 = hip_right_qz * s73
-    s84 = 1.0 - (s79 + s80)
-    s85 = s81 - s77
-    s86 = s76 + s82
-    s87 = s77 + s81
-    s88 = 1.0 - (s78 + s80)
-    s89 = s83 - s75
-    s90 = s82 - s76
-    s91 = s75 + s83
-    s92 = 1.0 - (s78 + s79)
-    s93 = thoracic_qw * thoracic_qw + thoracic_qx * thoracic_qx + thoracic_qy * thoracic_qy
-    s94 = 2.0 / (s93 + thoracic_qz * thoracic_qz)
-    s95 = thoracic_qx * s94
-    s96 = thoracic_qy * s94
-    s97 = thoracic_qz * s94
-    s98 = thoracic_qw * s95
-    s99 = thoracic_qw * s96
-    s100 = thoracic_qw * s97
-    s101 = thoracic_qx * s95
-    s102 = thoracic_qy * s96
-    s103 = thoracic_qz * s97
-    s104 = thoracic_qy * s95
-    s105 = thoracic_qz * s95
-    s106 = thoracic_qz * s96
-    s107 = 1.0 - (s102 + s103)
-    s108 = s104 - s100
-    s109 = s99 + s105
-    s110 = s100 + s104
-    s111 = 1.0 - (s101 + s103)
-    s112 = s106 - s98
-    s113 = s105 - s99
-    s114 = s98 + s106
-    s115 = 1.0 - (s101 + s102)
-    cos_knee_left_flexion = cos(knee_left_flexion)
-    sin_knee_left_flexion = sin(knee_left_flexion)
-    cos_knee_right_flexion = cos(knee_right_flexion)
-    sin_knee_right_flexion = sin(knee_right_flexion)
-    s118 = neck_qw * neck_qw + neck_qx * neck_qx + neck_qy * neck_qy + neck_qz * neck_qz
-    s119 = 2.0 / s118
-    s120 = neck_qx * s119
-    s121 = neck_qy * s119
-    s122 = neck_qz * s119
-    s123 = neck_qw * s120
-    s124 = neck_qw * s121
-    s125 = neck_qw * s122
-    s126 = neck_qx * s120
-    s127 = neck_qy * s121
-    s128 = neck_qz * s122
-    s129 = neck_qy * s120
-    s130 = neck_qz * s120
-    s131 = neck_qz * s121
-    s132 = 1.0 - (s127 + s128)
-    s133 = s129 - s125
-    s134 = s124 + s130
-    s135 = s125 + s129
-    s136 = 1.0 - (s126 + s128)
-    s137 = s131 - s123
-    s138 = s130 - s124
-    s139 = s123 + s131
-    s140 = 1.0 - (s126 + s127)
-    s141 = shoulder_left_qw * shoulder_left_qw + shoulder_left_qx * shoulder_left_qx
-    s142 = s141 + shoulder_left_qy * shoulder_left_qy + shoulder_left_qz * shoulder_left_qz
-    s143 = 2.0 / s142
-    s144 = shoulder_left_qx * s143
-    s145 = shoulder_left_qy * s143
-    s146 = shoulder_left_qz * s143
-    s147 = shoulder_left_qw * s144
-    s148 = shoulder_left_qw * s145
-    s149 = shoulder_left_qw * s146
-    s150 = shoulder_left_qx * s144
-    s151 = shoulder_left_qy * s145
-    s152 = shoulder_left_qz * s146
-    s153 = shoulder_left_qy * s144
-    s154 = shoulder_left_qz * s144
-    s155 = shoulder_left_qz * s145
-    s156 = 1.0 - (s151 + s152)
-    s157 = s153 - s149
-    s158 = s148 + s154
-    s159 = s149 + s153
-    s160 = 1.0 - (s150 + s152)
-    s161 = s155 - s147
-    s162 = s154 - s148
-    s163 = s147 + s155
-    s164 = 1.0 - (s150 + s151)
-    s165 = shoulder_right_qw * shoulder_right_qw + shoulder_right_qx * shoulder_right_qx
-    s166 = s165 + shoulder_right_qy * shoulder_right_qy + shoulder_right_qz * shoulder_right_qz
-    s167 = 2.0 / s166
-    s168 = shoulder_right_qx * s167
-    s169 = shoulder_right_qy * s167
-    s170 = shoulder_right_qz * s167
-    s171 = shoulder_right_qw * s168
-    s172 = shoulder_right_qw * s169
-    s173 = shoulder_right_qw * s170
-    s174 = shoulder_right_qx * s168
-    s175 = shoulder_right_qy * s169
-    s176 = shoulder_right_qz * s170
-    s177 = shoulder_right_qy * s168
-    s178 = shoulder_right_qz * s168
-    s179 = shoulder_right_qz * s169
-    s180 = 1.0 - (s175 + s176)
-    s181 = s177 - s173
-    s182 = s172 + s178
-    s183 = s173 + s177
-    s184 = 1.0 - (s174 + s176)
-    s185 = s179 - s171
-    s186 = s178 - s172
-    s187 = s171 + s179
-    s188 = 1.0 - (s174 + s175)
-    cos_ankle_left_flexion = cos(ankle_left_flexion)
-    sin_ankle_left_flexion = sin(ankle_left_flexion)
-    cos_ankle_left_inversion = cos(ankle_left_inversion)
-    sin_ankle_left_inversion = sin(ankle_left_inversion)
-    cos_ankle_right_flexion = cos(ankle_right_flexion)
-    sin_ankle_right_flexion = sin(ankle_right_flexion)
-    cos_ankle_right_inversion = cos(ankle_right_inversion)
-    sin_ankle_right_inversion = sin(ankle_right_inversion)
-    cos_elbow_left_flexion = cos(elbow_left_flexion)
-    sin_elbow_left_flexion = sin(elbow_left_flexion)
-    cos_elbow_left_pronation = cos(elbow_left_pronation)
-    sin_elbow_left_pronation = sin(elbow_left_pronation)
-    cos_elbow_right_flexion = cos(elbow_right_flexion)
-    sin_elbow_right_flexion = sin(elbow_right_flexion)
-    cos_elbow_right_pronation = cos(elbow_right_pronation)
-    sin_elbow_right_pronation = sin(elbow_right_pronation)
-    cos_wrist_left_flexion = cos(wrist_left_flexion)
-    sin_wrist_left_flexion = sin(wrist_left_flexion)
-    cos_wrist_left_deviation = cos(wrist_left_deviation)
-    sin_wrist_left_deviation = sin(wrist_left_deviation)
-    cos_wrist_right_flexion = cos(wrist_right_flexion)
-    sin_wrist_right_flexion = sin(wrist_right_flexion)
-    cos_wrist_right_deviation = cos(wrist_right_deviation)
-    sin_wrist_right_deviation = sin(wrist_right_deviation)
-    velocity_pelvis_x = pelvis_x_dot * (1.0 - (s10 + s11)) + pelvis_y_dot * (s8 + s12) + pelvis_z_dot * (s13 - s7)
-    velocity_pelvis_y = pelvis_x_dot * (s12 - s8) + pelvis_y_dot * (1.0 - (s9 + s11)) + pelvis_z_dot * (s6 + s14)
-    velocity_pelvis_z = pelvis_x_dot * (s7 + s13) + pelvis_y_dot * (s14 - s6) + pelvis_z_dot * (1.0 - (s9 + s10))
-    s3467 = velocity_pelvis_x + pelvis_wy * k1
-    s3468 = velocity_pelvis_y - pelvis_wx * k1
-    velocity_abdomen_x = s38 * s3467 + s41 * s3468 + s44 * velocity_pelvis_z
-    velocity_abdomen_y = s39 * s3467 + s42 * s3468 + s45 * velocity_pelvis_z
-    velocity_abdomen_z = s40 * s3467 + s43 * s3468 + s46 * velocity_pelvis_z
-    omega_abdomen_x = lumbar_wx + (pelvis_wx * s38 + pelvis_wy * s41 + pelvis_wz * s44)
-    omega_abdomen_y = lumbar_wy + (pelvis_wx * s39 + pelvis_wy * s42 + pelvis_wz * s45)
-    omega_abdomen_z = lumbar_wz + (pelvis_wx * s40 + pelvis_wy * s43 + pelvis_wz * s46)
-    s3469 = pelvis_wy * k2
-    s3470 = w_hip * pelvis_wz
-    s3471 = w_hip * pelvis_wx
-    s3472 = velocity_pelvis_x + (s3469 - s3470)
-    s3473 = velocity_pelvis_y - pelvis_wx * k2
-    s3474 = velocity_pelvis_z + s3471
-    velocity_thigh_left_x = s61 * s3472 + s64 * s3473 + s67 * s3474
-    velocity_thigh_left_y = s62 * s3472 + s65 * s3473 + s68 * s3474
-    velocity_thigh_left_z = s63 * s3472 + s66 * s3473 + s69 * s3474
-    omega_thigh_left_x = hip_left_wx + (pelvis_wx * s61 + pelvis_wy * s64 + pelvis_wz * s67)
-    omega_thigh_left_y = hip_left_wy + (pelvis_wx * s62 + pelvis_wy * s65 + pelvis_wz * s68)
-    omega_thigh_left_z = hip_left_wz + (pelvis_wx * s63 + pelvis_wy * s66 + pelvis_wz * s69)
-    s3475 = velocity_pelvis_x + (s3469 + s3470)
-    s3476 = velocity_pelvis_z - s3471
-    velocity_thigh_right_x = s84 * s3475 + s87 * s3473 + s90 * s3476
-    velocity_thigh_right_y = s85 * s3475 + s88 * s3473 + s91 * s3476
-    velocity_thigh_right_z = s86 * s3475 + s89 * s3473 + s92 * s3476
-    omega_thigh_right_x = hip_right_wx + (pelvis_wx * s84 + pelvis_wy * s87 + pelvis_wz * s90)
-    omega_thigh_right_y = hip_right_wy + (pelvis_wx * s85 + pelvis_wy * s88 + pelvis_wz * s91)
-    omega_thigh_right_z = hip_right_wz + (pelvis_wx * s86 + pelvis_wy * s89 + pelvis_wz * s92)
-    s3477 = velocity_abdomen_x + k3 * omega_abdomen_y
-    s3478 = velocity_abdomen_y - k3 * omega_abdomen_x
-    velocity_thorax_x = s107 * s3477 + s110 * s3478 + s113 * velocity_abdomen_z
-    velocity_thorax_y = s108 * s3477 + s111 * s3478 + s114 * velocity_abdomen_z
-    velocity_thorax_z = s109 * s3477 + s112 * s3478 + s115 * velocity_abdomen_z
-    omega_thorax_x = thoracic_wx + (s107 * omega_abdomen_x + s110 * omega_abdomen_y + s113 * omega_abdomen_z)
-    omega_thorax_y = thoracic_wy + (s108 * omega_abdomen_x + s111 * omega_abdomen_y + s114 * omega_abdomen_z)
-    omega_thorax_z = thoracic_wz + (s109 * omega_abdomen_x + s112 * omega_abdomen_y + s115 * omega_abdomen_z)
-    omega_shank_left_z = cos_knee_left_flexion * omega_thigh_left_z + sin_knee_left_flexion * omega_thigh_left_x
-    omega_shank_left_x = cos_knee_left_flexion * omega_thigh_left_x - sin_knee_left_flexion * omega_thigh_left_z
-    s3479 = velocity_thigh_left_x + k4 * omega_thigh_left_y
-    velocity_shank_left_y = velocity_thigh_left_y - k4 * omega_thigh_left_x
-    velocity_shank_left_z = cos_knee_left_flexion * velocity_thigh_left_z + sin_knee_left_flexion * s3479
-    velocity_shank_left_x = cos_knee_left_flexion * s3479 - sin_knee_left_flexion * velocity_thigh_left_z
-    omega_shank_left_y = knee_left_flexion_dot + omega_thigh_left_y
-    omega_shank_right_z = cos_knee_right_flexion * omega_thigh_right_z + sin_knee_right_flexion * omega_thigh_right_x
-    omega_shank_right_x = cos_knee_right_flexion * omega_thigh_right_x - sin_knee_right_flexion * omega_thigh_right_z
-    s3480 = velocity_thigh_right_x + k4 * omega_thigh_right_y
-    velocity_shank_right_y = velocity_thigh_right_y - k4 * omega_thigh_right_x
-    velocity_shank_right_z = cos_knee_right_flexion * velocity_thigh_right_z + sin_knee_right_flexion * s3480
-    velocity_shank_right_x = cos_knee_right_flexion * s3480 - sin_knee_right_flexion * velocity_thigh_right_z
-    omega_shank_right_y = knee_right_flexion_dot + omega_thigh_right_y
-    s3481 = velocity_thorax_x + k5 * omega_thorax_y
-    s3482 = velocity_thorax_y - k5 * omega_thorax_x
-    velocity_head_x = s132 * s3481 + s135 * s3482 + s138 * velocity_thorax_z
-    velocity_head_y = s133 * s3481 + s136 * s3482 + s139 * velocity_thorax_z
-    velocity_head_z = s134 * s3481 + s137 * s3482 + s140 * velocity_thorax_z
-    omega_head_x = neck_wx + (s132 * omega_thorax_x + s135 * omega_thorax_y + s138 * omega_thorax_z)
-    omega_head_y = neck_wy + (s133 * omega_thorax_x + s136 * omega_thorax_y + s139 * omega_thorax_z)
-    omega_head_z = neck_wz + (s134 * omega_thorax_x + s137 * omega_thorax_y + s140 * omega_thorax_z)
-    s3483 = k6 * omega_thorax_y
-    s3484 = w_shoulder * omega_thorax_z
-    s3485 = w_shoulder * omega_thorax_x
-    s3486 = velocity_thorax_x + (s3483 - s3484)
-    s3487 = velocity_thorax_y - k6 * omega_thorax_x
-    s3488 = velocity_thorax_z + s3485
-    velocity_upper_arm_left_x = s156 * s3486 + s159 * s3487 + s162 * s3488
-    velocity_upper_arm_left_y = s157 * s3486 + s160 * s3487 + s163 * s3488
-    velocity_upper_arm_left_z = s158 * s3486 + s161 * s3487 + s164 * s3488
-    omega_upper_arm_left_x = shoulder_left_wx + (s156 * omega_thorax_x + s159 * omega_thorax_y + s162 * omega_thorax_z)
-    omega_upper_arm_left_y = shoulder_left_wy + (s157 * omega_thorax_x + s160 * omega_thorax_y + s163 * omega_thorax_z)
-    omega_upper_arm_left_z = shoulder_left_wz + (s158 * omega_thorax_x + s161 * omega_thorax_y + s164 * omega_thorax_z)
-    s3489 = velocity_thorax_x + (s3483 + s3484)
-    s3490 = velocity_thorax_z - s3485
-    velocity_upper_arm_right_x = s180 * s3489 + s183 * s3487 + s186 * s3490
-    velocity_upper_arm_right_y = s181 * s3489 + s184 * s3487 + s187 * s3490
-    velocity_upper_arm_right_z = s182 * s3489 + s185 * s3487 + s188 * s3490
-    omega_upper_arm_right_x = shoulder_right_wx + (s180 * omega_thorax_x + s183 * omega_thorax_y + s186 * omega_thorax_z)
-    omega_upper_arm_right_y = shoulder_right_wy + (s181 * omega_thorax_x + s184 * omega_thorax_y + s187 * omega_thorax_z)
-    omega_upper_arm_right_z = shoulder_right_wz + (s182 * omega_thorax_x + s185 * omega_thorax_y + s188 * omega_thorax_z)
-    omega_foot_left_1_z = cos_ankle_left_flexion * omega_shank_left_z + sin_ankle_left_flexion * omega_shank_left_x
-    omega_foot_left_1_x = cos_ankle_left_flexion * omega_shank_left_x - sin_ankle_left_flexion * omega_shank_left_z
-    s3491 = velocity_shank_left_x + k7 * omega_shank_left_y
-    velocity_foot_left_1_y = velocity_shank_left_y - k7 * omega_shank_left_x
-    velocity_foot_left_1_z = cos_ankle_left_flexion * velocity_shank_left_z + sin_ankle_left_flexion * s3491
-    velocity_foot_left_1_x = cos_ankle_left_flexion * s3491 - sin_ankle_left_flexion * velocity_shank_left_z
-    omega_foot_left_1_y = ankle_left_flexion_dot + omega_shank_left_y
-    omega_foot_left_y = cos_ankle_left_inversion * omega_foot_left_1_y + sin_ankle_left_inversion * omega_foot_left_1_z
-    omega_foot_left_z = cos_ankle_left_inversion * omega_foot_left_1_z - sin_ankle_left_inversion * omega_foot_left_1_y
-    velocity_foot_left_y = cos_ankle_left_inversion * velocity_foot_left_1_y + sin_ankle_left_inversion * velocity_foot_left_1_z
-    velocity_foot_left_z = cos_ankle_left_inversion * velocity_foot_left_1_z - sin_ankle_left_inversion * velocity_foot_left_1_y
-    omega_foot_left_x = ankle_left_inversion_dot + omega_foot_left_1_x
-    omega_foot_right_1_z = cos_ankle_right_flexion * omega_shank_right_z + sin_ankle_right_flexion * omega_shank_right_x
-    omega_foot_right_1_x = cos_ankle_right_flexion * omega_shank_right_x - sin_ankle_right_flexion * omega_shank_right_z
-    s3492 = velocity_shank_right_x + k7 * omega_shank_right_y
-    velocity_foot_right_1_y = velocity_shank_right_y - k7 * omega_shank_right_x
-    velocity_foot_right_1_z = cos_ankle_right_flexion * velocity_shank_right_z + sin_ankle_right_flexion * s3492
-    velocity_foot_right_1_x = cos_ankle_right_flexion * s3492 - sin_ankle_right_flexion * velocity_shank_right_z
-    omega_foot_right_1_y = ankle_right_flexion_dot + omega_shank_right_y
-    omega_foot_right_y = cos_ankle_right_inversion * omega_foot_right_1_y + sin_ankle_right_inversion * omega_foot_right_1_z
-    omega_foot_right_z = cos_ankle_right_inversion * omega_foot_right_1_z - sin_ankle_right_inversion * omega_foot_right_1_y
-    velocity_foot_right_y = cos_ankle_right_inversion * velocity_foot_right_1_y + sin_ankle_right_inversion * velocity_foot_right_1_z
-    velocity_foot_right_z = cos_ankle_right_inversion * velocity_foot_right_1_z - sin_ankle_right_inversion * velocity_foot_right_1_y
-    omega_foot_right_x = ankle_right_inversion_dot + omega_foot_right_1_x
-    omega_forearm_left_1_z = cos_elbow_left_flexion * omega_upper_arm_left_z - sin_elbow_left_flexion * omega_upper_arm_left_x
-    s917 = cos_elbow_left_flexion * omega_upper_arm_left_x + sin_elbow_left_flexion * omega_upper_arm_left_z
-    s3493 = velocity_upper_arm_left_x + k8 * omega_upper_arm_left_y
-    s3494 = velocity_upper_arm_left_y - k8 * omega_upper_arm_left_x
-    velocity_forearm_left_1_z = cos_elbow_left_flexion * velocity_upper_arm_left_z - sin_elbow_left_flexion * s3493
-    s3495 = cos_elbow_left_flexion * s3493 + sin_elbow_left_flexion * velocity_upper_arm_left_z
-    s918 = omega_upper_arm_left_y - elbow_left_flexion_dot
-    omega_forearm_left_x = cos_elbow_left_pronation * s917 + sin_elbow_left_pronation * s918
-    s919 = cos_elbow_left_pronation * s918
-    s920 = sin_elbow_left_pronation * s917
-    omega_forearm_left_y = s919 - s920
-    velocity_forearm_left_x = cos_elbow_left_pronation * s3495 + sin_elbow_left_pronation * s3494
-    velocity_forearm_left_y = cos_elbow_left_pronation * s3494 - sin_elbow_left_pronation * s3495
-    omega_forearm_left_z = elbow_left_pronation_dot + omega_forearm_left_1_z
-    omega_forearm_right_1_z = cos_elbow_right_flexion * omega_upper_arm_right_z - sin_elbow_right_flexion * omega_upper_arm_right_x
-    s921 = cos_elbow_right_flexion * omega_upper_arm_right_x + sin_elbow_right_flexion * omega_upper_arm_right_z
-    s3496 = velocity_upper_arm_right_x + k8 * omega_upper_arm_right_y
-    s3497 = velocity_upper_arm_right_y - k8 * omega_upper_arm_right_x
-    velocity_forearm_right_1_z = cos_elbow_right_flexion * velocity_upper_arm_right_z - sin_elbow_right_flexion * s3496
-    s3498 = cos_elbow_right_flexion * s3496 + sin_elbow_right_flexion * velocity_upper_arm_right_z
-    s922 = omega_upper_arm_right_y - elbow_right_flexion_dot
-    omega_forearm_right_x = cos_elbow_right_pronation * s921 + sin_elbow_right_pronation * s922
-    s923 = cos_elbow_right_pronation * s922
-    s924 = sin_elbow_right_pronation * s921
-    omega_forearm_right_y = s923 - s924
-    velocity_forearm_right_x = cos_elbow_right_pronation * s3498 + sin_elbow_right_pronation * s3497
-    velocity_forearm_right_y = cos_elbow_right_pronation * s3497 - sin_elbow_right_pronation * s3498
-    omega_forearm_right_z = elbow_right_pronation_dot + omega_forearm_right_1_z
-    omega_hand_left_1_z = cos_wrist_left_flexion * omega_forearm_left_z - sin_wrist_left_flexion * omega_forearm_left_x
-    s925 = cos_wrist_left_flexion * omega_forearm_left_x + sin_wrist_left_flexion * omega_forearm_left_z
-    s3499 = velocity_forearm_left_x + k9 * omega_forearm_left_y
-    s3500 = velocity_forearm_left_y - k9 * omega_forearm_left_x
-    velocity_hand_left_1_z = cos_wrist_left_flexion * velocity_forearm_left_1_z - sin_wrist_left_flexion * s3499
-    velocity_hand_left_x = cos_wrist_left_flexion * s3499 + sin_wrist_left_flexion * velocity_forearm_left_1_z
-    omega_hand_left_1_y = wrist_left_flexion_dot + (s920 - s919)
-    omega_hand_left_y = sin_wrist_left_deviation * omega_hand_left_1_z - cos_wrist_left_deviation * omega_hand_left_1_y
-    omega_hand_left_z = cos_wrist_left_deviation * omega_hand_left_1_z + sin_wrist_left_deviation * omega_hand_left_1_y
-    velocity_hand_left_y = cos_wrist_left_deviation * s3500 + sin_wrist_left_deviation * velocity_hand_left_1_z
-    velocity_hand_left_z = cos_wrist_left_deviation * velocity_hand_left_1_z - sin_wrist_left_deviation * s3500
-    omega_hand_left_x = wrist_left_deviation_dot + s925
-    omega_hand_right_1_z = cos_wrist_right_flexion * omega_forearm_right_z - sin_wrist_right_flexion * omega_forearm_right_x
-    s926 = cos_wrist_right_flexion * omega_forearm_right_x + sin_wrist_right_flexion * omega_forearm_right_z
-    s3501 = velocity_forearm_right_x + k9 * omega_forearm_right_y
-    s3502 = velocity_forearm_right_y - k9 * omega_forearm_right_x
-    velocity_hand_right_1_z = cos_wrist_right_flexion * velocity_forearm_right_1_z - sin_wrist_right_flexion * s3501
-    velocity_hand_right_x = cos_wrist_right_flexion * s3501 + sin_wrist_right_flexion * velocity_forearm_right_1_z
-    omega_hand_right_1_y = wrist_right_flexion_dot + (s924 - s923)
-    omega_hand_right_y = sin_wrist_right_deviation * omega_hand_right_1_z - cos_wrist_right_deviation * omega_hand_right_1_y
-    omega_hand_right_z = cos_wrist_right_deviation * omega_hand_right_1_z + sin_wrist_right_deviation * omega_hand_right_1_y
-    velocity_hand_right_y = cos_wrist_right_deviation * s3502 + sin_wrist_right_deviation * velocity_hand_right_1_z
-    velocity_hand_right_z = cos_wrist_right_deviation * velocity_hand_right_1_z - sin_wrist_right_deviation * s3502
-    omega_hand_right_x = wrist_right_deviation_dot + s926
-    s3503 = velocity_pelvis_x * velocity_pelvis_x + velocity_pelvis_y * velocity_pelvis_y
-    s3504 = pelvis_wx * (pelvis_wx * inertia_pelvis_xx) + pelvis_wy * (pelvis_wy * inertia_pelvis_yy)
-    s3505 = mass_pelvis * (s3503 + velocity_pelvis_z * velocity_pelvis_z) + (s3504 + pelvis_wz * (pelvis_wz * inertia_pelvis_zz))
-    s3506 = velocity_abdomen_x * velocity_abdomen_x + velocity_abdomen_y * velocity_abdomen_y
-    s3507 = omega_abdomen_x * (inertia_abdomen_xx * omega_abdomen_x) + omega_abdomen_y * (inertia_abdomen_yy * omega_abdomen_y)
-    s3508 = s3505 + mass_abdomen * (s3506 + velocity_abdomen_z * velocity_abdomen_z) + (s3507 + omega_abdomen_z * (inertia_abdomen_zz * omega_abdomen_z))
-    s3509 = velocity_abdomen_y * (k10 * omega_abdomen_x) - velocity_abdomen_x * (k10 * omega_abdomen_y)
-    s3510 = velocity_thigh_left_x * velocity_thigh_left_x + velocity_thigh_left_y * velocity_thigh_left_y
-    s3511 = mass_thigh_left * (s3510 + velocity_thigh_left_z * velocity_thigh_left_z)
-    s3512 = omega_thigh_left_x * (inertia_thigh_left_xx * omega_thigh_left_x) + omega_thigh_left_y * (inertia_thigh_left_yy * omega_thigh_left_y)
-    s3513 = s3512 + omega_thigh_left_z * (inertia_thigh_left_zz * omega_thigh_left_z)
-    s3514 = velocity_thigh_left_y * (k11 * omega_thigh_left_x) - velocity_thigh_left_x * (k11 * omega_thigh_left_y)
-    s3515 = velocity_thigh_right_x * velocity_thigh_right_x + velocity_thigh_right_y * velocity_thigh_right_y
-    s3516 = mass_thigh_left * (s3515 + velocity_thigh_right_z * velocity_thigh_right_z)
-    s3517 = omega_thigh_right_x * (inertia_thigh_left_xx * omega_thigh_right_x) + omega_thigh_right_y * (inertia_thigh_left_yy * omega_thigh_right_y)
-    s3518 = s3517 + omega_thigh_right_z * (inertia_thigh_left_zz * omega_thigh_right_z)
-    s3519 = velocity_thigh_right_y * (k11 * omega_thigh_right_x) - velocity_thigh_right_x * (k11 * omega_thigh_right_y)
-    s3520 = velocity_thorax_x * velocity_thorax_x + velocity_thorax_y * velocity_thorax_y
-    s3521 = s3508 + s3511 + s3513 + s3516 + s3518 + mass_thorax * (s3520 + velocity_thorax_z * velocity_thorax_z)
-    s3522 = omega_thorax_x * (inertia_thorax_xx * omega_thorax_x) + omega_thorax_y * (inertia_thorax_yy * omega_thorax_y)
-    s3523 = velocity_thorax_y * (k12 * omega_thorax_x) - velocity_thorax_x * (k12 * omega_thorax_y)
-    s3524 = velocity_shank_left_x * velocity_shank_left_x + velocity_shank_left_y * velocity_shank_left_y
-    s3525 = mass_shank_left * (s3524 + velocity_shank_left_z * velocity_shank_left_z)
-    s3526 = s3521 + (s3522 + omega_thorax_z * (inertia_thorax_zz * omega_thorax_z)) + s3525
-    s3527 = omega_shank_left_x * (inertia_shank_left_xx * omega_shank_left_x) + omega_shank_left_y * (inertia_shank_left_yy * omega_shank_left_y)
-    s3528 = s3527 + omega_shank_left_z * (inertia_shank_left_zz * omega_shank_left_z)
-    s3529 = velocity_shank_left_y * (k13 * omega_shank_left_x) - velocity_shank_left_x * (k13 * omega_shank_left_y)
-    s3530 = velocity_shank_right_x * velocity_shank_right_x + velocity_shank_right_y * velocity_shank_right_y
-    s3531 = mass_shank_left * (s3530 + velocity_shank_right_z * velocity_shank_right_z)
-    s3532 = omega_shank_right_x * (inertia_shank_left_xx * omega_shank_right_x) + omega_shank_right_y * (inertia_shank_left_yy * omega_shank_right_y)
-    s3533 = s3532 + omega_shank_right_z * (inertia_shank_left_zz * omega_shank_right_z)
-    s3534 = velocity_shank_right_y * (k13 * omega_shank_right_x) - velocity_shank_right_x * (k13 * omega_shank_right_y)
-    s3535 = velocity_head_x * velocity_head_x + velocity_head_y * velocity_head_y + velocity_head_z * velocity_head_z
-    s3536 = omega_head_x * (inertia_head_xx * omega_head_x) + omega_head_y * (inertia_head_yy * omega_head_y)
-    s3537 = s3526 + s3528 + s3531 + s3533 + mass_head * s3535 + (s3536 + omega_head_z * (inertia_head_zz * omega_head_z))
-    s3538 = velocity_head_y * (k14 * omega_head_x) - velocity_head_x * (k14 * omega_head_y)
-    s3539 = velocity_upper_arm_left_x * velocity_upper_arm_left_x + velocity_upper_arm_left_y * velocity_upper_arm_left_y
-    s3540 = mass_upper_arm_left * (s3539 + velocity_upper_arm_left_z * velocity_upper_arm_left_z)
-    s3541 = omega_upper_arm_left_x * (inertia_upper_arm_left_xx * omega_upper_arm_left_x)
-    s3542 = omega_upper_arm_left_y * (inertia_upper_arm_left_yy * omega_upper_arm_left_y)
-    s3543 = omega_upper_arm_left_z * (inertia_upper_arm_left_zz * omega_upper_arm_left_z)
-    s3544 = velocity_upper_arm_left_y * (k15 * omega_upper_arm_left_x) - velocity_upper_arm_left_x * (k15 * omega_upper_arm_left_y)
-    s3545 = velocity_upper_arm_right_x * velocity_upper_arm_right_x + velocity_upper_arm_right_y * velocity_upper_arm_right_y
-    s3546 = mass_upper_arm_left * (s3545 + velocity_upper_arm_right_z * velocity_upper_arm_right_z)
-    s3547 = omega_upper_arm_right_x * (inertia_upper_arm_left_xx * omega_upper_arm_right_x)
-    s3548 = omega_upper_arm_right_y * (inertia_upper_arm_left_yy * omega_upper_arm_right_y)
-    s3549 = omega_upper_arm_right_z * (inertia_upper_arm_left_zz * omega_upper_arm_right_z)
-    s3550 = s3537 + s3540 + (s3541 + s3542 + s3543) + s3546 + (s3547 + s3548 + s3549)
-    s3551 = velocity_upper_arm_right_y * (k15 * omega_upper_arm_right_x) - velocity_upper_arm_right_x * (k15 * omega_upper_arm_right_y)
-    s3552 = velocity_foot_left_1_x * velocity_foot_left_1_x + velocity_foot_left_y * velocity_foot_left_y
-    s3553 = s3550 + mass_foot_left * (s3552 + velocity_foot_left_z * velocity_foot_left_z)
-    s3554 = inertia_foot_left_xx * omega_foot_left_x + inertia_foot_left_xz * omega_foot_left_z
-    s3555 = inertia_foot_left_xz * omega_foot_left_x + inertia_foot_left_zz * omega_foot_left_z
-    s3556 = omega_foot_left_x * s3554 + omega_foot_left_y * (inertia_foot_left_yy * omega_foot_left_y)
-    s3557 = velocity_foot_left_y * (moment_foot_left_x * omega_foot_left_z + k16 * omega_foot_left_x)
-    s3558 = s3557 - velocity_foot_left_1_x * (k16 * omega_foot_left_y) - velocity_foot_left_z * (moment_foot_left_x * omega_foot_left_y)
-    s3559 = s3509 + s3514 + s3519 + s3523 + s3529 + s3534 + s3538 + s3544 + s3551 + s3558
-    s3560 = velocity_foot_right_1_x * velocity_foot_right_1_x + velocity_foot_right_y * velocity_foot_right_y
-    s3561 = s3553 + (s3556 + omega_foot_left_z * s3555) + mass_foot_left * (s3560 + velocity_foot_right_z * velocity_foot_right_z)
-    s3562 = inertia_foot_left_xx * omega_foot_right_x + inertia_foot_left_xz * omega_foot_right_z
-    s3563 = inertia_foot_left_xz * omega_foot_right_x + inertia_foot_left_zz * omega_foot_right_z
-    s3564 = omega_foot_right_x * s3562 + omega_foot_right_y * (inertia_foot_left_yy * omega_foot_right_y)
-    s3565 = velocity_foot_right_y * (moment_foot_left_x * omega_foot_right_z + k16 * omega_foot_right_x)
-    s3566 = s3565 - velocity_foot_right_1_x * (k16 * omega_foot_right_y) - velocity_foot_right_z * (moment_foot_left_x * omega_foot_right_y)
-    s3567 = velocity_forearm_left_x * velocity_forearm_left_x + velocity_forearm_left_y * velocity_forearm_left_y
-    s3568 = mass_forearm_left * (velocity_forearm_left_1_z * velocity_forearm_left_1_z + s3567)
-    s3569 = omega_forearm_left_x * (inertia_forearm_left_xx * omega_forearm_left_x) + omega_forearm_left_y * (inertia_forearm_left_yy * omega_forearm_left_y)
-    s3570 = s3569 + omega_forearm_left_z * (inertia_forearm_left_zz * omega_forearm_left_z)
-    s3571 = velocity_forearm_left_y * (k17 * omega_forearm_left_x) - velocity_forearm_left_x * (k17 * omega_forearm_left_y)
-    s3572 = velocity_forearm_right_x * velocity_forearm_right_x + velocity_forearm_right_y * velocity_forearm_right_y
-    s3573 = mass_forearm_left * (velocity_forearm_right_1_z * velocity_forearm_right_1_z + s3572)
-    s3574 = omega_forearm_right_x * (inertia_forearm_left_xx * omega_forearm_right_x)
-    s3575 = omega_forearm_right_y * (inertia_forearm_left_yy * omega_forearm_right_y)
-    s3576 = omega_forearm_right_z * (inertia_forearm_left_zz * omega_forearm_right_z)
-    s3577 = s3561 + (s3564 + omega_foot_right_z * s3563) + s3568 + s3570 + s3573 + (s3574 + s3575 + s3576)
-    s3578 = velocity_forearm_right_y * (k17 * omega_forearm_right_x) - velocity_forearm_right_x * (k17 * omega_forearm_right_y)
-    s3579 = velocity_hand_left_x * velocity_hand_left_x + velocity_hand_left_y * velocity_hand_left_y
-    s3580 = s3577 + mass_hand_left * (s3579 + velocity_hand_left_z * velocity_hand_left_z)
-    s3581 = omega_hand_left_x * (inertia_hand_left_xx * omega_hand_left_x) + omega_hand_left_y * (inertia_hand_left_yy * omega_hand_left_y)
-    s3582 = s3580 + (s3581 + omega_hand_left_z * (inertia_hand_left_zz * omega_hand_left_z))
-    s3583 = velocity_hand_left_y * (k18 * omega_hand_left_x) - velocity_hand_left_x * (k18 * omega_hand_left_y)
-    s3584 = velocity_hand_right_x * velocity_hand_right_x + velocity_hand_right_y * velocity_hand_right_y
-    s3585 = s3582 + mass_hand_left * (s3584 + velocity_hand_right_z * velocity_hand_right_z)
-    s3586 = omega_hand_right_x * (inertia_hand_left_xx * omega_hand_right_x) + omega_hand_right_y * (inertia_hand_left_yy * omega_hand_right_y)
-    s3587 = s3585 + (s3586 + omega_hand_right_z * (inertia_hand_left_zz * omega_hand_right_z))
-    s3588 = velocity_hand_right_y * (k18 * omega_hand_right_x) - velocity_hand_right_x * (k18 * omega_hand_right_y)
-    return (
-        s3559 + s3566 + s3571 + s3578 + s3583 + s3588 + 0.5 * s3587,
-    )
-
-
-def _potential_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """520 operations: 144 add, 71 sub, 269 mul, 8 div, 14 sin, 14 cos."""
-    w_shoulder, w_hip, k1, k65, k2, k66, k3, k67, k4, k68, k5, k69, k6, k70, k7, k71, k72, k8, k73, k9, k74, k75, k76, k77, k78, k79, k80, k81, k82, k83, k84 = k
-    _, _, pelvis_z, pelvis_qw, pelvis_qx, pelvis_qy, pelvis_qz, lumbar_qw, lumbar_qx, lumbar_qy, lumbar_qz, hip_left_qw, hip_left_qx, hip_left_qy, hip_left_qz, hip_right_qw, hip_right_qx, hip_right_qy, hip_right_qz, thoracic_qw, thoracic_qx, thoracic_qy, thoracic_qz, knee_left_flexion, knee_right_flexion, neck_qw, neck_qx, neck_qy, neck_qz, shoulder_left_qw, shoulder_left_qx, shoulder_left_qy, shoulder_left_qz, shoulder_right_qw, shoulder_right_qx, shoulder_right_qy, shoulder_right_qz, ankle_left_flexion, ankle_left_inversion, ankle_right_flexion, ankle_right_inversion, elbow_left_flexion, elbow_left_pronation, elbow_right_flexion, elbow_right_pronation, wrist_left_flexion, wrist_left_deviation, wrist_right_flexion, wrist_right_deviation, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _ = y
-    s1 = pelvis_qw * pelvis_qw + pelvis_qx * pelvis_qx + pelvis_qy * pelvis_qy + pelvis_qz * pelvis_qz
-    s2 = 2.0 / s1
-    s3 = pelvis_qx * s2
-    s4 = pelvis_qy * s2
-    s21 = pelvis_qz * s3 - pelvis_qw * s4
-    s22 = pelvis_qw * s3 + pelvis_qz * s4
-    s23 = 1.0 - (pelvis_qx * s3 + pelvis_qy * s4)
-    s24 = lumbar_qw * lumbar_qw + lumbar_qx * lumbar_qx + lumbar_qy * lumbar_qy + lumbar_qz * lumbar_qz
-    s25 = 2.0 / s24
-    s26 = lumbar_qx * s25
-    s27 = lumbar_qy * s25
-    s28 = lumbar_qz * s25
-    s29 = lumbar_qw * s26
-    s30 = lumbar_qw * s27
-    s31 = lumbar_qw * s28
-    s32 = lumbar_qx * s26
-    s33 = lumbar_qy * s27
-    s34 = lumbar_qz * s28
-    s35 = lumbar_qy * s26
-    s36 = lumbar_qz * s26
-    s37 = lumbar_qz * s27
-    s3589 = s21 * (1.0 - (s33 + s34)) + s22 * (s31 + s35) + s23 * (s36 - s30)
-    s3590 = s21 * (s35 - s31) + s22 * (1.0 - (s32 + s34)) + s23 * (s29 + s37)
-    s3591 = s21 * (s30 + s36) + s22 * (s37 - s29) + s23 * (1.0 - (s32 + s33))
-    s47 = hip_left_qw * hip_left_qw + hip_left_qx * hip_left_qx + hip_left_qy * hip_left_qy
-    s48 = 2.0 / (s47 + hip_left_qz * hip_left_qz)
-    s49 = hip_left_qx * s48
-    s50 = hip_left_qy * s48
-    s51 = hip_left_qz * s48
-    s52 = hip_left_qw * s49
-    s53 = hip_left_qw * s50
-    s54 = hip_left_qw * s51
-    s55 = hip_left_qx * s49
-    s56 = hip_left_qy * s50
-    s57 = hip_left_qz * s51
-    s58 = hip_left_qy * s49
-    s59 = hip_left_qz * s49
-    s60 = hip_left_qz * s50
-    s3592 = s21 * (1.0 - (s56 + s57)) + s22 * (s54 + s58) + s23 * (s59 - s53)
-    s3593 = s21 * (s53 + s59) + s22 * (s60 - s52) + s23 * (1.0 - (s55 + s56))
-    s70 = hip_right_qw * hip_right_qw + hip_right_qx * hip_right_qx + hip_right_qy * hip_right_qy
-    s71 = 2.0 / (s70 + hip_right_qz * hip_right_qz)
-    s72 = hip_right_qx * s71
-    s73 = hip_right_qy * s71
-    s74 = hip_right_qz * s71
-    s75 = hip_right_qw * s72
-    s76 = hip_right_qw * s73
-    s77 = hip_right_qw * s74
-    s78 = hip_right_qx * s72
-    s79 = hip_right_qy * s73
-    s80 = hip_right_qz * s74
-    s81 = hip_right_qy * s72
-    s82 = hip_right_qz * s72
-    s83 = hip_right_qz * s73
-    s3594 = s21 * (1.0 - (s79 + s80)) + s22 * (s77 + s81) + s23 * (s82 - s76)
-    s3595 = s21 * (s76 + s82) + s22 * (s83 - s75) + s23 * (1.0 - (s78 + s79))
-    s93 = thoracic_qw * thoracic_qw + thoracic_qx * thoracic_qx + thoracic_qy * thoracic_qy
-    s94 = 2.0 / (s93 + thoracic_qz * thoracic_qz)
-    s95 = thoracic_qx * s94
-    s96 = thoracic_qy * s94
-    s97 = thoracic_qz * s94
-    s98 = thoracic_qw * s95
-    s99 = thoracic_qw * s96
-    s100 = thoracic_qw * s97
-    s101 = thoracic_qx * s95
-    s102 = thoracic_qy * s96
-    s103 = thoracic_qz * s97
-    s104 = thoracic_qy * s95
-    s105 = thoracic_qz * s95
-    s106 = thoracic_qz * s96
-    s3596 = s3589 * (1.0 - (s102 + s103)) + s3590 * (s100 + s104) + s3591 * (s105 - s99)
-    s3597 = s3589 * (s104 - s100) + s3590 * (1.0 - (s101 + s103)) + s3591 * (s98 + s106)
-    s3598 = s3589 * (s99 + s105) + s3590 * (s106 - s98) + s3591 * (1.0 - (s101 + s102))
-    cos_knee_left_flexion = cos(knee_left_flexion)
-    sin_knee_left_flexion = sin(knee_left_flexion)
-    s3599 = s3593 * cos_knee_left_flexion + s3592 * sin_knee_left_flexion
-    s3600 = s3592 * cos_knee_left_flexion - s3593 * sin_knee_left_flexion
-    cos_knee_right_flexion = cos(knee_right_flexion)
-    sin_knee_right_flexion = sin(knee_right_flexion)
-    s3601 = s3595 * cos_knee_right_flexion + s3594 * sin_knee_right_flexion
-    s3602 = s3594 * cos_knee_right_flexion - s3595 * sin_knee_right_flexion
-    s118 = neck_qw * neck_qw + neck_qx * neck_qx + neck_qy * neck_qy + neck_qz * neck_qz
-    s119 = 2.0 / s118
-    s120 = neck_qx * s119
-    s121 = neck_qy * s119
-    s3603 = s3596 * (neck_qw * s121 + neck_qz * s120) + s3597 * (neck_qz * s121 - neck_qw * s120)
-    s141 = shoulder_left_qw * shoulder_left_qw + shoulder_left_qx * shoulder_left_qx
-    s142 = s141 + shoulder_left_qy * shoulder_left_qy + shoulder_left_qz * shoulder_left_qz
-    s143 = 2.0 / s142
-    s144 = shoulder_left_qx * s143
-    s145 = shoulder_left_qy * s143
-    s146 = shoulder_left_qz * s143
-    s147 = shoulder_left_qw * s144
-    s148 = shoulder_left_qw * s145
-    s149 = shoulder_left_qw * s146
-    s150 = shoulder_left_qx * s144
-    s151 = shoulder_left_qy * s145
-    s152 = shoulder_left_qz * s146
-    s153 = shoulder_left_qy * s144
-    s154 = shoulder_left_qz * s144
-    s155 = shoulder_left_qz * s145
-    s3604 = s3596 * (1.0 - (s151 + s152)) + s3597 * (s149 + s153) + s3598 * (s154 - s148)
-    s3605 = s3596 * (s153 - s149) + s3597 * (1.0 - (s150 + s152)) + s3598 * (s147 + s155)
-    s3606 = s3596 * (s148 + s154) + s3597 * (s155 - s147) + s3598 * (1.0 - (s150 + s151))
-    s165 = shoulder_right_qw * shoulder_right_qw + shoulder_right_qx * shoulder_right_qx
-    s166 = s165 + shoulder_right_qy * shoulder_right_qy + shoulder_right_qz * shoulder_right_qz
-    s167 = 2.0 / s166
-    s168 = shoulder_right_qx * s167
-    s169 = shoulder_right_qy * s167
-    s170 = shoulder_right_qz * s167
-    s171 = shoulder_right_qw * s168
-    s172 = shoulder_right_qw * s169
-    s173 = shoulder_right_qw * s170
-    s174 = shoulder_right_qx * s168
-    s175 = shoulder_right_qy * s169
-    s176 = shoulder_right_qz * s170
-    s177 = shoulder_right_qy * s168
-    s178 = shoulder_right_qz * s168
-    s179 = shoulder_right_qz * s169
-    s3607 = s3596 * (1.0 - (s175 + s176)) + s3597 * (s173 + s177) + s3598 * (s178 - s172)
-    s3608 = s3596 * (s177 - s173) + s3597 * (1.0 - (s174 + s176)) + s3598 * (s171 + s179)
-    s3609 = s3596 * (s172 + s178) + s3597 * (s179 - s171) + s3598 * (1.0 - (s174 + s175))
-    cos_ankle_left_flexion = cos(ankle_left_flexion)
-    sin_ankle_left_flexion = sin(ankle_left_flexion)
-    s3610 = (s3599 * cos_ankle_left_flexion + s3600 * sin_ankle_left_flexion) * cos(ankle_left_inversion)
-    s3611 = (s21 * (s58 - s54) + s22 * (1.0 - (s55 + s57)) + s23 * (s52 + s60)) * sin(ankle_left_inversion)
-    cos_ankle_right_flexion = cos(ankle_right_flexion)
-    sin_ankle_right_flexion = sin(ankle_right_flexion)
-    s3612 = (s3601 * cos_ankle_right_flexion + s3602 * sin_ankle_right_flexion) * cos(ankle_right_inversion)
-    s3613 = (s21 * (s81 - s77) + s22 * (1.0 - (s78 + s80)) + s23 * (s75 + s83)) * sin(ankle_right_inversion)
-    cos_elbow_left_flexion = cos(elbow_left_flexion)
-    sin_elbow_left_flexion = sin(elbow_left_flexion)
-    s3614 = s3606 * cos_elbow_left_flexion - s3604 * sin_elbow_left_flexion
-    s3615 = s3604 * cos_elbow_left_flexion + s3606 * sin_elbow_left_flexion
-    cos_elbow_left_pronation = cos(elbow_left_pronation)
-    sin_elbow_left_pronation = sin(elbow_left_pronation)
-    cos_elbow_right_flexion = cos(elbow_right_flexion)
-    sin_elbow_right_flexion = sin(elbow_right_flexion)
-    s3616 = s3609 * cos_elbow_right_flexion - s3607 * sin_elbow_right_flexion
-    s3617 = s3607 * cos_elbow_right_flexion + s3609 * sin_elbow_right_flexion
-    cos_elbow_right_pronation = cos(elbow_right_pronation)
-    sin_elbow_right_pronation = sin(elbow_right_pronation)
-    s3618 = (s3615 * cos_elbow_left_pronation + s3605 * sin_elbow_left_pronation) * sin(wrist_left_flexion)
-    s3619 = (s3605 * cos_elbow_left_pronation - s3615 * sin_elbow_left_pronation) * sin(wrist_left_deviation)
-    s3620 = (s3614 * cos(wrist_left_flexion) - s3618) * cos(wrist_left_deviation) - s3619
-    s3621 = (s3617 * cos_elbow_right_pronation + s3608 * sin_elbow_right_pronation) * sin(wrist_right_flexion)
-    s3622 = (s3608 * cos_elbow_right_pronation - s3617 * sin_elbow_right_pronation) * sin(wrist_right_deviation)
-    s3623 = (s3616 * cos(wrist_right_flexion) - s3621) * cos(wrist_right_deviation) - s3622
-    s3624 = w_hip * s22
-    s3625 = k2 * s23
-    s3626 = w_shoulder * s3597
-    s3627 = k6 * s3598
-    s3628 = pelvis_z + k1 * s23
-    s3629 = pelvis_z + (s3624 + s3625)
-    s3630 = pelvis_z + (s3625 - s3624)
-    s3631 = k3 * s3591 + s3628
-    s3632 = k4 * s3593 + s3629
-    s3633 = k4 * s3595 + s3630
-    s3634 = s3626 + s3627 + s3631
-    s3635 = s3627 - s3626 + s3631
-    s3636 = k8 * s3606 + s3634
-    s3637 = k8 * s3609 + s3635
-    s3638 = pelvis_z * k75 + k76 * (s3628 - k65 * s3591) + k77 * (s3629 - k66 * s3593)
-    s3639 = s3638 + k77 * (s3630 - k66 * s3595) + k78 * (s3631 - k67 * s3598) + k79 * (s3632 - k68 * s3599)
-    s3640 = k5 * s3598 + s3631 - k69 * (s3603 + s3598 * (1.0 - (neck_qx * s120 + neck_qy * s121)))
-    s3641 = s3639 + k79 * (s3633 - k68 * s3601) + k80 * s3640 + k81 * (s3634 - k70 * s3606)
-    s3642 = k72 * (s3600 * cos_ankle_left_flexion - s3599 * sin_ankle_left_flexion) - k71 * (s3610 - s3611)
-    s3643 = k72 * (s3602 * cos_ankle_right_flexion - s3601 * sin_ankle_right_flexion)
-    s3644 = s3641 + k81 * (s3635 - k70 * s3609) + k82 * (k7 * s3599 + s3632 + s3642) + k82 * (k7 * s3601 + s3633 + (s3643 - k71 * (s3612 - s3613)))
-    s3645 = s3644 + k83 * (s3636 - k73 * s3614) + k83 * (s3637 - k73 * s3616) + k84 * (k9 * s3614 + s3636 - k74 * s3620)
-    return (
-        s3645 + k84 * (k9 * s3616 + s3637 - k74 * s3623),
-    )
-
-
-def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """1055 operations: 297 add, 141 sub, 581 mul, 8 div, 14 sin, 14 cos."""
-    w_shoulder, w_hip, k1, k65, k2, k66, k3, k67, k4, k68, k5, k69, k6, k70, k7, k71, k72, k8, k73, k9, k74 = k
-    pelvis_x, pelvis_y, pelvis_z, pelvis_qw, pelvis_qx, pelvis_qy, pelvis_qz, lumbar_qw, lumbar_qx, lumbar_qy, lumbar_qz, hip_left_qw, hip_left_qx, hip_left_qy, hip_left_qz, hip_right_qw, hip_right_qx, hip_right_qy, hip_right_qz, thoracic_qw, thoracic_qx, thoracic_qy, thoracic_qz, knee_left_flexion, knee_right_flexion, neck_qw, neck_qx, neck_qy, neck_qz, shoulder_left_qw, shoulder_left_qx, shoulder_left_qy, shoulder_left_qz, shoulder_right_qw, shoulder_right_qx, shoulder_right_qy, shoulder_right_qz, ankle_left_flexion, ankle_left_inversion, ankle_right_flexion, ankle_right_inversion, elbow_left_flexion, elbow_left_pronation, elbow_right_flexion, elbow_right_pronation, wrist_left_flexion, wrist_left_deviation, wrist_right_flexion, wrist_right_deviation, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _, _ = y
-    s1 = pelvis_qw * pelvis_qw + pelvis_qx * pelvis_qx + pelvis_qy * pelvis_qy + pelvis_qz * pelvis_qz
-    s2 = 2.0 / s1
-    s3 = pelvis_qx * s2
-    s4 = pelvis_qy * s2
-    s5 = pelvis_qz * s2
-    s6 = pelvis_qw * s3
-    s7 = pelvis_qw * s4
-    s8 = pelvis_qw * s5
-    s9 = pelvis_qx * s3
-    s10 = pelvis_qy * s4
-    s11 = pelvis_qz * s5
-    s12 = pelvis_qy * s3
-    s13 = pelvis_qz * s3
-    s14 = pelvis_qz * s4
-    s15 = 1.0 - (s10 + s11)
-    s16 = s12 - s8
-    s17 = s7 + s13
-    s18 = s8 + s12
-    s19 = 1.0 - (s9 + s11)
-    s20 = s14 - s6
-    s21 = s13 - s7
-    s22 = s6 + s14
-    s23 = 1.0 - (s9 + s10)
-    s24 = lumbar_qw * lumbar_qw + lumbar_qx * lumbar_qx + lumbar_qy * lumbar_qy + lumbar_qz * lumbar_qz
-    s25 = 2.0 / s24
-    s26 = lumbar_qx * s25
-    s27 = lumbar_qy * s25
-    s28 = lumbar_qz * s25
-    s29 = lumbar_qw * s26
-    s30 = lumbar_qw * s27
-    s31 = lumbar_qw * s28
-    s32 = lumbar_qx * s26
-    s33 = lumbar_qy * s27
-    s34 = lumbar_qz * s28
-    s35 = lumbar_qy * s26
-    s36 = lumbar_qz * s26
-    s37 = lumbar_qz * s27
-    s38 = 1.0 - (s33 + s34)
-    s39 = s35 - s31
-    s40 = s30 + s36
-    s41 = s31 + s35
-    s42 = 1.0 - (s32 + s34)
-    s43 = s37 - s29
-    s44 = s36 - s30
-    s45 = s29 + s37
-    s46 = 1.0 - (s32 + s33)
-    s3646 = s15 * s38 + s16 * s41 + s17 * s44
-    s3647 = s15 * s39 + s16 * s42 + s17 * s45
-    s3648 = s15 * s40 + s16 * s43 + s17 * s46
-    s3649 = s18 * s38 + s19 * s41 + s20 * s44
-    s3650 = s18 * s39 + s19 * s42 + s20 * s45
-    s3651 = s18 * s40 + s19 * s43 + s20 * s46
-    s3589 = s21 * s38 + s22 * s41 + s23 * s44
-    s3590 = s21 * s39 + s22 * s42 + s23 * s45
-    s3591 = s21 * s40 + s22 * s43 + s23 * s46
-    s47 = hip_left_qw * hip_left_qw + hip_left_qx * hip_left_qx + hip_left_qy * hip_left_qy
-    s48 = 2.0 / (s47 + hip_left_qz * hip_left_qz)
-    s49 = hip_left_qx * s48
-    s50 = hip_left_qy * s48
-    s51 = hip_left_qz * s48
-    s52 = hip_left_qw * s49
-    s53 = hip_left_qw * s50
-    s54 = hip_left_qw * s51
-    s55 = hip_left_qx * s49
-    s56 = hip_left_qy * s50
-    s57 = hip_left_qz * s51
-    s58 = hip_left_qy * s49
-    s59 = hip_left_qz * s49
-    s60 = hip_left_qz * s50
-    s61 = 1.0 - (s56 + s57)
-    s62 = s58 - s54
-    s63 = s53 + s59
-    s64 = s54 + s58
-    s65 = 1.0 - (s55 + s57)
-    s66 = s60 - s52
-    s67 = s59 - s53
-    s68 = s52 + s60
-    s69 = 1.0 - (s55 + s56)
-    s3652 = s15 * s61 + s16 * s64 + s17 * s67
-    s3653 = s15 * s62 + s16 * s65 + s17 * s68
-    s3654 = s15 * s63 + s16 * s66 + s17 * s69
-    s3655 = s18 * s61 + s19 * s64 + s20 * s67
-    s3656 = s18 * s62 + s19 * s65 + s20 * s68
-    s3657 = s18 * s63 + s19 * s66 + s20 * s69
-    s3592 = s21 * s61 + s22 * s64 + s23 * s67
-    s3658 = s21 * s62 + s22 * s65 + s23 * s68
-    s3593 = s21 * s63 + s22 * s66 + s23 * s69
-    s70 = hip_right_qw * hip_right_qw + hip_right_qx * hip_right_qx + hip_right_qy * hip_right_qy
-    s71 = 2.0 / (s70 + hip_right_qz * hip_right_qz)
-    s72 = hip_right_qx * s71
-    s73 = hip_right_qy * s71
-    s74 = hip_right_qz * s71
-    s75 = hip_right_qw * s72
-    s76 = hip_right_qw * s73
-    s77 = hip_right_qw * s74
-    s78 = hip_right_qx * s72
-    s79 = hip_right_qy * s73
-    s80 = hip_right_qz * s74
-    s81 = hip_right_qy * s72
-    s82 = hip_right_qz * s72
-    s83 = hip_right_qz * s73
-    s84 = 1.0 - (s79 + s80)
-    s85 = s81 - s77
-    s86 = s76 + s82
-    s87 = s77 + s81
-    s88 = 1.0 - (s78 + s80)
-    s89 = s83 - s75
-    s90 = s82 - s76
-    s91 = s75 + s83
-    s92 = 1.0 - (s78 + s79)
-    s3659 = s15 * s84 + s16 * s87 + s17 * s90
-    s3660 = s15 * s85 + s16 * s88 + s17 * s91
-    s3661 = s15 * s86 + s16 * s89 + s17 * s92
-    s3662 = s18 * s84 + s19 * s87 + s20 * s90
-    s3663 = s18 * s85 + s19 * s88 + s20 * s91
-    s3664 = s18 * s86 + s19 * s89 + s20 * s92
-    s3594 = s21 * s84 + s22 * s87 + s23 * s90
-    s3665 = s21 * s85 + s22 * s88 + s23 * s91
-    s3595 = s21 * s86 + s22 * s89 + s23 * s92
-    s93 = thoracic_qw * thoracic_qw + thoracic_qx * thoracic_qx + thoracic_qy * thoracic_qy
-    s94 = 2.0 / (s93 + thoracic_qz * thoracic_qz)
-    s95 = thoracic_qx * s94
-    s96 = thoracic_qy * s94
-    s97 = thoracic_qz * s94
-    s98 = thoracic_qw * s95
-    s99 = thoracic_qw * s96
-    s100 = thoracic_qw * s97
-    s101 = thoracic_qx * s95
-    s102 = thoracic_qy * s96
-    s103 = thoracic_qz * s97
-    s104 = thoracic_qy * s95
-    s105 = thoracic_qz * s95
-    s106 = thoracic_qz * s96
-    s107 = 1.0 - (s102 + s103)
-    s108 = s104 - s100
-    s109 = s99 + s105
-    s110 = s100 + s104
-    s111 = 1.0 - (s101 + s103)
-    s112 = s106 - s98
-    s113 = s105 - s99
-    s114 = s98 + s106
-    s115 = 1.0 - (s101 + s102)
-    s3666 = s3646 * s107 + s3647 * s110 + s3648 * s113
-    s3667 = s3646 * s108 + s3647 * s111 + s3648 * s114
-    s3668 = s3646 * s109 + s3647 * s112 + s3648 * s115
-    s3669 = s3649 * s107 + s3650 * s110 + s3651 * s113
-    s3670 = s3649 * s108 + s3650 * s111 + s3651 * s114
-    s3671 = s3649 * s109 + s3650 * s112 + s3651 * s115
-    s3596 = s3589 * s107 + s3590 * s110 + s3591 * s113
-    s3597 = s3589 * s108 + s3590 * s111 + s3591 * s114
-    s3598 = s3589 * s109 + s3590 * s112 + s3591 * s115
-    cos_knee_left_flexion = cos(knee_left_flexion)
-    sin_knee_left_flexion = sin(knee_left_flexion)
-    s3672 = s3654 * cos_knee_left_flexion + s3652 * sin_knee_left_flexion
-    s3673 = s3652 * cos_knee_left_flexion - s3654 * sin_knee_left_flexion
-    s3674 = s3657 * cos_knee_left_flexion + s3655 * sin_knee_left_flexion
-    s3675 = s3655 * cos_knee_left_flexion - s3657 * sin_knee_left_flexion
-    s3599 = s3593 * cos_knee_left_flexion + s3592 * sin_knee_left_flexion
-    s3600 = s3592 * cos_knee_left_flexion - s3593 * sin_knee_left_flexion
-    cos_knee_right_flexion = cos(knee_right_flexion)
-    sin_knee_right_flexion = sin(knee_right_flexion)
-    s3676 = s3661 * cos_knee_right_flexion + s3659 * sin_knee_right_flexion
-    s3677 = s3659 * cos_knee_right_flexion - s3661 * sin_knee_right_flexion
-    s3678 = s3664 * cos_knee_right_flexion + s3662 * sin_knee_right_flexion
-    s3679 = s3662 * cos_knee_right_flexion - s3664 * sin_knee_right_flexion
-    s3601 = s3595 * cos_knee_right_flexion + s3594 * sin_knee_right_flexion
-    s3602 = s3594 * cos_knee_right_flexion - s3595 * sin_knee_right_flexion
-    s118 = neck_qw * neck_qw + neck_qx * neck_qx + neck_qy * neck_qy + neck_qz * neck_qz
-    s119 = 2.0 / s118
-    s120 = neck_qx * s119
-    s121 = neck_qy * s119
-    s122 = neck_qz * s119
-    s123 = neck_qw * s120
-    s124 = neck_qw * s121
-    s125 = neck_qw * s122
-    s126 = neck_qx * s120
-    s127 = neck_qy * s121
-    s128 = neck_qz * s122
-    s129 = neck_qy * s120
-    s130 = neck_qz * s120
-    s131 = neck_qz * s121
-    s132 = 1.0 - (s127 + s128)
-    s133 = s129 - s125
-    s134 = s124 + s130
-    s135 = s125 + s129
-    s136 = 1.0 - (s126 + s128)
-    s137 = s131 - s123
-    s138 = s130 - s124
-    s139 = s123 + s131
-    s140 = 1.0 - (s126 + s127)
-    s3680 = s3666 * s134 + s3667 * s137 + s3668 * s140
-    s3681 = s3669 * s134 + s3670 * s137 + s3671 * s140
-    s3682 = s3596 * s134 + s3597 * s137 + s3598 * s140
-    s141 = shoulder_left_qw * shoulder_left_qw + shoulder_left_qx * shoulder_left_qx
-    s142 = s141 + shoulder_left_qy * shoulder_left_qy + shoulder_left_qz * shoulder_left_qz
-    s143 = 2.0 / s142
-    s144 = shoulder_left_qx * s143
-    s145 = shoulder_left_qy * s143
-    s146 = shoulder_left_qz * s143
-    s147 = shoulder_left_qw * s144
-    s148 = shoulder_left_qw * s145
-    s149 = shoulder_left_qw * s146
-    s150 = shoulder_left_qx * s144
-    s151 = shoulder_left_qy * s145
-    s152 = shoulder_left_qz * s146
-    s153 = shoulder_left_qy * s144
-    s154 = shoulder_left_qz * s144
-    s155 = shoulder_left_qz * s145
-    s156 = 1.0 - (s151 + s152)
-    s157 = s153 - s149
-    s158 = s148 + s154
-    s159 = s149 + s153
-    s160 = 1.0 - (s150 + s152)
-    s161 = s155 - s147
-    s162 = s154 - s148
-    s163 = s147 + s155
-    s164 = 1.0 - (s150 + s151)
-    s3683 = s3666 * s156 + s3667 * s159 + s3668 * s162
-    s3684 = s3666 * s157 + s3667 * s160 + s3668 * s163
-    s3685 = s3666 * s158 + s3667 * s161 + s3668 * s164
-    s3686 = s3669 * s156 + s3670 * s159 + s3671 * s162
-    s3687 = s3669 * s157 + s3670 * s160 + s3671 * s163
-    s3688 = s3669 * s158 + s3670 * s161 + s3671 * s164
-    s3604 = s3596 * s156 + s3597 * s159 + s3598 * s162
-    s3605 = s3596 * s157 + s3597 * s160 + s3598 * s163
-    s3606 = s3596 * s158 + s3597 * s161 + s3598 * s164
-    s165 = shoulder_right_qw * shoulder_right_qw + shoulder_right_qx * shoulder_right_qx
-    s166 = s165 + shoulder_right_qy * shoulder_right_qy + shoulder_right_qz * shoulder_right_qz
-    s167 = 2.0 / s166
-    s168 = shoulder_right_qx * s167
-    s169 = shoulder_right_qy * s167
-    s170 = shoulder_right_qz * s167
-    s171 = shoulder_right_qw * s168
-    s172 = shoulder_right_qw * s169
-    s173 = shoulder_right_qw * s170
-    s174 = shoulder_right_qx * s168
-    s175 = shoulder_right_qy * s169
-    s176 = shoulder_right_qz * s170
-    s177 = shoulder_right_qy * s168
-    s178 = shoulder_right_qz * s168
-    s179 = shoulder_right_qz * s169
-    s180 = 1.0 - (s175 + s176)
-    s181 = s177 - s173
-    s182 = s172 + s178
-    s183 = s173 + s177
-    s184 = 1.0 - (s174 + s176)
-    s185 = s179 - s171
-    s186 = s178 - s172
-    s187 = s171 + s179
-    s188 = 1.0 - (s174 + s175)
-    s3689 = s3666 * s180 + s3667 * s183 + s3668 * s186
-    s3690 = s3666 * s181 + s3667 * s184 + s3668 * s187
-    s3691 = s3666 * s182 + s3667 * s185 + s3668 * s188
-    s3692 = s3669 * s180 + s3670 * s183 + s3671 * s186
-    s3693 = s3669 * s181 + s3670 * s184 + s3671 * s187
-    s3694 = s3669 * s182 + s3670 * s185 + s3671 * s188
-    s3607 = s3596 * s180 + s3597 * s183 + s3598 * s186
-    s3608 = s3596 * s181 + s3597 * s184 + s3598 * s187
-    s3609 = s3596 * s182 + s3597 * s185 + s3598 * s188
-    cos_ankle_left_flexion = cos(ankle_left_flexion)
-    sin_ankle_left_flexion = sin(ankle_left_flexion)
-    s3695 = s3672 * cos_ankle_left_flexion + s3673 * sin_ankle_left_flexion
-    s3696 = s3673 * cos_ankle_left_flexion - s3672 * sin_ankle_left_flexion
-    s3697 = s3674 * cos_ankle_left_flexion + s3675 * sin_ankle_left_flexion
-    s3698 = s3675 * cos_ankle_left_flexion - s3674 * sin_ankle_left_flexion
-    s3699 = s3599 * cos_ankle_left_flexion + s3600 * sin_ankle_left_flexion
-    s3700 = s3600 * cos_ankle_left_flexion - s3599 * sin_ankle_left_flexion
-    cos_ankle_left_inversion = cos(ankle_left_inversion)
-    sin_ankle_left_inversion = sin(ankle_left_inversion)
-    s3701 = s3695 * cos_ankle_left_inversion - s3653 * sin_ankle_left_inversion
-    s3702 = s3697 * cos_ankle_left_inversion - s3656 * sin_ankle_left_inversion
-    s3703 = s3699 * cos_ankle_left_inversion - s3658 * sin_ankle_left_inversion
-    cos_ankle_right_flexion = cos(ankle_right_flexion)
-    sin_ankle_right_flexion = sin(ankle_right_flexion)
-    s3704 = s3676 * cos_ankle_right_flexion + s3677 * sin_ankle_right_flexion
-    s3705 = s3677 * cos_ankle_right_flexion - s3676 * sin_ankle_right_flexion
-    s3706 = s3678 * cos_ankle_right_flexion + s3679 * sin_ankle_right_flexion
-    s3707 = s3679 * cos_ankle_right_flexion - s3678 * sin_ankle_right_flexion
-    s3708 = s3601 * cos_ankle_right_flexion + s3602 * sin_ankle_right_flexion
-    s3709 = s3602 * cos_ankle_right_flexion - s3601 * sin_ankle_right_flexion
-    cos_ankle_right_inversion = cos(ankle_right_inversion)
-    sin_ankle_right_inversion = sin(ankle_right_inversion)
-    s3710 = s3704 * cos_ankle_right_inversion - s3660 * sin_ankle_right_inversion
-    s3711 = s3706 * cos_ankle_right_inversion - s3663 * sin_ankle_right_inversion
-    s3712 = s3708 * cos_ankle_right_inversion - s3665 * sin_ankle_right_inversion
-    cos_elbow_left_flexion = cos(elbow_left_flexion)
-    sin_elbow_left_flexion = sin(elbow_left_flexion)
-    s3713 = s3685 * cos_elbow_left_flexion - s3683 * sin_elbow_left_flexion
-    s3714 = s3683 * cos_elbow_left_flexion + s3685 * sin_elbow_left_flexion
-    s3715 = s3688 * cos_elbow_left_flexion - s3686 * sin_elbow_left_flexion
-    s3716 = s3686 * cos_elbow_left_flexion + s3688 * sin_elbow_left_flexion
-    s3614 = s3606 * cos_elbow_left_flexion - s3604 * sin_elbow_left_flexion
-    s3615 = s3604 * cos_elbow_left_flexion + s3606 * sin_elbow_left_flexion
-    cos_elbow_left_pronation = cos(elbow_left_pronation)
-    sin_elbow_left_pronation = sin(elbow_left_pronation)
-    s3717 = s3714 * cos_elbow_left_pronation + s3684 * sin_elbow_left_pronation
-    s3718 = s3684 * cos_elbow_left_pronation - s3714 * sin_elbow_left_pronation
-    s3719 = s3716 * cos_elbow_left_pronation + s3687 * sin_elbow_left_pronation
-    s3720 = s3687 * cos_elbow_left_pronation - s3716 * sin_elbow_left_pronation
-    s3721 = s3615 * cos_elbow_left_pronation + s3605 * sin_elbow_left_pronation
-    s3722 = s3605 * cos_elbow_left_pronation - s3615 * sin_elbow_left_pronation
-    cos_elbow_right_flexion = cos(elbow_right_flexion)
-    sin_elbow_right_flexion = sin(elbow_right_flexion)
-    s3723 = s3691 * cos_elbow_right_flexion - s3689 * sin_elbow_right_flexion
-    s3724 = s3689 * cos_elbow_right_flexion + s3691 * sin_elbow_right_flexion
-    s3725 = s3694 * cos_elbow_right_flexion - s3692 * sin_elbow_right_flexion
-    s3726 = s3692 * cos_elbow_right_flexion + s3694 * sin_elbow_right_flexion
-    s3616 = s3609 * cos_elbow_right_flexion - s3607 * sin_elbow_right_flexion
-    s3617 = s3607 * cos_elbow_right_flexion + s3609 * sin_elbow_right_flexion
-    cos_elbow_right_pronation = cos(elbow_right_pronation)
-    sin_elbow_right_pronation = sin(elbow_right_pronation)
-    s3727 = s3724 * cos_elbow_right_pronation + s3690 * sin_elbow_right_pronation
-    s3728 = s3690 * cos_elbow_right_pronation - s3724 * sin_elbow_right_pronation
-    s3729 = s3726 * cos_elbow_right_pronation + s3693 * sin_elbow_right_pronation
-    s3730 = s3693 * cos_elbow_right_pronation - s3726 * sin_elbow_right_pronation
-    s3731 = s3617 * cos_elbow_right_pronation + s3608 * sin_elbow_right_pronation
-    s3732 = s3608 * cos_elbow_right_pronation - s3617 * sin_elbow_right_pronation
-    cos_wrist_left_flexion = cos(wrist_left_flexion)
-    sin_wrist_left_flexion = sin(wrist_left_flexion)
-    s3733 = s3713 * cos_wrist_left_flexion - s3717 * sin_wrist_left_flexion
-    s3734 = s3715 * cos_wrist_left_flexion - s3719 * sin_wrist_left_flexion
-    s3735 = s3614 * cos_wrist_left_flexion - s3721 * sin_wrist_left_flexion
-    cos_wrist_left_deviation = cos(wrist_left_deviation)
-    sin_wrist_left_deviation = sin(wrist_left_deviation)
-    s3736 = s3733 * cos_wrist_left_deviation - s3718 * sin_wrist_left_deviation
-    s3737 = s3734 * cos_wrist_left_deviation - s3720 * sin_wrist_left_deviation
-    s3620 = s3735 * cos_wrist_left_deviation - s3722 * sin_wrist_left_deviation
-    cos_wrist_right_flexion = cos(wrist_right_flexion)
-    sin_wrist_right_flexion = sin(wrist_right_flexion)
-    s3738 = s3723 * cos_wrist_right_flexion - s3727 * sin_wrist_right_flexion
-    s3739 = s3725 * cos_wrist_right_flexion - s3729 * sin_wrist_right_flexion
-    s3740 = s3616 * cos_wrist_right_flexion - s3731 * sin_wrist_right_flexion
-    cos_wrist_right_deviation = cos(wrist_right_deviation)
-    sin_wrist_right_deviation = sin(wrist_right_deviation)
-    s3741 = s3738 * cos_wrist_right_deviation - s3728 * sin_wrist_right_deviation
-    s3742 = s3739 * cos_wrist_right_deviation - s3730 * sin_wrist_right_deviation
-    s3623 = s3740 * cos_wrist_right_deviation - s3732 * sin_wrist_right_deviation
-    s3743 = w_hip * s16
-    s3744 = k2 * s17
-    s3745 = w_hip * s19
-    s3746 = k2 * s20
-    s3624 = w_hip * s22
-    s3625 = k2 * s23
-    s3747 = w_shoulder * s3667
-    s3748 = k6 * s3668
-    s3749 = w_shoulder * s3670
-    s3750 = k6 * s3671
-    s3626 = w_shoulder * s3597
-    s3627 = k6 * s3598
-    s3751 = pelvis_x + k1 * s17
-    s3752 = pelvis_y + k1 * s20
-    s3628 = pelvis_z + k1 * s23
-    s3753 = pelvis_x + (s3743 + s3744)
-    s3754 = pelvis_y + (s3745 + s3746)
-    s3629 = pelvis_z + (s3624 + s3625)
-    s3755 = pelvis_x + (s3744 - s3743)
-    s3756 = pelvis_y + (s3746 - s3745)
-    s3630 = pelvis_z + (s3625 - s3624)
-    s3757 = k3 * s3648 + s3751
-    s3758 = k3 * s3651 + s3752
-    s3631 = k3 * s3591 + s3628
-    s3759 = k4 * s3654 + s3753
-    s3760 = k4 * s3657 + s3754
-    s3632 = k4 * s3593 + s3629
-    s3761 = k4 * s3661 + s3755
-    s3762 = k4 * s3664 + s3756
-    s3633 = k4 * s3595 + s3630
-    s3763 = s3747 + s3748 + s3757
-    s3764 = s3749 + s3750 + s3758
-    s3634 = s3626 + s3627 + s3631
-    s3765 = s3748 - s3747 + s3757
-    s3766 = s3750 - s3749 + s3758
-    s3635 = s3627 - s3626 + s3631
-    s3767 = k8 * s3685 + s3763
-    s3768 = k8 * s3688 + s3764
-    s3636 = k8 * s3606 + s3634
-    s3769 = k8 * s3691 + s3765
-    s3770 = k8 * s3694 + s3766
-    s3637 = k8 * s3609 + s3635
-    return (
-        s15,
-        s16,
-        s17,
-        pelvis_x,
-        s18,
-        s19,
-        s20,
-        pelvis_y,
-        s21,
-        s22,
-        s23,
-        pelvis_z,
-        s3646,
-        s3647,
-        s3648,
-        s3751 - k65 * s3648,
-        s3649,
-        s3650,
-        s3651,
-        s3752 - k65 * s3651,
-        s3589,
-        s3590,
-        s3591,
-        s3628 - k65 * s3591,
-        s3652,
-        s3653,
-        s3654,
-        s3753 - k66 * s3654,
-        s3655,
-        s3656,
-        s3657,
-        s3754 - k66 * s3657,
-        s3592,
-        s3658,
-        s3593,
-        s3629 - k66 * s3593,
-        s3659,
-        s3660,
-        s3661,
-        s3755 - k66 * s3661,
-        s3662,
-        s3663,
-        s3664,
-        s3756 - k66 * s3664,
-        s3594,
-        s3665,
-        s3595,
-        s3630 - k66 * s3595,
-        s3666,
-        s3667,
-        s3668,
-        s3757 - k67 * s3668,
-        s3669,
-        s3670,
-        s3671,
-        s3758 - k67 * s3671,
-        s3596,
-        s3597,
-        s3598,
-        s3631 - k67 * s3598,
-        s3673,
-        s3653,
-        s3672,
-        s3759 - k68 * s3672,
-        s3675,
-        s3656,
-        s3674,
-        s3760 - k68 * s3674,
-        s3600,
-        s3658,
-        s3599,
-        s3632 - k68 * s3599,
-        s3677,
-        s3660,
-        s3676,
-        s3761 - k68 * s3676,
-        s3679,
-        s3663,
-        s3678,
-        s3762 - k68 * s3678,
-        s3602,
-        s3665,
-        s3601,
-        s3633 - k68 * s3601,
-        s3666 * s132 + s3667 * s135 + s3668 * s138,
-        s3666 * s133 + s3667 * s136 + s3668 * s139,
-        s3680,
-        k5 * s3668 + s3757 - k69 * s3680,
-        s3669 * s132 + s3670 * s135 + s3671 * s138,
-        s3669 * s133 + s3670 * s136 + s3671 * s139,
-        s3681,
-        k5 * s3671 + s3758 - k69 * s3681,
-        s3596 * s132 + s3597 * s135 + s3598 * s138,
-        s3596 * s133 + s3597 * s136 + s3598 * s139,
-        s3682,
-        k5 * s3598 + s3631 - k69 * s3682,
-        s3683,
-        s3684,
-        s3685,
-        s3763 - k70 * s3685,
-        s3686,
-        s3687,
-        s3688,
-        s3764 - k70 * s3688,
-        s3604,
-        s3605,
-        s3606,
-        s3634 - k70 * s3606,
-        s3689,
-        s3690,
-        s3691,
-        s3765 - k70 * s3691,
-        s3692,
-        s3693,
-        s3694,
-        s3766 - k70 * s3694,
-        s3607,
-        s3608,
-        s3609,
-        s3635 - k70 * s3609,
-        s3696,
-        s3653 * cos_ankle_left_inversion + s3695 * sin_ankle_left_inversion,
-        s3701,
-        k7 * s3672 + s3759 + (k72 * s3696 - k71 * s3701),
-        s3698,
-        s3656 * cos_ankle_left_inversion + s3697 * sin_ankle_left_inversion,
-        s3702,
-        k7 * s3674 + s3760 + (k72 * s3698 - k71 * s3702),
-        s3700,
-        s3658 * cos_ankle_left_inversion + s3699 * sin_ankle_left_inversion,
-        s3703,
-        k7 * s3599 + s3632 + (k72 * s3700 - k71 * s3703),
-        s3705,
-        s3660 * cos_ankle_right_inversion + s3704 * sin_ankle_right_inversion,
-        s3710,
-        k7 * s3676 + s3761 + (k72 * s3705 - k71 * s3710),
-        s3707,
-        s3663 * cos_ankle_right_inversion + s3706 * sin_ankle_right_inversion,
-        s3711,
-        k7 * s3678 + s3762 + (k72 * s3707 - k71 * s3711),
-        s3709,
-        s3665 * cos_ankle_right_inversion + s3708 * sin_ankle_right_inversion,
-        s3712,
-        k7 * s3601 + s3633 + (k72 * s3709 - k71 * s3712),
-        s3717,
-        s3718,
-        s3713,
-        s3767 - k73 * s3713,
-        s3719,
-        s3720,
-        s3715,
-        s3768 - k73 * s3715,
-        s3721,
-        s3722,
-        s3614,
-        s3636 - k73 * s3614,
-        s3727,
-        s3728,
-        s3723,
-        s3769 - k73 * s3723,
-        s3729,
-        s3730,
-        s3725,
-        s3770 - k73 * s3725,
-        s3731,
-        s3732,
-        s3616,
-        s3637 - k73 * s3616,
-        s3717 * cos_wrist_left_flexion + s3713 * sin_wrist_left_flexion,
-        s3718 * cos_wrist_left_deviation + s3733 * sin_wrist_left_deviation,
-        s3736,
-        k9 * s3713 + s3767 - k74 * s3736,
-        s3719 * cos_wrist_left_flexion + s3715 * sin_wrist_left_flexion,
-        s3720 * cos_wrist_left_deviation + s3734 * sin_wrist_left_deviation,
-        s3737,
-        k9 * s3715 + s3768 - k74 * s3737,
-        s3721 * cos_wrist_left_flexion + s3614 * sin_wrist_left_flexion,
-        s3722 * cos_wrist_left_deviation + s3735 * sin_wrist_left_deviation,
-        s3620,
-        k9 * s3614 + s3636 - k74 * s3620,
-        s3727 * cos_wrist_right_flexion + s3723 * sin_wrist_right_flexion,
-        s3728 * cos_wrist_right_deviation + s3738 * sin_wrist_right_deviation,
-        s3741,
-        k9 * s3723 + s3769 - k74 * s3741,
-        s3729 * cos_wrist_right_flexion + s3725 * sin_wrist_right_flexion,
-        s3730 * cos_wrist_right_deviation + s3739 * sin_wrist_right_deviation,
-        s3742,
-        k9 * s3725 + s3770 - k74 * s3742,
-        s3731 * cos_wrist_right_flexion + s3616 * sin_wrist_right_flexion,
-        s3732 * cos_wrist_right_deviation + s3740 * sin_wrist_right_deviation,
-        s3623,
-        k9 * s3616 + s3637 - k74 * s3623,
-    )
-
-
 def _named(values, names, defaults, what):
     """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
@@ -7853,18 +6622,3 @@ def derivative(t, y, p=None, u=None):
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
     return _along(_jacobian, "jacobian", (90, 90), ('cos', 'sin'), y, p, u)
-
-
-def kinetic_energy(t, y, p=None, u=None):
-    """Kinetic energy, J."""
-    return _evaluate(_kinetic_energy, "kinetic_energy", (), ('cos', 'sin'), y, p, u)[()]
-
-
-def potential_energy(t, y, p=None, u=None):
-    """Potential energy, J."""
-    return _evaluate(_potential_energy, "potential_energy", (), ('cos', 'sin'), y, p, u)[()]
-
-
-def body_poses(t, y, p=None, u=None):
-    """[world_R_body | centre of mass (m)] of each body, 3 x 4."""
-    return _evaluate(_body_poses, "body_poses", (16, 3, 4), ('cos', 'sin'), y, p, u)

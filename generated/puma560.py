@@ -246,9 +246,6 @@ COST = {
     "mass_matrix": {"add": 187, "sub": 128, "mul": 417, "sin": 6, "cos": 6, "total": 744, "parameters": 62},
     "velocity_force": {"add": 97, "sub": 87, "mul": 214, "sin": 5, "cos": 5, "total": 408, "parameters": 75},
     "gravity_force": {"add": 29, "sub": 16, "mul": 76, "neg": 2, "sin": 5, "cos": 5, "total": 133, "parameters": 17},
-    "kinetic_energy": {"add": 53, "sub": 29, "mul": 129, "sin": 5, "cos": 5, "total": 221, "parameters": 58},
-    "potential_energy": {"add": 14, "sub": 3, "mul": 21, "sin": 3, "cos": 4, "total": 45, "parameters": 13},
-    "body_poses": {"add": 27, "sub": 28, "mul": 83, "neg": 12, "sin": 6, "cos": 6, "total": 162, "parameters": 8},
     "point_positions": {"add": 8, "sub": 7, "mul": 27, "sin": 3, "cos": 3, "total": 48, "parameters": 8},
     "point_jacobians": {"add": 12, "sub": 16, "mul": 41, "neg": 5, "sin": 3, "cos": 3, "total": 80, "parameters": 8},
 }
@@ -311,48 +308,48 @@ def _constants(values):
     k36 = J_2 * (G_2 * G_2)
     k1 = k42 - c_2x
     k43 = a_3 + c_3x
-    k51 = d_3 - c_3y
+    k44 = d_3 - c_3y
     k2 = J_3 * (G_3 * G_3)
     k3 = c_3x - k43
-    k4 = c_3y + k51
-    k44 = d_4 + c_4y
+    k4 = c_3y + k44
+    k45 = d_4 + c_4y
     k5 = J_4 * (G_4 * G_4)
-    k6 = k44 - c_4y
+    k6 = k45 - c_4y
     k7 = J_5 * (G_5 * G_5)
     k37 = J_6 * (G_6 * G_6)
     inertia_link_1_xx = I_1y + d_1 * (d_1 * m_1)
     moment_link_2_x = m_2 * k42
     moment_link_2_y = m_2 * c_2y
     moment_link_2_z = m_2 * c_2z
-    k52 = k42 * moment_link_2_x
-    k53 = c_2y * moment_link_2_y
-    k54 = c_2z * moment_link_2_z
+    k46 = k42 * moment_link_2_x
+    k47 = c_2y * moment_link_2_y
+    k48 = c_2z * moment_link_2_z
     k8 = c_2y * moment_link_2_x
     k9 = c_2z * moment_link_2_x
     k10 = c_2z * moment_link_2_y
-    inertia_link_2_xx = I_2x + (k53 + k54)
-    inertia_link_2_yy = I_2y + (k52 + k54)
-    inertia_link_2_zz = I_2z + (k52 + k53)
+    inertia_link_2_xx = I_2x + (k47 + k48)
+    inertia_link_2_yy = I_2y + (k46 + k48)
+    inertia_link_2_zz = I_2z + (k46 + k47)
     k11 = m_3 * k43
-    moment_link_3_y = m_3 * k51
+    moment_link_3_y = m_3 * k44
     moment_link_3_z = m_3 * c_3z
-    k55 = k43 * k11
-    k56 = k51 * moment_link_3_y
-    k57 = c_3z * moment_link_3_z
-    inertia_link_3_xy = k51 * k11
+    k49 = k43 * k11
+    k50 = k44 * moment_link_3_y
+    k51 = c_3z * moment_link_3_z
+    inertia_link_3_xy = k44 * k11
     inertia_link_3_xz = c_3z * k11
     k12 = c_3z * moment_link_3_y
-    inertia_link_3_xx = I_3x + (k56 + k57)
-    inertia_link_3_yy = I_3y + (k55 + k57)
-    inertia_link_3_zz = I_3z + (k55 + k56)
-    moment_link_4_y = m_4 * k44
-    k58 = k44 * moment_link_4_y
-    inertia_link_4_xx = I_4x + k58
-    inertia_link_4_zz = I_4z + k58
+    inertia_link_3_xx = I_3x + (k50 + k51)
+    inertia_link_3_yy = I_3y + (k49 + k51)
+    inertia_link_3_zz = I_3z + (k49 + k50)
+    moment_link_4_y = m_4 * k45
+    k52 = k45 * moment_link_4_y
+    inertia_link_4_xx = I_4x + k52
+    inertia_link_4_zz = I_4z + k52
     moment_link_6_z = m_6 * c_6z
-    k59 = c_6z * moment_link_6_z
-    inertia_link_6_xx = I_6x + k59
-    inertia_link_6_yy = I_6y + k59
+    k53 = c_6z * moment_link_6_z
+    inertia_link_6_xx = I_6x + k53
+    inertia_link_6_yy = I_6y + k53
     pivot_link_6 = I_6z + k37
     k13 = I_6z / pivot_link_6
     k14 = inertia_link_6_xx - inertia_link_6_yy
@@ -364,33 +361,27 @@ def _constants(values):
     k20 = k36 + inertia_link_2_zz
     k21 = I_1y + k39
     k40 = 0.5 * (inertia_link_1_xx + (I_1y + inertia_link_1_xx)) - inertia_link_1_xx
-    k60 = 0.5 * (inertia_link_2_zz + (inertia_link_2_xx + inertia_link_2_yy))
-    k22 = k60 - inertia_link_2_xx
-    k23 = k60 - inertia_link_2_yy
-    k41 = k60 - inertia_link_2_zz
-    k61 = 0.5 * (inertia_link_3_zz + (inertia_link_3_xx + inertia_link_3_yy))
-    k24 = k61 - inertia_link_3_xx
-    k25 = k61 - inertia_link_3_yy
-    k26 = k61 - inertia_link_3_zz
-    k62 = 0.5 * (inertia_link_4_zz + (I_4y + inertia_link_4_xx))
-    k27 = k62 - inertia_link_4_xx
-    k28 = k62 - I_4y
-    k29 = k62 - inertia_link_4_zz
-    k63 = 0.5 * (I_5z + (I_5x + I_5y))
-    k30 = k63 - I_5x
-    k31 = k63 - I_5y
-    k32 = k63 - I_5z
-    k64 = 0.5 * (I_6z + (inertia_link_6_xx + inertia_link_6_yy))
-    k33 = k64 - inertia_link_6_xx
-    k34 = k64 - inertia_link_6_yy
-    k35 = k64 - I_6z
+    k54 = 0.5 * (inertia_link_2_zz + (inertia_link_2_xx + inertia_link_2_yy))
+    k22 = k54 - inertia_link_2_xx
+    k23 = k54 - inertia_link_2_yy
+    k41 = k54 - inertia_link_2_zz
+    k55 = 0.5 * (inertia_link_3_zz + (inertia_link_3_xx + inertia_link_3_yy))
+    k24 = k55 - inertia_link_3_xx
+    k25 = k55 - inertia_link_3_yy
+    k26 = k55 - inertia_link_3_zz
+    k56 = 0.5 * (inertia_link_4_zz + (I_4y + inertia_link_4_xx))
+    k27 = k56 - inertia_link_4_xx
+    k28 = k56 - I_4y
+    k29 = k56 - inertia_link_4_zz
+    k57 = 0.5 * (I_5z + (I_5x + I_5y))
+    k30 = k57 - I_5x
+    k31 = k57 - I_5y
+    k32 = k57 - I_5z
+    k58 = 0.5 * (I_6z + (inertia_link_6_xx + inertia_link_6_yy))
+    k33 = k58 - inertia_link_6_xx
+    k34 = k58 - inertia_link_6_yy
+    k35 = k58 - I_6z
     k38 = m_3 + k19
-    k45 = m_2 * gravity_g
-    k46 = d_1 * (m_1 * gravity_g)
-    k47 = m_3 * gravity_g
-    k48 = m_4 * gravity_g
-    k49 = m_5 * gravity_g
-    k50 = m_6 * gravity_g
     return {
         "initial_state": (),
         "derivative": (m_3, m_4, I_4y, m_5, I_5x, m_6, gravity_g, k1, k2, k3, k4, k5, k6, k7, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35),
@@ -400,9 +391,6 @@ def _constants(values):
         "mass_matrix": (I_4y, I_5x, I_5y, I_5z, I_6z, k36, k1, k2, k3, k4, k5, k6, k7, k37, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, k17, k19, k21, k38),
         "velocity_force": (m_3, m_4, m_5, m_6, k1, k3, k4, k6, k8, k9, k10, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, moment_link_4_y, moment_link_6_z, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35),
         "gravity_force": (m_3, m_4, m_5, m_6, gravity_g, k1, k3, k4, k6, moment_link_2_x, moment_link_2_y, moment_link_2_z, k11, moment_link_3_y, moment_link_3_z, moment_link_4_y, moment_link_6_z, k17),
-        "kinetic_energy": (I_1y, m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, k39, k36, k1, k2, k3, k4, k5, k6, k7, k37, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy),
-        "potential_energy": (d_1, c_2y, c_3z, c_6z, k42, k1, k43, k3, k44, k6, k45, k46, k47, k48, k49, k50),
-        "body_poses": (d_1, c_2y, c_2z, c_3z, c_6z, k42, k1, k43, k51, k3, k4, k44, k6),
         "point_positions": (d_1, k1, k3, k4, k6),
         "point_jacobians": (d_1, k1, k3, k4, k6),
     }
@@ -3116,241 +3104,6 @@ def _gravity_force(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
-def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """221 operations: 53 add, 29 sub, 129 mul, 5 sin, 5 cos."""
-    I_1y, m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, k39, k36, k1, k2, k3, k4, k5, k6, k7, k37, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy = k
-    _, q_2, q_3, q_4, q_5, q_6, q_1_dot, q_2_dot, q_3_dot, q_4_dot, q_5_dot, q_6_dot = y
-    cos_q_3 = cos(q_3)
-    sin_q_3 = sin(q_3)
-    cos_q_4 = cos(q_4)
-    sin_q_4 = sin(q_4)
-    cos_q_5 = cos(q_5)
-    sin_q_5 = sin(q_5)
-    cos_q_6 = cos(q_6)
-    sin_q_6 = sin(q_6)
-    omega_link_2_x = q_1_dot * sin(q_2)
-    omega_link_2_y = q_1_dot * cos(q_2)
-    omega_link_3_z = cos_q_3 * omega_link_2_y - sin_q_3 * omega_link_2_x
-    s125 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
-    s1368 = q_2_dot * k1
-    s1369 = k1 * omega_link_2_y
-    velocity_link_3_z_2 = cos_q_3 * s1368
-    s1370 = sin_q_3 * s1368
-    omega_link_3_y = q_2_dot + q_3_dot
-    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s125
-    s126 = cos_q_4 * s125
-    s127 = sin_q_4 * omega_link_3_y
-    omega_link_4_x = s126 - s127
-    s1371 = s1370 + k4 * omega_link_3_z
-    s1372 = k3 * omega_link_3_z - s1369
-    velocity_link_4_y_2 = velocity_link_3_z_2 - (k4 * s125 + k3 * omega_link_3_y)
-    velocity_link_4_z_2 = cos_q_4 * s1372 + sin_q_4 * s1371
-    velocity_link_4_x_2 = cos_q_4 * s1371 - sin_q_4 * s1372
-    omega_link_4_y = q_4_dot + omega_link_3_z
-    s128 = s127 - s126
-    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s128
-    s129 = cos_q_5 * s128
-    s130 = sin_q_5 * omega_link_4_y
-    omega_link_5_x = s129 - s130
-    velocity_link_5_y_2 = velocity_link_4_z_2 + k6 * omega_link_4_x
-    s1373 = k6 * omega_link_4_z - velocity_link_4_x_2
-    velocity_link_5_z_2 = cos_q_5 * velocity_link_4_y_2 + sin_q_5 * s1373
-    s1374 = cos_q_5 * s1373
-    s1375 = sin_q_5 * velocity_link_4_y_2
-    velocity_link_5_x_2 = s1374 - s1375
-    omega_link_5_y = q_5_dot + omega_link_4_z
-    s131 = s130 - s129
-    omega_link_6_x = cos_q_6 * s131 - sin_q_6 * omega_link_5_y
-    s132 = cos_q_6 * omega_link_5_y + sin_q_6 * s131
-    s1376 = s1375 - s1374
-    velocity_link_6_x = cos_q_6 * s1376 - sin_q_6 * velocity_link_5_y_2
-    s1377 = cos_q_6 * velocity_link_5_y_2 + sin_q_6 * s1376
-    omega_link_6_z = q_6_dot + omega_link_5_z
-    s1378 = q_2_dot * inertia_link_2_zz - (k9 * omega_link_2_x + k10 * omega_link_2_y)
-    s1379 = omega_link_2_x * (inertia_link_2_xx * omega_link_2_x - k8 * omega_link_2_y - q_2_dot * k9)
-    s1380 = omega_link_2_y * (inertia_link_2_yy * omega_link_2_y - k8 * omega_link_2_x - q_2_dot * k10)
-    s1381 = q_1_dot * (I_1y * q_1_dot) + k39 * (q_1_dot * q_1_dot) + (s1379 + s1380 + q_2_dot * s1378)
-    s1382 = s1370 * s1370 + s1369 * s1369 + velocity_link_3_z_2 * velocity_link_3_z_2
-    s1383 = inertia_link_3_xy * omega_link_3_y - inertia_link_3_xx * s125 + inertia_link_3_xz * omega_link_3_z
-    s1384 = inertia_link_3_yy * omega_link_3_y - inertia_link_3_xy * s125 - k12 * omega_link_3_z
-    s1385 = inertia_link_3_zz * omega_link_3_z - (inertia_link_3_xz * s125 + k12 * omega_link_3_y)
-    s1386 = s1381 + k36 * (q_2_dot * q_2_dot) + m_3 * s1382 + (omega_link_3_y * s1384 - s125 * s1383 + omega_link_3_z * s1385)
-    s1387 = s1370 * (moment_link_3_z * omega_link_3_y - moment_link_3_y * omega_link_3_z)
-    s1388 = velocity_link_3_z_2 * (k11 * omega_link_3_y - moment_link_3_y * s125) - (s1387 + s1369 * (moment_link_3_z * s125 - k11 * omega_link_3_z))
-    s1389 = velocity_link_4_x_2 * velocity_link_4_x_2 + velocity_link_4_y_2 * velocity_link_4_y_2
-    s1390 = s1386 + k2 * (q_3_dot * q_3_dot) + m_4 * (s1389 + velocity_link_4_z_2 * velocity_link_4_z_2)
-    s1391 = omega_link_4_x * (inertia_link_4_xx * omega_link_4_x) + omega_link_4_y * (I_4y * omega_link_4_y)
-    s1392 = velocity_link_4_z_2 * (moment_link_4_y * omega_link_4_x) - velocity_link_4_x_2 * (moment_link_4_y * omega_link_4_z)
-    s1393 = s1390 + (s1391 + omega_link_4_z * (inertia_link_4_zz * omega_link_4_z)) + k5 * (q_4_dot * q_4_dot)
-    s1394 = velocity_link_5_x_2 * velocity_link_5_x_2 + velocity_link_5_y_2 * velocity_link_5_y_2
-    velocity_link_5_z_squared = velocity_link_5_z_2 * velocity_link_5_z_2
-    s1395 = omega_link_5_x * (I_5x * omega_link_5_x) + omega_link_5_y * (I_5y * omega_link_5_y)
-    s1396 = s1393 + m_5 * (s1394 + velocity_link_5_z_squared) + (s1395 + omega_link_5_z * (I_5z * omega_link_5_z))
-    s1397 = velocity_link_5_z_squared + (velocity_link_6_x * velocity_link_6_x + s1377 * s1377)
-    s1398 = omega_link_6_x * (inertia_link_6_xx * omega_link_6_x) + s132 * (inertia_link_6_yy * s132)
-    s1399 = s1396 + k7 * (q_5_dot * q_5_dot) + m_6 * s1397 + (s1398 + omega_link_6_z * (I_6z * omega_link_6_z))
-    s1400 = s1377 * (moment_link_6_z * omega_link_6_x) - velocity_link_6_x * (moment_link_6_z * s132)
-    return (
-        s1388 + s1392 + s1400 + 0.5 * (s1399 + k37 * (q_6_dot * q_6_dot)),
-    )
-
-
-def _potential_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """45 operations: 14 add, 3 sub, 21 mul, 3 sin, 4 cos."""
-    d_1, c_2y, c_3z, c_6z, k42, k1, k43, k3, k44, k6, k45, k46, k47, k48, k49, k50 = k
-    _, q_2, q_3, q_4, q_5, _, _, _, _, _, _, _ = y
-    cos_q_2 = cos(q_2)
-    sin_q_2 = sin(q_2)
-    cos_q_3 = cos(q_3)
-    sin_q_3 = sin(q_3)
-    s265 = cos_q_2 * cos_q_3 - sin_q_2 * sin_q_3
-    s266 = sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3
-    s1401 = d_1 + k1 * sin_q_2
-    s1402 = s1401 - k3 * s266
-    s1403 = k6 * s265 + s1402
-    s1404 = k46 + k45 * (d_1 + (k42 * sin_q_2 + c_2y * cos_q_2)) + k47 * (s1401 + (k43 * s266 + c_3z * s265))
-    return (
-        s1404 + k48 * (s1402 + k44 * s265) + s1403 * k49 + k50 * (s1403 + c_6z * (s265 * cos(q_5) - s266 * cos(q_4) * sin(q_5))),
-    )
-
-
-def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """162 operations: 27 add, 28 sub, 83 mul, 12 neg, 6 sin, 6 cos."""
-    d_1, c_2y, c_2z, c_3z, c_6z, k42, k1, k43, k51, k3, k4, k44, k6 = k
-    q_1, q_2, q_3, q_4, q_5, q_6, _, _, _, _, _, _ = y
-    cos_q_1 = cos(q_1)
-    sin_q_1 = sin(q_1)
-    s1405 = -cos_q_1
-    cos_q_2 = cos(q_2)
-    sin_q_2 = sin(q_2)
-    s253 = cos_q_1 * cos_q_2
-    s254 = cos_q_1 * sin_q_2
-    s255 = sin_q_1 * cos_q_2
-    s256 = sin_q_1 * sin_q_2
-    cos_q_3 = cos(q_3)
-    sin_q_3 = sin(q_3)
-    s257 = s254 * cos_q_3 + s253 * sin_q_3
-    s1406 = -s257
-    s258 = s253 * cos_q_3
-    s259 = s254 * sin_q_3
-    s260 = s259 - s258
-    s261 = s256 * cos_q_3 + s255 * sin_q_3
-    s1407 = -s261
-    s262 = s255 * cos_q_3
-    s263 = s256 * sin_q_3
-    s264 = s263 - s262
-    s265 = cos_q_2 * cos_q_3 - sin_q_2 * sin_q_3
-    s266 = sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3
-    cos_q_4 = cos(q_4)
-    sin_q_4 = sin(q_4)
-    s267 = s258 - s259
-    s268 = s262 - s263
-    s269 = sin_q_1 * cos_q_4 + sin_q_4 * s267
-    s270 = cos_q_4 * s267
-    s271 = sin_q_1 * sin_q_4
-    s273 = cos_q_1 * cos_q_4
-    s274 = sin_q_4 * s268
-    s276 = cos_q_4 * s268 + cos_q_1 * sin_q_4
-    s277 = s266 * sin_q_4
-    s278 = s266 * cos_q_4
-    cos_q_5 = cos(q_5)
-    sin_q_5 = sin(q_5)
-    s279 = s271 - s270
-    s280 = sin_q_5 * s279 - s257 * cos_q_5
-    s281 = cos_q_5 * s279 + s257 * sin_q_5
-    s282 = s261 * cos_q_5 + s276 * sin_q_5
-    s1408 = -s282
-    s286 = s265 * cos_q_5 - s278 * sin_q_5
-    s287 = s278 * cos_q_5 + s265 * sin_q_5
-    cos_q_6 = cos(q_6)
-    sin_q_6 = sin(q_6)
-    s288 = s276 * cos_q_5 - s261 * sin_q_5
-    s289 = s273 - s274
-    s311 = k1 * s253
-    s312 = k1 * s255
-    s1401 = d_1 + k1 * sin_q_2
-    s1409 = s311 + (k3 * s260 + k4 * sin_q_1)
-    s1410 = s312 + (k3 * s264 - k4 * cos_q_1)
-    s1402 = s1401 - k3 * s266
-    s1411 = s1409 - k6 * s257
-    s1412 = s1410 - k6 * s261
-    s1403 = k6 * s265 + s1402
-    return (
-        cos_q_1,
-        0.0,
-        sin_q_1,
-        0.0,
-        sin_q_1,
-        0.0,
-        s1405,
-        0.0,
-        0.0,
-        1.0,
-        0.0,
-        d_1,
-        s253,
-        -s254,
-        sin_q_1,
-        k42 * s253 - c_2y * s254 + c_2z * sin_q_1,
-        s255,
-        -s256,
-        s1405,
-        k42 * s255 - c_2y * s256 - c_2z * cos_q_1,
-        sin_q_2,
-        cos_q_2,
-        0.0,
-        d_1 + (k42 * sin_q_2 + c_2y * cos_q_2),
-        s267,
-        -sin_q_1,
-        s1406,
-        s311 + (k51 * sin_q_1 - k43 * s260 - c_3z * s257),
-        s268,
-        cos_q_1,
-        s1407,
-        s312 - (k43 * s264 + k51 * cos_q_1 + c_3z * s261),
-        s266,
-        0.0,
-        s265,
-        s1401 + (k43 * s266 + c_3z * s265),
-        s270 - s271,
-        s1406,
-        s269,
-        s1409 - k44 * s257,
-        s276,
-        s1407,
-        s274 - s273,
-        s1410 - k44 * s261,
-        s278,
-        s265,
-        s277,
-        s1402 + k44 * s265,
-        -s281,
-        -s269,
-        s280,
-        s1411,
-        s288,
-        s289,
-        s1408,
-        s1412,
-        s287,
-        -s277,
-        s286,
-        s1403,
-        -(s281 * cos_q_6 + s269 * sin_q_6),
-        s281 * sin_q_6 - s269 * cos_q_6,
-        s280,
-        s1411 + c_6z * s280,
-        cos_q_6 * s288 + sin_q_6 * s289,
-        cos_q_6 * s289 - sin_q_6 * s288,
-        s1408,
-        s1412 - c_6z * s282,
-        s287 * cos_q_6 - s277 * sin_q_6,
-        -(s277 * cos_q_6 + s287 * sin_q_6),
-        s286,
-        s1403 + c_6z * s286,
-    )
-
-
 def _point_positions(y, k, u=(), extra=(), cos=cos, sin=sin):
     """48 operations: 8 add, 7 sub, 27 mul, 3 sin, 3 cos."""
     d_1, k1, k3, k4, k6 = k
@@ -3392,35 +3145,35 @@ def _point_jacobians(y, k, u=(), extra=(), cos=cos, sin=sin):
     s311 = k1 * s253
     s312 = k1 * s255
     s351 = k6 * s261
-    s1401 = d_1 + k1 * sin_q_2
-    s1409 = s311 + (k3 * (s254 * sin_q_3 - s253 * cos_q_3) + k4 * sin_q_1)
-    s1410 = s312 + (k3 * (s256 * sin_q_3 - s255 * cos_q_3) - k4 * cos_q_1)
-    s1402 = s1401 - k3 * (sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3)
-    s1411 = s1409 - k6 * s257
-    s1412 = s1410 - s351
-    s1403 = k6 * s265 + s1402
-    s1413 = s1411 - s1409
-    s1414 = s1412 - s1410
-    s1415 = s1403 - s1402
-    s1416 = s1403 - s1401
-    s1417 = s1403 - d_1
+    s1368 = d_1 + k1 * sin_q_2
+    s1369 = s311 + (k3 * (s254 * sin_q_3 - s253 * cos_q_3) + k4 * sin_q_1)
+    s1370 = s312 + (k3 * (s256 * sin_q_3 - s255 * cos_q_3) - k4 * cos_q_1)
+    s1371 = s1368 - k3 * (sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3)
+    s1372 = s1369 - k6 * s257
+    s1373 = s1370 - s351
+    s1374 = k6 * s265 + s1371
+    s1375 = s1372 - s1369
+    s1376 = s1373 - s1370
+    s1377 = s1374 - s1371
+    s1378 = s1374 - s1368
+    s1379 = s1374 - d_1
     return (
-        s351 - s1410,
-        -cos_q_1 * s1417,
-        -cos_q_1 * s1416,
-        -(s261 * s1415 + s265 * s1414),
+        s351 - s1370,
+        -cos_q_1 * s1379,
+        -cos_q_1 * s1378,
+        -(s261 * s1377 + s265 * s1376),
         0.0,
         0.0,
-        s1411,
-        -sin_q_1 * s1417,
-        -sin_q_1 * s1416,
-        s265 * s1413 + s257 * s1415,
+        s1372,
+        -sin_q_1 * s1379,
+        -sin_q_1 * s1378,
+        s265 * s1375 + s257 * s1377,
         0.0,
         0.0,
         0.0,
-        sin_q_1 * s1412 + cos_q_1 * s1411,
-        sin_q_1 * (s1412 - s312) + cos_q_1 * (s1411 - s311),
-        s261 * s1413 - s257 * s1414,
+        sin_q_1 * s1373 + cos_q_1 * s1372,
+        sin_q_1 * (s1373 - s312) + cos_q_1 * (s1372 - s311),
+        s261 * s1375 - s257 * s1376,
         0.0,
         0.0,
     )
@@ -3542,21 +3295,6 @@ def velocity_force(t, y, p=None, u=None):
 def gravity_force(t, y, p=None, u=None):
     """G(q) of M v̇ + V + G = F, (nv,)."""
     return _evaluate(_gravity_force, "gravity_force", (6,), ('cos', 'sin'), y, p, u)
-
-
-def kinetic_energy(t, y, p=None, u=None):
-    """Kinetic energy, J."""
-    return _evaluate(_kinetic_energy, "kinetic_energy", (), ('cos', 'sin'), y, p, u)[()]
-
-
-def potential_energy(t, y, p=None, u=None):
-    """Potential energy, J."""
-    return _evaluate(_potential_energy, "potential_energy", (), ('cos', 'sin'), y, p, u)[()]
-
-
-def body_poses(t, y, p=None, u=None):
-    """[world_R_body | centre of mass (m)] of each body, 3 x 4."""
-    return _evaluate(_body_poses, "body_poses", (6, 3, 4), ('cos', 'sin'), y, p, u)
 
 
 def point_positions(t, y, p=None, u=None):

@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING
 
 from eomgen.commands.shared import Arguments, located, read_model
 from eomgen.derivation.recursive.regular import check_regular
-from eomgen.derivation.supported import why_not_pins
+from eomgen.derivation.supported import MOST_TOLD, why_not_pins
+from eomgen.errors import SceneError
 from eomgen.files import check_writable, write_whole
 from eomgen.model import Model
 from eomgen.run.progress import terminal_notice
@@ -35,6 +36,11 @@ def derive(given: Arguments) -> int:
 def _steps(model: Model) -> "tuple[Step, ...]":
     """The handout's derivation where it is for the model, and the general one elsewhere."""
     check_regular(model)
+    if len(model.bodies) > MOST_TOLD:
+        raise SceneError(
+            f"derive: tells mechanisms of up to {MOST_TOLD} bodies, and this has "
+            f"{len(model.bodies)}; generate writes the module of any"
+        )
     if why_not_pins(model):
         from eomgen.derivation.general.derive import derive_general
         from eomgen.derivation.general.tell import tell_general

@@ -23,7 +23,6 @@ from eomgen.model import Model
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import find_scene
-from eomgen.scene.schema import SHOWN
 from eomgen.study.equilibrium import equilibrium
 from eomgen.study.linearise import Linearisation, save
 from eomgen.study.linearise import linearise as linearised
@@ -38,11 +37,9 @@ STILL = 1e-9
 def linearise(given: Arguments) -> int:
     """Print A and B about an equilibrium or a state, modes, and what the inputs can do."""
     model, _ = read_model(given.scene, given)
-    wanted = "input_jacobian" if model.inputs else ""
     # Forms other than [q, v] have states that move with the parameters.
-    model = replace(
-        model, form="velocity", outputs=tuple(name for name in (*SHOWN, wanted) if name)
-    )
+    wanted = ("input_jacobian",) if model.inputs else ()
+    model = replace(model, form="velocity", outputs=wanted)
     parameters = assignments(given.set, model.defaults, "--set")
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
     if given.output is not None:

@@ -3,6 +3,7 @@
 import os
 import sys
 import webbrowser
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from eomgen.run.limits import excursions
 from eomgen.run.module import as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.schema import OUTPUTS, SHOWN
 
 
 def simulate(given: Arguments) -> int:
@@ -28,11 +30,15 @@ def simulate(given: Arguments) -> int:
     from eomgen.show.page import save_page
 
     model, name = read_model(given.scene, given)
+    asked = (*model.outputs, *SHOWN)
+    model = replace(model, outputs=tuple(output for output in OUTPUTS if output in asked))
     parameters = assignments(given.set, model.defaults, "--set")
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
     wanted = model.simulation
     integrator = _or(given.integrator, wanted.integrator)
     fixed = isinstance(find_integrator(integrator), FixedStep)
+    if fixed and (given.rtol is not None or given.atol is not None):
+        raise RunError(f"--rtol, --atol: {integrator} takes equal steps; give --dt instead")
     paths = _output_paths(given, name)
     code, module = code_of(given.scene, model, given)
     with terminal_progress(f"simulating {model.name}") as progress:
@@ -70,7 +76,8 @@ def simulate(given: Arguments) -> int:
         f"({'derived now' if code.derived else 'module fresh, not derived again'})"
     )
     print(f"    energy {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the end")
-    print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
+    if motion.joints:
+        print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
     _print_excursions(model, trajectory)
     for path in paths.values():
         print(f"    wrote {path}")

@@ -59,7 +59,10 @@ def load_module(source: str, name: str = "generated") -> GeneratedModule:
 
 def _unsolvable(error: Exception) -> str:
     if isinstance(error, ArithmeticError):
-        return "the mass matrix is singular at these parameters: change lengths, masses or inertias"
+        return (
+            "the mass matrix is singular at the initial state: change that, or lengths, masses or "
+            "inertias"
+        )
     return str(error)
 
 

@@ -1,8 +1,9 @@
 """The scene: every table and key of the language, as data."""
 
+import sys
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import Field, Strict
+from pydantic import AfterValidator, Field, Strict
 
 from eomgen.effects import Effect
 from eomgen.joints import Joint
@@ -38,7 +39,17 @@ OUTPUTS: tuple[Output, ...] = get_args(Output)
 """What a generated module can compute beside `derivative` and `jacobian`."""
 
 SHOWN = ("kinetic_energy", "potential_energy", "body_poses")
-"""The outputs that figures and pages are drawn from; generated always."""
+"""The outputs that figures and pages are drawn from."""
+
+
+def _no_module(name: str) -> str:
+    if name in sys.stdlib_module_names or name == "numpy":
+        raise ValueError("is a module that generated code would hide; choose another name")
+    return name
+
+
+ModuleName = Annotated[Identifier, AfterValidator(_no_module)]
+"""A scene's name is that of its module, which must not stand in the way of another."""
 
 Integrator = Literal[
     "euler",
@@ -136,7 +147,7 @@ class Simulation(Table):
 class Scene(Table):
     """A whole scene."""
 
-    name: Identifier
+    name: ModuleName
     title: Text = ""
     outputs: Literal["all"] | tuple[Output, ...] = Field(default=(), union_mode="left_to_right")
     form: Form = "velocity"
