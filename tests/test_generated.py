@@ -15,7 +15,7 @@ from newton_euler import Mechanism, Motion, solve
 
 from eomgen.errors import SceneError
 from eomgen.pipeline import compile_model, compile_scene
-from eomgen.scene.reader import built_in_names, parse_scene, read_scene
+from eomgen.scene.reader import parse_scene
 
 TOLERANCE = 1e-12
 GENERATED = Path(__file__).parent.parent / "generated"
@@ -524,18 +524,6 @@ ALLOWED = (
     ast.Assign, ast.Return, ast.Tuple, ast.Name, ast.Load, ast.Store, ast.Constant, ast.Call,
     ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub,
 )  # fmt: skip
-
-
-def test_generated_holds_every_scene() -> None:
-    """One module for each scene that comes with eomgen, and no other."""
-    assert sorted(path.stem for path in GENERATED.glob("*.py")) == list(built_in_names())
-
-
-@pytest.mark.parametrize("name", built_in_names())
-def test_generated_is_what_is_generated(name: str) -> None:
-    """The committed modules, byte for byte: a change of equations or of their cost shows."""
-    fresh = compile_scene(read_scene(name)).encode() == (GENERATED / f"{name}.py").read_bytes()
-    assert fresh, f"stale; run: eomgen generate {name} -o generated"
 
 
 def test_same_bytes_whatever_the_hash_seed() -> None:
