@@ -1,16 +1,16 @@
 """From a scene to a model: every name resolved, bodies in a tree, everything checked."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Literal, TypeVar
 
-from eomgen.effects import Effect, ExternalForce, Gravity, Motor
-from eomgen.effects.base import Input
+from eomgen.effects import Effect, Gravity, Motor
+from eomgen.effects.base import ExtraState, Input
 from eomgen.errors import SceneError, nearest
 from eomgen.joints import Joint, Prismatic, Revolute
 from eomgen.joints.base import WORLD, Coordinate
 from eomgen.language.base import Table
-from eomgen.language.formula import ZERO, Formula
+from eomgen.language.formula import ZERO, Floats, evaluate
 from eomgen.language.quantity import Parameter, name_quantities, with_components
 from eomgen.model import Body, Model, Point
 from eomgen.scene.chains import written_out
@@ -36,7 +36,8 @@ def build_model(scene: Scene) -> Model:
     if not velocities:
         raise SceneError("joints: nothing can move; give at least one that is no weld")
     inputs = _inputs(effects, bodies[0], scene.dimensions)
-    _check_symbols(parameters, coordinates, velocities, inputs)
+    states = [x for effect in effects for x in effect.states(scene.dimensions)]
+    _check_symbols(parameters, coordinates, velocities, inputs, states)
     check_look((), scene.camera, scene.dimensions, "camera")
     if scene.camera.follow is not None:
         _known_body(scene.camera.follow, "camera.follow", names)
@@ -49,6 +50,7 @@ def build_model(scene: Scene) -> Model:
         bodies=tuple(bodies[0]),
         points=tuple(points),
         effects=tuple(effects),
+        states=tuple(states),
         initial_q=_initial(scene.initial.q, coordinates, "initial.q"),
         initial_v=_initial(scene.initial.v, velocities, "initial.v"),
         outputs=outputs_for(scene.outputs, "outputs[{}]", scene.points, inputs, parameters),
@@ -188,10 +190,15 @@ def _bodies(
 
 
 def _named(
-    table: AnyTable, prefix: str, place: str, known: dict[str, float], parameters: list[Parameter]
+    table: AnyTable,
+    prefix: str,
+    place: str,
+    known: dict[str, float],
+    parameters: list[Parameter],
+    motion: Sequence[str] = (),
 ) -> AnyTable:
     """A table with its bare numbers as parameters, which are added to `parameters`."""
-    fields, new = name_quantities(table, prefix, place, known)
+    fields, new = name_quantities(table, prefix, place, known, motion)
     parameters += new
     return table.replaced(**fields)
 
@@ -233,33 +240,53 @@ def _points(
 def _effects(
     scene: Scene, bodies: Sequence[Body], known: dict[str, float], parameters: list[Parameter]
 ) -> list[Effect]:
+    """Effects with bodies and joints that there are, and vectors of the right length."""
     names = [body.name for body in bodies]
     driven = [b.joint.name for b in bodies if isinstance(b.joint, Revolute | Prismatic)]
     _check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
+    motion = ["t", *(c.name for b in bodies for c in (*b.positions, *b.velocities))]
+    for effect in scene.effects:
+        motion += [i.name for i in effect.inputs(scene.dimensions)]
+        motion += [x.name for x in effect.states(scene.dimensions)]
     effects: list[Effect] = []
     for i, effect in enumerate(scene.effects):
         place = f"effects[{i}]"
-        match effect:
-            case Gravity() if any(isinstance(other, Gravity) for other in effects):
-                raise SceneError(f"{place}.type: a second 'gravity'; give one")
-            case ExternalForce():
-                _known_body(effect.body, f"{place}.body", names)
-                vectors: dict[str, tuple[Formula, ...]] = {
-                    "at": with_components(effect.at, ZERO, scene.dimensions, f"{place}.at")
-                }
-                if effect.force != "input":
-                    force = effect.force
-                    vectors["force"] = with_components(
-                        force, ZERO, scene.dimensions, f"{place}.force"
-                    )
-                effect = effect.replaced(**vectors)
-            case Motor() if effect.joint not in driven:
-                hint = nearest(effect.joint, driven) or f"; known: {_listed(driven) or 'none'}"
-                raise SceneError(
-                    f"{place}.joint: no revolute or prismatic joint is named '{effect.joint}'{hint}"
-                )
-        effects.append(_named(effect, effect.name, place, known, parameters))
+        if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
+            raise SceneError(f"{place}.type: a second 'gravity'; give one")
+        for name, spot in _names_of(effect, effect.body_fields, place):
+            _known_body(name, spot, names)
+        for name, spot in _names_of(effect, effect.anchor_fields, place):
+            _known_body(name, spot, [WORLD, *names])
+        for name, spot in _names_of(effect, effect.joint_fields, place):
+            _known_joint(name, spot, driven)
+        vectors = {
+            field: with_components(value, ZERO, scene.dimensions, f"{place}.{field}")
+            for field in effect.vector_fields
+            if isinstance(value := getattr(effect, field), tuple)
+        }
+        effect = effect.replaced(**vectors).checked(scene.dimensions, place)
+        effects.append(_named(effect, effect.name, place, known, parameters, motion))
+        effect.check_values(lambda formula: float(evaluate(formula, known, Floats())), place)
     return effects
+
+
+def _names_of(effect: Effect, fields: Sequence[str], place: str) -> Iterator[tuple[str, str]]:
+    """Each name in some fields, of which some list names or hold tables by them, and its place."""
+    for field in fields:
+        value = getattr(effect, field)
+        if isinstance(value, str):
+            if (field, value) != ("bodies", "all"):
+                yield value, f"{place}.{field}"
+        elif isinstance(value, dict):
+            yield from ((name, f"{place}.{field}.{name}") for name in value)
+        elif value is not None:
+            yield from ((name, f"{place}.{field}[{i}]") for i, name in enumerate(value))
+
+
+def _known_joint(name: str, place: str, driven: Sequence[str]) -> None:
+    if name not in driven:
+        hint = nearest(name, driven) or f"; known: {_listed(driven) or 'none'}"
+        raise SceneError(f"{place}: no revolute or prismatic joint is named '{name}'{hint}")
 
 
 def _check_symbols(
@@ -267,6 +294,7 @@ def _check_symbols(
     coordinates: Sequence[Coordinate],
     velocities: Sequence[Coordinate],
     inputs: Sequence[Input],
+    states: Sequence[ExtraState],
 ) -> None:
     """No name may stand for two things in the equations."""
     taken = {"t": "time", "pi": "the number π"}
@@ -275,6 +303,7 @@ def _check_symbols(
     uses += [(c.name, "a velocity") for c in velocities]
     uses += [(c.acceleration, "an acceleration") for c in velocities]
     uses += [(i.name, "an input") for i in inputs]
+    uses += [(x.name, "a state") for x in states]
     for name, use in uses:
         if name in taken:
             other = "another" if use == taken[name] else taken[name]

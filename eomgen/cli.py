@@ -77,6 +77,10 @@ def _parser() -> argparse.ArgumentParser:
         ("view", commands.view, "integrate, and open the moving picture"),
     ):
         _simulation(_code(_form(command(name, run, about))))
+    costing = command("effects", commands.effects, "say what each effect costs")
+    _route(costing)
+    costing.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
+    _force(costing)
     _linearisation(command("linearise", commands.linearise, "A, B and modes about an equilibrium"))
     return parser
 

@@ -6,7 +6,7 @@ from itertools import accumulate
 from typing import TypeGuard
 
 from eomgen.effects import Effect
-from eomgen.effects.base import Input
+from eomgen.effects.base import ExtraState, Input
 from eomgen.joints import Joint, Revolute
 from eomgen.joints.base import Coordinate
 from eomgen.language.formula import Constant, Floats, Formula, evaluate
@@ -52,6 +52,7 @@ class Point:
 class Model:
     """A mechanism with everything that acts on it; see `build_model`.
 
+    `states` are those that effects bring along, after coordinates and velocities.
     `notices` say what was put right on the way, a line each.
     """
 
@@ -63,6 +64,7 @@ class Model:
     bodies: tuple[Body, ...]
     points: tuple[Point, ...]
     effects: tuple[Effect, ...]
+    states: tuple[ExtraState, ...]
     initial_q: tuple[float, ...]
     initial_v: tuple[float, ...]
     outputs: tuple[str, ...]

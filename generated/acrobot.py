@@ -31,7 +31,7 @@ columns of an array (4, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -75,6 +75,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity', 'motor')
+EFFECT_NAMES = ('gravity', 'tau')
 BODIES = ('upper', 'lower')
 JOINTS = ('shoulder', 'elbow')
 POINTS = ('feet',)
@@ -91,6 +92,7 @@ COST = {
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 11, "mul": 20, "sin": 2, "cos": 2, "total": 35, "parameters": 5},
     "potential_energy": {"add": 1, "sub": 3, "mul": 5, "cos": 2, "total": 11, "parameters": 3},
+    "effect_powers": {"add": 5, "sub": 1, "mul": 8, "neg": 1, "sin": 2, "total": 17, "parameters": 3},
     "momentum": {"add": 14, "sub": 3, "mul": 28, "sin": 2, "cos": 2, "total": 49, "parameters": 2},
     "centre_of_mass": {"add": 4, "sub": 3, "mul": 12, "sin": 2, "cos": 2, "total": 23, "parameters": 4},
     "joint_forces": {"add": 11, "sub": 9, "mul": 30, "div": 1, "neg": 3, "sin": 3, "cos": 3, "total": 60, "parameters": 36},
@@ -193,6 +195,7 @@ def _constants(values):
         "applied_force": (),
         "kinetic_energy": (c_1, c_2, k12, k13, k14, k15, k16),
         "potential_energy": (c_1, c_2, k17, k18, k19),
+        "effect_powers": (c_1, c_2, k15, k18, k19),
         "momentum": (m_1, m_2, I_1, I_2, c_1, c_2, k17, k15),
         "centre_of_mass": (m_1, m_2, c_1, c_2, k17, k15, k20),
         "joint_forces": (k1, k2, k21, k3, k22, k4, k5, k6, k7, k18, k23, k24),
@@ -416,6 +419,21 @@ def _potential_energy(y, k, u=(), extra=(), cos=cos):
     )
 
 
+def _effect_powers(y, k, u=(), extra=(), sin=sin):
+    """17 operations: 5 add, 1 sub, 8 mul, 1 neg, 2 sin."""
+    c_1, c_2, k15, k18, k19 = k
+    theta_1, theta_2, theta_1_dot, theta_2_dot = y
+    tau, = u
+    omega_lower = theta_1_dot + theta_2_dot
+    s20 = theta_1_dot * sin(theta_1)
+    yd_upper = c_1 * s20
+    s23 = (s20 * k15 + (yd_upper + c_2 * (sin(theta_1 + theta_2) * omega_lower))) * k18
+    return (
+        -(s23 + yd_upper * k19),
+        tau * (omega_lower - theta_1_dot),
+    )
+
+
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """49 operations: 14 add, 3 sub, 28 mul, 2 sin, 2 cos."""
     m_1, m_2, I_1, I_2, c_1, c_2, k17, k15 = k
@@ -434,12 +452,12 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     yd_lower = s20 * k15 + (yd_upper + c_2 * (sin_theta_1_theta_2 * omega_lower))
     s22 = c_1 * cos_theta_1
     x_upper = c_1 * sin_theta_1
-    s23 = yd_lower * (sin_theta_1 * k15 + (x_upper + c_2 * sin_theta_1_theta_2)) - xd_lower * (cos_theta_1 * k17 - s22 - c_2 * cos_theta_1_theta_2)
-    s24 = m_1 * (yd_upper * x_upper + xd_upper * s22) + (I_2 * omega_lower + I_1 * theta_1_dot)
+    s24 = yd_lower * (sin_theta_1 * k15 + (x_upper + c_2 * sin_theta_1_theta_2)) - xd_lower * (cos_theta_1 * k17 - s22 - c_2 * cos_theta_1_theta_2)
+    s25 = m_1 * (yd_upper * x_upper + xd_upper * s22) + (I_2 * omega_lower + I_1 * theta_1_dot)
     return (
         m_2 * xd_lower + m_1 * xd_upper,
         m_2 * yd_lower + m_1 * yd_upper,
-        m_2 * s23 + s24,
+        m_2 * s24 + s25,
     )
 
 
@@ -477,18 +495,18 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     alpha_lower = k5 * (load_lower - coupling_lower_upper * alpha_upper)
     cos_theta_1_theta_2 = cos(s2)
     cos_theta_1 = cos(theta_1)
-    s25 = theta_1_dot_squared * sin_theta_1 - alpha_upper * cos_theta_1
-    s26 = sin_theta_1_theta_2 * omega_lower_squared - alpha_lower * cos_theta_1_theta_2
-    s27 = k22 * s26
-    s28 = sin_theta_1 * alpha_upper + theta_1_dot_squared * cos_theta_1
-    s29 = sin_theta_1_theta_2 * alpha_lower + omega_lower_squared * cos_theta_1_theta_2
-    s30 = k22 * s29
+    s26 = theta_1_dot_squared * sin_theta_1 - alpha_upper * cos_theta_1
+    s27 = sin_theta_1_theta_2 * omega_lower_squared - alpha_lower * cos_theta_1_theta_2
+    s28 = k22 * s27
+    s29 = sin_theta_1 * alpha_upper + theta_1_dot_squared * cos_theta_1
+    s30 = sin_theta_1_theta_2 * alpha_lower + omega_lower_squared * cos_theta_1_theta_2
+    s31 = k22 * s30
     return (
-        k23 * s25 + s27,
-        -(s30 + (k24 + k23 * s28)),
+        k23 * s26 + s28,
+        -(s31 + (k24 + k23 * s29)),
         0.0,
-        s27 + k21 * s25,
-        -(k21 * s28 + (k18 + s30)),
+        s28 + k21 * s26,
+        -(k21 * s29 + (k18 + s31)),
         -tau,
     )
 
@@ -539,11 +557,11 @@ def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
     s2 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     cos_theta_1 = cos(theta_1)
-    s31 = c_2 * cos(s2)
-    s32 = c_2 * sin(s2)
+    s32 = c_2 * cos(s2)
+    s33 = c_2 * sin(s2)
     return (
-        s32 + (sin_theta_1 * k15 + (c_1 * sin_theta_1 + s32)),
-        cos_theta_1 * k17 - c_1 * cos_theta_1 - s31 - s31,
+        s33 + (sin_theta_1 * k15 + (c_1 * sin_theta_1 + s33)),
+        cos_theta_1 * k17 - c_1 * cos_theta_1 - s32 - s32,
     )
 
 
@@ -555,11 +573,11 @@ def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     omega_lower = theta_1_dot + theta_2_dot
     s19 = theta_1_dot * cos(theta_1)
     s20 = theta_1_dot * sin(theta_1)
-    s33 = c_2 * (omega_lower * cos(s2))
-    s34 = c_2 * (sin(s2) * omega_lower)
+    s34 = c_2 * (omega_lower * cos(s2))
+    s35 = c_2 * (sin(s2) * omega_lower)
     return (
-        s33 + (s19 * k15 + (c_1 * s19 + s33)),
-        s34 + (s20 * k15 + (c_1 * s20 + s34)),
+        s34 + (s19 * k15 + (c_1 * s19 + s34)),
+        s35 + (s20 * k15 + (c_1 * s20 + s35)),
     )
 
 
@@ -570,13 +588,13 @@ def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     s2 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     cos_theta_1 = cos(theta_1)
-    s31 = c_2 * cos(s2)
-    s32 = c_2 * sin(s2)
+    s32 = c_2 * cos(s2)
+    s33 = c_2 * sin(s2)
     return (
-        s31 + (cos_theta_1 * k15 + (c_1 * cos_theta_1 + s31)),
-        s31 + s31,
-        s32 + (sin_theta_1 * k15 + (c_1 * sin_theta_1 + s32)),
+        s32 + (cos_theta_1 * k15 + (c_1 * cos_theta_1 + s32)),
         s32 + s32,
+        s33 + (sin_theta_1 * k15 + (c_1 * sin_theta_1 + s33)),
+        s33 + s33,
     )
 
 
@@ -586,12 +604,12 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     _, theta_2, _, _ = y
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
-    s35 = (-1.0 - coupling_lower_upper * k5) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    s36 = (-1.0 - coupling_lower_upper * k5) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         0.0,
         0.0,
-        s35,
-        k5 * (1.0 - coupling_lower_upper * s35) - s35,
+        s36,
+        k5 * (1.0 - coupling_lower_upper * s36) - s36,
     )
 
 
@@ -601,40 +619,40 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
-    s36 = sin_theta_2 * sin_theta_2
-    pivot_upper = k1 + s36 * k2
+    s37 = sin_theta_2 * sin_theta_2
+    pivot_upper = k1 + s37 * k2
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
     sin_theta_1_theta_2 = sin(theta_1 + theta_2)
     s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
     load_lower = tau - sin_theta_1_theta_2 * k4 - k3 * s15
-    s37 = coupling_lower_upper * load_lower
+    s38 = coupling_lower_upper * load_lower
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    s38 = sin_theta_2 * (omega_lower * omega_lower)
-    alpha_upper = (k3 * s38 - tau - k5 * s37 - sin_theta_1 * k6 - sin_theta_1 * k7) / pivot_upper
-    s39 = load_lower - coupling_lower_upper * alpha_upper
-    s40 = (sin_theta_1 * k28 + alpha_upper * k27) / pivot_upper
-    s41 = cos_theta_2 * k26
-    s42 = sin_theta_1_theta_2 * k31 + s15 * k26
-    s43 = s38 * k26 - (k5 * (load_lower * s41 - coupling_lower_upper * s42) - s37 * k32)
-    s44 = (s43 - sin_theta_1 * k33 - alpha_upper * (k29 + s36 * k30)) / pivot_upper
-    s45 = s39 * k32 + k5 * (s42 + (alpha_upper * s41 + coupling_lower_upper * s44))
-    s46 = alpha_upper * k34 / pivot_upper
-    s47 = (s37 * k37 - alpha_upper * (k35 - s36 * k36)) / pivot_upper
-    s48 = cos_theta_2 * k22
-    s49 = k22 * s15
-    s50 = k22 * s38 - k5 * (load_lower * s48 - coupling_lower_upper * s49) - sin_theta_1 * k18
-    s51 = (s50 - alpha_upper * (k38 + s36 * k39)) / pivot_upper
-    s52 = (sin_theta_1 * k19 + alpha_upper * k40) / pivot_upper
-    s53 = cos_theta_2 * k21
-    s54 = sin_theta_1_theta_2 * k18 + k21 * s15
-    s55 = k21 * s38 - (k5 * (load_lower * s53 - coupling_lower_upper * s54) - s37 * k43)
-    s56 = (s55 - alpha_upper * (k41 + s36 * k42)) / pivot_upper
-    s57 = s39 * k43 + k5 * (s54 + (alpha_upper * s53 + coupling_lower_upper * s56))
-    s58 = sin_theta_1_theta_2 * k22
-    s59 = k5 * (coupling_lower_upper * s58) - sin_theta_1 * k25 - k21 * sin_theta_1
-    s60 = s59 / pivot_upper
+    s39 = sin_theta_2 * (omega_lower * omega_lower)
+    alpha_upper = (k3 * s39 - tau - k5 * s38 - sin_theta_1 * k6 - sin_theta_1 * k7) / pivot_upper
+    s40 = load_lower - coupling_lower_upper * alpha_upper
+    s41 = (sin_theta_1 * k28 + alpha_upper * k27) / pivot_upper
+    s42 = cos_theta_2 * k26
+    s43 = sin_theta_1_theta_2 * k31 + s15 * k26
+    s44 = s39 * k26 - (k5 * (load_lower * s42 - coupling_lower_upper * s43) - s38 * k32)
+    s45 = (s44 - sin_theta_1 * k33 - alpha_upper * (k29 + s37 * k30)) / pivot_upper
+    s46 = s40 * k32 + k5 * (s43 + (alpha_upper * s42 + coupling_lower_upper * s45))
+    s47 = alpha_upper * k34 / pivot_upper
+    s48 = (s38 * k37 - alpha_upper * (k35 - s37 * k36)) / pivot_upper
+    s49 = cos_theta_2 * k22
+    s50 = k22 * s15
+    s51 = k22 * s39 - k5 * (load_lower * s49 - coupling_lower_upper * s50) - sin_theta_1 * k18
+    s52 = (s51 - alpha_upper * (k38 + s37 * k39)) / pivot_upper
+    s53 = (sin_theta_1 * k19 + alpha_upper * k40) / pivot_upper
+    s54 = cos_theta_2 * k21
+    s55 = sin_theta_1_theta_2 * k18 + k21 * s15
+    s56 = k21 * s39 - (k5 * (load_lower * s54 - coupling_lower_upper * s55) - s38 * k43)
+    s57 = (s56 - alpha_upper * (k41 + s37 * k42)) / pivot_upper
+    s58 = s40 * k43 + k5 * (s55 + (alpha_upper * s54 + coupling_lower_upper * s57))
+    s59 = sin_theta_1_theta_2 * k22
+    s60 = k5 * (coupling_lower_upper * s59) - sin_theta_1 * k25 - k21 * sin_theta_1
+    s61 = s60 / pivot_upper
     return (
         0.0,
         0.0,
@@ -652,22 +670,22 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        -s40,
-        s44,
-        -s46,
-        s47,
-        s51,
-        -s52,
-        s56,
-        s60,
-        s40 + k5 * (coupling_lower_upper * s40),
-        -(s44 + s45),
-        s46 + k5 * (coupling_lower_upper * s46),
-        -(s47 + (s39 * k37 + k5 * (coupling_lower_upper * s47))),
-        -(s51 + k5 * (s49 + (alpha_upper * s48 + coupling_lower_upper * s51))),
-        s52 + k5 * (coupling_lower_upper * s52),
-        -(s56 + s57),
-        -(s60 + k5 * (s58 + coupling_lower_upper * s60)),
+        -s41,
+        s45,
+        -s47,
+        s48,
+        s52,
+        -s53,
+        s57,
+        s61,
+        s41 + k5 * (coupling_lower_upper * s41),
+        -(s45 + s46),
+        s47 + k5 * (coupling_lower_upper * s47),
+        -(s48 + (s40 * k37 + k5 * (coupling_lower_upper * s48))),
+        -(s52 + k5 * (s50 + (alpha_upper * s49 + coupling_lower_upper * s52))),
+        s53 + k5 * (coupling_lower_upper * s53),
+        -(s57 + s58),
+        -(s61 + k5 * (s59 + coupling_lower_upper * s61)),
     )
 
 
@@ -707,7 +725,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 2
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -817,6 +838,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), ('cos',), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (2,), ('sin',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

@@ -29,7 +29,7 @@ columns of an array (4, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -73,6 +73,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity',)
+EFFECT_NAMES = ('gravity',)
 BODIES = ('A', 'B')
 JOINTS = ('swing', 'twist')
 POINTS = ()
@@ -90,6 +91,7 @@ COST = {
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 3, "mul": 11, "sin": 1, "cos": 1, "total": 16, "parameters": 9},
     "potential_energy": {"sub": 1, "mul": 4, "cos": 1, "total": 6, "parameters": 4},
+    "effect_powers": {"add": 1, "sub": 1, "mul": 10, "sin": 2, "cos": 1, "total": 15, "parameters": 4},
     "momentum": {"add": 5, "sub": 6, "mul": 29, "sin": 2, "cos": 2, "total": 44, "parameters": 9},
     "centre_of_mass": {"sub": 2, "mul": 8, "div": 2, "sin": 1, "cos": 1, "total": 14, "parameters": 3},
     "joint_forces": {"add": 42, "sub": 27, "mul": 132, "div": 1, "neg": 11, "sin": 2, "cos": 2, "total": 217, "parameters": 19},
@@ -160,6 +162,7 @@ def _constants(values):
         "applied_force": (),
         "kinetic_energy": (I_Bz, inertia_A_xx, inertia_B_xx, inertia_B_yy),
         "potential_energy": (l_A, k15, k17, k19),
+        "effect_powers": (l_A, k15, k17, k19),
         "momentum": (I_Bz, k20, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy),
         "centre_of_mass": (m_A, m_B, l_A, k19, k21),
         "joint_forces": (m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k3, k4, k5, k6, k19),
@@ -386,6 +389,19 @@ def _potential_energy(y, k, u=(), extra=(), cos=cos):
     )
 
 
+def _effect_powers(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """15 operations: 1 add, 1 sub, 10 mul, 2 sin, 1 cos."""
+    l_A, k15, k17, k19 = k
+    q_A, q_B, q_A_dot, _ = y
+    cos_q_B = cos(q_B)
+    sin_q_B = sin(q_B)
+    sin_q_A = sin(q_A)
+    s15 = sin_q_A * k19 * (cos_q_B * (q_A_dot * cos_q_B) + sin_q_B * (q_A_dot * sin_q_B))
+    return (
+        k17 * s15 - k15 * (q_A_dot * (l_A * sin_q_A)),
+    )
+
+
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """44 operations: 5 add, 6 sub, 29 mul, 2 sin, 2 cos."""
     I_Bz, k20, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy = k
@@ -394,25 +410,25 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
     cos_q_A = cos(q_A)
-    s15 = sin_q_B * cos_q_A
-    s16 = cos_q_B * cos_q_A
-    s17 = sin_q_B * sin_q_A
-    s18 = cos_q_B * sin_q_A
+    s16 = sin_q_B * cos_q_A
+    s17 = cos_q_B * cos_q_A
+    s18 = sin_q_B * sin_q_A
+    s19 = cos_q_B * sin_q_A
     omega_B_x = q_A_dot * cos_q_B
     s13 = q_A_dot * sin_q_B
-    s19 = q_A_dot * k20
-    s20 = inertia_B_xx * omega_B_x
-    s21 = inertia_B_yy * s13
-    s22 = I_Bz * q_B_dot
-    s23 = moment_B_z * s13
-    s24 = moment_B_z * omega_B_x
+    s20 = q_A_dot * k20
+    s21 = inertia_B_xx * omega_B_x
+    s22 = inertia_B_yy * s13
+    s23 = I_Bz * q_B_dot
+    s24 = moment_B_z * s13
+    s25 = moment_B_z * omega_B_x
     return (
-        sin_q_B * s24 - cos_q_B * s23,
-        cos_q_A * s19 - (s15 * s23 + s16 * s24),
-        sin_q_A * s19 - (s17 * s23 + s18 * s24),
-        q_A_dot * inertia_A_xx + (cos_q_B * s20 + sin_q_B * s21),
-        s15 * s20 - s16 * s21 - sin_q_A * s22,
-        s17 * s20 - s18 * s21 + cos_q_A * s22,
+        sin_q_B * s25 - cos_q_B * s24,
+        cos_q_A * s20 - (s16 * s24 + s17 * s25),
+        sin_q_A * s20 - (s18 * s24 + s19 * s25),
+        q_A_dot * inertia_A_xx + (cos_q_B * s21 + sin_q_B * s22),
+        s16 * s21 - s17 * s22 - sin_q_A * s23,
+        s18 * s21 - s19 * s22 + cos_q_A * s23,
     )
 
 
@@ -441,74 +457,74 @@ def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
     q_A_dot_squared = q_A_dot * q_A_dot
     q_B_ddot = k4 * (s1 * q_A_dot_squared) * k6
     cos_q_A = cos(q_A)
-    s15 = sin_q_B * cos_q_A
-    s16 = cos_q_B * cos_q_A
-    s17 = sin_q_B * sin_q_A
-    s18 = cos_q_B * sin_q_A
+    s16 = sin_q_B * cos_q_A
+    s17 = cos_q_B * cos_q_A
+    s18 = sin_q_B * sin_q_A
+    s19 = cos_q_B * sin_q_A
     omega_B_x = q_A_dot * cos_q_B
     s13 = q_A_dot * sin_q_B
-    s25 = sin_q_A * k19
-    s26 = cos_q_A * k19
+    s26 = sin_q_A * k19
+    s27 = cos_q_A * k19
+    s28 = cos_q_B * omega_B_x + sin_q_B * s13
+    s29 = s16 * omega_B_x - s17 * s13 - q_B_dot * sin_q_A
+    s30 = s18 * omega_B_x - s19 * s13 + q_B_dot * cos_q_A
     a_A_y = g * sin_q_A
     a_A_z = g * cos_q_A
-    s27 = q_B_dot * s13
-    s28 = q_B_dot * omega_B_x
-    s29 = cos_q_B * s2 + s27
-    s30 = sin_q_B * s2 - s28
-    s31 = a_A_y - l_A * s2
-    s32 = a_A_z + l_A * q_A_dot_squared
-    s33 = m_A * (cos_q_A * s31 - sin_q_A * s32)
-    s34 = m_A * (sin_q_A * s31 + cos_q_A * s32)
-    s35 = cos_q_B * omega_B_x + sin_q_B * s13
-    s36 = s15 * omega_B_x - s16 * s13 - q_B_dot * sin_q_A
-    s37 = s17 * omega_B_x - s18 * s13 + q_B_dot * cos_q_A
-    s38 = sin_q_B * a_A_y + k19 * (s28 + s30)
-    s39 = cos_q_B * a_A_y + k19 * (s29 - s27)
-    s40 = a_A_z - k19 * (omega_B_x * omega_B_x + s13 * s13)
-    s41 = cos_q_B * s29 + sin_q_B * s30
-    s42 = s16 * s30 - s15 * s29 - sin_q_A * q_B_ddot
-    s43 = s18 * s30 - s17 * s29 + q_B_ddot * cos_q_A
-    s44 = I_Bx * cos_q_B
-    s45 = I_By * sin_q_B
-    s46 = I_Bx * s15
-    s47 = I_By * s16
-    s48 = I_Bz * sin_q_A
-    s49 = I_Bx * s17
-    s50 = I_By * s18
-    s51 = I_Bz * cos_q_A
-    s52 = cos_q_B * s44 + sin_q_B * s45
-    s53 = s15 * s44 - s16 * s45
-    s54 = s17 * s44 - s18 * s45
-    s55 = cos_q_B * s46 - sin_q_B * s47
-    s56 = s15 * s46 + s16 * s47 + sin_q_A * s48
-    s57 = s17 * s46 + s18 * s47 - cos_q_A * s48
-    s58 = cos_q_B * s49 - sin_q_B * s50
-    s59 = s15 * s49 + s16 * s50 - sin_q_A * s51
-    s60 = s17 * s49 + s18 * s50 + cos_q_A * s51
-    s61 = m_B * (cos_q_B * s38 - sin_q_B * s39)
-    s62 = m_B * (s15 * s38 + s16 * s39 - sin_q_A * s40)
-    s63 = m_B * (s17 * s38 + s18 * s39 + cos_q_A * s40)
-    s64 = s35 * s52 + s36 * s53 + s37 * s54
-    s65 = s35 * s55 + s36 * s56 + s37 * s57
-    s66 = s35 * s58 + s36 * s59 + s37 * s60
-    s67 = s42 * s53 - s41 * s52 + s43 * s54 + (s36 * s66 - s37 * s65)
-    s68 = s42 * s56 - s41 * s55 + s43 * s57 + (s37 * s64 - s35 * s66)
-    s69 = s42 * s59 - s41 * s58 + s43 * s60 + (s35 * s65 - s36 * s64)
-    s70 = l_A * sin_q_A * s34 + l_A * cos_q_A * s33 - I_A * s2 + (s67 - (s25 * s63 + s26 * s62))
-    s71 = -s61
+    s31 = q_B_dot * s13
+    s32 = q_B_dot * omega_B_x
+    s33 = cos_q_B * s2 + s31
+    s34 = sin_q_B * s2 - s32
+    s35 = a_A_y - l_A * s2
+    s36 = a_A_z + l_A * q_A_dot_squared
+    s37 = m_A * (cos_q_A * s35 - sin_q_A * s36)
+    s38 = m_A * (sin_q_A * s35 + cos_q_A * s36)
+    s39 = sin_q_B * a_A_y + k19 * (s32 + s34)
+    s40 = cos_q_B * a_A_y + k19 * (s33 - s31)
+    s41 = a_A_z - k19 * (omega_B_x * omega_B_x + s13 * s13)
+    s42 = cos_q_B * s33 + sin_q_B * s34
+    s43 = s17 * s34 - s16 * s33 - sin_q_A * q_B_ddot
+    s44 = s19 * s34 - s18 * s33 + q_B_ddot * cos_q_A
+    s45 = I_Bx * cos_q_B
+    s46 = I_By * sin_q_B
+    s47 = I_Bx * s16
+    s48 = I_By * s17
+    s49 = I_Bz * sin_q_A
+    s50 = I_Bx * s18
+    s51 = I_By * s19
+    s52 = I_Bz * cos_q_A
+    s53 = cos_q_B * s45 + sin_q_B * s46
+    s54 = s16 * s45 - s17 * s46
+    s55 = s18 * s45 - s19 * s46
+    s56 = cos_q_B * s47 - sin_q_B * s48
+    s57 = s16 * s47 + s17 * s48 + sin_q_A * s49
+    s58 = s18 * s47 + s19 * s48 - cos_q_A * s49
+    s59 = cos_q_B * s50 - sin_q_B * s51
+    s60 = s16 * s50 + s17 * s51 - sin_q_A * s52
+    s61 = s18 * s50 + s19 * s51 + cos_q_A * s52
+    s62 = m_B * (cos_q_B * s39 - sin_q_B * s40)
+    s63 = m_B * (s16 * s39 + s17 * s40 - sin_q_A * s41)
+    s64 = m_B * (s18 * s39 + s19 * s40 + cos_q_A * s41)
+    s65 = s28 * s53 + s29 * s54 + s30 * s55
+    s66 = s28 * s56 + s29 * s57 + s30 * s58
+    s67 = s28 * s59 + s29 * s60 + s30 * s61
+    s68 = s43 * s54 - s42 * s53 + s44 * s55 + (s29 * s67 - s30 * s66)
+    s69 = s43 * s57 - s42 * s56 + s44 * s58 + (s30 * s65 - s28 * s67)
+    s70 = s43 * s60 - s42 * s59 + s44 * s61 + (s28 * s66 - s29 * s65)
+    s71 = l_A * sin_q_A * s38 + l_A * cos_q_A * s37 - I_A * s2 + (s68 - (s26 * s64 + s27 * s63))
+    s72 = -s62
     return (
-        s71,
-        -(s33 + s62),
-        -(s34 + s63),
-        -s70,
-        -(s68 + s26 * s61),
-        -(s69 + s25 * s61),
-        s71,
-        -s62,
+        s72,
+        -(s37 + s63),
+        -(s38 + s64),
+        -s71,
+        -(s69 + s27 * s62),
+        -(s70 + s26 * s62),
+        s72,
         -s63,
-        -s67,
+        -s64,
         -s68,
         -s69,
+        -s70,
     )
 
 
@@ -519,7 +535,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
-    s72 = -sin_q_A
+    s73 = -sin_q_A
     cos_q_A = cos(q_A)
     return (
         1.0,
@@ -528,7 +544,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         cos_q_A,
-        s72,
+        s73,
         l_A * sin_q_A,
         0.0,
         sin_q_A,
@@ -540,7 +556,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         sin_q_B * cos_q_A,
         cos_q_B * cos_q_A,
-        s72,
+        s73,
         -sin_q_A * k19,
         sin_q_B * sin_q_A,
         cos_q_B * sin_q_A,
@@ -559,11 +575,11 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_q_A = cos(q_A)
     omega_B_x = q_A_dot * cos_q_B
     s13 = q_A_dot * sin_q_B
-    s25 = sin_q_A * k19
-    s26 = cos_q_A * k19
-    s35 = cos_q_B * omega_B_x + sin_q_B * s13
-    s36 = sin_q_B * cos_q_A * omega_B_x - cos_q_B * cos_q_A * s13 - q_B_dot * sin_q_A
-    s37 = sin_q_B * sin_q_A * omega_B_x - cos_q_B * sin_q_A * s13 + q_B_dot * cos_q_A
+    s26 = sin_q_A * k19
+    s27 = cos_q_A * k19
+    s28 = cos_q_B * omega_B_x + sin_q_B * s13
+    s29 = sin_q_B * cos_q_A * omega_B_x - cos_q_B * cos_q_A * s13 - q_B_dot * sin_q_A
+    s30 = sin_q_B * sin_q_A * omega_B_x - cos_q_B * sin_q_A * s13 + q_B_dot * cos_q_A
     return (
         0.0,
         q_A_dot * (l_A * cos_q_A),
@@ -571,12 +587,12 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
         q_A_dot,
         0.0,
         0.0,
-        s26 * s36 + s25 * s37,
-        -s26 * s35,
-        -s25 * s35,
-        s35,
-        s36,
-        s37,
+        s27 * s29 + s26 * s30,
+        -s27 * s28,
+        -s26 * s28,
+        s28,
+        s29,
+        s30,
     )
 
 
@@ -616,7 +632,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 2
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -721,6 +740,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), ('cos',), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (1,), ('cos', 'sin'), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

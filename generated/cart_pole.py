@@ -28,7 +28,7 @@ columns of an array (4, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -66,6 +66,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity', 'motor')
+EFFECT_NAMES = ('gravity', 'push')
 BODIES = ('cart', 'pole')
 JOINTS = ('rail', 'pin')
 POINTS = ('tip',)
@@ -84,6 +85,7 @@ COST = {
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 2, "mul": 8, "cos": 1, "total": 11, "parameters": 4},
     "potential_energy": {"mul": 2, "neg": 1, "cos": 1, "total": 4, "parameters": 1},
+    "effect_powers": {"mul": 4, "neg": 1, "sin": 1, "total": 6, "parameters": 1},
     "momentum": {"add": 4, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 3},
     "centre_of_mass": {"add": 2, "mul": 5, "div": 2, "neg": 1, "sin": 1, "cos": 1, "total": 12, "parameters": 1},
     "joint_forces": {"add": 10, "sub": 4, "mul": 22, "div": 1, "neg": 4, "sin": 1, "cos": 1, "total": 43, "parameters": 20},
@@ -162,6 +164,7 @@ def _constants(values):
         "applied_force": (),
         "kinetic_energy": (k4, k30, inertia_pole_zz),
         "potential_energy": (l, k31),
+        "effect_powers": (l, k31),
         "momentum": (m_cart, m_pole, k4, inertia_pole_zz),
         "centre_of_mass": (m_cart, m_pole, l, k30),
         "joint_forces": (m_cart, m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k6, k7, k32),
@@ -393,6 +396,17 @@ def _potential_energy(y, k, u=(), extra=(), cos=cos):
     )
 
 
+def _effect_powers(y, k, u=(), extra=(), sin=sin):
+    """6 operations: 4 mul, 1 neg, 1 sin."""
+    l, k31 = k
+    _, theta, x_dot, theta_dot = y
+    push, = u
+    return (
+        -k31 * (theta_dot * (l * sin(theta))),
+        x_dot * push,
+    )
+
+
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """15 operations: 4 add, 9 mul, 1 sin, 1 cos."""
     m_cart, m_pole, k4, inertia_pole_zz = k
@@ -537,7 +551,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 2
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -647,6 +664,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), ('cos',), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (2,), ('sin',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

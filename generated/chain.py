@@ -76,7 +76,7 @@ columns of an array (20, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -214,6 +214,7 @@ UNITS = {
     "gravity_g": "m/s^2",
 }
 EFFECTS = ('gravity',)
+EFFECT_NAMES = ('gravity',)
 BODIES = ('link_1', 'link_2', 'link_3', 'link_4', 'link_5', 'link_6', 'link_7', 'link_8', 'link_9', 'link_10')
 JOINTS = ('link_joint_1', 'link_joint_2', 'link_joint_3', 'link_joint_4', 'link_joint_5', 'link_joint_6', 'link_joint_7', 'link_joint_8', 'link_joint_9', 'link_joint_10')
 POINTS = ()
@@ -2384,7 +2385,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 10
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):

@@ -25,7 +25,7 @@ columns of an array (4, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -61,6 +61,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity',)
+EFFECT_NAMES = ('gravity',)
 BODIES = ('upper', 'lower')
 JOINTS = ('shoulder', 'elbow')
 POINTS = ()
@@ -77,6 +78,7 @@ COST = {
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 11, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 10},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 4},
+    "effect_powers": {"add": 5, "mul": 6, "neg": 1, "cos": 2, "total": 14, "parameters": 4},
     "momentum": {"add": 17, "mul": 24, "neg": 1, "sin": 2, "cos": 2, "total": 46, "parameters": 8},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 4},
     "joint_forces": {"add": 12, "sub": 6, "mul": 30, "div": 1, "sin": 3, "cos": 3, "total": 55, "parameters": 30},
@@ -164,6 +166,7 @@ def _constants(values):
         "applied_force": (),
         "kinetic_energy": (k12, k13, k14, k15, k16, k17),
         "potential_energy": (k12, k14, k18, k19),
+        "effect_powers": (k12, k14, k18, k19),
         "momentum": (m_1, m_2, k12, k14, k20, k21),
         "centre_of_mass": (m_1, m_2, k12, k14, k22),
         "joint_forces": (k1, k2, k23, k3, k4, k5, k6, k7, k18, k24, k25, k26),
@@ -375,6 +378,17 @@ def _potential_energy(y, k, u=(), extra=(), sin=sin):
     )
 
 
+def _effect_powers(y, k, u=(), extra=(), cos=cos):
+    """14 operations: 5 add, 6 mul, 1 neg, 2 cos."""
+    k12, k14, k18, k19 = k
+    theta_1, theta_2, theta_1_dot, theta_2_dot = y
+    yd_upper = k12 * (theta_1_dot * cos(theta_1))
+    yd_lower = k14 * (cos(theta_1 + theta_2) * (theta_1_dot + theta_2_dot)) + (yd_upper + yd_upper)
+    return (
+        -(yd_lower * k18 + yd_upper * k19),
+    )
+
+
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """46 operations: 17 add, 24 mul, 1 neg, 2 sin, 2 cos."""
     m_1, m_2, k12, k14, k20, k21 = k
@@ -575,7 +589,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 2
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -680,6 +697,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), ('sin',), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (1,), ('cos',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

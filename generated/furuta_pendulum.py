@@ -30,7 +30,7 @@ columns of an array (4, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -72,6 +72,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity', 'motor')
+EFFECT_NAMES = ('gravity', 'tau')
 BODIES = ('arm', 'pendulum')
 JOINTS = ('base', 'hinge')
 POINTS = ('tip',)
@@ -90,6 +91,7 @@ COST = {
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 6, "mul": 15, "sin": 1, "cos": 1, "total": 23, "parameters": 22},
     "potential_energy": {"mul": 2, "neg": 1, "cos": 1, "total": 4, "parameters": 2},
+    "effect_powers": {"add": 3, "sub": 4, "mul": 20, "neg": 1, "sin": 2, "cos": 2, "total": 32, "parameters": 4},
     "momentum": {"add": 12, "sub": 4, "mul": 35, "neg": 1, "sin": 2, "cos": 2, "total": 56, "parameters": 20},
     "centre_of_mass": {"add": 3, "sub": 1, "mul": 14, "div": 3, "neg": 1, "sin": 2, "cos": 2, "total": 26, "parameters": 4},
     "joint_forces": {"add": 47, "sub": 35, "mul": 135, "div": 1, "neg": 9, "sin": 2, "cos": 2, "total": 231, "parameters": 36},
@@ -166,15 +168,15 @@ def _constants(values):
     k28 = 1.0 / pivot_phi_dot
     k29 = k45 + (k31 + k44)
     k30 = g * k53 / 2.0
-    k35 = l_arm / 2.0
-    k36 = k35 + k35
+    k36 = l_arm / 2.0
+    k34 = k36 + k36
     k32 = l_pendulum / 2.0
-    moment_arm_x = m_arm * k35
-    inertia_arm_yy = k38 + k35 * moment_arm_x
-    moment_pendulum_x = m_pendulum * k36
-    k34 = m_pendulum * k32
-    inertia_pendulum_zz = k36 * moment_pendulum_x
-    k54 = k32 * k34
+    moment_arm_x = m_arm * k36
+    inertia_arm_yy = k38 + k36 * moment_arm_x
+    moment_pendulum_x = m_pendulum * k34
+    k35 = m_pendulum * k32
+    inertia_pendulum_zz = k34 * moment_pendulum_x
+    k54 = k32 * k35
     inertia_pendulum_xz = k32 * moment_pendulum_x
     inertia_pendulum_xx = k39 + k54
     inertia_pendulum_yy = k39 + (inertia_pendulum_zz + k54)
@@ -197,14 +199,15 @@ def _constants(values):
         "applied_force": (),
         "kinetic_energy": (k31, inertia_arm_yy, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
         "potential_energy": (k32, k33),
-        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k34, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
-        "centre_of_mass": (m_arm, m_pendulum, k35, k36, k32, k37),
-        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k35, k38, k36, k32, k39, k40),
-        "body_poses": (k35, k36, k32),
-        "body_velocities": (k35, k36, k32),
-        "point_positions": (k36, k41),
-        "point_velocities": (k36, k41),
-        "point_jacobians": (k36, k41),
+        "effect_powers": (k34, k32, k33),
+        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k35, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
+        "centre_of_mass": (m_arm, m_pendulum, k36, k34, k32, k37),
+        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k36, k38, k34, k32, k39, k40),
+        "body_poses": (k36, k34, k32),
+        "body_velocities": (k36, k34, k32),
+        "point_positions": (k34, k41),
+        "point_velocities": (k34, k41),
+        "point_jacobians": (k34, k41),
     }
 
 
@@ -462,56 +465,78 @@ def _potential_energy(y, k, u=(), extra=(), cos=cos):
     )
 
 
+def _effect_powers(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """32 operations: 3 add, 4 sub, 20 mul, 1 neg, 2 sin, 2 cos."""
+    k34, k32, k33 = k
+    theta, phi, theta_dot, phi_dot = y
+    tau, = u
+    sin_phi = sin(phi)
+    cos_phi = cos(phi)
+    cos_theta = cos(theta)
+    sin_theta = sin(theta)
+    s32 = sin_phi * sin_theta
+    s33 = sin_phi * cos_theta
+    omega_pendulum_y = theta_dot * sin_phi
+    omega_pendulum_z = theta_dot * cos_phi
+    s34 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s32 * omega_pendulum_z
+    s35 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s33 * omega_pendulum_z
+    s36 = (k34 * sin_theta + k32 * s33) * s34 - (k34 * cos_theta - k32 * s32) * s35
+    return (
+        -k33 * s36,
+        theta_dot * tau,
+    )
+
+
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """56 operations: 12 add, 4 sub, 35 mul, 1 neg, 2 sin, 2 cos."""
-    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k34, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
+    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k35, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s32 = cos_phi * sin_theta
-    s33 = sin_phi * sin_theta
-    s34 = cos_phi * cos_theta
-    s35 = sin_phi * cos_theta
+    s37 = cos_phi * sin_theta
+    s32 = sin_phi * sin_theta
+    s38 = cos_phi * cos_theta
+    s33 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
-    s36 = theta_dot * moment_arm_x
-    s37 = phi_dot * inertia_pendulum_xx + inertia_pendulum_xz * omega_pendulum_z
-    s38 = inertia_pendulum_yy * omega_pendulum_y
-    s39 = phi_dot * inertia_pendulum_xz + inertia_pendulum_zz * omega_pendulum_z
-    s40 = k34 * omega_pendulum_y
-    s41 = moment_pendulum_x * omega_pendulum_z + phi_dot * k34
-    s42 = moment_pendulum_x * omega_pendulum_y
+    s39 = theta_dot * moment_arm_x
+    s40 = phi_dot * inertia_pendulum_xx + inertia_pendulum_xz * omega_pendulum_z
+    s41 = inertia_pendulum_yy * omega_pendulum_y
+    s42 = phi_dot * inertia_pendulum_xz + inertia_pendulum_zz * omega_pendulum_z
+    s43 = k35 * omega_pendulum_y
+    s44 = moment_pendulum_x * omega_pendulum_z + phi_dot * k35
+    s45 = moment_pendulum_x * omega_pendulum_y
     return (
-        -(sin_theta * s36 + (cos_theta * s40 + s32 * s41 + s33 * s42)),
-        cos_theta * s36 + (s34 * s41 - sin_theta * s40 + s35 * s42),
-        sin_phi * s41 - cos_phi * s42,
-        cos_theta * s37 - s32 * s38 + s33 * s39,
-        sin_theta * s37 + s34 * s38 - s35 * s39,
-        theta_dot * inertia_arm_yy + (sin_phi * s38 + cos_phi * s39),
+        -(sin_theta * s39 + (cos_theta * s43 + s37 * s44 + s32 * s45)),
+        cos_theta * s39 + (s38 * s44 - sin_theta * s43 + s33 * s45),
+        sin_phi * s44 - cos_phi * s45,
+        cos_theta * s40 - s37 * s41 + s32 * s42,
+        sin_theta * s40 + s38 * s41 - s33 * s42,
+        theta_dot * inertia_arm_yy + (sin_phi * s41 + cos_phi * s42),
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     """26 operations: 3 add, 1 sub, 14 mul, 3 div, 1 neg, 2 sin, 2 cos."""
-    m_arm, m_pendulum, k35, k36, k32, k37 = k
+    m_arm, m_pendulum, k36, k34, k32, k37 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s43 = m_arm * (k35 * cos_theta) + m_pendulum * (k36 * cos_theta - k32 * (sin_phi * sin_theta))
-    s44 = m_arm * (k35 * sin_theta) + m_pendulum * (k36 * sin_theta + k32 * (sin_phi * cos_theta))
+    s46 = m_arm * (k36 * cos_theta) + m_pendulum * (k34 * cos_theta - k32 * (sin_phi * sin_theta))
+    s47 = m_arm * (k36 * sin_theta) + m_pendulum * (k34 * sin_theta + k32 * (sin_phi * cos_theta))
     return (
-        s43 / k37,
-        s44 / k37,
+        s46 / k37,
+        s47 / k37,
         -m_pendulum * (cos(phi) * k32) / k37,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """231 operations: 47 add, 35 sub, 135 mul, 1 div, 9 neg, 2 sin, 2 cos."""
-    m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k35, k38, k36, k32, k39, k40 = k
+    m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k36, k38, k34, k32, k39, k40 = k
     theta, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
@@ -524,110 +549,110 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     phi_ddot = theta_dot_squared * (sin_phi * cos_phi) - sin_phi * k6 - k7 * s14
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s32 = cos_phi * sin_theta
-    s33 = sin_phi * sin_theta
-    s34 = cos_phi * cos_theta
-    s35 = sin_phi * cos_theta
+    s37 = cos_phi * sin_theta
+    s32 = sin_phi * sin_theta
+    s38 = cos_phi * cos_theta
+    s33 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
-    s45 = k35 * cos_theta
-    s46 = k35 * sin_theta
-    s47 = k36 * cos_theta
-    s48 = k36 * sin_theta
-    s49 = cos_phi * k32
-    s50 = phi_dot * omega_pendulum_z
-    s51 = phi_dot * omega_pendulum_y
-    s52 = sin_phi * theta_ddot + s50
-    s53 = s14 - s51
+    s48 = k36 * cos_theta
+    s49 = k36 * sin_theta
+    s50 = k34 * cos_theta
+    s51 = k34 * sin_theta
+    s52 = cos_phi * k32
+    s34 = phi_dot * cos_theta - s37 * omega_pendulum_y + s32 * omega_pendulum_z
+    s35 = phi_dot * sin_theta + s38 * omega_pendulum_y - s33 * omega_pendulum_z
+    s53 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s54 = phi_dot * omega_pendulum_z
+    s55 = phi_dot * omega_pendulum_y
+    s56 = sin_phi * theta_ddot + s54
+    s57 = s14 - s55
     omega_pendulum_y_squared = omega_pendulum_y * omega_pendulum_y
-    s54 = theta_dot_squared * k35
-    s55 = theta_ddot * k35
-    s56 = m_arm * (cos_theta * s54 + sin_theta * s55)
-    s57 = m_arm * (cos_theta * s55 - sin_theta * s54)
-    s58 = phi_dot * cos_theta - s32 * omega_pendulum_y + s33 * omega_pendulum_z
-    s59 = phi_dot * sin_theta + s34 * omega_pendulum_y - s35 * omega_pendulum_z
-    s60 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s61 = k36 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k32 * (s50 + s52)
-    s62 = k36 * (s51 + s53) - k32 * (omega_pendulum_y * omega_pendulum_z - phi_ddot)
-    s63 = g * sin_phi + s62
-    s64 = g * cos_phi + (k36 * (s50 - s52) + k32 * (phi_dot_squared + omega_pendulum_y_squared))
-    s65 = phi_ddot * cos_theta - s32 * s52 + s33 * s53
-    s66 = phi_ddot * sin_theta + s34 * s52 - s35 * s53
-    s67 = sin_phi * s52 + cos_phi * s53
-    s68 = k39 * cos_theta
-    s69 = k39 * s32
-    s70 = k39 * sin_theta
-    s71 = k39 * s34
-    s72 = sin_phi * k39
-    s73 = cos_theta * s68 + s32 * s69
-    s74 = sin_theta * s68 - s34 * s69
-    s75 = sin_phi * s69
-    s76 = cos_theta * s70 - s32 * s71
-    s77 = sin_theta * s70 + s34 * s71
-    s78 = sin_phi * s71
-    s79 = s32 * s72
-    s80 = s34 * s72
-    s81 = sin_phi * s72
-    s82 = m_pendulum * (s33 * s64 - (cos_theta * s61 + s32 * s63))
-    s83 = m_pendulum * (s34 * s63 - sin_theta * s61 - s35 * s64)
-    s84 = m_pendulum * (sin_phi * s63 + cos_phi * s64)
-    s85 = s58 * s73 + s59 * s74 - s60 * s75
-    s86 = s58 * s76 + s59 * s77 + s60 * s78
-    s87 = s59 * s80 - s58 * s79 + s60 * s81
-    s88 = s65 * s76 + s66 * s77 + s67 * s78 + (s60 * s85 - s58 * s87)
-    s89 = s47 - k32 * s33 - s47
-    s90 = s48 + k32 * s35 - s48
-    s91 = s49 * s82 + s84 * s89
-    s92 = s65 * s73 + s66 * s74 - s67 * s75 + (s59 * s87 - s60 * s86) + (s84 * s90 + s49 * s83)
-    s93 = s66 * s80 - s65 * s79 + s67 * s81 + (s58 * s86 - s59 * s85) + (s83 * s89 - s82 * s90)
-    s94 = theta_ddot * k38 + (s45 * s57 + s46 * s56) + (s93 + (s47 * s83 - s48 * s82))
+    s58 = theta_dot_squared * k36
+    s59 = theta_ddot * k36
+    s60 = m_arm * (cos_theta * s58 + sin_theta * s59)
+    s61 = m_arm * (cos_theta * s59 - sin_theta * s58)
+    s62 = k34 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k32 * (s54 + s56)
+    s63 = k34 * (s55 + s57) - k32 * (omega_pendulum_y * omega_pendulum_z - phi_ddot)
+    s64 = g * sin_phi + s63
+    s65 = g * cos_phi + (k34 * (s54 - s56) + k32 * (phi_dot_squared + omega_pendulum_y_squared))
+    s66 = phi_ddot * cos_theta - s37 * s56 + s32 * s57
+    s67 = phi_ddot * sin_theta + s38 * s56 - s33 * s57
+    s68 = sin_phi * s56 + cos_phi * s57
+    s69 = k39 * cos_theta
+    s70 = k39 * s37
+    s71 = k39 * sin_theta
+    s72 = k39 * s38
+    s73 = sin_phi * k39
+    s74 = cos_theta * s69 + s37 * s70
+    s75 = sin_theta * s69 - s38 * s70
+    s76 = sin_phi * s70
+    s77 = cos_theta * s71 - s37 * s72
+    s78 = sin_theta * s71 + s38 * s72
+    s79 = sin_phi * s72
+    s80 = s37 * s73
+    s81 = s38 * s73
+    s82 = sin_phi * s73
+    s83 = m_pendulum * (s32 * s65 - (cos_theta * s62 + s37 * s64))
+    s84 = m_pendulum * (s38 * s64 - sin_theta * s62 - s33 * s65)
+    s85 = m_pendulum * (sin_phi * s64 + cos_phi * s65)
+    s86 = s34 * s74 + s35 * s75 - s53 * s76
+    s87 = s34 * s77 + s35 * s78 + s53 * s79
+    s88 = s35 * s81 - s34 * s80 + s53 * s82
+    s89 = s66 * s77 + s67 * s78 + s68 * s79 + (s53 * s86 - s34 * s88)
+    s90 = s50 - k32 * s32 - s50
+    s91 = s51 + k32 * s33 - s51
+    s92 = s52 * s83 + s85 * s90
+    s93 = s66 * s74 + s67 * s75 - s68 * s76 + (s35 * s88 - s53 * s87) + (s85 * s91 + s52 * s84)
+    s94 = s67 * s81 - s66 * s80 + s68 * s82 + (s34 * s87 - s35 * s86) + (s84 * s90 - s83 * s91)
+    s95 = theta_ddot * k38 + (s48 * s61 + s49 * s60) + (s94 + (s50 * s84 - s51 * s83))
     return (
-        s56 - s82,
-        -(s57 + s83),
-        -(k40 + s84),
-        -(k40 * s46 + (s92 + s48 * s84)),
-        k40 * s45 - (s88 - s91 - s47 * s84),
-        -s94,
-        -s82,
+        s60 - s83,
+        -(s61 + s84),
+        -(k40 + s85),
+        -(k40 * s49 + (s93 + s51 * s85)),
+        k40 * s48 - (s89 - s92 - s50 * s85),
+        -s95,
         -s83,
         -s84,
-        -s92,
-        s91 - s88,
+        -s85,
         -s93,
+        s92 - s89,
+        -s94,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
     """21 operations: 1 add, 1 sub, 11 mul, 4 neg, 2 sin, 2 cos."""
-    k35, k36, k32 = k
+    k36, k34, k32 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s33 = sin_phi * sin_theta
-    s35 = sin_phi * cos_theta
+    s32 = sin_phi * sin_theta
+    s33 = sin_phi * cos_theta
     return (
         cos_theta,
         -sin_theta,
         0.0,
-        k35 * cos_theta,
+        k36 * cos_theta,
         sin_theta,
         cos_theta,
         0.0,
-        k35 * sin_theta,
+        k36 * sin_theta,
         0.0,
         0.0,
         1.0,
         0.0,
         cos_theta,
         -cos_phi * sin_theta,
-        s33,
-        k36 * cos_theta - k32 * s33,
+        s32,
+        k34 * cos_theta - k32 * s32,
         sin_theta,
         cos_phi * cos_theta,
-        -s35,
-        k36 * sin_theta + k32 * s35,
+        -s33,
+        k34 * sin_theta + k32 * s33,
         0.0,
         sin_phi,
         cos_phi,
@@ -637,94 +662,94 @@ def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """45 operations: 6 add, 4 sub, 29 mul, 2 neg, 2 sin, 2 cos."""
-    k35, k36, k32 = k
+    k36, k34, k32 = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s33 = sin_phi * sin_theta
-    s35 = sin_phi * cos_theta
+    s32 = sin_phi * sin_theta
+    s33 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
-    s95 = k36 * cos_theta - k32 * s33
-    s96 = k36 * sin_theta + k32 * s35
-    s49 = cos_phi * k32
-    s58 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s33 * omega_pendulum_z
-    s59 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s35 * omega_pendulum_z
-    s60 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s96 = k34 * cos_theta - k32 * s32
+    s97 = k34 * sin_theta + k32 * s33
+    s52 = cos_phi * k32
+    s34 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s32 * omega_pendulum_z
+    s35 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s33 * omega_pendulum_z
+    s53 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
     return (
-        -theta_dot * (k35 * sin_theta),
-        theta_dot * (k35 * cos_theta),
+        -theta_dot * (k36 * sin_theta),
+        theta_dot * (k36 * cos_theta),
         0.0,
         0.0,
         0.0,
         theta_dot,
-        -(s49 * s59 + s96 * s60),
-        s95 * s60 + s49 * s58,
-        s96 * s58 - s95 * s59,
-        s58,
-        s59,
-        s60,
+        -(s52 * s35 + s97 * s53),
+        s96 * s53 + s52 * s34,
+        s97 * s34 - s96 * s35,
+        s34,
+        s35,
+        s53,
     )
 
 
 def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
     """14 operations: 1 add, 1 sub, 7 mul, 1 neg, 2 sin, 2 cos."""
-    k36, k41 = k
+    k34, k41 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     return (
-        k36 * cos_theta - sin_phi * sin_theta * k41,
-        k36 * sin_theta + sin_phi * cos_theta * k41,
+        k34 * cos_theta - sin_phi * sin_theta * k41,
+        k34 * sin_theta + sin_phi * cos_theta * k41,
         -cos(phi) * k41,
     )
 
 
 def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """40 operations: 6 add, 4 sub, 25 mul, 1 neg, 2 sin, 2 cos."""
-    k36, k41 = k
+    k34, k41 = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s33 = sin_phi * sin_theta
-    s35 = sin_phi * cos_theta
+    s32 = sin_phi * sin_theta
+    s33 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
-    s58 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s33 * omega_pendulum_z
-    s59 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s35 * omega_pendulum_z
-    s60 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s97 = k36 * cos_theta - s33 * k41
-    s98 = k36 * sin_theta + s35 * k41
-    s99 = cos_phi * k41
+    s34 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s32 * omega_pendulum_z
+    s35 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s33 * omega_pendulum_z
+    s53 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s98 = k34 * cos_theta - s32 * k41
+    s99 = k34 * sin_theta + s33 * k41
+    s100 = cos_phi * k41
     return (
-        -(s59 * s99 + s60 * s98),
-        s60 * s97 + s58 * s99,
-        s58 * s98 - s59 * s97,
+        -(s35 * s100 + s53 * s99),
+        s53 * s98 + s34 * s100,
+        s34 * s99 - s35 * s98,
     )
 
 
 def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     """20 operations: 1 add, 2 sub, 11 mul, 2 neg, 2 sin, 2 cos."""
-    k36, k41 = k
+    k34, k41 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s97 = k36 * cos_theta - sin_phi * sin_theta * k41
-    s98 = k36 * sin_theta + sin_phi * cos_theta * k41
-    s99 = cos(phi) * k41
+    s98 = k34 * cos_theta - sin_phi * sin_theta * k41
+    s99 = k34 * sin_theta + sin_phi * cos_theta * k41
+    s100 = cos(phi) * k41
     return (
-        -s98,
-        -sin_theta * s99,
-        s97,
-        cos_theta * s99,
+        -s99,
+        -sin_theta * s100,
+        s98,
+        cos_theta * s100,
         0.0,
-        cos_theta * s98 - sin_theta * s97,
+        cos_theta * s99 - sin_theta * s98,
     )
 
 
@@ -764,7 +789,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 2
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -874,6 +902,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), ('cos',), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (2,), ('sin', 'cos'), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

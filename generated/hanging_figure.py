@@ -168,7 +168,7 @@ columns of an array (84, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -490,6 +490,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity',)
+EFFECT_NAMES = ('gravity',)
 BODIES = ('hand_right', 'forearm_right', 'upper_arm_right', 'thorax', 'head', 'upper_arm_left', 'abdomen', 'forearm_left', 'pelvis', 'hand_left', 'thigh_left', 'thigh_right', 'shank_left', 'shank_right', 'foot_left', 'foot_right')
 JOINTS = ('grip', 'wrist_right', 'elbow_right', 'shoulder_right', 'neck', 'shoulder_left', 'thoracic', 'elbow_left', 'lumbar', 'wrist_left', 'hip_left', 'hip_right', 'knee_left', 'knee_right', 'ankle_left', 'ankle_right')
 POINTS = ()
@@ -6443,7 +6444,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 38
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):

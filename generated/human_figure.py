@@ -173,7 +173,7 @@ columns of an array (90, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -505,6 +505,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity',)
+EFFECT_NAMES = ('gravity',)
 BODIES = ('pelvis', 'abdomen', 'thigh_left', 'thigh_right', 'thorax', 'shank_left', 'shank_right', 'head', 'upper_arm_left', 'upper_arm_right', 'foot_left', 'foot_right', 'forearm_left', 'forearm_right', 'hand_left', 'hand_right')
 JOINTS = ('lumbar', 'hip_left', 'hip_right', 'thoracic', 'knee_left', 'knee_right', 'neck', 'shoulder_left', 'shoulder_right', 'ankle_left', 'ankle_right', 'elbow_left', 'elbow_right', 'wrist_left', 'wrist_right')
 POINTS = ()
@@ -6565,7 +6566,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 41
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):

@@ -20,7 +20,7 @@ columns of an array (2, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -48,6 +48,7 @@ UNITS = {
     "gravity_g": "m/s^2",
 }
 EFFECTS = ('gravity',)
+EFFECT_NAMES = ('gravity',)
 BODIES = ('bob',)
 JOINTS = ('pivot',)
 POINTS = ()
@@ -64,6 +65,7 @@ COST = {
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 1, "mul": 7, "sin": 1, "cos": 1, "total": 10, "parameters": 1},
     "potential_energy": {"mul": 2, "neg": 1, "sin": 1, "total": 4, "parameters": 1},
+    "effect_powers": {"mul": 3, "cos": 1, "total": 4, "parameters": 1},
     "momentum": {"add": 1, "mul": 11, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 0},
     "centre_of_mass": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
     "joint_forces": {"add": 1, "sub": 2, "mul": 9, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 6},
@@ -105,6 +107,7 @@ def _constants(values):
         "applied_force": (),
         "kinetic_energy": (pivot_r_child_x, k4),
         "potential_energy": (pivot_r_child_x, k5),
+        "effect_powers": (pivot_r_child_x, k5),
         "momentum": (bob_mass, pivot_r_child_x),
         "centre_of_mass": (pivot_r_child_x,),
         "joint_forces": (k6, k1, k2, k5),
@@ -224,6 +227,15 @@ def _potential_energy(y, k, u=(), extra=(), sin=sin):
     )
 
 
+def _effect_powers(y, k, u=(), extra=(), cos=cos):
+    """4 operations: 3 mul, 1 cos."""
+    pivot_r_child_x, k5 = k
+    theta, theta_dot = y
+    return (
+        pivot_r_child_x * (theta_dot * cos(theta)) * k5,
+    )
+
+
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """15 operations: 1 add, 11 mul, 1 neg, 1 sin, 1 cos."""
     bob_mass, pivot_r_child_x = k
@@ -339,7 +351,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 1
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -444,6 +459,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), ('sin',), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (1,), ('cos',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

@@ -84,7 +84,7 @@ columns of an array (12, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -234,6 +234,7 @@ UNITS = {
     "gravity_g": "m/s^2",
 }
 EFFECTS = ('gravity', 'motor', 'motor', 'motor', 'motor', 'motor', 'motor')
+EFFECT_NAMES = ('gravity', 'tau_1', 'tau_2', 'tau_3', 'tau_4', 'tau_5', 'tau_6')
 BODIES = ('link_1', 'link_2', 'link_3', 'link_4', 'link_5', 'link_6')
 JOINTS = ('joint_1', 'joint_2', 'joint_3', 'joint_4', 'joint_5', 'joint_6')
 POINTS = ('wrist',)
@@ -3215,7 +3216,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 6
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):

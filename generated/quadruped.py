@@ -85,7 +85,7 @@ columns of an array (37, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -241,6 +241,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity',)
+EFFECT_NAMES = ('gravity',)
 BODIES = ('trunk', 'front_left_hip', 'front_right_hip', 'hind_left_hip', 'hind_right_hip', 'front_left_thigh', 'front_right_thigh', 'hind_left_thigh', 'hind_right_thigh', 'front_left_shank', 'front_right_shank', 'hind_left_shank', 'hind_right_shank')
 JOINTS = ('front_left_abduction', 'front_right_abduction', 'hind_left_abduction', 'hind_right_abduction', 'front_left_swing', 'front_right_swing', 'hind_left_swing', 'hind_right_swing', 'front_left_knee', 'front_right_knee', 'hind_left_knee', 'hind_right_knee')
 POINTS = ('front_left_foot', 'front_right_foot', 'hind_left_foot', 'hind_right_foot')
@@ -8468,7 +8469,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 18
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):

@@ -28,7 +28,7 @@ columns of an array (7, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import isfinite
 
 import numpy as np
 
@@ -70,6 +70,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity',)
+EFFECT_NAMES = ('gravity',)
 BODIES = ('top',)
 JOINTS = ('tip',)
 POINTS = ('peg',)
@@ -87,6 +88,7 @@ COST = {
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 2, "mul": 7, "total": 9, "parameters": 3},
     "potential_energy": {"add": 4, "sub": 1, "mul": 10, "div": 1, "total": 16, "parameters": 1},
+    "effect_powers": {"add": 11, "sub": 5, "mul": 27, "div": 1, "neg": 1, "total": 45, "parameters": 1},
     "momentum": {"add": 15, "sub": 9, "mul": 36, "div": 1, "total": 61, "parameters": 3},
     "centre_of_mass": {"add": 5, "sub": 2, "mul": 18, "div": 4, "total": 29, "parameters": 0},
     "joint_forces": {"add": 66, "sub": 16, "mul": 133, "div": 2, "neg": 6, "total": 223, "parameters": 12},
@@ -150,6 +152,7 @@ def _constants(values):
         "applied_force": (),
         "kinetic_energy": (I_3, inertia_top_xx),
         "potential_energy": (h, k19),
+        "effect_powers": (h, k19),
         "momentum": (I_3, moment_top_z, inertia_top_xx),
         "centre_of_mass": (m, h),
         "joint_forces": (m, h, I_1, I_3, g, k1, k2, k3),
@@ -437,6 +440,27 @@ def _potential_energy(y, k, u=(), extra=()):
     )
 
 
+def _effect_powers(y, k, u=(), extra=()):
+    """45 operations: 11 add, 5 sub, 27 mul, 1 div, 1 neg."""
+    h, k19 = k
+    tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
+    s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
+    s29 = 2.0 / s1
+    s30 = tip_qx * s29
+    s31 = tip_qy * s29
+    s32 = tip_qz * s29
+    s33 = tip_qw * s32
+    s34 = tip_qz * s32
+    s35 = tip_qy * s30
+    s36 = tip_qw * s31 + tip_qz * s30
+    s37 = tip_qz * s31 - tip_qw * s30
+    s38 = tip_wx * (1.0 - (tip_qy * s31 + s34)) + tip_wy * (s35 - s33) + tip_wz * s36
+    s39 = tip_wx * (s33 + s35) + tip_wy * (1.0 - (tip_qx * s30 + s34)) + tip_wz * s37
+    return (
+        -k19 * (h * s37 * s38 - h * s36 * s39),
+    )
+
+
 def _momentum(y, k, u=(), extra=()):
     """61 operations: 15 add, 9 sub, 36 mul, 1 div."""
     I_3, moment_top_z, inertia_top_xx = k
@@ -446,33 +470,33 @@ def _momentum(y, k, u=(), extra=()):
     s30 = tip_qx * s29
     s31 = tip_qy * s29
     s32 = tip_qz * s29
-    s33 = tip_qw * s30
-    s34 = tip_qw * s31
-    s35 = tip_qw * s32
-    s36 = tip_qx * s30
-    s37 = tip_qy * s31
-    s38 = tip_qz * s32
-    s39 = tip_qy * s30
-    s40 = tip_qz * s30
-    s41 = tip_qz * s31
-    s42 = 1.0 - (s37 + s38)
-    s43 = s39 - s35
-    s44 = s35 + s39
-    s45 = 1.0 - (s36 + s38)
-    s46 = s40 - s34
-    s47 = s33 + s41
-    s48 = tip_wx * inertia_top_xx
-    s49 = tip_wy * inertia_top_xx
-    s50 = I_3 * tip_wz
-    s51 = tip_wy * moment_top_z
-    s52 = tip_wx * moment_top_z
+    s40 = tip_qw * s30
+    s41 = tip_qw * s31
+    s33 = tip_qw * s32
+    s42 = tip_qx * s30
+    s43 = tip_qy * s31
+    s34 = tip_qz * s32
+    s35 = tip_qy * s30
+    s44 = tip_qz * s30
+    s45 = tip_qz * s31
+    s46 = 1.0 - (s43 + s34)
+    s47 = s35 - s33
+    s48 = s33 + s35
+    s49 = 1.0 - (s42 + s34)
+    s50 = s44 - s41
+    s51 = s40 + s45
+    s52 = tip_wx * inertia_top_xx
+    s53 = tip_wy * inertia_top_xx
+    s54 = I_3 * tip_wz
+    s55 = tip_wy * moment_top_z
+    s56 = tip_wx * moment_top_z
     return (
-        s42 * s51 - s43 * s52,
-        s44 * s51 - s45 * s52,
-        s46 * s51 - s47 * s52,
-        s42 * s48 + s43 * s49 + (s34 + s40) * s50,
-        s44 * s48 + s45 * s49 + (s41 - s33) * s50,
-        s46 * s48 + s47 * s49 + (1.0 - (s36 + s37)) * s50,
+        s46 * s55 - s47 * s56,
+        s48 * s55 - s49 * s56,
+        s50 * s55 - s51 * s56,
+        s46 * s52 + s47 * s53 + (s41 + s44) * s54,
+        s48 * s52 + s49 * s53 + (s45 - s40) * s54,
+        s50 * s52 + s51 * s53 + (1.0 - (s42 + s43)) * s54,
     )
 
 
@@ -505,63 +529,63 @@ def _joint_forces(y, k, u=(), extra=()):
     s30 = tip_qx * s29
     s31 = tip_qy * s29
     s32 = tip_qz * s29
-    s33 = tip_qw * s30
-    s34 = tip_qw * s31
-    s35 = tip_qw * s32
-    s36 = tip_qx * s30
-    s37 = tip_qy * s31
-    s38 = tip_qz * s32
-    s39 = tip_qy * s30
-    s40 = tip_qz * s30
-    s41 = tip_qz * s31
-    s42 = 1.0 - (s37 + s38)
-    s43 = s39 - s35
-    s53 = s34 + s40
-    s44 = s35 + s39
-    s45 = 1.0 - (s36 + s38)
-    s54 = s41 - s33
-    s46 = s40 - s34
-    s47 = s33 + s41
-    s55 = 1.0 - (s36 + s37)
-    s56 = h * s53
-    s57 = h * s54
-    s58 = h * s55
-    s59 = tip_wx * s42 + tip_wy * s43 + tip_wz * s53
-    s60 = tip_wx * s44 + tip_wy * s45 + tip_wz * s54
-    s61 = tip_wx * s46 + tip_wy * s47 + tip_wz * s55
-    s62 = g * s46 + h * (s27 + tip_wy_ddot)
-    s63 = g * s47 + h * (s26 - tip_wx_ddot)
-    s64 = g * s55 - h * (tip_wx * tip_wx + tip_wy * tip_wy)
-    s65 = tip_wx_ddot * s42 + tip_wy_ddot * s43
-    s66 = tip_wx_ddot * s44 + tip_wy_ddot * s45
-    s67 = tip_wx_ddot * s46 + tip_wy_ddot * s47
-    s68 = I_1 * s42
-    s69 = I_1 * s43
-    s70 = I_3 * s53
-    s71 = I_1 * s44
-    s72 = I_1 * s45
-    s73 = I_3 * s54
-    s74 = I_1 * s46
-    s75 = I_1 * s47
-    s76 = I_3 * s55
-    s77 = s42 * s68 + s43 * s69 + s53 * s70
-    s78 = s44 * s68 + s45 * s69 + s54 * s70
-    s79 = s46 * s68 + s47 * s69 + s55 * s70
-    s80 = s42 * s71 + s43 * s72 + s53 * s73
-    s81 = s44 * s71 + s45 * s72 + s54 * s73
-    s82 = s46 * s71 + s47 * s72 + s55 * s73
-    s83 = s42 * s74 + s43 * s75 + s53 * s76
-    s84 = s44 * s74 + s45 * s75 + s54 * s76
-    s85 = s46 * s74 + s47 * s75 + s55 * s76
-    s86 = m * (s42 * s62 + s43 * s63 + s53 * s64)
-    s87 = m * (s44 * s62 + s45 * s63 + s54 * s64)
-    s88 = m * (s46 * s62 + s47 * s63 + s55 * s64)
-    s89 = s59 * s77 + s60 * s78 + s61 * s79
-    s90 = s59 * s80 + s60 * s81 + s61 * s82
-    s91 = s59 * s83 + s60 * s84 + s61 * s85
-    s92 = s65 * s77 + s66 * s78 + s67 * s79 + (s60 * s91 - s61 * s90) + (s57 * s88 - s58 * s87)
-    s93 = s65 * s80 + s66 * s81 + s67 * s82 + (s61 * s89 - s59 * s91) + (s58 * s86 - s56 * s88)
-    s94 = s65 * s83 + s66 * s84 + s67 * s85 + (s59 * s90 - s60 * s89) + (s56 * s87 - s57 * s86)
+    s40 = tip_qw * s30
+    s41 = tip_qw * s31
+    s33 = tip_qw * s32
+    s42 = tip_qx * s30
+    s43 = tip_qy * s31
+    s34 = tip_qz * s32
+    s35 = tip_qy * s30
+    s44 = tip_qz * s30
+    s45 = tip_qz * s31
+    s46 = 1.0 - (s43 + s34)
+    s47 = s35 - s33
+    s36 = s41 + s44
+    s48 = s33 + s35
+    s49 = 1.0 - (s42 + s34)
+    s37 = s45 - s40
+    s50 = s44 - s41
+    s51 = s40 + s45
+    s57 = 1.0 - (s42 + s43)
+    s58 = h * s36
+    s59 = h * s37
+    s60 = h * s57
+    s38 = tip_wx * s46 + tip_wy * s47 + tip_wz * s36
+    s39 = tip_wx * s48 + tip_wy * s49 + tip_wz * s37
+    s61 = tip_wx * s50 + tip_wy * s51 + tip_wz * s57
+    s62 = g * s50 + h * (s27 + tip_wy_ddot)
+    s63 = g * s51 + h * (s26 - tip_wx_ddot)
+    s64 = g * s57 - h * (tip_wx * tip_wx + tip_wy * tip_wy)
+    s65 = tip_wx_ddot * s46 + tip_wy_ddot * s47
+    s66 = tip_wx_ddot * s48 + tip_wy_ddot * s49
+    s67 = tip_wx_ddot * s50 + tip_wy_ddot * s51
+    s68 = I_1 * s46
+    s69 = I_1 * s47
+    s70 = I_3 * s36
+    s71 = I_1 * s48
+    s72 = I_1 * s49
+    s73 = I_3 * s37
+    s74 = I_1 * s50
+    s75 = I_1 * s51
+    s76 = I_3 * s57
+    s77 = s46 * s68 + s47 * s69 + s36 * s70
+    s78 = s48 * s68 + s49 * s69 + s37 * s70
+    s79 = s50 * s68 + s51 * s69 + s57 * s70
+    s80 = s46 * s71 + s47 * s72 + s36 * s73
+    s81 = s48 * s71 + s49 * s72 + s37 * s73
+    s82 = s50 * s71 + s51 * s72 + s57 * s73
+    s83 = s46 * s74 + s47 * s75 + s36 * s76
+    s84 = s48 * s74 + s49 * s75 + s37 * s76
+    s85 = s50 * s74 + s51 * s75 + s57 * s76
+    s86 = m * (s46 * s62 + s47 * s63 + s36 * s64)
+    s87 = m * (s48 * s62 + s49 * s63 + s37 * s64)
+    s88 = m * (s50 * s62 + s51 * s63 + s57 * s64)
+    s89 = s38 * s77 + s39 * s78 + s61 * s79
+    s90 = s38 * s80 + s39 * s81 + s61 * s82
+    s91 = s38 * s83 + s39 * s84 + s61 * s85
+    s92 = s65 * s77 + s66 * s78 + s67 * s79 + (s39 * s91 - s61 * s90) + (s59 * s88 - s60 * s87)
+    s93 = s65 * s80 + s66 * s81 + s67 * s82 + (s61 * s89 - s38 * s91) + (s60 * s86 - s58 * s88)
+    s94 = s65 * s83 + s66 * s84 + s67 * s85 + (s38 * s90 - s39 * s89) + (s58 * s87 - s59 * s86)
     return (
         -s86,
         -s87,
@@ -581,31 +605,31 @@ def _body_poses(y, k, u=(), extra=()):
     s30 = tip_qx * s29
     s31 = tip_qy * s29
     s32 = tip_qz * s29
-    s33 = tip_qw * s30
-    s34 = tip_qw * s31
-    s35 = tip_qw * s32
-    s36 = tip_qx * s30
-    s37 = tip_qy * s31
-    s38 = tip_qz * s32
-    s39 = tip_qy * s30
-    s40 = tip_qz * s30
-    s41 = tip_qz * s31
-    s53 = s34 + s40
-    s54 = s41 - s33
-    s55 = 1.0 - (s36 + s37)
+    s40 = tip_qw * s30
+    s41 = tip_qw * s31
+    s33 = tip_qw * s32
+    s42 = tip_qx * s30
+    s43 = tip_qy * s31
+    s34 = tip_qz * s32
+    s35 = tip_qy * s30
+    s44 = tip_qz * s30
+    s45 = tip_qz * s31
+    s36 = s41 + s44
+    s37 = s45 - s40
+    s57 = 1.0 - (s42 + s43)
     return (
-        1.0 - (s37 + s38),
-        s39 - s35,
-        s53,
-        h * s53,
-        s35 + s39,
-        1.0 - (s36 + s38),
-        s54,
-        h * s54,
-        s40 - s34,
-        s33 + s41,
-        s55,
-        h * s55,
+        1.0 - (s43 + s34),
+        s35 - s33,
+        s36,
+        h * s36,
+        s33 + s35,
+        1.0 - (s42 + s34),
+        s37,
+        h * s37,
+        s44 - s41,
+        s40 + s45,
+        s57,
+        h * s57,
     )
 
 
@@ -618,30 +642,30 @@ def _body_velocities(y, k, u=(), extra=()):
     s30 = tip_qx * s29
     s31 = tip_qy * s29
     s32 = tip_qz * s29
-    s33 = tip_qw * s30
-    s34 = tip_qw * s31
-    s35 = tip_qw * s32
-    s36 = tip_qx * s30
-    s37 = tip_qy * s31
-    s38 = tip_qz * s32
-    s39 = tip_qy * s30
-    s40 = tip_qz * s30
-    s41 = tip_qz * s31
-    s53 = s34 + s40
-    s54 = s41 - s33
-    s55 = 1.0 - (s36 + s37)
-    s56 = h * s53
-    s57 = h * s54
-    s58 = h * s55
-    s59 = tip_wx * (1.0 - (s37 + s38)) + tip_wy * (s39 - s35) + tip_wz * s53
-    s60 = tip_wx * (s35 + s39) + tip_wy * (1.0 - (s36 + s38)) + tip_wz * s54
-    s61 = tip_wx * (s40 - s34) + tip_wy * (s33 + s41) + tip_wz * s55
+    s40 = tip_qw * s30
+    s41 = tip_qw * s31
+    s33 = tip_qw * s32
+    s42 = tip_qx * s30
+    s43 = tip_qy * s31
+    s34 = tip_qz * s32
+    s35 = tip_qy * s30
+    s44 = tip_qz * s30
+    s45 = tip_qz * s31
+    s36 = s41 + s44
+    s37 = s45 - s40
+    s57 = 1.0 - (s42 + s43)
+    s58 = h * s36
+    s59 = h * s37
+    s60 = h * s57
+    s38 = tip_wx * (1.0 - (s43 + s34)) + tip_wy * (s35 - s33) + tip_wz * s36
+    s39 = tip_wx * (s33 + s35) + tip_wy * (1.0 - (s42 + s34)) + tip_wz * s37
+    s61 = tip_wx * (s44 - s41) + tip_wy * (s40 + s45) + tip_wz * s57
     return (
-        s58 * s60 - s57 * s61,
-        s56 * s61 - s58 * s59,
-        s57 * s59 - s56 * s60,
-        s59,
-        s60,
+        s60 * s39 - s59 * s61,
+        s58 * s61 - s60 * s38,
+        s59 * s38 - s58 * s39,
+        s38,
+        s39,
         s61,
     )
 
@@ -670,28 +694,28 @@ def _point_velocities(y, k, u=(), extra=()):
     s30 = tip_qx * s29
     s31 = tip_qy * s29
     s32 = tip_qz * s29
-    s33 = tip_qw * s30
-    s34 = tip_qw * s31
-    s35 = tip_qw * s32
-    s36 = tip_qx * s30
-    s37 = tip_qy * s31
-    s38 = tip_qz * s32
-    s39 = tip_qy * s30
-    s40 = tip_qz * s30
-    s41 = tip_qz * s31
-    s53 = s34 + s40
-    s54 = s41 - s33
-    s55 = 1.0 - (s36 + s37)
-    s59 = tip_wx * (1.0 - (s37 + s38)) + tip_wy * (s39 - s35) + tip_wz * s53
-    s60 = tip_wx * (s35 + s39) + tip_wy * (1.0 - (s36 + s38)) + tip_wz * s54
-    s61 = tip_wx * (s40 - s34) + tip_wy * (s33 + s41) + tip_wz * s55
-    s95 = s53 * k20
-    s96 = s54 * k20
-    s97 = s55 * k20
+    s40 = tip_qw * s30
+    s41 = tip_qw * s31
+    s33 = tip_qw * s32
+    s42 = tip_qx * s30
+    s43 = tip_qy * s31
+    s34 = tip_qz * s32
+    s35 = tip_qy * s30
+    s44 = tip_qz * s30
+    s45 = tip_qz * s31
+    s36 = s41 + s44
+    s37 = s45 - s40
+    s57 = 1.0 - (s42 + s43)
+    s38 = tip_wx * (1.0 - (s43 + s34)) + tip_wy * (s35 - s33) + tip_wz * s36
+    s39 = tip_wx * (s33 + s35) + tip_wy * (1.0 - (s42 + s34)) + tip_wz * s37
+    s61 = tip_wx * (s44 - s41) + tip_wy * (s40 + s45) + tip_wz * s57
+    s95 = s36 * k20
+    s96 = s37 * k20
+    s97 = s57 * k20
     return (
-        s60 * s97 - s61 * s96,
-        s61 * s95 - s59 * s97,
-        s59 * s96 - s60 * s95,
+        s39 * s97 - s61 * s96,
+        s61 * s95 - s38 * s97,
+        s38 * s96 - s39 * s95,
     )
 
 
@@ -704,37 +728,37 @@ def _point_jacobians(y, k, u=(), extra=()):
     s30 = tip_qx * s29
     s31 = tip_qy * s29
     s32 = tip_qz * s29
-    s33 = tip_qw * s30
-    s34 = tip_qw * s31
-    s35 = tip_qw * s32
-    s36 = tip_qx * s30
-    s37 = tip_qy * s31
-    s38 = tip_qz * s32
-    s39 = tip_qy * s30
-    s40 = tip_qz * s30
-    s41 = tip_qz * s31
-    s42 = 1.0 - (s37 + s38)
-    s43 = s39 - s35
-    s53 = s34 + s40
-    s44 = s35 + s39
-    s45 = 1.0 - (s36 + s38)
-    s54 = s41 - s33
-    s46 = s40 - s34
-    s47 = s33 + s41
-    s55 = 1.0 - (s36 + s37)
-    s95 = s53 * k20
-    s96 = s54 * k20
-    s97 = s55 * k20
+    s40 = tip_qw * s30
+    s41 = tip_qw * s31
+    s33 = tip_qw * s32
+    s42 = tip_qx * s30
+    s43 = tip_qy * s31
+    s34 = tip_qz * s32
+    s35 = tip_qy * s30
+    s44 = tip_qz * s30
+    s45 = tip_qz * s31
+    s46 = 1.0 - (s43 + s34)
+    s47 = s35 - s33
+    s36 = s41 + s44
+    s48 = s33 + s35
+    s49 = 1.0 - (s42 + s34)
+    s37 = s45 - s40
+    s50 = s44 - s41
+    s51 = s40 + s45
+    s57 = 1.0 - (s42 + s43)
+    s95 = s36 * k20
+    s96 = s37 * k20
+    s97 = s57 * k20
     return (
-        s44 * s97 - s46 * s96,
-        s45 * s97 - s47 * s96,
-        s54 * s97 - s55 * s96,
-        s46 * s95 - s42 * s97,
-        s47 * s95 - s43 * s97,
-        s55 * s95 - s53 * s97,
-        s42 * s96 - s44 * s95,
-        s43 * s96 - s45 * s95,
-        s53 * s96 - s54 * s95,
+        s48 * s97 - s50 * s96,
+        s49 * s97 - s51 * s96,
+        s37 * s97 - s57 * s96,
+        s50 * s95 - s46 * s97,
+        s51 * s95 - s47 * s97,
+        s57 * s95 - s36 * s97,
+        s46 * s96 - s48 * s95,
+        s47 * s96 - s49 * s95,
+        s36 * s96 - s37 * s95,
     )
 
 
@@ -774,7 +798,8 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 3
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -879,6 +904,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), (), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (1,), (), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

@@ -34,7 +34,7 @@ columns of an array (13, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import isfinite
 
 import numpy as np
 
@@ -88,6 +88,7 @@ UNITS = {
     "stem_at_y": "m",
 }
 EFFECTS = ()
+EFFECT_NAMES = ()
 BODIES = ('nut',)
 JOINTS = ()
 POINTS = ('stem',)
@@ -105,6 +106,7 @@ COST = {
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 20, "sub": 6, "mul": 36, "div": 1, "total": 63, "parameters": 0},
     "potential_energy": {"total": 0, "parameters": 0},
+    "effect_powers": {"total": 0, "parameters": 0},
     "momentum": {"add": 30, "sub": 9, "mul": 55, "div": 1, "total": 95, "parameters": 0},
     "centre_of_mass": {"mul": 3, "div": 3, "total": 6, "parameters": 0},
     "joint_forces": {"total": 0, "parameters": 0},
@@ -158,6 +160,7 @@ def _constants(values):
         "applied_force": (),
         "kinetic_energy": (m, I_1, I_2, I_3),
         "potential_energy": (),
+        "effect_powers": (),
         "momentum": (m, I_1, I_2, I_3),
         "centre_of_mass": (m,),
         "joint_forces": (),
@@ -640,6 +643,12 @@ def _potential_energy(y, k, u=(), extra=()):
     )
 
 
+def _effect_powers(y, k, u=(), extra=()):
+    """0 operations."""
+    return (
+    )
+
+
 def _momentum(y, k, u=(), extra=()):
     """95 operations: 30 add, 9 sub, 55 mul, 1 div."""
     m, I_1, I_2, I_3 = k
@@ -915,7 +924,8 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 6
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -1020,6 +1030,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), (), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (0,), (), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

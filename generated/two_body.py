@@ -31,7 +31,7 @@ columns of an array (8, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -79,6 +79,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity',)
+EFFECT_NAMES = ('gravity',)
 BODIES = ('A', 'B')
 JOINTS = ('hinge',)
 POINTS = ()
@@ -95,6 +96,7 @@ COST = {
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
+    "effect_powers": {"add": 5, "mul": 6, "neg": 1, "cos": 2, "total": 14, "parameters": 2},
     "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
     "joint_forces": {"add": 9, "sub": 2, "mul": 25, "div": 1, "sin": 3, "cos": 3, "total": 43, "parameters": 36},
@@ -205,6 +207,7 @@ def _constants(values):
         "applied_force": (),
         "kinetic_energy": (l_A, l_B, k18, k19, k20, k21),
         "potential_energy": (l_A, l_B, k22, k23),
+        "effect_powers": (l_A, l_B, k22, k23),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
         "centre_of_mass": (m_A, m_B, l_A, l_B, k8),
         "joint_forces": (k1, k2, k3, k4, k24, k25),
@@ -545,6 +548,16 @@ def _potential_energy(y, k, u=(), extra=(), sin=sin):
     )
 
 
+def _effect_powers(y, k, u=(), extra=(), cos=cos):
+    """14 operations: 5 add, 6 mul, 1 neg, 2 cos."""
+    l_A, l_B, k22, k23 = k
+    _, _, theta, phi, _, y_A_dot, theta_dot, phi_dot = y
+    yd_B = l_B * (cos(theta + phi) * (theta_dot + phi_dot)) + (y_A_dot + l_A * (theta_dot * cos(theta)))
+    return (
+        -(y_A_dot * k22 + k23 * yd_B),
+    )
+
+
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """45 operations: 13 add, 4 sub, 24 mul, 2 sin, 2 cos."""
     m_A, I_A, m_B, I_B, l_A, l_B = k
@@ -780,7 +793,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 4
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -885,6 +901,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), ('sin',), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (1,), ('cos',), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

@@ -40,7 +40,7 @@ columns of an array (8, k); then every result has a last axis of length k.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt, tan
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -102,6 +102,7 @@ UNITS = {
     "g": "m/s^2",
 }
 EFFECTS = ('gravity', 'external_force', 'external_force', 'motor')
+EFFECT_NAMES = ('gravity', 'f_A', 'f_B', 'tau')
 BODIES = ('A', 'B')
 JOINTS = ('hinge',)
 POINTS = ()
@@ -118,6 +119,7 @@ COST = {
     "applied_force": {"add": 8, "sub": 3, "mul": 10, "sin": 2, "cos": 2, "total": 25, "parameters": 0},
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
+    "effect_powers": {"add": 9, "sub": 5, "mul": 19, "neg": 1, "sin": 2, "cos": 2, "total": 38, "parameters": 2},
     "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
     "joint_forces": {"add": 14, "sub": 11, "mul": 42, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 75, "parameters": 52},
@@ -246,6 +248,7 @@ def _constants(values):
         "applied_force": (l_A, l_B, d_A, d_B),
         "kinetic_energy": (l_A, l_B, k22, k23, k24, k25),
         "potential_energy": (l_A, l_B, k26, k27),
+        "effect_powers": (l_A, l_B, d_A, d_B, k26, k27),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
         "centre_of_mass": (m_A, m_B, l_A, l_B, k3),
         "joint_forces": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k28, k29, k30, k31),
@@ -621,6 +624,26 @@ def _potential_energy(y, k, u=(), extra=(), sin=sin):
     )
 
 
+def _effect_powers(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """38 operations: 9 add, 5 sub, 19 mul, 1 neg, 2 sin, 2 cos."""
+    l_A, l_B, d_A, d_B, k26, k27 = k
+    _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
+    f_A_x, f_A_y, f_B_x, f_B_y, tau = u
+    s1 = theta + phi
+    omega_B = theta_dot + phi_dot
+    s61 = theta_dot * sin(theta)
+    s62 = sin(s1) * omega_B
+    s63 = theta_dot * cos(theta)
+    s64 = cos(s1) * omega_B
+    yd_B = l_B * s64 + (y_A_dot + l_A * s63)
+    return (
+        -(y_A_dot * k26 + k27 * yd_B),
+        f_A_x * (x_A_dot - d_A * s61) + f_A_y * (y_A_dot + d_A * s63),
+        f_B_x * (x_A_dot - l_A * s61 - l_B * s62 - d_B * s62) + f_B_y * (yd_B + d_B * s64),
+        tau * (omega_B - theta_dot),
+    )
+
+
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """45 operations: 13 add, 4 sub, 24 mul, 2 sin, 2 cos."""
     m_A, I_A, m_B, I_B, l_A, l_B = k
@@ -633,12 +656,12 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     omega_B = theta_dot + phi_dot
     xd_B = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
     yd_B = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
-    s61 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
-    s62 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
+    s65 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
+    s66 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
         m_A * x_A_dot + m_B * xd_B,
         m_A * y_A_dot + m_B * yd_B,
-        m_B * s61 + s62,
+        m_B * s65 + s66,
     )
 
 
@@ -674,11 +697,11 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     load_A = k4 * (sin_phi * omega_B_squared) + s3 - tau - k7 * (coupling_B_A * load_B)
     alpha_A = load_A / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
-    s63 = f_B_x * k28 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k30
-    s64 = f_B_y * k28 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k30
+    s67 = f_B_x * k28 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k30
+    s68 = f_B_y * k28 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k30
     return (
-        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k31 + s63 - f_A_x * k29,
-        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k31 + s64 - f_A_y * k29,
+        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k31 + s67 - f_A_x * k29,
+        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k31 + s68 - f_A_y * k29,
         -tau,
     )
 
@@ -726,20 +749,20 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta_phi = sin(s1)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s65 = sin_theta_phi * k6
-    s66 = (sin_theta * k9 - k7 * (coupling_B_A * s65)) / pivot_A
-    s67 = k7 * (s65 - coupling_B_A * s66)
-    s68 = cos_theta_phi * k6
-    s69 = (k7 * (coupling_B_A * s68) + cos_theta * k8) / pivot_A
-    s70 = k7 * (s68 + coupling_B_A * s69)
-    s71 = k5 * sin_theta_phi
-    s72 = (k7 * (coupling_B_A * s71) - sin_theta * k10) / pivot_A
-    s73 = k7 * (s71 + coupling_B_A * s72)
-    s74 = cos_theta_phi * k5
-    s75 = (cos_theta * k10 - k7 * (coupling_B_A * s74)) / pivot_A
-    s76 = k7 * (s74 - coupling_B_A * s75)
-    s77 = (-1.0 - coupling_B_A * k7) / pivot_A
-    s78 = k7 * (1.0 - coupling_B_A * s77)
+    s69 = sin_theta_phi * k6
+    s70 = (sin_theta * k9 - k7 * (coupling_B_A * s69)) / pivot_A
+    s71 = k7 * (s69 - coupling_B_A * s70)
+    s72 = cos_theta_phi * k6
+    s73 = (k7 * (coupling_B_A * s72) + cos_theta * k8) / pivot_A
+    s74 = k7 * (s72 + coupling_B_A * s73)
+    s75 = k5 * sin_theta_phi
+    s76 = (k7 * (coupling_B_A * s75) - sin_theta * k10) / pivot_A
+    s77 = k7 * (s75 + coupling_B_A * s76)
+    s78 = cos_theta_phi * k5
+    s79 = (cos_theta * k10 - k7 * (coupling_B_A * s78)) / pivot_A
+    s80 = k7 * (s78 - coupling_B_A * s79)
+    s81 = (-1.0 - coupling_B_A * k7) / pivot_A
+    s82 = k7 * (1.0 - coupling_B_A * s81)
     return (
         0.0,
         0.0,
@@ -761,26 +784,26 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        k6 * (sin_theta_phi * s67) + (k3 + k11 * (sin_theta * s66)),
-        k11 * (sin_theta * s69) - k6 * (sin_theta_phi * s70),
-        k3 + k11 * (sin_theta * s72) - k6 * (sin_theta_phi * s73),
-        k11 * (sin_theta * s75) + k6 * (sin_theta_phi * s76),
-        k11 * (sin_theta * s77) + k6 * (sin_theta_phi * s78),
-        -(k11 * (cos_theta * s66) + k6 * (cos_theta_phi * s67)),
-        k6 * (cos_theta_phi * s70) + (k3 - k11 * (cos_theta * s69)),
-        k6 * (cos_theta_phi * s73) - k11 * (cos_theta * s72),
-        k3 - k11 * (cos_theta * s75) - k6 * (cos_theta_phi * s76),
-        -(k11 * (cos_theta * s77) + k6 * (cos_theta_phi * s78)),
-        s66,
-        s69,
-        s72,
-        s75,
-        s77,
-        s67 - s66,
-        -(s69 + s70),
-        -(s72 + s73),
-        s76 - s75,
-        s78 - s77,
+        k6 * (sin_theta_phi * s71) + (k3 + k11 * (sin_theta * s70)),
+        k11 * (sin_theta * s73) - k6 * (sin_theta_phi * s74),
+        k3 + k11 * (sin_theta * s76) - k6 * (sin_theta_phi * s77),
+        k11 * (sin_theta * s79) + k6 * (sin_theta_phi * s80),
+        k11 * (sin_theta * s81) + k6 * (sin_theta_phi * s82),
+        -(k11 * (cos_theta * s70) + k6 * (cos_theta_phi * s71)),
+        k6 * (cos_theta_phi * s74) + (k3 - k11 * (cos_theta * s73)),
+        k6 * (cos_theta_phi * s77) - k11 * (cos_theta * s76),
+        k3 - k11 * (cos_theta * s79) - k6 * (cos_theta_phi * s80),
+        -(k11 * (cos_theta * s81) + k6 * (cos_theta_phi * s82)),
+        s70,
+        s73,
+        s76,
+        s79,
+        s81,
+        s71 - s70,
+        -(s73 + s74),
+        -(s76 + s77),
+        s80 - s79,
+        s82 - s81,
     )
 
 
@@ -790,8 +813,8 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
-    s79 = sin_phi * sin_phi
-    pivot_A = k1 + s79 * k2
+    s83 = sin_phi * sin_phi
+    pivot_A = k1 + s83 * k2
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k4
     s1 = theta + phi
@@ -800,56 +823,56 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     theta_dot_squared = theta_dot * theta_dot
     s37 = sin_phi * theta_dot_squared
     s56 = f_B_y * cos_theta_phi - f_B_x * sin_theta_phi
-    s80 = f_A_x * sin_theta_phi - f_A_y * cos_theta_phi
-    load_B = k6 * s80 + (tau + k5 * s56) - k4 * s37
-    s81 = coupling_B_A * load_B
+    s84 = f_A_x * sin_theta_phi - f_A_y * cos_theta_phi
+    load_B = k6 * s84 + (tau + k5 * s56) - k4 * s37
+    s85 = coupling_B_A * load_B
     cos_theta = cos(theta)
-    s82 = f_A_y * cos_theta
+    s86 = f_A_y * cos_theta
     sin_theta = sin(theta)
-    s83 = f_A_x * sin_theta
+    s87 = f_A_x * sin_theta
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s84 = sin_phi * omega_B_squared
-    s85 = f_B_y * cos_theta - f_B_x * sin_theta
-    alpha_A = (k4 * s84 + (k10 * s85 + (k8 * s82 + k9 * s83)) - tau - k7 * s81) / pivot_A
-    s86 = load_B - coupling_B_A * alpha_A
-    alpha_B = k7 * s86
-    s87 = sin_theta * alpha_A + theta_dot_squared * cos_theta
-    s88 = sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared
-    s89 = theta_dot_squared * sin_theta - cos_theta * alpha_A
-    s90 = sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B
-    s91 = cos_phi * k35
-    s92 = s56 * k36 - s80 * k37 - s37 * k35
-    s93 = s84 * k35 + (s85 * k41 + (s82 * k39 - s83 * k40)) - (k7 * (load_B * s91 + coupling_B_A * s92) - s81 * k38)
-    s94 = (s93 - alpha_A * (k32 + s79 * k33)) / pivot_A
-    s95 = k7 * (s92 - (alpha_A * s91 + coupling_B_A * s94)) - s86 * k38
-    s96 = (f_A_x + f_B_x) * k34
-    s97 = (f_A_y + f_B_y) * k34
-    s98 = s90 * k37 + k6 * (cos_theta_phi * s95) + (s97 + (s89 * k42 + k11 * (cos_theta * s94)))
-    s99 = alpha_A * k43 / pivot_A
-    s100 = k7 * (coupling_B_A * s99)
-    s101 = cos_phi * k46
-    s102 = s56 * k47 + s80 * k48 - s37 * k46
-    s103 = s84 * k46 + (s82 * k50 + s83 * k51 - s85 * k52) - (k7 * (load_B * s101 + coupling_B_A * s102) - s81 * k49)
-    s104 = (s103 - alpha_A * (k44 + s79 * k45)) / pivot_A
-    s105 = k7 * (s102 - (alpha_A * s101 + coupling_B_A * s104)) - s86 * k49
-    s106 = (s81 * k56 - alpha_A * (k54 - s79 * k55)) / pivot_A
-    s107 = s86 * k56 + k7 * (coupling_B_A * s106)
-    s108 = cos_phi * k31
-    s109 = s37 * k31
-    s110 = s84 * k31 + (s85 * k28 + (s83 - s82) * k29) - k7 * (load_B * s108 - coupling_B_A * s109)
-    s111 = (s110 - alpha_A * (k57 + s79 * k58)) / pivot_A
-    s112 = k7 * (s109 + (alpha_A * s108 + coupling_B_A * s111))
-    s113 = cos_phi * k30
-    s114 = s56 * k28 + s80 * k29 - s37 * k30
-    s115 = s84 * k30 - (k7 * (load_B * s113 + coupling_B_A * s114) - s81 * k61) - alpha_A * (k59 + s79 * k60)
-    s116 = s115 / pivot_A
-    s117 = k7 * (s114 - (alpha_A * s113 + coupling_B_A * s116)) - s86 * k61
-    s118 = (s82 - s83) * k62 / pivot_A
-    s119 = k7 * (coupling_B_A * s118)
-    s120 = s56 * k62
-    s121 = k7 * (coupling_B_A * s120) / pivot_A
-    s122 = k7 * (s120 + coupling_B_A * s121)
+    s88 = sin_phi * omega_B_squared
+    s89 = f_B_y * cos_theta - f_B_x * sin_theta
+    alpha_A = (k4 * s88 + (k10 * s89 + (k8 * s86 + k9 * s87)) - tau - k7 * s85) / pivot_A
+    s90 = load_B - coupling_B_A * alpha_A
+    alpha_B = k7 * s90
+    s91 = sin_theta * alpha_A + theta_dot_squared * cos_theta
+    s92 = sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared
+    s93 = theta_dot_squared * sin_theta - cos_theta * alpha_A
+    s94 = sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B
+    s95 = cos_phi * k35
+    s96 = s56 * k36 - s84 * k37 - s37 * k35
+    s97 = s88 * k35 + (s89 * k41 + (s86 * k39 - s87 * k40)) - (k7 * (load_B * s95 + coupling_B_A * s96) - s85 * k38)
+    s98 = (s97 - alpha_A * (k32 + s83 * k33)) / pivot_A
+    s99 = k7 * (s96 - (alpha_A * s95 + coupling_B_A * s98)) - s90 * k38
+    s100 = (f_A_x + f_B_x) * k34
+    s101 = (f_A_y + f_B_y) * k34
+    s102 = s94 * k37 + k6 * (cos_theta_phi * s99) + (s101 + (s93 * k42 + k11 * (cos_theta * s98)))
+    s103 = alpha_A * k43 / pivot_A
+    s104 = k7 * (coupling_B_A * s103)
+    s105 = cos_phi * k46
+    s106 = s56 * k47 + s84 * k48 - s37 * k46
+    s107 = s88 * k46 + (s86 * k50 + s87 * k51 - s89 * k52) - (k7 * (load_B * s105 + coupling_B_A * s106) - s85 * k49)
+    s108 = (s107 - alpha_A * (k44 + s83 * k45)) / pivot_A
+    s109 = k7 * (s106 - (alpha_A * s105 + coupling_B_A * s108)) - s90 * k49
+    s110 = (s85 * k56 - alpha_A * (k54 - s83 * k55)) / pivot_A
+    s111 = s90 * k56 + k7 * (coupling_B_A * s110)
+    s112 = cos_phi * k31
+    s113 = s37 * k31
+    s114 = s88 * k31 + (s89 * k28 + (s87 - s86) * k29) - k7 * (load_B * s112 - coupling_B_A * s113)
+    s115 = (s114 - alpha_A * (k57 + s83 * k58)) / pivot_A
+    s116 = k7 * (s113 + (alpha_A * s112 + coupling_B_A * s115))
+    s117 = cos_phi * k30
+    s118 = s56 * k28 + s84 * k29 - s37 * k30
+    s119 = s88 * k30 - (k7 * (load_B * s117 + coupling_B_A * s118) - s85 * k61) - alpha_A * (k59 + s83 * k60)
+    s120 = s119 / pivot_A
+    s121 = k7 * (s118 - (alpha_A * s117 + coupling_B_A * s120)) - s90 * k61
+    s122 = (s86 - s87) * k62 / pivot_A
+    s123 = k7 * (coupling_B_A * s122)
+    s124 = s56 * k62
+    s125 = k7 * (coupling_B_A * s124) / pivot_A
+    s126 = k7 * (s124 + coupling_B_A * s125)
     return (
         0.0,
         0.0,
@@ -887,41 +910,41 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        k6 * (sin_theta_phi * s95) - s88 * k37 + (k11 * (sin_theta * s94) - s87 * k42 - s96),
-        k6 * (sin_theta_phi * s100) - k11 * (sin_theta * s99),
-        s88 * k48 + k6 * (sin_theta_phi * s105) + (s87 * k53 + k11 * (sin_theta * s104) - s96),
-        k11 * (sin_theta * s106) - k6 * (sin_theta_phi * s107),
-        s87 * k29 + k11 * (sin_theta * s111) - k6 * (sin_theta_phi * s112),
-        k11 * (sin_theta * s116) + (s88 * k29 + k6 * (sin_theta_phi * s117)),
-        k11 * (sin_theta * s118) - k6 * (sin_theta_phi * s119),
-        k6 * (sin_theta_phi * s122) - k11 * (sin_theta * s121),
+        k6 * (sin_theta_phi * s99) - s92 * k37 + (k11 * (sin_theta * s98) - s91 * k42 - s100),
+        k6 * (sin_theta_phi * s104) - k11 * (sin_theta * s103),
+        s92 * k48 + k6 * (sin_theta_phi * s109) + (s91 * k53 + k11 * (sin_theta * s108) - s100),
+        k11 * (sin_theta * s110) - k6 * (sin_theta_phi * s111),
+        s91 * k29 + k11 * (sin_theta * s115) - k6 * (sin_theta_phi * s116),
+        k11 * (sin_theta * s120) + (s92 * k29 + k6 * (sin_theta_phi * s121)),
+        k11 * (sin_theta * s122) - k6 * (sin_theta_phi * s123),
+        k6 * (sin_theta_phi * s126) - k11 * (sin_theta * s125),
         0.0,
-        -s98,
-        k11 * (cos_theta * s99) - k6 * (cos_theta_phi * s100),
-        s90 * k48 - k6 * (cos_theta_phi * s105) + (s89 * k53 - k11 * (cos_theta * s104) - s97),
-        k6 * (cos_theta_phi * s107) - k11 * (cos_theta * s106),
-        s89 * k29 - k11 * (cos_theta * s111) + k6 * (cos_theta_phi * s112),
-        s90 * k29 - k6 * (cos_theta_phi * s117) - k11 * (cos_theta * s116),
-        k6 * (cos_theta_phi * s119) - k11 * (cos_theta * s118),
-        k11 * (cos_theta * s121) - k6 * (cos_theta_phi * s122),
+        -s102,
+        k11 * (cos_theta * s103) - k6 * (cos_theta_phi * s104),
+        s94 * k48 - k6 * (cos_theta_phi * s109) + (s93 * k53 - k11 * (cos_theta * s108) - s101),
+        k6 * (cos_theta_phi * s111) - k11 * (cos_theta * s110),
+        s93 * k29 - k11 * (cos_theta * s115) + k6 * (cos_theta_phi * s116),
+        s94 * k29 - k6 * (cos_theta_phi * s121) - k11 * (cos_theta * s120),
+        k6 * (cos_theta_phi * s123) - k11 * (cos_theta * s122),
+        k11 * (cos_theta * s125) - k6 * (cos_theta_phi * s126),
         -1.0,
-        s94,
-        -s99,
-        s104,
-        s106,
-        s111,
-        s116,
-        s118,
-        -s121,
+        s98,
+        -s103,
+        s108,
+        s110,
+        s115,
+        s120,
+        s122,
+        -s125,
         0.0,
-        s95 - s94,
-        s99 + s100,
-        s105 - s104,
-        -(s106 + s107),
-        -(s111 + s112),
-        s117 - s116,
-        -(s118 + s119),
-        s121 + s122,
+        s99 - s98,
+        s103 + s104,
+        s109 - s108,
+        -(s110 + s111),
+        -(s115 + s116),
+        s121 - s120,
+        -(s122 + s123),
+        s125 + s126,
         0.0,
     )
 
@@ -962,7 +985,10 @@ def _inputs(u, columns):
 _DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 4
-_COLUMNS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt}
+_COLUMNS = {
+    "sin": np.sin,
+    "cos": np.cos,
+}
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
@@ -1072,6 +1098,11 @@ def kinetic_energy(t, y, p=None, u=None):
 def potential_energy(t, y, p=None, u=None):
     """Potential energy, J."""
     return _evaluate(_potential_energy, "potential_energy", (), ('sin',), y, p, u)[()]
+
+
+def effect_powers(t, y, p=None, u=None):
+    """What each of `EFFECT_NAMES` does to the motion, W."""
+    return _evaluate(_effect_powers, "effect_powers", (4,), ('cos', 'sin'), y, p, u)
 
 
 def momentum(t, y, p=None, u=None):

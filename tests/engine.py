@@ -11,11 +11,13 @@ import pytest
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
+from eomgen.language.formula import FUNCTIONS as FORMULA_FUNCTIONS
 from eomgen.model import Model
 from eomgen.program import from_recursion as recording
 from eomgen.program.program import interpret
 from eomgen.program.route import routed
 from eomgen.program.system import System
+from eomgen.program.tape import TIME
 from eomgen.run.module import load_module
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Scene
@@ -27,6 +29,17 @@ STEP = MP.mpf(10) ** -20
 """Of central differences, which are off by its square."""
 
 
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(MP, name) for name in FORMULA_FUNCTIONS if hasattr(MP, name)},
+    "abs": abs,
+    "step": lambda x: MP.mpf(x > 0),
+    "min": min,
+    "max": max,
+    "select": lambda c, a, b: a if c > 0 else b,
+}
+"""What a program may call, in 60 digits."""
+
+
 class Digits:
     """60-digit numbers as scalars of a program."""
 
@@ -34,9 +47,9 @@ class Digits:
         """The double itself, exactly."""
         return MP.mpf(value)
 
-    def call(self, function: str, argument: Any) -> Any:
-        """sin, cos, tan or sqrt."""
-        return getattr(MP, function)(argument)
+    def call(self, function: str, *arguments: Any) -> Any:
+        """Any function of formulas."""
+        return FUNCTIONS[function](*arguments)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,10 +68,11 @@ class Engine:
         u: Mapping[str, Any] | None = None,
         p: Mapping[str, Any] | None = None,
         extra: Sequence[Any] = (),
+        t: Any = 0,
     ) -> np.ndarray:
         """An output in 60 digits, in its shape; `extra` are tau or vd, one a velocity."""
         given = {**self.module.PARAMETERS, **(p or {}), **self.module.INPUTS, **(u or {})}
-        given |= dict(zip(self.module.STATES, y, strict=True))
+        given |= {TIME: MP.mpf(t), **dict(zip(self.module.STATES, y, strict=True))}
         names = self.system.extra.get(output, ())
         if output not in self.system.tangents:
             given |= dict(zip(names, extra or [0.0] * len(names), strict=True))

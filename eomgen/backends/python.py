@@ -2,23 +2,42 @@
 
 import json
 import keyword
+import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from eomgen.language.formula import FUNCTIONS
 from eomgen.program.printing import Block, Dialect, Names, print_block
 from eomgen.program.program import cost
 from eomgen.program.system import System
+from eomgen.program.tape import TIME
 from eomgen.templating import render
 
 WIDTH = 100
 RESERVED = frozenset(
-    {"t", "y", "p", "u", "k", "extra", "np", "math", "sin", "cos", "tan", "sqrt", "values"}
+    {"y", "p", "u", "k", "extra", "np", "math", "values"}
+    | set(FUNCTIONS)
     | set(keyword.kwlist)
     | {"float", "len", "list", "tuple", "ValueError", "zip"}
 )
-DIALECT = Dialect({name: name for name in ("sin", "cos", "tan", "sqrt")}, RESERVED)
+DIALECT = Dialect({name: name for name in FUNCTIONS}, RESERVED)
+COLUMNS = {
+    **{name: f"np.{name}" for name in ("sin", "cos", "tan", "exp", "log", "tanh", "sqrt", "abs")},
+    **{name: f"np.arc{name[1:]}" for name in ("asin", "acos", "atan", "atan2")},
+    "min": "np.minimum",
+    "max": "np.maximum",
+    "step": "lambda x: np.heaviside(x, 0.0)",
+    "select": "lambda c, a, b: np.where(c > 0.0, a, b)",
+}
+"""What each function is on columns of states."""
+OWN = {
+    "step": ("x", "1.0 if x > 0.0 else 0.0"),
+    "select": ("c, a, b", "a if c > 0.0 else b"),
+}
+"""Functions that neither `math` nor Python has."""
+
 
 ABOUT = {
     "derivative": "Time derivative of the state.",
@@ -34,6 +53,7 @@ ABOUT = {
     "applied_force": "F of M v̇ + V + G = F, (nv,): applied forces and torques.",
     "kinetic_energy": "Kinetic energy, J.",
     "potential_energy": "Potential energy, J.",
+    "effect_powers": "What each of `EFFECT_NAMES` does to the motion, W.",
     "centre_of_mass": "World place of the centre of mass of all bodies, m.",
     "point_positions": "World place of each of `POINTS`, m.",
     "point_velocities": "World velocity of each of `POINTS`, m/s.",
@@ -69,6 +89,7 @@ class Kernel:
     functions: tuple[str, ...]
     operations: str
     tangent: bool
+    time: bool
 
 
 def python_module(system: System) -> str:
@@ -80,6 +101,7 @@ def python_module(system: System) -> str:
         for name, output in program.outputs.items()
     }
     kernels = {name: _kernel(system, name, block, names) for name, block in blocks.items()}
+    called = [f for f in FUNCTIONS if any(f in block.functions for block in blocks.values())]
     dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
     special = {"initial_state", "derivative", *DERIVATIVES, *(name for name, _, _ in dynamics)}
     quaternions = tuple(model.quaternions) if model.form == "velocity" else ()
@@ -93,6 +115,7 @@ def python_module(system: System) -> str:
         "ny": len(states),
         "nq": len(model.coordinates),
         "nv": len(model.velocities),
+        "nx": len(model.states),
         "positions": repr(tuple(i for i, s in enumerate(states) if s.position)),
         "quaternions": repr(quaternions),
         "parameters": model.parameters,
@@ -100,11 +123,16 @@ def python_module(system: System) -> str:
         "inputs": model.inputs,
         "units": _units(system),
         "effects": repr(tuple(effect.type for effect in model.effects)),
+        "effect_names": repr(tuple(effect.name for effect in model.effects)),
         "bodies": repr(tuple(body.name for body in model.bodies)),
         "joints": repr(tuple(b.joint.name for b in model.bodies if b.joint.type != "free")),
         "points": repr(tuple(point.name for point in model.points)),
         "costs": [(name, json.dumps(cost(program, name))) for name in kernels],
         "kernels": list(kernels.values()),
+        "math_functions": sorted({"isfinite", *(f for f in called if hasattr(math, f))}),
+        "own_functions": [(f, *OWN[f]) for f in called if f in OWN],
+        "columns": [(f, COLUMNS[f]) for f in called],
+        "timed": any(kernel.time for kernel in kernels.values()),
         "derivative": kernels["derivative"],
         "outputs": [kernel for name, kernel in kernels.items() if name not in special],
         "derivatives": [kernel for name, kernel in kernels.items() if name in DERIVATIVES],
@@ -129,6 +157,7 @@ def _kernel(system: System, name: str, block: Block, names: Names) -> Kernel:
         functions=block.functions,
         operations=_operations(cost(system.program, name)),
         tangent=name in system.tangents,
+        time=TIME in block.inputs,
     )
 
 

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 
+from eomgen.commands.costing import effects
 from eomgen.commands.deriving import derive
 from eomgen.commands.describing import check, list_scenes, print_schema
 from eomgen.commands.generating import generate
@@ -11,6 +12,7 @@ from eomgen.commands.running import simulate, view
 __all__ = [
     "check",
     "derive",
+    "effects",
     "generate",
     "linearise",
     "list_scenes",

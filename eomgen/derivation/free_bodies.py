@@ -7,7 +7,7 @@ import sympy as sp
 
 from eomgen.derivation.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, cross, rotate, scale
-from eomgen.effects.base import JointLoad, Load
+from eomgen.effects.base import JointLoad, Load, Unmoved
 from eomgen.joints import Free
 from eomgen.language.formula import Formula
 from eomgen.model import Model
@@ -16,7 +16,7 @@ Wrench = tuple[Vec, Expr]
 """Force in world axes at the centre of mass, and torque about z."""
 
 
-class SymbolicMechanism:
+class SymbolicMechanism(Unmoved):
     """The model as effects see it, over SymPy expressions."""
 
     def __init__(self, model: Model, symbols: Symbols) -> None:
@@ -32,7 +32,7 @@ class SymbolicMechanism:
         """World y symbol of a body."""
         return self._symbols.y[self.bodies.index(body)]
 
-    def value(self, formula: Formula) -> Expr:
+    def value(self, formula: Formula, **names: Expr) -> Expr:
         """A quantity over parameter symbols."""
         return self._symbols.value(formula)
 

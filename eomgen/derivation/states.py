@@ -16,9 +16,10 @@ class State:
 
 
 def velocity_states(model: Model) -> tuple[State, ...]:
-    """The form [q, v]: coordinates, then velocities."""
-    return tuple(
+    """The form [q, v, x]: coordinates, velocities, and what effects bring along."""
+    moving = (
         State(c.name, c.unit, c.about, position)
         for group, position in ((model.coordinates, True), (model.velocities, False))
         for c in group
     )
+    return (*moving, *(State(x.name, x.unit, x.about, False) for x in model.states))

@@ -16,8 +16,8 @@ FEW_BODIES, FEW_VELOCITIES = 3, 3
 
 def why_not_closed(model: Model) -> str:
     """What keeps a model from route `closed`, in a few words; "" if nothing does."""
-    if not why_not_pins(model):
-        return ""
+    if why_not_plain(model) or not why_not_pins(model):
+        return why_not_plain(model)
     if len(model.bodies) > MOST_GENERAL_BODIES:
         return (
             f"it is for {MOST_GENERAL_BODIES} bodies at most, or {MOST_BODIES} in a tree of pins "
@@ -40,11 +40,21 @@ def why_not_tried(model: Model) -> str:
     return ""
 
 
+def why_not_plain(model: Model) -> str:
+    """What keeps a model from any closed form: an effect of more than poses and inputs."""
+    for effect in model.effects:
+        if not effect.is_plain(model.defaults):
+            return f"it takes no '{effect.type}' that depends on the motion ('{effect.name}')"
+    return ""
+
+
 def why_not_pins(model: Model) -> str:
     """What keeps a model from the handout's own derivation, for pins and free bodies in the plane.
 
     The state forms of momenta are of that one alone.
     """
+    if why_not_plain(model):
+        return why_not_plain(model)
     if model.dimensions != 2:
         return "it is derived in the plane"
     for body in model.bodies:

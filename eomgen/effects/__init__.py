@@ -4,11 +4,54 @@ from typing import Annotated
 
 from pydantic import Field
 
+from eomgen.effects.attraction import PointGravity
+from eomgen.effects.controller import Controller
+from eomgen.effects.drag import Drag
 from eomgen.effects.external_force import ExternalForce
+from eomgen.effects.external_torque import ExternalTorque
+from eomgen.effects.field import ForceField
 from eomgen.effects.gravity import Gravity
+from eomgen.effects.joint_friction import JointFriction
+from eomgen.effects.joint_spring import JointSpring
+from eomgen.effects.joint_stop import JointStop
 from eomgen.effects.motor import Motor
+from eomgen.effects.pd import Pd
+from eomgen.effects.pid import Pid
+from eomgen.effects.spring import Spring
 
-Effect = Annotated[Gravity | ExternalForce | Motor, Field(discriminator="type")]
+Effect = Annotated[
+    Gravity
+    | Controller
+    | Drag
+    | ExternalForce
+    | ExternalTorque
+    | ForceField
+    | JointFriction
+    | JointSpring
+    | JointStop
+    | Motor
+    | Pd
+    | Pid
+    | PointGravity
+    | Spring,
+    Field(discriminator="type"),
+]
 """Any effect of a scene, told apart by its `type`."""
 
-__all__ = ["Effect", "ExternalForce", "Gravity", "Motor"]
+__all__ = [
+    "Controller",
+    "Drag",
+    "Effect",
+    "ExternalForce",
+    "ExternalTorque",
+    "ForceField",
+    "Gravity",
+    "JointFriction",
+    "JointSpring",
+    "JointStop",
+    "Motor",
+    "Pd",
+    "Pid",
+    "PointGravity",
+    "Spring",
+]

@@ -1,12 +1,16 @@
-"""What effects share: the loads they put on free bodies and joints, over any scalars."""
+"""What effects share: what they may ask of a mechanism, and the loads they put on it."""
 
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol, Self
 
-from eomgen.language.formula import Formula
+from eomgen.language.base import Identifier, Table
+from eomgen.language.formula import ZERO, Formula
 
 Scalar = Any
-"""SymPy expressions, program nodes or floats; effects only add, subtract and multiply them."""
+"""SymPy expressions, program nodes or floats; effects add, subtract, multiply, divide, and call."""
+Vector = tuple[Scalar, ...]
+"""Two components in the plane, three in space."""
 
 
 @dataclass(frozen=True)
@@ -19,29 +23,42 @@ class Input:
 
 
 @dataclass(frozen=True)
-class Load:
-    """A force on one free body: two components in the plane, three in space.
+class ExtraState:
+    """A state that an effect brings along, of a controller or an actuator for example."""
 
-    `force` in world axes (N) acts at `at`, measured from the centre of mass in body axes (m).
-    `kind` says on which side of M v̇ + V + G = F it stands.
+    name: str
+    unit: str
+    about: str
+    initial: float
+
+
+@dataclass(frozen=True)
+class Load:
+    """A force on one free body, and a torque.
+
+    `force` in world axes (N) acts at `at`, measured from the centre of mass in body axes (m);
+    `torque` in world axes (N m) has one component in the plane, about z, and three in space; ()
+    is none. `kind` says on which side of M v̇ + V + G = F it stands.
     """
 
     body: str
-    force: tuple[Scalar, ...]
-    at: tuple[Scalar, ...]
+    force: Vector
+    at: Vector
     kind: Literal["gravity", "applied"]
+    torque: Vector = ()
 
 
 @dataclass(frozen=True)
 class JointLoad:
-    """A force on the one coordinate of a joint (N m or N): on the child, and back on the parent."""
+    """A force on one coordinate of a joint (N m or N): on the child, and back on the parent."""
 
     joint: str
     force: Scalar
+    coordinate: int = 0
 
 
 class Mechanism(Protocol):
-    """What an effect may ask of the mechanism it acts on."""
+    """What an effect may ask of the mechanism it acts on. Vectors are in world axes."""
 
     @property
     def dimensions(self) -> int:
@@ -57,8 +74,129 @@ class Mechanism(Protocol):
     def height(self, body: str) -> Scalar:
         """World y of a body's centre of mass in the plane, z in space, m."""
 
-    def value(self, formula: Formula) -> Scalar:
-        """Value of a quantity."""
+    def place(self, body: str, at: Vector) -> Vector:
+        """World place of a point of a body, given from its centre of mass in body axes, m. The
+        world is a body, too, with its origin for a centre of mass.
+        """
+
+    def velocity(self, body: str, at: Vector) -> Vector:
+        """World velocity of such a point, m/s."""
+
+    def turning(self, body: str) -> Vector:
+        """Angular velocity of a body, rad/s: one component in the plane, three in space."""
+
+    def outward(self, body: str, vector: Vector) -> Vector:
+        """A vector of body axes in world axes."""
+
+    def coordinate(self, joint: str, index: int = 0) -> Scalar:
+        """A coordinate of a joint."""
+
+    def rate(self, joint: str, index: int = 0) -> Scalar:
+        """A velocity of a joint."""
+
+    def value(self, formula: Formula, **names: Scalar) -> Scalar:
+        """Value of a quantity; in its formula may stand parameters, `t`, coordinates, velocities,
+        inputs and extra states where the field lets them, and `names` besides.
+        """
 
     def input(self, name: str) -> Scalar:
         """Value of an input."""
+
+    def state(self, name: str) -> Scalar:
+        """Value of an extra state."""
+
+    def number(self, value: float) -> Scalar:
+        """A number as a scalar."""
+
+    def call(self, function: str, *arguments: Scalar) -> Scalar:
+        """A function of formulas (`language.formula.FUNCTIONS`)."""
+
+
+class Unmoved:
+    """A mechanism for those effects alone whose loads depend on no motion: see `is_plain`."""
+
+    def place(self, body: str, at: Vector) -> Vector:
+        """Never asked for."""
+        raise AssertionError(body)
+
+    def velocity(self, body: str, at: Vector) -> Vector:
+        """Never asked for."""
+        raise AssertionError(body)
+
+    def turning(self, body: str) -> Vector:
+        """Never asked for."""
+        raise AssertionError(body)
+
+    def outward(self, body: str, vector: Vector) -> Vector:
+        """Never asked for."""
+        raise AssertionError(body)
+
+    def coordinate(self, joint: str, index: int = 0) -> Scalar:
+        """Never asked for."""
+        raise AssertionError(joint)
+
+    def rate(self, joint: str, index: int = 0) -> Scalar:
+        """Never asked for."""
+        raise AssertionError(joint)
+
+    def state(self, name: str) -> Scalar:
+        """Never asked for."""
+        raise AssertionError(name)
+
+    def number(self, value: float) -> Scalar:
+        """Never asked for."""
+        raise AssertionError(value)
+
+    def call(self, function: str, *arguments: Scalar) -> Scalar:
+        """Never asked for."""
+        raise AssertionError(function)
+
+
+class EffectTable(Table):
+    """An effect's table: what it brings along and what it does. Most bring little."""
+
+    body_fields: ClassVar[tuple[str, ...]] = ()
+    """Fields that name a body, or list some; `anchor_fields` may name the world, too."""
+    anchor_fields: ClassVar[tuple[str, ...]] = ()
+    joint_fields: ClassVar[tuple[str, ...]] = ()
+    """Fields that name a revolute or prismatic joint, or hold a table by such names."""
+    vector_fields: ClassVar[tuple[str, ...]] = ()
+    """Fields that hold a vector: as many components as there are dimensions, or left out."""
+
+    name: Identifier
+
+    def checked(self, dimensions: int, place: str) -> Self:
+        """The effect itself, or put right where `dimensions` ask for it.
+
+        Raises `SceneError`, naming the field after `place`, for what the schema cannot know.
+        """
+        return self
+
+    def check_values(self, value: Callable[[Formula], float], place: str) -> None:
+        """Raise `SceneError` for quantities that do not go together, by their values."""
+
+    def inputs(self, dimensions: int) -> tuple[Input, ...]:
+        """Inputs that it takes."""
+        return ()
+
+    def states(self, dimensions: int) -> tuple[ExtraState, ...]:
+        """States that it brings along."""
+        return ()
+
+    def rates(self, mechanism: Mechanism) -> tuple[Scalar, ...]:
+        """Time derivatives of its states, in their order."""
+        return ()
+
+    def loads(self, mechanism: Mechanism) -> Iterable[Load | JointLoad]:
+        """What it puts on bodies and joints."""
+        return ()
+
+    def potential_energy(self, mechanism: Mechanism) -> Scalar:
+        """J; 0 for an effect that brings energy in or takes it out."""
+        return mechanism.value(ZERO)
+
+    def is_plain(self, parameters: Collection[str]) -> bool:
+        """Whether its loads depend on parameters, inputs and its bodies' poses alone, so that the
+        closed form takes them.
+        """
+        return False

@@ -1,34 +1,39 @@
 """A force from outside at a point of a body."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Literal
 
 from pydantic import Field
 
-from eomgen.effects.base import Input, Load, Mechanism, Scalar
-from eomgen.language.base import Identifier, Table
-from eomgen.language.formula import ZERO
+from eomgen.effects.base import EffectTable, Input, Load, Mechanism
+from eomgen.language.base import Identifier
+from eomgen.language.formula import names_in
 from eomgen.language.quantity import Vector, quantity
 
 
-class ExternalForce(Table):
-    """A force f_e in world axes at r_e of a body (handout (29)-(34)).
+class ExternalForce(EffectTable):
+    """A force f_e at r_e of a body (handout (29)-(34)), in world axes or in those of the body.
 
     `force = "input"` makes its components the inputs `<name>_x`, `<name>_y` and, in space,
     `<name>_z`.
     """
 
+    body_fields = ("body",)
+    vector_fields = ("at", "force")
+
     type: Literal["external_force"]
-    name: Identifier
     body: Identifier = Field(description="body it acts on")
+    axes: Literal["world", "body"] = Field(default="world", description="axes of its components")
     at: Vector = quantity("m", "point from the centre of mass", default=(), validate_default=False)
-    force: Literal["input"] | Vector = quantity("N", "force", union_mode="left_to_right")
+    force: Literal["input"] | Vector = quantity(
+        "N", "force", sees=("motion",), union_mode="left_to_right"
+    )
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
         """One input a component if the force is one."""
         if self.force != "input":
             return ()
-        about = f"force {self.name} on {self.body}"
+        about = f"force {self.name} on {self.body}" + ", body axes" * (self.axes == "body")
         return tuple(
             Input(f"{self.name}_{axis}", "N", f"{about}, {axis}") for axis in "xyz"[:dimensions]
         )
@@ -40,8 +45,14 @@ class ExternalForce(Table):
             force = tuple(mechanism.value(part) for part in self.force)
         else:
             force = tuple(mechanism.input(i.name) for i in self.inputs(mechanism.dimensions))
+        if self.axes == "body":
+            force = mechanism.outward(self.body, force)
         yield Load(self.body, force, at, "applied")
 
-    def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """None: an external force brings energy in or takes it out."""
-        return mechanism.value(ZERO)
+    def is_plain(self, parameters: Collection[str]) -> bool:
+        """In world axes, unless its formula uses the motion or the time."""
+        if self.axes == "body":
+            return False
+        if not isinstance(self.force, tuple):
+            return True
+        return all(n in parameters for part in self.force for n in names_in(part))

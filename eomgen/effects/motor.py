@@ -1,26 +1,29 @@
 """A motor at a joint of one coordinate."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Literal
 
 from pydantic import Field
 
-from eomgen.effects.base import Input, JointLoad, Mechanism, Scalar
-from eomgen.language.base import Identifier, Table
-from eomgen.language.formula import ZERO
+from eomgen.effects.base import EffectTable, Input, JointLoad, Mechanism
+from eomgen.language.base import Identifier
+from eomgen.language.formula import names_in
 from eomgen.language.quantity import Quantity, quantity
 
 
-class Motor(Table):
+class Motor(EffectTable):
     """A torque τ, +τ on the joint's child and -τ on its parent (handout (35), (36)).
 
     At a sliding joint it is a force. `torque = "input"` makes it the input `<name>`.
     """
 
+    joint_fields = ("joint",)
+
     type: Literal["motor"]
-    name: Identifier
     joint: Identifier = Field(description="revolute or prismatic joint it drives")
-    torque: Literal["input"] | Quantity = quantity("N m", "torque", union_mode="left_to_right")
+    torque: Literal["input"] | Quantity = quantity(
+        "N m", "torque", sees=("motion",), union_mode="left_to_right"
+    )
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
         """One input if the torque is one."""
@@ -36,6 +39,6 @@ class Motor(Table):
             torque = mechanism.value(self.torque)
         yield JointLoad(self.joint, torque)
 
-    def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """None: a motor brings energy in or takes it out."""
-        return mechanism.value(ZERO)
+    def is_plain(self, parameters: Collection[str]) -> bool:
+        """Unless its formula uses the motion or the time."""
+        return self.torque == "input" or all(n in parameters for n in names_in(self.torque))

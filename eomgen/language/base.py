@@ -21,10 +21,11 @@ class Table(BaseModel):
     @classmethod
     def _only_known_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
+            known = [field.alias or name for name, field in cls.model_fields.items()]
             for key in data:
-                if key not in cls.model_fields:
-                    hint = nearest(str(key), cls.model_fields)
-                    hint = hint or f"; known here: {', '.join(cls.model_fields)}"
+                if key not in known:
+                    hint = nearest(str(key), known)
+                    hint = hint or f"; known here: {', '.join(known)}"
                     raise PydanticCustomError(
                         "unknown_key", "unknown key{hint}", {"key": str(key), "hint": hint}
                     )

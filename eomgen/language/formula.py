@@ -14,7 +14,17 @@ from typing import Any, Protocol
 LONGEST_TEXT = 500
 DEEPEST = 150
 LARGEST_POWER = 16
-FUNCTIONS = ("cos", "sin", "sqrt", "tan")
+FUNCTIONS = {
+    **dict.fromkeys(("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh"), 1),
+    **dict.fromkeys(("sqrt", "abs", "step"), 1),
+    **dict.fromkeys(("atan2", "min", "max"), 2),
+    "select": 3,
+}
+"""Functions of a formula, with how many arguments each takes.
+
+`step(x)` is 1 where x > 0 and else 0; `select(c, a, b)` is a where c > 0 and else b, which is also
+what comparisons and `a if x < y else b` become.
+"""
 CONSTANTS = {"pi": math.pi}
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+",
@@ -22,6 +32,14 @@ _OPERATORS: dict[type[ast.operator], str] = {
     ast.Mult: "*",
     ast.Div: "/",
     ast.Pow: "**",
+}
+
+
+_COMPARISONS: dict[type[ast.cmpop], str] = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
 }
 
 
@@ -61,8 +79,8 @@ class Scalars(Protocol):
     def number(self, value: float) -> Any:
         """The scalar that stands for a float."""
 
-    def call(self, function: str, argument: Any) -> Any:
-        """One of `FUNCTIONS` of a scalar."""
+    def call(self, function: str, *arguments: Any) -> Any:
+        """One of `FUNCTIONS` of scalars."""
 
 
 class Floats:
@@ -72,9 +90,19 @@ class Floats:
         """Return the value itself."""
         return value
 
-    def call(self, function: str, argument: float) -> float:
+    def call(self, function: str, *arguments: float) -> float:
         """Return the function's value, by `math`."""
-        return float(getattr(math, function)(argument))
+        return float(BY_MATH[function](*arguments))
+
+
+BY_MATH: dict[str, Callable[..., float]] = {
+    **{name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)},
+    "abs": math.fabs,
+    "step": lambda x: 1.0 if x > 0.0 else 0.0,
+    "min": min,
+    "max": max,
+    "select": lambda c, a, b: a if c > 0.0 else b,
+}
 
 
 def parse(text: str) -> Formula:
@@ -125,10 +153,30 @@ def _read(node: ast.expr, depth: int) -> Formula:
                     f"has a power {at} that is not a whole number 0 to {LARGEST_POWER}"
                 )
             return Apply(_OPERATORS[type(op)], operands)
-        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
-            return Apply(name, (_read(argument, depth + 1),))
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
+            if len(arguments) != FUNCTIONS[name]:
+                wanted = FUNCTIONS[name]
+                raise FormulaError(
+                    f"gives {name} {at} {len(arguments)} arguments; it takes {wanted}"
+                )
+            return Apply(name, tuple(_read(argument, depth + 1) for argument in arguments))
+        case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARISONS:
+            return _compared(
+                _COMPARISONS[type(op)], _read(left, depth + 1), _read(right, depth + 1)
+            )
+        case ast.IfExp(test=test, body=body, orelse=orelse):
+            parts = (_read(part, depth + 1) for part in (test, body, orelse))
+            return Apply("select", tuple(parts))
         case _:
             raise FormulaError(f"has something {at} that no formula may hold")
+
+
+def _compared(operation: str, left: Formula, right: Formula) -> Formula:
+    """1 where the comparison holds, else 0."""
+    if operation in (">", "<="):
+        left, right = right, left
+    below = Apply("step", (Apply("-", (right, left)),))  # left < right
+    return below if operation in ("<", ">") else Apply("-", (Constant(1.0), below))
 
 
 def _small_whole(power: Formula) -> bool:
@@ -150,7 +198,7 @@ def names_in(formula: Formula) -> Iterator[str]:
 
 
 def calls_function(formula: Formula) -> bool:
-    """Whether a formula has sin, cos, tan or sqrt in it."""
+    """Whether a formula has a function in it."""
     match formula:
         case Apply(operation, operands):
             return operation in FUNCTIONS or any(calls_function(part) for part in operands)
@@ -166,10 +214,10 @@ def written(formula: Formula) -> str:
             return name
         case Apply("neg", (operand,)):
             return f"(-{written(operand)})"
+        case Apply(operation, operands) if operation in FUNCTIONS:
+            return f"{operation}({', '.join(written(operand) for operand in operands)})"
         case Apply(operation, (left, right)):
             return f"({written(left)} {operation} {written(right)})"
-        case Apply(operation, (argument,)):
-            return f"{operation}({written(argument)})"
     raise AssertionError(formula)
 
 
@@ -191,7 +239,7 @@ def evaluate(formula: Formula, names: Mapping[str, Any], scalars: Scalars) -> An
                 return result
             if operation in _ARITHMETIC:
                 return _ARITHMETIC[operation](*values)
-            return scalars.call(operation, values[0])
+            return scalars.call(operation, *values)
 
 
 _ARITHMETIC: dict[str, Callable[..., Any]] = {

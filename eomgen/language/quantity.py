@@ -5,7 +5,7 @@ the scene's `[parameters]`; a bare 0 is structure: it is folded away and is no p
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -61,9 +61,18 @@ Numbers = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
 Bound = Literal["any", "positive", "nonnegative"]
 
 
-def quantity(unit: str, about: str, bound: Bound = "any", **options: Any) -> Any:
-    """A field that holds a quantity: its unit, what it is, and the bound its value keeps."""
-    return Field(description=about, json_schema_extra={"unit": unit, "bound": bound}, **options)
+def quantity(
+    unit: str, about: str, bound: Bound = "any", sees: Sequence[str] = (), **options: Any
+) -> Any:
+    """A field that holds a quantity: its unit, what it is, and the bound its value keeps.
+
+    `sees` are names that its formula may use besides parameters: `motion` stands for `t`, all
+    coordinates, velocities, inputs and extra states; any other word for itself.
+    """
+    extra: dict[str, Any] = {"unit": unit, "bound": bound}
+    if sees:
+        extra["sees"] = list(sees)
+    return Field(description=about, json_schema_extra=extra, **options)
 
 
 @dataclass(frozen=True)
@@ -92,28 +101,46 @@ def with_components(
 
 
 def name_quantities(
-    table: Table, prefix: str, place: str, known: Mapping[str, float]
+    table: Table,
+    prefix: str,
+    place: str,
+    known: Mapping[str, float],
+    motion: Sequence[str] = (),
 ) -> tuple[dict[str, Any], list[Parameter]]:
     """Give every bare nonzero number among a table's quantities a name.
 
     Returns the replaced fields (for `Table.replaced`) and the new parameters. `known` holds the
-    values of the scene's own parameters. Raises `SceneError` for a name that is not there and for a
-    value outside the field's bound.
+    values of the scene's own parameters, `motion` names what else a field may see. Raises
+    `SceneError` for a name that is not there and for a value outside the field's bound.
     """
     fields: dict[str, Any] = {}
     parameters: list[Parameter] = []
     for field, info in type(table).model_fields.items():
-        extra = info.json_schema_extra
+        extra, value = info.json_schema_extra, getattr(table, field)
+        if isinstance(value, dict) and any(isinstance(x, Table) for x in value.values()):
+            tables = {}
+            for key, inner in value.items():
+                at = f"{place}.{info.alias or field}.{key}"
+                inside, new = name_quantities(inner, f"{prefix}_{key}", at, known, motion)
+                tables[key] = inner.replaced(**inside)
+                parameters += new
+            fields[field] = tables
         if not isinstance(extra, dict) or "unit" not in extra:
             continue
-        value = getattr(table, field)
+        sees = [str(word) for word in _listed(extra.get("sees"))]
         named: list[Formula] = []
         for formula, suffix, spot, off_diagonal in _parts(value, field):
             where = f"{place}.{spot}"
             bound = "any" if off_diagonal else str(extra["bound"])
-            _check(formula, where, bound, str(extra["unit"]), known)
+            if bound == "nonnegative" and getattr(table, "allow_active", False):
+                bound = "any"
+            seen = [
+                *(motion if "motion" in sees else ()),
+                *(word for word in sees if word != "motion"),
+            ]
+            _check(formula, where, bound, str(extra["unit"]), known, seen)
             if isinstance(formula, Constant) and formula.value != 0.0:
-                about = f"{info.description} of {prefix}{suffix.replace('_', ', ')}"
+                about = f"{info.description} of {prefix}{suffix.replace('_', ', ', 1)}"
                 name = f"{prefix}_{field}{suffix}"
                 parameters.append(Parameter(name, formula.value, str(extra["unit"]), about))
                 named.append(Name(name))
@@ -121,6 +148,8 @@ def name_quantities(
                 named.append(formula)
         if isinstance(value, tuple):
             fields[field] = tuple(named)
+        elif isinstance(value, dict):
+            fields[field] = dict(zip(value, named, strict=True))
         elif named:
             fields[field] = named[0]
     return fields, parameters
@@ -134,6 +163,9 @@ def _parts(value: Any, field: str) -> Iterator[tuple[Formula, str, str, bool]]:
     """Each quantity of a field with the end of its name, its place, and if it is off a diagonal."""
     if isinstance(value, Formula):
         yield value, "", field, False
+    elif isinstance(value, dict):
+        for key, part in value.items():
+            yield part, f"_{key}", f"{field}.{key}", False
     elif isinstance(value, tuple):
         matrix = field == "inertia_com"
         for i, part in enumerate(value):
@@ -141,12 +173,29 @@ def _parts(value: Any, field: str) -> Iterator[tuple[Formula, str, str, bool]]:
             yield part, f"_{end}" if end else "", f"{field}[{i}]", matrix and i >= 3
 
 
-def _check(formula: Formula, where: str, bound: str, unit: str, known: Mapping[str, float]) -> None:
+def _listed(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+def _check(
+    formula: Formula,
+    where: str,
+    bound: str,
+    unit: str,
+    known: Mapping[str, float],
+    seen: Sequence[str],
+) -> None:
+    moving = False
     for name in names_in(formula):
-        if name not in known:
-            words = [*known, *FUNCTIONS, *CONSTANTS]
+        moving = moving or name in seen
+        if name in known and name in seen:
+            raise SceneError(f"{where}: '{name}' is known here by itself; rename the parameter")
+        if name not in known and name not in seen:
+            words = [*known, *seen, *FUNCTIONS, *CONSTANTS]
             hint = nearest(name, words) or "; give it a value in [parameters]"
             raise SceneError(f"{where}: unknown parameter '{name}'{hint}")
+    if moving:  # then it has no value before the motion
+        return
     try:
         value = evaluate(formula, known, Floats())
     except (ArithmeticError, ValueError):

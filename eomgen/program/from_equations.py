@@ -7,7 +7,9 @@ import sympy as sp
 
 from eomgen.derivation.closed import Equations, written_out_forces
 from eomgen.derivation.forms import state_form
+from eomgen.derivation.free_bodies import SymbolicMechanism
 from eomgen.derivation.symbols import Vec, rotate
+from eomgen.effects.base import JointLoad
 from eomgen.language.formula import evaluate
 from eomgen.model import Point, is_zero, off_centre
 from eomgen.program.differentiate import jacobian
@@ -117,6 +119,7 @@ def _recipes(equations: Equations) -> dict[str, tuple[tuple[int, ...], list[Any]
         "applied_force": ((n,), list(symmetric.F)),
         "kinetic_energy": ((), [_kinetic_energy(equations)]),
         "potential_energy": ((), [equations.free_bodies.potential_energy]),
+        "effect_powers": ((len(equations.model.effects),), _powers(equations)),
         "momentum": ((3,), _momentum(equations)),
         "centre_of_mass": ((2,), _centre_of_mass(equations)),
         "joint_forces": ((len(pins), 3), [component for force in pins for component in force]),
@@ -135,6 +138,29 @@ def _point(equations: Equations, point: Point) -> tuple[Vec, Vec]:
     s, k = equations.symbols, point.body
     rx, ry = rotate((s.value(point.at[0]), s.value(point.at[1])), s.angle[k])
     return (s.x[k] + rx, s.y[k] + ry), (s.xd[k] - s.omega[k] * ry, s.yd[k] + s.omega[k] * rx)
+
+
+def _powers(equations: Equations) -> list[Any]:
+    """Of each effect Σ f · v of its loads, and τ times the rate of its joint."""
+    s, model = equations.symbols, equations.model
+    mechanism = SymbolicMechanism(model, s)
+    index = {body.name: k for k, body in enumerate(model.bodies)}
+    joint = {body.joint.name: k for k, body in enumerate(model.bodies)}
+    powers = []
+    for effect in model.effects:
+        power = sp.Integer(0)
+        for load in effect.loads(mechanism):
+            if isinstance(load, JointLoad):
+                k = joint[load.joint]
+                above = model.bodies[k].parent
+                power += load.force * (s.omega[k] - (s.omega[above] if above >= 0 else 0))
+            else:
+                k = index[load.body]
+                rx, ry = rotate((load.at[0], load.at[1]), s.angle[k])
+                power += load.force[0] * (s.xd[k] - s.omega[k] * ry)
+                power += load.force[1] * (s.yd[k] + s.omega[k] * rx)
+        powers.append(power)
+    return powers
 
 
 def _centre_of_mass(equations: Equations) -> list[Any]:

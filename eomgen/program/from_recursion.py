@@ -15,7 +15,7 @@ from eomgen.program.differentiate import jacobian, substituted, tangent
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system
-from eomgen.program.tape import Node, Stage, Tape
+from eomgen.program.tape import TIME, Node, Stage, Tape
 
 DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 
@@ -46,7 +46,10 @@ class Recording:
         self.q = [self.given(c.name, Stage.POSITIONS) for c in model.coordinates]
         self.v = [self.given(c.name, Stage.VELOCITIES) for c in model.velocities]
         self.inputs = {i.name: self.given(i.name, Stage.INPUTS) for i in model.inputs}
-        values = Values(self.parameters, self.inputs, self.q, self.v)
+        self.x = [self.given(x.name, Stage.VELOCITIES) for x in model.states]
+        extra = {x.name: node for x, node in zip(model.states, self.x, strict=True)}
+        time = self.given(TIME, Stage.INPUTS)
+        values = Values(self.parameters, self.inputs, self.q, self.v, extra, time)
         self.dynamics = Dynamics(model, values, self.scalars, axes)
         recursions = {
             "aba": self.dynamics.articulated_forward,
@@ -54,7 +57,8 @@ class Recording:
         }
         self.forward: Forward = forward(self) if forward is not None else recursions[route]
         self.vd = self.forward(None)
-        self.rates = [*position_rates(model, self.q, self.v, self.tape), *self.vd]
+        self.position_rates = position_rates(model, self.q, self.v, self.tape)
+        self.rates = [*self.position_rates, *self.vd, *self.dynamics.state_rates]
 
     def given(self, name: str, stage: Stage) -> Node:
         """An input of the program."""
@@ -89,9 +93,10 @@ def position_rates(model: Model, q: Sequence[Node], v: Sequence[Node], tape: Tap
 def from_recursion(record: Recording) -> System:
     """The whole system of a recorded model."""
     model = record.model
-    nq, nv, ny = len(record.q), len(record.v), len(record.q) + len(record.v)
+    ny = len(record.rates)
     tape = record.tape
-    start = [tape.constant(x) for x in (*model.initial_q, *model.initial_v)]
+    extras = (x.initial for x in model.states)
+    start = [tape.constant(x) for x in (*model.initial_q, *model.initial_v, *extras)]
     made: Made = {
         "initial_state": ((ny,), start),
         "derivative": ((ny,), record.rates),
@@ -109,7 +114,6 @@ def from_recursion(record: Recording) -> System:
     for name in model.outputs:
         if name not in DERIVATIVES:
             made[name] = output(record, name, extra)
-    assert nq + nv == ny
     return make_system(
         model,
         record.route,
@@ -152,6 +156,9 @@ def output(
             return (), [d.kinetic_energy]
         case "potential_energy":
             return (), [d.potential_energy]
+        case "effect_powers":
+            powers = [d.power(effect) for effect in model.effects]
+            return (len(powers),), powers
         case "momentum":
             p, about = observe.momentum(d.instant, d.places, d.moving, scalars)
             return ((3,), [p[0], p[1], about[2]]) if dims == 2 else ((6,), [*p, *about])
@@ -230,7 +237,7 @@ def along_directions(
 def variables(record: Recording, name: str) -> list[Node]:
     """What a matrix of derivatives is taken by: state, inputs or parameters."""
     return {
-        "jacobian": [*record.q, *record.v],
+        "jacobian": [*record.q, *record.v, *record.x],
         "input_jacobian": list(record.inputs.values()),
         "parameter_jacobian": list(record.parameters.values()),
     }[name]
@@ -269,7 +276,8 @@ def _matrix(record: Recording, name: str) -> list[list[Node]]:
         for k, column in enumerate(columns)
     ]
     below = [list(row) for row in zip(*answers, strict=True)] or [[] for _ in record.v]
-    return [*jacobian(record.rates[: len(record.q)], by), *below]
+    above = jacobian(record.position_rates, by)
+    return [*above, *below, *jacobian(record.dynamics.state_rates, by)]
 
 
 def _state_columns(record: Recording) -> list[list[Node]]:
@@ -302,7 +310,8 @@ def _state_columns(record: Recording) -> list[list[Node]]:
                     for a, b, c in zip(*turns, strict=True)
                 ]
             )
-    return columns + [column(slopes.by_velocity, j) for j in range(nv)]
+    columns += [column(slopes.by_velocity, j) for j in range(nv)]
+    return columns + [[zero] * nv for _ in record.x]
 
 
 def checks(record: Recording) -> list[Check]:

@@ -80,7 +80,7 @@ class Names:
     def _described(self, node: int) -> str | None:
         """`sin_theta` or `theta_dot_squared` for what is that simple."""
         step = self._program.steps[node]
-        if step.operation in FUNCTIONS:
+        if step.operation in FUNCTIONS and len(step.operands) == 1:
             words = self._angles(step.operands[0])
             return None if words is None else "_".join((step.operation, *words))
         if step.operation == "mul" and step.operands[0] == step.operands[1]:
@@ -175,7 +175,7 @@ def _expression(
     product in a product, keeps its brackets.
     """
     if operation in FUNCTIONS:
-        return f"{dialect.functions[operation]}({operands[0][0]})", _ATOM
+        return f"{dialect.functions[operation]}({', '.join(o[0] for o in operands)})", _ATOM
     if operation == "neg":
         source, level = operands[0]
         return (f"-{source}" if level >= _PRODUCT else f"-({source})"), _PRODUCT

@@ -94,8 +94,8 @@ class Arithmetic(Protocol):
     def number(self, value: float) -> Any:
         """The scalar that stands for a float."""
 
-    def call(self, function: str, argument: Any) -> Any:
-        """sin, cos, tan or sqrt of a scalar."""
+    def call(self, function: str, *arguments: Any) -> Any:
+        """A function of formulas (`language.formula.FUNCTIONS`)."""
 
 
 def interpret(
@@ -116,7 +116,7 @@ def interpret(
         elif step.operation == "neg":
             values[i] = -operands[0]
         elif step.operation in FUNCTIONS:
-            values[i] = scalars.call(step.operation, operands[0])
+            values[i] = scalars.call(step.operation, *operands)
         else:
             values[i] = ARITHMETIC[step.operation](*operands)
     return [values[n] for n in program.outputs[output].nodes]

@@ -13,9 +13,9 @@ class TapeScalars:
         """A constant."""
         return self._tape.constant(value)
 
-    def call(self, function: str, argument: Node) -> Node:
-        """sin, cos, tan or sqrt."""
-        return self._tape.apply(function, argument)
+    def call(self, function: str, *arguments: Node) -> Node:
+        """A function of formulas."""
+        return self._tape.apply(function, *arguments)
 
     def is_zero(self, value: Node) -> bool:
         """Whether a node has folded to 0."""

@@ -5,10 +5,14 @@ What is written twice exists once, constants fold, 0·x and 1·x vanish, and min
 until an addition swallows them. No expression tree ever exists.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Any, NamedTuple
+
+from eomgen.language.formula import BY_MATH
+
+TIME = "t"
+"""The input that stands for time; no name of a scene."""
 
 
 class Stage(IntEnum):
@@ -21,12 +25,8 @@ class Stage(IntEnum):
     INPUTS = 4
 
 
-FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "sin": math.sin,
-    "cos": math.cos,
-    "tan": math.tan,
-    "sqrt": math.sqrt,
-}
+FUNCTIONS: dict[str, Callable[..., float]] = dict(BY_MATH)
+"""The functions of formulas, each an operation of its own."""
 ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -115,17 +115,17 @@ class Tape:
         folded = fold(self, *nodes) if fold is not None else None
         if folded is not None:
             return folded
-        if len(nodes) == 1:
-            node = nodes[0]
-            value = self.values[node.index]
-            if value is not None and operation in FUNCTIONS:
-                return self.constant(FUNCTIONS[operation](value))
-            return self._intern((operation, node.index), self.steps[node.index].stage, None)
-        a, b = nodes[0].index, nodes[1].index
-        if a > b and operation in ("add", "mul"):
-            a, b = b, a
-        left, right = self.steps[a].stage, self.steps[b].stage
-        return self._intern((operation, a, b), left if left >= right else right, None)
+        if operation in FUNCTIONS:
+            values = [self.values[node.index] for node in nodes]
+            if None not in values:
+                return self.constant(FUNCTIONS[operation](*values))
+        indices = tuple(node.index for node in nodes)
+        if operation in ("add", "mul") and indices[0] > indices[1]:
+            indices = indices[::-1]
+        stage = self.steps[indices[0]].stage
+        for index in indices[1:]:
+            stage = max(stage, self.steps[index].stage)
+        return self._intern((operation, *indices), stage, None)
 
 
 def _value(node: Node) -> float | None:

@@ -18,8 +18,9 @@ def _without_internals(node: object) -> None:
     if isinstance(node, dict):
         if isinstance(node.get("unit"), str):  # a mark of ours, not a property of that name
             node["description"] = f"{node.get('description', '')} ({node.pop('unit')})"
-        if isinstance(node.get("bound"), str):
-            del node["bound"]
+        for internal, kind in (("bound", str), ("sees", list)):
+            if isinstance(node.get(internal), kind):
+                del node[internal]
         for value in node.values():
             _without_internals(value)
     elif isinstance(node, list):

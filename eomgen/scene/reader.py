@@ -99,7 +99,7 @@ def _lines(details: list[ErrorDetails]) -> list[str]:
     for detail in details:
         detail = _of_the_whole_list(detail)
         place, weight = _place(detail["loc"]), _weight(detail)
-        if detail["type"] == "unknown_key":
+        if detail["type"] in ("unknown_key", "keys"):
             place = f"{place}.{detail['ctx']['key']}"
         outer |= {place[:i] for i, character in enumerate(place) if character in ".["}
         if place not in lines or weight >= lines[place][0]:
@@ -151,6 +151,8 @@ def _line(detail: ErrorDetails) -> str:
         case "unknown_key":
             place = f"{place}.{context['key']}" if place else str(context["key"])
             return f"{place}: unknown key{context['hint']}"
+        case "keys":
+            return f"{place}.{context['key']}: {detail['msg']}"
         case "missing":
             if place.endswith("]"):
                 return f"{place}: missing; the list is too short"

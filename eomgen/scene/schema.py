@@ -24,6 +24,7 @@ Output = Literal[
     "applied_force",
     "kinetic_energy",
     "potential_energy",
+    "effect_powers",
     "momentum",
     "centre_of_mass",
     "joint_forces",

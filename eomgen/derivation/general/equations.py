@@ -13,7 +13,7 @@ from eomgen.derivation.general.constraints import Constraint, Moving, about
 from eomgen.derivation.general.simplify import gathered
 from eomgen.derivation.general.symbols import Ledger, Symbols
 from eomgen.derivation.symbols import Expr
-from eomgen.effects.base import JointLoad, Load
+from eomgen.effects.base import JointLoad, Load, Unmoved
 from eomgen.joints.base import Geared
 from eomgen.language.formula import Formula
 from eomgen.model import Model
@@ -73,7 +73,7 @@ class Balance:
     F: Expr
 
 
-class Mechanism:
+class Mechanism(Unmoved):
     """The model as effects see it while they put their loads on it."""
 
     def __init__(self, model: Model, symbols: Symbols) -> None:
@@ -90,7 +90,7 @@ class Mechanism:
         """No load depends on where a body is."""
         raise NotImplementedError
 
-    def value(self, formula: Formula) -> Expr:
+    def value(self, formula: Formula, **names: Expr) -> Expr:
         """A quantity over parameter symbols."""
         return self._symbols.value(formula)
 

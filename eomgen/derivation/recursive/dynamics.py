@@ -5,8 +5,7 @@ articulated-body recursion in the frames' own axes in space, in the world's in t
 angles add up; composite bodies in the world's, where nothing is turned again and again.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cached_property
 
 from eomgen.derivation.recursive import forces as fc
@@ -19,9 +18,6 @@ from eomgen.derivation.recursive.composite import (
     mass_entries,
     solved,
 )
-from eomgen.derivation.recursive.frames import Linkage
-from eomgen.derivation.recursive.instant import Axes, Instant, at_instant
-from eomgen.derivation.recursive.linkage import make_linkage
 from eomgen.derivation.recursive.motion import (
     Acceleration,
     Twist,
@@ -29,108 +25,18 @@ from eomgen.derivation.recursive.motion import (
     kinetic_energy,
     velocities,
 )
-from eomgen.derivation.recursive.observe import Places, places, position
-from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, sub, zeros
-from eomgen.effects import Gravity
-from eomgen.effects.base import JointLoad
+from eomgen.derivation.recursive.moving import Moving, Values
+from eomgen.derivation.recursive.vectors import Scalar, sub, zeros
+from eomgen.effects import Effect, Gravity
+from eomgen.effects.base import JointLoad, Load
 from eomgen.joints import Free
-from eomgen.language.formula import Formula, evaluate
-from eomgen.model import Model
+from eomgen.joints.base import WORLD
+
+__all__ = ["Dynamics", "Values"]
 
 
-@dataclass(frozen=True)
-class Values:
-    """Values of everything a model leaves open: parameters and inputs by name, q and v in order."""
-
-    parameters: Mapping[str, Scalar]
-    inputs: Mapping[str, Scalar]
-    q: Sequence[Scalar]
-    v: Sequence[Scalar]
-
-
-class Dynamics:
+class Dynamics(Moving):
     """A model at given values. What is asked for is computed once; nothing else is."""
-
-    def __init__(
-        self, model: Model, values: Values, scalars: Scalars, axes: Axes | None = None
-    ) -> None:
-        self.model = model
-        self.values = values
-        self.scalars = scalars
-        self.axes: Axes = axes or ("world" if model.dimensions == 2 else "own")
-        self.dimensions = model.dimensions
-        self.bodies = tuple(body.name for body in model.bodies)
-        self.nv = len(model.velocities)
-
-    # What effects may ask (effects.base.Mechanism).
-
-    def mass(self, body: str) -> Scalar:
-        """Mass of a body, kg."""
-        return self.linkage.mounts[self.bodies.index(body)].mass
-
-    def height(self, body: str) -> Scalar:
-        """World y of a centre of mass in the plane, z in space, m."""
-        return self.centre(self.bodies.index(body))[self.dimensions - 1]
-
-    def value(self, formula: Formula) -> Scalar:
-        """A quantity."""
-        return evaluate(formula, self.values.parameters, self.scalars)
-
-    def input(self, name: str) -> Scalar:
-        """An input."""
-        return self.values.inputs[name]
-
-    # Where everything is and how it moves.
-
-    @cached_property
-    def linkage(self) -> Linkage:
-        """Frames and mounts."""
-        return make_linkage(self.model, self.values.parameters, self.scalars)
-
-    @cached_property
-    def instant(self) -> Instant:
-        """The frames at q, in the axes of the recursions."""
-        return at_instant(self.linkage, self.values.q, self.axes, self.scalars)
-
-    @cached_property
-    def in_world(self) -> Instant:
-        """The frames at q, in world axes."""
-        if self.axes == "world":
-            return self.instant
-        return at_instant(self.linkage, self.values.q, "world", self.scalars)
-
-    @cached_property
-    def places(self) -> Places:
-        """Origins of the frames, in the world."""
-        return places(self.instant, self.scalars)
-
-    def centre(self, body: int) -> Vec:
-        """Centre of mass of a body, in the world."""
-        return self.position(body, zeros(self.scalars))
-
-    def position(self, body: int, at: Vec) -> Vec:
-        """A point of a body, in the world."""
-        return position(self.linkage, self.instant, self.places, body, at, self.scalars)
-
-    def angle(self, body: int) -> Scalar:
-        """The angle of a planar body from the world's x axis."""
-        mount = self.linkage.mounts[body]
-        angle = self.instant.angles[mount.frame] if mount.frame >= 0 else self.scalars.number(0.0)
-        return angle + self.scalars.number(mount.angle)
-
-    @cached_property
-    def moving(self) -> tuple[Twist, ...]:
-        """Velocities of the frames."""
-        return velocities(self.instant, self.values.v, self.scalars)
-
-    @cached_property
-    def down(self) -> Vec:
-        """The uniform gravity that acts, in world axes."""
-        g = list(zeros(self.scalars))
-        for effect in self.model.effects:
-            if isinstance(effect, Gravity):
-                g[self.dimensions - 1] = -self.value(effect.g)
-        return (g[0], g[1], g[2])
 
     def accelerating(
         self, vd: Sequence[Scalar] | None, *, still: bool = False, weightless: bool = False
@@ -157,20 +63,24 @@ class Dynamics:
     def loads(self) -> tuple[tuple[fc.PointForce, ...], tuple[JointLoad, ...]]:
         """What the effects put on bodies and joints; uniform gravity is an acceleration instead."""
         points, joints = [], []
-        zero = self.scalars.number(0.0)
         for effect in self.model.effects:
-            if isinstance(effect, Gravity):
-                continue
-            for load in effect.loads(self):
-                if isinstance(load, JointLoad):
-                    joints.append(load)
-                else:
-                    at, force = (
-                        (part[0], part[1], part[2] if len(part) > 2 else zero)
-                        for part in (load.at, load.force)
-                    )
-                    points.append(fc.PointForce(self.bodies.index(load.body), at, force))
+            if not isinstance(effect, Gravity) or effect.except_bodies:
+                for load in effect.loads(self):
+                    if isinstance(load, JointLoad):
+                        joints.append(load)
+                    elif load.body != WORLD:
+                        points.append(self._point_force(load))
         return tuple(points), tuple(joints)
+
+    def _point_force(self, load: Load) -> fc.PointForce:
+        zero = self.scalars.number(0.0)
+        torque = zeros(self.scalars)
+        if load.torque:
+            torque = (zero, zero, load.torque[0])
+            if len(load.torque) == 3:
+                torque = (load.torque[0], load.torque[1], load.torque[2])
+        body, at, force = self.index[load.body], self._three(load.at), self._three(load.force)
+        return fc.PointForce(body, at, force, torque)
 
     @cached_property
     def wrenches(self) -> tuple[fc.Force, ...]:
@@ -181,12 +91,9 @@ class Dynamics:
     def motors(self) -> list[Scalar]:
         """The loads on each velocity's own joint."""
         forces = [self.scalars.number(0.0)] * self.nv
-        first = {
-            body.joint.name: i
-            for body, i in zip(self.model.bodies, self.model.first_velocity, strict=True)
-        }
         for load in self.loads[1]:
-            forces[first[load.joint]] = forces[first[load.joint]] + load.force
+            i = self.first[load.joint][1] + load.coordinate
+            forces[i] = forces[i] + load.force
         return forces
 
     @cached_property
@@ -290,3 +197,21 @@ class Dynamics:
         for effect in self.model.effects:
             energy = energy + effect.potential_energy(self)
         return energy
+
+    def power(self, effect: Effect) -> Scalar:
+        """What an effect's loads do to the motion, W; of gravity and springs, too."""
+        power = self.scalars.number(0.0)
+        for load in effect.loads(self):
+            if isinstance(load, JointLoad):
+                power = power + load.force * self.rate(load.joint, load.coordinate)
+                continue
+            for force, speed in zip(load.force, self.velocity(load.body, load.at), strict=True):
+                power = power + force * speed
+            for torque, rate in zip(load.torque, self.turning(load.body), strict=False):
+                power = power + torque * rate
+        return power
+
+    @cached_property
+    def state_rates(self) -> list[Scalar]:
+        """Time derivatives of the extra states, in order."""
+        return [rate for effect in self.model.effects for rate in effect.rates(self)]

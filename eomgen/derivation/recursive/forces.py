@@ -30,11 +30,14 @@ class Force:
 
 @dataclass(frozen=True)
 class PointForce:
-    """A force in world axes at a point of a body, given from its centre of mass in body axes."""
+    """A force and a torque on a body, in world axes; the force acts at a point, given from the
+    centre of mass in body axes.
+    """
 
     body: int
     at: Vec
     force: Vec
+    torque: Vec
 
 
 def no_force(scalars: Scalars) -> Force:
@@ -69,7 +72,9 @@ def wrenches(
             at = add(mount.at, times(constant(mount.axes, scalars), load.at))
             force = instant.from_world(mount.frame, load.force)
             arm = instant.of_frame(mount.frame, at)
-            found[mount.frame] = total(found[mount.frame], Force(cross(arm, force), force))
+            torque = instant.from_world(mount.frame, load.torque)
+            wrench = Force(add(torque, cross(arm, force)), force)
+            found[mount.frame] = total(found[mount.frame], wrench)
     return tuple(found)
 
 

@@ -1,8 +1,7 @@
 """Plain floats as scalars of the recursions."""
 
-import math
-
 from eomgen.derivation.recursive.vectors import Scalar
+from eomgen.language.formula import BY_MATH
 
 
 class FloatScalars:
@@ -12,9 +11,9 @@ class FloatScalars:
         """The value itself."""
         return value
 
-    def call(self, function: str, argument: float) -> float:
-        """sin, cos, tan or sqrt."""
-        return float(getattr(math, function)(argument))
+    def call(self, function: str, *arguments: float) -> float:
+        """A function of formulas."""
+        return float(BY_MATH[function](*arguments))
 
     def is_zero(self, value: Scalar) -> bool:
         """Whether it is 0 here; then the shorter of two ways that agree is taken."""

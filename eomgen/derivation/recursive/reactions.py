@@ -59,7 +59,8 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
         k = load.body
         arm = sub(dynamics.position(k, load.at), joints[k])
         f = sums[k]
-        sums[k] = Force(sub(f.moment, cross(arm, load.force)), sub(f.force, load.force))
+        moment = add(load.torque, cross(arm, load.force))
+        sums[k] = Force(sub(f.moment, moment), sub(f.force, load.force))
     for k in reversed(range(len(sums))):
         parent = model.bodies[k].parent
         if parent >= 0:

@@ -23,8 +23,8 @@ class Scalars(Protocol):
     def number(self, value: float) -> Scalar:
         """The scalar that stands for a float."""
 
-    def call(self, function: str, argument: Scalar) -> Scalar:
-        """sin, cos or sqrt of a scalar."""
+    def call(self, function: str, *arguments: Scalar) -> Scalar:
+        """A function of formulas (`language.formula.FUNCTIONS`)."""
 
     def is_zero(self, value: Scalar) -> bool:
         """Whether a scalar is known to be 0 whatever its inputs."""

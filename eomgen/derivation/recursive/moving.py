@@ -1,0 +1,209 @@
+"""A mechanism at a state, over any scalars: what effects may ask of it (effects.base.Mechanism)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from eomgen.derivation.recursive.frames import Linkage
+from eomgen.derivation.recursive.instant import Axes, Instant, at_instant
+from eomgen.derivation.recursive.linkage import make_linkage
+from eomgen.derivation.recursive.motion import Twist, velocities
+from eomgen.derivation.recursive.observe import (
+    Places,
+    orientation,
+    places,
+    position,
+    velocity,
+)
+from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, times, zeros
+from eomgen.effects import Gravity
+from eomgen.effects.base import Vector
+from eomgen.joints.base import WORLD
+from eomgen.language.formula import Formula, evaluate
+from eomgen.model import Model
+
+
+@dataclass(frozen=True)
+class Values:
+    """Values of everything a model leaves open: parameters, inputs and extra states by name, q and
+    v in order, and the time.
+    """
+
+    parameters: Mapping[str, Scalar]
+    inputs: Mapping[str, Scalar]
+    q: Sequence[Scalar]
+    v: Sequence[Scalar]
+    states: Mapping[str, Scalar] = field(default_factory=dict)
+    time: Scalar = 0.0
+
+
+class Moving:
+    """A model at given values: where everything is and how it moves, for effects and recursions.
+
+    What is asked for is computed once; nothing else is.
+    """
+
+    def __init__(
+        self, model: Model, values: Values, scalars: Scalars, axes: Axes | None = None
+    ) -> None:
+        self.model = model
+        self.values = values
+        self.scalars = scalars
+        self.axes: Axes = axes or ("world" if model.dimensions == 2 else "own")
+        self.dimensions = model.dimensions
+        self.bodies = tuple(body.name for body in model.bodies)
+        self.nv = len(model.velocities)
+
+    # What effects may ask (effects.base.Mechanism).
+
+    def mass(self, body: str) -> Scalar:
+        """Mass of a body, kg."""
+        return self.linkage.mounts[self.index[body]].mass
+
+    def height(self, body: str) -> Scalar:
+        """World y of a centre of mass in the plane, z in space, m."""
+        return self.centre(self.index[body])[self.dimensions - 1]
+
+    def place(self, body: str, at: Vector) -> Vector:
+        """World place of a point of a body, m."""
+        return self._cut(at if body == WORLD else self.position(self.index[body], self._three(at)))
+
+    def velocity(self, body: str, at: Vector) -> Vector:
+        """World velocity of a point of a body, m/s."""
+        if body == WORLD:
+            return self._cut(zeros(self.scalars))
+        return self._cut(self.point_velocity(self.index[body], self._three(at))[0])
+
+    def turning(self, body: str) -> Vector:
+        """Angular velocity of a body, world axes, rad/s."""
+        if body == WORLD:
+            w = zeros(self.scalars)
+        else:
+            w = self.point_velocity(self.index[body], zeros(self.scalars))[1]
+        return w if self.dimensions == 3 else w[2:]
+
+    def outward(self, body: str, vector: Vector) -> Vector:
+        """A vector of body axes in world axes."""
+        if body == WORLD:
+            return vector
+        turned = times(
+            orientation(self.linkage, self.instant, self.index[body], self.scalars),
+            self._three(vector),
+        )
+        return self._cut(turned)
+
+    def coordinate(self, joint: str, index: int = 0) -> Scalar:
+        """A coordinate of a joint."""
+        return self.values.q[self.first[joint][0] + index]
+
+    def rate(self, joint: str, index: int = 0) -> Scalar:
+        """A velocity of a joint."""
+        return self.values.v[self.first[joint][1] + index]
+
+    def value(self, formula: Formula, **names: Scalar) -> Scalar:
+        """A quantity."""
+        return evaluate(formula, {**self.names, **names} if names else self.names, self.scalars)
+
+    def input(self, name: str) -> Scalar:
+        """An input."""
+        return self.values.inputs[name]
+
+    def state(self, name: str) -> Scalar:
+        """An extra state."""
+        return self.values.states[name]
+
+    def number(self, value: float) -> Scalar:
+        """A number."""
+        return self.scalars.number(value)
+
+    def call(self, function: str, *arguments: Scalar) -> Scalar:
+        """A function of formulas."""
+        return self.scalars.call(function, *arguments)
+
+    @cached_property
+    def names(self) -> dict[str, Scalar]:
+        """Everything that formulas may name."""
+        model, values = self.model, self.values
+        moving = zip((*model.coordinates, *model.velocities), (*values.q, *values.v), strict=False)
+        return {
+            "t": values.time,
+            **values.inputs,
+            **values.states,
+            **{c.name: x for c, x in moving},
+            **values.parameters,
+        }
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Index of each body by its name."""
+        return {name: k for k, name in enumerate(self.bodies)}
+
+    @cached_property
+    def first(self) -> dict[str, tuple[int, int]]:
+        """Of each joint the index of its first coordinate in q and velocity in v."""
+        model = self.model
+        starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
+        return {body.joint.name: (i, j) for body, i, j in starts}
+
+    def _three(self, vector: Vector) -> Vec:
+        x, y, *z = vector
+        return (x, y, z[0] if z else self.scalars.number(0.0))
+
+    def _cut(self, vector: Vector) -> Vector:
+        return tuple(vector[: self.dimensions])
+
+    # Where everything is and how it moves.
+
+    @cached_property
+    def linkage(self) -> Linkage:
+        """Frames and mounts."""
+        return make_linkage(self.model, self.values.parameters, self.scalars)
+
+    @cached_property
+    def instant(self) -> Instant:
+        """The frames at q, in the axes of the recursions."""
+        return at_instant(self.linkage, self.values.q, self.axes, self.scalars)
+
+    @cached_property
+    def in_world(self) -> Instant:
+        """The frames at q, in world axes."""
+        if self.axes == "world":
+            return self.instant
+        return at_instant(self.linkage, self.values.q, "world", self.scalars)
+
+    @cached_property
+    def places(self) -> Places:
+        """Origins of the frames, in the world."""
+        return places(self.instant, self.scalars)
+
+    def centre(self, body: int) -> Vec:
+        """Centre of mass of a body, in the world."""
+        return self.position(body, zeros(self.scalars))
+
+    def position(self, body: int, at: Vec) -> Vec:
+        """A point of a body, in the world."""
+        return position(self.linkage, self.instant, self.places, body, at, self.scalars)
+
+    def angle(self, body: int) -> Scalar:
+        """The angle of a planar body from the world's x axis."""
+        mount = self.linkage.mounts[body]
+        angle = self.instant.angles[mount.frame] if mount.frame >= 0 else self.scalars.number(0.0)
+        return angle + self.scalars.number(mount.angle)
+
+    @cached_property
+    def moving(self) -> tuple[Twist, ...]:
+        """Velocities of the frames."""
+        return velocities(self.instant, self.values.v, self.scalars)
+
+    def point_velocity(self, body: int, at: Vec) -> tuple[Vec, Vec]:
+        """Velocity of a point of a body, and the body's angular velocity, in the world."""
+        return velocity(self.linkage, self.instant, self.moving, body, at, self.scalars)
+
+    @cached_property
+    def down(self) -> Vec:
+        """The uniform gravity that acts, in world axes."""
+        g = list(zeros(self.scalars))
+        for effect in self.model.effects:
+            if isinstance(effect, Gravity) and not effect.except_bodies:
+                g[: self.dimensions] = effect.acceleration(self)
+        return (g[0], g[1], g[2])

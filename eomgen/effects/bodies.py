@@ -1,0 +1,96 @@
+"""What effects share that act on a point of one body, of several, or of all."""
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from eomgen.effects.base import EffectTable, Mechanism, Scalar, Vector
+from eomgen.language.base import Identifier
+from eomgen.language.formula import Formula, names_in
+from eomgen.language.quantity import Vector as VectorField
+from eomgen.language.quantity import quantity
+
+LEAST_SQUARE = 1e-300
+"""Of a length under a root: less counts as this."""
+
+
+class OnBodies(EffectTable):
+    """An effect on the point `at` of `body`, or of each of `bodies`, which may be "all"."""
+
+    body_fields = ("body", "bodies")
+    vector_fields: ClassVar[tuple[str, ...]] = ("at",)
+
+    body: Identifier | None = Field(default=None, description="body it acts on")
+    bodies: Literal["all"] | Annotated[tuple[Identifier, ...], Field(min_length=1)] | None = Field(
+        default=None, description="bodies it acts on, if several; 'all' are all of the scene"
+    )
+    at: VectorField = quantity(
+        "m", "point from the centre of mass", default=(), validate_default=False
+    )
+
+    @model_validator(mode="after")
+    def _one_or_several(self) -> Self:
+        if (self.body is None) == (self.bodies is None):
+            what = "is missing" if self.body is None else "is given beside 'bodies'"
+            raise wrong("body", f"{what}; give one of body, bodies")
+        listed = self.bodies if isinstance(self.bodies, tuple) else ()
+        for i, name in enumerate(listed):
+            if name in listed[:i]:
+                raise wrong(f"bodies[{i}]", f"'{name}' is listed twice; leave one out")
+        return self
+
+    def acted_on(self, mechanism: Mechanism) -> tuple[str, ...]:
+        """The bodies."""
+        if self.body is not None:
+            return (self.body,)
+        return self.bodies if isinstance(self.bodies, tuple) else mechanism.bodies
+
+    def points(self, mechanism: Mechanism) -> Iterator[tuple[str, Vector]]:
+        """Each body with the point on it, body axes, m."""
+        at = tuple(mechanism.value(part) for part in self.at)
+        for body in self.acted_on(mechanism):
+            yield body, at
+
+
+def wrong(key: str, message: str) -> PydanticCustomError:
+    """An error of a table that is a matter of several keys; `key` is where it shows."""
+    return PydanticCustomError("keys", "{why}", {"why": message, "key": key})
+
+
+def local_names(
+    mechanism: Mechanism, parts: tuple[Formula, ...], body: str, at: Vector
+) -> dict[str, Scalar]:
+    """Place x, y, z (m) and velocity vx, vy, vz (m/s) of a point, world axes, where formulas
+    name them. In the plane z and vz are 0.
+    """
+    used = {name for part in parts for name in names_in(part)}
+    found: dict[str, Scalar] = {}
+    for prefix, vector in (("", mechanism.place), ("v", mechanism.velocity)):
+        names = [f"{prefix}{axis}" for axis in "xyz"]
+        if used.intersection(names):
+            values = (*vector(body, at), mechanism.number(0.0))
+            found |= dict(zip(names, values, strict=False))
+    return found
+
+
+def length(mechanism: Mechanism, vector: Vector) -> Scalar:
+    """|a|, with a Jacobian that is finite and exact everywhere, 0 at a = 0.
+
+    Of several components it is sqrt(max(a·a, 1e-300)): the greater of two has the slope of the one
+    it takes, so that no root of 0 is ever differentiated. It is 1e-150 at a = 0, and right to
+    the last bit from there upwards; |a| a is exactly 0 at a = 0.
+    """
+    if len(vector) == 1:
+        return mechanism.call("abs", vector[0])
+    square = mechanism.call("max", dot(vector, vector), mechanism.number(LEAST_SQUARE))
+    return mechanism.call("sqrt", square)
+
+
+def dot(a: Vector, b: Vector) -> Scalar:
+    """a · b."""
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total = total + x * y
+    return total

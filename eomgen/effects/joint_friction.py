@@ -1,0 +1,63 @@
+"""Friction in a joint of one coordinate."""
+
+from collections.abc import Iterator
+from typing import Literal, Self
+
+from pydantic import Field
+
+from eomgen.effects.base import EffectTable, JointLoad, Mechanism
+from eomgen.errors import SceneError
+from eomgen.language.base import Identifier
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Quantity, quantity
+
+
+class JointFriction(EffectTable):
+    """Acts against the rate v of a joint's coordinate: -(b v + C tanh(v/speed)).
+
+    A torque (N m) at a hinge, a force (N) at a slide, on the child and back on the parent. Coulomb
+    friction C is smoothed: at |v| = `speed` it is 76 % of C, at 3 `speed` 99.5 %. So nothing quite
+    sticks: under a load F < C the joint creeps at speed · artanh(F/C), under a larger one it slips.
+    """
+
+    joint_fields = ("joint",)
+
+    type: Literal["joint_friction"]
+    joint: Identifier = Field(description="revolute or prismatic joint it acts on")
+    viscous: Quantity = quantity(
+        "N m s/rad or N s/m",
+        "viscous friction",
+        "nonnegative",
+        default=ZERO,
+        validate_default=False,
+    )
+    coulomb: Quantity = quantity(
+        "N m or N", "Coulomb friction", "nonnegative", default=ZERO, validate_default=False
+    )
+    speed: Quantity | None = quantity(
+        "rad/s or m/s", "speed within which Coulomb friction is smoothed", "positive", default=None
+    )
+    allow_active: bool = Field(
+        default=False, strict=True, description="whether friction may be negative"
+    )
+
+    def checked(self, dimensions: int, place: str) -> Self:
+        """There is friction, and a speed where one is of use."""
+        if not self.model_fields_set & {"viscous", "coulomb"}:
+            raise SceneError(f"{place}.viscous: missing; give it, or coulomb and speed")
+        if "coulomb" in self.model_fields_set and self.speed is None:
+            raise SceneError(
+                f"{place}.speed: missing; coulomb is smoothed as tanh(rate/speed), give a small one"
+            )
+        if "coulomb" not in self.model_fields_set and self.speed is not None:
+            raise SceneError(f"{place}.speed: it smooths coulomb, which is missing; give both")
+        return self
+
+    def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
+        """Equal and opposite on the joint's two bodies; the world takes its own."""
+        rate = mechanism.rate(self.joint)
+        against = mechanism.value(self.viscous) * rate
+        if self.speed is not None:
+            part = mechanism.call("tanh", rate / mechanism.value(self.speed))
+            against = against + mechanism.value(self.coulomb) * part
+        yield JointLoad(self.joint, -against)

@@ -1,0 +1,309 @@
+"""Drag: exact solutions, an independent solver, energy, Jacobians at rest, and mistakes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bookkeeping import differences, gained, powers
+from engine import Engine, apart, engine
+from scipy.integrate import solve_ivp
+from spatial_newton_euler import solve
+from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
+
+from eomgen.build import build_model
+from eomgen.errors import SceneError
+from eomgen.pipeline import generate
+from eomgen.run.module import load_module
+from eomgen.scene.reader import parse_scene
+
+MASS, INERTIA, G = 0.7, 0.03, 9.81
+DROP = """\
+name = "drop"
+outputs = "all"
+dimensions = {}
+[[bodies]]
+name = "drop"
+mass = 0.7
+inertia_com = {}
+[[joints]]
+name = "flight"
+type = "free"
+child = "drop"
+"""
+WEIGHT = '[[effects]]\ntype = "gravity"\ng = 9.81\n'
+DRAG = '[[effects]]\ntype = "drag"\nname = "air"\n'
+BODY = DRAG + 'body = "drop"\n'
+
+
+def drop(effects: str, dimensions: int = PLANE) -> Engine:
+    """A free body under some effects."""
+    inertia = "0.03" if dimensions == PLANE else "[0.03, 0.03, 0.03]"
+    return engine(DROP.format(dimensions, inertia) + effects)
+
+
+@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
+@pytest.mark.parametrize("law", ["linear", "quadratic", "made"])
+def test_a_fall_from_rest_is_the_exact_one(dimensions: int, law: str) -> None:
+    """v = v∞ (1 - e^(-t/T)) of linear drag, v∞ tanh(g t/v∞) of quadratic; v∞ in the end."""
+    k = 0.4
+    keys = {"made": "density = 1.6\narea = 0.25\ncoefficient = 2.0\n"}
+    made = drop(WEIGHT + BODY + keys.get(law, f"{law} = {k}\n"), dimensions)
+    down = made.module.STATES.index("drop_y_dot" if dimensions == PLANE else "drop_z_dot")
+    times = np.array([0.0, 0.1, 0.5, 1.5, 40.0])
+    start = made.module.initial_state()
+    found = solve_ivp(
+        made.module.derivative, (0, 40), start, "DOP853", times, rtol=1e-12, atol=1e-13
+    )
+    if law == "linear":
+        last = MASS * G / k
+        speeds = last * -np.expm1(-k * times / MASS)
+    else:
+        last = np.sqrt(MASS * G / k)
+        speeds = last * np.tanh(G * times / last)
+    assert apart(-found.y[down], speeds) < 1e-10
+    assert abs(speeds[-1] / last - 1) < 1e-9
+    ending = start.copy()
+    ending[down] = -last
+    assert abs(made.module.derivative(0.0, ending)[down]) < 1e-14 * G
+
+
+@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
+def test_turning_dies_down_as_it_must(dimensions: int) -> None:
+    """ω of a linear and quadratic drag together, I ω̇ = -(a + b |ω|) ω, solved by hand."""
+    a, b, w = 0.02, 0.05, 6.0
+    made = drop(f"{BODY}turning_linear = {a}\nturning_quadratic = {b}\n", dimensions)
+    spin = [made.module.STATES.index("drop_angle_dot")] if dimensions == PLANE else [10, 11, 12]
+    start = made.module.initial_state()
+    axis = np.array([1.0]) if dimensions == PLANE else np.array([2.0, -1.0, 2.0]) / 3
+    start[spin] = w * axis
+    times = np.linspace(0, 4, 9)
+    found = solve_ivp(
+        made.module.derivative, (0, 4), start, "DOP853", times, rtol=1e-12, atol=1e-13
+    )
+    decay = np.exp(-a * times / INERTIA)
+    expected = a * w * decay / (a + b * w * (1 - decay))
+    assert apart(found.y[spin], np.outer(axis, expected)) < 1e-10
+
+
+def test_a_wind_carries_along() -> None:
+    """Linear drag in a wind that turns with time: v follows it as a filter of first order."""
+    k, f = 0.7, 2.0
+    made = drop(f'{BODY}linear = {k}\nwind = ["sin(2*t)", 3]\n')
+    times = np.linspace(0, 5, 11)
+    start = made.module.initial_state()
+    found = solve_ivp(
+        made.module.derivative, (0, 5), start, "DOP853", times, rtol=1e-12, atol=1e-13
+    )
+    c = k / MASS
+    fade = np.exp(-c * times)
+    swung = c * (c * np.sin(f * times) - f * np.cos(f * times) + f * fade) / (c * c + f * f)
+    assert apart(found.y[3:5], [swung, 3 * (1 - fade)]) < 1e-10
+
+
+def force_by_hand(u: np.ndarray, place: np.ndarray, t: float) -> np.ndarray:
+    """The drag of `test_drag_on_any_tree`."""
+    wind = np.array([3 * np.sin(t) - 0.5 * place[1], 0.4 * place[0] ** 2, 0.0])
+    w = u - wind
+    return -(0.3 + 0.8 * np.linalg.norm(w)) * w
+
+
+@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
+def test_drag_on_any_tree(dimensions: int) -> None:
+    """Random trees against a solver that shares nothing, the drag put in as its external force."""
+    rng = np.random.default_rng(5)
+    tried, seed = 0, 0
+    wind = ["3*sin(t) - 0.5*y", "0.4*x**2", "0"][:dimensions]
+    while tried < 4:
+        tree, text = random_spatial_tree(seed := seed + 1, dimensions)
+        if tree.push is not None or len(tree.bodies) < 2:
+            continue
+        tried += 1
+        k = len(tree.bodies) - 1
+        at = np.array([0.2, -0.3, 0.1 if dimensions == SPACE else 0.0])
+        text += f'{DRAG}body = "b{k}"\nlinear = 0.3\nquadratic = 0.8\n'
+        text += f"at = {at[:dimensions].tolist()}\nwind = {wind}\n"
+        made = generate(build_model(parse_scene(text).replaced(outputs=())))
+        module = load_module(made.module, f"drag_{tree.name}")
+        q, v = random_state(tree, rng)
+        t = float(rng.uniform(0, 5))
+        free = solve(tree, q, v)
+        if dimensions == PLANE:
+            x, y, angle = free.body_poses[k]
+            turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0]])
+            arm = np.append(turn @ at, 0.0)
+            place, spin = np.array([x, y, 0]) + arm, np.array([0, 0, free.body_velocities[k][2]])
+            speed = np.append(free.body_velocities[k][:2], 0.0)
+        else:
+            arm = free.body_poses[k][:, :3] @ at
+            place, spin = free.body_poses[k][:, 3] + arm, free.body_velocities[k][3:]
+            speed = free.body_velocities[k][:3]
+        force = force_by_hand(speed + np.cross(spin, arm), place, t)
+        pushed = replace(tree, push=(k, tuple(at)))
+        u = dict(zip(("push_x", "push_y", "push_z"), force, strict=True))
+        expected = solve(pushed, q, v, u).accelerations
+        places = tree.places(module.STATES)
+        state = np.zeros(len(places))
+        state[places] = np.concatenate((q, v))
+        found = module.derivative(t, state)[places][len(q) :]
+        assert apart(found, expected) < 1e-10, tree.name
+
+
+CHAIN = """\
+name = "rope"
+outputs = "all"
+route = "aba"
+[[chains]]
+name = "link"
+count = 3
+mass = 0.2
+inertia_com = 1e-3
+r_parent = [0.2, 0]
+r_child = [-0.2, 0]
+[[effects]]
+type = "gravity"
+g = 9.81
+"""
+BLOWN = f"""{DRAG}bodies = "all"
+linear = 0.05
+quadratic = 0.3
+turning_linear = 0.01
+turning_quadratic = 0.02
+at = [0.1, 0.02]
+wind = ["4 + sin(3*t) - y", "x*vertical"]
+"""
+DRAUGHT = CHAIN.replace("[[chains]]", "[parameters]\nvertical = 0.3\n[[chains]]")
+
+
+def test_energy_changes_by_the_power_of_the_effects() -> None:
+    """dT/dt is the power of all effects, dE/dt that of drag alone; still air takes energy out."""
+    made = engine(DRAUGHT + BLOWN)
+    rng = np.random.default_rng(2)
+    for t in (0.0, 0.7, 2.0):
+        y = made.random_state(rng)
+        weight, air = powers(made, y, t)
+        kinetic, potential = (gained(made, f"{x}_energy", y, t) for x in ("kinetic", "potential"))
+        assert abs(kinetic - weight - air) < 1e-10 * max(1, abs(kinetic))
+        assert abs(potential + weight) < 1e-10 * max(1, abs(weight))
+    still = engine(CHAIN + BLOWN[: BLOWN.index("wind")])
+    assert powers(still, still.random_state(rng))[1] < 0
+
+
+@pytest.mark.parametrize("tangents", [False, True])
+def test_jacobians_are_right_at_rest_and_elsewhere(tangents: bool) -> None:
+    """Against differences of the module; at rest quadratic drag has no slope at all, exactly."""
+    still = CHAIN + f'{DRAG}bodies = "all"\nlinear = 0.05\nturning_linear = 0.01\n'
+    both = still + "quadratic = 0.3\nturning_quadratic = 0.02\n"
+    made, plain = (engine(text, tangents=tangents) for text in (both, still))
+    rng = np.random.default_rng(3)
+    y = made.random_state(rng)
+    assert apart(made.module.jacobian(0.0, y), differences(made, y, 0.0)) < 1e-7
+    y[3:] = 0.0
+    found = made.module.jacobian(0.0, y)
+    assert np.isfinite(found).all()
+    assert apart(found, plain.module.jacobian(0.0, y)) < 1e-15
+    assert apart(found, differences(made, y, 0.0)) < 1e-4  # |v| v of a step is not linear
+    np.testing.assert_array_equal(
+        made.module.derivative(0.0, y)[3:], plain.module.derivative(0.0, y)[3:]
+    )
+    blown = engine(DRAUGHT + BLOWN, tangents=tangents)
+    assert apart(blown.module.jacobian(1.3, y), differences(blown, y, 1.3)) < 1e-7
+
+
+def test_rest_in_space_is_smooth() -> None:
+    """Three components of speed and of turning."""
+    made = drop(f"{BODY}quadratic = 0.4\nturning_quadratic = 0.3\n", SPACE)
+    y = made.module.initial_state()
+    found = made.module.jacobian(0.0, y)
+    assert np.isfinite(found).all()
+    assert np.abs(found[7:]).max() < 1e-140
+    y[7:] = [1.0, -2.0, 0.5, 0.3, 2.0, -1.0]
+    assert apart(made.module.jacobian(0.0, y), differences(made, y, 0.0)) < 1e-7
+
+
+def test_absence_is_free() -> None:
+    """Without the effect the module is that of a scene that never had it; linear drag takes no
+    root, and a force no torque.
+    """
+    never, once = parse_scene(CHAIN), parse_scene(CHAIN + BLOWN.replace("vertical", "0.3"))
+    assert generate(build_model(never)).module != generate(build_model(once)).module
+    without = once.replaced(effects=once.effects[:1])
+    assert generate(build_model(without)).module == generate(build_model(never)).module
+    assert "sqrt" not in drop(f"{BODY}linear = 0.4\n").module.COST["derivative"]
+    counted = drop(f"{BODY}quadratic = 0.4\n").module.COST["derivative"]
+    assert counted["sqrt"] == counted["max"] == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("linear = 0.1", "effects[0].body: is missing; give one of body, bodies"),
+        (
+            'body = "drop"\nbodies = "all"\nlinear = 0.1',
+            "effects[0].body: is given beside 'bodies'; give one of body, bodies",
+        ),
+        (
+            'bodies = ["drop", "drop"]\nlinear = 0.1',
+            "effects[0].bodies[1]: 'drop' is listed twice; leave one out",
+        ),
+        (
+            'bodies = ["drop", "drip"]\nlinear = 0.1',
+            "effects[0].bodies[1]: no body is named 'drip' (did you mean 'drop'?)",
+        ),
+        (
+            'body = "drip"\nlinear = 0.1',
+            "effects[0].body: no body is named 'drip' (did you mean 'drop'?)",
+        ),
+        (
+            'body = "drop"\nlinear = -0.1',
+            "effects[0].linear: -0.1 is negative; give a number >= 0 in N s/m",
+        ),
+        (
+            'body = "drop"',
+            "effects[0].linear: there is no drag at all; give linear, quadratic, turning_linear or "
+            "turning_quadratic",
+        ),
+        (
+            'body = "drop"\ndensity = 1.2\narea = 0.1',
+            "effects[0].coefficient: is missing; give density, area and coefficient together",
+        ),
+        (
+            'body = "drop"\nquadratic = 0.1\ndensity = 1.2\narea = 0.1\ncoefficient = 1',
+            "effects[0].quadratic: is given beside 'density'; leave one of them out",
+        ),
+        (
+            'body = "drop"\nlinear = 1\nwind = [1, 0, 0]',
+            "effects[0].wind: has 3 components; the plane takes 2",
+        ),
+        (
+            'body = "drop"\nlinear = 1\nwind = ["gast", 0]',
+            "effects[0].wind[0]: unknown parameter 'gast' (did you mean 'gust'?)",
+        ),
+        (
+            'body = "drop"\nlinear = 1\nwind = ["gust*vx", 0]',
+            "effects[0].wind[0]: unknown parameter 'vx'",
+        ),
+    ],
+)
+def test_mistakes(text: str, message: str) -> None:
+    """Each in one line, with its place and what to do."""
+    scene = DROP.format(PLANE, 0.03) + f"[parameters]\ngust = 3.0\n{DRAG}{text}\n"
+    with pytest.raises(SceneError) as found:
+        build_model(parse_scene(scene))
+    assert message in str(found.value)
+    assert "\n" not in str(found.value)
+
+
+def test_a_parameter_may_not_hide_a_place() -> None:
+    """`x` is the point's own place in a wind."""
+    scene = DROP.format(PLANE, 0.03) + f"[parameters]\nx = 3.0\n{BODY}linear = 1\n"
+    build_model(parse_scene(scene))
+    with pytest.raises(SceneError, match=r"wind\[0\]: 'x' is known here by itself; rename"):
+        build_model(parse_scene(scene + 'wind = ["x", 0]\n'))
+
+
+def test_negative_drag_if_asked_for() -> None:
+    """It then puts energy in."""
+    made = drop(f"{BODY}linear = -0.5\nallow_active = true\n")
+    y = made.module.initial_state()
+    y[3] = 2.0
+    assert powers(made, y) == [pytest.approx(2.0)]

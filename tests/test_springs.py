@@ -1,0 +1,681 @@
+"""Springs, ropes, joint springs, friction and stops: closed forms, the independent solver, energy.
+
+Gravity acts along -y in the plane. "Exactly" is in 60 digits, with the derivatives taken there.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+import pytest
+from engine import MP, Engine, along, apart, engine
+from scipy.integrate import solve_ivp
+from spatial_newton_euler import SpatialMotion, solve
+from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
+
+from eomgen.backends.python import python_module
+from eomgen.build import build_model
+from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.effects.spring import NEAREST
+from eomgen.errors import SceneError
+from eomgen.language.formula import BY_MATH
+from eomgen.program.program import interpret
+from eomgen.program.route import routed
+from eomgen.scene.reader import parse_scene
+from eomgen.scene.schema import OUTPUTS
+
+EXACT = 1e-12
+KEPT = ("applied_force", "kinetic_energy", "potential_energy", "momentum")
+"""Outputs, besides those that every module has, that are looked at here."""
+M = 2.0
+
+
+class Digits:
+    """60-digit numbers as scalars."""
+
+    def number(self, value: float) -> Any:
+        """The double itself, exactly."""
+        return MP.mpf(value)
+
+    def call(self, function: str, *arguments: Any) -> Any:
+        """A function of formulas."""
+        plain = function in ("step", "min", "max", "select", "abs")
+        return BY_MATH[function](*arguments) if plain else getattr(MP, function)(*arguments)
+
+    def is_zero(self, value: Any) -> bool:
+        """Whether it is 0 here."""
+        return bool(value == 0)
+
+    def named(self, value: Any, name: str) -> Any:
+        """A number has no name."""
+        return value
+
+
+def exactly(made: Engine, output: str, y: np.ndarray) -> np.ndarray:
+    """An output in 60 digits."""
+    given = dict(zip(made.module.STATES, y, strict=True))
+    given |= {**made.module.PARAMETERS, **made.module.INPUTS, "t": 0.0}
+    inputs = {name: MP.mpf(value) for name, value in given.items()}
+    found = interpret(made.system.program, output, inputs, Digits())
+    shape = made.system.program.outputs[output].shape
+    return np.array(found, dtype=object).reshape(shape)[()]
+
+
+def exact_dynamics(made: Engine, y: np.ndarray) -> Dynamics:
+    """The model at a state, in 60 digits."""
+    model = made.model
+    parameters = {p.name: MP.mpf(p.default) for p in model.parameters}
+    nq = len(model.coordinates)
+    state = [MP.mpf(x) for x in y]
+    return Dynamics(model, Values(parameters, {}, state[:nq], state[nq:]), Digits())
+
+
+# Scenes.
+
+SLIDER = """
+name = "slider"
+dimensions = 2
+[[bodies]]
+name = "b"
+mass = 2.0
+inertia_com = 0.1
+[[joints]]
+name = "j"
+type = "prismatic"
+axis = [1, 0]
+parent = "world"
+child = "b"
+coordinate = "x"
+"""
+PENDULUM = """
+name = "swing"
+dimensions = 2
+[[bodies]]
+name = "b"
+mass = 2.0
+inertia_com = 0.3
+[[joints]]
+name = "j"
+type = "revolute"
+parent = "world"
+child = "b"
+r_child = [-0.8, 0]
+coordinate = "q"
+[[effects]]
+type = "gravity"
+g = 9.81
+"""
+BOB = """
+name = "bob"
+dimensions = 2
+[[bodies]]
+name = "b"
+mass = 2.0
+inertia_com = 0.3
+[[joints]]
+name = "j"
+type = "free"
+child = "b"
+[[effects]]
+type = "gravity"
+g = 9.81
+"""
+PAIR = """
+name = "pair"
+dimensions = {}
+[[bodies]]
+name = "a"
+mass = 2.0
+inertia_com = 0.3
+[[joints]]
+name = "ja"
+type = "free"
+child = "a"
+[[bodies]]
+name = "b"
+mass = 1.3
+inertia_com = 0.2
+[[joints]]
+name = "jb"
+type = "free"
+child = "b"
+"""
+
+
+def effect(kind: str, *lines: str, name: str = "e") -> str:
+    """An effect's table."""
+    return "\n".join((f'[[effects]]\ntype = "{kind}"\nname = "{name}"', *lines, ""))
+
+
+def between(first: str, second: str, *lines: str, name: str = "e") -> str:
+    """A spring's table."""
+    return effect("spring", f'body_1 = "{first}"', f'body_2 = "{second}"', *lines, name=name)
+
+
+def at_joint(kind: str, *lines: str, joint: str = "j", name: str = "e") -> str:
+    """A table of an effect at a joint."""
+    return effect(kind, f'joint = "{joint}"', *lines, name=name)
+
+
+@cache
+def made(text: str, route: str = "aba") -> Engine:
+    """A scene, compiled."""
+    return engine(text, route, leave_out=tuple(name for name in OUTPUTS if name not in KEPT))
+
+
+def run(text: str, y0: list[float], t_end: float) -> Callable[[float], np.ndarray]:
+    """The motion from a state, by a solver that is good to 1e-10 or so."""
+    module = made(text).module
+    found = solve_ivp(
+        module.derivative, (0.0, t_end), y0, "DOP853", rtol=1e-11, atol=1e-12, dense_output=True
+    )
+    assert found.success
+    return found.sol
+
+
+# Closed forms.
+
+
+@pytest.mark.parametrize("damping", [3.0, 20.0, 45.0])
+@pytest.mark.parametrize("kind", ["spring", "joint_spring"])
+def test_a_damped_oscillator_moves_as_its_roots_say(kind: str, damping: float) -> None:
+    """Under, critically and over: k = 50 N/m, m = 2 kg, from 0.3 m and 0.4 m/s."""
+    numbers = "stiffness = 50.0", f"damping = {damping}"
+    if kind == "spring":
+        table = between("world", "b", "at_1 = [-1.0, 0]", "rest_length = 1.25", *numbers)
+        rest = 0.25
+    else:
+        table, rest = at_joint(kind, "rest = 0.25", *numbers), 0.25
+    motion = run(SLIDER + table, [rest + 0.3, 0.4], 2.0)
+    a, w2 = damping / (2 * M), 50.0 / M
+    for t in (0.1, 0.7, 2.0):
+        root = np.sqrt(complex(w2 - a * a))
+        ratio = np.sin(root * t) / root if root else t
+        x = (math.exp(-a * t) * (0.3 * np.cos(root * t) + (0.4 + a * 0.3) * ratio)).real
+        assert motion(t)[0] - rest == pytest.approx(x, abs=1e-9)
+
+
+def test_a_joint_spring_raises_a_pendulum_s_frequency() -> None:
+    """ω² = (k + m g l)/(I + m l²) about hanging straight down."""
+    spring = at_joint("joint_spring", "stiffness = 7.0", 'rest = "-pi/2"')
+    module = made(PENDULUM + spring).module
+    values = np.linalg.eigvals(module.jacobian(0.0, np.array([-math.pi / 2, 0.0])))
+    expected = math.sqrt((7.0 + M * 9.81 * 0.8) / (0.3 + M * 0.64))
+    assert sorted(values.imag) == pytest.approx([-expected, expected], rel=EXACT)
+    assert values.real == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_a_rope_pulls_when_taut_and_never_pushes() -> None:
+    """Slack: free fall; taut: k s + c ṡ; taut but coming back too fast: nothing."""
+    numbers = "stiffness = 80.0", "damping = 5.0", "rest_length = 1.5", "tension_only = true"
+    module = made(BOB + between("world", "b", *numbers)).module
+
+    def lift(y: float, speed: float) -> float:
+        rate = module.derivative(0.0, np.array([0.0, y, 0.0, 0.0, speed, 0.0]))
+        assert rate[3] == rate[5] == 0.0
+        return M * (rate[4] + 9.81)
+
+    assert lift(-1.4, -3.0) == pytest.approx(0.0, abs=1e-13)
+    assert lift(0.0, -3.0) == pytest.approx(0.0, abs=1e-13)
+    assert lift(-1.7, 0.0) == pytest.approx(80.0 * 0.2)
+    assert lift(-1.7, -2.0) == pytest.approx(80.0 * 0.2 + 5.0 * 2.0)
+    assert lift(-1.7, 4.0) == pytest.approx(0.0, abs=1e-13)
+    for y, energy in ((-1.4, 0.0), (-1.7, 40.0 * 0.2**2)):
+        state = np.array([0.0, y, 0.0, 0.0, 0.0, 0.0])
+        assert module.potential_energy(0.0, state) - M * 9.81 * y == pytest.approx(energy)
+
+
+def test_a_law_stands_for_stiffness() -> None:
+    """Cubic between points, and at a hinge; it may use parameters and the time."""
+    table = between("world", "b", "rest_length = 1.0", 'law = "k3*stretch**3 + 2*rate + t"')
+    module = made(BOB + table + "[parameters]\nk3 = 40.0\n").module
+    rate = module.derivative(3.0, np.array([0.0, -1.2, 0.0, 0.7, 0.5, 0.0]))
+    assert M * (rate[4] + 9.81) == pytest.approx(40.0 * 0.2**3 - 2 * 0.5 + 3.0)
+    law = at_joint("joint_spring", 'law = "9*stretch**3 + rate"', "rest = 0.2", "damping = 0.5")
+    force = made(SLIDER + law).module.applied_force(0.0, np.array([0.7, 0.3]))
+    assert force == pytest.approx([-(9 * 0.5**3 + 1.5 * 0.3)])
+
+
+def test_coulomb_friction_holds_and_slips_as_smoothed() -> None:
+    """Below the threshold: creep at speed artanh(F/C); above: (F - C)/m; sliding stops in time."""
+    table = at_joint("joint_friction", "coulomb = 6.0", "speed = 0.001")
+    motor = '[[effects]]\ntype = "motor"\nname = "push"\njoint = "j"\ntorque = {}\n'
+    creep = run(SLIDER + table + motor.format(5.4), [0.0, 0.0], 0.05)
+    assert creep(0.05)[1] == pytest.approx(0.001 * math.atanh(0.9), rel=1e-8)
+    slip = run(SLIDER + table + motor.format(6.6), [0.0, 0.5], 1.0)
+    assert slip(1.0)[1] == pytest.approx(0.5 + 0.6 / M, abs=1e-8)
+    # m v̇ = -C tanh(v/v0): sinh(v/v0) falls as exp(-C t/(m v0)).
+    stop = run(SLIDER + table, [0.0, 0.02], 0.01)
+    t = 0.007
+    assert stop(t)[1] == pytest.approx(
+        0.001 * math.asinh(math.sinh(20.0) * math.exp(-6.0 * t / (M * 0.001))), abs=1e-10
+    )
+    both = at_joint("joint_friction", "viscous = 4.0", "coulomb = 6.0", "speed = 0.5")
+    force = made(SLIDER + both).module.applied_force(0.0, np.array([0.0, 0.5]))
+    assert force == pytest.approx([-(2.0 + 6.0 * math.tanh(1.0))])
+
+
+def test_a_stop_holds_and_gives_back_what_it_took() -> None:
+    """Half an oscillation beyond the limit, out as fast as in; then a load rests F/k beyond."""
+    k, v = 800.0, 1.5
+    stop = at_joint("joint_stop", "low = -0.2", "high = 0.3", f"stiffness = {k}")
+    contact = math.pi * math.sqrt(M / k)
+    for sign, limit in ((1, 0.3), (-1, -0.2)):
+        motion = run(SLIDER + stop, [limit, sign * v], contact)
+        deepest = motion(contact / 2)
+        assert deepest == pytest.approx([limit + sign * v * math.sqrt(M / k), 0.0], abs=1e-8)
+        assert motion(contact) == pytest.approx([limit, -sign * v], abs=1e-8)
+    module = made(SLIDER + stop).module
+    for x in (-0.2, 0.0, 0.3):
+        assert module.applied_force(0.0, np.array([x, 9.0])) == [0.0]
+    assert module.applied_force(0.0, np.array([0.35, 0.0])) == pytest.approx([-k * 0.05])
+    assert module.potential_energy(0.0, np.array([-0.3, 0.0])) == pytest.approx(k / 2 * 0.1**2)
+
+
+@pytest.mark.parametrize("limits", ["both", "low", "high"])
+def test_a_damped_stop_never_pulls(limits: str) -> None:
+    """k x + c v pushed back, cut off at 0; nothing within; one limit may be left out."""
+    given = [line for line in ("low = -0.2", "high = 0.3") if limits in ("both", line.split()[0])]
+    stop = at_joint("joint_stop", *given, "stiffness = 100.0", "damping = 20.0")
+    module = made(SLIDER + stop).module
+    cases = {"high": [(0.4, 0.0, -10.0), (0.4, 1.0, -30.0), (0.4, -0.2, -6.0), (0.4, -3.0, 0.0)]}
+    cases["low"] = [(-0.3, -v, -force) for _, v, force in cases["high"]]
+    for x, v, force in [*cases["high"], *cases["low"], (0.1, 5.0, 0.0), (0.1, -5.0, 0.0)]:
+        beyond = "high" if x > 0.3 else "low"
+        expected = force if limits in ("both", beyond) else 0.0
+        found = module.applied_force(0.0, np.array([x, v]))[0]
+        assert found == pytest.approx(expected, abs=1e-12), (x, v)
+
+
+# Equal and opposite.
+
+
+@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
+@pytest.mark.parametrize("more", [(), ("tension_only = true",), ('law = "9*stretch + 2*rate"',)])
+def test_a_spring_between_free_bodies_keeps_momentum(
+    dimensions: int, more: tuple[str, ...]
+) -> None:
+    """Linear and angular, damped or not, to all digits."""
+    ends = ("at_1 = [0.2, 0.3]", "at_2 = [-0.1, 0.4]")
+    if dimensions == SPACE:
+        ends = ("at_1 = [0.2, 0.3, -0.5]", "at_2 = [-0.1, 0.4, 0.2]")
+    own = () if any("law" in line for line in more) else ("stiffness = 30.0",)
+    numbers = ("damping = 4.0", "rest_length = 0.3", *own, *more)
+    pair = PAIR.format(dimensions)
+    if dimensions == SPACE:
+        pair = pair.replace("inertia_com = 0.3", "inertia_com = [0.3, 0.2, 0.25]")
+        pair = pair.replace("inertia_com = 0.2\n", "inertia_com = [0.1, 0.2, 0.25]\n")
+    found = made(pair + between("a", "b", *ends, *numbers))
+    rng = np.random.default_rng(3)
+    for _ in range(3):
+        y = np.array([MP.mpf(x) for x in found.random_state(rng)])
+        change = along(lambda z: exactly(found, "momentum", z), y, exactly(found, "derivative", y))
+        assert np.max(np.abs(change)) < 1e-14  # the state is a double's, its quaternions too
+        assert np.max(np.abs(exactly(found, "applied_force", y))) > 0.1
+
+
+# Random trees, with the loads put in by hand.
+
+
+def point(motion: SpatialMotion, dimensions: int, k: int, at: np.ndarray) -> tuple[np.ndarray, ...]:
+    """World place and velocity of a point of a body, three components."""
+    moved = motion.body_velocities[k]
+    if dimensions == PLANE:
+        x, y, angle = motion.body_poses[k]
+        c, s = math.cos(angle), math.sin(angle)
+        arm = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ at
+        base, speed, spin = np.array([x, y, 0]), np.array([*moved[:2], 0]), moved[2] * Z
+    else:
+        arm, base = motion.body_poses[k][:, :3] @ at, motion.body_poses[k][:, 3]
+        speed, spin = moved[:3], moved[3:]
+    return base + arm, speed + np.cross(spin, arm)
+
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def trees(dimensions: int, wanted: int) -> list[tuple[SpatialTree, str]]:
+    """Random trees with a motor, and with two bodies or more."""
+    found = []
+    for seed in range(400, 500):
+        tree, text = random_spatial_tree(seed, dimensions)
+        if tree.motor >= 0 and len(tree.bodies) > 1:
+            found.append((tree, text))
+        if len(found) == wanted:
+            break
+    return found
+
+
+def by_hand(
+    tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Mapping[str, float], rope: bool
+) -> np.ndarray:
+    """Accelerations of a tree with the effects of the test below: they are linear in loads."""
+    q0 = q[tree.q_slices()[tree.motor]][0]
+    v0 = v[tree.v_slices()[tree.motor]][0]
+    torque = -(3.0 * (q0 - 0.4) + 0.6 * v0) - (0.2 * v0 + 0.7 * math.tanh(v0 / 0.3))
+    torque -= 50.0 * (q0 - min(max(q0, -0.1), 0.1))
+    u = {**u, "drive": u["drive"] + torque}
+    plain = solve(tree, q, v, u)
+    last = len(tree.bodies) - 1
+    a, b = np.array([0.1, 0.2, 0.3]), np.array([-0.3, 0.15, 0.1])
+    if tree.dimensions == PLANE:
+        a[2] = b[2] = 0.0
+    anchor = np.array([2.0, 1.0, 0.0])
+    places = {k: point(plain, tree.dimensions, k, at) for k, at in ((0, a), (last, b))}
+    d, rate = places[last][0] - places[0][0], places[last][1] - places[0][1]
+    unit = d / np.linalg.norm(d)
+    stretch = np.linalg.norm(d) - 0.4
+    pull = (25.0 * stretch + 2.0 * unit @ rate) * unit
+    if rope and (stretch < 0 or pull @ unit < 0):
+        pull = 0 * pull
+    tied = 5.0 * (anchor - places[0][0])
+    total = plain.accelerations.copy()
+    for k, at, force in ((0, a, pull + tied), (last, b, -pull)):
+        pushed = replace(tree, push=(k, tuple(at)))
+        for load, sign in (
+            (dict(zip(("push_x", "push_y", "push_z"), force, strict=True)), 1),
+            ({}, -1),
+        ):
+            total += sign * solve(pushed, q, v, {"drive": u["drive"], **load}).accelerations
+    return total
+
+
+@pytest.mark.parametrize("route", ["aba", "ldl"])
+@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
+def test_random_trees_move_as_under_loads_put_in_by_hand(dimensions: int, route: str) -> None:
+    """A spring or rope between two bodies, one to the world, and all kinds at a joint."""
+    rng = np.random.default_rng(11)
+    for number, (tree, text) in enumerate(trees(dimensions, 2)):
+        rope = number % 2 == 1
+        zs = ("", "", "") if dimensions == PLANE else (", 0.3", ", 0.1", ", 0")
+        j = f"j{tree.motor}"
+        text += between(
+            "b0", f"b{len(tree.bodies) - 1}", f"at_1 = [0.1, 0.2{zs[0]}]",
+            f"at_2 = [-0.3, 0.15{zs[1]}]", "stiffness = 25.0", "damping = 2.0",
+            "rest_length = 0.4", f"tension_only = {str(rope).lower()}", name="e1",
+        )  # fmt: skip
+        text += between(
+            "world", "b0", f"at_1 = [2, 1{zs[2]}]", f"at_2 = [0.1, 0.2{zs[0]}]",
+            "stiffness = 5.0", name="e2",
+        )  # fmt: skip
+        text += at_joint(
+            "joint_spring", "stiffness = 3.0", "rest = 0.4", "damping = 0.6", joint=j, name="e3"
+        )
+        text += at_joint(
+            "joint_friction", "viscous = 0.2", "coulomb = 0.7", "speed = 0.3", joint=j, name="e4"
+        )
+        text += at_joint(
+            "joint_stop", "low = -0.1", "high = 0.1", "stiffness = 50.0", joint=j, name="e5"
+        )
+        module = made(text, route).module
+        for _ in range(4):
+            q, v = random_state(tree, rng)
+            u = {**tree.random_inputs(rng)}
+            y = np.empty(len(module.STATES))
+            y[tree.places(module.STATES)] = np.concatenate((q, v))
+            rates = module.derivative(0.0, y, None, u)[tree.places(module.STATES)][len(q) :]
+            assert apart(rates, by_hand(tree, q, v, u, rope)) < 1e-10
+
+
+# Energy.
+
+OFF = "at_1 = [0.2, 0.3]"
+KINDS = {
+    "spring": between("a", "b", "stiffness = 30.0", "rest_length = 0.3", "at_1 = [0.2, 0.3]"),
+    "no_length": between("world", "b", "stiffness = 30.0", "at_1 = [0.2, 0.3]"),
+    "rope": between("a", "b", "stiffness = 30.0", "rest_length = 0.8", "tension_only = true", OFF),
+    "joint_spring": at_joint("joint_spring", "stiffness = 9.0", "rest = 0.3"),
+    "joint_stop": at_joint("joint_stop", "low = -0.5", "high = 0.5", "stiffness = 90.0"),
+    "damper": between("a", "b", "damping = 2.0", "at_1 = [0.2, 0.3]"),
+    "damped_rope": between(
+        "a",
+        "b",
+        "stiffness = 9.0",
+        "damping = 5.0",
+        "rest_length = 0.7",
+        "tension_only = true",
+        OFF,
+    ),
+    "law": between("a", "b", OFF, "rest_length = 0.3", 'law = "5*stretch + 7*stretch**3 + rate"'),
+    "damped_joint": at_joint("joint_spring", "stiffness = 9.0", "damping = 2.0"),
+    "joint_law": at_joint("joint_spring", 'law = "9*stretch**3 + 2*rate"'),
+    "friction": at_joint("joint_friction", "viscous = 1.0", "coulomb = 2.0", "speed = 0.3"),
+    "damped_stop": at_joint(
+        "joint_stop", "low = -0.5", "high = 0.5", "stiffness = 90.0", "damping = 7.0"
+    ),
+}
+KEEPING = ("spring", "no_length", "rope", "joint_spring", "joint_stop")
+LOSING = ("damper", "friction")
+
+
+def linked(table: str) -> str:
+    """A slide that carries a hinge, and an effect."""
+    bodies = SLIDER.replace('"b"', '"a"').replace('name = "j"', 'name = "j0"')
+    second = PENDULUM[PENDULUM.index("[[bodies]]") :].replace('"world"', '"a"')
+    return bodies + second + table
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_change_of_energy_is_the_power_of_the_effects(kind: str) -> None:
+    """dT/dt is the power of all; of what has potential energy, power is minus its change."""
+    found = made(linked(KINDS[kind]))
+    own, rng = found.model.effects[-1], np.random.default_rng(5)
+
+    def own_energy(y: np.ndarray) -> Any:
+        return own.potential_energy(exact_dynamics(found, y))
+
+    worked = 0.0
+    for _ in range(6):
+        y = np.array([MP.mpf(x) for x in found.random_state(rng)])
+        rate = exactly(found, "derivative", y)
+        here = exact_dynamics(found, y)
+        powers = [here.power(e) for e in found.model.effects]
+        kinetic = along(partial(exactly, found, "kinetic_energy"), y, rate)
+        potential = along(partial(exactly, found, "potential_energy"), y, rate)
+        size = 1 + sum(map(abs, powers))
+        assert abs(kinetic - sum(powers)) < 1e-25 * size
+        change = along(own_energy, y, rate)
+        lost = powers[-1] + change  # what is put in beside the potential energy
+        worked = max(worked, abs(powers[-1]))
+        if kind in KEEPING:
+            assert abs(lost) < 1e-25 * size
+            assert abs(kinetic + potential) < 1e-25 * size
+        elif "law" not in kind:
+            assert lost < 1e-25 * size
+            assert kind not in LOSING or change == 0
+        else:
+            assert change == 0
+        module, plain = found.module, y.astype(float)
+        values = Values(module.PARAMETERS, {}, plain[:2], plain[2:])
+        in_doubles = Dynamics(found.model, values, FloatScalars())
+        doubles = sum(in_doubles.power(e) for e in found.model.effects)
+        assert abs(doubles - float(kinetic)) < 1e-10 * size
+    assert worked > 0.1
+
+
+# Derivatives, and points that meet.
+
+
+def central(found: Engine, y: np.ndarray) -> np.ndarray:
+    """∂f/∂y by central differences in 60 digits."""
+    ways = np.array([[MP.mpf(int(i == j)) for j in range(len(y))] for i in range(len(y))])
+    columns = [along(lambda z: exactly(found, "derivative", z), y, way) for way in ways]
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_jacobians_are_those_of_central_differences(kind: str) -> None:
+    """At random states."""
+    found, rng = made(linked(KINDS[kind])), np.random.default_rng(7)
+    for _ in range(2):
+        y = found.random_state(rng)
+        expected = central(found, np.array([MP.mpf(x) for x in y])).astype(float)
+        assert apart(found.module.jacobian(0.0, y), expected) < 1e-11
+
+
+ZERO_CASES = {
+    "no length": ("stiffness = 30.0",),
+    "damped": ("stiffness = 30.0", "damping = 4.0"),
+    "of a length": ("stiffness = 30.0", "damping = 4.0", "rest_length = 0.5"),
+    "a length of 0 by a parameter": ("stiffness = 30.0", 'rest_length = "0*g0"'),
+    "law": ('law = "30*stretch"', "damping = 4.0"),
+    "slack rope": ("stiffness = 30.0", "rest_length = 0.5", "tension_only = true"),
+    "rope": ("stiffness = 30.0", "damping = 4.0", "tension_only = true"),
+}
+
+
+@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
+@pytest.mark.parametrize("case", ZERO_CASES)
+def test_points_may_meet(case: str, dimensions: int) -> None:
+    """At zero distance and 0.3 ε from it all is finite, and so is every derivative; k d, c ḋ."""
+    pair = PAIR.format(dimensions) + "[parameters]\ng0 = 1.0\n"
+    if dimensions == SPACE:
+        pair = pair.replace("inertia_com = 0.3", "inertia_com = [0.3, 0.2, 0.25]")
+        pair = pair.replace("inertia_com = 0.2\n", "inertia_com = [0.1, 0.2, 0.25]\n")
+    lines = ZERO_CASES[case]
+    found = made(pair + between("a", "b", *lines))
+    module = found.module
+    names = list(module.STATES)
+    y = np.zeros(len(names))
+    for indices in map(list, module.QUATERNIONS):
+        y[indices[0]] = 1.0
+    for x, vx in ((0.0, 0.0), (0.0, 0.7), (0.3 * NEAREST, 0.7), (-1e-200, 0.7), (1e-5, 0.2)):
+        y[names.index("b_x")], y[names.index("b_x_dot")] = x, vx
+        rate, jacobian = module.derivative(0.0, y), module.jacobian(0.0, y)
+        assert np.all(np.isfinite(rate)) and np.all(np.isfinite(jacobian))
+        assert math.isfinite(module.potential_energy(0.0, y))
+        if dimensions == PLANE or x == 0.0:
+            expected = central(found, np.array([MP.mpf(z) for z in y])).astype(float)
+            assert apart(jacobian, expected) < 1e-11
+        if x == 0.0 and case != "slack rope":
+            damping = 4.0 if "damping = 4.0" in lines else 0.0
+            pull = rate[names.index("a_x_dot")] * M
+            assert pull == pytest.approx(damping * vx)
+            row, across = names.index("a_x_dot"), names.index("a_y_dot")
+            for index, velocity, column in ((row, "b_x_dot", "b_x"), (across, "b_y_dot", "b_y")):
+                assert M * jacobian[index, names.index(velocity)] == pytest.approx(damping)
+                if case != "of a length":
+                    assert M * jacobian[index, names.index(column)] == pytest.approx(30.0)
+        if case == "slack rope":
+            assert not np.any(rate[len(names) // 2 + 1 :])
+
+
+def test_the_energy_of_points_that_meet_has_the_force_for_a_slope() -> None:
+    """From 2 ε to 0, with and without a length: nothing jumps."""
+    for length in ("", "rest_length = 0.5"):
+        found = made(BOB.replace("9.81", "0") + between("world", "b", "stiffness = 30.0", length))
+        for x in (2.0, 1.01, 0.99, 0.4, 0.0):
+            y = np.array([MP.mpf(z) for z in (x * NEAREST, 0.0, 0.0, 0.0, 0.0, 0.0)])
+            way = np.array([MP.mpf(z) for z in (1, 0, 0, 0, 0, 0)])
+            slope = along(partial(exactly, found, "potential_energy"), y, way)
+            force = exactly(found, "applied_force", y)[0]
+            assert abs(slope + force) < 1e-15
+
+
+# Only what is there.
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_absence_is_free(kind: str) -> None:
+    """Without the effect the module is that of a scene that never had it."""
+    plain = made(linked("")).source
+    table = KINDS[kind]
+    scene = parse_scene(linked(table)).replaced(outputs="all")
+    without = scene.replaced(effects=[e for e in scene.effects if e.name != "e"])
+    model = replace(build_model(without), route="aba")
+    kept = tuple(name for name in model.outputs if name in KEPT)
+    assert python_module(routed(replace(model, outputs=kept)).system) == plain
+    assert made(linked(table)).source != plain
+
+
+def test_nothing_is_computed_that_a_spring_does_not_have() -> None:
+    """No square root without length, no tanh without Coulomb friction, no parameter unused."""
+    assert "sqrt" not in made(BOB + between("world", "b", "stiffness = 30.0")).source
+    source = made(SLIDER + at_joint("joint_friction", "viscous = 2.0")).source
+    assert "tanh" not in source and "e_speed" not in source
+    assert "e_damping" not in made(SLIDER + at_joint("joint_spring", "stiffness = 2.0")).source
+
+
+# Bad input.
+
+STOP = "effects[0].low: {} is not below high, {}; make low < high"
+BAD = {
+    between("world", "b", "stiffness = -1"): (
+        "effects[0].stiffness: -1 is negative; give a number >= 0 in N/m"
+    ),
+    between("world", "b", "damping = -2"): (
+        "effects[0].damping: -2 is negative; give a number >= 0 in N s/m"
+    ),
+    between("world", "b", "stiffness = 1", "rest_length = -2", "allow_active = true"): (
+        "effects[0].rest_length: -2 is negative; give a number >= 0 in m"
+    ),
+    between("world", "bb", "stiffness = 1"): (
+        "effects[0].body_2: no body is named 'bb' (did you mean 'b'?)"
+    ),
+    between("b", "b", "stiffness = 1"): (
+        "effects[0].body_2: 'b' is body_1 too, whose points keep their distance; name another body"
+    ),
+    between("world", "b"): "effects[0].stiffness: missing; give it, or damping or a law",
+    between("world", "b", "stiffness = 1", 'law = "stretch"'): (
+        "effects[0].stiffness: a law stands in its place; give one of them"
+    ),
+    between("world", "b", 'law = "3*strech"'): (
+        "effects[0].law: unknown parameter 'strech' (did you mean 'stretch'?)"
+    ),
+    between("world", "b", "stiffness = 1", "at_1 = [1, 2, 3]"): (
+        "effects[0].at_1: has 3 components; the plane takes 2"
+    ),
+    at_joint("joint_spring", "stiffness = -1"): (
+        "effects[0].stiffness: -1 is negative; give a number >= 0 in N m/rad or N/m"
+    ),
+    at_joint("joint_spring", "stiffness = 1", joint="jj"): (
+        "effects[0].joint: no revolute or prismatic joint is named 'jj' (did you mean 'j'?)"
+    ),
+    at_joint("joint_spring"): "effects[0].stiffness: missing; give it, or damping or a law",
+    at_joint("joint_friction", "viscous = -1"): (
+        "effects[0].viscous: -1 is negative; give a number >= 0 in N m s/rad or N s/m"
+    ),
+    at_joint("joint_friction"): "effects[0].viscous: missing; give it, or coulomb and speed",
+    at_joint("joint_friction", "coulomb = 1"): (
+        "effects[0].speed: missing; coulomb is smoothed as tanh(rate/speed), give a small one"
+    ),
+    at_joint("joint_friction", "coulomb = 1", "speed = 0"): (
+        "effects[0].speed: 0 is not positive; give a number > 0 in rad/s or m/s"
+    ),
+    at_joint("joint_friction", "viscous = 1", "speed = 1"): (
+        "effects[0].speed: it smooths coulomb, which is missing; give both"
+    ),
+    at_joint("joint_stop", "low = 1", "high = 1", "stiffness = 1"): STOP.format(1, 1),
+    at_joint("joint_stop", 'low = "pi"', "high = 1", "stiffness = 1"): STOP.format(3.14159, 1),
+    at_joint("joint_stop", "stiffness = 1"): (
+        "effects[0].low: missing, and high too; give one of them or both"
+    ),
+    at_joint("joint_stop", "low = 0", "stiffness = -1"): (
+        "effects[0].stiffness: -1 is negative; give a number >= 0 in N m/rad or N/m"
+    ),
+    at_joint("joint_stop", "low = 0"): ("effects[0].stiffness: missing; every such table needs it"),
+}
+
+
+@pytest.mark.parametrize("number", range(len(BAD)))
+def test_bad_input_gets_one_clear_line(number: int) -> None:
+    """Place, value, remedy."""
+    table, message = list(BAD.items())[number]
+    with pytest.raises(SceneError) as error:
+        build_model(parse_scene(SLIDER + table))
+    assert str(error.value).removeprefix("scene: ") == message
+
+
+def test_what_feeds_energy_in_must_be_asked_for() -> None:
+    """allow_active = true."""
+    for table in (
+        between("world", "b", "stiffness = -1", "damping = -1", "allow_active = true"),
+        at_joint("joint_spring", "stiffness = -1", "allow_active = true"),
+        at_joint("joint_friction", "viscous = -1", "allow_active = true"),
+        at_joint("joint_stop", "low = 0", "stiffness = 1", "damping = -1", "allow_active = true"),
+    ):
+        build_model(parse_scene(SLIDER + table))
