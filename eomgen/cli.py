@@ -57,6 +57,10 @@ def _parser() -> argparse.ArgumentParser:
 
     command("list", commands.list_scenes, "name the built-in scenes", None)
     command("schema", commands.print_schema, "print the JSON Schema of scenes, for editors", None)
+    reference = command(
+        "reference", commands.print_reference, "tell joints and effects with their keys", None
+    )
+    reference.add_argument("type", metavar="TYPE", nargs="?", help="one of them, drag for example")
     check = command("check", commands.check, "validate a scene and say what it is made of")
     check.add_argument("--long", action="store_true", help="list everything, however much")
     _form(check)

@@ -10,6 +10,7 @@ import eomgen
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.scene.json_schema import json_schema
 from eomgen.scene.reader import BUILT_IN, built_in_names, read_scene
+from eomgen.scene.reference import reference
 
 PACKAGE = Path(eomgen.__file__).parent
 ROOT = Path(__file__).parent.parent
@@ -157,6 +158,7 @@ def test_each_fact_lives_once() -> None:
     assert set(schema.Integrator.__args__) == set(INTEGRATORS)
     assert schema.Output.__args__ == schema.OUTPUTS
     assert (BUILT_IN / "scene.schema.json").read_text("utf-8") == json_schema()
+    assert (ROOT / "docs" / "reference.md").read_text("utf-8") == reference()
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     python = project["requires-python"].removeprefix(">=")
     assert f"Python ≥ {python}" in (ROOT / "README.md").read_text("utf-8")

@@ -4,7 +4,7 @@ import importlib.metadata
 
 from eomgen.commands.costing import effects
 from eomgen.commands.deriving import derive
-from eomgen.commands.describing import check, list_scenes, print_schema
+from eomgen.commands.describing import check, list_scenes, print_reference, print_schema
 from eomgen.commands.generating import generate
 from eomgen.commands.linearising import linearise
 from eomgen.commands.running import simulate, view
@@ -16,6 +16,7 @@ __all__ = [
     "generate",
     "linearise",
     "list_scenes",
+    "print_reference",
     "print_schema",
     "simulate",
     "version",

@@ -1,4 +1,4 @@
-"""What there is and what a scene is made of: `list`, `schema`, `check`."""
+"""What there is and what a scene is made of: `list`, `schema`, `reference`, `check`."""
 
 import sys
 
@@ -30,6 +30,14 @@ def print_schema(given: Arguments) -> int:
     from eomgen.scene.json_schema import json_schema
 
     print(json_schema(), end="")
+    return 0
+
+
+def print_reference(given: Arguments) -> int:
+    """Joints and effects with their keys, in Markdown."""
+    from eomgen.scene.reference import reference
+
+    print(reference(given.type), end="")
     return 0
 
 

@@ -1,0 +1,117 @@
+"""The scene language in words: every table with its keys, taken from the tables themselves."""
+
+import inspect
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args
+
+from pydantic.fields import FieldInfo
+
+from eomgen.effects import Effect
+from eomgen.errors import SceneError, nearest
+from eomgen.joints import Joint
+from eomgen.language.base import Table
+from eomgen.language.formula import CONSTANTS, FUNCTIONS, ZERO, Constant, Formula
+
+HEAD = """\
+# Scenes: joints and effects
+
+What `eomgen reference` prints. Each key is named with its unit and its default; keys without a
+default may be left out. A quantity is a number, which becomes a parameter of the generated module,
+or a formula in quotes: `+ - * /`, `**` with a whole number, brackets, comparisons,
+`a if x < y else b`, {functions}
+and {constants}. Formulas may name parameters, and where a key says so more: *motion* is the time
+`t` and all coordinates, velocities, inputs and states of effects; other words are told there.
+"""
+
+
+def reference(kind: str | None = None) -> str:
+    """Markdown about all joints and effects, or about the one whose `type` is `kind`.
+
+    Raises `SceneError` if there is none.
+    """
+    groups = {"Joints": _by_type(Joint), "Effects": _by_type(Effect)}
+    if kind is not None:
+        known = {name: table for tables in groups.values() for name, table in tables.items()}
+        if kind not in known:
+            hint = nearest(kind, known) or f"; known: {', '.join(known)}"
+            raise SceneError(f"no joint or effect is of type '{kind}'{hint}")
+        return "\n".join(_told(kind, known[kind]))
+    functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
+    constants = ", ".join(f"`{name}`" for name in CONSTANTS)
+    lines = [HEAD.format(functions=functions, constants=constants)]
+    for title, tables in groups.items():
+        lines += [f"## {title}", ""]
+        for name, table in tables.items():
+            lines += _told(name, table, "### ")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _by_type(union: Any) -> dict[str, type[Table]]:
+    """The tables of an annotated union, by their `type`, in alphabetical order."""
+    tables = get_args(get_args(union)[0])
+    return {_word(table): table for table in sorted(tables, key=_word)}
+
+
+def _word(table: type[Table]) -> str:
+    return str(get_args(table.model_fields["type"].annotation)[0])
+
+
+def _told(name: str, table: type[Table], heading: str = "# ") -> Iterator[str]:
+    yield f"{heading}{name}"
+    yield ""
+    yield inspect.cleandoc(table.__doc__ or "")
+    yield ""
+    yield "| key | unit | default | what it is |"
+    yield "|---|---|---|---|"
+    for key, field in table.model_fields.items():
+        if key not in ("type", "name"):
+            yield "| " + " | ".join(_row(key, field)) + " |"
+    yield ""
+
+
+def _row(key: str, field: FieldInfo) -> tuple[str, str, str, str]:
+    marks = field.json_schema_extra
+    extra: Mapping[str, Any] = marks if isinstance(marks, Mapping) else {}
+    about = re.sub(r"(<\w+>\w*)", r"`\1`", field.description or "")
+    words = _words(field.annotation)
+    if words:
+        about += (": " if about else "") + ", ".join(f"`{word}`" for word in words)
+    bounds = {"positive": "> 0", "nonnegative": ">= 0"}
+    if (bound := bounds.get(str(extra.get("bound")))) is not None:
+        about += f", {bound}"
+    if seen := extra.get("sees"):
+        about += "; formula over " + ", ".join(
+            "*motion*" if word == "motion" else f"`{word}`" for word in seen
+        )
+    unit = re.sub(r"\*\*", "^", str(extra.get("unit", "")))
+    return f"`{field.alias or key}`", unit, _default(field), about
+
+
+def _words(annotation: Any) -> list[str]:
+    """The words that a field may hold, however deep they stand in its type."""
+    found: list[str] = []
+    for part in get_args(annotation):
+        found += [part] if isinstance(part, str) else _words(part)
+    return found
+
+
+def _default(field: FieldInfo) -> str:
+    value = field.default
+    if field.is_required():
+        return "needed"
+    if value is None or value in ((), {}):
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Constant):
+        return "0" if value == ZERO else f"{value.value:g}"
+    assert not isinstance(value, Formula)
+    return f"`{_written(value)}`" if isinstance(value, tuple | str) else _written(value)
+
+
+def _written(value: Any) -> str:
+    """As a scene has it."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_written, value))}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
