@@ -172,13 +172,15 @@ def _bodies(
         joint, joint_place = holding[name]
         joint = straightened_joint(joint, joint_place, scene.dimensions, notices)
         check_look(body.shapes, None, scene.dimensions, place)
+        count = len(parameters)
         body = _named(body, body.name, place, known, parameters)
+        own = {p.name: p.default for p in parameters[count:]}
         joint = _named(joint, joint.name, joint_place, known, parameters)
         built.append(
             Body(
                 name=name,
                 mass=body.mass,
-                inertia_com=checked_inertia(body, place, scene.dimensions, parameters),
+                inertia_com=checked_inertia(body, place, scene.dimensions, {**known, **own}),
                 joint=joint,
                 parent=-1 if joint.parent == WORLD else index[joint.parent],
                 positions=joint.positions(scene.dimensions),
