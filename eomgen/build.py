@@ -87,7 +87,12 @@ def outputs_for(
             raise SceneError(
                 f"{place.format(i)}: '{name}' is about {needs[name]}, and there are none"
             )
-    return tuple(name for name in OUTPUTS if name in wanted)
+    return in_order(wanted)
+
+
+def in_order(outputs: Collection[str]) -> tuple[str, ...]:
+    """Outputs, each once, in the order of `OUTPUTS`."""
+    return tuple(name for name in OUTPUTS if name in outputs)
 
 
 def _inputs(effects: Sequence[Effect], bodies: Sequence[Body], dimensions: int) -> list[Input]:
