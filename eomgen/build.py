@@ -2,16 +2,17 @@
 
 import math
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from typing import Literal, TypeVar
 
-from eomgen.effects import Effect, Gravity, Motor
+from eomgen.effects import Effect, Gravity
 from eomgen.effects.base import ExtraState, Input
 from eomgen.errors import SceneError, nearest
 from eomgen.joints import Joint, Prismatic, Revolute
 from eomgen.joints.base import WORLD, Coordinate
 from eomgen.language.base import Table
 from eomgen.language.formula import ZERO, Floats, evaluate
-from eomgen.language.quantity import Parameter, name_quantities, with_components
+from eomgen.language.quantity import Parameter, name_quantities, of_joint, with_components
 from eomgen.model import Body, Model, Point
 from eomgen.scene.chains import written_out
 from eomgen.scene.look import check_look
@@ -19,6 +20,7 @@ from eomgen.scene.schema import OUTPUTS, Scene
 from eomgen.straighten import checked_inertia, straightened_joint, unit_quaternions
 
 AnyTable = TypeVar("AnyTable", bound=Table)
+Given = TypeVar("Given", Input, ExtraState)
 
 
 def build_model(scene: Scene) -> Model:
@@ -29,14 +31,15 @@ def build_model(scene: Scene) -> Model:
     parameters, known = _scene_parameters(scene)
     bodies = _bodies(scene, known, parameters)
     names = {body.name: i for i, body in enumerate(bodies[0])}
-    effects = _effects(scene, bodies[0], known, parameters)
+    sliding = {body.joint.name for body in bodies[0] if isinstance(body.joint, Prismatic)}
+    effects = _effects(scene, bodies[0], sliding, known, parameters)
     points = _points(scene, names, known, parameters)
     coordinates = [c for body in bodies[0] for c in body.positions]
     velocities = [c for body in bodies[0] for c in body.velocities]
     if not velocities:
         raise SceneError("joints: nothing can move; give at least one that is no weld")
-    inputs = _inputs(effects, bodies[0], scene.dimensions)
-    states = [x for effect in effects for x in effect.states(scene.dimensions)]
+    inputs = [_at_joint(x, e, sliding) for e in effects for x in e.inputs(scene.dimensions)]
+    states = [_at_joint(x, e, sliding) for e in effects for x in e.states(scene.dimensions)]
     _check_symbols(parameters, coordinates, velocities, inputs, states)
     check_look((), scene.camera, scene.dimensions, "camera")
     if scene.camera.follow is not None:
@@ -87,19 +90,21 @@ def outputs_for(
             raise SceneError(
                 f"{place.format(i)}: '{name}' is about {needs[name]}, and there are none"
             )
-    return tuple(name for name in OUTPUTS if name in wanted)
+    return in_order(wanted)
 
 
-def _inputs(effects: Sequence[Effect], bodies: Sequence[Body], dimensions: int) -> list[Input]:
-    """All inputs in order; that of a motor at a sliding joint is a force."""
-    slides = {body.joint.name for body in bodies if isinstance(body.joint, Prismatic)}
-    inputs: list[Input] = []
-    for effect in effects:
-        for given in effect.inputs(dimensions):
-            if isinstance(effect, Motor) and effect.joint in slides:
-                given = Input(given.name, "N", f"motor force at {effect.joint}")
-            inputs.append(given)
-    return inputs
+def in_order(outputs: Collection[str]) -> tuple[str, ...]:
+    """Outputs, each once, in the order of `OUTPUTS`."""
+    return tuple(name for name in OUTPUTS if name in outputs)
+
+
+def _at_joint(given: Given, effect: Effect, sliding: Collection[str]) -> Given:
+    """An input or state of an effect, in the unit and words for its joint if it has one."""
+    joint = getattr(effect, "joint", None)
+    if joint is None:
+        return given
+    unit, about = (of_joint(text, joint in sliding) for text in (given.unit, given.about))
+    return replace(given, unit=unit, about=about)
 
 
 def _scene_parameters(scene: Scene) -> tuple[list[Parameter], dict[str, float]]:
@@ -172,13 +177,15 @@ def _bodies(
         joint, joint_place = holding[name]
         joint = straightened_joint(joint, joint_place, scene.dimensions, notices)
         check_look(body.shapes, None, scene.dimensions, place)
+        count = len(parameters)
         body = _named(body, body.name, place, known, parameters)
+        own = {p.name: p.default for p in parameters[count:]}
         joint = _named(joint, joint.name, joint_place, known, parameters)
         built.append(
             Body(
                 name=name,
                 mass=body.mass,
-                inertia_com=checked_inertia(body, place, scene.dimensions, parameters),
+                inertia_com=checked_inertia(body, place, scene.dimensions, {**known, **own}),
                 joint=joint,
                 parent=-1 if joint.parent == WORLD else index[joint.parent],
                 positions=joint.positions(scene.dimensions),
@@ -196,9 +203,10 @@ def _named(
     known: dict[str, float],
     parameters: list[Parameter],
     motion: Sequence[str] = (),
+    sliding: Collection[str] = (),
 ) -> AnyTable:
     """A table with its bare numbers as parameters, which are added to `parameters`."""
-    fields, new = name_quantities(table, prefix, place, known, motion)
+    fields, new = name_quantities(table, prefix, place, known, motion, sliding)
     parameters += new
     return table.replaced(**fields)
 
@@ -238,7 +246,11 @@ def _points(
 
 
 def _effects(
-    scene: Scene, bodies: Sequence[Body], known: dict[str, float], parameters: list[Parameter]
+    scene: Scene,
+    bodies: Sequence[Body],
+    sliding: Collection[str],
+    known: dict[str, float],
+    parameters: list[Parameter],
 ) -> list[Effect]:
     """Effects with bodies and joints that there are, and vectors of the right length."""
     names = [body.name for body in bodies]
@@ -267,7 +279,7 @@ def _effects(
             if isinstance(value := getattr(effect, field), tuple)
         }
         effect = effect.replaced(**vectors).checked(scene.dimensions, place)
-        effects.append(_named(effect, effect.name, place, known, parameters, motion))
+        effects.append(_named(effect, effect.name, place, known, parameters, motion, sliding))
         effect.check_values(lambda formula: float(evaluate(formula, known, Floats())), place)
     return effects
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import accumulate
 from typing import TypeGuard
 
@@ -110,8 +111,8 @@ class Model:
                 found.append((w, w + 1, w + 2, w + 3))
         return tuple(found)
 
-    @property
-    def defaults(self) -> dict[str, float]:
+    @cached_property
+    def defaults(self) -> Mapping[str, float]:
         """Parameter values of the scene, by name."""
         return {p.name: p.default for p in self.parameters}
 

@@ -10,7 +10,7 @@ from eomgen.errors import SceneError
 from eomgen.joints import Free, Joint
 from eomgen.joints.base import Geared
 from eomgen.language.formula import ZERO, Constant, Floats, Formula, evaluate
-from eomgen.language.quantity import Parameter, with_components
+from eomgen.language.quantity import with_components
 from eomgen.model import Model
 from eomgen.scene.schema import BodyTable
 
@@ -88,15 +88,14 @@ def _example(axis: Sequence[float]) -> str:
 
 
 def checked_inertia(
-    body: BodyTable, place: str, dimensions: int, parameters: Sequence[Parameter]
+    body: BodyTable, place: str, dimensions: int, known: Mapping[str, float]
 ) -> tuple[Formula, ...]:
-    """The entries of a body's inertia: one in the plane, six in space.
+    """The entries of a body's inertia: one in the plane, six in space; `known` are parameters.
 
     Raises `SceneError`, naming the body, if its values are no inertia of any body: not positive, or
     against the triangle inequality; or if it has inertia but no mass.
     """
     given = body.inertia_com
-    known = {p.name: p.default for p in parameters}
     values = [
         float(evaluate(f, known, Floats()))
         for f in (given if isinstance(given, tuple) else (given,))

@@ -630,21 +630,21 @@ BAD = {
         "effects[0].at_1: has 3 components; the plane takes 2"
     ),
     at_joint("joint_spring", "stiffness = -1"): (
-        "effects[0].stiffness: -1 is negative; give a number >= 0 in N m/rad or N/m"
+        "effects[0].stiffness: -1 is negative; give a number >= 0 in N/m"
     ),
     at_joint("joint_spring", "stiffness = 1", joint="jj"): (
         "effects[0].joint: no revolute or prismatic joint is named 'jj' (did you mean 'j'?)"
     ),
     at_joint("joint_spring"): "effects[0].stiffness: missing; give it, or damping or a law",
     at_joint("joint_friction", "viscous = -1"): (
-        "effects[0].viscous: -1 is negative; give a number >= 0 in N m s/rad or N s/m"
+        "effects[0].viscous: -1 is negative; give a number >= 0 in N s/m"
     ),
     at_joint("joint_friction"): "effects[0].viscous: missing; give it, or coulomb and speed",
     at_joint("joint_friction", "coulomb = 1"): (
         "effects[0].speed: missing; coulomb is smoothed as tanh(rate/speed), give a small one"
     ),
     at_joint("joint_friction", "coulomb = 1", "speed = 0"): (
-        "effects[0].speed: 0 is not positive; give a number > 0 in rad/s or m/s"
+        "effects[0].speed: 0 is not positive; give a number > 0 in m/s"
     ),
     at_joint("joint_friction", "viscous = 1", "speed = 1"): (
         "effects[0].speed: it smooths coulomb, which is missing; give both"
@@ -655,7 +655,7 @@ BAD = {
         "effects[0].low: missing, and high too; give one of them or both"
     ),
     at_joint("joint_stop", "low = 0", "stiffness = -1"): (
-        "effects[0].stiffness: -1 is negative; give a number >= 0 in N m/rad or N/m"
+        "effects[0].stiffness: -1 is negative; give a number >= 0 in N/m"
     ),
     at_joint("joint_stop", "low = 0"): ("effects[0].stiffness: missing; every such table needs it"),
 }

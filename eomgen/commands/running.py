@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from eomgen.build import in_order
 from eomgen.commands.shared import Arguments, assignments, code_of, read_model, shortened
 from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
@@ -16,7 +17,7 @@ from eomgen.run.limits import excursions
 from eomgen.run.module import as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory
-from eomgen.scene.schema import OUTPUTS, SHOWN
+from eomgen.scene.schema import SHOWN
 
 
 def simulate(given: Arguments) -> int:
@@ -30,8 +31,7 @@ def simulate(given: Arguments) -> int:
     from eomgen.show.page import save_page
 
     model, name = read_model(given.scene, given)
-    asked = (*model.outputs, *SHOWN)
-    model = replace(model, outputs=tuple(output for output in OUTPUTS if output in asked))
+    model = replace(model, outputs=in_order((*model.outputs, *SHOWN)))
     parameters = assignments(given.set, model.defaults, "--set")
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
     wanted = model.simulation

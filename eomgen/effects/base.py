@@ -15,7 +15,10 @@ Vector = tuple[Scalar, ...]
 
 @dataclass(frozen=True)
 class Input:
-    """A commanded input `u` of the generated module; it is 0 unless given."""
+    """A commanded input `u` of the generated module; it is 0 unless given.
+
+    At a joint `unit` and `about` may have alternatives: see `language.quantity.of_joint`.
+    """
 
     name: str
     unit: str
@@ -24,7 +27,10 @@ class Input:
 
 @dataclass(frozen=True)
 class ExtraState:
-    """A state that an effect brings along, of a controller or an actuator for example."""
+    """A state that an effect brings along, of a controller or an actuator for example.
+
+    Its `unit` and `about` are like those of an `Input`.
+    """
 
     name: str
     unit: str

@@ -39,7 +39,7 @@ class Controller(EffectTable):
         default={}, alias="states", description="its states by name"
     )
     torques: Annotated[dict[Identifier, Quantity], Field(min_length=1, max_length=MOST)] = quantity(
-        "N m", "torque", sees=("motion",)
+        "N m | N", "torque | force", sees=("motion",)
     )
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:

@@ -25,17 +25,17 @@ class JointFriction(EffectTable):
     type: Literal["joint_friction"]
     joint: Identifier = Field(description="revolute or prismatic joint it acts on")
     viscous: Quantity = quantity(
-        "N m s/rad or N s/m",
+        "N m s/rad | N s/m",
         "viscous friction",
         "nonnegative",
         default=ZERO,
         validate_default=False,
     )
     coulomb: Quantity = quantity(
-        "N m or N", "Coulomb friction", "nonnegative", default=ZERO, validate_default=False
+        "N m | N", "Coulomb friction", "nonnegative", default=ZERO, validate_default=False
     )
     speed: Quantity | None = quantity(
-        "rad/s or m/s", "speed within which Coulomb friction is smoothed", "positive", default=None
+        "rad/s | m/s", "speed within which Coulomb friction is smoothed", "positive", default=None
     )
     allow_active: bool = Field(
         default=False, strict=True, description="whether friction may be negative"

@@ -25,16 +25,14 @@ class JointSpring(EffectTable):
     type: Literal["joint_spring"]
     joint: Identifier = Field(description="revolute or prismatic joint it acts on")
     stiffness: Quantity = quantity(
-        "N m/rad or N/m", "stiffness", "nonnegative", default=ZERO, validate_default=False
+        "N m/rad | N/m", "stiffness", "nonnegative", default=ZERO, validate_default=False
     )
     damping: Quantity = quantity(
-        "N m s/rad or N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
+        "N m s/rad | N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
     )
-    rest: Quantity = quantity(
-        "rad or m", "coordinate at rest", default=ZERO, validate_default=False
-    )
+    rest: Quantity = quantity("rad | m", "coordinate at rest", default=ZERO, validate_default=False)
     law: Quantity | None = quantity(
-        "N m or N",
+        "N m | N",
         "pull back in place of stiffness",
         sees=("motion", "stretch", "rate"),
         default=None,

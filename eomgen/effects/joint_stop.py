@@ -25,11 +25,11 @@ class JointStop(EffectTable):
 
     type: Literal["joint_stop"]
     joint: Identifier = Field(description="revolute or prismatic joint it acts on")
-    low: Quantity | None = quantity("rad or m", "lower limit", default=None)
-    high: Quantity | None = quantity("rad or m", "upper limit", default=None)
-    stiffness: Quantity = quantity("N m/rad or N/m", "stiffness", "nonnegative")
+    low: Quantity | None = quantity("rad | m", "lower limit", default=None)
+    high: Quantity | None = quantity("rad | m", "upper limit", default=None)
+    stiffness: Quantity = quantity("N m/rad | N/m", "stiffness", "nonnegative")
     damping: Quantity = quantity(
-        "N m s/rad or N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
+        "N m s/rad | N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
     )
     allow_active: bool = Field(
         default=False, strict=True, description="whether stiffness and damping may be negative"

@@ -22,14 +22,15 @@ class Motor(EffectTable):
     type: Literal["motor"]
     joint: Identifier = Field(description="revolute or prismatic joint it drives")
     torque: Literal["input"] | Quantity = quantity(
-        "N m", "torque", sees=("motion",), union_mode="left_to_right"
+        "N m | N", "torque | force", sees=("motion",), union_mode="left_to_right"
     )
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
         """One input if the torque is one."""
         if self.torque != "input":
             return ()
-        return (Input(self.name, "N m", f"motor torque at {self.joint}"),)
+        about = f"motor torque at {self.joint} | motor force at {self.joint}"
+        return (Input(self.name, "N m | N", about),)
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Equal and opposite on the joint's two bodies; the world takes its own."""

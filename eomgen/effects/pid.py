@@ -17,9 +17,9 @@ class Pid(Servo):
     """
 
     type: Literal["pid"]
-    stiffness: Quantity = quantity("N m/rad", "gain k_p of the deviation", "positive")
+    stiffness: Quantity = quantity("N m/rad | N/m", "gain k_p of the deviation", "positive")
     integral_gain: Quantity = quantity(
-        "N m/(rad s)", "gain k_i of the deviation's integral", "positive"
+        "N m/(rad s) | N/(m s)", "gain k_i of the deviation's integral", "positive"
     )
     tracking: Quantity | None = quantity(
         "s", "time in which a cut-off command is tracked", "positive", default=None
@@ -28,7 +28,7 @@ class Pid(Servo):
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:
         """The integral, and what an actuator brings along."""
         about = f"integral of the deviation of {self.name}"
-        integral = ExtraState(f"{self.name}_integral", "rad s", about, 0.0)
+        integral = ExtraState(f"{self.name}_integral", "rad s | m s", about, 0.0)
         return (integral, *super().states(dimensions))
 
     def wanted(self, mechanism: Mechanism) -> Scalar:

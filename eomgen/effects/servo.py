@@ -13,25 +13,25 @@ from eomgen.language.quantity import Quantity, quantity
 class Servo(EffectTable):
     """A command to a joint of one coordinate, on its child and back on its parent.
 
-    At a sliding joint it is a force: read m for rad and N for N m. The command is cut off at
-    ±`limit`, if there is one. With `lag` T the actuator's torque τ follows it by T dτ/dt = c - τ;
-    τ is the state `<name>_torque` and starts at 0.
+    At a sliding joint it is a force. The command is cut off at ±`limit`, if there is one. With
+    `lag` T the actuator's torque τ follows it by T dτ/dt = c - τ; τ is the state `<name>_torque`
+    and starts at 0.
     """
 
     joint_fields = ("joint",)
 
     name: Identifier
     joint: Identifier = Field(description="revolute or prismatic joint it drives")
-    target: Quantity = quantity("rad", "target of the coordinate", sees=("motion",))
+    target: Quantity = quantity("rad | m", "target of the coordinate", sees=("motion",))
     target_rate: Quantity = quantity(
-        "rad/s", "target of the velocity", sees=("motion",), default=ZERO
+        "rad/s | m/s", "target of the velocity", sees=("motion",), default=ZERO
     )
-    stiffness: Quantity = quantity("N m/rad", "gain k_p of the deviation", "nonnegative")
+    stiffness: Quantity = quantity("N m/rad | N/m", "gain k_p of the deviation", "nonnegative")
     damping: Quantity = quantity(
-        "N m s/rad", "gain k_d of the velocity's deviation", "nonnegative", default=ZERO
+        "N m s/rad | N s/m", "gain k_d of the velocity's deviation", "nonnegative", default=ZERO
     )
     limit: Quantity | None = quantity(
-        "N m", "largest size of the command", "positive", default=None
+        "N m | N", "largest size of the command", "positive", default=None
     )
     lag: Quantity | None = quantity("s", "time constant of the actuator", "positive", default=None)
     allow_active: bool = Field(
@@ -60,7 +60,8 @@ class Servo(EffectTable):
         """The torque of an actuator that lags."""
         if self.lag is None:
             return ()
-        return (ExtraState(f"{self.name}_torque", "N m", f"torque of {self.name}", 0.0),)
+        about = f"torque of {self.name} | force of {self.name}"
+        return (ExtraState(f"{self.name}_torque", "N m | N", about, 0.0),)
 
     def rates(self, mechanism: Mechanism) -> tuple[Scalar, ...]:
         """How it follows the command."""

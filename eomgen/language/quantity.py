@@ -5,7 +5,7 @@ the scene's `[parameters]`; a bare 0 is structure: it is folded away and is no p
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -66,6 +66,7 @@ def quantity(
 ) -> Any:
     """A field that holds a quantity: its unit, what it is, and the bound its value keeps.
 
+    Unit and words may be alternatives for a quantity of a joint: see `of_joint`.
     `sees` are names that its formula may use besides parameters: `motion` stands for `t`, all
     coordinates, velocities, inputs and extra states; any other word for itself.
     """
@@ -73,6 +74,15 @@ def quantity(
     if sees:
         extra["sees"] = list(sees)
     return Field(description=about, json_schema_extra=extra, **options)
+
+
+def of_joint(text: str, slides: bool) -> str:
+    """What holds at the joint at hand of "N m | N": the first where it turns, else the second.
+
+    A text without " | " holds at any joint.
+    """
+    turning, _, sliding = text.partition(" | ")
+    return sliding if slides and sliding else turning
 
 
 @dataclass(frozen=True)
@@ -106,12 +116,15 @@ def name_quantities(
     place: str,
     known: Mapping[str, float],
     motion: Sequence[str] = (),
+    sliding: Collection[str] = (),
 ) -> tuple[dict[str, Any], list[Parameter]]:
     """Give every bare nonzero number among a table's quantities a name.
 
     Returns the replaced fields (for `Table.replaced`) and the new parameters. `known` holds the
-    values of the scene's own parameters, `motion` names what else a field may see. Raises
-    `SceneError` for a name that is not there and for a value outside the field's bound.
+    values of the scene's own parameters, `motion` names what else a field may see. `sliding` are
+    joints that slide; which joint a quantity is of says its key in a field that is a table by
+    joints, or else the table's `joint`. Raises `SceneError` for a name that is not there and for a
+    value outside the field's bound.
     """
     fields: dict[str, Any] = {}
     parameters: list[Parameter] = []
@@ -121,7 +134,7 @@ def name_quantities(
             tables = {}
             for key, inner in value.items():
                 at = f"{place}.{info.alias or field}.{key}"
-                inside, new = name_quantities(inner, f"{prefix}_{key}", at, known, motion)
+                inside, new = name_quantities(inner, f"{prefix}_{key}", at, known, motion, sliding)
                 tables[key] = inner.replaced(**inside)
                 parameters += new
             fields[field] = tables
@@ -138,11 +151,14 @@ def name_quantities(
                 *(motion if "motion" in sees else ()),
                 *(word for word in sees if word != "motion"),
             ]
-            _check(formula, where, bound, str(extra["unit"]), known, seen)
+            joint = suffix[1:] if isinstance(value, dict) else getattr(table, "joint", None)
+            unit = of_joint(str(extra["unit"]), joint in sliding)
+            _check(formula, where, bound, unit, known, seen)
             if isinstance(formula, Constant) and formula.value != 0.0:
-                about = f"{info.description} of {prefix}{suffix.replace('_', ', ', 1)}"
+                what = of_joint(str(info.description), joint in sliding)
+                about = f"{what} of {prefix}{suffix.replace('_', ', ', 1)}"
                 name = f"{prefix}_{field}{suffix}"
-                parameters.append(Parameter(name, formula.value, str(extra["unit"]), about))
+                parameters.append(Parameter(name, formula.value, unit, about))
                 named.append(Name(name))
             else:
                 named.append(formula)

@@ -133,6 +133,7 @@ def print_block(
     for n in nodes:
         uses[n] += 1
 
+    results, kept = frozenset(nodes), frozenset(keep)
     text: dict[int, tuple[str, int]] = {}
     lines: list[tuple[str, str]] = []
     functions: dict[str, None] = {}
@@ -147,8 +148,8 @@ def print_block(
         if step.operation in FUNCTIONS:
             functions[step.operation] = None
         source, level = _expression(step.operation, [text[o] for o in step.operands], dialect)
-        long = len(source) > LONGEST_INLINE and i not in nodes
-        if i in keep or uses[i] > 1 or long:
+        long = len(source) > LONGEST_INLINE and i not in results
+        if i in kept or uses[i] > 1 or long:
             lines.append((names[i], source))
             text[i] = (names[i], _ATOM)
         else:

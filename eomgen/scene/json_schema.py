@@ -17,7 +17,8 @@ def _without_internals(node: object) -> None:
     """Drop what only this program reads; keep the unit, in words, where an editor shows it."""
     if isinstance(node, dict):
         if isinstance(node.get("unit"), str):  # a mark of ours, not a property of that name
-            node["description"] = f"{node.get('description', '')} ({node.pop('unit')})"
+            words = f"{node.get('description', '')} ({node.pop('unit')})"
+            node["description"] = words.replace(" | ", " or ")  # see `language.quantity.of_joint`
         for internal, kind in (("bound", str), ("sees", list)):
             if isinstance(node.get(internal), kind):
                 del node[internal]

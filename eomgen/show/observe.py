@@ -12,6 +12,7 @@ from eomgen.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.trajectory import Trajectory
 from eomgen.show.motion import Anchor, Motion
+from eomgen.show.skeleton import shapes_of
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Mo
         units=tuple(module.UNITS[name] for name in trajectory.states),
         positions=module.POSITIONS,
         bodies=module.BODIES,
-        shapes=tuple(body.shapes for body in model.bodies),
+        shapes=shapes_of(model),
         joints=tuple(joint.name for _, joint in _joints(model, HOLDING)),
         poses=poses,
         kinetic_energy=kinetic,

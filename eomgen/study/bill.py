@@ -77,12 +77,13 @@ def _without(model: Model, i: int) -> Model:
 def _with(model: Model, effects: Sequence[object]) -> Model:
     """The model under some of its effects only."""
     kept = tuple(effect for effect in model.effects if effect in effects)
-    dimensions = model.dimensions
+    inputs = {i.name for effect in kept for i in effect.inputs(model.dimensions)}
+    states = {x.name for effect in kept for x in effect.states(model.dimensions)}
     return replace(
         model,
         effects=kept,
-        inputs=tuple(i for effect in kept for i in effect.inputs(dimensions)),
-        states=tuple(x for effect in kept for x in effect.states(dimensions)),
+        inputs=tuple(i for i in model.inputs if i.name in inputs),
+        states=tuple(x for x in model.states if x.name in states),
     )
 
 

@@ -62,7 +62,6 @@ def make_symbols(model: Model) -> Symbols:
     quantities += [b.joint.motor_inertia for b in model.bodies if isinstance(b.joint, Geared)]
     positive = {quantity.name for quantity in quantities if isinstance(quantity, Name)}
     called = dict.fromkeys(f for f in model.quantities() if calls_function(f))
-    velocities = [c.name for c in model.velocities]
     return Symbols(
         parameters={
             p.name: sp.Symbol(p.name, positive=True) if p.name in positive else real(p.name)
@@ -71,9 +70,9 @@ def make_symbols(model: Model) -> Symbols:
         formulas={formula: real(f"formula__{i}") for i, formula in enumerate(called, 1)},
         inputs={i.name: real(i.name) for i in model.inputs},
         q=tuple(real(c.name) for c in model.coordinates),
-        v=tuple(real(name) for name in velocities),
-        a=tuple(real(f"{name.removesuffix('_dot')}_ddot") for name in velocities),
-        tau=tuple(real(f"tau__{name}") for name in velocities),
+        v=tuple(real(c.name) for c in model.velocities),
+        a=tuple(real(c.acceleration) for c in model.velocities),
+        tau=tuple(real(f"tau__{c.name}") for c in model.velocities),
     )
 
 

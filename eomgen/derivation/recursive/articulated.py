@@ -18,6 +18,7 @@ from eomgen.derivation.recursive.forces import Force, at_parent, total
 from eomgen.derivation.recursive.instant import Axis, Instant, Link
 from eomgen.derivation.recursive.vectors import (
     AXES,
+    ENTRIES,
     Mat,
     Scalar,
     Scalars,
@@ -183,8 +184,7 @@ def moved_to_parent(link: Link, p: Resistance, scalars: Scalars) -> Resistance:
             i, j = j, i
         return J[i][j] + (old[i][j] + new[j][i])
 
-    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    return Resistance(symmetric([entry(i, j) for i, j in pairs]), moved, H)
+    return Resistance(symmetric([entry(i, j) for i, j in ENTRIES]), moved, H)
 
 
 def inertia_along(p: Resistance, axis: Axis) -> Scalar:
@@ -212,9 +212,8 @@ def eliminated(p: Resistance, axis: Axis, link: Link, scalars: Scalars) -> tuple
         moment, force = with_component(axis, moment, force, zero)
     u = (moment[0] / d, moment[1] / d, moment[2] / d)
     w = (force[0] / d, force[1] / d, force[2] / d)
-    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    J = symmetric([p.J[i][j] - u[i] * moment[j] for i, j in pairs])
-    H = symmetric([p.H[i][j] - w[i] * force[j] for i, j in pairs])
+    J = symmetric([p.J[i][j] - u[i] * moment[j] for i, j in ENTRIES])
+    H = symmetric([p.H[i][j] - w[i] * force[j] for i, j in ENTRIES])
     G = _less_outer(p.G, u, force)
     if absolute:
         J, G, H = _without(J, G, H, axis, zero)

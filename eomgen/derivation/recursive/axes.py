@@ -34,25 +34,38 @@ def with_simple_origins(
 ) -> tuple[list[Frame], list[Mount]]:
     """The same mechanism with offsets of as few components as can be."""
     frames, mounts = list(frames), list(mounts)
-    for k, frame in enumerate(frames):
+    for k, (children, riders) in enumerate(_carried(frames, mounts)):
+        frame = frames[k]
         if frame.kind == "spin":
             continue
-        frame = frames[k]
         offset, shift = _better_origin(frame, scalars)
-        children = {n: f for n, f in enumerate(frames) if f.parent == k}
-        riders = {n: m for n, m in enumerate(mounts) if m.frame == k}
-        offsets = [f.offset for f in children.values()]
-        centres = [m.at for m in riders.values()]
+        offsets = [frames[n].offset for n in children]
+        centres = [mounts[n].at for n in riders]
         before = _parts([frame.offset, *offsets], centres, scalars)
         moved = [[sub(a, shift) for a in vectors] for vectors in (offsets, centres)]
         if _parts([offset, *moved[0]], moved[1], scalars) >= before:
             continue
         frames[k] = replace(frame, offset=offset)
-        for n, f in children.items():
-            frames[n] = replace(f, offset=sub(f.offset, shift))
-        for n, m in riders.items():
-            mounts[n] = replace(m, at=sub(m.at, shift))
+        for n in children:
+            frames[n] = replace(frames[n], offset=sub(frames[n].offset, shift))
+        for n in riders:
+            mounts[n] = replace(mounts[n], at=sub(mounts[n].at, shift))
     return frames, mounts
+
+
+Carried = tuple[list[int], list[int]]
+"""Indices of what a frame carries: frames and mounts."""
+
+
+def _carried(frames: Sequence[Frame], mounts: Sequence[Mount]) -> tuple[Carried, ...]:
+    found: tuple[Carried, ...] = tuple(([], []) for _ in frames)
+    for n, frame in enumerate(frames):
+        if frame.parent >= 0:
+            found[frame.parent][0].append(n)
+    for n, mount in enumerate(mounts):
+        if mount.frame >= 0:
+            found[mount.frame][1].append(n)
+    return found
 
 
 def _better_origin(frame: Frame, scalars: Scalars) -> tuple[Vec, Vec]:
@@ -84,6 +97,7 @@ def with_simple_axes(
 ) -> tuple[list[Frame], list[Mount]]:
     """The same mechanism with fixed rotations as simple as they can be."""
     frames, mounts = list(frames), list(mounts)
+    carried = _carried(frames, mounts)
     fitted: set[int] = set()
     for k in range(len(frames)):
         frame = frames[k]
@@ -93,12 +107,13 @@ def with_simple_axes(
         fits = above is not None and above.kind == "turn" and frame.parent not in fitted
         i = above.axis if above is not None and fits else (frame.axis + 1) % 3
         a, m, b, c = _factors(frame.fixed, i, frame.axis)
-        _turn_axes(frames, mounts, k, c, scalars)
+        _turn_axes(frames, mounts, carried[k], turn_matrix(frame.axis, c), scalars)
         rest = turn_matrix(m, b)
         if fits:
+            above = frames[frame.parent]
             fitted.add(frame.parent)
-            _turn_axes(frames, mounts, frame.parent, -a, scalars)
-            frames[frame.parent] = replace(frames[frame.parent], lead=frames[frame.parent].lead + a)
+            _turn_axes(frames, mounts, carried[frame.parent], turn_matrix(i, -a), scalars)
+            frames[frame.parent] = replace(above, lead=above.lead + a)
         else:
             rest = turn_matrix(i, a) @ rest
         frames[k] = replace(frames[k], fixed=rest)
@@ -106,17 +121,17 @@ def with_simple_axes(
 
 
 def _turn_axes(
-    frames: list[Frame], mounts: list[Mount], k: int, angle: float, scalars: Scalars
+    frames: list[Frame], mounts: list[Mount], carried: Carried, turned: Array, scalars: Scalars
 ) -> None:
-    """Write what frame k carries in axes turned by -angle about its own axis."""
-    turned = turn_matrix(frames[k].axis, angle)
+    """Write what a frame carries in other axes of its own; `turned` takes vectors into them."""
+    children, riders = carried
     node = constant(turned, scalars)
-    for n, frame in enumerate(frames):
-        if frame.parent == k:
-            frames[n] = replace(frame, fixed=turned @ frame.fixed, offset=times(node, frame.offset))
-    for n, mount in enumerate(mounts):
-        if mount.frame == k:
-            mounts[n] = replace(mount, axes=turned @ mount.axes, at=times(node, mount.at))
+    for n in children:
+        fixed, offset = turned @ frames[n].fixed, times(node, frames[n].offset)
+        frames[n] = replace(frames[n], fixed=fixed, offset=offset)
+    for n in riders:
+        axes, at = turned @ mounts[n].axes, times(node, mounts[n].at)
+        mounts[n] = replace(mounts[n], axes=axes, at=at)
 
 
 def _is_signed_permutation(matrix: Array) -> bool:

@@ -7,6 +7,7 @@ from eomgen.derivation.recursive.forces import Force, at_parent
 from eomgen.derivation.recursive.frames import Rigid, joined
 from eomgen.derivation.recursive.instant import Instant, Link
 from eomgen.derivation.recursive.vectors import (
+    ENTRIES,
     Scalar,
     Scalars,
     Vec,
@@ -45,13 +46,9 @@ def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:
         entries = [zero, zero, J[2][2] + (both[0] + both[1]), zero, zero, zero]
         return Rigid(body.mass, moved, symmetric(entries))
     diagonal = [both[1] + both[2], both[0] + both[2], both[0] + both[1]]
-    off = [-(r[i] * moved[j] + h[i] * r[j]) for i, j in ((0, 1), (0, 2), (1, 2))]
-    entries = [
-        J[i][j] + more
-        for (i, j), more in zip(
-            ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)), [*diagonal, *off], strict=True
-        )
-    ]
+    off = [-(r[i] * moved[j] + h[i] * r[j]) for i, j in ENTRIES[3:]]
+    more = zip(ENTRIES, [*diagonal, *off], strict=True)
+    entries = [J[i][j] + x for (i, j), x in more]
     return Rigid(body.mass, moved, symmetric(entries))
 
 

@@ -23,6 +23,7 @@ from eomgen.derivation.recursive.frames import (
     turn_of,
 )
 from eomgen.derivation.recursive.vectors import (
+    ENTRIES,
     Scalar,
     Scalars,
     Symmetric,
@@ -167,12 +168,10 @@ def _named(rigid: Rigid, name: str, scalars: Scalars) -> Rigid:
         for h, axis in zip(rigid.first, "xyz", strict=True)
     ]
     entries = [
-        scalars.named(rigid.inertia[i][j], f"inertia_{name}_{word}") for i, j, word in _ENTRIES
+        scalars.named(rigid.inertia[i][j], f"inertia_{name}_{'xyz'[i]}{'xyz'[j]}")
+        for i, j in ENTRIES
     ]
     return Rigid(m, (first[0], first[1], first[2]), symmetric(entries))
-
-
-_ENTRIES = ((0, 0, "xx"), (1, 1, "yy"), (2, 2, "zz"), (0, 1, "xy"), (0, 2, "xz"), (1, 2, "yz"))
 
 
 def _orientation(degrees: float | tuple[float, float, float]) -> Array:

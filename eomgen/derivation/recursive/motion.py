@@ -122,8 +122,7 @@ def _field(w: Vec, a: Vec) -> tuple[Mat, Vec]:
 def inertial_force(link: Link, a: Acceleration, scalars: Scalars) -> tuple[Vec, Vec]:
     """Moment about the origin and force that give the link's mass its acceleration.
 
-    f = m a + W h with the first moment h; n = h x a + Σ m r x (W r), where the last sum is that of
-    W's entries with Σ m r rᵀ = ½ tr(J) 1 - J, written in J: what multiplies the trace cancels.
+    f = m a + W h with the first moment h; n = h x a + Σ m r x (W r), see `_moment`.
     """
     m, h, inertia = link.rigid.mass, link.rigid.first, link.rigid.inertia
     force = add(scale(m, a.linear), times(a.field, h))
@@ -132,14 +131,18 @@ def inertial_force(link: Link, a: Acceleration, scalars: Scalars) -> tuple[Vec, 
 
 
 def _moment(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
-    """Σ m r x (W r) from the inertia matrix."""
+    """Σ m r x (W r) = J α + ω x J ω from the inertia matrix.
+
+    With E = Σ m r rᵀ = ½ tr(J) 1 - J its entries are those of W E less those of its transpose,
+    n_x = (W E)_zy - (W E)_yz and so on in turn, where W_zz - W_yy, … stand in `spread`.
+    """
     w = a.field
     half, zero = scalars.number(0.5), scalars.number(0.0)
     xx, yy, zz = inertia[0][0], inertia[1][1], inertia[2][2]
     if scalars.is_zero(xx) and scalars.is_zero(yy):  # a planar body: J α
         return (zero, zero, zz * w[1][0])
     total = half * (xx + yy + zz)
-    # E = Σ m r rᵀ; its entries depend on parameters alone in own axes.
+    # Entries of E, which depend on parameters alone in own axes.
     ex, ey, ez = total - xx, total - yy, total - zz
     exy, exz, eyz = -inertia[0][1], -inertia[0][2], -inertia[1][2]
     x = w[2][0] * exy - w[1][0] * exz + a.spread[0] * eyz + w[2][1] * ey - w[1][2] * ez

@@ -15,6 +15,8 @@ Symmetric = Mat
 """A matrix whose entries (i, j) and (j, i) are the same."""
 
 AXES = (0, 1, 2)
+ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""What of a symmetric matrix is computed, and its order: xx, yy, zz, xy, xz, yz."""
 
 
 class Scalars(Protocol):
@@ -92,7 +94,7 @@ def product(a: Mat, b: Mat) -> Mat:
 
 
 def symmetric(entries: Sequence[Scalar]) -> Symmetric:
-    """The matrix of xx, yy, zz, xy, xz, yz."""
+    """The matrix of its `ENTRIES`."""
     xx, yy, zz, xy, xz, yz = entries
     return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
@@ -100,9 +102,7 @@ def symmetric(entries: Sequence[Scalar]) -> Symmetric:
 def congruent(r: Mat, a: Symmetric) -> Symmetric:
     """r a rᵀ, six entries computed."""
     half = product(r, a)
-    return symmetric(
-        [dot(half[i], r[j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    )
+    return symmetric([dot(half[i], r[j]) for i, j in ENTRIES])
 
 
 def skew(a: Vec, zero: Scalar) -> Mat:

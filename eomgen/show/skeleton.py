@@ -1,0 +1,63 @@
+"""What stands for bodies that a scene gives no shapes: a box, and rods from it to their joints."""
+
+import math
+from statistics import median
+
+from eomgen.joints import Free
+from eomgen.joints.base import WORLD
+from eomgen.language.formula import Formula
+from eomgen.model import Model
+from eomgen.scene.look import Box, Rod, Shape
+
+BOX, ROD = 0.25, 0.07
+"""Side of a box and width of a rod, over the length of a rod."""
+DRAWN = (1e-90, 1e90)
+"""Lengths between these, m, are drawn; of what is beyond, a dot is left."""
+
+
+def shapes_of(model: Model) -> tuple[tuple[Shape, ...], ...]:
+    """The shapes of every body, its own or those that stand for it, at the scene's parameters."""
+    arms = _arms(model)
+    size = _size(model, arms)
+    return tuple(
+        body.shapes or _skeleton(arms[body.name], model.dimensions, size) for body in model.bodies
+    )
+
+
+def _arms(model: Model) -> dict[str, list[tuple[float, ...]]]:
+    """For each body the points of its joints away from its centre of mass, body axes, m."""
+    arms: dict[str, list[tuple[float, ...]]] = {body.name: [] for body in model.bodies}
+
+    def add(body: str, r: tuple[Formula, ...]) -> None:
+        point = tuple(map(model.value, r))
+        if body != WORLD and _drawn(math.hypot(*point)) and point not in arms[body]:
+            arms[body].append(point)
+
+    for body in model.bodies:
+        if not isinstance(body.joint, Free):
+            add(body.name, body.joint.r_child)
+            add(body.joint.parent, body.joint.r_parent)
+    return arms
+
+
+def _size(model: Model, arms: dict[str, list[tuple[float, ...]]]) -> float:
+    """A length of the mechanism, m: of its arms, or of what turns, or of what the camera sees."""
+    lengths = [math.hypot(*point) for points in arms.values() for point in points]
+    if lengths:
+        return median(lengths)
+    masses = [model.value(body.mass) for body in model.bodies]
+    moments = [max(map(model.value, body.inertia_com)) for body in model.bodies]
+    gyrations = [math.sqrt(i / m) for i, m in zip(moments, masses, strict=True) if i > 0 and m > 0]
+    return 2.0 * median(gyrations) if gyrations else model.camera.height / 10
+
+
+def _skeleton(arms: list[tuple[float, ...]], dimensions: int, size: float) -> tuple[Shape, ...]:
+    if not _drawn(size):
+        return ()
+    centre = (0.0,) * dimensions
+    rods = [Rod(type="rod", start=centre, end=point, width=ROD * size) for point in arms]
+    return (Box(type="box", size=(BOX * size,) * dimensions), *rods)
+
+
+def _drawn(length: float) -> bool:
+    return DRAWN[0] < length < DRAWN[1]
