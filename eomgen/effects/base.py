@@ -57,6 +57,31 @@ class JointLoad:
     coordinate: int = 0
 
 
+@dataclass(frozen=True)
+class Contact:
+    """Two things that must not pass through each other: they touch where `gap` is 0.
+
+    `normal`: the loads of a unit force that drives them apart; `tangents`: the loads of a unit
+    friction force along each tangent, on the same pair: none, one in the plane, two in space.
+    By virtual work the gap's rate and the slip velocities are the powers of these loads.
+    """
+
+    name: str
+    """A Python identifier, unique among contacts: "<effect>_<body>", "<effect>_<body>_3"."""
+    effect: str
+    """The effect's name."""
+    gap: Scalar
+    """m or rad, > 0 apart."""
+    normal: tuple[Load | JointLoad, ...]
+    tangents: tuple[tuple[Load, ...], ...]
+    restitution: Scalar
+    """0 to 1."""
+    friction: Scalar
+    """>= 0."""
+    slip_speed: Scalar
+    """m/s: smoothing of friction while they stay in touch."""
+
+
 class Mechanism(Protocol):
     """What an effect may ask of the mechanism it acts on. Vectors are in world axes."""
 
@@ -189,6 +214,10 @@ class EffectTable(Table):
 
     def loads(self, mechanism: Mechanism) -> Iterable[Load | JointLoad]:
         """What it puts on bodies and joints."""
+        return ()
+
+    def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
+        """Rigid contacts: events of a run instead of loads."""
         return ()
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
