@@ -21,7 +21,7 @@ class OnBodies(EffectTable):
     of the scene's own `points`, by their names.
     """
 
-    body_fields = ("body", "bodies")
+    body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies")
     point_fields = ("points",)
     vector_fields: ClassVar[tuple[str, ...]] = ("at",)
 
