@@ -1,6 +1,6 @@
 """What effects share: what they may ask of a mechanism, and the loads they put on it."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, Self
 
@@ -216,8 +216,12 @@ class EffectTable(Table):
         """What it puts on bodies and joints."""
         return ()
 
+    def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
+        """Names of its rigid contacts where there are these bodies."""
+        return ()
+
     def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
-        """Rigid contacts: events of a run instead of loads."""
+        """Its rigid contacts, which are events of a run instead of loads."""
         return ()
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
