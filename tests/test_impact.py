@@ -89,6 +89,101 @@ SLOPE = Balls(
         ("trunk", "left_shank", 0.25, 0.125),
     ),
 )
+BOXES = """\
+name = "boxes"
+dimensions = 3
+[[bodies]]
+name = "box"
+mass = 2.0
+inertia_com = [0.03, 0.02, 0.04]
+[[bodies]]
+name = "arm"
+mass = 0.5
+inertia_com = [0.01, 0.02, 0.01]
+[[bodies]]
+name = "ball"
+mass = 0.7
+inertia_com = [0.01, 0.01, 0.01]
+[[joints]]
+name = "f"
+type = "free"
+parent = "world"
+child = "box"
+[[joints]]
+name = "g"
+type = "free"
+parent = "world"
+child = "ball"
+[[joints]]
+name = "h"
+type = "revolute"
+axis = [1,0,0]
+parent = "box"
+child = "arm"
+r_parent = [0.2,0,0]
+r_child = [0,0.25,0]
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "contact"
+name = "floor"
+law = "impact"
+body = "box"
+corners = [0.2,0.15,0.1]
+restitution = 0.3
+friction = 0.5
+slip_speed = 0.001
+[[effects]]
+type = "contact"
+name = "roll"
+law = "impact"
+bodies = ["ball","arm"]
+radius = 0.1
+normal = [0,0.6,0.8]
+restitution = 0.3
+[[effects]]
+type = "contact"
+name = "catch"
+law = "impact"
+body = "ball"
+radius = 0.1
+other = "arm"
+other_at = [0,0.1,0]
+other_radius = 0.05
+against = "ball"
+restitution = 0.5
+friction = 0.2
+slip_speed = 0.001
+[[effects]]
+type = "contact"
+name = "lid"
+law = "impact"
+body = "ball"
+radius = 0.1
+other = "box"
+offset = 0.1
+restitution = 0.5
+friction = 0.2
+slip_speed = 0.001
+[[effects]]
+type = "contact"
+name = "each"
+law = "impact"
+bodies = ["ball","box"]
+radius = 0.1
+against = "each_other"
+restitution = 0.5
+friction = 0.3
+slip_speed = 0.001
+[[effects]]
+type = "joint_stop"
+name = "stop"
+joint = "h"
+low = -1
+high = 1
+restitution = 0.5
+"""
 MODELS = {
     "disc": (DISC, FLOOR_2),
     "ball": (BALL, FLOOR_3),
@@ -326,21 +421,28 @@ def test_held(name: str, route: str) -> None:
         assert alone[ny + nc + k] == pytest.approx(push @ jacobian @ y[nq:], rel=1e-12)
 
 
-@pytest.mark.parametrize("name", list(MODELS))
-def test_gap_rates_and_accelerations_by_differences(name: str) -> None:
-    """In 60 digits along the motion: rates are those of the gaps, accelerations of the rates."""
-    engine = striking(*MODELS[name])
-    rng = np.random.default_rng(6)
+def rates_and_accelerations_off(engine: Engine, rng: np.random.Generator) -> Any:
+    """How far, in 60 digits, gap rates are from differences of gaps along the motion, and
+    accelerations from those of rates.
+    """
     ny, nc = len(engine.module.STATES), len(engine.module.CONTACTS)
     y = exact(engine.random_state(rng))
     for indices in map(list, engine.module.QUATERNIONS):
         y[indices] = y[indices] / MP.sqrt(sum(y[indices] ** 2))
     forces = [MP.mpf(x) for x in rng.uniform(0.0, 9.0, size=nc)]
     held = engine.exactly("held", y, extra=forces)
-    for output, slope in (("gaps", "rates"), ("gap_rates", "accelerations")):
-        expected = along(lambda x, name=output: engine.exactly(name, x), y, held[:ny])
-        found = engine.exactly("gap_rates", y) if slope == "rates" else held[ny : ny + nc]
-        assert max(abs(a - b) for a, b in zip(found, expected, strict=True)) < MP.mpf(10) ** -35
+    pairs = {"gaps": engine.exactly("gap_rates", y), "gap_rates": held[ny : ny + nc]}
+    return max(
+        max(abs(found - along(lambda x, name=name: engine.exactly(name, x), y, held[:ny])))
+        for name, found in pairs.items()
+    )
+
+
+@pytest.mark.parametrize("name", list(MODELS))
+def test_gap_rates_and_accelerations_by_differences(name: str) -> None:
+    """Rates are those of the gaps, accelerations those of the rates."""
+    engine = striking(*MODELS[name])
+    assert rates_and_accelerations_off(engine, np.random.default_rng(6)) < MP.mpf(10) ** -35
 
 
 def test_a_stop_strikes() -> None:
@@ -371,6 +473,29 @@ def test_stops_and_rough_contacts_in_one_module() -> None:
     y = np.array([0.4, 0.3, 1.0, 2.5])
     assert list(together.CONTACTS.values()) == ["balls", "balls", "limit"]
     np.testing.assert_allclose(together.impact(0.0, y, 2), alone.impact(0.0, y, 0), atol=1e-15)
+
+
+def test_contacts_of_a_scene() -> None:
+    """Corners, balls on planes and on each other, lids that move, stops: 60 digits and energy."""
+    engine = striking(BOXES)
+    module, rng = engine.module, np.random.default_rng(10)
+    ny, nc = len(module.STATES), len(module.CONTACTS)
+    assert list(module.CONTACTS) == [
+        *(f"floor_box_{i}" for i in range(1, 9)),
+        *("roll_ball", "roll_arm", "catch_ball", "lid_ball", "each_ball_box"),
+        *("stop_low", "stop_high"),
+    ]
+    assert rates_and_accelerations_off(engine, rng) < MP.mpf(10) ** -35
+    for _ in range(200):
+        k = int(rng.integers(nc))
+        y = approaching(engine, rng, k)
+        found = module.impact(0.0, y, k)
+        rest = 0.3 if k < 10 else 0.5
+        before, after = (module.gap_rates(0.0, x)[k] for x in (y, found))
+        assert abs(after + rest * before) < 1e-13 * max(1.0, np.max(np.abs(y)))
+        energies = [module.kinetic_energy(0.0, x) for x in (y, found)]
+        assert energies[1] <= energies[0] * (1 + 1e-14)
+    assert module.held(0.0, module.initial_state(), np.ones(nc)).shape == (ny + 2 * nc,)
 
 
 def test_columns() -> None:
