@@ -58,6 +58,8 @@ ABOUT = {
     "point_positions": "World place of each of `POINTS`, m.",
     "point_velocities": "World velocity of each of `POINTS`, m/s.",
     "point_jacobians": "J of each of `POINTS`: its world velocity is J v.",
+    "gaps": "How far apart each of `CONTACTS` is, m or rad; negative where they overlap.",
+    "gap_rates": "How fast each of `gaps` grows, m/s or rad/s.",
 }
 ABOUT_PLANE = {
     "momentum": "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
@@ -106,6 +108,7 @@ def python_module(system: System) -> str:
     called = [f for f in FUNCTIONS if f in moving or f in once]
     dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
     special = {"initial_state", "derivative", *DERIVATIVES, *(name for name, _, _ in dynamics)}
+    special |= {"impact", "held"}
     quaternions = tuple(model.quaternions) if model.form == "velocity" else ()
     context: dict[str, Any] = {
         "title": _plain(model.title),
@@ -129,6 +132,9 @@ def python_module(system: System) -> str:
         "bodies": repr(tuple(body.name for body in model.bodies)),
         "joints": repr(tuple(b.joint.name for b in model.bodies if b.joint.type != "free")),
         "points": repr(tuple(point.name for point in model.points)),
+        "contacts": [(touch.name, touch.effect) for touch in system.contacts],
+        "impact": kernels.get("impact"),
+        "held": kernels.get("held"),
         "costs": [(name, json.dumps(cost(program, name))) for name in kernels],
         "kernels": list(kernels.values()),
         "math_functions": sorted({"isfinite", *(f for f in called if hasattr(math, f))}),
@@ -219,7 +225,10 @@ def _plain(text: str) -> str:
 def _units(system: System) -> list[tuple[str, str]]:
     entries = [(s.name, s.unit) for s in system.states]
     entries += [(i.name, i.unit) for i in system.model.inputs]
-    return entries + [(p.name, _plain(p.unit)) for p in system.model.parameters]
+    entries += [(p.name, _plain(p.unit)) for p in system.model.parameters]
+    # A contact may be called what a parameter is; the parameter's entry is the one looked up.
+    taken = {name for name, _ in entries}
+    return entries + [(c.name, c.unit) for c in system.contacts if c.name not in taken]
 
 
 def _document(system: System) -> list[str]:
@@ -240,6 +249,10 @@ def _document(system: System) -> list[str]:
         )
     effects = ", ".join(effect.type for effect in model.effects) or "none"
     lines += ["", f"Effects: {effects}."]
+    if system.contacts:
+        lines += ["", "Contacts that strike, each with the unit of its gap and its effect:"]
+        lines += _table([(touch.name, touch.unit, touch.effect) for touch in system.contacts])
+        lines += [""]
     counts = cost(system.program, "derivative")
     lines += textwrap.wrap(
         f"One call of `derivative` takes {_operations(counts)}; "

@@ -11,6 +11,7 @@ from eomgen.derivation.recursive.sensitivity import sensitivity
 from eomgen.derivation.recursive.vectors import Vec, sub, zeros
 from eomgen.derivation.states import velocity_states
 from eomgen.model import Model, is_zero
+from eomgen.program.contacts import Forward, contact_outputs, touches
 from eomgen.program.differentiate import jacobian, substituted, tangent
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
@@ -18,10 +19,6 @@ from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system
 from eomgen.program.tape import TIME, Node, Stage, Tape
 
 DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
-
-
-Forward = Callable[[Sequence[Node] | None], list[Node]]
-"""v̇ under the effects and, if given, forces beside them, one a velocity."""
 
 
 class Recording:
@@ -114,6 +111,11 @@ def from_recursion(record: Recording) -> System:
     for name in model.outputs:
         if name not in DERIVATIVES:
             made[name] = output(record, name, extra)
+    if record.dynamics.contacts:
+        more, taken = contact_outputs(
+            record.dynamics, tape, record.route, record.forward, record.position_rates
+        )
+        made, extra = made | more, extra | taken
     return make_system(
         model,
         record.route,
@@ -123,6 +125,7 @@ def from_recursion(record: Recording) -> System:
         checks(record),
         extra,
         frozenset(tangents),
+        touches(record.dynamics),
     )
 
 

@@ -17,12 +17,22 @@ Made = dict[str, tuple[tuple[int, ...], list[Node]]]
 
 
 @dataclass(frozen=True)
+class Touch:
+    """A rigid contact that a module tells of; `unit` is that of its gap."""
+
+    name: str
+    effect: str
+    unit: str
+
+
+@dataclass(frozen=True)
 class System:
     """A model's program.
 
     `extra` names what some outputs take besides state, parameters and inputs: generalised forces or
     accelerations, one a velocity; or directions, for those of `tangents`, which compute how
-    something changes along a direction in place of a matrix of derivatives.
+    something changes along a direction in place of a matrix of derivatives. `contacts` are the
+    rigid ones.
     """
 
     model: Model
@@ -32,6 +42,7 @@ class System:
     extra: Mapping[str, tuple[str, ...]]
     tangents: frozenset[str]
     reports: tuple[PassReport, ...]
+    contacts: tuple[Touch, ...] = ()
 
 
 def make_system(
@@ -43,6 +54,7 @@ def make_system(
     checks: Sequence[Check],
     extra: Mapping[str, tuple[str, ...]],
     tangents: frozenset[str],
+    contacts: tuple[Touch, ...] = (),
 ) -> System:
     """Finish a tape's program and run the passes over it."""
     outputs = {
@@ -50,4 +62,4 @@ def make_system(
         for name, (shape, nodes) in made.items()
     }
     program, reports = optimise(finish(tape, outputs, checks))
-    return System(model, route, tuple(states), program, extra, tangents, reports)
+    return System(model, route, tuple(states), program, extra, tangents, reports, contacts)

@@ -5,7 +5,7 @@ articulated-body recursion in the frames' own axes in space, in the world's in t
 angles add up; composite bodies in the world's, where nothing is turned again and again.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 from eomgen.derivation.recursive import forces as fc
@@ -28,7 +28,7 @@ from eomgen.derivation.recursive.motion import (
 from eomgen.derivation.recursive.moving import Moving, Values
 from eomgen.derivation.recursive.vectors import Scalar, sub, zeros
 from eomgen.effects import Effect, Gravity
-from eomgen.effects.base import JointLoad, Load
+from eomgen.effects.base import Contact, JointLoad, Load
 from eomgen.joints import Free
 from eomgen.joints.base import WORLD
 
@@ -200,8 +200,12 @@ class Dynamics(Moving):
 
     def power(self, effect: Effect) -> Scalar:
         """What an effect's loads do to the motion, W; of gravity and springs, too."""
+        return self.power_of(effect.loads(self))
+
+    def power_of(self, loads: Iterable[Load | JointLoad]) -> Scalar:
+        """The power of loads, W; of unit loads their speed, m/s or rad/s."""
         power = self.scalars.number(0.0)
-        for load in effect.loads(self):
+        for load in loads:
             if isinstance(load, JointLoad):
                 power = power + load.force * self.rate(load.joint, load.coordinate)
                 continue
@@ -210,6 +214,11 @@ class Dynamics(Moving):
             for torque, rate in zip(load.torque, self.turning(load.body), strict=False):
                 power = power + torque * rate
         return power
+
+    @cached_property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The rigid contacts of all effects, in order."""
+        return tuple(contact for effect in self.model.effects for contact in effect.contacts(self))
 
     @cached_property
     def state_rates(self) -> list[Scalar]:

@@ -1,0 +1,219 @@
+"""What contacts do to a mechanism: forces while two things touch, impulses when they strike.
+
+An impact takes no time: coordinates stay, and the impulses p along the contact's normal n and
+tangents t change the velocities by M⁻¹ Jᵀ p, where u = J v are its normal velocity, positive apart,
+and its slip velocities. With A = J M⁻¹ Jᵀ and a restitution e the law is that of A. Chatterjee and
+A. Ruina, "A new algebraic rigid-body collision law based on impulse space considerations", J. Appl.
+Mech. 65 (1998) 939-951, without tangential restitution:
+
+    p = (1 + e) p_I + κ (p_II - p_I),    p_I = -(u_n / A_nn) n,    p_II = -A⁻¹ u,
+
+where p_I ends the approach without friction, p_II the slip, too, and κ is 1, or as much less as
+|p_t| = μ p_n asks for: p_I has no tangential part, so that κ = μ (1 + e) p_I,n / (|d_t| - μ d_n)
+with d = p_II - p_I. The normal velocity becomes -e u_n whatever the friction; kinetic energy never
+grows for 0 <= e <= 1.
+"""
+
+from collections.abc import Iterable, Sequence
+
+from eomgen.derivation.recursive import forces as fc
+from eomgen.derivation.recursive.articulated import respond
+from eomgen.derivation.recursive.composite import solved
+from eomgen.derivation.recursive.dynamics import Dynamics
+from eomgen.derivation.recursive.observe import arm
+from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, add, cross, zeros
+from eomgen.effects.base import Contact, JointLoad, Load, Vector
+from eomgen.joints.base import WORLD
+
+AnyLoad = Load | JointLoad
+
+LEAST = 1e-300
+"""Stands in for what would divide by 0; there what is divided is 0, too, or is not used."""
+IMMOVABLE = 1e-12
+"""A way along which nothing moves: its share of A is no more than this, which is rounding."""
+
+
+def scaled(loads: Iterable[AnyLoad], k: Scalar) -> list[AnyLoad]:
+    """k times as much."""
+    found: list[AnyLoad] = []
+    for load in loads:
+        if isinstance(load, JointLoad):
+            found.append(JointLoad(load.joint, k * load.force, load.coordinate))
+        else:
+            force, torque = (tuple(k * part for part in x) for x in (load.force, load.torque))
+            found.append(Load(load.body, force, load.at, load.kind, torque))
+    return found
+
+
+def generalised(d: Dynamics, loads: Iterable[AnyLoad]) -> list[Scalar]:
+    """Jᵀ f of loads: the forces on the velocities that do the same work."""
+    loads = list(loads)
+    wrenches = _wrenches(d, [load for load in loads if isinstance(load, Load)])
+    parts = fc.generalised(d.instant, fc.carried(d.instant, wrenches), d.nv)
+    for load in loads:
+        if isinstance(load, JointLoad):
+            i = d.first[load.joint][1] + load.coordinate
+            parts[i] = parts[i] + load.force
+    return parts
+
+
+def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Force]:
+    """Loads as a wrench on each frame. They are summed in world axes, and turned once a frame."""
+    nothing = zeros(d.scalars)
+    points: dict[tuple[str, Vector], tuple[Vec, Vec]] = {}
+    for load in loads:
+        force, torque = points.get((load.body, load.at), (nothing, nothing))
+        more = _turning(load.torque, d.scalars)
+        points[load.body, load.at] = add(force, _three(load.force, d.scalars)), add(torque, more)
+    sums: dict[int, fc.Force] = {}
+    for (body, at), (force, torque) in points.items():
+        frame = -1 if body == WORLD else d.linkage.mounts[d.index[body]].frame
+        if frame >= 0:
+            own = _three(at, d.scalars)
+            reach = arm(d.linkage, d.instant, d.index[body], own, d.scalars)
+            wrench = fc.Force(add(torque, cross(reach, force)), force)
+            sums[frame] = fc.total(sums[frame], wrench) if frame in sums else wrench
+    wrenches = [fc.Force(nothing, nothing)] * len(d.instant.links)
+    for frame, f in sums.items():
+        turned = (d.instant.from_world(frame, part) for part in (f.moment, f.force))
+        wrenches[frame] = fc.Force(*turned)
+    return wrenches
+
+
+def _three(vector: Vector, scalars: Scalars) -> Vec:
+    x, y, *z = vector
+    return (x, y, z[0] if z else scalars.number(0.0))
+
+
+def _turning(torque: Vector, scalars: Scalars) -> Vec:
+    if len(torque) == 1:
+        return (scalars.number(0.0), scalars.number(0.0), torque[0])
+    return _three(torque, scalars) if torque else zeros(scalars)
+
+
+def rough(d: Dynamics, contact: Contact) -> tuple[tuple[Load, ...], ...]:
+    """The tangents that friction acts along: none without friction."""
+    return () if d.scalars.is_zero(contact.friction) else contact.tangents
+
+
+def pressed(d: Dynamics, contact: Contact, force: Scalar) -> tuple[list[AnyLoad], Scalar]:
+    """The loads of a normal force on a contact with its friction, and their power, W.
+
+    Friction is -μ force s / sqrt(s·s + slip_speed²) along the tangents, s the slip velocities.
+    """
+    loads, power = scaled(contact.normal, force), force * d.power_of(contact.normal)
+    tangents = rough(d, contact)
+    slips = [d.power_of(tangent) for tangent in tangents]
+    if slips:
+        speed = _root([*slips, contact.slip_speed], d.scalars)
+        drag = contact.friction * force / speed
+        for tangent, slip in zip(tangents, slips, strict=True):
+            loads += scaled(tangent, -(drag * slip))
+            power = power - drag * (slip * slip)
+    return loads, power
+
+
+def struck(
+    d: Dynamics,
+    directions: Sequence[Sequence[AnyLoad]],
+    restitution: Scalar,
+    friction: Scalar,
+    route: str,
+) -> list[Scalar]:
+    """The velocities after an impact along a normal and the tangents across it.
+
+    `directions` are the loads of a unit impulse along each, the normal first.
+    """
+    scalars = d.scalars
+    jacobian = [generalised(d, loads) for loads in directions]
+    responses = [response(d, row, route) for row in jacobian]
+    n = len(directions)
+    inverse_mass: list[list[Scalar]] = [[None] * n for _ in range(n)]
+    for i in range(n):
+        for j in range(i, n):
+            inverse_mass[i][j] = inverse_mass[j][i] = _dot(jacobian[i], responses[j], scalars)
+    speeds = [_dot(row, d.values.v, scalars) for row in jacobian]
+    found = list(d.values.v)
+    for p, along in zip(
+        impulses(inverse_mass, speeds, restitution, friction, scalars), responses, strict=True
+    ):
+        found = [v + p * change for v, change in zip(found, along, strict=True)]
+    return found
+
+
+def response(d: Dynamics, impulse: Sequence[Scalar], route: str) -> list[Scalar]:
+    """M⁻¹ of impulses on the velocities, by the recursion of a route."""
+    if route == "ldl":
+        return solved(d.factors, impulse)
+    still = [fc.no_force(d.scalars)] * len(d.instant.links)
+    return respond(d.instant, d.articulated, still, impulse, d.scalars)
+
+
+def impulses(
+    inverse_mass: Sequence[Sequence[Scalar]],
+    speeds: Sequence[Scalar],
+    restitution: Scalar,
+    friction: Scalar,
+    scalars: Scalars,
+) -> list[Scalar]:
+    """The impulses p of A, u, e and μ; normal first, with none, one or two tangents.
+
+    Ways across the normal along which the mechanism cannot move take no impulse. Never NaN.
+    """
+    A, u = inverse_mass, speeds
+    across = range(1, len(u))
+    zero, least = scalars.number(0.0), scalars.number(LEAST)
+    against = scalars.call("max", A[0][0], least)
+    plastic = -(u[0] / against)
+    bounced = (scalars.number(1.0) + restitution) * plastic
+    if not across:
+        return [bounced]
+    lean = [A[0][i] / against for i in across]
+    # What is left after p_I: the slip, and what resists it while the normal velocity stays 0.
+    slip = [u[i] + A[0][i] * plastic for i in across]
+    rest = [[A[i][j] - lean[i - 1] * A[0][j] for j in across] for i in across]
+    floor = scalars.number(IMMOVABLE) * _sum([A[i][i] for i in across], scalars)
+    stick = [-x for x in _least_solution(rest, slip, floor, scalars)]
+    normal = -_dot(lean, stick, scalars)
+    most = scalars.call("max", friction * bounced, zero)
+    excess = _root(stick, scalars) - friction * normal
+    share = most / scalars.call("max", scalars.call("max", excess, most), least)
+    return [bounced + share * normal, *(share * x for x in stick)]
+
+
+def _least_solution(
+    matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar], floor: Scalar, scalars: Scalars
+) -> list[Scalar]:
+    """The shortest x with S x = b for S of one or two rows, symmetric and not negative.
+
+    Eigenvalues up to `floor` count as 0. The choice of the two axes does not matter.
+    """
+    zero, least = scalars.number(0.0), scalars.number(LEAST)
+    if len(right) == 1:
+        quotient = right[0] / scalars.call("max", matrix[0][0], least)
+        return [scalars.call("select", matrix[0][0] - floor, quotient, zero)]
+    ((a, b), (_, c)), (x, y) = matrix, right
+    trace, determinant = a + c, a * c - b * b
+    # λ₁ λ₂ > floor (λ₁ + λ₂): both are above it. Of rank one, S = λ e eᵀ has S / λ² for inverse.
+    full = determinant - floor * trace
+    over = scalars.call("max", scalars.call("select", full, determinant, trace * trace), least)
+    tops = [(c * x - b * y, a * x + b * y), (a * y - b * x, b * x + c * y)]
+    quotients = [scalars.call("select", full, *pair) / over for pair in tops]
+    return [scalars.call("select", trace - floor, quotient, zero) for quotient in quotients]
+
+
+def _root(parts: Sequence[Scalar], scalars: Scalars) -> Scalar:
+    """|a|; 1e-150 at least, where there is a choice of direction to divide by it."""
+    square = _dot(parts, parts, scalars)
+    return scalars.call("sqrt", scalars.call("max", square, scalars.number(LEAST)))
+
+
+def _dot(a: Sequence[Scalar], b: Sequence[Scalar], scalars: Scalars) -> Scalar:
+    return _sum([x * y for x, y in zip(a, b, strict=True)], scalars)
+
+
+def _sum(parts: Sequence[Scalar], scalars: Scalars) -> Scalar:
+    total = scalars.number(0.0)
+    for part in parts:
+        total = total + part
+    return total

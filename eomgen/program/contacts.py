@@ -1,0 +1,100 @@
+"""What a module knows of rigid contacts: gaps, impacts, and motion under forces that hold."""
+
+from collections.abc import Callable, Sequence
+from itertools import chain
+
+from eomgen.derivation.recursive.dynamics import Dynamics
+from eomgen.derivation.recursive.impulses import generalised, pressed, rough, scaled, struck
+from eomgen.effects.base import Contact, JointLoad
+from eomgen.program.differentiate import tangent
+from eomgen.program.system import Made, Touch
+from eomgen.program.tape import Node, Stage, Tape, total
+
+Forward = Callable[[Sequence[Node] | None], list[Node]]
+"""v̇ under the effects and, if given, forces beside them, one a velocity."""
+
+
+def touches(d: Dynamics) -> tuple[Touch, ...]:
+    """The contacts by name, effect and unit of the gap."""
+    return tuple(Touch(c.name, c.effect, _unit(d, c)) for c in d.contacts)
+
+
+def _unit(d: Dynamics, contact: Contact) -> str:
+    units = [
+        d.model.coordinates[d.first[load.joint][0] + load.coordinate].unit
+        for load in contact.normal
+        if isinstance(load, JointLoad)
+    ]
+    return units[0] if units else "m"
+
+
+def contact_outputs(
+    d: Dynamics, tape: Tape, route: str, forward: Forward, position_rates: Sequence[Node]
+) -> tuple[Made, dict[str, tuple[str, ...]]]:
+    """Outputs of a model with contacts, and the inputs that two of them take besides."""
+    names = [contact.name for contact in d.contacts]
+    chosen = [_given(tape, f"struck__{name}") for name in names]
+    bounce = _given(tape, "impact__bounce")
+    forces = [_given(tape, f"force__{name}") for name in names]
+    extra = {"impact": [*chosen, bounce], "held": forces}
+    found = {
+        "gaps": [contact.gap for contact in d.contacts],
+        "gap_rates": _rates(d),
+        "impact": [
+            *d.values.q,
+            *_struck(d, tape, route, chosen, bounce),
+            *d.values.states.values(),
+        ],
+        "held": _held(d, tape, forward, position_rates, forces),
+    }
+    made: Made = {name: ((len(nodes),), nodes) for name, nodes in found.items()}
+    return made, {k: tuple(str(node.step.value) for node in nodes) for k, nodes in extra.items()}
+
+
+def _given(tape: Tape, name: str) -> Node:
+    return tape.input(name, Stage.INPUTS)
+
+
+def _rates(d: Dynamics) -> list[Node]:
+    return [d.power_of(contact.normal) for contact in d.contacts]
+
+
+def _struck(
+    d: Dynamics, tape: Tape, route: str, chosen: Sequence[Node], bounce: Node
+) -> list[Node]:
+    """The velocities after that contact has struck whose number in `chosen` is 1, all others 0.
+
+    The loads are those of all contacts, each times its number: so one impact does for all.
+    """
+    contacts = list(zip(d.contacts, chosen, strict=True))
+    across = max(len(rough(d, contact)) for contact in d.contacts)
+    directions = [
+        list(
+            chain.from_iterable(
+                scaled(loads, one)
+                for contact, one in contacts
+                for loads in (contact.normal, *rough(d, contact))[i : i + 1]
+            )
+        )
+        for i in range(across + 1)
+    ]
+    restitution = bounce * total([one * c.restitution for c, one in contacts], tape)
+    friction = total([one * c.friction for c, one in contacts], tape)
+    return struck(d, directions, restitution, friction, route)
+
+
+def _held(
+    d: Dynamics,
+    tape: Tape,
+    forward: Forward,
+    position_rates: Sequence[Node],
+    forces: Sequence[Node],
+) -> list[Node]:
+    """The state's derivative under forces on the contacts, ä of the gaps, the contacts' powers."""
+    found = [pressed(d, contact, f) for contact, f in zip(d.contacts, forces, strict=True)]
+    vd = forward(generalised(d, chain.from_iterable(loads for loads, _ in found)))
+    rates = [*position_rates, *vd, *d.state_rates]
+    given = (*d.values.q, *d.values.v, *d.values.states.values())
+    along = {node.index: rate for node, rate in zip(given, rates, strict=True)}
+    along[d.values.time.index] = tape.constant(1.0)
+    return [*rates, *tangent(_rates(d), along), *(power for _, power in found)]
