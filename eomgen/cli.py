@@ -132,6 +132,7 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
+    parser.add_argument("--works", action="store_true", help="book the work of each effect")
     _values(parser)
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     parser.add_argument("--plot", metavar="FILE", type=Path, help="figure (DIR/NAME.png)")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from eomgen.errors import RunError
-from eomgen.run.trajectory import Trajectory, load_npz, save_csv, save_npz
+from eomgen.run.trajectory import Event, Trajectory, load_npz, save_csv, save_npz
 
 # Numbers that a careless format loses: no short decimal, subnormal, huge, minus zero.
 AWKWARD = np.array([[0.1 + 0.2, -0.0], [5e-324, 1.7976931348623157e308], [1 / 3, -2e-17]])
@@ -19,9 +19,14 @@ RUN = Trajectory(
     integrator="rk4",
     finished=False,
     message="stopped at t = 0.43, crank=0.3: the state left the finite numbers",
-    counts={"steps": 2, "derivatives": 8, "jacobians": 0},
+    counts={"steps": 2, "derivatives": 8, "jacobians": 0, "impacts": 1},
+    events=(
+        Event(0.1, "floor_crank", "impact", 1 / 3),
+        Event(0.4, "floor_crank", "rest", 5e-324),
+    ),
 )
 FINISHED = replace(RUN, finished=True, message="")
+WORKED = replace(FINISHED, works=AWKWARD[:, ::-1], work_names=("gravity", "air"))
 
 
 def bits(array):
@@ -60,7 +65,7 @@ def test_what_does_not_fit_together_is_refused(change, message):
 
 def test_arrays_are_read_only_copies():
     t, y = np.array([0.0]), np.array([[1.0]])
-    counts = dict.fromkeys(("steps", "derivatives", "jacobians"), 0)
+    counts = dict.fromkeys(("steps", "derivatives", "jacobians", "impacts"), 0)
     trajectory = Trajectory("one", ("x",), t, y, "rk4", True, "", counts)
     y[0, 0] = counts["steps"] = 7
     assert trajectory.y[0, 0] == 1.0
@@ -72,7 +77,7 @@ def test_arrays_are_read_only_copies():
 # --- .npz ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("trajectory", [RUN, FINISHED])
+@pytest.mark.parametrize("trajectory", [RUN, FINISHED, WORKED])
 def test_npz_gives_every_bit_back_and_the_same_bytes_again(trajectory, tmp_path):
     first, second = tmp_path / "run.npz", tmp_path / "deeper" / "again"
     save_npz(trajectory, first)
@@ -91,9 +96,9 @@ def test_npz_is_recognisable_and_needs_no_pickle(tmp_path):
     with np.load(path, allow_pickle=False) as members:
         assert members.files == [
             *("eomgen", "t", "y", "states", "name"),
-            *("integrator", "finished", "message", "counts"),
+            *("integrator", "finished", "message", "counts", "events", "event_names"),
         ]
-        assert str(members["eomgen"]) == "trajectory 1"
+        assert str(members["eomgen"]) == "trajectory 2"
 
 
 def error_of(action, *arguments):
@@ -103,14 +108,15 @@ def error_of(action, *arguments):
 
 
 def test_npz_that_cannot_be_read(tmp_path):
-    missing, foreign, newer = (tmp_path / name for name in ("missing", "foreign", "newer"))
+    missing, foreign, older = (tmp_path / name for name in ("missing", "foreign", "older"))
     assert error_of(load_npz, missing) == f"{missing}: cannot be read: No such file or directory"
     foreign.write_bytes(b"PK\x03\x04 and so on")
     assert error_of(load_npz, foreign) == f"{foreign}: is no trajectory written by eomgen"
-    with newer.open("wb") as file:
-        np.savez(file, eomgen=np.array("trajectory 2"))
-    assert error_of(load_npz, newer) == (
-        f"{newer}: is in format 'trajectory 2', but this eomgen reads 'trajectory 1'"
+    with older.open("wb") as file:
+        np.savez(file, eomgen=np.array("trajectory 1"))
+    assert error_of(load_npz, older) == (
+        f"{older}: is in format 'trajectory 1', but this eomgen reads 'trajectory 2'; "
+        "simulate again"
     )
 
 
@@ -148,7 +154,7 @@ def test_code_in_npz_is_not_run(tmp_path):
     path, sprung = tmp_path / "run.npz", tmp_path / "sprung"
     with path.open("wb") as file:
         trap = np.array([Trap(str(sprung))], dtype=object)
-        np.savez(file, eomgen=np.array("trajectory 1"), name=trap)
+        np.savez(file, eomgen=np.array("trajectory 2"), name=trap)
     assert error_of(load_npz, path).endswith("; simulate again")
     assert not sprung.exists()
 

@@ -8,13 +8,20 @@ from pathlib import Path
 from typing import Any
 
 from eomgen.build import in_order
-from eomgen.commands.shared import Arguments, assignments, code_of, read_model, shortened
+from eomgen.commands.shared import (
+    Arguments,
+    assignments,
+    code_of,
+    print_listed,
+    read_model,
+    shortened,
+)
 from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.joints.base import Geared
 from eomgen.model import Model
 from eomgen.run.limits import excursions
-from eomgen.run.module import as_problem
+from eomgen.run.module import as_powers, as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import SHOWN
@@ -31,7 +38,8 @@ def simulate(given: Arguments) -> int:
     from eomgen.show.page import save_page
 
     model, name = read_model(given.scene, given)
-    model = replace(model, outputs=in_order((*model.outputs, *SHOWN)))
+    asked = (*model.outputs, *SHOWN, *(("effect_powers",) if given.works else ()))
+    model = replace(model, outputs=in_order(asked))
     parameters = assignments(given.set, model.defaults, "--set")
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
     wanted = model.simulation
@@ -41,9 +49,10 @@ def simulate(given: Arguments) -> int:
         raise RunError(f"--rtol, --atol: {integrator} takes equal steps; give --dt instead")
     paths = _output_paths(given, name)
     code, module = code_of(given.scene, model, given)
+    values = (parameters or None, inputs or None)
     with terminal_progress(f"simulating {model.name}") as progress:
         trajectory = integrate(
-            as_problem(module, parameters or None, inputs or None),
+            as_problem(module, *values),
             integrator,
             _or(given.t_end, wanted.t_end),
             dt=_or(given.dt, wanted.dt) if fixed else given.dt,
@@ -51,16 +60,19 @@ def simulate(given: Arguments) -> int:
             atol=_or(given.atol, wanted.atol),
             samples=given.samples,
             progress=progress,
+            rest_speed=wanted.rest_speed,
+            powers=as_powers(module, *values) if given.works else None,
         )
     model = model.with_parameters(parameters)
     motion = observe(model, module, trajectory)
-    values = tuple(model.defaults.values())
     write_whole(paths["py"], code.module, force=given.force)
     save_npz(trajectory, paths["npz"], force=given.force)
     save_csv(trajectory, paths["csv"], force=given.force)
     try:
         save_figure(motion, paths["png"], force=given.force)
-        save_page(motion, code.poses, values, paths["html"], force=given.force)
+        save_page(
+            motion, code.poses, tuple(model.defaults.values()), paths["html"], force=given.force
+        )
     except RunError as error:
         # Pictures of an earlier run must not stand beside the numbers of this one.
         for kind in ("png", "html"):
@@ -76,6 +88,8 @@ def simulate(given: Arguments) -> int:
         f"({'derived now' if code.derived else 'module fresh, not derived again'})"
     )
     print(f"    energy {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the end")
+    _print_works(trajectory, float(motion.kinetic_energy[-1] - motion.kinetic_energy[0]))
+    _print_events(trajectory)
     if motion.joints:
         print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
     _print_excursions(model, trajectory)
@@ -89,10 +103,41 @@ def simulate(given: Arguments) -> int:
     return 0
 
 
+def _print_works(trajectory: Trajectory, change: float) -> None:
+    """Say what each effect has done, and what of the kinetic energy's `change` that leaves, J."""
+    if trajectory.works is None:
+        return
+    works = trajectory.works[-1]
+    each = [f"{name} {work:.6g} J" for name, work in zip(trajectory.work_names, works, strict=True)]
+    print_listed("    work: ", shortened(each))
+    print(
+        f"    kinetic energy changed by {change:.6g} J, {change - works.sum():.2g} J unaccounted for"
+    )
+
+
+def _print_events(trajectory: Trajectory) -> None:
+    """Say how often rigid contacts struck, and which are held at the end, since when."""
+    if not trajectory.events:
+        return
+    held: dict[str, float] = {}
+    for event in trajectory.events:
+        if event.kind == "rest":
+            held[event.contact] = event.t
+        elif event.kind == "lift":
+            held.pop(event.contact, None)
+    impacts = trajectory.counts["impacts"]
+    words = [f"{impacts} impact{'' if impacts == 1 else 's'}"]
+    words += [f"at rest on {name} from t = {t:.6g} s" for name, t in held.items()]
+    print_listed("    ", shortened(words))
+
+
 def _print_excursions(model: Model, trajectory: Trajectory) -> None:
-    """Say which coordinates left the limits of their joints, which nothing enforces."""
+    """Say which coordinates left the limits of their joints, which nothing but a stop enforces."""
+    stopped = {effect.joint for effect in model.effects if effect.type == "joint_stop"}
     limits, units = {}, {}
     for body in model.bodies:
+        if body.joint.name in stopped:
+            continue
         if isinstance(body.joint, Geared) and body.joint.limits is not None:
             coordinate = body.positions[0]
             limits[coordinate.name], units[coordinate.name] = body.joint.limits, coordinate.unit

@@ -3,11 +3,12 @@
 import math
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from eomgen.errors import RunError
+from eomgen.run import events
 from eomgen.run.integrators import (
     INTEGRATORS,
     FixedStep,
@@ -19,12 +20,16 @@ from eomgen.run.integrators import (
 from eomgen.run.integrators.interface import Adaptive, Advance
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
-from eomgen.run.trajectory import Trajectory
+from eomgen.run.trajectory import Event, Trajectory
+from eomgen.run.works import Account, Powers
 
 SMALLEST_RTOL = 2.3e-14
 """SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
 ADAPTIVE_SAMPLES = 1001
 MOST_SAMPLES = 1_000_000
+REST_SPEED = 1e-3
+LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Where in a long step the gaps of contacts are looked at; in an equal step at its ends."""
 
 
 def integrate(
@@ -39,6 +44,8 @@ def integrate(
     samples: int | None = None,
     progress: Progress | None = None,
     max_steps: int = 10_000_000,
+    rest_speed: float = REST_SPEED,
+    powers: Powers | None = None,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
@@ -49,6 +56,9 @@ def integrate(
                 this many (default: all), for adaptive methods this many equally spaced times
                 (default: 1001); the first and the last are always kept
     progress    told the fraction done, at most about ten times a second
+    rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
+                that then neither part nor close are held, so that bouncing comes to an end
+    powers      asks for the works of effects
 
     Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
     has begun, Ctrl-C included, ends it early instead: the trajectory then holds the finite rows
@@ -63,26 +73,58 @@ def integrate(
     if samples is not None and samples > MOST_SAMPLES:
         raise RunError(f"samples: {samples} is too many; give at most {MOST_SAMPLES}")
 
-    derivative, jacobian = _Counted(problem.derivative), _Counted(problem.jacobian)
-    counted = replace(problem, derivative=derivative, jacobian=jacobian)
+    if not (math.isfinite(rest_speed) and rest_speed > 0):
+        raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
+
+    derivatives, jacobians = _Count(), _Count()
+    counted = replace(
+        problem,
+        derivative=derivatives.of(problem.derivative),
+        jacobian=jacobians.of(problem.jacobian),
+    )
     if isinstance(method, FixedStep):
         dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
-        advances = fixed_step.advances(method, counted, t_start, t_end, dt, every)
+
+        def begin(piece: Problem, t: float, made: int) -> Iterator[Advance]:
+            return fixed_step.advances(
+                method, piece, t, t_start=t_start, t_end=t_end, dt=dt, every=every
+            )
     else:
         _check_no_step(integrator, dt)
-        rows = samples or ADAPTIVE_SAMPLES
-        advances = adaptive.advances(
-            method, counted, t_start, t_end, rtol=rtol, atol=atol, samples=rows, max_steps=max_steps
+        times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
+
+        def begin(piece: Problem, t: float, made: int) -> Iterator[Advance]:
+            return adaptive.advances(
+                method,
+                piece,
+                t,
+                t_end,
+                rtol=rtol,
+                atol=atol,
+                times=times,
+                made=made,
+                max_steps=max_steps,
+            )
+
+    if problem.contacts is None:
+        advances = begin(counted, t_start, 0)
+    else:
+        looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
+        stepper = events.Stepper(begin, looks, derivatives.of)
+        advances = events.advances(
+            stepper, counted, t_start, t_end, rest_speed=rest_speed, max_steps=max_steps
         )
 
-    run = _Run(t_start, problem.initial, [(t_start, problem.initial)])
+    account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
+    run = _Run(t_start, problem.initial, account)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")
         trouble = _follow(run, advances, problem, method, t_end, throttled(progress or _ignore))
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
     message = "; ".join(part for part in (trouble, remarks) if part)
-    calls = {"derivatives": derivative.calls, "jacobians": jacobian.calls}
+    calls = {"derivatives": derivatives.calls, "jacobians": jacobians.calls}
+    impacts = sum(event.kind == "impact" for event in run.events)
     return Trajectory(
         name=problem.name,
         states=problem.states,
@@ -91,30 +133,62 @@ def integrate(
         integrator=integrator,
         finished=not trouble,
         message=" ".join(message.split()),
-        counts={"steps": run.steps, **calls},
+        counts={"steps": run.steps, **calls, "impacts": impacts},
+        events=tuple(run.events),
+        works=np.array(run.works) if account and account.names else None,
+        work_names=account.names if account else (),
     )
 
 
 @dataclass
-class _Counted:
-    """A function of t and y that counts its calls."""
+class _Count:
+    """How often functions of t and y are called."""
 
-    function: Callable[[float, Floats], Floats]
     calls: int = 0
 
-    def __call__(self, t: float, y: Floats) -> Floats:
-        self.calls += 1
-        return self.function(t, y)
+    def of(self, function: Callable[[float, Floats], Floats]) -> Callable[[float, Floats], Floats]:
+        """The same function, its calls counted here."""
+
+        def counted(t: float, y: Floats) -> Floats:
+            self.calls += 1
+            return function(t, y)
+
+        return counted
 
 
 @dataclass
 class _Run:
-    """How far a run has come: time and state, the rows kept, the steps made."""
+    """How far a run has come: time and state, rows kept and works there, steps made, events met."""
 
     t: float
     y: Floats
-    rows: list[tuple[float, Floats]]
+    account: Account | None
+    rows: list[tuple[float, Floats]] = field(default_factory=list)
+    works: list[Floats] = field(default_factory=list)
     steps: int = 0
+    events: list[Event] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._keep()
+
+    def take(self, advance: Advance) -> None:
+        """Go on to the end of a step, or through a strike."""
+        if self.account:
+            self.works.extend(self.account.book(self.t, self.y, advance))
+        self.t, self.y = advance.t, advance.y
+        self.rows.extend(advance.samples)
+        self.steps += advance.is_step
+        self.events.extend(advance.events)
+
+    def end(self) -> None:
+        """Keep the last state, too, where no row has its time."""
+        if self.t > self.rows[-1][0]:
+            self._keep()
+
+    def _keep(self) -> None:
+        self.rows.append((self.t, self.y))
+        if self.account:
+            self.works.append(self.account.total)
 
 
 def _follow(
@@ -133,9 +207,7 @@ def _follow(
             for advance in advances:
                 if not _is_finite(advance):
                     raise StepFailure(f"the state left the finite numbers; {method.remedy}")
-                run.t, run.y = advance.t, advance.y
-                run.rows.extend(advance.samples)
-                run.steps += 1
+                run.take(advance)
                 progress((run.t - t_start) / (t_end - t_start))
         return ""
     except KeyboardInterrupt:
@@ -147,8 +219,7 @@ def _follow(
     except (ArithmeticError, ValueError) as error:
         kind = type(error).__name__
         trouble = f"stopped at {_place(problem, run)}: {kind}: {error}; {method.remedy}"
-    if run.t > run.rows[-1][0]:
-        run.rows.append((run.t, run.y))
+    run.end()
     return trouble
 
 

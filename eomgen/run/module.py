@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Any, Protocol, cast
 
 from eomgen.errors import RunError
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import Contacts, Floats, Problem
+from eomgen.run.works import Powers
 
 
 class GeneratedModule(Protocol):
@@ -94,4 +95,34 @@ def as_problem(module: GeneratedModule, parameters: Any = None, inputs: Any = No
         jacobian=jacobian,
         initial=initial,
         quaternions=module.QUATERNIONS,
+        contacts=_contacts(module, parameters, inputs),
+    )
+
+
+def as_powers(module: Any, parameters: Any = None, inputs: Any = None) -> Powers | None:
+    """The powers of a module's effects, at given parameters and constant inputs; None if it was
+    generated without them or without the kinetic energy, or has no effects.
+    """
+    wanted = ("effect_powers", "kinetic_energy")
+    if not (module.EFFECT_NAMES and all(hasattr(module, name) for name in wanted)):
+        return None
+    return Powers(
+        names=tuple(module.EFFECT_NAMES),
+        powers=lambda t, y: module.effect_powers(t, y, parameters, inputs),
+        kinetic_energy=lambda t, y: float(module.kinetic_energy(t, y, parameters, inputs)),
+    )
+
+
+def _contacts(module: Any, parameters: Any, inputs: Any) -> Contacts | None:
+    """The rigid contacts of a module, if it has any."""
+    names = getattr(module, "CONTACTS", None)
+    if not names:
+        return None
+    return Contacts(
+        names=tuple(names),
+        effects=tuple(names.values()),
+        gaps=lambda t, y: module.gaps(t, y, parameters, inputs),
+        rates=lambda t, y: module.gap_rates(t, y, parameters, inputs),
+        impact=lambda t, y, k, bounce: module.impact(t, y, k, bounce, parameters, inputs),
+        held=lambda t, y, forces: module.held(t, y, forces, parameters, inputs),
     )

@@ -14,6 +14,28 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Contacts:
+    """What a mechanism's nc rigid contacts do; a contact touches where its gap is 0.
+
+    names, effects  of each contact, and of the effect that its work is booked under
+    gaps            (t, y) -> (nc,), m or rad, > 0 apart
+    rates           (t, y) -> (nc,), their time derivatives
+    impact          (t, y, contact, bounce) -> (ny,), the state after contact number `contact` has
+                    struck, its restitution multiplied by `bounce` (0: perfectly plastic)
+    held            (t, y (ny, k), forces (nc, k)) -> (ny + 2 nc, k), affine in the forces (N or
+                    N m): under normal forces of the contacts, and the friction they cause, the
+                    state's derivative, the gaps' second derivatives, the contacts' powers (W)
+    """
+
+    names: tuple[str, ...]
+    effects: tuple[str, ...]
+    gaps: Callable[[float, Floats], Floats]
+    rates: Callable[[float, Floats], Floats]
+    impact: Callable[[float, Floats, int, float], Floats]
+    held: Callable[[float, Floats, Floats], Floats]
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """The initial-value problem y' = f(t, y), y(t_start) = initial.
 
@@ -25,6 +47,7 @@ class Problem:
     jacobian    df/dy(t, y) -> (ny, ny), exact
     initial     (ny,), kept as a read-only copy
     quaternions indices of the four components of each unit quaternion among the states
+    contacts    what must not pass through each other; None where nothing can touch
 
     Raises `RunError` if `initial` has not one finite number per state.
     """
@@ -36,6 +59,7 @@ class Problem:
     jacobian: Callable[[float, Floats], Floats]
     initial: Floats
     quaternions: tuple[tuple[int, int, int, int], ...] = ()
+    contacts: Contacts | None = None
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

@@ -5,6 +5,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,8 +13,24 @@ from eomgen.errors import RunError
 from eomgen.files import is_ours, write_whole
 from eomgen.run.problem import Floats
 
-FORMAT = "trajectory 1"
-COUNTS = ("steps", "derivatives", "jacobians")
+FORMAT = "trajectory 2"
+COUNTS = ("steps", "derivatives", "jacobians", "impacts")
+Kind = Literal["impact", "rest", "lift"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """What happened to a contact at time `t`, s.
+
+    kind   "impact": it struck; "rest": from here on it is held, the force that keeps it closed
+           being known at every moment; "lift": it no longer is
+    speed  with which it closed, m/s or rad/s; 0 for a lift
+    """
+
+    t: float
+    contact: str
+    kind: Kind
+    speed: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +43,12 @@ class Trajectory:
     integrator    the method that made it
     finished      whether it reached the end time
     message       why not, and what to change; "" if there is nothing to say
-    counts        how many `steps` were made and `derivatives` and `jacobians` evaluated
+    counts        how many `steps` were made, `derivatives` and `jacobians` evaluated, and `impacts`
+                  met
+    events        what happened to contacts, in time; the rows just before and just after an impact
+                  have the same t
+    works         (n, m), J: what each effect has done since the start; None if it was not asked for
+    work_names    names of these m effects
 
     Raises `ValueError` if these do not fit together.
     """
@@ -39,6 +61,9 @@ class Trajectory:
     finished: bool
     message: str
     counts: Mapping[str, int]
+    events: tuple[Event, ...] = ()
+    works: Floats | None = None
+    work_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         t, y = np.array(self.t, dtype=np.float64), np.array(self.y, dtype=np.float64)
@@ -52,7 +77,17 @@ class Trajectory:
             raise ValueError("trajectory: t decreases")
         if set(self.counts) != set(COUNTS):
             raise ValueError(f"trajectory: counts are {sorted(self.counts)}, not {COUNTS}")
-        for array in (t, y):
+        arrays = [t, y]
+        if self.works is not None:
+            works = np.array(self.works, dtype=np.float64)
+            if works.shape != (t.size, len(self.work_names)):
+                raise ValueError(
+                    f"trajectory: works have shape {works.shape}, "
+                    f"not {(t.size, len(self.work_names))}"
+                )
+            arrays.append(works)
+            object.__setattr__(self, "works", works)
+        for array in arrays:
             array.flags.writeable = False
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "y", y)
@@ -77,8 +112,21 @@ def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
         finished=np.array(trajectory.finished),
         message=np.array(trajectory.message),
         counts=np.array([trajectory.counts[key] for key in COUNTS], dtype=np.int64),
+        events=np.array([(event.t, event.speed) for event in trajectory.events]).reshape(-1, 2),
+        event_names=np.array(
+            [(event.contact, event.kind) for event in trajectory.events], dtype=np.str_
+        ).reshape(-1, 2),
+        **_worked(trajectory),
     )
     write_whole(path, buffer.getvalue(), force=force)
+
+
+def _worked(trajectory: Trajectory) -> dict[str, Any]:
+    """The members of a file that hold works; none where they were not asked for."""
+    if trajectory.works is None:
+        return {}
+    names = np.array(trajectory.work_names, dtype=np.str_)
+    return {"works": trajectory.works, "work_names": names}
 
 
 def load_npz(path: Path) -> Trajectory:
@@ -105,16 +153,27 @@ def load_npz(path: Path) -> Trajectory:
                     finished=bool(members["finished"]),
                     message=str(members["message"]),
                     counts=dict(zip(COUNTS, members["counts"].tolist(), strict=True)),
+                    events=tuple(
+                        Event(t, contact, kind, speed)
+                        for (t, speed), (contact, kind) in zip(
+                            members["events"].tolist(), members["event_names"].tolist(), strict=True
+                        )
+                    ),
+                    works=members.get("works"),
+                    work_names=tuple(members.get("work_names", np.array(())).tolist()),
                 )
     # What a broken archive makes zipfile and NumPy raise has no common base.
     except Exception as error:
         text = " ".join(str(error).split())
         raise RunError(f"{path}: is damaged ({text}); simulate again") from None
-    raise RunError(f"{path}: is in format '{form}', but this eomgen reads '{FORMAT}'")
+    raise RunError(
+        f"{path}: is in format '{form}', but this eomgen reads '{FORMAT}'; simulate again"
+    )
 
 
 def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
-    """Write `trajectory` as a table: a comment line, the header, one row of t and y per time.
+    """Write `trajectory` as a table: a comment line, the header, one row of t and y per time, and
+    where works were asked for, of these: work_<effect>, J.
 
     Numbers are the shortest that read back exactly; `np.loadtxt(path, delimiter=",",
     skiprows=2)` loads them. Raises `RunError` as `save_npz` does.
@@ -125,6 +184,8 @@ def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
     buffer = io.StringIO()
     buffer.write(" ".join(comment.split()) + "\n")
     table = csv.writer(buffer, lineterminator="\n")
-    table.writerow(["t", *trajectory.states])
-    table.writerows(np.column_stack([trajectory.t, trajectory.y]).tolist())
+    works = [] if trajectory.works is None else [trajectory.works]
+    names = [f"work_{name}" for name in trajectory.work_names]
+    table.writerow(["t", *trajectory.states, *names])
+    table.writerows(np.column_stack([trajectory.t, trajectory.y, *works]).tolist())
     write_whole(path, buffer.getvalue(), force=force)

@@ -136,13 +136,17 @@ class Initial(Table):
 
 
 class Simulation(Table):
-    """How to run it unless the command line says otherwise."""
+    """How to run it unless the command line says otherwise.
+
+    Rigid contacts that close more slowly than `rest_speed`, in m/s or rad/s, do not bounce.
+    """
 
     t_end: Positive = 10.0
     integrator: Integrator = "DOP853"
     dt: Positive = 0.001
     rtol: Positive = 1e-9
     atol: Positive = 1e-12
+    rest_speed: Positive = 1e-3
 
 
 class Scene(Table):

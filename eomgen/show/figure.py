@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from eomgen.show.motion import Motion, instants, thinned
+from eomgen.show.motion import Array, Motion, instants, thinned
 from eomgen.show.panels import MOST_CURVES, draw_curves, draw_map, draw_small
 from eomgen.show.plane import draw_plane
 from eomgen.show.space import draw_space
@@ -46,13 +46,15 @@ def draw_motion(motion: Motion) -> Figure:
         figure = Figure(figsize=(12.0, 7.4))
         _draw_heading(figure, motion)
         groups = _positions_by_title(shown)
-        rows = len(groups) + 1
+        rows = len(groups) + 1 + (shown.works is not None)
         heights = [3.2 / rows] * rows + [1.0]
         grid = figure.add_gridspec(rows + 1, 2, width_ratios=(1.25, 1), height_ratios=heights)
         _draw_mechanism(figure.add_subplot(grid[:-1, 0]), shown)
         for row, (title, indices) in enumerate(groups.items()):
             _draw_coordinates(figure.add_subplot(grid[row, 1]), shown, title, indices)
-        _draw_energy(figure.add_subplot(grid[-2, 1]), shown)
+        _draw_energy(figure.add_subplot(grid[len(groups), 1]), shown)
+        if shown.works is not None:
+            _draw_works(figure.add_subplot(grid[-2, 1]), shown, shown.works)
         _draw_energy_change(figure.add_subplot(grid[-1, 0]), shown)
         _draw_drift(figure.add_subplot(grid[-1, 1]), shown)
     return figure
@@ -123,6 +125,17 @@ def _draw_energy(axes: Axes, motion: Motion) -> None:
     )
     axes.set_title("Energy")
     axes.set_ylabel("J")
+    axes.set_xlabel("t, s")
+
+
+def _draw_works(axes: Axes, motion: Motion, works: Array) -> None:
+    labels = [plain(name) for name in motion.effects]
+    if len(labels) > MOST_CURVES:
+        draw_map(axes, motion.t, works, labels, "J")
+    else:
+        draw_curves(axes, motion.t, works, labels, colours(len(labels)))
+        axes.set_ylabel("J")
+    axes.set_title("Work of each effect")
     axes.set_xlabel("t, s")
 
 

@@ -38,7 +38,8 @@ class Motion:
     those among them that make a unit quaternion. `poses` holds in the plane world x, y of each
     body's centre of mass and its angle, in space [world_R_body | world x, y, z of the centre of
     mass]. `joint_drift` is the distance between a joint's point on parent and on child. `anchors`
-    are points to mark as joints.
+    are points to mark as joints. `works` are what each effect has done since the start, None where
+    that was not asked for.
     """
 
     name: str
@@ -61,6 +62,8 @@ class Motion:
     message: str
     anchors: tuple[Anchor, ...] = ()
     quaternions: tuple[tuple[int, int, int, int], ...] = ()
+    works: Array | None = None  # (n, m) J, of m effects
+    effects: tuple[str, ...] = ()  # m names
 
     def __post_init__(self) -> None:
         n, ny, nb, nj = len(self.t), len(self.states), len(self.bodies), len(self.joints)
@@ -68,6 +71,7 @@ class Motion:
         assert self.y.shape == (n, ny) and len(self.units) == ny
         assert self.poses.shape in ((n, nb, 3), (n, nb, 3, 4)) and len(self.shapes) == nb
         assert self.joint_drift.shape == (n, nj)
+        assert self.works is None or self.works.shape == (n, len(self.effects))
         assert all(len(anchor) == 1 + self.dimensions for anchor in self.anchors)
 
     @property
@@ -153,4 +157,5 @@ def thinned(motion: Motion, most: int = MOST_ROWS) -> Motion:
         kinetic_energy=motion.kinetic_energy[rows],
         potential_energy=motion.potential_energy[rows],
         joint_drift=motion.joint_drift[rows],
+        works=None if motion.works is None else motion.works[rows],
     )

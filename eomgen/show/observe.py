@@ -64,6 +64,8 @@ def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Mo
         message=trajectory.message,
         anchors=_anchors(model, poses.ndim - 1),
         quaternions=tuple(getattr(module, "QUATERNIONS", ())),
+        works=trajectory.works,
+        effects=trajectory.work_names,
     )
 
 

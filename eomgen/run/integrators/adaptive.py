@@ -4,12 +4,14 @@ RK45 and DOP853 are explicit (Dormand, Prince), Radau is Radau IIA of order 5, B
 multistep methods, LSODA switching between stiff and nonstiff by itself (Hindmarsh, Petzold).
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
 from eomgen.run.integrators.interface import Adaptive, Advance, StepFailure
-from eomgen.run.problem import Problem
+from eomgen.run.problem import Floats, Problem
 
 _STALLED = 100
 _ENOUGH_TO_JUDGE = 100_000
@@ -24,14 +26,16 @@ def advances(
     *,
     rtol: float,
     atol: float,
-    samples: int,
+    times: Floats,
+    made: int,
     max_steps: int,
 ) -> Iterator[Advance]:
-    """Yield the steps of `method`, with those of `samples` equally spaced times that each spans.
+    """Yield the steps of `method`, with a sample at those of `times` (ascending) that each spans.
 
     Between steps the method's own dense output is used, which is of its accuracy. The sample at
     `t_start` is the caller's. Quaternions are scaled to unit length in every state that is yielded;
-    one-step methods go on from there, multistep ones from their own history.
+    one-step methods go on from there, multistep ones from their own history. `made` steps went
+    before, which `max_steps` counts, too.
     Raises `StepFailure` if the method gives up, or after `max_steps`.
     """
     jacobian = {"jac": problem.jacobian} if method.uses_jacobian else {}
@@ -40,13 +44,13 @@ def advances(
     solver = method.solver(
         problem.derivative, t_start, start, t_end, rtol=rtol, atol=atol, **jacobian
     )
-    times = np.linspace(t_start, t_end, samples)
-    sampled, stalled = 1, 0
-    for made in range(max_steps):
-        if made == _ENOUGH_TO_JUDGE and (solver.t - t_start) * max_steps < (t_end - t_start) * made:
+    sampled, stalled = int(np.searchsorted(times, t_start, side="right")), 0
+    left = max_steps - made
+    for here in range(left):
+        if here == _ENOUGH_TO_JUDGE and (solver.t - t_start) * left < (t_end - t_start) * here:
             raise StepFailure(
-                f"{made} steps came to {solver.t:g} s only, at which pace the end is more than "
-                f"{max_steps} steps away; take a shorter --t-end, or {method.remedy}"
+                f"{here} steps came to {solver.t:g} s only, at which pace the end is more than "
+                f"{left} steps away; take a shorter --t-end, or {method.remedy}"
             )
         complaint = solver.step()
         if solver.status == "failed":
@@ -59,10 +63,11 @@ def advances(
         if stalled == _STALLED:
             raise StepFailure(f"the steps have shrunk to nothing; {method.remedy}")
         passed = int(np.searchsorted(times, t, side="right"))
-        within = times[sampled:passed]
-        states = solver.dense_output()(within).T if within.size else ()
-        samples_within = zip(within.tolist(), map(problem.unit, states), strict=True)
-        yield Advance(t, y, list(samples_within))
+        dense = cache(solver.dense_output)
+        spanned = times[sampled:passed]
+        states = dense()(spanned).T if spanned.size else ()
+        samples = list(zip(spanned.tolist(), map(problem.unit, states), strict=True))
+        yield Advance(t, y, samples, problem, partial(_between, problem, dense))
         sampled = passed
         if solver.status == "finished":
             return
@@ -72,3 +77,8 @@ def advances(
             # it again changes no error, and costs a derivative a step.
             solver.y = y.copy()
     raise StepFailure(f"{max_steps} steps did not suffice; {method.remedy}")
+
+
+def _between(problem: Problem, dense: Callable[[], Any], t: float) -> Floats:
+    """The state at a time within a step, by its dense output, which is made when first asked."""
+    return problem.unit(dense()(t))

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Iterator
+from functools import partial
 
 from eomgen.run.integrators.interface import Advance, FixedStep
-from eomgen.run.problem import Problem
+from eomgen.run.problem import Floats, Problem
 
 
 def count_steps(span: float, dt: float) -> float:
@@ -18,17 +19,34 @@ def count_steps(span: float, dt: float) -> float:
 
 
 def advances(
-    method: FixedStep, problem: Problem, t_start: float, t_end: float, dt: float, every: int
+    method: FixedStep,
+    problem: Problem,
+    t: float,
+    *,
+    t_start: float,
+    t_end: float,
+    dt: float,
+    every: int,
 ) -> Iterator[Advance]:
-    """Yield the steps of `method`, with a sample at every `every`-th and at the last one.
+    """Yield the steps of `method` from time `t` on, with a sample at every `every`-th and the last.
 
-    Quaternions are scaled back to unit length after every step.
+    Steps end at t_start + i dt and at `t_end`, so that the first is shorter if `t` lies between.
+    Quaternions are scaled back to unit length after every step. Within a step the state is that
+    after a shorter one.
     """
     steps = int(count_steps(t_end - t_start, dt))
-    t, y = t_start, problem.initial
-    for i in range(1, steps + 1):
+    first = min(math.floor((t - t_start) / dt + 1e-9) + 1, steps)
+    regular, y = t == t_start, problem.initial
+    for i in range(first, steps + 1):
         last = i == steps
-        y = problem.unit(method.step(problem, t, y, t_end - t if last else dt))
         # From the start each time: adding up dt would gather rounding.
-        t = t_end if last else min(t_start + i * dt, t_end)
-        yield Advance(t, y, [(t, y)] if last or i % every == 0 else [])
+        end = t_end if last else min(t_start + i * dt, t_end)
+        within = partial(_shorter, method, problem, t, y)
+        y = problem.unit(method.step(problem, t, y, dt if regular and not last else end - t))
+        t, regular = end, True
+        yield Advance(t, y, [(t, y)] if last or i % every == 0 else [], problem, within)
+
+
+def _shorter(method: FixedStep, problem: Problem, t: float, y: Floats, end: float) -> Floats:
+    """The state at `end` after one step from `t`."""
+    return problem.unit(method.step(problem, t, y, end - t)) if end > t else y

@@ -18,6 +18,8 @@ _ROUNDOFF = 4 * np.finfo(np.float64).eps
 # Updates that stop shrinking below this fraction of the state are the derivative's own rounding
 # noise: nothing is gained by iterating on. Above it, they are a method that does not converge.
 _NOISE = 1e-10
+# The same where the whole state is as good as zero, as of a body at rest on the ground.
+_NOTHING = 1e-13
 
 
 def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
@@ -47,7 +49,7 @@ def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
         # Hairer, Wanner, Solving ODEs II, section IV.8.
         contraction = size / previous if previous else 1.0
         converged = np.all(contraction * np.abs(update) <= _ROUNDOFF * scale)
-        stagnant = 0 < previous <= 2 * size and size <= _NOISE * np.max(scale)
+        stagnant = 0 < previous <= 2 * size and size <= max(_NOISE * np.max(scale), _NOTHING)
         if converged or stagnant:
             return y + change
         previous = size

@@ -8,6 +8,7 @@ from scipy.integrate import OdeSolver
 
 from eomgen.errors import RunError
 from eomgen.run.problem import Floats, Problem
+from eomgen.run.trajectory import Event
 
 Step = Callable[[Problem, float, Floats, float], Floats]
 """`step(problem, t, y, h) -> y_new`: one step of size h; leaves `y` (ny,) as it is."""
@@ -47,8 +48,23 @@ class Adaptive:
 
 @dataclass(frozen=True)
 class Advance:
-    """One step made: the state `y` (ny,) reached at time `t`, and the samples to keep of it."""
+    """One step made, from where the last one ended: the state `y` (ny,) reached at time `t`.
+
+    samples  the rows to keep of it
+    problem  whose derivative was integrated
+    within   the state at any time within the step; asked for before the next step is made
+    is_step  False for what takes no time, an impact or a mere note of `events`
+    struck   the number of the contact that struck
+    events   what happened at its end
+    contact_powers  (t, y) -> (nc,), powers of the contacts that were held during the step, W
+    """
 
     t: float
     y: Floats
     samples: Sequence[tuple[float, Floats]]
+    problem: Problem
+    within: Callable[[float], Floats]
+    is_step: bool = True
+    struck: int | None = None
+    events: tuple[Event, ...] = ()
+    contact_powers: Callable[[float, Floats], Floats] | None = None

@@ -1,0 +1,77 @@
+"""Linear complementarity: forces that push and never pull."""
+
+import numpy as np
+
+from eomgen.run.problem import Floats
+
+ROUNDING = 1e-10
+"""What counts as zero, beside the largest offset or force."""
+
+CONSISTENT = 1e-6
+"""What a redundant set of contacts may leave of its accelerations, beside the largest offset."""
+
+
+def complementary(matrix: Floats, offset: Floats) -> Floats | None:
+    """Return f (n,) with 0 <= f, 0 <= a = matrix f + offset, f_i a_i = 0; None if none is found.
+
+    Murty's least-index principal pivoting, then, where that turns in circles, Lemke's method:
+    Cottle, Pang, Stone, The Linear Complementarity Problem, sections 4.2 and 4.4. The systems of
+    the former are solved by least squares of least norm, so that contacts of which fewer would do,
+    a box's four corners on the ground, share the load evenly.
+    """
+    scale = np.abs(offset).max(initial=0.0)
+    if not (offset < 0).any():
+        return np.zeros(len(offset))
+    if not (np.isfinite(scale) and np.isfinite(matrix).all()):
+        return None
+    acts = offset < 0
+    for _ in range(4 * len(offset) + 4):
+        forces = np.zeros(len(offset))
+        forces[acts] = _least(matrix[np.ix_(acts, acts)], -offset[acts])
+        left = matrix @ forces + offset
+        pulls = acts & (forces < -ROUNDING * np.abs(forces).max())
+        closes = ~acts & (left < -ROUNDING * scale)
+        wrong = np.flatnonzero(pulls | closes)
+        if not wrong.size:
+            if np.abs(left[acts]).max(initial=0.0) <= CONSISTENT * scale:
+                return np.maximum(forces, 0.0)
+            break
+        acts[wrong[0]] = not acts[wrong[0]]
+    return _lemke(matrix, offset, scale)
+
+
+def _least(matrix: Floats, wanted: Floats) -> Floats:
+    """The least solution of matrix x = wanted, nearest where there is none."""
+    if len(wanted) == 1 and matrix[0, 0]:
+        return np.asarray(wanted / matrix[0])
+    return np.asarray(np.linalg.lstsq(matrix, wanted, rcond=ROUNDING)[0])
+
+
+def _lemke(matrix: Floats, offset: Floats, scale: float) -> Floats | None:
+    """Lemke's method: an artificial variable makes everything feasible, then is driven out."""
+    n = len(offset)
+    # Columns: a (0 … n-1), f (n … 2n-1), the artificial one, the right-hand side.
+    table = np.column_stack([np.eye(n), -matrix, -np.ones(n), offset])
+    basis = list(range(n))
+    entering, row = 2 * n, int(np.argmin(offset))
+    for _ in range(20 * n + 20):
+        table[row] /= table[row, entering]
+        others = np.arange(n) != row
+        table[others] -= np.outer(table[others, entering], table[row])
+        leaving, basis[row] = basis[row], entering
+        if leaving == 2 * n:
+            forces = np.zeros(2 * n + 1)
+            forces[basis] = table[:, -1]
+            found = np.maximum(forces[n : 2 * n], 0.0)
+            holds = (matrix @ found + offset >= -CONSISTENT * scale).all()
+            return found if holds else None
+        entering = leaving + n if leaving < n else leaving - n
+        column = table[:, entering]
+        rows = np.flatnonzero(column > ROUNDING * np.abs(column).max())
+        if not rows.size:
+            return None  # a ray: no forces do it
+        ratios = table[rows, -1] / column[rows]
+        least = rows[ratios <= ratios.min() + ROUNDING * scale]
+        # The artificial variable first, or degenerate corners are gone around for ever.
+        row = next((int(i) for i in least if basis[i] == 2 * n), int(least[0]))
+    return None

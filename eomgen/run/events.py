@@ -1,0 +1,293 @@
+"""Runs with rigid contacts: where they close, strike, stay closed and open again.
+
+A run is cut into pieces at whose ends a contact strikes or opens; within a piece the motion is
+smooth, and a method's steps are its own. Contacts that are apart are watched by their gaps, those
+that are held by their forces.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.optimize import brentq
+
+from eomgen.run.contacts import (
+    PARTING,
+    TOLERANCE,
+    Holding,
+    Rate,
+    check_depth,
+    restrained,
+    still,
+    strikes,
+)
+from eomgen.run.integrators.interface import Advance, StepFailure
+from eomgen.run.problem import Contacts, Floats, Problem
+from eomgen.run.trajectory import Event
+
+MOST_EVENTS = 10_000
+"""At so many moments something may happen before time has moved on."""
+
+TOGETHER = 1e-9
+"""Contacts that open within this fraction of a step open together."""
+
+
+@dataclass(frozen=True)
+class Stepper:
+    """Steps of a method that can be begun anywhere.
+
+    begin    steps of a problem from a time on, with how many were made before
+    looks    fractions of a step at whose ends gaps are looked at, 0 to 1
+    counted  makes a function count among the derivatives evaluated
+    """
+
+    begin: Callable[[Problem, float, int], Iterator[Advance]]
+    looks: Sequence[float]
+    counted: Callable[[Rate], Rate]
+
+
+@dataclass
+class _Moment:
+    """How a run stands: time, state, contacts held, and contacts that have just opened.
+
+    The latter lie within rounding of closed; their gaps are counted from `slack` below 0 until they
+    are clear of `TOLERANCE`.
+    """
+
+    t: float
+    y: Floats
+    held: tuple[int, ...]
+    slack: Floats
+
+
+@dataclass
+class _Guard:
+    """Counts moments at which time does not move on, and stops a run that does not."""
+
+    least: float
+    since: float
+    count: int = 0
+
+    def notice(self, t: float) -> None:
+        """Something happened at `t`."""
+        self.count += 1
+        if t - self.since > self.least:
+            self.since, self.count = t, 0
+        if self.count > MOST_EVENTS:
+            raise StepFailure(
+                f"contacts struck or opened {MOST_EVENTS} times within {self.least:.2g} s; "
+                "take a larger rest_speed"
+            )
+
+
+def advances(
+    stepper: Stepper,
+    problem: Problem,
+    t_start: float,
+    t_end: float,
+    *,
+    rest_speed: float,
+    max_steps: int,
+) -> Iterator[Advance]:
+    """Yield the steps of a run with contacts, cut where one strikes or opens, and the strikes.
+
+    Raises `StepFailure` for a start too deep, for contacts that admit no forces, for impacts
+    without end, and after `max_steps`.
+    """
+    contacts = problem.contacts
+    assert contacts is not None
+    now = _Moment(t_start, problem.initial, (), np.zeros(len(contacts.names)))
+    check_depth(contacts, now.t, now.y)
+    closed = np.flatnonzero(contacts.gaps(now.t, now.y) <= TOLERANCE).tolist()
+    guard = _Guard(1e-9 * (t_end - t_start), t_start)
+    made = 0
+    while True:
+        if closed:
+            guard.notice(now.t)
+            yield from _strike(problem, now, closed, rest_speed)
+        closed = []
+        if now.t >= t_end:
+            return
+        holding = Holding(contacts, now.held, (now.t, now.y)) if now.held else None
+        piece = restrained(replace(problem, initial=now.y), holding, stepper.counted)
+        powers = holding.powers if holding else None
+        for advance in stepper.begin(piece, now.t, made):
+            made += 1
+            if made > max_steps:
+                raise StepFailure(f"{max_steps} steps did not suffice; take a shorter --t-end")
+            step = replace(advance, contact_powers=powers)
+            closing, closed = _closing(contacts, now, step, stepper.looks)
+            opening, opened = _opening(holding, now, step)
+            if closing <= opening and closed:
+                now.slack = np.zeros(len(contacts.names))
+                yield from _cut(now, step, closing, keep=True)
+                break
+            closed = []
+            if opened:
+                guard.notice(opening)
+                yield from _cut(now, step, opening, keep=False)
+                yield _open(contacts, piece, now, opened)
+                break
+            now.t, now.y = step.t, step.y
+            if now.slack.any():
+                now.slack[contacts.gaps(now.t, now.y) > TOLERANCE] = 0.0
+            yield step
+
+
+def _strike(
+    problem: Problem, now: _Moment, closed: Sequence[int], rest_speed: float
+) -> Iterator[Advance]:
+    """Yield each strike at one moment; `now` then tells what is held."""
+    contacts, t = problem.contacts, now.t
+    assert contacts is not None
+    near = np.flatnonzero(contacts.gaps(t, now.y) <= TOLERANCE).tolist()
+    touching = sorted({*closed, *now.held, *near})
+    speeds: dict[int, float] = {}
+
+    def instant(struck: int | None = None) -> Advance:
+        y = now.y
+        return Advance(t, y, [], problem, lambda _: y, is_step=False, struck=struck)
+
+    for contact, speed, y in strikes(contacts, t, now.y, touching, rest_speed):
+        now.y = y
+        speeds[contact] = max(speeds.get(contact, 0.0), speed)
+        yield instant(contact)
+    before, now.held = now.held, tuple(still(contacts, t, now.y, touching))
+    # What touches without closing, but for what has bounced, lies within rounding of closed.
+    slow = np.abs(contacts.rates(t, now.y)) < rest_speed
+    for k in touching:
+        now.slack[k] = 0.0
+        if k not in now.held and slow[k]:
+            now.slack[k] = _slack(contacts, t, now.y, k)
+    events = [
+        Event(t, contacts.names[k], "impact", speed)
+        for k, speed in sorted(speeds.items())
+        if speed >= rest_speed
+    ]
+    rest = [k for k in now.held if k not in before]
+    lift = [k for k in before if k not in now.held]
+    events += [Event(t, contacts.names[k], "rest", speeds.get(k, 0.0)) for k in rest]
+    events += [Event(t, contacts.names[k], "lift", 0.0) for k in lift]
+    rows = [(t, now.y)] if speeds else []
+    yield replace(instant(), samples=rows, events=tuple(events))
+
+
+def _open(contacts: Contacts, problem: Problem, now: _Moment, opened: Sequence[int]) -> Advance:
+    """Let contacts go."""
+    now.held = tuple(k for k in now.held if k not in opened)
+    for k in opened:
+        now.slack[k] = _slack(contacts, now.t, now.y, k)
+    events = tuple(Event(now.t, contacts.names[k], "lift", 0.0) for k in opened)
+    y = now.y
+    return Advance(now.t, y, [], problem, lambda _: y, is_step=False, events=events)
+
+
+def _slack(contacts: Contacts, t: float, y: Floats, contact: int) -> float:
+    """How far below 0 a contact that opens may be: `TOLERANCE`, or twice what it is off by."""
+    return max(TOLERANCE, -2 * float(contacts.gaps(t, y)[contact]))
+
+
+def _cut(now: _Moment, step: Advance, t: float, keep: bool) -> Iterator[Advance]:
+    """Yield the part of a step up to `t`, if it has any length, and go there."""
+    if t <= now.t:
+        return
+    y = step.y if t == step.t else step.within(t)
+    samples = [sample for sample in step.samples if sample[0] < t or (sample[0] == t and not keep)]
+    now.t, now.y = t, y
+    yield replace(step, t=t, y=y, samples=[*samples, (t, y)] if keep else samples)
+
+
+def _closing(
+    contacts: Contacts, now: _Moment, step: Advance, looks: Sequence[float]
+) -> tuple[float, list[int]]:
+    """When contacts first close in a step, and which; infinity and none if they stay apart."""
+    apart = [k for k in range(len(contacts.names)) if k not in now.held]
+    if not apart:
+        return np.inf, []
+    length, slack = step.t - now.t, now.slack.copy()
+
+    def state(s: float) -> Floats:
+        return now.y if s <= 0 else step.y if s >= length else step.within(now.t + s)
+
+    def gap(k: int, s: float) -> float:
+        return float(contacts.gaps(now.t + s, state(s))[k] + slack[k])
+
+    def rate(k: int, s: float) -> float:
+        return float(contacts.rates(now.t + s, state(s))[k])
+
+    def look(s: float) -> tuple[float, Floats, Floats]:
+        y = state(s)
+        return s, contacts.gaps(now.t + s, y), contacts.rates(now.t + s, y)
+
+    a, gaps_a, rates_a = look(0.0)
+    for fraction in looks[1:]:
+        b, gaps_b, rates_b = look(fraction * length)
+        found = []
+        for k in apart:
+            low = gaps_b[k] + slack[k] < 0
+            dips = rates_a[k] < 0 < rates_b[k]
+            if low or dips:
+                ends = (gaps_a[k] + slack[k], gaps_b[k] + slack[k])
+                at = _first_zero(partial(gap, k), partial(rate, k), a, b, ends)
+                if at is not None:
+                    found.append((at, k))
+        if found:
+            first = min(found)[0]
+            return now.t + first, [k for at, k in found if at <= first + 1e-12 * length]
+        slack[gaps_b > TOLERANCE] = 0.0
+        a, gaps_a, rates_a = b, gaps_b, rates_b
+    return np.inf, []
+
+
+def _first_zero(
+    gap: Callable[[float], float],
+    rate: Callable[[float], float],
+    a: float,
+    b: float,
+    ends: tuple[float, float],
+) -> float | None:
+    """Where a gap that turns at most once between `a` and `b` first falls to 0, if it does."""
+    at_a, at_b = ends
+    if at_a > 0 and at_b < 0:
+        return _root(gap, a, b)
+    before, after = rate(a), rate(b)
+    turns = before * after < 0
+    middle = _root(rate, a, b) if turns else b
+    if before < 0:  # it falls first
+        if at_a <= 0:
+            return a
+        return _root(gap, a, middle) if turns and gap(middle) < 0 else None
+    if at_b >= 0 or not turns:  # it rises still
+        return a if before == 0 and at_b < at_a <= 0 else None
+    return _root(gap, middle, b) if gap(middle) > 0 else middle
+
+
+def _root(function: Callable[[float], float], a: float, b: float) -> float:
+    return float(brentq(function, a, b, xtol=max(1e-14 * (b - a), 1e-300), rtol=1e-15))
+
+
+def _opening(holding: Holding | None, now: _Moment, step: Advance) -> tuple[float, list[int]]:
+    """When held contacts first open in a step, and which; infinity and none if they stay held.
+
+    A contact opens where its force has fallen to 0 and its gap begins to grow.
+    """
+    if holding is None:
+        return np.inf, []
+    _, pushes, parts = holding.solve(step.t, step.y)
+    length = step.t - now.t
+
+    def force(i: int, s: float) -> float:
+        y = step.y if s >= length else step.within(now.t + s) if s > 0 else now.y
+        _, push, part = holding.solve(now.t + s, y)
+        return float(push[i] - part[i])
+
+    found = []
+    for i in np.flatnonzero((pushes == 0) & (parts > PARTING)).tolist():
+        pressed = partial(force, i)
+        at = _root(pressed, 0.0, length) if pressed(0.0) > 0 else 0.0
+        found.append((at, holding.held[i]))
+    if not found:
+        return np.inf, []
+    first = min(found)[0]
+    return now.t + first, [k for at, k in found if at <= first + TOGETHER * length]
