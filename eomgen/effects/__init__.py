@@ -7,6 +7,7 @@ from pydantic import Field
 from eomgen.effects.attraction import PointGravity
 from eomgen.effects.controller import Controller
 from eomgen.effects.drag import Drag
+from eomgen.effects.driven import Driven
 from eomgen.effects.external_force import ExternalForce
 from eomgen.effects.external_torque import ExternalTorque
 from eomgen.effects.field import ForceField
@@ -23,6 +24,7 @@ Effect = Annotated[
     Gravity
     | Controller
     | Drag
+    | Driven
     | ExternalForce
     | ExternalTorque
     | ForceField
@@ -41,6 +43,7 @@ Effect = Annotated[
 __all__ = [
     "Controller",
     "Drag",
+    "Driven",
     "Effect",
     "ExternalForce",
     "ExternalTorque",
