@@ -276,6 +276,8 @@ def _effects(
             _known_body(name, spot, names)
         for name, spot in _names_of(effect, effect.anchor_fields, place):
             _known_body(name, spot, [WORLD, *names])
+        for name, spot in _names_of(effect, effect.point_fields, place):
+            _known_point(name, spot, [point.name for point in scene.points])
         for name, spot in _names_of(effect, effect.joint_fields, place):
             _known_joint(name, spot, driven)
         vectors = {
@@ -302,6 +304,12 @@ def _names_of(effect: Effect, fields: Sequence[str], place: str) -> Iterator[tup
             yield from ((name, f"{place}.{field}.{name}") for name in value)
         elif value is not None:
             yield from ((name, f"{place}.{field}[{i}]") for i, name in enumerate(value))
+
+
+def _known_point(name: str, place: str, known: Sequence[str]) -> None:
+    if name not in known:
+        hint = nearest(name, known) or f"; known: {_listed(known) or 'none'}"
+        raise SceneError(f"{place}: no point is named '{name}'{hint}")
 
 
 def _known_joint(name: str, place: str, driven: Sequence[str]) -> None:

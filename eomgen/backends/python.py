@@ -103,7 +103,9 @@ def python_module(system: System) -> str:
         for name, output in program.outputs.items()
     }
     kernels = {name: _kernel(system, name, block, names) for name, block in blocks.items()}
-    called = [f for f in FUNCTIONS if any(f in block.functions for block in blocks.values())]
+    moving = {f for block in blocks.values() for f in block.functions}
+    fixed, once = _fixed(system, blocks, names)
+    called = [f for f in FUNCTIONS if f in moving or f in once]
     dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
     special = {"initial_state", "derivative", *DERIVATIVES, *(name for name, _, _ in dynamics)}
     quaternions = tuple(model.quaternions) if model.form == "velocity" else ()
@@ -134,13 +136,13 @@ def python_module(system: System) -> str:
         "kernels": list(kernels.values()),
         "math_functions": sorted({"isfinite", *(f for f in called if hasattr(math, f))}),
         "own_functions": [(f, *OWN[f]) for f in called if f in OWN],
-        "columns": [(f, COLUMNS[f]) for f in called],
+        "columns": [(f, COLUMNS[f]) for f in called if f in moving],
         "timed": any(kernel.time for kernel in kernels.values()),
         "derivative": kernels["derivative"],
         "outputs": [kernel for name, kernel in kernels.items() if name not in special],
         "derivatives": [kernel for name, kernel in kernels.items() if name in DERIVATIVES],
         "dynamics": [(kernels[name], *rest) for name, *rest in dynamics if name in kernels],
-        **_fixed(system, blocks, names),
+        **fixed,
     }
     return render("python", "module.py.jinja", context)
 
@@ -164,8 +166,12 @@ def _kernel(system: System, name: str, block: Block, names: Names) -> Kernel:
     )
 
 
-def _fixed(system: System, blocks: Mapping[str, Block], names: Names) -> dict[str, Any]:
-    """What depends on parameters alone: lines, and what must be positive with the lines for it."""
+def _fixed(
+    system: System, blocks: Mapping[str, Block], names: Names
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """What depends on parameters alone: lines, and what must be positive with the lines for it;
+    and the functions that these call.
+    """
     program = system.program
     roots = sorted({i for block in blocks.values() for i in block.constants})
     made = [i for i in roots if program.steps[i].operation != "input"]
@@ -182,7 +188,7 @@ def _fixed(system: System, blocks: Mapping[str, Block], names: Names) -> dict[st
             for check, source in zip(program.checks, checked.results, strict=True)
         ],
         "fixed": [(name, source) for name, source in fixed.lines if name not in known],
-    }
+    }, (*checked.functions, *fixed.functions)
 
 
 _BOUNDS = {False: (">", "not positive"), True: (">=", "negative")}

@@ -71,6 +71,11 @@ class Moving:
         """World place of a point of a body, m."""
         return self._cut(at if body == WORLD else self.position(self.index[body], self._three(at)))
 
+    def point(self, name: str) -> tuple[str, Vector]:
+        """A named point: its body, and where on it, m."""
+        point = next(point for point in self.model.points if point.name == name)
+        return self.bodies[point.body], tuple(self.value(part) for part in point.at)
+
     def velocity(self, body: str, at: Vector) -> Vector:
         """World velocity of a point of a body, m/s."""
         if body == WORLD:
