@@ -308,7 +308,7 @@ def _names_of(effect: Effect, fields: Sequence[str], place: str) -> Iterator[tup
 
 def _known_point(name: str, place: str, known: Sequence[str]) -> None:
     if name not in known:
-        hint = nearest(name, known) or f"; known: {_listed(known) or 'none'}"
+        hint = nearest(name, known) or f"; known: {listed(known) or 'none'}"
         raise SceneError(f"{place}: no point is named '{name}'{hint}")
 
 
