@@ -11,7 +11,7 @@ Nothing is eliminated and no mass matrix is formed. The plane is motion in space
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,7 +39,7 @@ class SpatialMotion:
 
     `kinetic_energy` has the rotors' ½ armature q̇². `external_power` is that of push and motor;
     `external_wrench` (6,), about the world's origin, is all that acts from outside: gravity, the
-    push, and the joints of the world.
+    push, and the joints of the world. `driving` is the force along each prescribed velocity.
     """
 
     accelerations: np.ndarray
@@ -56,6 +56,7 @@ class SpatialMotion:
     point_velocities: np.ndarray
     external_power: float
     external_wrench: np.ndarray
+    driving: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -70,9 +71,16 @@ class _Body:
 
 
 def solve(
-    tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Mapping[str, float] | None = None
+    tree: SpatialTree,
+    q: np.ndarray,
+    v: np.ndarray,
+    u: Mapping[str, float] | None = None,
+    prescribed: Mapping[str, float] | None = None,
 ) -> SpatialMotion:
-    """Everything about the tree at coordinates `q`, velocities `v` and inputs `u` by name."""
+    """Everything about the tree at coordinates `q`, velocities `v` and inputs `u` by name.
+
+    Velocities in `prescribed` change at the rates given there: one more blocked direction each.
+    """
     n = len(tree.bodies)
     still = _Body(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
     moving: list[_Body] = []
@@ -84,6 +92,14 @@ def solve(
 
     blocked = [pair.blocked() for pair in pairs]
     free = [pair.free() for pair in pairs]
+    driven: dict[str, tuple[int, int]] = {}  # the body, and which of its joint's directions
+    for k, (body, (ways, lacks)) in enumerate(zip(tree.bodies, free, strict=True)):
+        for name, way, lack in zip(body.joint.velocities, ways, lacks, strict=True):
+            if name in (prescribed or {}):
+                rows, rest = blocked[k]
+                driven[name] = (k, len(rows))
+                rest = np.append(rest, lack - (prescribed or {})[name])
+                blocked[k] = np.vstack([rows.reshape(-1, 12), way]), rest
     ends = 6 * n + np.cumsum([0] + [len(rows) for rows, _ in blocked])
     matrix, right = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
     inertias: list[np.ndarray] = []
@@ -133,7 +149,10 @@ def solve(
         wrenches[k] = [*-force, *(_cross(arm, force) - wrench[3:])]
         if body.joint.parent < 0:
             outside += [*force, *(_cross(moving[k].place, force) + wrench[3:])]
-    return _report(tree, v, pairs, inertias, changes, accelerations, wrenches, power, outside)
+    report = _report(tree, v, pairs, inertias, changes, accelerations, wrenches, power, outside)
+    return replace(
+        report, driving={name: float(found[ends[k] + i]) for name, (k, i) in driven.items()}
+    )
 
 
 class _Pair:

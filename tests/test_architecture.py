@@ -25,6 +25,7 @@ ORDER = (
     ("scene",),
     ("model",),
     ("straighten",),
+    ("prescribed",),
     ("build",),
     ("derivation",),
     ("templating",),

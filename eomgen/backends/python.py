@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from eomgen.language.formula import FUNCTIONS
+from eomgen.language.formula import FUNCTIONS, written
+from eomgen.model import Model
 from eomgen.program.printing import Block, Dialect, Names, print_block
 from eomgen.program.program import cost
 from eomgen.program.system import System
@@ -60,6 +61,7 @@ ABOUT = {
     "point_jacobians": "J of each of `POINTS`: its world velocity is J v.",
     "gaps": "How far apart each of `CONTACTS` is, m or rad; negative where they overlap.",
     "gap_rates": "How fast each of `gaps` grows, m/s or rad/s.",
+    "driving_forces": "What each of `DRIVEN` takes, N m or N, on the child and back on the parent.",
 }
 ABOUT_PLANE = {
     "momentum": "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
@@ -130,7 +132,8 @@ def python_module(system: System) -> str:
         "effects": repr(tuple(effect.type for effect in model.effects)),
         "effect_names": repr(tuple(effect.name for effect in model.effects)),
         "bodies": repr(tuple(body.name for body in model.bodies)),
-        "joints": repr(tuple(b.joint.name for b in model.bodies if b.joint.type != "free")),
+        "joints": repr(tuple(body.joint.name for body in model.holding)),
+        "driven": repr(tuple(c.position.name for c in model.driven)) if model.driven else "",
         "points": repr(tuple(point.name for point in model.points)),
         "contacts": [(touch.name, touch.effect) for touch in system.contacts],
         "impact": kernels.get("impact"),
@@ -247,18 +250,40 @@ def _document(system: System) -> list[str]:
                 for p in model.parameters
             ]
         )
+    lines += _given(model)
     effects = ", ".join(effect.type for effect in model.effects) or "none"
     lines += ["", f"Effects: {effects}."]
     if system.contacts:
         lines += ["", "Contacts that strike, each with the unit of its gap and its effect:"]
         lines += _table([(touch.name, touch.unit, touch.effect) for touch in system.contacts])
         lines += [""]
+    if "velocity_forces" in model.leave_out:
+        lines.append("Left out: velocity forces V, so M v̇ + G = F (V: what driven joints take).")
     counts = cost(system.program, "derivative")
     lines += textwrap.wrap(
         f"One call of `derivative` takes {_operations(counts)}; "
         f"{counts['parameters']} more on parameters alone are done once.",
         WIDTH,
     )
+    return lines
+
+
+def _given(model: Model) -> list[str]:
+    """What there is to say of coordinates that are no states."""
+    lines: list[str] = []
+    if model.driven:
+        rows = [
+            (f"{c.position.name} = {written(c.value)}", c.position.unit, c.position.about)
+            for c in model.driven
+        ]
+        lines += ["", "Driven coordinates, which are no states:", *_table(rows)]
+        lines.append("M, V, G, F are of the other velocities; V holds what driving takes, too.")
+    if locked := [c for c in model.prescribed if c.locked]:
+        rows = [
+            (f"{c.position.name} = {written(c.value)}", c.position.unit, c.position.about)
+            for c in locked
+        ]
+        lines += ["", "Locked coordinates, which are no states:", *_table(rows)]
     return lines
 
 

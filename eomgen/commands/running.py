@@ -111,7 +111,8 @@ def _print_works(trajectory: Trajectory, change: float) -> None:
     each = [f"{name} {work:.6g} J" for name, work in zip(trajectory.work_names, works, strict=True)]
     print_listed("    work: ", shortened(each))
     print(
-        f"    kinetic energy changed by {change:.6g} J, {change - works.sum():.2g} J unaccounted for"
+        f"    kinetic energy changed by {change:.6g} J, "
+        f"{change - works.sum():.2g} J unaccounted for"
     )
 
 
@@ -152,8 +153,10 @@ def _print_excursions(model: Model, trajectory: Trajectory) -> None:
             f"{out.low:g} to {out.high:g} {unit}{when}; "
             f"farthest {out.farthest:.4g} {unit} at t = {out.at:.4g} s"
         )
+    given = {c.position.name: "locked" if c.locked else "driven" for c in model.prescribed}
+    why = f"is no state of the form '{model.form}'"
     lines += [
-        f"{name} has limits, but is no state of the form '{model.form}'"
+        f"{name} has limits, but {f'is {given[name]}' if name in given else why}"
         for name in limits
         if name not in trajectory.states
     ]

@@ -21,7 +21,7 @@ def touches(d: Dynamics) -> tuple[Touch, ...]:
 
 def _unit(d: Dynamics, contact: Contact) -> str:
     units = [
-        d.model.coordinates[d.first[load.joint][0] + load.coordinate].unit
+        d.seats[load.joint].body.velocities[load.coordinate].unit.removesuffix("/s")
         for load in contact.normal
         if isinstance(load, JointLoad)
     ]
@@ -92,7 +92,7 @@ def _held(
 ) -> list[Node]:
     """The state's derivative under forces on the contacts, ä of the gaps, the contacts' powers."""
     found = [pressed(d, contact, f) for contact, f in zip(d.contacts, forces, strict=True)]
-    vd = forward(generalised(d, chain.from_iterable(loads for loads, _ in found)))
+    vd = forward(generalised(d, chain.from_iterable(loads for loads, _ in found))[: d.nv])
     rates = [*position_rates, *vd, *d.state_rates]
     given = (*d.values.q, *d.values.v, *d.values.states.values())
     along = {node.index: rate for node, rate in zip(given, rates, strict=True)}

@@ -46,14 +46,15 @@ def scaled(loads: Iterable[AnyLoad], k: Scalar) -> list[AnyLoad]:
 
 
 def generalised(d: Dynamics, loads: Iterable[AnyLoad]) -> list[Scalar]:
-    """Jᵀ f of loads: the forces on the velocities that do the same work."""
+    """Jᵀ f of loads: the forces on the velocities, driven ones too, that do the same work."""
     loads = list(loads)
     wrenches = _wrenches(d, [load for load in loads if isinstance(load, Load)])
-    parts = fc.generalised(d.instant, fc.carried(d.instant, wrenches), d.nv)
+    parts = fc.generalised(d.instant, fc.carried(d.instant, wrenches), d.moved)
     for load in loads:
         if isinstance(load, JointLoad):
-            i = d.first[load.joint][1] + load.coordinate
-            parts[i] = parts[i] + load.force
+            i = d.seats[load.joint].v[load.coordinate]
+            if i < d.moved:
+                parts[i] = parts[i] + load.force
     return parts
 
 
@@ -126,13 +127,15 @@ def struck(
     """
     scalars = d.scalars
     jacobian = [generalised(d, loads) for loads in directions]
-    responses = [response(d, row, route) for row in jacobian]
+    responses = [response(d, row[: d.nv], route) for row in jacobian]
     n = len(directions)
     inverse_mass: list[list[Scalar]] = [[None] * n for _ in range(n)]
     for i in range(n):
         for j in range(i, n):
-            inverse_mass[i][j] = inverse_mass[j][i] = _dot(jacobian[i], responses[j], scalars)
-    speeds = [_dot(row, d.values.v, scalars) for row in jacobian]
+            inverse_mass[i][j] = inverse_mass[j][i] = _dot(
+                jacobian[i][: d.nv], responses[j], scalars
+            )
+    speeds = [_dot(row, d.v[: d.moved], scalars) for row in jacobian]
     found = list(d.values.v)
     for p, along in zip(
         impulses(inverse_mass, speeds, restitution, friction, scalars), responses, strict=True
