@@ -553,6 +553,9 @@ def test_rigid_contacts_have_names(geometry: str) -> None:
     assert [c.name for c in contacts] == NAMED[geometry]
     (effect,) = found.model.effects
     assert effect.contact_names(["a", "b"]) == tuple(NAMED[geometry])
+    whole = scene("points on a plane", PLANE, 'other = "b"', *RIGID)
+    (c,) = rigid(made(whole), exact(state(found, a_x=5.0)))[0]
+    assert c.name == "e_a"  # no body touches its own plane
     flat = made(
         free("b") + contact('body = "b"', "corners = [0.5, 0.3]", "normal = [1, 0]", *RIGID)
     )
@@ -610,6 +613,7 @@ def test_a_rigid_stop_is_a_contact_of_each_limit(limits: str) -> None:
         assert c.normal == (JointLoad("j", way),)
         assert power(here, c.normal) == 2.0 * way
         assert (c.tangents, c.friction, float(c.restitution)) == ((), 0.0, 0.7)
+    assert not here.loads[1]
     assert not found.module.applied_force(0.0, state(found, x=0.9)).any()
     assert found.module.potential_energy(0.0, state(found, x=0.9)) == 0.0
 
@@ -632,7 +636,7 @@ def test_absence_is_free() -> None:
     assert list(smooth.PARAMETERS)[2:] == ["e_radius", "e_stiffness"]
 
 
-@pytest.mark.parametrize(("lines", "most"), [((), 40), (RUB, 90)])
+@pytest.mark.parametrize(("lines", "most"), [((), 0), (RUB, 10)])
 def test_a_sphere_on_the_ground_in_space_costs_little(lines: tuple[str, ...], most: int) -> None:
     """Operations beyond those of a force and a torque that depend on the motion as much."""
     drag = '[[effects]]\ntype = "drag"\nname = "e"\nbody = "b"\nlinear = 1.0\n'
@@ -642,7 +646,7 @@ def test_a_sphere_on_the_ground_in_space_costs_little(lines: tuple[str, ...], mo
         made(body + table).module.COST["derivative"]["total"]
         for table in (drag, contact('body = "b"', "radius = 0.1", *HUNT, *lines))
     ]
-    assert costs[1] - costs[0] < most
+    assert costs[1] - costs[0] <= most
 
 
 # Bad input.
@@ -709,7 +713,7 @@ BAD = {
         "effects[0].body: one body has no other to touch; give two or more in bodies"
     ),
     (*SOFT, EACH, "normal = [0, 1]"): (
-        "effects[0].normal: is nothing that against 'each_other' takes; it takes none such"
+        "effects[0].normal: is nothing that against 'each_other' takes; leave it out"
     ),
     (*SOFT, 'against = "ball"', "corners = [0.1, 0.1]"): (
         "effects[0].corners: is nothing that against 'ball' takes; it takes other_radius, "
