@@ -110,10 +110,8 @@ def _print_works(trajectory: Trajectory, change: float) -> None:
     works = trajectory.works[-1]
     each = [f"{name} {work:.6g} J" for name, work in zip(trajectory.work_names, works, strict=True)]
     print_listed("    work: ", shortened(each))
-    print(
-        f"    kinetic energy changed by {change:.6g} J, "
-        f"{change - works.sum():.2g} J unaccounted for"
-    )
+    left = change - works.sum()
+    print(f"    kinetic energy changed by {change:.6g} J, {left:.2g} J unaccounted for")
 
 
 def _print_events(trajectory: Trajectory) -> None:

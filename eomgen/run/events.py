@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 from eomgen.run.contacts import (
     PARTING,
+    STILL,
     TOLERANCE,
     Holding,
     Rate,
@@ -154,12 +155,10 @@ def _strike(
         speeds[contact] = max(speeds.get(contact, 0.0), speed)
         yield instant(contact)
     before, now.held = now.held, tuple(still(contacts, t, now.y, touching))
-    # What touches without closing, but for what has bounced, lies within rounding of closed.
-    slow = np.abs(contacts.rates(t, now.y)) < rest_speed
+    slow = contacts.rates(t, now.y) <= STILL
     for k in touching:
-        now.slack[k] = 0.0
-        if k not in now.held and slow[k]:
-            now.slack[k] = _slack(contacts, t, now.y, k)
+        opens = slow[k] and k not in now.held
+        now.slack[k] = _slack(contacts, t, now.y, k) if opens else 0.0
     events = [
         Event(t, contacts.names[k], "impact", speed)
         for k, speed in sorted(speeds.items())
@@ -184,8 +183,8 @@ def _open(contacts: Contacts, problem: Problem, now: _Moment, opened: Sequence[i
 
 
 def _slack(contacts: Contacts, t: float, y: Floats, contact: int) -> float:
-    """How far below 0 a contact that opens may be: `TOLERANCE`, or twice what it is off by."""
-    return max(TOLERANCE, -2 * float(contacts.gaps(t, y)[contact]))
+    """How far below 0 a contact that opens may be: `TOLERANCE`, or hardly more than it is now."""
+    return max(TOLERANCE, 0.01 * TOLERANCE - float(contacts.gaps(t, y)[contact]))
 
 
 def _cut(now: _Moment, step: Advance, t: float, keep: bool) -> Iterator[Advance]:
