@@ -66,8 +66,8 @@ class BodyContact(OnBodies):
 
     `friction` μ adds -μ F u/sqrt(|u|² + s²) for the slip u (m/s) at the touching point, with
     `slip_speed` s: 71 % of μ F at |u| = s, 99.5 % at 10 s. So nothing quite sticks: under a load of
-    the fraction ρ < 1 of μ F it creeps at s ρ/sqrt(1 - ρ²). Sliding to a stop from v under the
-    deceleration μ g takes v²/(2 μ g) but for s/v, see the tests.
+    the fraction ρ < 1 of μ F it creeps at s ρ/sqrt(1 - ρ²); from a speed v >> s a block slides
+    v²/(2 μ g) (1 + (s/v)² (½ + ln(2 v/s))).
     """
 
     body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies", "radii")
@@ -127,8 +127,8 @@ class BodyContact(OnBodies):
             takes = all_keys[chosen]
             for key in dict.fromkeys(key for keys in all_keys.values() for key in keys):
                 if key in given and key not in takes:
-                    known = ", ".join(takes) or "none such"
-                    raise wrong(key, f"is nothing that {choice} '{chosen}' takes; it takes {known}")
+                    known = f"it takes {', '.join(takes)}" if takes else "leave it out"
+                    raise wrong(key, f"is nothing that {choice} '{chosen}' takes; {known}")
         needed = LAWS[self.law][0]
         if needed not in given:
             raise wrong(needed, f"is missing; law '{self.law}' needs it")
@@ -206,10 +206,11 @@ class BodyContact(OnBodies):
         total = mechanism.number(0.0)
         if self.law == "impact":
             return total
-        share = mechanism.number(0.5 if self.law == "spring_damper" else 0.4)
+        power = mechanism.number(2.0 if self.law == "spring_damper" else 2.5)
         for touch in self._touches(mechanism):
             force = self._elastic(mechanism, touch)
-            part = share * force * mechanism.call("max", -touch.gap, mechanism.number(0.0))
+            d = mechanism.call("max", -touch.gap, mechanism.number(0.0))
+            part = force * d / power
             if touch.meeting is not None:
                 part = part + force * touch.meeting
             total = total + part
