@@ -121,17 +121,19 @@ class Balls(EffectTable):
 
 
 class Limit(EffectTable):
-    """A stop: a coordinate q of a joint stays below `high`."""
+    """A stop: a coordinate q of a joint stays below `high`. The gap is `weight` (high - q)."""
 
     type: Literal["limit"] = "limit"
     name: str = "limit"
     joint: str
     high: float
+    weight: str = "1"
 
     def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
         """One, without friction."""
-        gap = mechanism.number(self.high) - mechanism.coordinate(self.joint)
-        push = JointLoad(self.joint, mechanism.number(-1.0))
+        weight = mechanism.value(parse(self.weight))
+        gap = weight * (mechanism.number(self.high) - mechanism.coordinate(self.joint))
+        push = JointLoad(self.joint, -weight)
         material = (mechanism.value(parse(x)) for x in ("rest", "mu", "creep"))
         return (Contact(f"{self.name}_high", self.name, gap, (push,), (), *material),)
 

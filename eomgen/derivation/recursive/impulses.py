@@ -11,7 +11,8 @@ Mech. 65 (1998) 939-951, without tangential restitution:
 where p_I ends the approach without friction, p_II the slip, too, and κ is 1, or as much less as
 |p_t| = μ p_n asks for: p_I has no tangential part, so that κ = μ (1 + e) p_I,n / (|d_t| - μ d_n)
 with d = p_II - p_I. The normal velocity becomes -e u_n whatever the friction; kinetic energy never
-grows for 0 <= e <= 1.
+grows for 0 <= e <= 1. What sticks has no slip before it rebounds; the rebound is without friction,
+and leaves the slip -e u_n A_tn / A_nn.
 """
 
 from collections.abc import Iterable, Sequence
