@@ -273,8 +273,9 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     lines = shown.out.splitlines()
     assert lines[0] == "furuta_pendulum: linearised about an equilibrium"
     assert lines[1] == "state       theta = 0, phi = 3.14159 (180 deg)"
-    assert lines[3].split() == ["A", "theta", "phi", "theta_dot", "phi_dot"]
-    assert lines[8].split() == ["B", "tau"]
+    assert lines[3].startswith("note        at rest, without the initial theta_dot = 1.5;")
+    assert lines[4].split() == ["A", "theta", "phi", "theta_dot", "phi_dot"]
+    assert lines[9].split() == ["B", "tau"]
     assert "stability   unstable: a small deviation grows" in lines
     assert "control     rank 4 of 4: controllable" in lines
     with np.load(target, allow_pickle=False) as kept:
@@ -292,6 +293,25 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     table.write_text("mine")
     assert main([*command, "-o", str(table)]) == 1
     assert "was not written by eomgen" in capsys.readouterr().err
+
+
+def test_an_equilibrium_says_that_it_is_at_rest(capsys: pytest.CaptureFixture[str]) -> None:
+    """A top that spins is not what was linearised; one that is still is no matter to mention."""
+    spins = "note        at rest, without the initial tip_wz = 60; --at initial keeps the motion\n"
+    for more, told in (([], True), (["--at", "rest"], True), (["--at", "initial"], False)):
+        assert main(["linearise", "spinning_top", "--route", "aba", *more]) == 0
+        assert (spins in capsys.readouterr().out) == told
+    assert main(["linearise", "acrobot", "--route", "aba"]) == 0
+    assert "note" not in capsys.readouterr().out
+
+
+def test_an_input_found_to_be_zero_is_shown_as_zero(capsys: pytest.CaptureFixture[str]) -> None:
+    """Without the rounding that the search leaves; one that is given is shown as it is."""
+    assert main(["linearise", "cart_pole", "--route", "aba", "--trim", "push"]) == 0
+    assert "inputs      push = 0\n" in capsys.readouterr().out
+    command = ["linearise", "cart_pole", "--route", "aba", "--at", "initial"]
+    assert main([*command, "--input", "push=1e-12"]) == 0
+    assert "inputs      push = 1e-12\n" in capsys.readouterr().out
 
 
 def test_the_command_on_quaternions_and_states(capsys: pytest.CaptureFixture[str]) -> None:

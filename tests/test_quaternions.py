@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from eomgen.build import build_model
+from eomgen.errors import RunError
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, Adaptive
@@ -126,3 +127,15 @@ def test_scaling_a_state() -> None:
     y[list(indices)] = 0.0
     with pytest.raises(ArithmeticError):
         asked.unit(y)
+
+
+@pytest.mark.parametrize("length", [0.0, 1e-170])
+def test_a_quaternion_of_no_length_is_refused(length: float) -> None:
+    """One line says which, before anything divides by it."""
+    asked = problem("spinning_top")
+    y = asked.initial.copy()
+    y[list(asked.quaternions[0])] = [length, 0.0, 0.0, 0.0]
+    message = "initial: the quaternion from tip_qw on has no length; give 1, 0, 0, 0 for no turn"
+    with pytest.raises(RunError) as caught:
+        replace(asked, initial=y)
+    assert str(caught.value) == message

@@ -31,7 +31,7 @@ from eomgen.study.modes import Mode, controllable_rank, modes, stability
 WIDEST = 12
 """States up to which A and B are printed."""
 STILL = 1e-9
-"""Positions and accelerations below this, in SI units, are rounding."""
+"""Positions, accelerations and inputs found that are below this, in SI units, are rounding."""
 
 
 def linearise(given: Arguments) -> int:
@@ -48,7 +48,8 @@ def linearise(given: Arguments) -> int:
             raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
     _, module = code_of(given.scene, model, given)
     with located(given.scene):
-        y = _state(given, model, as_problem(module, parameters or None, inputs or None).initial)
+        start = _state(given, model, as_problem(module, parameters or None, inputs or None).initial)
+        y = start
         u: Mapping[str, float] | Floats = inputs
         if given.at != "initial":
             y, u = equilibrium(
@@ -65,7 +66,9 @@ def linearise(given: Arguments) -> int:
         whole = linearised(module, y, u, parameters)
     least = whole.reduced()
     found = modes(least.A)
-    _print_place(module, whole, given.at)
+    _print_place(module, whole, given.at, given.trim)
+    if given.at != "initial":
+        _print_stopped(model, start)
     _print_matrices(least)
     _print_modes(found)
     verdict = {
@@ -111,7 +114,9 @@ def _state(given: Arguments, model: Model, initial: Floats) -> Floats:
     return y
 
 
-def _print_place(module: GeneratedModule, whole: Linearisation, at: str) -> None:
+def _print_place(
+    module: GeneratedModule, whole: Linearisation, at: str, trimmed: Sequence[str]
+) -> None:
     nq = len(module.POSITIONS)
     kind = {
         "equilibrium": "an equilibrium",
@@ -127,8 +132,11 @@ def _print_place(module: GeneratedModule, whole: Linearisation, at: str) -> None
         degrees = f" ({_number(math.degrees(value))} deg)" if angle else ""
         values.append(f"{name} = {_number(value)}{degrees}")
     print_listed("state       ", shortened(values, 80))
-    inputs = zip(whole.input_names, whole.u.tolist(), strict=True)
-    print_listed("inputs      ", [f"{name} = {_number(value)}" for name, value in inputs])
+    inputs = []
+    for name, value in zip(whole.input_names, whole.u.tolist(), strict=True):
+        rounding = name in trimmed and abs(value) <= STILL
+        inputs.append(f"{name} = {_number(0.0 if rounding else value)}")
+    print_listed("inputs      ", inputs)
     changes = whole.rates[nq:]
     if at == "initial" and np.max(np.abs(changes), initial=0.0) > STILL:
         worst = int(np.argmax(np.abs(changes)))
@@ -138,6 +146,20 @@ def _print_place(module: GeneratedModule, whole: Linearisation, at: str) -> None
             "note        ",
             f"no equilibrium: {name} changes by {_number(changes[worst])} {unit}; A and B are for "
             "deviations from this motion, at this instant",
+        )
+
+
+def _print_stopped(model: Model, start: Floats) -> None:
+    """Say which velocities of the state given an equilibrium does not have."""
+    rates = start[len(model.coordinates) :].tolist()
+    moving = [
+        f"{c.name} = {_number(v)}" for c, v in zip(model.velocities, rates, strict=False) if v
+    ]
+    if moving:
+        print_wrapped(
+            "note        ",
+            f"at rest, without the initial {', '.join(shortened(moving, 12))}; "
+            "--at initial keeps the motion",
         )
 
 

@@ -12,6 +12,9 @@ from eomgen.errors import RunError
 Floats = NDArray[np.float64]
 """An array of 64-bit floats; every state vector is one."""
 
+SHORTEST = 1e-150
+"""A quaternion shorter than this says no orientation: its square is no number."""
+
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
@@ -49,7 +52,8 @@ class Problem:
     quaternions indices of the four components of each unit quaternion among the states
     contacts    what must not pass through each other; None where nothing can touch
 
-    Raises `RunError` if `initial` has not one finite number per state.
+    Raises `RunError` if `initial` has not one finite number per state, or if a quaternion has no
+    length there.
     """
 
     name: str
@@ -71,6 +75,12 @@ class Problem:
         for state, value in zip(self.states, initial.tolist(), strict=True):
             if not np.isfinite(value):
                 raise RunError(f"initial: {state} = {value} is not finite")
+        for indices in self.quaternions:
+            if math.hypot(*(float(initial[i]) for i in indices)) < SHORTEST:
+                raise RunError(
+                    f"initial: the quaternion from {self.states[indices[0]]} on has no length; "
+                    "give 1, 0, 0, 0 for no turn"
+                )
         assert len(set(self.positions)) == len(self.positions)
         assert all(0 <= index < len(self.states) for index in self.positions)
         initial.flags.writeable = False
