@@ -11,8 +11,14 @@ from eomgen.joints import Joint, Prismatic, Revolute
 from eomgen.joints.base import WORLD, Coordinate
 from eomgen.language.base import Table
 from eomgen.language.formula import ZERO, Floats, evaluate
-from eomgen.language.quantity import Parameter, name_quantities, of_joint, with_components
-from eomgen.model import Body, Model, Point
+from eomgen.language.quantity import (
+    Parameter,
+    about_slides,
+    name_quantities,
+    of_joint,
+    with_components,
+)
+from eomgen.model import Body, Model, Point, ways_of
 from eomgen.prescribed import check_drive, initial_values, locked_values
 from eomgen.scene.chains import written_out
 from eomgen.scene.look import check_look
@@ -31,7 +37,7 @@ def build_model(scene: Scene) -> Model:
     parameters, known = _scene_parameters(scene)
     bodies = _bodies(scene, known, parameters)
     names = {body.name: i for i, body in enumerate(bodies[0])}
-    sliding = {body.joint.name for body in bodies[0] if isinstance(body.joint, Prismatic)}
+    sliding = _sliding(bodies[0], scene.dimensions)
     effects = _effects(scene, bodies[0], sliding, known, parameters)
     points = _points(scene, names, known, parameters)
     inputs = [_at_joint(x, e, sliding) for e in effects for x in e.inputs(scene.dimensions)]
@@ -123,12 +129,21 @@ def in_order(outputs: Collection[str]) -> tuple[str, ...]:
     return tuple(name for name in OUTPUTS if name in outputs)
 
 
+def _sliding(bodies: Sequence[Body], dimensions: int) -> set[str]:
+    """Joints and coordinates that slide."""
+    found = {body.joint.name for body in bodies if isinstance(body.joint, Prismatic)}
+    for body in bodies:
+        pairs = zip(body.positions, body.joint.moves(dimensions), strict=False)
+        found |= {c.name for c, move in pairs if move.kind == "slide"}
+    return found
+
+
 def _at_joint(given: Given, effect: Effect, sliding: Collection[str]) -> Given:
     """An input or state of an effect, in the unit and words for its joint if it has one."""
-    joint = getattr(effect, "joint", None)
-    if joint is None:
+    here = about_slides(effect, sliding)
+    if here is None:
         return given
-    unit, about = (of_joint(text, joint in sliding) for text in (given.unit, given.about))
+    unit, about = (of_joint(text, here) for text in (given.unit, given.about))
     return replace(given, unit=unit, about=about)
 
 
@@ -275,6 +290,8 @@ def _effects(
     names = [body.name for body in bodies]
     driven = [b.joint.name for b in bodies if isinstance(b.joint, Revolute | Prismatic)]
     _check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
+    ways = ways_of(bodies, scene.dimensions)
+    names_of_ways = {b.joint.name: [c.name for c in b.positions] for b in bodies}
     motion = ["t", *(c.name for b in bodies for c in (*b.positions, *b.velocities))]
     for effect in scene.effects:
         motion += [i.name for i in effect.inputs(scene.dimensions)]
@@ -292,6 +309,11 @@ def _effects(
             _known_point(name, spot, [point.name for point in scene.points])
         for name, spot in _names_of(effect, effect.joint_fields, place):
             _known_joint(name, spot, driven)
+        for name, spot in _names_of(effect, effect.way_fields, place):
+            if name not in ways:
+                hint = nearest(name, ways) or f"; known: {listed(list(ways)) or 'none'}"
+                raise SceneError(f"{spot}: no joint that moves is named '{name}'{hint}")
+        effect.check_ways(ways, names_of_ways, place)
         vectors = {
             field: with_components(value, ZERO, scene.dimensions, f"{place}.{field}")
             for field in effect.vector_fields
@@ -310,7 +332,7 @@ def _names_of(effect: Effect, fields: Sequence[str], place: str) -> Iterator[tup
     for field in fields:
         value = getattr(effect, field)
         if isinstance(value, str):
-            if (field, value) != ("bodies", "all"):
+            if (field, value) not in (("bodies", "all"), ("joints", "all")):
                 yield value, f"{place}.{field}"
         elif isinstance(value, dict):
             yield from ((name, f"{place}.{field}.{name}") for name in value)

@@ -1,6 +1,6 @@
 """The model: a scene whose every name is resolved; bodies in a tree, parents before children."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
@@ -73,6 +73,15 @@ class Prescribed:
     def locked(self) -> bool:
         """Whether it stays as it is."""
         return self.by is None
+
+
+def ways_of(bodies: Iterable[Body], dimensions: int) -> dict[str, tuple[str, ...]]:
+    """The joints that move but the free ones, each with the kinds of its moves."""
+    return {
+        body.joint.name: tuple(move.kind for move in body.joint.moves(dimensions))
+        for body in bodies
+        if body.positions and not isinstance(body.joint, Free)
+    }
 
 
 @dataclass(frozen=True)

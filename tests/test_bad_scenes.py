@@ -243,7 +243,7 @@ MISTAKES = [
     (
         None,
         '[[effects]]\ntype = "motor"\nname = "tau"\njoint = "elbow"\ntorque = "input"\n',
-        "effects[1].joint: no revolute or prismatic joint is named 'elbow'; "
+        "effects[1].joint: no joint that moves is named 'elbow'; "
         "known: shoulder, wrist",
     ),
     (
@@ -571,7 +571,7 @@ MISTAKES_IN_SPACE = [
      "chains[0].axis: has no length; give a direction, for example [1.0, 0.0, 0.0]"),
     # Joints that cannot do what is asked.
     (None, '[[effects]]\ntype = "motor"\nname = "tau"\njoint = "wrist"\ntorque = "input"\n',
-     "effects[1].joint: no revolute or prismatic joint is named 'wrist'; known: shoulder"),
+     "effects[1].joint: 'wrist' is a ball joint and has no angle"),
     (BALL, BALL + "\nmotor_inertia = 1e-5",
      "joints[1].motor_inertia: unknown key; known here: name, parent, child, r_parent, r_child, "
      "orientation_deg, type"),

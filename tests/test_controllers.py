@@ -357,7 +357,7 @@ MISTAKES = [
     (servo("pd").replace("10.0", "-10.0"),
      "effects[0].stiffness: -10 is negative; give a number >= 0 in N m/rad"),
     (servo("pd", joint="axel"),
-     "effects[0].joint: no revolute or prismatic joint is named 'axel' (did you mean 'axle'?)"),
+     "effects[0].joint: no joint that moves is named 'axel' (did you mean 'axle'?)"),
     (servo("pid").replace("7.0", "0"),
      "effects[0].integral_gain: 0 is not positive; give a number > 0 in N m/(rad s)"),
     (servo("pid").replace("target = 0.5", 'target = "qq"'),

@@ -633,7 +633,7 @@ BAD = {
         "effects[0].stiffness: -1 is negative; give a number >= 0 in N/m"
     ),
     at_joint("joint_spring", "stiffness = 1", joint="jj"): (
-        "effects[0].joint: no revolute or prismatic joint is named 'jj' (did you mean 'j'?)"
+        "effects[0].joint: no joint that moves is named 'jj' (did you mean 'j'?)"
     ),
     at_joint("joint_spring"): "effects[0].stiffness: missing; give it, or damping or a law",
     at_joint("joint_friction", "viscous = -1"): (

@@ -1,6 +1,6 @@
 """What effects share: what they may ask of a mechanism, and the loads they put on it."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, Self
 
@@ -99,6 +99,12 @@ class Mechanism(Protocol):
     def bodies(self) -> tuple[str, ...]:
         """Names of all bodies."""
 
+    @property
+    def joints(self) -> Mapping[str, tuple[str, ...]]:
+        """All joints that move but the free ones, each with its ways in order: "turn" or "slide"
+        for a coordinate of its own, "spin" for a quaternion.
+        """
+
     def mass(self, body: str) -> Scalar:
         """Mass of a body, kg."""
 
@@ -124,6 +130,9 @@ class Mechanism(Protocol):
 
     def coordinate(self, joint: str, index: int = 0) -> Scalar:
         """A coordinate of a joint."""
+
+    def coordinate_name(self, joint: str, index: int = 0) -> str:
+        """Its name."""
 
     def rate(self, joint: str, index: int = 0) -> Scalar:
         """A velocity of a joint."""
@@ -169,7 +178,16 @@ class Unmoved:
         """Never asked for."""
         raise AssertionError(body)
 
+    @property
+    def joints(self) -> Mapping[str, tuple[str, ...]]:
+        """Never asked for."""
+        raise AssertionError
+
     def coordinate(self, joint: str, index: int = 0) -> Scalar:
+        """Never asked for."""
+        raise AssertionError(joint)
+
+    def coordinate_name(self, joint: str, index: int = 0) -> str:
         """Never asked for."""
         raise AssertionError(joint)
 
@@ -200,6 +218,8 @@ class EffectTable(Table):
     """Fields that list named points of the scene."""
     joint_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that name a revolute or prismatic joint, or hold a table by such names."""
+    way_fields: ClassVar[tuple[str, ...]] = ()
+    """Fields that name a joint that moves and is not free, list some, or are "all"."""
     vector_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that hold a vector: as many components as there are dimensions, or left out."""
 
@@ -211,6 +231,17 @@ class EffectTable(Table):
         Raises `SceneError`, naming the field after `place`, for what the schema cannot know.
         """
         return self
+
+    def check_ways(
+        self,
+        joints: Mapping[str, tuple[str, ...]],
+        names: Mapping[str, Sequence[str]],
+        place: str,
+    ) -> None:
+        """Raise `SceneError` for a joint that moves in a way which it cannot act on.
+
+        `joints` has the kinds of ways of all that move but the free ones, `names` the coordinates.
+        """
 
     def check_values(self, value: Callable[[Formula], float], place: str) -> None:
         """Raise `SceneError` for quantities that do not go together, by their values."""

@@ -45,9 +45,10 @@ AGAINST = {
 class BodyContact(OnBodies):
     """Spheres (circles in the plane), points, and corners of boxes, which do not go through things.
 
-    Of `body`, or of each of `bodies`, the sphere of `radius` about `at`; `radii` gives some bodies
-    radii of their own; of radius 0 it is a point. With `corners`, half sizes along the body's axes,
-    it is the corners of the box about `at` instead, rounded by a radius if there is one. They are
+    Of `body`, or of each of `bodies`, the sphere of `radius` about `at`, or one about each of the
+    named `points`; `radii` gives some bodies radii of their own; of radius 0 it is a point. With
+    `corners`, half sizes along the body's axes, it is the corners of the box about `at` instead,
+    rounded by a radius if there is one. They are
 
     - `against = "plane"`: n·x >= `offset`, with the direction `normal` n, up if left out;
     - `against = "ball"`: the sphere of `other_radius` about `other_at`;
@@ -141,6 +142,10 @@ class BodyContact(OnBodies):
     @model_validator(mode="after")
     def _bodies_that_fit(self) -> Self:
         listed = self.bodies if isinstance(self.bodies, tuple) else (self.body,)
+        if self.points is not None and self.against == "each_other":
+            raise wrong("points", "may lie on one body; give bodies instead")
+        if self.points is not None and self.radii:
+            raise wrong("radii", "named points have one radius; give each effect its own points")
         if self.against == "each_other" and len(listed) < 2 and self.bodies != "all":
             key = "body" if self.bodies is None else "bodies"
             raise wrong(key, "one body has no other to touch; give two or more in bodies")
@@ -173,7 +178,7 @@ class BodyContact(OnBodies):
             raise SceneError(
                 f"{place}.restitution: {restitution:g} is not from 0 to 1; give one that is"
             )
-        listed = self.bodies if isinstance(self.bodies, tuple) else (self.body,)
+        listed = self.points or (self.bodies if isinstance(self.bodies, tuple) else (self.body,))
         if self.bodies == "all" and self.radii:
             return  # which bodies are left to be points is not known here
         points = sum(radii.get(f"radii.{name}", radii["radius"]) == 0 for name in listed)
@@ -217,12 +222,12 @@ class BodyContact(OnBodies):
         return total
 
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
-        """Of rigid contacts: `<effect>_<body>`, with the corner's number or the other body's name
-        behind it if there is one.
+        """Of rigid contacts: `<effect>_<body>`, or `<effect>_<point>`, with the corner's number or
+        the other body's name behind it if there is one.
         """
         if self.law != "impact":
             return ()
-        touching = self._in_contact(bodies)
+        touching = self.points or self._in_contact(bodies)
         if self.against == "each_other":
             return tuple(f"{self.name}_{a}_{b}" for a, b in combinations(touching, 2))
         names = [f"{self.name}_{body}" for body in touching]
@@ -286,10 +291,10 @@ class BodyContact(OnBodies):
         return [body for body in listed if body != self.other]
 
     def _touches(self, mechanism: Mechanism) -> Iterator[Touch]:
-        at = tuple(mechanism.value(part) for part in self.at)
         balls = [
             Ball(body, at, mechanism.value(self.radii.get(body, self.radius)))
-            for body in self._in_contact(mechanism.bodies)
+            for body, at in self.places(mechanism)
+            if body != self.other
         ]
         if self.against == "each_other":
             yield from (on_ball(mechanism, *pair) for pair in combinations(balls, 2))

@@ -1,18 +1,19 @@
-"""Friction in a joint of one coordinate."""
+"""Friction in a joint."""
 
 from collections.abc import Iterator
 from typing import Literal, Self
 
 from pydantic import Field
 
-from eomgen.effects.base import EffectTable, JointLoad, Mechanism
+from eomgen.effects.base import JointLoad, Mechanism, Vector
+from eomgen.effects.bodies import length
+from eomgen.effects.ways import OnJoints
 from eomgen.errors import SceneError
-from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 
 
-class JointFriction(EffectTable):
+class JointFriction(OnJoints):
     """Acts against the rate v of a joint's coordinate: -(b v + C tanh(v/speed)).
 
     A torque (N m) at a hinge, a force (N) at a slide, on the child and back on the parent. Coulomb
@@ -20,10 +21,7 @@ class JointFriction(EffectTable):
     sticks: under a load F < C the joint creeps at speed · artanh(F/C), under a larger one it slips.
     """
 
-    joint_fields = ("joint",)
-
     type: Literal["joint_friction"]
-    joint: Identifier = Field(description="revolute or prismatic joint it acts on")
     viscous: Quantity = quantity(
         "N m s/rad | N s/m",
         "viscous friction",
@@ -55,9 +53,20 @@ class JointFriction(EffectTable):
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Equal and opposite on the joint's two bodies; the world takes its own."""
-        rate = mechanism.rate(self.joint)
-        against = mechanism.value(self.viscous) * rate
-        if self.speed is not None:
-            part = mechanism.call("tanh", rate / mechanism.value(self.speed))
-            against = against + mechanism.value(self.coulomb) * part
-        yield JointLoad(self.joint, -against)
+        viscous = mechanism.value(self.viscous)
+        for way in self.ways(mechanism):
+            against = [viscous * rate for rate in way.rates]
+            if self.speed is not None:
+                parts = self._dry(mechanism, way.rates)
+                against = [a + b for a, b in zip(against, parts, strict=True)]
+            yield from way.loads([-part for part in against])
+
+    def _dry(self, mechanism: Mechanism, rates: Vector) -> Vector:
+        """C tanh(|v|/speed) v/|v|."""
+        assert self.speed is not None
+        coulomb, speed = mechanism.value(self.coulomb), mechanism.value(self.speed)
+        if len(rates) == 1:
+            return (coulomb * mechanism.call("tanh", rates[0] / speed),)
+        size = length(mechanism, rates)
+        factor = coulomb * mechanism.call("tanh", size / speed) / size
+        return tuple(factor * rate for rate in rates)

@@ -1,29 +1,29 @@
-"""A spring and damper at a joint of one coordinate."""
+"""A spring and damper at a joint."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, Self
 
 from pydantic import Field
 
-from eomgen.effects.base import EffectTable, JointLoad, Mechanism, Scalar
+from eomgen.effects.base import JointLoad, Mechanism, Scalar
 from eomgen.effects.spring import check_law
-from eomgen.language.base import Identifier
+from eomgen.effects.ways import OnJoints, Way
+from eomgen.errors import SceneError
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 
 
-class JointSpring(EffectTable):
+class JointSpring(OnJoints):
     """Pulls a joint's coordinate q back to `rest`: -(k s + c ds/dt) with s = q - rest.
 
-    A torque (N m, s in rad) at a hinge, a force (N, s in m) at a slide, on the child and back on
-    the parent. A `law` over `stretch` s and `rate` ds/dt stands for k s; positive pulls back.
-    Potential energy is ½ k s²; a law has none, what it gives and takes is power.
+    A torque (N m, s in rad) where it turns, a force (N, s in m) where it slides, on the child and
+    back on the parent. A `law` over `stretch` s and `rate` ds/dt stands for k s; positive pulls
+    back. Potential energy is ½ k s²; a law has none, what it gives and takes is power. At a ball
+    joint s is the angle of the whole turn, the shorter way round, and the torque -k s n - c ω, n
+    the axis of that turn; it has no `rest` but 0, and turns over at half a turn.
     """
 
-    joint_fields = ("joint",)
-
     type: Literal["joint_spring"]
-    joint: Identifier = Field(description="revolute or prismatic joint it acts on")
     stiffness: Quantity = quantity(
         "N m/rad | N/m", "stiffness", "nonnegative", default=ZERO, validate_default=False
     )
@@ -46,21 +46,40 @@ class JointSpring(EffectTable):
         check_law(self, self.law, place)
         return self
 
+    def check_ways(
+        self,
+        joints: Mapping[str, tuple[str, ...]],
+        names: Mapping[str, Sequence[str]],
+        place: str,
+    ) -> None:
+        """A ball rests in one place only."""
+        super().check_ways(joints, names, place)
+        for joint in self.acted_on(joints):
+            if "spin" in joints[joint] and self.rest != ZERO:
+                raise SceneError(f"{place}.rest: at a ball joint ('{joint}') it is 0; leave it out")
+
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Equal and opposite on the joint's two bodies; the world takes its own."""
-        rate, stretch = mechanism.rate(self.joint), self._stretch(mechanism)
-        if self.law is not None:
-            back = mechanism.value(self.law, stretch=stretch, rate=rate)
-        else:
-            back = mechanism.value(self.stiffness) * stretch
-        yield JointLoad(self.joint, -(back + mechanism.value(self.damping) * rate))
+        for way in self.ways(mechanism):
+            stretch = self._stretch(mechanism, way)
+            if self.law is not None:
+                back = mechanism.value(self.law, stretch=stretch, rate=way.rate)
+            else:
+                back = mechanism.value(self.stiffness) * stretch
+            damping = mechanism.value(self.damping)
+            pairs = zip(way.along(back), way.rates, strict=True)
+            yield from way.loads([-(force + damping * rate) for force, rate in pairs])
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k s², J."""
+        total = mechanism.number(0.0)
         if self.law is not None:
-            return mechanism.number(0.0)
-        stretch = self._stretch(mechanism)
-        return mechanism.number(0.5) * mechanism.value(self.stiffness) * (stretch * stretch)
+            return total
+        for way in self.ways(mechanism):
+            stretch = self._stretch(mechanism, way)
+            half = mechanism.number(0.5) * mechanism.value(self.stiffness)
+            total = total + half * (stretch * stretch)
+        return total
 
-    def _stretch(self, mechanism: Mechanism) -> Scalar:
-        return mechanism.coordinate(self.joint) - mechanism.value(self.rest)
+    def _stretch(self, mechanism: Mechanism, way: Way) -> Scalar:
+        return way.value - mechanism.value(self.rest)

@@ -1,31 +1,29 @@
 """Stops at the ends of a joint's range, as springs and dampers or rigid."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Literal, Self
 
 from pydantic import Field
 
-from eomgen.effects.base import Contact, EffectTable, JointLoad, Mechanism, Scalar
+from eomgen.effects.base import Contact, JointLoad, Mechanism, Scalar
+from eomgen.effects.ways import OnJoints, Way
 from eomgen.errors import SceneError
-from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Quantity, quantity
 
 
-class JointStop(EffectTable):
+class JointStop(OnJoints):
     """Pushes a joint's coordinate q back into `low` to `high`, and does nothing within.
 
     Beyond a limit by x (q - high > 0 or q - low < 0) it puts -(k x + c dq/dt) on the child and back
-    on the parent, a torque (N m) at a hinge, a force (N) at a slide; it never pulls towards the
-    limit, however fast q comes back. Damping sets in with a jump. Potential energy is ½ k x².
-    Either limit may be left out. With `restitution` instead of stiffness it is rigid: it puts no
-    load on the joint, and each limit is a contact, `<effect>_low` and `<effect>_high`.
+    on the parent, a torque (N m) where it turns, a force (N) where it slides; it never pulls
+    towards the limit, however fast q comes back. Damping sets in with a jump. Potential energy is
+    ½ k x². Either limit may be left out. Of a ball joint q is the angle of the whole turn, which
+    has no `low`. With `restitution` instead of stiffness it is rigid, of one joint that moves in
+    one way: no load, and each limit is a contact, `<effect>_low` and `<effect>_high`.
     """
 
-    joint_fields = ("joint",)
-
     type: Literal["joint_stop"]
-    joint: Identifier = Field(description="revolute or prismatic joint it acts on")
     low: Quantity | None = quantity("rad | m", "lower limit", default=None)
     high: Quantity | None = quantity("rad | m", "upper limit", default=None)
     stiffness: Quantity = quantity(
@@ -62,30 +60,62 @@ class JointStop(EffectTable):
                     f"{place}.low: {low:g} is not below high, {high:g}; make low < high"
                 )
 
+    def check_ways(
+        self,
+        joints: Mapping[str, tuple[str, ...]],
+        names: Mapping[str, Sequence[str]],
+        place: str,
+    ) -> None:
+        """The turn of a ball is at least 0; a rigid stop is of one way."""
+        super().check_ways(joints, names, place)
+        acted_on = self.acted_on(joints)
+        for joint in acted_on:
+            if "spin" in joints[joint] and self.low is not None:
+                raise SceneError(
+                    f"{place}.low: the turn of a ball joint ('{joint}') is never below 0; give high"
+                )
+        if self.restitution is not None:
+            if self.joints is not None:
+                raise SceneError(f"{place}.joints: a rigid stop is of one joint; name it as joint")
+            if self.coordinate is None and len(joints[acted_on[0]]) > 1:
+                raise SceneError(
+                    f"{place}.coordinate: missing; a rigid stop is of one coordinate, and "
+                    f"'{self.joint}' has {', '.join(names[acted_on[0]])}"
+                )
+
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Equal and opposite on the joint's two bodies; the world takes its own."""
         if self.restitution is not None:
             return
-        beyond, nothing = self._beyond(mechanism), mechanism.number(0.0)
+        for way in self.ways(mechanism):
+            yield from way.loads([-part for part in way.along(self._back(mechanism, way))])
+
+    def _back(self, mechanism: Mechanism, way: Way) -> Scalar:
+        """k x + c dq/dt, as far as it pushes back."""
+        beyond, nothing = self._beyond(mechanism, way), mechanism.number(0.0)
         back = mechanism.value(self.stiffness) * beyond
-        if self.damping != ZERO:
-            back = back + mechanism.value(self.damping) * mechanism.rate(self.joint)
-            above = mechanism.call("max", back, nothing)
-            below = mechanism.call("min", back, nothing)
-            if self.low is None:
-                below = nothing
-            if self.high is None:
-                above = nothing
-            under = mechanism.call("select", -beyond, below, nothing)
-            back = mechanism.call("select", beyond, above, under)
-        yield JointLoad(self.joint, -back)
+        if self.damping == ZERO:
+            return back
+        back = back + mechanism.value(self.damping) * way.rate
+        above = mechanism.call("max", back, nothing)
+        below = mechanism.call("min", back, nothing)
+        if self.low is None:
+            below = nothing
+        if self.high is None:
+            above = nothing
+        under = mechanism.call("select", -beyond, below, nothing)
+        return mechanism.call("select", beyond, above, under)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k x², J; of a rigid stop 0."""
+        total = mechanism.number(0.0)
         if self.restitution is not None:
-            return mechanism.number(0.0)
-        beyond = self._beyond(mechanism)
-        return mechanism.number(0.5) * mechanism.value(self.stiffness) * (beyond * beyond)
+            return total
+        for way in self.ways(mechanism):
+            beyond = self._beyond(mechanism, way)
+            half = mechanism.number(0.5) * mechanism.value(self.stiffness)
+            total = total + half * (beyond * beyond)
+        return total
 
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
         """Of a rigid stop: one for each limit."""
@@ -97,21 +127,30 @@ class JointStop(EffectTable):
         """Of a rigid stop: the gaps q - low and high - q; no friction."""
         if self.restitution is None:
             return ()
-        q, one = mechanism.coordinate(self.joint), mechanism.number(1.0)
+        (way,), one = self.ways(mechanism), mechanism.number(1.0)
         ends = []
         if self.low is not None:
-            ends.append((q - mechanism.value(self.low), one))
+            ends.append((way.value - mechanism.value(self.low), one))
         if self.high is not None:
-            ends.append((mechanism.value(self.high) - q, -one))
+            ends.append((mechanism.value(self.high) - way.value, -one))
         restitution, none = mechanism.value(self.restitution), mechanism.number(0.0)
         return tuple(
-            Contact(name, self.name, gap, (JointLoad(self.joint, way),), (), restitution, none, one)
-            for name, (gap, way) in zip(self.contact_names(()), ends, strict=True)
+            Contact(
+                name,
+                self.name,
+                gap,
+                tuple(way.loads(way.along(sign))),
+                (),
+                restitution,
+                none,
+                one,
+            )
+            for name, (gap, sign) in zip(self.contact_names(()), ends, strict=True)
         )
 
-    def _beyond(self, mechanism: Mechanism) -> Scalar:
+    def _beyond(self, mechanism: Mechanism, way: Way) -> Scalar:
         """How far q is beyond its limits, negative below: 0 within."""
-        q = within = mechanism.coordinate(self.joint)
+        q = within = way.value
         if self.high is not None:
             within = mechanism.call("min", within, mechanism.value(self.high))
         if self.low is not None:

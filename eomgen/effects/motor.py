@@ -1,26 +1,21 @@
-"""A motor at a joint of one coordinate."""
+"""A motor at a joint."""
 
 from collections.abc import Collection, Iterator
 from typing import Literal
 
-from pydantic import Field
-
-from eomgen.effects.base import EffectTable, Input, JointLoad, Mechanism
-from eomgen.language.base import Identifier
+from eomgen.effects.base import Input, JointLoad, Mechanism
+from eomgen.effects.ways import OnCoordinate
 from eomgen.language.formula import names_in
 from eomgen.language.quantity import Quantity, quantity
 
 
-class Motor(EffectTable):
+class Motor(OnCoordinate):
     """A torque τ, +τ on the joint's child and -τ on its parent (handout (35), (36)).
 
     At a sliding joint it is a force. `torque = "input"` makes it the input `<name>`.
     """
 
-    joint_fields = ("joint",)
-
     type: Literal["motor"]
-    joint: Identifier = Field(description="revolute or prismatic joint it drives")
     torque: Literal["input"] | Quantity = quantity(
         "N m | N", "torque | force", sees=("motion",), union_mode="left_to_right"
     )
@@ -38,8 +33,10 @@ class Motor(EffectTable):
             torque = mechanism.input(self.name)
         else:
             torque = mechanism.value(self.torque)
-        yield JointLoad(self.joint, torque)
+        yield JointLoad(self.joint, torque, self.place(mechanism))
 
     def is_plain(self, parameters: Collection[str]) -> bool:
-        """Unless its formula uses the motion or the time."""
+        """Unless its formula uses the motion or the time, or it is on one coordinate of several."""
+        if self.coordinate is not None:
+            return False
         return self.torque == "input" or all(n in parameters for n in names_in(self.torque))

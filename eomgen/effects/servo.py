@@ -4,24 +4,22 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
-from eomgen.effects.base import EffectTable, ExtraState, JointLoad, Mechanism, Scalar
+from eomgen.effects.base import ExtraState, JointLoad, Mechanism, Scalar
+from eomgen.effects.ways import OnCoordinate
 from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 
 
-class Servo(EffectTable):
-    """A command to a joint of one coordinate, on its child and back on its parent.
+class Servo(OnCoordinate):
+    """A command to a joint, on its child and back on its parent.
 
     At a sliding joint it is a force. The command is cut off at ±`limit`, if there is one. With
     `lag` T the actuator's torque τ follows it by T dτ/dt = c - τ; τ is the state `<name>_torque`
     and starts at 0.
     """
 
-    joint_fields = ("joint",)
-
     name: Identifier
-    joint: Identifier = Field(description="revolute or prismatic joint it drives")
     target: Quantity = quantity("rad | m", "target of the coordinate", sees=("motion",))
     target_rate: Quantity = quantity(
         "rad/s | m/s", "target of the velocity", sees=("motion",), default=ZERO
@@ -40,11 +38,13 @@ class Servo(EffectTable):
 
     def deviation(self, mechanism: Mechanism) -> Scalar:
         """Target less coordinate, rad or m."""
-        return mechanism.value(self.target) - mechanism.coordinate(self.joint)
+        return mechanism.value(self.target) - mechanism.coordinate(
+            self.joint, self.place(mechanism)
+        )
 
     def wanted(self, mechanism: Mechanism) -> Scalar:
         """The command before it is cut off, N m or N."""
-        late = mechanism.value(self.target_rate) - mechanism.rate(self.joint)
+        late = mechanism.value(self.target_rate) - mechanism.rate(self.joint, self.place(mechanism))
         stiffness, damping = mechanism.value(self.stiffness), mechanism.value(self.damping)
         return stiffness * self.deviation(mechanism) + damping * late
 
@@ -73,6 +73,8 @@ class Servo(EffectTable):
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """The command, or what the actuator makes of it."""
         if self.lag is None:
-            yield JointLoad(self.joint, self.command(mechanism))
+            yield JointLoad(self.joint, self.command(mechanism), self.place(mechanism))
         else:
-            yield JointLoad(self.joint, mechanism.state(f"{self.name}_torque"))
+            yield JointLoad(
+                self.joint, mechanism.state(f"{self.name}_torque"), self.place(mechanism)
+            )

@@ -85,6 +85,19 @@ def of_joint(text: str, slides: bool) -> str:
     return sliding if slides and sliding else turning
 
 
+def about_slides(table: Table, sliding: Collection[str]) -> bool | None:
+    """Whether a table is about what slides: its coordinate, or its joint, or all its joints; None
+    if it is about no joint.
+    """
+    for key in ("coordinate", "joint", "joints"):
+        at = getattr(table, key, None)
+        if isinstance(at, str):
+            return at in sliding
+        if isinstance(at, tuple):
+            return all(joint in sliding for joint in at)
+    return None
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A named number of the generated module."""
@@ -122,8 +135,8 @@ def name_quantities(
 
     Returns the replaced fields (for `Table.replaced`) and the new parameters. `known` holds the
     values of the scene's own parameters, `motion` names what else a field may see. `sliding` are
-    joints that slide; which joint a quantity is of says its key in a field that is a table by
-    joints, or else the table's `joint`. Raises `SceneError` for a name that is not there and for a
+    joints and coordinates that slide; which one a quantity is of says its key in a field that is a
+    table by joints, or else the table. Raises `SceneError` for a name that is not there and for a
     value outside the field's bound.
     """
     fields: dict[str, Any] = {}
@@ -151,11 +164,12 @@ def name_quantities(
                 *(motion if "motion" in sees else ()),
                 *(word for word in sees if word != "motion"),
             ]
-            joint = suffix[1:] if isinstance(value, dict) else getattr(table, "joint", None)
-            unit = of_joint(str(extra["unit"]), joint in sliding)
+            keyed = isinstance(value, dict)
+            here = suffix[1:] in sliding if keyed else bool(about_slides(table, sliding))
+            unit = of_joint(str(extra["unit"]), here)
             _check(formula, where, bound, unit, known, seen)
             if isinstance(formula, Constant) and formula.value != 0.0:
-                what = of_joint(str(info.description), joint in sliding)
+                what = of_joint(str(info.description), here)
                 about = f"{what} of {prefix}{suffix.replace('_', ', ', 1)}"
                 name = f"{prefix}_{field}{suffix}"
                 parameters.append(Parameter(name, formula.value, unit, about))

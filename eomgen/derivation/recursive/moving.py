@@ -21,7 +21,7 @@ from eomgen.effects.base import Vector
 from eomgen.joints.base import WORLD
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.slopes import with_rates
-from eomgen.model import Model, Seat
+from eomgen.model import Model, Seat, ways_of
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,11 @@ class Moving:
         self.moved = self.nv + len(model.driven)
 
     # What effects may ask (effects.base.Mechanism).
+
+    @cached_property
+    def joints(self) -> dict[str, tuple[str, ...]]:
+        """The joints that move but the free ones, each with the kinds of its ways."""
+        return ways_of(self.model.bodies, self.dimensions)
 
     def mass(self, body: str) -> Scalar:
         """Mass of a body, kg."""
@@ -103,6 +108,10 @@ class Moving:
     def coordinate(self, joint: str, index: int = 0) -> Scalar:
         """A coordinate of a joint."""
         return self.q[self.seats[joint].q[index]]
+
+    def coordinate_name(self, joint: str, index: int = 0) -> str:
+        """Its name."""
+        return self.seats[joint].body.positions[index].name
 
     def rate(self, joint: str, index: int = 0) -> Scalar:
         """A velocity of a joint."""
