@@ -1,12 +1,22 @@
-"""What each effect of a scene costs: `effects`."""
+"""What each effect of a scene costs, and what leaving it out does: `effects`."""
 
-from eomgen.commands.shared import Arguments, located, read_model
+import math
+from typing import TYPE_CHECKING
+
+from eomgen.commands.shared import Arguments, located, print_wrapped, read_model
 from eomgen.files import check_folder
-from eomgen.run.progress import terminal_notice
+from eomgen.run.progress import terminal_progress
+from eomgen.scene.reader import read_scene
+
+if TYPE_CHECKING:
+    from eomgen.study.bill import Bill, Item
+
+OWN, SHARED = "the mechanism itself", "shared by effects"
 
 
 def effects(given: Arguments) -> int:
-    """Print what each effect costs, and draw it."""
+    """Print what each effect costs and does, and draw it."""
+    # Imported here: nothing else needs Matplotlib for costs.
     from eomgen.show.bill import save_bill
     from eomgen.show.style import check_figure
     from eomgen.study.bill import bill
@@ -15,33 +25,91 @@ def effects(given: Arguments) -> int:
     path = given.output / f"{name}_effects.png"
     check_folder(path.parent)
     check_figure(path, force=given.force)
-    with located(given.scene), terminal_notice(f"costing {name} …"):
-        found = bill(model)
-    width = max([len("the mechanism itself"), *(len(item.name) for item in found.items)])
-    kinds = max([0, *(len(item.type) for item in found.items)])
+    scene = read_scene(given.scene).replaced(route=model.route)
+    with located(given.scene), terminal_progress(f"costing {name}") as progress:
+        found = bill(scene, each=given.each, motion=not given.no_motion, progress=progress)
     print(f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs")
-    head = f"{'':<{width}}  {'':<{kinds}}"
-    print(f"    {head}  operations   share        µs  states  inputs")
-    print(
-        f"    {'the mechanism itself':<{width}}  {'':<{kinds}}  {found.bare_operations:>10}"
-        f"  {_share(found.bare_operations, found.operations)}  {_us(found.bare_seconds):>8}"
-    )
-    for item in found.items:
-        print(
-            f"    {item.name:<{width}}  {item.type:<{kinds}}  {item.operations:>10}"
-            f"  {_share(item.operations, found.operations)}  {_us(item.seconds):>8}"
-            f"  {item.states:>6}  {item.inputs:>6}"
-        )
-    for line in found.routes:
-        print(f"    {line}")
+    _print_items(found)
+    _print_routes(found)
+    if found.extent is not None:
+        _print_motion(found, found.extent)
     save_bill(found, path, force=given.force)
     print(f"    wrote {path}")
     return 0
 
 
+def _print_items(bill: "Bill") -> None:
+    operations, seconds = bill.shared
+    width = max(len(OWN), *(len(item.label) for item in bill.items), 0)
+    motion = "   motion  from 1 %" if bill.extent is not None else ""
+    print(f"    {'':<{width}}  operations   share        µs  states  inputs{motion}")
+
+    def line(label: str, operations: int, seconds: float, rest: str = "") -> None:
+        share = operations / bill.operations if bill.operations else 0.0
+        text = f"    {label:<{width}}  {operations:>10}  {share:6.1%}  {_us(seconds):>8}  {rest}"
+        print(text.rstrip())
+
+    line(OWN, bill.bare_operations, bill.bare_seconds)
+    for item in bill.items:
+        if item.left_out:
+            continue
+        if item.needed_by:
+            print(f"    {item.label:<{width}}  {_needed(item)}")
+        else:
+            line(item.label, item.operations, item.seconds, _rest(item))
+    if len(bill.items) > 1 or operations:
+        line(SHARED, operations, seconds)
+    if any(item.left_out for item in bill.items):
+        print("    left out on purpose; what it would add:")
+    for item in bill.items:
+        if item.left_out:
+            line(item.label, item.operations, item.seconds, _rest(item))
+
+
+def _needed(item: "Item") -> str:
+    """Why nothing is known of an item alone."""
+    more = f" and {len(item.needed_by) - 3} more" if len(item.needed_by) > 3 else ""
+    return f"others need it: {', '.join(item.needed_by[:3])}{more}"
+
+
+def _rest(item: "Item") -> str:
+    """States, inputs, and what it does to the motion."""
+    text = f"{item.states:>6}  {item.inputs:>6}"
+    if item.change is None:
+        return text
+    relative, since = item.change.relative, item.change.since
+    part = "-" if math.isnan(relative) else f"{100 * relative:.2g} %"
+    return f"{text}  {part:>7}  {'-' if since is None else f'{since:.3g} s':>8}"
+
+
+def _print_routes(bill: "Bill") -> None:
+    print("    route     operations        µs")
+    for route in bill.routes:
+        count = "-" if route.operations is None else str(route.operations)
+        seconds = "-" if route.seconds is None else _us(route.seconds)
+        label = f"    {route.route:<8}  {count:>10}  {seconds:>8}  "
+        print_wrapped(label, route.words or " ")
+
+
+def _print_motion(bill: "Bill", extent: float) -> None:
+    """What the changes of the motion mean, and the largest of them in m and degrees."""
+    measured = [item for item in bill.items if item.change is not None]
+    print_wrapped(
+        "    motion: ",
+        "how far all mass is from where it would be (root mean square, largest over the run, inputs "
+        f"at 0), in parts of the extent of the scene's own motion, {extent:.3g} m; about 100 % and "
+        "more: another motion altogether",
+    )
+    for item in measured:
+        if item.change is None or not item.change.distance + item.change.angle:
+            continue
+        text = f"up to {item.change.distance:.3g} m ({item.change.body})"
+        text += f" and {math.degrees(item.change.angle):.3g}°"
+        if item.change.until < bill.t_end:
+            ended = f": {item.change.ended}" if item.change.ended else ""
+            text += f"; compared to t = {item.change.until:.3g} s of {bill.t_end:g} s{ended}"
+        print_wrapped(f"        {item.label}: ", text)
+
+
 def _us(seconds: float) -> str:
     return f"{1e6 * seconds:.1f}"
-
-
-def _share(part: int, whole: int) -> str:
-    return f"{part / whole if whole else 0.0:6.1%}"

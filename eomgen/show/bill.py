@@ -1,31 +1,64 @@
-"""A bill of effects as bars: operations and time, longest first."""
+"""A bill of effects as bars: operations, time, and what leaving each out does to the motion."""
 
+import math
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from eomgen.show.style import PALETTE, plain, style, write_figure
+from eomgen.show.style import FAINT, PALETTE, plain, style, write_figure
 from eomgen.study.bill import Bill
+
+MOST_BARS = 40
+OWN, EFFECT, LEFT_OUT = FAINT, PALETTE[0], PALETTE[1]
 
 
 def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
-    """Write the figure; raises `RunError` as `write_figure` does."""
-    items = sorted(bill.items, key=lambda item: item.operations)
-    names = [plain(f"{item.name} ({item.type})") for item in items]
-    names.insert(0, "the mechanism itself")
-    operations = [bill.bare_operations, *(item.operations for item in items)]
-    microseconds = [1e6 * bill.bare_seconds, *(1e6 * item.seconds for item in items)]
+    """Write the figure, the longest bar of operations first, of very many items the first ones.
+
+    Raises `RunError` as `write_figure` does.
+    """
+    known = [item for item in bill.items if not item.needed_by]
+    items = sorted(known, key=lambda item: -item.operations)[:MOST_BARS]
+    operations, seconds = bill.shared
+    labels = ["the mechanism itself", *(item.label for item in items), "shared by effects"]
+    labels = [f"{label} (left out)" if label in _left_out(bill) else label for label in labels]
+    colours = [OWN, *(LEFT_OUT if item.left_out else EFFECT for item in items), OWN]
+    counts = [bill.bare_operations, *(item.operations for item in items), operations]
+    times = [bill.bare_seconds, *(item.seconds for item in items), seconds]
+    changes = [math.nan, *(_percent(item.change) for item in items), math.nan]
+    panels = [
+        ("operations of a derivative", counts, "{:.0f}"),
+        ("time of a call, µs", [1e6 * x for x in times], "{:.1f}"),
+    ]
+    if bill.extent is not None:
+        panels.append(("changes the motion by, %", changes, "{:.2g}"))
     with style():
-        figure = Figure(figsize=(9.0, 1.6 + 0.34 * len(names)), layout="constrained")
-        left, right = figure.subplots(1, 2, sharey=True)
-        for axes, values, label, unit in (
-            (left, operations, "operations of a derivative", "{:.0f}"),
-            (right, microseconds, "time of a call, µs", "{:.1f}"),
+        figure = Figure(figsize=(10.0, 1.5 + 0.32 * len(labels)), layout="constrained")
+        for axes, (label, values, unit) in zip(
+            figure.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels, strict=True
         ):
-            bars = axes.barh(names, values, color=PALETTE[0])
-            axes.bar_label(bars, [f" {unit.format(value)}" for value in values], fontsize=8.5)
-            axes.margins(x=0.15)
+            _bars(axes, [plain(text) for text in labels], values, colours, unit)
             axes.set_xlabel(label)
-            axes.grid(axis="y", visible=False)
+        axes.invert_yaxis()  # shared: the first label is on top
         figure.suptitle(f"{plain(bill.name)}: what each effect costs", x=0.01, ha="left")
         write_figure(figure, path, force=force)
+
+
+def _left_out(bill: Bill) -> set[str]:
+    return {item.label for item in bill.items if item.left_out}
+
+
+def _percent(change: object) -> float:
+    return 100 * getattr(change, "relative", math.nan)
+
+
+def _bars(
+    axes: Axes, labels: list[str], values: list[float], colours: list[str], unit: str
+) -> None:
+    lengths = [value if math.isfinite(value) else 0.0 for value in values]
+    bars = axes.barh(range(len(labels)), lengths, color=colours, tick_label=labels)
+    texts = [f" {unit.format(value)}" if math.isfinite(value) else "" for value in values]
+    axes.bar_label(bars, texts, fontsize=8.5)
+    axes.margins(x=0.2)
+    axes.grid(axis="y", visible=False)
