@@ -38,6 +38,7 @@ def build_model(scene: Scene) -> Model:
     inputs = _inputs(effects, bodies[0], scene.dimensions)
     states = [x for effect in effects for x in effect.states(scene.dimensions)]
     _check_symbols(parameters, coordinates, velocities, inputs, states)
+    _check_contacts(effects, list(names))
     check_look((), scene.camera, scene.dimensions, "camera")
     if scene.camera.follow is not None:
         _known_body(scene.camera.follow, "camera.follow", names)
@@ -311,6 +312,19 @@ def _check_symbols(
                 f"'{name}' would be the name of {use} and of {other}; rename one of them"
             )
         taken[name] = use
+
+
+def _check_contacts(effects: Sequence[Effect], bodies: Sequence[str]) -> None:
+    """No name may stand for two contacts."""
+    taken: dict[str, str] = {}
+    for effect in effects:
+        for name in effect.contact_names(bodies):
+            if name in taken:
+                raise SceneError(
+                    f"'{name}' would be the name of a contact of '{taken[name]}' and of one of "
+                    f"'{effect.name}'; rename one of them"
+                )
+            taken[name] = effect.name
 
 
 def _initial(

@@ -657,7 +657,7 @@ BAD = {
     at_joint("joint_stop", "low = 0", "stiffness = -1"): (
         "effects[0].stiffness: -1 is negative; give a number >= 0 in N m/rad or N/m"
     ),
-    at_joint("joint_stop", "low = 0"): ("effects[0].stiffness: missing; every such table needs it"),
+    at_joint("joint_stop", "low = 0"): ("effects[0].stiffness: missing; give it or a restitution"),
 }
 
 

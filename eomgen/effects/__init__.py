@@ -5,6 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from eomgen.effects.attraction import PointGravity
+from eomgen.effects.contact import BodyContact
 from eomgen.effects.controller import Controller
 from eomgen.effects.drag import Drag
 from eomgen.effects.external_force import ExternalForce
@@ -21,6 +22,7 @@ from eomgen.effects.spring import Spring
 
 Effect = Annotated[
     Gravity
+    | BodyContact
     | Controller
     | Drag
     | ExternalForce
@@ -39,6 +41,7 @@ Effect = Annotated[
 """Any effect of a scene, told apart by its `type`."""
 
 __all__ = [
+    "BodyContact",
     "Controller",
     "Drag",
     "Effect",

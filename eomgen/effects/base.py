@@ -1,6 +1,6 @@
 """What effects share: what they may ask of a mechanism, and the loads they put on it."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, Self
 
@@ -55,6 +55,31 @@ class JointLoad:
     joint: str
     force: Scalar
     coordinate: int = 0
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Two things that must not pass through each other: they touch where `gap` is 0.
+
+    `normal`: the loads of a unit force that drives them apart; `tangents`: the loads of a unit
+    friction force along each tangent, on the same pair: none, one in the plane, two in space.
+    By virtual work the gap's rate and the slip velocities are the powers of these loads.
+    """
+
+    name: str
+    """A Python identifier, unique among contacts: "<effect>_<body>", "<effect>_<body>_3"."""
+    effect: str
+    """The effect's name."""
+    gap: Scalar
+    """m or rad, > 0 apart."""
+    normal: tuple[Load | JointLoad, ...]
+    tangents: tuple[tuple[Load, ...], ...]
+    restitution: Scalar
+    """0 to 1."""
+    friction: Scalar
+    """>= 0."""
+    slip_speed: Scalar
+    """m/s: smoothing of friction while they stay in touch."""
 
 
 class Mechanism(Protocol):
@@ -189,6 +214,14 @@ class EffectTable(Table):
 
     def loads(self, mechanism: Mechanism) -> Iterable[Load | JointLoad]:
         """What it puts on bodies and joints."""
+        return ()
+
+    def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
+        """Names of its rigid contacts where there are these bodies."""
+        return ()
+
+    def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
+        """Its rigid contacts, which are events of a run instead of loads."""
         return ()
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:

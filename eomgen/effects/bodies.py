@@ -19,7 +19,7 @@ LEAST_SQUARE = 1e-300
 class OnBodies(EffectTable):
     """An effect on the point `at` of `body`, or of each of `bodies`, which may be "all"."""
 
-    body_fields = ("body", "bodies")
+    body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies")
     vector_fields: ClassVar[tuple[str, ...]] = ("at",)
 
     body: Identifier | None = Field(default=None, description="body it acts on")

@@ -1,11 +1,11 @@
-"""Stops at the ends of a joint's range, as springs and dampers."""
+"""Stops at the ends of a joint's range, as springs and dampers or rigid."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, Self
 
 from pydantic import Field
 
-from eomgen.effects.base import EffectTable, JointLoad, Mechanism, Scalar
+from eomgen.effects.base import Contact, EffectTable, JointLoad, Mechanism, Scalar
 from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO, Formula
@@ -18,7 +18,8 @@ class JointStop(EffectTable):
     Beyond a limit by x (q - high > 0 or q - low < 0) it puts -(k x + c dq/dt) on the child and back
     on the parent, a torque (N m) at a hinge, a force (N) at a slide; it never pulls towards the
     limit, however fast q comes back. Damping sets in with a jump. Potential energy is ½ k x².
-    Either limit may be left out.
+    Either limit may be left out. With `restitution` instead of stiffness it is rigid: it puts no
+    load on the joint, and each limit is a contact, `<effect>_low` and `<effect>_high`.
     """
 
     joint_fields = ("joint",)
@@ -27,22 +28,33 @@ class JointStop(EffectTable):
     joint: Identifier = Field(description="revolute or prismatic joint it acts on")
     low: Quantity | None = quantity("rad or m", "lower limit", default=None)
     high: Quantity | None = quantity("rad or m", "upper limit", default=None)
-    stiffness: Quantity = quantity("N m/rad or N/m", "stiffness", "nonnegative")
+    stiffness: Quantity = quantity(
+        "N m/rad or N/m", "stiffness", "nonnegative", default=ZERO, validate_default=False
+    )
     damping: Quantity = quantity(
         "N m s/rad or N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
     )
+    restitution: Quantity | None = quantity("", "coefficient of restitution, 0 to 1", default=None)
     allow_active: bool = Field(
         default=False, strict=True, description="whether stiffness and damping may be negative"
     )
 
     def checked(self, dimensions: int, place: str) -> Self:
-        """There is a limit."""
+        """There is a limit, and one law."""
         if self.low is None and self.high is None:
             raise SceneError(f"{place}.low: missing, and high too; give one of them or both")
+        given = self.model_fields_set
+        if self.restitution is None and "stiffness" not in given:
+            raise SceneError(f"{place}.stiffness: missing; give it or a restitution")
+        for key in ("stiffness", "damping", "allow_active"):
+            if self.restitution is not None and key in given:
+                raise SceneError(f"{place}.{key}: a restitution stands in its place; give one")
         return self
 
     def check_values(self, value: Callable[[Formula], float], place: str) -> None:
-        """There is room between two limits."""
+        """There is room between two limits, and restitution is from 0 to 1."""
+        if self.restitution is not None and not 0 <= (e := value(self.restitution)) <= 1:
+            raise SceneError(f"{place}.restitution: {e:g} is not from 0 to 1; give one that is")
         if self.low is not None and self.high is not None:
             low, high = value(self.low), value(self.high)
             if not low < high:
@@ -52,6 +64,8 @@ class JointStop(EffectTable):
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Equal and opposite on the joint's two bodies; the world takes its own."""
+        if self.restitution is not None:
+            return
         beyond, nothing = self._beyond(mechanism), mechanism.number(0.0)
         back = mechanism.value(self.stiffness) * beyond
         if self.damping != ZERO:
@@ -67,9 +81,33 @@ class JointStop(EffectTable):
         yield JointLoad(self.joint, -back)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """½ k x², J."""
+        """½ k x², J; of a rigid stop 0."""
+        if self.restitution is not None:
+            return mechanism.number(0.0)
         beyond = self._beyond(mechanism)
         return mechanism.number(0.5) * mechanism.value(self.stiffness) * (beyond * beyond)
+
+    def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
+        """Of a rigid stop: one for each limit."""
+        ends = (("low", self.low), ("high", self.high))
+        rigid = self.restitution is not None
+        return tuple(f"{self.name}_{end}" for end, limit in ends if rigid and limit is not None)
+
+    def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
+        """Of a rigid stop: the gaps q - low and high - q; no friction."""
+        if self.restitution is None:
+            return ()
+        q, one = mechanism.coordinate(self.joint), mechanism.number(1.0)
+        ends = []
+        if self.low is not None:
+            ends.append((q - mechanism.value(self.low), one))
+        if self.high is not None:
+            ends.append((mechanism.value(self.high) - q, -one))
+        restitution, none = mechanism.value(self.restitution), mechanism.number(0.0)
+        return tuple(
+            Contact(name, self.name, gap, (JointLoad(self.joint, way),), (), restitution, none, one)
+            for name, (gap, way) in zip(self.contact_names(()), ends, strict=True)
+        )
 
     def _beyond(self, mechanism: Mechanism) -> Scalar:
         """How far q is beyond its limits, negative below: 0 within."""

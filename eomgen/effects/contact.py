@@ -1,0 +1,308 @@
+"""Contact: bodies that do not go through a plane or each other, soft or rigid."""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from eomgen.effects.base import Contact, Load, Mechanism, Scalar
+from eomgen.effects.base import Vector as Components
+from eomgen.effects.bodies import LEAST_SQUARE, OnBodies, dot, wrong
+from eomgen.effects.touching import (
+    Ball,
+    Plane,
+    Touch,
+    acting,
+    merged,
+    on_ball,
+    on_plane,
+    parting,
+    pressing,
+    sliding,
+    tangents,
+)
+from eomgen.errors import SceneError
+from eomgen.joints.base import WORLD
+from eomgen.language.base import Identifier
+from eomgen.language.formula import ZERO, Formula
+from eomgen.language.quantity import Numbers, Quantity, Vector, quantity, with_components
+
+LAWS = {
+    "spring_damper": ("stiffness", "damping", "allow_active"),
+    "hunt_crossley": ("stiffness", "dissipation", "allow_active"),
+    "impact": ("restitution",),
+}
+"""What each law takes beside what all take; the first it needs."""
+AGAINST = {
+    "plane": ("normal", "offset", "corners", "other"),
+    "ball": ("other_radius", "other_at", "other"),
+    "each_other": (),
+}
+"""What contact with each takes beside what all take."""
+
+
+class BodyContact(OnBodies):
+    """Spheres (circles in the plane), points, and corners of boxes, which do not go through things.
+
+    Of `body`, or of each of `bodies`, the sphere of `radius` about `at`; `radii` gives some bodies
+    radii of their own; of radius 0 it is a point. With `corners`, half sizes along the body's axes,
+    it is the corners of the box about `at` instead, rounded by a radius if there is one. They are
+
+    - `against = "plane"`: n·x >= `offset`, with the direction `normal` n, up if left out;
+    - `against = "ball"`: the sphere of `other_radius` about `other_at`;
+    - `against = "each_other"`: every two of `bodies`.
+
+    Plane and ball stand still in the world, or are fixed to the body `other` and counted from its
+    centre of mass in its axes. An offset is no formula of time: a floor that moves is a body.
+
+    With the gap g, d = -g where they overlap and else 0, and ḋ = -dg/dt the normal force is
+
+    - `law = "spring_damper"`: max(0, k d + c ḋ) where d > 0; energy ½ k d²;
+    - `law = "hunt_crossley"`: max(0, k d^1.5 (1 + 1.5 a ḋ)); energy 2/5 k d^2.5. Hunt & Crossley,
+      "Coefficient of restitution interpreted as damping in vibroimpact", J. Appl. Mech. 42 (1975)
+      440-445, with λ = 1.5 a k;
+    - `law = "impact"`: none; they are rigid, and contact is an event (`Contact`).
+
+    `friction` μ adds -μ F u/sqrt(|u|² + s²) for the slip u (m/s) at the touching point, with
+    `slip_speed` s: 71 % of μ F at |u| = s, 99.5 % at 10 s. So nothing quite sticks: under a load of
+    the fraction ρ < 1 of μ F it creeps at s ρ/sqrt(1 - ρ²). Sliding to a stop from v under the
+    deceleration μ g takes v²/(2 μ g) but for s/v, see the tests.
+    """
+
+    body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies", "radii")
+    anchor_fields: ClassVar[tuple[str, ...]] = ("other",)
+    vector_fields: ClassVar[tuple[str, ...]] = ("at", "corners", "other_at")
+
+    type: Literal["contact"]
+    law: Literal["spring_damper", "hunt_crossley", "impact"]
+    against: Literal["plane", "ball", "each_other"] = "plane"
+    radius: Quantity = quantity("m", "radius", "nonnegative", default=ZERO, validate_default=False)
+    radii: dict[Identifier, Quantity] = quantity(
+        "m", "radius", "nonnegative", default={}, validate_default=False
+    )
+    corners: Vector | None = quantity("m", "half sizes of the box", "positive", default=None)
+    normal: Numbers = Field(
+        default=(), validate_default=False, description="direction out of the plane"
+    )
+    offset: Quantity = quantity(
+        "m", "place of the plane along its normal", default=ZERO, validate_default=False
+    )
+    other: Identifier = Field(
+        default=WORLD, description="body of the plane or the ball, or 'world'"
+    )
+    other_at: Vector = quantity(
+        "m", "centre of the ball from the centre of mass", default=(), validate_default=False
+    )
+    other_radius: Quantity = quantity(
+        "m", "radius of the ball", "nonnegative", default=ZERO, validate_default=False
+    )
+    stiffness: Quantity = quantity(
+        "N/m or N/m^1.5", "stiffness", "nonnegative", default=ZERO, validate_default=False
+    )
+    damping: Quantity = quantity(
+        "N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
+    )
+    dissipation: Quantity = quantity(
+        "s/m", "dissipation a", "nonnegative", default=ZERO, validate_default=False
+    )
+    restitution: Quantity = quantity(
+        "", "coefficient of restitution, 0 to 1", default=ZERO, validate_default=False
+    )
+    friction: Quantity = quantity(
+        "", "coefficient of friction", "nonnegative", default=ZERO, validate_default=False
+    )
+    slip_speed: Quantity | None = quantity(
+        "m/s", "speed within which friction is smoothed", "positive", default=None
+    )
+    allow_active: bool = Field(
+        default=False, strict=True, description="whether stiffness and damping may be negative"
+    )
+
+    @model_validator(mode="after")
+    def _keys_that_belong(self) -> Self:
+        given = self.model_fields_set
+        choices = (("law", self.law, LAWS), ("against", self.against, AGAINST))
+        for choice, chosen, all_keys in choices:
+            takes = all_keys[chosen]
+            for key in dict.fromkeys(key for keys in all_keys.values() for key in keys):
+                if key in given and key not in takes:
+                    known = ", ".join(takes) or "none such"
+                    raise wrong(key, f"is nothing that {choice} '{chosen}' takes; it takes {known}")
+        needed = LAWS[self.law][0]
+        if needed not in given:
+            raise wrong(needed, f"is missing; law '{self.law}' needs it")
+        if "friction" in given and self.slip_speed is None:
+            raise wrong("slip_speed", "is missing; it smooths friction, give a small one in m/s")
+        if "friction" not in given and self.slip_speed is not None:
+            raise wrong("slip_speed", "smooths friction, which is missing; give both")
+        return self
+
+    @model_validator(mode="after")
+    def _bodies_that_fit(self) -> Self:
+        listed = self.bodies if isinstance(self.bodies, tuple) else (self.body,)
+        if self.against == "each_other" and len(listed) < 2 and self.bodies != "all":
+            key = "body" if self.bodies is None else "bodies"
+            raise wrong(key, "one body has no other to touch; give two or more in bodies")
+        if self.other in listed:
+            raise wrong("other", f"'{self.other}' cannot touch itself; name another body or world")
+        for name in self.radii:
+            if name not in listed and self.bodies != "all":
+                raise wrong(f"radii.{name}", "is none of the bodies in contact; leave it out")
+        return self
+
+    def checked(self, dimensions: int, place: str) -> Self:
+        """Its normal has a direction, and length 1."""
+        up = (0.0,) * (dimensions - 1) + (1.0,)
+        normal = with_components(self.normal or up, 0.0, dimensions, f"{place}.normal")
+        largest = max(map(abs, normal))
+        if largest == 0.0:
+            raise SceneError(f"{place}.normal: has no direction; give one that is not zero")
+        scaled = tuple(x / largest for x in normal)
+        size = sum(x * x for x in scaled) ** 0.5
+        return self.replaced(normal=tuple(x / size for x in scaled))
+
+    def check_values(self, value: Callable[[Formula], float], place: str) -> None:
+        """No radius is negative, spheres have one, restitution is from 0 to 1."""
+        radii = {f"radii.{name}": value(radius) for name, radius in self.radii.items()}
+        radii |= {"radius": value(self.radius), "other_radius": value(self.other_radius)}
+        for key, radius in radii.items():
+            if radius < 0:
+                raise SceneError(f"{place}.{key}: {radius:g} is negative; give a number >= 0 in m")
+        if not 0 <= (restitution := value(self.restitution)) <= 1:
+            raise SceneError(
+                f"{place}.restitution: {restitution:g} is not from 0 to 1; give one that is"
+            )
+        listed = self.bodies if isinstance(self.bodies, tuple) else (self.body,)
+        if self.bodies == "all" and self.radii:
+            return  # which bodies are left to be points is not known here
+        points = sum(radii.get(f"radii.{name}", radii["radius"]) == 0 for name in listed)
+        if self.against == "ball" and radii["other_radius"] == 0 and points:
+            raise SceneError(f"{place}.other_radius: two points never meet; give a radius > 0")
+        if self.against == "each_other" and (points > 1 or (points and self.bodies == "all")):
+            raise SceneError(f"{place}.radius: two points never meet; give a radius > 0")
+
+    def loads(self, mechanism: Mechanism) -> Iterator[Load]:
+        """One load a body and touching point of it, for the corners of a box in one."""
+        if self.law == "impact":
+            return
+        found: list[Load] = []
+        for touch in self._touches(mechanism):
+            if self.friction == ZERO:
+                force = self._force(mechanism, touch, parting(mechanism, touch))
+                found += pressing(touch, force)
+                continue
+            apart, slip = sliding(mechanism, touch)
+            force = self._force(mechanism, touch, apart)
+            speed = self._slip_speed(mechanism)
+            size = mechanism.call("sqrt", dot(slip, slip) + speed * speed)
+            drag = mechanism.value(self.friction) * force / size
+            pairs = zip(touch.normal, slip, strict=True)
+            found += acting(touch, tuple(force * n - drag * u for n, u in pairs))
+        yield from merged(found)
+
+    def potential_energy(self, mechanism: Mechanism) -> Scalar:
+        """½ k d² or 2/5 k d^2.5 of every contact, J."""
+        total = mechanism.number(0.0)
+        if self.law == "impact":
+            return total
+        share = mechanism.number(0.5 if self.law == "spring_damper" else 0.4)
+        for touch in self._touches(mechanism):
+            force = self._elastic(mechanism, touch)
+            part = share * force * mechanism.call("max", -touch.gap, mechanism.number(0.0))
+            if touch.meeting is not None:
+                part = part + force * touch.meeting
+            total = total + part
+        return total
+
+    def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
+        """Of rigid contacts: `<effect>_<body>`, with the corner's number or the other body's name
+        behind it if there is one.
+        """
+        if self.law != "impact":
+            return ()
+        touching = self._in_contact(bodies)
+        if self.against == "each_other":
+            return tuple(f"{self.name}_{a}_{b}" for a, b in combinations(touching, 2))
+        names = [f"{self.name}_{body}" for body in touching]
+        if self.corners is None:
+            return tuple(names)
+        numbers = range(1, 2 ** len(self.corners) + 1)
+        return tuple(f"{name}_{number}" for name in names for number in numbers)
+
+    def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
+        """Of law "impact": one for each point, sphere, corner or pair of spheres."""
+        if self.law != "impact":
+            return ()
+        names = self.contact_names(mechanism.bodies)
+        return tuple(
+            Contact(
+                name,
+                self.name,
+                touch.gap,
+                pressing(touch, mechanism.number(1.0)),
+                tuple(acting(touch, tangent) for tangent in tangents(mechanism, touch)),
+                mechanism.value(self.restitution),
+                mechanism.value(self.friction),
+                self._slip_speed(mechanism),
+            )
+            for name, touch in zip(names, self._touches(mechanism), strict=True)
+        )
+
+    def _elastic(self, mechanism: Mechanism, touch: Touch) -> Scalar:
+        """k d or k d^1.5, N. d^1.5 has the slope 0 at d = 0, as `bodies.length` has it."""
+        d = mechanism.call("max", -touch.gap, mechanism.number(0.0))
+        force = mechanism.value(self.stiffness) * d
+        if self.law == "spring_damper":
+            return force
+        least = mechanism.number(LEAST_SQUARE)
+        return force * mechanism.call("sqrt", mechanism.call("max", d, least))
+
+    def _force(self, mechanism: Mechanism, touch: Touch, apart: Scalar) -> Scalar:
+        """The normal force, N, where the gap grows by `apart`, m/s."""
+        force, nothing = self._elastic(mechanism, touch), mechanism.number(0.0)
+        if self.law == "spring_damper" and self.damping != ZERO:
+            force = force - mechanism.value(self.damping) * apart
+            force = mechanism.call("max", force, nothing)
+            return mechanism.call("select", -touch.gap, force, nothing)
+        if self.law == "hunt_crossley" and self.dissipation != ZERO:
+            faster = mechanism.number(1.5) * mechanism.value(self.dissipation)
+            force = force * (mechanism.number(1.0) - faster * apart)
+            return mechanism.call("max", force, nothing)
+        return force
+
+    def _slip_speed(self, mechanism: Mechanism) -> Scalar:
+        """m/s; without friction any does."""
+        return (
+            mechanism.number(1.0) if self.slip_speed is None else mechanism.value(self.slip_speed)
+        )
+
+    def _in_contact(self, bodies: Sequence[str]) -> list[str]:
+        """Those of all bodies that are in contact with something."""
+        if self.body is not None:
+            return [self.body]
+        listed = self.bodies if isinstance(self.bodies, tuple) else bodies
+        return [body for body in listed if body != self.other]
+
+    def _touches(self, mechanism: Mechanism) -> Iterator[Touch]:
+        at = tuple(mechanism.value(part) for part in self.at)
+        balls = [
+            Ball(body, at, mechanism.value(self.radii.get(body, self.radius)))
+            for body in self._in_contact(mechanism.bodies)
+        ]
+        if self.against == "each_other":
+            yield from (on_ball(mechanism, *pair) for pair in combinations(balls, 2))
+            return
+        if self.against == "ball":
+            centre = tuple(mechanism.value(part) for part in self.other_at)
+            ball = Ball(self.other, centre, mechanism.value(self.other_radius))
+            yield from (on_ball(mechanism, first, ball) for first in balls)
+            return
+        zeros = (mechanism.number(0.0),) * mechanism.dimensions
+        normal = tuple(mechanism.number(x) for x in self.normal)
+        plane = Plane(self.other, zeros, normal, mechanism.value(self.offset))
+        corners: Components | None = None
+        if self.corners is not None:
+            corners = tuple(mechanism.value(part) for part in self.corners)
+        for ball in balls:
+            yield from on_plane(mechanism, plane, ball, corners)
