@@ -40,6 +40,7 @@ def effects(given: Arguments) -> int:
 
 def _print_items(bill: "Bill") -> None:
     operations, seconds = bill.shared
+    others = [item.route for item in bill.items if item.route not in ("", bill.route)]
     width = max(len(OWN), *(len(item.label) for item in bill.items), 0)
     motion = "   motion  from 1 %" if bill.extent is not None else ""
     print(f"    {'':<{width}}  operations   share        µs  states  inputs{motion}")
@@ -56,14 +57,18 @@ def _print_items(bill: "Bill") -> None:
         if item.needed_by:
             print(f"    {item.label:<{width}}  {_needed(item)}")
         else:
-            line(item.label, item.operations, item.seconds, _rest(item))
+            line(item.label, item.operations, item.seconds, _rest(bill, item))
     if len(bill.items) > 1 or operations:
         line(SHARED, operations, seconds)
+    if others:
+        print_wrapped(
+            "    ", f"(route): the equations without it come by that route, not {bill.route}"
+        )
     if any(item.left_out for item in bill.items):
         print("    left out on purpose; what it would add:")
     for item in bill.items:
         if item.left_out:
-            line(item.label, item.operations, item.seconds, _rest(item))
+            line(item.label, item.operations, item.seconds, _rest(bill, item))
 
 
 def _needed(item: "Item") -> str:
@@ -72,14 +77,17 @@ def _needed(item: "Item") -> str:
     return f"others need it: {', '.join(item.needed_by[:3])}{more}"
 
 
-def _rest(item: "Item") -> str:
-    """States, inputs, and what it does to the motion."""
+def _rest(bill: "Bill", item: "Item") -> str:
+    """States, inputs, what it does to the motion, and the route if it makes for another."""
+    other_way = "" if item.route == bill.route else f"  ({item.route})"
     text = f"{item.states:>6}  {item.inputs:>6}"
+    if bill.extent is None:
+        return f"{text}{other_way}"
     if item.change is None:
-        return text
+        return f"{text}{'':>19}{other_way}"
     relative, since = item.change.relative, item.change.since
-    part = "-" if math.isnan(relative) else f"{100 * relative:.2g} %"
-    return f"{text}  {part:>7}  {'-' if since is None else f'{since:.3g} s':>8}"
+    part = "-" if math.isnan(relative) else percent(100 * relative)
+    return f"{text}  {part:>7}  {'-' if since is None else f'{since:.3g} s':>8}{other_way}"
 
 
 def _print_routes(bill: "Bill") -> None:
@@ -88,28 +96,35 @@ def _print_routes(bill: "Bill") -> None:
         count = "-" if route.operations is None else str(route.operations)
         seconds = "-" if route.seconds is None else _us(route.seconds)
         label = f"    {route.route:<8}  {count:>10}  {seconds:>8}  "
-        print_wrapped(label, route.words or " ")
+        if route.words:
+            print_wrapped(label, route.words)
+        else:
+            print(label.rstrip())
 
 
 def _print_motion(bill: "Bill", extent: float) -> None:
     """What the changes of the motion mean, and the largest of them in m and degrees."""
-    measured = [item for item in bill.items if item.change is not None]
     print_wrapped(
         "    motion: ",
-        "how far all mass is from where it would be (root mean square, largest over the run, inputs "
-        f"at 0), in parts of the extent of the scene's own motion, {extent:.3g} m; about 100 % and "
-        "more: another motion altogether",
+        "how far all mass is from where it would be without (root mean square, the most over the "
+        f"run, inputs at 0), in parts of how far the scene's own motion takes it, {extent:.3g} m; "
+        "about 100 % and more: another motion altogether",
     )
-    for item in measured:
-        if item.change is None or not item.change.distance + item.change.angle:
+    for item in bill.items:
+        if item.change is None or item.change.since is None:
             continue
         text = f"up to {item.change.distance:.3g} m ({item.change.body})"
-        text += f" and {math.degrees(item.change.angle):.3g}°"
+        text += f" and {math.degrees(item.change.angle):.0f}°"
         if item.change.until < bill.t_end:
             ended = f": {item.change.ended}" if item.change.ended else ""
             text += f"; compared to t = {item.change.until:.3g} s of {bill.t_end:g} s{ended}"
         print_wrapped(f"        {item.label}: ", text)
 
 
+def percent(value: float) -> str:
+    """Two digits, and all of a whole number."""
+    return f"{value:.0f} %" if abs(value) >= 10 else f"{value:.2g} %"
+
+
 def _us(seconds: float) -> str:
-    return f"{1e6 * seconds:.1f}"
+    return f"{round(1e6 * seconds, 1) + 0.0:.1f}"  # never -0.0

@@ -1,6 +1,7 @@
 """A bill of effects as bars: operations, time, and what leaving each out does to the motion."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -27,7 +28,7 @@ def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
     counts = [bill.bare_operations, *(item.operations for item in items), operations]
     times = [bill.bare_seconds, *(item.seconds for item in items), seconds]
     changes = [math.nan, *(_percent(item.change) for item in items), math.nan]
-    panels = [
+    panels: list[tuple[str, Sequence[float], str]] = [
         ("operations of a derivative", counts, "{:.0f}"),
         ("time of a call, µs", [1e6 * x for x in times], "{:.1f}"),
     ]
@@ -54,7 +55,7 @@ def _percent(change: object) -> float:
 
 
 def _bars(
-    axes: Axes, labels: list[str], values: list[float], colours: list[str], unit: str
+    axes: Axes, labels: list[str], values: Sequence[float], colours: list[str], unit: str
 ) -> None:
     lengths = [value if math.isfinite(value) else 0.0 for value in values]
     bars = axes.barh(range(len(labels)), lengths, color=colours, tick_label=labels)

@@ -14,20 +14,19 @@ from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.derivation.supported import why_not_closed, why_not_tried
-from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.program.route import least_factoring, routed
-from eomgen.run.module import GeneratedModule, load_module
+from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route, Scene
 from eomgen.study.omission import Change, Run, change, extent, run
 from eomgen.study.variants import Variant, bare, counted, without_effects
 
-ROUNDS = 21
-TIMING = 1.5
+TIMING = 1.0
 """About how long all calls that are timed take together, s."""
-MOST_CALLS = 700
-"""Most calls of one module in a round."""
+CHUNK = 5e-4
+"""About how long those of one module in one round take, s: too short to be interrupted often."""
+LEAST_ROUNDS = 7
 MOTION = 6.0
 """Most wall time of all motions together, s."""
 MOST_FACTORING = 20_000
@@ -40,6 +39,7 @@ class Item:
 
     operations, seconds  of a call of `derivative` that it adds, or would add
     states, inputs       that it brings
+    route                of the equations without it, or of those with what is left out
     needed_by            effects that cannot be without it: then nothing is known of it alone
     change               what leaving it out does to the motion; None if that was not asked for
     """
@@ -49,6 +49,7 @@ class Item:
     seconds: float = 0.0
     states: int = 0
     inputs: int = 0
+    route: str = ""
     needed_by: tuple[str, ...] = ()
     left_out: bool = False
     change: Change | None = None
@@ -68,10 +69,11 @@ class RouteCost:
 class Bill:
     """The whole and its items; `bare` is the mechanism without any effect.
 
-    `extent` is that of the scene's motion, m, or None if no motion was asked for.
+    `route` is that of the whole. `extent` is that of the scene's motion, m, or None if no motion was asked for.
     """
 
     name: str
+    route: str
     operations: int
     seconds: float
     bare_operations: int
@@ -137,6 +139,7 @@ def bill(
         size, changes = _changes(whole, parts, changed, lambda x: progress(0.6 + 0.4 * x))
     return Bill(
         name=whole.model.name,
+        route=whole.route,
         operations=whole.operations,
         seconds=whole.seconds,
         bare_operations=without.operations,
@@ -161,10 +164,7 @@ def _compiled(model: Model) -> _Made:
     check_regular(model)
     system = routed(model, jacobian=False).system
     module = load_module(python_module(system), model.name)
-    try:
-        module.derivative(0.0, module.initial_state())
-    except (ValueError, ArithmeticError) as error:
-        raise RunError(f"the derivative at the start cannot be evaluated: {error}") from None
+    as_problem(module)
     return _Made(model, module, system.route, module.COST["derivative"]["total"])
 
 
@@ -200,6 +200,7 @@ def _item(whole: _Made, part: Variant, other: _Made | None, change: Change | Non
         more.seconds - less.seconds,
         len(more.model.states) - len(less.model.states),
         len(more.model.inputs) - len(less.model.inputs),
+        route=other.route,
         left_out=part.left_out,
         change=change,
     )
@@ -209,12 +210,12 @@ def _timed(made: Sequence[_Made | None]) -> list[_Made | None]:
     """With the least time of a call in s, of all in turn: a busy machine is busy for all."""
     there = [one for one in made if one is not None]
     calls = [_call(one.module) for one in there]
-    once = sum(_seconds(call, 3) for call in calls)
-    count = max(1, min(MOST_CALLS, int(TIMING / ROUNDS / once)))
-    least = [inf] * len(calls)
-    for _ in range(ROUNDS):
-        for k, call in enumerate(calls):
+    counts = [1 + int(CHUNK / min(_seconds(call, 1) for _ in range(5))) for call in calls]
+    least, rounds, begin = [inf] * len(calls), 0, time.perf_counter()
+    while rounds < LEAST_ROUNDS or time.perf_counter() < begin + TIMING:
+        for k, (call, count) in enumerate(zip(calls, counts, strict=True)):
             least[k] = min(least[k], _seconds(call, count))
+        rounds += 1
     found = iter(least)
     return [None if one is None else replace(one, seconds=next(found)) for one in made]
 

@@ -11,14 +11,14 @@ it is farthest from there. Chaotic motions part until d is as large as the motio
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from eomgen.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
-from eomgen.run.module import GeneratedModule
+from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
 
@@ -26,7 +26,10 @@ SMALL = 0.01
 """Part of the extent beyond which a motion counts as changed."""
 STILL = 1e-9
 """Extent, m, of a motion that is none."""
+FINEST = (1e-6, 1e-9)
+"""Relative and absolute tolerance of the runs that are compared."""
 MOST_ROWS = 2001
+"""Most instants that two motions are compared at."""
 OVER = "no time to compute more"
 FAR_ENOUGH = "the other run ends here"
 
@@ -66,17 +69,18 @@ def run(
 ) -> Run:
     """A scene's own run, its inputs at 0, for `seconds` of wall time or up to `until` of its own.
 
-    The module needs its derivative and `body_poses` only.
+    The scene's integrator and step are used, its tolerances down to `FINEST`, which will do for
+    fractions of a percent. The module needs its derivative and `body_poses` only.
     """
     wanted = model.simulation
     fixed = isinstance(find_integrator(wanted.integrator), FixedStep)
     trajectory = integrate(
-        _problem(module, time.perf_counter() + seconds, until),
+        _timed(module, time.perf_counter() + seconds, until),
         wanted.integrator,
         wanted.t_end,
         dt=wanted.dt if fixed else None,
-        rtol=wanted.rtol,
-        atol=wanted.atol,
+        rtol=max(wanted.rtol, FINEST[0]),
+        atol=max(wanted.atol, FINEST[1]),
         progress=progress,
     )
     if trajectory.message.startswith("interrupted"):
@@ -91,31 +95,18 @@ def run(
     return Run(trajectory.t[few], poses, ended)
 
 
-def _problem(module: GeneratedModule, due: float, until: float) -> Problem:
-    """The initial-value problem of a module without a Jacobian, which ends when it is time."""
+def _timed(module: GeneratedModule, due: float, until: float) -> Problem:
+    """The initial-value problem of a module, which ends when the time for it is over."""
+    problem = as_problem(module)
 
     def derivative(t: float, y: Floats) -> Floats:
         if time.perf_counter() > due:
             raise StepFailure(OVER)
         if t > until:
             raise StepFailure(FAR_ENOUGH)
-        return module.derivative(t, y)
+        return problem.derivative(t, y)
 
-    def jacobian(t: float, y: Floats) -> Floats:
-        # By differences, for implicit methods: they ask for no more than a direction to iterate.
-        steps = 1e-7 * np.maximum(1.0, np.abs(y))
-        ahead = module.derivative(t, y[:, None] + np.diag(steps))
-        return np.asarray((ahead - derivative(t, y)[:, None]) / steps)
-
-    return Problem(
-        name=module.NAME,
-        states=module.STATES,
-        positions=module.POSITIONS,
-        derivative=derivative,
-        jacobian=jacobian,
-        initial=module.initial_state(),
-        quaternions=module.QUATERNIONS,
-    )
+    return replace(problem, derivative=derivative)
 
 
 def extent(model: Model, motion: Run) -> float:
