@@ -1,18 +1,19 @@
 """From a scene to a model: every name resolved, bodies in a tree, everything checked."""
 
-import math
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from typing import Literal, TypeVar
 
-from eomgen.effects import Effect, Gravity, Motor
+from eomgen.effects import Driven, Effect, Gravity, Motor
 from eomgen.effects.base import ExtraState, Input
-from eomgen.errors import SceneError, nearest
+from eomgen.errors import SceneError, listed, nearest
 from eomgen.joints import Joint, Prismatic, Revolute
 from eomgen.joints.base import WORLD, Coordinate
 from eomgen.language.base import Table
 from eomgen.language.formula import ZERO, Floats, evaluate
 from eomgen.language.quantity import Parameter, name_quantities, with_components
 from eomgen.model import Body, Model, Point
+from eomgen.prescribed import check_drive, initial_values, locked_values
 from eomgen.scene.chains import written_out
 from eomgen.scene.look import check_look
 from eomgen.scene.schema import OUTPUTS, Scene
@@ -31,14 +32,15 @@ def build_model(scene: Scene) -> Model:
     names = {body.name: i for i, body in enumerate(bodies[0])}
     effects = _effects(scene, bodies[0], known, parameters)
     points = _points(scene, names, known, parameters)
+    inputs = _inputs(effects, bodies[0], scene.dimensions)
+    states = [x for effect in effects for x in effect.states(scene.dimensions)]
     coordinates = [c for body in bodies[0] for c in body.positions]
     velocities = [c for body in bodies[0] for c in body.velocities]
     if not velocities:
         raise SceneError("joints: nothing can move; give at least one that is no weld")
-    inputs = _inputs(effects, bodies[0], scene.dimensions)
-    states = [x for effect in effects for x in effect.states(scene.dimensions)]
     _check_symbols(parameters, coordinates, velocities, inputs, states)
     _check_contacts(effects, list(names))
+    locked = locked_values(scene.locked, bodies[0], effects)
     check_look((), scene.camera, scene.dimensions, "camera")
     if scene.camera.follow is not None:
         _known_body(scene.camera.follow, "camera.follow", names)
@@ -52,16 +54,32 @@ def build_model(scene: Scene) -> Model:
         points=tuple(points),
         effects=tuple(effects),
         states=tuple(states),
-        initial_q=_initial(scene.initial.q, coordinates, "initial.q"),
-        initial_v=_initial(scene.initial.v, velocities, "initial.v"),
-        outputs=outputs_for(scene.outputs, "outputs[{}]", scene.points, inputs, parameters),
+        initial_q=(),
+        initial_v=(),
+        outputs=(),
         form=scene.form,
         route=scene.route,
         simulation=scene.simulation,
         camera=scene.camera,
+        locked=tuple(locked.items()),
+        leave_out=scene.leave_out,
         notices=bodies[1],
     )
-    return unit_quaternions(model, scene.initial.q)
+    if not model.velocities:
+        raise SceneError(
+            "scene: every coordinate is driven or locked, so there is no motion to find; "
+            "leave one free"
+        )
+    q, v = scene.initial.q, scene.initial.v
+    model = replace(
+        model,
+        initial_q=initial_values(q, model.coordinates, "initial.q", model.prescribed),
+        initial_v=initial_values(v, model.velocities, "initial.v", model.prescribed),
+        outputs=outputs_for(
+            scene.outputs, "outputs[{}]", scene.points, inputs, parameters, model.driven
+        ),
+    )
+    return unit_quaternions(model, q)
 
 
 def outputs_for(
@@ -70,6 +88,7 @@ def outputs_for(
     points: Collection[object],
     inputs: Collection[object],
     parameters: Collection[object],
+    driven: Collection[object],
 ) -> tuple[str, ...]:
     """What is to be generated, in the order of `OUTPUTS`; "all" is all that there can be.
 
@@ -79,8 +98,14 @@ def outputs_for(
         **dict.fromkeys(("point_positions", "point_velocities", "point_jacobians"), "points"),
         "input_jacobian": "inputs",
         "parameter_jacobian": "parameters",
+        "driving_forces": "driven joints",
     }
-    there = {"points": points, "inputs": inputs, "parameters": parameters}
+    there = {
+        "points": points,
+        "inputs": inputs,
+        "parameters": parameters,
+        "driven joints": driven,
+    }
     if wanted == "all":
         return tuple(name for name in OUTPUTS if name not in needs or there[needs[name]])
     for i, name in enumerate(wanted):
@@ -128,14 +153,8 @@ def _check_names(tables: Sequence[tuple[str, str]]) -> None:
 
 def _known_body(name: str, place: str, known: Sequence[str] | dict[str, int]) -> None:
     if name not in known:
-        hint = nearest(name, known) or f"; known: {_listed(known)}"
+        hint = nearest(name, known) or f"; known: {listed(known)}"
         raise SceneError(f"{place}: no body is named '{name}'{hint}")
-
-
-def _listed(names: Sequence[str] | dict[str, int]) -> str:
-    """Names in a message, the first few of many."""
-    words = list(names)
-    return ", ".join(words[:12]) + (f" and {len(words) - 12} more" if len(words) > 12 else "")
 
 
 def _bodies(
@@ -258,6 +277,8 @@ def _effects(
             _known_body(name, spot, names)
         for name, spot in _names_of(effect, effect.anchor_fields, place):
             _known_body(name, spot, [WORLD, *names])
+        for name, spot in _names_of(effect, effect.point_fields, place):
+            _known_point(name, spot, [point.name for point in scene.points])
         for name, spot in _names_of(effect, effect.joint_fields, place):
             _known_joint(name, spot, driven)
         vectors = {
@@ -266,6 +287,8 @@ def _effects(
             if isinstance(value := getattr(effect, field), tuple)
         }
         effect = effect.replaced(**vectors).checked(scene.dimensions, place)
+        if isinstance(effect, Driven):
+            check_drive(effect, place, bodies, effects, known, motion)
         effects.append(_named(effect, effect.name, place, known, parameters, motion))
         effect.check_values(lambda formula: float(evaluate(formula, known, Floats())), place)
     return effects
@@ -284,9 +307,15 @@ def _names_of(effect: Effect, fields: Sequence[str], place: str) -> Iterator[tup
             yield from ((name, f"{place}.{field}[{i}]") for i, name in enumerate(value))
 
 
+def _known_point(name: str, place: str, known: Sequence[str]) -> None:
+    if name not in known:
+        hint = nearest(name, known) or f"; known: {listed(known) or 'none'}"
+        raise SceneError(f"{place}: no point is named '{name}'{hint}")
+
+
 def _known_joint(name: str, place: str, driven: Sequence[str]) -> None:
     if name not in driven:
-        hint = nearest(name, driven) or f"; known: {_listed(driven) or 'none'}"
+        hint = nearest(name, driven) or f"; known: {listed(driven) or 'none'}"
         raise SceneError(f"{place}: no revolute or prismatic joint is named '{name}'{hint}")
 
 
@@ -325,29 +354,3 @@ def _check_contacts(effects: Sequence[Effect], bodies: Sequence[str]) -> None:
                     f"'{effect.name}'; rename one of them"
                 )
             taken[name] = effect.name
-
-
-def _initial(
-    given: Sequence[float] | dict[str, float], coordinates: Sequence[Coordinate], place: str
-) -> tuple[float, ...]:
-    names = [c.name for c in coordinates]
-    if not isinstance(given, dict):
-        if len(given) != len(names):
-            raise SceneError(
-                f"{place}: has {len(given)} numbers for {len(names)} coordinates; "
-                f"give one each for {_listed(names)}"
-            )
-        return tuple(float(x) for x in given)
-    values = dict.fromkeys(names, 0.0)
-    degrees = {f"{c.name}_deg": c.name for c in coordinates if c.unit in ("rad", "rad/s")}
-    for key, value in given.items():
-        if key in values:
-            values[key] = float(value)
-        elif key in degrees:
-            if degrees[key] in given:
-                raise SceneError(f"{place}.{key}: {degrees[key]} is given too; give one of them")
-            values[degrees[key]] = math.radians(value)
-        else:
-            hint = nearest(key, names) or f"; known: {_listed(names)}"
-            raise SceneError(f"{place}.{key}: no coordinate has this name{hint}")
-    return tuple(values.values())

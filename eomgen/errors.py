@@ -1,7 +1,7 @@
 """Errors that are the user's to mend: one clear line each, with place, value and remedy."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class EomgenError(Exception):
@@ -20,3 +20,9 @@ def nearest(word: str, known: Iterable[str]) -> str:
     """Return ``" (did you mean 'x'?)"`` for the known word nearest to `word`, or ``""``."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
     return f" (did you mean '{close[0]}'?)" if close else ""
+
+
+def listed(names: Sequence[str] | dict[str, int]) -> str:
+    """Names in a message, the first few of many."""
+    words = list(names)
+    return ", ".join(words[:12]) + (f" and {len(words) - 12} more" if len(words) > 12 else "")

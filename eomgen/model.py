@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import TypeGuard
 
-from eomgen.effects import Effect
+from eomgen.effects import Driven, Effect
 from eomgen.effects.base import ExtraState, Input
-from eomgen.joints import Joint, Revolute
+from eomgen.joints import Free, Joint, Revolute
 from eomgen.joints.base import Coordinate
 from eomgen.language.formula import Constant, Floats, Formula, evaluate
 from eomgen.language.quantity import Parameter
 from eomgen.scene.look import Camera, Shape
-from eomgen.scene.schema import Form, Route, Simulation
+from eomgen.scene.schema import Form, LeftOut, Route, Simulation
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,8 @@ class Body:
     """A body and the joint that holds it. `parent` is an index into the bodies, -1 the world.
 
     `inertia_com` about the centre of mass in body axes: one moment in the plane; in space xx, yy,
-    zz, xy, xz, yz. `positions` and `velocities` are the joint's, in the order of `q` and `v`.
+    zz, xy, xz, yz. `positions` and `velocities` are all the joint's, whether states or not; see
+    `Model.seats`.
     """
 
     name: str
@@ -31,6 +32,14 @@ class Body:
     positions: tuple[Coordinate, ...]
     velocities: tuple[Coordinate, ...]
     shapes: tuple[Shape, ...]
+
+    @property
+    def plain(self) -> int:
+        """How many of its coordinates have a rate of their own: all but those of a quaternion,
+        which are four for three velocities.
+        """
+        turns = len(self.positions) != len(self.velocities)
+        return len(self.positions) - (4 if turns else 0)
 
     @property
     def moment(self) -> Formula:
@@ -49,10 +58,55 @@ class Point:
 
 
 @dataclass(frozen=True)
+class Prescribed:
+    """A coordinate that is no state: `value` is a formula of t and parameters, or a number if it is
+    locked. `by` is the name of the effect that drives it.
+    """
+
+    position: Coordinate
+    velocity: Coordinate
+    value: Formula
+    by: str | None
+
+    @property
+    def locked(self) -> bool:
+        """Whether it stays as it is."""
+        return self.by is None
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where a body's joint stands among all coordinates and all velocities, which are those of the
+    state, then the driven ones, then the locked ones, each in the order of the bodies.
+    """
+
+    body: Body
+    q: tuple[int, ...]
+    v: tuple[int, ...]
+
+    @property
+    def plain(self) -> tuple[tuple[int, int], ...]:
+        """Each coordinate that has a rate of its own, and that."""
+        end = self.body.plain
+        return tuple(zip(self.q[:end], self.v[:end], strict=True))
+
+    @property
+    def quaternion(self) -> tuple[int, ...]:
+        """The other coordinates, w, x, y, z of a quaternion; or none."""
+        return self.q[self.body.plain :]
+
+    @property
+    def spin(self) -> tuple[int, ...]:
+        """The velocities of that."""
+        return self.v[self.body.plain :]
+
+
+@dataclass(frozen=True)
 class Model:
     """A mechanism with everything that acts on it; see `build_model`.
 
     `states` are those that effects bring along, after coordinates and velocities.
+    `locked` holds each coordinate that is held fast, by name, with its value.
     `notices` say what was put right on the way, a line each.
     """
 
@@ -72,43 +126,106 @@ class Model:
     route: Route
     simulation: Simulation
     camera: Camera
+    locked: tuple[tuple[str, float], ...] = ()
+    leave_out: tuple[LeftOut, ...] = ()
     notices: tuple[str, ...] = ()
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """All coordinates, in the order of `q`."""
-        return tuple(c for body in self.bodies for c in body.positions)
+        """The coordinates of the state, in the order of `q`."""
+        given = {c.position.name for c in self.prescribed}
+        return tuple(c for body in self.bodies for c in body.positions if c.name not in given)
 
     @property
     def velocities(self) -> tuple[Coordinate, ...]:
-        """All velocities, in the order of `v`."""
-        return tuple(c for body in self.bodies for c in body.velocities)
+        """The velocities of the state, in the order of `v`."""
+        given = {c.velocity.name for c in self.prescribed}
+        return tuple(c for body in self.bodies for c in body.velocities if c.name not in given)
+
+    @property
+    def prescribed(self) -> tuple[Prescribed, ...]:
+        """The coordinates that are no states: driven ones in the order of the bodies, then locked
+        ones.
+        """
+        drives = {e.joint: e for e in self.effects if isinstance(e, Driven)}
+        values = dict(self.locked)
+        driven, locked = [], []
+        for body in self.bodies if drives or values else ():
+            for x, v in zip(body.positions, body.velocities, strict=False):
+                if drive := drives.get(body.joint.name):
+                    driven.append(Prescribed(x, v, drive.coordinate, drive.name))
+                elif x.name in values:
+                    locked.append(Prescribed(x, v, Constant(values[x.name]), None))
+        return (*driven, *locked)
+
+    @property
+    def driven(self) -> tuple[Prescribed, ...]:
+        """Those of them that a drive moves."""
+        return tuple(c for c in self.prescribed if not c.locked)
+
+    @property
+    def seats(self) -> tuple[Seat, ...]:
+        """Where each body's joint stands among the coordinates and velocities."""
+        given = self.prescribed
+        positions = (*self.coordinates, *(c.position for c in given))
+        velocities = (*self.velocities, *(c.velocity for c in given))
+        q = {c.name: i for i, c in enumerate(positions)}
+        v = {c.name: i for i, c in enumerate(velocities)}
+        return tuple(
+            Seat(b, tuple(q[c.name] for c in b.positions), tuple(v[c.name] for c in b.velocities))
+            for b in self.bodies
+        )
 
     @property
     def first_position(self) -> tuple[int, ...]:
-        """For each body the index in `q` of its joint's first coordinate."""
+        """For each body its joint's first coordinate, where nothing is prescribed."""
         return tuple(accumulate((len(b.positions) for b in self.bodies), initial=0))[:-1]
 
     @property
     def first_velocity(self) -> tuple[int, ...]:
-        """For each body the index in `v` of its joint's first velocity."""
+        """For each body its joint's first velocity, where nothing is prescribed."""
         return tuple(accumulate((len(b.velocities) for b in self.bodies), initial=0))[:-1]
 
     @property
     def turning(self) -> tuple[int, ...]:
-        """For each planar body the index of the coordinate that turns it: its joint's last."""
+        """For each planar body the index of the coordinate that turns it: its joint's last; where
+        nothing is prescribed.
+        """
         return tuple(accumulate((len(b.positions) for b in self.bodies), initial=-1))[1:]
 
     @property
     def quaternions(self) -> tuple[tuple[int, int, int, int], ...]:
         """Indices in `q` of each unit quaternion."""
         found = []
-        for body, first in zip(self.bodies, self.first_position, strict=True):
-            moves = body.joint.moves(self.dimensions)
-            if moves and moves[-1].kind == "spin":
-                w = first + len(body.positions) - 4
-                found.append((w, w + 1, w + 2, w + 3))
+        for seat in self.seats:
+            if seat.quaternion:
+                w, x, y, z = seat.quaternion
+                found.append((w, x, y, z))
         return tuple(found)
+
+    @property
+    def carriers(self) -> tuple[int, ...]:
+        """For each velocity of the state how many others carry it; pairs that M couples."""
+        nv, depth = len(self.velocities), list[int]()
+        found = [0] * nv
+        for seat in self.seats:
+            above = depth[seat.body.parent] if seat.body.parent >= 0 else 0
+            for i in seat.v:
+                if i < nv:
+                    found[i] = above
+                    above += 1
+            depth.append(above)
+        return tuple(found)
+
+    @property
+    def holding(self) -> tuple[Body, ...]:
+        """The bodies whose joint transmits forces: all but those that nothing holds."""
+        given = {c.position.name for c in self.prescribed}
+        return tuple(
+            body
+            for body in self.bodies
+            if not isinstance(body.joint, Free) or any(c.name in given for c in body.positions)
+        )
 
     @property
     def defaults(self) -> dict[str, float]:

@@ -51,6 +51,14 @@ class Digits:
         """Any function of formulas."""
         return FUNCTIONS[function](*arguments)
 
+    def is_zero(self, value: Any) -> bool:
+        """Whether it is 0 here."""
+        return bool(value == 0)
+
+    def named(self, value: Any, name: str) -> Any:
+        """A number has no name."""
+        return value
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Engine:
@@ -91,7 +99,7 @@ class Engine:
     def random_state(self, rng: np.random.Generator) -> np.ndarray:
         """Angles over two turns, slides within 0.6 m, unit quaternions; 3 rad/s, 1 m/s."""
         reach = {"rad": 2 * np.pi, "m": 0.6, "rad/s": 3.0, "m/s": 1.0, "": 1.0}
-        y = np.array([reach[s.unit] * rng.uniform(-1.0, 1.0) for s in self.system.states])
+        y = np.array([reach.get(s.unit, 1.0) * rng.uniform(-1.0, 1.0) for s in self.system.states])
         for indices in map(list, self.module.QUATERNIONS):
             parts = rng.normal(size=4)
             y[indices] = parts / np.linalg.norm(parts)

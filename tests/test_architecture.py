@@ -24,6 +24,7 @@ ORDER = (
     ("scene",),
     ("model",),
     ("straighten",),
+    ("prescribed",),
     ("build",),
     ("derivation",),
     ("templating",),

@@ -68,6 +68,28 @@ def test_a_fall_from_rest_is_the_exact_one(dimensions: int, law: str) -> None:
 
 
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
+def test_named_points_are_places_like_others(dimensions: int) -> None:
+    """Drag at two named points is drag at those two places."""
+    places = ([0.1, -0.2, 0.3][:dimensions], [-0.4, 0.1, 0.2][:dimensions])
+    points = "".join(
+        f'[[points]]\nname = "{name}"\nbody = "drop"\nat = {place}\n'
+        for name, place in zip(("tip", "tail"), places, strict=True)
+    )
+    named = drop(f'{points}{DRAG}points = ["tip", "tail"]\nquadratic = 0.4\n', dimensions)
+    placed = drop(
+        "".join(
+            f'{DRAG.replace("air", f"air_{i}")}body = "drop"\nat = {place}\nquadratic = 0.4\n'
+            for i, place in enumerate(places)
+        ),
+        dimensions,
+    )
+    y = named.random_state(np.random.default_rng(5))
+    found, expected = (made.module.derivative(0.0, y) for made in (named, placed))
+    assert apart(found, expected) < 1e-14
+    assert apart(found, drop("", dimensions).module.derivative(0.0, y)) > 0.01
+
+
+@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 def test_turning_dies_down_as_it_must(dimensions: int) -> None:
     """ω of a linear and quadratic drag together, I ω̇ = -(a + b |ω|) ω, solved by hand."""
     a, b, w = 0.02, 0.05, 6.0
@@ -236,10 +258,18 @@ def test_absence_is_free() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("linear = 0.1", "effects[0].body: is missing; give one of body, bodies"),
+        ("linear = 0.1", "effects[0].body: is missing; give one of body, bodies, points"),
         (
             'body = "drop"\nbodies = "all"\nlinear = 0.1',
-            "effects[0].body: is given beside 'bodies'; give one of body, bodies",
+            "effects[0].body: is given beside 'bodies'; give one of body, bodies, points",
+        ),
+        (
+            'points = ["tip"]\nlinear = 0.1',
+            "effects[0].points[0]: no point is named 'tip'; known: none",
+        ),
+        (
+            'points = ["tip"]\nat = [0, 1]\nlinear = 0.1',
+            "effects[0].at: named points have their own places; leave it out",
         ),
         (
             'bodies = ["drop", "drop"]\nlinear = 0.1',

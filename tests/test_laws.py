@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from engine import MP, Engine, along, apart, engine, exact, read
+from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
 from eomgen.build import build_model
+from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.effects import ExternalForce, Gravity, Motor
+from eomgen.effects.base import JointLoad, Load
 from eomgen.joints import Free
 from eomgen.joints.base import Geared
 from eomgen.language.formula import Formula
@@ -67,9 +69,10 @@ class Moment:
         self.e, self.model, self.module = e, e.model, e.module
         self.doubles = e.random_state(rng)
         self.u = e.random_inputs(rng)
+        self.t = float(rng.uniform(0.0, 2.0))
         self.y = exact(self.doubles)
-        self.nq = len(e.model.coordinates)
-        self.q, self.v = np.split(self.y, [self.nq])
+        self.nq, self.nv = len(e.model.coordinates), len(e.model.velocities)
+        self.q, self.v, self.x = np.split(self.y, [self.nq, self.nq + self.nv])
         self.tau = list(exact(rng.uniform(-9.0, 9.0, len(self.v))))
         self.plane = e.model.dimensions == 2
         self.known: dict[str, np.ndarray] = {}
@@ -81,13 +84,38 @@ class Moment:
 
     def at(self, output: str, y: np.ndarray, p: Mapping[str, float] | None = None) -> np.ndarray:
         """An output at another state."""
-        return self.e.exactly(output, y, self.u, p)
+        return self.e.exactly(output, y, self.u, p, t=self.t)
+
+    def moving(self, y: np.ndarray) -> Dynamics:
+        """What effects may ask, in 60 digits."""
+        q, v, x = np.split(y, [self.nq, self.nq + self.nv])
+        parameters = {name: MP.mpf(value) for name, value in self.module.PARAMETERS.items()}
+        inputs = {name: MP.mpf(value) for name, value in self.u.items()}
+        states = dict(zip((state.name for state in self.model.states), x, strict=True))
+        values = Values(parameters, inputs, list(q), list(v), states, MP.mpf(self.t))
+        return Dynamics(self.model, values, Digits())
+
+    def stored(self, y: np.ndarray) -> Any:
+        """Potential energy of all effects but gravity."""
+        moving = self.moving(y)
+        others = (e for e in self.model.effects if not isinstance(e, Gravity))
+        return sum((e.potential_energy(moving) for e in others), MP.mpf(0))
+
+    def way(self, v: np.ndarray) -> np.ndarray:
+        """Where velocities lead, they themselves held still."""
+        way = self.at("derivative", np.concatenate((self.q, v, self.x)))
+        way[self.nq :] = 0 * way[self.nq :]
+        return way
 
     def slope(self, output: str, v: np.ndarray) -> np.ndarray:
-        """How an output changes along the way that velocities lead, they themselves held still."""
-        way = self.at("derivative", np.concatenate((self.q, v)))
-        way[self.nq :] = exact(np.zeros(len(v)))
-        return along(lambda y: self.at(output, y), self.y, way)
+        """How an output changes that way."""
+        return along(lambda y: self.at(output, y), self.y, self.way(v))
+
+    def slope_of_stored(self, v: np.ndarray) -> Any:
+        """The same of `stored`."""
+        if all(isinstance(effect, PLAIN) for effect in self.model.effects):
+            return MP.mpf(0)
+        return along(self.stored, self.y, self.way(v))
 
     def rate(self, output: str) -> np.ndarray:
         """How an output changes along the motion."""
@@ -96,7 +124,7 @@ class Moment:
     @cached_property
     def vd(self) -> np.ndarray:
         """v̇."""
-        return self["derivative"][self.nq :]
+        return self["derivative"][self.nq : self.nq + self.nv]
 
     # The bodies one by one, in space.
 
@@ -139,10 +167,26 @@ class Moment:
         g = [self.value(e.g) for e in self.model.effects if isinstance(e, Gravity)]
         return -sum(g, MP.mpf(0)) * exact(np.eye(3)[1 if self.plane else 2])
 
-    def pushes(self) -> list[tuple[int, np.ndarray, np.ndarray]]:
-        """External forces: body, place on it in body axes, force in world axes."""
+    @cached_property
+    def others(self) -> list[Any]:
+        """Loads of effects but the plainest, as they tell them: each has a test of its own."""
+        moving = self.moving(self.y)
+        effects = (e for e in self.model.effects if not isinstance(e, PLAIN))
+        return [load for effect in effects for load in effect.loads(moving)]
+
+    def pushes(self) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+        """Forces on bodies: body, place on it in body axes, force and torque in world axes."""
         names = [body.name for body in self.model.bodies]
-        found = []
+        found, none = [], exact(np.zeros(3))
+        for load in self.others:
+            if isinstance(load, Load) and load.body in names:
+                torque = (
+                    none
+                    if not load.torque
+                    else exact([*none[: 3 - len(load.torque)], *load.torque])
+                )
+                at, force = (in_space(np.array(x, dtype=object)) for x in (load.at, load.force))
+                found.append((names.index(load.body), at, force, torque))
         for effect in self.model.effects:
             if isinstance(effect, ExternalForce):
                 force = effect.force
@@ -151,7 +195,7 @@ class Moment:
                 else:
                     ends = "xyz"[: self.model.dimensions]
                     pushed = in_space(exact([self.u[f"{effect.name}_{x}"] for x in ends]))
-                found.append((names.index(effect.body), self.vector(effect.at), pushed))
+                found.append((names.index(effect.body), self.vector(effect.at), pushed, none))
         return found
 
     def torques(self) -> np.ndarray:
@@ -169,6 +213,9 @@ class Moment:
                 torque = effect.torque
                 given = self.u[effect.name] if isinstance(torque, str) else self.value(torque)
                 found[first[effect.joint]] += given
+        for load in self.others:
+            if isinstance(load, JointLoad):
+                found[first[load.joint] + load.coordinate] += load.force
         return found
 
     def armatures(self) -> np.ndarray:
@@ -180,6 +227,10 @@ class Moment:
                 geared = MP.mpf(1) if ratio is None else self.value(ratio)
                 found[first] = geared**2 * self.value(body.joint.motor_inertia)
         return found
+
+
+PLAIN = (Gravity, ExternalForce, Motor)
+"""Effects whose loads are told here by hand."""
 
 
 def in_space(vector: np.ndarray) -> np.ndarray:
@@ -225,11 +276,12 @@ def test_module_is_its_program(m: Moment) -> None:
             continue
         if name.endswith("_dynamics"):
             extra = np.array(m.tau, dtype=float)
-            q, v = np.split(y, [m.nq])
-            found = getattr(module, name)(q, v, extra, u=m.u)
-            expected = m.e.exactly(name, m.y, m.u, extra=m.tau)
+            q, v, x = np.split(y, [m.nq, m.nq + m.nv])
+            given = {"x": x} if m.model.states else {}
+            found = getattr(module, name)(q, v, extra, t=m.t, u=m.u, **given)
+            expected = m.e.exactly(name, m.y, m.u, extra=m.tau, t=m.t)
         else:
-            found, expected = getattr(module, name)(0.0, y, u=m.u), m[name]
+            found, expected = getattr(module, name)(m.t, y, u=m.u), m[name]
         assert apart(found, expected) < ROUNDING, name
 
 
@@ -288,13 +340,13 @@ def units(m: Moment) -> np.ndarray:
 
 
 def test_gravity_force_is_the_slope_of_the_potential(m: Moment) -> None:
-    """G is how U changes along each velocity; U is the weights' height."""
-    slopes = np.array([m.slope("potential_energy", e) for e in units(m)])
+    """G is how the weights' U changes along each velocity; that is their height."""
+    slopes = np.array([m.slope("potential_energy", e) - m.slope_of_stored(e) for e in units(m)])
     assert apart(m["gravity_force"], slopes) < EXACT
     assert ("gravity" in m.module.EFFECTS) == bool(np.any(m.gravity))
     _, centres = m.places(m["body_poses"])
     weights = sum((-a * (m.gravity @ x) for a, x in zip(m.masses, centres, strict=True)), MP.mpf(0))
-    assert apart(m["potential_energy"], weights) < EXACT
+    assert apart(m["potential_energy"], weights + m.stored(m.y)) < EXACT
 
 
 def test_velocity_force(m: Moment) -> None:
@@ -323,10 +375,10 @@ def spinning(body: Any) -> bool:
 
 def test_velocity_force_is_quadratic(m: Moment) -> None:
     """V(q, s v) = s² V(q, v), exactly so where s is a power of two."""
-    q, v = np.split(m.doubles, [m.nq])
+    q, v, x = np.split(m.doubles, [m.nq, m.nq + m.nv])
     V = m.module.velocity_force(0.0, m.doubles)
     for s in (-4.0, 0.0, 0.5):
-        scaled = m.module.velocity_force(0.0, np.concatenate((q, s * v)))
+        scaled = m.module.velocity_force(0.0, np.concatenate((q, s * v, x)))
         assert np.array_equal(scaled, s**2 * V)
 
 
@@ -340,7 +392,7 @@ def test_balance(m: Moment) -> None:
         for name in "mass_matrix velocity_force gravity_force bias_force applied_force".split()
     )
     forward, inverse = (
-        (lambda x, name=name: m.e.exactly(name, m.y, m.u, extra=list(x)))
+        (lambda x, name=name: m.e.exactly(name, m.y, m.u, extra=list(x), t=m.t))
         for name in ("forward_dynamics", "inverse_dynamics")
     )
     assert apart(V + G, h) < EXACT
@@ -350,7 +402,7 @@ def test_balance(m: Moment) -> None:
     assert apart(inverse(pushed), m.tau, M @ pushed, h) < EXACT
     assert apart(inverse(0 * m.v), h - F) < EXACT
     assert apart(forward(0 * m.v), m.vd) < EXACT
-    still = np.concatenate((m.q, 0 * m.v))
+    still = np.concatenate((m.q, 0 * m.v, m.x))
     assert apart(m.at("bias_force", still), G) < EXACT
 
 
@@ -360,12 +412,12 @@ def test_energy_changes_by_the_power_of_applied_forces(m: Moment) -> None:
     power = m.torques() @ m.v
     turned, _ = m.places(m["body_poses"])
     twists = m.twists(m["body_velocities"])
-    for k, at, force in m.pushes():
+    for k, at, force, torque in m.pushes():
         linear, spin = twists[k]
-        power += force @ (linear + cross(spin, turned[k] @ at))
+        power += force @ (linear + cross(spin, turned[k] @ at)) + torque @ spin
     terms = (m.rate("kinetic_energy"), m["kinetic_energy"])
     assert apart(m["applied_force"] @ m.v, power, *terms) < EXACT
-    assert apart(flow, power, *terms) < EXACT
+    assert apart(flow - m.slope_of_stored(m.v), power, *terms) < EXACT
 
 
 # Kinematics and momentum.
@@ -441,8 +493,9 @@ def test_momentum_changes_by_the_forces_from_outside(m: Moment) -> None:
 
     for k, centre in enumerate(centres):
         act(m.masses[k] * m.gravity, centre)
-    for k, at, pushed in m.pushes():
+    for k, at, pushed, turning in m.pushes():
         act(pushed, centres[k] + turned[k] @ at)
+        torque = torque + turning
     points = joint_points(m)
     for k, (f, n) in wrenches(m).items():
         if m.model.bodies[k].parent < 0:
@@ -485,8 +538,8 @@ def test_newton_and_euler_for_each_body(m: Moment) -> None:
         forces[k], torques[k] = forces[k] + f, torques[k] + more
         sizes.extend((f, more))
 
-    for k, at, force in m.pushes():
-        act(k, force, exact(np.zeros(3)), centres[k] + turned[k] @ at)
+    for k, at, force, torque in m.pushes():
+        act(k, force, torque, centres[k] + turned[k] @ at)
     driven = m.torques() - m.armatures() * m.vd
     for k, (f, n) in joints.items():
         body = m.model.bodies[k]

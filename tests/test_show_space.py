@@ -541,7 +541,7 @@ eval(parts[1] + `
   view.azimuth += 360;
   const round = eyeAxes();
   startRaster(width, height);
-  drawSolids(posesOf(stateAt(place(t[last]))), first, scale, left, top);
+  drawSolids(posesOf(stateAt(place(t[last])), t[last]), first, scale, left, top);
   let covered = 0;
   for (const pixel of raster.pixels) covered += pixel !== 0;
   const at = (x, y) => raster.pixels[Math.round(raster.ratio * y) * raster.width

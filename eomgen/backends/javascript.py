@@ -2,21 +2,30 @@
 
 from collections.abc import Sequence
 
+from eomgen.language.formula import FUNCTIONS
 from eomgen.program.printing import Dialect, Names, print_block
 from eomgen.program.system import System
+from eomgen.program.tape import TIME
 from eomgen.templating import render
 
 RESERVED = frozenset(
-    "y p Math break case catch class const continue debugger default delete do else enum eval "
-    "export extends false finally for function if implements import in instanceof interface let "
-    "new null package private protected public return static super switch this throw true try "
-    "typeof var void while with yield await async of get set arguments undefined NaN".split()
+    "y p t select step Math break case catch class const continue debugger default delete do "
+    "else enum eval export extends false finally for function if implements import in "
+    "instanceof interface let new null package private protected public return static super "
+    "switch this throw true try typeof var void while with yield await async of get set "
+    "arguments undefined NaN".split()
 )
-DIALECT = Dialect({name: f"Math.{name}" for name in ("sin", "cos", "tan", "sqrt")}, RESERVED)
+OWN = {
+    "step": "(x) => (x > 0 ? 1 : 0)",
+    "select": "(c, a, b) => (c > 0 ? a : b)",
+}
+"""Functions of formulas that JavaScript has not."""
+DIALECT = Dialect({name: name if name in OWN else f"Math.{name}" for name in FUNCTIONS}, RESERVED)
 
 
 def javascript_poses(system: System) -> str:
-    """`function bodyPoses(y, p)`: the poses of all bodies from state and parameters.
+    """`function bodyPoses(y, p)`: the poses of all bodies from state and parameters; with driven
+    joints `bodyPoses(y, p, t)`, from the time in s, too.
 
     For each body [x, y, angle] in the plane, m and rad; in space the three rows, four numbers each,
     of [world_R_body | position], 1 and m.
@@ -35,7 +44,13 @@ def javascript_poses(system: System) -> str:
     rows = _bracketed(block.results, poses.shape[-1], ", ")
     if len(poses.shape) == 3:  # rows of a matrix each body
         rows = _bracketed(rows, poses.shape[-2], ",\n     ")
-    context = {"given": given, "lines": block.lines, "rows": rows}
+    context = {
+        "timed": TIME in block.inputs,
+        "own_functions": [(name, OWN[name]) for name in block.functions if name in OWN],
+        "given": given,
+        "lines": block.lines,
+        "rows": rows,
+    }
     return render("javascript", "poses.js.jinja", context)
 
 

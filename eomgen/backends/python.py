@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from eomgen.language.formula import FUNCTIONS
+from eomgen.language.formula import FUNCTIONS, written
+from eomgen.model import Model
 from eomgen.program.printing import Block, Dialect, Names, print_block
 from eomgen.program.program import cost
 from eomgen.program.system import System
@@ -58,6 +59,7 @@ ABOUT = {
     "point_positions": "World place of each of `POINTS`, m.",
     "point_velocities": "World velocity of each of `POINTS`, m/s.",
     "point_jacobians": "J of each of `POINTS`: its world velocity is J v.",
+    "driving_forces": "What each of `DRIVEN` takes, N m or N, on the child and back on the parent.",
 }
 ABOUT_PLANE = {
     "momentum": "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
@@ -101,7 +103,9 @@ def python_module(system: System) -> str:
         for name, output in program.outputs.items()
     }
     kernels = {name: _kernel(system, name, block, names) for name, block in blocks.items()}
-    called = [f for f in FUNCTIONS if any(f in block.functions for block in blocks.values())]
+    moving = {f for block in blocks.values() for f in block.functions}
+    fixed, once = _fixed(system, blocks, names)
+    called = [f for f in FUNCTIONS if f in moving or f in once]
     dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
     special = {"initial_state", "derivative", *DERIVATIVES, *(name for name, _, _ in dynamics)}
     quaternions = tuple(model.quaternions) if model.form == "velocity" else ()
@@ -125,19 +129,20 @@ def python_module(system: System) -> str:
         "effects": repr(tuple(effect.type for effect in model.effects)),
         "effect_names": repr(tuple(effect.name for effect in model.effects)),
         "bodies": repr(tuple(body.name for body in model.bodies)),
-        "joints": repr(tuple(b.joint.name for b in model.bodies if b.joint.type != "free")),
+        "joints": repr(tuple(body.joint.name for body in model.holding)),
+        "driven": repr(tuple(c.position.name for c in model.driven)) if model.driven else "",
         "points": repr(tuple(point.name for point in model.points)),
         "costs": [(name, json.dumps(cost(program, name))) for name in kernels],
         "kernels": list(kernels.values()),
         "math_functions": sorted({"isfinite", *(f for f in called if hasattr(math, f))}),
         "own_functions": [(f, *OWN[f]) for f in called if f in OWN],
-        "columns": [(f, COLUMNS[f]) for f in called],
+        "columns": [(f, COLUMNS[f]) for f in called if f in moving],
         "timed": any(kernel.time for kernel in kernels.values()),
         "derivative": kernels["derivative"],
         "outputs": [kernel for name, kernel in kernels.items() if name not in special],
         "derivatives": [kernel for name, kernel in kernels.items() if name in DERIVATIVES],
         "dynamics": [(kernels[name], *rest) for name, *rest in dynamics if name in kernels],
-        **_fixed(system, blocks, names),
+        **fixed,
     }
     return render("python", "module.py.jinja", context)
 
@@ -161,8 +166,12 @@ def _kernel(system: System, name: str, block: Block, names: Names) -> Kernel:
     )
 
 
-def _fixed(system: System, blocks: Mapping[str, Block], names: Names) -> dict[str, Any]:
-    """What depends on parameters alone: lines, and what must be positive with the lines for it."""
+def _fixed(
+    system: System, blocks: Mapping[str, Block], names: Names
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """What depends on parameters alone: lines, and what must be positive with the lines for it;
+    and the functions that these call.
+    """
     program = system.program
     roots = sorted({i for block in blocks.values() for i in block.constants})
     made = [i for i in roots if program.steps[i].operation != "input"]
@@ -179,7 +188,7 @@ def _fixed(system: System, blocks: Mapping[str, Block], names: Names) -> dict[st
             for check, source in zip(program.checks, checked.results, strict=True)
         ],
         "fixed": [(name, source) for name, source in fixed.lines if name not in known],
-    }
+    }, (*checked.functions, *fixed.functions)
 
 
 _BOUNDS = {False: (">", "not positive"), True: (">=", "negative")}
@@ -232,14 +241,36 @@ def _document(system: System) -> list[str]:
                 for p in model.parameters
             ]
         )
+    lines += _given(model)
     effects = ", ".join(effect.type for effect in model.effects) or "none"
     lines += ["", f"Effects: {effects}."]
+    if "velocity_forces" in model.leave_out:
+        lines.append("Left out: velocity forces V, so M v̇ + G = F (V: what driven joints take).")
     counts = cost(system.program, "derivative")
     lines += textwrap.wrap(
         f"One call of `derivative` takes {_operations(counts)}; "
         f"{counts['parameters']} more on parameters alone are done once.",
         WIDTH,
     )
+    return lines
+
+
+def _given(model: Model) -> list[str]:
+    """What there is to say of coordinates that are no states."""
+    lines: list[str] = []
+    if model.driven:
+        rows = [
+            (f"{c.position.name} = {written(c.value)}", c.position.unit, c.position.about)
+            for c in model.driven
+        ]
+        lines += ["", "Driven coordinates, which are no states:", *_table(rows)]
+        lines.append("M, V, G, F are of the other velocities; V holds what driving takes, too.")
+    if locked := [c for c in model.prescribed if c.locked]:
+        rows = [
+            (f"{c.position.name} = {written(c.value)}", c.position.unit, c.position.about)
+            for c in locked
+        ]
+        lines += ["", "Locked coordinates, which are no states:", *_table(rows)]
     return lines
 
 

@@ -13,6 +13,7 @@ from eomgen.commands.shared import (
 )
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.joints.base import WORLD, Geared
+from eomgen.language.formula import written
 from eomgen.model import Body, Model
 from eomgen.scene.reader import built_in_names, read_scene
 
@@ -50,6 +51,11 @@ def check(given: Arguments) -> int:
     for line in shortened([_joint(model, body) for body in model.bodies], most):
         print_wrapped("joint       ", line)
     print(f"freedom     {freedom}")
+    for c in model.prescribed:
+        label = "locked      " if c.locked else "driven      "
+        print_wrapped(label, f"{c.position.name} = {written(c.value)} {c.position.unit}")
+    for words in model.leave_out:
+        print(f"left out    {words.replace('_', ' ')}")
     print_listed("points      ", shortened([point.name for point in model.points], most))
     effects = [effect.type for effect in model.effects]
     counted = [

@@ -107,8 +107,10 @@ def _print_excursions(model: Model, trajectory: Trajectory) -> None:
             f"{out.low:g} to {out.high:g} {unit}{when}; "
             f"farthest {out.farthest:.4g} {unit} at t = {out.at:.4g} s"
         )
+    given = {c.position.name: "locked" if c.locked else "driven" for c in model.prescribed}
+    why = f"is no state of the form '{model.form}'"
     lines += [
-        f"{name} has limits, but is no state of the form '{model.form}'"
+        f"{name} has limits, but {f'is {given[name]}' if name in given else why}"
         for name in limits
         if name not in trajectory.states
     ]

@@ -44,7 +44,9 @@ def read_model(scene: str, given: Arguments) -> tuple[Model, str]:
                 model = replace(model, **{option: wanted})
                 name = f"{name}_{wanted}"
         if asked is not None:
-            chosen = outputs_for(names, "--outputs", model.points, model.inputs, model.parameters)
+            chosen = outputs_for(
+                names, "--outputs", model.points, model.inputs, model.parameters, model.driven
+            )
             model = replace(model, outputs=chosen)
     return model, name
 

@@ -41,7 +41,13 @@ def why_not_tried(model: Model) -> str:
 
 
 def why_not_plain(model: Model) -> str:
-    """What keeps a model from any closed form: an effect of more than poses and inputs."""
+    """What keeps a model from any closed form: motion that is given, something left out, or an
+    effect of more than poses and inputs.
+    """
+    for c in model.prescribed:
+        return f"it takes no {'locked' if c.locked else 'driven'} coordinate ('{c.position.name}')"
+    for words in model.leave_out:
+        return f"it leaves nothing out ('{words}')"
     for effect in model.effects:
         if not effect.is_plain(model.defaults):
             return f"it takes no '{effect.type}' that depends on the motion ('{effect.name}')"

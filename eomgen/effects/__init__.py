@@ -8,6 +8,7 @@ from eomgen.effects.attraction import PointGravity
 from eomgen.effects.contact import BodyContact
 from eomgen.effects.controller import Controller
 from eomgen.effects.drag import Drag
+from eomgen.effects.driven import Driven
 from eomgen.effects.external_force import ExternalForce
 from eomgen.effects.external_torque import ExternalTorque
 from eomgen.effects.field import ForceField
@@ -25,6 +26,7 @@ Effect = Annotated[
     | BodyContact
     | Controller
     | Drag
+    | Driven
     | ExternalForce
     | ExternalTorque
     | ForceField
@@ -44,6 +46,7 @@ __all__ = [
     "BodyContact",
     "Controller",
     "Drag",
+    "Driven",
     "Effect",
     "ExternalForce",
     "ExternalTorque",

@@ -104,6 +104,9 @@ class Mechanism(Protocol):
         world is a body, too, with its origin for a centre of mass.
         """
 
+    def point(self, name: str) -> tuple[str, Vector]:
+        """A named point: its body, and where on it, from the centre of mass in body axes, m."""
+
     def velocity(self, body: str, at: Vector) -> Vector:
         """World velocity of such a point, m/s."""
 
@@ -144,6 +147,10 @@ class Unmoved:
         """Never asked for."""
         raise AssertionError(body)
 
+    def point(self, name: str) -> tuple[str, Vector]:
+        """Never asked for."""
+        raise AssertionError(name)
+
     def velocity(self, body: str, at: Vector) -> Vector:
         """Never asked for."""
         raise AssertionError(body)
@@ -183,6 +190,8 @@ class EffectTable(Table):
     body_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that name a body, or list some; `anchor_fields` may name the world, too."""
     anchor_fields: ClassVar[tuple[str, ...]] = ()
+    point_fields: ClassVar[tuple[str, ...]] = ()
+    """Fields that list named points of the scene."""
     joint_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that name a revolute or prismatic joint, or hold a table by such names."""
     vector_fields: ClassVar[tuple[str, ...]] = ()

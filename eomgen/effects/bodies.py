@@ -17,14 +17,20 @@ LEAST_SQUARE = 1e-300
 
 
 class OnBodies(EffectTable):
-    """An effect on the point `at` of `body`, or of each of `bodies`, which may be "all"."""
+    """An effect on the point `at` of `body`, or of each of `bodies`, which may be "all"; or on each
+    of the scene's own `points`, by their names.
+    """
 
     body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies")
+    point_fields = ("points",)
     vector_fields: ClassVar[tuple[str, ...]] = ("at",)
 
     body: Identifier | None = Field(default=None, description="body it acts on")
     bodies: Literal["all"] | Annotated[tuple[Identifier, ...], Field(min_length=1)] | None = Field(
         default=None, description="bodies it acts on, if several; 'all' are all of the scene"
+    )
+    points: Annotated[tuple[Identifier, ...], Field(min_length=1)] | None = Field(
+        default=None, description="named points it acts on, instead of bodies"
     )
     at: VectorField = quantity(
         "m", "point from the centre of mass", default=(), validate_default=False
@@ -32,13 +38,17 @@ class OnBodies(EffectTable):
 
     @model_validator(mode="after")
     def _one_or_several(self) -> Self:
-        if (self.body is None) == (self.bodies is None):
-            what = "is missing" if self.body is None else "is given beside 'bodies'"
-            raise wrong("body", f"{what}; give one of body, bodies")
-        listed = self.bodies if isinstance(self.bodies, tuple) else ()
-        for i, name in enumerate(listed):
+        given = [key for key in ("body", "bodies", "points") if getattr(self, key) is not None]
+        if len(given) != 1:
+            what = f"is given beside '{given[1]}'" if given else "is missing"
+            key = given[0] if given else "body"
+            raise wrong(key, f"{what}; give one of body, bodies, points")
+        if given == ["points"] and self.at:
+            raise wrong("at", "named points have their own places; leave it out")
+        listed = getattr(self, given[0])
+        for i, name in enumerate(listed if isinstance(listed, tuple) else ()):
             if name in listed[:i]:
-                raise wrong(f"bodies[{i}]", f"'{name}' is listed twice; leave one out")
+                raise wrong(f"{given[0]}[{i}]", f"'{name}' is listed twice; leave one out")
         return self
 
     def acted_on(self, mechanism: Mechanism) -> tuple[str, ...]:
@@ -47,8 +57,11 @@ class OnBodies(EffectTable):
             return (self.body,)
         return self.bodies if isinstance(self.bodies, tuple) else mechanism.bodies
 
-    def points(self, mechanism: Mechanism) -> Iterator[tuple[str, Vector]]:
+    def places(self, mechanism: Mechanism) -> Iterator[tuple[str, Vector]]:
         """Each body with the point on it, body axes, m."""
+        if self.points is not None:
+            yield from (mechanism.point(name) for name in self.points)
+            return
         at = tuple(mechanism.value(part) for part in self.at)
         for body in self.acted_on(mechanism):
             yield body, at

@@ -86,7 +86,7 @@ class ForceField(OnBodies):
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """The force on each body."""
-        for body, at in self.points(mechanism):
+        for body, at in self.places(mechanism):
             if self.kind == "formula":
                 names = local_names(mechanism, self.force, body, at)
                 force: Vector = tuple(mechanism.value(part, **names) for part in self.force)
@@ -101,7 +101,7 @@ class ForceField(OnBodies):
         total = mechanism.number(0.0)
         if self.kind not in ("attract", "repel"):
             return total
-        for body, at in self.points(mechanism):
+        for body, at in self.places(mechanism):
             square = self._square(mechanism, self._way(mechanism, body, at))
             if self.power == 1:
                 part = mechanism.number(0.5) * mechanism.call("log", square)

@@ -2,6 +2,8 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
+from eomgen.language.slopes import slope
+from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import Node, Step, Tape
 
 
@@ -55,7 +57,7 @@ def _between(tape: Tape, outputs: Sequence[Node], inputs: Collection[int]) -> li
 
 
 def _slope(tape: Tape, i: int, step: Step, slopes: Mapping[int, Node]) -> Node:
-    zero, one, two = (tape.constant(x) for x in (0.0, 1.0, 2.0))
+    zero, two = tape.constant(0.0), tape.constant(2.0)
     value = Node(tape, i)
     nodes = [Node(tape, o) for o in step.operands]
     d = [slopes.get(o, zero) for o in step.operands]
@@ -72,38 +74,6 @@ def _slope(tape: Tape, i: int, step: Step, slopes: Mapping[int, Node]) -> Node:
             return (d[0] - value * d[1]) / nodes[1]
         case "neg":
             return -d[0]
-        case "sin":
-            return tape.apply("cos", nodes[0]) * d[0]
-        case "cos":
-            return -(tape.apply("sin", nodes[0]) * d[0])
-        case "tan":
-            return (one + value * value) * d[0]
-        case "sqrt":
-            return d[0] / (two * value)
-        case "asin":
-            return d[0] / tape.apply("sqrt", one - nodes[0] * nodes[0])
-        case "acos":
-            return -(d[0] / tape.apply("sqrt", one - nodes[0] * nodes[0]))
-        case "atan":
-            return d[0] / (one + nodes[0] * nodes[0])
-        case "exp":
-            return value * d[0]
-        case "log":
-            return d[0] / nodes[0]
-        case "tanh":
-            return (one - value * value) * d[0]
-        case "abs":
-            return tape.apply("select", nodes[0], d[0], -d[0])
-        case "step":
-            return zero
-        case "atan2":
-            y, x = nodes
-            return (x * d[0] - y * d[1]) / (x * x + y * y)
-        case "min":
-            return tape.apply("select", nodes[1] - nodes[0], d[0], d[1])
-        case "max":
-            return tape.apply("select", nodes[0] - nodes[1], d[0], d[1])
-        case "select":
-            return tape.apply("select", nodes[0], d[1], d[2])
-        case other:
-            raise AssertionError(f"no derivative is known for {other}")
+        case function:
+            changed: Node = slope(function, value, nodes, d, TapeScalars(tape))
+            return changed

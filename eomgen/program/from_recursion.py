@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from eomgen.derivation.recursive import observe
-from eomgen.derivation.recursive.composite import full, solved
+from eomgen.derivation.recursive.composite import Entries, full, solved
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.reactions import reactions
@@ -56,7 +56,7 @@ class Recording:
             "ldl": self.dynamics.factored_forward,
         }
         self.forward: Forward = forward(self) if forward is not None else recursions[route]
-        self.vd = self.forward(None)
+        self.vd = self.dynamics.vd = self.forward(None)
         self.position_rates = position_rates(model, self.q, self.v, self.tape)
         self.rates = [*self.position_rates, *self.vd, *self.dynamics.state_rates]
 
@@ -74,13 +74,11 @@ def position_rates(model: Model, q: Sequence[Node], v: Sequence[Node], tape: Tap
     """q̇ of every coordinate: its own velocity, or ½ q ∘ ω of a quaternion (ω in its own axes)."""
     rates: list[Node] = []
     half = tape.constant(0.5)
-    starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
-    for body, first_q, first_v in starts:
-        plain = len(body.positions) - (4 if len(body.positions) != len(body.velocities) else 0)
-        rates += v[first_v : first_v + plain]
-        if plain != len(body.positions):
-            w, x, y, z = q[first_q + plain : first_q + plain + 4]
-            a, b, c = (half * part for part in v[first_v + plain : first_v + plain + 3])
+    for seat in model.seats:
+        rates += [v[j] for _, j in seat.plain if j < len(v)]
+        if seat.quaternion:
+            w, x, y, z = (q[i] for i in seat.quaternion)
+            a, b, c = (half * v[j] for j in seat.spin)
             rates += [
                 -(x * a + y * b + z * c),
                 w * a + y * c - z * b,
@@ -177,6 +175,8 @@ def output(
             if dims == 2:
                 return (nb, 3), [x for u, w in moved for x in (u[0], u[1], w[2])]
             return (nb, 6), [x for u, w in moved for x in (*u, *w)]
+        case "driving_forces":
+            return (len(d.driving_forces),), d.driving_forces
         case "joint_forces":
             found = reactions(d, record.vd)
             width = 3 if dims == 2 else 6
@@ -249,13 +249,13 @@ def variables(record: Recording, name: str) -> list[Node]:
 
 
 def _is_small(record: Recording, name: str) -> bool:
-    """Whether a matrix is worth writing out: what its columns take to be solved for."""
-    factors = record.dynamics.factors.above if len(record.v) <= 60 else None
-    if factors is None:
-        return False
-    pairs = sum(len(above) for above in factors)
+    """Whether a matrix is worth writing out: its entries, or what its columns take to be solved
+    for, are few.
+    """
+    pairs, columns = sum(record.model.carriers), len(variables(record, name))
     products = 100 if record.model.dimensions == 3 else 20
-    return 4 * pairs * len(variables(record, name)) + products * pairs <= LARGEST_JACOBIAN
+    operations = 4 * pairs * columns + products * pairs
+    return max(operations, columns * len(record.rates)) <= LARGEST_JACOBIAN
 
 
 def _matrix(record: Recording, name: str) -> list[list[Node]]:
@@ -264,7 +264,7 @@ def _matrix(record: Recording, name: str) -> list[list[Node]]:
     """
     d, tape = record.dynamics, record.tape
     zero = tape.constant(0.0)
-    by = variables(record, name)
+    by, factors = variables(record, name), d.factors
     moved = jacobian(d.applied_force, by)
     if name == "jacobian":
         columns = _state_columns(record)
@@ -277,7 +277,7 @@ def _matrix(record: Recording, name: str) -> list[list[Node]]:
     else:
         columns = [[zero] * len(record.v) for _ in by]
     answers = [
-        solved(d.factors, [row[k] - part for row, part in zip(moved, column, strict=True)])
+        solved(factors, [row[k] - part for row, part in zip(moved, column, strict=True)])
         for k, column in enumerate(columns)
     ]
     below = [list(row) for row in zip(*answers, strict=True)] or [[] for _ in record.v]
@@ -293,19 +293,17 @@ def _state_columns(record: Recording) -> list[list[Node]]:
     slopes = sensitivity(d.in_world, moving, accelerating, base, record.scalars)
     nv, zero, two = len(record.v), tape.constant(0.0), tape.constant(2.0)
 
-    def column(entries: object, j: int) -> list[Node]:
-        return [entries.get((i, j), zero) for i in range(nv)]  # type: ignore[attr-defined]
+    def column(entries: Entries, j: int) -> list[Node]:
+        return [entries.get((i, j), zero) for i in range(nv)]
 
     columns: list[list[Node]] = []
-    starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
-    for body, first_q, first_v in starts:
-        plain = len(body.positions) - (4 if len(body.positions) != len(body.velocities) else 0)
-        columns += [column(slopes.by_position, first_v + i) for i in range(plain)]
-        if plain == len(body.positions):
+    for seat in model.seats:
+        columns += [column(slopes.by_position, j) for _, j in seat.plain if j < nv]
+        if not seat.quaternion:
             continue
-        w, x, y, z = record.q[first_q + plain : first_q + plain + 4]
+        w, x, y, z = (record.q[i] for i in seat.quaternion)
         k = two / (w * w + x * x + y * y + z * z)
-        turns = [column(slopes.by_position, first_v + plain + i) for i in range(3)]
+        turns = [column(slopes.by_position, j) for j in seat.spin]
         # δ = (2/|q|²) Im(q* dq): the small angle in own axes that a change of q is.
         for signs in ((-x, -y, -z), (w, -z, y), (z, w, -x), (-y, x, w)):
             weights = [k * sign for sign in signs]

@@ -103,14 +103,7 @@ def least_factoring(model: Model) -> int:
     """Operations of LᵀDL at least: for each velocity a division and a product and a difference for
     every pair of velocities that carry it.
     """
-    depth: list[int] = []
-    total = 0
-    for body in model.bodies:
-        start = depth[body.parent] if body.parent >= 0 else 0
-        for above in range(start, start + len(body.velocities)):
-            total += above + above * (above + 1)
-        depth.append(start + len(body.velocities))
-    return total
+    return sum(above + above * (above + 1) for above in model.carriers)
 
 
 def _closed(model: Model, jacobian: bool) -> System:

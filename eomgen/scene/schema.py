@@ -28,6 +28,7 @@ Output = Literal[
     "momentum",
     "centre_of_mass",
     "joint_forces",
+    "driving_forces",
     "body_poses",
     "body_velocities",
     "point_positions",
@@ -65,6 +66,8 @@ Integrator = Literal[
 ]
 Form = Literal["velocity", "momentum", "redundant"]
 Route = Literal["auto", "closed", "ldl", "aba"]
+LeftOut = Literal["velocity_forces"]
+"""What a scene may leave out of the equations on purpose."""
 
 
 class ParameterTable(Table):
@@ -162,6 +165,10 @@ class Scene(Table):
     chains: Annotated[tuple[ChainTable, ...], Field(max_length=MOST)] = ()
     points: Annotated[tuple[PointTable, ...], Field(max_length=MOST)] = ()
     effects: Annotated[tuple[Effect, ...], Field(max_length=MOST)] = ()
+    locked: Annotated[dict[Identifier, Number], Field(max_length=MOST)] = Field(
+        default={}, description="coordinates held fast, by name (<name>_deg for an angle)"
+    )
+    leave_out: Annotated[tuple[LeftOut, ...], Field(max_length=1)] = ()
     initial: Initial = Initial()
     simulation: Simulation = Simulation()
     camera: Camera = Camera()

@@ -38,9 +38,9 @@ def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Mo
     with np.errstate(
         all="ignore"
     ):  # a run that was stopped may hold numbers whose squares overflow
-        poses = np.moveaxis(module.body_poses(0.0, columns, p), -1, 0)
-        kinetic = module.kinetic_energy(0.0, columns, p)
-        potential = module.potential_energy(0.0, columns, p)
+        poses = np.moveaxis(module.body_poses(trajectory.t, columns, p), -1, 0)
+        kinetic = module.kinetic_energy(trajectory.t, columns, p)
+        potential = module.potential_energy(trajectory.t, columns, p)
         drift = joint_drift(model, poses)
     return Motion(
         name=model.name,

@@ -21,11 +21,11 @@ BUDGET = 4000
 def render_page(motion: Motion, poses_source: str, parameters: tuple[float, ...]) -> str:
     """Return the page that plays `motion` from its state vector.
 
-    `poses_source` is the JavaScript text of `function bodyPoses(y, p)`, which returns the poses of
-    the bodies from the state `y` (ny,) and `parameters` `p`: in the plane `[[x, y, angle], …]` (m,
-    m, rad), in space `[[[r11, r12, r13, x], […], […]], …]`, rows of [world_R_body | position] (1,
-    m). The page calls it for every picture it draws. Arrays lie in the page as float64, bit for
-    bit. Raises `RunError` if no sample is finite.
+    `poses_source` is the JavaScript text of `function bodyPoses(y, p, t)`, which returns the poses
+    of the bodies from the state `y` (ny,), `parameters` `p` and the time: in the plane
+    `[[x, y, angle], …]` (m, m, rad), in space `[[[r11, r12, r13, x], […], […]], …]`, rows of
+    [world_R_body | position] (1, m). The page calls it for every picture it draws. Arrays lie in
+    the page as float64, bit for bit. Raises `RunError` if no sample is finite.
     """
     assert not re.search(r"</script|<!--", poses_source, re.IGNORECASE), "would end its script"
     shown = thinned(motion)

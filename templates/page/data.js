@@ -1,6 +1,6 @@
-// What the page knows: the run, and its state and poses at any time. `bodyPoses(y, p)`, written by
-// the generator, gives the poses of all bodies for any state, so that what moves here is the state
-// itself and not a recorded film.
+// What the page knows: the run, and its state and poses at any time. `bodyPoses(y, p, t)`, written
+// by the generator, gives the poses of all bodies for any state and time, so that what moves here is
+// the state itself and not a recorded film.
 
 const byId = (id) => document.getElementById(id);
 const run = JSON.parse(byId("run").textContent);
@@ -42,7 +42,7 @@ function stateAt(where) {
   }
   return state;
 }
-const posesOf = (state) => bodyPoses(state, run.parameters);
+const posesOf = (state, time) => bodyPoses(state, run.parameters, time);
 
 // What is read well on the background.
 function luminance(color) {

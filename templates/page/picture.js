@@ -3,7 +3,7 @@
 
 // Centres of mass of the traced bodies at every sample.
 const paths = Array.from(t, (_, i) => {
-  const poses = posesOf(y.subarray(i * ny, (i + 1) * ny));
+  const poses = posesOf(y.subarray(i * ny, (i + 1) * ny), t[i]);
   return run.traced.map((body) => positionOf(poses[body]));
 });
 
@@ -32,7 +32,7 @@ function roundLength(length) {
 function draw() {
   const where = place(clock.time);
   const state = stateAt(where);
-  const poses = posesOf(state);
+  const poses = posesOf(state, clock.time);
   const ratio = window.devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   if (canvas.width !== Math.round(width * ratio)) canvas.width = Math.round(width * ratio);

@@ -8,7 +8,9 @@ acceleration a of the origin,
 where accelerations are counted from those that the mechanism would have if its velocities did not
 change, so that p is made of forces alone. Eliminating the acceleration along an axis of motion
 leaves a form of the same kind; along a coordinate axis it also leaves that row zero, and then the
-acceleration found is the absolute one, from which the parent's is taken off.
+acceleration found is the absolute one, from which the parent's is taken off. A driven axis is not
+eliminated: its acceleration is given and part of what is counted from, so that all of the
+resistance passes on to the parent.
 """
 
 from collections.abc import Sequence
@@ -64,14 +66,14 @@ Pivots = tuple[tuple[Pivot, ...], ...]
 
 
 def articulate(instant: Instant, scalars: Scalars) -> Pivots:
-    """Eliminate every axis of motion, leaves first."""
+    """Eliminate every axis of motion that is free, leaves first."""
     links = instant.links
     sums = [resistance_of(link, scalars.number(0.0)) for link in links]
     pivots: list[tuple[Pivot, ...]] = [()] * len(links)
     for k in reversed(range(len(links))):
         link, p = links[k], sums[k]
         found = []
-        for axis in link.axes:
+        for axis, _ in link.free:
             pivot, p = eliminated(p, axis, link, scalars)
             found.append(pivot)
         pivots[k] = tuple(found)
@@ -100,7 +102,7 @@ def _inwards(
     shares = list(tau)
     for k in reversed(range(len(links))):
         link, p = links[k], sums[k]
-        for axis, pivot, i in zip(link.axes, pivots[k], link.v, strict=True):
+        for (axis, i), pivot in zip(link.free, pivots[k], strict=True):
             left = tau[i] - along(axis, p.moment, p.force)
             shares[i] = left / pivot.d
             p = Force(add(p.moment, scale(left, pivot.u)), add(p.force, scale(left, pivot.w)))
@@ -126,7 +128,7 @@ def _outwards(
             base_angular, base_linear = reached[link.parent]
             angular = link.turn.into(base_angular)
             linear = link.turn.into(add(base_linear, cross(base_angular, link.arm)))
-        for axis, pivot, i in reversed(list(zip(link.axes, pivots[k], link.v, strict=True))):
+        for (axis, i), pivot in reversed(list(zip(link.free, pivots[k], strict=True))):
             value = shares[i] - (dot(pivot.u, angular) + dot(pivot.w, linear))
             if pivot.absolute:
                 result[i] = value - along(axis, angular, linear)

@@ -62,18 +62,20 @@ def force_to_move(body: Rigid, angular: Vec, linear: Vec) -> Force:
 
 
 def mass_entries(instant: Instant, scalars: Scalars) -> Entries:
-    """The entries of M at and below the diagonal that are not zero by the tree's shape."""
+    """The entries of M at and below the diagonal that are not zero by the tree's shape, rows and
+    columns of driven motions left out.
+    """
     bodies = composite_bodies(instant, scalars)
     zero = scalars.number(0.0)
     nothing = (zero, zero, zero)
     entries: dict[tuple[int, int], Scalar] = {}
     for k, link in enumerate(instant.links):
-        for n, (axis, i) in enumerate(zip(link.axes, link.v, strict=True)):
+        for n, (axis, i) in enumerate(link.free):
             angular, linear = (
                 (axis.direction, nothing) if axis.angular else (nothing, axis.direction)
             )
             force = force_to_move(bodies[k], angular, linear)
-            for other, j in zip(link.axes[: n + 1], link.v[: n + 1], strict=True):
+            for other, j in link.free[: n + 1]:
                 entries[i, j] = dot(other.direction, force.moment if other.angular else force.force)
             entries[i, i] = entries[i, i] + link.armature
             above, inner = k, force
@@ -81,7 +83,7 @@ def mass_entries(instant: Instant, scalars: Scalars) -> Entries:
                 inner = at_parent(instant.links[above], inner)
                 above = instant.links[above].parent
                 outer = instant.links[above]
-                for other, j in zip(outer.axes, outer.v, strict=True):
+                for other, j in outer.free:
                     part = inner.moment if other.angular else inner.force
                     entries[i, j] = dot(other.direction, part)
     return entries
@@ -98,16 +100,15 @@ def full(entries: Entries, nv: int, scalars: Scalars) -> list[Scalar]:
 
 
 def ancestors(instant: Instant) -> tuple[tuple[int, ...], ...]:
-    """For each velocity those that carry it, nearest first; itself left out."""
+    """For each free velocity those that carry it, nearest first; itself left out."""
     found: dict[int, tuple[int, ...]] = {}
+    reached: list[tuple[int, ...]] = []  # of each link, its own with those above
     for link in instant.links:
-        above: tuple[int, ...] = ()
-        if link.parent >= 0:
-            last = instant.links[link.parent].v[-1]
-            above = (last, *found[last])
-        for i in link.v:
+        above = reached[link.parent] if link.parent >= 0 else ()
+        for _, i in link.free:
             found[i] = above
             above = (i, *above)
+        reached.append(above)
     return tuple(found[i] for i in sorted(found))
 
 

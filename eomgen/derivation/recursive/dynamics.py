@@ -3,6 +3,12 @@
 This is the one place that knows in which axes each algorithm is cheapest: forces and the
 articulated-body recursion in the frames' own axes in space, in the world's in the plane, where
 angles add up; composite bodies in the world's, where nothing is turned again and again.
+
+All frames move, the driven ones as they are told, and M v̇ + V + G = F is that of the free
+velocities alone: V holds what the driven accelerations take, too. Where a scene leaves the velocity
+forces out, inertia feels no velocities (`felt`), so that V is what driven accelerations take and
+nothing else, gyroscopic torques are gone, and joints transmit what the remaining equations ask for;
+effects, energies and everything that moves still have them. Energy is then not kept.
 """
 
 from collections.abc import Sequence
@@ -27,7 +33,7 @@ from eomgen.derivation.recursive.motion import (
 )
 from eomgen.derivation.recursive.moving import Moving, Values
 from eomgen.derivation.recursive.vectors import Scalar, sub, zeros
-from eomgen.effects import Effect, Gravity
+from eomgen.effects import Driven, Effect, Gravity
 from eomgen.effects.base import JointLoad, Load
 from eomgen.joints import Free
 from eomgen.joints.base import WORLD
@@ -42,20 +48,39 @@ class Dynamics(Moving):
         self, vd: Sequence[Scalar] | None, *, still: bool = False, weightless: bool = False
     ) -> tuple[Acceleration, ...]:
         """Accelerations of the frames at v̇, counted from free fall; `still` leaves v out."""
-        zero = self.scalars.number(0.0)
-        v = [zero] * self.nv if still else self.values.v
-        moving = velocities(self.instant, v, self.scalars) if still else self.moving
+        v, moving = self._stopped if still else self.felt
         nothing = zeros(self.scalars)
         base = nothing if weightless else sub(nothing, self.down)
+        vd = vd if still else self.with_driven(vd)
         return accelerations(self.instant, moving, v, vd, base, self.scalars)
+
+    @cached_property
+    def felt(self) -> tuple[Sequence[Scalar], tuple[Twist, ...]]:
+        """All velocities and those of the frames, as inertia feels them."""
+        if "velocity_forces" in self.model.leave_out:
+            return self._stopped
+        return self.v, self.moving
+
+    @cached_property
+    def _stopped(self) -> tuple[Sequence[Scalar], tuple[Twist, ...]]:
+        v = [self.scalars.number(0.0)] * self.moved
+        return v, velocities(self.instant, v, self.scalars)
+
+    def with_driven(self, vd: Sequence[Scalar] | None) -> Sequence[Scalar] | None:
+        """v̇ (None: nothing) with the accelerations of driven velocities."""
+        if self.moved == self.nv:
+            return vd
+        driven = [a for _, _, a in self.given[: self.moved - self.nv]]
+        return [*([self.scalars.number(0.0)] * self.nv if vd is None else vd), *driven]
 
     def motion_in_world(
         self, vd: Sequence[Scalar]
     ) -> tuple[tuple[Twist, ...], tuple[Acceleration, ...]]:
         """Velocities and accelerations of the frames at v̇, in world axes."""
-        v, base = self.values.v, sub(zeros(self.scalars), self.down)
+        v, base = self.felt[0], sub(zeros(self.scalars), self.down)
         moving = velocities(self.in_world, v, self.scalars)
-        return moving, accelerations(self.in_world, moving, v, vd, base, self.scalars)
+        whole = self.with_driven(vd)
+        return moving, accelerations(self.in_world, moving, v, whole, base, self.scalars)
 
     # Forces.
 
@@ -89,19 +114,24 @@ class Dynamics(Moving):
 
     @cached_property
     def motors(self) -> list[Scalar]:
-        """The loads on each velocity's own joint."""
-        forces = [self.scalars.number(0.0)] * self.nv
+        """The loads on each velocity's own joint, driven ones too; a locked joint holds its own."""
+        forces = [self.scalars.number(0.0)] * self.moved
         for load in self.loads[1]:
-            i = self.first[load.joint][1] + load.coordinate
-            forces[i] = forces[i] + load.force
+            i = self.seats[load.joint].v[load.coordinate]
+            if i < self.moved:
+                forces[i] = forces[i] + load.force
         return forces
+
+    @cached_property
+    def _applied(self) -> list[Scalar]:
+        carried = fc.carried(self.instant, self.wrenches)
+        parts = fc.generalised(self.instant, carried, self.moved)
+        return [a + b for a, b in zip(parts, self.motors, strict=True)]
 
     @cached_property
     def applied_force(self) -> list[Scalar]:
         """F of M v̇ + V + G = F."""
-        carried = fc.carried(self.instant, self.wrenches)
-        parts = fc.generalised(self.instant, carried, self.nv)
-        return [a + b for a, b in zip(parts, self.motors, strict=True)]
+        return self._applied[: self.nv]
 
     def bias(self, *, still: bool = False, weightless: bool = False) -> list[Scalar]:
         """h = V + G; without velocities G, without weight V."""
@@ -111,13 +141,32 @@ class Dynamics(Moving):
         self, vd: Sequence[Scalar] | None, *, still: bool = False, weightless: bool = False
     ) -> list[Scalar]:
         """M v̇ + V + G by the recursive Newton-Euler algorithm (Featherstone 2008, 5.3)."""
+        return self._needed(vd, still=still, weightless=weightless)[: self.nv]
+
+    def _needed(
+        self, vd: Sequence[Scalar] | None, *, still: bool = False, weightless: bool = False
+    ) -> list[Scalar]:
+        """The same with the rows of driven velocities."""
         moving = self.accelerating(vd, still=still, weightless=weightless)
         inertial = fc.inertial(self.instant, moving, self.scalars)
-        parts = fc.generalised(self.instant, fc.carried(self.instant, inertial), self.nv)
+        parts = fc.generalised(self.instant, fc.carried(self.instant, inertial), self.moved)
         if vd is None:
             return parts
-        rotors = fc.rotor_forces(self.instant, vd, self.nv, self.scalars)
+        whole = self.with_driven(vd)
+        assert whole is not None
+        rotors = fc.rotor_forces(self.instant, whole, self.moved, self.scalars)
         return [a + b for a, b in zip(parts, rotors, strict=True)]
+
+    @cached_property
+    def vd(self) -> list[Scalar]:
+        """v̇ under the effects."""
+        return self.articulated_forward()
+
+    @cached_property
+    def driving_forces(self) -> list[Scalar]:
+        """What each driven coordinate takes, N m or N: inverse dynamics at v̇, less the loads."""
+        pairs = zip(self._needed(self.vd)[self.nv :], self._applied[self.nv :], strict=True)
+        return [needed - applied for needed, applied in pairs]
 
     # Forward dynamics.
 
@@ -128,33 +177,36 @@ class Dynamics(Moving):
 
     def articulated_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """v̇ under the effects and forces `tau` beside them, by articulated bodies."""
-        driven = self._driven(tau)
-        found = respond(self.instant, self.articulated, self._at_rest, driven, self.scalars)
+        pushed = self._pushed(tau)
+        found = respond(self.instant, self.articulated, self._at_rest, pushed, self.scalars)
         return self._fallen(found)
 
     def factored_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by LᵀDL factors of the mass matrix."""
         carried = fc.carried(self.instant, self._at_rest)
-        bias = fc.generalised(self.instant, carried, self.nv)
-        right = [a - b for a, b in zip(self._driven(tau), bias, strict=True)]
+        bias = fc.generalised(self.instant, carried, self.moved)[: self.nv]
+        right = [a - b for a, b in zip(self._pushed(tau), bias, strict=True)]
         return self._fallen(solved(self.factors, right))
 
     @cached_property
     def _free_roots(self) -> list[int]:
         """Of each body that nothing holds the index of its first velocity."""
-        starts = zip(self.model.bodies, self.model.first_velocity, strict=True)
-        return [i for body, i in starts if isinstance(body.joint, Free)]
+        return [
+            seat.v[0]
+            for seat in self.model.seats
+            if isinstance(seat.body.joint, Free) and max(seat.v[: self.dimensions]) < self.nv
+        ]
 
     @cached_property
     def _at_rest(self) -> list[fc.Force]:
-        """The wrenches that would keep the velocities as they are, but for the fall of trees that
-        nothing holds: their weight changes nothing else, and is put in at the end.
+        """The wrenches that would keep the free velocities as they are, but for the fall of trees
+        that nothing holds: their weight changes nothing else, and is put in at the end.
         """
         falling = [k for k, link in enumerate(self.instant.links) if link.v[0] in self._free_roots]
         base = sub(zeros(self.scalars), self.down)
-        moving = accelerations(
-            self.instant, self.moving, self.values.v, None, base, self.scalars, falling
-        )
+        v, twists = self.felt
+        vd = self.with_driven(None)
+        moving = accelerations(self.instant, twists, v, vd, base, self.scalars, falling)
         inertial = fc.inertial(self.instant, moving, self.scalars)
         return [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
 
@@ -167,10 +219,9 @@ class Dynamics(Moving):
         rates = zip(found, self.model.velocities, strict=True)
         return [self.scalars.named(x, c.acceleration) for x, c in rates]
 
-    def _driven(self, tau: Sequence[Scalar] | None) -> list[Scalar]:
-        if tau is None:
-            return self.motors
-        return [a + b for a, b in zip(self.motors, tau, strict=True)]
+    def _pushed(self, tau: Sequence[Scalar] | None) -> list[Scalar]:
+        motors = self.motors[: self.nv]
+        return motors if tau is None else [a + b for a, b in zip(motors, tau, strict=True)]
 
     @cached_property
     def mass_entries(self) -> Entries:
@@ -188,7 +239,7 @@ class Dynamics(Moving):
     @cached_property
     def kinetic_energy(self) -> Scalar:
         """Of all bodies and rotors, J."""
-        return kinetic_energy(self.instant, self.moving, self.values.v, self.scalars)
+        return kinetic_energy(self.instant, self.moving, self.v, self.scalars)
 
     @cached_property
     def potential_energy(self) -> Scalar:
@@ -201,6 +252,9 @@ class Dynamics(Moving):
     def power(self, effect: Effect) -> Scalar:
         """What an effect's loads do to the motion, W; of gravity and springs, too."""
         power = self.scalars.number(0.0)
+        if isinstance(effect, Driven):
+            i = [c.by for c in self.model.driven].index(effect.name)
+            return self.driving_forces[i] * self.rate(effect.joint)
         for load in effect.loads(self):
             if isinstance(load, JointLoad):
                 power = power + load.force * self.rate(load.joint, load.coordinate)

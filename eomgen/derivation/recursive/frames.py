@@ -34,7 +34,7 @@ class Frame:
     are its axes at zero in the parent's; the move goes about or along coordinate axis `axis` of
     its own, a turn by `lead` more than its coordinate. In the plane `angle` is that of its axes at
     zero in the parent's. `q` and `v` index its coordinates and velocities.
-    `armature` is the inertia of a motor's rotor on the coordinate.
+    `armature` is the inertia of a motor's rotor on the coordinate. A `driven` move is given.
     """
 
     name: str
@@ -49,6 +49,7 @@ class Frame:
     v: tuple[int, ...]
     armature: Scalar
     rigid: Rigid
+    driven: bool
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,8 @@ class Link:
     """A frame at an instant.
 
     `turn` leads from its axes to the parent's; `arm` is its origin from the parent's, in the
-    parent's axes; `axes` are its motions in its own axes, the velocity v[i] times each.
+    parent's axes; `axes` are its motions in its own axes, the velocity v[i] times each. A `driven`
+    motion is given and not solved for.
     """
 
     name: str
@@ -67,6 +68,12 @@ class Link:
     v: tuple[int, ...]
     armature: Scalar
     rigid: Rigid
+    driven: bool
+
+    @property
+    def free(self) -> tuple[tuple[Axis, int], ...]:
+        """The axes whose velocities are states, each with the index of that."""
+        return () if self.driven else tuple(zip(self.axes, self.v, strict=True))
 
 
 @dataclass(frozen=True)
@@ -126,7 +133,17 @@ def at_instant(linkage: Linkage, q: Sequence[Scalar], axes: Axes, scalars: Scala
             first = times(world[-1], rigid.first)
             rigid = Rigid(rigid.mass, first, congruent(world[-1], rigid.inertia))
         links.append(
-            Link(frame.name, frame.parent, turn, arm, directions, frame.v, frame.armature, rigid)
+            Link(
+                frame.name,
+                frame.parent,
+                turn,
+                arm,
+                directions,
+                frame.v,
+                frame.armature,
+                rigid,
+                frame.driven,
+            )
         )
     return Instant(tuple(links), tuple(world), tuple(angles), axes)
 

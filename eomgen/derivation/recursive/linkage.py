@@ -1,8 +1,9 @@
 """A model as a tree of frames, each of which makes one elementary move against its parent.
 
 A joint of several coordinates is a row of frames, all but the last without mass. A weld adds no
-frame: its body is carried by the frame of its parent. The axes of a frame are those of the body it
-carries, turned by a fixed rotation where that makes the axis of the move a coordinate axis.
+frame: its body is carried by the frame of its parent; nor does a locked coordinate. The axes of a
+frame are those of the body it carries, turned by a fixed rotation where that makes the axis of the
+move a coordinate axis.
 """
 
 import math
@@ -75,8 +76,10 @@ def _drafted(
 
     drafts: list[Frame] = []
     mounts: list[Mount] = []
-    starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
-    for body, first_q, first_v in starts:
+    locked = dict(model.locked)
+    nv = len(model.velocities)
+    for seat in model.seats:
+        body = seat.body
         frame, axes, angle, at = -1, np.eye(3), 0.0, zeros(scalars)
         if body.parent >= 0:
             parent = mounts[body.parent]
@@ -93,12 +96,21 @@ def _drafted(
                 armature = value(joint.motor_inertia)
                 if joint.gear_ratio is not None:
                     armature = value(joint.gear_ratio) * value(joint.gear_ratio) * armature
-        q, v = first_q, first_v
         moves = joint.moves(model.dimensions)
         for i, move in enumerate(moves):
             to_axis, k = _to_coordinate_axis(move)
+            held = locked.get(body.positions[i].name)
+            if held is not None and move.kind == "slide":
+                way = np.array(move.axis) * held
+                at = add(at, _numbers(axes @ way, scalars))
+                continue
+            if held is not None:
+                axes = axes @ (to_axis @ _turn(k, math.degrees(held)) @ to_axis.T)
+                angle += move.axis[2] * held
+                continue
             tilt = math.atan2(to_axis[1, 0], to_axis[0, 0])
-            n_q, n_v = (4, 3) if move.kind == "spin" else (1, 1)
+            spins = move.kind == "spin"
+            v = seat.spin if spins else seat.v[i : i + 1]
             drafts.append(
                 Frame(
                     name=body.name if i == len(moves) - 1 else f"{body.name}_{i + 1}",
@@ -109,14 +121,14 @@ def _drafted(
                     axis=k,
                     angle=angle + tilt,
                     lead=0.0,
-                    q=tuple(range(q, q + n_q)),
-                    v=tuple(range(v, v + n_v)),
+                    q=seat.quaternion if spins else seat.q[i : i + 1],
+                    v=v,
                     armature=armature,
                     rigid=_nothing(scalars),
+                    driven=v[0] >= nv,
                 )
             )
             frame, axes, angle, at = len(drafts) - 1, to_axis.T, -tilt, zeros(scalars)
-            q, v = q + n_q, v + n_v
         at = sub(at, times(constant(axes, scalars), point))
         mounts.append(
             Mount(
@@ -130,6 +142,11 @@ def _drafted(
             )
         )
     return drafts, mounts
+
+
+def _numbers(vector: Array, scalars: Scalars) -> Vec:
+    x, y, z = (scalars.number(part) for part in vector.tolist())
+    return (x, y, z)
 
 
 def _inertia(body: Body, entries: list[Scalar], scalars: Scalars) -> Symmetric:

@@ -19,14 +19,15 @@ from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, times, zer
 from eomgen.effects import Gravity
 from eomgen.effects.base import Vector
 from eomgen.joints.base import WORLD
-from eomgen.language.formula import Formula, evaluate
-from eomgen.model import Model
+from eomgen.language.formula import Formula, evaluate, names_in
+from eomgen.language.slopes import with_rates
+from eomgen.model import Model, Seat
 
 
 @dataclass(frozen=True)
 class Values:
     """Values of everything a model leaves open: parameters, inputs and extra states by name, q and
-    v in order, and the time.
+    v of the state in order, and the time.
     """
 
     parameters: Mapping[str, Scalar]
@@ -40,7 +41,8 @@ class Values:
 class Moving:
     """A model at given values: where everything is and how it moves, for effects and recursions.
 
-    What is asked for is computed once; nothing else is.
+    What is asked for is computed once; nothing else is. `nv` counts the velocities of the state,
+    `moved` those and the driven ones.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class Moving:
         self.dimensions = model.dimensions
         self.bodies = tuple(body.name for body in model.bodies)
         self.nv = len(model.velocities)
+        self.moved = self.nv + len(model.driven)
 
     # What effects may ask (effects.base.Mechanism).
 
@@ -67,6 +70,11 @@ class Moving:
     def place(self, body: str, at: Vector) -> Vector:
         """World place of a point of a body, m."""
         return self._cut(at if body == WORLD else self.position(self.index[body], self._three(at)))
+
+    def point(self, name: str) -> tuple[str, Vector]:
+        """A named point: its body, and where on it, m."""
+        point = next(point for point in self.model.points if point.name == name)
+        return self.bodies[point.body], tuple(self.value(part) for part in point.at)
 
     def velocity(self, body: str, at: Vector) -> Vector:
         """World velocity of a point of a body, m/s."""
@@ -94,11 +102,11 @@ class Moving:
 
     def coordinate(self, joint: str, index: int = 0) -> Scalar:
         """A coordinate of a joint."""
-        return self.values.q[self.first[joint][0] + index]
+        return self.q[self.seats[joint].q[index]]
 
     def rate(self, joint: str, index: int = 0) -> Scalar:
         """A velocity of a joint."""
-        return self.values.v[self.first[joint][1] + index]
+        return self.v[self.seats[joint].v[index]]
 
     def value(self, formula: Formula, **names: Scalar) -> Scalar:
         """A quantity."""
@@ -124,12 +132,14 @@ class Moving:
     def names(self) -> dict[str, Scalar]:
         """Everything that formulas may name."""
         model, values = self.model, self.values
-        moving = zip((*model.coordinates, *model.velocities), (*values.q, *values.v), strict=False)
+        positions = (*model.coordinates, *(c.position for c in model.prescribed))
+        velocities = (*model.velocities, *(c.velocity for c in model.prescribed))
         return {
             "t": values.time,
             **values.inputs,
             **values.states,
-            **{c.name: x for c, x in moving},
+            **{c.name: x for c, x in zip(positions, self.q, strict=True)},
+            **{c.name: x for c, x in zip(velocities, self.v, strict=True)},
             **values.parameters,
         }
 
@@ -139,11 +149,32 @@ class Moving:
         return {name: k for k, name in enumerate(self.bodies)}
 
     @cached_property
-    def first(self) -> dict[str, tuple[int, int]]:
-        """Of each joint the index of its first coordinate in q and velocity in v."""
-        model = self.model
-        starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
-        return {body.joint.name: (i, j) for body, i, j in starts}
+    def seats(self) -> dict[str, Seat]:
+        """Where the coordinates and velocities of each joint stand."""
+        return {seat.body.joint.name: seat for seat in self.model.seats}
+
+    @cached_property
+    def given(self) -> list[tuple[Scalar, Scalar, Scalar]]:
+        """Value, rate and acceleration of each coordinate that is prescribed."""
+        found = []
+        for c in self.model.prescribed:
+            used = (name for name in names_in(c.value) if name != "t")
+            names = {name: self.values.parameters[name] for name in used}
+            motion = with_rates(c.value, names, self.values.time, self.scalars)
+            words = (c.position.name, c.velocity.name, c.velocity.acceleration)
+            x, v, a = (self.scalars.named(x, w) for x, w in zip(motion, words, strict=True))
+            found.append((x, v, a))
+        return found
+
+    @cached_property
+    def q(self) -> list[Scalar]:
+        """All coordinates: those of the state, then the prescribed ones."""
+        return [*self.values.q, *(x for x, _, _ in self.given)]
+
+    @cached_property
+    def v(self) -> list[Scalar]:
+        """All velocities, in the same order."""
+        return [*self.values.v, *(v for _, v, _ in self.given)]
 
     def _three(self, vector: Vector) -> Vec:
         x, y, *z = vector
@@ -162,14 +193,14 @@ class Moving:
     @cached_property
     def instant(self) -> Instant:
         """The frames at q, in the axes of the recursions."""
-        return at_instant(self.linkage, self.values.q, self.axes, self.scalars)
+        return at_instant(self.linkage, self.q, self.axes, self.scalars)
 
     @cached_property
     def in_world(self) -> Instant:
         """The frames at q, in world axes."""
         if self.axes == "world":
             return self.instant
-        return at_instant(self.linkage, self.values.q, "world", self.scalars)
+        return at_instant(self.linkage, self.q, "world", self.scalars)
 
     @cached_property
     def places(self) -> Places:
@@ -193,7 +224,7 @@ class Moving:
     @cached_property
     def moving(self) -> tuple[Twist, ...]:
         """Velocities of the frames."""
-        return velocities(self.instant, self.values.v, self.scalars)
+        return velocities(self.instant, self.v, self.scalars)
 
     def point_velocity(self, body: int, at: Vec) -> tuple[Vec, Vec]:
         """Velocity of a point of a body, and the body's angular velocity, in the world."""

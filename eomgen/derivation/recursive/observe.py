@@ -106,13 +106,13 @@ def point_jacobian(
     nv: int,
     scalars: Scalars,
 ) -> list[Vec]:
-    """For each velocity what it adds to the velocity of a point, in world axes."""
+    """For each free velocity what it adds to the velocity of a point, in world axes."""
     columns = [zeros(scalars)] * nv
     frame = linkage.mounts[body].frame
     place = position(linkage, instant, where, body, at, scalars)
     while frame >= 0:
         link = instant.links[frame]
-        for axis, i in zip(link.axes, link.v, strict=True):
+        for axis, i in link.free:
             direction = instant.to_world(frame, axis.direction)
             reach = sub(place, where[frame])
             columns[i] = cross(direction, reach) if axis.angular else direction

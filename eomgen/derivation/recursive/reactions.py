@@ -17,12 +17,11 @@ from eomgen.derivation.recursive.vectors import (
     transposed,
     zeros,
 )
-from eomgen.joints import Free
 
 
 def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
-    """The wrench of each joint but the free ones on its parent, at the joint's point on the child,
-    in world axes.
+    """The wrench of each joint that holds something on its parent, at the joint's point on the
+    child, in world axes.
 
     By Newton and Euler for each body, leaves first: a joint gives its child what the child and all
     that hangs on it need beyond weight and loads. A motor acts between the two bodies of its joint,
@@ -30,7 +29,7 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
     """
     model, linkage, instant = dynamics.model, dynamics.linkage, dynamics.instant
     scalars = dynamics.scalars
-    moving = dynamics.moving
+    moving = dynamics.felt[1]
     accelerating = dynamics.accelerating(vd)
     nothing = zeros(scalars)
     sums: list[Force] = []  # about each body's joint point, in world axes
@@ -68,8 +67,9 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
             f, g = sums[parent], sums[k]
             moment = add(f.moment, add(g.moment, cross(arm, g.force)))
             sums[parent] = Force(moment, add(f.force, g.force))
+    holding = {body.name for body in model.holding}
     return [
         Force(sub(nothing, f.moment), sub(nothing, f.force))
         for body, f in zip(model.bodies, sums, strict=True)
-        if not isinstance(body.joint, Free)
+        if body.name in holding
     ]

@@ -11,7 +11,8 @@ from eomgen.derivation.recursive.articulated import (
     resistance_of,
 )
 from eomgen.derivation.recursive.composite import composite_bodies
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.derivation.recursive.instant import Axes, at_instant
+from eomgen.derivation.recursive.linkage import make_linkage
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.errors import SceneError
 from eomgen.joints.base import Geared
@@ -35,7 +36,7 @@ def check_regular(model: Model) -> None:
     rng = random.Random(20)
     largest: dict[int, float] = {}
     for _ in range(TRIALS):
-        q = [rng.uniform(-1.5, 1.5) for _ in model.coordinates]
+        q = [rng.uniform(-1.5, 1.5) for _ in (*model.coordinates, *model.driven)]
         for i, share in _shares(even, q).items():
             largest[i] = max(largest.get(i, 0.0), share)
     for i in sorted(largest, reverse=True):
@@ -66,15 +67,16 @@ def _evened(body: Body, model: Model) -> Body:
 def _shares(model: Model, q: list[float]) -> dict[int, float]:
     """For each velocity its pivot over its entry of M; one that is nothing frees nothing more."""
     scalars = FloatScalars()
-    values = Values(model.defaults, dict.fromkeys((i.name for i in model.inputs), 0.0), q, [])
-    instant = Dynamics(model, values, scalars).instant
+    linkage = make_linkage(model, model.defaults, scalars)
+    axes: Axes = "world" if model.dimensions == 2 else "own"
+    instant = at_instant(linkage, q, axes, scalars)
     bodies = composite_bodies(instant, scalars)
     sums = [resistance_of(link, 0.0) for link in instant.links]
     shares: dict[int, float] = {}
     for k in reversed(range(len(sums))):
         link, left = instant.links[k], sums[k]
         whole = resistance_of(replace(link, rigid=bodies[k]), 0.0)
-        for axis, i in zip(link.axes, link.v, strict=True):
+        for axis, i in link.free:
             pivot, entry = inertia_along(left, axis), inertia_along(whole, axis) + link.armature
             shares[i] = (pivot + link.armature) / entry if entry > 0 else 0.0
             if shares[i] >= VANISHED:
@@ -87,11 +89,7 @@ def _shares(model: Model, q: list[float]) -> dict[int, float]:
 
 def _singular(model: Model, i: int) -> str:
     name = model.velocities[i].name
-    body = next(
-        body
-        for body, first in zip(model.bodies, model.first_velocity, strict=True)
-        if first <= i < first + len(body.velocities)
-    )
+    body = next(seat.body for seat in model.seats if i in seat.v)
     return (
         f"body '{body.name}': nothing resists '{name}', neither its mass or inertia nor what it "
         "carries; give it some, or a joint that does not move so"

@@ -49,7 +49,7 @@ from eomgen.derivation.recursive.vectors import (
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Matrices of nv x nv, entries that are not zero by the tree's shape.
+    """Matrices of nv x nv over free velocities, entries that are not zero by the tree's shape.
 
     `by_position` is ∂τ/∂q, where q of a spin is the small angle in its own axes, `by_velocity`
     ∂τ/∂v.
@@ -90,7 +90,7 @@ def sensitivity(
     by_v: dict[tuple[int, int], Scalar] = {}
     for k, link in enumerate(links):
         drag = drags[k]
-        for own, i in zip(columns[k], link.v, strict=True):
+        for own, (_, i) in zip(columns[k], link.free, strict=True):
             reach = force_to_move(bodies[k], own.axis.angular, own.axis.linear)
             pull = drag.transposed_times(own.axis)
             turned = total(
@@ -100,7 +100,7 @@ def sensitivity(
             sped = total(_moved(bodies[k], own.both), drag.times(own.axis))
             above = k
             while above >= 0:
-                for other, j in zip(columns[above], links[above].v, strict=True):
+                for other, (_, j) in zip(columns[above], links[above].free, strict=True):
                     by_q[i, j] = _work(other.second, reach) + dot(pull, other.first.angular)
                     by_v[i, j] = _work(other.both, reach) + dot(pull, other.axis.angular)
                     if above != k:
@@ -132,7 +132,7 @@ def _columns(
         pushed = Twist(a.angular, sub(reached, cross(v.angular, linear)))
     own = Twist(moving[k].angular, moving[k].linear)
     columns = []
-    for axis in link.axes:
+    for axis, _ in link.free:
         s = Twist(axis.direction, nothing) if axis.angular else Twist(nothing, axis.direction)
         first = _crossed(carrier, s)
         second = _plus(_crossed(pushed, s), _crossed(carrier, first))

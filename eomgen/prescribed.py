@@ -1,0 +1,132 @@
+"""What is given and not found: initial values, and coordinates that are driven or locked."""
+
+import math
+from collections.abc import Sequence
+
+from eomgen.effects import Driven, Effect
+from eomgen.errors import SceneError, listed, nearest
+from eomgen.joints.base import Coordinate
+from eomgen.language.formula import Floats, names_in
+from eomgen.language.slopes import with_rates
+from eomgen.model import Body, Prescribed
+
+
+def initial_values(
+    given: Sequence[float] | dict[str, float],
+    coordinates: Sequence[Coordinate],
+    place: str,
+    prescribed: Sequence[Prescribed],
+) -> tuple[float, ...]:
+    """The values of coordinates or velocities, in order: 0 for what a table does not name.
+
+    Raises `SceneError`, naming the `place`, for names that are not there or `prescribed`.
+    """
+    names = [c.name for c in coordinates]
+    if not isinstance(given, dict):
+        if len(given) != len(names):
+            raise SceneError(
+                f"{place}: has {len(given)} numbers for {len(names)} coordinates; "
+                f"give one each for {listed(names)}"
+            )
+        return tuple(float(x) for x in given)
+    reasons = _reasons(prescribed)
+    for key in given:
+        if why := reasons.get(key) or reasons.get(key.removesuffix("_deg")):
+            raise SceneError(f"{place}.{key}: {why}; leave it out")
+    return tuple((dict.fromkeys(names, 0.0) | _by_name(given, coordinates, place)).values())
+
+
+def _by_name(
+    given: dict[str, float], coordinates: Sequence[Coordinate], place: str
+) -> dict[str, float]:
+    """The values of a table by the names of coordinates, some of them in degrees."""
+    names = [c.name for c in coordinates]
+    degrees = {f"{c.name}_deg": c.name for c in coordinates if c.unit in ("rad", "rad/s")}
+    values: dict[str, float] = {}
+    for key, value in given.items():
+        if key in names:
+            values[key] = float(value)
+        elif key in degrees:
+            if degrees[key] in given:
+                raise SceneError(f"{place}.{key}: {degrees[key]} is given too; give one of them")
+            values[degrees[key]] = math.radians(value)
+        else:
+            hint = nearest(key, names) or f"; known: {listed(names)}"
+            raise SceneError(f"{place}.{key}: no coordinate has this name{hint}")
+    return values
+
+
+def _reasons(prescribed: Sequence[Prescribed]) -> dict[str, str]:
+    """Why each coordinate or velocity that is no state has no initial value."""
+    return {
+        name: f"'{c.position.name}' is {'locked' if c.locked else f'driven by {c.by!r}'}"
+        for c in prescribed
+        for name in (c.position.name, c.velocity.name)
+    }
+
+
+def locked_values(
+    given: dict[str, float], bodies: Sequence[Body], effects: Sequence[Effect]
+) -> dict[str, float]:
+    """The coordinates that are held fast, with their values, from a table by name.
+
+    Raises `SceneError` for one that is not there, is part of a quaternion, or is driven.
+    """
+    values = _by_name(given, [c for body in bodies for c in body.positions], "locked")
+    driven = {effect.joint: effect.name for effect in effects if isinstance(effect, Driven)}
+    for body in bodies:
+        for i, c in enumerate(body.positions):
+            if c.name in values and i >= body.plain:
+                raise SceneError(
+                    f"locked.{c.name}: is part of a quaternion, which is held whole or not at all; "
+                    f"give joint '{body.joint.name}' type = 'weld'"
+                )
+            if c.name in values and body.joint.name in driven:
+                raise SceneError(
+                    f"locked: '{c.name}' is driven by '{driven[body.joint.name]}' too; "
+                    "give one of them"
+                )
+    return values
+
+
+def check_drive(
+    drive: Driven,
+    place: str,
+    bodies: Sequence[Body],
+    before: Sequence[Effect],
+    known: dict[str, float],
+    motion: Sequence[str],
+) -> None:
+    """A coordinate follows one formula, of time and parameters, and is finite at the start.
+
+    `known` holds the values of parameters, `motion` names all that a formula of the motion may use.
+    Raises `SceneError` for any other.
+    """
+    for other in before:
+        if isinstance(other, Driven) and other.joint == drive.joint:
+            raise SceneError(
+                f"{place}.joint: '{drive.joint}' is driven by '{other.name}' too; give one of them"
+            )
+    own = next(b.positions[0].name for b in bodies if b.joint.name == drive.joint)
+    for name in names_in(drive.coordinate):
+        if name in (own, f"{own}_dot"):
+            raise SceneError(
+                f"{place}.coordinate: '{name}' is the motion that it gives, which is circular; "
+                "use t and parameters"
+            )
+        if name in motion and name not in known and name != "t":
+            raise SceneError(
+                f"{place}.coordinate: '{name}' is found only as it moves, and a drive is fixed "
+                "beforehand; use t and parameters"
+            )
+        if name not in known and name != "t":
+            return  # unknown, which is said where all such names are
+    try:
+        start = with_rates(drive.coordinate, known, 0.0, Floats())
+    except (ArithmeticError, ValueError):
+        start = (math.nan, math.nan, math.nan)
+    if not all(map(math.isfinite, start)):
+        raise SceneError(
+            f"{place}.coordinate: it, its rate or its acceleration is not finite at t = 0; "
+            "change the formula"
+        )
