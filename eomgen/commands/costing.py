@@ -20,6 +20,7 @@ def effects(given: Arguments) -> int:
     from eomgen.show.bill import save_bill
     from eomgen.show.style import check_figure
     from eomgen.study.bill import bill
+    from eomgen.study.variants import variants
 
     model, name = read_model(given.scene, given)
     path = given.output / f"{name}_effects.png"
@@ -27,7 +28,12 @@ def effects(given: Arguments) -> int:
     check_figure(path, force=given.force)
     scene = read_scene(given.scene).replaced(route=model.route)
     with located(given.scene), terminal_progress(f"costing {name}") as progress:
-        found = bill(scene, each=given.each, motion=not given.no_motion, progress=progress)
+        found = bill(
+            scene,
+            variants(scene, each=given.each),
+            motion=not given.no_motion,
+            progress=progress,
+        )
     print(f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs")
     _print_items(found)
     _print_routes(found)
@@ -40,7 +46,6 @@ def effects(given: Arguments) -> int:
 
 def _print_items(bill: "Bill") -> None:
     operations, seconds = bill.shared
-    others = [item.route for item in bill.items if item.route not in ("", bill.route)]
     width = max(len(OWN), *(len(item.label) for item in bill.items), 0)
     motion = "   motion  from 1 %" if bill.extent is not None else ""
     print(f"    {'':<{width}}  operations   share        µs  states  inputs{motion}")
@@ -50,25 +55,33 @@ def _print_items(bill: "Bill") -> None:
         text = f"    {label:<{width}}  {operations:>10}  {share:6.1%}  {_us(seconds):>8}  {rest}"
         print(text.rstrip())
 
-    line(OWN, bill.bare_operations, bill.bare_seconds)
-    for item in bill.items:
-        if item.left_out:
-            continue
-        if item.needed_by:
-            print(f"    {item.label:<{width}}  {_needed(item)}")
-        else:
-            line(item.label, item.operations, item.seconds, _rest(bill, item))
-    if len(bill.items) > 1 or operations:
+    def lines(kind: str) -> None:
+        for item in bill.items:
+            if item.kind == kind and item.needed_by:
+                print(f"    {item.label:<{width}}  {_needed(item)}")
+            elif item.kind == kind:
+                line(item.label, item.operations, item.seconds, _rest(bill, item))
+
+    kinds = [item.kind for item in bill.items]
+    by = (
+        ""
+        if bill.bare_route == bill.route
+        else f"{'':>14}{motion and ' ' * 19}  ({bill.bare_route})"
+    )
+    line(OWN, bill.bare_operations, bill.bare_seconds, by)
+    lines("effect")
+    if kinds.count("effect") > 1 or operations:
         line(SHARED, operations, seconds)
-    if others:
+    if "mechanism" in kinds:
+        print("    of the mechanism itself, what might be left out:")
+        lines("mechanism")
+    if "left out" in kinds:
+        print("    left out on purpose, what it would add:")
+        lines("left out")
+    if {bill.bare_route, *(item.route for item in bill.items)} - {"", bill.route}:
         print_wrapped(
-            "    ", f"(route): the equations without it come by that route, not {bill.route}"
+            "    ", f"(route): so its equations come without it, all of them by {bill.route}"
         )
-    if any(item.left_out for item in bill.items):
-        print("    left out on purpose; what it would add:")
-    for item in bill.items:
-        if item.left_out:
-            line(item.label, item.operations, item.seconds, _rest(bill, item))
 
 
 def _needed(item: "Item") -> str:

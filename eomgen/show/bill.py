@@ -8,10 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from eomgen.show.style import FAINT, PALETTE, plain, style, write_figure
-from eomgen.study.bill import Bill
+from eomgen.study.bill import Bill, Item
+from eomgen.study.omission import Change
+from eomgen.study.variants import Kind
 
 MOST_BARS = 40
-OWN, EFFECT, LEFT_OUT = FAINT, PALETTE[0], PALETTE[1]
+OWN = FAINT
+COLOURS: dict[Kind, str] = {"effect": PALETTE[0], "mechanism": "#bbbbbb", "left out": PALETTE[1]}
+"""Of the bars of each kind of item."""
 
 
 def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
@@ -22,9 +26,8 @@ def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
     known = [item for item in bill.items if not item.needed_by]
     items = sorted(known, key=lambda item: -item.operations)[:MOST_BARS]
     operations, seconds = bill.shared
-    labels = ["the mechanism itself", *(item.label for item in items), "shared by effects"]
-    labels = [f"{label} (left out)" if label in _left_out(bill) else label for label in labels]
-    colours = [OWN, *(LEFT_OUT if item.left_out else EFFECT for item in items), OWN]
+    labels = ["the mechanism itself", *map(_label, items), "shared by effects"]
+    colours = [OWN, *(COLOURS[item.kind] for item in items), OWN]
     counts = [bill.bare_operations, *(item.operations for item in items), operations]
     times = [bill.bare_seconds, *(item.seconds for item in items), seconds]
     changes = [math.nan, *(_percent(item.change) for item in items), math.nan]
@@ -46,12 +49,13 @@ def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
         write_figure(figure, path, force=force)
 
 
-def _left_out(bill: Bill) -> set[str]:
-    return {item.label for item in bill.items if item.left_out}
+def _label(item: Item) -> str:
+    tails = {"effect": "", "mechanism": ", of the mechanism", "left out": ", left out"}
+    return item.label + tails[item.kind]
 
 
-def _percent(change: object) -> float:
-    return 100 * getattr(change, "relative", math.nan)
+def _percent(change: Change | None) -> float:
+    return math.nan if change is None else 100 * change.relative
 
 
 def _bars(

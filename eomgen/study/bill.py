@@ -20,7 +20,7 @@ from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route, Scene
 from eomgen.study.omission import Change, Run, change, extent, run
-from eomgen.study.variants import Variant, bare, counted, without_effects
+from eomgen.study.variants import Kind, Variant, bare, counted
 
 TIMING = 1.0
 """About how long all calls that are timed take together, s."""
@@ -35,23 +35,23 @@ MOST_FACTORING = 20_000
 
 @dataclass(frozen=True)
 class Item:
-    """One thing that the scene has, or that it leaves out on purpose (`left_out`).
+    """One thing that the scene has, or that it leaves out on purpose: see `Kind`.
 
     operations, seconds  of a call of `derivative` that it adds, or would add
-    states, inputs       that it brings
+    states, inputs       that it brings; below 0 for what takes states away, a driven joint
     route                of the equations without it, or of those with what is left out
     needed_by            effects that cannot be without it: then nothing is known of it alone
     change               what leaving it out does to the motion; None if that was not asked for
     """
 
     label: str
+    kind: Kind
     operations: int = 0
     seconds: float = 0.0
     states: int = 0
     inputs: int = 0
     route: str = ""
     needed_by: tuple[str, ...] = ()
-    left_out: bool = False
     change: Change | None = None
 
 
@@ -69,13 +69,15 @@ class RouteCost:
 class Bill:
     """The whole and its items; `bare` is the mechanism without any effect.
 
-    `route` is that of the whole. `extent` is that of the scene's motion, m, or None if no motion was asked for.
+    `route` and `bare_route` are those of their equations. `extent` is that of the scene's motion,
+    m, or None if no motion was asked for.
     """
 
     name: str
     route: str
     operations: int
     seconds: float
+    bare_route: str
     bare_operations: int
     bare_seconds: float
     items: tuple[Item, ...]
@@ -88,9 +90,10 @@ class Bill:
         """Operations and time, s, that go with no item alone.
 
         Effects share work: two that ask for the velocity of one point pay for it once, and it stays
-        when one of them goes. Below 0 where one costs more beside another than without it.
+        when one of them goes. So does what another route costs that only the bare mechanism lets
+        in. Below 0 where one costs more beside another than without it.
         """
-        items = [item for item in self.items if not item.left_out]
+        items = [item for item in self.items if item.kind == "effect"]
         return (
             self.operations - self.bare_operations - sum(item.operations for item in items),
             self.seconds - self.bare_seconds - sum(item.seconds for item in items),
@@ -110,18 +113,16 @@ class _Made:
 
 def bill(
     scene: Scene,
+    parts: Sequence[Variant],
     *,
-    each: bool = False,
     motion: bool = True,
-    variants: Sequence[Variant] = (),
     progress: Progress = lambda fraction: None,
 ) -> Bill:
-    """Compile a scene whole, without each type of effect (or `each` single one), changed into each
-    of further `variants`, and bare; count, time and, for `motion`, run them all.
+    """Compile a scene whole, in each of its variants, and bare; count, time and, for `motion`, run
+    them all. `parts` are `variants(scene)` or some of them.
 
     Raises `SceneError` or `RunError` if the whole cannot be compiled or evaluated at its start.
     """
-    parts = (*without_effects(scene, each=each), *variants)
     whole = _compiled(build_model(counted(scene)))
     tries = {route: _try(whole, route) for route in get_args(Route) if route != "auto"}
     models = [bare(scene), *(part.model for part in parts), *(m for m, _ in tries.values())]
@@ -142,6 +143,7 @@ def bill(
         route=whole.route,
         operations=whole.operations,
         seconds=whole.seconds,
+        bare_route=without.route,
         bare_operations=without.operations,
         bare_seconds=without.seconds,
         items=tuple(_item(whole, *part) for part in zip(parts, changed, changes, strict=True)),
@@ -192,16 +194,16 @@ def _route_cost(route: str, words: str, made: _Made | None) -> RouteCost:
 def _item(whole: _Made, part: Variant, other: _Made | None, change: Change | None) -> Item:
     """The difference between two modules: what one has more than the other."""
     if other is None:
-        return Item(part.label, needed_by=part.needed_by, left_out=part.left_out)
-    more, less = (other, whole) if part.left_out else (whole, other)
+        return Item(part.label, part.kind, needed_by=part.needed_by)
+    more, less = (other, whole) if part.kind == "left out" else (whole, other)
     return Item(
         part.label,
+        part.kind,
         more.operations - less.operations,
         more.seconds - less.seconds,
-        len(more.model.states) - len(less.model.states),
+        len(more.module.STATES) - len(less.module.STATES),
         len(more.model.inputs) - len(less.model.inputs),
         route=other.route,
-        left_out=part.left_out,
         change=change,
     )
 
@@ -258,7 +260,7 @@ def _changes(
             continue
         other = ran(made, float(base.t[-1]))
         # What is left out on purpose is measured in parts of the complete motion.
-        complete = extent(made.model, other) if part.left_out else size
+        complete = extent(made.model, other) if part.kind == "left out" else size
         found.append(change(whole.model, base, other, complete))
     return size, found
 
