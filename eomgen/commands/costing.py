@@ -98,9 +98,8 @@ def _rest(bill: "Bill", item: "Item") -> str:
         return f"{text}{other_way}"
     if item.change is None:
         return f"{text}{'':>19}{other_way}"
-    relative, since = item.change.relative, item.change.since
-    part = "-" if math.isnan(relative) else percent(100 * relative)
-    return f"{text}  {part:>7}  {'-' if since is None else f'{since:.3g} s':>8}{other_way}"
+    since = "-" if item.change.since is None else f"{item.change.since:.3g} s"
+    return f"{text}  {item.change.percent + ' %':>7}  {since:>8}{other_way}"
 
 
 def _print_routes(bill: "Bill") -> None:
@@ -132,11 +131,6 @@ def _print_motion(bill: "Bill", extent: float) -> None:
             ended = f": {item.change.ended}" if item.change.ended else ""
             text += f"; compared to t = {item.change.until:.3g} s of {bill.t_end:g} s{ended}"
         print_wrapped(f"        {item.label}: ", text)
-
-
-def percent(value: float) -> str:
-    """Two digits, and all of a whole number."""
-    return f"{value:.0f} %" if abs(value) >= 10 else f"{value:.2g} %"
 
 
 def _us(seconds: float) -> str:

@@ -31,18 +31,20 @@ def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
     counts = [bill.bare_operations, *(item.operations for item in items), operations]
     times = [bill.bare_seconds, *(item.seconds for item in items), seconds]
     changes = [math.nan, *(_percent(item.change) for item in items), math.nan]
-    panels: list[tuple[str, Sequence[float], str]] = [
-        ("operations of a derivative", counts, "{:.0f}"),
-        ("time of a call, µs", [1e6 * x for x in times], "{:.1f}"),
+    times = [1e6 * seconds for seconds in times]
+    panels: list[tuple[str, Sequence[float], Sequence[str]]] = [
+        ("operations of a derivative", counts, [str(count) for count in counts]),
+        ("time of a call, µs", times, [f"{time:.1f}" for time in times]),
     ]
     if bill.extent is not None:
-        panels.append(("changes the motion by, %", changes, "{:.2g}"))
+        texts = ["" if item.change is None else item.change.percent for item in items]
+        panels.append(("without it the motion changes by, %", changes, ["", *texts, ""]))
     with style():
         figure = Figure(figsize=(10.0, 1.5 + 0.32 * len(labels)), layout="constrained")
-        for axes, (label, values, unit) in zip(
+        for axes, (label, values, texts) in zip(
             figure.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels, strict=True
         ):
-            _bars(axes, [plain(text) for text in labels], values, colours, unit)
+            _bars(axes, [plain(text) for text in labels], values, texts, colours)
             axes.set_xlabel(label)
         axes.invert_yaxis()  # shared: the first label is on top
         figure.suptitle(f"{plain(bill.name)}: what each effect costs", x=0.01, ha="left")
@@ -59,11 +61,10 @@ def _percent(change: Change | None) -> float:
 
 
 def _bars(
-    axes: Axes, labels: list[str], values: Sequence[float], colours: list[str], unit: str
+    axes: Axes, labels: list[str], values: Sequence[float], texts: Sequence[str], colours: list[str]
 ) -> None:
     lengths = [value if math.isfinite(value) else 0.0 for value in values]
     bars = axes.barh(range(len(labels)), lengths, color=colours, tick_label=labels)
-    texts = [f" {unit.format(value)}" if math.isfinite(value) else "" for value in values]
-    axes.bar_label(bars, texts, fontsize=8.5)
+    axes.bar_label(bars, [f" {text}" for text in texts], fontsize=8.5)
     axes.margins(x=0.2)
     axes.grid(axis="y", visible=False)

@@ -63,6 +63,14 @@ class Change:
     until: float
     ended: str
 
+    @property
+    def percent(self) -> str:
+        """`relative` to two digits, and all of a whole number; "-" if nothing moves."""
+        if math.isnan(self.relative):
+            return "-"
+        value = 100 * self.relative
+        return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
+
 
 def run(
     model: Model, module: GeneratedModule, seconds: float, until: float, progress: Progress

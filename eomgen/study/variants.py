@@ -1,6 +1,6 @@
 """What a scene may be without, and the scene without it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -55,16 +55,16 @@ def complete(scene: Scene) -> tuple[Variant, ...]:
     if scene.locked:
         count = len(scene.locked)
         label = f"{count} locked coordinate" + "s" * (count > 1)
-        found.append((label, _as_started(scene).replaced(locked={})))
+        found.append((label, _started(scene, (None,)).replaced(locked={})))
     return tuple(Variant(label, build_model(counted(s)), "left out") for label, s in found)
 
 
-def _as_started(scene: Scene) -> Scene:
-    """The scene with the start of every coordinate, of those that are driven or locked, too."""
+def _started(scene: Scene, by: Collection[str | None]) -> Scene:
+    """The scene with the start of coordinates driven by some effects, or locked (None), too."""
     model = build_model(counted(scene))
     q = dict(zip((c.name for c in model.coordinates), model.initial_q, strict=True))
     v = dict(zip((c.name for c in model.velocities), model.initial_v, strict=True))
-    for c in model.prescribed:
+    for c in (c for c in model.prescribed if c.by in by):
         value, rate, _ = with_rates(c.value, model.defaults, 0.0, Floats())
         q[c.position.name], v[c.velocity.name] = float(value), float(rate)
     return scene.replaced(initial=scene.initial.replaced(q=q, v=v))
@@ -93,8 +93,9 @@ def bare(scene: Scene) -> Model:
 
 def removed(scene: Scene, effects: Sequence[Effect]) -> Scene:
     """The scene without some effects; joints that were driven start as they were driven."""
-    if any(isinstance(effect, Driven) for effect in effects):
-        scene = _as_started(scene)
+    drives = [effect.name for effect in effects if isinstance(effect, Driven)]
+    if drives:
+        scene = _started(scene, drives)
     return scene.replaced(effects=tuple(e for e in scene.effects if e not in effects))
 
 
