@@ -206,10 +206,11 @@ class BodyContact(OnBodies):
         total = mechanism.number(0.0)
         if self.law == "impact":
             return total
-        share = mechanism.number(0.5 if self.law == "spring_damper" else 0.4)
+        power = mechanism.number(2.0 if self.law == "spring_damper" else 2.5)
         for touch in self._touches(mechanism):
             force = self._elastic(mechanism, touch)
-            part = share * force * mechanism.call("max", -touch.gap, mechanism.number(0.0))
+            d = mechanism.call("max", -touch.gap, mechanism.number(0.0))
+            part = force * d / power
             if touch.meeting is not None:
                 part = part + force * touch.meeting
             total = total + part
