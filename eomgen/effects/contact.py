@@ -140,6 +140,8 @@ class BodyContact(OnBodies):
 
     @model_validator(mode="after")
     def _bodies_that_fit(self) -> Self:
+        if self.points is not None:
+            raise wrong("points", "contact is between bodies; give body or bodies, and at")
         listed = self.bodies if isinstance(self.bodies, tuple) else (self.body,)
         if self.against == "each_other" and len(listed) < 2 and self.bodies != "all":
             key = "body" if self.bodies is None else "bodies"
