@@ -122,15 +122,17 @@ def _print_motion(bill: "Bill", extent: float) -> None:
         f"run, inputs at 0), in parts of how far the scene's own motion takes it, {extent:.3g} m; "
         "about 100 % and more: another motion altogether",
     )
-    for item in bill.items:
-        if item.change is None or item.change.since is None:
-            continue
-        text = f"up to {item.change.distance:.3g} m ({item.change.body})"
-        text += f" and {math.degrees(item.change.angle):.0f}°"
-        if item.change.until < bill.t_end:
-            ended = f": {item.change.ended}" if item.change.ended else ""
-            text += f"; compared to t = {item.change.until:.3g} s of {bill.t_end:g} s{ended}"
-        print_wrapped(f"        {item.label}: ", text)
+    changes = [(item.label, item.change) for item in bill.items if item.change is not None]
+    for why in dict.fromkeys(change.ended for _, change in changes if change.ended):
+        ends = [change.until for _, change in changes if change.ended == why]
+        to = " to ".join(dict.fromkeys(f"{t:.3g}" for t in (min(ends), max(ends))))
+        some = "" if len(ends) == len(changes) else f"{len(ends)} of {len(changes)} "
+        print_wrapped("        ", f"{some}compared to t = {to} s of {bill.t_end:g} s alone: {why}")
+    for label, change in changes:
+        if change.since is not None:
+            angle = f"{math.degrees(change.angle):.0f}°"
+            text = f"up to {change.distance:.3g} m ({change.body}) and {angle}"
+            print_wrapped(f"        {label}: ", text)
 
 
 def _us(seconds: float) -> str:

@@ -29,16 +29,15 @@ def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
     labels = ["the mechanism itself", *map(_label, items), "shared by effects"]
     colours = [OWN, *(COLOURS[item.kind] for item in items), OWN]
     counts = [bill.bare_operations, *(item.operations for item in items), operations]
-    times = [bill.bare_seconds, *(item.seconds for item in items), seconds]
+    times = [1e6 * s for s in (bill.bare_seconds, *(item.seconds for item in items), seconds)]
     changes = [math.nan, *(_percent(item.change) for item in items), math.nan]
-    times = [1e6 * seconds for seconds in times]
     panels: list[tuple[str, Sequence[float], Sequence[str]]] = [
         ("operations of a derivative", counts, [str(count) for count in counts]),
         ("time of a call, µs", times, [f"{time:.1f}" for time in times]),
     ]
     if bill.extent is not None:
-        texts = ["" if item.change is None else item.change.percent for item in items]
-        panels.append(("without it the motion changes by, %", changes, ["", *texts, ""]))
+        percents = ["" if item.change is None else item.change.percent for item in items]
+        panels.append(("without it the motion changes by, %", changes, ["", *percents, ""]))
     with style():
         figure = Figure(figsize=(10.0, 1.5 + 0.32 * len(labels)), layout="constrained")
         for axes, (label, values, texts) in zip(

@@ -27,7 +27,7 @@ TIMING = 1.0
 CHUNK = 5e-4
 """About how long those of one module in one round take, s: too short to be interrupted often."""
 LEAST_ROUNDS = 7
-MOTION = 6.0
+MOTION = 10.0
 """Most wall time of all motions together, s."""
 MOST_FACTORING = 20_000
 """Operations of factoring alone beyond which `ldl` is not tried."""
