@@ -218,6 +218,22 @@ def test_motion_of_turning() -> None:
     assert change.distance == 0
 
 
+def test_motion_of_a_driven_joint() -> None:
+    """A wheel is driven to and fro; left to itself it goes on as fast as it starts."""
+    free = WHEEL[: WHEEL.index("effects")].replace("t_end = 1.0", "t_end = 1.5")
+    drive = '{ type = "driven", name = "crank", joint = "axle", coordinate = "0.4*sin(2*t)" }'
+    other = (
+        'bodies = [{ name = "b", mass = 1e-9, inertia_com = 1e-9 }, '
+        '{ name = "a", mass = 2.0, inertia_com = 0.3 }]\n'
+        'joints = [{ name = "idle", type = "revolute", parent = "world", child = "b" }, '
+    )
+    start = free.index("bodies")
+    text = free[:start] + other + free[free.index("joints = [") + len("joints = [") :]
+    change = items(costed(f"{text}effects = [{drive}]"))["driven (crank)"].change
+    assert change is not None
+    assert change.angle == pytest.approx(0.8 * 1.5 - 0.4 * math.sin(3.0), rel=1e-6)
+
+
 def test_distance_of_all_mass() -> None:
     """By points of mass that make up the bodies, in space; and it sees no difference in place."""
     rng = np.random.default_rng(5)

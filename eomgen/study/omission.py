@@ -98,9 +98,10 @@ def run(
         known = [reason for reason in (OVER, FAR_ENOUGH) if reason in trajectory.message]
         ended = known[0] if known else f"it breaks off at t = {trajectory.t[-1]:.4g} s"
     few = slice(None, None, math.ceil(len(trajectory.t) / MOST_ROWS))
-    with np.errstate(all="ignore"):
-        poses = np.moveaxis(module.body_poses(0.0, trajectory.y[few].T), -1, 0)
-    return Run(trajectory.t[few], poses, ended)
+    t = trajectory.t[few]
+    with np.errstate(all="ignore"):  # driven joints are where the time has them
+        poses = np.moveaxis(module.body_poses(t, trajectory.y[few].T), -1, 0)
+    return Run(t, poses, ended)
 
 
 def _timed(module: GeneratedModule, due: float, until: float) -> Problem:
