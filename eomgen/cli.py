@@ -81,8 +81,10 @@ def _parser() -> argparse.ArgumentParser:
         ("view", commands.view, "integrate, and open the moving picture"),
     ):
         _simulation(_code(_form(command(name, run, about))))
-    costing = command("effects", commands.effects, "say what each effect costs")
-    _route(costing)
+    about = "say what each effect costs, and what leaving it out does to the motion"
+    costing = _route(command("effects", commands.effects, about))
+    costing.add_argument("--each", action="store_true", help="a line an effect, not one a type")
+    costing.add_argument("--no-motion", action="store_true", help="say what it costs alone")
     costing.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     _force(costing)
     _linearisation(command("linearise", commands.linearise, "A, B and modes about an equilibrium"))
@@ -96,12 +98,13 @@ def _form(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     return parser
 
 
-def _route(parser: argparse.ArgumentParser) -> None:
+def _route(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument(
         "--route",
         choices=("auto", "closed", "ldl", "aba"),
         help="way to the equations (the scene's; auto is the one of the fewest operations)",
     )
+    return parser
 
 
 def _code(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:

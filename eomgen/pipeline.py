@@ -24,13 +24,16 @@ class Generated:
     explanation: tuple[str, ...]
 
 
-def generate(model: Model) -> Generated:
+def generate(model: Model, *, jacobian: bool = True) -> Generated:
     """Derive a model's equations and write them as code. Same model, same bytes.
+
+    Without its `jacobian`, which takes longer than all else, a module is no whole one, but enough
+    to count and to run by explicit methods.
 
     Raises `SceneError` if the mass matrix is singular or the route is not for the model.
     """
     check_regular(model)
-    choice = routed(model)
+    choice = routed(model, jacobian=jacobian)
     return Generated(
         python_module(choice.system),
         javascript_poses(choice.system) if "body_poses" in model.outputs else "",

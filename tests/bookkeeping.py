@@ -1,10 +1,45 @@
 """What effects do to the energy of a scene, and its Jacobian by differences, for tests."""
 
-import numpy as np
-from engine import Engine, along, exact
+from functools import cache
 
+import numpy as np
+from engine import MP, STEP, Engine, along, exact, read
+
+from eomgen.backends.python import python_module
+from eomgen.build import build_model
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.program.route import routed
+from eomgen.run.module import load_module
+from eomgen.scene.schema import Scene
+
+ENERGIES = ("kinetic_energy", "potential_energy", "effect_powers")
+
+
+@cache
+def light(scene: str) -> Engine:
+    """A scene by its name or text, compiled with `ENERGIES` alone: without the Jacobian that takes
+    longest.
+    """
+    return compiled_light(read(scene))
+
+
+def compiled_light(scene: Scene) -> Engine:
+    """The same of a scene that has been read."""
+    model = build_model(scene.replaced(outputs=ENERGIES))
+    system = routed(model, jacobian=False).system
+    source = python_module(system)
+    return Engine(model, system, source, load_module(source, model.name))
+
+
+def growth(made: Engine, output: str, y: np.ndarray, t: float, **given: dict) -> np.ndarray:
+    """How fast an output grows along the motion, in 60 digits; as time goes on, too."""
+    rate = made.exactly("derivative", exact(y), t=t, **given)
+    ends = (
+        made.exactly(output, exact(y) + h * rate, t=MP.mpf(t) + h, **given) for h in (STEP, -STEP)
+    )
+    ahead, behind = ends
+    return (ahead - behind) / (2 * STEP)
 
 
 def powers(made: Engine, y: np.ndarray, t: float = 0.0) -> list[float]:

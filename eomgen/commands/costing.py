@@ -1,47 +1,139 @@
-"""What each effect of a scene costs: `effects`."""
+"""What each effect of a scene costs, and what leaving it out does: `effects`."""
 
-from eomgen.commands.shared import Arguments, located, read_model
+import math
+from typing import TYPE_CHECKING
+
+from eomgen.commands.shared import Arguments, located, print_wrapped, read_model
 from eomgen.files import check_folder
-from eomgen.run.progress import terminal_notice
+from eomgen.run.progress import terminal_progress
+from eomgen.scene.reader import read_scene
+
+if TYPE_CHECKING:
+    from eomgen.study.bill import Bill, Item
+
+OWN, SHARED = "the mechanism itself", "shared by effects"
 
 
 def effects(given: Arguments) -> int:
-    """Print what each effect costs, and draw it."""
+    """Print what each effect costs and does, and draw it."""
+    # Imported here: nothing else needs Matplotlib for costs.
     from eomgen.show.bill import save_bill
     from eomgen.show.style import check_figure
     from eomgen.study.bill import bill
+    from eomgen.study.variants import variants
 
     model, name = read_model(given.scene, given)
     path = given.output / f"{name}_effects.png"
     check_folder(path.parent)
     check_figure(path, force=given.force)
-    with located(given.scene), terminal_notice(f"costing {name} …"):
-        found = bill(model)
-    width = max([len("the mechanism itself"), *(len(item.name) for item in found.items)])
-    kinds = max([0, *(len(item.type) for item in found.items)])
-    print(f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs")
-    head = f"{'':<{width}}  {'':<{kinds}}"
-    print(f"    {head}  operations   share        µs  states  inputs")
-    print(
-        f"    {'the mechanism itself':<{width}}  {'':<{kinds}}  {found.bare_operations:>10}"
-        f"  {_share(found.bare_operations, found.operations)}  {_us(found.bare_seconds):>8}"
-    )
-    for item in found.items:
-        print(
-            f"    {item.name:<{width}}  {item.type:<{kinds}}  {item.operations:>10}"
-            f"  {_share(item.operations, found.operations)}  {_us(item.seconds):>8}"
-            f"  {item.states:>6}  {item.inputs:>6}"
+    scene = read_scene(given.scene).replaced(route=model.route)
+    with located(given.scene), terminal_progress(f"costing {name}") as progress:
+        found = bill(
+            scene,
+            variants(scene, each=given.each),
+            motion=not given.no_motion,
+            progress=progress,
         )
-    for line in found.routes:
-        print(f"    {line}")
+    print(f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs")
+    _print_items(found)
+    _print_routes(found)
+    if found.extent is not None:
+        _print_motion(found, found.extent)
     save_bill(found, path, force=given.force)
     print(f"    wrote {path}")
     return 0
 
 
+def _print_items(bill: "Bill") -> None:
+    operations, seconds = bill.shared
+    width = max(len(OWN), *(len(item.label) for item in bill.items), 0)
+    motion = "   motion  from 1 %" if bill.extent is not None else ""
+    print(f"    {'':<{width}}  operations   share        µs  states  inputs{motion}")
+
+    def line(label: str, operations: int, seconds: float, rest: str = "") -> None:
+        share = operations / bill.operations if bill.operations else 0.0
+        text = f"    {label:<{width}}  {operations:>10}  {share:6.1%}  {_us(seconds):>8}  {rest}"
+        print(text.rstrip())
+
+    def lines(kind: str) -> None:
+        for item in bill.items:
+            if item.kind == kind and item.needed_by:
+                print(f"    {item.label:<{width}}  {_needed(item)}")
+            elif item.kind == kind:
+                line(item.label, item.operations, item.seconds, _rest(bill, item))
+
+    kinds = [item.kind for item in bill.items]
+    by = (
+        ""
+        if bill.bare_route == bill.route
+        else f"{'':>14}{motion and ' ' * 19}  ({bill.bare_route})"
+    )
+    line(OWN, bill.bare_operations, bill.bare_seconds, by)
+    lines("effect")
+    if kinds.count("effect") > 1 or operations:
+        line(SHARED, operations, seconds)
+    if "mechanism" in kinds:
+        print("    of the mechanism itself, what might be left out:")
+        lines("mechanism")
+    if "left out" in kinds:
+        print("    left out on purpose, what it would add:")
+        lines("left out")
+    if {bill.bare_route, *(item.route for item in bill.items)} - {"", bill.route}:
+        print_wrapped(
+            "    ", f"(route): so its equations come without it, all of them by {bill.route}"
+        )
+
+
+def _needed(item: "Item") -> str:
+    """Why nothing is known of an item alone."""
+    more = f" and {len(item.needed_by) - 3} more" if len(item.needed_by) > 3 else ""
+    return f"others need it: {', '.join(item.needed_by[:3])}{more}"
+
+
+def _rest(bill: "Bill", item: "Item") -> str:
+    """States, inputs, what it does to the motion, and the route if it makes for another."""
+    other_way = "" if item.route == bill.route else f"  ({item.route})"
+    text = f"{item.states:>6}  {item.inputs:>6}"
+    if bill.extent is None:
+        return f"{text}{other_way}"
+    if item.change is None:
+        return f"{text}{'':>19}{other_way}"
+    since = "-" if item.change.since is None else f"{item.change.since:.3g} s"
+    return f"{text}  {item.change.percent + ' %':>7}  {since:>8}{other_way}"
+
+
+def _print_routes(bill: "Bill") -> None:
+    print("    route     operations        µs")
+    for route in bill.routes:
+        count = "-" if route.operations is None else str(route.operations)
+        seconds = "-" if route.seconds is None else _us(route.seconds)
+        label = f"    {route.route:<8}  {count:>10}  {seconds:>8}  "
+        if route.words:
+            print_wrapped(label, route.words)
+        else:
+            print(label.rstrip())
+
+
+def _print_motion(bill: "Bill", extent: float) -> None:
+    """What the changes of the motion mean, and the largest of them in m and degrees."""
+    print_wrapped(
+        "    motion: ",
+        "how far all mass is from where it would be without (root mean square, the most over the "
+        f"run, inputs at 0), in parts of how far the scene's own motion takes it, {extent:.3g} m; "
+        "about 100 % and more: another motion altogether",
+    )
+    changes = [(item.label, item.change) for item in bill.items if item.change is not None]
+    for why in dict.fromkeys(change.ended for _, change in changes if change.ended):
+        ends = [change.until for _, change in changes if change.ended == why]
+        to = " to ".join(dict.fromkeys(f"{t:.3g}" for t in (min(ends), max(ends))))
+        some = "" if len(ends) == len(changes) else f"{len(ends)} of {len(changes)} "
+        print_wrapped("        ", f"{some}compared to t = {to} s of {bill.t_end:g} s alone: {why}")
+    for label, change in changes:
+        if change.since is not None:
+            angle = f"{math.degrees(change.angle):.0f}°"
+            text = f"up to {change.distance:.3g} m ({change.body}) and {angle}"
+            print_wrapped(f"        {label}: ", text)
+
+
 def _us(seconds: float) -> str:
-    return f"{1e6 * seconds:.1f}"
-
-
-def _share(part: int, whole: int) -> str:
-    return f"{part / whole if whole else 0.0:6.1%}"
+    return f"{round(1e6 * seconds, 1) + 0.0:.1f}"  # never -0.0

@@ -12,7 +12,7 @@ from eomgen.derivation.symbols import Vec, rotate
 from eomgen.effects.base import JointLoad
 from eomgen.language.formula import evaluate
 from eomgen.model import Point, is_zero, off_centre
-from eomgen.program.differentiate import jacobian
+from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
@@ -32,8 +32,8 @@ NEEDS_VELOCITIES = (
 """Outputs in generalised coordinates, made for the form [q, v] only."""
 
 
-def from_equations(equations: Equations) -> System:
-    """Lower the equations, differentiate the derivative, run the passes."""
+def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
+    """Lower the equations, differentiate the derivative unless told not to, run the passes."""
     model, symbols, form = equations.model, equations.symbols, state_form(equations)
     tape = Tape()
     named = {name: tape.input(name, Stage.PARAMETERS) for name in symbols.parameters}
@@ -82,13 +82,13 @@ def from_equations(equations: Equations) -> System:
     }
     recipes = _recipes(equations)
     lowerings = {"forward_dynamics": pushed, "inverse_dynamics": demanded}
-    for name in ("jacobian", *model.outputs):
+    for name in (*["jacobian"] * jacobian, *model.outputs):
         if name in by:
-            slopes = jacobian(rates, by[name])
+            slopes = slopes_of(rates, by[name])
             made[name] = ((len(rates), len(by[name])), [node for row in slopes for node in row])
         elif name == "point_jacobians" and model.form == "velocity":
             shape, expressions = recipes["point_velocities"]
-            slopes = jacobian(rows(passive, expressions), [states[s] for s in symbols.v])
+            slopes = slopes_of(rows(passive, expressions), [states[s] for s in symbols.v])
             made[name] = ((*shape, len(symbols.v)), [node for row in slopes for node in row])
         elif model.form == "velocity" or name not in NEEDS_VELOCITIES:
             shape, expressions = recipes[name]

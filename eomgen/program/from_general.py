@@ -10,12 +10,13 @@ from typing import Any
 from eomgen.derivation.general.derive import GeneralEquations
 from eomgen.derivation.states import velocity_states
 from eomgen.language.formula import evaluate
-from eomgen.program.differentiate import jacobian
+from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.from_recursion import (
     DERIVATIVES,
     Recording,
     along_directions,
     checks,
+    derivatives,
     output,
     variables,
 )
@@ -67,8 +68,8 @@ class Lowered:
         return [symbol for symbol in definitions if symbol in needed]
 
 
-def from_general(equations: GeneralEquations) -> System:
-    """The whole system of a model by route `closed`."""
+def from_general(equations: GeneralEquations, *, jacobian: bool = True) -> System:
+    """The whole system of a model by route `closed`; with the derivative's Jacobian or without."""
     model = equations.model
     record = Recording(model, "closed", lambda record: Lowered(equations, record).forward)
     lowered, tape, ny = Lowered(equations, record), record.tape, len(record.q) + len(record.v)
@@ -76,9 +77,9 @@ def from_general(equations: GeneralEquations) -> System:
     made: Made = {"initial_state": ((ny,), start), "derivative": ((ny,), record.rates)}
     extra: dict[str, tuple[str, ...]] = {}
     tangents: set[str] = set()
-    for name in ("jacobian", *(name for name in model.outputs if name in DERIVATIVES)):
+    for name in derivatives(model, jacobian):
         by, before = variables(record, name), len(tape.steps)
-        rows = jacobian(record.rates, by)
+        rows = slopes_of(record.rates, by)
         if len(tape.steps) - before > LARGEST_JACOBIAN:
             rows, extra[name] = along_directions(record, by)
             tangents.add(name)

@@ -85,8 +85,8 @@ def position_rates(model: Model, q: Sequence[Node], v: Sequence[Node], tape: Tap
     return rates
 
 
-def from_recursion(record: Recording) -> System:
-    """The whole system of a recorded model."""
+def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
+    """The whole system of a recorded model; with the derivative's Jacobian or without."""
     model = record.model
     ny = len(record.rates)
     tape = record.tape
@@ -98,7 +98,7 @@ def from_recursion(record: Recording) -> System:
     }
     extra: dict[str, tuple[str, ...]] = {}
     tangents: set[str] = set()
-    for name in ("jacobian", *(name for name in model.outputs if name in DERIVATIVES)):
+    for name in derivatives(model, jacobian):
         by = variables(record, name)
         if _is_small(record, name):
             rows = _matrix(record, name)
@@ -125,6 +125,11 @@ def from_recursion(record: Recording) -> System:
         frozenset(tangents),
         touches(record.dynamics),
     )
+
+
+def derivatives(model: Model, jacobian: bool) -> list[str]:
+    """Names of the matrices of derivatives that are made of a model."""
+    return ["jacobian"] * jacobian + [name for name in model.outputs if name in DERIVATIVES]
 
 
 def output(

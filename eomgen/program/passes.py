@@ -163,5 +163,8 @@ def _rebuilt(
 
 
 def _report(name: str, program: Program) -> PassReport:
-    derivative, jacobian = (cost(program, output)["total"] for output in ("derivative", "jacobian"))
+    derivative, jacobian = (
+        cost(program, output)["total"] if output in program.outputs else 0
+        for output in ("derivative", "jacobian")
+    )
     return PassReport(name, len(program.steps), derivative, jacobian)

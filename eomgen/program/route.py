@@ -36,8 +36,9 @@ class Routed:
         return lines
 
 
-def routed(model: Model) -> Routed:
-    """The system of a model by the route it names, or by the one of the fewest operations.
+def routed(model: Model, *, jacobian: bool = True) -> Routed:
+    """The system of a model by the route it names, or by the one of the fewest operations; with
+    the derivative's Jacobian or without.
 
     Raises `SceneError` if it names one that is not for it.
     """
@@ -53,9 +54,9 @@ def routed(model: Model) -> Routed:
                 "from the closed form"
             )
         words = "named" if model.route == "closed" else f"form '{model.form}' comes from it alone"
-        return _taken(_closed(model), words)
+        return _taken(_closed(model, jacobian), words)
     if model.route != "auto":
-        return _taken(from_recursion(recorded(model, model.route)), "named")
+        return _taken(from_recursion(recorded(model, model.route), jacobian=jacobian), "named")
     candidates = []
     closed: System | None = None
     if why_not:
@@ -63,7 +64,7 @@ def routed(model: Model) -> Routed:
     elif words := why_not_tried(model):
         candidates.append(Candidate("closed", None, words))
     else:
-        closed = _closed(model)
+        closed = _closed(model, jacobian)
         candidates.append(_candidate("closed", _operations(closed)))
     records = {"aba": recorded(model, "aba")}
     aba, least = _operations_of(records["aba"]), least_factoring(model)
@@ -76,8 +77,9 @@ def routed(model: Model) -> Routed:
         candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
     tried = [c for c in candidates if c.operations is not None]
     best = min(tried, key=lambda c: c.operations or 0)
-    system = closed if closed and best.route == "closed" else from_recursion(records[best.route])
-    return Routed(system, tuple(candidates))
+    if closed is None or best.route != "closed":
+        closed = from_recursion(records[best.route], jacobian=jacobian)
+    return Routed(closed, tuple(candidates))
 
 
 def recorded(model: Model, route: str) -> Recording:
@@ -104,17 +106,17 @@ def least_factoring(model: Model) -> int:
     return sum(above + above * (above + 1) for above in model.carriers)
 
 
-def _closed(model: Model) -> System:
+def _closed(model: Model, jacobian: bool) -> System:
     # Imported here because SymPy takes longer to load than everything else together.
     if why_not_pins(model):
         from eomgen.derivation.general.derive import derive_general
         from eomgen.program.from_general import from_general
 
-        return from_general(derive_general(model))
+        return from_general(derive_general(model), jacobian=jacobian)
     from eomgen.derivation.closed import derive
     from eomgen.program.from_equations import from_equations
 
-    return from_equations(derive(model))
+    return from_equations(derive(model), jacobian=jacobian)
 
 
 def _taken(system: System, words: str) -> Routed:

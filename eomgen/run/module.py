@@ -5,6 +5,8 @@ import importlib.util
 from collections.abc import Callable
 from typing import Any, Protocol, cast
 
+import numpy as np
+
 from eomgen.errors import RunError
 from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.works import Powers
@@ -58,6 +60,15 @@ def load_module(source: str, name: str = "generated") -> GeneratedModule:
     return cast(GeneratedModule, module)
 
 
+def _by_differences(module: GeneratedModule) -> Callable[[float, Floats], Floats]:
+    def jacobian(t: float, y: Floats) -> Floats:
+        steps = 1e-7 * np.maximum(1.0, np.abs(y))
+        ahead = module.derivative(t, y[:, None] + np.diag(steps))
+        return np.asarray((ahead - module.derivative(t, y)[:, None]) / steps)
+
+    return jacobian
+
+
 def _unsolvable(error: Exception) -> str:
     if isinstance(error, ArithmeticError):
         return (
@@ -70,10 +81,13 @@ def _unsolvable(error: Exception) -> str:
 def as_problem(module: GeneratedModule, parameters: Any = None, inputs: Any = None) -> Problem:
     """The initial-value problem of a module, at given parameters and constant inputs.
 
+    A module that was made without its Jacobian has one by differences: enough to iterate with.
+
     Raises `RunError` if the module refuses them.
     """
     if parameters is None and inputs is None:  # the module's shortest way
-        derivative, jacobian = module.derivative, module.jacobian
+        derivative = module.derivative
+        jacobian = getattr(module, "jacobian", _by_differences(module))
     else:
 
         def derivative(t: float, y: Floats) -> Floats:

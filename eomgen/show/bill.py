@@ -1,31 +1,69 @@
-"""A bill of effects as bars: operations and time, longest first."""
+"""A bill of effects as bars: operations, time, and what leaving each out does to the motion."""
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from eomgen.show.style import PALETTE, plain, style, write_figure
-from eomgen.study.bill import Bill
+from eomgen.show.style import FAINT, PALETTE, plain, style, write_figure
+from eomgen.study.bill import Bill, Item
+from eomgen.study.omission import Change
+from eomgen.study.variants import Kind
+
+MOST_BARS = 40
+OWN = FAINT
+COLOURS: dict[Kind, str] = {"effect": PALETTE[0], "mechanism": "#bbbbbb", "left out": PALETTE[1]}
+"""Of the bars of each kind of item."""
 
 
 def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
-    """Write the figure; raises `RunError` as `write_figure` does."""
-    items = sorted(bill.items, key=lambda item: item.operations)
-    names = [plain(f"{item.name} ({item.type})") for item in items]
-    names.insert(0, "the mechanism itself")
-    operations = [bill.bare_operations, *(item.operations for item in items)]
-    microseconds = [1e6 * bill.bare_seconds, *(1e6 * item.seconds for item in items)]
+    """Write the figure, the longest bar of operations first, of very many items the first ones.
+
+    Raises `RunError` as `write_figure` does.
+    """
+    known = [item for item in bill.items if not item.needed_by]
+    items = sorted(known, key=lambda item: -item.operations)[:MOST_BARS]
+    operations, seconds = bill.shared
+    labels = ["the mechanism itself", *map(_label, items), "shared by effects"]
+    colours = [OWN, *(COLOURS[item.kind] for item in items), OWN]
+    counts = [bill.bare_operations, *(item.operations for item in items), operations]
+    times = [1e6 * s for s in (bill.bare_seconds, *(item.seconds for item in items), seconds)]
+    changes = [math.nan, *(_percent(item.change) for item in items), math.nan]
+    panels: list[tuple[str, Sequence[float], Sequence[str]]] = [
+        ("operations of a derivative", counts, [str(count) for count in counts]),
+        ("time of a call, µs", times, [f"{time:.1f}" for time in times]),
+    ]
+    if bill.extent is not None:
+        percents = ["" if item.change is None else item.change.percent for item in items]
+        panels.append(("without it the motion changes by, %", changes, ["", *percents, ""]))
     with style():
-        figure = Figure(figsize=(9.0, 1.6 + 0.34 * len(names)), layout="constrained")
-        left, right = figure.subplots(1, 2, sharey=True)
-        for axes, values, label, unit in (
-            (left, operations, "operations of a derivative", "{:.0f}"),
-            (right, microseconds, "time of a call, µs", "{:.1f}"),
+        figure = Figure(figsize=(10.0, 1.5 + 0.32 * len(labels)), layout="constrained")
+        for axes, (label, values, texts) in zip(
+            figure.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels, strict=True
         ):
-            bars = axes.barh(names, values, color=PALETTE[0])
-            axes.bar_label(bars, [f" {unit.format(value)}" for value in values], fontsize=8.5)
-            axes.margins(x=0.15)
+            _bars(axes, [plain(text) for text in labels], values, texts, colours)
             axes.set_xlabel(label)
-            axes.grid(axis="y", visible=False)
+        axes.invert_yaxis()  # shared: the first label is on top
         figure.suptitle(f"{plain(bill.name)}: what each effect costs", x=0.01, ha="left")
         write_figure(figure, path, force=force)
+
+
+def _label(item: Item) -> str:
+    tails = {"effect": "", "mechanism": ", of the mechanism", "left out": ", left out"}
+    return item.label + tails[item.kind]
+
+
+def _percent(change: Change | None) -> float:
+    return math.nan if change is None else 100 * change.relative
+
+
+def _bars(
+    axes: Axes, labels: list[str], values: Sequence[float], texts: Sequence[str], colours: list[str]
+) -> None:
+    lengths = [value if math.isfinite(value) else 0.0 for value in values]
+    bars = axes.barh(range(len(labels)), lengths, color=colours, tick_label=labels)
+    axes.bar_label(bars, [f" {text}" for text in texts], fontsize=8.5)
+    axes.margins(x=0.2)
+    axes.grid(axis="y", visible=False)

@@ -1,95 +1,225 @@
-"""What each effect of a scene costs: operations, time, states and inputs, with it and without."""
+"""What each effect of a scene costs: operations, time, states, inputs; and what it does for that.
+
+Operations are those of `derivative`, counted in modules that hold it and the bodies' places alone.
+"""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from math import inf
+from typing import get_args
 
+from eomgen.backends.python import python_module
+from eomgen.build import build_model
+from eomgen.derivation.recursive.regular import check_regular
+from eomgen.derivation.supported import why_not_closed, why_not_tried
 from eomgen.model import Model
-from eomgen.pipeline import generate
-from eomgen.run.module import GeneratedModule, load_module
+from eomgen.program.route import least_factoring, routed
+from eomgen.run.module import GeneratedModule, as_problem, load_module
+from eomgen.run.progress import Progress
+from eomgen.scene.schema import Route, Scene
+from eomgen.study.omission import Change, Run, change, extent, run
+from eomgen.study.variants import Kind, Variant, bare, counted
 
-ROUNDS = 7
-CALLS = 200
+TIMING = 1.0
+"""About how long all calls that are timed take together, s."""
+CHUNK = 5e-4
+"""About how long those of one module in one round take, s: too short to be interrupted often."""
+LEAST_ROUNDS = 7
+MOTION = 10.0
+"""Most wall time of all motions together, s."""
+MOST_FACTORING = 20_000
+"""Operations of factoring alone beyond which `ldl` is not tried."""
 
 
 @dataclass(frozen=True)
 class Item:
-    """One effect: operations of `derivative` that it adds, and time of a call in s that it adds."""
+    """One thing that the scene has, or that it leaves out on purpose: see `Kind`.
 
-    name: str
-    type: str
-    operations: int
-    seconds: float
-    states: int
-    inputs: int
+    operations, seconds  of a call of `derivative` that it adds, or would add
+    states, inputs       that it brings; below 0 for what takes states away, a driven joint
+    route                of the equations without it, or of those with what is left out
+    needed_by            effects that cannot be without it: then nothing is known of it alone
+    change               what leaving it out does to the motion; None if that was not asked for
+    """
+
+    label: str
+    kind: Kind
+    operations: int = 0
+    seconds: float = 0.0
+    states: int = 0
+    inputs: int = 0
+    route: str = ""
+    needed_by: tuple[str, ...] = ()
+    change: Change | None = None
+
+
+@dataclass(frozen=True)
+class RouteCost:
+    """A route: operations and time, s, of a call of `derivative`, or None and why not."""
+
+    route: str
+    operations: int | None
+    seconds: float | None
+    words: str
 
 
 @dataclass(frozen=True)
 class Bill:
     """The whole and its items; `bare` is the mechanism without any effect.
 
-    What the items add up to differs from the whole where effects share work: two that ask for the
-    velocity of one point pay for it once.
+    `route` and `bare_route` are those of their equations. `extent` is that of the scene's motion,
+    m, or None if no motion was asked for.
     """
 
     name: str
+    route: str
     operations: int
     seconds: float
+    bare_route: str
     bare_operations: int
     bare_seconds: float
     items: tuple[Item, ...]
-    routes: tuple[str, ...]
+    routes: tuple[RouteCost, ...]
+    t_end: float
+    extent: float | None
 
+    @property
+    def shared(self) -> tuple[int, float]:
+        """Operations and time, s, that go with no item alone.
 
-def bill(model: Model) -> Bill:
-    """Generate the scene whole, without each effect, and bare; count and time them in turn."""
-    models = [model, _with(model, ()), *(_without(model, i) for i in range(len(model.effects)))]
-    generated = [generate(_light(m)) for m in models]
-    modules = [load_module(g.module, model.name) for g in generated]
-    times = _times([_call(module) for module in modules])
-    counts = [module.COST["derivative"]["total"] for module in modules]
-    items = tuple(
-        Item(
-            effect.name,
-            effect.type,
-            counts[0] - counts[2 + i],
-            times[0] - times[2 + i],
-            len(effect.states(model.dimensions)),
-            len(effect.inputs(model.dimensions)),
+        Effects share work: two that ask for the velocity of one point pay for it once, and it stays
+        when one of them goes. So does what another route costs that only the bare mechanism lets
+        in. Below 0 where one costs more beside another than without it.
+        """
+        items = [item for item in self.items if item.kind == "effect"]
+        return (
+            self.operations - self.bare_operations - sum(item.operations for item in items),
+            self.seconds - self.bare_seconds - sum(item.seconds for item in items),
         )
-        for i, effect in enumerate(model.effects)
-    )
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A model compiled and timed."""
+
+    model: Model
+    module: GeneratedModule
+    route: str
+    operations: int
+    seconds: float = 0.0
+
+
+def bill(
+    scene: Scene,
+    parts: Sequence[Variant],
+    *,
+    motion: bool = True,
+    progress: Progress = lambda fraction: None,
+) -> Bill:
+    """Compile a scene whole, in each of its variants, and bare; count, time and, for `motion`, run
+    them all. `parts` are `variants(scene)` or some of them.
+
+    Raises `SceneError` or `RunError` if the whole cannot be compiled or evaluated at its start.
+    """
+    whole = _compiled(build_model(counted(scene)))
+    tries = {route: _try(whole, route) for route in get_args(Route) if route != "auto"}
+    models = [bare(scene), *(part.model for part in parts), *(m for m, _ in tries.values())]
+    made: list[_Made | None] = [whole]
+    for model in models:
+        progress(0.5 * len(made) / (1 + len(models)))
+        made.append(None if model is None else _compiled(model))
+    progress(0.5)
+    timed = _timed(made)
+    whole, without = _there(timed[0]), _there(timed[1])
+    changed, other_routes = timed[2 : 2 + len(parts)], timed[2 + len(parts) :]
+    size: float | None = None
+    changes: list[Change | None] = [None] * len(parts)
+    if motion:
+        size, changes = _changes(whole, parts, changed, lambda x: progress(0.6 + 0.4 * x))
     return Bill(
-        model.name,
-        counts[0],
-        times[0],
-        counts[1],
-        times[1],
-        items,
-        generated[0].explanation,
+        name=whole.model.name,
+        route=whole.route,
+        operations=whole.operations,
+        seconds=whole.seconds,
+        bare_route=without.route,
+        bare_operations=without.operations,
+        bare_seconds=without.seconds,
+        items=tuple(_item(whole, *part) for part in zip(parts, changed, changes, strict=True)),
+        routes=tuple(
+            _route_cost(route, words, whole if route == whole.route else other)
+            for (route, (_, words)), other in zip(tries.items(), other_routes, strict=True)
+        ),
+        t_end=whole.model.simulation.t_end,
+        extent=size,
     )
 
 
-def _without(model: Model, i: int) -> Model:
-    return _with(model, tuple(effect for k, effect in enumerate(model.effects) if k != i))
+def _there(made: _Made | None) -> _Made:
+    assert made is not None
+    return made
 
 
-def _with(model: Model, effects: Sequence[object]) -> Model:
-    """The model under some of its effects only."""
-    kept = tuple(effect for effect in model.effects if effect in effects)
-    inputs = {i.name for effect in kept for i in effect.inputs(model.dimensions)}
-    states = {x.name for effect in kept for x in effect.states(model.dimensions)}
-    return replace(
-        model,
-        effects=kept,
-        inputs=tuple(i for i in model.inputs if i.name in inputs),
-        states=tuple(x for x in model.states if x.name in states),
+def _compiled(model: Model) -> _Made:
+    """Raises `SceneError` or `RunError` if that cannot be, or not be evaluated at its start."""
+    check_regular(model)
+    system = routed(model, jacobian=False).system
+    module = load_module(python_module(system), model.name)
+    as_problem(module)
+    return _Made(model, module, system.route, module.COST["derivative"]["total"])
+
+
+def _try(whole: _Made, route: Route) -> tuple[Model | None, str]:
+    """The model by another route, or None and why not."""
+    model = whole.model
+    if route == whole.route:
+        return None, "taken"
+    if model.form != "velocity":
+        return None, f"the form '{model.form}' comes from the closed form alone"
+    least, why_not = least_factoring(model), ""
+    if route == "closed":
+        why_not = why_not_closed(model) or why_not_tried(model)
+    elif route == "ldl" and least > MOST_FACTORING:
+        why_not = f"not tried: factoring alone takes {least} operations"
+    return (None, why_not) if why_not else (replace(model, route=route), "")
+
+
+def _route_cost(route: str, words: str, made: _Made | None) -> RouteCost:
+    if made is None:
+        return RouteCost(route, None, None, words)
+    return RouteCost(route, made.operations, made.seconds, words)
+
+
+def _item(whole: _Made, part: Variant, other: _Made | None, change: Change | None) -> Item:
+    """The difference between two modules: what one has more than the other."""
+    if other is None:
+        return Item(part.label, part.kind, needed_by=part.needed_by)
+    more, less = (other, whole) if part.kind == "left out" else (whole, other)
+    return Item(
+        part.label,
+        part.kind,
+        more.operations - less.operations,
+        more.seconds - less.seconds,
+        len(more.module.STATES) - len(less.module.STATES),
+        len(more.model.inputs) - len(less.model.inputs),
+        route=other.route,
+        change=change,
     )
 
 
-def _light(model: Model) -> Model:
-    """Without outputs that only cost time to generate."""
-    return replace(model, outputs=("kinetic_energy", "potential_energy", "body_poses"))
+def _timed(made: Sequence[_Made | None]) -> list[_Made | None]:
+    """With the least time of a call in s, of all in turn: a busy machine is busy for all."""
+    there = [one for one in made if one is not None]
+    calls = [_call(one.module) for one in there]
+    counts = [1 + int(CHUNK / min(_seconds(call, 1) for _ in range(5))) for call in calls]
+    least, rounds, begin = [inf] * len(calls), 0, time.perf_counter()
+    while rounds < LEAST_ROUNDS or time.perf_counter() < begin + TIMING:
+        for k, (call, count) in enumerate(zip(calls, counts, strict=True)):
+            least[k] = min(least[k], _seconds(call, count))
+        rounds += 1
+    found = iter(least)
+    return [None if one is None else replace(one, seconds=next(found)) for one in made]
 
 
 def _call(module: GeneratedModule) -> Callable[[], object]:
@@ -97,13 +227,50 @@ def _call(module: GeneratedModule) -> Callable[[], object]:
     return lambda: module.derivative(0.0, start)
 
 
-def _times(calls: Sequence[Callable[[], object]]) -> list[float]:
-    """Least time of a call in s, all taken in turn, so that a busy machine is busy for all."""
-    least = [float("inf")] * len(calls)
-    for _ in range(ROUNDS):
-        for k, call in enumerate(calls):
-            begin = time.perf_counter()
-            for _ in range(CALLS):
-                call()
-            least[k] = min(least[k], (time.perf_counter() - begin) / CALLS)
-    return least
+def _seconds(call: Callable[[], object], count: int) -> float:
+    begin = time.perf_counter()
+    for _ in range(count):
+        call()
+    return (time.perf_counter() - begin) / count
+
+
+def _changes(
+    whole: _Made, parts: Sequence[Variant], changed: Sequence[_Made | None], progress: Progress
+) -> tuple[float, list[Change | None]]:
+    """The extent of the scene's motion, m, and how each variant's comes apart from it.
+
+    The runs share the time there is; none goes on where that of the scene ended.
+    """
+    count = 1 + sum(made is not None for made in changed)
+    shares = _shares(MOTION, count)
+    done = 0
+
+    def ran(made: _Made, until: float) -> Run:
+        nonlocal done
+        before, done = done, done + 1
+        told = partial(_part_of, progress, before, count)
+        return run(made.model, made.module, next(shares), until, told)
+
+    base = ran(whole, inf)
+    size = extent(whole.model, base)
+    found: list[Change | None] = []
+    for part, made in zip(parts, changed, strict=True):
+        if made is None:
+            found.append(None)
+            continue
+        other = ran(made, float(base.t[-1]))
+        # What is left out on purpose is measured in parts of the complete motion.
+        complete = extent(made.model, other) if part.kind == "left out" else size
+        found.append(change(whole.model, base, other, complete))
+    return size, found
+
+
+def _part_of(progress: Progress, done: int, count: int, fraction: float) -> None:
+    progress((done + fraction) / count)
+
+
+def _shares(total: float, count: int) -> Iterator[float]:
+    """An equal share of the time, s, for each; what one leaves is for those after it."""
+    due = time.perf_counter() + total
+    for left in range(count, 0, -1):
+        yield max(0.0, due - time.perf_counter()) / left

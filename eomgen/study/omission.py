@@ -1,0 +1,190 @@
+"""What leaving something out does to a motion: two runs, and how far they come apart.
+
+The measure is the distance between the two mechanisms, each body's every piece of mass against the
+same piece in the other run: d² = Σ ∫ |Δx|² dm / Σ m, a root mean square in m that knows both places
+and angles (of a rigid body ∫ |Δx|² dm = m |Δx_com|² + tr(ΔR J ΔRᵀ), J = ∫ r rᵀ dm). It is given in
+parts of the motion's extent: the same measure between the start of the whole scene's run and where
+it is farthest from there. Chaotic motions part until d is as large as the motion itself; about
+100 % and more then say: another motion altogether.
+"""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from eomgen.model import Model
+from eomgen.run.integrate import integrate
+from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
+from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.problem import Floats, Problem
+from eomgen.run.progress import Progress
+
+SMALL = 0.01
+"""Part of the extent beyond which a motion counts as changed."""
+STILL = 1e-9
+"""Extent, m, of a motion that is none."""
+FINEST = (1e-6, 1e-9)
+"""Relative and absolute tolerance of the runs that are compared."""
+MOST_ROWS = 2001
+"""Most instants that two motions are compared at."""
+OVER = "no time to compute more"
+FAR_ENOUGH = "the other run ends here"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A motion: times (n,), poses (n, nb, …) as `body_poses` has them, and why it ended early."""
+
+    t: Floats
+    poses: Floats
+    ended: str
+
+
+@dataclass(frozen=True)
+class Change:
+    """How far apart two motions come.
+
+    relative  greatest d in parts of the extent, nan if nothing moves
+    since     first time at which d is more than `SMALL` of the extent, s; None if it never is
+    distance  greatest distance between the two places of one centre of mass, m, that of `body`
+    angle     greatest angle between the two attitudes of one body, rad
+    until     how far they were compared, s
+    ended     why no farther; "" if that is the end
+    """
+
+    relative: float
+    since: float | None
+    distance: float
+    body: str
+    angle: float
+    until: float
+    ended: str
+
+    @property
+    def percent(self) -> str:
+        """`relative` to two digits, and all of a whole number; "-" if nothing moves."""
+        if math.isnan(self.relative):
+            return "-"
+        value = 100 * self.relative
+        return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
+
+
+def run(
+    model: Model, module: GeneratedModule, seconds: float, until: float, progress: Progress
+) -> Run:
+    """A scene's own run, its inputs at 0, for `seconds` of wall time or up to `until` of its own.
+
+    The scene's integrator and step are used, its tolerances down to `FINEST`, which will do for
+    fractions of a percent. The module needs its derivative and `body_poses` only.
+    """
+    wanted = model.simulation
+    fixed = isinstance(find_integrator(wanted.integrator), FixedStep)
+    trajectory = integrate(
+        _timed(module, time.perf_counter() + seconds, until),
+        wanted.integrator,
+        wanted.t_end,
+        dt=wanted.dt if fixed else None,
+        rtol=max(wanted.rtol, FINEST[0]),
+        atol=max(wanted.atol, FINEST[1]),
+        progress=progress,
+    )
+    if trajectory.message.startswith("interrupted"):
+        raise KeyboardInterrupt
+    ended = ""
+    if not trajectory.finished:
+        known = [reason for reason in (OVER, FAR_ENOUGH) if reason in trajectory.message]
+        ended = known[0] if known else f"it breaks off at t = {trajectory.t[-1]:.4g} s"
+    few = slice(None, None, math.ceil(len(trajectory.t) / MOST_ROWS))
+    t = trajectory.t[few]
+    with np.errstate(all="ignore"):  # driven joints are where the time has them
+        poses = np.moveaxis(module.body_poses(t, trajectory.y[few].T), -1, 0)
+    return Run(t, poses, ended)
+
+
+def _timed(module: GeneratedModule, due: float, until: float) -> Problem:
+    """The initial-value problem of a module, which ends when the time for it is over."""
+    problem = as_problem(module)
+
+    def derivative(t: float, y: Floats) -> Floats:
+        if time.perf_counter() > due:
+            raise StepFailure(OVER)
+        if t > until:
+            raise StepFailure(FAR_ENOUGH)
+        return problem.derivative(t, y)
+
+    return replace(problem, derivative=derivative)
+
+
+def extent(model: Model, motion: Run) -> float:
+    """How far a motion gets from its start, m, by the measure of this page."""
+    return float(np.max(distances(model, motion.poses, motion.poses[:1])))
+
+
+def change(model: Model, whole: Run, other: Run, size: float) -> Change:
+    """How far another run comes from that of the whole; `size` is the extent, m."""
+    _, i, j = np.intersect1d(whole.t, other.t, return_indices=True)
+    t, one, two = whole.t[i], whole.poses[i], other.poses[j]
+    apart = distances(model, one, two)
+    moving = size > STILL
+    late = np.flatnonzero(apart > SMALL * size) if moving else np.array([], dtype=int)
+    gaps = _places(one) - _places(two)
+    gap = np.sqrt(np.sum(gaps * gaps, axis=-1))
+    farthest = np.unravel_index(int(np.argmax(gap)), gap.shape)
+    ends = [ended for ended in (other.ended, whole.ended) if ended not in ("", FAR_ENOUGH)]
+    return Change(
+        relative=float(np.max(apart)) / size if moving else math.nan,
+        since=float(t[late[0]]) if late.size else None,
+        distance=float(gap[farthest]),
+        body=model.bodies[int(farthest[1])].name,
+        angle=float(np.max(_angles(one, two))),
+        until=float(t[-1]),
+        ended=ends[0] if ends else "",
+    )
+
+
+def distances(model: Model, one: Floats, two: Floats) -> Floats:
+    """d of each row of two motions, (n,), m: root mean square over all mass."""
+    total: Floats = np.zeros(len(one))
+    moved = np.sum((_places(one) - _places(two)) ** 2, axis=-1)
+    turned = _attitudes(one) - _attitudes(two)
+    masses = [model.value(body.mass) for body in model.bodies]
+    for k, body in enumerate(model.bodies):
+        inertia = [model.value(part) for part in body.inertia_com]
+        spread = np.einsum("nij,jk,nik->n", turned[:, k], _second_moment(inertia), turned[:, k])
+        total = total + masses[k] * moved[:, k] + spread
+    return np.asarray(np.sqrt(np.maximum(total, 0.0) / sum(masses)))
+
+
+def _second_moment(inertia: Sequence[float]) -> Floats:
+    """J = ∫ r rᵀ dm from the moments of inertia: ½ tr(I) 1 - I; in the plane any J of that I."""
+    if len(inertia) == 1:
+        return np.asarray(np.eye(2) * inertia[0] / 2)
+    xx, yy, zz, xy, xz, yz = (*inertia, 0.0, 0.0, 0.0)[:6]
+    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return np.asarray(np.trace(matrix) / 2 * np.eye(3) - matrix)
+
+
+def _places(poses: Floats) -> Floats:
+    """Centres of mass, (n, nb, 2) or (n, nb, 3)."""
+    return poses[..., :2] if poses.ndim == 3 else poses[..., 3]
+
+
+def _attitudes(poses: Floats) -> Floats:
+    """World_R_body of each body, (n, nb, 2, 2) or (n, nb, 3, 3)."""
+    if poses.ndim == 4:
+        return poses[..., :3]
+    c, s = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+    return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
+
+
+def _angles(one: Floats, two: Floats) -> Floats:
+    """Angle between two attitudes of each body, 0 to π, (n, nb).
+
+    From |ΔR|² = 4 (1 - cos) in the plane, 8 sin²(½ angle) = 4 (1 - cos) in space alike.
+    """
+    turned = _attitudes(one) - _attitudes(two)
+    half = np.sqrt(np.sum(turned * turned, axis=(-2, -1)) / 8)
+    return np.asarray(2 * np.arcsin(np.minimum(half, 1.0)))

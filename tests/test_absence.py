@@ -1,0 +1,186 @@
+"""Absence is free: a scene without an effect knows nothing of it, and an effect brings no more
+than it needs.
+"""
+
+import ast
+import typing
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+from bookkeeping import compiled_light, light
+from effect_cases import BASES, CASES, Case
+from engine import Engine
+
+from eomgen.backends.python import OWN
+from eomgen.effects import Effect
+from eomgen.errors import SceneError
+from eomgen.pipeline import compile_scene
+from eomgen.scene.reader import parse_scene
+from eomgen.study.variants import removed, without_effects
+
+GENERATED = Path(__file__).parent.parent / "generated"
+NAMES = [case.name for case in CASES]
+
+
+@cache
+def without(base: str) -> Engine:
+    """A scene that never had an effect, from a text of its own."""
+    return compiled_light(parse_scene(BASES[base].format(outputs="")))
+
+
+@pytest.mark.parametrize("case", CASES, ids=NAMES)
+def test_absence_is_free(case: Case) -> None:
+    """With the effect the module is another, full of what it brings; without it, byte for byte that
+    of a scene that never had it; so is the model that `eomgen effects` compares with.
+    """
+    scene, made, bare = parse_scene(case.text()), light(case.text()), without(case.base)
+    assert compiled_light(removed(scene, scene.effects)).source == bare.source
+    (variant,) = without_effects(scene)
+    assert variant.model == replace(bare.model, outputs=("body_poses",))
+    kind = scene.effects[0].type
+    assert "marker" in made.source and "marker" not in bare.source
+    assert f"Effects: {kind}." in made.source and kind not in bare.source
+    check_tidy(made.source)
+    check_added(made.module, bare.module)
+
+
+@pytest.mark.parametrize("base", ["plane", "space"])
+def test_absence_of_many(base: str) -> None:
+    """The same of whole modules, Jacobian and all, and of many effects at once."""
+    tables = [case.table for case in CASES if case.base == base][:: 3 if base == "plane" else 16]
+    named = [t.replace("marker", f"marker{i}") for i, t in enumerate(tables) if "driven" not in t]
+    bare = BASES[base].format(outputs='outputs = ["potential_energy"]')
+    scene = parse_scene(bare + "".join(f"[[effects]]\n{table}\n" for table in named))
+    assert len(scene.effects) > 3
+    check_tidy(compile_scene(scene))
+    assert compile_scene(removed(scene, scene.effects)) == compile_scene(parse_scene(bare))
+    first, *others = scene.effects
+    alone = compile_scene(removed(scene, others))
+    assert alone == compile_scene(parse_scene(f"{bare}[[effects]]\n{named[0]}"))
+    assert removed(scene, others).effects == (first,)
+
+
+def check_added(more: Any, less: Any) -> None:
+    """What one module has more than another is named after the effect, but for operations."""
+    for table in ("PARAMETERS", "INPUTS", "STATES", "UNITS"):
+        there, before = getattr(more, table), getattr(less, table)
+        kept = [name for name in there if name in before]
+        driven = [name for name in before if name not in there]  # is no state any more
+        assert all(name.startswith(("q", "s")) for name in driven)
+        assert "driven" in more.EFFECTS or not driven
+        assert kept == [name for name in before if name in there]
+        assert all(name.startswith("marker") for name in there if name not in before)
+    assert less.EFFECTS == less.EFFECT_NAMES == ()
+    assert more.EFFECT_NAMES == ("marker",)
+
+
+def check_tidy(source: str) -> None:
+    """Everything that a module imports, defines and computes is used."""
+    tree = ast.parse(source)
+    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+    called, loaded = set(), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            called.add(node.func.id)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+            loaded.add(node.id)
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom):
+            unused = {alias.name for alias in node.names} - called
+            assert not unused, unused
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_COLUMNS":
+            unused = {key.value for key in node.value.keys} - called
+            assert not unused, unused
+    for name, function in functions.items():
+        if name.startswith("_"):
+            assert name in loaded | called, name
+            check_kernel(function)
+        assert name not in OWN or name in called, name
+
+
+def check_kernel(function: ast.FunctionDef) -> None:
+    """Every value of a function is used in it."""
+    made, used = set(), set()
+    for node in ast.walk(function):
+        if isinstance(node, ast.Name):
+            (made if isinstance(node.ctx, ast.Store) else used).add(node.id)
+    if function.name == "_constants":  # a parameter may be without effect, and stays one
+        unpacked = next(node for node in ast.walk(function) if isinstance(node, ast.Assign))
+        made -= {node.id for node in ast.walk(unpacked.targets[0]) if isinstance(node, ast.Name)}
+    assert made <= used | {"_"}, (function.name, made - used)
+
+
+SMALL = sorted(p.stem for p in GENERATED.glob("*.py") if p.stat().st_size < 200_000)
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_nothing_unused_in_generated_modules(name: str) -> None:
+    """Not in the committed ones either; larger ones are more of the same."""
+    assert len(SMALL) > 10
+    check_tidy((GENERATED / f"{name}.py").read_text("utf-8"))
+
+
+def test_the_check_finds_what_is_unused() -> None:
+    """An import, a helper, a value more: each is found."""
+    source = compile_scene(parse_scene(CASES[0].text()))
+    check_tidy(source)
+    for old, new in (
+        ("import cos", "import atan, cos"),
+        ("@lru_cache", "def step(x):\n    return x\n\n\n@lru_cache"),
+        ("_COLUMNS = {", '_COLUMNS = {\n    "tan": np.tan,'),
+        ("    return (\n", "    unused = 1.0\n    return (\n"),
+    ):
+        assert old in source
+        with pytest.raises(AssertionError):
+            check_tidy(source.replace(old, new))
+
+
+# Nothing is missing here.
+
+
+def literals(annotation: Any) -> list[str]:
+    """The words that a field may be."""
+    if typing.get_origin(annotation) is typing.Literal:
+        return list(get_args(annotation))
+    return [word for part in get_args(annotation) for word in literals(part)]
+
+
+@pytest.mark.parametrize("effect", get_args(get_args(Effect)[0]), ids=lambda e: e.__name__)
+def test_every_effect_has_its_cases(effect: Any) -> None:
+    """In the plane and in space, with every key that it has, and every word that one may be."""
+    (kind,) = get_args(effect.model_fields["type"].annotation)
+    told = {
+        base: [
+            parse_scene(case.text()).effects[0]
+            for case in CASES
+            if case.base == base and f'type = "{kind}"' in case.table
+        ]
+        for base in ("plane", "space")
+    }
+    for base, tables in told.items():
+        assert tables, f"{kind} has no case in {base}: add one to tests/effect_cases.py"
+    tables = [*told["plane"], *told["space"]]
+    for field, info in effect.model_fields.items():
+        if (kind, field) in REFUSED:
+            continue
+        given = [getattr(table, field) for table in tables if field in table.model_fields_set]
+        assert given, f"{kind}.{field} has no case: add one to tests/effect_cases.py"
+        for word in literals(info.annotation):
+            assert word in given, f"{kind}.{field} = {word!r} has no case"
+
+
+REFUSED = (("contact", "points"),)
+"""Keys that come with what effects share, and that some have no use for."""
+
+
+def test_keys_without_cases_are_refused() -> None:
+    """With the place and a remedy."""
+    table = 'type = "contact"\nname = "floor"\nlaw = "impact"\nrestitution = 1\npoints = ["tip"]'
+    with pytest.raises(SceneError) as error:
+        parse_scene(f"{BASES['plane'].format(outputs='')}[[effects]]\n{table}")
+    assert str(error.value) == (
+        "scene: effects[0].points: contact is between bodies; give body or bodies, and at"
+    )
