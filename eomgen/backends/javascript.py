@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from eomgen.language.formula import FUNCTIONS
 from eomgen.program.printing import Dialect, Names, print_block
 from eomgen.program.system import System
 from eomgen.templating import render
@@ -12,7 +13,9 @@ RESERVED = frozenset(
     "new null package private protected public return static super switch this throw true try "
     "typeof var void while with yield await async of get set arguments undefined NaN".split()
 )
-DIALECT = Dialect({name: f"Math.{name}" for name in ("sin", "cos", "tan", "sqrt")}, RESERVED)
+OWN = {"step": "(x => x > 0 ? 1 : 0)", "select": "((c, a, b) => c > 0 ? a : b)"}
+"""Functions that JavaScript's Math has not."""
+DIALECT = Dialect({name: OWN.get(name, f"Math.{name}") for name in FUNCTIONS}, RESERVED)
 
 
 def javascript_poses(system: System) -> str:

@@ -101,7 +101,9 @@ def python_module(system: System) -> str:
         for name, output in program.outputs.items()
     }
     kernels = {name: _kernel(system, name, block, names) for name, block in blocks.items()}
-    called = [f for f in FUNCTIONS if any(f in block.functions for block in blocks.values())]
+    fixed, once = _fixed(system, blocks, names)
+    in_kernels = {f for block in blocks.values() for f in block.functions}
+    called = [f for f in FUNCTIONS if f in in_kernels or f in once]
     dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
     special = {"initial_state", "derivative", *DERIVATIVES, *(name for name, _, _ in dynamics)}
     quaternions = tuple(model.quaternions) if model.form == "velocity" else ()
@@ -131,13 +133,13 @@ def python_module(system: System) -> str:
         "kernels": list(kernels.values()),
         "math_functions": sorted({"isfinite", *(f for f in called if hasattr(math, f))}),
         "own_functions": [(f, *OWN[f]) for f in called if f in OWN],
-        "columns": [(f, COLUMNS[f]) for f in called],
+        "columns": [(f, COLUMNS[f]) for f in called if f in in_kernels],
         "timed": any(kernel.time for kernel in kernels.values()),
         "derivative": kernels["derivative"],
         "outputs": [kernel for name, kernel in kernels.items() if name not in special],
         "derivatives": [kernel for name, kernel in kernels.items() if name in DERIVATIVES],
         "dynamics": [(kernels[name], *rest) for name, *rest in dynamics if name in kernels],
-        **_fixed(system, blocks, names),
+        **fixed,
     }
     return render("python", "module.py.jinja", context)
 
@@ -161,8 +163,12 @@ def _kernel(system: System, name: str, block: Block, names: Names) -> Kernel:
     )
 
 
-def _fixed(system: System, blocks: Mapping[str, Block], names: Names) -> dict[str, Any]:
-    """What depends on parameters alone: lines, and what must be positive with the lines for it."""
+def _fixed(
+    system: System, blocks: Mapping[str, Block], names: Names
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """What depends on parameters alone: lines, and what must be positive with the lines for it;
+    and the functions called there.
+    """
     program = system.program
     roots = sorted({i for block in blocks.values() for i in block.constants})
     made = [i for i in roots if program.steps[i].operation != "input"]
@@ -172,7 +178,7 @@ def _fixed(system: System, blocks: Mapping[str, Block], names: Names) -> dict[st
     )
     fixed = print_block(program, made, names, DIALECT, fixed=True, keep=made)
     known = {name for name, _ in checked.lines}
-    return {
+    context = {
         "checked": checked.lines,
         "checks": [
             (_plain(check.about), source, *_BOUNDS[check.may_vanish])
@@ -180,6 +186,7 @@ def _fixed(system: System, blocks: Mapping[str, Block], names: Names) -> dict[st
         ],
         "fixed": [(name, source) for name, source in fixed.lines if name not in known],
     }
+    return context, (*checked.functions, *fixed.functions)
 
 
 _BOUNDS = {False: (">", "not positive"), True: (">=", "negative")}
