@@ -43,7 +43,7 @@ def simulate(given: Arguments) -> int:
     code, module = code_of(given.scene, model, given)
     with terminal_progress(f"simulating {model.name}") as progress:
         trajectory = integrate(
-            as_problem(module, parameters or None, inputs or None),
+            as_problem(module, parameters or None, inputs or None, model),
             integrator,
             _or(given.t_end, wanted.t_end),
             dt=_or(given.dt, wanted.dt) if fixed else given.dt,

@@ -78,7 +78,9 @@ def integrate(
     run = _Run(t_start, problem.initial, [(t_start, problem.initial)])
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")
-        trouble = _follow(run, advances, problem, method, t_end, throttled(progress or _ignore))
+        trouble = _follow(
+            run, advances, counted, problem, method, t_end, throttled(progress or _ignore)
+        )
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
     message = "; ".join(part for part in (trouble, remarks) if part)
@@ -97,14 +99,19 @@ def integrate(
 
 @dataclass
 class _Counted:
-    """A function of t and y that counts its calls."""
+    """A function of t and y that counts its calls, and keeps where it raised an error."""
 
     function: Callable[[float, Floats], Floats]
     calls: int = 0
+    failed: tuple[float, Floats] | None = None
 
     def __call__(self, t: float, y: Floats) -> Floats:
         self.calls += 1
-        return self.function(t, y)
+        try:
+            return self.function(t, y)
+        except (ArithmeticError, ValueError):
+            self.failed = float(t), np.array(y)
+            raise
 
 
 @dataclass
@@ -120,6 +127,7 @@ class _Run:
 def _follow(
     run: _Run,
     advances: Iterator[Advance],
+    counted: Problem,
     problem: Problem,
     method: FixedStep | Adaptive,
     t_end: float,
@@ -141,15 +149,32 @@ def _follow(
     except KeyboardInterrupt:
         trouble = f"interrupted at t = {run.t:.6g}"
     except StepFailure as failure:
-        trouble = f"stopped at {_place(problem, run)}: {failure}"
+        why = problem.explain(run.t, run.y, problem.initial)
+        cause = f"{str(failure).partition(';')[0]}: {why}" if why else str(failure)
+        trouble = f"stopped at {_place(problem, run)}: {cause}"
     # Plain Python arithmetic raises where NumPy would give inf or nan: math.exp(1000), 1 / 0.0,
     # math.sqrt(-1); a ValueError is also how SciPy's factorizations refuse a nan.
     except (ArithmeticError, ValueError) as error:
-        kind = type(error).__name__
-        trouble = f"stopped at {_place(problem, run)}: {kind}: {error}; {method.remedy}"
+        plain = f"{type(error).__name__}: {error}; {method.remedy}"
+        trouble = f"stopped at {_place(problem, run)}: {_why(counted, run, plain)}"
     if run.t > run.rows[-1][0]:
         run.rows.append((run.t, run.y))
     return trouble
+
+
+def _why(problem: Problem, run: _Run, error: str) -> str:
+    """What had no value in the step from where a run has come to, or else the bare error."""
+    for function in (problem.derivative, problem.jacobian):
+        assert isinstance(function, _Counted)
+        if function.failed is not None:
+            t, y = function.failed
+            here = t == run.t and np.array_equal(y, run.y)
+            why = problem.explain(t, y, problem.initial)
+            if why:
+                return f"{'there' if here else 'in the next step'} {why}"
+            return f"the Jacobian: {error}" if function is problem.jacobian else error
+    why = problem.explain(run.t, run.y, problem.initial)
+    return f"there {why}" if why else error
 
 
 def _check_start(problem: Problem, run: _Run) -> None:

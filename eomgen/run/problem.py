@@ -11,6 +11,9 @@ from eomgen.errors import RunError
 
 Floats = NDArray[np.float64]
 """An array of 64-bit floats; every state vector is one."""
+Explain = Callable[[float, Floats, Floats], str]
+"""Of t, y and the initial y: what keeps the derivative at t, y from being finite or tame, and what
+to change, in words; "" if nothing is known of that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +28,7 @@ class Problem:
     jacobian    df/dy(t, y) -> (ny, ny), exact
     initial     (ny,), kept as a read-only copy
     quaternions indices of the four components of each unit quaternion among the states
+    explain     see `Explain`
 
     Raises `RunError` if `initial` has not one finite number per state.
     """
@@ -36,6 +40,7 @@ class Problem:
     jacobian: Callable[[float, Floats], Floats]
     initial: Floats
     quaternions: tuple[tuple[int, int, int, int], ...] = ()
+    explain: Explain = lambda _t, _y, _initial: ""
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)
