@@ -140,6 +140,12 @@ def name_quantities(
                 *(motion if "motion" in sees else ()),
                 *(word for word in sees if word != "motion"),
             ]
+            for name in names_in(formula):
+                if name in motion and name not in seen and name not in known:
+                    raise SceneError(
+                        f"{where}: '{name}' changes with the motion, which this value must not; "
+                        "use parameters"
+                    )
             _check(formula, where, bound, str(extra["unit"]), known, seen)
             if isinstance(formula, Constant) and formula.value != 0.0:
                 about = f"{info.description} of {prefix}{suffix.replace('_', ', ', 1)}"
