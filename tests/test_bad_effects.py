@@ -74,6 +74,14 @@ TABLES: dict[str, dict[str, str]] = {
     "controller": {"torques": '{{ hinge = "z" }}', "states": '{{ z = {{ rate = "swing" }} }}'},
 }  # fmt: skip
 """Of every effect good tables, which together give every field that holds a quantity or a name."""
+OF_ANY_SIGN = set(
+    "controller.torques drag.at drag.wind external_force.at external_force.force "
+    "external_torque.torque field.at field.center field.force gravity.g joint_spring.law "
+    "joint_spring.rest joint_stop.high joint_stop.low motor.torque pd.target pd.target_rate "
+    "pid.target pid.target_rate point_gravity.at spring.at_1 spring.at_2 spring.law "
+    "spring.rest_length".split()
+)
+"""Forces, places, laws and targets. All else, stiffness, damping, drag, gains, is not negative."""
 MEMBERS: dict[str, type[EffectTable]] = {
     member.model_fields["type"].annotation.__args__[0]: member
     for member in get_args(get_args(Effect)[0])
@@ -126,12 +134,15 @@ def quantities(kind: str) -> Iterator[tuple[str, Any, dict[str, Any]]]:
 def test_all_effects_are_here() -> None:
     """A new effect needs a table above, which gives every quantity and name that it has."""
     assert set(TESTED) == set(MEMBERS)
+    free = set()
     for kind, member in MEMBERS.items():
         given = {key for name, table in TABLES.items() if name.split()[0] == kind for key in table}
         for field, info in member.model_fields.items():
             extra = info.json_schema_extra
             if isinstance(extra, dict) and "unit" in extra:
                 assert field in given, f"{kind}.{field}"
+                free |= {f"{kind}.{field}"} if extra["bound"] == "any" else set()
+    assert free == OF_ANY_SIGN
     for kind in TABLES:
         for dimensions in (2, 3):
             build_model(parse_scene(crane(kind, dimensions)))
