@@ -21,6 +21,7 @@ from eomgen.language.quantity import (
 from eomgen.model import Body, Model, Point, ways_of
 from eomgen.prescribed import check_drive, initial_values, locked_values
 from eomgen.scene.chains import written_out
+from eomgen.scene.definitions import with_definitions
 from eomgen.scene.look import check_look
 from eomgen.scene.schema import OUTPUTS, Scene
 from eomgen.straighten import checked_inertia, straightened_joint, unit_quaternions
@@ -35,11 +36,13 @@ def build_model(scene: Scene) -> Model:
     Raises `SceneError`, naming place, value and remedy, if the scene makes no mechanism.
     """
     parameters, known = _scene_parameters(scene)
-    bodies = _bodies(scene, known, parameters)
+    motion = _motion(scene)
+    scene = with_definitions(scene, motion)
+    bodies = _bodies(scene, known, parameters, motion)
     names = {body.name: i for i, body in enumerate(bodies[0])}
     sliding = _sliding(bodies[0], scene.dimensions)
-    effects = _effects(scene, bodies[0], sliding, known, parameters)
-    points = _points(scene, names, known, parameters)
+    effects = _effects(scene, bodies[0], sliding, known, parameters, motion)
+    points = _points(scene, names, known, parameters, motion)
     inputs = [_at_joint(x, e, sliding) for e in effects for x in e.inputs(scene.dimensions)]
     states = [_at_joint(x, e, sliding) for e in effects for x in e.states(scene.dimensions)]
     coordinates = [c for body in bodies[0] for c in body.positions]
@@ -176,8 +179,20 @@ def _known_body(name: str, place: str, known: Sequence[str] | dict[str, int]) ->
         raise SceneError(f"{place}: no body is named '{name}'{hint}")
 
 
+def _motion(scene: Scene) -> list[str]:
+    """Names of what changes while a scene moves: time, coordinates, velocities, inputs, states."""
+    names = ["t"]
+    for joint, _ in written_out(scene)[1]:
+        both = (*joint.positions(scene.dimensions), *joint.velocities(scene.dimensions))
+        names += [coordinate.name for coordinate in both]
+    for effect in scene.effects:
+        names += [i.name for i in effect.inputs(scene.dimensions)]
+        names += [x.name for x in effect.states(scene.dimensions)]
+    return names
+
+
 def _bodies(
-    scene: Scene, known: dict[str, float], parameters: list[Parameter]
+    scene: Scene, known: dict[str, float], parameters: list[Parameter], motion: Sequence[str]
 ) -> tuple[list[Body], tuple[str, ...]]:
     """Bodies with their joints, parents first and otherwise in the scene's order; and notices."""
     bodies, joints = written_out(scene)
@@ -212,9 +227,9 @@ def _bodies(
         joint = straightened_joint(joint, joint_place, scene.dimensions, notices)
         check_look(body.shapes, None, scene.dimensions, place)
         count = len(parameters)
-        body = _named(body, body.name, place, known, parameters)
+        body = _named(body, body.name, place, known, parameters, motion)
         own = {p.name: p.default for p in parameters[count:]}
-        joint = _named(joint, joint.name, joint_place, known, parameters)
+        joint = _named(joint, joint.name, joint_place, known, parameters, motion)
         built.append(
             Body(
                 name=name,
@@ -236,7 +251,7 @@ def _named(
     place: str,
     known: dict[str, float],
     parameters: list[Parameter],
-    motion: Sequence[str] = (),
+    motion: Sequence[str],
     sliding: Collection[str] = (),
 ) -> AnyTable:
     """A table with its bare numbers as parameters, which are added to `parameters`."""
@@ -266,7 +281,11 @@ def _depths(holding: dict[str, tuple[Joint, str]]) -> dict[str, int]:
 
 
 def _points(
-    scene: Scene, names: dict[str, int], known: dict[str, float], parameters: list[Parameter]
+    scene: Scene,
+    names: dict[str, int],
+    known: dict[str, float],
+    parameters: list[Parameter],
+    motion: Sequence[str],
 ) -> list[Point]:
     _check_names([(point.name, f"points[{i}]") for i, point in enumerate(scene.points)])
     points = []
@@ -274,7 +293,7 @@ def _points(
         place = f"points[{i}]"
         _known_body(point.body, f"{place}.body", names)
         at = with_components(point.at, ZERO, scene.dimensions, f"{place}.at")
-        named = _named(point.replaced(at=at), point.name, place, known, parameters)
+        named = _named(point.replaced(at=at), point.name, place, known, parameters, motion)
         points.append(Point(point.name, names[point.body], named.at))
     return points
 
@@ -285,6 +304,7 @@ def _effects(
     sliding: Collection[str],
     known: dict[str, float],
     parameters: list[Parameter],
+    motion: Sequence[str],
 ) -> list[Effect]:
     """Effects with bodies and joints that there are, and vectors of the right length."""
     names = [body.name for body in bodies]
@@ -292,10 +312,6 @@ def _effects(
     _check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
     ways = ways_of(bodies, scene.dimensions)
     names_of_ways = {b.joint.name: [c.name for c in b.positions] for b in bodies}
-    motion = ["t", *(c.name for b in bodies for c in (*b.positions, *b.velocities))]
-    for effect in scene.effects:
-        motion += [i.name for i in effect.inputs(scene.dimensions)]
-        motion += [x.name for x in effect.states(scene.dimensions)]
     effects: list[Effect] = []
     for i, effect in enumerate(scene.effects):
         place = f"effects[{i}]"

@@ -215,9 +215,15 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
         'joint = "hinge"; stiffness = 12.0; damping = 0.4; rest = 0.2',
         damped("damping"),
     ),
+    ("joint_spring", "several", 'joints = ["hinge", "rail"]; stiffness = 12.0', CONSERVES),
+    ("joint_spring", "all", 'joints = "all"; stiffness = 12.0', CONSERVES),
+    ("joint_spring", "one", 'joint = "hinge"; coordinate = "q"; stiffness = 12.0', CONSERVES),
     ("joint_spring", "law", 'joint = "rail"; law = "9*stretch + 40*stretch**3"', NO_ENERGY),
     ("joint_spring", "active", 'joint = "rail"; damping = -0.1; allow_active = true', NO_ENERGY),
     ("joint_friction", "viscous", 'joint = "rail"; viscous = 0.3', NO_ENERGY),
+    ("joint_friction", "several", 'joints = ["hinge", "rail"]; viscous = 0.3', NO_ENERGY),
+    ("joint_friction", "all", 'joints = "all"; viscous = 0.3', NO_ENERGY),
+    ("joint_friction", "one", 'joint = "rail"; coordinate = "s"; viscous = 0.3', NO_ENERGY),
     ("joint_friction", "coulomb", 'joint = "hinge"; coulomb = 0.3; speed = 0.2', NO_ENERGY),
     (
         "joint_friction",
@@ -230,6 +236,14 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
         "both",
         'joint = "hinge"; low = -0.3; high = 0.2; stiffness = 60.0; damping = 3.0',
         damped("damping"),
+    ),
+    ("joint_stop", "several", 'joints = ["hinge", "rail"]; high = 0.1; stiffness = 60', CONSERVES),
+    ("joint_stop", "all", 'joints = "all"; low = -0.1; stiffness = 60.0', CONSERVES),
+    (
+        "joint_stop",
+        "one",
+        'joint = "hinge"; coordinate = "q"; high = 0.1; stiffness = 6',
+        CONSERVES,
     ),
     ("joint_stop", "high", 'joint = "rail"; high = -0.2; stiffness = 60.0', CONSERVES),
     (
@@ -251,6 +265,12 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
         f'law = "hunt_crossley"; radius = 0.1; radii = {{ b = 0.2 }}; dissipation = 0.3; '
         f"normal = <0.2 1 0.3>; {GROUND}{LOSSES}",
         damped("dissipation", "friction"),
+    ),
+    (
+        "contact",
+        "points",
+        'law = "spring_damper"; points = ["tip"]; radius = 0.1; stiffness = 300.0; offset = 0.4',
+        CONSERVES,
     ),
     (
         "contact",
@@ -287,9 +307,11 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
         NO_ENERGY,
     ),
     ("motor", "constant", 'joint = "hinge"; torque = 0.7', NO_ENERGY),
+    ("motor", "one", 'joint = "hinge"; coordinate = "q"; torque = 0.7', NO_ENERGY),
     ("motor", "formula", 'joint = "rail"; torque = "atan2(q, 2) - min(s, t)"', NO_ENERGY),
     ("motor", "input", 'joint = "hinge"; torque = "input"', NO_ENERGY),
     ("pd", "plain", SERVO + GAINS, NO_ENERGY),
+    ("pd", "one", SERVO + GAINS + 'coordinate = "q"', NO_ENERGY),
     ("pd", "limited", SERVO + GAINS + "limit = 0.8", NO_ENERGY),
     ("pd", "lags", SERVO + GAINS + "limit = 0.8; lag = 0.1", NO_ENERGY),
     (
@@ -299,6 +321,7 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
         NO_ENERGY,
     ),
     ("pid", "plain", SERVO + GAINS + "integral_gain = 5.0", NO_ENERGY),
+    ("pid", "one", SERVO + GAINS + 'integral_gain = 5.0; coordinate = "q"', NO_ENERGY),
     ("pid", "limited", SERVO + GAINS + "integral_gain = 5.0; limit = 1.0; lag = 0.1", NO_ENERGY),
     (
         "pid",

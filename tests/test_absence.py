@@ -16,7 +16,6 @@ from engine import Engine
 
 from eomgen.backends.python import OWN
 from eomgen.effects import Effect
-from eomgen.errors import SceneError
 from eomgen.pipeline import compile_scene
 from eomgen.scene.reader import parse_scene
 from eomgen.study.variants import removed, without_effects
@@ -164,23 +163,7 @@ def test_every_effect_has_its_cases(effect: Any) -> None:
         assert tables, f"{kind} has no case in {base}: add one to tests/effect_cases.py"
     tables = [*told["plane"], *told["space"]]
     for field, info in effect.model_fields.items():
-        if (kind, field) in REFUSED:
-            continue
         given = [getattr(table, field) for table in tables if field in table.model_fields_set]
         assert given, f"{kind}.{field} has no case: add one to tests/effect_cases.py"
         for word in literals(info.annotation):
             assert word in given, f"{kind}.{field} = {word!r} has no case"
-
-
-REFUSED = (("contact", "points"),)
-"""Keys that come with what effects share, and that some have no use for."""
-
-
-def test_keys_without_cases_are_refused() -> None:
-    """With the place and a remedy."""
-    table = 'type = "contact"\nname = "floor"\nlaw = "impact"\nrestitution = 1\npoints = ["tip"]'
-    with pytest.raises(SceneError) as error:
-        parse_scene(f"{BASES['plane'].format(outputs='')}[[effects]]\n{table}")
-    assert str(error.value) == (
-        "scene: effects[0].points: contact is between bodies; give body or bodies, and at"
-    )

@@ -125,17 +125,19 @@ MISTAKES = [
     (
         'mass = "m"',
         'mass = "__import__(\'os\')"',
-        'bodies[0].mass: "__import__(\'os\')" has something at column 1 that no formula may hold',
+        'bodies[0].mass: "__import__(\'os\')" has \'__import__\' at column 1; a name starts with a '
+        "letter, does not end in _, and contains no __",
     ),
     (
         'mass = "m"',
         'mass = "m.real"',
-        "bodies[0].mass: 'm.real' has something at column 1 that no formula may hold",
+        "bodies[0].mass: 'm.real' has '.real' at column 2, which no formula may hold",
     ),
     (
         'mass = "m"',
         'mass = "m**999"',
-        "bodies[0].mass: 'm**999' has a power at column 1 that is not a whole number 0 to 16",
+        "bodies[0].mass: 'm**999' has a power at column 4 that is not a whole number 0 to 16; "
+        "others are 1/x**n, sqrt(x), exp(p*log(x))",
     ),
     ('mass = "m"', 'mass = "m/0"', "bodies[0].mass: its value is not a finite number; "
      "change its parameters"),
@@ -286,7 +288,7 @@ MISTAKES = [
     ("inertia_com = 0.02", "inertia_com = { xx = 1 }",
      "bodies[1].inertia_com: {'xx': 1} is neither a number nor a formula; give one"),
     ("inertia_com = 0.02", 'inertia_com = "m*"',
-     "bodies[1].inertia_com: 'm*' is no formula; write for example '2*m_A' or 'l_A/2'"),
+     "bodies[1].inertia_com: 'm*' is no formula at column 3; write for example '2*m_A' or 'l_A/2'"),
     ("inertia_com = 0.02", 'inertia_com = "I"',
      "bodies[1].inertia_com: unknown parameter 'I'; give it a value in [parameters]"),
     ("inertia_com = 0.02", "inertia_com = [0.02]",
@@ -416,7 +418,7 @@ MISTAKES = [
     ("mass = 0.5", f"mass = {300 * '['}{300 * ']'}",
      f"bodies[1].mass: {57 * '['}... is neither a number nor a formula; give one"),
     ("mass = 0.5", f'mass = "{151 * "-"}m"', f"bodies[1].mass: '{56 * '-'}... "
-     "is nested deeper than 150"),
+     "is nested deeper than 150 at column 152"),
     *((GOOD, 'name = "swing"\n' + "".join(line.format(i) for i in range(10**5)),
        f"{key}: has 100000 entries; give at most 1000")
       for key, line in (("bodies", '[[bodies]]\nname = "b{}"\n'),

@@ -374,7 +374,8 @@ MISTAKES = [
     (CONTROLLER.format('states = { z = { rat = 1 } }\ntorques = { axle = "z" }'),
      "effects[0].states.z.rat: unknown key (did you mean 'rate'?)"),
     (CONTROLLER.format('states = { z = { rate = "__import__" } }\ntorques = { axle = "zeta" }'),
-     "effects[0].states.z.rate: unknown parameter '__import__'; give it a value in [parameters]"),
+     "effects[0].states.z.rate: '__import__' has '__import__' at column 1; a name starts with a "
+     "letter, does not end in _, and contains no __"),
     (CONTROLLER.format('state = { z = { rate = 1 } }\ntorques = { axle = "1" }'),
      "effects[0].state: unknown key (did you mean 'states'?)"),
     (CONTROLLER.format('states = { q = { rate = "1" } }\ntorques = { axle = "q" }'),

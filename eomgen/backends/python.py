@@ -187,14 +187,15 @@ def _fixed(
     )
     fixed = print_block(program, made, names, DIALECT, fixed=True, keep=made)
     known = {name for name, _ in checked.lines}
-    return {
+    context = {
         "checked": checked.lines,
         "checks": [
             (_plain(check.about), source, *_BOUNDS[check.may_vanish])
             for check, source in zip(program.checks, checked.results, strict=True)
         ],
         "fixed": [(name, source) for name, source in fixed.lines if name not in known],
-    }, (*checked.functions, *fixed.functions)
+    }
+    return context, (*checked.functions, *fixed.functions)
 
 
 _BOUNDS = {False: (">", "not positive"), True: (">=", "negative")}

@@ -48,8 +48,8 @@ def linearise(given: Arguments) -> int:
             raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
     _, module = code_of(given.scene, model, given)
     with located(given.scene):
-        start = _state(given, model, as_problem(module, parameters or None, inputs or None).initial)
-        y = start
+        problem = as_problem(module, parameters or None, inputs or None, model)
+        y = start = _state(given, model, problem.initial)
         u: Mapping[str, float] | Floats = inputs
         if given.at != "initial":
             y, u = equilibrium(

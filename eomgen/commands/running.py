@@ -52,7 +52,7 @@ def simulate(given: Arguments) -> int:
     values = (parameters or None, inputs or None)
     with terminal_progress(f"simulating {model.name}") as progress:
         trajectory = integrate(
-            as_problem(module, *values),
+            as_problem(module, *values, model),
             integrator,
             _or(given.t_end, wanted.t_end),
             dt=_or(given.dt, wanted.dt) if fixed else given.dt,

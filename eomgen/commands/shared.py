@@ -75,7 +75,7 @@ def code_of(scene: str, model: Model, given: Arguments) -> tuple[Code, Generated
         with terminal_notice(f"deriving {model.name} …"):
             code = generated_code(model)
         module = load_module(code.module, model.name)
-        as_problem(module)
+        as_problem(module, model=model)
         if getattr(given, "outputs", None) not in (None, "all"):
             for name in model.outputs:
                 if not hasattr(module, name):

@@ -54,7 +54,9 @@ class Drag(OnBodies):
         default=(),
         validate_default=False,
     )
-    allow_active: bool = Field(default=False, description="let coefficients be negative")
+    allow_active: bool = Field(
+        default=False, strict=True, description="whether coefficients may be negative"
+    )
 
     @model_validator(mode="after")
     def _one_quadratic(self) -> Self:

@@ -44,7 +44,8 @@ class ForceField(OnBodies):
       The way taken past an obstacle is the same at any speed. Straight at the centre n is ẑ: to
       the right. It is no wall: too weak, it lets a body through, and a heading is all it changes.
 
-    Without softening the central fields are infinite at the centre.
+    Without softening the central fields are infinite at the centre. A run with adaptive steps ends
+    there; equal steps may leap over it and go on, far off.
     """
 
     vector_fields = ("at", "center", "force")

@@ -5,11 +5,15 @@ is evaluated over any scalars: floats, SymPy expressions, the nodes of a program
 """
 
 import ast
+import keyword
 import math
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
+
+from eomgen.errors import nearest
 
 LONGEST_TEXT = 500
 DEEPEST = 150
@@ -23,7 +27,8 @@ FUNCTIONS = {
 """Functions of a formula, with how many arguments each takes.
 
 `step(x)` is 1 where x > 0 and else 0; `select(c, a, b)` is a where c > 0 and else b, which is also
-what comparisons and `a if x < y else b` become.
+what comparisons and `a if x < y else b` become. Both a and b are computed, so both must have a
+value: write sqrt(max(x, 0)), not sqrt(x) if x > 0 else 0.
 """
 CONSTANTS = {"pi": math.pi}
 _OPERATORS: dict[type[ast.operator], str] = {
@@ -105,8 +110,29 @@ BY_MATH: dict[str, Callable[..., float]] = {
 }
 
 
+_TOKEN = re.compile(
+    r"(?P<space>\ +)"
+    r"|(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![A-Za-z0-9_.])"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
+    r"|(?P<sign>\*\*(?!\*)|[<>]=?(?![<>=])|/(?!/)|[-+*(),])"
+)
+"""All that a formula is made of."""
+_WRONG = re.compile(r"[A-Za-z0-9_.]{1,20}|[-=!<>:/&|*%@^~]{1,3}|.", re.DOTALL)
+"""What stands where nothing of that does, as messages show it."""
+_REMEDIES = {
+    "and": "write min(a, b)",
+    "or": "write max(a, b)",
+    "not": "write 1 - a",
+    "^": "write ** for a power",
+    "==": "compare with <, <=, > or >=",
+    "!=": "compare with <, <=, > or >=",
+}
+_EXAMPLE = "write for example '2*m_A' or 'l_A/2'"
+
+
 def parse(text: str) -> Formula:
-    """Read a formula: numbers, names, `+ - * / **` (small whole powers), sin, cos, tan, sqrt, pi.
+    """Read a formula: numbers, names, `FUNCTIONS`, `CONSTANTS`, `+ - * / **` (small whole powers),
+    one comparison, `a if x < y else b`.
 
     Raises `FormulaError`, naming the column, for anything else.
     """
@@ -115,22 +141,63 @@ def parse(text: str) -> Formula:
     if not text.isascii():
         column = next(i for i, c in enumerate(text) if not c.isascii()) + 1
         raise FormulaError(f"has a character at column {column} that is not plain ASCII")
+    _check_tokens(text)
+    plain = text.strip(" ")
+    start = len(text) - len(text.lstrip(" ")) + 1
+    if not plain:
+        raise FormulaError(f"is no formula; {_EXAMPLE}")
     try:
         with warnings.catch_warnings():  # of Python about what is no Python of ours
             warnings.simplefilter("ignore")
-            tree = ast.parse(text.strip(), mode="eval")
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise FormulaError("is no formula; write for example '2*m_A' or 'l_A/2'") from None
-    return _read(tree.body, 0)
+            tree = ast.parse(plain, mode="eval")
+    except SyntaxError as error:
+        column = start - 1 + (error.offset or len(plain) + 1)  # 0 stands for the end
+        raise FormulaError(f"is no formula at column {column}; {_EXAMPLE}") from None
+    except (RecursionError, MemoryError):
+        raise FormulaError(f"is nested deeper than {DEEPEST}") from None
+    return _read(tree.body, 0, start)
 
 
-def _read(node: ast.expr, depth: int) -> Formula:
-    at = f"at column {node.col_offset + 1}"
+def _check_tokens(text: str) -> None:
+    """Only words and signs of formulas reach the parser: then no other syntax can."""
+    at = depth = 0
+    while at < len(text):
+        found = _TOKEN.match(text, at)
+        if found is None:
+            _refuse(_WRONG.match(text, at)[0], at + 1)  # type: ignore[index]
+        word = found[0]
+        if found.lastgroup == "name":
+            if keyword.iskeyword(word) and word not in ("if", "else"):
+                _refuse(word, at + 1)
+            if word.startswith("_") or word.endswith("_") or "__" in word:
+                raise FormulaError(
+                    f"has {word[:20]!r} at column {at + 1}; a name starts with a letter, "
+                    "does not end in _, and contains no __"
+                )
+        depth += (word == "(") - (word == ")")
+        if depth > DEEPEST:
+            raise FormulaError(f"is nested deeper than {DEEPEST} at column {at + 1}")
+        at = found.end()
+
+
+def _refuse(word: str, column: int) -> NoReturn:
+    remedy = _REMEDIES.get(word)
+    if remedy is None and word[0].isdigit():
+        remedy = "write numbers as 1000.0 or 1e3, and * to multiply"
+    tail = f"; {remedy}" if remedy else ""
+    raise FormulaError(f"has {word!r} at column {column}, which no formula may hold{tail}")
+
+
+def _read(node: ast.expr, depth: int, start: int) -> Formula:
+    """The formula of a node; `start` is the column at which the parsed text starts."""
+    at = f"at column {node.col_offset + start}"
     if depth > DEEPEST:
-        raise FormulaError(f"is nested deeper than {DEEPEST}")
+        raise FormulaError(f"is nested deeper than {DEEPEST} {at}")
+
+    def read(*parts: ast.expr) -> tuple[Formula, ...]:
+        return tuple(_read(part, depth + 1, start) for part in parts)
+
     match node:
-        case ast.Constant(value=bool()):
-            raise FormulaError(f"has a truth value {at} where a number is wanted")
         case ast.Constant(value=int() | float() as value):
             try:
                 number = float(value)
@@ -142,33 +209,40 @@ def _read(node: ast.expr, depth: int) -> Formula:
         case ast.Name(id=name):
             return Constant(CONSTANTS[name]) if name in CONSTANTS else Name(name)
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            inner = _read(operand, depth + 1)
+            (inner,) = read(operand)
             return Constant(-inner.value) if isinstance(inner, Constant) else Apply("neg", (inner,))
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-            return _read(operand, depth + 1)
+            return read(operand)[0]
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-            operands = (_read(left, depth + 1), _read(right, depth + 1))
+            operands = read(left, right)
             if isinstance(op, ast.Pow) and not _small_whole(operands[1]):
                 raise FormulaError(
-                    f"has a power {at} that is not a whole number 0 to {LARGEST_POWER}"
+                    f"has a power at column {right.col_offset + start} that is not a whole number "
+                    f"0 to {LARGEST_POWER}; others are 1/x**n, sqrt(x), exp(p*log(x))"
                 )
             return Apply(_OPERATORS[type(op)], operands)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
+            operands = read(*arguments)
             if len(arguments) != FUNCTIONS[name]:
-                wanted = FUNCTIONS[name]
                 raise FormulaError(
-                    f"gives {name} {at} {len(arguments)} arguments; it takes {wanted}"
+                    f"gives {name} {at} {len(arguments)} arguments; it takes {FUNCTIONS[name]}"
                 )
-            return Apply(name, tuple(_read(argument, depth + 1) for argument in arguments))
+            return Apply(name, operands)
+        case ast.Call(func=ast.Name(id=name)) if name not in FUNCTIONS:
+            hint = nearest(name, FUNCTIONS) or f"; * multiplies, functions are {_FUNCTION_LIST}"
+            raise FormulaError(f"calls {name!r} {at}, which is no function{hint}")
         case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARISONS:
-            return _compared(
-                _COMPARISONS[type(op)], _read(left, depth + 1), _read(right, depth + 1)
-            )
+            return _compared(_COMPARISONS[type(op)], *read(left, right))
+        case ast.Compare():
+            raise FormulaError(f"compares more than two {at}; write min(a < b, b < c)")
         case ast.IfExp(test=test, body=body, orelse=orelse):
-            parts = (_read(part, depth + 1) for part in (test, body, orelse))
-            return Apply("select", tuple(parts))
-        case _:
-            raise FormulaError(f"has something {at} that no formula may hold")
+            return Apply("select", read(test, body, orelse))
+        case ast.Call(keywords=[first, *_]):
+            at = f"at column {first.col_offset + start}"
+    raise FormulaError(f"has something {at} that no formula may hold")
+
+
+_FUNCTION_LIST = ", ".join(FUNCTIONS)
 
 
 def _compared(operation: str, left: Formula, right: Formula) -> Formula:
@@ -209,7 +283,7 @@ def written(formula: Formula) -> str:
     """A formula as one may write it, every operation in brackets."""
     match formula:
         case Constant(value):
-            return repr(value)
+            return repr(value) if math.copysign(1.0, value) > 0 else f"({value!r})"
         case Name(name):
             return name
         case Apply("neg", (operand,)):

@@ -17,6 +17,7 @@ from eomgen.language.base import LARGEST, Number, Table
 from eomgen.language.formula import (
     CONSTANTS,
     FUNCTIONS,
+    Apply,
     Constant,
     Floats,
     Formula,
@@ -25,6 +26,7 @@ from eomgen.language.formula import (
     evaluate,
     names_in,
     parse,
+    written,
 )
 
 
@@ -167,6 +169,12 @@ def name_quantities(
             keyed = isinstance(value, dict)
             here = suffix[1:] in sliding if keyed else bool(about_slides(table, sliding))
             unit = of_joint(str(extra["unit"]), here)
+            for name in names_in(formula):
+                if name in motion and name not in seen and name not in known:
+                    raise SceneError(
+                        f"{where}: '{name}' changes with the motion, which this value must not; "
+                        "use parameters"
+                    )
             _check(formula, where, bound, unit, known, seen)
             if isinstance(formula, Constant) and formula.value != 0.0:
                 what = of_joint(str(info.description), here)
@@ -223,13 +231,18 @@ def _check(
         if name not in known and name not in seen:
             words = [*known, *seen, *FUNCTIONS, *CONSTANTS]
             hint = nearest(name, words) or "; give it a value in [parameters]"
+            if name in FUNCTIONS:
+                hint = f"; the function is written {name}({', '.join('xyz'[: FUNCTIONS[name]])})"
             raise SceneError(f"{where}: unknown parameter '{name}'{hint}")
-    if moving:  # then it has no value before the motion
+    if moving:  # then it has no value before the motion, but its still parts have
+        for part in _still(formula, known):
+            if not math.isfinite(_value(part, known)):
+                raise SceneError(
+                    f"{where}: its part '{_shortened(written(part))}' is not a finite number; "
+                    "change it or its parameters"
+                )
         return
-    try:
-        value = evaluate(formula, known, Floats())
-    except (ArithmeticError, ValueError):
-        value = math.nan
+    value = _value(formula, known)
     if not math.isfinite(value):
         raise SceneError(f"{where}: its value is not a finite number; change its parameters")
     if abs(value) > LARGEST:
@@ -238,3 +251,25 @@ def _check(
         raise SceneError(f"{where}: {value:g} is not positive; give a number > 0 in {unit}")
     if bound == "nonnegative" and value < 0:
         raise SceneError(f"{where}: {value:g} is negative; give a number >= 0 in {unit}")
+
+
+def _value(formula: Formula, known: Mapping[str, float]) -> float:
+    """The value of a formula, nan where it has none."""
+    try:
+        return float(evaluate(formula, known, Floats()))
+    except (ArithmeticError, ValueError):
+        return math.nan
+
+
+def _still(formula: Formula, known: Mapping[str, float]) -> Iterator[Apply]:
+    """The largest parts of a formula that depend on nothing but parameters."""
+    if isinstance(formula, Apply):
+        if all(name in known for name in names_in(formula)):
+            yield formula
+        else:
+            for operand in formula.operands:
+                yield from _still(operand, known)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -5,6 +5,7 @@ What is written twice exists once, constants fold, 0·x and 1·x vanish, and min
 until an addition swallows them. No expression tree ever exists.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Any, NamedTuple
@@ -117,8 +118,9 @@ class Tape:
             return folded
         if operation in FUNCTIONS:
             values = [self.values[node.index] for node in nodes]
-            if None not in values:
-                return self.constant(FUNCTIONS[operation](*values))
+            number = None if None in values else _number(FUNCTIONS[operation], *values)
+            if number is not None:
+                return self.constant(number)
         indices = tuple(node.index for node in nodes)
         if operation in ("add", "mul") and indices[0] > indices[1]:
             indices = indices[::-1]
@@ -126,6 +128,15 @@ class Tape:
         for index in indices[1:]:
             stage = max(stage, self.steps[index].stage)
         return self._intern((operation, *indices), stage, None)
+
+
+def _number(function: Callable[..., float], *values: float | None) -> float | None:
+    """A value of constants, or None where it is not finite: then that shows when it is computed."""
+    try:
+        value = function(*values)
+    except (ArithmeticError, ValueError):
+        return None
+    return value if math.isfinite(value) else None
 
 
 def _value(node: Node) -> float | None:
@@ -138,10 +149,15 @@ def _negated(node: Node) -> Node | None:
     return Node(node.tape, step.operands[0]) if step.operation == "neg" else None
 
 
+def _folded(tape: Tape, operation: str, a: float, b: float) -> Node | None:
+    number = _number(ARITHMETIC[operation], a, b)
+    return None if number is None else tape.constant(number)
+
+
 def _fold_add(tape: Tape, a: Node, b: Node) -> Node | None:
     va, vb = _value(a), _value(b)
     if va is not None and vb is not None:
-        return tape.constant(va + vb)
+        return _folded(tape, "add", va, vb)
     if va == 0.0:
         return b
     if vb == 0.0:
@@ -157,7 +173,7 @@ def _fold_add(tape: Tape, a: Node, b: Node) -> Node | None:
 def _fold_sub(tape: Tape, a: Node, b: Node) -> Node | None:
     va, vb = _value(a), _value(b)
     if va is not None and vb is not None:
-        return tape.constant(va - vb)
+        return _folded(tape, "sub", va, vb)
     if vb == 0.0:
         return a
     if va == 0.0:
@@ -175,7 +191,7 @@ def _fold_sub(tape: Tape, a: Node, b: Node) -> Node | None:
 def _fold_mul(tape: Tape, a: Node, b: Node) -> Node | None:
     va, vb = _value(a), _value(b)
     if va is not None and vb is not None:
-        return tape.constant(va * vb)
+        return _folded(tape, "mul", va, vb)
     for value, other in ((va, b), (vb, a)):
         if value == 0.0:
             return tape.constant(0.0)
@@ -192,8 +208,8 @@ def _fold_mul(tape: Tape, a: Node, b: Node) -> Node | None:
 
 def _fold_div(tape: Tape, a: Node, b: Node) -> Node | None:
     va, vb = _value(a), _value(b)
-    if va is not None and vb is not None and vb != 0.0:
-        return tape.constant(va / vb)
+    if va is not None and vb is not None:
+        return _folded(tape, "div", va, vb)
     if va == 0.0:
         return tape.constant(0.0)
     if vb == 1.0:

@@ -119,7 +119,9 @@ def integrate(
     run = _Run(t_start, problem.initial, account)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")
-        trouble = _follow(run, advances, problem, method, t_end, throttled(progress or _ignore))
+        trouble = _follow(
+            run, advances, (derivatives, jacobians), problem, method, t_end, progress or _ignore
+        )
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
     message = "; ".join(part for part in (trouble, remarks) if part)
@@ -142,16 +144,21 @@ def integrate(
 
 @dataclass
 class _Count:
-    """How often functions of t and y are called."""
+    """How often functions of t and y are called, and where one last raised an error."""
 
     calls: int = 0
+    failed: tuple[float, Floats] | None = None
 
     def of(self, function: Callable[[float, Floats], Floats]) -> Callable[[float, Floats], Floats]:
         """The same function, its calls counted here."""
 
         def counted(t: float, y: Floats) -> Floats:
             self.calls += 1
-            return function(t, y)
+            try:
+                return function(t, y)
+            except (ArithmeticError, ValueError):
+                self.failed = float(t), np.array(y)
+                raise
 
         return counted
 
@@ -194,13 +201,14 @@ class _Run:
 def _follow(
     run: _Run,
     advances: Iterator[Advance],
+    counts: tuple[_Count, _Count],
     problem: Problem,
     method: FixedStep | Adaptive,
     t_end: float,
     progress: Progress,
 ) -> str:
     """Carry `run` on to `t_end`; return "" or, if it stops before, the trouble in one line."""
-    t_start = run.t
+    t_start, told = run.t, throttled(progress)
     try:
         with np.errstate(all="ignore"):
             _check_start(problem, run)
@@ -208,19 +216,35 @@ def _follow(
                 if not _is_finite(advance):
                     raise StepFailure(f"the state left the finite numbers; {method.remedy}")
                 run.take(advance)
-                progress((run.t - t_start) / (t_end - t_start))
+                told((run.t - t_start) / (t_end - t_start))
         return ""
     except KeyboardInterrupt:
         trouble = f"interrupted at t = {run.t:.6g}"
     except StepFailure as failure:
-        trouble = f"stopped at {_place(problem, run)}: {failure}"
+        why = problem.explain(run.t, run.y, problem.initial)
+        cause = f"{str(failure).partition(';')[0]}: {why}" if why else str(failure)
+        trouble = f"stopped at {_place(problem, run)}: {cause}"
     # Plain Python arithmetic raises where NumPy would give inf or nan: math.exp(1000), 1 / 0.0,
     # math.sqrt(-1); a ValueError is also how SciPy's factorizations refuse a nan.
     except (ArithmeticError, ValueError) as error:
-        kind = type(error).__name__
-        trouble = f"stopped at {_place(problem, run)}: {kind}: {error}; {method.remedy}"
+        plain = f"{type(error).__name__}: {error}; {method.remedy}"
+        trouble = f"stopped at {_place(problem, run)}: {_why(counts, problem, run, plain)}"
     run.end()
     return trouble
+
+
+def _why(counts: tuple[_Count, _Count], problem: Problem, run: _Run, error: str) -> str:
+    """What had no value in the step from where a run has come to, or else the bare error."""
+    for count in counts:
+        if count.failed is not None:
+            t, y = count.failed
+            here = t == run.t and np.array_equal(y, run.y)
+            why = problem.explain(t, y, problem.initial)
+            if why:
+                return f"{'there' if here else 'in the next step'} {why}"
+            return f"the Jacobian: {error}" if count is counts[1] else error
+    why = problem.explain(run.t, run.y, problem.initial)
+    return f"there {why}" if why else error
 
 
 def _check_start(problem: Problem, run: _Run) -> None:

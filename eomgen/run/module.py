@@ -2,12 +2,14 @@
 
 import importlib.abc
 import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol, cast
 
 import numpy as np
 
 from eomgen.errors import RunError
+from eomgen.model import Model
+from eomgen.run.explain import explain_by
 from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.works import Powers
 
@@ -70,20 +72,29 @@ def _by_differences(module: GeneratedModule) -> Callable[[float, Floats], Floats
 
 
 def _unsolvable(error: Exception) -> str:
+    """Why there is no derivative at the start, as far as the module itself tells."""
     if isinstance(error, ArithmeticError):
         return (
-            "the mass matrix is singular at the initial state: change that, or lengths, masses or "
-            "inertias"
+            "the mass matrix is singular at the initial state, or an effect infinite: change that, "
+            "or lengths, masses or inertias"
         )
+    if str(error) == "math domain error":
+        return "a formula has no value at the initial state (math domain error): change either"
     return str(error)
 
 
-def as_problem(module: GeneratedModule, parameters: Any = None, inputs: Any = None) -> Problem:
+def as_problem(
+    module: GeneratedModule,
+    parameters: Any = None,
+    inputs: Any = None,
+    model: Model | None = None,
+) -> Problem:
     """The initial-value problem of a module, at given parameters and constant inputs.
 
-    A module that was made without its Jacobian has one by differences: enough to iterate with.
+    `model`, what the module was made of, lets messages name what has no finite value. A module that
+    was made without its Jacobian has one by differences: enough to iterate with.
 
-    Raises `RunError` if the module refuses them.
+    Raises `RunError` if the module refuses them, or has no derivative to start from.
     """
     if parameters is None and inputs is None:  # the module's shortest way
         derivative = module.derivative
@@ -96,11 +107,18 @@ def as_problem(module: GeneratedModule, parameters: Any = None, inputs: Any = No
         def jacobian(t: float, y: Floats) -> Floats:
             return module.jacobian(t, y, parameters, inputs)
 
+    explain = explain_by(
+        model, _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
+    )
     try:
         initial = module.initial_state(parameters)
-        derivative(0.0, initial)
     except (ValueError, ArithmeticError) as error:
         raise RunError(_unsolvable(error)) from None
+    try:
+        derivative(0.0, initial)
+    except (ValueError, ArithmeticError) as error:
+        why = explain(0.0, initial, initial)
+        raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None
     return Problem(
         name=module.NAME,
         states=module.STATES,
@@ -110,6 +128,7 @@ def as_problem(module: GeneratedModule, parameters: Any = None, inputs: Any = No
         initial=initial,
         quaternions=module.QUATERNIONS,
         contacts=_contacts(module, parameters, inputs),
+        explain=explain,
     )
 
 
@@ -140,3 +159,11 @@ def _contacts(module: Any, parameters: Any, inputs: Any) -> Contacts | None:
         impact=lambda t, y, k, bounce: module.impact(t, y, k, bounce, parameters, inputs),
         held=lambda t, y, forces: module.held(t, y, forces, parameters, inputs),
     )
+
+
+def _by_name(names: Iterable[str], values: Any) -> dict[str, float]:
+    """Values by name, or in order of the names; none at all if None."""
+    if values is None:
+        return {}
+    pairs = values.items() if hasattr(values, "keys") else zip(names, values, strict=False)
+    return {name: float(value) for name, value in pairs}

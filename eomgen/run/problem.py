@@ -11,6 +11,9 @@ from eomgen.errors import RunError
 
 Floats = NDArray[np.float64]
 """An array of 64-bit floats; every state vector is one."""
+Explain = Callable[[float, Floats, Floats], str]
+"""Of t, y and the initial y: what keeps the derivative at t, y from being finite or tame, and what
+to change, in words; "" if nothing is known of that."""
 
 SHORTEST = 1e-150
 """A quaternion shorter than this says no orientation: its square is no number."""
@@ -51,6 +54,7 @@ class Problem:
     initial     (ny,), kept as a read-only copy
     quaternions indices of the four components of each unit quaternion among the states
     contacts    what must not pass through each other; None where nothing can touch
+    explain     see `Explain`
 
     Raises `RunError` if `initial` has not one finite number per state, or if a quaternion has no
     length there.
@@ -64,6 +68,7 @@ class Problem:
     initial: Floats
     quaternions: tuple[tuple[int, int, int, int], ...] = ()
     contacts: Contacts | None = None
+    explain: Explain = lambda _t, _y, _initial: ""
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

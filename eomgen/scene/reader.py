@@ -181,6 +181,8 @@ def _line(detail: ErrorDetails) -> str:
             return f"{place}: {value} is too small; give at least {context['ge']}"
         case "less_than_equal":
             return f"{place}: {value} is too large; give at most {context['le']}"
+        case "bool_type":
+            return f"{place}: {value} is neither true nor false; give one"
         case "int_type" | "int_from_float" | "int_parsing":
             return f"{place}: {value} is not a whole number; give one"
         case "too_long" | "too_short":

@@ -162,6 +162,9 @@ class Scene(Table):
     parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
         Field(default={})
     )
+    definitions: Annotated[dict[Identifier, Quantity], Field(max_length=MOST)] = Field(
+        default={}, description="names for formulas of parameters, the motion and one another"
+    )
     dimensions: Literal[2, 3] = 2
     route: Route = "auto"
     bodies: Annotated[tuple[BodyTable, ...], Field(max_length=MOST)] = ()

@@ -1,0 +1,66 @@
+"""What has no finite value at a time and state, in numbers: asked when a run cannot go on."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.effects import Effect
+from eomgen.effects.base import JointLoad
+from eomgen.model import Model
+
+
+def values_at(
+    model: Model,
+    t: float,
+    y: Sequence[float],
+    parameters: Mapping[str, float],
+    inputs: Mapping[str, float],
+) -> Values:
+    """Everything a model leaves open, at time t (s) and state y = [q, v, x] of form 'velocity'.
+
+    Parameters and inputs that are not given have their defaults.
+    """
+    nq, nv = len(model.coordinates), len(model.velocities)
+    states = {x.name: value for x, value in zip(model.states, y[nq + nv :], strict=True)}
+    return Values(
+        {**model.defaults, **parameters},
+        {**dict.fromkeys((i.name for i in model.inputs), 0.0), **inputs},
+        list(y[:nq]),
+        list(y[nq : nq + nv]),
+        states,
+        t,
+    )
+
+
+def effect_sizes(model: Model, values: Values) -> dict[str, float]:
+    """The largest component, by size, of what each effect does: forces (N), torques (N m), rates of
+    its states; infinite where one has no finite value.
+    """
+    dynamics = Dynamics(model, values, FloatScalars())
+    return {effect.name: _size(effect, dynamics) for effect in model.effects}
+
+
+def _size(effect: Effect, dynamics: Dynamics) -> float:
+    largest = 0.0
+    try:
+        numbers = [float(rate) for rate in effect.rates(dynamics)]
+        for load in effect.loads(dynamics):
+            parts = (load.force,) if isinstance(load, JointLoad) else (*load.force, *load.torque)
+            numbers += [float(part) for part in parts]
+    except (ArithmeticError, ValueError):
+        return math.inf
+    for number in numbers:
+        largest = max(largest, abs(number)) if math.isfinite(number) else math.inf
+    return largest
+
+
+def is_singular(model: Model, values: Values) -> bool:
+    """Whether the mass matrix is: then there are no accelerations from rest without effects."""
+    still = replace(values, v=[0.0] * len(values.v))
+    try:
+        found = Dynamics(replace(model, effects=()), still, FloatScalars()).articulated_forward()
+    except (ArithmeticError, ValueError):
+        return True
+    return not all(math.isfinite(vd) for vd in found)
