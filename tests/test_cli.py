@@ -298,7 +298,7 @@ def test_routes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_works_are_booked_where_they_are_asked_for(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    command = ["simulate", "pendulum", "-o", str(tmp_path), "--t-end", "1"]
+    command = ["simulate", "pendulum", "--outputs", "momentum", "-o", str(tmp_path), "--t-end", "1"]
     for asked in ([], ["--works"]):
         assert main([*command, *asked]) == 0
         said, table = capsys.readouterr().out, (tmp_path / "pendulum.csv").read_text("utf-8")
