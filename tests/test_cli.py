@@ -295,6 +295,20 @@ def test_routes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert stop.value.code == 2
 
 
+def test_works_are_booked_where_they_are_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["simulate", "pendulum", "--outputs", "momentum", "-o", str(tmp_path), "--t-end", "1"]
+    for asked in ([], ["--works"]):
+        assert main([*command, *asked]) == 0
+        said, table = capsys.readouterr().out, (tmp_path / "pendulum.csv").read_text("utf-8")
+        assert ("    work: gravity " in said) is bool(asked)
+        assert ("J unaccounted for" in said) is bool(asked)
+        assert table.splitlines()[1].endswith(",work_gravity") is bool(asked)
+        module = (tmp_path / "pendulum.py").read_text("utf-8")
+        assert ("def effect_powers" in module) is bool(asked)
+
+
 def test_the_route_is_explained(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -30,6 +30,7 @@ from eomgen.show.style import GREEK, symbol, write_figure
 
 NASTY = "</script><img src=x onerror=alert(1)> <!-- $x^2$ \u2028 鎖 \x01 {{ t }}"
 ARM = 0.6
+WORKED = {"works": np.outer(np.arange(201.0), (1.0, -1.0)), "effects": ("gravity", "air")}
 POSES = """function bodyPoses(y, p) {
   const [x, theta] = y;
   return [[x, 0, 0], [x + p[0] * Math.sin(theta), -p[0] * Math.cos(theta), theta]];
@@ -162,6 +163,7 @@ MANY = {
         pytest.param({"joint_drift": np.zeros((201, 2)), **STILL}, "exactly 0", id="at rest"),
         pytest.param({"kinetic_energy": DIVERGED}, "to 2.98 s (full)", id="diverged"),
         pytest.param({"title": NASTY, "integrator": NASTY}, "鎖", id="nasty text"),
+        pytest.param(WORKED, "Work of each effect", id="works"),
         pytest.param(MANY, r"$\phi_{39}$", id="many states"),
         pytest.param(
             {"finished": False, "message": "no $\\step{$\nis small"},

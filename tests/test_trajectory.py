@@ -56,6 +56,7 @@ def same(one, other):
         ({"y": np.where(AWKWARD < 0, np.nan, AWKWARD)}, "t or y is not finite"),
         ({"t": [0.0, 1.0, 0.5]}, "t decreases"),
         ({"counts": {"steps": 2}}, "counts are"),
+        ({"works": AWKWARD}, r"works have shape \(3, 2\), not \(3, 0\)"),
     ],
 )
 def test_what_does_not_fit_together_is_refused(change, message):
@@ -172,6 +173,16 @@ def test_csv_reads_back_exactly(tmp_path):
     table = np.loadtxt(path, delimiter=",", skiprows=2)
     assert bits(np.ascontiguousarray(table[:, 0])) == bits(RUN.t)
     assert bits(np.ascontiguousarray(table[:, 1:])) == bits(RUN.y)
+
+
+def test_csv_holds_works_that_were_asked_for(tmp_path):
+    path = tmp_path / "run.csv"
+    save_csv(WORKED, path)
+    assert path.read_text(encoding="utf-8").split("\n")[1] == (
+        't,crank,"Δ,rate",work_gravity,work_air'
+    )
+    table = np.loadtxt(path, delimiter=",", skiprows=2)
+    assert bits(np.ascontiguousarray(table[:, 3:])) == bits(WORKED.works)
 
 
 def test_csv_says_on_one_line_that_it_is_unfinished(tmp_path):

@@ -80,13 +80,13 @@ class Holding:
         """Matrix and offset of a, and the columns that `Contacts.held` gives: under no force, and
         under the unit of each.
         """
-        held, count = list(self.held), len(self.held)
-        forces = np.zeros((len(self.contacts.names), count + 1))
-        forces[held, range(1, count + 1)] = units
-        states = np.repeat(y[:, np.newaxis], count + 1, axis=1)
-        columns = self.contacts.held(t, states, forces)
+        held = list(self.held)
+        forces = np.zeros((len(held) + 1, len(self.contacts.names)))
+        forces[range(1, len(held) + 1), held] = units
+        # One at a time: scalar code, ten times as fast as columns where there are few.
+        columns = np.column_stack([self.contacts.held(t, y, each) for each in forces])
         gaps, rates = self.contacts.gaps(t, y)[held], self.contacts.rates(t, y)[held]
-        free = columns[len(y) :, :][held, :]
+        free = columns[len(y) :][held]
         offset = free[:, 0] + 2 * ALPHA * rates + ALPHA**2 * gaps
         return free[:, 1:] - free[:, :1], offset, columns
 

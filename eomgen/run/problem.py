@@ -28,9 +28,9 @@ class Contacts:
     rates           (t, y) -> (nc,), their time derivatives
     impact          (t, y, contact, bounce) -> (ny,), the state after contact number `contact` has
                     struck, its restitution multiplied by `bounce` (0: perfectly plastic)
-    held            (t, y (ny, k), forces (nc, k)) -> (ny + 2 nc, k), affine in the forces (N or
-                    N m): under normal forces of the contacts, and the friction they cause, the
-                    state's derivative, the gaps' second derivatives, the contacts' powers (W)
+    held            (t, y, forces (nc,)) -> (ny + 2 nc,), affine in the forces (N or N m): under
+                    normal forces of the contacts, and the friction they cause, the state's
+                    derivative, the gaps' second derivatives, the contacts' powers (W)
     """
 
     names: tuple[str, ...]
