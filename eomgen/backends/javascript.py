@@ -9,7 +9,7 @@ from eomgen.program.tape import TIME
 from eomgen.templating import render
 
 RESERVED = frozenset(
-    "y p t select step Math break case catch class const continue debugger default delete do "
+    "y p select step Math break case catch class const continue debugger default delete do "
     "else enum eval export extends false finally for function if implements import in "
     "instanceof interface let new null package private protected public return static super "
     "switch this throw true try typeof var void while with yield await async of get set "

@@ -259,7 +259,8 @@ def _document(system: System) -> list[str]:
         lines += _table([(touch.name, touch.unit, touch.effect) for touch in system.contacts])
         lines += [""]
     if "velocity_forces" in model.leave_out:
-        lines.append("Left out: velocity forces V, so M v̇ + G = F (V: what driven joints take).")
+        rest = ", of which V keeps what driving takes" if model.driven else ": M v̇ + G = F"
+        lines.append(f"Left out: velocity forces{rest}.")
     counts = cost(system.program, "derivative")
     lines += textwrap.wrap(
         f"One call of `derivative` takes {_operations(counts)}; "

@@ -175,7 +175,10 @@ class Scene(Table):
     locked: Annotated[dict[Identifier, Number], Field(max_length=MOST)] = Field(
         default={}, description="coordinates held fast, by name (<name>_deg for an angle)"
     )
-    leave_out: Annotated[tuple[LeftOut, ...], Field(max_length=1)] = ()
+    leave_out: Annotated[tuple[LeftOut, ...], Field(max_length=1)] = Field(
+        default=(),
+        description="what the equations are to be without: velocity_forces, for slow motion",
+    )
     initial: Initial = Initial()
     simulation: Simulation = Simulation()
     camera: Camera = Camera()
