@@ -141,8 +141,6 @@ class BodyContact(OnBodies):
 
     @model_validator(mode="after")
     def _bodies_that_fit(self) -> Self:
-        if self.points is not None:
-            raise wrong("points", "contact is between bodies; give body or bodies, and at")
         listed = self.bodies if isinstance(self.bodies, tuple) else (self.body,)
         if self.points is not None and self.against == "each_other":
             raise wrong("points", "may lie on one body; give bodies instead")
