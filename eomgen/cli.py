@@ -85,6 +85,9 @@ def _parser() -> argparse.ArgumentParser:
     costing = _route(command("effects", commands.effects, about))
     costing.add_argument("--each", action="store_true", help="a line an effect, not one a type")
     costing.add_argument("--no-motion", action="store_true", help="say what it costs alone")
+    costing.add_argument(
+        "--motion-time", metavar="S", type=float, default=10.0, help="time to compare motions, 10 s"
+    )
     costing.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     _force(costing)
     _linearisation(command("linearise", commands.linearise, "A, B and modes about an equilibrium"))

@@ -113,7 +113,7 @@ def in_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "TIMING", 0.0)
 
 
-def costed(text: str, *, motion: bool = True, each: bool = False) -> Bill:
+def costed(text: str, *, motion: float = 10.0, each: bool = False) -> Bill:
     """The bill of a scene's text."""
     scene = parse_scene(text)
     return bill(scene, variants(scene, each=each), motion=motion)
@@ -136,7 +136,7 @@ def test_counts_are_those_of_the_modules(each: bool) -> None:
     lost between them.
     """
     scene = parse_scene(ARM)
-    found = costed(ARM, motion=False, each=each)
+    found = costed(ARM, motion=0.0, each=each)
     by_label = items(found)
     assert found.operations == counted(scene)
     assert found.bare_operations == counted(scene.replaced(effects=()))
@@ -157,7 +157,7 @@ def test_counts_are_those_of_the_modules(each: bool) -> None:
 def test_inputs_and_removed_effects() -> None:
     """An input is counted with its effect, and its parameters go with it."""
     scene = read_scene("two_body_forced").replaced(route="aba")
-    found = items(bill(scene, without_effects(scene), motion=False))
+    found = items(bill(scene, without_effects(scene), motion=0.0))
     assert found["2 external_force"].inputs == 4
     assert found["motor (tau)"].inputs == 1
     (air,) = (part for part in without_effects(parse_scene(STONE)) if "air" in part.label)
@@ -170,7 +170,7 @@ def test_inputs_and_removed_effects() -> None:
 
 def test_routes() -> None:
     """Each with its operations or why not; those of the route taken are the scene's own."""
-    found = costed(WHEEL, motion=False)
+    found = costed(WHEEL, motion=0.0)
     routes = {route.route: route for route in found.routes}
     assert set(routes) >= {"closed", "ldl", "aba"}
     (taken,) = (route for route in found.routes if route.words == "taken")
@@ -178,7 +178,7 @@ def test_routes() -> None:
     for name, route in routes.items():
         scene = parse_scene(f'route = "{name}"\n{WHEEL}')
         assert route.operations == counted(scene)
-    closed = {route.route: route for route in costed(STONE, motion=False).routes}["closed"]
+    closed = {route.route: route for route in costed(STONE, motion=0.0).routes}["closed"]
     assert closed.operations is None
     assert "'drag'" in closed.words
 
@@ -291,10 +291,9 @@ def test_what_a_scene_leaves_out() -> None:
     assert kept.operations == counted(parse_scene(ARM)) - counted(freed)
 
 
-def test_time_runs_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_time_runs_out() -> None:
     """Then motions are compared as far as they got, and that is said."""
-    monkeypatch.setattr(study, "MOTION", 1e-9)
-    found = costed(STONE)
+    found = costed(STONE, motion=1e-9)
     for item in found.items:
         assert item.change is not None
         assert item.change.until < 2.0

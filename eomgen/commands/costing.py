@@ -4,6 +4,7 @@ import math
 from typing import TYPE_CHECKING
 
 from eomgen.commands.shared import Arguments, located, print_wrapped, read_model
+from eomgen.errors import RunError
 from eomgen.files import check_folder
 from eomgen.run.progress import terminal_progress
 from eomgen.scene.reader import read_scene
@@ -22,6 +23,8 @@ def effects(given: Arguments) -> int:
     from eomgen.study.bill import bill
     from eomgen.study.variants import variants
 
+    if not 0 < given.motion_time < math.inf:
+        raise RunError(f"--motion-time: {given.motion_time:g} is no positive time; give one in s")
     model, name = read_model(given.scene, given)
     path = given.output / f"{name}_effects.png"
     check_folder(path.parent)
@@ -31,7 +34,7 @@ def effects(given: Arguments) -> int:
         found = bill(
             scene,
             variants(scene, each=given.each),
-            motion=not given.no_motion,
+            motion=0.0 if given.no_motion else given.motion_time,
             progress=progress,
         )
     print(f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs")

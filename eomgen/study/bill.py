@@ -28,7 +28,7 @@ CHUNK = 5e-4
 """About how long those of one module in one round take, s: too short to be interrupted often."""
 LEAST_ROUNDS = 7
 MOTION = 10.0
-"""Most wall time of all motions together, s."""
+"""Most wall time of all motions together, s, unless told."""
 MOST_FACTORING = 20_000
 """Operations of factoring alone beyond which `ldl` is not tried."""
 
@@ -115,11 +115,12 @@ def bill(
     scene: Scene,
     parts: Sequence[Variant],
     *,
-    motion: bool = True,
+    motion: float = MOTION,
     progress: Progress = lambda fraction: None,
 ) -> Bill:
-    """Compile a scene whole, in each of its variants, and bare; count, time and, for `motion`, run
-    them all. `parts` are `variants(scene)` or some of them.
+    """Compile a scene whole, in each of its variants, and bare; count, time and run them all, for
+    `motion` seconds of wall time together at most, 0 for not at all. `parts` are `variants(scene)`
+    or some of them.
 
     Raises `SceneError` or `RunError` if the whole cannot be compiled or evaluated at its start.
     """
@@ -137,7 +138,8 @@ def bill(
     size: float | None = None
     changes: list[Change | None] = [None] * len(parts)
     if motion:
-        size, changes = _changes(whole, parts, changed, lambda x: progress(0.6 + 0.4 * x))
+        told = partial(_part_of, progress, 1.5, 2.5)
+        size, changes = _changes(whole, parts, changed, motion, told)
     return Bill(
         name=whole.model.name,
         route=whole.route,
@@ -235,14 +237,18 @@ def _seconds(call: Callable[[], object], count: int) -> float:
 
 
 def _changes(
-    whole: _Made, parts: Sequence[Variant], changed: Sequence[_Made | None], progress: Progress
+    whole: _Made,
+    parts: Sequence[Variant],
+    changed: Sequence[_Made | None],
+    seconds: float,
+    progress: Progress,
 ) -> tuple[float, list[Change | None]]:
     """The extent of the scene's motion, m, and how each variant's comes apart from it.
 
     The runs share the time there is; none goes on where that of the scene ended.
     """
     count = 1 + sum(made is not None for made in changed)
-    shares = _shares(MOTION, count)
+    shares = _shares(seconds, count)
     done = 0
 
     def ran(made: _Made, until: float) -> Run:
@@ -265,7 +271,7 @@ def _changes(
     return size, found
 
 
-def _part_of(progress: Progress, done: int, count: int, fraction: float) -> None:
+def _part_of(progress: Progress, done: float, count: float, fraction: float) -> None:
     progress((done + fraction) / count)
 
 
