@@ -5,7 +5,7 @@ import sys
 import webbrowser
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from eomgen.build import in_order
 from eomgen.commands.shared import (
@@ -25,6 +25,9 @@ from eomgen.run.module import as_powers, as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import SHOWN
+
+if TYPE_CHECKING:
+    from eomgen.show.motion import Motion
 
 
 def simulate(given: Arguments) -> int:
@@ -64,7 +67,7 @@ def simulate(given: Arguments) -> int:
             powers=as_powers(module, *values) if given.works else None,
         )
     model = model.with_parameters(parameters)
-    motion = observe(model, module, trajectory)
+    motion = observe(model, module, trajectory, inputs)
     write_whole(paths["py"], code.module, force=given.force)
     save_npz(trajectory, paths["npz"], force=given.force)
     save_csv(trajectory, paths["csv"], force=given.force)
@@ -88,7 +91,7 @@ def simulate(given: Arguments) -> int:
         f"({'derived now' if code.derived else 'module fresh, not derived again'})"
     )
     print(f"    energy {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the end")
-    _print_works(trajectory, float(motion.kinetic_energy[-1] - motion.kinetic_energy[0]))
+    _print_works(motion, float(motion.kinetic_energy[-1] - motion.kinetic_energy[0]))
     _print_events(trajectory)
     if motion.joints:
         print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
@@ -103,12 +106,12 @@ def simulate(given: Arguments) -> int:
     return 0
 
 
-def _print_works(trajectory: Trajectory, change: float) -> None:
+def _print_works(motion: "Motion", change: float) -> None:
     """Say what each effect has done, and what of the kinetic energy's `change` that leaves, J."""
-    if trajectory.works is None:
+    if motion.works is None:
         return
-    works = trajectory.works[-1]
-    each = [f"{name} {work:.6g} J" for name, work in zip(trajectory.work_names, works, strict=True)]
+    works = motion.works[-1]
+    each = [f"{name} {work:.6g} J" for name, work in zip(motion.effects, works, strict=True)]
     print_listed("    work: ", shortened(each))
     left = change - works.sum()
     print(f"    kinetic energy changed by {change:.6g} J, {left:.2g} J unaccounted for")

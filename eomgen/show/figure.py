@@ -37,9 +37,11 @@ TITLES = {"m": "Lengths", "rad": "Angles"}
 
 
 def draw_motion(motion: Motion) -> Figure:
-    """Draw the mechanism at a few instants, its coordinates, its energy, and two measures of error.
+    """Draw the mechanism at a few instants, its coordinates, its energy, and measures of error.
 
-    The figure belongs to no window and no global state. Raises `RunError` if no sample is finite.
+    That of energy is its change where exact motion keeps it; elsewhere it is what the works of
+    effects leave over, if they are known. The figure belongs to no window and no global state.
+    Raises `RunError` if no sample is finite.
     """
     shown = thinned(motion)
     with style():
@@ -49,13 +51,15 @@ def draw_motion(motion: Motion) -> Figure:
         rows = len(groups) + 1 + (shown.works is not None)
         heights = [3.2 / rows] * rows + [1.0]
         grid = figure.add_gridspec(rows + 1, 2, width_ratios=(1.25, 1), height_ratios=heights)
-        _draw_mechanism(figure.add_subplot(grid[:-1, 0]), shown)
+        balanced = shown.keeps_energy or shown.works is not None
+        _draw_mechanism(figure.add_subplot(grid[: -1 if balanced else None, 0]), shown)
         for row, (title, indices) in enumerate(groups.items()):
             _draw_coordinates(figure.add_subplot(grid[row, 1]), shown, title, indices)
         _draw_energy(figure.add_subplot(grid[len(groups), 1]), shown)
         if shown.works is not None:
             _draw_works(figure.add_subplot(grid[-2, 1]), shown, shown.works)
-        _draw_energy_change(figure.add_subplot(grid[-1, 0]), shown)
+        if balanced:
+            _draw_balance(figure.add_subplot(grid[-1, 0]), shown)
         _draw_drift(figure.add_subplot(grid[-1, 1]), shown)
     return figure
 
@@ -125,27 +129,31 @@ def _draw_energy(axes: Axes, motion: Motion) -> None:
     )
     axes.set_title("Energy")
     axes.set_ylabel("J")
-    axes.set_xlabel("t, s")
+    if motion.works is None:
+        axes.set_xlabel("t, s")
+    else:  # the next panel below says it
+        axes.tick_params(labelbottom=False)
 
 
 def _draw_works(axes: Axes, motion: Motion, works: Array) -> None:
     labels = [plain(name) for name in motion.effects]
-    if len(labels) > MOST_CURVES:
-        draw_map(axes, motion.t, works, labels, "J")
-    else:
-        draw_curves(axes, motion.t, works, labels, colours(len(labels)))
-        axes.set_ylabel("J")
-    axes.set_title("Work of each effect")
+    draw_curves(axes, motion.t, works, labels, colours(len(labels)))
+    axes.set_ylabel("J")
+    axes.set_title("Work of effects")
     axes.set_xlabel("t, s")
 
 
-def _draw_energy_change(axes: Axes, motion: Motion) -> None:
+def _draw_balance(axes: Axes, motion: Motion) -> None:
     kinetic, potential = motion.kinetic_energy, motion.potential_energy
-    total = kinetic + potential
+    if motion.keeps_energy:
+        title, off = r"Relative change of energy,  $|E-E_0|", kinetic + potential
+    else:
+        assert motion.works is not None
+        title, off = r"Energy unaccounted for,  $|T-T_0-W|", kinetic - motion.works.sum(axis=1)
     # Where potential energy is zero is a matter of taste, so it must not enter the scale.
     scale = float(kinetic.max() + np.ptp(potential)) or 1.0
-    draw_small(axes, motion.t, np.abs(total - total[:1])[:, None] / scale, [""], [TOTAL])
-    axes.set_title(r"Relative change of energy,  $|E-E_0|\,/\,(\max\,T + \mathrm{range}\,V)$")
+    draw_small(axes, motion.t, np.abs(off - off[:1])[:, None] / scale, [""], [TOTAL])
+    axes.set_title(title + r"\,/\,(\max\,T + \mathrm{range}\,V)$")
 
 
 def _draw_drift(axes: Axes, motion: Motion) -> None:

@@ -30,6 +30,27 @@ MOST_MARKS = 30
 """Joints that a still picture marks: more marks than these hide what they mark."""
 
 
+@dataclass(frozen=True)
+class Plane:
+    """A plane that stands still: n·x = `offset`, m, with n its `normal`, of length 1, to the free
+    side; world axes.
+    """
+
+    normal: tuple[float, ...]
+    offset: float
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball that stands still, or, with a `reach` beyond its surface, an obstacle of a field; m,
+    world axes.
+    """
+
+    center: tuple[float, ...]
+    radius: float
+    reach: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A run of a mechanism: n samples, ny states, nb bodies, nj joints that hold a common point.
@@ -38,8 +59,9 @@ class Motion:
     those among them that make a unit quaternion. `poses` holds in the plane world x, y of each
     body's centre of mass and its angle, in space [world_R_body | world x, y, z of the centre of
     mass]. `joint_drift` is the distance between a joint's point on parent and on child. `anchors`
-    are points to mark as joints. `works` are what each effect has done since the start, None where
-    that was not asked for.
+    are points to mark as joints. `works` are what each effect, or all of a type, have done since
+    the start, None where that was not asked for. `planes` and `balls` are what stands still in the
+    world and bodies touch or avoid. `keeps_energy` says whether exact motion would.
     """
 
     name: str
@@ -64,6 +86,9 @@ class Motion:
     quaternions: tuple[tuple[int, int, int, int], ...] = ()
     works: Array | None = None  # (n, m) J, of m effects
     effects: tuple[str, ...] = ()  # m names
+    planes: tuple[Plane, ...] = ()
+    balls: tuple[Ball, ...] = ()
+    keeps_energy: bool = True
 
     def __post_init__(self) -> None:
         n, ny, nb, nj = len(self.t), len(self.states), len(self.bodies), len(self.joints)
@@ -73,6 +98,8 @@ class Motion:
         assert self.joint_drift.shape == (n, nj)
         assert self.works is None or self.works.shape == (n, len(self.effects))
         assert all(len(anchor) == 1 + self.dimensions for anchor in self.anchors)
+        assert all(len(plane.normal) == self.dimensions for plane in self.planes)
+        assert all(len(ball.center) == self.dimensions for ball in self.balls)
 
     @property
     def dimensions(self) -> int:

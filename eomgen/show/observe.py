@@ -1,6 +1,6 @@
 """From a trajectory to a motion: poses, energies and joint gaps, by the generated code."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol, cast
 
 import numpy as np
@@ -11,8 +11,10 @@ from eomgen.language.formula import Formula
 from eomgen.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.trajectory import Trajectory
+from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.motion import Anchor, Motion
 from eomgen.show.skeleton import shapes_of
+from eomgen.show.surroundings import balls_of, planes_of
 
 Floats = NDArray[np.float64]
 
@@ -32,8 +34,15 @@ class _Joint(Protocol):
     r_child: tuple[Formula, ...]
 
 
-def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Motion:
-    """What a figure or a page shows of a run, at the values of the model's parameters."""
+def observe(
+    model: Model,
+    module: GeneratedModule,
+    trajectory: Trajectory,
+    inputs: Mapping[str, float] | None = None,
+) -> Motion:
+    """What a figure or a page shows of a run, at the values of the model's parameters and those of
+    the `inputs` that are not 0.
+    """
     columns = trajectory.y.T
     p = {parameter.name: parameter.default for parameter in model.parameters}
     with np.errstate(
@@ -43,6 +52,9 @@ def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Mo
         kinetic = module.kinetic_energy(trajectory.t, columns, p)
         potential = module.potential_energy(trajectory.t, columns, p)
         drift = joint_drift(model, poses)
+    effects, works = trajectory.work_names, trajectory.works
+    if works is not None:
+        effects, works = works_by_type(model, effects, works)
     return Motion(
         name=model.name,
         title=model.title,
@@ -64,8 +76,11 @@ def observe(model: Model, module: GeneratedModule, trajectory: Trajectory) -> Mo
         message=trajectory.message,
         anchors=_anchors(model, poses.ndim - 1),
         quaternions=tuple(getattr(module, "QUATERNIONS", ())),
-        works=trajectory.works,
-        effects=trajectory.work_names,
+        works=works,
+        effects=effects,
+        planes=planes_of(model),
+        balls=balls_of(model),
+        keeps_energy=keeps_energy(model, inputs or {}),
     )
 
 

@@ -2,6 +2,7 @@
 
 import base64
 import re
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from eomgen.files import write_whole
 from eomgen.scene.look import Shape
 from eomgen.show.motion import Array, Motion, thinned
 from eomgen.show.solid import Indices, solids
-from eomgen.show.view import AMBIENT, GLOSS, LIGHT, cast_of, floor_under
+from eomgen.show.view import AMBIENT, GLOSS, LIGHT, cast_of, floor_under, patches
 from eomgen.templating import render
 
 BUDGET = 4000
@@ -50,9 +51,13 @@ def render_page(motion: Motion, poses_source: str, parameters: tuple[float, ...]
     }
     if motion.dimensions == 2:
         run["shapes"] = [[_in_plane(shape) for shape in shapes] for shapes in motion.shapes]
+        if motion.planes:
+            run["planes"] = [asdict(plane) for plane in motion.planes]
     else:
         run["camera"] |= {"azimuth": camera.azimuth_deg, "elevation": camera.elevation_deg}
         run |= _in_space(shown)
+    if motion.balls:
+        run["balls"] = [asdict(ball) for ball in motion.balls]
     context = {
         "heading": motion.heading,
         "summary": motion.summary + (f", {kept} of them here" if kept < len(motion.t) else ""),
@@ -87,7 +92,8 @@ def _in_space(motion: Motion) -> dict[str, Any]:
     """Faces of the bodies, floor, light: worked out here, as for the figure."""
     parts = solids(motion.shapes, motion.camera.height, BUDGET)
     floor = floor_under(motion, cast_of(parts))
-    return {
+    squares = patches(motion, floor).tolist()
+    return ({"patches": squares} if squares else {}) | {
         "quaternions": motion.quaternions,
         "meshes": [
             {

@@ -2,11 +2,19 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
 from matplotlib.patches import Polygon as Patch
 
-from eomgen.scene.look import Box, Disc, Polygon, Rod, Shape
-from eomgen.show.motion import BARE, MOST_MARKS, Array, Motion, instants
+from eomgen.scene.look import Box, Camera, Disc, Polygon, Rod, Shape
+from eomgen.show.motion import BARE, MOST_MARKS, Array, Ball, Motion, instants
 from eomgen.show.style import ink_on, mixed
+
+SPREAD = 20
+"""Planes are drawn so many times as far as the motion goes: the view's shape shows more of them."""
+
+FILL, SURFACE, REACH = 0.08, 0.4, 0.25
+"""How strong the ink is of what stands still: its inside, its surface, a field's reach."""
 
 
 def draw_plane(axes: Axes, motion: Motion) -> None:
@@ -23,10 +31,61 @@ def draw_plane(axes: Axes, motion: Motion) -> None:
         )
     for order, (row, strength) in enumerate(instants(motion)):
         _draw_pose(axes, motion, motion.poses[row], strength, zorder=3 + order)
+    for ball in motion.balls:
+        draw_ball(axes, ball, np.array(ball.center), motion.camera)
+    _draw_planes(axes, motion)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06)
     axes.set_xlabel("x, m")
     axes.set_ylabel("y, m")
+
+
+def draw_ball(axes: Axes, ball: Ball, center: Array, camera: Camera) -> None:
+    """Draw a ball that stands still about its `center` in the picture, below the bodies.
+
+    The view takes in those that are smaller than the camera's; of others it shows a part.
+    """
+    paper = camera.background
+    ink = ink_on(paper)
+    surface = Circle(
+        (center[0], center[1]),
+        ball.radius,
+        facecolor=mixed(paper, ink, FILL) if ball.reach is None else "none",
+        edgecolor=mixed(paper, ink, SURFACE),
+        linewidth=0.8,
+        zorder=1.2,
+    )
+    (axes.add_patch if 2 * ball.radius <= camera.height else axes.add_artist)(surface)
+    if ball.reach is not None:
+        reach = Circle(
+            (center[0], center[1]),
+            ball.radius + ball.reach,
+            facecolor="none",
+            edgecolor=mixed(paper, ink, REACH),
+            linewidth=0.8,
+            linestyle=":",
+            zorder=1.1,
+        )
+        axes.add_artist(reach)
+
+
+def _draw_planes(axes: Axes, motion: Motion) -> None:
+    """Draw what lies behind each plane grey, as far as the view goes; the view does not follow."""
+    paper = motion.camera.background
+    ink = ink_on(paper)
+    low, high = axes.dataLim.get_points()
+    far = SPREAD * max(float(np.linalg.norm(high - low)), motion.camera.height)
+    for plane in motion.planes:
+        normal = np.array(plane.normal)
+        gap = float(normal @ (low + high)) / 2 - plane.offset
+        foot = (low + high) / 2 - gap * normal
+        along = far * np.array([-normal[1], normal[0]])
+        ends, behind = np.array([foot - along, foot + along]), (abs(gap) + far) * normal
+        corners = np.concatenate([ends, ends[::-1] - behind])
+        colour = mixed(paper, ink, FILL)
+        axes.add_artist(Patch(corners, facecolor=colour, edgecolor="none", zorder=0.4))
+        line = Line2D(*ends.T, color=mixed(paper, ink, SURFACE), linewidth=1.0, zorder=1.5)
+        axes.add_artist(line)
 
 
 def outline(shape: Shape) -> Array:

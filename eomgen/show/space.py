@@ -9,10 +9,11 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 
 from eomgen.show.motion import BARE, MOST_MARKS, Array, Motion, instants
+from eomgen.show.plane import FILL, SURFACE, draw_ball
 from eomgen.show.raster import frame_around, render_solids
 from eomgen.show.solid import solids
 from eomgen.show.style import FAINT, ink_on, mixed
-from eomgen.show.view import Cast, Floor, cast_of, eye_axes, floor_under, look
+from eomgen.show.view import Cast, Floor, cast_of, eye_axes, floor_under, look, patches
 
 BUDGET = 2500
 """Faces of all bodies at one instant, about."""
@@ -34,6 +35,9 @@ def draw_space(axes: Axes, motion: Motion) -> None:
     floor = floor_under(motion, cast)
     rows = instants(motion)
     _draw_floor(axes, floor, eye, paper)
+    for ball in motion.balls:
+        draw_ball(axes, ball, eye @ ball.center, camera)
+    _draw_patches(axes, patches(motion, floor), eye, paper)
     if eye[2, 2] > 0:  # from below the floor its shadows are not seen
         _draw_shadow(
             axes, look(cast, motion.poses[rows[-1][0]], np.eye(3)).faces, floor, eye, paper
@@ -102,6 +106,19 @@ def _draw_floor(axes: Axes, floor: Floor, eye: Array, paper: str) -> None:
     colours = [mixed(paper, ink_on(paper), share) for share in shares]
     flat = (lines @ eye.T)[..., :2]
     axes.add_collection(LineCollection(list(flat), colors=colours, linewidths=0.7, zorder=1))
+
+
+def _draw_patches(axes: Axes, squares: Array, eye: Array, paper: str) -> None:
+    """Draw planes other than the floor, which hide nothing."""
+    axes.add_collection(
+        PolyCollection(
+            list((squares @ eye.T)[..., :2]),
+            facecolors=(*to_rgb(ink_on(paper)), FILL / 2),
+            edgecolors=mixed(paper, ink_on(paper), SURFACE),
+            linewidths=0.8,
+            zorder=1.0,
+        )
+    )
 
 
 def _draw_shadow(axes: Axes, above: Array, floor: Floor, eye: Array, paper: str) -> None:

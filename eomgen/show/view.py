@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.show.motion import Array, Motion
+from eomgen.show.motion import Array, Motion, Plane
 from eomgen.show.solid import Indices, Solids, unit
 
 LIGHT = unit(np.array([-0.45, 0.75, 0.65]))
@@ -17,6 +17,8 @@ LIGHT = unit(np.array([-0.45, 0.75, 0.65]))
 
 AMBIENT, GLOSS = 0.56, 0.1
 """The part of a colour that shadow leaves, and the part of white that full light adds."""
+
+UP = (0.0, 0.0, 1.0)
 
 LINES = 40
 """Lines of the floor's grid in each direction, at most."""
@@ -142,7 +144,8 @@ def lit(colours: Array, toward_light: Array) -> Array:
 
 
 def floor_under(motion: Motion, cast: Cast) -> Floor:
-    """The floor that a motion happens above: z = 0, or where its lowest point comes.
+    """The floor that a motion happens above: a level plane of contact that it comes near to, z = 0,
+    or where its lowest point comes.
 
     A body that falls for ever takes no floor with it: the floor stays in the first picture.
     """
@@ -155,6 +158,8 @@ def floor_under(motion: Motion, cast: Cast) -> Floor:
     if -NEAR_ZERO * height <= z <= NEAR_FLOOR * height:
         z = 0.0
     z = max(z, float(looks) - height / 2)
+    levels = [plane.offset for plane in _near(motion) if plane.normal == UP]
+    z = max(levels, default=z)
     step = round_length(height / 8)
     widest = float(max(high[:2] - low[:2]))
     if widest > LINES * step:
@@ -164,6 +169,37 @@ def floor_under(motion: Motion, cast: Cast) -> Floor:
     x_low, y_low = np.floor((low[:2] - spare) / step - 0.2) * step
     x_high, y_high = np.ceil((high[:2] + spare) / step + 0.2) * step
     return Floor(z, step, (float(x_low), float(x_high)), (float(y_low), float(y_high)))
+
+
+def patches(motion: Motion, floor: Floor) -> Array:
+    """Squares (k, 4, 3), as wide as the floor, of the other planes that the motion comes near to.
+
+    Each lies where the middle of the motion is nearest to it, two of its sides level.
+    """
+    places = motion.places.reshape(-1, 3)
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    half = max(floor.x[1] - floor.x[0], floor.y[1] - floor.y[0]) / 2
+    found = []
+    for plane in _near(motion):
+        if plane != Plane(UP, floor.z):
+            normal = np.array(plane.normal)
+            level = unit(np.cross(UP, normal)) if normal[:2].any() else np.array([1.0, 0.0, 0.0])
+            foot = middle - (normal @ middle - plane.offset) * normal
+            one, other = half * level, half * np.cross(normal, level)
+            found.append(
+                [foot - one - other, foot + one - other, foot + one + other, foot - one + other]
+            )
+    return np.array(found).reshape(-1, 4, 3)
+
+
+def _near(motion: Motion) -> list[Plane]:
+    """The planes that a centre of mass comes nearer to than the picture is high."""
+    places = motion.places.reshape(-1, 3)
+    return [
+        plane
+        for plane in motion.planes
+        if np.abs(places @ plane.normal - plane.offset).min() <= motion.camera.height
+    ]
 
 
 def _bounds(motion: Motion, cast: Cast) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ const paths = Array.from(t, (_, i) => {
 const canvas = byId("stage");
 const pen = canvas.getContext("2d");
 const view = { ...HOME };
+const [FILL, SURFACE, REACH] = [0.08, 0.4, 0.25]; // ink of what stands still, and of a field's reach
 const GRID = 130; // CSS pixels between grid lines, at most; the scale bar is one step long
 const MARKS = 30; // marks of more joints or bodies than this are smaller until the view comes closer
 const WIDEST = 4 / 3; // a narrow window shows at least this much width for the camera's height
@@ -61,6 +62,29 @@ function drawTraces(upTo, poses, pixel, seen) {
     pen.stroke();
   });
   pen.globalAlpha = 1;
+}
+
+// Balls that stand still, and, as outlines, the obstacles of fields with their reach dotted; `size` is
+// how many units of the pen a metre has, `pixel` how many a CSS pixel.
+function drawBalls(size, pixel, seen) {
+  pen.lineWidth = pixel;
+  for (const { center, radius, reach } of run.balls ?? []) {
+    const circle = (r, strength) => {
+      pen.strokeStyle = `rgba(${ink}, ${strength})`;
+      pen.beginPath();
+      pen.arc(...seen(center), r * size, 0, 2 * Math.PI);
+      pen.stroke();
+    };
+    circle(radius, SURFACE);
+    if (reach === null) {
+      pen.fillStyle = `rgba(${ink}, ${FILL})`;
+      pen.fill();
+    } else {
+      pen.setLineDash([2 * pixel, 3 * pixel]);
+      circle(radius + reach, REACH);
+      pen.setLineDash([]);
+    }
+  }
 }
 
 function drawScaleBar(scale, height) {

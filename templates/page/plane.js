@@ -16,6 +16,8 @@ function drawScene(poses, upTo, { scale, ratio, width, height }) {
   pen.setTransform(ratio * scale, 0, 0, -ratio * scale,
     ratio * (width / 2 - x * scale), ratio * (height / 2 + y * scale));
   drawGrid(x, y, width / scale / 2, height / scale / 2, pixel);
+  drawPlanes(x, y, Math.hypot(width, height) * pixel, pixel);
+  drawBalls(1, pixel, (center) => center);
   if (byId("trace").checked) drawTraces(upTo, poses, pixel, (position) => position);
   poses.forEach((pose, body) => drawBody(body, pose, pixel));
   for (const [body, ax, ay] of markRadius() > 1.5 ? run.anchors : []) drawAnchor(poses[body], ax, ay, pixel);
@@ -34,6 +36,36 @@ function drawGrid(x, y, halfWidth, halfHeight, pixel) {
   const [left, right, low, high] = [x - halfWidth, x + halfWidth, y - halfHeight, y + halfHeight];
   for (let i = Math.ceil(left / step); i * step <= right; i++) line(i, [i * step, low], [i * step, high]);
   for (let i = Math.ceil(low / step); i * step <= high; i++) line(i, [left, i * step], [right, i * step]);
+}
+
+// What lies behind planes of contact, grey, as `far` as the view goes around x, y.
+function drawPlanes(x, y, far, pixel) {
+  const ends = (run.planes ?? []).map(({ normal: [nx, ny], offset }) => {
+    const gap = nx * x + ny * y - offset;
+    const [footX, footY] = [x - gap * nx, y - gap * ny];
+    const depth = far + Math.abs(gap);
+    return [
+      [footX + far * ny, footY - far * nx],
+      [footX - far * ny, footY + far * nx],
+      [footX - far * ny - depth * nx, footY + far * nx - depth * ny],
+      [footX + far * ny - depth * nx, footY - far * nx - depth * ny],
+    ];
+  });
+  pen.fillStyle = `rgba(${ink}, ${FILL})`;
+  pen.strokeStyle = `rgba(${ink}, ${SURFACE})`;
+  pen.lineWidth = 1.4 * pixel;
+  pen.beginPath(); // one for all, so that what lies behind two planes is not darker
+  for (const corners of ends) {
+    corners.forEach((corner, k) => (k ? pen.lineTo(...corner) : pen.moveTo(...corner)));
+    pen.closePath();
+  }
+  pen.fill();
+  for (const [from, to] of ends) {
+    pen.beginPath();
+    pen.moveTo(...from);
+    pen.lineTo(...to);
+    pen.stroke();
+  }
 }
 
 function drawBody(body, [x, y, angle], pixel) {

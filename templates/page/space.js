@@ -34,6 +34,8 @@ function drawScene(poses, upTo, { scale, width, height }) {
   const toPicture = (point) => [left + scale * dot(axes[0], point), top - scale * dot(axes[1], point)];
   if (axes[2][2] > 0) drawShadow(poses, toPicture); // from below the floor it is not seen
   drawFloor(toPicture);
+  drawPatches(toPicture);
+  drawBalls(scale, 1, toPicture);
   if (byId("trace").checked) drawTraces(upTo, poses, 1, toPicture);
   startRaster(width, height);
   drawSolids(poses, axes, scale, left, top);
@@ -82,6 +84,20 @@ function drawFloor(toPicture) {
     pen.lineTo(...toPicture(to));
     pen.stroke();
   });
+}
+
+// Squares of planes of contact other than the floor; they hide nothing.
+function drawPatches(toPicture) {
+  pen.fillStyle = `rgba(${ink}, ${FILL / 2})`;
+  pen.strokeStyle = `rgba(${ink}, ${SURFACE})`;
+  pen.lineWidth = 1;
+  for (const corners of run.patches ?? []) {
+    pen.beginPath();
+    for (const corner of corners) pen.lineTo(...toPicture(corner));
+    pen.closePath();
+    pen.fill();
+    pen.stroke();
+  }
 }
 
 function drawDot([x, y], radius, fill, line) {
