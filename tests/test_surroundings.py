@@ -179,7 +179,8 @@ const log = [];
 const pen = new Proxy({}, {
   get: (at, name) => name in at ? at[name] : (...given) => {
     log.push([name, ...given, at[name + "Style"]]); // of "fill" and "stroke"
-    return name !== "createImageData" ? {} : { data: new Uint8ClampedArray(4 * given[0] * given[1]) };
+    const size = name === "createImageData" ? 4 * given[0] * given[1] : 0;
+    return { data: new Uint8ClampedArray(size) };
   },
 });
 const sheet = { getContext: () => pen };
