@@ -233,6 +233,9 @@ def test_the_page_draws_what_stands_still_in_the_plane() -> None:
     expected = behind(points, (SLOPE, WALL))
     assert 0.1 < expected.mean() < 0.9
     np.testing.assert_array_equal(covered(points, [np.array(g) for g in grounds]), expected)
+    deep = drawn_by_page(swinging(planes=(Plane((0.0, 1.0), 30.0),)), POSES, (ARM,), frame)
+    (ground,) = next(p for do, ink, p in deep if do == "fill" and "0.08" in ink)
+    assert covered(points, [np.array(ground)]).all()
     circles = [(do, *p) for do, ink, p in painted if ink[-5:] in ("0.08)", " 0.4)", "0.25)")]
     arcs = [(do, *map(float, arc)) for do, arc, *more in circles if not more and len(arc) == 3]
     assert arcs == [
