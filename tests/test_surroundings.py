@@ -287,6 +287,9 @@ def test_energy_is_kept_where_effects_give_it_back(case: Case) -> None:
     assert keeps_energy(model, {}) == (case.conserves == {} or idle)
     if case.conserves is not None:
         assert keeps_energy(model.with_parameters(case.conserves), {})
+    for lossy in case.conserves or ():
+        others = {name: 0.0 for name in case.conserves or () if name != lossy}
+        assert not keeps_energy(model.with_parameters(others), {})
     for given in model.inputs:
         assert not keeps_energy(model, {given.name: 0.1})
 
