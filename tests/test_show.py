@@ -163,7 +163,7 @@ MANY = {
         pytest.param({"joint_drift": np.zeros((201, 2)), **STILL}, "exactly 0", id="at rest"),
         pytest.param({"kinetic_energy": DIVERGED}, "to 2.98 s (full)", id="diverged"),
         pytest.param({"title": NASTY, "integrator": NASTY}, "鎖", id="nasty text"),
-        pytest.param(WORKED, "Work of each effect", id="works"),
+        pytest.param(WORKED, "Work of effects", id="works"),
         pytest.param(MANY, r"$\phi_{39}$", id="many states"),
         pytest.param(
             {"finished": False, "message": "no $\\step{$\nis small"},
