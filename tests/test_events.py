@@ -365,6 +365,16 @@ def test_mass_leaves_a_shaken_table(name):
     assert trajectory.events[4].t == pytest.approx(lift + 2 * math.pi / 12, abs=bound)
 
 
+def test_what_flies_off_is_not_struck_again_where_it_was():
+    """The gap at a bounce is 0 but for rounding, and a long step ends below the ground."""
+
+    def gap(s):
+        return 1e-16 + 0.0032 * s - 5 * s**2 if s > 1e-15 else math.copysign(1e-16, 1e-16 - s)
+
+    at = events._first_zero(gap, lambda s: 0.0032 - 10 * s, 0.0, 0.1, (1e-16, gap(0.1)))
+    assert at == pytest.approx(0.00064, rel=1e-9)
+
+
 def hump(v):
     """A point mass on a circle's top, without friction."""
 

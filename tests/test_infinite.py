@@ -218,3 +218,16 @@ def test_parameters_of_the_run_count() -> None:
             None,
             made.model,
         )
+
+
+def test_what_is_driven_is_no_reason() -> None:
+    """A run that stops beside a drive is explained, and the drive's coordinate is no state."""
+    effect = 'type = "driven"\njoint = "wire"\ncoordinate = "sin(t)"'
+    text = scene(effect, 0.0)
+    text = text[: text.index("[initial]")] + (
+        '[[bodies]]\nname = "bob"\nmass = 1.0\ninertia_com = 0.1\n'
+        '[[joints]]\nname = "pin"\ntype = "revolute"\nparent = "bead"\nchild = "bob"\n'
+        "r_child = [0, 0.5]\n"
+    )
+    model = engine(text).model
+    assert not is_singular(model, values_at(model, 0.0, [0.0, 0.0], {}, {}))

@@ -561,3 +561,16 @@ def test_terminal_progress(terminal, monkeypatch):
 def test_running_needs_no_sympy():
     code = "import sys, eomgen.run.integrate; sys.exit('sympy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_newton_ends_where_a_component_should_be_nothing():
+    """With a Jacobian by differences it shrinks by a factor for ever, and never to its own eps."""
+    problem = Problem(
+        name="rest",
+        states=("x", "v"),
+        positions=(0,),
+        derivative=lambda t, y: np.array([0.0, -3000.0 * y[1]]),
+        jacobian=lambda t, y: np.array([[0.0, 0.0], [0.0, -2950.0]]),
+        initial=np.array([1.0, 1e-18]),
+    )
+    assert integrate(problem, "implicit_midpoint", 0.01, dt=1e-3).finished

@@ -248,9 +248,10 @@ def _first_zero(
 ) -> float | None:
     """Where a gap that turns at most once between `a` and `b` first falls to 0, if it does."""
     at_a, at_b = ends
-    if at_a > 0 and at_b < 0:
-        return _root(gap, a, b)
     before, after = rate(a), rate(b)
+    # One that rises first falls to 0 only after its turn: at `a` it may be 0 but for rounding.
+    if at_a > 0 and at_b < 0 and not before > 0 > after:
+        return _root(gap, a, b)
     turns = before * after < 0
     middle = _root(rate, a, b) if turns else b
     if before < 0:  # it falls first

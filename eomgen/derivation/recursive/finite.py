@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
-from eomgen.effects import Effect
+from eomgen.effects import Driven, Effect
 from eomgen.effects.base import JointLoad
 from eomgen.model import Model
 
@@ -59,8 +59,10 @@ def _size(effect: Effect, dynamics: Dynamics) -> float:
 def is_singular(model: Model, values: Values) -> bool:
     """Whether the mass matrix is: then there are no accelerations from rest without effects."""
     still = replace(values, v=[0.0] * len(values.v))
+    # Drives are no loads: without them their coordinates would be states.
+    bare = replace(model, effects=tuple(e for e in model.effects if isinstance(e, Driven)))
     try:
-        found = Dynamics(replace(model, effects=()), still, FloatScalars()).articulated_forward()
+        found = Dynamics(bare, still, FloatScalars()).articulated_forward()
     except (ArithmeticError, ValueError):
         return True
     return not all(math.isfinite(vd) for vd in found)

@@ -20,6 +20,9 @@ _ROUNDOFF = 4 * np.finfo(np.float64).eps
 _NOISE = 1e-10
 # The same where the whole state is as good as zero, as of a body at rest on the ground.
 _NOTHING = 1e-13
+# A component smaller than this fraction of the largest is solved to its roundoff, not to its own:
+# one that should be 0 has no size of its own.
+_SMALL = 1e-9
 
 
 def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
@@ -48,7 +51,8 @@ def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
         # What is still missing is about the next update: this one times the last contraction.
         # Hairer, Wanner, Solving ODEs II, section IV.8.
         contraction = size / previous if previous else 1.0
-        converged = np.all(contraction * np.abs(update) <= _ROUNDOFF * scale)
+        sizes = np.maximum(scale, _SMALL * np.max(scale))
+        converged = np.all(contraction * np.abs(update) <= _ROUNDOFF * sizes)
         stagnant = 0 < previous <= 2 * size and size <= max(_NOISE * np.max(scale), _NOTHING)
         if converged or stagnant:
             return y + change
