@@ -133,6 +133,7 @@ def python_module(system: System) -> str:
         "effect_names": repr(tuple(effect.name for effect in model.effects)),
         "bodies": repr(tuple(body.name for body in model.bodies)),
         "joints": repr(tuple(body.joint.name for body in model.holding)),
+        "drives": len(model.driven),
         "driven": repr(tuple(c.position.name for c in model.driven)) if model.driven else "",
         "points": repr(tuple(point.name for point in model.points)),
         "contacts": [(touch.name, touch.effect) for touch in system.contacts],

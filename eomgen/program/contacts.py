@@ -90,11 +90,15 @@ def _held(
     position_rates: Sequence[Node],
     forces: Sequence[Node],
 ) -> list[Node]:
-    """The state's derivative under forces on the contacts, ä of the gaps, the contacts' powers."""
+    """Under forces on the contacts: the state's derivative, ä of the gaps, the powers of the
+    contacts and of the drives.
+    """
     found = [pressed(d, contact, f) for contact, f in zip(d.contacts, forces, strict=True)]
-    vd = forward(generalised(d, chain.from_iterable(loads for loads, _ in found))[: d.nv])
+    beside = generalised(d, chain.from_iterable(loads for loads, _ in found))
+    vd = forward(beside[: d.nv])
     rates = [*position_rates, *vd, *d.state_rates]
     given = (*d.values.q, *d.values.v, *d.values.states.values())
     along = {node.index: rate for node, rate in zip(given, rates, strict=True)}
     along[d.values.time.index] = tape.constant(1.0)
-    return [*rates, *tangent(_rates(d), along), *(power for _, power in found)]
+    powers = [power for _, power in found] + d.driving_powers(vd, beside)
+    return [*rates, *tangent(_rates(d), along), *powers]

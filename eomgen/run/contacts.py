@@ -52,8 +52,8 @@ class Holding:
         return 10.0 / np.where(own > 0, own, 10.0)
 
     def solve(self, t: float, y: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return what `Contacts.held` gives (ny + 2 nc,), and (nh,) each forces times what they
-        do to their own gaps, and a, m/s².
+        """Return what `Contacts.held` gives (ny + 2 nc + nd,), and (nh,) each: forces times what
+        they do to their own gaps, and a, m/s².
 
         Raises `StepFailure` if no forces keep the contacts from closing.
         """
@@ -73,7 +73,7 @@ class Holding:
         return self.solve(t, y)[0][: len(y)]
 
     def powers(self, t: float, y: Floats) -> Floats:
-        """What the contacts' forces do (nc,), W."""
+        """What the contacts' forces and the drives do (nc + nd,), W."""
         return self.solve(t, y)[0][len(y) + len(self.contacts.names) :]
 
     def _system(self, t: float, y: Floats, units: Floats) -> tuple[Floats, Floats, Floats]:

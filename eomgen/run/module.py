@@ -158,6 +158,11 @@ def _contacts(module: Any, parameters: Any, inputs: Any) -> Contacts | None:
         rates=lambda t, y: module.gap_rates(t, y, parameters, inputs),
         impact=lambda t, y, k, bounce: module.impact(t, y, k, bounce, parameters, inputs),
         held=lambda t, y, forces: module.held(t, y, forces, parameters, inputs),
+        drives=tuple(
+            name
+            for name, kind in zip(module.EFFECT_NAMES, module.EFFECTS, strict=True)
+            if kind == "driven"
+        ),
     )
 
 

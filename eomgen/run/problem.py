@@ -28,9 +28,11 @@ class Contacts:
     rates           (t, y) -> (nc,), their time derivatives
     impact          (t, y, contact, bounce) -> (ny,), the state after contact number `contact` has
                     struck, its restitution multiplied by `bounce` (0: perfectly plastic)
-    held            (t, y, forces (nc,)) -> (ny + 2 nc,), affine in the forces (N or N m): under
-                    normal forces of the contacts, and the friction they cause, the state's
-                    derivative, the gaps' second derivatives, the contacts' powers (W)
+    held            (t, y, forces (nc,)) -> (ny + 2 nc + nd,), affine in the forces (N or N m):
+                    under normal forces of the contacts, and the friction they cause, the state's
+                    derivative, the gaps' second derivatives, the powers (W) of the contacts and
+                    of the drives
+    drives          effects (nd) that drive joints: what they do depends on the contacts' forces
     """
 
     names: tuple[str, ...]
@@ -39,6 +41,7 @@ class Contacts:
     rates: Callable[[float, Floats], Floats]
     impact: Callable[[float, Floats, int, float], Floats]
     held: Callable[[float, Floats, Floats], Floats]
+    drives: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -165,8 +165,23 @@ class Dynamics(Moving):
     @cached_property
     def driving_forces(self) -> list[Scalar]:
         """What each driven coordinate takes, N m or N: inverse dynamics at v̇, less the loads."""
-        pairs = zip(self._needed(self.vd)[self.nv :], self._applied[self.nv :], strict=True)
+        return self._driving(self.vd)
+
+    def _driving(self, vd: Sequence[Scalar]) -> list[Scalar]:
+        """The same at other v̇."""
+        pairs = zip(self._needed(vd)[self.nv :], self._applied[self.nv :], strict=True)
         return [needed - applied for needed, applied in pairs]
+
+    def driving_powers(self, vd: Sequence[Scalar], beside: Sequence[Scalar]) -> list[Scalar]:
+        """What each driven effect, in order, does to the motion at v̇, W, where forces `beside` the
+        effects, one a velocity, driven ones too, act.
+        """
+        taken = zip(self._driving(vd), beside[self.nv :], self.v[self.nv : self.moved], strict=True)
+        powers = {
+            c.by: (force - other) * rate
+            for c, (force, other, rate) in zip(self.model.driven, taken, strict=True)
+        }
+        return [powers[e.name] for e in self.model.effects if isinstance(e, Driven)]
 
     # Forward dynamics.
 

@@ -56,7 +56,8 @@ class Advance:
     is_step  False for what takes no time, an impact or a mere note of `events`
     struck   the number of the contact that struck
     events   what happened at its end
-    contact_powers  (t, y) -> (nc,), powers of the contacts that were held during the step, W
+    contact_powers  (t, y) -> (nc + nd,), powers of the contacts, of which some were held during the
+                    step, and of the drives, W
     """
 
     t: float
