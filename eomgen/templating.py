@@ -46,12 +46,13 @@ def render(folder: str, template: str, context: Mapping[str, object], *, html: b
     return surroundings.get_template(template).render(context)
 
 
-def _names_read(surroundings: Environment, template: str) -> set[str]:
+@cache
+def _names_read(surroundings: Environment, template: str) -> frozenset[str]:
     """Names that `template` and whatever it includes read from the context."""
     assert surroundings.loader is not None
     source, _, _ = surroundings.loader.get_source(surroundings, template)
     tree = surroundings.parse(source)
-    names = meta.find_undeclared_variables(tree)
+    names = frozenset(meta.find_undeclared_variables(tree))
     for other in meta.find_referenced_templates(tree):
         assert other is not None, f"{template} chooses what it includes only when it runs"
         names |= _names_read(surroundings, other)

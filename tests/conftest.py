@@ -1,9 +1,23 @@
-"""Fixtures shared by the tests."""
+"""What the tests share: fixtures, and which of them run in one process."""
 
 from collections.abc import Iterator
 
 import pytest
 from mechanisms import BUILT_IN, Compiled, compiled
+
+TOGETHER = {
+    "closed": "generated handout identities pivots program".split(),
+    "effects": "absence bookkeeping".split(),
+}
+"""Files whose tests ask for the same compiled scenes: these are made once a process."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Groups for pytest-xdist: each runs in one process, a file of its own or several together."""
+    groups = {f"test_{name}": group for group, names in TOGETHER.items() for name in names}
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group(groups.get(item.path.stem, item.path.stem)))
 
 
 @pytest.fixture(scope="session", params=BUILT_IN)

@@ -242,7 +242,7 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
     (
         "joint_stop",
         "one",
-        'joint = "hinge"; coordinate = "q"; high = 0.1; stiffness = 6',
+        'joint = "hinge"; coordinate = "q"; low = -0.1; high = 0.1; stiffness = 6',
         CONSERVES,
     ),
     ("joint_stop", "high", 'joint = "rail"; high = -0.2; stiffness = 60.0', CONSERVES),

@@ -66,6 +66,15 @@ TABLES: dict[str, dict[str, str]] = {
     "joint_spring law": {"joint": '"hinge"', "law": "1"},
     "joint_friction": {"joint": '"rail"', "viscous": "1", "coulomb": "1", "speed": "1"},
     "joint_stop": {"joint": '"rail"', "low": "-1", "high": "1", "stiffness": "1", "damping": "1"},
+    "joint_stop rigid": {"joint": '"hinge"', "low": "-1", "restitution": "1"},
+    "contact": {"body": '"boom"', "law": '"spring_damper"', "radius": "1", "corners": "{c}",
+                "at": "{v}", "offset": "1", "other": '"trolley"', "stiffness": "1",
+                "damping": "1", "friction": "1", "slip_speed": "1"},
+    "contact ball": {"bodies": '"all"', "law": '"hunt_crossley"', "against": '"ball"',
+                     "radii": "{{ boom = 1 }}", "radius": "1", "other_radius": "1",
+                     "other_at": "{v}", "stiffness": "1", "dissipation": "1"},
+    "contact rigid": {"body": '"boom"', "law": '"impact"', "restitution": "1"},
+    "driven": {"joint": '"rail"', "coordinate": '"sin(t)"'},
     "motor": {"joint": '"rail"', "torque": "1"},
     "pd": {"joint": '"rail"', "target": "1", "target_rate": "1", "stiffness": "1", "damping": "1",
            "limit": "1", "lag": "1"},
@@ -75,13 +84,16 @@ TABLES: dict[str, dict[str, str]] = {
 }  # fmt: skip
 """Of every effect good tables, which together give every field that holds a quantity or a name."""
 OF_ANY_SIGN = set(
-    "controller.torques drag.at drag.wind external_force.at external_force.force "
-    "external_torque.torque field.at field.center field.force gravity.g joint_spring.law "
-    "joint_spring.rest joint_stop.high joint_stop.low motor.torque pd.target pd.target_rate "
+    "contact.at contact.offset contact.other_at contact.restitution controller.torques drag.at "
+    "drag.wind driven.coordinate external_force.at external_force.force external_torque.torque "
+    "field.at field.center field.force gravity.g joint_spring.law joint_spring.rest "
+    "joint_stop.high joint_stop.low joint_stop.restitution motor.torque pd.target pd.target_rate "
     "pid.target pid.target_rate point_gravity.at spring.at_1 spring.at_2 spring.law "
     "spring.rest_length".split()
 )
-"""Forces, places, laws and targets. All else, stiffness, damping, drag, gains, is not negative."""
+"""Forces, places, laws and targets; a restitution has two bounds, and tests of its own. All else,
+stiffness, damping, drag, gains, is not negative.
+"""
 MEMBERS: dict[str, type[EffectTable]] = {
     member.model_fields["type"].annotation.__args__[0]: member
     for member in get_args(get_args(Effect)[0])
@@ -93,9 +105,8 @@ def crane(kind: str, dimensions: int = 2, **changed: str | None) -> str:
     """The scene with one effect; a field that is changed to None is left out."""
     space = dimensions == 3
     arm = "[0.5, 0, 0]" if space else "[0.5, 0]"
-    fields = {
-        key: value.format(v=arm, t=arm if space else 1) for key, value in TABLES[kind].items()
-    }
+    vectors = {"v": arm, "c": arm.replace(" 0", " 1"), "t": arm if space else 1}
+    fields = {key: value.format(**vectors) for key, value in TABLES[kind].items()}
     fields |= {"type": f'"{kind.split()[0]}"', "name": '"effect"'}
     given = {key: changed.get(key, value) for key, value in {**fields, **changed}.items()}
     return (
@@ -120,15 +131,15 @@ def refusal(scene: str) -> str:
 
 
 def quantities(kind: str) -> Iterator[tuple[str, Any, dict[str, Any]]]:
-    """Each field of a table that holds a quantity: key, what it holds, unit and bound."""
+    """Each field of a table that holds a quantity: key, what it holds; unit, there, and bound."""
     member = MEMBERS[kind.split()[0]]
     effect = build_model(parse_scene(crane(kind))).effects[0]
     for field, info in member.model_fields.items():
         extra = info.json_schema_extra
         if field in TABLES[kind] and isinstance(extra, dict) and "unit" in extra:
-            value = getattr(effect, field)
-            if not isinstance(value, dict):
-                yield field, value, extra
+            turning, *sliding = extra["unit"].split(" | ")
+            unit = sliding[-1] if sliding and "rail" in TABLES[kind].get("joint", "") else turning
+            yield field, getattr(effect, field), {**extra, "unit": unit}
 
 
 def test_all_effects_are_here() -> None:
@@ -154,12 +165,15 @@ def test_quantities(kind: str) -> None:
     active = "allow_active" in MEMBERS[kind.split()[0]].model_fields
     for field, value, extra in quantities(kind):
         place = f"effects[0].{field}"
+        form = "{}"
         if isinstance(value, tuple):
-            place += "[1]"
+            place, form = f"{place}[1]", "[0.5, {}]"
+        elif isinstance(value, dict):
+            (key,) = value
+            place, form = f"{place}.{key}", f"{{{{ {key} = {{}} }}}}"
 
-        def put(given: str, field: str = field, value: Any = value, **more: str) -> str:
-            one = f"[0.5, {given}]" if isinstance(value, tuple) else given
-            return crane(kind, **{field: one}, **more)
+        def put(given: str, field: str = field, form: str = form, **more: str) -> str:
+            return crane(kind, **{field: form.format(given)}, **more)
 
         said = refusal(put("nan"))
         assert said == f"{place}: nan is not a finite number; give one that is"
@@ -175,14 +189,17 @@ def test_quantities(kind: str) -> None:
         assert refusal(put('"stiff.real"')) == (
             f"{place}: 'stiff.real' has '.real' at column 6, which no formula may hold"
         )
-        assert refusal(put('"1/(stiff + 4)"')) == (
-            f"{place}: its value is not a finite number; change its parameters"
+        assert refusal(put('"1/(stiff + 4)"')) == f"{place}: " + (
+            "it, its rate or its acceleration is not finite at t = 0; change the formula"
+            if kind == "driven"
+            else "its value is not a finite number; change its parameters"
         )
         assert refusal(put("1e101")) == f"{place}: 1e+101 is larger than 1e+100; choose other units"
-        if "sees" not in extra:
-            assert refusal(put('"2*swing"')) == (
-                f"{place}: 'swing' changes with the motion, which this value must not; "
-                "use parameters"
+        if "motion" not in extra.get("sees", ()):
+            assert refusal(put('"2*swing"')) == f"{place}: 'swing' " + (
+                "is found only as it moves, and a drive is fixed beforehand; use t and parameters"
+                if kind == "driven"
+                else "changes with the motion, which this value must not; use parameters"
             )
         bound = {
             "positive": "is not positive; give a number >",
@@ -195,6 +212,8 @@ def test_quantities(kind: str) -> None:
         assert refusal(put('"stiff"')) == f"{place}: -4 {bound} 0 in {extra['unit']}"
         if extra["bound"] == "positive":
             assert refusal(put("0")) == f"{place}: 0 {bound} 0 in {extra['unit']}"
+        elif active and extra["unit"] == "m":  # a length is never negative
+            assert refusal(put("-4", allow_active="true")) == refusal(put("-4"))
         elif active:
             build_model(parse_scene(put("-4", allow_active="true")))
             assert refusal(put("-4", allow_active="false")) == refusal(put("-4"))
@@ -205,9 +224,14 @@ def test_names_and_vectors(kind: str) -> None:
     """Bodies and joints that are not there or not named; vectors too long, in plane and space."""
     member = MEMBERS[kind.split()[0]]
     for field in (*member.body_fields, *member.anchor_fields):
-        if field not in TABLES[kind]:
+        if field not in TABLES[kind] or TABLES[kind][field] == '"all"':
             continue
         place = f"effects[0].{field}"
+        if TABLES[kind][field].startswith("{"):
+            assert refusal(crane(kind, **{field: "{ boon = 1 }"})) == (
+                f"{place}.boon: no body is named 'boon' (did you mean 'boom'?)"
+            )
+            continue
         assert refusal(crane(kind, **{field: '"boon"'})) == (
             f"{place}: no body is named 'boon' (did you mean 'boom'?)"
         )
@@ -218,23 +242,18 @@ def test_names_and_vectors(kind: str) -> None:
         assert refusal(crane(kind, **{field: '"my boom"'})) == (
             f"{place}: 'my boom' is no identifier; use letters a-z, digits and _, a letter first"
         )
-        missing = refusal(crane(kind, **{field: None}))
-        assert missing.startswith((f"{place}: missing; every", f"{place}: is missing; give one of"))
+        if member.model_fields[field].default == "world":
+            build_model(parse_scene(crane(kind, **{field: None})))
+        else:
+            missing = refusal(crane(kind, **{field: None}))
+            assert missing in (
+                f"{place}: missing; every such table needs it",
+                f"{place}: is missing; give one of body, bodies, points",
+            )
         if field in member.body_fields:
             assert refusal(crane(kind, **{field: '"world"'})) == (
                 f"{place}: no body is named 'world'; known: boom, trolley"
             )
-    if "joint" in TABLES[kind]:
-        assert refusal(crane(kind, joint='"hing"')) == (
-            "effects[0].joint: no revolute or prismatic joint is named 'hing' "
-            "(did you mean 'hinge'?)"
-        )
-        assert refusal(crane(kind, joint='"boom"')) == (
-            "effects[0].joint: no revolute or prismatic joint is named 'boom'; known: hinge, rail"
-        )
-        assert refusal(crane(kind, joint=None)) == (
-            "effects[0].joint: missing; every such table needs it"
-        )
     for field in member.vector_fields:
         if field not in TABLES[kind]:
             continue
@@ -250,6 +269,38 @@ def test_names_and_vectors(kind: str) -> None:
             f"{place}: has lists in it; give everything in one list"
         )
         assert refusal(crane(kind, **{field: "1"})) == f"{place}: 1 is not a list; give one"
+
+
+@pytest.mark.parametrize("kind", [kind for kind in TABLES if "joint" in TABLES[kind]])
+def test_joints(kind: str) -> None:
+    """Joints that are not there, not named, or named twice; coordinates that they have not."""
+    member = MEMBERS[kind.split()[0]]
+    what = "revolute or prismatic joint" if member.joint_fields else "joint that moves"
+    places = {"joint": '"{}"', "joints": '["{}"]'}
+    for field in (*member.joint_fields, *member.way_fields):
+        place = f"effects[0].{field}" + "[0]" * (field == "joints")
+        for name, hint in (("hing", " (did you mean 'hinge'?)"), ("boom", "; known: hinge, rail")):
+            wrong = {"joint": None, field: places[field].format(name)}
+            assert refusal(crane(kind, **wrong)) == f"{place}: no {what} is named '{name}'{hint}"
+    several = "joints" in member.way_fields
+    assert refusal(crane(kind, joint=None)) == "effects[0].joint: " + (
+        "is missing; give one of joint, joints" if several else "missing; every such table needs it"
+    )
+    if several:
+        assert refusal(crane(kind, joints='["rail"]')) == (
+            "effects[0].joint: is given beside 'joints'; give one of joint, joints"
+        )
+        assert refusal(crane(kind, joint=None, joints='["rail", "rail"]')) == (
+            "effects[0].joints[1]: 'rail' is listed twice; leave one out"
+        )
+    if member.way_fields:
+        joint = TABLES[kind]["joint"].strip('"')
+        own, other = ("swing", "run") if joint == "hinge" else ("run", "swing")
+        build_model(parse_scene(crane(kind, coordinate=f'"{own}"')))
+        for name, hint in ((f"{own}s", f" (did you mean '{own}'?)"), (other, f"; known: {own}")):
+            assert refusal(crane(kind, coordinate=f'"{name}"')) == (
+                f"effects[0].coordinate: '{joint}' has no angle or slide '{name}'{hint}"
+            )
 
 
 @pytest.mark.parametrize("kind", TABLES)
@@ -327,5 +378,6 @@ def test_formulas_stay_formulas() -> None:
     """A quantity read is a tree of constants, names and operations, never a text."""
     for kind in TABLES:
         for _, value, _ in quantities(kind):
-            for part in value if isinstance(value, tuple) else (value,):
+            parts = value.values() if isinstance(value, dict) else value
+            for part in parts if isinstance(value, dict | tuple) else (value,):
                 assert isinstance(part, Formula)

@@ -700,7 +700,7 @@ BAD = {
         "effects[0].corners[1]: 0 is not positive; give a number > 0 in m"
     ),
     (*SOFT, 'offset = "sin(t)"'): (
-        "effects[0].offset: unknown parameter 't'; give it a value in [parameters]"
+        "effects[0].offset: 't' changes with the motion, which this value must not; use parameters"
     ),
     (*SOFT, 'other = "c"'): "effects[0].other: no body is named 'c'; known: world, a, b",
     (*SOFT, 'other = "a"'): (

@@ -149,7 +149,7 @@ class BodyContact(OnBodies):
         if self.against == "each_other" and len(listed) < 2 and self.bodies != "all":
             key = "body" if self.bodies is None else "bodies"
             raise wrong(key, "one body has no other to touch; give two or more in bodies")
-        if self.other in listed:
+        if self.other != WORLD and self.other in listed:
             raise wrong("other", f"'{self.other}' cannot touch itself; name another body or world")
         for name in self.radii:
             if name not in listed and self.bodies != "all":
