@@ -104,6 +104,17 @@ def test_the_running_half_does_without_sympy() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+def test_generating_does_without_scipy(tmp_path: Path) -> None:
+    """SciPy and Matplotlib take longer to load than a scene takes to check or to generate."""
+    code = (
+        "import sys; from eomgen.cli import main; "
+        "code = main(['generate', 'chain', '-o', sys.argv[1]]); "
+        "sys.exit(code or 10 * ('scipy' in sys.modules or 'matplotlib' in sys.modules))"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
 def test_a_fresh_scene_is_simulated_without_sympy(tmp_path: Path) -> None:
     """With its module in the store, `simulate` never loads SymPy."""
     run = (

@@ -2,11 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance
 from eomgen.run.problem import Contacts, Floats, Problem
+
+if TYPE_CHECKING:  # it loads SciPy, which a module that is generated alone does not need
+    from eomgen.run.integrators.interface import Advance
 
 NODES = 5
 """Gauss–Legendre nodes on each step: exact for powers that are polynomials of degree 9."""
@@ -55,7 +58,7 @@ class Account:
         self._slots = [self.names.index(effect) for effect in booked]
         self._last: tuple[Problem, Floats, Floats] | None = None
 
-    def book(self, t: float, y: Floats, advance: Advance) -> list[Floats]:
+    def book(self, t: float, y: Floats, advance: "Advance") -> list[Floats]:
         """Take up the step or strike from state `y` at `t`; return the works at its samples."""
         if advance.struck is not None:
             energy = self._powers.kinetic_energy
@@ -77,7 +80,7 @@ class Account:
         self.total = until(1.0)
         return works
 
-    def _at(self, t: float, y: Floats, advance: Advance) -> Floats:
+    def _at(self, t: float, y: Floats, advance: "Advance") -> Floats:
         """All powers at one time, (m,)."""
         powers = np.zeros(len(self.names))
         powers[: len(self._powers.names)] = self._powers.powers(t, y)
@@ -85,7 +88,7 @@ class Account:
             np.add.at(powers, self._slots, advance.contact_powers(t, y))
         return powers
 
-    def _cubic(self, t: float, y: Floats, advance: Advance) -> Callable[[float], Floats]:
+    def _cubic(self, t: float, y: Floats, advance: "Advance") -> Callable[[float], Floats]:
         """Hermite's cubic through both ends of a step, with the slopes there."""
         problem, length = advance.problem, advance.t - t
         if self._last is not None and self._last[0] is problem and self._last[1] is y:
