@@ -26,6 +26,8 @@ ORDER = (
     ("model",),
     ("straighten",),
     ("prescribed",),
+    ("naming",),
+    ("acting",),
     ("build",),
     ("derivation",),
     ("templating",),
