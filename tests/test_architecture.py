@@ -178,6 +178,13 @@ def test_each_fact_lives_once() -> None:
     assert f"Python ≥ {python}" in (ROOT / "README.md").read_text("utf-8")
 
 
+def test_tables_of_the_reference_are_whole() -> None:
+    """A bar within a cell would make two of it."""
+    rows = [line for line in reference().splitlines() if line.startswith("|")]
+    assert len(rows) > 100
+    assert {row.count("|") for row in rows} == {5}
+
+
 def test_built_in_scenes_fit_the_json_schema() -> None:
     """What editors are told agrees with what the reader takes."""
     import json

@@ -23,7 +23,7 @@ class Spring(EffectTable):
     s <= 0, and damping never makes it push. Potential energy is ½ k s²; a law has none, what it
     gives and takes is power.
 
-    Points nearer than ε = 1e-9 m (`NEAREST`) have no sure line between them. There |d| counts as ε and the
+    Points nearer than ε = 1e-9 m have no sure line between them. There |d| counts as ε and the
     force falls with d to nothing, T(ε) d/ε; damping becomes that of the whole relative velocity,
     c ((u·ḋ) u + (1 - u·u) ḋ) with u = d/ε. Everything is continuous and finite, the energy that
     of the force; without rest length the spring is k d anywhere.
