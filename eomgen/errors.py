@@ -1,7 +1,7 @@
 """Errors that are the user's to mend: one clear line each, with place, value and remedy."""
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 
 class EomgenError(Exception):
@@ -22,7 +22,7 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
-def listed(names: Sequence[str] | dict[str, int]) -> str:
+def listed(names: Iterable[str]) -> str:
     """Names in a message, the first few of many."""
     words = list(names)
     return ", ".join(words[:12]) + (f" and {len(words) - 12} more" if len(words) > 12 else "")

@@ -140,19 +140,19 @@ class Model:
     leave_out: tuple[LeftOut, ...] = ()
     notices: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """The coordinates of the state, in the order of `q`."""
         given = {c.position.name for c in self.prescribed}
         return tuple(c for body in self.bodies for c in body.positions if c.name not in given)
 
-    @property
+    @cached_property
     def velocities(self) -> tuple[Coordinate, ...]:
         """The velocities of the state, in the order of `v`."""
         given = {c.velocity.name for c in self.prescribed}
         return tuple(c for body in self.bodies for c in body.velocities if c.name not in given)
 
-    @property
+    @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:
         """The coordinates that are no states: driven ones in the order of the bodies, then locked
         ones.
@@ -173,7 +173,7 @@ class Model:
         """Those of them that a drive moves."""
         return tuple(c for c in self.prescribed if not c.locked)
 
-    @property
+    @cached_property
     def seats(self) -> tuple[Seat, ...]:
         """Where each body's joint stands among the coordinates and velocities."""
         given = self.prescribed

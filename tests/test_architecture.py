@@ -26,6 +26,8 @@ ORDER = (
     ("model",),
     ("straighten",),
     ("prescribed",),
+    ("naming",),
+    ("acting",),
     ("build",),
     ("derivation",),
     ("templating",),
@@ -104,6 +106,17 @@ def test_the_running_half_does_without_sympy() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+def test_generating_does_without_scipy(tmp_path: Path) -> None:
+    """SciPy and Matplotlib take longer to load than a scene takes to check or to generate."""
+    code = (
+        "import sys; from eomgen.cli import main; "
+        "code = main(['generate', 'chain', '-o', sys.argv[1]]); "
+        "sys.exit(code or 10 * ('scipy' in sys.modules or 'matplotlib' in sys.modules))"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
 def test_a_fresh_scene_is_simulated_without_sympy(tmp_path: Path) -> None:
     """With its module in the store, `simulate` never loads SymPy."""
     run = (
@@ -163,6 +176,13 @@ def test_each_fact_lives_once() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     python = project["requires-python"].removeprefix(">=")
     assert f"Python ≥ {python}" in (ROOT / "README.md").read_text("utf-8")
+
+
+def test_tables_of_the_reference_are_whole() -> None:
+    """A bar within a cell would make two of it."""
+    rows = [line for line in reference().splitlines() if line.startswith("|")]
+    assert len(rows) > 100
+    assert {row.count("|") for row in rows} == {5}
 
 
 def test_built_in_scenes_fit_the_json_schema() -> None:

@@ -245,6 +245,10 @@ def test_notices_and_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert at == pytest.approx(rows[np.argmax(rows[:, 1]), 0], rel=1e-3)
     assert main(["simulate", str(scene), "-o", out, "--t-end", "0.1"]) == 0
     assert " limits" not in capsys.readouterr().out
+    stop = '{ type = "joint_stop", name = "end", joints = ["s"], high = 1.0, stiffness = 9.0 }'
+    scene.write_text(ARM.replace("g = 9.81 }", f"g = 9.81 }}, {stop}"), "utf-8")
+    assert main(["simulate", str(scene), "-o", out, "--t-end", "1"]) == 0
+    assert " limits" not in capsys.readouterr().out, "a stop enforces them"
     scene.write_text(ARM.replace("[-0.5, 1.0]", "[0.5, 1.0]"), "utf-8")
     assert main(["simulate", str(scene), "-o", out, "--t-end", "0.1"]) == 0
     assert "s_angle starts outside its limits 0.5 to 1 rad; " in capsys.readouterr().out

@@ -23,7 +23,7 @@ from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.effects.base import Contact, JointLoad, Load
-from eomgen.effects.spring import NEAREST
+from eomgen.effects.vectors import NEAREST
 from eomgen.errors import SceneError
 from eomgen.program.route import routed
 from eomgen.scene.reader import parse_scene

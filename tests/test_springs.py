@@ -20,7 +20,7 @@ from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
-from eomgen.effects.spring import NEAREST
+from eomgen.effects.vectors import NEAREST
 from eomgen.errors import SceneError
 from eomgen.language.formula import BY_MATH
 from eomgen.program.program import interpret

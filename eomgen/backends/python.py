@@ -136,7 +136,7 @@ def python_module(system: System) -> str:
         "drives": len(model.driven),
         "driven": repr(tuple(c.position.name for c in model.driven)) if model.driven else "",
         "points": repr(tuple(point.name for point in model.points)),
-        "contacts": [(touch.name, touch.effect) for touch in system.contacts],
+        "contacts": [(c.name, c.effect) for c in system.contacts],
         "impact": kernels.get("impact"),
         "held": kernels.get("held"),
         "costs": [(name, json.dumps(cost(program, name))) for name in kernels],
@@ -257,7 +257,7 @@ def _document(system: System) -> list[str]:
     lines += ["", f"Effects: {effects}."]
     if system.contacts:
         lines += ["", "Contacts that strike, each with the unit of its gap and its effect:"]
-        lines += _table([(touch.name, touch.unit, touch.effect) for touch in system.contacts])
+        lines += _table([(c.name, c.unit, c.effect) for c in system.contacts])
         lines += [""]
     if "velocity_forces" in model.leave_out:
         rest = ", of which V keeps what driving takes" if model.driven else ": M v̇ + G = F"

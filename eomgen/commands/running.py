@@ -16,10 +16,11 @@ from eomgen.commands.shared import (
     read_model,
     shortened,
 )
+from eomgen.effects import JointStop
 from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.joints.base import Geared
-from eomgen.model import Model
+from eomgen.model import Model, ways_of
 from eomgen.run.limits import excursions
 from eomgen.run.module import as_powers, as_problem
 from eomgen.run.progress import terminal_progress
@@ -135,7 +136,9 @@ def _print_events(trajectory: Trajectory) -> None:
 
 def _print_excursions(model: Model, trajectory: Trajectory) -> None:
     """Say which coordinates left the limits of their joints, which nothing but a stop enforces."""
-    stopped = {effect.joint for effect in model.effects if effect.type == "joint_stop"}
+    joints = ways_of(model.bodies, model.dimensions)
+    stops = [effect for effect in model.effects if isinstance(effect, JointStop)]
+    stopped = {joint for stop in stops for joint in stop.acted_on(joints)}
     limits, units = {}, {}
     for body in model.bodies:
         if body.joint.name in stopped:

@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from eomgen.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
+from eomgen.effects.vectors import dot, negative, scale, sub
 from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
@@ -37,7 +38,7 @@ class PointGravity(EffectTable):
             arm, squared = self._from_point(mechanism, body)
             cubed = squared * mechanism.call("sqrt", squared)
             pull = mu * mechanism.mass(body) / cubed
-            yield Load(body, tuple(-(pull * part) for part in arm), zeros, "applied")
+            yield Load(body, negative(scale(pull, arm)), zeros, "applied")
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """-Σ μ m/|r|, J, zero far away."""
@@ -52,9 +53,7 @@ class PointGravity(EffectTable):
 
     def _from_point(self, mechanism: Mechanism, body: str) -> tuple[Vector, Scalar]:
         """r, and its square."""
-        total = mechanism.value(ZERO)
-        place = mechanism.place(body, (total,) * mechanism.dimensions)
-        arm = tuple(x - mechanism.value(y) for x, y in zip(place, self.at, strict=True))
-        for part in arm:
-            total = total + part * part
-        return arm, total
+        zeros = (mechanism.value(ZERO),) * mechanism.dimensions
+        centre = tuple(mechanism.value(part) for part in self.at)
+        arm = sub(mechanism.place(body, zeros), centre)
+        return arm, dot(arm, arm)

@@ -12,9 +12,6 @@ from eomgen.language.formula import Formula, names_in
 from eomgen.language.quantity import Vector as VectorField
 from eomgen.language.quantity import quantity
 
-LEAST_SQUARE = 1e-300
-"""Of a length under a root: less counts as this."""
-
 
 class OnBodies(EffectTable):
     """An effect on the point `at` of `body`, or of each of `bodies`, which may be "all"; or on each
@@ -86,24 +83,3 @@ def local_names(
             values = (*vector(body, at), mechanism.number(0.0))
             found |= dict(zip(names, values, strict=False))
     return found
-
-
-def length(mechanism: Mechanism, vector: Vector) -> Scalar:
-    """|a|, with a Jacobian that is finite and exact everywhere, 0 at a = 0.
-
-    Of several components it is sqrt(max(a·a, 1e-300)): the greater of two has the slope of the one
-    it takes, so that no root of 0 is ever differentiated. It is 1e-150 at a = 0, and right to
-    the last bit from there upwards; |a| a is exactly 0 at a = 0.
-    """
-    if len(vector) == 1:
-        return mechanism.call("abs", vector[0])
-    square = mechanism.call("max", dot(vector, vector), mechanism.number(LEAST_SQUARE))
-    return mechanism.call("sqrt", square)
-
-
-def dot(a: Vector, b: Vector) -> Scalar:
-    """a · b."""
-    total = a[0] * b[0]
-    for x, y in zip(a[1:], b[1:], strict=True):
-        total = total + x * y
-    return total

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from eomgen.effects.base import Contact, Load, Mechanism, Scalar
 from eomgen.effects.base import Vector as Components
-from eomgen.effects.bodies import LEAST_SQUARE, OnBodies, dot, wrong
+from eomgen.effects.bodies import OnBodies, wrong
 from eomgen.effects.touching import (
     Ball,
     Plane,
@@ -22,6 +22,7 @@ from eomgen.effects.touching import (
     sliding,
     tangents,
 )
+from eomgen.effects.vectors import LEAST_SQUARE, dot
 from eomgen.errors import SceneError
 from eomgen.joints.base import WORLD
 from eomgen.language.base import Identifier
@@ -256,7 +257,7 @@ class BodyContact(OnBodies):
         )
 
     def _elastic(self, mechanism: Mechanism, touch: Touch) -> Scalar:
-        """k d or k d^1.5, N. d^1.5 has the slope 0 at d = 0, as `bodies.length` has it."""
+        """k d or k d^1.5, N. d^1.5 has the slope 0 at d = 0, as `vectors.length` has it."""
         d = mechanism.call("max", -touch.gap, mechanism.number(0.0))
         force = mechanism.value(self.stiffness) * d
         if self.law == "spring_damper":

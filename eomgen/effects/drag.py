@@ -6,7 +6,8 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from eomgen.effects.base import Load, Mechanism, Scalar, Vector
-from eomgen.effects.bodies import OnBodies, length, local_names, wrong
+from eomgen.effects.bodies import OnBodies, local_names, wrong
+from eomgen.effects.vectors import length, negative, scale, sub
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.language.quantity import Vector as VectorField
@@ -19,8 +20,7 @@ class Drag(OnBodies):
 
     Also on the turning at ω: torque = -(turning_linear + turning_quadratic |ω|) ω. Instead of
     `quadratic` there may be the ½ density area coefficient of Rayleigh's drag equation. All vectors
-    in world axes; all coefficients are those of each body. Defined and differentiable at rest: see
-    `bodies.length`.
+    in world axes; all coefficients are those of each body. Defined and differentiable at rest.
     """
 
     vector_fields = ("at", "wind")
@@ -86,7 +86,7 @@ class Drag(OnBodies):
                 if blows:
                     names = local_names(mechanism, self.wind, body, at)
                     wind = tuple(mechanism.value(part, **names) for part in self.wind)
-                    speed = tuple(v - w for v, w in zip(speed, wind, strict=True))
+                    speed = sub(speed, wind)
                 force = _drag(mechanism, linear, quadratic, speed)
             torque: Vector = ()
             if turns:
@@ -106,4 +106,4 @@ def _drag(mechanism: Mechanism, linear: Scalar, quadratic: Scalar | None, speed:
     factor = linear
     if quadratic is not None:
         factor = factor + quadratic * length(mechanism, speed)
-    return tuple(-(factor * part) for part in speed)
+    return negative(scale(factor, speed))

@@ -23,4 +23,4 @@ class Driven(EffectTable):
 
     type: Literal["driven"]
     joint: Identifier = Field(description="revolute or prismatic joint it drives")
-    coordinate: Quantity = quantity("rad or m", "coordinate", sees=("t",))
+    coordinate: Quantity = quantity("rad | m", "coordinate", sees=("t",))

@@ -6,7 +6,8 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from eomgen.effects.base import Load, Mechanism, Scalar, Vector
-from eomgen.effects.bodies import OnBodies, dot, length, local_names, wrong
+from eomgen.effects.bodies import OnBodies, local_names, wrong
+from eomgen.effects.vectors import cross, dot, length, negative, scale, sub
 from eomgen.language.base import Number
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
@@ -115,8 +116,8 @@ class ForceField(OnBodies):
 
     def _way(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
         """From the centre to the point."""
-        centre = (mechanism.value(part) for part in self.center)
-        return tuple(x - c for x, c in zip(mechanism.place(body, at), centre, strict=True))
+        centre = tuple(mechanism.value(part) for part in self.center)
+        return sub(mechanism.place(body, at), centre)
 
     def _square(self, mechanism: Mechanism, way: Vector) -> Scalar:
         softening = mechanism.value(self.softening)
@@ -137,11 +138,11 @@ class ForceField(OnBodies):
             return (-(factor * way[1]), factor * way[0], zero)[: mechanism.dimensions]
         if self.kind == "attract":
             factor = -factor
-        return tuple(factor * part for part in way)
+        return scale(factor, way)
 
     def _sideways(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
         call, zero, one = mechanism.call, mechanism.number(0.0), mechanism.number(1.0)
-        ahead = tuple(-part for part in self._way(mechanism, body, at))
+        ahead = negative(self._way(mechanism, body, at))
         v = mechanism.velocity(body, at)
         distance, speed = length(mechanism, ahead), length(mechanism, v)
         gap = distance - self._value(mechanism, self.radius)
@@ -156,12 +157,12 @@ class ForceField(OnBodies):
             factor = call("select", -left, -factor, factor)
             return (factor * v[1], -(factor * v[0]))
         n = self._turn(mechanism, v, ahead, (distance * speed) * (distance * speed))
-        return tuple(factor * part for part in _cross(v, n))
+        return scale(factor, cross(v, n))
 
     def _turn(self, mechanism: Mechanism, v: Vector, ahead: Vector, scale: Scalar) -> Vector:
         """The axis of the turn away, in space: a unit vector."""
         call, zero, one = mechanism.call, mechanism.number(0.0), mechanism.number(1.0)
-        about = _cross(v, ahead)
+        about = cross(v, ahead)
         beside = dot(about, about) - mechanism.number(HEAD_ON) * scale
         upright = (zero, zero, one)
         axis = tuple(call("select", beside, a, b) for a, b in zip(about, upright, strict=True))
@@ -177,11 +178,3 @@ def _raised(mechanism: Mechanism, square: Scalar, power: float) -> Scalar:
     for _ in range(int(power) // 2):
         result = result * square
     return result * mechanism.call("sqrt", square) if int(power) % 2 else result
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )

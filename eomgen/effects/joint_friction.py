@@ -6,7 +6,7 @@ from typing import Literal, Self
 from pydantic import Field
 
 from eomgen.effects.base import JointLoad, Mechanism, Vector
-from eomgen.effects.bodies import length
+from eomgen.effects.vectors import add, length, negative, scale
 from eomgen.effects.ways import OnJoints
 from eomgen.errors import SceneError
 from eomgen.language.formula import ZERO
@@ -55,11 +55,10 @@ class JointFriction(OnJoints):
         """Equal and opposite on the joint's two bodies; the world takes its own."""
         viscous = mechanism.value(self.viscous)
         for way in self.ways(mechanism):
-            against = [viscous * rate for rate in way.rates]
+            against = scale(viscous, way.rates)
             if self.speed is not None:
-                parts = self._dry(mechanism, way.rates)
-                against = [a + b for a, b in zip(against, parts, strict=True)]
-            yield from way.loads([-part for part in against])
+                against = add(against, self._dry(mechanism, way.rates))
+            yield from way.loads(negative(against))
 
     def _dry(self, mechanism: Mechanism, rates: Vector) -> Vector:
         """C tanh(|v|/speed) v/|v|."""
@@ -69,4 +68,4 @@ class JointFriction(OnJoints):
             return (coulomb * mechanism.call("tanh", rates[0] / speed),)
         size = length(mechanism, rates)
         factor = coulomb * mechanism.call("tanh", size / speed) / size
-        return tuple(factor * rate for rate in rates)
+        return scale(factor, rates)

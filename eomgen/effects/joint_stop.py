@@ -6,6 +6,7 @@ from typing import Literal, Self
 from pydantic import Field
 
 from eomgen.effects.base import Contact, JointLoad, Mechanism, Scalar
+from eomgen.effects.vectors import negative
 from eomgen.effects.ways import OnJoints, Way
 from eomgen.errors import SceneError
 from eomgen.language.formula import ZERO, Formula
@@ -88,7 +89,7 @@ class JointStop(OnJoints):
         if self.restitution is not None:
             return
         for way in self.ways(mechanism):
-            yield from way.loads([-part for part in way.along(self._back(mechanism, way))])
+            yield from way.loads(negative(way.along(self._back(mechanism, way))))
 
     def _back(self, mechanism: Mechanism, way: Way) -> Scalar:
         """k x + c dq/dt, as far as it pushes back."""

@@ -8,13 +8,11 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from eomgen.effects.base import EffectTable, Load, Mechanism, Scalar
 from eomgen.effects.base import Vector as Components
+from eomgen.effects.vectors import NEAREST, dot, negative, sub
 from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Quantity, Vector, quantity
-
-NEAREST = 1e-9
-"""Distance, m, within which the line between two points has no sure direction: see `Spring`."""
 
 
 class Spring(EffectTable):
@@ -25,7 +23,7 @@ class Spring(EffectTable):
     s <= 0, and damping never makes it push. Potential energy is ½ k s²; a law has none, what it
     gives and takes is power.
 
-    Points nearer than ε = `NEAREST` have no sure line between them. There |d| counts as ε and the
+    Points nearer than ε = 1e-9 m have no sure line between them. There |d| counts as ε and the
     force falls with d to nothing, T(ε) d/ε; damping becomes that of the whole relative velocity,
     c ((u·ḋ) u + (1 - u·u) ḋ) with u = d/ε. Everything is continuous and finite, the energy that
     of the force; without rest length the spring is k d anywhere.
@@ -83,7 +81,7 @@ class Spring(EffectTable):
         line = _line(self, mechanism)
         pull = self._pull(mechanism, line)
         yield Load(self.body_1, pull, line.at_1, "applied")
-        yield Load(self.body_2, tuple(-part for part in pull), line.at_2, "applied")
+        yield Load(self.body_2, negative(pull), line.at_2, "applied")
 
     def _pull(self, mechanism: Mechanism, line: "_Line") -> tuple[Scalar, ...]:
         """The force on point 1, world axes."""
@@ -141,37 +139,26 @@ class _Line:
     @property
     def rate(self) -> Scalar:
         """ds/dt, m/s; it falls to 0 where points meet."""
-        return _dot(self.d, self.d_dot) / self.length
+        return dot(self.d, self.d_dot) / self.length
 
     def resisted(self, one: Scalar) -> Components:
         """What damping acts against, m/s: (u·ḋ) u + (1 - u·u) ḋ, whose last term is 0 but for
         points that meet.
         """
-        along, across = _dot(self.d, self.d_dot) / self.larger, one - self.square / self.larger
+        along, across = dot(self.d, self.d_dot) / self.larger, one - self.square / self.larger
         return tuple(along * x + across * y for x, y in zip(self.d, self.d_dot, strict=True))
 
 
 def _line(spring: Spring, mechanism: Mechanism) -> _Line:
     at_1 = tuple(mechanism.value(part) for part in spring.at_1)
     at_2 = tuple(mechanism.value(part) for part in spring.at_2)
-    d = _less(mechanism.place(spring.body_2, at_2), mechanism.place(spring.body_1, at_1))
-    d_dot = _less(mechanism.velocity(spring.body_2, at_2), mechanism.velocity(spring.body_1, at_1))
-    square = _dot(d, d)
+    d = sub(mechanism.place(spring.body_2, at_2), mechanism.place(spring.body_1, at_1))
+    d_dot = sub(mechanism.velocity(spring.body_2, at_2), mechanism.velocity(spring.body_1, at_1))
+    square = dot(d, d)
     larger = mechanism.call("max", square, mechanism.number(NEAREST**2))
     length = mechanism.call("sqrt", larger)
     stretch = length - mechanism.value(spring.rest_length)
     return _Line(at_1, at_2, d, d_dot, square, larger, length, stretch)
-
-
-def _less(a: Components, b: Components) -> Components:
-    return tuple(x - y for x, y in zip(a, b, strict=True))
-
-
-def _dot(a: Components, b: Components) -> Scalar:
-    first, *others = (x * y for x, y in zip(a, b, strict=True))
-    for other in others:
-        first = first + other
-    return first
 
 
 def check_law(table: EffectTable, law: Formula | None, place: str) -> None:

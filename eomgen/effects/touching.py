@@ -4,8 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from eomgen.effects.base import Load, Mechanism, Scalar, Vector
-from eomgen.effects.bodies import dot
-from eomgen.effects.spring import NEAREST
+from eomgen.effects.vectors import NEAREST, add, cross, dot, negative, scale, sub
 from eomgen.joints.base import WORLD
 
 
@@ -70,7 +69,7 @@ def on_plane(
     normal = mechanism.outward(plane.body, plane.normal)
     centre = mechanism.place(ball.body, ball.at)
     if plane.body != WORLD:
-        centre = _less(centre, mechanism.place(plane.body, plane.at))
+        centre = sub(centre, mechanism.place(plane.body, plane.at))
     height = dot(normal, centre) - (plane.offset + ball.radius)
     arms: list[Vector] = [()]
     lifts = [mechanism.number(0.0)]
@@ -81,7 +80,7 @@ def on_plane(
     for arm, lift in zip(arms, lifts, strict=True):
         sides = [Side(ball.body, ball.at, arm, -ball.radius)]
         if plane.body != WORLD:
-            from_plane = _more(centre, arm) if arm else centre
+            from_plane = add(centre, arm) if arm else centre
             sides.append(Side(plane.body, plane.at, from_plane, -ball.radius))
         yield Touch(normal, height + lift, tuple(sides))
 
@@ -93,7 +92,7 @@ def on_ball(mechanism: Mechanism, first: Ball, second: Ball) -> Touch:
     overlap, so that they change no angular momentum. Centres within ε = `NEAREST` of each other
     have no sure normal: there n is d/ε, d the way from the second to the first, and 0 at last.
     """
-    d = _less(mechanism.place(first.body, first.at), mechanism.place(second.body, second.at))
+    d = sub(mechanism.place(first.body, first.at), mechanism.place(second.body, second.at))
     square = dot(d, d)
     larger = mechanism.call("max", square, mechanism.number(NEAREST**2))
     length = mechanism.call("sqrt", larger)
@@ -116,7 +115,7 @@ def sliding(mechanism: Mechanism, touch: Touch) -> tuple[Scalar, Vector]:
     speeds = [_speed(mechanism, s, lever) for s, lever in zip(touch.sides, levers, strict=True)]
     u = _between(speeds)
     apart = dot(touch.normal, u)
-    return apart, tuple(x - apart * n for x, n in zip(u, touch.normal, strict=True))
+    return apart, sub(u, scale(apart, touch.normal))
 
 
 def acting(touch: Touch, force: Vector) -> tuple[Load, ...]:
@@ -126,8 +125,7 @@ def acting(touch: Touch, force: Vector) -> tuple[Load, ...]:
 
 def pressing(touch: Touch, force: Scalar) -> tuple[Load, ...]:
     """The same of a force along the normal, which no reach along it turns."""
-    push = tuple(force * n for n in touch.normal)
-    return _on_both(touch, push, [side.arm for side in touch.sides])
+    return _on_both(touch, scale(force, touch.normal), [side.arm for side in touch.sides])
 
 
 def tangents(mechanism: Mechanism, touch: Touch) -> tuple[Vector, ...]:
@@ -155,8 +153,8 @@ def merged(loads: Sequence[Load]) -> Iterator[Load]:
         if (other := found.get(key)) is not None:
             torque = load.torque or other.torque
             if load.torque and other.torque:
-                torque = _more(other.torque, load.torque)
-            load = Load(load.body, _more(other.force, load.force), load.at, load.kind, torque)
+                torque = add(other.torque, load.torque)
+            load = Load(load.body, add(other.force, load.force), load.at, load.kind, torque)
         found[key] = load
     yield from found.values()
 
@@ -164,9 +162,9 @@ def merged(loads: Sequence[Load]) -> Iterator[Load]:
 def _on_both(touch: Touch, force: Vector, levers: Sequence[Vector]) -> tuple[Load, ...]:
     loads = []
     for side, lever in zip(touch.sides, levers, strict=True):
-        torque = _moment(lever, force) if lever else ()
+        torque = cross(lever, force) if lever else ()
         loads.append(Load(side.body, force, side.at, "applied", torque))
-        force = tuple(-part for part in force)
+        force = negative(force)
     return tuple(loads)
 
 
@@ -174,8 +172,8 @@ def _lever(touch: Touch, side: Side) -> Vector:
     """From the side's own point to P, world axes."""
     if side.reach is None:
         return side.arm
-    reach = tuple(side.reach * n for n in touch.normal)
-    return _more(side.arm, reach) if side.arm else reach
+    reach = scale(side.reach, touch.normal)
+    return add(side.arm, reach) if side.arm else reach
 
 
 def _speed(mechanism: Mechanism, side: Side, lever: Vector) -> Vector:
@@ -187,12 +185,12 @@ def _speed(mechanism: Mechanism, side: Side, lever: Vector) -> Vector:
     if len(lever) == 2:
         x, y = lever
         return (speed[0] - w[0] * y, speed[1] + w[0] * x)
-    return _more(speed, _cross(w, lever))
+    return add(speed, cross(w, lever))
 
 
 def _between(speeds: Sequence[Vector]) -> Vector:
     """The first, against the second if there is one."""
-    return _less(*speeds) if len(speeds) == 2 else speeds[0]
+    return sub(*speeds) if len(speeds) == 2 else speeds[0]
 
 
 def _edge(mechanism: Mechanism, body: str, size: Scalar, axis: int) -> Vector:
@@ -205,29 +203,7 @@ def _edge(mechanism: Mechanism, body: str, size: Scalar, axis: int) -> Vector:
 def _signed_sums(parts: Sequence[Vector]) -> list[Vector]:
     """±a ±b …, every choice of signs, those of the first changing fastest."""
     first, *others = parts
-    sums = [tuple(-x for x in first), tuple(first)]
+    sums = [negative(first), first]
     for other in others:
-        sums = [_less(x, other) for x in sums] + [_more(x, other) for x in sums]
+        sums = [sub(x, other) for x in sums] + [add(x, other) for x in sums]
     return sums
-
-
-def _moment(lever: Vector, force: Vector) -> Vector:
-    if len(lever) == 2:
-        return (lever[0] * force[1] - lever[1] * force[0],)
-    return _cross(lever, force)
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
-
-
-def _more(a: Vector, b: Vector) -> Vector:
-    return tuple(x + y for x, y in zip(a, b, strict=True))
-
-
-def _less(a: Vector, b: Vector) -> Vector:
-    return tuple(x - y for x, y in zip(a, b, strict=True))

@@ -7,7 +7,8 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from eomgen.effects.base import EffectTable, JointLoad, Mechanism, Scalar, Vector
-from eomgen.effects.bodies import dot, length, wrong
+from eomgen.effects.bodies import wrong
+from eomgen.effects.vectors import dot, length, scale
 from eomgen.errors import SceneError, nearest
 from eomgen.language.base import Identifier
 
@@ -42,7 +43,7 @@ class Way:
         """A force in its direction."""
         if len(self.rates) == 1:
             return (force,)
-        return tuple(force * part for part in self.direction)
+        return scale(force, self.direction)
 
 
 def way(mechanism: Mechanism, joint: str, kind: str, place: int) -> Way:
@@ -57,7 +58,7 @@ def way(mechanism: Mechanism, joint: str, kind: str, place: int) -> Way:
     half = mechanism.call("atan2", sine, mechanism.call("abs", w))
     per_sine = mechanism.number(1.0) / sine
     per_sine = mechanism.call("select", -w, -per_sine, per_sine)
-    direction = tuple(part * per_sine for part in vector)
+    direction = scale(per_sine, vector)
     return Way(joint, place, half + half, direction, rates)
 
 

@@ -87,6 +87,11 @@ def of_joint(text: str, slides: bool) -> str:
     return sliding if slides and sliding else turning
 
 
+def of_any_joint(text: str) -> str:
+    """Such a text where no joint is at hand: "N m or N"."""
+    return text.replace(" | ", " or ")
+
+
 def about_slides(table: Table, sliding: Collection[str]) -> bool | None:
     """Whether a table is about what slides: its coordinate, or its joint, or all its joints; None
     if it is about no joint.

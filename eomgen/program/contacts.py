@@ -7,16 +7,16 @@ from eomgen.derivation.recursive.dynamics import Dynamics
 from eomgen.derivation.recursive.impulses import generalised, pressed, rough, scaled, struck
 from eomgen.effects.base import Contact, JointLoad
 from eomgen.program.differentiate import tangent
-from eomgen.program.system import Made, Touch
+from eomgen.program.system import ContactLabel, Made
 from eomgen.program.tape import Node, Stage, Tape, total
 
 Forward = Callable[[Sequence[Node] | None], list[Node]]
 """v̇ under the effects and, if given, forces beside them, one a velocity."""
 
 
-def touches(d: Dynamics) -> tuple[Touch, ...]:
+def contact_labels(d: Dynamics) -> tuple[ContactLabel, ...]:
     """The contacts by name, effect and unit of the gap."""
-    return tuple(Touch(c.name, c.effect, _unit(d, c)) for c in d.contacts)
+    return tuple(ContactLabel(c.name, c.effect, _unit(d, c)) for c in d.contacts)
 
 
 def _unit(d: Dynamics, contact: Contact) -> str:

@@ -11,7 +11,7 @@ from eomgen.derivation.recursive.sensitivity import sensitivity
 from eomgen.derivation.recursive.vectors import Vec, sub, zeros
 from eomgen.derivation.states import velocity_states
 from eomgen.model import Model, is_zero
-from eomgen.program.contacts import Forward, contact_outputs, touches
+from eomgen.program.contacts import Forward, contact_labels, contact_outputs
 from eomgen.program.differentiate import jacobian, substituted, tangent
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
@@ -123,7 +123,7 @@ def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
         checks(record),
         extra,
         frozenset(tangents),
-        touches(record.dynamics),
+        contact_labels(record.dynamics),
     )
 
 

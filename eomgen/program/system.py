@@ -17,8 +17,8 @@ Made = dict[str, tuple[tuple[int, ...], list[Node]]]
 
 
 @dataclass(frozen=True)
-class Touch:
-    """A rigid contact that a module tells of; `unit` is that of its gap."""
+class ContactLabel:
+    """What a module tells of a rigid contact; `unit` is that of its gap."""
 
     name: str
     effect: str
@@ -42,7 +42,7 @@ class System:
     extra: Mapping[str, tuple[str, ...]]
     tangents: frozenset[str]
     reports: tuple[PassReport, ...]
-    contacts: tuple[Touch, ...] = ()
+    contacts: tuple[ContactLabel, ...] = ()
 
 
 def make_system(
@@ -54,7 +54,7 @@ def make_system(
     checks: Sequence[Check],
     extra: Mapping[str, tuple[str, ...]],
     tangents: frozenset[str],
-    contacts: tuple[Touch, ...] = (),
+    contacts: tuple[ContactLabel, ...] = (),
 ) -> System:
     """Finish a tape's program and run the passes over it."""
     outputs = {

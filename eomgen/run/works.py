@@ -2,11 +2,14 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance
 from eomgen.run.problem import Contacts, Floats, Problem
+
+if TYPE_CHECKING:  # it loads SciPy, which a module that is generated alone does not need
+    from eomgen.run.integrators.interface import Advance
 
 NODES = 5
 """Gauss–Legendre nodes on each step: exact for powers that are polynomials of degree 9."""
@@ -74,7 +77,7 @@ class Account:
         self._drives = [self.names.index(effect) for effect in contacts.drives] if contacts else []
         self._last: tuple[Problem, Floats, Floats] | None = None
 
-    def book(self, t: float, y: Floats, advance: Advance) -> list[Floats]:
+    def book(self, t: float, y: Floats, advance: "Advance") -> list[Floats]:
         """Take up the step or strike from state `y` at `t`; return the works at its samples."""
         if advance.struck is not None:
             energy = self._powers.kinetic_energy
@@ -100,7 +103,7 @@ class Account:
         self._largest = max(self._largest, float(np.abs(self.total).max(initial=0.0)))
         return works
 
-    def _at(self, t: float, y: Floats, advance: Advance) -> Floats:
+    def _at(self, t: float, y: Floats, advance: "Advance") -> Floats:
         """All powers at one time, (m,)."""
         powers = np.zeros(len(self.names))
         powers[: len(self._powers.names)] = self._powers.powers(t, y)
@@ -111,7 +114,7 @@ class Account:
             powers[self._drives] = found[count:]
         return powers
 
-    def _cubic(self, t: float, y: Floats, advance: Advance) -> Callable[[float], Floats]:
+    def _cubic(self, t: float, y: Floats, advance: "Advance") -> Callable[[float], Floats]:
         """Hermite's cubic through both ends of a step, with the slopes there."""
         problem, length = advance.problem, advance.t - t
         if self._last is not None and self._last[0] is problem and self._last[1] is y:

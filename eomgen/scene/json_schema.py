@@ -2,6 +2,7 @@
 
 import json
 
+from eomgen.language.quantity import of_any_joint
 from eomgen.scene.schema import Scene
 
 
@@ -18,7 +19,7 @@ def _without_internals(node: object) -> None:
     if isinstance(node, dict):
         if isinstance(node.get("unit"), str):  # a mark of ours, not a property of that name
             words = f"{node.get('description', '')} ({node.pop('unit')})"
-            node["description"] = words.replace(" | ", " or ")  # see `language.quantity.of_joint`
+            node["description"] = of_any_joint(words)
         for internal, kind in (("bound", str), ("sees", list)):
             if isinstance(node.get(internal), kind):
                 del node[internal]

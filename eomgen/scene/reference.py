@@ -12,6 +12,7 @@ from eomgen.errors import SceneError, nearest
 from eomgen.joints import Joint
 from eomgen.language.base import Table
 from eomgen.language.formula import CONSTANTS, FUNCTIONS, ZERO, Constant, Formula
+from eomgen.language.quantity import of_any_joint
 
 HEAD = """\
 # Scenes: joints and effects
@@ -85,7 +86,7 @@ def _row(key: str, field: FieldInfo) -> tuple[str, str, str, str]:
             "*motion*" if word == "motion" else f"`{word}`" for word in seen
         )
     unit = re.sub(r"\*\*", "^", str(extra.get("unit", "")))
-    return f"`{field.alias or key}`", unit, _default(field), about
+    return f"`{field.alias or key}`", of_any_joint(unit), _default(field), of_any_joint(about)
 
 
 def _words(annotation: Any) -> list[str]:

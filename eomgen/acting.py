@@ -1,0 +1,118 @@
+"""From what a scene says of effects to effects that act: what they name is there and fits them."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+from eomgen.effects import Driven, Effect, Gravity
+from eomgen.effects.base import ExtraState, Input
+from eomgen.errors import SceneError
+from eomgen.joints import Prismatic, Revolute
+from eomgen.joints.base import WORLD
+from eomgen.language.formula import ZERO, Floats, evaluate
+from eomgen.language.quantity import Parameter, about_slides, of_joint, with_components
+from eomgen.model import Body, ways_of
+from eomgen.naming import check_known, check_names, named
+from eomgen.prescribed import check_drive
+from eomgen.scene.schema import Scene
+
+Given = TypeVar("Given", Input, ExtraState)
+
+
+def sliding_in(bodies: Sequence[Body], dimensions: int) -> set[str]:
+    """Joints and coordinates that slide."""
+    found = {body.joint.name for body in bodies if isinstance(body.joint, Prismatic)}
+    for body in bodies:
+        pairs = zip(body.positions, body.joint.moves(dimensions), strict=False)
+        found |= {c.name for c, move in pairs if move.kind == "slide"}
+    return found
+
+
+def at_joint(given: Given, effect: Effect, sliding: Collection[str]) -> Given:
+    """An input or state of an effect, in the unit and words for its joint if it has one."""
+    here = about_slides(effect, sliding)
+    if here is None:
+        return given
+    unit, about = (of_joint(text, here) for text in (given.unit, given.about))
+    return replace(given, unit=unit, about=about)
+
+
+def acting_effects(
+    scene: Scene,
+    bodies: Sequence[Body],
+    sliding: Collection[str],
+    known: dict[str, float],
+    parameters: list[Parameter],
+    motion: Sequence[str],
+) -> list[Effect]:
+    """Effects with bodies, points and joints that there are, and vectors of the right length.
+
+    `sliding` are the joints and coordinates that slide; `known` holds the values of the scene's
+    own parameters, `motion` names what changes as it moves; `parameters` grows by those of bare
+    numbers. Raises `SceneError`, naming the place, for an effect that cannot act.
+    """
+    check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
+    ways = ways_of(bodies, scene.dimensions)
+    names_of_ways = {b.joint.name: [c.name for c in b.positions] for b in bodies}
+    there = _there(scene, bodies, ways)
+    effects: list[Effect] = []
+    for i, effect in enumerate(scene.effects):
+        place = f"effects[{i}]"
+        if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
+            raise SceneError(f"{place}.type: a second 'gravity'; give one")
+        for fields, (what, names) in there.items():
+            for name, spot in _names_in(effect, getattr(effect, fields), place):
+                check_known(name, spot, names, what)
+        effect.check_ways(ways, names_of_ways, place)
+        vectors = {
+            field: with_components(value, ZERO, scene.dimensions, f"{place}.{field}")
+            for field in effect.vector_fields
+            if isinstance(value := getattr(effect, field), tuple)
+        }
+        effect = effect.replaced(**vectors).checked(scene.dimensions, place)
+        if isinstance(effect, Driven):
+            check_drive(effect, place, bodies, effects, known, motion)
+        effects.append(named(effect, effect.name, place, known, parameters, motion, sliding))
+        effect.check_values(lambda formula: float(evaluate(formula, known, Floats())), place)
+    return effects
+
+
+def check_contacts(effects: Sequence[Effect], bodies: Sequence[str]) -> None:
+    """Raise `SceneError` if a name would stand for two contacts."""
+    taken: dict[str, str] = {}
+    for effect in effects:
+        for name in effect.contact_names(bodies):
+            if name in taken:
+                raise SceneError(
+                    f"'{name}' would be the name of a contact of '{taken[name]}' and of one of "
+                    f"'{effect.name}'; rename one of them"
+                )
+            taken[name] = effect.name
+
+
+def _there(
+    scene: Scene, bodies: Sequence[Body], ways: Mapping[str, object]
+) -> dict[str, tuple[str, Collection[str]]]:
+    """Of each kind of `EffectTable.…_fields`: what its fields name, and all that there are."""
+    own = [b.joint.name for b in bodies if isinstance(b.joint, Revolute | Prismatic)]
+    names = [body.name for body in bodies]
+    return {
+        "body_fields": ("body", dict.fromkeys(names)),
+        "anchor_fields": ("body", dict.fromkeys([WORLD, *names])),
+        "point_fields": ("point", dict.fromkeys(point.name for point in scene.points)),
+        "joint_fields": ("revolute or prismatic joint", dict.fromkeys(own)),
+        "way_fields": ("joint that moves", ways),
+    }
+
+
+def _names_in(effect: Effect, fields: Sequence[str], place: str) -> Iterator[tuple[str, str]]:
+    """Each name in some fields, of which some list names or hold tables by them, and its place."""
+    for field in fields:
+        value = getattr(effect, field)
+        if isinstance(value, str):
+            if (field, value) not in (("bodies", "all"), ("joints", "all")):
+                yield value, f"{place}.{field}"
+        elif isinstance(value, dict):
+            yield from ((name, f"{place}.{field}.{name}") for name in value)
+        elif value is not None:
+            yield from ((name, f"{place}.{field}[{i}]") for i, name in enumerate(value))
