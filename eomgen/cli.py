@@ -136,6 +136,7 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
     parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
     parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
+    parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument("--works", action="store_true", help="book the work of each effect")

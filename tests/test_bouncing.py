@@ -234,3 +234,30 @@ def test_two_bodies_bounce_until_they_lie_still() -> None:
     assert np.max(np.abs(gaps[-1])) < 1e-8
     assert np.max(np.abs(run.y[-1, 5:])) < 0.05  # friction is smoothed: it never quite sticks
     assert {e.contact for e in run.events if e.kind == "rest"} == set(made.module.CONTACTS)
+
+
+@pytest.mark.parametrize("integrator", ["DOP853", "RK45", "Radau", "BDF", "LSODA"])
+def test_no_step_leaps_over_what_is_short(integrator: str) -> None:
+    """A stiff ball between two far walls, and then a pulse of a force: steps would like to be long.
+
+    The walls give back its speed, and the pulse, 100 N for 20 ms on 1 kg, adds 2 m/s.
+    """
+    wall = '[[effects]]\ntype = "contact"\nlaw = "hunt_crossley"\nbody = "b"\nstiffness = 1e8\n'
+    made = engine(
+        'name = "court"\noutputs = "all"\n'
+        'bodies = [{ name = "b", mass = 1.0, inertia_com = 0 }]\n'
+        'joints = [{ name = "p", type = "prismatic", parent = "world", child = "b", '
+        "axis = [1, 0] }]\n"
+        "initial = { v = { p_slide_dot = 1.0 } }\n"
+        f'{wall}name = "right"\nnormal = [-1, 0]\noffset = -1\n'
+        f'{wall}name = "left"\nnormal = [1, 0]\noffset = -1\n'
+        '[[effects]]\ntype = "external_force"\nname = "kick"\nbody = "b"\n'
+        'force = ["100*step(t - 5.2)*step(5.22 - t)", 0]\n'
+    )
+    run = ran(made, 4.9, integrator)
+    found = run.y[:, 1]
+    assert np.count_nonzero(np.diff(np.sign(found))) == 2  # at 1 and 3 s
+    assert abs(found[-1] - 1.0) < 1e-4
+    run = ran(made, 5.5, integrator)
+    assert abs(run.y[-1, 1] - 1.0) < 1e-2  # -1 at the wall, and 2 by the pulse
+    assert run.counts["steps"] >= 200

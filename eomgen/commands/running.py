@@ -63,6 +63,7 @@ def simulate(given: Arguments) -> int:
             rtol=_or(given.rtol, wanted.rtol),
             atol=_or(given.atol, wanted.atol),
             samples=given.samples,
+            max_step=given.max_step,
             progress=progress,
             rest_speed=wanted.rest_speed,
             powers=as_powers(module, *values) if given.works else None,

@@ -100,7 +100,7 @@ class BodyContact(OnBodies):
         "m", "radius of the ball", "nonnegative", default=ZERO, validate_default=False
     )
     stiffness: Quantity = quantity(
-        "N/m or N/m^1.5", "stiffness", "nonnegative", default=ZERO, validate_default=False
+        "N/m or N/m^1.5", "stiffness, which soft laws need", "nonnegative", default=ZERO, validate_default=False
     )
     damping: Quantity = quantity(
         "N s/m", "damping", "nonnegative", default=ZERO, validate_default=False

@@ -26,6 +26,8 @@ from eomgen.run.works import Account, Powers
 SMALLEST_RTOL = 2.3e-14
 """SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
 ADAPTIVE_SAMPLES = 1001
+LEAST_STEPS = 200
+"""Of an adaptive method on a derivative with corners."""
 MOST_SAMPLES = 1_000_000
 REST_SPEED = 1e-3
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -43,6 +45,7 @@ def integrate(
     atol: float = 1e-12,
     samples: int | None = None,
     progress: Progress | None = None,
+    max_step: float | None = None,
     max_steps: int = 10_000_000,
     rest_speed: float = REST_SPEED,
     powers: Powers | None = None,
@@ -56,6 +59,9 @@ def integrate(
                 this many (default: all), for adaptive methods this many equally spaced times
                 (default: 1001); the first and the last are always kept
     progress    told the fraction done, at most about ten times a second
+    max_step    longest step in s of the adaptive methods; without it, they may go as far as their
+                error allows, but where the derivative has corners no more than 1/200 of the run:
+                else they might leap over a contact or a pulse
     rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
                 that then neither part nor close are held, so that bouncing comes to an end
     powers      asks for the works of effects
@@ -83,6 +89,8 @@ def integrate(
         jacobian=jacobians.of(problem.jacobian),
     )
     if isinstance(method, FixedStep):
+        if max_step is not None:
+            raise RunError(f"max_step: {integrator} takes equal steps; give --dt instead")
         dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
 
         def begin(piece: Problem, t: float, made: int) -> Iterator[Advance]:
@@ -92,6 +100,7 @@ def integrate(
     else:
         _check_no_step(integrator, dt)
         times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
+        longest = _longest(max_step, t_end - t_start, problem.corners)
 
         def begin(piece: Problem, t: float, made: int) -> Iterator[Advance]:
             return adaptive.advances(
@@ -101,6 +110,7 @@ def integrate(
                 t_end,
                 rtol=rtol,
                 atol=atol,
+                max_step=longest,
                 times=times,
                 made=made,
                 max_steps=max_steps,
@@ -271,6 +281,15 @@ def _place(problem: Problem, run: _Run) -> str:
 
 def _ignore(fraction: float) -> None:
     """Take no notice of progress."""
+
+
+def _longest(max_step: float | None, span: float, corners: bool) -> float:
+    """The longest step of an adaptive method, s."""
+    if max_step is None:
+        return span / LEAST_STEPS if corners else math.inf
+    if not (math.isfinite(max_step) and max_step > 0):
+        raise RunError(f"max_step: {max_step:g} is not a positive step; give e.g. --max-step 0.01")
+    return max_step
 
 
 def _check_times(t_start: float, t_end: float) -> None:

@@ -13,6 +13,9 @@ from eomgen.run.explain import explain_by
 from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.works import Powers
 
+CORNERS = ("abs", "max", "min", "select", "step")
+"""Functions that have a corner or a jump."""
+
 
 class GeneratedModule(Protocol):
     """The contract of a generated module, as far as running and showing need it."""
@@ -129,6 +132,7 @@ def as_problem(
         quaternions=module.QUATERNIONS,
         contacts=_contacts(module, parameters, inputs),
         explain=explain,
+        corners=any(kind in module.COST["derivative"] for kind in CORNERS),
     )
 
 

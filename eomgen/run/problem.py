@@ -58,6 +58,8 @@ class Problem:
     quaternions indices of the four components of each unit quaternion among the states
     contacts    what must not pass through each other; None where nothing can touch
     explain     see `Explain`
+    corners     whether the derivative has corners or jumps, as one-sided forces have: a long step
+                might leap over what begins and ends within it
 
     Raises `RunError` if `initial` has not one finite number per state, or if a quaternion has no
     length there.
@@ -72,6 +74,7 @@ class Problem:
     quaternions: tuple[tuple[int, int, int, int], ...] = ()
     contacts: Contacts | None = None
     explain: Explain = lambda _t, _y, _initial: ""
+    corners: bool = False
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

@@ -26,6 +26,7 @@ def advances(
     *,
     rtol: float,
     atol: float,
+    max_step: float,
     times: Floats,
     made: int,
     max_steps: int,
@@ -38,12 +39,12 @@ def advances(
     before, which `max_steps` counts, too.
     Raises `StepFailure` if the method gives up, or after `max_steps`.
     """
-    jacobian = {"jac": problem.jacobian} if method.uses_jacobian else {}
+    options: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": max_step}
+    if method.uses_jacobian:
+        options["jac"] = problem.jacobian
     # A copy: LSODA's compiled code works on state arrays in place.
     start = problem.initial.copy()
-    solver = method.solver(
-        problem.derivative, t_start, start, t_end, rtol=rtol, atol=atol, **jacobian
-    )
+    solver = method.solver(problem.derivative, t_start, start, t_end, **options)
     sampled, stalled = int(np.searchsorted(times, t_start, side="right")), 0
     left = max_steps - made
     for here in range(left):
