@@ -100,7 +100,11 @@ class BodyContact(OnBodies):
         "m", "radius of the ball", "nonnegative", default=ZERO, validate_default=False
     )
     stiffness: Quantity = quantity(
-        "N/m or N/m^1.5", "stiffness, which soft laws need", "nonnegative", default=ZERO, validate_default=False
+        "N/m or N/m^1.5",
+        "stiffness, which the soft laws need",
+        "nonnegative",
+        default=ZERO,
+        validate_default=False,
     )
     damping: Quantity = quantity(
         "N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
@@ -109,7 +113,10 @@ class BodyContact(OnBodies):
         "s/m", "dissipation a", "nonnegative", default=ZERO, validate_default=False
     )
     restitution: Quantity = quantity(
-        "", "coefficient of restitution, 0 to 1", default=ZERO, validate_default=False
+        "",
+        "coefficient of restitution, 0 to 1, which law 'impact' needs",
+        default=ZERO,
+        validate_default=False,
     )
     friction: Quantity = quantity(
         "", "coefficient of friction", "nonnegative", default=ZERO, validate_default=False

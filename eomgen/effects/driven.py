@@ -15,7 +15,8 @@ class Driven(EffectTable):
     Rate and acceleration are the formula's exact derivatives; where it has a corner (step, select,
     abs, min, max) those of the pieces, so that a jump gives no impulse. What the drive takes for it
     is the output `driving_forces`: a torque (N m) at a hinge, a force (N) at a slide, on the child
-    along the coordinate and back on the parent. It is a constraint rather than a load, and so the
+    along the coordinate and back on the parent, but for the forces of rigid contacts, which only a
+    run knows. It is a constraint rather than a load, and so the
     derivation itself carries it out.
     """
 

@@ -26,7 +26,7 @@ from eomgen.run.works import Account, Powers
 SMALLEST_RTOL = 2.3e-14
 """SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
 ADAPTIVE_SAMPLES = 1001
-LEAST_STEPS = 200
+LEAST_STEPS = 1000
 """Of an adaptive method on a derivative with corners."""
 MOST_SAMPLES = 1_000_000
 REST_SPEED = 1e-3
@@ -60,7 +60,7 @@ def integrate(
                 (default: 1001); the first and the last are always kept
     progress    told the fraction done, at most about ten times a second
     max_step    longest step in s of the adaptive methods; without it, they may go as far as their
-                error allows, but where the derivative has corners no more than 1/200 of the run:
+                error allows, but where the derivative has corners no more than 1/1000 of the run:
                 else they might leap over a contact or a pulse
     rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
                 that then neither part nor close are held, so that bouncing comes to an end

@@ -13,9 +13,10 @@ from eomgen.joints import Joint
 from eomgen.language.base import Table
 from eomgen.language.formula import CONSTANTS, FUNCTIONS, ZERO, Constant, Formula
 from eomgen.language.quantity import of_any_joint
+from eomgen.scene.schema import BodyTable, ChainTable, Initial, PointTable, Scene, Simulation
 
 HEAD = """\
-# Scenes: joints and effects
+# Scenes: their tables, joints and effects
 
 What `eomgen reference` prints. Each key is named with its unit and its default; keys without a
 default may be left out. A quantity is a number, which becomes a parameter of the generated module,
@@ -24,6 +25,16 @@ or a formula in quotes: `+ - * /`, `**` with a whole number, brackets, compariso
 and {constants}. Formulas may name parameters, and where a key says so more: *motion* is the time
 `t` and all coordinates, velocities, inputs and states of effects; other words are told there.
 """
+
+TABLES: Mapping[str, type[Table]] = {
+    "the scene itself": Scene,
+    "bodies": BodyTable,
+    "chains": ChainTable,
+    "points": PointTable,
+    "initial": Initial,
+    "simulation": Simulation,
+}
+"""What is neither a joint nor an effect."""
 
 
 def reference(kind: str | None = None) -> str:
@@ -40,7 +51,9 @@ def reference(kind: str | None = None) -> str:
         return "\n".join(_told(kind, known[kind]))
     functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
     constants = ", ".join(f"`{name}`" for name in CONSTANTS)
-    lines = [HEAD.format(functions=functions, constants=constants)]
+    lines = [HEAD.format(functions=functions, constants=constants), "## Tables", ""]
+    for title, table in TABLES.items():
+        lines += _told(title, table, "### ")
     for title, tables in groups.items():
         lines += [f"## {title}", ""]
         for name, table in tables.items():
@@ -66,7 +79,7 @@ def _told(name: str, table: type[Table], heading: str = "# ") -> Iterator[str]:
     yield "| key | unit | default | what it is |"
     yield "|---|---|---|---|"
     for key, field in table.model_fields.items():
-        if key not in ("type", "name"):
+        if key != "type":
             yield "| " + " | ".join(_row(key, field)) + " |"
     yield ""
 
@@ -74,7 +87,8 @@ def _told(name: str, table: type[Table], heading: str = "# ") -> Iterator[str]:
 def _row(key: str, field: FieldInfo) -> tuple[str, str, str, str]:
     marks = field.json_schema_extra
     extra: Mapping[str, Any] = marks if isinstance(marks, Mapping) else {}
-    about = re.sub(r"(<\w+>\w*)", r"`\1`", field.description or "")
+    told = "its own name" if key == "name" else field.description or ""
+    about = re.sub(r"(<\w+>\w*)", r"`\1`", told)
     words = _words(field.annotation)
     if words:
         about += (": " if about else "") + ", ".join(f"`{word}`" for word in words)
@@ -101,7 +115,7 @@ def _default(field: FieldInfo) -> str:
     value = field.default
     if field.is_required():
         return "needed"
-    if value is None or value in ((), {}):
+    if value is None or value in ((), {}, "") or isinstance(value, Table):
         return ""
     if isinstance(value, bool):
         return str(value).lower()

@@ -98,33 +98,33 @@ class BodyTable(Table):
     name: Identifier
     mass: Quantity = quantity("kg", "mass", "nonnegative")
     inertia_com: Inertia = inertia()
-    shapes: tuple[Shape, ...] = ()
+    shapes: tuple[Shape, ...] = Field(default=(), description="what it looks like")
 
 
 class ChainTable(Table):
-    """A chain of equal links in one line: bodies <name>_1, …, on pins <name>_joint_1, …
+    """A chain of equal links in one line: bodies `<name>_1`, …, on pins `<name>_joint_1`, …
 
     `r_parent` is the pin on the link before, `r_child` that on the link itself, each from the
     link's centre of mass; `start` is the first pin on `parent`.
     """
 
     name: Identifier
-    count: Annotated[int, Strict(), Field(ge=1, le=MOST)]
-    parent: Identifier = "world"
+    count: Annotated[int, Strict(), Field(ge=1, le=MOST, description="number of links")]
+    parent: Identifier = Field(default="world", description="what the first link hangs on")
     mass: Quantity = quantity("kg", "mass", "nonnegative")
     inertia_com: Inertia = inertia()
     start: Vector = quantity("m", "first pin on the parent", default=(), validate_default=False)
     r_parent: Vector = quantity("m", "pin on the link before")
     r_child: Vector = quantity("m", "pin on the link itself")
-    axis: Numbers | None = None
-    shapes: tuple[Shape, ...] = ()
+    axis: Numbers | None = Field(default=None, description="of the pins, in space; z if absent")
+    shapes: tuple[Shape, ...] = Field(default=(), description="what each link looks like")
 
 
 class PointTable(Table):
     """A named point of a body."""
 
     name: Identifier
-    body: Identifier
+    body: Identifier = Field(description="body it is fixed to")
     at: Vector = quantity("m", "point from the centre of mass", default=(), validate_default=False)
 
 
@@ -134,8 +134,12 @@ class Initial(Table):
     In a table what is not named is 0, and an angle may be given in degrees as `<name>_deg`.
     """
 
-    q: tuple[Number, ...] | dict[str, Number] = Field(default={}, union_mode="left_to_right")
-    v: tuple[Number, ...] | dict[str, Number] = Field(default={}, union_mode="left_to_right")
+    q: tuple[Number, ...] | dict[str, Number] = Field(
+        default={}, union_mode="left_to_right", description="coordinates"
+    )
+    v: tuple[Number, ...] | dict[str, Number] = Field(
+        default={}, union_mode="left_to_right", description="velocities"
+    )
 
 
 class Simulation(Table):
@@ -144,34 +148,46 @@ class Simulation(Table):
     Rigid contacts that close more slowly than `rest_speed`, in m/s or rad/s, do not bounce.
     """
 
-    t_end: Positive = 10.0
-    integrator: Integrator = "DOP853"
-    dt: Positive = 0.001
-    rtol: Positive = 1e-9
-    atol: Positive = 1e-12
-    rest_speed: Positive = 1e-3
+    t_end: Positive = Field(default=10.0, description="end, s")
+    integrator: Integrator = Field(default="DOP853", description="method")
+    dt: Positive = Field(default=0.001, description="step of a fixed-step method, s")
+    rtol: Positive = Field(default=1e-9, description="relative tolerance of an adaptive method")
+    atol: Positive = Field(default=1e-12, description="absolute tolerance of an adaptive method")
+    rest_speed: Positive = Field(default=1e-3, description="slower than this nothing bounces")
 
 
 class Scene(Table):
     """A whole scene."""
 
     name: ModuleName
-    title: Text = ""
-    outputs: Literal["all"] | tuple[Output, ...] = Field(default=(), union_mode="left_to_right")
-    form: Form = "velocity"
+    title: Text = Field(default="", description="a line for people")
+    outputs: Literal["all"] | tuple[Output, ...] = Field(
+        default=(), union_mode="left_to_right", description="what the module computes"
+    )
+    form: Form = Field(default="velocity", description="what the state is made of")
     parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
-        Field(default={})
+        Field(default={}, description="named numbers, or tables of value, unit and about")
     )
     definitions: Annotated[dict[Identifier, Quantity], Field(max_length=MOST)] = Field(
         default={}, description="names for formulas of parameters, the motion and one another"
     )
-    dimensions: Literal[2, 3] = 2
-    route: Route = "auto"
-    bodies: Annotated[tuple[BodyTable, ...], Field(max_length=MOST)] = ()
-    joints: Annotated[tuple[Joint, ...], Field(max_length=MOST)] = ()
-    chains: Annotated[tuple[ChainTable, ...], Field(max_length=MOST)] = ()
-    points: Annotated[tuple[PointTable, ...], Field(max_length=MOST)] = ()
-    effects: Annotated[tuple[Effect, ...], Field(max_length=MOST)] = ()
+    dimensions: Literal[2, 3] = Field(default=2, description="2 in the plane, 3 in space")
+    route: Route = Field(default="auto", description="way to the equations")
+    bodies: Annotated[tuple[BodyTable, ...], Field(max_length=MOST)] = Field(
+        default=(), description="bodies"
+    )
+    joints: Annotated[tuple[Joint, ...], Field(max_length=MOST)] = Field(
+        default=(), description="joints, one for each body"
+    )
+    chains: Annotated[tuple[ChainTable, ...], Field(max_length=MOST)] = Field(
+        default=(), description="whole chains in a line each"
+    )
+    points: Annotated[tuple[PointTable, ...], Field(max_length=MOST)] = Field(
+        default=(), description="named points of bodies"
+    )
+    effects: Annotated[tuple[Effect, ...], Field(max_length=MOST)] = Field(
+        default=(), description="what acts"
+    )
     locked: Annotated[dict[Identifier, Number], Field(max_length=MOST)] = Field(
         default={}, description="coordinates held fast, by name (<name>_deg for an angle)"
     )
@@ -179,6 +195,6 @@ class Scene(Table):
         default=(),
         description="what the equations are to be without: velocity_forces, for slow motion",
     )
-    initial: Initial = Initial()
-    simulation: Simulation = Simulation()
-    camera: Camera = Camera()
+    initial: Initial = Field(default=Initial(), description="state at the start")
+    simulation: Simulation = Field(default=Simulation(), description="how to run it")
+    camera: Camera = Field(default=Camera(), description="how to look at it")
