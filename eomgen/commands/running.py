@@ -37,9 +37,7 @@ def simulate(given: Arguments) -> int:
     from eomgen.run.integrate import integrate
     from eomgen.run.integrators import FixedStep, find_integrator
     from eomgen.run.trajectory import save_csv, save_npz
-    from eomgen.show.figure import save_figure
     from eomgen.show.observe import observe
-    from eomgen.show.page import save_page
 
     model, name = read_model(given.scene, given)
     asked = (*model.outputs, *SHOWN, *(("effect_powers",) if given.works else ()))
@@ -73,27 +71,14 @@ def simulate(given: Arguments) -> int:
     write_whole(paths["py"], code.module, force=given.force)
     save_npz(trajectory, paths["npz"], force=given.force)
     save_csv(trajectory, paths["csv"], force=given.force)
-    try:
-        save_figure(motion, paths["png"], force=given.force)
-        save_page(
-            motion, code.poses, tuple(model.defaults.values()), paths["html"], force=given.force
-        )
-    except RunError as error:
-        # Pictures of an earlier run must not stand beside the numbers of this one.
-        for kind in ("png", "html"):
-            remove_ours(paths.pop(kind))
-        drawing = str(error)
-    else:
-        drawing = ""
-
-    energy = motion.kinetic_energy + motion.potential_energy
+    parameter_values = tuple(model.defaults.values())
+    drawing = _save_pictures(motion, code.poses, parameter_values, paths, given.force)
     print(
         f"{model.name}: {trajectory.t[-1]:g} s by {integrator}, "
         f"{trajectory.counts['steps']} steps, {trajectory.counts['derivatives']} derivatives "
         f"({'derived now' if code.derived else 'module fresh, not derived again'})"
     )
-    print(f"    energy {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the end")
-    _print_works(motion, float(motion.kinetic_energy[-1] - motion.kinetic_energy[0]))
+    _print_energy(motion)
     _print_events(trajectory)
     if motion.joints:
         print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
@@ -108,11 +93,37 @@ def simulate(given: Arguments) -> int:
     return 0
 
 
-def _print_works(motion: "Motion", change: float) -> None:
-    """Say what each effect has done, and what of the kinetic energy's `change` that leaves, J."""
+def _save_pictures(
+    motion: "Motion",
+    poses: str,
+    parameters: tuple[float, ...],
+    paths: dict[str, Path],
+    force: bool,
+) -> str:
+    """Write figure and page; return "" or, if they cannot be drawn, why not."""
+    from eomgen.show.figure import save_figure
+    from eomgen.show.page import save_page
+
+    try:
+        save_figure(motion, paths["png"], force=force)
+        save_page(motion, poses, parameters, paths["html"], force=force)
+    except RunError as error:
+        # Pictures of an earlier run must not stand beside the numbers of this one.
+        for kind in ("png", "html"):
+            remove_ours(paths.pop(kind))
+        return str(error)
+    return ""
+
+
+def _print_energy(motion: "Motion") -> None:
+    """Say the energy at both ends; if it is known, what each effect has done, and what of the
+    change of kinetic energy that leaves, J.
+    """
+    kinetic, total = motion.kinetic_energy, motion.kinetic_energy + motion.potential_energy
+    print(f"    energy {total[0]:.9g} J at the start, {total[-1]:.9g} J at the end")
     if motion.works is None:
         return
-    works = motion.works[-1]
+    works, change = motion.works[-1], float(kinetic[-1] - kinetic[0])
     each = [f"{name} {work:.6g} J" for name, work in zip(motion.effects, works, strict=True)]
     print_listed("    work: ", shortened(each))
     left = change - works.sum()

@@ -8,7 +8,7 @@ from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.reactions import reactions
 from eomgen.derivation.recursive.sensitivity import sensitivity
-from eomgen.derivation.recursive.vectors import Vec, sub, zeros
+from eomgen.derivation.recursive.vectors import Vec, in_space, sub, zeros
 from eomgen.derivation.states import velocity_states
 from eomgen.model import Model, is_zero
 from eomgen.program.contacts import Forward, contact_labels, contact_outputs
@@ -217,8 +217,7 @@ def _points(record: Recording, name: str) -> tuple[tuple[int, ...], list[Node]]:
     dims, nv = model.dimensions, len(record.v)
     nodes: list[Node] = []
     for point in model.points:
-        x, y, *z = (d.value(part) for part in point.at)
-        at = (x, y, z[0] if z else scalars.number(0.0))
+        at = in_space([d.value(part) for part in point.at], scalars)
         if name == "point_positions":
             nodes += d.position(point.body, at)[:dims]
         elif name == "point_velocities":

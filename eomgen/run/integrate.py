@@ -33,6 +33,9 @@ REST_SPEED = 1e-3
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Where in a long step the gaps of contacts are looked at; in an equal step at its ends."""
 
+Begin = Callable[[Problem, float, int], Iterator[Advance]]
+"""Steps of a problem from a time on; with how many were made before."""
+
 
 def integrate(
     problem: Problem,
@@ -74,13 +77,21 @@ def integrate(
     t_start, t_end = float(t_start), float(t_end)
     _check_times(t_start, t_end)
     _check_tolerances(rtol, atol)
-    if samples is not None and samples < 2:
-        raise RunError(f"samples: {samples} is too few; give at least 2, the first and the last")
-    if samples is not None and samples > MOST_SAMPLES:
-        raise RunError(f"samples: {samples} is too many; give at most {MOST_SAMPLES}")
-
+    _check_samples(samples)
     if not (math.isfinite(rest_speed) and rest_speed > 0):
         raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
+
+    begin: Begin
+    if isinstance(method, FixedStep):
+        if max_step is not None:
+            raise RunError(f"max_step: {integrator} takes equal steps; give --dt instead")
+        dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
+        begin = _equal_steps(method, t_start, t_end, dt, every)
+    else:
+        _check_no_step(integrator, dt)
+        times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
+        longest = _longest(max_step, t_end - t_start, problem.corners)
+        begin = _adaptive_steps(method, t_end, (rtol, atol, longest), times, max_steps)
 
     derivatives, jacobians = _Count(), _Count()
     counted = replace(
@@ -88,34 +99,6 @@ def integrate(
         derivative=derivatives.of(problem.derivative),
         jacobian=jacobians.of(problem.jacobian),
     )
-    if isinstance(method, FixedStep):
-        if max_step is not None:
-            raise RunError(f"max_step: {integrator} takes equal steps; give --dt instead")
-        dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
-
-        def begin(piece: Problem, t: float, made: int) -> Iterator[Advance]:
-            return fixed_step.advances(
-                method, piece, t, t_start=t_start, t_end=t_end, dt=dt, every=every
-            )
-    else:
-        _check_no_step(integrator, dt)
-        times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
-        longest = _longest(max_step, t_end - t_start, problem.corners)
-
-        def begin(piece: Problem, t: float, made: int) -> Iterator[Advance]:
-            return adaptive.advances(
-                method,
-                piece,
-                t,
-                t_end,
-                rtol=rtol,
-                atol=atol,
-                max_step=longest,
-                times=times,
-                made=made,
-                max_steps=max_steps,
-            )
-
     if problem.contacts is None:
         advances = begin(counted, t_start, 0)
     else:
@@ -150,6 +133,46 @@ def integrate(
         works=np.array(run.works) if account and account.names else None,
         work_names=account.names if account else (),
     )
+
+
+def _equal_steps(method: FixedStep, t_start: float, t_end: float, dt: float, every: int) -> Begin:
+    """Steps of `dt` from `t_start`, wherever they are begun; every how-manieth has a row."""
+
+    def begin(problem: Problem, t: float, made: int) -> Iterator[Advance]:
+        return fixed_step.advances(
+            method, problem, t, t_start=t_start, t_end=t_end, dt=dt, every=every
+        )
+
+    return begin
+
+
+def _adaptive_steps(
+    method: Adaptive,
+    t_end: float,
+    bounds: tuple[float, float, float],
+    times: Floats,
+    max_steps: int,
+) -> Begin:
+    """Steps that a method chooses itself within rtol, atol and a longest step, s, with rows at
+    `times`.
+    """
+    rtol, atol, longest = bounds
+
+    def begin(problem: Problem, t: float, made: int) -> Iterator[Advance]:
+        return adaptive.advances(
+            method,
+            problem,
+            t,
+            t_end,
+            rtol=rtol,
+            atol=atol,
+            max_step=longest,
+            times=times,
+            made=made,
+            max_steps=max_steps,
+        )
+
+    return begin
 
 
 @dataclass
@@ -306,6 +329,13 @@ def _check_tolerances(rtol: float, atol: float) -> None:
             raise RunError(f"{name}: {tolerance:g} is not a positive number")
     if rtol < SMALLEST_RTOL:
         raise RunError(f"rtol: {rtol:g} is too small; the smallest allowed is {SMALLEST_RTOL:g}")
+
+
+def _check_samples(samples: int | None) -> None:
+    if samples is not None and samples < 2:
+        raise RunError(f"samples: {samples} is too few; give at least 2, the first and the last")
+    if samples is not None and samples > MOST_SAMPLES:
+        raise RunError(f"samples: {samples} is too many; give at most {MOST_SAMPLES}")
 
 
 def _check_no_step(integrator: str, dt: float | None) -> None:

@@ -32,7 +32,7 @@ from eomgen.derivation.recursive.motion import (
     velocities,
 )
 from eomgen.derivation.recursive.moving import Moving, Values
-from eomgen.derivation.recursive.vectors import Scalar, sub, zeros
+from eomgen.derivation.recursive.vectors import Scalar, sub, turning_in_space, zeros
 from eomgen.effects import Driven, Effect, Gravity
 from eomgen.effects.base import Contact, JointLoad, Load
 from eomgen.joints import Free
@@ -98,14 +98,9 @@ class Dynamics(Moving):
         return tuple(points), tuple(joints)
 
     def _point_force(self, load: Load) -> fc.PointForce:
-        zero = self.scalars.number(0.0)
-        torque = zeros(self.scalars)
-        if load.torque:
-            torque = (zero, zero, load.torque[0])
-            if len(load.torque) == 3:
-                torque = (load.torque[0], load.torque[1], load.torque[2])
-        body, at, force = self.index[load.body], self._three(load.at), self._three(load.force)
-        return fc.PointForce(body, at, force, torque)
+        at, force = self._in_space(load.at), self._in_space(load.force)
+        torque = turning_in_space(load.torque, self.scalars)
+        return fc.PointForce(self.index[load.body], at, force, torque)
 
     @cached_property
     def wrenches(self) -> tuple[fc.Force, ...]:

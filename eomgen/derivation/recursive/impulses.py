@@ -22,7 +22,16 @@ from eomgen.derivation.recursive.articulated import respond
 from eomgen.derivation.recursive.composite import solved
 from eomgen.derivation.recursive.dynamics import Dynamics
 from eomgen.derivation.recursive.observe import arm
-from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, add, cross, zeros
+from eomgen.derivation.recursive.vectors import (
+    Scalar,
+    Scalars,
+    Vec,
+    add,
+    cross,
+    in_space,
+    turning_in_space,
+    zeros,
+)
 from eomgen.effects.base import Contact, JointLoad, Load, Vector
 from eomgen.joints.base import WORLD
 
@@ -65,13 +74,13 @@ def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Force]:
     points: dict[tuple[str, Vector], tuple[Vec, Vec]] = {}
     for load in loads:
         force, torque = points.get((load.body, load.at), (nothing, nothing))
-        more = _turning(load.torque, d.scalars)
-        points[load.body, load.at] = add(force, _three(load.force, d.scalars)), add(torque, more)
+        more = turning_in_space(load.torque, d.scalars)
+        points[load.body, load.at] = add(force, in_space(load.force, d.scalars)), add(torque, more)
     sums: dict[int, fc.Force] = {}
     for (body, at), (force, torque) in points.items():
         frame = -1 if body == WORLD else d.linkage.mounts[d.index[body]].frame
         if frame >= 0:
-            own = _three(at, d.scalars)
+            own = in_space(at, d.scalars)
             reach = arm(d.linkage, d.instant, d.index[body], own, d.scalars)
             wrench = fc.Force(add(torque, cross(reach, force)), force)
             sums[frame] = fc.total(sums[frame], wrench) if frame in sums else wrench
@@ -80,17 +89,6 @@ def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Force]:
         turned = (d.instant.from_world(frame, part) for part in (f.moment, f.force))
         wrenches[frame] = fc.Force(*turned)
     return wrenches
-
-
-def _three(vector: Vector, scalars: Scalars) -> Vec:
-    x, y, *z = vector
-    return (x, y, z[0] if z else scalars.number(0.0))
-
-
-def _turning(torque: Vector, scalars: Scalars) -> Vec:
-    if len(torque) == 1:
-        return (scalars.number(0.0), scalars.number(0.0), torque[0])
-    return _three(torque, scalars) if torque else zeros(scalars)
 
 
 def rough(d: Dynamics, contact: Contact) -> tuple[tuple[Load, ...], ...]:

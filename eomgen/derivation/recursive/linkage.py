@@ -32,6 +32,7 @@ from eomgen.derivation.recursive.vectors import (
     add,
     congruent,
     constant,
+    in_space,
     no_matrix,
     plus,
     scale,
@@ -72,8 +73,7 @@ def _drafted(
         return evaluate(formula, parameters, scalars)
 
     def vector(parts: tuple[Formula, ...]) -> Vec:
-        x, y, *z = (value(part) for part in parts)
-        return (x, y, z[0] if z else scalars.number(0.0))
+        return in_space([value(part) for part in parts], scalars)
 
     drafts: list[Frame] = []
     mounts: list[Mount] = []

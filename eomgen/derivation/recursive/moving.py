@@ -15,7 +15,7 @@ from eomgen.derivation.recursive.observe import (
     position,
     velocity,
 )
-from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, times, zeros
+from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, in_space, times, zeros
 from eomgen.effects import Gravity
 from eomgen.effects.base import Vector
 from eomgen.joints.base import WORLD
@@ -74,7 +74,9 @@ class Moving:
 
     def place(self, body: str, at: Vector) -> Vector:
         """World place of a point of a body, m."""
-        return self._cut(at if body == WORLD else self.position(self.index[body], self._three(at)))
+        return self._cut(
+            at if body == WORLD else self.position(self.index[body], self._in_space(at))
+        )
 
     def point(self, name: str) -> tuple[str, Vector]:
         """A named point: its body, and where on it, m."""
@@ -85,7 +87,7 @@ class Moving:
         """World velocity of a point of a body, m/s."""
         if body == WORLD:
             return self._cut(zeros(self.scalars))
-        return self._cut(self.point_velocity(self.index[body], self._three(at))[0])
+        return self._cut(self.point_velocity(self.index[body], self._in_space(at))[0])
 
     def turning(self, body: str) -> Vector:
         """Angular velocity of a body, world axes, rad/s."""
@@ -101,7 +103,7 @@ class Moving:
             return vector
         turned = times(
             orientation(self.linkage, self.instant, self.index[body], self.scalars),
-            self._three(vector),
+            self._in_space(vector),
         )
         return self._cut(turned)
 
@@ -185,9 +187,8 @@ class Moving:
         """All velocities, in the same order."""
         return [*self.values.v, *(v for _, v, _ in self.given)]
 
-    def _three(self, vector: Vector) -> Vec:
-        x, y, *z = vector
-        return (x, y, z[0] if z else self.scalars.number(0.0))
+    def _in_space(self, vector: Vector) -> Vec:
+        return in_space(vector, self.scalars)
 
     def _cut(self, vector: Vector) -> Vector:
         return tuple(vector[: self.dimensions])

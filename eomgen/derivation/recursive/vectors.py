@@ -128,6 +128,19 @@ def named(a: Vec, name: str, scalars: Scalars) -> Vec:
     return (x, y, z)
 
 
+def in_space(vector: Sequence[Scalar], scalars: Scalars) -> Vec:
+    """A vector of two components or three, z = 0 in the plane."""
+    x, y, *z = vector
+    return (x, y, z[0] if z else scalars.number(0.0))
+
+
+def turning_in_space(torque: Sequence[Scalar], scalars: Scalars) -> Vec:
+    """A torque of one component, about z, of three, or of none."""
+    if len(torque) == 1:
+        return (scalars.number(0.0), scalars.number(0.0), torque[0])
+    return in_space(torque, scalars) if torque else zeros(scalars)
+
+
 def zeros(scalars: Scalars) -> Vec:
     """The zero vector."""
     zero = scalars.number(0.0)
