@@ -21,7 +21,7 @@ Parameters p, with the scene's values:
     l_B = 0.5                 m       joint to the centre of mass of B
     g = 9.81                  m/s^2   gravitational acceleration
     ground_radius = 0.08      m       radius of ground
-    ground_restitution = 0.8          coefficient of restitution, 0 to 1 of ground
+    ground_restitution = 0.8          coefficient of restitution, 0 to 1, which law 'impact' needs of ground
     ground_friction = 0.5             coefficient of friction of ground
     ground_slip_speed = 0.01  m/s     speed within which friction is smoothed of ground
 

@@ -84,7 +84,7 @@ Parameters p, with the scene's values:
     kd = 2.0                     N m s/rad       gain on its rate
     strong = 33.5                N m             the most that a motor gives
     ground_radius = 0.018        m               radius of ground
-    ground_stiffness = 600000.0  N/m or N/m^1.5  stiffness of ground
+    ground_stiffness = 600000.0  N/m or N/m^1.5  stiffness, which the soft laws need of ground
     ground_dissipation = 2.0     s/m             dissipation a of ground
     ground_friction = 0.8                        coefficient of friction of ground
     ground_slip_speed = 0.02     m/s             speed within which friction is smoothed of ground
