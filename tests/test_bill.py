@@ -344,3 +344,13 @@ def test_command_of_a_scene_without_effects(
     scene.write_text(WHEEL[: WHEEL.index("effects")], "utf-8")
     assert main(["effects", str(scene), "-o", str(tmp_path)]) == 0
     assert "the mechanism itself" in capsys.readouterr().out
+
+
+def test_rigid_contacts_are_told_beside_the_derivative() -> None:
+    """What is computed when they strike or hold is no part of it; without contacts nothing is."""
+    floor = '[[effects]]\ntype = "contact"\nname = "floor"\nlaw = "impact"\nbody = "a"\n'
+    found = costed(STONE + floor + "radius = 0.1\nrestitution = 0.5\n", motion=0.0)
+    assert set(found.at_contacts) == {"gaps", "gap_rates", "impact", "held"}
+    assert min(found.at_contacts.values()) >= 1
+    assert found.operations == costed(STONE, motion=0.0).operations
+    assert not costed(STONE, motion=0.0).at_contacts

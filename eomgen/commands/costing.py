@@ -106,6 +106,9 @@ def _rest(bill: "Bill", item: "Item") -> str:
 
 
 def _print_routes(bill: "Bill") -> None:
+    if bill.at_contacts:
+        counts = ", ".join(f"{name} {count}" for name, count in bill.at_contacts.items())
+        print(f"    rigid contacts beside it, operations each when asked for: {counts}")
     print("    route     operations        µs")
     for route in bill.routes:
         count = "-" if route.operations is None else str(route.operations)

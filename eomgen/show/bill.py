@@ -66,4 +66,6 @@ def _bars(
     bars = axes.barh(range(len(labels)), lengths, color=colours, tick_label=labels)
     axes.bar_label(bars, [f" {text}" for text in texts], fontsize=8.5)
     axes.margins(x=0.2)
+    if not any(lengths):
+        axes.set_xlim(0, 1)
     axes.grid(axis="y", visible=False)

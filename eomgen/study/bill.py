@@ -4,7 +4,7 @@ Operations are those of `derivative`, counted in modules that hold it and the bo
 """
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
@@ -29,6 +29,7 @@ CHUNK = 5e-4
 LEAST_ROUNDS = 7
 MOTION = 10.0
 """Most wall time of all motions together, s, unless told."""
+AT_CONTACTS = ("gaps", "gap_rates", "impact", "held")
 MOST_FACTORING = 20_000
 """Operations of factoring alone beyond which `ldl` is not tried."""
 
@@ -70,7 +71,8 @@ class Bill:
     """The whole and its items; `bare` is the mechanism without any effect.
 
     `route` and `bare_route` are those of their equations. `extent` is that of the scene's motion,
-    m, or None if no motion was asked for.
+    m, or None if no motion was asked for. `at_contacts` are the operations of what rigid contacts
+    bring besides `derivative`, by name: they are no part of it.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Bill:
     routes: tuple[RouteCost, ...]
     t_end: float
     extent: float | None
+    at_contacts: Mapping[str, int]
 
     @property
     def shared(self) -> tuple[int, float]:
@@ -134,6 +137,7 @@ def bill(
     progress(0.5)
     timed = _timed(made)
     whole, without = _there(timed[0]), _there(timed[1])
+    cost = whole.module.COST
     changed, other_routes = timed[2 : 2 + len(parts)], timed[2 + len(parts) :]
     size: float | None = None
     changes: list[Change | None] = [None] * len(parts)
@@ -155,6 +159,7 @@ def bill(
         ),
         t_end=whole.model.simulation.t_end,
         extent=size,
+        at_contacts={name: cost[name]["total"] for name in AT_CONTACTS if name in cost},
     )
 
 
