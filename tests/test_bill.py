@@ -351,6 +351,6 @@ def test_rigid_contacts_are_told_beside_the_derivative() -> None:
     floor = '[[effects]]\ntype = "contact"\nname = "floor"\nlaw = "impact"\nbody = "a"\n'
     found = costed(STONE + floor + "radius = 0.1\nrestitution = 0.5\n", motion=0.0)
     assert set(found.at_contacts) == {"gaps", "gap_rates", "impact", "held"}
-    assert min(found.at_contacts.values()) >= 1
+    assert found.at_contacts["impact"] > 0 and found.at_contacts["held"] > 0
     assert found.operations == costed(STONE, motion=0.0).operations
     assert not costed(STONE, motion=0.0).at_contacts
