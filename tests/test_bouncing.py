@@ -236,7 +236,7 @@ def test_two_bodies_bounce_until_they_lie_still() -> None:
     assert {e.contact for e in run.events if e.kind == "rest"} == set(made.module.CONTACTS)
 
 
-@pytest.mark.parametrize("integrator", ["DOP853", "RK45", "Radau", "BDF", "LSODA"])
+@pytest.mark.parametrize("integrator", ["DOP853", "LSODA"])
 def test_no_step_leaps_over_what_is_short(integrator: str) -> None:
     """A stiff ball between two far walls, and then a pulse of a force: steps would like to be long.
 

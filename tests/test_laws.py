@@ -31,7 +31,6 @@ from eomgen.scene.reader import built_in_names, parse_scene
 
 FIGURES = ("human_figure", "hanging_figure", "quadruped")
 LARGE = (*FIGURES, "ragdoll", "walker_motors", "chain", "chain_in_wind", "puma560")
-SMALL = tuple(name for name in built_in_names() if name not in LARGE)
 TREES = {  # of up to 5 bodies; together they have everything
     "plane_60": (60, 2),
     "plane_379": (379, 2),
@@ -42,7 +41,6 @@ TREES = {  # of up to 5 bodies; together they have everything
     "space_377": (377, 3),
 }
 CASES = [(name, "") for name in built_in_names()]
-CASES += [(name, ("aba", "ldl")[i % 2]) for i, name in enumerate(SMALL)]
 CASES += [(name, ("aba", "ldl")[i % 2]) for i, name in enumerate(TREES)]
 CASES += [("puma560", "ldl")]
 EXACT = 1e-13
