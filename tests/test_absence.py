@@ -11,6 +11,7 @@ from typing import Any, get_args
 
 import pytest
 from bookkeeping import ENERGIES, compiled_light, light
+from campaign import FULL
 from effect_cases import BASES, CASES, Case
 from engine import Engine
 
@@ -39,6 +40,8 @@ def test_absence_is_free(case: Case) -> None:
     scene, made, bare = parse_scene(case.text()), light(case.text()), without(case.base)
     never = removed(scene, scene.effects).replaced(outputs=ENERGIES)
     assert build_model(never) == bare.model
+    if FULL:  # the bytes follow from that
+        assert compiled_light(removed(scene, scene.effects)).source == bare.source
     (variant,) = without_effects(scene)
     assert variant.model == replace(bare.model, outputs=("body_poses",))
     kind = scene.effects[0].type

@@ -10,6 +10,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from campaign import some
 from mechanisms import BUILT_IN, Compiled, compiled, random_tree
 
 from eomgen.program.program import interpret
@@ -104,7 +105,7 @@ def test_mass_matrix(c: Compiled) -> None:
     eq = c.equations
     names = (*eq.symbols.parameters.values(), *eq.symbols.q)
     matrix = sp.lambdify(names, eq.symmetric.M.tolist(), "math")
-    for y, u in samples(c):
+    for y, u in samples(c, some(5, 20)):
         q, v = halves(y)
         M = c.module.mass_matrix(0.0, y, u=u)
         assert np.array_equal(M, M.T)

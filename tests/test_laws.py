@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bookkeeping import growth
+from campaign import some
 from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
@@ -42,6 +43,8 @@ TREES = {  # of up to 5 bodies; together they have everything
 }
 CASES = [(name, "") for name in built_in_names()]
 CASES += [(name, ("aba", "ldl")[i % 2]) for i, name in enumerate(TREES)]
+SMALL = [name for name in built_in_names() if name not in LARGE]
+CASES += some([], [(name, route) for name in SMALL for route in ("aba", "ldl")])
 CASES += [("puma560", "ldl")]
 EXACT = 1e-13
 """For 60 digits: the directions and orientations of a scene are doubles, and so are its sines."""

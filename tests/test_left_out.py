@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import some
 from engine import along, apart, engine, exact
 from spatial_trees import PLANE, SPACE, random_spatial_tree
 from test_show_space import page_parts
@@ -129,7 +130,7 @@ PAIRS = [  # dimensions, the joint, what is locked, the weld in its place
 
 @pytest.mark.parametrize(
     ("dimensions", "joint", "locked", "weld", "route"),
-    [(*pair, ROUTES[i % len(ROUTES)]) for i, pair in enumerate(PAIRS)],
+    [(*pair, r) for i, pair in enumerate(PAIRS) for r in some(ROUTES[i % 2 :][:1], ROUTES)],
 )
 def test_locked_is_welded(dimensions: int, joint: str, locked: str, weld: str, route: str) -> None:
     """The same numbers at the same cost: a locked joint is gone from the equations."""
