@@ -371,3 +371,114 @@ def test_beads_on_a_thread() -> None:
     np.testing.assert_allclose(S, S.T, rtol=0, atol=1e-12 * LAGUERRE_10[-1])
     found = np.sort(np.linalg.eigvals(-A).real)
     np.testing.assert_allclose(found, LAGUERRE_10, rtol=1e-12)
+
+
+# The stiff beam of the CWI/Bari Test Set for IVP Solvers (Hairer and Wanner, Solving ODEs II, section
+# IV.10) at t = 5: RADAU in extended precision, rtol = atol = 1.1e-18, as R's deTestSet ships it
+# (Ex_beam.f, rforge/bvpsolve at 78c711b7). Angles from the x axis, and their rates.
+BEAM_ANGLES = np.array(
+    [
+        -0.005792366591285007,
+        -0.01695298550721735,
+        -0.02769103312973094,
+        -0.03800815655879158,
+        -0.04790616859743763,
+        -0.05738710435274594,
+        -0.06645327313454617,
+        -0.07510730581979037,
+        -0.08335219765414992,
+        -0.09119134654647947,
+        -0.0986285870013209,
+        -0.1056682200378002,
+        -0.1123150395409595,
+        -0.1185743552727245,
+        -0.1244520128755561,
+        -0.1299544113264161,
+        -0.1350885180610398,
+        -0.1398618819194422,
+        -0.1442826441015242,
+        -0.1483595472463012,
+        -0.1521019429001447,
+        -0.1555197978061129,
+        -0.1586236993420229,
+        -0.1614248603702127,
+        -0.1639351238193223,
+        -0.1661669673440852,
+        -0.1681335081778558,
+        -0.1698485080602243,
+        -0.1713263782440888,
+        -0.1725821847462537,
+        -0.1736316537975654,
+        -0.1744911773840049,
+        -0.1751778187863392,
+        -0.1757093178712902,
+        -0.1761040960228576,
+        -0.1763812607175549,
+        -0.1765606097564671,
+        -0.1766626352260565,
+        -0.176708527080746,
+        -0.1767201761075488,
+    ]
+)
+BEAM_RATES = np.array(
+    [
+        0.03747362681329794,
+        0.1099117880217593,
+        0.1798360474312799,
+        0.2472427305442391,
+        0.3121293820596567,
+        0.37449473770195,
+        0.4343386073492798,
+        0.4916620354601748,
+        0.5464677854586807,
+        0.598760970262427,
+        0.648549361111074,
+        0.6958435169132503,
+        0.7406572668520808,
+        0.7830081747813241,
+        0.8229176659201515,
+        0.860411030519056,
+        0.8955175502377805,
+        0.9282708263127953,
+        0.9587089334522034,
+        0.9868747821728363,
+        1.012816579961883,
+        1.036587736679858,
+        1.058246826481355,
+        1.077857811433353,
+        1.095490222005369,
+        1.111219164294898,
+        1.125125269286501,
+        1.137294526609229,
+        1.147818025153607,
+        1.156792132004482,
+        1.164318845130183,
+        1.170505992596124,
+        1.17546742429955,
+        1.179323003228859,
+        1.182198586299667,
+        1.184226111223146,
+        1.185543909805575,
+        1.186297084203716,
+        1.186637618908127,
+        1.186724615113034,
+    ]
+)
+
+
+def test_stiff_beam() -> None:
+    """Forty angles within 1e-9 and their rates within 1e-6: sums of the relative ones here."""
+    module = loaded("stiff_beam")
+    found = integrate(as_problem(module), "Radau", 5.0, rtol=2e-8, atol=2e-9, samples=2)
+    assert found.finished
+    angles, rates = np.cumsum(found.y[-1].reshape(2, 40), axis=1)
+    np.testing.assert_allclose(angles, BEAM_ANGLES, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(rates, BEAM_RATES, rtol=0, atol=1e-6)
+
+
+def test_stiffness_of_the_beam() -> None:
+    """Its fastest frequency is some 6400 rad/s, and nothing but rounding damps it."""
+    module = loaded("stiff_beam")
+    found = np.linalg.eigvals(module.jacobian(0.0, module.initial_state()))
+    assert 6390 < np.max(found.imag) < 6410
+    assert np.max(np.abs(found.real)) < 1e-6
