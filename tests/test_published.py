@@ -373,9 +373,9 @@ def test_beads_on_a_thread() -> None:
     np.testing.assert_allclose(found, LAGUERRE_10, rtol=1e-12)
 
 
-# The stiff beam of the CWI/Bari Test Set for IVP Solvers (Hairer and Wanner, Solving ODEs II, section
-# IV.10) at t = 5: RADAU in extended precision, rtol = atol = 1.1e-18, as R's deTestSet ships it
-# (Ex_beam.f, rforge/bvpsolve at 78c711b7). Angles from the x axis, and their rates.
+# The stiff beam of the CWI/Bari Test Set for IVP Solvers (E. Hairer, G. Wanner, Solving ODEs II,
+# IV.10) at t = 5: RADAU in extended precision, rtol = atol = 1.1e-18, as R's deTestSet
+# ships it: Ex_beam.f, rforge/bvpsolve at 78c711b7. Angles from the x axis, and their rates.
 BEAM_ANGLES = np.array(
     [
         -0.005792366591285007,
