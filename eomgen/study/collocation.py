@@ -11,7 +11,7 @@ corrected, and how far off it is, is in long numbers.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -32,7 +32,7 @@ FORECAST = 1e-10
 ASTRAY = 1e-6
 """A forecast this far off, in parts of the scale, begins anew."""
 MANY = 40
-"""States from which on the Jacobian is interpolated, not computed at every stage."""
+"""States from which on one Jacobian serves all stages of a step."""
 MOST_CORRECTIONS = 12
 SHRINK, GROW, SAFETY = 0.2, 3.0, 0.9
 """Bounds of how the step changes."""
@@ -168,7 +168,6 @@ class Step:
 
     y: Longs
     error: float
-    corrections: int
 
 
 def advance(
@@ -186,61 +185,64 @@ def advance(
 
     Raises `NoStep` if the corrections do not shrink, `ArithmeticError` where f has no value.
     """
-    stages, ny = len(method.c), len(y)
     times = [t + c * h for c in method.c]
     near = y.astype(float)
-    points, weights = _jacobian_points(stages, ny)
-    wanted = float(t) + float(h) * np.concatenate((np.array(times) * 0.0, points)).astype(float)
-    wanted[:stages] = [float(time) for time in times]
-    order = np.argsort(wanted, kind="stable")
-    guessed = np.empty((len(wanted), ny))
-    guessed[order] = forecast(float(t), near, wanted[order])
-
-    jacobians = np.array(
-        [problem.jacobian(wanted[stages + k], guessed[stages + k]) for k in range(len(points))]
-    )
-    jacobians = np.tensordot(weights, jacobians, axes=1)
-    matrix = -float(h) * np.einsum("ij,jab->iajb", method.a_double, jacobians)
-    matrix = matrix.reshape(stages * ny, stages * ny)
-    matrix.flat[:: stages * ny + 1] += 1.0
-    factors = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
-
-    moves = guessed[:stages].astype(object) - y  # long: floats would add up to floats
+    moments = np.array(times, dtype=float)
+    guessed = forecast(float(t), near, moments)
+    correct = _solver(method, problem, float(h), moments, guessed)
+    moves = guessed.astype(object) - y  # long: doubles would add up to doubles
     last = math.inf
-    for correction in range(1, MOST_CORRECTIONS + 1):
-        slopes = np.array(
-            [precise.derivative(times[i], (y + moves[i]).tolist()) for i in range(stages)],
-            dtype=object,
-        )
+    for _ in range(MOST_CORRECTIONS):
+        states = y + moves
+        slopes = np.array(list(map(precise.derivative, times, states.tolist())), dtype=object)
         residual = moves - h * (method.a @ slopes)
-        change = scipy.linalg.lu_solve(
-            factors, -residual.astype(float).ravel(), check_finite=False
-        ).reshape(stages, ny)
+        change = correct(residual.astype(float))
         size = float(np.max(np.abs(change) / scale))
         if not size < math.inf:
             raise NoStep("the corrections are not finite")
-        moves = moves + change.astype(object)
-        if correction > 1:
-            rate = size / last
-            if rate * size <= 0.01 * tolerance:
-                return Step(y + method.d @ moves, _error(method, slopes, h, scale), correction)
-            if rate > 0.5:
-                raise NoStep("the corrections do not shrink")
-        elif size == 0:
-            return Step(y + method.d @ moves, 0.0, correction)
+        moves = moves - change.astype(object)
+        rate = size / last
+        if (size * rate <= 0.01 * tolerance and last < math.inf) or size == 0:
+            return Step(y + method.d @ moves, _error(method, slopes, h, scale))
+        if rate > 0.5:
+            raise NoStep("the corrections do not shrink")
         last = size
     raise NoStep("the corrections shrink too slowly")
 
 
-@cache
-def _jacobian_points(stages: int, ny: int) -> tuple[Floats, Floats]:
-    """Where in a step Jacobians are computed, and (stages, points) how the stages' follow."""
-    nodes = gauss(stages).c.astype(float)
+def _solver(
+    method: Gauss, problem: Problem, h: float, times: Floats, states: Floats
+) -> Callable[[Floats], Floats]:
+    """What solves Δ - h A J Δ = r (stages, ny) for Δ in doubles, well enough to correct with.
+
+    Small systems take the Jacobian of every stage. Large ones take one for all: A's eigenvectors
+    then part the system into one of ny equations for each eigenvalue. Solving ODEs II, IV.8.
+    """
+    stages, ny = states.shape
     if ny < MANY:
-        return nodes, np.eye(stages)
-    points = np.array([0.0, 0.5, 1.0])
-    lagrange = [np.prod([(nodes - q) / (p - q) for q in points if q != p], axis=0) for p in points]
-    return points, np.array(lagrange).T
+        jacobians = np.array([problem.jacobian(t, y) for t, y in zip(times, states, strict=True)])
+        matrix = -h * np.einsum("ij,jab->iajb", method.a_double, jacobians)
+        matrix = matrix.reshape(stages * ny, stages * ny)
+        matrix.flat[:: stages * ny + 1] += 1.0
+        factors = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
+
+        def solve_all(residual: Floats) -> Floats:
+            found = scipy.linalg.lu_solve(factors, residual.ravel(), check_finite=False)
+            return np.asarray(found).reshape(stages, ny)
+
+        return solve_all
+
+    middle = stages // 2
+    jacobian = problem.jacobian(float(times[middle]), states[middle])
+    values, vectors = np.linalg.eig(method.a_double)
+    back = np.linalg.inv(vectors)
+    inverses = np.linalg.inv(np.eye(ny) - h * values[:, None, None] * jacobian)
+
+    def solve_each(residual: Floats) -> Floats:
+        parts = np.matmul(inverses, (back @ residual)[:, :, None])[:, :, 0]
+        return np.asarray((vectors @ parts).real)
+
+    return solve_each
 
 
 def _error(method: Gauss, slopes: Longs, h: Long, scale: Floats) -> float:
@@ -257,7 +259,7 @@ def _error(method: Gauss, slopes: Longs, h: Long, scale: Floats) -> float:
 
 
 def rows(
-    stages: int,
+    ladder: Sequence[int],
     precise: Precise,
     problem: Problem,
     scale: Floats,
@@ -266,22 +268,23 @@ def rows(
 ) -> Iterator[tuple[Longs, int]]:
     """The state at each of `times` (ascending; the first is the start) and the steps made so far.
 
+    ladder     numbers of stages, ascending; a step takes the least that serve
     tolerance  what each step's error is held to, in parts of the scale
 
     Every row ends a step, so that rows are as accurate as the end. Long numbers must be on
     (`digits`) wherever this is resumed. Raises `NoStep` if steps shrink to nothing.
     """
-    method = gauss(stages)
     forecast = Forecast(problem, scale, float(times[-1]))
     t = mpfr(float(times[0]))
     y = np.array(precise.initial, dtype=object)
-    made, length = 0, mpfr(float(times[1] - times[0]))
+    made, stages, length = 0, ladder[-1], mpfr(float(times[1] - times[0]))
     yield y, made
     for end in times[1:]:
         target = mpfr(float(end))
         while t < target:
             count = max(1, math.ceil((target - t) / length * 0.999))
             h = (target - t) / count
+            method = gauss(stages)
             try:
                 step = advance(method, precise, problem, forecast, scale, t, y, h, tolerance)
                 error = step.error
@@ -292,9 +295,20 @@ def rows(
             if error <= tolerance:
                 y, made = step.y, made + 1
                 t = target if count == 1 else t + h
-                length = max(h * factor, length) if count > 1 or factor > 1 else h * factor
+                length = max(h * factor, length) if factor > 1 else h * factor
+                stages = _fewest(ladder, stages, error, tolerance, length > target - t)
             else:
-                length = h * min(factor, SAFETY)
+                length, stages = h * min(factor, SAFETY), ladder[-1]
                 if length < abs(t) * 1e-16 or length < 1e-18:
                     raise NoStep(f"steps shrink to nothing at t = {float(t):.6g}")
         yield y, made
+
+
+def _fewest(ladder: Sequence[int], stages: int, error: float, tolerance: float, spare: bool) -> int:
+    """The stages of the next step, after one of some stages and error: the fewest that would have
+    served by far, where steps could be longer than rows let them; else the most.
+    """
+    if not spare:
+        return ladder[-1]
+    served = (n for n in ladder if error ** (n / stages) <= 0.01 * tolerance)
+    return next(served, ladder[-1])

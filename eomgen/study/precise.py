@@ -8,9 +8,8 @@ computed from them, what depends on parameters alone included, is computed in lo
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from types import FunctionType
-from typing import Any
+from typing import Any, cast
 
 import gmpy2
 from gmpy2 import mpfr
@@ -34,25 +33,24 @@ def digits(bits: int = BITS) -> Any:
 
 FUNCTIONS: dict[str, Callable[..., Long]] = {
     **{name: getattr(gmpy2, name) for name in FORMULA_FUNCTIONS if hasattr(gmpy2, name)},
-    "abs": lambda x: abs(mpfr(x)),
-    "step": lambda x: mpfr(1 if x > 0 else 0),
-    "min": lambda a, b: mpfr(min(a, b)),
-    "max": lambda a, b: mpfr(max(a, b)),
-    "select": lambda c, a, b: mpfr(a if c > 0 else b),
+    "abs": abs,
+    "step": lambda x: mpfr(x > 0),
+    "min": min,
+    "max": max,
+    "select": lambda c, a, b: a if c > 0 else b,
 }
-"""What generated code may call. Each gives a long number, even where it only passes on a constant:
-two floats that met would be rounded to a float."""
+"""What generated code may call."""
 
 
 @dataclass(frozen=True, eq=False)
 class Precise:
     """y' = f(t, y) in long numbers, to be used within `digits()`.
 
-    derivative  f(t, y), a list of ny long numbers; t and y long
-    initial     (ny), the initial state of doubles
+    derivative  f(t, y), ny long numbers; t and y long
+    initial     (ny,), the initial state of doubles
     """
 
-    derivative: Callable[[Long, Sequence[Long]], list[Long]]
+    derivative: Callable[[Long, Sequence[Long]], Sequence[Long]]
     initial: tuple[Long, ...]
 
 
@@ -70,27 +68,37 @@ def precise(
     functions           what the module's functions are to be
     """
     with digits():
-        values = _long(parameters, module.PARAMETERS)
         # The module keeps constants by value, and a long 1 is equal to a double 1: go round that.
-        fixed = _over(module._constants.__wrapped__, functions)(values)["derivative"]
-        constants = tuple(map(mpfr, fixed))
+        constants = _over(module._constants.__wrapped__, functions)(
+            _long(parameters, module.PARAMETERS)
+        )["derivative"]
         u = _long(inputs, module.INPUTS)
-        kernel = module._derivative
-        arguments = inspect.signature(kernel).parameters
-        call = partial(kernel, **{f: functions[f] for f in arguments if f in functions})
-        timed = "t" in arguments
         start = tuple(map(mpfr, initial.tolist()))
+        kernel = _over(module._derivative, functions)
+    names = inspect.signature(kernel).parameters
+    called = {name: functions[name] for name in names if name in functions}
+    timed = "t" in names
 
-    def derivative(t: Long, y: Sequence[Long]) -> list[Long]:
-        slopes = call(y, constants, u, t=t) if timed else call(y, constants, u)
-        return [mpfr(slope) for slope in slopes]
+    def derivative(t: Long, y: Sequence[Long]) -> Sequence[Long]:
+        time = {"t": t} if timed else {}
+        return cast(Sequence[Long], kernel(y, constants, u, **time, **called))
 
     return Precise(derivative, start)
 
 
 def _over(function: Any, functions: Mapping[str, Callable[..., Long]]) -> Any:
-    """A function of a generated module with other functions in the place of `math`'s."""
-    return FunctionType(function.__code__, {**function.__globals__, **functions})
+    """A function of a generated module over long numbers: its steps, with its numbers as long ones
+    and other functions in the place of `math`'s.
+
+    Where numbers remained doubles, two of them that meet would be rounded to a double.
+    """
+    code = function.__code__
+    numbers = tuple(mpfr(c) if isinstance(c, float) else c for c in code.co_consts)
+    return FunctionType(
+        code.replace(co_consts=numbers),
+        {**function.__globals__, **functions},
+        argdefs=function.__defaults__,
+    )
 
 
 def _long(given: Any, defaults: Mapping[str, float]) -> tuple[Long, ...]:
@@ -101,4 +109,4 @@ def _long(given: Any, defaults: Mapping[str, float]) -> tuple[Long, ...]:
         values = [given.get(name, default) for name, default in defaults.items()]
     else:
         values = list(given)
-    return tuple(mpfr(float(value)) for value in values)
+    return tuple(mpfr(value) for value in values)
