@@ -32,7 +32,7 @@ from eomgen.study.precise import BITS, digits, precise
 ROWS = 201
 SECONDS = 120.0
 """How long a reference in long numbers may take, s; the one in doubles comes on top."""
-TIGHT, LOOSE = ((6, 8, 10, 12), 1e-20), ((5, 7, 9, 11), 1e-18)
+TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
 """Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
 FORMAT = "reference 1"
 """Changes whenever a reference would come out otherwise."""
@@ -125,13 +125,13 @@ def _in_long_numbers(
 ) -> tuple[Floats, Floats, str]:
     """The motion (n, ny), the same plus what the looser run is off, and how they were found."""
     scale = measure.scales(module.STATES, module.UNITS, _roughly(problem, times).y)
-    exactly = precise(module, parameters, inputs, problem.initial)
     began = time.monotonic()
 
     def run(
         stages: tuple[int, ...], tolerance: float, before: float, share: float
     ) -> tuple[Longs, int]:
         found = []
+        exactly = precise(module, parameters, inputs, problem.initial, watched=True)
         with digits():
             for y, made in rows(stages, exactly, problem, scale, times, tolerance):
                 found.append(y)
