@@ -30,8 +30,8 @@ from eomgen.study.collocation import Longs, NoStep, rows
 from eomgen.study.precise import BITS, digits, precise
 
 ROWS = 201
-SECONDS = 120.0
-"""How long a reference in long numbers may take, s; the one in doubles comes on top."""
+SECONDS = 180.0
+"""Of processor time that a reference in long numbers may take; one in doubles comes on top."""
 TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
 """Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
 FORMAT = "reference 1"
@@ -81,7 +81,7 @@ def reference(
 
     model     what the module was made of, for messages; or None
     progress  told the fraction done
-    seconds   how long long numbers may take; 0 for doubles at once
+    seconds   of processor time that long numbers may take; 0 for doubles at once
     folder    where references are kept, so that none is computed twice; or None
 
     Raises `RunError` if the module refuses parameters or inputs, if the motion does not get to
@@ -125,7 +125,7 @@ def _in_long_numbers(
 ) -> tuple[Floats, Floats, str]:
     """The motion (n, ny), the same plus what the looser run is off, and how they were found."""
     scale = measure.scales(module.STATES, module.UNITS, _roughly(problem, times).y)
-    began = time.monotonic()
+    began = time.process_time()
 
     def run(
         stages: tuple[int, ...], tolerance: float, before: float, share: float
@@ -138,7 +138,7 @@ def _in_long_numbers(
                 steps = made
                 done = before + share * len(found) / len(times)
                 progress(done)
-                _check_pace(time.monotonic() - began, done, seconds)
+                _check_pace(time.process_time() - began, done, seconds)
         return np.array(found), steps
 
     # The looser one goes first: it is the cheaper one to give up.
@@ -207,7 +207,7 @@ def _key(
     given = [module.PARAMETERS if parameters is None else parameters]
     given += [module.INPUTS if inputs is None else inputs]
     values = [list(g.items()) if hasattr(g, "keys") else np.asarray(g).tolist() for g in given]
-    parts = (FORMAT, source, values, problem.initial.tolist(), float(t_end), seconds > 0)
+    parts = (FORMAT, source, values, problem.initial.tolist(), float(t_end), float(seconds))
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
 
