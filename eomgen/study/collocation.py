@@ -11,6 +11,7 @@ corrected, and how far off it is, is in long numbers.
 """
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -148,7 +149,7 @@ class Forecast:
             self._problem.derivative,
             t,
             y.copy(),
-            2 * self._t_end,  # of which it will not use more than it is asked for
+            self._t_end,
             rtol=FORECAST,
             atol=FORECAST * self._scale,
             jac=self._problem.jacobian,
@@ -157,7 +158,9 @@ class Forecast:
 
     def _go_on(self) -> None:
         before = self._solver.t
-        complaint = self._solver.step()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # LSODA says in one what it then fails with
+            complaint = self._solver.step()
         if self._solver.status == "failed" or not np.isfinite(self._solver.y).all():
             raise NoStep(complaint or "the forecast failed")
         if self._solver.t > before:
@@ -196,7 +199,8 @@ def advance(
 ) -> Step:
     """One step of length h from t, y, its stages corrected to a part of the tolerance.
 
-    Raises `NoStep` if the corrections do not shrink, `ArithmeticError` where f has no value.
+    Raises `NoStep` if the corrections do not shrink, `ArithmeticError` or `ValueError` where f has
+    no value.
     """
     times = [t + c * h for c in method.c]
     near = y.astype(float)
@@ -353,7 +357,7 @@ def rows(
                     method, precise, problem, forecast, scale, way.t, way.y, h, tolerance
                 )
                 error = step.error
-            except ArithmeticError:
+            except (ArithmeticError, ValueError):  # of floats, of factors, of a step
                 error = math.inf
             if not error <= tolerance:
                 way.again(h, error, tolerance)

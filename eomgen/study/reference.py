@@ -26,7 +26,7 @@ from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
 from eomgen.study import measure
-from eomgen.study.collocation import Longs, NoStep, rows
+from eomgen.study.collocation import Longs, rows
 from eomgen.study.precise import BITS, digits, precise
 
 ROWS = 201
@@ -100,7 +100,7 @@ def reference(
     if problem.contacts is None and seconds > 0:
         try:
             found = _in_long_numbers(module, problem, parameters, inputs, times, seconds, told)
-        except (_TooLongError, NoStep, ArithmeticError) as reason:
+        except (_TooLongError, ArithmeticError, ValueError) as reason:
             why = str(reason)
     else:
         why = "rigid contacts" if problem.contacts else "as asked"
