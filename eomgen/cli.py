@@ -90,6 +90,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     costing.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     _force(costing)
+    about = "say what accuracy costs in time, and how exact the arithmetic is"
+    _arithmetic(command("accuracy", commands.accuracy, about))
     _linearisation(command("linearise", commands.linearise, "A, B and modes about an equilibrium"))
     return parser
 
@@ -144,6 +146,19 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     parser.add_argument("--plot", metavar="FILE", type=Path, help="figure (DIR/NAME.png)")
     parser.add_argument("--view", action="store_true", help="open the page when done")
+    _force(parser)
+
+
+def _arithmetic(parser: argparse.ArgumentParser) -> None:
+    half = parser.add_mutually_exclusive_group()
+    half.add_argument("--arithmetic", action="store_true", help="the arithmetic alone, no runs")
+    half.add_argument("--no-arithmetic", action="store_true", help="the runs alone")
+    parser.add_argument("--float32", action="store_true", help="the arithmetic in float32, too")
+    parser.add_argument(
+        "--states", metavar="N", type=int, help="states of each kind for it (100, 20 if large)"
+    )
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of its random states")
+    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     _force(parser)
 
 

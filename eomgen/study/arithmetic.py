@@ -24,8 +24,8 @@ from eomgen.run.module import GeneratedModule, load_module
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route
-from eomgen.study.single import in_single, kernel_in_single
 from eomgen.study.samples import Sample, agreement, condition_numbers, judging_states
+from eomgen.study.single import in_single, kernel_in_single
 from eomgen.study.timing import least_seconds
 from eomgen.study.truth import Exact, Truth
 from eomgen.study.ulps import BITS, component_errors, vector_errors

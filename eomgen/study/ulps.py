@@ -6,7 +6,9 @@ once, and correctly, is off by half a ulp at most.
 
 Of a vector the components of one unit are a group, and an error is counted in ulps of the group's
 greatest component: by itself a component that happens to be near 0 might be off by any number of
-its own. The vector's error is that of its worst component.
+its own. For the same reason a group that is smaller than it is at half of all states, as that of a
+motion that dies down, counts in ulps of what it is there. The vector's error is that of its worst
+component.
 """
 
 from collections.abc import Sequence
@@ -30,22 +32,19 @@ def ulp(x: Any, bits: int) -> Any:
 def vector_errors(found: Floats, true: Exact, units: Sequence[str], bits: int) -> Floats:
     """Errors (n,) of vectors (n of length m, in columns: (m, n)) in ulps, as this page counts them.
 
-    `units` are those of the components. A group that is 0 altogether counts in ulps of the
-    greatest it is in any of the columns; where that is 0, too, any error is infinite. What was
-    found and is not finite has nan as its error.
+    `units` are those of the components. Where a group is 0 at most states, its greatest size at any
+    of them counts for the others; where that is 0, too, any error is infinite. What was found and
+    is not finite has nan as its error.
     """
+    finite = np.all(np.isfinite(found), axis=0)
+    errors = np.where(finite, 0.0, np.nan)
     groups = [[i for i, u in enumerate(units) if u == unit] for unit in dict.fromkeys(units)]
-    sizes = np.abs(true)
-    errors = np.zeros(found.shape[1])
     for group in groups:
-        largest = max(sizes[group].ravel(), default=MP.mpf(0))
-        for k in range(found.shape[1]):
-            if not np.all(np.isfinite(found[:, k])):
-                errors[k] = np.nan
-                continue
+        sizes = np.max(np.abs(true[group]), axis=0)
+        middle = sorted(sizes)[len(sizes) // 2] or max(sizes)
+        for k in np.flatnonzero(finite):
             off = max(abs(MP.mpf(float(found[i, k])) - true[i, k]) for i in group)
-            scale = max(sizes[group, k]) or largest
-            errors[k] = max(errors[k], _in_ulps(off, scale, bits))
+            errors[k] = max(errors[k], _in_ulps(off, max(sizes[k], middle), bits))
     return errors
 
 
