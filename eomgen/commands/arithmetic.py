@@ -90,9 +90,9 @@ def _print_notes(found: "Arithmetic", model: Model) -> None:
     print_wrapped("    condition of the mass matrix, its diagonal scaled to 1: ", conditions)
     print_wrapped(
         "    ulp: ",
-        "of the greatest acceleration of the same unit, or of what that is at half of the states "
-        "where it is smaller; correctly rounded is 0.5. linalg.solve: M v̇ = F - V - G by NumPy on "
-        "the scene's own terms, their operations and those of elimination",
+        "of the greatest acceleration of the same unit, but of no less than 1/1000 of what that is "
+        "at half of the states; correctly rounded is 0.5. linalg.solve: M v̇ = F - V - G by NumPy "
+        "on the scene's own terms, their operations and those of elimination",
     )
     parts = [f"against 60 digits, in which two ways agree to {found.agreed:.0f}; inputs 0"]
     for sample in found.samples:

@@ -6,9 +6,9 @@ once, and correctly, is off by half a ulp at most.
 
 Of a vector the components of one unit are a group, and an error is counted in ulps of the group's
 greatest component: by itself a component that happens to be near 0 might be off by any number of
-its own. For the same reason a group that is smaller than it is at half of all states, as that of a
-motion that dies down, counts in ulps of what it is there. The vector's error is that of its worst
-component.
+its own. For the same reason a group that is all but nothing, as that of a motion that dies down,
+counts in ulps of a thousandth of what it is at half of all states. The vector's error is that of
+its worst component.
 """
 
 from collections.abc import Sequence
@@ -20,6 +20,8 @@ from eomgen.program.digits import MP
 from eomgen.run.problem import Floats
 from eomgen.study.truth import Exact
 
+HARDLY = 1e-3
+"""Part of its middle size below which a group is all but nothing."""
 BITS = {"float64": 53, "float32": 24}
 """Of the significand of each format, the leading one included."""
 
@@ -41,10 +43,10 @@ def vector_errors(found: Floats, true: Exact, units: Sequence[str], bits: int) -
     groups = [[i for i, u in enumerate(units) if u == unit] for unit in dict.fromkeys(units)]
     for group in groups:
         sizes = np.max(np.abs(true[group]), axis=0)
-        middle = sorted(sizes)[len(sizes) // 2] or max(sizes)
+        least = HARDLY * (sorted(sizes)[len(sizes) // 2] or max(sizes))
         for k in np.flatnonzero(finite):
             off = max(abs(MP.mpf(float(found[i, k])) - true[i, k]) for i in group)
-            errors[k] = max(errors[k], _in_ulps(off, max(sizes[k], middle), bits))
+            errors[k] = max(errors[k], _in_ulps(off, max(sizes[k], least), bits))
     return errors
 
 
