@@ -17,6 +17,7 @@ from eomgen.model import Model
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_line, terminal_notice, terminal_progress
 from eomgen.scene.schema import SHOWN
+from eomgen.store import folder
 
 if TYPE_CHECKING:
     from eomgen.run.problem import Floats
@@ -33,6 +34,7 @@ def accuracy(given: Arguments) -> int:
     from eomgen.study import records
     from eomgen.study.ladder import methods_named
     from eomgen.study.reference import reference
+    from eomgen.study.reference import save as save_reference
     from eomgen.study.work_precision import call_times
 
     for option, value in (("--run-time", given.run_time), ("--time", given.time)):
@@ -46,9 +48,11 @@ def accuracy(given: Arguments) -> int:
     if not 0 < t_end < math.inf:
         raise RunError(f"--t-end: {t_end:g} is no positive time; give one in s")
     paths = {kind: given.output / f"{name}_accuracy.{kind}" for kind in ("csv", "png")}
+    paths["npz"] = given.output / f"{name}_reference.npz"
     check_folder(given.output)
     check_figure(paths["png"], force=given.force)
-    check_writable(paths["csv"], force=given.force)
+    for kind in ("csv", "npz"):
+        check_writable(paths[kind], force=given.force)
 
     model = replace(model, outputs=in_order((*SHOWN, "effect_powers")))
     begin = time.perf_counter()
@@ -64,7 +68,15 @@ def accuracy(given: Arguments) -> int:
             pipeline.generate(model)
             generation = time.perf_counter() - begin
     with located(given.scene), terminal_progress(f"reference of {name}") as progress:
-        truth = reference(model, module, parameters, inputs, t_end, progress=progress)
+        truth = reference(
+            model,
+            module,
+            parameters or None,
+            inputs or None,
+            t_end,
+            progress=progress,
+            folder=folder() / "references",
+        )
         bench = _bench(model, module, parameters, inputs, truth)
         _check_reference(bench)
         costs = call_times(bench.problem, truth)
@@ -88,6 +100,7 @@ def accuracy(given: Arguments) -> int:
     shown = records.ordered(work for work in works.values() if work.rung.method in methods)
     print_table(name, bench, ladder, methods, shown, costs, generation, t_end)
     _print_origin(len(shown), made, given.time, ladder, methods, works)
+    save_reference(truth, paths["npz"])
     _draw(name, model, bench, t_end, shown, paths["png"], given.force)
     for path in paths.values():
         print(f"    wrote {path}")
