@@ -13,6 +13,7 @@ SIGNATURES = (
     b"# eomgen trajectory of ",  # tables
     b"# eomgen linearisation of ",
     b"# eomgen accuracy of ",
+    b"# eomgen arithmetic of ",
     b"eomgen.npy",  # archives: their first member
     b"Software\0eomgen",  # PNG
     b"<dc:title>eomgen</dc:title>",  # SVG: who made it

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eomgen.build import in_order
+from eomgen.commands.arithmetic import check_arithmetic, print_arithmetic
 from eomgen.commands.shared import Arguments, assignments, code_of, located, read_model
 from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable
@@ -27,6 +28,18 @@ if TYPE_CHECKING:
 
 
 def accuracy(given: Arguments) -> int:
+    """Print, write and draw what runs cost by every method, and how exact the arithmetic is."""
+    model, name = read_model(given.scene, given)
+    if not given.no_arithmetic:
+        check_arithmetic(given, name)
+    if not given.arithmetic:
+        _runs(given, model, name)
+    if not given.no_arithmetic:
+        print_arithmetic(given, model, name)
+    return 0
+
+
+def _runs(given: Arguments, model: Model, name: str) -> None:
     """Run every method over its ladder; print the table, write it and draw it."""
     from eomgen import pipeline  # here, so that loading SymPy is not counted as deriving
     from eomgen.commands.accuracy_table import comments, print_table
@@ -41,7 +54,6 @@ def accuracy(given: Arguments) -> int:
         if not 0 < value < math.inf:
             raise RunError(f"{option}: {value:g} is no positive time; give one in s")
     methods = methods_named(given.methods)
-    model, name = read_model(given.scene, given)
     parameters = assignments(given.set, model.defaults, "--set")
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
     t_end = model.simulation.t_end if given.t_end is None else given.t_end
@@ -104,7 +116,6 @@ def accuracy(given: Arguments) -> int:
     _draw(name, model, bench, t_end, shown, paths["png"], given.force)
     for path in paths.values():
         print(f"    wrote {path}")
-    return 0
 
 
 def _bench(

@@ -20,6 +20,7 @@ from eomgen.run.works import Powers
 from eomgen.study.ladder import Ladder, Rung, Work, next_rung
 from eomgen.study.measure import WRONG, error
 from eomgen.study.reference import Reference
+from eomgen.study.timing import least_seconds
 
 TELLS_APART = 100
 """Errors below so many times the reference's own are not told apart."""
@@ -34,9 +35,6 @@ WORKS_COST = 8
 SAME_TIME = 1e-6
 """Rows this close, in parts of the time between two, are at one time."""
 OVER = "it took too long"
-CALLS = 0.05
-"""About how long the calls of one function are timed, s, each of `ROUNDS` times."""
-ROUNDS = 5
 
 Rows = Callable[[Floats, Floats], Floats]
 """Of times (n,) and states (n, ny): a number for each, (n,)."""
@@ -275,21 +273,10 @@ def _energy_drift(bench: Bench, rung: Rung, first: _Run, run_time: float) -> flo
 
 
 def call_times(problem: Problem, reference: Reference) -> tuple[float, float]:
-    """Least mean time of a derivative and of a Jacobian along the motion, s."""
-    every = max(1, len(reference.t) // 20)
-    rows = list(zip(reference.t[::every].tolist(), reference.y[::every], strict=True))
-    return _call_time(problem.derivative, rows), _call_time(problem.jacobian, rows)
-
-
-def _call_time(
-    call: Callable[[float, Floats], Floats], rows: Sequence[tuple[float, Floats]]
-) -> float:
-    least, begin = math.inf, time.perf_counter()
-    rounds = 0
-    while rounds < ROUNDS or time.perf_counter() - begin < CALLS:
-        start = time.perf_counter()
-        for t, y in rows:
-            call(t, y)
-        least = min(least, (time.perf_counter() - start) / len(rows))
-        rounds += 1
-    return least
+    """Least time of a derivative and of a Jacobian halfway through the motion, s."""
+    middle = len(reference.t) // 2
+    t, y = float(reference.t[middle]), reference.y[middle]
+    derivative, jacobian = least_seconds(
+        [lambda: problem.derivative(t, y), lambda: problem.jacobian(t, y)]
+    )
+    return derivative, jacobian
