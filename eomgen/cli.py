@@ -81,6 +81,8 @@ def _parser() -> argparse.ArgumentParser:
         ("view", commands.view, "integrate, and open the moving picture"),
     ):
         _simulation(_code(_form(command(name, run, about))))
+    about = "say what accuracy costs in time, and how exact the arithmetic is"
+    _accuracy(_route(_form(command("accuracy", commands.accuracy, about))))
     about = "say what each effect costs, and what leaving it out does to the motion"
     costing = _route(command("effects", commands.effects, about))
     costing.add_argument("--each", action="store_true", help="a line an effect, not one a type")
@@ -90,8 +92,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     costing.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     _force(costing)
-    about = "say what accuracy costs in time, and how exact the arithmetic is"
-    _arithmetic(command("accuracy", commands.accuracy, about))
     _linearisation(command("linearise", commands.linearise, "A, B and modes about an equilibrium"))
     return parser
 
@@ -149,7 +149,18 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     _force(parser)
 
 
-def _arithmetic(parser: argparse.ArgumentParser) -> None:
+def _accuracy(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--methods", metavar="A,B,…", help="these integrators alone (all)")
+    parser.add_argument("--quick", action="store_true", help="every second rung alone")
+    parser.add_argument("--t-end", metavar="S", type=float, help="end time (the scene's)")
+    parser.add_argument(
+        "--run-time", metavar="S", type=float, default=3.0, help="longest time of one run, 3 s"
+    )
+    parser.add_argument(
+        "--time", metavar="S", type=float, default=300.0, help="begin no run after this, 300 s"
+    )
+    parser.add_argument("--fresh", action="store_true", help="take nothing from an earlier call")
+    _values(parser)
     half = parser.add_mutually_exclusive_group()
     half.add_argument("--arithmetic", action="store_true", help="the arithmetic alone, no runs")
     half.add_argument("--no-arithmetic", action="store_true", help="the runs alone")
