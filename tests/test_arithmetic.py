@@ -496,7 +496,7 @@ def test_command_tells_what_is_not_there(
     text = " ".join(capsys.readouterr().out.split())
     assert "no rigid contact held" in text
     assert "closed it takes no 'contact'" in text
-    for wrong in (["--states", "0"], ["--seed", "-1"]):
+    for wrong in (["--states", "0"], ["--seed", "-1"], ["--set", "M=1"]):
         assert main(["accuracy", "pendulum", "--arithmetic", *wrong, "-o", str(tmp_path)]) == 1
         assert capsys.readouterr().err.startswith(f"eomgen: {wrong[0]}: ")
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.commands.shared import Arguments, located, print_wrapped
+from eomgen.commands.shared import Arguments, assignments, located, print_wrapped
 from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable
 from eomgen.model import Model
@@ -42,6 +42,7 @@ def print_arithmetic(given: Arguments, model: Model, name: str) -> None:
     from eomgen.study.arithmetic import arithmetic
 
     check_arithmetic(given, name)
+    model = model.with_parameters(assignments(given.set, model.defaults, "--set"))
     label = f"arithmetic of {name}"
     with located(given.scene), terminal_progress(label) as progress:
         found = arithmetic(
