@@ -294,20 +294,19 @@ def _singles(name: str, made: _Made, sample: Sample) -> tuple[Any, list[str]]:
 def _timed(found: Sequence[Way], made: Mapping[str, _Made], states: Floats) -> list[Way]:
     """With the least times of calls, all in turn."""
     many = np.resize(states, (BATCH, states.shape[1])).T.copy()
-    calls, places = [], []
-    for i, way in enumerate(found):
-        if way.operations is None:
-            continue
-        call = _call(way, made[way.name])
-        start = made[way.name].module.initial_state()
-        for key, y in (("seconds", start), ("batch_seconds", many)):
-            given = y if way.precision == "float64" else y.astype(np.float32)
-            with suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
-                call(given)
-                calls.append(partial(call, given))
-                places.append((i, key))
-    timed = list(found)
+    timed, calls, places = list(found), [], []
     with np.errstate(all="ignore"):
+        for i, way in enumerate(found):
+            if way.operations is None:
+                continue
+            call = _call(way, made[way.name])
+            start = made[way.name].module.initial_state()
+            for key, y in (("seconds", start), ("batch_seconds", many)):
+                given = y if way.precision == "float64" else y.astype(np.float32)
+                with suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
+                    call(given)
+                    calls.append(partial(call, given))
+                    places.append((i, key))
         for (i, key), least in zip(places, least_seconds(calls), strict=True):
             part = least / BATCH if key == "batch_seconds" else least
             timed[i] = replace(timed[i], **{key: part})  # type: ignore[arg-type]
