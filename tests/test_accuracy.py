@@ -135,7 +135,7 @@ def test_runs_that_are_wrong_or_fail_are_told_and_stay() -> None:
     failed = [work for work in works["rk4"] if work.status == "failed"]
     assert failed and all(work.reason and math.isnan(work.error) for work in failed)
     assert works["implicit_midpoint"][-1].status == "ok"
-    coarse = climbed(bench(), ["euler"], most_steps=100)["euler"]
+    coarse = climbed(bench(), ["euler"], most_steps=50)["euler"]
     assert [work.status for work in coarse] == ["wrong"] * len(coarse)
     assert all("reported success" in work.reason and work.error >= 0.1 for work in coarse)
 
@@ -169,7 +169,7 @@ def test_a_run_over_its_time_ends_its_ladder() -> None:
 def test_rounding_ends_a_ladder() -> None:
     """Two finer runs that gain nothing are enough; far from rounding they are not."""
     whole = replace(ladder(bench()), most_steps=25 * 2**12)
-    for smallest, expected in ((1e-12, 9), (1e-5, 11)):
+    for smallest, expected in ((1e-12, 10), (1e-5, 13)):
         done: dict[Rung, Work] = {}
         while rung := next_rung(whole, "rk4", done):
             assert rung.dt is not None
