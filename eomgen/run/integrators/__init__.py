@@ -14,6 +14,7 @@ from eomgen.run.integrators import (
     runge_kutta_4,
     semi_implicit_euler,
 )
+from eomgen.run.integrators.gragg_bulirsch_stoer import GraggBulirschStoer
 from eomgen.run.integrators.implicit_stages import REMEDY, ImplicitMethod
 from eomgen.run.integrators.interface import Adaptive, FixedStep, StepFailure
 
@@ -39,6 +40,9 @@ INTEGRATORS: Mapping[str, FixedStep | Adaptive] = MappingProxyType(
         "gauss_6": _implicit(gauss_6.METHOD),
         "RK45": Adaptive(RK45, uses_jacobian=False, one_step=True, remedy=_LOOSER),
         "DOP853": Adaptive(DOP853, uses_jacobian=False, one_step=True, remedy=_LOOSER),
+        "gragg_bulirsch_stoer": Adaptive(
+            GraggBulirschStoer, uses_jacobian=False, one_step=True, remedy=_LOOSER
+        ),
         "Radau": Adaptive(Radau, uses_jacobian=True, one_step=True, remedy=_LOOSER),
         "Radau_differences": Adaptive(Radau, uses_jacobian=False, one_step=True, remedy=_LOOSER),
         "BDF": Adaptive(BDF, uses_jacobian=True, one_step=False, remedy=_LOOSER),
