@@ -17,7 +17,6 @@ too, p = M(q) v, where they are symplectic (section VI.4).
 """
 
 import argparse
-import re
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -127,4 +127,3 @@ def density(tree: Tree) -> int:
 def written(tree: Tree) -> str:
     """A tree in Butcher's brackets: τ for a lone node, [τ[τ]] for a root with τ and [τ] on it."""
     return f"[{''.join(map(written, tree))}]" if tree else "τ"
-
