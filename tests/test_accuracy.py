@@ -18,7 +18,7 @@ from eomgen.run.problem import Floats, Problem
 from eomgen.run.trajectory import Trajectory
 from eomgen.show.work_precision import COLOURS, TOP, Diagram, draw
 from eomgen.study import records, work_precision
-from eomgen.study.ladder import Ladder, Rung, Work, atol_scale, first_steps, next_rung
+from eomgen.study.ladder import Ladder, Rung, Work, atol_scale, first_steps, next_rung, order
 from eomgen.study.measure import scales
 from eomgen.study.reading import cheapest, observed_order, saved_by_jacobian
 from eomgen.study.reference import Reference
@@ -93,13 +93,13 @@ ADAPTIVE = [name for name in INTEGRATORS if name not in FIXED]
 
 def test_orders_are_those_of_the_methods() -> None:
     """The range is found without knowing them, and the slope there is the order."""
-    methods = [name for name in FIXED if name != "leapfrog"]
-    for method, works in climbed(bench(), methods).items():
-        nominal = INTEGRATORS[method].order  # type: ignore[union-attr]
+    for method in FIXED:
+        nominal = order(method)
+        works = climbed(bench(), [method], most_steps=12800 if nominal == 1 else 800)[method]
         seen = observed_order(works)
         assert seen is not None, method
-        assert seen.value == pytest.approx(nominal, rel=0.04), method
-        assert seen.coarse >= 4 * seen.fine
+        assert seen.value == pytest.approx(nominal, rel=0.03), method
+        assert seen.coarse >= 3.99 * seen.fine
 
 
 def test_errors_are_those_of_the_closed_form() -> None:
@@ -117,14 +117,19 @@ def test_errors_are_those_of_the_closed_form() -> None:
 
 
 def test_tighter_tolerances_give_smaller_errors() -> None:
-    """Down to 1e-10 by every adaptive method; what implicit ones need Jacobians for is counted."""
-    for method, works in climbed(bench(), ADAPTIVE, quick=True).items():
-        assert [work.rung.rtol for work in works][:3] == [1e-2, 1e-4, 1e-6], method
-        assert all(work.rung.atol == pytest.approx(1e-3 * 2 * work.rung.rtol) for work in works)
-        assert min(work.error for work in works) < 1e-10, method
-        assert works[0].error > works[2].error > works[4].error
-        assert works[-1].derivatives > works[0].derivatives
-        assert (works[0].jacobians > 0) == (method in ("Radau", "BDF")) or method == "LSODA"
+    """By every adaptive method; only those that use the Jacobian ask for it."""
+    found = bench()
+    climb = ladder(found)
+    for method in ADAPTIVE:
+        done: dict[Rung, Work] = {}
+        while (rung := next_rung(climb, method, done)) and (rung.rtol or 0) > 1e-7:
+            done[rung] = measure(found, rung, 60.0)
+        loosest, *_, tightest = done.values()
+        assert [r.rtol for r in done] == [1e-2, 1e-3, 1e-4, 1e-5, 1e-6]
+        assert all(r.atol == pytest.approx(2e-3 * (r.rtol or 0), rel=2e-3) for r in done)
+        assert tightest.error < 1e-4 and tightest.error < loosest.error / 100, method
+        assert tightest.derivatives > loosest.derivatives
+        assert (tightest.jacobians > 0) == (method in ("Radau", "BDF")) or method == "LSODA"
 
 
 def test_runs_that_are_wrong_or_fail_are_told_and_stay() -> None:
@@ -261,7 +266,7 @@ def test_records_come_back_as_they_were(tmp_path: Path) -> None:
     assert len({records.key("m", {"a": x}) for x in (1.0, 2.0, 1.0)}) == 2
 
 
-QUICK = "--quick --no-arithmetic --t-end 0.5 --methods rk4,DOP853,Radau".split()
+QUICK = "--quick --no-arithmetic --t-end 0.5 --methods rk4,DOP853".split()
 
 
 def test_what_was_interrupted_goes_on(
@@ -302,7 +307,7 @@ def test_what_was_interrupted_goes_on(
     assert sorted(path.name for path in parted.iterdir()) == names
     again.clear()
     assert main(["accuracy", "pendulum", *QUICK, "-o", str(parted)]) == 0 and not again
-    assert main(["accuracy", "pendulum", *QUICK, "--set", "g=5", "-o", str(parted)]) == 0
+    assert main(["accuracy", "pendulum", *QUICK, "--set", "gravity_g=5", "-o", str(parted)]) == 0
     assert len(again) == len(cells(table)) and "taken from" not in capsys.readouterr().out
     again.clear()
     assert main(["accuracy", "pendulum", *QUICK, "--fresh", "-o", str(parted)]) == 0
@@ -324,12 +329,15 @@ def test_the_table_says_what_it_must(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_scenes_by_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Redundant forms have gaps in their joints; driven scenes account for works."""
-    quick = "--quick --no-arithmetic --t-end 0.3 --methods rk4 --run-time 0.5".split()
+    quick = "--quick --no-arithmetic --t-end 0.1 --methods rk4 --run-time 0.5".split()
     assert main(["accuracy", "two_body", "--form", "redundant", *quick, "-o", str(tmp_path)]) == 0
     rows = cells(tmp_path / "two_body_redundant_accuracy.csv")
     gaps = [float(row["joint_gap_m"]) for row in rows]
     assert gaps[0] > 1e3 * gaps[-1] > 0
-    assert main(["accuracy", "two_body_forced", *quick, "-o", str(tmp_path)]) == 0
+    assert (
+        main(["accuracy", "two_body_forced", "--input", "f_A_x=2", *quick, "-o", str(tmp_path)])
+        == 0
+    )
     rows = cells(tmp_path / "two_body_forced_accuracy.csv")
     drifts = [float(row["energy_drift"]) for row in rows if row["energy_drift"]]
     assert min(drifts) < 1e-8 and {row["joint_gap_m"] for row in rows} == {""}
