@@ -256,8 +256,8 @@ def _draw(
     floor, _ = bench.floors
     about = (
         f"{model.title or model.name}, {t_end:g} s, form {model.form}; "
-        f"time is the least of repeated runs, outputs off\n"
-        f"reference: {truth.origin}; its own error {truth.error:.1g}, "
-        f"so errors are told apart from {floor:.1g}"
+        "time is the least of repeated runs, outputs off\n"
+        f"reference: its own error {truth.error:.1g}, errors are told apart from {floor:.1g} on; "
+        f"{truth.origin.partition(';')[0]}"
     )
     save(Diagram(name, about, floor, energy, model.form == "redundant"), shown, path, force=force)

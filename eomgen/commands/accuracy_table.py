@@ -164,7 +164,7 @@ def _print_orders(methods: Sequence[str], works: Sequence[Work]) -> None:
             continue
         seen = observed_order(own)
         if seen is None:
-            text = "none to be seen: no three steps in a row with equal slopes of the error"
+            text = "none to be seen: no two equal slopes of the error in a row"
         else:
             text = f"{seen.value:.2f} over dt {seen.coarse:.3g} to {seen.fine:.3g} s"
         lines.append(f"        {method:<20}  {nominal}   {text}")

@@ -11,7 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from eomgen.run.integrators import INTEGRATORS, FixedStep
+from eomgen.errors import RunError
+from eomgen.run.integrators import INTEGRATORS, FixedStep, find_integrator
 from eomgen.run.problem import Floats, Problem
 
 Status = Literal["ok", "wrong", "failed", "over", "refused"]
@@ -196,9 +197,9 @@ def methods_named(text: str | None) -> Sequence[str]:
     """
     if text is None:
         return tuple(INTEGRATORS)
-    from eomgen.run.integrators import find_integrator
-
     names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
+        raise RunError(f"--methods: names no integrator; known: {', '.join(INTEGRATORS)}")
     for name in names:
         find_integrator(name)
     return [name for name in INTEGRATORS if name in names]

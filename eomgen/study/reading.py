@@ -7,13 +7,14 @@ from statistics import median
 import numpy as np
 
 from eomgen.study.ladder import Work
-from eomgen.study.measure import WRONG
 
 TARGETS = (1e-3, 1e-6, 1e-9)
-AGREE = 0.15
-"""Local slopes of the error are in the asymptotic range while none is off their median by more than
-this, in parts of it."""
+AGREE = 0.05
+"""Slopes of the error from step to step are nearly equal while none is farther from their median
+than this, in parts of it."""
 LEAST_SLOPES = 2
+COARSE = 0.01
+"""Errors above are not looked at: so far off, no method shows its order."""
 DIFFERENCES = "_differences"
 """What a method's name ends in that has its Jacobian by finite differences."""
 
@@ -31,30 +32,29 @@ def observed_order(works: Sequence[Work]) -> Order | None:
     """The order that equal steps show, from one method's runs; None if they show none.
 
     The asymptotic range is sought without knowing the order: the longest stretch of steps, of
-    equally long ones the finest, on which slopes from one step to the next are nearly equal. Only
-    measured errors of right runs count. The order is the slope of the straight line fitted there.
+    equally long ones the finest, on which slopes from one step to the next are nearly equal.
+    Only measured errors below `COARSE` count. The order is the slope of the straight line there.
     """
     usable = [
         work
         for work in works
-        if work.status == "ok" and not work.at_most[0] and 0 < work.error < WRONG
+        if work.status == "ok" and not work.at_most[0] and 0 < work.error < COARSE
     ]
     steps = np.log([work.rung.dt or np.nan for work in usable])
     errors = np.log([work.error for work in usable])
     if len(usable) <= LEAST_SLOPES:
         return None
     slopes = np.diff(errors) / np.diff(steps)
-    best: tuple[int, int] | None = None
+    found: list[slice] = []
     for start in range(len(slopes)):
         for stop in range(start + LEAST_SLOPES, len(slopes) + 1):
             part = slopes[start:stop]
             middle = float(np.median(part))
-            even = middle > 0 and float(np.max(np.abs(part - middle))) <= AGREE * middle
-            if even and (best is None or stop - start >= best[1] - best[0]):
-                best = start, stop
-    if best is None:
+            if middle > 0 and float(np.max(np.abs(part - middle))) <= AGREE * middle:
+                found.append(slice(start, stop + 1))
+    if not found:
         return None
-    span = slice(best[0], best[1] + 1)
+    span = max(found, key=lambda stretch: (stretch.stop - stretch.start, stretch.start))
     slope = float(np.polyfit(steps[span], errors[span], 1)[0])
     return Order(slope, float(np.exp(steps[span][0])), float(np.exp(steps[span][-1])))
 
