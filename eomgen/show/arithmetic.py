@@ -48,7 +48,10 @@ def save_figure(found: Arithmetic, path: Path, *, force: bool = False) -> None:
 
 
 def _label(way: Way) -> str:
-    time = "" if way.seconds is None else f", {1e6 * way.seconds:.3g} µs"
+    time = ""
+    if way.seconds is not None:
+        us = 1e6 * way.seconds
+        time = f", {us:.1f} µs" if us < 99.95 else f", {us:.0f} µs"
     return f"{way.name}, {way.precision}\n{way.operations} operations{time}"
 
 
