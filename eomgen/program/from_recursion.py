@@ -26,7 +26,8 @@ class Recording:
     """A model's dynamics on a tape by a route, and the nodes that are given to it.
 
     v̇ comes from the recursion of the route, `aba` or `ldl`, or from what `forward` makes. `axes`
-    are those that the recursion works in, if not the usual ones.
+    are those that the recursion works in, if not the usual ones; `tape` is one to begin, if not a
+    plain one.
     """
 
     def __init__(
@@ -35,10 +36,11 @@ class Recording:
         route: str,
         forward: Callable[["Recording"], Forward] | None = None,
         axes: Axes | None = None,
+        tape: Tape | None = None,
     ) -> None:
         self.model = model
         self.route = route
-        self.tape = Tape()
+        self.tape = tape or Tape()
         self.scalars = TapeScalars(self.tape)
         self.parameters = {p.name: self.given(p.name, Stage.PARAMETERS) for p in model.parameters}
         self.q = [self.given(c.name, Stage.POSITIONS) for c in model.coordinates]

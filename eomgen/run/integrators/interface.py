@@ -10,8 +10,8 @@ from eomgen.errors import RunError
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.trajectory import Event
 
-Step = Callable[[Problem, float, Floats, float], Floats]
-"""`step(problem, t, y, h) -> y_new`: one step of size h; leaves `y` (ny,) as it is."""
+Change = Callable[[Problem, float, Floats, float], Floats]
+"""`change(problem, t, y, h) -> d`: one step of size h leads to y + d; leaves `y` (ny,) as it is."""
 
 
 class StepFailure(RunError):
@@ -26,7 +26,7 @@ class FixedStep:
     remedy  what to change when a run goes astray
     """
 
-    step: Step
+    change: Change
     order: int
     remedy: str
 
