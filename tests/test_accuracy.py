@@ -307,6 +307,7 @@ def test_what_was_interrupted_goes_on(
     assert sorted(path.name for path in parted.iterdir()) == names
     again.clear()
     assert main(["accuracy", "pendulum", *QUICK, "-o", str(parted)]) == 0 and not again
+    capsys.readouterr()
     assert main(["accuracy", "pendulum", *QUICK, "--set", "gravity_g=5", "-o", str(parted)]) == 0
     assert len(again) == len(cells(table)) and "taken from" not in capsys.readouterr().out
     again.clear()

@@ -53,7 +53,8 @@ TOP = 3.0
 BESIDE = 0.85
 """Where the legend begins, in parts of the figure's width."""
 SMALLEST = 1e-17
-"""A drift of 0 is drawn here at the least."""
+MOST = 10.0
+"""Drifts below and above are drawn here."""
 
 Value = Callable[[Work], float]
 
@@ -213,7 +214,7 @@ def _draw_drift(works: Sequence[Work], title: str, value: Value, axes: Axes) -> 
         known = [work for work in own if value(work) >= 0]
         axes.plot(
             [work.seconds for work in known],
-            [min(max(value(work), SMALLEST), 1e3) for work in known],
+            [min(max(value(work), SMALLEST), MOST) for work in known],
             label=method,
             **_line(method) | {"markersize": 3.5, "linewidth": 1.0},  # type: ignore[arg-type]
         )
