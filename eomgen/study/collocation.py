@@ -11,11 +11,12 @@ corrected, and how far off it is, is in long numbers.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import gmpy2
 import numpy as np
 import scipy.linalg
 from gmpy2 import mpfr
@@ -23,7 +24,9 @@ from numpy.typing import NDArray
 from scipy.integrate import LSODA
 
 from eomgen.run.problem import Floats, Problem
-from eomgen.study.precise import BITS, Long, Precise, digits
+from eomgen.study import corners
+from eomgen.study.corners import Turn
+from eomgen.study.precise import BITS, Long, Precise, Watch, digits
 
 Longs = NDArray[np.object_]
 """An array of long numbers."""
@@ -32,8 +35,12 @@ FORECAST = 1e-10
 ASTRAY = 1e-6
 """A forecast this far off, in parts of the scale, begins anew."""
 MANY = 40
-"""States from which on the Jacobian is interpolated, not computed at every stage."""
+"""States from which on one Jacobian serves all stages of a step."""
 MOST_CORRECTIONS = 12
+ENOUGH = 0.001
+"""Part of the tolerance that stages are corrected to."""
+TURNINGS = 40
+"""Steps made again for the sake of one turn before that is given up."""
 SHRINK, GROW, SAFETY = 0.2, 3.0, 0.9
 """Bounds of how the step changes."""
 
@@ -46,16 +53,17 @@ class NoStep(ArithmeticError):
 class Gauss:
     """The method of s stages on [0, 1].
 
-    c  nodes (s,)           a  weights of the stages (s, s), in long numbers and in doubles
-    d  (s,): the end of a polynomial that is 0 at 0, from its values at the nodes
-    legendre (s, s): from values at the nodes to coefficients in normalised Legendre polynomials
+    c     nodes (s,)
+    a     weights of the stages (s, s)
+    d     (s,): the end of a polynomial that is 0 at 0, from its values at the nodes
+    fall  (4, s): from those values, of the polynomial's slope the two middle and the two last
+          coefficients in Legendre polynomials
     """
 
     c: Longs
     a: Longs
-    a_double: Floats
     d: Longs
-    legendre: Floats
+    fall: Longs
 
 
 @cache
@@ -75,27 +83,31 @@ def gauss(stages: int) -> Gauss:
             slope = stages * (x * values[stages] - values[stages - 1]) / (x * x - 1)
             nodes.append((x + 1) / 2)
             weights.append(1 / ((1 - x * x) * slope * slope))
-        at = np.array([_legendre(stages, 2 * c - 1) for c in nodes], dtype=object)
+        at = np.array([_legendre(stages, 2 * c - 1) for c in nodes])
         # The integral of P_k(2x - 1) from 0 on is (P_{k+1} - P_{k-1}) / (2 (2k + 1)).
-        integrals = np.array(
-            [
-                [row[0] + row[1] if k == 0 else row[k + 1] - row[k - 1] for k in range(stages)]
-                for row in at
-            ],
-            dtype=object,
-        )
-        a = integrals @ (at[:, :stages] * np.array(weights, dtype=object)[:, None]).T / 2
+        before = np.array([[mpfr(-1), *row] for row in at])
+        integrals = at[:, 1:] - before[:, :stages]
+        a = integrals @ (at[:, :stages] * np.array(weights)[:, None]).T / 2
         d = [
             math.prod((1 - c) / (node - c) for c in nodes if c is not node) / node for node in nodes
         ]
-        norms = np.sqrt(2.0 * np.arange(stages) + 1.0)
-        legendre = (
-            norms[:, None] * (at[:, :stages].astype(float) * np.array(weights, float)[:, None]).T
-        )
+        slopes = np.array([[_slope(nodes, i, j) for i in range(stages)] for j in range(stages)])
+        kept = [stages // 2 - 1, stages // 2, stages - 2, stages - 1]
+        norms = np.array([gmpy2.sqrt(mpfr(2 * k + 1)) for k in kept])
+        legendre = (at[:, kept] * np.array(weights)[:, None] * norms).T
+        exact = (np.array(nodes), a, np.array(d), legendre @ slopes)
     with digits():
-        c_, a_, d_ = (np.array([mpfr(x) for x in np.ravel(m)], dtype=object) for m in (nodes, a, d))
-    square = a_.reshape(stages, stages)
-    return Gauss(c_, square, square.astype(float), d_, legendre)
+        return Gauss(*(x * mpfr(1) for x in exact))
+
+
+def _slope(nodes: list[Long], i: int, j: int) -> Long:
+    """At node j, the slope of the polynomial that is 1 at node i, 0 at the others and at 0."""
+    x = nodes[j]
+    others = [mpfr(0), *(c for c in nodes if c is not nodes[i])]
+    if i == j:
+        return sum(1 / (x - c) for c in others)
+    rest = [c for c in others if c is not x]
+    return math.prod((x - c) / (nodes[i] - c) for c in rest) / (nodes[i] - x)
 
 
 def _legendre(degree: int, x: Long) -> list[Long]:
@@ -162,13 +174,13 @@ class Forecast:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """The state `y` (ny, long) at the end of a step, and about how far off it is, in parts of the
-    scale.
+    """The state `y` (ny, long) at the end of a step, about how far off it is, in parts of the
+    scale, and the margins of corners (n, corners) at its start, at its stages, and at its end.
     """
 
     y: Longs
     error: float
-    corrections: int
+    margins: Floats
 
 
 def advance(
@@ -182,82 +194,133 @@ def advance(
     h: Long,
     tolerance: float,
 ) -> Step:
-    """One step of length h from t, y, its stages corrected to a hundredth of the tolerance.
+    """One step of length h from t, y, its stages corrected to a part of the tolerance.
 
     Raises `NoStep` if the corrections do not shrink, `ArithmeticError` where f has no value.
     """
-    stages, ny = len(method.c), len(y)
     times = [t + c * h for c in method.c]
     near = y.astype(float)
-    points, weights = _jacobian_points(stages, ny)
-    wanted = float(t) + float(h) * np.concatenate((np.array(times) * 0.0, points)).astype(float)
-    wanted[:stages] = [float(time) for time in times]
-    order = np.argsort(wanted, kind="stable")
-    guessed = np.empty((len(wanted), ny))
-    guessed[order] = forecast(float(t), near, wanted[order])
-
-    jacobians = np.array(
-        [problem.jacobian(wanted[stages + k], guessed[stages + k]) for k in range(len(points))]
-    )
-    jacobians = np.tensordot(weights, jacobians, axes=1)
-    matrix = -float(h) * np.einsum("ij,jab->iajb", method.a_double, jacobians)
-    matrix = matrix.reshape(stages * ny, stages * ny)
-    matrix.flat[:: stages * ny + 1] += 1.0
-    factors = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
-
-    moves = guessed[:stages].astype(object) - y  # long: floats would add up to floats
+    moments = np.array(times, dtype=float)
+    guessed = forecast(float(t), near, moments)
+    correct = _solver(method, problem, float(h), moments, guessed)
+    moves = guessed.astype(object) - y  # long: doubles would add up to doubles
     last = math.inf
-    for correction in range(1, MOST_CORRECTIONS + 1):
-        slopes = np.array(
-            [precise.derivative(times[i], (y + moves[i]).tolist()) for i in range(stages)],
-            dtype=object,
-        )
-        residual = moves - h * (method.a @ slopes)
-        change = scipy.linalg.lu_solve(
-            factors, -residual.astype(float).ravel(), check_finite=False
-        ).reshape(stages, ny)
+    for _ in range(MOST_CORRECTIONS):
+        states, slopes, margins = y + moves, [], []
+        for time, state in zip(times, states.tolist(), strict=True):
+            slopes.append(precise.derivative(time, state))
+            margins.append(precise.watch.margins if precise.watch else [])
+        residual = moves - h * (method.a @ np.array(slopes, dtype=object))
+        change = correct(residual.astype(float))
         size = float(np.max(np.abs(change) / scale))
         if not size < math.inf:
             raise NoStep("the corrections are not finite")
-        moves = moves + change.astype(object)
-        if correction > 1:
-            rate = size / last
-            if rate * size <= 0.01 * tolerance:
-                return Step(y + method.d @ moves, _error(method, slopes, h, scale), correction)
-            if rate > 0.5:
-                raise NoStep("the corrections do not shrink")
-        elif size == 0:
-            return Step(y + method.d @ moves, 0.0, correction)
+        moves = moves - change.astype(object)
+        rate = size / last
+        if size == 0 or (size * rate <= ENOUGH * tolerance and last < math.inf):
+            end = y + method.d @ moves
+            if precise.watch:
+                margins = [_margins(precise, t, y), *margins, _margins(precise, t + h, end)]
+            return Step(end, _error(method, moves, scale), np.array(margins, dtype=float))
+        if rate > 0.5:
+            raise NoStep("the corrections do not shrink")
         last = size
     raise NoStep("the corrections shrink too slowly")
 
 
-@cache
-def _jacobian_points(stages: int, ny: int) -> tuple[Floats, Floats]:
-    """Where in a step Jacobians are computed, and (stages, points) how the stages' follow."""
-    nodes = gauss(stages).c.astype(float)
-    if ny < MANY:
-        return nodes, np.eye(stages)
-    points = np.array([0.0, 0.5, 1.0])
-    lagrange = [np.prod([(nodes - q) / (p - q) for q in points if q != p], axis=0) for p in points]
-    return points, np.array(lagrange).T
+def _margins(precise: Precise, t: Long, y: Longs) -> list[Long]:
+    assert precise.watch is not None
+    precise.derivative(t, y.tolist())
+    return precise.watch.margins
 
 
-def _error(method: Gauss, slopes: Longs, h: Long, scale: Floats) -> float:
-    """What the end is off, in parts of the scale, by how fast Legendre coefficients of the slope
-    fall.
+def _solver(
+    method: Gauss, problem: Problem, h: float, times: Floats, states: Floats
+) -> Callable[[Floats], Floats]:
+    """What solves Δ - h A J Δ = r (stages, ny) for Δ in doubles, well enough to correct with.
 
-    What the slope lacks is orthogonal to polynomials of degree s - 1, and so meets only that part
-    of what carries it to the end which is not one: both fall alike. So where the last coefficients
-    are a share q of the first, the end is off by about q².
+    Small systems take the Jacobian of every stage. Large ones take one for all: A's eigenvectors
+    then part the system into one of ny equations for each eigenvalue. Solving ODEs II, IV.8.
     """
-    parts = np.abs(method.legendre @ slopes.astype(float)) * (float(h) / scale)
-    whole, last = float(np.max(parts)), float(np.max(parts[-2:]))
-    return last * last / whole if whole else 0.0
+    stages, ny = states.shape
+    if ny < MANY:
+        jacobians = np.array([problem.jacobian(t, y) for t, y in zip(times, states, strict=True)])
+        matrix = -h * np.einsum("ij,jab->iajb", method.a.astype(float), jacobians)
+        matrix = matrix.reshape(stages * ny, stages * ny)
+        matrix.flat[:: stages * ny + 1] += 1.0
+        factors = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
+
+        def solve_all(residual: Floats) -> Floats:
+            found = scipy.linalg.lu_solve(factors, residual.ravel(), check_finite=False)
+            return np.asarray(found).reshape(stages, ny)
+
+        return solve_all
+
+    middle = stages // 2
+    jacobian = problem.jacobian(float(times[middle]), states[middle])
+    values, vectors = np.linalg.eig(method.a.astype(float))
+    back = np.linalg.inv(vectors)
+    inverses = np.linalg.inv(np.eye(ny) - h * values[:, None, None] * jacobian)
+
+    def solve_each(residual: Floats) -> Floats:
+        parts = np.matmul(inverses, (back @ residual)[:, :, None])[:, :, 0]
+        return np.asarray((vectors @ parts).real)
+
+    return solve_each
+
+
+def _error(method: Gauss, moves: Longs, scale: Floats) -> float:
+    """What the end is off, in parts of the scale, by how Legendre coefficients of the slope fall.
+
+    The end has to do with coefficients from number s on, and, as the method integrates
+    polynomials of degree 2s - 1 exactly, with no less than two of them that add up to 2s. So the
+    fall from the middle to the last is carried on as far again, twice: where coefficients fall as
+    powers of q, that makes q^(2s); where as powers of their number, after a kink, it is modest.
+    """
+    fall = np.abs(method.fall @ moves).astype(float) / scale
+    middle, last = np.max(fall[:2], axis=0), np.max(fall[2:], axis=0)
+    share = np.divide(last, middle, out=np.ones_like(last), where=middle > last)
+    return float(np.max(last * share * share))
+
+
+class _Way:
+    """How far rows have come, and what the next step is to be."""
+
+    def __init__(self, ladder: Sequence[int], t: Long, y: Longs, length: Long) -> None:
+        self.t, self.y, self.length, self.made = t, y, length, 0
+        self.ladder, self.stages = ladder, ladder[-1]
+
+    def take(self, h: Long, step: Step, tolerance: float, *, spare: bool) -> None:
+        """Go on to the end of a step; where it was short only because of a row, with `spare`."""
+        self.t, self.y, self.made = self.t + h, step.y, self.made + 1
+        factor = _factor(step.error, tolerance, self.stages)
+        self.length = max(h * factor, self.length) if factor > 1 else h * factor
+        fewer = self.ladder[max(self.ladder.index(self.stages) - 1, 0)]
+        serve = step.error ** (fewer / self.stages) <= 0.01 * tolerance
+        if not spare:
+            self.stages = self.ladder[-1]
+        elif serve:
+            self.stages = fewer
+
+    def again(self, h: Long, error: float, tolerance: float) -> None:
+        """Try once more, with more stages or else a shorter step.
+
+        Raises `NoStep` if steps shrink to nothing.
+        """
+        if self.stages == self.ladder[-1]:
+            self.length = h * min(_factor(error, tolerance, self.stages), SAFETY)
+        self.stages = self.ladder[-1]
+        if self.length < abs(self.t) * 1e-25 or self.length < 1e-25:
+            raise NoStep(f"steps shrink to nothing at t = {float(self.t):.6g}")
+
+
+def _factor(error: float, tolerance: float, stages: int) -> float:
+    factor = SAFETY * (tolerance / error) ** (0.5 / stages) if error else GROW
+    return min(max(factor, SHRINK), GROW)
 
 
 def rows(
-    stages: int,
+    ladder: Sequence[int],
     precise: Precise,
     problem: Problem,
     scale: Floats,
@@ -266,35 +329,67 @@ def rows(
 ) -> Iterator[tuple[Longs, int]]:
     """The state at each of `times` (ascending; the first is the start) and the steps made so far.
 
+    ladder     numbers of stages, ascending; a step takes the least that serve
     tolerance  what each step's error is held to, in parts of the scale
 
-    Every row ends a step, so that rows are as accurate as the end. Long numbers must be on
-    (`digits`) wherever this is resumed. Raises `NoStep` if steps shrink to nothing.
+    Every row ends a step, so that rows are as accurate as the end; so does every turn of a corner.
+    Long numbers must be on (`digits`) wherever this is resumed. Raises `NoStep` if steps shrink to
+    nothing, or corners turn again and again.
     """
-    method = gauss(stages)
     forecast = Forecast(problem, scale, float(times[-1]))
-    t = mpfr(float(times[0]))
-    y = np.array(precise.initial, dtype=object)
-    made, length = 0, mpfr(float(times[1] - times[0]))
-    yield y, made
+    start = np.array(precise.initial, dtype=object)
+    way = _Way(ladder, mpfr(float(times[0])), start, mpfr(float(times[1] - times[0])))
+    yield start, 0
     for end in times[1:]:
         target = mpfr(float(end))
-        while t < target:
-            count = max(1, math.ceil((target - t) / length * 0.999))
-            h = (target - t) / count
+        turn, tried, h = None, 0, mpfr(0)
+        while way.t < target:
+            left = target - way.t
+            count = max(1, math.ceil(left / way.length * 0.999))
+            h = left / count if turn is None else h + h * turn.beyond
+            method = gauss(way.stages)
             try:
-                step = advance(method, precise, problem, forecast, scale, t, y, h, tolerance)
+                step = advance(
+                    method, precise, problem, forecast, scale, way.t, way.y, h, tolerance
+                )
                 error = step.error
             except ArithmeticError:
                 error = math.inf
-            factor = SAFETY * (tolerance / error) ** (0.5 / stages) if error else GROW
-            factor = min(max(factor, SHRINK), GROW)
-            if error <= tolerance:
-                y, made = step.y, made + 1
-                t = target if count == 1 else t + h
-                length = max(h * factor, length) if count > 1 or factor > 1 else h * factor
-            else:
-                length = h * min(factor, SAFETY)
-                if length < abs(t) * 1e-16 or length < 1e-18:
-                    raise NoStep(f"steps shrink to nothing at t = {float(t):.6g}")
-        yield y, made
+            if not error <= tolerance:
+                way.again(h, error, tolerance)
+                turn = None
+                continue
+            if precise.watch:
+                again, turn = _turned(precise.watch, method, step.margins, turn, h, left)
+                tried += again
+                if tried > TURNINGS:
+                    raise NoStep(f"corners turn again and again at t = {float(way.t):.6g}")
+                if again:
+                    continue
+            way.take(h, step, tolerance, spare=way.length > left)
+            tried = 0
+            if count == 1 and abs(target - way.t) <= abs(target) * 2.0 ** (3 - BITS):
+                way.t = target
+        yield way.y, way.made
+
+
+def _turned(
+    watch: Watch, method: Gauss, margins: Floats, turn: Turn | None, h: Long, left: Long
+) -> tuple[bool, Turn | None]:
+    """Whether a step is to be made again because of corners, and up to which turn; turns those that
+    are there at its start, or at its end, if it is taken.
+    """
+    places = np.array([0.0, *method.c.tolist(), 1.0], dtype=float)
+    if turn is not None:
+        if not corners.is_there(turn, margins):
+            return True, corners.nearer(turn, places, margins)
+        for corner in corners.turned_at_the_end(turn, margins):
+            watch.ways[corner] = not watch.ways[corner]
+        return False, None
+    late = corners.wrong_from_the_start(watch.ways, margins)
+    for corner in late:
+        watch.ways[corner] = not watch.ways[corner]
+    if late:
+        return True, None
+    found = corners.first_turn(watch.ways, places, margins)
+    return found is not None, found
