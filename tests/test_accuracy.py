@@ -96,6 +96,11 @@ def test_orders_are_those_of_the_methods() -> None:
     for method in FIXED:
         nominal = order(method)
         works = climbed(bench(), [method], most_steps=12800 if nominal == 1 else 800)[method]
+        if method == "leapfrog":  # z is pulled by v: it says so, once
+            assert [work.status for work in works] == ["refused"] and "depends on" in works[
+                0
+            ].reason
+            continue
         seen = observed_order(works)
         assert seen is not None, method
         assert seen.value == pytest.approx(nominal, rel=0.03), method
@@ -330,16 +335,13 @@ def test_the_table_says_what_it_must(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_scenes_by_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Redundant forms have gaps in their joints; driven scenes account for works."""
-    quick = "--quick --no-arithmetic --t-end 0.1 --methods rk4 --run-time 0.5".split()
-    assert main(["accuracy", "two_body", "--form", "redundant", *quick, "-o", str(tmp_path)]) == 0
-    rows = cells(tmp_path / "two_body_redundant_accuracy.csv")
+    quick = "--quick --no-arithmetic --t-end 0.3 --methods rk4 --run-time 0.5".split()
+    assert main(["accuracy", "pendulum", "--form", "redundant", *quick, "-o", str(tmp_path)]) == 0
+    rows = cells(tmp_path / "pendulum_redundant_accuracy.csv")
     gaps = [float(row["joint_gap_m"]) for row in rows]
     assert gaps[0] > 1e3 * gaps[-1] > 0
-    assert (
-        main(["accuracy", "two_body_forced", "--input", "f_A_x=2", *quick, "-o", str(tmp_path)])
-        == 0
-    )
-    rows = cells(tmp_path / "two_body_forced_accuracy.csv")
+    assert main(["accuracy", "cart_pole", "--input", "push=2", *quick, "-o", str(tmp_path)]) == 0
+    rows = cells(tmp_path / "cart_pole_accuracy.csv")
     drifts = [float(row["energy_drift"]) for row in rows if row["energy_drift"]]
     assert min(drifts) < 1e-8 and {row["joint_gap_m"] for row in rows} == {""}
     assert "leave unaccounted for" in " ".join(capsys.readouterr().out.split())

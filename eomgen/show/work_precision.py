@@ -234,7 +234,7 @@ def _ticks(axes: Axes) -> None:
 
 def _draw_legend(figure: Figure, works: Sequence[Work], top: float) -> None:
     """Methods by kind, and what the marks mean, in a column of its own."""
-    present = _by_method(works)
+    present = _by_method([work for work in works if work.status != "refused"])
     handles: list[Line2D] = []
 
     def heading(text: str) -> None:
