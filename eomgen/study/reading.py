@@ -14,8 +14,7 @@ AGREE = 0.05
 than this, in parts of it."""
 LEAST_SLOPES = 2
 LEAST = 0.5
-COARSE = 0.01
-"""Errors above are not looked at: so far off, no method shows its order."""
+"""Slopes below are those of rounding."""
 DIFFERENCES = "_differences"
 """What a method's name ends in that has its Jacobian by finite differences."""
 
@@ -34,13 +33,11 @@ def observed_order(works: Sequence[Work]) -> Order | None:
 
     The asymptotic range is sought without knowing the order: of all stretches of steps on which the
     slopes from one step to the next are nearly equal the finest, as far as it goes. Only measured
-    errors below `COARSE` count, and no slopes below `LEAST`, which are rounding. The order is the
-    slope of the straight line there.
+    errors of right runs count, and no slopes below `LEAST`. The order is the slope of the straight
+    line there.
     """
     usable = [
-        work
-        for work in works
-        if work.status == "ok" and not work.at_most[0] and 0 < work.error < COARSE
+        work for work in works if work.status == "ok" and not work.at_most[0] and work.error > 0
     ]
     steps = np.log([work.rung.dt or np.nan for work in usable])
     errors = np.log([work.error for work in usable])
