@@ -109,6 +109,21 @@ def test_orders_are_those_of_the_methods() -> None:
         assert seen.coarse >= 3.99 * seen.fine
 
 
+def test_the_order_is_that_of_the_finest_even_stretch() -> None:
+    """Neither of coarse steps, whose slopes may be even too, nor of rounding; or there is none."""
+
+    def works(slopes: Sequence[float]) -> list[Work]:
+        sizes = 1e-2 * 2.0 ** -np.cumsum([0.0, *slopes])
+        rungs = [Rung("rk4", dt=2.0**-k) for k in range(len(sizes))]
+        return [Work(r, "ok", 1.0, 1, error=e) for r, e in zip(rungs, sizes.tolist(), strict=True)]
+
+    seen = observed_order(works([4.8, 4.7, 4.75, 4.4, 4.05, 4.0, 3.95, 1.2, 0.1, 0.1]))
+    assert seen is not None and seen.value == pytest.approx(4.0, abs=1e-3)
+    assert (seen.coarse, seen.fine) == pytest.approx((2.0**-4, 2.0**-7))
+    assert observed_order(works([4.8, 4.3, 3.6, 2.9])) is None
+    assert observed_order(works([4.0])) is None
+
+
 def test_errors_are_those_of_the_closed_form() -> None:
     """Of explicit Euler: |1 + 3ih|^n instead of 1."""
     found = bench()
@@ -204,7 +219,7 @@ def test_rows_are_compared_at_their_own_times() -> None:
     assert errors(run, truth) == (0.0, 0.0)
 
 
-def test_quaternions_are_measured_before_they_are_scaled() -> None:
+def test_quaternions_are_measured_before_they_are_scaled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Euler's step leaves the sphere by (h w / 2)² / 2, every time."""
 
     def derivative(t: float, y: Floats) -> Floats:
@@ -231,6 +246,14 @@ def test_quaternions_are_measured_before_they_are_scaled() -> None:
         assert work.quaternion_defect == pytest.approx(math.hypot(1, 3 * h) - 1, rel=1e-9)
     adaptive = measure(found, Rung("RK45", rtol=1e-6, atol=1e-9), 60.0)
     assert 0 < adaptive.quaternion_defect < 1e-5
+    monkeypatch.setattr(
+        work_precision, "ONCE", 1.0
+    )  # where it is repeated, rows between do not count
+    again = measure(found, Rung("RK45", rtol=1e-6, atol=1e-9), 60.0)
+    ends = replace(found, reference=replace(truth, t=truth.t[[0, -1]], y=truth.y[[0, -1]]))
+    steps = measure(ends, Rung("RK45", rtol=1e-6, atol=1e-9), 60.0)
+    assert again.repeats >= 2
+    assert again.quaternion_defect == steps.quaternion_defect < adaptive.quaternion_defect
     assert math.isnan(measure(bench(), Rung("euler", dt=0.02), 60.0).quaternion_defect)
 
 
