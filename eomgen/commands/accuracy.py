@@ -250,9 +250,9 @@ def _draw(
     truth = bench.reference
     energy = ""
     if bench.energy is not None:
-        energy = "Energy drift, in parts of the motion's energy"
+        energy = "Energy drift, in parts of the motion's own"
     elif any(work.energy_drift >= 0 for work in shown):
-        energy = "Energy unaccounted for at the end, in parts of the motion's"
+        energy = "Energy unaccounted for at the end"
     floor, _ = bench.floors
     about = (
         f"{model.title or model.name}, {t_end:g} s, form {model.form}; "

@@ -160,7 +160,7 @@ def _print_orders(methods: Sequence[str], works: Sequence[Work]) -> None:
     for method in methods:
         nominal = order(method)
         own = [work for work in works if work.rung.method == method]
-        if nominal is None or not own:
+        if nominal is None or all(work.status == "refused" for work in own):
             continue
         seen = observed_order(own)
         if seen is None:
@@ -196,7 +196,8 @@ def _print_reading(works: Sequence[Work]) -> None:
             "a tenth of the motion's own scale and more",
         )
     for method, ratio in saved_by_jacobian(works).items():
-        print(
-            f"    {method} with the generated Jacobian takes 1/{ratio:.2f} of the time that it "
-            "takes with finite differences (median over tolerances)"
+        print_wrapped(
+            "    ",
+            f"{method} takes {ratio:.2f} times as long with finite differences as with the "
+            "generated Jacobian (median over tolerances)",
         )

@@ -53,7 +53,8 @@ TOP = 3.0
 BESIDE = 0.85
 """Where the legend begins, in parts of the figure's width."""
 SMALLEST = 1e-17
-"""A drift of 0 is drawn here at the least."""
+MOST = 10.0
+"""Drifts below and above are drawn here."""
 
 Value = Callable[[Work], float]
 
@@ -213,7 +214,7 @@ def _draw_drift(works: Sequence[Work], title: str, value: Value, axes: Axes) -> 
         known = [work for work in own if value(work) >= 0]
         axes.plot(
             [work.seconds for work in known],
-            [min(max(value(work), SMALLEST), 1e3) for work in known],
+            [min(max(value(work), SMALLEST), MOST) for work in known],
             label=method,
             **_line(method) | {"markersize": 3.5, "linewidth": 1.0},  # type: ignore[arg-type]
         )
@@ -233,7 +234,7 @@ def _ticks(axes: Axes) -> None:
 
 def _draw_legend(figure: Figure, works: Sequence[Work], top: float) -> None:
     """Methods by kind, and what the marks mean, in a column of its own."""
-    present = _by_method(works)
+    present = _by_method([work for work in works if work.status != "refused"])
     handles: list[Line2D] = []
 
     def heading(text: str) -> None:

@@ -13,8 +13,8 @@ AGREE = 0.05
 """Slopes of the error from step to step are nearly equal while none is farther from their median
 than this, in parts of it."""
 LEAST_SLOPES = 2
-COARSE = 0.01
-"""Errors above are not looked at: so far off, no method shows its order."""
+LEAST = 0.5
+"""Slopes below are those of rounding."""
 DIFFERENCES = "_differences"
 """What a method's name ends in that has its Jacobian by finite differences."""
 
@@ -31,14 +31,13 @@ class Order:
 def observed_order(works: Sequence[Work]) -> Order | None:
     """The order that equal steps show, from one method's runs; None if they show none.
 
-    The asymptotic range is sought without knowing the order: the longest stretch of steps, of
-    equally long ones the finest, on which slopes from one step to the next are nearly equal.
-    Only measured errors below `COARSE` count. The order is the slope of the straight line there.
+    The asymptotic range is sought without knowing the order: of all stretches of steps on which the
+    slopes from one step to the next are nearly equal the finest, as far as it goes. Only measured
+    errors of right runs count, and no slopes below `LEAST`. The order is the slope of the straight
+    line there.
     """
     usable = [
-        work
-        for work in works
-        if work.status == "ok" and not work.at_most[0] and 0 < work.error < COARSE
+        work for work in works if work.status == "ok" and not work.at_most[0] and work.error > 0
     ]
     steps = np.log([work.rung.dt or np.nan for work in usable])
     errors = np.log([work.error for work in usable])
@@ -50,11 +49,11 @@ def observed_order(works: Sequence[Work]) -> Order | None:
         for stop in range(start + LEAST_SLOPES, len(slopes) + 1):
             part = slopes[start:stop]
             middle = float(np.median(part))
-            if middle > 0 and float(np.max(np.abs(part - middle))) <= AGREE * middle:
+            if middle > LEAST and float(np.max(np.abs(part - middle))) <= AGREE * middle:
                 found.append(slice(start, stop + 1))
     if not found:
         return None
-    span = max(found, key=lambda stretch: (stretch.stop - stretch.start, stretch.start))
+    span = max(found, key=lambda stretch: (stretch.stop, -stretch.start))
     slope = float(np.polyfit(steps[span], errors[span], 1)[0])
     return Order(slope, float(np.exp(steps[span][0])), float(np.exp(steps[span][-1])))
 

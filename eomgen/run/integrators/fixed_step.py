@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance, FixedStep
+from eomgen.run.integrators.interface import Advance, Change
 from eomgen.run.problem import Floats, Problem
 
 
@@ -21,7 +21,7 @@ def count_steps(span: float, dt: float) -> float:
 
 
 def advances(
-    method: FixedStep,
+    change: Change,
     problem: Problem,
     t: float,
     *,
@@ -30,7 +30,7 @@ def advances(
     dt: float,
     every: int,
 ) -> Iterator[Advance]:
-    """Yield the steps of `method` from time `t` on, with a sample at every `every`-th and the last.
+    """Yield the steps of a method from time `t` on, with a sample at every `every`-th and the last.
 
     Steps end at t_start + i dt and at `t_end`, so that the first is shorter if `t` lies between.
     Quaternions are scaled back to unit length after every step. Within a step the state is that
@@ -45,17 +45,17 @@ def advances(
         last = i == steps
         # From the start each time: adding up dt would gather rounding.
         end = t_end if last else min(t_start + i * dt, t_end)
-        within = partial(_shorter, method, problem, t, y)
+        within = partial(_shorter, change, problem, t, y)
         length = dt if regular and not last else end - t
-        y, lost = _sum(y, method.change(problem, t, y, length) + lost)
+        y, lost = _sum(y, change(problem, t, y, length) + lost)
         y = problem.unit(y)
         t, regular = end, True
         yield Advance(t, y, [(t, y)] if last or i % every == 0 else [], problem, within)
 
 
-def _shorter(method: FixedStep, problem: Problem, t: float, y: Floats, end: float) -> Floats:
+def _shorter(change: Change, problem: Problem, t: float, y: Floats, end: float) -> Floats:
     """The state at `end` after one step from `t`."""
-    return problem.unit(y + method.change(problem, t, y, end - t)) if end > t else y
+    return problem.unit(y + change(problem, t, y, end - t)) if end > t else y
 
 
 def _sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:

@@ -157,9 +157,8 @@ class GraggBulirschStoer(OdeSolver[Any]):
         """Of a step whose error by this row is what is allowed, less a margin."""
         root = 1 / (2 * row + 1)
         least = _LEAST**root
-        return min(
-            length / min(_MOST / least, max(least, (error / _ERROR) ** root / _STEP)), self.max_step
-        )
+        shrink = min(_MOST / least, max(least, (error / _ERROR) ** root / _STEP))
+        return min(length / shrink, float(self.max_step))
 
     def _shorter(self, table: _Table, length: float) -> float:
         """The length of the step to try after one that was refused, which sets the order, too."""

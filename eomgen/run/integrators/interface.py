@@ -22,20 +22,22 @@ class StepFailure(RunError):
 class FixedStep:
     """A method whose steps the user chooses.
 
-    order   global error O(h^order)
-    remedy  what to change when a run goes astray
+    prepare  gives the method's `Change` for a problem, once a run; raises `RunError` if the method
+             cannot serve it
+    order    global error O(h^order)
+    remedy   what to change when a run goes astray
     """
 
-    change: Change
+    prepare: Callable[[Problem], Change]
     order: int
     remedy: str
 
 
 @dataclass(frozen=True)
 class Adaptive:
-    """A SciPy method that chooses its own steps to meet rtol and atol.
+    """A method, SciPy's or one like it, that chooses its own steps to meet rtol and atol.
 
-    uses_jacobian  whether it is implicit, and so is given the problem's Jacobian
+    uses_jacobian  whether it is given the problem's Jacobian
     one_step       whether it steps on from a state alone, which then may be put right between steps
     remedy         what to change when a run goes astray
     """
