@@ -1,0 +1,282 @@
+"""Which method and tolerance meet an accuracy, or make the most of a time: found on the very scene.
+
+Methods are first tried at a loose tolerance, where a run is cheap, over the whole span: a part of it
+would say nothing of a spike, a contact or of chaos farther on. Differences of runs tell their errors
+and how these fall with the tolerance (`estimate`), their times how those grow. Then the method that
+promises to be the quickest is tried where its error should be a tenth of what is asked, some decades
+tighter at once at most, until a run's own estimate says that it will do. That run is the result; it
+is not made again.
+"""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from eomgen.errors import RunError
+from eomgen.run.problem import Floats
+from eomgen.study.estimate import Law, errors, fit
+from eomgen.study.measure import WRONG
+from eomgen.study.trial import Case, Method, Tried, method_of
+
+GOAL = 0.1
+"""Of the error asked for: what a tolerance is chosen for."""
+ENOUGH = 0.5
+"""Of the error asked for: an estimate up to here will do."""
+CLEAR = 0.3 * WRONG
+"""Runs of greater errors tell nothing of how errors fall: those of a chaotic motion stay as large."""
+RUNG, RUNGS = 100.0, 1000.0
+"""So many times less an error is aimed at at once, where nothing or something is known of it."""
+TIGHTER = 3.0
+"""So many times less an error makes another run worth while."""
+SLACK = 1.5
+"""Of the quickest so far: what another method may take at first."""
+BETTER = 1.5
+"""Among the runs that will do the most accurate counts, up to so many times the least time."""
+FULL, HALF = 0.7, 0.5
+"""Of the time that is left: what a run is planned for. Of that, a run that only shows the way."""
+WORTH = 0.5
+"""Of the best error so far: where none less is expected, a budget is spent no further."""
+FIRST = 1e-4
+"""Tolerance of the first runs, where none is asked for."""
+FIRST_STEPS, MOST_STEPS = 256, 2**22
+"""Of equal steps: in the first run of a method, and in any."""
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A method's next run, the error and the time (s) expected of it, and the time that its run at
+    the accuracy asked for should take.
+    """
+
+    method: Method
+    tolerance: float
+    error: float
+    seconds: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The run chosen.
+
+    error    its estimated error, in parts of the motion's scale; infinite if there is no estimate
+    met      whether that is what was asked for
+    runs     how many were made in all, which took `seconds` together, with this one
+    """
+
+    tried: Tried
+    error: float
+    met: bool
+    runs: int
+    seconds: float
+
+
+@dataclass
+class _Search:
+    """Runs made so far: those that came to the end, and others; methods that are not gone on with."""
+
+    case: Case
+    say: Say
+    first: float
+    runs: list[Tried] = field(default_factory=list)
+    broken: list[Tried] = field(default_factory=list)
+    left_out: set[str] = field(default_factory=set)
+    started: float = field(default_factory=time.perf_counter)
+
+    @property
+    def spent(self) -> float:
+        return time.perf_counter() - self.started
+
+    @property
+    def motion(self) -> Floats:
+        """The motion as the run held tightest so far has it, or where it starts."""
+        if not self.runs:
+            return self.case.problem.initial[None, :]
+        return min(self.runs, key=lambda run: run.tolerance).trajectory.y
+
+    def of(self, name: str) -> list[Tried]:
+        """The finished runs of a method, the tightest last."""
+        own = [run for run in self.runs if run.setting.integrator == name]
+        return sorted(own, key=lambda run: -run.tolerance)
+
+    def tightest(self, method: Method) -> float:
+        return method.tightest or self.case.t_end / MOST_STEPS
+
+    def attempt(self, method: Method, tolerance: float, limit: float) -> bool:
+        """Make a run; where it comes to no end, the method is gone on with no further."""
+        tried = self.case.run(self.case.setting(method, tolerance, self.motion), limit)
+        (self.runs if tried.trajectory.finished else self.broken).append(tried)
+        (self.left_out.discard if tried.trajectory.finished else self.left_out.add)(method.name)
+        return tried.trajectory.finished
+
+    def make(self, plan: Plan, limit: float = math.inf) -> None:
+        """Make the run of a plan, and say what is expected of it."""
+        setting = self.case.setting(plan.method, plan.tolerance, self.motion)
+        self.say(f"{setting.options}: expecting an error of {plan.error:.1g} in {plan.cost:.2g} s")
+        self.attempt(plan.method, plan.tolerance, limit)
+
+    def judged(self) -> dict[int, float]:
+        """Estimated error of each run, by the run's identity."""
+        found = errors(self.runs, self.case.scale(self.motion), self.case.bounded)
+        return {id(run): error for run, error in zip(self.runs, found, strict=True)}
+
+    def chosen(self, tried: Tried, judged: dict[int, float], met: bool) -> Choice:
+        runs = len(self.runs) + len(self.broken)
+        return Choice(tried, judged[id(tried)], met, runs, self.spent)
+
+    def nothing(self) -> Choice:
+        """Of runs that all break off, the one that comes farthest."""
+        farthest = max(self.broken, key=lambda tried: float(tried.trajectory.t[-1]))
+        return self.chosen(farthest, {id(farthest): math.inf}, False)
+
+
+def candidates(case: Case, asked: str | None) -> list[str]:
+    """Methods that are tried, in this order: the one asked for, or those that have been found to be
+    the quickest on one scene or another.
+
+    A multistep method begins anew at each impact, which others do more lightly.
+    """
+    if asked is not None:
+        return [method_of(asked).name]
+    if case.problem.contacts is not None:
+        return ["RK45", "DOP853"]
+    return ["LSODA", "DOP853"]
+
+
+def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda _: None) -> Choice:
+    """A run whose error in the last state is below `target`, in parts of the motion's scale.
+
+    asked  the only method to try
+    say    told of each run after the first ones, and of what is expected of it
+
+    Raises `RunError` for a target that is none.
+    """
+    if not 0 < target < WRONG:
+        raise RunError(f"--accuracy: {target:g} is not between 0 and {WRONG:g}; give e.g. 1e-6")
+    start = min(1e-4, max(1e-6, 1e-4 * (target / 1e-3) ** (1 / 3)))
+    search = _Search(case, say, start)
+    names = _race(search, candidates(case, asked), math.inf)
+    while search.runs:
+        judged = search.judged()
+        done = [run for run in search.runs if judged[id(run)] <= ENOUGH * target]
+        if done:
+            most = BETTER * min(run.seconds for run in done)
+            near = [run for run in done if run.seconds <= most]
+            return search.chosen(min(near, key=lambda run: judged[id(run)]), judged, True)
+        plans = [_towards(search, method_of(name), judged, GOAL * target) for name in names]
+        possible = [plan for plan in plans if plan]
+        if not possible:
+            best = min(search.runs, key=lambda run: judged[id(run)])
+            return search.chosen(best, judged, judged[id(best)] <= target)
+        search.make(min(possible, key=lambda plan: plan.seconds))
+    return search.nothing()
+
+
+def within(case: Case, budget: float, asked: str | None = None, say: Say = lambda _: None) -> Choice:
+    """The most accurate run that, with all that is tried for it, takes up to `budget` s.
+
+    asked, say  as of `meet`
+
+    Raises `RunError` for a time that is none, and if no run comes to its end in it.
+    """
+    if not 0 < budget < math.inf:
+        raise RunError(f"--budget: {budget:g} s is no time to compute in; give e.g. 2s")
+    search = _Search(case, say, FIRST)
+    names = _race(search, candidates(case, asked), budget)
+    while search.runs:
+        judged = search.judged()
+        best = min(search.runs, key=lambda run: judged[id(run)])
+        left = budget - search.spent
+        plans = [_most(search, method_of(name), judged, left) for name in names]
+        possible = [plan for plan in plans if plan]
+        if not possible:
+            return search.chosen(best, judged, True)
+        plan = min(possible, key=lambda plan: plan.error)
+        if plan.error > WORTH * judged[id(best)]:
+            return search.chosen(best, judged, True)
+        search.make(plan, left)
+    if all(tried.cut for tried in search.broken):
+        raise RunError(
+            f"--budget: no run of {case.problem.name} to t = {case.t_end:g} s fits into {budget:g} s"
+            "; give more, or a shorter --t-end"
+        )
+    return search.nothing()
+
+
+def _race(search: _Search, names: list[str], limit: float) -> list[str]:
+    """Try each method once, but those that take much longer than another not to the end; return
+    the names of all that were: where a method had to be implicit, a more accurate one that is, too.
+    """
+    for name in names:
+        _first(search, method_of(name), limit)
+    stiff = any(run.trajectory.counts["jacobians"] for run in search.runs)
+    if len(names) > 1 and (stiff or not search.runs):
+        names = [*names, "Radau"]
+        _first(search, method_of("Radau"), limit)
+    return names
+
+
+def _first(search: _Search, method: Method, limit: float) -> None:
+    """A method's first run; where that fails, a tighter one: too long a step may not be stable."""
+    tolerance = search.case.t_end / FIRST_STEPS if method.equal_steps else search.first
+    while tolerance >= search.tightest(method):
+        quickest = min((run.seconds for run in search.runs), default=math.inf)
+        allowed = min(SLACK * quickest, limit - search.spent)
+        if search.attempt(method, tolerance, allowed) or search.broken[-1].cut:
+            return
+        tolerance /= _rung(method, RUNG)
+
+
+def _rung(method: Method, errors: float) -> float:
+    """How many times tighter makes an error so many times less; at most ten times the steps."""
+    return float(min(errors ** (1 / method.exponent), 10 ** (1 / method.growth)))
+
+
+def _towards(search: _Search, method: Method, judged: dict[int, float], goal: float) -> Plan | None:
+    """A method's next run on the way to an error; none if it can be held no tighter."""
+    own = search.of(method.name)
+    if not own or method.name in search.left_out:
+        return None
+    last, tightest = own[-1].tolerance, search.tightest(method)
+    law, known = _error_law(method, own, judged)
+    wanted = max(min(law.tolerance(goal), last / _rung(method, TIGHTER)), tightest)
+    if wanted >= last:
+        return None
+    tolerance = max(wanted, last / _rung(method, RUNGS if known else RUNG))
+    seconds = _time_law(method, own)
+    return Plan(method, tolerance, law.at(tolerance), seconds.at(wanted), seconds.at(tolerance))
+
+
+def _most(search: _Search, method: Method, judged: dict[int, float], left: float) -> Plan | None:
+    """A method's best run in the time that is left; none if that is no better than its last."""
+    own = search.of(method.name)
+    if not own or method.name in search.left_out or left <= 0:
+        return None
+    last, tightest = own[-1].tolerance, search.tightest(method)
+    law, known = _error_law(method, own, judged)
+    seconds = _time_law(method, own)
+    tolerance = max(seconds.tolerance(FULL * left), tightest)
+    rung = last / _rung(method, RUNG)
+    if not (known and len(own) > 1) and seconds.at(rung) < HALF * FULL * left:
+        tolerance = max(tolerance, rung)
+    if tolerance > last / _rung(method, TIGHTER):
+        return None
+    cost = seconds.at(tolerance)
+    return Plan(method, tolerance, law.at(tolerance), cost, cost)
+
+
+def _error_law(method: Method, own: Sequence[Tried], judged: dict[int, float]) -> tuple[Law, bool]:
+    """How a method's error falls, and whether that is known: else it is taken to begin to fall."""
+    clear = [run for run in own if 0 < judged[id(run)] < CLEAR]
+    if not clear:
+        return fit([own[-1].tolerance], [CLEAR], method.exponent), False
+    pairs = [run.tolerance for run in clear], [judged[id(run)] for run in clear]
+    return fit(*pairs, method.exponent), True
+
+
+def _time_law(method: Method, own: Sequence[Tried]) -> Law:
+    """How a method's time grows."""
+    return fit([r.tolerance for r in own], [r.seconds for r in own], -method.growth)

@@ -1,0 +1,181 @@
+"""One run of a scene under a method's tolerance or step, and what it took."""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from eomgen.run.integrate import integrate
+from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
+from eomgen.run.problem import Floats, Problem
+from eomgen.run.progress import Progress
+from eomgen.run.trajectory import Trajectory
+from eomgen.study.measure import scales
+
+TIGHTEST = {"LSODA": 1e-12}
+"""Relative tolerances beyond which a method gives up on many scenes."""
+TIGHTEST_OF_ALL = 1e-13
+ORDERS = {"RK45": 5, "DOP853": 8, "LSODA": 10, "Radau": 5, "BDF": 4, "gragg_bulirsch_stoer": 12}
+"""Of adaptive methods: the time for an error e grows as e^(-1/order). That of LSODA goes up to 12,
+and that of extrapolation as far as it finds worth it."""
+OVER = "no time for more"
+SOON = 0.2
+"""Part of the time allowed after which a run's pace is judged."""
+SLOW = 2.5
+"""So many times the time allowed, at the pace so far, end a run early."""
+
+Watch = Callable[[str], AbstractContextManager[Progress]]
+"""Shows what is being tried, and how far it is."""
+
+
+def unseen(label: str) -> AbstractContextManager[Progress]:
+    """Watch nothing."""
+    return nullcontext(lambda fraction: None)
+
+
+@dataclass(frozen=True)
+class Method:
+    """What theory says of a method: error ∝ τ^exponent, time ∝ τ^-growth (of an equal step, τ = h).
+
+    tightest  relative tolerance that it is taken to; of an equal step 0
+    """
+
+    name: str
+    exponent: float
+    growth: float
+    tightest: float
+
+    @property
+    def equal_steps(self) -> bool:
+        """Whether τ is a step, s."""
+        return not self.tightest
+
+
+def method_of(name: str) -> Method:
+    """A method by its name. Raises `RunError` if there is none."""
+    found = find_integrator(name)
+    if isinstance(found, FixedStep):
+        return Method(name, float(found.order), 1.0, 0.0)
+    return Method(name, 1.0, 1 / ORDERS.get(name, 5), TIGHTEST.get(name, TIGHTEST_OF_ALL))
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A method and how it is bounded: by tolerances, or by a step, s."""
+
+    integrator: str
+    rtol: float | None = None
+    atol: float | None = None
+    dt: float | None = None
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """Those that are given, by name."""
+        pairs = {"rtol": self.rtol, "atol": self.atol, "dt": self.dt}
+        return {name: value for name, value in pairs.items() if value is not None}
+
+    @property
+    def options(self) -> str:
+        """What on the command line makes the same run."""
+        given = [f"--{name} {value!r}" for name, value in self.bounds.items()]
+        return " ".join([f"--integrator {self.integrator}", *given])
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A run, and what it took, s."""
+
+    setting: Setting
+    trajectory: Trajectory
+    seconds: float
+
+    @property
+    def tolerance(self) -> float:
+        """Relative tolerance; of equal steps their length, s."""
+        return self.setting.rtol or self.setting.dt or math.nan
+
+    @property
+    def cut(self) -> bool:
+        """Whether it was ended for taking too long."""
+        return OVER in self.trajectory.message
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is run: a problem from 0 to `t_end`, s.
+
+    units    of the states, by name
+    kept     what else `integrate` is told, the same for all runs
+    watch    shows each run
+    """
+
+    problem: Problem
+    t_end: float
+    units: Mapping[str, str]
+    kept: Mapping[str, Any] = field(default_factory=dict)
+    watch: Watch = unseen
+
+    @property
+    def bounded(self) -> bool:
+        """Whether steps are kept short for other reasons than their error, in some runs at least."""
+        return self.problem.corners or self.kept.get("max_step") is not None
+
+    def scale(self, y: Floats) -> Floats:
+        """The scale of each state (ny,) of a motion y (n, ny)."""
+        return scales(self.problem.states, self.units, y)
+
+    def setting(self, method: Method, tolerance: float, like: Floats) -> Setting:
+        """A method at about a tolerance, or equal step, s, of few digits.
+
+        The absolute tolerance is that part of the smallest scale in the motion `like` (n, ny): no
+        kind of state is then held to less than the relative tolerance of its own scale.
+        """
+        if method.equal_steps:
+            return Setting(method.name, dt=_plain(tolerance))
+        rtol = max(_plain(tolerance), method.tightest)
+        size = 10.0 ** math.floor(math.log10(float(np.min(self.scale(like)))))
+        return Setting(method.name, rtol=rtol, atol=float(f"{rtol * size:.0e}"))
+
+    def run(self, setting: Setting, limit: float = math.inf) -> Tried:
+        """Make a run; it ends early when it takes longer than `limit`, s, or is sure to."""
+        kept = dict(self.kept)
+        if setting.dt is not None:
+            kept.pop("max_step", None)
+        with self.watch(f"{self.problem.name} by {setting.options[2:]}") as progress:
+            started = time.perf_counter()
+            trajectory = integrate(
+                self.problem,
+                setting.integrator,
+                self.t_end,
+                progress=_limited(progress, started, limit),
+                **setting.bounds,
+                **kept,
+            )
+            seconds = time.perf_counter() - started
+        if trajectory.message.startswith("interrupted"):
+            raise KeyboardInterrupt
+        return Tried(setting, trajectory, seconds)
+
+
+def _limited(progress: Progress, started: float, limit: float) -> Progress:
+    """`progress`, which ends the run when its time is over."""
+
+    def told(fraction: float) -> None:
+        progress(fraction)
+        spent = time.perf_counter() - started
+        hopeless = spent > SOON * limit and spent > SLOW * limit * fraction
+        if fraction < 1 and (spent > limit or hopeless):
+            raise StepFailure(OVER)
+
+    return told
+
+
+def _plain(value: float) -> float:
+    """The next of 1, 2, 5, 10 … at or below a positive value."""
+    power = math.floor(math.log10(value) + 1e-9)
+    first = next(digit for digit in (5, 2, 1) if value * (1 + 1e-9) >= digit * 10.0**power)
+    return float(f"{first}e{power}")
