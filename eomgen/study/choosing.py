@@ -1,11 +1,11 @@
-"""Which method and tolerance meet an accuracy, or make the most of a time: found on the very scene.
+"""Which method and tolerance meet an accuracy, or make the most of a time, on the very scene.
 
-Methods are first tried at a loose tolerance, where a run is cheap, over the whole span: a part of it
-would say nothing of a spike, a contact or of chaos farther on. Differences of runs tell their errors
-and how these fall with the tolerance (`estimate`), their times how those grow. Then the method that
-promises to be the quickest is tried where its error should be a tenth of what is asked, some decades
-tighter at once at most, until a run's own estimate says that it will do. That run is the result; it
-is not made again.
+Methods are first tried at a loose tolerance, where a run is cheap, over the whole span: a part of
+it would say nothing of a spike, a contact or of chaos farther on. Differences of runs tell their
+errors and how these fall with the tolerance (`estimate`), their times how those grow. Then the
+method that promises to be the quickest is tried where its error should be a tenth of what is asked,
+some decades tighter at once at most, until a run's own estimate says that it will do. That run is
+the result; it is not made again.
 """
 
 import math
@@ -24,7 +24,7 @@ GOAL = 0.1
 ENOUGH = 0.5
 """Of the error asked for: an estimate up to here will do."""
 CLEAR = 0.3 * WRONG
-"""Runs of greater errors tell nothing of how errors fall: those of a chaotic motion stay as large."""
+"""Runs of greater errors tell nothing of how errors fall: those of chaotic motions stay large."""
 RUNG, RUNGS = 100.0, 1000.0
 """So many times less an error is aimed at at once, where nothing or something is known of it."""
 TIGHTER = 3.0
@@ -39,7 +39,7 @@ WORTH = 0.5
 """Of the best error so far: where none less is expected, a budget is spent no further."""
 FIRST = 1e-4
 """Tolerance of the first runs, where none is asked for."""
-FIRST_STEPS, MOST_STEPS = 256, 2**22
+FIRST_STEPS, MOST_STEPS = 256, 2**20
 """Of equal steps: in the first run of a method, and in any."""
 
 Say = Callable[[str], None]
@@ -47,15 +47,18 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Plan:
-    """A method's next run, the error and the time (s) expected of it, and the time that its run at
-    the accuracy asked for should take.
+    """A method's next run.
+
+    error, seconds  expected of it, the error only where it is `known`
+    work            that its run at the accuracy asked for should take, s of the processor
     """
 
     method: Method
     tolerance: float
     error: float
+    known: bool
     seconds: float
-    cost: float
+    work: float
 
 
 @dataclass(frozen=True)
@@ -76,11 +79,12 @@ class Choice:
 
 @dataclass
 class _Search:
-    """Runs made so far: those that came to the end, and others; methods that are not gone on with."""
+    """Runs made so far: those that came to the end, and others; methods that are done with."""
 
     case: Case
     say: Say
     first: float
+    budget: float = math.inf
     runs: list[Tried] = field(default_factory=list)
     broken: list[Tried] = field(default_factory=list)
     left_out: set[str] = field(default_factory=set)
@@ -105,18 +109,28 @@ class _Search:
     def tightest(self, method: Method) -> float:
         return method.tightest or self.case.t_end / MOST_STEPS
 
-    def attempt(self, method: Method, tolerance: float, limit: float) -> bool:
-        """Make a run; where it comes to no end, the method is gone on with no further."""
-        tried = self.case.run(self.case.setting(method, tolerance, self.motion), limit)
-        (self.runs if tried.trajectory.finished else self.broken).append(tried)
-        (self.left_out.discard if tried.trajectory.finished else self.left_out.add)(method.name)
-        return tried.trajectory.finished
+    @property
+    def deepest(self) -> float:
+        """The tightest tolerance so far."""
+        return min(run.tolerance for run in self.runs)
 
-    def make(self, plan: Plan, limit: float = math.inf) -> None:
+    def attempt(self, method: Method, tolerance: float, most: float = math.inf) -> bool:
+        """Make a run; where it comes to no end, the method is gone on with no further."""
+        setting = self.case.setting(method, tolerance, self.motion)
+        tried = self.case.run(setting, most=most, due=self.started + self.budget)
+        if tried.interrupted:
+            raise KeyboardInterrupt
+        finished = tried.trajectory.finished
+        (self.runs if finished else self.broken).append(tried)
+        (self.left_out.discard if finished else self.left_out.add)(method.name)
+        return finished
+
+    def make(self, plan: Plan) -> None:
         """Make the run of a plan, and say what is expected of it."""
         setting = self.case.setting(plan.method, plan.tolerance, self.motion)
-        self.say(f"{setting.options}: expecting an error of {plan.error:.1g} in {plan.cost:.2g} s")
-        self.attempt(plan.method, plan.tolerance, limit)
+        error = f"an error of {plan.error:.1g} in " if plan.known else ""
+        self.say(f"{setting.options}: expecting {error}{plan.seconds:.2g} s")
+        self.attempt(plan.method, plan.tolerance)
 
     def judged(self) -> dict[int, float]:
         """Estimated error of each run, by the run's identity."""
@@ -158,24 +172,26 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         raise RunError(f"--accuracy: {target:g} is not between 0 and {WRONG:g}; give e.g. 1e-6")
     start = min(1e-4, max(1e-6, 1e-4 * (target / 1e-3) ** (1 / 3)))
     search = _Search(case, say, start)
-    names = _race(search, candidates(case, asked), math.inf)
+    names = _race(search, candidates(case, asked))
     while search.runs:
         judged = search.judged()
         done = [run for run in search.runs if judged[id(run)] <= ENOUGH * target]
         if done:
-            most = BETTER * min(run.seconds for run in done)
-            near = [run for run in done if run.seconds <= most]
+            most = BETTER * min(run.work for run in done)
+            near = [run for run in done if run.work <= most]
             return search.chosen(min(near, key=lambda run: judged[id(run)]), judged, True)
         plans = [_towards(search, method_of(name), judged, GOAL * target) for name in names]
         possible = [plan for plan in plans if plan]
         if not possible:
             best = min(search.runs, key=lambda run: judged[id(run)])
             return search.chosen(best, judged, judged[id(best)] <= target)
-        search.make(min(possible, key=lambda plan: plan.seconds))
+        search.make(min(possible, key=lambda plan: plan.work))
     return search.nothing()
 
 
-def within(case: Case, budget: float, asked: str | None = None, say: Say = lambda _: None) -> Choice:
+def within(
+    case: Case, budget: float, asked: str | None = None, say: Say = lambda _: None
+) -> Choice:
     """The most accurate run that, with all that is tried for it, takes up to `budget` s.
 
     asked, say  as of `meet`
@@ -184,8 +200,8 @@ def within(case: Case, budget: float, asked: str | None = None, say: Say = lambd
     """
     if not 0 < budget < math.inf:
         raise RunError(f"--budget: {budget:g} s is no time to compute in; give e.g. 2s")
-    search = _Search(case, say, FIRST)
-    names = _race(search, candidates(case, asked), budget)
+    search = _Search(case, say, FIRST, budget)
+    names = _race(search, candidates(case, asked))
     while search.runs:
         judged = search.judged()
         best = min(search.runs, key=lambda run: judged[id(run)])
@@ -197,35 +213,34 @@ def within(case: Case, budget: float, asked: str | None = None, say: Say = lambd
         plan = min(possible, key=lambda plan: plan.error)
         if plan.error > WORTH * judged[id(best)]:
             return search.chosen(best, judged, True)
-        search.make(plan, left)
+        search.make(plan)
     if all(tried.cut for tried in search.broken):
         raise RunError(
-            f"--budget: no run of {case.problem.name} to t = {case.t_end:g} s fits into {budget:g} s"
-            "; give more, or a shorter --t-end"
+            f"--budget: no run of {case.problem.name} to t = {case.t_end:g} s fits into "
+            f"{budget:g} s; give more, or a shorter --t-end"
         )
     return search.nothing()
 
 
-def _race(search: _Search, names: list[str], limit: float) -> list[str]:
+def _race(search: _Search, names: list[str]) -> list[str]:
     """Try each method once, but those that take much longer than another not to the end; return
     the names of all that were: where a method had to be implicit, a more accurate one that is, too.
     """
     for name in names:
-        _first(search, method_of(name), limit)
+        _first(search, method_of(name))
     stiff = any(run.trajectory.counts["jacobians"] for run in search.runs)
     if len(names) > 1 and (stiff or not search.runs):
         names = [*names, "Radau"]
-        _first(search, method_of("Radau"), limit)
+        _first(search, method_of("Radau"))
     return names
 
 
-def _first(search: _Search, method: Method, limit: float) -> None:
+def _first(search: _Search, method: Method) -> None:
     """A method's first run; where that fails, a tighter one: too long a step may not be stable."""
     tolerance = search.case.t_end / FIRST_STEPS if method.equal_steps else search.first
+    most = SLACK * min((run.work for run in search.runs), default=math.inf)
     while tolerance >= search.tightest(method):
-        quickest = min((run.seconds for run in search.runs), default=math.inf)
-        allowed = min(SLACK * quickest, limit - search.spent)
-        if search.attempt(method, tolerance, allowed) or search.broken[-1].cut:
+        if search.attempt(method, tolerance, most) or search.broken[-1].cut:
             return
         tolerance /= _rung(method, RUNG)
 
@@ -241,13 +256,18 @@ def _towards(search: _Search, method: Method, judged: dict[int, float], goal: fl
     if not own or method.name in search.left_out:
         return None
     last, tightest = own[-1].tolerance, search.tightest(method)
-    law, known = _error_law(method, own, judged)
-    wanted = max(min(law.tolerance(goal), last / _rung(method, TIGHTER)), tightest)
-    if wanted >= last:
+    law, known = _error_law(search, method, judged)
+    if known:
+        wanted = max(min(law.tolerance(goal), last / _rung(method, TIGHTER)), tightest)
+        tolerance = max(wanted, search.deepest / _rung(method, RUNGS))
+    else:
+        tolerance = wanted = max(search.deepest / _rung(method, RUNG), tightest)
+    if tolerance >= last:
         return None
-    tolerance = max(wanted, last / _rung(method, RUNGS if known else RUNG))
-    seconds = _time_law(method, own)
-    return Plan(method, tolerance, law.at(tolerance), seconds.at(wanted), seconds.at(tolerance))
+    seconds = _growth(method, [(run.tolerance, run.seconds) for run in own])
+    work = _growth(method, [(run.tolerance, run.work) for run in own])
+    error, cost = law.at(tolerance), seconds.at(tolerance)
+    return Plan(method, tolerance, error, known, cost, work.at(wanted))
 
 
 def _most(search: _Search, method: Method, judged: dict[int, float], left: float) -> Plan | None:
@@ -256,8 +276,8 @@ def _most(search: _Search, method: Method, judged: dict[int, float], left: float
     if not own or method.name in search.left_out or left <= 0:
         return None
     last, tightest = own[-1].tolerance, search.tightest(method)
-    law, known = _error_law(method, own, judged)
-    seconds = _time_law(method, own)
+    law, known = _error_law(search, method, judged)
+    seconds = _growth(method, [(run.tolerance, run.seconds) for run in own])
     tolerance = max(seconds.tolerance(FULL * left), tightest)
     rung = last / _rung(method, RUNG)
     if not (known and len(own) > 1) and seconds.at(rung) < HALF * FULL * left:
@@ -265,18 +285,30 @@ def _most(search: _Search, method: Method, judged: dict[int, float], left: float
     if tolerance > last / _rung(method, TIGHTER):
         return None
     cost = seconds.at(tolerance)
-    return Plan(method, tolerance, law.at(tolerance), cost, cost)
+    return Plan(method, tolerance, law.at(tolerance), known, cost, cost)
 
 
-def _error_law(method: Method, own: Sequence[Tried], judged: dict[int, float]) -> tuple[Law, bool]:
-    """How a method's error falls, and whether that is known: else it is taken to begin to fall."""
-    clear = [run for run in own if 0 < judged[id(run)] < CLEAR]
-    if not clear:
-        return fit([own[-1].tolerance], [CLEAR], method.exponent), False
-    pairs = [run.tolerance for run in clear], [judged[id(run)] for run in clear]
-    return fit(*pairs, method.exponent), True
+def _error_law(search: _Search, method: Method, judged: dict[int, float]) -> tuple[Law, bool]:
+    """How a method's error falls, and whether that is known.
+
+    Of a method whose runs were all too wrong to tell, it is that of the method held tightest: what
+    makes small errors large is the motion. Where nothing is known, it is taken to begin to fall.
+    """
+
+    def clear(name: str) -> list[Tried]:
+        return [run for run in search.of(name) if 0 < judged[id(run)] < CLEAR]
+
+    told = clear(method.name)
+    if not told:
+        others = sorted({run.setting.integrator for run in search.runs})
+        ladders = [runs for name in others if (runs := clear(name))]
+        told = min(ladders, key=lambda runs: runs[-1].tolerance, default=[])
+    if not told:
+        return fit([search.of(method.name)[-1].tolerance], [CLEAR], method.exponent), False
+    errors = [judged[id(run)] for run in told]
+    return fit([run.tolerance for run in told], errors, method.exponent), True
 
 
-def _time_law(method: Method, own: Sequence[Tried]) -> Law:
-    """How a method's time grows."""
-    return fit([r.tolerance for r in own], [r.seconds for r in own], -method.growth)
+def _growth(method: Method, times: Sequence[tuple[float, float]]) -> Law:
+    """How a method's time grows, from pairs of tolerance and time."""
+    return fit([pair[0] for pair in times], [pair[1] for pair in times], -method.growth)

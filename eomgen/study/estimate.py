@@ -1,21 +1,23 @@
 """What a run's own error is, as far as other runs of the same scene and its energy tell.
 
-A method makes an error C τ^a at the tolerance τ, a near 1; of order p at an equal step h, C h^p. Two
-runs that differ in τ alone are apart by the error of the looser one, but for the share that the
+A method makes an error C τ^a at the tolerance τ, a near 1; of order p at an equal step h, C h^p.
+Two runs that differ in τ alone are apart by the error of the looser one, but for the share that the
 tighter one has itself; three tell the exponent. Runs of two methods are apart by the error of the
 worse one. Differences are taken over the last part of the run, not at its last moment alone: a
-motion swings, and so does what two runs differ by, which may pass through 0 just there.
+motion swings, and so does what two runs differ by, which may pass through 0 just there; nor where
+it is greatest, which a spike or an impact makes large for a moment.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from eomgen.run.problem import Floats
 from eomgen.run.trajectory import Trajectory
-from eomgen.study.measure import WRONG, error
+from eomgen.study.measure import WRONG
 from eomgen.study.trial import TIGHTEST_OF_ALL, Case, Tried, method_of
 
 LAST = 0.1
@@ -35,7 +37,7 @@ class Law:
 
     def at(self, tolerance: float) -> float:
         """The quantity at a tolerance."""
-        return self.factor * tolerance**self.exponent
+        return self.factor * math.pow(tolerance, self.exponent)
 
     def tolerance(self, quantity: float) -> float:
         """The tolerance for a quantity."""
@@ -51,22 +53,24 @@ def fit(tolerances: Sequence[float], quantities: Sequence[float], expected: floa
     if len(tau) > 1:
         away, rise = tau[:-1] - tau[-1], e[:-1] - e[-1]
         bounds = sorted(bound * expected for bound in SLOPES)
-        slope = float(np.clip(away @ rise / (away @ away), *bounds))
+        slope = min(max(float(away @ rise) / float(away @ away), bounds[0]), bounds[1])
     return Law(math.exp(e[-1] - slope * tau[-1]), slope)
 
 
 def difference(one: Trajectory, other: Trajectory, scale: Floats) -> float:
-    """How far two runs over the same time are apart in its last part, in parts of the scale."""
+    """How far two runs over the same time are apart, in parts of the scale: at the end, or, where
+    that is more, at half the moments of the last part of the run.
+    """
     start, end = float(one.t[0]), float(one.t[-1])
     since = end - LAST * (end - start)
     a, b = _rows(one, since), _rows(other, since)
     _, i, j = np.intersect1d(a[0], b[0], return_indices=True)
-    return error(a[1][i], b[1][j], scale)
+    apart = np.max(np.abs(a[1][i] - b[1][j]) / scale, axis=1)
+    return max(float(apart[-1]), float(np.median(apart)))
 
 
 def _rows(run: Trajectory, since: float) -> tuple[Floats, Floats]:
-    """Rows from a time on, backwards: of those at one moment, an impact, the last is then met first.
-    """
+    """Rows from a time on, backwards: of those at one moment, an impact, the last comes first."""
     late = run.t >= since
     return run.t[late][::-1], run.y[late][::-1]
 
@@ -87,7 +91,7 @@ def remaining(gaps: Sequence[float], tolerances: Sequence[float], expected: floa
         slope = min(measured, expected)
     elif len(gaps) > 1 and gaps[-2] <= last:
         slope = 0.0
-    return last * (tolerances[-1] / tolerances[-2]) ** slope
+    return last * math.pow(tolerances[-1] / tolerances[-2], slope)
 
 
 def errors(runs: Sequence[Tried], scale: Floats, bounded: bool = False) -> list[float]:
@@ -106,7 +110,7 @@ def errors(runs: Sequence[Tried], scale: Floats, bounded: bool = False) -> list[
         if run is not own[-1]:
             apart.append(difference(run.trajectory, own[-1].trajectory, scale))
         elif len(own) > 1:
-            pairs = zip(own, own[1:], strict=False)
+            pairs = pairwise(own)
             gaps = [difference(a.trajectory, b.trajectory, scale) for a, b in pairs]
             tolerances = [r.tolerance for r in own]
             if gaps[-1] > 0 or not bounded:
@@ -118,8 +122,8 @@ def errors(runs: Sequence[Tried], scale: Floats, bounded: bool = False) -> list[
 def by_second_run(case: Case, first: Tried) -> tuple[float, Tried]:
     """A run's error, in parts of the motion's scale, by another one, and that one.
 
-    The other has a tenth of its tolerances, or half its step; where no tighter tolerance is allowed,
-    ten times them. The error is infinite where the other run comes to no end.
+    The other has a tenth of its tolerances, or half its step; where they are near the tightest, ten
+    times them. The error is infinite where the other run comes to no end.
     """
     given, tightest = first.setting, TIGHTEST_OF_ALL
     if given.dt is not None:
@@ -129,6 +133,8 @@ def by_second_run(case: Case, first: Tried) -> tuple[float, Tried]:
         factor = 0.1 if given.rtol >= 10 * tightest else 10.0
         other = replace(given, rtol=_plain(given.rtol * factor), atol=_plain(given.atol * factor))
     second = case.run(other)
+    if second.interrupted:
+        raise KeyboardInterrupt
     if not (first.trajectory.finished and second.trajectory.finished):
         return math.inf, second
     apart = difference(first.trajectory, second.trajectory, case.scale(second.trajectory.y))

@@ -14,6 +14,7 @@ from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
 from eomgen.run.trajectory import Trajectory
+from eomgen.run.works import Powers
 from eomgen.study.measure import scales
 
 TIGHTEST = {"LSODA": 1e-12}
@@ -73,30 +74,39 @@ class Setting:
     dt: float | None = None
 
     @property
-    def bounds(self) -> dict[str, float]:
+    def tolerances(self) -> dict[str, Any]:
         """Those that are given, by name."""
-        pairs = {"rtol": self.rtol, "atol": self.atol, "dt": self.dt}
+        pairs = {"rtol": self.rtol, "atol": self.atol}
         return {name: value for name, value in pairs.items() if value is not None}
 
     @property
     def options(self) -> str:
         """What on the command line makes the same run."""
-        given = [f"--{name} {value!r}" for name, value in self.bounds.items()]
+        steps = {} if self.dt is None else {"dt": self.dt}
+        given = [f"--{name} {value!r}" for name, value in {**self.tolerances, **steps}.items()]
         return " ".join([f"--integrator {self.integrator}", *given])
 
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A run, and what it took, s."""
+    """A run, and what it took, s: by the clock on the wall, and of the processor, which tells
+    methods apart where the machine has other work, too.
+    """
 
     setting: Setting
     trajectory: Trajectory
     seconds: float
+    work: float
 
     @property
     def tolerance(self) -> float:
         """Relative tolerance; of equal steps their length, s."""
         return self.setting.rtol or self.setting.dt or math.nan
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the user ended it."""
+        return self.trajectory.message.startswith("interrupted")
 
     @property
     def cut(self) -> bool:
@@ -121,7 +131,7 @@ class Case:
 
     @property
     def bounded(self) -> bool:
-        """Whether steps are kept short for other reasons than their error, in some runs at least."""
+        """Whether steps are kept short for other reasons than their error."""
         return self.problem.corners or self.kept.get("max_step") is not None
 
     def scale(self, y: Floats) -> Floats:
@@ -140,35 +150,41 @@ class Case:
         size = 10.0 ** math.floor(math.log10(float(np.min(self.scale(like)))))
         return Setting(method.name, rtol=rtol, atol=float(f"{rtol * size:.0e}"))
 
-    def run(self, setting: Setting, limit: float = math.inf) -> Tried:
-        """Make a run; it ends early when it takes longer than `limit`, s, or is sure to."""
-        kept = dict(self.kept)
-        if setting.dt is not None:
-            kept.pop("max_step", None)
+    def run(
+        self,
+        setting: Setting,
+        *,
+        most: float = math.inf,
+        due: float = math.inf,
+        powers: Powers | None = None,
+    ) -> Tried:
+        """Make a run. It ends early when it takes `most` s of the processor, or is sure to, and
+        when `time.perf_counter` is at `due`. `powers` asks for the works of effects.
+        """
         with self.watch(f"{self.problem.name} by {setting.options[2:]}") as progress:
-            started = time.perf_counter()
+            started, began = time.perf_counter(), time.thread_time()
             trajectory = integrate(
                 self.problem,
                 setting.integrator,
                 self.t_end,
-                progress=_limited(progress, started, limit),
-                **setting.bounds,
-                **kept,
+                dt=setting.dt,
+                **setting.tolerances,
+                **self.kept,
+                progress=_limited(progress, began, most, due),
+                powers=powers,
             )
-            seconds = time.perf_counter() - started
-        if trajectory.message.startswith("interrupted"):
-            raise KeyboardInterrupt
-        return Tried(setting, trajectory, seconds)
+            seconds, work = time.perf_counter() - started, time.thread_time() - began
+        return Tried(setting, trajectory, seconds, work)
 
 
-def _limited(progress: Progress, started: float, limit: float) -> Progress:
+def _limited(progress: Progress, began: float, most: float, due: float) -> Progress:
     """`progress`, which ends the run when its time is over."""
 
     def told(fraction: float) -> None:
         progress(fraction)
-        spent = time.perf_counter() - started
-        hopeless = spent > SOON * limit and spent > SLOW * limit * fraction
-        if fraction < 1 and (spent > limit or hopeless):
+        spent = time.thread_time() - began
+        hopeless = spent > SOON * most and spent > SLOW * most * fraction
+        if fraction < 1 and (spent > most or hopeless or time.perf_counter() > due):
             raise StepFailure(OVER)
 
     return told
