@@ -90,25 +90,22 @@ def print_choice(choice: "Choice", given: Arguments) -> str:
 def print_estimate(case: "Case", tried: "Tried") -> None:
     """Say a run's error by a second run, which is made here."""
     from eomgen.study.estimate import by_second_run
-
-    error, second = by_second_run(case, tried)
-    if math.isfinite(error):
-        print(
-            f"    error estimate {_error(error)}, from a second run, {second.setting.options}, "
-            f"{second.seconds:.2g} s"
-        )
-        warn_of_error(error)
-    else:
-        print(f"    no error estimate: {second.setting.options} {second.trajectory.message}")
-
-
-def warn_of_error(error: float) -> None:
-    """Warn of a run that its own estimate tells to be wrong."""
     from eomgen.study.measure import WRONG
 
-    if WRONG <= error < math.inf:
+    found = by_second_run(case, tried)
+    second = found.second
+    if not math.isfinite(found.last):
+        print(f"    no error estimate: {second.setting.options} {second.trajectory.message}")
+        return
+    print(
+        f"    error estimate {_error(found.last)} at the end, at most {found.most:.1e} at "
+        f"t = {found.at:.4g} s"
+    )
+    print(f"    by a second run, {second.setting.options}, which took {second.seconds:.2g} s")
+    if found.most >= WRONG:
         _warn(
-            f"by its own estimate this run is wrong by {error:.1g} of the motion's scale; {BETTER}"
+            f"by its own estimate this run is wrong by {found.most:.1g} of the motion's scale at "
+            f"t = {found.at:.4g} s; {BETTER}"
         )
 
 

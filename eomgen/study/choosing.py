@@ -27,6 +27,8 @@ CLEAR = 0.3 * WRONG
 """Runs of greater errors tell nothing of how errors fall: those of chaotic motions stay large."""
 RUNG, RUNGS = 100.0, 1000.0
 """So many times less an error is aimed at at once, where nothing or something is known of it."""
+BESIDE = 10.0
+"""So many times more an error is that of a run made to tell that of the next one."""
 TIGHTER = 3.0
 """So many times less an error makes another run worth while."""
 SLACK = 1.5
@@ -125,12 +127,12 @@ class _Search:
         (self.left_out.discard if finished else self.left_out.add)(method.name)
         return finished
 
-    def make(self, plan: Plan) -> None:
-        """Make the run of a plan, and say what is expected of it."""
+    def make(self, plan: Plan) -> bool:
+        """Make the run of a plan, and say what is expected of it; whether it came to its end."""
         setting = self.case.setting(plan.method, plan.tolerance, self.motion)
         error = f"an error of {plan.error:.1g} in " if plan.known else ""
         self.say(f"{setting.options}: expecting {error}{plan.seconds:.2g} s")
-        self.attempt(plan.method, plan.tolerance)
+        return self.attempt(plan.method, plan.tolerance)
 
     def judged(self) -> dict[int, float]:
         """Estimated error of each run, by the run's identity."""
@@ -182,10 +184,12 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
             return search.chosen(min(near, key=lambda run: judged[id(run)]), judged, True)
         plans = [_towards(search, method_of(name), judged, GOAL * target) for name in names]
         possible = [plan for plan in plans if plan]
-        if not possible:
-            best = min(search.runs, key=lambda run: judged[id(run)])
-            return search.chosen(best, judged, judged[id(best)] <= target)
-        search.make(min(possible, key=lambda plan: plan.work))
+        best = min(search.runs, key=lambda run: judged[id(run)])
+        if judged[id(best)] <= target and not possible:
+            return search.chosen(best, judged, True)
+        plan = min(possible, key=lambda plan: plan.work) if possible else _beside(search, best)
+        if not (plan and search.make(plan)) and not possible:
+            return search.chosen(best, judged, False)
     return search.nothing()
 
 
@@ -268,6 +272,16 @@ def _towards(search: _Search, method: Method, judged: dict[int, float], goal: fl
     work = _growth(method, [(run.tolerance, run.work) for run in own])
     error, cost = law.at(tolerance), seconds.at(tolerance)
     return Plan(method, tolerance, error, known, cost, work.at(wanted))
+
+
+def _beside(search: _Search, best: Tried) -> Plan | None:
+    """A run a little looser than the best, where that has none near it to tell its error by."""
+    method = method_of(best.setting.integrator)
+    others = [run.tolerance for run in search.of(method.name) if run is not best]
+    if min(others, default=math.inf) <= best.tolerance * _rung(method, RUNG):
+        return None
+    tolerance = best.tolerance * _rung(method, BESIDE)
+    return Plan(method, tolerance, math.nan, False, best.seconds, best.work)
 
 
 def _most(search: _Search, method: Method, judged: dict[int, float], left: float) -> Plan | None:

@@ -24,6 +24,11 @@ LAST = 0.1
 """Part of a run's time over whose rows differences are taken."""
 CAUTION = 0.8
 """Of the exponent that a method has in theory: taken where one difference alone is known."""
+APART = 30.0
+"""By so much must an error have become less by theory for its fall to be seen: errors scatter."""
+SCATTER = 3.0
+"""Those of multistep methods, whose orders change, too, scatter more: what remains of theirs is
+taken so many times."""
 SLOPES = (0.6, 1.2)
 """Of the exponent in theory: what a fitted one is kept to."""
 
@@ -80,17 +85,18 @@ def remaining(gaps: Sequence[float], tolerances: Sequence[float], expected: floa
     differences (k - 1,) of each from the next.
 
     That of a wrong run says nothing of the next one's error, and is returned as it is. From two on
-    they tell how fast the error falls now: near rounding it does no longer.
+    they tell how fast the error falls now, if they are far enough apart: near rounding it does no
+    longer.
     """
     last = gaps[-1]
     if last >= WRONG or last == 0:
         return last
     slope = CAUTION * expected
-    if len(gaps) > 1 and last < gaps[-2] < WRONG:
-        measured = math.log(gaps[-2] / last) / math.log(tolerances[-3] / tolerances[-2])
-        slope = min(measured, expected)
-    elif len(gaps) > 1 and gaps[-2] <= last:
-        slope = 0.0
+    for gap, tolerance in zip(gaps[-2::-1], tolerances[-3::-1], strict=True):
+        ratio = tolerance / tolerances[-2]
+        if ratio**expected >= APART and 0 < gap < WRONG:
+            slope = min(max(math.log(gap / last) / math.log(ratio), 0.0), expected)
+            break
     return last * math.pow(tolerances[-1] / tolerances[-2], slope)
 
 
@@ -114,16 +120,33 @@ def errors(runs: Sequence[Tried], scale: Floats, bounded: bool = False) -> list[
             gaps = [difference(a.trajectory, b.trajectory, scale) for a, b in pairs]
             tolerances = [r.tolerance for r in own]
             if gaps[-1] > 0 or not bounded:
-                apart.append(remaining(gaps, tolerances, method_of(name).exponent))
+                method = method_of(name)
+                scatter = SCATTER if method.multistep else 1.0
+                apart.append(scatter * remaining(gaps, tolerances, method.exponent))
         found.append(min(apart, default=math.inf))
     return found
 
 
-def by_second_run(case: Case, first: Tried) -> tuple[float, Tried]:
-    """A run's error, in parts of the motion's scale, by another one, and that one.
+@dataclass(frozen=True)
+class Estimate:
+    """A run's error in parts of the motion's scale, by a `second` run, infinite if that breaks off.
+
+    last  of the last state
+    most  of any row, that at the time `at`, s; with contacts, where a row may lie before an impact
+          in one run and after it in the other, of the last state, too
+    """
+
+    last: float
+    most: float
+    at: float
+    second: Tried
+
+
+def by_second_run(case: Case, first: Tried) -> Estimate:
+    """A run's error by another run, which is made here.
 
     The other has a tenth of its tolerances, or half its step; where they are near the tightest, ten
-    times them. The error is infinite where the other run comes to no end.
+    times them.
     """
     given, tightest = first.setting, TIGHTEST_OF_ALL
     if given.dt is not None:
@@ -135,13 +158,20 @@ def by_second_run(case: Case, first: Tried) -> tuple[float, Tried]:
     second = case.run(other)
     if second.interrupted:
         raise KeyboardInterrupt
-    if not (first.trajectory.finished and second.trajectory.finished):
-        return math.inf, second
-    apart = difference(first.trajectory, second.trajectory, case.scale(second.trajectory.y))
-    ratio = second.tolerance / first.tolerance
+    one, two = first.trajectory, second.trajectory
+    if not (one.finished and two.finished):
+        return Estimate(math.inf, math.inf, math.nan, second)
     exponent = method_of(given.integrator).exponent * (CAUTION if given.dt is None else 1)
     # What they are apart by is one error less the other.
-    return apart / abs(1 - ratio**exponent), second
+    share = abs(1 - math.pow(second.tolerance / first.tolerance, exponent))
+    scale = case.scale(two.y)
+    last = difference(one, two, scale) / share
+    if case.problem.contacts is not None:
+        return Estimate(last, last, float(one.t[-1]), second)
+    t, i, j = np.intersect1d(one.t, two.t, return_indices=True)
+    apart = np.max(np.abs(one.y[i] - two.y[j]) / scale, axis=1) / share
+    worst = int(np.argmax(apart))
+    return Estimate(last, max(last, float(apart[worst])), float(t[worst]), second)
 
 
 def _plain(value: float) -> float:

@@ -42,13 +42,15 @@ def unseen(label: str) -> AbstractContextManager[Progress]:
 class Method:
     """What theory says of a method: error ∝ τ^exponent, time ∝ τ^-growth (of an equal step, τ = h).
 
-    tightest  relative tolerance that it is taken to; of an equal step 0
+    tightest   relative tolerance that it is taken to; of an equal step 0
+    multistep  whether it steps on from several states
     """
 
     name: str
     exponent: float
     growth: float
     tightest: float
+    multistep: bool = False
 
     @property
     def equal_steps(self) -> bool:
@@ -61,7 +63,8 @@ def method_of(name: str) -> Method:
     found = find_integrator(name)
     if isinstance(found, FixedStep):
         return Method(name, float(found.order), 1.0, 0.0)
-    return Method(name, 1.0, 1 / ORDERS.get(name, 5), TIGHTEST.get(name, TIGHTEST_OF_ALL))
+    growth, tightest = 1 / ORDERS.get(name, 5), TIGHTEST.get(name, TIGHTEST_OF_ALL)
+    return Method(name, 1.0, growth, tightest, not found.one_step)
 
 
 @dataclass(frozen=True)
