@@ -250,8 +250,8 @@ def test_no_false_alarm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     scene = tmp_path / "stiff.toml"
     scene.write_text(STIFF)
     quiet = [
-        [str(scene)],
-        [str(scene), "--works"],
+        [str(scene), "--t-end", "0.3"],
+        [str(scene), "--t-end", "0.3", "--works"],
         ["two_body_forced", "--input", "tau=3", "--t-end", "0.5"],
         ["two_body_forced", "--input", "tau=3", "--t-end", "0.5", "--works"],
         ["pendulum", "--estimate"],

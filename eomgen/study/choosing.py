@@ -41,7 +41,9 @@ WORTH = 0.5
 """Of the best error so far: where none less is expected, a budget is spent no further."""
 FIRST = 1e-4
 """Tolerance of the first runs, where none is asked for."""
-FIRST_STEPS, MOST_STEPS = 256, 2**20
+LOOSE = 1e-5
+"""Errors asked for down to here may be met by few equal steps."""
+FIRST_STEPS, MOST_STEPS = 64, 2**20
 """Of equal steps: in the first run of a method, and in any."""
 
 Say = Callable[[str], None]
@@ -101,7 +103,8 @@ class _Search:
         """The motion as the run held tightest so far has it, or where it starts."""
         if not self.runs:
             return self.case.problem.initial[None, :]
-        return min(self.runs, key=lambda run: run.tolerance).trajectory.y
+        tightest = min(self.runs, key=lambda run: (run.setting.dt is not None, run.tolerance))
+        return tightest.trajectory.y
 
     def of(self, name: str) -> list[Tried]:
         """The finished runs of a method, the tightest last."""
@@ -111,10 +114,10 @@ class _Search:
     def tightest(self, method: Method) -> float:
         return method.tightest or self.case.t_end / MOST_STEPS
 
-    @property
-    def deepest(self) -> float:
-        """The tightest tolerance so far."""
-        return min(run.tolerance for run in self.runs)
+    def deepest(self, method: Method) -> float:
+        """The tightest tolerance so far, or shortest step, of methods of its kind."""
+        alike = (run for run in self.runs if (run.setting.dt is not None) == method.equal_steps)
+        return min(run.tolerance for run in alike)
 
     def attempt(self, method: Method, tolerance: float, most: float = math.inf) -> bool:
         """Make a run; where it comes to no end, the method is gone on with no further."""
@@ -174,7 +177,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         raise RunError(f"--accuracy: {target:g} is not between 0 and {WRONG:g}; give e.g. 1e-6")
     start = min(1e-4, max(1e-6, 1e-4 * (target / 1e-3) ** (1 / 3)))
     search = _Search(case, say, start)
-    names = _race(search, candidates(case, asked))
+    names = _race(search, candidates(case, asked), target >= LOOSE)
     while search.runs:
         judged = search.judged()
         done = [run for run in search.runs if judged[id(run)] <= ENOUGH * target]
@@ -205,7 +208,7 @@ def within(
     if not 0 < budget < math.inf:
         raise RunError(f"--budget: {budget:g} s is no time to compute in; give e.g. 2s")
     search = _Search(case, say, FIRST, budget)
-    names = _race(search, candidates(case, asked))
+    names = _race(search, candidates(case, asked), False)
     while search.runs:
         judged = search.judged()
         best = min(search.runs, key=lambda run: judged[id(run)])
@@ -226,17 +229,25 @@ def within(
     return search.nothing()
 
 
-def _race(search: _Search, names: list[str]) -> list[str]:
+def _race(search: _Search, names: list[str], loose: bool) -> list[str]:
     """Try each method once, but those that take much longer than another not to the end; return
-    the names of all that were: where a method had to be implicit, a more accurate one that is, too.
+    the names of all that were.
+
+    Where a method had to be implicit, a more accurate one that is is tried, too; where it had not,
+    the motion is smooth, and a `loose` error is asked for, one that spends no time on its steps.
     """
     for name in names:
         _first(search, method_of(name))
-    stiff = any(run.trajectory.counts["jacobians"] for run in search.runs)
-    if len(names) > 1 and (stiff or not search.runs):
-        names = [*names, "Radau"]
-        _first(search, method_of("Radau"))
-    return names
+    if len(names) == 1:
+        return names
+    more = []
+    if not search.runs or any(run.trajectory.counts["jacobians"] for run in search.runs):
+        more = ["Radau"]
+    elif loose and not search.case.problem.corners and search.case.problem.contacts is None:
+        more = ["rk4"]
+    for name in more:
+        _first(search, method_of(name))
+    return [*names, *more]
 
 
 def _first(search: _Search, method: Method) -> None:
@@ -261,11 +272,8 @@ def _towards(search: _Search, method: Method, judged: dict[int, float], goal: fl
         return None
     last, tightest = own[-1].tolerance, search.tightest(method)
     law, known = _error_law(search, method, judged)
-    if known:
-        wanted = max(min(law.tolerance(goal), last / _rung(method, TIGHTER)), tightest)
-        tolerance = max(wanted, search.deepest / _rung(method, RUNGS))
-    else:
-        tolerance = wanted = max(search.deepest / _rung(method, RUNG), tightest)
+    wanted = max(min(law.tolerance(goal), last / _rung(method, TIGHTER)), tightest)
+    tolerance = max(wanted, search.deepest(method) / _rung(method, RUNGS if known else RUNG))
     if tolerance >= last:
         return None
     seconds = _growth(method, [(run.tolerance, run.seconds) for run in own])
@@ -314,11 +322,12 @@ def _error_law(search: _Search, method: Method, judged: dict[int, float]) -> tup
 
     told = clear(method.name)
     if not told:
-        others = sorted({run.setting.integrator for run in search.runs})
+        alike = [r for r in search.runs if (r.setting.dt is not None) == method.equal_steps]
+        others = sorted({run.setting.integrator for run in alike})
         ladders = [runs for name in others if (runs := clear(name))]
         told = min(ladders, key=lambda runs: runs[-1].tolerance, default=[])
     if not told:
-        return fit([search.of(method.name)[-1].tolerance], [CLEAR], method.exponent), False
+        return fit([search.deepest(method)], [CLEAR], method.exponent), False
     errors = [judged[id(run)] for run in told]
     return fit([run.tolerance for run in told], errors, method.exponent), True
 

@@ -148,7 +148,7 @@ class Case:
         kind of state is then held to less than the relative tolerance of its own scale.
         """
         if method.equal_steps:
-            return Setting(method.name, dt=_plain(tolerance))
+            return Setting(method.name, dt=float(f"{tolerance:.2g}"))
         rtol = max(_plain(tolerance), method.tightest)
         size = 10.0 ** math.floor(math.log10(float(np.min(self.scale(like)))))
         return Setting(method.name, rtol=rtol, atol=float(f"{rtol * size:.0e}"))
