@@ -254,10 +254,10 @@ def _first(search: _Search, method: Method) -> None:
     """A method's first run; where that fails, a tighter one: too long a step may not be stable."""
     tolerance = search.case.t_end / FIRST_STEPS if method.equal_steps else search.first
     most = SLACK * min((run.work for run in search.runs), default=math.inf)
-    while tolerance >= search.tightest(method):
-        if search.attempt(method, tolerance, most) or search.broken[-1].cut:
-            return
+    while not (search.attempt(method, tolerance, most) or search.broken[-1].cut):
         tolerance /= _rung(method, RUNG)
+        if tolerance < search.tightest(method):
+            return
 
 
 def _rung(method: Method, errors: float) -> float:

@@ -23,6 +23,8 @@ TIGHTEST_OF_ALL = 1e-13
 ORDERS = {"RK45": 5, "DOP853": 8, "LSODA": 10, "Radau": 5, "BDF": 4, "gragg_bulirsch_stoer": 12}
 """Of adaptive methods: the time for an error e grows as e^(-1/order). That of LSODA goes up to 12,
 and that of extrapolation as far as it finds worth it."""
+LEAST = 1e-9
+"""Less than this, s, no clock tells apart."""
 OVER = "no time for more"
 SOON = 0.2
 """Part of the time allowed after which a run's pace is judged."""
@@ -164,7 +166,7 @@ class Case:
         """Make a run. It ends early when it takes `most` s of the processor, or is sure to, and
         when `time.perf_counter` is at `due`. `powers` asks for the works of effects.
         """
-        with self.watch(f"{self.problem.name} by {setting.options[2:]}") as progress:
+        with self.watch(f"simulating {self.problem.name}") as progress:
             started, began = time.perf_counter(), time.thread_time()
             trajectory = integrate(
                 self.problem,
@@ -177,7 +179,7 @@ class Case:
                 powers=powers,
             )
             seconds, work = time.perf_counter() - started, time.thread_time() - began
-        return Tried(setting, trajectory, seconds, work)
+        return Tried(setting, trajectory, max(seconds, LEAST), max(work, LEAST))
 
 
 def _limited(progress: Progress, began: float, most: float, due: float) -> Progress:
