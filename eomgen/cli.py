@@ -139,6 +139,18 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
     parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
     parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
+    parser.add_argument(
+        "--accuracy",
+        metavar="X",
+        type=float,
+        help="choose method and tolerances for an error at the end of X of the motion's scale",
+    )
+    parser.add_argument(
+        "--budget", metavar="TIME", help="the most accurate run found in this time, 2s for example"
+    )
+    parser.add_argument(
+        "--estimate", action="store_true", help="estimate the error of the run by a second one"
+    )
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument("--works", action="store_true", help="book the work of each effect")
