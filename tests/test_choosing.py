@@ -4,6 +4,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from eomgen.store import generated_code
 from eomgen.study.choosing import meet, within
 from eomgen.study.estimate import by_second_run, difference, fit, remaining
 from eomgen.study.measure import error
-from eomgen.study.trial import Case, Setting, method_of
+from eomgen.study.trial import Case, Setting, Tried, method_of
 
 # A small body on a hinge as stiff as a beam, ω = 3e4/s, damped, beside a swing of seconds.
 STIFF = """
@@ -112,6 +113,8 @@ def test_a_difference_is_no_accident_of_its_moment() -> None:
     spike = np.where(np.arange(201) == 198, 1.0, 1e-6)
     assert difference(motion(t, np.zeros(201)), motion(t, spike), np.ones(1)) == 1e-6
     assert difference(motion(t, t * 0), motion(t[::200], t[::200]), np.ones(1)) == 1
+    struck = motion(np.array([0.0, 1.0, 1.0]), np.array([0.0, 0.0, -1.0]))
+    assert difference(struck, motion(np.array([0.0, 1.0]), np.array([0.0, -1.0])), np.ones(1)) == 0
 
 
 @pytest.mark.parametrize(
@@ -160,11 +163,31 @@ def test_one_method_alone() -> None:
 def test_steps_that_something_else_keeps_short() -> None:
     """Two runs of the same steps tell nothing of their error."""
     case = case_of("pendulum")
-    case = replace(case, kept={**case.kept, "max_step": 0.05})
+    case = replace(case, kept={**case.kept, "max_step": 0.01})
     true = truth(replace(case, kept={**case.kept, "max_step": None}))
     choice = meet(case, 1e-4, "RK45")
     assert choice.met and 0 < choice.error <= 5e-5
     assert error(choice.tried.trajectory.y[-1], true[-1], case.scale(true)) < 1e-4
+
+
+def test_what_was_put_aside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A method that takes longer than another one at first is gone back to where that one, which
+    is taken to 1e-12 only, does not get there.
+    """
+    case = case_of("two_body")
+    made: list[Setting] = []
+    run = Case.run
+
+    def slow(self: Case, setting: Setting, *, most: float = math.inf, **given: Any) -> Tried:
+        made.append(setting)
+        cut = 0.0 if setting.integrator == "DOP853" and math.isfinite(most) else math.inf
+        return run(self, setting, most=cut, **given)
+
+    monkeypatch.setattr(Case, "run", slow)
+    choice = meet(case, 1e-16)
+    assert not choice.met
+    tightest = {s.integrator: s.rtol for s in made}
+    assert tightest == {"LSODA": 1e-12, "DOP853": 1e-13}
 
 
 def test_a_budget() -> None:

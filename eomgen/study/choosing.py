@@ -190,9 +190,11 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         best = min(search.runs, key=lambda run: judged[id(run)])
         if judged[id(best)] <= target and not possible:
             return search.chosen(best, judged, True)
-        plan = min(possible, key=lambda plan: plan.work) if possible else _beside(search, best)
-        if not (plan and search.make(plan)) and not possible:
+        if not possible:
+            possible = [plan for plan in (_beside(search, best), _again(search, names)) if plan][:1]
+        if not possible:
             return search.chosen(best, judged, False)
+        search.make(min(possible, key=lambda plan: plan.work))
     return search.nothing()
 
 
@@ -286,10 +288,23 @@ def _beside(search: _Search, best: Tried) -> Plan | None:
     """A run a little looser than the best, where that has none near it to tell its error by."""
     method = method_of(best.setting.integrator)
     others = [run.tolerance for run in search.of(method.name) if run is not best]
-    if min(others, default=math.inf) <= best.tolerance * _rung(method, RUNG):
+    near = min(others, default=math.inf) <= best.tolerance * _rung(method, RUNG)
+    if near or method.name in search.left_out:
         return None
     tolerance = best.tolerance * _rung(method, BESIDE)
     return Plan(method, tolerance, math.nan, False, best.seconds, best.work)
+
+
+def _again(search: _Search, names: Sequence[str]) -> Plan | None:
+    """A run of a method that was put aside for taking longer than others, now at their end."""
+    for name in names:
+        own = [run for run in search.broken if run.setting.integrator == name]
+        if own and own[-1].cut and not search.of(name):
+            method, cut = method_of(name), own[-1]
+            tolerance = max(search.deepest(method), method.tightest)
+            work = _growth(method, [(cut.tolerance, cut.work)]).at(tolerance)
+            return Plan(method, tolerance, math.nan, False, work, work)
+    return None
 
 
 def _most(search: _Search, method: Method, judged: dict[int, float], left: float) -> Plan | None:
