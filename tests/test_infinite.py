@@ -111,7 +111,7 @@ def test_infinite_at_the_start(
         )
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("integrator", [name for name in INTEGRATORS if name != "leapfrog"])
 @pytest.mark.parametrize(
     ("formula", "x", "v", "low", "high"),
     [

@@ -10,6 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign import some
+from campaigns import energy
 from scipy.integrate import DOP853, RK45, solve_ivp
 from scipy.special import ellipj, ellipk
 
@@ -741,6 +743,10 @@ def test_leapfrog_takes_one_derivative_a_step():
     [
         (SPINNING_BODY, "no state is a position"),
         (
+            replace(PENDULUM, contacts="some"),
+            "those of rigid contacts that are held depend on velocities",
+        ),
+        (
             replace(
                 PENDULUM,
                 derivative=lambda t, y: np.array([y[1], -y[0] - 0.1 * y[1]]),
@@ -826,6 +832,49 @@ def test_extrapolation_keeps_to_the_longest_step():
     found = integrate(PENDULUM, "gragg_bulirsch_stoer", 10.0, max_step=0.05, samples=2)
     assert found.counts["steps"] >= 200
     assert found.y[-1] == pytest.approx(exact_pendulum(10.0)[0], abs=1e-11)
+
+
+# --- many periods -------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def tumbling():
+    """The two-body scene, and the same by Hamilton's equations."""
+    return {"scene": energy.scene()[1], "canonical": energy.canonical()}
+
+
+def test_canonical_momenta_tell_the_same_motion(tumbling):
+    exact = {"rtol": 1e-12, "atol": 1e-13, "samples": 2}
+    ends = {
+        form: integrate(each.problem, "DOP853", 3.0, **exact).y for form, each in tumbling.items()
+    }
+    alpha, beta = ends["canonical"][-1, :2]
+    assert ends["scene"][-1, 2:4] == pytest.approx([alpha, beta - alpha], abs=1e-10)
+    by_form = [each.energy(ends[form]) for form, each in tumbling.items()]
+    assert by_form[0] == pytest.approx(by_form[1], rel=1e-11)
+    problem = tumbling["canonical"].problem
+    y = problem.initial
+    columns = [
+        (problem.derivative(0.0, y + d) - problem.derivative(0.0, y - d)) / 2e-6
+        for d in np.eye(4) * 1e-6
+    ]
+    assert problem.jacobian(0.0, y) == pytest.approx(np.array(columns).T, abs=1e-8)
+
+
+@pytest.mark.parametrize(("form", "name"), energy.RUNS)
+def test_energy_over_many_periods(tumbling, form, name):
+    """A small form of `campaigns/energy.py`, which runs 1e5 of them."""
+    periods = some(60, 2000)
+    times, change = energy.run(tumbling[form], name, periods, energy.STEPS[name])
+    found = energy.drift(times, change)
+    if name == "rk4":
+        assert found.slope < -20 * found.error
+        assert found.slope * periods == pytest.approx(change[-1], rel=0.2)
+    else:
+        assert abs(found.slope) * periods < found.band / 20
+        assert abs(found.slope) < 1.5e-6 * some(10, 1)
+        half = len(change) // 2
+        assert np.abs(change[half:]).max() == pytest.approx(found.band, rel=0.3), "it does not grow"
 
 
 # --- progress, imports --------------------------------------------------------------------------
