@@ -17,6 +17,7 @@ too, p = M(q) v, where they are symplectic (section VI.4).
 """
 
 import argparse
+import math
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -103,23 +104,31 @@ def canonical() -> Motion:
     c = reduced * p["l_A"] * p["l_B"]
 
     def rates(y: Floats) -> Floats:
-        """α̇ and β̇, with the columns of states."""
+        """α̇ and β̇ (2, n) of states in columns (4, n)."""
         k = c * np.cos(y[1] - y[0])
         return np.array([b * y[2] - k * y[3], a * y[3] - k * y[2]]) / (a * b - k * k)
 
+    def at(y: Floats) -> tuple[float, float, float, float, float]:
+        """α̇, β̇, c sin(β - α), k and det M of one state."""
+        alpha, beta, p_alpha, p_beta = y.tolist()
+        k = c * math.cos(beta - alpha)
+        det = a * b - k * k
+        u, v = (b * p_alpha - k * p_beta) / det, (a * p_beta - k * p_alpha) / det
+        return u, v, c * math.sin(beta - alpha), k, det
+
     def derivative(t: float, y: Floats) -> Floats:
-        u = rates(y)
-        force = c * np.sin(y[1] - y[0]) * u[0] * u[1]
-        return np.array([u[0], u[1], force, -force])
+        u, v, s, _, _ = at(y)
+        return np.array([u, v, s * u * v, -s * u * v])
 
     def jacobian(t: float, y: Floats) -> Floats:
-        u, v = rates(y).tolist()
-        sine, k = c * np.sin(y[1] - y[0]), c * np.cos(y[1] - y[0])
-        inverse = np.array([[b, -k], [-k, a]]) / (a * b - k * k)
-        turned = inverse @ [sine * v, sine * u]  # by β - α, at constant momenta
-        by = np.column_stack((-turned, turned, inverse))
-        force = sine * (by[0] * v + u * by[1]) + k * u * v * np.array([-1.0, 1.0, 0.0, 0.0])
-        return np.vstack((by, force, -force))
+        u, v, s, k, det = at(y)
+        # By β - α at constant momenta, and by the momenta: the inverse of M.
+        u_turn, v_turn = s * (b * v - k * u) / det, s * (a * u - k * v) / det
+        first = (-u_turn, u_turn, b / det, -k / det)
+        second = (-v_turn, v_turn, -k / det, a / det)
+        bend = (-k * u * v, k * u * v, 0.0, 0.0)
+        force = [s * (du * v + u * dv) + df for du, dv, df in zip(first, second, bend, strict=True)]
+        return np.array([first, second, force, [-df for df in force]])
 
     alpha, beta = y["theta"], y["theta"] + y["phi"]
     u, v = y["theta_dot"], y["theta_dot"] + y["phi_dot"]

@@ -55,6 +55,8 @@ def _check(problem: Problem, positions: list[int], others: list[int]) -> None:
     """Raise `RunError` if the problem does not fall into drift and kick."""
     if not positions:
         raise _refusal("no state is a position")
+    if problem.contacts is not None:
+        raise _refusal("those of rigid contacts that are held depend on velocities")
     first: Floats | None = None
     for jacobian in _jacobians(problem):
         for group in (others, positions):
