@@ -248,6 +248,43 @@ def test_corners_are_met_exactly() -> None:
     assert np.max(np.abs(tight - exact)) < np.max(np.abs(tight - loose)) < 1e-15
 
 
+BALL = """
+name = "ball"
+dimensions = 2
+bodies = [{ name = "b", mass = 0.3, inertia_com = 1e-3 }]
+joints = [{ name = "j", type = "free", child = "b" }]
+initial = { q = { b_y = 0.9 } }
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "contact"
+name = "floor"
+law = "impact"
+body = "b"
+radius = 0.1
+restitution = 0.6
+friction = 0.3
+slip_speed = 0.01
+"""
+
+
+def test_rigid_contacts_are_followed_in_doubles() -> None:
+    """A ball that bounces twice, against parabolas; the stated error is true."""
+    model, module = compiled(BALL)
+    found = reference(model, module, t_end=1.1)
+    assert "rigid contacts" in found.origin
+    fall = np.sqrt(2 * 0.8 / 9.81)
+    begins = fall * np.array([0.0, 1.0, 2.2])
+    flight = np.searchsorted(begins, found.t, side="right") - 1
+    past = found.t - begins[flight]
+    speed = 9.81 * fall * np.array([0.0, 0.6, 0.36])[flight]
+    height = np.where(flight == 0, 0.9, 0.1) + speed * past - 9.81 / 2 * past**2
+    k = module.STATES.index("b_y")
+    off = np.max(np.abs(found.y[:, k] - height)) / found.scale[k]
+    assert 0 < off < found.error < 1e-13
+
+
 def test_doubles_stand_in() -> None:
     """Where there is no time for long numbers, and what is stated then is true, too."""
     made = compiled("pendulum")

@@ -96,15 +96,18 @@ def reference(
         return kept
     began = time.monotonic()
     times = np.linspace(0.0, t_end, ROWS)
+    scale = measure.scales(module.STATES, module.UNITS, _roughly(problem, times))
     found = None
     if problem.contacts is None and seconds > 0:
         try:
-            found = _in_long_numbers(module, problem, parameters, inputs, times, seconds, told)
+            found = _in_long_numbers(
+                module, problem, parameters, inputs, times, scale, seconds, told
+            )
         except (_TooLongError, ArithmeticError, ValueError) as reason:
             why = str(reason)
     else:
         why = "rigid contacts" if problem.contacts else "as asked"
-    y, other, origin = found or _in_doubles(problem, times, why, told)
+    y, other, origin = found or _in_doubles(problem, times, scale, why, told)
     scale = measure.scales(module.STATES, module.UNITS, y)
     apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)
     spent = time.monotonic() - began
@@ -120,11 +123,11 @@ def _in_long_numbers(
     parameters: Any,
     inputs: Any,
     times: Floats,
+    scale: Floats,
     seconds: float,
     progress: Progress,
 ) -> tuple[Floats, Floats, str]:
     """The motion (n, ny), the same plus what the looser run is off, and how they were found."""
-    scale = measure.scales(module.STATES, module.UNITS, _roughly(problem, times).y)
     began = time.process_time()
 
     def run(
@@ -160,16 +163,16 @@ def _check_pace(spent: float, done: float, seconds: float) -> None:
         raise _TooLongError(f"more than {seconds:g} s in long numbers")
 
 
-def _roughly(problem: Problem, times: Floats) -> Any:
+def _roughly(problem: Problem, times: Floats) -> Floats:
     """A quick run, for the scale. Raises `RunError` if it does not get to the end."""
     run = integrate(problem, "LSODA", float(times[-1]), rtol=1e-8, atol=1e-10, samples=len(times))
     if not run.finished:
         raise RunError(f"reference: {run.message}")
-    return run
+    return run.y
 
 
 def _in_doubles(
-    problem: Problem, times: Floats, why: str, progress: Progress
+    problem: Problem, times: Floats, scale: Floats, why: str, progress: Progress
 ) -> tuple[Floats, Floats, str]:
     """The motion by two methods, and how."""
     other = "gragg_bulirsch_stoer" if "gragg_bulirsch_stoer" in INTEGRATORS else "Radau"
@@ -184,7 +187,7 @@ def _in_doubles(
             method,
             float(times[-1]),
             rtol=rtol,
-            atol=1e-3 * rtol,
+            atol=0.1 * rtol * float(np.min(scale)),
             samples=len(times),
             progress=told,
         )
