@@ -114,7 +114,9 @@ def errors(runs: Sequence[Tried], scale: Floats, bounded: bool = False) -> list[
         others = [r for r in runs if r.setting.integrator != name]
         apart = [difference(run.trajectory, r.trajectory, scale) for r in others]
         if run is not own[-1]:
-            apart.append(difference(run.trajectory, own[-1].trajectory, scale))
+            gap = difference(run.trajectory, own[-1].trajectory, scale)
+            if gap > 0 or not bounded:
+                apart.append(gap)
         elif len(own) > 1:
             pairs = pairwise(own)
             gaps = [difference(a.trajectory, b.trajectory, scale) for a, b in pairs]
