@@ -1,15 +1,15 @@
 """A cart of a millionth of its pole's weight: spikes, and what they take to be integrated.
 
-The published ladder, floor and defaults: `python tests/light_cart_pole.py` prints all of them.
+The published ladder, floor and defaults: `campaigns/light_cart_pole.py` prints all of them.
 """
 
 from statistics import median
 from typing import Any
 
-import light_cart_pole as cart
 import numpy as np
 import pytest
 from campaign import some
+from campaigns import light_cart_pole as cart
 from scipy.optimize import brentq
 
 # t, x, theta: recomputed for this benchmark by a quadrature in 30 digits.

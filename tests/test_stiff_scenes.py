@@ -1,9 +1,9 @@
-"""What the generated Jacobian spares Radau: `python tests/stiff_scenes.py` prints how much."""
+"""What the generated Jacobian spares Radau: `campaigns/stiff_scenes.py` prints how much."""
 
 import numpy as np
 import pytest
 from campaign import some
-from stiff_scenes import STIFF, run
+from campaigns.stiff_scenes import STIFF, run
 
 
 @pytest.mark.parametrize("rtol", some([1e-3], [1e-3, 1e-6]))

@@ -20,7 +20,7 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.files import is_ours, write_whole
 from eomgen.model import Model
-from eomgen.run.integrate import SMALLEST_RTOL, integrate
+from eomgen.run.integrate import REST_SPEED, SMALLEST_RTOL, integrate
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats, Problem
@@ -89,14 +89,16 @@ def reference(
     """
     problem = as_problem(module, parameters, inputs, model)
     told = progress or _ignore
-    path = folder and folder / f"{_key(module, problem, parameters, inputs, t_end, seconds)}.npz"
+    rest_speed = model.simulation.rest_speed if model else REST_SPEED
+    key = _key(module, problem, parameters, inputs, t_end, seconds, rest_speed)
+    path = folder and folder / f"{key}.npz"
     kept = path and load(path)
     if kept:
         told(1.0)
         return kept
     began = time.monotonic()
     times = np.linspace(0.0, t_end, ROWS)
-    scale = measure.scales(module.STATES, module.UNITS, _roughly(problem, times))
+    scale = measure.scales(module.STATES, module.UNITS, _roughly(problem, times, rest_speed))
     found = None
     if problem.contacts is None and seconds > 0:
         try:
@@ -107,7 +109,7 @@ def reference(
             why = str(reason)
     else:
         why = "rigid contacts" if problem.contacts else "as asked"
-    y, other, origin = found or _in_doubles(problem, times, scale, why, told)
+    y, other, origin = found or _in_doubles(problem, times, scale, rest_speed, why, told)
     scale = measure.scales(module.STATES, module.UNITS, y)
     apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)
     spent = time.monotonic() - began
@@ -163,16 +165,29 @@ def _check_pace(spent: float, done: float, seconds: float) -> None:
         raise _TooLongError(f"more than {seconds:g} s in long numbers")
 
 
-def _roughly(problem: Problem, times: Floats) -> Floats:
+def _roughly(problem: Problem, times: Floats, rest_speed: float) -> Floats:
     """A quick run, for the scale. Raises `RunError` if it does not get to the end."""
-    run = integrate(problem, "LSODA", float(times[-1]), rtol=1e-8, atol=1e-10, samples=len(times))
+    run = integrate(
+        problem,
+        "LSODA",
+        float(times[-1]),
+        rtol=1e-8,
+        atol=1e-10,
+        samples=len(times),
+        rest_speed=rest_speed,
+    )
     if not run.finished:
         raise RunError(f"reference: {run.message}")
     return run.y
 
 
 def _in_doubles(
-    problem: Problem, times: Floats, scale: Floats, why: str, progress: Progress
+    problem: Problem,
+    times: Floats,
+    scale: Floats,
+    rest_speed: float,
+    why: str,
+    progress: Progress,
 ) -> tuple[Floats, Floats, str]:
     """The motion by two methods, and how."""
     other = "gragg_bulirsch_stoer" if "gragg_bulirsch_stoer" in INTEGRATORS else "Radau"
@@ -190,6 +205,7 @@ def _in_doubles(
             atol=0.1 * rtol * float(np.min(scale)),
             samples=len(times),
             progress=told,
+            rest_speed=rest_speed,
         )
         if not run.finished:
             raise RunError(f"reference: {method}: {run.message}")
@@ -203,14 +219,21 @@ def _in_doubles(
 
 
 def _key(
-    module: Any, problem: Problem, parameters: Any, inputs: Any, t_end: float, seconds: float
+    module: Any,
+    problem: Problem,
+    parameters: Any,
+    inputs: Any,
+    t_end: float,
+    seconds: float,
+    rest_speed: float,
 ) -> str:
     """A digest of all that makes a reference what it is."""
     source = module.__spec__.loader.get_source(module.__spec__.name) or ""
     given = [module.PARAMETERS if parameters is None else parameters]
     given += [module.INPUTS if inputs is None else inputs]
     values = [list(g.items()) if hasattr(g, "keys") else np.asarray(g).tolist() for g in given]
-    parts = (FORMAT, source, values, problem.initial.tolist(), float(t_end), float(seconds))
+    times = (float(t_end), float(seconds))
+    parts = (FORMAT, source, values, problem.initial.tolist(), times, rest_speed)
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
 

@@ -1,6 +1,6 @@
 """Does `--accuracy` hold? Scenes, targets, and the cheapest run that would have done.
 
-    python -m tests.campaigns.choosing [--keep FOLDER] [--reference S] [--times N] [SCENE …]
+    python tests/campaigns/choosing.py [--keep FOLDER] [--reference S] [--times N] [SCENE …]
 
 For each scene (all built-in ones) and each target: the true error of the run chosen, its estimate,
 and its time beside that of the cheapest run of any method over a ladder of tolerances or steps

@@ -1,6 +1,6 @@
 """Radau with the generated Jacobian beside Radau with finite differences, on the stiff scenes.
 
-    python tests/stiff_scenes.py
+    python tests/campaigns/stiff_scenes.py
 
 prints CPU times, least of several, and evaluations, in which each column of a Jacobian by
 differences counts as one.

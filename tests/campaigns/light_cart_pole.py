@@ -1,6 +1,6 @@
 """The scene `light_cart_pole`: its exact motion, and the published ladder of errors.
 
-    python tests/light_cart_pole.py
+    python tests/campaigns/light_cart_pole.py
 
 prints the whole ladder beside what was published: github.com/Noah-Parsons/light-cartpole-benchmark
 at 07054c27 (MIT), proposed to the IFToMM library.
