@@ -158,7 +158,7 @@ class GraggBulirschStoer(OdeSolver[Any]):
         root = 1 / (2 * row + 1)
         least = _LEAST**root
         shrink = min(_MOST / least, max(least, (error / _ERROR) ** root / _STEP))
-        return min(length / shrink, float(self.max_step))
+        return float(min(length / shrink, self.max_step))
 
     def _shorter(self, table: _Table, length: float) -> float:
         """The length of the step to try after one that was refused, which sets the order, too."""

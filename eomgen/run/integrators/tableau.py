@@ -69,11 +69,6 @@ class ButcherTableau:
         a, b, c = (np.array(part, dtype=np.float64) for part in (self.a, self.b, self.c))
         return a, b, c
 
-    @property
-    def explicit(self) -> bool:
-        """Whether each stage needs those before it only."""
-        return not np.any(np.triu(self.arrays[0]))
-
     def change(
         self, derivative: Callable[[float, Floats], Floats], t: float, y: Floats, h: float
     ) -> Floats:
