@@ -191,7 +191,7 @@ def test_what_was_put_aside(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_impacts_have_a_floor_of_their_own() -> None:
-    """With rigid contacts nothing is taken to be more exact than two runs are near to each other."""
+    """With rigid contacts nothing is taken to be more exact than two runs are near each other."""
     case = case_of("pendulum")
     nothing: Any = lambda *given: np.zeros(0)  # noqa: E731
     contacts = Contacts((), (), nothing, nothing, nothing, nothing)
