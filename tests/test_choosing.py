@@ -13,12 +13,12 @@ from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.run.integrate import SMALLEST_RTOL
 from eomgen.run.module import as_problem, load_module
-from eomgen.run.problem import Floats
+from eomgen.run.problem import Contacts, Floats
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.store import generated_code
 from eomgen.study.choosing import meet, within
-from eomgen.study.estimate import by_second_run, difference, fit, remaining
+from eomgen.study.estimate import by_second_run, difference, errors, fit, remaining
 from eomgen.study.measure import error
 from eomgen.study.trial import Case, Setting, Tried, method_of
 
@@ -188,6 +188,19 @@ def test_what_was_put_aside(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not choice.met
     tightest = {s.integrator: s.rtol for s in made}
     assert tightest == {"LSODA": 1e-12, "DOP853": 1e-13}
+
+
+def test_impacts_have_a_floor_of_their_own() -> None:
+    """With rigid contacts nothing is taken to be more exact than two runs are near each other."""
+    case = case_of("pendulum")
+    nothing: Any = lambda *given: np.zeros(0)  # noqa: E731
+    contacts = Contacts((), (), nothing, nothing, nothing, nothing)
+    struck = replace(case, problem=replace(case.problem, contacts=contacts))
+    runs = [case.run(Setting("RK45", rtol, rtol)) for rtol in (1e-6, 1e-8)]
+    scale = case.scale(runs[1].trajectory.y)
+    gap = difference(runs[0].trajectory, runs[1].trajectory, scale)
+    assert errors(runs, scale, struck) == [gap, gap]
+    assert errors(runs, scale, case) == [gap, pytest.approx(gap * 100**-0.8)]
 
 
 def test_a_budget() -> None:

@@ -139,7 +139,7 @@ class _Search:
 
     def judged(self) -> dict[int, float]:
         """Estimated error of each run, by the run's identity."""
-        found = errors(self.runs, self.case.scale(self.motion), self.case.bounded)
+        found = errors(self.runs, self.case.scale(self.motion), self.case)
         return {id(run): error for run, error in zip(self.runs, found, strict=True)}
 
     def chosen(self, tried: Tried, judged: dict[int, float], met: bool) -> Choice:

@@ -100,12 +100,14 @@ def remaining(gaps: Sequence[float], tolerances: Sequence[float], expected: floa
     return last * math.pow(tolerances[-1] / tolerances[-2], slope)
 
 
-def errors(runs: Sequence[Tried], scale: Floats, bounded: bool = False) -> list[float]:
+def errors(runs: Sequence[Tried], scale: Floats, case: Case) -> list[float]:
     """Estimated error of each run, in parts of the scale; infinite where nothing is known.
 
     Of a method's looser runs their difference from its tightest, of that one what remains by the
     law; or the difference from some run of another method, where that is less. Two runs that do not
-    differ at all tell nothing where steps are `bounded` otherwise: they may be the same steps.
+    differ at all tell nothing where steps are bounded otherwise: they may be the same steps. Rigid
+    contacts close within a fixed tolerance of their own, which no law of the method's knows: there
+    nothing is taken to remain less than two runs differ by.
     """
     found = []
     for run in runs:
@@ -115,16 +117,18 @@ def errors(runs: Sequence[Tried], scale: Floats, bounded: bool = False) -> list[
         apart = [difference(run.trajectory, r.trajectory, scale) for r in others]
         if run is not own[-1]:
             gap = difference(run.trajectory, own[-1].trajectory, scale)
-            if gap > 0 or not bounded:
+            if gap > 0 or not case.bounded:
                 apart.append(gap)
         elif len(own) > 1:
             pairs = pairwise(own)
             gaps = [difference(a.trajectory, b.trajectory, scale) for a, b in pairs]
             tolerances = [r.tolerance for r in own]
-            if gaps[-1] > 0 or not bounded:
+            if gaps[-1] > 0 or not case.bounded:
                 method = method_of(name)
                 scatter = SCATTER if method.multistep else 1.0
-                apart.append(scatter * remaining(gaps, tolerances, method.exponent))
+                struck = case.problem.contacts is not None
+                left = gaps[-1] if struck else remaining(gaps, tolerances, method.exponent)
+                apart.append(scatter * left)
         found.append(min(apart, default=math.inf))
     return found
 
