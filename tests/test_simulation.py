@@ -92,7 +92,7 @@ def test_the_published_pendulum() -> None:
         ("rk4", 4, (40, 80, 160)),
         ("implicit_midpoint", 2, (100, 200, 400)),
         ("gauss_4", 4, (20, 40, 80)),
-        ("gauss_6", 6, (10, 20, 40)),
+        ("gauss_6", 6, (20, 28, 40)),
     ],
 )
 def test_order_of_fixed_step_methods(
