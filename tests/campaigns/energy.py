@@ -1,6 +1,6 @@
 """Energy of the two-body scene over many periods: who keeps it, and who loses it.
 
-    python tests/campaigns/energy.py [--periods 100000] [--only scene] [--stretch 2] [-o FIGURE]
+    python tests/campaigns/energy.py [--periods 100000] [--only scene rk4] [--stretch 2] [-o FILE]
 
 takes some half an hour of one core for 1e5 periods; a run that is done is kept beside the figure
 (`--kept`) and not done again. `test_integrators.py` does a few hundred periods of the same.
@@ -198,7 +198,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run what is not kept yet, print a table, draw."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--periods", type=float, default=1e5)
-    parser.add_argument("--only", metavar="NAME", help="one form or one method, no figure")
+    parser.add_argument("--only", metavar="NAME", nargs="*", default=[], help="forms or methods")
     parser.add_argument("--stretch", type=float, default=1.0, help="steps so many times as long")
     parser.add_argument("--kept", type=Path, default=Path("out/energy"), help="folder of runs")
     parser.add_argument("-o", type=Path, default=Path("docs/energy_two_body.png"))
@@ -207,7 +207,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     motions = {"scene": scene()[1], "canonical": canonical()}
     kept = {}
     for form, method in RUNS:
-        if given.only not in (None, form, method):
+        forms, methods = (set(given.only) & set(names) for names in (motions, STEPS))
+        if form not in (forms or motions) or method not in (methods or STEPS):
             continue
         dt = given.stretch * STEPS[method]
         path = given.kept / f"{form}_{method}_{given.periods:g}_{dt:g}.npz"
@@ -223,8 +224,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             "in all",
             flush=True,
         )
-    if given.only is None:
-        draw(kept, given.stretch, given.o)
+    draw(kept, given.stretch, given.o)
 
 
 if __name__ == "__main__":
