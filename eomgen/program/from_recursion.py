@@ -47,10 +47,13 @@ class Recording:
         extra = {x.name: node for x, node in zip(model.states, self.x, strict=True)}
         time = self.given(TIME, Stage.INPUTS)
         values = Values(self.parameters, self.inputs, self.q, self.v, extra, time)
+        if route == "orthogonal":
+            axes = "own"
         self.dynamics = Dynamics(model, values, self.scalars, axes)
         recursions = {
             "aba": self.dynamics.articulated_forward,
             "ldl": self.dynamics.factored_forward,
+            "orthogonal": self.dynamics.orthogonal_forward,
         }
         self.forward: Forward = forward(self) if forward is not None else recursions[route]
         self.vd = self.dynamics.vd = self.forward(None)
