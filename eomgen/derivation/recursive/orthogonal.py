@@ -222,18 +222,26 @@ class Elimination:
             return ({}, {}), wrench
         linear, angular, left, moment = {}, {}, zero, zero
         way = add(a.linear, times(a.field, solid.centre))
-        if s.is_zero(solid.mass):
+        light = self._heaviest[k] >= 0
+        if light or s.is_zero(solid.mass):
             left = wrench.force
-        else:
+        if not s.is_zero(solid.mass):
             m = s.call("max", solid.mass, self._tiny)
             for j in self._axes():
-                linear[j] = self._row(m, zero, unit(j, s), wrench.force[j] / m - way[j])
-        y = list(sub(wrench.moment, moment_about_centre(solid.inertia, a, s)))
+                right = -way[j] if light else wrench.force[j] / m - way[j]
+                linear[j] = self._row(m, zero, unit(j, s), right)
+        turning = moment_about_centre(solid.inertia, a, s)
+        if light:
+            moment = wrench.moment
+            y = [-x for x in turning]
+        else:
+            y = list(sub(wrench.moment, turning))
         work = [list(row) for row in solid.inertia]
         order = self._turns_of(self._links[k])
         for n, i in enumerate(order):
             if s.is_zero(solid.inertia[i][i]):
-                moment = replaced(moment, i, y[i])
+                if not light:
+                    moment = replaced(moment, i, y[i])
                 continue
             d = self._pivot_of(work[i][i], solid.inertia[i][i])
             entries = unit(i, s)
@@ -300,6 +308,8 @@ class Elimination:
         kept = {(False, j): _shifted(linear[j], at) for j in orders[0] if j in linear}
         kept |= {(True, j): angular[j] for j in orders[1] if j in angular}
         free = [_shifted(row, at) for row in loose if not self._is_empty(row)]
+        # Rows of angular accelerations alone first, which so stay what they are.
+        free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
         empty = [row for row in loose if self._is_empty(row)]
         taken = []
         for axis, i in reversed(link.free):
@@ -377,20 +387,21 @@ class Elimination:
             pivot, free[n] = self._rotated(pivot, row, way.angular, way.unit, turns)
         for key in reversed(kept):
             pivot, kept[key] = self._rotated(pivot, kept[key], way.angular, way.unit, turns)
-        force = along(way, term.moment, term.force) + tau
-        rotor, parents = -1, self._zero
+        carried = along(way, term.moment, term.force)
+        force, rotor, parents = carried + tau, -1, -tau
         if not s.is_zero(link.armature):
             # Its row is that of the joint's acceleration, the frame's less the parent's.
             row = replace(self._empty_row(way.unit, angular=way.angular), weight=link.armature)
             pivot, row = self._rotated(pivot, row, way.angular, way.unit, turns)
             minus = with_component(way, row.angular, row.linear, -self._one)
             free.append(replace(row, angular=minus[0], linear=minus[1]))
-            rotor, parents = row.index, -(link.armature / pivot.weight)
+            # Of what pushes the frame the rotor's share, and of tau the frame's, minus.
+            rotor, parents = row.index, turns[-1].s * carried - turns[-1].c * tau
         pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
         share = force / pivot.weight
         moment = sub(term.moment, scale(force, pivot.angular))
         push = sub(term.force, scale(force, pivot.linear))
-        passed = Force(*with_component(way, moment, push, -tau - force * parents))
+        passed = Force(*with_component(way, moment, push, parents))
         return Taken(way, i, first, share, tuple(turns), rotor), kept, free, passed
 
     def _rotated(
