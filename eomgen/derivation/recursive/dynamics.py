@@ -34,8 +34,19 @@ from eomgen.derivation.recursive.motion import (
 )
 from eomgen.derivation.recursive.moving import Moving, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
-from eomgen.derivation.recursive.orthogonal import Elimination, heaviest, solids
-from eomgen.derivation.recursive.vectors import Scalar, sub, turning_in_space, zeros
+from eomgen.derivation.recursive.orthogonal import (
+    Elimination,
+    Solid,
+    heaviest,
+    solids,
+)
+from eomgen.derivation.recursive.vectors import (
+    Scalar,
+    no_matrix,
+    sub,
+    turning_in_space,
+    zeros,
+)
 from eomgen.effects import Driven, Effect, Gravity
 from eomgen.effects.base import Contact, JointLoad, Load
 from eomgen.joints import Free
@@ -203,12 +214,26 @@ class Dynamics(Moving):
 
     def orthogonal_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by orthogonal elimination, in the frames' own axes."""
-        carried = solids(self.linkage, self.scalars)
-        centres = [zeros(self.scalars) if solid is None else solid.centre for solid in carried]
+        centres = [zeros(self.scalars) if solid is None else solid.centre for solid in self._solids]
         wrenches = fc.wrenches(self.linkage, self.instant, self.loads[0], self.scalars, centres)
+        found = self._eliminated.respond(self._falling, wrenches, self._pushed(tau))
+        return self._fallen(found)
+
+    def orthogonal_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
+        """M⁻¹ of impulses on the velocities by orthogonal elimination."""
+        nothing, matrix = zeros(self.scalars), no_matrix(self.scalars)
+        still = [Acceleration(nothing, nothing, matrix, nothing)] * len(self.instant.links)
+        wrenches = [fc.no_force(self.scalars)] * len(still)
+        return self._eliminated.respond(still, wrenches, impulse)
+
+    @cached_property
+    def _solids(self) -> tuple[Solid | None, ...]:
+        return solids(self.linkage, self.scalars)
+
+    @cached_property
+    def _eliminated(self) -> Elimination:
         first = heaviest(make_linkage(self.model, self.model.defaults, FloatScalars()))
-        elimination = Elimination(self.instant, carried, first, self.scalars)
-        return self._fallen(elimination.respond(self._falling, wrenches, self._pushed(tau)))
+        return Elimination(self.instant, self._solids, first, self.scalars)
 
     @cached_property
     def _free_roots(self) -> list[int]:

@@ -67,7 +67,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Row:
-    """angular · α + linear · a = right, times weight; `index` says which of the residuals is its."""
+    """angular · α + linear · a = right, times weight; `index` names its residual."""
 
     index: int
     weight: Scalar
@@ -266,7 +266,8 @@ class Elimination:
         """The axes to turn about, that of the link last."""
         if self._planar:
             return (2,)
-        last = next((axis.unit for axis, _ in reversed(link.free) if axis.angular), 2)
+        units = [axis.unit for axis, _ in link.free if axis.angular and axis.unit is not None]
+        last = units[-1] if units else 2
         return ((last + 1) % 3, (last + 2) % 3, last)
 
     def _slides_of(self, link: Link, arm: Vec) -> tuple[int, ...]:
@@ -357,9 +358,7 @@ class Elimination:
             return kept.pop((way.angular, way.unit)), kept, free, ()
         single = self._empty_row(way.unit, angular=way.angular)
         for n, row in enumerate(free):
-            parts = zip(
-                (*row.angular, *row.linear), (*single.angular, *single.linear), strict=True
-            )
+            parts = zip((*row.angular, *row.linear), (*single.angular, *single.linear), strict=True)
             if all(self._scalars.is_zero(a - b) for a, b in parts):
                 return row, kept, [*free[:n], *free[n + 1 :]], ()
         free = list(free)
