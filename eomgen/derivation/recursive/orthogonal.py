@@ -88,6 +88,14 @@ class Turn:
 
 
 @dataclass(frozen=True)
+class Sum:
+    """Rows of one unknown, alone in the pivot row too, put together at once: x times it is right."""
+
+    pivot: Row
+    rows: tuple[tuple[int, Scalar, Scalar], ...]
+
+
+@dataclass(frozen=True)
 class Taken:
     """An axis of motion that was eliminated: its row before, the residual of that at the end, and
     the rotations between. `rotor` is the index of its motor's row, -1 if it has none.
@@ -97,9 +105,9 @@ class Taken:
     velocity: int
     row: Row
     left: Scalar
-    turns: tuple[Turn, ...]
+    turns: tuple[Turn | Sum, ...]
     rotor: int
-    before: tuple[Turn, ...] = ()
+    before: tuple[Turn | Sum, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -108,7 +116,7 @@ class Eliminated:
     the parent, and those that hold nothing more.
     """
 
-    turns: tuple[Turn, ...]
+    turns: tuple[Turn | Sum, ...]
     axes: tuple[Taken, ...]
     rows: tuple[Row, ...]
     empty: tuple[Row, ...]
@@ -297,7 +305,7 @@ class Elimination:
         if solid is not None:
             linear = {j: _shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
         loose = [_shifted(row, sub(zeros(s), at)) for row in rows]
-        turns: list[Turn] = []
+        turns: list[Turn | Sum] = []
         orders = (self._slides_of(link, at), self._turns_of(link))
         room = len(orders[0]) + len(orders[1])
         folded = bool(linear) or len(loose) + len(angular) > room
@@ -331,7 +339,7 @@ class Elimination:
         own: dict[int, Row],
         rows: Sequence[Row],
         order: Sequence[int],
-        turns: list[Turn],
+        turns: list[Turn | Sum],
         *,
         angular: bool,
     ) -> tuple[dict[int, Row], list[Row]]:
@@ -341,14 +349,36 @@ class Elimination:
         own, rows = dict(own), list(rows)
         for j in order:
             pivot = own.get(j) or self._empty_row(j, angular=angular)
+            if angular and j == order[-1] and j in own:
+                pivot, rows = self._summed(pivot, rows, j, turns)
             for n, row in enumerate(rows):
                 pivot, rows[n] = self._rotated(pivot, row, angular, j, turns)
             own[j] = pivot
         return own, rows
 
+    def _summed(
+        self, pivot: Row, rows: Sequence[Row], j: int, turns: list[Turn | Sum]
+    ) -> tuple[Row, list[Row]]:
+        """A pivot row about one angular acceleration with all rows about that, and the others."""
+        is_zero = self._scalars.is_zero
+        weight, right, found, others = pivot.weight, pivot.weight * pivot.right, [], []
+        for row in rows:
+            x = row.angular[j]
+            if is_zero(x):
+                others.append(row)
+                continue
+            q = row.weight * x
+            weight, right = weight + q * x, right + q * row.right
+            found.append((row.index, x, row.right))
+        if not found:
+            return pivot, list(rows)
+        pivot = replace(pivot, weight=weight, right=right / weight)
+        turns.append(Sum(pivot, tuple(found)))
+        return pivot, others
+
     def _first(
         self, way: Axis, held: bool, kept: dict[tuple[bool, int], Row], free: list[Row]
-    ) -> tuple[Row, dict[tuple[bool, int], Row], list[Row], tuple[Turn, ...]]:
+    ) -> tuple[Row, dict[tuple[bool, int], Row], list[Row], tuple[Turn | Sum, ...]]:
         """The row that an axis is found from: one that holds it alone, as there is where a link has
         inertia against it; else what can be gathered of it from all.
         """
@@ -404,7 +434,7 @@ class Elimination:
         return Taken(way, i, first, share, tuple(turns), rotor), kept, free, passed
 
     def _rotated(
-        self, pivot: Row, row: Row, angular: bool, j: int, turns: list[Turn]
+        self, pivot: Row, row: Row, angular: bool, j: int, turns: list[Turn | Sum]
     ) -> tuple[Row, Row]:
         """A pivot row, 1 in a column, and a row that has x there and then nothing."""
         x = (row.angular if angular else row.linear)[j]
@@ -472,8 +502,13 @@ class Elimination:
         return result
 
 
-def _turned_back(turns: Sequence[Turn], residuals: dict[int, Scalar]) -> None:
+def _turned_back(turns: Sequence[Turn | Sum], residuals: dict[int, Scalar]) -> None:
     for turn in reversed(turns):
+        if isinstance(turn, Sum):
+            value = turn.pivot.right + residuals[turn.pivot.index]
+            for index, x, right in turn.rows:
+                residuals[index] = x * value - right
+            continue
         a, b = residuals[turn.pivot], residuals[turn.row]
         residuals[turn.pivot] = a - turn.s * b
         residuals[turn.row] = turn.x * a + turn.c * b
