@@ -196,7 +196,7 @@ class Elimination:
         the accelerations at v̇ = 0.
         """
         zero = zeros(self._scalars)
-        rows: list[list[Row]] = [[] for _ in self._links]
+        rows: list[list[tuple[Row, Vec]]] = [[] for _ in self._links]
         terms = [Force(zero, zero) for _ in self._links]
         found: list[Eliminated] = []
         for k in reversed(range(len(self._links))):
@@ -206,7 +206,7 @@ class Elimination:
             eliminated, passed = self._eliminated(k, own, rows[k], terms[k], tau)
             found.append(eliminated)
             if link.parent >= 0:
-                rows[link.parent] += [_at_parent(link, row) for row in eliminated.rows]
+                rows[link.parent] += [(_turned(link, row), link.arm) for row in eliminated.rows]
                 terms[link.parent] = total(terms[link.parent], at_parent(link, passed))
         return self._outwards(found[::-1], len(tau))
 
@@ -290,11 +290,11 @@ class Elimination:
         self,
         k: int,
         own: tuple[dict[int, Row], dict[int, Row]],
-        rows: Sequence[Row],
+        rows: Sequence[tuple[Row, Vec]],
         term: Force,
         tau: Sequence[Scalar],
     ) -> tuple[Eliminated, Force]:
-        """Take a link's free axes out of the rows of all that it carries."""
+        """Take a link's free axes out of the rows of all that it carries, each about a point."""
         s, link, solid = self._scalars, self._links[k], self._solids[k]
         # Where the heaviest rows have no arm, light ones keep theirs.
         heaviest = self._heaviest[k]
@@ -304,7 +304,7 @@ class Elimination:
         linear, angular = dict(own[0]), dict(own[1])
         if solid is not None:
             linear = {j: _shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
-        loose = [_shifted(row, sub(zeros(s), at)) for row in rows]
+        loose = [_shifted(row, sub(arm, at)) for row, arm in rows]
         turns: list[Turn | Sum] = []
         orders = (self._slides_of(link, at), self._turns_of(link))
         room = len(orders[0]) + len(orders[1])
@@ -519,8 +519,8 @@ def _shifted(row: Row, way: Vec) -> Row:
     return replace(row, angular=add(row.angular, cross(way, row.linear)))
 
 
-def _at_parent(link: Link, row: Row) -> Row:
-    """A row of a link as one of its parent, about the parent's origin."""
-    turn = link.turn
-    row = replace(row, angular=turn.out(row.angular), linear=turn.out(row.linear))
-    return _shifted(row, link.arm)
+def _turned(link: Link, row: Row) -> Row:
+    """A row of a link in its parent's axes."""
+    return replace(
+        row, angular=link.turn.out(row.angular), linear=link.turn.out(row.linear)
+    )
