@@ -348,11 +348,11 @@ class Elimination:
         """
         own, rows = dict(own), list(rows)
         for j in order:
-            pivot = own.get(j) or self._empty_row(j, angular=angular)
+            first = pivot = own.get(j) or self._empty_row(j, angular=angular)
             if angular and j == order[-1] and j in own:
                 pivot, rows = self._summed(pivot, rows, j, turns)
             for n, row in enumerate(rows):
-                pivot, rows[n] = self._rotated(pivot, row, angular, j, turns)
+                pivot, rows[n] = self._rotated(pivot, row, angular, j, turns, own=pivot is first)
             own[j] = pivot
         return own, rows
 
@@ -434,9 +434,18 @@ class Elimination:
         return Taken(way, i, first, share, tuple(turns), rotor), kept, free, passed
 
     def _rotated(
-        self, pivot: Row, row: Row, angular: bool, j: int, turns: list[Turn | Sum]
+        self,
+        pivot: Row,
+        row: Row,
+        angular: bool,
+        j: int,
+        turns: list[Turn | Sum],
+        *,
+        own: bool = False,
     ) -> tuple[Row, Row]:
-        """A pivot row, 1 in a column, and a row that has x there and then nothing."""
+        """A pivot row, 1 in a column, and a row that has x there and then nothing; `own` if the
+        pivot row is a body's own yet.
+        """
         x = (row.angular if angular else row.linear)[j]
         if self._scalars.is_zero(x):
             return pivot, row
@@ -445,24 +454,26 @@ class Elimination:
         s, c = q / d, pivot.weight / d
         turns.append(Turn(pivot.index, row.index, x, s, c))
 
-        def mixed(a: Scalar, b: Scalar) -> Scalar:
-            return c * a + s * b
-
-        def rest(a: Scalar, b: Scalar) -> Scalar:
-            return b - x * a
+        def mixed(a: Scalar, b: Scalar) -> tuple[Scalar, Scalar]:
+            # c a + s b is a + s (b - x a), too, and shorter, but not as good if a is large: in a
+            # link's own rows it is not, nor longer if a or b is nothing.
+            rest = b - x * a
+            short = own and not self._scalars.is_zero(a) and not self._scalars.is_zero(b)
+            return (a + s * rest if short else c * a + s * b), rest
 
         def both(a: Vec, b: Vec, clear: bool) -> tuple[Vec, Vec]:
-            one = [mixed(*pair) for pair in zip(a, b, strict=True)]
-            other = [rest(*pair) for pair in zip(a, b, strict=True)]
+            pairs = [mixed(*pair) for pair in zip(a, b, strict=True)]
             if clear:
-                one[j], other[j] = self._one, self._zero
-            return (one[0], one[1], one[2]), (other[0], other[1], other[2])
+                pairs[j] = (self._one, self._zero)
+            (p, f), (q, g), (r, h) = pairs
+            return (p, q, r), (f, g, h)
 
         turn, left_turn = both(pivot.angular, row.angular, angular)
         move, left_move = both(pivot.linear, row.linear, not angular)
+        right, left_right = mixed(pivot.right, row.right)
         return (
-            Row(pivot.index, d, turn, move, mixed(pivot.right, row.right)),
-            Row(row.index, row.weight * c, left_turn, left_move, rest(pivot.right, row.right)),
+            Row(pivot.index, d, turn, move, right),
+            Row(row.index, row.weight * c, left_turn, left_move, left_right),
         )
 
     # Outwards.
@@ -521,6 +532,4 @@ def _shifted(row: Row, way: Vec) -> Row:
 
 def _turned(link: Link, row: Row) -> Row:
     """A row of a link in its parent's axes."""
-    return replace(
-        row, angular=link.turn.out(row.angular), linear=link.turn.out(row.linear)
-    )
+    return replace(row, angular=link.turn.out(row.angular), linear=link.turn.out(row.linear))
