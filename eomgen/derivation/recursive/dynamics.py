@@ -34,12 +34,8 @@ from eomgen.derivation.recursive.motion import (
 )
 from eomgen.derivation.recursive.moving import Moving, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
-from eomgen.derivation.recursive.orthogonal import (
-    Elimination,
-    Solid,
-    heaviest,
-    solids,
-)
+from eomgen.derivation.recursive.orthogonal import Elimination
+from eomgen.derivation.recursive.solids import Solid, centres, heaviest, solids
 from eomgen.derivation.recursive.vectors import (
     Scalar,
     no_matrix,
@@ -214,8 +210,8 @@ class Dynamics(Moving):
 
     def orthogonal_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by orthogonal elimination, in the frames' own axes."""
-        centres = [zeros(self.scalars) if solid is None else solid.centre for solid in self._solids]
-        wrenches = fc.wrenches(self.linkage, self.instant, self.loads[0], self.scalars, centres)
+        about = centres(self._solids, self.scalars)
+        wrenches = fc.wrenches(self.linkage, self.instant, self.loads[0], self.scalars, about)
         found = self._eliminated.respond(self._falling, wrenches, self._pushed(tau))
         return self._fallen(found)
 

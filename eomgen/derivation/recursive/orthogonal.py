@@ -21,78 +21,41 @@ begins with an empty row of no weight to speak of.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import count
 
 from eomgen.derivation.recursive.articulated import along, with_component
 from eomgen.derivation.recursive.forces import Force, at_parent, total
-from eomgen.derivation.recursive.frames import Linkage
 from eomgen.derivation.recursive.instant import Axis, Instant, Link
 from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
+from eomgen.derivation.recursive.rows import (
+    Column,
+    Row,
+    Rows,
+    Steps,
+    Sum,
+    Turn,
+    shifted,
+    turned_back,
+)
+from eomgen.derivation.recursive.solids import Solid
 from eomgen.derivation.recursive.vectors import (
     AXES,
     Scalar,
     Scalars,
-    Symmetric,
     Vec,
     add,
-    congruent,
-    constant,
     cross,
     dot,
     named,
-    plus,
     replaced,
     scale,
     sub,
-    symmetric,
     times,
     unit,
     zeros,
 )
 
-TINY = 1e-200
-"""The weight of an empty row, and the least of any: so small that it never counts."""
 SLIGHT = 1e-16
 """The least share of a diagonal entry that a pivot of an inertia matrix keeps."""
-
-
-@dataclass(frozen=True)
-class Solid:
-    """What a frame carries as one body: mass, centre and inertia about it, in the frame's axes."""
-
-    mass: Scalar
-    centre: Vec
-    inertia: Symmetric
-
-
-@dataclass(frozen=True)
-class Row:
-    """angular · α + linear · a = right, times weight; `index` names its residual."""
-
-    index: int
-    weight: Scalar
-    angular: Vec
-    linear: Vec
-    right: Scalar
-
-
-@dataclass(frozen=True)
-class Turn:
-    """A rotation of a row against a pivot row that has 1 where it has x."""
-
-    pivot: int
-    row: int
-    x: Scalar
-    s: Scalar
-    c: Scalar
-
-
-@dataclass(frozen=True)
-class Sum:
-    """Rows of one unknown, alone in the pivot row too, put together at once: x times it is right."""
-
-    pivot: Row
-    rows: tuple[tuple[int, Scalar, Scalar], ...]
 
 
 @dataclass(frozen=True)
@@ -122,52 +85,6 @@ class Eliminated:
     empty: tuple[Row, ...]
 
 
-def solids(linkage: Linkage, scalars: Scalars) -> tuple[Solid | None, ...]:
-    """What each frame carries, if anything; bodies welded together as one, without cancellation."""
-    found: list[Solid | None] = [None] * len(linkage.frames)
-    for mount in linkage.mounts:
-        inertia = mount.inertia
-        if not linkage.planar:
-            inertia = congruent(constant(mount.axes, scalars), inertia)
-        empty = all(scalars.is_zero(x) for x in (mount.mass, *(inertia[i][i] for i in AXES)))
-        if mount.frame >= 0 and not empty:
-            one, other = Solid(mount.mass, mount.at, inertia), found[mount.frame]
-            found[mount.frame] = one if other is None else _welded(other, one, scalars)
-    return tuple(found)
-
-
-def _welded(a: Solid, b: Solid, scalars: Scalars) -> Solid:
-    """Two as one: I = I_a + I_b + (m_a m_b / m) (r² 1 - r rᵀ) with r between the centres."""
-    if scalars.is_zero(b.mass) or scalars.is_zero(a.mass):
-        heavy = a if scalars.is_zero(b.mass) else b
-        return replace(heavy, inertia=plus(a.inertia, b.inertia))
-    mass = a.mass + b.mass
-    share = b.mass / mass
-    x, y, z = way = sub(b.centre, a.centre)
-    k = a.mass * share
-    xx, yy, zz = k * x * x, k * y * y, k * z * z
-    off = (-(k * x * y), -(k * x * z), -(k * y * z))
-    more = symmetric([yy + zz, xx + zz, xx + yy, *off])
-    inertia = plus(plus(a.inertia, b.inertia), more)
-    return Solid(mass, add(a.centre, scale(share, way)), inertia)
-
-
-def heaviest(linkage: Linkage) -> tuple[int, ...]:
-    """For each frame which of its children carries more mass than it and any other has; else -1.
-
-    The linkage is one over floats.
-    """
-    whole = [float(frame.rigid.mass) for frame in linkage.frames]
-    most, found = list(whole), [-1] * len(whole)
-    for k in reversed(range(len(whole))):
-        parent = linkage.frames[k].parent
-        if parent >= 0:
-            whole[parent] += whole[k]
-            if whole[k] > most[parent]:
-                most[parent], found[parent] = whole[k], k
-    return tuple(found)
-
-
 class Elimination:
     """One sweep over the frames of an instant in its own axes.
 
@@ -186,8 +103,7 @@ class Elimination:
         self._solids, self._heaviest = carried, heaviest
         self._scalars = scalars
         self._planar = bool(instant.angles)
-        self._indices = count()
-        self._zero, self._one, self._tiny = (scalars.number(x) for x in (0.0, 1.0, TINY))
+        self._rows = Rows(scalars)
 
     def respond(
         self, moving: Sequence[Acceleration], wrenches: Sequence[Force], tau: Sequence[Scalar]
@@ -212,13 +128,6 @@ class Elimination:
 
     # Inwards.
 
-    def _row(self, weight: Scalar, angular: Vec, linear: Vec, right: Scalar) -> Row:
-        return Row(next(self._indices), weight, angular, linear, right)
-
-    def _empty_row(self, axis: int, *, angular: bool) -> Row:
-        one, zero = unit(axis, self._scalars), zeros(self._scalars)
-        return self._row(self._tiny, *((one, zero) if angular else (zero, one)), self._zero)
-
     def _own_rows(
         self, k: int, a: Acceleration, wrench: Force
     ) -> tuple[tuple[dict[int, Row], dict[int, Row]], Force]:
@@ -234,10 +143,10 @@ class Elimination:
         if light or s.is_zero(solid.mass):
             left = wrench.force
         if not s.is_zero(solid.mass):
-            m = s.call("max", solid.mass, self._tiny)
+            m = s.call("max", solid.mass, self._rows.tiny)
             for j in self._axes():
                 right = -way[j] if light else wrench.force[j] / m - way[j]
-                linear[j] = self._row(m, zero, unit(j, s), right)
+                linear[j] = self._rows.make(m, zero, unit(j, s), right)
         turning = moment_about_centre(solid.inertia, a, s)
         if light:
             moment = wrench.moment
@@ -259,12 +168,12 @@ class Elimination:
                 y[j] = y[j] - part * y[i]
                 for h in order[n + 1 :]:
                     work[j][h] = work[j][h] - part * work[i][h]
-            angular[i] = self._row(d, entries, zero, y[i] / d)
+            angular[i] = self._rows.make(d, entries, zero, y[i] / d)
         moved = add(moment, cross(solid.centre, left))
         return (linear, angular), Force(moved, left)
 
     def _pivot_of(self, pivot: Scalar, entry: Scalar) -> Scalar:
-        floor = self._tiny if pivot is entry else self._scalars.number(SLIGHT) * entry
+        floor = self._rows.tiny if pivot is entry else self._scalars.number(SLIGHT) * entry
         return self._scalars.call("max", pivot, floor)
 
     def _axes(self) -> tuple[int, ...]:
@@ -303,23 +212,23 @@ class Elimination:
             at = solid.centre
         linear, angular = dict(own[0]), dict(own[1])
         if solid is not None:
-            linear = {j: _shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
-        loose = [_shifted(row, sub(arm, at)) for row, arm in rows]
-        turns: list[Turn | Sum] = []
+            linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
+        loose = [shifted(row, sub(arm, at)) for row, arm in rows]
+        turns: Steps = []
         orders = (self._slides_of(link, at), self._turns_of(link))
         room = len(orders[0]) + len(orders[1])
         folded = bool(linear) or len(loose) + len(angular) > room
         if folded:
-            linear, loose = self._folded(linear, loose, orders[0], turns, angular=False)
-            holding = sum(not self._is_empty(row) for row in loose)
+            linear, loose = self._rows.folded(linear, loose, orders[0], turns, angular=False)
+            holding = sum(not self._rows.is_empty(row) for row in loose)
             if angular or holding > len(orders[1]):
-                angular, loose = self._folded(angular, loose, orders[1], turns, angular=True)
-        kept = {(False, j): _shifted(linear[j], at) for j in orders[0] if j in linear}
+                angular, loose = self._rows.folded(angular, loose, orders[1], turns, angular=True)
+        kept = {(False, j): shifted(linear[j], at) for j in orders[0] if j in linear}
         kept |= {(True, j): angular[j] for j in orders[1] if j in angular}
-        free = [_shifted(row, at) for row in loose if not self._is_empty(row)]
+        free = [shifted(row, at) for row in loose if not self._rows.is_empty(row)]
         # Rows of angular accelerations alone first, which so stay what they are.
         free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
-        empty = [row for row in loose if self._is_empty(row)]
+        empty = [row for row in loose if self._rows.is_empty(row)]
         taken = []
         for axis, i in reversed(link.free):
             held = axis.unit in own[axis.angular]
@@ -327,75 +236,30 @@ class Elimination:
             one, kept, free, term = self._taken(link, (axis, i), first, kept, free, term, tau[i])
             taken.append(replace(one, before=before))
         rest = [*kept.values(), *free]
-        holding_rows = [row for row in rest if not self._is_empty(row)]
-        empty += [row for row in rest if self._is_empty(row)]
+        holding_rows = [row for row in rest if not self._rows.is_empty(row)]
+        empty += [row for row in rest if self._rows.is_empty(row)]
         return Eliminated(tuple(turns), tuple(taken), tuple(holding_rows), tuple(empty)), term
 
-    def _is_empty(self, row: Row) -> bool:
-        return all(self._scalars.is_zero(x) for x in (*row.angular, *row.linear))
-
-    def _folded(
-        self,
-        own: dict[int, Row],
-        rows: Sequence[Row],
-        order: Sequence[int],
-        turns: list[Turn | Sum],
-        *,
-        angular: bool,
-    ) -> tuple[dict[int, Row], list[Row]]:
-        """Rotate rows against the link's own until those alone hold the linear, or else the angular
-        accelerations, as a triangle in their order.
-        """
-        own, rows = dict(own), list(rows)
-        for j in order:
-            first = pivot = own.get(j) or self._empty_row(j, angular=angular)
-            if angular and j == order[-1] and j in own:
-                pivot, rows = self._summed(pivot, rows, j, turns)
-            for n, row in enumerate(rows):
-                pivot, rows[n] = self._rotated(pivot, row, angular, j, turns, own=pivot is first)
-            own[j] = pivot
-        return own, rows
-
-    def _summed(
-        self, pivot: Row, rows: Sequence[Row], j: int, turns: list[Turn | Sum]
-    ) -> tuple[Row, list[Row]]:
-        """A pivot row about one angular acceleration with all rows about that, and the others."""
-        is_zero = self._scalars.is_zero
-        weight, right, found, others = pivot.weight, pivot.weight * pivot.right, [], []
-        for row in rows:
-            x = row.angular[j]
-            if is_zero(x):
-                others.append(row)
-                continue
-            q = row.weight * x
-            weight, right = weight + q * x, right + q * row.right
-            found.append((row.index, x, row.right))
-        if not found:
-            return pivot, list(rows)
-        pivot = replace(pivot, weight=weight, right=right / weight)
-        turns.append(Sum(pivot, tuple(found)))
-        return pivot, others
-
     def _first(
-        self, way: Axis, held: bool, kept: dict[tuple[bool, int], Row], free: list[Row]
-    ) -> tuple[Row, dict[tuple[bool, int], Row], list[Row], tuple[Turn | Sum, ...]]:
+        self, way: Axis, held: bool, kept: dict[Column, Row], free: list[Row]
+    ) -> tuple[Row, dict[Column, Row], list[Row], tuple[Turn | Sum, ...]]:
         """The row that an axis is found from: one that holds it alone, as there is where a link has
         inertia against it; else what can be gathered of it from all.
         """
-        assert way.unit is not None
-        kept, turns = dict(kept), []  # type: ignore[var-annotated]
+        column = _column(way)
+        kept, turns = dict(kept), Steps()
         if held:
-            return kept.pop((way.angular, way.unit)), kept, free, ()
-        single = self._empty_row(way.unit, angular=way.angular)
+            return kept.pop(column), kept, free, ()
+        single = self._rows.empty(column)
         for n, row in enumerate(free):
             parts = zip((*row.angular, *row.linear), (*single.angular, *single.linear), strict=True)
             if all(self._scalars.is_zero(a - b) for a, b in parts):
                 return row, kept, [*free[:n], *free[n + 1 :]], ()
         free = list(free)
         for n, row in enumerate(free):
-            single, free[n] = self._rotated(single, row, way.angular, way.unit, turns)
+            single, free[n] = self._rows.rotated(single, row, column, turns)
         for key in reversed(kept):
-            single, kept[key] = self._rotated(single, kept[key], way.angular, way.unit, turns)
+            single, kept[key] = self._rows.rotated(single, kept[key], column, turns)
         return single, kept, free, tuple(turns)
 
     def _taken(
@@ -403,29 +267,30 @@ class Elimination:
         link: Link,
         axis: tuple[Axis, int],
         first: Row,
-        kept: dict[tuple[bool, int], Row],
+        kept: dict[Column, Row],
         free: Sequence[Row],
         term: Force,
         tau: Scalar,
-    ) -> tuple[Taken, dict[tuple[bool, int], Row], list[Row], Force]:
+    ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
         """Rotate one row until it alone holds an axis of motion."""
         s, (way, i) = self._scalars, axis
-        assert way.unit is not None
-        pivot, kept, free, turns = first, dict(kept), list(free), []  # type: ignore[var-annotated]
+        column = _column(way)
+        pivot, kept, free, turns = first, dict(kept), list(free), Steps()
         for n, row in enumerate(free):
-            pivot, free[n] = self._rotated(pivot, row, way.angular, way.unit, turns)
+            pivot, free[n] = self._rows.rotated(pivot, row, column, turns)
         for key in reversed(kept):
-            pivot, kept[key] = self._rotated(pivot, kept[key], way.angular, way.unit, turns)
+            pivot, kept[key] = self._rows.rotated(pivot, kept[key], column, turns)
         carried = along(way, term.moment, term.force)
         force, rotor, parents = carried + tau, -1, -tau
         if not s.is_zero(link.armature):
             # Its row is that of the joint's acceleration, the frame's less the parent's.
-            row = replace(self._empty_row(way.unit, angular=way.angular), weight=link.armature)
-            pivot, row = self._rotated(pivot, row, way.angular, way.unit, turns)
-            minus = with_component(way, row.angular, row.linear, -self._one)
+            row, before = replace(self._rows.empty(column), weight=link.armature), pivot.weight
+            pivot, row = self._rows.rotated(pivot, row, column, turns)
+            minus = with_component(way, row.angular, row.linear, -self._rows.one)
             free.append(replace(row, angular=minus[0], linear=minus[1]))
             # Of what pushes the frame the rotor's share, and of tau the frame's, minus.
-            rotor, parents = row.index, turns[-1].s * carried - turns[-1].c * tau
+            s_rotor = link.armature / pivot.weight
+            rotor, parents = row.index, s_rotor * carried - before / pivot.weight * tau
         pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
         share = force / pivot.weight
         moment = sub(term.moment, scale(force, pivot.angular))
@@ -433,55 +298,12 @@ class Elimination:
         passed = Force(*with_component(way, moment, push, parents))
         return Taken(way, i, first, share, tuple(turns), rotor), kept, free, passed
 
-    def _rotated(
-        self,
-        pivot: Row,
-        row: Row,
-        angular: bool,
-        j: int,
-        turns: list[Turn | Sum],
-        *,
-        own: bool = False,
-    ) -> tuple[Row, Row]:
-        """A pivot row, 1 in a column, and a row that has x there and then nothing; `own` if the
-        pivot row is a body's own yet.
-        """
-        x = (row.angular if angular else row.linear)[j]
-        if self._scalars.is_zero(x):
-            return pivot, row
-        q = row.weight * x
-        d = pivot.weight + q * x
-        s, c = q / d, pivot.weight / d
-        turns.append(Turn(pivot.index, row.index, x, s, c))
-
-        def mixed(a: Scalar, b: Scalar) -> tuple[Scalar, Scalar]:
-            # c a + s b is a + s (b - x a), too, and shorter, but not as good if a is large: in a
-            # link's own rows it is not, nor longer if a or b is nothing.
-            rest = b - x * a
-            short = own and not self._scalars.is_zero(a) and not self._scalars.is_zero(b)
-            return (a + s * rest if short else c * a + s * b), rest
-
-        def both(a: Vec, b: Vec, clear: bool) -> tuple[Vec, Vec]:
-            pairs = [mixed(*pair) for pair in zip(a, b, strict=True)]
-            if clear:
-                pairs[j] = (self._one, self._zero)
-            (p, f), (q, g), (r, h) = pairs
-            return (p, q, r), (f, g, h)
-
-        turn, left_turn = both(pivot.angular, row.angular, angular)
-        move, left_move = both(pivot.linear, row.linear, not angular)
-        right, left_right = mixed(pivot.right, row.right)
-        return (
-            Row(pivot.index, d, turn, move, right),
-            Row(row.index, row.weight * c, left_turn, left_move, left_right),
-        )
-
     # Outwards.
 
     def _outwards(self, found: Sequence[Eliminated], nv: int) -> list[Scalar]:
         """Residuals from the world outwards, and from them the accelerations."""
         scalars = self._scalars
-        result = [self._zero] * nv
+        result = [self._rows.zero] * nv
         residuals: dict[int, Scalar] = {}
         reached: list[tuple[Vec, Vec]] = []
         for link, eliminated in zip(self._links, found, strict=True):
@@ -495,39 +317,27 @@ class Elimination:
             for taken in reversed(eliminated.axes):
                 row, way = taken.row, taken.axis
                 residuals[row.index] = taken.left
-                _turned_back(taken.turns, residuals)
+                turned_back(taken.turns, residuals)
                 before = along(way, angular, linear)
                 if taken.rotor >= 0:
                     result[taken.velocity] = residuals[taken.rotor]
                     value = before + residuals[taken.rotor]
                 else:
-                    clear = with_component(way, row.angular, row.linear, self._zero)
+                    clear = with_component(way, row.angular, row.linear, self._rows.zero)
                     value = row.right + residuals[row.index]
                     value = value - (dot(clear[0], angular) + dot(clear[1], linear))
                     result[taken.velocity] = value - before
                 angular, linear = with_component(way, angular, linear, value)
-                _turned_back(taken.before, residuals)
-            _turned_back(eliminated.turns, residuals)
+                turned_back(taken.before, residuals)
+            turned_back(eliminated.turns, residuals)
             angular = named(angular, f"alpha_{link.name}", scalars)
             reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
         return result
 
 
-def _turned_back(turns: Sequence[Turn | Sum], residuals: dict[int, Scalar]) -> None:
-    for turn in reversed(turns):
-        if isinstance(turn, Sum):
-            value = turn.pivot.right + residuals[turn.pivot.index]
-            for index, x, right in turn.rows:
-                residuals[index] = x * value - right
-            continue
-        a, b = residuals[turn.pivot], residuals[turn.row]
-        residuals[turn.pivot] = a - turn.s * b
-        residuals[turn.row] = turn.x * a + turn.c * b
-
-
-def _shifted(row: Row, way: Vec) -> Row:
-    """A row about a point as one about the origin that the point lies `way` from."""
-    return replace(row, angular=add(row.angular, cross(way, row.linear)))
+def _column(axis: Axis) -> Column:
+    assert axis.unit is not None  # as all are in the frames' own axes
+    return axis.angular, axis.unit
 
 
 def _turned(link: Link, row: Row) -> Row:
