@@ -35,7 +35,7 @@ from eomgen.derivation.recursive.motion import (
 from eomgen.derivation.recursive.moving import Moving, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.orthogonal import Elimination
-from eomgen.derivation.recursive.solids import Solid, centres, heaviest, solids
+from eomgen.derivation.recursive.solids import Solid, centres, ranked, solids
 from eomgen.derivation.recursive.vectors import (
     Scalar,
     no_matrix,
@@ -228,8 +228,8 @@ class Dynamics(Moving):
 
     @cached_property
     def _eliminated(self) -> Elimination:
-        first = heaviest(make_linkage(self.model, self.model.defaults, FloatScalars()))
-        return Elimination(self.instant, self._solids, first, self.scalars)
+        ranks = ranked(make_linkage(self.model, self.model.defaults, FloatScalars()))
+        return Elimination(self.instant, self._solids, ranks, self.scalars)
 
     @cached_property
     def _free_roots(self) -> list[int]:

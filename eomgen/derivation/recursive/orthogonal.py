@@ -36,7 +36,7 @@ from eomgen.derivation.recursive.rows import (
     shifted,
     turned_back,
 )
-from eomgen.derivation.recursive.solids import Solid
+from eomgen.derivation.recursive.solids import Ranks, Solid
 from eomgen.derivation.recursive.vectors import (
     AXES,
     Scalar,
@@ -88,19 +88,18 @@ class Eliminated:
 class Elimination:
     """One sweep over the frames of an instant in its own axes.
 
-    `solids` are what the frames carry, about whose centres `wrenches` act; `heaviest` names for
-    each link the child that carries most, -1 where that is the link itself.
+    `carried` is what the frames carry, about whose centres wrenches act.
     """
 
     def __init__(
         self,
         instant: Instant,
         carried: Sequence[Solid | None],
-        heaviest: Sequence[int],
+        ranks: Ranks,
         scalars: Scalars,
     ) -> None:
         self._links = instant.links
-        self._solids, self._heaviest = carried, heaviest
+        self._solids, self._ranks = carried, ranks
         self._scalars = scalars
         self._planar = bool(instant.angles)
         self._rows = Rows(scalars)
@@ -112,6 +111,7 @@ class Elimination:
         the accelerations at v̇ = 0.
         """
         zero = zeros(self._scalars)
+        wrenches, tau = self._on_bodies(wrenches, tau)
         rows: list[list[tuple[Row, Vec]]] = [[] for _ in self._links]
         terms = [Force(zero, zero) for _ in self._links]
         found: list[Eliminated] = []
@@ -128,6 +128,39 @@ class Elimination:
 
     # Inwards.
 
+    def _on_bodies(
+        self, wrenches: Sequence[Force], tau: Sequence[Scalar]
+    ) -> tuple[list[Force], list[Scalar]]:
+        """Torques between two bodies that can take them as moments on both, which is shorter."""
+        s, wrenches, tau = self._scalars, list(wrenches), list(tau)
+        for k, link in enumerate(self._links):
+            for axis, i in link.free:
+                ends = [n for n in (k, link.parent) if n >= 0]
+                turns = axis.angular and s.is_zero(link.armature)
+                if turns and all(self._takes(n) for n in ends) and not s.is_zero(tau[i]):
+                    moment = scale(tau[i], axis.direction)
+                    wrenches[k] = replace(wrenches[k], moment=add(wrenches[k].moment, moment))
+                    if link.parent >= 0:
+                        other = wrenches[link.parent]
+                        moment = sub(other.moment, link.turn.out(moment))
+                        wrenches[link.parent] = replace(other, moment=moment)
+                    tau[i] = self._rows.zero
+        return wrenches, tau
+
+    def _takes(self, k: int) -> bool:
+        """Whether a link's own rows take what acts on it: where heavier ones hold the link, its own
+        would be moved far and back.
+        """
+        solid = self._solids[k]
+        return (
+            solid is not None
+            and not self._ranks.light[k]
+            and not any(self._scalars.is_zero(solid.inertia[j][j]) for j in self._spins())
+        )
+
+    def _spins(self) -> tuple[int, ...]:
+        return (2,) if self._planar else (0, 1, 2)
+
     def _own_rows(
         self, k: int, a: Acceleration, wrench: Force
     ) -> tuple[tuple[dict[int, Row], dict[int, Row]], Force]:
@@ -139,7 +172,7 @@ class Elimination:
             return ({}, {}), wrench
         linear, angular, left, moment = {}, {}, zero, zero
         way = add(a.linear, times(a.field, solid.centre))
-        light = self._heaviest[k] >= 0
+        light = self._ranks.light[k]
         if light or s.is_zero(solid.mass):
             left = wrench.force
         if not s.is_zero(solid.mass):
@@ -206,7 +239,7 @@ class Elimination:
         """Take a link's free axes out of the rows of all that it carries, each about a point."""
         s, link, solid = self._scalars, self._links[k], self._solids[k]
         # Where the heaviest rows have no arm, light ones keep theirs.
-        heaviest = self._heaviest[k]
+        heaviest = self._ranks.heaviest[k]
         at = self._links[heaviest].arm if heaviest >= 0 else zeros(s)
         if heaviest < 0 and solid is not None:
             at = solid.centre

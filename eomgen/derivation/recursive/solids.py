@@ -20,6 +20,9 @@ from eomgen.derivation.recursive.vectors import (
     zeros,
 )
 
+LIGHT = 10.0
+"""How many times heavier than a body one that it carries must be for it to be light."""
+
 
 @dataclass(frozen=True)
 class Solid:
@@ -65,17 +68,26 @@ def centres(carried: Sequence[Solid | None], scalars: Scalars) -> list[Vec]:
     return [zeros(scalars) if solid is None else solid.centre for solid in carried]
 
 
-def heaviest(linkage: Linkage) -> tuple[int, ...]:
-    """For each frame which of its children carries more mass than it and any other has; else -1.
-
-    The linkage is one over floats.
+@dataclass(frozen=True)
+class Ranks:
+    """Which bodies are heavier than others, by frame: the child that carries more mass than the
+    frame itself and any other child, -1 if none; and whether a body is light beside one it carries.
     """
-    whole = [float(frame.rigid.mass) for frame in linkage.frames]
-    most, found = list(whole), [-1] * len(whole)
-    for k in reversed(range(len(whole))):
+
+    heaviest: tuple[int, ...]
+    light: tuple[bool, ...]
+
+
+def ranked(linkage: Linkage) -> Ranks:
+    """The ranks of a linkage over floats."""
+    own = [float(frame.rigid.mass) for frame in linkage.frames]
+    whole, most, found, single = list(own), list(own), [-1] * len(own), list(own)
+    for k in reversed(range(len(own))):
         parent = linkage.frames[k].parent
         if parent >= 0:
             whole[parent] += whole[k]
+            single[parent] = max(single[parent], single[k])
             if whole[k] > most[parent]:
                 most[parent], found[parent] = whole[k], k
-    return tuple(found)
+    light = (one > LIGHT * mass for one, mass in zip(single, own, strict=True))
+    return Ranks(tuple(found), tuple(light))
