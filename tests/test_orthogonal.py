@@ -213,7 +213,7 @@ def test_what_the_others_lose(dimensions: int) -> None:
     assert off(model, at, "aba") > 1e-8
     assert off(model, at) < 1e-14
     lost = digits_lost(model)
-    assert min(lost.values()) > 8.0
+    assert min(lost["aba"], lost["ldl"]) > 8.0
 
 
 def test_free_pair() -> None:
@@ -232,7 +232,8 @@ def test_cart_of_nothing() -> None:
     rail = '[[joints]]\ntype = "prismatic"\nname = "rail"\nparent = "world"\nchild = "cart"\n'
     text = (
         'name = "cart"\n[[effects]]\ntype = "gravity"\ng = 9.81\n'
-        '[[bodies]]\nname = "cart"\nmass = 1\ninertia_com = 0\n[[bodies]]\nname = "pole"\nmass = 1\n'
+        '[[bodies]]\nname = "cart"\nmass = 1\ninertia_com = 0\n'
+        f'[[bodies]]\nname = "pole"\nmass = 1\n'
         f"inertia_com = 0.1\n{rail}axis = [1, 0]\n{pole}r_child = [-0.5, 0]\n"
         '[[effects]]\ntype = "motor"\nname = "drive"\njoint = "rail"\ntorque = "input"\n'
     )

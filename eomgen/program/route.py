@@ -1,16 +1,20 @@
 """Which route a model's equations take, and why."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from eomgen.derivation.recursive.digits import digits_lost
+from eomgen.derivation.recursive.digits import Accelerations, digits_lost
+from eomgen.derivation.recursive.moving import Values
+from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.errors import SceneError
 from eomgen.model import Model
 from eomgen.program.from_recursion import Recording, from_recursion
-from eomgen.program.program import Output, cost, finish
+from eomgen.program.program import Output, cost, finish, interpret
 from eomgen.program.system import System
+from eomgen.program.tape import TIME
 
-MOST_LOST = 6.0
+MOST_LOST = 4.0
 """Decimal digits of v̇ that a route may lose at ordinary states and still be taken by itself."""
 
 
@@ -83,9 +87,9 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
     else:
         records["ldl"] = recorded(model, "ldl")
         candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
-    lost = digits_lost(model)
-    candidates = [_weighed(c, lost.get(c.route, lost["ldl"])) for c in candidates]
-    if min(lost.values()) > MOST_LOST:
+    lost = digits_lost(model, None if closed is None else _accelerations(closed))
+    candidates = [_weighed(c, lost[c.route]) for c in candidates]
+    if all(c.refused or c.operations is None for c in candidates):
         records["orthogonal"] = recorded(model, "orthogonal")
         words = f"keeps the digits that these masses take from the others, {lost['aba']:.0f} of aba"
         count = _operations_of(records["orthogonal"])
@@ -146,6 +150,20 @@ def _weighed(candidate: Candidate, lost: float) -> Candidate:
         return candidate
     words = f"{candidate.words}; would lose {lost:.0f} digits"
     return replace(candidate, words=words, refused=True)
+
+
+def _accelerations(system: System) -> Accelerations:
+    """v̇ as a system in velocity form has it."""
+    model = system.model
+
+    def found(values: Values) -> Sequence[float]:
+        names = [c.name for c in (*model.coordinates, *model.velocities)]
+        given = {**values.parameters, **values.inputs, TIME: 0.0}
+        given |= dict(zip(names, (*values.q, *values.v), strict=True))
+        rates = interpret(system.program, "derivative", given, FloatScalars())
+        return rates[-len(model.velocities) :]
+
+    return found
 
 
 def _candidate(route: str, operations: int) -> Candidate:

@@ -3,7 +3,7 @@
 import math
 import random
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
@@ -15,19 +15,23 @@ TRIALS = 3
 ALL = -math.log10(sys.float_info.epsilon)
 """The digits of a double."""
 
+Accelerations = Callable[[Values], Sequence[float]]
+"""v̇ at values of a model."""
 
-def digits_lost(model: Model) -> Mapping[str, float]:
-    """The decimal digits that `aba` and `ldl` lose on v̇, relative to its largest component or 1, at
-    the worst of some seeded random states; 0 to `ALL`.
+
+def digits_lost(model: Model, closed: Accelerations | None = None) -> Mapping[str, float]:
+    """The decimal digits that `aba`, `ldl` and, if it is given, the closed form lose on v̇, relative
+    to its largest component or 1, at the worst of some seeded random states; 0 to `ALL`.
 
     They are compared with `orthogonal`, which keeps them. Of the effects uniform gravity and drives
-    act, the scene's own parameters hold, and inputs are 0.
+    act, or with a closed form all, the scene's own parameters hold, and inputs are 0.
     """
-    still = replace(
-        model, effects=tuple(e for e in model.effects if isinstance(e, Gravity | Driven))
-    )
+    still = model
+    if closed is None:
+        kept = tuple(e for e in model.effects if isinstance(e, Gravity | Driven))
+        still = replace(model, effects=kept)
     rng = random.Random(6)
-    worst = {"aba": 0.0, "ldl": 0.0}
+    worst: dict[str, float] = {}
     for _ in range(TRIALS):
         q = [rng.uniform(-1.5, 1.5) for _ in model.coordinates]
         v = [rng.uniform(-1.5, 1.5) for _ in model.velocities]
@@ -38,12 +42,15 @@ def digits_lost(model: Model) -> Mapping[str, float]:
             d = Dynamics(still, values, FloatScalars(), "own")
             true = d.orthogonal_forward()
             found = {"aba": d.articulated_forward(), "ldl": d.factored_forward()}
+            found |= {} if closed is None else {"closed": list(closed(values))}
         except (ArithmeticError, ValueError):
             continue
         size = max(1.0, *(abs(x) for x in true)) if true else 1.0
         for route, other in found.items():
             off = max((abs(a - b) for a, b in zip(other, true, strict=True)), default=0.0) / size
-            worst[route] = max(worst[route], off if off == off else 1.0)
-    return {
-        route: min(ALL, max(0.0, math.log10(off or 1e-300) + ALL)) for route, off in worst.items()
-    }
+            worst[route] = max(worst.get(route, 0.0), off if off == off else 1.0)
+    return {route: _digits(worst.get(route, 0.0)) for route in ("aba", "ldl", "closed")}
+
+
+def _digits(off: float) -> float:
+    return min(ALL, max(0.0, math.log10(off) + ALL)) if off > 0.0 else 0.0
