@@ -244,6 +244,22 @@ def test_cart_of_nothing() -> None:
             assert off(heavier, state(heavier, "random", seed)) < AT_RANDOM
 
 
+def test_force_on_what_is_light() -> None:
+    """A force on 1e-12 kg, which 1e12 kg on a slant hold: what it would do alone is not in it."""
+    text = 'name = "slides"\n[[effects]]\ntype = "gravity"\ng = 9.81\n'
+    for name, parent, axis in (("base", "world", [1.0, 0.0]), ("block", "base", [0.6, 0.8])):
+        text += (
+            f'[[bodies]]\nname = "{name}"\nmass = 1\ninertia_com = 0.1\n'
+            f'[[joints]]\ntype = "prismatic"\nname = "j_{name}"\nparent = "{parent}"\n'
+            f'child = "{name}"\naxis = {axis}\n'
+        )
+    text += '[[effects]]\ntype = "external_force"\nname = "push"\nbody = "base"\nforce = "input"\n'
+    for masses in ((1e-12, 1e12), (1e-6, 1e6), (1e12, 1e-12)):
+        model = with_masses(build_model(parse_scene(text)), masses)
+        for seed in range(some(3, 100)):
+            assert off(model, state(model, "random", seed)) < AT_RANDOM
+
+
 # Operations.
 
 
