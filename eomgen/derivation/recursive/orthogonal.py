@@ -5,18 +5,22 @@ By Gauss's principle of least constraint the accelerations are those with the le
     ½ Σ w (c · x - f)² - t · x,                  x = (α, a) of the frames,
 
 with a row c · x = f of weight w for each component of each body's Newton's and Euler's equations:
-the mass, a_centre = force / mass; the principal parts of the inertia, α = moment / inertia. The
-mass matrix and articulated inertias are this sum's normal equations. They square its condition,
-and a light body vanishes beside a heavy one; rows of their own weight do not. So rows are rotated
-against each other until one alone holds the acceleration along a free axis, from the leaves to the
-root: the QR factors of least squares over the tree of frames, by rotations without square roots
-(Gentleman 1973; Golub & Van Loan 5.1.13 of the 3rd edition). Weights are only added, or multiplied
-by ratios below 1, and each row is good to rounding of its own size.
+the mass, a_centre = force / mass; the pivots of the inertia, α = moment / inertia. The mass matrix
+and articulated inertias are this sum's normal equations. They square its condition, and a light
+body vanishes beside a heavy one; rows of their own weight do not. So rows are rotated against each
+other until one alone holds the acceleration along a free axis, from the leaves to the root: the QR
+factors of least squares over the tree of frames (Golub & Van Loan, Matrix Computations, 5.3). Each
+row is good to rounding of its own size, and a lever that is zero stays so: a link's rows are put
+together about the joint of what is heaviest on it.
 
-Outwards no acceleration is substituted, which could cancel, but the rows' residuals are rotated
-back: what is left of the first rows times their weights are the forces, small where the rows are
-light. Rows that are all pivots have the residual that t leaves. An axis of a frame without inertia
-begins with an empty row of no weight to speak of.
+Outwards no acceleration is substituted, which could cancel, but what the rows leave is rotated
+back. Those of a body times their weights are the forces that joints put on it, small where it is
+light. What has no inertia of its own along an axis is found from its neighbours' rows after all.
+
+A force on a body is part of its own rows, unless heavier ones hold it; it and torques of joints are
+then in t. Digits are lost still where heavy points, such as hang on ball joints, pull along a line
+that their link, free to turn with next to no inertia, has along no coordinate axis; and where the
+heavy rows of a tip end exactly at a joint that others turn it to by angles that are no quarters.
 """
 
 from collections.abc import Sequence
