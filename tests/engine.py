@@ -5,15 +5,14 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
-from eomgen.language.formula import FUNCTIONS as FORMULA_FUNCTIONS
 from eomgen.model import Model
 from eomgen.program import from_recursion as recording
+from eomgen.program.digits import MP, Digits, exact
 from eomgen.program.program import interpret
 from eomgen.program.route import routed
 from eomgen.program.system import System
@@ -21,43 +20,12 @@ from eomgen.program.tape import TIME
 from eomgen.run.module import load_module
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Scene
+from eomgen.study.states import random_state
 
-MP = mpmath.MPContext()
-"""Numbers of this context work in 60 digits, wherever they are."""
-MP.dps = 60
+__all__ = ["MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "read"]
+
 STEP = MP.mpf(10) ** -20
 """Of central differences, which are off by its square."""
-
-
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **{name: getattr(MP, name) for name in FORMULA_FUNCTIONS if hasattr(MP, name)},
-    "abs": abs,
-    "step": lambda x: MP.mpf(x > 0),
-    "min": min,
-    "max": max,
-    "select": lambda c, a, b: a if c > 0 else b,
-}
-"""What a program may call, in 60 digits."""
-
-
-class Digits:
-    """60-digit numbers as scalars of a program."""
-
-    def number(self, value: float) -> Any:
-        """The double itself, exactly."""
-        return MP.mpf(value)
-
-    def call(self, function: str, *arguments: Any) -> Any:
-        """Any function of formulas."""
-        return FUNCTIONS[function](*arguments)
-
-    def is_zero(self, value: Any) -> bool:
-        """Whether it is 0 here."""
-        return bool(value == 0)
-
-    def named(self, value: Any, name: str) -> Any:
-        """A number has no name."""
-        return value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,12 +66,7 @@ class Engine:
 
     def random_state(self, rng: np.random.Generator) -> np.ndarray:
         """Angles over two turns, slides within 0.6 m, unit quaternions; 3 rad/s, 1 m/s."""
-        reach = {"rad": 2 * np.pi, "m": 0.6, "rad/s": 3.0, "m/s": 1.0, "": 1.0}
-        y = np.array([reach.get(s.unit, 1.0) * rng.uniform(-1.0, 1.0) for s in self.system.states])
-        for indices in map(list, self.module.QUATERNIONS):
-            parts = rng.normal(size=4)
-            y[indices] = parts / np.linalg.norm(parts)
-        return y
+        return random_state(self.module, rng)
 
     def random_inputs(self, rng: np.random.Generator) -> dict[str, float]:
         """A value for every input."""
@@ -132,12 +95,6 @@ def engine(
         system = routed(model).system
     source = python_module(system)
     return Engine(model, system, source, load_module(source, f"tested_{model.name}"))
-
-
-def exact(values: Any) -> np.ndarray:
-    """Doubles as 60-digit numbers."""
-    array = np.asarray(values)
-    return np.array([MP.mpf(x) for x in array.ravel()], dtype=object).reshape(array.shape)
 
 
 def along(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, way: np.ndarray) -> np.ndarray:

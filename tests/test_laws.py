@@ -23,15 +23,15 @@ from eomgen.effects import ExternalForce, Gravity, Motor
 from eomgen.effects.base import JointLoad, Load
 from eomgen.joints import Free
 from eomgen.joints.base import Geared
-from eomgen.language.formula import Formula
+from eomgen.language.formula import Floats, Formula, evaluate
 from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, Program, cost, finish, live_steps
 from eomgen.program.route import routed
-from eomgen.program.tape import Stage
+from eomgen.program.tape import TIME, Stage
 from eomgen.scene.reader import built_in_names, parse_scene
 
 FIGURES = ("human_figure", "hanging_figure", "quadruped")
-LARGE = (*FIGURES, "ragdoll", "walker_motors", "chain", "chain_in_wind", "puma560")
+LARGE = (*FIGURES, "ragdoll", "walker_motors", "chain", "chain_in_wind", "puma560", "stiff_beam")
 TREES = {  # of up to 5 bodies; together they have everything
     "plane_60": (60, 2),
     "plane_379": (379, 2),
@@ -131,8 +131,8 @@ class Moment:
     # The bodies one by one, in space.
 
     def value(self, formula: Formula) -> Any:
-        """A quantity, as doubles have it."""
-        return MP.mpf(self.model.value(formula))
+        """A quantity, as doubles have it; a formula of time now."""
+        return MP.mpf(evaluate(formula, {**self.model.defaults, TIME: self.t}, Floats()))
 
     def vector(self, parts: tuple[Formula, ...]) -> np.ndarray:
         """A vector of the scene."""
