@@ -229,11 +229,8 @@ def _print_origin(
         print(f"    {made} runs made now, {shown - made} taken from earlier (--fresh begins anew)")
     missing = left_out(ladder, methods, works)
     if missing:
-        print_listed(
-            f"    {seconds:g} s were over before finer runs of these; the same command again goes "
-            "on with them: ",
-            missing,
-        )
+        print(f"    {seconds:g} s were over before finer runs of these; the same command goes on:")
+        print_listed("        ", missing)
 
 
 def _draw(

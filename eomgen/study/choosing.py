@@ -43,6 +43,8 @@ FIRST = 1e-4
 """Tolerance of the first runs, where none is asked for."""
 LOOSE = 1e-5
 """Errors asked for down to here may be met by few equal steps."""
+FEW_ROWS = 257
+"""With more, equal steps lose what they save."""
 FIRST_STEPS, MOST_STEPS = 64, 2**20
 """Of equal steps: in the first run of a method, and in any."""
 
@@ -184,7 +186,8 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         if done:
             most = BETTER * min(run.work for run in done)
             near = [run for run in done if run.work <= most]
-            return search.chosen(min(near, key=lambda run: judged[id(run)]), judged, True)
+            best = min(near, key=lambda run: (judged[id(run)], run.work))
+            return search.chosen(best, judged, True)
         plans = [_towards(search, method_of(name), judged, GOAL * target) for name in names]
         possible = [plan for plan in plans if plan]
         best = min(search.runs, key=lambda run: judged[id(run)])
@@ -245,16 +248,25 @@ def _race(search: _Search, names: list[str], loose: bool) -> list[str]:
     more = []
     if not search.runs or any(run.trajectory.counts["jacobians"] for run in search.runs):
         more = ["Radau"]
-    elif loose and not search.case.problem.corners and search.case.problem.contacts is None:
+    elif loose and _few_steps_do(search.case):
         more = ["rk4"]
     for name in more:
         _first(search, method_of(name))
     return [*names, *more]
 
 
+def _few_steps_do(case: Case) -> bool:
+    """Whether equal steps may be few: the motion is smooth, and not many rows are asked for, of
+    which each is the end of a step.
+    """
+    smooth = not case.problem.corners and case.problem.contacts is None
+    return smooth and case.rows <= FEW_ROWS
+
+
 def _first(search: _Search, method: Method) -> None:
     """A method's first run; where that fails, a tighter one: too long a step may not be stable."""
-    tolerance = search.case.t_end / FIRST_STEPS if method.equal_steps else search.first
+    steps = max(FIRST_STEPS, search.case.rows - 1)
+    tolerance = search.case.t_end / steps if method.equal_steps else search.first
     most = SLACK * min((run.work for run in search.runs), default=math.inf)
     while not (search.attempt(method, tolerance, most) or search.broken[-1].cut):
         tolerance /= _rung(method, RUNG)

@@ -11,43 +11,36 @@ corrected, and how far off it is, is in long numbers.
 """
 
 import math
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import gmpy2
 import numpy as np
 import scipy.linalg
 from gmpy2 import mpfr
 from numpy.typing import NDArray
-from scipy.integrate import LSODA
 
 from eomgen.run.problem import Floats, Problem
 from eomgen.study import corners
 from eomgen.study.corners import Turn
+from eomgen.study.forecast import Forecast, NoStep
 from eomgen.study.precise import BITS, Long, Precise, Watch, digits
 
 Longs = NDArray[np.object_]
 """An array of long numbers."""
-FORECAST = 1e-10
-"""Relative tolerance of the forecast; what it is off makes the first correction."""
-ASTRAY = 1e-6
-"""A forecast this far off, in parts of the scale, begins anew."""
 MANY = 40
 """States from which on one Jacobian serves all stages of a step."""
 MOST_CORRECTIONS = 12
+NEAR = 1e-12
+"""Corrections this small, in parts of the scale, are the last that doubles are worth."""
 ENOUGH = 0.001
 """Part of the tolerance that stages are corrected to."""
 TURNINGS = 40
-"""Steps made again for the sake of one turn before that is given up."""
+SLOW = 6
+"""Steps made again for the sake of one turn before that is given up, and before it is slow."""
 SHRINK, GROW, SAFETY = 0.2, 3.0, 0.9
 """Bounds of how the step changes."""
-
-
-class NoStep(ArithmeticError):
-    """A step that cannot be made; the text says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,62 +112,6 @@ def _legendre(degree: int, x: Long) -> list[Long]:
     return values
 
 
-class Forecast:
-    """The motion ahead, roughly: what one double-precision run yields, begun anew as it strays."""
-
-    def __init__(self, problem: Problem, scale: Floats, t_end: float) -> None:
-        self._problem, self._scale, self._t_end = problem, scale, t_end
-        self._pieces: list[Any] = []
-        self._solver: Any = None
-
-    def __call__(self, t: float, y: Floats, times: Floats) -> Floats:
-        """States (len(times), ny) at `times`, ascending and not before t, of the motion through y.
-
-        Raises `NoStep` if it does not get there.
-        """
-        if self._solver is None or not self._reaches(t, t):
-            self._begin(t, y)
-        shift = y - self._at(t)
-        if np.max(np.abs(shift) / self._scale) > ASTRAY:
-            self._begin(t, y)
-            shift = np.zeros_like(y)
-        while not self._reaches(t, times[-1]):
-            self._go_on()
-        self._pieces = [piece for piece in self._pieces if piece.t >= t]
-        return np.array([self._at(float(time)) + shift for time in times])
-
-    def _begin(self, t: float, y: Floats) -> None:
-        self._pieces = []
-        self._solver = LSODA(
-            self._problem.derivative,
-            t,
-            y.copy(),
-            self._t_end,
-            rtol=FORECAST,
-            atol=FORECAST * self._scale,
-            jac=self._problem.jacobian,
-        )
-        self._go_on()
-
-    def _go_on(self) -> None:
-        before = self._solver.t
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # LSODA says in one what it then fails with
-            complaint = self._solver.step()
-        if self._solver.status == "failed" or not np.isfinite(self._solver.y).all():
-            raise NoStep(complaint or "the forecast failed")
-        if self._solver.t > before:
-            self._pieces.append(self._solver.dense_output())
-
-    def _reaches(self, t: float, end: float) -> bool:
-        pieces = self._pieces
-        return bool(pieces) and pieces[0].t_old <= t and pieces[-1].t >= end
-
-    def _at(self, t: float) -> Floats:
-        piece = next(piece for piece in self._pieces if piece.t >= t)
-        return np.asarray(piece(t))
-
-
 @dataclass(frozen=True, eq=False)
 class Step:
     """The state `y` (ny, long) at the end of a step, about how far off it is, in parts of the
@@ -207,6 +144,8 @@ def advance(
     moments = np.array(times, dtype=float)
     guessed = forecast(float(t), near, moments)
     correct = _solver(method, problem, float(h), moments, guessed)
+    if precise.watch is None:  # else the motion in doubles would turn where this one does not
+        guessed = _in_doubles(method, problem, float(h), moments, near, guessed, correct, scale)
     moves = guessed.astype(object) - y  # long: doubles would add up to doubles
     last = math.inf
     for _ in range(MOST_CORRECTIONS):
@@ -230,6 +169,30 @@ def advance(
             raise NoStep("the corrections do not shrink")
         last = size
     raise NoStep("the corrections shrink too slowly")
+
+
+def _in_doubles(
+    method: Gauss,
+    problem: Problem,
+    h: float,
+    times: Floats,
+    near: Floats,
+    states: Floats,
+    correct: Callable[[Floats], Floats],
+    scale: Floats,
+) -> Floats:
+    """The stages as well as doubles make them: cheaper corrections first."""
+    a, last = method.a.astype(float), math.inf
+    for _ in range(MOST_CORRECTIONS):
+        slopes = np.array([problem.derivative(t, y) for t, y in zip(times, states, strict=True)])
+        change = correct(states - near - h * (a @ slopes))
+        size = float(np.max(np.abs(change) / scale))
+        if not size < 0.1 * last:
+            break
+        states, last = states - change, size
+        if size < NEAR:
+            break
+    return states
 
 
 def _margins(precise: Precise, t: Long, y: Longs) -> list[Long]:
@@ -364,7 +327,8 @@ def rows(
                 turn = None
                 continue
             if precise.watch:
-                again, turn = _turned(precise.watch, method, step.margins, turn, h, left)
+                slow = tried > SLOW
+                again, turn = _turned(precise.watch, method, step.margins, turn, slow=slow)
                 tried += again
                 if tried > TURNINGS:
                     raise NoStep(f"corners turn again and again at t = {float(way.t):.6g}")
@@ -378,7 +342,7 @@ def rows(
 
 
 def _turned(
-    watch: Watch, method: Gauss, margins: Floats, turn: Turn | None, h: Long, left: Long
+    watch: Watch, method: Gauss, margins: Floats, turn: Turn | None, *, slow: bool
 ) -> tuple[bool, Turn | None]:
     """Whether a step is to be made again because of corners, and up to which turn; turns those that
     are there at its start, or at its end, if it is taken.
@@ -386,7 +350,8 @@ def _turned(
     places = np.array([0.0, *method.c.tolist(), 1.0], dtype=float)
     if turn is not None:
         if not corners.is_there(turn, margins):
-            return True, corners.nearer(turn, places, margins)
+            turn = corners.nearer(turn, places, margins)
+            return True, corners.simpler(turn, places, margins) if slow else turn
         for corner in corners.turned_at_the_end(turn, margins):
             watch.ways[corner] = not watch.ways[corner]
         return False, None

@@ -29,6 +29,9 @@ APART = 30.0
 SCATTER = 3.0
 """Those of multistep methods, whose orders change, too, scatter more: what remains of theirs is
 taken so many times."""
+ALIKE = 2.0
+"""Runs of two methods are taken to be off by so many times what they differ by, for they may be off
+alike; and it is the nearest of several that is asked."""
 SLOPES = (0.6, 1.2)
 """Of the exponent in theory: what a fitted one is kept to."""
 
@@ -114,7 +117,7 @@ def errors(runs: Sequence[Tried], scale: Floats, case: Case) -> list[float]:
         name = run.setting.integrator
         own = sorted((r for r in runs if r.setting.integrator == name), key=lambda r: -r.tolerance)
         others = [r for r in runs if r.setting.integrator != name]
-        apart = [difference(run.trajectory, r.trajectory, scale) for r in others]
+        apart = [ALIKE * difference(run.trajectory, r.trajectory, scale) for r in others]
         if run is not own[-1]:
             gap = difference(run.trajectory, own[-1].trajectory, scale)
             if gap > 0 or not case.bounded:

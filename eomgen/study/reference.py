@@ -3,8 +3,8 @@
 The motion is found twice by Gauss collocation in long numbers (`collocation`), once with fewer
 stages and a looser tolerance; the looser one's difference from the tighter, which is what is kept,
 is the stated error, with what rounding to doubles adds. Where contacts strike, or where that would
-take too long, two methods in doubles at their tightest tolerance stand in: their difference is the
-stated error, and the origin says so.
+take too long, two methods in doubles at their tightest tolerance stand in: twice their difference
+is the stated error, and the origin says so.
 """
 
 import hashlib
@@ -30,11 +30,11 @@ from eomgen.study.collocation import Longs, rows
 from eomgen.study.precise import BITS, digits, precise
 
 ROWS = 201
-SECONDS = 180.0
+SECONDS = 300.0
 """Of processor time that a reference in long numbers may take; one in doubles comes on top."""
 TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
 """Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
-FORMAT = "reference 1"
+FORMAT = "reference 2"
 """Changes whenever a reference would come out otherwise."""
 _JUDGED = 0.1
 """Share of the time after which the pace tells whether it will suffice."""
@@ -171,8 +171,8 @@ def _roughly(problem: Problem, times: Floats, rest_speed: float) -> Floats:
         problem,
         "LSODA",
         float(times[-1]),
-        rtol=1e-8,
-        atol=1e-10,
+        rtol=1e-6,
+        atol=1e-8,
         samples=len(times),
         rest_speed=rest_speed,
     )
@@ -212,9 +212,9 @@ def _in_doubles(
         found.append(np.array([run.y[np.searchsorted(run.t, t)] for t in times]))
     return (
         found[0],
-        found[1],
-        f"DOP853 in doubles at rtol {SMALLEST_RTOL:g} ({why}); error: difference from {other} "
-        "at rtol 1e-12",
+        2 * found[1] - found[0],  # which of the two is better is not known
+        f"DOP853 in doubles at rtol {SMALLEST_RTOL:g} ({why}); error: twice the difference from "
+        f"{other} at rtol 1e-12",
     )
 
 

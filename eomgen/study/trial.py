@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.integrate import integrate
+from eomgen.run.integrate import ADAPTIVE_SAMPLES, integrate
 from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
@@ -135,6 +135,11 @@ class Case:
     watch: Watch = unseen
 
     @property
+    def rows(self) -> int:
+        """How many are to be kept."""
+        return self.kept.get("samples") or ADAPTIVE_SAMPLES
+
+    @property
     def bounded(self) -> bool:
         """Whether steps are kept short for other reasons than their error."""
         return self.problem.corners or self.kept.get("max_step") is not None
@@ -150,7 +155,7 @@ class Case:
         kind of state is then held to less than the relative tolerance of its own scale.
         """
         if method.equal_steps:
-            return Setting(method.name, dt=float(f"{tolerance:.2g}"))
+            return Setting(method.name, dt=float(f"{tolerance:.3g}"))
         rtol = max(_plain(tolerance), method.tightest)
         size = 10.0 ** math.floor(math.log10(float(np.min(self.scale(like)))))
         return Setting(method.name, rtol=rtol, atol=float(f"{rtol * size:.0e}"))
