@@ -27,9 +27,9 @@ from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.rotations import AxisTurn
 from eomgen.language.formula import Constant
 from eomgen.model import Model
-from eomgen.program.program import Output, cost, finish
+from eomgen.program.program import Output, cost, finish, interpret
 from eomgen.program.route import recorded, routed
-from eomgen.scene.reader import parse_scene
+from eomgen.scene.reader import find_scene, parse_scene
 
 PLANE, SPACE = 2, 3
 AT_RANDOM, ALIGNED = 1e-13, 1e-10
@@ -270,7 +270,7 @@ def operations(text: str, route: str) -> int:
     return cost(finish(record.tape, outputs, ()), "v")["total"]
 
 
-@pytest.mark.parametrize("n", [8, 20])
+@pytest.mark.parametrize("n", some([5, 9], [8, 20]))
 @pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 def test_operations(dimensions: int, free: bool, n: int) -> None:
@@ -286,11 +286,11 @@ def test_operations(dimensions: int, free: bool, n: int) -> None:
 
 
 @cache
-def tip(mass: float) -> str:
-    """A chain of two links of 1 kg with a third of some mass, as text."""
-    text = scene(PLANE, 3, 5, simple=True)
-    head, tail = text.split('name = "b2"\nmass = 1.0')
-    return f'{head}name = "b2"\nmass = {mass!r}{tail}'
+def tip(mass: float, n: int = 3) -> str:
+    """A chain of n - 1 links of 1 kg with another of some mass, as text."""
+    text = scene(PLANE, n, 5, simple=True)
+    head, tail = text.split(f'name = "b{n - 1}"\nmass = 1.0')
+    return f'{head}name = "b{n - 1}"\nmass = {mass!r}{tail}'
 
 
 def test_taken_where_masses_call_for_it() -> None:
@@ -301,7 +301,7 @@ def test_taken_where_masses_call_for_it() -> None:
     assert all("would lose" in line for line in lines if " operations a call" in line)
     assert lines[-1].startswith("orthogonal") and lines[-1].endswith("<- taken")
     assert "keeps the digits that these masses take from the others" in lines[-1]
-    ordinary = routed(build_model(parse_scene(tip(2.0))))
+    ordinary = routed(build_model(parse_scene(tip(2.0, 2))))
     assert ordinary.system.route != "orthogonal"
     assert not any("digits" in line or "orthogonal" in line for line in ordinary.explanation())
 
@@ -351,3 +351,68 @@ def test_mass_of_zero_at_run_time() -> None:
     for extra in (0.0, 1.0):
         pair = (e.module.derivative(0.0, [*q, *v], {"extra": extra}, u) for e in (made, other))
         assert apart(*pair) < 1e-11
+
+
+EVERYTHING = """
+[[bodies]]
+name = "C"
+mass = 0.3
+inertia_com = 0.02
+
+[[joints]]
+name = "knee"
+type = "revolute"
+parent = "B"
+child = "C"
+r_parent = ["l_B", 0]
+r_child = [-0.2, 0]
+motor_inertia = 0.01
+
+[[bodies]]
+name = "D"
+mass = 0.2
+inertia_com = 0.01
+
+[[joints]]
+name = "told"
+type = "revolute"
+parent = "C"
+child = "D"
+r_child = [-0.1, 0]
+
+[[effects]]
+type = "driven"
+name = "tell"
+joint = "told"
+coordinate = "0.3*sin(2*t)"
+
+[[effects]]
+type = "motor"
+name = "drive"
+joint = "knee"
+torque = "input"
+
+[[effects]]
+type = "joint_spring"
+name = "hold"
+joint = "hinge"
+stiffness = 3.0
+"""
+"""What is added to two bodies that bounce: a rotor, a motor, a spring, a motion that is told."""
+
+
+def test_every_output() -> None:
+    """Contacts, impacts, inputs, told motions, derivatives: all outputs are those of `aba`."""
+    text = find_scene("bouncing_two_body").read_text()
+    text = text.replace("outputs = []", 'outputs = "all"') + EVERYTHING
+    ours, theirs = (
+        routed(replace(build_model(parse_scene(text)), route=route)).system
+        for route in ("orthogonal", "aba")
+    )
+    assert {"impact", "jacobian", "parameter_jacobian", "input_jacobian"} <= {*ours.program.outputs}
+    assert {*ours.program.outputs} == {*theirs.program.outputs}
+    r, names = random.Random(7), {s.value for s in ours.program.steps if s.operation == "input"}
+    given = {name: r.uniform(0.2, 0.9) for name in sorted(names)}
+    for name in ours.program.outputs:
+        one, other = (interpret(s.program, name, given, FloatScalars()) for s in (ours, theirs))
+        assert apart(one, other) < 1e-11, name
