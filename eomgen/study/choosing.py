@@ -48,6 +48,8 @@ FEW_ROWS = 257
 PATIENT = "gauss_6"
 """Tried where others at their tightest are not exact enough: in equal steps that are summed with
 compensation, rounding disturbs a run a thousand times less."""
+PATIENCE = 10.0
+"""Of the time of the best run so far: what the first run of `PATIENT` may take."""
 FIRST_STEPS, MOST_STEPS = 64, 2**20
 """Of equal steps: in the first run of a method, and in any."""
 
@@ -196,7 +198,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         best = min(search.runs, key=lambda run: judged[id(run)])
         if judged[id(best)] <= target and not possible:
             return search.chosen(best, judged, True)
-        if asked is None and not all(plans) and _patience(search, names, math.inf):
+        if asked is None and _patience(search, names, plans, PATIENCE * best.work):
             continue
         if not possible:
             possible = [plan for plan in (_beside(search, best), _again(search, names)) if plan][:1]
@@ -225,7 +227,7 @@ def within(
         left = budget - search.spent
         plans = [_most(search, method_of(name), judged, left) for name in names]
         possible = [plan for plan in plans if plan]
-        if asked is None and not all(plans) and _patience(search, names, HALF * left):
+        if asked is None and _patience(search, names, plans, HALF * left):
             continue
         if not possible:
             return search.chosen(best, judged, True)
@@ -262,9 +264,14 @@ def _race(search: _Search, names: list[str], loose: bool) -> list[str]:
     return [*names, *more]
 
 
-def _patience(search: _Search, names: list[str], most: float) -> bool:
-    """Try `PATIENT`, too, for `most` s, if it is not among the `names` and for this motion."""
-    if PATIENT in names or not _smooth(search.case):
+def _patience(search: _Search, names: list[str], plans: Sequence[Plan | None], most: float) -> bool:
+    """Try `PATIENT`, too, for `most` s, if it is for this motion, is not among the `names`, and the
+    explicit ones of these can be held no tighter.
+    """
+    explicit = [plan for name, plan in zip(names, plans, strict=True) if name != "Radau"]
+    own = search.of("DOP853")
+    spent = bool(own) and own[-1].tolerance <= search.tightest(method_of("DOP853"))
+    if PATIENT in names or any(explicit) or not (spent and _smooth(search.case)):
         return False
     names.append(PATIENT)
     _first(search, method_of(PATIENT), most)
