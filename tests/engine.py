@@ -1,63 +1,25 @@
 """Scenes compiled by a given route, for tests: as loaded modules, and as programs in 60 digits."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
+from digits import STEP, Digits, number
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
-from eomgen.language.formula import FUNCTIONS as FORMULA_FUNCTIONS
 from eomgen.model import Model
 from eomgen.program import from_recursion as recording
-from eomgen.program.program import interpret
+from eomgen.program.program import interpreter
 from eomgen.program.route import routed
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.run.module import load_module
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Scene
-
-MP = mpmath.MPContext()
-"""Numbers of this context work in 60 digits, wherever they are."""
-MP.dps = 60
-STEP = MP.mpf(10) ** -20
-"""Of central differences, which are off by its square."""
-
-
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **{name: getattr(MP, name) for name in FORMULA_FUNCTIONS if hasattr(MP, name)},
-    "abs": abs,
-    "step": lambda x: MP.mpf(x > 0),
-    "min": min,
-    "max": max,
-    "select": lambda c, a, b: a if c > 0 else b,
-}
-"""What a program may call, in 60 digits."""
-
-
-class Digits:
-    """60-digit numbers as scalars of a program."""
-
-    def number(self, value: float) -> Any:
-        """The double itself, exactly."""
-        return MP.mpf(value)
-
-    def call(self, function: str, *arguments: Any) -> Any:
-        """Any function of formulas."""
-        return FUNCTIONS[function](*arguments)
-
-    def is_zero(self, value: Any) -> bool:
-        """Whether it is 0 here."""
-        return bool(value == 0)
-
-    def named(self, value: Any, name: str) -> Any:
-        """A number has no name."""
-        return value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,6 +30,9 @@ class Engine:
     system: System
     source: str
     module: Any
+    _runs: dict[str, Callable[[Mapping[str, Any]], list[Any]]] = field(
+        init=False, default_factory=dict
+    )
 
     def exactly(
         self,
@@ -80,7 +45,7 @@ class Engine:
     ) -> np.ndarray:
         """An output in 60 digits, in its shape; `extra` are tau or vd, one a velocity."""
         given = {**self.module.PARAMETERS, **(p or {}), **self.module.INPUTS, **(u or {})}
-        given |= {TIME: MP.mpf(t), **dict(zip(self.module.STATES, y, strict=True))}
+        given |= {TIME: t, **dict(zip(self.module.STATES, y, strict=True))}
         names = self.system.extra.get(output, ())
         if output not in self.system.tangents:
             given |= dict(zip(names, extra or [0.0] * len(names), strict=True))
@@ -92,9 +57,10 @@ class Engine:
         return np.array(columns, dtype=object).T
 
     def _run(self, output: str, given: Mapping[str, Any]) -> np.ndarray:
-        inputs = {name: MP.mpf(value) for name, value in given.items()}
-        found = interpret(self.system.program, output, inputs, Digits())
-        return np.array(found, dtype=object)
+        if output not in self._runs:
+            self._runs[output] = interpreter(self.system.program, output, Digits())
+        inputs = {name: number(value) for name, value in given.items()}
+        return np.array(self._runs[output](inputs), dtype=object)
 
     def random_state(self, rng: np.random.Generator) -> np.ndarray:
         """Angles over two turns, slides within 0.6 m, unit quaternions; 3 rad/s, 1 m/s."""
@@ -115,14 +81,18 @@ def read(scene: str) -> Scene:
     return read_scene(scene) if scene in built_in_names() else parse_scene(scene)
 
 
-@cache
 def engine(
     scene: str, route: str = "", *, leave_out: tuple[str, ...] = (), tangents: bool = False
 ) -> Engine:
-    """Compile a scene with all outputs but some, by a route or by its own.
+    """Compile a scene, once, with all outputs but some, by a route or by its own.
 
     `tangents`: as large models have it, no matrix of derivatives is written out.
     """
+    return _engine(scene, route, leave_out, tangents)
+
+
+@cache
+def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) -> Engine:
     model = build_model(read(scene).replaced(outputs="all"))
     outputs = tuple(name for name in model.outputs if name not in leave_out)
     model = replace(model, outputs=outputs, route=route or model.route)
@@ -137,7 +107,8 @@ def engine(
 def exact(values: Any) -> np.ndarray:
     """Doubles as 60-digit numbers."""
     array = np.asarray(values)
-    return np.array([MP.mpf(x) for x in array.ravel()], dtype=object).reshape(array.shape)
+    numbers = [number(x) for x in array.ravel().tolist()]
+    return np.array(numbers, dtype=object).reshape(array.shape)
 
 
 def along(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, way: np.ndarray) -> np.ndarray:
@@ -147,9 +118,16 @@ def along(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, way: np.ndarray)
 
 def apart(actual: Any, expected: Any, *terms: Any) -> float:
     """Greatest difference, relative to the greatest value, of terms too if given, or to 1."""
-    actual, expected = np.asarray(actual), np.asarray(expected)
+    arrays = [np.asarray(x) for x in (actual, expected, *terms)]
+    if any(array.dtype == object for array in arrays):
+        arrays = [exact(array) for array in arrays]
+    actual, expected = arrays[:2]
     assert actual.shape == expected.shape, f"{actual.shape} is not {expected.shape}"
-    sizes = (np.max(np.abs(x), initial=0) for x in (expected, *(np.asarray(t) for t in terms)))
-    difference = np.max(np.abs(actual - expected), initial=0)
+    sizes = map(_greatest, arrays[1:])
+    difference = _greatest(actual - expected)
     assert difference == difference, "not a number"
     return float(difference / max(1, *sizes))
+
+
+def _greatest(values: Any) -> Any:
+    return np.max(np.abs(np.ravel(values)), initial=0)

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from engine import MP, Digits, Engine, along, apart, engine, exact
+from digits import Digits, number, sqrt
+from engine import Engine, along, apart, engine, exact
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from spatial_newton_euler import SpatialMotion, solve
@@ -38,18 +39,6 @@ HERTZ = 'law = "hunt_crossley"', "stiffness = 900.0"
 RUB = "friction = 0.4", "slip_speed = 0.05"
 RIGID = 'law = "impact"', "restitution = 0.6", "friction = 0.3", "slip_speed = 0.01"
 WEIGHT = '[[effects]]\ntype = "gravity"\ng = 9.81\n'
-
-
-class Exact(Digits):
-    """60-digit numbers as scalars of the recursions."""
-
-    def is_zero(self, value: Any) -> bool:
-        """Whether it is 0 here."""
-        return bool(value == 0)
-
-    def named(self, value: Any, name: str) -> Any:
-        """A number has no name."""
-        return value
 
 
 def free(*names: str, dimensions: int = PLANE, inertia: float = 0.4 * M * R * R) -> str:
@@ -97,10 +86,12 @@ def run(found: Engine, y0: np.ndarray, t_end: float) -> Callable[[float], dict[s
 def exact_dynamics(found: Engine, y: np.ndarray) -> Dynamics:
     """The model at a state, in 60 digits."""
     model = found.model
-    parameters = {p.name: MP.mpf(p.default) for p in model.parameters}
+    parameters = {p.name: number(p.default) for p in model.parameters}
     nq = len(model.coordinates)
-    values = [MP.mpf(x) for x in y]
-    return Dynamics(model, Values(parameters, {}, values[:nq], values[nq:], {}, MP.mpf(0)), Exact())
+    values = [number(x) for x in y]
+    return Dynamics(
+        model, Values(parameters, {}, values[:nq], values[nq:], {}, number(0)), Digits()
+    )
 
 
 # One body on the ground, in closed form.
@@ -376,13 +367,13 @@ def states(found: Engine, seed: int, count: int) -> Iterator[np.ndarray]:
     for _ in range(count):
         y = exact(found.random_state(rng))
         for indices in map(list, found.module.QUATERNIONS):
-            y[indices] = y[indices] / MP.sqrt(sum(y[indices] ** 2))
+            y[indices] = y[indices] / sqrt(sum(y[indices] ** 2))
         yield y
 
 
 def power(dynamics: Dynamics, loads: tuple[Load | JointLoad, ...]) -> Any:
     """What loads do to the motion, W."""
-    total = MP.mpf(0)
+    total = number(0)
     for load in loads:
         if isinstance(load, JointLoad):
             total += load.force * dynamics.rate(load.joint)
@@ -395,8 +386,8 @@ def power(dynamics: Dynamics, loads: tuple[Load | JointLoad, ...]) -> Any:
 
 def wrench(dynamics: Dynamics, loads: tuple[Load | JointLoad, ...]) -> np.ndarray:
     """The force of loads and their moment about the origin, six components."""
-    total = np.array([MP.mpf(0)] * 6)
-    pad = [MP.mpf(0)] * 3
+    total = np.array([number(0)] * 6)
+    pad = [number(0)] * 3
     for load in loads:
         assert isinstance(load, Load)
         force, place = ([*x, *pad][:3] for x in (load.force, dynamics.place(load.body, load.at)))
@@ -418,7 +409,7 @@ def test_the_change_of_energy_is_the_power_of_the_contacts(
     for y in states(found, 5, 4 if dimensions == PLANE else 2):
         rate, here = found.exactly("derivative", y), exact_dynamics(found, y)
         done = here.power(effect)
-        size = 1 + abs(done)
+        size = float(1 + abs(done))
         kinetic = along(partial(found.exactly, "kinetic_energy"), y, rate)
         stored = along(partial(found.exactly, "potential_energy"), y, rate)
         assert abs(kinetic - done) < 1e-25 * size
@@ -481,10 +472,10 @@ def test_centres_may_meet(law: tuple[str, ...], dimensions: int) -> None:
     if law in (SPRING, HERTZ):
         for x in (0.3, 0.99, 1.01, 2.0):
             y, way = exact(state(found, b_x=x * NEAREST)), exact(state(found) * 0)
-            way[found.module.STATES.index("b_x")] = MP.mpf(1)
+            way[found.module.STATES.index("b_x")] = number(1)
             slope = along(partial(found.exactly, "potential_energy"), y, way)
             force = exact_dynamics(found, y).loads[0][1].force[0]
-            assert abs(slope + force) < 1e-12 * abs(force)
+            assert abs(slope + force) < 1e-12 * float(abs(force))
 
 
 # Rigid contacts.
@@ -512,7 +503,7 @@ def test_rigid_contacts_say_how_their_gaps_change(geometry: str, dimensions: int
             assert abs(gap_rate - power(here, c.normal)) < 1e-25
             ways = np.array([c.normal[0].force, *(t[0].force for t in c.tangents)])
             assert len(ways) == dimensions
-            assert np.abs(ways @ ways.T - np.eye(dimensions)).max() < 1e-15  # of a double's normal
+            assert apart(ways @ ways.T, exact(np.eye(dimensions))) < 1e-15  # of a double's normal
             assert np.linalg.det(ways.astype(float)) == pytest.approx(1.0)
             for loads in (c.normal, *c.tangents):
                 if len(loads) == 2:
