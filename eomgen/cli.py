@@ -81,6 +81,8 @@ def _parser() -> argparse.ArgumentParser:
         ("view", commands.view, "integrate, and open the moving picture"),
     ):
         _simulation(_code(_form(command(name, run, about))))
+    about = "say what accuracy costs in time, and how exact the arithmetic is"
+    _accuracy(_route(_form(command("accuracy", commands.accuracy, about))))
     about = "say what each effect costs, and what leaving it out does to the motion"
     costing = _route(command("effects", commands.effects, about))
     costing.add_argument("--each", action="store_true", help="a line an effect, not one a type")
@@ -137,6 +139,18 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
     parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
     parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
+    parser.add_argument(
+        "--accuracy",
+        metavar="X",
+        type=float,
+        help="choose method and tolerances for an error at the end of X of the motion's scale",
+    )
+    parser.add_argument(
+        "--budget", metavar="TIME", help="the most accurate run found in this time, 2s for example"
+    )
+    parser.add_argument(
+        "--estimate", action="store_true", help="estimate the error of the run by a second one"
+    )
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument("--works", action="store_true", help="book the work of each effect")
@@ -144,6 +158,30 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     parser.add_argument("--plot", metavar="FILE", type=Path, help="figure (DIR/NAME.png)")
     parser.add_argument("--view", action="store_true", help="open the page when done")
+    _force(parser)
+
+
+def _accuracy(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--methods", metavar="A,B,…", help="these integrators alone (all)")
+    parser.add_argument("--quick", action="store_true", help="every second rung alone")
+    parser.add_argument("--t-end", metavar="S", type=float, help="end time (the scene's)")
+    parser.add_argument(
+        "--run-time", metavar="S", type=float, default=3.0, help="longest time of one run, 3 s"
+    )
+    parser.add_argument(
+        "--time", metavar="S", type=float, default=300.0, help="begin no run after this, 300 s"
+    )
+    parser.add_argument("--fresh", action="store_true", help="take nothing from an earlier call")
+    _values(parser)
+    half = parser.add_mutually_exclusive_group()
+    half.add_argument("--arithmetic", action="store_true", help="the arithmetic alone, no runs")
+    half.add_argument("--no-arithmetic", action="store_true", help="the runs alone")
+    parser.add_argument("--float32", action="store_true", help="the arithmetic in float32, too")
+    parser.add_argument(
+        "--states", metavar="N", type=int, help="states of each kind for it (100, 20 if large)"
+    )
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of its random states")
+    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
     _force(parser)
 
 

@@ -12,6 +12,8 @@ SIGNATURES = (
     b'<meta name="generator" content="eomgen">',  # pages
     b"# eomgen trajectory of ",  # tables
     b"# eomgen linearisation of ",
+    b"# eomgen accuracy of ",
+    b"# eomgen arithmetic of ",
     b"eomgen.npy",  # archives: their first member
     b"Software\0eomgen",  # PNG
     b"<dc:title>eomgen</dc:title>",  # SVG: who made it

@@ -3,8 +3,7 @@
 from functools import cache
 
 import numpy as np
-from digits import STEP, number
-from engine import Engine, along, exact, read
+from engine import MP, STEP, Engine, along, exact, read
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
@@ -37,7 +36,7 @@ def growth(made: Engine, output: str, y: np.ndarray, t: float, **given: dict) ->
     """How fast an output grows along the motion, in 60 digits; as time goes on, too."""
     rate = made.exactly("derivative", exact(y), t=t, **given)
     ends = (
-        made.exactly(output, exact(y) + h * rate, t=number(t) + h, **given) for h in (STEP, -STEP)
+        made.exactly(output, exact(y) + h * rate, t=MP.mpf(t) + h, **given) for h in (STEP, -STEP)
     )
     ahead, behind = ends
     return (ahead - behind) / (2 * STEP)

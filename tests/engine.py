@@ -7,19 +7,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digits import STEP, Digits, number
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.model import Model
 from eomgen.program import from_recursion as recording
-from eomgen.program.program import interpreter
+from eomgen.program.digits import MP, Digits, evaluator, exact
 from eomgen.program.route import routed
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.run.module import load_module
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Scene
+from eomgen.study.states import random_state
+
+__all__ = ["MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "read"]
+
+STEP = MP.mpf(10) ** -20
+"""Of central differences, which are off by its square."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,7 +50,7 @@ class Engine:
     ) -> np.ndarray:
         """An output in 60 digits, in its shape; `extra` are tau or vd, one a velocity."""
         given = {**self.module.PARAMETERS, **(p or {}), **self.module.INPUTS, **(u or {})}
-        given |= {TIME: t, **dict(zip(self.module.STATES, y, strict=True))}
+        given |= {TIME: MP.mpf(t), **dict(zip(self.module.STATES, y, strict=True))}
         names = self.system.extra.get(output, ())
         if output not in self.system.tangents:
             given |= dict(zip(names, extra or [0.0] * len(names), strict=True))
@@ -58,18 +63,12 @@ class Engine:
 
     def _run(self, output: str, given: Mapping[str, Any]) -> np.ndarray:
         if output not in self._runs:
-            self._runs[output] = interpreter(self.system.program, output, Digits())
-        inputs = {name: number(value) for name, value in given.items()}
-        return np.array(self._runs[output](inputs), dtype=object)
+            self._runs[output] = evaluator(self.system.program, output)
+        return np.array(self._runs[output](given), dtype=object)
 
     def random_state(self, rng: np.random.Generator) -> np.ndarray:
         """Angles over two turns, slides within 0.6 m, unit quaternions; 3 rad/s, 1 m/s."""
-        reach = {"rad": 2 * np.pi, "m": 0.6, "rad/s": 3.0, "m/s": 1.0, "": 1.0}
-        y = np.array([reach.get(s.unit, 1.0) * rng.uniform(-1.0, 1.0) for s in self.system.states])
-        for indices in map(list, self.module.QUATERNIONS):
-            parts = rng.normal(size=4)
-            y[indices] = parts / np.linalg.norm(parts)
-        return y
+        return random_state(self.module, rng)
 
     def random_inputs(self, rng: np.random.Generator) -> dict[str, float]:
         """A value for every input."""
@@ -104,13 +103,6 @@ def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) 
     return Engine(model, system, source, load_module(source, f"tested_{model.name}"))
 
 
-def exact(values: Any) -> np.ndarray:
-    """Doubles as 60-digit numbers."""
-    array = np.asarray(values)
-    numbers = [number(x) for x in array.ravel().tolist()]
-    return np.array(numbers, dtype=object).reshape(array.shape)
-
-
 def along(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, way: np.ndarray) -> np.ndarray:
     """The derivative of f at x in a direction: a central difference, some 40 digits."""
     return (f(x + STEP * way) - f(x - STEP * way)) / (2 * STEP)
@@ -118,16 +110,9 @@ def along(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, way: np.ndarray)
 
 def apart(actual: Any, expected: Any, *terms: Any) -> float:
     """Greatest difference, relative to the greatest value, of terms too if given, or to 1."""
-    arrays = [np.asarray(x) for x in (actual, expected, *terms)]
-    if any(array.dtype == object for array in arrays):
-        arrays = [exact(array) for array in arrays]
-    actual, expected = arrays[:2]
+    actual, expected = np.asarray(actual), np.asarray(expected)
     assert actual.shape == expected.shape, f"{actual.shape} is not {expected.shape}"
-    sizes = map(_greatest, arrays[1:])
-    difference = _greatest(actual - expected)
+    sizes = (np.max(np.abs(x), initial=0) for x in (expected, *(np.asarray(t) for t in terms)))
+    difference = np.max(np.abs(actual - expected), initial=0)
     assert difference == difference, "not a number"
     return float(difference / max(1, *sizes))
-
-
-def _greatest(values: Any) -> Any:
-    return np.max(np.abs(np.ravel(values)), initial=0)

@@ -13,7 +13,7 @@ from eomgen.cli import main
 from eomgen.pipeline import compile_model, compile_scene
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene, read_scene
-from eomgen.study import bill as study
+from eomgen.study import timing
 from eomgen.study.bill import Bill, Item, bill
 from eomgen.study.omission import Run, distances
 from eomgen.study.variants import (
@@ -110,7 +110,7 @@ torques = { link_joint_1 = "2*z" }
 @pytest.fixture(autouse=True)
 def in_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Times are not looked at here."""
-    monkeypatch.setattr(study, "TIMING", 0.0)
+    monkeypatch.setattr(timing, "TIMING", 0.0)
 
 
 def costed(text: str, *, motion: float = 10.0, each: bool = False) -> Bill:

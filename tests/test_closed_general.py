@@ -3,15 +3,15 @@
 import ast
 from collections.abc import Sequence
 from dataclasses import replace
-from decimal import Decimal
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sp
 from campaign import some
-from digits import Digits, number, sqrt
+from engine import MP
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
 import eomgen.derivation.general
@@ -28,9 +28,9 @@ from eomgen.errors import SceneError
 from eomgen.joints import Free
 from eomgen.model import Model
 from eomgen.pipeline import compile_model
+from eomgen.program.digits import evaluator
 from eomgen.program.from_general import from_general
 from eomgen.program.from_recursion import Recording, from_recursion
-from eomgen.program.program import interpret
 from eomgen.program.route import routed
 from eomgen.program.system import System
 from eomgen.run.module import load_module
@@ -49,24 +49,24 @@ EXACT, ROUNDED = 1e-52, 1e-13
 """Relative errors: of exact rotations in 60 digits, and of those that doubles only come near to."""
 
 
-def values(model: Model, rng: np.random.Generator) -> dict[str, Decimal]:
+def values(model: Model, rng: np.random.Generator) -> dict[str, Any]:
     """A random state, random inputs and forces, at the scene's parameters."""
-    found = {p.name: number(p.default) for p in model.parameters}
+    found = {p.name: MP.mpf(p.default) for p in model.parameters}
     for c in (*model.coordinates, *model.velocities, *model.inputs):
-        found[c.name] = number(float(rng.uniform(-2.0, 2.0)))
+        found[c.name] = MP.mpf(float(rng.uniform(-2.0, 2.0)))
     for indices in model.quaternions:
         names = [model.coordinates[i].name for i in indices]
-        length = sqrt(sum(found[name] ** 2 for name in names))
+        length = MP.sqrt(sum(found[name] ** 2 for name in names))
         found |= {name: found[name] / length for name in names}
     for c in model.velocities:
         for prefix in ("tau", "vd"):
-            found[f"{prefix}__{c.name}"] = number(float(rng.uniform(-2.0, 2.0)))
+            found[f"{prefix}__{c.name}"] = MP.mpf(float(rng.uniform(-2.0, 2.0)))
     return found
 
 
-def apart(one: System, other: System, output: str, given: dict[str, Decimal]) -> float:
+def apart(one: System, other: System, output: str, given: dict[str, Any]) -> float:
     """Largest difference of an output over its largest entry."""
-    a, b = (interpret(s.program, output, given, Digits()) for s in (one, other))
+    a, b = (evaluator(s.program, output)(given) for s in (one, other))
     assert len(a) == len(b)
     size = max(map(abs, b), default=1) or 1
     return float(max((abs(x - y) for x, y in zip(a, b, strict=True)), default=0) / size)
@@ -310,7 +310,7 @@ def test_light_cart() -> None:
     model = build_model(read_scene("cart_pole"))
     light = {"m_cart": 0.3e-6, "I_pole": 1e-9}
     model = model.with_parameters(light)
-    exact = from_recursion(Recording(model, "aba"))
+    exactly = evaluator(from_recursion(Recording(model, "aba")).program, "derivative")
     worst = {}
     for route in ("closed", "aba"):
         module = load_module(compile_model(replace(model, route=route)))
@@ -319,11 +319,8 @@ def test_light_cart() -> None:
         for _ in range(40):
             y = rng.uniform(-3.0, 3.0, 4)
             y[1] = np.pi * rng.integers(0, 2) + 1e-4 * rng.normal()
-            given = {p.name: number(p.default) for p in model.parameters}
-            given |= dict(zip(module.STATES, map(number, y.tolist()), strict=True))
-            given["push"] = number(0)
-            truth = interpret(exact.program, "derivative", given, Digits())
-            truth = np.array([float(x) for x in truth])
+            given = {**model.defaults, **dict(zip(module.STATES, y, strict=True)), "push": 0.0}
+            truth = np.array([float(x) for x in exactly(given)])
             error = np.abs(module.derivative(0.0, y) - truth).max() / np.abs(truth).max()
             worst[route] = max(worst[route], float(error))
     assert worst["closed"] < 2e-15 < 1e-11 < worst["aba"]

@@ -9,12 +9,10 @@ from functools import cache
 from itertools import product
 from typing import Any
 
-import digits as sixty
 import numpy as np
 import pytest
 from campaign import some
-from digits import Digits, number
-from engine import Engine, along, apart, engine, exact
+from engine import MP, Digits, Engine, along, apart, engine, exact
 from scipy.integrate import solve_ivp
 from spatial_newton_euler import solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
@@ -35,8 +33,8 @@ ROUTES = ("aba", "ldl")
 
 
 def way(i: int, t: Any, on: Any) -> tuple[Any, Any, Any]:
-    """The formula that drives joint i, with both derivatives by hand, over `math` or `digits`."""
-    a, b, c, w = (number(x) if on is sixty else x for x in (0.25, 0.5, 0.125, 1.5))
+    """The formula that drives joint i, with both derivatives by hand, over `math` or mpmath."""
+    a, b, c, w = (on.mpf(x) if on is MP else x for x in (0.25, 0.5, 0.125, 1.5))
     s, e = w * t + i, on.exp(-t)
     return (
         a + b * on.sin(s) + c * t * t * e,
@@ -150,7 +148,7 @@ def made(dimensions: int, seed: int, route: str, *, tangents: bool = False) -> E
 def at_random(e: Engine, seed: int) -> tuple[np.ndarray, dict[str, float], Any]:
     """A state, inputs and a time."""
     rng = np.random.default_rng(seed)
-    return e.random_state(rng), e.random_inputs(rng), number(float(rng.uniform(0.0, 3.0)))
+    return e.random_state(rng), e.random_inputs(rng), MP.mpf(float(rng.uniform(0.0, 3.0)))
 
 
 @pytest.mark.parametrize("route", ROUTES)
@@ -162,7 +160,7 @@ def test_as_the_undriven_scene(dimensions: int, seed: int, route: str) -> None:
     case, e = given(dimensions, seed, 5, locks=False), made(dimensions, seed, route)
     bare = engine(case.bare, "aba")
     y, u, t = at_random(e, seed)
-    at, accelerations = case.values(t, sixty)
+    at, accelerations = case.values(t, MP)
     assert accelerations
     assert list(e.module.DRIVEN) == [position for position, _ in case.driven]
     at |= dict(zip(e.module.STATES, exact(y), strict=True))
@@ -177,28 +175,28 @@ def test_as_the_undriven_scene(dimensions: int, seed: int, route: str) -> None:
     driven = [names.index(velocity) for _, velocity in case.driven]
     given_up = exact([accelerations[names[i]] for i in driven])
     mass, all_mass = both("mass_matrix")
-    bound = 1e-14 if turned(case.tree) else 1e-50
-    assert apart(mass, all_mass[np.ix_(free, free)]) < bound
+    digits = 1e-14 if turned(case.tree) else 1e-50
+    assert apart(mass, all_mass[np.ix_(free, free)]) < digits
     force, all_force = both("velocity_force")
-    assert apart(force, all_force[free] + all_mass[np.ix_(free, driven)] @ given_up) < bound
+    assert apart(force, all_force[free] + all_mass[np.ix_(free, driven)] @ given_up) < digits
     for name in ("gravity_force", "applied_force"):
         own, others = both(name)
-        assert apart(own, others[free]) < bound, name
+        assert apart(own, others[free]) < digits, name
     same = "kinetic_energy potential_energy momentum centre_of_mass body_poses body_velocities"
     points = ("point_positions", "point_velocities")
     for name in (*same.split(), *(name for name in points if name in e.model.outputs)):
         own, others = both(name)
-        assert apart(own, others) < bound, name
+        assert apart(own, others) < digits, name
     nq = len(e.model.coordinates)
     found = e.exactly("derivative", y, u, t=t)[nq : nq + len(free)]
     vd = exact(np.zeros(len(names)))
     vd[free], vd[driven] = found, given_up
     needed = bare.exactly("inverse_dynamics", whole, u, extra=list(vd))
-    assert apart(needed[free], exact(np.zeros(len(free))), vd) < bound
-    assert apart(e.exactly("driving_forces", y, u, t=t), needed[driven]) < bound
+    assert apart(needed[free], exact(np.zeros(len(free))), vd) < digits
+    assert apart(e.exactly("driving_forces", y, u, t=t), needed[driven]) < digits
     tau = exact(np.random.default_rng(seed).uniform(-5.0, 5.0, len(free)))
     pushed = e.exactly("forward_dynamics", y, u, extra=list(tau), t=t)
-    assert apart(e.exactly("inverse_dynamics", y, u, extra=list(pushed), t=t), tau) < bound
+    assert apart(e.exactly("inverse_dynamics", y, u, extra=list(pushed), t=t), tau) < digits
 
 
 def turned(tree: SpatialTree) -> bool:
@@ -220,14 +218,14 @@ def turned(tree: SpatialTree) -> bool:
 def test_jacobians(dimensions: int, seed: int, route: str, tangents: bool) -> None:
     """By state and by parameters, those of the drives among them, against differences."""
     e = made(dimensions, seed, route, tangents=tangents)
-    bound = 1e-13 if turned(given(dimensions, seed, 5, locks=False).tree) else 1e-30
+    digits = 1e-13 if turned(given(dimensions, seed, 5, locks=False).tree) else 1e-30
     y, u, t = at_random(e, seed)
     quaternions = {i for four in e.module.QUATERNIONS for i in four}
     jacobian = e.exactly("jacobian", y, u, t=t)
     for i, unit in enumerate(exact(np.eye(len(y)))):
         if i not in quaternions:
             rate = along(lambda z: e.exactly("derivative", z, u, t=t), exact(y), unit)
-            assert apart(jacobian[:, i], rate) < bound, e.module.STATES[i]
+            assert apart(jacobian[:, i], rate) < digits, e.module.STATES[i]
     names = list(e.module.PARAMETERS)
     jacobian = e.exactly("parameter_jacobian", y, u, t=t)
     p = exact(list(e.module.PARAMETERS.values()))
@@ -236,7 +234,7 @@ def test_jacobians(dimensions: int, seed: int, route: str, tangents: bool) -> No
         def rates(values: np.ndarray) -> np.ndarray:
             return e.exactly("derivative", y, u, dict(zip(names, values, strict=True)), t=t)
 
-        assert apart(jacobian[:, i], along(rates, p, unit)) < bound, names[i]
+        assert apart(jacobian[:, i], along(rates, p, unit)) < digits, names[i]
 
 
 @pytest.mark.parametrize(("dimensions", "seed"), FEW)
@@ -248,16 +246,16 @@ def test_energy_is_accounted_for(dimensions: int, seed: int) -> None:
         along(
             lambda z, name=name: e.exactly(name, z[:-1], u, t=z[-1]),
             exact([*y, t]),
-            np.array([*e.exactly("derivative", y, u, t=t), number(1)], dtype=object),
+            np.array([*e.exactly("derivative", y, u, t=t), MP.mpf(1)], dtype=object),
         )
         for name in ("kinetic_energy", "potential_energy")
     )
     powers = dict(zip(e.module.EFFECT_NAMES, e.exactly("effect_powers", y, u, t=t), strict=True))
     gained = kinetic - sum(powers.values())
     assert apart(gained, exact(0.0), *map(abs, powers.values())) < 1e-14
-    weight = powers.get("gravity", number(0))
+    weight = powers.get("gravity", MP.mpf(0))
     assert apart(potential, -exact(weight)) < 1e-14
-    at, _ = given(dimensions, seed, 5, locks=False).values(t, sixty)
+    at, _ = given(dimensions, seed, 5, locks=False).values(t, MP)
     forces = e.exactly("driving_forces", y, u, t=t)
     for i, (_, velocity) in enumerate(given(dimensions, seed, 5, locks=False).driven):
         assert apart(powers[f"way{i}"], forces[i] * at[velocity]) < 1e-50
@@ -285,14 +283,14 @@ def test_rates_of_formulas(function: str) -> None:
     """Every function's derivatives by time, against differences of its value."""
     inner = ("0.4 + a*sin(t)", "0.3*t + a*t*t", "a + t*cos(t)")[: FUNCTIONS[function]]
     formula = parse(f"t*{function}({', '.join(inner)})/(a + t) - -t**3")
-    names, scalars = {"a": number("0.31")}, Digits()
+    names, digits = {"a": MP.mpf("0.31")}, Digits()
 
     def value(t: Any) -> Any:
-        return with_rates(formula, names, t, scalars)[0]
+        return with_rates(formula, names, t, digits)[0]
 
-    for t in (number("0.2"), number("0.45")):
-        found = with_rates(formula, names, t, scalars)
-        h = number(10) ** -12
+    for t in (MP.mpf("0.2"), MP.mpf("0.45")):
+        found = with_rates(formula, names, t, digits)
+        h = MP.mpf(10) ** -12
         first = (value(t + h) - value(t - h)) / (2 * h)
         second = (value(t + h) - 2 * value(t) + value(t - h)) / h**2
         assert apart(np.array(found[1:]), np.array([first, second])) < 1e-20

@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digits import number, sqrt
-from engine import Engine, along, exact
+from engine import MP, Engine, along, exact
 from striking import (
     MATERIAL,
     Balls,
@@ -449,8 +448,8 @@ def rates_and_accelerations_off(engine: Engine, rng: np.random.Generator) -> Any
     ny, nc = len(engine.module.STATES), len(engine.module.CONTACTS)
     y = exact(engine.random_state(rng))
     for indices in map(list, engine.module.QUATERNIONS):
-        y[indices] = y[indices] / sqrt(sum(y[indices] ** 2))
-    forces = [number(x) for x in rng.uniform(0.0, 9.0, size=nc)]
+        y[indices] = y[indices] / MP.sqrt(sum(y[indices] ** 2))
+    forces = [MP.mpf(x) for x in rng.uniform(0.0, 9.0, size=nc)]
     held = engine.exactly("held", y, extra=forces)
     pairs = {"gaps": engine.exactly("gap_rates", y), "gap_rates": held[ny : ny + nc]}
     return max(
@@ -463,7 +462,7 @@ def rates_and_accelerations_off(engine: Engine, rng: np.random.Generator) -> Any
 def test_gap_rates_and_accelerations_by_differences(name: str) -> None:
     """Rates are those of the gaps, accelerations those of the rates."""
     engine = striking(*MODELS[name])
-    assert rates_and_accelerations_off(engine, np.random.default_rng(6)) < number(10) ** -35
+    assert rates_and_accelerations_off(engine, np.random.default_rng(6)) < MP.mpf(10) ** -35
 
 
 def test_a_stop_strikes() -> None:
@@ -513,10 +512,10 @@ torque = "input"
     assert (found[:4] == striking(TWIN, WALL, rocking).module.impact(t, y[:4], 2)).all()
     base = module.held(t, y, np.zeros(3), u=u)
     np.testing.assert_allclose(base[:6], module.derivative(t, y, u=u), rtol=1e-14)
-    held = engine.exactly("held", exact(y), u, extra=[number(x) for x in (1, 2, 3)], t=t)
-    ahead = np.append(held[:6], number(1))
+    held = engine.exactly("held", exact(y), u, extra=[MP.mpf(x) for x in (1, 2, 3)], t=t)
+    ahead = np.append(held[:6], MP.mpf(1))
     expected = along(lambda x: engine.exactly("gap_rates", x[:6], u, t=x[6]), exact([*y, t]), ahead)
-    assert max(abs(expected - held[6:9])) < number(10) ** -35
+    assert max(abs(expected - held[6:9])) < MP.mpf(10) ** -35
 
 
 def test_stops_and_rough_contacts_in_one_module() -> None:
@@ -538,7 +537,7 @@ def test_contacts_of_a_scene() -> None:
         *("roll_ball", "roll_arm", "catch_ball", "lid_ball", "each_ball_box"),
         *("stop_low", "stop_high"),
     ]
-    assert rates_and_accelerations_off(engine, rng) < number(10) ** -35
+    assert rates_and_accelerations_off(engine, rng) < MP.mpf(10) ** -35
     for _ in range(200):
         k = int(rng.integers(nc))
         y = approaching(engine, rng, k)

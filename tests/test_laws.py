@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 from bookkeeping import growth
 from campaign import some
-from digits import Digits, cos, number, sin
-from engine import Engine, along, apart, engine, exact, read
+from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
 from eomgen.build import build_model
@@ -25,15 +24,15 @@ from eomgen.effects import ExternalForce, Gravity, Motor
 from eomgen.effects.base import JointLoad, Load
 from eomgen.joints import Free
 from eomgen.joints.base import Geared
-from eomgen.language.formula import Formula
+from eomgen.language.formula import Floats, Formula, evaluate
 from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, Program, cost, finish, live_steps
 from eomgen.program.route import routed
-from eomgen.program.tape import Stage
+from eomgen.program.tape import TIME, Stage
 from eomgen.scene.reader import built_in_names, parse_scene
 
 FIGURES = ("human_figure", "hanging_figure", "quadruped")
-LARGE = (*FIGURES, "ragdoll", "walker_motors", "chain", "chain_in_wind", "puma560")
+LARGE = (*FIGURES, "ragdoll", "walker_motors", "chain", "chain_in_wind", "puma560", "stiff_beam")
 TREES = {  # of up to 5 bodies; together they have everything
     "plane_60": (60, 2),
     "plane_379": (379, 2),
@@ -93,17 +92,17 @@ class Moment:
     def moving(self, y: np.ndarray) -> Dynamics:
         """What effects may ask, in 60 digits."""
         q, v, x = np.split(y, [self.nq, self.nq + self.nv])
-        parameters = {name: number(value) for name, value in self.module.PARAMETERS.items()}
-        inputs = {name: number(value) for name, value in self.u.items()}
+        parameters = {name: MP.mpf(value) for name, value in self.module.PARAMETERS.items()}
+        inputs = {name: MP.mpf(value) for name, value in self.u.items()}
         states = dict(zip((state.name for state in self.model.states), x, strict=True))
-        values = Values(parameters, inputs, list(q), list(v), states, number(self.t))
+        values = Values(parameters, inputs, list(q), list(v), states, MP.mpf(self.t))
         return Dynamics(self.model, values, Digits())
 
     def stored(self, y: np.ndarray) -> Any:
         """Potential energy of all effects but gravity."""
         moving = self.moving(y)
         others = (e for e in self.model.effects if not isinstance(e, Gravity))
-        return sum((e.potential_energy(moving) for e in others), number(0))
+        return sum((e.potential_energy(moving) for e in others), MP.mpf(0))
 
     def way(self, v: np.ndarray) -> np.ndarray:
         """Where velocities lead, they themselves held still."""
@@ -118,7 +117,7 @@ class Moment:
     def slope_of_stored(self, v: np.ndarray) -> Any:
         """The same of `stored`."""
         if all(isinstance(effect, PLAIN) for effect in self.model.effects):
-            return number(0)
+            return MP.mpf(0)
         return along(self.stored, self.y, self.way(v))
 
     def rate(self, output: str) -> np.ndarray:
@@ -133,8 +132,8 @@ class Moment:
     # The bodies one by one, in space.
 
     def value(self, formula: Formula) -> Any:
-        """A quantity, as doubles have it."""
-        return number(self.model.value(formula))
+        """A quantity, as doubles have it; a formula of time now."""
+        return MP.mpf(evaluate(formula, {**self.model.defaults, TIME: self.t}, Floats()))
 
     def vector(self, parts: tuple[Formula, ...]) -> np.ndarray:
         """A vector of the scene."""
@@ -162,14 +161,14 @@ class Moment:
         """Linear and angular part of motions, or of wrenches, that the module tells."""
         if not self.plane:
             return [(row[:3], row[3:]) for row in velocities]
-        nothing = number(0)
+        nothing = MP.mpf(0)
         return [(in_space(row[:2]), exact([nothing, nothing, row[2]])) for row in velocities]
 
     @cached_property
     def gravity(self) -> np.ndarray:
         """Acceleration of gravity, world axes."""
         g = [self.value(e.g) for e in self.model.effects if isinstance(e, Gravity)]
-        return -sum(g, number(0)) * exact(np.eye(3)[1 if self.plane else 2])
+        return -sum(g, MP.mpf(0)) * exact(np.eye(3)[1 if self.plane else 2])
 
     @cached_property
     def others(self) -> list[Any]:
@@ -228,7 +227,7 @@ class Moment:
         for body, first in zip(self.model.bodies, self.model.first_velocity, strict=True):
             if isinstance(body.joint, Geared):
                 ratio = body.joint.gear_ratio
-                geared = number(1) if ratio is None else self.value(ratio)
+                geared = MP.mpf(1) if ratio is None else self.value(ratio)
                 found[first] = geared**2 * self.value(body.joint.motor_inertia)
         return found
 
@@ -239,12 +238,12 @@ PLAIN = (Gravity, ExternalForce, Motor)
 
 def in_space(vector: np.ndarray) -> np.ndarray:
     """With z = 0 if it is one of the plane."""
-    return np.array([*vector, *[number(0)] * (3 - len(vector))], dtype=object)
+    return np.array([*vector, *[MP.mpf(0)] * (3 - len(vector))], dtype=object)
 
 
 def turn_about_z(angle: Any) -> np.ndarray:
     """The rotation of a planar body."""
-    c, s = cos(angle), sin(angle)
+    c, s = MP.cos(angle), MP.sin(angle)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=object)
 
 
@@ -328,7 +327,7 @@ def test_mass_matrix(m: Moment) -> None:
     energy = m["kinetic_energy"]
     assert apart(v @ M @ v / 2, energy) < EXACT
     turned, _ = m.places(m["body_poses"])
-    told = sum(m.armatures() * v * v, number(0))
+    told = sum(m.armatures() * v * v, MP.mpf(0))
     for k, (linear, spin) in enumerate(m.twists(m["body_velocities"])):
         told += m.masses[k] * (linear @ linear) + spin @ m.inertia(k, turned[k]) @ spin
     assert apart(told / 2, energy) < EXACT
@@ -347,7 +346,7 @@ def test_gravity_force_is_the_slope_of_the_potential(m: Moment) -> None:
         assert apart(G @ way, slope, G) < EXACT
     assert ("gravity" in m.module.EFFECTS) == bool(np.any(m.gravity))
     _, centres = m.places(m["body_poses"])
-    weights = sum((-a * (m.gravity @ x) for a, x in zip(m.masses, centres, strict=True)), number(0))
+    weights = sum((-a * (m.gravity @ x) for a, x in zip(m.masses, centres, strict=True)), MP.mpf(0))
     assert apart(m["potential_energy"], weights + m.stored(m.y)) < EXACT
 
 
@@ -531,7 +530,7 @@ def test_momentum_is_constant_when_nothing_acts_from_outside(name: str) -> None:
     rates = m.at("derivative", m.y, p)
     assert np.max(np.abs(rates[m.nq :])) > 0.1
     flow = along(lambda y: m.at("momentum", y, p), m.y, rates)
-    assert np.max(np.abs(flow)) < EXACT * float(np.max(np.abs(m["momentum"])))
+    assert np.max(np.abs(flow)) < EXACT * np.max(np.abs(m["momentum"]))
 
 
 def test_newton_and_euler_for_each_body(m: Moment) -> None:
@@ -564,7 +563,7 @@ def test_newton_and_euler_for_each_body(m: Moment) -> None:
             slip = slip - linear - cross(other, points[k] - centres[body.parent])
             spin = spin - other
         own = slice(m.model.first_velocity[k], m.model.first_velocity[k] + len(body.velocities))
-        power = driven[own] @ m.v[own] if len(body.velocities) else number(0)
+        power = driven[own] @ m.v[own] if len(body.velocities) else MP.mpf(0)
         assert apart(-(f @ slip) - n @ spin, power, f, n) < EXACT, body.name
     for k, (linear, turning) in enumerate(m.twists(m.rate("body_velocities"))):
         spin, inertia = twists[k][1], m.inertia(k, turned[k])
@@ -589,12 +588,12 @@ def test_length_of_quaternions(name: str, route: str) -> None:
     longer = m.y.copy()
     for n, indices in enumerate(quaternions):
         parts = m.y[indices]
-        assert abs(parts @ m["derivative"][indices]) < number(10) ** -50
+        assert abs(parts @ m["derivative"][indices]) < MP.mpf(10) ** -50
         assert np.max(np.abs(m["derivative"][indices])) > 0.01
-        longer[indices] = parts * (number("1.7") + n)
+        longer[indices] = parts * (MP.mpf("1.7") + n)
     rates = m.at("derivative", longer)
     for n, indices in enumerate(quaternions):
-        rates[indices] = rates[indices] / (number("1.7") + n)
+        rates[indices] = rates[indices] / (MP.mpf("1.7") + n)
     assert apart(rates, m["derivative"]) < 1e-50
     for output in m.e.system.program.outputs:
         if output in ("initial_state", "derivative", "jacobian") or output.endswith("_dynamics"):

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digits import STEP, number
-from engine import apart, engine, exact
+from engine import MP, STEP, apart, engine, exact
 from scipy.optimize import brentq
 
 from eomgen.run.integrate import integrate
@@ -188,7 +187,7 @@ coordinate = "0.4*t*t"
 def test_powers_under_contact_forces_add_up(route: str) -> None:
     """Of contacts, drives, in the order of the effects, and weight: dE/dt, in 60 digits."""
     e = engine(ARMS, route, leave_out=("jacobian", "parameter_jacobian"))
-    ny, nc, t, forces = len(e.module.STATES), 2, number("0.7"), [30.0, 70.0]
+    ny, nc, t, forces = len(e.module.STATES), 2, MP.mpf("0.7"), [30.0, 70.0]
     y = exact(e.random_state(np.random.default_rng(6)))
     rates, _, contacts, drives = np.split(
         e.exactly("held", y, extra=forces, t=t), [ny, ny + nc, ny + 2 * nc]

@@ -205,7 +205,7 @@ def test_entries_are_exact_one_by_one(name: str, route: str) -> None:
         if output in e.system.program.outputs:
             expected = differences(e, output, y, u, p)
             for row, wanted in zip(e.exactly(output, y, u, p), expected, strict=True):
-                size = float(np.max(np.abs(wanted), initial=0))
+                size = np.max(np.abs(wanted), initial=0)
                 assert np.max(np.abs(row - wanted), initial=0) <= 1e-12 * size + 1e-30, output
 
 

@@ -91,6 +91,8 @@ def test_the_published_pendulum() -> None:
         ("semi_implicit_euler", 1, (2000, 4000, 8000)),
         ("rk4", 4, (40, 80, 160)),
         ("implicit_midpoint", 2, (100, 200, 400)),
+        ("gauss_4", 4, (20, 40, 80)),
+        ("gauss_6", 6, (20, 28, 40)),
     ],
 )
 def test_order_of_fixed_step_methods(

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from digits import Digits, number
-from engine import Engine, along, apart, engine
+from engine import MP, Digits, Engine, along, apart, engine
 from scipy.integrate import solve_ivp
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
@@ -36,9 +35,9 @@ M = 2.0
 def exact_dynamics(made: Engine, y: np.ndarray) -> Dynamics:
     """The model at a state, in 60 digits."""
     model = made.model
-    parameters = {p.name: number(p.default) for p in model.parameters}
+    parameters = {p.name: MP.mpf(p.default) for p in model.parameters}
     nq = len(model.coordinates)
-    state = [number(x) for x in y]
+    state = [MP.mpf(x) for x in y]
     return Dynamics(model, Values(parameters, {}, state[:nq], state[nq:]), Digits())
 
 
@@ -280,7 +279,7 @@ def test_a_spring_between_free_bodies_keeps_momentum(
     found = made(pair + between("a", "b", *ends, *numbers))
     rng = np.random.default_rng(3)
     for _ in range(3):
-        y = np.array([number(x) for x in found.random_state(rng)])
+        y = np.array([MP.mpf(x) for x in found.random_state(rng)])
         change = along(lambda z: found.exactly("momentum", z), y, found.exactly("derivative", y))
         assert np.max(np.abs(change)) < 1e-14  # the state is a double's, its quaternions too
         assert np.max(np.abs(found.exactly("applied_force", y))) > 0.1
@@ -357,8 +356,8 @@ def by_hand(
 def test_random_trees_move_as_under_loads_put_in_by_hand(dimensions: int, route: str) -> None:
     """A spring or rope between two bodies, one to the world, and all kinds at a joint."""
     rng = np.random.default_rng(11)
-    for i, (tree, text) in enumerate(trees(dimensions, 2)):
-        rope = i % 2 == 1
+    for number, (tree, text) in enumerate(trees(dimensions, 2)):
+        rope = number % 2 == 1
         zs = ("", "", "") if dimensions == PLANE else (", 0.3", ", 0.1", ", 0")
         j = f"j{tree.motor}"
         text += between(
@@ -438,13 +437,13 @@ def test_the_change_of_energy_is_the_power_of_the_effects(kind: str) -> None:
 
     worked = 0.0
     for _ in range(6):
-        y = np.array([number(x) for x in found.random_state(rng)])
+        y = np.array([MP.mpf(x) for x in found.random_state(rng)])
         rate = found.exactly("derivative", y)
         here = exact_dynamics(found, y)
         powers = [here.power(e) for e in found.model.effects]
         kinetic = along(partial(found.exactly, "kinetic_energy"), y, rate)
         potential = along(partial(found.exactly, "potential_energy"), y, rate)
-        size = float(1 + sum(map(abs, powers)))
+        size = 1 + sum(map(abs, powers))
         assert abs(kinetic - sum(powers)) < 1e-25 * size
         change = along(own_energy, y, rate)
         lost = powers[-1] + change  # what is put in beside the potential energy
@@ -470,7 +469,7 @@ def test_the_change_of_energy_is_the_power_of_the_effects(kind: str) -> None:
 
 def central(found: Engine, y: np.ndarray) -> np.ndarray:
     """∂f/∂y by central differences in 60 digits."""
-    ways = np.array([[number(int(i == j)) for j in range(len(y))] for i in range(len(y))])
+    ways = np.array([[MP.mpf(int(i == j)) for j in range(len(y))] for i in range(len(y))])
     columns = [along(lambda z: found.exactly("derivative", z), y, way) for way in ways]
     return np.array(columns).T
 
@@ -481,7 +480,7 @@ def test_jacobians_are_those_of_central_differences(kind: str) -> None:
     found, rng = made(linked(KINDS[kind])), np.random.default_rng(7)
     for _ in range(2):
         y = found.random_state(rng)
-        expected = central(found, np.array([number(x) for x in y])).astype(float)
+        expected = central(found, np.array([MP.mpf(x) for x in y])).astype(float)
         assert apart(found.module.jacobian(0.0, y), expected) < 1e-11
 
 
@@ -517,7 +516,7 @@ def test_points_may_meet(case: str, dimensions: int) -> None:
         assert np.all(np.isfinite(rate)) and np.all(np.isfinite(jacobian))
         assert math.isfinite(module.potential_energy(0.0, y))
         if dimensions == PLANE or x == 0.0:
-            expected = central(found, np.array([number(z) for z in y])).astype(float)
+            expected = central(found, np.array([MP.mpf(z) for z in y])).astype(float)
             assert apart(jacobian, expected) < 1e-11
         if x == 0.0 and case != "slack rope":
             damping = 4.0 if "damping = 4.0" in lines else 0.0
@@ -537,8 +536,8 @@ def test_the_energy_of_points_that_meet_has_the_force_for_a_slope() -> None:
     for length in ("", "rest_length = 0.5"):
         found = made(BOB.replace("9.81", "0") + between("world", "b", "stiffness = 30.0", length))
         for x in (2.0, 1.01, 0.99, 0.4, 0.0):
-            y = np.array([number(z) for z in (x * NEAREST, 0.0, 0.0, 0.0, 0.0, 0.0)])
-            way = np.array([number(z) for z in (1, 0, 0, 0, 0, 0)])
+            y = np.array([MP.mpf(z) for z in (x * NEAREST, 0.0, 0.0, 0.0, 0.0, 0.0)])
+            way = np.array([MP.mpf(z) for z in (1, 0, 0, 0, 0, 0)])
             slope = along(partial(found.exactly, "potential_energy"), y, way)
             force = found.exactly("applied_force", y)[0]
             assert abs(slope + force) < 1e-15

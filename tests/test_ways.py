@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from digits import number
-from engine import Engine, along, apart, engine, exact
+from engine import MP, Engine, along, apart, engine, exact
 
 from eomgen.build import build_model
 from eomgen.errors import SceneError
@@ -192,7 +191,7 @@ def test_powers_add_up() -> None:
         kinetic = along(lambda x: made.exactly("kinetic_energy", x), y, rates)
         stored = along(lambda x: made.exactly("potential_energy", x), y, rates)
         powers = made.exactly("effect_powers", y)
-        assert apart(kinetic, powers.sum(), number(1)) < 1e-13
+        assert apart(kinetic, powers.sum(), MP.mpf(1)) < 1e-13
         assert apart(kinetic + stored, kinetic) > 1e-3
 
 

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 
+from eomgen.commands.accuracy import accuracy
 from eomgen.commands.costing import effects
 from eomgen.commands.deriving import derive
 from eomgen.commands.describing import check, list_scenes, print_reference, print_schema
@@ -10,6 +11,7 @@ from eomgen.commands.linearising import linearise
 from eomgen.commands.running import simulate, view
 
 __all__ = [
+    "accuracy",
     "check",
     "derive",
     "effects",

@@ -8,6 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eomgen.build import in_order
+from eomgen.commands.choosing import (
+    check_choice,
+    choose,
+    made_again,
+    print_choice,
+    print_estimate,
+    warn_of_energy,
+)
 from eomgen.commands.shared import (
     Arguments,
     assignments,
@@ -29,43 +37,43 @@ from eomgen.scene.schema import SHOWN
 
 if TYPE_CHECKING:
     from eomgen.show.motion import Motion
+    from eomgen.study.trial import Setting
 
 
 def simulate(given: Arguments) -> int:
     """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
     # Imported here: `check` and `generate` need neither SciPy nor Matplotlib.
-    from eomgen.run.integrate import integrate
-    from eomgen.run.integrators import FixedStep, find_integrator
     from eomgen.run.trajectory import save_csv, save_npz
     from eomgen.show.observe import observe
+    from eomgen.study.trial import Case
 
+    check_choice(given)
     model, name = read_model(given.scene, given)
     asked = (*model.outputs, *SHOWN, *(("effect_powers",) if given.works else ()))
     model = replace(model, outputs=in_order(asked))
     parameters = assignments(given.set, model.defaults, "--set")
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
     wanted = model.simulation
-    integrator = _or(given.integrator, wanted.integrator)
-    fixed = isinstance(find_integrator(integrator), FixedStep)
-    if fixed and (given.rtol is not None or given.atol is not None):
-        raise RunError(f"--rtol, --atol: {integrator} takes equal steps; give --dt instead")
+    chosen = given.accuracy is not None or given.budget is not None
+    setting = None if chosen else _setting(given, model)
     paths = _output_paths(given, name)
     code, module = code_of(given.scene, model, given)
     values = (parameters or None, inputs or None)
-    with terminal_progress(f"simulating {model.name}") as progress:
-        trajectory = integrate(
-            as_problem(module, *values, model),
-            integrator,
-            _or(given.t_end, wanted.t_end),
-            dt=_or(given.dt, wanted.dt) if fixed else given.dt,
-            rtol=_or(given.rtol, wanted.rtol),
-            atol=_or(given.atol, wanted.atol),
-            samples=given.samples,
-            max_step=given.max_step,
-            progress=progress,
-            rest_speed=wanted.rest_speed,
-            powers=as_powers(module, *values) if given.works else None,
-        )
+    case = Case(
+        as_problem(module, *values, model),
+        _or(given.t_end, wanted.t_end),
+        module.UNITS,
+        {"samples": given.samples, "max_step": given.max_step, "rest_speed": wanted.rest_speed},
+        terminal_progress,
+    )
+    powers = as_powers(module, *values) if given.works else None
+    choice = None
+    if setting is None:
+        choice = choose(case, given)
+        tried = made_again(case, choice, powers)
+    else:
+        tried = case.run(setting, powers=powers)
+    trajectory = tried.trajectory
     model = model.with_parameters(parameters)
     motion = observe(model, module, trajectory, inputs)
     write_whole(paths["py"], code.module, force=given.force)
@@ -74,10 +82,13 @@ def simulate(given: Arguments) -> int:
     parameter_values = tuple(model.defaults.values())
     drawing = _save_pictures(motion, code.poses, parameter_values, paths, given.force)
     print(
-        f"{model.name}: {trajectory.t[-1]:g} s by {integrator}, "
+        f"{model.name}: {trajectory.t[-1]:g} s by {trajectory.integrator}, "
         f"{trajectory.counts['steps']} steps, {trajectory.counts['derivatives']} derivatives "
         f"({'derived now' if code.derived else 'module fresh, not derived again'})"
     )
+    missed = print_choice(choice, given) if choice else ""
+    if given.estimate and not choice and trajectory.finished:
+        print_estimate(case, tried)
     _print_energy(motion)
     _print_events(trajectory)
     if motion.joints:
@@ -85,12 +96,28 @@ def simulate(given: Arguments) -> int:
     _print_excursions(model, trajectory)
     for path in paths.values():
         print(f"    wrote {path}")
-    trouble = "" if trajectory.finished else f"{model.name}: {trajectory.message}"
+    warn_of_energy(motion)
+    trouble = missed if trajectory.finished else f"{model.name}: {trajectory.message}"
     if trouble or drawing:
         raise RunError("\n".join(line for line in (trouble, drawing) if line))
     if given.view:
         _open(paths["html"])
     return 0
+
+
+def _setting(given: Arguments, model: Model) -> "Setting":
+    """The method asked for, or the scene's, with tolerances or a step."""
+    from eomgen.run.integrators import FixedStep, find_integrator
+    from eomgen.study.trial import Setting
+
+    wanted = model.simulation
+    integrator = _or(given.integrator, wanted.integrator)
+    if not isinstance(find_integrator(integrator), FixedStep):
+        rtol, atol = _or(given.rtol, wanted.rtol), _or(given.atol, wanted.atol)
+        return Setting(integrator, rtol, atol, given.dt)
+    if given.rtol is not None or given.atol is not None:
+        raise RunError(f"--rtol, --atol: {integrator} takes equal steps; give --dt instead")
+    return Setting(integrator, dt=_or(given.dt, wanted.dt))
 
 
 def _save_pictures(

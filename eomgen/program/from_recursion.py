@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from eomgen.derivation.recursive import observe
 from eomgen.derivation.recursive.composite import Entries, full, solved
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.derivation.recursive.impulses import response
 from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.reactions import reactions
 from eomgen.derivation.recursive.sensitivity import sensitivity
@@ -25,7 +26,8 @@ class Recording:
     """A model's dynamics on a tape by a route, and the nodes that are given to it.
 
     v̇ comes from the recursion of the route, `aba` or `ldl`, or from what `forward` makes. `axes`
-    are those that the recursion works in, if not the usual ones.
+    are those that the recursion works in, if not the usual ones; `tape` is one to begin, if not a
+    plain one.
     """
 
     def __init__(
@@ -34,10 +36,11 @@ class Recording:
         route: str,
         forward: Callable[["Recording"], Forward] | None = None,
         axes: Axes | None = None,
+        tape: Tape | None = None,
     ) -> None:
         self.model = model
         self.route = route
-        self.tape = Tape()
+        self.tape = tape or Tape()
         self.scalars = TapeScalars(self.tape)
         self.parameters = {p.name: self.given(p.name, Stage.PARAMETERS) for p in model.parameters}
         self.q = [self.given(c.name, Stage.POSITIONS) for c in model.coordinates]
@@ -234,11 +237,22 @@ def _points(record: Recording, name: str) -> tuple[tuple[int, ...], list[Node]]:
 def along_directions(
     record: Recording, by: Sequence[Node]
 ) -> tuple[list[list[Node]], tuple[str, ...]]:
-    """How the rates change along directions of `by`, and the names of those."""
+    """How the rates change along directions of `by`, and the names of those.
+
+    By a recursion, v̇ as M v̇ + V + G = F says: inverse dynamics is differentiated at the
+    accelerations found, which takes fewer operations than forward dynamics, and M solved for them.
+    """
     directions = [record.given(f"d__{node.step.value}", Stage.INPUTS) for node in by]
+    names = tuple(str(d.step.value) for d in directions)
     seeds = {x.index: d for x, d in zip(by, directions, strict=True)}
-    rows = [[node] for node in tangent(record.rates, seeds)]
-    return rows, tuple(str(d.step.value) for d in directions)
+    if record.route == "closed":
+        return [[node] for node in tangent(record.rates, seeds)], names
+    d, inputs = record.dynamics, record.beside("vd")
+    found = {x.index: vd for x, vd in zip(inputs, record.vd, strict=True)}
+    moved, needed = (tangent(f, seeds) for f in (d.applied_force, d.inverse(inputs)))
+    left = [a - b for a, b in zip(moved, substituted(needed, found), strict=True)]
+    above, beside = (tangent(f, seeds) for f in (record.position_rates, d.state_rates))
+    return [[node] for node in (*above, *response(d, left, record.route), *beside)], names
 
 
 def variables(record: Recording, name: str) -> list[Node]:

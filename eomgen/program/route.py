@@ -9,6 +9,9 @@ from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.program import Output, cost, finish
 from eomgen.program.system import System
 
+MOST_FACTORING = 20_000
+"""Operations of factoring alone beyond which `ldl` is not tried only to be compared."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -104,6 +107,18 @@ def least_factoring(model: Model) -> int:
     every pair of velocities that carry it.
     """
     return sum(above + above * (above + 1) for above in model.carriers)
+
+
+def why_not_compared(model: Model, route: str) -> str:
+    """What keeps a route from being made beside the one taken, in a few words; "" if nothing."""
+    if model.form != "velocity":
+        return f"the form '{model.form}' comes from the closed form alone"
+    if route == "closed":
+        return why_not_closed(model) or why_not_tried(model)
+    least = least_factoring(model)
+    if route == "ldl" and least > MOST_FACTORING:
+        return f"not tried: factoring alone takes {least} operations"
+    return ""
 
 
 def _closed(model: Model, jacobian: bool) -> System:

@@ -9,6 +9,7 @@ import math
 import operator
 from collections.abc import Callable, Sequence
 from enum import IntEnum
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 from eomgen.language.formula import BY_MATH
@@ -128,7 +129,7 @@ class Tape:
             return folded
         if operation in FUNCTIONS:
             values = [self.values[node.index] for node in nodes]
-            number = None if None in values else _number(FUNCTIONS[operation], *values)
+            number = None if None in values else self.folded(FUNCTIONS[operation], *values)
             if number is not None:
                 return self.constant(number)
         indices = tuple([node.index for node in nodes])
@@ -141,14 +142,28 @@ class Tape:
         stage = max([self.steps[i].stage for i in indices])
         return self._add(key, Step(operation, indices, stage))
 
+    def folded(self, function: Callable[..., float], *values: float | None) -> float | None:
+        """A value of constants, or None where it is not finite: then that shows when it is
+        computed.
+        """
+        try:
+            value = function(*values)
+        except (ArithmeticError, ValueError):
+            return None
+        return value if math.isfinite(value) else None
 
-def _number(function: Callable[..., float], *values: float | None) -> float | None:
-    """A value of constants, or None where it is not finite: then that shows when it is computed."""
-    try:
-        value = function(*values)
-    except (ArithmeticError, ValueError):
-        return None
-    return value if math.isfinite(value) else None
+
+class ExactTape(Tape):
+    """A tape that folds numbers only where nothing is rounded: run in many digits, it computes
+    with exactly the numbers of the scene.
+    """
+
+    def folded(self, function: Callable[..., float], *values: float | None) -> float | None:
+        """A sum, difference, product or quotient that is a double itself; else None."""
+        number = super().folded(function, *values)
+        if number is None or function not in ARITHMETIC.values():
+            return None
+        return number if function(*map(Fraction, values)) == number else None  # type: ignore[arg-type]
 
 
 def _negated(node: Node) -> Node | None:
@@ -158,7 +173,7 @@ def _negated(node: Node) -> Node | None:
 
 
 def _folded(tape: Tape, operation: str, a: float, b: float) -> Node | None:
-    number = _number(ARITHMETIC[operation], a, b)
+    number = tape.folded(ARITHMETIC[operation], a, b)
     return None if number is None else tape.constant(number)
 
 

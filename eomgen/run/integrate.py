@@ -17,7 +17,7 @@ from eomgen.run.integrators import (
     find_integrator,
     fixed_step,
 )
-from eomgen.run.integrators.interface import Adaptive, Advance
+from eomgen.run.integrators.interface import Adaptive, Advance, Change
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.trajectory import Event, Trajectory
@@ -81,24 +81,24 @@ def integrate(
     if not (math.isfinite(rest_speed) and rest_speed > 0):
         raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
 
-    begin: Begin
-    if isinstance(method, FixedStep):
-        if max_step is not None:
-            raise RunError(f"max_step: {integrator} takes equal steps; give --dt instead")
-        dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
-        begin = _equal_steps(method, t_start, t_end, dt, every)
-    else:
-        _check_no_step(integrator, dt)
-        times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
-        longest = _longest(max_step, t_end - t_start, problem.corners)
-        begin = _adaptive_steps(method, t_end, (rtol, atol, longest), times, max_steps)
-
     derivatives, jacobians = _Count(), _Count()
     counted = replace(
         problem,
         derivative=derivatives.of(problem.derivative),
         jacobian=jacobians.of(problem.jacobian),
     )
+    begin: Begin
+    if isinstance(method, FixedStep):
+        if max_step is not None:
+            raise RunError(f"max_step: {integrator} takes equal steps; give --dt instead")
+        dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
+        begin = _equal_steps(method.prepare(counted), t_start, t_end, dt, every)
+    else:
+        _check_no_step(integrator, dt)
+        times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
+        longest = _longest(max_step, t_end - t_start, problem.corners)
+        begin = _adaptive_steps(method, t_end, (rtol, atol, longest), times, max_steps)
+
     if problem.contacts is None:
         advances = begin(counted, t_start, 0)
     else:
@@ -135,12 +135,12 @@ def integrate(
     )
 
 
-def _equal_steps(method: FixedStep, t_start: float, t_end: float, dt: float, every: int) -> Begin:
+def _equal_steps(change: Change, t_start: float, t_end: float, dt: float, every: int) -> Begin:
     """Steps of `dt` from `t_start`, wherever they are begun; every how-manieth has a row."""
 
     def begin(problem: Problem, t: float, made: int) -> Iterator[Advance]:
         return fixed_step.advances(
-            method, problem, t, t_start=t_start, t_end=t_end, dt=dt, every=every
+            change, problem, t, t_start=t_start, t_end=t_end, dt=dt, every=every
         )
 
     return begin

@@ -32,7 +32,7 @@ def terminal_progress(label: str) -> Iterator[Progress]:
 
     Where standard error is no terminal the callable does nothing.
     """
-    with _line() as write:
+    with terminal_line() as write:
 
         def draw(fraction: float) -> None:
             done = min(max(fraction, 0.0), 1.0)
@@ -45,14 +45,17 @@ def terminal_progress(label: str) -> Iterator[Progress]:
 @contextmanager
 def terminal_notice(text: str) -> Iterator[None]:
     """Show a line on standard error while the block runs, if that is a terminal."""
-    with _line() as write:
+    with terminal_line() as write:
         write(text)
         yield
 
 
 @contextmanager
-def _line() -> Iterator[Callable[[str], None]]:
-    """Give a function that rewrites one line of the terminal, wiped when the block ends."""
+def terminal_line() -> Iterator[Callable[[str], None]]:
+    """Give a function that rewrites one line on standard error, wiped when the block ends.
+
+    Where standard error is no terminal it does nothing.
+    """
     stream = sys.stderr
     if not stream.isatty():
         yield lambda text: None

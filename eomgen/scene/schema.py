@@ -56,12 +56,18 @@ ModuleName = Annotated[Identifier, AfterValidator(_no_module)]
 Integrator = Literal[
     "euler",
     "semi_implicit_euler",
+    "leapfrog",
     "rk4",
     "implicit_midpoint",
+    "gauss_4",
+    "gauss_6",
     "RK45",
     "DOP853",
+    "gragg_bulirsch_stoer",
     "Radau",
+    "Radau_differences",
     "BDF",
+    "BDF_differences",
     "LSODA",
 ]
 Form = Literal["velocity", "momentum", "redundant"]

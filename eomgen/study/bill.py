@@ -13,25 +13,18 @@ from typing import get_args
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.derivation.recursive.regular import check_regular
-from eomgen.derivation.supported import why_not_closed, why_not_tried
 from eomgen.model import Model
-from eomgen.program.route import least_factoring, routed
+from eomgen.program.route import routed, why_not_compared
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route, Scene
 from eomgen.study.omission import Change, Run, change, extent, run
+from eomgen.study.timing import least_seconds
 from eomgen.study.variants import Kind, Variant, bare, counted
 
-TIMING = 1.0
-"""About how long all calls that are timed take together, s."""
-CHUNK = 5e-4
-"""About how long those of one module in one round take, s: too short to be interrupted often."""
-LEAST_ROUNDS = 7
 MOTION = 10.0
 """Most wall time of all motions together, s, unless told."""
 AT_CONTACTS = ("gaps", "gap_rates", "impact", "held")
-MOST_FACTORING = 20_000
-"""Operations of factoring alone beyond which `ldl` is not tried."""
 
 
 @dataclass(frozen=True)
@@ -179,17 +172,10 @@ def _compiled(model: Model) -> _Made:
 
 def _try(whole: _Made, route: Route) -> tuple[Model | None, str]:
     """The model by another route, or None and why not."""
-    model = whole.model
     if route == whole.route:
         return None, "taken"
-    if model.form != "velocity":
-        return None, f"the form '{model.form}' comes from the closed form alone"
-    least, why_not = least_factoring(model), ""
-    if route == "closed":
-        why_not = why_not_closed(model) or why_not_tried(model)
-    elif route == "ldl" and least > MOST_FACTORING:
-        why_not = f"not tried: factoring alone takes {least} operations"
-    return (None, why_not) if why_not else (replace(model, route=route), "")
+    why_not = why_not_compared(whole.model, route)
+    return (None, why_not) if why_not else (replace(whole.model, route=route), "")
 
 
 def _route_cost(route: str, words: str, made: _Made | None) -> RouteCost:
@@ -216,15 +202,8 @@ def _item(whole: _Made, part: Variant, other: _Made | None, change: Change | Non
 
 
 def _timed(made: Sequence[_Made | None]) -> list[_Made | None]:
-    """With the least time of a call in s, of all in turn: a busy machine is busy for all."""
-    there = [one for one in made if one is not None]
-    calls = [_call(one.module) for one in there]
-    counts = [1 + int(CHUNK / min(_seconds(call, 1) for _ in range(5))) for call in calls]
-    least, rounds, begin = [inf] * len(calls), 0, time.perf_counter()
-    while rounds < LEAST_ROUNDS or time.perf_counter() < begin + TIMING:
-        for k, (call, count) in enumerate(zip(calls, counts, strict=True)):
-            least[k] = min(least[k], _seconds(call, count))
-        rounds += 1
+    """With the least time of a call in s."""
+    least = least_seconds([_call(one.module) for one in made if one is not None])
     found = iter(least)
     return [None if one is None else replace(one, seconds=next(found)) for one in made]
 
@@ -232,13 +211,6 @@ def _timed(made: Sequence[_Made | None]) -> list[_Made | None]:
 def _call(module: GeneratedModule) -> Callable[[], object]:
     start = module.initial_state()
     return lambda: module.derivative(0.0, start)
-
-
-def _seconds(call: Callable[[], object], count: int) -> float:
-    begin = time.perf_counter()
-    for _ in range(count):
-        call()
-    return (time.perf_counter() - begin) / count
 
 
 def _changes(

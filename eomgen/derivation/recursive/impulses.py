@@ -144,7 +144,7 @@ def struck(
 
 
 def response(d: Dynamics, impulse: Sequence[Scalar], route: str) -> list[Scalar]:
-    """M⁻¹ of impulses on the velocities, by the recursion of a route."""
+    """M⁻¹ of impulses, or forces, on the velocities, by the recursion of a route."""
     if route == "ldl":
         return solved(d.factors, impulse)
     still = [fc.no_force(d.scalars)] * len(d.instant.links)

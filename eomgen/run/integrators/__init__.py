@@ -1,33 +1,62 @@
 """The integrators by name."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Any
 
-from scipy.integrate import BDF, DOP853, LSODA, RK45, Radau
+from scipy.integrate import BDF, DOP853, LSODA, RK45, OdeSolver, Radau
 
 from eomgen.errors import RunError, nearest
-from eomgen.run.integrators import euler, implicit_midpoint, runge_kutta_4, semi_implicit_euler
-from eomgen.run.integrators.interface import Adaptive, FixedStep, StepFailure
+from eomgen.run.integrators import (
+    euler,
+    gauss_4,
+    gauss_6,
+    implicit_midpoint,
+    leapfrog,
+    runge_kutta_4,
+    semi_implicit_euler,
+)
+from eomgen.run.integrators.gragg_bulirsch_stoer import GraggBulirschStoer
+from eomgen.run.integrators.implicit_stages import REMEDY, ImplicitMethod
+from eomgen.run.integrators.interface import Adaptive, Change, FixedStep, StepFailure
 
 __all__ = ["INTEGRATORS", "Adaptive", "FixedStep", "StepFailure", "find_integrator"]
 
 _SHORTER = "take a smaller --dt, or an implicit or adaptive method (--integrator Radau)"
 _LOOSER = "try another --integrator, or a looser --rtol and --atol"
 
+
+def _any(change: Change, order: int, remedy: str) -> FixedStep:
+    """A method that serves every problem alike."""
+    return FixedStep(lambda _: change, order, remedy)
+
+
+def _implicit(method: ImplicitMethod) -> FixedStep:
+    return _any(method.change, method.order, REMEDY)
+
+
+def _explicit(solver: "Callable[..., OdeSolver[Any]]") -> Adaptive:
+    return Adaptive(solver, uses_jacobian=False, one_step=True, remedy=_LOOSER)
+
+
 INTEGRATORS: Mapping[str, FixedStep | Adaptive] = MappingProxyType(
     {
-        "euler": FixedStep(euler.step, euler.ORDER, _SHORTER),
-        "semi_implicit_euler": FixedStep(
-            semi_implicit_euler.step, semi_implicit_euler.ORDER, _SHORTER
+        "euler": _any(euler.change, euler.ORDER, _SHORTER),
+        "semi_implicit_euler": _any(
+            semi_implicit_euler.change, semi_implicit_euler.ORDER, _SHORTER
         ),
-        "rk4": FixedStep(runge_kutta_4.step, runge_kutta_4.ORDER, _SHORTER),
-        "implicit_midpoint": FixedStep(
-            implicit_midpoint.step, implicit_midpoint.ORDER, implicit_midpoint.REMEDY
-        ),
-        "RK45": Adaptive(RK45, uses_jacobian=False, one_step=True, remedy=_LOOSER),
-        "DOP853": Adaptive(DOP853, uses_jacobian=False, one_step=True, remedy=_LOOSER),
+        "leapfrog": FixedStep(leapfrog.prepare, leapfrog.ORDER, _SHORTER),
+        "rk4": _any(runge_kutta_4.change, runge_kutta_4.ORDER, _SHORTER),
+        "implicit_midpoint": _implicit(implicit_midpoint.METHOD),
+        "gauss_4": _implicit(gauss_4.METHOD),
+        "gauss_6": _implicit(gauss_6.METHOD),
+        "RK45": _explicit(RK45),
+        "DOP853": _explicit(DOP853),
+        "gragg_bulirsch_stoer": _explicit(GraggBulirschStoer),
         "Radau": Adaptive(Radau, uses_jacobian=True, one_step=True, remedy=_LOOSER),
+        "Radau_differences": Adaptive(Radau, uses_jacobian=False, one_step=True, remedy=_LOOSER),
         "BDF": Adaptive(BDF, uses_jacobian=True, one_step=False, remedy=_LOOSER),
+        "BDF_differences": Adaptive(BDF, uses_jacobian=False, one_step=False, remedy=_LOOSER),
         "LSODA": Adaptive(LSODA, uses_jacobian=True, one_step=False, remedy=_LOOSER),
     }
 )

@@ -1,7 +1,9 @@
-"""SciPy's adaptive methods, one step at a time, with the problem's exact Jacobian.
+"""SciPy's adaptive methods and those made like them, one step at a time.
 
 RK45 and DOP853 are explicit (Dormand, Prince), Radau is Radau IIA of order 5, BDF and LSODA are
-multistep methods, LSODA switching between stiff and nonstiff by itself (Hindmarsh, Petzold).
+multistep methods, LSODA switching between stiff and nonstiff by itself (Hindmarsh, Petzold). The
+implicit ones are given the problem's exact Jacobian; left without it, as `Radau_differences` and
+`BDF_differences` are, they make one of derivatives, which count as such.
 """
 
 from collections.abc import Callable, Iterator
@@ -66,8 +68,11 @@ def advances(
         passed = int(np.searchsorted(times, t, side="right"))
         dense = cache(solver.dense_output)
         spanned = times[sampled:passed]
-        states = dense()(spanned).T if spanned.size else ()
-        samples = list(zip(spanned.tolist(), map(problem.unit, states), strict=True))
+        # The step's end is known without what dense output costs.
+        within = spanned[spanned < t]
+        states = dense()(within).T if within.size else ()
+        samples = list(zip(within.tolist(), map(problem.unit, states), strict=True))
+        samples += [(t, y)] * (spanned.size - within.size)
         yield Advance(t, y, samples, problem, partial(_between, problem, dense))
         sampled = passed
         if solver.status == "finished":

@@ -8,6 +8,6 @@ from eomgen.run.problem import Floats, Problem
 ORDER = 1
 
 
-def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
-    """Return y(t + h), shape (ny,). Hairer, Norsett, Wanner, Solving ODEs I, section I.7."""
-    return y + h * problem.derivative(t, y)
+def change(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+    """Return y(t + h) - y(t), (ny,). Hairer, Norsett, Wanner, Solving ODEs I, section I.7."""
+    return h * problem.derivative(t, y)

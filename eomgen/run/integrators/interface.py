@@ -10,8 +10,8 @@ from eomgen.errors import RunError
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.trajectory import Event
 
-Step = Callable[[Problem, float, Floats, float], Floats]
-"""`step(problem, t, y, h) -> y_new`: one step of size h; leaves `y` (ny,) as it is."""
+Change = Callable[[Problem, float, Floats, float], Floats]
+"""`change(problem, t, y, h) -> d`: one step of size h leads to y + d; leaves `y` (ny,) as it is."""
 
 
 class StepFailure(RunError):
@@ -22,20 +22,22 @@ class StepFailure(RunError):
 class FixedStep:
     """A method whose steps the user chooses.
 
-    order   global error O(h^order)
-    remedy  what to change when a run goes astray
+    prepare  gives the method's `Change` for a problem, once a run; raises `RunError` if the method
+             cannot serve it
+    order    global error O(h^order)
+    remedy   what to change when a run goes astray
     """
 
-    step: Step
+    prepare: Callable[[Problem], Change]
     order: int
     remedy: str
 
 
 @dataclass(frozen=True)
 class Adaptive:
-    """A SciPy method that chooses its own steps to meet rtol and atol.
+    """A method, SciPy's or one like it, that chooses its own steps to meet rtol and atol.
 
-    uses_jacobian  whether it is implicit, and so is given the problem's Jacobian
+    uses_jacobian  whether it is given the problem's Jacobian
     one_step       whether it steps on from a state alone, which then may be put right between steps
     remedy         what to change when a run goes astray
     """

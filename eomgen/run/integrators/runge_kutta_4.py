@@ -18,6 +18,6 @@ TABLEAU = ButcherTableau(
 ORDER = TABLEAU.order
 
 
-def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
-    """Return y(t + h), shape (ny,)."""
-    return TABLEAU.step(problem.derivative, t, y, h)
+def change(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+    """Return y(t + h) - y(t), shape (ny,)."""
+    return TABLEAU.change(problem.derivative, t, y, h)

@@ -9,14 +9,13 @@ from eomgen.run.problem import Floats, Problem
 ORDER = 1
 
 
-def step(problem: Problem, t: float, y: Floats, h: float) -> Floats:
-    """Return y(t + h), shape (ny,). Hairer, Lubich, Wanner, Geometric Numerical Integration,
+def change(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+    """Return y(t + h) - y(t), shape (ny,). Hairer, Lubich, Wanner, Geometric Numerical Integration,
     section VI.3, written with the derivative alone so that it serves every form of the state:
     the drift is the position part of f at (old positions, new velocities).
     """
     positions = list(problem.positions)
-    kicked = y + h * problem.derivative(t, y)
-    kicked[positions] = y[positions]
-    drift = problem.derivative(t, kicked)[positions]
-    kicked[positions] += h * drift
-    return kicked
+    kick = h * problem.derivative(t, y)
+    kick[positions] = 0.0
+    kick[positions] = h * problem.derivative(t, y + kick)[positions]
+    return kick

@@ -1,0 +1,203 @@
+"""The table of `accuracy` in words: every run, the orders seen, and how to read it."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+from eomgen.commands.shared import print_wrapped
+from eomgen.study.ladder import Ladder, Work, order
+from eomgen.study.reading import TARGETS, cheapest, observed_order, saved_by_jacobian
+from eomgen.study.work_precision import Bench
+
+WORDS = {"wrong": "wrong", "failed": "failed", "over": "over", "refused": "not possible"}
+RUNNERS_UP = 2
+"""Methods that are named beside the cheapest."""
+
+
+def comments(
+    bench: Bench,
+    costs: tuple[float, float],
+    t_end: float,
+    parameters: Mapping[str, float],
+    inputs: Mapping[str, float],
+) -> list[str]:
+    """Lines above the columns of the CSV: what its numbers are, and were measured by."""
+    truth = bench.reference
+    values = [f"{name}={value:g}" for name, value in {**parameters, **inputs}.items()]
+    return [
+        f"t_end {t_end:g} s" + (f", {', '.join(values)}" if values else ""),
+        f"reference: {truth.origin}; error {truth.error:.2g}, at the end {truth.final_error:.2g}",
+        f"one derivative {1e6 * costs[0]:.2f} us, one Jacobian {1e6 * costs[1]:.2f} us",
+        "error, final_error: greatest difference of any state over the rows, and at the end, in "
+        "parts of the motion's own scale; 'at most': below 100 times the reference's own error",
+        "time_s: least wall time of that many repeats, outputs off; 1: made once, being slow",
+        f"energy_drift: {_energy(bench)}",
+        f"quaternion_defect: {_quaternions(bench)}",
+    ]
+
+
+def _energy(bench: Bench) -> str:
+    if bench.energy is not None:
+        return "greatest change of the energy, which exact motion keeps, in parts of the motion's"
+    if bench.powers is not None:
+        return (
+            "kinetic energy at the end that the works of effects leave unaccounted for, in parts "
+            "of the motion's energy; empty where booking them would take too long"
+        )
+    return "not known: energy is not kept, and the works of effects are not known"
+
+
+def _quaternions(bench: Bench) -> str:
+    if not bench.problem.quaternions:
+        return "none, the state has no quaternions"
+    return (
+        "how far their length was from 1 at most before it was scaled back to 1, as it is after "
+        "every step"
+    )
+
+
+def print_table(
+    name: str,
+    bench: Bench,
+    ladder: Ladder,
+    methods: Sequence[str],
+    works: Sequence[Work],
+    costs: tuple[float, float],
+    generation: float,
+    t_end: float,
+) -> None:
+    """Print what was measured: a line a run, a word on each method's order, and a reading."""
+    truth = bench.reference
+    print(
+        f"{name}: {t_end:g} s; one derivative takes {1e6 * costs[0]:.1f} µs, one Jacobian "
+        f"{1e6 * costs[1]:.1f} µs; generated in {generation:.2g} s"
+    )
+    floor = bench.floors[0]
+    print_wrapped("    reference: ", f"{truth.origin} ({_time(truth.seconds)})")
+    print_wrapped(
+        "    ",
+        f"its own error {truth.error:.1g} of the motion's scale: errors are told apart from "
+        f"{floor:.1g} on",
+    )
+    print_wrapped("    energy: ", _energy(bench))
+    if bench.problem.quaternions:
+        print_wrapped("    quaternions: ", _quaternions(bench))
+    extras: list[tuple[str, Callable[[Work], float]]] = [
+        ("energy", lambda w: w.energy_drift),
+        ("gap, m", lambda w: w.joint_gap),
+        ("quaternion", lambda w: w.quaternion_defect),
+    ]
+    extras = [(title, value) for title, value in extras if any(value(w) >= 0 for w in works)]
+    heads = "".join(f"  {title:>10}" for title, _ in extras)
+    print(
+        f"    {'method':<20}  {'setting':<12}  {'error':>10}{heads}  {'time':>8}  {'steps':>8}  "
+        f"{'derivatives':>11}  {'Jacobians':>9}  {'in them':>7}"
+    )
+    reasons: dict[tuple[str, str, str], list[Work]] = {}
+    for method in methods:
+        own = [work for work in works if work.rung.method == method]
+        for work in own:
+            cells = "".join(f"  {_small(value(work)):>10}" for _, value in extras)
+            print(
+                f"    {method:<20}  {work.rung.setting:<12}  {_error(work):>10}{cells}  "
+                f"{_time(work.seconds):>8}  {work.steps:>8}  {work.derivatives:>11}  "
+                f"{work.jacobians:>9}  {_share(bench, work, costs):>7}"
+            )
+            if work.status != "ok":
+                cause = "" if work.status == "wrong" else _cause(work.reason)
+                reasons.setdefault((method, work.status, cause), []).append(work)
+    _print_troubles(reasons)
+    _print_orders(methods, works)
+    _print_reading(works)
+
+
+def _error(work: Work) -> str:
+    if work.status == "wrong":
+        return f"wrong {work.error:.1e}" if work.error < 1e4 else "wrong"
+    if work.status != "ok":
+        return WORDS[work.status]
+    return f"{'≤ ' if work.at_most[0] else ''}{work.error:.1e}"
+
+
+def _small(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.1e}" if value else "0"
+
+
+def _time(seconds: float) -> str:
+    if seconds >= 1:
+        return f"{seconds:.3g} s"
+    return f"{1e3 * seconds:.3g} ms" if seconds >= 1e-3 else f"{1e6 * seconds:.3g} µs"
+
+
+def _share(bench: Bench, work: Work, costs: tuple[float, float]) -> str:
+    """Share of the time that the generated code takes; not told where contacts add their own."""
+    if bench.problem.contacts is not None or not work.derivatives:
+        return "-"
+    spent = work.derivatives * costs[0] + work.jacobians * costs[1]
+    return f"{min(1.0, spent / work.seconds):.0%}"
+
+
+def _cause(reason: str) -> str:
+    """Why a run failed, without the time and the state that it stopped at."""
+    return reason.partition(": ")[2] or reason
+
+
+def _print_troubles(reasons: Mapping[tuple[str, str, str], Sequence[Work]]) -> None:
+    """What went wrong, methods and reasons that are the same together."""
+    if reasons:
+        print("    not right:")
+    for (method, status, cause), works in reasons.items():
+        settings = works[0].rung.setting
+        if len(works) > 1:
+            settings += f" to {works[-1].rung.setting.split()[1]}"
+        if status == "wrong":
+            worst = max(work.error for work in works)
+            cause = f"reported success, but up to {worst:.2g} of the motion's own scale off"
+        print_wrapped(f"        {method}, {settings}: ", f"{WORDS[status]}: {cause}")
+
+
+def _print_orders(methods: Sequence[str], works: Sequence[Work]) -> None:
+    lines = []
+    for method in methods:
+        nominal = order(method)
+        own = [work for work in works if work.rung.method == method]
+        if nominal is None or all(work.status == "refused" for work in own):
+            continue
+        seen = observed_order(own)
+        if seen is None:
+            text = "none to be seen: no two equal slopes of the error in a row"
+        else:
+            text = f"{seen.value:.2f} over dt {seen.coarse:.3g} to {seen.fine:.3g} s"
+        lines.append(f"        {method:<20}  {nominal}   {text}")
+    if lines:
+        print("    order     by its making, and as seen:")
+        print("\n".join(lines))
+
+
+def _print_reading(works: Sequence[Work]) -> None:
+    """The cheapest runs for a few errors, and what the generated Jacobian saves."""
+    print("    cheapest run for an error within")
+    for target in TARGETS:
+        best = cheapest(works, target)
+        if not best:
+            print(f"        {target:.0e}  none of these runs")
+            continue
+        first = best[0]
+        text = f"{first.rung.method} at {first.rung.setting}, {_time(first.seconds)}"
+        others = [
+            f"{other.rung.method} {other.seconds / first.seconds:.1f} times"
+            for other in best[1 : 1 + RUNNERS_UP]
+        ]
+        print(f"        {target:.0e}  {'; '.join([text, *others])}")
+    wrong = [work for work in works if work.status == "wrong"]
+    if wrong:
+        print_wrapped(
+            "    ",
+            f"{len(wrong)} of {len(works)} runs reported success and are wrong: their errors are "
+            "a tenth of the motion's own scale and more",
+        )
+    for method, ratio in saved_by_jacobian(works).items():
+        print_wrapped(
+            "    ",
+            f"{method} takes {ratio:.2f} times as long with finite differences as with the "
+            "generated Jacobian (median over tolerances)",
+        )

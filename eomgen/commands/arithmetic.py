@@ -1,0 +1,119 @@
+"""How exact the arithmetic of each route is: the half of `accuracy` that needs no run."""
+
+from dataclasses import replace
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from eomgen.commands.shared import Arguments, assignments, located, print_wrapped
+from eomgen.errors import RunError
+from eomgen.files import check_folder, check_writable
+from eomgen.model import Model
+from eomgen.run.progress import terminal_progress
+
+if TYPE_CHECKING:
+    from eomgen.study.arithmetic import Arithmetic, Way
+
+MOST_STATES = 100_000
+HEADS = {
+    "float64": "float64",
+    "float32": "float32, ulp of its own, 2^29 of those above; at the states rounded to it",
+}
+
+
+def check_arithmetic(given: Arguments, name: str) -> None:
+    """Raise `RunError` if this half cannot be done as asked, or not be written."""
+    from eomgen.show.style import check_figure
+
+    if given.states is not None and not 1 <= given.states <= MOST_STATES:
+        raise RunError(f"--states: {given.states} is not a number from 1 to {MOST_STATES}")
+    if given.seed < 0:
+        raise RunError(f"--seed: {given.seed} is negative; give 0, 1, 2, …")
+    check_folder(given.output)
+    check_figure(given.output / f"{name}_arithmetic.png", force=given.force)
+    check_writable(given.output / f"{name}_arithmetic.csv", force=given.force)
+
+
+def print_arithmetic(given: Arguments, model: Model, name: str) -> None:
+    """Judge, print and draw the arithmetic of every route of a scene's model."""
+    # Imported here: nothing else needs Matplotlib, or that many digits.
+    from eomgen.show.arithmetic import save_figure, save_table
+    from eomgen.study.arithmetic import arithmetic
+
+    check_arithmetic(given, name)
+    model = model.with_parameters(assignments(given.set, model.defaults, "--set"))
+    label = f"arithmetic of {name}"
+    with located(given.scene), terminal_progress(label) as progress:
+        found = arithmetic(
+            model, states=given.states, seed=given.seed, single=given.float32, progress=progress
+        )
+    found = replace(found, name=name)
+    print(
+        f"{name}: error of v̇ in units in the last place (ulp), by every route; taken: {found.taken}"
+    )
+    for precision in dict.fromkeys(way.precision for way in found.ways):
+        _print_ways(found, precision)
+    _print_notes(found, model)
+    figure, table = (given.output / f"{name}_arithmetic.{suffix}" for suffix in ("png", "csv"))
+    save_table(found, table, force=given.force)
+    save_figure(found, figure, force=given.force)
+    print(f"    wrote {table}, {figure.name}")
+
+
+def _print_ways(found: "Arithmetic", precision: str) -> None:
+    kinds = "".join(f"{f'{len(s.y)} {s.kind}':>20}" for s in found.samples)
+    print(f"    {HEADS[precision]}")
+    print(f"    {'':<14}{'':>10}{'':>10}{'µs each':>12}{kinds}")
+    heads = f"{'median':>10}{'worst':>10}" * len(found.samples)
+    print(f"    {'':<14}{'operations':>10}{'µs':>10}{'of 1000':>12}{heads}")
+    for way in found.ways:
+        if way.precision == precision:
+            _print_way(way)
+
+
+def _print_way(way: "Way") -> None:
+    if way.operations is None:
+        print_wrapped(f"    {way.name:<14}", way.words)
+        return
+    errors = "".join(f"{ulps(e.median):>10}{ulps(e.worst):>10}" for e in way.errors)
+    each, many = _us(way.seconds, 1), _us(way.batch_seconds, 3)
+    print(f"    {way.name:<14}{way.operations:>10}{each:>10}{many:>12}{errors}")
+    if way.words:
+        print_wrapped(f"    {'':<14}", way.words)
+
+
+def _print_notes(found: "Arithmetic", model: Model) -> None:
+    conditions = "; ".join(
+        f"{s.kind} median {np.median(s.condition):.2g}, worst {np.max(s.condition):.2g}"
+        for s in found.samples
+    )
+    print_wrapped("    condition of the mass matrix, its diagonal scaled to 1: ", conditions)
+    print_wrapped(
+        "    ulp: ",
+        "of the greatest acceleration of the same unit, but of no less than 1/1000 of what that is "
+        "at half of the states; correctly rounded is 0.5. linalg.solve: M v̇ = F - V - G by NumPy "
+        "on the scene's own terms, their operations and those of elimination",
+    )
+    parts = [f"against 60 digits, in which two ways agree to {found.agreed:.0f}; inputs 0"]
+    for sample in found.samples:
+        if sample.until is not None:
+            parts.append(f"{sample.kind} to t = {sample.until:.4g} s")
+        if sample.left_out:
+            parts.append(f"{sample.left_out} {sample.kind} left out, which have no acceleration")
+    if model.form != "velocity":
+        parts.append(f"form '{model.form}' is judged as 'velocity'")
+    if any(getattr(effect, "law", "") == "impact" for effect in model.effects):
+        parts.append("no rigid contact held")
+    print_wrapped("    true: ", "; ".join(parts))
+
+
+def ulps(value: float) -> str:
+    """An error for a reader: a decimal if it is small, a power of ten if it is large."""
+    if not isfinite(value):
+        return "-" if value != value else "inf"
+    return f"{value:.1f}" if value < 9.95 else f"{value:.0f}" if value < 9999.5 else f"{value:.1e}"
+
+
+def _us(seconds: float | None, digits: int) -> str:
+    return "-" if seconds is None else f"{1e6 * seconds:.{digits}f}"

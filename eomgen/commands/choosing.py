@@ -1,0 +1,136 @@
+"""`--accuracy`, `--budget`, `--estimate`: a run by its error or time, and what it says of that."""
+
+import math
+import re
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from eomgen.commands.shared import Arguments
+from eomgen.errors import RunError
+
+if TYPE_CHECKING:
+    from eomgen.run.works import Powers
+    from eomgen.show.motion import Motion
+    from eomgen.study.choosing import Choice
+    from eomgen.study.trial import Case, Tried
+
+SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0}
+DRIFTED = 2e-3
+"""Of the greatest kinetic energy: where a run gains or loses more than it may, speeds are off by
+half that part, which over a few swings makes another motion."""
+FEWEST = 201
+"""Rows by which runs are compared."""
+BETTER = "take tighter tolerances or a shorter step, or let --accuracy 1e-3 choose"
+
+
+def check_choice(given: Arguments) -> None:
+    """Raise `RunError` where a run is asked for in two ways at once."""
+    asked = [name for name in ("accuracy", "budget") if getattr(given, name) is not None]
+    if len(asked) > 1:
+        raise RunError("--accuracy, --budget: a run has one aim; give one of them")
+    for aim in asked:
+        for name in ("rtol", "atol", "dt"):
+            if getattr(given, name) is not None:
+                raise RunError(f"--{aim}, --{name}: --{aim} chooses {name} itself; leave one out")
+
+
+def seconds_of(text: str) -> float:
+    """A time like 2s, 500ms, 1.5min or 2, in s. Raises `RunError` for any other."""
+    found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(s|ms|min|)\s*", text)
+    try:
+        value = float(found[1]) * SECONDS[found[2]] if found else math.nan
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise RunError(f"--budget {text}: is no time to compute in; give e.g. 2s, 500ms or 1.5min")
+    return value
+
+
+def choose(case: "Case", given: Arguments) -> "Choice":
+    """The run that is asked for by its error or its time; each run tried for it is told."""
+    from eomgen.study.choosing import meet, within
+
+    def say(text: str) -> None:
+        print(f"    trying {text}", flush=True)
+
+    case = replace(case, kept={**case.kept, "samples": max(given.samples, FEWEST)})
+    if given.budget is not None:
+        return within(case, seconds_of(given.budget), given.integrator, say)
+    return meet(case, given.accuracy, given.integrator, say)
+
+
+def made_again(case: "Case", choice: "Choice", powers: "Powers | None") -> "Tried":
+    """The chosen run, made again only where it has no works or not the rows that are asked for."""
+    if powers is None and case.kept["samples"] >= FEWEST:
+        return choice.tried
+    return case.run(choice.tried.setting, powers=powers)
+
+
+def print_choice(choice: "Choice", given: Arguments) -> str:
+    """Say what was chosen and what it cost; return "" or that it is not what was asked for."""
+    run = choice.tried
+    if not run.trajectory.finished:
+        return ""
+    print(f"    chosen: {run.setting.options}")
+    print(
+        f"    error estimate {_error(choice.error)}; it took {run.seconds:.2g} s, "
+        f"all {choice.runs} runs tried {choice.seconds:.2g} s"
+    )
+    if not choice.met:
+        return (
+            f"--accuracy {given.accuracy:g}: not reached, the best run's estimate is "
+            f"{choice.error:.1g}: rounding or chaos stands in the way; take a shorter --t-end"
+        )
+    return ""
+
+
+def print_estimate(case: "Case", tried: "Tried") -> None:
+    """Say a run's error by a second run, which is made here."""
+    from eomgen.study.estimate import by_second_run
+    from eomgen.study.measure import WRONG
+
+    found = by_second_run(case, tried)
+    second = found.second
+    if not math.isfinite(found.last):
+        print(f"    no error estimate: {second.setting.options} {second.trajectory.message}")
+        return
+    print(
+        f"    error estimate {_error(found.last)} at the end, at most {found.most:.1e} at "
+        f"t = {found.at:.4g} s"
+    )
+    print(f"    by a second run, {second.setting.options}, which took {second.seconds:.2g} s")
+    if found.most >= WRONG:
+        _warn(
+            f"by its own estimate this run is wrong by {found.most:.1g} of the motion's scale at "
+            f"t = {found.at:.4g} s; {BETTER}"
+        )
+
+
+def warn_of_energy(motion: "Motion") -> None:
+    """Warn of a run whose energy is not what it must be: conserved, or accounted for by works."""
+    size = float(np.max(motion.kinetic_energy))
+    if motion.keeps_energy:
+        total = motion.kinetic_energy + motion.potential_energy
+        lost, what = float(np.max(np.abs(total - total[0]))), "exact motion keeps its energy"
+    elif motion.works is not None:
+        change = motion.kinetic_energy - motion.kinetic_energy[0]
+        lost = float(np.max(np.abs(change - motion.works.sum(axis=1))))
+        what = "works and kinetic energy balance in exact motion"
+    else:
+        return
+    if lost > DRIFTED * size:
+        _warn(
+            f"{what}, but this run is off by {lost:.2g} J, {lost / size:.1%} of the greatest "
+            f"kinetic energy; {BETTER}"
+        )
+
+
+def _error(value: float) -> str:
+    return f"{value:.1e} of the motion's scale" if math.isfinite(value) else "none: a single run"
+
+
+def _warn(text: str) -> None:
+    print(f"eomgen: warning: {text}", file=sys.stderr)

@@ -1,0 +1,95 @@
+"""Leapfrog, or Störmer-Verlet: drift half a step, kick, drift: order 2, explicit, symplectic.
+
+Hairer, Lubich, Wanner, Geometric Numerical Integration, section I.1.4, variant B. One derivative a
+step. For mechanisms whose velocities change at rates that depend on positions and time alone, and
+whose positions change at rates that are the velocities times a constant matrix: particles, one
+pendulum, a chain of masses on springs; neither a mass matrix that depends on the positions nor
+resistance.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from eomgen.errors import RunError
+from eomgen.run.integrators.interface import Change
+from eomgen.run.problem import Floats, Problem
+
+ORDER = 2
+
+_LOOKS = 5
+# Of a Jacobian by differences; of an exact one the parts that must not vary do not.
+_SAME = 1e-6
+
+
+def prepare(problem: Problem) -> Change:
+    """Return `change(problem, t, y, h) -> y(t + h) - y(t)`, shape (ny,), for this problem.
+
+    Raises `RunError` if the Jacobian, looked at in the initial state and a few seeded ones, is not
+    zero where it must be for the method to be what it is.
+    """
+    positions = list(problem.positions)
+    others = [i for i in range(len(problem.states)) if i not in problem.positions]
+    _check(problem, positions, others)
+    rates = np.empty((len(positions), len(others)))
+    start = problem.initial.copy()
+    for column, state in enumerate(others):
+        start[others] = 0.0
+        start[state] = 1.0
+        rates[:, column] = problem.derivative(0.0, start)[positions]
+
+    def change(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+        velocities = y[others]
+        middle = y.copy()
+        middle[positions] += h / 2 * (rates @ velocities)
+        kick = h * problem.derivative(t + h / 2, middle)[others]
+        found = np.empty_like(y)
+        found[others] = kick
+        found[positions] = h * (rates @ (velocities + kick / 2))
+        return found
+
+    return change
+
+
+def _check(problem: Problem, positions: list[int], others: list[int]) -> None:
+    """Raise `RunError` if the problem does not fall into drift and kick."""
+    if not positions:
+        raise _refusal("no state is a position")
+    if problem.contacts is not None:
+        raise _refusal("those of rigid contacts that are held depend on velocities")
+    first: Floats | None = None
+    for jacobian in _jacobians(problem):
+        for group in (others, positions):
+            found = np.argwhere(jacobian[np.ix_(group, group)])
+            if found.size:
+                of, by = (problem.states[group[i]] for i in found[0])
+                raise _refusal(f"the rate of {of} depends on {by}")
+        rates = jacobian[np.ix_(positions, others)]
+        if first is None:
+            first = rates
+        varies = np.argwhere(np.abs(rates - first) > _SAME * np.max(np.abs(first)))
+        if varies.size:
+            of = problem.states[positions[varies[0, 0]]]
+            raise _refusal(f"the rate of {of} is not the velocities times constants")
+
+
+def _jacobians(problem: Problem) -> Iterator[Floats]:
+    """Jacobians, the initial state's first, where there are any."""
+    seeded = np.random.default_rng(1)
+    size = 0.1 * np.maximum(1.0, np.abs(problem.initial))
+    for look in range(_LOOKS):
+        y = problem.unit(problem.initial + (look > 0) * size * seeded.normal(size=len(size)))
+        try:
+            with np.errstate(all="ignore"):
+                jacobian = problem.jacobian(float(look), y)
+        except (ArithmeticError, ValueError):
+            continue
+        if np.isfinite(jacobian).all():
+            yield jacobian
+
+
+def _refusal(why: str) -> RunError:
+    return RunError(
+        f"integrator: leapfrog needs forces that depend on positions alone, and {why}; "
+        "take --integrator implicit_midpoint or gauss_4"
+    )

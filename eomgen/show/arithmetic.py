@@ -1,0 +1,105 @@
+"""Errors of the arithmetic as bars, a line a way; and as a table of all states."""
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from eomgen.files import write_whole
+from eomgen.run.problem import Floats
+from eomgen.show.style import FAINT, INK, PALETTE, plain, style, write_figure
+from eomgen.study.arithmetic import Arithmetic, Way
+
+LEAST = 0.05
+"""What is less stands at the edge: a logarithmic axis has no 0."""
+COLOURS = {"float64": PALETTE[0], "float32": PALETTE[1]}
+
+
+def save_figure(found: Arithmetic, path: Path, *, force: bool = False) -> None:
+    """Write the figure: for each way all states, the middle half of them, median and worst.
+
+    Raises `RunError` as `write_figure` does.
+    """
+    ways = [way for way in found.ways if way.operations is not None]
+    with style():
+        engine = ConstrainedLayoutEngine(rect=(0.015, 0.0, 0.985, 1.0))  # for labels of two lines
+        figure = Figure(figsize=(10.0, 1.7 + 0.42 * len(ways)), layout=engine)
+        panels = figure.subplots(1, len(found.samples), sharey=True, sharex=True, squeeze=False)[0]
+        for k, (axes, sample) in enumerate(zip(panels, found.samples, strict=True)):
+            for i, way in enumerate(ways):
+                _bar(axes, i, way.errors[k].ulps, COLOURS[way.precision])
+            axes.set_title(f"{len(sample.y)} states, {sample.kind}")
+            axes.set_xscale("log")
+            axes.set_xlabel("error of v̇, units in the last place of its precision")
+            axes.grid(axis="y", visible=False)
+        panels[0].set_xlim(LEAST / 1.5, _farthest(ways))
+        panels[0].set_yticks(range(len(ways)), [_label(way) for way in ways])
+        panels[0].set_ylim(len(ways) - 0.4, -0.6)  # shared: the first way is on top
+        figure.suptitle(
+            f"{plain(found.name)}: how exact the accelerations are, and what they take",
+            x=0.01,
+            ha="left",
+        )
+        write_figure(figure, path, force=force)
+
+
+def _label(way: Way) -> str:
+    time = ""
+    if way.seconds is not None:
+        us = 1e6 * way.seconds
+        time = f", {us:.1f} µs" if us < 99.95 else f", {us:.0f} µs"
+    return f"{way.name}, {way.precision}\n{way.operations} operations{time}"
+
+
+def _farthest(ways: list[Way]) -> float:
+    """The right edge, with room for what is written beside the bars."""
+    all_ulps = np.concatenate([errors.ulps for way in ways for errors in way.errors])
+    finite = all_ulps[np.isfinite(all_ulps)]
+    most = max(float(np.max(finite, initial=1.0)), 10.0)
+    return float(most * (most / LEAST) ** 0.2)
+
+
+def _bar(axes: Axes, row: int, ulps: Floats, colour: str) -> None:
+    known = np.maximum(ulps[np.isfinite(ulps)], LEAST)
+    if not known.size:
+        axes.text(LEAST, row, "no finite number", color=FAINT, va="center", fontsize=8.5)
+        return
+    least, low, median, high, most = np.quantile(known, (0.0, 0.25, 0.5, 0.75, 1.0))
+    axes.plot([least, most], [row, row], color=colour, linewidth=1.2)
+    axes.barh(row, high - low, left=low, height=0.5, color=colour, alpha=0.55)
+    axes.plot([median, median], [row - 0.25, row + 0.25], color=INK, linewidth=1.6)
+    axes.plot(most, row, ".", color=colour, markersize=6)
+    axes.annotate(
+        f"{most:.3g}",
+        (most, row),
+        xytext=(5, 0),
+        textcoords="offset points",
+        va="center",
+        fontsize=8.5,
+        color=FAINT,
+    )
+
+
+def save_table(found: Arithmetic, path: Path, *, force: bool = False) -> None:
+    """Write a row a state: its kind, time, condition, ulps of each way, and the state itself.
+
+    The numbers of the states are exact, so that the worst of them can be looked at again; those in
+    float32 were computed at the same states rounded to that. Raises `RunError` as `write_whole`
+    does.
+    """
+    ways = [way for way in found.ways if way.operations is not None]
+    text = io.StringIO()
+    text.write(f"# eomgen arithmetic of {found.name}: errors of accelerations in ulp\n")
+    table = csv.writer(text, lineterminator="\n")
+    heads = [f"{way.name} {way.precision}" for way in ways]
+    table.writerow(["states", "t", "condition", *heads, *found.states])
+    for k, sample in enumerate(found.samples):
+        columns = [way.errors[k].ulps for way in ways]
+        for i, (t, y) in enumerate(zip(sample.t.tolist(), sample.y.tolist(), strict=True)):
+            errors = [f"{column[i]:.6g}" for column in columns]
+            table.writerow([sample.kind, repr(t), f"{sample.condition[i]:.6g}", *errors, *y])
+    write_whole(path, text.getvalue(), force=force)

@@ -1,0 +1,281 @@
+"""The work–precision diagram: error against time on logarithmic axes, a line a method."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from eomgen.run.integrators import INTEGRATORS
+from eomgen.show.style import ALARM, FAINT, INK, colours, plain, style, write_figure
+from eomgen.study.ladder import Kind, Work, kind, order
+from eomgen.study.measure import WRONG
+
+COLOURS = {
+    "euler": "#999999",
+    "rk4": "#4477aa",
+    "semi_implicit_euler": "#b8a000",
+    "leapfrog": "#aa3377",
+    "implicit_midpoint": "#ee6677",
+    "gauss_4": "#cc3311",
+    "gauss_6": "#7a1f4e",
+    "RK45": "#55bbe8",
+    "DOP853": "#0055bb",
+    "gragg_bulirsch_stoer": "#332288",
+    "Radau": "#228833",
+    "Radau_differences": "#228833",
+    "BDF": "#ee7733",
+    "BDF_differences": "#ee7733",
+    "LSODA": "#009988",
+}
+"""Each method has its colour in every figure, by differences that of the same with the Jacobian."""
+MARKERS: dict[Kind, str] = {"explicit": "o", "implicit": "s", "symplectic": "D"}
+TITLES: dict[Kind, str] = {
+    "explicit": "Explicit",
+    "implicit": "Implicit",
+    "symplectic": "Symplectic",
+}
+TROUBLES = {
+    "wrong": ("x", "reported success,\nbut is wrong"),
+    "failed": ("P", "failed"),
+    "over": (">", "stopped: took too long"),
+}
+"""Statuses that are drawn at the top, each with its marker and words."""
+AT_MOST = "v"
+TOP = 3.0
+"""Errors above, those of runs that failed among them, are drawn here."""
+BESIDE = 0.85
+"""Where the legend begins, in parts of the figure's width."""
+SMALLEST = 1e-17
+MOST = 10.0
+"""Drifts below and above are drawn here."""
+
+Value = Callable[[Work], float]
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """What a figure says beside its runs.
+
+    name    of the scene
+    about   lines below the title
+    floor   error below which nothing is told apart
+    energy  what the drift of energy means here; "" if it is not known
+    joints  whether joints can come apart, so that their gaps are worth a panel
+    """
+
+    name: str
+    about: str
+    floor: float
+    energy: str
+    joints: bool
+
+
+def draw(diagram: Diagram, works: Sequence[Work]) -> Figure:
+    """Draw error against time and against derivatives, and what drifts, one line a method.
+
+    What failed or is wrong is drawn at its time, no higher than the top. The figure belongs to no
+    window and no global state.
+    """
+    panels: list[Callable[[Axes], None]] = [partial(_draw_evaluations, diagram, works)]
+    if diagram.energy:
+        panels.append(partial(_draw_drift, works, diagram.energy, lambda w: w.energy_drift))
+    if diagram.joints:
+        panels.append(partial(_draw_drift, works, "Gap in the joints, m", lambda w: w.joint_gap))
+    if any(work.quaternion_defect > 0 for work in works):
+        title = "Length of quaternions off 1 before each scaling"
+        panels.append(partial(_draw_drift, works, title, lambda w: w.quaternion_defect))
+    with style():
+        figure = Figure(figsize=(13.0, 7.2 if len(panels) < 3 else 8.6))
+        write = partial(figure.text, 0.01, va="top", parse_math=False)
+        height = figure.get_figheight()
+        write(
+            1 - 0.1 / height, f"{diagram.name}: what accuracy costs in time", size=15, weight="bold"
+        )
+        write(1 - 0.42 / height, diagram.about, size=9.5, color=FAINT, linespacing=1.4)
+        top = 1 - (0.55 + 0.2 * (1 + diagram.about.count("\n"))) / height
+        figure.set_layout_engine(
+            ConstrainedLayoutEngine(
+                rect=(0.006, 0.006, BESIDE - 0.014, top), wspace=0.03, hspace=0.03
+            )
+        )
+        grid = figure.add_gridspec(len(panels), 2, width_ratios=(1.5, 1))
+        main = figure.add_subplot(grid[:, 0])
+        _draw_errors(main, diagram, works, lambda work: work.seconds)
+        main.set_xlabel("time of a run, s")
+        main.set_title("Error over the whole run, in parts of the motion's own scale")
+        for row, panel in enumerate(panels):
+            panel(figure.add_subplot(grid[row, 1]))
+        _draw_legend(figure, works, top)
+    return figure
+
+
+def save(diagram: Diagram, works: Sequence[Work], path: Path, *, force: bool = False) -> None:
+    """Write the figure, .png or .svg. Raises `RunError` as `write_figure` does."""
+    write_figure(draw(diagram, works), path, force=force)
+
+
+def colour(method: str) -> str:
+    """A method's colour; one that is new takes one by its place."""
+    if method in COLOURS:
+        return COLOURS[method]
+    return colours(len(INTEGRATORS))[list(INTEGRATORS).index(method)]
+
+
+def _line(method: str) -> dict[str, object]:
+    """How a method's line looks: dashes for equal steps, hollow where it takes differences."""
+    hollow = method.endswith("_differences")
+    dashes = ":" if hollow else "-" if order(method) is None else "--"
+    return {
+        "color": colour(method),
+        "linestyle": dashes,
+        "marker": MARKERS[kind(method)],
+        "markerfacecolor": "white" if hollow else colour(method),
+        "markersize": 5,
+        "linewidth": 1.3,
+    }
+
+
+def _by_method(works: Sequence[Work]) -> dict[str, list[Work]]:
+    found: dict[str, list[Work]] = {method: [] for method in INTEGRATORS}
+    for work in works:
+        found[work.rung.method].append(work)
+    return {method: own for method, own in found.items() if own}
+
+
+def _draw_errors(
+    axes: Axes, diagram: Diagram, works: Sequence[Work], cost: Value, *, words: bool = True
+) -> None:
+    """One line a method through its right runs; the others as marks, where their errors are."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for method, own in _by_method(works).items():
+        right = [work for work in own if work.status == "ok"]
+        axes.plot(
+            [cost(work) for work in right],
+            [work.error for work in right],
+            label=method,
+            **_line(method),  # type: ignore[arg-type]
+        )
+        bounds = [work for work in right if work.at_most[0]]
+        axes.plot(
+            [cost(work) for work in bounds],
+            [work.error for work in bounds],
+            AT_MOST,
+            color=colour(method),
+            markerfacecolor="white",
+            markersize=7,
+        )
+        for status, (marker, _) in TROUBLES.items():
+            marks = [work for work in own if work.status == status and cost(work) > 0]
+            axes.plot(
+                [cost(work) for work in marks],
+                [min(work.error, TOP) if work.error > 0 else TOP for work in marks],
+                marker,
+                color=colour(method),
+                markersize=6,
+                clip_on=False,
+                in_layout=False,
+            )
+    known = [work.error for work in works if work.status == "ok" and work.error > 0]
+    low = min(known, default=1e-3) / 4
+    axes.axhspan(WRONG, TOP, color=ALARM, alpha=0.07, linewidth=0)
+    beside = partial(axes.text, transform=axes.get_yaxis_transform(), va="center", size=8.5)
+    if words:
+        text = beside(0.995, math.sqrt(WRONG * TOP), "wrong", ha="right", color=ALARM)
+        text.set_in_layout(False)
+    if diagram.floor > low:
+        axes.axhspan(low, diagram.floor, color=FAINT, alpha=0.16, linewidth=0)
+    if diagram.floor > low and words:
+        told = "not told apart: below 100 × the reference's error"
+        text = beside(0.01, math.sqrt(low * diagram.floor), told, color=FAINT)
+        text.set_in_layout(False)
+    axes.set_ylim(low, TOP)
+    _ticks(axes)
+
+
+def _draw_evaluations(diagram: Diagram, works: Sequence[Work], axes: Axes) -> None:
+    _draw_errors(axes, diagram, works, lambda work: float(work.derivatives), words=False)
+    axes.set_xlabel("derivatives evaluated")
+    axes.set_title("The same error against derivatives")
+
+
+def _draw_drift(works: Sequence[Work], title: str, value: Value, axes: Axes) -> None:
+    """Something that should stay 0, against time; right and wrong runs, those that finished."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for method, own in _by_method(works).items():
+        known = [work for work in own if value(work) >= 0]
+        axes.plot(
+            [work.seconds for work in known],
+            [min(max(value(work), SMALLEST), MOST) for work in known],
+            label=method,
+            **_line(method) | {"markersize": 3.5, "linewidth": 1.0},  # type: ignore[arg-type]
+        )
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, max(high, 1e4 * low))
+    axes.set_xlabel("time of a run, s")
+    axes.set_title(title)
+    _ticks(axes)
+
+
+def _ticks(axes: Axes) -> None:
+    """A label at every few decades, none between."""
+    axes.yaxis.set_major_locator(LogLocator(numticks=12))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _draw_legend(figure: Figure, works: Sequence[Work], top: float) -> None:
+    """Methods by kind, and what the marks mean, in a column of its own."""
+    present = _by_method([work for work in works if work.status != "refused"])
+    handles: list[Line2D] = []
+
+    def heading(text: str) -> None:
+        if handles:
+            handles.append(Line2D([], [], linestyle="", label=" "))
+        handles.append(Line2D([], [], linestyle="", label=text, gid="heading"))
+
+    for sort, title in TITLES.items():
+        own = [method for method in present if kind(method) == sort]
+        if own:
+            heading(title)
+            handles += [
+                Line2D([], [], label=method, **_line(method))  # type: ignore[arg-type]
+                for method in own
+            ]
+    heading("Lines")
+    handles += [
+        Line2D([], [], color=INK, linestyle="--", label="equal steps"),
+        Line2D([], [], color=INK, linestyle="-", label="adaptive"),
+        Line2D([], [], color=INK, linestyle=":", label="by differences"),
+    ]
+    marks = [
+        (marker, words)
+        for status, (marker, words) in TROUBLES.items()
+        if any(work.status == status for work in works)
+    ]
+    if any(work.at_most[0] for work in works):
+        marks.append((AT_MOST, "at most"))
+    if marks:
+        heading("Marks")
+        handles += [
+            Line2D([], [], color=INK, linestyle="", marker=marker, label=words, markersize=6,
+                   markerfacecolor="white" if marker == AT_MOST else INK)
+            for marker, words in marks
+        ]  # fmt: skip
+    legend = figure.legend(
+        handles=handles, loc="upper left", bbox_to_anchor=(BESIDE, top), borderaxespad=0,
+        handlelength=2.6, labelspacing=0.42, fontsize=8.8,
+    )  # fmt: skip
+    for text, handle in zip(legend.get_texts(), handles, strict=True):
+        text.set_text(plain(text.get_text()))
+        if handle.get_gid() == "heading":
+            text.set_fontweight("bold")
+    legend.set_in_layout(False)

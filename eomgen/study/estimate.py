@@ -1,0 +1,187 @@
+"""What a run's own error is, as far as other runs of the same scene and its energy tell.
+
+A method makes an error C τ^a at the tolerance τ, a near 1; of order p at an equal step h, C h^p.
+Two runs that differ in τ alone are apart by the error of the looser one, but for the share that the
+tighter one has itself; three tell the exponent. Runs of two methods are apart by the error of the
+worse one. Differences are taken over the last part of the run, not at its last moment alone: a
+motion swings, and so does what two runs differ by, which may pass through 0 just there; nor where
+it is greatest, which a spike or an impact makes large for a moment.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from eomgen.run.problem import Floats
+from eomgen.run.trajectory import Trajectory
+from eomgen.study.measure import WRONG
+from eomgen.study.trial import TIGHTEST_OF_ALL, Case, Tried, method_of
+
+LAST = 0.1
+"""Part of a run's time over whose rows differences are taken."""
+CAUTION = 0.8
+"""Of the exponent that a method has in theory: taken where one difference alone is known."""
+APART = 30.0
+"""By so much must an error have become less by theory for its fall to be seen: errors scatter."""
+SCATTER = 3.0
+"""Those of multistep methods, whose orders change, too, scatter more: what remains of theirs is
+taken so many times."""
+ALIKE = 2.0
+"""Runs of two methods are taken to be off by so many times what they differ by, for they may be off
+alike; and it is the nearest of several that is asked."""
+SLOPES = (0.6, 1.2)
+"""Of the exponent in theory: what a fitted one is kept to."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """quantity = factor · τ^exponent."""
+
+    factor: float
+    exponent: float
+
+    def at(self, tolerance: float) -> float:
+        """The quantity at a tolerance."""
+        return self.factor * math.pow(tolerance, self.exponent)
+
+    def tolerance(self, quantity: float) -> float:
+        """The tolerance for a quantity."""
+        return math.exp(math.log(quantity / self.factor) / self.exponent)
+
+
+def fit(tolerances: Sequence[float], quantities: Sequence[float], expected: float) -> Law:
+    """The power law through a ladder's last point, its exponent by least squares of the logarithms
+    of the others, kept within `SLOPES` of the `expected` one; of one point alone it is that.
+    """
+    tau, e = np.log(np.asarray(tolerances)), np.log(np.asarray(quantities))
+    slope = expected
+    if len(tau) > 1:
+        away, rise = tau[:-1] - tau[-1], e[:-1] - e[-1]
+        bounds = sorted(bound * expected for bound in SLOPES)
+        slope = min(max(float(away @ rise) / float(away @ away), bounds[0]), bounds[1])
+    return Law(math.exp(e[-1] - slope * tau[-1]), slope)
+
+
+def difference(one: Trajectory, other: Trajectory, scale: Floats) -> float:
+    """How far two runs over the same time are apart, in parts of the scale: at the end, or, where
+    that is more, at half the moments of the last part of the run.
+    """
+    start, end = float(one.t[0]), float(one.t[-1])
+    since = end - LAST * (end - start)
+    a, b = _rows(one, since), _rows(other, since)
+    _, i, j = np.intersect1d(a[0], b[0], return_indices=True)
+    apart = np.max(np.abs(a[1][i] - b[1][j]) / scale, axis=1)
+    return max(float(apart[-1]), float(np.median(apart)))
+
+
+def _rows(run: Trajectory, since: float) -> tuple[Floats, Floats]:
+    """Rows from a time on, backwards: of those at one moment, an impact, the last comes first."""
+    late = run.t >= since
+    return run.t[late][::-1], run.y[late][::-1]
+
+
+def remaining(gaps: Sequence[float], tolerances: Sequence[float], expected: float) -> float:
+    """Error of the tightest of k >= 2 runs of one method, whose `tolerances` (k,) fall, from the
+    differences (k - 1,) of each from the next.
+
+    That of a wrong run says nothing of the next one's error, and is returned as it is. From two on
+    they tell how fast the error falls now, if they are far enough apart: near rounding it does no
+    longer.
+    """
+    last = gaps[-1]
+    if last >= WRONG or last == 0:
+        return last
+    slope = CAUTION * expected
+    for gap, tolerance in zip(gaps[-2::-1], tolerances[-3::-1], strict=True):
+        ratio = tolerance / tolerances[-2]
+        if ratio**expected >= APART and 0 < gap < WRONG:
+            slope = min(max(math.log(gap / last) / math.log(ratio), 0.0), expected)
+            break
+    return last * math.pow(tolerances[-1] / tolerances[-2], slope)
+
+
+def errors(runs: Sequence[Tried], scale: Floats, case: Case) -> list[float]:
+    """Estimated error of each run, in parts of the scale; infinite where nothing is known.
+
+    Of a method's looser runs their difference from its tightest, of that one what remains by the
+    law; or the difference from some run of another method, where that is less. Two runs that do not
+    differ at all tell nothing where steps are bounded otherwise: they may be the same steps. Rigid
+    contacts close within a fixed tolerance of their own, which no law of the method's knows: there
+    nothing is taken to remain less than two runs differ by.
+    """
+    found = []
+    for run in runs:
+        name = run.setting.integrator
+        own = sorted((r for r in runs if r.setting.integrator == name), key=lambda r: -r.tolerance)
+        others = [r for r in runs if r.setting.integrator != name]
+        apart = [ALIKE * difference(run.trajectory, r.trajectory, scale) for r in others]
+        if run is not own[-1]:
+            gap = difference(run.trajectory, own[-1].trajectory, scale)
+            if gap > 0 or not case.bounded:
+                apart.append(gap)
+        elif len(own) > 1:
+            pairs = pairwise(own)
+            gaps = [difference(a.trajectory, b.trajectory, scale) for a, b in pairs]
+            tolerances = [r.tolerance for r in own]
+            if gaps[-1] > 0 or not case.bounded:
+                method = method_of(name)
+                scatter = SCATTER if method.multistep else 1.0
+                struck = case.problem.contacts is not None
+                left = gaps[-1] if struck else remaining(gaps, tolerances, method.exponent)
+                apart.append(scatter * left)
+        found.append(min(apart, default=math.inf))
+    return found
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A run's error in parts of the motion's scale, by a `second` run, infinite if that breaks off.
+
+    last  of the last state
+    most  of any row, that at the time `at`, s; with contacts, where a row may lie before an impact
+          in one run and after it in the other, of the last state, too
+    """
+
+    last: float
+    most: float
+    at: float
+    second: Tried
+
+
+def by_second_run(case: Case, first: Tried) -> Estimate:
+    """A run's error by another run, which is made here.
+
+    The other has a tenth of its tolerances, or half its step; where they are near the tightest, ten
+    times them.
+    """
+    given, tightest = first.setting, TIGHTEST_OF_ALL
+    if given.dt is not None:
+        other = replace(given, dt=given.dt / 2)
+    else:
+        assert given.rtol is not None and given.atol is not None
+        factor = 0.1 if given.rtol >= 10 * tightest else 10.0
+        other = replace(given, rtol=_plain(given.rtol * factor), atol=_plain(given.atol * factor))
+    second = case.run(other)
+    if second.interrupted:
+        raise KeyboardInterrupt
+    one, two = first.trajectory, second.trajectory
+    if not (one.finished and two.finished):
+        return Estimate(math.inf, math.inf, math.nan, second)
+    exponent = method_of(given.integrator).exponent * (CAUTION if given.dt is None else 1)
+    # What they are apart by is one error less the other.
+    share = abs(1 - math.pow(second.tolerance / first.tolerance, exponent))
+    scale = case.scale(two.y)
+    last = difference(one, two, scale) / share
+    if case.problem.contacts is not None:
+        return Estimate(last, last, float(one.t[-1]), second)
+    t, i, j = np.intersect1d(one.t, two.t, return_indices=True)
+    apart = np.max(np.abs(one.y[i] - two.y[j]) / scale, axis=1) / share
+    worst = int(np.argmax(apart))
+    return Estimate(last, max(last, float(apart[worst])), float(t[worst]), second)
+
+
+def _plain(value: float) -> float:
+    return float(f"{value:.6g}")

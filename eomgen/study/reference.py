@@ -1,0 +1,279 @@
+"""What a run is compared with: the motion to more digits than any run has, and how sure that is.
+
+The motion is found twice by Gauss collocation in long numbers (`collocation`), once with fewer
+stages and a looser tolerance; the looser one's difference from the tighter, which is what is kept,
+is the stated error, with what rounding to doubles adds. Where contacts strike, or where that would
+take too long, two methods in doubles at their tightest tolerance stand in: twice their difference
+is the stated error, and the origin says so.
+"""
+
+import hashlib
+import io
+import time
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eomgen.errors import RunError
+from eomgen.files import is_ours, write_whole
+from eomgen.model import Model
+from eomgen.run.integrate import REST_SPEED, SMALLEST_RTOL, integrate
+from eomgen.run.integrators import INTEGRATORS
+from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.problem import Floats, Problem
+from eomgen.run.progress import Progress
+from eomgen.study import measure
+from eomgen.study.collocation import Longs, rows
+from eomgen.study.precise import BITS, digits, precise
+
+ROWS = 201
+SECONDS = 300.0
+"""Of processor time that a reference in long numbers may take; one in doubles comes on top."""
+TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
+"""Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
+FORMAT = "reference 2"
+"""Changes whenever a reference would come out otherwise."""
+_JUDGED = 0.1
+"""Share of the time after which the pace tells whether it will suffice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The motion as exactly as it was found.
+
+    t            times (n,), s, equally spaced, both ends included
+    y            states (n, ny), rounded to doubles
+    scale        of each state (ny,): `measure.scales`
+    error        what y may be off, the most of all rows, in parts of the scale
+    final_error  the same of the last row
+    origin       method, digits, and how the error was found, in one line
+    seconds      how long it took
+    """
+
+    t: Floats
+    y: Floats
+    scale: Floats
+    error: float
+    final_error: float
+    origin: str
+    seconds: float
+
+
+class _TooLongError(Exception):
+    """It would take longer than allowed."""
+
+
+def reference(
+    model: Model | None,
+    module: GeneratedModule,
+    parameters: Any = None,
+    inputs: Any = None,
+    t_end: float = 10.0,
+    *,
+    progress: Progress | None = None,
+    seconds: float = SECONDS,
+    folder: Path | None = None,
+) -> Reference:
+    """The motion of a module from 0 to `t_end`, s, at given parameters and constant inputs.
+
+    model     what the module was made of, for messages; or None
+    progress  told the fraction done
+    seconds   of processor time that long numbers may take; 0 for doubles at once
+    folder    where references are kept, so that none is computed twice; or None
+
+    Raises `RunError` if the module refuses parameters or inputs, if the motion does not get to
+    `t_end`, or if a reference cannot be kept.
+    """
+    problem = as_problem(module, parameters, inputs, model)
+    told = progress or _ignore
+    rest_speed = model.simulation.rest_speed if model else REST_SPEED
+    key = _key(module, problem, parameters, inputs, t_end, seconds, rest_speed)
+    path = folder and folder / f"{key}.npz"
+    kept = path and load(path)
+    if kept:
+        told(1.0)
+        return kept
+    began = time.monotonic()
+    times = np.linspace(0.0, t_end, ROWS)
+    scale = measure.scales(module.STATES, module.UNITS, _roughly(problem, times, rest_speed))
+    found = None
+    if problem.contacts is None and seconds > 0:
+        try:
+            found = _in_long_numbers(
+                module, problem, parameters, inputs, times, scale, seconds, told
+            )
+        except (_TooLongError, ArithmeticError, ValueError) as reason:
+            why = str(reason)
+    else:
+        why = "rigid contacts" if problem.contacts else "as asked"
+    y, other, origin = found or _in_doubles(problem, times, scale, rest_speed, why, told)
+    scale = measure.scales(module.STATES, module.UNITS, y)
+    apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)
+    spent = time.monotonic() - began
+    made = Reference(times, y, scale, float(apart.max()), float(apart[-1]), origin, spent)
+    if path:
+        save(made, path)
+    return made
+
+
+def _in_long_numbers(
+    module: GeneratedModule,
+    problem: Problem,
+    parameters: Any,
+    inputs: Any,
+    times: Floats,
+    scale: Floats,
+    seconds: float,
+    progress: Progress,
+) -> tuple[Floats, Floats, str]:
+    """The motion (n, ny), the same plus what the looser run is off, and how they were found."""
+    began = time.process_time()
+
+    def run(
+        stages: tuple[int, ...], tolerance: float, before: float, share: float
+    ) -> tuple[Longs, int]:
+        found = []
+        exactly = precise(module, parameters, inputs, problem.initial, watched=True)
+        with digits():
+            for y, made in rows(stages, exactly, problem, scale, times, tolerance):
+                found.append(y)
+                steps = made
+                done = before + share * len(found) / len(times)
+                progress(done)
+                _check_pace(time.process_time() - began, done, seconds)
+        return np.array(found), steps
+
+    # The looser one goes first: it is the cheaper one to give up.
+    loose, _ = run(*LOOSE, 0.0, 0.4)
+    tight, steps = run(*TIGHT, 0.4, 0.6)
+    with digits():
+        off = np.abs(loose - tight).astype(float)
+    y = tight.astype(float)
+    origin = (
+        f"Gauss collocation of order up to {2 * TIGHT[0][-1]} in {BITS} bits, {steps} steps; "
+        "error: of the same with fewer stages and a looser tolerance, and of rounding to doubles"
+    )
+    return y, y + off, origin
+
+
+def _check_pace(spent: float, done: float, seconds: float) -> None:
+    """Raise `_TooLongError` if the time is over, or clearly will be."""
+    if spent > seconds or (spent > _JUDGED * seconds and spent > 1.5 * done * seconds):
+        raise _TooLongError(f"more than {seconds:g} s in long numbers")
+
+
+def _roughly(problem: Problem, times: Floats, rest_speed: float) -> Floats:
+    """A quick run, for the scale. Raises `RunError` if it does not get to the end."""
+    run = integrate(
+        problem,
+        "LSODA",
+        float(times[-1]),
+        rtol=1e-6,
+        atol=1e-8,
+        samples=len(times),
+        rest_speed=rest_speed,
+    )
+    if not run.finished:
+        raise RunError(f"reference: {run.message}")
+    return run.y
+
+
+def _in_doubles(
+    problem: Problem,
+    times: Floats,
+    scale: Floats,
+    rest_speed: float,
+    why: str,
+    progress: Progress,
+) -> tuple[Floats, Floats, str]:
+    """The motion by two methods, and how."""
+    other = "gragg_bulirsch_stoer" if "gragg_bulirsch_stoer" in INTEGRATORS else "Radau"
+    found = []
+    for i, (method, rtol) in enumerate((("DOP853", SMALLEST_RTOL), (other, 1e-12))):
+
+        def told(done: float, i: int = i) -> None:
+            progress((i + done) / 2)
+
+        run = integrate(
+            problem,
+            method,
+            float(times[-1]),
+            rtol=rtol,
+            atol=0.1 * rtol * float(np.min(scale)),
+            samples=len(times),
+            progress=told,
+            rest_speed=rest_speed,
+        )
+        if not run.finished:
+            raise RunError(f"reference: {method}: {run.message}")
+        found.append(np.array([run.y[np.searchsorted(run.t, t)] for t in times]))
+    return (
+        found[0],
+        2 * found[1] - found[0],  # which of the two is better is not known
+        f"DOP853 in doubles at rtol {SMALLEST_RTOL:g} ({why}); error: twice the difference from "
+        f"{other} at rtol 1e-12",
+    )
+
+
+def _key(
+    module: Any,
+    problem: Problem,
+    parameters: Any,
+    inputs: Any,
+    t_end: float,
+    seconds: float,
+    rest_speed: float,
+) -> str:
+    """A digest of all that makes a reference what it is."""
+    source = module.__spec__.loader.get_source(module.__spec__.name) or ""
+    given = [module.PARAMETERS if parameters is None else parameters]
+    given += [module.INPUTS if inputs is None else inputs]
+    values = [list(g.items()) if hasattr(g, "keys") else np.asarray(g).tolist() for g in given]
+    times = (float(t_end), float(seconds))
+    parts = (FORMAT, source, values, problem.initial.tolist(), times, rest_speed)
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
+
+
+def save(made: Reference, path: Path) -> None:
+    """Write a reference as NumPy's .npz, whole. Raises `RunError` if that cannot be."""
+    buffer = io.BytesIO()
+    np.savez(  # `eomgen` comes first, where it marks the file as ours
+        buffer,
+        eomgen=np.array(FORMAT),
+        t=made.t,
+        y=made.y,
+        scale=made.scale,
+        errors=np.array([made.error, made.final_error, made.seconds]),
+        origin=np.array(made.origin),
+    )
+    write_whole(path, buffer.getvalue())
+
+
+def load(path: Path) -> Reference | None:
+    """The reference that a file holds; None if there is none, or it is damaged or of old."""
+    try:
+        data = path.read_bytes()
+        if not is_ours(data):
+            return None
+        with np.load(io.BytesIO(data), allow_pickle=False) as members:
+            if str(members["eomgen"]) != FORMAT:
+                return None
+            error, final_error, seconds = members["errors"].tolist()
+            return Reference(
+                members["t"],
+                members["y"],
+                members["scale"],
+                error,
+                final_error,
+                str(members["origin"]),
+                seconds,
+            )
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def _ignore(fraction: float) -> None:
+    """Take no notice of progress."""

@@ -1,0 +1,75 @@
+"""A program in float32, and how fast a generated module is in it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.language.formula import FUNCTIONS
+from eomgen.program.program import interpret
+from eomgen.program.system import System
+from eomgen.program.tape import TIME
+from eomgen.run.problem import Floats
+
+Singles = NDArray[np.float32]
+
+_NUMPY: dict[str, Callable[..., Any]] = {
+    **{name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)},
+    **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan", "atan2")},
+    "min": np.minimum,
+    "max": np.maximum,
+    "step": lambda x: np.heaviside(x, np.float32(0.0)),
+    "select": lambda c, a, b: np.where(c > 0, a, b),
+}
+
+
+class Single:
+    """float32 numbers, or arrays of them, as scalars of a program."""
+
+    def number(self, value: float) -> np.float32:
+        """The float32 nearest to a double."""
+        return np.float32(value)
+
+    def call(self, function: str, *arguments: Any) -> Any:
+        """Any function of formulas."""
+        return _NUMPY[function](*arguments)
+
+
+def in_single(system: System, output: str, t: Floats, y: Floats) -> Singles:
+    """An output of a system at times t (n,) and states y (n, ny), its inputs at 0, in its shape and
+    a last axis of n: every number that it takes, and every step, rounded to float32.
+    """
+    model, columns = system.model, y.astype(np.float32).T
+    given: dict[str, Any] = dict(zip((s.name for s in system.states), columns, strict=True))
+    given |= {p.name: np.float32(p.default) for p in model.parameters}
+    given |= {i.name: np.float32(0.0) for i in model.inputs} | {TIME: t.astype(np.float32)}
+    with np.errstate(all="ignore"):
+        values = interpret(system.program, output, given, Single())
+    result = np.empty((len(values), len(y)), dtype=np.float32)
+    for row, value in zip(result, values, strict=True):
+        assert value.dtype == np.float32, f"{output} has left float32"
+        row[:] = value
+    return result.reshape((*system.program.outputs[output].shape, len(y)))
+
+
+def kernel_in_single(module: Any, output: str) -> Callable[[Singles], Singles]:
+    """The code that computes an output, for one state (ny,) or for columns (ny, k) in float32.
+
+    To be timed: its constants are the module's own, rounded.
+    """
+    kernel = getattr(module, f"_{output}")
+    taken = kernel.__code__.co_varnames[: kernel.__code__.co_argcount]
+    functions = {name: _NUMPY[name] for name in FUNCTIONS if name in taken}
+    constants = tuple(np.float32(k) for k in module._DEFAULT[output])
+    inputs = (np.float32(0.0),) * len(module.INPUTS)
+    time = {"t": np.float32(0.0)} if "t" in taken else {}
+
+    def call(y: Singles) -> Singles:
+        values = kernel(y if y.ndim == 2 else tuple(y), constants, inputs, **time, **functions)
+        result = np.empty((len(values), *y.shape[1:]), dtype=np.float32)
+        for i, value in enumerate(values):
+            result[i] = value
+        return result
+
+    return call

@@ -1,0 +1,82 @@
+"""The states that a scene's own run passes through."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from eomgen.model import Model
+from eomgen.run.integrate import integrate
+from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
+from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.problem import Floats
+from eomgen.run.progress import Progress
+
+MOST_OPERATIONS = 20_000_000
+"""Of all derivatives of a run together: seconds at most, and the same on every machine."""
+ENOUGH = "enough states"
+
+
+@dataclass(frozen=True, eq=False)
+class Visited:
+    """Times t (n,) and states y (n, ny) of a run, and how far it went, s."""
+
+    t: Floats
+    y: Floats
+    until: float
+
+
+def visited(
+    model: Model, module: GeneratedModule, count: int, progress: Progress = lambda _: None
+) -> Visited:
+    """About `count` states at which the scene's own integrator asks for the derivative.
+
+    They lie evenly among its calls, so that where it has to take many small steps there are many;
+    those of an adaptive method are closer to the motion than anyone looks. A run that takes too
+    long, or fails, gives those up to there.
+
+    Raises `RunError` if the module has no derivative to start from.
+    """
+    problem, wanted = as_problem(module, model=model), model.simulation
+    keep = _Keep(count, most=1 + MOST_OPERATIONS // max(1, module.COST["derivative"]["total"]))
+
+    def derivative(t: float, y: Floats) -> Floats:
+        keep.see(t, y)
+        return problem.derivative(t, y)
+
+    fixed = isinstance(find_integrator(wanted.integrator), FixedStep)
+    run = integrate(
+        replace(problem, derivative=derivative),
+        wanted.integrator,
+        wanted.t_end,
+        dt=wanted.dt if fixed else None,
+        rtol=wanted.rtol,
+        atol=wanted.atol,
+        progress=progress,
+    )
+    if run.message.startswith("interrupted"):
+        raise KeyboardInterrupt
+    chosen = np.unique(np.linspace(0, len(keep.rows) - 1, count).round().astype(int))
+    rows = [keep.rows[i] for i in chosen]
+    return Visited(np.array([t for t, _ in rows]), np.array([y for _, y in rows]), keep.last)
+
+
+class _Keep:
+    """Every k-th state seen, k doubled whenever there are too many."""
+
+    def __init__(self, count: int, most: int) -> None:
+        self.rows: list[tuple[float, Floats]] = []
+        self.last = 0.0
+        self._limit, self._most = 20 * count, most
+        self._every, self._seen = 1, 0
+
+    def see(self, t: float, y: Floats) -> None:
+        """Take note of a state. Raises `StepFailure` when there have been enough."""
+        if self._seen >= self._most:
+            raise StepFailure(ENOUGH)
+        if self._seen % self._every == 0 and np.all(np.isfinite(y)):
+            self.rows.append((float(t), np.array(y, dtype=float)))
+            self.last = max(self.last, float(t))
+            if len(self.rows) > self._limit:
+                del self.rows[1::2]
+                self._every *= 2
+        self._seen += 1

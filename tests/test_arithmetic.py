@@ -1,0 +1,565 @@
+"""How exact each route's accelerations are: the truth, the counting, and what is found by them."""
+
+import csv
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any, get_args
+
+import gmpy2
+import mpmath
+import numpy as np
+import pytest
+from engine import MP, Digits, apart, exact, read
+
+from eomgen.build import build_model
+from eomgen.cli import main
+from eomgen.language.formula import FUNCTIONS
+from eomgen.model import Model
+from eomgen.program.digits import evaluator
+from eomgen.program.program import Output, Program, finish, interpret
+from eomgen.program.route import routed
+from eomgen.program.system import System
+from eomgen.program.tape import TIME, ExactTape, Stage, Tape
+from eomgen.run.module import load_module
+from eomgen.scene.schema import Route
+from eomgen.study import timing
+from eomgen.study import visited as visiting
+from eomgen.study.arithmetic import (
+    BASELINE,
+    Arithmetic,
+    Way,
+    arithmetic,
+    python_module,
+    solve_operations,
+)
+from eomgen.study.single import Single, in_single, kernel_in_single
+from eomgen.study.states import random_state
+from eomgen.study.truth import Truth
+from eomgen.study.ulps import component_errors, ulp, vector_errors
+from eomgen.study.visited import visited
+
+ROD = """
+name = "rod"
+bodies = [{ name = "a", mass = 1.3, inertia_com = 0.07 }]
+effects = [{ type = "gravity", g = 9.81 }]
+[[joints]]
+name = "pin"
+type = "revolute"
+parent = "world"
+child = "a"
+r_child = [0.0, 0.7]
+coordinate = "q"
+"""
+"""A compound pendulum of bare numbers."""
+
+CART = """
+name = "cart"
+bodies = [{ name = "c", mass = MASS, inertia_com = 0 }, { name = "p", mass = 1, inertia_com = 0 }]
+effects = [{ type = "gravity", g = 9.81 }]
+initial = { q = { q_deg = ANGLE } }
+simulation = { t_end = 3.0, rtol = 1e-10, atol = 1e-12 }
+[[joints]]
+name = "rail"
+type = "prismatic"
+parent = "world"
+child = "c"
+axis = [1.0, 0.0]
+coordinate = "x"
+[[joints]]
+name = "pin"
+type = "revolute"
+parent = "c"
+child = "p"
+r_child = [0, 1]
+coordinate = "q"
+"""
+"""A point of mass below a cart of hardly any."""
+
+ALL_FUNCTIONS = """
+name = "push"
+parameters = { k = 1.7, a = 0.3 }
+bodies = [{ name = "b", mass = 1.3, inertia_com = 0.07 }]
+[[joints]]
+name = "pin"
+type = "prismatic"
+parent = "world"
+child = "b"
+axis = [1, 0]
+coordinate = "x"
+[[effects]]
+type = "controller"
+name = "all"
+[effects.torques]
+pin = "FORMULA"
+"""
+FORMULA = (
+    "sin(k)*cos(x) + tan(a*x) + asin(a)*acos(x/9) + atan(k*x) + exp(a*x) + log(k + x*x) + tanh(x)"
+    " + sqrt(k)*abs(x) + step(x) + step(a) + atan2(x, k) + min(x, a) + max(x, sin(a)) + 0.1*t"
+    " + (x if x < a else 2) + (1 if x > a else 2)"
+)
+
+
+@pytest.fixture(autouse=True)
+def in_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Times are not looked at here, and few states will do."""
+    monkeypatch.setattr(timing, "TIMING", 0.0)
+    monkeypatch.setattr(visiting, "MOST_OPERATIONS", 200_000)
+
+
+def model_of(scene: str) -> Model:
+    """A built-in scene's model, or one of a text."""
+    return build_model(read(scene))
+
+
+@cache
+def judged(scene: str, states: int = 30, *, single: bool = False) -> Arithmetic:
+    """A scene's arithmetic."""
+    return arithmetic(model_of(scene), states=states, single=single)
+
+
+def way(found: Arithmetic, name: str, precision: str = "float64") -> Way:
+    """One of the ways."""
+    return next(w for w in found.ways if (w.name, w.precision) == (name, precision))
+
+
+def bare(scene: str, route: str = "auto") -> System:
+    """A scene's derivative by a route, and nothing else."""
+    model = replace(model_of(scene), outputs=(), route=route, form="velocity")
+    return routed(model, jacobian=False).system
+
+
+def states_of(system: System, count: int = 5) -> tuple[np.ndarray, np.ndarray]:
+    """Some times and states."""
+    rng = np.random.default_rng(3)
+    module: Any = load_module(python_module(system))
+    return rng.uniform(0, 2, count), np.array([random_state(module, rng) for _ in range(count)])
+
+
+def in_digits(system: System, program: Program, t: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """v̇ of a program in 60 digits, as columns."""
+    nq, nv = len(system.model.coordinates), len(system.model.velocities)
+    run, names = evaluator(program, "derivative"), [state.name for state in system.states]
+    given = {**system.model.defaults, **{i.name: 0.0 for i in system.model.inputs}}
+    columns = [
+        run({**given, **dict(zip(names, state, strict=True)), TIME: time})[nq : nq + nv]
+        for time, state in zip(t, y, strict=True)
+    ]
+    return np.array(columns, dtype=object).T
+
+
+# The truth.
+
+
+def test_truth_of_a_compound_pendulum() -> None:
+    """θ̈ = -m g l sin θ / (I + m l²) with the very doubles of the scene."""
+    y = np.array([[0.3, 1.0], [2.0, -3.0], [-1e-9, 0.0]])
+    mass, g, length, inertia = map(MP.mpf, (1.3, 9.81, 0.7, 0.07))
+    factor = -mass * g * length / (inertia + mass * length * length)
+    expected = [factor * MP.sin(MP.mpf(x)) for x in y[:, 0]]
+    assert apart(Truth(model_of(ROD))(np.zeros(3), y)[0], np.array(expected)) < 1e-57
+
+
+@pytest.mark.parametrize("scene", ["two_body", "furuta_pendulum", "tumbling_body", CART])
+def test_truth_agrees_with_other_routes(scene: str) -> None:
+    """LᵀDL from no recording; and the program itself where no number of the scene was folded."""
+    scene = scene.replace("MASS", "0.3").replace("ANGLE", "20")
+    system = bare(scene, "ldl")
+    truth, (t, y) = Truth(system.model), states_of(system)
+    true = truth(t, y)
+    factored = np.array([truth.factored(*at) for at in zip(t, y, strict=True)]).T
+    assert apart(factored, true) < 1e-50
+    off = apart(in_digits(system, system.program, t, y), true)
+    assert off < 1e-50 or (scene.startswith("\n") and 0 < off < 1e-15)
+
+
+def test_a_wrong_last_digit_is_seen() -> None:
+    """Of each constant of a program in turn, while 40 digits agree without that."""
+    system = bare("two_body", "aba")
+    (t, y), program = states_of(system, 2), system.program
+    true = Truth(system.model)(t, y)
+    assert apart(in_digits(system, program, t, y), true) < 1e-40
+    places = [i for i, step in enumerate(program.steps) if step.operation == "constant"]
+    nodes = {n for step in program.steps for n in step.operands}
+    seen = 0
+    for i in places:
+        steps = list(program.steps)
+        value = steps[i].value
+        assert isinstance(value, float)
+        steps[i] = steps[i]._replace(value=float(np.nextafter(value, 9.0)))
+        off = apart(in_digits(system, replace(program, steps=tuple(steps)), t, y), true)
+        seen += 1e-25 < off < 1e-10
+    given = {n: v * (1 + 2**-52) for n, v in system.model.defaults.items()}
+    for name in given:
+        other = Truth(system.model.with_parameters({name: given[name]}))(t, y)
+        seen += 1e-20 < apart(other, true) < 1e-12
+    assert places or not nodes
+    assert seen > len(given) // 2
+
+
+def test_exact_tape_folds_what_is_exact() -> None:
+    """0.5 · 4 = 2, and a third is none of the doubles."""
+    for tape, folded in ((Tape(), True), (ExactTape(), False)):
+        number = tape.constant
+        assert tape.values[(number(0.5) * number(4.0)).index] == 2.0
+        assert tape.values[(number(0.0) * tape.input("x", 0)).index] == 0.0  # type: ignore[arg-type]
+        for node in (
+            number(1.0) / number(3.0),
+            number(0.1) + number(0.2),
+            number(0.1) * number(3.0),
+            number(1e300) - number(1.0),
+            tape.apply("sin", number(1.0)),
+        ):
+            assert (tape.values[node.index] is not None) == folded
+
+
+def test_no_truth_at_a_singular_state() -> None:
+    """None where nothing resists, and the truth beside it."""
+    polar = """
+    name = "polar"
+    initial = { q = { r = 1.0 } }
+    [[bodies]]
+    name = "a"
+    mass = 1e-9
+    inertia_com = 0
+    [[bodies]]
+    name = "b"
+    mass = 1
+    inertia_com = 0
+    [[joints]]
+    name = "pin"
+    type = "revolute"
+    parent = "world"
+    child = "a"
+    coordinate = "q"
+    [[joints]]
+    name = "arm"
+    type = "prismatic"
+    parent = "a"
+    child = "b"
+    axis = [1, 0]
+    coordinate = "r"
+    """
+    truth = Truth(model_of(polar))
+    y = np.array([[0.2, 0.0, 1.0, 0.0], [0.2, 0.5, 2.0, 0.0]])
+    found = truth(np.zeros(2), y)
+    assert found[0, 0] is None and found[1, 0] is None
+    assert (found[0, 1], found[1, 1]) == (0, 2)  # r θ̇² outwards
+
+
+# Counting.
+
+
+def test_ulp_is_the_distance_of_neighbours() -> None:
+    """At powers of two, between them, in both formats."""
+    rng = np.random.default_rng(1)
+    for x in (1.0, 0.5, 1.9999999, 1024.0, 3e-300, *rng.lognormal(0, 30, 50)):
+        assert ulp(MP.mpf(x), 53) == np.spacing(x)
+        if 1e-30 < x < 1e30:
+            single = np.float32(x)
+            assert ulp(MP.mpf(float(single)), 24) == np.spacing(single)
+
+
+def test_errors_by_hand() -> None:
+    """Neighbours are 1 off, below a power of two half; the worst of a vector; each of its unit."""
+    units = ["rad/s", "m/s", "rad/s"]
+    true = exact(np.array([[3.0, 1.0], [5e8, 5e8], [0.25, -1.0]]))
+    found = true.astype(float)
+    assert vector_errors(found, true, units, 53).tolist() == [0, 0]
+    found[0] = np.nextafter(found[0], 9.0)
+    assert vector_errors(found, true, units, 53).tolist() == [1, 1]
+    assert vector_errors(found, true, units, 24) == pytest.approx([2.0**-29, 2.0**-29])
+    found[0, 1] = np.nextafter(1.0, 0.0)
+    assert vector_errors(found, true, units, 53).tolist() == [1, 0.5]
+    found[2, 0] += 3 * np.spacing(2.0)  # 24 of its own
+    assert vector_errors(found, true, units, 53).tolist() == [3, 0.5]
+    assert component_errors(found, true, 53).tolist() == [1, 0.5, 0, 0, 24, 0]
+    found[1, 1] = np.nextafter(5e8, 0)
+    found[0, 0] = np.nan
+    assert vector_errors(found, true, units, 53).tolist() == pytest.approx([np.nan, 1], nan_ok=True)
+    assert component_errors(found, true, 53).tolist() == [0.5, 0, 1, 24, 0]
+
+
+def test_errors_beside_nothing() -> None:
+    """What dies down counts as a thousandth of what it was; and of nothing, all is too much."""
+    still = exact(np.array([[0.0, 0.0, 0.0]]))
+    assert vector_errors(np.zeros((1, 3)), still, ["m/s"], 53).tolist() == [0, 0, 0]
+    assert vector_errors(np.full((1, 3), 1e-17), still, ["m/s"], 53)[0] == math.inf
+    dying = exact(np.array([[4000.0, 1000.0, 1e-20, 1.0]]))
+    found = dying.astype(float) + np.array([[0.0, 0.0, np.spacing(1.0), np.spacing(1.0)]])
+    errors = vector_errors(found, dying, ["m/s"], 53)
+    assert errors.tolist() == pytest.approx([0, 0, 1, 1], abs=1e-3)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 7])
+def test_operations_of_a_dense_solution(n: int) -> None:
+    """Elimination, and back, with every operation counted."""
+    count = 0
+
+    class Number(float):
+        def _counted(self, value: float) -> "Number":
+            nonlocal count
+            count += 1
+            return Number(value)
+
+        def __sub__(self, other: float) -> "Number":
+            return self._counted(float(self) - float(other))
+
+        def __mul__(self, other: float) -> "Number":
+            return self._counted(float(self) * float(other))
+
+        def __truediv__(self, other: float) -> "Number":
+            return self._counted(float(self) / float(other))
+
+    rng = np.random.default_rng(n)
+    matrix = rng.normal(size=(n, n))
+    a = [[Number(x) for x in row] for row in matrix.tolist()]
+    x = [Number(z) for z in range(1, n + 1)]
+    for k in range(n):
+        for i in range(k + 1, n):
+            share = a[i][k] / a[k][k]
+            for j in range(k + 1, n):
+                a[i][j] = a[i][j] - share * a[k][j]
+            x[i] = x[i] - share * x[k]
+    for i in reversed(range(n)):
+        for j in range(i + 1, n):
+            x[i] = x[i] - a[i][j] * x[j]
+        x[i] = x[i] / a[i][i]
+    assert matrix @ np.array(x) == pytest.approx(np.arange(1, n + 1))
+    assert count == solve_operations(n)
+
+
+# float32.
+
+
+@pytest.mark.parametrize("scene", ["two_body", "tumbling_body", "functions"])
+def test_program_and_module_go_the_same_steps(scene: str) -> None:
+    """Bit by bit in doubles; in float32 as far as constants are rounded once or step by step."""
+    text = ALL_FUNCTIONS.replace("FORMULA", FORMULA)
+    system = bare(text if scene == "functions" else scene)
+    module: Any = load_module(python_module(system))
+    t, y = states_of(system, 8)
+    t *= 0
+
+    class Doubles(Single):
+        def number(self, value: float) -> Any:
+            return value
+
+    given = dict(zip(module.STATES, y.T, strict=True)) | system.model.defaults
+    given |= dict.fromkeys(module.INPUTS, 0.0) | {TIME: 0.0}
+    expected = module.derivative(0.0, y.T)
+    found = interpret(system.program, "derivative", given, Doubles())
+    for i, row in enumerate(expected):
+        np.testing.assert_array_equal(np.broadcast_to(found[i], row.shape), row)
+    single = in_single(system, "derivative", t, y)
+    kernel = kernel_in_single(module, "derivative")
+    assert single.dtype == kernel(y.T.astype(np.float32)).dtype == np.float32
+    assert kernel(y.T.astype(np.float32)) == pytest.approx(single, rel=3e-6, abs=3e-6)
+    assert kernel(y[0].astype(np.float32)) == pytest.approx(single[:, 0], rel=3e-6, abs=3e-6)
+    assert single == pytest.approx(expected, rel=3e-5, abs=3e-5)
+    assert not np.all(single == expected)
+
+
+def test_no_step_leaves_float32(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Constants, parameters, time and every function."""
+    system = bare(ALL_FUNCTIONS.replace("FORMULA", FORMULA))
+    t, y = states_of(system)
+    used, kinds = set(), set()
+    call = Single.call
+
+    def spied(self: Single, function: str, *arguments: Any) -> Any:
+        result = call(self, function, *arguments)
+        used.add(function)
+        kinds.update(x.dtype for x in (result, *arguments))
+        return result
+
+    monkeypatch.setattr(Single, "call", spied)
+    in_single(system, "derivative", t, y)
+    assert len(used) > 14 and kinds == {np.dtype("float32")}
+    with pytest.raises(AssertionError, match="has left float32"):
+        monkeypatch.setattr(Single, "number", lambda _, x: np.float64(x))
+        in_single(system, "derivative", t, y)
+
+
+def test_float32_loses_29_bits() -> None:
+    """The same number of ulps, each of them 2^29 times as large."""
+    found = judged("two_body", single=True)
+    for route in ("closed", "ldl", "aba", BASELINE):
+        double, single = way(found, route), way(found, route, "float32")
+        assert double.operations == single.operations
+        for ours, theirs in zip(double.errors, single.errors, strict=True):
+            assert 1 / 4 < theirs.median / ours.median < 4
+            assert 1 / 10 < theirs.component / ours.component < 10
+
+
+# What is found.
+
+
+@pytest.mark.parametrize("scene", ["double_pendulum", "two_body", "tumbling_body"])
+def test_every_route_is_exact_where_masses_are_even(scene: str) -> None:
+    """A few ulps at most states, some hundred at the worst; and every route is there."""
+    found = judged(scene, single=scene == "two_body")
+    assert found.agreed > 55
+    assert {w.name for w in found.ways} == {*get_args(Route), BASELINE} - {"auto"}
+    for w in found.ways:
+        assert not w.words and w.seconds and w.batch_seconds
+        for errors, sample in zip(w.errors, found.samples, strict=True):
+            assert 0 < errors.median < 15
+            assert errors.worst < 500
+            assert errors.failed == 0
+            assert len(errors.ulps) == len(sample.y)
+    assert [s.kind for s in found.samples] == ["seeded", "own run"]
+
+
+def test_solution_by_hand_keeps_what_a_light_cart_loses() -> None:
+    """The closed form has every digit; whatever adds the cart's mass to the pole's has lost it."""
+    found = judged(CART.replace("MASS", "1e-6").replace("ANGLE", "90"), 60)
+    seeded, own = way(found, "closed").errors
+    assert max(seeded.worst, own.worst) < 5
+    worse = way(found, BASELINE).errors
+    assert worse[1].worst > 1e4 * own.worst
+    assert worse[1].median > 25 * own.median
+    assert np.max(found.samples[1].condition) > 1e4
+    assert found.samples[1].until > 2  # twice through below
+
+
+def test_a_way_that_fails_says_why() -> None:
+    """1 kg and 1e-20 are 1 kg: M is singular to all but the closed form, at the run's rest."""
+    found = judged(CART.replace("MASS", "1e-20").replace("ANGLE", "0"), 5)
+    assert way(found, "closed").errors[1].worst == 0
+    for name, words in ((BASELINE, "Singular matrix"), ("ldl", "division by zero")):
+        failed = way(found, name)
+        assert failed.errors[1].failed == len(found.samples[1].y)
+        assert words in failed.words and "of" in failed.words
+        assert np.isnan(failed.errors[1].worst) and failed.errors[1].at is None
+
+
+def test_the_same_seed_the_same_numbers() -> None:
+    """And another one others."""
+    one, two = (arithmetic(model_of("pendulum"), states=5) for _ in range(2))
+    other = arithmetic(model_of("pendulum"), states=5, seed=1)
+    for k in (0, 1):
+        np.testing.assert_array_equal(one.samples[k].y, two.samples[k].y)
+        for w in one.ways:
+            np.testing.assert_array_equal(w.errors[k].ulps, way(two, w.name).errors[k].ulps)
+    assert not np.any(one.samples[0].y == other.samples[0].y)
+    np.testing.assert_array_equal(one.samples[1].y, other.samples[1].y)
+
+
+def test_states_of_its_own_run() -> None:
+    """Evenly among the calls, within the run; fewer calls for it end it sooner."""
+    system = bare("cart_pole")
+    module: Any = load_module(python_module(system))
+    calls, derivative = [], module.derivative
+
+    def noted(t: float, y: np.ndarray) -> np.ndarray:
+        calls.append((t, *y))
+        return derivative(t, y)
+
+    module.derivative = noted
+    run = visited(system.model, module, 9)
+    assert len(run.t) == 9 and run.t[0] == 0 and run.until > 9
+    at = [calls.index(row) for row in zip(run.t, *run.y.T, strict=True)]
+    assert min(np.diff(at)) > 0.9 * max(np.diff(at)) > 20  # among hundreds of calls
+    np.testing.assert_array_equal(run.y[0], module.initial_state())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(visiting, "MOST_OPERATIONS", 60 * 18)
+        assert visited(system.model, module, 40).until < 0.5
+
+
+# The command.
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Table, figure, and a row a state from which the worst can be found again."""
+    asked = ["accuracy", "two_body", "--arithmetic", "--float32", "--states", "6"]
+    assert main([*asked, "-o", str(tmp_path)]) == 0
+    output = capsys.readouterr()
+    assert output.err == ""
+    lines = output.out.splitlines()
+    assert max(len(line) for line in lines if not line.startswith("    wrote ")) <= 100
+    assert sum(line.split()[:1] == ["aba"] for line in lines) == 2
+    assert (tmp_path / "two_body_arithmetic.png").stat().st_size > 10_000
+    text = (tmp_path / "two_body_arithmetic.csv").read_text("utf-8").splitlines()
+    assert text[0].startswith("# eomgen arithmetic of two_body")
+    rows = list(csv.DictReader(text[1:]))
+    assert len(rows) == 12
+    system = bare("two_body", "aba")
+    module: Any = load_module(python_module(system))
+    units = [c.unit for c in system.model.velocities]
+    truth = Truth(system.model)
+    for kind in ("seeded", "own run"):
+        there = [row for row in rows if row["states"] == kind]
+        y = np.array([[float(row[name]) for name in module.STATES] for row in there])
+        found = np.array([module.derivative(0.0, row)[4:] for row in y]).T
+        errors = vector_errors(found, truth(np.zeros(6), y), units, 53)
+        assert [float(row["aba float64"]) for row in there] == pytest.approx(errors, rel=1e-4)
+    (tmp_path / "two_body_arithmetic.csv").write_text("mine", "utf-8")
+    assert main([*asked, "-o", str(tmp_path)]) == 1
+
+
+def test_command_tells_what_is_not_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Another form, contacts, routes; and what cannot be asked for."""
+    other = ["--states", "3", "-o", str(tmp_path)]
+    assert main(["accuracy", "bouncing_two_body", "--arithmetic", *other]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "no rigid contact held" in text
+    assert "closed it takes no 'contact'" in text
+    for wrong in (["--states", "0"], ["--seed", "-1"], ["--set", "M=1"]):
+        assert main(["accuracy", "pendulum", "--arithmetic", *wrong, "-o", str(tmp_path)]) == 1
+        assert capsys.readouterr().err.startswith(f"eomgen: {wrong[0]}: ")
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_functions_in_sixty_digits(name: str) -> None:
+    """Every function of formulas, alone and in a program, against mpmath's in 80 digits."""
+    tape, count = Tape(), FUNCTIONS[name]
+    node = tape.apply(name, *(tape.input(x, Stage.POSITIONS) for x in "abc"[:count]))
+    run = evaluator(finish(tape, {"f": Output((), (node.index,))}, ()), "f")
+    by_hand = {
+        "abs": abs,
+        "step": lambda x: mpmath.mpf(x > 0),
+        "min": lambda a, b: a if a < b else b,
+        "max": lambda a, b: b if a < b else a,
+        "select": lambda c, a, b: a if c > 0 else b,
+    }
+    for numbers in ((0.3, 0.7, 0.9), (0.7, -0.3, 0.2), (-0.7, 0.3, 0.2)):
+        given = exact(numbers[:count])
+        with mpmath.workdps(80):
+            more = map(mpmath.mpf, given)
+            expected = by_hand[name](*more) if name in by_hand else getattr(mpmath, name)(*more)
+        if not isinstance(expected, mpmath.mpf):  # a complex number
+            with pytest.raises((ArithmeticError, ValueError)):
+                run(dict(zip("abc", given, strict=False)))
+            continue
+        for found in (*run(dict(zip("abc", given, strict=False))), Digits().call(name, *given)):
+            assert isinstance(found, MP.mpf) and abs(found - expected) < 1e-59
+
+
+@pytest.mark.parametrize("bits", (24, 53, 400))
+def test_programs_in_sixty_digits(bits: int) -> None:
+    """Sums, products and quotients keep their digits, whatever digits the caller works in."""
+    tape = Tape()
+    x, three, tiny = tape.input("x", Stage.POSITIONS), tape.constant(3.0), tape.constant(1e-300)
+    nodes = (-x / three, x * x * tiny, x / three - x * tape.constant(0.3))
+    program = finish(tape, {"f": Output((3,), tuple(node.index for node in nodes))}, ())
+    for value in (1.0, 3, MP.mpf(-2) / 7, MP.mpf(10) ** 40, MP.mpf(10) ** -400, 0.0):
+        z = MP.mpf(value)
+        with gmpy2.context(precision=bits):
+            found = evaluator(program, "f")({"x": value})
+        for a, b in zip(found, (-z / 3, z * z * 1e-300, z / 3 - z * 0.3), strict=True):
+            assert abs(a - b) <= 1e-58 * abs(b)
+
+
+def test_no_value_in_sixty_digits() -> None:
+    """Where a step has none, there is none, even if later steps hid it."""
+    tape = Tape()
+    x, one = tape.input("x", Stage.POSITIONS), tape.constant(1.0)
+    root = tape.apply("sqrt", x - one)
+    for node in (one / (one / x), root / root, tape.apply("max", tape.apply("log", x), x)):
+        program = finish(tape, {"f": Output((), (node.index,))}, ())
+        with pytest.raises((ArithmeticError, ValueError)):
+            evaluator(program, "f")({"x": 0.0})

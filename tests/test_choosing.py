@@ -1,0 +1,392 @@
+"""`--accuracy`, `--budget`, `--estimate`: what is chosen holds, and what is wrong is told."""
+
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eomgen.build import build_model
+from eomgen.cli import main
+from eomgen.run.integrate import SMALLEST_RTOL
+from eomgen.run.module import as_problem, load_module
+from eomgen.run.problem import Contacts, Floats
+from eomgen.run.trajectory import Trajectory
+from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.store import generated_code
+from eomgen.study.choosing import meet, within
+from eomgen.study.estimate import by_second_run, difference, errors, fit, remaining
+from eomgen.study.measure import error
+from eomgen.study.trial import Case, Setting, Tried, method_of
+
+# A small body on a hinge as stiff as a beam, ω = 3e4/s, damped, beside a swing of seconds.
+STIFF = """
+name = "stiff"
+bodies = [
+  { name = "a", mass = 1, inertia_com = 0.1 },
+  { name = "b", mass = 1e-3, inertia_com = 1e-6 },
+]
+joints = [
+  { name = "pin", type = "revolute", parent = "world", child = "a", r_child = [0, 0.5] },
+  { name = "tip", type = "revolute", parent = "a", child = "b", r_parent = [0, -0.5] },
+]
+effects = [
+  { type = "gravity", g = 9.81 },
+  { type = "joint_spring", name = "beam", joint = "tip", stiffness = 1000, damping = 0.1 },
+]
+initial = { q = { pin_angle_deg = 60 } }
+simulation = { t_end = 2, integrator = "LSODA" }
+"""
+# github.com/Noah-Parsons/light-cartpole-benchmark: the cart weighs a millionth of the pole.
+SPIKY = """
+name = "spiky"
+bodies = [
+  { name = "cart", mass = 1e-6, inertia_com = 0 },
+  { name = "pole", mass = 1, inertia_com = 0 },
+]
+joints = [
+  { name = "rail", type = "prismatic", parent = "world", child = "cart", axis = [1, 0] },
+  { name = "pin", type = "revolute", parent = "cart", child = "pole", r_child = [0, 1] },
+]
+effects = [{ type = "gravity", g = 9.81 }]
+initial = { q = { pin_angle_deg = 90 } }
+simulation = { t_end = 10 }
+"""
+
+
+def case_of(scene: str) -> Case:
+    """A built-in scene's own run, or that of a scene's text."""
+    model = build_model(parse_scene(scene) if "\n" in scene else read_scene(scene))
+    module = load_module(generated_code(model).module, model.name)
+    kept = {"samples": 1001, "rest_speed": model.simulation.rest_speed}
+    problem = as_problem(module, model=model)
+    return Case(problem, model.simulation.t_end, module.UNITS, kept)
+
+
+def truth(case: Case, integrator: str = "DOP853", rtol: float = SMALLEST_RTOL) -> Floats:
+    """The motion (n, ny) as tightly as doubles have it."""
+    return case.run(Setting(integrator, rtol, 1e-2 * rtol)).trajectory.y
+
+
+def motion(t: Floats, y: Floats) -> Trajectory:
+    """A run of one state, finished."""
+    counts = dict.fromkeys(("steps", "derivatives", "jacobians", "impacts"), 0)
+    return Trajectory("made up", ("q",), t, y[:, None], "RK45", True, "", counts)
+
+
+def test_the_law_of_errors() -> None:
+    """An exact power law comes back; a slope that cannot be is held near the expected one."""
+    tolerances = [1e-3, 1e-5, 1e-8]
+    law = fit(tolerances, [7.0 * t**0.9 for t in tolerances], 1.0)
+    assert law.factor == pytest.approx(7.0) and law.exponent == pytest.approx(0.9)
+    assert law.at(law.tolerance(1e-6)) == pytest.approx(1e-6, rel=1e-12)
+    assert fit([1e-4], [1e-2], 0.8).exponent == 0.8
+    assert fit([1e-4, 1e-6], [1e-3, 1e-3], 1.0).exponent == 0.6
+    growing = fit([1e-4, 1e-8], [1.0, 10**0.5], -0.125)
+    assert growing.exponent == pytest.approx(-0.125) and growing.at(1e-12) == pytest.approx(10.0)
+
+
+def test_what_remains_after_the_last_difference() -> None:
+    """Of ladders of errors like 10 τ and 3 τ^0.7 it is what is left of them; where rounding stops
+    the fall, or runs are wrong, the last difference.
+    """
+    for factor, exponent in ((10.0, 1.0), (3.0, 0.7), (1e3, 0.9)):
+        taus = [1e-6, 1e-8, 1e-10]
+        errors = [factor * tau**exponent for tau in taus]
+        gaps = [errors[0] - errors[1], errors[1] - errors[2]]
+        assert errors[2] * 0.9 < remaining(gaps, taus, 1.0) < 2 * errors[2]
+        assert remaining(gaps[1:], taus[1:], 1.0) > 0.3 * errors[2]
+    assert remaining([3e-9, 4e-9], [1e-9, 1e-11, 1e-13], 1.0) == 4e-9
+    assert remaining([0.5], [1e-4, 1e-6], 1.0) == 0.5
+
+
+def test_a_difference_is_no_accident_of_its_moment() -> None:
+    """One that passes through 0 at the end counts as large as it was just before; one that is large
+    for a moment, as a spike makes it, counts as at the end.
+    """
+    t = np.linspace(0.0, 1.0, 201)
+    swings = difference(motion(t, np.zeros(201)), motion(t, np.sin(20 * np.pi * t)), np.ones(1))
+    assert 0.5 < swings < 1
+    spike = np.where(np.arange(201) == 198, 1.0, 1e-6)
+    assert difference(motion(t, np.zeros(201)), motion(t, spike), np.ones(1)) == 1e-6
+    assert difference(motion(t, t * 0), motion(t[::200], t[::200]), np.ones(1)) == 1
+    struck = motion(np.array([0.0, 1.0, 1.0]), np.array([0.0, 0.0, -1.0]))
+    assert difference(struck, motion(np.array([0.0, 1.0]), np.array([0.0, -1.0])), np.ones(1)) == 0
+
+
+@pytest.mark.parametrize(
+    ("scene", "targets"),
+    [("pendulum", (1e-3, 1e-6, 1e-9)), ("two_body", (1e-3, 1e-8)), ("double_pendulum", (1e-4,))],
+)
+def test_the_accuracy_holds(scene: str, targets: tuple[float, ...]) -> None:
+    """The true error, by a run as tight as doubles allow, is below what was asked for, and the
+    estimate is not far from it.
+    """
+    case = case_of(scene)
+    true = truth(case)
+    for target in targets:
+        choice = meet(case, target)
+        off = error(choice.tried.trajectory.y[-1], true[-1], case.scale(true))
+        assert choice.met and off < target
+        assert choice.error <= target / 2
+        assert off < 3 * choice.error
+
+
+def test_a_stiff_scene() -> None:
+    """Explicit methods are not followed to the end; the error holds by another method's measure."""
+    case = case_of(STIFF)
+    true = truth(case, "Radau", 1e-11)
+    choice = meet(case, 1e-6)
+    assert choice.tried.setting.integrator in ("LSODA", "Radau") and choice.met
+    assert error(choice.tried.trajectory.y[-1], true[-1], case.scale(true)) < 1e-6
+    setting = choice.tried.setting
+    cut = case.run(replace(setting, integrator="RK45"), most=0.0)
+    assert cut.cut and not cut.trajectory.finished
+
+
+def test_one_method_alone() -> None:
+    """The method asked for is kept to, equal steps among it."""
+    case = case_of("pendulum")
+    case = replace(case, kept={**case.kept, "samples": 101})
+    true = truth(case)
+    for name in ("rk4", "RK45", "implicit_midpoint"):
+        target = 1e-3 if name == "implicit_midpoint" else 1e-6
+        said: list[str] = []
+        choice = meet(case, target, name, said.append)
+        assert choice.tried.setting.integrator == name and choice.met
+        assert all(text.startswith(f"--integrator {name} ") for text in said)
+        assert error(choice.tried.trajectory.y[-1], true[-1], case.scale(true)) < target
+
+
+def test_few_equal_steps() -> None:
+    """A loose error and few rows may be had by few equal steps, at the end of each a row."""
+    case = case_of("two_body")
+    few = replace(case, kept={**case.kept, "samples": 201})
+    true = truth(case)
+    tried: list[Tried] = []
+    run = Case.run
+
+    def kept(self: Case, setting: Setting, **given: Any) -> Tried:
+        tried.append(run(self, setting, **given))
+        return tried[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Case, "run", kept)
+        assert meet(few, 1e-3).met
+        (equal,) = [one for one in tried if one.setting.integrator == "rk4"]
+        assert len(equal.trajectory.t) >= 201
+        assert error(equal.trajectory.y[-1], true[-1], case.scale(true)) < 1e-6
+        tried.clear()
+        assert meet(case, 1e-3).met
+        assert all(one.setting.dt is None for one in tried)
+
+
+def test_steps_that_something_else_keeps_short() -> None:
+    """Two runs of the same steps tell nothing of their error."""
+    case = case_of("pendulum")
+    case = replace(case, kept={**case.kept, "max_step": 0.01})
+    true = truth(replace(case, kept={**case.kept, "max_step": None}))
+    choice = meet(case, 1e-4, "RK45")
+    assert choice.met and 0 < choice.error <= 5e-5
+    assert error(choice.tried.trajectory.y[-1], true[-1], case.scale(true)) < 1e-4
+
+
+def test_what_was_put_aside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A method that takes longer than another one at first is gone back to where that one, which
+    is taken to 1e-12 only, does not get there.
+    """
+    case = case_of("two_body")
+    made: list[Setting] = []
+    run = Case.run
+
+    def slow(self: Case, setting: Setting, *, most: float = math.inf, **given: Any) -> Tried:
+        made.append(setting)
+        cut = 0.0 if setting.integrator == "DOP853" and math.isfinite(most) else math.inf
+        return run(self, setting, most=cut, **given)
+
+    monkeypatch.setattr(Case, "run", slow)
+    choice = meet(case, 1e-16)
+    assert not choice.met
+    tightest = {s.integrator: s.rtol for s in made}
+    assert tightest == {"LSODA": 1e-12, "DOP853": 1e-13}
+
+
+def test_impacts_have_a_floor_of_their_own() -> None:
+    """With rigid contacts nothing is taken to be more exact than two runs are near each other."""
+    case = case_of("pendulum")
+    nothing: Any = lambda *given: np.zeros(0)  # noqa: E731
+    contacts = Contacts((), (), nothing, nothing, nothing, nothing)
+    struck = replace(case, problem=replace(case.problem, contacts=contacts))
+    runs = [case.run(Setting("RK45", rtol, rtol)) for rtol in (1e-6, 1e-8)]
+    scale = case.scale(runs[1].trajectory.y)
+    gap = difference(runs[0].trajectory, runs[1].trajectory, scale)
+    assert errors(runs, scale, struck) == [gap, gap]
+    assert errors(runs, scale, case) == [gap, pytest.approx(gap * 100**-0.8)]
+
+
+def test_a_budget() -> None:
+    """With time enough the run goes as far as rounding lets it, and says what it is worth."""
+    case = case_of("two_body")
+    true = truth(case)
+    choice = within(case, 30.0)
+    off = error(choice.tried.trajectory.y[-1], true[-1], case.scale(true))
+    assert off < 1e-9 and off < 10 * choice.error
+
+
+def test_a_second_run_tells_the_error() -> None:
+    """Adaptive and equal steps: the estimate is near the true error."""
+    case = case_of("pendulum")
+    true = truth(case)
+    for setting in (
+        Setting("RK45", 1e-6, 1e-8),
+        Setting("LSODA", 1e-8, 1e-10),
+        Setting("rk4", dt=0.02),
+        Setting("euler", dt=1e-3),
+        Setting("Radau", 1e-5, 1e-7),
+    ):
+        first = case.run(setting)
+        found = by_second_run(case, first)
+        # Of equal steps, a row is at each; the last is at the end in all.
+        off = error(first.trajectory.y[-1], true[-1], case.scale(true))
+        assert off / 4 < found.last < 20 * off, setting.options
+        assert found.most >= found.last
+        assert found.last > 0.9 * off or setting.dt is None
+        assert found.second.tolerance < first.tolerance
+    tightest = case.run(Setting("DOP853", SMALLEST_RTOL, 1e-16))
+    found = by_second_run(case, tightest)
+    assert found.second.tolerance > SMALLEST_RTOL and 1e-16 < found.last < 1e-11
+
+
+def rows(folder: Path) -> Floats:
+    """The states that a run of two_body has kept."""
+    with np.load(folder / "two_body.npz") as kept:
+        return np.asarray(kept["y"])
+
+
+def test_the_same_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The options that are told make the same run, to the last bit, works or not."""
+    asked = ["simulate", "two_body", "--accuracy", "5e-6", "--samples", "300", "-o"]
+    assert main([*asked, str(tmp_path / "one")]) == 0
+    out = capsys.readouterr().out
+    (told,) = re.findall(r"chosen: (--integrator .*)", out)
+    assert re.search(r"error estimate \S+ of the motion's scale; it took", out)
+    again = ["simulate", "two_body", *told.split(), "--samples", "300", "-o"]
+    assert main([*again, str(tmp_path / "two")]) == 0
+    one, two = rows(tmp_path / "one"), rows(tmp_path / "two")
+    assert np.array_equal(one, two) and len(one) == 300
+    few = [*asked[:4], "--works", "--samples", "5", "-o", str(tmp_path / "few")]
+    assert main(few) == 0
+    five = rows(tmp_path / "few")
+    assert len(five) == 5 and np.array_equal(five[-1], one[-1])
+
+
+def test_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What rounding does not allow is said in one line; the best run is kept."""
+    assert main(["simulate", "pendulum", "--accuracy", "1e-16", "-o", str(tmp_path)]) == 1
+    said = capsys.readouterr()
+    assert re.fullmatch(
+        r"eomgen: --accuracy 1e-16: not reached, the best run's estimate is \S+: rounding or chaos "
+        r"stands in the way; take a shorter --t-end\n",
+        said.err,
+    )
+    assert (tmp_path / "pendulum.npz").exists()
+
+
+@pytest.mark.parametrize("integrator", ["RK45", "DOP853", "LSODA", "BDF", "Radau"])
+def test_a_wrong_run_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], integrator: str
+) -> None:
+    """At SciPy's default tolerances every method reports success on the light cart-pole and is
+    wrong (published errors 2.29, 0.086, 2.21, 3.85, 0.134): energy alone tells, and a second run.
+    """
+    scene = tmp_path / "spiky.toml"
+    scene.write_text(SPIKY)
+    bounds = ["--rtol", "1e-3", "--atol", "1e-6", "--integrator", integrator]
+    assert main(["simulate", str(scene), *bounds, "--estimate", "-o", str(tmp_path)]) == 0
+    said = capsys.readouterr()
+    assert re.search(r"error estimate \S+ of the motion's scale at the end, at most", said.out)
+    assert "warning: by its own estimate this run is wrong by" in said.err
+    assert "warning: exact motion keeps its energy, but this run is off by" in said.err
+
+
+def test_no_false_alarm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Energy that is lost to damping, or comes from a force, is none of the method's errors."""
+    scene = tmp_path / "stiff.toml"
+    scene.write_text(STIFF)
+    quiet = [
+        [str(scene), "--t-end", "0.3"],
+        [str(scene), "--t-end", "0.3", "--works"],
+        ["two_body_forced", "--input", "tau=3", "--t-end", "0.5"],
+        ["two_body_forced", "--input", "tau=3", "--t-end", "0.5", "--works"],
+        ["pendulum", "--estimate"],
+        ["tumbling_body", "--t-end", "1"],
+    ]
+    for asked in quiet:
+        assert main(["simulate", *asked, "-o", str(tmp_path)]) == 0
+        assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("--accuracy 1e-6 --rtol 1e-6", "--accuracy chooses rtol itself; leave one out"),
+        ("--accuracy 1e-6 --dt 0.1", "--accuracy chooses dt itself; leave one out"),
+        ("--budget 2s --atol 1e-9", "--budget chooses atol itself; leave one out"),
+        ("--accuracy 1e-6 --budget 2s", "a run has one aim; give one of them"),
+        ("--accuracy 0", "--accuracy: 0 is not between 0 and 0.1; give e.g. 1e-6"),
+        ("--accuracy nan", "--accuracy: nan is not between 0 and 0.1; give e.g. 1e-6"),
+        ("--accuracy 1", "--accuracy: 1 is not between 0 and 0.1; give e.g. 1e-6"),
+        ("--accuracy 1e-3 --integrator RK54", "unknown name 'RK54' (did you mean 'RK45'?)"),
+        ("--accuracy 1e-3 --t-end -1", "t_end: -1 is not after t_start = 0"),
+        ("--accuracy 1e-3 --t-end nan --integrator rk4", "t_end: nan is not a finite time"),
+        ("--accuracy 1e-3 --max-step 0", "max_step: 0 is not a positive step"),
+        ("--accuracy 1e-3 --samples 1", "samples: 1 is too few"),
+        ("--budget 2h", "--budget 2h: is no time to compute in; give e.g. 2s, 500ms or 1.5min"),
+        ("--budget=-1s", "--budget -1s: is no time to compute in"),
+        ("--budget 1..2", "--budget 1..2: is no time to compute in"),
+        ("--budget 1e-9", "no run of pendulum to t = 10 s fits into 1e-09 s; give more, or a sho"),
+    ],
+)
+def test_what_cannot_be_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: str, words: str
+) -> None:
+    """One clear line each."""
+    assert main(["simulate", "pendulum", *options.split(), "-o", str(tmp_path)]) == 1
+    said = capsys.readouterr()
+    assert words in said.err and said.err.count("\n") == 1
+
+
+def test_a_scene_that_breaks_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Where no method gets to the end, the farthest run is kept, and its reason told."""
+    scene = tmp_path / "breaks.toml"
+    text = STIFF.replace("damping = 0.1", 'damping = 0.1, law = "1 / (0.001 - deflection)"')
+    scene.write_text(text)
+    asked = ["simulate", str(scene), "--accuracy", "1e-4", "-o", str(tmp_path)]
+    assert main(asked) == 1
+    assert capsys.readouterr().err
+
+
+def test_an_interrupt_ends_it_all() -> None:
+    """Ctrl-C while methods are tried is no failure of one of them."""
+    case = case_of("pendulum")
+    calls = 0
+
+    def derivative(t: float, y: Floats) -> Floats:
+        nonlocal calls
+        calls += 1
+        if calls == 500:
+            raise KeyboardInterrupt
+        return case.problem.derivative(t, y)
+
+    with pytest.raises(KeyboardInterrupt):
+        meet(replace(case, problem=replace(case.problem, derivative=derivative)), 1e-6)
+
+
+def test_methods_are_known() -> None:
+    """Equal steps have an order, tolerances an exponent near 1."""
+    assert method_of("rk4").equal_steps and method_of("rk4").exponent == 4
+    assert not method_of("LSODA").equal_steps and method_of("LSODA").exponent == 1
+    assert math.isclose(method_of("RK45").growth, 0.2)

@@ -1,0 +1,341 @@
+"""References: long numbers against 60 digits, the motion against exact and published ones, and
+whether what is stated of its error is true.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gmpy2
+import numpy as np
+import pytest
+from campaign import some
+from engine import MP, engine
+from gmpy2 import mpfr
+from mpmath import mp
+
+from eomgen.build import build_model
+from eomgen.errors import RunError
+from eomgen.model import Model
+from eomgen.run.module import as_problem, load_module
+from eomgen.scene.reader import built_in_names, parse_scene, read_scene
+from eomgen.store import generated_code
+from eomgen.study import measure
+from eomgen.study.collocation import gauss, rows
+from eomgen.study.precise import BITS, Precise, digits, precise
+from eomgen.study.reference import LOOSE, TIGHT, load, reference
+
+ONE_SIDED = """
+name = "one_sided"
+dimensions = 2
+[parameters]
+k = 400.0
+w = 9.5
+c = 2.0
+[[bodies]]
+name = "block"
+mass = 1.0
+inertia_com = 1.0
+[[joints]]
+name = "slide"
+type = "prismatic"
+parent = "world"
+child = "block"
+axis = [1.0, 0.0]
+coordinate = "x"
+[[effects]]
+type = "external_force"
+name = "push"
+body = "block"
+force = ["max(-k * x, 0) + c * step(-x) - w", 0]
+[initial]
+q = { x = 0.75 }
+"""
+"""A block that falls on a spring, with a kink, and into a field, with a jump, again and again."""
+FORCED = """
+name = "forced"
+dimensions = 2
+[parameters]
+a = 0.3
+[[bodies]]
+name = "block"
+mass = 1.0
+inertia_com = 1.0
+[[joints]]
+name = "slide"
+type = "prismatic"
+parent = "world"
+child = "block"
+axis = [1.0, 0.0]
+coordinate = "x"
+[[effects]]
+type = "external_force"
+name = "push"
+body = "block"
+force = ["select(x - 0.3, 0.7, 0.1) * a * step(x_dot) - min(abs(x), 0.1) / 3 + sin(t) * x_dot", 0]
+"""
+"""Corners of every kind, with plain numbers that meet."""
+
+
+def compiled(scene: str) -> tuple[Model, Any]:
+    """A scene's model and module."""
+    model = build_model(read_scene(scene) if scene in built_in_names() else parse_scene(scene))
+    return model, load_module(generated_code(model).module)
+
+
+def long_rows(
+    made: tuple[Any, Any],
+    times: np.ndarray,
+    how: tuple[tuple[int, ...], float],
+    exactly: Precise | None = None,
+) -> np.ndarray:
+    """The motion at some times in long numbers, in parts of the scale where they are compared."""
+    module = made[1]
+    problem = as_problem(module)
+    scale = measure.scales(module.STATES, module.UNITS, np.array([problem.initial + 1.0] * 2))
+    exactly = exactly or precise(module, None, None, problem.initial, watched=True)
+    with digits():
+        return np.array([y for y, _ in rows(how[0], exactly, problem, scale, times, how[1])])
+
+
+def to_mp(values: np.ndarray) -> np.ndarray:
+    """Long numbers as those of mpmath, exactly."""
+
+    def one(x: Any) -> Any:
+        mantissa, exponent = x.as_mantissa_exp()
+        return MP.mpf(int(mantissa)) * MP.mpf(2) ** int(exponent)
+
+    return np.array([one(x) for x in values.ravel()], dtype=object).reshape(values.shape)
+
+
+SCENES = some(("babyboot", "chain_in_wind", "two_body_forced", FORCED), (*built_in_names(), FORCED))
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.split()[0])
+def test_the_derivative_is_the_program_in_long_numbers(scene: str) -> None:
+    """To 30 digits what 60 make of it, whatever the state, time, parameters and inputs."""
+    rng = np.random.default_rng(1)
+    made = engine(scene)
+    module = made.module
+    for watched in (False, True):
+        y = made.random_state(rng)
+        u = made.random_inputs(rng)
+        p = {name: value * rng.uniform(0.99, 1.01) for name, value in module.PARAMETERS.items()}
+        exactly = made.exactly("derivative", y, u, p, t=0.7)
+        module.derivative(0.7, y, p, u)  # keeps what it computed of these parameters, in doubles
+        found = precise(module, p, u, y, watched=watched)
+        with digits():
+            got = to_mp(np.array(found.derivative(mpfr(0.7), found.initial)))
+        terms = np.maximum(np.abs(exactly), np.max(np.abs(exactly)))
+        assert float(np.max(np.abs(got - exactly) / terms)) < 1e-30
+
+
+def test_numbers_that_meet_stay_long() -> None:
+    """Two plain numbers of a formula that meet behind a corner are not rounded to a double."""
+    made = engine(FORCED)
+    with digits():
+        found = precise(made.module, None, None, np.array([1.0, 1.0]))
+        slope = found.derivative(mpfr(0), found.initial)[1]
+        assert slope == mpfr(0.7) * mpfr(0.3) - mpfr(0.1) / 3
+
+
+@pytest.mark.parametrize("stages", [5, 8, 12])
+def test_collocation_is_of_gauss(stages: int) -> None:
+    """Stages integrate polynomials of their degree, the end those of twice that, to 32 digits."""
+    method = gauss(stages)
+    with digits():
+        for k in range(2 * stages):
+            powers = method.c**k
+            if k < stages:
+                off = np.max(np.abs(method.a @ powers - method.c ** (k + 1) / (k + 1)))
+                assert off < 1e-31
+            assert abs(method.d @ (method.a @ powers) - mpfr(1) / (k + 1)) < 1e-30
+        assert (
+            abs(method.d @ (method.a @ method.c ** (2 * stages)) - mpfr(1) / (2 * stages + 1)) > 0
+        )
+
+
+def exact_pendulum(times: np.ndarray) -> np.ndarray:
+    """The scene's motion, in Jacobi's functions, 40 digits: it starts at rest at an angle."""
+    with mp.workdps(40):
+        start = mp.mpf(float(np.pi)) - 3 * mp.pi / 2  # from hanging down
+        k, w = mp.sin(start / 2), mp.sqrt(mp.mpf(9.81))
+        quarter = mp.ellipk(k * k)
+        found = []
+        for t in times.tolist():
+            u = w * mp.mpf(t) + quarter
+            sn, cn = (mp.ellipfun(name, u, m=k * k) for name in ("sn", "cn"))
+            found.append([2 * mp.asin(k * sn) + 3 * mp.pi / 2, 2 * w * k * cn])
+        return np.array(found, dtype=object)
+
+
+def test_the_pendulum_is_exact_and_its_error_stated() -> None:
+    """What the tighter and the looser run differ by is more than either is off from the truth."""
+    made = compiled("pendulum")
+    times = np.linspace(0.0, 10.0, 21)
+    exact = exact_pendulum(times)
+    tight, loose = (to_mp(long_rows(made, times, how)) for how in (TIGHT, LOOSE))
+    off = np.max(np.abs(tight - exact))
+    assert off < 1e-19
+    assert np.max(np.abs(tight - loose)) > off
+    made_of = reference(*made, t_end=10.0)
+    rounded = np.abs(made_of.y[::10] - exact) / made_of.scale
+    assert float(np.max(rounded)) < made_of.error < 1e-15
+    assert float(np.max(rounded[-1])) < made_of.final_error <= made_of.error
+    assert np.array_equal(made_of.t[::10], times)
+    assert made_of.origin.startswith("Gauss collocation")
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-12, 1e-16])
+def test_the_stated_error_is_true_at_any_tolerance(tolerance: float) -> None:
+    """The difference of two runs bounds the error of the tighter, and falls with the tolerance."""
+    made = compiled("pendulum")
+    times = np.linspace(0.0, 10.0, 6)
+    exact = exact_pendulum(times)
+    tight = to_mp(long_rows(made, times, (TIGHT[0], 0.01 * tolerance)))
+    loose = to_mp(long_rows(made, times, (LOOSE[0], tolerance)))
+    off, stated = (float(np.max(np.abs(tight - other))) for other in (exact, loose))
+    assert off < stated < 100 * tolerance
+
+
+def test_babyboot_as_others_recomputed_it() -> None:
+    """The chaotic benchmark at 10 s against 20 digits of an extrapolation method in 48 digits.
+
+    Problem: T. R. Kane 1974, in Drake's multibody/benchmarks/chaotic_babyboot, which publishes 7.
+    """
+    model, module = compiled("babyboot")
+    with digits():
+        decimal = {name: mpfr(repr(value)) for name, value in module.PARAMETERS.items()}
+        problem = as_problem(module)
+        start = (gmpy2.const_pi() / 2, gmpy2.const_pi() / 180, mpfr(0), mpfr(0))
+        exactly = replace(precise(module, decimal, None, problem.initial), initial=start)
+        y = long_rows((model, module), np.linspace(0.0, 10.0, 101), TIGHT, exactly)[-1]
+        degrees = [
+            y[0] * 180 / gmpy2.const_pi() - mpfr("-61.312983517501685533557430"),
+            y[1] * 180 / gmpy2.const_pi() - mpfr("-929.47789813700101347430713"),
+        ]
+        rates = [
+            y[2] - mpfr("-6.7440080753737697787210635"),
+            y[3] - mpfr("-2.7795696723106601822852136"),
+        ]
+        assert max(map(abs, degrees)) < 1e-15
+        assert max(map(abs, rates)) < 1e-16
+
+
+def test_corners_are_met_exactly() -> None:
+    """A block that falls on a spring again and again: parabolas and sines in 40 digits."""
+    made = compiled(ONE_SIDED)
+    times = np.linspace(0.0, 10.0, 51)
+    tight, loose = (to_mp(long_rows(made, times, how)) for how in (TIGHT, LOOSE))
+    with mp.workdps(40):
+        k, w, height = mp.mpf(400), mp.mpf(9.5), mp.mpf(0.75)
+        omega, fall = mp.sqrt(k), mp.sqrt(2 * height / w)
+        speed = w * fall
+        rest = (w - 2) / k  # how deep it would rest
+        phase = mp.atan2(speed / omega, rest)
+        within = (2 * mp.pi - 2 * phase) / omega
+        size = mp.hypot(speed / omega, rest)
+        exact = []
+        for t in times.tolist():
+            s = (mp.mpf(t) + fall) % (2 * fall + within)  # since it last left the spring
+            if s < 2 * fall:
+                exact.append([speed * s - w * s * s / 2, speed - w * s])
+            else:
+                angle = omega * (s - 2 * fall) + phase
+                exact.append([size * mp.cos(angle) - rest, -size * omega * mp.sin(angle)])
+        exact = np.array(exact, dtype=object)
+    assert np.max(np.abs(tight - exact)) < 1e-17
+    assert np.max(np.abs(tight - exact)) < np.max(np.abs(tight - loose)) < 1e-15
+
+
+BALL = """
+name = "ball"
+dimensions = 2
+bodies = [{ name = "b", mass = 0.3, inertia_com = 1e-3 }]
+joints = [{ name = "j", type = "free", child = "b" }]
+initial = { q = { b_y = 0.9 } }
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "contact"
+name = "floor"
+law = "impact"
+body = "b"
+radius = 0.1
+restitution = 0.6
+friction = 0.3
+slip_speed = 0.01
+"""
+
+
+def test_rigid_contacts_are_followed_in_doubles() -> None:
+    """A ball that bounces twice, against parabolas; the stated error is true."""
+    model, module = compiled(BALL)
+    found = reference(model, module, t_end=1.1)
+    assert "rigid contacts" in found.origin
+    fall = np.sqrt(2 * 0.8 / 9.81)
+    begins = fall * np.array([0.0, 1.0, 2.2])
+    flight = np.searchsorted(begins, found.t, side="right") - 1
+    past = found.t - begins[flight]
+    speed = 9.81 * fall * np.array([0.0, 0.6, 0.36])[flight]
+    height = np.where(flight == 0, 0.9, 0.1) + speed * past - 9.81 / 2 * past**2
+    k = module.STATES.index("b_y")
+    off = np.max(np.abs(found.y[:, k] - height)) / found.scale[k]
+    assert 0 < off < found.error < 1e-13
+
+
+def test_doubles_stand_in() -> None:
+    """Where there is no time for long numbers, and what is stated then is true, too."""
+    made = compiled("pendulum")
+    made_of = reference(*made, t_end=1.0, seconds=1e-6)
+    assert "doubles" in made_of.origin and "s in long numbers" in made_of.origin
+    rounded = np.abs(made_of.y[::10] - exact_pendulum(made_of.t[::10])) / made_of.scale
+    assert float(np.max(rounded)) < made_of.error < 1e-10
+
+
+def test_kept_and_found_again(tmp_path: Path) -> None:
+    """A reference is computed once for what it depends on; a damaged file is computed anew."""
+    model, module = compiled("pendulum")
+
+    def made(**changes: Any) -> Any:
+        given = {"t_end": 0.5, "folder": tmp_path, "seconds": 60.0, **changes}
+        return reference(model, module, **given)
+
+    first = made()
+    (path,) = tmp_path.iterdir()
+    before = path.stat().st_mtime_ns
+    again = made()
+    assert path.stat().st_mtime_ns == before
+    assert np.array_equal(first.y, again.y) and first.seconds == again.seconds
+    assert (first.error, first.final_error, first.origin) == (
+        again.error,
+        again.final_error,
+        again.origin,
+    )
+    for changes in ({"t_end": 0.25}, {"parameters": {"gravity_g": 9.0}}, {"seconds": 0.0}):
+        count = len(list(tmp_path.iterdir()))
+        made(**changes)
+        assert len(list(tmp_path.iterdir())) == count + 1, changes
+    path.write_bytes(path.read_bytes()[:300])
+    assert load(path) is None
+    assert np.array_equal(made().y, first.y)
+    assert load(path) is not None
+
+
+def test_trouble() -> None:
+    """Ctrl-C passes; what the module refuses is said in a line; progress goes up to 1."""
+    model, module = compiled("pendulum")
+    told: list[float] = []
+    reference(model, module, t_end=0.5, progress=told.append)
+    assert told == sorted(told) and told[-1] == 1.0
+
+    def interrupt(done: float) -> None:
+        if done > 0.2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        reference(model, module, t_end=0.5, progress=interrupt)
+    with pytest.raises(RunError, match="mass of bob is not positive"):
+        reference(model, module, {"bob_mass": -1.0}, t_end=0.5)
+    assert gmpy2.get_context().precision != BITS
