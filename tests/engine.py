@@ -25,6 +25,7 @@ __all__ = ["MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact"
 
 STEP = MP.mpf(10) ** -20
 """Of central differences, which are off by its square."""
+DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,7 +86,8 @@ def engine(
 ) -> Engine:
     """Compile a scene, once, with all outputs but some, by a route or by its own.
 
-    `tangents`: as large models have it, no matrix of derivatives is written out.
+    Without "jacobian" and what else is in `DERIVATIVES`, most of the work is left out. `tangents`:
+    as large models have it, no matrix of derivatives is written out.
     """
     return _engine(scene, route, leave_out, tangents)
 
@@ -98,7 +100,7 @@ def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) 
     with pytest.MonkeyPatch.context() as patch:
         if tangents:
             patch.setattr(recording, "LARGEST_JACOBIAN", -1)
-        system = routed(model).system
+        system = routed(model, jacobian="jacobian" not in leave_out).system
     source = python_module(system)
     return Engine(model, system, source, load_module(source, f"tested_{model.name}"))
 
