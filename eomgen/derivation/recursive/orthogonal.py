@@ -224,13 +224,21 @@ class Elimination:
         last = units[-1] if units else 2
         return ((last + 1) % 3, (last + 2) % 3, last)
 
-    def _slides_of(self, link: Link, arm: Vec) -> tuple[int, ...]:
-        """The axes to move along, that of the link last, or that of an arm."""
-        ways = [j for j in AXES if not self._scalars.is_zero(arm[j])]
-        last = next((axis.unit for axis, _ in link.free if not axis.angular), None)
-        if last is None:
-            last = ways[0] if len(ways) == 1 else 2
-        return tuple(j for j in ((last + 1) % 3, (last + 2) % 3, last) if j in self._axes())
+    def _slides_of(self, link: Link, arm: Vec, rows: Sequence[Row]) -> tuple[int, ...]:
+        """The axes to move along, that of the link last. Before it those that rows of few axes
+        hold, which so stay what they are, and that of an arm.
+        """
+        is_zero = self._scalars.is_zero
+        ways = [[j for j in AXES if not is_zero(way[j])] for way in (arm, *(r.linear for r in rows))]
+        own = next((axis.unit for axis, _ in link.free if not axis.angular), None)
+        last = ways[0][0] if len(ways[0]) == 1 else 2
+
+        def late(j: int) -> tuple[bool, int, int]:
+            held = [len(way) for way in ways[1:] if j in way]
+            return j == own, -min(held, default=4), len(held)
+
+        turn = ((last + 1) % 3, (last + 2) % 3, last)
+        return tuple(sorted((j for j in turn if j in self._axes()), key=late))
 
     def _eliminated(
         self,
@@ -252,7 +260,7 @@ class Elimination:
             linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
         loose = [shifted(row, sub(arm, at)) for row, arm in rows]
         turns: Steps = []
-        orders = (self._slides_of(link, at), self._turns_of(link))
+        orders = (self._slides_of(link, at, loose), self._turns_of(link))
         room = len(orders[0]) + len(orders[1])
         folded = bool(linear) or len(loose) + len(angular) > room
         if folded:
