@@ -107,6 +107,7 @@ class Elimination:
         self._scalars = scalars
         self._planar = bool(instant.angles)
         self._rows = Rows(scalars)
+        self._columns = self._moving()
 
     def respond(
         self, moving: Sequence[Acceleration], wrenches: Sequence[Force], tau: Sequence[Scalar]
@@ -213,6 +214,29 @@ class Elimination:
         floor = self._rows.tiny if pivot is entry else self._scalars.number(SLIGHT) * entry
         return self._scalars.call("max", pivot, floor)
 
+    def _moving(self) -> list[set[Column]]:
+        """The accelerations that each frame can have at all."""
+        found: list[set[Column]] = []
+        for link in self._links:
+            columns = {_column(axis) for axis, _ in link.free}
+            if link.parent >= 0:
+                before = found[link.parent]
+                for angular, j in before | self._moved(before, link.arm):
+                    columns |= self._parts(angular, link.turn.into(unit(j, self._scalars)))
+            found.append(columns)
+        return found
+
+    def _moved(self, columns: set[Column], at: Vec) -> set[Column]:
+        """What turning adds to the accelerations of a point."""
+        found: set[Column] = set()
+        for angular, j in columns:
+            if angular:
+                found |= self._parts(False, cross(unit(j, self._scalars), at))
+        return found
+
+    def _parts(self, angular: bool, way: Vec) -> set[Column]:
+        return {(angular, j) for j in AXES if not self._scalars.is_zero(way[j])}
+
     def _axes(self) -> tuple[int, ...]:
         return (0, 1) if self._planar else (0, 1, 2)
 
@@ -229,7 +253,9 @@ class Elimination:
         hold, which so stay what they are, and that of an arm.
         """
         is_zero = self._scalars.is_zero
-        ways = [[j for j in AXES if not is_zero(way[j])] for way in (arm, *(r.linear for r in rows))]
+        ways = [
+            [j for j in AXES if not is_zero(way[j])] for way in (arm, *(r.linear for r in rows))
+        ]
         own = next((axis.unit for axis, _ in link.free if not axis.angular), None)
         last = ways[0][0] if len(ways[0]) == 1 else 2
 
@@ -255,12 +281,21 @@ class Elimination:
         at = self._links[heaviest].arm if heaviest >= 0 else zeros(s)
         if heaviest < 0 and solid is not None:
             at = solid.centre
+        columns = self._columns[k]
+        about = columns | self._moved(columns, at)
         linear, angular = dict(own[0]), dict(own[1])
         if solid is not None:
             linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
-        loose = [shifted(row, sub(arm, at)) for row, arm in rows]
+        linear = {j: self._rows.of(about, row) for j, row in linear.items()}
+        angular = {j: self._rows.of(about, row) for j, row in angular.items()}
+        loose = [self._rows.of(about, shifted(row, sub(arm, at))) for row, arm in rows]
         turns: Steps = []
-        orders = (self._slides_of(link, at, loose), self._turns_of(link))
+        orders = (
+            [j for j in self._slides_of(link, at, loose) if (False, j) in about],
+            [j for j in self._turns_of(link) if (True, j) in about],
+        )
+        loose += [linear.pop(j) for j in [*linear] if j not in orders[0]]
+        loose += [angular.pop(j) for j in [*angular] if j not in orders[1]]
         room = len(orders[0]) + len(orders[1])
         folded = bool(linear) or len(loose) + len(angular) > room
         if folded:
@@ -270,7 +305,9 @@ class Elimination:
                 angular, loose = self._rows.folded(angular, loose, orders[1], turns, angular=True)
         kept = {(False, j): shifted(linear[j], at) for j in orders[0] if j in linear}
         kept |= {(True, j): angular[j] for j in orders[1] if j in angular}
+        kept = {column: self._rows.of(columns, row) for column, row in kept.items()}
         free = [shifted(row, at) for row in loose if not self._rows.is_empty(row)]
+        free = [self._rows.of(columns, row) for row in free]
         # Rows of angular accelerations alone first, which so stay what they are.
         free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
         empty = [row for row in loose if self._rows.is_empty(row)]
