@@ -19,8 +19,8 @@ light. What has no inertia of its own along an axis is found from its neighbours
 
 A force on a body is part of its own rows, unless heavier ones hold it; it and torques of joints are
 then in t. Digits are lost still where heavy points, such as hang on ball joints, pull along a line
-that their link, free to turn with next to no inertia, has along no coordinate axis; and where the
-heavy rows of a tip end exactly at a joint that others turn it to by angles that are no quarters.
+that their link, free to turn with next to no inertia, has along no coordinate axis; and where a
+heavy tip hangs in line with all joints, of which rounding of sines and cosines knows no more.
 """
 
 from collections.abc import Sequence
@@ -30,6 +30,7 @@ from eomgen.derivation.recursive.articulated import along, with_component
 from eomgen.derivation.recursive.forces import Force, at_parent, total
 from eomgen.derivation.recursive.instant import Axis, Instant, Link
 from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
+from eomgen.derivation.recursive.possible import column_of, moved, possible
 from eomgen.derivation.recursive.rows import (
     Column,
     Row,
@@ -107,7 +108,7 @@ class Elimination:
         self._scalars = scalars
         self._planar = bool(instant.angles)
         self._rows = Rows(scalars)
-        self._columns = self._moving()
+        self._columns = possible(instant.links, scalars)
 
     def respond(
         self, moving: Sequence[Acceleration], wrenches: Sequence[Force], tau: Sequence[Scalar]
@@ -214,29 +215,6 @@ class Elimination:
         floor = self._rows.tiny if pivot is entry else self._scalars.number(SLIGHT) * entry
         return self._scalars.call("max", pivot, floor)
 
-    def _moving(self) -> list[set[Column]]:
-        """The accelerations that each frame can have at all."""
-        found: list[set[Column]] = []
-        for link in self._links:
-            columns = {_column(axis) for axis, _ in link.free}
-            if link.parent >= 0:
-                before = found[link.parent]
-                for angular, j in before | self._moved(before, link.arm):
-                    columns |= self._parts(angular, link.turn.into(unit(j, self._scalars)))
-            found.append(columns)
-        return found
-
-    def _moved(self, columns: set[Column], at: Vec) -> set[Column]:
-        """What turning adds to the accelerations of a point."""
-        found: set[Column] = set()
-        for angular, j in columns:
-            if angular:
-                found |= self._parts(False, cross(unit(j, self._scalars), at))
-        return found
-
-    def _parts(self, angular: bool, way: Vec) -> set[Column]:
-        return {(angular, j) for j in AXES if not self._scalars.is_zero(way[j])}
-
     def _axes(self) -> tuple[int, ...]:
         return (0, 1) if self._planar else (0, 1, 2)
 
@@ -282,7 +260,7 @@ class Elimination:
         if heaviest < 0 and solid is not None:
             at = solid.centre
         columns = self._columns[k]
-        about = columns | self._moved(columns, at)
+        about = columns | moved(columns, at, s)
         linear, angular = dict(own[0]), dict(own[1])
         if solid is not None:
             linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
@@ -328,7 +306,7 @@ class Elimination:
         """The row that an axis is found from: one that holds it alone, as there is where a link has
         inertia against it; else what can be gathered of it from all.
         """
-        column = _column(way)
+        column = column_of(way)
         kept, turns = dict(kept), Steps()
         if held:
             return kept.pop(column), kept, free, ()
@@ -356,7 +334,7 @@ class Elimination:
     ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
         """Rotate one row until it alone holds an axis of motion."""
         s, (way, i) = self._scalars, axis
-        column = _column(way)
+        column = column_of(way)
         pivot, kept, free, turns = first, dict(kept), list(free), Steps()
         for n, row in enumerate(free):
             pivot, free[n] = self._rows.rotated(pivot, row, column, turns)
@@ -415,11 +393,6 @@ class Elimination:
             angular = named(angular, f"alpha_{link.name}", scalars)
             reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
         return result
-
-
-def _column(axis: Axis) -> Column:
-    assert axis.unit is not None  # as all are in the frames' own axes
-    return axis.angular, axis.unit
 
 
 def _turned(link: Link, row: Row) -> Row:
