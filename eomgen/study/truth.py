@@ -15,6 +15,7 @@ from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, finish, interpret
 from eomgen.program.tape import TIME, ExactTape
 from eomgen.run.problem import Floats
+from eomgen.study.longs import Array, LongScalars, long
 
 Exact = NDArray[np.object_]
 """60-digit numbers."""
@@ -60,6 +61,18 @@ class Truth:
         if not all(isinstance(x, MP.mpf) and MP.isfinite(x) for x in columns.ravel()):
             raise ValueError("no finite real number")
         return columns
+
+    def long(
+        self, t: Any, y: Any, inputs: Mapping[str, Any], parameters: Mapping[str, Any]
+    ) -> Array:
+        """v̇ (nv,) at one state, of the same recording in long numbers (`longs`), which are as long
+        and much faster; nan where there is none. To be called within `long_digits()`.
+        """
+        given = dict(zip(self._states, long(y), strict=True))
+        values = {**self.model.defaults, **parameters}
+        values |= {i.name: inputs.get(i.name, 0.0) for i in self.model.inputs} | {TIME: t}
+        given |= dict(zip(values, long(list(values.values())), strict=True))
+        return long(interpret(self._program, "vd", given, LongScalars()))
 
     def factored(self, t: float, y: Floats) -> Exact:
         """v̇ (nv,) at one state."""
