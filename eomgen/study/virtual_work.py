@@ -86,7 +86,7 @@ class FreeBodies(Placed):
                 w = self.spin(k)
                 torque = torque + np.cross(w, self.inertias[k] @ w)
             total = total + pose.place_v @ force + pose.spin_v @ torque
-            sizes = sizes + abs(pose.place_v) @ abs(force) + abs(pose.spin_v) @ abs(torque)
+            sizes = sizes + _reach(pose.place_v, force) + _reach(pose.spin_v, torque)
         return total, sizes
 
     def pushed(self, loads: Sequence[Load | JointLoad]) -> tuple[Array, Array]:
@@ -103,7 +103,7 @@ class FreeBodies(Placed):
                 force, torque = self.in_space(load.force), self.torque(load)
                 at = pose.place_v + pose.turn_v @ self.in_space(load.at)
                 total = total + at @ force + pose.spin_v @ torque
-                sizes = sizes + abs(at) @ abs(force) + abs(pose.spin_v) @ abs(torque)
+                sizes = sizes + _reach(at, force) + _reach(pose.spin_v, torque)
         return total, sizes
 
     def torque(self, load: Load) -> Array:
@@ -278,3 +278,8 @@ class FreeBodies(Placed):
     def driven_velocities(self) -> Array:
         """Rates of the driven coordinates."""
         return self.rates[self.nv :]
+
+
+def _reach(slopes: Array, force: Array) -> Array:
+    """The most that a force does along motions (m, 3), whatever its direction, (m,)."""
+    return np.sum(abs(slopes), axis=1) * np.sum(abs(force))
