@@ -108,8 +108,9 @@ def _form(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 def _route(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument(
         "--route",
-        choices=("auto", "closed", "ldl", "aba"),
-        help="way to the equations (the scene's; auto is the one of the fewest operations)",
+        choices=("auto", "closed", "ldl", "aba", "orthogonal"),
+        help="way to the equations (the scene's; auto is the one of the fewest operations that "
+        "keeps its digits)",
     )
     return parser
 

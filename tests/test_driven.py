@@ -118,6 +118,8 @@ def test_as_the_judge_has_it(dimensions: int, seed: int) -> None:
         d = Dynamics(model, values, FloatScalars(), axes)
         assert apart(d.articulated_forward(), motion.accelerations[place]) < ROUNDING
         assert apart(d.factored_forward(), motion.accelerations[place]) < ROUNDING
+        if axes == "own":
+            assert apart(d.orthogonal_forward(), motion.accelerations[place]) < ROUNDING
         forces = [motion.driving[c.velocity.name] for c in model.driven]
         assert apart(d.driving_forces, forces) < ROUNDING
         assert apart(d.kinetic_energy, motion.kinetic_energy) < ROUNDING

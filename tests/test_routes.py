@@ -1,4 +1,4 @@
-"""All routes to a mechanism's motion agree: `closed`, `ldl`, `aba`, and three outsiders.
+"""All routes to a mechanism's motion agree: `closed`, `ldl`, `aba`, `orthogonal`, three outsiders.
 
 The outsiders are the tests' own solver in maximal coordinates, MuJoCo and Pinocchio. Most trees
 are run in plain floats, some as generated modules, some in 60 digits.
@@ -71,6 +71,8 @@ def test_accelerations(dimensions: int, seed: int) -> None:
         found = dynamics.articulated_forward()
         assert apart(found, expected) < ROUNDING
         assert apart(dynamics.factored_forward(), expected) < ROUNDING
+        if axes == "own":
+            assert apart(dynamics.orthogonal_forward(), expected) < ROUNDING
         assert_observed(tree, model, dynamics, found, motion)
     joints = [body.joint.name for body in model.bodies if body.joint.type != "free"]
     wrenches = [(*f.force, *f.moment) for f in reactions(dynamics, expected)]
@@ -99,6 +101,8 @@ def test_accelerations_from_rest(dimensions: int, seed: int) -> None:
         dynamics = in_floats(tree, model, q, v, u, axes)
         assert apart(dynamics.articulated_forward(), expected) < ROUNDING
         assert apart(dynamics.factored_forward(), expected) < ROUNDING
+        if axes == "own":
+            assert apart(dynamics.orthogonal_forward(), expected) < ROUNDING
 
 
 KEPT = {PLANE: [0, 1, 5], SPACE: [0, 1, 2, 3, 4, 5]}

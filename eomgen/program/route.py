@@ -1,13 +1,21 @@
 """Which route a model's equations take, and why."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
+from eomgen.derivation.recursive.digits import Accelerations, digits_lost
+from eomgen.derivation.recursive.moving import Values
+from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.errors import SceneError
 from eomgen.model import Model
 from eomgen.program.from_recursion import Recording, from_recursion
-from eomgen.program.program import Output, cost, finish
+from eomgen.program.program import Output, cost, finish, interpret
 from eomgen.program.system import System
+from eomgen.program.tape import TIME
+
+MOST_LOST = 4.0
+"""Decimal digits of v̇ that a route may lose at ordinary states and still be taken by itself."""
 
 MOST_FACTORING = 20_000
 """Operations of factoring alone beyond which `ldl` is not tried only to be compared."""
@@ -15,11 +23,15 @@ MOST_FACTORING = 20_000
 
 @dataclass(frozen=True)
 class Candidate:
-    """A route with the operations of its `derivative`, or None and why it was not tried."""
+    """A route with the operations of its `derivative`, or None and why it was not tried.
+
+    It is `refused` if it loses too many digits.
+    """
 
     route: str
     operations: int | None
     words: str
+    refused: bool = False
 
 
 @dataclass(frozen=True)
@@ -35,13 +47,13 @@ class Routed:
         for candidate in self.candidates:
             count = "-" if candidate.operations is None else str(candidate.operations)
             taken = " <- taken" if candidate.route == self.system.route else ""
-            lines.append(f"{candidate.route:<8}{count:>8}  {candidate.words}{taken}".rstrip())
+            lines.append(f"{candidate.route:<10}{count:>6}  {candidate.words}{taken}".rstrip())
         return lines
 
 
 def routed(model: Model, *, jacobian: bool = True) -> Routed:
-    """The system of a model by the route it names, or by the one of the fewest operations; with
-    the derivative's Jacobian or without.
+    """The system of a model by the route it names, or by the one of the fewest operations that
+    keeps its digits; with the derivative's Jacobian or without.
 
     Raises `SceneError` if it names one that is not for it.
     """
@@ -78,7 +90,14 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
     else:
         records["ldl"] = recorded(model, "ldl")
         candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
-    tried = [c for c in candidates if c.operations is not None]
+    lost = digits_lost(model, None if closed is None else _accelerations(closed))
+    candidates = [_weighed(c, lost[c.route]) for c in candidates]
+    if all(c.refused or c.operations is None for c in candidates):
+        records["orthogonal"] = recorded(model, "orthogonal")
+        words = f"keeps the digits that these masses take from the others, {lost['aba']:.0f} of aba"
+        count = _operations_of(records["orthogonal"])
+        candidates.append(Candidate("orthogonal", count, words))
+    tried = [c for c in candidates if c.operations is not None and not c.refused]
     best = min(tried, key=lambda c: c.operations or 0)
     if closed is None or best.route != "closed":
         closed = from_recursion(records[best.route], jacobian=jacobian)
@@ -86,12 +105,14 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
 
 
 def recorded(model: Model, route: str) -> Recording:
-    """A model on a tape by `aba` or `ldl`, in the axes that take the fewest operations.
+    """A model on a tape by a recursion, in the axes that take the fewest operations.
 
     In the plane those are the world's, in which angles add up, unless bodies that turn carry
     slides; in space they are the frames' own.
     """
     record = Recording(model, route)
+    if route == "orthogonal":
+        return record
     if model.dimensions == 2 and any(
         move.kind == "slide"
         for body in model.bodies
@@ -136,6 +157,28 @@ def _closed(model: Model, jacobian: bool) -> System:
 
 def _taken(system: System, words: str) -> Routed:
     return Routed(system, (Candidate(system.route, _operations(system), words),))
+
+
+def _weighed(candidate: Candidate, lost: float) -> Candidate:
+    """A route that was tried, refused if it loses too many digits."""
+    if candidate.operations is None or lost <= MOST_LOST:
+        return candidate
+    words = f"{candidate.words}; would lose {lost:.0f} digits"
+    return replace(candidate, words=words, refused=True)
+
+
+def _accelerations(system: System) -> Accelerations:
+    """v̇ as a system in velocity form has it."""
+    model = system.model
+
+    def found(values: Values) -> Sequence[float]:
+        names = [c.name for c in (*model.coordinates, *model.velocities)]
+        given = {**values.parameters, **values.inputs, TIME: 0.0}
+        given |= dict(zip(names, (*values.q, *values.v), strict=True))
+        rates = interpret(system.program, "derivative", given, FloatScalars())
+        return rates[-len(model.velocities) :]
+
+    return found
 
 
 def _candidate(route: str, operations: int) -> Candidate:

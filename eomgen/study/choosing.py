@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from eomgen.errors import RunError
 from eomgen.run.problem import Floats
-from eomgen.study.estimate import Law, errors, fit
+from eomgen.study.estimate import ROUNDING, Law, errors, fit
 from eomgen.study.measure import WRONG
 from eomgen.study.trial import Case, Method, Tried, method_of
 
@@ -45,6 +45,11 @@ LOOSE = 1e-5
 """Errors asked for down to here may be met by few equal steps."""
 FEW_ROWS = 257
 """With more, equal steps lose what they save."""
+PATIENT = "gauss_6"
+"""Tried where others at their tightest are not exact enough: in equal steps that are summed with
+compensation, rounding disturbs a run a thousand times less."""
+PATIENCE = 10.0
+"""Of the time of the best run so far: what the first run of `PATIENT` may take."""
 FIRST_STEPS, MOST_STEPS = 64, 2**20
 """Of equal steps: in the first run of a method, and in any."""
 
@@ -193,6 +198,8 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         best = min(search.runs, key=lambda run: judged[id(run)])
         if judged[id(best)] <= target and not possible:
             return search.chosen(best, judged, True)
+        if asked is None and _patience(search, names, plans, PATIENCE * best.work):
+            continue
         if not possible:
             possible = [plan for plan in (_beside(search, best), _again(search, names)) if plan][:1]
         if not possible:
@@ -220,6 +227,8 @@ def within(
         left = budget - search.spent
         plans = [_most(search, method_of(name), judged, left) for name in names]
         possible = [plan for plan in plans if plan]
+        if asked is None and _patience(search, names, plans, HALF * left):
+            continue
         if not possible:
             return search.chosen(best, judged, True)
         plan = min(possible, key=lambda plan: plan.error)
@@ -255,19 +264,40 @@ def _race(search: _Search, names: list[str], loose: bool) -> list[str]:
     return [*names, *more]
 
 
+def _patience(search: _Search, names: list[str], plans: Sequence[Plan | None], most: float) -> bool:
+    """Try `PATIENT`, too, for `most` s, if it is for this motion, is not among the `names`, and the
+    explicit ones of these can be held no tighter.
+    """
+    explicit = [plan for name, plan in zip(names, plans, strict=True) if name != "Radau"]
+    own = search.of("DOP853")
+    spent = bool(own) and own[-1].tolerance <= search.tightest(method_of("DOP853"))
+    if PATIENT in names or any(explicit) or not (spent and _smooth(search.case)):
+        return False
+    names.append(PATIENT)
+    _first(search, method_of(PATIENT), most)
+    return True
+
+
 def _few_steps_do(case: Case) -> bool:
     """Whether equal steps may be few: the motion is smooth, and not many rows are asked for, of
     which each is the end of a step.
     """
-    smooth = not case.problem.corners and case.problem.contacts is None
-    return smooth and case.rows <= FEW_ROWS
+    return _smooth(case) and case.rows <= FEW_ROWS
 
 
-def _first(search: _Search, method: Method) -> None:
-    """A method's first run; where that fails, a tighter one: too long a step may not be stable."""
+def _smooth(case: Case) -> bool:
+    """Whether a method's order holds all along the motion."""
+    return not case.problem.corners and case.problem.contacts is None
+
+
+def _first(search: _Search, method: Method, most: float | None = None) -> None:
+    """A method's first run, for `most` s or not much longer than the quickest; where it fails, a
+    tighter one: too long a step may not be stable.
+    """
     steps = max(FIRST_STEPS, search.case.rows - 1)
     tolerance = search.case.t_end / steps if method.equal_steps else search.first
-    most = SLACK * min((run.work for run in search.runs), default=math.inf)
+    if most is None:
+        most = SLACK * min((run.work for run in search.runs), default=math.inf)
     while not (search.attempt(method, tolerance, most) or search.broken[-1].cut):
         tolerance /= _rung(method, RUNG)
         if tolerance < search.tightest(method):
@@ -275,14 +305,20 @@ def _first(search: _Search, method: Method) -> None:
 
 
 def _rung(method: Method, errors: float) -> float:
-    """How many times tighter makes an error so many times less; at most ten times the steps."""
-    return float(min(errors ** (1 / method.exponent), 10 ** (1 / method.growth)))
+    """How many times tighter makes an error so many times less; at most ten times the steps.
+
+    Equal steps are halved at least.
+    """
+    least = 2.0 if method.equal_steps else 1.0
+    return float(min(max(least, errors ** (1 / method.exponent)), 10 ** (1 / method.growth)))
 
 
 def _towards(search: _Search, method: Method, judged: dict[int, float], goal: float) -> Plan | None:
-    """A method's next run on the way to an error; none if it can be held no tighter."""
+    """A method's next run on the way to an error; none if it can be held no tighter, or rounding
+    is all that is left.
+    """
     own = search.of(method.name)
-    if not own or method.name in search.left_out:
+    if not own or method.name in search.left_out or judged[id(own[-1])] <= ROUNDING:
         return None
     last, tightest = own[-1].tolerance, search.tightest(method)
     law, known = _error_law(search, method, judged)

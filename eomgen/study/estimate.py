@@ -24,6 +24,10 @@ LAST = 0.1
 """Part of a run's time over whose rows differences are taken."""
 CAUTION = 0.8
 """Of the exponent that a method has in theory: taken where one difference alone is known."""
+ROUNDING = 2.0**-52
+"""No state of doubles is known to less."""
+SMALL = 1e-3
+"""Once differences are less than this, errors of equal steps fall as theory has it."""
 APART = 30.0
 """By so much must an error have become less by theory for its fall to be seen: errors scatter."""
 SCATTER = 3.0
@@ -83,9 +87,13 @@ def _rows(run: Trajectory, since: float) -> tuple[Floats, Floats]:
     return run.t[late][::-1], run.y[late][::-1]
 
 
-def remaining(gaps: Sequence[float], tolerances: Sequence[float], expected: float) -> float:
+def remaining(
+    gaps: Sequence[float], tolerances: Sequence[float], expected: float, caution: float = CAUTION
+) -> float:
     """Error of the tightest of k >= 2 runs of one method, whose `tolerances` (k,) fall, from the
     differences (k - 1,) of each from the next.
+
+    Where one difference alone is known, `caution` times the exponent is taken.
 
     That of a wrong run says nothing of the next one's error, and is returned as it is. From two on
     they tell how fast the error falls now, if they are far enough apart: near rounding it does no
@@ -94,7 +102,7 @@ def remaining(gaps: Sequence[float], tolerances: Sequence[float], expected: floa
     last = gaps[-1]
     if last >= WRONG or last == 0:
         return last
-    slope = CAUTION * expected
+    slope = caution * expected
     for gap, tolerance in zip(gaps[-2::-1], tolerances[-3::-1], strict=True):
         ratio = tolerance / tolerances[-2]
         if ratio**expected >= APART and 0 < gap < WRONG:
@@ -130,9 +138,11 @@ def errors(runs: Sequence[Tried], scale: Floats, case: Case) -> list[float]:
                 method = method_of(name)
                 scatter = SCATTER if method.multistep else 1.0
                 struck = case.problem.contacts is not None
-                left = gaps[-1] if struck else remaining(gaps, tolerances, method.exponent)
+                caution = 1.0 if method.equal_steps and gaps[-1] < SMALL else CAUTION
+                left = remaining(gaps, tolerances, method.exponent, caution)
+                left = gaps[-1] if struck else left
                 apart.append(scatter * left)
-        found.append(min(apart, default=math.inf))
+        found.append(max(min(apart, default=math.inf), ROUNDING))
     return found
 
 

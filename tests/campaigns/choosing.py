@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from eomgen.build import build_model
+from eomgen.errors import RunError
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.run.module import as_problem, load_module
 from eomgen.scene.reader import built_in_names, find_scene, read_scene
@@ -56,8 +57,13 @@ def ladder(case: Case, true: Reference) -> Iterator[Setting]:
 
 
 def true_error(case: Case, true: Reference, setting: Setting, most: float) -> tuple[float, float]:
-    """A run's true error, infinite if it breaks off, and its work, s."""
-    run = case.run(setting, most=most)
+    """A run's true error, infinite if it breaks off or its method is not for this motion, and its
+    work, s.
+    """
+    try:
+        run = case.run(setting, most=most)
+    except RunError:
+        return math.inf, math.inf
     ended = run.trajectory.finished
     return error(run.trajectory.y[-1], true.y[-1], true.scale) if ended else math.inf, run.work
 
