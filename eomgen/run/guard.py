@@ -93,6 +93,8 @@ class Watch:
             found = self.problem.derivative(t, y)
         except (ArithmeticError, ValueError):
             return math.inf
+        if not np.isfinite(found).all():
+            return math.inf
         worst = 0.0
         self._sizes = self._sizes or [0.0] * len(self.guard.groups)
         for k, group in enumerate(map(list, self.guard.groups)):
@@ -101,7 +103,7 @@ class Watch:
             off = float(np.max(np.abs(found[group] - true[group])))
             if off:
                 worst = max(worst, off / max(size, HARDLY * self._sizes[k]))
-        return worst if worst == worst else math.inf
+        return worst
 
     def lost(self, loss: float) -> StepFailure:
         """What a run stops with where too much is lost."""
