@@ -261,7 +261,8 @@ def test_a_heavy_body_on_light_ones_is_found_to_lose_digits_by_aba_and_not_by_or
     line = check(lossy, "forward error of v̇, aba (taken)")
     assert line.missed and line.value > 1e6 and "orthogonal" in lossy.better
     sound = verify(replace(light, route="orthogonal"), states=2)
-    assert not sound.missed, [(c.what, c.value, c.bound) for c in sound.missed]
+    line = check(sound, "forward error of v̇, orthogonal (taken)")
+    assert not line.missed and line.value < 2000
     assert check(sound, "residual").value < 450
 
 

@@ -1,5 +1,7 @@
 """Long numbers for what doubles are judged by: MPFR's, of 200 bits, 60 digits, one or in arrays."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import gmpy2
@@ -15,9 +17,11 @@ Array = Any
 """An array of such numbers."""
 
 
-def long_digits() -> Any:
-    """A `with` block in which numbers are of `BITS` bits; what has no value is nan there."""
-    return gmpy2.context(precision=BITS)
+@contextmanager
+def long_digits() -> Iterator[None]:
+    """A block in which numbers are of `BITS` bits; what has no value is nan there."""
+    with gmpy2.context(precision=BITS), np.errstate(all="ignore"):
+        yield
 
 
 def long(values: Any) -> Array:
