@@ -4,10 +4,10 @@ What is asked, and why the bounds are what they are:
 
 - Forward error of v̇, of the route taken: at most `BOUND` ulps, 1e-13, at states where bodies are
   anywhere, and `IN_LINE`, 1e-10, where they are in line or nearly so, and lengths cancel; or
-  `AMPLIFIED` times what one ulp in the data does to v̇, whichever is more. An algorithm that is stable gives the answer to
-  data that are a few ulps off; where even that changes the answer, nothing that works in doubles
-  can do better. What it may not do is to lose digits that the data have. `--bound` asks for a
-  number of ulps outright.
+  `AMPLIFIED` times what one ulp in the data does to v̇, whichever is more. An algorithm that is
+  stable gives the answer to data that are a few ulps off; where even that changes the answer,
+  nothing that works in doubles can do better. What it may not do is to lose digits that the data
+  have. `--bound` asks for a number of ulps outright.
 - The other routes are compared, and are not what is generated: they may in addition lose what any
   solution with the mass matrix may lose, a few ulps times its condition number (Higham, Accuracy
   and Stability of Numerical Algorithms, theorem 10.3 and section 9). What they lose is told.
@@ -293,7 +293,7 @@ def _forward_checks(
 def _allowed(there: Sequence[Judged], data: Floats) -> Floats:
     """What the forward error of the route taken may be at each state (n,), ulps."""
     least = np.array([BOUND if one.state.kind in ANYWHERE else IN_LINE for one in there])
-    return np.maximum(least, AMPLIFIED * data)
+    return np.asarray(np.maximum(least, AMPLIFIED * data))
 
 
 def _worst(errors: Floats, allowed: Floats) -> int:
