@@ -345,11 +345,7 @@ def test_closed_is_aba(seed: int, most: int) -> None:
     assert scene.text is not None
     left = ("input_jacobian", "parameter_jacobian")
     aba, ldl = (engine(scene.text, route, leave_out=left) for route in ("aba", "ldl"))
-    if most == 5:
-        closed = engine(scene.text, "closed", leave_out=left)
-    else:  # as other tests have it
-        c = compiled(scene)
-        closed = Engine(c.model, c.system, c.source, c.module)
+    closed = engine(scene.text, "closed", leave_out=left) if most == 5 else compiled(scene)
     assert [e.system.route for e in (closed, aba, ldl)] == ["closed", "aba", "ldl"]
     assert_equal_programs(closed, aba, seed, 50)
     assert_equal_programs(ldl, aba, seed, 50)

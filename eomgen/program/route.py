@@ -10,7 +10,7 @@ from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tr
 from eomgen.errors import SceneError
 from eomgen.model import Model
 from eomgen.program.from_recursion import Recording, from_recursion
-from eomgen.program.program import Output, cost, finish, interpret
+from eomgen.program.program import Output, cost, finish, interpreter
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
 
@@ -170,13 +170,13 @@ def _weighed(candidate: Candidate, lost: float) -> Candidate:
 def _accelerations(system: System) -> Accelerations:
     """v̇ as a system in velocity form has it."""
     model = system.model
+    run = interpreter(system.program, "derivative", FloatScalars())
 
     def found(values: Values) -> Sequence[float]:
         names = [c.name for c in (*model.coordinates, *model.velocities)]
         given = {**values.parameters, **values.inputs, TIME: 0.0}
         given |= dict(zip(names, (*values.q, *values.v), strict=True))
-        rates = interpret(system.program, "derivative", given, FloatScalars())
-        return rates[-len(model.velocities) :]
+        return run(given)[-len(model.velocities) :]
 
     return found
 

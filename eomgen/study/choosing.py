@@ -26,7 +26,8 @@ ENOUGH = 0.5
 CLEAR = 0.3 * WRONG
 """Runs of greater errors tell nothing of how errors fall: those of chaotic motions stay large."""
 RUNG, RUNGS = 100.0, 1000.0
-"""So many times less an error is aimed at at once, where nothing or something is known of it."""
+"""So many times less an error is aimed at at once, where nothing or something is known of it; where
+steps are bounded otherwise, too, errors do not yet fall as they will."""
 BESIDE = 10.0
 """So many times more an error is that of a run made to tell that of the next one."""
 TIGHTER = 3.0
@@ -35,6 +36,8 @@ SLACK = 1.5
 """Of the quickest so far: what another method may take at first."""
 BETTER = 1.5
 """Among the runs that will do the most accurate counts, up to so many times the least time."""
+OVERRUN = 3.0
+"""Of the time expected of a run: after that others are tried."""
 FULL, HALF = 0.7, 0.5
 """Of the time that is left: what a run is planned for. Of that, a run that only shows the way."""
 WORTH = 0.5
@@ -137,12 +140,12 @@ class _Search:
         (self.left_out.discard if finished else self.left_out.add)(method.name)
         return finished
 
-    def make(self, plan: Plan) -> bool:
+    def make(self, plan: Plan, most: float = math.inf) -> bool:
         """Make the run of a plan, and say what is expected of it; whether it came to its end."""
         setting = self.case.setting(plan.method, plan.tolerance, self.motion)
         error = f"an error of {plan.error:.1g} in " if plan.known else ""
         self.say(f"{setting.options}: expecting {error}{plan.seconds:.2g} s")
-        return self.attempt(plan.method, plan.tolerance)
+        return self.attempt(plan.method, plan.tolerance, most)
 
     def judged(self) -> dict[int, float]:
         """Estimated error of each run, by the run's identity."""
@@ -200,11 +203,14 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
             return search.chosen(best, judged, True)
         if asked is None and _patience(search, names, plans, PATIENCE * best.work):
             continue
+        aside = _again(search, names)
         if not possible:
-            possible = [plan for plan in (_beside(search, best), _again(search, names)) if plan][:1]
+            possible = [plan for plan in (_beside(search, best), aside) if plan][:1]
         if not possible:
             return search.chosen(best, judged, False)
-        search.make(min(possible, key=lambda plan: plan.work))
+        plan = min(possible, key=lambda plan: plan.work)
+        bounded = plan is not aside and (aside or len(possible) > 1)
+        search.make(plan, OVERRUN * plan.seconds if bounded else math.inf)
     return search.nothing()
 
 
@@ -323,7 +329,8 @@ def _towards(search: _Search, method: Method, judged: dict[int, float], goal: fl
     last, tightest = own[-1].tolerance, search.tightest(method)
     law, known = _error_law(search, method, judged)
     wanted = max(min(law.tolerance(goal), last / _rung(method, TIGHTER)), tightest)
-    tolerance = max(wanted, search.deepest(method) / _rung(method, RUNGS if known else RUNG))
+    surely = known and not search.case.bounded
+    tolerance = max(wanted, search.deepest(method) / _rung(method, RUNGS if surely else RUNG))
     if tolerance >= last:
         return None
     seconds = _growth(method, [(run.tolerance, run.seconds) for run in own])
@@ -344,15 +351,20 @@ def _beside(search: _Search, best: Tried) -> Plan | None:
 
 
 def _again(search: _Search, names: Sequence[str]) -> Plan | None:
-    """A run of a method that was put aside for taking longer than others, now at their end."""
+    """A run of a method that was put aside for taking longer than others, or than was expected of
+    it, now to its end; of several, of the one that has the least to go.
+    """
+    plans = []
     for name in names:
         own = [run for run in search.broken if run.setting.integrator == name]
-        if own and own[-1].cut and not search.of(name):
+        if own and own[-1].cut and name in search.left_out:
             method, cut = method_of(name), own[-1]
             tolerance = max(search.deepest(method), method.tightest)
-            work = _growth(method, [(cut.tolerance, cut.work)]).at(tolerance)
-            return Plan(method, tolerance, math.nan, False, work, work)
-    return None
+            tolerance = cut.tolerance if search.of(name) else tolerance
+            whole = cut.work * search.case.t_end / max(float(cut.trajectory.t[-1]), cut.tolerance)
+            work = _growth(method, [(cut.tolerance, whole)]).at(tolerance)
+            plans.append(Plan(method, tolerance, math.nan, False, work, work))
+    return min(plans, key=lambda plan: plan.work, default=None)
 
 
 def _most(search: _Search, method: Method, judged: dict[int, float], left: float) -> Plan | None:

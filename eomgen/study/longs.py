@@ -1,4 +1,4 @@
-"""Long numbers for what doubles are judged by: MPFR's, of 200 bits, 60 digits, one or in arrays."""
+"""Long numbers for what doubles are judged by: MPFR's, of 60 digits, one or in arrays."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,10 +8,11 @@ import gmpy2
 import numpy as np
 from gmpy2 import mpfr
 
+from eomgen.program.digits import BY_MPFR, MP
 from eomgen.run.problem import Floats
-from eomgen.study.precise import FUNCTIONS, Long
+from eomgen.study.precise import Long
 
-BITS = 200
+BITS = MP.prec
 """Of the significand: 60 digits."""
 Array = Any
 """An array of such numbers."""
@@ -42,7 +43,7 @@ class LongScalars:
 
     def call(self, function: str, *arguments: Long) -> Long:
         """A function of formulas."""
-        return FUNCTIONS[function](*arguments)
+        return BY_MPFR[function](*arguments)
 
 
 def zeros(*shape: int) -> Array:

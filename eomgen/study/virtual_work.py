@@ -12,7 +12,7 @@ No velocity is handed on from body to body, no inertia is moved to another point
 carried inwards, and the matrix is solved by dense elimination with row exchanges. Joints enter by
 the moves that their types state, effects by the loads and energies that they state.
 
-Numbers are MPFR's, of 200 bits: 60 digits. Drives are differentiated by central differences.
+Numbers are MPFR's, of 60 digits. Drives are differentiated by central differences.
 """
 
 from collections.abc import Sequence

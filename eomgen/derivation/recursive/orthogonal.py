@@ -19,8 +19,8 @@ light. What has no inertia of its own along an axis is found from its neighbours
 
 A force on a body is part of its own rows, unless heavier ones hold it; it and torques of joints are
 then in t. Digits are lost still where heavy points, such as hang on ball joints, pull along a line
-that their link, free to turn with next to no inertia, has along no coordinate axis; and where the
-heavy rows of a tip end exactly at a joint that others turn it to by angles that are no quarters.
+that their link, free to turn with next to no inertia, has along no coordinate axis; and where a
+heavy tip hangs in line with all joints, of which rounding of sines and cosines knows no more.
 """
 
 from collections.abc import Sequence
@@ -30,6 +30,7 @@ from eomgen.derivation.recursive.articulated import along, with_component
 from eomgen.derivation.recursive.forces import Force, at_parent, total
 from eomgen.derivation.recursive.instant import Axis, Instant, Link
 from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
+from eomgen.derivation.recursive.possible import column_of, moved, possible
 from eomgen.derivation.recursive.rows import (
     Column,
     Row,
@@ -107,6 +108,7 @@ class Elimination:
         self._scalars = scalars
         self._planar = bool(instant.angles)
         self._rows = Rows(scalars)
+        self._columns = possible(instant.links, scalars)
 
     def respond(
         self, moving: Sequence[Acceleration], wrenches: Sequence[Force], tau: Sequence[Scalar]
@@ -224,13 +226,23 @@ class Elimination:
         last = units[-1] if units else 2
         return ((last + 1) % 3, (last + 2) % 3, last)
 
-    def _slides_of(self, link: Link, arm: Vec) -> tuple[int, ...]:
-        """The axes to move along, that of the link last, or that of an arm."""
-        ways = [j for j in AXES if not self._scalars.is_zero(arm[j])]
-        last = next((axis.unit for axis, _ in link.free if not axis.angular), None)
-        if last is None:
-            last = ways[0] if len(ways) == 1 else 2
-        return tuple(j for j in ((last + 1) % 3, (last + 2) % 3, last) if j in self._axes())
+    def _slides_of(self, link: Link, arm: Vec, rows: Sequence[Row]) -> tuple[int, ...]:
+        """The axes to move along, that of the link last. Before it those that rows of few axes
+        hold, which so stay what they are, and that of an arm.
+        """
+        is_zero = self._scalars.is_zero
+        ways = [
+            [j for j in AXES if not is_zero(way[j])] for way in (arm, *(r.linear for r in rows))
+        ]
+        own = next((axis.unit for axis, _ in link.free if not axis.angular), None)
+        last = ways[0][0] if len(ways[0]) == 1 else 2
+
+        def late(j: int) -> tuple[bool, int, int]:
+            held = [len(way) for way in ways[1:] if j in way]
+            return j == own, -min(held, default=4), len(held)
+
+        turn = ((last + 1) % 3, (last + 2) % 3, last)
+        return tuple(sorted((j for j in turn if j in self._axes()), key=late))
 
     def _eliminated(
         self,
@@ -247,12 +259,21 @@ class Elimination:
         at = self._links[heaviest].arm if heaviest >= 0 else zeros(s)
         if heaviest < 0 and solid is not None:
             at = solid.centre
+        columns = self._columns[k]
+        about = columns | moved(columns, at, s)
         linear, angular = dict(own[0]), dict(own[1])
         if solid is not None:
             linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
-        loose = [shifted(row, sub(arm, at)) for row, arm in rows]
+        linear = {j: self._rows.of(about, row) for j, row in linear.items()}
+        angular = {j: self._rows.of(about, row) for j, row in angular.items()}
+        loose = [self._rows.of(about, shifted(row, sub(arm, at))) for row, arm in rows]
         turns: Steps = []
-        orders = (self._slides_of(link, at), self._turns_of(link))
+        orders = (
+            [j for j in self._slides_of(link, at, loose) if (False, j) in about],
+            [j for j in self._turns_of(link) if (True, j) in about],
+        )
+        loose += [linear.pop(j) for j in [*linear] if j not in orders[0]]
+        loose += [angular.pop(j) for j in [*angular] if j not in orders[1]]
         room = len(orders[0]) + len(orders[1])
         folded = bool(linear) or len(loose) + len(angular) > room
         if folded:
@@ -262,7 +283,9 @@ class Elimination:
                 angular, loose = self._rows.folded(angular, loose, orders[1], turns, angular=True)
         kept = {(False, j): shifted(linear[j], at) for j in orders[0] if j in linear}
         kept |= {(True, j): angular[j] for j in orders[1] if j in angular}
+        kept = {column: self._rows.of(columns, row) for column, row in kept.items()}
         free = [shifted(row, at) for row in loose if not self._rows.is_empty(row)]
+        free = [self._rows.of(columns, row) for row in free]
         # Rows of angular accelerations alone first, which so stay what they are.
         free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
         empty = [row for row in loose if self._rows.is_empty(row)]
@@ -283,7 +306,7 @@ class Elimination:
         """The row that an axis is found from: one that holds it alone, as there is where a link has
         inertia against it; else what can be gathered of it from all.
         """
-        column = _column(way)
+        column = column_of(way)
         kept, turns = dict(kept), Steps()
         if held:
             return kept.pop(column), kept, free, ()
@@ -311,7 +334,7 @@ class Elimination:
     ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
         """Rotate one row until it alone holds an axis of motion."""
         s, (way, i) = self._scalars, axis
-        column = _column(way)
+        column = column_of(way)
         pivot, kept, free, turns = first, dict(kept), list(free), Steps()
         for n, row in enumerate(free):
             pivot, free[n] = self._rows.rotated(pivot, row, column, turns)
@@ -370,11 +393,6 @@ class Elimination:
             angular = named(angular, f"alpha_{link.name}", scalars)
             reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
         return result
-
-
-def _column(axis: Axis) -> Column:
-    assert axis.unit is not None  # as all are in the frames' own axes
-    return axis.angular, axis.unit
 
 
 def _turned(link: Link, row: Row) -> Row:

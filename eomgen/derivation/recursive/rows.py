@@ -9,11 +9,11 @@ of which r has nothing there: a Givens rotation without its square root. Backwar
 new rows leave at some accelerations follows what the old ones leave, a = p - s r, b = x p + c r.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
-from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, add, cross, unit, zeros
+from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, add, cross, unit, zeros
 
 TINY = 1e-200
 """The weight of an empty row, and the least of any: so small that it never counts."""
@@ -72,6 +72,13 @@ class Rows:
         angular, axis = column
         one, zero = unit(axis, self._scalars), zeros(self._scalars)
         return self.make(self.tiny, *((one, zero) if angular else (zero, one)), self.zero)
+
+    def of(self, columns: Collection[Column], row: Row) -> Row:
+        """A row where only some accelerations can be other than nothing."""
+        a, b = row.angular, row.linear
+        x, y, z = (a[j] if (True, j) in columns else self.zero for j in AXES)
+        p, q, r = (b[j] if (False, j) in columns else self.zero for j in AXES)
+        return replace(row, angular=(x, y, z), linear=(p, q, r))
 
     def is_empty(self, row: Row) -> bool:
         """Whether a row holds nothing any more."""
