@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from engine import MP, Digits, apart, exact, read
 
+from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.language.formula import FUNCTIONS
@@ -31,7 +32,6 @@ from eomgen.study.arithmetic import (
     Arithmetic,
     Way,
     arithmetic,
-    python_module,
     solve_operations,
 )
 from eomgen.study.single import Single, in_single, kernel_in_single

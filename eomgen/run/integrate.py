@@ -9,6 +9,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run import events
+from eomgen.run.guard import OF_TOLERANCE, Guard, Watch, repaired, watched
 from eomgen.run.integrators import (
     INTEGRATORS,
     FixedStep,
@@ -52,6 +53,7 @@ def integrate(
     max_steps: int = 10_000_000,
     rest_speed: float = REST_SPEED,
     powers: Powers | None = None,
+    guard: Guard | None = None,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
@@ -68,6 +70,8 @@ def integrate(
     rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
                 that then neither part nor close are held, so that bouncing comes to an end
     powers      asks for the works of effects
+    guard       watches the derivative's rounding at every step, and stops the run where digits are
+                lost, or repairs it (`run.guard`); what it lets pass is what it is without
 
     Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
     has begun, Ctrl-C included, ends it early instead: the trajectory then holds the finite rows
@@ -81,10 +85,17 @@ def integrate(
     if not (math.isfinite(rest_speed) and rest_speed > 0):
         raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
 
+    if guard is not None and guard.repairs and problem.contacts is not None:
+        raise RunError("guard: what contacts do cannot be repaired; let it stop instead (--guard)")
+    watch = None
+    if guard is not None:
+        tight = OF_TOLERANCE * rtol if isinstance(method, Adaptive) else guard.bound
+        watch = Watch(guard, problem, min(guard.bound, tight))
+
     derivatives, jacobians = _Count(), _Count()
     counted = replace(
         problem,
-        derivative=derivatives.of(problem.derivative),
+        derivative=derivatives.of(watch.derivative if watch else problem.derivative),
         jacobian=jacobians.of(problem.jacobian),
     )
     begin: Begin
@@ -99,7 +110,9 @@ def integrate(
         longest = _longest(max_step, t_end - t_start, problem.corners)
         begin = _adaptive_steps(method, t_end, (rtol, atol, longest), times, max_steps)
 
-    if problem.contacts is None:
+    if watch and watch.guard.repairs:
+        advances = repaired(watch, begin, counted, t_start, max_steps)
+    elif problem.contacts is None:
         advances = begin(counted, t_start, 0)
     else:
         looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
@@ -107,6 +120,9 @@ def integrate(
         advances = events.advances(
             stepper, counted, t_start, t_end, rest_speed=rest_speed, max_steps=max_steps
         )
+
+    if watch and not watch.guard.repairs:
+        advances = watched(watch, advances, t_start, problem.initial)
 
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
     run = _Run(t_start, problem.initial, account)
@@ -117,7 +133,8 @@ def integrate(
         )
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
-    message = "; ".join(part for part in (trouble, remarks) if part)
+    mended = watch.words() if watch else ""
+    message = "; ".join(part for part in (trouble, mended, remarks) if part)
     calls = {"derivatives": derivatives.calls, "jacobians": jacobians.calls}
     impacts = sum(event.kind == "impact" for event in run.events)
     return Trajectory(

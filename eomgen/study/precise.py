@@ -78,17 +78,24 @@ class Precise:
 
 
 def precise(
-    module: Any, parameters: Any, inputs: Any, initial: Floats, *, watched: bool = False
+    module: Any,
+    parameters: Any,
+    inputs: Any,
+    initial: Floats,
+    *,
+    watched: bool = False,
+    bits: int = BITS,
 ) -> Precise:
     """A generated module's derivative over long numbers, at given parameters and inputs.
 
     parameters, inputs  as `module.derivative` takes them; they must be valid there
     initial             the initial state of doubles, (ny,)
     watched             hold the ways that corners go, if there are any
+    bits                of what depends on parameters alone
     """
     names = inspect.signature(module._derivative).parameters
     watch = Watch() if watched and any(name in names for name in CORNERS) else None
-    with digits():
+    with digits(bits):
         functions = {**BY_MPFR, **(watch.functions() if watch else {})}
         # The module keeps constants by value, and a long 1 is equal to a double 1: go round that.
         constants = _over(module._constants.__wrapped__, BY_MPFR)(

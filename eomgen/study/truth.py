@@ -1,5 +1,6 @@
 """Accelerations in 60 digits, at exactly the numbers of scene, state and parameters."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ from eomgen.derivation.states import velocity_states
 from eomgen.model import Model
 from eomgen.program.digits import MP, Digits, evaluator, exact
 from eomgen.program.from_recursion import Recording
-from eomgen.program.program import Output, finish
+from eomgen.program.program import Output, finish, interpreter
 from eomgen.program.tape import TIME, ExactTape
 from eomgen.run.problem import Floats
+from eomgen.study.longs import Array, LongScalars, long
 
 Exact = NDArray[np.object_]
 """60-digit numbers."""
@@ -33,6 +35,7 @@ class Truth:
         nodes = tuple(node.index for node in record.vd)
         program = finish(record.tape, {"vd": Output((len(nodes),), nodes)}, ())
         self._accelerations = evaluator(program, "vd")
+        self._long = interpreter(program, "vd", LongScalars())
 
     def __call__(self, t: Floats, y: Floats) -> Exact:
         """v̇ (nv, n) at times t (n,) and states y (n, ny); None all over where there is none."""
@@ -45,6 +48,18 @@ class Truth:
             return self._accelerations({**states, **self.model.defaults, **inputs, TIME: t})
         except (ArithmeticError, ValueError):
             return [None] * len(self.model.velocities)
+
+    def long(
+        self, t: Any, y: Any, inputs: Mapping[str, Any], parameters: Mapping[str, Any]
+    ) -> Array:
+        """v̇ (nv,) at one state, of the same recording, at numbers of which none need be a double;
+        nan where there is none. To be called within `long_digits()`.
+        """
+        given = dict(zip(self._states, long(y), strict=True))
+        values = {**self.model.defaults, **parameters}
+        values |= {i.name: inputs.get(i.name, 0.0) for i in self.model.inputs} | {TIME: t}
+        given |= dict(zip(values, long(list(values.values())), strict=True))
+        return long(self._long(given))
 
     def factored(self, t: float, y: Floats) -> Exact:
         """v̇ (nv,) at one state."""
