@@ -15,12 +15,15 @@ from gmpy2 import mpfr
 from eomgen.backends.python import python_module
 from eomgen.build import build_model, in_order
 from eomgen.cli import main
+from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.program.route import routed
 from eomgen.run.module import load_module
 from eomgen.study import drift as drifting
+from eomgen.study import horizon as horizons
 from eomgen.study import visited as visiting
 from eomgen.study.hard_states import KINDS, hard_states
+from eomgen.study.horizon import horizon as horizon_of
 from eomgen.study.judging import judged
 from eomgen.study.laws import kept
 from eomgen.study.longs import doubles, long, long_digits
@@ -301,6 +304,26 @@ def test_a_module_that_gives_no_number_misses_its_bound() -> None:
     found = judged(model, Truth(model), "aba", {"aba": module}, full, state)
     assert found is not None and np.isnan(found.off["aba"]).all()
     assert found.losses["residual of aba"].error == np.inf
+
+
+# How long doubles mean anything.
+
+
+def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A short run means something all along; asked for more digits, it has them for a while."""
+    model = model_of("double_pendulum")
+    model = replace(model, simulation=model.simulation.replaced(t_end=1.5), outputs=())
+    module = load_module(python_module(routed(model).system))
+    whole = horizon_of(model, module)
+    assert whole.time is None and 1e-16 < whole.worst < 1e-10 and whole.sure < 1e-15
+    assert whole.words.startswith("doubles are meaningful for the whole run, 1.5 s: off by")
+    monkeypatch.setattr(horizons, "PARTED", whole.worst / 2)
+    part = horizon_of(model, module)
+    assert part.time is not None and 0.1 < part.time <= 1.5
+    assert part.words.startswith(f"doubles are meaningful to t = {part.time:.4g} s of 1.5 s")
+    with pytest.raises(RunError, match="rigid contacts strike"):
+        bouncing = replace(model_of("bouncing_two_body"), outputs=())
+        horizon_of(bouncing, load_module(python_module(routed(bouncing).system)))
 
 
 # The command.

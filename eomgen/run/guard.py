@@ -4,9 +4,9 @@ A small residual M v̇ + h - F does not mean that v̇ is right: with a heavy bod
 a digit for each decade of their masses, and its residual none. So the residual that is watched is
 that of the derivative itself, ẏ - f(t, y), with f the same equations in numbers that are long
 enough; it is the forward error of v̇ and of all else that goes into the step. It is asked for at
-every state that a step ends in: what is lost depends on the configuration, which changes little
-within a step, and one evaluation in long numbers costs three to five of doubles, where a step of an
-explicit method of high order takes twelve.
+every state that a step ends in, so that no row is kept that was not looked at. One evaluation in
+long numbers takes as long as 8 to 17 of doubles, a step of DOP853 12: a guarded run takes half as
+long again by DOP853, and three to five times as long by rk4, whose steps are short.
 """
 
 import math
