@@ -85,6 +85,27 @@ def scene(dimensions: int, n: int, seed: int, *, simple: bool = False, free: boo
     return "\n".join(lines)
 
 
+def mixed(kind: str, n: int, seed: int) -> str:
+    """A tree in space of joints of one kind, arms, axes and inertias general."""
+    r = random.Random(seed)
+    lines = ['name = "tree"\ndimensions = 3\n[[effects]]\ntype = "gravity"\ng = 9.81']
+    for k in range(n):
+        inertia = [r.uniform(*ends) for ends in 3 * [(0.04, 0.06)] + 3 * [(-0.01, 0.01)]]
+        parent = r.choice((k - 1, r.randrange(k))) if k else -1
+        one = np.array([r.gauss(0, 1) for _ in range(3)])
+        two = np.cross(one, [r.gauss(0, 1) for _ in range(3)])
+        axes = [(a / np.linalg.norm(a)).tolist() for a in (one, two)]
+        ways = {"ball": "", "universal": f"axes = {axes}"}.get(kind, f"axis = {axes[0]}")
+        lines.append(
+            f'[[bodies]]\nname = "b{k}"\nmass = 1.0\ninertia_com = {inertia}\n'
+            f'[[joints]]\ntype = "{kind}"\nname = "j{k}"\nchild = "b{k}"\n{ways}\n'
+            f'parent = "{"world" if parent < 0 else f"b{parent}"}"\n'
+            f"r_parent = {[r.uniform(-0.5, 0.5) for _ in range(3)]}\n"
+            f"r_child = {[r.uniform(-0.5, 0.5) for _ in range(3)]}"
+        )
+    return "\n".join(lines)
+
+
 def with_masses(model: Model, masses: Sequence[float]) -> Model:
     """The same bodies, each heavier throughout by a factor."""
     bodies = (
@@ -186,6 +207,22 @@ def test_every_digit_of_trees(dimensions: int, masses: str, free: bool) -> None:
         assert off(model, state(model, "random", seed)) < AT_RANDOM, (seed, n)
         kind = ("straight", "quarter turns", "some straight", "eighths of turns")[seed % 4]
         assert off(model, state(model, kind, seed)) < ALIGNED, (seed, n, kind)
+
+
+@pytest.mark.parametrize("masses", MASSES)
+@pytest.mark.parametrize("kind", ["prismatic", "cylindrical", "universal", "ball"])
+def test_every_digit_of_other_joints(kind: str, masses: str) -> None:
+    """A heavy body on a ball joint, say, which turns a light one about none of its own axes. Of
+    trees of ball joints one in twenty may be off by more, as far as 1e-6: a limit of the route.
+    """
+    missed, count = [], some(2, 60)
+    for seed in range(count):
+        n = random.Random(seed).randrange(2, some(5, 8))
+        model = heavy(masses, mixed(kind, n, seed), seed)
+        error = off(model, state(model, "random", seed))
+        assert error < 1e-6, (seed, n)
+        missed += [(seed, n)] if error > AT_RANDOM else []
+    assert len(missed) <= (count // 20 if kind == "ball" else 0), missed
 
 
 ALIGNMENTS = [

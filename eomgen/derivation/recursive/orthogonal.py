@@ -18,19 +18,19 @@ back. Those of a body times their weights are the forces that joints put on it, 
 light. What has no inertia of its own along an axis is found from its neighbours' rows after all.
 
 A force on a body is part of its own rows, unless heavier ones hold it; it and torques of joints are
-then in t. Digits are lost still where heavy points, such as hang on ball joints, pull along a line
-that their link, free to turn with next to no inertia, has along no coordinate axis; and where a
-heavy tip hangs in line with all joints, of which rounding of sines and cosines knows no more.
+then in t. Digits are lost still where inertia is a small part of mass times arms squared, and where
+a heavy tip hangs in line with all joints, of which rounding of sines and cosines knows no more.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from eomgen.derivation.recursive.aligned import aligned
 from eomgen.derivation.recursive.articulated import along, with_component
 from eomgen.derivation.recursive.forces import Force, at_parent, total
 from eomgen.derivation.recursive.instant import Axis, Instant, Link
 from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
-from eomgen.derivation.recursive.possible import column_of, moved, possible
+from eomgen.derivation.recursive.possible import column_of, moved, possible, slides_of, turns_of
 from eomgen.derivation.recursive.rows import (
     Column,
     Row,
@@ -103,12 +103,13 @@ class Elimination:
         ranks: Ranks,
         scalars: Scalars,
     ) -> None:
-        self._links = instant.links
-        self._solids, self._ranks = carried, ranks
+        self._aligned = aligned(instant.links, carried, ranks.heaviest, scalars)
+        self._links, self._solids = self._aligned.links, self._aligned.carried
+        self._carried, self._ranks = carried, ranks
         self._scalars = scalars
         self._planar = bool(instant.angles)
         self._rows = Rows(scalars)
-        self._columns = possible(instant.links, scalars)
+        self._columns = possible(self._links, scalars)
 
     def respond(
         self, moving: Sequence[Acceleration], wrenches: Sequence[Force], tau: Sequence[Scalar]
@@ -117,7 +118,7 @@ class Elimination:
         the accelerations at v̇ = 0.
         """
         zero = zeros(self._scalars)
-        wrenches, tau = self._on_bodies(wrenches, tau)
+        wrenches, tau = self._on_bodies(*self._aligned.into(wrenches, tau))
         rows: list[list[tuple[Row, Vec]]] = [[] for _ in self._links]
         terms = [Force(zero, zero) for _ in self._links]
         found: list[Eliminated] = []
@@ -130,7 +131,7 @@ class Elimination:
             if link.parent >= 0:
                 rows[link.parent] += [(_turned(link, row), link.arm) for row in eliminated.rows]
                 terms[link.parent] = total(terms[link.parent], at_parent(link, passed))
-        return self._outwards(found[::-1], len(tau))
+        return self._aligned.out(self._outwards(found[::-1], len(tau)))
 
     # Inwards.
 
@@ -161,11 +162,13 @@ class Elimination:
         return (
             solid is not None
             and not self._ranks.light[k]
-            and not any(self._scalars.is_zero(solid.inertia[j][j]) for j in self._spins())
+            and not any(
+                self._scalars.is_zero(solid.inertia[j][j]) for j in AXES[2 * self._planar :]
+            )
         )
 
     def _spins(self) -> tuple[int, ...]:
-        return (2,) if self._planar else (0, 1, 2)
+        return (2,) if self._planar else AXES
 
     def _own_rows(
         self, k: int, a: Acceleration, wrench: Force
@@ -173,27 +176,28 @@ class Elimination:
         """Rows of a link's own mass, by axis: linear about its centre, and angular; and the part of
         the wrench that no inertia takes.
         """
-        s, zero, solid = self._scalars, zeros(self._scalars), self._solids[k]
-        if solid is None:
+        s, zero, solid, own = self._scalars, zeros(self._scalars), self._solids[k], self._carried[k]
+        if solid is None or own is None:
             return ({}, {}), wrench
         linear, angular, left, moment = {}, {}, zero, zero
-        way = add(a.linear, times(a.field, solid.centre))
+        into = self._aligned.turns[k].into
+        way = into(add(a.linear, times(a.field, own.centre)))
         light = self._ranks.light[k]
         if light or s.is_zero(solid.mass):
             left = wrench.force
         if not s.is_zero(solid.mass):
             m = s.call("max", solid.mass, self._rows.tiny)
-            for j in self._axes():
+            for j in AXES[: 2 if self._planar else 3]:
                 right = -way[j] if light else wrench.force[j] / m - way[j]
                 linear[j] = self._rows.make(m, zero, unit(j, s), right)
-        turning = moment_about_centre(solid.inertia, a, s)
+        turning = into(moment_about_centre(own.inertia, a, s))
         if light:
             moment = wrench.moment
             y = [-x for x in turning]
         else:
             y = list(sub(wrench.moment, turning))
         work = [list(row) for row in solid.inertia]
-        order = self._turns_of(self._links[k])
+        order = turns_of(self._links[k], self._planar)
         for n, i in enumerate(order):
             if s.is_zero(solid.inertia[i][i]):
                 if not light:
@@ -214,35 +218,6 @@ class Elimination:
     def _pivot_of(self, pivot: Scalar, entry: Scalar) -> Scalar:
         floor = self._rows.tiny if pivot is entry else self._scalars.number(SLIGHT) * entry
         return self._scalars.call("max", pivot, floor)
-
-    def _axes(self) -> tuple[int, ...]:
-        return (0, 1) if self._planar else (0, 1, 2)
-
-    def _turns_of(self, link: Link) -> tuple[int, ...]:
-        """The axes to turn about, that of the link last."""
-        if self._planar:
-            return (2,)
-        units = [axis.unit for axis, _ in link.free if axis.angular and axis.unit is not None]
-        last = units[-1] if units else 2
-        return ((last + 1) % 3, (last + 2) % 3, last)
-
-    def _slides_of(self, link: Link, arm: Vec, rows: Sequence[Row]) -> tuple[int, ...]:
-        """The axes to move along, that of the link last. Before it those that rows of few axes
-        hold, which so stay what they are, and that of an arm.
-        """
-        is_zero = self._scalars.is_zero
-        ways = [
-            [j for j in AXES if not is_zero(way[j])] for way in (arm, *(r.linear for r in rows))
-        ]
-        own = next((axis.unit for axis, _ in link.free if not axis.angular), None)
-        last = ways[0][0] if len(ways[0]) == 1 else 2
-
-        def late(j: int) -> tuple[bool, int, int]:
-            held = [len(way) for way in ways[1:] if j in way]
-            return j == own, -min(held, default=4), len(held)
-
-        turn = ((last + 1) % 3, (last + 2) % 3, last)
-        return tuple(sorted((j for j in turn if j in self._axes()), key=late))
 
     def _eliminated(
         self,
@@ -268,9 +243,10 @@ class Elimination:
         angular = {j: self._rows.of(about, row) for j, row in angular.items()}
         loose = [self._rows.of(about, shifted(row, sub(arm, at))) for row, arm in rows]
         turns: Steps = []
+        slides, ways = slides_of(link, at, loose, self._planar, s), turns_of(link, self._planar)
         orders = (
-            [j for j in self._slides_of(link, at, loose) if (False, j) in about],
-            [j for j in self._turns_of(link) if (True, j) in about],
+            [j for j in slides if (False, j) in about],
+            [j for j in ways if (True, j) in about],
         )
         loose += [linear.pop(j) for j in [*linear] if j not in orders[0]]
         loose += [angular.pop(j) for j in [*angular] if j not in orders[1]]

@@ -1,9 +1,9 @@
-"""Which accelerations the frames of a tree can have at all, by its shape."""
+"""Which accelerations the frames of a tree can have at all, and the order to eliminate them in."""
 
 from collections.abc import Sequence
 
 from eomgen.derivation.recursive.instant import Axis, Link
-from eomgen.derivation.recursive.rows import Column
+from eomgen.derivation.recursive.rows import Column, Row
 from eomgen.derivation.recursive.vectors import AXES, Scalars, Vec, cross, unit
 
 
@@ -29,6 +29,35 @@ def moved(columns: set[Column], at: Vec, scalars: Scalars) -> set[Column]:
         if angular:
             found |= _parts(False, cross(unit(j, scalars), at), scalars)
     return found
+
+
+def turns_of(link: Link, planar: bool) -> tuple[int, ...]:
+    """The axes to turn about, in the order to eliminate them in, that of the link last."""
+    if planar:
+        return (2,)
+    units = [axis.unit for axis, _ in link.free if axis.angular and axis.unit is not None]
+    last = units[-1] if units else 2
+    return ((last + 1) % 3, (last + 2) % 3, last)
+
+
+def slides_of(
+    link: Link, arm: Vec, rows: Sequence[Row], planar: bool, scalars: Scalars
+) -> tuple[int, ...]:
+    """The axes to move along, that of the link last. Before it those that rows of few axes hold,
+    which so stay what they are, and that of an arm.
+    """
+    ways = [
+        [j for j in AXES if not scalars.is_zero(way[j])] for way in (arm, *(r.linear for r in rows))
+    ]
+    own = next((axis.unit for axis, _ in link.free if not axis.angular), None)
+    last = ways[0][0] if len(ways[0]) == 1 else 2
+
+    def late(j: int) -> tuple[bool, int, int]:
+        held = [len(way) for way in ways[1:] if j in way]
+        return j == own, -min(held, default=4), len(held)
+
+    turn = ((last + 1) % 3, (last + 2) % 3, last)
+    return tuple(sorted((j for j in turn if not planar or j < 2), key=late))
 
 
 def column_of(axis: Axis) -> Column:

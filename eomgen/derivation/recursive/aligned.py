@@ -1,0 +1,109 @@
+"""Axes of frames on ball joints along the line to the heaviest thing that they carry.
+
+A heavy point pulls along that line and turns the frame about it by nothing at all, which sums of
+products would hide in their rounding: along a coordinate axis the lever is no number, but absent.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from eomgen.derivation.recursive.forces import Force
+from eomgen.derivation.recursive.instant import Link
+from eomgen.derivation.recursive.rotations import AxisTurn, Both, Rotation, Unturned
+from eomgen.derivation.recursive.solids import Solid
+from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, zeros
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """Links and what they carry in such axes; `turns` lead from these to the frames' own."""
+
+    links: tuple[Link, ...]
+    carried: tuple[Solid | None, ...]
+    turns: tuple[Rotation, ...]
+
+    def into(
+        self, wrenches: Sequence[Force], tau: Sequence[Scalar]
+    ) -> tuple[list[Force], list[Scalar]]:
+        """Wrenches on the frames, and what acts on the velocities."""
+        pairs = zip(self.turns, wrenches, strict=True)
+        turned = [Force(turn.into(f.moment), turn.into(f.force)) for turn, f in pairs]
+        found = list(tau)
+        for turn, link in zip(self.turns, self.links, strict=True):
+            if not isinstance(turn, Unturned):
+                x, y, z = link.v
+                found[x], found[y], found[z] = turn.into((tau[x], tau[y], tau[z]))
+        return turned, found
+
+    def out(self, rates: Sequence[Scalar]) -> list[Scalar]:
+        """Rates of the velocities as they are asked for."""
+        found = list(rates)
+        for turn, link in zip(self.turns, self.links, strict=True):
+            if not isinstance(turn, Unturned):
+                x, y, z = link.v
+                found[x], found[y], found[z] = turn.out((rates[x], rates[y], rates[z]))
+        return found
+
+
+def aligned(
+    links: Sequence[Link],
+    carried: Sequence[Solid | None],
+    heaviest: Sequence[int],
+    scalars: Scalars,
+) -> Aligned:
+    """Links, and what they carry, where `heaviest` is for each the link it carries to look at, or
+    -1. Frames on other joints keep their axes.
+    """
+    turns: list[Rotation] = [Unturned() for _ in links]
+    arms = {k: link.arm for k, link in enumerate(links)}
+    for k, link in enumerate(links):
+        child, spins = heaviest[k], [axis.angular for axis, _ in link.free] == [True] * 3
+        # What is free to move in all ways, by frames of no mass before, resists along that line.
+        loose = link.parent >= 0 and carried[link.parent] is None
+        if child >= 0 and spins and not loose:
+            turns[k], arms[child] = _along(links[child].arm, scalars)
+    found, bodies = [], []
+    for k, link in enumerate(links):
+        base = turns[link.parent] if link.parent >= 0 else Unturned()
+        turn = link.turn
+        if not isinstance(base, Unturned):
+            turn = Both(_back(base), turn)
+            if k != heaviest[link.parent]:
+                arms[k] = base.into(link.arm)
+        body = carried[k]
+        if not isinstance(turns[k], Unturned):
+            turn = Both(turn, turns[k])
+            if body is not None:
+                inertia = _back(turns[k]).out_symmetric(body.inertia)
+                body = replace(body, centre=turns[k].into(body.centre), inertia=inertia)
+        found.append(replace(link, turn=turn, arm=arms[k]))
+        bodies.append(body)
+    return Aligned(tuple(found), tuple(bodies), tuple(turns))
+
+
+def _along(arm: Vec, scalars: Scalars) -> tuple[Rotation, Vec]:
+    """A rotation that brings a coordinate axis to an arm, and the arm on that axis."""
+    ways = [j for j in AXES if not scalars.is_zero(arm[j])]
+    if len(ways) < 2:
+        return Unturned(), arm
+    zero = scalars.number(0.0)
+    if len(ways) == 3:
+        first, flat = _along((arm[0], arm[1], zero), scalars)
+        second, left = _along((flat[0], zero, arm[2]), scalars)
+        return Both(first, second), left
+    # A turn about the third axis brings axis i, the next after it, to the arm.
+    (k,) = (j for j in AXES if j not in ways)
+    i, j = (k + 1) % 3, (k + 2) % 3
+    length = scalars.call("sqrt", arm[i] * arm[i] + arm[j] * arm[j])
+    # An arm that a user makes 0 keeps its axes.
+    none = scalars.number(1.0) - scalars.call("step", length)
+    c, s = (arm[i] + none) / (length + none), arm[j] / (length + none)
+    along = list(zeros(scalars))
+    along[i] = length
+    return AxisTurn(k, c, s, scalars.number(2.0) * c), (along[0], along[1], along[2])
+
+
+def _back(turn: Rotation) -> Rotation:
+    if isinstance(turn, Both):
+        return Both(_back(turn.inner), _back(turn.outer))
+    return replace(turn, s=-turn.s) if isinstance(turn, AxisTurn) else turn
