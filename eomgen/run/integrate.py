@@ -29,7 +29,8 @@ ADAPTIVE_SAMPLES = 1001
 LEAST_STEPS = 1000
 """Of an adaptive method on a derivative with corners."""
 MOST_SAMPLES = 1_000_000
-REST_SPEED = 1e-3
+ATOL = 1e-12
+"""Of each state, in parts of its size."""
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Where in a long step the gaps of contacts are looked at; in an equal step at its ends."""
 
@@ -45,19 +46,20 @@ def integrate(
     t_start: float = 0.0,
     dt: float | None = None,
     rtol: float = 1e-9,
-    atol: float = 1e-12,
+    atol: float | None = None,
     samples: int | None = None,
     progress: Progress | None = None,
     max_step: float | None = None,
     max_steps: int = 10_000_000,
-    rest_speed: float = REST_SPEED,
+    rest_speed: float | None = None,
     powers: Powers | None = None,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
     integrator  a name in `eomgen.run.integrators.INTEGRATORS`
     dt          step in s of the fixed-step methods, which need it; the last one is shortened
-    rtol, atol  what the adaptive methods hold the error of each step to
+    rtol, atol  what the adaptive methods hold the error of each step to; without `atol`, each state
+                has 1e-12 of its size in `problem.sizes`
     samples     how many rows to keep: for fixed steps every k-th one such that there are about
                 this many (default: all), for adaptive methods this many equally spaced times
                 (default: 1001); the first and the last are always kept
@@ -66,7 +68,9 @@ def integrate(
                 error allows, but where the derivative has corners no more than 1/1000 of the run:
                 else they might leap over a contact or a pulse
     rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
-                that then neither part nor close are held, so that bouncing comes to an end
+                that then neither part nor close are held, so that bouncing comes to an end;
+                without it, it is √(1e-7 a size), of contacts that bounce by less than 5e-8 of the
+                mechanism's size under what accelerates them, a
     powers      asks for the works of effects
 
     Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
@@ -78,7 +82,7 @@ def integrate(
     _check_times(t_start, t_end)
     _check_tolerances(rtol, atol)
     _check_samples(samples)
-    if not (math.isfinite(rest_speed) and rest_speed > 0):
+    if rest_speed is not None and not (math.isfinite(rest_speed) and rest_speed > 0):
         raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
 
     derivatives, jacobians = _Count(), _Count()
@@ -97,7 +101,8 @@ def integrate(
         _check_no_step(integrator, dt)
         times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
         longest = _longest(max_step, t_end - t_start, problem.corners)
-        begin = _adaptive_steps(method, t_end, (rtol, atol, longest), times, max_steps)
+        allowed = _allowed(problem, atol)
+        begin = _adaptive_steps(method, t_end, (rtol, allowed, longest), times, max_steps)
 
     if problem.contacts is None:
         advances = begin(counted, t_start, 0)
@@ -149,7 +154,7 @@ def _equal_steps(change: Change, t_start: float, t_end: float, dt: float, every:
 def _adaptive_steps(
     method: Adaptive,
     t_end: float,
-    bounds: tuple[float, float, float],
+    bounds: tuple[float, float | Floats, float],
     times: Floats,
     max_steps: int,
 ) -> Begin:
@@ -323,8 +328,17 @@ def _check_times(t_start: float, t_end: float) -> None:
         raise RunError(f"t_end: {t_end:g} is not after t_start = {t_start:g}")
 
 
-def _check_tolerances(rtol: float, atol: float) -> None:
+def _allowed(problem: Problem, atol: float | None) -> float | Floats:
+    """The absolute tolerance, of each state where none was given and they have sizes."""
+    if atol is not None:
+        return atol
+    return ATOL * np.array(problem.sizes) if problem.sizes else ATOL
+
+
+def _check_tolerances(rtol: float, atol: float | None) -> None:
     for name, tolerance in (("rtol", rtol), ("atol", atol)):
+        if tolerance is None:
+            continue
         if not (math.isfinite(tolerance) and tolerance > 0):
             raise RunError(f"{name}: {tolerance:g} is not a positive number")
     if rtol < SMALLEST_RTOL:

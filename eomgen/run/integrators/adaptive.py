@@ -27,7 +27,7 @@ def advances(
     t_end: float,
     *,
     rtol: float,
-    atol: float,
+    atol: float | Floats,
     max_step: float,
     times: Floats,
     made: int,
