@@ -43,7 +43,8 @@ if TYPE_CHECKING:
 def simulate(given: Arguments) -> int:
     """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
     # Imported here: `check` and `generate` need neither SciPy nor Matplotlib.
-    from eomgen.run.trajectory import save_csv, save_npz
+    from eomgen.run.resume import going_on
+    from eomgen.run.trajectory import load_npz, save_csv, save_npz
     from eomgen.show.observe import observe
     from eomgen.study.trial import Case
 
@@ -55,15 +56,28 @@ def simulate(given: Arguments) -> int:
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
     wanted = model.simulation
     chosen = given.accuracy is not None or given.budget is not None
+    if chosen and given.resume is not None:
+        raise RunError(
+            "--from: goes on with a method that is named; leave --accuracy, --budget out"
+        )
     setting = None if chosen else _setting(given, model)
     paths = _output_paths(given, name)
+    if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
+        raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
     code, module = code_of(given.scene, model, given)
     values = (parameters or None, inputs or None)
+    kept = {"samples": given.samples, "max_step": given.max_step, "rest_speed": wanted.rest_speed}
+    problem, words = as_problem(module, *values, model), ""
+    if given.resume is not None:
+        assert setting is not None
+        start = going_on(load_npz(given.resume), given.resume, problem, setting)
+        problem, words = start.problem, start.words
+        kept |= start.options
     case = Case(
-        as_problem(module, *values, model),
+        problem,
         _or(given.t_end, wanted.t_end),
         module.UNITS,
-        {"samples": given.samples, "max_step": given.max_step, "rest_speed": wanted.rest_speed},
+        kept,
         terminal_progress,
     )
     powers = as_powers(module, *values) if given.works else None
@@ -86,6 +100,8 @@ def simulate(given: Arguments) -> int:
         f"{trajectory.counts['steps']} steps, {trajectory.counts['derivatives']} derivatives "
         f"({'derived now' if code.derived else 'module fresh, not derived again'})"
     )
+    if words:
+        print(f"    {words}")
     missed = print_choice(choice, given) if choice else ""
     if given.estimate and not choice and trajectory.finished:
         print_estimate(case, tried)

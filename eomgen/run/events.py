@@ -32,7 +32,7 @@ from eomgen.run.contacts import (
     still,
     strikes,
 )
-from eomgen.run.integrators.interface import Advance, StepFailure
+from eomgen.run.integrators.interface import Advance, Resume, StepFailure
 from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.trajectory import Event
 
@@ -52,7 +52,7 @@ class Stepper:
     counted  makes a function count among the derivatives evaluated
     """
 
-    begin: Callable[[Problem, float, int], Iterator[Advance]]
+    begin: Callable[[Problem, float, int, Resume | None], Iterator[Advance]]
     looks: Sequence[float]
     counted: Callable[[Rate], Rate]
 
@@ -101,11 +101,12 @@ def advances(
     *,
     rest_speed: float | None,
     max_steps: int,
+    resume: Resume | None = None,
 ) -> Iterator[Advance]:
     """Yield the steps of a run with contacts, cut where one strikes or opens, and the strikes.
 
-    `rest_speed`, m/s or rad/s: see `integrate`. Raises `StepFailure` for a start too deep, for contacts that admit no forces, for impacts
-    without end, and after `max_steps`.
+    `rest_speed`, m/s or rad/s, and `resume`: see `integrate`. Raises `StepFailure` for a start too
+    deep, for contacts that admit no forces, for impacts without end, and after `max_steps`.
     """
     assert problem.contacts is not None
     problem = replace(problem, contacts=in_sizes(problem.contacts))
@@ -114,9 +115,17 @@ def advances(
     count = len(contacts.names)
     fastest = float(np.abs(contacts.rates(t_start, problem.initial)).max())
     now = _Moment(t_start, problem.initial, (), np.zeros(count), fastest)
-    alpha = recovery(contacts, t_start, now.y, t_end - t_start)
-    check_depth(contacts, now.t, now.y)
-    closed = np.flatnonzero(contacts.gaps(now.t, now.y) <= TOLERANCE).tolist()
+    closed: list[int] = []
+    begun = (now.t, now.y)
+    if resume and "alpha" in resume:
+        alpha = float(resume["alpha"])
+        now.held = tuple(resume["held"].astype(int).tolist())
+        now.slack, now.fastest = resume["slack"].copy(), float(resume["fastest"])
+        begun = (float(resume["begun_t"]), resume["begun_y"])
+    else:
+        alpha = recovery(contacts, t_start, now.y, t_end - t_start)
+        check_depth(contacts, now.t, now.y)
+        closed = np.flatnonzero(contacts.gaps(now.t, now.y) <= TOLERANCE).tolist()
     guard = _Guard(1e-9 * (t_end - t_start), t_start)
     made = 0
     while True:
@@ -126,10 +135,14 @@ def advances(
         closed = []
         if now.t >= t_end:
             return
-        holding = Holding(contacts, now.held, (now.t, now.y), alpha) if now.held else None
+        if resume is None:
+            begun = (now.t, now.y)
+        holding = Holding(contacts, now.held, begun, alpha) if now.held else None
         piece = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
-        for advance in stepper.begin(piece, now.t, made):
+        steps = stepper.begin(piece, now.t, made, resume)
+        resume = None
+        for advance in steps:
             made += 1
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice; take a shorter --t-end")
@@ -149,7 +162,29 @@ def advances(
             now.t, now.y = step.t, step.y
             if now.slack.any():
                 now.slack[contacts.gaps(now.t, now.y) > TOLERANCE] = 0.0
-            yield step
+            yield replace(step, resume=_resume(step, now, begun, alpha))
+
+
+def _resume(
+    step: Advance, now: _Moment, begun: tuple[float, Floats], alpha: float
+) -> Callable[[], Resume] | None:
+    """What a step goes on from, with what contacts do."""
+    if step.resume is None:
+        return None
+    held, slack, fastest, own = now.held, now.slack.copy(), now.fastest, step.resume
+
+    def resume() -> Resume:
+        return {
+            **own(),
+            "alpha": np.array(alpha),
+            "held": np.array(held, dtype=np.float64),
+            "slack": slack,
+            "fastest": np.array(fastest),
+            "begun_t": np.array(begun[0]),
+            "begun_y": begun[1],
+        }
+
+    return resume
 
 
 def _strike(
@@ -225,7 +260,8 @@ def _cut(now: _Moment, step: Advance, t: float, keep: bool) -> Iterator[Advance]
     y = step.y if t == step.t else step.within(t)
     samples = [sample for sample in step.samples if sample[0] < t or (sample[0] == t and not keep)]
     now.t, now.y = t, y
-    yield replace(step, t=t, y=y, samples=[*samples, (t, y)] if keep else samples)
+    rows = [*samples, (t, y)] if keep else samples
+    yield replace(step, t=t, y=y, samples=rows, resume=None)
 
 
 def _closing(

@@ -17,7 +17,8 @@ from eomgen.run.integrators import (
     find_integrator,
     fixed_step,
 )
-from eomgen.run.integrators.interface import Adaptive, Advance, Change
+from eomgen.run.integrators.interface import Adaptive, Advance, Change, Resume
+from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.trajectory import Event, Trajectory
@@ -34,8 +35,8 @@ ATOL = 1e-12
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Where in a long step the gaps of contacts are looked at; in an equal step at its ends."""
 
-Begin = Callable[[Problem, float, int], Iterator[Advance]]
-"""Steps of a problem from a time on; with how many were made before."""
+Begin = Callable[[Problem, float, int, Resume | None], Iterator[Advance]]
+"""Steps of a problem from a time on; with how many were made before, and what they go on from."""
 
 
 def integrate(
@@ -53,6 +54,7 @@ def integrate(
     max_steps: int = 10_000_000,
     rest_speed: float | None = None,
     powers: Powers | None = None,
+    resume: Resume | None = None,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
@@ -72,12 +74,20 @@ def integrate(
                 without it, it is √(1e-7 a size), of contacts that bounce by less than 5e-8 of the
                 mechanism's size under what accelerates them, a
     powers      asks for the works of effects
+    resume      what an earlier run left in `Trajectory.resume`: this one goes on from there,
+                whatever `t_start` and `problem.initial` say, to the same bytes as if that one had
+                not ended, if method and step or tolerances are the same
 
     Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
     has begun, Ctrl-C included, ends it early instead: the trajectory then holds the finite rows
     up to there, is not `finished`, and its `message` says where, why, and what to change.
     """
     method = find_integrator(integrator)
+    grid = float(t_start)
+    if resume is not None:
+        t_start = float(resume["t"])
+        problem = replace(problem, initial=resume["y"])
+        grid = float(resume.get("grid", t_start))
     t_start, t_end = float(t_start), float(t_end)
     _check_times(t_start, t_end)
     _check_tolerances(rtol, atol)
@@ -92,25 +102,36 @@ def integrate(
         jacobian=jacobians.of(problem.jacobian),
     )
     begin: Begin
+    longest: float | None = None
     if isinstance(method, FixedStep):
         if max_step is not None:
             raise RunError(f"max_step: {integrator} takes equal steps; give --dt instead")
         dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
-        begin = _equal_steps(method.prepare(counted), t_start, t_end, dt, every)
+        # What is looked at on the way does not count.
+        watched = problem if method.explicit else None
+        begin = _equal_steps(method.prepare(counted), grid, t_end, dt, every, watched)
     else:
         _check_no_step(integrator, dt)
         times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
         longest = _longest(max_step, t_end - t_start, problem.corners)
+        if resume is not None and max_step is None:
+            longest = float(resume.get("longest", longest))
         allowed = _allowed(problem, atol)
         begin = _adaptive_steps(method, t_end, (rtol, allowed, longest), times, max_steps)
 
     if problem.contacts is None:
-        advances = begin(counted, t_start, 0)
+        advances = begin(counted, t_start, 0, resume)
     else:
         looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
         stepper = events.Stepper(begin, looks, derivatives.of)
         advances = events.advances(
-            stepper, counted, t_start, t_end, rest_speed=rest_speed, max_steps=max_steps
+            stepper,
+            counted,
+            t_start,
+            t_end,
+            rest_speed=rest_speed,
+            max_steps=max_steps,
+            resume=resume,
         )
 
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
@@ -137,15 +158,28 @@ def integrate(
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
         work_names=account.names if account else (),
+        resume={**run.resume(), **_numbers(grid=grid, dt=dt, rtol=rtol, atol=atol, longest=longest)}
+        if run.resume
+        else {},
     )
 
 
-def _equal_steps(change: Change, t_start: float, t_end: float, dt: float, every: int) -> Begin:
+def _equal_steps(
+    change: Change, t_start: float, t_end: float, dt: float, every: int, watched: Problem | None
+) -> Begin:
     """Steps of `dt` from `t_start`, wherever they are begun; every how-manieth has a row."""
 
-    def begin(problem: Problem, t: float, made: int) -> Iterator[Advance]:
+    def begin(problem: Problem, t: float, made: int, resume: Resume | None) -> Iterator[Advance]:
         return fixed_step.advances(
-            change, problem, t, t_start=t_start, t_end=t_end, dt=dt, every=every
+            change,
+            problem,
+            t,
+            t_start=t_start,
+            t_end=t_end,
+            dt=dt,
+            every=every,
+            watched=problem if watched and problem.contacts else watched,
+            resume=resume,
         )
 
     return begin
@@ -163,7 +197,7 @@ def _adaptive_steps(
     """
     rtol, atol, longest = bounds
 
-    def begin(problem: Problem, t: float, made: int) -> Iterator[Advance]:
+    def begin(problem: Problem, t: float, made: int, resume: Resume | None) -> Iterator[Advance]:
         return adaptive.advances(
             method,
             problem,
@@ -175,6 +209,7 @@ def _adaptive_steps(
             times=times,
             made=made,
             max_steps=max_steps,
+            resume=resume,
         )
 
     return begin
@@ -212,6 +247,7 @@ class _Run:
     works: list[Floats] = field(default_factory=list)
     steps: int = 0
     events: list[Event] = field(default_factory=list)
+    resume: Callable[[], Resume] | None = None
 
     def __post_init__(self) -> None:
         self._keep()
@@ -224,6 +260,7 @@ class _Run:
         self.rows.extend(advance.samples)
         self.steps += advance.is_step
         self.events.extend(advance.events)
+        self.resume = advance.resume or self.resume
 
     def end(self) -> None:
         """Keep the last state, too, where no row has its time."""
@@ -258,6 +295,8 @@ def _follow(
         return ""
     except KeyboardInterrupt:
         trouble = f"interrupted at t = {run.t:.6g}"
+    except UnstableStepError as failure:
+        trouble = f"stopped at {_place(problem, run)}: {failure}"
     except StepFailure as failure:
         why = problem.explain(run.t, run.y, problem.initial)
         cause = f"{str(failure).partition(';')[0]}: {why}" if why else str(failure)
@@ -326,6 +365,11 @@ def _check_times(t_start: float, t_end: float) -> None:
             raise RunError(f"{name}: {time:g} is not a finite time")
     if t_end <= t_start:
         raise RunError(f"t_end: {t_end:g} is not after t_start = {t_start:g}")
+
+
+def _numbers(**values: float | None) -> dict[str, Floats]:
+    """Numbers as arrays, nan for none."""
+    return {name: np.array(math.nan if x is None else x) for name, x in values.items()}
 
 
 def _allowed(problem: Problem, atol: float | None) -> float | Floats:
