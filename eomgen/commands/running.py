@@ -29,7 +29,7 @@ from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.joints.base import Geared
 from eomgen.model import Model, ways_of
-from eomgen.run.limits import excursions
+from eomgen.run.limits import excursions, locks
 from eomgen.run.module import as_powers, as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory
@@ -110,6 +110,8 @@ def simulate(given: Arguments) -> int:
     if motion.joints:
         print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
     _print_excursions(model, trajectory)
+    for line in locks(model, trajectory):
+        print(f"    {line}")
     for path in paths.values():
         print(f"    wrote {path}")
     warn_of_energy(motion)

@@ -32,6 +32,9 @@ for a mechanism of one metre under gravity."""
 RISE = 5e-8
 """In sizes: a bounce that will not rise higher than this is none, unless `rest_speed` says so."""
 
+AWAY = 1e-6
+"""In accelerations of the motion: a gap that grows at more than this does so of itself."""
+
 STRONG = 2.0**200
 """N or N m: a force beside which all others are nothing, whatever it moves."""
 
@@ -75,9 +78,26 @@ def recovery(contacts: Contacts, t: float, y: Floats, span: float) -> float:
 
 def pressed(contacts: Contacts, t: float, y: Floats) -> float:
     """The greatest acceleration of any gap, either way, without contact forces: sizes/s²."""
+    return float(np.abs(accelerations(contacts, t, y)).max())
+
+
+def accelerations(contacts: Contacts, t: float, y: Floats) -> Floats:
+    """Those of the gaps (nc,), without contact forces: sizes/s²."""
     count = len(contacts.names)
-    found = contacts.held(t, y, np.zeros(count))[len(y) : len(y) + count]
-    return float(np.abs(found).max())
+    return contacts.held(t, y, np.zeros(count))[len(y) : len(y) + count]
+
+
+def slowest_bounces(free: Floats, rest_speed: Floats | None) -> Floats:
+    """With what speed each contact must close to bounce (nc,), sizes/s: `rest_speed` if given, or
+    that from which the bounce rises by `RISE` under the accelerations `free` of the gaps.
+
+    One that parts of itself, as what grazes along a curve does, bounces at any: its bounces come to
+    an end without, and to stop them would stop what slides by.
+    """
+    force = float(np.abs(free).max())
+    # What strikes at v under the acceleration a rises by v²/2a.
+    rising = np.full(len(free), math.sqrt(2 * RISE * force))
+    return np.where(free > AWAY * force, 0.0, rising if rest_speed is None else rest_speed)
 
 
 @dataclass(frozen=True, eq=False)

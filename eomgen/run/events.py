@@ -7,7 +7,8 @@ that are held by their forces.
 What is promised: no contact is ever deeper than `contacts.TOLERANCE` of the mechanism's size, 1e-9,
 and what the method's own error adds between the looks at a step. An impact at which a contact
 closes so slowly that it would not rise by 5e-8 of that size, or more slowly than `rest_speed`, does
-not bounce, which ends the bounces that would go on for ever in a finite time.
+not bounce, which ends the bounces that would go on for ever in a finite time; one whose gap grows of
+itself, as of what grazes along a curve, always bounces.
 """
 
 import math
@@ -19,16 +20,16 @@ import numpy as np
 from scipy.optimize import brentq
 
 from eomgen.run.contacts import (
-    RISE,
     STILL,
     TOLERANCE,
     Holding,
     Rate,
+    accelerations,
     check_depth,
     in_sizes,
-    pressed,
     recovery,
     restrained,
+    slowest_bounces,
     still,
     strikes,
 )
@@ -206,14 +207,10 @@ def _strike(
         return Advance(t, y, [], problem, lambda _: y, is_step=False, struck=struck)
 
     sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
-    force = pressed(contacts, t, now.y)
+    free = accelerations(contacts, t, now.y)
     now.fastest = max(now.fastest, float(np.abs(contacts.rates(t, now.y)).max()))
-    nothing = STILL * max(now.fastest, math.sqrt(force))
-    # What strikes at v under the acceleration a rises by v²/2a.
-    if rest_speed is None:
-        least = np.full(len(sizes), math.sqrt(2 * RISE * force))
-    else:
-        least = rest_speed / sizes
+    nothing = STILL * max(now.fastest, math.sqrt(np.abs(free).max()))
+    least = slowest_bounces(free, None if rest_speed is None else rest_speed / sizes)
     for contact, speed, y in strikes(contacts, t, now.y, touching, least, nothing):
         now.y = y
         speeds[contact] = max(speeds.get(contact, 0.0), speed)

@@ -319,6 +319,9 @@ def _why(counts: tuple[_Count, _Count], problem: Problem, run: _Run, error: str)
             why = problem.explain(t, y, problem.initial)
             if why:
                 return f"{'there' if here else 'in the next step'} {why}"
+            why = "" if here else problem.explain(run.t, run.y, problem.initial)
+            if why:
+                return f"there {why}"
             return f"the Jacobian: {error}" if count is counts[1] else error
     why = problem.explain(run.t, run.y, problem.initial)
     return f"there {why}" if why else error

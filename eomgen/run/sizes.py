@@ -1,7 +1,7 @@
 """How large a mechanism and its motion are, where something has to count as small beside them.
 
-All sizes are whole powers of two: a scene in other units by such a factor runs exactly alike, and
-in units by a power of ten but for rounding.
+All sizes scale with the units of a scene: in units by powers of two it runs exactly alike, in units
+by powers of ten but for rounding.
 """
 
 import math
@@ -29,7 +29,7 @@ def mechanism_size(
     placed = _lengths((name, value) for name, value in start.items() if units.get(name) == "m")
     near = max((value for name, value in own if not name.endswith("_offset")), default=0.0)
     far = max((value for _, value in own + placed), default=0.0)
-    return power_of_two(max(near, FAR * far) if near else far)
+    return _or_one(max(near, FAR * far) if near else far)
 
 
 def state_sizes(
@@ -46,7 +46,7 @@ def state_sizes(
     for i in moves:
         own = lengths[units[states[i]]]
         rate = max(rate, abs(float(y[i])) / own, math.sqrt(abs(float(slope[i])) / own))
-    rate = power_of_two(rate)
+    rate = _or_one(rate)
     others: dict[str, float] = {}
     for i, state in enumerate(states):
         unit = units.get(state, "")
@@ -56,16 +56,14 @@ def state_sizes(
     found = []
     for state in states:
         unit = units.get(state, "")
-        known = lengths[unit] if unit in lengths else power_of_two(others[unit])
+        known = lengths[unit] if unit in lengths else _or_one(others[unit])
         found.append(known * (rate if unit in ("m/s", "rad/s") else 1.0))
     return tuple(found)
 
 
-def power_of_two(value: float) -> float:
-    """The greatest one that is not above a value; 1 if that is 0 or not finite."""
-    if not (value > 0 and math.isfinite(value)):
-        return 1.0
-    return math.ldexp(0.5, math.frexp(value)[1])
+def _or_one(value: float) -> float:
+    """A positive value; 1 for one that is 0 or not finite."""
+    return value if value > 0 and math.isfinite(value) else 1.0
 
 
 def _lengths(pairs: Iterable[tuple[str, float]]) -> list[tuple[str, float]]:
