@@ -20,8 +20,13 @@ def pendulum(below: float) -> str:
     return f"""
 name = "graze"
 bodies = [{{ name = "b", mass = 0.5, inertia_com = 0 }}]
-joints = [{{ name = "j", type = "revolute", parent = "world", child = "b", r_child = [0, {SWING}] }}]
 initial = {{ q = {{ j_angle = 1.5 }} }}
+[[joints]]
+name = "j"
+type = "revolute"
+parent = "world"
+child = "b"
+r_child = [0, {SWING}]
 [[effects]]
 type = "gravity"
 g = {G}
@@ -50,8 +55,8 @@ def ran(text: str, method: str, t_end: float, **given: float) -> tuple[Trajector
 @pytest.mark.parametrize("method", ["rk4", "DOP853"])
 @pytest.mark.parametrize("below", [1e-6, 1e-12, 0.0, -1e-12, -1e-6, -1e-3])
 def test_grazing(method: str, below: float) -> None:
-    """A floor just missed, just touched, or just hit, in two swings: the run comes to its end, keeps
-    its energy, and is never deeper than is stated. What misses is not disturbed.
+    """A floor just missed, just touched, or just hit, in two swings: the run comes to its end,
+    keeps its energy, and is never deeper than is stated. What misses is not disturbed.
     """
     run, gaps = ran(pendulum(below), method, 3.0)
     assert gaps.min() > -TOLERANCE

@@ -152,7 +152,7 @@ def test_the_redundant_state_drifts_and_the_reduced_one_does_not() -> None:
         assert len(module.STATES) == count
         run = ran(as_problem(module), "rk4", 20.0, dt=0.02, samples=101)
         gaps[form] = _gap(module, run)
-    assert gaps["momentum"] < 1e-13
+    assert gaps["momentum"] < np.spacing(2000.0)  # it falls so far, m
     assert gaps["redundant"] > 1e-7
 
 

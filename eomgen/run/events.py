@@ -7,8 +7,8 @@ that are held by their forces.
 What is promised: no contact is ever deeper than `contacts.TOLERANCE` of the mechanism's size, 1e-9,
 and what the method's own error adds between the looks at a step. An impact at which a contact
 closes so slowly that it would not rise by 5e-8 of that size, or more slowly than `rest_speed`, does
-not bounce, which ends the bounces that would go on for ever in a finite time; one whose gap grows of
-itself, as of what grazes along a curve, always bounces.
+not bounce, which ends the bounces that would go on for ever in a finite time; one whose gap grows
+of itself, as of what grazes along a curve, always bounces.
 """
 
 import math

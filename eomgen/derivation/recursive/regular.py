@@ -1,7 +1,7 @@
 """Is there inertia against every motion? Asked before code is written, in numbers."""
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from eomgen.derivation.recursive.articulated import (
