@@ -81,6 +81,8 @@ def _parser() -> argparse.ArgumentParser:
         ("view", commands.view, "integrate, and open the moving picture"),
     ):
         _simulation(_code(_form(command(name, run, about))))
+    about = "the module against an independent solver and 60 digits, at hard states, too"
+    _verification(_route(command("verify", commands.verify, about)))
     about = "say what accuracy costs in time, and how exact the arithmetic is"
     _accuracy(_route(_form(command("accuracy", commands.accuracy, about))))
     about = "say what each effect costs, and what leaving it out does to the motion"
@@ -106,8 +108,9 @@ def _form(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 def _route(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument(
         "--route",
-        choices=("auto", "closed", "ldl", "aba"),
-        help="way to the equations (the scene's; auto is the one of the fewest operations)",
+        choices=("auto", "closed", "ldl", "aba", "orthogonal"),
+        help="way to the equations (the scene's; auto is the one of the fewest operations that "
+        "keeps its digits)",
     )
     return parser
 
@@ -151,6 +154,13 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--estimate", action="store_true", help="estimate the error of the run by a second one"
     )
+    parser.add_argument(
+        "--guard",
+        choices=("stop", "repair"),
+        nargs="?",
+        const="stop",
+        help="watch rounding at every step, and stop where digits are lost, or repair it",
+    )
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument(
         "--from",
@@ -189,6 +199,33 @@ def _accuracy(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="of its random states")
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
+    _force(parser)
+
+
+def _verification(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--states", metavar="N", type=int, help="states of each kind (8, 2 if there are many)"
+    )
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of the random states")
+    parser.add_argument(
+        "--bound", metavar="ULPS", type=float, help="most that v̇ may be off (what the data allow)"
+    )
+    parser.add_argument(
+        "--horizon",
+        metavar="S",
+        type=float,
+        nargs="?",
+        const=60.0,
+        help="say how long doubles mean anything, by a run in long numbers of at most S s (60)",
+    )
+    parser.add_argument(
+        "--save",
+        metavar="DIR",
+        type=Path,
+        nargs="?",
+        const=Path("generated"),
+        help="write the evidence beside the module, in DIR (generated)",
+    )
     _force(parser)
 
 

@@ -14,6 +14,8 @@ SIGNATURES = (
     b"# eomgen linearisation of ",
     b"# eomgen accuracy of ",
     b"# eomgen arithmetic of ",
+    b"# eomgen verification of ",
+    b'"eomgen": "verification of ',
     b"eomgen.npy",  # archives: their first member
     b"Software\0eomgen",  # PNG
     b"<dc:title>eomgen</dc:title>",  # SVG: who made it

@@ -1,5 +1,6 @@
 """What the tests share: fixtures, and which of them run in one process."""
 
+import gc
 from collections.abc import Iterator
 
 import pytest
@@ -10,6 +11,13 @@ TOGETHER = {
     "effects": "absence bookkeeping".split(),
 }
 """Files whose tests ask for the same compiled scenes: these are made once a process."""
+
+
+def pytest_configure() -> None:
+    """Look for garbage seldom: a compiled scene is a hundred thousand things that are kept, and to
+    go through them again and again takes a fifth of the time.
+    """
+    gc.set_threshold(100_000, 20, 20)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -1,7 +1,7 @@
 """Scenes compiled by a given route, for tests: as loaded modules, and as programs in 60 digits."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -12,8 +12,7 @@ from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.model import Model
 from eomgen.program import from_recursion as recording
-from eomgen.program.digits import MP, Digits, exact
-from eomgen.program.program import interpret
+from eomgen.program.digits import MP, Digits, evaluator, exact
 from eomgen.program.route import routed
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
@@ -26,6 +25,7 @@ __all__ = ["MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact"
 
 STEP = MP.mpf(10) ** -20
 """Of central differences, which are off by its square."""
+DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,6 +36,9 @@ class Engine:
     system: System
     source: str
     module: Any
+    _runs: dict[str, Callable[[Mapping[str, Any]], list[Any]]] = field(
+        init=False, default_factory=dict
+    )
 
     def exactly(
         self,
@@ -60,9 +63,9 @@ class Engine:
         return np.array(columns, dtype=object).T
 
     def _run(self, output: str, given: Mapping[str, Any]) -> np.ndarray:
-        inputs = {name: MP.mpf(value) for name, value in given.items()}
-        found = interpret(self.system.program, output, inputs, Digits())
-        return np.array(found, dtype=object)
+        if output not in self._runs:
+            self._runs[output] = evaluator(self.system.program, output)
+        return np.array(self._runs[output](given), dtype=object)
 
     def random_state(self, rng: np.random.Generator) -> np.ndarray:
         """Angles over two turns, slides within 0.6 m, unit quaternions; 3 rad/s, 1 m/s."""
@@ -78,21 +81,26 @@ def read(scene: str) -> Scene:
     return read_scene(scene) if scene in built_in_names() else parse_scene(scene)
 
 
-@cache
 def engine(
     scene: str, route: str = "", *, leave_out: tuple[str, ...] = (), tangents: bool = False
 ) -> Engine:
-    """Compile a scene with all outputs but some, by a route or by its own.
+    """Compile a scene, once, with all outputs but some, by a route or by its own.
 
-    `tangents`: as large models have it, no matrix of derivatives is written out.
+    Without "jacobian" and what else is in `DERIVATIVES`, most of the work is left out. `tangents`:
+    as large models have it, no matrix of derivatives is written out.
     """
+    return _engine(scene, route, leave_out, tangents)
+
+
+@cache
+def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) -> Engine:
     model = build_model(read(scene).replaced(outputs="all"))
     outputs = tuple(name for name in model.outputs if name not in leave_out)
     model = replace(model, outputs=outputs, route=route or model.route)
     with pytest.MonkeyPatch.context() as patch:
         if tangents:
             patch.setattr(recording, "LARGEST_JACOBIAN", -1)
-        system = routed(model).system
+        system = routed(model, jacobian="jacobian" not in leave_out).system
     source = python_module(system)
     return Engine(model, system, source, load_module(source, f"tested_{model.name}"))
 

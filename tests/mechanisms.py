@@ -8,14 +8,13 @@ from functools import cache
 
 import numpy as np
 from campaign import some
+from engine import Engine
 from newton_euler import Mechanism, Motion, solve
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.derivation.closed import Equations, derive
-from eomgen.model import Model
 from eomgen.program.from_equations import from_equations
-from eomgen.program.system import System
 from eomgen.scene.reader import parse_scene, read_scene
 
 BUILT_IN = ("double_pendulum", "pendulum", "two_body", "two_body_forced")
@@ -90,29 +89,30 @@ class Scene:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Compiled:
-    """A scene after every stage of eomgen."""
+class Compiled(Engine):
+    """A scene after every stage of eomgen, told in plain numbers too."""
 
     scene: Scene
-    model: Model
     equations: Equations
-    system: System
-    source: str
-    module: types.ModuleType
+
+
+def compiled(scene: "Scene | str", form: str = "velocity") -> Compiled:
+    """Compile a scene, or a built-in one by name, once; all outputs on; by the route `closed`."""
+    return _compiled(TOLD[scene] if isinstance(scene, str) else scene, form)
 
 
 @cache
-def compiled(scene: "Scene | str", form: str = "velocity") -> Compiled:
-    """Compile a scene, or a built-in one by name, once; all outputs on; by the route `closed`."""
-    if isinstance(scene, str):
-        scene = TOLD[scene]
+def _compiled(scene: Scene, form: str) -> Compiled:
     read = read_scene(scene.name) if scene.text is None else parse_scene(scene.text)
     model = replace(build_model(read), form=form)
-    equations = derive(model)
+    if form == "velocity":
+        equations = derive(model)
+    else:  # the same equations, to be written in other states
+        equations = replace(compiled(scene).equations, model=model)
     system = from_equations(equations)
     assert system.route == "closed"
     source = python_module(system)
-    return Compiled(scene, model, equations, system, source, load(source))
+    return Compiled(model, system, source, load(source), scene, equations)
 
 
 def load(source: str) -> types.ModuleType:

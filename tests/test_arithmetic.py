@@ -7,18 +7,22 @@ from functools import cache
 from pathlib import Path
 from typing import Any, get_args
 
+import gmpy2
 import mpmath
 import numpy as np
 import pytest
 from engine import MP, Digits, apart, exact, read
 
+from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.cli import main
+from eomgen.language.formula import FUNCTIONS
 from eomgen.model import Model
-from eomgen.program.program import Program, interpret
+from eomgen.program.digits import evaluator
+from eomgen.program.program import Output, Program, finish, interpret
 from eomgen.program.route import routed
 from eomgen.program.system import System
-from eomgen.program.tape import TIME, ExactTape, Tape
+from eomgen.program.tape import TIME, ExactTape, Stage, Tape
 from eomgen.run.module import load_module
 from eomgen.scene.schema import Route
 from eomgen.study import timing
@@ -28,7 +32,6 @@ from eomgen.study.arithmetic import (
     Arithmetic,
     Way,
     arithmetic,
-    python_module,
     solve_operations,
 )
 from eomgen.study.single import Single, in_single, kernel_in_single
@@ -136,12 +139,14 @@ def states_of(system: System, count: int = 5) -> tuple[np.ndarray, np.ndarray]:
 
 def in_digits(system: System, program: Program, t: np.ndarray, y: np.ndarray) -> np.ndarray:
     """v̇ of a program in 60 digits, as columns."""
-    given = dict(zip((s.name for s in system.states), exact(y.T), strict=True))
-    given |= {name: MP.mpf(value) for name, value in system.model.defaults.items()}
-    given |= {i.name: MP.mpf(0) for i in system.model.inputs} | {TIME: exact(t)}
     nq, nv = len(system.model.coordinates), len(system.model.velocities)
-    rows = interpret(program, "derivative", given, Digits())[nq : nq + nv]
-    return np.array([np.broadcast_to(np.asarray(x, object), t.shape) for x in rows])
+    run, names = evaluator(program, "derivative"), [state.name for state in system.states]
+    given = {**system.model.defaults, **{i.name: 0.0 for i in system.model.inputs}}
+    columns = [
+        run({**given, **dict(zip(names, state, strict=True)), TIME: time})[nq : nq + nv]
+        for time, state in zip(t, y, strict=True)
+    ]
+    return np.array(columns, dtype=object).T
 
 
 # The truth.
@@ -508,17 +513,53 @@ def test_command_tells_what_is_not_there(
         assert capsys.readouterr().err.startswith(f"eomgen: {wrong[0]}: ")
 
 
-def test_digits_are_those_of_mpmath() -> None:
-    """Every function of formulas, of a number and of an array of them."""
-    digits = Digits()
-    x = exact(np.array([0.3, 0.7]))
-    with mpmath.workdps(60):
-        for name in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh", "sqrt"):
-            expected = [getattr(mpmath, name)(mpmath.mpf(z)) for z in (0.3, 0.7)]
-            found = digits.call(name, x)
-            assert all(abs(a - b) < 1e-55 for a, b in zip(found, expected, strict=True))
-            assert digits.call(name, x[0]) == found[0]
-    assert list(digits.call("select", x - 0.5, x, -x)) == [-x[0], x[1]]
-    assert list(digits.call("step", x - 0.5)) == [0, 1]
-    assert list(digits.call("max", x, MP.mpf(0.5))) == [0.5, x[1]]
-    assert digits.is_zero(0 * x) and not digits.is_zero(x - x[0])
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_functions_in_sixty_digits(name: str) -> None:
+    """Every function of formulas, alone and in a program, against mpmath's in 80 digits."""
+    tape, count = Tape(), FUNCTIONS[name]
+    node = tape.apply(name, *(tape.input(x, Stage.POSITIONS) for x in "abc"[:count]))
+    run = evaluator(finish(tape, {"f": Output((), (node.index,))}, ()), "f")
+    by_hand = {
+        "abs": abs,
+        "step": lambda x: mpmath.mpf(x > 0),
+        "min": lambda a, b: a if a < b else b,
+        "max": lambda a, b: b if a < b else a,
+        "select": lambda c, a, b: a if c > 0 else b,
+    }
+    for numbers in ((0.3, 0.7, 0.9), (0.7, -0.3, 0.2), (-0.7, 0.3, 0.2)):
+        given = exact(numbers[:count])
+        with mpmath.workdps(80):
+            more = map(mpmath.mpf, given)
+            expected = by_hand[name](*more) if name in by_hand else getattr(mpmath, name)(*more)
+        if not isinstance(expected, mpmath.mpf):  # a complex number
+            with pytest.raises((ArithmeticError, ValueError)):
+                run(dict(zip("abc", given, strict=False)))
+            continue
+        for found in (*run(dict(zip("abc", given, strict=False))), Digits().call(name, *given)):
+            assert isinstance(found, MP.mpf) and abs(found - expected) < 1e-59
+
+
+@pytest.mark.parametrize("bits", (24, 53, 400))
+def test_programs_in_sixty_digits(bits: int) -> None:
+    """Sums, products and quotients keep their digits, whatever digits the caller works in."""
+    tape = Tape()
+    x, three, tiny = tape.input("x", Stage.POSITIONS), tape.constant(3.0), tape.constant(1e-300)
+    nodes = (-x / three, x * x * tiny, x / three - x * tape.constant(0.3))
+    program = finish(tape, {"f": Output((3,), tuple(node.index for node in nodes))}, ())
+    for value in (1.0, 3, MP.mpf(-2) / 7, MP.mpf(10) ** 40, MP.mpf(10) ** -400, 0.0):
+        z = MP.mpf(value)
+        with gmpy2.context(precision=bits):
+            found = evaluator(program, "f")({"x": value})
+        for a, b in zip(found, (-z / 3, z * z * 1e-300, z / 3 - z * 0.3), strict=True):
+            assert abs(a - b) <= 1e-58 * abs(b)
+
+
+def test_no_value_in_sixty_digits() -> None:
+    """Where a step has none, there is none, even if later steps hid it."""
+    tape = Tape()
+    x, one = tape.input("x", Stage.POSITIONS), tape.constant(1.0)
+    root = tape.apply("sqrt", x - one)
+    for node in (one / (one / x), root / root, tape.apply("max", tape.apply("log", x), x)):
+        program = finish(tape, {"f": Output((), (node.index,))}, ())
+        with pytest.raises((ArithmeticError, ValueError)):
+            evaluator(program, "f")({"x": 0.0})

@@ -406,7 +406,7 @@ MISTAKES = [
      "route: unknown value 'abba' (did you mean 'aba'?)"),
     *(('name = "swing"', f'name = "swing"\nroute = "{route}"\nform = "{form}"',
        f"route: '{route}' is for form = 'velocity'; the form '{form}' comes from the closed form")
-      for route, form in (("aba", "momentum"), ("ldl", "redundant"))),
+      for route, form in (("aba", "momentum"), ("ldl", "redundant"), ("orthogonal", "momentum"))),
     # Nesting without end, and too much of everything.
     (GOOD, 'name = "swing"\na = ' + 10**5 * "[" + 10**5 * "]", "is not TOML: nested too deep"),
     (GOOD, 'name = "swing"\na = ' + 5000 * "{ a = " + "1" + 5000 * "}",

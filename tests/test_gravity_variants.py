@@ -72,7 +72,7 @@ def effect(text: str, g: float = 9.81) -> str:
     return f'[[effects]]\ntype = "gravity"\ng = {g}\n{text}\n'
 
 
-COSTLY = ("parameter_jacobian", "inverse_dynamics", "forward_dynamics", "mass_matrix")
+COSTLY = ("jacobian", "parameter_jacobian", "inverse_dynamics", "forward_dynamics", "mass_matrix")
 PULL = '[[effects]]\ntype = "point_gravity"\nname = "sun"\nmu = 2.0\n{}\n'
 
 

@@ -111,7 +111,13 @@ def test_angles_of_1e8_lose_what_their_digits_force() -> None:
         assert abs(float(made.module.derivative(0.0, y)[1] - exact)) < 8 * DIGITS * 9.81
     asked, turns = problem(PENDULUM), 2 * np.pi * 15_915_494
     near = ran(asked, "DOP853", 2.0, rtol=1e-12, atol=1e-13)
-    far = ran(replace(asked, initial=asked.initial + [turns, 0.0]), "rk4", 2.0, dt=1e-3, samples=3)
+    far = ran(
+        replace(asked, initial=asked.initial + np.array([turns, 0.0])),
+        "rk4",
+        2.0,
+        dt=1e-3,
+        samples=3,
+    )
     assert np.max(np.abs(far.y[-1] - near.y[-1] - [turns, 0.0])) < 50 * np.spacing(1e8)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign import some
-from engine import along, apart, engine, exact
+from engine import DERIVATIVES, along, apart, engine, exact
 from spatial_trees import PLANE, SPACE, random_spatial_tree
 from test_show_space import page_parts
 
@@ -276,7 +276,7 @@ def test_without_velocity_forces(dimensions: int, seed: int, route: str) -> None
     """
     text = random_spatial_tree(seed, dimensions, 5)[1]
     e = engine(text.replace("\n", '\nleave_out = ["velocity_forces"]\n', 1), route)
-    whole = engine(text, "aba")
+    whole = engine(text, "aba", leave_out=DERIVATIVES)
     rng = np.random.default_rng(seed)
     y, u = e.random_state(rng), e.random_inputs(rng)
     nq, nv = len(e.model.coordinates), len(e.model.velocities)

@@ -1,4 +1,4 @@
-"""All routes to a mechanism's motion agree: `closed`, `ldl`, `aba`, and three outsiders.
+"""All routes to a mechanism's motion agree: `closed`, `ldl`, `aba`, `orthogonal`, three outsiders.
 
 The outsiders are the tests' own solver in maximal coordinates, MuJoCo and Pinocchio. Most trees
 are run in plain floats, some as generated modules, some in 60 digits.
@@ -71,6 +71,8 @@ def test_accelerations(dimensions: int, seed: int) -> None:
         found = dynamics.articulated_forward()
         assert apart(found, expected) < ROUNDING
         assert apart(dynamics.factored_forward(), expected) < ROUNDING
+        if axes == "own":
+            assert apart(dynamics.orthogonal_forward(), expected) < ROUNDING
         assert_observed(tree, model, dynamics, found, motion)
     joints = [body.joint.name for body in model.bodies if body.joint.type != "free"]
     wrenches = [(*f.force, *f.moment) for f in reactions(dynamics, expected)]
@@ -99,6 +101,8 @@ def test_accelerations_from_rest(dimensions: int, seed: int) -> None:
         dynamics = in_floats(tree, model, q, v, u, axes)
         assert apart(dynamics.articulated_forward(), expected) < ROUNDING
         assert apart(dynamics.factored_forward(), expected) < ROUNDING
+        if axes == "own":
+            assert apart(dynamics.orthogonal_forward(), expected) < ROUNDING
 
 
 KEPT = {PLANE: [0, 1, 5], SPACE: [0, 1, 2, 3, 4, 5]}
@@ -341,11 +345,7 @@ def test_closed_is_aba(seed: int, most: int) -> None:
     assert scene.text is not None
     left = ("input_jacobian", "parameter_jacobian")
     aba, ldl = (engine(scene.text, route, leave_out=left) for route in ("aba", "ldl"))
-    if most == 5:
-        closed = engine(scene.text, "closed", leave_out=left)
-    else:  # as other tests have it
-        c = compiled(scene)
-        closed = Engine(c.model, c.system, c.source, c.module)
+    closed = engine(scene.text, "closed", leave_out=left) if most == 5 else compiled(scene)
     assert [e.system.route for e in (closed, aba, ldl)] == ["closed", "aba", "ldl"]
     assert_equal_programs(closed, aba, seed, 50)
     assert_equal_programs(ldl, aba, seed, 50)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from engine import MP, Engine, along, apart, engine
+from engine import MP, Digits, Engine, along, apart, engine
 from scipy.integrate import solve_ivp
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
@@ -22,8 +22,6 @@ from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.effects.vectors import NEAREST
 from eomgen.errors import SceneError
-from eomgen.language.formula import BY_MATH
-from eomgen.program.program import interpret
 from eomgen.program.route import routed
 from eomgen.scene.reader import parse_scene
 from eomgen.scene.schema import OUTPUTS
@@ -32,37 +30,6 @@ EXACT = 1e-12
 KEPT = ("applied_force", "kinetic_energy", "potential_energy", "momentum")
 """Outputs, besides those that every module has, that are looked at here."""
 M = 2.0
-
-
-class Digits:
-    """60-digit numbers as scalars."""
-
-    def number(self, value: float) -> Any:
-        """The double itself, exactly."""
-        return MP.mpf(value)
-
-    def call(self, function: str, *arguments: Any) -> Any:
-        """A function of formulas."""
-        plain = function in ("step", "min", "max", "select", "abs")
-        return BY_MATH[function](*arguments) if plain else getattr(MP, function)(*arguments)
-
-    def is_zero(self, value: Any) -> bool:
-        """Whether it is 0 here."""
-        return bool(value == 0)
-
-    def named(self, value: Any, name: str) -> Any:
-        """A number has no name."""
-        return value
-
-
-def exactly(made: Engine, output: str, y: np.ndarray) -> np.ndarray:
-    """An output in 60 digits."""
-    given = dict(zip(made.module.STATES, y, strict=True))
-    given |= {**made.module.PARAMETERS, **made.module.INPUTS, "t": 0.0}
-    inputs = {name: MP.mpf(value) for name, value in given.items()}
-    found = interpret(made.system.program, output, inputs, Digits())
-    shape = made.system.program.outputs[output].shape
-    return np.array(found, dtype=object).reshape(shape)[()]
 
 
 def exact_dynamics(made: Engine, y: np.ndarray) -> Dynamics:
@@ -162,9 +129,11 @@ def at_joint(kind: str, *lines: str, joint: str = "j", name: str = "e") -> str:
 
 
 @cache
-def made(text: str, route: str = "aba") -> Engine:
+def made(text: str, route: str = "aba", *, jacobian: bool = True) -> Engine:
     """A scene, compiled."""
-    return engine(text, route, leave_out=tuple(name for name in OUTPUTS if name not in KEPT))
+    left_out = tuple(name for name in OUTPUTS if name not in KEPT)
+    left_out += () if jacobian else ("jacobian",)
+    return engine(text, route, leave_out=left_out)
 
 
 def run(text: str, y0: list[float], t_end: float) -> Callable[[float], np.ndarray]:
@@ -313,9 +282,9 @@ def test_a_spring_between_free_bodies_keeps_momentum(
     rng = np.random.default_rng(3)
     for _ in range(3):
         y = np.array([MP.mpf(x) for x in found.random_state(rng)])
-        change = along(lambda z: exactly(found, "momentum", z), y, exactly(found, "derivative", y))
+        change = along(lambda z: found.exactly("momentum", z), y, found.exactly("derivative", y))
         assert np.max(np.abs(change)) < 1e-14  # the state is a double's, its quaternions too
-        assert np.max(np.abs(exactly(found, "applied_force", y))) > 0.1
+        assert np.max(np.abs(found.exactly("applied_force", y))) > 0.1
 
 
 # Random trees, with the loads put in by hand.
@@ -411,7 +380,7 @@ def test_random_trees_move_as_under_loads_put_in_by_hand(dimensions: int, route:
         text += at_joint(
             "joint_stop", "low = -0.1", "high = 0.1", "stiffness = 50.0", joint=j, name="e5"
         )
-        module = made(text, route).module
+        module = made(text, route, jacobian=False).module
         for _ in range(4):
             q, v = random_state(tree, rng)
             u = {**tree.random_inputs(rng)}
@@ -471,11 +440,11 @@ def test_the_change_of_energy_is_the_power_of_the_effects(kind: str) -> None:
     worked = 0.0
     for _ in range(6):
         y = np.array([MP.mpf(x) for x in found.random_state(rng)])
-        rate = exactly(found, "derivative", y)
+        rate = found.exactly("derivative", y)
         here = exact_dynamics(found, y)
         powers = [here.power(e) for e in found.model.effects]
-        kinetic = along(partial(exactly, found, "kinetic_energy"), y, rate)
-        potential = along(partial(exactly, found, "potential_energy"), y, rate)
+        kinetic = along(partial(found.exactly, "kinetic_energy"), y, rate)
+        potential = along(partial(found.exactly, "potential_energy"), y, rate)
         size = 1 + sum(map(abs, powers))
         assert abs(kinetic - sum(powers)) < 1e-25 * size
         change = along(own_energy, y, rate)
@@ -503,7 +472,7 @@ def test_the_change_of_energy_is_the_power_of_the_effects(kind: str) -> None:
 def central(found: Engine, y: np.ndarray) -> np.ndarray:
     """∂f/∂y by central differences in 60 digits."""
     ways = np.array([[MP.mpf(int(i == j)) for j in range(len(y))] for i in range(len(y))])
-    columns = [along(lambda z: exactly(found, "derivative", z), y, way) for way in ways]
+    columns = [along(lambda z: found.exactly("derivative", z), y, way) for way in ways]
     return np.array(columns).T
 
 
@@ -571,8 +540,8 @@ def test_the_energy_of_points_that_meet_has_the_force_for_a_slope() -> None:
         for x in (2.0, 1.01, 0.99, 0.4, 0.0):
             y = np.array([MP.mpf(z) for z in (x * NEAREST, 0.0, 0.0, 0.0, 0.0, 0.0)])
             way = np.array([MP.mpf(z) for z in (1, 0, 0, 0, 0, 0)])
-            slope = along(partial(exactly, found, "potential_energy"), y, way)
-            force = exactly(found, "applied_force", y)[0]
+            slope = along(partial(found.exactly, "potential_energy"), y, way)
+            force = found.exactly("applied_force", y)[0]
             assert abs(slope + force) < 1e-15
 
 

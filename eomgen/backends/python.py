@@ -104,7 +104,8 @@ def python_module(system: System) -> str:
         name: print_block(program, output.nodes, names, DIALECT)
         for name, output in program.outputs.items()
     }
-    kernels = {name: _kernel(system, name, block, names) for name, block in blocks.items()}
+    costs = {name: cost(program, name) for name in blocks}
+    kernels = {name: _kernel(system, name, blocks[name], names, costs[name]) for name in blocks}
     moving = {f for block in blocks.values() for f in block.functions}
     fixed, once = _fixed(system, blocks, names)
     called = [f for f in FUNCTIONS if f in moving or f in once]
@@ -115,7 +116,7 @@ def python_module(system: System) -> str:
     context: dict[str, Any] = {
         "title": _plain(model.title),
         "scene": model.name,
-        "about": _document(system),
+        "about": _document(system, costs["derivative"]),
         "form": model.form,
         "dimensions": model.dimensions,
         "states": states,
@@ -139,7 +140,7 @@ def python_module(system: System) -> str:
         "contacts": [(c.name, c.effect) for c in system.contacts],
         "impact": kernels.get("impact"),
         "held": kernels.get("held"),
-        "costs": [(name, json.dumps(cost(program, name))) for name in kernels],
+        "costs": [(name, json.dumps(counts)) for name, counts in costs.items()],
         "kernels": list(kernels.values()),
         "math_functions": sorted({"isfinite", *(f for f in called if hasattr(math, f))}),
         "own_functions": [(f, *OWN[f]) for f in called if f in OWN],
@@ -154,7 +155,9 @@ def python_module(system: System) -> str:
     return render("python", "module.py.jinja", context)
 
 
-def _kernel(system: System, name: str, block: Block, names: Names) -> Kernel:
+def _kernel(
+    system: System, name: str, block: Block, names: Names, counts: Mapping[str, int]
+) -> Kernel:
     shape = tuple(system.program.outputs[name].shape)
     special = ABOUT_PLANE if system.model.dimensions == 2 else ABOUT_SPACE
     return Kernel(
@@ -167,7 +170,7 @@ def _kernel(system: System, name: str, block: Block, names: Names) -> Kernel:
         extra=_unpacking(system.extra.get(name, ()), block, names),
         constants=_joined([names[i] for i in block.constants]),
         functions=block.functions,
-        operations=_operations(cost(system.program, name)),
+        operations=_operations(counts),
         tangent=name in system.tangents,
         time=TIME in block.inputs,
     )
@@ -213,7 +216,7 @@ def _joined(words: list[str]) -> str:
     return f"{words[0]}," if len(words) == 1 else ", ".join(words)
 
 
-def _operations(counts: dict[str, int]) -> str:
+def _operations(counts: Mapping[str, int]) -> str:
     kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items() if kind not in _SUMS)
     return f"{counts['total']} operations" + (f": {kinds}" if kinds else "")
 
@@ -236,7 +239,7 @@ def _units(system: System) -> list[tuple[str, str]]:
     return entries + [(c.name, c.unit) for c in system.contacts if c.name not in taken]
 
 
-def _document(system: System) -> list[str]:
+def _document(system: System, counts: Mapping[str, int]) -> list[str]:
     """The docstring's tables: states, inputs, parameters, effects, operations."""
     model = system.model
     lines = ["State y, in this order:"]
@@ -262,7 +265,6 @@ def _document(system: System) -> list[str]:
     if "velocity_forces" in model.leave_out:
         rest = ", of which V keeps what driving takes" if model.driven else ": M v̇ + G = F"
         lines.append(f"Left out: velocity forces{rest}.")
-    counts = cost(system.program, "derivative")
     lines += textwrap.wrap(
         f"One call of `derivative` takes {_operations(counts)}; "
         f"{counts['parameters']} more on parameters alone are done once.",

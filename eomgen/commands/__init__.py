@@ -9,6 +9,7 @@ from eomgen.commands.describing import check, list_scenes, print_reference, prin
 from eomgen.commands.generating import generate
 from eomgen.commands.linearising import linearise
 from eomgen.commands.running import simulate, view
+from eomgen.commands.verifying import verify
 
 __all__ = [
     "accuracy",
@@ -21,6 +22,7 @@ __all__ = [
     "print_reference",
     "print_schema",
     "simulate",
+    "verify",
     "version",
     "view",
 ]

@@ -113,7 +113,7 @@ def _print_routes(bill: "Bill") -> None:
     for route in bill.routes:
         count = "-" if route.operations is None else str(route.operations)
         seconds = "-" if route.seconds is None else _us(route.seconds)
-        label = f"    {route.route:<8}  {count:>10}  {seconds:>8}  "
+        label = f"    {route.route:<10}{count:>10}  {seconds:>8}  "
         if route.words:
             print_wrapped(label, route.words)
         else:

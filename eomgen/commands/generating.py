@@ -61,7 +61,7 @@ def _text(path: Path) -> str | None:
 
 
 def _print_explanation(code: Code) -> None:
-    print(f"    {'route':<8}{'cost':>8}  (operations of derivative)")
+    print(f"    {'route':<10}{'cost':>6}  (operations of derivative)")
     for line in code.explanation:
         print(f"    {line}")
 

@@ -21,6 +21,7 @@ from eomgen.commands.shared import (
     assignments,
     code_of,
     print_listed,
+    print_wrapped,
     read_model,
     shortened,
 )
@@ -30,12 +31,13 @@ from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.joints.base import Geared
 from eomgen.model import Model, ways_of
 from eomgen.run.limits import excursions, locks
-from eomgen.run.module import as_powers, as_problem
+from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import SHOWN
 
 if TYPE_CHECKING:
+    from eomgen.run.guard import Guard
     from eomgen.show.motion import Motion
     from eomgen.study.trial import Setting
 
@@ -66,7 +68,12 @@ def simulate(given: Arguments) -> int:
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
     code, module = code_of(given.scene, model, given)
     values = (parameters or None, inputs or None)
-    kept = {"samples": given.samples, "max_step": given.max_step, "rest_speed": wanted.rest_speed}
+    kept = {
+        "samples": given.samples,
+        "max_step": given.max_step,
+        "rest_speed": wanted.rest_speed,
+        "guard": _guard(given, module, values),
+    }
     problem, words = as_problem(module, *values, model), ""
     if given.resume is not None:
         assert setting is not None
@@ -105,6 +112,8 @@ def simulate(given: Arguments) -> int:
     missed = print_choice(choice, given) if choice else ""
     if given.estimate and not choice and trajectory.finished:
         print_estimate(case, tried)
+    if given.guard and trajectory.finished and trajectory.message:
+        print_wrapped("    ", trajectory.message)
     _print_energy(motion)
     _print_events(trajectory)
     if motion.joints:
@@ -121,6 +130,17 @@ def simulate(given: Arguments) -> int:
     if given.view:
         _open(paths["html"])
     return 0
+
+
+def _guard(
+    given: Arguments, module: GeneratedModule, values: tuple[dict[str, float] | None, ...]
+) -> "Guard | None":
+    """What watches the run, if that is asked for."""
+    if given.guard is None:
+        return None
+    from eomgen.study.guarding import guard_of
+
+    return guard_of(module, *values, repairs=given.guard == "repair")
 
 
 def _setting(given: Arguments, model: Model) -> "Setting":

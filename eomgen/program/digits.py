@@ -1,32 +1,40 @@
 """Numbers of many digits as scalars of formulas, recursions and programs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
+import gmpy2
 import mpmath
 import numpy as np
+from gmpy2 import mpfr
 
 from eomgen.language.formula import FUNCTIONS
+from eomgen.program.program import Program, interpreter
 
 DIGITS = 60
 MP = mpmath.MPContext()
 """Numbers of this context work in `DIGITS` digits, wherever they are."""
 MP.dps = DIGITS
 
-_ONE_BY_ONE: dict[str, Callable[..., Any]] = {
-    **{name: getattr(MP, name) for name in FUNCTIONS if hasattr(MP, name)},
-    "abs": abs,
-    "step": lambda x: MP.mpf(x > 0),
-    "min": min,
-    "max": max,
-    "select": lambda c, a, b: a if c > 0 else b,
-}
-_CALLED = {name: np.frompyfunc(f, FUNCTIONS[name], 1) for name, f in _ONE_BY_ONE.items()}
-"""The functions of formulas, of numbers and of arrays of them."""
+
+def _functions(library: Any, number: Callable[[bool], Any]) -> dict[str, Callable[..., Any]]:
+    return {
+        **{name: getattr(library, name) for name in FUNCTIONS if hasattr(library, name)},
+        "abs": abs,
+        "step": lambda x: number(x > 0),
+        "min": min,
+        "max": max,
+        "select": lambda c, a, b: a if c > 0 else b,
+    }
+
+
+_BY_MPMATH = _functions(MP, MP.mpf)
+BY_MPFR = _functions(gmpy2, mpfr)
+"""The functions of formulas, of MPFR's numbers; as exact as gmpy2's context then is."""
 
 
 class Digits:
-    """60-digit numbers, or arrays of them, as scalars."""
+    """60-digit numbers as scalars."""
 
     def number(self, value: float) -> Any:
         """The double itself, exactly."""
@@ -34,11 +42,11 @@ class Digits:
 
     def call(self, function: str, *arguments: Any) -> Any:
         """Any function of formulas."""
-        return _CALLED[function](*arguments)
+        return _BY_MPMATH[function](*arguments)
 
     def is_zero(self, value: Any) -> bool:
-        """Whether it is 0 here, everywhere in an array."""
-        return bool(np.all(value == 0))
+        """Whether it is 0 here."""
+        return bool(value == 0)
 
     def named(self, value: Any, name: str) -> Any:
         """A number has no name."""
@@ -49,3 +57,40 @@ def exact(values: Any) -> Any:
     """Doubles, one or an array of them, as 60-digit numbers: exactly the same."""
     array = np.asarray(values)
     return np.array([MP.mpf(x) for x in array.ravel()], dtype=object).reshape(array.shape)
+
+
+class _Bits:
+    """MPFR's numbers as scalars: they add and multiply ten times as fast as mpmath's."""
+
+    def number(self, value: float) -> Any:
+        return mpfr(value, 53)  # all its bits, in any context
+
+    def call(self, function: str, *arguments: Any) -> Any:
+        return BY_MPFR[function](*arguments)
+
+
+def evaluator(program: Program, output: str) -> Callable[[Mapping[str, Any]], list[Any]]:
+    """One output of a program in 60 digits, for many inputs: doubles, or 60-digit numbers.
+
+    It takes the steps that `interpret` takes over `Digits`, faster. It raises `ArithmeticError` or
+    `ValueError` where there is no finite real value.
+    """
+    steps = interpreter(program, output, _Bits())
+
+    def run(inputs: Mapping[str, Any]) -> list[Any]:
+        # Only here, since MPFR's numbers are as exact as the context of whoever uses them.
+        with gmpy2.context(precision=MP.prec, trap_divzero=True, trap_invalid=True):
+            found = steps({name: _in_bits(value) for name, value in inputs.items()})
+            return [MP.mpf(tuple(map(int, x.as_mantissa_exp()))) for x in found]
+
+    return run
+
+
+def _in_bits(value: Any) -> Any:
+    if isinstance(value, float):
+        return mpfr(value)
+    minus, significand, exponent, _ = MP.mpf(value)._mpf_
+    if not significand:  # of 0, and of what is not finite
+        return mpfr(float(value))
+    scaled = gmpy2.mul_2exp if exponent >= 0 else gmpy2.div_2exp
+    return scaled(mpfr(-significand if minus else significand), abs(exponent))

@@ -25,9 +25,9 @@ DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 class Recording:
     """A model's dynamics on a tape by a route, and the nodes that are given to it.
 
-    v̇ comes from the recursion of the route, `aba` or `ldl`, or from what `forward` makes. `axes`
-    are those that the recursion works in, if not the usual ones; `tape` is one to begin, if not a
-    plain one.
+    v̇ comes from the recursion of the route, `aba`, `ldl` or `orthogonal`, or from what `forward`
+    makes. `axes` are those that the recursion works in, if not the usual ones, `orthogonal` works
+    in the frames' own; `tape` is one to begin, if not a plain one.
     """
 
     def __init__(
@@ -50,10 +50,12 @@ class Recording:
         extra = {x.name: node for x, node in zip(model.states, self.x, strict=True)}
         time = self.given(TIME, Stage.INPUTS)
         values = Values(self.parameters, self.inputs, self.q, self.v, extra, time)
-        self.dynamics = Dynamics(model, values, self.scalars, axes)
+        own: Axes | None = "own" if route == "orthogonal" else axes
+        self.dynamics = Dynamics(model, values, self.scalars, own)
         recursions = {
             "aba": self.dynamics.articulated_forward,
             "ldl": self.dynamics.factored_forward,
+            "orthogonal": self.dynamics.orthogonal_forward,
         }
         self.forward: Forward = forward(self) if forward is not None else recursions[route]
         self.vd = self.dynamics.vd = self.forward(None)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 from eomgen.program.program import Output, Program, cost, finish, live_steps
-from eomgen.program.tape import Node, Stage, Tape
+from eomgen.program.tape import Node, Stage, Step, Tape
 
 Rule = Callable[[Tape, str, list[Node]], Node]
 
@@ -32,13 +32,15 @@ def drop_dead_steps(program: Program) -> Program:
     """Leave out what no output and no check needs."""
     roots = [n for output in program.outputs.values() for n in output.nodes]
     keep = live_steps(program, [*roots, *(check.node for check in program.checks)])
+    if len(keep) == len(program.steps):
+        return program
     new = {old: i for i, old in enumerate(keep)}
-    steps = tuple(
-        step._replace(operands=tuple(new[o] for o in step.operands))
-        for step in (program.steps[i] for i in keep)
-    )
+    steps = [
+        Step(operation, tuple([new[o] for o in operands]), stage, value)
+        for operation, operands, stage, value in (program.steps[i] for i in keep)
+    ]
     return Program(
-        steps,
+        tuple(steps),
         {k: Output(o.shape, tuple(new[n] for n in o.nodes)) for k, o in program.outputs.items()},
         {new[i]: name for i, name in program.names.items() if i in new},
         tuple(replace(check, node=new[check.node]) for check in program.checks),
@@ -52,7 +54,7 @@ def gather_parameters(program: Program) -> Program:
     lone = _Lone(program, ("mul", "add"))
 
     def rule(tape: Tape, operation: str, nodes: list[Node]) -> Node:
-        if operation in ("mul", "add"):
+        if operation in ("mul", "add") and not lone.results.isdisjoint([n.index for n in nodes]):
             parts = _flattened(tape, operation, nodes, lone.results)
             fixed = [n for n in parts if n.step.stage <= Stage.PARAMETERS]
             if len(fixed) > 1 and len(parts) > len(fixed):
@@ -90,7 +92,7 @@ def factor_sums(program: Program) -> Program:
     lone = _Lone(program, ("mul",))
 
     def rule(tape: Tape, operation: str, nodes: list[Node]) -> Node:
-        if operation in ("add", "sub") and all(n.index in lone.results for n in nodes):
+        if operation in ("add", "sub") and lone.results.issuperset([n.index for n in nodes]):
             a, b = (n.step.operands for n in nodes)
             common = [i for i in a if i in b]
             if common:
@@ -112,7 +114,7 @@ class _Lone:
 
     def note(self, old: int, node: Node) -> None:
         """Step `old` of the program has become `node`."""
-        if node.step.operation in self._operations and self._uses[old] == 1:
+        if self._uses[old] == 1 and node.step.operation in self._operations:
             self.results.add(node.index)
         else:
             self.results.discard(node.index)

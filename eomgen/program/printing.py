@@ -125,9 +125,10 @@ def print_block(
         return steps[i].operation == "input" or (not fixed and steps[i].stage <= Stage.PARAMETERS)
 
     live = live_steps(program, nodes, outside)
+    given = {i for i in live if outside(i)}
     uses = dict.fromkeys(live, 0)
     for i in live:
-        if not outside(i):
+        if i not in given:
             for o in steps[i].operands:
                 uses[o] += 1
     for n in nodes:
@@ -142,7 +143,7 @@ def print_block(
         if step.operation == "constant":
             text[i] = (repr(float(step.value or 0.0)), _ATOM)
             continue
-        if outside(i):
+        if i in given:
             text[i] = (names[i], _ATOM)
             continue
         if step.operation in FUNCTIONS:
@@ -157,7 +158,7 @@ def print_block(
     return Block(
         lines=tuple(lines),
         results=tuple(text[n][0] for n in nodes),
-        constants=tuple(i for i in live if outside(i) and steps[i].stage <= Stage.PARAMETERS),
+        constants=tuple(i for i in live if i in given and steps[i].stage <= Stage.PARAMETERS),
         inputs=tuple(
             str(steps[i].value)
             for i in live

@@ -1,7 +1,10 @@
 """A finished program: steps in order and the named outputs they compute."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from operator import neg
 from typing import Any, Protocol
 
 from eomgen.program.tape import ARITHMETIC, COUNTED, FUNCTIONS, Stage, Step, Tape
@@ -58,15 +61,16 @@ def live_steps(
     program: Program, nodes: Iterable[int], outside: Callable[[int], bool] | None = None
 ) -> list[int]:
     """The steps that some nodes need, in order; what lies behind those `outside` is left out."""
-    needed: set[int] = set()
-    stack = list(nodes)
+    live = set(nodes)
+    stack = list(live)
     while stack:
         i = stack.pop()
-        if i not in needed:
-            needed.add(i)
-            if outside is None or not outside(i):
-                stack += program.steps[i].operands
-    return sorted(needed)
+        if outside is None or not outside(i):
+            for operand in program.steps[i].operands:
+                if operand not in live:
+                    live.add(operand)
+                    stack.append(operand)
+    return sorted(live)
 
 
 def cost(program: Program, output: str) -> dict[str, int]:
@@ -74,18 +78,12 @@ def cost(program: Program, output: str) -> dict[str, int]:
 
     The entry `total` is their sum, and `parameters` counts what depends on parameters alone.
     """
-    counts: dict[str, int] = {}
-    fixed = 0
-    for i in live_steps(program, program.outputs[output].nodes):
-        step = program.steps[i]
-        if step.operation not in COUNTED:
-            continue
-        if step.stage <= Stage.PARAMETERS:
-            fixed += 1
-        else:
-            counts[step.operation] = counts.get(step.operation, 0) + 1
+    live = [program.steps[i] for i in live_steps(program, program.outputs[output].nodes)]
+    counts = Counter([step.operation for step in live if step.stage > Stage.PARAMETERS])
+    fixed = Counter([step.operation for step in live if step.stage <= Stage.PARAMETERS])
     by_kind = {kind: counts[kind] for kind in COUNTED if kind in counts}
-    return {**by_kind, "total": sum(by_kind.values()), "parameters": fixed}
+    parameters = sum(fixed[kind] for kind in COUNTED)
+    return {**by_kind, "total": sum(by_kind.values()), "parameters": parameters}
 
 
 class Arithmetic(Protocol):
@@ -101,22 +99,43 @@ class Arithmetic(Protocol):
 def interpret(
     program: Program, output: str, inputs: Mapping[str, Any], scalars: Arithmetic
 ) -> list[Any]:
-    """Run the steps of one output over any scalars (floats, mpmath numbers, arrays).
+    """Run the steps of one output over any scalars (floats, 60-digit numbers, arrays).
 
     Raises `KeyError` for an input that is not given.
     """
-    values: dict[int, Any] = {}
-    for i in live_steps(program, program.outputs[output].nodes):
+    return interpreter(program, output, scalars)(inputs)
+
+
+def interpreter(
+    program: Program, output: str, scalars: Arithmetic
+) -> Callable[[Mapping[str, Any]], list[Any]]:
+    """`interpret` for many inputs: which steps to run, and how, is found once."""
+    live = live_steps(program, program.outputs[output].nodes)
+    place = {i: k for k, i in enumerate(live)}
+    start: list[Any] = [None] * len(live)
+    given: list[tuple[int, str]] = []
+    todo: list[tuple[int, Callable[..., Any], tuple[int, ...]]] = []
+    for k, i in enumerate(live):
         step = program.steps[i]
-        operands = [values[o] for o in step.operands]
+        operands = tuple(place[o] for o in step.operands)
         if step.operation == "constant":
-            values[i] = scalars.number(float(step.value or 0.0))
+            start[k] = scalars.number(float(step.value or 0.0))
         elif step.operation == "input":
-            values[i] = inputs[str(step.value)]
+            given.append((k, str(step.value)))
         elif step.operation == "neg":
-            values[i] = -operands[0]
+            todo.append((k, neg, operands))
         elif step.operation in FUNCTIONS:
-            values[i] = scalars.call(step.operation, *operands)
+            todo.append((k, partial(scalars.call, step.operation), operands))
         else:
-            values[i] = ARITHMETIC[step.operation](*operands)
-    return [values[n] for n in program.outputs[output].nodes]
+            todo.append((k, ARITHMETIC[step.operation], operands))
+    results = [place[n] for n in program.outputs[output].nodes]
+
+    def run(inputs: Mapping[str, Any]) -> list[Any]:
+        values = start.copy()
+        for k, name in given:
+            values[k] = inputs[name]
+        for k, function, operands in todo:
+            values[k] = function(*[values[o] for o in operands])
+        return [values[k] for k in results]
+
+    return run

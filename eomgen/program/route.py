@@ -1,13 +1,25 @@
 """Which route a model's equations take, and why."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
+from eomgen.derivation.recursive.digits import ALL, Accelerations, digits_lost
+from eomgen.derivation.recursive.moving import Values
+from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.errors import SceneError
 from eomgen.model import Model
+from eomgen.program.digits import Digits
 from eomgen.program.from_recursion import Recording, from_recursion
-from eomgen.program.program import Output, cost, finish
+from eomgen.program.program import Output, cost, finish, interpreter
 from eomgen.program.system import System
+from eomgen.program.tape import TIME
+
+MOST_LOST = 4.0
+"""Decimal digits of v̇ that a route may lose at ordinary states and still be taken by itself."""
+
+MOST_LOST_OF_ALL = 6.0
+"""That the last of all routes may lose; a scene for which it loses more is refused."""
 
 MOST_FACTORING = 20_000
 """Operations of factoring alone beyond which `ldl` is not tried only to be compared."""
@@ -15,11 +27,15 @@ MOST_FACTORING = 20_000
 
 @dataclass(frozen=True)
 class Candidate:
-    """A route with the operations of its `derivative`, or None and why it was not tried."""
+    """A route with the operations of its `derivative`, or None and why it was not tried.
+
+    It is `refused` if it loses too many digits.
+    """
 
     route: str
     operations: int | None
     words: str
+    refused: bool = False
 
 
 @dataclass(frozen=True)
@@ -35,13 +51,13 @@ class Routed:
         for candidate in self.candidates:
             count = "-" if candidate.operations is None else str(candidate.operations)
             taken = " <- taken" if candidate.route == self.system.route else ""
-            lines.append(f"{candidate.route:<8}{count:>8}  {candidate.words}{taken}".rstrip())
+            lines.append(f"{candidate.route:<10}{count:>6}  {candidate.words}{taken}".rstrip())
         return lines
 
 
 def routed(model: Model, *, jacobian: bool = True) -> Routed:
-    """The system of a model by the route it names, or by the one of the fewest operations; with
-    the derivative's Jacobian or without.
+    """The system of a model by the route it names, or by the one of the fewest operations that
+    keeps its digits; with the derivative's Jacobian or without.
 
     Raises `SceneError` if it names one that is not for it.
     """
@@ -78,20 +94,30 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
     else:
         records["ldl"] = recorded(model, "ldl")
         candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
-    tried = [c for c in candidates if c.operations is not None]
-    best = min(tried, key=lambda c: c.operations or 0)
+    by_closed = None if closed is None else _accelerations(closed)
+    tried = _weighed(candidates, digits_lost(model, by_closed))
+    if not _kept(tried):
+        lost = digits_lost(model, by_closed, Digits())
+        tried = _weighed(candidates, lost)
+        if not _kept(tried):
+            records["orthogonal"] = recorded(model, "orthogonal")
+            tried.append(_last_resort(records["orthogonal"], lost))
+    candidates = tried
+    best = min(_kept(candidates), key=lambda c: c.operations or 0)
     if closed is None or best.route != "closed":
         closed = from_recursion(records[best.route], jacobian=jacobian)
     return Routed(closed, tuple(candidates))
 
 
 def recorded(model: Model, route: str) -> Recording:
-    """A model on a tape by `aba` or `ldl`, in the axes that take the fewest operations.
+    """A model on a tape by a recursion, in the axes that take the fewest operations.
 
     In the plane those are the world's, in which angles add up, unless bodies that turn carry
     slides; in space they are the frames' own.
     """
     record = Recording(model, route)
+    if route == "orthogonal":
+        return record
     if model.dimensions == 2 and any(
         move.kind == "slide"
         for body in model.bodies
@@ -136,6 +162,48 @@ def _closed(model: Model, jacobian: bool) -> System:
 
 def _taken(system: System, words: str) -> Routed:
     return Routed(system, (Candidate(system.route, _operations(system), words),))
+
+
+def _weighed(candidates: Sequence[Candidate], lost: Mapping[str, float]) -> list[Candidate]:
+    """Those that were tried and lose too many digits are refused."""
+    weighed = []
+    for candidate in candidates:
+        if candidate.operations is not None and (digits := lost[candidate.route]) > MOST_LOST:
+            words = f"{candidate.words}; would lose {digits:.0f} digits"
+            candidate = replace(candidate, words=words, refused=True)
+        weighed.append(candidate)
+    return weighed
+
+
+def _kept(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Those that may be taken."""
+    return [c for c in candidates if c.operations is not None and not c.refused]
+
+
+def _last_resort(record: Recording, lost: Mapping[str, float]) -> Candidate:
+    """Orthogonal elimination. Raises `SceneError` if it loses too many digits, too."""
+    if lost["orthogonal"] > MOST_LOST_OF_ALL:
+        raise SceneError(
+            f"route: every one loses digits at these masses and lengths, 'orthogonal' "
+            f"{lost['orthogonal']:.0f} of {ALL:.0f}; make them less uneven, or name the route to "
+            "take it all the same"
+        )
+    words = f"keeps the digits that these masses take from the others, {lost['aba']:.0f} of aba"
+    return Candidate("orthogonal", _operations_of(record), words)
+
+
+def _accelerations(system: System) -> Accelerations:
+    """v̇ as a system in velocity form has it."""
+    model = system.model
+    run = interpreter(system.program, "derivative", FloatScalars())
+
+    def found(values: Values) -> Sequence[float]:
+        names = [c.name for c in (*model.coordinates, *model.velocities)]
+        given = {**values.parameters, **values.inputs, TIME: 0.0}
+        given |= dict(zip(names, (*values.q, *values.v), strict=True))
+        return run(given)[-len(model.velocities) :]
+
+    return found
 
 
 def _candidate(route: str, operations: int) -> Candidate:

@@ -6,6 +6,7 @@ until an addition swallows them. No expression tree ever exists.
 """
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from enum import IntEnum
 from fractions import Fraction
@@ -30,10 +31,10 @@ class Stage(IntEnum):
 FUNCTIONS: dict[str, Callable[..., float]] = dict(BY_MATH)
 """The functions of formulas, each an operation of its own."""
 ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "div": operator.truediv,
 }
 COUNTED = (*ARITHMETIC, "neg", *FUNCTIONS)
 """Operations that cost something, each counted one."""
@@ -86,25 +87,34 @@ class Tape:
         self.names: dict[int, str] = {}
         self.values: list[float | None] = []
         """The number that a step is, if it is a constant."""
+        self.minus: list[int | None] = []
+        """The step that a step is minus of, if it is a negation."""
         self._known: dict[tuple[Any, ...], int] = {}
 
-    def _intern(self, key: tuple[Any, ...], stage: Stage, value: float | str | None) -> Node:
-        index = self._known.get(key)
-        if index is None:
-            index = self._known[key] = len(self.steps)
-            operands = key[1:] if value is None else ()
-            self.steps.append(Step(key[0], operands, stage, value))
-            self.values.append(value if key[0] == "constant" else None)  # type: ignore[arg-type]
+    def _add(self, key: tuple[Any, ...], step: Step, number: float | None = None) -> Node:
+        """A step that is not there yet."""
+        index = self._known[key] = len(self.steps)
+        self.steps.append(step)
+        self.values.append(number)
+        self.minus.append(step.operands[0] if step.operation == "neg" else None)
         return Node(self, index)
 
     def constant(self, value: float) -> Node:
         """A number."""
         number = float(value) + 0.0
-        return self._intern(("constant", number), Stage.CONSTANT, number)
+        key = ("constant", number)
+        index = self._known.get(key)
+        if index is not None:
+            return Node(self, index)
+        return self._add(key, Step("constant", (), Stage.CONSTANT, number), number)
 
     def input(self, name: str, stage: Stage) -> Node:
         """A named quantity that is given at run time."""
-        return self._intern(("input", name), stage, name)
+        key = ("input", name)
+        index = self._known.get(key)
+        if index is not None:
+            return Node(self, index)
+        return self._add(key, Step("input", (), stage, name))
 
     def named(self, node: Node, name: str) -> Node:
         """Suggest a name for the variable that will hold a node; the first suggestion stays."""
@@ -122,13 +132,15 @@ class Tape:
             number = None if None in values else self.folded(FUNCTIONS[operation], *values)
             if number is not None:
                 return self.constant(number)
-        indices = tuple(node.index for node in nodes)
-        if operation in ("add", "mul") and indices[0] > indices[1]:
+        indices = tuple([node.index for node in nodes])
+        if (operation == "add" or operation == "mul") and indices[0] > indices[1]:
             indices = indices[::-1]
-        stage = self.steps[indices[0]].stage
-        for index in indices[1:]:
-            stage = max(stage, self.steps[index].stage)
-        return self._intern((operation, *indices), stage, None)
+        key = (operation, *indices)
+        index = self._known.get(key)
+        if index is not None:
+            return Node(self, index)
+        stage = max([self.steps[i].stage for i in indices])
+        return self._add(key, Step(operation, indices, stage))
 
     def folded(self, function: Callable[..., float], *values: float | None) -> float | None:
         """A value of constants, or None where it is not finite: then that shows when it is
@@ -154,14 +166,10 @@ class ExactTape(Tape):
         return number if function(*map(Fraction, values)) == number else None  # type: ignore[arg-type]
 
 
-def _value(node: Node) -> float | None:
-    return node.tape.values[node.index]
-
-
 def _negated(node: Node) -> Node | None:
     """The node that this one is minus of, if it is a negation."""
-    step = node.step
-    return Node(node.tape, step.operands[0]) if step.operation == "neg" else None
+    index = node.tape.minus[node.index]
+    return None if index is None else Node(node.tape, index)
 
 
 def _folded(tape: Tape, operation: str, a: float, b: float) -> Node | None:
@@ -170,7 +178,7 @@ def _folded(tape: Tape, operation: str, a: float, b: float) -> Node | None:
 
 
 def _fold_add(tape: Tape, a: Node, b: Node) -> Node | None:
-    va, vb = _value(a), _value(b)
+    va, vb = tape.values[a.index], tape.values[b.index]
     if va is not None and vb is not None:
         return _folded(tape, "add", va, vb)
     if va == 0.0:
@@ -186,7 +194,7 @@ def _fold_add(tape: Tape, a: Node, b: Node) -> Node | None:
 
 
 def _fold_sub(tape: Tape, a: Node, b: Node) -> Node | None:
-    va, vb = _value(a), _value(b)
+    va, vb = tape.values[a.index], tape.values[b.index]
     if va is not None and vb is not None:
         return _folded(tape, "sub", va, vb)
     if vb == 0.0:
@@ -204,25 +212,28 @@ def _fold_sub(tape: Tape, a: Node, b: Node) -> Node | None:
 
 
 def _fold_mul(tape: Tape, a: Node, b: Node) -> Node | None:
-    va, vb = _value(a), _value(b)
+    va, vb = tape.values[a.index], tape.values[b.index]
     if va is not None and vb is not None:
         return _folded(tape, "mul", va, vb)
-    for value, other in ((va, b), (vb, a)):
+    if va is not None or vb is not None:
+        value, other = (va, b) if va is not None else (vb, a)
         if value == 0.0:
             return tape.constant(0.0)
         if value == 1.0:
             return other
         if value is not None and value < 0.0:
             return -(tape.constant(-value) * other)
-    for x, other in ((a, b), (b, a)):
-        minus = _negated(x)
-        if minus is not None:
-            return -(minus * other)
+    minus_a = _negated(a)
+    if minus_a is not None:
+        return -(minus_a * b)
+    minus_b = _negated(b)
+    if minus_b is not None:
+        return -(minus_b * a)
     return None
 
 
 def _fold_div(tape: Tape, a: Node, b: Node) -> Node | None:
-    va, vb = _value(a), _value(b)
+    va, vb = tape.values[a.index], tape.values[b.index]
     if va is not None and vb is not None:
         return _folded(tape, "div", va, vb)
     if va == 0.0:
@@ -242,7 +253,7 @@ def _fold_div(tape: Tape, a: Node, b: Node) -> Node | None:
 
 
 def _fold_neg(tape: Tape, a: Node) -> Node | None:
-    value, minus = _value(a), _negated(a)
+    value, minus = tape.values[a.index], _negated(a)
     if value is not None:
         return tape.constant(-value)
     if minus is not None:

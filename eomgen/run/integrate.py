@@ -4,13 +4,24 @@ import math
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run import events
+from eomgen.run.checks import (
+    allowed_errors,
+    check_no_step,
+    check_samples,
+    check_steps,
+    check_times,
+    check_tolerances,
+    longest_step,
+    numbers,
+)
+from eomgen.run.guard import OF_TOLERANCE, Guard, Watch, repaired, watched
 from eomgen.run.integrators import (
-    INTEGRATORS,
     FixedStep,
     StepFailure,
     adaptive,
@@ -24,19 +35,17 @@ from eomgen.run.progress import Progress, throttled
 from eomgen.run.trajectory import Event, Trajectory
 from eomgen.run.works import Account, Powers
 
-SMALLEST_RTOL = 2.3e-14
-"""SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
 ADAPTIVE_SAMPLES = 1001
-LEAST_STEPS = 1000
-"""Of an adaptive method on a derivative with corners."""
-MOST_SAMPLES = 1_000_000
-ATOL = 1e-12
-"""Of each state, in parts of its size."""
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Where in a long step the gaps of contacts are looked at; in an equal step at its ends."""
 
-Begin = Callable[[Problem, float, int, Resume | None], Iterator[Advance]]
-"""Steps of a problem from a time on; with how many were made before, and what they go on from."""
+
+class Begin(Protocol):
+    """Steps of a problem from a time on; with how many were made before, what they go on from."""
+
+    def __call__(
+        self, problem: Problem, t: float, made: int, resume: Resume | None = None
+    ) -> Iterator[Advance]: ...
 
 
 def integrate(
@@ -55,6 +64,7 @@ def integrate(
     rest_speed: float | None = None,
     powers: Powers | None = None,
     resume: Resume | None = None,
+    guard: Guard | None = None,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
@@ -77,6 +87,8 @@ def integrate(
     resume      what an earlier run left in `Trajectory.resume`: this one goes on from there,
                 whatever `t_start` and `problem.initial` say, to the same bytes as if that one had
                 not ended, if method and step or tolerances are the same
+    guard       watches the derivative's rounding at every step, and stops the run where digits are
+                lost, or repairs it (`run.guard`); what it lets pass is what it is without
 
     Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
     has begun, Ctrl-C included, ends it early instead: the trajectory then holds the finite rows
@@ -89,16 +101,23 @@ def integrate(
         problem = replace(problem, initial=resume["y"])
         grid = float(resume.get("grid", t_start))
     t_start, t_end = float(t_start), float(t_end)
-    _check_times(t_start, t_end)
-    _check_tolerances(rtol, atol)
-    _check_samples(samples)
+    check_times(t_start, t_end)
+    check_tolerances(rtol, atol)
+    check_samples(samples)
     if rest_speed is not None and not (math.isfinite(rest_speed) and rest_speed > 0):
         raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
+
+    if guard is not None and guard.repairs and problem.contacts is not None:
+        raise RunError("guard: what contacts do cannot be repaired; let it stop instead (--guard)")
+    watch = None
+    if guard is not None:
+        tight = OF_TOLERANCE * rtol if isinstance(method, Adaptive) else guard.bound
+        watch = Watch(guard, problem, min(guard.bound, tight))
 
     derivatives, jacobians = _Count(), _Count()
     counted = replace(
         problem,
-        derivative=derivatives.of(problem.derivative),
+        derivative=derivatives.of(watch.derivative if watch else problem.derivative),
         jacobian=jacobians.of(problem.jacobian),
     )
     begin: Begin
@@ -106,20 +125,24 @@ def integrate(
     if isinstance(method, FixedStep):
         if max_step is not None:
             raise RunError(f"max_step: {integrator} takes equal steps; give --dt instead")
-        dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
+        dt, every = check_steps(integrator, t_end - t_start, dt, samples, max_steps)
         # What is looked at on the way does not count.
-        watched = problem if method.explicit else None
-        begin = _equal_steps(method.prepare(counted), grid, t_end, dt, every, watched)
+        looked_at = problem if method.explicit else None
+        begin = _equal_steps(method.prepare(counted), grid, t_end, dt, every, looked_at)
     else:
-        _check_no_step(integrator, dt)
+        check_no_step(integrator, dt)
         times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
-        longest = _longest(max_step, t_end - t_start, problem.corners)
+        longest = longest_step(max_step, t_end - t_start, problem.corners)
         if resume is not None and max_step is None:
             longest = float(resume.get("longest", longest))
-        allowed = _allowed(problem, atol)
-        begin = _adaptive_steps(method, t_end, (rtol, allowed, longest), times, max_steps)
+        bounds = allowed_errors(problem, atol)
+        begin = _adaptive_steps(method, t_end, (rtol, bounds, longest), times, max_steps)
 
-    if problem.contacts is None:
+    if watch and watch.guard.repairs:
+        if resume is not None:
+            raise RunError("guard: what goes on is not repaired; let it stop instead (--guard)")
+        advances = repaired(watch, begin, counted, t_start, max_steps)
+    elif problem.contacts is None:
         advances = begin(counted, t_start, 0, resume)
     else:
         looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
@@ -134,6 +157,9 @@ def integrate(
             resume=resume,
         )
 
+    if watch and not watch.guard.repairs:
+        advances = watched(watch, advances, t_start, problem.initial)
+
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
     run = _Run(t_start, problem.initial, account)
     with warnings.catch_warnings(record=True) as caught:
@@ -143,7 +169,8 @@ def integrate(
         )
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
-    message = "; ".join(part for part in (trouble, remarks) if part)
+    mended = watch.words() if watch else ""
+    message = "; ".join(part for part in (trouble, mended, remarks) if part)
     calls = {"derivatives": derivatives.calls, "jacobians": jacobians.calls}
     impacts = sum(event.kind == "impact" for event in run.events)
     return Trajectory(
@@ -158,18 +185,20 @@ def integrate(
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
         work_names=account.names if account else (),
-        resume={**run.resume(), **_numbers(grid=grid, dt=dt, rtol=rtol, atol=atol, longest=longest)}
+        resume={**run.resume(), **numbers(grid=grid, dt=dt, rtol=rtol, atol=atol, longest=longest)}
         if run.resume
         else {},
     )
 
 
 def _equal_steps(
-    change: Change, t_start: float, t_end: float, dt: float, every: int, watched: Problem | None
+    change: Change, t_start: float, t_end: float, dt: float, every: int, looked_at: Problem | None
 ) -> Begin:
     """Steps of `dt` from `t_start`, wherever they are begun; every how-manieth has a row."""
 
-    def begin(problem: Problem, t: float, made: int, resume: Resume | None) -> Iterator[Advance]:
+    def begin(
+        problem: Problem, t: float, made: int, resume: Resume | None = None
+    ) -> Iterator[Advance]:
         return fixed_step.advances(
             change,
             problem,
@@ -178,7 +207,7 @@ def _equal_steps(
             t_end=t_end,
             dt=dt,
             every=every,
-            watched=problem if watched and problem.contacts else watched,
+            watched=problem if looked_at and problem.contacts else looked_at,
             resume=resume,
         )
 
@@ -197,7 +226,9 @@ def _adaptive_steps(
     """
     rtol, atol, longest = bounds
 
-    def begin(problem: Problem, t: float, made: int, resume: Resume | None) -> Iterator[Advance]:
+    def begin(
+        problem: Problem, t: float, made: int, resume: Resume | None = None
+    ) -> Iterator[Advance]:
         return adaptive.advances(
             method,
             problem,
@@ -351,73 +382,3 @@ def _place(problem: Problem, run: _Run) -> str:
 
 def _ignore(fraction: float) -> None:
     """Take no notice of progress."""
-
-
-def _longest(max_step: float | None, span: float, corners: bool) -> float:
-    """The longest step of an adaptive method, s."""
-    if max_step is None:
-        return span / LEAST_STEPS if corners else math.inf
-    if not (math.isfinite(max_step) and max_step > 0):
-        raise RunError(f"max_step: {max_step:g} is not a positive step; give e.g. --max-step 0.01")
-    return max_step
-
-
-def _check_times(t_start: float, t_end: float) -> None:
-    for name, time in (("t_start", t_start), ("t_end", t_end)):
-        if not math.isfinite(time):
-            raise RunError(f"{name}: {time:g} is not a finite time")
-    if t_end <= t_start:
-        raise RunError(f"t_end: {t_end:g} is not after t_start = {t_start:g}")
-
-
-def _numbers(**values: float | None) -> dict[str, Floats]:
-    """Numbers as arrays, nan for none."""
-    return {name: np.array(math.nan if x is None else x) for name, x in values.items()}
-
-
-def _allowed(problem: Problem, atol: float | None) -> float | Floats:
-    """The absolute tolerance, of each state where none was given and they have sizes."""
-    if atol is not None:
-        return atol
-    return ATOL * np.array(problem.sizes) if problem.sizes else ATOL
-
-
-def _check_tolerances(rtol: float, atol: float | None) -> None:
-    for name, tolerance in (("rtol", rtol), ("atol", atol)):
-        if tolerance is None:
-            continue
-        if not (math.isfinite(tolerance) and tolerance > 0):
-            raise RunError(f"{name}: {tolerance:g} is not a positive number")
-    if rtol < SMALLEST_RTOL:
-        raise RunError(f"rtol: {rtol:g} is too small; the smallest allowed is {SMALLEST_RTOL:g}")
-
-
-def _check_samples(samples: int | None) -> None:
-    if samples is not None and samples < 2:
-        raise RunError(f"samples: {samples} is too few; give at least 2, the first and the last")
-    if samples is not None and samples > MOST_SAMPLES:
-        raise RunError(f"samples: {samples} is too many; give at most {MOST_SAMPLES}")
-
-
-def _check_no_step(integrator: str, dt: float | None) -> None:
-    if dt is not None:
-        fixed = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
-        raise RunError(
-            f"dt: {integrator} chooses its own steps; leave --dt out, "
-            f"or take one of {', '.join(fixed)}"
-        )
-
-
-def _check_steps(
-    integrator: str, span: float, dt: float | None, samples: int | None, max_steps: int
-) -> tuple[float, int]:
-    """Return the step and that every how-manieth is kept."""
-    if dt is None:
-        raise RunError(f"dt: {integrator} needs a step; give e.g. --dt 0.001")
-    if not (math.isfinite(dt) and dt > 0):
-        raise RunError(f"dt: {dt:g} is not a positive step; give e.g. --dt 0.001")
-    steps = fixed_step.count_steps(span, dt)
-    if steps > max_steps:
-        raise RunError(f"dt: {dt:g} takes {steps:g} steps, but at most {max_steps} are made")
-    every = 1 if samples is None else math.ceil(steps / (samples - 1))
-    return float(dt), every

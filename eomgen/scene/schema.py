@@ -71,7 +71,7 @@ Integrator = Literal[
     "LSODA",
 ]
 Form = Literal["velocity", "momentum", "redundant"]
-Route = Literal["auto", "closed", "ldl", "aba"]
+Route = Literal["auto", "closed", "ldl", "aba", "orthogonal"]
 LeftOut = Literal["velocity_forces"]
 """What a scene may leave out of the equations on purpose."""
 

@@ -13,17 +13,15 @@ from typing import Any, get_args
 
 import numpy as np
 
-from eomgen.backends.python import python_module
 from eomgen.derivation.recursive.regular import check_regular
-from eomgen.errors import EomgenError, RunError
+from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.program.digits import DIGITS
-from eomgen.program.route import routed, why_not_compared
-from eomgen.program.system import System
-from eomgen.run.module import GeneratedModule, load_module
+from eomgen.program.route import routed
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route
+from eomgen.study.routes import Made, compiled, loaded, velocities
 from eomgen.study.samples import Sample, agreement, condition_numbers, judging_states
 from eomgen.study.single import in_single, kernel_in_single
 from eomgen.study.timing import least_seconds
@@ -112,14 +110,6 @@ class Arithmetic:
     agreed: float
 
 
-@dataclass(frozen=True)
-class _Made:
-    """A compiled system."""
-
-    system: System
-    module: GeneratedModule
-
-
 def arithmetic(
     model: Model,
     *,
@@ -139,8 +129,10 @@ def arithmetic(
     model = replace(model, form="velocity", outputs=())
     check_regular(model)
     taken = routed(model, jacobian=False).system
-    ways, missing = _compiled(model, taken)
-    terms = _loaded(routed(replace(model, route="aba", outputs=TERMS), jacobian=False).system)
+    others, missing = compiled(model, but=taken.route)
+    there = {taken.route: loaded(taken), **others}
+    ways = {route: there[route] for route in get_args(Route) if route in there}
+    terms = loaded(routed(replace(model, route="aba", outputs=TERMS), jacobian=False).system)
     progress(0.2)
     truth = Truth(model)
     count = states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
@@ -184,36 +176,11 @@ def solve_operations(n: int) -> int:
     return factor + 2 * n * (n - 1) + n
 
 
-def _compiled(model: Model, taken: System) -> tuple[dict[str, _Made], dict[str, str]]:
-    """Every route there is, and why not for the others."""
-    made: dict[str, _Made] = {}
-    missing: dict[str, str] = {}
-    for route in get_args(Route):
-        if route == taken.route:
-            made[route] = _loaded(taken)
-        elif route != "auto":
-            words = why_not_compared(model, route)
-            try:
-                if not words:
-                    made[route] = _loaded(
-                        routed(replace(model, route=route), jacobian=False).system
-                    )
-            except EomgenError as error:
-                words = str(error)
-            if words:
-                missing[route] = words
-    return made, missing
-
-
-def _loaded(system: System) -> _Made:
-    return _Made(system, load_module(python_module(system), system.model.name))
-
-
 def _rounded(values: Floats) -> Floats:
     return values.astype(np.float32).astype(np.float64)
 
 
-def _judged(name: str, made: _Made, precision: str, pairs: Sequence[tuple[Sample, Exact]]) -> Way:
+def _judged(name: str, made: Made, precision: str, pairs: Sequence[tuple[Sample, Exact]]) -> Way:
     """A way with its errors, not timed yet."""
     model, bits = made.system.model, BITS[precision]
     units = [c.unit for c in model.velocities]
@@ -234,22 +201,16 @@ def _judged(name: str, made: _Made, precision: str, pairs: Sequence[tuple[Sample
     return Way(name, precision, _operations(name, made), None, None, tuple(errors), words)
 
 
-def _operations(name: str, made: _Made) -> int:
+def _operations(name: str, made: Made) -> int:
     cost, n = made.module.COST, len(made.system.model.velocities)
     if name != BASELINE:
         return cost["derivative"]["total"]
     return sum(cost[term]["total"] for term in TERMS) + n + solve_operations(n)
 
 
-def _velocities(made: _Made) -> slice:
-    """Where v̇ stands in the derivative."""
-    first = len(made.system.model.coordinates)
-    return slice(first, first + len(made.system.model.velocities))
-
-
-def _doubles(name: str, made: _Made, sample: Sample) -> tuple[Floats, list[str]]:
+def _doubles(name: str, made: Made, sample: Sample) -> tuple[Floats, list[str]]:
     """v̇ (nv, n) by the generated code, nan where it has none, and why."""
-    at, module = _velocities(made), made.module
+    at, module = velocities(made), made.module
     found = np.full((at.stop - at.start, len(sample.y)), np.nan)
     whys = []
     for k, (t, y) in enumerate(zip(sample.t, sample.y, strict=True)):
@@ -276,10 +237,10 @@ def _dense(matrix: Any, right: Any) -> Any:
     return np.linalg.solve(np.moveaxis(matrix, -1, 0), right.T[..., None])[..., 0].T
 
 
-def _singles(name: str, made: _Made, sample: Sample) -> tuple[Any, list[str]]:
+def _singles(name: str, made: Made, sample: Sample) -> tuple[Any, list[str]]:
     """The same in float32, step by step as the generated code goes."""
     if name != BASELINE:
-        return in_single(made.system, "derivative", sample.t, sample.y)[_velocities(made)], []
+        return in_single(made.system, "derivative", sample.t, sample.y)[velocities(made)], []
     matrix, bias, applied = (in_single(made.system, term, sample.t, sample.y) for term in TERMS)
     right, whys = applied - bias, []
     found = np.full(right.shape, np.nan, dtype=np.float32)
@@ -291,7 +252,7 @@ def _singles(name: str, made: _Made, sample: Sample) -> tuple[Any, list[str]]:
     return found, whys
 
 
-def _timed(found: Sequence[Way], made: Mapping[str, _Made], states: Floats) -> list[Way]:
+def _timed(found: Sequence[Way], made: Mapping[str, Made], states: Floats) -> list[Way]:
     """With the least times of calls, all in turn."""
     many = np.resize(states, (BATCH, states.shape[1])).T.copy()
     timed, calls, places = list(found), [], []
@@ -313,7 +274,7 @@ def _timed(found: Sequence[Way], made: Mapping[str, _Made], states: Floats) -> l
     return timed
 
 
-def _call(way: Way, made: _Made) -> Callable[[Any], Any]:
+def _call(way: Way, made: Made) -> Callable[[Any], Any]:
     """A way's computation of one state, or of columns of states, at t = 0."""
     module = made.module
     if way.precision == "float64":

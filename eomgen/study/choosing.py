@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from eomgen.errors import RunError
 from eomgen.run.problem import Floats
-from eomgen.study.estimate import Law, errors, fit
+from eomgen.study.estimate import ROUNDING, Law, errors, fit
 from eomgen.study.measure import WRONG
 from eomgen.study.trial import Case, Method, Tried, method_of
 
@@ -26,7 +26,8 @@ ENOUGH = 0.5
 CLEAR = 0.3 * WRONG
 """Runs of greater errors tell nothing of how errors fall: those of chaotic motions stay large."""
 RUNG, RUNGS = 100.0, 1000.0
-"""So many times less an error is aimed at at once, where nothing or something is known of it."""
+"""So many times less an error is aimed at at once, where nothing or something is known of it; where
+steps are bounded otherwise, too, errors do not yet fall as they will."""
 BESIDE = 10.0
 """So many times more an error is that of a run made to tell that of the next one."""
 TIGHTER = 3.0
@@ -35,6 +36,8 @@ SLACK = 1.5
 """Of the quickest so far: what another method may take at first."""
 BETTER = 1.5
 """Among the runs that will do the most accurate counts, up to so many times the least time."""
+OVERRUN = 3.0
+"""Of the time expected of a run: after that others are tried."""
 FULL, HALF = 0.7, 0.5
 """Of the time that is left: what a run is planned for. Of that, a run that only shows the way."""
 WORTH = 0.5
@@ -45,6 +48,11 @@ LOOSE = 1e-5
 """Errors asked for down to here may be met by few equal steps."""
 FEW_ROWS = 257
 """With more, equal steps lose what they save."""
+PATIENT = "gauss_6"
+"""Tried where others at their tightest are not exact enough: in equal steps that are summed with
+compensation, rounding disturbs a run a thousand times less."""
+PATIENCE = 10.0
+"""Of the time of the best run so far: what the first run of `PATIENT` may take."""
 FIRST_STEPS, MOST_STEPS = 64, 2**20
 """Of equal steps: in the first run of a method, and in any."""
 
@@ -132,12 +140,12 @@ class _Search:
         (self.left_out.discard if finished else self.left_out.add)(method.name)
         return finished
 
-    def make(self, plan: Plan) -> bool:
+    def make(self, plan: Plan, most: float = math.inf) -> bool:
         """Make the run of a plan, and say what is expected of it; whether it came to its end."""
         setting = self.case.setting(plan.method, plan.tolerance, self.motion)
         error = f"an error of {plan.error:.1g} in " if plan.known else ""
         self.say(f"{setting.options}: expecting {error}{plan.seconds:.2g} s")
-        return self.attempt(plan.method, plan.tolerance)
+        return self.attempt(plan.method, plan.tolerance, most)
 
     def judged(self) -> dict[int, float]:
         """Estimated error of each run, by the run's identity."""
@@ -193,11 +201,16 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         best = min(search.runs, key=lambda run: judged[id(run)])
         if judged[id(best)] <= target and not possible:
             return search.chosen(best, judged, True)
+        if asked is None and _patience(search, names, plans, PATIENCE * best.work):
+            continue
+        aside = _again(search, names)
         if not possible:
-            possible = [plan for plan in (_beside(search, best), _again(search, names)) if plan][:1]
+            possible = [plan for plan in (_beside(search, best), aside) if plan][:1]
         if not possible:
             return search.chosen(best, judged, False)
-        search.make(min(possible, key=lambda plan: plan.work))
+        plan = min(possible, key=lambda plan: plan.work)
+        bounded = plan is not aside and (aside or len(possible) > 1)
+        search.make(plan, OVERRUN * plan.seconds if bounded else math.inf)
     return search.nothing()
 
 
@@ -220,6 +233,8 @@ def within(
         left = budget - search.spent
         plans = [_most(search, method_of(name), judged, left) for name in names]
         possible = [plan for plan in plans if plan]
+        if asked is None and _patience(search, names, plans, HALF * left):
+            continue
         if not possible:
             return search.chosen(best, judged, True)
         plan = min(possible, key=lambda plan: plan.error)
@@ -255,19 +270,40 @@ def _race(search: _Search, names: list[str], loose: bool) -> list[str]:
     return [*names, *more]
 
 
+def _patience(search: _Search, names: list[str], plans: Sequence[Plan | None], most: float) -> bool:
+    """Try `PATIENT`, too, for `most` s, if it is for this motion, is not among the `names`, and the
+    explicit ones of these can be held no tighter.
+    """
+    explicit = [plan for name, plan in zip(names, plans, strict=True) if name != "Radau"]
+    own = search.of("DOP853")
+    spent = bool(own) and own[-1].tolerance <= search.tightest(method_of("DOP853"))
+    if PATIENT in names or any(explicit) or not (spent and _smooth(search.case)):
+        return False
+    names.append(PATIENT)
+    _first(search, method_of(PATIENT), most)
+    return True
+
+
 def _few_steps_do(case: Case) -> bool:
     """Whether equal steps may be few: the motion is smooth, and not many rows are asked for, of
     which each is the end of a step.
     """
-    smooth = not case.problem.corners and case.problem.contacts is None
-    return smooth and case.rows <= FEW_ROWS
+    return _smooth(case) and case.rows <= FEW_ROWS
 
 
-def _first(search: _Search, method: Method) -> None:
-    """A method's first run; where that fails, a tighter one: too long a step may not be stable."""
+def _smooth(case: Case) -> bool:
+    """Whether a method's order holds all along the motion."""
+    return not case.problem.corners and case.problem.contacts is None
+
+
+def _first(search: _Search, method: Method, most: float | None = None) -> None:
+    """A method's first run, for `most` s or not much longer than the quickest; where it fails, a
+    tighter one: too long a step may not be stable.
+    """
     steps = max(FIRST_STEPS, search.case.rows - 1)
     tolerance = search.case.t_end / steps if method.equal_steps else search.first
-    most = SLACK * min((run.work for run in search.runs), default=math.inf)
+    if most is None:
+        most = SLACK * min((run.work for run in search.runs), default=math.inf)
     while not (search.attempt(method, tolerance, most) or search.broken[-1].cut):
         tolerance /= _rung(method, RUNG)
         if tolerance < search.tightest(method):
@@ -275,19 +311,26 @@ def _first(search: _Search, method: Method) -> None:
 
 
 def _rung(method: Method, errors: float) -> float:
-    """How many times tighter makes an error so many times less; at most ten times the steps."""
-    return float(min(errors ** (1 / method.exponent), 10 ** (1 / method.growth)))
+    """How many times tighter makes an error so many times less; at most ten times the steps.
+
+    Equal steps are halved at least.
+    """
+    least = 2.0 if method.equal_steps else 1.0
+    return float(min(max(least, errors ** (1 / method.exponent)), 10 ** (1 / method.growth)))
 
 
 def _towards(search: _Search, method: Method, judged: dict[int, float], goal: float) -> Plan | None:
-    """A method's next run on the way to an error; none if it can be held no tighter."""
+    """A method's next run on the way to an error; none if it can be held no tighter, or rounding
+    is all that is left.
+    """
     own = search.of(method.name)
-    if not own or method.name in search.left_out:
+    if not own or method.name in search.left_out or judged[id(own[-1])] <= ROUNDING:
         return None
     last, tightest = own[-1].tolerance, search.tightest(method)
     law, known = _error_law(search, method, judged)
     wanted = max(min(law.tolerance(goal), last / _rung(method, TIGHTER)), tightest)
-    tolerance = max(wanted, search.deepest(method) / _rung(method, RUNGS if known else RUNG))
+    surely = known and not search.case.bounded
+    tolerance = max(wanted, search.deepest(method) / _rung(method, RUNGS if surely else RUNG))
     if tolerance >= last:
         return None
     seconds = _growth(method, [(run.tolerance, run.seconds) for run in own])
@@ -308,15 +351,20 @@ def _beside(search: _Search, best: Tried) -> Plan | None:
 
 
 def _again(search: _Search, names: Sequence[str]) -> Plan | None:
-    """A run of a method that was put aside for taking longer than others, now at their end."""
+    """A run of a method that was put aside for taking longer than others, or than was expected of
+    it, now to its end; of several, of the one that has the least to go.
+    """
+    plans = []
     for name in names:
         own = [run for run in search.broken if run.setting.integrator == name]
-        if own and own[-1].cut and not search.of(name):
+        if own and own[-1].cut and name in search.left_out:
             method, cut = method_of(name), own[-1]
             tolerance = max(search.deepest(method), method.tightest)
-            work = _growth(method, [(cut.tolerance, cut.work)]).at(tolerance)
-            return Plan(method, tolerance, math.nan, False, work, work)
-    return None
+            tolerance = cut.tolerance if search.of(name) else tolerance
+            whole = cut.work * search.case.t_end / max(float(cut.trajectory.t[-1]), cut.tolerance)
+            work = _growth(method, [(cut.tolerance, whole)]).at(tolerance)
+            plans.append(Plan(method, tolerance, math.nan, False, work, work))
+    return min(plans, key=lambda plan: plan.work, default=None)
 
 
 def _most(search: _Search, method: Method, judged: dict[int, float], left: float) -> Plan | None:

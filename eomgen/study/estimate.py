@@ -24,6 +24,12 @@ LAST = 0.1
 """Part of a run's time over whose rows differences are taken."""
 CAUTION = 0.8
 """Of the exponent that a method has in theory: taken where one difference alone is known."""
+MORE = 1.5
+"""Times the steps: other steps."""
+ROUNDING = 2.0**-52
+"""No state of doubles is known to less."""
+SMALL = 1e-3
+"""Once differences are less than this, errors of equal steps fall as theory has it."""
 APART = 30.0
 """By so much must an error have become less by theory for its fall to be seen: errors scatter."""
 SCATTER = 3.0
@@ -83,9 +89,13 @@ def _rows(run: Trajectory, since: float) -> tuple[Floats, Floats]:
     return run.t[late][::-1], run.y[late][::-1]
 
 
-def remaining(gaps: Sequence[float], tolerances: Sequence[float], expected: float) -> float:
+def remaining(
+    gaps: Sequence[float], tolerances: Sequence[float], expected: float, caution: float = CAUTION
+) -> float:
     """Error of the tightest of k >= 2 runs of one method, whose `tolerances` (k,) fall, from the
     differences (k - 1,) of each from the next.
+
+    Where one difference alone is known, `caution` times the exponent is taken.
 
     That of a wrong run says nothing of the next one's error, and is returned as it is. From two on
     they tell how fast the error falls now, if they are far enough apart: near rounding it does no
@@ -94,7 +104,7 @@ def remaining(gaps: Sequence[float], tolerances: Sequence[float], expected: floa
     last = gaps[-1]
     if last >= WRONG or last == 0:
         return last
-    slope = CAUTION * expected
+    slope = caution * expected
     for gap, tolerance in zip(gaps[-2::-1], tolerances[-3::-1], strict=True):
         ratio = tolerance / tolerances[-2]
         if ratio**expected >= APART and 0 < gap < WRONG:
@@ -107,33 +117,49 @@ def errors(runs: Sequence[Tried], scale: Floats, case: Case) -> list[float]:
     """Estimated error of each run, in parts of the scale; infinite where nothing is known.
 
     Of a method's looser runs their difference from its tightest, of that one what remains by the
-    law; or the difference from some run of another method, where that is less. Two runs that do not
-    differ at all tell nothing where steps are bounded otherwise: they may be the same steps. Rigid
+    law; or the difference from some run of another method, where that is less. Where steps are
+    bounded otherwise, two runs may be the same steps but for a few: they tell of each other only if
+    one took `MORE` times as many, and how errors fall is not seen from fewer than three. Rigid
     contacts close within a fixed tolerance of their own, which no law of the method's knows: there
     nothing is taken to remain less than two runs differ by.
     """
     found = []
     for run in runs:
         name = run.setting.integrator
-        own = sorted((r for r in runs if r.setting.integrator == name), key=lambda r: -r.tolerance)
         others = [r for r in runs if r.setting.integrator != name]
         apart = [ALIKE * difference(run.trajectory, r.trajectory, scale) for r in others]
-        if run is not own[-1]:
-            gap = difference(run.trajectory, own[-1].trajectory, scale)
-            if gap > 0 or not case.bounded:
-                apart.append(gap)
-        elif len(own) > 1:
-            pairs = pairwise(own)
-            gaps = [difference(a.trajectory, b.trajectory, scale) for a, b in pairs]
+        own = _telling(
+            sorted((r for r in runs if r.setting.integrator == name), key=lambda r: r.tolerance),
+            case,
+        )
+        if run is not own[-1] and (run in own or not case.bounded or _more(own[-1], run)):
+            apart.append(difference(run.trajectory, own[-1].trajectory, scale))
+        elif run is own[-1] and len(own) > 1:
+            gaps = [difference(a.trajectory, b.trajectory, scale) for a, b in pairwise(own)]
             tolerances = [r.tolerance for r in own]
-            if gaps[-1] > 0 or not case.bounded:
-                method = method_of(name)
-                scatter = SCATTER if method.multistep else 1.0
-                struck = case.problem.contacts is not None
-                left = gaps[-1] if struck else remaining(gaps, tolerances, method.exponent)
-                apart.append(scatter * left)
-        found.append(min(apart, default=math.inf))
+            method = method_of(name)
+            scatter = SCATTER if method.multistep else 1.0
+            struck = case.problem.contacts is not None
+            caution = 1.0 if method.equal_steps and gaps[-1] < SMALL else CAUTION
+            caution = 0.0 if case.bounded else caution
+            left = remaining(gaps, tolerances, method.exponent, caution)
+            apart.append(scatter * (gaps[-1] if struck else left))
+        found.append(max(min(apart, default=math.inf), ROUNDING))
     return found
+
+
+def _telling(own: Sequence[Tried], case: Case) -> list[Tried]:
+    """Of a method's runs, the tightest first, those that tell of each other, the tightest last."""
+    ladder = [own[0]]
+    for run in own[1:]:
+        if not case.bounded or _more(ladder[-1], run):
+            ladder.append(run)
+    return ladder[::-1]
+
+
+def _more(one: Tried, other: Tried) -> bool:
+    """Whether one run took clearly more steps than the other."""
+    return one.trajectory.counts["steps"] >= MORE * other.trajectory.counts["steps"]
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Any, cast
 import gmpy2
 from gmpy2 import mpfr
 
-from eomgen.language.formula import FUNCTIONS as FORMULA_FUNCTIONS
+from eomgen.program.digits import BY_MPFR
 from eomgen.run.module import CORNERS
 from eomgen.run.problem import Floats
 
@@ -63,17 +63,6 @@ class Watch:
         }
 
 
-FUNCTIONS: dict[str, Callable[..., Long]] = {
-    **{name: getattr(gmpy2, name) for name in FORMULA_FUNCTIONS if hasattr(gmpy2, name)},
-    "abs": abs,
-    "step": lambda x: mpfr(x > 0),
-    "min": min,
-    "max": max,
-    "select": lambda c, a, b: a if c > 0 else b,
-}
-"""What generated code may call."""
-
-
 @dataclass(frozen=True, eq=False)
 class Precise:
     """y' = f(t, y) in long numbers, to be used within `digits()`.
@@ -89,20 +78,27 @@ class Precise:
 
 
 def precise(
-    module: Any, parameters: Any, inputs: Any, initial: Floats, *, watched: bool = False
+    module: Any,
+    parameters: Any,
+    inputs: Any,
+    initial: Floats,
+    *,
+    watched: bool = False,
+    bits: int = BITS,
 ) -> Precise:
     """A generated module's derivative over long numbers, at given parameters and inputs.
 
     parameters, inputs  as `module.derivative` takes them; they must be valid there
     initial             the initial state of doubles, (ny,)
     watched             hold the ways that corners go, if there are any
+    bits                of what depends on parameters alone
     """
     names = inspect.signature(module._derivative).parameters
     watch = Watch() if watched and any(name in names for name in CORNERS) else None
-    with digits():
-        functions = {**FUNCTIONS, **(watch.functions() if watch else {})}
+    with digits(bits):
+        functions = {**BY_MPFR, **(watch.functions() if watch else {})}
         # The module keeps constants by value, and a long 1 is equal to a double 1: go round that.
-        constants = _over(module._constants.__wrapped__, FUNCTIONS)(
+        constants = _over(module._constants.__wrapped__, BY_MPFR)(
             _long(parameters, module.PARAMETERS)
         )["derivative"]
         u = _long(inputs, module.INPUTS)

@@ -20,7 +20,8 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.files import is_ours, write_whole
 from eomgen.model import Model
-from eomgen.run.integrate import SMALLEST_RTOL, integrate
+from eomgen.run.checks import SMALLEST_RTOL
+from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats, Problem

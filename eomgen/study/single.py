@@ -1,5 +1,6 @@
 """A program in float32, and how fast a generated module is in it."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,8 @@ from eomgen.program.tape import TIME
 from eomgen.run.problem import Floats
 
 Singles = NDArray[np.float32]
+LEAST: np.float32 = np.finfo(np.float32).smallest_normal
+"""For a weight that is there so that nothing is divided by 0, as a double may be."""
 
 _NUMPY: dict[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)},
@@ -28,8 +31,9 @@ class Single:
     """float32 numbers, or arrays of them, as scalars of a program."""
 
     def number(self, value: float) -> np.float32:
-        """The float32 nearest to a double."""
-        return np.float32(value)
+        """The float32 nearest to a double; the least one for what is not 0."""
+        nearest = np.float32(value)
+        return LEAST * np.float32(math.copysign(1.0, value)) if value and not nearest else nearest
 
     def call(self, function: str, *arguments: Any) -> Any:
         """Any function of formulas."""

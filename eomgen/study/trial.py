@@ -28,6 +28,8 @@ LEAST = 1e-9
 OVER = "no time for more"
 SOON = 0.2
 """Part of the time allowed after which a run's pace is judged."""
+HARDLY = 0.3
+"""Power of 2 by which equal steps may be longer than asked: twice the steps are twice the time."""
 SLOW = 2.5
 """So many times the time allowed, at the pace so far, end a run early."""
 
@@ -149,13 +151,18 @@ class Case:
         return scales(self.problem.states, self.units, y)
 
     def setting(self, method: Method, tolerance: float, like: Floats) -> Setting:
-        """A method at about a tolerance, or equal step, s, of few digits.
+        """A method at about a tolerance of few digits, or in equal steps, s, of about a length.
 
-        The absolute tolerance is that part of the smallest scale in the motion `like` (n, ny): no
-        kind of state is then held to less than the relative tolerance of its own scale.
+        Equal steps are the distance of the rows, halved so often that they are hardly longer than
+        asked: all runs then have rows at the very same moments. The absolute tolerance is that part
+        of the smallest scale in the motion `like` (n, ny): no kind of state is then held to less
+        than the relative tolerance of its own scale.
         """
         if method.equal_steps:
-            return Setting(method.name, dt=float(f"{tolerance:.3g}"))
+            dt = self.t_end / (self.rows - 1)
+            while dt > tolerance * 2**HARDLY:
+                dt /= 2
+            return Setting(method.name, dt=dt)
         rtol = max(_plain(tolerance), method.tightest)
         size = 10.0 ** math.floor(math.log10(float(np.min(self.scale(like)))))
         return Setting(method.name, rtol=rtol, atol=float(f"{rtol * size:.0e}"))

@@ -40,14 +40,24 @@ def vector_errors(found: Floats, true: Exact, units: Sequence[str], bits: int) -
     """
     finite = np.all(np.isfinite(found), axis=0)
     errors = np.where(finite, 0.0, np.nan)
-    groups = [[i for i, u in enumerate(units) if u == unit] for unit in dict.fromkeys(units)]
-    for group in groups:
-        sizes = np.max(np.abs(true[group]), axis=0)
-        least = HARDLY * (sorted(sizes)[len(sizes) // 2] or max(sizes))
+    for group, scale in group_scales(true, units):
         for k in np.flatnonzero(finite):
             off = max(abs(MP.mpf(float(found[i, k])) - true[i, k]) for i in group)
-            errors[k] = max(errors[k], _in_ulps(off, max(sizes[k], least), bits))
+            errors[k] = max(errors[k], _in_ulps(off, scale[k], bits))
     return errors
+
+
+def group_scales(true: Any, units: Sequence[str]) -> list[tuple[list[int], Any]]:
+    """Of each group of vectors in columns (m, n): its components, and what its errors are counted
+    in ulps of, (n,).
+    """
+    found = []
+    for unit in dict.fromkeys(units):
+        group = [i for i, u in enumerate(units) if u == unit]
+        sizes = np.max(np.abs(true[group]), axis=0)
+        least = HARDLY * (sorted(sizes)[len(sizes) // 2] or max(sizes))
+        found.append((group, np.maximum(sizes, least)))
+    return found
 
 
 def component_errors(found: Floats, true: Exact, bits: int) -> Floats:

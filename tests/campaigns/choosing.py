@@ -1,6 +1,7 @@
 """Does `--accuracy` hold? Scenes, targets, and the cheapest run that would have done.
 
-    python tests/campaigns/choosing.py [--keep FOLDER] [--reference S] [--times N] [SCENE …]
+    python tests/campaigns/choosing.py [--keep FOLDER] [--reference S] [--times N]
+        [--methods A,B,…] [SCENE …]
 
 For each scene (all built-in ones) and each target: the true error of the run chosen, its estimate,
 and its time beside that of the cheapest run of any method over a ladder of tolerances or steps
@@ -12,11 +13,12 @@ and not done again.
 import argparse
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from eomgen.build import build_model
+from eomgen.errors import RunError
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.run.module import as_problem, load_module
 from eomgen.scene.reader import built_in_names, find_scene, read_scene
@@ -43,9 +45,9 @@ def prepared(scene: str, folder: Path | None, seconds: float) -> tuple[Case, Ref
     return case, true
 
 
-def ladder(case: Case, true: Reference) -> Iterator[Setting]:
-    """Settings of all methods, the loosest of each first; equal steps give the rows asked for."""
-    for name in INTEGRATORS:
+def ladder(case: Case, true: Reference, names: Iterable[str]) -> Iterator[Setting]:
+    """Settings of the methods, the loosest of each first; equal steps give the rows asked for."""
+    for name in names:
         method = method_of(name)
         if method.equal_steps:
             for k in range(7):
@@ -56,8 +58,13 @@ def ladder(case: Case, true: Reference) -> Iterator[Setting]:
 
 
 def true_error(case: Case, true: Reference, setting: Setting, most: float) -> tuple[float, float]:
-    """A run's true error, infinite if it breaks off, and its work, s."""
-    run = case.run(setting, most=most)
+    """A run's true error, infinite if it breaks off or its method is not for this motion, and its
+    work, s.
+    """
+    try:
+        run = case.run(setting, most=most)
+    except RunError:
+        return math.inf, math.inf
     ended = run.trajectory.finished
     return error(run.trajectory.y[-1], true.y[-1], true.scale) if ended else math.inf, run.work
 
@@ -87,7 +94,7 @@ def case_rows(scene: str, given: argparse.Namespace) -> list[dict[str, Any]]:
     most = max(row["work"] for row in rows)
     cheapest = dict.fromkeys(TARGETS, (math.inf, ""))
     given_up = set()
-    for setting in ladder(case, true):
+    for setting in ladder(case, true, given.methods.split(",")):
         # A method is given up once it takes longer than anything of interest.
         if setting.integrator in given_up:
             continue
@@ -139,6 +146,7 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, default=Path("out/choosing"))
     parser.add_argument("--reference", type=float, default=120.0, help="s for long numbers")
     parser.add_argument("--times", type=int, default=3)
+    parser.add_argument("--methods", default=",".join(INTEGRATORS), help="for the cheapest run")
     given = parser.parse_args()
     given.keep.mkdir(parents=True, exist_ok=True)
     rows = []

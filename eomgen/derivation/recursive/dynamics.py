@@ -24,6 +24,7 @@ from eomgen.derivation.recursive.composite import (
     mass_entries,
     solved,
 )
+from eomgen.derivation.recursive.linkage import make_linkage
 from eomgen.derivation.recursive.motion import (
     Acceleration,
     Twist,
@@ -32,7 +33,16 @@ from eomgen.derivation.recursive.motion import (
     velocities,
 )
 from eomgen.derivation.recursive.moving import Moving, Values
-from eomgen.derivation.recursive.vectors import Scalar, sub, turning_in_space, zeros
+from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.derivation.recursive.orthogonal import Elimination
+from eomgen.derivation.recursive.solids import Solid, centres, ranked, solids
+from eomgen.derivation.recursive.vectors import (
+    Scalar,
+    no_matrix,
+    sub,
+    turning_in_space,
+    zeros,
+)
 from eomgen.effects import Driven, Effect, Gravity
 from eomgen.effects.base import Contact, JointLoad, Load
 from eomgen.joints import Free
@@ -198,6 +208,29 @@ class Dynamics(Moving):
         right = [a - b for a, b in zip(self._pushed(tau), bias, strict=True)]
         return self._fallen(solved(self.factors, right))
 
+    def orthogonal_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
+        """The same by orthogonal elimination, in the frames' own axes."""
+        about = centres(self._solids, self.scalars)
+        wrenches = fc.wrenches(self.linkage, self.instant, self.loads[0], self.scalars, about)
+        found = self._eliminated.respond(self._falling, wrenches, self._pushed(tau))
+        return self._fallen(found)
+
+    def orthogonal_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
+        """M⁻¹ of impulses on the velocities by orthogonal elimination."""
+        nothing, matrix = zeros(self.scalars), no_matrix(self.scalars)
+        still = [Acceleration(nothing, nothing, matrix, nothing)] * len(self.instant.links)
+        wrenches = [fc.no_force(self.scalars)] * len(still)
+        return self._eliminated.respond(still, wrenches, impulse)
+
+    @cached_property
+    def _solids(self) -> tuple[Solid | None, ...]:
+        return solids(self.linkage, self.scalars)
+
+    @cached_property
+    def _eliminated(self) -> Elimination:
+        ranks = ranked(make_linkage(self.model, self.model.defaults, FloatScalars()))
+        return Elimination(self.instant, self._solids, ranks, self.scalars)
+
     @cached_property
     def _free_roots(self) -> list[int]:
         """Of each body that nothing holds the index of its first velocity."""
@@ -208,16 +241,20 @@ class Dynamics(Moving):
         ]
 
     @cached_property
-    def _at_rest(self) -> list[fc.Force]:
-        """The wrenches that would keep the free velocities as they are, but for the fall of trees
-        that nothing holds: their weight changes nothing else, and is put in at the end.
+    def _falling(self) -> tuple[Acceleration, ...]:
+        """Accelerations of the frames if the free velocities do not change, but for the fall of
+        trees that nothing holds: their weight changes nothing else, and is put in at the end.
         """
         falling = [k for k, link in enumerate(self.instant.links) if link.v[0] in self._free_roots]
         base = sub(zeros(self.scalars), self.down)
         v, twists = self.felt
         vd = self.with_driven(None)
-        moving = accelerations(self.instant, twists, v, vd, base, self.scalars, falling)
-        inertial = fc.inertial(self.instant, moving, self.scalars)
+        return accelerations(self.instant, twists, v, vd, base, self.scalars, falling)
+
+    @cached_property
+    def _at_rest(self) -> list[fc.Force]:
+        """The wrenches that would keep the free velocities as they are."""
+        inertial = fc.inertial(self.instant, self._falling, self.scalars)
         return [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
 
     def _fallen(self, vd: Sequence[Scalar]) -> list[Scalar]:

@@ -62,14 +62,19 @@ def at_parent(link: Link, f: Force) -> Force:
 
 
 def wrenches(
-    linkage: Linkage, instant: Instant, loads: Sequence[PointForce], scalars: Scalars
+    linkage: Linkage,
+    instant: Instant,
+    loads: Sequence[PointForce],
+    scalars: Scalars,
+    about: Sequence[Vec] | None = None,
 ) -> tuple[Force, ...]:
-    """The loads as a wrench on each frame."""
+    """The loads as a wrench on each frame, about points of frames' own axes if they are given."""
     found = [no_force(scalars)] * len(instant.links)
     for load in loads:
         mount = linkage.mounts[load.body]
         if mount.frame >= 0:
-            at = add(mount.at, times(constant(mount.axes, scalars), load.at))
+            at = mount.at if about is None else sub(mount.at, about[mount.frame])
+            at = add(at, times(constant(mount.axes, scalars), load.at))
             force = instant.from_world(mount.frame, load.force)
             arm = instant.of_frame(mount.frame, at)
             torque = instant.from_world(mount.frame, load.torque)

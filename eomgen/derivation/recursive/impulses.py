@@ -147,6 +147,8 @@ def response(d: Dynamics, impulse: Sequence[Scalar], route: str) -> list[Scalar]
     """M⁻¹ of impulses, or forces, on the velocities, by the recursion of a route."""
     if route == "ldl":
         return solved(d.factors, impulse)
+    if route == "orthogonal":
+        return d.orthogonal_response(impulse)
     still = [fc.no_force(d.scalars)] * len(d.instant.links)
     return respond(d.instant, d.articulated, still, impulse, d.scalars)
 

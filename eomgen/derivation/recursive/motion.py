@@ -122,15 +122,15 @@ def _field(w: Vec, a: Vec) -> tuple[Mat, Vec]:
 def inertial_force(link: Link, a: Acceleration, scalars: Scalars) -> tuple[Vec, Vec]:
     """Moment about the origin and force that give the link's mass its acceleration.
 
-    f = m a + W h with the first moment h; n = h x a + Σ m r x (W r), see `_moment`.
+    f = m a + W h with the first moment h; n = h x a + Σ m r x (W r), see `moment_about_centre`.
     """
     m, h, inertia = link.rigid.mass, link.rigid.first, link.rigid.inertia
     force = add(scale(m, a.linear), times(a.field, h))
-    moment = add(cross(h, a.linear), _moment(inertia, a, scalars))
+    moment = add(cross(h, a.linear), moment_about_centre(inertia, a, scalars))
     return moment, force
 
 
-def _moment(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
+def moment_about_centre(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
     """Σ m r x (W r) = J α + ω x J ω from the inertia matrix.
 
     With E = Σ m r rᵀ = ½ tr(J) 1 - J its entries are those of W E less those of its transpose,

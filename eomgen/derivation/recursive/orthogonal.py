@@ -1,0 +1,400 @@
+"""Forward dynamics by orthogonal elimination: no digit is lost where heavy bodies hang on light.
+
+By Gauss's principle of least constraint the accelerations are those with the least
+
+    ½ Σ w (c · x - f)² - t · x,                  x = (α, a) of the frames,
+
+with a row c · x = f of weight w for each component of each body's Newton's and Euler's equations:
+the mass, a_centre = force / mass; the pivots of the inertia, α = moment / inertia. The mass matrix
+and articulated inertias are this sum's normal equations. They square its condition, and a light
+body vanishes beside a heavy one; rows of their own weight do not. So rows are rotated against each
+other until one alone holds the acceleration along a free axis, from the leaves to the root: the QR
+factors of least squares over the tree of frames (Golub & Van Loan, Matrix Computations, 5.3). Each
+row is good to rounding of its own size, and a lever that is zero stays so: a link's rows are put
+together about the joint of what is heaviest on it.
+
+Outwards no acceleration is substituted, which could cancel, but what the rows leave is rotated
+back. Those of a body times their weights are the forces that joints put on it, small where it is
+light. What has no inertia of its own along an axis is found from its neighbours' rows after all.
+
+A force on a body is part of its own rows, unless heavier ones hold it; it and torques of joints are
+then in t. Digits are lost still where heavy points, such as hang on ball joints, pull along a line
+that their link, free to turn with next to no inertia, has along no coordinate axis; and where a
+heavy tip hangs in line with all joints, of which rounding of sines and cosines knows no more.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from eomgen.derivation.recursive.articulated import along, with_component
+from eomgen.derivation.recursive.forces import Force, at_parent, total
+from eomgen.derivation.recursive.instant import Axis, Instant, Link
+from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
+from eomgen.derivation.recursive.possible import column_of, moved, possible
+from eomgen.derivation.recursive.rows import (
+    Column,
+    Row,
+    Rows,
+    Steps,
+    Sum,
+    Turn,
+    shifted,
+    turned_back,
+)
+from eomgen.derivation.recursive.solids import Ranks, Solid
+from eomgen.derivation.recursive.vectors import (
+    AXES,
+    Scalar,
+    Scalars,
+    Vec,
+    add,
+    cross,
+    dot,
+    named,
+    replaced,
+    scale,
+    sub,
+    times,
+    unit,
+    zeros,
+)
+
+SLIGHT = 1e-16
+"""The least share of a diagonal entry that a pivot of an inertia matrix keeps."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """An axis of motion that was eliminated: its row before, the residual of that at the end, and
+    the rotations between. `rotor` is the index of its motor's row, -1 if it has none.
+    """
+
+    axis: Axis
+    velocity: int
+    row: Row
+    left: Scalar
+    turns: tuple[Turn | Sum, ...]
+    rotor: int
+    before: tuple[Turn | Sum, ...] = ()
+
+
+@dataclass(frozen=True)
+class Eliminated:
+    """A link after its axes are: rotations before, axes in the order taken, rows that remain for
+    the parent, and those that hold nothing more.
+    """
+
+    turns: tuple[Turn | Sum, ...]
+    axes: tuple[Taken, ...]
+    rows: tuple[Row, ...]
+    empty: tuple[Row, ...]
+
+
+class Elimination:
+    """One sweep over the frames of an instant in its own axes.
+
+    `carried` is what the frames carry, about whose centres wrenches act.
+    """
+
+    def __init__(
+        self,
+        instant: Instant,
+        carried: Sequence[Solid | None],
+        ranks: Ranks,
+        scalars: Scalars,
+    ) -> None:
+        self._links = instant.links
+        self._solids, self._ranks = carried, ranks
+        self._scalars = scalars
+        self._planar = bool(instant.angles)
+        self._rows = Rows(scalars)
+        self._columns = possible(instant.links, scalars)
+
+    def respond(
+        self, moving: Sequence[Acceleration], wrenches: Sequence[Force], tau: Sequence[Scalar]
+    ) -> list[Scalar]:
+        """The v̇ under wrenches about the centres and `tau` on the velocities, where `moving` are
+        the accelerations at v̇ = 0.
+        """
+        zero = zeros(self._scalars)
+        wrenches, tau = self._on_bodies(wrenches, tau)
+        rows: list[list[tuple[Row, Vec]]] = [[] for _ in self._links]
+        terms = [Force(zero, zero) for _ in self._links]
+        found: list[Eliminated] = []
+        for k in reversed(range(len(self._links))):
+            link = self._links[k]
+            own, term = self._own_rows(k, moving[k], wrenches[k])
+            terms[k] = total(terms[k], term)
+            eliminated, passed = self._eliminated(k, own, rows[k], terms[k], tau)
+            found.append(eliminated)
+            if link.parent >= 0:
+                rows[link.parent] += [(_turned(link, row), link.arm) for row in eliminated.rows]
+                terms[link.parent] = total(terms[link.parent], at_parent(link, passed))
+        return self._outwards(found[::-1], len(tau))
+
+    # Inwards.
+
+    def _on_bodies(
+        self, wrenches: Sequence[Force], tau: Sequence[Scalar]
+    ) -> tuple[list[Force], list[Scalar]]:
+        """Torques between two bodies that can take them as moments on both, which is shorter."""
+        s, wrenches, tau = self._scalars, list(wrenches), list(tau)
+        for k, link in enumerate(self._links):
+            for axis, i in link.free:
+                ends = [n for n in (k, link.parent) if n >= 0]
+                turns = axis.angular and s.is_zero(link.armature)
+                if turns and all(self._takes(n) for n in ends) and not s.is_zero(tau[i]):
+                    moment = scale(tau[i], axis.direction)
+                    wrenches[k] = replace(wrenches[k], moment=add(wrenches[k].moment, moment))
+                    if link.parent >= 0:
+                        other = wrenches[link.parent]
+                        moment = sub(other.moment, link.turn.out(moment))
+                        wrenches[link.parent] = replace(other, moment=moment)
+                    tau[i] = self._rows.zero
+        return wrenches, tau
+
+    def _takes(self, k: int) -> bool:
+        """Whether a link's own rows take what acts on it: where heavier ones hold the link, its own
+        would be moved far and back.
+        """
+        solid = self._solids[k]
+        return (
+            solid is not None
+            and not self._ranks.light[k]
+            and not any(self._scalars.is_zero(solid.inertia[j][j]) for j in self._spins())
+        )
+
+    def _spins(self) -> tuple[int, ...]:
+        return (2,) if self._planar else (0, 1, 2)
+
+    def _own_rows(
+        self, k: int, a: Acceleration, wrench: Force
+    ) -> tuple[tuple[dict[int, Row], dict[int, Row]], Force]:
+        """Rows of a link's own mass, by axis: linear about its centre, and angular; and the part of
+        the wrench that no inertia takes.
+        """
+        s, zero, solid = self._scalars, zeros(self._scalars), self._solids[k]
+        if solid is None:
+            return ({}, {}), wrench
+        linear, angular, left, moment = {}, {}, zero, zero
+        way = add(a.linear, times(a.field, solid.centre))
+        light = self._ranks.light[k]
+        if light or s.is_zero(solid.mass):
+            left = wrench.force
+        if not s.is_zero(solid.mass):
+            m = s.call("max", solid.mass, self._rows.tiny)
+            for j in self._axes():
+                right = -way[j] if light else wrench.force[j] / m - way[j]
+                linear[j] = self._rows.make(m, zero, unit(j, s), right)
+        turning = moment_about_centre(solid.inertia, a, s)
+        if light:
+            moment = wrench.moment
+            y = [-x for x in turning]
+        else:
+            y = list(sub(wrench.moment, turning))
+        work = [list(row) for row in solid.inertia]
+        order = self._turns_of(self._links[k])
+        for n, i in enumerate(order):
+            if s.is_zero(solid.inertia[i][i]):
+                if not light:
+                    moment = replaced(moment, i, y[i])
+                continue
+            d = self._pivot_of(work[i][i], solid.inertia[i][i])
+            entries = unit(i, s)
+            for j in order[n + 1 :]:
+                part = work[i][j] / d
+                entries = replaced(entries, j, part)
+                y[j] = y[j] - part * y[i]
+                for h in order[n + 1 :]:
+                    work[j][h] = work[j][h] - part * work[i][h]
+            angular[i] = self._rows.make(d, entries, zero, y[i] / d)
+        moved = add(moment, cross(solid.centre, left))
+        return (linear, angular), Force(moved, left)
+
+    def _pivot_of(self, pivot: Scalar, entry: Scalar) -> Scalar:
+        floor = self._rows.tiny if pivot is entry else self._scalars.number(SLIGHT) * entry
+        return self._scalars.call("max", pivot, floor)
+
+    def _axes(self) -> tuple[int, ...]:
+        return (0, 1) if self._planar else (0, 1, 2)
+
+    def _turns_of(self, link: Link) -> tuple[int, ...]:
+        """The axes to turn about, that of the link last."""
+        if self._planar:
+            return (2,)
+        units = [axis.unit for axis, _ in link.free if axis.angular and axis.unit is not None]
+        last = units[-1] if units else 2
+        return ((last + 1) % 3, (last + 2) % 3, last)
+
+    def _slides_of(self, link: Link, arm: Vec, rows: Sequence[Row]) -> tuple[int, ...]:
+        """The axes to move along, that of the link last. Before it those that rows of few axes
+        hold, which so stay what they are, and that of an arm.
+        """
+        is_zero = self._scalars.is_zero
+        ways = [
+            [j for j in AXES if not is_zero(way[j])] for way in (arm, *(r.linear for r in rows))
+        ]
+        own = next((axis.unit for axis, _ in link.free if not axis.angular), None)
+        last = ways[0][0] if len(ways[0]) == 1 else 2
+
+        def late(j: int) -> tuple[bool, int, int]:
+            held = [len(way) for way in ways[1:] if j in way]
+            return j == own, -min(held, default=4), len(held)
+
+        turn = ((last + 1) % 3, (last + 2) % 3, last)
+        return tuple(sorted((j for j in turn if j in self._axes()), key=late))
+
+    def _eliminated(
+        self,
+        k: int,
+        own: tuple[dict[int, Row], dict[int, Row]],
+        rows: Sequence[tuple[Row, Vec]],
+        term: Force,
+        tau: Sequence[Scalar],
+    ) -> tuple[Eliminated, Force]:
+        """Take a link's free axes out of the rows of all that it carries, each about a point."""
+        s, link, solid = self._scalars, self._links[k], self._solids[k]
+        # Where the heaviest rows have no arm, light ones keep theirs.
+        heaviest = self._ranks.heaviest[k]
+        at = self._links[heaviest].arm if heaviest >= 0 else zeros(s)
+        if heaviest < 0 and solid is not None:
+            at = solid.centre
+        columns = self._columns[k]
+        about = columns | moved(columns, at, s)
+        linear, angular = dict(own[0]), dict(own[1])
+        if solid is not None:
+            linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
+        linear = {j: self._rows.of(about, row) for j, row in linear.items()}
+        angular = {j: self._rows.of(about, row) for j, row in angular.items()}
+        loose = [self._rows.of(about, shifted(row, sub(arm, at))) for row, arm in rows]
+        turns: Steps = []
+        orders = (
+            [j for j in self._slides_of(link, at, loose) if (False, j) in about],
+            [j for j in self._turns_of(link) if (True, j) in about],
+        )
+        loose += [linear.pop(j) for j in [*linear] if j not in orders[0]]
+        loose += [angular.pop(j) for j in [*angular] if j not in orders[1]]
+        room = len(orders[0]) + len(orders[1])
+        folded = bool(linear) or len(loose) + len(angular) > room
+        if folded:
+            linear, loose = self._rows.folded(linear, loose, orders[0], turns, angular=False)
+            holding = sum(not self._rows.is_empty(row) for row in loose)
+            if angular or holding > len(orders[1]):
+                angular, loose = self._rows.folded(angular, loose, orders[1], turns, angular=True)
+        kept = {(False, j): shifted(linear[j], at) for j in orders[0] if j in linear}
+        kept |= {(True, j): angular[j] for j in orders[1] if j in angular}
+        kept = {column: self._rows.of(columns, row) for column, row in kept.items()}
+        free = [shifted(row, at) for row in loose if not self._rows.is_empty(row)]
+        free = [self._rows.of(columns, row) for row in free]
+        # Rows of angular accelerations alone first, which so stay what they are.
+        free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
+        empty = [row for row in loose if self._rows.is_empty(row)]
+        taken = []
+        for axis, i in reversed(link.free):
+            held = axis.unit in own[axis.angular]
+            first, kept, free, before = self._first(axis, held, kept, free)
+            one, kept, free, term = self._taken(link, (axis, i), first, kept, free, term, tau[i])
+            taken.append(replace(one, before=before))
+        rest = [*kept.values(), *free]
+        holding_rows = [row for row in rest if not self._rows.is_empty(row)]
+        empty += [row for row in rest if self._rows.is_empty(row)]
+        return Eliminated(tuple(turns), tuple(taken), tuple(holding_rows), tuple(empty)), term
+
+    def _first(
+        self, way: Axis, held: bool, kept: dict[Column, Row], free: list[Row]
+    ) -> tuple[Row, dict[Column, Row], list[Row], tuple[Turn | Sum, ...]]:
+        """The row that an axis is found from: one that holds it alone, as there is where a link has
+        inertia against it; else what can be gathered of it from all.
+        """
+        column = column_of(way)
+        kept, turns = dict(kept), Steps()
+        if held:
+            return kept.pop(column), kept, free, ()
+        single = self._rows.empty(column)
+        for n, row in enumerate(free):
+            parts = zip((*row.angular, *row.linear), (*single.angular, *single.linear), strict=True)
+            if all(self._scalars.is_zero(a - b) for a, b in parts):
+                return row, kept, [*free[:n], *free[n + 1 :]], ()
+        free = list(free)
+        for n, row in enumerate(free):
+            single, free[n] = self._rows.rotated(single, row, column, turns)
+        for key in reversed(kept):
+            single, kept[key] = self._rows.rotated(single, kept[key], column, turns)
+        return single, kept, free, tuple(turns)
+
+    def _taken(
+        self,
+        link: Link,
+        axis: tuple[Axis, int],
+        first: Row,
+        kept: dict[Column, Row],
+        free: Sequence[Row],
+        term: Force,
+        tau: Scalar,
+    ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
+        """Rotate one row until it alone holds an axis of motion."""
+        s, (way, i) = self._scalars, axis
+        column = column_of(way)
+        pivot, kept, free, turns = first, dict(kept), list(free), Steps()
+        for n, row in enumerate(free):
+            pivot, free[n] = self._rows.rotated(pivot, row, column, turns)
+        for key in reversed(kept):
+            pivot, kept[key] = self._rows.rotated(pivot, kept[key], column, turns)
+        carried = along(way, term.moment, term.force)
+        force, rotor, parents = carried + tau, -1, -tau
+        if not s.is_zero(link.armature):
+            # Its row is that of the joint's acceleration, the frame's less the parent's.
+            row, before = replace(self._rows.empty(column), weight=link.armature), pivot.weight
+            pivot, row = self._rows.rotated(pivot, row, column, turns)
+            minus = with_component(way, row.angular, row.linear, -self._rows.one)
+            free.append(replace(row, angular=minus[0], linear=minus[1]))
+            # Of what pushes the frame the rotor's share, and of tau the frame's, minus.
+            s_rotor = link.armature / pivot.weight
+            rotor, parents = row.index, s_rotor * carried - before / pivot.weight * tau
+        pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
+        share = force / pivot.weight
+        moment = sub(term.moment, scale(force, pivot.angular))
+        push = sub(term.force, scale(force, pivot.linear))
+        passed = Force(*with_component(way, moment, push, parents))
+        return Taken(way, i, first, share, tuple(turns), rotor), kept, free, passed
+
+    # Outwards.
+
+    def _outwards(self, found: Sequence[Eliminated], nv: int) -> list[Scalar]:
+        """Residuals from the world outwards, and from them the accelerations."""
+        scalars = self._scalars
+        result = [self._rows.zero] * nv
+        residuals: dict[int, Scalar] = {}
+        reached: list[tuple[Vec, Vec]] = []
+        for link, eliminated in zip(self._links, found, strict=True):
+            angular, linear = zeros(scalars), zeros(scalars)
+            if link.parent >= 0:
+                base_angular, base_linear = reached[link.parent]
+                angular = link.turn.into(base_angular)
+                linear = link.turn.into(add(base_linear, cross(base_angular, link.arm)))
+            for row in (*eliminated.empty, *(eliminated.rows if link.parent < 0 else ())):
+                residuals[row.index] = -row.right
+            for taken in reversed(eliminated.axes):
+                row, way = taken.row, taken.axis
+                residuals[row.index] = taken.left
+                turned_back(taken.turns, residuals)
+                before = along(way, angular, linear)
+                if taken.rotor >= 0:
+                    result[taken.velocity] = residuals[taken.rotor]
+                    value = before + residuals[taken.rotor]
+                else:
+                    clear = with_component(way, row.angular, row.linear, self._rows.zero)
+                    value = row.right + residuals[row.index]
+                    value = value - (dot(clear[0], angular) + dot(clear[1], linear))
+                    result[taken.velocity] = value - before
+                angular, linear = with_component(way, angular, linear, value)
+                turned_back(taken.before, residuals)
+            turned_back(eliminated.turns, residuals)
+            angular = named(angular, f"alpha_{link.name}", scalars)
+            reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
+        return result
+
+
+def _turned(link: Link, row: Row) -> Row:
+    """A row of a link in its parent's axes."""
+    return replace(row, angular=link.turn.out(row.angular), linear=link.turn.out(row.linear))

@@ -1,0 +1,188 @@
+"""Weighted rows about a frame's accelerations, and their rotations against each other.
+
+A row of weight w and one of weight v with 1 and x in a column become, with d = w + v x²,
+c = w / d and s = v x / d,
+
+    p = c a + s b  of weight d,    r = b - x a  of weight v c        (Gentleman 1973),
+
+of which r has nothing there: a Givens rotation without its square root. Backwards, from what the
+new rows leave at some accelerations follows what the old ones leave, a = p - s r, b = x p + c r.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+
+from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, add, cross, unit, zeros
+
+TINY = 1e-200
+"""The weight of an empty row, and the least of any: so small that it never counts."""
+
+Column = tuple[bool, int]
+"""Whether an acceleration is angular, and its axis."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """angular · α + linear · a = right, times weight; `index` names its residual."""
+
+    index: int
+    weight: Scalar
+    angular: Vec
+    linear: Vec
+    right: Scalar
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A rotation of a row against a pivot row that has 1 where it has x."""
+
+    pivot: int
+    row: int
+    x: Scalar
+    s: Scalar
+    c: Scalar
+
+
+@dataclass(frozen=True)
+class Sum:
+    """Rows x · unknown = right put together at once with a pivot row of that unknown alone."""
+
+    pivot: Row
+    rows: tuple[tuple[int, Scalar, Scalar], ...]
+
+
+Steps = list[Turn | Sum]
+
+
+class Rows:
+    """Makes and rotates rows; each has an index of its own."""
+
+    def __init__(self, scalars: Scalars) -> None:
+        self._scalars = scalars
+        self._indices = count()
+        self.zero, self.one, self.tiny = (scalars.number(x) for x in (0.0, 1.0, TINY))
+
+    def make(self, weight: Scalar, angular: Vec, linear: Vec, right: Scalar) -> Row:
+        """A row."""
+        return Row(next(self._indices), weight, angular, linear, right)
+
+    def empty(self, column: Column) -> Row:
+        """One that holds one acceleration, and of which nothing is asked."""
+        angular, axis = column
+        one, zero = unit(axis, self._scalars), zeros(self._scalars)
+        return self.make(self.tiny, *((one, zero) if angular else (zero, one)), self.zero)
+
+    def of(self, columns: Collection[Column], row: Row) -> Row:
+        """A row where only some accelerations can be other than nothing."""
+        a, b = row.angular, row.linear
+        x, y, z = (a[j] if (True, j) in columns else self.zero for j in AXES)
+        p, q, r = (b[j] if (False, j) in columns else self.zero for j in AXES)
+        return replace(row, angular=(x, y, z), linear=(p, q, r))
+
+    def is_empty(self, row: Row) -> bool:
+        """Whether a row holds nothing any more."""
+        return all(self._scalars.is_zero(x) for x in (*row.angular, *row.linear))
+
+    def folded(
+        self,
+        own: dict[int, Row],
+        rows: Sequence[Row],
+        order: Sequence[int],
+        turns: Steps,
+        *,
+        angular: bool,
+    ) -> tuple[dict[int, Row], list[Row]]:
+        """Rotate rows against the link's own until those alone hold the linear, or else the angular
+        accelerations, as a triangle in their order.
+        """
+        own, rows = dict(own), list(rows)
+        for j in order:
+            first = pivot = own.get(j) or self.empty((angular, j))
+            if angular and j == order[-1] and j in own:
+                pivot, rows = self._summed(pivot, rows, j, turns)
+            for n, row in enumerate(rows):
+                pivot, rows[n] = self.rotated(pivot, row, (angular, j), turns, own=pivot is first)
+            own[j] = pivot
+        return own, rows
+
+    def _summed(
+        self, pivot: Row, rows: Sequence[Row], j: int, turns: Steps
+    ) -> tuple[Row, list[Row]]:
+        """A pivot row about one angular acceleration with all rows about that, and the others."""
+        is_zero = self._scalars.is_zero
+        weight, right, found, others = pivot.weight, pivot.weight * pivot.right, [], []
+        for row in rows:
+            x = row.angular[j]
+            if is_zero(x):
+                others.append(row)
+                continue
+            q = row.weight * x
+            weight, right = weight + q * x, right + q * row.right
+            found.append((row.index, x, row.right))
+        if not found:
+            return pivot, list(rows)
+        pivot = replace(pivot, weight=weight, right=right / weight)
+        turns.append(Sum(pivot, tuple(found)))
+        return pivot, others
+
+    def rotated(
+        self,
+        pivot: Row,
+        row: Row,
+        column: Column,
+        turns: Steps,
+        *,
+        own: bool = False,
+    ) -> tuple[Row, Row]:
+        """A pivot row, 1 in a column, and a row that has x there and then nothing; `own` if the
+        pivot row is a body's own yet.
+        """
+        angular, j = column
+        x = (row.angular if angular else row.linear)[j]
+        if self._scalars.is_zero(x):
+            return pivot, row
+        q = row.weight * x
+        d = pivot.weight + q * x
+        s, c = q / d, pivot.weight / d
+        turns.append(Turn(pivot.index, row.index, x, s, c))
+
+        def mixed(a: Scalar, b: Scalar) -> tuple[Scalar, Scalar]:
+            # c a + s b is a + s (b - x a), too, and shorter, but not as good if a is large: in a
+            # link's own rows it is not, nor longer if a or b is nothing.
+            rest = b - x * a
+            short = own and not self._scalars.is_zero(a) and not self._scalars.is_zero(b)
+            return (a + s * rest if short else c * a + s * b), rest
+
+        def both(a: Vec, b: Vec, clear: bool) -> tuple[Vec, Vec]:
+            pairs = [mixed(*pair) for pair in zip(a, b, strict=True)]
+            if clear:
+                pairs[j] = (self.one, self.zero)
+            (p, f), (q, g), (r, h) = pairs
+            return (p, q, r), (f, g, h)
+
+        turn, left_turn = both(pivot.angular, row.angular, angular)
+        move, left_move = both(pivot.linear, row.linear, not angular)
+        right, left_right = mixed(pivot.right, row.right)
+        return (
+            Row(pivot.index, d, turn, move, right),
+            Row(row.index, row.weight * c, left_turn, left_move, left_right),
+        )
+
+
+def turned_back(turns: Sequence[Turn | Sum], residuals: dict[int, Scalar]) -> None:
+    """What rows leave before rotations, from what they leave after them."""
+    for turn in reversed(turns):
+        if isinstance(turn, Sum):
+            value = turn.pivot.right + residuals[turn.pivot.index]
+            for index, x, right in turn.rows:
+                residuals[index] = x * value - right
+            continue
+        a, b = residuals[turn.pivot], residuals[turn.row]
+        residuals[turn.pivot] = a - turn.s * b
+        residuals[turn.row] = turn.x * a + turn.c * b
+
+
+def shifted(row: Row, way: Vec) -> Row:
+    """A row about a point as one about the origin that the point lies `way` from."""
+    return replace(row, angular=add(row.angular, cross(way, row.linear)))

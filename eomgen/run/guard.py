@@ -1,0 +1,180 @@
+"""A run guarded against lost digits: what rounding does to its derivative, watched at every step.
+
+A small residual M v̇ + h - F does not mean that v̇ is right: with a heavy body on light ones v̇ loses
+a digit for each decade of their masses, and its residual none. So the residual that is watched is
+that of the derivative itself, ẏ - f(t, y), with f the same equations in numbers that are long
+enough; it is the forward error of v̇ and of all else that goes into the step. It is asked for at
+every state that a step ends in: what is lost depends on the configuration, which changes little
+within a step, and one evaluation in long numbers costs three to five of doubles, where a step of an
+explicit method of high order takes twelve.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from eomgen.run.integrators.interface import Advance, StepFailure
+from eomgen.run.problem import Floats, Problem
+
+LOST = 1e-8
+"""Relative error of a derivative at which digits count as lost, unless the run is held tighter."""
+OF_TOLERANCE = 10.0
+"""Times the relative tolerance of a run that its derivative may be off."""
+HARDLY = 1e-3
+"""Part of the greatest that a rate was in the run, of which less counts as no more."""
+REGAINED = 0.1
+"""Part of the bound below which doubles are trusted again."""
+UNIT = 1e-12
+"""What a quaternion may be off unit length."""
+FULL = 16.0
+"""Digits of doubles."""
+
+Begin = Callable[[Problem, float, int], Iterator[Advance]]
+
+
+@dataclass(frozen=True, eq=False)
+class Guard:
+    """What watches a run.
+
+    exact    f(t, y) -> (ny,), the derivative by long numbers, nan where it has no value there
+    groups   of states that share a unit, whose rates are measured by the greatest of them
+    bound    relative error of the derivative beyond which digits are lost
+    repairs  go on by `exact` where digits are lost, instead of stopping
+    """
+
+    exact: Callable[[float, Floats], Floats]
+    groups: tuple[tuple[int, ...], ...]
+    bound: float = LOST
+    repairs: bool = False
+
+
+@dataclass(eq=False)
+class Watch:
+    """A guard at its work on one run, which holds it to `bound`.
+
+    derivative  what the run is to integrate: the problem's own, and `exact` while `repairing`
+    stretches   begin, end (s) and worst loss of what was repaired
+    """
+
+    guard: Guard
+    problem: Problem
+    bound: float
+    repairing: bool = False
+    stretches: list[tuple[float, float, float]] = field(default_factory=list)
+    _sizes: list[float] = field(default_factory=list)
+
+    def derivative(self, t: float, y: Floats) -> Floats:
+        """f(t, y) as the run takes it now."""
+        return self.guard.exact(t, y) if self.repairing else self.problem.derivative(t, y)
+
+    def loss(self, t: float, y: Floats) -> float:
+        """Relative error of the problem's own derivative; infinite where it is not finite.
+
+        Raises `StepFailure` where there is no value in long numbers either, and for a quaternion
+        that has left unit length.
+        """
+        for indices in self.problem.quaternions:
+            off = math.hypot(*(float(y[i]) for i in indices)) - 1.0
+            if abs(off) > UNIT:
+                state = self.problem.states[indices[0]]
+                raise StepFailure(
+                    f"the quaternion from {state} on is off unit length by {off:.2g}; "
+                    "take a smaller step or tighter tolerances"
+                )
+        true = self.guard.exact(t, y)
+        if not np.isfinite(true).all():
+            raise StepFailure(
+                "the step has left the domain: the equations have no finite value there, in long "
+                "numbers either; take a smaller step, or keep away"
+            )
+        try:
+            found = self.problem.derivative(t, y)
+        except (ArithmeticError, ValueError):
+            return math.inf
+        if not np.isfinite(found).all():
+            return math.inf
+        worst = 0.0
+        self._sizes = self._sizes or [0.0] * len(self.guard.groups)
+        for k, group in enumerate(map(list, self.guard.groups)):
+            size = float(np.max(np.abs(true[group])))
+            self._sizes[k] = max(self._sizes[k], size)
+            off = float(np.max(np.abs(found[group] - true[group])))
+            if off:
+                worst = max(worst, off / max(size, HARDLY * self._sizes[k]))
+        return worst
+
+    def lost(self, loss: float) -> StepFailure:
+        """What a run stops with where too much is lost."""
+        left = max(0.0, -math.log10(loss)) if loss < 1 else 0.0
+        return StepFailure(
+            f"digits lost: accelerations there are right to {left:.0f} of {FULL:.0f} digits only "
+            f"(relative error {loss:.2g}, allowed {self.bound:.2g}); "
+            "take --route orthogonal, or --guard repair"
+        )
+
+    def words(self) -> str:
+        """What was repaired, in a line; "" if nothing."""
+        if not self.stretches:
+            return ""
+        begin, end = self.stretches[0][0], self.stretches[-1][1]
+        worst = max(loss for _, _, loss in self.stretches)
+        times = f", {len(self.stretches)} times" if len(self.stretches) > 1 else ""
+        return (
+            f"digits lost between t = {begin:.6g} and {end:.6g} s{times} (relative error up to "
+            f"{worst:.2g}) were repaired by long numbers"
+        )
+
+
+def watched(watch: Watch, advances: Iterator[Advance], t: float, y: Floats) -> Iterator[Advance]:
+    """The same steps. Raises `StepFailure` before the first whose end has lost digits."""
+    _check(watch, watch.loss(t, y))
+    for advance in advances:
+        if np.isfinite(advance.y).all():
+            _check(watch, watch.loss(advance.t, advance.y))
+        yield advance
+
+
+def repaired(
+    watch: Watch, begin: Begin, problem: Problem, t: float, max_steps: int
+) -> Iterator[Advance]:
+    """Steps of a problem from time t on, in doubles where they hold, in long numbers elsewhere.
+
+    A step whose end has lost digits is made again from where it began, in long numbers, and so are
+    those after it up to where doubles are good again.
+    """
+    y, made = problem.initial, 0
+    watch.repairing = False
+    loss = watch.loss(t, y)
+    if loss > watch.bound:
+        _repair(watch, t, loss)
+    again = True
+    while again:
+        again = False
+        for advance in begin(replace(problem, initial=y), t, made):
+            if np.isfinite(advance.y).all():
+                loss = watch.loss(advance.t, advance.y)
+                if loss > watch.bound and not watch.repairing:
+                    _repair(watch, t, loss)
+                    again = True
+                    break
+                if watch.repairing:
+                    since, _, worst = watch.stretches[-1]
+                    watch.stretches[-1] = since, advance.t, max(worst, loss)
+                    watch.repairing = loss > REGAINED * watch.bound
+            t, y = advance.t, advance.y
+            made += advance.is_step
+            if made > max_steps:
+                raise StepFailure(f"{max_steps} steps did not suffice; take a shorter --t-end")
+            yield advance
+
+
+def _check(watch: Watch, loss: float) -> None:
+    if loss > watch.bound:
+        raise watch.lost(loss)
+
+
+def _repair(watch: Watch, t: float, loss: float) -> None:
+    watch.repairing = True
+    watch.stretches.append((t, t, loss))

@@ -1,0 +1,89 @@
+"""Long numbers for what doubles are judged by: MPFR's, of 60 digits, one or in arrays."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import gmpy2
+import numpy as np
+from gmpy2 import mpfr
+
+from eomgen.program.digits import BY_MPFR, MP
+from eomgen.run.problem import Floats
+from eomgen.study.precise import Long
+
+BITS = MP.prec
+"""Of the significand: 60 digits."""
+Array = Any
+"""An array of such numbers."""
+
+
+@contextmanager
+def long_digits() -> Iterator[None]:
+    """A block in which numbers are of `BITS` bits; what has no value is nan there."""
+    with gmpy2.context(precision=BITS), np.errstate(all="ignore"):
+        yield
+
+
+def long(values: Any) -> Array:
+    """Doubles or long numbers, one or an array, as long ones, exactly."""
+    array = np.asarray(values, dtype=object)
+    return np.asarray(_LONG(array), dtype=object) if array.size else array
+
+
+_LONG = np.frompyfunc(mpfr, 1, 1)
+
+
+class LongScalars:
+    """Long numbers as scalars of formulas and effects."""
+
+    def number(self, value: float) -> Long:
+        """The double itself, exactly."""
+        return mpfr(value)
+
+    def call(self, function: str, *arguments: Long) -> Long:
+        """A function of formulas."""
+        return BY_MPFR[function](*arguments)
+
+
+def zeros(*shape: int) -> Array:
+    """An array of zeros."""
+    return np.full(shape, mpfr(0), dtype=object)
+
+
+def eye() -> Array:
+    """The unit matrix of space."""
+    return long(np.eye(3))
+
+
+def along(rate: Array, slopes: Array) -> Array:
+    """Time derivative of what has these slopes along the velocities."""
+    if not len(rate):
+        return zeros(*slopes.shape[1:])
+    return np.tensordot(rate, slopes, axes=(0, 0))
+
+
+def solved(matrix: Array, right: Array) -> Array:
+    """x of matrix x = right, by elimination with row exchanges; `right` a vector or columns.
+
+    Raises `ZeroDivisionError` if the matrix is singular.
+    """
+    a, b, n = matrix.copy(), right.copy(), len(matrix)
+    for k in range(n):
+        pivot = k + max(range(n - k), key=lambda i: abs(a[k + i, k]))
+        if not a[pivot, k]:
+            raise ZeroDivisionError("the mass matrix is singular")
+        a[[k, pivot]], b[[k, pivot]] = a[[pivot, k]], b[[pivot, k]]
+        for i in range(k + 1, n):
+            if a[i, k]:
+                factor = a[i, k] / a[k, k]
+                a[i, k + 1 :] = a[i, k + 1 :] - factor * a[k, k + 1 :]
+                b[i] = b[i] - factor * b[k]
+    for k in reversed(range(n)):
+        b[k] = (b[k] - a[k, k + 1 :] @ b[k + 1 :]) / a[k, k] if k + 1 < n else b[k] / a[k, k]
+    return b
+
+
+def doubles(values: Any) -> Floats:
+    """Long numbers rounded to doubles."""
+    return np.asarray(values).astype(float)

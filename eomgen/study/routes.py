@@ -1,0 +1,49 @@
+"""The routes of a model, each compiled and loaded."""
+
+from dataclasses import dataclass, replace
+from typing import get_args
+
+from eomgen.backends.python import python_module
+from eomgen.errors import EomgenError
+from eomgen.model import Model
+from eomgen.program.route import routed, why_not_compared
+from eomgen.program.system import System
+from eomgen.run.module import GeneratedModule, load_module
+from eomgen.scene.schema import Route
+
+
+@dataclass(frozen=True)
+class Made:
+    """A compiled system."""
+
+    system: System
+    module: GeneratedModule
+
+
+def compiled(model: Model, but: str) -> tuple[dict[str, Made], dict[str, str]]:
+    """Every route there is but one, and why not for those that are not."""
+    made: dict[str, Made] = {}
+    missing: dict[str, str] = {}
+    for route in get_args(Route):
+        if route in ("auto", but):
+            continue
+        words = why_not_compared(model, route)
+        try:
+            if not words:
+                made[route] = loaded(routed(replace(model, route=route), jacobian=False).system)
+        except EomgenError as error:
+            words = str(error)
+        if words:
+            missing[route] = words
+    return made, missing
+
+
+def loaded(system: System) -> Made:
+    """A system written as a module and loaded."""
+    return Made(system, load_module(python_module(system), system.model.name))
+
+
+def velocities(made: Made) -> slice:
+    """Where v̇ stands in the derivative."""
+    first = len(made.system.model.coordinates)
+    return slice(first, first + len(made.system.model.velocities))

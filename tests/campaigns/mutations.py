@@ -1,0 +1,153 @@
+"""Seeded faults in the derivation, and which test catches each.
+
+    python tests/campaigns/mutations.py [--count N] [--seed N] [--only WORD] [TEST …]
+
+A fault flips a sign, drops a term, swaps an index or turns sin into cos, somewhere in what derives
+equations, at random. Each is made in a copy of the package, against which the tests run until the
+first fails; not those that compare written modules byte for byte, which catch any change. What
+survives is shown with its line: either the tests have a hole, or the change means nothing.
+"""
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent.parent
+ROOMS = ("derivation", "joints", "effects", "program/differentiate.py")
+"""What is changed, below the package."""
+TESTS = (
+    *("test_handout", "test_closed_general", "test_joints", "test_routes", "test_ways"),
+    *("test_identities", "test_judges", "test_laws", "test_orthogonal", "test_springs"),
+    *("test_drag", "test_controllers", "test_driven", "test_contact", "test_impact"),
+    *("test_field", "test_gravity_variants", "test_effects_published", "test_sensitivity"),
+    *("test_linearise", "test_quaternions", "test_pivots", "test_bad_scenes"),
+)
+"""In the order in which they are run."""
+LONGEST = 900.0
+"""Seconds for the tests of one fault: a fault that makes them hang is noticed, too."""
+SWAPPED = {"sin": "cos", "cos": "sin"}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A changed module: its path below the package, the line, what was done, and the new text."""
+
+    path: str
+    line: int
+    words: str
+    text: str
+
+
+def faults(path: Path) -> Iterator[Fault]:
+    """All faults of a module."""
+    text = path.read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    nodes = list(ast.walk(tree))
+    for place, node in enumerate(nodes):
+        for words, new in _changes(node):
+            changed = deepcopy(tree)
+            twin = list(ast.walk(changed))[place]
+            _replace(changed, twin, new)
+            line = getattr(node, "lineno", 0)
+            written = ast.unparse(ast.fix_missing_locations(changed))
+            yield Fault(str(path.relative_to(ROOT)), line, words, written)
+
+
+def _changes(node: ast.AST) -> Iterator[tuple[str, ast.expr]]:
+    match node:
+        case ast.BinOp(left, ast.Add() | ast.Sub() as op, right) if not _is_text(left, right):
+            other: ast.operator = ast.Sub() if isinstance(op, ast.Add) else ast.Add()
+            yield "sign flipped", ast.BinOp(left, other, right)
+            yield "term dropped", left
+        case ast.UnaryOp(ast.USub(), operand) if not isinstance(operand, ast.Constant):
+            yield "sign flipped", operand
+        case ast.Subscript(value, ast.Constant(int() as index)) if index in (0, 1, 2):
+            yield "index swapped", ast.Subscript(value, ast.Constant((index + 1) % 3 % 2))
+        case ast.Attribute(value, name) if name in SWAPPED:
+            yield f"{name} for {SWAPPED[name]}", ast.Attribute(value, SWAPPED[name], ast.Load())
+
+
+def _is_text(*sides: ast.expr) -> bool:
+    """Whether something is plainly a text or a tuple that is put together."""
+    plain = (ast.JoinedStr, ast.Tuple, ast.List)
+    return any(
+        isinstance(x, plain) or (isinstance(x, ast.Constant) and isinstance(x.value, str))
+        for x in sides
+    )
+
+
+def _replace(tree: ast.AST, old: ast.AST, new: ast.expr) -> None:
+    for parent in ast.walk(tree):
+        for name, value in ast.iter_fields(parent):
+            if value is old:
+                setattr(parent, name, new)
+                return
+            if isinstance(value, list) and any(item is old for item in value):
+                value[next(i for i, item in enumerate(value) if item is old)] = new
+                return
+
+
+def judged(fault: Fault, tests: list[str], folder: Path) -> tuple[str, float]:
+    """The first test that fails, or "", and the seconds that it took."""
+    copy = folder / "copy"
+    shutil.rmtree(copy, ignore_errors=True)
+    ignored = shutil.ignore_patterns("__pycache__", ".git", ".venv", "out")
+    shutil.copytree(ROOT, copy, ignore=ignored)
+    (copy / fault.path).write_text(fault.text, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(copy), "EOMGEN_CACHE": str(copy / "store")}
+    began = time.monotonic()
+    asked = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", *tests]
+    try:
+        done = subprocess.run(
+            asked, cwd=copy, env=environment, capture_output=True, text=True, timeout=LONGEST
+        )
+    except subprocess.TimeoutExpired:
+        return "hangs", LONGEST
+    lines = [x for x in done.stdout.splitlines() if x.startswith(("FAILED", "ERROR"))]
+    said = lines[0] if lines else done.stdout[-200:] + done.stderr[-200:]
+    return said if done.returncode else "", time.monotonic() - began
+
+
+def main() -> None:
+    """Make faults, try each, and say what caught it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("tests", nargs="*", default=[f"tests/{name}.py" for name in TESTS])
+    parser.add_argument("--count", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="", help="modules with this in their path")
+    given = parser.parse_args()
+    package = ROOT / "eomgen"
+    paths = sorted(
+        path
+        for room in ROOMS
+        for path in ([package / room] if room.endswith(".py") else (package / room).rglob("*.py"))
+        if given.only in str(path.relative_to(ROOT))
+    )
+    every = [fault for path in paths for fault in faults(path)]
+    chosen = random.Random(given.seed).sample(every, min(given.count, len(every)))
+    print(f"{len(chosen)} of {len(every)} faults", flush=True)
+    survivors = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for fault in chosen:
+            caught, seconds = judged(fault, given.tests, Path(folder))
+            survivors += not caught
+            source = (ROOT / fault.path).read_text(encoding="utf-8").splitlines()
+            shown = source[fault.line - 1].strip()
+            print(f"{fault.path}:{fault.line}: {fault.words}: {shown}")
+            print(f"    {caught or 'SURVIVED'} ({seconds:.0f} s)", flush=True)
+    print(f"{len(chosen) - survivors} of {len(chosen)} caught")
+    sys.exit(survivors > 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,137 @@
+"""Random trees with parameters over many decades, and what their data let one know of v̇."""
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from engine import MP, Digits
+from spatial_trees import random_spatial_tree
+
+from eomgen.build import build_model
+from eomgen.derivation.recursive.digits import digits_lost
+from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.derivation.recursive.regular import check_regular
+from eomgen.model import Model
+from eomgen.program.route import MOST_LOST, MOST_LOST_OF_ALL
+from eomgen.scene.reader import parse_scene
+
+SPECIAL = (0.0, np.pi / 2, -np.pi / 2, np.pi, np.pi / 4)
+"""Angles at which levers vanish or axes meet; quaternions are then those of no turn."""
+MOST_BODIES = 4
+NUDGES = 3
+"""How often data are changed in their last place to see what that does."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A model, the parameters it is judged at, and one that is to be refused never gets here."""
+
+    model: Model
+    parameters: dict[str, float]
+
+
+def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Drawn:
+    """A random tree whose masses, inertias, arms and gravity are as many decades off; those of one
+    body's inertia alike, for it must stay one.
+
+    Raises `SceneError` if the program refuses it.
+    """
+    tree, text = random_spatial_tree(seed, dimensions, MOST_BODIES)
+    factors: dict[str, float] = {}
+    parameters = {}
+    for name, value in tree.parameters.items():
+        alike = name.rsplit("_", 1)[0] if name[-3:-2] == "_" else name
+        if alike not in factors:
+            factors[alike] = 10.0 ** decades[len(factors) % len(decades)]
+        parameters[name] = value * factors[alike]
+    _, text = random_spatial_tree(seed, dimensions, MOST_BODIES, parameters)
+    model = build_model(parse_scene(text))
+    check_regular(model)
+    return Drawn(model, {**model.defaults})
+
+
+def state(model: Model, seed: int, special: bool) -> tuple[list[float], list[float]]:
+    """Positions and velocities, at special places or anywhere."""
+    r = random.Random(seed)
+    q: list[float] = []
+    for c in model.coordinates:
+        if c.unit == "rad":
+            q.append(r.choice(SPECIAL) if special else r.uniform(-6, 6))
+        else:
+            q.append(0.0 if special and r.random() < 0.5 else r.gauss(0, 1))
+    for i in [i for i, c in enumerate(model.coordinates) if c.name.endswith("qw")]:
+        turn = [1.0, 0.0, 0.0, 0.0] if special else [r.gauss(0, 1) for _ in range(4)]
+        q[i : i + 4] = (np.array(turn) / np.linalg.norm(turn)).tolist()
+    return q, [r.uniform(-3, 3) for _ in model.velocities]
+
+
+def dynamics(model: Model, p: Any, q: Any, v: Any, u: Any, scalars: Any) -> Dynamics:
+    """The recursions at numbers of some kind."""
+    values = Values(p, u, list(q), list(v), time=scalars.number(0.0))
+    return Dynamics(model, values, scalars, "own")
+
+
+class Refused(Exception):
+    """No recursion keeps its digits."""
+
+
+def taken(model: Model) -> str:
+    """The recursion that `auto` takes, by the digits that each loses at the scene's masses.
+
+    Raises `Refused` where it refuses the scene.
+    """
+    for lost in (digits_lost(model), digits_lost(model, None, Digits())):
+        for route in ("aba", "ldl"):
+            if lost[route] <= MOST_LOST:
+                return route
+    if lost["orthogonal"] > MOST_LOST_OF_ALL:
+        raise Refused
+    return "orthogonal"
+
+
+def found(d: Drawn, q: Sequence[float], v: Sequence[float], u: dict[str, float]) -> list[float]:
+    """v̇ in doubles, by the recursion taken. Raises `Refused`."""
+    at = dynamics(d.model, d.parameters, q, v, u, FloatScalars())
+    forward = {
+        "aba": at.articulated_forward,
+        "ldl": at.factored_forward,
+        "orthogonal": at.orthogonal_forward,
+    }
+    return list(forward[taken(d.model)]())
+
+
+def truth(
+    d: Drawn, q: Sequence[float], v: Sequence[float], u: dict[str, float]
+) -> tuple[list[Any], float]:
+    """v̇ in 60 digits, and how much of its largest component it changes by when all data are
+    changed by up to half a unit in the last place: no more than that can be asked of doubles.
+    """
+    r = random.Random(7)
+
+    def near(value: float, nudge: float) -> Any:
+        return MP.mpf(value) * (1 + MP.mpf(nudge * r.uniform(-1, 1)))
+
+    def exactly(nudge: float) -> list[Any]:
+        p = {name: near(value, nudge) for name, value in d.parameters.items()}
+        w = {name: near(value, nudge) for name, value in u.items()}
+        at = ([near(x, nudge) for x in q], [near(x, nudge) for x in v])
+        return list(dynamics(d.model, p, *at, w, Digits()).articulated_forward())
+
+    true = exactly(0.0)
+    size = max(abs(x) for x in true)
+    if not size:
+        return true, 0.0
+    moved = (exactly(2.0**-53) for _ in range(NUDGES))
+    return true, max(float(abs(a - b) / size) for m in moved for a, b in zip(m, true, strict=True))
+
+
+def apart(value: Sequence[float], true: Sequence[Any]) -> float:
+    """The error relative to the largest component; infinite where there is no number."""
+    if not np.isfinite(value).all():
+        return np.inf
+    size = max(abs(x) for x in true)
+    off = max(abs(MP.mpf(float(a)) - b) for a, b in zip(value, true, strict=True))
+    return float(off / size) if size else float(off)

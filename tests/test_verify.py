@@ -1,0 +1,376 @@
+"""Generated modules verified: the independent solver, the bounds, what is found out, evidence."""
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from engine import MP, read
+from gmpy2 import mpfr
+
+from eomgen.backends.python import python_module
+from eomgen.build import build_model, in_order
+from eomgen.cli import main
+from eomgen.model import Model
+from eomgen.program.route import routed
+from eomgen.run.module import load_module
+from eomgen.study import drift as drifting
+from eomgen.study import visited as visiting
+from eomgen.study.hard_states import KINDS, hard_states
+from eomgen.study.judging import judged
+from eomgen.study.laws import kept
+from eomgen.study.longs import doubles, long, long_digits
+from eomgen.study.truth import Truth
+from eomgen.study.verify import OUTPUTS, Verified, verify
+from eomgen.study.virtual_work import FreeBodies
+
+SCREW = """
+name = "screw"
+dimensions = 3
+parameters = { m = 1.7, J = 0.3 }
+bodies = [
+    { name = "a", mass = "m", inertia_com = [0.2, "J", 0.25, 0.01, -0.02, 0.03] },
+    { name = "b", mass = 0.8, inertia_com = [0.05, 0.06, 0.07] },
+    { name = "c", mass = 0.4, inertia_com = 0 },
+    { name = "d", mass = 0.6, inertia_com = [0.02, 0.03, 0.04] },
+    { name = "e", mass = 0.3, inertia_com = [0.02, 0.03, 0.04] },
+    { name = "f", mass = 0.2, inertia_com = [0.02, 0.03, 0.04] },
+]
+[[joints]]
+name = "ja"
+type = "revolute"
+parent = "world"
+child = "a"
+axis = [0.6, 0.0, 0.8]
+r_parent = [0.1, 0.2, 0.3]
+r_child = [-0.4, 0.1, 0.0]
+orientation_deg = [90.0, 0.0, 180.0]
+motor_inertia = 0.002
+gear_ratio = 20.0
+[[joints]]
+name = "jb"
+type = "universal"
+parent = "a"
+child = "b"
+r_parent = [0.3, 0.0, 0.1]
+r_child = [0.0, 0.2, -0.2]
+[[joints]]
+name = "jc"
+type = "cylindrical"
+parent = "b"
+child = "c"
+axis = [0.0, 1.0, 0.0]
+r_child = [0.3, 0.1, -0.2]
+[[joints]]
+name = "jd"
+type = "ball"
+parent = "a"
+child = "d"
+r_parent = [-0.3, 0.0, 0.1]
+r_child = [0.0, 0.0, 0.4]
+[[joints]]
+name = "je"
+type = "prismatic"
+parent = "d"
+child = "e"
+axis = [0.0, 0.0, 1.0]
+r_parent = [0.1, 0.1, 0.1]
+[[joints]]
+name = "jf"
+type = "planar"
+parent = "d"
+child = "f"
+r_parent = [0.0, 0.2, 0.1]
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "driven"
+name = "drive"
+joint = "je"
+coordinate = "0.1*sin(3*t)"
+[[effects]]
+type = "spring"
+name = "cord"
+body_1 = "world"
+at_1 = [0.5, 0.5, 0.5]
+body_2 = "c"
+stiffness = 30.0
+damping = 0.4
+rest_length = 0.2
+[[effects]]
+type = "motor"
+name = "tau"
+joint = "ja"
+torque = "input"
+"""
+"""All joints of space but the free one, a rotor, a drive, a spring with damping, a motor."""
+
+PENDULUM_ROUTES = ("closed", "ldl", "aba", "orthogonal")
+
+
+@pytest.fixture(autouse=True)
+def in_little_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Short runs will do; nothing is left in the user's cache."""
+    monkeypatch.setattr(visiting, "MOST_OPERATIONS", 20_000)
+    monkeypatch.setattr(drifting, "MOST_CALLS", 2_000)
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path / "store"))
+
+
+@cache
+def model_of(scene: str) -> Model:
+    """A built-in scene's model, or one of a text."""
+    return build_model(read(scene))
+
+
+def as_long(x: Any) -> Any:
+    """An mpmath number as one of MPFR, exactly."""
+    sign, digits, exponent, _ = x._mpf_
+    return (-1) ** sign * mpfr(int(digits)) * mpfr(2) ** int(exponent)
+
+
+def check(found: Verified, what: str) -> Any:
+    """A line of the report."""
+    return next(line for line in found.checks if line.what.startswith(what))
+
+
+# The independent solver.
+
+
+@pytest.mark.parametrize("scene", ["babyboot", "tumbling_body", "chain", "two_body_forced"])
+def test_virtual_work_agrees_with_articulated_bodies_to_55_digits(scene: str) -> None:
+    """Where all fixed rotations are exact the two ways share data, and nothing else."""
+    model = replace(model_of(scene), form="velocity", outputs=())
+    truth, rng = Truth(model), np.random.default_rng(3)
+    count = len(model.coordinates) + len(model.velocities)
+    y = np.array([MP.mpf(x) for x in rng.uniform(-3, 3, count)], dtype=object)
+    for indices in map(list, model.quaternions):
+        y[indices] /= MP.sqrt(sum(y[indices] ** 2))
+    articulated = truth(np.array([0.3]), y[None])[:, 0]
+    with long_digits():
+        vd = FreeBodies(model, 0.3, [as_long(x) for x in y]).vd
+        off = abs(vd - [as_long(x) for x in articulated])
+        assert max(off) <= 1e-55 * float(max(abs(vd)))
+
+
+def test_virtual_work_on_all_joints_with_drive_rotor_and_spring() -> None:
+    """Against LᵀDL factors in 60 digits, at a time when the drive moves."""
+    model = replace(model_of(SCREW), outputs=())
+    truth, rng = Truth(model), np.random.default_rng(4)
+    y = rng.uniform(-1, 1, len(model.coordinates) + len(model.velocities))
+    for indices in map(list, model.quaternions):
+        y[indices] /= np.linalg.norm(y[indices])
+    with long_digits():
+        whole = long(y)
+        for indices in map(list, model.quaternions):
+            whole[indices] = whole[indices] / (whole[indices] @ whole[indices]) ** mpfr(0.5)
+        vd = FreeBodies(model, 0.7, whole).vd
+        # The axis 0.6, 0, 0.8 is rounded to doubles in one and made of unit length in the other.
+        off = doubles(vd - truth.long(mpfr(0.7), whole, {}, {}))
+    assert np.max(np.abs(off)) <= 1e-14 * np.max(np.abs(doubles(vd)))
+
+
+def test_kinetic_energy_of_free_bodies_has_their_mass_matrix() -> None:
+    """T = ½ vᵀ M v, two sums that are made apart, where no drive moves anything."""
+    model = replace(model_of("quadruped"), outputs=())
+    rng = np.random.default_rng(5)
+    y = rng.uniform(-1, 1, len(model.coordinates) + len(model.velocities) + len(model.states))
+    with long_digits():
+        free = FreeBodies(model, 0.0, y)
+        twice = free.rates @ free.mass_matrix @ free.rates
+        # Off the sphere of unit quaternions angular velocity is defined by its skew part alone.
+        for indices in map(list, model.quaternions):
+            assert len(indices) == 4
+        assert abs(free.kinetic_energy - twice / 2) <= 1e-50 * float(free.kinetic_energy)
+
+
+# States.
+
+
+def test_hard_states_are_what_their_kinds_say() -> None:
+    """The same for the same seed, others for another; each of its kind."""
+    model = replace(model_of("human_figure"), form="velocity", outputs=())
+    module: Any = load_module(python_module(routed(model, jacobian=False).system))
+    nv, nq = len(model.velocities), len(model.coordinates)
+    states = hard_states(module, nv, 2, 0, 1.0)
+    assert [s.kind for s in states] == [k for k in KINDS for _ in range(1 if k == "zero" else 2)]
+    again, other = hard_states(module, nv, 2, 0, 1.0), hard_states(module, nv, 2, 1, 1.0)
+    assert all(np.array_equal(a.y, b.y) and a.t == b.t for a, b in zip(states, again, strict=True))
+    assert not np.array_equal(states[-1].y, other[-1].y)
+    by = {state.kind: state for state in states}
+    for state in states:
+        for indices in map(list, module.QUATERNIONS):
+            assert abs(np.linalg.norm(state.y[indices]) - 1) < 1e-15
+    turning = {i for q in module.QUATERNIONS for i in q}
+    angles = [i for i in range(nq) if i not in turning and module.UNITS[module.STATES[i]] == "rad"]
+    quarters = by["aligned"].y[angles] / (np.pi / 4)
+    assert np.array_equal(quarters, np.round(quarters)) and np.ptp(quarters) > 0
+    assert np.array_equal(np.abs(by["folded"].y[angles]), np.full(len(angles), np.pi))
+    gimbal = np.abs(np.cos(by["gimbal"].y[angles]))
+    assert np.all((gimbal > 1e-10) & (gimbal < 1.1e-3))
+    assert not np.any(by["still"].y[nq : nq + nv])
+    assert np.max(np.abs(by["fast"].y[nq : nq + nv])) > 100
+
+
+# What is found.
+
+
+def test_a_good_module_passes_by_every_route() -> None:
+    """Errors of a few ulps, and every identity holds."""
+    found = verify(model_of("cart_pole"), states=2)
+    assert not found.missed and found.left_out == 0
+    assert set(found.ulps) == set(PENDULUM_ROUTES)
+    assert max(np.median(errors) for errors in found.ulps.values()) < 10
+    assert check(found, "virtual work").value < 1e-40
+    assert check(found, "energy law").value < 30
+    assert check(found, "drift of momentum x").value < 1e-9  # a rail without friction
+
+
+def test_a_floating_tree_keeps_what_it_should() -> None:
+    """Thrown upwards: x of momentum, not y, and the momentum law holds."""
+    found = verify(model_of("two_body"), states=2)
+    assert not found.missed and check(found, "momentum law").value < 30
+    drifts = [line.what for line in found.checks if line.what.startswith("drift")]
+    assert drifts == ["drift of energy", "drift of momentum x"]
+
+
+def test_what_takes_energy_is_named() -> None:
+    """Damping does, gravity, the spring without and a motor at rest do not."""
+    model = replace(model_of(SCREW), outputs=())
+    module: Any = load_module(python_module(routed(model, jacobian=False).system))
+    states = [s for s in hard_states(module, len(model.velocities), 1, 0, 1.0) if s.number == 0]
+    keeps = kept(model, states[-2:])
+    assert not keeps.energy and keeps.takers == ("drive", "cord") and keeps.momentum == ()
+
+
+def test_all_joints_with_drive_rotor_and_spring_are_verified() -> None:
+    """Driven coordinates, their powers, and inputs among all else."""
+    found = verify(model_of(SCREW), states=1)
+    assert not found.missed, [line.what for line in found.missed]
+    assert {"effect_powers", "inverse_dynamics", "body_poses"} <= {c.what for c in found.checks}
+
+
+def test_a_heavy_body_on_light_ones_is_found_to_lose_digits_by_aba_and_not_by_orthogonal() -> None:
+    """Each decade of mass costs the recursion a digit; the other route loses none."""
+    light = model_of(HEAVY.replace("ROUTE", "aba"))
+    lossy = verify(light, states=2)
+    line = check(lossy, "forward error of v̇, aba (taken)")
+    assert line.missed and line.value > 1e6 and "orthogonal" in lossy.better
+    sound = verify(replace(light, route="orthogonal"), states=2)
+    line = check(sound, "forward error of v̇, orthogonal (taken)")
+    assert not line.missed and line.value < 2000
+    assert check(sound, "residual").value < 450
+
+
+FAULTS = {
+    "a sign in v̇": (r"(def _derivative\(.*?\n.*?) - ", r"\1 + "),
+    "a factor in v̇": (r"(def _derivative\(.*?\n.*?)sin\(", r"\1 1.0000001*sin("),
+    "mass matrix": (r"(def _mass_matrix\(.*?\n.*?)cos\(", r"\1 1.001*cos("),
+    "energy": (r"(def _potential_energy\(.*?\n.*?)cos\(", r"\1 1.001*cos("),
+    "jacobian": (r"(def _jacobian\(.*?\n.*?) - ", r"\1 + "),
+    "momentum": (r"(def _momentum\(.*?\n.*?)cos\(", r"\1 -cos("),
+    "inverse dynamics": (r"(def _inverse_dynamics\(.*?\n.*?)sin\(", r"\1 -sin("),
+    "poses": (r"(def _body_poses\(.*?\n.*?)cos\(", r"\1 -cos("),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_in_a_module_is_caught(fault: str) -> None:
+    """Each seeded in a copy of a good module, in one place."""
+    model = replace(model_of("acrobot"), outputs=in_order(OUTPUTS), route="aba")
+    source = python_module(routed(model).system)
+    seeded, places = re.subn(*FAULTS[fault], source, count=1, flags=re.DOTALL)
+    assert places == 1 and seeded != source
+    module = load_module(seeded)
+    assert verify(model, states=1, module=module).missed
+    assert not verify(model, states=1, module=load_module(source)).missed
+
+
+def test_a_module_that_gives_no_number_misses_its_bound() -> None:
+    """Errors are infinite then, and nothing is raised."""
+    model = replace(model_of("pendulum"), outputs=())
+    module: Any = load_module(python_module(routed(model).system))
+    bare = replace(model, outputs=in_order(OUTPUTS))
+    full: Any = load_module(python_module(routed(bare).system))
+    state = hard_states(module, 1, 1, 0, 1.0)[1]
+    module.derivative = lambda *_: np.full(2, np.nan)
+    found = judged(model, Truth(model), "aba", {"aba": module}, full, state)
+    assert found is not None and np.isnan(found.off["aba"]).all()
+    assert found.losses["residual of aba"].error == np.inf
+
+
+# The command.
+
+
+def test_verify_says_saves_and_repeats(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Same scene, same bytes; nothing of others is overwritten; data hold every state."""
+    arguments = ["verify", "pendulum", "--states", "1", "--save", str(tmp_path)]
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    assert "forward error of v̇, closed (taken)" in text and "MISSED" not in text
+    paths = [tmp_path / f"pendulum_verified.{kind}" for kind in ("txt", "json")]
+    first = [path.read_bytes() for path in paths]
+    data = json.loads(first[1])
+    assert data["passed"] and len(data["states"]) > 8
+    assert {"y", "vd", "error_ulps", "condition"} <= set(data["states"][0])
+    assert str(tmp_path).encode() not in first[0] + first[1]
+    assert main(arguments) == 0 and [path.read_bytes() for path in paths] == first
+    paths[0].write_text("mine")
+    assert main(arguments) == 1 and "was not written by eomgen" in capsys.readouterr().err
+    assert paths[0].read_text() == "mine" and paths[1].read_bytes() == first[1]
+    assert main([*arguments, "--force"]) == 0 and paths[0].read_bytes() == first[0]
+
+
+def test_a_missed_bound_is_named_and_exits_1(capsys: pytest.CaptureFixture[str]) -> None:
+    """With the state in full, so that anyone can look at it."""
+    assert main(["verify", "furuta_pendulum", "--states", "1", "--bound", "0.6"]) == 1
+    out, err = capsys.readouterr()
+    assert "MISSED" in out
+    line = next(line for line in err.splitlines() if "forward error of v̇" in line)
+    assert "above its bound 0.6 ulp, at state '" in line and "theta=" in line and "tau=" in line
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ("--states 0", "--states: 0 is not a number from 1"),
+        ("--seed -1", "--seed: -1 is negative"),
+        ("--bound 0.1", "--bound: 0.1 is no number of ulps"),
+        ("--bound nan", "--bound: nan is no number of ulps"),
+        ("--horizon 0", "--horizon: 0 is no positive time"),
+    ],
+)
+def test_wrong_options_get_a_line(
+    option: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And no traceback."""
+    assert main(["verify", "pendulum", *option.split()]) == 1
+    assert words in capsys.readouterr().err
+
+
+HEAVY = """
+name = "heavy_tip"
+route = "ROUTE"
+effects = [{ type = "gravity", g = 9.81 }]
+bodies = [{ name = "tip", mass = 1e12, inertia_com = 1e11 }]
+simulation = { t_end = 0.2, integrator = "rk4", dt = 0.01 }
+[[chains]]
+name = "link"
+count = 5
+mass = 1
+inertia_com = 0.1
+r_parent = [0.5, 0]
+r_child = [-0.5, 0]
+[[joints]]
+name = "last"
+type = "revolute"
+parent = "link_5"
+child = "tip"
+r_parent = [0.5, 0]
+r_child = [-0.5, 0]
+"""
+"""A tip of 1e12 kg on five links of 1 kg."""
