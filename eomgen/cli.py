@@ -162,6 +162,13 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
         help="watch rounding at every step, and stop where digits are lost, or repair it",
     )
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
+    parser.add_argument(
+        "--from",
+        metavar="FILE.npz",
+        dest="resume",
+        type=Path,
+        help="go on where an earlier run ended, as if it had not",
+    )
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument("--works", action="store_true", help="book the work of each effect")
     _values(parser)

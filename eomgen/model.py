@@ -1,5 +1,6 @@
 """The model: a scene whose every name is resolved; bodies in a tree, parents before children."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -254,6 +255,20 @@ class Model:
                         yield part
         for point in self.points:
             yield from point.at
+
+    @cached_property
+    def magnitude(self) -> float:
+        """The order of its lengths, a power of 2^40: 1 for all from a micrometre to a megametre.
+
+        What has to be near nothing beside any of them counts in it: for ordinary scenes, in metres.
+        """
+        lengths = [p.default for p in self.parameters if p.unit == "m"]
+        pairs = zip(self.coordinates, self.initial_q, strict=False)
+        lengths += [value for coordinate, value in pairs if coordinate.unit == "m"]
+        largest = max(map(abs, lengths), default=0.0)
+        if not (largest > 0 and math.isfinite(largest)):
+            return 1.0
+        return float(2.0 ** (40 * round(math.log2(largest) / 40)))
 
     def with_parameters(self, values: Mapping[str, float]) -> "Model":
         """The same model with other values for some parameters."""

@@ -11,7 +11,7 @@ import pytest
 
 from eomgen.build import build_model
 from eomgen.cli import main
-from eomgen.run.integrate import SMALLEST_RTOL
+from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Contacts, Floats
 from eomgen.run.trajectory import Trajectory

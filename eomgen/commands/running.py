@@ -30,7 +30,7 @@ from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.joints.base import Geared
 from eomgen.model import Model, ways_of
-from eomgen.run.limits import excursions
+from eomgen.run.limits import excursions, locks
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory
@@ -45,7 +45,8 @@ if TYPE_CHECKING:
 def simulate(given: Arguments) -> int:
     """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
     # Imported here: `check` and `generate` need neither SciPy nor Matplotlib.
-    from eomgen.run.trajectory import save_csv, save_npz
+    from eomgen.run.resume import going_on
+    from eomgen.run.trajectory import load_npz, save_csv, save_npz
     from eomgen.show.observe import observe
     from eomgen.study.trial import Case
 
@@ -57,20 +58,33 @@ def simulate(given: Arguments) -> int:
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
     wanted = model.simulation
     chosen = given.accuracy is not None or given.budget is not None
+    if chosen and given.resume is not None:
+        raise RunError(
+            "--from: goes on with a method that is named; leave --accuracy, --budget out"
+        )
     setting = None if chosen else _setting(given, model)
     paths = _output_paths(given, name)
+    if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
+        raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
     code, module = code_of(given.scene, model, given)
     values = (parameters or None, inputs or None)
+    kept = {
+        "samples": given.samples,
+        "max_step": given.max_step,
+        "rest_speed": wanted.rest_speed,
+        "guard": _guard(given, module, values),
+    }
+    problem, words = as_problem(module, *values, model), ""
+    if given.resume is not None:
+        assert setting is not None
+        start = going_on(load_npz(given.resume), given.resume, problem, setting)
+        problem, words = start.problem, start.words
+        kept |= start.options
     case = Case(
-        as_problem(module, *values, model),
+        problem,
         _or(given.t_end, wanted.t_end),
         module.UNITS,
-        {
-            "samples": given.samples,
-            "max_step": given.max_step,
-            "rest_speed": wanted.rest_speed,
-            "guard": _guard(given, module, values),
-        },
+        kept,
         terminal_progress,
     )
     powers = as_powers(module, *values) if given.works else None
@@ -93,6 +107,8 @@ def simulate(given: Arguments) -> int:
         f"{trajectory.counts['steps']} steps, {trajectory.counts['derivatives']} derivatives "
         f"({'derived now' if code.derived else 'module fresh, not derived again'})"
     )
+    if words:
+        print(f"    {words}")
     missed = print_choice(choice, given) if choice else ""
     if given.estimate and not choice and trajectory.finished:
         print_estimate(case, tried)
@@ -103,6 +119,8 @@ def simulate(given: Arguments) -> int:
     if motion.joints:
         print(f"    largest gap in a joint {motion.joint_drift.max(initial=0.0):.2g} m")
     _print_excursions(model, trajectory)
+    for line in locks(model, trajectory):
+        print(f"    {line}")
     for path in paths.values():
         print(f"    wrote {path}")
     warn_of_energy(motion)

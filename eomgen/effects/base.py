@@ -96,6 +96,10 @@ class Mechanism(Protocol):
         """2 in the plane, 3 in space."""
 
     @property
+    def magnitude(self) -> float:
+        """The order of its lengths, m: see `Model.magnitude`."""
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """Names of all bodies."""
 
@@ -157,6 +161,11 @@ class Mechanism(Protocol):
 
 class Unmoved:
     """A mechanism for those effects alone whose loads depend on no motion: see `is_plain`."""
+
+    @property
+    def magnitude(self) -> float:
+        """Never asked for."""
+        raise AssertionError
 
     def place(self, body: str, at: Vector) -> Vector:
         """Never asked for."""

@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from eomgen.effects.base import EffectTable, Load, Mechanism, Scalar
 from eomgen.effects.base import Vector as Components
-from eomgen.effects.vectors import NEAREST, dot, negative, sub
+from eomgen.effects.vectors import dot, nearest_square, negative, sub
 from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO, Formula
@@ -155,7 +155,7 @@ def _line(spring: Spring, mechanism: Mechanism) -> _Line:
     d = sub(mechanism.place(spring.body_2, at_2), mechanism.place(spring.body_1, at_1))
     d_dot = sub(mechanism.velocity(spring.body_2, at_2), mechanism.velocity(spring.body_1, at_1))
     square = dot(d, d)
-    larger = mechanism.call("max", square, mechanism.number(NEAREST**2))
+    larger = mechanism.call("max", square, nearest_square(mechanism))
     length = mechanism.call("sqrt", larger)
     stretch = length - mechanism.value(spring.rest_length)
     return _Line(at_1, at_2, d, d_dot, square, larger, length, stretch)

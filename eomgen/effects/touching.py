@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from eomgen.effects.base import Load, Mechanism, Scalar, Vector
-from eomgen.effects.vectors import NEAREST, add, cross, dot, negative, scale, sub
+from eomgen.effects.vectors import add, cross, dot, nearest_square, negative, scale, sub
 from eomgen.joints.base import WORLD
 
 
@@ -94,7 +94,7 @@ def on_ball(mechanism: Mechanism, first: Ball, second: Ball) -> Touch:
     """
     d = sub(mechanism.place(first.body, first.at), mechanism.place(second.body, second.at))
     square = dot(d, d)
-    larger = mechanism.call("max", square, mechanism.number(NEAREST**2))
+    larger = mechanism.call("max", square, nearest_square(mechanism))
     length = mechanism.call("sqrt", larger)
     both = first.radius + second.radius
     sides = [Side(first.body, first.at, (), -(length * (first.radius / both)))]

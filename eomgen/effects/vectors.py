@@ -11,7 +11,14 @@ LEAST_SQUARE = 1e-300
 """Of a length under a root: less counts as this."""
 
 NEAREST = 1e-9
-"""Distance, m, within which the line between two points has no sure direction: see `Spring`."""
+"""Distance, m, within which the line between two points has no sure direction: see `Spring`. So it
+is in a scene of ordinary size; in one of molecules or planets it is as small beside them.
+"""
+
+
+def nearest_square(mechanism: Mechanism) -> Scalar:
+    """The square of that distance, m²."""
+    return mechanism.number((NEAREST * mechanism.magnitude) ** 2)
 
 
 def add(a: Vector, b: Vector) -> Vector:

@@ -1,5 +1,11 @@
-"""Rigid contacts: forces of those that are held, and impacts of those that close."""
+"""Rigid contacts: forces of those that are held, and impacts of those that close.
 
+Nothing here has a unit of its own: gaps are counted in the size of the mechanism, `Contacts.sizes`,
+speeds and accelerations in those of its motion. So a scene in other units, of molecules or of
+planets, runs as it does in metres and seconds; `in_sizes` is what makes it so.
+"""
+
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -11,16 +17,26 @@ from eomgen.run.integrators.interface import StepFailure
 from eomgen.run.problem import Contacts, Floats, Problem
 
 TOLERANCE = 1e-9
-"""m or rad: contacts this close touch, and may start this deep."""
+"""In sizes: contacts this close touch, and may start this deep."""
 
-STILL = 1e-10
-"""m/s or rad/s: contacts that close more slowly do not close."""
+STILL = 3e-11
+"""In speeds of the motion: contacts that close more slowly do not close."""
 
-PARTING = 1e-9
-"""m/s^2 or rad/s^2: contacts without a force that part with less stay as they are."""
+PARTING = 1e-10
+"""In accelerations of the motion: contacts without a force that part with less stay as they are."""
 
-ALPHA = 10.0
-"""1/s: what a held contact is off by, it leaves behind at this rate."""
+ALPHA = 10 / math.sqrt(9.81)
+"""In rates of the motion: what a held contact is off by, it leaves behind at this rate. It is 10/s
+for a mechanism of one metre under gravity."""
+
+RISE = 5e-8
+"""In sizes: a bounce that will not rise higher than this is none, unless `rest_speed` says so."""
+
+AWAY = 1e-6
+"""In accelerations of the motion: a gap that grows at more than this does so of itself."""
+
+STRONG = 2.0**200
+"""N or N m: a force beside which all others are nothing, whatever it moves."""
 
 BOUNCES, STRIKES = 100, 5000
 """Strikes at one moment, per contact: with restitution, and in all."""
@@ -32,28 +48,89 @@ Rate = Callable[[float, Floats], Floats]
 """A function of time and state, such as the derivative."""
 
 
+def in_sizes(contacts: Contacts) -> Contacts:
+    """The same contacts, their gaps and what these do counted in sizes."""
+    sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
+    if (sizes == 1).all():
+        return contacts
+
+    def held(t: float, y: Floats, forces: Floats) -> Floats:
+        found = contacts.held(t, y, forces)
+        shape = (len(sizes), *([1] * (found.ndim - 1)))
+        found[len(y) : len(y) + len(sizes)] /= sizes.reshape(shape)
+        return found
+
+    return replace(
+        contacts,
+        gaps=lambda t, y: contacts.gaps(t, y) / sizes,
+        rates=lambda t, y: contacts.rates(t, y) / sizes,
+        held=held,
+    )
+
+
+def recovery(contacts: Contacts, t: float, y: Floats, span: float) -> float:
+    """The rate at which contacts recover from drift, 1/s, in a run of `span` s: `ALPHA` times that
+    of the motion at its start, √(a/size) of what accelerates the gaps, or v/size.
+    """
+    fastest = float(np.abs(contacts.rates(t, y)).max())
+    return ALPHA * max(math.sqrt(pressed(contacts, t, y)), fastest, 1 / span)
+
+
+def pressed(contacts: Contacts, t: float, y: Floats) -> float:
+    """The greatest acceleration of any gap, either way, without contact forces: sizes/s²."""
+    return float(np.abs(accelerations(contacts, t, y)).max())
+
+
+def accelerations(contacts: Contacts, t: float, y: Floats) -> Floats:
+    """Those of the gaps (nc,), without contact forces: sizes/s²."""
+    count = len(contacts.names)
+    return contacts.held(t, y, np.zeros(count))[len(y) : len(y) + count]
+
+
+def slowest_bounces(free: Floats, rest_speed: Floats | None) -> Floats:
+    """With what speed each contact must close to bounce (nc,), sizes/s: `rest_speed` if given, or
+    that from which the bounce rises by `RISE` under the accelerations `free` of the gaps.
+
+    One that parts of itself, as what grazes along a curve does, bounces at any: its bounces come to
+    an end without, and to stop them would stop what slides by.
+    """
+    force = float(np.abs(free).max())
+    # What strikes at v under the acceleration a rises by v²/2a.
+    rising = np.full(len(free), math.sqrt(2 * RISE * force))
+    return np.where(free > AWAY * force, 0.0, rising if rest_speed is None else rest_speed)
+
+
 @dataclass(frozen=True, eq=False)
 class Holding:
     """Some contacts of a mechanism, held: they may part, but not close.
 
     Their forces f solve 0 <= f, 0 <= a, f a = 0 with a = gap'' + 2 α gap' + α² gap, which is affine
-    in the forces; α (Baumgarte's stabilisation with both roots at -α) takes drift back.
+    in the forces; α = `alpha` (Baumgarte's stabilisation with both roots at -α) takes drift back.
     """
 
     contacts: Contacts
     held: tuple[int, ...]
     start: tuple[float, Floats]
+    alpha: float
+
+    @cached_property
+    def pressed(self) -> float:
+        """The greatest acceleration of any gap under no contact force at the start."""
+        return pressed(self.contacts, *self.start)
 
     @cached_property
     def units(self) -> Floats:
-        """Forces (nh,) that accelerate each gap by about 10 m/s²: differences keep their digits."""
-        matrix, _, _ = self._system(*self.start, np.ones(len(self.held)))
-        own = np.abs(np.diagonal(matrix))
-        return 10.0 / np.where(own > 0, own, 10.0)
+        """Forces (nh,) that accelerate each gap about as all else does: differences keep their
+        digits.
+        """
+        matrix, _, _ = self._system(*self.start, np.full(len(self.held), STRONG))
+        own = np.abs(np.diagonal(matrix)) / STRONG
+        wanted = self.pressed or 1.0
+        return wanted / np.where(own > 0, own, wanted)
 
     def solve(self, t: float, y: Floats) -> tuple[Floats, Floats, Floats]:
         """Return what `Contacts.held` gives (ny + 2 nc + nd,), and (nh,) each: forces times what
-        they do to their own gaps, and a, m/s².
+        they do to their own gaps, and a, or 0 where that is nothing beside what else accelerates.
 
         Raises `StepFailure` if no forces keep the contacts from closing.
         """
@@ -66,7 +143,9 @@ class Holding:
                 f"that); take less friction, or another law of contact"
             )
         result = columns[:, 0] + (columns[:, 1:] - columns[:, :1]) @ forces
-        return result, forces * np.diagonal(matrix), matrix @ forces + offset
+        left = matrix @ forces + offset
+        left[np.abs(left) <= PARTING * np.abs(columns[self._gaps, 0]).max()] = 0.0
+        return result, forces * np.diagonal(matrix), left
 
     def derivative(self, t: float, y: Floats) -> Floats:
         """The state's derivative (ny,) under the contacts' forces."""
@@ -75,6 +154,12 @@ class Holding:
     def powers(self, t: float, y: Floats) -> Floats:
         """What the contacts' forces and the drives do (nc + nd,), W."""
         return self.solve(t, y)[0][len(y) + len(self.contacts.names) :]
+
+    @property
+    def _gaps(self) -> slice:
+        """Where `Contacts.held` has the gaps' accelerations."""
+        states = len(self.start[1])
+        return slice(states, states + len(self.contacts.names))
 
     def _system(self, t: float, y: Floats, units: Floats) -> tuple[Floats, Floats, Floats]:
         """Matrix and offset of a, and the columns that `Contacts.held` gives: under no force, and
@@ -86,8 +171,8 @@ class Holding:
         # One at a time: scalar code, ten times as fast as columns where there are few.
         columns = np.column_stack([self.contacts.held(t, y, each) for each in forces])
         gaps, rates = self.contacts.gaps(t, y)[held], self.contacts.rates(t, y)[held]
-        free = columns[len(y) :][held]
-        offset = free[:, 0] + 2 * ALPHA * rates + ALPHA**2 * gaps
+        free = columns[self._gaps][held]
+        offset = free[:, 0] + 2 * self.alpha * rates + self.alpha**2 * gaps
         return free[:, 1:] - free[:, :1], offset, columns
 
 
@@ -112,22 +197,28 @@ def _differences(derivative: Rate, t: float, y: Floats) -> Floats:
 
 
 def strikes(
-    contacts: Contacts, t: float, y: Floats, touching: Sequence[int], rest_speed: float
+    contacts: Contacts,
+    t: float,
+    y: Floats,
+    touching: Sequence[int],
+    least: Floats,
+    nothing: float,
 ) -> Iterator[tuple[int, float, Floats]]:
     """Yield what strikes at one moment: contact, speed with which it closed, state after it.
 
-    Of those in `touching` the one that closes fastest strikes, again and again, until none closes.
-    One that closes more slowly than `rest_speed` strikes without bouncing, and so does each after
-    `BOUNCES` strikes per contact. Raises `StepFailure` if `STRIKES` per contact do not end it.
+    Of those in `touching` the one that closes fastest strikes, again and again, until none closes
+    faster than `nothing`. One that closes more slowly than its `least` (nc,) strikes without
+    bouncing, and so does each after `BOUNCES` strikes per contact. Raises `StepFailure` if
+    `STRIKES` per contact do not end it.
     """
     where = list(touching)
     for count in range(STRIKES * len(where)):
         rates = contacts.rates(t, y)[where]
         first = int(np.argmin(rates))
         speed = -float(rates[first])
-        if not speed > STILL:
+        if not speed > nothing:
             return
-        bounces = speed >= rest_speed and count < BOUNCES * len(where)
+        bounces = speed >= least[where[first]] and count < BOUNCES * len(where)
         y = contacts.impact(t, y, where[first], 1.0 if bounces else 0.0)
         yield where[first], speed, y
     names = ", ".join(contacts.names[k] for k in where)
@@ -136,16 +227,23 @@ def strikes(
     )
 
 
-def still(contacts: Contacts, t: float, y: Floats, touching: Sequence[int]) -> list[int]:
-    """Those in `touching` that are to be held: they neither part nor would without a force."""
+def still(
+    contacts: Contacts,
+    t: float,
+    y: Floats,
+    touching: Sequence[int],
+    nothing: float,
+    alpha: float,
+) -> list[int]:
+    """Those in `touching` that are to be held: they neither part, faster than `nothing`, nor would
+    without a force.
+    """
     rates = contacts.rates(t, y)
-    slow = [k for k in touching if rates[k] <= STILL]
+    slow = [k for k in touching if rates[k] <= nothing]
     if not slow:
         return []
-    _, pushes, parts = Holding(contacts, tuple(slow), (t, y)).solve(t, y)
-    return [
-        k for k, push, part in zip(slow, pushes, parts, strict=True) if push > 0 or part <= PARTING
-    ]
+    _, pushes, parts = Holding(contacts, tuple(slow), (t, y), alpha).solve(t, y)
+    return [k for k, push, part in zip(slow, pushes, parts, strict=True) if push > 0 or part <= 0]
 
 
 def check_depth(contacts: Contacts, t: float, y: Floats) -> None:
@@ -153,7 +251,8 @@ def check_depth(contacts: Contacts, t: float, y: Floats) -> None:
     gaps = contacts.gaps(t, y)
     deepest = int(np.argmin(gaps))
     if gaps[deepest] < -TOLERANCE:
+        depth = -gaps[deepest] * (contacts.sizes[deepest] if contacts.sizes else 1.0)
         raise StepFailure(
-            f"contact {contacts.names[deepest]} starts {-gaps[deepest]:.3g} deep; "
+            f"contact {contacts.names[deepest]} starts {depth:.3g} deep; "
             "move its bodies apart in the initial state"
         )

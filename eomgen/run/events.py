@@ -3,8 +3,15 @@
 A run is cut into pieces at whose ends a contact strikes or opens; within a piece the motion is
 smooth, and a method's steps are its own. Contacts that are apart are watched by their gaps, those
 that are held by their forces.
+
+What is promised: no contact is ever deeper than `contacts.TOLERANCE` of the mechanism's size, 1e-9,
+and what the method's own error adds between the looks at a step. An impact at which a contact
+closes so slowly that it would not rise by 5e-8 of that size, or more slowly than `rest_speed`, does
+not bounce, which ends the bounces that would go on for ever in a finite time; one whose gap grows
+of itself, as of what grazes along a curve, always bounces.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,17 +20,20 @@ import numpy as np
 from scipy.optimize import brentq
 
 from eomgen.run.contacts import (
-    PARTING,
     STILL,
     TOLERANCE,
     Holding,
     Rate,
+    accelerations,
     check_depth,
+    in_sizes,
+    recovery,
     restrained,
+    slowest_bounces,
     still,
     strikes,
 )
-from eomgen.run.integrators.interface import Advance, StepFailure
+from eomgen.run.integrators.interface import Advance, Resume, StepFailure
 from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.trajectory import Event
 
@@ -43,7 +53,7 @@ class Stepper:
     counted  makes a function count among the derivatives evaluated
     """
 
-    begin: Callable[[Problem, float, int], Iterator[Advance]]
+    begin: Callable[[Problem, float, int, Resume | None], Iterator[Advance]]
     looks: Sequence[float]
     counted: Callable[[Rate], Rate]
 
@@ -53,13 +63,15 @@ class _Moment:
     """How a run stands: time, state, contacts held, and contacts that have just opened.
 
     The latter lie within rounding of closed; their gaps are counted from `slack` below 0 until they
-    are clear of `TOLERANCE`.
+    are clear of `TOLERANCE`. `fastest` is the greatest rate of any gap at any strike so far,
+    sizes/s.
     """
 
     t: float
     y: Floats
     held: tuple[int, ...]
     slack: Floats
+    fastest: float
 
 
 @dataclass
@@ -88,32 +100,50 @@ def advances(
     t_start: float,
     t_end: float,
     *,
-    rest_speed: float,
+    rest_speed: float | None,
     max_steps: int,
+    resume: Resume | None = None,
 ) -> Iterator[Advance]:
     """Yield the steps of a run with contacts, cut where one strikes or opens, and the strikes.
 
-    Raises `StepFailure` for a start too deep, for contacts that admit no forces, for impacts
-    without end, and after `max_steps`.
+    `rest_speed`, m/s or rad/s, and `resume`: see `integrate`. Raises `StepFailure` for a start too
+    deep, for contacts that admit no forces, for impacts without end, and after `max_steps`.
     """
+    assert problem.contacts is not None
+    problem = replace(problem, contacts=in_sizes(problem.contacts))
     contacts = problem.contacts
     assert contacts is not None
-    now = _Moment(t_start, problem.initial, (), np.zeros(len(contacts.names)))
-    check_depth(contacts, now.t, now.y)
-    closed = np.flatnonzero(contacts.gaps(now.t, now.y) <= TOLERANCE).tolist()
+    count = len(contacts.names)
+    fastest = float(np.abs(contacts.rates(t_start, problem.initial)).max())
+    now = _Moment(t_start, problem.initial, (), np.zeros(count), fastest)
+    closed: list[int] = []
+    begun = (now.t, now.y)
+    if resume and "alpha" in resume:
+        alpha = float(resume["alpha"])
+        now.held = tuple(resume["held"].astype(int).tolist())
+        now.slack, now.fastest = resume["slack"].copy(), float(resume["fastest"])
+        begun = (float(resume["begun_t"]), resume["begun_y"])
+    else:
+        alpha = recovery(contacts, t_start, now.y, t_end - t_start)
+        check_depth(contacts, now.t, now.y)
+        closed = np.flatnonzero(contacts.gaps(now.t, now.y) <= TOLERANCE).tolist()
     guard = _Guard(1e-9 * (t_end - t_start), t_start)
     made = 0
     while True:
         if closed:
             guard.notice(now.t)
-            yield from _strike(problem, now, closed, rest_speed)
+            yield from _strike(problem, now, closed, rest_speed, alpha)
         closed = []
         if now.t >= t_end:
             return
-        holding = Holding(contacts, now.held, (now.t, now.y)) if now.held else None
+        if resume is None:
+            begun = (now.t, now.y)
+        holding = Holding(contacts, now.held, begun, alpha) if now.held else None
         piece = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
-        for advance in stepper.begin(piece, now.t, made):
+        steps = stepper.begin(piece, now.t, made, resume)
+        resume = None
+        for advance in steps:
             made += 1
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice; take a shorter --t-end")
@@ -133,11 +163,37 @@ def advances(
             now.t, now.y = step.t, step.y
             if now.slack.any():
                 now.slack[contacts.gaps(now.t, now.y) > TOLERANCE] = 0.0
-            yield step
+            yield replace(step, resume=_resume(step, now, begun, alpha))
+
+
+def _resume(
+    step: Advance, now: _Moment, begun: tuple[float, Floats], alpha: float
+) -> Callable[[], Resume] | None:
+    """What a step goes on from, with what contacts do."""
+    if step.resume is None:
+        return None
+    held, slack, fastest, own = now.held, now.slack.copy(), now.fastest, step.resume
+
+    def resume() -> Resume:
+        return {
+            **own(),
+            "alpha": np.array(alpha),
+            "held": np.array(held, dtype=np.float64),
+            "slack": slack,
+            "fastest": np.array(fastest),
+            "begun_t": np.array(begun[0]),
+            "begun_y": begun[1],
+        }
+
+    return resume
 
 
 def _strike(
-    problem: Problem, now: _Moment, closed: Sequence[int], rest_speed: float
+    problem: Problem,
+    now: _Moment,
+    closed: Sequence[int],
+    rest_speed: float | None,
+    alpha: float,
 ) -> Iterator[Advance]:
     """Yield each strike at one moment; `now` then tells what is held."""
     contacts, t = problem.contacts, now.t
@@ -150,23 +206,30 @@ def _strike(
         y = now.y
         return Advance(t, y, [], problem, lambda _: y, is_step=False, struck=struck)
 
-    for contact, speed, y in strikes(contacts, t, now.y, touching, rest_speed):
+    sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
+    free = accelerations(contacts, t, now.y)
+    now.fastest = max(now.fastest, float(np.abs(contacts.rates(t, now.y)).max()))
+    nothing = STILL * max(now.fastest, math.sqrt(np.abs(free).max()))
+    least = slowest_bounces(free, None if rest_speed is None else rest_speed / sizes)
+    for contact, speed, y in strikes(contacts, t, now.y, touching, least, nothing):
         now.y = y
         speeds[contact] = max(speeds.get(contact, 0.0), speed)
         yield instant(contact)
-    before, now.held = now.held, tuple(still(contacts, t, now.y, touching))
-    slow = contacts.rates(t, now.y) <= STILL
+    before, now.held = now.held, tuple(still(contacts, t, now.y, touching, nothing, alpha))
+    slow = contacts.rates(t, now.y) <= nothing
     for k in touching:
         opens = slow[k] and k not in now.held
         now.slack[k] = _slack(contacts, t, now.y, k) if opens else 0.0
     events = [
-        Event(t, contacts.names[k], "impact", speed)
+        Event(t, contacts.names[k], "impact", float(speed * sizes[k]))
         for k, speed in sorted(speeds.items())
-        if speed >= rest_speed
+        if speed >= least[k]
     ]
     rest = [k for k in now.held if k not in before]
     lift = [k for k in before if k not in now.held]
-    events += [Event(t, contacts.names[k], "rest", speeds.get(k, 0.0)) for k in rest]
+    events += [
+        Event(t, contacts.names[k], "rest", float(speeds.get(k, 0.0) * sizes[k])) for k in rest
+    ]
     events += [Event(t, contacts.names[k], "lift", 0.0) for k in lift]
     rows = [(t, now.y)] if speeds else []
     yield replace(instant(), samples=rows, events=tuple(events))
@@ -194,7 +257,8 @@ def _cut(now: _Moment, step: Advance, t: float, keep: bool) -> Iterator[Advance]
     y = step.y if t == step.t else step.within(t)
     samples = [sample for sample in step.samples if sample[0] < t or (sample[0] == t and not keep)]
     now.t, now.y = t, y
-    yield replace(step, t=t, y=y, samples=[*samples, (t, y)] if keep else samples)
+    rows = [*samples, (t, y)] if keep else samples
+    yield replace(step, t=t, y=y, samples=rows, resume=None)
 
 
 def _closing(
@@ -283,7 +347,7 @@ def _opening(holding: Holding | None, now: _Moment, step: Advance) -> tuple[floa
         return float(push[i] - part[i])
 
     found = []
-    for i in np.flatnonzero((pushes == 0) & (parts > PARTING)).tolist():
+    for i in np.flatnonzero((pushes == 0) & (parts > 0)).tolist():
         pressed = partial(force, i)
         at = _root(pressed, 0.0, length) if pressed(0.0) > 0 else 0.0
         found.append((at, holding.held[i]))

@@ -5,11 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from eomgen.derivation.recursive.finite import effect_sizes, is_singular, values_at
+from eomgen.derivation.recursive.regular import resistances, why_unresisted
 from eomgen.model import Model
 from eomgen.run.problem import Explain, Floats
 
 GROWN = 1e9
 """How many times its size at the start an effect has grown where it is worth saying."""
+GONE = 1e-9
+"""Part of the inertia that a velocity feels elsewhere that is as good as none."""
 REMEDY = "soften it, keep its formula finite there, or keep away"
 
 
@@ -29,6 +32,11 @@ def explain_by(
         endless = [name for name, size in sizes.items() if size == float("inf")]
         if endless:
             return f"{_effects(endless)} no finite value; {REMEDY}"
+        if not (known.driven or known.locked):
+            (felt,) = resistances(known.with_parameters(parameters), [values.q])
+            for i in sorted(felt):
+                if felt[i] < GONE:
+                    return why_unresisted(known, i)
         if is_singular(known, values):
             return "the mass matrix is singular; change lengths, masses or inertias, or keep away"
         first = effect_sizes(known, values_at(known, 0.0, initial.tolist(), parameters, inputs))

@@ -4,38 +4,48 @@ import math
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run import events
+from eomgen.run.checks import (
+    allowed_errors,
+    check_no_step,
+    check_samples,
+    check_steps,
+    check_times,
+    check_tolerances,
+    longest_step,
+    numbers,
+)
 from eomgen.run.guard import OF_TOLERANCE, Guard, Watch, repaired, watched
 from eomgen.run.integrators import (
-    INTEGRATORS,
     FixedStep,
     StepFailure,
     adaptive,
     find_integrator,
     fixed_step,
 )
-from eomgen.run.integrators.interface import Adaptive, Advance, Change
+from eomgen.run.integrators.interface import Adaptive, Advance, Change, Resume
+from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.trajectory import Event, Trajectory
 from eomgen.run.works import Account, Powers
 
-SMALLEST_RTOL = 2.3e-14
-"""SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
 ADAPTIVE_SAMPLES = 1001
-LEAST_STEPS = 1000
-"""Of an adaptive method on a derivative with corners."""
-MOST_SAMPLES = 1_000_000
-REST_SPEED = 1e-3
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Where in a long step the gaps of contacts are looked at; in an equal step at its ends."""
 
-Begin = Callable[[Problem, float, int], Iterator[Advance]]
-"""Steps of a problem from a time on; with how many were made before."""
+
+class Begin(Protocol):
+    """Steps of a problem from a time on; with how many were made before, what they go on from."""
+
+    def __call__(
+        self, problem: Problem, t: float, made: int, resume: Resume | None = None
+    ) -> Iterator[Advance]: ...
 
 
 def integrate(
@@ -46,20 +56,22 @@ def integrate(
     t_start: float = 0.0,
     dt: float | None = None,
     rtol: float = 1e-9,
-    atol: float = 1e-12,
+    atol: float | None = None,
     samples: int | None = None,
     progress: Progress | None = None,
     max_step: float | None = None,
     max_steps: int = 10_000_000,
-    rest_speed: float = REST_SPEED,
+    rest_speed: float | None = None,
     powers: Powers | None = None,
+    resume: Resume | None = None,
     guard: Guard | None = None,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
     integrator  a name in `eomgen.run.integrators.INTEGRATORS`
     dt          step in s of the fixed-step methods, which need it; the last one is shortened
-    rtol, atol  what the adaptive methods hold the error of each step to
+    rtol, atol  what the adaptive methods hold the error of each step to; without `atol`, each state
+                has 1e-12 of its size in `problem.sizes`
     samples     how many rows to keep: for fixed steps every k-th one such that there are about
                 this many (default: all), for adaptive methods this many equally spaced times
                 (default: 1001); the first and the last are always kept
@@ -68,8 +80,13 @@ def integrate(
                 error allows, but where the derivative has corners no more than 1/1000 of the run:
                 else they might leap over a contact or a pulse
     rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
-                that then neither part nor close are held, so that bouncing comes to an end
+                that then neither part nor close are held, so that bouncing comes to an end;
+                without it, it is √(1e-7 a size), of contacts that bounce by less than 5e-8 of the
+                mechanism's size under what accelerates them, a
     powers      asks for the works of effects
+    resume      what an earlier run left in `Trajectory.resume`: this one goes on from there,
+                whatever `t_start` and `problem.initial` say, to the same bytes as if that one had
+                not ended, if method and step or tolerances are the same
     guard       watches the derivative's rounding at every step, and stops the run where digits are
                 lost, or repairs it (`run.guard`); what it lets pass is what it is without
 
@@ -78,11 +95,16 @@ def integrate(
     up to there, is not `finished`, and its `message` says where, why, and what to change.
     """
     method = find_integrator(integrator)
+    grid = float(t_start)
+    if resume is not None:
+        t_start = float(resume["t"])
+        problem = replace(problem, initial=resume["y"])
+        grid = float(resume.get("grid", t_start))
     t_start, t_end = float(t_start), float(t_end)
-    _check_times(t_start, t_end)
-    _check_tolerances(rtol, atol)
-    _check_samples(samples)
-    if not (math.isfinite(rest_speed) and rest_speed > 0):
+    check_times(t_start, t_end)
+    check_tolerances(rtol, atol)
+    check_samples(samples)
+    if rest_speed is not None and not (math.isfinite(rest_speed) and rest_speed > 0):
         raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
 
     if guard is not None and guard.repairs and problem.contacts is not None:
@@ -99,26 +121,40 @@ def integrate(
         jacobian=jacobians.of(problem.jacobian),
     )
     begin: Begin
+    longest: float | None = None
     if isinstance(method, FixedStep):
         if max_step is not None:
             raise RunError(f"max_step: {integrator} takes equal steps; give --dt instead")
-        dt, every = _check_steps(integrator, t_end - t_start, dt, samples, max_steps)
-        begin = _equal_steps(method.prepare(counted), t_start, t_end, dt, every)
+        dt, every = check_steps(integrator, t_end - t_start, dt, samples, max_steps)
+        # What is looked at on the way does not count.
+        looked_at = problem if method.explicit else None
+        begin = _equal_steps(method.prepare(counted), grid, t_end, dt, every, looked_at)
     else:
-        _check_no_step(integrator, dt)
+        check_no_step(integrator, dt)
         times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
-        longest = _longest(max_step, t_end - t_start, problem.corners)
-        begin = _adaptive_steps(method, t_end, (rtol, atol, longest), times, max_steps)
+        longest = longest_step(max_step, t_end - t_start, problem.corners)
+        if resume is not None and max_step is None:
+            longest = float(resume.get("longest", longest))
+        bounds = allowed_errors(problem, atol)
+        begin = _adaptive_steps(method, t_end, (rtol, bounds, longest), times, max_steps)
 
     if watch and watch.guard.repairs:
+        if resume is not None:
+            raise RunError("guard: what goes on is not repaired; let it stop instead (--guard)")
         advances = repaired(watch, begin, counted, t_start, max_steps)
     elif problem.contacts is None:
-        advances = begin(counted, t_start, 0)
+        advances = begin(counted, t_start, 0, resume)
     else:
         looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
         stepper = events.Stepper(begin, looks, derivatives.of)
         advances = events.advances(
-            stepper, counted, t_start, t_end, rest_speed=rest_speed, max_steps=max_steps
+            stepper,
+            counted,
+            t_start,
+            t_end,
+            rest_speed=rest_speed,
+            max_steps=max_steps,
+            resume=resume,
         )
 
     if watch and not watch.guard.repairs:
@@ -149,15 +185,30 @@ def integrate(
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
         work_names=account.names if account else (),
+        resume={**run.resume(), **numbers(grid=grid, dt=dt, rtol=rtol, atol=atol, longest=longest)}
+        if run.resume
+        else {},
     )
 
 
-def _equal_steps(change: Change, t_start: float, t_end: float, dt: float, every: int) -> Begin:
+def _equal_steps(
+    change: Change, t_start: float, t_end: float, dt: float, every: int, looked_at: Problem | None
+) -> Begin:
     """Steps of `dt` from `t_start`, wherever they are begun; every how-manieth has a row."""
 
-    def begin(problem: Problem, t: float, made: int) -> Iterator[Advance]:
+    def begin(
+        problem: Problem, t: float, made: int, resume: Resume | None = None
+    ) -> Iterator[Advance]:
         return fixed_step.advances(
-            change, problem, t, t_start=t_start, t_end=t_end, dt=dt, every=every
+            change,
+            problem,
+            t,
+            t_start=t_start,
+            t_end=t_end,
+            dt=dt,
+            every=every,
+            watched=problem if looked_at and problem.contacts else looked_at,
+            resume=resume,
         )
 
     return begin
@@ -166,7 +217,7 @@ def _equal_steps(change: Change, t_start: float, t_end: float, dt: float, every:
 def _adaptive_steps(
     method: Adaptive,
     t_end: float,
-    bounds: tuple[float, float, float],
+    bounds: tuple[float, float | Floats, float],
     times: Floats,
     max_steps: int,
 ) -> Begin:
@@ -175,7 +226,9 @@ def _adaptive_steps(
     """
     rtol, atol, longest = bounds
 
-    def begin(problem: Problem, t: float, made: int) -> Iterator[Advance]:
+    def begin(
+        problem: Problem, t: float, made: int, resume: Resume | None = None
+    ) -> Iterator[Advance]:
         return adaptive.advances(
             method,
             problem,
@@ -187,6 +240,7 @@ def _adaptive_steps(
             times=times,
             made=made,
             max_steps=max_steps,
+            resume=resume,
         )
 
     return begin
@@ -224,6 +278,7 @@ class _Run:
     works: list[Floats] = field(default_factory=list)
     steps: int = 0
     events: list[Event] = field(default_factory=list)
+    resume: Callable[[], Resume] | None = None
 
     def __post_init__(self) -> None:
         self._keep()
@@ -236,6 +291,7 @@ class _Run:
         self.rows.extend(advance.samples)
         self.steps += advance.is_step
         self.events.extend(advance.events)
+        self.resume = advance.resume or self.resume
 
     def end(self) -> None:
         """Keep the last state, too, where no row has its time."""
@@ -270,6 +326,8 @@ def _follow(
         return ""
     except KeyboardInterrupt:
         trouble = f"interrupted at t = {run.t:.6g}"
+    except UnstableStepError as failure:
+        trouble = f"stopped at {_place(problem, run)}: {failure}"
     except StepFailure as failure:
         why = problem.explain(run.t, run.y, problem.initial)
         cause = f"{str(failure).partition(';')[0]}: {why}" if why else str(failure)
@@ -292,6 +350,9 @@ def _why(counts: tuple[_Count, _Count], problem: Problem, run: _Run, error: str)
             why = problem.explain(t, y, problem.initial)
             if why:
                 return f"{'there' if here else 'in the next step'} {why}"
+            why = "" if here else problem.explain(run.t, run.y, problem.initial)
+            if why:
+                return f"there {why}"
             return f"the Jacobian: {error}" if count is counts[1] else error
     why = problem.explain(run.t, run.y, problem.initial)
     return f"there {why}" if why else error
@@ -321,59 +382,3 @@ def _place(problem: Problem, run: _Run) -> str:
 
 def _ignore(fraction: float) -> None:
     """Take no notice of progress."""
-
-
-def _longest(max_step: float | None, span: float, corners: bool) -> float:
-    """The longest step of an adaptive method, s."""
-    if max_step is None:
-        return span / LEAST_STEPS if corners else math.inf
-    if not (math.isfinite(max_step) and max_step > 0):
-        raise RunError(f"max_step: {max_step:g} is not a positive step; give e.g. --max-step 0.01")
-    return max_step
-
-
-def _check_times(t_start: float, t_end: float) -> None:
-    for name, time in (("t_start", t_start), ("t_end", t_end)):
-        if not math.isfinite(time):
-            raise RunError(f"{name}: {time:g} is not a finite time")
-    if t_end <= t_start:
-        raise RunError(f"t_end: {t_end:g} is not after t_start = {t_start:g}")
-
-
-def _check_tolerances(rtol: float, atol: float) -> None:
-    for name, tolerance in (("rtol", rtol), ("atol", atol)):
-        if not (math.isfinite(tolerance) and tolerance > 0):
-            raise RunError(f"{name}: {tolerance:g} is not a positive number")
-    if rtol < SMALLEST_RTOL:
-        raise RunError(f"rtol: {rtol:g} is too small; the smallest allowed is {SMALLEST_RTOL:g}")
-
-
-def _check_samples(samples: int | None) -> None:
-    if samples is not None and samples < 2:
-        raise RunError(f"samples: {samples} is too few; give at least 2, the first and the last")
-    if samples is not None and samples > MOST_SAMPLES:
-        raise RunError(f"samples: {samples} is too many; give at most {MOST_SAMPLES}")
-
-
-def _check_no_step(integrator: str, dt: float | None) -> None:
-    if dt is not None:
-        fixed = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
-        raise RunError(
-            f"dt: {integrator} chooses its own steps; leave --dt out, "
-            f"or take one of {', '.join(fixed)}"
-        )
-
-
-def _check_steps(
-    integrator: str, span: float, dt: float | None, samples: int | None, max_steps: int
-) -> tuple[float, int]:
-    """Return the step and that every how-manieth is kept."""
-    if dt is None:
-        raise RunError(f"dt: {integrator} needs a step; give e.g. --dt 0.001")
-    if not (math.isfinite(dt) and dt > 0):
-        raise RunError(f"dt: {dt:g} is not a positive step; give e.g. --dt 0.001")
-    steps = fixed_step.count_steps(span, dt)
-    if steps > max_steps:
-        raise RunError(f"dt: {dt:g} takes {steps:g} steps, but at most {max_steps} are made")
-    every = 1 if samples is None else math.ceil(steps / (samples - 1))
-    return float(dt), every

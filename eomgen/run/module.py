@@ -11,6 +11,7 @@ from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.run.explain import explain_by
 from eomgen.run.problem import Contacts, Floats, Problem
+from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
 
 CORNERS = ("abs", "max", "min", "select", "step")
@@ -118,10 +119,13 @@ def as_problem(
     except (ValueError, ArithmeticError) as error:
         raise RunError(_unsolvable(error)) from None
     try:
-        derivative(0.0, initial)
+        slope = derivative(0.0, initial)
     except (ValueError, ArithmeticError) as error:
         why = explain(0.0, initial, initial)
         raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None
+    values = {**module.PARAMETERS, **_by_name(module.PARAMETERS, parameters)}
+    start = dict(zip(module.STATES, initial.tolist(), strict=True))
+    size = mechanism_size(module.UNITS, values, start)
     return Problem(
         name=module.NAME,
         states=module.STATES,
@@ -130,9 +134,10 @@ def as_problem(
         jacobian=jacobian,
         initial=initial,
         quaternions=module.QUATERNIONS,
-        contacts=_contacts(module, parameters, inputs),
+        contacts=_contacts(module, parameters, inputs, size),
         explain=explain,
         corners=any(kind in module.COST["derivative"] for kind in CORNERS),
+        sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
     )
 
 
@@ -150,8 +155,8 @@ def as_powers(module: Any, parameters: Any = None, inputs: Any = None) -> Powers
     )
 
 
-def _contacts(module: Any, parameters: Any, inputs: Any) -> Contacts | None:
-    """The rigid contacts of a module, if it has any."""
+def _contacts(module: Any, parameters: Any, inputs: Any, size: float) -> Contacts | None:
+    """The rigid contacts of a module of this size, m, if it has any."""
     names = getattr(module, "CONTACTS", None)
     if not names:
         return None
@@ -167,6 +172,7 @@ def _contacts(module: Any, parameters: Any, inputs: Any) -> Contacts | None:
             for name, kind in zip(module.EFFECT_NAMES, module.EFFECTS, strict=True)
             if kind == "driven"
         ),
+        sizes=tuple(size if module.UNITS[name] == "m" else 1.0 for name in names),
     )
 
 

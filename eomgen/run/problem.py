@@ -33,6 +33,8 @@ class Contacts:
                     derivative, the gaps' second derivatives, the powers (W) of the contacts and
                     of the drives
     drives          effects (nd) that drive joints: what they do depends on the contacts' forces
+    sizes           of the mechanism, in each gap's unit: gaps are judged in parts of it, see
+                    `contacts.TOLERANCE`; 1 of each if not given
     """
 
     names: tuple[str, ...]
@@ -42,6 +44,7 @@ class Contacts:
     impact: Callable[[float, Floats, int, float], Floats]
     held: Callable[[float, Floats, Floats], Floats]
     drives: tuple[str, ...] = ()
+    sizes: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,8 @@ class Problem:
     quaternions indices of the four components of each unit quaternion among the states
     contacts    what must not pass through each other; None where nothing can touch
     explain     see `Explain`
+    sizes       (ny,), of each state, in its unit, what the default of atol is a part of; 1 of each
+                if not given
     corners     whether the derivative has corners or jumps, as one-sided forces have: a long step
                 might leap over what begins and ends within it
 
@@ -75,6 +80,7 @@ class Problem:
     contacts: Contacts | None = None
     explain: Explain = lambda _t, _y, _initial: ""
     corners: bool = False
+    sizes: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

@@ -3,7 +3,7 @@
 import csv
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,6 +14,8 @@ from eomgen.files import is_ours, write_whole
 from eomgen.run.problem import Floats
 
 FORMAT = "trajectory 2"
+RESUME = "resume_"
+"""Begins the names of members of a file that a later run goes on from."""
 COUNTS = ("steps", "derivatives", "jacobians", "impacts")
 Kind = Literal["impact", "rest", "lift"]
 
@@ -49,6 +51,8 @@ class Trajectory:
                   have the same t
     works         (n, m), J: what each effect has done since the start; None if it was not asked for
     work_names    names of these m effects
+    resume        what a later run goes on from, to the same bytes as this one would have: arrays by
+                  name, see `integrate`; none where the method cannot
 
     Raises `ValueError` if these do not fit together.
     """
@@ -64,6 +68,7 @@ class Trajectory:
     events: tuple[Event, ...] = ()
     works: Floats | None = None
     work_names: tuple[str, ...] = ()
+    resume: Mapping[str, Floats] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         t, y = np.array(self.t, dtype=np.float64), np.array(self.y, dtype=np.float64)
@@ -117,6 +122,7 @@ def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
             [(event.contact, event.kind) for event in trajectory.events], dtype=np.str_
         ).reshape(-1, 2),
         **_worked(trajectory),
+        **_resumed(trajectory),
     )
     write_whole(path, buffer.getvalue(), force=force)
 
@@ -127,6 +133,11 @@ def _worked(trajectory: Trajectory) -> dict[str, Any]:
         return {}
     names = np.array(trajectory.work_names, dtype=np.str_)
     return {"works": trajectory.works, "work_names": names}
+
+
+def _resumed(trajectory: Trajectory) -> dict[str, Any]:
+    """The members of a file that a later run goes on from."""
+    return {f"{RESUME}{name}": trajectory.resume[name] for name in sorted(trajectory.resume)}
 
 
 def load_npz(path: Path) -> Trajectory:
@@ -161,6 +172,11 @@ def load_npz(path: Path) -> Trajectory:
                     ),
                     works=members.get("works"),
                     work_names=tuple(members.get("work_names", np.array(())).tolist()),
+                    resume={
+                        name.removeprefix(RESUME): members[name]
+                        for name in members
+                        if name.startswith(RESUME)
+                    },
                 )
     # What a broken archive makes zipfile and NumPy raise has no common base.
     except Exception as error:

@@ -7,7 +7,8 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.model import Model
-from eomgen.run.integrate import SMALLEST_RTOL, integrate
+from eomgen.run.checks import SMALLEST_RTOL
+from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.progress import Progress
 from eomgen.study.precise import BITS

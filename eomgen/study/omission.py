@@ -88,7 +88,7 @@ def run(
         wanted.t_end,
         dt=wanted.dt if fixed else None,
         rtol=max(wanted.rtol, FINEST[0]),
-        atol=max(wanted.atol, FINEST[1]),
+        atol=None if wanted.atol is None else max(wanted.atol, FINEST[1]),
         progress=progress,
     )
     if trajectory.message.startswith("interrupted"):

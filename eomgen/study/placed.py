@@ -63,6 +63,11 @@ class Placed:
     # What effects may ask.
 
     @property
+    def magnitude(self) -> float:
+        """The order of its lengths, m."""
+        return self.model.magnitude
+
+    @property
     def joints(self) -> Mapping[str, tuple[str, ...]]:
         """The joints that move but the free ones, each with the kinds of its ways."""
         return ways_of(self.model.bodies, self.dimensions)

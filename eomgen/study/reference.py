@@ -20,7 +20,8 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.files import is_ours, write_whole
 from eomgen.model import Model
-from eomgen.run.integrate import REST_SPEED, SMALLEST_RTOL, integrate
+from eomgen.run.checks import SMALLEST_RTOL
+from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats, Problem
@@ -89,7 +90,7 @@ def reference(
     """
     problem = as_problem(module, parameters, inputs, model)
     told = progress or _ignore
-    rest_speed = model.simulation.rest_speed if model else REST_SPEED
+    rest_speed = model.simulation.rest_speed if model else None
     key = _key(module, problem, parameters, inputs, t_end, seconds, rest_speed)
     path = folder and folder / f"{key}.npz"
     kept = path and load(path)
@@ -165,7 +166,7 @@ def _check_pace(spent: float, done: float, seconds: float) -> None:
         raise _TooLongError(f"more than {seconds:g} s in long numbers")
 
 
-def _roughly(problem: Problem, times: Floats, rest_speed: float) -> Floats:
+def _roughly(problem: Problem, times: Floats, rest_speed: float | None) -> Floats:
     """A quick run, for the scale. Raises `RunError` if it does not get to the end."""
     run = integrate(
         problem,
@@ -185,7 +186,7 @@ def _in_doubles(
     problem: Problem,
     times: Floats,
     scale: Floats,
-    rest_speed: float,
+    rest_speed: float | None,
     why: str,
     progress: Progress,
 ) -> tuple[Floats, Floats, str]:
@@ -225,7 +226,7 @@ def _key(
     inputs: Any,
     t_end: float,
     seconds: float,
-    rest_speed: float,
+    rest_speed: float | None,
 ) -> str:
     """A digest of all that makes a reference what it is."""
     source = module.__spec__.loader.get_source(module.__spec__.name) or ""

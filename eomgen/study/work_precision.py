@@ -46,7 +46,7 @@ class Bench:
 
     problem       whose motion it is
     reference     that motion, and how well it is known
-    rest_speed    below which contacts do not bounce, m/s or rad/s
+    rest_speed    below which contacts do not bounce, m/s or rad/s; None: see `integrate`
     kinetic       kinetic energy, J
     energy        an energy that exact motion keeps, J; None where there is none
     energy_scale  of the motion, J
@@ -56,7 +56,7 @@ class Bench:
 
     problem: Problem
     reference: Reference
-    rest_speed: float
+    rest_speed: float | None
     kinetic: Rows
     energy: Rows | None
     energy_scale: float

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.integrate import Radau
 
 from eomgen.pipeline import compile_scene
-from eomgen.run.integrate import LEAST_STEPS
+from eomgen.run.checks import LEAST_STEPS
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
 from eomgen.scene.reader import read_scene

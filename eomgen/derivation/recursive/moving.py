@@ -78,6 +78,11 @@ class Moving:
             at if body == WORLD else self.position(self.index[body], self._in_space(at))
         )
 
+    @property
+    def magnitude(self) -> float:
+        """The order of its lengths, m."""
+        return self.model.magnitude
+
     def point(self, name: str) -> tuple[str, Vector]:
         """A named point: its body, and where on it, m."""
         point = next(point for point in self.model.points if point.name == name)

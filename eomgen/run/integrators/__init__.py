@@ -32,11 +32,11 @@ def _any(change: Change, order: int, remedy: str) -> FixedStep:
 
 
 def _implicit(method: ImplicitMethod) -> FixedStep:
-    return _any(method.change, method.order, REMEDY)
+    return FixedStep(lambda _: method.change, method.order, REMEDY, explicit=False)
 
 
-def _explicit(solver: "Callable[..., OdeSolver[Any]]") -> Adaptive:
-    return Adaptive(solver, uses_jacobian=False, one_step=True, remedy=_LOOSER)
+def _explicit(solver: "Callable[..., OdeSolver[Any]]", *memory: str) -> Adaptive:
+    return Adaptive(solver, uses_jacobian=False, one_step=True, remedy=_LOOSER, memory=memory)
 
 
 INTEGRATORS: Mapping[str, FixedStep | Adaptive] = MappingProxyType(
@@ -50,9 +50,9 @@ INTEGRATORS: Mapping[str, FixedStep | Adaptive] = MappingProxyType(
         "implicit_midpoint": _implicit(implicit_midpoint.METHOD),
         "gauss_4": _implicit(gauss_4.METHOD),
         "gauss_6": _implicit(gauss_6.METHOD),
-        "RK45": _explicit(RK45),
-        "DOP853": _explicit(DOP853),
-        "gragg_bulirsch_stoer": _explicit(GraggBulirschStoer),
+        "RK45": _explicit(RK45, "h_abs", "f"),
+        "DOP853": _explicit(DOP853, "h_abs", "f"),
+        "gragg_bulirsch_stoer": _explicit(GraggBulirschStoer, "length", "slope", "target", "fresh"),
         "Radau": Adaptive(Radau, uses_jacobian=True, one_step=True, remedy=_LOOSER),
         "Radau_differences": Adaptive(Radau, uses_jacobian=False, one_step=True, remedy=_LOOSER),
         "BDF": Adaptive(BDF, uses_jacobian=True, one_step=False, remedy=_LOOSER),

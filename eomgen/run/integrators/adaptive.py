@@ -12,10 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Adaptive, Advance, StepFailure
+from eomgen.run.integrators.interface import Adaptive, Advance, Resume, StepFailure
+from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.problem import Floats, Problem
 
 _STALLED = 100
+_ENOUGH_TO_LOOK, _MANY_MORE = 10_000, 20
+"""Steps after which an explicit method that has many times as many before it is asked why."""
 _ENOUGH_TO_JUDGE = 100_000
 """Steps after which the pace so far tells whether the end will ever be reached."""
 
@@ -27,11 +30,12 @@ def advances(
     t_end: float,
     *,
     rtol: float,
-    atol: float,
+    atol: float | Floats,
     max_step: float,
     times: Floats,
     made: int,
     max_steps: int,
+    resume: Resume | None = None,
 ) -> Iterator[Advance]:
     """Yield the steps of `method`, with a sample at those of `times` (ascending) that each spans.
 
@@ -47,6 +51,10 @@ def advances(
     # A copy: LSODA's compiled code works on state arrays in place.
     start = problem.initial.copy()
     solver = method.solver(problem.derivative, t_start, start, t_end, **options)
+    if resume is not None:
+        for name in method.memory:
+            kind = type(getattr(solver, name))
+            setattr(solver, name, _restored(resume[name], kind))
     sampled, stalled = int(np.searchsorted(times, t_start, side="right")), 0
     left = max_steps - made
     for here in range(left):
@@ -55,6 +63,8 @@ def advances(
                 f"{here} steps came to {solver.t:g} s only, at which pace the end is more than "
                 f"{left} steps away; take a shorter --t-end, or {method.remedy}"
             )
+        if here == _ENOUGH_TO_LOOK and not method.uses_jacobian and method.one_step:
+            _check_stiff(problem, solver, (t_start, t_end), here)
         complaint = solver.step()
         if solver.status == "failed":
             cause = (complaint or "the method gave up").rstrip(".")
@@ -73,9 +83,14 @@ def advances(
         states = dense()(within).T if within.size else ()
         samples = list(zip(within.tolist(), map(problem.unit, states), strict=True))
         samples += [(t, y)] * (spanned.size - within.size)
-        yield Advance(t, y, samples, problem, partial(_between, problem, dense))
+        finished = solver.status == "finished"
+        # The last step is cut short by the end, but no step before it knows of that.
+        stands = None
+        if method.memory and not finished:
+            stands = partial(_stands, t, y, {name: getattr(solver, name) for name in method.memory})
+        yield Advance(t, y, samples, problem, partial(_between, problem, dense), resume=stands)
         sampled = passed
-        if solver.status == "finished":
+        if finished:
             return
         if method.one_step:
             # The slope that the next step takes over stays: what it is off is of the size of this
@@ -83,6 +98,26 @@ def advances(
             # it again changes no error, and costs a derivative a step.
             solver.y = y.copy()
     raise StepFailure(f"{max_steps} steps did not suffice; {method.remedy}")
+
+
+def _check_stiff(problem: Problem, solver: Any, span: tuple[float, float], made: int) -> None:
+    """Raise `UnstableStepError` if it is stiffness that leaves far more steps than were made."""
+    t_start, t_end = span
+    pace = (float(solver.t) - t_start) / made
+    if (t_end - t_start) > _MANY_MORE * made * pace:
+        why = stiffness(problem, float(solver.t), solver.y, float(solver.t - solver.t_old))
+        if why:
+            raise UnstableStepError(f"{made} steps came to {solver.t:g} s only: {why}")
+
+
+def _stands(t: float, y: Floats, memory: dict[str, Any]) -> Resume:
+    arrays = {name: np.array(value, dtype=np.float64) for name, value in memory.items()}
+    return {"t": np.array(t), "y": y, **arrays}
+
+
+def _restored(value: Floats, kind: type) -> Any:
+    """An array as one of its own, a number as of its kind."""
+    return value.copy() if value.ndim else kind(value)
 
 
 def _between(problem: Problem, dense: Callable[[], Any], t: float) -> Floats:

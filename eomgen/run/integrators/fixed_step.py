@@ -6,7 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance, Change
+from eomgen.run.integrators.interface import Advance, Change, Resume
+from eomgen.run.integrators.stability import Watch
 from eomgen.run.problem import Floats, Problem
 
 
@@ -29,6 +30,8 @@ def advances(
     t_end: float,
     dt: float,
     every: int,
+    watched: Problem | None = None,
+    resume: Resume | None = None,
 ) -> Iterator[Advance]:
     """Yield the steps of a method from time `t` on, with a sample at every `every`-th and the last.
 
@@ -36,21 +39,34 @@ def advances(
     Quaternions are scaled back to unit length after every step. Within a step the state is that
     after a shorter one. What rounding cuts off a step's change is added to the next one's: else
     it would gather in long runs (Hairer, Lubich, Wanner, Geometric Numerical Integration, VIII.5).
+    Steps of an explicit method are watched for being too long, the problem to look at being
+    `watched`; `resume` is what an `Advance` gave.
     """
     steps = int(count_steps(t_end - t_start, dt))
     first = min(math.floor((t - t_start) / dt + 1e-9) + 1, steps)
-    regular, y = t == t_start, problem.initial
-    lost = np.zeros_like(y)
+    regular, y = t == t_start or resume is not None, problem.initial
+    lost = np.zeros_like(y) if resume is None else resume["lost"]
+    watch = Watch(change)
     for i in range(first, steps + 1):
-        last = i == steps
         # From the start each time: adding up dt would gather rounding.
-        end = t_end if last else min(t_start + i * dt, t_end)
+        mark = t_start + i * dt
+        whole = i < steps or abs(mark - t_end) <= 4 * math.ulp(t_end)
+        end = min(mark, t_end) if i < steps else t_end
         within = partial(_shorter, change, problem, t, y)
-        length = dt if regular and not last else end - t
-        y, lost = _sum(y, change(problem, t, y, length) + lost)
+        length = dt if regular and whole else end - t
+        step = change(problem, t, y, length)
+        if watched:
+            watch.see(watched, t, y, step, length)
+        y, lost = _sum(y, step + lost)
         y = problem.unit(y)
         t, regular = end, True
-        yield Advance(t, y, [(t, y)] if last or i % every == 0 else [], problem, within)
+        samples = [(t, y)] if i == steps or i % every == 0 else []
+        stands = partial(_stands, mark, y, lost) if whole else None
+        yield Advance(t, y, samples, problem, within, resume=stands)
+
+
+def _stands(t: float, y: Floats, lost: Floats) -> Resume:
+    return {"t": np.array(t), "y": y, "lost": lost}
 
 
 def _shorter(change: Change, problem: Problem, t: float, y: Floats, end: float) -> Floats:

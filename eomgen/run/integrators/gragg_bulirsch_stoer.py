@@ -82,7 +82,7 @@ class GraggBulirschStoer(OdeSolver[Any]):
         t_bound: float,
         *,
         rtol: float,
-        atol: float,
+        atol: float | Floats,
         max_step: float = inf,
     ) -> None:
         super().__init__(fun, t0, y0, t_bound, vectorized=False)
@@ -222,7 +222,7 @@ class _Interpolant(DenseOutput):
     output). The rows are made for it, which costs about as many derivatives as the step did.
     """
 
-    def __init__(self, taken: _Span, fun: Slope, rtol: float, atol: float) -> None:
+    def __init__(self, taken: _Span, fun: Slope, rtol: float, atol: float | Floats) -> None:
         super().__init__(taken.t, taken.t + taken.step)
         start, step = taken.start, taken.step / 2
         allowed = atol + rtol * np.maximum(np.abs(start), np.abs(start + taken.change))

@@ -1,6 +1,6 @@
 """What every integrator looks like from outside."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,11 @@ from eomgen.run.trajectory import Event
 
 Change = Callable[[Problem, float, Floats, float], Floats]
 """`change(problem, t, y, h) -> d`: one step of size h leads to y + d; leaves `y` (ny,) as it is."""
+
+
+Resume = Mapping[str, Floats]
+"""Where a run stands, by name: `t` (), `y` (ny,), and what else its method and contacts go on from.
+"""
 
 
 class StepFailure(RunError):
@@ -26,11 +31,13 @@ class FixedStep:
              cannot serve it
     order    global error O(h^order)
     remedy   what to change when a run goes astray
+    explicit whether steps may be too long for stability
     """
 
     prepare: Callable[[Problem], Change]
     order: int
     remedy: str
+    explicit: bool = True
 
 
 @dataclass(frozen=True)
@@ -40,12 +47,15 @@ class Adaptive:
     uses_jacobian  whether it is given the problem's Jacobian
     one_step       whether it steps on from a state alone, which then may be put right between steps
     remedy         what to change when a run goes astray
+    memory         attributes of the solver, numbers or arrays, that with time and state are all
+                   that the next step goes on from; none where there is more to it
     """
 
     solver: "Callable[..., OdeSolver[Any]]"
     uses_jacobian: bool
     one_step: bool
     remedy: str
+    memory: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,6 +70,8 @@ class Advance:
     events   what happened at its end
     contact_powers  (t, y) -> (nc + nd,), powers of the contacts, of which some were held during the
                     step, and of the drives, W
+    resume   gives what a later run needs to go on from here as this one does; None where this one
+             would not have stopped here, or its method cannot
     """
 
     t: float
@@ -71,3 +83,4 @@ class Advance:
     struck: int | None = None
     events: tuple[Event, ...] = ()
     contact_powers: Callable[[float, Floats], Floats] | None = None
+    resume: Callable[[], Resume] | None = None

@@ -1,0 +1,87 @@
+"""What a run is asked for, checked before it begins."""
+
+import math
+
+import numpy as np
+
+from eomgen.errors import RunError
+from eomgen.run.integrators import INTEGRATORS, FixedStep, fixed_step
+from eomgen.run.problem import Floats, Problem
+
+SMALLEST_RTOL = 2.3e-14
+"""SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
+LEAST_STEPS = 1000
+"""Of an adaptive method on a derivative with corners."""
+MOST_SAMPLES = 1_000_000
+ATOL = 1e-12
+"""Of each state, in parts of its size."""
+
+
+def longest_step(max_step: float | None, span: float, corners: bool) -> float:
+    """The longest step of an adaptive method, s."""
+    if max_step is None:
+        return span / LEAST_STEPS if corners else math.inf
+    if not (math.isfinite(max_step) and max_step > 0):
+        raise RunError(f"max_step: {max_step:g} is not a positive step; give e.g. --max-step 0.01")
+    return max_step
+
+
+def check_times(t_start: float, t_end: float) -> None:
+    for name, time in (("t_start", t_start), ("t_end", t_end)):
+        if not math.isfinite(time):
+            raise RunError(f"{name}: {time:g} is not a finite time")
+    if t_end <= t_start:
+        raise RunError(f"t_end: {t_end:g} is not after t_start = {t_start:g}")
+
+
+def numbers(**values: float | None) -> dict[str, Floats]:
+    """Numbers as arrays, nan for none."""
+    return {name: np.array(math.nan if x is None else x) for name, x in values.items()}
+
+
+def allowed_errors(problem: Problem, atol: float | None) -> float | Floats:
+    """The absolute tolerance, of each state where none was given and they have sizes."""
+    if atol is not None:
+        return atol
+    return ATOL * np.array(problem.sizes) if problem.sizes else ATOL
+
+
+def check_tolerances(rtol: float, atol: float | None) -> None:
+    for name, tolerance in (("rtol", rtol), ("atol", atol)):
+        if tolerance is None:
+            continue
+        if not (math.isfinite(tolerance) and tolerance > 0):
+            raise RunError(f"{name}: {tolerance:g} is not a positive number")
+    if rtol < SMALLEST_RTOL:
+        raise RunError(f"rtol: {rtol:g} is too small; the smallest allowed is {SMALLEST_RTOL:g}")
+
+
+def check_samples(samples: int | None) -> None:
+    if samples is not None and samples < 2:
+        raise RunError(f"samples: {samples} is too few; give at least 2, the first and the last")
+    if samples is not None and samples > MOST_SAMPLES:
+        raise RunError(f"samples: {samples} is too many; give at most {MOST_SAMPLES}")
+
+
+def check_no_step(integrator: str, dt: float | None) -> None:
+    if dt is not None:
+        fixed = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
+        raise RunError(
+            f"dt: {integrator} chooses its own steps; leave --dt out, "
+            f"or take one of {', '.join(fixed)}"
+        )
+
+
+def check_steps(
+    integrator: str, span: float, dt: float | None, samples: int | None, max_steps: int
+) -> tuple[float, int]:
+    """Return the step and that every how-manieth is kept."""
+    if dt is None:
+        raise RunError(f"dt: {integrator} needs a step; give e.g. --dt 0.001")
+    if not (math.isfinite(dt) and dt > 0):
+        raise RunError(f"dt: {dt:g} is not a positive step; give e.g. --dt 0.001")
+    steps = fixed_step.count_steps(span, dt)
+    if steps > max_steps:
+        raise RunError(f"dt: {dt:g} takes {steps:g} steps, but at most {max_steps} are made")
+    every = 1 if samples is None else math.ceil(steps / (samples - 1))
+    return float(dt), every

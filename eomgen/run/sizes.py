@@ -1,0 +1,70 @@
+"""How large a mechanism and its motion are, where something has to count as small beside them.
+
+All sizes scale with the units of a scene: in units by powers of two it runs exactly alike, in units
+by powers of ten but for rounding.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from eomgen.run.problem import Floats
+
+FAR = 64 * np.finfo(float).eps / 1e-9
+"""Part of the farthest length that a size is at least: 1e-9 of it is then more than rounding."""
+
+
+def mechanism_size(
+    units: Mapping[str, str], parameters: Mapping[str, float], start: Mapping[str, float]
+) -> float:
+    """The size of a mechanism, m: its greatest length, but for how far from the origin its ground
+    lies and it starts; 1 if it has none.
+
+    units       of parameters and states, by name
+    parameters  values
+    start       the initial state
+    """
+    own = _lengths((name, value) for name, value in parameters.items() if units.get(name) == "m")
+    placed = _lengths((name, value) for name, value in start.items() if units.get(name) == "m")
+    near = max((value for name, value in own if not name.endswith("_offset")), default=0.0)
+    far = max((value for _, value in own + placed), default=0.0)
+    return _or_one(max(near, FAR * far) if near else far)
+
+
+def state_sizes(
+    states: Sequence[str], units: Mapping[str, str], y: Floats, slope: Floats, size: float
+) -> tuple[float, ...]:
+    """The size of each state (ny,): of a length that of the mechanism, m, of an angle 1, of
+    velocities these times the rate of the motion, and of what else there is what it starts with.
+
+    y, slope  (ny,), the initial state and its derivative
+    """
+    lengths = {"m": size, "m/s": size, "rad": 1.0, "rad/s": 1.0, "": 1.0}
+    moves = [i for i, state in enumerate(states) if units.get(state) in ("m/s", "rad/s")]
+    rate = 0.0
+    for i in moves:
+        own = lengths[units[states[i]]]
+        rate = max(rate, abs(float(y[i])) / own, math.sqrt(abs(float(slope[i])) / own))
+    rate = _or_one(rate)
+    others: dict[str, float] = {}
+    for i, state in enumerate(states):
+        unit = units.get(state, "")
+        if unit not in lengths:
+            now = max(abs(float(y[i])), abs(float(slope[i])) / rate)
+            others[unit] = max(others.get(unit, 0.0), now)
+    found = []
+    for state in states:
+        unit = units.get(state, "")
+        known = lengths[unit] if unit in lengths else _or_one(others[unit])
+        found.append(known * (rate if unit in ("m/s", "rad/s") else 1.0))
+    return tuple(found)
+
+
+def _or_one(value: float) -> float:
+    """A positive value; 1 for one that is 0 or not finite."""
+    return value if value > 0 and math.isfinite(value) else 1.0
+
+
+def _lengths(pairs: Iterable[tuple[str, float]]) -> list[tuple[str, float]]:
+    return [(name, abs(value)) for name, value in pairs if math.isfinite(value)]

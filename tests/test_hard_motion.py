@@ -1,0 +1,235 @@
+"""Fast and slow motions, large numbers, long runs, and runs that go on where one ended."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bookkeeping import light
+from campaign import some
+from engine import read
+
+from eomgen.cli import main
+from eomgen.pipeline import compile_scene
+from eomgen.run.integrate import integrate
+from eomgen.run.module import as_problem, load_module
+from eomgen.run.problem import Problem
+from eomgen.run.trajectory import Trajectory, load_npz
+from eomgen.study.truth import Truth
+
+DIGITS = np.finfo(float).eps / 2
+PENDULUM = """
+name = "swing"
+route = "aba"
+bodies = [{ name = "b", mass = 1.0, inertia_com = 0.1 }]
+joints = [{ name = "j", type = "revolute", parent = "world", child = "b", r_child = [0, 1] }]
+initial = { q = { j_angle = 1.0 } }
+[[effects]]
+type = "gravity"
+g = 9.81
+"""
+
+
+@cache
+def problem(scene: str) -> Problem:
+    """A scene by its name or text."""
+    return as_problem(light(scene).module)
+
+
+def ran(asked: Problem, method: str, t_end: float, **given: Any) -> Trajectory:
+    run = integrate(asked, method, t_end, **given)
+    assert run.finished, run.message
+    return run
+
+
+# --- fast and slow ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scene", ["spinning_top", "tumbling_body"])
+def test_spins_of_1e5_keep_their_digits(scene: str) -> None:
+    """v̇ against 60 digits, in parts of its largest component; squares of 1e5 rad/s cancel."""
+    made, spin = light(scene), 1e5
+    noise, nq = np.random.default_rng(3), len(made.model.coordinates)
+    rows = []
+    for _ in range(5):
+        y = problem(scene).unit(made.random_state(noise))
+        y[nq:] = spin * noise.normal(size=len(y) - nq)
+        rows.append(y)
+    true = Truth(made.model)(np.zeros(len(rows)), np.array(rows))
+    for k, y in enumerate(rows):
+        found = made.module.derivative(0.0, y)[nq:]
+        assert float(max(abs(found - true[:, k])) / max(abs(true[:, k]))) < 32 * DIGITS
+
+
+def test_a_top_at_1e5_rad_per_s_keeps_its_energy() -> None:
+    """Over some 160 turns."""
+    asked, module = problem("spinning_top"), light("spinning_top").module
+    y = asked.initial.copy()
+    y[list(module.STATES).index("tip_wz")] = 1e5
+    run = ran(replace(asked, initial=y), "DOP853", 1e-2, rtol=1e-12, samples=51)
+    energy = np.array([module.kinetic_energy(0.0, row) for row in run.y])
+    energy += [module.potential_energy(0.0, row) for row in run.y]
+    assert np.ptp(energy) < 1e-9 * energy[0]
+
+
+@pytest.mark.parametrize(("spin", "sleeps"), [(100.0, True), (40.0, False)])
+def test_a_sleeping_top(spin: float, sleeps: bool) -> None:
+    """Upright, it stays exactly so; nudged, it stays near if I₃ω > 2 √(m g h I), and else falls."""
+    asked, module = problem("spinning_top"), light("spinning_top").module
+    p, names = module.PARAMETERS, list(module.STATES)
+    critical = 2 * np.sqrt(p["m"] * 9.81 * p["h"] * (p["I_1"] + p["m"] * p["h"] ** 2)) / p["I_3"]
+    assert (spin > critical) == sleeps
+    y = np.zeros(len(names))
+    y[names.index("tip_qw")], y[names.index("tip_wz")] = 1.0, spin
+    run = ran(replace(asked, initial=y), "DOP853", 3.0, rtol=1e-11)
+    assert np.max(np.abs(run.y[:, [names.index("tip_qx"), names.index("tip_qy")]])) == 0.0
+    y[names.index("tip_qx")] = 1e-6
+    run = ran(replace(asked, initial=y), "DOP853", 3.0, rtol=1e-11)
+    lean = np.max(np.abs(run.y[:, [names.index("tip_qx"), names.index("tip_qy")]]))
+    assert lean < 1e-5 if sleeps else lean > 0.1
+
+
+def test_late_times_lose_nothing() -> None:
+    """What knows no time runs at 1e6 s as at 0, but for the rounding of its steps' ends."""
+    early = ran(problem(PENDULUM), "DOP853", 5.0, rtol=1e-12, atol=1e-14)
+    late = ran(problem(PENDULUM), "DOP853", 1e6 + 5, t_start=1e6, rtol=1e-12, atol=1e-14)
+    rate = np.max(np.abs(early.y[:, 1]))
+    assert np.max(np.abs(late.y - early.y)) < 20 * np.spacing(1e6) * max(rate, 9.81)
+
+
+def test_angles_of_1e8_lose_what_their_digits_force() -> None:
+    """v̇ at the very number is right to rounding; the motion is that of the same angle within a
+    turn, to what 1e8 rounds by.
+    """
+    made = light(PENDULUM)
+    noise = np.random.default_rng(5)
+    rows = np.column_stack([1e8 * noise.uniform(-1, 1, 20), noise.normal(size=20)])
+    true = Truth(made.model)(np.zeros(len(rows)), rows)[0]
+    for y, exact in zip(rows, true, strict=True):
+        assert abs(float(made.module.derivative(0.0, y)[1] - exact)) < 8 * DIGITS * 9.81
+    asked, turns = problem(PENDULUM), 2 * np.pi * 15_915_494
+    near = ran(asked, "DOP853", 2.0, rtol=1e-12, atol=1e-13)
+    far = ran(
+        replace(asked, initial=asked.initial + np.array([turns, 0.0])),
+        "rk4",
+        2.0,
+        dt=1e-3,
+        samples=3,
+    )
+    assert np.max(np.abs(far.y[-1] - near.y[-1] - [turns, 0.0])) < 50 * np.spacing(1e8)
+
+
+def test_quaternions_stay_unit() -> None:
+    """Of a tumbling body, at each row of up to a million steps."""
+    asked = problem("tumbling_body")
+    steps = some(20_000, 1_000_000)
+    run = ran(asked, "semi_implicit_euler", steps * 1e-4, dt=1e-4, samples=1001)
+    (indices,) = asked.quaternions
+    assert run.counts["steps"] == steps
+    assert np.max(np.abs(np.linalg.norm(run.y[:, list(indices)], axis=1) - 1)) < 1e-12
+
+
+# --- long runs ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("method", "dt"), [("leapfrog", 0.05), ("gauss_4", 0.2)])
+def test_symplectic_methods_keep_the_energy(method: str, dt: float) -> None:
+    """In a band whose middle does not move: the last tenth of a run is as the first."""
+    steps = some({"leapfrog": 20_000, "gauss_4": 2_000}[method], 1_000_000)
+    run = ran(problem(PENDULUM), method, steps * dt, dt=dt, samples=steps + 1)
+    energy = 0.55 * run.y[:, 1] ** 2 - 9.81 * np.cos(run.y[:, 0])
+    first, last = energy[: steps // 10], energy[-(steps // 10) :]
+    band = np.ptp(first)
+    assert band < 0.05
+    assert np.ptp(energy) < 1.05 * band
+    assert abs(last.mean() - first.mean()) < 0.02 * band
+
+
+def test_the_redundant_state_drifts_and_the_reduced_one_does_not() -> None:
+    """The handout's twelve numbers let the joint come apart by the method's error, which its eight
+    cannot: there the joint is closed whatever the error.
+    """
+    gaps = {}
+    for form, count in (("redundant", 12), ("momentum", 8)):
+        scene = read("two_body").replaced(form=form, outputs=("body_poses",))
+        module = load_module(compile_scene(scene), f"two_body_{form}")
+        assert len(module.STATES) == count
+        run = ran(as_problem(module), "rk4", 20.0, dt=0.02, samples=101)
+        gaps[form] = _gap(module, run)
+    assert gaps["momentum"] < np.spacing(2000.0)  # it falls so far, m
+    assert gaps["redundant"] > 1e-7
+
+
+def _gap(module: Any, run: Trajectory) -> float:
+    """How far apart the joint's two points come, m."""
+    found, p = 0.0, module.PARAMETERS
+    for t, y in zip(run.t, run.y, strict=True):
+        (xa, ya, a), (xb, yb, b) = module.body_poses(t, y)
+        dx = xa + p["l_A"] * np.cos(a) - xb + p["l_B"] * np.cos(b)
+        dy = ya + p["l_A"] * np.sin(a) - yb + p["l_B"] * np.sin(b)
+        found = max(found, float(np.hypot(dx, dy)))
+    return found
+
+
+# --- going on -----------------------------------------------------------------------------------
+
+GOING_ON = {
+    "euler": {"dt": 1e-3},
+    "leapfrog": {"dt": 1e-3},
+    "rk4": {"dt": 3e-3},
+    "gauss_4": {"dt": 7e-3},
+    "RK45": {"rtol": 1e-7},
+    "DOP853": {"rtol": 1e-7},
+    "gragg_bulirsch_stoer": {"rtol": 1e-7},
+}
+
+
+@pytest.mark.parametrize("method", GOING_ON)
+def test_a_run_goes_on_to_the_same_bytes(method: str) -> None:
+    """Ended twice on the way, at times that are no step's, or once not."""
+    asked, given = problem(PENDULUM), GOING_ON[method]
+    whole = ran(asked, method, 3.0, **given)
+    run = ran(asked, method, 1.0, **given)
+    for t_end in (2.0001, 3.0):
+        run = ran(asked, method, t_end, resume=run.resume, **given)
+    assert run.y[-1].tobytes() == whole.y[-1].tobytes()
+    assert run.t[-1] == whole.t[-1]
+
+
+def test_a_bouncing_run_goes_on_to_the_same_bytes() -> None:
+    """In flight, and when it lies: what is held, and since where, goes along."""
+    asked, dt = problem("bouncing_two_body"), 2.0**-9
+    whole = ran(asked, "rk4", 2.0, dt=dt)
+    for t_end in (0.75, 1.5):
+        first = ran(asked, "rk4", t_end, dt=dt)
+        run = ran(asked, "rk4", 2.0, dt=dt, resume=first.resume)
+        assert run.y[-1].tobytes() == whole.y[-1].tobytes()
+
+
+def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The same bytes from the file; what cannot go on so says why, and nothing is overwritten."""
+    scene = tmp_path / "swing.toml"
+    scene.write_text(PENDULUM)
+    ends: dict[str, Trajectory] = {}
+    for folder, extra in {
+        "whole": ["--t-end", "2"],
+        "first": ["--t-end", "1"],
+        "second": ["--t-end", "2", "--from", str(tmp_path / "first/swing.npz")],
+    }.items():
+        given = ["--integrator", "rk4", "--dt", "0.003", *extra, "-o", str(tmp_path / folder)]
+        assert main(["simulate", str(scene), *given]) == 0
+        ends[folder] = load_npz(tmp_path / folder / "swing.npz")
+    assert ends["second"].y[-1].tobytes() == ends["whole"].y[-1].tobytes()
+    assert "goes on from t = 0.999 s as if the run had not ended" in capsys.readouterr().out
+    again = ["simulate", str(scene), "--from", str(tmp_path / "first/swing.npz")]
+    assert main([*again, "--t-end", "2", "-o", str(tmp_path / "first")]) == 1
+    assert "would be overwritten; give another folder with -o" in capsys.readouterr().err
+    assert main([*again, "--t-end", "2", "-o", str(tmp_path / "other")]) == 0
+    assert "begins anew from the state at t = 1 s: that run was by rk4" in capsys.readouterr().out
+    assert main([*again, "--t-end", "0.5", "-o", str(tmp_path / "other")]) == 1
+    assert "t_end: 0.5 is not after t_start = 1" in capsys.readouterr().err
+    wrong = ["simulate", "pendulum", "--from", str(tmp_path / "first/swing.npz")]
+    assert main([*wrong, "-o", str(tmp_path / "other")]) == 1
+    assert "give a run of this scene" in capsys.readouterr().err

@@ -1,0 +1,131 @@
+"""Stiffness: an explicit method that cannot hold it says so, and names what can."""
+
+import re
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from bookkeeping import light
+
+from eomgen.run.integrate import integrate
+from eomgen.run.module import as_problem
+from eomgen.run.problem import Problem
+from eomgen.run.trajectory import Trajectory
+
+SLIDE = """
+name = "slide"
+bodies = [{ name = "b", mass = 1.0, inertia_com = 0 }]
+joints = [{ name = "j", type = "prismatic", parent = "world", child = "b", axis = [0, 1] }]
+"""
+SPRING = f"""{SLIDE}
+initial = {{ q = {{ j_slide = 0.1 }}, v = {{ j_slide_dot = 1.0 }} }}
+[[effects]]
+type = "joint_spring"
+name = "spring"
+joint = "j"
+stiffness = 1e12
+damping = 0
+"""
+WALL = f"""{SLIDE}
+initial = {{ q = {{ j_slide = 0.5 }} }}
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "contact"
+name = "floor"
+law = "hunt_crossley"
+body = "b"
+stiffness = 1e9
+dissipation = 0.0
+"""
+SERVO = """
+name = "servo"
+bodies = [{ name = "b", mass = 1.0, inertia_com = 0.1 }]
+joints = [{ name = "j", type = "revolute", parent = "world", child = "b", r_child = [0, 1] }]
+initial = { q = { j_angle = 1.0 } }
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "pd"
+name = "hold"
+joint = "j"
+target = 0.5
+stiffness = 1e8
+damping = 1e7
+"""
+SCENES = {"spring": SPRING, "wall": WALL, "servo": SERVO}
+EXPLICIT = ["euler", "semi_implicit_euler", "rk4"]
+
+
+@cache
+def problem(scene: str) -> Problem:
+    return as_problem(light(SCENES[scene]).module)
+
+
+def stopped(run: Trajectory) -> float:
+    """The step that a message asks for."""
+    assert not run.finished
+    assert "too long for an explicit method" in run.message
+    assert "--integrator implicit_midpoint, or Radau" in run.message
+    found = re.search(r"take --dt (\S+) or less", run.message)
+    assert found
+    return float(found[1])
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("method", EXPLICIT)
+def test_too_long_a_step_is_refused(scene: str, method: str) -> None:
+    """Before the state is spoilt: at the last row there is no more energy than at the start. At
+    the wall nothing would overflow: the ball would be thrown up a hundred metres.
+    """
+    asked = problem(scene)
+    run = integrate(asked, method, 1.0, dt=1e-3)
+    stopped(run)
+    assert np.abs(run.y).max() < 10
+
+
+@pytest.mark.parametrize(("scene", "rate"), [("spring", 1e6), ("servo", 1e7 / 1.1)])
+def test_the_step_that_is_named_is_the_longest(scene: str, rate: float) -> None:
+    """Of rk4 it is 2.83/ω of an oscillation and 2.79/λ of a decay; and it does hold."""
+    asked = problem(scene)
+    dt = stopped(integrate(asked, "rk4", 1.0, dt=1e-3))
+    limit = {"spring": 2.8284, "servo": 2.7853}[scene] / rate
+    assert 0.9 * limit < dt < 1.01 * limit
+    run = integrate(asked, "rk4", 300 * dt, dt=dt)
+    assert run.finished
+    stopped(integrate(asked, "rk4", 300 * limit, dt=1.3 * limit))
+
+
+def test_implicit_methods_hold_what_explicit_ones_do_not() -> None:
+    """The energy of the spring, and where the servo comes to: where its torque bears the weight."""
+    spring = problem("spring")
+    run = integrate(spring, "implicit_midpoint", 1.0, dt=1e-3)
+    energy = 0.5 * run.y[:, 1] ** 2 + 0.5e12 * run.y[:, 0] ** 2
+    assert np.ptp(energy) < 1e-10 * energy[0]
+    ends = []
+    kept: list[tuple[str, dict[str, Any]]] = [("Radau", {"rtol": 1e-8}), ("gauss_4", {"dt": 1e-3})]
+    for method, given in kept:
+        run = integrate(problem("servo"), method, 2.0, **given)
+        assert run.finished
+        ends.append(run.y[-1, 0])
+    lags = 0.5 * np.exp(-2.0 * 1e8 / 1e7)
+    assert abs(ends[0] - 0.5) < 1e-7 + 2 * lags
+
+
+def test_an_adaptive_explicit_method_names_stiffness() -> None:
+    """Long before its ten million steps are over."""
+    run = integrate(problem("servo"), "RK45", 2.0, rtol=1e-6)
+    assert not run.finished and run.counts["steps"] <= 10_000
+    assert "the motion is stiff: it damps at 9.1e+06/s" in run.message
+    assert "take --integrator Radau, or BDF" in run.message
+
+
+def test_what_holds_is_left_alone() -> None:
+    """A step within the limit, through a whole bounce."""
+    run = integrate(problem("wall"), "rk4", 0.4, dt=5e-5, samples=101)
+    assert run.finished
+    energy = 0.5 * run.y[-1, 1] ** 2 + 9.81 * run.y[-1, 0]
+    assert abs(energy - 0.5 * 9.81) < 0.02 * energy
