@@ -2,7 +2,7 @@
 
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.model import Model
-from eomgen.program.route import MOST_LOST
+from eomgen.program.route import MOST_LOST, MOST_LOST_OF_ALL
 from eomgen.scene.reader import parse_scene
 
 SPECIAL = (0.0, np.pi / 2, -np.pi / 2, np.pi, np.pi / 4)
@@ -74,15 +74,33 @@ def dynamics(model: Model, p: Any, q: Any, v: Any, u: Any, scalars: Any) -> Dyna
     return Dynamics(model, values, scalars, "own")
 
 
+class Refused(Exception):
+    """No recursion keeps its digits."""
+
+
 def taken(model: Model) -> str:
-    """The recursion that `auto` takes, by the digits that it loses at the scene's masses."""
-    return "aba" if digits_lost(model)["aba"] <= MOST_LOST else "orthogonal"
+    """The recursion that `auto` takes, by the digits that each loses at the scene's masses.
+
+    Raises `Refused` where it refuses the scene.
+    """
+    for lost in (digits_lost(model), digits_lost(model, None, Digits())):
+        for route in ("aba", "ldl"):
+            if lost[route] <= MOST_LOST:
+                return route
+    if lost["orthogonal"] > MOST_LOST_OF_ALL:
+        raise Refused
+    return "orthogonal"
 
 
 def found(d: Drawn, q: Sequence[float], v: Sequence[float], u: dict[str, float]) -> list[float]:
-    """v̇ in doubles, by the recursion taken."""
+    """v̇ in doubles, by the recursion taken. Raises `Refused`."""
     at = dynamics(d.model, d.parameters, q, v, u, FloatScalars())
-    return at.articulated_forward() if taken(d.model) == "aba" else at.orthogonal_forward()
+    forward = {
+        "aba": at.articulated_forward,
+        "ldl": at.factored_forward,
+        "orthogonal": at.orthogonal_forward,
+    }
+    return list(forward[taken(d.model)]())
 
 
 def truth(
@@ -117,8 +135,3 @@ def apart(value: Sequence[float], true: Sequence[Any]) -> float:
     size = max(abs(x) for x in true)
     off = max(abs(MP.mpf(float(a)) - b) for a, b in zip(value, true, strict=True))
     return float(off / size) if size else float(off)
-
-
-def lighter(model: Model) -> Model:
-    """The same without what is not judged here."""
-    return replace(model, outputs=())

@@ -1,14 +1,15 @@
 """Which route a model's equations take, and why."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from eomgen.derivation.recursive.digits import Accelerations, digits_lost
+from eomgen.derivation.recursive.digits import ALL, Accelerations, digits_lost
 from eomgen.derivation.recursive.moving import Values
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.errors import SceneError
 from eomgen.model import Model
+from eomgen.program.digits import Digits
 from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.program import Output, cost, finish, interpreter
 from eomgen.program.system import System
@@ -16,6 +17,9 @@ from eomgen.program.tape import TIME
 
 MOST_LOST = 4.0
 """Decimal digits of v̇ that a route may lose at ordinary states and still be taken by itself."""
+
+MOST_LOST_OF_ALL = 6.0
+"""That the last of all routes may lose; a scene for which it loses more is refused."""
 
 MOST_FACTORING = 20_000
 """Operations of factoring alone beyond which `ldl` is not tried only to be compared."""
@@ -90,15 +94,16 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
     else:
         records["ldl"] = recorded(model, "ldl")
         candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
-    lost = digits_lost(model, None if closed is None else _accelerations(closed))
-    candidates = [_weighed(c, lost[c.route]) for c in candidates]
-    if all(c.refused or c.operations is None for c in candidates):
-        records["orthogonal"] = recorded(model, "orthogonal")
-        words = f"keeps the digits that these masses take from the others, {lost['aba']:.0f} of aba"
-        count = _operations_of(records["orthogonal"])
-        candidates.append(Candidate("orthogonal", count, words))
-    tried = [c for c in candidates if c.operations is not None and not c.refused]
-    best = min(tried, key=lambda c: c.operations or 0)
+    by_closed = None if closed is None else _accelerations(closed)
+    tried = _weighed(candidates, digits_lost(model, by_closed))
+    if not _kept(tried):
+        lost = digits_lost(model, by_closed, Digits())
+        tried = _weighed(candidates, lost)
+        if not _kept(tried):
+            records["orthogonal"] = recorded(model, "orthogonal")
+            tried.append(_last_resort(records["orthogonal"], lost))
+    candidates = tried
+    best = min(_kept(candidates), key=lambda c: c.operations or 0)
     if closed is None or best.route != "closed":
         closed = from_recursion(records[best.route], jacobian=jacobian)
     return Routed(closed, tuple(candidates))
@@ -159,12 +164,32 @@ def _taken(system: System, words: str) -> Routed:
     return Routed(system, (Candidate(system.route, _operations(system), words),))
 
 
-def _weighed(candidate: Candidate, lost: float) -> Candidate:
-    """A route that was tried, refused if it loses too many digits."""
-    if candidate.operations is None or lost <= MOST_LOST:
-        return candidate
-    words = f"{candidate.words}; would lose {lost:.0f} digits"
-    return replace(candidate, words=words, refused=True)
+def _weighed(candidates: Sequence[Candidate], lost: Mapping[str, float]) -> list[Candidate]:
+    """Those that were tried and lose too many digits are refused."""
+    weighed = []
+    for candidate in candidates:
+        if candidate.operations is not None and (digits := lost[candidate.route]) > MOST_LOST:
+            words = f"{candidate.words}; would lose {digits:.0f} digits"
+            candidate = replace(candidate, words=words, refused=True)
+        weighed.append(candidate)
+    return weighed
+
+
+def _kept(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Those that may be taken."""
+    return [c for c in candidates if c.operations is not None and not c.refused]
+
+
+def _last_resort(record: Recording, lost: Mapping[str, float]) -> Candidate:
+    """Orthogonal elimination. Raises `SceneError` if it loses too many digits, too."""
+    if lost["orthogonal"] > MOST_LOST_OF_ALL:
+        raise SceneError(
+            f"route: every one loses digits at these masses and lengths, 'orthogonal' "
+            f"{lost['orthogonal']:.0f} of {ALL:.0f}; make them less uneven, or name the route to "
+            "take it all the same"
+        )
+    words = f"keeps the digits that these masses take from the others, {lost['aba']:.0f} of aba"
+    return Candidate("orthogonal", _operations_of(record), words)
 
 
 def _accelerations(system: System) -> Accelerations:

@@ -138,8 +138,9 @@ def cases() -> Iterator[Case]:
         for angles in ANGLES:
             hard = tree(dimensions, anywhere, 2)
             yield Case(f"{name}: 12 links over 24 decades, {angles}", hard, angles)
-        branching = tree(dimensions, anywhere, 3, straight=0.4)
-        yield Case(f"{name}: tree of 12 over 24 decades", branching)
+        for words, masses in (("", anywhere), (", heavier outwards", sorted(anywhere))):
+            branching = tree(dimensions, masses, 3, straight=0.4)
+            yield Case(f"{name}: tree of 12 over 24 decades{words}", branching)
     for masses in ([1.0, 1e12], [1e12, 1.0]):
         pair = tree(PLANE, masses, 4, first="free")
         yield Case("two free bodies, {:g} and {:g} kg".format(*masses), pair)

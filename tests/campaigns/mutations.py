@@ -18,7 +18,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,27 +39,28 @@ SWAPPED = {"sin": "cos", "cos": "sin"}
 
 @dataclass(frozen=True)
 class Fault:
-    """A changed module: its path below the package, the line, what was done, and the new text."""
+    """A change of a module: of which node, in the order of `ast.walk`, and which of its changes."""
 
-    path: str
-    line: int
-    words: str
-    text: str
+    path: Path
+    place: int
+    change: int
+
+    def made(self) -> tuple[str, int, str]:
+        """What was done, on which line, and the changed module."""
+        tree = ast.parse(self.path.read_text(encoding="utf-8"))
+        node = list(ast.walk(tree))[self.place]
+        words, new = list(_changes(node))[self.change]
+        line = getattr(node, "lineno", 0)
+        _replace(tree, node, new)
+        return words, line, ast.unparse(ast.fix_missing_locations(tree))
 
 
 def faults(path: Path) -> Iterator[Fault]:
     """All faults of a module."""
-    text = path.read_text(encoding="utf-8")
-    tree = ast.parse(text)
-    nodes = list(ast.walk(tree))
-    for place, node in enumerate(nodes):
-        for words, new in _changes(node):
-            changed = deepcopy(tree)
-            twin = list(ast.walk(changed))[place]
-            _replace(changed, twin, new)
-            line = getattr(node, "lineno", 0)
-            written = ast.unparse(ast.fix_missing_locations(changed))
-            yield Fault(str(path.relative_to(ROOT)), line, words, written)
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for place, node in enumerate(ast.walk(tree)):
+        for change, _ in enumerate(_changes(node)):
+            yield Fault(path, place, change)
 
 
 def _changes(node: ast.AST) -> Iterator[tuple[str, ast.expr]]:
@@ -97,13 +97,13 @@ def _replace(tree: ast.AST, old: ast.AST, new: ast.expr) -> None:
                 return
 
 
-def judged(fault: Fault, tests: list[str], folder: Path) -> tuple[str, float]:
-    """The first test that fails, or "", and the seconds that it took."""
+def judged(path: Path, text: str, tests: list[str], folder: Path) -> tuple[str, float]:
+    """The first test that fails where a module is another text, or "", and the seconds it took."""
     copy = folder / "copy"
     shutil.rmtree(copy, ignore_errors=True)
     ignored = shutil.ignore_patterns("__pycache__", ".git", ".venv", "out")
     shutil.copytree(ROOT, copy, ignore=ignored)
-    (copy / fault.path).write_text(fault.text, encoding="utf-8")
+    (copy / path.relative_to(ROOT)).write_text(text, encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": str(copy), "EOMGEN_CACHE": str(copy / "store")}
     began = time.monotonic()
     asked = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", *tests]
@@ -139,11 +139,11 @@ def main() -> None:
     survivors = 0
     with tempfile.TemporaryDirectory() as folder:
         for fault in chosen:
-            caught, seconds = judged(fault, given.tests, Path(folder))
+            words, line, text = fault.made()
+            caught, seconds = judged(fault.path, text, given.tests, Path(folder))
             survivors += not caught
-            source = (ROOT / fault.path).read_text(encoding="utf-8").splitlines()
-            shown = source[fault.line - 1].strip()
-            print(f"{fault.path}:{fault.line}: {fault.words}: {shown}")
+            shown = fault.path.read_text(encoding="utf-8").splitlines()[line - 1].strip()
+            print(f"{fault.path.relative_to(ROOT)}:{line}: {words}: {shown}")
             print(f"    {caught or 'SURVIVED'} ({seconds:.0f} s)", flush=True)
     print(f"{len(chosen) - survivors} of {len(chosen)} caught")
     sys.exit(survivors > 0)

@@ -5,13 +5,17 @@ import random
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.derivation.recursive.vectors import Scalars
 from eomgen.effects import Driven, Gravity
 from eomgen.model import Model
 
 TRIALS = 3
+ROUTES = ("closed", "ldl", "aba", "orthogonal")
+EPSILON = sys.float_info.epsilon
 ALL = -math.log10(sys.float_info.epsilon)
 """The digits of a double."""
 
@@ -19,12 +23,19 @@ Accelerations = Callable[[Values], Sequence[float]]
 """v̇ at values of a model."""
 
 
-def digits_lost(model: Model, closed: Accelerations | None = None) -> Mapping[str, float]:
-    """The decimal digits that `aba`, `ldl` and, if it is given, the closed form lose on v̇, relative
-    to its largest component or 1, at the worst of some seeded random states; 0 to `ALL`.
+def digits_lost(
+    model: Model, closed: Accelerations | None = None, exactly: Scalars | None = None
+) -> Mapping[str, float]:
+    """The decimal digits that routes lose on v̇, relative to its largest component or 1, at the
+    worst of some seeded random states; 0 to `ALL`.
 
-    They are compared with `orthogonal`, which keeps them. Of the effects uniform gravity and drives
-    act, or with a closed form all, the scene's own parameters hold, and inputs are 0.
+    closed   v̇ by the closed form, which is judged, too
+    exactly  scalars of many digits, by which all are judged, and `orthogonal`, too; what half a
+             unit in the last place of all numbers given would change counts as nothing. Without
+             them `orthogonal` is what the others are compared with.
+
+    Of the effects uniform gravity and drives act, or with a closed form all, the scene's own
+    parameters hold, and inputs are 0.
     """
     still = model
     if closed is None:
@@ -40,17 +51,49 @@ def digits_lost(model: Model, closed: Accelerations | None = None) -> Mapping[st
         values = Values(model.defaults, inputs, q, v, states)
         try:
             d = Dynamics(still, values, FloatScalars(), "own")
-            true = d.orthogonal_forward()
             found = {"aba": d.articulated_forward(), "ldl": d.factored_forward()}
             found |= {} if closed is None else {"closed": list(closed(values))}
+            found["orthogonal"] = d.orthogonal_forward()
+            true, allowed = found["orthogonal"], EPSILON
+            if exactly is not None:
+                true, allowed = _exactly(still, values, exactly)
         except (ArithmeticError, ValueError):
             continue
-        size = max(1.0, *(abs(x) for x in true)) if true else 1.0
+        size = _size(true)
         for route, other in found.items():
-            off = max((abs(a - b) for a, b in zip(other, true, strict=True)), default=0.0) / size
-            worst[route] = max(worst.get(route, 0.0), off if off == off else 1.0)
-    return {route: _digits(worst.get(route, 0.0)) for route in ("aba", "ldl", "closed")}
+            off = _apart(other, true) / size / allowed
+            worst[route] = max(worst.get(route, 0.0), off if off == off else math.inf)
+    return {route: _digits(worst.get(route, 1.0)) for route in ROUTES}
 
 
-def _digits(off: float) -> float:
-    return min(ALL, max(0.0, math.log10(off) + ALL)) if off > 0.0 else 0.0
+def _exactly(model: Model, values: Values, scalars: Scalars) -> tuple[list[Any], float]:
+    """v̇ in many digits, and what it is off where all numbers are by half a unit in the last place,
+    in parts of its size; at least `EPSILON`.
+    """
+    rng = random.Random(7)
+
+    def forward(nudge: float) -> list[Any]:
+        def near(x: float) -> Any:
+            return scalars.number(x) * (1 + scalars.number(nudge * rng.uniform(-1, 1)))
+
+        given = (values.parameters, values.inputs, values.states)
+        named = [{name: near(x) for name, x in own.items()} for own in given]
+        q, v = ([near(x) for x in own] for own in (values.q, values.v))
+        near_by = Values(named[0], named[1], q, v, named[2], scalars.number(0.0))
+        return Dynamics(model, near_by, scalars, "own").articulated_forward()
+
+    true = forward(0.0)
+    apart = max(_apart(forward(EPSILON / 2), true) for _ in range(TRIALS))
+    return true, max(EPSILON, apart / _size(true))
+
+
+def _size(values: Sequence[Any]) -> float:
+    return max([1.0, *(float(abs(x)) for x in values)])
+
+
+def _apart(one: Sequence[Any], other: Sequence[Any]) -> float:
+    return max((float(abs(a - b)) for a, b in zip(one, other, strict=True)), default=0.0)
+
+
+def _digits(times: float) -> float:
+    return min(ALL, math.log10(times)) if times > 1.0 else 0.0
