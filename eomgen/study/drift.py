@@ -76,7 +76,7 @@ def drift(
         samples=101,
         progress=progress,
         rest_speed=model.simulation.rest_speed,
-        powers=as_powers(full),
+        powers=None if model.leave_out else as_powers(full),  # else energy is not kept
     )
     if run.message.startswith("interrupted"):
         raise KeyboardInterrupt

@@ -162,7 +162,7 @@ def verify(
 
     Raises `SceneError` or `RunError` if there is none, or no state has an acceleration.
     """
-    model = replace(model, form="velocity")
+    form, model = model.form, replace(model, form="velocity")
     check_regular(model)
     code = generated_code(model)
     taken = next(line.split()[0] for line in code.explanation if "<- taken" in line)
@@ -209,7 +209,9 @@ def verify(
         *_drift_checks(ran),
     ]
     notes = [f"route {route} is not there: {why}" for route, why in missing.items()]
-    notes += _notes(model, keeps, ran, bare)
+    if form != "velocity":
+        notes.append(f"form '{form}' is verified as 'velocity'")
+    notes += _notes(keeps, ran, bare)
     return Verified(
         model.name,
         taken,
@@ -375,16 +377,18 @@ def _drift_checks(ran: Drift) -> list[Check]:
     return checks
 
 
-def _notes(model: Model, keeps: Kept, ran: Drift, bare: Model) -> list[str]:
+def _notes(keeps: Kept, ran: Drift, model: Model) -> list[str]:
     notes = []
     if keeps.takers:
         notes.append(f"energy is not kept: {', '.join(keeps.takers)} give or take it")
-    if why := why_no_energy_law(bare):
+    if why := why_no_energy_law(model):
         notes.append(f"no energy law: {why}")
-    if why := why_no_momentum_law(bare):
+    if why := why_no_momentum_law(model):
         notes.append(f"no momentum law: {why}")
     parts = ", ".join(keeps.momentum) or "no component"
     notes.append(f"exact motion keeps of momentum: {parts}")
+    if any(getattr(effect, "law", "") == "impact" for effect in model.effects):
+        notes.append("no rigid contact is held, and what they take is not asked for")
     if ran.stopped:
         notes.append(f"the short run {ran.stopped}")
     return notes
