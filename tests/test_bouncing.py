@@ -16,7 +16,9 @@ G = 9.81
 GRAVITY = f'[[effects]]\ntype = "gravity"\ng = {G}\n'
 
 
-def ran(made: Engine, t_end: float, integrator: str = "DOP853") -> Trajectory:
+def ran(
+    made: Engine, t_end: float, integrator: str = "DOP853", rest_speed: float | None = None
+) -> Trajectory:
     """A scene's run, with the works of its effects."""
     return integrate(
         as_problem(made.module),
@@ -26,6 +28,7 @@ def ran(made: Engine, t_end: float, integrator: str = "DOP853") -> Trajectory:
         rtol=1e-11,
         atol=1e-12,
         powers=as_powers(made.module),
+        rest_speed=rest_speed,
     )
 
 
@@ -62,7 +65,7 @@ body = "b"
 radius = {r}
 restitution = {e}
 """)
-    run = ran(made, 4.0)
+    run = ran(made, 4.0, rest_speed=1e-3)
     fall = math.sqrt(2 * h / G)
     found = impacts(run)
     count = 1 + int(math.log(1e-3 / math.sqrt(2 * G * h)) / math.log(e))

@@ -146,11 +146,12 @@ def test_a_run_that_blows_up_keeps_what_it_has(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Time, state and remedy in one line, exit code 1, and finite rows in every file."""
-    command = ["simulate", "double_pendulum", "--integrator", "euler", "--dt", "0.5"]
-    assert main([*command, "--t-end", "1000", "-o", str(tmp_path)]) == 1
+    command = ["simulate", "double_pendulum", "--integrator", "euler", "--dt", "0.1"]
+    assert main([*command, "--t-end", "10", "-o", str(tmp_path)]) == 1
     err = capsys.readouterr().err
-    assert err.startswith("eomgen: double_pendulum: stopped at t = ")
-    assert "theta_1=" in err and "take a smaller --dt" in err and err.count("\n") == 1
+    assert err.count("eomgen: double_pendulum: stopped at t = ") == 1
+    line = err.splitlines()[-1]
+    assert "theta_1=" in line and "take --dt 0.0" in line and "implicit" in line
     run = load_npz(tmp_path / "double_pendulum.npz")
     assert not run.finished and len(run.t) > 5 and np.isfinite(run.y).all()
     table = np.loadtxt(tmp_path / "double_pendulum.csv", delimiter=",", skiprows=2)

@@ -115,8 +115,15 @@ class Holding:
 
     @cached_property
     def pressed(self) -> float:
-        """The greatest acceleration of any gap under no contact force at the start."""
-        return pressed(self.contacts, *self.start)
+        """The greatest acceleration of any gap under no contact force at the start, or that of the
+        motion, if it is more: bodies that move alike do not accelerate their gaps.
+        """
+        return max(pressed(self.contacts, *self.start), self._usual)
+
+    @property
+    def _usual(self) -> float:
+        """An acceleration of the motion, sizes/s²: see `recovery`."""
+        return (self.alpha / ALPHA) ** 2
 
     @cached_property
     def units(self) -> Floats:
@@ -125,8 +132,7 @@ class Holding:
         """
         matrix, _, _ = self._system(*self.start, np.full(len(self.held), STRONG))
         own = np.abs(np.diagonal(matrix)) / STRONG
-        wanted = self.pressed or 1.0
-        return wanted / np.where(own > 0, own, wanted)
+        return self.pressed / np.where(own > 0, own, self.pressed)
 
     def solve(self, t: float, y: Floats) -> tuple[Floats, Floats, Floats]:
         """Return what `Contacts.held` gives (ny + 2 nc + nd,), and (nh,) each: forces times what
@@ -144,7 +150,8 @@ class Holding:
             )
         result = columns[:, 0] + (columns[:, 1:] - columns[:, :1]) @ forces
         left = matrix @ forces + offset
-        left[np.abs(left) <= PARTING * np.abs(columns[self._gaps, 0]).max()] = 0.0
+        usual = max(float(np.abs(columns[self._gaps, 0]).max()), self._usual)
+        left[np.abs(left) <= PARTING * usual] = 0.0
         return result, forces * np.diagonal(matrix), left
 
     def derivative(self, t: float, y: Floats) -> Floats:

@@ -125,9 +125,11 @@ class _Search:
         return method.tightest or self.case.t_end / MOST_STEPS
 
     def deepest(self, method: Method) -> float:
-        """The tightest tolerance so far, or shortest step, of methods of its kind."""
+        """The tightest tolerance so far, or shortest step, of methods of its kind; infinite if none
+        came to its end.
+        """
         alike = (run for run in self.runs if (run.setting.dt is not None) == method.equal_steps)
-        return min(run.tolerance for run in alike)
+        return min((run.tolerance for run in alike), default=math.inf)
 
     def attempt(self, method: Method, tolerance: float, most: float = math.inf) -> bool:
         """Make a run; where it comes to no end, the method is gone on with no further."""
@@ -359,7 +361,7 @@ def _again(search: _Search, names: Sequence[str]) -> Plan | None:
         own = [run for run in search.broken if run.setting.integrator == name]
         if own and own[-1].cut and name in search.left_out:
             method, cut = method_of(name), own[-1]
-            tolerance = max(search.deepest(method), method.tightest)
+            tolerance = min(cut.tolerance, max(search.deepest(method), method.tightest))
             tolerance = cut.tolerance if search.of(name) else tolerance
             whole = cut.work * search.case.t_end / max(float(cut.trajectory.t[-1]), cut.tolerance)
             work = _growth(method, [(cut.tolerance, whole)]).at(tolerance)

@@ -49,9 +49,11 @@ def resistances(model: Model, poses: Sequence[Sequence[float]]) -> list[dict[int
     """At each pose, for each velocity, the inertia that it feels when all that it carries is free,
     in parts of the greatest that it feels at any of these poses and a few seeded ones.
 
-    Where the axes of a joint come into line with what they carry, as those of a gimbal do, some
-    motion moves no mass: it feels none there, and the mass matrix tells no acceleration.
+    As in `check_regular` all masses are taken as 1: heavy on light is no lock. Where the axes of a
+    joint come into line with what they carry, as those of a gimbal do, some motion moves no mass:
+    it feels none there, and the mass matrix tells no acceleration.
     """
+    model = replace(model, bodies=tuple(_evened(body, model) for body in model.bodies))
     rng = random.Random(20)
     count = len(model.coordinates)
     some = [[rng.uniform(-1.5, 1.5) for _ in range(count)] for _ in range(TRIALS)]

@@ -220,12 +220,17 @@ class _Interpolant(DenseOutput):
     Each has the values and slopes of both ends and, in the middle, the value and derivatives that
     come of differences of the rows' slopes, extrapolated (Hairer, Norsett, Wanner I, II.9, dense
     output). The rows are made for it, which costs about as many derivatives as the step did.
+
+    At a single time, which is asked where an event is looked for, a step is made from the start to
+    there instead: one that goes beyond an event may bend behind it, and its polynomial all along.
     """
 
     def __init__(self, taken: _Span, fun: Slope, rtol: float, atol: float | Floats) -> None:
         super().__init__(taken.t, taken.t + taken.step)
+        self._fun, self._taken = fun, taken
         start, step = taken.start, taken.step / 2
         allowed = atol + rtol * np.maximum(np.abs(start), np.abs(start + taken.change))
+        self._allowed = allowed
         rows, columns = list[_Row](), list[Floats]()
         for count in range(1, MOST_ROWS + 1):
             substeps = DENSE_SUBSTEPS[count - 1]
@@ -246,12 +251,28 @@ class _Interpolant(DenseOutput):
 
     def _call_impl(self, t: Any) -> Any:
         times = np.asarray(t)
+        alone = self._stepped(float(times)) if not times.ndim else None
+        if alone is not None:
+            return alone
         first, second = (
             half.start + _values(coefficients, 2 * (times - half.t) / half.step - 1)
             for half, coefficients in zip(self._halves, self._coefficients, strict=True)
         )
         late = (times - self._halves[1].t) * self._halves[1].step > 0
         return np.where(late[..., None], second, first).T
+
+    def _stepped(self, t: float) -> Floats | None:
+        """The state at t by a step from the start; None if its rows do not agree."""
+        taken, columns = self._taken, list[Floats]()
+        if t == taken.t:
+            return taken.start
+        for count in range(1, MOST_ROWS + 1):
+            substeps = SUBSTEPS[count - 1]
+            row = _midpoint(self._fun, taken.t, taken.start, t - taken.t, substeps, taken.before)
+            columns = _next_row(columns, row.change, SUBSTEPS[:count])
+            if count > 1 and _norm((columns[-1] - columns[-2]) / self._allowed) <= 1:
+                return taken.start + columns[-1]
+        return None
 
 
 def _settled(fun: Slope, half: _Span, rows: list[_Row], allowed: Floats) -> Floats:

@@ -19,6 +19,9 @@ GROWS = 1.25
 HOLDS = 1.001
 """The same of a step that is said to be short enough."""
 
+LEAST = 1e-9
+"""Of a step: what must be shorter than that blows up by itself, and no step can hold it."""
+
 JUMP, NOISE = 0.5, 1e-9
 """A rate that changes from one step to the next by so much of its largest so far is looked into,
 unless it is nothing beside the largest of all.
@@ -68,6 +71,8 @@ class Watch:
             return
         rates = np.abs(np.linalg.eigvals(jacobian))
         dt = longest(self.change, problem, jacobian, h)
+        if dt < LEAST * h:
+            return
         raise UnstableStepError(
             f"the step of {h:g} s is too long for an explicit method, which makes what changes at "
             f"a rate of {rates.max():.2g}/s grow without bound; take --dt {dt:g} or less, or an "
