@@ -27,6 +27,7 @@ def longest_step(max_step: float | None, span: float, corners: bool) -> float:
 
 
 def check_times(t_start: float, t_end: float) -> None:
+    """Raise `RunError` for a span that is none."""
     for name, time in (("t_start", t_start), ("t_end", t_end)):
         if not math.isfinite(time):
             raise RunError(f"{name}: {time:g} is not a finite time")
@@ -47,6 +48,7 @@ def allowed_errors(problem: Problem, atol: float | None) -> float | Floats:
 
 
 def check_tolerances(rtol: float, atol: float | None) -> None:
+    """Raise `RunError` for tolerances that are none, or that doubles cannot meet."""
     for name, tolerance in (("rtol", rtol), ("atol", atol)):
         if tolerance is None:
             continue
@@ -57,6 +59,7 @@ def check_tolerances(rtol: float, atol: float | None) -> None:
 
 
 def check_samples(samples: int | None) -> None:
+    """Raise `RunError` for too few rows, or too many."""
     if samples is not None and samples < 2:
         raise RunError(f"samples: {samples} is too few; give at least 2, the first and the last")
     if samples is not None and samples > MOST_SAMPLES:
@@ -64,6 +67,7 @@ def check_samples(samples: int | None) -> None:
 
 
 def check_no_step(integrator: str, dt: float | None) -> None:
+    """Raise `RunError` for an equal step given to a method that chooses its own."""
     if dt is not None:
         fixed = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
         raise RunError(
