@@ -25,9 +25,9 @@ ROOT = Path(__file__).parent.parent.parent
 ROOMS = ("derivation", "joints", "effects", "program/differentiate.py")
 """What is changed, below the package."""
 TESTS = (
-    *("test_handout", "test_closed_general", "test_joints", "test_routes", "test_ways"),
-    *("test_identities", "test_judges", "test_laws", "test_orthogonal", "test_springs"),
-    *("test_drag", "test_controllers", "test_driven", "test_contact", "test_impact"),
+    *("test_handout", "test_orthogonal", "test_verify", "test_joints", "test_judges"),
+    *("test_springs", "test_contact", "test_impact", "test_closed_general", "test_identities"),
+    *("test_routes", "test_ways", "test_laws", "test_drag", "test_controllers", "test_driven"),
     *("test_field", "test_gravity_variants", "test_effects_published", "test_sensitivity"),
     *("test_linearise", "test_quaternions", "test_pivots", "test_bad_scenes"),
 )
