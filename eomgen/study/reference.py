@@ -35,7 +35,7 @@ SECONDS = 300.0
 """Of processor time that a reference in long numbers may take; one in doubles comes on top."""
 TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
 """Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
-FORMAT = "reference 2"
+FORMAT = "reference 3"
 """Changes whenever a reference would come out otherwise."""
 _JUDGED = 0.1
 """Share of the time after which the pace tells whether it will suffice."""
