@@ -274,6 +274,24 @@ def test_what_the_others_lose(dimensions: int) -> None:
     assert min(lost["aba"], lost["ldl"]) > 8.0
 
 
+def test_a_route_that_gives_no_number_loses_all_digits_and_hides_nobody_elses() -> None:
+    """Slides of 1e-9 kg under 1e12 kg are rounded away in LᵀDL, which then divides by 0."""
+    lines = ['name = "slides"\neffects = [{ type = "gravity", g = 9.81, direction = [1, 0] }]']
+    for k, (mass, kind) in enumerate(
+        ((1.0, "revolute"), (1e-9, "prismatic"), (1e-9, "prismatic"), (1e12, "revolute"))
+    ):
+        lines.append(
+            f'[[bodies]]\nname = "b{k}"\nmass = {mass}\ninertia_com = 0\n[[joints]]\n'
+            f'name = "j{k}"\ntype = "{kind}"\nparent = "{f"b{k - 1}" if k else "world"}"\n'
+            f'child = "b{k}"\nr_parent = [{0.5 if k else 0.0}, 0]\nr_child = [-0.5, 0]'
+            + ("\naxis = [1, 0]" if kind == "prismatic" else "")
+        )
+    model = build_model(parse_scene("\n".join(lines)))
+    lost = digits_lost(model, None, Digits())
+    assert lost["ldl"] > 15 and lost["aba"] > 8 and lost["orthogonal"] < 1
+    assert routed(model, jacobian=False).system.route == "orthogonal"
+
+
 def test_free_pair() -> None:
     """The handout's two bodies with m_B / m_A from 1e-12 to 1e12 and back."""
     text = scene(PLANE, 2, 1, free=True)
