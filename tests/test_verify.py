@@ -177,6 +177,31 @@ def test_virtual_work_on_all_joints_with_drive_rotor_and_spring() -> None:
     assert np.max(np.abs(off)) <= 1e-14 * np.max(np.abs(doubles(vd)))
 
 
+@pytest.mark.parametrize(
+    ("formula", "t", "expected"),
+    [
+        ("t**3", 0.0, (0.0, 0.0)),
+        ("2*t/3 + max(t, 0)**3", 0.0, (2 / 3, 0.0)),
+        ("sin(3*t)", 0.25, (3 * np.cos(0.75), -9 * np.sin(0.75))),
+        ("max(t, 0)", 0.0, None),
+        ("t*abs(t)", 0.0, None),
+    ],
+)
+def test_drives_have_exact_rates_and_none_at_a_corner(
+    formula: str, t: float, expected: tuple[float, float] | None
+) -> None:
+    """What is 0 is 0, not what is left of a difference; nan where the two sides differ."""
+    model = model_of(SCREW.replace("0.1*sin(3*t)", formula))
+    y = np.zeros(len(model.coordinates) + len(model.velocities))
+    with long_digits():
+        free = FreeBodies(model, t, y)
+        rates = (float(free.v[-1]), float(free.driven_rates[0]))
+    if expected is None:
+        assert np.isnan(rates).all()
+    else:
+        assert np.allclose(rates, expected, rtol=1e-15, atol=0)
+
+
 def test_kinetic_energy_of_free_bodies_has_their_mass_matrix() -> None:
     """T = ½ vᵀ M v, two sums that are made apart, where no drive moves anything."""
     model = replace(model_of("quadruped"), outputs=())
