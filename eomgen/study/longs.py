@@ -14,6 +14,8 @@ from eomgen.study.precise import Long
 
 BITS = MP.prec
 """Of the significand: 60 digits."""
+NOTHING = 1e-25
+"""Part of its terms below which a sum of long numbers is what rounding left of them."""
 Array = Any
 """An array of such numbers."""
 
