@@ -395,6 +395,10 @@ def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.Mon
     part = horizon_of(model, module)
     assert part.time is not None and 0.1 < part.time <= 1.5
     assert part.words.startswith(f"doubles are meaningful to t = {part.time:.4g} s of 1.5 s")
+    with pytest.raises(
+        RunError, match=r"^horizon: no run of 1\.5 s in .* more than 1e-06 s in long"
+    ):
+        horizon_of(model, module, seconds=1e-6)
     with pytest.raises(RunError, match="rigid contacts strike"):
         bouncing = replace(model_of("bouncing_two_body"), outputs=())
         horizon_of(bouncing, load_module(python_module(routed(bouncing).system)))

@@ -258,7 +258,7 @@ def _loss(given: Any, true: Array, changes: Sequence[Array], scale: Array) -> Lo
 
 def ulps(off: Array, scale: Array) -> float:
     """The greatest of differences, each in ulps of its scale, but of a thousandth of the greatest
-    scale at least (see `ulps`); where all are 0 it must be exact.
+    scale at least (see `ulps`); where all are 0 it must be exact. nan if any of them is.
     """
     off, scale = np.broadcast_arrays(off, np.maximum(scale, HARDLY * np.max(scale)))
     parts = [
@@ -266,7 +266,7 @@ def ulps(off: Array, scale: Array) -> float:
         for x, s in zip(off.flat, scale.flat, strict=True)
         if x
     ]
-    return max(parts, default=0.0)
+    return float(np.max(parts, initial=0.0))  # unlike Python's own, no nan is lost
 
 
 def _condition(matrix: Array) -> tuple[float, float]:

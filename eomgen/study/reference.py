@@ -77,6 +77,7 @@ def reference(
     progress: Progress | None = None,
     seconds: float = SECONDS,
     folder: Path | None = None,
+    doubles: bool = True,
 ) -> Reference:
     """The motion of a module from 0 to `t_end`, s, at given parameters and constant inputs.
 
@@ -84,9 +85,10 @@ def reference(
     progress  told the fraction done
     seconds   of processor time that long numbers may take; 0 for doubles at once
     folder    where references are kept, so that none is computed twice; or None
+    doubles   whether they may stand in where there is no run in long numbers
 
     Raises `RunError` if the module refuses parameters or inputs, if the motion does not get to
-    `t_end`, or if a reference cannot be kept.
+    `t_end`, if a reference cannot be kept, or if doubles would stand in that may not.
     """
     problem = as_problem(module, parameters, inputs, model)
     told = progress or _ignore
@@ -110,6 +112,8 @@ def reference(
             why = str(reason)
     else:
         why = "rigid contacts" if problem.contacts else "as asked"
+    if not (found or doubles):
+        raise RunError(f"no run of {t_end:g} s in long numbers: {why}")
     y, other, origin = found or _in_doubles(problem, times, scale, rest_speed, why, told)
     scale = measure.scales(module.STATES, module.UNITS, y)
     apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)

@@ -357,7 +357,8 @@ def _law_checks(model: Model, laws: Sequence[Broken]) -> list[Check]:
     for what, (of, bound) in pick.items():
         values = [(value, law) for law in laws if (value := of(law)) is not None]
         if values:
-            value, law = max(values, key=lambda pair: pair[0])
+            # What is not a number is the worst.
+            value, law = max(values, key=lambda pair: (pair[0] != pair[0], pair[0]))
             checks.append(Check(what, value, bound, "ulp", at=law.state.label))
     return checks
 
