@@ -15,7 +15,8 @@ from eomgen.joints import Free
 from eomgen.joints.base import WORLD, Move
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model import Model, Seat, ways_of
-from eomgen.study.longs import Array, LongScalars, along, long, zeros
+from eomgen.program.digits import Bits
+from eomgen.study.longs import Array, along, long, zeros
 from eomgen.study.poses import Pose, about, orientation, spun, turned_about, world_pose
 from eomgen.study.precise import Long
 
@@ -46,7 +47,7 @@ class Placed:
     ) -> None:
         self.model = model
         self.dimensions = model.dimensions
-        self.scalars = LongScalars()
+        self.scalars = Bits()
         self.bodies = tuple(body.name for body in model.bodies)
         self.nv = len(model.velocities)
         self.moved = self.nv + len(model.driven)
