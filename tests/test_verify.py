@@ -19,6 +19,7 @@ from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.program.route import routed
 from eomgen.run.module import load_module
+from eomgen.scene.reader import find_scene
 from eomgen.study import drift as drifting
 from eomgen.study import horizon as horizons
 from eomgen.study import visited as visiting
@@ -319,6 +320,7 @@ joints = [{ name = "j", type = "free", child = "a" }]
     "a drive that starts from rest": ARM + GRAVITY + DRIVE.replace("FORMULA", "0.1*t**3"),
     "a drive that waits": ARM + DRIVE.replace("FORMULA", "select(t - 0.8, (t - 0.8)**3, 0)"),
     "a force for a while": ARM + GRAVITY + PUSH,
+    "a plate at rest, which nothing turns": find_scene("babyboot").read_text(),
 }
 
 

@@ -122,11 +122,14 @@ def _changed(values: Any, rng: np.random.Generator) -> Any:
 
 def _agreed(free: FreeBodies, vd: Array) -> float:
     """Digits to which v̇ of another solver, in 60 digits, solves M v̇ + h - F = 0, of the terms of
-    each row: where these cancel, v̇ itself is but what rounding leaves.
+    each row: where these cancel, v̇ itself is but what rounding leaves. A row in which nothing acts
+    is measured by a part of the greatest, in units of its own inertia.
     """
-    off = abs(_needed(free, vd))
-    terms = abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes
-    worst = max((a / b if b else mpfr(1) for a, b in zip(off, terms, strict=True) if a), default=0)
+    root = long([_root(x) for x in np.diag(free.mass_matrix)])
+    off = abs(_needed(free, vd)) / root
+    terms = (abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes) / root
+    terms = np.maximum(terms, HARDLY * np.max(terms))
+    worst = max((a / b for a, b in zip(off, terms, strict=True) if a), default=0)
     return -_log10(worst) if worst else 60.0
 
 
