@@ -26,7 +26,7 @@ from eomgen.study.virtual_work import FreeBodies
 
 ULP = 2.0**-52
 """Of 1."""
-NEAR = 2
+NEAR = 4
 """How many times the data are changed."""
 
 
