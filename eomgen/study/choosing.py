@@ -172,9 +172,7 @@ def _patience(search: Search, names: list[str], plans: Sequence[Plan | None], mo
     explicit ones of these can be held no tighter.
     """
     explicit = [plan for name, plan in zip(names, plans, strict=True) if name != "Radau"]
-    own = search.of("DOP853")
-    spent = bool(own) and own[-1].tolerance <= search.tightest(method_of("DOP853"))
-    if PATIENT in names or any(explicit) or not (spent and _smooth(search.case)):
+    if PATIENT in names or any(explicit) or not (_spent(search) and _smooth(search.case)):
         return False
     names.append(PATIENT)
     _first(search, method_of(PATIENT), most)
@@ -223,6 +221,8 @@ def _towards(search: Search, method: Method, judged: dict[int, float], goal: flo
     own = search.of(method.name)
     if not own or method.name in search.left_out or judged[id(own[-1])] <= ROUNDING:
         return None
+    if method.name != PATIENT and _lost(search, judged):
+        return None
     last, tightest = own[-1].tolerance, search.tightest(method)
     law, known = _error_law(search, method, judged)
     wanted = max(min(law.tolerance(goal), last / _rung(method, TIGHTER)), tightest)
@@ -233,10 +233,24 @@ def _towards(search: Search, method: Method, judged: dict[int, float], goal: flo
     seconds = _growth(method, [(run.tolerance, run.seconds) for run in own])
     work = _growth(method, [(run.tolerance, run.work) for run in own])
     error, cost = law.at(tolerance), seconds.at(tolerance)
-    others = search.of("DOP853")
-    if method.name == PATIENT and others and cost > LIMIT * others[-1].seconds:
+    spent = _spent(search)
+    if method.name == PATIENT and spent and cost > LIMIT * spent.seconds:
         return None
     return Plan(method, tolerance, error, known, cost, work.at(wanted))
+
+
+def _lost(search: Search, judged: dict[int, float]) -> bool:
+    """Whether a run as tight as doubles go is wrong: the motion makes its rounding that large, and
+    other methods' no smaller.
+    """
+    spent = _spent(search)
+    return spent is not None and judged[id(spent)] >= CLEAR
+
+
+def _spent(search: Search) -> Tried | None:
+    """DOP853 as tight as it goes, if it has been run so."""
+    own = search.of("DOP853")
+    return own[-1] if own and own[-1].tolerance <= search.tightest(method_of("DOP853")) else None
 
 
 def _beside(search: Search, best: Tried) -> Plan | None:
