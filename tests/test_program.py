@@ -21,7 +21,7 @@ from eomgen.program.digits import evaluator
 from eomgen.program.from_equations import from_equations
 from eomgen.program.passes import PASSES, optimise
 from eomgen.program.program import Output, Program, cost, finish, interpret, live_steps
-from eomgen.program.tape import Node, Stage, Step, Tape, power, total
+from eomgen.program.tape import Node, Stage, Tape, power, total
 from eomgen.scene.reader import parse_scene
 
 TREES = (4, 9, 22, 38)
@@ -299,7 +299,7 @@ def test_jacobian_of_each_operation(build: Callable, slopes: Callable) -> None:
 def test_jacobian_knows_every_operation() -> None:
     """An operation without a known derivative is a fault of this program, never a silent 0."""
     tape, x, y = fresh()
-    odd = tape._add(("cosh", x.index), Step("cosh", (x.index,), Stage.POSITIONS))
+    odd = tape.apply("cosh", x)
     with pytest.raises(AssertionError, match="cosh"):
         jacobian([odd], [x])
     assert jacobian([], [x, y]) == []
