@@ -89,7 +89,7 @@ COST = {
     "gravity_force": {"mul": 1, "sin": 1, "total": 2, "parameters": 4},
     "bias_force": {"add": 1, "mul": 8, "sin": 2, "cos": 1, "total": 12, "parameters": 7},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 3, "mul": 11, "sin": 1, "cos": 1, "total": 16, "parameters": 9},
+    "kinetic_energy": {"add": 6, "mul": 19, "sin": 1, "cos": 1, "total": 27, "parameters": 2},
     "potential_energy": {"sub": 1, "mul": 4, "cos": 1, "total": 6, "parameters": 4},
     "effect_powers": {"add": 1, "sub": 1, "mul": 10, "sin": 2, "cos": 1, "total": 15, "parameters": 4},
     "momentum": {"add": 5, "sub": 6, "mul": 29, "sin": 2, "cos": 2, "total": 44, "parameters": 9},
@@ -160,7 +160,7 @@ def _constants(values):
         "gravity_force": (k3,),
         "bias_force": (k3, k5, k18),
         "applied_force": (),
-        "kinetic_energy": (I_Bz, inertia_A_xx, inertia_B_xx, inertia_B_yy),
+        "kinetic_energy": (m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, k19),
         "potential_energy": (l_A, k15, k17, k19),
         "effect_powers": (l_A, k15, k17, k19),
         "momentum": (I_Bz, k20, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy),
@@ -368,14 +368,18 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """16 operations: 3 add, 11 mul, 1 sin, 1 cos."""
-    I_Bz, inertia_A_xx, inertia_B_xx, inertia_B_yy = k
+    """27 operations: 6 add, 19 mul, 1 sin, 1 cos."""
+    m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, k19 = k
     _, q_B, q_A_dot, q_B_dot = y
     omega_B_x = q_A_dot * cos(q_B)
     s13 = q_A_dot * sin(q_B)
-    s14 = omega_B_x * (inertia_B_xx * omega_B_x) + s13 * (inertia_B_yy * s13) + q_B_dot * (I_Bz * q_B_dot)
+    s14 = l_A * q_A_dot
+    s15 = k19 * s13
+    s16 = k19 * omega_B_x
+    s17 = m_A * (s14 * s14) + q_A_dot * (I_A * q_A_dot) + m_B * (s15 * s15 + s16 * s16)
+    s18 = omega_B_x * (I_Bx * omega_B_x) + s13 * (I_By * s13) + q_B_dot * (I_Bz * q_B_dot)
     return (
-        0.5 * (q_A_dot * (q_A_dot * inertia_A_xx) + s14),
+        0.5 * (s17 + s18),
     )
 
 
@@ -396,9 +400,9 @@ def _effect_powers(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
-    s15 = sin_q_A * k19 * (cos_q_B * (q_A_dot * cos_q_B) + sin_q_B * (q_A_dot * sin_q_B))
+    s19 = sin_q_A * k19 * (cos_q_B * (q_A_dot * cos_q_B) + sin_q_B * (q_A_dot * sin_q_B))
     return (
-        k17 * s15 - k15 * (q_A_dot * (l_A * sin_q_A)),
+        k17 * s19 - k15 * (q_A_dot * (l_A * sin_q_A)),
     )
 
 
@@ -410,25 +414,25 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
     cos_q_A = cos(q_A)
-    s16 = sin_q_B * cos_q_A
-    s17 = cos_q_B * cos_q_A
-    s18 = sin_q_B * sin_q_A
-    s19 = cos_q_B * sin_q_A
+    s20 = sin_q_B * cos_q_A
+    s21 = cos_q_B * cos_q_A
+    s22 = sin_q_B * sin_q_A
+    s23 = cos_q_B * sin_q_A
     omega_B_x = q_A_dot * cos_q_B
     s13 = q_A_dot * sin_q_B
-    s20 = q_A_dot * k20
-    s21 = inertia_B_xx * omega_B_x
-    s22 = inertia_B_yy * s13
-    s23 = I_Bz * q_B_dot
-    s24 = moment_B_z * s13
-    s25 = moment_B_z * omega_B_x
+    s24 = I_Bz * q_B_dot
+    s25 = q_A_dot * k20
+    s26 = moment_B_z * s13
+    s27 = moment_B_z * omega_B_x
+    s28 = inertia_B_xx * omega_B_x
+    s29 = inertia_B_yy * s13
     return (
-        sin_q_B * s25 - cos_q_B * s24,
-        cos_q_A * s20 - (s16 * s24 + s17 * s25),
-        sin_q_A * s20 - (s18 * s24 + s19 * s25),
-        q_A_dot * inertia_A_xx + (cos_q_B * s21 + sin_q_B * s22),
-        s16 * s21 - s17 * s22 - sin_q_A * s23,
-        s18 * s21 - s19 * s22 + cos_q_A * s23,
+        sin_q_B * s27 - cos_q_B * s26,
+        cos_q_A * s25 - (s20 * s26 + s21 * s27),
+        sin_q_A * s25 - (s22 * s26 + s23 * s27),
+        q_A_dot * inertia_A_xx + (cos_q_B * s28 + sin_q_B * s29),
+        s20 * s28 - s21 * s29 - sin_q_A * s24,
+        s22 * s28 - s23 * s29 + cos_q_A * s24,
     )
 
 
@@ -457,74 +461,74 @@ def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
     q_A_dot_squared = q_A_dot * q_A_dot
     q_B_ddot = k4 * (s1 * q_A_dot_squared) * k6
     cos_q_A = cos(q_A)
-    s16 = sin_q_B * cos_q_A
-    s17 = cos_q_B * cos_q_A
-    s18 = sin_q_B * sin_q_A
-    s19 = cos_q_B * sin_q_A
+    s20 = sin_q_B * cos_q_A
+    s21 = cos_q_B * cos_q_A
+    s22 = sin_q_B * sin_q_A
+    s23 = cos_q_B * sin_q_A
     omega_B_x = q_A_dot * cos_q_B
     s13 = q_A_dot * sin_q_B
-    s26 = sin_q_A * k19
-    s27 = cos_q_A * k19
-    s28 = cos_q_B * omega_B_x + sin_q_B * s13
-    s29 = s16 * omega_B_x - s17 * s13 - q_B_dot * sin_q_A
-    s30 = s18 * omega_B_x - s19 * s13 + q_B_dot * cos_q_A
+    s30 = sin_q_A * k19
+    s31 = cos_q_A * k19
+    s32 = cos_q_B * omega_B_x + sin_q_B * s13
+    s33 = s20 * omega_B_x - s21 * s13 - q_B_dot * sin_q_A
+    s34 = s22 * omega_B_x - s23 * s13 + q_B_dot * cos_q_A
     a_A_y = g * sin_q_A
     a_A_z = g * cos_q_A
-    s31 = q_B_dot * s13
-    s32 = q_B_dot * omega_B_x
-    s33 = cos_q_B * s2 + s31
-    s34 = sin_q_B * s2 - s32
-    s35 = a_A_y - l_A * s2
-    s36 = a_A_z + l_A * q_A_dot_squared
-    s37 = m_A * (cos_q_A * s35 - sin_q_A * s36)
-    s38 = m_A * (sin_q_A * s35 + cos_q_A * s36)
-    s39 = sin_q_B * a_A_y + k19 * (s32 + s34)
-    s40 = cos_q_B * a_A_y + k19 * (s33 - s31)
-    s41 = a_A_z - k19 * (omega_B_x * omega_B_x + s13 * s13)
-    s42 = cos_q_B * s33 + sin_q_B * s34
-    s43 = s17 * s34 - s16 * s33 - sin_q_A * q_B_ddot
-    s44 = s19 * s34 - s18 * s33 + q_B_ddot * cos_q_A
-    s45 = I_Bx * cos_q_B
-    s46 = I_By * sin_q_B
-    s47 = I_Bx * s16
-    s48 = I_By * s17
-    s49 = I_Bz * sin_q_A
-    s50 = I_Bx * s18
-    s51 = I_By * s19
-    s52 = I_Bz * cos_q_A
-    s53 = cos_q_B * s45 + sin_q_B * s46
-    s54 = s16 * s45 - s17 * s46
-    s55 = s18 * s45 - s19 * s46
-    s56 = cos_q_B * s47 - sin_q_B * s48
-    s57 = s16 * s47 + s17 * s48 + sin_q_A * s49
-    s58 = s18 * s47 + s19 * s48 - cos_q_A * s49
-    s59 = cos_q_B * s50 - sin_q_B * s51
-    s60 = s16 * s50 + s17 * s51 - sin_q_A * s52
-    s61 = s18 * s50 + s19 * s51 + cos_q_A * s52
-    s62 = m_B * (cos_q_B * s39 - sin_q_B * s40)
-    s63 = m_B * (s16 * s39 + s17 * s40 - sin_q_A * s41)
-    s64 = m_B * (s18 * s39 + s19 * s40 + cos_q_A * s41)
-    s65 = s28 * s53 + s29 * s54 + s30 * s55
-    s66 = s28 * s56 + s29 * s57 + s30 * s58
-    s67 = s28 * s59 + s29 * s60 + s30 * s61
-    s68 = s43 * s54 - s42 * s53 + s44 * s55 + (s29 * s67 - s30 * s66)
-    s69 = s43 * s57 - s42 * s56 + s44 * s58 + (s30 * s65 - s28 * s67)
-    s70 = s43 * s60 - s42 * s59 + s44 * s61 + (s28 * s66 - s29 * s65)
-    s71 = l_A * sin_q_A * s38 + l_A * cos_q_A * s37 - I_A * s2 + (s68 - (s26 * s64 + s27 * s63))
-    s72 = -s62
+    s35 = q_B_dot * s13
+    s36 = q_B_dot * omega_B_x
+    s37 = cos_q_B * s2 + s35
+    s38 = sin_q_B * s2 - s36
+    s39 = a_A_y - l_A * s2
+    s40 = a_A_z + l_A * q_A_dot_squared
+    s41 = m_A * (cos_q_A * s39 - sin_q_A * s40)
+    s42 = m_A * (sin_q_A * s39 + cos_q_A * s40)
+    s43 = sin_q_B * a_A_y + k19 * (s36 + s38)
+    s44 = cos_q_B * a_A_y + k19 * (s37 - s35)
+    s45 = a_A_z - k19 * (omega_B_x * omega_B_x + s13 * s13)
+    s46 = cos_q_B * s37 + sin_q_B * s38
+    s47 = s21 * s38 - s20 * s37 - sin_q_A * q_B_ddot
+    s48 = s23 * s38 - s22 * s37 + q_B_ddot * cos_q_A
+    s49 = I_Bx * cos_q_B
+    s50 = I_By * sin_q_B
+    s51 = I_Bx * s20
+    s52 = I_By * s21
+    s53 = I_Bz * sin_q_A
+    s54 = I_Bx * s22
+    s55 = I_By * s23
+    s56 = I_Bz * cos_q_A
+    s57 = cos_q_B * s49 + sin_q_B * s50
+    s58 = s20 * s49 - s21 * s50
+    s59 = s22 * s49 - s23 * s50
+    s60 = cos_q_B * s51 - sin_q_B * s52
+    s61 = s20 * s51 + s21 * s52 + sin_q_A * s53
+    s62 = s22 * s51 + s23 * s52 - cos_q_A * s53
+    s63 = cos_q_B * s54 - sin_q_B * s55
+    s64 = s20 * s54 + s21 * s55 - sin_q_A * s56
+    s65 = s22 * s54 + s23 * s55 + cos_q_A * s56
+    s66 = m_B * (cos_q_B * s43 - sin_q_B * s44)
+    s67 = m_B * (s20 * s43 + s21 * s44 - sin_q_A * s45)
+    s68 = m_B * (s22 * s43 + s23 * s44 + cos_q_A * s45)
+    s69 = s32 * s57 + s33 * s58 + s34 * s59
+    s70 = s32 * s60 + s33 * s61 + s34 * s62
+    s71 = s32 * s63 + s33 * s64 + s34 * s65
+    s72 = s47 * s58 - s46 * s57 + s48 * s59 + (s33 * s71 - s34 * s70)
+    s73 = s47 * s61 - s46 * s60 + s48 * s62 + (s34 * s69 - s32 * s71)
+    s74 = s47 * s64 - s46 * s63 + s48 * s65 + (s32 * s70 - s33 * s69)
+    s75 = l_A * sin_q_A * s42 + l_A * cos_q_A * s41 - I_A * s2 + (s72 - (s30 * s68 + s31 * s67))
+    s76 = -s66
     return (
-        s72,
-        -(s37 + s63),
-        -(s38 + s64),
-        -s71,
-        -(s69 + s27 * s62),
-        -(s70 + s26 * s62),
-        s72,
-        -s63,
-        -s64,
+        s76,
+        -(s41 + s67),
+        -(s42 + s68),
+        -s75,
+        -(s73 + s31 * s66),
+        -(s74 + s30 * s66),
+        s76,
+        -s67,
         -s68,
-        -s69,
-        -s70,
+        -s72,
+        -s73,
+        -s74,
     )
 
 
@@ -535,7 +539,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
-    s73 = -sin_q_A
+    s77 = -sin_q_A
     cos_q_A = cos(q_A)
     return (
         1.0,
@@ -544,7 +548,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         cos_q_A,
-        s73,
+        s77,
         l_A * sin_q_A,
         0.0,
         sin_q_A,
@@ -556,7 +560,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         sin_q_B * cos_q_A,
         cos_q_B * cos_q_A,
-        s73,
+        s77,
         -sin_q_A * k19,
         sin_q_B * sin_q_A,
         cos_q_B * sin_q_A,
@@ -575,11 +579,11 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_q_A = cos(q_A)
     omega_B_x = q_A_dot * cos_q_B
     s13 = q_A_dot * sin_q_B
-    s26 = sin_q_A * k19
-    s27 = cos_q_A * k19
-    s28 = cos_q_B * omega_B_x + sin_q_B * s13
-    s29 = sin_q_B * cos_q_A * omega_B_x - cos_q_B * cos_q_A * s13 - q_B_dot * sin_q_A
-    s30 = sin_q_B * sin_q_A * omega_B_x - cos_q_B * sin_q_A * s13 + q_B_dot * cos_q_A
+    s30 = sin_q_A * k19
+    s31 = cos_q_A * k19
+    s32 = cos_q_B * omega_B_x + sin_q_B * s13
+    s33 = sin_q_B * cos_q_A * omega_B_x - cos_q_B * cos_q_A * s13 - q_B_dot * sin_q_A
+    s34 = sin_q_B * sin_q_A * omega_B_x - cos_q_B * sin_q_A * s13 + q_B_dot * cos_q_A
     return (
         0.0,
         q_A_dot * (l_A * cos_q_A),
@@ -587,12 +591,12 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
         q_A_dot,
         0.0,
         0.0,
-        s27 * s29 + s26 * s30,
-        -s27 * s28,
-        -s26 * s28,
-        s28,
-        s29,
-        s30,
+        s31 * s33 + s30 * s34,
+        -s31 * s32,
+        -s30 * s32,
+        s32,
+        s33,
+        s34,
     )
 
 

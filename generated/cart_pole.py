@@ -83,7 +83,7 @@ COST = {
     "gravity_force": {"mul": 1, "sin": 1, "total": 2, "parameters": 2},
     "bias_force": {"mul": 4, "neg": 1, "sin": 1, "total": 6, "parameters": 2},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 2, "mul": 8, "cos": 1, "total": 11, "parameters": 4},
+    "kinetic_energy": {"add": 4, "mul": 12, "sin": 1, "cos": 1, "total": 18, "parameters": 0},
     "potential_energy": {"mul": 2, "neg": 1, "cos": 1, "total": 4, "parameters": 1},
     "effect_powers": {"mul": 4, "neg": 1, "sin": 1, "total": 6, "parameters": 1},
     "momentum": {"add": 4, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 3},
@@ -162,7 +162,7 @@ def _constants(values):
         "gravity_force": (k29,),
         "bias_force": (k4, k29),
         "applied_force": (),
-        "kinetic_energy": (k4, k30, inertia_pole_zz),
+        "kinetic_energy": (m_cart, m_pole, I_pole, l),
         "potential_energy": (l, k31),
         "effect_powers": (l, k31),
         "momentum": (m_cart, m_pole, k4, inertia_pole_zz),
@@ -377,13 +377,15 @@ def _applied_force(y, k, u=(), extra=()):
     )
 
 
-def _kinetic_energy(y, k, u=(), extra=(), cos=cos):
-    """11 operations: 2 add, 8 mul, 1 cos."""
-    k4, k30, inertia_pole_zz = k
+def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """18 operations: 4 add, 12 mul, 1 sin, 1 cos."""
+    m_cart, m_pole, I_pole, l = k
     _, theta, x_dot, theta_dot = y
-    s19 = 0.5 * (k30 * (x_dot * x_dot) + theta_dot * (theta_dot * inertia_pole_zz))
+    s19 = theta_dot * (l * sin(theta))
+    s20 = x_dot + theta_dot * (l * cos(theta))
+    s21 = m_cart * (x_dot * x_dot) + m_pole * (s20 * s20 + s19 * s19) + theta_dot * (I_pole * theta_dot)
     return (
-        x_dot * (theta_dot * (k4 * cos(theta))) + s19,
+        0.5 * s21,
     )
 
 
@@ -412,11 +414,11 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     m_cart, m_pole, k4, inertia_pole_zz = k
     x, theta, x_dot, theta_dot = y
     s18 = k4 * cos(theta)
-    s20 = theta_dot * (sin(theta) * k4)
+    s22 = theta_dot * (sin(theta) * k4)
     return (
-        m_cart * x_dot + (theta_dot * s18 + m_pole * x_dot),
-        s20,
-        theta_dot * inertia_pole_zz + x_dot * s18 + x * s20,
+        m_cart * x_dot + (m_pole * x_dot + theta_dot * s18),
+        s22,
+        theta_dot * inertia_pole_zz + x_dot * s18 + x * s22,
     )
 
 
@@ -439,19 +441,19 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     theta_dot_squared = theta_dot * theta_dot
     cos_theta = cos(theta)
     x_ddot = (push + sin_theta * (theta_dot_squared * k4 + cos_theta * k5)) / ((sin_theta * sin_theta * k1 + k2) * k3)
-    s21 = sin_theta * k6 + k7 * (cos_theta * x_ddot)
-    s22 = l * sin_theta
-    s23 = l * cos_theta
-    s24 = m_pole * (x_ddot - (theta_dot_squared * s22 + s21 * s23))
-    s25 = m_pole * (g + (theta_dot_squared * s23 - s21 * s22))
-    s26 = I_pole * s21 - (s25 * (x + s22 - x) + s23 * s24)
+    s23 = sin_theta * k6 + k7 * (cos_theta * x_ddot)
+    s24 = l * sin_theta
+    s25 = l * cos_theta
+    s26 = m_pole * (x_ddot - (theta_dot_squared * s24 + s23 * s25))
+    s27 = m_pole * (g + (theta_dot_squared * s25 - s23 * s24))
+    s28 = I_pole * s23 - (s27 * (x + s24 - x) + s25 * s26)
     return (
-        -(m_cart * x_ddot + s24),
-        -(k32 + s25),
-        s26,
-        -s24,
-        -s25,
-        s26,
+        -(m_cart * x_ddot + s26),
+        -(k32 + s27),
+        s28,
+        -s26,
+        -s27,
+        s28,
     )
 
 
@@ -658,7 +660,7 @@ def applied_force(t, y, p=None, u=None):
 
 def kinetic_energy(t, y, p=None, u=None):
     """Kinetic energy, J."""
-    return _evaluate(_kinetic_energy, "kinetic_energy", (), ('cos',), y, p, u)[()]
+    return _evaluate(_kinetic_energy, "kinetic_energy", (), ('sin', 'cos'), y, p, u)[()]
 
 
 def potential_energy(t, y, p=None, u=None):

@@ -89,7 +89,7 @@ COST = {
     "gravity_force": {"mul": 1, "sin": 1, "total": 2, "parameters": 3},
     "bias_force": {"sub": 2, "mul": 11, "sin": 1, "cos": 1, "total": 15, "parameters": 12},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 6, "mul": 15, "sin": 1, "cos": 1, "total": 23, "parameters": 22},
+    "kinetic_energy": {"add": 8, "mul": 22, "sin": 1, "cos": 1, "total": 32, "parameters": 11},
     "potential_energy": {"mul": 2, "neg": 1, "cos": 1, "total": 4, "parameters": 2},
     "effect_powers": {"add": 3, "sub": 4, "mul": 20, "neg": 1, "sin": 2, "cos": 2, "total": 32, "parameters": 4},
     "momentum": {"add": 12, "sub": 4, "mul": 35, "neg": 1, "sin": 2, "cos": 2, "total": 56, "parameters": 20},
@@ -107,19 +107,19 @@ COST = {
 def _constants(values):
     """Everything that depends on parameters alone, once for each set of them."""
     m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g = values
-    k38 = m_arm * (l_arm * l_arm) / 12.0
-    k39 = m_pendulum * (l_pendulum * l_pendulum) / 12.0
+    k33 = m_arm * (l_arm * l_arm) / 12.0
+    k36 = m_pendulum * (l_pendulum * l_pendulum) / 12.0
     if not m_arm > 0.0:
         raise ValueError("mass of arm is not positive: change the parameters")
-    if not k38 >= 0.0:
+    if not k33 >= 0.0:
         raise ValueError("inertia_com yy of arm is negative: change the parameters")
-    if not k38 >= 0.0:
+    if not k33 >= 0.0:
         raise ValueError("inertia_com zz of arm is negative: change the parameters")
     if not m_pendulum > 0.0:
         raise ValueError("mass of pendulum is not positive: change the parameters")
-    if not k39 >= 0.0:
+    if not k36 >= 0.0:
         raise ValueError("inertia_com xx of pendulum is negative: change the parameters")
-    if not k39 >= 0.0:
+    if not k36 >= 0.0:
         raise ValueError("inertia_com yy of pendulum is negative: change the parameters")
     l_pendulum_squared = l_pendulum * l_pendulum
     k42 = m_pendulum * l_pendulum_squared
@@ -168,22 +168,22 @@ def _constants(values):
     k28 = 1.0 / pivot_phi_dot
     k29 = k45 + (k31 + k44)
     k30 = g * k53 / 2.0
-    k36 = l_arm / 2.0
-    k34 = k36 + k36
-    k32 = l_pendulum / 2.0
-    moment_arm_x = m_arm * k36
-    inertia_arm_yy = k38 + k36 * moment_arm_x
+    k32 = l_arm / 2.0
+    k34 = k32 + k32
+    k35 = l_pendulum / 2.0
+    moment_arm_x = m_arm * k32
+    inertia_arm_yy = k33 + k32 * moment_arm_x
     moment_pendulum_x = m_pendulum * k34
-    k35 = m_pendulum * k32
+    k38 = m_pendulum * k35
     inertia_pendulum_zz = k34 * moment_pendulum_x
-    k54 = k32 * k35
-    inertia_pendulum_xz = k32 * moment_pendulum_x
-    inertia_pendulum_xx = k39 + k54
-    inertia_pendulum_yy = k39 + (inertia_pendulum_zz + k54)
+    k54 = k35 * k38
+    inertia_pendulum_xz = k35 * moment_pendulum_x
+    inertia_pendulum_xx = k36 + k54
+    inertia_pendulum_yy = k36 + (inertia_pendulum_zz + k54)
     k40 = m_arm * g
-    k33 = m_pendulum * g
-    k37 = m_arm + m_pendulum
-    k41 = k32 + k32
+    k37 = m_pendulum * g
+    k39 = m_arm + m_pendulum
+    k41 = k35 + k35
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6, k7),
@@ -197,14 +197,14 @@ def _constants(values):
         "gravity_force": (k30,),
         "bias_force": (pivot_phi_dot, k4, k5, k30),
         "applied_force": (),
-        "kinetic_energy": (k31, inertia_arm_yy, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
-        "potential_energy": (k32, k33),
-        "effect_powers": (k34, k32, k33),
-        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k35, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
-        "centre_of_mass": (m_arm, m_pendulum, k36, k34, k32, k37),
-        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k36, k38, k34, k32, k39, k40),
-        "body_poses": (k36, k34, k32),
-        "body_velocities": (k36, k34, k32),
+        "kinetic_energy": (m_arm, m_pendulum, k31, k32, k33, k34, k35, k36),
+        "potential_energy": (k35, k37),
+        "effect_powers": (k34, k35, k37),
+        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k38, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
+        "centre_of_mass": (m_arm, m_pendulum, k32, k34, k35, k39),
+        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k32, k33, k34, k35, k36, k40),
+        "body_poses": (k32, k34, k35),
+        "body_velocities": (k32, k34, k35),
         "point_positions": (k34, k41),
         "point_velocities": (k34, k41),
         "point_jacobians": (k34, k41),
@@ -443,100 +443,102 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """23 operations: 6 add, 15 mul, 1 sin, 1 cos."""
-    k31, inertia_arm_yy, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
+    """32 operations: 8 add, 22 mul, 1 sin, 1 cos."""
+    m_arm, m_pendulum, k31, k32, k33, k34, k35, k36 = k
     _, phi, theta_dot, phi_dot = y
     omega_pendulum_y = theta_dot * sin(phi)
-    omega_pendulum_z = theta_dot * cos(phi)
-    s29 = phi_dot * (phi_dot * inertia_pendulum_xx + inertia_pendulum_xz * omega_pendulum_z)
-    s30 = omega_pendulum_z * (phi_dot * inertia_pendulum_xz + inertia_pendulum_zz * omega_pendulum_z)
-    s31 = theta_dot * (theta_dot * inertia_arm_yy) + k31 * (theta_dot * theta_dot) + (s29 + omega_pendulum_y * (inertia_pendulum_yy * omega_pendulum_y) + s30)
+    s29 = theta_dot * k32
+    s30 = m_arm * (s29 * s29) + theta_dot * (theta_dot * k33) + k31 * (theta_dot * theta_dot)
+    s31 = k35 * omega_pendulum_y
+    s32 = k34 * (theta_dot * cos(phi)) + phi_dot * k35
+    s33 = k34 * omega_pendulum_y
+    s34 = s30 + m_pendulum * (s31 * s31 + s32 * s32 + s33 * s33) + (phi_dot * (phi_dot * k36) + omega_pendulum_y * (k36 * omega_pendulum_y))
     return (
-        0.5 * s31,
+        0.5 * s34,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
     """4 operations: 2 mul, 1 neg, 1 cos."""
-    k32, k33 = k
+    k35, k37 = k
     _, phi, _, _ = y
     return (
-        -k33 * (cos(phi) * k32),
+        -k37 * (cos(phi) * k35),
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), sin=sin, cos=cos):
     """32 operations: 3 add, 4 sub, 20 mul, 1 neg, 2 sin, 2 cos."""
-    k34, k32, k33 = k
+    k34, k35, k37 = k
     theta, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s32 = sin_phi * sin_theta
-    s33 = sin_phi * cos_theta
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
-    s34 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s32 * omega_pendulum_z
-    s35 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s33 * omega_pendulum_z
-    s36 = (k34 * sin_theta + k32 * s33) * s34 - (k34 * cos_theta - k32 * s32) * s35
+    s37 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s35 * omega_pendulum_z
+    s38 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s36 * omega_pendulum_z
+    s39 = (k34 * sin_theta + k35 * s36) * s37 - (k34 * cos_theta - k35 * s35) * s38
     return (
-        -k33 * s36,
+        -k37 * s39,
         theta_dot * tau,
     )
 
 
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """56 operations: 12 add, 4 sub, 35 mul, 1 neg, 2 sin, 2 cos."""
-    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k35, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
+    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k38, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s37 = cos_phi * sin_theta
-    s32 = sin_phi * sin_theta
-    s38 = cos_phi * cos_theta
-    s33 = sin_phi * cos_theta
+    s40 = cos_phi * sin_theta
+    s35 = sin_phi * sin_theta
+    s41 = cos_phi * cos_theta
+    s36 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
-    s39 = theta_dot * moment_arm_x
-    s40 = phi_dot * inertia_pendulum_xx + inertia_pendulum_xz * omega_pendulum_z
-    s41 = inertia_pendulum_yy * omega_pendulum_y
-    s42 = phi_dot * inertia_pendulum_xz + inertia_pendulum_zz * omega_pendulum_z
-    s43 = k35 * omega_pendulum_y
-    s44 = moment_pendulum_x * omega_pendulum_z + phi_dot * k35
+    s42 = theta_dot * moment_arm_x
+    s43 = k38 * omega_pendulum_y
+    s44 = moment_pendulum_x * omega_pendulum_z + phi_dot * k38
     s45 = moment_pendulum_x * omega_pendulum_y
+    s46 = phi_dot * inertia_pendulum_xx + inertia_pendulum_xz * omega_pendulum_z
+    s47 = inertia_pendulum_yy * omega_pendulum_y
+    s48 = phi_dot * inertia_pendulum_xz + inertia_pendulum_zz * omega_pendulum_z
     return (
-        -(sin_theta * s39 + (cos_theta * s43 + s37 * s44 + s32 * s45)),
-        cos_theta * s39 + (s38 * s44 - sin_theta * s43 + s33 * s45),
+        -(sin_theta * s42 + (cos_theta * s43 + s40 * s44 + s35 * s45)),
+        cos_theta * s42 + (s41 * s44 - sin_theta * s43 + s36 * s45),
         sin_phi * s44 - cos_phi * s45,
-        cos_theta * s40 - s37 * s41 + s32 * s42,
-        sin_theta * s40 + s38 * s41 - s33 * s42,
-        theta_dot * inertia_arm_yy + (sin_phi * s41 + cos_phi * s42),
+        cos_theta * s46 - s40 * s47 + s35 * s48,
+        sin_theta * s46 + s41 * s47 - s36 * s48,
+        theta_dot * inertia_arm_yy + (sin_phi * s47 + cos_phi * s48),
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     """26 operations: 3 add, 1 sub, 14 mul, 3 div, 1 neg, 2 sin, 2 cos."""
-    m_arm, m_pendulum, k36, k34, k32, k37 = k
+    m_arm, m_pendulum, k32, k34, k35, k39 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s46 = m_arm * (k36 * cos_theta) + m_pendulum * (k34 * cos_theta - k32 * (sin_phi * sin_theta))
-    s47 = m_arm * (k36 * sin_theta) + m_pendulum * (k34 * sin_theta + k32 * (sin_phi * cos_theta))
+    s49 = m_arm * (k32 * cos_theta) + m_pendulum * (k34 * cos_theta - k35 * (sin_phi * sin_theta))
+    s50 = m_arm * (k32 * sin_theta) + m_pendulum * (k34 * sin_theta + k35 * (sin_phi * cos_theta))
     return (
-        s46 / k37,
-        s47 / k37,
-        -m_pendulum * (cos(phi) * k32) / k37,
+        s49 / k39,
+        s50 / k39,
+        -m_pendulum * (cos(phi) * k35) / k39,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """231 operations: 47 add, 35 sub, 135 mul, 1 div, 9 neg, 2 sin, 2 cos."""
-    m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k36, k38, k34, k32, k39, k40 = k
+    m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k32, k33, k34, k35, k36, k40 = k
     theta, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
@@ -549,148 +551,148 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     phi_ddot = theta_dot_squared * (sin_phi * cos_phi) - sin_phi * k6 - k7 * s14
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s37 = cos_phi * sin_theta
-    s32 = sin_phi * sin_theta
-    s38 = cos_phi * cos_theta
-    s33 = sin_phi * cos_theta
+    s40 = cos_phi * sin_theta
+    s35 = sin_phi * sin_theta
+    s41 = cos_phi * cos_theta
+    s36 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
-    s48 = k36 * cos_theta
-    s49 = k36 * sin_theta
-    s50 = k34 * cos_theta
-    s51 = k34 * sin_theta
-    s52 = cos_phi * k32
-    s34 = phi_dot * cos_theta - s37 * omega_pendulum_y + s32 * omega_pendulum_z
-    s35 = phi_dot * sin_theta + s38 * omega_pendulum_y - s33 * omega_pendulum_z
-    s53 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s54 = phi_dot * omega_pendulum_z
-    s55 = phi_dot * omega_pendulum_y
-    s56 = sin_phi * theta_ddot + s54
-    s57 = s14 - s55
+    s51 = k32 * cos_theta
+    s52 = k32 * sin_theta
+    s53 = k34 * cos_theta
+    s54 = k34 * sin_theta
+    s55 = cos_phi * k35
+    s37 = phi_dot * cos_theta - s40 * omega_pendulum_y + s35 * omega_pendulum_z
+    s38 = phi_dot * sin_theta + s41 * omega_pendulum_y - s36 * omega_pendulum_z
+    s56 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s57 = phi_dot * omega_pendulum_z
+    s58 = phi_dot * omega_pendulum_y
+    s59 = sin_phi * theta_ddot + s57
+    s60 = s14 - s58
     omega_pendulum_y_squared = omega_pendulum_y * omega_pendulum_y
-    s58 = theta_dot_squared * k36
-    s59 = theta_ddot * k36
-    s60 = m_arm * (cos_theta * s58 + sin_theta * s59)
-    s61 = m_arm * (cos_theta * s59 - sin_theta * s58)
-    s62 = k34 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k32 * (s54 + s56)
-    s63 = k34 * (s55 + s57) - k32 * (omega_pendulum_y * omega_pendulum_z - phi_ddot)
-    s64 = g * sin_phi + s63
-    s65 = g * cos_phi + (k34 * (s54 - s56) + k32 * (phi_dot_squared + omega_pendulum_y_squared))
-    s66 = phi_ddot * cos_theta - s37 * s56 + s32 * s57
-    s67 = phi_ddot * sin_theta + s38 * s56 - s33 * s57
-    s68 = sin_phi * s56 + cos_phi * s57
-    s69 = k39 * cos_theta
-    s70 = k39 * s37
-    s71 = k39 * sin_theta
-    s72 = k39 * s38
-    s73 = sin_phi * k39
-    s74 = cos_theta * s69 + s37 * s70
-    s75 = sin_theta * s69 - s38 * s70
-    s76 = sin_phi * s70
-    s77 = cos_theta * s71 - s37 * s72
-    s78 = sin_theta * s71 + s38 * s72
-    s79 = sin_phi * s72
-    s80 = s37 * s73
-    s81 = s38 * s73
-    s82 = sin_phi * s73
-    s83 = m_pendulum * (s32 * s65 - (cos_theta * s62 + s37 * s64))
-    s84 = m_pendulum * (s38 * s64 - sin_theta * s62 - s33 * s65)
-    s85 = m_pendulum * (sin_phi * s64 + cos_phi * s65)
-    s86 = s34 * s74 + s35 * s75 - s53 * s76
-    s87 = s34 * s77 + s35 * s78 + s53 * s79
-    s88 = s35 * s81 - s34 * s80 + s53 * s82
-    s89 = s66 * s77 + s67 * s78 + s68 * s79 + (s53 * s86 - s34 * s88)
-    s90 = s50 - k32 * s32 - s50
-    s91 = s51 + k32 * s33 - s51
-    s92 = s52 * s83 + s85 * s90
-    s93 = s66 * s74 + s67 * s75 - s68 * s76 + (s35 * s88 - s53 * s87) + (s85 * s91 + s52 * s84)
-    s94 = s67 * s81 - s66 * s80 + s68 * s82 + (s34 * s87 - s35 * s86) + (s84 * s90 - s83 * s91)
-    s95 = theta_ddot * k38 + (s48 * s61 + s49 * s60) + (s94 + (s50 * s84 - s51 * s83))
+    s61 = theta_dot_squared * k32
+    s62 = theta_ddot * k32
+    s63 = m_arm * (cos_theta * s61 + sin_theta * s62)
+    s64 = m_arm * (cos_theta * s62 - sin_theta * s61)
+    s65 = k34 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k35 * (s57 + s59)
+    s66 = k34 * (s58 + s60) - k35 * (omega_pendulum_y * omega_pendulum_z - phi_ddot)
+    s67 = g * sin_phi + s66
+    s68 = g * cos_phi + (k34 * (s57 - s59) + k35 * (phi_dot_squared + omega_pendulum_y_squared))
+    s69 = phi_ddot * cos_theta - s40 * s59 + s35 * s60
+    s70 = phi_ddot * sin_theta + s41 * s59 - s36 * s60
+    s71 = sin_phi * s59 + cos_phi * s60
+    s72 = k36 * cos_theta
+    s73 = k36 * s40
+    s74 = k36 * sin_theta
+    s75 = k36 * s41
+    s76 = sin_phi * k36
+    s77 = cos_theta * s72 + s40 * s73
+    s78 = sin_theta * s72 - s41 * s73
+    s79 = sin_phi * s73
+    s80 = cos_theta * s74 - s40 * s75
+    s81 = sin_theta * s74 + s41 * s75
+    s82 = sin_phi * s75
+    s83 = s40 * s76
+    s84 = s41 * s76
+    s85 = sin_phi * s76
+    s86 = m_pendulum * (s35 * s68 - (cos_theta * s65 + s40 * s67))
+    s87 = m_pendulum * (s41 * s67 - sin_theta * s65 - s36 * s68)
+    s88 = m_pendulum * (sin_phi * s67 + cos_phi * s68)
+    s89 = s37 * s77 + s38 * s78 - s56 * s79
+    s90 = s37 * s80 + s38 * s81 + s56 * s82
+    s91 = s38 * s84 - s37 * s83 + s56 * s85
+    s92 = s69 * s80 + s70 * s81 + s71 * s82 + (s56 * s89 - s37 * s91)
+    s93 = s53 - k35 * s35 - s53
+    s94 = s54 + k35 * s36 - s54
+    s95 = s55 * s86 + s88 * s93
+    s96 = s69 * s77 + s70 * s78 - s71 * s79 + (s38 * s91 - s56 * s90) + (s88 * s94 + s55 * s87)
+    s97 = s70 * s84 - s69 * s83 + s71 * s85 + (s37 * s90 - s38 * s89) + (s87 * s93 - s86 * s94)
+    s98 = theta_ddot * k33 + (s51 * s64 + s52 * s63) + (s97 + (s53 * s87 - s54 * s86))
     return (
-        s60 - s83,
-        -(s61 + s84),
-        -(k40 + s85),
-        -(k40 * s49 + (s93 + s51 * s85)),
-        k40 * s48 - (s89 - s92 - s50 * s85),
-        -s95,
-        -s83,
-        -s84,
-        -s85,
-        -s93,
-        s92 - s89,
-        -s94,
+        s63 - s86,
+        -(s64 + s87),
+        -(k40 + s88),
+        -(k40 * s52 + (s96 + s54 * s88)),
+        k40 * s51 - (s92 - s95 - s53 * s88),
+        -s98,
+        -s86,
+        -s87,
+        -s88,
+        -s96,
+        s95 - s92,
+        -s97,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
     """21 operations: 1 add, 1 sub, 11 mul, 4 neg, 2 sin, 2 cos."""
-    k36, k34, k32 = k
+    k32, k34, k35 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s32 = sin_phi * sin_theta
-    s33 = sin_phi * cos_theta
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
     return (
         cos_theta,
         -sin_theta,
         0.0,
-        k36 * cos_theta,
+        k32 * cos_theta,
         sin_theta,
         cos_theta,
         0.0,
-        k36 * sin_theta,
+        k32 * sin_theta,
         0.0,
         0.0,
         1.0,
         0.0,
         cos_theta,
         -cos_phi * sin_theta,
-        s32,
-        k34 * cos_theta - k32 * s32,
+        s35,
+        k34 * cos_theta - k35 * s35,
         sin_theta,
         cos_phi * cos_theta,
-        -s33,
-        k34 * sin_theta + k32 * s33,
+        -s36,
+        k34 * sin_theta + k35 * s36,
         0.0,
         sin_phi,
         cos_phi,
-        -cos_phi * k32,
+        -cos_phi * k35,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """45 operations: 6 add, 4 sub, 29 mul, 2 neg, 2 sin, 2 cos."""
-    k36, k34, k32 = k
+    k32, k34, k35 = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s32 = sin_phi * sin_theta
-    s33 = sin_phi * cos_theta
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
-    s96 = k34 * cos_theta - k32 * s32
-    s97 = k34 * sin_theta + k32 * s33
-    s52 = cos_phi * k32
-    s34 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s32 * omega_pendulum_z
-    s35 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s33 * omega_pendulum_z
-    s53 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s99 = k34 * cos_theta - k35 * s35
+    s100 = k34 * sin_theta + k35 * s36
+    s55 = cos_phi * k35
+    s37 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s35 * omega_pendulum_z
+    s38 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s36 * omega_pendulum_z
+    s56 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
     return (
-        -theta_dot * (k36 * sin_theta),
-        theta_dot * (k36 * cos_theta),
+        -theta_dot * (k32 * sin_theta),
+        theta_dot * (k32 * cos_theta),
         0.0,
         0.0,
         0.0,
         theta_dot,
-        -(s52 * s35 + s97 * s53),
-        s96 * s53 + s52 * s34,
-        s97 * s34 - s96 * s35,
-        s34,
-        s35,
-        s53,
+        -(s55 * s38 + s100 * s56),
+        s99 * s56 + s55 * s37,
+        s100 * s37 - s99 * s38,
+        s37,
+        s38,
+        s56,
     )
 
 
@@ -716,20 +718,20 @@ def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s32 = sin_phi * sin_theta
-    s33 = sin_phi * cos_theta
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
-    s34 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s32 * omega_pendulum_z
-    s35 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s33 * omega_pendulum_z
-    s53 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s98 = k34 * cos_theta - s32 * k41
-    s99 = k34 * sin_theta + s33 * k41
-    s100 = cos_phi * k41
+    s37 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s35 * omega_pendulum_z
+    s38 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s36 * omega_pendulum_z
+    s56 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s101 = k34 * cos_theta - s35 * k41
+    s102 = k34 * sin_theta + s36 * k41
+    s103 = cos_phi * k41
     return (
-        -(s35 * s100 + s53 * s99),
-        s53 * s98 + s34 * s100,
-        s34 * s99 - s35 * s98,
+        -(s38 * s103 + s56 * s102),
+        s56 * s101 + s37 * s103,
+        s37 * s102 - s38 * s101,
     )
 
 
@@ -740,16 +742,16 @@ def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s98 = k34 * cos_theta - sin_phi * sin_theta * k41
-    s99 = k34 * sin_theta + sin_phi * cos_theta * k41
-    s100 = cos(phi) * k41
+    s101 = k34 * cos_theta - sin_phi * sin_theta * k41
+    s102 = k34 * sin_theta + sin_phi * cos_theta * k41
+    s103 = cos(phi) * k41
     return (
-        -s99,
-        -sin_theta * s100,
-        s98,
-        cos_theta * s100,
+        -s102,
+        -sin_theta * s103,
+        s101,
+        cos_theta * s103,
         0.0,
-        cos_theta * s99 - sin_theta * s98,
+        cos_theta * s102 - sin_theta * s101,
     )
 
 

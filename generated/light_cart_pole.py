@@ -74,7 +74,7 @@ COST = {
     "gravity_force": {"mul": 1, "sin": 1, "total": 2, "parameters": 2},
     "bias_force": {"mul": 4, "neg": 1, "sin": 1, "total": 6, "parameters": 2},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 2, "mul": 8, "cos": 1, "total": 11, "parameters": 3},
+    "kinetic_energy": {"add": 3, "mul": 10, "sin": 1, "cos": 1, "total": 15, "parameters": 0},
     "potential_energy": {"mul": 2, "neg": 1, "cos": 1, "total": 4, "parameters": 1},
     "effect_powers": {"mul": 3, "neg": 1, "sin": 1, "total": 5, "parameters": 1},
     "momentum": {"add": 4, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 2},
@@ -119,7 +119,7 @@ def _constants(values):
         "gravity_force": (k10,),
         "bias_force": (k9, k10),
         "applied_force": (),
-        "kinetic_energy": (k8, k9, inertia_pole_zz),
+        "kinetic_energy": (M, m, l),
         "potential_energy": (l, k11),
         "effect_powers": (l, k11),
         "momentum": (M, m, k9, inertia_pole_zz),
@@ -302,12 +302,14 @@ def _applied_force(y, k, u=(), extra=()):
     )
 
 
-def _kinetic_energy(y, k, u=(), extra=(), cos=cos):
-    """11 operations: 2 add, 8 mul, 1 cos."""
-    k8, k9, inertia_pole_zz = k
+def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """15 operations: 3 add, 10 mul, 1 sin, 1 cos."""
+    M, m, l = k
     _, theta, x_dot, theta_dot = y
+    s13 = theta_dot * (l * sin(theta))
+    s14 = x_dot + theta_dot * (l * cos(theta))
     return (
-        x_dot * (theta_dot * (cos(theta) * k9)) + 0.5 * (k8 * (x_dot * x_dot) + theta_dot * (theta_dot * inertia_pole_zz)),
+        0.5 * (M * (x_dot * x_dot) + m * (s14 * s14 + s13 * s13)),
     )
 
 
@@ -316,7 +318,7 @@ def _potential_energy(y, k, u=(), extra=(), cos=cos):
     l, k11 = k
     _, theta, _, _ = y
     return (
-        -k11 * (l * cos(theta)),
+        -l * cos(theta) * k11,
     )
 
 
@@ -325,7 +327,7 @@ def _effect_powers(y, k, u=(), extra=(), sin=sin):
     l, k11 = k
     _, theta, _, theta_dot = y
     return (
-        -k11 * (theta_dot * (l * sin(theta))),
+        -theta_dot * (l * sin(theta)) * k11,
     )
 
 
@@ -334,11 +336,11 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     M, m, k9, inertia_pole_zz = k
     x, theta, x_dot, theta_dot = y
     s12 = cos(theta) * k9
-    s13 = theta_dot * (sin(theta) * k9)
+    s15 = theta_dot * (sin(theta) * k9)
     return (
-        M * x_dot + (theta_dot * s12 + m * x_dot),
-        s13,
-        theta_dot * inertia_pole_zz + x_dot * s12 + x * s13,
+        M * x_dot + (m * x_dot + theta_dot * s12),
+        s15,
+        theta_dot * inertia_pole_zz + x_dot * s12 + x * s15,
     )
 
 
@@ -360,19 +362,19 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta = cos(theta)
     theta_dot_squared = theta_dot * theta_dot
     x_ddot = m * (sin_theta * (g * cos_theta + l * theta_dot_squared)) / (M + m * (sin_theta * sin_theta))
-    s14 = sin_theta * k1 + k2 * (cos_theta * x_ddot)
-    s15 = l * sin_theta
-    s16 = l * cos_theta
-    s17 = m * (x_ddot - (theta_dot_squared * s15 + s14 * s16))
-    s18 = m * (g + (theta_dot_squared * s16 - s14 * s15))
-    s19 = -(s18 * (x + s15 - x) + s16 * s17)
+    s16 = sin_theta * k1 + k2 * (cos_theta * x_ddot)
+    s17 = l * sin_theta
+    s18 = l * cos_theta
+    s19 = m * (x_ddot - (theta_dot_squared * s17 + s16 * s18))
+    s20 = m * (g + (theta_dot_squared * s18 - s16 * s17))
+    s21 = -(s20 * (x + s17 - x) + s18 * s19)
     return (
-        -(M * x_ddot + s17),
-        -(k12 + s18),
-        s19,
-        -s17,
-        -s18,
-        s19,
+        -(M * x_ddot + s19),
+        -(k12 + s20),
+        s21,
+        -s19,
+        -s20,
+        s21,
     )
 
 
@@ -542,7 +544,7 @@ def applied_force(t, y, p=None, u=None):
 
 def kinetic_energy(t, y, p=None, u=None):
     """Kinetic energy, J."""
-    return _evaluate(_kinetic_energy, "kinetic_energy", (), ('cos',), y, p, u)[()]
+    return _evaluate(_kinetic_energy, "kinetic_energy", (), ('sin', 'cos'), y, p, u)[()]
 
 
 def potential_energy(t, y, p=None, u=None):

@@ -86,7 +86,7 @@ COST = {
     "gravity_force": {"add": 4, "sub": 1, "mul": 13, "div": 1, "neg": 1, "total": 20, "parameters": 2},
     "bias_force": {"add": 5, "sub": 2, "mul": 17, "div": 1, "total": 25, "parameters": 8},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 2, "mul": 7, "total": 9, "parameters": 3},
+    "kinetic_energy": {"add": 4, "mul": 12, "total": 16, "parameters": 0},
     "potential_energy": {"add": 4, "sub": 1, "mul": 10, "div": 1, "total": 16, "parameters": 1},
     "effect_powers": {"add": 11, "sub": 5, "mul": 27, "div": 1, "neg": 1, "total": 45, "parameters": 1},
     "momentum": {"add": 15, "sub": 9, "mul": 36, "div": 1, "total": 61, "parameters": 3},
@@ -150,7 +150,7 @@ def _constants(values):
         "gravity_force": (k17,),
         "bias_force": (k16, k17, k18),
         "applied_force": (),
-        "kinetic_energy": (I_3, inertia_top_xx),
+        "kinetic_energy": (m, h, I_1, I_3),
         "potential_energy": (h, k19),
         "effect_powers": (h, k19),
         "momentum": (I_3, moment_top_z, inertia_top_xx),
@@ -420,12 +420,14 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=()):
-    """9 operations: 2 add, 7 mul."""
-    I_3, inertia_top_xx = k
+    """16 operations: 4 add, 12 mul."""
+    m, h, I_1, I_3 = k
     _, _, _, _, tip_wx, tip_wy, tip_wz = y
-    s28 = tip_wx * (tip_wx * inertia_top_xx) + tip_wy * (tip_wy * inertia_top_xx) + tip_wz * (I_3 * tip_wz)
+    s28 = h * tip_wy
+    s29 = h * tip_wx
+    s30 = tip_wx * (I_1 * tip_wx) + tip_wy * (I_1 * tip_wy) + tip_wz * (I_3 * tip_wz)
     return (
-        0.5 * s28,
+        0.5 * (m * (s28 * s28 + s29 * s29) + s30),
     )
 
 
@@ -434,9 +436,9 @@ def _potential_energy(y, k, u=(), extra=()):
     h, k19 = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s29 = 2.0 / s1
+    s31 = 2.0 / s1
     return (
-        k19 * (h * (1.0 - (tip_qx * (tip_qx * s29) + tip_qy * (tip_qy * s29)))),
+        k19 * (h * (1.0 - (tip_qx * (tip_qx * s31) + tip_qy * (tip_qy * s31)))),
     )
 
 
@@ -445,19 +447,19 @@ def _effect_powers(y, k, u=(), extra=()):
     h, k19 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s29 = 2.0 / s1
-    s30 = tip_qx * s29
-    s31 = tip_qy * s29
-    s32 = tip_qz * s29
-    s33 = tip_qw * s32
-    s34 = tip_qz * s32
-    s35 = tip_qy * s30
-    s36 = tip_qw * s31 + tip_qz * s30
-    s37 = tip_qz * s31 - tip_qw * s30
-    s38 = tip_wx * (1.0 - (tip_qy * s31 + s34)) + tip_wy * (s35 - s33) + tip_wz * s36
-    s39 = tip_wx * (s33 + s35) + tip_wy * (1.0 - (tip_qx * s30 + s34)) + tip_wz * s37
+    s31 = 2.0 / s1
+    s32 = tip_qx * s31
+    s33 = tip_qy * s31
+    s34 = tip_qz * s31
+    s35 = tip_qw * s34
+    s36 = tip_qz * s34
+    s37 = tip_qy * s32
+    s38 = tip_qw * s33 + tip_qz * s32
+    s39 = tip_qz * s33 - tip_qw * s32
+    s40 = tip_wx * (1.0 - (tip_qy * s33 + s36)) + tip_wy * (s37 - s35) + tip_wz * s38
+    s41 = tip_wx * (s35 + s37) + tip_wy * (1.0 - (tip_qx * s32 + s36)) + tip_wz * s39
     return (
-        -k19 * (h * s37 * s38 - h * s36 * s39),
+        -k19 * (h * s39 * s40 - h * s38 * s41),
     )
 
 
@@ -466,37 +468,37 @@ def _momentum(y, k, u=(), extra=()):
     I_3, moment_top_z, inertia_top_xx = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s29 = 2.0 / s1
-    s30 = tip_qx * s29
-    s31 = tip_qy * s29
-    s32 = tip_qz * s29
-    s40 = tip_qw * s30
-    s41 = tip_qw * s31
-    s33 = tip_qw * s32
-    s42 = tip_qx * s30
-    s43 = tip_qy * s31
-    s34 = tip_qz * s32
-    s35 = tip_qy * s30
-    s44 = tip_qz * s30
-    s45 = tip_qz * s31
-    s46 = 1.0 - (s43 + s34)
-    s47 = s35 - s33
-    s48 = s33 + s35
-    s49 = 1.0 - (s42 + s34)
-    s50 = s44 - s41
-    s51 = s40 + s45
-    s52 = tip_wx * inertia_top_xx
-    s53 = tip_wy * inertia_top_xx
+    s31 = 2.0 / s1
+    s32 = tip_qx * s31
+    s33 = tip_qy * s31
+    s34 = tip_qz * s31
+    s42 = tip_qw * s32
+    s43 = tip_qw * s33
+    s35 = tip_qw * s34
+    s44 = tip_qx * s32
+    s45 = tip_qy * s33
+    s36 = tip_qz * s34
+    s37 = tip_qy * s32
+    s46 = tip_qz * s32
+    s47 = tip_qz * s33
+    s48 = 1.0 - (s45 + s36)
+    s49 = s37 - s35
+    s50 = s35 + s37
+    s51 = 1.0 - (s44 + s36)
+    s52 = s46 - s43
+    s53 = s42 + s47
     s54 = I_3 * tip_wz
     s55 = tip_wy * moment_top_z
     s56 = tip_wx * moment_top_z
+    s57 = tip_wx * inertia_top_xx
+    s58 = tip_wy * inertia_top_xx
     return (
-        s46 * s55 - s47 * s56,
         s48 * s55 - s49 * s56,
         s50 * s55 - s51 * s56,
-        s46 * s52 + s47 * s53 + (s41 + s44) * s54,
-        s48 * s52 + s49 * s53 + (s45 - s40) * s54,
-        s50 * s52 + s51 * s53 + (1.0 - (s42 + s43)) * s54,
+        s52 * s55 - s53 * s56,
+        s48 * s57 + s49 * s58 + (s43 + s46) * s54,
+        s50 * s57 + s51 * s58 + (s47 - s42) * s54,
+        s52 * s57 + s53 * s58 + (1.0 - (s44 + s45)) * s54,
     )
 
 
@@ -505,13 +507,13 @@ def _centre_of_mass(y, k, u=(), extra=()):
     m, h = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s29 = 2.0 / s1
-    s30 = tip_qx * s29
-    s31 = tip_qy * s29
+    s31 = 2.0 / s1
+    s32 = tip_qx * s31
+    s33 = tip_qy * s31
     return (
-        m * (h * (tip_qw * s31 + tip_qz * s30)) / m,
-        m * (h * (tip_qz * s31 - tip_qw * s30)) / m,
-        m * (h * (1.0 - (tip_qx * s30 + tip_qy * s31))) / m,
+        m * (h * (tip_qw * s33 + tip_qz * s32)) / m,
+        m * (h * (tip_qz * s33 - tip_qw * s32)) / m,
+        m * (h * (1.0 - (tip_qx * s32 + tip_qy * s33))) / m,
     )
 
 
@@ -525,74 +527,74 @@ def _joint_forces(y, k, u=(), extra=()):
     tip_wx_dot = k1 * s26 + k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k2
     s27 = tip_wx * tip_wz
     tip_wy_dot = k3 * s27 - k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k2
-    s29 = 2.0 / s1
-    s30 = tip_qx * s29
-    s31 = tip_qy * s29
-    s32 = tip_qz * s29
-    s40 = tip_qw * s30
-    s41 = tip_qw * s31
-    s33 = tip_qw * s32
-    s42 = tip_qx * s30
-    s43 = tip_qy * s31
-    s34 = tip_qz * s32
-    s35 = tip_qy * s30
-    s44 = tip_qz * s30
-    s45 = tip_qz * s31
-    s46 = 1.0 - (s43 + s34)
-    s47 = s35 - s33
-    s36 = s41 + s44
-    s48 = s33 + s35
-    s49 = 1.0 - (s42 + s34)
-    s37 = s45 - s40
-    s50 = s44 - s41
-    s51 = s40 + s45
-    s57 = 1.0 - (s42 + s43)
-    s58 = h * s36
-    s59 = h * s37
-    s60 = h * s57
-    s38 = tip_wx * s46 + tip_wy * s47 + tip_wz * s36
-    s39 = tip_wx * s48 + tip_wy * s49 + tip_wz * s37
-    s61 = tip_wx * s50 + tip_wy * s51 + tip_wz * s57
-    s62 = g * s50 + h * (s27 + tip_wy_dot)
-    s63 = g * s51 + h * (s26 - tip_wx_dot)
-    s64 = g * s57 - h * (tip_wx * tip_wx + tip_wy * tip_wy)
-    s65 = tip_wx_dot * s46 + tip_wy_dot * s47
-    s66 = tip_wx_dot * s48 + tip_wy_dot * s49
-    s67 = tip_wx_dot * s50 + tip_wy_dot * s51
-    s68 = I_1 * s46
-    s69 = I_1 * s47
-    s70 = I_3 * s36
-    s71 = I_1 * s48
-    s72 = I_1 * s49
-    s73 = I_3 * s37
-    s74 = I_1 * s50
-    s75 = I_1 * s51
-    s76 = I_3 * s57
-    s77 = s46 * s68 + s47 * s69 + s36 * s70
-    s78 = s48 * s68 + s49 * s69 + s37 * s70
-    s79 = s50 * s68 + s51 * s69 + s57 * s70
-    s80 = s46 * s71 + s47 * s72 + s36 * s73
-    s81 = s48 * s71 + s49 * s72 + s37 * s73
-    s82 = s50 * s71 + s51 * s72 + s57 * s73
-    s83 = s46 * s74 + s47 * s75 + s36 * s76
-    s84 = s48 * s74 + s49 * s75 + s37 * s76
-    s85 = s50 * s74 + s51 * s75 + s57 * s76
-    s86 = m * (s46 * s62 + s47 * s63 + s36 * s64)
-    s87 = m * (s48 * s62 + s49 * s63 + s37 * s64)
-    s88 = m * (s50 * s62 + s51 * s63 + s57 * s64)
-    s89 = s38 * s77 + s39 * s78 + s61 * s79
-    s90 = s38 * s80 + s39 * s81 + s61 * s82
-    s91 = s38 * s83 + s39 * s84 + s61 * s85
-    s92 = s65 * s77 + s66 * s78 + s67 * s79 + (s39 * s91 - s61 * s90) + (s59 * s88 - s60 * s87)
-    s93 = s65 * s80 + s66 * s81 + s67 * s82 + (s61 * s89 - s38 * s91) + (s60 * s86 - s58 * s88)
-    s94 = s65 * s83 + s66 * s84 + s67 * s85 + (s38 * s90 - s39 * s89) + (s58 * s87 - s59 * s86)
+    s31 = 2.0 / s1
+    s32 = tip_qx * s31
+    s33 = tip_qy * s31
+    s34 = tip_qz * s31
+    s42 = tip_qw * s32
+    s43 = tip_qw * s33
+    s35 = tip_qw * s34
+    s44 = tip_qx * s32
+    s45 = tip_qy * s33
+    s36 = tip_qz * s34
+    s37 = tip_qy * s32
+    s46 = tip_qz * s32
+    s47 = tip_qz * s33
+    s48 = 1.0 - (s45 + s36)
+    s49 = s37 - s35
+    s38 = s43 + s46
+    s50 = s35 + s37
+    s51 = 1.0 - (s44 + s36)
+    s39 = s47 - s42
+    s52 = s46 - s43
+    s53 = s42 + s47
+    s59 = 1.0 - (s44 + s45)
+    s60 = h * s38
+    s61 = h * s39
+    s62 = h * s59
+    s40 = tip_wx * s48 + tip_wy * s49 + tip_wz * s38
+    s41 = tip_wx * s50 + tip_wy * s51 + tip_wz * s39
+    s63 = tip_wx * s52 + tip_wy * s53 + tip_wz * s59
+    s64 = g * s52 + h * (s27 + tip_wy_dot)
+    s65 = g * s53 + h * (s26 - tip_wx_dot)
+    s66 = g * s59 - h * (tip_wx * tip_wx + tip_wy * tip_wy)
+    s67 = tip_wx_dot * s48 + tip_wy_dot * s49
+    s68 = tip_wx_dot * s50 + tip_wy_dot * s51
+    s69 = tip_wx_dot * s52 + tip_wy_dot * s53
+    s70 = I_1 * s48
+    s71 = I_1 * s49
+    s72 = I_3 * s38
+    s73 = I_1 * s50
+    s74 = I_1 * s51
+    s75 = I_3 * s39
+    s76 = I_1 * s52
+    s77 = I_1 * s53
+    s78 = I_3 * s59
+    s79 = s48 * s70 + s49 * s71 + s38 * s72
+    s80 = s50 * s70 + s51 * s71 + s39 * s72
+    s81 = s52 * s70 + s53 * s71 + s59 * s72
+    s82 = s48 * s73 + s49 * s74 + s38 * s75
+    s83 = s50 * s73 + s51 * s74 + s39 * s75
+    s84 = s52 * s73 + s53 * s74 + s59 * s75
+    s85 = s48 * s76 + s49 * s77 + s38 * s78
+    s86 = s50 * s76 + s51 * s77 + s39 * s78
+    s87 = s52 * s76 + s53 * s77 + s59 * s78
+    s88 = m * (s48 * s64 + s49 * s65 + s38 * s66)
+    s89 = m * (s50 * s64 + s51 * s65 + s39 * s66)
+    s90 = m * (s52 * s64 + s53 * s65 + s59 * s66)
+    s91 = s40 * s79 + s41 * s80 + s63 * s81
+    s92 = s40 * s82 + s41 * s83 + s63 * s84
+    s93 = s40 * s85 + s41 * s86 + s63 * s87
+    s94 = s67 * s79 + s68 * s80 + s69 * s81 + (s41 * s93 - s63 * s92) + (s61 * s90 - s62 * s89)
+    s95 = s67 * s82 + s68 * s83 + s69 * s84 + (s63 * s91 - s40 * s93) + (s62 * s88 - s60 * s90)
+    s96 = s67 * s85 + s68 * s86 + s69 * s87 + (s40 * s92 - s41 * s91) + (s60 * s89 - s61 * s88)
     return (
-        -s86,
-        -s87,
         -s88,
-        -s92,
-        -s93,
+        -s89,
+        -s90,
         -s94,
+        -s95,
+        -s96,
     )
 
 
@@ -601,35 +603,35 @@ def _body_poses(y, k, u=(), extra=()):
     h, = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s29 = 2.0 / s1
-    s30 = tip_qx * s29
-    s31 = tip_qy * s29
-    s32 = tip_qz * s29
-    s40 = tip_qw * s30
-    s41 = tip_qw * s31
-    s33 = tip_qw * s32
-    s42 = tip_qx * s30
-    s43 = tip_qy * s31
-    s34 = tip_qz * s32
-    s35 = tip_qy * s30
-    s44 = tip_qz * s30
-    s45 = tip_qz * s31
-    s36 = s41 + s44
-    s37 = s45 - s40
-    s57 = 1.0 - (s42 + s43)
+    s31 = 2.0 / s1
+    s32 = tip_qx * s31
+    s33 = tip_qy * s31
+    s34 = tip_qz * s31
+    s42 = tip_qw * s32
+    s43 = tip_qw * s33
+    s35 = tip_qw * s34
+    s44 = tip_qx * s32
+    s45 = tip_qy * s33
+    s36 = tip_qz * s34
+    s37 = tip_qy * s32
+    s46 = tip_qz * s32
+    s47 = tip_qz * s33
+    s38 = s43 + s46
+    s39 = s47 - s42
+    s59 = 1.0 - (s44 + s45)
     return (
-        1.0 - (s43 + s34),
-        s35 - s33,
-        s36,
-        h * s36,
-        s33 + s35,
-        1.0 - (s42 + s34),
-        s37,
-        h * s37,
-        s44 - s41,
-        s40 + s45,
-        s57,
-        h * s57,
+        1.0 - (s45 + s36),
+        s37 - s35,
+        s38,
+        h * s38,
+        s35 + s37,
+        1.0 - (s44 + s36),
+        s39,
+        h * s39,
+        s46 - s43,
+        s42 + s47,
+        s59,
+        h * s59,
     )
 
 
@@ -638,35 +640,35 @@ def _body_velocities(y, k, u=(), extra=()):
     h, = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s29 = 2.0 / s1
-    s30 = tip_qx * s29
-    s31 = tip_qy * s29
-    s32 = tip_qz * s29
-    s40 = tip_qw * s30
-    s41 = tip_qw * s31
-    s33 = tip_qw * s32
-    s42 = tip_qx * s30
-    s43 = tip_qy * s31
-    s34 = tip_qz * s32
-    s35 = tip_qy * s30
-    s44 = tip_qz * s30
-    s45 = tip_qz * s31
-    s36 = s41 + s44
-    s37 = s45 - s40
-    s57 = 1.0 - (s42 + s43)
-    s58 = h * s36
-    s59 = h * s37
-    s60 = h * s57
-    s38 = tip_wx * (1.0 - (s43 + s34)) + tip_wy * (s35 - s33) + tip_wz * s36
-    s39 = tip_wx * (s33 + s35) + tip_wy * (1.0 - (s42 + s34)) + tip_wz * s37
-    s61 = tip_wx * (s44 - s41) + tip_wy * (s40 + s45) + tip_wz * s57
+    s31 = 2.0 / s1
+    s32 = tip_qx * s31
+    s33 = tip_qy * s31
+    s34 = tip_qz * s31
+    s42 = tip_qw * s32
+    s43 = tip_qw * s33
+    s35 = tip_qw * s34
+    s44 = tip_qx * s32
+    s45 = tip_qy * s33
+    s36 = tip_qz * s34
+    s37 = tip_qy * s32
+    s46 = tip_qz * s32
+    s47 = tip_qz * s33
+    s38 = s43 + s46
+    s39 = s47 - s42
+    s59 = 1.0 - (s44 + s45)
+    s60 = h * s38
+    s61 = h * s39
+    s62 = h * s59
+    s40 = tip_wx * (1.0 - (s45 + s36)) + tip_wy * (s37 - s35) + tip_wz * s38
+    s41 = tip_wx * (s35 + s37) + tip_wy * (1.0 - (s44 + s36)) + tip_wz * s39
+    s63 = tip_wx * (s46 - s43) + tip_wy * (s42 + s47) + tip_wz * s59
     return (
-        s60 * s39 - s59 * s61,
-        s58 * s61 - s60 * s38,
-        s59 * s38 - s58 * s39,
-        s38,
-        s39,
-        s61,
+        s62 * s41 - s61 * s63,
+        s60 * s63 - s62 * s40,
+        s61 * s40 - s60 * s41,
+        s40,
+        s41,
+        s63,
     )
 
 
@@ -675,13 +677,13 @@ def _point_positions(y, k, u=(), extra=()):
     k20, = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s29 = 2.0 / s1
-    s30 = tip_qx * s29
-    s31 = tip_qy * s29
+    s31 = 2.0 / s1
+    s32 = tip_qx * s31
+    s33 = tip_qy * s31
     return (
-        (tip_qw * s31 + tip_qz * s30) * k20,
-        (tip_qz * s31 - tip_qw * s30) * k20,
-        (1.0 - (tip_qx * s30 + tip_qy * s31)) * k20,
+        (tip_qw * s33 + tip_qz * s32) * k20,
+        (tip_qz * s33 - tip_qw * s32) * k20,
+        (1.0 - (tip_qx * s32 + tip_qy * s33)) * k20,
     )
 
 
@@ -690,32 +692,32 @@ def _point_velocities(y, k, u=(), extra=()):
     k20, = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s29 = 2.0 / s1
-    s30 = tip_qx * s29
-    s31 = tip_qy * s29
-    s32 = tip_qz * s29
-    s40 = tip_qw * s30
-    s41 = tip_qw * s31
-    s33 = tip_qw * s32
-    s42 = tip_qx * s30
-    s43 = tip_qy * s31
-    s34 = tip_qz * s32
-    s35 = tip_qy * s30
-    s44 = tip_qz * s30
-    s45 = tip_qz * s31
-    s36 = s41 + s44
-    s37 = s45 - s40
-    s57 = 1.0 - (s42 + s43)
-    s38 = tip_wx * (1.0 - (s43 + s34)) + tip_wy * (s35 - s33) + tip_wz * s36
-    s39 = tip_wx * (s33 + s35) + tip_wy * (1.0 - (s42 + s34)) + tip_wz * s37
-    s61 = tip_wx * (s44 - s41) + tip_wy * (s40 + s45) + tip_wz * s57
-    s95 = s36 * k20
-    s96 = s37 * k20
-    s97 = s57 * k20
+    s31 = 2.0 / s1
+    s32 = tip_qx * s31
+    s33 = tip_qy * s31
+    s34 = tip_qz * s31
+    s42 = tip_qw * s32
+    s43 = tip_qw * s33
+    s35 = tip_qw * s34
+    s44 = tip_qx * s32
+    s45 = tip_qy * s33
+    s36 = tip_qz * s34
+    s37 = tip_qy * s32
+    s46 = tip_qz * s32
+    s47 = tip_qz * s33
+    s38 = s43 + s46
+    s39 = s47 - s42
+    s59 = 1.0 - (s44 + s45)
+    s40 = tip_wx * (1.0 - (s45 + s36)) + tip_wy * (s37 - s35) + tip_wz * s38
+    s41 = tip_wx * (s35 + s37) + tip_wy * (1.0 - (s44 + s36)) + tip_wz * s39
+    s63 = tip_wx * (s46 - s43) + tip_wy * (s42 + s47) + tip_wz * s59
+    s97 = s38 * k20
+    s98 = s39 * k20
+    s99 = s59 * k20
     return (
-        s39 * s97 - s61 * s96,
-        s61 * s95 - s38 * s97,
-        s38 * s96 - s39 * s95,
+        s41 * s99 - s63 * s98,
+        s63 * s97 - s40 * s99,
+        s40 * s98 - s41 * s97,
     )
 
 
@@ -724,41 +726,41 @@ def _point_jacobians(y, k, u=(), extra=()):
     k20, = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s29 = 2.0 / s1
-    s30 = tip_qx * s29
-    s31 = tip_qy * s29
-    s32 = tip_qz * s29
-    s40 = tip_qw * s30
-    s41 = tip_qw * s31
-    s33 = tip_qw * s32
-    s42 = tip_qx * s30
-    s43 = tip_qy * s31
-    s34 = tip_qz * s32
-    s35 = tip_qy * s30
-    s44 = tip_qz * s30
-    s45 = tip_qz * s31
-    s46 = 1.0 - (s43 + s34)
-    s47 = s35 - s33
-    s36 = s41 + s44
-    s48 = s33 + s35
-    s49 = 1.0 - (s42 + s34)
-    s37 = s45 - s40
-    s50 = s44 - s41
-    s51 = s40 + s45
-    s57 = 1.0 - (s42 + s43)
-    s95 = s36 * k20
-    s96 = s37 * k20
-    s97 = s57 * k20
+    s31 = 2.0 / s1
+    s32 = tip_qx * s31
+    s33 = tip_qy * s31
+    s34 = tip_qz * s31
+    s42 = tip_qw * s32
+    s43 = tip_qw * s33
+    s35 = tip_qw * s34
+    s44 = tip_qx * s32
+    s45 = tip_qy * s33
+    s36 = tip_qz * s34
+    s37 = tip_qy * s32
+    s46 = tip_qz * s32
+    s47 = tip_qz * s33
+    s48 = 1.0 - (s45 + s36)
+    s49 = s37 - s35
+    s38 = s43 + s46
+    s50 = s35 + s37
+    s51 = 1.0 - (s44 + s36)
+    s39 = s47 - s42
+    s52 = s46 - s43
+    s53 = s42 + s47
+    s59 = 1.0 - (s44 + s45)
+    s97 = s38 * k20
+    s98 = s39 * k20
+    s99 = s59 * k20
     return (
-        s48 * s97 - s50 * s96,
-        s49 * s97 - s51 * s96,
-        s37 * s97 - s57 * s96,
-        s50 * s95 - s46 * s97,
-        s51 * s95 - s47 * s97,
-        s57 * s95 - s36 * s97,
-        s46 * s96 - s48 * s95,
-        s47 * s96 - s49 * s95,
-        s36 * s96 - s37 * s95,
+        s50 * s99 - s52 * s98,
+        s51 * s99 - s53 * s98,
+        s39 * s99 - s59 * s98,
+        s52 * s97 - s48 * s99,
+        s53 * s97 - s49 * s99,
+        s59 * s97 - s38 * s99,
+        s48 * s98 - s50 * s97,
+        s49 * s98 - s51 * s97,
+        s38 * s98 - s39 * s97,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from campaign import some
 from campaigns import light_cart_pole as cart
+from mpmath import mp
 from scipy.optimize import brentq
 
 # t, x, theta: recomputed for this benchmark by a quadrature in 30 digits.
@@ -108,3 +109,16 @@ def test_lu_has_a_floor(rtol: str, tightest: Any) -> None:
     found, _ = cart.errors(some(1, 4), "DOP853", rtol, derivative=cart.by_lu)
     assert cart.FLOOR[rtol] / 6 < median(found) < cart.FLOOR[rtol] * 6
     assert min(found) > 50 * cart.error(tightest.y)
+
+
+def test_energy_keeps_its_digits_in_a_spike() -> None:
+    """The pole turns about its own end there, of which the cart's rate and its own tell by a
+    difference: ½ M ẋ² + ½ m |v|² is to be summed, not multiplied out.
+    """
+    theta, rate = 1e-3, 4000.0
+    y = np.array([0.0, theta, -rate * np.cos(theta), rate])
+    with mp.workdps(40):
+        _, angle, slide, turn = map(mp.mpf, y.tolist())
+        across = slide + turn * mp.cos(angle), turn * mp.sin(angle)
+        exact = (mp.mpf(1e-6) * slide**2 + across[0] ** 2 + across[1] ** 2) / 2
+    assert cart.module().kinetic_energy(0.0, y) == pytest.approx(float(exact), rel=1e-15)

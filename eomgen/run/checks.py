@@ -66,6 +66,20 @@ def check_samples(samples: int | None) -> None:
         raise RunError(f"samples: {samples} is too many; give at most {MOST_SAMPLES}")
 
 
+def check_rest_speed(rest_speed: float | None) -> None:
+    """Raise `RunError` for a speed that is none."""
+    if rest_speed is not None and not (math.isfinite(rest_speed) and rest_speed > 0):
+        raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
+
+
+def check_repairs(problem: Problem, resumed: bool) -> None:
+    """Raise `RunError` for a run that long numbers cannot repair."""
+    if problem.contacts is not None:
+        raise RunError("guard: what contacts do cannot be repaired; let it stop instead (--guard)")
+    if resumed:
+        raise RunError("guard: what goes on is not repaired; let it stop instead (--guard)")
+
+
 def check_no_step(integrator: str, dt: float | None) -> None:
     """Raise `RunError` for an equal step given to a method that chooses its own."""
     if dt is not None:

@@ -33,7 +33,7 @@ from eomgen.run.contacts import (
     still,
     strikes,
 )
-from eomgen.run.integrators.interface import Advance, Resume, StepFailure
+from eomgen.run.integrators.interface import Advance, Begin, Resume, StepFailure
 from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.trajectory import Event
 
@@ -53,7 +53,7 @@ class Stepper:
     counted  makes a function count among the derivatives evaluated
     """
 
-    begin: Callable[[Problem, float, int, Resume | None], Iterator[Advance]]
+    begin: Begin
     looks: Sequence[float]
     counted: Callable[[Rate], Rate]
 

@@ -33,9 +33,9 @@ def explain_by(
         if endless:
             return f"{_effects(endless)} no finite value; {REMEDY}"
         if not (known.driven or known.locked):
-            (felt,) = resistances(known.with_parameters(parameters), [values.q])
+            felt = resistances(known.with_parameters(parameters), np.array([values.q]))
             for i in sorted(felt):
-                if felt[i] < GONE:
+                if felt[i][0] < GONE:
                     return why_unresisted(known, i)
         if is_singular(known, values):
             return "the mass matrix is singular; change lengths, masses or inertias, or keep away"

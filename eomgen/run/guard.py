@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance, StepFailure
+from eomgen.run.integrators.interface import Advance, Begin, StepFailure
 from eomgen.run.problem import Floats, Problem
 
 LOST = 1e-8
@@ -30,8 +30,6 @@ UNIT = 1e-12
 """What a quaternion may be off unit length."""
 FULL = 16.0
 """Digits of doubles."""
-
-Begin = Callable[[Problem, float, int], Iterator[Advance]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,10 +1,8 @@
 """From a problem to its trajectory: check what is asked, step, and keep what was computed."""
 
-import math
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -13,6 +11,8 @@ from eomgen.run import events
 from eomgen.run.checks import (
     allowed_errors,
     check_no_step,
+    check_repairs,
+    check_rest_speed,
     check_samples,
     check_steps,
     check_times,
@@ -28,7 +28,7 @@ from eomgen.run.integrators import (
     find_integrator,
     fixed_step,
 )
-from eomgen.run.integrators.interface import Adaptive, Advance, Change, Resume
+from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Change, Resume
 from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
@@ -38,14 +38,6 @@ from eomgen.run.works import Account, Powers
 ADAPTIVE_SAMPLES = 1001
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Where in a long step the gaps of contacts are looked at; in an equal step at its ends."""
-
-
-class Begin(Protocol):
-    """Steps of a problem from a time on; with how many were made before, what they go on from."""
-
-    def __call__(
-        self, problem: Problem, t: float, made: int, resume: Resume | None = None
-    ) -> Iterator[Advance]: ...
 
 
 def integrate(
@@ -104,11 +96,10 @@ def integrate(
     check_times(t_start, t_end)
     check_tolerances(rtol, atol)
     check_samples(samples)
-    if rest_speed is not None and not (math.isfinite(rest_speed) and rest_speed > 0):
-        raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
-
-    if guard is not None and guard.repairs and problem.contacts is not None:
-        raise RunError("guard: what contacts do cannot be repaired; let it stop instead (--guard)")
+    check_rest_speed(rest_speed)
+    repairs = guard is not None and guard.repairs
+    if repairs:
+        check_repairs(problem, resume is not None)
     watch = None
     if guard is not None:
         tight = OF_TOLERANCE * rtol if isinstance(method, Adaptive) else guard.bound
@@ -128,7 +119,7 @@ def integrate(
         dt, every = check_steps(integrator, t_end - t_start, dt, samples, max_steps)
         # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
-        looked_at = problem if method.explicit and not (guard and guard.repairs) else None
+        looked_at = problem if method.explicit and not repairs else None
         begin = _equal_steps(method.prepare(counted), grid, t_end, dt, every, looked_at)
     else:
         check_no_step(integrator, dt)
@@ -139,9 +130,7 @@ def integrate(
         bounds = allowed_errors(problem, atol)
         begin = _adaptive_steps(method, t_end, (rtol, bounds, longest), times, max_steps)
 
-    if watch and watch.guard.repairs:
-        if resume is not None:
-            raise RunError("guard: what goes on is not repaired; let it stop instead (--guard)")
+    if watch and repairs:
         advances = repaired(watch, begin, counted, t_start, max_steps)
     elif problem.contacts is None:
         advances = begin(counted, t_start, 0, resume)
@@ -158,7 +147,7 @@ def integrate(
             resume=resume,
         )
 
-    if watch and not watch.guard.repairs:
+    if watch and not repairs:
         advances = watched(watch, advances, t_start, problem.initial)
 
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
@@ -171,7 +160,7 @@ def integrate(
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
     mended = watch.words() if watch else ""
-    message = "; ".join(part for part in (trouble, mended, remarks) if part)
+    remembered = numbers(grid=grid, dt=dt, rtol=rtol, atol=atol, longest=longest)
     calls = {"derivatives": derivatives.calls, "jacobians": jacobians.calls}
     impacts = sum(event.kind == "impact" for event in run.events)
     return Trajectory(
@@ -181,14 +170,12 @@ def integrate(
         y=np.array([y for _, y in run.rows]),
         integrator=integrator,
         finished=not trouble,
-        message=" ".join(message.split()),
+        message=" ".join("; ".join(filter(None, (trouble, mended, remarks))).split()),
         counts={"steps": run.steps, **calls, "impacts": impacts},
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
         work_names=account.names if account else (),
-        resume={**run.resume(), **numbers(grid=grid, dt=dt, rtol=rtol, atol=atol, longest=longest)}
-        if run.resume
-        else {},
+        resume={**run.resume(), **remembered} if run.resume else {},
     )
 
 

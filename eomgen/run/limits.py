@@ -13,8 +13,6 @@ NEAR = 1e-4
 """Part of the inertia felt elsewhere below which a joint is near a lock: its axes stand within a
 hundredth of a radian of it, and every digit of that part is lost.
 """
-MOST = 12
-"""Velocities of models whose rows are looked at for it."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +57,12 @@ def locks(model: Model, trajectory: Trajectory) -> list[str]:
     next to nothing resists there.
     """
     known = model.form == "velocity" and not (model.driven or model.locked)
-    if not known or model.dimensions != 3 or len(model.velocities) > MOST:
+    if not known or model.dimensions != 3:
         return []
-    felt = resistances(model, trajectory.y[:, : len(model.coordinates)].tolist())
+    felt = resistances(model, trajectory.y[:, : len(model.coordinates)])
     lines = []
-    for i in sorted(felt[0]):
-        row = min(range(len(felt)), key=lambda k: felt[k][i])
-        if felt[row][i] < NEAR:
+    for i in sorted(felt):
+        row = int(np.argmin(felt[i]))
+        if felt[i][row] < NEAR:
             lines.append(f"at t = {trajectory.t[row]:.4g} s {why_unresisted(model, i)}")
     return lines

@@ -286,7 +286,7 @@ class Dynamics(Moving):
     @cached_property
     def kinetic_energy(self) -> Scalar:
         """Of all bodies and rotors, J."""
-        return kinetic_energy(self.instant, self.moving, self.v, self.scalars)
+        return kinetic_energy(self.instant, self._solids, self.moving, self.v, self.scalars)
 
     @cached_property
     def potential_energy(self) -> Scalar:

@@ -101,6 +101,10 @@ class Instant:
         """A vector of frame k's own axes in those of link k."""
         return times(self.world[k], a) if k >= 0 and self.axes == "world" else a
 
+    def in_frame(self, k: int, a: Vec) -> Vec:
+        """A vector of link k in frame k's own axes."""
+        return times(transposed(self.world[k]), a) if k >= 0 and self.axes == "world" else a
+
 
 def at_instant(linkage: Linkage, q: Sequence[Scalar], axes: Axes, scalars: Scalars) -> Instant:
     """The links of a linkage at coordinates `q`."""

@@ -4,6 +4,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from eomgen.derivation.recursive.instant import Instant, Link
+from eomgen.derivation.recursive.solids import Solid
 from eomgen.derivation.recursive.vectors import (
     Mat,
     Scalar,
@@ -152,18 +153,25 @@ def moment_about_centre(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
 
 
 def kinetic_energy(
-    instant: Instant, moving: Sequence[Twist], v: Sequence[Scalar], scalars: Scalars
+    instant: Instant,
+    carried: Sequence[Solid | None],
+    moving: Sequence[Twist],
+    v: Sequence[Scalar],
+    scalars: Scalars,
 ) -> Scalar:
-    """Σ ½ m |v|² + v · (ω x h) + ½ ω · J ω, and ½ A q̇² of the motors' rotors."""
-    half, twice = scalars.number(0.5), scalars.number(0.0)
-    energy = scalars.number(0.0)
-    for link, motion in zip(instant.links, moving, strict=True):
-        w, u, rigid = motion.angular, motion.linear, link.rigid
-        twice = twice + rigid.mass * dot(u, u) + dot(w, times(rigid.inertia, w))
-        energy = energy + dot(u, cross(w, rigid.first))
+    """Σ ½ m |v|² + ½ ω · I ω about the centres of what the frames carry, and ½ A q̇² of the motors'
+    rotors. About other points there were terms of both signs: a pole that swings about its own
+    centre, on next to nothing, would lose digits.
+    """
+    twice = scalars.number(0.0)
+    for k, (link, solid, motion) in enumerate(zip(instant.links, carried, moving, strict=True)):
+        if solid is not None:
+            u = add(motion.linear, cross(motion.angular, instant.of_frame(k, solid.centre)))
+            w = instant.in_frame(k, motion.angular)
+            twice = twice + solid.mass * dot(u, u) + dot(w, times(solid.inertia, w))
         for i in link.v:
             twice = twice + link.armature * (v[i] * v[i])
-    return half * twice + energy
+    return scalars.number(0.5) * twice
 
 
 def momentum_of(link: Link, motion: Twist) -> tuple[Vec, Vec]:

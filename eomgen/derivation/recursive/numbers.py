@@ -1,4 +1,6 @@
-"""Plain floats as scalars of the recursions."""
+"""Plain floats as scalars of the recursions, and arrays of them: many poses at once."""
+
+import numpy as np
 
 from eomgen.derivation.recursive.vectors import Scalar
 from eomgen.language.formula import BY_MATH
@@ -21,4 +23,24 @@ class FloatScalars:
 
     def named(self, value: Scalar, name: str) -> Scalar:
         """A float has no name."""
+        return value
+
+
+class ArrayScalars:
+    """What `Scalars` asks for where scalars are floats or arrays (n,) of them, of one length n."""
+
+    def number(self, value: float) -> float:
+        """The value itself, the same in all of them."""
+        return value
+
+    def call(self, function: str, *arguments: Scalar) -> Scalar:
+        """A function of formulas that NumPy has by the same name, entry by entry."""
+        return getattr(np, function)(*arguments)
+
+    def is_zero(self, value: Scalar) -> bool:
+        """Whether it is 0 in all of them; then the shorter of two ways that agree is taken."""
+        return bool(np.all(value == 0.0))
+
+    def named(self, value: Scalar, name: str) -> Scalar:
+        """An array has no name."""
         return value

@@ -1,10 +1,14 @@
 """Is there inertia against every motion? Asked before code is written, in numbers."""
 
 import random
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from eomgen.derivation.recursive.articulated import (
+    Resistance,
     eliminated,
     inertia_along,
     joined,
@@ -14,11 +18,14 @@ from eomgen.derivation.recursive.articulated import (
 from eomgen.derivation.recursive.composite import composite_bodies
 from eomgen.derivation.recursive.instant import Axes, at_instant
 from eomgen.derivation.recursive.linkage import make_linkage
-from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.derivation.recursive.numbers import ArrayScalars
+from eomgen.derivation.recursive.vectors import Mat
 from eomgen.errors import SceneError
 from eomgen.joints.base import Geared
 from eomgen.language.formula import Constant, Formula
 from eomgen.model import Body, Model
+
+Array = npt.NDArray[np.float64]
 
 TRIALS = 3
 VANISHED = 1e-12
@@ -33,38 +40,32 @@ def check_regular(model: Model) -> None:
     the inertia that a velocity feels when all that it carries is free; one that vanishes at seeded
     random poses vanishes at all, or at almost all.
     """
-    even = replace(model, bodies=tuple(_evened(body, model) for body in model.bodies))
     rng = random.Random(20)
-    largest: dict[int, float] = {}
-    for _ in range(TRIALS):
-        q = [rng.uniform(-1.5, 1.5) for _ in (*model.coordinates, *model.driven)]
-        for i, share in _shares(even, q).items():
-            largest[i] = max(largest.get(i, 0.0), share)
-    for i in sorted(largest, reverse=True):
-        if largest[i] < VANISHED:
+    count = len(model.coordinates) + len(model.driven)
+    pivots = _pivots(_evened(model), _seeded(rng, count))
+    for i in sorted(pivots, reverse=True):
+        pivot, entry = pivots[i]
+        shares = np.divide(pivot, entry, out=np.zeros(TRIALS), where=entry > 0)
+        if shares.max() < VANISHED:
             raise SceneError(_singular(model, i))
 
 
-def resistances(model: Model, poses: Sequence[Sequence[float]]) -> list[dict[int, float]]:
-    """At each pose, for each velocity, the inertia that it feels when all that it carries is free,
-    in parts of the greatest that it feels at any of these poses and a few seeded ones.
+def resistances(model: Model, poses: Array) -> dict[int, Array]:
+    """For each velocity the inertia that it feels when all that it carries is free, at each of n
+    poses (n, nq), in parts of the greatest that it feels at any of these and a few seeded ones:
+    (n,).
 
     As in `check_regular` all masses are taken as 1: heavy on light is no lock. Where the axes of a
     joint come into line with what they carry, as those of a gimbal do, some motion moves no mass:
     it feels none there, and the mass matrix tells no acceleration.
     """
-    model = replace(model, bodies=tuple(_evened(body, model) for body in model.bodies))
-    rng = random.Random(20)
-    count = len(model.coordinates)
-    some = [[rng.uniform(-1.5, 1.5) for _ in range(count)] for _ in range(TRIALS)]
-    found = [
-        {i: pivot for i, (pivot, _) in _pivots(model, list(q)).items()} for q in (*poses, *some)
-    ]
-    largest = {i: max(pivots[i] for pivots in found) for i in found[0]}
-    return [
-        {i: pivot / largest[i] if largest[i] > 0 else 0.0 for i, pivot in pivots.items()}
-        for pivots in found[: len(poses)]
-    ]
+    some = _seeded(random.Random(20), len(model.coordinates))
+    found = _pivots(_evened(model), np.concatenate([poses, some]))
+    shares = {}
+    for i, (pivot, _) in found.items():
+        largest = pivot.max()
+        shares[i] = pivot[: len(poses)] / largest if largest > 0 else np.zeros(len(poses))
+    return shares
 
 
 def why_unresisted(model: Model, i: int) -> str:
@@ -79,7 +80,16 @@ def why_unresisted(model: Model, i: int) -> str:
     return f"next to nothing resists {where}: it moves no mass; give it some, or keep away"
 
 
-def _evened(body: Body, model: Model) -> Body:
+def _seeded(rng: random.Random, count: int) -> Array:
+    return np.array([[rng.uniform(-1.5, 1.5) for _ in range(count)] for _ in range(TRIALS)])
+
+
+def _evened(model: Model) -> Model:
+    """The model with bodies that all weigh the same."""
+    return replace(model, bodies=tuple(_evened_body(body, model) for body in model.bodies))
+
+
+def _evened_body(body: Body, model: Model) -> Body:
     """A body with mass 1 for any, inertia of size 1 for any, a rotor of 1 for any."""
 
     def size(formula: Formula, unit: float = 1.0) -> Constant:
@@ -99,33 +109,46 @@ def _evened(body: Body, model: Model) -> Body:
     )
 
 
-def _shares(model: Model, q: list[float]) -> dict[int, float]:
-    """For each velocity its pivot over its entry of M."""
-    pairs = _pivots(model, q).items()
-    return {i: pivot / entry if entry > 0 else 0.0 for i, (pivot, entry) in pairs}
-
-
-def _pivots(model: Model, q: list[float]) -> dict[int, tuple[float, float]]:
-    """For each velocity its pivot and its entry of M; one that is nothing frees nothing more."""
-    scalars = FloatScalars()
+def _pivots(model: Model, poses: Array) -> dict[int, tuple[Array, Array]]:
+    """For each velocity its pivots and its entries of M at n poses (n, nq), (n,) each; where a
+    pivot is nothing, it frees nothing more.
+    """
+    scalars = ArrayScalars()
     linkage = make_linkage(model, model.defaults, scalars)
     axes: Axes = "world" if model.dimensions == 2 else "own"
-    instant = at_instant(linkage, q, axes, scalars)
+    instant = at_instant(linkage, list(poses.T), axes, scalars)
     bodies = composite_bodies(instant, scalars)
     sums = [resistance_of(link, 0.0) for link in instant.links]
-    pivots: dict[int, tuple[float, float]] = {}
+    pivots: dict[int, tuple[Array, Array]] = {}
     for k in reversed(range(len(sums))):
         link, left = instant.links[k], sums[k]
         whole = resistance_of(replace(link, rigid=bodies[k]), 0.0)
         for axis, i in link.free:
-            pivot, entry = inertia_along(left, axis), inertia_along(whole, axis) + link.armature
-            pivots[i] = (pivot + link.armature, entry)
-            if entry > 0 and pivots[i][0] >= VANISHED * entry:
-                _, left = eliminated(left, axis, link, scalars)
+            pivot, entry = (
+                np.broadcast_to(inertia_along(p, axis) + link.armature, len(poses))
+                for p in (left, whole)
+            )
+            pivots[i] = (pivot, entry)
+            frees = (entry > 0) & (pivot >= VANISHED * entry)
+            if frees.any():
+                with np.errstate(all="ignore"):
+                    left = _where(frees, eliminated(left, axis, link, scalars)[1], left)
         if link.parent >= 0:
             moved = moved_to_parent(link, left, scalars)
             sums[link.parent] = joined(sums[link.parent], moved)
     return pivots
+
+
+def _where(here: npt.NDArray[np.bool_], a: Resistance, b: Resistance) -> Resistance:
+    """One resistance at some of the poses, another at the rest."""
+    if here.all():
+        return a
+
+    def chosen(x: Mat, y: Mat) -> Any:
+        rows = zip(x, y, strict=True)
+        return tuple(tuple(np.where(here, *ab) for ab in zip(*row, strict=True)) for row in rows)
+
+    return Resistance(chosen(a.J, b.J), chosen(a.G, b.G), chosen(a.H, b.H))
 
 
 def _singular(model: Model, i: int) -> str:

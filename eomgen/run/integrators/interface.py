@@ -1,8 +1,8 @@
 """What every integrator looks like from outside."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from scipy.integrate import OdeSolver
 
@@ -84,3 +84,11 @@ class Advance:
     events: tuple[Event, ...] = ()
     contact_powers: Callable[[float, Floats], Floats] | None = None
     resume: Callable[[], Resume] | None = None
+
+
+class Begin(Protocol):
+    """Steps of a problem from a time on; with how many were made before, what they go on from."""
+
+    def __call__(
+        self, problem: Problem, t: float, made: int, resume: Resume | None = None
+    ) -> Iterator[Advance]: ...

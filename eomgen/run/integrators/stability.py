@@ -37,20 +37,25 @@ class Watch:
     """Looks into steps where rates jump, as they do at once where a method cannot hold them."""
 
     change: Change
-    last: Floats | None = None
-    largest: Floats | float = 0.0
+    _last: Floats | None = None
+    _largest: Floats | float = 0.0
+    _allowed: Floats | float = 0.0
 
     def see(self, problem: Problem, t: float, y: Floats, step: Floats, h: float) -> None:
         """Take note of a step of h from `y` at `t` to y + `step`, (ny,) each.
 
         Raises `UnstableStepError` if it is too long.
         """
-        rate = step / h
-        first = self.last is None
-        last = rate if self.last is None else self.last
-        seen = np.maximum(JUMP * self.largest, NOISE * np.max(self.largest))
-        jumps = first or bool((np.abs(rate - last) > seen).any())
-        self.last, self.largest = rate, np.maximum(self.largest, np.abs(rate))
+        rate, last = step / h, self._last
+        self._last = rate
+        # Nothing more is done at most steps: the largest rates are brought up to date by a jump.
+        if last is not None and (np.abs(rate - last) <= self._allowed).all():
+            return
+        first = last is None
+        before = rate if last is None else last
+        self._note(before)
+        jumps = first or not (np.abs(rate - before) <= self._allowed).all()
+        self._note(rate)
         if not jumps:
             return
         if not np.isfinite(step).all():
@@ -65,6 +70,11 @@ class Watch:
             jacobian = _jacobian(problem, time, state)
             if jacobian is not None:
                 self._judge(problem, jacobian, h)
+
+    def _note(self, rate: Floats) -> None:
+        """Take a rate among the largest so far."""
+        self._largest = np.maximum(self._largest, np.abs(rate))
+        self._allowed = np.maximum(JUMP * self._largest, NOISE * np.max(self._largest))
 
     def _judge(self, problem: Problem, jacobian: Floats, h: float) -> None:
         if not growth(self.change, problem, jacobian, h) > math.log(GROWS):
