@@ -4,6 +4,7 @@ import gc
 from collections.abc import Iterator
 
 import pytest
+from matplotlib.figure import Figure
 from mechanisms import BUILT_IN, Compiled, compiled
 
 TOGETHER = {
@@ -32,6 +33,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def built_in(request: pytest.FixtureRequest) -> Compiled:
     """Each built-in scene, compiled once."""
     return compiled(request.param)
+
+
+@pytest.fixture
+def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of commands are written, but blank: of a short run they take most of the time, and
+    what they show has tests of its own.
+    """
+    monkeypatch.setattr("eomgen.show.figure.draw_motion", lambda motion: Figure((1, 1)))
+    monkeypatch.setattr("eomgen.show.work_precision.draw", lambda about, works: Figure((1, 1)))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -302,6 +302,7 @@ QUICK = "--quick --no-arithmetic --t-end 0.5 --methods rk4,DOP853 --run-time 100
 """No run is over its time, however slow the machine: what is run is the same each time."""
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_what_was_interrupted_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

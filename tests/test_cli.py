@@ -18,6 +18,7 @@ from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene
 from eomgen.store import generated_code
 
 ROOT = Path(__file__).parent.parent
+pytestmark = pytest.mark.usefixtures("blank_figures")
 
 
 def test_committed_modules_are_what_is_generated(
