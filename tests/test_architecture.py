@@ -1,6 +1,7 @@
 """The shape of the code: imports go one way, the running half is light, promises of the README."""
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -135,7 +136,8 @@ def test_a_fresh_scene_is_simulated_without_sympy(tmp_path: Path) -> None:
         "code = main(['simulate', 'pendulum', '--t-end', '0.1', '-o', sys.argv[1]]); "
         "sys.exit(code or 10 * ('sympy' in sys.modules))"
     )
-    environment = {"EOMGEN_CACHE": str(tmp_path / "store"), "PATH": ""}
+    # Of a home without a cache of fonts Matplotlib would make one, each time.
+    environment = {**os.environ, "EOMGEN_CACHE": str(tmp_path / "store"), "PATH": ""}
     codes = [
         subprocess.run(
             [sys.executable, "-c", run, str(tmp_path)],
