@@ -2,7 +2,6 @@
 
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,15 +24,7 @@ NUDGES = 3
 """How often data are changed in their last place to see what that does."""
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """A model, the parameters it is judged at, and one that is to be refused never gets here."""
-
-    model: Model
-    parameters: dict[str, float]
-
-
-def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Drawn:
+def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Model:
     """A random tree whose masses, inertias, arms and gravity are as many decades off; those of one
     body's inertia alike, for it must stay one.
 
@@ -50,7 +41,7 @@ def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Drawn:
     _, text = random_spatial_tree(seed, dimensions, MOST_BODIES, parameters)
     model = build_model(parse_scene(text))
     check_regular(model)
-    return Drawn(model, {**model.defaults})
+    return model
 
 
 def state(model: Model, seed: int, special: bool) -> tuple[list[float], list[float]]:
@@ -92,19 +83,19 @@ def taken(model: Model) -> str:
     return "orthogonal"
 
 
-def found(d: Drawn, q: Sequence[float], v: Sequence[float], u: dict[str, float]) -> list[float]:
+def found(model: Model, q: Sequence[float], v: Sequence[float], u: dict[str, float]) -> list[float]:
     """v̇ in doubles, by the recursion taken. Raises `Refused`."""
-    at = dynamics(d.model, d.parameters, q, v, u, FloatScalars())
+    at = dynamics(model, model.defaults, q, v, u, FloatScalars())
     forward = {
         "aba": at.articulated_forward,
         "ldl": at.factored_forward,
         "orthogonal": at.orthogonal_forward,
     }
-    return list(forward[taken(d.model)]())
+    return list(forward[taken(model)]())
 
 
 def truth(
-    d: Drawn, q: Sequence[float], v: Sequence[float], u: dict[str, float]
+    model: Model, q: Sequence[float], v: Sequence[float], u: dict[str, float]
 ) -> tuple[list[Any], float]:
     """v̇ in 60 digits, and how much of its largest component it changes by when all data are
     changed by up to half a unit in the last place: no more than that can be asked of doubles.
@@ -115,10 +106,10 @@ def truth(
         return MP.mpf(value) * (1 + MP.mpf(nudge * r.uniform(-1, 1)))
 
     def exactly(nudge: float) -> list[Any]:
-        p = {name: near(value, nudge) for name, value in d.parameters.items()}
+        p = {name: near(value, nudge) for name, value in model.defaults.items()}
         w = {name: near(value, nudge) for name, value in u.items()}
         at = ([near(x, nudge) for x in q], [near(x, nudge) for x in v])
-        return list(dynamics(d.model, p, *at, w, Digits()).articulated_forward())
+        return list(dynamics(model, p, *at, w, Digits()).articulated_forward())
 
     true = exactly(0.0)
     size = max(abs(x) for x in true)

@@ -291,6 +291,10 @@ def test_records_come_back_as_they_were(tmp_path: Path) -> None:
     assert generation == 1.25
     assert repr([back[work.rung] for work in works]) == repr(works)  # nan is not nan
     assert list(back) == [work.rung for work in records.ordered(works)]
+    whole = path.read_text()
+    path.write_text(whole.rstrip().rpartition(",")[0])  # the last row breaks off
+    assert records.load(path, "ab12") == ({}, None)
+    path.write_text(whole)
     assert records.load(path, "ab13") == ({}, None)
     path.write_text(path.read_text("utf-8").replace(",ok,", ",fine,", 1), "utf-8")
     assert records.load(path, "ab12") == ({}, None)

@@ -24,9 +24,9 @@ def _tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) 
         tree = drawn(seed, dimensions, decades)
     except SceneError:
         return "refused"
-    q, v = state(tree.model, seed, special)
+    q, v = state(tree, seed, special)
     r = np.random.default_rng(seed)
-    u = {i.name: float(r.uniform(-9, 9)) for i in tree.model.inputs}
+    u = {i.name: float(r.uniform(-9, 9)) for i in tree.inputs}
     try:
         true, allowed = truth(tree, q, v, u)
         off = apart(found(tree, q, v, u), true)

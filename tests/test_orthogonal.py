@@ -34,6 +34,9 @@ from eomgen.scene.reader import find_scene, parse_scene
 PLANE, SPACE = 2, 3
 AT_RANDOM, ALIGNED = 1e-13, 1e-10
 """The bounds that the route is built for; of the states here the worst is off by 3e-14."""
+BALLS = {"ball": 1e-12}
+"""All but one in two hundred random trees of ball joints are below 1e-13, too."""
+LOOSE = 'type = "free"\nname = "j0"\nchild = "b0"'
 MOST_OPERATIONS = {PLANE: 2.3, SPACE: 2.8}
 """Times those of `aba`."""
 MASSES = {
@@ -212,17 +215,32 @@ def test_every_digit_of_trees(dimensions: int, masses: str, free: bool) -> None:
 @pytest.mark.parametrize("masses", MASSES)
 @pytest.mark.parametrize("kind", ["prismatic", "cylindrical", "universal", "ball"])
 def test_every_digit_of_other_joints(kind: str, masses: str) -> None:
-    """A heavy body on a ball joint, say, which turns a light one about none of its own axes. Of
-    trees of ball joints one in twenty may be off by more, as far as 1e-6: a limit of the route.
-    """
-    missed, count = [], some(2, 60)
-    for seed in range(count):
+    """A heavy body on a ball joint, say, which turns a light one about none of its own axes."""
+    for seed in range(some(2, 60)):
         n = random.Random(seed).randrange(2, some(5, 8))
         model = heavy(masses, mixed(kind, n, seed), seed)
-        error = off(model, state(model, "random", seed))
-        assert error < 1e-6, (seed, n)
-        missed += [(seed, n)] if error > AT_RANDOM else []
-    assert len(missed) <= (count // 20 if kind == "ball" else 0), missed
+        assert off(model, state(model, "random", seed)) < BALLS.get(kind, AT_RANDOM), (seed, n)
+
+
+@pytest.mark.parametrize(
+    ("masses", "seed", "free"),
+    [
+        ("alternating", 29, False),  # two heavy bodies on a light one
+        ("alternating", 38, False),  # one, and another at the end of a light link
+        ("alternating", 45, False),
+        ("heavier outwards", 26, False),
+        ("heavier outwards", 54, True),  # nothing holds the light one
+    ],
+)
+def test_light_between_heavy_balls(masses: str, seed: int, free: bool) -> None:
+    """What heavy points on ball joints leave free is felt by light inertia alone, and there as far
+    as the heavy rows know nothing of it, not as far as their rounding does.
+    """
+    text = mixed("ball", random.Random(seed).randrange(2, 8), seed)
+    if free:
+        text = re.sub(r'type = "ball"(?s:.*?)(?=\n\[\[bodies)', LOOSE, text, count=1)
+    model = heavy(masses, text, seed)
+    assert off(model, state(model, "random", seed)) < AT_RANDOM
 
 
 ALIGNMENTS = [
@@ -272,6 +290,24 @@ def test_what_the_others_lose(dimensions: int) -> None:
     assert off(model, at) < 1e-14
     lost = digits_lost(model)
     assert min(lost["aba"], lost["ldl"]) > 8.0
+
+
+def test_a_route_that_gives_no_number_loses_all_digits_and_hides_nobody_elses() -> None:
+    """Slides of 1e-9 kg under 1e12 kg are rounded away in LᵀDL, which then divides by 0."""
+    lines = ['name = "slides"\neffects = [{ type = "gravity", g = 9.81, direction = [1, 0] }]']
+    for k, (mass, kind) in enumerate(
+        ((1.0, "revolute"), (1e-9, "prismatic"), (1e-9, "prismatic"), (1e12, "revolute"))
+    ):
+        lines.append(
+            f'[[bodies]]\nname = "b{k}"\nmass = {mass}\ninertia_com = 0\n[[joints]]\n'
+            f'name = "j{k}"\ntype = "{kind}"\nparent = "{f"b{k - 1}" if k else "world"}"\n'
+            f'child = "b{k}"\nr_parent = [{0.5 if k else 0.0}, 0]\nr_child = [-0.5, 0]'
+            + ("\naxis = [1, 0]" if kind == "prismatic" else "")
+        )
+    model = build_model(parse_scene("\n".join(lines)))
+    lost = digits_lost(model, None, Digits())
+    assert lost["ldl"] > 15 and lost["aba"] > 8 and lost["orthogonal"] < 1
+    assert routed(model, jacobian=False).system.route == "orthogonal"
 
 
 def test_free_pair() -> None:

@@ -248,6 +248,65 @@ def test_corners_are_met_exactly() -> None:
     assert np.max(np.abs(tight - exact)) < np.max(np.abs(tight - loose)) < 1e-15
 
 
+STOPPED = """
+name = "stopped"
+dimensions = 2
+[[bodies]]
+name = "block"
+mass = 1.0
+inertia_com = 1.0
+[[joints]]
+name = "slide"
+type = "prismatic"
+parent = "world"
+child = "block"
+axis = [1.0, 0.0]
+coordinate = "x"
+[[effects]]
+type = "joint_stop"
+name = "stop"
+joint = "slide"
+low = -0.5
+high = 0.5
+stiffness = 100.0
+damping = 2.0
+[initial]
+v = { x_dot = 1.0 }
+"""
+
+
+def test_damped_stops_let_go() -> None:
+    """To and fro between two: the force ends before its depth does, and within there is none."""
+    made = compiled(STOPPED)
+    times = np.linspace(0.0, 4.0, 41)
+    tight = to_mp(long_rows(made, times, TIGHT))
+    with mp.workdps(40):
+        k, c = mp.mpf(100), mp.mpf(2)
+        omega = mp.sqrt(k - c * c / 4)
+
+        def pushed(s: Any) -> Any:
+            """Depth and rate at a time s after touching at 1 m/s: x'' = -k x - c x'."""
+            fall, sine, cosine = mp.exp(-c / 2 * s), mp.sin(omega * s), mp.cos(omega * s)
+            return fall * sine / omega, fall * (cosine - c / 2 * sine / omega)
+
+        # k x + c x' = 0, with x and x' as above.
+        within = (mp.pi - mp.atan2(c * omega, k - c * c / 2)) / omega
+        depth, back = pushed(within)
+        exact, begin, speed, way = [], mp.mpf(0), mp.mpf(1), 1  # of a ride from the middle
+        for t in map(mp.mpf, times.tolist()):
+            while t > (end := begin + 0.5 / speed + within - (0.5 + depth * speed) / back / speed):
+                begin, speed, way = end, -back * speed, -way
+            s = t - begin - 0.5 / speed  # since it touched
+            x, v = 0.5 + s * speed, speed
+            if s >= within:
+                x, v = 0.5 + (depth + (s - within) * back) * speed, back * speed
+            elif s >= 0:
+                x, v = 0.5 + pushed(s)[0] * speed, pushed(s)[1] * speed
+            exact.append([way * x, way * v])
+        exact = np.array(exact, dtype=object)
+    assert np.max(np.abs(tight - exact)) < 1e-17
+
+
 BALL = """
 name = "ball"
 dimensions = 2

@@ -14,7 +14,7 @@ from eomgen.errors import RunError
 if TYPE_CHECKING:
     from eomgen.run.works import Powers
     from eomgen.show.motion import Motion
-    from eomgen.study.choosing import Choice
+    from eomgen.study.search import Choice
     from eomgen.study.trial import Case, Tried
 
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0}

@@ -9,14 +9,12 @@ the result; it is not made again.
 """
 
 import math
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 from eomgen.errors import RunError
-from eomgen.run.problem import Floats
-from eomgen.study.estimate import ROUNDING, Law, errors, fit
+from eomgen.study.estimate import ROUNDING, Law, fit
 from eomgen.study.measure import WRONG
+from eomgen.study.search import Choice, Plan, Say, Search
 from eomgen.study.trial import Case, Method, Tried, method_of
 
 GOAL = 0.1
@@ -53,115 +51,8 @@ PATIENT = "gauss_6"
 compensation, rounding disturbs a run a thousand times less."""
 PATIENCE = 10.0
 """Of the time of the best run so far: what the first run of `PATIENT` may take."""
-FIRST_STEPS, MOST_STEPS = 64, 2**20
-"""Of equal steps: in the first run of a method, and in any."""
-
-Say = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A method's next run.
-
-    error, seconds  expected of it, the error only where it is `known`
-    work            that its run at the accuracy asked for should take, s of the processor
-    """
-
-    method: Method
-    tolerance: float
-    error: float
-    known: bool
-    seconds: float
-    work: float
-
-
-@dataclass(frozen=True)
-class Choice:
-    """The run chosen.
-
-    error    its estimated error, in parts of the motion's scale; infinite if there is no estimate
-    met      whether that is what was asked for
-    runs     how many were made in all, which took `seconds` together, with this one
-    """
-
-    tried: Tried
-    error: float
-    met: bool
-    runs: int
-    seconds: float
-
-
-@dataclass
-class _Search:
-    """Runs made so far: those that came to the end, and others; methods that are done with."""
-
-    case: Case
-    say: Say
-    first: float
-    budget: float = math.inf
-    runs: list[Tried] = field(default_factory=list)
-    broken: list[Tried] = field(default_factory=list)
-    left_out: set[str] = field(default_factory=set)
-    started: float = field(default_factory=time.perf_counter)
-
-    @property
-    def spent(self) -> float:
-        return time.perf_counter() - self.started
-
-    @property
-    def motion(self) -> Floats:
-        """The motion as the run held tightest so far has it, or where it starts."""
-        if not self.runs:
-            return self.case.problem.initial[None, :]
-        tightest = min(self.runs, key=lambda run: (run.setting.dt is not None, run.tolerance))
-        return tightest.trajectory.y
-
-    def of(self, name: str) -> list[Tried]:
-        """The finished runs of a method, the tightest last."""
-        own = [run for run in self.runs if run.setting.integrator == name]
-        return sorted(own, key=lambda run: -run.tolerance)
-
-    def tightest(self, method: Method) -> float:
-        return method.tightest or self.case.t_end / MOST_STEPS
-
-    def deepest(self, method: Method) -> float:
-        """The tightest tolerance so far, or shortest step, of methods of its kind; infinite if none
-        came to its end.
-        """
-        alike = (run for run in self.runs if (run.setting.dt is not None) == method.equal_steps)
-        return min((run.tolerance for run in alike), default=math.inf)
-
-    def attempt(self, method: Method, tolerance: float, most: float = math.inf) -> bool:
-        """Make a run; where it comes to no end, the method is gone on with no further."""
-        setting = self.case.setting(method, tolerance, self.motion)
-        tried = self.case.run(setting, most=most, due=self.started + self.budget)
-        if tried.interrupted:
-            raise KeyboardInterrupt
-        finished = tried.trajectory.finished
-        (self.runs if finished else self.broken).append(tried)
-        (self.left_out.discard if finished else self.left_out.add)(method.name)
-        return finished
-
-    def make(self, plan: Plan, most: float = math.inf) -> bool:
-        """Make the run of a plan, and say what is expected of it; whether it came to its end."""
-        setting = self.case.setting(plan.method, plan.tolerance, self.motion)
-        error = f"an error of {plan.error:.1g} in " if plan.known else ""
-        self.say(f"{setting.options}: expecting {error}{plan.seconds:.2g} s")
-        return self.attempt(plan.method, plan.tolerance, most)
-
-    def judged(self) -> dict[int, float]:
-        """Estimated error of each run, by the run's identity."""
-        found = errors(self.runs, self.case.scale(self.motion), self.case)
-        return {id(run): error for run, error in zip(self.runs, found, strict=True)}
-
-    def chosen(self, tried: Tried, judged: dict[int, float], met: bool) -> Choice:
-        runs = len(self.runs) + len(self.broken)
-        return Choice(tried, judged[id(tried)], met, runs, self.spent)
-
-    def nothing(self) -> Choice:
-        """Of runs that all break off, the one that comes farthest."""
-        farthest = max(self.broken, key=lambda tried: float(tried.trajectory.t[-1]))
-        return self.chosen(farthest, {id(farthest): math.inf}, False)
+FIRST_STEPS = 64
+"""Of equal steps, in the first run of a method."""
 
 
 def candidates(case: Case, asked: str | None) -> list[str]:
@@ -188,7 +79,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
     if not 0 < target < WRONG:
         raise RunError(f"--accuracy: {target:g} is not between 0 and {WRONG:g}; give e.g. 1e-6")
     start = min(1e-4, max(1e-6, 1e-4 * (target / 1e-3) ** (1 / 3)))
-    search = _Search(case, say, start)
+    search = Search(case, say, start)
     names = _race(search, candidates(case, asked), target >= LOOSE)
     while search.runs:
         judged = search.judged()
@@ -227,7 +118,7 @@ def within(
     """
     if not 0 < budget < math.inf:
         raise RunError(f"--budget: {budget:g} s is no time to compute in; give e.g. 2s")
-    search = _Search(case, say, FIRST, budget)
+    search = Search(case, say, FIRST, budget)
     names = _race(search, candidates(case, asked), False)
     while search.runs:
         judged = search.judged()
@@ -251,7 +142,7 @@ def within(
     return search.nothing()
 
 
-def _race(search: _Search, names: list[str], loose: bool) -> list[str]:
+def _race(search: Search, names: list[str], loose: bool) -> list[str]:
     """Try each method once, but those that take much longer than another not to the end; return
     the names of all that were.
 
@@ -272,7 +163,7 @@ def _race(search: _Search, names: list[str], loose: bool) -> list[str]:
     return [*names, *more]
 
 
-def _patience(search: _Search, names: list[str], plans: Sequence[Plan | None], most: float) -> bool:
+def _patience(search: Search, names: list[str], plans: Sequence[Plan | None], most: float) -> bool:
     """Try `PATIENT`, too, for `most` s, if it is for this motion, is not among the `names`, and the
     explicit ones of these can be held no tighter.
     """
@@ -298,7 +189,7 @@ def _smooth(case: Case) -> bool:
     return not case.problem.corners and case.problem.contacts is None
 
 
-def _first(search: _Search, method: Method, most: float | None = None) -> None:
+def _first(search: Search, method: Method, most: float | None = None) -> None:
     """A method's first run, for `most` s or not much longer than the quickest; where it fails, a
     tighter one: too long a step may not be stable.
     """
@@ -321,7 +212,7 @@ def _rung(method: Method, errors: float) -> float:
     return float(min(max(least, errors ** (1 / method.exponent)), 10 ** (1 / method.growth)))
 
 
-def _towards(search: _Search, method: Method, judged: dict[int, float], goal: float) -> Plan | None:
+def _towards(search: Search, method: Method, judged: dict[int, float], goal: float) -> Plan | None:
     """A method's next run on the way to an error; none if it can be held no tighter, or rounding
     is all that is left.
     """
@@ -341,7 +232,7 @@ def _towards(search: _Search, method: Method, judged: dict[int, float], goal: fl
     return Plan(method, tolerance, error, known, cost, work.at(wanted))
 
 
-def _beside(search: _Search, best: Tried) -> Plan | None:
+def _beside(search: Search, best: Tried) -> Plan | None:
     """A run a little looser than the best, where that has none near it to tell its error by."""
     method = method_of(best.setting.integrator)
     others = [run.tolerance for run in search.of(method.name) if run is not best]
@@ -352,7 +243,7 @@ def _beside(search: _Search, best: Tried) -> Plan | None:
     return Plan(method, tolerance, math.nan, False, best.seconds, best.work)
 
 
-def _again(search: _Search, names: Sequence[str]) -> Plan | None:
+def _again(search: Search, names: Sequence[str]) -> Plan | None:
     """A run of a method that was put aside for taking longer than others, or than was expected of
     it, now to its end; of several, of the one that has the least to go.
     """
@@ -369,7 +260,7 @@ def _again(search: _Search, names: Sequence[str]) -> Plan | None:
     return min(plans, key=lambda plan: plan.work, default=None)
 
 
-def _most(search: _Search, method: Method, judged: dict[int, float], left: float) -> Plan | None:
+def _most(search: Search, method: Method, judged: dict[int, float], left: float) -> Plan | None:
     """A method's best run in the time that is left; none if that is no better than its last."""
     own = search.of(method.name)
     if not own or method.name in search.left_out or left <= 0:
@@ -387,7 +278,7 @@ def _most(search: _Search, method: Method, judged: dict[int, float], left: float
     return Plan(method, tolerance, law.at(tolerance), known, cost, cost)
 
 
-def _error_law(search: _Search, method: Method, judged: dict[int, float]) -> tuple[Law, bool]:
+def _error_law(search: Search, method: Method, judged: dict[int, float]) -> tuple[Law, bool]:
     """How a method's error falls, and whether that is known.
 
     Of a method whose runs were all too wrong to tell, it is that of the method held tightest: what

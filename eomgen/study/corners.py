@@ -35,13 +35,16 @@ def wrong(ways: Sequence[bool], margins: Floats) -> Floats:
 def wrong_from_the_start(ways: Sequence[bool], margins: Floats) -> list[int]:
     """Corners that were about to turn at the start of a step and go the wrong way all along it.
 
+    A margin that is 0 throughout is not > 0: as that of a stop, which is what a coordinate is
+    beyond its limits, has been turned with others, and then stays 0.
+
     margins (n, corners) at the start, the stages and the end
     """
     against = wrong(ways, margins)
     sizes = np.max(np.abs(margins), axis=0)
-    return np.flatnonzero(
-        against[1:].all(axis=0) & (np.abs(margins[0]) <= NOTHING * sizes)
-    ).tolist()
+    late = against[1:].all(axis=0) & (np.abs(margins[0]) <= NOTHING * sizes)
+    idle = np.array(ways) & (margins[1:] == 0).all(axis=0)
+    return np.flatnonzero(late | idle).tolist()
 
 
 def first_turn(ways: Sequence[bool], places: Floats, margins: Floats) -> Turn | None:

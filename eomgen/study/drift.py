@@ -1,5 +1,6 @@
 """A short run, and what it loses of what exact motion keeps."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,7 +12,9 @@ from eomgen.run.integrators import StepFailure
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
-from eomgen.study.laws import AXES, Kept
+from eomgen.run.trajectory import Trajectory
+from eomgen.study.hard_states import State
+from eomgen.study.laws import AXES, Kept, kept
 from eomgen.study.visited import ENOUGH
 
 METHOD, RTOL = "DOP853", 1e-11
@@ -29,7 +32,8 @@ class Drift:
     until    how far it went, s
     steps    how many it took
     stopped  why it ended before its time, if not for its length
-    kept     by name, energy and components of momentum that exact motion keeps
+    keeps    what exact motion keeps, as far as its states tell
+    lost     by name, energy and components of momentum that it keeps
     books    what of the change of kinetic energy the works of effects do not account for; None if
              there are no effects
     unit     the most that a quaternion is off unit length
@@ -38,7 +42,8 @@ class Drift:
     until: float
     steps: int
     stopped: str
-    kept: dict[str, float]
+    keeps: Kept
+    lost: dict[str, float]
     books: float | None
     unit: float
 
@@ -47,11 +52,12 @@ def drift(
     model: Model,
     module: GeneratedModule,
     full: Any,
-    kept: Kept,
+    states: Sequence[State],
     progress: Progress = lambda _: None,
 ) -> Drift:
     """Run a module from its initial state, at most `MOST_TIME` and no further than the scene says;
-    `full` is one that has energies, momentum and powers.
+    `full` is one that has energies, momentum and powers. What exact motion keeps is asked at some
+    `states`, and where the run's energy changes the most: there something may act for a while only.
 
     What was lost is counted in parts: of energy, of the greatest that was kinetic, or went to and
     fro; of momentum, of the sum over bodies.
@@ -81,14 +87,15 @@ def drift(
     if run.message.startswith("interrupted"):
         raise KeyboardInterrupt
     kinetic = _along(full.kinetic_energy, run.t, run.y)
+    total = kinetic + _along(full.potential_energy, run.t, run.y)
+    keeps = kept(model, [*states, *_beside_change(run, total)])
     lost: dict[str, float] = {}
-    if kept.energy and problem.contacts is None:
-        total = kinetic + _along(full.potential_energy, run.t, run.y)
+    if keeps.energy and problem.contacts is None:
         lost["energy"] = _lost(total, max(np.max(kinetic), np.ptp(total - kinetic)))
     momenta = _along(full.momentum, run.t, run.y)
     if problem.contacts is None:
         for name, row, size in _components(model.dimensions, momenta):
-            if name in kept.momentum:
+            if name in keeps.momentum:
                 lost[f"momentum {name}"] = _lost(momenta[row], size)
     books = None
     if run.works is not None:
@@ -99,7 +106,15 @@ def drift(
     for indices in map(list, module.QUATERNIONS):
         unit = max(unit, float(np.max(np.abs(np.linalg.norm(run.y[:, indices], axis=1) - 1))))
     stopped = "" if run.finished or ENOUGH in run.message else run.message
-    return Drift(float(run.t[-1]), run.counts["steps"], stopped, lost, books, unit)
+    return Drift(float(run.t[-1]), run.counts["steps"], stopped, keeps, lost, books, unit)
+
+
+def _beside_change(run: Trajectory, total: Floats) -> list[State]:
+    """The rows before and after energy changes the most."""
+    if len(run.t) < 2:
+        return []
+    k = int(np.argmax(np.abs(np.diff(total))))
+    return [State("short run", i, float(run.t[i]), run.y[i], {}) for i in (k, k + 1)]
 
 
 def _operations(module: GeneratedModule) -> int:

@@ -47,7 +47,7 @@ class Judged:
     vd         v̇ (nv,), as exactly as doubles hold it
     off        for each route what its v̇ is off (nv,), nan where it gave no finite number
     data       what one ulp in the data does to v̇ (nv,)
-    agreed     digits to which articulated bodies and virtual work agree on v̇, in 60 digits
+    agreed     digits to which articulated bodies and virtual work agree, in 60 digits
     condition  number of the mass matrix scaled to a diagonal of ones, 2-norm
     pivot      smallest pivot of that matrix, eliminated from its last row on as LᵀDL does
     losses     of everything else that the module computes
@@ -94,9 +94,7 @@ def judged(
         if not all(_finite(vd) for vd in (exact, other, *moved)):
             return None
         recorded = truth.long(mpfr(state.t), whole, state.u, {})
-        size = max(abs(other))
-        apart = max(abs(recorded - other))
-        agreed = float(-_log10(apart / size)) if apart and size else 60.0
+        agreed = _agreed(free, recorded)
         data = np.max([abs(vd - other) for vd in moved], axis=0)
         found = {route: _derivative(module, state) for route, module in modules.items()}
         nq, nv = len(model.coordinates), len(model.velocities)
@@ -120,6 +118,16 @@ def _changed(values: Any, rng: np.random.Generator) -> Any:
     signs = rng.choice((-ULP, ULP), size=len(values))
     # Of different sizes, lest two numbers that nearly cancel change alike.
     return values * (1 + long(signs * rng.uniform(0.25, 1.0, size=len(values))))
+
+
+def _agreed(free: FreeBodies, vd: Array) -> float:
+    """Digits to which v̇ of another solver, in 60 digits, solves M v̇ + h - F = 0, of the terms of
+    each row: where these cancel, v̇ itself is but what rounding leaves.
+    """
+    off = abs(_needed(free, vd))
+    terms = abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes
+    worst = max((a / b if b else mpfr(1) for a, b in zip(off, terms, strict=True) if a), default=0)
+    return -_log10(worst) if worst else 60.0
 
 
 def _derivative(module: Any, state: State) -> Floats:
@@ -250,7 +258,7 @@ def _loss(given: Any, true: Array, changes: Sequence[Array], scale: Array) -> Lo
 
 def ulps(off: Array, scale: Array) -> float:
     """The greatest of differences, each in ulps of its scale, but of a thousandth of the greatest
-    scale at least (see `ulps`); where all are 0 it must be exact.
+    scale at least (see `ulps`); where all are 0 it must be exact. nan if any of them is.
     """
     off, scale = np.broadcast_arrays(off, np.maximum(scale, HARDLY * np.max(scale)))
     parts = [
@@ -258,7 +266,7 @@ def ulps(off: Array, scale: Array) -> float:
         for x, s in zip(off.flat, scale.flat, strict=True)
         if x
     ]
-    return max(parts, default=0.0)
+    return float(np.max(parts, initial=0.0))  # unlike Python's own, no nan is lost
 
 
 def _condition(matrix: Array) -> tuple[float, float]:

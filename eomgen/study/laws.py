@@ -19,14 +19,14 @@ from eomgen.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.study.hard_states import State
 from eomgen.study.judging import ulps
-from eomgen.study.longs import Array, long, long_digits, zeros
+from eomgen.study.longs import NOTHING, Array, long, long_digits, zeros
 from eomgen.study.precise import Long
 from eomgen.study.virtual_work import FreeBodies
 
 _STEP = mpfr(2) ** -66
 """Of central differences, in parts of the way in a second; off by their square, some 40 digits."""
-NOTHING = 1e-25
-"""A rate this small, in parts of its terms, is 0."""
+_LEFT = 1e-45
+"""Part of what is differenced that rounding leaves of a difference that is 0."""
 SMOOTH = 1e-9
 """Part of a difference that the difference of two of them may be where there is no corner."""
 AXES = ("x", "y", "z")
@@ -82,14 +82,19 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
             change = (ahead.kinetic_energy - behind.kinetic_energy) / step
             powers, sizes = free.powers
             power = np.sum(powers, initial=mpfr(0))
-            power += free.driving_forces(vd) @ free.rates[nv:] if model.driven else 0
             needed = abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes
-            scale = abs(free.rates[:nv]) @ needed + np.sum(sizes, initial=mpfr(0)) + abs(power)
+            # At both ends of the difference what rests here has come to move.
+            scale = (abs(free.rates[:nv]) + step * abs(vd)) @ needed
+            scale += np.sum(sizes, initial=mpfr(0))
+            scale += _LEFT * free.kinetic_energy / step
+            if model.driven:
+                power += free.driving_forces(vd) @ free.rates[nv:]
+                scale += free.driving_sizes(vd) @ abs(free.rates[nv:])
             energy = ulps(long([change - power]), long([scale]))
         if not why_no_momentum_law(model):
             change = (ahead.momentum - behind.momentum) / step
             outside, sizes = _outside(free)
-            sizes = sizes + free.inertial_sizes(vd)
+            sizes = sizes + free.inertial_sizes(vd) + _LEFT * free.momentum_sizes / step
             # Of force and of moment each by itself: they have no common unit.
             momentum = max(
                 ulps((change - outside)[part], sizes[part]) for part in (slice(3), slice(3, 6))
@@ -180,13 +185,13 @@ class Kept:
 
 
 def kept(model: Model, states: Sequence[State]) -> Kept:
-    """What is kept at all of some states."""
-    lost_energy = False
+    """What is kept at all of some states; of none, nothing."""
+    lost_energy = not states
     takers: dict[str, None] = {}
     names = [*AXES, *(f"about {axis}" for axis in AXES)]
     if model.dimensions == 2:
         names = ["x", "y", "", "", "", "about z"]
-    lost = [not name for name in names]
+    lost = [not (name and states) for name in names]
     with long_digits():
         for state in states:
             y = _unit(model, long(state.y))

@@ -8,12 +8,13 @@ import gmpy2
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.program.digits import BY_MPFR, MP
+from eomgen.program.digits import MP
 from eomgen.run.problem import Floats
-from eomgen.study.precise import Long
 
 BITS = MP.prec
 """Of the significand: 60 digits."""
+NOTHING = 1e-25
+"""Part of its terms below which a sum of long numbers is what rounding left of them."""
 Array = Any
 """An array of such numbers."""
 
@@ -32,18 +33,6 @@ def long(values: Any) -> Array:
 
 
 _LONG = np.frompyfunc(mpfr, 1, 1)
-
-
-class LongScalars:
-    """Long numbers as scalars of formulas and effects."""
-
-    def number(self, value: float) -> Long:
-        """The double itself, exactly."""
-        return mpfr(value)
-
-    def call(self, function: str, *arguments: Long) -> Long:
-        """A function of formulas."""
-        return BY_MPFR[function](*arguments)
 
 
 def zeros(*shape: int) -> Array:

@@ -15,12 +15,17 @@ from eomgen.joints import Free
 from eomgen.joints.base import WORLD, Move
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model import Model, Seat, ways_of
-from eomgen.study.longs import Array, LongScalars, along, long, zeros
+from eomgen.program.digits import Bits
+from eomgen.study.longs import Array, along, long, zeros
 from eomgen.study.poses import Pose, about, orientation, spun, turned_about, world_pose
 from eomgen.study.precise import Long
 
-_INSTANT = mpfr(2) ** -50
-"""s, of differences: their second derivatives are off by some 1e-30 of the fourth."""
+_INSTANT, _BITS = mpfr(2) ** -600, 4096
+"""s, of differences, and the bits of the numbers that they are taken of."""
+_LEAST = mpfr(2) ** -500
+"""A rate smaller than this is 0, and what is left of it is of the differences."""
+_JUMP = 1e-30
+"""Part of an acceleration, or of 1, by which it is not the same on both sides of a jump."""
 
 
 class Placed:
@@ -42,7 +47,7 @@ class Placed:
     ) -> None:
         self.model = model
         self.dimensions = model.dimensions
-        self.scalars = LongScalars()
+        self.scalars = Bits()
         self.bodies = tuple(body.name for body in model.bodies)
         self.nv = len(model.velocities)
         self.moved = self.nv + len(model.driven)
@@ -158,17 +163,23 @@ class Placed:
         }
 
     def _prescribed(self, formula: Formula) -> tuple[Long, Long, Long]:
-        """Value, rate and acceleration of a formula of time."""
-
-        def at(t: Long) -> Long:
-            return evaluate(formula, {**self._parameters, "t": t}, self.scalars)
-
-        before, now, after = (at(self._time + step * _INSTANT) for step in (-1, 0, 1))
-        return (
-            now,
-            (after - before) / (2 * _INSTANT),
-            (after - 2 * now + before) / (_INSTANT * _INSTANT),
-        )
+        """Value, rate and acceleration of a formula of time; nan at a corner, which has none."""
+        h = _INSTANT
+        with gmpy2.context(precision=_BITS):
+            x = [
+                evaluate(formula, {**self._parameters, "t": self._time + k * h}, self.scalars)
+                for k in range(-2, 3)
+            ]
+            rate = (x[3] - x[1]) / (2 * h)
+            behind, here, ahead = (
+                (a - 2 * b + c) / (h * h) for a, b, c in zip(x, x[1:], x[2:], strict=False)
+            )
+            smooth = max(abs(ahead - here), abs(behind - here)) <= _JUMP * (1 + abs(here))
+            rates = [y if abs(y) > _LEAST else mpfr(0) for y in (rate, here)]
+        if not smooth:
+            return mpfr(x[2]), mpfr("nan"), mpfr("nan")
+        value, rate, acceleration = map(mpfr, (x[2], *rates))  # of the bits that hold outside
+        return value, rate, acceleration
 
     def in_space(self, vector: Sequence[Any]) -> Array:
         """A vector of the plane or of space as one of space."""

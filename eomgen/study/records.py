@@ -111,7 +111,7 @@ def load(path: Path, key: str) -> tuple[Mapping[Rung, Work], float | None]:
         generation = float(times[0].removeprefix(GENERATION)) if times else None
         table = csv.DictReader([line for line in lines if not line.startswith("#")])
         works = [_work(row) for row in table]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, csv.Error):
         return {}, None
     return {work.rung: work for work in works}, generation
 
@@ -159,6 +159,8 @@ def _work(row: Mapping[str, str]) -> Work:
 
     if row["method"] not in INTEGRATORS or row["status"] not in STATUSES:
         raise ValueError("no such method or status")
+    if None in row.values():
+        raise ValueError("a row breaks off")
     return Work(
         Rung(row["method"], optional("dt_s"), optional("rtol"), optional("atol")),
         next(status for status in STATUSES if status == row["status"]),

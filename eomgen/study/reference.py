@@ -35,7 +35,7 @@ SECONDS = 300.0
 """Of processor time that a reference in long numbers may take; one in doubles comes on top."""
 TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
 """Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
-FORMAT = "reference 2"
+FORMAT = "reference 3"
 """Changes whenever a reference would come out otherwise."""
 _JUDGED = 0.1
 """Share of the time after which the pace tells whether it will suffice."""
@@ -77,6 +77,7 @@ def reference(
     progress: Progress | None = None,
     seconds: float = SECONDS,
     folder: Path | None = None,
+    doubles: bool = True,
 ) -> Reference:
     """The motion of a module from 0 to `t_end`, s, at given parameters and constant inputs.
 
@@ -84,9 +85,10 @@ def reference(
     progress  told the fraction done
     seconds   of processor time that long numbers may take; 0 for doubles at once
     folder    where references are kept, so that none is computed twice; or None
+    doubles   whether they may stand in where there is no run in long numbers
 
     Raises `RunError` if the module refuses parameters or inputs, if the motion does not get to
-    `t_end`, or if a reference cannot be kept.
+    `t_end`, if a reference cannot be kept, or if doubles would stand in that may not.
     """
     problem = as_problem(module, parameters, inputs, model)
     told = progress or _ignore
@@ -110,6 +112,8 @@ def reference(
             why = str(reason)
     else:
         why = "rigid contacts" if problem.contacts else "as asked"
+    if not (found or doubles):
+        raise RunError(f"no run of {t_end:g} s in long numbers: {why}")
     y, other, origin = found or _in_doubles(problem, times, scale, rest_speed, why, told)
     scale = measure.scales(module.STATES, module.UNITS, y)
     apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)

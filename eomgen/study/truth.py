@@ -10,12 +10,12 @@ from eomgen.derivation.recursive.dynamics import Dynamics
 from eomgen.derivation.recursive.finite import values_at
 from eomgen.derivation.states import velocity_states
 from eomgen.model import Model
-from eomgen.program.digits import MP, Digits, evaluator, exact
+from eomgen.program.digits import MP, Bits, Digits, evaluator, exact
 from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, finish, interpreter
 from eomgen.program.tape import TIME, ExactTape
 from eomgen.run.problem import Floats
-from eomgen.study.longs import Array, LongScalars, long
+from eomgen.study.longs import Array, long
 
 Exact = NDArray[np.object_]
 """60-digit numbers."""
@@ -35,7 +35,7 @@ class Truth:
         nodes = tuple(node.index for node in record.vd)
         program = finish(record.tape, {"vd": Output((len(nodes),), nodes)}, ())
         self._accelerations = evaluator(program, "vd")
-        self._long = interpreter(program, "vd", LongScalars())
+        self._long = interpreter(program, "vd", Bits())
 
     def __call__(self, t: Floats, y: Floats) -> Exact:
         """v̇ (nv, n) at times t (n,) and states y (n, ny); None all over where there is none."""

@@ -23,7 +23,7 @@ from gmpy2 import mpfr
 
 from eomgen.effects.base import JointLoad, Load
 from eomgen.joints.base import WORLD, Geared
-from eomgen.study.longs import Array, along, long, solved, zeros
+from eomgen.study.longs import NOTHING, Array, along, long, solved, zeros
 from eomgen.study.placed import Placed
 from eomgen.study.poses import composed
 from eomgen.study.precise import Long
@@ -79,6 +79,9 @@ class FreeBodies(Placed):
         """What inertia takes while no velocity changes (m,), and the sizes of its terms."""
         total, sizes = zeros(self.moved), zeros(self.moved)
         left_out = "velocity_forces" in self.model.leave_out
+        pace = np.max(abs(self.felt), initial=mpfr(0))
+        # Where all of it cancels, as in a free body that turns evenly, no term is left to count by.
+        least = NOTHING * pace * pace
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
             force = self.mass(name) * pose.place_b
             torque = self.inertias[k] @ pose.spin_b
@@ -87,6 +90,8 @@ class FreeBodies(Placed):
                 torque = torque + np.cross(w, self.inertias[k] @ w)
             total = total + pose.place_v @ force + pose.spin_v @ torque
             sizes = sizes + _reach(pose.place_v, force) + _reach(pose.spin_v, torque)
+            sizes = sizes + _reach(pose.place_v, least * self.mass(name) * self.reach)
+            sizes = sizes + _reach(pose.spin_v, least * self.inertias[k])
         return total, sizes
 
     def pushed(self, loads: Sequence[Load | JointLoad]) -> tuple[Array, Array]:
@@ -262,10 +267,11 @@ class FreeBodies(Placed):
             taken = dict(zip(self.model.driven, self.driving_forces(self.vd), strict=True))
             speeds = dict(zip(self.model.driven, self.rates[self.nv :], strict=True))
             at = {effect.name: k for k, effect in enumerate(self.model.effects)}
+            needed = dict(zip(self.model.driven, self.driving_sizes(self.vd), strict=True))
             for drive, force in taken.items():
                 k = at[str(drive.by)]
                 powers[k] = force * speeds[drive]
-                sizes[k] = abs(powers[k])
+                sizes[k] = needed[drive] * abs(speeds[drive])
         return powers, sizes
 
     def driving_forces(self, vd: Array) -> Array:
@@ -274,12 +280,13 @@ class FreeBodies(Placed):
         needed = self._whole_matrix @ whole + self._resisting[0]
         return (needed - self._loads["gravity"][0] - self._loads["applied"][0])[self.nv :]
 
-    @property
-    def driven_velocities(self) -> Array:
-        """Rates of the driven coordinates."""
-        return self.rates[self.nv :]
+    def driving_sizes(self, vd: Array) -> Array:
+        """Sum of the sizes of its terms."""
+        whole = abs(np.concatenate([vd, self.driven_rates]))
+        sizes = abs(self._whole_matrix) @ whole + self._resisting[1]
+        return (sizes + self._loads["gravity"][1] + self._loads["applied"][1])[self.nv :]
 
 
-def _reach(slopes: Array, force: Array) -> Array:
+def _reach(slopes: Array, force: Array | Long) -> Array:
     """The most that a force does along motions (m, 3), whatever its direction, (m,)."""
     return np.sum(abs(slopes), axis=1) * np.sum(abs(force))

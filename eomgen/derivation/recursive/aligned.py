@@ -2,25 +2,32 @@
 
 A heavy point pulls along that line and turns the frame about it by nothing at all, which sums of
 products would hide in their rounding: along a coordinate axis the lever is no number, but absent.
+So it is with two such points: neither turns the frame about the line between them. Axes can be
+along one line only, and are along that whose turn is the lighter beside what turns it otherwise.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.derivation.recursive.forces import Force
 from eomgen.derivation.recursive.instant import Link
 from eomgen.derivation.recursive.rotations import AxisTurn, Both, Rotation, Unturned
-from eomgen.derivation.recursive.solids import Solid
-from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, zeros
+from eomgen.derivation.recursive.solids import Ranks, Solid
+from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, add, sub, zeros
 
 
 @dataclass(frozen=True)
 class Aligned:
-    """Links and what they carry in such axes; `turns` lead from these to the frames' own."""
+    """Links and what they carry in such axes; `turns` lead from these to the frames' own. `between`
+    has the arms of links from the heaviest on the same frame, where axes are along those; `along`
+    the axis of each frame that is along the arm of the heaviest, if one is.
+    """
 
     links: tuple[Link, ...]
     carried: tuple[Solid | None, ...]
     turns: tuple[Rotation, ...]
+    between: Mapping[int, Vec]
+    along: tuple[int | None, ...]
 
     def into(
         self, wrenches: Sequence[Force], tau: Sequence[Scalar]
@@ -48,27 +55,35 @@ class Aligned:
 def aligned(
     links: Sequence[Link],
     carried: Sequence[Solid | None],
-    heaviest: Sequence[int],
+    ranks: Ranks,
     scalars: Scalars,
 ) -> Aligned:
     """Links, and what they carry, where `heaviest` is for each the link it carries to look at, or
     -1. Frames on other joints keep their axes.
     """
     turns: list[Rotation] = [Unturned() for _ in links]
+    heaviest, between = ranks.heaviest, dict[int, Vec]()
+    ways: list[int | None] = [None] * len(links)
     arms = {k: link.arm for k, link in enumerate(links)}
     for k, link in enumerate(links):
         child, spins = heaviest[k], [axis.angular for axis, _ in link.free] == [True] * 3
         # What is free to move in all ways, by frames of no mass before, resists along that line.
         loose = link.parent >= 0 and carried[link.parent] is None
-        if child >= 0 and spins and not loose:
+        other = ranks.beside[k]
+        if child >= 0 and spins and other >= 0:
+            turns[k], between[other] = _along(sub(links[other].arm, links[child].arm), scalars)
+            arms[child] = turns[k].into(links[child].arm)
+            arms[other] = add(arms[child], between[other])
+        elif child >= 0 and spins and not loose:
             turns[k], arms[child] = _along(links[child].arm, scalars)
+            ways[k] = next((j for j in AXES if not scalars.is_zero(arms[child][j])), None)
     found, bodies = [], []
     for k, link in enumerate(links):
         base = turns[link.parent] if link.parent >= 0 else Unturned()
         turn = link.turn
         if not isinstance(base, Unturned):
             turn = Both(_back(base), turn)
-            if k != heaviest[link.parent]:
+            if k not in (heaviest[link.parent], ranks.beside[link.parent]):
                 arms[k] = base.into(link.arm)
         body = carried[k]
         if not isinstance(turns[k], Unturned):
@@ -78,7 +93,7 @@ def aligned(
                 body = replace(body, centre=turns[k].into(body.centre), inertia=inertia)
         found.append(replace(link, turn=turn, arm=arms[k]))
         bodies.append(body)
-    return Aligned(tuple(found), tuple(bodies), tuple(turns))
+    return Aligned(tuple(found), tuple(bodies), tuple(turns), between, tuple(ways))
 
 
 def _along(arm: Vec, scalars: Scalars) -> tuple[Rotation, Vec]:

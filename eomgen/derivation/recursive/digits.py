@@ -5,6 +5,7 @@ import random
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
@@ -35,7 +36,8 @@ def digits_lost(
              them `orthogonal` is what the others are compared with.
 
     Of the effects uniform gravity and drives act, or with a closed form all, the scene's own
-    parameters hold, and inputs are 0.
+    parameters hold, and inputs are 0. A route that gives no number at a state loses all digits; a
+    state where there is none at all says nothing.
     """
     still = model
     if closed is None:
@@ -51,18 +53,23 @@ def digits_lost(
         values = Values(model.defaults, inputs, q, v, states)
         try:
             d = Dynamics(still, values, FloatScalars(), "own")
-            found = {"aba": d.articulated_forward(), "ldl": d.factored_forward()}
-            found |= {} if closed is None else {"closed": list(closed(values))}
-            found["orthogonal"] = d.orthogonal_forward()
-            true, allowed = found["orthogonal"], EPSILON
-            if exactly is not None:
-                true, allowed = _exactly(still, values, exactly)
+            true, allowed = (
+                (d.orthogonal_forward(), EPSILON)
+                if exactly is None
+                else _exactly(still, values, exactly)
+            )
         except (ArithmeticError, ValueError):
-            continue
-        size = _size(true)
-        for route, other in found.items():
-            off = _apart(other, true) / size / allowed
-            worst[route] = max(worst.get(route, 0.0), off if off == off else math.inf)
+            continue  # no v̇ there to lose digits of
+        forward: dict[str, Callable[[], Sequence[float]]] = {
+            "aba": d.articulated_forward,
+            "ldl": d.factored_forward,
+            "orthogonal": d.orthogonal_forward,
+        }
+        if closed is not None:
+            forward["closed"] = partial(closed, values)
+        for route, found in forward.items():
+            off = _off(found, true) / allowed
+            worst[route] = max(worst.get(route, 0.0), off)
     return {route: _digits(worst.get(route, 1.0)) for route in ROUTES}
 
 
@@ -87,12 +94,23 @@ def _exactly(model: Model, values: Values, scalars: Scalars) -> tuple[list[Any],
     return true, max(EPSILON, apart / _size(true))
 
 
+def _off(found: Callable[[], Sequence[float]], true: Sequence[Any]) -> float:
+    """What a route's v̇ is off, in parts of its size; infinite where it gives no number."""
+    try:
+        off = _apart(found(), true) / _size(true)
+    except (ArithmeticError, ValueError):
+        return math.inf
+    return off if off == off else math.inf
+
+
 def _size(values: Sequence[Any]) -> float:
     return max([1.0, *(float(abs(x)) for x in values)])
 
 
 def _apart(one: Sequence[Any], other: Sequence[Any]) -> float:
-    return max((float(abs(a - b)) for a, b in zip(one, other, strict=True)), default=0.0)
+    """The greatest difference; nan if one of them is."""
+    apart = [float(abs(a - b)) for a, b in zip(one, other, strict=True)]
+    return math.nan if any(map(math.isnan, apart)) else max(apart, default=0.0)
 
 
 def _digits(times: float) -> float:

@@ -23,7 +23,7 @@ a heavy tip hangs in line with all joints, of which rounding of sines and cosine
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from eomgen.derivation.recursive.aligned import aligned
 from eomgen.derivation.recursive.articulated import along, with_component
@@ -33,10 +33,12 @@ from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
 from eomgen.derivation.recursive.possible import column_of, moved, possible, slides_of, turns_of
 from eomgen.derivation.recursive.rows import (
     Column,
+    Eliminated,
     Row,
     Rows,
     Steps,
     Sum,
+    Taken,
     Turn,
     shifted,
     turned_back,
@@ -63,33 +65,6 @@ SLIGHT = 1e-16
 """The least share of a diagonal entry that a pivot of an inertia matrix keeps."""
 
 
-@dataclass(frozen=True)
-class Taken:
-    """An axis of motion that was eliminated: its row before, the residual of that at the end, and
-    the rotations between. `rotor` is the index of its motor's row, -1 if it has none.
-    """
-
-    axis: Axis
-    velocity: int
-    row: Row
-    left: Scalar
-    turns: tuple[Turn | Sum, ...]
-    rotor: int
-    before: tuple[Turn | Sum, ...] = ()
-
-
-@dataclass(frozen=True)
-class Eliminated:
-    """A link after its axes are: rotations before, axes in the order taken, rows that remain for
-    the parent, and those that hold nothing more.
-    """
-
-    turns: tuple[Turn | Sum, ...]
-    axes: tuple[Taken, ...]
-    rows: tuple[Row, ...]
-    empty: tuple[Row, ...]
-
-
 class Elimination:
     """One sweep over the frames of an instant in its own axes.
 
@@ -103,7 +78,7 @@ class Elimination:
         ranks: Ranks,
         scalars: Scalars,
     ) -> None:
-        self._aligned = aligned(instant.links, carried, ranks.heaviest, scalars)
+        self._aligned = aligned(instant.links, carried, ranks, scalars)
         self._links, self._solids = self._aligned.links, self._aligned.carried
         self._carried, self._ranks = carried, ranks
         self._scalars = scalars
@@ -119,7 +94,7 @@ class Elimination:
         """
         zero = zeros(self._scalars)
         wrenches, tau = self._on_bodies(*self._aligned.into(wrenches, tau))
-        rows: list[list[tuple[Row, Vec]]] = [[] for _ in self._links]
+        rows: list[list[tuple[Row, int]]] = [[] for _ in self._links]
         terms = [Force(zero, zero) for _ in self._links]
         found: list[Eliminated] = []
         for k in reversed(range(len(self._links))):
@@ -129,7 +104,7 @@ class Elimination:
             eliminated, passed = self._eliminated(k, own, rows[k], terms[k], tau)
             found.append(eliminated)
             if link.parent >= 0:
-                rows[link.parent] += [(_turned(link, row), link.arm) for row in eliminated.rows]
+                rows[link.parent] += [(_turned(link, row), k) for row in eliminated.rows]
                 terms[link.parent] = total(terms[link.parent], at_parent(link, passed))
         return self._aligned.out(self._outwards(found[::-1], len(tau)))
 
@@ -197,7 +172,7 @@ class Elimination:
         else:
             y = list(sub(wrench.moment, turning))
         work = [list(row) for row in solid.inertia]
-        order = turns_of(self._links[k], self._planar)
+        order = turns_of(self._links[k], self._planar, self._aligned.along[k])
         for n, i in enumerate(order):
             if s.is_zero(solid.inertia[i][i]):
                 if not light:
@@ -223,11 +198,11 @@ class Elimination:
         self,
         k: int,
         own: tuple[dict[int, Row], dict[int, Row]],
-        rows: Sequence[tuple[Row, Vec]],
+        rows: Sequence[tuple[Row, int]],
         term: Force,
         tau: Sequence[Scalar],
     ) -> tuple[Eliminated, Force]:
-        """Take a link's free axes out of the rows of all that it carries, each about a point."""
+        """Take a link's free axes out of the rows of all that it carries, each of a link."""
         s, link, solid = self._scalars, self._links[k], self._solids[k]
         # Where the heaviest rows have no arm, light ones keep theirs.
         heaviest = self._ranks.heaviest[k]
@@ -241,9 +216,22 @@ class Elimination:
             linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
         linear = {j: self._rows.of(about, row) for j, row in linear.items()}
         angular = {j: self._rows.of(about, row) for j, row in angular.items()}
-        loose = [self._rows.of(about, shifted(row, sub(arm, at))) for row, arm in rows]
-        turns: Steps = []
-        slides, ways = slides_of(link, at, loose, self._planar, s), turns_of(link, self._planar)
+        loose = [self._rows.of(about, shifted(row, self._arm(n, at))) for row, n in rows]
+        # Those without an arm first, which so stay without it, be there more of them than columns.
+        loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
+        along = self._aligned.along[k]
+        slides = slides_of(link, at, loose, self._planar, s)
+        ways = turns_of(link, self._planar, along)
+        axes, turns, taken = list(reversed(link.free)), Steps(), []
+        if along is not None and along in angular:
+            axes.sort(key=lambda axis: -ways.index(column_of(axis[0])[1]))
+            kept = {(False, j): linear[j] for j in slides if j in linear}
+            kept |= {(True, j): angular[j] for j in ways if j in angular}
+            one, kept, loose, term = self._early(link, axes.pop(0), kept, loose, term, tau, at)
+            taken.append(one)
+            linear = {j: row for (spins, j), row in kept.items() if not spins}
+            angular = {j: row for (spins, j), row in kept.items() if spins}
+            about = about - {(True, along)}
         orders = (
             [j for j in slides if (False, j) in about],
             [j for j in ways if (True, j) in about],
@@ -265,16 +253,44 @@ class Elimination:
         # Rows of angular accelerations alone first, which so stay what they are.
         free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
         empty = [row for row in loose if self._rows.is_empty(row)]
-        taken = []
-        for axis, i in reversed(link.free):
-            held = axis.unit in own[axis.angular]
-            first, kept, free, before = self._first(axis, held, kept, free)
-            one, kept, free, term = self._taken(link, (axis, i), first, kept, free, term, tau[i])
-            taken.append(replace(one, before=before))
+        for axis in axes:
+            held = axis[0].unit in own[axis[0].angular]
+            first, kept, free, before = self._first(axis[0], held, kept, free)
+            one, kept, free, term = self._taken(link, axis, first, kept, free, term, tau[axis[1]])
+            taken.append(replace(one, before=(*turns, *before)))
+            turns.clear()
         rest = [*kept.values(), *free]
         holding_rows = [row for row in rest if not self._rows.is_empty(row)]
         empty += [row for row in rest if self._rows.is_empty(row)]
-        return Eliminated(tuple(turns), tuple(taken), tuple(holding_rows), tuple(empty)), term
+        return Eliminated(tuple(taken), tuple(turns), tuple(holding_rows), tuple(empty)), term
+
+    def _early(
+        self,
+        link: Link,
+        axis: tuple[Axis, int],
+        kept: dict[Column, Row],
+        loose: list[Row],
+        term: Force,
+        tau: Sequence[Scalar],
+        at: Vec,
+    ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
+        """Take the turn along an arm out of rows about its end `at`.
+
+        The heaviest rows know nothing of it; but they would once those of other arms, rotated
+        against them, had got into them, and rounding would not take it out again.
+        """
+        about = replace(term, moment=sub(term.moment, cross(at, term.force)))
+        first = kept.pop(column_of(axis[0]))
+        one, kept, loose, left = self._taken(
+            link, axis, first, kept, loose, about, tau[axis[1]], early=True
+        )
+        passed = replace(left, moment=add(left.moment, cross(at, left.force)))
+        return replace(one, row=shifted(first, at)), kept, loose, passed
+
+    def _arm(self, k: int, at: Vec) -> Vec:
+        """The arm of a link from a point, that of the heaviest beside it."""
+        between = self._aligned.between.get(k)
+        return sub(self._links[k].arm, at) if between is None else between
 
     def _first(
         self, way: Axis, held: bool, kept: dict[Column, Row], free: list[Row]
@@ -307,15 +323,25 @@ class Elimination:
         free: Sequence[Row],
         term: Force,
         tau: Scalar,
+        *,
+        early: bool = False,
     ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
-        """Rotate one row until it alone holds an axis of motion."""
+        """Rotate one row until it alone holds an axis of motion; where it is early, first against
+        the kept ones, which so stay a triangle.
+        """
         s, (way, i) = self._scalars, axis
         column = column_of(way)
-        pivot, kept, free, turns = first, dict(kept), list(free), Steps()
-        for n, row in enumerate(free):
-            pivot, free[n] = self._rows.rotated(pivot, row, column, turns)
+        kept, free, turns = dict(kept), list(free), Steps()
+
+        def with_free(pivot: Row) -> Row:
+            for n, row in enumerate(free):
+                pivot, free[n] = self._rows.rotated(pivot, row, column, turns)
+            return pivot
+
+        pivot = first if early else with_free(first)
         for key in reversed(kept):
             pivot, kept[key] = self._rows.rotated(pivot, kept[key], column, turns)
+        pivot = with_free(pivot) if early else pivot
         carried = along(way, term.moment, term.force)
         force, rotor, parents = carried + tau, -1, -tau
         if not s.is_zero(link.armature):
@@ -350,6 +376,7 @@ class Elimination:
                 linear = link.turn.into(add(base_linear, cross(base_angular, link.arm)))
             for row in (*eliminated.empty, *(eliminated.rows if link.parent < 0 else ())):
                 residuals[row.index] = -row.right
+            turned_back(eliminated.turns, residuals)
             for taken in reversed(eliminated.axes):
                 row, way = taken.row, taken.axis
                 residuals[row.index] = taken.left
@@ -365,7 +392,6 @@ class Elimination:
                     result[taken.velocity] = value - before
                 angular, linear = with_component(way, angular, linear, value)
                 turned_back(taken.before, residuals)
-            turned_back(eliminated.turns, residuals)
             angular = named(angular, f"alpha_{link.name}", scalars)
             reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
         return result

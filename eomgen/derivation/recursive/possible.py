@@ -31,12 +31,14 @@ def moved(columns: set[Column], at: Vec, scalars: Scalars) -> set[Column]:
     return found
 
 
-def turns_of(link: Link, planar: bool) -> tuple[int, ...]:
-    """The axes to turn about, in the order to eliminate them in, that of the link last."""
+def turns_of(link: Link, planar: bool, along: int | None) -> tuple[int, ...]:
+    """The axes to turn about, in the order to eliminate them in, that of the link last, or that
+    `along` the arm of what it carries.
+    """
     if planar:
         return (2,)
     units = [axis.unit for axis, _ in link.free if axis.angular and axis.unit is not None]
-    last = units[-1] if units else 2
+    last = along if along is not None else units[-1] if units else 2
     return ((last + 1) % 3, (last + 2) % 3, last)
 
 

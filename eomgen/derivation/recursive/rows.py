@@ -13,6 +13,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
+from eomgen.derivation.recursive.instant import Axis
 from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, add, cross, unit, zeros
 
 TINY = 1e-200
@@ -46,13 +47,44 @@ class Turn:
 
 @dataclass(frozen=True)
 class Sum:
-    """Rows x · unknown = right put together at once with a pivot row of that unknown alone."""
+    """Rows x · unknown = right put together at once with a row of that unknown alone, whose right
+    side was `before`, to `pivot`.
+    """
 
     pivot: Row
+    before: Scalar
     rows: tuple[tuple[int, Scalar, Scalar], ...]
 
 
 Steps = list[Turn | Sum]
+
+
+@dataclass(frozen=True)
+class Taken:
+    """An axis of motion that was eliminated: its row before, the residual of that at the end, the
+    rotations between, and those `before` since the last axis. `rotor` is the index of its motor's
+    row, -1 if it has none.
+    """
+
+    axis: Axis
+    velocity: int
+    row: Row
+    left: Scalar
+    turns: tuple[Turn | Sum, ...]
+    rotor: int
+    before: tuple[Turn | Sum, ...] = ()
+
+
+@dataclass(frozen=True)
+class Eliminated:
+    """A link after its axes are: these in the order taken, rotations after them, rows that remain
+    for the parent, and those that hold nothing more.
+    """
+
+    axes: tuple[Taken, ...]
+    turns: tuple[Turn | Sum, ...]
+    rows: tuple[Row, ...]
+    empty: tuple[Row, ...]
 
 
 class Rows:
@@ -122,9 +154,9 @@ class Rows:
             found.append((row.index, x, row.right))
         if not found:
             return pivot, list(rows)
-        pivot = replace(pivot, weight=weight, right=right / weight)
-        turns.append(Sum(pivot, tuple(found)))
-        return pivot, others
+        summed = replace(pivot, weight=weight, right=right / weight)
+        turns.append(Sum(summed, pivot.right, tuple(found)))
+        return summed, others
 
     def rotated(
         self,
@@ -177,6 +209,7 @@ def turned_back(turns: Sequence[Turn | Sum], residuals: dict[int, Scalar]) -> No
             value = turn.pivot.right + residuals[turn.pivot.index]
             for index, x, right in turn.rows:
                 residuals[index] = x * value - right
+            residuals[turn.pivot.index] = value - turn.before
             continue
         a, b = residuals[turn.pivot], residuals[turn.row]
         residuals[turn.pivot] = a - turn.s * b

@@ -70,24 +70,42 @@ def centres(carried: Sequence[Solid | None], scalars: Scalars) -> list[Vec]:
 
 @dataclass(frozen=True)
 class Ranks:
-    """Which bodies are heavier than others, by frame: the child that carries more mass than the
-    frame itself and any other child, -1 if none; and whether a body is light beside one it carries.
+    """Which bodies are heavier than others, by frame.
+
+    heaviest  the child that carries more mass than the frame itself and any other child, -1 if
+              none; of a ball joint the child that is heaviest whatever way it is moved
+    beside    of a ball joint the next such child, where axes are to be along the line between these
+              two; -1 elsewhere
+    light     whether a body is light beside one it carries
     """
 
     heaviest: tuple[int, ...]
+    beside: tuple[int, ...]
     light: tuple[bool, ...]
 
 
 def ranked(linkage: Linkage) -> Ranks:
     """The ranks of a linkage over floats."""
-    own = [float(frame.rigid.mass) for frame in linkage.frames]
-    whole, most, found, single = list(own), list(own), [-1] * len(own), list(own)
+    frames = linkage.frames
+    own = [float(frame.rigid.mass) for frame in frames]
+    whole, single, least = list(own), list(own), list(own)
+    heaviest, beside = [-1] * len(own), [-1] * len(own)
     for k in reversed(range(len(own))):
-        parent = linkage.frames[k].parent
-        if parent >= 0:
-            whole[parent] += whole[k]
-            single[parent] = max(single[parent], single[k])
-            if whole[k] > most[parent]:
-                most[parent], found[parent] = whole[k], k
+        children = [n for n, frame in enumerate(frames) if frame.parent == k]
+        whole[k] += sum(whole[n] for n in children)
+        single[k] = max([own[k], *(single[n] for n in children)])
+        firm = sorted((*(least[n] for n in children), 0.0, 0.0, 0.0), reverse=True)
+        spins = frames[k].kind == "spin"
+        # What is left of so many points when all turns are free.
+        least[k] = 0.0 if frames[k].kind == "slide" else max(own[k], firm[2 if spins else 1])
+        weights = least if spins else whole
+        order = sorted(children, key=lambda n: -weights[n])
+        if order and weights[order[0]] > own[k]:
+            heaviest[k] = order[0]
+            third = max(own[k], firm[2])
+            # Nothing holds the frame of a free body: there no other line asks for the axes.
+            free = frames[k].parent >= 0 and own[frames[k].parent] == 0.0
+            if spins and firm[1] > third and (free or firm[1] ** 2 > firm[0] * third):
+                beside[k] = order[1]
     light = (one > LIGHT * mass for one, mass in zip(single, own, strict=True))
-    return Ranks(tuple(found), tuple(light))
+    return Ranks(tuple(heaviest), tuple(beside), tuple(light))
