@@ -16,7 +16,7 @@ from eomgen.run.trajectory import Trajectory
 Units = tuple[float, float, float]
 """Of mass, length and time."""
 
-T_END = 2.0
+T_END = 1.375
 
 
 def scene(units: Units) -> str:
