@@ -461,6 +461,51 @@ def test_every_symbol_is_told(name: str) -> None:
             known.add(equation.left.name)
 
 
+@pytest.mark.parametrize("name", TOLD)
+def test_what_is_told_is_true(name: str) -> None:
+    """In numbers every equation gives what the recursions do, to the digits that are shown: places
+    of the bodies along the tree, and accelerations at the end.
+    """
+    equations = scene(name)
+    model = equations.model
+    given = values(model, np.random.default_rng(2))
+    found = {name: float(x) for name, x in given.items()}
+    recording = from_recursion(Recording(replace(model, outputs=("body_poses",)), "aba"))
+    rates, poses = (evaluator(recording.program, x)(given) for x in ("derivative", "body_poses"))
+    state, *steps = tell_general(equations)
+    moving = (*model.coordinates, *model.velocities)
+    numbers = [*(given[c.name] for c in moving), *rates[-len(model.velocities) :]]
+    symbols = [x for line in state.equations for x in line.right]
+    found |= {x.name: float(z) for x, z in zip(symbols, numbers, strict=True)}
+    matrices: dict[str, Any] = {}
+    checked = 0
+    for step in steps:
+        for line in step.equations:
+            by = {x: found[x.name] for x in line.right.free_symbols}
+            right, left = line.right.xreplace(by), line.left.name
+            if isinstance(right, sp.MatrixBase):
+                matrices[left] = np.array(right.evalf().tolist(), dtype=float)
+                continue
+            if left in found:
+                assert float(right) == pytest.approx(found[left], rel=1e-4, abs=1e-4), left
+                checked += 1
+            found[left] = float(right)
+    assert checked >= len(model.velocities)
+    n = model.dimensions
+    places, turns = [np.zeros(n)], [np.eye(n)]
+    for k, body in enumerate(model.bodies):
+        up = body.parent + 1
+        place = matrices[f"r_{body.name}"].ravel()[:n]
+        places.append(places[up] + turns[up] @ place)
+        turns.append(turns[up] @ matrices.get(f"R_{body.name}", np.eye(n)))
+        expected = np.array(poses, dtype=float).reshape(len(model.bodies), -1)[k]
+        if n == SPACE:
+            expected = expected.reshape(3, 4)
+            np.testing.assert_allclose(turns[-1], expected[:, :3], atol=1e-5)
+            expected = expected[:, 3]
+        np.testing.assert_allclose(places[-1], expected[:n], rtol=1e-5, atol=1e-5)
+
+
 @pytest.mark.parametrize("format_", ["text", "latex", "html"])
 def test_derive(format_: str, capsys: pytest.CaptureFixture[str]) -> None:
     """The command writes it in every format."""

@@ -51,6 +51,10 @@ PATIENT = "gauss_6"
 compensation, rounding disturbs a run a thousand times less."""
 PATIENCE = 10.0
 """Of the time of the best run so far: what the first run of `PATIENT` may take."""
+LIMIT = 30.0
+"""Of the time of the tightest run of others: what any run of `PATIENT` may be expected to take. It
+gains three digits in less; where it would need more, the motion is lost in rounding.
+"""
 FIRST_STEPS = 64
 """Of equal steps, in the first run of a method."""
 
@@ -229,6 +233,9 @@ def _towards(search: Search, method: Method, judged: dict[int, float], goal: flo
     seconds = _growth(method, [(run.tolerance, run.seconds) for run in own])
     work = _growth(method, [(run.tolerance, run.work) for run in own])
     error, cost = law.at(tolerance), seconds.at(tolerance)
+    others = search.of("DOP853")
+    if method.name == PATIENT and others and cost > LIMIT * others[-1].seconds:
+        return None
     return Plan(method, tolerance, error, known, cost, work.at(wanted))
 
 
