@@ -4,13 +4,16 @@ import gc
 from collections.abc import Iterator
 
 import pytest
+from matplotlib.figure import Figure
 from mechanisms import BUILT_IN, Compiled, compiled
 
 TOGETHER = {
-    "closed": "generated handout identities pivots program".split(),
+    "closed": "generated handout identities pivots program routes".split(),
     "effects": "absence bookkeeping".split(),
 }
 """Files whose tests ask for the same compiled scenes: these are made once a process."""
+FIRST = "closed effects laws events closed_general no_silent_error orthogonal cli choosing".split()
+"""Groups and files that take longest, so that no process is left with one of them at the end."""
 
 
 def pytest_configure() -> None:
@@ -23,15 +26,28 @@ def pytest_configure() -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Groups for pytest-xdist: each runs in one process, a file of its own or several together."""
-    groups = {f"test_{name}": group for group, names in TOGETHER.items() for name in names}
+    groups = {name: group for group, names in TOGETHER.items() for name in names}
+    names = [item.path.stem.removeprefix("test_") for item in items]
+    group = {item: groups.get(name, name) for item, name in zip(items, names, strict=True)}
     for item in items:
-        item.add_marker(pytest.mark.xdist_group(groups.get(item.path.stem, item.path.stem)))
+        item.add_marker(pytest.mark.xdist_group(group[item]))
+    rank = {name: i for i, name in enumerate(FIRST)}
+    items.sort(key=lambda item: rank.get(group[item], len(FIRST)))
 
 
 @pytest.fixture(scope="session", params=BUILT_IN)
 def built_in(request: pytest.FixtureRequest) -> Compiled:
     """Each built-in scene, compiled once."""
     return compiled(request.param)
+
+
+@pytest.fixture
+def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of commands are written, but blank: of a short run they take most of the time, and
+    what they show has tests of its own.
+    """
+    monkeypatch.setattr("eomgen.show.figure.draw_motion", lambda motion: Figure((1, 1)))
+    monkeypatch.setattr("eomgen.show.work_precision.draw", lambda about, works: Figure((1, 1)))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -8,6 +8,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from campaign import some
+
 PLANE = """\
 name = "mechanism"
 {outputs}
@@ -376,4 +378,18 @@ def _cases() -> list[Case]:
     return found
 
 
+def _part() -> list[Case]:
+    """The first case of each effect in the plane and in space; of the others one or the other."""
+    met: dict[tuple[str, str], int] = {}
+    found = []
+    for case in CASES:
+        label, base = case.name.rsplit(", ", 1)
+        kind = label.split()[0]
+        turn = met[kind, base] = met.get((kind, base), -1) + 1
+        if base == "pins" or turn == 0 or (turn % 2 == 0) == (base == "plane"):
+            found.append(case)
+    return found
+
+
 CASES = _cases()
+TRIED = some(_part(), CASES)

@@ -21,7 +21,7 @@ from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Scene
 from eomgen.study.states import random_state
 
-__all__ = ["MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "read"]
+__all__ = ["MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "quick", "read"]
 
 STEP = MP.mpf(10) ** -20
 """Of central differences, which are off by its square."""
@@ -90,6 +90,12 @@ def engine(
     as large models have it, no matrix of derivatives is written out.
     """
     return _engine(scene, route, leave_out, tangents)
+
+
+def quick(scene: str, route: str = "", *, tangents: bool = False) -> Engine:
+    """The same without derivatives by inputs and parameters, which take longest to make."""
+    left = ("input_jacobian", "parameter_jacobian")
+    return engine(scene, route, leave_out=left, tangents=tangents)
 
 
 @cache

@@ -97,7 +97,7 @@ def test_orders_are_those_of_the_methods() -> None:
     """The range is found without knowing them, and the slope there is the order."""
     for method in FIXED:
         nominal = order(method)
-        works = climbed(bench(), [method], most_steps=12800 if nominal == 1 else 800)[method]
+        works = climbed(bench(), [method], most_steps=3200 if nominal == 1 else 800)[method]
         if method == "leapfrog":  # z is pulled by v: it says so, once
             assert [work.status for work in works] == ["refused"] and "depends on" in works[
                 0
@@ -302,10 +302,11 @@ def test_records_come_back_as_they_were(tmp_path: Path) -> None:
     assert len({records.key("m", {"a": x}) for x in (1.0, 2.0, 1.0)}) == 2
 
 
-QUICK = "--quick --no-arithmetic --t-end 0.5 --methods rk4,DOP853 --run-time 1000".split()
+QUICK = "--quick --no-arithmetic --t-end 0.2 --methods rk4,DOP853 --run-time 1000".split()
 """No run is over its time, however slow the machine: what is run is the same each time."""
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_what_was_interrupted_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

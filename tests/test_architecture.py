@@ -1,9 +1,12 @@
 """The shape of the code: imports go one way, the running half is light, promises of the README."""
 
 import ast
+import os
+import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import eomgen
@@ -44,10 +47,17 @@ ORDER = (
 )
 
 
+@cache
+def nodes(path: Path) -> list[ast.AST]:
+    """Everything that a module is made of."""
+    return list(ast.walk(ast.parse(path.read_text("utf-8"))))
+
+
+@cache
 def imports(path: Path) -> list[str]:
     """The package's own modules that a module imports, wherever in it."""
     found = []
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("eomgen"):
             found += [f"{node.module}.{alias.name}" for alias in node.names]
         elif isinstance(node, ast.Import):
@@ -121,10 +131,13 @@ def test_a_fresh_scene_is_simulated_without_sympy(tmp_path: Path) -> None:
     """With its module in the store, `simulate` never loads SymPy."""
     run = (
         "import sys; from eomgen.cli import main; "
+        "import eomgen.show.figure as f; from matplotlib.figure import Figure; "
+        "f.draw_motion = lambda motion: Figure((1, 1)); "
         "code = main(['simulate', 'pendulum', '--t-end', '0.1', '-o', sys.argv[1]]); "
         "sys.exit(code or 10 * ('sympy' in sys.modules))"
     )
-    environment = {"EOMGEN_CACHE": str(tmp_path / "store"), "PATH": ""}
+    # Of a home without a cache of fonts Matplotlib would make one, each time.
+    environment = {**os.environ, "EOMGEN_CACHE": str(tmp_path / "store"), "PATH": ""}
     codes = [
         subprocess.run(
             [sys.executable, "-c", run, str(tmp_path)],
@@ -140,15 +153,9 @@ def test_a_fresh_scene_is_simulated_without_sympy(tmp_path: Path) -> None:
 def test_generated_modules_import_math_and_numpy_only() -> None:
     """`functools` of the standard library beside them; nothing that solves."""
     for path in sorted((ROOT / "generated").glob("*.py")):
-        tree = ast.parse(path.read_text("utf-8"))
-        names = set()
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Import):
-                names |= {alias.name for alias in node.names}
-            elif isinstance(node, ast.ImportFrom):
-                names.add(node.module)
-            elif isinstance(node, ast.Attribute):
-                assert node.attr not in ("linalg", "solve", "inv", "lstsq", "det"), path
+        source = path.read_text("utf-8")
+        assert not re.search(r"\.\s*(linalg|solve|inv|lstsq|det)\b", source), path
+        names = set(re.findall(r"^\s*(?:from|import) +([\w.]+)", source, re.MULTILINE))
         assert names == {"functools", "math", "numpy"}, path
 
 
@@ -156,7 +163,7 @@ def test_no_text_is_executed() -> None:
     """Nothing in the package evaluates text: no eval, exec, sympify, parse_expr or lambdify."""
     forbidden = {"eval", "exec", "sympify", "parse_expr", "lambdify", "S"}
     for path in sorted(PACKAGE.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        for node in nodes(path):
             if isinstance(node, ast.Call):
                 called = node.func
                 name = getattr(called, "id", None) or getattr(called, "attr", "")
@@ -198,4 +205,4 @@ def test_built_in_scenes_fit_the_json_schema() -> None:
         assert read_scene(name).name == name
         first = (table.get("bodies") or table["chains"])[0]
         first["mas"] = first.pop("mass")
-        assert list(validator.iter_errors(table)), name
+        assert not validator.is_valid(table), name

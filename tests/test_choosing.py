@@ -23,6 +23,8 @@ from eomgen.study.measure import error
 from eomgen.study.reference import Reference, reference
 from eomgen.study.trial import Case, Setting, Tried, method_of
 
+pytestmark = pytest.mark.usefixtures("blank_figures")
+
 # A small body on a hinge as stiff as a beam, ω = 3e4/s, damped, beside a swing of seconds.
 STIFF = """
 name = "stiff"

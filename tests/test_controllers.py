@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from engine import engine
+from engine import engine, quick
 from scipy.integrate import solve_ivp
 
 from eomgen.build import build_model
@@ -129,7 +129,7 @@ SCENES = {
 
 def response(scene: str, t: float) -> dict[str, float]:
     """The state after t seconds from the start."""
-    module = engine(scene).module
+    module = quick(scene).module
     run = solve_ivp(module.derivative, (0, t), module.initial_state(), **TIGHT)
     return dict(zip(module.STATES, run.y[:, -1], strict=True))
 
@@ -156,7 +156,7 @@ def test_targets_are_formulas() -> None:
     """With both targets from one motion the wheel, started on it, lacks its inertia alone."""
     target = 'target_rate = "-2*sin(2*t)"\n'
     scene = WHEEL + servo("pd", target).replace("target = 0.5", 'target = "cos(2*t)"')
-    module = engine(scene).module
+    module = quick(scene).module
     for t in (0.0, 0.7):
         y = [np.cos(2 * t), -2 * np.sin(2 * t)]
         assert np.allclose(module.derivative(t, np.array(y)), [y[1], 0.0], atol=1e-14)
@@ -174,7 +174,7 @@ def test_saturation() -> None:
     """Away from the target the torque is the limit: the wheel gains speed evenly."""
     found = response(WHEEL + servo("pd", "limit = 0.6"), 0.4)
     assert np.isclose(found["q_dot"], 0.6 / INERTIA * 0.4, rtol=1e-10)
-    module = engine(WHEEL + servo("pd", "limit = 0.6")).module
+    module = quick(WHEEL + servo("pd", "limit = 0.6")).module
     force = [module.applied_force(0.0, np.array([q, 0.0]))[0] for q in (-9.0, 0.48, 9.0)]
     assert np.allclose(force, [0.6, 0.2, -0.6])
 
@@ -199,7 +199,7 @@ def test_saturated_pid() -> None:
         rate = 0.5 - q + (cut - wanted) / 10
         return [v, (torque - 1.5) / INERTIA, rate, (cut - torque) / 0.02]
 
-    module = engine(scene).module
+    module = quick(scene).module
     assert module.STATES == ("q", "q_dot", "hold_integral", "hold_torque")
     for seed in range(5):
         y = random_state(module, seed)
@@ -219,12 +219,12 @@ def test_lag() -> None:
 def test_negative_gains_on_purpose() -> None:
     """Taken where the scene says so."""
     scene = WHEEL + servo("pd", "allow_active = true").replace("10.0", "-10.0")
-    assert np.isclose(engine(scene).module.applied_force(0.0, np.zeros(2))[0], -5.0)
+    assert np.isclose(quick(scene).module.applied_force(0.0, np.zeros(2))[0], -5.0)
 
 
 def test_a_sliding_joint() -> None:
     """There the command is a force, along the slide and back on the parent."""
-    module = engine(CART + servo("pd", joint="rail")).module
+    module = quick(CART + servo("pd", joint="rail")).module
     y = np.array([0.1, 0.0, 0.3, 0.0])
     assert list(module.STATES)[:3:2] == ["s", "s_dot"]
     assert np.allclose(module.applied_force(0.0, y), [10 * 0.4 - 1.2 * 0.3, 0.0])
@@ -243,7 +243,7 @@ def test_user_defined() -> None:
         torque = -3 * z - 0.2 * v + max(w, -0.1)
         return [v, torque / INERTIA, q - 2 * z, z * np.cos(t) - 0.5 * w]
 
-    module = engine(scene).module
+    module = quick(scene).module
     assert module.initial_state().tolist() == [0.0, 0.0, 0.3, 0.0]
     exact = solve_ivp(by_hand, (0, 3), [0, 0, 0.3, 0], **TIGHT).y[:, -1]
     assert np.allclose(list(response(scene, 3.0).values()), exact, atol=1e-9)
@@ -255,11 +255,11 @@ def test_numbers_are_parameters() -> None:
         '[[effects]]\ntype = "controller"\nname = "own"\n'
         "states = { z = { rate = 0.25 } }\ntorques = { axle = 0.8 }\n"
     )
-    module = engine(scene).module
+    module = quick(scene).module
     assert module.PARAMETERS["own_z_rate"] == 0.25 and module.PARAMETERS["own_torques_axle"] == 0.8
     rates = module.derivative(0.0, np.zeros(3), {"own_torques_axle": 4.0, "own_z_rate": 5.0})
     assert np.allclose(rates, [0.0, 10.0, 5.0])
-    module = engine(WHEEL + servo("pid", "limit = 3.0\nlag = 0.02")).module
+    module = quick(WHEEL + servo("pid", "limit = 3.0\nlag = 0.02")).module
     names = ("target", "stiffness", "damping", "integral_gain", "limit", "lag")
     assert all(f"hold_{name}" in module.PARAMETERS for name in names)
 
@@ -290,10 +290,10 @@ def test_jacobian(name: str, tangents: bool) -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_dynamics_with_states(name: str) -> None:
     """Forward and inverse dynamics take the states as `x`, and answer each other."""
-    module = engine(SCENES[name]).module
+    module = quick(SCENES[name]).module
     rng = np.random.default_rng(2)
     y = random_state(module, 2)
-    extra = len(engine(SCENES[name]).model.states)
+    extra = len(quick(SCENES[name]).model.states)
     nq = len(module.POSITIONS)
     q, v, x = y[:nq], y[nq : len(y) - extra], y[len(y) - extra :]
     tau = rng.normal(size=len(v))
@@ -307,7 +307,7 @@ def test_dynamics_with_states(name: str) -> None:
 @pytest.mark.parametrize("name", ["pid tracks", "own"])
 def test_columns(name: str) -> None:
     """Many states at once."""
-    module = engine(SCENES[name]).module
+    module = quick(SCENES[name]).module
     states = np.stack([random_state(module, seed) for seed in range(6)], axis=1)
     one = np.stack([module.derivative(0.2, y) for y in states.T], axis=1)
     assert np.allclose(module.derivative(0.2, states), one, rtol=1e-13, atol=1e-14)
@@ -317,7 +317,7 @@ def test_columns(name: str) -> None:
 def test_integrators(integrator: str) -> None:
     """Each goes its way with states that are neither positions nor velocities."""
     scene = WHEEL + LOAD + servo("pid", "lag = 0.05")
-    problem = as_problem(engine(scene).module)
+    problem = as_problem(quick(scene).module)
     exact = list(response(scene, 0.5).values())
     adaptive = hasattr(INTEGRATORS[integrator], "uses_jacobian")
     kept = {"rtol": 1e-8, "atol": 1e-10} if adaptive else {"dt": 5e-4}
@@ -329,7 +329,7 @@ def test_integrators(integrator: str) -> None:
 
 def test_power() -> None:
     """Kinetic energy grows by what the effects do."""
-    module = engine(SCENES["own"]).module
+    module = quick(SCENES["own"]).module
     y, h = random_state(module, 4), 1e-6
     f = module.derivative(0.0, y)
     after, before = (module.kinetic_energy(0.0, x) for x in (y + h * f, y - h * f))
@@ -339,11 +339,11 @@ def test_power() -> None:
 
 def test_absence_is_free() -> None:
     """No states, functions or names of controllers where there are none."""
-    bare = engine(WHEEL)
+    bare = quick(WHEEL)
     assert "max(" not in bare.source and ", x=None" not in bare.source
-    straight = engine(WHEEL + servo("pd"))
+    straight = quick(WHEEL + servo("pd"))
     assert straight.model.states == () and "max(" not in straight.source
-    assert engine(WHEEL + servo("pd", "target_rate = 0")).source == straight.source
+    assert quick(WHEEL + servo("pd", "target_rate = 0")).source == straight.source
 
 
 CONTROLLER = '[[effects]]\ntype = "controller"\nname = "own"\n{}\n'

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bookkeeping import differences, gained, powers
-from engine import Engine, apart, engine
+from engine import Engine, apart, quick
 from scipy.integrate import solve_ivp
 from spatial_newton_euler import solve
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
@@ -38,7 +38,7 @@ BODY = DRAG + 'body = "drop"\n'
 def drop(effects: str, dimensions: int = PLANE) -> Engine:
     """A free body under some effects."""
     inertia = "0.03" if dimensions == PLANE else "[0.03, 0.03, 0.03]"
-    return engine(DROP.format(dimensions, inertia) + effects)
+    return quick(DROP.format(dimensions, inertia) + effects)
 
 
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
@@ -198,7 +198,7 @@ DRAUGHT = CHAIN.replace("[[chains]]", "[parameters]\nvertical = 0.3\n[[chains]]"
 
 def test_energy_changes_by_the_power_of_the_effects() -> None:
     """dT/dt is the power of all effects, dE/dt that of drag alone; still air takes energy out."""
-    made = engine(DRAUGHT + BLOWN)
+    made = quick(DRAUGHT + BLOWN)
     rng = np.random.default_rng(2)
     for t in (0.0, 0.7, 2.0):
         y = made.random_state(rng)
@@ -206,7 +206,7 @@ def test_energy_changes_by_the_power_of_the_effects() -> None:
         kinetic, potential = (gained(made, f"{x}_energy", y, t) for x in ("kinetic", "potential"))
         assert abs(kinetic - weight - air) < 1e-10 * max(1, abs(kinetic))
         assert abs(potential + weight) < 1e-10 * max(1, abs(weight))
-    still = engine(CHAIN + BLOWN[: BLOWN.index("wind")])
+    still = quick(CHAIN + BLOWN[: BLOWN.index("wind")])
     assert powers(still, still.random_state(rng))[1] < 0
 
 
@@ -215,7 +215,7 @@ def test_jacobians_are_right_at_rest_and_elsewhere(tangents: bool) -> None:
     """Against differences of the module; at rest quadratic drag has no slope at all, exactly."""
     still = CHAIN + f'{DRAG}bodies = "all"\nlinear = 0.05\nturning_linear = 0.01\n'
     both = still + "quadratic = 0.3\nturning_quadratic = 0.02\n"
-    made, plain = (engine(text, tangents=tangents) for text in (both, still))
+    made, plain = (quick(text, tangents=tangents) for text in (both, still))
     rng = np.random.default_rng(3)
     y = made.random_state(rng)
     assert apart(made.module.jacobian(0.0, y), differences(made, y, 0.0)) < 1e-7
@@ -227,7 +227,7 @@ def test_jacobians_are_right_at_rest_and_elsewhere(tangents: bool) -> None:
     np.testing.assert_array_equal(
         made.module.derivative(0.0, y)[3:], plain.module.derivative(0.0, y)[3:]
     )
-    blown = engine(DRAUGHT + BLOWN, tangents=tangents)
+    blown = quick(DRAUGHT + BLOWN, tangents=tangents)
     assert apart(blown.module.jacobian(1.3, y), differences(blown, y, 1.3)) < 1e-7
 
 

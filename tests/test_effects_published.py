@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from engine import apart, engine
+from engine import apart, engine, quick
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
@@ -57,7 +57,7 @@ def effect(kind: str, keys: str, name: str = "effect") -> str:
 
 def motion(text: str, times: np.ndarray, **start: float) -> dict[str, np.ndarray]:
     """Every state at some times, from the scene's initial state but for what is given."""
-    module = engine(text).module
+    module = quick(text).module
     y = module.initial_state()
     for name, value in start.items():
         y[module.STATES.index(name)] = value
@@ -192,7 +192,7 @@ def test_a_pendulum_leans_in_the_wind(law: str, dimensions: int) -> None:
     wind = vector(dimensions, W, 0, 0)
     text += effect("gravity", "g = 9.81", "weight")
     text += effect("drag", f'body = "bob"\n{law} = {k}\nwind = {wind}', "air")
-    module = engine(text).module
+    module = quick(text).module
     drag = k * W if law == "linear" else k * W * W
     lean = math.atan(drag / (M * G))
     assert abs(module.derivative(0.0, np.array([lean, 0.0]))[1]) < 1e-13 * G
@@ -208,7 +208,7 @@ def test_a_spinning_ball_slows_by_its_two_drags() -> None:
     keys = 'body = "ball"\nlinear = 0.21\nturning_linear = 0.012'
     times = np.linspace(0, 5, 6)
     text = flight(effect("drag", keys), SPACE)
-    names = engine(text).module.STATES[7:]
+    names = quick(text).module.STATES[7:]
     found = motion(text, times, **dict(zip(names, (2.0, 0, 0, 3.0, 0, -1.0), strict=True)))
     assert apart(found[names[0]], 2.0 * np.exp(-0.21 / M * times)) < 1e-12
     assert apart(found[names[3]], 3.0 * np.exp(-0.012 / 0.03 * times)) < 1e-12
@@ -239,7 +239,7 @@ def test_a_mass_on_a_belt_sticks_and_slips() -> None:
     hold = f"({Fk} + {F - Fk}*exp(-(({V} - x_dot)/(4*w))**2))*tanh(({V} - x_dot)/w)"
     belt = effect("motor", f'joint = "wire"\ntorque = "{hold}"', "belt")
     text = BEAD.format(PLANE, INERTIA[PLANE], "") + spring + belt + "[parameters]\nw = 1e-4\n"
-    module = engine(text).module
+    module = quick(text).module
 
     def measured(w: float) -> float:
         run = solve_ivp(

@@ -22,6 +22,7 @@ FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, Fixe
 # Leapfrog knows no contacts.
 GENERAL = [name for name in INTEGRATORS if name != "leapfrog"]
 EXACT = {"rtol": 1e-12, "atol": 1e-14}
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
 
 def mechanism(
@@ -171,7 +172,8 @@ def test_every_integrator_bounces_and_rests(name):
     right to rounding.
     """
     order = getattr(INTEGRATORS[name], "order", 4)
-    trajectory = run(ball(1.0, 0.5), name, 2.0, dt=1e-3, rest_speed=0.05)
+    dt = 1e-3 if order == 1 else 1e-2
+    trajectory = run(ball(1.0, 0.5), name, 2.0, dt=dt, rest_speed=0.05)
     exact, _ = bounces(5, 1.0, 0.5)
     bound = 1e-2 if order == 1 else 1e-8
     np.testing.assert_allclose(times(trajectory)[:5], exact, rtol=0, atol=bound)
@@ -190,7 +192,7 @@ def test_bounces_are_as_exact_as_the_method():
     exact = run(problem, "DOP853", 2.0, rtol=3e-14, atol=1e-15)
     assert exact.counts["impacts"] >= 3
     for name, steps in (
-        ("euler", (4000, 8000)),
+        ("euler", (1000, 2000)),
         ("implicit_midpoint", (100, 200)),
         ("rk4", (40, 80)),
     ):
@@ -222,7 +224,7 @@ def test_grazing(name, margin):
 def test_a_bounce_within_the_first_look_is_not_missed():
     """Up from the ground and down again within a twentieth of an enormous step."""
     problem = ball(0.0, 1.0, v=0.2)
-    trajectory = integrate(problem, "rk4", 10.0, dt=10.0)
+    trajectory = integrate(problem, "rk4", 2.5, dt=2.5)
     np.testing.assert_allclose(times(trajectory)[:50], 0.4 / G * np.arange(1, 51), rtol=1e-11)
 
 
@@ -351,10 +353,16 @@ def test_mass_leaves_a_shaken_table(name):
     """Where the table falls faster than g; then it flies, and meets it again."""
     problem = mechanism([0.0], [1.2], [[1.0]], force=weight, ground=shaken, bounce=0.0)
     lift = math.asin(G / 14.4) / 12
-    fixed = name in FIXED
-    trajectory = run(problem, name, 0.6, dt=1e-3, **({} if fixed else {"rtol": 1e-11}))
+    fixed, order = name in FIXED, getattr(INTEGRATORS[name], "order", 4)
+    dt = {"gauss_4": 2e-3, "gauss_6": 5e-3}.get(name, 1e-3)
+    trajectory = run(
+        problem,
+        name,
+        0.6,
+        dt=dt,
+        **({} if fixed else {"rtol": 1e-10 if "Radau" in name else 1e-11}),
+    )
     first, second, *_ = [e for e in trajectory.events if e.kind != "rest"]
-    order = getattr(INTEGRATORS[name], "order", 4)
     bound = {1: 1e-3, 2: 5e-6}.get(order, 1e-9)
     assert first.kind == "lift"
     assert first.t == pytest.approx(lift, abs=bound)
@@ -416,7 +424,7 @@ def hump(v):
 def test_mass_slides_off_a_hump(name):
     """It leaves a circle of radius r at cos = 2/3 + v²/3gr."""
     v = 0.5
-    trajectory = run(hump(v), name, 2.0, dt=1e-3, **({} if name in FIXED else EXACT))
+    trajectory = run(hump(v), name, 2.0, dt=1e-3, **({} if name in FIXED else TIGHT))
     lift = trajectory.events[-1]
     assert [e.kind for e in trajectory.events] == ["rest", "lift"]
     after = int(np.searchsorted(trajectory.t, lift.t))
@@ -500,7 +508,7 @@ def airy(names=("gravity", "air", "ground")):
 def test_works_sum_to_the_change_of_energy(names):
     """At every row, through air, impacts, sliding and rest; the ground's is booked as its own."""
     problem, powers = airy(names)
-    trajectory = run(problem, "DOP853", 4.0, powers=powers, **EXACT)
+    trajectory = run(problem, "DOP853", 2.3, powers=powers, **EXACT)
     assert trajectory.work_names == ("gravity", "air", "ground")
     assert trajectory.works.shape == (len(trajectory.t), 3)
     energy = (trajectory.y[:, 2:] ** 2).sum(axis=1) / 2
@@ -515,7 +523,7 @@ def test_works_sum_to_the_change_of_energy(names):
     start = int(np.searchsorted(trajectory.t, trajectory.events[-1].t, side="right"))
     assert trajectory.works[start, 2] - ground > 0.01
     # Without asking there are none, and the run is the same.
-    plain = run(problem, "DOP853", 4.0, **EXACT)
+    plain = run(problem, "DOP853", 2.3, **EXACT)
     assert plain.works is None
     assert plain.work_names == ()
     assert plain.y.tobytes() == trajectory.y.tobytes()
@@ -535,10 +543,12 @@ def test_works_follow_the_order_of_the_method():
 @pytest.mark.parametrize("name", GENERAL)
 def test_every_integrator_books_works(name):
     problem, powers = airy()
-    trajectory = run(problem, name, 1.5, dt=5e-4, powers=powers, rest_speed=0.05)
+    order = getattr(INTEGRATORS[name], "order", 4)
+    dt = 1e-3 if order < 4 else 1e-2
+    trajectory = run(problem, name, 1.5, dt=dt, powers=powers, rest_speed=0.05)
     energy = (trajectory.y[:, 2:] ** 2).sum(axis=1) / 2
     left = np.abs(trajectory.works.sum(axis=1) - energy + energy[0]).max()
-    assert left < (2e-2 if getattr(INTEGRATORS[name], "order", 4) == 1 else 2e-5)
+    assert left < {1: 1e-2, 2: 1e-5}.get(order, 1e-6)
 
 
 # --- what goes wrong ----------------------------------------------------------------------------
@@ -585,8 +595,8 @@ def test_impacts_without_end():
 
 def test_bouncing_without_end(monkeypatch):
     """A rest speed below what can be told from none."""
-    assert message(ball(1.0, 0.9999), t_end=1e5, rest_speed=1.0, max_steps=2000).endswith(
-        "2000 steps did not suffice; try another --integrator, or a looser --rtol and --atol"
+    assert message(ball(1.0, 0.9999), t_end=1e5, rest_speed=1.0, max_steps=500).endswith(
+        "500 steps did not suffice; try another --integrator, or a looser --rtol and --atol"
     )
     monkeypatch.setattr(events, "MOST_EVENTS", 100)
     stuck = ball(0.0, 1.0, v=1e-9)

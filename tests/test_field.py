@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bookkeeping import differences, gained, powers
-from engine import Engine, apart, engine
+from engine import Engine, apart, engine, quick
 from scipy.integrate import solve_ivp
 from spatial_trees import PLANE, SPACE
 
@@ -35,7 +35,7 @@ AVOID = "steering = 3.0\nradius = 0.4\nreach = 1.0\n"
 def ball(effects: str, dimensions: int = PLANE) -> Engine:
     """A free body under some effects."""
     inertia = "0.03" if dimensions == PLANE else "[0.02, 0.03, 0.04]"
-    return engine(BALL.format(dimensions, inertia) + effects)
+    return quick(BALL.format(dimensions, inertia) + effects)
 
 
 def at(made: Engine, place: list[float], v: list[float]) -> np.ndarray:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import some
 from mechanisms import BUILT_IN, SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
 from newton_euler import Mechanism, Motion, solve
 
@@ -527,7 +528,7 @@ ALLOWED = (
 
 
 def test_same_bytes_whatever_the_hash_seed() -> None:
-    """Two processes with different hash seeds write the committed modules, by every route."""
+    """A process with another hash seed writes the committed modules, by every route."""
     program = (
         "import sys; from eomgen.pipeline import compile_scene;"
         "from eomgen.scene.reader import read_scene;"
@@ -542,11 +543,11 @@ def test_same_bytes_whatever_the_hash_seed() -> None:
             env={**os.environ, "PYTHONHASHSEED": seed},
             cwd=GENERATED.parent,
         )
-        for seed in ("0", "1")
+        for seed in some(("1",), ("0", "1", "2"))
     ]
-    first, second = (process.communicate(timeout=60)[0] for process in running)
+    first, *others = (process.communicate(timeout=60)[0] for process in running)
     assert all(process.returncode == 0 for process in running)
-    same = first == second
+    same = all(other == first for other in others)
     assert same
     modules = dict(zip(names, first.split(b"\0"), strict=True))
     stale = [n for n, module in modules.items() if module != (GENERATED / f"{n}.py").read_bytes()]

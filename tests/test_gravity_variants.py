@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from engine import engine
+from engine import engine, quick
 from scipy.integrate import solve_ivp
 
 from eomgen.build import build_model
@@ -87,8 +87,8 @@ def random_state(module, seed: int) -> np.ndarray:
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 def test_any_direction_is_a_turned_scene(route: str) -> None:
     """Pulled along +x in the plane as downwards with the whole scene turned by 90 degrees."""
-    down = engine(PLANE + effect(""), route).module
-    sideways = engine(PLANE + effect("direction = [2.0, 0.0]"), route).module
+    down = quick(PLANE + effect(""), route).module
+    sideways = quick(PLANE + effect("direction = [2.0, 0.0]"), route).module
     for seed in range(3):
         y = random_state(down, seed)
         turned = y.copy()
@@ -125,9 +125,9 @@ def test_except_bodies(scene: str) -> None:
     """Weights of all but some: as forces from outside on the others, and none excepted is all."""
     dims = 2 if scene is PLANE else 3
     weight = [*[0.0] * (dims - 1), -0.7 * 9.81]
-    some = engine(scene + effect('except_bodies = ["upper"]')).module
+    some = quick(scene + effect('except_bodies = ["upper"]')).module
     push = f'[[effects]]\ntype = "external_force"\nname = "w"\nbody = "lower"\nforce = {weight}\n'
-    other = engine(scene + push).module
+    other = quick(scene + push).module
     for seed in range(3):
         y = random_state(some, seed)
         for output in ("derivative", "jacobian"):
@@ -142,7 +142,7 @@ def test_except_bodies(scene: str) -> None:
 
 def test_free_bodies_and_except() -> None:
     """The one falls, the other flies straight on."""
-    module = engine(SHIP + effect('except_bodies = ["moon"]')).module
+    module = quick(SHIP + effect('except_bodies = ["moon"]')).module
     rates = dict(zip(module.STATES, module.derivative(0.0, random_state(module, 1)), strict=True))
     assert np.isclose(rates["ship_y_dot"], -9.81) and rates["ship_x_dot"] == 0.0
     assert rates["moon_x_dot"] == rates["moon_y_dot"] == 0.0
@@ -154,7 +154,7 @@ def test_kepler_ellipse(dimensions: int) -> None:
     mu, a, e = 2.0, 1.5, 0.6
     point = [0.3, -0.2, 0.1][:dimensions]
     scene = SHIP if dimensions == 2 else SPINNER
-    module = engine(scene + PULL.format(f'at = {point}\nexcept_bodies = ["moon"]')).module
+    module = quick(scene + PULL.format(f'at = {point}\nexcept_bodies = ["moon"]')).module
     period = 2 * np.pi * np.sqrt(a**3 / mu)
     y = np.array(module.initial_state())
     names = list(module.STATES)
@@ -185,7 +185,7 @@ def test_where_it_is_infinite() -> None:
     """A body that starts at the point itself is refused."""
     text = SHIP + PULL.format('except_bodies = ["moon"]') + "[initial]\nq = { ship_x = 0.0 }\n"
     with pytest.raises(Exception, match=r"singular|not finite|division"):
-        as_problem(engine(text).module)
+        as_problem(quick(text).module)
 
 
 def _torque(text: str, body: str = "ship") -> str:
@@ -193,7 +193,7 @@ def _torque(text: str, body: str = "ship") -> str:
 
 
 def _spun(text: str) -> tuple[object, np.ndarray, list[int], list[int]]:
-    module = engine(SPINNER + _torque(text)).module
+    module = quick(SPINNER + _torque(text)).module
     names = list(module.STATES)
     spin = [names.index(f"ship_w{axis}") for axis in "xyz"]
     turn = list(module.QUATERNIONS[0])
@@ -232,10 +232,10 @@ def test_torque_in_world_axes() -> None:
 
 def test_torque_in_the_plane() -> None:
     """One number: torque over moment of inertia."""
-    module = engine(SHIP + _torque("torque = 0.6")).module
+    module = quick(SHIP + _torque("torque = 0.6")).module
     rates = dict(zip(module.STATES, module.derivative(0.0, module.initial_state()), strict=True))
     assert np.isclose(rates["ship_angle_dot"], 6.0)
-    module = engine(SHIP + _torque('torque = "input"')).module
+    module = quick(SHIP + _torque('torque = "input"')).module
     assert list(module.INPUTS) == ["twist"]
 
 
@@ -245,10 +245,10 @@ def test_force_in_body_axes(scene: str) -> None:
     dims = 2 if scene is SHIP else 3
     push = '[[effects]]\ntype = "external_force"\nname = "jet"\nbody = "ship"\nforce = "input"\n'
     place = f"at = {[0.1, 0.2, -0.3][:dims]}\n"
-    own = engine(scene + push + place + 'axes = "body"').module
-    world = engine(scene + push + place).module
-    named = engine(scene + push + place + 'axes = "world"')
-    assert named.source == engine(scene + push + place).source
+    own = quick(scene + push + place + 'axes = "body"').module
+    world = quick(scene + push + place).module
+    named = quick(scene + push + place + 'axes = "world"')
+    assert named.source == quick(scene + push + place).source
     for seed in range(3):
         y = random_state(own, seed)
         force = np.array([0.4, -1.0, 0.7][:dims])
@@ -277,7 +277,7 @@ VARIANTS = [
 def test_jacobian_and_energy(scene: str, more: str) -> None:
     """Jacobians as central differences have them; dE/dt is the power of what has no potential."""
     for route in ("aba", "ldl"):
-        module = engine(scene + more, route).module
+        module = quick(scene + more, route).module
         y = random_state(module, 7)
         h = 1e-6
         slopes = [
@@ -297,7 +297,7 @@ def test_jacobian_and_energy(scene: str, more: str) -> None:
 
 def test_columns_and_a_run() -> None:
     """Many states at once, and a run of the whole program."""
-    module = engine(SPACE + PULL.format("at = [2.0, 1.0, 3.0]")).module
+    module = quick(SPACE + PULL.format("at = [2.0, 1.0, 3.0]")).module
     states = np.stack([random_state(module, seed) for seed in range(4)], axis=1)
     one = np.stack([module.derivative(0.0, y) for y in states.T], axis=1)
     assert np.allclose(module.derivative(0.0, states), one, rtol=1e-13)
@@ -309,10 +309,10 @@ def test_columns_and_a_run() -> None:
 
 def test_plain_gravity_is_as_it_was() -> None:
     """Downwards for all bodies needs no other key, and the closed form takes nothing else."""
-    assert engine(PLANE + effect(""), "closed").system.route == "closed"
-    assert engine(PLANE + effect("except_bodies = []")).source == engine(PLANE + effect("")).source
+    assert quick(PLANE + effect(""), "closed").system.route == "closed"
+    assert quick(PLANE + effect("except_bodies = []")).source == quick(PLANE + effect("")).source
     for more in ("direction = [0, -1]", 'except_bodies = ["upper"]'):
-        assert engine(PLANE + effect(more)).system.route != "closed"
+        assert quick(PLANE + effect(more)).system.route != "closed"
         with pytest.raises(SceneError, match="closed form, and it takes no 'gravity'"):
             compile_scene(parse_scene('route = "closed"\n' + PLANE + effect(more)))
 

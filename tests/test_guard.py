@@ -21,6 +21,8 @@ from eomgen.run.problem import Problem
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.study.guarding import guard_of
 
+pytestmark = pytest.mark.usefixtures("blank_figures")
+
 HEAVY = """
 name = "heavy_tip"
 route = "aba"

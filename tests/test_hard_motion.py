@@ -208,6 +208,7 @@ def test_a_bouncing_run_goes_on_to_the_same_bytes() -> None:
         assert run.y[-1].tobytes() == whole.y[-1].tobytes()
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same bytes from the file; what cannot go on so says why, and nothing is overwritten."""
     scene = tmp_path / "swing.toml"

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from eomgen.run.trajectory import Trajectory
 Units = tuple[float, float, float]
 """Of mass, length and time."""
 
-T_END = 2.0
+T_END = 1.375
 
 
 def scene(units: Units) -> str:
@@ -68,6 +69,7 @@ slip_speed = {number(0.0625, 0, 1, -1)}
 """
 
 
+@cache
 def ran(units: Units, method: str) -> Trajectory:
     """Until most bounces are over, by the method's default tolerances or 1000 steps."""
     t_end = T_END * units[2]

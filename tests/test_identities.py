@@ -11,7 +11,7 @@ from campaign import some
 from engine import along, exact
 from mechanisms import BUILT_IN, Compiled, compiled, random_tree
 
-TREES = (9, 22, 38)
+TREES = some((9, 22, 37), (9, 22, 38))
 ROUNDING = 1e-12
 
 
@@ -180,7 +180,7 @@ def test_momentum_is_constant_when_nothing_acts_from_outside() -> None:
 CASES = [(scene, "velocity") for scene in (*BUILT_IN, *TREES)]
 CASES += [  # the other forms need an inertia of every body
     (scene, form)
-    for scene in ("double_pendulum", "two_body", "two_body_forced", 9, 38)
+    for scene in ("double_pendulum", "two_body", "two_body_forced", 9, TREES[-1])
     for form in ("momentum", "redundant")
 ]
 

@@ -511,6 +511,7 @@ def test_a_singular_drive_is_no_fault() -> None:
         check_regular(build_model(parse_scene(light.replace("mass = 0.8", "mass = 0"))))
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_what_check_and_the_module_say(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 import sympy as sp
+from campaign import some
 from mechanisms import BUILT_IN, SEEDS, TOLD, Scene, compiled, random_tree
 from newton_euler import Mechanism, solve
 
@@ -15,7 +16,7 @@ from eomgen.derivation.closed import Equations, derive
 from eomgen.scene.reader import parse_scene
 
 POSITIVE, NONNEGATIVE = "positive", "nonnegative"
-FIVE_BODIES = (11, 13, 20, 26)
+FIVE_BODIES = some((26,), (11, 13, 20, 26))
 SCENES = [
     *(TOLD[name] for name in BUILT_IN),
     *(random_tree(seed) for seed in SEEDS),

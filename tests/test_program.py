@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from campaign import some
 from engine import MP
 from mechanisms import BUILT_IN, compiled, load, random_tree
 from newton_euler import Mechanism, solve
@@ -21,10 +22,10 @@ from eomgen.program.digits import evaluator
 from eomgen.program.from_equations import from_equations
 from eomgen.program.passes import PASSES, optimise
 from eomgen.program.program import Output, Program, cost, finish, interpret, live_steps
-from eomgen.program.tape import Node, Stage, Step, Tape, power, total
+from eomgen.program.tape import Node, Stage, Tape, power, total
 from eomgen.scene.reader import parse_scene
 
-TREES = (4, 9, 22, 38)
+TREES = some((4, 9, 22, 37), (4, 9, 22, 38))
 
 
 class Floats:
@@ -226,7 +227,7 @@ def test_passes_keep_values_and_save_work(case: str | int) -> None:
     assert reports[-1].steps < reports[0].steps
 
 
-@pytest.mark.parametrize("case", ["two_body_forced", 38])
+@pytest.mark.parametrize("case", ["two_body_forced", TREES[-1]])
 def test_programs_are_well_formed(case: str | int) -> None:
     """Steps use earlier steps only, none twice, none for nothing, at a stage not before theirs."""
     program = compiled(case if isinstance(case, str) else random_tree(case)).system.program
@@ -299,7 +300,7 @@ def test_jacobian_of_each_operation(build: Callable, slopes: Callable) -> None:
 def test_jacobian_knows_every_operation() -> None:
     """An operation without a known derivative is a fault of this program, never a silent 0."""
     tape, x, y = fresh()
-    odd = tape._add(("cosh", x.index), Step("cosh", (x.index,), Stage.POSITIONS))
+    odd = tape.apply("cosh", x)
     with pytest.raises(AssertionError, match="cosh"):
         jacobian([odd], [x])
     assert jacobian([], [x, y]) == []

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from campaign import some
 
 from eomgen.build import build_model
 from eomgen.errors import RunError
@@ -35,10 +36,10 @@ def off_unit(asked: Problem, y: np.ndarray) -> float:
     return float(np.max(np.abs(np.array(lengths) - 1)))
 
 
-@pytest.mark.parametrize(("scene", "dt"), [("tumbling_body", 5e-4), ("spinning_top", 5e-4)])
-def test_twenty_thousand_steps_stay_on_the_sphere(scene: str, dt: float) -> None:
+@pytest.mark.parametrize("scene", some(["spinning_top"], ["tumbling_body", "spinning_top"]))
+def test_twenty_thousand_steps_stay_on_the_sphere(scene: str) -> None:
     """Classical Runge-Kutta of the tumbling body and of the top: below 1e-12 off, at every row."""
-    asked = problem(scene)
+    asked, dt = problem(scene), 5e-4
     run = integrate(asked, "rk4", 20_000 * dt, dt=dt, samples=1001)
     assert run.finished and run.counts["steps"] == 20_000
     assert off_unit(asked, run.y) < 1e-12
@@ -77,8 +78,8 @@ def test_a_stopped_run_keeps_a_unit_row() -> None:
 @pytest.mark.parametrize(
     ("method", "order", "steps"),
     [
-        ("euler", 1, (16000, 32000)),
-        ("semi_implicit_euler", 1, (16000, 32000)),
+        ("euler", 1, (8000, 16000)),
+        ("semi_implicit_euler", 1, (8000, 16000)),
         ("rk4", 4, (100, 200, 400)),
         ("implicit_midpoint", 2, (200, 400, 800)),
     ],

@@ -31,6 +31,7 @@ def test_python_examples_run_and_print_what_they_say() -> None:
         assert run.stdout.splitlines() == expected
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_scene_examples_are_scenes(tmp_path: Path) -> None:
     """Each TOML block is a whole scene that is generated and simulated."""
     examples = blocks("toml")

@@ -27,7 +27,7 @@ from eomgen.derivation.recursive.reactions import reactions
 from eomgen.model import Model
 from eomgen.scene.reader import parse_scene
 
-SEEDS = range(150)
+SEEDS = range(some(75, 150))
 MOST = (6, 14, 30)
 """Bodies up to which every third tree has."""
 SMALL = range(some(10, 14))
@@ -42,7 +42,7 @@ def drawn(seed: int, dimensions: int, most: int) -> tuple[SpatialTree, str]:
     return random_spatial_tree(seed, dimensions, most)
 
 
-# In floats: 300 trees.
+# In floats.
 
 
 def in_floats(
@@ -139,7 +139,7 @@ def test_the_trees_have_everything() -> None:
     space = [*plane, *"cylindrical universal ball".split()]
     for dimensions, kinds in ((PLANE, plane), (SPACE, space)):
         for feature in (*kinds, *FEATURES):
-            assert seen.get(f"{feature} of {dimensions}", 0) >= 10, feature
+            assert seen.get(f"{feature} of {dimensions}", 0) >= some(8, 10), feature
     assert len(sizes) > 25
     assert max(sizes) == MOST[-1]
     for package in ("mujoco", "pinocchio"):
@@ -316,8 +316,8 @@ def test_columns_are_one_by_one(dimensions: int, seed: int, route: str) -> None:
 # In 60 digits.
 
 FEW = range(20, some(23, 25))
-CLOSED = [(seed, 4) for seed in some((4, 9, 15, 22, 36), (4, 9, 15, 22, 27, 36))]
-CLOSED += some([(20, 5)], [(13, 5), (20, 5)])
+CLOSED = [(seed, 4) for seed in some((4, 9, 15, 22, 37), (4, 9, 15, 22, 27, 36, 37))]
+CLOSED += some([], [(13, 5), (20, 5)])
 OUTPUTS = (
     "derivative mass_matrix velocity_force gravity_force bias_force applied_force kinetic_energy "
     "potential_energy momentum centre_of_mass joint_forces body_poses body_velocities "

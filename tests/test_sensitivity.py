@@ -255,7 +255,7 @@ def test_what_must_vanish() -> None:
     assert not np.any(e.module.parameter_jacobian(0.0, y, p, u)[:nq])
     for indices in map(list, e.module.QUATERNIONS):  # a longer quaternion is the same rotation
         assert np.max(np.abs(J[nq:, indices] @ y[indices])) < 1e-9
-    M = engine(MACHINE, "aba").module.mass_matrix(0.0, y, p, u)
+    M = engine(MACHINE, "aba", leave_out=DERIVATIVES).module.mass_matrix(0.0, y, p, u)
     drive = list(e.module.INPUTS).index("drive")
     row = [c.name for c in e.model.velocities].index("rail_slide_dot")
     answer = e.module.input_jacobian(0.0, y, p, u)[nq:, drive]

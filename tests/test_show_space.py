@@ -348,6 +348,13 @@ def test_the_floor_is_under_the_motion(lift: float, z: float) -> None:
 # ---- Figure ----
 
 
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bodies of few faces and pixels, which are quick to draw."""
+    monkeypatch.setattr("eomgen.show.space.BUDGET", 400)
+    monkeypatch.setattr("eomgen.show.space.PIXELS", 350)
+
+
 def panel(figure: Any, title: str) -> Any:
     return next(axes for axes in figure.axes if title in axes.get_title(loc="left"))
 
@@ -383,6 +390,7 @@ def test_orientations_have_a_panel_of_their_own() -> None:
     assert len(panel(figure, "Lengths").get_lines()) == 6
 
 
+@pytest.mark.usefixtures("coarse")
 def test_a_hundred_bodies_make_a_figure(tmp_path: Path) -> None:
     motion = chain()
     figure = draw_motion(motion)
@@ -417,6 +425,7 @@ def test_a_hundred_bodies_make_a_figure(tmp_path: Path) -> None:
         ),
     ],
 )
+@pytest.mark.usefixtures("coarse")
 def test_odd_motions_in_space_are_drawn(tmp_path: Path, changes: dict[str, Any]) -> None:
     motion = sliding(**changes)
     figure = draw_motion(motion)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from campaign import some
 from engine import MP, Digits, Engine, along, apart, engine
 from scipy.integrate import solve_ivp
 from spatial_newton_euler import SpatialMotion, solve
@@ -497,8 +498,13 @@ ZERO_CASES = {
 }
 
 
-@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
-@pytest.mark.parametrize("case", ZERO_CASES)
+@pytest.mark.parametrize(
+    ("case", "dimensions"),
+    [
+        *((case, PLANE) for case in ZERO_CASES),
+        *((case, SPACE) for case in some(list(ZERO_CASES)[::3], ZERO_CASES)),
+    ],
+)
 def test_points_may_meet(case: str, dimensions: int) -> None:
     """At zero distance and 0.3 ε from it all is finite, and so is every derivative; k d, c ḋ."""
     pair = PAIR.format(dimensions) + "[parameters]\ng0 = 1.0\n"

@@ -337,6 +337,7 @@ PUSHES = [f'motor"\nname = "push_{k}"\njoint = "pin"\ntorque = {k}' for k in (1,
 
 
 @pytest.mark.parametrize("count", [3, 4])
+@pytest.mark.usefixtures("blank_figures")
 def test_many_works_are_summed_by_type(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], count: int
 ) -> None:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from engine import MP, Engine, along, apart, engine, exact
+from engine import MP, Engine, along, apart, exact, quick
 
 from eomgen.build import build_model
 from eomgen.errors import SceneError
@@ -36,7 +36,7 @@ SPRING = '[[effects]]\ntype = "joint_spring"\nname = "s"\nstiffness = 7.0\ndampi
 
 def tree(effects: str) -> Engine:
     """A ball, a universal joint and a pin one after the other, under some effects."""
-    return engine(TREE + effects)
+    return quick(TREE + effects)
 
 
 def torques(made: Engine, y: np.ndarray) -> np.ndarray:
@@ -89,7 +89,7 @@ effects = [{ type = "joint_spring", name = "k", joint = "j", stiffness = 0.5 }]
 """
     from scipy.integrate import solve_ivp
 
-    made = engine(scene)
+    made = quick(scene)
     start = np.array([math.cos(1.25), *(math.sin(1.25) * AXIS), 0.0, 0.0, 0.0])
     times = np.linspace(0.0, 2 * math.pi / 5, 9)  # one period
     run = solve_ivp(

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
+from functools import partial, reduce
 
 from eomgen.program.program import Output, Program, cost, finish, live_steps
-from eomgen.program.tape import Node, Stage, Step, Tape
+from eomgen.program.tape import Stage, Step, Tape
 
-Rule = Callable[[Tape, str, list[Node]], Node]
+Rule = Callable[[Tape, str, list[int]], int]
+"""An operation on steps of a tape, as a step."""
 
 
 @dataclass(frozen=True)
@@ -53,53 +55,50 @@ def gather_parameters(program: Program) -> Program:
     """
     lone = _Lone(program, ("mul", "add"))
 
-    def rule(tape: Tape, operation: str, nodes: list[Node]) -> Node:
-        if operation in ("mul", "add") and not lone.results.isdisjoint([n.index for n in nodes]):
+    def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
+        if operation in ("mul", "add") and not lone.results.isdisjoint(nodes):
             parts = _flattened(tape, operation, nodes, lone.results)
-            fixed = [n for n in parts if n.step.stage <= Stage.PARAMETERS]
+            fixed = [n for n in parts if tape.steps[n].stage <= Stage.PARAMETERS]
             if len(fixed) > 1 and len(parts) > len(fixed):
-                rest = [n for n in parts if n.step.stage > Stage.PARAMETERS]
-                return tape.apply(
+                rest = [n for n in parts if tape.steps[n].stage > Stage.PARAMETERS]
+                return tape.applied(
                     operation, _all(tape, operation, fixed), _all(tape, operation, rest)
                 )
-        return tape.apply(operation, *nodes)
+        return tape.applied(operation, *nodes)
 
     return drop_dead_steps(_rebuilt(program, rule, lone.note))
 
 
-def _flattened(tape: Tape, operation: str, nodes: list[Node], lone: Collection[int]) -> list[Node]:
+def _flattened(tape: Tape, operation: str, nodes: list[int], lone: Collection[int]) -> list[int]:
     """The operands of a product of products, or sum of sums, where nothing else uses the inner."""
-    parts: list[Node] = []
+    parts: list[int] = []
     stack = nodes[::-1]
     while stack:
         node = stack.pop()
-        if node.index in lone and node.step.operation == operation:
-            stack += [Node(tape, o) for o in reversed(node.step.operands)]
+        if node in lone and tape.steps[node].operation == operation:
+            stack += reversed(tape.steps[node].operands)
         else:
             parts.append(node)
     return parts
 
 
-def _all(tape: Tape, operation: str, nodes: list[Node]) -> Node:
-    result = nodes[0]
-    for node in nodes[1:]:
-        result = tape.apply(operation, result, node)
-    return result
+def _all(tape: Tape, operation: str, nodes: list[int]) -> int:
+    return reduce(partial(tape.applied, operation), nodes)
 
 
 def factor_sums(program: Program) -> Program:
     """a·x ± a·y as a·(x ± y), where neither product is used elsewhere: one operation saved."""
     lone = _Lone(program, ("mul",))
 
-    def rule(tape: Tape, operation: str, nodes: list[Node]) -> Node:
-        if operation in ("add", "sub") and lone.results.issuperset([n.index for n in nodes]):
-            a, b = (n.step.operands for n in nodes)
+    def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
+        if operation in ("add", "sub") and lone.results.issuperset(nodes):
+            a, b = (tape.steps[n].operands for n in nodes)
             common = [i for i in a if i in b]
             if common:
                 shared = common[0]
-                left, right = (Node(tape, o[0] if o[1] == shared else o[1]) for o in (a, b))
-                return Node(tape, shared) * tape.apply(operation, left, right)
-        return tape.apply(operation, *nodes)
+                left, right = (o[0] if o[1] == shared else o[1] for o in (a, b))
+                return tape.applied("mul", shared, tape.applied(operation, left, right))
+        return tape.applied(operation, *nodes)
 
     return drop_dead_steps(_rebuilt(program, rule, lone.note))
 
@@ -112,12 +111,12 @@ class _Lone:
         self._uses = _uses(program)
         self._operations = operations
 
-    def note(self, old: int, node: Node) -> None:
-        """Step `old` of the program has become `node`."""
-        if self._uses[old] == 1 and node.step.operation in self._operations:
-            self.results.add(node.index)
+    def note(self, old: int, operation: str, new: int) -> None:
+        """Step `old` of the program has become step `new`, which is of an operation."""
+        if self._uses[old] == 1 and operation in self._operations:
+            self.results.add(new)
         else:
-            self.results.discard(node.index)
+            self.results.discard(new)
 
 
 PASSES: tuple[Callable[[Program], Program], ...] = (
@@ -138,29 +137,26 @@ def _uses(program: Program) -> list[int]:
     return uses
 
 
-def _rebuilt(
-    program: Program, rule: Rule, note: Callable[[int, Node], None] | None = None
-) -> Program:
+def _rebuilt(program: Program, rule: Rule, note: Callable[[int, str, int], None]) -> Program:
     """The program built again on a fresh tape, each operation through `rule`."""
     tape = Tape()
-    nodes: list[Node] = []
-    for i, step in enumerate(program.steps):
-        if step.operation == "constant":
-            node = tape.constant(float(step.value or 0.0))
-        elif step.operation == "input":
-            node = tape.input(str(step.value), step.stage)
+    new: list[int] = []
+    for i, (operation, operands, stage, value) in enumerate(program.steps):
+        if operation == "constant":
+            node = tape.number(float(value or 0.0))
+        elif operation == "input":
+            node = tape.input(str(value), stage).index
         else:
-            node = rule(tape, step.operation, [nodes[o] for o in step.operands])
+            node = rule(tape, operation, [new[o] for o in operands])
         if i in program.names:
-            tape.named(node, program.names[i])
-        if note is not None:
-            note(i, node)
-        nodes.append(node)
+            tape.names.setdefault(node, program.names[i])
+        note(i, tape.steps[node].operation, node)
+        new.append(node)
     outputs = {
-        name: Output(output.shape, tuple(nodes[n].index for n in output.nodes))
+        name: Output(output.shape, tuple([new[n] for n in output.nodes]))
         for name, output in program.outputs.items()
     }
-    checks = (replace(check, node=nodes[check.node].index) for check in program.checks)
+    checks = (replace(check, node=new[check.node]) for check in program.checks)
     return finish(tape, outputs, checks)
 
 

@@ -61,16 +61,18 @@ def live_steps(
     program: Program, nodes: Iterable[int], outside: Callable[[int], bool] | None = None
 ) -> list[int]:
     """The steps that some nodes need, in order; what lies behind those `outside` is left out."""
-    live = set(nodes)
-    stack = list(live)
-    while stack:
-        i = stack.pop()
+    live = bytearray(len(program.steps))
+    for node in nodes:
+        live[node] = 1
+    steps, found = program.steps, []
+    i = live.rfind(1)
+    while i >= 0:  # operands come before what they are used in
+        found.append(i)
         if outside is None or not outside(i):
-            for operand in program.steps[i].operands:
-                if operand not in live:
-                    live.add(operand)
-                    stack.append(operand)
-    return sorted(live)
+            for operand in steps[i][1]:
+                live[operand] = 1
+        i = live.rfind(1, 0, i)
+    return found[::-1]
 
 
 def cost(program: Program, output: str) -> dict[str, int]:

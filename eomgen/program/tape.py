@@ -64,19 +64,23 @@ class Node:
         return self.tape.steps[self.index]
 
     def __add__(self, other: "Node") -> "Node":
-        return self.tape.apply("add", self, other)
+        tape = self.tape
+        return Node(tape, tape.applied("add", self.index, other.index))
 
     def __sub__(self, other: "Node") -> "Node":
-        return self.tape.apply("sub", self, other)
+        tape = self.tape
+        return Node(tape, tape.applied("sub", self.index, other.index))
 
     def __mul__(self, other: "Node") -> "Node":
-        return self.tape.apply("mul", self, other)
+        tape = self.tape
+        return Node(tape, tape.applied("mul", self.index, other.index))
 
     def __truediv__(self, other: "Node") -> "Node":
-        return self.tape.apply("div", self, other)
+        tape = self.tape
+        return Node(tape, tape.applied("div", self.index, other.index))
 
     def __neg__(self) -> "Node":
-        return self.tape.apply("neg", self)
+        return Node(self.tape, self.tape.applied("neg", self.index))
 
 
 class Tape:
@@ -91,30 +95,34 @@ class Tape:
         """The step that a step is minus of, if it is a negation."""
         self._known: dict[tuple[Any, ...], int] = {}
 
-    def _add(self, key: tuple[Any, ...], step: Step, number: float | None = None) -> Node:
+    def _add(self, key: tuple[Any, ...], step: Step, number: float | None = None) -> int:
         """A step that is not there yet."""
         index = self._known[key] = len(self.steps)
         self.steps.append(step)
         self.values.append(number)
         self.minus.append(step.operands[0] if step.operation == "neg" else None)
-        return Node(self, index)
+        return index
+
+    def number(self, value: float) -> int:
+        """The step that is a number."""
+        number = float(value) + 0.0
+        index = self._known.get(("constant", number))
+        if index is None:
+            step = Step("constant", (), Stage.CONSTANT, number)
+            index = self._add(("constant", number), step, number)
+        return index
 
     def constant(self, value: float) -> Node:
         """A number."""
-        number = float(value) + 0.0
-        key = ("constant", number)
-        index = self._known.get(key)
-        if index is not None:
-            return Node(self, index)
-        return self._add(key, Step("constant", (), Stage.CONSTANT, number), number)
+        return Node(self, self.number(value))
 
     def input(self, name: str, stage: Stage) -> Node:
         """A named quantity that is given at run time."""
         key = ("input", name)
         index = self._known.get(key)
-        if index is not None:
-            return Node(self, index)
-        return self._add(key, Step("input", (), stage, name))
+        if index is None:
+            index = self._add(key, Step("input", (), stage, name))
+        return Node(self, index)
 
     def named(self, node: Node, name: str) -> Node:
         """Suggest a name for the variable that will hold a node; the first suggestion stays."""
@@ -123,24 +131,29 @@ class Tape:
 
     def apply(self, operation: str, *nodes: Node) -> Node:
         """An operation on nodes, folded if it can be."""
+        return Node(self, self.applied(operation, *[node.index for node in nodes]))
+
+    def applied(self, operation: str, *operands: int) -> int:
+        """The step of an operation on steps, folded if it can be."""
         fold = _FOLD.get(operation)
-        folded = fold(self, *nodes) if fold is not None else None
-        if folded is not None:
-            return folded
+        if fold is not None:
+            folded = fold(self, *operands)
+            if folded is not None:
+                return folded
         if operation in FUNCTIONS:
-            values = [self.values[node.index] for node in nodes]
+            values = [self.values[i] for i in operands]
             number = None if None in values else self.folded(FUNCTIONS[operation], *values)
             if number is not None:
-                return self.constant(number)
-        indices = tuple([node.index for node in nodes])
-        if (operation == "add" or operation == "mul") and indices[0] > indices[1]:
-            indices = indices[::-1]
-        key = (operation, *indices)
+                return self.number(number)
+        elif (operation == "add" or operation == "mul") and operands[0] > operands[1]:
+            operands = operands[::-1]
+        key = (operation, *operands)
         index = self._known.get(key)
-        if index is not None:
-            return Node(self, index)
-        stage = max([self.steps[i].stage for i in indices])
-        return self._add(key, Step(operation, indices, stage))
+        if index is None:
+            steps = self.steps
+            stage = max([steps[i][2] for i in operands])
+            index = self._add(key, Step(operation, operands, stage))
+        return index
 
     def folded(self, function: Callable[..., float], *values: float | None) -> float | None:
         """A value of constants, or None where it is not finite: then that shows when it is
@@ -166,115 +179,111 @@ class ExactTape(Tape):
         return number if function(*map(Fraction, values)) == number else None  # type: ignore[arg-type]
 
 
-def _negated(node: Node) -> Node | None:
-    """The node that this one is minus of, if it is a negation."""
-    index = node.tape.minus[node.index]
-    return None if index is None else Node(node.tape, index)
-
-
-def _folded(tape: Tape, operation: str, a: float, b: float) -> Node | None:
+def _folded(tape: Tape, operation: str, a: float, b: float) -> int | None:
     number = tape.folded(ARITHMETIC[operation], a, b)
-    return None if number is None else tape.constant(number)
+    return None if number is None else tape.number(number)
 
 
-def _fold_add(tape: Tape, a: Node, b: Node) -> Node | None:
-    va, vb = tape.values[a.index], tape.values[b.index]
+# Each takes steps and returns the one that an operation on them folds to, or None.
+
+
+def _fold_add(tape: Tape, a: int, b: int) -> int | None:
+    va, vb = tape.values[a], tape.values[b]
     if va is not None and vb is not None:
         return _folded(tape, "add", va, vb)
     if va == 0.0:
         return b
     if vb == 0.0:
         return a
-    minus_b, minus_a = _negated(b), _negated(a)
+    minus_a, minus_b = tape.minus[a], tape.minus[b]
     if minus_b is not None:
-        return a - minus_b
+        return tape.applied("sub", a, minus_b)
     if minus_a is not None:
-        return b - minus_a
+        return tape.applied("sub", b, minus_a)
     return None
 
 
-def _fold_sub(tape: Tape, a: Node, b: Node) -> Node | None:
-    va, vb = tape.values[a.index], tape.values[b.index]
+def _fold_sub(tape: Tape, a: int, b: int) -> int | None:
+    va, vb = tape.values[a], tape.values[b]
     if va is not None and vb is not None:
         return _folded(tape, "sub", va, vb)
     if vb == 0.0:
         return a
     if va == 0.0:
-        return -b
-    if a.index == b.index:
-        return tape.constant(0.0)
-    minus_b, minus_a = _negated(b), _negated(a)
+        return tape.applied("neg", b)
+    if a == b:
+        return tape.number(0.0)
+    minus_a, minus_b = tape.minus[a], tape.minus[b]
     if minus_b is not None:
-        return a + minus_b
+        return tape.applied("add", a, minus_b)
     if minus_a is not None:
-        return -(minus_a + b)
+        return tape.applied("neg", tape.applied("add", minus_a, b))
     return None
 
 
-def _fold_mul(tape: Tape, a: Node, b: Node) -> Node | None:
-    va, vb = tape.values[a.index], tape.values[b.index]
+def _fold_mul(tape: Tape, a: int, b: int) -> int | None:
+    va, vb = tape.values[a], tape.values[b]
     if va is not None and vb is not None:
         return _folded(tape, "mul", va, vb)
     if va is not None or vb is not None:
         value, other = (va, b) if va is not None else (vb, a)
         if value == 0.0:
-            return tape.constant(0.0)
+            return tape.number(0.0)
         if value == 1.0:
             return other
         if value is not None and value < 0.0:
-            return -(tape.constant(-value) * other)
-    minus_a = _negated(a)
+            return tape.applied("neg", tape.applied("mul", tape.number(-value), other))
+    minus_a, minus_b = tape.minus[a], tape.minus[b]
     if minus_a is not None:
-        return -(minus_a * b)
-    minus_b = _negated(b)
+        return tape.applied("neg", tape.applied("mul", minus_a, b))
     if minus_b is not None:
-        return -(minus_b * a)
+        return tape.applied("neg", tape.applied("mul", minus_b, a))
     return None
 
 
-def _fold_div(tape: Tape, a: Node, b: Node) -> Node | None:
-    va, vb = tape.values[a.index], tape.values[b.index]
+def _fold_div(tape: Tape, a: int, b: int) -> int | None:
+    va, vb = tape.values[a], tape.values[b]
     if va is not None and vb is not None:
         return _folded(tape, "div", va, vb)
     if va == 0.0:
-        return tape.constant(0.0)
+        return tape.number(0.0)
     if vb == 1.0:
         return a
     if vb is not None and vb < 0.0:
-        return -(a / tape.constant(-vb))
+        return tape.applied("neg", tape.applied("div", a, tape.number(-vb)))
     if va is not None and va < 0.0:
-        return -(tape.constant(-va) / b)
-    minus_a, minus_b = _negated(a), _negated(b)
+        return tape.applied("neg", tape.applied("div", tape.number(-va), b))
+    minus_a, minus_b = tape.minus[a], tape.minus[b]
     if minus_a is not None:
-        return -(minus_a / b)
+        return tape.applied("neg", tape.applied("div", minus_a, b))
     if minus_b is not None:
-        return -(a / minus_b)
+        return tape.applied("neg", tape.applied("div", a, minus_b))
     return None
 
 
-def _fold_neg(tape: Tape, a: Node) -> Node | None:
-    value, minus = tape.values[a.index], _negated(a)
+def _fold_neg(tape: Tape, a: int) -> int | None:
+    value, minus = tape.values[a], tape.minus[a]
     if value is not None:
-        return tape.constant(-value)
+        return tape.number(-value)
     if minus is not None:
         return minus
-    if a.step.operation == "sub":
-        left, right = a.step.operands
-        return Node(tape, right) - Node(tape, left)
+    operation, operands, _, _ = tape.steps[a]
+    if operation == "sub":
+        return tape.applied("sub", operands[1], operands[0])
     return None
 
 
-def _fold_sin(tape: Tape, a: Node) -> Node | None:
-    minus = _negated(a)
-    return None if minus is None else -tape.apply("sin", minus)
+def _fold_sin(tape: Tape, a: int) -> int | None:
+    minus = tape.minus[a]
+    return None if minus is None else tape.applied("neg", tape.applied("sin", minus))
 
 
-def _fold_cos(tape: Tape, a: Node) -> Node | None:
-    minus = _negated(a)
-    return None if minus is None else tape.apply("cos", minus)
+def _fold_cos(tape: Tape, a: int) -> int | None:
+    minus = tape.minus[a]
+    return None if minus is None else tape.applied("cos", minus)
 
 
-_FOLD: dict[str, Callable[..., Node | None]] = {
+_FOLD: dict[str, Callable[..., int | None]] = {
     "add": _fold_add,
     "sub": _fold_sub,
     "mul": _fold_mul,
