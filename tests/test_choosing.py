@@ -13,10 +13,11 @@ from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.module import as_problem, load_module
-from eomgen.run.problem import Contacts, Floats
+from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.store import generated_code
+from eomgen.study import choosing
 from eomgen.study.choosing import meet, within
 from eomgen.study.estimate import by_second_run, difference, errors, fit, remaining
 from eomgen.study.measure import error
@@ -207,6 +208,32 @@ def test_beyond_the_floor_of_adaptive_methods() -> None:
     assert choice.met and choice.tried.setting.integrator == "gauss_6"
     assert error(found, true.y[-1], true.scale) < target
     assert error(floor, true.y[-1], true.scale) > target
+
+
+def test_a_motion_that_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lorenz's over 50 s grows an error by 1e19: no run in doubles is right, and once DOP853 as
+    tight as it goes is wrong, no other method is asked; gauss_6 for so long that it tells, no more.
+    """
+
+    def derivative(t: float, y: Floats) -> Floats:
+        a, b, c = y.tolist()
+        return np.array([10 * (b - a), a * (28 - c) - b, a * b - 8 / 3 * c])
+
+    def jacobian(t: float, y: Floats) -> Floats:
+        a, b, c = y.tolist()
+        return np.array([[-10, 10, 0], [28 - c, -1, -a], [b, a, -8 / 3]])
+
+    lorenz = Problem("lorenz", ("a", "b", "c"), (0, 1, 2), derivative, jacobian, np.ones(3))
+    made: list[Tried] = []
+    run = Case.run
+    monkeypatch.setattr(Case, "run", lambda *a, **k: made.append(run(*a, **k)) or made[-1])
+    monkeypatch.setattr(choosing, "PATIENCE", 1.0)
+    monkeypatch.setattr(choosing, "LIMIT", 2.0)
+    choice = meet(Case(lorenz, 50.0, dict.fromkeys("abc", "m"), {}), 1e-3)
+    assert not choice.met and choice.error > 1e-3
+    names = [one.setting.integrator for one in made]
+    after = names[names.index("gauss_6") :]
+    assert set(after) == {"gauss_6"} and len(after) <= 6
 
 
 def test_steps_that_something_else_keeps_short() -> None:
