@@ -41,6 +41,7 @@ from eomgen.derivation.recursive.rows import (
     Taken,
     Turn,
     shifted,
+    turned,
     turned_back,
 )
 from eomgen.derivation.recursive.solids import Ranks, Solid
@@ -104,7 +105,7 @@ class Elimination:
             eliminated, passed = self._eliminated(k, own, rows[k], terms[k], tau)
             found.append(eliminated)
             if link.parent >= 0:
-                rows[link.parent] += [(_turned(link, row), k) for row in eliminated.rows]
+                rows[link.parent] += [(turned(link, row), k) for row in eliminated.rows]
                 terms[link.parent] = total(terms[link.parent], at_parent(link, passed))
         return self._aligned.out(self._outwards(found[::-1], len(tau)))
 
@@ -395,8 +396,3 @@ class Elimination:
             angular = named(angular, f"alpha_{link.name}", scalars)
             reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
         return result
-
-
-def _turned(link: Link, row: Row) -> Row:
-    """A row of a link in its parent's axes."""
-    return replace(row, angular=link.turn.out(row.angular), linear=link.turn.out(row.linear))

@@ -13,7 +13,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
-from eomgen.derivation.recursive.instant import Axis
+from eomgen.derivation.recursive.instant import Axis, Link
 from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, add, cross, unit, zeros
 
 TINY = 1e-200
@@ -219,3 +219,8 @@ def turned_back(turns: Sequence[Turn | Sum], residuals: dict[int, Scalar]) -> No
 def shifted(row: Row, way: Vec) -> Row:
     """A row about a point as one about the origin that the point lies `way` from."""
     return replace(row, angular=add(row.angular, cross(way, row.linear)))
+
+
+def turned(link: Link, row: Row) -> Row:
+    """A row of a link in its parent's axes."""
+    return replace(row, angular=link.turn.out(row.angular), linear=link.turn.out(row.linear))
