@@ -27,6 +27,7 @@ from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.rotations import AxisTurn
 from eomgen.language.formula import Constant
 from eomgen.model import Model
+from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.program import Output, cost, finish, interpret
 from eomgen.program.route import recorded, routed
 from eomgen.scene.reader import find_scene, parse_scene
@@ -424,6 +425,32 @@ def test_as_a_module() -> None:
     columns = np.array([y, y + 0.1]).T
     together = one.module.derivative(0.0, columns, u=at[2])
     assert apart(together[:, 0], one.module.derivative(0.0, y, u=at[2])) < 1e-14
+
+
+@pytest.mark.parametrize(
+    ("text", "masses"),
+    [(scene(PLANE, 4, 1), "heavy tip"), (mixed("ball", 3, 1), "alternating")],
+    ids=["plane", "space"],
+)
+def test_digits_of_the_jacobian(text: str, masses: str) -> None:
+    """Those, too: its own steps are differentiated. The factors of M would lose all of them."""
+    model = heavy(masses, text, 1)
+    q, v, u = state(model, "random", 1)
+    names = [c.name for c in (*model.coordinates, *model.velocities)]
+    given = {**model.defaults, **dict(zip(names, (*q, *v), strict=True)), **u}
+    found, exactly = (
+        interpret(
+            from_recursion(Recording(replace(model, outputs=()), route)).program,
+            "jacobian",
+            {name: scalars.number(x) for name, x in given.items()},
+            scalars,
+        )
+        for route, scalars in (("orthogonal", FloatScalars()), ("aba", Digits()))
+    )
+    n = len(names)
+    for k in range(n):
+        pair = ([MP.mpf(x) for x in found[k::n]], exactly[k::n])
+        assert apart(*pair) < AT_RANDOM, names[k]
 
 
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])

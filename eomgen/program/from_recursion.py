@@ -19,6 +19,8 @@ from eomgen.program.scalars import TapeScalars
 from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system
 from eomgen.program.tape import TIME, Node, Stage, Tape
 
+DIFFERENTIATED = ("closed", "orthogonal")
+"""Routes whose own steps are differentiated: the factors of M have lost what `orthogonal` keeps."""
 DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 
 
@@ -105,9 +107,9 @@ def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
     tangents: set[str] = set()
     for name in derivatives(model, jacobian):
         by = variables(record, name)
-        if _is_small(record, name):
-            rows = _matrix(record, name)
-        else:
+        before, rows = len(tape.steps), _matrix(record, name) if _is_small(record, name) else None
+        more = len(tape.steps) - before
+        if rows is None or (record.route in DIFFERENTIATED and more > LARGEST_JACOBIAN):
             rows, extra[name] = along_directions(record, by)
             tangents.add(name)
         made[name] = ((ny, len(by)), [node for row in rows for node in row])
@@ -247,7 +249,7 @@ def along_directions(
     directions = [record.given(f"d__{node.step.value}", Stage.INPUTS) for node in by]
     names = tuple(str(d.step.value) for d in directions)
     seeds = {x.index: d for x, d in zip(by, directions, strict=True)}
-    if record.route == "closed":
+    if record.route in DIFFERENTIATED:
         return [[node] for node in tangent(record.rates, seeds)], names
     d, inputs = record.dynamics, record.beside("vd")
     found = {x.index: vd for x, vd in zip(inputs, record.vd, strict=True)}
@@ -278,11 +280,14 @@ def _is_small(record: Recording, name: str) -> bool:
 
 def _matrix(record: Recording, name: str) -> list[list[Node]]:
     """∂f by state, inputs or parameters: inverse dynamics is differentiated at the accelerations
-    found, and M solved for them, ∂v̇ = -M⁻¹ ∂τ.
+    found, and M solved for them, ∂v̇ = -M⁻¹ ∂τ; or else the steps of the route are.
     """
     d, tape = record.dynamics, record.tape
     zero = tape.constant(0.0)
-    by, factors = variables(record, name), d.factors
+    by = variables(record, name)
+    if record.route in DIFFERENTIATED:
+        return jacobian(record.rates, by)
+    factors = d.factors
     moved = jacobian(d.applied_force, by)
     if name == "jacobian":
         columns = _state_columns(record)
