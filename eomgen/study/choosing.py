@@ -100,7 +100,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
             return search.chosen(best, judged, True)
         if asked is None and _patience(search, names, plans, PATIENCE * best.work):
             continue
-        aside = _again(search, names)
+        aside = None if _lost(search, judged) else _again(search, names)
         if not possible:
             possible = [plan for plan in (_beside(search, best), aside) if plan][:1]
         if not possible:
