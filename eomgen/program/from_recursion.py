@@ -108,8 +108,8 @@ def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
     for name in derivatives(model, jacobian):
         by = variables(record, name)
         before, rows = len(tape.steps), _matrix(record, name) if _is_small(record, name) else None
-        more = len(tape.steps) - before
-        if rows is None or (record.route in DIFFERENTIATED and more > LARGEST_JACOBIAN):
+        written = len(tape.steps) - before
+        if rows is None or (record.route in DIFFERENTIATED and written > LARGEST_JACOBIAN):
             rows, extra[name] = along_directions(record, by)
             tangents.add(name)
         made[name] = ((ny, len(by)), [node for row in rows for node in row])

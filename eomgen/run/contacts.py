@@ -193,12 +193,15 @@ def restrained(
     if holding is None:
         return problem
     derivative = counted(holding.derivative)
-    return replace(problem, derivative=derivative, jacobian=partial(_differences, derivative))
+    sizes = np.array(problem.sizes or (1.0,))
+    return replace(
+        problem, derivative=derivative, jacobian=partial(_differences, derivative, sizes)
+    )
 
 
-def _differences(derivative: Rate, t: float, y: Floats) -> Floats:
-    """Derivatives (ny, ny) of a derivative by the state, by central differences."""
-    steps = _CUBE_ROOT * np.maximum(1.0, np.abs(y))
+def _differences(derivative: Rate, sizes: Floats, t: float, y: Floats) -> Floats:
+    """Derivatives (ny, ny) of a derivative by a state of such sizes, by central differences."""
+    steps = _CUBE_ROOT * np.maximum(sizes, np.abs(y))
     columns = [derivative(t, y + change) - derivative(t, y - change) for change in np.diag(steps)]
     return np.column_stack(columns) / (2 * steps)
 
