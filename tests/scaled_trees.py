@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from eomgen.derivation.recursive.digits import digits_lost
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.regular import check_regular
+from eomgen.language.formula import Constant
 from eomgen.model import Model
 from eomgen.program.route import MOST_LOST, MOST_LOST_OF_ALL
 from eomgen.scene.reader import parse_scene
@@ -41,7 +43,26 @@ def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Model:
     _, text = random_spatial_tree(seed, dimensions, MOST_BODIES, parameters)
     model = build_model(parse_scene(text))
     check_regular(model)
-    return model
+    # Doubles are what is given of a body, not formulas of them: I + m l² may be m l² to all digits.
+    bodies = (
+        replace(
+            body,
+            mass=Constant(model.value(body.mass)),
+            inertia_com=_no_needle([model.value(x) for x in body.inertia_com]),
+        )
+        for body in model.bodies
+    )
+    return replace(model, bodies=tuple(bodies))
+
+
+def _no_needle(entries: Sequence[float]) -> tuple[Constant, ...]:
+    """Moments of inertia of one body within six decades: in turned axes doubles hold a body that is
+    thinner no better than its axes, of which half a unit in the last place tells all.
+    """
+    moments, products = entries[:3], entries[3:]
+    if len(moments) == 3 and min(moments) > 0:
+        moments = [max(x, 1e-6 * max(moments)) for x in moments]
+    return tuple(map(Constant, (*moments, *products)))
 
 
 def state(model: Model, seed: int, special: bool) -> tuple[list[float], list[float]]:
@@ -97,8 +118,8 @@ def found(model: Model, q: Sequence[float], v: Sequence[float], u: dict[str, flo
 def truth(
     model: Model, q: Sequence[float], v: Sequence[float], u: dict[str, float]
 ) -> tuple[list[Any], float]:
-    """v̇ in 60 digits, and how much of its largest component it changes by when all data are
-    changed by up to half a unit in the last place: no more than that can be asked of doubles.
+    """v̇ in 60 digits, and how much of its size it changes by when all data are changed by up to
+    half a unit in the last place: no more than that can be asked of doubles.
     """
     r = random.Random(7)
 
@@ -112,17 +133,25 @@ def truth(
         return list(dynamics(model, p, *at, w, Digits()).articulated_forward())
 
     true = exactly(0.0)
-    size = max(abs(x) for x in true)
+    size = size_of(true, model, v)
     if not size:
         return true, 0.0
     moved = (exactly(2.0**-53) for _ in range(NUDGES))
     return true, max(float(abs(a - b) / size) for m in moved for a, b in zip(m, true, strict=True))
 
 
-def apart(value: Sequence[float], true: Sequence[Any]) -> float:
-    """The error relative to the largest component; infinite where there is no number."""
+def size_of(true: Sequence[Any], model: Model, v: Sequence[float]) -> Any:
+    """The largest component of v̇, or the largest that turning makes of rates, ω v: a ball that
+    turns as it is has accelerations of 0, in which terms of that size cancel for any data.
+    """
+    turning = [x for c, x in zip(model.velocities, v, strict=True) if c.unit == "rad/s"]
+    rates = max(map(abs, turning), default=0.0) * max(map(abs, v))
+    return max(MP.mpf(rates), *(abs(x) for x in true))
+
+
+def apart(value: Sequence[float], true: Sequence[Any], size: Any) -> float:
+    """The error in parts of a size; infinite where there is no number."""
     if not np.isfinite(value).all():
         return np.inf
-    size = max(abs(x) for x in true)
     off = max(abs(MP.mpf(float(a)) - b) for a, b in zip(value, true, strict=True))
     return float(off / size) if size else float(off)

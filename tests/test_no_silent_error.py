@@ -9,16 +9,16 @@ import scaled_trees
 from campaign import some
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scaled_trees import Refused, apart, drawn, found, state, truth
+from scaled_trees import Refused, apart, drawn, found, size_of, state, truth
 
 from eomgen.errors import SceneError
 
 BOUND, TIMES = 1e-10, 1e3
-"""Of v̇ relative to its largest component; and of what half a unit in the last place of all data
-changes it by."""
+"""Of v̇ relative to its largest component, or that of ω v; and of what half a unit in the last place
+of all data changes it by."""
 
 
-def _tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) -> str:
+def tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) -> str:
     """What came of a case: 'right', 'refused', or, in words, an error that is too large."""
     try:
         tree = drawn(seed, dimensions, decades)
@@ -29,7 +29,7 @@ def _tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) 
     u = {i.name: float(r.uniform(-9, 9)) for i in tree.inputs}
     try:
         true, allowed = truth(tree, q, v, u)
-        off = apart(found(tree, q, v, u), true)
+        off = apart(found(tree, q, v, u), true, size_of(true, tree, v))
     except (Refused, ZeroDivisionError):
         return "refused"
     bound = BOUND + TIMES * allowed
@@ -37,7 +37,7 @@ def _tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) 
 
 
 @settings(
-    max_examples=some(150, 100_000),
+    max_examples=some(150, 3000),
     deadline=None,
     derandomize=True,
     database=None,
@@ -50,15 +50,15 @@ def _tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) 
     special=st.booleans(),
 )
 def test_right_or_refused(seed: int, dimensions: int, decades: list[float], special: bool) -> None:
-    """No error beyond its bound goes unsaid. With FULL=1 it is the campaign of 1e5 cases."""
-    outcome = _tried(seed, dimensions, decades, special)
+    """No error beyond its bound goes unsaid. `campaigns.silent_errors` tries 1e5 cases."""
+    outcome = tried(seed, dimensions, decades, special)
 
     assert outcome in ("right", "refused"), outcome
 
 
 def test_most_are_right() -> None:
     """Refusing everything would be no answer."""
-    outcomes = Counter(_tried(seed, 2 + seed % 2, [0.0], bool(seed % 3)) for seed in range(20))
+    outcomes = Counter(tried(seed, 2 + seed % 2, [0.0], bool(seed % 3)) for seed in range(20))
     assert outcomes == {"right": 20}
 
 
@@ -67,4 +67,4 @@ def test_it_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scaled_trees, "taken", lambda model: "aba")
     r = np.random.default_rng(1)
     cases = ((seed, 2, r.uniform(-12, 12, 30).tolist(), False) for seed in range(60))
-    assert any(_tried(*case).startswith("off") for case in cases)
+    assert any(tried(*case).startswith("off") for case in cases)

@@ -14,7 +14,8 @@ from eomgen.derivation.recursive.vectors import Scalars
 from eomgen.effects import Driven, Gravity
 from eomgen.model import Model
 
-TRIALS = 3
+TRIALS, ALIGNED, PUSHED, NUDGES = 2, 2, 1, 3
+"""States at random, at multiples of 45 degrees, and under forces; how often numbers are changed."""
 ROUTES = ("closed", "ldl", "aba", "orthogonal")
 EPSILON = sys.float_info.epsilon
 ALL = -math.log10(sys.float_info.epsilon)
@@ -28,7 +29,7 @@ def digits_lost(
     model: Model, closed: Accelerations | None = None, exactly: Scalars | None = None
 ) -> Mapping[str, float]:
     """The decimal digits that routes lose on v̇, relative to its largest component or 1, at the
-    worst of some seeded random states; 0 to `ALL`.
+    worst of some seeded states, random and aligned ones; 0 to `ALL`.
 
     closed   v̇ by the closed form, which is judged, too
     exactly  scalars of many digits, by which all are judged, and `orthogonal`, too; what half a
@@ -36,8 +37,9 @@ def digits_lost(
              them `orthogonal` is what the others are compared with.
 
     Of the effects uniform gravity and drives act, or with a closed form all, the scene's own
-    parameters hold, and inputs are 0. A route that gives no number at a state loses all digits; a
-    state where there is none at all says nothing.
+    parameters hold, and inputs are 0; where there are other effects, forces of about 1 N or N m on
+    all velocities stand for them at some more states. A route that gives no number at a state loses
+    all digits; a state where there is none at all says nothing.
     """
     still = model
     if closed is None:
@@ -45,25 +47,29 @@ def digits_lost(
         still = replace(model, effects=kept)
     rng = random.Random(6)
     worst: dict[str, float] = {}
-    for _ in range(TRIALS):
+    pushed = PUSHED if len(still.effects) < len(model.effects) else 0
+    for trial in range(TRIALS + ALIGNED + pushed):
         q = [rng.uniform(-1.5, 1.5) for _ in model.coordinates]
+        if TRIALS <= trial < TRIALS + ALIGNED:
+            q = _aligned(model, rng)
         v = [rng.uniform(-1.5, 1.5) for _ in model.velocities]
+        tau = [rng.uniform(-1.0, 1.0) for _ in v] if trial >= TRIALS + ALIGNED else None
         inputs = {i.name: 0.0 for i in model.inputs}
         states = {x.name: x.initial for x in model.states}
         values = Values(model.defaults, inputs, q, v, states)
         try:
             d = Dynamics(still, values, FloatScalars(), "own")
             true, allowed = (
-                (d.orthogonal_forward(), EPSILON)
+                (d.orthogonal_forward(tau), EPSILON)
                 if exactly is None
-                else _exactly(still, values, exactly)
+                else _exactly(still, values, tau, exactly)
             )
         except (ArithmeticError, ValueError):
             continue  # no v̇ there to lose digits of
         forward: dict[str, Callable[[], Sequence[float]]] = {
-            "aba": d.articulated_forward,
-            "ldl": d.factored_forward,
-            "orthogonal": d.orthogonal_forward,
+            "aba": partial(d.articulated_forward, tau),
+            "ldl": partial(d.factored_forward, tau),
+            "orthogonal": partial(d.orthogonal_forward, tau),
         }
         if closed is not None:
             forward["closed"] = partial(closed, values)
@@ -73,7 +79,21 @@ def digits_lost(
     return {route: _digits(worst.get(route, 1.0)) for route in ROUTES}
 
 
-def _exactly(model: Model, values: Values, scalars: Scalars) -> tuple[list[Any], float]:
+def _aligned(model: Model, rng: random.Random) -> list[float]:
+    """Coordinates where levers vanish and axes meet."""
+    q = [
+        rng.randrange(-4, 5) * (math.pi / 4) if c.unit == "rad" else rng.choice((0.0, 1.0))
+        for c in model.coordinates
+    ]
+    for indices in model.quaternions:
+        for n, i in enumerate(indices):
+            q[i] = float(n == 0)
+    return q
+
+
+def _exactly(
+    model: Model, values: Values, tau: Sequence[float] | None, scalars: Scalars
+) -> tuple[list[Any], float]:
     """v̇ in many digits, and what it is off where all numbers are by half a unit in the last place,
     in parts of its size; at least `EPSILON`.
     """
@@ -87,10 +107,11 @@ def _exactly(model: Model, values: Values, scalars: Scalars) -> tuple[list[Any],
         named = [{name: near(x) for name, x in own.items()} for own in given]
         q, v = ([near(x) for x in own] for own in (values.q, values.v))
         near_by = Values(named[0], named[1], q, v, named[2], scalars.number(0.0))
-        return Dynamics(model, near_by, scalars, "own").articulated_forward()
+        forces = None if tau is None else [near(x) for x in tau]
+        return Dynamics(model, near_by, scalars, "own").articulated_forward(forces)
 
     true = forward(0.0)
-    apart = max(_apart(forward(EPSILON / 2), true) for _ in range(TRIALS))
+    apart = max(_apart(forward(EPSILON / 2), true) for _ in range(NUDGES))
     return true, max(EPSILON, apart / _size(true))
 
 

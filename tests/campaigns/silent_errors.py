@@ -1,0 +1,48 @@
+"""Random trees over 24 decades of everything: right, or refused; a hundred thousand of them.
+
+    python tests/campaigns/silent_errors.py [--count N] [--first N]
+
+What `test_no_silent_error` tries a few hundred of, by number, so that it can be run in parts: all
+failures are told, each with the number that makes it again.
+"""
+
+import argparse
+import random
+import sys
+from collections import Counter
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parent.parent))
+
+from test_no_silent_error import tried
+
+BATCH = 500
+
+
+def case(number: int) -> tuple[int, int, list[float], bool]:
+    """Seed, dimensions, decades of masses and the like, and whether the state is a special one."""
+    r = random.Random(number)
+    decades = [r.uniform(-12, 12) for _ in range(r.choice((1, 2, 3, 5, 8, 30)))]
+    return r.randrange(2**32), r.choice((2, 3)), decades, r.random() < 0.5
+
+
+def main() -> None:
+    """Try them, and say what came of them."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--count", type=int, default=100_000)
+    parser.add_argument("--first", type=int, default=0)
+    given = parser.parse_args()
+    counts: Counter[str] = Counter()
+    for number in range(given.first, given.first + given.count):
+        outcome = tried(*case(number))
+        counts[outcome if outcome in ("right", "refused") else "silent"] += 1
+        if outcome not in ("right", "refused"):
+            print(f"{number}: {outcome}", flush=True)
+        if (number + 1) % BATCH == 0:
+            print(f"to {number + 1}: {dict(counts)}", flush=True)
+    print(f"{given.count} trees: {dict(counts)}")
+    sys.exit(counts["silent"] > 0)
+
+
+if __name__ == "__main__":
+    main()
