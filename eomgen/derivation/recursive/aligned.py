@@ -58,8 +58,8 @@ def aligned(
     ranks: Ranks,
     scalars: Scalars,
 ) -> Aligned:
-    """Links, and what they carry, where `heaviest` is for each the link it carries to look at, or
-    -1. Frames on other joints keep their axes.
+    """Links, and what they carry, where `ranks` tell which links each has to look at. Frames on
+    other joints keep their axes.
     """
     turns: list[Rotation] = [Unturned() for _ in links]
     heaviest, between = ranks.heaviest, dict[int, Vec]()

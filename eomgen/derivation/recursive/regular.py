@@ -1,5 +1,6 @@
 """Is there inertia against every motion? Asked before code is written, in numbers."""
 
+import math
 import random
 from dataclasses import replace
 from typing import Any
@@ -28,6 +29,8 @@ from eomgen.model import Body, Model
 Array = npt.NDArray[np.float64]
 
 TRIALS = 3
+TOGETHER = 4096
+"""Poses that are looked at at once: a long run has more than memory for all of them."""
 VANISHED = 1e-12
 """A pivot below this share of the diagonal entry it came from is rounding."""
 
@@ -60,9 +63,12 @@ def resistances(model: Model, poses: Array) -> dict[int, Array]:
     it feels none there, and the mass matrix tells no acceleration.
     """
     some = _seeded(random.Random(20), len(model.coordinates))
-    found = _pivots(_evened(model), np.concatenate([poses, some]))
+    even, asked = _evened(model), np.concatenate([poses, some])
+    parts = np.array_split(asked, math.ceil(len(asked) / TOGETHER))
+    found = [_pivots(even, part) for part in parts]
     shares = {}
-    for i, (pivot, _) in found.items():
+    for i in found[0]:
+        pivot = np.concatenate([pivots[i][0] for pivots in found])
         largest = pivot.max()
         shares[i] = pivot[: len(poses)] / largest if largest > 0 else np.zeros(len(poses))
     return shares

@@ -90,8 +90,12 @@ def ranked(linkage: Linkage) -> Ranks:
     own = [float(frame.rigid.mass) for frame in frames]
     whole, single, least = list(own), list(own), list(own)
     heaviest, beside = [-1] * len(own), [-1] * len(own)
+    carried: list[list[int]] = [[] for _ in frames]
+    for n, frame in enumerate(frames):
+        if frame.parent >= 0:
+            carried[frame.parent].append(n)
     for k in reversed(range(len(own))):
-        children = [n for n, frame in enumerate(frames) if frame.parent == k]
+        children = carried[k]
         whole[k] += sum(whole[n] for n in children)
         single[k] = max([own[k], *(single[n] for n in children)])
         firm = sorted((*(least[n] for n in children), 0.0, 0.0, 0.0), reverse=True)
