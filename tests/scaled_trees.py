@@ -6,16 +6,17 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from engine import MP, Digits
+from engine import MP
 from spatial_trees import random_spatial_tree
 
 from eomgen.build import build_model
 from eomgen.derivation.recursive.digits import digits_lost
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.language.formula import Constant
 from eomgen.model import Model
+from eomgen.program.digits import Bits, out_of_bits, sixty_digits
 from eomgen.program.route import MOST_LOST, MOST_LOST_OF_ALL
 from eomgen.scene.reader import parse_scene
 
@@ -95,24 +96,34 @@ def taken(model: Model) -> str:
 
     Raises `Refused` where it refuses the scene.
     """
-    for lost in (digits_lost(model), digits_lost(model, None, Digits())):
+    lost = digits_lost(model)
+    for again in (False, True):
         for route in ("aba", "ldl"):
             if lost[route] <= MOST_LOST:
                 return route
+        if not again:
+            with sixty_digits():
+                lost = digits_lost(model, None, Bits())
     if lost["orthogonal"] > MOST_LOST_OF_ALL:
         raise Refused
     return "orthogonal"
 
 
 def found(model: Model, q: Sequence[float], v: Sequence[float], u: dict[str, float]) -> list[float]:
-    """v̇ in doubles, by the recursion taken. Raises `Refused`."""
-    at = dynamics(model, model.defaults, q, v, u, FloatScalars())
+    """v̇ in doubles, by the recursion taken. Raises `Refused`.
+
+    Beside the state stands one at random, so that nothing is left out as 0 that is not always.
+    """
+    r = random.Random(1)
+    places, rates = ([np.array([x, r.uniform(-1, 1)]) for x in own] for own in (q, v))
+    at = dynamics(model, model.defaults, places, rates, u, ArrayScalars())
     forward = {
         "aba": at.articulated_forward,
         "ldl": at.factored_forward,
         "orthogonal": at.orthogonal_forward,
     }
-    return list(forward[taken(model)]())
+    with np.errstate(all="ignore"):
+        return [float(np.broadcast_to(x, 2)[0]) for x in forward[taken(model)]()]
 
 
 def truth(
@@ -123,14 +134,17 @@ def truth(
     """
     r = random.Random(7)
 
+    bits = Bits()
+
     def near(value: float, nudge: float) -> Any:
-        return MP.mpf(value) * (1 + MP.mpf(nudge * r.uniform(-1, 1)))
+        return bits.number(value) * (1 + bits.number(nudge * r.uniform(-1, 1)))
 
     def exactly(nudge: float) -> list[Any]:
-        p = {name: near(value, nudge) for name, value in model.defaults.items()}
-        w = {name: near(value, nudge) for name, value in u.items()}
-        at = ([near(x, nudge) for x in q], [near(x, nudge) for x in v])
-        return list(dynamics(model, p, *at, w, Digits()).articulated_forward())
+        with sixty_digits():
+            p = {name: near(value, nudge) for name, value in model.defaults.items()}
+            w = {name: near(value, nudge) for name, value in u.items()}
+            at = ([near(x, nudge) for x in q], [near(x, nudge) for x in v])
+            return out_of_bits(dynamics(model, p, *at, w, bits).articulated_forward())
 
     true = exactly(0.0)
     size = size_of(true, model, v)

@@ -37,7 +37,7 @@ def tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) -
 
 
 @settings(
-    max_examples=some(150, 3000),
+    max_examples=some(150, 100_000),
     deadline=None,
     derandomize=True,
     database=None,

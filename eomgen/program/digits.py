@@ -1,6 +1,7 @@
 """Numbers of many digits as scalars of formulas, recursions and programs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import gmpy2
@@ -36,6 +37,8 @@ BY_MPFR = _functions(gmpy2, mpfr)
 class Digits:
     """60-digit numbers as scalars."""
 
+    exact = True
+
     def number(self, value: float) -> Any:
         """The double itself, exactly."""
         return MP.mpf(value)
@@ -64,6 +67,8 @@ class Bits:
     fast as mpmath's.
     """
 
+    exact = True
+
     def number(self, value: float) -> Any:
         """The double itself, exactly."""
         return mpfr(value, 53)  # all its bits, in any context
@@ -71,6 +76,23 @@ class Bits:
     def call(self, function: str, *arguments: Any) -> Any:
         """A function of formulas."""
         return BY_MPFR[function](*arguments)
+
+    def is_zero(self, value: Any) -> bool:
+        """Whether it is 0 here."""
+        return bool(value == 0)
+
+    def named(self, value: Any, name: str) -> Any:
+        """A number has no name."""
+        return value
+
+
+@contextmanager
+def sixty_digits() -> Iterator[None]:
+    """A block in which MPFR's numbers are of `DIGITS` digits, and what has no value raises
+    `ArithmeticError`.
+    """
+    with gmpy2.context(precision=MP.prec, trap_divzero=True, trap_invalid=True):
+        yield
 
 
 def evaluator(program: Program, output: str) -> Callable[[Mapping[str, Any]], list[Any]]:
@@ -83,11 +105,16 @@ def evaluator(program: Program, output: str) -> Callable[[Mapping[str, Any]], li
 
     def run(inputs: Mapping[str, Any]) -> list[Any]:
         # Only here, since MPFR's numbers are as exact as the context of whoever uses them.
-        with gmpy2.context(precision=MP.prec, trap_divzero=True, trap_invalid=True):
+        with sixty_digits():
             found = steps({name: _in_bits(value) for name, value in inputs.items()})
-            return [MP.mpf(tuple(map(int, x.as_mantissa_exp()))) for x in found]
+            return out_of_bits(found)
 
     return run
+
+
+def out_of_bits(numbers: Iterable[Any]) -> list[Any]:
+    """MPFR's numbers as mpmath's, exactly."""
+    return [MP.mpf(tuple(map(int, x.as_mantissa_exp()))) for x in numbers]
 
 
 def _in_bits(value: Any) -> Any:

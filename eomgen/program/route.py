@@ -9,7 +9,7 @@ from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.errors import SceneError
 from eomgen.model import Model
-from eomgen.program.digits import Digits
+from eomgen.program.digits import Bits, sixty_digits
 from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.program import Output, cost, finish, interpreter
 from eomgen.program.system import System
@@ -18,7 +18,7 @@ from eomgen.program.tape import TIME
 MOST_LOST = 4.0
 """Decimal digits of v̇ that a route may lose at ordinary states and still be taken by itself."""
 
-MOST_LOST_OF_ALL = 6.0
+MOST_LOST_OF_ALL = 5.0
 """That the last of all routes may lose; a scene for which it loses more is refused."""
 
 MOST_FACTORING = 20_000
@@ -97,7 +97,8 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
     by_closed = None if closed is None else _accelerations(closed)
     tried = _weighed(candidates, digits_lost(model, by_closed))
     if not _kept(tried):
-        lost = digits_lost(model, by_closed, Digits())
+        with sixty_digits():
+            lost = digits_lost(model, by_closed, Bits())
         tried = _weighed(candidates, lost)
         if not _kept(tried):
             records["orthogonal"] = recorded(model, "orthogonal")

@@ -1,6 +1,6 @@
 """The tape's nodes as the abstract scalars of formulas and recursions."""
 
-from eomgen.program.tape import Node, Tape
+from eomgen.program.tape import ExactTape, Node, Tape
 
 
 class TapeScalars:
@@ -8,6 +8,7 @@ class TapeScalars:
 
     def __init__(self, tape: Tape) -> None:
         self._tape = tape
+        self.exact = isinstance(tape, ExactTape)
 
     def number(self, value: float) -> Node:
         """A constant."""

@@ -8,17 +8,40 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.derivation.recursive.vectors import Scalars
 from eomgen.effects import Driven, Gravity
 from eomgen.model import Model
 
-TRIALS, ALIGNED, PUSHED, NUDGES = 2, 2, 1, 3
-"""States at random, at multiples of 45 degrees, and under forces; how often numbers are changed."""
+Array = NDArray[np.float64]
+
+ANGLES: tuple[tuple[float, ...], ...] = (
+    (),
+    tuple(n * math.pi / 4 for n in range(-4, 5)),
+    (0.0, 0.0, 0.0, math.pi / 2, math.pi / 4),
+)
+"""Kinds of states by their angles: any; those where levers vanish and axes meet; and these mostly
+at 0, the only one of them that is a double, where they do so to the last digit.
+"""
+EACH, CLOSELY = 20, 4
+"""States of a kind; and at how many of these the routes are judged by many digits: those where it
+does most to change all numbers in their last place.
+"""
+SURE = 100.0
+"""A change of v̇ by half a unit in the last place of all numbers counts as nothing in this part."""
+TRUSTED = 100.0
+"""How far off in parts of what is allowed `orthogonal` may be there, to judge the others at all
+states.
+"""
+PUSH = 10.0
+"""The size of inputs, at most."""
 ROUTES = ("closed", "ldl", "aba", "orthogonal")
 EPSILON = sys.float_info.epsilon
-ALL = -math.log10(sys.float_info.epsilon)
+ALL = -math.log10(EPSILON)
 """The digits of a double."""
 
 Accelerations = Callable[[Values], Sequence[float]]
@@ -32,68 +55,165 @@ def digits_lost(
     worst of some seeded states, random and aligned ones; 0 to `ALL`.
 
     closed   v̇ by the closed form, which is judged, too
-    exactly  scalars of many digits, by which all are judged, and `orthogonal`, too; what half a
-             unit in the last place of all numbers given would change counts as nothing. Without
-             them `orthogonal` is what the others are compared with.
+    exactly  scalars of many digits, by which all are judged, and `orthogonal`, too, at the states
+             where that is most in doubt; what half a unit in the last place of all numbers given
+             would change counts as nothing. Without them `orthogonal` is what the others are
+             compared with.
 
-    Of the effects uniform gravity and drives act, or with a closed form all, the scene's own
-    parameters hold, and inputs are 0; where there are other effects, forces of about 1 N or N m on
-    all velocities stand for them at some more states. A route that gives no number at a state loses
-    all digits; a state where there is none at all says nothing.
+    Uniform gravity and drives act alone (with a closed form all effects, without inputs), and then
+    all effects under inputs of up to `PUSH`; the scene's own parameters hold. A route that gives no
+    number at a state loses all digits; a state where there is none at all says nothing.
     """
+    rng = random.Random(6)
+    q = [_position(model, angles, rng) for angles in ANGLES for _ in range(EACH)]
+    v = [[rng.uniform(-1.5, 1.5) for _ in model.velocities] for _ in q]
+    pushes = [{i.name: rng.uniform(-PUSH, PUSH) for i in model.inputs} for _ in q]
     still = model
     if closed is None:
         kept = tuple(e for e in model.effects if isinstance(e, Gravity | Driven))
         still = replace(model, effects=kept)
-    rng = random.Random(6)
-    worst: dict[str, float] = {}
-    pushed = PUSHED if len(still.effects) < len(model.effects) else 0
-    for trial in range(TRIALS + ALIGNED + pushed):
+    nothing = {i.name: 0.0 for i in model.inputs}
+    states = {x.name: x.initial for x in model.states}
+    parts = [(still, [nothing] * len(q))]
+    if model.inputs or len(still.effects) < len(model.effects):
+        parts.append((model, pushes))
+    worst = dict.fromkeys(ROUTES, 0.0)
+    for acting, inputs in parts:
+        at = [Values(model.defaults, *rest, states) for rest in zip(inputs, q, v, strict=True)]
+        for route, off in _off(acting, at, closed, exactly).items():
+            worst[route] = max(worst[route], off)
+    return {route: _digits(off) for route, off in worst.items()}
+
+
+def _position(model: Model, angles: Sequence[float], rng: random.Random) -> list[float]:
+    """Coordinates at random, or angles of a few, and then no turn of balls."""
+    if not angles:
         q = [rng.uniform(-1.5, 1.5) for _ in model.coordinates]
-        if TRIALS <= trial < TRIALS + ALIGNED:
-            q = _aligned(model, rng)
-        v = [rng.uniform(-1.5, 1.5) for _ in model.velocities]
-        tau = [rng.uniform(-1.0, 1.0) for _ in v] if trial >= TRIALS + ALIGNED else None
-        inputs = {i.name: 0.0 for i in model.inputs}
-        states = {x.name: x.initial for x in model.states}
-        values = Values(model.defaults, inputs, q, v, states)
-        try:
-            d = Dynamics(still, values, FloatScalars(), "own")
-            true, allowed = (
-                (d.orthogonal_forward(tau), EPSILON)
-                if exactly is None
-                else _exactly(still, values, tau, exactly)
-            )
-        except (ArithmeticError, ValueError):
-            continue  # no v̇ there to lose digits of
-        forward: dict[str, Callable[[], Sequence[float]]] = {
-            "aba": partial(d.articulated_forward, tau),
-            "ldl": partial(d.factored_forward, tau),
-            "orthogonal": partial(d.orthogonal_forward, tau),
-        }
-        if closed is not None:
-            forward["closed"] = partial(closed, values)
-        for route, found in forward.items():
-            off = _off(found, true) / allowed
-            worst[route] = max(worst.get(route, 0.0), off)
-    return {route: _digits(worst.get(route, 1.0)) for route in ROUTES}
-
-
-def _aligned(model: Model, rng: random.Random) -> list[float]:
-    """Coordinates where levers vanish and axes meet."""
-    q = [
-        rng.randrange(-4, 5) * (math.pi / 4) if c.unit == "rad" else rng.choice((0.0, 1.0))
-        for c in model.coordinates
-    ]
+        for indices in model.quaternions:
+            length = math.hypot(*(q[i] for i in indices))
+            for i in indices:
+                q[i] /= length
+        return q
+    q = [rng.choice(angles if c.unit == "rad" else (0.0, 1.0)) for c in model.coordinates]
     for indices in model.quaternions:
         for n, i in enumerate(indices):
             q[i] = float(n == 0)
     return q
 
 
-def _exactly(
-    model: Model, values: Values, tau: Sequence[float] | None, scalars: Scalars
-) -> tuple[list[Any], float]:
+def _off(
+    model: Model,
+    at: Sequence[Values],
+    closed: Accelerations | None,
+    exactly: Scalars | None,
+) -> dict[str, float]:
+    """What the v̇ of each route is off, in parts of its size and of what must be allowed, at the
+    worst of some states; infinite where it gives no number.
+    """
+    found = _found(model, _together(at), len(at))
+    if closed is not None:
+        shape = (len(model.velocities),)
+        found["closed"] = np.column_stack([_numbers(partial(closed, x), shape) for x in at])
+    true = found["orthogonal"]
+    if exactly is None:
+        known = np.isfinite(np.stack([*found.values()])).all(axis=1).any(axis=0)
+        return _worst(found, true, EPSILON, known)
+    nudged = _found(model, _nudged(_together(at), len(at)), len(at), "orthogonal")
+    change = _shares(nudged["orthogonal"], true)
+    worst = dict.fromkeys(found, 0.0)
+    for n in _doubtful(change):
+        try:
+            long, allowed = _exactly(model, at[n], exactly)
+        except (ArithmeticError, ValueError):
+            continue  # no v̇ there to lose digits of
+        for route, rates in found.items():
+            own = rates[:, n]
+            off = _apart(own.tolist(), long) if np.isfinite(own).all() else math.inf
+            worst[route] = max(worst[route], off / _size(long) / allowed)
+    if worst["orthogonal"] <= TRUSTED:
+        at_all = np.isfinite(true).all(axis=0)
+        beside = _worst(found, true, np.fmax(change / SURE, EPSILON), at_all)
+        worst = {route: max(off, beside[route]) for route, off in worst.items()}
+    return worst
+
+
+def _found(model: Model, values: Values, count: int, *routes: str) -> dict[str, Array]:
+    """v̇ by the recursions (nv, count) at so many states; nan where there is no number."""
+    # All states at once: what is 0 at some of them only, is none of a program's zeros.
+    d = Dynamics(model, values, ArrayScalars(), "own")
+    forward: dict[str, Callable[[], Sequence[Any]]] = {
+        "aba": d.articulated_forward,
+        "ldl": d.factored_forward,
+        "orthogonal": d.orthogonal_forward,
+    }
+    shape = len(model.velocities), count
+    with np.errstate(all="ignore"):
+        return {route: _numbers(forward[route], shape) for route in routes or forward}
+
+
+def _doubtful(change: Array) -> list[int]:
+    """Of each kind the states of the greatest changes."""
+    kinds = np.where(np.isnan(change), np.inf, change).reshape(len(ANGLES), EACH)
+    order = np.argsort(-kinds, axis=1, kind="stable")[:, :CLOSELY]
+    return (order + EACH * np.arange(len(ANGLES))[:, None]).ravel().tolist()
+
+
+def _together(at: Sequence[Values]) -> Values:
+    """Values at several states as arrays."""
+    first = at[0]
+    return Values(
+        first.parameters,
+        {name: np.array([x.inputs[name] for x in at]) for name in first.inputs},
+        list(np.array([x.q for x in at]).T),
+        list(np.array([x.v for x in at]).T),
+        first.states,
+    )
+
+
+def _nudged(values: Values, count: int) -> Values:
+    """Values at so many states, all of them changed by up to a unit in the last place."""
+    rng = np.random.default_rng(7)
+
+    def near(x: Any, count: int | None = count) -> Any:
+        return x * (1.0 + rng.uniform(-EPSILON, EPSILON, count))
+
+    # One number of each for all: some are the names of places.
+    given = (values.parameters, values.states)
+    fixed, states = ({name: near(x, None) for name, x in own.items()} for own in given)
+    inputs = {name: near(x) for name, x in values.inputs.items()}
+    return Values(fixed, inputs, [*map(near, values.q)], [*map(near, values.v)], states)
+
+
+def _numbers(forward: Callable[[], Sequence[Any]], shape: tuple[int, ...]) -> Array:
+    """v̇ as an array of a shape; nan where there is no number."""
+    try:
+        rows = [np.broadcast_to(np.asarray(x, dtype=float), shape[1:]) for x in forward()]
+    except (ArithmeticError, ValueError):
+        return np.full(shape, np.nan)
+    return np.reshape(rows, shape)
+
+
+def _worst(
+    found: Mapping[str, Array], true: Array, allowed: Array | float, known: NDArray[np.bool_]
+) -> dict[str, float]:
+    """What v̇ is off (nv, n), in parts of its size and of what is allowed, at the worst of those
+    states where it is `known` (n,); infinite where it is no number.
+    """
+    worst = {}
+    for route, rates in found.items():
+        off = _shares(rates, true) / allowed
+        worst[route] = float(np.where(np.isnan(off), np.inf, off)[known].max(initial=0.0))
+    return worst
+
+
+def _shares(rates: Array, true: Array) -> Array:
+    """The greatest difference at each of n states, in parts of the size of v̇ there."""
+    with np.errstate(all="ignore"):
+        off = np.abs(rates - true).max(axis=0, initial=0.0)
+        return np.asarray(off / np.abs(true).max(axis=0, initial=1.0))
+
+
+def _exactly(model: Model, values: Values, scalars: Scalars) -> tuple[list[Any], float]:
     """v̇ in many digits, and what it is off where all numbers are by half a unit in the last place,
     in parts of its size; at least `EPSILON`.
     """
@@ -107,21 +227,10 @@ def _exactly(
         named = [{name: near(x) for name, x in own.items()} for own in given]
         q, v = ([near(x) for x in own] for own in (values.q, values.v))
         near_by = Values(named[0], named[1], q, v, named[2], scalars.number(0.0))
-        forces = None if tau is None else [near(x) for x in tau]
-        return Dynamics(model, near_by, scalars, "own").articulated_forward(forces)
+        return Dynamics(model, near_by, scalars, "own").articulated_forward()
 
     true = forward(0.0)
-    apart = max(_apart(forward(EPSILON / 2), true) for _ in range(NUDGES))
-    return true, max(EPSILON, apart / _size(true))
-
-
-def _off(found: Callable[[], Sequence[float]], true: Sequence[Any]) -> float:
-    """What a route's v̇ is off, in parts of its size; infinite where it gives no number."""
-    try:
-        off = _apart(found(), true) / _size(true)
-    except (ArithmeticError, ValueError):
-        return math.inf
-    return off if off == off else math.inf
+    return true, max(EPSILON, _apart(forward(EPSILON / 2), true) / _size(true) / SURE)
 
 
 def _size(values: Sequence[Any]) -> float:
@@ -129,9 +238,7 @@ def _size(values: Sequence[Any]) -> float:
 
 
 def _apart(one: Sequence[Any], other: Sequence[Any]) -> float:
-    """The greatest difference; nan if one of them is."""
-    apart = [float(abs(a - b)) for a, b in zip(one, other, strict=True)]
-    return math.nan if any(map(math.isnan, apart)) else max(apart, default=0.0)
+    return max((float(abs(a - b)) for a, b in zip(one, other, strict=True)), default=0.0)
 
 
 def _digits(times: float) -> float:

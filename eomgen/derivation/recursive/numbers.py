@@ -1,13 +1,27 @@
 """Plain floats as scalars of the recursions, and arrays of them: many poses at once."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from eomgen.derivation.recursive.vectors import Scalar
-from eomgen.language.formula import BY_MATH
+from eomgen.language.formula import BY_MATH, FUNCTIONS
+
+BY_NUMPY: dict[str, Callable[..., Any]] = {
+    **{name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)},
+    **{f"a{name}": getattr(np, f"arc{name}") for name in ("sin", "cos", "tan", "tan2")},
+    "step": lambda x: np.where(x > 0.0, 1.0, 0.0),
+    "min": np.minimum,
+    "max": np.maximum,
+    "select": lambda c, a, b: np.where(c > 0.0, a, b),
+}
 
 
 class FloatScalars:
     """What `Scalars` asks for, by `math`."""
+
+    exact = False
 
     def number(self, value: float) -> float:
         """The value itself."""
@@ -29,13 +43,15 @@ class FloatScalars:
 class ArrayScalars:
     """What `Scalars` asks for where scalars are floats or arrays (n,) of them, of one length n."""
 
+    exact = False
+
     def number(self, value: float) -> float:
         """The value itself, the same in all of them."""
         return value
 
     def call(self, function: str, *arguments: Scalar) -> Scalar:
-        """A function of formulas that NumPy has by the same name, entry by entry."""
-        return getattr(np, function)(*arguments)
+        """A function of formulas, entry by entry."""
+        return BY_NUMPY[function](*arguments)
 
     def is_zero(self, value: Scalar) -> bool:
         """Whether it is 0 in all of them; then the shorter of two ways that agree is taken."""

@@ -100,9 +100,8 @@ class Elimination:
         found: list[Eliminated] = []
         for k in reversed(range(len(self._links))):
             link = self._links[k]
-            own, term = self._own_rows(k, moving[k], wrenches[k])
-            terms[k] = total(terms[k], term)
-            eliminated, passed = self._eliminated(k, own, rows[k], terms[k], tau)
+            own, term = self._own_rows(k, moving[k], wrenches[k], terms[k])
+            eliminated, passed = self._eliminated(k, own, rows[k], term, tau)
             found.append(eliminated)
             if link.parent >= 0:
                 rows[link.parent] += [(turned(link, row), k) for row in eliminated.rows]
@@ -138,6 +137,7 @@ class Elimination:
         return (
             solid is not None
             and not self._ranks.light[k]
+            and not self._ranks.slight[k]
             and not any(
                 self._scalars.is_zero(solid.inertia[j][j]) for j in AXES[2 * self._planar :]
             )
@@ -147,18 +147,20 @@ class Elimination:
         return (2,) if self._planar else AXES
 
     def _own_rows(
-        self, k: int, a: Acceleration, wrench: Force
+        self, k: int, a: Acceleration, wrench: Force, term: Force
     ) -> tuple[tuple[dict[int, Row], dict[int, Row]], Force]:
         """Rows of a link's own mass, by axis: linear about its centre, and angular; and the part of
-        the wrench that no inertia takes.
+        a wrench about that, and of the term about the origin, that no inertia takes.
         """
         s, zero, solid, own = self._scalars, zeros(self._scalars), self._solids[k], self._carried[k]
         if solid is None or own is None:
-            return ({}, {}), wrench
+            return ({}, {}), total(wrench, term)
         linear, angular, left, moment = {}, {}, zero, zero
         into = self._aligned.turns[k].into
         way = into(add(a.linear, times(a.field, own.centre)))
         light = self._ranks.light[k]
+        about = sub(term.moment, cross(solid.centre, term.force))
+        wrench = total(wrench, Force(about, term.force))
         if light or s.is_zero(solid.mass):
             left = wrench.force
         if not s.is_zero(solid.mass):
@@ -167,7 +169,7 @@ class Elimination:
                 right = -way[j] if light else wrench.force[j] / m - way[j]
                 linear[j] = self._rows.make(m, zero, unit(j, s), right)
         turning = into(moment_about_centre(own.inertia, a, s))
-        if light:
+        if light or self._ranks.slight[k]:
             moment = wrench.moment
             y = [-x for x in turning]
         else:
@@ -176,7 +178,7 @@ class Elimination:
         order = turns_of(self._links[k], self._planar, self._aligned.along[k])
         for n, i in enumerate(order):
             if s.is_zero(solid.inertia[i][i]):
-                if not light:
+                if not light and not self._ranks.slight[k]:
                     moment = replaced(moment, i, y[i])
                 continue
             d = self._pivot_of(work[i][i], solid.inertia[i][i])

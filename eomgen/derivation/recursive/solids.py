@@ -1,9 +1,11 @@
 """What the frames carry, about its own centre: masses and inertias put together by sums alone."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.derivation.recursive.frames import Linkage
+from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.vectors import (
     AXES,
     Scalar,
@@ -13,6 +15,7 @@ from eomgen.derivation.recursive.vectors import (
     add,
     congruent,
     constant,
+    dot,
     plus,
     scale,
     sub,
@@ -77,11 +80,13 @@ class Ranks:
     beside    of a ball joint the next such child, where axes are to be along the line between these
               two; -1 elsewhere
     light     whether a body is light beside one it carries
+    slight    whether a body's inertia is nothing beside what else resists its turning
     """
 
     heaviest: tuple[int, ...]
     beside: tuple[int, ...]
     light: tuple[bool, ...]
+    slight: tuple[bool, ...]
 
 
 def ranked(linkage: Linkage) -> Ranks:
@@ -94,22 +99,61 @@ def ranked(linkage: Linkage) -> Ranks:
     for n, frame in enumerate(frames):
         if frame.parent >= 0:
             carried[frame.parent].append(n)
+    free = _sliding_all_ways(linkage, carried)
     for k in reversed(range(len(own))):
         children = carried[k]
-        whole[k] += sum(whole[n] for n in children)
-        single[k] = max([own[k], *(single[n] for n in children)])
+        whole[k] += sum(whole[n] for n in children if not free[n])
+        single[k] = max([own[k], *(single[n] for n in children if not free[n])])
         firm = sorted((*(least[n] for n in children), 0.0, 0.0, 0.0), reverse=True)
         spins = frames[k].kind == "spin"
         # What is left of so many points when all turns are free.
         least[k] = 0.0 if frames[k].kind == "slide" else max(own[k], firm[2 if spins else 1])
-        weights = least if spins else whole
+        weights = least if spins else [0.0 if free[n] else w for n, w in enumerate(whole)]
         order = sorted(children, key=lambda n: -weights[n])
         if order and weights[order[0]] > own[k]:
             heaviest[k] = order[0]
             third = max(own[k], firm[2])
             # Nothing holds the frame of a free body: there no other line asks for the axes.
-            free = frames[k].parent >= 0 and own[frames[k].parent] == 0.0
-            if spins and firm[1] > third and (free or firm[1] ** 2 > firm[0] * third):
+            loose = frames[k].parent >= 0 and own[frames[k].parent] == 0.0
+            if spins and firm[1] > third and (loose or firm[1] ** 2 > firm[0] * third):
                 beside[k] = order[1]
     light = (one > LIGHT * mass for one, mass in zip(single, own, strict=True))
-    return Ranks(tuple(heaviest), tuple(beside), tuple(light))
+    slight = _slight(linkage, carried, single)
+    return Ranks(tuple(heaviest), tuple(beside), tuple(light), tuple(slight))
+
+
+def _sliding_all_ways(linkage: Linkage, carried: Sequence[Sequence[int]]) -> list[bool]:
+    """Of each frame whether it begins slides along all axes, through which no force gets."""
+    frames, ways = linkage.frames, 2 if linkage.planar else 3
+    run = [0] * len(frames)
+    for k in reversed(range(len(frames))):
+        if frames[k].kind == "slide":
+            alone = frames[k].rigid.mass == 0.0 and len(carried[k]) == 1
+            run[k] = 1 + (run[carried[k][0]] if alone else 0)
+    return [n >= ways for n in run]
+
+
+def _slight(
+    linkage: Linkage, carried: Sequence[Sequence[int]], single: Sequence[float]
+) -> Iterator[bool]:
+    """Of each frame whether an axis of what it carries has next to no inertia beside masses on an
+    arm, its own about the frame's origin or children's, or a child's inertia.
+    """
+    frames, axes = linkage.frames, AXES[2 * linkage.planar :]
+    found = solids(linkage, FloatScalars())
+    moments = [[solid.inertia[j][j] for j in axes] if solid else [0.0] for solid in found]
+    for k, (frame, solid) in enumerate(zip(frames, found, strict=True)):
+        if solid is None or frame.kind == "slide":
+            yield False  # no turn is free
+            continue
+        base = frame.parent
+        while base >= 0 and frames[base].rigid.mass == 0.0:
+            base = frames[base].parent
+        held = math.inf if base < 0 else frames[base].rigid.mass
+        resisting = [min(solid.mass, held) * dot(solid.centre, solid.centre)]
+        for n in carried[k]:
+            arm, turns = frames[n].offset, frames[n].kind == "turn" and not linkage.planar
+            resisting.append(min(single[n], max(solid.mass, held)) * dot(arm, arm))
+            if turns or frames[n].kind == "slide":
+                resisting.append(max(moments[n]))
+        yield max(resisting) > LIGHT * min(moments[k])

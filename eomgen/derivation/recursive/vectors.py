@@ -20,7 +20,14 @@ ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class Scalars(Protocol):
-    """What the recursions need of scalars, besides + - * / and unary minus."""
+    """What the recursions need of scalars, besides + - * / and unary minus.
+
+    `exact` says whether they keep more digits than doubles; what doubles round of a model's
+    geometry is then put right.
+    """
+
+    @property
+    def exact(self) -> bool: ...
 
     def number(self, value: float) -> Scalar:
         """The scalar that stands for a float."""
