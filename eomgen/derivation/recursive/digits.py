@@ -116,7 +116,7 @@ def _off(
         found["closed"] = np.column_stack([_numbers(partial(closed, x), shape) for x in at])
     true = found["orthogonal"]
     if exactly is None:
-        known = np.isfinite(np.stack([*found.values()])).all(axis=1).any(axis=0)
+        known = np.asarray(np.isfinite(np.stack([*found.values()])).all(axis=1).any(axis=0))
         return _worst(found, true, EPSILON, known)
     nudged = _found(model, _nudged(_together(at), len(at)), len(at), "orthogonal")
     change = _shares(nudged["orthogonal"], true)
@@ -131,7 +131,7 @@ def _off(
             off = _apart(own.tolist(), long) if np.isfinite(own).all() else math.inf
             worst[route] = max(worst[route], off / _size(long) / allowed)
     if worst["orthogonal"] <= TRUSTED:
-        at_all = np.isfinite(true).all(axis=0)
+        at_all = np.asarray(np.isfinite(true).all(axis=0))
         beside = _worst(found, true, np.fmax(change / SURE, EPSILON), at_all)
         worst = {route: max(off, beside[route]) for route, off in worst.items()}
     return worst
