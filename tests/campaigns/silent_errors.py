@@ -7,23 +7,15 @@ failures are told, each with the number that makes it again.
 """
 
 import argparse
-import random
 import sys
 from collections import Counter
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parent.parent))
 
-from test_no_silent_error import tried
+from test_no_silent_error import case, tried
 
 BATCH = 500
-
-
-def case(number: int) -> tuple[int, int, list[float], bool]:
-    """Seed, dimensions, decades of masses and the like, and whether the state is a special one."""
-    r = random.Random(number)
-    decades = [r.uniform(-12, 12) for _ in range(r.choice((1, 2, 3, 5, 8, 30)))]
-    return r.randrange(2**32), r.choice((2, 3)), decades, r.random() < 0.5
 
 
 def main() -> None:
