@@ -35,7 +35,7 @@ RISE = 5e-8
 AWAY = 1e-6
 """In accelerations of the motion: a gap that grows at more than this does so of itself."""
 
-STRONG = 2.0**200
+STRONG = 2.0**400
 """N or N m: a force beside which all others are nothing, whatever it moves."""
 
 BOUNCES, STRIKES = 100, 5000
