@@ -88,7 +88,7 @@ def in_ones(run: Trajectory, units: Units) -> tuple[np.ndarray, Sequence[tuple[f
 
 
 POWERS = some(
-    [(2.0**-80, 2.0**-50, 2.0**-40), (2.0**80, 2.0**50, 2.0**20)],
+    [(2.0**-80, 2.0**-50, 2.0**-40), (2.0**80, 2.0**50, 2.0**-40)],
     [(2.0**a, 2.0**b, 2.0**c) for a in (-80, 0, 80) for b in (-50, 0, 50) for c in (-40, 0, 20)],
 )
 
