@@ -96,14 +96,12 @@ def taken(model: Model) -> str:
 
     Raises `Refused` where it refuses the scene.
     """
-    lost = digits_lost(model)
-    for again in (False, True):
+    for closely in (False, True):
+        with sixty_digits():
+            lost = digits_lost(model, Bits(), closely=closely)
         for route in ("aba", "ldl"):
             if lost[route] <= MOST_LOST:
                 return route
-        if not again:
-            with sixty_digits():
-                lost = digits_lost(model, None, Bits())
     if lost["orthogonal"] > MOST_LOST_OF_ALL:
         raise Refused
     return "orthogonal"

@@ -95,10 +95,9 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
         records["ldl"] = recorded(model, "ldl")
         candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
     by_closed = None if closed is None else _accelerations(closed)
-    tried = _weighed(candidates, digits_lost(model, by_closed))
+    tried = _weighed(candidates, _lost(model, by_closed, closely=False))
     if not _kept(tried):
-        with sixty_digits():
-            lost = digits_lost(model, by_closed, Bits())
+        lost = _lost(model, by_closed, closely=True)
         tried = _weighed(candidates, lost)
         if not _kept(tried):
             records["orthogonal"] = recorded(model, "orthogonal")
@@ -163,6 +162,11 @@ def _closed(model: Model, jacobian: bool) -> System:
 
 def _taken(system: System, words: str) -> Routed:
     return Routed(system, (Candidate(system.route, _operations(system), words),))
+
+
+def _lost(model: Model, closed: Accelerations | None, *, closely: bool) -> Mapping[str, float]:
+    with sixty_digits():
+        return digits_lost(model, Bits(), closed, closely=closely)
 
 
 def _weighed(candidates: Sequence[Candidate], lost: Mapping[str, float]) -> list[Candidate]:

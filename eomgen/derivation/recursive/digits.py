@@ -22,12 +22,12 @@ Array = NDArray[np.float64]
 ANGLES: tuple[tuple[float, ...], ...] = (
     (),
     tuple(n * math.pi / 4 for n in range(-4, 5)),
-    (0.0, 0.0, 0.0, math.pi / 2, math.pi / 4),
+    (0.0, 0.0, 0.0, 0.0, math.pi, -math.pi / 2, math.pi / 2, math.pi / 4),
 )
 """Kinds of states by their angles: any; those where levers vanish and axes meet; and these mostly
 at 0, the only one of them that is a double, where they do so to the last digit.
 """
-EACH, CLOSELY = 20, 4
+EACH, CLOSELY, ROUGHLY = 30, 4, 1
 """States of a kind; and at how many of these the routes are judged by many digits: those where it
 does most to change all numbers in their last place.
 """
@@ -49,16 +49,17 @@ Accelerations = Callable[[Values], Sequence[float]]
 
 
 def digits_lost(
-    model: Model, closed: Accelerations | None = None, exactly: Scalars | None = None
+    model: Model, exactly: Scalars, closed: Accelerations | None = None, *, closely: bool = False
 ) -> Mapping[str, float]:
     """The decimal digits that routes lose on v̇, relative to its largest component or 1, at the
     worst of some seeded states, random and aligned ones; 0 to `ALL`.
 
+    exactly  scalars of many digits
     closed   v̇ by the closed form, which is judged, too
-    exactly  scalars of many digits, by which all are judged, and `orthogonal`, too, at the states
-             where that is most in doubt; what half a unit in the last place of all numbers given
-             would change counts as nothing. Without them `orthogonal` is what the others are
-             compared with.
+    closely  whether routes are judged by many digits at all states that are in doubt, and what half
+             a unit in the last place of all numbers given would change counts as nothing. Else they
+             are compared with `orthogonal`, and by many digits at a state of a kind; what is not
+             lost so is not lost closely, and that takes ten times as long.
 
     Uniform gravity and drives act alone (with a closed form all effects, without inputs), and then
     all effects under inputs of up to `PUSH`; the scene's own parameters hold. A route that gives no
@@ -80,7 +81,7 @@ def digits_lost(
     worst = dict.fromkeys(ROUTES, 0.0)
     for acting, inputs in parts:
         at = [Values(model.defaults, *rest, states) for rest in zip(inputs, q, v, strict=True)]
-        for route, off in _off(acting, at, closed, exactly).items():
+        for route, off in _off(acting, at, closed, exactly, closely).items():
             worst[route] = max(worst[route], off)
     return {route: _digits(off) for route, off in worst.items()}
 
@@ -105,7 +106,8 @@ def _off(
     model: Model,
     at: Sequence[Values],
     closed: Accelerations | None,
-    exactly: Scalars | None,
+    exactly: Scalars,
+    closely: bool,
 ) -> dict[str, float]:
     """What the v̇ of each route is off, in parts of its size and of what must be allowed, at the
     worst of some states; infinite where it gives no number.
@@ -115,26 +117,27 @@ def _off(
         shape = (len(model.velocities),)
         found["closed"] = np.column_stack([_numbers(partial(closed, x), shape) for x in at])
     true = found["orthogonal"]
-    if exactly is None:
-        known = np.asarray(np.isfinite(np.stack([*found.values()])).all(axis=1).any(axis=0))
-        return _worst(found, true, EPSILON, known)
-    nudged = _found(model, _nudged(_together(at), len(at)), len(at), "orthogonal")
-    change = _shares(nudged["orthogonal"], true)
+    change = np.zeros(len(at))
+    if closely:
+        nudged = _found(model, _nudged(_together(at), len(at)), len(at), "orthogonal")
+        change = _shares(nudged["orthogonal"], true)
     worst = dict.fromkeys(found, 0.0)
-    for n in _doubtful(change):
+    for n in _doubtful(change, CLOSELY if closely else ROUGHLY):
         try:
-            long, allowed = _exactly(model, at[n], exactly)
+            long, allowed = _exactly(model, at[n], exactly, nudge=closely)
         except (ArithmeticError, ValueError):
             continue  # no v̇ there to lose digits of
         for route, rates in found.items():
             own = rates[:, n]
             off = _apart(own.tolist(), long) if np.isfinite(own).all() else math.inf
             worst[route] = max(worst[route], off / _size(long) / allowed)
-    if worst["orthogonal"] <= TRUSTED:
-        at_all = np.asarray(np.isfinite(true).all(axis=0))
-        beside = _worst(found, true, np.fmax(change / SURE, EPSILON), at_all)
-        worst = {route: max(off, beside[route]) for route, off in worst.items()}
-    return worst
+    if closely and worst["orthogonal"] > TRUSTED:
+        return worst
+    known = np.isfinite(true).all(axis=0)
+    if not closely:  # what one route has no number for, others may
+        known = np.any([np.isfinite(rates).all(axis=0) for rates in found.values()], axis=0)
+    beside = _worst(found, true, np.fmax(change / SURE, EPSILON), np.asarray(known))
+    return {route: max(off, beside[route]) for route, off in worst.items()}
 
 
 def _found(model: Model, values: Values, count: int, *routes: str) -> dict[str, Array]:
@@ -151,10 +154,10 @@ def _found(model: Model, values: Values, count: int, *routes: str) -> dict[str, 
         return {route: _numbers(forward[route], shape) for route in routes or forward}
 
 
-def _doubtful(change: Array) -> list[int]:
-    """Of each kind the states of the greatest changes."""
+def _doubtful(change: Array, count: int) -> list[int]:
+    """Of each kind so many states, those of the greatest changes."""
     kinds = np.where(np.isnan(change), np.inf, change).reshape(len(ANGLES), EACH)
-    order = np.argsort(-kinds, axis=1, kind="stable")[:, :CLOSELY]
+    order = np.argsort(-kinds, axis=1, kind="stable")[:, :count]
     return (order + EACH * np.arange(len(ANGLES))[:, None]).ravel().tolist()
 
 
@@ -194,7 +197,7 @@ def _numbers(forward: Callable[[], Sequence[Any]], shape: tuple[int, ...]) -> Ar
 
 
 def _worst(
-    found: Mapping[str, Array], true: Array, allowed: Array | float, known: NDArray[np.bool_]
+    found: Mapping[str, Array], true: Array, allowed: Array, known: NDArray[np.bool_]
 ) -> dict[str, float]:
     """What v̇ is off (nv, n), in parts of its size and of what is allowed, at the worst of those
     states where it is `known` (n,); infinite where it is no number.
@@ -213,9 +216,11 @@ def _shares(rates: Array, true: Array) -> Array:
         return np.asarray(off / np.abs(true).max(axis=0, initial=1.0))
 
 
-def _exactly(model: Model, values: Values, scalars: Scalars) -> tuple[list[Any], float]:
-    """v̇ in many digits, and what it is off where all numbers are by half a unit in the last place,
-    in parts of its size; at least `EPSILON`.
+def _exactly(
+    model: Model, values: Values, scalars: Scalars, *, nudge: bool
+) -> tuple[list[Any], float]:
+    """v̇ in many digits, and what may be off in parts of its size: `EPSILON`, or the part of what
+    it is off where all numbers are by half a unit in the last place, where it is asked for.
     """
     rng = random.Random(7)
 
@@ -230,6 +235,8 @@ def _exactly(model: Model, values: Values, scalars: Scalars) -> tuple[list[Any],
         return Dynamics(model, near_by, scalars, "own").articulated_forward()
 
     true = forward(0.0)
+    if not nudge:
+        return true, EPSILON
     return true, max(EPSILON, _apart(forward(EPSILON / 2), true) / _size(true) / SURE)
 
 

@@ -55,7 +55,7 @@ class ArrayScalars:
 
     def is_zero(self, value: Scalar) -> bool:
         """Whether it is 0 in all of them; then the shorter of two ways that agree is taken."""
-        return bool(np.all(value == 0.0))
+        return value == 0.0 if isinstance(value, float) else not np.any(value)
 
     def named(self, value: Scalar, name: str) -> Scalar:
         """An array has no name."""
