@@ -19,17 +19,15 @@ from eomgen.model import Model
 
 Array = NDArray[np.float64]
 
-ANGLES: tuple[tuple[float, ...], ...] = (
-    (),
-    tuple(n * math.pi / 4 for n in range(-4, 5)),
-    (0.0, 0.0, 0.0, 0.0, math.pi, -math.pi / 2, math.pi / 2, math.pi / 4),
-)
-"""Kinds of states by their angles: any; those where levers vanish and axes meet; and these mostly
-at 0, the only one of them that is a double, where they do so to the last digit.
+KINDS = ("anywhere", "aligned", "in line")
+"""Of states: at random; with angles of multiples of 45 degrees, where levers vanish and axes meet;
+and with some angles of 0, the only one of these that is a double, where they do so to the last
+digit.
 """
-EACH, CLOSELY, ROUGHLY = 30, 4, 1
-"""States of a kind; and at how many of these the routes are judged by many digits: those where it
-does most to change all numbers in their last place.
+EACH, CLOSELY, ROUGHLY = 30, 3, 1
+"""States of a kind; and at how many of these the routes are judged by many digits: those where two
+of them disagree most, and closely those, too, where it does most to change all numbers in their
+last place.
 """
 SURE = 100.0
 """A change of v̇ by half a unit in the last place of all numbers counts as nothing in this part."""
@@ -66,7 +64,7 @@ def digits_lost(
     number at a state loses all digits; a state where there is none at all says nothing.
     """
     rng = random.Random(6)
-    q = [_position(model, angles, rng) for angles in ANGLES for _ in range(EACH)]
+    q = [_position(model, kind, rng) for kind in KINDS for _ in range(EACH)]
     v = [[rng.uniform(-1.5, 1.5) for _ in model.velocities] for _ in q]
     pushes = [{i.name: rng.uniform(-PUSH, PUSH) for i in model.inputs} for _ in q]
     still = model
@@ -86,19 +84,21 @@ def digits_lost(
     return {route: _digits(off) for route, off in worst.items()}
 
 
-def _position(model: Model, angles: Sequence[float], rng: random.Random) -> list[float]:
-    """Coordinates at random, or angles of a few, and then no turn of balls."""
-    if not angles:
-        q = [rng.uniform(-1.5, 1.5) for _ in model.coordinates]
-        for indices in model.quaternions:
-            length = math.hypot(*(q[i] for i in indices))
-            for i in indices:
-                q[i] /= length
-        return q
-    q = [rng.choice(angles if c.unit == "rad" else (0.0, 1.0)) for c in model.coordinates]
+def _position(model: Model, kind: str, rng: random.Random) -> list[float]:
+    """Coordinates of a state of a kind; quaternions of length 1, of no turn but anywhere."""
+    q = []
+    for c in model.coordinates:
+        anywhere = rng.uniform(-1.5, 1.5)
+        lined = rng.randrange(-4, 5) * (math.pi / 4) if kind == "aligned" else 0.0
+        lined = lined if c.unit == "rad" else rng.choice((0.0, 1.0))
+        usual = kind == "anywhere" or (kind == "in line" and rng.random() < 0.5)
+        q.append(anywhere if usual else lined)
     for indices in model.quaternions:
         for n, i in enumerate(indices):
-            q[i] = float(n == 0)
+            q[i] = q[i] if kind == "anywhere" else float(n == 0)
+        length = math.hypot(*(q[i] for i in indices))
+        for i in indices:
+            q[i] /= length
     return q
 
 
@@ -118,11 +118,13 @@ def _off(
         found["closed"] = np.column_stack([_numbers(partial(closed, x), shape) for x in at])
     true = found["orthogonal"]
     change = np.zeros(len(at))
+    doubts = [_shares(found["aba"], true)]
     if closely:
         nudged = _found(model, _nudged(_together(at), len(at)), len(at), "orthogonal")
         change = _shares(nudged["orthogonal"], true)
+        doubts.append(change)
     worst = dict.fromkeys(found, 0.0)
-    for n in _doubtful(change, CLOSELY if closely else ROUGHLY):
+    for n in _doubtful(doubts, CLOSELY if closely else ROUGHLY):
         try:
             long, allowed = _exactly(model, at[n], exactly, nudge=closely)
         except (ArithmeticError, ValueError):
@@ -154,11 +156,14 @@ def _found(model: Model, values: Values, count: int, *routes: str) -> dict[str, 
         return {route: _numbers(forward[route], shape) for route in routes or forward}
 
 
-def _doubtful(change: Array, count: int) -> list[int]:
-    """Of each kind so many states, those of the greatest changes."""
-    kinds = np.where(np.isnan(change), np.inf, change).reshape(len(ANGLES), EACH)
-    order = np.argsort(-kinds, axis=1, kind="stable")[:, :count]
-    return (order + EACH * np.arange(len(ANGLES))[:, None]).ravel().tolist()
+def _doubtful(doubts: Sequence[Array], count: int) -> list[int]:
+    """Of each kind so many states of the greatest doubt of one sort (n,), so many of the other."""
+    found = set()
+    for doubt in doubts:
+        kinds = np.where(np.isnan(doubt), np.inf, doubt).reshape(len(KINDS), EACH)
+        order = np.argsort(-kinds, axis=1, kind="stable")[:, :count]
+        found |= {*(order + EACH * np.arange(len(KINDS))[:, None]).ravel().tolist()}
+    return sorted(found)
 
 
 def _together(at: Sequence[Values]) -> Values:
