@@ -210,6 +210,7 @@ def test_every_digit_of_other_joints(kind: str, masses: str) -> None:
         ("alternating", 45, False),
         ("heavier outwards", 26, False),
         ("heavier outwards", 54, True),  # nothing holds the light one
+        ("heavier outwards", 97, False),  # rows without an arm, to be taken before others
     ],
 )
 def test_light_between_heavy_balls(masses: str, seed: int, free: bool) -> None:
