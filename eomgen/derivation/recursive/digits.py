@@ -24,7 +24,7 @@ KINDS = ("anywhere", "aligned", "in line")
 and with some angles of 0, the only one of these that is a double, where they do so to the last
 digit.
 """
-EACH, CLOSELY, ROUGHLY = 30, 3, 1
+EACH, CLOSELY, ROUGHLY = 120, 3, 1
 """States of a kind; and at how many of these the routes are judged by many digits: those where two
 of them disagree most, and closely those, too, where it does most to change all numbers in their
 last place.
