@@ -80,7 +80,7 @@ ONCE_SILENT = {
     103237: "a fixed rotation of doubles, which is none in 60 digits",
     5315: "too few states asked, where bodies are in line",
     5867: "moments of inertia swamped in every route alike",
-    56062: "the same",
+    56062: "a route judged at too few states",
     103937: "an arm in line with an axis at angles of 0, and there alone",
 }
 
