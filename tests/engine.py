@@ -10,9 +10,10 @@ import pytest
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
+from eomgen.language.digits import MP, Digits, exact
 from eomgen.model import Model
 from eomgen.program import from_recursion as recording
-from eomgen.program.digits import MP, Digits, evaluator, exact
+from eomgen.program.digits import evaluator
 from eomgen.program.route import routed
 from eomgen.program.system import System
 from eomgen.program.tape import TIME

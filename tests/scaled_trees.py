@@ -14,9 +14,10 @@ from eomgen.derivation.recursive.digits import digits_lost
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.derivation.recursive.regular import check_regular
+from eomgen.errors import SceneError
+from eomgen.language.digits import Bits, out_of_bits, sixty_digits
 from eomgen.language.formula import Constant
 from eomgen.model import Model
-from eomgen.program.digits import Bits, out_of_bits, sixty_digits
 from eomgen.program.route import MOST_LOST, MOST_LOST_OF_ALL
 from eomgen.scene.reader import parse_scene
 
@@ -33,16 +34,14 @@ def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Model:
 
     Raises `SceneError` if the program refuses it.
     """
-    tree, text = random_spatial_tree(seed, dimensions, MOST_BODIES)
-    factors: dict[str, float] = {}
-    parameters = {}
-    for name, value in tree.parameters.items():
-        alike = name.rsplit("_", 1)[0] if name[-3:-2] == "_" else name
-        if alike not in factors:
-            factors[alike] = 10.0 ** decades[len(factors) % len(decades)]
-        parameters[name] = value * factors[alike]
-    _, text = random_spatial_tree(seed, dimensions, MOST_BODIES, parameters)
-    model = build_model(parse_scene(text))
+    while True:
+        try:
+            model = build_model(parse_scene(_scaled(seed, dimensions, decades)))
+            break
+        except SceneError as error:
+            if "principal moments" not in str(error):
+                raise
+            seed += 1  # an inertia of several parameters may be that of no body
     check_regular(model)
     # Doubles are what is given of a body, not formulas of them: I + m l² may be m l² to all digits.
     bodies = (
@@ -54,6 +53,19 @@ def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Model:
         for body in model.bodies
     )
     return replace(model, bodies=tuple(bodies))
+
+
+def _scaled(seed: int, dimensions: int, decades: Sequence[float]) -> str:
+    """The scene of such a tree."""
+    tree, _ = random_spatial_tree(seed, dimensions, MOST_BODIES)
+    factors: dict[str, float] = {}
+    parameters = {}
+    for name, value in tree.parameters.items():
+        alike = name.rsplit("_", 1)[0] if name[-3:-2] == "_" else name
+        if alike not in factors:
+            factors[alike] = 10.0 ** decades[len(factors) % len(decades)]
+        parameters[name] = value * factors[alike]
+    return random_spatial_tree(seed, dimensions, MOST_BODIES, parameters)[1]
 
 
 def _no_needle(entries: Sequence[float]) -> tuple[Constant, ...]:
@@ -97,8 +109,7 @@ def taken(model: Model) -> str:
     Raises `Refused` where it refuses the scene.
     """
     for closely in (False, True):
-        with sixty_digits():
-            lost = digits_lost(model, Bits(), closely=closely)
+        lost = digits_lost(model, closely=closely)
         for route in ("aba", "ldl"):
             if lost[route] <= MOST_LOST:
                 return route

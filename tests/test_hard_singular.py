@@ -61,6 +61,20 @@ def test_singular_models_are_refused(text: str, body: str, velocity: str) -> Non
     )
 
 
+def test_long_arms_are_no_singularity() -> None:
+    """What a kilogram and a kilogram metre squared resist at 1e9 m, is 1e-18 of what they weigh."""
+    text = """
+name = "far"
+bodies = [{ name = "b", mass = 1.0, inertia_com = INERTIA }]
+joints = [
+    { name = "j", type = "planar", parent = "world", child = "b", r_child = [1e9, 0] },
+]
+"""
+    check_regular(build_model(parse_scene(text.replace("INERTIA", "1.0"))))
+    with pytest.raises(SceneError, match="nothing resists"):
+        check_regular(build_model(parse_scene(text.replace("INERTIA", "0.0"))))
+
+
 SMALL = some([1e-12], [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14])
 NEARLY = {
     "tiny inertia at the end": lambda e: pins((1.0, 0.1, 1.0), (1.0, e, 0.0)),

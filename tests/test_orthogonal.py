@@ -22,9 +22,9 @@ from eomgen.derivation.recursive.digits import digits_lost
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.impulses import response
 from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.language.digits import Bits, out_of_bits, sixty_digits
 from eomgen.language.formula import Constant
 from eomgen.model import Model
-from eomgen.program.digits import Bits, out_of_bits, sixty_digits
 from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.program import Output, cost, finish, interpret
 from eomgen.program.route import recorded, routed
@@ -269,8 +269,7 @@ def test_what_the_others_lose(dimensions: int) -> None:
     at = state(model, "random", 3)
     assert off(model, at, "aba") > 1e-8
     assert off(model, at) < 1e-14
-    with sixty_digits():
-        lost = digits_lost(model, Bits())
+    lost = digits_lost(model)
     assert min(lost["aba"], lost["ldl"]) > 8.0
 
 
@@ -287,8 +286,7 @@ def test_a_route_that_gives_no_number_loses_all_digits_and_hides_nobody_elses() 
             + ("\naxis = [1, 0]" if kind == "prismatic" else "")
         )
     model = build_model(parse_scene("\n".join(lines)))
-    with sixty_digits():
-        lost = digits_lost(model, Bits(), closely=True)
+    lost = digits_lost(model, closely=True)
     assert lost["ldl"] > 15 and lost["aba"] > 8 and lost["orthogonal"] < 1
     assert routed(model, jacobian=False).system.route == "orthogonal"
 

@@ -1,98 +1,13 @@
-"""Numbers of many digits as scalars of formulas, recursions and programs."""
+"""Programs in 60 digits."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import gmpy2
-import mpmath
-import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.language.formula import FUNCTIONS
+from eomgen.language.digits import MP, Bits, out_of_bits, sixty_digits
 from eomgen.program.program import Program, interpreter
-
-DIGITS = 60
-MP = mpmath.MPContext()
-"""Numbers of this context work in `DIGITS` digits, wherever they are."""
-MP.dps = DIGITS
-
-
-def _functions(library: Any, number: Callable[[bool], Any]) -> dict[str, Callable[..., Any]]:
-    return {
-        **{name: getattr(library, name) for name in FUNCTIONS if hasattr(library, name)},
-        "abs": abs,
-        "step": lambda x: number(x > 0),
-        "min": min,
-        "max": max,
-        "select": lambda c, a, b: a if c > 0 else b,
-    }
-
-
-_BY_MPMATH = _functions(MP, MP.mpf)
-BY_MPFR = _functions(gmpy2, mpfr)
-"""The functions of formulas, of MPFR's numbers; as exact as gmpy2's context then is."""
-
-
-class Digits:
-    """60-digit numbers as scalars."""
-
-    exact = True
-
-    def number(self, value: float) -> Any:
-        """The double itself, exactly."""
-        return MP.mpf(value)
-
-    def call(self, function: str, *arguments: Any) -> Any:
-        """Any function of formulas."""
-        return _BY_MPMATH[function](*arguments)
-
-    def is_zero(self, value: Any) -> bool:
-        """Whether it is 0 here."""
-        return bool(value == 0)
-
-    def named(self, value: Any, name: str) -> Any:
-        """A number has no name."""
-        return value
-
-
-def exact(values: Any) -> Any:
-    """Doubles, one or an array of them, as 60-digit numbers: exactly the same."""
-    array = np.asarray(values)
-    return np.array([MP.mpf(x) for x in array.ravel()], dtype=object).reshape(array.shape)
-
-
-class Bits:
-    """MPFR's numbers as scalars, as exact as gmpy2's context: they add and multiply ten times as
-    fast as mpmath's.
-    """
-
-    exact = True
-
-    def number(self, value: float) -> Any:
-        """The double itself, exactly."""
-        return mpfr(value, 53)  # all its bits, in any context
-
-    def call(self, function: str, *arguments: Any) -> Any:
-        """A function of formulas."""
-        return BY_MPFR[function](*arguments)
-
-    def is_zero(self, value: Any) -> bool:
-        """Whether it is 0 here."""
-        return bool(value == 0)
-
-    def named(self, value: Any, name: str) -> Any:
-        """A number has no name."""
-        return value
-
-
-@contextmanager
-def sixty_digits() -> Iterator[None]:
-    """A block in which MPFR's numbers are of `DIGITS` digits, and what has no value raises
-    `ArithmeticError`.
-    """
-    with gmpy2.context(precision=MP.prec, trap_divzero=True, trap_invalid=True):
-        yield
 
 
 def evaluator(program: Program, output: str) -> Callable[[Mapping[str, Any]], list[Any]]:
@@ -110,11 +25,6 @@ def evaluator(program: Program, output: str) -> Callable[[Mapping[str, Any]], li
             return out_of_bits(found)
 
     return run
-
-
-def out_of_bits(numbers: Iterable[Any]) -> list[Any]:
-    """MPFR's numbers as mpmath's, exactly."""
-    return [MP.mpf(tuple(map(int, x.as_mantissa_exp()))) for x in numbers]
 
 
 def _in_bits(value: Any) -> Any:

@@ -9,7 +9,6 @@ from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.errors import SceneError
 from eomgen.model import Model
-from eomgen.program.digits import Bits, sixty_digits
 from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.program import Output, cost, finish, interpreter
 from eomgen.program.system import System
@@ -95,9 +94,9 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
         records["ldl"] = recorded(model, "ldl")
         candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
     by_closed = None if closed is None else _accelerations(closed)
-    tried = _weighed(candidates, _lost(model, by_closed, closely=False))
+    tried = _weighed(candidates, digits_lost(model, by_closed))
     if not _kept(tried):
-        lost = _lost(model, by_closed, closely=True)
+        lost = digits_lost(model, by_closed, closely=True)
         tried = _weighed(candidates, lost)
         if not _kept(tried):
             records["orthogonal"] = recorded(model, "orthogonal")
@@ -162,11 +161,6 @@ def _closed(model: Model, jacobian: bool) -> System:
 
 def _taken(system: System, words: str) -> Routed:
     return Routed(system, (Candidate(system.route, _operations(system), words),))
-
-
-def _lost(model: Model, closed: Accelerations | None, *, closely: bool) -> Mapping[str, float]:
-    with sixty_digits():
-        return digits_lost(model, Bits(), closed, closely=closely)
 
 
 def _weighed(candidates: Sequence[Candidate], lost: Mapping[str, float]) -> list[Candidate]:

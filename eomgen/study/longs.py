@@ -8,7 +8,7 @@ import gmpy2
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.program.digits import MP
+from eomgen.language.digits import MP
 from eomgen.run.problem import Floats
 
 BITS = MP.prec

@@ -14,7 +14,7 @@ from typing import Any, cast
 import gmpy2
 from gmpy2 import mpfr
 
-from eomgen.program.digits import BY_MPFR
+from eomgen.language.digits import BY_MPFR
 from eomgen.run.module import CORNERS
 from eomgen.run.problem import Floats
 

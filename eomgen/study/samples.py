@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.program.digits import DIGITS
+from eomgen.language.digits import DIGITS
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress

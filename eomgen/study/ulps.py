@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.program.digits import MP
+from eomgen.language.digits import MP
 from eomgen.run.problem import Floats
 from eomgen.study.truth import Exact
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import ArrayScalars
-from eomgen.derivation.recursive.vectors import Scalars
 from eomgen.effects import Driven, Gravity
+from eomgen.language.digits import Bits, out_of_bits, sixty_digits
 from eomgen.model import Model
 
 Array = NDArray[np.float64]
@@ -47,12 +47,11 @@ Accelerations = Callable[[Values], Sequence[float]]
 
 
 def digits_lost(
-    model: Model, exactly: Scalars, closed: Accelerations | None = None, *, closely: bool = False
+    model: Model, closed: Accelerations | None = None, *, closely: bool = False
 ) -> Mapping[str, float]:
     """The decimal digits that routes lose on v̇, relative to its largest component or 1, at the
     worst of some seeded states, random and aligned ones; 0 to `ALL`.
 
-    exactly  scalars of many digits
     closed   v̇ by the closed form, which is judged, too
     closely  whether routes are judged by many digits at all states that are in doubt, and what half
              a unit in the last place of all numbers given would change counts as nothing. Else they
@@ -79,7 +78,7 @@ def digits_lost(
     worst = dict.fromkeys(ROUTES, 0.0)
     for acting, inputs in parts:
         at = [Values(model.defaults, *rest, states) for rest in zip(inputs, q, v, strict=True)]
-        for route, off in _off(acting, at, closed, exactly, closely).items():
+        for route, off in _off(acting, at, closed, closely).items():
             worst[route] = max(worst[route], off)
     return {route: _digits(off) for route, off in worst.items()}
 
@@ -106,7 +105,6 @@ def _off(
     model: Model,
     at: Sequence[Values],
     closed: Accelerations | None,
-    exactly: Scalars,
     closely: bool,
 ) -> dict[str, float]:
     """What the v̇ of each route is off, in parts of its size and of what must be allowed, at the
@@ -126,7 +124,7 @@ def _off(
     worst = dict.fromkeys(found, 0.0)
     for n in _doubtful(doubts, CLOSELY if closely else ROUGHLY):
         try:
-            long, allowed = _exactly(model, at[n], exactly, nudge=closely)
+            long, allowed = _exactly(model, at[n], nudge=closely)
         except (ArithmeticError, ValueError):
             continue  # no v̇ there to lose digits of
         for route, rates in found.items():
@@ -221,23 +219,22 @@ def _shares(rates: Array, true: Array) -> Array:
         return np.asarray(off / np.abs(true).max(axis=0, initial=1.0))
 
 
-def _exactly(
-    model: Model, values: Values, scalars: Scalars, *, nudge: bool
-) -> tuple[list[Any], float]:
-    """v̇ in many digits, and what may be off in parts of its size: `EPSILON`, or the part of what
-    it is off where all numbers are by half a unit in the last place, where it is asked for.
+def _exactly(model: Model, values: Values, *, nudge: bool) -> tuple[list[Any], float]:
+    """v̇ in 60 digits, and what may be off in parts of its size: `EPSILON`, or the part of what it
+    is off where all numbers are by half a unit in the last place, where it is asked for.
     """
-    rng = random.Random(7)
+    rng, scalars = random.Random(7), Bits()
 
     def forward(nudge: float) -> list[Any]:
         def near(x: float) -> Any:
             return scalars.number(x) * (1 + scalars.number(nudge * rng.uniform(-1, 1)))
 
-        given = (values.parameters, values.inputs, values.states)
-        named = [{name: near(x) for name, x in own.items()} for own in given]
-        q, v = ([near(x) for x in own] for own in (values.q, values.v))
-        near_by = Values(named[0], named[1], q, v, named[2], scalars.number(0.0))
-        return Dynamics(model, near_by, scalars, "own").articulated_forward()
+        with sixty_digits():
+            given = (values.parameters, values.inputs, values.states)
+            named = [{name: near(x) for name, x in own.items()} for own in given]
+            q, v = ([near(x) for x in own] for own in (values.q, values.v))
+            near_by = Values(named[0], named[1], q, v, named[2], scalars.number(0.0))
+            return out_of_bits(Dynamics(model, near_by, scalars, "own").articulated_forward())
 
     true = forward(0.0)
     if not nudge:

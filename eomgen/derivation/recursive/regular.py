@@ -2,6 +2,7 @@
 
 import math
 import random
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +21,7 @@ from eomgen.derivation.recursive.composite import composite_bodies
 from eomgen.derivation.recursive.instant import Axes, at_instant
 from eomgen.derivation.recursive.linkage import make_linkage
 from eomgen.derivation.recursive.numbers import ArrayScalars
-from eomgen.derivation.recursive.vectors import Mat
+from eomgen.derivation.recursive.vectors import Mat, Scalars
 from eomgen.errors import SceneError
 from eomgen.joints.base import Geared
 from eomgen.language.formula import Constant, Formula
@@ -32,25 +33,43 @@ TRIALS = 3
 TOGETHER = 4096
 """Poses that are looked at at once: a long run has more than memory for all of them."""
 VANISHED = 1e-12
-"""A pivot below this share of the diagonal entry it came from is rounding."""
+"""A pivot below this share of the diagonal entry it came from may be rounding."""
+NOTHING = 1e-48
+"""And is, in 60 digits: lengths that are as many decades apart as masses leave more."""
+UNDERFLOW = 1e-290
+"""A pivot below this is nothing in doubles."""
 
 
 def check_regular(model: Model) -> None:
     """Raise `SceneError`, naming the body and what to change, if the mass matrix is singular.
 
     M is singular where some motion moves no mass, however large the masses are; so all of them are
-    taken as 1, which leaves no question of rounding. A pivot of the articulated-body algorithm is
+    taken as 1, which leaves few questions of rounding. A pivot of the articulated-body algorithm is
     the inertia that a velocity feels when all that it carries is free; one that vanishes at seeded
-    random poses vanishes at all, or at almost all.
+    random poses vanishes at all, or at almost all. One that might is looked at in 60 digits.
     """
-    rng = random.Random(20)
     count = len(model.coordinates) + len(model.driven)
-    pivots = _pivots(_evened(model), _seeded(rng, count))
-    for i in sorted(pivots, reverse=True):
-        pivot, entry = pivots[i]
-        shares = np.divide(pivot, entry, out=np.zeros(TRIALS), where=entry > 0)
-        if shares.max() < VANISHED:
-            raise SceneError(_singular(model, i))
+    even, poses = _evened(model), _seeded(random.Random(20), count)
+    if not _vanishing(_pivots(even, poses, ArrayScalars()), VANISHED):
+        return
+    # Imported here because a model that is regular has no need of it, nor has a run.
+    from eomgen.language.digits import Bits, sixty_digits
+
+    with sixty_digits():
+        (first, *_), bits = poses, Bits()
+        pose = np.array([[bits.number(x) for x in first.tolist()]], dtype=object)
+        vanishing = _vanishing(_pivots(even, pose, bits, NOTHING), NOTHING)
+    if vanishing:
+        raise SceneError(_singular(model, vanishing[0]))
+
+
+def _vanishing(pivots: Mapping[int, tuple[Array, Array]], share: float) -> list[int]:
+    """The velocities, last first, whose pivots are below a share of their entries at all poses."""
+    return [
+        i
+        for i, (pivot, entry) in sorted(pivots.items(), reverse=True)
+        if not ((pivot > share * entry) & (pivot > UNDERFLOW)).any()
+    ]
 
 
 def resistances(model: Model, poses: Array) -> dict[int, Array]:
@@ -65,7 +84,7 @@ def resistances(model: Model, poses: Array) -> dict[int, Array]:
     some = _seeded(random.Random(20), len(model.coordinates))
     even, asked = _evened(model), np.concatenate([poses, some])
     parts = np.array_split(asked, math.ceil(len(asked) / TOGETHER))
-    found = [_pivots(even, part) for part in parts]
+    found = [_pivots(even, part, ArrayScalars()) for part in parts]
     shares = {}
     for i in found[0]:
         pivot = np.concatenate([pivots[i][0] for pivots in found])
@@ -115,14 +134,16 @@ def _evened_body(body: Body, model: Model) -> Body:
     )
 
 
-def _pivots(model: Model, poses: Array) -> dict[int, tuple[Array, Array]]:
+def _pivots(
+    model: Model, poses: Array, scalars: Scalars, vanished: float = VANISHED
+) -> dict[int, tuple[Array, Array]]:
     """For each velocity its pivots and its entries of M at n poses (n, nq), (n,) each; where a
-    pivot is nothing, it frees nothing more.
+    pivot is nothing, it frees nothing more. Scalars that are no arrays do at one pose.
     """
-    scalars = ArrayScalars()
     linkage = make_linkage(model, model.defaults, scalars)
     axes: Axes = "world" if model.dimensions == 2 else "own"
-    instant = at_instant(linkage, list(poses.T), axes, scalars)
+    places = [x if len(x) > 1 else x[0] for x in poses.T]
+    instant = at_instant(linkage, places, axes, scalars)
     bodies = composite_bodies(instant, scalars)
     sums = [resistance_of(link, 0.0) for link in instant.links]
     pivots: dict[int, tuple[Array, Array]] = {}
@@ -135,7 +156,7 @@ def _pivots(model: Model, poses: Array) -> dict[int, tuple[Array, Array]]:
                 for p in (left, whole)
             )
             pivots[i] = (pivot, entry)
-            frees = (entry > 0) & (pivot >= VANISHED * entry)
+            frees = (entry > 0) & (pivot >= vanished * entry)
             if frees.any():
                 with np.errstate(all="ignore"):
                     left = _where(frees, eliminated(left, axis, link, scalars)[1], left)
