@@ -11,7 +11,7 @@ from campaign import some
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.derivation.recursive.regular import check_regular, resistances
 from eomgen.errors import SceneError
 from eomgen.model import Model
 from eomgen.program.route import routed
@@ -73,6 +73,11 @@ joints = [
     check_regular(build_model(parse_scene(text.replace("INERTIA", "1.0"))))
     with pytest.raises(SceneError, match="nothing resists"):
         check_regular(build_model(parse_scene(text.replace("INERTIA", "0.0"))))
+    in_space = text.replace("INERTIA", "[1.0, 1.0, 1.0]").replace("[1e9, 0]", "[1e9, 1e9, 0]")
+    model = build_model(parse_scene(in_space + "dimensions = 3\n"))
+    check_regular(model)
+    poses = np.random.default_rng(1).uniform(-3, 3, (50, len(model.coordinates)))
+    assert (resistances(model, poses)[0] == 1).all()  # rounding is no lock
 
 
 SMALL = some([1e-12], [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14])

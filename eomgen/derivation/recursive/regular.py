@@ -75,7 +75,7 @@ def _vanishing(pivots: Mapping[int, tuple[Array, Array]], share: float) -> list[
 def resistances(model: Model, poses: Array) -> dict[int, Array]:
     """For each velocity the inertia that it feels when all that it carries is free, at each of n
     poses (n, nq), in parts of the greatest that it feels at any of these and a few seeded ones:
-    (n,).
+    (n,). They are 1 where all of that is rounding, as beside arms of 1e9 m.
 
     As in `check_regular` all masses are taken as 1: heavy on light is no lock. Where the axes of a
     joint come into line with what they carry, as those of a gimbal do, some motion moves no mass:
@@ -87,9 +87,12 @@ def resistances(model: Model, poses: Array) -> dict[int, Array]:
     found = [_pivots(even, part, ArrayScalars()) for part in parts]
     shares = {}
     for i in found[0]:
-        pivot = np.concatenate([pivots[i][0] for pivots in found])
+        pivot, entry = (np.concatenate([pivots[i][n] for pivots in found]) for n in (0, 1))
         largest = pivot.max()
-        shares[i] = pivot[: len(poses)] / largest if largest > 0 else np.zeros(len(poses))
+        if largest < VANISHED * entry.max():  # rounding, which tells of no pose anything
+            shares[i] = np.ones(len(poses))
+        else:
+            shares[i] = pivot[: len(poses)] / largest if largest > 0 else np.zeros(len(poses))
     return shares
 
 
