@@ -94,9 +94,10 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
         records["ldl"] = recorded(model, "ldl")
         candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
     by_closed = None if closed is None else _accelerations(closed)
-    tried = _weighed(candidates, digits_lost(model, by_closed))
+    ldl = "ldl" in records
+    tried = _weighed(candidates, digits_lost(model, by_closed, ldl=ldl))
     if not _kept(tried):
-        lost = digits_lost(model, by_closed, closely=True)
+        lost = digits_lost(model, by_closed, ldl=ldl, closely=True)
         tried = _weighed(candidates, lost)
         if not _kept(tried):
             records["orthogonal"] = recorded(model, "orthogonal")

@@ -47,12 +47,17 @@ Accelerations = Callable[[Values], Sequence[float]]
 
 
 def digits_lost(
-    model: Model, closed: Accelerations | None = None, *, closely: bool = False
+    model: Model,
+    closed: Accelerations | None = None,
+    *,
+    ldl: bool = True,
+    closely: bool = False,
 ) -> Mapping[str, float]:
     """The decimal digits that routes lose on v̇, relative to its largest component or 1, at the
     worst of some seeded states, random and aligned ones; 0 to `ALL`.
 
     closed   v̇ by the closed form, which is judged, too
+    ldl      whether that is, too; it takes long for many bodies
     closely  whether routes are judged by many digits at all states that are in doubt, and what half
              a unit in the last place of all numbers given would change counts as nothing. Else they
              are compared with `orthogonal`, and by many digits at a state of a kind; what is not
@@ -78,7 +83,7 @@ def digits_lost(
     worst = dict.fromkeys(ROUTES, 0.0)
     for acting, inputs in parts:
         at = [Values(model.defaults, *rest, states) for rest in zip(inputs, q, v, strict=True)]
-        for route, off in _off(acting, at, closed, closely).items():
+        for route, off in _off(acting, at, closed, ldl, closely).items():
             worst[route] = max(worst[route], off)
     return {route: _digits(off) for route, off in worst.items()}
 
@@ -105,12 +110,13 @@ def _off(
     model: Model,
     at: Sequence[Values],
     closed: Accelerations | None,
+    ldl: bool,
     closely: bool,
 ) -> dict[str, float]:
     """What the v̇ of each route is off, in parts of its size and of what must be allowed, at the
     worst of some states; infinite where it gives no number.
     """
-    found = _found(model, _together(at), len(at))
+    found = _found(model, _together(at), len(at), "orthogonal", "aba", *["ldl"] * ldl)
     if closed is not None:
         shape = (len(model.velocities),)
         found["closed"] = np.column_stack([_numbers(partial(closed, x), shape) for x in at])
@@ -151,7 +157,7 @@ def _found(model: Model, values: Values, count: int, *routes: str) -> dict[str, 
     }
     shape = len(model.velocities), count
     with np.errstate(all="ignore"):
-        return {route: _numbers(forward[route], shape) for route in routes or forward}
+        return {route: _numbers(forward[route], shape) for route in routes}
 
 
 def _doubtful(doubts: Sequence[Array], count: int) -> list[int]:
