@@ -35,8 +35,8 @@ AT_RANDOM, ALIGNED = 1e-13, 1e-10
 """The bounds that the route is built for; of the states here the worst is off by 3e-14."""
 AT_MOST, SELDOM = 1e-11, 1 / 25
 """At random states no more than so many trees of a sort are off by more than `AT_RANDOM`, and none
-by more than this: those in which joints are by chance within 1e-3 of being in line. Of 2000 trees
-of hinges they are 4, of 1200 of other joints 5.
+by more than this. Of 2000 trees of hinges they are 4, of 1200 of other joints 5; in those looked at
+joints happen to be within 1e-3 of being in line.
 """
 LOOSE = 'type = "free"\nname = "j0"\nchild = "b0"'
 MOST_OPERATIONS = {PLANE: 2.3, SPACE: 2.8}
