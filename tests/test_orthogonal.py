@@ -33,11 +33,20 @@ from eomgen.scene.reader import find_scene, parse_scene
 PLANE, SPACE = 2, 3
 AT_RANDOM, ALIGNED = 1e-13, 1e-10
 """The bounds that the route is built for; of the states here the worst is off by 3e-14."""
-AT_MOST, SELDOM = 1e-11, 1 / 25
-"""At random states no more than so many trees of a sort are off by more than `AT_RANDOM`, and none
-by more than this. Of 2000 trees of hinges they are 4, of 1200 of other joints 5; in those looked at
-joints happen to be within 1e-3 of being in line.
+MISSED: dict[tuple[object, ...], tuple[int, ...]] = {
+    (2, "heavier outwards", True): (35,),
+    (3, "heavier outwards", True): (86,),
+    (3, "heavy tip", False): (6, 78),
+    ("cylindrical", "anywhere"): (6,),
+    ("cylindrical", "heavy tip"): (6,),
+    ("universal", "heavier outwards"): (5, 33),
+    ("ball", "heavier outwards"): (6,),
+}
+"""Seeds of the trees that are known to miss `AT_RANDOM`: 4 of 2000 of hinges, 5 of 1200 of other
+joints. In those looked at joints happen to be within 1e-3 of being in line.
 """
+AT_MOST = 1e-11
+"""What they are off by at most."""
 LOOSE = 'type = "free"\nname = "j0"\nchild = "b0"'
 MOST_OPERATIONS = {PLANE: 2.3, SPACE: 2.8}
 """Times those of `aba`."""
@@ -177,10 +186,11 @@ def exactly(model: Model, q: Any, v: Any, u: Any) -> list[Any]:
         return out_of_bits(dynamics(model, q, v, u, Bits()).articulated_forward())
 
 
-def check_all_but_few(errors: Sequence[float]) -> None:
-    """Of trees at random states."""
-    assert max(errors) < AT_MOST
-    assert sum(e > AT_RANDOM for e in errors) <= SELDOM * len(errors), errors
+def check(errors: Sequence[float], *sort: object) -> None:
+    """Errors of a sort of trees at random states, by seed."""
+    for seed, error in enumerate(errors):
+        bound = AT_MOST if seed in MISSED.get(sort, ()) else AT_RANDOM
+        assert error < bound, (seed, error)
 
 
 @pytest.mark.parametrize("free", [False, True])
@@ -195,7 +205,7 @@ def test_every_digit_of_trees(dimensions: int, masses: str, free: bool) -> None:
         errors.append(off(model, state(model, "random", seed)))
         kind = ("straight", "quarter turns", "some straight", "eighths of turns")[seed % 4]
         assert off(model, state(model, kind, seed)) < ALIGNED, (seed, n, kind)
-    check_all_but_few(errors)
+    check(errors, dimensions, masses, free)
 
 
 @pytest.mark.parametrize("masses", MASSES)
@@ -207,7 +217,7 @@ def test_every_digit_of_other_joints(kind: str, masses: str) -> None:
         n = random.Random(seed).randrange(2, some(5, 8))
         model = heavy(masses, mixed(kind, n, seed), seed)
         errors.append(off(model, state(model, "random", seed)))
-    check_all_but_few(errors)
+    check(errors, kind, masses)
 
 
 @pytest.mark.parametrize(

@@ -60,8 +60,8 @@ def digits_lost(
     ldl      whether that is, too; it takes long for many bodies
     closely  whether routes are judged by many digits at all states that are in doubt, and what half
              a unit in the last place of all numbers given would change counts as nothing. Else they
-             are compared with `orthogonal`, and by many digits at a state of a kind; what is not
-             lost so is not lost closely, and that takes ten times as long.
+             are compared with `orthogonal`, and by many digits at a state of a kind, which takes a
+             tenth of the time.
 
     Uniform gravity and drives act alone (with a closed form all effects, without inputs), and then
     all effects under inputs of up to `PUSH`; the scene's own parameters hold. A route that gives no
