@@ -5,13 +5,15 @@ import random
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.derivation.recursive.frames import Linkage
+from eomgen.derivation.recursive.linkage import make_linkage
 from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.effects import Driven, Gravity
 from eomgen.language.digits import Bits, out_of_bits, sixty_digits
@@ -127,10 +129,10 @@ def _off(
         nudged = _found(model, _nudged(_together(at), len(at)), len(at), "orthogonal")
         change = _shares(nudged["orthogonal"], true)
         doubts.append(change)
-    worst = dict.fromkeys(found, 0.0)
+    worst, exactly = dict.fromkeys(found, 0.0), _in_many_digits(model, nudge=closely)
     for n in _doubtful(doubts, CLOSELY if closely else ROUGHLY):
         try:
-            long, allowed = _exactly(model, at[n], nudge=closely)
+            long, allowed = exactly(at[n])
         except (ArithmeticError, ValueError):
             continue  # no v̇ there to lose digits of
         for route, rates in found.items():
@@ -225,27 +227,43 @@ def _shares(rates: Array, true: Array) -> Array:
         return np.asarray(off / np.abs(true).max(axis=0, initial=1.0))
 
 
-def _exactly(model: Model, values: Values, *, nudge: bool) -> tuple[list[Any], float]:
-    """v̇ in 60 digits, and what may be off in parts of its size: `EPSILON`, or the part of what it
-    is off where all numbers are by half a unit in the last place, where it is asked for.
+def _in_many_digits(model: Model, *, nudge: bool) -> Callable[[Values], tuple[list[Any], float]]:
+    """A function of values with the model's own parameters: v̇ in 60 digits, and what may be off in
+    parts of its size: `EPSILON`, or the part of what it is off where all numbers are by half a unit
+    in the last place, where it is asked for.
     """
-    rng, scalars = random.Random(7), Bits()
+    scalars = Bits()
 
-    def forward(nudge: float) -> list[Any]:
-        def near(x: float) -> Any:
-            return scalars.number(x) * (1 + scalars.number(nudge * rng.uniform(-1, 1)))
+    def near(x: float, nudge: float, rng: random.Random) -> Any:
+        return scalars.number(x) * (1 + scalars.number(nudge * rng.uniform(-1, 1)))
 
+    @cache
+    def made(nudge: float) -> tuple[dict[str, Any], Linkage]:
+        rng = random.Random(7)
+        parameters = {name: near(x, nudge, rng) for name, x in model.defaults.items()}
+        return parameters, make_linkage(model, parameters, scalars)
+
+    def forward(values: Values, nudge: float) -> list[Any]:
+        rng = random.Random(8)
         with sixty_digits():
-            given = (values.parameters, values.inputs, values.states)
-            named = [{name: near(x) for name, x in own.items()} for own in given]
-            q, v = ([near(x) for x in own] for own in (values.q, values.v))
-            near_by = Values(named[0], named[1], q, v, named[2], scalars.number(0.0))
-            return out_of_bits(Dynamics(model, near_by, scalars, "own").articulated_forward())
+            parameters, linkage = made(nudge)
+            inputs, states = (
+                {name: near(x, nudge, rng) for name, x in own.items()}
+                for own in (values.inputs, values.states)
+            )
+            q, v = ([near(x, nudge, rng) for x in own] for own in (values.q, values.v))
+            near_by = Values(parameters, inputs, q, v, states, scalars.number(0.0))
+            d = Dynamics(model, near_by, scalars, "own", linkage)
+            return out_of_bits(d.articulated_forward())
 
-    true = forward(0.0)
-    if not nudge:
-        return true, EPSILON
-    return true, max(EPSILON, _apart(forward(EPSILON / 2), true) / _size(true) / SURE)
+    def exactly(values: Values) -> tuple[list[Any], float]:
+        true = forward(values, 0.0)
+        if not nudge:
+            return true, EPSILON
+        change = _apart(forward(values, EPSILON / 2), true)
+        return true, max(EPSILON, change / _size(true) / SURE)
+
+    return exactly
 
 
 def _size(values: Sequence[Any]) -> float:

@@ -14,6 +14,7 @@ from eomgen.derivation.recursive.vectors import (
     constant,
     cross,
     dot,
+    scale,
     sub,
     times,
     zeros,
@@ -81,6 +82,24 @@ def wrenches(
             wrench = Force(add(torque, cross(arm, force)), force)
             found[mount.frame] = total(found[mount.frame], wrench)
     return tuple(found)
+
+
+def on_frames(
+    links: Sequence[Link], found: Sequence[Force], tau: Sequence[Scalar], scalars: Scalars
+) -> tuple[list[Force], list[Scalar]]:
+    """Wrenches with the torques of joints as moments on both frames, and what is left of `tau`."""
+    wrenches, left = list(found), list(tau)
+    for k, link in enumerate(links):
+        for axis, i in link.free:
+            if not axis.angular or scalars.is_zero(tau[i]):
+                continue
+            moment = scale(tau[i], axis.direction)
+            wrenches[k] = total(wrenches[k], Force(moment, zeros(scalars)))
+            if link.parent >= 0:
+                back = Force(link.turn.out(moment), zeros(scalars))
+                wrenches[link.parent] = less(wrenches[link.parent], back)
+            left[i] = scalars.number(0.0)
+    return wrenches, left
 
 
 def inertial(

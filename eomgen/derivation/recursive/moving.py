@@ -42,11 +42,16 @@ class Moving:
     """A model at given values: where everything is and how it moves, for effects and recursions.
 
     What is asked for is computed once; nothing else is. `nv` counts the velocities of the state,
-    `moved` those and the driven ones.
+    `moved` those and the driven ones. A `linkage` over the same parameters need not be made again.
     """
 
     def __init__(
-        self, model: Model, values: Values, scalars: Scalars, axes: Axes | None = None
+        self,
+        model: Model,
+        values: Values,
+        scalars: Scalars,
+        axes: Axes | None = None,
+        linkage: Linkage | None = None,
     ) -> None:
         self.model = model
         self.values = values
@@ -56,6 +61,7 @@ class Moving:
         self.bodies = tuple(body.name for body in model.bodies)
         self.nv = len(model.velocities)
         self.moved = self.nv + len(model.driven)
+        self._linkage = linkage
 
     # What effects may ask (effects.base.Mechanism).
 
@@ -203,7 +209,7 @@ class Moving:
     @cached_property
     def linkage(self) -> Linkage:
         """Frames and mounts."""
-        return make_linkage(self.model, self.values.parameters, self.scalars)
+        return self._linkage or make_linkage(self.model, self.values.parameters, self.scalars)
 
     @cached_property
     def instant(self) -> Instant:

@@ -13,13 +13,15 @@ factors of least squares over the tree of frames (Golub & Van Loan, Matrix Compu
 row is good to rounding of its own size, and a lever that is zero stays so: a link's rows are put
 together about the joint of what is heaviest on it.
 
+Forces act on rows, t = Σ φ c, and are rotated with them. Handed inwards as a sum, t would push, by
+its rounding, at light bodies beside that whose row takes all of it.
+
 Outwards no acceleration is substituted, which could cancel, but what the rows leave is rotated
 back. Those of a body times their weights are the forces that joints put on it, small where it is
 light. What has no inertia of its own along an axis is found from its neighbours' rows after all.
 
-A force on a body is part of its own rows, unless heavier ones hold it; it and torques of joints are
-then in t. Digits are lost still where inertia is a small part of mass times arms squared, and where
-a heavy tip hangs in line with all joints, of which rounding of sines and cosines knows no more.
+Digits are lost still where inertia is a small part of mass times arms squared, and where a heavy
+tip hangs in line with all joints, of which rounding of sines and cosines knows no more.
 """
 
 from collections.abc import Sequence
@@ -27,7 +29,7 @@ from dataclasses import replace
 
 from eomgen.derivation.recursive.aligned import aligned
 from eomgen.derivation.recursive.articulated import along, with_component
-from eomgen.derivation.recursive.forces import Force, at_parent, total
+from eomgen.derivation.recursive.forces import Force, on_frames
 from eomgen.derivation.recursive.instant import Axis, Instant, Link
 from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
 from eomgen.derivation.recursive.possible import column_of, moved, possible, slides_of, turns_of
@@ -55,7 +57,6 @@ from eomgen.derivation.recursive.vectors import (
     dot,
     named,
     replaced,
-    scale,
     sub,
     times,
     unit,
@@ -93,105 +94,66 @@ class Elimination:
         """The v̇ under wrenches about the centres and `tau` on the velocities, where `moving` are
         the accelerations at v̇ = 0.
         """
-        zero = zeros(self._scalars)
-        wrenches, tau = self._on_bodies(*self._aligned.into(wrenches, tau))
+        wrenches, tau = on_frames(self._links, *self._aligned.into(wrenches, tau), self._scalars)
         rows: list[list[tuple[Row, int]]] = [[] for _ in self._links]
-        terms = [Force(zero, zero) for _ in self._links]
         found: list[Eliminated] = []
         for k in reversed(range(len(self._links))):
             link = self._links[k]
-            own, term = self._own_rows(k, moving[k], wrenches[k], terms[k])
-            eliminated, passed = self._eliminated(k, own, rows[k], term, tau)
+            own, pushed = self._own_rows(k, moving[k], wrenches[k])
+            eliminated = self._eliminated(k, own, pushed, rows[k], tau)
             found.append(eliminated)
             if link.parent >= 0:
                 rows[link.parent] += [(turned(link, row), k) for row in eliminated.rows]
-                terms[link.parent] = total(terms[link.parent], at_parent(link, passed))
         return self._aligned.out(self._outwards(found[::-1], len(tau)))
 
     # Inwards.
 
-    def _on_bodies(
-        self, wrenches: Sequence[Force], tau: Sequence[Scalar]
-    ) -> tuple[list[Force], list[Scalar]]:
-        """Torques between two bodies that can take them as moments on both, which is shorter."""
-        s, wrenches, tau = self._scalars, list(wrenches), list(tau)
-        for k, link in enumerate(self._links):
-            for axis, i in link.free:
-                ends = [n for n in (k, link.parent) if n >= 0]
-                turns = axis.angular and s.is_zero(link.armature)
-                if turns and all(self._takes(n) for n in ends) and not s.is_zero(tau[i]):
-                    moment = scale(tau[i], axis.direction)
-                    wrenches[k] = replace(wrenches[k], moment=add(wrenches[k].moment, moment))
-                    if link.parent >= 0:
-                        other = wrenches[link.parent]
-                        moment = sub(other.moment, link.turn.out(moment))
-                        wrenches[link.parent] = replace(other, moment=moment)
-                    tau[i] = self._rows.zero
-        return wrenches, tau
-
-    def _takes(self, k: int) -> bool:
-        """Whether a link's own rows take what acts on it: where heavier ones hold the link, its own
-        would be moved far and back.
-        """
-        solid = self._solids[k]
-        return (
-            solid is not None
-            and not self._ranks.light[k]
-            and not self._ranks.slight[k]
-            and not any(
-                self._scalars.is_zero(solid.inertia[j][j]) for j in AXES[2 * self._planar :]
-            )
-        )
-
-    def _spins(self) -> tuple[int, ...]:
-        return (2,) if self._planar else AXES
-
     def _own_rows(
-        self, k: int, a: Acceleration, wrench: Force, term: Force
-    ) -> tuple[tuple[dict[int, Row], dict[int, Row]], Force]:
-        """Rows of a link's own mass, by axis: linear about its centre, and angular; and the part of
-        a wrench about that, and of the term about the origin, that no inertia takes.
+        self, k: int, a: Acceleration, wrench: Force
+    ) -> tuple[tuple[dict[int, Row], dict[int, Row]], list[Row]]:
+        """Rows of a link's own mass, by axis: linear about its centre, and angular; and rows of no
+        weight for the part of a wrench about the centre that no inertia takes.
         """
         s, zero, solid, own = self._scalars, zeros(self._scalars), self._solids[k], self._carried[k]
-        if solid is None or own is None:
-            return ({}, {}), total(wrench, term)
-        linear, angular, left, moment = {}, {}, zero, zero
-        into = self._aligned.turns[k].into
-        way = into(add(a.linear, times(a.field, own.centre)))
-        light = self._ranks.light[k]
-        about = sub(term.moment, cross(solid.centre, term.force))
-        wrench = total(wrench, Force(about, term.force))
-        if light or s.is_zero(solid.mass):
-            left = wrench.force
-        if not s.is_zero(solid.mass):
-            m = s.call("max", solid.mass, self._rows.tiny)
-            for j in AXES[: 2 if self._planar else 3]:
-                right = -way[j] if light else wrench.force[j] / m - way[j]
-                linear[j] = self._rows.make(m, zero, unit(j, s), right)
-        turning = into(moment_about_centre(own.inertia, a, s))
-        if light or self._ranks.slight[k]:
-            moment = wrench.moment
-            y = [-x for x in turning]
-        else:
-            y = list(sub(wrench.moment, turning))
-        work = [list(row) for row in solid.inertia]
-        order = turns_of(self._links[k], self._planar, self._aligned.along[k])
-        for n, i in enumerate(order):
-            if s.is_zero(solid.inertia[i][i]):
-                if not light and not self._ranks.slight[k]:
-                    moment = replaced(moment, i, y[i])
-                continue
-            d = self._pivot_of(work[i][i], solid.inertia[i][i])
-            entries = unit(i, s)
-            for j in order[n + 1 :]:
-                part = work[i][j] / d
-                entries = replaced(entries, j, part)
-                y[j] = y[j] - part * y[i]
-                for h in order[n + 1 :]:
-                    work[j][h] = work[j][h] - part * work[i][h]
-            angular[i] = self._rows.make(d, entries, zero, y[i] / d)
-        moved = add(moment, cross(solid.centre, left))
-        return (linear, angular), Force(moved, left)
+        linear, angular = dict[int, Row](), dict[int, Row]()
+        moment = list(wrench.moment)
+
+        def row(weight: Scalar, angular: Vec, linear: Vec, right: Scalar, force: Scalar) -> Row:
+            # Forces on a firm body are shorter as a part of its acceleration.
+            if self._ranks.firm[k]:
+                right, force = right + force / weight, self._rows.zero
+            return self._rows.make(weight, angular, linear, right, force)
+
+        if solid is not None and own is not None:
+            into = self._aligned.turns[k].into
+            way = into(add(a.linear, times(a.field, own.centre)))
+            if not s.is_zero(solid.mass):
+                m = s.call("max", solid.mass, self._rows.tiny)
+                for j in AXES[: 2 if self._planar else 3]:
+                    linear[j] = row(m, zero, unit(j, s), -way[j], wrench.force[j])
+            y = [-x for x in into(moment_about_centre(own.inertia, a, s))]
+            work = [list(row) for row in solid.inertia]
+            order = turns_of(self._links[k], self._planar, self._aligned.along[k])
+            for n, i in enumerate(order):
+                if s.is_zero(solid.inertia[i][i]):
+                    continue
+                d = self._pivot_of(work[i][i], solid.inertia[i][i])
+                entries = unit(i, s)
+                for j in order[n + 1 :]:
+                    part = work[i][j] / d
+                    entries = replaced(entries, j, part)
+                    y[j], moment[j] = y[j] - part * y[i], moment[j] - part * moment[i]
+                    for h in order[n + 1 :]:
+                        work[j][h] = work[j][h] - part * work[i][h]
+                angular[i] = row(d, entries, zero, y[i] / d, moment[i])
+        parts = [((False, j), wrench.force[j]) for j in AXES if j not in linear]
+        parts += [((True, j), moment[j]) for j in AXES if j not in angular]
+        pushed = [
+            replace(self._rows.empty(column), force=force)
+            for column, force in parts
+            if not s.is_zero(force)
+        ]
+        return (linear, angular), pushed
 
     def _pivot_of(self, pivot: Scalar, entry: Scalar) -> Scalar:
         floor = self._rows.tiny if pivot is entry else self._scalars.number(SLIGHT) * entry
@@ -201,10 +163,10 @@ class Elimination:
         self,
         k: int,
         own: tuple[dict[int, Row], dict[int, Row]],
+        pushed: Sequence[Row],
         rows: Sequence[tuple[Row, int]],
-        term: Force,
         tau: Sequence[Scalar],
-    ) -> tuple[Eliminated, Force]:
+    ) -> Eliminated:
         """Take a link's free axes out of the rows of all that it carries, each of a link."""
         s, link, solid = self._scalars, self._links[k], self._solids[k]
         # Where the heaviest rows have no arm, light ones keep theirs.
@@ -219,7 +181,10 @@ class Elimination:
             linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
         linear = {j: self._rows.of(about, row) for j, row in linear.items()}
         angular = {j: self._rows.of(about, row) for j, row in angular.items()}
-        loose = [self._rows.of(about, shifted(row, self._arm(n, at))) for row, n in rows]
+        loose = [shifted(row, self._arm(n, at)) for row, n in rows]
+        centre = zeros(s) if solid is None else solid.centre
+        loose += [shifted(row, sub(centre, at)) for row in pushed]
+        loose = [self._rows.of(about, row) for row in loose]
         # Those without an arm first, which so stay without it, be there more of them than columns.
         loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
         along = self._aligned.along[k]
@@ -230,8 +195,13 @@ class Elimination:
             axes.sort(key=lambda axis: -ways.index(column_of(axis[0])[1]))
             kept = {(False, j): linear[j] for j in slides if j in linear}
             kept |= {(True, j): angular[j] for j in ways if j in angular}
-            one, kept, loose, term = self._early(link, axes.pop(0), kept, loose, term, tau, at)
-            taken.append(one)
+            # The heaviest rows know nothing of the turn along their arm; but they would once those
+            # of other arms, rotated against them, had got into them, and rounding would not take
+            # it out again: so it is taken out of rows about the arm's end.
+            axis = axes.pop(0)
+            first = kept.pop(column_of(axis[0]))
+            one, kept, loose = self._taken(link, axis, first, kept, loose, tau[axis[1]], early=True)
+            taken.append(replace(one, row=shifted(first, at)))
             linear = {j: row for (spins, j), row in kept.items() if not spins}
             angular = {j: row for (spins, j), row in kept.items() if spins}
             about = about - {(True, along)}
@@ -259,36 +229,13 @@ class Elimination:
         for axis in axes:
             held = axis[0].unit in own[axis[0].angular]
             first, kept, free, before = self._first(axis[0], held, kept, free)
-            one, kept, free, term = self._taken(link, axis, first, kept, free, term, tau[axis[1]])
+            one, kept, free = self._taken(link, axis, first, kept, free, tau[axis[1]])
             taken.append(replace(one, before=(*turns, *before)))
             turns.clear()
         rest = [*kept.values(), *free]
         holding_rows = [row for row in rest if not self._rows.is_empty(row)]
         empty += [row for row in rest if self._rows.is_empty(row)]
-        return Eliminated(tuple(taken), tuple(turns), tuple(holding_rows), tuple(empty)), term
-
-    def _early(
-        self,
-        link: Link,
-        axis: tuple[Axis, int],
-        kept: dict[Column, Row],
-        loose: list[Row],
-        term: Force,
-        tau: Sequence[Scalar],
-        at: Vec,
-    ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
-        """Take the turn along an arm out of rows about its end `at`.
-
-        The heaviest rows know nothing of it; but they would once those of other arms, rotated
-        against them, had got into them, and rounding would not take it out again.
-        """
-        about = replace(term, moment=sub(term.moment, cross(at, term.force)))
-        first = kept.pop(column_of(axis[0]))
-        one, kept, loose, left = self._taken(
-            link, axis, first, kept, loose, about, tau[axis[1]], early=True
-        )
-        passed = replace(left, moment=add(left.moment, cross(at, left.force)))
-        return replace(one, row=shifted(first, at)), kept, loose, passed
+        return Eliminated(tuple(taken), tuple(turns), tuple(holding_rows), tuple(empty))
 
     def _arm(self, k: int, at: Vec) -> Vec:
         """The arm of a link from a point, that of the heaviest beside it."""
@@ -324,11 +271,10 @@ class Elimination:
         first: Row,
         kept: dict[Column, Row],
         free: Sequence[Row],
-        term: Force,
         tau: Scalar,
         *,
         early: bool = False,
-    ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
+    ) -> tuple[Taken, dict[Column, Row], list[Row]]:
         """Rotate one row until it alone holds an axis of motion; where it is early, first against
         the kept ones, which so stay a triangle.
         """
@@ -345,23 +291,18 @@ class Elimination:
         for key in reversed(kept):
             pivot, kept[key] = self._rows.rotated(pivot, kept[key], column, turns)
         pivot = with_free(pivot) if early else pivot
-        carried = along(way, term.moment, term.force)
-        force, rotor, parents = carried + tau, -1, -tau
-        if not s.is_zero(link.armature):
-            # Its row is that of the joint's acceleration, the frame's less the parent's.
-            row, before = replace(self._rows.empty(column), weight=link.armature), pivot.weight
+        rotor = -1
+        if not s.is_zero(link.armature) or not s.is_zero(tau):
+            # A row of the joint's acceleration, the frame's less the parent's.
+            row = replace(self._rows.empty(column), force=tau)
+            if not s.is_zero(link.armature):
+                row, rotor = replace(row, weight=link.armature), row.index
             pivot, row = self._rows.rotated(pivot, row, column, turns)
             minus = with_component(way, row.angular, row.linear, -self._rows.one)
             free.append(replace(row, angular=minus[0], linear=minus[1]))
-            # Of what pushes the frame the rotor's share, and of tau the frame's, minus.
-            s_rotor = link.armature / pivot.weight
-            rotor, parents = row.index, s_rotor * carried - before / pivot.weight * tau
         pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
-        share = force / pivot.weight
-        moment = sub(term.moment, scale(force, pivot.angular))
-        push = sub(term.force, scale(force, pivot.linear))
-        passed = Force(*with_component(way, moment, push, parents))
-        return Taken(way, i, first, share, tuple(turns), rotor), kept, free, passed
+        share = pivot.force / pivot.weight
+        return Taken(way, i, first, share, tuple(turns), rotor), kept, free
 
     # Outwards.
 

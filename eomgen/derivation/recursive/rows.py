@@ -7,6 +7,7 @@ c = w / d and s = v x / d,
 
 of which r has nothing there: a Givens rotation without its square root. Backwards, from what the
 new rows leave at some accelerations follows what the old ones leave, a = p - s r, b = x p + c r.
+So do forces f and g on them: f a + g b = (f + x g) p + (c g - s f) r.
 """
 
 from collections.abc import Collection, Sequence
@@ -25,13 +26,16 @@ Column = tuple[bool, int]
 
 @dataclass(frozen=True)
 class Row:
-    """angular · α + linear · a = right, times weight; `index` names its residual."""
+    """angular · α + linear · a = right, times weight, and a force on that sum; `index` names its
+    residual.
+    """
 
     index: int
     weight: Scalar
     angular: Vec
     linear: Vec
     right: Scalar
+    force: Scalar
 
 
 @dataclass(frozen=True)
@@ -95,15 +99,16 @@ class Rows:
         self._indices = count()
         self.zero, self.one, self.tiny = (scalars.number(x) for x in (0.0, 1.0, TINY))
 
-    def make(self, weight: Scalar, angular: Vec, linear: Vec, right: Scalar) -> Row:
+    def make(self, weight: Scalar, angular: Vec, linear: Vec, right: Scalar, force: Scalar) -> Row:
         """A row."""
-        return Row(next(self._indices), weight, angular, linear, right)
+        return Row(next(self._indices), weight, angular, linear, right, force)
 
     def empty(self, column: Column) -> Row:
         """One that holds one acceleration, and of which nothing is asked."""
         angular, axis = column
         one, zero = unit(axis, self._scalars), zeros(self._scalars)
-        return self.make(self.tiny, *((one, zero) if angular else (zero, one)), self.zero)
+        ways = (one, zero) if angular else (zero, one)
+        return self.make(self.tiny, *ways, self.zero, self.zero)
 
     def of(self, columns: Collection[Column], row: Row) -> Row:
         """A row where only some accelerations can be other than nothing."""
@@ -143,7 +148,8 @@ class Rows:
     ) -> tuple[Row, list[Row]]:
         """A pivot row about one angular acceleration with all rows about that, and the others."""
         is_zero = self._scalars.is_zero
-        weight, right, found, others = pivot.weight, pivot.weight * pivot.right, [], []
+        weight, right, force = pivot.weight, pivot.weight * pivot.right, pivot.force
+        found, others = [], []
         for row in rows:
             x = row.angular[j]
             if is_zero(x):
@@ -151,10 +157,11 @@ class Rows:
                 continue
             q = row.weight * x
             weight, right = weight + q * x, right + q * row.right
+            force = force + x * row.force
             found.append((row.index, x, row.right))
         if not found:
             return pivot, list(rows)
-        summed = replace(pivot, weight=weight, right=right / weight)
+        summed = replace(pivot, weight=weight, right=right / weight, force=force)
         turns.append(Sum(summed, pivot.right, tuple(found)))
         return summed, others
 
@@ -196,9 +203,10 @@ class Rows:
         turn, left_turn = both(pivot.angular, row.angular, angular)
         move, left_move = both(pivot.linear, row.linear, not angular)
         right, left_right = mixed(pivot.right, row.right)
+        force, left_force = pivot.force + x * row.force, c * row.force - s * pivot.force
         return (
-            Row(pivot.index, d, turn, move, right),
-            Row(row.index, row.weight * c, left_turn, left_move, left_right),
+            Row(pivot.index, d, turn, move, right, force),
+            Row(row.index, row.weight * c, left_turn, left_move, left_right, left_force),
         )
 
 

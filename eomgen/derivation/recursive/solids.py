@@ -1,6 +1,5 @@
 """What the frames carry, about its own centre: masses and inertias put together by sums alone."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -23,8 +22,8 @@ from eomgen.derivation.recursive.vectors import (
     zeros,
 )
 
-LIGHT = 10.0
-"""How many times heavier than a body one that it carries must be for it to be light."""
+FIRM = 0.01
+"""The part of what may hold a body that its own mass and inertia must be for it to be firm."""
 
 
 @dataclass(frozen=True)
@@ -79,14 +78,13 @@ class Ranks:
               none; of a ball joint the child that is heaviest whatever way it is moved
     beside    of a ball joint the next such child, where axes are to be along the line between these
               two; -1 elsewhere
-    light     whether a body is light beside one it carries
-    slight    whether a body's inertia is nothing beside what else resists its turning
+    firm      whether a frame's own mass and inertia are not slight beside what else may resist its
+              motion: forces on it move it about as they would if it were alone
     """
 
     heaviest: tuple[int, ...]
     beside: tuple[int, ...]
-    light: tuple[bool, ...]
-    slight: tuple[bool, ...]
+    firm: tuple[bool, ...]
 
 
 def ranked(linkage: Linkage) -> Ranks:
@@ -104,22 +102,21 @@ def ranked(linkage: Linkage) -> Ranks:
         children = carried[k]
         whole[k] += sum(whole[n] for n in children if not free[n])
         single[k] = max([own[k], *(single[n] for n in children if not free[n])])
-        firm = sorted((*(least[n] for n in children), 0.0, 0.0, 0.0), reverse=True)
+        fixed = sorted((*(least[n] for n in children), 0.0, 0.0, 0.0), reverse=True)
         spins = frames[k].kind == "spin"
         # What is left of so many points when all turns are free.
-        least[k] = 0.0 if frames[k].kind == "slide" else max(own[k], firm[2 if spins else 1])
+        least[k] = 0.0 if frames[k].kind == "slide" else max(own[k], fixed[2 if spins else 1])
         weights = least if spins else [0.0 if free[n] else w for n, w in enumerate(whole)]
         order = sorted(children, key=lambda n: -weights[n])
         if order and weights[order[0]] > own[k]:
             heaviest[k] = order[0]
-            third = max(own[k], firm[2])
+            third = max(own[k], fixed[2])
             # Nothing holds the frame of a free body: there no other line asks for the axes.
             loose = frames[k].parent >= 0 and own[frames[k].parent] == 0.0
-            if spins and firm[1] > third and (loose or firm[1] ** 2 > firm[0] * third):
+            if spins and fixed[1] > third and (loose or fixed[1] ** 2 > fixed[0] * third):
                 beside[k] = order[1]
-    light = (one > LIGHT * mass for one, mass in zip(single, own, strict=True))
-    slight = _slight(linkage, carried, single)
-    return Ranks(tuple(heaviest), tuple(beside), tuple(light), tuple(slight))
+    firm = _firm(linkage, carried, single)
+    return Ranks(tuple(heaviest), tuple(beside), tuple(firm))
 
 
 def _sliding_all_ways(linkage: Linkage, carried: Sequence[Sequence[int]]) -> list[bool]:
@@ -133,27 +130,23 @@ def _sliding_all_ways(linkage: Linkage, carried: Sequence[Sequence[int]]) -> lis
     return [n >= ways for n in run]
 
 
-def _slight(
+def _firm(
     linkage: Linkage, carried: Sequence[Sequence[int]], single: Sequence[float]
 ) -> Iterator[bool]:
-    """Of each frame whether an axis of what it carries has next to no inertia beside masses on an
-    arm, its own about the frame's origin or children's, or a child's inertia.
+    """Of each frame whether nothing resists more than its own mass and inertia by far: the heaviest
+    thing it carries, masses on arms, rotors.
     """
     frames, axes = linkage.frames, AXES[2 * linkage.planar :]
     found = solids(linkage, FloatScalars())
     moments = [[solid.inertia[j][j] for j in axes] if solid else [0.0] for solid in found]
     for k, (frame, solid) in enumerate(zip(frames, found, strict=True)):
-        if solid is None or frame.kind == "slide":
-            yield False  # no turn is free
+        if solid is None:
+            yield False
             continue
-        base = frame.parent
-        while base >= 0 and frames[base].rigid.mass == 0.0:
-            base = frames[base].parent
-        held = math.inf if base < 0 else frames[base].rigid.mass
-        resisting = [min(solid.mass, held) * dot(solid.centre, solid.centre)]
+        moving, turning = [single[k]], [solid.mass * dot(solid.centre, solid.centre)]
         for n in carried[k]:
-            arm, turns = frames[n].offset, frames[n].kind == "turn" and not linkage.planar
-            resisting.append(min(single[n], max(solid.mass, held)) * dot(arm, arm))
-            if turns or frames[n].kind == "slide":
-                resisting.append(max(moments[n]))
-        yield max(resisting) > LIGHT * min(moments[k])
+            arm = frames[n].offset
+            turning += [single[n] * dot(arm, arm), max(moments[n])]
+        for joint in (frame, *(frames[n] for n in carried[k])):
+            (moving if joint.kind == "slide" else turning).append(joint.armature)
+        yield solid.mass >= FIRM * max(moving) and min(moments[k]) >= FIRM * max(turning)
