@@ -62,6 +62,11 @@ def at_parent(link: Link, f: Force) -> Force:
     return Force(add(link.turn.out(f.moment), cross(link.arm, force)), force)
 
 
+def moved_to(point: Vec, f: Force) -> Force:
+    """A wrench about the origin as one about a point."""
+    return Force(sub(f.moment, cross(point, f.force)), f.force)
+
+
 def wrenches(
     linkage: Linkage,
     instant: Instant,

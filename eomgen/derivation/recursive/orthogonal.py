@@ -29,7 +29,7 @@ from dataclasses import replace
 
 from eomgen.derivation.recursive.aligned import aligned
 from eomgen.derivation.recursive.articulated import along, with_component
-from eomgen.derivation.recursive.forces import Force, on_frames
+from eomgen.derivation.recursive.forces import Force, at_parent, moved_to, on_frames, total
 from eomgen.derivation.recursive.instant import Axis, Instant, Link
 from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
 from eomgen.derivation.recursive.possible import column_of, moved, possible, slides_of, turns_of
@@ -57,6 +57,7 @@ from eomgen.derivation.recursive.vectors import (
     dot,
     named,
     replaced,
+    scale,
     sub,
     times,
     unit,
@@ -99,20 +100,27 @@ class Elimination:
         found: list[Eliminated] = []
         for k in reversed(range(len(self._links))):
             link = self._links[k]
-            own, pushed = self._own_rows(k, moving[k], wrenches[k])
-            eliminated = self._eliminated(k, own, pushed, rows[k], tau)
+            own, left = self._own_rows(k, moving[k], wrenches[k])
+            eliminated, passed = self._eliminated(k, own, rows[k], left, tau)
             found.append(eliminated)
             if link.parent >= 0:
                 rows[link.parent] += [(turned(link, row), k) for row in eliminated.rows]
+                more = moved_to(self._centre(link.parent), at_parent(link, passed))
+                wrenches[link.parent] = total(wrenches[link.parent], more)
         return self._aligned.out(self._outwards(found[::-1], len(tau)))
 
     # Inwards.
 
+    def _centre(self, k: int) -> Vec:
+        """The centre of what a link carries itself, its origin if that is nothing."""
+        solid = self._solids[k]
+        return zeros(self._scalars) if solid is None else solid.centre
+
     def _own_rows(
         self, k: int, a: Acceleration, wrench: Force
-    ) -> tuple[tuple[dict[int, Row], dict[int, Row]], list[Row]]:
-        """Rows of a link's own mass, by axis: linear about its centre, and angular; and rows of no
-        weight for the part of a wrench about the centre that no inertia takes.
+    ) -> tuple[tuple[dict[int, Row], dict[int, Row]], Force]:
+        """Rows of a link's own mass, by axis: linear about its centre, and angular; and the part of
+        a wrench about the centre that no inertia takes, about the origin.
         """
         s, zero, solid, own = self._scalars, zeros(self._scalars), self._solids[k], self._carried[k]
         linear, angular = dict[int, Row](), dict[int, Row]()
@@ -146,14 +154,13 @@ class Elimination:
                     for h in order[n + 1 :]:
                         work[j][h] = work[j][h] - part * work[i][h]
                 angular[i] = row(d, entries, zero, y[i] / d, moment[i])
-        parts = [((False, j), wrench.force[j]) for j in AXES if j not in linear]
-        parts += [((True, j), moment[j]) for j in AXES if j not in angular]
-        pushed = [
-            replace(self._rows.empty(column), force=force)
-            for column, force in parts
-            if not s.is_zero(force)
-        ]
-        return (linear, angular), pushed
+        # What has rows of its own is pushed there.
+        for j in linear:
+            wrench = replace(wrench, force=replaced(wrench.force, j, self._rows.zero))
+        for j in angular:
+            moment[j] = self._rows.zero
+        left = replace(wrench, moment=(moment[0], moment[1], moment[2]))
+        return (linear, angular), moved_to(sub(zero, self._centre(k)), left)
 
     def _pivot_of(self, pivot: Scalar, entry: Scalar) -> Scalar:
         floor = self._rows.tiny if pivot is entry else self._scalars.number(SLIGHT) * entry
@@ -163,11 +170,13 @@ class Elimination:
         self,
         k: int,
         own: tuple[dict[int, Row], dict[int, Row]],
-        pushed: Sequence[Row],
         rows: Sequence[tuple[Row, int]],
+        term: Force,
         tau: Sequence[Scalar],
-    ) -> Eliminated:
-        """Take a link's free axes out of the rows of all that it carries, each of a link."""
+    ) -> tuple[Eliminated, Force]:
+        """Take a link's free axes out of the rows of all that it carries, each of a link, and of a
+        wrench that nothing takes; what is left of that.
+        """
         s, link, solid = self._scalars, self._links[k], self._solids[k]
         # Where the heaviest rows have no arm, light ones keep theirs.
         heaviest = self._ranks.heaviest[k]
@@ -181,10 +190,7 @@ class Elimination:
             linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
         linear = {j: self._rows.of(about, row) for j, row in linear.items()}
         angular = {j: self._rows.of(about, row) for j, row in angular.items()}
-        loose = [shifted(row, self._arm(n, at)) for row, n in rows]
-        centre = zeros(s) if solid is None else solid.centre
-        loose += [shifted(row, sub(centre, at)) for row in pushed]
-        loose = [self._rows.of(about, row) for row in loose]
+        loose = [self._rows.of(about, shifted(row, self._arm(n, at))) for row, n in rows]
         # Those without an arm first, which so stay without it, be there more of them than columns.
         loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
         along = self._aligned.along[k]
@@ -200,8 +206,11 @@ class Elimination:
             # it out again: so it is taken out of rows about the arm's end.
             axis = axes.pop(0)
             first = kept.pop(column_of(axis[0]))
-            one, kept, loose = self._taken(link, axis, first, kept, loose, tau[axis[1]], early=True)
+            one, kept, loose, about_end = self._taken(
+                link, axis, first, kept, loose, moved_to(at, term), tau[axis[1]], early=True
+            )
             taken.append(replace(one, row=shifted(first, at)))
+            term = moved_to(sub(zeros(s), at), about_end)
             linear = {j: row for (spins, j), row in kept.items() if not spins}
             angular = {j: row for (spins, j), row in kept.items() if spins}
             about = about - {(True, along)}
@@ -229,13 +238,13 @@ class Elimination:
         for axis in axes:
             held = axis[0].unit in own[axis[0].angular]
             first, kept, free, before = self._first(axis[0], held, kept, free)
-            one, kept, free = self._taken(link, axis, first, kept, free, tau[axis[1]])
+            one, kept, free, term = self._taken(link, axis, first, kept, free, term, tau[axis[1]])
             taken.append(replace(one, before=(*turns, *before)))
             turns.clear()
         rest = [*kept.values(), *free]
         holding_rows = [row for row in rest if not self._rows.is_empty(row)]
         empty += [row for row in rest if self._rows.is_empty(row)]
-        return Eliminated(tuple(taken), tuple(turns), tuple(holding_rows), tuple(empty))
+        return Eliminated(tuple(taken), tuple(turns), tuple(holding_rows), tuple(empty)), term
 
     def _arm(self, k: int, at: Vec) -> Vec:
         """The arm of a link from a point, that of the heaviest beside it."""
@@ -271,10 +280,11 @@ class Elimination:
         first: Row,
         kept: dict[Column, Row],
         free: Sequence[Row],
+        term: Force,
         tau: Scalar,
         *,
         early: bool = False,
-    ) -> tuple[Taken, dict[Column, Row], list[Row]]:
+    ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
         """Rotate one row until it alone holds an axis of motion; where it is early, first against
         the kept ones, which so stay a triangle.
         """
@@ -291,18 +301,23 @@ class Elimination:
         for key in reversed(kept):
             pivot, kept[key] = self._rows.rotated(pivot, kept[key], column, turns)
         pivot = with_free(pivot) if early else pivot
-        rotor = -1
-        if not s.is_zero(link.armature) or not s.is_zero(tau):
-            # A row of the joint's acceleration, the frame's less the parent's.
-            row = replace(self._rows.empty(column), force=tau)
-            if not s.is_zero(link.armature):
-                row, rotor = replace(row, weight=link.armature), row.index
+        rotor, pushed, back = -1, along(way, term.moment, term.force), self._rows.zero
+        if s.is_zero(link.armature):
+            pushed, back = pushed + tau, -tau
+        pivot = replace(pivot, force=pivot.force + pushed)
+        moment = sub(term.moment, scale(pushed, pivot.angular))
+        push = sub(term.force, scale(pushed, pivot.linear))
+        if not s.is_zero(link.armature):
+            # Its row is that of the joint's acceleration, the frame's less the parent's.
+            row = replace(self._rows.empty(column), weight=link.armature, force=tau)
+            rotor = row.index
             pivot, row = self._rows.rotated(pivot, row, column, turns)
             minus = with_component(way, row.angular, row.linear, -self._rows.one)
             free.append(replace(row, angular=minus[0], linear=minus[1]))
         pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
         share = pivot.force / pivot.weight
-        return Taken(way, i, first, share, tuple(turns), rotor), kept, free
+        left = Force(*with_component(way, moment, push, back))
+        return Taken(way, i, first, share, tuple(turns), rotor), kept, free, left
 
     # Outwards.
 
