@@ -34,18 +34,17 @@ PLANE, SPACE = 2, 3
 AT_RANDOM, ALIGNED = 1e-13, 1e-10
 """The bounds that the route is built for; of the states here the worst is off by 3e-14."""
 MISSED: dict[tuple[object, ...], tuple[int, ...]] = {
-    (2, "heavier outwards", True): (35,),
-    (3, "heavier outwards", True): (86,),
-    (3, "heavy tip", False): (6, 78),
+    (3, "heavy tip", False): (6,),
     ("cylindrical", "anywhere"): (6,),
     ("cylindrical", "heavy tip"): (6,),
     ("universal", "heavier outwards"): (5, 33),
     ("ball", "heavier outwards"): (6,),
 }
-"""Seeds of the trees that are known to miss `AT_RANDOM`: 4 of 2000 of hinges, 5 of 1200 of other
-joints. In those looked at joints happen to be within 1e-3 of being in line.
+"""Seeds of the trees that are known to miss `AT_RANDOM`: 1 of 2000 of hinges, 5 of 1200 of other
+joints. A heavy row holds an axis of theirs by 1e-3 only: rotated with it first, a light row loses
+so many digits to the next that holds the axis well. The better order changes with the state.
 """
-AT_MOST = 1e-11
+AT_MOST = 1e-12
 """What they are off by at most."""
 LOOSE = 'type = "free"\nname = "j0"\nchild = "b0"'
 MOST_OPERATIONS = {PLANE: 2.3, SPACE: 2.8}
@@ -206,6 +205,16 @@ def test_every_digit_of_trees(dimensions: int, masses: str, free: bool) -> None:
         kind = ("straight", "quarter turns", "some straight", "eighths of turns")[seed % 4]
         assert off(model, state(model, kind, seed)) < ALIGNED, (seed, n, kind)
     check(errors, dimensions, masses, free)
+
+
+@pytest.mark.parametrize(("dimensions", "seed"), [(PLANE, 35), (SPACE, 86)])
+def test_torques_on_light_bodies_push_no_others(dimensions: int, seed: int) -> None:
+    """Joints within 1e-3 of a line: summed up, a torque on a light body becomes a thousand times
+    the force on a lighter one, but for its rounding, which was 8e-12 of v̇.
+    """
+    text = scene(dimensions, random.Random(seed).randrange(2, 31), seed, free=True)
+    model = heavy("heavier outwards", text, seed)
+    assert off(model, state(model, "random", seed)) < 1e-15
 
 
 @pytest.mark.parametrize("masses", MASSES)
