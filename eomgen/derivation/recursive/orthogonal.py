@@ -29,7 +29,14 @@ from dataclasses import replace
 
 from eomgen.derivation.recursive.aligned import aligned
 from eomgen.derivation.recursive.articulated import along, with_component
-from eomgen.derivation.recursive.forces import Force, at_parent, moved_to, on_frames, total
+from eomgen.derivation.recursive.forces import (
+    Force,
+    at_parent,
+    moved_to,
+    no_force,
+    on_frames,
+    total,
+)
 from eomgen.derivation.recursive.instant import Axis, Instant, Link
 from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
 from eomgen.derivation.recursive.possible import column_of, moved, possible, slides_of, turns_of
@@ -201,16 +208,8 @@ class Elimination:
             axes.sort(key=lambda axis: -ways.index(column_of(axis[0])[1]))
             kept = {(False, j): linear[j] for j in slides if j in linear}
             kept |= {(True, j): angular[j] for j in ways if j in angular}
-            # The heaviest rows know nothing of the turn along their arm; but they would once those
-            # of other arms, rotated against them, had got into them, and rounding would not take
-            # it out again: so it is taken out of rows about the arm's end.
-            axis = axes.pop(0)
-            first = kept.pop(column_of(axis[0]))
-            one, kept, loose, about_end = self._taken(
-                link, axis, first, kept, loose, moved_to(at, term), tau[axis[1]], early=True
-            )
-            taken.append(replace(one, row=shifted(first, at)))
-            term = moved_to(sub(zeros(s), at), about_end)
+            one, kept, loose = self._early(link, axes.pop(0), kept, loose, at)
+            taken.append(one)
             linear = {j: row for (spins, j), row in kept.items() if not spins}
             angular = {j: row for (spins, j), row in kept.items() if spins}
             about = about - {(True, along)}
@@ -245,6 +244,26 @@ class Elimination:
         holding_rows = [row for row in rest if not self._rows.is_empty(row)]
         empty += [row for row in rest if self._rows.is_empty(row)]
         return Eliminated(tuple(taken), tuple(turns), tuple(holding_rows), tuple(empty)), term
+
+    def _early(
+        self,
+        link: Link,
+        axis: tuple[Axis, int],
+        kept: dict[Column, Row],
+        loose: list[Row],
+        at: Vec,
+    ) -> tuple[Taken, dict[Column, Row], list[Row]]:
+        """Take the turn along an arm out of rows about its end `at`.
+
+        The heaviest rows know nothing of it; but they would once those of other arms, rotated
+        against them, had got into them, and rounding would not take it out again.
+        """
+        first, nothing = kept.pop(column_of(axis[0])), no_force(self._scalars)
+        # All that pushes it is on its own row.
+        one, kept, loose, _ = self._taken(
+            link, axis, first, kept, loose, nothing, self._rows.zero, early=True
+        )
+        return replace(one, row=shifted(first, at)), kept, loose
 
     def _arm(self, k: int, at: Vec) -> Vec:
         """The arm of a link from a point, that of the heaviest beside it."""
