@@ -55,8 +55,9 @@ def digits_lost(
     ldl: bool = True,
     closely: bool = False,
 ) -> Mapping[str, float]:
-    """The decimal digits that routes lose on v̇, relative to its largest component or 1, at the
-    worst of some seeded states, random and aligned ones; 0 to `ALL`.
+    """The decimal digits that routes lose on v̇, at the worst of some seeded states, random and
+    aligned ones; 0 to `ALL`. They are those of its largest component, or of 1 where that is more
+    and more is usual: v̇ may be 0 at a state, but are no less for being small at all.
 
     closed   v̇ by the closed form, which is judged, too
     ldl      whether that is, too; it takes long for many bodies
@@ -123,13 +124,15 @@ def _off(
         shape = (len(model.velocities),)
         found["closed"] = np.column_stack([_numbers(partial(closed, x), shape) for x in at])
     true = found["orthogonal"]
+    least = _usual(true)
     change = np.zeros(len(at))
-    doubts = [_shares(found["aba"], true)]
+    doubts = [_shares(found["aba"], true, least)]
     if closely:
         nudged = _found(model, _nudged(_together(at), len(at)), len(at), "orthogonal")
-        change = _shares(nudged["orthogonal"], true)
+        change = _shares(nudged["orthogonal"], true, least)
         doubts.append(change)
-    worst, exactly = dict.fromkeys(found, 0.0), _in_many_digits(model, nudge=closely)
+    worst = dict.fromkeys(found, 0.0)
+    exactly = _in_many_digits(model, least, nudge=closely)
     for n in _doubtful(doubts, CLOSELY if closely else ROUGHLY):
         try:
             long, allowed = exactly(at[n])
@@ -138,13 +141,13 @@ def _off(
         for route, rates in found.items():
             own = rates[:, n]
             off = _apart(own.tolist(), long) if np.isfinite(own).all() else math.inf
-            worst[route] = max(worst[route], off / _size(long) / allowed)
+            worst[route] = max(worst[route], off / _size(long, least) / allowed)
     if closely and worst["orthogonal"] > TRUSTED:
         return worst
     known = np.isfinite(true).all(axis=0)
     if not closely:  # what one route has no number for, others may
         known = np.any([np.isfinite(rates).all(axis=0) for rates in found.values()], axis=0)
-    beside = _worst(found, true, np.fmax(change / SURE, EPSILON), np.asarray(known))
+    beside = _worst(found, true, least, np.fmax(change / SURE, EPSILON), np.asarray(known))
     return {route: max(off, beside[route]) for route, off in worst.items()}
 
 
@@ -208,26 +211,39 @@ def _numbers(forward: Callable[[], Sequence[Any]], shape: tuple[int, ...]) -> Ar
 
 
 def _worst(
-    found: Mapping[str, Array], true: Array, allowed: Array, known: NDArray[np.bool_]
+    found: Mapping[str, Array],
+    true: Array,
+    least: float,
+    allowed: Array,
+    known: NDArray[np.bool_],
 ) -> dict[str, float]:
     """What v̇ is off (nv, n), in parts of its size and of what is allowed, at the worst of those
     states where it is `known` (n,); infinite where it is no number.
     """
     worst = {}
     for route, rates in found.items():
-        off = _shares(rates, true) / allowed
+        off = _shares(rates, true, least) / allowed
         worst[route] = float(np.where(np.isnan(off), np.inf, off)[known].max(initial=0.0))
     return worst
 
 
-def _shares(rates: Array, true: Array) -> Array:
+def _usual(rates: Array) -> float:
+    """The size of v̇ (nv, n) at the middle of n states, at most 1; 1 if there v̇ is 0 or none."""
+    sizes = np.sort(np.abs(rates).max(axis=0, initial=0.0))
+    middle = float(sizes[len(sizes) // 2])
+    return middle if 0.0 < middle < 1.0 else 1.0
+
+
+def _shares(rates: Array, true: Array, least: float) -> Array:
     """The greatest difference at each of n states, in parts of the size of v̇ there."""
     with np.errstate(all="ignore"):
         off = np.abs(rates - true).max(axis=0, initial=0.0)
-        return np.asarray(off / np.abs(true).max(axis=0, initial=1.0))
+        return np.asarray(off / np.abs(true).max(axis=0, initial=least))
 
 
-def _in_many_digits(model: Model, *, nudge: bool) -> Callable[[Values], tuple[list[Any], float]]:
+def _in_many_digits(
+    model: Model, least: float, *, nudge: bool
+) -> Callable[[Values], tuple[list[Any], float]]:
     """A function of values with the model's own parameters: v̇ in 60 digits, and what may be off in
     parts of its size: `EPSILON`, or the part of what it is off where all numbers are by half a unit
     in the last place, where it is asked for.
@@ -261,13 +277,13 @@ def _in_many_digits(model: Model, *, nudge: bool) -> Callable[[Values], tuple[li
         if not nudge:
             return true, EPSILON
         change = _apart(forward(values, EPSILON / 2), true)
-        return true, max(EPSILON, change / _size(true) / SURE)
+        return true, max(EPSILON, change / _size(true, least) / SURE)
 
     return exactly
 
 
-def _size(values: Sequence[Any]) -> float:
-    return max([1.0, *(float(abs(x)) for x in values)])
+def _size(values: Sequence[Any], least: float) -> float:
+    return max([least, *(float(abs(x)) for x in values)])
 
 
 def _apart(one: Sequence[Any], other: Sequence[Any]) -> float:
