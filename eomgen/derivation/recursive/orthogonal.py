@@ -24,7 +24,7 @@ Digits are lost still where inertia is a small part of mass times arms squared, 
 tip hangs in line with all joints, of which rounding of sines and cosines knows no more.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from eomgen.derivation.recursive.aligned import aligned
@@ -236,9 +236,9 @@ class Elimination:
         empty = [row for row in loose if self._rows.is_empty(row)]
         for axis in axes:
             held = axis[0].unit in own[axis[0].angular]
-            first, kept, free, before = self._first(axis[0], held, kept, free)
+            first, sources, kept, free, gathered = self._first(axis[0], held, kept, free)
             one, kept, free, term = self._taken(link, axis, first, kept, free, term, tau[axis[1]])
-            taken.append(replace(one, before=(*turns, *before)))
+            taken.append(replace(one, rows=sources, gathered=gathered, before=tuple(turns)))
             turns.clear()
         rest = [*kept.values(), *free]
         holding_rows = [row for row in rest if not self._rows.is_empty(row)]
@@ -263,7 +263,7 @@ class Elimination:
         one, kept, loose, _ = self._taken(
             link, axis, first, kept, loose, nothing, self._rows.zero, early=True
         )
-        return replace(one, row=shifted(first, at)), kept, loose
+        return replace(one, rows=(shifted(first, at),)), kept, loose
 
     def _arm(self, k: int, at: Vec) -> Vec:
         """The arm of a link from a point, that of the heaviest beside it."""
@@ -272,25 +272,31 @@ class Elimination:
 
     def _first(
         self, way: Axis, held: bool, kept: dict[Column, Row], free: list[Row]
-    ) -> tuple[Row, dict[Column, Row], list[Row], tuple[Turn | Sum, ...]]:
-        """The row that an axis is found from: one that holds it alone, as there is where a link has
-        inertia against it; else what can be gathered of it from all.
+    ) -> tuple[Row, tuple[Row, ...], dict[Column, Row], list[Row], tuple[Turn | Sum, ...]]:
+        """The row that takes an axis: one that holds it alone, as there is where a link has inertia
+        against it; else what can be gathered of it from all. And the rows that it is found from.
         """
         column = column_of(way)
         kept, turns = dict(kept), Steps()
         if held:
-            return kept.pop(column), kept, free, ()
+            first = kept.pop(column)
+            return first, (first,), kept, free, ()
         single = self._rows.empty(column)
         for n, row in enumerate(free):
             parts = zip((*row.angular, *row.linear), (*single.angular, *single.linear), strict=True)
             if all(self._scalars.is_zero(a - b) for a, b in parts):
-                return row, kept, [*free[:n], *free[n + 1 :]], ()
-        free = list(free)
+                return row, (row,), kept, [*free[:n], *free[n + 1 :]], ()
+        free, angular = list(free), column[0]
+        sources = tuple(
+            row
+            for row in (*free, *reversed(kept.values()))
+            if not self._scalars.is_zero((row.angular if angular else row.linear)[column[1]])
+        )
         for n, row in enumerate(free):
             single, free[n] = self._rows.rotated(single, row, column, turns)
         for key in reversed(kept):
             single, kept[key] = self._rows.rotated(single, kept[key], column, turns)
-        return single, kept, free, tuple(turns)
+        return single, sources or (single,), kept, free, tuple(turns)
 
     def _taken(
         self,
@@ -336,7 +342,8 @@ class Elimination:
         pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
         share = pivot.force / pivot.weight
         left = Force(*with_component(way, moment, push, back))
-        return Taken(way, i, first, share, tuple(turns), rotor), kept, free, left
+        one = Taken(way, i, (first,), first.index, share, tuple(turns), rotor)
+        return one, kept, free, left
 
     # Outwards.
 
@@ -356,20 +363,35 @@ class Elimination:
                 residuals[row.index] = -row.right
             turned_back(eliminated.turns, residuals)
             for taken in reversed(eliminated.axes):
-                row, way = taken.row, taken.axis
-                residuals[row.index] = taken.left
-                turned_back(taken.turns, residuals)
+                way = taken.axis
+                residuals[taken.pivot] = taken.left
+                turned_back((*taken.gathered, *taken.turns), residuals)
                 before = along(way, angular, linear)
                 if taken.rotor >= 0:
                     result[taken.velocity] = residuals[taken.rotor]
                     value = before + residuals[taken.rotor]
                 else:
-                    clear = with_component(way, row.angular, row.linear, self._rows.zero)
-                    value = row.right + residuals[row.index]
-                    value = value - (dot(clear[0], angular) + dot(clear[1], linear))
+                    value = self._value(taken, residuals, angular, linear)
                     result[taken.velocity] = value - before
                 angular, linear = with_component(way, angular, linear, value)
                 turned_back(taken.before, residuals)
             angular = named(angular, f"alpha_{link.name}", scalars)
             reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
         return result
+
+    def _value(
+        self, taken: Taken, residuals: Mapping[int, Scalar], angular: Vec, linear: Vec
+    ) -> Scalar:
+        """The acceleration along an axis from rows that hold it, where the others are known. Each
+        of several tells it, and better the more of it is in the row, however light that is.
+        """
+        above, below = self._rows.zero, self._rows.zero
+        for row in taken.rows:
+            x, zero = along(taken.axis, row.angular, row.linear), self._rows.zero
+            clear = with_component(taken.axis, row.angular, row.linear, zero)
+            known = dot(clear[0], angular) + dot(clear[1], linear)
+            held = row.right + residuals[row.index] - known
+            if len(taken.rows) == 1:
+                return held / x
+            above, below = above + x * held, below + x * x
+        return above / below

@@ -65,17 +65,23 @@ Steps = list[Turn | Sum]
 
 @dataclass(frozen=True)
 class Taken:
-    """An axis of motion that was eliminated: its row before, the residual of that at the end, the
-    rotations between, and those `before` since the last axis. `rotor` is the index of its motor's
-    row, -1 if it has none.
+    """An axis of motion that was eliminated.
+
+    rows    what it is found from: the one row that held it, or all before they were gathered
+    pivot   the index of that which held it at last, and its residual at the end, `left`
+    turns   the rotations that cleared it; before those the ones that `gathered` the rows, and
+            before those the ones since the last axis
+    rotor   the index of its motor's row, -1 if it has none
     """
 
     axis: Axis
     velocity: int
-    row: Row
+    rows: tuple[Row, ...]
+    pivot: int
     left: Scalar
     turns: tuple[Turn | Sum, ...]
     rotor: int
+    gathered: tuple[Turn | Sum, ...] = ()
     before: tuple[Turn | Sum, ...] = ()
 
 
