@@ -184,19 +184,17 @@ class Elimination:
         """Take a link's free axes out of the rows of all that it carries, each of a link, and of a
         wrench that nothing takes; what is left of that.
         """
-        s, link, solid = self._scalars, self._links[k], self._solids[k]
+        s, link = self._scalars, self._links[k]
         # Where the heaviest rows have no arm, light ones keep theirs.
         heaviest = self._ranks.heaviest[k]
-        at = self._links[heaviest].arm if heaviest >= 0 else zeros(s)
-        if heaviest < 0 and solid is not None:
-            at = solid.centre
+        at = self._links[heaviest].arm if heaviest >= 0 else self._centre(k)
         columns = self._columns[k]
         about = columns | moved(columns, at, s)
-        linear, angular = dict(own[0]), dict(own[1])
-        if solid is not None:
-            linear = {j: shifted(row, sub(solid.centre, at)) for j, row in linear.items()}
-        linear = {j: self._rows.of(about, row) for j, row in linear.items()}
-        angular = {j: self._rows.of(about, row) for j, row in angular.items()}
+        centre = self._centre(k)
+        linear = {
+            j: self._rows.of(about, shifted(row, sub(centre, at))) for j, row in own[0].items()
+        }
+        angular = {j: self._rows.of(about, row) for j, row in own[1].items()}
         loose = [self._rows.of(about, shifted(row, self._arm(n, at))) for row, n in rows]
         # Those without an arm first, which so stay without it, be there more of them than columns.
         loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
