@@ -56,8 +56,8 @@ def digits_lost(
     closely: bool = False,
 ) -> Mapping[str, float]:
     """The decimal digits that routes lose on v̇, at the worst of some seeded states, random and
-    aligned ones; 0 to `ALL`. They are those of its largest component, or of 1 where that is more
-    and more is usual: v̇ may be 0 at a state, but are no less for being small at all.
+    aligned ones; 0 to `ALL`. They count from its largest component, but at a state where that is
+    less than usual from the usual one, of at most 1: v̇ may vanish at a state.
 
     closed   v̇ by the closed form, which is judged, too
     ldl      whether that is, too; it takes long for many bodies
