@@ -6,36 +6,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eomgen.errors import RunError
 from eomgen.run import events
-from eomgen.run.checks import (
-    allowed_errors,
-    check_no_step,
-    check_repairs,
-    check_rest_speed,
-    check_samples,
-    check_steps,
-    check_times,
-    check_tolerances,
-    longest_step,
-    numbers,
-)
+from eomgen.run.checks import check_repairs, check_rest_speed
 from eomgen.run.guard import OF_TOLERANCE, Guard, Watch, repaired, watched
-from eomgen.run.integrators import (
-    FixedStep,
-    StepFailure,
-    adaptive,
-    find_integrator,
-    fixed_step,
-)
-from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Change, Resume
+from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
+from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
+from eomgen.run.stepping import Asked, adaptive_steps, equal_steps
 from eomgen.run.trajectory import Event, Trajectory
 from eomgen.run.works import Account, Powers
 
-ADAPTIVE_SAMPLES = 1001
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Where in a long step the gaps of contacts are looked at; in an equal step at its ends."""
 
@@ -92,77 +74,43 @@ def integrate(
         t_start = float(resume["t"])
         problem = replace(problem, initial=resume["y"])
         grid = float(resume.get("grid", t_start))
-    t_start, t_end = float(t_start), float(t_end)
-    check_times(t_start, t_end)
-    check_tolerances(rtol, atol)
-    check_samples(samples)
+    asked = Asked(
+        integrator=integrator,
+        t_start=float(t_start),
+        t_end=float(t_end),
+        grid=grid,
+        dt=dt,
+        rtol=rtol,
+        atol=atol,
+        samples=samples,
+        max_step=max_step,
+        max_steps=max_steps,
+        resume=resume,
+    )
     check_rest_speed(rest_speed)
-    repairs = guard is not None and guard.repairs
-    if repairs:
-        check_repairs(problem, resume is not None)
-    watch = None
-    if guard is not None:
-        tight = OF_TOLERANCE * rtol if isinstance(method, Adaptive) else guard.bound
-        watch = Watch(guard, problem, min(guard.bound, tight))
-
+    watch = _watch(guard, problem, method, asked) if guard else None
     derivatives, jacobians = _Count(), _Count()
     counted = replace(
         problem,
         derivative=derivatives.of(watch.derivative if watch else problem.derivative),
         jacobian=jacobians.of(problem.jacobian),
     )
-    begin: Begin
-    longest: float | None = None
     if isinstance(method, FixedStep):
-        if max_step is not None:
-            raise RunError(f"max_step: {integrator} takes equal steps; give --dt instead")
-        dt, every = check_steps(integrator, t_end - t_start, dt, samples, max_steps)
-        # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
-        looked_at = problem if method.explicit and not repairs else None
-        begin = _equal_steps(method.prepare(counted), grid, t_end, dt, every, looked_at)
+        looked_at = problem if method.explicit and not (watch and watch.guard.repairs) else None
+        begin, remembered = equal_steps(asked, method, counted, looked_at)
     else:
-        check_no_step(integrator, dt)
-        times = np.linspace(t_start, t_end, samples or ADAPTIVE_SAMPLES)
-        longest = longest_step(max_step, t_end - t_start, problem.corners)
-        if resume is not None and max_step is None:
-            longest = float(resume.get("longest", longest))
-        bounds = allowed_errors(problem, atol)
-        begin = _adaptive_steps(method, t_end, (rtol, bounds, longest), times, max_steps)
+        begin, remembered = adaptive_steps(asked, method, problem)
 
-    if watch and repairs:
-        advances = repaired(watch, begin, counted, t_start, max_steps)
-    elif problem.contacts is None:
-        advances = begin(counted, t_start, 0, resume)
-    else:
-        looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
-        stepper = events.Stepper(begin, looks, derivatives.of)
-        advances = events.advances(
-            stepper,
-            counted,
-            t_start,
-            t_end,
-            rest_speed=rest_speed,
-            max_steps=max_steps,
-            resume=resume,
-        )
-
-    if watch and not repairs:
-        advances = watched(watch, advances, t_start, problem.initial)
-
+    looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
+    stepper = events.Stepper(begin, looks, derivatives.of)
+    advances = _advances(stepper, counted, asked, watch, rest_speed)
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
-    run = _Run(t_start, problem.initial, account)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("default")
-        trouble = _follow(
-            run, advances, (derivatives, jacobians), problem, method, t_end, progress or _ignore
-        )
-    # LSODA says why it failed in a warning only.
-    remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
-    mended = watch.words() if watch else ""
-    remembered = numbers(grid=grid, dt=dt, rtol=rtol, atol=atol, longest=longest)
-    calls = {"derivatives": derivatives.calls, "jacobians": jacobians.calls}
-    impacts = sum(event.kind == "impact" for event in run.events)
+    run = _Run(asked.t_start, problem.initial, account)
+    trouble, remarks = _followed(
+        run, advances, (derivatives, jacobians), problem, method, asked.t_end, progress or _ignore
+    )
+    said = (trouble, watch.words() if watch else "", remarks)
     return Trajectory(
         name=problem.name,
         states=problem.states,
@@ -170,8 +118,13 @@ def integrate(
         y=np.array([y for _, y in run.rows]),
         integrator=integrator,
         finished=not trouble,
-        message=" ".join("; ".join(filter(None, (trouble, mended, remarks))).split()),
-        counts={"steps": run.steps, **calls, "impacts": impacts},
+        message=" ".join("; ".join(filter(None, said)).split()),
+        counts={
+            "steps": run.steps,
+            "derivatives": derivatives.calls,
+            "jacobians": jacobians.calls,
+            "impacts": sum(event.kind == "impact" for event in run.events),
+        },
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
         work_names=account.names if account else (),
@@ -179,59 +132,12 @@ def integrate(
     )
 
 
-def _equal_steps(
-    change: Change, t_start: float, t_end: float, dt: float, every: int, looked_at: Problem | None
-) -> Begin:
-    """Steps of `dt` from `t_start`, wherever they are begun; every how-manieth has a row."""
-
-    def begin(
-        problem: Problem, t: float, made: int, resume: Resume | None = None
-    ) -> Iterator[Advance]:
-        return fixed_step.advances(
-            change,
-            problem,
-            t,
-            t_start=t_start,
-            t_end=t_end,
-            dt=dt,
-            every=every,
-            watched=problem if looked_at and problem.contacts else looked_at,
-            resume=resume,
-        )
-
-    return begin
-
-
-def _adaptive_steps(
-    method: Adaptive,
-    t_end: float,
-    bounds: tuple[float, float | Floats, float],
-    times: Floats,
-    max_steps: int,
-) -> Begin:
-    """Steps that a method chooses itself within rtol, atol and a longest step, s, with rows at
-    `times`.
-    """
-    rtol, atol, longest = bounds
-
-    def begin(
-        problem: Problem, t: float, made: int, resume: Resume | None = None
-    ) -> Iterator[Advance]:
-        return adaptive.advances(
-            method,
-            problem,
-            t,
-            t_end,
-            rtol=rtol,
-            atol=atol,
-            max_step=longest,
-            times=times,
-            made=made,
-            max_steps=max_steps,
-            resume=resume,
-        )
-
-    return begin
+def _watch(guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: Asked) -> Watch:
+    """Raise `RunError` for repairs that cannot be made."""
+    if guard.repairs:
+        check_repairs(problem, asked.resume is not None)
+    tight = OF_TOLERANCE * asked.rtol if isinstance(method, Adaptive) else guard.bound
+    return Watch(guard, problem, min(guard.bound, tight))
 
 
 @dataclass
@@ -290,6 +196,49 @@ class _Run:
         self.rows.append((self.t, self.y))
         if self.account:
             self.works.append(self.account.total)
+
+
+def _advances(
+    stepper: events.Stepper,
+    problem: Problem,
+    asked: Asked,
+    watch: Watch | None,
+    rest_speed: float | None,
+) -> Iterator[Advance]:
+    """The steps of a run, from strike to strike if it has contacts, and under its guard."""
+    t_start, resume = asked.t_start, asked.resume
+    if watch and watch.guard.repairs:
+        return repaired(watch, stepper.begin, problem, t_start, asked.max_steps)
+    if problem.contacts is None:
+        advances = stepper.begin(problem, t_start, 0, resume)
+    else:
+        advances = events.advances(
+            stepper,
+            problem,
+            t_start,
+            asked.t_end,
+            rest_speed=rest_speed,
+            max_steps=asked.max_steps,
+            resume=resume,
+        )
+    return watched(watch, advances, t_start, problem.initial) if watch else advances
+
+
+def _followed(
+    run: _Run,
+    advances: Iterator[Advance],
+    counts: tuple[_Count, _Count],
+    problem: Problem,
+    method: FixedStep | Adaptive,
+    t_end: float,
+    progress: Progress,
+) -> tuple[str, str]:
+    """The trouble that `_follow` tells, and what was warned of meanwhile."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("default")
+        trouble = _follow(run, advances, counts, problem, method, t_end, progress)
+    # LSODA says why it failed in a warning only.
+    return trouble, "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
 
 
 def _follow(

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from eomgen.files import check_folder, check_writable, write_whole
+from eomgen.study.bounds import OWN, Check
 from eomgen.study.hard_states import KINDS, State
 from eomgen.study.horizon import Horizon
-from eomgen.study.verify import OWN, Check, Verified
+from eomgen.study.verify import Verified
 
 SHOWN = 12
 """States of more numbers are not written out in messages."""

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.integrate import ADAPTIVE_SAMPLES, integrate
+from eomgen.run.integrate import integrate
 from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
+from eomgen.run.stepping import ADAPTIVE_SAMPLES
 from eomgen.run.trajectory import Trajectory
 from eomgen.run.works import Powers
 from eomgen.study.measure import scales

@@ -1,0 +1,121 @@
+"""How the steps that a run asks for are begun."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from eomgen.errors import RunError
+from eomgen.run.checks import (
+    allowed_errors,
+    check_no_step,
+    check_samples,
+    check_steps,
+    check_times,
+    check_tolerances,
+    longest_step,
+    numbers,
+)
+from eomgen.run.integrators import FixedStep, adaptive, fixed_step
+from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Resume
+from eomgen.run.problem import Problem
+
+ADAPTIVE_SAMPLES = 1001
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The steps of a run, as `integrate` describes them; `grid` is where equal ones count from, s.
+
+    Raises `RunError` for what no method can serve.
+    """
+
+    integrator: str
+    t_start: float
+    t_end: float
+    grid: float
+    dt: float | None
+    rtol: float
+    atol: float | None
+    samples: int | None
+    max_step: float | None
+    max_steps: int
+    resume: Resume | None
+
+    def __post_init__(self) -> None:
+        check_times(self.t_start, self.t_end)
+        check_tolerances(self.rtol, self.atol)
+        check_samples(self.samples)
+
+    @property
+    def span(self) -> float:
+        """How long the run is, s."""
+        return self.t_end - self.t_start
+
+
+def equal_steps(
+    asked: Asked, method: FixedStep, problem: Problem, looked_at: Problem | None
+) -> tuple[Begin, Resume]:
+    """Equal steps from `asked.grid`, wherever they are begun, and what a run from their end needs.
+
+    looked_at  the problem whose Jacobian tells whether a step is too long, if that is to be asked
+
+    Raises `RunError` for a step that is none.
+    """
+    if asked.max_step is not None:
+        raise RunError(f"max_step: {asked.integrator} takes equal steps; give --dt instead")
+    dt, every = check_steps(asked.integrator, asked.span, asked.dt, asked.samples, asked.max_steps)
+    change = method.prepare(problem)
+
+    def begin(
+        problem: Problem, t: float, made: int, resume: Resume | None = None
+    ) -> Iterator[Advance]:
+        return fixed_step.advances(
+            change,
+            problem,
+            t,
+            t_start=asked.grid,
+            t_end=asked.t_end,
+            dt=dt,
+            every=every,
+            watched=problem if looked_at and problem.contacts else looked_at,
+            resume=resume,
+        )
+
+    return begin, _remembered(asked, dt, None)
+
+
+def adaptive_steps(asked: Asked, method: Adaptive, problem: Problem) -> tuple[Begin, Resume]:
+    """Steps that a method chooses itself, and what a run from their end needs.
+
+    Raises `RunError` for a step given, or a longest one that is none.
+    """
+    check_no_step(asked.integrator, asked.dt)
+    times = np.linspace(asked.t_start, asked.t_end, asked.samples or ADAPTIVE_SAMPLES)
+    longest = longest_step(asked.max_step, asked.span, problem.corners)
+    if asked.resume is not None and asked.max_step is None:
+        longest = float(asked.resume.get("longest", longest))
+    atol = allowed_errors(problem, asked.atol)
+
+    def begin(
+        problem: Problem, t: float, made: int, resume: Resume | None = None
+    ) -> Iterator[Advance]:
+        return adaptive.advances(
+            method,
+            problem,
+            t,
+            asked.t_end,
+            rtol=asked.rtol,
+            atol=atol,
+            max_step=longest,
+            times=times,
+            made=made,
+            max_steps=asked.max_steps,
+            resume=resume,
+        )
+
+    return begin, _remembered(asked, None, longest)
+
+
+def _remembered(asked: Asked, dt: float | None, longest: float | None) -> Resume:
+    return numbers(grid=asked.grid, dt=dt, rtol=asked.rtol, atol=asked.atol, longest=longest)
