@@ -36,7 +36,7 @@ from eomgen.study.judging import Judged, judged
 from eomgen.study.laws import broken, why_no_energy_law, why_no_momentum_law
 from eomgen.study.routes import compiled
 from eomgen.study.truth import Truth
-from eomgen.study.visited import visited
+from eomgen.study.visited import Visited, visited
 
 OUTPUTS = (
     "inverse_dynamics",
@@ -117,7 +117,8 @@ def verify(
     bare = replace(model, outputs=())
     truth, count = Truth(bare), states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
     asked = hard_states(module, len(model.velocities), count, seed, model.simulation.t_end)
-    asked += _own_run(model, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
+    run = visited(model, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
+    asked += _states(run, module)
     found = []
     for k, state in enumerate(asked):
         found.append(judged(bare, truth, taken, modules, full, state))
@@ -154,7 +155,7 @@ def verify(
         checks=checks,
         notes=(*notes, *_notes(ran, bare)),
         left_out=len(found) - len(there),
-        until=ran.until,
+        until=run.until,
         ulps=ulps,
         data=data,
     )
@@ -181,9 +182,8 @@ def _modules(
     return taken, {r: modules[r] for r in get_args(Route) if r in modules}, full, missing
 
 
-def _own_run(model: Model, module: GeneratedModule, count: int, progress: Progress) -> list[State]:
-    """States that the scene's own run visits."""
-    run = visited(model, module, count, progress)
+def _states(run: Visited, module: GeneratedModule) -> list[State]:
+    """The states that the scene's own run visits."""
     unit = as_problem(module).unit  # within steps methods leave the sphere of unit quaternions
     inputs = dict.fromkeys(module.INPUTS, 0.0)
     return [
