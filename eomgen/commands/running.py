@@ -35,18 +35,20 @@ from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import SHOWN
+from eomgen.store import Code
 
 if TYPE_CHECKING:
     from eomgen.run.guard import Guard
     from eomgen.show.motion import Motion
-    from eomgen.study.trial import Setting
+    from eomgen.study.search import Choice
+    from eomgen.study.trial import Case, Setting, Tried
 
 
 def simulate(given: Arguments) -> int:
     """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
     # Imported here: `check` and `generate` need neither SciPy nor Matplotlib.
     from eomgen.run.resume import going_on
-    from eomgen.run.trajectory import load_npz, save_csv, save_npz
+    from eomgen.run.trajectory import load_npz
     from eomgen.show.observe import observe
     from eomgen.study.trial import Case
 
@@ -97,11 +99,51 @@ def simulate(given: Arguments) -> int:
     trajectory = tried.trajectory
     model = model.with_parameters(parameters)
     motion = observe(model, module, trajectory, inputs)
-    write_whole(paths["py"], code.module, force=given.force)
-    save_npz(trajectory, paths["npz"], force=given.force)
-    save_csv(trajectory, paths["csv"], force=given.force)
-    parameter_values = tuple(model.defaults.values())
-    drawing = _save_pictures(motion, code.poses, parameter_values, paths, given.force)
+    drawing = _write(code, trajectory, motion, tuple(model.defaults.values()), paths, given.force)
+    missed = _report(given, model, code, case, tried, choice, motion, words)
+    for path in paths.values():
+        print(f"    wrote {path}")
+    warn_of_energy(motion)
+    trouble = missed if trajectory.finished else f"{model.name}: {trajectory.message}"
+    if trouble or drawing:
+        raise RunError("\n".join(line for line in (trouble, drawing) if line))
+    if given.view:
+        _open(paths["html"])
+    return 0
+
+
+def _write(
+    code: Code,
+    trajectory: Trajectory,
+    motion: "Motion",
+    parameters: tuple[float, ...],
+    paths: dict[str, Path],
+    force: bool,
+) -> str:
+    """Write everything; return "" or, if pictures cannot be drawn, why not."""
+    from eomgen.run.trajectory import save_csv, save_npz
+
+    write_whole(paths["py"], code.module, force=force)
+    save_npz(trajectory, paths["npz"], force=force)
+    save_csv(trajectory, paths["csv"], force=force)
+    return _save_pictures(motion, code.poses, parameters, paths, force)
+
+
+def _report(
+    given: Arguments,
+    model: Model,
+    code: Code,
+    case: "Case",
+    tried: "Tried",
+    choice: "Choice | None",
+    motion: "Motion",
+    words: str,
+) -> str:
+    """Say how the run went; return "" or what the choice of a method could not meet.
+
+    words  of what the run goes on from
+    """
+    trajectory = tried.trajectory
     print(
         f"{model.name}: {trajectory.t[-1]:g} s by {trajectory.integrator}, "
         f"{trajectory.counts['steps']} steps, {trajectory.counts['derivatives']} derivatives "
@@ -121,15 +163,7 @@ def simulate(given: Arguments) -> int:
     _print_excursions(model, trajectory)
     for line in locks(model, trajectory):
         print(f"    {line}")
-    for path in paths.values():
-        print(f"    wrote {path}")
-    warn_of_energy(motion)
-    trouble = missed if trajectory.finished else f"{model.name}: {trajectory.message}"
-    if trouble or drawing:
-        raise RunError("\n".join(line for line in (trouble, drawing) if line))
-    if given.view:
-        _open(paths["html"])
-    return 0
+    return missed
 
 
 def _guard(
