@@ -130,7 +130,7 @@ def within(
         left = budget - search.spent
         plans = [_most(search, method_of(name), judged, left) for name in names]
         possible = [plan for plan in plans if plan]
-        if asked is None and _patience(search, names, plans, HALF * left):
+        if asked is None and left > 0 and _patience(search, names, plans, HALF * left):
             continue
         if not possible:
             return search.chosen(best, judged, True)
