@@ -94,6 +94,14 @@ def test_not_silent_again(number: int) -> None:
     assert tried(*case(number)) == outcome, ONCE_SILENT[number]
 
 
+@pytest.mark.parametrize("number", [212, 574, 1086])
+def test_not_refused(number: int) -> None:
+    """A body may be slight beside the masses it carries, their moments of inertia, or both: pushed
+    about as if it were alone, it would cost so many digits that these were refused.
+    """
+    assert tried(*case(number)) == "right"
+
+
 @pytest.mark.parametrize("number", [102847, 103237, 103403, 100194, 103220])
 def test_in_many_digits_all_recursions_are_the_same(number: int) -> None:
     """Fixed rotations are rotations there: heavy slides on light bodies would show that they are
