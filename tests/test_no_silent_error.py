@@ -96,8 +96,9 @@ def test_not_silent_again(number: int) -> None:
 
 ONCE_REFUSED = {
     212: "slight beside the masses it carries",
-    574: "slight beside masses on arms or moments of inertia that it carries",
-    1086: "slight beside masses on arms",
+    514: "slight in inertia beside its own mass on an arm",
+    1086: "slight beside masses it carries on arms",
+    9273: "slight beside moments of inertia that it carries",
     5369: "slight beside a rotor",
 }
 
