@@ -1,6 +1,5 @@
 """Stiffness: an explicit method that cannot hold it says so, and names what can."""
 
-import math
 import re
 from functools import cache
 from typing import Any
@@ -130,26 +129,3 @@ def test_what_holds_is_left_alone() -> None:
     assert run.finished
     energy = 0.5 * run.y[-1, 1] ** 2 + 9.81 * run.y[-1, 0]
     assert abs(energy - 0.5 * 9.81) < 0.02 * energy
-
-
-@pytest.mark.parametrize("method", ["euler", "rk4"])
-def test_wild_forces_are_looked_into_seldom_and_what_cannot_be_held_at_once(method: str) -> None:
-    """A force that jumps at every step, to no harm; from 1 s on a damper, too strong by far."""
-    looks: list[float] = []
-
-    def strength(t: float) -> float:
-        return 300.0 if t >= 1.0 else 0.0
-
-    def derivative(t: float, y: Any) -> Any:
-        force = math.copysign(10.0, math.sin(997.0 * t))
-        return np.array([force, force - strength(t) * y[1]])
-
-    def jacobian(t: float, y: Any) -> Any:
-        looks.append(t)
-        return np.array([[0.0, 0.0], [0.0, -strength(t)]])
-
-    asked = Problem("wild", ("a", "b"), (), derivative, jacobian, np.ones(2))
-    run = integrate(asked, method, 3.0, dt=0.01)
-    assert len([t for t in looks if t < 0.99]) <= 40
-    assert stopped(run) < 0.01
-    assert run.t[-1] < 1.1 and np.abs(run.y).max() < 50

@@ -27,12 +27,6 @@ JUMP, NOISE = 0.5, 1e-9
 unless it is nothing beside the largest of all.
 """
 
-FAR, PATIENCE = 4.0, 31
-"""A rate so many times its largest so far is looked into at once. Of lesser jumps, which a wild
-motion makes at every step, ever more are let pass after each that was looked into for nothing, up
-to so many: a look takes as long as a hundred steps of a large mechanism.
-"""
-
 
 class UnstableStepError(StepFailure):
     """A step that is too long for an explicit method; the text says how long one may be."""
@@ -46,8 +40,6 @@ class Watch:
     _last: Floats | None = None
     _largest: Floats | float = 0.0
     _allowed: Floats | float = 0.0
-    _passed: int = 0
-    _patience: int = 0
 
     def see(self, problem: Problem, t: float, y: Floats, step: Floats, h: float) -> None:
         """Take note of a step of h from `y` at `t` to y + `step`, (ny,) each.
@@ -63,15 +55,9 @@ class Watch:
         before = rate if last is None else last
         self._note(before)
         jumps = first or not (np.abs(rate - before) <= self._allowed).all()
-        least = np.maximum(FAR * self._largest, NOISE * np.max(self._largest))
-        near = (np.abs(rate) <= least).all()
         self._note(rate)
         if not jumps:
             return
-        if near and self._passed < self._patience:
-            self._passed += 1
-            return
-        self._passed, self._patience = 0, min(2 * self._patience + 1, PATIENCE)
         if not np.isfinite(step).all():
             places = [(t, y)]
         elif first:
