@@ -96,6 +96,7 @@ def integrate(
         jacobian=jacobians.of(problem.jacobian),
     )
     if isinstance(method, FixedStep):
+        # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
         looked_at = problem if method.explicit and not (watch and watch.guard.repairs) else None
         begin, remembered = equal_steps(asked, method, counted, looked_at)
@@ -107,9 +108,12 @@ def integrate(
     advances = _advances(stepper, counted, asked, watch, rest_speed)
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
     run = _Run(asked.t_start, problem.initial, account)
-    trouble, remarks = _followed(
-        run, advances, (derivatives, jacobians), problem, method, asked.t_end, progress or _ignore
-    )
+    counts, told = (derivatives, jacobians), progress or _ignore
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("default")
+        trouble = _follow(run, advances, counts, problem, method, asked.t_end, told)
+    # LSODA says why it failed in a warning only.
+    remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
     said = (trouble, watch.words() if watch else "", remarks)
     return Trajectory(
         name=problem.name,
@@ -133,7 +137,10 @@ def integrate(
 
 
 def _watch(guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: Asked) -> Watch:
-    """Raise `RunError` for repairs that cannot be made."""
+    """A guard at its work on a run, held to what the run's tolerance asks for, too.
+
+    Raises `RunError` for repairs that cannot be made.
+    """
     if guard.repairs:
         check_repairs(problem, asked.resume is not None)
     tight = OF_TOLERANCE * asked.rtol if isinstance(method, Adaptive) else guard.bound
@@ -222,23 +229,6 @@ def _advances(
             resume=resume,
         )
     return watched(watch, advances, t_start, problem.initial) if watch else advances
-
-
-def _followed(
-    run: _Run,
-    advances: Iterator[Advance],
-    counts: tuple[_Count, _Count],
-    problem: Problem,
-    method: FixedStep | Adaptive,
-    t_end: float,
-    progress: Progress,
-) -> tuple[str, str]:
-    """The trouble that `_follow` tells, and what was warned of meanwhile."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("default")
-        trouble = _follow(run, advances, counts, problem, method, t_end, progress)
-    # LSODA says why it failed in a warning only.
-    return trouble, "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
 
 
 def _follow(
