@@ -6,6 +6,7 @@ from eomgen.commands.shared import (
     FEW,
     Arguments,
     located,
+    overlap_lines,
     print_listed,
     print_wrapped,
     read_model,
@@ -71,6 +72,8 @@ def check(given: Arguments) -> int:
         for name in dict.fromkeys(effects)
     ]
     print_listed("effects     ", counted)
+    for line in shortened(overlap_lines(model), most):
+        print_wrapped("at start    ", line)
     print_listed("inputs      ", shortened([i.name for i in model.inputs], most))
     values = [f"{p.name} = {p.default:g}" for p in model.parameters]
     print_listed("parameters  ", shortened(values, most))

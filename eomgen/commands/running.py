@@ -20,6 +20,7 @@ from eomgen.commands.shared import (
     Arguments,
     assignments,
     code_of,
+    overlap_lines,
     print_listed,
     print_wrapped,
     read_model,
@@ -151,6 +152,9 @@ def _report(
     )
     if words:
         print(f"    {words}")
+    else:
+        for line in shortened(overlap_lines(model)):
+            print(f"    {line}")
     missed = print_choice(choice, given) if choice else ""
     if given.estimate and not choice and trajectory.finished:
         print_estimate(case, tried)

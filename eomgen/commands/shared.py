@@ -10,8 +10,10 @@ from dataclasses import replace
 from typing import Literal
 
 from eomgen.build import build_model, outputs_for
+from eomgen.derivation.recursive.finite import initial_overlaps
+from eomgen.effects import JointStop
 from eomgen.errors import EomgenError, RunError, SceneError, nearest
-from eomgen.model import Model
+from eomgen.model import Model, ways_of
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import terminal_notice
 from eomgen.scene.reader import find_scene, read_scene
@@ -109,6 +111,27 @@ def assignments(texts: list[str], known: Collection[str], option: str) -> dict[s
             raise RunError(f"{option} {text}: gives no finite number; write {option} {name}=1.5")
         values[name] = value
     return values
+
+
+def overlap_lines(model: Model) -> list[str]:
+    """A line for each soft contact or stop that is pressed in at the initial state.
+
+    Such an effect starts with energy in it, and may throw the bodies apart.
+    """
+    lines = []
+    effects = {effect.name: effect for effect in model.effects}
+    joints = ways_of(model.bodies, model.dimensions)
+    for overlap in initial_overlaps(model):
+        effect, kind, unit = effects[overlap.effect], "contact", "m"
+        if isinstance(effect, JointStop):
+            slides = {way == "slide" for joint in effect.acted_on(joints) for way in joints[joint]}
+            kind = "stop"
+            unit = "rad or m" if len(slides) == 2 else "m" if True in slides else "rad"
+        lines.append(
+            f"{kind} '{overlap.effect}' starts {overlap.depth:.3g} {unit} deep, "
+            f"with {overlap.energy:.3g} J in it"
+        )
+    return lines
 
 
 def shortened(words: Sequence[str], most: int = FEW) -> list[str]:
