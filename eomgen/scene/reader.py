@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from eomgen.errors import SceneError, nearest
+from eomgen.files import read_plain
 from eomgen.scene.schema import MOST, Scene
 
 BUILT_IN = Path(__file__).parent.parent / "scenes"
@@ -50,13 +51,7 @@ def read_scene(scene: str | Path) -> Scene:
     Raises `SceneError` with one line for each mistake: place, value, remedy.
     """
     path = find_scene(scene) if isinstance(scene, str) else scene
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise SceneError(f"{path.name}: cannot be read: {error.strerror}") from None
-    if len(data) > LARGEST_FILE:
-        raise SceneError(f"{path.name}: is larger than {LARGEST_FILE} bytes")
+    data = read_plain(path, LARGEST_FILE, name=path.name, error=SceneError)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
