@@ -22,6 +22,7 @@ ROOT = Path(__file__).parent.parent
 ORDER = (
     ("errors",),
     ("files",),
+    ("entries",),
     ("language",),
     ("joints",),
     ("effects",),

@@ -87,7 +87,7 @@ def _runs(given: Arguments, model: Model, name: str) -> None:
             inputs or None,
             t_end,
             progress=progress,
-            folder=folder() / "references",
+            folder=folder("references"),
         )
         bench = _bench(model, module, parameters, inputs, truth)
         _check_reference(bench)

@@ -26,7 +26,8 @@ def generate(given: Arguments) -> int:
         if not given.check:
             check_folder(given.output)
             check_writable(path, force=given.force)
-        code, _ = code_of(scene, model, given)
+        # What is checked is what would be derived now, whatever the store holds.
+        code, _ = code_of(scene, model, given, anew=given.check)
         current = _text(path)
         if given.check:
             state = "fresh" if current == code.module else "missing" if current is None else "stale"

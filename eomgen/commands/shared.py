@@ -65,15 +65,20 @@ def _output_names(text: str) -> Literal["all"] | Sequence[str]:
     return names
 
 
-def code_of(scene: str, model: Model, given: Arguments) -> tuple[Code, GeneratedModule]:
-    """A model's code, derived now or before, and its module, loaded and tried.
+def code_of(
+    scene: str, model: Model, given: Arguments, *, anew: bool = False
+) -> tuple[Code, GeneratedModule]:
+    """A model's code, derived now or, unless `anew`, before, and its module, loaded and tried.
 
-    Raises `SceneError` if it cannot be evaluated as the scene is, or has no output that the command
-    line names.
+    Why the store was not used is said on standard error, once. Raises `SceneError` if it cannot be
+    evaluated as the scene is, or has no output that the command line names.
     """
     with located(scene):
         with terminal_notice(f"deriving {model.name} …"):
-            code = generated_code(model)
+            code = generated_code(model, anew=anew)
+        if code.notice and code.notice not in vars(given).setdefault("noticed", []):
+            print(f"eomgen: note: {code.notice}", file=sys.stderr)
+            given.noticed.append(code.notice)
         module = load_module(code.module, model.name)
         as_problem(module, model=model)
         if getattr(given, "outputs", None) not in (None, "all"):
