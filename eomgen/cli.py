@@ -1,42 +1,70 @@
 """The command line: parse, call, say what was done; exit code 0 done, 1 at fault, 2 wrong usage."""
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
-from eomgen.errors import EomgenError
+from eomgen.errors import EomgenError, InterruptedRunError
+from eomgen.streams import steady_streams
+from eomgen.text import one_line
 
 Arguments = argparse.Namespace
+INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code."""
+    """Run one command; returns the exit code. Raises `SystemExit` for wrong usage and for help.
+
+    Streams that fail end no command: it does what it is to do, and what was lost is said then.
+    """
+    with steady_streams() as output:
+        stopped = False
+        try:
+            code = _run(arguments)
+        except SystemExit as stop:
+            stopped, code = True, int(stop.code or 0)
+        if why := output.lost():
+            print(f"eomgen: standard output cannot be written: {why}", file=sys.stderr)
+            code = code or 1
+        if stopped:
+            raise SystemExit(code)
+        return code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         parser = _parser()
         given = parser.parse_args(arguments)
         if "scenes" in given and not (given.scenes or given.all):
             parser.error("generate: no scene; name one, or give --all for the built-in ones")
         code: int = given.run(given)
-        sys.stdout.flush()
     except EomgenError as error:
-        for line in str(error).splitlines():
+        for line in error.lines:
             print(f"eomgen: {line}", file=sys.stderr)
-        return 1
-    except BrokenPipeError:  # the reader of our output has gone; nothing is left to say
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return INTERRUPTED if isinstance(error, InterruptedRunError) else 1
+    except (OSError, MemoryError) as error:
+        why = "out of memory" if isinstance(error, MemoryError) else one_line(str(error))
+        print(f"eomgen: {why}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("eomgen: interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
     return code
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that repeats what it does not understand as one line, not as it is."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(one_line(message))
 
 
 def _parser() -> argparse.ArgumentParser:
     from eomgen import commands  # here, where an interrupt during its imports is caught
 
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="eomgen",
         description="Equations of motion from a scene: derived, solved once, written as code.",
         epilog="SCENE is a file or the name of a built-in scene (eomgen list).",
@@ -263,7 +291,3 @@ def _linearisation(parser: argparse.ArgumentParser) -> None:
         "-o", "--output", metavar="FILE", type=Path, help="write A and B to FILE.npz or FILE.csv"
     )
     _force(parser)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

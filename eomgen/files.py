@@ -3,8 +3,8 @@ are plain files alone, and no more of them than there may be.
 """
 
 import os
+import secrets
 import stat
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -40,7 +40,7 @@ def read_plain(
     Pipes and devices are refused before anything waits for them. Raises `error`, which says in one
     line that the file cannot be read and why, that it is no plain file, or that it is too large.
     """
-    shown = name or _short(path)
+    shown = name or str(path)
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     try:
         _check_plain(path.stat(), shown, error)  # to open a device may do something to it
@@ -82,7 +82,7 @@ def check_writable(path: Path, *, force: bool = False) -> None:
         with path.open("rb") as file:
             ours = is_ours(file.read(SIGNED_WITHIN))
     except OSError as error:
-        raise RunError(f"{_short(path)}: cannot be used: {error.strerror}") from None
+        raise RunError(f"{path}: cannot be used: {error.strerror}") from None
     if not ours:
         raise RunError(
             f"{path}: exists and was not written by eomgen; "
@@ -95,7 +95,7 @@ def check_folder(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RunError(f"{_short(path)}: cannot be made a folder: {error.strerror}") from None
+        raise RunError(f"{path}: cannot be made a folder: {error.strerror}") from None
     if not os.access(path, os.W_OK | os.X_OK):
         raise RunError(f"{path}: cannot be written to; choose another folder with -o")
 
@@ -108,20 +108,19 @@ def write_whole(path: Path, data: bytes | str, *, force: bool = False) -> None:
     """
     check_writable(path, force=force)
     content = data.encode("utf-8") if isinstance(data, str) else data
-    temporary: str | None = None
+    # Named before it is made: an interrupt at any moment, too, must leave nothing behind.
+    temporary = path.parent / f".{path.name[:40]}.{secrets.token_hex(6)}"
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:40]}.")
-        with os.fdopen(handle, "wb") as file:
+        with os.fdopen(os.open(temporary, flags, 0o666), "wb") as file:
             file.write(content)
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(path)
-    except BaseException as error:  # an interrupt, too, must leave nothing behind
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise RunError(f"{_short(path)}: cannot be written: {error.strerror}") from None
-        raise
+        temporary.replace(path)
+    except OSError as error:
+        raise RunError(f"{path}: cannot be written: {error.strerror}") from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def remove_ours(path: Path) -> None:
@@ -131,14 +130,3 @@ def remove_ours(path: Path) -> None:
             ours = is_ours(file.read(SIGNED_WITHIN))
         if ours:
             path.unlink()
-
-
-def _short(path: Path) -> str:
-    text = str(path)
-    return text if len(text) <= 200 else f"{text[:197]}..."
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

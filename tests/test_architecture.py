@@ -20,7 +20,9 @@ ROOT = Path(__file__).parent.parent
 
 # Each room may import from itself and from those before it.
 ORDER = (
+    ("text",),
     ("errors",),
+    ("streams",),
     ("files",),
     ("entries",),
     ("language",),

@@ -94,7 +94,7 @@ def located(scene: str) -> Iterator[None]:
     try:
         yield
     except EomgenError as error:
-        raise SceneError(f"{find_scene(scene).name}: {error}") from None
+        raise SceneError(*(f"{find_scene(scene).name}: {line}" for line in error.lines)) from None
 
 
 def assignments(texts: list[str], known: Collection[str], option: str) -> dict[str, float]:

@@ -77,7 +77,7 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
         more = len(lines) - MOST_MESSAGES
         tail = [f"{source}: and {more} more"] if more > 0 else []
         shown = [f"{source}: {line}" for line in lines[:MOST_MESSAGES]]
-        raise SceneError("\n".join([*shown, *tail])) from None
+        raise SceneError(*shown, *tail) from None
 
 
 def _check_sizes(table: dict[str, Any], source: str) -> None:
