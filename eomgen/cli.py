@@ -8,7 +8,7 @@ from typing import NoReturn
 
 from eomgen.errors import EomgenError, InterruptedRunError
 from eomgen.streams import steady_streams
-from eomgen.text import one_line
+from eomgen.text import breaks_lines, one_line
 
 Arguments = argparse.Namespace
 INTERRUPTED = 130
@@ -54,6 +54,12 @@ def _run(arguments: Sequence[str] | None) -> int:
     return code
 
 
+def _path(text: str) -> Path:
+    if breaks_lines(text):
+        raise argparse.ArgumentTypeError(f"{text} has a control character in its name")
+    return Path(text)
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser that repeats what it does not understand as one line, not as it is."""
 
@@ -94,11 +100,11 @@ def _parser() -> argparse.ArgumentParser:
     _form(check)
     derive = _form(command("derive", commands.derive, "print the derivation, step by step"))
     derive.add_argument("--format", choices=("text", "latex", "html"), default="text")
-    derive.add_argument("-o", "--output", metavar="FILE", type=Path, help="write it to a file")
+    derive.add_argument("-o", "--output", metavar="FILE", type=_path, help="write it to a file")
     _force(derive)
     generate = command("generate", commands.generate, "write the module of a scene", "scenes")
     _code(_form(generate))
-    generate.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"))
+    generate.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("generated"))
     generate.add_argument("--all", action="store_true", help="all built-in scenes")
     generate.add_argument("--check", action="store_true", help="say which is stale, write nothing")
     generate.add_argument("--explain", action="store_true", help="say why its route was taken")
@@ -120,7 +126,7 @@ def _parser() -> argparse.ArgumentParser:
     costing.add_argument(
         "--motion-time", metavar="S", type=float, default=10.0, help="time to compare motions, 10 s"
     )
-    costing.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
+    costing.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     _force(costing)
     _linearisation(command("linearise", commands.linearise, "A, B and modes about an equilibrium"))
     return parser
@@ -194,14 +200,14 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
         "--from",
         metavar="FILE.npz",
         dest="resume",
-        type=Path,
+        type=_path,
         help="go on where an earlier run ended, as if it had not",
     )
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument("--works", action="store_true", help="book the work of each effect")
     _values(parser)
-    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
-    parser.add_argument("--plot", metavar="FILE", type=Path, help="figure (DIR/NAME.png)")
+    parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
+    parser.add_argument("--plot", metavar="FILE", type=_path, help="figure (DIR/NAME.png)")
     parser.add_argument("--view", action="store_true", help="open the page when done")
     _force(parser)
 
@@ -226,7 +232,7 @@ def _accuracy(parser: argparse.ArgumentParser) -> None:
         "--states", metavar="N", type=int, help="states of each kind for it (100, 20 if large)"
     )
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="of its random states")
-    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
+    parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     _force(parser)
 
 
@@ -249,7 +255,7 @@ def _verification(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--save",
         metavar="DIR",
-        type=Path,
+        type=_path,
         nargs="?",
         const=Path("generated"),
         help="write the evidence beside the module, in DIR (generated)",
@@ -288,6 +294,6 @@ def _linearisation(parser: argparse.ArgumentParser) -> None:
     _values(parser)
     _route(parser)
     parser.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, help="write A and B to FILE.npz or FILE.csv"
+        "-o", "--output", metavar="FILE", type=_path, help="write A and B to FILE.npz or FILE.csv"
     )
     _force(parser)

@@ -11,27 +11,37 @@ import unicodedata
 LONGEST_LINE = 1000
 """Letters of a message's line; more are left out in its middle, since its end says what to do."""
 LONGEST_WORD = 200
+LONGEST_VALUE = 60
 _LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 
 
-def escaped(text: str, but: str = "") -> str:
-    r"""A text whose every character can be seen: others than those in `but` as \n, \x1b, \u202e.
+def escaped(text: str) -> str:
+    r"""A text whose every character can be seen: those that cannot be as \n, \x1b, \u202e.
 
-    Lone halves of surrogate pairs, which no encoding takes, are among the others.
+    Lone halves of surrogate pairs, which no encoding takes, are among them.
     """
     if text.isprintable():
         return text
-    return "".join(
-        c if c.isprintable() or c in but else c.encode("unicode_escape").decode() for c in text
-    )
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def brief(text: str, most: int = LONGEST_VALUE) -> str:
+    """A text of any length and characters as a name or a value in a message."""
+    if len(text) > 4 * most:  # what is left out need not be escaped first
+        text = text[: 2 * most] + text[-2 * most :]
+    return _without_middle(escaped(text), most)
 
 
 def one_line(text: str) -> str:
     """A text of any length and characters as one line for a message."""
-    if len(text) > 4 * LONGEST_LINE:  # what is left out need not be escaped first
-        text = text[: 2 * LONGEST_LINE] + text[-2 * LONGEST_LINE :]
-    line = _LONG_WORD.sub(lambda word: _without_middle(word[0], LONGEST_WORD), escaped(text))
+    line = brief(text, 4 * LONGEST_LINE)
+    line = _LONG_WORD.sub(lambda word: _without_middle(word[0], LONGEST_WORD), line)
     return _without_middle(line, LONGEST_LINE)
+
+
+def breaks_lines(text: str) -> bool:
+    """Whether a text has line breaks or other control characters."""
+    return any(unicodedata.category(c) in ("Cc", "Zl", "Zp") for c in text)
 
 
 def _without_middle(text: str, most: int) -> str:
@@ -70,4 +80,4 @@ def _spelled(character: str, encoding: str) -> str:
     raised = "^" if "<super>" in unicodedata.decomposition(character) else ""
     accent = "_dot" if parts.endswith("\u0307") else ""
     plain = parts.encode("ascii", "ignore").decode()
-    return raised + plain + accent if plain else character.encode("unicode_escape").decode()
+    return raised + plain + accent if plain else ascii(character)[1:-1]

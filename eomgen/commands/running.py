@@ -207,10 +207,12 @@ def _save_pictures(
     try:
         save_figure(motion, paths["png"], force=force)
         save_page(motion, poses, parameters, paths["html"], force=force)
-    except RunError as error:
+    except (RunError, KeyboardInterrupt) as error:
         # Pictures of an earlier run must not stand beside the numbers of this one.
         for kind in ("png", "html"):
             remove_ours(paths.pop(kind))
+        if isinstance(error, KeyboardInterrupt):
+            raise
         return str(error)
     return ""
 

@@ -17,6 +17,7 @@ from eomgen.run.progress import terminal_notice
 from eomgen.scene.reader import find_scene, read_scene
 from eomgen.scene.schema import OUTPUTS
 from eomgen.store import Code, generated_code
+from eomgen.text import one_line
 
 Arguments = argparse.Namespace
 
@@ -77,7 +78,7 @@ def code_of(
         with terminal_notice(f"deriving {model.name} …"):
             code = generated_code(model, anew=anew)
         if code.notice and code.notice not in vars(given).setdefault("noticed", []):
-            print(f"eomgen: note: {code.notice}", file=sys.stderr)
+            print(f"eomgen: note: {one_line(code.notice)}", file=sys.stderr)
             given.noticed.append(code.notice)
         module = load_module(code.module, model.name)
         as_problem(module, model=model)
