@@ -1,4 +1,7 @@
-"""The command line: parse, call, say what was done; exit code 0 done, 1 at fault, 2 wrong usage."""
+"""The command line: parse, call, say what was done.
+
+Exit codes: 0 done, 1 the scene or the run is at fault, 2 wrong usage, 130 interrupted.
+"""
 
 import argparse
 import sys

@@ -22,7 +22,9 @@ from eomgen.cli import main
 from eomgen.entries import LARGEST, LONGEST_UNUSED, LONGEST_WRITING, Entries
 from eomgen.model import Model
 from eomgen.pipeline import generate
+from eomgen.run.module import load_module
 from eomgen.scene.reader import BUILT_IN, parse_scene, read_scene
+from eomgen.study.reference import reference
 
 KEY = "0123456789abcdef" * 2
 OTHER = KEY[::-1]
@@ -493,3 +495,27 @@ def test_every_number_of_a_model_is_in_its_key() -> None:
     changed = text.replace("9.81", "9.810000000000002")
     assert store._key(build_model(parse_scene(changed))) != key
     assert generate(model_of("pendulum")).module.encode() == RIGHT
+
+
+def test_references_are_kept_as_safely(folder: Path, tmp_path: Path) -> None:
+    """One under another key, one that others could have written, a pipe: computed anew."""
+    module = load_module(generate(model_of("pendulum")).module)
+    place = folder / "references"
+
+    def made(t_end: float) -> Any:
+        return reference(None, module, t_end=t_end, folder=place, seconds=0.0)
+
+    short, other = made(0.1), made(0.2)
+    assert place.stat().st_mode & 0o777 == 0o700
+    paths = sorted(place.iterdir(), key=lambda path: path.stat().st_mtime)
+    assert len(paths) == 2
+    paths[0].write_bytes(paths[1].read_bytes())
+    assert made(0.1).t[-1] == short.t[-1] != other.t[-1]
+    paths[0].unlink()
+    os.mkfifo(paths[0])
+    assert made(0.1).t[-1] == short.t[-1] and paths[0].is_file()
+    place.chmod(0o777)
+    for path in paths:
+        path.write_bytes(b"")
+    assert made(0.1).t[-1] == short.t[-1]
+    assert [path.read_bytes() for path in paths] == [b"", b""]

@@ -77,9 +77,7 @@ def code_of(
     with located(scene):
         with terminal_notice(f"deriving {model.name} …"):
             code = generated_code(model, anew=anew)
-        if code.notice and code.notice not in vars(given).setdefault("noticed", []):
-            print(f"eomgen: note: {one_line(code.notice)}", file=sys.stderr)
-            given.noticed.append(code.notice)
+        note(given, code.notice)
         module = load_module(code.module, model.name)
         as_problem(module, model=model)
         if getattr(given, "outputs", None) not in (None, "all"):
@@ -87,6 +85,13 @@ def code_of(
                 if not hasattr(module, name):
                     raise RunError(f"--outputs: '{name}' is made for form = 'velocity' only")
     return code, module
+
+
+def note(given: Arguments, notice: str) -> None:
+    """Say on standard error what a command did without, if anything, once."""
+    if notice and notice not in vars(given).setdefault("noted", []):
+        print(f"eomgen: note: {one_line(notice)}", file=sys.stderr)
+        given.noted.append(notice)
 
 
 @contextmanager
