@@ -17,7 +17,6 @@ from scipy.integrate import Radau
 
 from eomgen.pipeline import compile_scene
 from eomgen.run.module import as_problem, load_module
-from eomgen.run.problem import Problem
 from eomgen.scene.reader import read_scene
 
 STIFF = {
