@@ -61,6 +61,8 @@ ABOUT = {
     "point_jacobians": "J of each of `POINTS`: its world velocity is J v.",
     "gaps": "How far apart each of `CONTACTS` is, m or rad; negative where they overlap.",
     "gap_rates": "How fast each of `gaps` grows, m/s or rad/s.",
+    "switching_functions": "`derivative` has another branch where one of these passes 0.",
+    "switching_functions_of_time": "As `switching_functions`; these depend on time alone.",
     "driving_forces": "What each of `DRIVEN` takes, N m or N, on the child and back on the parent.",
 }
 ABOUT_PLANE = {

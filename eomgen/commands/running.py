@@ -156,6 +156,8 @@ def _report(
     else:
         for line in shortened(overlap_lines(model)):
             print(f"    {line}")
+    for line in _bounded(given, trajectory):
+        print(f"    {line}")
     missed = print_choice(choice, given) if choice else ""
     if given.estimate and not choice and trajectory.finished:
         print_estimate(case, tried)
@@ -169,6 +171,28 @@ def _report(
     for line in locks(model, trajectory):
         print(f"    {line}")
     return missed
+
+
+def _bounded(given: Arguments, trajectory: Trajectory) -> list[str]:
+    """What else than their error kept steps short, and how often."""
+    from eomgen.run.checks import LEAST_STEPS
+
+    steps, capped, cut = (trajectory.counts[name] for name in ("steps", "capped", "cut"))
+    lines = []
+    if cut:
+        times = "once" if cut == 1 else f"{cut} times"
+        lines.append(
+            f"a step was made again, shorter, {times}: it had passed over a contact, a stop, a "
+            "pulse or the like"
+        )
+    if capped and given.max_step is not None:
+        lines.append(f"{capped} of {steps} steps as long as --max-step allows")
+    elif capped:
+        lines.append(
+            f"{capped} of {steps} steps held to 1/{LEAST_STEPS} of the run: what longer ones would "
+            "pass over cannot be told; --max-step sets another length"
+        )
+    return lines
 
 
 def _guard(

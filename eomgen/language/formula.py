@@ -30,6 +30,8 @@ FUNCTIONS = {
 what comparisons and `a if x < y else b` become. Both a and b are computed, so both must have a
 value: write sqrt(max(x, 0)), not sqrt(x) if x > 0 else 0.
 """
+CORNERS = ("abs", "max", "min", "select", "step")
+"""Functions that have a corner or a jump: they go on by another branch where one is reached."""
 CONSTANTS = {"pi": math.pi}
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+",

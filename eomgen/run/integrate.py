@@ -51,8 +51,9 @@ def integrate(
                 (default: 1001); the first and the last are always kept
     progress    told the fraction done, at most about ten times a second
     max_step    longest step in s of the adaptive methods; without it, they may go as far as their
-                error allows, but where the derivative has corners no more than 1/1000 of the run:
-                else they might leap over a contact or a pulse
+                error allows. Where the derivative has corners, a step that has passed over a
+                contact or a pulse is made again (`run.branches`); where that cannot be told, steps
+                take no more than 1/1000 of the run
     rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
                 that then neither part nor close are held, so that bouncing comes to an end;
                 without it, it is √(1e-7 a size), of contacts that bounce by less than 5e-8 of the
@@ -128,6 +129,8 @@ def integrate(
             "derivatives": derivatives.calls,
             "jacobians": jacobians.calls,
             "impacts": sum(event.kind == "impact" for event in run.events),
+            "capped": run.capped,
+            "cut": run.cut,
         },
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
@@ -178,6 +181,8 @@ class _Run:
     rows: list[tuple[float, Floats]] = field(default_factory=list)
     works: list[Floats] = field(default_factory=list)
     steps: int = 0
+    capped: int = 0
+    cut: int = 0
     events: list[Event] = field(default_factory=list)
     resume: Callable[[], Resume] | None = None
 
@@ -191,6 +196,8 @@ class _Run:
         self.t, self.y = advance.t, advance.y
         self.rows.extend(advance.samples)
         self.steps += advance.is_step
+        self.capped += advance.capped
+        self.cut += advance.cut
         self.events.extend(advance.events)
         self.resume = advance.resume or self.resume
 

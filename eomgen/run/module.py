@@ -2,7 +2,8 @@
 
 import importlib.abc
 import importlib.util
-from collections.abc import Callable, Iterable
+import inspect
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -10,12 +11,10 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.run.explain import explain_by
-from eomgen.run.problem import Contacts, Floats, Problem
+from eomgen.run.intervals import BY_INTERVALS, Interval
+from eomgen.run.problem import Contacts, Floats, Problem, Switching
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
-
-CORNERS = ("abs", "max", "min", "select", "step")
-"""Functions that have a corner or a jump."""
 
 
 class GeneratedModule(Protocol):
@@ -126,6 +125,7 @@ def as_problem(
     values = {**module.PARAMETERS, **_by_name(module.PARAMETERS, parameters)}
     start = dict(zip(module.STATES, initial.tolist(), strict=True))
     size = mechanism_size(module.UNITS, values, start)
+    switching = _switching(module, parameters, inputs)
     return Problem(
         name=module.NAME,
         states=module.STATES,
@@ -136,7 +136,8 @@ def as_problem(
         quaternions=module.QUATERNIONS,
         contacts=_contacts(module, parameters, inputs, size),
         explain=explain,
-        corners=any(kind in module.COST["derivative"] for kind in CORNERS),
+        corners=switching is not None,
+        switching=switching,
         sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
     )
 
@@ -153,6 +154,37 @@ def as_powers(module: Any, parameters: Any = None, inputs: Any = None) -> Powers
         powers=lambda t, y: module.effect_powers(t, y, parameters, inputs),
         kinetic_energy=lambda t, y: float(module.kinetic_energy(t, y, parameters, inputs)),
     )
+
+
+def _switching(module: Any, parameters: Any, inputs: Any) -> Switching | None:
+    """The switching functions of a module, if its derivative has any."""
+    of_state = getattr(module, "switching_functions", None)
+    of_time = getattr(module, "_switching_functions_of_time", None)
+    if of_state is None and of_time is None:
+        return None
+    positions = [module.STATES[i] for i in module.POSITIONS]
+    return Switching(
+        of_state and (lambda t, y: np.asarray(of_state(t, y, parameters, inputs))),
+        of_state is not None and "t" in inspect.signature(module._switching_functions).parameters,
+        tuple(i for i, name in enumerate(positions) if module.UNITS[name] == "rad"),
+        of_time and _over_intervals(module, of_time, parameters, inputs),
+    )
+
+
+def _over_intervals(
+    module: Any, kernel: Any, parameters: Any, inputs: Any
+) -> Callable[[Interval], Sequence[Interval]]:
+    """A kernel of functions of time alone as one of intervals of time."""
+    wanted = inspect.signature(kernel).parameters
+    functions = {name: BY_INTERVALS[name] for name in BY_INTERVALS if name in wanted}
+    name = kernel.__name__.removeprefix("_")
+    constants = (module._DEFAULT if parameters is None else module._parameters(parameters))[name]
+    u = module._NO_INPUT if inputs is None else module._inputs(inputs, 0)
+
+    def values(t: Interval) -> Sequence[Interval]:
+        return cast(Sequence[Interval], kernel((), constants, u, t=t, **functions))
+
+    return values
 
 
 def _contacts(module: Any, parameters: Any, inputs: Any, size: float) -> Contacts | None:

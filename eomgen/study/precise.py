@@ -15,7 +15,7 @@ import gmpy2
 from gmpy2 import mpfr
 
 from eomgen.language.digits import BY_MPFR
-from eomgen.run.module import CORNERS
+from eomgen.language.formula import CORNERS
 from eomgen.run.problem import Floats
 
 BITS = 113
