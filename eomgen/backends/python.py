@@ -127,7 +127,7 @@ def python_module(system: System) -> str:
         "positions": repr(tuple(i for i, s in enumerate(states) if s.position)),
         "quaternions": repr(quaternions),
         "parameters": model.parameters,
-        "parameter_names": _joined([names.safe(p.name) for p in model.parameters]),
+        "parameter_names": ", ".join(names.safe(p.name) for p in model.parameters),
         "inputs": model.inputs,
         "units": _units(system),
         "effects": repr(tuple(effect.type for effect in model.effects)),
