@@ -124,10 +124,8 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, ground_friction, ground_slip_speed = values
+def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, ground_friction, ground_slip_speed):
+    """Everything that depends on parameters alone, for each kernel."""
     if not m_A > 0.0:
         raise ValueError("mass of A is not positive: change the parameters")
     if not I_A >= 0.0:
@@ -151,6 +149,12 @@ def _constants(values):
         "impact": (m_A, I_A, m_B, l_A, ground_radius, ground_restitution, ground_friction, moment_B_x, inertia_B_zz, k3),
         "held": (m_A, I_A, m_B, l_A, g, ground_radius, ground_friction, moment_B_x, inertia_B_zz, k3, ground_slip_speed_squared),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters; their bytes tell 0.0 from -0.0."""
+    return _fixed(*np.frombuffer(key).tolist())
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -579,7 +583,7 @@ def _held(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt):
 
 
 def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+    """Values by name or in order as an array; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
         for name in values:
             if name not in names:
@@ -588,16 +592,15 @@ def _named(values, names, defaults, what):
     array = np.asarray(values, dtype=float)
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+    return array
 
 
 def _parameters(p):
     try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter").tobytes())
     except ZeroDivisionError:
         raise ValueError("the mass matrix is singular: change the parameters") from None
 
@@ -608,10 +611,10 @@ def _inputs(u, columns):
         if array.shape != (len(INPUTS), columns):
             raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
         return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    return tuple(_named(u, tuple(INPUTS), INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 4
 _COLUMNS = {

@@ -211,10 +211,8 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    rho, gust, depth, link_1_mass, link_1_inertia_com, link_joint_1_r_child_x, link_2_mass, link_2_inertia_com, link_joint_2_r_parent_x, link_joint_2_r_child_x, link_3_mass, link_3_inertia_com, link_joint_3_r_parent_x, link_joint_3_r_child_x, link_4_mass, link_4_inertia_com, link_joint_4_r_parent_x, link_joint_4_r_child_x, link_5_mass, link_5_inertia_com, link_joint_5_r_parent_x, link_joint_5_r_child_x, link_6_mass, link_6_inertia_com, link_joint_6_r_parent_x, link_joint_6_r_child_x, link_7_mass, link_7_inertia_com, link_joint_7_r_parent_x, link_joint_7_r_child_x, link_8_mass, link_8_inertia_com, link_joint_8_r_parent_x, link_joint_8_r_child_x, gravity_g, air_area, air_coefficient, air_turning_linear = values
+def _fixed(rho, gust, depth, link_1_mass, link_1_inertia_com, link_joint_1_r_child_x, link_2_mass, link_2_inertia_com, link_joint_2_r_parent_x, link_joint_2_r_child_x, link_3_mass, link_3_inertia_com, link_joint_3_r_parent_x, link_joint_3_r_child_x, link_4_mass, link_4_inertia_com, link_joint_4_r_parent_x, link_joint_4_r_child_x, link_5_mass, link_5_inertia_com, link_joint_5_r_parent_x, link_joint_5_r_child_x, link_6_mass, link_6_inertia_com, link_joint_6_r_parent_x, link_joint_6_r_child_x, link_7_mass, link_7_inertia_com, link_joint_7_r_parent_x, link_joint_7_r_child_x, link_8_mass, link_8_inertia_com, link_joint_8_r_parent_x, link_joint_8_r_child_x, gravity_g, air_area, air_coefficient, air_turning_linear):
+    """Everything that depends on parameters alone, for each kernel."""
     if not link_1_mass > 0.0:
         raise ValueError("mass of link_1 is not positive: change the parameters")
     if not link_1_inertia_com >= 0.0:
@@ -284,6 +282,12 @@ def _constants(values):
         "derivative": (gust, depth, link_joint_1_r_child_x, link_2_mass, link_joint_2_r_child_x, link_3_mass, link_joint_3_r_child_x, link_4_mass, link_joint_4_r_child_x, link_5_mass, link_joint_5_r_child_x, link_6_mass, link_joint_6_r_child_x, link_7_mass, link_joint_7_r_child_x, link_8_mass, link_joint_8_r_child_x, gravity_g, air_turning_linear, k1, k2, k3, k4, k5, k6, k7, k8, inertia_link_1_zz, k9, inertia_link_2_zz, k10, inertia_link_3_zz, k11, inertia_link_4_zz, k12, inertia_link_5_zz, k13, inertia_link_6_zz, k14, inertia_link_7_zz, k15, inertia_link_8_zz, k16),
         "jacobian": (gust, depth, link_joint_1_r_child_x, link_2_mass, link_joint_2_r_child_x, link_3_mass, link_joint_3_r_child_x, link_4_mass, link_joint_4_r_child_x, link_5_mass, link_joint_5_r_child_x, link_6_mass, link_joint_6_r_child_x, link_7_mass, link_joint_7_r_child_x, link_8_mass, link_joint_8_r_child_x, gravity_g, air_turning_linear, k1, k2, k3, k4, k5, k6, k7, k8, k17, inertia_link_1_zz, k9, inertia_link_2_zz, k10, inertia_link_3_zz, k11, inertia_link_4_zz, k12, inertia_link_5_zz, k13, inertia_link_6_zz, k14, inertia_link_7_zz, k15, inertia_link_8_zz, k18, k19, k20, k21, k22, k23, k16, k24),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters; their bytes tell 0.0 from -0.0."""
+    return _fixed(*np.frombuffer(key).tolist())
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -2564,7 +2568,7 @@ def _jacobian(y, k, u=(), extra=(), t=0.0, cos=cos, sin=sin, exp=exp, max=max, s
 
 
 def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+    """Values by name or in order as an array; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
         for name in values:
             if name not in names:
@@ -2573,16 +2577,15 @@ def _named(values, names, defaults, what):
     array = np.asarray(values, dtype=float)
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+    return array
 
 
 def _parameters(p):
     try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter").tobytes())
     except ZeroDivisionError:
         raise ValueError("the mass matrix is singular: change the parameters") from None
 
@@ -2593,10 +2596,10 @@ def _inputs(u, columns):
         if array.shape != (len(INPUTS), columns):
             raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
         return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    return tuple(_named(u, tuple(INPUTS), INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 8
 _COLUMNS = {

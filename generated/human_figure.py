@@ -516,10 +516,8 @@ COST = {
 }
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, g = values
+def _fixed(body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, g):
+    """Everything that depends on parameters alone, for each kernel."""
     mass_pelvis = body_mass * m_pelvis
     k65 = l_pelvis * kx_pelvis
     k66 = l_pelvis * ky_pelvis
@@ -838,6 +836,12 @@ def _constants(values):
         "derivative": (w_shoulder, w_hip, g, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k1, mass_abdomen, inertia_abdomen_zz, k2, mass_thigh_left, inertia_thigh_left_zz, k3, mass_thorax, inertia_thorax_zz, k4, mass_shank_left, inertia_shank_left_zz, k5, mass_head, inertia_head_zz, k6, mass_upper_arm_left, inertia_upper_arm_left_zz, k7, mass_foot_left, k8, mass_forearm_left, inertia_forearm_left_zz, k9, mass_hand_left, inertia_hand_left_zz, k10, inertia_abdomen_xx, inertia_abdomen_yy, k11, inertia_thigh_left_xx, inertia_thigh_left_yy, k12, inertia_thorax_xx, inertia_thorax_yy, k13, inertia_shank_left_xx, inertia_shank_left_yy, k14, inertia_head_xx, inertia_head_yy, k15, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k16, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k17, inertia_forearm_left_xx, inertia_forearm_left_yy, k18, inertia_hand_left_xx, inertia_hand_left_yy, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64),
         "jacobian": (w_shoulder, w_hip, g, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k1, mass_abdomen, inertia_abdomen_zz, k2, mass_thigh_left, inertia_thigh_left_zz, k3, mass_thorax, inertia_thorax_zz, k4, mass_shank_left, inertia_shank_left_zz, k5, mass_head, inertia_head_zz, k6, mass_upper_arm_left, inertia_upper_arm_left_zz, k7, mass_foot_left, k8, mass_forearm_left, inertia_forearm_left_zz, k9, mass_hand_left, inertia_hand_left_zz, k10, inertia_abdomen_xx, inertia_abdomen_yy, k11, inertia_thigh_left_xx, inertia_thigh_left_yy, k12, inertia_thorax_xx, inertia_thorax_yy, k13, inertia_shank_left_xx, inertia_shank_left_yy, k14, inertia_head_xx, inertia_head_yy, k15, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k16, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k17, inertia_forearm_left_xx, inertia_forearm_left_yy, k18, inertia_hand_left_xx, inertia_hand_left_yy, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters; their bytes tell 0.0 from -0.0."""
+    return _fixed(*np.frombuffer(key).tolist())
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -6351,7 +6355,7 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+    """Values by name or in order as an array; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
         for name in values:
             if name not in names:
@@ -6360,16 +6364,15 @@ def _named(values, names, defaults, what):
     array = np.asarray(values, dtype=float)
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+    return array
 
 
 def _parameters(p):
     try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter").tobytes())
     except ZeroDivisionError:
         raise ValueError("the mass matrix is singular: change the parameters") from None
 
@@ -6380,10 +6383,10 @@ def _inputs(u, columns):
         if array.shape != (len(INPUTS), columns):
             raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
         return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    return tuple(_named(u, tuple(INPUTS), INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 41
 _COLUMNS = {

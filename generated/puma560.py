@@ -252,10 +252,8 @@ COST = {
 }
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    d_1, a_2, d_3, a_3, d_4, m_1, I_1y, m_2, I_2x, I_2y, I_2z, c_2x, c_2y, c_2z, m_3, I_3x, I_3y, I_3z, c_3x, c_3y, c_3z, m_4, I_4x, I_4y, I_4z, c_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6x, I_6y, I_6z, c_6z, J_1, G_1, J_2, G_2, J_3, G_3, J_4, G_4, J_5, G_5, J_6, G_6, gravity_g = values
+def _fixed(d_1, a_2, d_3, a_3, d_4, m_1, I_1y, m_2, I_2x, I_2y, I_2z, c_2x, c_2y, c_2z, m_3, I_3x, I_3y, I_3z, c_3x, c_3y, c_3z, m_4, I_4x, I_4y, I_4z, c_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6x, I_6y, I_6z, c_6z, J_1, G_1, J_2, G_2, J_3, G_3, J_4, G_4, J_5, G_5, J_6, G_6, gravity_g):
+    """Everything that depends on parameters alone, for each kernel."""
     if not m_1 > 0.0:
         raise ValueError("mass of link_1 is not positive: change the parameters")
     if not I_1y >= 0.0:
@@ -395,6 +393,12 @@ def _constants(values):
         "point_positions": (d_1, k1, k3, k4, k6),
         "point_jacobians": (d_1, k1, k3, k4, k6),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters; their bytes tell 0.0 from -0.0."""
+    return _fixed(*np.frombuffer(key).tolist())
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -3181,7 +3185,7 @@ def _point_jacobians(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+    """Values by name or in order as an array; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
         for name in values:
             if name not in names:
@@ -3190,16 +3194,15 @@ def _named(values, names, defaults, what):
     array = np.asarray(values, dtype=float)
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+    return array
 
 
 def _parameters(p):
     try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter").tobytes())
     except ZeroDivisionError:
         raise ValueError("the mass matrix is singular: change the parameters") from None
 
@@ -3210,10 +3213,10 @@ def _inputs(u, columns):
         if array.shape != (len(INPUTS), columns):
             raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
         return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    return tuple(_named(u, tuple(INPUTS), INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 6
 _COLUMNS = {

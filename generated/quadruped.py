@@ -252,10 +252,8 @@ COST = {
 }
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g = values
+def _fixed(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g):
+    """Everything that depends on parameters alone, for each kernel."""
     if not m_trunk > 0.0:
         raise ValueError("mass of trunk is not positive: change the parameters")
     if not I_trunk_x >= 0.0:
@@ -418,6 +416,12 @@ def _constants(values):
         "derivative": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27),
         "jacobian": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, k28, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k29, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k30),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters; their bytes tell 0.0 from -0.0."""
+    return _fixed(*np.frombuffer(key).tolist())
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -8434,7 +8438,7 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+    """Values by name or in order as an array; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
         for name in values:
             if name not in names:
@@ -8443,16 +8447,15 @@ def _named(values, names, defaults, what):
     array = np.asarray(values, dtype=float)
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+    return array
 
 
 def _parameters(p):
     try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter").tobytes())
     except ZeroDivisionError:
         raise ValueError("the mass matrix is singular: change the parameters") from None
 
@@ -8463,10 +8466,10 @@ def _inputs(u, columns):
         if array.shape != (len(INPUTS), columns):
             raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
         return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    return tuple(_named(u, tuple(INPUTS), INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 18
 _COLUMNS = {

@@ -244,10 +244,8 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    m, I, stream, k_, steer, margin, reach, place_1_r_parent_x, place_1_r_parent_y, place_2_r_parent_x, place_2_r_parent_y, place_3_r_parent_x, place_3_r_parent_y, place_4_r_parent_x, place_4_r_parent_y, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y = values
+def _fixed(m, I, stream, k_, steer, margin, reach, place_1_r_parent_x, place_1_r_parent_y, place_2_r_parent_x, place_2_r_parent_y, place_3_r_parent_x, place_3_r_parent_y, place_4_r_parent_x, place_4_r_parent_y, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y):
+    """Everything that depends on parameters alone, for each kernel."""
     if not m > 0.0:
         raise ValueError("mass of disc_1 is not positive: change the parameters")
     if not I >= 0.0:
@@ -285,6 +283,12 @@ def _constants(values):
         "derivative": (m, stream, k_, steer, reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3),
         "jacobian": (m, k_, steer, reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3, k4),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters; their bytes tell 0.0 from -0.0."""
+    return _fixed(*np.frombuffer(key).tolist())
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -3551,7 +3555,7 @@ def _jacobian(y, k, u=(), extra=(), max=max, sqrt=sqrt, min=min, select=select):
 
 
 def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+    """Values by name or in order as an array; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
         for name in values:
             if name not in names:
@@ -3560,16 +3564,15 @@ def _named(values, names, defaults, what):
     array = np.asarray(values, dtype=float)
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+    return array
 
 
 def _parameters(p):
     try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter").tobytes())
     except ZeroDivisionError:
         raise ValueError("the mass matrix is singular: change the parameters") from None
 
@@ -3580,10 +3583,10 @@ def _inputs(u, columns):
         if array.shape != (len(INPUTS), columns):
             raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
         return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    return tuple(_named(u, tuple(INPUTS), INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 21
 _COLUMNS = {

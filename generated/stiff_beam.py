@@ -305,10 +305,8 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    h, m, EI, load = values
+def _fixed(h, m, EI, load):
+    """Everything that depends on parameters alone, for each kernel."""
     if not m > 0.0:
         raise ValueError("mass of rod_1 is not positive: change the parameters")
     if not m > 0.0:
@@ -400,6 +398,12 @@ def _constants(values):
         "derivative": (h, m, load, k1, mass_tip_1, moment_rod_1_x, inertia_rod_1_zz, moment_tip_1_x, inertia_tip_1_zz),
         "jacobian": (h, m, load, k1, mass_tip_1, moment_rod_1_x, inertia_rod_1_zz, moment_tip_1_x, inertia_tip_1_zz),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters; their bytes tell 0.0 from -0.0."""
+    return _fixed(*np.frombuffer(key).tolist())
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -4126,7 +4130,7 @@ def _jacobian(y, k, u=(), extra=(), t=0.0, step=step, sin=sin, select=select, co
 
 
 def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+    """Values by name or in order as an array; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
         for name in values:
             if name not in names:
@@ -4135,16 +4139,15 @@ def _named(values, names, defaults, what):
     array = np.asarray(values, dtype=float)
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+    return array
 
 
 def _parameters(p):
     try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter").tobytes())
     except ZeroDivisionError:
         raise ValueError("the mass matrix is singular: change the parameters") from None
 
@@ -4155,10 +4158,10 @@ def _inputs(u, columns):
         if array.shape != (len(INPUTS), columns):
             raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
         return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    return tuple(_named(u, tuple(INPUTS), INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 40
 _COLUMNS = {

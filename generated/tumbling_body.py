@@ -118,10 +118,8 @@ COST = {
 }
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    m, I_1, I_2, I_3, stem_at_y = values
+def _fixed(m, I_1, I_2, I_3, stem_at_y):
+    """Everything that depends on parameters alone, for each kernel."""
     if not m > 0.0:
         raise ValueError("mass of nut is not positive: change the parameters")
     if not I_1 >= 0.0:
@@ -170,6 +168,12 @@ def _constants(values):
         "point_velocities": (stem_at_y,),
         "point_jacobians": (stem_at_y,),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters; their bytes tell 0.0 from -0.0."""
+    return _fixed(*np.frombuffer(key).tolist())
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -889,7 +893,7 @@ def _point_jacobians(y, k, u=(), extra=()):
 
 
 def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+    """Values by name or in order as an array; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
         for name in values:
             if name not in names:
@@ -898,16 +902,15 @@ def _named(values, names, defaults, what):
     array = np.asarray(values, dtype=float)
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+    return array
 
 
 def _parameters(p):
     try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter").tobytes())
     except ZeroDivisionError:
         raise ValueError("the mass matrix is singular: change the parameters") from None
 
@@ -918,10 +921,10 @@ def _inputs(u, columns):
         if array.shape != (len(INPUTS), columns):
             raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
         return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    return tuple(_named(u, tuple(INPUTS), INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 6
 _COLUMNS = {
