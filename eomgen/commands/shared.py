@@ -120,7 +120,7 @@ def assignments(texts: list[str], known: Collection[str], option: str) -> dict[s
             value = math.nan
         if not (sign and math.isfinite(value)):
             raise RunError(f"{option} {text}: gives no finite number; write {option} {name}=1.5")
-        values[name] = value
+        values[name] = value + 0.0  # -0.0 becomes 0.0, as in a scene
     return values
 
 

@@ -56,9 +56,13 @@ class FormulaError(ValueError):
 
 @dataclass(frozen=True)
 class Constant:
-    """A number as it stands in the scene."""
+    """A number as it stands in the scene. Its zero has no sign: 0.0 and -0.0 are one number."""
 
     value: float
+
+    def __post_init__(self) -> None:
+        # They compare as equal, and so share one entry in a table, but atan2 tells them apart.
+        object.__setattr__(self, "value", float(self.value) + 0.0)
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,7 @@ def integrate(
     )
     check_rest_speed(rest_speed)
     watch = _watch(guard, problem, method, asked) if guard else None
-    derivatives, jacobians = _Count(), _Count()
+    derivatives, jacobians = _Count(1), _Count(2)
     counted = replace(
         problem,
         derivative=derivatives.of(watch.derivative if watch else problem.derivative),
@@ -152,8 +152,13 @@ def _watch(guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: 
 
 @dataclass
 class _Count:
-    """How often functions of t and y are called, and where one last raised an error."""
+    """How often functions of t and y are called, and where one last raised an error.
 
+    `axes` is the number of axes of their values, which are nan at a state that is not finite: then
+    a method rejects the step that led there.
+    """
+
+    axes: int
     calls: int = 0
     failed: tuple[float, Floats] | None = None
 
@@ -165,6 +170,8 @@ class _Count:
             try:
                 return function(t, y)
             except (ArithmeticError, ValueError):
+                if not np.isfinite(y).all():
+                    return np.full((len(y),) * self.axes, np.nan)
                 self.failed = float(t), np.array(y)
                 raise
 

@@ -76,14 +76,12 @@ def _by_differences(module: GeneratedModule) -> Callable[[float, Floats], Floats
 
 def _unsolvable(error: Exception) -> str:
     """Why there is no derivative at the start, as far as the module itself tells."""
-    if isinstance(error, ArithmeticError):
+    if isinstance(error, ZeroDivisionError):
         return (
             "the mass matrix is singular at the initial state, or an effect infinite: change that, "
             "or lengths, masses or inertias"
         )
-    if str(error) == "math domain error":
-        return "a formula has no value at the initial state (math domain error): change either"
-    return str(error)
+    return str(error).removeprefix("derivative: ").replace("at this state", "at the initial state")
 
 
 def as_problem(
@@ -100,15 +98,21 @@ def as_problem(
     Raises `RunError` if the module refuses them, or has no derivative to start from.
     """
     if parameters is None and inputs is None:  # the module's shortest way
-        derivative = module.derivative
+        exactly = module.derivative
         jacobian = getattr(module, "jacobian", _by_differences(module))
     else:
 
-        def derivative(t: float, y: Floats) -> Floats:
+        def exactly(t: float, y: Floats) -> Floats:
             return module.derivative(t, y, parameters, inputs)
 
         def jacobian(t: float, y: Floats) -> Floats:
             return module.jacobian(t, y, parameters, inputs)
+
+    def derivative(t: float, y: Floats) -> Floats:
+        try:
+            return exactly(t, y)
+        except FloatingPointError:  # y is so large that a method had better not have tried it
+            return np.full(len(y), np.nan)
 
     explain = explain_by(
         model, _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
@@ -118,7 +122,7 @@ def as_problem(
     except (ValueError, ArithmeticError) as error:
         raise RunError(_unsolvable(error)) from None
     try:
-        slope = derivative(0.0, initial)
+        slope = exactly(0.0, initial)
     except (ValueError, ArithmeticError) as error:
         why = explain(0.0, initial, initial)
         raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None

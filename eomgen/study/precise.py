@@ -97,10 +97,8 @@ def precise(
     watch = Watch() if watched and any(name in names for name in CORNERS) else None
     with digits(bits):
         functions = {**BY_MPFR, **(watch.functions() if watch else {})}
-        # The module keeps constants by value, and a long 1 is equal to a double 1: go round that.
-        constants = _over(module._constants.__wrapped__, BY_MPFR)(
-            _long(parameters, module.PARAMETERS)
-        )["derivative"]
+        given = _long(parameters, module.PARAMETERS)
+        constants = _over(module._fixed, BY_MPFR)(*given)["derivative"]
         u = _long(inputs, module.INPUTS)
         start = tuple(map(mpfr, initial.tolist()))
         kernel = _over(module._derivative, functions)
