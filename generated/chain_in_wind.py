@@ -208,6 +208,7 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 162, "sub": 155, "mul": 359, "div": 30, "neg": 2, "sin": 18, "cos": 8, "exp": 8, "sqrt": 8, "max": 8, "total": 758, "parameters": 35},
     "jacobian": {"add": 1120, "sub": 1930, "mul": 3026, "div": 294, "neg": 1, "sin": 18, "cos": 16, "exp": 8, "sqrt": 8, "max": 8, "select": 72, "total": 6501, "parameters": 42},
+    "switching_functions": {"add": 57, "sub": 51, "mul": 113, "div": 8, "neg": 1, "sin": 18, "cos": 8, "exp": 8, "total": 264, "parameters": 7},
 }
 
 
@@ -285,6 +286,7 @@ def _fixed(rho, gust, depth, link_1_mass, link_1_inertia_com, link_joint_1_r_chi
         "initial_state": (),
         "derivative": (gust, depth, link_joint_1_r_child_x, link_2_mass, link_joint_2_r_child_x, link_3_mass, link_joint_3_r_child_x, link_4_mass, link_joint_4_r_child_x, link_5_mass, link_joint_5_r_child_x, link_6_mass, link_joint_6_r_child_x, link_7_mass, link_joint_7_r_child_x, link_8_mass, link_joint_8_r_child_x, gravity_g, air_turning_linear, k1, k2, k3, k4, k5, k6, k7, k8, inertia_link_1_zz, k9, inertia_link_2_zz, k10, inertia_link_3_zz, k11, inertia_link_4_zz, k12, inertia_link_5_zz, k13, inertia_link_6_zz, k14, inertia_link_7_zz, k15, inertia_link_8_zz, k16),
         "jacobian": (gust, depth, link_joint_1_r_child_x, link_2_mass, link_joint_2_r_child_x, link_3_mass, link_joint_3_r_child_x, link_4_mass, link_joint_4_r_child_x, link_5_mass, link_joint_5_r_child_x, link_6_mass, link_joint_6_r_child_x, link_7_mass, link_joint_7_r_child_x, link_8_mass, link_joint_8_r_child_x, gravity_g, air_turning_linear, k1, k2, k3, k4, k5, k6, k7, k8, k17, inertia_link_1_zz, k9, inertia_link_2_zz, k10, inertia_link_3_zz, k11, inertia_link_4_zz, k12, inertia_link_5_zz, k13, inertia_link_6_zz, k14, inertia_link_7_zz, k15, inertia_link_8_zz, k18, k19, k20, k21, k22, k23, k16, k24),
+        "switching_functions": (gust, depth, link_joint_1_r_child_x, link_joint_2_r_child_x, link_joint_3_r_child_x, link_joint_4_r_child_x, link_joint_5_r_child_x, link_joint_6_r_child_x, link_joint_7_r_child_x, link_joint_8_r_child_x, k2, k3, k4, k5, k6, k7, k8),
     }
 
 
@@ -2591,6 +2593,127 @@ def _jacobian(y, k, u=(), extra=(), t=0.0, cos=cos, sin=sin, exp=exp, max=max, s
     )
 
 
+def _switching_functions(y, k, u=(), extra=(), t=0.0, cos=cos, sin=sin, exp=exp):
+    """264 operations: 57 add, 51 sub, 113 mul, 8 div, 1 neg, 18 sin, 8 cos, 8 exp."""
+    gust, depth, link_joint_1_r_child_x, link_joint_2_r_child_x, link_joint_3_r_child_x, link_joint_4_r_child_x, link_joint_5_r_child_x, link_joint_6_r_child_x, link_joint_7_r_child_x, link_joint_8_r_child_x, k2, k3, k4, k5, k6, k7, k8 = k
+    link_joint_1_angle, link_joint_2_angle, link_joint_3_angle, link_joint_4_angle, link_joint_5_angle, link_joint_6_angle, link_joint_7_angle, link_joint_8_angle, link_joint_1_angle_dot, link_joint_2_angle_dot, link_joint_3_angle_dot, link_joint_4_angle_dot, link_joint_5_angle_dot, link_joint_6_angle_dot, link_joint_7_angle_dot, link_joint_8_angle_dot = y
+    cos_link_joint_1_angle = cos(link_joint_1_angle)
+    sin_link_joint_1_angle = sin(link_joint_1_angle)
+    angle_link_2 = link_joint_1_angle + link_joint_2_angle
+    cos_angle_link_2 = cos(angle_link_2)
+    sin_angle_link_2 = sin(angle_link_2)
+    s1 = k2 * cos_link_joint_1_angle
+    s2 = k2 * sin_link_joint_1_angle
+    angle_link_3 = link_joint_3_angle + angle_link_2
+    cos_angle_link_3 = cos(angle_link_3)
+    sin_angle_link_3 = sin(angle_link_3)
+    s5 = k3 * cos_angle_link_2
+    s6 = k3 * sin_angle_link_2
+    angle_link_4 = link_joint_4_angle + angle_link_3
+    cos_angle_link_4 = cos(angle_link_4)
+    sin_angle_link_4 = sin(angle_link_4)
+    s9 = k4 * cos_angle_link_3
+    s10 = k4 * sin_angle_link_3
+    angle_link_5 = link_joint_5_angle + angle_link_4
+    cos_angle_link_5 = cos(angle_link_5)
+    sin_angle_link_5 = sin(angle_link_5)
+    s13 = k5 * cos_angle_link_4
+    s14 = k5 * sin_angle_link_4
+    angle_link_6 = link_joint_6_angle + angle_link_5
+    cos_angle_link_6 = cos(angle_link_6)
+    sin_angle_link_6 = sin(angle_link_6)
+    s17 = k6 * cos_angle_link_5
+    s18 = k6 * sin_angle_link_5
+    angle_link_7 = link_joint_7_angle + angle_link_6
+    cos_angle_link_7 = cos(angle_link_7)
+    sin_angle_link_7 = sin(angle_link_7)
+    s21 = k7 * cos_angle_link_6
+    s22 = k7 * sin_angle_link_6
+    angle_link_8 = link_joint_8_angle + angle_link_7
+    s25 = k8 * cos_angle_link_7
+    s26 = k8 * sin_angle_link_7
+    s29 = link_joint_1_angle_dot * s2
+    velocity_link_2_y = link_joint_1_angle_dot * s1
+    omega_link_2_z = link_joint_1_angle_dot + link_joint_2_angle_dot
+    s30 = s29 + s6 * omega_link_2_z
+    velocity_link_3_y = velocity_link_2_y + s5 * omega_link_2_z
+    omega_link_3_z = link_joint_3_angle_dot + omega_link_2_z
+    s31 = s30 + s10 * omega_link_3_z
+    velocity_link_4_y = velocity_link_3_y + s9 * omega_link_3_z
+    omega_link_4_z = link_joint_4_angle_dot + omega_link_3_z
+    s32 = s31 + s14 * omega_link_4_z
+    velocity_link_5_y = velocity_link_4_y + s13 * omega_link_4_z
+    omega_link_5_z = link_joint_5_angle_dot + omega_link_4_z
+    s33 = s32 + s18 * omega_link_5_z
+    velocity_link_6_y = velocity_link_5_y + s17 * omega_link_5_z
+    omega_link_6_z = link_joint_6_angle_dot + omega_link_5_z
+    s34 = s33 + s22 * omega_link_6_z
+    velocity_link_7_y = velocity_link_6_y + s21 * omega_link_6_z
+    omega_link_7_z = link_joint_7_angle_dot + omega_link_6_z
+    omega_link_8_z = link_joint_8_angle_dot + omega_link_7_z
+    s35 = link_joint_1_r_child_x * cos_link_joint_1_angle
+    s36 = link_joint_1_r_child_x * sin_link_joint_1_angle
+    s37 = link_joint_1_angle_dot * s35
+    s38 = s1 + s5
+    s39 = s2 + s6
+    s40 = s9 + s38
+    s41 = s10 + s39
+    s42 = s13 + s40
+    s43 = s14 + s41
+    s44 = s17 + s42
+    s45 = s18 + s43
+    s46 = s21 + s44
+    s47 = s22 + s45
+    s48 = 1.0 + 0.5 * sin(t * 2.1) * sin(1.0 + t * 0.7)
+    s49 = t * 5.3
+    s50 = link_joint_1_angle_dot * s36 - gust * exp(-s36 / depth) * (s48 + 0.2 * sin(s49 + 2.0 * s35))
+    s52 = link_joint_2_r_child_x * cos_angle_link_2
+    s53 = link_joint_2_r_child_x * sin_angle_link_2
+    s54 = velocity_link_2_y - omega_link_2_z * s52
+    s55 = gust * exp((s2 - s53) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s1 - s52)))
+    s56 = omega_link_2_z * s53 - s29 - s55
+    s60 = link_joint_3_r_child_x * cos_angle_link_3
+    s61 = link_joint_3_r_child_x * sin_angle_link_3
+    s62 = velocity_link_3_y - omega_link_3_z * s60
+    s63 = gust * exp((s39 - s61) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s38 - s60)))
+    s64 = omega_link_3_z * s61 - s30 - s63
+    s68 = link_joint_4_r_child_x * cos_angle_link_4
+    s69 = link_joint_4_r_child_x * sin_angle_link_4
+    s70 = velocity_link_4_y - omega_link_4_z * s68
+    s71 = gust * exp((s41 - s69) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s40 - s68)))
+    s72 = omega_link_4_z * s69 - s31 - s71
+    s76 = link_joint_5_r_child_x * cos_angle_link_5
+    s77 = link_joint_5_r_child_x * sin_angle_link_5
+    s78 = velocity_link_5_y - omega_link_5_z * s76
+    s79 = gust * exp((s43 - s77) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s42 - s76)))
+    s80 = omega_link_5_z * s77 - s32 - s79
+    s84 = link_joint_6_r_child_x * cos_angle_link_6
+    s85 = link_joint_6_r_child_x * sin_angle_link_6
+    s86 = velocity_link_6_y - omega_link_6_z * s84
+    s87 = gust * exp((s45 - s85) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s44 - s84)))
+    s88 = omega_link_6_z * s85 - s33 - s87
+    s92 = link_joint_7_r_child_x * cos_angle_link_7
+    s93 = link_joint_7_r_child_x * sin_angle_link_7
+    s94 = velocity_link_7_y - omega_link_7_z * s92
+    s95 = gust * exp((s47 - s93) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s46 - s92)))
+    s96 = omega_link_7_z * s93 - s34 - s95
+    s100 = link_joint_8_r_child_x * cos(angle_link_8)
+    s101 = link_joint_8_r_child_x * sin(angle_link_8)
+    s102 = velocity_link_7_y + s25 * omega_link_7_z - omega_link_8_z * s100
+    s103 = gust * exp((s26 + s47 - s101) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s25 + s46 - s100)))
+    s104 = omega_link_8_z * s101 - (s34 + s26 * omega_link_7_z) - s103
+    return (
+        s50 * s50 + s37 * s37 - 1e-300,
+        s56 * s56 + s54 * s54 - 1e-300,
+        s64 * s64 + s62 * s62 - 1e-300,
+        s72 * s72 + s70 * s70 - 1e-300,
+        s80 * s80 + s78 * s78 - 1e-300,
+        s88 * s88 + s86 * s86 - 1e-300,
+        s96 * s96 + s94 * s94 - 1e-300,
+        s104 * s104 + s102 * s102 - 1e-300,
+    )
+
+
 _ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
 _LARGEST = 1e+100
 
@@ -2802,3 +2925,8 @@ def derivative(t, y, p=None, u=None):
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
     return _evaluate(_jacobian, "jacobian", (16, 16), ('cos', 'sin', 'exp', 'max', 'sqrt', 'select'), y, p, u, (), t)
+
+
+def switching_functions(t, y, p=None, u=None):
+    """`derivative` has another branch where one of these passes 0."""
+    return _evaluate(_switching_functions, "switching_functions", (8,), ('cos', 'sin', 'exp'), y, p, u, (), t)

@@ -241,6 +241,7 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 112, "sub": 154, "mul": 420, "div": 70, "neg": 35, "sqrt": 35, "min": 28, "max": 91, "select": 28, "total": 973, "parameters": 3},
     "jacobian": {"add": 546, "sub": 420, "mul": 1575, "div": 364, "neg": 266, "sqrt": 35, "min": 28, "max": 91, "select": 434, "total": 3759, "parameters": 4},
+    "switching_functions": {"add": 63, "sub": 203, "mul": 182, "div": 28, "sqrt": 28, "max": 56, "total": 560, "parameters": 3},
 }
 
 
@@ -286,6 +287,7 @@ def _fixed(m, I, stream, k_, steer, margin, reach, place_1_r_parent_x, place_1_r
         "initial_state": (),
         "derivative": (m, stream, k_, steer, reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3),
         "jacobian": (m, k_, steer, reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3, k4),
+        "switching_functions": (reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3),
     }
 
 
@@ -3578,6 +3580,273 @@ def _jacobian(y, k, u=(), extra=(), max=max, sqrt=sqrt, min=min, select=select):
     )
 
 
+def _switching_functions(y, k, u=(), extra=(), max=max, sqrt=sqrt):
+    """560 operations: 63 add, 203 sub, 182 mul, 28 div, 28 sqrt, 56 max."""
+    reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3 = k
+    disc_1_x, disc_1_y, _, disc_2_x, disc_2_y, _, disc_3_x, disc_3_y, _, disc_4_x, disc_4_y, _, disc_5_x, disc_5_y, _, disc_6_x, disc_6_y, _, disc_7_x, disc_7_y, _, disc_1_x_dot, disc_1_y_dot, _, disc_2_x_dot, disc_2_y_dot, _, disc_3_x_dot, disc_3_y_dot, _, disc_4_x_dot, disc_4_y_dot, _, disc_5_x_dot, disc_5_y_dot, _, disc_6_x_dot, disc_6_y_dot, _, disc_7_x_dot, disc_7_y_dot, _ = y
+    s1 = avoid_1_center_x - disc_1_x
+    s2 = avoid_1_center_y - disc_1_y
+    s218 = s1 * s1 + s2 * s2
+    s1191 = 1.0 - (sqrt(max(s218, 1e-300)) - k1) / reach
+    s9 = avoid_1_center_x - disc_2_x
+    s10 = avoid_1_center_y - disc_2_y
+    s229 = s9 * s9 + s10 * s10
+    s1192 = 1.0 - (sqrt(max(s229, 1e-300)) - k1) / reach
+    s17 = avoid_1_center_x - disc_3_x
+    s18 = avoid_1_center_y - disc_3_y
+    s240 = s17 * s17 + s18 * s18
+    s1193 = 1.0 - (sqrt(max(s240, 1e-300)) - k1) / reach
+    s25 = avoid_1_center_x - disc_4_x
+    s26 = avoid_1_center_y - disc_4_y
+    s251 = s25 * s25 + s26 * s26
+    s1194 = 1.0 - (sqrt(max(s251, 1e-300)) - k1) / reach
+    s33 = avoid_1_center_x - disc_5_x
+    s34 = avoid_1_center_y - disc_5_y
+    s262 = s33 * s33 + s34 * s34
+    s1195 = 1.0 - (sqrt(max(s262, 1e-300)) - k1) / reach
+    s41 = avoid_1_center_x - disc_6_x
+    s42 = avoid_1_center_y - disc_6_y
+    s273 = s41 * s41 + s42 * s42
+    s1196 = 1.0 - (sqrt(max(s273, 1e-300)) - k1) / reach
+    s49 = avoid_1_center_x - disc_7_x
+    s50 = avoid_1_center_y - disc_7_y
+    s284 = s49 * s49 + s50 * s50
+    s1197 = 1.0 - (sqrt(max(s284, 1e-300)) - k1) / reach
+    s57 = avoid_2_center_x - disc_1_x
+    s58 = avoid_2_center_y - disc_1_y
+    s295 = s57 * s57 + s58 * s58
+    s1198 = 1.0 - (sqrt(max(s295, 1e-300)) - k2) / reach
+    s64 = avoid_2_center_x - disc_2_x
+    s65 = avoid_2_center_y - disc_2_y
+    s305 = s64 * s64 + s65 * s65
+    s1199 = 1.0 - (sqrt(max(s305, 1e-300)) - k2) / reach
+    s71 = avoid_2_center_x - disc_3_x
+    s72 = avoid_2_center_y - disc_3_y
+    s315 = s71 * s71 + s72 * s72
+    s1200 = 1.0 - (sqrt(max(s315, 1e-300)) - k2) / reach
+    s78 = avoid_2_center_x - disc_4_x
+    s79 = avoid_2_center_y - disc_4_y
+    s325 = s78 * s78 + s79 * s79
+    s1201 = 1.0 - (sqrt(max(s325, 1e-300)) - k2) / reach
+    s85 = avoid_2_center_x - disc_5_x
+    s86 = avoid_2_center_y - disc_5_y
+    s335 = s85 * s85 + s86 * s86
+    s1202 = 1.0 - (sqrt(max(s335, 1e-300)) - k2) / reach
+    s92 = avoid_2_center_x - disc_6_x
+    s93 = avoid_2_center_y - disc_6_y
+    s345 = s92 * s92 + s93 * s93
+    s1203 = 1.0 - (sqrt(max(s345, 1e-300)) - k2) / reach
+    s99 = avoid_2_center_x - disc_7_x
+    s100 = avoid_2_center_y - disc_7_y
+    s355 = s99 * s99 + s100 * s100
+    s1204 = 1.0 - (sqrt(max(s355, 1e-300)) - k2) / reach
+    s106 = avoid_3_center_x - disc_1_x
+    s107 = avoid_3_center_y - disc_1_y
+    s365 = s106 * s106 + s107 * s107
+    s1205 = 1.0 - (sqrt(max(s365, 1e-300)) - k3) / reach
+    s113 = avoid_3_center_x - disc_2_x
+    s114 = avoid_3_center_y - disc_2_y
+    s375 = s113 * s113 + s114 * s114
+    s1206 = 1.0 - (sqrt(max(s375, 1e-300)) - k3) / reach
+    s120 = avoid_3_center_x - disc_3_x
+    s121 = avoid_3_center_y - disc_3_y
+    s385 = s120 * s120 + s121 * s121
+    s1207 = 1.0 - (sqrt(max(s385, 1e-300)) - k3) / reach
+    s127 = avoid_3_center_x - disc_4_x
+    s128 = avoid_3_center_y - disc_4_y
+    s395 = s127 * s127 + s128 * s128
+    s1208 = 1.0 - (sqrt(max(s395, 1e-300)) - k3) / reach
+    s134 = avoid_3_center_x - disc_5_x
+    s135 = avoid_3_center_y - disc_5_y
+    s405 = s134 * s134 + s135 * s135
+    s1209 = 1.0 - (sqrt(max(s405, 1e-300)) - k3) / reach
+    s141 = avoid_3_center_x - disc_6_x
+    s142 = avoid_3_center_y - disc_6_y
+    s415 = s141 * s141 + s142 * s142
+    s1210 = 1.0 - (sqrt(max(s415, 1e-300)) - k3) / reach
+    s148 = avoid_3_center_x - disc_7_x
+    s149 = avoid_3_center_y - disc_7_y
+    s425 = s148 * s148 + s149 * s149
+    s1211 = 1.0 - (sqrt(max(s425, 1e-300)) - k3) / reach
+    s155 = avoid_4_center_x - disc_1_x
+    s156 = avoid_4_center_y - disc_1_y
+    s435 = s155 * s155 + s156 * s156
+    s1212 = 1.0 - (sqrt(max(s435, 1e-300)) - k2) / reach
+    s162 = avoid_4_center_x - disc_2_x
+    s163 = avoid_4_center_y - disc_2_y
+    s445 = s162 * s162 + s163 * s163
+    s1213 = 1.0 - (sqrt(max(s445, 1e-300)) - k2) / reach
+    s169 = avoid_4_center_x - disc_3_x
+    s170 = avoid_4_center_y - disc_3_y
+    s455 = s169 * s169 + s170 * s170
+    s1214 = 1.0 - (sqrt(max(s455, 1e-300)) - k2) / reach
+    s176 = avoid_4_center_x - disc_4_x
+    s177 = avoid_4_center_y - disc_4_y
+    s465 = s176 * s176 + s177 * s177
+    s1215 = 1.0 - (sqrt(max(s465, 1e-300)) - k2) / reach
+    s183 = avoid_4_center_x - disc_5_x
+    s184 = avoid_4_center_y - disc_5_y
+    s475 = s183 * s183 + s184 * s184
+    s1216 = 1.0 - (sqrt(max(s475, 1e-300)) - k2) / reach
+    s190 = avoid_4_center_x - disc_6_x
+    s191 = avoid_4_center_y - disc_6_y
+    s485 = s190 * s190 + s191 * s191
+    s1217 = 1.0 - (sqrt(max(s485, 1e-300)) - k2) / reach
+    s197 = avoid_4_center_x - disc_7_x
+    s198 = avoid_4_center_y - disc_7_y
+    s495 = s197 * s197 + s198 * s198
+    s1218 = 1.0 - (sqrt(max(s495, 1e-300)) - k2) / reach
+    return (
+        s218 - 1e-300,
+        disc_1_x_dot * disc_1_x_dot + disc_1_y_dot * disc_1_y_dot - 1e-300,
+        s1191,
+        1.0 - max(0.0, s1191),
+        disc_1_x_dot * s1 + disc_1_y_dot * s2,
+        disc_1_y_dot * s1 - disc_1_x_dot * s2,
+        s229 - 1e-300,
+        disc_2_x_dot * disc_2_x_dot + disc_2_y_dot * disc_2_y_dot - 1e-300,
+        s1192,
+        1.0 - max(0.0, s1192),
+        disc_2_x_dot * s9 + disc_2_y_dot * s10,
+        disc_2_y_dot * s9 - disc_2_x_dot * s10,
+        s240 - 1e-300,
+        disc_3_x_dot * disc_3_x_dot + disc_3_y_dot * disc_3_y_dot - 1e-300,
+        s1193,
+        1.0 - max(0.0, s1193),
+        disc_3_x_dot * s17 + disc_3_y_dot * s18,
+        disc_3_y_dot * s17 - disc_3_x_dot * s18,
+        s251 - 1e-300,
+        disc_4_x_dot * disc_4_x_dot + disc_4_y_dot * disc_4_y_dot - 1e-300,
+        s1194,
+        1.0 - max(0.0, s1194),
+        disc_4_x_dot * s25 + disc_4_y_dot * s26,
+        disc_4_y_dot * s25 - disc_4_x_dot * s26,
+        s262 - 1e-300,
+        disc_5_x_dot * disc_5_x_dot + disc_5_y_dot * disc_5_y_dot - 1e-300,
+        s1195,
+        1.0 - max(0.0, s1195),
+        disc_5_x_dot * s33 + disc_5_y_dot * s34,
+        disc_5_y_dot * s33 - disc_5_x_dot * s34,
+        s273 - 1e-300,
+        disc_6_x_dot * disc_6_x_dot + disc_6_y_dot * disc_6_y_dot - 1e-300,
+        s1196,
+        1.0 - max(0.0, s1196),
+        disc_6_x_dot * s41 + disc_6_y_dot * s42,
+        disc_6_y_dot * s41 - disc_6_x_dot * s42,
+        s284 - 1e-300,
+        disc_7_x_dot * disc_7_x_dot + disc_7_y_dot * disc_7_y_dot - 1e-300,
+        s1197,
+        1.0 - max(0.0, s1197),
+        disc_7_x_dot * s49 + disc_7_y_dot * s50,
+        disc_7_y_dot * s49 - disc_7_x_dot * s50,
+        s295 - 1e-300,
+        s1198,
+        1.0 - max(0.0, s1198),
+        disc_1_x_dot * s57 + disc_1_y_dot * s58,
+        disc_1_y_dot * s57 - disc_1_x_dot * s58,
+        s305 - 1e-300,
+        s1199,
+        1.0 - max(0.0, s1199),
+        disc_2_x_dot * s64 + disc_2_y_dot * s65,
+        disc_2_y_dot * s64 - disc_2_x_dot * s65,
+        s315 - 1e-300,
+        s1200,
+        1.0 - max(0.0, s1200),
+        disc_3_x_dot * s71 + disc_3_y_dot * s72,
+        disc_3_y_dot * s71 - disc_3_x_dot * s72,
+        s325 - 1e-300,
+        s1201,
+        1.0 - max(0.0, s1201),
+        disc_4_x_dot * s78 + disc_4_y_dot * s79,
+        disc_4_y_dot * s78 - disc_4_x_dot * s79,
+        s335 - 1e-300,
+        s1202,
+        1.0 - max(0.0, s1202),
+        disc_5_x_dot * s85 + disc_5_y_dot * s86,
+        disc_5_y_dot * s85 - disc_5_x_dot * s86,
+        s345 - 1e-300,
+        s1203,
+        1.0 - max(0.0, s1203),
+        disc_6_x_dot * s92 + disc_6_y_dot * s93,
+        disc_6_y_dot * s92 - disc_6_x_dot * s93,
+        s355 - 1e-300,
+        s1204,
+        1.0 - max(0.0, s1204),
+        disc_7_x_dot * s99 + disc_7_y_dot * s100,
+        disc_7_y_dot * s99 - disc_7_x_dot * s100,
+        s365 - 1e-300,
+        s1205,
+        1.0 - max(0.0, s1205),
+        disc_1_x_dot * s106 + disc_1_y_dot * s107,
+        disc_1_y_dot * s106 - disc_1_x_dot * s107,
+        s375 - 1e-300,
+        s1206,
+        1.0 - max(0.0, s1206),
+        disc_2_x_dot * s113 + disc_2_y_dot * s114,
+        disc_2_y_dot * s113 - disc_2_x_dot * s114,
+        s385 - 1e-300,
+        s1207,
+        1.0 - max(0.0, s1207),
+        disc_3_x_dot * s120 + disc_3_y_dot * s121,
+        disc_3_y_dot * s120 - disc_3_x_dot * s121,
+        s395 - 1e-300,
+        s1208,
+        1.0 - max(0.0, s1208),
+        disc_4_x_dot * s127 + disc_4_y_dot * s128,
+        disc_4_y_dot * s127 - disc_4_x_dot * s128,
+        s405 - 1e-300,
+        s1209,
+        1.0 - max(0.0, s1209),
+        disc_5_x_dot * s134 + disc_5_y_dot * s135,
+        disc_5_y_dot * s134 - disc_5_x_dot * s135,
+        s415 - 1e-300,
+        s1210,
+        1.0 - max(0.0, s1210),
+        disc_6_x_dot * s141 + disc_6_y_dot * s142,
+        disc_6_y_dot * s141 - disc_6_x_dot * s142,
+        s425 - 1e-300,
+        s1211,
+        1.0 - max(0.0, s1211),
+        disc_7_x_dot * s148 + disc_7_y_dot * s149,
+        disc_7_y_dot * s148 - disc_7_x_dot * s149,
+        s435 - 1e-300,
+        s1212,
+        1.0 - max(0.0, s1212),
+        disc_1_x_dot * s155 + disc_1_y_dot * s156,
+        disc_1_y_dot * s155 - disc_1_x_dot * s156,
+        s445 - 1e-300,
+        s1213,
+        1.0 - max(0.0, s1213),
+        disc_2_x_dot * s162 + disc_2_y_dot * s163,
+        disc_2_y_dot * s162 - disc_2_x_dot * s163,
+        s455 - 1e-300,
+        s1214,
+        1.0 - max(0.0, s1214),
+        disc_3_x_dot * s169 + disc_3_y_dot * s170,
+        disc_3_y_dot * s169 - disc_3_x_dot * s170,
+        s465 - 1e-300,
+        s1215,
+        1.0 - max(0.0, s1215),
+        disc_4_x_dot * s176 + disc_4_y_dot * s177,
+        disc_4_y_dot * s176 - disc_4_x_dot * s177,
+        s475 - 1e-300,
+        s1216,
+        1.0 - max(0.0, s1216),
+        disc_5_x_dot * s183 + disc_5_y_dot * s184,
+        disc_5_y_dot * s183 - disc_5_x_dot * s184,
+        s485 - 1e-300,
+        s1217,
+        1.0 - max(0.0, s1217),
+        disc_6_x_dot * s190 + disc_6_y_dot * s191,
+        disc_6_y_dot * s190 - disc_6_x_dot * s191,
+        s495 - 1e-300,
+        s1218,
+        1.0 - max(0.0, s1218),
+        disc_7_x_dot * s197 + disc_7_y_dot * s198,
+        disc_7_y_dot * s197 - disc_7_x_dot * s198,
+    )
+
+
 _ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
 _LARGEST = 1e+100
 
@@ -3776,3 +4045,8 @@ def derivative(t, y, p=None, u=None):
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
     return _evaluate(_jacobian, "jacobian", (42, 42), ('max', 'sqrt', 'min', 'select'), y, p, u)
+
+
+def switching_functions(t, y, p=None, u=None):
+    """`derivative` has another branch where one of these passes 0."""
+    return _evaluate(_switching_functions, "switching_functions", (147,), ('max', 'sqrt'), y, p, u)

@@ -298,6 +298,7 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 697, "sub": 508, "mul": 1216, "div": 118, "neg": 1, "sin": 41, "cos": 40, "step": 1, "select": 1, "total": 2623, "parameters": 6},
     "jacobian": {"add": 2050, "sub": 1057, "mul": 3016, "div": 158, "sin": 41, "cos": 40, "step": 1, "select": 1, "total": 6364, "parameters": 6},
+    "switching_functions_of_time": {"sub": 2, "step": 1, "total": 3, "parameters": 0},
 }
 
 
@@ -401,6 +402,7 @@ def _fixed(h, m, EI, load):
         "initial_state": (),
         "derivative": (h, m, load, k1, mass_tip_1, moment_rod_1_x, inertia_rod_1_zz, moment_tip_1_x, inertia_tip_1_zz),
         "jacobian": (h, m, load, k1, mass_tip_1, moment_rod_1_x, inertia_rod_1_zz, moment_tip_1_x, inertia_tip_1_zz),
+        "switching_functions_of_time": (),
     }
 
 
@@ -4153,6 +4155,15 @@ def _jacobian(y, k, u=(), extra=(), t=0.0, step=step, sin=sin, select=select, co
     )
 
 
+def _switching_functions_of_time(y, k, u=(), extra=(), t=0.0, step=step):
+    """3 operations: 2 sub, 1 step."""
+    s1981 = t - 3.141592653589793
+    return (
+        s1981,
+        1.0 - step(s1981),
+    )
+
+
 _ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
 _LARGEST = 1e+100
 
@@ -4385,3 +4396,8 @@ def derivative(t, y, p=None, u=None):
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
     return _along(_jacobian, "jacobian", (80, 80), ('step', 'sin', 'select', 'cos'), y, p, u, t)
+
+
+def switching_functions_of_time(t, y, p=None, u=None):
+    """As `switching_functions`; these depend on time alone."""
+    return _evaluate(_switching_functions_of_time, "switching_functions_of_time", (2,), ('step',), y, p, u, (), t)

@@ -295,6 +295,8 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 969, "sub": 832, "mul": 1960, "div": 79, "neg": 10, "sin": 13, "cos": 13, "sqrt": 8, "min": 13, "max": 26, "total": 3923, "parameters": 75},
     "jacobian": {"add": 8823, "sub": 9830, "mul": 21757, "div": 760, "neg": 163, "sin": 13, "cos": 13, "sqrt": 8, "min": 13, "max": 26, "select": 180, "total": 41586, "parameters": 81},
+    "switching_functions": {"add": 152, "sub": 141, "mul": 400, "div": 2, "neg": 5, "sin": 13, "cos": 13, "sqrt": 4, "min": 13, "max": 10, "total": 753, "parameters": 11},
+    "switching_functions_of_time": {"sub": 1, "mul": 1, "div": 1, "cos": 1, "total": 4, "parameters": 0},
 }
 
 
@@ -472,6 +474,8 @@ def _fixed(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip,
         "initial_state": (),
         "derivative": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, ground_friction, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, k7, k8, ground_slip_speed_squared, k9, k10, pivot_hind_right_shank, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31),
         "jacobian": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, ground_friction, k1, k2, k3, k4, k32, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, k7, k8, ground_slip_speed_squared, k9, k10, pivot_hind_right_shank, k11, k12, k13, k14, k15, k16, k17, k18, k33, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k34, k35, k36),
+        "switching_functions": (x_hip, y_hip, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, k2, k3, k4, k7, k8, k9, k10),
+        "switching_functions_of_time": (pace, settle),
     }
 
 
@@ -12617,6 +12621,310 @@ def _jacobian(y, k, u=(), extra=(), t=0.0, cos=cos, sin=sin, max=max, sqrt=sqrt,
     )
 
 
+def _switching_functions(y, k, u=(), extra=(), t=0.0, cos=cos, sin=sin, max=max, sqrt=sqrt, min=min):
+    """753 operations: 152 add, 141 sub, 400 mul, 2 div, 5 neg, 13 sin, 13 cos, 4 sqrt, 13 min, 10 max."""
+    x_hip, y_hip, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, k2, k3, k4, k7, k8, k9, k10 = k
+    _, _, trunk_z, trunk_qw, trunk_qx, trunk_qy, trunk_qz, front_left_abduction_angle, front_right_abduction_angle, hind_left_abduction_angle, hind_right_abduction_angle, front_left_swing_angle, front_right_swing_angle, hind_left_swing_angle, hind_right_swing_angle, front_left_knee_angle, front_right_knee_angle, hind_left_knee_angle, hind_right_knee_angle, trunk_x_dot, trunk_y_dot, trunk_z_dot, trunk_wx, trunk_wy, trunk_wz, front_left_abduction_angle_dot, front_right_abduction_angle_dot, hind_left_abduction_angle_dot, hind_right_abduction_angle_dot, front_left_swing_angle_dot, front_right_swing_angle_dot, hind_left_swing_angle_dot, hind_right_swing_angle_dot, front_left_knee_angle_dot, front_right_knee_angle_dot, hind_left_knee_angle_dot, hind_right_knee_angle_dot = y
+    s1 = trunk_qw * trunk_qw + trunk_qx * trunk_qx + trunk_qy * trunk_qy + trunk_qz * trunk_qz
+    s2 = 2.0 / s1
+    s3 = trunk_qx * s2
+    s4 = trunk_qy * s2
+    s5 = trunk_qz * s2
+    s6 = trunk_qw * s3
+    s7 = trunk_qw * s4
+    s8 = trunk_qw * s5
+    s9 = trunk_qx * s3
+    s10 = trunk_qy * s4
+    s11 = trunk_qz * s5
+    s12 = trunk_qy * s3
+    s13 = trunk_qz * s3
+    s14 = trunk_qz * s4
+    s15 = 1.0 - (s10 + s11)
+    s16 = s12 - s8
+    s17 = s7 + s13
+    s18 = s8 + s12
+    s19 = 1.0 - (s9 + s11)
+    s20 = s14 - s6
+    s21 = s13 - s7
+    s22 = s6 + s14
+    s23 = 1.0 - (s9 + s10)
+    cos_front_left_abduction_angle = cos(front_left_abduction_angle)
+    sin_front_left_abduction_angle = sin(front_left_abduction_angle)
+    s25 = s16 * cos_front_left_abduction_angle + s17 * sin_front_left_abduction_angle
+    s26 = s17 * cos_front_left_abduction_angle - s16 * sin_front_left_abduction_angle
+    s27 = s19 * cos_front_left_abduction_angle + s20 * sin_front_left_abduction_angle
+    s28 = s20 * cos_front_left_abduction_angle - s19 * sin_front_left_abduction_angle
+    s29 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
+    s30 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
+    cos_front_right_abduction_angle = cos(front_right_abduction_angle)
+    sin_front_right_abduction_angle = sin(front_right_abduction_angle)
+    s32 = s16 * cos_front_right_abduction_angle + s17 * sin_front_right_abduction_angle
+    s33 = s17 * cos_front_right_abduction_angle - s16 * sin_front_right_abduction_angle
+    s34 = s19 * cos_front_right_abduction_angle + s20 * sin_front_right_abduction_angle
+    s35 = s20 * cos_front_right_abduction_angle - s19 * sin_front_right_abduction_angle
+    s36 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
+    s37 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
+    cos_hind_left_abduction_angle = cos(hind_left_abduction_angle)
+    sin_hind_left_abduction_angle = sin(hind_left_abduction_angle)
+    s39 = s16 * cos_hind_left_abduction_angle + s17 * sin_hind_left_abduction_angle
+    s40 = s17 * cos_hind_left_abduction_angle - s16 * sin_hind_left_abduction_angle
+    s41 = s19 * cos_hind_left_abduction_angle + s20 * sin_hind_left_abduction_angle
+    s42 = s20 * cos_hind_left_abduction_angle - s19 * sin_hind_left_abduction_angle
+    s43 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
+    s44 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
+    cos_hind_right_abduction_angle = cos(hind_right_abduction_angle)
+    sin_hind_right_abduction_angle = sin(hind_right_abduction_angle)
+    s46 = s16 * cos_hind_right_abduction_angle + s17 * sin_hind_right_abduction_angle
+    s47 = s17 * cos_hind_right_abduction_angle - s16 * sin_hind_right_abduction_angle
+    s48 = s19 * cos_hind_right_abduction_angle + s20 * sin_hind_right_abduction_angle
+    s49 = s20 * cos_hind_right_abduction_angle - s19 * sin_hind_right_abduction_angle
+    s50 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
+    s51 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
+    cos_front_left_swing_angle = cos(front_left_swing_angle)
+    sin_front_left_swing_angle = sin(front_left_swing_angle)
+    s53 = s26 * cos_front_left_swing_angle + s15 * sin_front_left_swing_angle
+    s54 = s15 * cos_front_left_swing_angle - s26 * sin_front_left_swing_angle
+    s55 = s28 * cos_front_left_swing_angle + s18 * sin_front_left_swing_angle
+    s56 = s18 * cos_front_left_swing_angle - s28 * sin_front_left_swing_angle
+    s57 = s30 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
+    s58 = s21 * cos_front_left_swing_angle - s30 * sin_front_left_swing_angle
+    cos_front_right_swing_angle = cos(front_right_swing_angle)
+    sin_front_right_swing_angle = sin(front_right_swing_angle)
+    s60 = s33 * cos_front_right_swing_angle + s15 * sin_front_right_swing_angle
+    s61 = s15 * cos_front_right_swing_angle - s33 * sin_front_right_swing_angle
+    s62 = s35 * cos_front_right_swing_angle + s18 * sin_front_right_swing_angle
+    s63 = s18 * cos_front_right_swing_angle - s35 * sin_front_right_swing_angle
+    s64 = s37 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
+    s65 = s21 * cos_front_right_swing_angle - s37 * sin_front_right_swing_angle
+    cos_hind_left_swing_angle = cos(hind_left_swing_angle)
+    sin_hind_left_swing_angle = sin(hind_left_swing_angle)
+    s67 = s40 * cos_hind_left_swing_angle + s15 * sin_hind_left_swing_angle
+    s68 = s15 * cos_hind_left_swing_angle - s40 * sin_hind_left_swing_angle
+    s69 = s42 * cos_hind_left_swing_angle + s18 * sin_hind_left_swing_angle
+    s70 = s18 * cos_hind_left_swing_angle - s42 * sin_hind_left_swing_angle
+    s71 = s44 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
+    s72 = s21 * cos_hind_left_swing_angle - s44 * sin_hind_left_swing_angle
+    cos_hind_right_swing_angle = cos(hind_right_swing_angle)
+    sin_hind_right_swing_angle = sin(hind_right_swing_angle)
+    s74 = s47 * cos_hind_right_swing_angle + s15 * sin_hind_right_swing_angle
+    s75 = s15 * cos_hind_right_swing_angle - s47 * sin_hind_right_swing_angle
+    s76 = s49 * cos_hind_right_swing_angle + s18 * sin_hind_right_swing_angle
+    s77 = s18 * cos_hind_right_swing_angle - s49 * sin_hind_right_swing_angle
+    s78 = s51 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
+    s79 = s21 * cos_hind_right_swing_angle - s51 * sin_hind_right_swing_angle
+    cos_front_left_knee_angle = cos(front_left_knee_angle)
+    sin_front_left_knee_angle = sin(front_left_knee_angle)
+    s80 = s53 * cos_front_left_knee_angle + s54 * sin_front_left_knee_angle
+    s82 = s55 * cos_front_left_knee_angle + s56 * sin_front_left_knee_angle
+    s84 = s57 * cos_front_left_knee_angle + s58 * sin_front_left_knee_angle
+    cos_front_right_knee_angle = cos(front_right_knee_angle)
+    sin_front_right_knee_angle = sin(front_right_knee_angle)
+    s86 = s60 * cos_front_right_knee_angle + s61 * sin_front_right_knee_angle
+    s88 = s62 * cos_front_right_knee_angle + s63 * sin_front_right_knee_angle
+    s90 = s64 * cos_front_right_knee_angle + s65 * sin_front_right_knee_angle
+    cos_hind_left_knee_angle = cos(hind_left_knee_angle)
+    sin_hind_left_knee_angle = sin(hind_left_knee_angle)
+    s92 = s67 * cos_hind_left_knee_angle + s68 * sin_hind_left_knee_angle
+    s94 = s69 * cos_hind_left_knee_angle + s70 * sin_hind_left_knee_angle
+    s96 = s71 * cos_hind_left_knee_angle + s72 * sin_hind_left_knee_angle
+    cos_hind_right_knee_angle = cos(hind_right_knee_angle)
+    sin_hind_right_knee_angle = sin(hind_right_knee_angle)
+    s98 = s74 * cos_hind_right_knee_angle + s75 * sin_hind_right_knee_angle
+    s100 = s76 * cos_hind_right_knee_angle + s77 * sin_hind_right_knee_angle
+    s102 = s78 * cos_hind_right_knee_angle + s79 * sin_hind_right_knee_angle
+    s104 = x_hip * s21
+    s105 = y_hip * s22
+    s106 = s104 + s105
+    velocity_trunk_x = trunk_x_dot * s15 + trunk_y_dot * s18 + trunk_z_dot * s21
+    velocity_trunk_y = trunk_x_dot * s16 + trunk_y_dot * s19 + trunk_z_dot * s22
+    velocity_trunk_z = trunk_x_dot * s17 + trunk_y_dot * s20 + trunk_z_dot * s23
+    omega_front_left_hip_y = trunk_wy * cos_front_left_abduction_angle + trunk_wz * sin_front_left_abduction_angle
+    omega_front_left_hip_z = trunk_wz * cos_front_left_abduction_angle - trunk_wy * sin_front_left_abduction_angle
+    s110 = y_hip * trunk_wz
+    s111 = x_hip * trunk_wz
+    s112 = y_hip * trunk_wx
+    s113 = x_hip * trunk_wy
+    velocity_front_left_hip_x = velocity_trunk_x - s110
+    s114 = velocity_trunk_y + s111
+    s115 = velocity_trunk_z + (s112 - s113)
+    velocity_front_left_hip_y = cos_front_left_abduction_angle * s114 + sin_front_left_abduction_angle * s115
+    velocity_front_left_hip_z = cos_front_left_abduction_angle * s115 - sin_front_left_abduction_angle * s114
+    omega_front_left_hip_x = trunk_wx + front_left_abduction_angle_dot
+    omega_front_right_hip_y = trunk_wy * cos_front_right_abduction_angle + trunk_wz * sin_front_right_abduction_angle
+    omega_front_right_hip_z = trunk_wz * cos_front_right_abduction_angle - trunk_wy * sin_front_right_abduction_angle
+    s116 = s112 + s113
+    velocity_front_right_hip_x = velocity_trunk_x + s110
+    s117 = velocity_trunk_z - s116
+    velocity_front_right_hip_y = cos_front_right_abduction_angle * s114 + sin_front_right_abduction_angle * s117
+    velocity_front_right_hip_z = cos_front_right_abduction_angle * s117 - sin_front_right_abduction_angle * s114
+    omega_front_right_hip_x = trunk_wx + front_right_abduction_angle_dot
+    omega_hind_left_hip_y = trunk_wy * cos_hind_left_abduction_angle + trunk_wz * sin_hind_left_abduction_angle
+    omega_hind_left_hip_z = trunk_wz * cos_hind_left_abduction_angle - trunk_wy * sin_hind_left_abduction_angle
+    s118 = velocity_trunk_y - s111
+    s119 = velocity_trunk_z + s116
+    velocity_hind_left_hip_y = cos_hind_left_abduction_angle * s118 + sin_hind_left_abduction_angle * s119
+    velocity_hind_left_hip_z = cos_hind_left_abduction_angle * s119 - sin_hind_left_abduction_angle * s118
+    omega_hind_left_hip_x = trunk_wx + hind_left_abduction_angle_dot
+    omega_hind_right_hip_y = trunk_wy * cos_hind_right_abduction_angle + trunk_wz * sin_hind_right_abduction_angle
+    omega_hind_right_hip_z = trunk_wz * cos_hind_right_abduction_angle - trunk_wy * sin_hind_right_abduction_angle
+    s120 = velocity_trunk_z + (s113 - s112)
+    velocity_hind_right_hip_y = cos_hind_right_abduction_angle * s118 + sin_hind_right_abduction_angle * s120
+    velocity_hind_right_hip_z = cos_hind_right_abduction_angle * s120 - sin_hind_right_abduction_angle * s118
+    omega_hind_right_hip_x = trunk_wx + hind_right_abduction_angle_dot
+    omega_front_left_thigh_z = cos_front_left_swing_angle * omega_front_left_hip_z + sin_front_left_swing_angle * omega_front_left_hip_x
+    omega_front_left_thigh_x = cos_front_left_swing_angle * omega_front_left_hip_x - sin_front_left_swing_angle * omega_front_left_hip_z
+    s121 = velocity_front_left_hip_x - k2 * omega_front_left_hip_z
+    s122 = velocity_front_left_hip_z + k2 * omega_front_left_hip_x
+    velocity_front_left_thigh_z = cos_front_left_swing_angle * s122 + sin_front_left_swing_angle * s121
+    omega_front_left_thigh_y = front_left_swing_angle_dot + omega_front_left_hip_y
+    omega_front_right_thigh_z = cos_front_right_swing_angle * omega_front_right_hip_z + sin_front_right_swing_angle * omega_front_right_hip_x
+    omega_front_right_thigh_x = cos_front_right_swing_angle * omega_front_right_hip_x - sin_front_right_swing_angle * omega_front_right_hip_z
+    s123 = velocity_front_right_hip_x - k3 * omega_front_right_hip_z
+    s124 = velocity_front_right_hip_z + k3 * omega_front_right_hip_x
+    velocity_front_right_thigh_z = cos_front_right_swing_angle * s124 + sin_front_right_swing_angle * s123
+    omega_front_right_thigh_y = front_right_swing_angle_dot + omega_front_right_hip_y
+    omega_hind_left_thigh_z = cos_hind_left_swing_angle * omega_hind_left_hip_z + sin_hind_left_swing_angle * omega_hind_left_hip_x
+    omega_hind_left_thigh_x = cos_hind_left_swing_angle * omega_hind_left_hip_x - sin_hind_left_swing_angle * omega_hind_left_hip_z
+    s125 = velocity_front_left_hip_x - k2 * omega_hind_left_hip_z
+    s126 = velocity_hind_left_hip_z + k2 * omega_hind_left_hip_x
+    velocity_hind_left_thigh_z = cos_hind_left_swing_angle * s126 + sin_hind_left_swing_angle * s125
+    omega_hind_left_thigh_y = hind_left_swing_angle_dot + omega_hind_left_hip_y
+    omega_hind_right_thigh_z = cos_hind_right_swing_angle * omega_hind_right_hip_z + sin_hind_right_swing_angle * omega_hind_right_hip_x
+    omega_hind_right_thigh_x = cos_hind_right_swing_angle * omega_hind_right_hip_x - sin_hind_right_swing_angle * omega_hind_right_hip_z
+    s127 = velocity_front_right_hip_x - k3 * omega_hind_right_hip_z
+    s128 = velocity_hind_right_hip_z + k3 * omega_hind_right_hip_x
+    velocity_hind_right_thigh_z = cos_hind_right_swing_angle * s128 + sin_hind_right_swing_angle * s127
+    omega_hind_right_thigh_y = hind_right_swing_angle_dot + omega_hind_right_hip_y
+    omega_front_left_shank_z = cos_front_left_knee_angle * omega_front_left_thigh_z + sin_front_left_knee_angle * omega_front_left_thigh_x
+    omega_front_left_shank_x = cos_front_left_knee_angle * omega_front_left_thigh_x - sin_front_left_knee_angle * omega_front_left_thigh_z
+    s129 = cos_front_left_swing_angle * s121 - sin_front_left_swing_angle * s122 + k4 * omega_front_left_thigh_y
+    velocity_front_left_shank_z = cos_front_left_knee_angle * velocity_front_left_thigh_z + sin_front_left_knee_angle * s129
+    velocity_front_left_shank_x = cos_front_left_knee_angle * s129 - sin_front_left_knee_angle * velocity_front_left_thigh_z
+    omega_front_left_shank_y = front_left_knee_angle_dot + omega_front_left_thigh_y
+    omega_front_right_shank_z = cos_front_right_knee_angle * omega_front_right_thigh_z + sin_front_right_knee_angle * omega_front_right_thigh_x
+    omega_front_right_shank_x = cos_front_right_knee_angle * omega_front_right_thigh_x - sin_front_right_knee_angle * omega_front_right_thigh_z
+    s130 = cos_front_right_swing_angle * s123 - sin_front_right_swing_angle * s124 + k4 * omega_front_right_thigh_y
+    velocity_front_right_shank_z = cos_front_right_knee_angle * velocity_front_right_thigh_z + sin_front_right_knee_angle * s130
+    velocity_front_right_shank_x = cos_front_right_knee_angle * s130 - sin_front_right_knee_angle * velocity_front_right_thigh_z
+    omega_front_right_shank_y = front_right_knee_angle_dot + omega_front_right_thigh_y
+    omega_hind_left_shank_z = cos_hind_left_knee_angle * omega_hind_left_thigh_z + sin_hind_left_knee_angle * omega_hind_left_thigh_x
+    omega_hind_left_shank_x = cos_hind_left_knee_angle * omega_hind_left_thigh_x - sin_hind_left_knee_angle * omega_hind_left_thigh_z
+    s131 = cos_hind_left_swing_angle * s125 - sin_hind_left_swing_angle * s126 + k4 * omega_hind_left_thigh_y
+    velocity_hind_left_shank_z = cos_hind_left_knee_angle * velocity_hind_left_thigh_z + sin_hind_left_knee_angle * s131
+    velocity_hind_left_shank_x = cos_hind_left_knee_angle * s131 - sin_hind_left_knee_angle * velocity_hind_left_thigh_z
+    omega_hind_left_shank_y = hind_left_knee_angle_dot + omega_hind_left_thigh_y
+    omega_hind_right_shank_z = cos_hind_right_knee_angle * omega_hind_right_thigh_z + sin_hind_right_knee_angle * omega_hind_right_thigh_x
+    omega_hind_right_shank_x = cos_hind_right_knee_angle * omega_hind_right_thigh_x - sin_hind_right_knee_angle * omega_hind_right_thigh_z
+    s132 = cos_hind_right_swing_angle * s127 - sin_hind_right_swing_angle * s128 + k4 * omega_hind_right_thigh_y
+    velocity_hind_right_shank_z = cos_hind_right_knee_angle * velocity_hind_right_thigh_z + sin_hind_right_knee_angle * s132
+    velocity_hind_right_shank_x = cos_hind_right_knee_angle * s132 - sin_hind_right_knee_angle * velocity_hind_right_thigh_z
+    omega_hind_right_shank_y = hind_right_knee_angle_dot + omega_hind_right_thigh_y
+    s8949 = (s54 * cos_front_left_knee_angle - s53 * sin_front_left_knee_angle) * omega_front_left_shank_x
+    s8950 = (s56 * cos_front_left_knee_angle - s55 * sin_front_left_knee_angle) * omega_front_left_shank_x
+    s8951 = (s58 * cos_front_left_knee_angle - s57 * sin_front_left_knee_angle) * velocity_front_left_shank_x
+    s8952 = s8951 + s29 * (velocity_front_left_hip_y - k4 * omega_front_left_thigh_x)
+    s8953 = s82 * k7 * (s8949 + s25 * omega_front_left_shank_y + s80 * omega_front_left_shank_z)
+    s8954 = s80 * k7 * (s8950 + s27 * omega_front_left_shank_y + s82 * omega_front_left_shank_z)
+    s1164 = ground_radius - (trunk_z + s106 + k2 * s29 + k4 * s57 + s84 * k7)
+    s141 = max(s1164, 0.0)
+    s8955 = (s61 * cos_front_right_knee_angle - s60 * sin_front_right_knee_angle) * omega_front_right_shank_x
+    s152 = s8955 + s32 * omega_front_right_shank_y + s86 * omega_front_right_shank_z
+    s8956 = (s63 * cos_front_right_knee_angle - s62 * sin_front_right_knee_angle) * omega_front_right_shank_x
+    s153 = s8956 + s34 * omega_front_right_shank_y + s88 * omega_front_right_shank_z
+    s8957 = (s65 * cos_front_right_knee_angle - s64 * sin_front_right_knee_angle) * velocity_front_right_shank_x
+    s8958 = s8957 + s36 * (velocity_front_right_hip_y - k4 * omega_front_right_thigh_x)
+    s8959 = s8958 + s90 * velocity_front_right_shank_z + (s88 * k7 * s152 - s86 * k7 * s153)
+    s1170 = ground_radius - (trunk_z + (s104 - s105) + k3 * s36 + k4 * s64 + s90 * k7)
+    s160 = max(s1170, 0.0)
+    s8960 = (s68 * cos_hind_left_knee_angle - s67 * sin_hind_left_knee_angle) * omega_hind_left_shank_x
+    s8961 = (s70 * cos_hind_left_knee_angle - s69 * sin_hind_left_knee_angle) * omega_hind_left_shank_x
+    s8962 = (s72 * cos_hind_left_knee_angle - s71 * sin_hind_left_knee_angle) * velocity_hind_left_shank_x
+    s176 = s8962 + s43 * (velocity_hind_left_hip_y - k4 * omega_hind_left_thigh_x) + s96 * velocity_hind_left_shank_z
+    s8963 = s94 * k7 * (s8960 + s39 * omega_hind_left_shank_y + s92 * omega_hind_left_shank_z)
+    s8964 = s92 * k7 * (s8961 + s41 * omega_hind_left_shank_y + s94 * omega_hind_left_shank_z)
+    s1176 = ground_radius - (trunk_z + (s105 - s104) + k2 * s43 + k4 * s71 + s96 * k7)
+    s179 = max(s1176, 0.0)
+    s8965 = (s75 * cos_hind_right_knee_angle - s74 * sin_hind_right_knee_angle) * omega_hind_right_shank_x
+    s8966 = (s77 * cos_hind_right_knee_angle - s76 * sin_hind_right_knee_angle) * omega_hind_right_shank_x
+    s8967 = (s79 * cos_hind_right_knee_angle - s78 * sin_hind_right_knee_angle) * velocity_hind_right_shank_x
+    s8968 = s8967 + s50 * (velocity_hind_right_hip_y - k4 * omega_hind_right_thigh_x)
+    s8969 = s100 * k7 * (s8965 + s46 * omega_hind_right_shank_y + s98 * omega_hind_right_shank_z)
+    s8970 = s98 * k7 * (s8966 + s48 * omega_hind_right_shank_y + s100 * omega_hind_right_shank_z)
+    s1182 = ground_radius - (trunk_z - s106 + k3 * s50 + k4 * s78 + s102 * k7)
+    s198 = max(s1182, 0.0)
+    s1186 = 1.0 - k8 * (s8968 + s102 * velocity_hind_right_shank_z + (s8969 - s8970))
+    s8971 = -(kp * front_left_abduction_angle + kd * front_left_abduction_angle_dot)
+    s207 = min(1.0, t / settle)
+    s208 = pace * t
+    s209 = stride * sin(s208)
+    s210 = cos(s208)
+    s211 = max(0.0, -s210)
+    s212 = stance_thigh + s207 * (s209 + k10 * s211)
+    s1189 = kp * (s212 - front_left_swing_angle) - kd * front_left_swing_angle_dot
+    s214 = lift * s207
+    s215 = stance_knee - s211 * s214
+    s1190 = kp * (s215 - front_left_knee_angle) - kd * front_left_knee_angle_dot
+    s217 = -(kp * front_right_abduction_angle + kd * front_right_abduction_angle_dot)
+    s218 = max(0.0, s210)
+    s219 = stance_thigh + s207 * (k10 * s218 - s209)
+    s1193 = kp * (s219 - front_right_swing_angle) - kd * front_right_swing_angle_dot
+    s221 = stance_knee - s214 * s218
+    s1194 = kp * (s221 - front_right_knee_angle) - kd * front_right_knee_angle_dot
+    s8972 = -(kp * hind_left_abduction_angle + kd * hind_left_abduction_angle_dot)
+    s1196 = kp * (s219 - hind_left_swing_angle) - kd * hind_left_swing_angle_dot
+    s1197 = kp * (s221 - hind_left_knee_angle) - kd * hind_left_knee_angle_dot
+    s8973 = -(kp * hind_right_abduction_angle + kd * hind_right_abduction_angle_dot)
+    s1199 = kp * (s212 - hind_right_swing_angle) - kd * hind_right_swing_angle_dot
+    s1200 = kp * (s215 - hind_right_knee_angle) - kd * hind_right_knee_angle_dot
+    return (
+        s1164,
+        s141 - 1e-300,
+        ground_stiffness * s141 * sqrt(max(s141, 1e-300)) * (1.0 - (s8952 + s84 * velocity_front_left_shank_z + (s8953 - s8954)) * k8),
+        s1170,
+        s160 - 1e-300,
+        ground_stiffness * s160 * sqrt(max(s160, 1e-300)) * (1.0 - k8 * s8959),
+        s1176,
+        s179 - 1e-300,
+        ground_stiffness * s179 * sqrt(max(s179, 1e-300)) * (1.0 - k8 * (s176 + (s8963 - s8964))),
+        s1182,
+        s198 - 1e-300,
+        ground_stiffness * s198 * sqrt(max(s198, 1e-300)) * s1186,
+        strong - s8971,
+        k9 - min(strong, s8971),
+        s1189 - strong,
+        k9 - min(strong, s1189),
+        s1190 - strong,
+        k9 - min(strong, s1190),
+        strong - s217,
+        k9 - min(strong, s217),
+        s1193 - strong,
+        k9 - min(strong, s1193),
+        s1194 - strong,
+        k9 - min(strong, s1194),
+        strong - s8972,
+        k9 - min(strong, s8972),
+        s1196 - strong,
+        k9 - min(strong, s1196),
+        s1197 - strong,
+        k9 - min(strong, s1197),
+        strong - s8973,
+        k9 - min(strong, s8973),
+        s1199 - strong,
+        k9 - min(strong, s1199),
+        s1200 - strong,
+        k9 - min(strong, s1200),
+    )
+
+
+def _switching_functions_of_time(y, k, u=(), extra=(), t=0.0, cos=cos):
+    """4 operations: 1 sub, 1 mul, 1 div, 1 cos."""
+    pace, settle = k
+    return (
+        1.0 - t / settle,
+        cos(pace * t),
+    )
+
+
 _ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
 _LARGEST = 1e+100
 
@@ -12834,3 +13142,13 @@ def derivative(t, y, p=None, u=None):
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
     return _evaluate(_jacobian, "jacobian", (37, 37), ('cos', 'sin', 'max', 'sqrt', 'min', 'select'), y, p, u, (), t)
+
+
+def switching_functions(t, y, p=None, u=None):
+    """`derivative` has another branch where one of these passes 0."""
+    return _evaluate(_switching_functions, "switching_functions", (36,), ('cos', 'sin', 'max', 'sqrt', 'min'), y, p, u, (), t)
+
+
+def switching_functions_of_time(t, y, p=None, u=None):
+    """As `switching_functions`; these depend on time alone."""
+    return _evaluate(_switching_functions_of_time, "switching_functions_of_time", (2,), ('cos',), y, p, u, (), t)
