@@ -11,7 +11,6 @@ from eomgen.run.checks import check_repairs, check_rest_speed
 from eomgen.run.guard import OF_TOLERANCE, Guard, Watch, repaired, watched
 from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
-from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.stepping import Asked, adaptive_steps, equal_steps
@@ -267,8 +266,6 @@ def _follow(
         return ""
     except KeyboardInterrupt:
         trouble = f"interrupted at t = {run.t:.6g}"
-    except UnstableStepError as failure:
-        trouble = f"stopped at {_place(problem, run)}: {failure}"
     except StepFailure as failure:
         why = problem.explain(run.t, run.y, problem.initial)
         cause = f"{str(failure).partition(';')[0]}: {why}" if why else str(failure)
