@@ -36,6 +36,7 @@ SCREW = """
 name = "screw"
 dimensions = 3
 parameters = { m = 1.7, J = 0.3 }
+simulation = { t_end = 5.0 }
 bodies = [
     { name = "a", mass = "m", inertia_com = [0.2, "J", 0.25, 0.01, -0.02, 0.03] },
     { name = "b", mass = 0.8, inertia_com = [0.05, 0.06, 0.07] },
