@@ -208,6 +208,11 @@ def test_a_name_with_control_characters_is_refused(
     assert capsys.readouterr().err.endswith(
         r"a\nb.toml: has a control character in its name; rename it" + "\n"
     )
+    for option in (["-o", str(tmp_path / "a\nb")], ["--plot", "a\x9b.png"], ["--from", "\u2028"]):
+        with pytest.raises(SystemExit) as stop:
+            main(["simulate", "pendulum", "--t-end", "0.1", *option])
+        assert stop.value.code == 2
+        assert "has a control character in its name" in capsys.readouterr().err
     odd = tmp_path / "pendül \u202e\udcff.toml"  # and others are no fault
     odd.write_bytes(scene.read_bytes())
     with steady_streams():
