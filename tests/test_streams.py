@@ -131,7 +131,36 @@ def test_a_terminal_of_ascii(tmp_path: Path, name: str, how: str) -> None:
     }[how]
     done = run(COMMANDS[name], tmp_path, **ascii_alone)
     assert done.returncode == 0 and quiet(done)
-    assert done.stdout.isascii() and done.stderr.isascii() and "\\u" not in done.stdout
+    assert done.stdout.isascii() and done.stderr.isascii()
+    assert "\\u" not in done.stdout or name == "schema"  # as JSON spells it anywhere
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_full_output_ends_no_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    """Of each command: all its files, one line of what was lost, and 1."""
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        assert main([word.format(out=tmp_path) for word in COMMANDS[name].split()]) == 1
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1] == "eomgen: standard output cannot be written: No space left on device"
+    assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
+
+
+@pytest.mark.parametrize("name", some([n for n in COMMANDS if n != "accuracy"], list(COMMANDS)))
+def test_ascii_and_a_closed_error_stream(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Of each command: all its files, all it prints in letters of ASCII, and 0."""
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.setattr(sys, "stderr", None)
+    assert main([word.format(out=tmp_path) for word in COMMANDS[name].split()]) == 0
+    terminal.seek(0)
+    told = terminal.read()
+    assert told and ("\\u" not in told or name == "schema")  # as JSON spells it anywhere
+    assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
 
 
 def test_a_derivation_in_ascii(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
