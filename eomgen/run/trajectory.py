@@ -203,6 +203,8 @@ def _members(data: bytes) -> dict[str, Any]:
         members = {name: archive[name] for name in archive.files}
     if any(array.size > len(data) for array in members.values()):
         raise ValueError("it holds more than its size")
+    if any(array.dtype.kind not in "biufU" for array in members.values()):
+        raise ValueError("it holds what is neither numbers nor text")
     return members
 
 
