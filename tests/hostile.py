@@ -66,7 +66,7 @@ def _changed_tree(r: random.Random) -> str:
             case 1 if isinstance(parent, dict):
                 parent[r.choice(ODD_TEXTS)] = parent.pop(key)
             case 2 if isinstance(parent, list):
-                parent += [parent[key]] * r.choice((1, 3, 300))
+                parent += [parent[key]] * r.choice((1, 2, 3, 50))
             case 3:
                 other, at = r.choice(places)
                 parent[key] = json.loads(json.dumps(other[at])) if at in other else {}
@@ -88,7 +88,7 @@ def _odd(r: random.Random) -> Any:
     value: Any = r.choice((r.choice(ODD_TEXTS), r.choice(ODD_NUMBERS), True, [], {}))
     for _ in range(r.choice((0, 0, 0, 1, 2, 10, 60))):
         value = [value] if r.random() < 0.5 else {r.choice(("a", "type", "name", "\x1b")): value}
-    return [value] * r.choice((1, 2, 3, 5000)) if r.random() < 0.2 else value
+    return [value] * r.choice((1, 2, 3, 5, 50, 5000)) if r.random() < 0.1 else value
 
 
 def _toml(value: Any) -> str:

@@ -40,7 +40,7 @@ def main() -> None:
                 counts, failed = counts + found, failed + len(failures)
                 for failure in failures:
                     print(failure, flush=True)
-                if (first - given.first) % (10 * BATCH) == 0:
+                if (first - given.first) % (2 * BATCH) == 0:
                     print(f"{kind} to {first + BATCH}: {dict(counts)}", flush=True)
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1000
             print(f"{count} of kind {kind}: {dict(counts)}, {failed} failures, peak {peak} MB")
