@@ -5,10 +5,10 @@ from dataclasses import replace
 from typing import Literal
 
 from eomgen.acting import acting_effects, at_joint, check_contacts, sliding_in
-from eomgen.effects.base import ExtraState, Input
+from eomgen.effects import Effect
 from eomgen.errors import SceneError
 from eomgen.joints import Joint
-from eomgen.joints.base import WORLD, Coordinate
+from eomgen.joints.base import WORLD
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, with_components
 from eomgen.model import Body, Model, Point
@@ -36,11 +36,9 @@ def build_model(scene: Scene) -> Model:
     points = _points(scene, names, known, parameters, motion)
     inputs = [at_joint(x, e, sliding) for e in effects for x in e.inputs(scene.dimensions)]
     states = [at_joint(x, e, sliding) for e in effects for x in e.states(scene.dimensions)]
-    coordinates = [c for body in bodies for c in body.positions]
-    velocities = [c for body in bodies for c in body.velocities]
-    if not velocities:
+    if not any(body.velocities for body in bodies):
         raise SceneError("joints: nothing can move; give at least one that is no weld")
-    _check_symbols(parameters, coordinates, velocities, inputs, states)
+    _check_symbols(scene, parameters, bodies, effects)
     check_contacts(effects, list(names))
     locked = locked_values(scene.locked, bodies, effects)
     check_look((), scene.camera, scene.dimensions, "camera")
@@ -126,10 +124,11 @@ def in_order(outputs: Collection[str]) -> tuple[str, ...]:
 def _scene_parameters(scene: Scene) -> tuple[list[Parameter], dict[str, float]]:
     parameters = []
     for name, entry in scene.parameters.items():
+        place = f"parameters.{name}"
         if isinstance(entry, float | int):
-            parameters.append(Parameter(name, float(entry), "", ""))
+            parameters.append(Parameter(name, float(entry), "", "", place))
         else:
-            parameters.append(Parameter(name, float(entry.value), entry.unit, entry.about))
+            parameters.append(Parameter(name, float(entry.value), entry.unit, entry.about, place))
     return parameters, {p.name: p.default for p in parameters}
 
 
@@ -239,24 +238,29 @@ def _points(
 
 
 def _check_symbols(
+    scene: Scene,
     parameters: Sequence[Parameter],
-    coordinates: Sequence[Coordinate],
-    velocities: Sequence[Coordinate],
-    inputs: Sequence[Input],
-    states: Sequence[ExtraState],
+    bodies: Sequence[Body],
+    effects: Sequence[Effect],
 ) -> None:
-    """No name may stand for two things in the equations."""
-    taken = {"t": "time", "pi": "the number π"}
-    uses = [(p.name, "a parameter") for p in parameters]
-    uses += [(c.name, "a coordinate") for c in coordinates]
-    uses += [(c.name, "a velocity") for c in velocities]
-    uses += [(c.acceleration, "an acceleration") for c in velocities]
-    uses += [(i.name, "an input") for i in inputs]
-    uses += [(x.name, "a state") for x in states]
-    for name, use in uses:
+    """No name may stand for two things in the equations. Raises `SceneError` with both places."""
+    places = {joint.name: place for joint, place in written_out(scene)[1]}
+    moving = [(body, places[body.joint.name]) for body in bodies]
+    acting = [(effect, f"effects[{i}]") for i, effect in enumerate(effects)]
+    n = scene.dimensions
+    uses = [(p.name, "a parameter", p.place) for p in parameters]
+    uses += [(c.name, "a coordinate", at) for body, at in moving for c in body.positions]
+    uses += [(c.name, "a velocity", at) for body, at in moving for c in body.velocities]
+    uses += [(c.acceleration, "an acceleration", at) for b, at in moving for c in b.velocities]
+    uses += [(i.name, "an input", at) for effect, at in acting for i in effect.inputs(n)]
+    uses += [(x.name, "a state", at) for effect, at in acting for x in effect.states(n)]
+    taken = {"t": ("time", ""), "pi": ("the number π", "")}
+    for name, use, place in uses:
         if name in taken:
-            other = "another" if use == taken[name] else taken[name]
+            other, at = taken[name]
+            other = "another" if use == other else other
             raise SceneError(
-                f"'{name}' would be the name of {use} and of {other}; rename one of them"
+                f"{place}: '{name}' would be the name of {use} and of {other}"
+                f"{f' ({at})' if at else ''}; rename one of them"
             )
-        taken[name] = use
+        taken[name] = use, place

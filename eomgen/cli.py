@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from eomgen.errors import EomgenError, InterruptedRunError
+from eomgen.errors import EomgenError, InterruptedRunError, tell_refusal
 from eomgen.streams import steady_streams
 from eomgen.text import breaks_lines, one_line
 
@@ -44,8 +44,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             parser.error("generate: no scene; name one, or give --all for the built-in ones")
         code: int = given.run(given)
     except EomgenError as error:
-        for line in error.lines:
-            print(f"eomgen: {line}", file=sys.stderr)
+        tell_refusal(error)
         return INTERRUPTED if isinstance(error, InterruptedRunError) else 1
     except (OSError, MemoryError) as error:
         why = "out of memory" if isinstance(error, MemoryError) else one_line(str(error))

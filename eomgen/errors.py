@@ -1,6 +1,7 @@
 """Errors that are the user's to mend: one clear line each, with place, value and remedy."""
 
 import difflib
+import sys
 from collections.abc import Iterable
 
 from eomgen.text import one_line
@@ -30,6 +31,12 @@ class RunError(EomgenError):
 
 class InterruptedRunError(RunError):
     """A run that an interrupt ended; what it had computed is kept."""
+
+
+def tell_refusal(error: EomgenError) -> None:
+    """Say on standard error what is wrong, each line as one of this program."""
+    for line in error.lines:
+        print(f"eomgen: {line}", file=sys.stderr)
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -383,12 +383,14 @@ MISTAKES = [
     (CONTROLLER.format('state = { z = { rate = 1 } }\ntorques = { axle = "1" }'),
      "effects[0].state: unknown key (did you mean 'states'?)"),
     (CONTROLLER.format('states = { q = { rate = "1" } }\ntorques = { axle = "q" }'),
-     "'q' would be the name of a state and of a coordinate; rename one of them"),
+     "effects[0]: 'q' would be the name of a state and of a coordinate (joints[0]); rename one of "
+     "them"),
     (CONTROLLER.format('states = { t = { rate = "1" } }\ntorques = { axle = "t" }'),
-     "'t' would be the name of a state and of time; rename one of them"),
+     "effects[0]: 't' would be the name of a state and of time; rename one of them"),
     (CONTROLLER.format('states = { hold_torque = { rate = "1" } }\ntorques = { axle = "t" }')
      + servo("pd", "lag = 0.1"),
-     "'hold_torque' would be the name of a state and of another; rename one of them"),
+     "effects[1]: 'hold_torque' would be the name of a state and of another (effects[0]); rename "
+     "one of them"),
 ]  # fmt: skip
 
 

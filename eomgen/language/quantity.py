@@ -7,6 +7,7 @@ the scene's `[parameters]`; a bare 0 is structure: it is folded away and is no p
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as data_field
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, WithJsonSchema
@@ -107,12 +108,13 @@ def about_slides(table: Table, sliding: Collection[str]) -> bool | None:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A named number of the generated module."""
+    """A named number of the generated module; `place` is where the scene gives it, for messages."""
 
     name: str
     default: float
     unit: str
     about: str
+    place: str = data_field(default="", repr=False, compare=False)
 
 
 def with_components(
@@ -185,7 +187,7 @@ def name_quantities(
                 what = of_joint(str(info.description), here)
                 about = f"{what} of {prefix}{suffix.replace('_', ', ', 1)}"
                 name = f"{prefix}_{field}{suffix}"
-                parameters.append(Parameter(name, formula.value, unit, about))
+                parameters.append(Parameter(name, formula.value, unit, about, where))
                 named.append(Name(name))
             else:
                 named.append(formula)

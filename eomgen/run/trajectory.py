@@ -2,6 +2,7 @@
 
 import csv
 import io
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,12 +11,14 @@ from typing import Any, Literal
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.files import is_ours, write_whole
+from eomgen.files import is_ours, read_plain, write_whole
 from eomgen.run.problem import Floats
 
 FORMAT = "trajectory 2"
 RESUME = "resume_"
 """Begins the names of members of a file that a later run goes on from."""
+LARGEST = 2**32
+"""Bytes of the largest file that is read: a run of a million samples of 500 states."""
 COUNTS = ("steps", "derivatives", "jacobians", "impacts", "capped", "cut")
 Kind = Literal["impact", "rest", "lift"]
 
@@ -146,39 +149,36 @@ def load_npz(path: Path) -> Trajectory:
 
     Raises `RunError` if the file is missing, not a trajectory of ours, or damaged.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RunError(f"{path}: cannot be read: {error.strerror}") from None
+    data = read_plain(path, LARGEST)
     if not is_ours(data):
         raise RunError(f"{path}: is no trajectory written by eomgen")
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as members:
-            form = str(members["eomgen"])
-            if form == FORMAT:
-                return Trajectory(
-                    name=str(members["name"]),
-                    states=tuple(members["states"].tolist()),
-                    t=members["t"],
-                    y=members["y"],
-                    integrator=str(members["integrator"]),
-                    finished=bool(members["finished"]),
-                    message=str(members["message"]),
-                    counts=dict(zip(COUNTS, members["counts"].tolist(), strict=True)),
-                    events=tuple(
-                        Event(t, contact, kind, speed)
-                        for (t, speed), (contact, kind) in zip(
-                            members["events"].tolist(), members["event_names"].tolist(), strict=True
-                        )
-                    ),
-                    works=members.get("works"),
-                    work_names=tuple(members.get("work_names", np.array(())).tolist()),
-                    resume={
-                        name.removeprefix(RESUME): members[name]
-                        for name in members
-                        if name.startswith(RESUME)
-                    },
-                )
+        members = _members(data)
+        form = str(members["eomgen"])
+        if form == FORMAT:
+            return Trajectory(
+                name=str(members["name"]),
+                states=tuple(members["states"].tolist()),
+                t=members["t"],
+                y=members["y"],
+                integrator=str(members["integrator"]),
+                finished=bool(members["finished"]),
+                message=str(members["message"]),
+                counts=dict(zip(COUNTS, members["counts"].tolist(), strict=True)),
+                events=tuple(
+                    Event(t, contact, kind, speed)
+                    for (t, speed), (contact, kind) in zip(
+                        members["events"].tolist(), members["event_names"].tolist(), strict=True
+                    )
+                ),
+                works=members.get("works"),
+                work_names=tuple(members.get("work_names", np.array(())).tolist()),
+                resume={
+                    name.removeprefix(RESUME): members[name]
+                    for name in members
+                    if name.startswith(RESUME)
+                },
+            )
     # What a broken archive makes zipfile and NumPy raise has no common base.
     except Exception as error:
         text = " ".join(str(error).split())
@@ -186,6 +186,27 @@ def load_npz(path: Path) -> Trajectory:
     raise RunError(
         f"{path}: is in format '{form}', but this eomgen reads '{FORMAT}'; simulate again"
     )
+
+
+def _members(data: bytes) -> dict[str, Any]:
+    """The arrays of an archive. Raises whatever zipfile and NumPy raise, or `ValueError` for one
+    that would take more memory than its own bytes.
+
+    This program compresses nothing, and every entry of its arrays has bytes. Members that are
+    compressed or share bytes, and arrays of many entries without a byte, are of others.
+    """
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        about = archive.infolist()
+    packed = any(member.compress_type != zipfile.ZIP_STORED for member in about)
+    if packed or sum(member.file_size for member in about) > len(data):
+        raise ValueError("it holds more than its size")
+    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        members = {name: archive[name] for name in archive.files}
+    if any(array.size > len(data) for array in members.values()):
+        raise ValueError("it holds more than its size")
+    if any(array.dtype.kind not in "biufU" for array in members.values()):
+        raise ValueError("it holds what is neither numbers nor text")
+    return members
 
 
 def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
