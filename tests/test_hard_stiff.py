@@ -129,3 +129,30 @@ def test_what_holds_is_left_alone() -> None:
     assert run.finished
     energy = 0.5 * run.y[-1, 1] ** 2 + 9.81 * run.y[-1, 0]
     assert abs(energy - 0.5 * 9.81) < 0.02 * energy
+
+
+@pytest.mark.parametrize("method", ["euler", "semi_implicit_euler", "rk4"])
+def test_wild_forces_are_looked_into_seldom_and_what_cannot_be_held_at_once(method: str) -> None:
+    """Forces on 40 freedoms that jump at every step, to no harm; from 4 s on a damper on one of
+    them, too strong by far. A Jacobian takes as long as 40 derivatives.
+    """
+    n, looks = 40, list[float]()
+
+    def strengths(t: float) -> Any:
+        return np.where(np.arange(n) == 7, 300.0 if t >= 4.0 else 0.0, 0.0)
+
+    def derivative(t: float, y: Any) -> Any:
+        force = np.copysign(10.0, np.sin(997.0 * t + np.arange(n)))
+        return np.concatenate((y[n:], force - strengths(t) * y[n:]))
+
+    def jacobian(t: float, y: Any) -> Any:
+        looks.append(t)
+        return np.block([[np.zeros((n, n)), np.eye(n)], [np.zeros((n, n)), -np.diag(strengths(t))]])
+
+    states = tuple(f"y{i}" for i in range(2 * n))
+    asked = Problem("wild", states, tuple(range(n)), derivative, jacobian, np.ones(2 * n))
+    run = integrate(asked, method, 6.0, dt=0.01)
+    derivatives = 400 * {"rk4": 4}.get(method, 1)
+    assert 2 <= len([t for t in looks if t < 3.98]) * n < 0.5 * derivatives + 8000 / n
+    assert stopped(run) < 0.01
+    assert 3.9 < run.t[-1] < 4.1 and np.abs(run.y).max() < 500

@@ -79,6 +79,7 @@ def equal_steps(
             dt=dt,
             every=every,
             watched=problem if looked_at and problem.contacts else looked_at,
+            stability=method.stability,
             resume=resume,
         )
 
