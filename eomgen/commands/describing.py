@@ -1,5 +1,6 @@
 """What there is and what a scene is made of: `list`, `schema`, `reference`, `check`."""
 
+import shlex
 import sys
 
 from eomgen.commands.shared import (
@@ -75,7 +76,7 @@ def check(given: Arguments) -> int:
     values = [f"{p.name} = {p.default:g}" for p in model.parameters]
     print_listed("parameters  ", shortened(values, most))
     if max(len(values), len(model.bodies), len(model.points), len(model.inputs)) > most:
-        print(f"            eomgen check {given.scene} --long lists all")
+        print(f"            eomgen check {shlex.quote(given.scene)} --long lists all")
     return 0
 
 

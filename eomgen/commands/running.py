@@ -26,7 +26,7 @@ from eomgen.commands.shared import (
     shortened,
 )
 from eomgen.effects import JointStop
-from eomgen.errors import RunError
+from eomgen.errors import InterruptedRunError, RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.joints.base import Geared
 from eomgen.model import Model, ways_of
@@ -106,7 +106,8 @@ def simulate(given: Arguments) -> int:
     warn_of_energy(motion)
     trouble = missed if trajectory.finished else f"{model.name}: {trajectory.message}"
     if trouble or drawing:
-        raise RunError("\n".join(line for line in (trouble, drawing) if line))
+        kind = InterruptedRunError if tried.interrupted else RunError
+        raise kind(*(line for line in (trouble, drawing) if line))
     if given.view:
         _open(paths["html"])
     return 0
@@ -230,10 +231,12 @@ def _save_pictures(
     try:
         save_figure(motion, paths["png"], force=force)
         save_page(motion, poses, parameters, paths["html"], force=force)
-    except RunError as error:
+    except (RunError, KeyboardInterrupt) as error:
         # Pictures of an earlier run must not stand beside the numbers of this one.
         for kind in ("png", "html"):
             remove_ours(paths.pop(kind))
+        if isinstance(error, KeyboardInterrupt):
+            raise
         return str(error)
     return ""
 

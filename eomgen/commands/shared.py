@@ -17,6 +17,7 @@ from eomgen.run.progress import terminal_notice
 from eomgen.scene.reader import find_scene, read_scene
 from eomgen.scene.schema import OUTPUTS
 from eomgen.store import Code, generated_code
+from eomgen.text import one_line
 
 Arguments = argparse.Namespace
 
@@ -65,15 +66,18 @@ def _output_names(text: str) -> Literal["all"] | Sequence[str]:
     return names
 
 
-def code_of(scene: str, model: Model, given: Arguments) -> tuple[Code, GeneratedModule]:
-    """A model's code, derived now or before, and its module, loaded and tried.
+def code_of(
+    scene: str, model: Model, given: Arguments, *, anew: bool = False
+) -> tuple[Code, GeneratedModule]:
+    """A model's code, derived now or, unless `anew`, before, and its module, loaded and tried.
 
-    Raises `SceneError` if it cannot be evaluated as the scene is, or has no output that the command
-    line names.
+    Why the store was not used is said on standard error, once. Raises `SceneError` if it cannot be
+    evaluated as the scene is, or has no output that the command line names.
     """
     with located(scene):
         with terminal_notice(f"deriving {model.name} …"):
-            code = generated_code(model)
+            code = generated_code(model, anew=anew)
+        note(given, code.notice)
         module = load_module(code.module, model.name)
         as_problem(module, model=model)
         if getattr(given, "outputs", None) not in (None, "all"):
@@ -83,13 +87,20 @@ def code_of(scene: str, model: Model, given: Arguments) -> tuple[Code, Generated
     return code, module
 
 
+def note(given: Arguments, notice: str) -> None:
+    """Say on standard error what a command did without, if anything, once."""
+    if notice and notice not in vars(given).setdefault("noted", []):
+        print(f"eomgen: note: {one_line(notice)}", file=sys.stderr)
+        given.noted.append(notice)
+
+
 @contextmanager
 def located(scene: str) -> Iterator[None]:
     """Name the scene's file in front of what is said of the scene."""
     try:
         yield
     except EomgenError as error:
-        raise SceneError(f"{find_scene(scene).name}: {error}") from None
+        raise SceneError(*(f"{find_scene(scene).name}: {line}" for line in error.lines)) from None
 
 
 def assignments(texts: list[str], known: Collection[str], option: str) -> dict[str, float]:
