@@ -76,11 +76,12 @@ def simulate(given: Arguments) -> int:
         "rest_speed": wanted.rest_speed,
         "guard": _guard(given, module, values),
     }
-    problem, words = as_problem(module, *values, model), ""
+    problem, start = as_problem(module, *values, model), None
     if given.resume is not None:
         assert setting is not None
-        start = going_on(load_npz(given.resume), given.resume, problem, setting)
-        problem, words = start.problem, start.words
+        bounds = {name: kept[name] for name in ("max_step", "rest_speed")}
+        start = going_on(load_npz(given.resume), given.resume, problem, setting, **bounds)
+        problem = start.problem
         kept |= start.options
     case = Case(
         problem,
@@ -100,6 +101,7 @@ def simulate(given: Arguments) -> int:
     model = model.with_parameters(parameters)
     motion = observe(model, module, trajectory, inputs)
     drawing = _write(code, trajectory, motion, tuple(model.defaults.values()), paths, given.force)
+    words = start.told(trajectory) if start else ""
     missed = _report(given, model, code, case, tried, choice, motion, words)
     for path in paths.values():
         print(f"    wrote {path}")

@@ -12,6 +12,7 @@ from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.run.explain import explain_by
 from eomgen.run.intervals import BY_INTERVALS, Interval
+from eomgen.run.origin import origin_of
 from eomgen.run.problem import Contacts, Floats, Problem, Switching
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
@@ -110,9 +111,8 @@ def as_problem(
         def jacobian(t: float, y: Floats) -> Floats:
             return module.jacobian(t, y, parameters, inputs)
 
-    explain = explain_by(
-        model, _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
-    )
+    given = _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
+    explain = explain_by(model, *given)
     try:
         initial = module.initial_state(parameters)
     except (ValueError, ArithmeticError) as error:
@@ -122,7 +122,7 @@ def as_problem(
     except (ValueError, ArithmeticError) as error:
         why = explain(0.0, initial, initial)
         raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None
-    values = {**module.PARAMETERS, **_by_name(module.PARAMETERS, parameters)}
+    values = {**module.PARAMETERS, **given[0]}
     start = dict(zip(module.STATES, initial.tolist(), strict=True))
     size = mechanism_size(module.UNITS, values, start)
     switching = _switching(module, parameters, inputs)
@@ -139,6 +139,7 @@ def as_problem(
         corners=switching is not None,
         switching=switching,
         sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
+        origin=origin_of(model, *given) if model else None,
     )
 
 

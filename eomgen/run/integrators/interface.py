@@ -55,7 +55,8 @@ class Adaptive:
     one_step       whether it steps on from a state alone, which then may be put right between steps
     remedy         what to change when a run goes astray
     memory         attributes of the solver, numbers or arrays, that with time and state are all
-                   that the next step goes on from; none where there is more to it
+                   that the next step goes on from, the first its length; none where there is more
+    vectors        those of memory that have a number for each state
     sees_end       whether its error estimate sees the derivative at the end of a step
     """
 
@@ -64,6 +65,7 @@ class Adaptive:
     one_step: bool
     remedy: str
     memory: tuple[str, ...] = ()
+    vectors: tuple[str, ...] = ("f", "slope")
     sees_end: bool = True
 
 
