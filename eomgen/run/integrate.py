@@ -41,6 +41,7 @@ def integrate(
     powers: Powers | None = None,
     resume: Resume | None = None,
     guard: Guard | None = None,
+    unstable: bool = False,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
@@ -66,6 +67,8 @@ def integrate(
                 not ended, if problem, method and step or tolerances are the same
     guard       watches the derivative's rounding at every step, and stops the run where digits are
                 lost, or repairs it (`run.guard`); what it lets pass is what it is without
+    unstable    lets equal steps of an explicit method be too long for stability, to show what they
+                then do; else the run stops there and says how long they may be
 
     Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
     has begun, Ctrl-C included, ends it early instead: the trajectory then holds the finite rows
@@ -103,7 +106,8 @@ def integrate(
     if isinstance(method, FixedStep):
         # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
-        looked_at = problem if method.explicit and not (watch and watch.guard.repairs) else None
+        unseen = unstable or not method.explicit or (watch and watch.guard.repairs)
+        looked_at = None if unseen else problem
         begin, remembered = equal_steps(asked, method, counted, looked_at)
     else:
         begin, remembered = adaptive_steps(asked, method, problem)
