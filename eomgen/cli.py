@@ -175,6 +175,11 @@ def _force(parser: argparse.ArgumentParser) -> None:
 def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
     parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
+    parser.add_argument(
+        "--unstable",
+        action="store_true",
+        help="let steps of an explicit method be too long, to see the motion blow up",
+    )
     parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
     parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
     parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")

@@ -66,6 +66,7 @@ def simulate(given: Arguments) -> int:
             "--from: goes on with a method that is named; leave --accuracy, --budget out"
         )
     setting = None if chosen else _setting(given, model)
+    _check_unstable(given, setting)
     paths = _output_paths(given, name)
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
@@ -76,12 +77,14 @@ def simulate(given: Arguments) -> int:
         "max_step": given.max_step,
         "rest_speed": wanted.rest_speed,
         "guard": _guard(given, module, values),
+        "unstable": given.unstable,
     }
-    problem, words = as_problem(module, *values, model), ""
+    problem, start = as_problem(module, *values, model), None
     if given.resume is not None:
         assert setting is not None
-        start = going_on(load_npz(given.resume), given.resume, problem, setting)
-        problem, words = start.problem, start.words
+        bounds = {name: kept[name] for name in ("max_step", "rest_speed")}
+        start = going_on(load_npz(given.resume), given.resume, problem, setting, **bounds)
+        problem = start.problem
         kept |= start.options
     case = Case(
         problem,
@@ -101,6 +104,7 @@ def simulate(given: Arguments) -> int:
     model = model.with_parameters(parameters)
     motion = observe(model, module, trajectory, inputs)
     drawing = _write(code, trajectory, motion, tuple(model.defaults.values()), paths, given.force)
+    words = start.told(trajectory) if start else ""
     missed = _report(given, model, code, case, tried, choice, motion, words)
     for path in paths.values():
         print(f"    wrote {path}")
@@ -174,11 +178,13 @@ def _report(
 
 
 def _bounded(given: Arguments, trajectory: Trajectory) -> list[str]:
-    """What else than their error kept steps short, and how often."""
+    """What else than their error kept steps short, and how often; that nothing did, if asked."""
     from eomgen.run.checks import LEAST_STEPS
 
     steps, capped, cut = (trajectory.counts[name] for name in ("steps", "capped", "cut"))
     lines = []
+    if given.unstable:
+        lines.append("steps were let be too long for stability (--unstable)")
     if cut:
         times = "once" if cut == 1 else f"{cut} times"
         lines.append(
@@ -193,6 +199,22 @@ def _bounded(given: Arguments, trajectory: Trajectory) -> list[str]:
             "pass over cannot be told; --max-step sets another length"
         )
     return lines
+
+
+def _check_unstable(given: Arguments, setting: "Setting | None") -> None:
+    """Raise `RunError` for `--unstable` where no step can be too long."""
+    from eomgen.run.integrators import FixedStep, find_integrator
+
+    if not given.unstable:
+        return
+    if setting is None:
+        raise RunError("--unstable: is for a step that is given; leave --accuracy, --budget out")
+    method = find_integrator(setting.integrator)
+    if not (isinstance(method, FixedStep) and method.explicit):
+        raise RunError(
+            f"--unstable: steps of {setting.integrator} are stable however long, or its own "
+            "choice; leave it out, or take --integrator euler, leapfrog or rk4"
+        )
 
 
 def _guard(

@@ -12,6 +12,7 @@ from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.run.explain import explain_by
 from eomgen.run.intervals import BY_INTERVALS, Interval
+from eomgen.run.origin import origin_of
 from eomgen.run.problem import Contacts, Floats, Problem, Switching
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
@@ -114,9 +115,8 @@ def as_problem(
         except FloatingPointError:  # y is so large that a method had better not have tried it
             return np.full(len(y), np.nan)
 
-    explain = explain_by(
-        model, _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
-    )
+    given = _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
+    explain = explain_by(model, *given)
     try:
         initial = module.initial_state(parameters)
     except (ValueError, ArithmeticError) as error:
@@ -126,7 +126,7 @@ def as_problem(
     except (ValueError, ArithmeticError) as error:
         why = explain(0.0, initial, initial)
         raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None
-    values = {**module.PARAMETERS, **_by_name(module.PARAMETERS, parameters)}
+    values = {**module.PARAMETERS, **given[0]}
     start = dict(zip(module.STATES, initial.tolist(), strict=True))
     size = mechanism_size(module.UNITS, values, start)
     switching = _switching(module, parameters, inputs)
@@ -143,6 +143,7 @@ def as_problem(
         corners=switching is not None,
         switching=switching,
         sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
+        origin=origin_of(model, *given) if model else None,
     )
 
 

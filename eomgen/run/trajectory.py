@@ -2,7 +2,6 @@
 
 import csv
 import io
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,13 +11,15 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.files import is_ours, read_plain, write_whole
+from eomgen.run.archive import Array, checked, packed, unpacked
+from eomgen.run.origin import Origin
 from eomgen.run.problem import Floats
 
-FORMAT = "trajectory 2"
-RESUME = "resume_"
-"""Begins the names of members of a file that a later run goes on from."""
+FORMAT = "trajectory 3"
 LARGEST = 2**32
 """Bytes of the largest file that is read: a run of a million samples of 500 states."""
+RESUME = "resume_"
+"""Begins the names of members of a file that a later run goes on from."""
 COUNTS = ("steps", "derivatives", "jacobians", "impacts", "capped", "cut")
 Kind = Literal["impact", "rest", "lift"]
 
@@ -57,6 +58,7 @@ class Trajectory:
     work_names    names of these m effects
     resume        what a later run goes on from, to the same bytes as this one would have: arrays by
                   name, see `integrate`; none where the method cannot
+    origin        what motion it is of; None if that was not known
 
     Raises `ValueError` if these do not fit together.
     """
@@ -73,6 +75,7 @@ class Trajectory:
     works: Floats | None = None
     work_names: tuple[str, ...] = ()
     resume: Mapping[str, Floats] = field(default_factory=dict)
+    origin: Origin | None = None
 
     def __post_init__(self) -> None:
         t, y = np.array(self.t, dtype=np.float64), np.array(self.y, dtype=np.float64)
@@ -108,105 +111,132 @@ def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
 
     Raises `RunError` if `path` cannot be written or holds a foreign file (then give `force`).
     """
-    buffer = io.BytesIO()
+    events = trajectory.events
     # Members keep this order: `eomgen` comes first, where it marks the file as ours.
-    np.savez(
-        buffer,
-        eomgen=np.array(FORMAT),
-        t=trajectory.t,
-        y=trajectory.y,
-        states=np.array(trajectory.states, dtype=np.str_),
-        name=np.array(trajectory.name),
-        integrator=np.array(trajectory.integrator),
-        finished=np.array(trajectory.finished),
-        message=np.array(trajectory.message),
-        counts=np.array([trajectory.counts[key] for key in COUNTS], dtype=np.int64),
-        events=np.array([(event.t, event.speed) for event in trajectory.events]).reshape(-1, 2),
-        event_names=np.array(
-            [(event.contact, event.kind) for event in trajectory.events], dtype=np.str_
-        ).reshape(-1, 2),
-        **_worked(trajectory),
-        **_resumed(trajectory),
-    )
-    write_whole(path, buffer.getvalue(), force=force)
+    members: dict[str, Array] = {
+        "eomgen": np.array(FORMAT),
+        "t": trajectory.t,
+        "y": trajectory.y,
+        "states": _names(trajectory.states),
+        "name": np.array(trajectory.name),
+        "integrator": np.array(trajectory.integrator),
+        "finished": np.array(trajectory.finished),
+        "message": np.array(trajectory.message),
+        "counts": np.array([trajectory.counts[key] for key in COUNTS], dtype=np.int64),
+        "events": np.array([(event.t, event.speed) for event in events]).reshape(-1, 2),
+        "event_names": _names([(event.contact, event.kind) for event in events]).reshape(-1, 2),
+    }
+    if trajectory.works is not None:
+        members |= {"works": trajectory.works, "work_names": _names(trajectory.work_names)}
+    if trajectory.origin is not None:
+        members |= _origin_members(trajectory.origin)
+    members |= {f"{RESUME}{name}": trajectory.resume[name] for name in sorted(trajectory.resume)}
+    write_whole(path, packed(members), force=force)
 
 
-def _worked(trajectory: Trajectory) -> dict[str, Any]:
-    """The members of a file that hold works; none where they were not asked for."""
-    if trajectory.works is None:
-        return {}
-    names = np.array(trajectory.work_names, dtype=np.str_)
-    return {"works": trajectory.works, "work_names": names}
+def _names(names: Any) -> Array:
+    return np.array(names, dtype=np.str_)
 
 
-def _resumed(trajectory: Trajectory) -> dict[str, Any]:
-    """The members of a file that a later run goes on from."""
-    return {f"{RESUME}{name}": trajectory.resume[name] for name in sorted(trajectory.resume)}
+def _origin_members(origin: Origin) -> dict[str, Array]:
+    """The members of a file that hold where a motion comes from."""
+    members = {"scene": _names([*origin.scene.items()]).reshape(-1, 2)}
+    for kind in ("parameters", "inputs"):
+        values: Mapping[str, float] = getattr(origin, kind)
+        members[f"{kind}_names"] = _names([*values])
+        members[kind] = np.array([*values.values()], dtype=np.float64)
+    return members
 
 
 def load_npz(path: Path) -> Trajectory:
     """Return the trajectory that `save_npz` wrote; runs no code that the file may hold.
 
-    Raises `RunError` if the file is missing, not a trajectory of ours, or damaged.
+    What is read is what was written, by a digest over all of it. Raises `RunError` if the file is
+    missing, not a trajectory of ours, or damaged.
     """
     data = read_plain(path, LARGEST)
     if not is_ours(data):
         raise RunError(f"{path}: is no trajectory written by eomgen")
-    try:
-        members = _members(data)
-        form = str(members["eomgen"])
-        if form == FORMAT:
-            return Trajectory(
-                name=str(members["name"]),
-                states=tuple(members["states"].tolist()),
-                t=members["t"],
-                y=members["y"],
-                integrator=str(members["integrator"]),
-                finished=bool(members["finished"]),
-                message=str(members["message"]),
-                counts=dict(zip(COUNTS, members["counts"].tolist(), strict=True)),
-                events=tuple(
-                    Event(t, contact, kind, speed)
-                    for (t, speed), (contact, kind) in zip(
-                        members["events"].tolist(), members["event_names"].tolist(), strict=True
-                    )
-                ),
-                works=members.get("works"),
-                work_names=tuple(members.get("work_names", np.array(())).tolist()),
-                resume={
-                    name.removeprefix(RESUME): members[name]
-                    for name in members
-                    if name.startswith(RESUME)
-                },
-            )
     # What a broken archive makes zipfile and NumPy raise has no common base.
-    except Exception as error:
-        text = " ".join(str(error).split())
-        raise RunError(f"{path}: is damaged ({text}); simulate again") from None
+    try:
+        members = unpacked(data)
+        form = _text(members["eomgen"])
+        if form == FORMAT:
+            return _trajectory(checked(members))
+    except Exception:
+        raise RunError(f"{path}: is damaged; simulate again") from None
     raise RunError(
         f"{path}: is in format '{form}', but this eomgen reads '{FORMAT}'; simulate again"
     )
 
 
-def _members(data: bytes) -> dict[str, Any]:
-    """The arrays of an archive. Raises whatever zipfile and NumPy raise, or `ValueError` for one
-    that would take more memory than its own bytes.
+def _trajectory(members: dict[str, Array]) -> Trajectory:
+    """The trajectory of an archive's members, each of the type that it was written as, no others.
 
-    This program compresses nothing, and every entry of its arrays has bytes. Members that are
-    compressed or share bytes, and arrays of many entries without a byte, are of others.
+    Raises `ValueError` or `KeyError` if it holds none.
     """
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        about = archive.infolist()
-    packed = any(member.compress_type != zipfile.ZIP_STORED for member in about)
-    if packed or sum(member.file_size for member in about) > len(data):
-        raise ValueError("it holds more than its size")
-    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        members = {name: archive[name] for name in archive.files}
-    if any(array.size > len(data) for array in members.values()):
-        raise ValueError("it holds more than its size")
-    if any(array.dtype.kind not in "biufU" for array in members.values()):
-        raise ValueError("it holds what is neither numbers nor text")
-    return members
+    rest = dict(members)
+    del rest["eomgen"]
+    counts, finished = rest.pop("counts"), rest.pop("finished")
+    if counts.dtype != np.int64 or counts.ndim != 1 or finished.dtype != np.bool_ or finished.ndim:
+        raise ValueError("numbers of another type")
+    worked, known = "works" in rest, "scene" in rest
+    pairs = zip(
+        _floats(rest.pop("events"), 2).tolist(), _strings(rest.pop("event_names"), 2), strict=True
+    )
+    made = Trajectory(
+        name=_text(rest.pop("name")),
+        states=tuple(_strings(rest.pop("states"), 1)),
+        t=_floats(rest.pop("t"), 1),
+        y=_floats(rest.pop("y"), 2),
+        integrator=_text(rest.pop("integrator")),
+        finished=bool(finished),
+        message=_text(rest.pop("message")),
+        counts=dict(zip(COUNTS, counts.tolist(), strict=True)),
+        events=tuple(Event(t, contact, kind, speed) for (t, speed), (contact, kind) in pairs),
+        works=_floats(rest.pop("works"), 2) if worked else None,
+        work_names=tuple(_strings(rest.pop("work_names"), 1)) if worked else (),
+        resume={
+            name.removeprefix(RESUME): _floats(rest.pop(name))
+            for name in members
+            if name.startswith(RESUME)
+        },
+        origin=_origin(rest) if known else None,
+    )
+    if rest:
+        raise ValueError("members that no trajectory has")
+    return made
+
+
+def _origin(rest: dict[str, Array]) -> Origin:
+    """Where a motion comes from; takes its members out."""
+    values = []
+    for kind in ("parameters", "inputs"):
+        names = _strings(rest.pop(f"{kind}_names"), 1)
+        values.append(dict(zip(names, _floats(rest.pop(kind), 1).tolist(), strict=True)))
+    return Origin(dict(_strings(rest.pop("scene"), 2)), *values)
+
+
+def _floats(array: Array, dimensions: int | None = None) -> Floats:
+    """An array of doubles. Raises `ValueError` for any other."""
+    if array.dtype != np.float64 or dimensions not in (None, array.ndim):
+        raise ValueError("no doubles, or not in that shape")
+    return array
+
+
+def _strings(array: Array, dimensions: int) -> list[Any]:
+    """Texts, or lists of them. Raises `ValueError` for anything else."""
+    if array.dtype.kind != "U" or array.ndim != dimensions:
+        raise ValueError("no texts, or not in that shape")
+    found: list[Any] = array.tolist()
+    return found
+
+
+def _text(array: Array) -> str:
+    """A text. Raises `ValueError` for anything else."""
+    if array.dtype.kind != "U" or array.ndim:
+        raise ValueError("no text")
+    return str(array)
 
 
 def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
