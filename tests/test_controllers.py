@@ -67,7 +67,7 @@ inertia_com = [0.02, 0.03, 0.04]
 [[bodies]]
 name = "lower"
 mass = 0.5
-inertia_com = [0.01, 0.02, 0.03]
+inertia_com = [0.015, 0.02, 0.03]
 [[joints]]
 name = "shoulder"
 type = "ball"
@@ -339,10 +339,11 @@ def test_power() -> None:
 
 def test_absence_is_free() -> None:
     """No states, functions or names of controllers where there are none."""
-    bare = quick(WHEEL)
-    assert "max(" not in bare.source and ", x=None" not in bare.source
-    straight = quick(WHEEL + servo("pd"))
-    assert straight.model.states == () and "max(" not in straight.source
+    bare, straight = quick(WHEEL), quick(WHEEL + servo("pd"))
+    for made in (bare, straight):
+        kernels, shell = made.source.split("def _numbers")
+        assert "max(" not in kernels and ", x=None" not in shell
+    assert straight.model.states == ()
     assert quick(WHEEL + servo("pd", "target_rate = 0")).source == straight.source
 
 
