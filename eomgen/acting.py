@@ -58,6 +58,7 @@ def acting_effects(
     ways = ways_of(bodies, scene.dimensions)
     names_of_ways = {b.joint.name: [c.name for c in b.positions] for b in bodies}
     there = _there(scene, bodies, ways)
+    types = {b.joint.name: b.joint.type for b in bodies}
     effects: list[Effect] = []
     for i, effect in enumerate(scene.effects):
         place = f"effects[{i}]"
@@ -65,6 +66,12 @@ def acting_effects(
             raise SceneError(f"{place}.type: a second 'gravity'; give one")
         for fields, (what, names) in there.items():
             for name, spot in _names_in(effect, getattr(effect, fields), place):
+                if "joint" in what and name in types and name not in names:
+                    one = what if fields == "joint_fields" else f"{what} and is not free"
+                    raise SceneError(
+                        f"{spot}: '{name}' is a {types[name]} joint, which '{effect.type}' does "
+                        f"not act on; name a {one}"
+                    )
                 check_known(name, spot, names, what)
         effect.check_ways(ways, names_of_ways, place)
         vectors = {

@@ -163,6 +163,11 @@ def _bodies(
     anchors = dict.fromkeys([WORLD, *names])
     holding: dict[str, tuple[Joint, str]] = {}
     for joint, place in joints:
+        if joint.child == WORLD:
+            raise SceneError(
+                f"{place}.child: '{WORLD}' is the ground, which hangs on nothing; name it as the "
+                "parent, and give no body a second joint: loops are not closed"
+            )
         check_known(joint.child, f"{place}.child", names, "body")
         if joint.parent != WORLD:
             check_known(joint.parent, f"{place}.parent", anchors, "body")

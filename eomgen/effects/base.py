@@ -290,3 +290,7 @@ class EffectTable(Table):
         closed form takes them.
         """
         return False
+
+    def why_not_plain(self) -> str:
+        """What keeps one that is not from the closed form, in a few words."""
+        return "that depends on the motion"
