@@ -9,6 +9,7 @@ from eomgen.effects import Effect
 from eomgen.errors import SceneError
 from eomgen.joints import Joint
 from eomgen.joints.base import WORLD
+from eomgen.language.conditions import Condition, of_inertia, require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, with_components
 from eomgen.model import Body, Model, Point
@@ -18,7 +19,7 @@ from eomgen.scene.chains import written_out
 from eomgen.scene.definitions import with_definitions
 from eomgen.scene.look import check_look
 from eomgen.scene.schema import OUTPUTS, Scene
-from eomgen.straighten import checked_inertia, straightened_joint, unit_quaternions
+from eomgen.straighten import entries_of_inertia, straightened_joint, unit_quaternions
 
 
 def build_model(scene: Scene) -> Model:
@@ -29,11 +30,12 @@ def build_model(scene: Scene) -> Model:
     parameters, known = _scene_parameters(scene)
     motion = _motion(scene)
     scene = with_definitions(scene, motion)
-    bodies, notices = _bodies(scene, known, parameters, motion)
+    conditions: list[Condition] = []
+    bodies, notices = _bodies(scene, known, parameters, conditions, motion)
     names = {body.name: i for i, body in enumerate(bodies)}
     sliding = sliding_in(bodies, scene.dimensions)
-    effects = acting_effects(scene, bodies, sliding, known, parameters, motion)
-    points = _points(scene, names, known, parameters, motion)
+    effects = acting_effects(scene, bodies, sliding, known, parameters, conditions, motion)
+    points = _points(scene, names, known, parameters, conditions, motion)
     inputs = [at_joint(x, e, sliding) for e in effects for x in e.inputs(scene.dimensions)]
     states = [at_joint(x, e, sliding) for e in effects for x in e.states(scene.dimensions)]
     if not any(body.velocities for body in bodies):
@@ -49,6 +51,7 @@ def build_model(scene: Scene) -> Model:
         title=scene.title or scene.name,
         dimensions=scene.dimensions,
         parameters=tuple(parameters),
+        conditions=tuple(conditions),
         inputs=tuple(inputs),
         bodies=tuple(bodies),
         points=tuple(points),
@@ -145,7 +148,11 @@ def _motion(scene: Scene) -> list[str]:
 
 
 def _bodies(
-    scene: Scene, known: dict[str, float], parameters: list[Parameter], motion: Sequence[str]
+    scene: Scene,
+    known: dict[str, float],
+    parameters: list[Parameter],
+    conditions: list[Condition],
+    motion: Sequence[str],
 ) -> tuple[list[Body], tuple[str, ...]]:
     """Bodies with their joints, parents first and otherwise in the scene's order; and notices."""
     bodies, joints = written_out(scene)
@@ -155,6 +162,11 @@ def _bodies(
     anchors = dict.fromkeys([WORLD, *names])
     holding: dict[str, tuple[Joint, str]] = {}
     for joint, place in joints:
+        if joint.child == WORLD:
+            raise SceneError(
+                f"{place}.child: '{WORLD}' is the ground, which hangs on nothing; name it as the "
+                "parent, and give no body a second joint: loops are not closed"
+            )
         check_known(joint.child, f"{place}.child", names, "body")
         if joint.parent != WORLD:
             check_known(joint.parent, f"{place}.parent", anchors, "body")
@@ -180,15 +192,19 @@ def _bodies(
         joint, joint_place = holding[name]
         joint = straightened_joint(joint, joint_place, scene.dimensions, notices)
         check_look(body.shapes, None, scene.dimensions, place)
-        count = len(parameters)
-        body = named(body, body.name, place, known, parameters, motion)
-        own = {p.name: p.default for p in parameters[count:]}
-        joint = named(joint, joint.name, joint_place, known, parameters, motion)
+        body = named(body, body.name, place, known, parameters, conditions, motion)
+        inertia_com = entries_of_inertia(body, place, scene.dimensions)
+        values = {**known, **{p.name: p.default for p in parameters}}
+        at = f"{place}.inertia_com"
+        sound = list(of_inertia(at, body.name, body.mass, inertia_com, values))
+        require(sound, values)
+        conditions += sound
+        joint = named(joint, joint.name, joint_place, known, parameters, conditions, motion)
         built.append(
             Body(
                 name=name,
                 mass=body.mass,
-                inertia_com=checked_inertia(body, place, scene.dimensions, {**known, **own}),
+                inertia_com=inertia_com,
                 joint=joint,
                 parent=-1 if joint.parent == WORLD else index[joint.parent],
                 positions=joint.positions(scene.dimensions),
@@ -224,6 +240,7 @@ def _points(
     names: dict[str, int],
     known: dict[str, float],
     parameters: list[Parameter],
+    conditions: list[Condition],
     motion: Sequence[str],
 ) -> list[Point]:
     check_names([(point.name, f"points[{i}]") for i, point in enumerate(scene.points)])
@@ -232,7 +249,8 @@ def _points(
         place = f"points[{i}]"
         check_known(point.body, f"{place}.body", names, "body")
         at = with_components(point.at, ZERO, scene.dimensions, f"{place}.at")
-        point = named(point.replaced(at=at), point.name, place, known, parameters, motion)
+        point = point.replaced(at=at)
+        point = named(point, point.name, place, known, parameters, conditions, motion)
         points.append(Point(point.name, names[point.body], point.at))
     return points
 

@@ -100,7 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     check = command("check", commands.check, "validate a scene and say what it is made of")
     check.add_argument("--long", action="store_true", help="list everything, however much")
     _form(check)
-    derive = _form(command("derive", commands.derive, "print the derivation, step by step"))
+    derive = command("derive", commands.derive, "print the derivation, step by step")
     derive.add_argument("--format", choices=("text", "latex", "html"), default="text")
     derive.add_argument("-o", "--output", metavar="FILE", type=_path, help="write it to a file")
     _force(derive)

@@ -11,6 +11,7 @@ from eomgen.effects import Driven, Effect
 from eomgen.effects.base import ExtraState, Input
 from eomgen.joints import Free, Joint, Revolute
 from eomgen.joints.base import Coordinate
+from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import Constant, Floats, Formula, evaluate
 from eomgen.language.quantity import Parameter
 from eomgen.scene.look import Camera, Shape
@@ -116,6 +117,7 @@ class Seat:
 class Model:
     """A mechanism with everything that acts on it; see `build_model`.
 
+    `conditions` are what values of the parameters keep.
     `states` are those that effects bring along, after coordinates and velocities.
     `locked` holds each coordinate that is held fast, by name, with its value.
     `notices` say what was put right on the way, a line each.
@@ -125,6 +127,7 @@ class Model:
     title: str
     dimensions: int
     parameters: tuple[Parameter, ...]
+    conditions: tuple[Condition, ...]
     inputs: tuple[Input, ...]
     bodies: tuple[Body, ...]
     points: tuple[Point, ...]
@@ -271,9 +274,14 @@ class Model:
         return float(2.0 ** (40 * round(math.log2(largest) / 40)))
 
     def with_parameters(self, values: Mapping[str, float]) -> "Model":
-        """The same model with other values for some parameters."""
+        """The same model with other values for some parameters.
+
+        Raises `SceneError` for values that a scene may not have.
+        """
         parameters = (replace(p, default=values.get(p.name, p.default)) for p in self.parameters)
-        return replace(self, parameters=tuple(parameters))
+        model = replace(self, parameters=tuple(parameters))
+        require(self.conditions, model.defaults)
+        return model
 
     def value(self, formula: Formula) -> float:
         """A quantity's value at the scene's parameters."""

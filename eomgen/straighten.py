@@ -9,15 +9,14 @@ import numpy as np
 from eomgen.errors import SceneError
 from eomgen.joints import Free, Joint
 from eomgen.joints.base import Geared
-from eomgen.language.formula import ZERO, Constant, Floats, Formula, evaluate
+from eomgen.language.conditions import ROUNDING
+from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import with_components
 from eomgen.model import Model
 from eomgen.scene.schema import BodyTable
 
 PARALLEL = 1e-6
 """Sine of the angle below which the two axes of a universal joint count as one."""
-ROUNDING = 1e-9
-"""How far numbers of a scene may be from what they should be, for having been rounded."""
 
 
 def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[str]) -> Joint:
@@ -87,23 +86,13 @@ def _example(axis: Sequence[float]) -> str:
     return str([1.0, *([0.0] * (len(axis) - 1))])
 
 
-def checked_inertia(
-    body: BodyTable, place: str, dimensions: int, known: Mapping[str, float]
-) -> tuple[Formula, ...]:
-    """The entries of a body's inertia: one in the plane, six in space; `known` are parameters.
+def entries_of_inertia(body: BodyTable, place: str, dimensions: int) -> tuple[Formula, ...]:
+    """The entries of a body's inertia: one in the plane, six in space.
 
-    Raises `SceneError`, naming the body, if its values are no inertia of any body: not positive, or
-    against the triangle inequality; or if it has inertia but no mass.
+    Raises `SceneError`, naming the body, if there are not as many as there should be.
     """
     given = body.inertia_com
-    values = [
-        float(evaluate(f, known, Floats()))
-        for f in (given if isinstance(given, tuple) else (given,))
-    ]
-    mass = float(evaluate(body.mass, known, Floats()))
     where = f"{place}.inertia_com: body '{body.name}'"
-    if mass == 0.0 and any(values):
-        raise SceneError(f"{where} has inertia but no mass; give it a mass, or inertia_com = 0")
     if dimensions == 2:
         if isinstance(given, tuple):
             raise SceneError(f"{where} has {len(given)} entries; the plane takes one number")
@@ -113,30 +102,10 @@ def checked_inertia(
             raise SceneError(
                 f"{where} has {len(given)} entries; give [xx, yy, zz], or those and xy, xz, yz"
             )
-        _check_matrix(values + [0.0] * (6 - len(values)), where)
-        return (*given, *([Constant(0.0)] * (6 - len(given))))
-    if values != [0.0]:
+        return (*given, *([ZERO] * (6 - len(given))))
+    if given != ZERO:
         raise SceneError(f"{where} has one number; space takes [xx, yy, zz], or 0 for a particle")
     return (ZERO,) * 6
-
-
-def _check_matrix(values: Sequence[float], where: str) -> None:
-    """The principal moments are not negative, and none is larger than the other two together."""
-    xx, yy, zz, xy, xz, yz = values
-    scale = max(map(abs, values)) or 1.0
-    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / scale
-    a, b, c = np.linalg.eigvalsh(matrix).tolist()
-    shown = ", ".join(f"{scale * moment:.6g}" for moment in (a, b, c))
-    if a < -ROUNDING:
-        raise SceneError(
-            f"{where} has principal moments {shown}; none may be negative: "
-            "make the products xy, xz, yz smaller"
-        )
-    if c > a + b + ROUNDING:
-        raise SceneError(
-            f"{where} has principal moments {shown}; no body has one larger than the other two "
-            "together: change xx, yy or zz"
-        )
 
 
 def unit_quaternions(model: Model, given: Collection[object]) -> Model:

@@ -110,6 +110,14 @@ COST = {
 }
 
 
+def _refused(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = c_1 - l_1
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters c_1, l_1: joints[1].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k1)
+    return None
+
+
 def _fixed(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_1 > 0.0:
@@ -220,6 +228,12 @@ def _constants(key):
     near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):

@@ -128,6 +128,19 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
+def _refused(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, ground_friction, ground_slip_speed):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    if not ground_radius >= 0.0:
+        return 'parameters ground_radius: effects[1].radius: {:g} is negative; give a number >= 0 in m'.format(ground_radius)
+    if not ground_friction >= 0.0:
+        return 'parameters ground_friction: effects[1].friction: {:g} is negative; give a number >= 0 in '.format(ground_friction)
+    if not ground_slip_speed > 0.0:
+        return 'parameters ground_slip_speed: effects[1].slip_speed: {:g} is not positive; give a number > 0 in m/s'.format(ground_slip_speed)
+    if not 0.0 <= ground_restitution <= 1.0:
+        return 'parameters ground_restitution: effects[1].restitution: {:g} is not from 0 to 1; give one that is'.format(ground_restitution)
+    return None
+
+
 def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, ground_friction, ground_slip_speed):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_A > 0.0:
@@ -164,6 +177,12 @@ def _constants(key):
     near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -807,7 +826,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and -reach < state[0] + state[1] < reach:
                 return _from(values, _FLOAT, 8)
         except (ArithmeticError, ValueError):

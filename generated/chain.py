@@ -2564,7 +2564,7 @@ def derivative(t, y, p=None, u=None):
             made = _parameters(p)
             k, reach = made["derivative"], made["reach"]
         try:
-            values = _derivative(y.tolist(), k, _NO_INPUT)
+            values = _derivative(y.tolist(), k)
             if hypot(*values) < reach:
                 return _from(values, _FLOAT, 20)
         except (ArithmeticError, ValueError):

@@ -505,6 +505,353 @@ COST = {
 }
 
 
+def _refused(body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, l_grip, g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = body_mass * m_hand
+    k2 = l_hand * kx_hand
+    k3 = k1 * (k2 * k2)
+    k4 = l_hand * ky_hand
+    k5 = k1 * (k4 * k4)
+    k6 = l_hand * kz_hand
+    k7 = k1 * (k6 * k6)
+    k8 = k3 + k5
+    k9 = 5e-10 * (k7 + k8)
+    k10 = min(min(k5 + k7 + k9 - k3, k9 + (k3 + k7) - k5), k8 + k9 - k7)
+    k11 = l_hand * c_hand
+    k12 = k11 - l_grip
+    k13 = body_mass * m_forearm
+    k14 = l_forearm * kx_forearm
+    k15 = k13 * (k14 * k14)
+    k16 = l_forearm * ky_forearm
+    k17 = k13 * (k16 * k16)
+    k18 = l_forearm * kz_forearm
+    k19 = k13 * (k18 * k18)
+    k20 = k15 + k17
+    k21 = 5e-10 * (k19 + k20)
+    k22 = min(min(k17 + k19 + k21 - k15, k21 + (k15 + k19) - k17), k20 + k21 - k19)
+    k23 = l_forearm * (c_forearm - 1.0)
+    k24 = body_mass * m_upper_arm
+    k25 = l_upper_arm * kx_upper_arm
+    k26 = k24 * (k25 * k25)
+    k27 = l_upper_arm * ky_upper_arm
+    k28 = k24 * (k27 * k27)
+    k29 = l_upper_arm * kz_upper_arm
+    k30 = k24 * (k29 * k29)
+    k31 = k26 + k28
+    k32 = 5e-10 * (k30 + k31)
+    k33 = min(min(k28 + k30 + k32 - k26, k32 + (k26 + k30) - k28), k31 + k32 - k30)
+    k34 = l_forearm * c_forearm
+    k35 = l_upper_arm * (c_upper_arm - 1.0)
+    k36 = body_mass * m_thorax
+    k37 = l_thorax * kx_thorax
+    k38 = k36 * (k37 * k37)
+    k39 = l_thorax * ky_thorax
+    k40 = k36 * (k39 * k39)
+    k41 = l_thorax * kz_thorax
+    k42 = k36 * (k41 * k41)
+    k43 = k38 + k40
+    k44 = 5e-10 * (k42 + k43)
+    k45 = l_upper_arm * c_upper_arm
+    k46 = l_thorax * c_thorax
+    k47 = k46 - d_shoulder
+    k48 = body_mass * m_head
+    k49 = l_head * kx_head
+    k50 = k48 * (k49 * k49)
+    k51 = l_head * ky_head
+    k52 = k48 * (k51 * k51)
+    k53 = l_head * kz_head
+    k54 = k48 * (k53 * k53)
+    k55 = k50 + k52
+    k56 = 5e-10 * (k54 + k55)
+    k57 = l_head * (c_head - 1.0)
+    k58 = body_mass * m_abdomen
+    k59 = l_abdomen * kx_abdomen
+    k60 = k58 * (k59 * k59)
+    k61 = l_abdomen * ky_abdomen
+    k62 = k58 * (k61 * k61)
+    k63 = l_abdomen * kz_abdomen
+    k64 = k58 * (k63 * k63)
+    k65 = k60 + k62
+    k66 = 5e-10 * (k64 + k65)
+    k67 = l_thorax * (c_thorax - 1.0)
+    k68 = l_abdomen * c_abdomen
+    k69 = body_mass * m_pelvis
+    k70 = l_pelvis * kx_pelvis
+    k71 = k69 * (k70 * k70)
+    k72 = l_pelvis * ky_pelvis
+    k73 = k69 * (k72 * k72)
+    k74 = l_pelvis * kz_pelvis
+    k75 = k69 * (k74 * k74)
+    k76 = k71 + k73
+    k77 = 5e-10 * (k75 + k76)
+    k78 = l_abdomen * (c_abdomen - 1.0)
+    k79 = l_pelvis * c_pelvis
+    k80 = body_mass * m_thigh
+    k81 = l_thigh * kx_thigh
+    k82 = k80 * (k81 * k81)
+    k83 = l_thigh * ky_thigh
+    k84 = k80 * (k83 * k83)
+    k85 = l_thigh * kz_thigh
+    k86 = k80 * (k85 * k85)
+    k87 = k82 + k84
+    k88 = 5e-10 * (k86 + k87)
+    k89 = min(min(k84 + k86 + k88 - k82, k88 + (k82 + k86) - k84), k87 + k88 - k86)
+    k90 = l_pelvis * (c_pelvis - 1.0)
+    k91 = l_thigh * c_thigh
+    k92 = body_mass * m_shank
+    k93 = l_shank * kx_shank
+    k94 = k92 * (k93 * k93)
+    k95 = l_shank * ky_shank
+    k96 = k92 * (k95 * k95)
+    k97 = l_shank * kz_shank
+    k98 = k92 * (k97 * k97)
+    k99 = k94 + k96
+    k100 = 5e-10 * (k98 + k99)
+    k101 = min(min(k96 + k98 + k100 - k94, k100 + (k94 + k98) - k96), k99 + k100 - k98)
+    k102 = l_thigh * (c_thigh - 1.0)
+    k103 = l_shank * c_shank
+    k104 = body_mass * m_foot
+    k105 = l_foot * kx_foot
+    k106 = k104 * (k105 * k105)
+    k107 = l_foot * ky_foot
+    k108 = k104 * (k107 * k107)
+    k109 = l_foot * kz_foot
+    k110 = k104 * (k109 * k109)
+    k111 = k106 + k108
+    k112 = 5e-10 * (k110 + k111)
+    k113 = min(min(k108 + k110 + k112 - k106, k112 + (k106 + k110) - k108), k111 + k112 - k110)
+    k114 = l_shank * (c_shank - 1.0)
+    k115 = d_ankle - l_foot * c_foot
+    k116 = h_ankle / 2.0
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters m_hand, body_mass: bodies[0].mass: {:g} is larger than 1e+100; choose other units'.format(k1)
+    if not -1e+100 <= k3 <= 1e+100:
+        return 'parameters m_hand, body_mass, kx_hand, l_hand: bodies[0].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k3)
+    if not -1e+100 <= k5 <= 1e+100:
+        return 'parameters m_hand, body_mass, ky_hand, l_hand: bodies[0].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k5)
+    if not -1e+100 <= k7 <= 1e+100:
+        return 'parameters m_hand, body_mass, kz_hand, l_hand: bodies[0].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k7)
+    if not k10 >= 0.0:
+        return "parameters m_hand, body_mass, ky_hand, l_hand, kz_hand, kx_hand: bodies[0].inertia_com: body 'hand_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k3, k5, k7)
+    if not -1e+100 <= k12 <= 1e+100:
+        return 'parameters c_hand, l_hand, l_grip: joints[0].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k12)
+    if not -1e+100 <= k13 <= 1e+100:
+        return 'parameters m_forearm, body_mass: bodies[1].mass: {:g} is larger than 1e+100; choose other units'.format(k13)
+    if not -1e+100 <= k15 <= 1e+100:
+        return 'parameters m_forearm, body_mass, kx_forearm, l_forearm: bodies[1].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k15)
+    if not -1e+100 <= k17 <= 1e+100:
+        return 'parameters m_forearm, body_mass, ky_forearm, l_forearm: bodies[1].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k17)
+    if not -1e+100 <= k19 <= 1e+100:
+        return 'parameters m_forearm, body_mass, kz_forearm, l_forearm: bodies[1].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k19)
+    if not k22 >= 0.0:
+        return "parameters m_forearm, body_mass, ky_forearm, l_forearm, kz_forearm, kx_forearm: bodies[1].inertia_com: body 'forearm_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k15, k17, k19)
+    if not -1e+100 <= k11 <= 1e+100:
+        return 'parameters c_hand, l_hand: joints[1].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k11)
+    if not -1e+100 <= k23 <= 1e+100:
+        return 'parameters c_forearm, l_forearm: joints[1].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k23)
+    if not -1e+100 <= k24 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass: bodies[2].mass: {:g} is larger than 1e+100; choose other units'.format(k24)
+    if not -1e+100 <= k26 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, kx_upper_arm, l_upper_arm: bodies[2].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k26)
+    if not -1e+100 <= k28 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, ky_upper_arm, l_upper_arm: bodies[2].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k28)
+    if not -1e+100 <= k30 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, kz_upper_arm, l_upper_arm: bodies[2].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k30)
+    if not k33 >= 0.0:
+        return "parameters m_upper_arm, body_mass, ky_upper_arm, l_upper_arm, kz_upper_arm, kx_upper_arm: bodies[2].inertia_com: body 'upper_arm_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k26, k28, k30)
+    if not -1e+100 <= k34 <= 1e+100:
+        return 'parameters c_forearm, l_forearm: joints[2].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k34)
+    if not -1e+100 <= k35 <= 1e+100:
+        return 'parameters c_upper_arm, l_upper_arm: joints[2].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k35)
+    if not -1e+100 <= k36 <= 1e+100:
+        return 'parameters m_thorax, body_mass: bodies[3].mass: {:g} is larger than 1e+100; choose other units'.format(k36)
+    if not -1e+100 <= k38 <= 1e+100:
+        return 'parameters m_thorax, body_mass, kx_thorax, l_thorax: bodies[3].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k38)
+    if not -1e+100 <= k40 <= 1e+100:
+        return 'parameters m_thorax, body_mass, ky_thorax, l_thorax: bodies[3].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k40)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters m_thorax, body_mass, kz_thorax, l_thorax: bodies[3].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    if not min(min(k40 + k42 + k44 - k38, k44 + (k38 + k42) - k40), k43 + k44 - k42) >= 0.0:
+        return "parameters m_thorax, body_mass, ky_thorax, l_thorax, kz_thorax, kx_thorax: bodies[3].inertia_com: body 'thorax' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k38, k40, k42)
+    if not -1e+100 <= k45 <= 1e+100:
+        return 'parameters c_upper_arm, l_upper_arm: joints[3].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k45)
+    if not -1e+100 <= k47 <= 1e+100:
+        return 'parameters c_thorax, l_thorax, d_shoulder: joints[3].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k47)
+    if not -1e+100 <= k48 <= 1e+100:
+        return 'parameters m_head, body_mass: bodies[4].mass: {:g} is larger than 1e+100; choose other units'.format(k48)
+    if not -1e+100 <= k50 <= 1e+100:
+        return 'parameters m_head, body_mass, kx_head, l_head: bodies[4].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k50)
+    if not -1e+100 <= k52 <= 1e+100:
+        return 'parameters m_head, body_mass, ky_head, l_head: bodies[4].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k52)
+    if not -1e+100 <= k54 <= 1e+100:
+        return 'parameters m_head, body_mass, kz_head, l_head: bodies[4].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k54)
+    if not min(min(k52 + k54 + k56 - k50, k56 + (k50 + k54) - k52), k55 + k56 - k54) >= 0.0:
+        return "parameters m_head, body_mass, ky_head, l_head, kz_head, kx_head: bodies[4].inertia_com: body 'head' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k50, k52, k54)
+    if not -1e+100 <= k46 <= 1e+100:
+        return 'parameters c_thorax, l_thorax: joints[4].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k46)
+    if not -1e+100 <= k57 <= 1e+100:
+        return 'parameters c_head, l_head: joints[4].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k57)
+    if not -1e+100 <= k24 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass: bodies[5].mass: {:g} is larger than 1e+100; choose other units'.format(k24)
+    if not -1e+100 <= k26 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, kx_upper_arm, l_upper_arm: bodies[5].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k26)
+    if not -1e+100 <= k28 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, ky_upper_arm, l_upper_arm: bodies[5].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k28)
+    if not -1e+100 <= k30 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, kz_upper_arm, l_upper_arm: bodies[5].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k30)
+    if not k33 >= 0.0:
+        return "parameters m_upper_arm, body_mass, ky_upper_arm, l_upper_arm, kz_upper_arm, kx_upper_arm: bodies[5].inertia_com: body 'upper_arm_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k26, k28, k30)
+    if not -1e+100 <= k47 <= 1e+100:
+        return 'parameters c_thorax, l_thorax, d_shoulder: joints[5].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k47)
+    if not -1e+100 <= k45 <= 1e+100:
+        return 'parameters c_upper_arm, l_upper_arm: joints[5].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k45)
+    if not -1e+100 <= k58 <= 1e+100:
+        return 'parameters m_abdomen, body_mass: bodies[8].mass: {:g} is larger than 1e+100; choose other units'.format(k58)
+    if not -1e+100 <= k60 <= 1e+100:
+        return 'parameters m_abdomen, body_mass, kx_abdomen, l_abdomen: bodies[8].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k60)
+    if not -1e+100 <= k62 <= 1e+100:
+        return 'parameters m_abdomen, body_mass, ky_abdomen, l_abdomen: bodies[8].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k62)
+    if not -1e+100 <= k64 <= 1e+100:
+        return 'parameters m_abdomen, body_mass, kz_abdomen, l_abdomen: bodies[8].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k64)
+    if not min(min(k62 + k64 + k66 - k60, k66 + (k60 + k64) - k62), k65 + k66 - k64) >= 0.0:
+        return "parameters m_abdomen, body_mass, ky_abdomen, l_abdomen, kz_abdomen, kx_abdomen: bodies[8].inertia_com: body 'abdomen' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k60, k62, k64)
+    if not -1e+100 <= k67 <= 1e+100:
+        return 'parameters c_thorax, l_thorax: joints[8].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k67)
+    if not -1e+100 <= k68 <= 1e+100:
+        return 'parameters c_abdomen, l_abdomen: joints[8].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k68)
+    if not -1e+100 <= k13 <= 1e+100:
+        return 'parameters m_forearm, body_mass: bodies[6].mass: {:g} is larger than 1e+100; choose other units'.format(k13)
+    if not -1e+100 <= k15 <= 1e+100:
+        return 'parameters m_forearm, body_mass, kx_forearm, l_forearm: bodies[6].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k15)
+    if not -1e+100 <= k17 <= 1e+100:
+        return 'parameters m_forearm, body_mass, ky_forearm, l_forearm: bodies[6].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k17)
+    if not -1e+100 <= k19 <= 1e+100:
+        return 'parameters m_forearm, body_mass, kz_forearm, l_forearm: bodies[6].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k19)
+    if not k22 >= 0.0:
+        return "parameters m_forearm, body_mass, ky_forearm, l_forearm, kz_forearm, kx_forearm: bodies[6].inertia_com: body 'forearm_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k15, k17, k19)
+    if not -1e+100 <= k35 <= 1e+100:
+        return 'parameters c_upper_arm, l_upper_arm: joints[6].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k35)
+    if not -1e+100 <= k34 <= 1e+100:
+        return 'parameters c_forearm, l_forearm: joints[6].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k34)
+    if not -1e+100 <= k69 <= 1e+100:
+        return 'parameters m_pelvis, body_mass: bodies[9].mass: {:g} is larger than 1e+100; choose other units'.format(k69)
+    if not -1e+100 <= k71 <= 1e+100:
+        return 'parameters m_pelvis, body_mass, kx_pelvis, l_pelvis: bodies[9].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k71)
+    if not -1e+100 <= k73 <= 1e+100:
+        return 'parameters m_pelvis, body_mass, ky_pelvis, l_pelvis: bodies[9].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k73)
+    if not -1e+100 <= k75 <= 1e+100:
+        return 'parameters m_pelvis, body_mass, kz_pelvis, l_pelvis: bodies[9].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k75)
+    if not min(min(k73 + k75 + k77 - k71, k77 + (k71 + k75) - k73), k76 + k77 - k75) >= 0.0:
+        return "parameters m_pelvis, body_mass, ky_pelvis, l_pelvis, kz_pelvis, kx_pelvis: bodies[9].inertia_com: body 'pelvis' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k71, k73, k75)
+    if not -1e+100 <= k78 <= 1e+100:
+        return 'parameters c_abdomen, l_abdomen: joints[9].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k78)
+    if not -1e+100 <= k79 <= 1e+100:
+        return 'parameters c_pelvis, l_pelvis: joints[9].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k79)
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters m_hand, body_mass: bodies[7].mass: {:g} is larger than 1e+100; choose other units'.format(k1)
+    if not -1e+100 <= k3 <= 1e+100:
+        return 'parameters m_hand, body_mass, kx_hand, l_hand: bodies[7].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k3)
+    if not -1e+100 <= k5 <= 1e+100:
+        return 'parameters m_hand, body_mass, ky_hand, l_hand: bodies[7].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k5)
+    if not -1e+100 <= k7 <= 1e+100:
+        return 'parameters m_hand, body_mass, kz_hand, l_hand: bodies[7].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k7)
+    if not k10 >= 0.0:
+        return "parameters m_hand, body_mass, ky_hand, l_hand, kz_hand, kx_hand: bodies[7].inertia_com: body 'hand_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k3, k5, k7)
+    if not -1e+100 <= k23 <= 1e+100:
+        return 'parameters c_forearm, l_forearm: joints[7].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k23)
+    if not -1e+100 <= k11 <= 1e+100:
+        return 'parameters c_hand, l_hand: joints[7].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k11)
+    if not -1e+100 <= k80 <= 1e+100:
+        return 'parameters m_thigh, body_mass: bodies[10].mass: {:g} is larger than 1e+100; choose other units'.format(k80)
+    if not -1e+100 <= k82 <= 1e+100:
+        return 'parameters m_thigh, body_mass, kx_thigh, l_thigh: bodies[10].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k82)
+    if not -1e+100 <= k84 <= 1e+100:
+        return 'parameters m_thigh, body_mass, ky_thigh, l_thigh: bodies[10].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k84)
+    if not -1e+100 <= k86 <= 1e+100:
+        return 'parameters m_thigh, body_mass, kz_thigh, l_thigh: bodies[10].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k86)
+    if not k89 >= 0.0:
+        return "parameters m_thigh, body_mass, ky_thigh, l_thigh, kz_thigh, kx_thigh: bodies[10].inertia_com: body 'thigh_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k82, k84, k86)
+    if not -1e+100 <= k90 <= 1e+100:
+        return 'parameters c_pelvis, l_pelvis: joints[10].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k90)
+    if not -1e+100 <= k91 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[10].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k91)
+    if not -1e+100 <= k80 <= 1e+100:
+        return 'parameters m_thigh, body_mass: bodies[13].mass: {:g} is larger than 1e+100; choose other units'.format(k80)
+    if not -1e+100 <= k82 <= 1e+100:
+        return 'parameters m_thigh, body_mass, kx_thigh, l_thigh: bodies[13].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k82)
+    if not -1e+100 <= k84 <= 1e+100:
+        return 'parameters m_thigh, body_mass, ky_thigh, l_thigh: bodies[13].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k84)
+    if not -1e+100 <= k86 <= 1e+100:
+        return 'parameters m_thigh, body_mass, kz_thigh, l_thigh: bodies[13].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k86)
+    if not k89 >= 0.0:
+        return "parameters m_thigh, body_mass, ky_thigh, l_thigh, kz_thigh, kx_thigh: bodies[13].inertia_com: body 'thigh_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k82, k84, k86)
+    if not -1e+100 <= k90 <= 1e+100:
+        return 'parameters c_pelvis, l_pelvis: joints[13].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k90)
+    if not -1e+100 <= k91 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[13].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k91)
+    if not -1e+100 <= k92 <= 1e+100:
+        return 'parameters m_shank, body_mass: bodies[11].mass: {:g} is larger than 1e+100; choose other units'.format(k92)
+    if not -1e+100 <= k94 <= 1e+100:
+        return 'parameters m_shank, body_mass, kx_shank, l_shank: bodies[11].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k94)
+    if not -1e+100 <= k96 <= 1e+100:
+        return 'parameters m_shank, body_mass, ky_shank, l_shank: bodies[11].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k96)
+    if not -1e+100 <= k98 <= 1e+100:
+        return 'parameters m_shank, body_mass, kz_shank, l_shank: bodies[11].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k98)
+    if not k101 >= 0.0:
+        return "parameters m_shank, body_mass, ky_shank, l_shank, kz_shank, kx_shank: bodies[11].inertia_com: body 'shank_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k94, k96, k98)
+    if not -1e+100 <= k102 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[11].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k102)
+    if not -1e+100 <= k103 <= 1e+100:
+        return 'parameters c_shank, l_shank: joints[11].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k103)
+    if not -1e+100 <= k92 <= 1e+100:
+        return 'parameters m_shank, body_mass: bodies[14].mass: {:g} is larger than 1e+100; choose other units'.format(k92)
+    if not -1e+100 <= k94 <= 1e+100:
+        return 'parameters m_shank, body_mass, kx_shank, l_shank: bodies[14].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k94)
+    if not -1e+100 <= k96 <= 1e+100:
+        return 'parameters m_shank, body_mass, ky_shank, l_shank: bodies[14].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k96)
+    if not -1e+100 <= k98 <= 1e+100:
+        return 'parameters m_shank, body_mass, kz_shank, l_shank: bodies[14].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k98)
+    if not k101 >= 0.0:
+        return "parameters m_shank, body_mass, ky_shank, l_shank, kz_shank, kx_shank: bodies[14].inertia_com: body 'shank_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k94, k96, k98)
+    if not -1e+100 <= k102 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[14].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k102)
+    if not -1e+100 <= k103 <= 1e+100:
+        return 'parameters c_shank, l_shank: joints[14].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k103)
+    if not -1e+100 <= k104 <= 1e+100:
+        return 'parameters m_foot, body_mass: bodies[12].mass: {:g} is larger than 1e+100; choose other units'.format(k104)
+    if not -1e+100 <= k106 <= 1e+100:
+        return 'parameters m_foot, body_mass, kx_foot, l_foot: bodies[12].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k106)
+    if not -1e+100 <= k108 <= 1e+100:
+        return 'parameters m_foot, body_mass, ky_foot, l_foot: bodies[12].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k108)
+    if not -1e+100 <= k110 <= 1e+100:
+        return 'parameters m_foot, body_mass, kz_foot, l_foot: bodies[12].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k110)
+    if not k113 >= 0.0:
+        return "parameters m_foot, body_mass, ky_foot, l_foot, kz_foot, kx_foot: bodies[12].inertia_com: body 'foot_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k106, k108, k110)
+    if not -1e+100 <= k114 <= 1e+100:
+        return 'parameters c_shank, l_shank: joints[12].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k114)
+    if not -1e+100 <= k115 <= 1e+100:
+        return 'parameters d_ankle, c_foot, l_foot: joints[12].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k115)
+    if not -1e+100 <= k116 <= 1e+100:
+        return 'parameters h_ankle: joints[12].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k116)
+    if not -1e+100 <= k104 <= 1e+100:
+        return 'parameters m_foot, body_mass: bodies[15].mass: {:g} is larger than 1e+100; choose other units'.format(k104)
+    if not -1e+100 <= k106 <= 1e+100:
+        return 'parameters m_foot, body_mass, kx_foot, l_foot: bodies[15].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k106)
+    if not -1e+100 <= k108 <= 1e+100:
+        return 'parameters m_foot, body_mass, ky_foot, l_foot: bodies[15].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k108)
+    if not -1e+100 <= k110 <= 1e+100:
+        return 'parameters m_foot, body_mass, kz_foot, l_foot: bodies[15].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k110)
+    if not k113 >= 0.0:
+        return "parameters m_foot, body_mass, ky_foot, l_foot, kz_foot, kx_foot: bodies[15].inertia_com: body 'foot_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k106, k108, k110)
+    if not -1e+100 <= k114 <= 1e+100:
+        return 'parameters c_shank, l_shank: joints[15].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k114)
+    if not -1e+100 <= k115 <= 1e+100:
+        return 'parameters d_ankle, c_foot, l_foot: joints[15].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k115)
+    if not -1e+100 <= k116 <= 1e+100:
+        return 'parameters h_ankle: joints[15].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k116)
+    return None
+
+
 def _fixed(body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, l_grip, g):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     mass_hand_right = body_mass * m_hand
@@ -876,6 +1223,12 @@ def _constants(key):
     near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -6486,7 +6839,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and hypot(*state) < reach:
                 return _from(values, _FLOAT, 84)
         except (ArithmeticError, ValueError):

@@ -520,6 +520,350 @@ COST = {
 }
 
 
+def _refused(body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = body_mass * m_pelvis
+    k2 = l_pelvis * kx_pelvis
+    k3 = k1 * (k2 * k2)
+    k4 = l_pelvis * ky_pelvis
+    k5 = k1 * (k4 * k4)
+    k6 = l_pelvis * kz_pelvis
+    k7 = k1 * (k6 * k6)
+    k8 = k3 + k5
+    k9 = 5e-10 * (k7 + k8)
+    k10 = body_mass * m_abdomen
+    k11 = l_abdomen * kx_abdomen
+    k12 = k10 * (k11 * k11)
+    k13 = l_abdomen * ky_abdomen
+    k14 = k10 * (k13 * k13)
+    k15 = l_abdomen * kz_abdomen
+    k16 = k10 * (k15 * k15)
+    k17 = k12 + k14
+    k18 = 5e-10 * (k16 + k17)
+    k19 = l_pelvis * c_pelvis
+    k20 = l_abdomen * (c_abdomen - 1.0)
+    k21 = body_mass * m_thigh
+    k22 = l_thigh * kx_thigh
+    k23 = k21 * (k22 * k22)
+    k24 = l_thigh * ky_thigh
+    k25 = k21 * (k24 * k24)
+    k26 = l_thigh * kz_thigh
+    k27 = k21 * (k26 * k26)
+    k28 = k23 + k25
+    k29 = 5e-10 * (k27 + k28)
+    k30 = min(min(k25 + k27 + k29 - k23, k29 + (k23 + k27) - k25), k28 + k29 - k27)
+    k31 = l_pelvis * (c_pelvis - 1.0)
+    k32 = l_thigh * c_thigh
+    k33 = body_mass * m_thorax
+    k34 = l_thorax * kx_thorax
+    k35 = k33 * (k34 * k34)
+    k36 = l_thorax * ky_thorax
+    k37 = k33 * (k36 * k36)
+    k38 = l_thorax * kz_thorax
+    k39 = k33 * (k38 * k38)
+    k40 = k35 + k37
+    k41 = 5e-10 * (k39 + k40)
+    k42 = l_abdomen * c_abdomen
+    k43 = l_thorax * (c_thorax - 1.0)
+    k44 = body_mass * m_shank
+    k45 = l_shank * kx_shank
+    k46 = k44 * (k45 * k45)
+    k47 = l_shank * ky_shank
+    k48 = k44 * (k47 * k47)
+    k49 = l_shank * kz_shank
+    k50 = k44 * (k49 * k49)
+    k51 = k46 + k48
+    k52 = 5e-10 * (k50 + k51)
+    k53 = min(min(k48 + k50 + k52 - k46, k52 + (k46 + k50) - k48), k51 + k52 - k50)
+    k54 = l_thigh * (c_thigh - 1.0)
+    k55 = l_shank * c_shank
+    k56 = body_mass * m_head
+    k57 = l_head * kx_head
+    k58 = k56 * (k57 * k57)
+    k59 = l_head * ky_head
+    k60 = k56 * (k59 * k59)
+    k61 = l_head * kz_head
+    k62 = k56 * (k61 * k61)
+    k63 = k58 + k60
+    k64 = 5e-10 * (k62 + k63)
+    k65 = l_thorax * c_thorax
+    k66 = l_head * (c_head - 1.0)
+    k67 = body_mass * m_upper_arm
+    k68 = l_upper_arm * kx_upper_arm
+    k69 = k67 * (k68 * k68)
+    k70 = l_upper_arm * ky_upper_arm
+    k71 = k67 * (k70 * k70)
+    k72 = l_upper_arm * kz_upper_arm
+    k73 = k67 * (k72 * k72)
+    k74 = k69 + k71
+    k75 = 5e-10 * (k73 + k74)
+    k76 = min(min(k71 + k73 + k75 - k69, k75 + (k69 + k73) - k71), k74 + k75 - k73)
+    k77 = k65 - d_shoulder
+    k78 = l_upper_arm * c_upper_arm
+    k79 = body_mass * m_foot
+    k80 = l_foot * kx_foot
+    k81 = k79 * (k80 * k80)
+    k82 = l_foot * ky_foot
+    k83 = k79 * (k82 * k82)
+    k84 = l_foot * kz_foot
+    k85 = k79 * (k84 * k84)
+    k86 = k81 + k83
+    k87 = 5e-10 * (k85 + k86)
+    k88 = min(min(k83 + k85 + k87 - k81, k87 + (k81 + k85) - k83), k86 + k87 - k85)
+    k89 = l_shank * (c_shank - 1.0)
+    k90 = d_ankle - l_foot * c_foot
+    k91 = h_ankle / 2.0
+    k92 = body_mass * m_forearm
+    k93 = l_forearm * kx_forearm
+    k94 = k92 * (k93 * k93)
+    k95 = l_forearm * ky_forearm
+    k96 = k92 * (k95 * k95)
+    k97 = l_forearm * kz_forearm
+    k98 = k92 * (k97 * k97)
+    k99 = k94 + k96
+    k100 = 5e-10 * (k98 + k99)
+    k101 = min(min(k96 + k98 + k100 - k94, k100 + (k94 + k98) - k96), k99 + k100 - k98)
+    k102 = l_upper_arm * (c_upper_arm - 1.0)
+    k103 = l_forearm * c_forearm
+    k104 = body_mass * m_hand
+    k105 = l_hand * kx_hand
+    k106 = k104 * (k105 * k105)
+    k107 = l_hand * ky_hand
+    k108 = k104 * (k107 * k107)
+    k109 = l_hand * kz_hand
+    k110 = k104 * (k109 * k109)
+    k111 = k106 + k108
+    k112 = 5e-10 * (k110 + k111)
+    k113 = min(min(k108 + k110 + k112 - k106, k112 + (k106 + k110) - k108), k111 + k112 - k110)
+    k114 = l_forearm * (c_forearm - 1.0)
+    k115 = l_hand * c_hand
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters m_pelvis, body_mass: bodies[0].mass: {:g} is larger than 1e+100; choose other units'.format(k1)
+    if not -1e+100 <= k3 <= 1e+100:
+        return 'parameters m_pelvis, body_mass, kx_pelvis, l_pelvis: bodies[0].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k3)
+    if not -1e+100 <= k5 <= 1e+100:
+        return 'parameters m_pelvis, body_mass, ky_pelvis, l_pelvis: bodies[0].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k5)
+    if not -1e+100 <= k7 <= 1e+100:
+        return 'parameters m_pelvis, body_mass, kz_pelvis, l_pelvis: bodies[0].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k7)
+    if not min(min(k5 + k7 + k9 - k3, k9 + (k3 + k7) - k5), k8 + k9 - k7) >= 0.0:
+        return "parameters m_pelvis, body_mass, ky_pelvis, l_pelvis, kz_pelvis, kx_pelvis: bodies[0].inertia_com: body 'pelvis' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k3, k5, k7)
+    if not -1e+100 <= k10 <= 1e+100:
+        return 'parameters m_abdomen, body_mass: bodies[1].mass: {:g} is larger than 1e+100; choose other units'.format(k10)
+    if not -1e+100 <= k12 <= 1e+100:
+        return 'parameters m_abdomen, body_mass, kx_abdomen, l_abdomen: bodies[1].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k12)
+    if not -1e+100 <= k14 <= 1e+100:
+        return 'parameters m_abdomen, body_mass, ky_abdomen, l_abdomen: bodies[1].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k14)
+    if not -1e+100 <= k16 <= 1e+100:
+        return 'parameters m_abdomen, body_mass, kz_abdomen, l_abdomen: bodies[1].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k16)
+    if not min(min(k14 + k16 + k18 - k12, k18 + (k12 + k16) - k14), k17 + k18 - k16) >= 0.0:
+        return "parameters m_abdomen, body_mass, ky_abdomen, l_abdomen, kz_abdomen, kx_abdomen: bodies[1].inertia_com: body 'abdomen' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k12, k14, k16)
+    if not -1e+100 <= k19 <= 1e+100:
+        return 'parameters c_pelvis, l_pelvis: joints[1].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k19)
+    if not -1e+100 <= k20 <= 1e+100:
+        return 'parameters c_abdomen, l_abdomen: joints[1].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k20)
+    if not -1e+100 <= k21 <= 1e+100:
+        return 'parameters m_thigh, body_mass: bodies[10].mass: {:g} is larger than 1e+100; choose other units'.format(k21)
+    if not -1e+100 <= k23 <= 1e+100:
+        return 'parameters m_thigh, body_mass, kx_thigh, l_thigh: bodies[10].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k23)
+    if not -1e+100 <= k25 <= 1e+100:
+        return 'parameters m_thigh, body_mass, ky_thigh, l_thigh: bodies[10].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k25)
+    if not -1e+100 <= k27 <= 1e+100:
+        return 'parameters m_thigh, body_mass, kz_thigh, l_thigh: bodies[10].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k27)
+    if not k30 >= 0.0:
+        return "parameters m_thigh, body_mass, ky_thigh, l_thigh, kz_thigh, kx_thigh: bodies[10].inertia_com: body 'thigh_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k23, k25, k27)
+    if not -1e+100 <= k31 <= 1e+100:
+        return 'parameters c_pelvis, l_pelvis: joints[7].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k31)
+    if not -1e+100 <= k32 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[7].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k32)
+    if not -1e+100 <= k21 <= 1e+100:
+        return 'parameters m_thigh, body_mass: bodies[13].mass: {:g} is larger than 1e+100; choose other units'.format(k21)
+    if not -1e+100 <= k23 <= 1e+100:
+        return 'parameters m_thigh, body_mass, kx_thigh, l_thigh: bodies[13].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k23)
+    if not -1e+100 <= k25 <= 1e+100:
+        return 'parameters m_thigh, body_mass, ky_thigh, l_thigh: bodies[13].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k25)
+    if not -1e+100 <= k27 <= 1e+100:
+        return 'parameters m_thigh, body_mass, kz_thigh, l_thigh: bodies[13].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k27)
+    if not k30 >= 0.0:
+        return "parameters m_thigh, body_mass, ky_thigh, l_thigh, kz_thigh, kx_thigh: bodies[13].inertia_com: body 'thigh_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k23, k25, k27)
+    if not -1e+100 <= k31 <= 1e+100:
+        return 'parameters c_pelvis, l_pelvis: joints[13].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k31)
+    if not -1e+100 <= k32 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[13].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k32)
+    if not -1e+100 <= k33 <= 1e+100:
+        return 'parameters m_thorax, body_mass: bodies[2].mass: {:g} is larger than 1e+100; choose other units'.format(k33)
+    if not -1e+100 <= k35 <= 1e+100:
+        return 'parameters m_thorax, body_mass, kx_thorax, l_thorax: bodies[2].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k35)
+    if not -1e+100 <= k37 <= 1e+100:
+        return 'parameters m_thorax, body_mass, ky_thorax, l_thorax: bodies[2].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k37)
+    if not -1e+100 <= k39 <= 1e+100:
+        return 'parameters m_thorax, body_mass, kz_thorax, l_thorax: bodies[2].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k39)
+    if not min(min(k37 + k39 + k41 - k35, k41 + (k35 + k39) - k37), k40 + k41 - k39) >= 0.0:
+        return "parameters m_thorax, body_mass, ky_thorax, l_thorax, kz_thorax, kx_thorax: bodies[2].inertia_com: body 'thorax' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k35, k37, k39)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters c_abdomen, l_abdomen: joints[2].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    if not -1e+100 <= k43 <= 1e+100:
+        return 'parameters c_thorax, l_thorax: joints[2].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k43)
+    if not -1e+100 <= k44 <= 1e+100:
+        return 'parameters m_shank, body_mass: bodies[11].mass: {:g} is larger than 1e+100; choose other units'.format(k44)
+    if not -1e+100 <= k46 <= 1e+100:
+        return 'parameters m_shank, body_mass, kx_shank, l_shank: bodies[11].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k46)
+    if not -1e+100 <= k48 <= 1e+100:
+        return 'parameters m_shank, body_mass, ky_shank, l_shank: bodies[11].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k48)
+    if not -1e+100 <= k50 <= 1e+100:
+        return 'parameters m_shank, body_mass, kz_shank, l_shank: bodies[11].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k50)
+    if not k53 >= 0.0:
+        return "parameters m_shank, body_mass, ky_shank, l_shank, kz_shank, kx_shank: bodies[11].inertia_com: body 'shank_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k46, k48, k50)
+    if not -1e+100 <= k54 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[8].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k54)
+    if not -1e+100 <= k55 <= 1e+100:
+        return 'parameters c_shank, l_shank: joints[8].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k55)
+    if not -1e+100 <= k44 <= 1e+100:
+        return 'parameters m_shank, body_mass: bodies[14].mass: {:g} is larger than 1e+100; choose other units'.format(k44)
+    if not -1e+100 <= k46 <= 1e+100:
+        return 'parameters m_shank, body_mass, kx_shank, l_shank: bodies[14].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k46)
+    if not -1e+100 <= k48 <= 1e+100:
+        return 'parameters m_shank, body_mass, ky_shank, l_shank: bodies[14].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k48)
+    if not -1e+100 <= k50 <= 1e+100:
+        return 'parameters m_shank, body_mass, kz_shank, l_shank: bodies[14].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k50)
+    if not k53 >= 0.0:
+        return "parameters m_shank, body_mass, ky_shank, l_shank, kz_shank, kx_shank: bodies[14].inertia_com: body 'shank_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k46, k48, k50)
+    if not -1e+100 <= k54 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[14].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k54)
+    if not -1e+100 <= k55 <= 1e+100:
+        return 'parameters c_shank, l_shank: joints[14].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k55)
+    if not -1e+100 <= k56 <= 1e+100:
+        return 'parameters m_head, body_mass: bodies[3].mass: {:g} is larger than 1e+100; choose other units'.format(k56)
+    if not -1e+100 <= k58 <= 1e+100:
+        return 'parameters m_head, body_mass, kx_head, l_head: bodies[3].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k58)
+    if not -1e+100 <= k60 <= 1e+100:
+        return 'parameters m_head, body_mass, ky_head, l_head: bodies[3].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k60)
+    if not -1e+100 <= k62 <= 1e+100:
+        return 'parameters m_head, body_mass, kz_head, l_head: bodies[3].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k62)
+    if not min(min(k60 + k62 + k64 - k58, k64 + (k58 + k62) - k60), k63 + k64 - k62) >= 0.0:
+        return "parameters m_head, body_mass, ky_head, l_head, kz_head, kx_head: bodies[3].inertia_com: body 'head' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k58, k60, k62)
+    if not -1e+100 <= k65 <= 1e+100:
+        return 'parameters c_thorax, l_thorax: joints[3].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k65)
+    if not -1e+100 <= k66 <= 1e+100:
+        return 'parameters c_head, l_head: joints[3].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k66)
+    if not -1e+100 <= k67 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass: bodies[4].mass: {:g} is larger than 1e+100; choose other units'.format(k67)
+    if not -1e+100 <= k69 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, kx_upper_arm, l_upper_arm: bodies[4].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k69)
+    if not -1e+100 <= k71 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, ky_upper_arm, l_upper_arm: bodies[4].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k71)
+    if not -1e+100 <= k73 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, kz_upper_arm, l_upper_arm: bodies[4].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k73)
+    if not k76 >= 0.0:
+        return "parameters m_upper_arm, body_mass, ky_upper_arm, l_upper_arm, kz_upper_arm, kx_upper_arm: bodies[4].inertia_com: body 'upper_arm_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k69, k71, k73)
+    if not -1e+100 <= k77 <= 1e+100:
+        return 'parameters c_thorax, l_thorax, d_shoulder: joints[4].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k77)
+    if not -1e+100 <= k78 <= 1e+100:
+        return 'parameters c_upper_arm, l_upper_arm: joints[4].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k78)
+    if not -1e+100 <= k67 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass: bodies[7].mass: {:g} is larger than 1e+100; choose other units'.format(k67)
+    if not -1e+100 <= k69 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, kx_upper_arm, l_upper_arm: bodies[7].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k69)
+    if not -1e+100 <= k71 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, ky_upper_arm, l_upper_arm: bodies[7].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k71)
+    if not -1e+100 <= k73 <= 1e+100:
+        return 'parameters m_upper_arm, body_mass, kz_upper_arm, l_upper_arm: bodies[7].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k73)
+    if not k76 >= 0.0:
+        return "parameters m_upper_arm, body_mass, ky_upper_arm, l_upper_arm, kz_upper_arm, kx_upper_arm: bodies[7].inertia_com: body 'upper_arm_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k69, k71, k73)
+    if not -1e+100 <= k77 <= 1e+100:
+        return 'parameters c_thorax, l_thorax, d_shoulder: joints[10].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k77)
+    if not -1e+100 <= k78 <= 1e+100:
+        return 'parameters c_upper_arm, l_upper_arm: joints[10].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k78)
+    if not -1e+100 <= k79 <= 1e+100:
+        return 'parameters m_foot, body_mass: bodies[12].mass: {:g} is larger than 1e+100; choose other units'.format(k79)
+    if not -1e+100 <= k81 <= 1e+100:
+        return 'parameters m_foot, body_mass, kx_foot, l_foot: bodies[12].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k81)
+    if not -1e+100 <= k83 <= 1e+100:
+        return 'parameters m_foot, body_mass, ky_foot, l_foot: bodies[12].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k83)
+    if not -1e+100 <= k85 <= 1e+100:
+        return 'parameters m_foot, body_mass, kz_foot, l_foot: bodies[12].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k85)
+    if not k88 >= 0.0:
+        return "parameters m_foot, body_mass, ky_foot, l_foot, kz_foot, kx_foot: bodies[12].inertia_com: body 'foot_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k81, k83, k85)
+    if not -1e+100 <= k89 <= 1e+100:
+        return 'parameters c_shank, l_shank: joints[9].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k89)
+    if not -1e+100 <= k90 <= 1e+100:
+        return 'parameters d_ankle, c_foot, l_foot: joints[9].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k90)
+    if not -1e+100 <= k91 <= 1e+100:
+        return 'parameters h_ankle: joints[9].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k91)
+    if not -1e+100 <= k79 <= 1e+100:
+        return 'parameters m_foot, body_mass: bodies[15].mass: {:g} is larger than 1e+100; choose other units'.format(k79)
+    if not -1e+100 <= k81 <= 1e+100:
+        return 'parameters m_foot, body_mass, kx_foot, l_foot: bodies[15].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k81)
+    if not -1e+100 <= k83 <= 1e+100:
+        return 'parameters m_foot, body_mass, ky_foot, l_foot: bodies[15].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k83)
+    if not -1e+100 <= k85 <= 1e+100:
+        return 'parameters m_foot, body_mass, kz_foot, l_foot: bodies[15].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k85)
+    if not k88 >= 0.0:
+        return "parameters m_foot, body_mass, ky_foot, l_foot, kz_foot, kx_foot: bodies[15].inertia_com: body 'foot_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k81, k83, k85)
+    if not -1e+100 <= k89 <= 1e+100:
+        return 'parameters c_shank, l_shank: joints[15].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k89)
+    if not -1e+100 <= k90 <= 1e+100:
+        return 'parameters d_ankle, c_foot, l_foot: joints[15].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k90)
+    if not -1e+100 <= k91 <= 1e+100:
+        return 'parameters h_ankle: joints[15].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k91)
+    if not -1e+100 <= k92 <= 1e+100:
+        return 'parameters m_forearm, body_mass: bodies[5].mass: {:g} is larger than 1e+100; choose other units'.format(k92)
+    if not -1e+100 <= k94 <= 1e+100:
+        return 'parameters m_forearm, body_mass, kx_forearm, l_forearm: bodies[5].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k94)
+    if not -1e+100 <= k96 <= 1e+100:
+        return 'parameters m_forearm, body_mass, ky_forearm, l_forearm: bodies[5].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k96)
+    if not -1e+100 <= k98 <= 1e+100:
+        return 'parameters m_forearm, body_mass, kz_forearm, l_forearm: bodies[5].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k98)
+    if not k101 >= 0.0:
+        return "parameters m_forearm, body_mass, ky_forearm, l_forearm, kz_forearm, kx_forearm: bodies[5].inertia_com: body 'forearm_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k94, k96, k98)
+    if not -1e+100 <= k102 <= 1e+100:
+        return 'parameters c_upper_arm, l_upper_arm: joints[5].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k102)
+    if not -1e+100 <= k103 <= 1e+100:
+        return 'parameters c_forearm, l_forearm: joints[5].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k103)
+    if not -1e+100 <= k92 <= 1e+100:
+        return 'parameters m_forearm, body_mass: bodies[8].mass: {:g} is larger than 1e+100; choose other units'.format(k92)
+    if not -1e+100 <= k94 <= 1e+100:
+        return 'parameters m_forearm, body_mass, kx_forearm, l_forearm: bodies[8].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k94)
+    if not -1e+100 <= k96 <= 1e+100:
+        return 'parameters m_forearm, body_mass, ky_forearm, l_forearm: bodies[8].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k96)
+    if not -1e+100 <= k98 <= 1e+100:
+        return 'parameters m_forearm, body_mass, kz_forearm, l_forearm: bodies[8].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k98)
+    if not k101 >= 0.0:
+        return "parameters m_forearm, body_mass, ky_forearm, l_forearm, kz_forearm, kx_forearm: bodies[8].inertia_com: body 'forearm_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k94, k96, k98)
+    if not -1e+100 <= k102 <= 1e+100:
+        return 'parameters c_upper_arm, l_upper_arm: joints[11].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k102)
+    if not -1e+100 <= k103 <= 1e+100:
+        return 'parameters c_forearm, l_forearm: joints[11].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k103)
+    if not -1e+100 <= k104 <= 1e+100:
+        return 'parameters m_hand, body_mass: bodies[6].mass: {:g} is larger than 1e+100; choose other units'.format(k104)
+    if not -1e+100 <= k106 <= 1e+100:
+        return 'parameters m_hand, body_mass, kx_hand, l_hand: bodies[6].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k106)
+    if not -1e+100 <= k108 <= 1e+100:
+        return 'parameters m_hand, body_mass, ky_hand, l_hand: bodies[6].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k108)
+    if not -1e+100 <= k110 <= 1e+100:
+        return 'parameters m_hand, body_mass, kz_hand, l_hand: bodies[6].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k110)
+    if not k113 >= 0.0:
+        return "parameters m_hand, body_mass, ky_hand, l_hand, kz_hand, kx_hand: bodies[6].inertia_com: body 'hand_left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k106, k108, k110)
+    if not -1e+100 <= k114 <= 1e+100:
+        return 'parameters c_forearm, l_forearm: joints[6].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k114)
+    if not -1e+100 <= k115 <= 1e+100:
+        return 'parameters c_hand, l_hand: joints[6].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k115)
+    if not -1e+100 <= k104 <= 1e+100:
+        return 'parameters m_hand, body_mass: bodies[9].mass: {:g} is larger than 1e+100; choose other units'.format(k104)
+    if not -1e+100 <= k106 <= 1e+100:
+        return 'parameters m_hand, body_mass, kx_hand, l_hand: bodies[9].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k106)
+    if not -1e+100 <= k108 <= 1e+100:
+        return 'parameters m_hand, body_mass, ky_hand, l_hand: bodies[9].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k108)
+    if not -1e+100 <= k110 <= 1e+100:
+        return 'parameters m_hand, body_mass, kz_hand, l_hand: bodies[9].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k110)
+    if not k113 >= 0.0:
+        return "parameters m_hand, body_mass, ky_hand, l_hand, kz_hand, kx_hand: bodies[9].inertia_com: body 'hand_right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k106, k108, k110)
+    if not -1e+100 <= k114 <= 1e+100:
+        return 'parameters c_forearm, l_forearm: joints[12].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k114)
+    if not -1e+100 <= k115 <= 1e+100:
+        return 'parameters c_hand, l_hand: joints[12].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k115)
+    return None
+
+
 def _fixed(body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, g):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     mass_pelvis = body_mass * m_pelvis
@@ -851,6 +1195,12 @@ def _constants(key):
     near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -6593,7 +6943,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and hypot(*state) < reach:
                 return _from(values, _FLOAT, 90)
         except (ArithmeticError, ValueError):

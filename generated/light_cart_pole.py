@@ -633,7 +633,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and -reach < state[0] < reach:
                 return _from(values, _FLOAT, 4)
         except (ArithmeticError, ValueError):

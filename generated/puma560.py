@@ -256,6 +256,59 @@ COST = {
 }
 
 
+def _refused(d_1, a_2, d_3, a_3, d_4, m_1, I_1y, m_2, I_2x, I_2y, I_2z, c_2x, c_2y, c_2z, m_3, I_3x, I_3y, I_3z, c_3x, c_3y, c_3z, m_4, I_4x, I_4y, I_4z, c_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6x, I_6y, I_6z, c_6z, J_1, G_1, J_2, G_2, J_3, G_3, J_4, G_4, J_5, G_5, J_6, G_6, gravity_g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = I_1y + I_1y
+    k2 = k1 + 5e-10 * (I_1y + k1) - I_1y
+    k3 = I_2x + I_2y
+    k4 = 5e-10 * (I_2z + k3)
+    k5 = -(a_2 + c_2x)
+    k6 = I_3x + I_3y
+    k7 = 5e-10 * (I_3z + k6)
+    k8 = -(a_3 + c_3x)
+    k9 = d_3 - c_3y
+    k10 = I_4x + I_4y
+    k11 = 5e-10 * (I_4z + k10)
+    k12 = -(d_4 + c_4y)
+    k13 = I_5x + I_5y
+    k14 = 5e-10 * (I_5z + k13)
+    k15 = I_6x + I_6y
+    k16 = 5e-10 * (I_6z + k15)
+    if not min(min(k2, k2), k2) >= 0.0:
+        return "parameters I_1y: bodies[0].inertia_com: body 'link_1' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_1y, I_1y, I_1y)
+    if not J_1 >= 0.0:
+        return 'parameters J_1: joints[0].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_1)
+    if not min(min(I_2y + I_2z + k4 - I_2x, k4 + (I_2x + I_2z) - I_2y), k3 + k4 - I_2z) >= 0.0:
+        return "parameters I_2y, I_2z, I_2x: bodies[1].inertia_com: body 'link_2' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_2x, I_2y, I_2z)
+    if not -1e+100 <= k5 <= 1e+100:
+        return 'parameters c_2x, a_2: joints[1].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k5)
+    if not J_2 >= 0.0:
+        return 'parameters J_2: joints[1].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_2)
+    if not min(min(I_3y + I_3z + k7 - I_3x, k7 + (I_3x + I_3z) - I_3y), k6 + k7 - I_3z) >= 0.0:
+        return "parameters I_3y, I_3z, I_3x: bodies[2].inertia_com: body 'link_3' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_3x, I_3y, I_3z)
+    if not -1e+100 <= k8 <= 1e+100:
+        return 'parameters c_3x, a_3: joints[2].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k8)
+    if not -1e+100 <= k9 <= 1e+100:
+        return 'parameters c_3y, d_3: joints[2].r_child[1]: {:g} is larger than 1e+100; choose other units'.format(k9)
+    if not J_3 >= 0.0:
+        return 'parameters J_3: joints[2].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_3)
+    if not min(min(I_4y + I_4z + k11 - I_4x, k11 + (I_4x + I_4z) - I_4y), k10 + k11 - I_4z) >= 0.0:
+        return "parameters I_4y, I_4z, I_4x: bodies[3].inertia_com: body 'link_4' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_4x, I_4y, I_4z)
+    if not -1e+100 <= k12 <= 1e+100:
+        return 'parameters c_4y, d_4: joints[3].r_child[1]: {:g} is larger than 1e+100; choose other units'.format(k12)
+    if not J_4 >= 0.0:
+        return 'parameters J_4: joints[3].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_4)
+    if not min(min(I_5y + I_5z + k14 - I_5x, k14 + (I_5x + I_5z) - I_5y), k13 + k14 - I_5z) >= 0.0:
+        return "parameters I_5y, I_5z, I_5x: bodies[4].inertia_com: body 'link_5' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_5x, I_5y, I_5z)
+    if not J_5 >= 0.0:
+        return 'parameters J_5: joints[4].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_5)
+    if not min(min(I_6y + I_6z + k16 - I_6x, k16 + (I_6x + I_6z) - I_6y), k15 + k16 - I_6z) >= 0.0:
+        return "parameters I_6y, I_6z, I_6x: bodies[5].inertia_com: body 'link_6' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_6x, I_6y, I_6z)
+    if not J_6 >= 0.0:
+        return 'parameters J_6: joints[5].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_6)
+    return None
+
+
 def _fixed(d_1, a_2, d_3, a_3, d_4, m_1, I_1y, m_2, I_2x, I_2y, I_2z, c_2x, c_2y, c_2z, m_3, I_3x, I_3y, I_3z, c_3x, c_3y, c_3z, m_4, I_4x, I_4y, I_4z, c_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6x, I_6y, I_6z, c_6z, J_1, G_1, J_2, G_2, J_3, G_3, J_4, G_4, J_5, G_5, J_6, G_6, gravity_g):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_1 > 0.0:
@@ -408,6 +461,12 @@ def _constants(key):
     near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):

@@ -256,6 +256,132 @@ COST = {
 }
 
 
+def select(c, a, b):
+    return a if c > 0.0 else b
+
+
+def _refused(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = I_trunk_x + I_trunk_y
+    k2 = 5e-10 * (I_trunk_z + k1)
+    k3 = min(I_trunk_y + I_trunk_z + k2 - I_trunk_x, k2 + (I_trunk_x + I_trunk_z) - I_trunk_y)
+    k4 = abs(I_hip_xx) + abs(I_hip_yy) + abs(I_hip_zz)
+    abs_I_hip_xz = abs(I_hip_xz)
+    k5 = k4 + abs(I_hip_xy) + abs_I_hip_xz + abs(I_hip_yz)
+    k6 = select(k5, k5, 1.0)
+    k7 = I_hip_xx / k6
+    k8 = I_hip_yy / k6
+    k9 = I_hip_zz / k6
+    k10 = 5e-10 + (k7 + k8 + k9)
+    k11 = k10 - k7 * 2.0
+    k12 = 2.0 * (I_hip_xy / k6)
+    k13 = k11 * (k10 - k8 * 2.0) - k12 * k12
+    k14 = 2.0 * (I_hip_xz / k6)
+    k15 = k11 * (2.0 * (I_hip_yz / k6)) + k12 * k14
+    k16 = min(min(k11, k13), k13 * (k11 * (k10 - k9 * 2.0) - k14 * k14) - k15 * k15)
+    k17 = -I_hip_xy
+    k18 = -I_hip_yz
+    k19 = abs_I_hip_xz + (k4 + abs(k17)) + abs(k18)
+    k20 = select(k19, k19, 1.0)
+    k21 = I_hip_xx / k20
+    k22 = I_hip_yy / k20
+    k23 = I_hip_zz / k20
+    k24 = 5e-10 + (k21 + k22 + k23)
+    k25 = k24 - 2.0 * k21
+    k26 = 2.0 * (I_hip_xy / k20)
+    k27 = k25 * (k24 - 2.0 * k22) - k26 * k26
+    k28 = 2.0 * (I_hip_xz / k20)
+    k29 = k25 * (2.0 * (I_hip_yz / k20)) + k26 * k28
+    k30 = min(min(k25, k27), k27 * (k25 * (k24 - 2.0 * k23) - k28 * k28) - k29 * k29)
+    k31 = I_thigh_x + I_thigh_y
+    k32 = 5e-10 * (I_thigh_z + k31)
+    k33 = min(I_thigh_y + I_thigh_z + k32 - I_thigh_x, k32 + (I_thigh_x + I_thigh_z) - I_thigh_y)
+    k34 = min(k33, k31 + k32 - I_thigh_z)
+    k35 = l_hip - c_hip
+    k36 = c_hip - l_hip
+    k37 = I_shank_x + I_shank_y
+    k38 = 5e-10 * (I_shank_z + k37)
+    k39 = min(I_shank_y + I_shank_z + k38 - I_shank_x, k38 + (I_shank_x + I_shank_z) - I_shank_y)
+    k40 = min(k39, k37 + k38 - I_shank_z)
+    k41 = c_thigh - l_thigh
+    k42 = c_shank - l_shank
+    if not min(k3, k1 + k2 - I_trunk_z) >= 0.0:
+        return "parameters I_trunk_y, I_trunk_z, I_trunk_x: bodies[0].inertia_com: body 'trunk' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_trunk_x, I_trunk_y, I_trunk_z)
+    if not k16 > 0.0:
+        return "parameters I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz: bodies[1].inertia_com: body 'front_left_hip' has moments {:.6g}, {:.6g}, {:.6g} and products {:.6g}, {:.6g}, {:.6g}; so one of its principal moments is negative, or larger than the other two together: make the products smaller, or change xx, yy or zz".format(I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[1].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k30 > 0.0:
+        return "parameters I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz: bodies[4].inertia_com: body 'front_right_hip' has moments {:.6g}, {:.6g}, {:.6g} and products {:.6g}, {:.6g}, {:.6g}; so one of its principal moments is negative, or larger than the other two together: make the products smaller, or change xx, yy or zz".format(I_hip_xx, I_hip_yy, I_hip_zz, k17, I_hip_xz, k18)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[4].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k16 > 0.0:
+        return "parameters I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz: bodies[7].inertia_com: body 'hind_left_hip' has moments {:.6g}, {:.6g}, {:.6g} and products {:.6g}, {:.6g}, {:.6g}; so one of its principal moments is negative, or larger than the other two together: make the products smaller, or change xx, yy or zz".format(I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[7].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k30 > 0.0:
+        return "parameters I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz: bodies[10].inertia_com: body 'hind_right_hip' has moments {:.6g}, {:.6g}, {:.6g} and products {:.6g}, {:.6g}, {:.6g}; so one of its principal moments is negative, or larger than the other two together: make the products smaller, or change xx, yy or zz".format(I_hip_xx, I_hip_yy, I_hip_zz, k17, I_hip_xz, k18)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[10].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k34 >= 0.0:
+        return "parameters I_thigh_y, I_thigh_z, I_thigh_x: bodies[2].inertia_com: body 'front_left_thigh' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_thigh_x, I_thigh_y, I_thigh_z)
+    if not -1e+100 <= k35 <= 1e+100:
+        return 'parameters l_hip, c_hip: joints[2].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k35)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[2].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k34 >= 0.0:
+        return "parameters I_thigh_y, I_thigh_z, I_thigh_x: bodies[5].inertia_com: body 'front_right_thigh' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_thigh_x, I_thigh_y, I_thigh_z)
+    if not -1e+100 <= k36 <= 1e+100:
+        return 'parameters c_hip, l_hip: joints[5].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k36)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[5].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k34 >= 0.0:
+        return "parameters I_thigh_y, I_thigh_z, I_thigh_x: bodies[8].inertia_com: body 'hind_left_thigh' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_thigh_x, I_thigh_y, I_thigh_z)
+    if not -1e+100 <= k35 <= 1e+100:
+        return 'parameters l_hip, c_hip: joints[8].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k35)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[8].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k34 >= 0.0:
+        return "parameters I_thigh_y, I_thigh_z, I_thigh_x: bodies[11].inertia_com: body 'hind_right_thigh' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_thigh_x, I_thigh_y, I_thigh_z)
+    if not -1e+100 <= k36 <= 1e+100:
+        return 'parameters c_hip, l_hip: joints[11].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k36)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[11].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k40 >= 0.0:
+        return "parameters I_shank_y, I_shank_z, I_shank_x: bodies[3].inertia_com: body 'front_left_shank' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_shank_x, I_shank_y, I_shank_z)
+    if not -1e+100 <= k41 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[3].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k41)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[3].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k40 >= 0.0:
+        return "parameters I_shank_y, I_shank_z, I_shank_x: bodies[6].inertia_com: body 'front_right_shank' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_shank_x, I_shank_y, I_shank_z)
+    if not -1e+100 <= k41 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[6].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k41)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[6].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k40 >= 0.0:
+        return "parameters I_shank_y, I_shank_z, I_shank_x: bodies[9].inertia_com: body 'hind_left_shank' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_shank_x, I_shank_y, I_shank_z)
+    if not -1e+100 <= k41 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[9].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k41)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[9].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k40 >= 0.0:
+        return "parameters I_shank_y, I_shank_z, I_shank_x: bodies[12].inertia_com: body 'hind_right_shank' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_shank_x, I_shank_y, I_shank_z)
+    if not -1e+100 <= k41 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[12].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k41)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[12].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters c_shank, l_shank: points[0].at[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters c_shank, l_shank: points[1].at[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters c_shank, l_shank: points[2].at[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters c_shank, l_shank: points[3].at[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    return None
+
+
 def _fixed(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_trunk > 0.0:
@@ -431,6 +557,12 @@ def _constants(key):
     near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -8654,7 +8786,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and hypot(*state) < reach:
                 return _from(values, _FLOAT, 37)
         except (ArithmeticError, ValueError):

@@ -310,6 +310,23 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
+def _refused(h, m, EI, load):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = m / 2.0
+    k2 = EI / h
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters m: chains[1].mass: {:g} is larger than 1e+100; choose other units'.format(k1)
+    if not -1e+100 <= k2 <= 1e+100:
+        return 'parameters EI, h: effects[0].stiffness: {:g} is larger than 1e+100; choose other units'.format(k2)
+    if not k2 >= 0.0:
+        return 'parameters EI, h: effects[0].stiffness: {:g} is negative; give a number >= 0 in N m/rad'.format(k2)
+    if not -1e+100 <= k2 <= 1e+100:
+        return 'parameters EI, h: effects[1].stiffness: {:g} is larger than 1e+100; choose other units'.format(k2)
+    if not k2 >= 0.0:
+        return 'parameters EI, h: effects[1].stiffness: {:g} is negative; give a number >= 0 in N m/rad'.format(k2)
+    return None
+
+
 def _fixed(h, m, EI, load):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m > 0.0:
@@ -415,6 +432,12 @@ def _constants(key):
     near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -4388,7 +4411,7 @@ def derivative(t, y, p=None, u=None):
             made = _parameters(p)
             k, reach = made["derivative"], made["reach"]
         try:
-            values = _derivative(y.tolist(), k, _NO_INPUT, t=t if t.__class__ is float else _time(t))
+            values = _derivative(y.tolist(), k, t=t if t.__class__ is float else _time(t))
             if hypot(*values) < reach:
                 return _from(values, _FLOAT, 80)
         except (ArithmeticError, ValueError):

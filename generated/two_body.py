@@ -984,7 +984,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and -reach < state[0] + state[1] < reach:
                 return _from(values, _FLOAT, 8)
         except (ArithmeticError, ValueError):

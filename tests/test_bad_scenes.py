@@ -529,14 +529,16 @@ MISTAKES_IN_SPACE = [
     (INERTIA, "inertia_com = [1, -1, 1]",
      "bodies[1].inertia_com[1]: -1 is negative; give a number >= 0 in kg m^2"),
     (INERTIA, "inertia_com = [1, 1, 1, 2, 0, 0]",
-     "bodies[1].inertia_com: body 'hand' has principal moments -1, 1, 3; none may be negative: "
-     "make the products xy, xz, yz smaller"),
+     "bodies[1].inertia_com: body 'hand' has moments 1, 1, 1 and products 2, 0, 0; so one of its "
+     "principal moments is negative, or larger than the other two together: make the products "
+     "smaller, or change xx, yy or zz"),
     (INERTIA, 'inertia_com = [1, "m", "3*m"]',
      "bodies[1].inertia_com: body 'hand' has principal moments 1, 1, 3; no body has one larger "
      "than the other two together: change xx, yy or zz"),
     (INERTIA, "inertia_com = [2, 2, 1.5, -1.2, 0, 0]",
-     "bodies[1].inertia_com: body 'hand' has principal moments 0.8, 1.5, 3.2; no body has one "
-     "larger than the other two together: change xx, yy or zz"),
+     "bodies[1].inertia_com: body 'hand' has moments 2, 2, 1.5 and products -1.2, 0, 0; so one "
+     "of its principal moments is negative, or larger than the other two together: make the "
+     "products smaller, or change xx, yy or zz"),
     (INERTIA, "", "bodies[1].inertia_com: missing; every such table needs it"),
     # Directions.
     (AXIS, "axis = [0, 0, 0]",

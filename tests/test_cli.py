@@ -239,7 +239,7 @@ def test_notices_and_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     )
     assert said
     since, farthest, at = map(float, said.groups())
-    rows = np.loadtxt(tmp_path / "out" / "arm.csv", delimiter=",", skiprows=2)
+    rows = np.loadtxt(tmp_path / "out" / "arm.csv", delimiter=",", skiprows=1)
     outside = (rows[:, 1] < -0.5) | (rows[:, 1] > 1.0)
     assert since == pytest.approx(rows[outside][0, 0], rel=1e-3)
     assert farthest == pytest.approx(rows[:, 1].max(), rel=1e-3)

@@ -69,7 +69,7 @@ inertia_com = [0.02, 0.03, 0.04]
 [[bodies]]
 name = "lower"
 mass = 0.5
-inertia_com = [0.01, 0.02, 0.03]
+inertia_com = [0.015, 0.02, 0.03]
 [[joints]]
 name = "shoulder"
 type = "ball"

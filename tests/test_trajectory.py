@@ -1,5 +1,6 @@
 """Trajectories: what they refuse to be, and files that give back every bit."""
 
+import csv
 import io
 import os
 import zipfile
@@ -254,10 +255,9 @@ def test_csv_reads_back_exactly(tmp_path):
     path = tmp_path / "run.csv"
     save_csv(FINISHED, path)
     lines = path.read_text(encoding="utf-8").split("\n")
-    assert lines[0] == "# eomgen trajectory of four bar, integrator rk4"
-    assert lines[1] == 't,crank,"Δ,rate"'
-    assert lines[2] == "0.0,0.30000000000000004,-0.0"
-    table = np.loadtxt(path, delimiter=",", skiprows=2)
+    assert lines[0] == 't,crank,"Δ,rate"'
+    assert lines[1] == "0.0,0.30000000000000004,-0.0"
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
     assert bits(np.ascontiguousarray(table[:, 0])) == bits(RUN.t)
     assert bits(np.ascontiguousarray(table[:, 1:])) == bits(RUN.y)
 
@@ -265,21 +265,39 @@ def test_csv_reads_back_exactly(tmp_path):
 def test_csv_holds_works_that_were_asked_for(tmp_path):
     path = tmp_path / "run.csv"
     save_csv(WORKED, path)
-    assert path.read_text(encoding="utf-8").split("\n")[1] == (
+    assert path.read_text(encoding="utf-8").split("\n")[0] == (
         't,crank,"Δ,rate",work_gravity,work_air'
     )
-    table = np.loadtxt(path, delimiter=",", skiprows=2)
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
     assert bits(np.ascontiguousarray(table[:, 3:])) == bits(WORKED.works)
 
 
-def test_csv_says_on_one_line_that_it_is_unfinished(tmp_path):
+def test_csv_is_what_others_read(tmp_path):
+    """The first line names the columns, each line after it has a number for each, and no more."""
     path = tmp_path / "run.csv"
-    save_csv(replace(RUN, name="four\nbar"), path)
-    assert path.read_text(encoding="utf-8").split("\n")[0] == (
-        "# eomgen trajectory of four bar, integrator rk4, unfinished: "
-        "stopped at t = 0.43, crank=0.3: the state left the finite numbers"
-    )
-    assert np.loadtxt(path, delimiter=",", skiprows=2).shape == (3, 3)
+    save_csv(replace(RUN, states=("crank", "rate")), path)
+    assert not RUN.finished
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    assert table.dtype.names == ("t", "crank", "rate")
+    assert bits(table["t"]) == bits(RUN.t) and bits(table["rate"]) == bits(RUN.y[:, 1])
+    # So does pandas.read_csv, which is no dependency: by the first line, and by commas.
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["crank"]) for row in rows] == RUN.y[:, 0].tolist()
+
+
+def test_a_table_is_ours_by_the_archive_beside_it(tmp_path):
+    """Of a run of the same columns; a table that stands alone, or has others, is not."""
+    path = tmp_path / "run.csv"
+    path.write_text("t,crank\n0,1\n")
+    assert "was not written by eomgen" in error_of(save_csv, RUN, path)
+    save_npz(RUN, tmp_path / "run.npz")
+    assert "was not written by eomgen" in error_of(save_csv, RUN, path)
+    assert path.read_text() == "t,crank\n0,1\n"
+    path.unlink()
+    for _ in range(2):
+        save_csv(RUN, path)
+    save_csv(WORKED, path)  # which has more columns
 
 
 # --- files that are not ours --------------------------------------------------------------------
@@ -287,10 +305,11 @@ def test_csv_says_on_one_line_that_it_is_unfinished(tmp_path):
 
 @pytest.mark.parametrize("save", [save_npz, save_csv])
 def test_a_foreign_file_is_not_overwritten(save, tmp_path):
-    path = tmp_path / "thesis"
+    path = tmp_path / "thesis.x"
     path.write_bytes(b"years of work")
     assert "was not written by eomgen" in error_of(save, RUN, path)
     assert path.read_bytes() == b"years of work"
     save(RUN, path, force=True)
-    save(RUN, path)
+    if save is save_npz:
+        save(RUN, path)
     assert list(tmp_path.iterdir()) == [path]

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from eomgen.backends.conditions import refusals
 from eomgen.language.base import LARGEST
 from eomgen.language.formula import FUNCTIONS, written
 from eomgen.model import Model
@@ -115,7 +116,8 @@ def python_module(system: System) -> str:
     kernels = {name: _kernel(system, name, blocks[name], names, costs[name]) for name in blocks}
     moving = {f for block in blocks.values() for f in block.functions}
     fixed, once = _fixed(system, blocks, names)
-    called = [f for f in FUNCTIONS if f in moving or f in once]
+    refused = refusals(model, DIALECT)
+    called = [f for f in FUNCTIONS if f in moving or f in once or f in refused.functions]
     dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
     special = {"initial_state", "derivative", *DERIVATIVES, *(name for name, _, _ in dynamics)}
     special |= {"impact", "held"}
@@ -135,6 +137,7 @@ def python_module(system: System) -> str:
         "quaternions": repr(quaternions),
         "parameters": model.parameters,
         "parameter_names": ", ".join(names.safe(p.name) for p in model.parameters),
+        "refused": refused,
         "inputs": model.inputs,
         "units": _units(system),
         "effects": repr(tuple(effect.type for effect in model.effects)),

@@ -34,7 +34,7 @@ from eomgen.model import Model, ways_of
 from eomgen.run.limits import excursions, locks
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_progress
-from eomgen.run.trajectory import Trajectory
+from eomgen.run.trajectory import Trajectory, is_own_table
 from eomgen.scene.schema import SHOWN
 from eomgen.store import Code
 
@@ -130,8 +130,9 @@ def _write(
     from eomgen.run.trajectory import save_csv, save_npz
 
     write_whole(paths["py"], code.module, force=force)
-    save_npz(trajectory, paths["npz"], force=force)
+    # The table first: the archive of an earlier run is what tells whose table it overwrites.
     save_csv(trajectory, paths["csv"], force=force)
+    save_npz(trajectory, paths["npz"], force=force)
     return _save_pictures(motion, code.poses, parameters, paths, force)
 
 
@@ -342,9 +343,10 @@ def _output_paths(given: Arguments, name: str) -> dict[str, Path]:
     paths = {kind: given.output / f"{name}.{kind}" for kind in kinds}
     paths["png"] = _or(given.plot, paths["png"])
     check_figure(paths["png"], force=given.force)
-    for path in paths.values():
+    for kind, path in paths.items():
         check_folder(path.parent)
-        check_writable(path, force=given.force)
+        own = kind == "csv" and path.is_file() and is_own_table(path)
+        check_writable(path, force=given.force or own)
     return paths
 
 

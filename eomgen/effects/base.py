@@ -1,10 +1,11 @@
 """What effects share: what they may ask of a mechanism, and the loads they put on it."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, Self
 
 from eomgen.language.base import Identifier, Table
+from eomgen.language.conditions import Condition
 from eomgen.language.formula import ZERO, Formula
 
 Scalar = Any
@@ -252,8 +253,9 @@ class EffectTable(Table):
         `joints` has the kinds of ways of all that move but the free ones, `names` the coordinates.
         """
 
-    def check_values(self, value: Callable[[Formula], float], place: str) -> None:
-        """Raise `SceneError` for quantities that do not go together, by their values."""
+    def conditions(self, place: str) -> Iterable[Condition]:
+        """What its quantities are to keep beside their own bounds; `place` is the effect's."""
+        return ()
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
         """Inputs that it takes."""
@@ -292,3 +294,7 @@ class EffectTable(Table):
         closed form takes them.
         """
         return False
+
+    def why_not_plain(self) -> str:
+        """What keeps one that is not from the closed form, in a few words."""
+        return "that depends on the motion"

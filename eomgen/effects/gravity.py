@@ -79,3 +79,7 @@ class Gravity(EffectTable):
     def is_plain(self, parameters: Collection[str]) -> bool:
         """Downwards, on all bodies."""
         return self.direction is None and not self.except_bodies
+
+    def why_not_plain(self) -> str:
+        """It has a direction of its own, or leaves bodies alone."""
+        return "with except_bodies" if self.except_bodies else "with a direction of its own"

@@ -240,20 +240,33 @@ def _text(array: Array) -> str:
 
 
 def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
-    """Write `trajectory` as a table: a comment line, the header, one row of t and y per time, and
-    where works were asked for, of these: work_<effect>, J.
+    """Write `trajectory` as a table: a line of names, one row of t and y per time, and where works
+    were asked for, of these: work_<effect>, J.
 
-    Numbers are the shortest that read back exactly; `np.loadtxt(path, delimiter=",",
-    skiprows=2)` loads them. Raises `RunError` as `save_npz` does.
+    Numbers are the shortest that read back exactly. `pandas.read_csv(path)` loads it, and
+    `np.genfromtxt(path, delimiter=",", names=True)`. All else that there is to say of a trajectory
+    stands in the archive that `save_npz` writes. Raises `RunError` as `save_npz` does.
     """
-    comment = f"# eomgen trajectory of {trajectory.name}, integrator {trajectory.integrator}"
-    if not trajectory.finished:
-        comment += f", unfinished: {trajectory.message}"
     buffer = io.StringIO()
-    buffer.write(" ".join(comment.split()) + "\n")
     table = csv.writer(buffer, lineterminator="\n")
     works = [] if trajectory.works is None else [trajectory.works]
-    names = [f"work_{name}" for name in trajectory.work_names]
-    table.writerow(["t", *trajectory.states, *names])
+    table.writerow(_columns(trajectory))
     table.writerows(np.column_stack([trajectory.t, trajectory.y, *works]).tolist())
-    write_whole(path, buffer.getvalue(), force=force)
+    write_whole(path, buffer.getvalue(), force=force or is_own_table(path))
+
+
+def is_own_table(path: Path) -> bool:
+    """Whether a table has the columns of a trajectory of ours beside it, in the .npz of its name.
+
+    A table that others read has no room for a mark of whose it is.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            head = next(csv.reader(file), [])
+        return head == _columns(load_npz(path.with_suffix(".npz")))
+    except (OSError, UnicodeDecodeError, csv.Error, RunError):
+        return False
+
+
+def _columns(trajectory: Trajectory) -> list[str]:
+    return ["t", *trajectory.states, *(f"work_{name}" for name in trajectory.work_names)]
