@@ -293,11 +293,13 @@ def rows(
     scale: Floats,
     times: Floats,
     tolerance: float,
+    told: Callable[[float], None] = lambda t: None,
 ) -> Iterator[tuple[Longs, int]]:
     """The state at each of `times` (ascending; the first is the start) and the steps made so far.
 
     ladder     numbers of stages, ascending; a step takes the least that serve
     tolerance  what each step's error is held to, in parts of the scale
+    told       where each step begins, s, whether it is taken or not; may raise to end it
 
     Every row ends a step, so that rows are as accurate as the end; so does every turn of a corner.
     Long numbers must be on (`digits`) wherever this is resumed. Raises `NoStep` if steps shrink to
@@ -311,6 +313,7 @@ def rows(
         target = mpfr(float(end))
         turn, tried, h = None, 0, mpfr(0)
         while way.t < target:
+            told(float(way.t))
             left = target - way.t
             count = max(1, math.ceil(left / way.length * 0.999))
             h = left / count if turn is None else h + h * turn.beyond
