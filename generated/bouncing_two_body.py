@@ -818,7 +818,7 @@ def initial_state(p=None):
 
 
 def derivative(t, y, p=None, u=None):
-    """Time derivative of the state: (8,), or (8, k) for k states."""
+    """Time derivative of the state: (8,), or (8, k) for k states. Forces of held contacts are left out."""
     if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
         k, reach = _DERIVATIVE, _REACH
         if p is not None:

@@ -309,7 +309,7 @@ def test_works_are_booked_where_they_are_asked_for(
         said, table = capsys.readouterr().out, (tmp_path / "pendulum.csv").read_text("utf-8")
         assert ("    work: gravity " in said) is bool(asked)
         assert ("J unaccounted for" in said) is bool(asked)
-        assert table.splitlines()[1].endswith(",work_gravity") is bool(asked)
+        assert table.splitlines()[0].endswith(",work_gravity") is bool(asked)
         module = (tmp_path / "pendulum.py").read_text("utf-8")
         assert ("def effect_powers" in module) is bool(asked)
 

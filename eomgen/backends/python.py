@@ -83,6 +83,15 @@ ABOUT_SPACE = {
     "body_poses": "[world_R_body | centre of mass (m)] of each body, 3 x 4.",
     "body_velocities": "Velocity of each centre of mass (m/s) and angular velocity (rad/s), world.",
 }
+ABOUT_CONTACTS = (
+    "derivative",
+    "forward_dynamics",
+    "inverse_dynamics",
+    "applied_force",
+    "joint_forces",
+    "driving_forces",
+)
+"""What rigid contacts would change while they are held."""
 DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 
 
@@ -174,7 +183,7 @@ def _kernel(
     special = ABOUT_PLANE if system.model.dimensions == 2 else ABOUT_SPACE
     return Kernel(
         name=name,
-        about=special.get(name, ABOUT.get(name, "")),
+        about=special.get(name, ABOUT.get(name, "")) + _left_out(system, name),
         shape=repr(shape),
         block=block,
         state=_unpacking([s.name for s in system.states], block, names),
@@ -186,6 +195,12 @@ def _kernel(
         tangent=name in system.tangents,
         time=TIME in block.inputs,
     )
+
+
+def _left_out(system: System, name: str) -> str:
+    """What an output lacks where there are rigid contacts, whose forces only a run finds."""
+    lacks = name in ABOUT_CONTACTS and bool(system.contacts)
+    return " Forces of held contacts are left out." if lacks else ""
 
 
 def watched(program: Program, states: Sequence[str]) -> str:
