@@ -361,6 +361,25 @@ def test_force_on_what_is_light() -> None:
             assert off(model, state(model, "random", seed)) < AT_RANDOM
 
 
+@pytest.mark.parametrize("angle", [1e-20, 1e-17, 1e-10, 1e-3])
+@pytest.mark.parametrize("rate", [0.0, 0.5])
+def test_rows_that_hold_next_to_nothing_of_an_axis(angle: float, rate: float) -> None:
+    """A light link between two heavy ones, all but in line with the outer: that one's row holds so
+    little of the turn about the middle pin that rounding is most of what it says of it.
+    """
+    text = 'name = "links"\n[[effects]]\ntype = "gravity"\ng = 9.81\n'
+    for k, mass in enumerate((1.0, 1e-12, 1.0)):
+        text += (
+            f'[[bodies]]\nname = "b{k}"\nmass = {mass!r}\ninertia_com = 0\n'
+            f'[[joints]]\nname = "j{k}"\ntype = "revolute"\nchild = "b{k}"\nr_child = [-1, 0]\n'
+            f'parent = "{f"b{k - 1}" if k else "world"}"\nr_parent = [{1.0 if k else 0.0}, 0]\n'
+        )
+    model = build_model(parse_scene(text))
+    q, v = [0.7, 0.5, angle], [rate, -rate, 2 * rate]
+    size = max(1.0, *(abs(float(x)) for x in exactly(model, q, v, {})))
+    assert off(model, (q, v, {})) < 1e-13 * size
+
+
 # Operations.
 
 
