@@ -43,6 +43,7 @@ class Code:
     poses: str
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
+    notices: tuple[str, ...]
     derived: bool
 
 
@@ -59,21 +60,23 @@ def generated_code(model: Model) -> Code:
     from eomgen.pipeline import generate
 
     made = generate(model)
-    parts = [made.module, made.poses, [astuple(r) for r in made.reports], made.explanation]
+    reports = [astuple(report) for report in made.reports]
+    parts = [made.module, made.poses, reports, made.explanation, made.notices]
     with suppress(RunError):
         write_whole(path, json.dumps({"digest": _digest(parts), "parts": parts}), force=True)
-    return Code(made.module, made.poses, made.reports, made.explanation, derived=True)
+    return Code(**vars(made), derived=True)
 
 
 def _kept(path: Path) -> Code | None:
     """What a file of the store holds, or None if it is not whole."""
     try:
         entry = json.loads(path.read_text("utf-8"))
-        module, poses, reports, explanation = entry["parts"]
+        module, poses, reports, *told = entry["parts"]
         if entry["digest"] != _digest(entry["parts"]):
             return None
         reports = tuple(PassReport(*report) for report in reports)
-        return Code(module, poses, reports, tuple(explanation), derived=False)
+        explanation, notices = map(tuple, told)
+        return Code(module, poses, reports, explanation, notices, derived=False)
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None
 

@@ -74,6 +74,8 @@ def code_of(scene: str, model: Model, given: Arguments) -> tuple[Code, Generated
     with located(scene):
         with terminal_notice(f"deriving {model.name} …"):
             code = generated_code(model)
+        for notice in code.notices:
+            print(f"eomgen: note: {find_scene(scene).name}: {notice}", file=sys.stderr)
         module = load_module(code.module, model.name)
         as_problem(module, model=model)
         if getattr(given, "outputs", None) not in (None, "all"):
