@@ -65,6 +65,10 @@ def build_model(scene: Scene) -> Model:
         simulation=scene.simulation,
         camera=scene.camera,
         locked=tuple(locked.items()),
+        # What is not there by its own name is there in degrees.
+        locked_deg=tuple(
+            (name, scene.locked[f"{name}_deg"]) for name in locked if name not in scene.locked
+        ),
         leave_out=scene.leave_out,
         notices=notices,
     )

@@ -12,6 +12,7 @@ from eomgen.effects.base import ExtraState, Input
 from eomgen.joints import Free, Joint, Revolute
 from eomgen.joints.base import Coordinate
 from eomgen.language.conditions import Condition, require
+from eomgen.language.exact import Real, radians
 from eomgen.language.formula import Constant, Floats, Formula, evaluate
 from eomgen.language.quantity import Parameter
 from eomgen.scene.look import Camera, Shape
@@ -119,7 +120,8 @@ class Model:
 
     `conditions` are what values of the parameters keep.
     `states` are those that effects bring along, after coordinates and velocities.
-    `locked` holds each coordinate that is held fast, by name, with its value.
+    `locked` holds each coordinate that is held fast, by name, with its value; `locked_deg` those
+    of them that the scene gives in degrees, in which a quarter turn is one.
     `notices` say what was put right on the way, a line each.
     """
 
@@ -141,6 +143,7 @@ class Model:
     simulation: Simulation
     camera: Camera
     locked: tuple[tuple[str, float], ...] = ()
+    locked_deg: tuple[tuple[str, float], ...] = ()
     leave_out: tuple[LeftOut, ...] = ()
     notices: tuple[str, ...] = ()
 
@@ -258,6 +261,11 @@ class Model:
                         yield part
         for point in self.points:
             yield from point.at
+
+    def locked_angle(self, name: str) -> Real:
+        """The value of a locked angle, rad, of more digits than a double has."""
+        degrees = dict(self.locked_deg)
+        return radians(degrees[name]) if name in degrees else dict(self.locked)[name]
 
     @cached_property
     def magnitude(self) -> float:

@@ -4,26 +4,25 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from eomgen.errors import SceneError
 from eomgen.joints import Free, Joint
 from eomgen.joints.base import Geared
 from eomgen.language.conditions import ROUNDING
+from eomgen.language.exact import sine_between
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import with_components
 from eomgen.model import Model
 from eomgen.scene.schema import BodyTable
 
-PARALLEL = 1e-6
-"""Sine of the angle below which the two axes of a universal joint count as one."""
+PARALLEL = 1e-15
+"""Sine of the angle below which two axes are as good as parallel: their last digits say which."""
 
 
 def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[str]) -> Joint:
-    """A joint with vectors of the right length and axes of length 1.
+    """A joint with vectors of the right length and axes that have a direction.
 
-    Adds a notice for every axis that was scaled. Raises `SceneError` for a joint that there is not
-    in this space, an axis of no length, parallel axes, limits upside down.
+    Adds a notice for every axis that is not of length 1. Raises `SceneError` for a joint that there
+    is not in this space, an axis of no length, parallel axes, limits upside down.
     """
     if dimensions not in joint.spaces:
         raise SceneError(
@@ -44,13 +43,13 @@ def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[
     if axis is not None:
         if joint.type == "revolute" and dimensions == 2:
             raise SceneError(f"{place}.axis: in the plane a pin turns about z; leave it out")
-        fields["axis"] = _unit(axis, f"{place}.axis", dimensions, notices)
+        fields["axis"] = _direction(axis, f"{place}.axis", dimensions, notices)
     axes = getattr(joint, "axes", None)
     if axes is not None:
         first, second = (
-            _unit(a, f"{place}.axes[{i}]", dimensions, notices) for i, a in enumerate(axes)
+            _direction(a, f"{place}.axes[{i}]", dimensions, notices) for i, a in enumerate(axes)
         )
-        if float(np.linalg.norm(np.cross(first, second))) < PARALLEL:
+        if sine_between(first, second) < PARALLEL:
             raise SceneError(f"{place}.axes: are parallel; give two that cross, or a revolute")
         fields["axes"] = (first, second)
     if isinstance(joint, Geared):
@@ -64,9 +63,10 @@ def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[
     return joint.replaced(**fields)
 
 
-def _unit(
+def _direction(
     axis: tuple[float, ...], place: str, dimensions: int, notices: list[str]
 ) -> tuple[float, ...]:
+    """The axis itself: rounded to length 1 it would no longer be what the scene says."""
     axis = with_components(axis, 0.0, dimensions, place)
     if not any(axis):
         raise SceneError(f"{place}: has no length; give a direction, for example {_example(axis)}")
@@ -74,12 +74,7 @@ def _unit(
         notices.append(
             f"{place}: has length {math.hypot(*axis):g}; taken as a direction of length 1"
         )
-    # By a power of two first, which is exact: the length of a tiny axis would have few digits.
-    _, exponent = math.frexp(max(map(abs, axis)))
-    axis = tuple(math.ldexp(a, -exponent) for a in axis)
-    length = math.hypot(*axis)
-    # A direction along a coordinate axis stays exact, so that what it makes zero is folded away.
-    return tuple(math.copysign(1.0, a) if abs(a) == length else a / length for a in axis)
+    return axis
 
 
 def _example(axis: Sequence[float]) -> str:

@@ -75,20 +75,16 @@ Parameters p, with the scene's values:
     gravity_g = 9.81  m/s^2   gravitational acceleration, downwards of gravity
 
 Effects: gravity, motor, motor, motor, motor, motor, motor.
-One call of `derivative` takes 920 operations: 219 add, 216 sub, 452 mul, 23 div, 5 sin, 5 cos; 99
+One call of `derivative` takes 904 operations: 217 add, 203 sub, 451 mul, 23 div, 5 sin, 5 cos; 85
 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (12, k); then every result has a last axis of length k.
-
-All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
-where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
-results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import cos, hypot, inf, isfinite, nan, prod, sin
+from math import cos, isfinite, sin
 
 import numpy as np
 
@@ -244,169 +240,117 @@ JOINTS = ('joint_1', 'joint_2', 'joint_3', 'joint_4', 'joint_5', 'joint_6')
 POINTS = ('wrist',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 219, "sub": 216, "mul": 452, "div": 23, "sin": 5, "cos": 5, "total": 920, "parameters": 99},
-    "jacobian": {"add": 1303, "sub": 1142, "mul": 2643, "div": 104, "neg": 11, "sin": 6, "cos": 6, "total": 5215, "parameters": 100},
-    "forward_dynamics": {"add": 225, "sub": 216, "mul": 452, "div": 23, "sin": 5, "cos": 5, "total": 926, "parameters": 99},
-    "inverse_dynamics": {"add": 124, "sub": 96, "mul": 235, "sin": 5, "cos": 5, "total": 465, "parameters": 95},
+    "derivative": {"add": 217, "sub": 203, "mul": 451, "div": 23, "sin": 5, "cos": 5, "total": 904, "parameters": 85},
+    "jacobian": {"add": 1305, "sub": 1139, "mul": 2642, "div": 104, "neg": 11, "sin": 6, "cos": 6, "total": 5213, "parameters": 86},
+    "forward_dynamics": {"add": 223, "sub": 203, "mul": 451, "div": 23, "sin": 5, "cos": 5, "total": 910, "parameters": 85},
+    "inverse_dynamics": {"add": 121, "sub": 84, "mul": 235, "sin": 5, "cos": 5, "total": 450, "parameters": 73},
     "mass_matrix": {"add": 187, "sub": 128, "mul": 417, "sin": 6, "cos": 6, "total": 744, "parameters": 62},
-    "velocity_force": {"add": 97, "sub": 87, "mul": 214, "sin": 5, "cos": 5, "total": 408, "parameters": 75},
+    "velocity_force": {"add": 95, "sub": 75, "mul": 214, "sin": 5, "cos": 5, "total": 394, "parameters": 61},
     "gravity_force": {"add": 29, "sub": 16, "mul": 76, "neg": 2, "sin": 5, "cos": 5, "total": 133, "parameters": 17},
     "point_positions": {"add": 8, "sub": 7, "mul": 27, "sin": 3, "cos": 3, "total": 48, "parameters": 8},
     "point_jacobians": {"add": 12, "sub": 16, "mul": 41, "neg": 5, "sin": 3, "cos": 3, "total": 80, "parameters": 8},
 }
 
 
-def _refused(d_1, a_2, d_3, a_3, d_4, m_1, I_1y, m_2, I_2x, I_2y, I_2z, c_2x, c_2y, c_2z, m_3, I_3x, I_3y, I_3z, c_3x, c_3y, c_3z, m_4, I_4x, I_4y, I_4z, c_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6x, I_6y, I_6z, c_6z, J_1, G_1, J_2, G_2, J_3, G_3, J_4, G_4, J_5, G_5, J_6, G_6, gravity_g):
-    """What the scene would refuse in these parameters, in words; or nothing."""
-    k1 = I_1y + I_1y
-    k2 = k1 + 5e-10 * (I_1y + k1) - I_1y
-    k3 = I_2x + I_2y
-    k4 = 5e-10 * (I_2z + k3)
-    k5 = -(a_2 + c_2x)
-    k6 = I_3x + I_3y
-    k7 = 5e-10 * (I_3z + k6)
-    k8 = -(a_3 + c_3x)
-    k9 = d_3 - c_3y
-    k10 = I_4x + I_4y
-    k11 = 5e-10 * (I_4z + k10)
-    k12 = -(d_4 + c_4y)
-    k13 = I_5x + I_5y
-    k14 = 5e-10 * (I_5z + k13)
-    k15 = I_6x + I_6y
-    k16 = 5e-10 * (I_6z + k15)
-    if not min(min(k2, k2), k2) >= 0.0:
-        return "parameters I_1y: bodies[0].inertia_com: body 'link_1' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_1y, I_1y, I_1y)
-    if not J_1 >= 0.0:
-        return 'parameters J_1: joints[0].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_1)
-    if not min(min(I_2y + I_2z + k4 - I_2x, k4 + (I_2x + I_2z) - I_2y), k3 + k4 - I_2z) >= 0.0:
-        return "parameters I_2y, I_2z, I_2x: bodies[1].inertia_com: body 'link_2' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_2x, I_2y, I_2z)
-    if not -1e+100 <= k5 <= 1e+100:
-        return 'parameters c_2x, a_2: joints[1].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k5)
-    if not J_2 >= 0.0:
-        return 'parameters J_2: joints[1].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_2)
-    if not min(min(I_3y + I_3z + k7 - I_3x, k7 + (I_3x + I_3z) - I_3y), k6 + k7 - I_3z) >= 0.0:
-        return "parameters I_3y, I_3z, I_3x: bodies[2].inertia_com: body 'link_3' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_3x, I_3y, I_3z)
-    if not -1e+100 <= k8 <= 1e+100:
-        return 'parameters c_3x, a_3: joints[2].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k8)
-    if not -1e+100 <= k9 <= 1e+100:
-        return 'parameters c_3y, d_3: joints[2].r_child[1]: {:g} is larger than 1e+100; choose other units'.format(k9)
-    if not J_3 >= 0.0:
-        return 'parameters J_3: joints[2].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_3)
-    if not min(min(I_4y + I_4z + k11 - I_4x, k11 + (I_4x + I_4z) - I_4y), k10 + k11 - I_4z) >= 0.0:
-        return "parameters I_4y, I_4z, I_4x: bodies[3].inertia_com: body 'link_4' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_4x, I_4y, I_4z)
-    if not -1e+100 <= k12 <= 1e+100:
-        return 'parameters c_4y, d_4: joints[3].r_child[1]: {:g} is larger than 1e+100; choose other units'.format(k12)
-    if not J_4 >= 0.0:
-        return 'parameters J_4: joints[3].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_4)
-    if not min(min(I_5y + I_5z + k14 - I_5x, k14 + (I_5x + I_5z) - I_5y), k13 + k14 - I_5z) >= 0.0:
-        return "parameters I_5y, I_5z, I_5x: bodies[4].inertia_com: body 'link_5' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_5x, I_5y, I_5z)
-    if not J_5 >= 0.0:
-        return 'parameters J_5: joints[4].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_5)
-    if not min(min(I_6y + I_6z + k16 - I_6x, k16 + (I_6x + I_6z) - I_6y), k15 + k16 - I_6z) >= 0.0:
-        return "parameters I_6y, I_6z, I_6x: bodies[5].inertia_com: body 'link_6' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_6x, I_6y, I_6z)
-    if not J_6 >= 0.0:
-        return 'parameters J_6: joints[5].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_6)
-    return None
-
-
-def _fixed(d_1, a_2, d_3, a_3, d_4, m_1, I_1y, m_2, I_2x, I_2y, I_2z, c_2x, c_2y, c_2z, m_3, I_3x, I_3y, I_3z, c_3x, c_3y, c_3z, m_4, I_4x, I_4y, I_4z, c_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6x, I_6y, I_6z, c_6z, J_1, G_1, J_2, G_2, J_3, G_3, J_4, G_4, J_5, G_5, J_6, G_6, gravity_g):
-    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
+@lru_cache(maxsize=64)
+def _constants(values):
+    """Everything that depends on parameters alone, once for each set of them."""
+    d_1, a_2, d_3, a_3, d_4, m_1, I_1y, m_2, I_2x, I_2y, I_2z, c_2x, c_2y, c_2z, m_3, I_3x, I_3y, I_3z, c_3x, c_3y, c_3z, m_4, I_4x, I_4y, I_4z, c_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6x, I_6y, I_6z, c_6z, J_1, G_1, J_2, G_2, J_3, G_3, J_4, G_4, J_5, G_5, J_6, G_6, gravity_g = values
     if not m_1 > 0.0:
-        return "mass of link_1 is not positive"
+        raise ValueError("mass of link_1 is not positive: change the parameters")
     if not I_1y >= 0.0:
-        return "inertia_com xx of link_1 is negative"
+        raise ValueError("inertia_com xx of link_1 is negative: change the parameters")
     if not I_1y >= 0.0:
-        return "inertia_com yy of link_1 is negative"
+        raise ValueError("inertia_com yy of link_1 is negative: change the parameters")
     if not I_1y >= 0.0:
-        return "inertia_com zz of link_1 is negative"
+        raise ValueError("inertia_com zz of link_1 is negative: change the parameters")
     if not m_2 > 0.0:
-        return "mass of link_2 is not positive"
+        raise ValueError("mass of link_2 is not positive: change the parameters")
     if not I_2x >= 0.0:
-        return "inertia_com xx of link_2 is negative"
+        raise ValueError("inertia_com xx of link_2 is negative: change the parameters")
     if not I_2y >= 0.0:
-        return "inertia_com yy of link_2 is negative"
+        raise ValueError("inertia_com yy of link_2 is negative: change the parameters")
     if not I_2z >= 0.0:
-        return "inertia_com zz of link_2 is negative"
+        raise ValueError("inertia_com zz of link_2 is negative: change the parameters")
     if not m_3 > 0.0:
-        return "mass of link_3 is not positive"
+        raise ValueError("mass of link_3 is not positive: change the parameters")
     if not I_3x >= 0.0:
-        return "inertia_com xx of link_3 is negative"
+        raise ValueError("inertia_com xx of link_3 is negative: change the parameters")
     if not I_3y >= 0.0:
-        return "inertia_com yy of link_3 is negative"
+        raise ValueError("inertia_com yy of link_3 is negative: change the parameters")
     if not I_3z >= 0.0:
-        return "inertia_com zz of link_3 is negative"
+        raise ValueError("inertia_com zz of link_3 is negative: change the parameters")
     if not m_4 > 0.0:
-        return "mass of link_4 is not positive"
+        raise ValueError("mass of link_4 is not positive: change the parameters")
     if not I_4x >= 0.0:
-        return "inertia_com xx of link_4 is negative"
+        raise ValueError("inertia_com xx of link_4 is negative: change the parameters")
     if not I_4y >= 0.0:
-        return "inertia_com yy of link_4 is negative"
+        raise ValueError("inertia_com yy of link_4 is negative: change the parameters")
     if not I_4z >= 0.0:
-        return "inertia_com zz of link_4 is negative"
+        raise ValueError("inertia_com zz of link_4 is negative: change the parameters")
     if not m_5 > 0.0:
-        return "mass of link_5 is not positive"
+        raise ValueError("mass of link_5 is not positive: change the parameters")
     if not I_5x >= 0.0:
-        return "inertia_com xx of link_5 is negative"
+        raise ValueError("inertia_com xx of link_5 is negative: change the parameters")
     if not I_5y >= 0.0:
-        return "inertia_com yy of link_5 is negative"
+        raise ValueError("inertia_com yy of link_5 is negative: change the parameters")
     if not I_5z >= 0.0:
-        return "inertia_com zz of link_5 is negative"
+        raise ValueError("inertia_com zz of link_5 is negative: change the parameters")
     if not m_6 > 0.0:
-        return "mass of link_6 is not positive"
+        raise ValueError("mass of link_6 is not positive: change the parameters")
     if not I_6x >= 0.0:
-        return "inertia_com xx of link_6 is negative"
+        raise ValueError("inertia_com xx of link_6 is negative: change the parameters")
     if not I_6y >= 0.0:
-        return "inertia_com yy of link_6 is negative"
+        raise ValueError("inertia_com yy of link_6 is negative: change the parameters")
     if not I_6z >= 0.0:
-        return "inertia_com zz of link_6 is negative"
-    k39 = J_1 * (G_1 * G_1)
-    k42 = a_2 + c_2x
-    k36 = J_2 * (G_2 * G_2)
-    k1 = k42 - c_2x
-    k43 = a_3 + c_3x
-    k44 = d_3 - c_3y
+        raise ValueError("inertia_com zz of link_6 is negative: change the parameters")
+    k40 = J_1 * (G_1 * G_1)
+    k41 = a_2 + c_2x
+    k37 = J_2 * (G_2 * G_2)
+    k1 = k41 - c_2x
+    k42 = a_3 + c_3x
+    k43 = d_3 - c_3y
     k2 = J_3 * (G_3 * G_3)
-    k3 = c_3x - k43
-    k4 = c_3y + k44
-    k45 = d_4 + c_4y
+    k3 = c_3x - k42
+    k4 = c_3y + k43
+    k44 = d_4 + c_4y
     k5 = J_4 * (G_4 * G_4)
-    k6 = k45 - c_4y
+    k6 = k44 - c_4y
     k7 = J_5 * (G_5 * G_5)
-    k37 = J_6 * (G_6 * G_6)
-    inertia_link_1_xx = I_1y + d_1 * (d_1 * m_1)
-    moment_link_2_x = m_2 * k42
+    k38 = J_6 * (G_6 * G_6)
+    moment_link_2_x = m_2 * k41
     moment_link_2_y = m_2 * c_2y
     moment_link_2_z = m_2 * c_2z
-    k46 = k42 * moment_link_2_x
-    k47 = c_2y * moment_link_2_y
-    k48 = c_2z * moment_link_2_z
+    k45 = k41 * moment_link_2_x
+    k46 = c_2y * moment_link_2_y
+    k47 = c_2z * moment_link_2_z
     k8 = c_2y * moment_link_2_x
     k9 = c_2z * moment_link_2_x
     k10 = c_2z * moment_link_2_y
-    inertia_link_2_xx = I_2x + (k47 + k48)
-    inertia_link_2_yy = I_2y + (k46 + k48)
-    inertia_link_2_zz = I_2z + (k46 + k47)
-    k11 = m_3 * k43
-    moment_link_3_y = m_3 * k44
+    inertia_link_2_xx = I_2x + (k46 + k47)
+    inertia_link_2_yy = I_2y + (k45 + k47)
+    inertia_link_2_zz = I_2z + (k45 + k46)
+    k11 = m_3 * k42
+    moment_link_3_y = m_3 * k43
     moment_link_3_z = m_3 * c_3z
-    k49 = k43 * k11
-    k50 = k44 * moment_link_3_y
-    k51 = c_3z * moment_link_3_z
-    inertia_link_3_xy = k44 * k11
+    k48 = k42 * k11
+    k49 = k43 * moment_link_3_y
+    k50 = c_3z * moment_link_3_z
+    inertia_link_3_xy = k43 * k11
     inertia_link_3_xz = c_3z * k11
     k12 = c_3z * moment_link_3_y
-    inertia_link_3_xx = I_3x + (k50 + k51)
-    inertia_link_3_yy = I_3y + (k49 + k51)
-    inertia_link_3_zz = I_3z + (k49 + k50)
-    moment_link_4_y = m_4 * k45
-    k52 = k45 * moment_link_4_y
-    inertia_link_4_xx = I_4x + k52
-    inertia_link_4_zz = I_4z + k52
+    inertia_link_3_xx = I_3x + (k49 + k50)
+    inertia_link_3_yy = I_3y + (k48 + k50)
+    inertia_link_3_zz = I_3z + (k48 + k49)
+    moment_link_4_y = m_4 * k44
+    k51 = k44 * moment_link_4_y
+    inertia_link_4_xx = I_4x + k51
+    inertia_link_4_zz = I_4z + k51
     moment_link_6_z = m_6 * c_6z
-    k53 = c_6z * moment_link_6_z
-    inertia_link_6_xx = I_6x + k53
-    inertia_link_6_yy = I_6y + k53
-    pivot_link_6 = I_6z + k37
+    k52 = c_6z * moment_link_6_z
+    inertia_link_6_xx = I_6x + k52
+    inertia_link_6_yy = I_6y + k52
+    pivot_link_6 = I_6z + k38
     k13 = I_6z / pivot_link_6
     k14 = inertia_link_6_xx - inertia_link_6_yy
     k15 = I_5y + inertia_link_6_yy
@@ -414,77 +358,36 @@ def _fixed(d_1, a_2, d_3, a_3, d_4, m_1, I_1y, m_2, I_2x, I_2y, I_2z, c_2x, c_2y
     k17 = m_5 + m_6
     k18 = k6 * k17
     k19 = m_4 + k17
-    k20 = k36 + inertia_link_2_zz
-    k21 = I_1y + k39
-    k40 = 0.5 * (inertia_link_1_xx + (I_1y + inertia_link_1_xx)) - inertia_link_1_xx
-    k54 = 0.5 * (inertia_link_2_zz + (inertia_link_2_xx + inertia_link_2_yy))
-    k22 = k54 - inertia_link_2_xx
-    k23 = k54 - inertia_link_2_yy
-    k41 = k54 - inertia_link_2_zz
-    k55 = 0.5 * (inertia_link_3_zz + (inertia_link_3_xx + inertia_link_3_yy))
-    k24 = k55 - inertia_link_3_xx
-    k25 = k55 - inertia_link_3_yy
-    k26 = k55 - inertia_link_3_zz
-    k56 = 0.5 * (inertia_link_4_zz + (I_4y + inertia_link_4_xx))
-    k27 = k56 - inertia_link_4_xx
-    k28 = k56 - I_4y
-    k29 = k56 - inertia_link_4_zz
-    k57 = 0.5 * (I_5z + (I_5x + I_5y))
-    k30 = k57 - I_5x
-    k31 = k57 - I_5y
-    k32 = k57 - I_5z
-    k58 = 0.5 * (I_6z + (inertia_link_6_xx + inertia_link_6_yy))
-    k33 = k58 - inertia_link_6_xx
-    k34 = k58 - inertia_link_6_yy
-    k35 = k58 - I_6z
-    k38 = m_3 + k19
+    k20 = k37 + inertia_link_2_zz
+    k21 = I_1y + k40
+    k22 = inertia_link_2_zz - inertia_link_2_yy
+    k23 = inertia_link_2_xx - inertia_link_2_zz
+    k24 = inertia_link_2_yy - inertia_link_2_xx
+    k25 = inertia_link_3_zz - inertia_link_3_yy
+    k26 = inertia_link_3_xx - inertia_link_3_zz
+    k27 = inertia_link_3_yy - inertia_link_3_xx
+    k28 = inertia_link_4_zz - I_4y
+    k29 = inertia_link_4_xx - inertia_link_4_zz
+    k30 = I_4y - inertia_link_4_xx
+    k31 = I_5z - I_5y
+    k32 = I_5x - I_5z
+    k33 = I_5y - I_5x
+    k34 = I_6z - inertia_link_6_yy
+    k35 = inertia_link_6_xx - I_6z
+    k36 = inertia_link_6_yy - inertia_link_6_xx
+    k39 = m_3 + k19
     return {
         "initial_state": (),
-        "derivative": (m_3, m_4, I_4y, m_5, I_5x, m_6, gravity_g, k1, k2, k3, k4, k5, k6, k7, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35),
-        "jacobian": (m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k36, k1, k2, k3, k4, k5, k6, k7, k37, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k38),
-        "forward_dynamics": (m_3, m_4, I_4y, m_5, I_5x, m_6, gravity_g, k1, k2, k3, k4, k5, k6, k7, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35),
-        "inverse_dynamics": (m_3, m_4, m_5, m_6, gravity_g, k39, k36, k1, k2, k3, k4, k5, k6, k7, k37, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, moment_link_4_y, moment_link_6_z, k40, k22, k23, k41, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35),
-        "mass_matrix": (I_4y, I_5x, I_5y, I_5z, I_6z, k36, k1, k2, k3, k4, k5, k6, k7, k37, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, k17, k19, k21, k38),
-        "velocity_force": (m_3, m_4, m_5, m_6, k1, k3, k4, k6, k8, k9, k10, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, moment_link_4_y, moment_link_6_z, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35),
+        "derivative": (m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k1, k2, k3, k4, k5, k6, k7, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36),
+        "jacobian": (m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k37, k1, k2, k3, k4, k5, k6, k7, k38, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k39),
+        "forward_dynamics": (m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k1, k2, k3, k4, k5, k6, k7, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36),
+        "inverse_dynamics": (I_1y, m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k40, k37, k1, k2, k3, k4, k5, k6, k7, k38, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36),
+        "mass_matrix": (I_4y, I_5x, I_5y, I_5z, I_6z, k37, k1, k2, k3, k4, k5, k6, k7, k38, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, k17, k19, k21, k39),
+        "velocity_force": (m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, k1, k3, k4, k6, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36),
         "gravity_force": (m_3, m_4, m_5, m_6, gravity_g, k1, k3, k4, k6, moment_link_2_x, moment_link_2_y, moment_link_2_z, k11, moment_link_3_y, moment_link_3_z, moment_link_4_y, moment_link_6_z, k17),
         "point_positions": (d_1, k1, k3, k4, k6),
         "point_jacobians": (d_1, k1, k3, k4, k6),
     }
-
-
-@lru_cache(maxsize=64)
-def _constants(key):
-    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
-
-    `reach` is how large states and results may be without a thought of overflow. It is 0 if
-    parameters or constants are so large or small that a product may be lost; not for the constants
-    near 1e-200 that weigh what must never count.
-    """
-    values = np.frombuffer(key) if key else np.empty(0)
-    try:
-        made = _refused(*values.tolist())
-    except (ArithmeticError, ValueError):
-        made = "a formula has no value: change the parameters"
-    if made:
-        raise ValueError(made)
-    try:
-        made = _fixed(*values.tolist())
-        with np.errstate(over="raise", under="raise", invalid="raise"):
-            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
-    except ArithmeticError as error:
-        made = "the mass matrix is singular"
-        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
-        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
-            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
-            made = f"numbers are too large or too small for floats, with sizes from {ends}"
-    except ValueError as error:
-        made = f"a formula has no value ({error})"
-    if made.__class__ is str:
-        raise ValueError(f"{made}: change the parameters")
-    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
-    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
-    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
-    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -506,8 +409,8 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """920 operations: 219 add, 216 sub, 452 mul, 23 div, 5 sin, 5 cos."""
-    m_3, m_4, I_4y, m_5, I_5x, m_6, gravity_g, k1, k2, k3, k4, k5, k6, k7, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35 = k
+    """904 operations: 217 add, 203 sub, 451 mul, 23 div, 5 sin, 5 cos."""
+    m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k1, k2, k3, k4, k5, k6, k7, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36 = k
     _, q_2, q_3, q_4, q_5, q_6, q_1_dot, q_2_dot, q_3_dot, q_4_dot, q_5_dot, q_6_dot = y
     tau_1, tau_2, tau_3, tau_4, tau_5, tau_6 = u
     cos_q_2 = cos(q_2)
@@ -525,297 +428,287 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
     s3 = sin_q_6 * k14
     s4 = sin_q_6 * s3
     s5 = cos_q_6 * s3
-    s6 = 2.0 * s5 - s5
-    s7 = s4 + k15
-    pivot_link_5 = k7 + s7
+    s6 = s4 + k15
+    pivot_link_5 = k7 + s6
+    s7 = s5 / pivot_link_5
     s8 = s6 / pivot_link_5
-    s9 = s7 / pivot_link_5
-    s10 = moment_link_6_z / pivot_link_5
-    s11 = I_5x + (inertia_link_6_xx - s4) - s6 * s8
-    s12 = s6 - s7 * s8
-    s13 = k17 - moment_link_6_z * s10
-    s14 = moment_link_6_z * s8
-    s15 = moment_link_6_z - moment_link_6_z * s9
-    s16 = sin_q_5 * (k16 - s11)
-    s17 = sin_q_5 * s16
-    s18 = sin_q_5 * s14
-    s19 = sin_q_5 * s18
-    s20 = cos_q_5 * s18
-    s21 = cos_q_5 * s15
-    s22 = moment_link_6_z * sin_q_5
-    s23 = moment_link_6_z * cos_q_5
-    s24 = s19 - s14
-    s25 = sin_q_5 * (k17 - s13)
-    s26 = sin_q_5 * s25
-    s27 = s13 + s26
-    s28 = cos_q_5 * s25
-    s29 = s23 + k18
-    s30 = s21 + k6 * s27
-    s31 = k6 * s22 - cos_q_5 * s16
-    s32 = k6 * s20 - sin_q_5 * s12
-    s33 = I_4y + (k16 - s17)
-    pivot_link_4 = k5 + s33
-    s34 = s31 / pivot_link_4
-    s35 = s33 / pivot_link_4
-    s36 = s32 / pivot_link_4
-    s37 = s20 / pivot_link_4
-    s38 = s19 / pivot_link_4
-    s39 = s22 / pivot_link_4
-    s40 = inertia_link_4_xx + (s11 + s17 + k6 * (s23 + s29)) - s31 * s34
-    s41 = inertia_link_4_zz + (s7 - s7 * s9 + k6 * (s21 + s30)) - s32 * s36
-    s42 = s31 - s33 * s34
-    s43 = cos_q_5 * s12 + k6 * s24 + s32 * s34
-    s44 = s32 - s32 * s35
-    s45 = m_4 + s27 - s20 * s37
-    s46 = m_4 + (k17 - s26) - s19 * s38
-    s47 = k19 - s22 * s39
-    s48 = s28 + s19 * s37
-    s49 = s22 * s37
-    s50 = s22 * s38
-    s51 = s24 + s20 * s34
-    s52 = s19 * s34 - s20
-    s53 = moment_link_4_y + s29 - s22 * s34
-    s54 = s20 * s35 - s20
-    s55 = s22 - s22 * s35
-    s56 = s20 * s36 - (moment_link_4_y + s30)
-    s57 = k6 * s28 - sin_q_5 * s15 + s19 * s36
-    s58 = s22 * s36
-    s59 = sin_q_4 * (s41 - s40) - s2 * s43
-    s60 = sin_q_4 * s59
-    s61 = cos_q_4 * (s53 + s56) - sin_q_4 * (s51 + s58)
-    s62 = sin_q_4 * s61
-    s63 = cos_q_4 * s61
-    s64 = cos_q_4 * s55 - sin_q_4 * s54
-    s65 = sin_q_4 * s55 + cos_q_4 * s54
-    s66 = cos_q_4 * s57 - sin_q_4 * s52
-    s67 = sin_q_4 * s57 + cos_q_4 * s52
-    s68 = s58 + s62
-    s69 = s51 + s62
-    s70 = s56 - s63
-    s71 = s53 - s63
-    s72 = sin_q_4 * (s47 - s45) + s2 * s49
-    s73 = sin_q_4 * s72
-    s74 = cos_q_4 * s50 + sin_q_4 * s48
-    s75 = s47 - s73
-    s76 = s45 + s73
-    s77 = cos_q_4 * s48 - sin_q_4 * s50
-    s78 = s49 - cos_q_4 * s72
-    s79 = k4 * s77
-    s80 = k3 * s74
-    s81 = k4 * s46 - s67
-    s82 = s68 + s80
-    s83 = s66 - k3 * s46
-    s84 = k3 * s78 - k4 * s76 - s65
-    s85 = s64 + (k3 * s75 - k4 * s78)
-    s86 = s19 * s35 - s19 + (s80 - s79)
-    s87 = inertia_link_3_xy + (k3 * s67 + k4 * s83 - (s43 + cos_q_4 * s59))
-    s88 = inertia_link_3_xz + (k3 * s70 - k4 * s69 + k4 * s86 - (sin_q_4 * s44 + cos_q_4 * s42))
-    s89 = inertia_link_3_yy + (s41 - s60 - k3 * (s66 + s83))
-    s90 = cos_q_4 * s44 - sin_q_4 * s42 - (k3 * s68 + k4 * s71 + k3 * s86) - k12
-    s91 = inertia_link_3_zz + (s33 - s33 * s35 + (k3 * s64 + k4 * s65 + (k3 * s85 - k4 * s84)))
-    s92 = moment_link_3_z + (s71 - k3 * s77)
-    s93 = k11 + s83
-    pivot_link_3 = k2 + s89
-    s94 = s87 / pivot_link_3
+    s9 = moment_link_6_z / pivot_link_5
+    s10 = I_5x + (inertia_link_6_xx - s4) - s5 * s7
+    s11 = s5 - s6 * s7
+    s12 = k17 - moment_link_6_z * s9
+    s13 = moment_link_6_z * s7
+    s14 = moment_link_6_z - moment_link_6_z * s8
+    s15 = sin_q_5 * (k16 - s10)
+    s16 = sin_q_5 * s15
+    s17 = sin_q_5 * s13
+    s18 = sin_q_5 * s17
+    s19 = cos_q_5 * s17
+    s20 = cos_q_5 * s14
+    s21 = moment_link_6_z * sin_q_5
+    s22 = moment_link_6_z * cos_q_5
+    s23 = s18 - s13
+    s24 = sin_q_5 * (k17 - s12)
+    s25 = sin_q_5 * s24
+    s26 = s12 + s25
+    s27 = cos_q_5 * s24
+    s28 = s22 + k18
+    s29 = s20 + k6 * s26
+    s30 = k6 * s21 - cos_q_5 * s15
+    s31 = k6 * s19 - sin_q_5 * s11
+    s32 = I_4y + (k16 - s16)
+    pivot_link_4 = k5 + s32
+    s33 = s30 / pivot_link_4
+    s34 = s32 / pivot_link_4
+    s35 = s31 / pivot_link_4
+    s36 = s19 / pivot_link_4
+    s37 = s18 / pivot_link_4
+    s38 = s21 / pivot_link_4
+    s39 = inertia_link_4_xx + (s10 + s16 + k6 * (s22 + s28)) - s30 * s33
+    s40 = inertia_link_4_zz + (s6 - s6 * s8 + k6 * (s20 + s29)) - s31 * s35
+    s41 = s30 - s32 * s33
+    s42 = cos_q_5 * s11 + k6 * s23 + s31 * s33
+    s43 = s31 - s31 * s34
+    s44 = m_4 + s26 - s19 * s36
+    s45 = m_4 + (k17 - s25) - s18 * s37
+    s46 = k19 - s21 * s38
+    s47 = s27 + s18 * s36
+    s48 = s21 * s36
+    s49 = s21 * s37
+    s50 = s23 + s19 * s33
+    s51 = s18 * s33 - s19
+    s52 = moment_link_4_y + s28 - s21 * s33
+    s53 = s19 * s34 - s19
+    s54 = s21 - s21 * s34
+    s55 = s19 * s35 - (moment_link_4_y + s29)
+    s56 = k6 * s27 - sin_q_5 * s14 + s18 * s35
+    s57 = s21 * s35
+    s58 = sin_q_4 * (s40 - s39) - s2 * s42
+    s59 = sin_q_4 * s58
+    s60 = cos_q_4 * (s52 + s55) - sin_q_4 * (s50 + s57)
+    s61 = sin_q_4 * s60
+    s62 = cos_q_4 * s60
+    s63 = cos_q_4 * s54 - sin_q_4 * s53
+    s64 = sin_q_4 * s54 + cos_q_4 * s53
+    s65 = cos_q_4 * s56 - sin_q_4 * s51
+    s66 = sin_q_4 * s56 + cos_q_4 * s51
+    s67 = s57 + s61
+    s68 = s50 + s61
+    s69 = s55 - s62
+    s70 = s52 - s62
+    s71 = sin_q_4 * (s46 - s44) + s2 * s48
+    s72 = sin_q_4 * s71
+    s73 = cos_q_4 * s49 + sin_q_4 * s47
+    s74 = s46 - s72
+    s75 = s44 + s72
+    s76 = s48 - cos_q_4 * s71
+    s77 = cos_q_4 * s47 - sin_q_4 * s49
+    s78 = k4 * s77
+    s79 = k3 * s73
+    s80 = k4 * s45 - s66
+    s81 = s67 + s79
+    s82 = s65 - k3 * s45
+    s83 = k3 * s76 - k4 * s75 - s64
+    s84 = s63 + (k3 * s74 - k4 * s76)
+    s85 = s18 * s34 - s18 + (s79 - s78)
+    s86 = inertia_link_3_xy + (k3 * s66 + k4 * s82 - (s42 + cos_q_4 * s58))
+    s87 = inertia_link_3_xz + (k3 * s69 - k4 * s68 + k4 * s85 - (sin_q_4 * s43 + cos_q_4 * s41))
+    s88 = inertia_link_3_yy + (s40 - s59 - k3 * (s65 + s82))
+    s89 = cos_q_4 * s43 - sin_q_4 * s41 - (k3 * s67 + k4 * s70 + k3 * s85) - k12
+    s90 = inertia_link_3_zz + (s32 - s32 * s34 + (k3 * s63 + k4 * s64 + (k3 * s84 - k4 * s83)))
+    s91 = moment_link_3_z + (s70 - k3 * s77)
+    s92 = k11 + s82
+    pivot_link_3 = k2 + s88
+    s93 = s86 / pivot_link_3
+    s94 = s88 / pivot_link_3
     s95 = s89 / pivot_link_3
-    s96 = s90 / pivot_link_3
-    s97 = s92 / pivot_link_3
-    s98 = s82 / pivot_link_3
-    s99 = s93 / pivot_link_3
-    s100 = inertia_link_3_xx + (s40 + s60 + k4 * (s81 - s67)) - s87 * s94
-    s101 = s91 - s90 * s96
-    s102 = s87 - s89 * s94
-    s103 = s88 - s90 * s94
-    s104 = s90 - s90 * s95
-    s105 = m_3 + s46 - s93 * s99
-    s106 = s70 + k4 * s74 - moment_link_3_z + s82 * s94
-    s107 = s84 - moment_link_3_y - s92 * s96
-    s108 = s85 - k11 + s82 * s96
-    s109 = s86 - s93 * s96
-    s110 = sin_q_3 * (s101 - s100) + s1 * s103
-    s111 = sin_q_3 * s110
-    s112 = sin_q_3 * (s109 - (s69 + s79 - s92 * s94)) + cos_q_3 * (moment_link_3_y + s81 - s93 * s94 + s107)
-    s113 = cos_q_3 * (s93 - s93 * s95) - sin_q_3 * (s92 - s92 * s95)
-    s114 = cos_q_3 * s108 - sin_q_3 * s106
-    s115 = sin_q_3 * (sin_q_3 * (s105 - (m_3 + s76 - s92 * s97)) + s1 * (s77 - s93 * s97))
-    s116 = s82 * s95 - s82 + k1 * (cos_q_3 * (s74 + s93 * s98) - sin_q_3 * (s78 + s82 * s97))
-    s117 = k1 * (s107 - cos_q_3 * s112) - (sin_q_3 * s104 + cos_q_3 * s102) - k9
-    s118 = inertia_link_2_yy + (s101 - s111 - k1 * (s114 + (s114 - k1 * (m_3 + s75 - s82 * s98))))
-    s119 = cos_q_3 * s104 - sin_q_3 * s102 + k1 * (s109 - sin_q_3 * s112 - s116) - k10
-    pivot_link_2 = k20 + (k1 * (s113 + k1 * (s105 - s115)) + (s89 - s89 * s95 + k1 * s113))
-    s120 = s117 / pivot_link_2
-    s121 = s119 / pivot_link_2
-    s122 = s118 - s119 * s121
-    s123 = s103 - cos_q_3 * s110 + k1 * (sin_q_3 * s108 + cos_q_3 * s106) - k8 - s119 * s120
-    s124 = sin_q_2 * (inertia_link_2_xx + (s100 + s111) - s117 * s120 - s122) + 2.0 * cos_q_2 * s123
+    s96 = s91 / pivot_link_3
+    s97 = s81 / pivot_link_3
+    s98 = s92 / pivot_link_3
+    s99 = inertia_link_3_xx + (s39 + s59 + k4 * (s80 - s66)) - s86 * s93
+    s100 = s90 - s89 * s95
+    s101 = s86 - s88 * s93
+    s102 = s87 - s89 * s93
+    s103 = s89 - s89 * s94
+    s104 = m_3 + s45 - s92 * s98
+    s105 = s69 + k4 * s73 - moment_link_3_z + s81 * s93
+    s106 = s83 - moment_link_3_y - s91 * s95
+    s107 = s84 - k11 + s81 * s95
+    s108 = s85 - s92 * s95
+    s109 = sin_q_3 * (s100 - s99) + s1 * s102
+    s110 = sin_q_3 * s109
+    s111 = sin_q_3 * (s108 - (s68 + s78 - s91 * s93)) + cos_q_3 * (moment_link_3_y + s80 - s92 * s93 + s106)
+    s112 = cos_q_3 * (s92 - s92 * s94) - sin_q_3 * (s91 - s91 * s94)
+    s113 = cos_q_3 * s107 - sin_q_3 * s105
+    s114 = sin_q_3 * (sin_q_3 * (s104 - (m_3 + s75 - s91 * s96)) + s1 * (s77 - s92 * s96))
+    s115 = s81 * s94 - s81 + k1 * (cos_q_3 * (s73 + s92 * s97) - sin_q_3 * (s76 + s81 * s96))
+    s116 = k1 * (s106 - cos_q_3 * s111) - (sin_q_3 * s103 + cos_q_3 * s101) - k9
+    s117 = inertia_link_2_yy + (s100 - s110 - k1 * (s113 + (s113 - k1 * (m_3 + s74 - s81 * s97))))
+    s118 = cos_q_3 * s103 - sin_q_3 * s101 + k1 * (s108 - sin_q_3 * s111 - s115) - k10
+    pivot_link_2 = k20 + (k1 * (s112 + k1 * (s104 - s114)) + (s88 - s88 * s94 + k1 * s112))
+    s119 = s116 / pivot_link_2
+    s120 = s118 / pivot_link_2
+    s121 = s117 - s118 * s120
+    s122 = s102 - cos_q_3 * s109 + k1 * (sin_q_3 * s107 + cos_q_3 * s105) - k8 - s118 * s119
+    s123 = sin_q_2 * (inertia_link_2_xx + (s99 + s110) - s116 * s119 - s121) + 2.0 * cos_q_2 * s122
     omega_link_2_x = q_1_dot * sin_q_2
     omega_link_2_y = q_1_dot * cos_q_2
     omega_link_3_z = cos_q_3 * omega_link_2_y - sin_q_3 * omega_link_2_x
-    s125 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
+    s124 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
     omega_link_3_y = q_2_dot + q_3_dot
-    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s125
-    s126 = cos_q_4 * s125
-    s127 = sin_q_4 * omega_link_3_y
-    omega_link_4_x = s126 - s127
+    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s124
+    s125 = cos_q_4 * s124
+    s126 = sin_q_4 * omega_link_3_y
+    omega_link_4_x = s125 - s126
     omega_link_4_y = q_4_dot + omega_link_3_z
-    s128 = s127 - s126
-    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s128
-    s129 = cos_q_5 * s128
-    s130 = sin_q_5 * omega_link_4_y
-    omega_link_5_x = s129 - s130
+    s127 = s126 - s125
+    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s127
+    s128 = cos_q_5 * s127
+    s129 = sin_q_5 * omega_link_4_y
+    omega_link_5_x = s128 - s129
     omega_link_5_y = q_5_dot + omega_link_4_z
-    s131 = s130 - s129
-    omega_link_6_x = cos_q_6 * s131 - sin_q_6 * omega_link_5_y
-    s132 = cos_q_6 * omega_link_5_y + sin_q_6 * s131
+    s130 = s129 - s128
+    omega_link_6_x = cos_q_6 * s130 - sin_q_6 * omega_link_5_y
+    s131 = cos_q_6 * omega_link_5_y + sin_q_6 * s130
     omega_link_6_z = q_6_dot + omega_link_5_z
     bias_link_2_x = gravity_g * sin_q_2
     bias_link_2_y = gravity_g * cos_q_2
-    s133 = q_2_dot * omega_link_2_y
-    s134 = q_2_dot * omega_link_2_x
+    s132 = q_2_dot * omega_link_2_y
+    s133 = q_2_dot * omega_link_2_x
     omega_link_2_x_squared = omega_link_2_x * omega_link_2_x
     omega_link_2_y_squared = omega_link_2_y * omega_link_2_y
     q_2_dot_squared = q_2_dot * q_2_dot
-    s135 = omega_link_2_x * omega_link_2_y
-    s136 = s134 + s134
-    s137 = s133 + s133
-    s138 = sin_q_3 * s134 - cos_q_3 * s133
-    bias_link_3_y = k1 * s136
-    s139 = bias_link_2_y + k1 * s135
-    s140 = k1 * (omega_link_2_y_squared + q_2_dot_squared) - bias_link_2_x
-    bias_link_3_z = cos_q_3 * s139 + sin_q_3 * s140
-    bias_link_3_x = cos_q_3 * s140 - sin_q_3 * s139
-    s141 = q_3_dot * omega_link_3_z
-    s142 = s138 - s141
-    s143 = cos_q_3 * s134 + sin_q_3 * s133 + q_3_dot * s125
-    s144 = s125 * s125
+    s134 = omega_link_2_x * omega_link_2_y
+    s135 = s133 + s133
+    s136 = sin_q_3 * s133 - cos_q_3 * s132
+    bias_link_3_y = k1 * s135
+    s137 = bias_link_2_y + k1 * s134
+    s138 = k1 * (omega_link_2_y_squared + q_2_dot_squared) - bias_link_2_x
+    bias_link_3_z = cos_q_3 * s137 + sin_q_3 * s138
+    bias_link_3_x = cos_q_3 * s138 - sin_q_3 * s137
+    s139 = q_3_dot * omega_link_3_z
+    s140 = s136 - s139
+    s141 = cos_q_3 * s133 + sin_q_3 * s132 + q_3_dot * s124
+    s142 = s124 * s124
     omega_link_3_y_squared = omega_link_3_y * omega_link_3_y
     omega_link_3_z_squared = omega_link_3_z * omega_link_3_z
-    s145 = s125 * omega_link_3_y
-    s146 = omega_link_3_z * s125
-    s147 = omega_link_3_z * omega_link_3_y
-    s148 = omega_link_3_y_squared + omega_link_3_z_squared
-    s149 = s143 - s145
-    s150 = s143 + s145
-    s151 = s144 + omega_link_3_z_squared
-    s152 = s147 - s142
-    s153 = s142 + s147
-    s154 = s141 - s138
-    s155 = cos_q_4 * s154
-    s156 = bias_link_3_x + (k4 * s149 - k3 * s148)
-    s157 = bias_link_3_y - (k3 * s150 + k4 * s151)
-    bias_link_4_y = bias_link_3_z + (k4 * s153 - k3 * s146)
-    bias_link_4_z = cos_q_4 * s157 - sin_q_4 * s156
-    s158 = cos_q_4 * s156 + sin_q_4 * s157
-    s159 = q_4_dot * omega_link_4_z
-    s160 = s155 - s159
-    s161 = sin_q_4 * s154 + q_4_dot * omega_link_4_x
-    s162 = omega_link_4_x * omega_link_4_y
-    s163 = omega_link_4_z * omega_link_4_x
-    s164 = omega_link_4_z * omega_link_4_y
-    s165 = s162 - s161
-    s166 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
-    s167 = s160 + s164
-    s168 = s159 - s155
-    s169 = cos_q_5 * s168 + sin_q_5 * s143
-    s170 = bias_link_4_y - k6 * s166
-    bias_link_5_y = bias_link_4_z + k6 * s167
-    s171 = s158 - k6 * s165
-    bias_link_5_z = cos_q_5 * s170 + sin_q_5 * s171
-    s172 = cos_q_5 * s171
-    s173 = sin_q_5 * s170
-    s174 = q_5_dot * omega_link_5_z
-    s175 = s169 - s174
-    s176 = sin_q_5 * s168 - cos_q_5 * s143 + q_5_dot * omega_link_5_x
-    s177 = omega_link_5_x * omega_link_5_y
-    s178 = omega_link_5_z * omega_link_5_x
-    s179 = omega_link_5_z * omega_link_5_y
-    s180 = s174 - s169
-    s181 = s173 - s172
-    bias_link_6_x = cos_q_6 * s181 - sin_q_6 * bias_link_5_y
-    s182 = cos_q_6 * bias_link_5_y + sin_q_6 * s181
-    s183 = cos_q_6 * s180 - sin_q_6 * s161 - q_6_dot * s132
-    s184 = cos_q_6 * s161 + sin_q_6 * s180 + q_6_dot * omega_link_6_x
-    s185 = omega_link_6_x * s132
-    s186 = omega_link_6_x * omega_link_6_z
-    s187 = s132 * omega_link_6_z
-    s188 = s186 - s184
-    s189 = s183 + s187
-    s190 = k8 * s136 - k9 * s135 + k10 * (q_2_dot_squared - omega_link_2_y_squared) + s137 * k23
-    s191 = k10 * s135 - k8 * s137 + k9 * (omega_link_2_x_squared - q_2_dot_squared) - s136 * k22
-    s192 = k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + s135 * k22 - s135 * k23
-    s193 = k11 * s146 + moment_link_3_y * s153 - moment_link_3_z * (s144 + omega_link_3_y_squared)
-    s194 = m_3 * bias_link_3_x + (k11 * s148 + moment_link_3_y * s149 - moment_link_3_z * s146)
-    s195 = m_3 * bias_link_3_y + (k11 * s150 - moment_link_3_y * s151 + moment_link_3_z * s152)
-    s196 = inertia_link_3_xy * s146 - inertia_link_3_xz * s150 + k12 * (omega_link_3_z_squared - omega_link_3_y_squared)
-    s197 = k12 * s149 + inertia_link_3_xy * s153 - inertia_link_3_xz * (s144 - omega_link_3_z_squared)
-    s198 = k12 * s146 - inertia_link_3_xz * s152 - inertia_link_3_xy * (omega_link_3_y_squared - s144)
-    s199 = moment_link_3_y * bias_link_3_z - moment_link_3_z * bias_link_3_y + (s196 + s153 * k25 - s152 * k26)
-    s200 = moment_link_3_z * bias_link_3_x + k11 * bias_link_3_z + (s197 - s146 * k26 + s146 * k24)
-    s201 = s198 - s150 * k24 - s149 * k25 - (k11 * bias_link_3_y + moment_link_3_y * bias_link_3_x)
-    s202 = m_6 * bias_link_6_x + moment_link_6_z * s188
-    s203 = m_6 * s182 + moment_link_6_z * s189
-    s204 = m_6 * bias_link_5_z - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s132 * s132)
-    s205 = (s176 - s185) * k33 + (s176 + s185) * k34
-    s206 = moment_link_6_z * s182 + ((s183 - s187) * k34 + s189 * k35)
-    s207 = moment_link_6_z * bias_link_6_x + (s188 * k35 - (s184 + s186) * k33)
-    s208 = tau_6 - s205
-    s209 = (s175 + s179) * k31 - (s179 - s175) * k32 + (sin_q_6 * s207 - cos_q_6 * s206)
-    s210 = (s161 + s178) * k32 - (s178 - s161) * k30 - (sin_q_6 * s206 + cos_q_6 * s207)
-    s211 = (s176 + s177) * k30 - (s177 - s176) * k31 + (s205 + k13 * s208)
-    s212 = m_5 * bias_link_5_y + (cos_q_6 * s203 - sin_q_6 * s202)
-    s213 = m_5 * bias_link_5_z + s204
-    s214 = tau_5 - s210
-    s215 = s209 + s8 * s214
-    s216 = m_5 * (s172 - s173) - (cos_q_6 * s202 + sin_q_6 * s203) + s10 * s214
-    s217 = sin_q_5 * s213 + cos_q_5 * s216
-    s218 = moment_link_4_y * bias_link_4_z + (s167 * k28 - (s164 - s160) * k29) + (k6 * s212 - (sin_q_5 * s211 + cos_q_5 * s215))
-    s219 = (s163 - s143) * k29 - (s143 + s163) * k27 + (cos_q_5 * s211 - sin_q_5 * s215)
-    s220 = moment_link_4_y * s158 + ((s161 + s162) * k27 - s165 * k28) + (s210 + s9 * s214 + k6 * s217)
-    s221 = m_4 * bias_link_4_y - moment_link_4_y * s166 + (cos_q_5 * s213 - sin_q_5 * s216)
-    s222 = tau_4 - s219
-    s223 = s218 + s34 * s222
-    s224 = s220 + s36 * s222
-    s225 = moment_link_4_y * s165 - m_4 * s158 - s217 - s37 * s222
-    s226 = s221 - s38 * s222
-    s227 = m_4 * bias_link_4_z + moment_link_4_y * s167 + s212 + s39 * s222
-    s228 = cos_q_4 * s227 - sin_q_4 * s225
-    s229 = sin_q_4 * s227 + cos_q_4 * s225
-    s230 = s200 + (cos_q_4 * s224 - sin_q_4 * s223 - k3 * s226)
-    s231 = tau_3 - s230
-    s232 = s199 + (k4 * s226 - (sin_q_4 * s224 + cos_q_4 * s223)) + s94 * s231
-    s233 = s201 + (s219 + s35 * s222 + (k3 * s228 + k4 * s229)) + s96 * s231
-    s234 = cos_q_3 * (m_3 * bias_link_3_z + s193 + s226 + s99 * s231) - sin_q_3 * (s194 - s229 + s97 * s231)
-    s235 = s190 - moment_link_2_z * bias_link_2_y - (sin_q_3 * s233 + cos_q_3 * s232)
-    s236 = moment_link_2_z * bias_link_2_x + s191 + (cos_q_3 * s233 - sin_q_3 * s232 - k1 * (s195 + s228 - s98 * s231))
-    s237 = moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + s192 + (s230 + s95 * s231 + k1 * s234)
-    s238 = tau_2 - s237
-    s239 = tau_1 - (sin_q_2 * (s235 + s120 * s238) + cos_q_2 * (s236 + s121 * s238))
-    alpha_link_1_y = s239 / (s122 + sin_q_2 * s124 + k21)
+    s143 = s124 * omega_link_3_y
+    s144 = omega_link_3_z * s124
+    s145 = omega_link_3_z * omega_link_3_y
+    s146 = omega_link_3_y_squared + omega_link_3_z_squared
+    s147 = s141 - s143
+    s148 = s141 + s143
+    s149 = s142 + omega_link_3_z_squared
+    s150 = s145 - s140
+    s151 = s140 + s145
+    s152 = s139 - s136
+    s153 = cos_q_4 * s152
+    s154 = bias_link_3_x + (k4 * s147 - k3 * s146)
+    s155 = bias_link_3_y - (k3 * s148 + k4 * s149)
+    bias_link_4_y = bias_link_3_z + (k4 * s151 - k3 * s144)
+    bias_link_4_z = cos_q_4 * s155 - sin_q_4 * s154
+    s156 = cos_q_4 * s154 + sin_q_4 * s155
+    s157 = q_4_dot * omega_link_4_z
+    s158 = s153 - s157
+    s159 = sin_q_4 * s152 + q_4_dot * omega_link_4_x
+    s160 = omega_link_4_x * omega_link_4_y
+    s161 = omega_link_4_z * omega_link_4_y
+    s162 = s160 - s159
+    s163 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
+    s164 = s158 + s161
+    s165 = s157 - s153
+    s166 = cos_q_5 * s165 + sin_q_5 * s141
+    s167 = bias_link_4_y - k6 * s163
+    bias_link_5_y = bias_link_4_z + k6 * s164
+    s168 = s156 - k6 * s162
+    bias_link_5_z = cos_q_5 * s167 + sin_q_5 * s168
+    s169 = cos_q_5 * s168
+    s170 = sin_q_5 * s167
+    s171 = q_5_dot * omega_link_5_z
+    s172 = sin_q_5 * s165 - cos_q_5 * s141 + q_5_dot * omega_link_5_x
+    s173 = s171 - s166
+    s174 = s170 - s169
+    bias_link_6_x = cos_q_6 * s174 - sin_q_6 * bias_link_5_y
+    s175 = cos_q_6 * bias_link_5_y + sin_q_6 * s174
+    s176 = cos_q_6 * s173 - sin_q_6 * s159 - q_6_dot * s131
+    s177 = cos_q_6 * s159 + sin_q_6 * s173 + q_6_dot * omega_link_6_x
+    s178 = omega_link_6_x * omega_link_6_z
+    s179 = s131 * omega_link_6_z
+    s180 = k8 * s135 - k9 * s134 + k10 * (q_2_dot_squared - omega_link_2_y_squared) + inertia_link_2_xx * s132
+    s181 = k10 * s134 - k8 * (s132 + s132) + k9 * (omega_link_2_x_squared - q_2_dot_squared)
+    s182 = moment_link_2_z * bias_link_2_x + (s181 - inertia_link_2_yy * s133 + s133 * k23)
+    s183 = moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + (k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + s134 * k24)
+    s184 = k11 * s144 + moment_link_3_y * s151 - moment_link_3_z * (s142 + omega_link_3_y_squared)
+    s185 = m_3 * bias_link_3_x + (k11 * s146 + moment_link_3_y * s147 - moment_link_3_z * s144)
+    s186 = m_3 * bias_link_3_y + (k11 * s148 - moment_link_3_y * s149 + moment_link_3_z * s150)
+    s187 = inertia_link_3_xy * s144 - inertia_link_3_xz * s148 + k12 * (omega_link_3_z_squared - omega_link_3_y_squared)
+    s188 = k12 * s147 + inertia_link_3_xy * s151 - inertia_link_3_xz * (s142 - omega_link_3_z_squared)
+    s189 = k12 * s144 - inertia_link_3_xz * s150 - inertia_link_3_xy * (omega_link_3_y_squared - s142)
+    s190 = moment_link_3_y * bias_link_3_z - moment_link_3_z * bias_link_3_y + (s187 + inertia_link_3_xx * s140 + s145 * k25)
+    s191 = moment_link_3_z * bias_link_3_x + k11 * bias_link_3_z + (s188 - s144 * k26)
+    s192 = s189 - inertia_link_3_zz * s141 - s143 * k27 - (k11 * bias_link_3_y + moment_link_3_y * bias_link_3_x)
+    s193 = moment_link_4_y * bias_link_4_z + (inertia_link_4_xx * s158 + s161 * k28)
+    s194 = m_6 * bias_link_6_x + moment_link_6_z * (s178 - s177)
+    s195 = m_6 * s175 + moment_link_6_z * (s176 + s179)
+    s196 = m_6 * bias_link_5_z - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s131 * s131)
+    s197 = I_6z * s172 - omega_link_6_x * s131 * k36
+    s198 = moment_link_6_z * s175 + (inertia_link_6_xx * s176 - s179 * k34)
+    s199 = moment_link_6_z * bias_link_6_x + (s178 * k35 - inertia_link_6_yy * s177)
+    s200 = tau_6 - s197
+    s201 = I_5x * (s166 - s171) + omega_link_5_z * omega_link_5_y * k31 + (sin_q_6 * s199 - cos_q_6 * s198)
+    s202 = I_5y * s159 + omega_link_5_z * omega_link_5_x * k32 - (sin_q_6 * s198 + cos_q_6 * s199)
+    s203 = I_5z * s172 + omega_link_5_x * omega_link_5_y * k33 + (s197 + k13 * s200)
+    s204 = m_5 * bias_link_5_y + (cos_q_6 * s195 - sin_q_6 * s194)
+    s205 = m_5 * bias_link_5_z + s196
+    s206 = tau_5 - s202
+    s207 = s201 + s7 * s206
+    s208 = m_5 * (s169 - s170) - (cos_q_6 * s194 + sin_q_6 * s195) + s9 * s206
+    s209 = sin_q_5 * s205 + cos_q_5 * s208
+    s210 = omega_link_4_z * omega_link_4_x * k29 - I_4y * s141 + (cos_q_5 * s203 - sin_q_5 * s207)
+    s211 = moment_link_4_y * s156 + (inertia_link_4_zz * s159 + s160 * k30) + (s202 + s8 * s206 + k6 * s209)
+    s212 = m_4 * bias_link_4_y - moment_link_4_y * s163 + (cos_q_5 * s205 - sin_q_5 * s208)
+    s213 = tau_4 - s210
+    s214 = s193 + (k6 * s204 - (sin_q_5 * s203 + cos_q_5 * s207)) + s33 * s213
+    s215 = s211 + s35 * s213
+    s216 = moment_link_4_y * s162 - m_4 * s156 - s209 - s36 * s213
+    s217 = s212 - s37 * s213
+    s218 = m_4 * bias_link_4_z + moment_link_4_y * s164 + s204 + s38 * s213
+    s219 = cos_q_4 * s218 - sin_q_4 * s216
+    s220 = sin_q_4 * s218 + cos_q_4 * s216
+    s221 = s191 + (cos_q_4 * s215 - sin_q_4 * s214 - k3 * s217)
+    s222 = tau_3 - s221
+    s223 = s190 + (k4 * s217 - (sin_q_4 * s215 + cos_q_4 * s214)) + s93 * s222
+    s224 = s192 + (s210 + s34 * s213 + (k3 * s219 + k4 * s220)) + s95 * s222
+    s225 = cos_q_3 * (m_3 * bias_link_3_z + s184 + s217 + s98 * s222) - sin_q_3 * (s185 - s220 + s96 * s222)
+    s226 = s180 + s132 * k22 - moment_link_2_z * bias_link_2_y - (sin_q_3 * s224 + cos_q_3 * s223)
+    s227 = s182 + (cos_q_3 * s224 - sin_q_3 * s223 - k1 * (s186 + s219 - s97 * s222))
+    s228 = tau_2 - (s183 + (s221 + s94 * s222 + k1 * s225))
+    s229 = tau_1 - (sin_q_2 * (s226 + s119 * s228) + cos_q_2 * (s227 + s120 * s228))
+    alpha_link_1_y = s229 / (s121 + sin_q_2 * s123 + k21)
     alpha_link_2_x = sin_q_2 * alpha_link_1_y
     alpha_link_2_y = cos_q_2 * alpha_link_1_y
-    alpha_link_2_z = s238 / pivot_link_2 - (s120 * alpha_link_2_x + s121 * alpha_link_2_y)
+    alpha_link_2_z = s228 / pivot_link_2 - (s119 * alpha_link_2_x + s120 * alpha_link_2_y)
     alpha_link_3_z = cos_q_3 * alpha_link_2_y - sin_q_3 * alpha_link_2_x
-    s240 = cos_q_3 * alpha_link_2_x + sin_q_3 * alpha_link_2_y
-    s241 = k1 * alpha_link_2_z
-    s242 = k1 * alpha_link_2_y
-    delta_link_3_z = cos_q_3 * s241
-    s243 = sin_q_3 * s241
-    s244 = s95 * alpha_link_2_z - s94 * s240 + s96 * alpha_link_3_z + (s98 * s242 - s97 * s243 + s99 * delta_link_3_z)
-    q_3_ddot = s231 / pivot_link_3 - s244
+    s230 = cos_q_3 * alpha_link_2_x + sin_q_3 * alpha_link_2_y
+    s231 = k1 * alpha_link_2_z
+    s232 = k1 * alpha_link_2_y
+    delta_link_3_z = cos_q_3 * s231
+    s233 = sin_q_3 * s231
+    s234 = s94 * alpha_link_2_z - s93 * s230 + s95 * alpha_link_3_z + (s97 * s232 - s96 * s233 + s98 * delta_link_3_z)
+    q_3_ddot = s222 / pivot_link_3 - s234
     alpha_link_3_y = alpha_link_2_z + q_3_ddot
-    alpha_link_4_z = cos_q_4 * alpha_link_3_y + sin_q_4 * s240
-    s245 = cos_q_4 * s240
-    s246 = sin_q_4 * alpha_link_3_y
-    s247 = s243 + k4 * alpha_link_3_z
-    s248 = k3 * alpha_link_3_z - s242
-    delta_link_4_y = delta_link_3_z - (k4 * s240 + k3 * alpha_link_3_y)
-    delta_link_4_x = cos_q_4 * s247 - sin_q_4 * s248
-    s249 = s39 * (cos_q_4 * s248 + sin_q_4 * s247) - (s37 * delta_link_4_x + s38 * delta_link_4_y)
-    q_4_ddot = s222 / pivot_link_4 - (s34 * (s245 - s246) + s35 * alpha_link_3_z + s36 * alpha_link_4_z + s249)
+    alpha_link_4_z = cos_q_4 * alpha_link_3_y + sin_q_4 * s230
+    s235 = cos_q_4 * s230
+    s236 = sin_q_4 * alpha_link_3_y
+    s237 = s233 + k4 * alpha_link_3_z
+    s238 = k3 * alpha_link_3_z - s232
+    delta_link_4_y = delta_link_3_z - (k4 * s230 + k3 * alpha_link_3_y)
+    delta_link_4_x = cos_q_4 * s237 - sin_q_4 * s238
+    s239 = s38 * (cos_q_4 * s238 + sin_q_4 * s237) - (s36 * delta_link_4_x + s37 * delta_link_4_y)
+    q_4_ddot = s213 / pivot_link_4 - (s33 * (s235 - s236) + s34 * alpha_link_3_z + s35 * alpha_link_4_z + s239)
     alpha_link_4_y = alpha_link_3_z + q_4_ddot
-    s250 = s246 - s245
+    s240 = s236 - s235
     delta_link_5_x = cos_q_5 * (k6 * alpha_link_4_z - delta_link_4_x) - sin_q_5 * delta_link_4_y
-    s251 = s8 * (cos_q_5 * s250 - sin_q_5 * alpha_link_4_y) + s9 * alpha_link_4_z + s10 * delta_link_5_x
+    s241 = s7 * (cos_q_5 * s240 - sin_q_5 * alpha_link_4_y) + s8 * alpha_link_4_z + s9 * delta_link_5_x
     return (
         q_1_dot,
         q_2_dot,
@@ -827,1283 +720,1265 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
         alpha_link_2_z,
         q_3_ddot,
         q_4_ddot,
-        s214 / pivot_link_5 - s251,
-        s208 / pivot_link_6 - k13 * (cos_q_5 * alpha_link_4_y + sin_q_5 * s250),
+        s206 / pivot_link_5 - s241,
+        s200 / pivot_link_6 - k13 * (cos_q_5 * alpha_link_4_y + sin_q_5 * s240),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """5215 operations: 1303 add, 1142 sub, 2643 mul, 104 div, 11 neg, 6 sin, 6 cos."""
-    m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k36, k1, k2, k3, k4, k5, k6, k7, k37, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k38 = k
+    """5213 operations: 1305 add, 1139 sub, 2642 mul, 104 div, 11 neg, 6 sin, 6 cos."""
+    m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k37, k1, k2, k3, k4, k5, k6, k7, k38, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k39 = k
     q_1, q_2, q_3, q_4, q_5, q_6, q_1_dot, q_2_dot, q_3_dot, q_4_dot, q_5_dot, q_6_dot = y
     tau_1, tau_2, tau_3, tau_4, tau_5, tau_6 = u
     cos_q_1 = cos(q_1)
     sin_q_1 = sin(q_1)
-    s252 = 2.0 * cos_q_1
+    s242 = cos_q_1 * 2.0
     cos_q_2 = cos(q_2)
     sin_q_2 = sin(q_2)
-    s253 = cos_q_1 * cos_q_2
-    s254 = cos_q_1 * sin_q_2
-    s255 = sin_q_1 * cos_q_2
-    s256 = sin_q_1 * sin_q_2
+    s243 = cos_q_1 * cos_q_2
+    s244 = cos_q_1 * sin_q_2
+    s245 = sin_q_1 * cos_q_2
+    s246 = sin_q_1 * sin_q_2
     cos_q_3 = cos(q_3)
     sin_q_3 = sin(q_3)
     s1 = 2.0 * cos_q_3
-    s257 = s254 * cos_q_3 + s253 * sin_q_3
-    s258 = s253 * cos_q_3
-    s259 = s254 * sin_q_3
-    s260 = s259 - s258
-    s261 = s256 * cos_q_3 + s255 * sin_q_3
-    s262 = s255 * cos_q_3
-    s263 = s256 * sin_q_3
-    s264 = s263 - s262
-    s265 = cos_q_2 * cos_q_3 - sin_q_2 * sin_q_3
-    s266 = sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3
+    s247 = s244 * cos_q_3 + s243 * sin_q_3
+    s248 = s243 * cos_q_3
+    s249 = s244 * sin_q_3
+    s250 = s249 - s248
+    s251 = s246 * cos_q_3 + s245 * sin_q_3
+    s252 = s245 * cos_q_3
+    s253 = s246 * sin_q_3
+    s254 = s253 - s252
+    s255 = cos_q_2 * cos_q_3 - sin_q_2 * sin_q_3
+    s256 = sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3
     cos_q_4 = cos(q_4)
     sin_q_4 = sin(q_4)
     s2 = 2.0 * cos_q_4
-    s267 = s258 - s259
-    s268 = s262 - s263
-    s269 = sin_q_1 * cos_q_4 + sin_q_4 * s267
-    s270 = cos_q_4 * s267
-    s271 = sin_q_1 * sin_q_4
-    s272 = s270 - s271
-    s273 = cos_q_1 * cos_q_4
-    s274 = sin_q_4 * s268
-    s275 = s274 - s273
-    s276 = cos_q_4 * s268 + cos_q_1 * sin_q_4
-    s277 = s266 * sin_q_4
-    s278 = s266 * cos_q_4
+    s257 = s248 - s249
+    s258 = s252 - s253
+    s259 = sin_q_1 * cos_q_4 + sin_q_4 * s257
+    s260 = cos_q_4 * s257
+    s261 = sin_q_1 * sin_q_4
+    s262 = s260 - s261
+    s263 = cos_q_1 * cos_q_4
+    s264 = sin_q_4 * s258
+    s265 = s264 - s263
+    s266 = cos_q_4 * s258 + cos_q_1 * sin_q_4
+    s267 = s256 * sin_q_4
+    s268 = s256 * cos_q_4
     cos_q_5 = cos(q_5)
     sin_q_5 = sin(q_5)
-    s279 = s271 - s270
-    s280 = sin_q_5 * s279 - s257 * cos_q_5
-    s281 = cos_q_5 * s279 + s257 * sin_q_5
-    s282 = s261 * cos_q_5 + s276 * sin_q_5
-    s283 = s276 * cos_q_5
-    s284 = s261 * sin_q_5
-    s285 = s284 - s283
-    s286 = s265 * cos_q_5 - s278 * sin_q_5
-    s287 = s278 * cos_q_5 + s265 * sin_q_5
+    s269 = s263 - s264
+    s270 = s261 - s260
+    s271 = sin_q_5 * s270 - s247 * cos_q_5
+    s272 = cos_q_5 * s270 + s247 * sin_q_5
+    s273 = s251 * cos_q_5 + s266 * sin_q_5
+    s274 = s266 * cos_q_5
+    s275 = s251 * sin_q_5
+    s276 = s275 - s274
+    s277 = s255 * cos_q_5 - s268 * sin_q_5
+    s278 = s268 * cos_q_5 + s255 * sin_q_5
     cos_q_6 = cos(q_6)
     sin_q_6 = sin(q_6)
-    s288 = s283 - s284
-    s289 = s273 - s274
-    s290 = s281 * cos_q_6 + s269 * sin_q_6
-    s291 = s281 * sin_q_6 - s269 * cos_q_6
-    s292 = cos_q_6 * s288 + sin_q_6 * s289
-    s293 = cos_q_6 * s289 - sin_q_6 * s288
-    s294 = s287 * cos_q_6 - s277 * sin_q_6
-    s295 = s277 * cos_q_6 + s287 * sin_q_6
+    s279 = s274 - s275
+    s280 = s272 * cos_q_6 + s259 * sin_q_6
+    s281 = s272 * sin_q_6 - s259 * cos_q_6
+    s282 = cos_q_6 * s279 + s269 * sin_q_6
+    s283 = s269 * cos_q_6 - sin_q_6 * s279
+    s284 = s278 * cos_q_6 - s267 * sin_q_6
+    s285 = s267 * cos_q_6 + s278 * sin_q_6
     s3 = sin_q_6 * k14
     s4 = sin_q_6 * s3
     s5 = cos_q_6 * s3
-    s6 = 2.0 * s5 - s5
-    s7 = s4 + k15
-    pivot_link_5 = k7 + s7
+    s6 = s4 + k15
+    pivot_link_5 = k7 + s6
+    s7 = s5 / pivot_link_5
     s8 = s6 / pivot_link_5
-    s9 = s7 / pivot_link_5
-    s10 = moment_link_6_z / pivot_link_5
-    s11 = I_5x + (inertia_link_6_xx - s4) - s6 * s8
-    s12 = s6 - s7 * s8
-    s13 = k17 - moment_link_6_z * s10
-    s14 = moment_link_6_z * s8
-    s15 = moment_link_6_z - moment_link_6_z * s9
-    s16 = sin_q_5 * (k16 - s11)
-    s17 = sin_q_5 * s16
-    s18 = sin_q_5 * s14
-    s19 = sin_q_5 * s18
-    s20 = cos_q_5 * s18
-    s21 = cos_q_5 * s15
-    s22 = moment_link_6_z * sin_q_5
-    s23 = moment_link_6_z * cos_q_5
-    s24 = s19 - s14
-    s25 = sin_q_5 * (k17 - s13)
-    s26 = sin_q_5 * s25
-    s27 = s13 + s26
-    s28 = cos_q_5 * s25
-    s29 = s23 + k18
-    s30 = s21 + k6 * s27
-    s31 = k6 * s22 - cos_q_5 * s16
-    s32 = k6 * s20 - sin_q_5 * s12
-    s33 = I_4y + (k16 - s17)
-    pivot_link_4 = k5 + s33
-    s34 = s31 / pivot_link_4
-    s35 = s33 / pivot_link_4
-    s36 = s32 / pivot_link_4
-    s37 = s20 / pivot_link_4
-    s38 = s19 / pivot_link_4
-    s39 = s22 / pivot_link_4
-    s40 = inertia_link_4_xx + (s11 + s17 + k6 * (s23 + s29)) - s31 * s34
-    s41 = inertia_link_4_zz + (s7 - s7 * s9 + k6 * (s21 + s30)) - s32 * s36
-    s42 = s31 - s33 * s34
-    s43 = cos_q_5 * s12 + k6 * s24 + s32 * s34
-    s44 = s32 - s32 * s35
-    s45 = m_4 + s27 - s20 * s37
-    s46 = m_4 + (k17 - s26) - s19 * s38
-    s47 = k19 - s22 * s39
-    s48 = s28 + s19 * s37
-    s49 = s22 * s37
-    s50 = s22 * s38
-    s51 = s24 + s20 * s34
-    s52 = s19 * s34 - s20
-    s53 = moment_link_4_y + s29 - s22 * s34
-    s54 = s20 * s35 - s20
-    s55 = s22 - s22 * s35
-    s56 = s20 * s36 - (moment_link_4_y + s30)
-    s57 = k6 * s28 - sin_q_5 * s15 + s19 * s36
-    s58 = s22 * s36
-    s59 = sin_q_4 * (s41 - s40) - s2 * s43
-    s60 = sin_q_4 * s59
-    s61 = cos_q_4 * (s53 + s56) - sin_q_4 * (s51 + s58)
-    s62 = sin_q_4 * s61
-    s63 = cos_q_4 * s61
-    s64 = cos_q_4 * s55 - sin_q_4 * s54
-    s65 = sin_q_4 * s55 + cos_q_4 * s54
-    s66 = cos_q_4 * s57 - sin_q_4 * s52
-    s67 = sin_q_4 * s57 + cos_q_4 * s52
-    s68 = s58 + s62
-    s69 = s51 + s62
-    s70 = s56 - s63
-    s71 = s53 - s63
-    s72 = sin_q_4 * (s47 - s45) + s2 * s49
-    s73 = sin_q_4 * s72
-    s74 = cos_q_4 * s50 + sin_q_4 * s48
-    s75 = s47 - s73
-    s76 = s45 + s73
-    s77 = cos_q_4 * s48 - sin_q_4 * s50
-    s78 = s49 - cos_q_4 * s72
-    s79 = k4 * s77
-    s80 = k3 * s74
-    s81 = k4 * s46 - s67
-    s82 = s68 + s80
-    s83 = s66 - k3 * s46
-    s84 = k3 * s78 - k4 * s76 - s65
-    s85 = s64 + (k3 * s75 - k4 * s78)
-    s86 = s19 * s35 - s19 + (s80 - s79)
-    s87 = inertia_link_3_xy + (k3 * s67 + k4 * s83 - (s43 + cos_q_4 * s59))
-    s88 = inertia_link_3_xz + (k3 * s70 - k4 * s69 + k4 * s86 - (sin_q_4 * s44 + cos_q_4 * s42))
-    s89 = inertia_link_3_yy + (s41 - s60 - k3 * (s66 + s83))
-    s90 = cos_q_4 * s44 - sin_q_4 * s42 - (k3 * s68 + k4 * s71 + k3 * s86) - k12
-    s91 = inertia_link_3_zz + (s33 - s33 * s35 + (k3 * s64 + k4 * s65 + (k3 * s85 - k4 * s84)))
-    s92 = moment_link_3_z + (s71 - k3 * s77)
-    s93 = k11 + s83
-    pivot_link_3 = k2 + s89
-    s94 = s87 / pivot_link_3
+    s9 = moment_link_6_z / pivot_link_5
+    s10 = I_5x + (inertia_link_6_xx - s4) - s5 * s7
+    s11 = s5 - s6 * s7
+    s12 = k17 - moment_link_6_z * s9
+    s13 = moment_link_6_z * s7
+    s14 = moment_link_6_z - moment_link_6_z * s8
+    s15 = sin_q_5 * (k16 - s10)
+    s16 = sin_q_5 * s15
+    s17 = sin_q_5 * s13
+    s18 = sin_q_5 * s17
+    s19 = cos_q_5 * s17
+    s20 = cos_q_5 * s14
+    s21 = moment_link_6_z * sin_q_5
+    s22 = moment_link_6_z * cos_q_5
+    s23 = s18 - s13
+    s24 = sin_q_5 * (k17 - s12)
+    s25 = sin_q_5 * s24
+    s26 = s12 + s25
+    s27 = cos_q_5 * s24
+    s28 = s22 + k18
+    s29 = s20 + k6 * s26
+    s30 = k6 * s21 - cos_q_5 * s15
+    s31 = k6 * s19 - sin_q_5 * s11
+    s32 = I_4y + (k16 - s16)
+    pivot_link_4 = k5 + s32
+    s33 = s30 / pivot_link_4
+    s34 = s32 / pivot_link_4
+    s35 = s31 / pivot_link_4
+    s36 = s19 / pivot_link_4
+    s37 = s18 / pivot_link_4
+    s38 = s21 / pivot_link_4
+    s39 = inertia_link_4_xx + (s10 + s16 + k6 * (s22 + s28)) - s30 * s33
+    s40 = inertia_link_4_zz + (s6 - s6 * s8 + k6 * (s20 + s29)) - s31 * s35
+    s41 = s30 - s32 * s33
+    s42 = cos_q_5 * s11 + k6 * s23 + s31 * s33
+    s43 = s31 - s31 * s34
+    s44 = m_4 + s26 - s19 * s36
+    s45 = m_4 + (k17 - s25) - s18 * s37
+    s46 = k19 - s21 * s38
+    s47 = s27 + s18 * s36
+    s48 = s21 * s36
+    s49 = s21 * s37
+    s50 = s23 + s19 * s33
+    s51 = s18 * s33 - s19
+    s52 = moment_link_4_y + s28 - s21 * s33
+    s53 = s19 * s34 - s19
+    s54 = s21 - s21 * s34
+    s55 = s19 * s35 - (moment_link_4_y + s29)
+    s56 = k6 * s27 - sin_q_5 * s14 + s18 * s35
+    s57 = s21 * s35
+    s58 = sin_q_4 * (s40 - s39) - s2 * s42
+    s59 = sin_q_4 * s58
+    s60 = cos_q_4 * (s52 + s55) - sin_q_4 * (s50 + s57)
+    s61 = sin_q_4 * s60
+    s62 = cos_q_4 * s60
+    s63 = cos_q_4 * s54 - sin_q_4 * s53
+    s64 = sin_q_4 * s54 + cos_q_4 * s53
+    s65 = cos_q_4 * s56 - sin_q_4 * s51
+    s66 = sin_q_4 * s56 + cos_q_4 * s51
+    s67 = s57 + s61
+    s68 = s50 + s61
+    s69 = s55 - s62
+    s70 = s52 - s62
+    s71 = sin_q_4 * (s46 - s44) + s2 * s48
+    s72 = sin_q_4 * s71
+    s73 = cos_q_4 * s49 + sin_q_4 * s47
+    s74 = s46 - s72
+    s75 = s44 + s72
+    s76 = s48 - cos_q_4 * s71
+    s77 = cos_q_4 * s47 - sin_q_4 * s49
+    s78 = k4 * s77
+    s79 = k3 * s73
+    s80 = k4 * s45 - s66
+    s81 = s67 + s79
+    s82 = s65 - k3 * s45
+    s83 = k3 * s76 - k4 * s75 - s64
+    s84 = s63 + (k3 * s74 - k4 * s76)
+    s85 = s18 * s34 - s18 + (s79 - s78)
+    s86 = inertia_link_3_xy + (k3 * s66 + k4 * s82 - (s42 + cos_q_4 * s58))
+    s87 = inertia_link_3_xz + (k3 * s69 - k4 * s68 + k4 * s85 - (sin_q_4 * s43 + cos_q_4 * s41))
+    s88 = inertia_link_3_yy + (s40 - s59 - k3 * (s65 + s82))
+    s89 = cos_q_4 * s43 - sin_q_4 * s41 - (k3 * s67 + k4 * s70 + k3 * s85) - k12
+    s90 = inertia_link_3_zz + (s32 - s32 * s34 + (k3 * s63 + k4 * s64 + (k3 * s84 - k4 * s83)))
+    s91 = moment_link_3_z + (s70 - k3 * s77)
+    s92 = k11 + s82
+    pivot_link_3 = k2 + s88
+    s93 = s86 / pivot_link_3
+    s94 = s88 / pivot_link_3
     s95 = s89 / pivot_link_3
-    s96 = s90 / pivot_link_3
-    s97 = s92 / pivot_link_3
-    s98 = s82 / pivot_link_3
-    s99 = s93 / pivot_link_3
-    s100 = inertia_link_3_xx + (s40 + s60 + k4 * (s81 - s67)) - s87 * s94
-    s101 = s91 - s90 * s96
-    s102 = s87 - s89 * s94
-    s103 = s88 - s90 * s94
-    s104 = s90 - s90 * s95
-    s105 = m_3 + s46 - s93 * s99
-    s106 = s70 + k4 * s74 - moment_link_3_z + s82 * s94
-    s107 = s84 - moment_link_3_y - s92 * s96
-    s108 = s85 - k11 + s82 * s96
-    s109 = s86 - s93 * s96
-    s110 = sin_q_3 * (s101 - s100) + s1 * s103
-    s111 = sin_q_3 * s110
-    s112 = sin_q_3 * (s109 - (s69 + s79 - s92 * s94)) + cos_q_3 * (moment_link_3_y + s81 - s93 * s94 + s107)
-    s113 = cos_q_3 * (s93 - s93 * s95) - sin_q_3 * (s92 - s92 * s95)
-    s114 = cos_q_3 * s108 - sin_q_3 * s106
-    s115 = sin_q_3 * (sin_q_3 * (s105 - (m_3 + s76 - s92 * s97)) + s1 * (s77 - s93 * s97))
-    s116 = s82 * s95 - s82 + k1 * (cos_q_3 * (s74 + s93 * s98) - sin_q_3 * (s78 + s82 * s97))
-    s117 = k1 * (s107 - cos_q_3 * s112) - (sin_q_3 * s104 + cos_q_3 * s102) - k9
-    s118 = inertia_link_2_yy + (s101 - s111 - k1 * (s114 + (s114 - k1 * (m_3 + s75 - s82 * s98))))
-    s119 = cos_q_3 * s104 - sin_q_3 * s102 + k1 * (s109 - sin_q_3 * s112 - s116) - k10
-    pivot_link_2 = k20 + (k1 * (s113 + k1 * (s105 - s115)) + (s89 - s89 * s95 + k1 * s113))
-    s120 = s117 / pivot_link_2
-    s121 = s119 / pivot_link_2
-    s122 = s118 - s119 * s121
-    s123 = s103 - cos_q_3 * s110 + k1 * (sin_q_3 * s108 + cos_q_3 * s106) - k8 - s119 * s120
-    s124 = sin_q_2 * (inertia_link_2_xx + (s100 + s111) - s117 * s120 - s122) + 2.0 * cos_q_2 * s123
+    s96 = s91 / pivot_link_3
+    s97 = s81 / pivot_link_3
+    s98 = s92 / pivot_link_3
+    s99 = inertia_link_3_xx + (s39 + s59 + k4 * (s80 - s66)) - s86 * s93
+    s100 = s90 - s89 * s95
+    s101 = s86 - s88 * s93
+    s102 = s87 - s89 * s93
+    s103 = s89 - s89 * s94
+    s104 = m_3 + s45 - s92 * s98
+    s105 = s69 + k4 * s73 - moment_link_3_z + s81 * s93
+    s106 = s83 - moment_link_3_y - s91 * s95
+    s107 = s84 - k11 + s81 * s95
+    s108 = s85 - s92 * s95
+    s109 = sin_q_3 * (s100 - s99) + s1 * s102
+    s110 = sin_q_3 * s109
+    s111 = sin_q_3 * (s108 - (s68 + s78 - s91 * s93)) + cos_q_3 * (moment_link_3_y + s80 - s92 * s93 + s106)
+    s112 = cos_q_3 * (s92 - s92 * s94) - sin_q_3 * (s91 - s91 * s94)
+    s113 = cos_q_3 * s107 - sin_q_3 * s105
+    s114 = sin_q_3 * (sin_q_3 * (s104 - (m_3 + s75 - s91 * s96)) + s1 * (s77 - s92 * s96))
+    s115 = s81 * s94 - s81 + k1 * (cos_q_3 * (s73 + s92 * s97) - sin_q_3 * (s76 + s81 * s96))
+    s116 = k1 * (s106 - cos_q_3 * s111) - (sin_q_3 * s103 + cos_q_3 * s101) - k9
+    s117 = inertia_link_2_yy + (s100 - s110 - k1 * (s113 + (s113 - k1 * (m_3 + s74 - s81 * s97))))
+    s118 = cos_q_3 * s103 - sin_q_3 * s101 + k1 * (s108 - sin_q_3 * s111 - s115) - k10
+    pivot_link_2 = k20 + (k1 * (s112 + k1 * (s104 - s114)) + (s88 - s88 * s94 + k1 * s112))
+    s119 = s116 / pivot_link_2
+    s120 = s118 / pivot_link_2
+    s121 = s117 - s118 * s120
+    s122 = s102 - cos_q_3 * s109 + k1 * (sin_q_3 * s107 + cos_q_3 * s105) - k8 - s118 * s119
+    s123 = sin_q_2 * (inertia_link_2_xx + (s99 + s110) - s116 * s119 - s121) + 2.0 * cos_q_2 * s122
     omega_link_2_x = q_1_dot * sin_q_2
     omega_link_2_y = q_1_dot * cos_q_2
     omega_link_3_z = cos_q_3 * omega_link_2_y - sin_q_3 * omega_link_2_x
-    s125 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
+    s124 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
     omega_link_3_y = q_2_dot + q_3_dot
-    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s125
-    s126 = cos_q_4 * s125
-    s127 = sin_q_4 * omega_link_3_y
-    omega_link_4_x = s126 - s127
+    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s124
+    s125 = cos_q_4 * s124
+    s126 = sin_q_4 * omega_link_3_y
+    omega_link_4_x = s125 - s126
     omega_link_4_y = q_4_dot + omega_link_3_z
-    s128 = s127 - s126
-    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s128
-    s129 = cos_q_5 * s128
-    s130 = sin_q_5 * omega_link_4_y
-    omega_link_5_x = s129 - s130
+    s127 = s126 - s125
+    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s127
+    s128 = cos_q_5 * s127
+    s129 = sin_q_5 * omega_link_4_y
+    omega_link_5_x = s128 - s129
     omega_link_5_y = q_5_dot + omega_link_4_z
-    s131 = s130 - s129
-    omega_link_6_x = cos_q_6 * s131 - sin_q_6 * omega_link_5_y
-    s132 = cos_q_6 * omega_link_5_y + sin_q_6 * s131
+    s130 = s129 - s128
+    omega_link_6_x = cos_q_6 * s130 - sin_q_6 * omega_link_5_y
+    s131 = cos_q_6 * omega_link_5_y + sin_q_6 * s130
     omega_link_6_z = q_6_dot + omega_link_5_z
     q_1_dot_squared = q_1_dot * q_1_dot
     bias_link_2_x = gravity_g * sin_q_2
     bias_link_2_y = gravity_g * cos_q_2
-    s133 = q_2_dot * omega_link_2_y
-    s134 = q_2_dot * omega_link_2_x
+    s132 = q_2_dot * omega_link_2_y
+    s133 = q_2_dot * omega_link_2_x
     omega_link_2_x_squared = omega_link_2_x * omega_link_2_x
     omega_link_2_y_squared = omega_link_2_y * omega_link_2_y
     q_2_dot_squared = q_2_dot * q_2_dot
-    s135 = omega_link_2_x * omega_link_2_y
-    s136 = s134 + s134
-    s137 = s133 + s133
-    s138 = sin_q_3 * s134 - cos_q_3 * s133
-    bias_link_3_y = k1 * s136
-    s139 = bias_link_2_y + k1 * s135
-    s140 = k1 * (omega_link_2_y_squared + q_2_dot_squared) - bias_link_2_x
-    bias_link_3_z = cos_q_3 * s139 + sin_q_3 * s140
-    bias_link_3_x = cos_q_3 * s140 - sin_q_3 * s139
-    s141 = q_3_dot * omega_link_3_z
-    s142 = s138 - s141
-    s143 = cos_q_3 * s134 + sin_q_3 * s133 + q_3_dot * s125
-    s144 = s125 * s125
+    s134 = omega_link_2_x * omega_link_2_y
+    s135 = s133 + s133
+    s136 = sin_q_3 * s133 - cos_q_3 * s132
+    bias_link_3_y = k1 * s135
+    s137 = bias_link_2_y + k1 * s134
+    s138 = k1 * (omega_link_2_y_squared + q_2_dot_squared) - bias_link_2_x
+    bias_link_3_z = cos_q_3 * s137 + sin_q_3 * s138
+    bias_link_3_x = cos_q_3 * s138 - sin_q_3 * s137
+    s139 = q_3_dot * omega_link_3_z
+    s140 = s136 - s139
+    s141 = cos_q_3 * s133 + sin_q_3 * s132 + q_3_dot * s124
+    s142 = s124 * s124
     omega_link_3_y_squared = omega_link_3_y * omega_link_3_y
     omega_link_3_z_squared = omega_link_3_z * omega_link_3_z
-    s145 = s125 * omega_link_3_y
-    s146 = omega_link_3_z * s125
-    s147 = omega_link_3_z * omega_link_3_y
-    s148 = omega_link_3_y_squared + omega_link_3_z_squared
-    s149 = s143 - s145
-    s150 = s143 + s145
-    s151 = s144 + omega_link_3_z_squared
-    s152 = s147 - s142
-    s153 = s142 + s147
-    s154 = s141 - s138
-    s155 = cos_q_4 * s154
-    s156 = bias_link_3_x + (k4 * s149 - k3 * s148)
-    s157 = bias_link_3_y - (k3 * s150 + k4 * s151)
-    bias_link_4_y = bias_link_3_z + (k4 * s153 - k3 * s146)
-    bias_link_4_z = cos_q_4 * s157 - sin_q_4 * s156
-    s158 = cos_q_4 * s156 + sin_q_4 * s157
-    s159 = q_4_dot * omega_link_4_z
-    s160 = s155 - s159
-    s161 = sin_q_4 * s154 + q_4_dot * omega_link_4_x
-    s162 = omega_link_4_x * omega_link_4_y
-    s163 = omega_link_4_z * omega_link_4_x
-    s164 = omega_link_4_z * omega_link_4_y
-    s165 = s162 - s161
-    s166 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
-    s167 = s160 + s164
-    s168 = s159 - s155
-    s169 = cos_q_5 * s168 + sin_q_5 * s143
-    s170 = bias_link_4_y - k6 * s166
-    bias_link_5_y = bias_link_4_z + k6 * s167
-    s171 = s158 - k6 * s165
-    bias_link_5_z = cos_q_5 * s170 + sin_q_5 * s171
-    s172 = cos_q_5 * s171
-    s173 = sin_q_5 * s170
-    s174 = q_5_dot * omega_link_5_z
-    s175 = s169 - s174
-    s176 = sin_q_5 * s168 - cos_q_5 * s143 + q_5_dot * omega_link_5_x
-    s177 = omega_link_5_x * omega_link_5_y
-    s178 = omega_link_5_z * omega_link_5_x
-    s179 = omega_link_5_z * omega_link_5_y
-    s180 = s174 - s169
-    s181 = s173 - s172
-    bias_link_6_x = cos_q_6 * s181 - sin_q_6 * bias_link_5_y
-    s182 = cos_q_6 * bias_link_5_y + sin_q_6 * s181
-    s183 = cos_q_6 * s180 - sin_q_6 * s161 - q_6_dot * s132
-    s184 = cos_q_6 * s161 + sin_q_6 * s180 + q_6_dot * omega_link_6_x
-    s185 = omega_link_6_x * s132
-    s186 = omega_link_6_x * omega_link_6_z
-    s187 = s132 * omega_link_6_z
-    s188 = s186 - s184
-    s189 = s183 + s187
-    s190 = k8 * s136 - k9 * s135 + k10 * (q_2_dot_squared - omega_link_2_y_squared) + s137 * k23
-    s191 = k10 * s135 - k8 * s137 + k9 * (omega_link_2_x_squared - q_2_dot_squared) - s136 * k22
-    s192 = k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + s135 * k22 - s135 * k23
-    s193 = k11 * s146 + moment_link_3_y * s153 - moment_link_3_z * (s144 + omega_link_3_y_squared)
-    s194 = m_3 * bias_link_3_x + (k11 * s148 + moment_link_3_y * s149 - moment_link_3_z * s146)
-    s195 = m_3 * bias_link_3_y + (k11 * s150 - moment_link_3_y * s151 + moment_link_3_z * s152)
-    s196 = inertia_link_3_xy * s146 - inertia_link_3_xz * s150 + k12 * (omega_link_3_z_squared - omega_link_3_y_squared)
-    s197 = k12 * s149 + inertia_link_3_xy * s153 - inertia_link_3_xz * (s144 - omega_link_3_z_squared)
-    s198 = k12 * s146 - inertia_link_3_xz * s152 - inertia_link_3_xy * (omega_link_3_y_squared - s144)
-    s199 = moment_link_3_y * bias_link_3_z - moment_link_3_z * bias_link_3_y + (s196 + s153 * k25 - s152 * k26)
-    s200 = moment_link_3_z * bias_link_3_x + k11 * bias_link_3_z + (s197 - s146 * k26 + s146 * k24)
-    s201 = s198 - s150 * k24 - s149 * k25 - (k11 * bias_link_3_y + moment_link_3_y * bias_link_3_x)
-    s202 = m_6 * bias_link_6_x + moment_link_6_z * s188
-    s203 = m_6 * s182 + moment_link_6_z * s189
-    s204 = m_6 * bias_link_5_z - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s132 * s132)
-    s205 = (s176 - s185) * k33 + (s176 + s185) * k34
-    s206 = moment_link_6_z * s182 + ((s183 - s187) * k34 + s189 * k35)
-    s207 = moment_link_6_z * bias_link_6_x + (s188 * k35 - (s184 + s186) * k33)
-    s208 = tau_6 - s205
-    s209 = (s175 + s179) * k31 - (s179 - s175) * k32 + (sin_q_6 * s207 - cos_q_6 * s206)
-    s210 = (s161 + s178) * k32 - (s178 - s161) * k30 - (sin_q_6 * s206 + cos_q_6 * s207)
-    s211 = (s176 + s177) * k30 - (s177 - s176) * k31 + (s205 + k13 * s208)
-    s212 = m_5 * bias_link_5_y + (cos_q_6 * s203 - sin_q_6 * s202)
-    s213 = m_5 * bias_link_5_z + s204
-    s214 = tau_5 - s210
-    s215 = s209 + s8 * s214
-    s216 = m_5 * (s172 - s173) - (cos_q_6 * s202 + sin_q_6 * s203) + s10 * s214
-    s217 = sin_q_5 * s213 + cos_q_5 * s216
-    s218 = moment_link_4_y * bias_link_4_z + (s167 * k28 - (s164 - s160) * k29) + (k6 * s212 - (sin_q_5 * s211 + cos_q_5 * s215))
-    s219 = (s163 - s143) * k29 - (s143 + s163) * k27 + (cos_q_5 * s211 - sin_q_5 * s215)
-    s220 = moment_link_4_y * s158 + ((s161 + s162) * k27 - s165 * k28) + (s210 + s9 * s214 + k6 * s217)
-    s221 = m_4 * bias_link_4_y - moment_link_4_y * s166 + (cos_q_5 * s213 - sin_q_5 * s216)
-    s222 = tau_4 - s219
-    s223 = s218 + s34 * s222
-    s224 = s220 + s36 * s222
-    s225 = moment_link_4_y * s165 - m_4 * s158 - s217 - s37 * s222
-    s226 = s221 - s38 * s222
-    s227 = m_4 * bias_link_4_z + moment_link_4_y * s167 + s212 + s39 * s222
-    s228 = cos_q_4 * s227 - sin_q_4 * s225
-    s229 = sin_q_4 * s227 + cos_q_4 * s225
-    s230 = s200 + (cos_q_4 * s224 - sin_q_4 * s223 - k3 * s226)
-    s231 = tau_3 - s230
-    s232 = s199 + (k4 * s226 - (sin_q_4 * s224 + cos_q_4 * s223)) + s94 * s231
-    s233 = s201 + (s219 + s35 * s222 + (k3 * s228 + k4 * s229)) + s96 * s231
-    s234 = cos_q_3 * (m_3 * bias_link_3_z + s193 + s226 + s99 * s231) - sin_q_3 * (s194 - s229 + s97 * s231)
-    s235 = s190 - moment_link_2_z * bias_link_2_y - (sin_q_3 * s233 + cos_q_3 * s232)
-    s236 = moment_link_2_z * bias_link_2_x + s191 + (cos_q_3 * s233 - sin_q_3 * s232 - k1 * (s195 + s228 - s98 * s231))
-    s237 = moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + s192 + (s230 + s95 * s231 + k1 * s234)
-    s238 = tau_2 - s237
-    s239 = tau_1 - (sin_q_2 * (s235 + s120 * s238) + cos_q_2 * (s236 + s121 * s238))
-    alpha_link_1_y = s239 / (s122 + sin_q_2 * s124 + k21)
+    s143 = s124 * omega_link_3_y
+    s144 = omega_link_3_z * s124
+    s145 = omega_link_3_z * omega_link_3_y
+    s146 = omega_link_3_y_squared + omega_link_3_z_squared
+    s147 = s141 - s143
+    s148 = s141 + s143
+    s149 = s142 + omega_link_3_z_squared
+    s150 = s145 - s140
+    s151 = s140 + s145
+    s152 = s139 - s136
+    s153 = cos_q_4 * s152
+    s154 = bias_link_3_x + (k4 * s147 - k3 * s146)
+    s155 = bias_link_3_y - (k3 * s148 + k4 * s149)
+    bias_link_4_y = bias_link_3_z + (k4 * s151 - k3 * s144)
+    bias_link_4_z = cos_q_4 * s155 - sin_q_4 * s154
+    s156 = cos_q_4 * s154 + sin_q_4 * s155
+    s157 = q_4_dot * omega_link_4_z
+    s158 = s153 - s157
+    s159 = sin_q_4 * s152 + q_4_dot * omega_link_4_x
+    s160 = omega_link_4_x * omega_link_4_y
+    s161 = omega_link_4_z * omega_link_4_y
+    s162 = s160 - s159
+    s163 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
+    s164 = s158 + s161
+    s165 = s157 - s153
+    s166 = cos_q_5 * s165 + sin_q_5 * s141
+    s167 = bias_link_4_y - k6 * s163
+    bias_link_5_y = bias_link_4_z + k6 * s164
+    s168 = s156 - k6 * s162
+    bias_link_5_z = cos_q_5 * s167 + sin_q_5 * s168
+    s169 = cos_q_5 * s168
+    s170 = sin_q_5 * s167
+    s171 = q_5_dot * omega_link_5_z
+    s172 = sin_q_5 * s165 - cos_q_5 * s141 + q_5_dot * omega_link_5_x
+    s173 = s171 - s166
+    s174 = s170 - s169
+    bias_link_6_x = cos_q_6 * s174 - sin_q_6 * bias_link_5_y
+    s175 = cos_q_6 * bias_link_5_y + sin_q_6 * s174
+    s176 = cos_q_6 * s173 - sin_q_6 * s159 - q_6_dot * s131
+    s177 = cos_q_6 * s159 + sin_q_6 * s173 + q_6_dot * omega_link_6_x
+    s178 = omega_link_6_x * omega_link_6_z
+    s179 = s131 * omega_link_6_z
+    s180 = k8 * s135 - k9 * s134 + k10 * (q_2_dot_squared - omega_link_2_y_squared) + inertia_link_2_xx * s132
+    s181 = k10 * s134 - k8 * (s132 + s132) + k9 * (omega_link_2_x_squared - q_2_dot_squared)
+    s182 = moment_link_2_z * bias_link_2_x + (s181 - inertia_link_2_yy * s133 + s133 * k23)
+    s183 = moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + (k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + s134 * k24)
+    s184 = k11 * s144 + moment_link_3_y * s151 - moment_link_3_z * (s142 + omega_link_3_y_squared)
+    s185 = m_3 * bias_link_3_x + (k11 * s146 + moment_link_3_y * s147 - moment_link_3_z * s144)
+    s186 = m_3 * bias_link_3_y + (k11 * s148 - moment_link_3_y * s149 + moment_link_3_z * s150)
+    s187 = inertia_link_3_xy * s144 - inertia_link_3_xz * s148 + k12 * (omega_link_3_z_squared - omega_link_3_y_squared)
+    s188 = k12 * s147 + inertia_link_3_xy * s151 - inertia_link_3_xz * (s142 - omega_link_3_z_squared)
+    s189 = k12 * s144 - inertia_link_3_xz * s150 - inertia_link_3_xy * (omega_link_3_y_squared - s142)
+    s190 = moment_link_3_y * bias_link_3_z - moment_link_3_z * bias_link_3_y + (s187 + inertia_link_3_xx * s140 + s145 * k25)
+    s191 = moment_link_3_z * bias_link_3_x + k11 * bias_link_3_z + (s188 - s144 * k26)
+    s192 = s189 - inertia_link_3_zz * s141 - s143 * k27 - (k11 * bias_link_3_y + moment_link_3_y * bias_link_3_x)
+    s193 = moment_link_4_y * bias_link_4_z + (inertia_link_4_xx * s158 + s161 * k28)
+    s194 = m_6 * bias_link_6_x + moment_link_6_z * (s178 - s177)
+    s195 = m_6 * s175 + moment_link_6_z * (s176 + s179)
+    s196 = m_6 * bias_link_5_z - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s131 * s131)
+    s197 = I_6z * s172 - omega_link_6_x * s131 * k36
+    s198 = moment_link_6_z * s175 + (inertia_link_6_xx * s176 - s179 * k34)
+    s199 = moment_link_6_z * bias_link_6_x + (s178 * k35 - inertia_link_6_yy * s177)
+    s200 = tau_6 - s197
+    s201 = I_5x * (s166 - s171) + omega_link_5_z * omega_link_5_y * k31 + (sin_q_6 * s199 - cos_q_6 * s198)
+    s202 = I_5y * s159 + omega_link_5_z * omega_link_5_x * k32 - (sin_q_6 * s198 + cos_q_6 * s199)
+    s203 = I_5z * s172 + omega_link_5_x * omega_link_5_y * k33 + (s197 + k13 * s200)
+    s204 = m_5 * bias_link_5_y + (cos_q_6 * s195 - sin_q_6 * s194)
+    s205 = m_5 * bias_link_5_z + s196
+    s206 = tau_5 - s202
+    s207 = s201 + s7 * s206
+    s208 = m_5 * (s169 - s170) - (cos_q_6 * s194 + sin_q_6 * s195) + s9 * s206
+    s209 = sin_q_5 * s205 + cos_q_5 * s208
+    s210 = omega_link_4_z * omega_link_4_x * k29 - I_4y * s141 + (cos_q_5 * s203 - sin_q_5 * s207)
+    s211 = moment_link_4_y * s156 + (inertia_link_4_zz * s159 + s160 * k30) + (s202 + s8 * s206 + k6 * s209)
+    s212 = m_4 * bias_link_4_y - moment_link_4_y * s163 + (cos_q_5 * s205 - sin_q_5 * s208)
+    s213 = tau_4 - s210
+    s214 = s193 + (k6 * s204 - (sin_q_5 * s203 + cos_q_5 * s207)) + s33 * s213
+    s215 = s211 + s35 * s213
+    s216 = moment_link_4_y * s162 - m_4 * s156 - s209 - s36 * s213
+    s217 = s212 - s37 * s213
+    s218 = m_4 * bias_link_4_z + moment_link_4_y * s164 + s204 + s38 * s213
+    s219 = cos_q_4 * s218 - sin_q_4 * s216
+    s220 = sin_q_4 * s218 + cos_q_4 * s216
+    s221 = s191 + (cos_q_4 * s215 - sin_q_4 * s214 - k3 * s217)
+    s222 = tau_3 - s221
+    s223 = s190 + (k4 * s217 - (sin_q_4 * s215 + cos_q_4 * s214)) + s93 * s222
+    s224 = s192 + (s210 + s34 * s213 + (k3 * s219 + k4 * s220)) + s95 * s222
+    s225 = cos_q_3 * (m_3 * bias_link_3_z + s184 + s217 + s98 * s222) - sin_q_3 * (s185 - s220 + s96 * s222)
+    s226 = s180 + s132 * k22 - moment_link_2_z * bias_link_2_y - (sin_q_3 * s224 + cos_q_3 * s223)
+    s227 = s182 + (cos_q_3 * s224 - sin_q_3 * s223 - k1 * (s186 + s219 - s97 * s222))
+    s228 = tau_2 - (s183 + (s221 + s94 * s222 + k1 * s225))
+    s229 = tau_1 - (sin_q_2 * (s226 + s119 * s228) + cos_q_2 * (s227 + s120 * s228))
+    alpha_link_1_y = s229 / (s121 + sin_q_2 * s123 + k21)
     alpha_link_2_x = sin_q_2 * alpha_link_1_y
     alpha_link_2_y = cos_q_2 * alpha_link_1_y
-    alpha_link_2_z = s238 / pivot_link_2 - (s120 * alpha_link_2_x + s121 * alpha_link_2_y)
+    alpha_link_2_z = s228 / pivot_link_2 - (s119 * alpha_link_2_x + s120 * alpha_link_2_y)
     alpha_link_3_z = cos_q_3 * alpha_link_2_y - sin_q_3 * alpha_link_2_x
-    s240 = cos_q_3 * alpha_link_2_x + sin_q_3 * alpha_link_2_y
-    s241 = k1 * alpha_link_2_z
-    s242 = k1 * alpha_link_2_y
-    delta_link_3_z = cos_q_3 * s241
-    s243 = sin_q_3 * s241
-    s244 = s95 * alpha_link_2_z - s94 * s240 + s96 * alpha_link_3_z + (s98 * s242 - s97 * s243 + s99 * delta_link_3_z)
-    q_3_ddot = s231 / pivot_link_3 - s244
+    s230 = cos_q_3 * alpha_link_2_x + sin_q_3 * alpha_link_2_y
+    s231 = k1 * alpha_link_2_z
+    s232 = k1 * alpha_link_2_y
+    delta_link_3_z = cos_q_3 * s231
+    s233 = sin_q_3 * s231
+    s234 = s94 * alpha_link_2_z - s93 * s230 + s95 * alpha_link_3_z + (s97 * s232 - s96 * s233 + s98 * delta_link_3_z)
+    q_3_ddot = s222 / pivot_link_3 - s234
     alpha_link_3_y = alpha_link_2_z + q_3_ddot
-    alpha_link_4_z = cos_q_4 * alpha_link_3_y + sin_q_4 * s240
-    s245 = cos_q_4 * s240
-    s246 = sin_q_4 * alpha_link_3_y
-    s247 = s243 + k4 * alpha_link_3_z
-    s248 = k3 * alpha_link_3_z - s242
-    delta_link_4_y = delta_link_3_z - (k4 * s240 + k3 * alpha_link_3_y)
-    delta_link_4_x = cos_q_4 * s247 - sin_q_4 * s248
-    s249 = s39 * (cos_q_4 * s248 + sin_q_4 * s247) - (s37 * delta_link_4_x + s38 * delta_link_4_y)
-    q_4_ddot = s222 / pivot_link_4 - (s34 * (s245 - s246) + s35 * alpha_link_3_z + s36 * alpha_link_4_z + s249)
+    alpha_link_4_z = cos_q_4 * alpha_link_3_y + sin_q_4 * s230
+    s235 = cos_q_4 * s230
+    s236 = sin_q_4 * alpha_link_3_y
+    s237 = s233 + k4 * alpha_link_3_z
+    s238 = k3 * alpha_link_3_z - s232
+    delta_link_4_y = delta_link_3_z - (k4 * s230 + k3 * alpha_link_3_y)
+    delta_link_4_x = cos_q_4 * s237 - sin_q_4 * s238
+    s239 = s38 * (cos_q_4 * s238 + sin_q_4 * s237) - (s36 * delta_link_4_x + s37 * delta_link_4_y)
+    q_4_ddot = s213 / pivot_link_4 - (s33 * (s235 - s236) + s34 * alpha_link_3_z + s35 * alpha_link_4_z + s239)
     alpha_link_4_y = alpha_link_3_z + q_4_ddot
-    s250 = s246 - s245
+    s240 = s236 - s235
     delta_link_5_x = cos_q_5 * (k6 * alpha_link_4_z - delta_link_4_x) - sin_q_5 * delta_link_4_y
-    s251 = s8 * (cos_q_5 * s250 - sin_q_5 * alpha_link_4_y) + s9 * alpha_link_4_z + s10 * delta_link_5_x
-    q_5_ddot = s214 / pivot_link_5 - s251
-    q_6_ddot = s208 / pivot_link_6 - k13 * (cos_q_5 * alpha_link_4_y + sin_q_5 * s250)
-    s296 = moment_link_2_x * s253 - moment_link_2_y * s254 + moment_link_2_z * sin_q_1
-    s297 = moment_link_2_x * s255 - moment_link_2_y * s256 - moment_link_2_z * cos_q_1
-    s298 = inertia_link_2_xx * s253 + k8 * s254 - k9 * sin_q_1
-    s299 = k8 * s253 + inertia_link_2_yy * s254 + k10 * sin_q_1
-    s300 = k10 * s254 - k9 * s253 + inertia_link_2_zz * sin_q_1
-    s301 = inertia_link_2_xx * s255 + k8 * s256 + k9 * cos_q_1
-    s302 = k10 * cos_q_1 - (k8 * s255 + inertia_link_2_yy * s256)
-    s303 = s253 * s298 + s254 * s299 + sin_q_1 * s300
-    s304 = s255 * s301 - s256 * s302 - cos_q_1 * (k10 * s256 - k9 * s255 - inertia_link_2_zz * cos_q_1)
-    s305 = sin_q_2 * (inertia_link_2_xx * sin_q_2 - k8 * cos_q_2) + cos_q_2 * (inertia_link_2_yy * cos_q_2 - k8 * sin_q_2)
-    s306 = s255 * s298 + s256 * s299
-    s307 = cos_q_1 * s300
-    s308 = sin_q_2 * s298
-    s309 = cos_q_2 * s299
-    s310 = sin_q_2 * s301 + cos_q_2 * s302
-    s311 = k1 * s253
-    s312 = k1 * s255
-    s313 = k1 * sin_q_2
-    s314 = moment_link_3_y * sin_q_1 - k11 * s260 - moment_link_3_z * s257
-    s315 = k11 * s264 + moment_link_3_y * cos_q_1 + moment_link_3_z * s261
-    s316 = k11 * s266 + moment_link_3_z * s265
-    s317 = inertia_link_3_xx * s260 + inertia_link_3_xy * sin_q_1 - inertia_link_3_xz * s257
-    s318 = inertia_link_3_xy * s260 + inertia_link_3_yy * sin_q_1 + k12 * s257
-    s319 = inertia_link_3_xz * s260 - k12 * sin_q_1 - inertia_link_3_zz * s257
-    s320 = inertia_link_3_xx * s264 - inertia_link_3_xy * cos_q_1 - inertia_link_3_xz * s261
-    s321 = inertia_link_3_xz * s264 + k12 * cos_q_1 - inertia_link_3_zz * s261
-    s322 = s260 * s317 + sin_q_1 * s318 - s257 * s319
-    s323 = cos_q_1 * (inertia_link_3_xy * s264 - inertia_link_3_yy * cos_q_1 + k12 * s261)
-    s324 = s264 * s320 - s323 - s261 * s321
-    s325 = s265 * (inertia_link_3_zz * s265 - inertia_link_3_xz * s266) - s266 * (inertia_link_3_xz * s265 - inertia_link_3_xx * s266)
-    s326 = s264 * s317 - cos_q_1 * s318
-    s327 = s261 * s319
-    s328 = s266 * s317
-    s329 = s265 * s319
-    s330 = s266 * s320
-    s331 = s265 * s321
-    s332 = k3 * s260 + k4 * sin_q_1
-    s333 = k3 * s264 - k4 * cos_q_1
-    s334 = k3 * s266
-    s335 = moment_link_4_y * s257
-    s336 = moment_link_4_y * s261
-    s337 = moment_link_4_y * s265
-    s338 = inertia_link_4_xx * s272
-    s339 = I_4y * s257
-    s340 = inertia_link_4_zz * s269
-    s341 = inertia_link_4_xx * s276
-    s342 = I_4y * s261
-    s343 = inertia_link_4_zz * s275
-    s344 = s272 * s338 + s257 * s339 + s269 * s340
-    s345 = s276 * s341 + s261 * s342 + s275 * s343
-    s346 = s278 * (inertia_link_4_xx * s278) + s265 * (I_4y * s265) + s277 * (inertia_link_4_zz * s277)
-    s347 = s276 * s338 + s261 * s339 + s275 * s340
-    s348 = s278 * s338 - s265 * s339 + s277 * s340
-    s349 = s278 * s341 - s265 * s342 + s277 * s343
-    s350 = k6 * s257
-    s351 = k6 * s261
-    s352 = k6 * s265
-    s353 = I_5x * s281
-    s354 = I_5y * s269
-    s355 = I_5z * s280
-    s356 = I_5x * s285
-    s357 = I_5y * s275
-    s358 = I_5z * s282
-    s359 = s281 * s353 + s269 * s354 + s280 * s355
-    s360 = s285 * s356 + s275 * s357 + s282 * s358
-    s361 = s287 * (I_5x * s287) + s277 * (I_5y * s277) + s286 * (I_5z * s286)
-    s362 = s285 * s353 + s275 * s354
-    s363 = s282 * s355
-    s364 = s277 * s354 - s287 * s353 + s286 * s355
-    s365 = s277 * s357 - s287 * s356
-    s366 = s286 * s358
-    s367 = moment_link_6_z * s280
-    s368 = moment_link_6_z * s282
-    s369 = moment_link_6_z * s286
-    s370 = inertia_link_6_xx * s290
-    s371 = inertia_link_6_yy * s291
-    s372 = I_6z * s280
-    s373 = inertia_link_6_xx * s292
-    s374 = inertia_link_6_yy * s293
-    s375 = I_6z * s282
-    s376 = s290 * s370 + s291 * s371 + s280 * s372
-    s377 = s292 * s373 + s293 * s374 + s282 * s375
-    s378 = s294 * (inertia_link_6_xx * s294) + s295 * (inertia_link_6_yy * s295) + s286 * (I_6z * s286)
-    s379 = s293 * s371 - s292 * s370
-    s380 = s282 * s372
-    s381 = s379 - s380
-    s382 = s294 * s370 + s295 * s371
-    s383 = s286 * s372
-    s384 = s383 - s382
-    s385 = s294 * s373 - s295 * s374
-    s386 = s286 * s375
-    s387 = s385 - s386
-    s388 = s359 + s376
-    s389 = s362 - s363 + s381
-    s390 = s364 + s384
-    s391 = s360 + s377
-    s392 = s365 - s366 + s387
-    s393 = s361 + s378
-    s394 = s367 - k17 * s350
-    s395 = s368 + k17 * s351
-    s396 = s369 + k17 * s352
-    s397 = s350 * (s367 + s394)
-    s398 = s351 * (s368 + s395)
-    s399 = s352 * (s369 + s396)
-    s400 = s394 - s335
-    s401 = s336 + s395
-    s402 = s337 + s396
-    s403 = s344 + (s388 + (s398 + s399))
-    s404 = s347 + (s389 + (s351 * s367 - s350 * s395))
-    s405 = s348 + (s390 + (s350 * s396 - s352 * s367))
-    s406 = s345 + (s391 + (s399 - s397))
-    s407 = s349 + (s392 + (s351 * s396 + s352 * s368))
-    s408 = s346 + (s393 + (s398 - s397))
-    s409 = s400 + k19 * s332
-    s410 = k19 * s333 - s401
-    s411 = s402 - k19 * s334
-    s412 = s332 * (s400 + s409)
-    s413 = s333 * (s410 - s401)
-    s414 = s334 * (s402 + s411)
-    s415 = s314 + s409
-    s416 = s410 - s315
-    s417 = s316 + s411
-    s418 = s322 + (s403 + (s413 - s414))
-    s419 = s326 - s327 + (s404 - (s332 * s410 + s333 * s400))
-    s420 = s329 - s328 + (s405 + (s334 * s400 - s332 * s411))
-    s421 = s324 + (s406 + (s412 - s414))
-    s422 = s331 - s330 + (s407 - (s333 * s411 + s334 * s401))
-    s423 = s325 + (s408 + (s412 + s413))
-    s424 = s415 + s311 * k38
-    s425 = s416 + s312 * k38
-    s426 = s417 + s313 * k38
-    s427 = s311 * (s415 + s424)
-    s428 = s312 * (s416 + s425)
-    s429 = s313 * (s417 + s426)
-    s430 = moment_link_2_x * sin_q_2 + moment_link_2_y * cos_q_2 + s426
-    s431 = s306 - s307 + (s419 - (s311 * s425 + s312 * s415))
-    s432 = s308 - s309 + (s420 - (s311 * s426 + s313 * s415))
-    s433 = s310 + (s422 - (s312 * s426 + s313 * s416))
-    s434 = sin_q_1 * (s303 + (s418 + (s428 + s429))) - cos_q_1 * s431
-    s435 = sin_q_1 * s431 - cos_q_1 * (s304 + (s421 + (s427 + s429)))
-    s436 = cos_q_1 * s417
-    s437 = sin_q_1 * s417
-    s438 = sin_q_1 * s416 + cos_q_1 * s415
-    s439 = sin_q_1 * s418 - cos_q_1 * s419
-    s440 = sin_q_1 * s419 - cos_q_1 * s421
-    s441 = sin_q_1 * s420 - cos_q_1 * s422
-    s442 = s439 + (s312 * s438 + s313 * s437)
-    s443 = s440 - (s313 * s436 + s311 * s438)
-    s444 = s265 * s401 - s261 * s402
-    s445 = s265 * s400 + s257 * s402
-    s446 = s257 * s401 + s261 * s400
-    s447 = s265 * s405 - (s257 * s403 + s261 * s404)
-    s448 = s265 * s407 - (s257 * s404 + s261 * s406)
-    s449 = s265 * s408 - (s257 * s405 + s261 * s407)
-    s450 = s447 + (s333 * s446 + s334 * s445)
-    s451 = s448 - (s334 * s444 + s332 * s446)
-    s452 = s449 + (s332 * s445 - s333 * s444)
-    s453 = s450 + (s312 * s446 - s313 * s445)
-    s454 = s451 + (s313 * s444 - s311 * s446)
-    s455 = s275 * s369 + s277 * s368
-    s456 = s277 * s367 - s269 * s369
-    s457 = s269 * s368 + s275 * s367
-    s458 = s269 * s388 + s275 * s389 + s277 * s390
-    s459 = s269 * s389 + s275 * s391 + s277 * s392
-    s460 = s269 * s390 + s275 * s392 + s277 * s393
-    s461 = s458 + (s351 * s457 - s352 * s456)
-    s462 = s459 + (s352 * s455 - s350 * s457)
-    s463 = s460 + (s351 * s455 - s350 * s456)
-    s464 = s461 + (s334 * s456 - s333 * s457)
-    s465 = s462 + (s332 * s457 - s334 * s455)
-    s466 = s463 + (s332 * s456 - s333 * s455)
-    s467 = s464 - (s312 * s457 + s313 * s456)
-    s468 = s465 + (s313 * s455 + s311 * s457)
-    s469 = s286 * s368 - s282 * s369
-    s470 = s286 * s367 - s280 * s369
-    s471 = s282 * s367 - s280 * s368
-    s472 = s280 * s376 - s282 * s381 + s286 * s384
-    s473 = s280 * s381 - s282 * s377 + s286 * s387
-    s474 = s280 * s384 - s282 * s387 + s286 * s378
-    pivot_q_6_dot = k37 + (s280 * s472 - s282 * s473 + s286 * s474)
-    s475 = s269 * s472 + s275 * s473 + s277 * s474
-    s476 = s472 - (s351 * s471 + s352 * s470)
-    s477 = s473 + (s352 * s469 + s350 * s471)
-    s478 = s474 + (s351 * s469 - s350 * s470)
-    s479 = s265 * s478 - (s257 * s476 + s261 * s477)
-    s480 = s476 + (s333 * s471 + s334 * s470)
-    s481 = s477 - (s334 * s469 + s332 * s471)
-    s482 = s478 + (s332 * s470 - s333 * s469)
-    s483 = sin_q_1 * s480 - cos_q_1 * s481
-    s484 = s480 + (s312 * s471 - s313 * s470)
-    s485 = s481 + (s313 * s469 - s311 * s471)
-    s486 = s482 + (s311 * s470 - s312 * s469)
-    s487 = sin_q_1 * s484 - cos_q_1 * s485
-    s488 = s475 / pivot_q_6_dot
-    s489 = s479 / pivot_q_6_dot
-    s490 = s483 / pivot_q_6_dot
-    s491 = s487 / pivot_q_6_dot
-    s492 = s486 / pivot_q_6_dot
-    pivot_q_5_dot = k7 + (s269 * s458 + s275 * s459 + s277 * s460) - s475 * s488
-    s493 = s265 * s463 - (s257 * s461 + s261 * s462) - s479 * s488
-    s494 = sin_q_1 * s464 - cos_q_1 * s465 - s483 * s488
-    s495 = sin_q_1 * s467 - cos_q_1 * s468 - s487 * s488
-    s496 = s466 + (s311 * s456 - s312 * s455) - s486 * s488
-    s497 = s493 / pivot_q_5_dot
-    s498 = s494 / pivot_q_5_dot
-    s499 = s495 / pivot_q_5_dot
-    s500 = s496 / pivot_q_5_dot
-    pivot_q_4_dot = k5 + (s265 * s449 - (s257 * s447 + s261 * s448)) - s479 * s489 - s493 * s497
-    s501 = sin_q_1 * s450 - cos_q_1 * s451 - s483 * s489 - s494 * s497
-    s502 = sin_q_1 * s453 - cos_q_1 * s454 - s487 * s489 - s495 * s497
-    s503 = s452 + (s311 * s445 - s312 * s444) - s486 * s489 - s496 * s497
-    s504 = s501 / pivot_q_4_dot
-    s505 = s502 / pivot_q_4_dot
-    s506 = s503 / pivot_q_4_dot
-    pivot_q_3_dot = k2 + (sin_q_1 * s439 - cos_q_1 * s440) - s483 * s490 - s494 * s498 - s501 * s504
-    s507 = sin_q_1 * s442 - cos_q_1 * s443 - s487 * s490 - s495 * s498 - s502 * s504
-    s508 = s441 + (s312 * s436 - s311 * s437) - s486 * s490 - s496 * s498 - s503 * s504
-    s509 = k36 + (sin_q_1 * s434 - cos_q_1 * s435) - s487 * s491 - s495 * s499 - s502 * s505
-    s510 = sin_q_1 * s432 - cos_q_1 * s433 - s486 * s491 - s496 * s499 - s503 * s505
-    s511 = k21 + (s428 + (s427 + (s305 + s423))) - s486 * s492 - s496 * s500 - s503 * s506
-    s512 = s507 / pivot_q_3_dot
-    s513 = s508 / pivot_q_3_dot
-    pivot_q_2_dot = s509 - s507 * s512
-    s514 = s510 - s508 * s512
-    s515 = s514 / pivot_q_2_dot
-    pivot_q_1_dot = s511 - s508 * s513 - s514 * s515
+    s241 = s7 * (cos_q_5 * s240 - sin_q_5 * alpha_link_4_y) + s8 * alpha_link_4_z + s9 * delta_link_5_x
+    q_5_ddot = s206 / pivot_link_5 - s241
+    q_6_ddot = s200 / pivot_link_6 - k13 * (cos_q_5 * alpha_link_4_y + sin_q_5 * s240)
+    s286 = moment_link_2_x * s243 - moment_link_2_y * s244 + moment_link_2_z * sin_q_1
+    s287 = moment_link_2_x * s245 - moment_link_2_y * s246 - moment_link_2_z * cos_q_1
+    s288 = inertia_link_2_xx * s243 + k8 * s244 - k9 * sin_q_1
+    s289 = k8 * s243 + inertia_link_2_yy * s244 + k10 * sin_q_1
+    s290 = k10 * s244 - k9 * s243 + inertia_link_2_zz * sin_q_1
+    s291 = inertia_link_2_xx * s245 + k8 * s246 + k9 * cos_q_1
+    s292 = k10 * cos_q_1 - (k8 * s245 + inertia_link_2_yy * s246)
+    s293 = s243 * s288 + s244 * s289 + sin_q_1 * s290
+    s294 = s245 * s291 - s246 * s292 - cos_q_1 * (k10 * s246 - k9 * s245 - inertia_link_2_zz * cos_q_1)
+    s295 = sin_q_2 * (inertia_link_2_xx * sin_q_2 - k8 * cos_q_2) + cos_q_2 * (inertia_link_2_yy * cos_q_2 - k8 * sin_q_2)
+    s296 = s245 * s288 + s246 * s289
+    s297 = cos_q_1 * s290
+    s298 = sin_q_2 * s288
+    s299 = cos_q_2 * s289
+    s300 = sin_q_2 * s291 + cos_q_2 * s292
+    s301 = k1 * s243
+    s302 = k1 * s245
+    s303 = k1 * sin_q_2
+    s304 = moment_link_3_y * sin_q_1 - k11 * s250 - moment_link_3_z * s247
+    s305 = k11 * s254 + moment_link_3_y * cos_q_1 + moment_link_3_z * s251
+    s306 = k11 * s256 + moment_link_3_z * s255
+    s307 = inertia_link_3_xx * s250 + inertia_link_3_xy * sin_q_1 - inertia_link_3_xz * s247
+    s308 = inertia_link_3_xy * s250 + inertia_link_3_yy * sin_q_1 + k12 * s247
+    s309 = inertia_link_3_xz * s250 - k12 * sin_q_1 - inertia_link_3_zz * s247
+    s310 = inertia_link_3_xx * s254 - inertia_link_3_xy * cos_q_1 - inertia_link_3_xz * s251
+    s311 = inertia_link_3_xz * s254 + k12 * cos_q_1 - inertia_link_3_zz * s251
+    s312 = s250 * s307 + sin_q_1 * s308 - s247 * s309
+    s313 = cos_q_1 * (inertia_link_3_xy * s254 - inertia_link_3_yy * cos_q_1 + k12 * s251)
+    s314 = s254 * s310 - s313 - s251 * s311
+    s315 = s255 * (inertia_link_3_zz * s255 - inertia_link_3_xz * s256) - s256 * (inertia_link_3_xz * s255 - inertia_link_3_xx * s256)
+    s316 = s254 * s307 - cos_q_1 * s308
+    s317 = s251 * s309
+    s318 = s256 * s307
+    s319 = s255 * s309
+    s320 = s256 * s310
+    s321 = s255 * s311
+    s322 = k3 * s250 + k4 * sin_q_1
+    s323 = k3 * s254 - k4 * cos_q_1
+    s324 = k3 * s256
+    s325 = moment_link_4_y * s247
+    s326 = moment_link_4_y * s251
+    s327 = moment_link_4_y * s255
+    s328 = inertia_link_4_xx * s262
+    s329 = I_4y * s247
+    s330 = inertia_link_4_zz * s259
+    s331 = inertia_link_4_xx * s266
+    s332 = I_4y * s251
+    s333 = inertia_link_4_zz * s265
+    s334 = s262 * s328 + s247 * s329 + s259 * s330
+    s335 = s266 * s331 + s251 * s332 + s265 * s333
+    s336 = s268 * (inertia_link_4_xx * s268) + s255 * (I_4y * s255) + s267 * (inertia_link_4_zz * s267)
+    s337 = s266 * s328 + s251 * s329 + s265 * s330
+    s338 = s268 * s328 - s255 * s329 + s267 * s330
+    s339 = s268 * s331 - s255 * s332 + s267 * s333
+    s340 = k6 * s247
+    s341 = k6 * s251
+    s342 = k6 * s255
+    s343 = I_5x * s272
+    s344 = I_5y * s259
+    s345 = I_5z * s271
+    s346 = I_5x * s276
+    s347 = I_5y * s265
+    s348 = I_5z * s273
+    s349 = s272 * s343 + s259 * s344 + s271 * s345
+    s350 = s276 * s346 + s265 * s347 + s273 * s348
+    s351 = s278 * (I_5x * s278) + s267 * (I_5y * s267) + s277 * (I_5z * s277)
+    s352 = s276 * s343 + s265 * s344
+    s353 = s273 * s345
+    s354 = s267 * s344 - s278 * s343 + s277 * s345
+    s355 = s267 * s347 - s278 * s346
+    s356 = s277 * s348
+    s357 = moment_link_6_z * s271
+    s358 = moment_link_6_z * s273
+    s359 = moment_link_6_z * s277
+    s360 = inertia_link_6_xx * s280
+    s361 = inertia_link_6_yy * s281
+    s362 = I_6z * s271
+    s363 = inertia_link_6_xx * s282
+    s364 = inertia_link_6_yy * s283
+    s365 = I_6z * s273
+    s366 = s280 * s360 + s281 * s361 + s271 * s362
+    s367 = s282 * s363 + s283 * s364 + s273 * s365
+    s368 = s284 * (inertia_link_6_xx * s284) + s285 * (inertia_link_6_yy * s285) + s277 * (I_6z * s277)
+    s369 = s283 * s361 - s282 * s360
+    s370 = s273 * s362
+    s371 = s369 - s370
+    s372 = s284 * s360 + s285 * s361
+    s373 = s277 * s362
+    s374 = s373 - s372
+    s375 = s284 * s363 - s285 * s364
+    s376 = s277 * s365
+    s377 = s375 - s376
+    s378 = s349 + s366
+    s379 = s352 - s353 + s371
+    s380 = s354 + s374
+    s381 = s350 + s367
+    s382 = s355 - s356 + s377
+    s383 = s351 + s368
+    s384 = s357 - k17 * s340
+    s385 = s358 + k17 * s341
+    s386 = s359 + k17 * s342
+    s387 = s340 * (s357 + s384)
+    s388 = s341 * (s358 + s385)
+    s389 = s342 * (s359 + s386)
+    s390 = s384 - s325
+    s391 = s326 + s385
+    s392 = s327 + s386
+    s393 = s334 + (s378 + (s388 + s389))
+    s394 = s337 + (s379 + (s341 * s357 - s340 * s385))
+    s395 = s338 + (s380 + (s340 * s386 - s342 * s357))
+    s396 = s335 + (s381 + (s389 - s387))
+    s397 = s339 + (s382 + (s341 * s386 + s342 * s358))
+    s398 = s336 + (s383 + (s388 - s387))
+    s399 = s390 + k19 * s322
+    s400 = k19 * s323 - s391
+    s401 = s392 - k19 * s324
+    s402 = s322 * (s390 + s399)
+    s403 = s323 * (s400 - s391)
+    s404 = s324 * (s392 + s401)
+    s405 = s304 + s399
+    s406 = s400 - s305
+    s407 = s306 + s401
+    s408 = s312 + (s393 + (s403 - s404))
+    s409 = s316 - s317 + (s394 - (s322 * s400 + s323 * s390))
+    s410 = s319 - s318 + (s395 + (s324 * s390 - s322 * s401))
+    s411 = s314 + (s396 + (s402 - s404))
+    s412 = s321 - s320 + (s397 - (s323 * s401 + s324 * s391))
+    s413 = s315 + (s398 + (s402 + s403))
+    s414 = s405 + s301 * k39
+    s415 = s406 + s302 * k39
+    s416 = s407 + s303 * k39
+    s417 = s301 * (s405 + s414)
+    s418 = s302 * (s406 + s415)
+    s419 = s303 * (s407 + s416)
+    s420 = moment_link_2_x * sin_q_2 + moment_link_2_y * cos_q_2 + s416
+    s421 = s296 - s297 + (s409 - (s301 * s415 + s302 * s405))
+    s422 = s298 - s299 + (s410 - (s301 * s416 + s303 * s405))
+    s423 = s300 + (s412 - (s302 * s416 + s303 * s406))
+    s424 = sin_q_1 * (s293 + (s408 + (s418 + s419))) - cos_q_1 * s421
+    s425 = sin_q_1 * s421 - cos_q_1 * (s294 + (s411 + (s417 + s419)))
+    s426 = cos_q_1 * s407
+    s427 = sin_q_1 * s407
+    s428 = sin_q_1 * s406 + cos_q_1 * s405
+    s429 = sin_q_1 * s408 - cos_q_1 * s409
+    s430 = sin_q_1 * s409 - cos_q_1 * s411
+    s431 = sin_q_1 * s410 - cos_q_1 * s412
+    s432 = s429 + (s302 * s428 + s303 * s427)
+    s433 = s430 - (s303 * s426 + s301 * s428)
+    s434 = s255 * s391 - s251 * s392
+    s435 = s255 * s390 + s247 * s392
+    s436 = s247 * s391 + s251 * s390
+    s437 = s255 * s395 - (s247 * s393 + s251 * s394)
+    s438 = s255 * s397 - (s247 * s394 + s251 * s396)
+    s439 = s255 * s398 - (s247 * s395 + s251 * s397)
+    s440 = s437 + (s323 * s436 + s324 * s435)
+    s441 = s438 - (s324 * s434 + s322 * s436)
+    s442 = s439 + (s322 * s435 - s323 * s434)
+    s443 = s440 + (s302 * s436 - s303 * s435)
+    s444 = s441 + (s303 * s434 - s301 * s436)
+    s445 = s265 * s359 + s267 * s358
+    s446 = s267 * s357 - s259 * s359
+    s447 = s259 * s358 + s265 * s357
+    s448 = s259 * s378 + s265 * s379 + s267 * s380
+    s449 = s259 * s379 + s265 * s381 + s267 * s382
+    s450 = s259 * s380 + s265 * s382 + s267 * s383
+    s451 = s448 + (s341 * s447 - s342 * s446)
+    s452 = s449 + (s342 * s445 - s340 * s447)
+    s453 = s450 + (s341 * s445 - s340 * s446)
+    s454 = s451 + (s324 * s446 - s323 * s447)
+    s455 = s452 + (s322 * s447 - s324 * s445)
+    s456 = s453 + (s322 * s446 - s323 * s445)
+    s457 = s454 - (s302 * s447 + s303 * s446)
+    s458 = s455 + (s303 * s445 + s301 * s447)
+    s459 = s277 * s358 - s273 * s359
+    s460 = s277 * s357 - s271 * s359
+    s461 = s273 * s357 - s271 * s358
+    s462 = s271 * s366 - s273 * s371 + s277 * s374
+    s463 = s271 * s371 - s273 * s367 + s277 * s377
+    s464 = s271 * s374 - s273 * s377 + s277 * s368
+    pivot_q_6_dot = k38 + (s271 * s462 - s273 * s463 + s277 * s464)
+    s465 = s259 * s462 + s265 * s463 + s267 * s464
+    s466 = s462 - (s341 * s461 + s342 * s460)
+    s467 = s463 + (s342 * s459 + s340 * s461)
+    s468 = s464 + (s341 * s459 - s340 * s460)
+    s469 = s255 * s468 - (s247 * s466 + s251 * s467)
+    s470 = s466 + (s323 * s461 + s324 * s460)
+    s471 = s467 - (s324 * s459 + s322 * s461)
+    s472 = s468 + (s322 * s460 - s323 * s459)
+    s473 = sin_q_1 * s470 - cos_q_1 * s471
+    s474 = s470 + (s302 * s461 - s303 * s460)
+    s475 = s471 + (s303 * s459 - s301 * s461)
+    s476 = s472 + (s301 * s460 - s302 * s459)
+    s477 = sin_q_1 * s474 - cos_q_1 * s475
+    s478 = s465 / pivot_q_6_dot
+    s479 = s469 / pivot_q_6_dot
+    s480 = s473 / pivot_q_6_dot
+    s481 = s477 / pivot_q_6_dot
+    s482 = s476 / pivot_q_6_dot
+    pivot_q_5_dot = k7 + (s259 * s448 + s265 * s449 + s267 * s450) - s465 * s478
+    s483 = s255 * s453 - (s247 * s451 + s251 * s452) - s469 * s478
+    s484 = sin_q_1 * s454 - cos_q_1 * s455 - s473 * s478
+    s485 = sin_q_1 * s457 - cos_q_1 * s458 - s477 * s478
+    s486 = s456 + (s301 * s446 - s302 * s445) - s476 * s478
+    s487 = s483 / pivot_q_5_dot
+    s488 = s484 / pivot_q_5_dot
+    s489 = s485 / pivot_q_5_dot
+    s490 = s486 / pivot_q_5_dot
+    pivot_q_4_dot = k5 + (s255 * s439 - (s247 * s437 + s251 * s438)) - s469 * s479 - s483 * s487
+    s491 = sin_q_1 * s440 - cos_q_1 * s441 - s473 * s479 - s484 * s487
+    s492 = sin_q_1 * s443 - cos_q_1 * s444 - s477 * s479 - s485 * s487
+    s493 = s442 + (s301 * s435 - s302 * s434) - s476 * s479 - s486 * s487
+    s494 = s491 / pivot_q_4_dot
+    s495 = s492 / pivot_q_4_dot
+    s496 = s493 / pivot_q_4_dot
+    pivot_q_3_dot = k2 + (sin_q_1 * s429 - cos_q_1 * s430) - s473 * s480 - s484 * s488 - s491 * s494
+    s497 = sin_q_1 * s432 - cos_q_1 * s433 - s477 * s480 - s485 * s488 - s492 * s494
+    s498 = s431 + (s302 * s426 - s301 * s427) - s476 * s480 - s486 * s488 - s493 * s494
+    s499 = k37 + (sin_q_1 * s424 - cos_q_1 * s425) - s477 * s481 - s485 * s489 - s492 * s495
+    s500 = sin_q_1 * s422 - cos_q_1 * s423 - s476 * s481 - s486 * s489 - s493 * s495
+    s501 = k21 + (s418 + (s417 + (s295 + s413))) - s476 * s482 - s486 * s490 - s493 * s496
+    s502 = s497 / pivot_q_3_dot
+    s503 = s498 / pivot_q_3_dot
+    pivot_q_2_dot = s499 - s497 * s502
+    s504 = s500 - s498 * s502
+    s505 = s504 / pivot_q_2_dot
+    pivot_q_1_dot = s501 - s498 * s503 - s504 * s505
     omega_link_2_x_2 = q_2_dot * sin_q_1
-    s516 = q_2_dot * cos_q_1
-    s517 = s313 * s516 + q_1_dot * s312
-    velocity_link_3_y = q_1_dot * s311 - s313 * omega_link_2_x_2
-    velocity_link_3_z = s312 * omega_link_2_x_2 + s311 * s516
-    s518 = q_3_dot * sin_q_1
-    s519 = q_3_dot * cos_q_1
-    omega_link_3_x = omega_link_2_x_2 + s518
-    s520 = s516 + s519
-    velocity_link_4_x = s334 * s520 - q_1_dot * s333 - s517
-    velocity_link_4_y = velocity_link_3_y + (q_1_dot * s332 + s334 * omega_link_3_x)
-    velocity_link_4_z = velocity_link_3_z + (s333 * omega_link_3_x + s332 * s520)
-    s521 = q_4_dot * s257
-    s522 = q_4_dot * s261
-    s523 = q_4_dot * s265
-    omega_link_4_x_2 = omega_link_3_x - s521
-    s524 = s520 + s522
-    omega_link_4_z_2 = q_1_dot + s523
-    velocity_link_5_x = velocity_link_4_x + (s351 * omega_link_4_z_2 - s352 * s524)
-    velocity_link_5_y = velocity_link_4_y - (s350 * omega_link_4_z_2 + s352 * omega_link_4_x_2)
-    velocity_link_5_z = velocity_link_4_z - (s351 * omega_link_4_x_2 + s350 * s524)
-    s525 = q_5_dot * s269
-    s526 = q_5_dot * s275
-    s527 = q_5_dot * s277
-    omega_link_5_x_2 = omega_link_4_x_2 + s525
-    omega_link_5_y_2 = s526 - s524
-    omega_link_5_z_2 = omega_link_4_z_2 + s527
-    s528 = q_6_dot * s280
-    s529 = q_6_dot * s282
-    s530 = q_6_dot * s286
-    omega_link_6_x_2 = omega_link_5_x_2 + s528
-    omega_link_6_y = omega_link_5_y_2 - s529
-    omega_link_6_z_2 = omega_link_5_z_2 + s530
-    s531 = q_1_dot * s516
-    s532 = q_1_dot * omega_link_2_x_2
-    s533 = s531 + sin_q_1 * alpha_link_2_z
-    s534 = s532 - cos_q_1 * alpha_link_2_z
+    s506 = q_2_dot * cos_q_1
+    s507 = s303 * s506 + q_1_dot * s302
+    velocity_link_3_y = q_1_dot * s301 - s303 * omega_link_2_x_2
+    velocity_link_3_z = s302 * omega_link_2_x_2 + s301 * s506
+    s508 = q_3_dot * sin_q_1
+    s509 = q_3_dot * cos_q_1
+    omega_link_3_x = omega_link_2_x_2 + s508
+    s510 = s506 + s509
+    velocity_link_4_x = s324 * s510 - q_1_dot * s323 - s507
+    velocity_link_4_y = velocity_link_3_y + (q_1_dot * s322 + s324 * omega_link_3_x)
+    velocity_link_4_z = velocity_link_3_z + (s323 * omega_link_3_x + s322 * s510)
+    s511 = q_4_dot * s247
+    s512 = q_4_dot * s251
+    s513 = q_4_dot * s255
+    omega_link_4_x_2 = omega_link_3_x - s511
+    s514 = s510 + s512
+    omega_link_4_z_2 = q_1_dot + s513
+    velocity_link_5_x = velocity_link_4_x + (s341 * omega_link_4_z_2 - s342 * s514)
+    velocity_link_5_y = velocity_link_4_y - (s340 * omega_link_4_z_2 + s342 * omega_link_4_x_2)
+    velocity_link_5_z = velocity_link_4_z - (s341 * omega_link_4_x_2 + s340 * s514)
+    s515 = q_5_dot * s259
+    s516 = q_5_dot * s265
+    s517 = q_5_dot * s267
+    omega_link_5_x_2 = omega_link_4_x_2 + s515
+    omega_link_5_y_2 = s516 - s514
+    omega_link_5_z_2 = omega_link_4_z_2 + s517
+    s518 = q_6_dot * s271
+    s519 = q_6_dot * s273
+    s520 = q_6_dot * s277
+    omega_link_6_x_2 = omega_link_5_x_2 + s518
+    omega_link_6_y = omega_link_5_y_2 - s519
+    omega_link_6_z_2 = omega_link_5_z_2 + s520
+    s521 = q_1_dot * s506
+    s522 = q_1_dot * omega_link_2_x_2
+    s523 = s521 + sin_q_1 * alpha_link_2_z
+    s524 = s522 - cos_q_1 * alpha_link_2_z
     omega_link_2_x_squared_2 = omega_link_2_x_2 * omega_link_2_x_2
-    s535 = s516 * s516
-    s536 = omega_link_2_x_2 * s516
-    s537 = alpha_link_1_y + s536
-    s538 = s532 + s534
-    s539 = alpha_link_1_y - s536
-    s540 = s531 + s533
-    s541 = s532 - s534
-    s542 = s533 - s531
-    a_link_3_x = s313 * s538 - (s311 * (q_1_dot_squared + s535) + s312 * s537)
-    a_link_3_y = s311 * s539 - s312 * (q_1_dot_squared + omega_link_2_x_squared_2) - s313 * s540
-    a_link_3_z = gravity_g + (s311 * s541 + s312 * s542 - s313 * (omega_link_2_x_squared_2 + s535))
-    s543 = alpha_link_1_y + (s516 * s518 - omega_link_2_x_2 * s519)
-    s544 = s533 + q_1_dot * s519 + sin_q_1 * q_3_ddot
-    s545 = s534 + q_1_dot * s518 - cos_q_1 * q_3_ddot
+    s525 = s506 * s506
+    s526 = omega_link_2_x_2 * s506
+    s527 = alpha_link_1_y + s526
+    s528 = alpha_link_1_y - s526
+    s529 = s522 - s524
+    s530 = s523 - s521
+    a_link_3_x = s303 * (s522 + s524) - (s301 * (q_1_dot_squared + s525) + s302 * s527)
+    a_link_3_y = s301 * s528 - s302 * (q_1_dot_squared + omega_link_2_x_squared_2) - s303 * (s521 + s523)
+    a_link_3_z = gravity_g + (s301 * s529 + s302 * s530 - s303 * (omega_link_2_x_squared_2 + s525))
+    s531 = alpha_link_1_y + (s506 * s508 - omega_link_2_x_2 * s509)
+    s532 = s523 + q_1_dot * s509 + sin_q_1 * q_3_ddot
+    s533 = s524 + q_1_dot * s508 - cos_q_1 * q_3_ddot
     omega_link_3_x_squared = omega_link_3_x * omega_link_3_x
-    s546 = s520 * s520
-    s547 = omega_link_3_x * s520
-    s548 = q_1_dot * omega_link_3_x
-    s549 = q_1_dot * s520
-    s550 = q_1_dot_squared + s546
-    s551 = s543 + s547
-    s552 = s545 + s548
-    s553 = s543 - s547
-    s554 = q_1_dot_squared + omega_link_3_x_squared
-    s555 = s544 + s549
-    s556 = s548 - s545
-    s557 = s544 - s549
-    s558 = omega_link_3_x_squared + s546
-    a_link_4_x = a_link_3_x - (s332 * s550 + s333 * s551 + s334 * s552)
-    a_link_4_y = a_link_3_y + (s332 * s553 - s333 * s554 + s334 * s555)
-    a_link_4_z = a_link_3_z + (s332 * s556 + s333 * s557 + s334 * s558)
-    s559 = s544 + (q_1_dot * s522 - s520 * s523) - s257 * q_4_ddot
-    s560 = s545 - (q_1_dot * s521 + omega_link_3_x * s523) - s261 * q_4_ddot
-    s561 = s543 - (omega_link_3_x * s522 + s520 * s521) + s265 * q_4_ddot
+    s534 = s510 * s510
+    s535 = omega_link_3_x * s510
+    s536 = q_1_dot * omega_link_3_x
+    s537 = q_1_dot * s510
+    s538 = q_1_dot_squared + s534
+    s539 = s531 + s535
+    s540 = s533 + s536
+    s541 = s531 - s535
+    s542 = q_1_dot_squared + omega_link_3_x_squared
+    s543 = s532 + s537
+    s544 = s536 - s533
+    s545 = s532 - s537
+    s546 = omega_link_3_x_squared + s534
+    a_link_4_x = a_link_3_x - (s322 * s538 + s323 * s539 + s324 * s540)
+    a_link_4_y = a_link_3_y + (s322 * s541 - s323 * s542 + s324 * s543)
+    a_link_4_z = a_link_3_z + (s322 * s544 + s323 * s545 + s324 * s546)
+    s547 = s532 + (q_1_dot * s512 - s510 * s513) - s247 * q_4_ddot
+    s548 = s533 - (q_1_dot * s511 + omega_link_3_x * s513) - s251 * q_4_ddot
+    s549 = s531 - (omega_link_3_x * s512 + s510 * s511) + s255 * q_4_ddot
     omega_link_4_x_squared = omega_link_4_x_2 * omega_link_4_x_2
-    s562 = s524 * s524
+    s550 = s514 * s514
     omega_link_4_z_squared = omega_link_4_z_2 * omega_link_4_z_2
-    s563 = omega_link_4_x_2 * s524
-    s564 = omega_link_4_x_2 * omega_link_4_z_2
-    s565 = s524 * omega_link_4_z_2
-    s566 = s562 + omega_link_4_z_squared
-    s567 = s561 + s563
-    s568 = s560 + s564
-    s569 = s561 - s563
-    s570 = omega_link_4_x_squared + omega_link_4_z_squared
-    s571 = s559 + s565
-    s572 = s564 - s560
-    s573 = s559 - s565
-    s574 = omega_link_4_x_squared + s562
-    a_link_5_x = a_link_4_x + (s350 * s566 + s351 * s567 + s352 * s568)
-    a_link_5_y = a_link_4_y + (s351 * s570 - s350 * s569 - s352 * s571)
-    a_link_5_z = a_link_4_z - (s350 * s572 + s351 * s573 + s352 * s574)
-    s575 = s559 - (s524 * s527 + omega_link_4_z_2 * s526) + s269 * q_5_ddot
-    s576 = s560 + (omega_link_4_z_2 * s525 - omega_link_4_x_2 * s527) + s275 * q_5_ddot
-    s577 = s561 + (omega_link_4_x_2 * s526 + s524 * s525) + s277 * q_5_ddot
+    s551 = omega_link_4_x_2 * s514
+    s552 = omega_link_4_x_2 * omega_link_4_z_2
+    s553 = s514 * omega_link_4_z_2
+    s554 = s550 + omega_link_4_z_squared
+    s555 = s549 + s551
+    s556 = s548 + s552
+    s557 = s549 - s551
+    s558 = omega_link_4_x_squared + omega_link_4_z_squared
+    s559 = s547 + s553
+    s560 = s552 - s548
+    s561 = s547 - s553
+    s562 = omega_link_4_x_squared + s550
+    a_link_5_x = a_link_4_x + (s340 * s554 + s341 * s555 + s342 * s556)
+    a_link_5_y = a_link_4_y + (s341 * s558 - s340 * s557 - s342 * s559)
+    a_link_5_z = a_link_4_z - (s340 * s560 + s341 * s561 + s342 * s562)
+    s563 = s547 - (s514 * s517 + omega_link_4_z_2 * s516) + s259 * q_5_ddot
+    s564 = s548 + (omega_link_4_z_2 * s515 - omega_link_4_x_2 * s517) + s265 * q_5_ddot
+    s565 = s549 + (omega_link_4_x_2 * s516 + s514 * s515) + s267 * q_5_ddot
     omega_link_5_x_squared = omega_link_5_x_2 * omega_link_5_x_2
     omega_link_5_y_squared = omega_link_5_y_2 * omega_link_5_y_2
     omega_link_5_z_squared = omega_link_5_z_2 * omega_link_5_z_2
-    s578 = omega_link_5_x_2 * omega_link_5_y_2
-    s579 = omega_link_5_x_2 * omega_link_5_z_2
-    s580 = omega_link_5_y_2 * omega_link_5_z_2
-    s581 = s578 - s577
-    s582 = s576 + s579
-    s583 = s577 + s578
-    s584 = s580 - s575
-    s585 = s579 - s576
-    s586 = s575 + s580
-    s587 = s575 + (omega_link_5_y_2 * s530 + omega_link_5_z_2 * s529) + s280 * q_6_ddot
-    s588 = s576 + (omega_link_5_z_2 * s528 - omega_link_5_x_2 * s530) - s282 * q_6_ddot
-    s589 = s577 - (omega_link_5_x_2 * s529 + omega_link_5_y_2 * s528) + s286 * q_6_ddot
+    s566 = omega_link_5_x_2 * omega_link_5_y_2
+    s567 = omega_link_5_x_2 * omega_link_5_z_2
+    s568 = omega_link_5_y_2 * omega_link_5_z_2
+    s569 = s563 + (omega_link_5_y_2 * s520 + omega_link_5_z_2 * s519) + s271 * q_6_ddot
+    s570 = s564 + (omega_link_5_z_2 * s518 - omega_link_5_x_2 * s520) - s273 * q_6_ddot
+    s571 = s565 - (omega_link_5_x_2 * s519 + omega_link_5_y_2 * s518) + s277 * q_6_ddot
     omega_link_6_x_squared = omega_link_6_x_2 * omega_link_6_x_2
     omega_link_6_y_squared = omega_link_6_y * omega_link_6_y
     omega_link_6_z_squared = omega_link_6_z_2 * omega_link_6_z_2
-    s590 = omega_link_6_x_2 * omega_link_6_y
-    s591 = omega_link_6_x_2 * omega_link_6_z_2
-    s592 = omega_link_6_y * omega_link_6_z_2
-    s593 = s590 - s589
-    s594 = s588 + s591
-    s595 = s589 + s590
-    s596 = s592 - s587
-    s597 = s591 - s588
-    s598 = s587 + s592
-    s599 = 0.5 * (s305 + (s303 + s304))
-    s600 = s599 - s303
-    s601 = s599 - s304
-    s602 = s599 - s305
-    s603 = s307 - s306
-    s604 = s309 - s308
-    s605 = s541 * s603 - s539 * s604 - s310 * (q_1_dot_squared - s535) + s542 * s601
-    s606 = s310 * s537 - s542 * s603 + (omega_link_2_x_squared_2 - q_1_dot_squared) * s604
-    s607 = 0.5 * (s325 + (s322 + s324))
-    s608 = s607 - s322
-    s609 = s607 - s324
-    s610 = s607 - s325
-    s611 = s327 - s326
-    s612 = s328 - s329
-    s613 = s330 - s331
-    s614 = s556 * s611 - s553 * s612 + (q_1_dot_squared - s546) * s613 + s557 * s609
-    s615 = (omega_link_3_x_squared - q_1_dot_squared) * s612 - (s551 * s613 + s557 * s611)
-    s616 = (s546 - omega_link_3_x_squared) * s611 - (s555 * s612 + s552 * s613) + s553 * s608
-    s617 = s316 * a_link_3_x - s314 * a_link_3_z + (s615 + s552 * s610 - s556 * s608)
-    s618 = 0.5 * (s346 + (s344 + s345))
-    s619 = s618 - s344
-    s620 = s618 - s345
-    s621 = s618 - s346
-    s622 = s348 * s569 - s347 * s572 - s349 * (omega_link_4_z_squared - s562) + s573 * s620
-    s623 = s349 * s567 + s347 * s573 - s348 * (omega_link_4_x_squared - omega_link_4_z_squared)
-    s624 = s348 * s571 + s349 * s568 - s347 * (s562 - omega_link_4_x_squared) + s569 * s619
-    s625 = s337 * a_link_4_x + s335 * a_link_4_z + (s623 + s568 * s621 - s572 * s619)
-    s626 = 0.5 * (s361 + (s359 + s360))
-    s627 = s626 - s359
-    s628 = s626 - s360
-    s629 = s626 - s361
-    s630 = s363 - s362
-    s631 = s366 - s365
-    s632 = s585 * s630 + s364 * s583 + (omega_link_5_z_squared - omega_link_5_y_squared) * s631
-    s633 = s581 * s631 - s586 * s630 - s364 * (omega_link_5_x_squared - omega_link_5_z_squared)
-    s634 = (omega_link_5_y_squared - omega_link_5_x_squared) * s630 - (s364 * s584 + s582 * s631)
-    s635 = s369 * s594 - (s367 * (omega_link_6_y_squared + omega_link_6_z_squared) + s368 * s593)
-    s636 = s367 * s595 + s368 * (omega_link_6_x_squared + omega_link_6_z_squared) + s369 * s596
-    s637 = s367 * s597 - s368 * s598 - s369 * (omega_link_6_x_squared + omega_link_6_y_squared)
-    s638 = m_6 * a_link_5_x + s635
-    s639 = m_6 * a_link_5_y + s636
-    s640 = m_6 * a_link_5_z + s637
-    s641 = 0.5 * (s378 + (s376 + s377))
-    s642 = s641 - s376
-    s643 = s641 - s377
-    s644 = s641 - s378
-    s645 = s380 - s379
-    s646 = s382 - s383
-    s647 = s386 - s385
-    s648 = s597 * s645 - s595 * s646 + (omega_link_6_z_squared - omega_link_6_y_squared) * s647
-    s649 = s593 * s647 - s598 * s645 + (omega_link_6_x_squared - omega_link_6_z_squared) * s646
-    s650 = s596 * s646 - s594 * s647 + (omega_link_6_y_squared - omega_link_6_x_squared) * s645
-    s651 = s648 + s598 * s643 - s596 * s644 - (s368 * a_link_5_z + s369 * a_link_5_y)
-    s652 = s369 * a_link_5_x - s367 * a_link_5_z + (s649 + s594 * s644 - s597 * s642)
-    s653 = s367 * a_link_5_y + s368 * a_link_5_x + (s650 + s595 * s642 - s593 * s643)
-    s654 = s632 + s586 * s628 - s584 * s629 + s651
-    s655 = s633 + s582 * s629 - s585 * s627 + s652
-    s656 = s634 + s583 * s627 - s581 * s628 + s653
-    s657 = m_5 * a_link_5_x + s638
-    s658 = m_5 * a_link_5_y + s639
-    s659 = m_5 * a_link_5_z + s640
-    s660 = s622 + s571 * s621 - (s336 * a_link_4_z + s337 * a_link_4_y) + (s654 - (s351 * s659 + s352 * s658))
-    s661 = s625 + (s655 + (s352 * s657 + s350 * s659))
-    s662 = s336 * a_link_4_x - s335 * a_link_4_y + (s624 + s567 * s620) + (s656 + (s351 * s657 - s350 * s658))
-    s663 = m_4 * a_link_4_x + (s335 * s566 + s336 * s567 + s337 * s568) + s657
-    s664 = m_4 * a_link_4_y + (s336 * s570 - s335 * s569 - s337 * s571) + s658
-    s665 = m_4 * a_link_4_z - (s335 * s572 + s336 * s573 + s337 * s574) + s659
-    s666 = s614 + s555 * s610 - (s315 * a_link_3_z + s316 * a_link_3_y) + (s660 + (s333 * s665 + s334 * s664))
-    s667 = s617 + (s661 - (s334 * s663 + s332 * s665))
-    s668 = s314 * a_link_3_y + s315 * a_link_3_x + (s616 + s551 * s609) + (s662 + (s332 * s664 - s333 * s663))
-    s669 = m_3 * a_link_3_x + (s315 * s551 - s314 * s550 + s316 * s552) + s663
-    s670 = m_3 * a_link_3_y + (s314 * s553 + s315 * s554 - s316 * s555) + s664
-    s671 = m_3 * a_link_3_z + (s314 * s556 - s315 * s557 - s316 * s558) + s665
-    s672 = gravity_g * s297 + (s605 + s540 * s602) + (s666 + (s312 * s671 - s313 * s670))
-    s673 = s606 + s538 * s602 - s541 * s600 - gravity_g * s296 + (s667 + (s313 * s669 - s311 * s671))
-    s674 = q_1_dot * s603
-    s675 = s516 * s604
-    s676 = s310 * omega_link_2_x_2
-    s677 = q_1_dot * s611
-    s678 = s520 * s612
-    s679 = omega_link_3_x * s613
-    s680 = s314 * s517
-    s681 = s315 * velocity_link_3_y
-    s682 = s316 * velocity_link_3_z
-    s683 = m_4 * velocity_link_4_y - (s335 * omega_link_4_z_2 + s337 * omega_link_4_x_2)
-    s684 = s521 - omega_link_3_x
-    s685 = s347 * omega_link_4_z_2
-    s686 = s348 * s524
-    s687 = s335 * velocity_link_4_x
-    s688 = s336 * velocity_link_4_y
-    s689 = s337 * velocity_link_4_z
-    s690 = s524 - s526
-    s691 = omega_link_5_z_2 * s630
-    s692 = omega_link_5_x_2 * s631
-    s693 = m_6 * velocity_link_5_x + (s369 * omega_link_6_y + s368 * omega_link_6_z_2)
-    s694 = m_6 * velocity_link_5_y + (s367 * omega_link_6_z_2 - s369 * omega_link_6_x_2)
-    s695 = m_6 * velocity_link_5_z - (s368 * omega_link_6_x_2 + s367 * omega_link_6_y)
-    s696 = s529 - omega_link_5_y_2
-    s697 = omega_link_6_z_2 * s645
-    s698 = omega_link_6_x_2 * s647
-    s699 = s367 * velocity_link_5_x
-    s700 = s368 * velocity_link_5_y
-    s701 = s369 * velocity_link_5_z
-    s702 = s701 - s700 + (s697 - omega_link_6_y * s646)
-    s703 = s368 * velocity_link_5_x + (omega_link_6_z_2 * s643 - omega_link_6_y * s647)
-    s704 = omega_link_6_z_2 * s647 - omega_link_6_y * s644 - s369 * velocity_link_5_x
-    s705 = omega_link_6_x_2 * s646 - omega_link_6_z_2 * s642 - s367 * velocity_link_5_y
-    s706 = s699 + s701 + (s698 - s697)
-    s707 = omega_link_6_x_2 * s644 - omega_link_6_z_2 * s646 - s369 * velocity_link_5_y
-    s708 = s367 * velocity_link_5_z + (s642 * s696 + omega_link_6_x_2 * s645)
-    s709 = s368 * velocity_link_5_z - (s645 * s696 + omega_link_6_x_2 * s643)
-    s710 = s699 - s700 - (s698 + s646 * s696)
-    s711 = m_5 * velocity_link_5_x + s693
-    s712 = m_5 * velocity_link_5_y + s694
-    s713 = m_5 * velocity_link_5_z + s695
-    s714 = s691 + s364 * omega_link_5_y_2 + s702
-    s715 = omega_link_5_z_2 * s628 - omega_link_5_y_2 * s631 + s703
-    s716 = omega_link_5_z_2 * s631 - omega_link_5_y_2 * s629 + s704
-    s717 = s705 - (s364 * omega_link_5_x_2 + omega_link_5_z_2 * s627)
-    s718 = s692 - s691 + s706
-    s719 = s364 * omega_link_5_z_2 + omega_link_5_x_2 * s629 + s707
-    s720 = s627 * s690 + omega_link_5_x_2 * s630 + s708
-    s721 = s709 - (s630 * s690 + omega_link_5_x_2 * s628)
-    s722 = s364 * s690 - s692 + s710
-    s723 = s350 * s711
-    s724 = s351 * s712
-    s725 = s352 * s713
-    s726 = m_4 * velocity_link_4_x + (s336 * omega_link_4_z_2 - s337 * s524) + s711
-    s727 = s683 + s712
-    s728 = m_4 * velocity_link_4_z - (s336 * omega_link_4_x_2 + s335 * s524) + s713
-    s729 = s689 - s688 - (s685 + s686) + (s714 + (s725 - s724))
-    s730 = s336 * velocity_link_4_x + (omega_link_4_z_2 * s620 - s349 * s524) + (s715 + s351 * s711)
-    s731 = s524 * s621 - s349 * omega_link_4_z_2 - s337 * velocity_link_4_x + (s716 - s352 * s711)
-    s732 = s335 * velocity_link_4_y + (s348 * s684 - omega_link_4_z_2 * s619) + (s717 + s350 * s712)
-    s733 = s685 + s349 * s684 + (s689 - s687) + (s718 + (s725 - s723))
-    s734 = s348 * omega_link_4_z_2 - s621 * s684 - s337 * velocity_link_4_y + (s719 - s352 * s712)
-    s735 = s335 * velocity_link_4_z + (s347 * omega_link_4_x_2 - s524 * s619) + (s350 * s713 - s720)
-    s736 = s336 * velocity_link_4_z + (s347 * s524 - omega_link_4_x_2 * s620) + (s721 + s351 * s713)
-    s737 = s686 + s349 * omega_link_4_x_2 - (s687 + s688) + (s722 - (s723 + s724))
-    s738 = s332 * s726
-    s739 = s333 * s727
-    s740 = s334 * s728
-    s741 = q_1_dot * s315 - s316 * s520 - m_3 * s517 + s726
-    s742 = m_3 * velocity_link_3_y + (q_1_dot * s314 - s316 * omega_link_3_x) + s727
-    s743 = m_3 * velocity_link_3_z + (s314 * s520 - s315 * omega_link_3_x) + s728
-    s744 = s677 + s678 + (s682 - s681) + (s729 + (s739 - s740))
-    s745 = q_1_dot * s609 + s520 * s613 - s315 * s517 + (s730 - s333 * s726)
-    s746 = s316 * s517 + (q_1_dot * s613 + s520 * s610) + (s731 + s334 * s726)
-    s747 = omega_link_3_x * s612 - q_1_dot * s608 - s314 * velocity_link_3_y + (s732 - s332 * s727)
-    s748 = s682 - s680 + (s679 - s677) + (s733 + (s738 - s740))
-    s749 = omega_link_3_x * s610 - q_1_dot * s612 - s316 * velocity_link_3_y + (s734 + s334 * s727)
-    s750 = s735 - s332 * s728 - (s314 * velocity_link_3_z + (s520 * s608 + omega_link_3_x * s611))
-    s751 = s315 * velocity_link_3_z - (s520 * s611 + omega_link_3_x * s609) + (s736 - s333 * s728)
-    s752 = s737 + (s738 + s739) - (s678 + s679 + (s680 + s681))
-    s753 = s311 * s741
-    s754 = s312 * s742
-    s755 = s313 * s743
-    s756 = s750 - s311 * s743 - (s516 * s600 + omega_link_2_x_2 * s603)
-    s757 = s751 - s312 * s743 - (s516 * s603 + omega_link_2_x_2 * s601)
-    s758 = q_1_dot * cos_q_1
-    s759 = q_1_dot * sin_q_1
-    s760 = cos_q_1 * alpha_link_1_y
-    s761 = sin_q_1 * alpha_link_1_y
-    s762 = gravity_g * cos_q_1
-    s763 = gravity_g * sin_q_1
-    s764 = q_1_dot * s759
-    s765 = q_1_dot * s758
-    s766 = s760 - s764
-    s767 = s761 + s765
-    s768 = s758 + s758
-    s769 = s759 + s759
-    s770 = a_link_3_z - (omega_link_2_x_2 * velocity_link_3_y - s516 * s517)
-    s771 = sin_q_1 * s516 - cos_q_1 * omega_link_2_x_2
-    s772 = cos_q_1 * velocity_link_3_z
-    s773 = sin_q_1 * velocity_link_3_z
-    s774 = cos_q_1 * s517 - sin_q_1 * velocity_link_3_y
-    s775 = cos_q_1 * (a_link_3_x + (s516 * velocity_link_3_z + q_1_dot * velocity_link_3_y))
-    s776 = sin_q_1 * (a_link_3_y + (q_1_dot * s517 + omega_link_2_x_2 * velocity_link_3_z))
-    s777 = velocity_link_3_y * s771 - velocity_link_3_z * s759 - (s516 * s774 + q_1_dot * s773)
-    s778 = velocity_link_3_z * s758 + s517 * s771 + (q_1_dot * s772 - omega_link_2_x_2 * s774)
-    s779 = omega_link_2_x_2 * s773 + s516 * s772 - (s517 * s759 + velocity_link_3_y * s758)
-    s780 = s760 - (s764 + s516 * s771)
-    s781 = s761 + (s765 - omega_link_2_x_2 * s771)
-    s782 = omega_link_2_x_2 * s759 + s516 * s758 - (cos_q_1 * s533 + sin_q_1 * s534)
-    s783 = cos_q_1 * s770 + s777
-    s784 = sin_q_1 * s770 + s778
-    s785 = s779 - (s775 + s776)
-    s786 = s771 + s771
-    s787 = s772 + s772
-    s788 = s773 + s773
-    s789 = s774 + s774
-    s790 = a_link_4_x + (s520 * velocity_link_4_z + q_1_dot * velocity_link_4_y)
-    s791 = a_link_4_y - (q_1_dot * velocity_link_4_x - omega_link_3_x * velocity_link_4_z)
-    s792 = a_link_4_z - (omega_link_3_x * velocity_link_4_y + s520 * velocity_link_4_x)
-    s793 = q_1_dot * s261 - s265 * s520
-    s794 = q_1_dot * s257 + s265 * omega_link_3_x
-    s795 = s261 * omega_link_3_x + s257 * s520
-    s796 = s265 * velocity_link_4_y + s261 * velocity_link_4_z
-    s797 = s257 * velocity_link_4_z + s265 * velocity_link_4_x
-    s798 = s257 * velocity_link_4_y - s261 * velocity_link_4_x
-    s799 = velocity_link_4_z * s794 - velocity_link_4_y * s795 + (q_1_dot * s797 - s520 * s798)
-    s800 = velocity_link_4_z * s793 + velocity_link_4_x * s795 + (q_1_dot * s796 - omega_link_3_x * s798)
-    s801 = s520 * s796 - omega_link_3_x * s797 - (velocity_link_4_x * s794 + velocity_link_4_y * s793)
-    s802 = s265 * s545 + s261 * s543 + (s520 * s795 + q_1_dot * s794)
-    s803 = q_1_dot * s793 + omega_link_3_x * s795 - (s257 * s543 + s265 * s544)
-    s804 = s257 * s545 - s261 * s544 + (s520 * s793 - omega_link_3_x * s794)
-    s805 = s265 * s791 + s261 * s792 + s799
-    s806 = s800 - (s257 * s792 + s265 * s790)
-    s807 = s257 * s791 - s261 * s790 + s801
-    s808 = s793 + s793
-    s809 = s794 + s794
-    s810 = s795 + s795
-    s811 = s796 + s796
-    s812 = s797 + s797
-    s813 = s798 + s798
-    s814 = omega_link_4_z_2 * velocity_link_5_x - omega_link_4_x_2 * velocity_link_5_z
-    s815 = a_link_5_x + (s524 * velocity_link_5_z + omega_link_4_z_2 * velocity_link_5_y)
-    s816 = a_link_5_y - s814
-    s817 = a_link_5_z - (omega_link_4_x_2 * velocity_link_5_y + s524 * velocity_link_5_x)
-    s818 = s277 * s524 + s275 * omega_link_4_z_2
-    s819 = s269 * omega_link_4_z_2 - s277 * omega_link_4_x_2
-    s820 = s275 * omega_link_4_x_2 + s269 * s524
-    s821 = s277 * velocity_link_5_y - s275 * velocity_link_5_z
-    s822 = s269 * velocity_link_5_z - s277 * velocity_link_5_x
-    s823 = s275 * velocity_link_5_x - s269 * velocity_link_5_y
-    s824 = velocity_link_5_y * s820 - velocity_link_5_z * s819 - (s524 * s823 + omega_link_4_z_2 * s822)
-    s825 = omega_link_4_z_2 * s821 - omega_link_4_x_2 * s823 - (velocity_link_5_z * s818 + velocity_link_5_x * s820)
-    s826 = velocity_link_5_x * s819 + velocity_link_5_y * s818 + (omega_link_4_x_2 * s822 + s524 * s821)
-    s827 = s277 * s560 - s275 * s561 - (s524 * s820 + omega_link_4_z_2 * s819)
-    s828 = s269 * s561 - s277 * s559 - (omega_link_4_z_2 * s818 + omega_link_4_x_2 * s820)
-    s829 = s275 * s559 - s269 * s560 + (omega_link_4_x_2 * s819 - s524 * s818)
-    s830 = s277 * s816 - s275 * s817 + s824
-    s831 = s269 * s817 - s277 * s815 + s825
-    s832 = s275 * s815 - s269 * s816 + s826
-    s833 = s818 + s818
-    s834 = s819 + s819
-    s835 = s820 + s820
-    s836 = s821 + s821
-    s837 = s822 + s822
-    s838 = s823 + s823
-    s839 = velocity_link_5_z * omega_link_5_y_2 - velocity_link_5_y * omega_link_5_z_2
-    s840 = velocity_link_5_x * omega_link_5_z_2 - velocity_link_5_z * omega_link_5_x_2
-    s841 = velocity_link_5_y * omega_link_5_x_2 - velocity_link_5_x * omega_link_5_y_2
-    s842 = a_link_5_x - s839
-    s843 = a_link_5_y - s840
-    s844 = a_link_5_z - s841
-    s845 = s286 * omega_link_5_y_2 + s282 * omega_link_5_z_2
-    s846 = s280 * omega_link_5_z_2 - s286 * omega_link_5_x_2
-    s847 = s282 * omega_link_5_x_2 + s280 * omega_link_5_y_2
-    s848 = s286 * velocity_link_5_y + s282 * velocity_link_5_z
-    s849 = s280 * velocity_link_5_z - s286 * velocity_link_5_x
-    s850 = s282 * velocity_link_5_x + s280 * velocity_link_5_y
-    s851 = velocity_link_5_y * s847 + velocity_link_5_z * s846 + (omega_link_5_y_2 * s850 + omega_link_5_z_2 * s849)
-    s852 = velocity_link_5_z * s845 + velocity_link_5_x * s847 + (omega_link_5_z_2 * s848 + omega_link_5_x_2 * s850)
-    s853 = velocity_link_5_x * s846 - velocity_link_5_y * s845 + (omega_link_5_x_2 * s849 - omega_link_5_y_2 * s848)
-    s854 = s286 * s576 + s282 * s577 - (omega_link_5_y_2 * s847 + omega_link_5_z_2 * s846)
-    s855 = s280 * s577 - s286 * s575 + (omega_link_5_z_2 * s845 + omega_link_5_x_2 * s847)
-    s856 = omega_link_5_x_2 * s846 - omega_link_5_y_2 * s845 - (s282 * s575 + s280 * s576)
-    s857 = s286 * s843 + s282 * s844 - s851
-    s858 = s280 * s844 - s286 * s842 + s852
-    s859 = s853 - (s282 * s842 + s280 * s843)
-    s860 = s845 + s845
-    s861 = s846 + s846
-    s862 = s847 + s847
-    s863 = s848 + s848
-    s864 = s849 + s849
-    s865 = s850 + s850
-    s866 = 2.0 * sin_q_1
-    s867 = (s674 + s675 + (s744 + (s754 + s755))) * s866 - s252 * (omega_link_2_x_2 * s604 - q_1_dot * s600 + (s747 - s311 * s742))
-    s868 = (q_1_dot * s601 - s310 * s516 + (s745 - s312 * s741)) * s866 - s252 * (s748 + (s753 + s755) - (s674 + s676))
-    s869 = s432 * s766 + s433 * s767 + ((s296 + s424) * s763 - (s297 + s425) * s762)
-    s870 = 2.0 * s758
-    s871 = 2.0 * s759
-    s872 = s434 * s766 + s435 * s767 - (cos_q_1 * s430 * s762 + sin_q_1 * s430 * s763)
-    s873 = s744 * s866
-    s874 = s873 - s252 * s747
-    s875 = s252 * s748
-    s876 = s745 * s866 - s875
-    s877 = s746 * s866
-    s878 = s252 * s749
-    s879 = 2.0 * s771
-    s880 = s418 * s780 + s419 * s781 + s420 * s782 + (s416 * s785 - s417 * s784) + (s744 * s870 + s745 * s871 + s746 * s879)
-    s881 = s419 * s780 + s421 * s781 + s422 * s782 + (s417 * s783 - s415 * s785) + (s747 * s870 + s748 * s871 + s749 * s879)
-    s882 = s420 * s780 + s422 * s781 + s423 * s782 + (s415 * s784 - s416 * s783) + (s750 * s870 + s751 * s871 + s752 * s879)
-    s883 = k38 * s783 + (s417 * s781 - s416 * s782) + (s743 * s871 - s742 * s879) - cos_q_1 * s671
-    s884 = k38 * s784 + (s415 * s782 - s417 * s780) + (s741 * s879 - s743 * s870) - sin_q_1 * s671
-    s885 = sin_q_1 * s670 + cos_q_1 * s669 + (k38 * s785 + (s416 * s780 - s415 * s781) + (s742 * s870 - s741 * s871))
-    s886 = s418 * s768 + s419 * s769 + s420 * s786 + (s416 * s789 - s417 * s788) + (s873 - s252 * s745)
-    s887 = s419 * s768 + s421 * s769 + s422 * s786 + (s417 * s787 - s415 * s789) + (s747 * s866 - s875)
-    s888 = s420 * s768 + s422 * s769 + s423 * s786 + (s415 * s788 - s416 * s787) + (s750 * s866 - s252 * s751)
-    s889 = k38 * s787 + (s417 * s769 - s416 * s786) - s252 * s743
-    s890 = k38 * s788 + (s415 * s786 - s417 * s768) - s743 * s866
-    s891 = k38 * s789 + (s416 * s768 - s415 * s769) + (s742 * s866 + s252 * s741)
-    s892 = s439 * s780 + s440 * s781 + s441 * s782 + (s438 * s785 - (s436 * s783 + s437 * s784))
-    s893 = s758 * s874 + s759 * s876
-    s894 = s439 * s768 + s440 * s769 + s441 * s786 + (s438 * s789 - (s436 * s787 + s437 * s788))
-    s895 = sin_q_1 * s874 - cos_q_1 * s876
-    s896 = 2.0 * s257
-    s897 = 2.0 * s261
-    s898 = 2.0 * s265
-    s899 = s729 * s896
-    s900 = s735 * s898 - (s899 + s732 * s897)
-    s901 = s733 * s897
-    s902 = s736 * s898 - (s730 * s896 + s901)
-    s903 = s731 * s896 + s734 * s897
-    s904 = s737 * s898
-    s905 = s904 - s903
-    s906 = 2.0 * s793
-    s907 = 2.0 * s794
-    s908 = 2.0 * s795
-    s909 = s403 * s802 + s404 * s803 + s405 * s804 - (s401 * s807 + s402 * s806) + (s729 * s906 - s730 * s907 - s731 * s908)
-    s910 = s404 * s802 + s406 * s803 + s407 * s804 + (s402 * s805 - s400 * s807) + (s732 * s906 - s733 * s907 - s734 * s908)
-    s911 = s405 * s802 + s407 * s803 + s408 * s804 + (s400 * s806 + s401 * s805) + (s735 * s906 - s736 * s907 - s737 * s908)
-    s912 = k19 * s805 + (s402 * s803 + s401 * s804) + (s727 * s908 - s728 * s907) - (s261 * s665 + s265 * s664)
-    s913 = s265 * s663 + s257 * s665 + (k19 * s806 + (s400 * s804 - s402 * s802) - (s726 * s908 + s728 * s906))
-    s914 = s261 * s663 - s257 * s664 + (k19 * s807 - (s401 * s802 + s400 * s803) + (s727 * s906 + s726 * s907))
-    s915 = s403 * s808 - s404 * s809 - s405 * s810 + (s402 * s812 - s401 * s813) + (s731 * s898 - (s899 + s730 * s897))
-    s916 = s404 * s808 - s406 * s809 - s407 * s810 + (s402 * s811 - s400 * s813) + (s734 * s898 - (s901 + s732 * s896))
-    s917 = s405 * s808 - s407 * s809 - s408 * s810 + (s401 * s811 - s400 * s812) + (s904 - (s735 * s896 + s736 * s897))
-    s918 = k19 * s811 - (s402 * s809 + s401 * s810) - (s728 * s897 + s727 * s898)
-    s919 = s726 * s898 + s728 * s896 - (k19 * s812 + (s400 * s810 + s402 * s808))
-    s920 = k19 * s813 + (s400 * s809 - s401 * s808) + (s726 * s897 - s727 * s896)
-    s921 = s447 * s802 + s448 * s803 + s449 * s804 + (s444 * s805 + s445 * s806 + s446 * s807)
-    s922 = s447 * s808 - s448 * s809 - s449 * s810 + (s444 * s811 - s445 * s812 + s446 * s813)
-    s923 = s909 - (s261 * s662 + s265 * s661) + (s333 * s914 + s334 * s913)
-    s924 = s265 * s660 + s257 * s662 + s910 - (s334 * s912 + s332 * s914)
-    s925 = s915 + (s333 * s920 + s334 * s919)
-    s926 = s916 - (s334 * s918 + s332 * s920)
-    s927 = s450 * s780 + s451 * s781 + s452 * s782 + (s444 * s783 + s445 * s784 + s446 * s785)
-    s928 = s758 * s900 + s759 * s902
-    s929 = s450 * s768 + s451 * s769 + s452 * s786 + (s444 * s787 + s445 * s788 + s446 * s789)
-    s930 = sin_q_1 * s900 - cos_q_1 * s902
-    s931 = s261 * s660 - s257 * s661 + s911 + (s332 * s913 - s333 * s912) + (s311 * s913 - s312 * s912)
-    s932 = 2.0 * s269
-    s933 = 2.0 * s275
-    s934 = 2.0 * s277
-    s935 = s714 * s932
-    s936 = s935 + s717 * s933 - s720 * s934
-    s937 = s718 * s933
-    s938 = s715 * s932 + s937 + s721 * s934
-    s939 = s722 * s934
-    s940 = s716 * s932 + s719 * s933 + s939
-    s941 = 2.0 * s818
-    s942 = 2.0 * s819
-    s943 = 2.0 * s820
-    s944 = s388 * s827 + s389 * s828 + s390 * s829 - (s368 * s832 + s369 * s831) + (s715 * s942 - s714 * s941 + s716 * s943)
-    s945 = s389 * s827 + s391 * s828 + s392 * s829 + (s369 * s830 - s367 * s832) + (s718 * s942 - s717 * s941 + s719 * s943)
-    s946 = s390 * s827 + s392 * s828 + s393 * s829 + (s367 * s831 + s368 * s830) + (s720 * s941 + s721 * s942 + s722 * s943)
-    s947 = s275 * s659 - s277 * s658 + (k17 * s830 + (s369 * s828 + s368 * s829) + (s713 * s942 - s712 * s943))
-    s948 = s277 * s657 - s269 * s659 + (k17 * s831 + (s367 * s829 - s369 * s827) + (s711 * s943 + s713 * s941))
-    s949 = s269 * s658 - s275 * s657 + (k17 * s832 - (s368 * s827 + s367 * s828) - (s712 * s941 + s711 * s942))
-    s950 = s389 * s834 - s388 * s833 + s390 * s835 - (s368 * s838 + s369 * s837) + (s935 + s715 * s933 + s716 * s934)
-    s951 = s391 * s834 - s389 * s833 + s392 * s835 + (s369 * s836 - s367 * s838) + (s937 + s717 * s932 + s719 * s934)
-    s952 = s392 * s834 - s390 * s833 + s393 * s835 + (s367 * s837 + s368 * s836) + (s939 + (s721 * s933 - s720 * s932))
-    s953 = k17 * s836 + (s369 * s834 + s368 * s835) + (s713 * s933 - s712 * s934)
-    s954 = k17 * s837 + (s367 * s835 + s369 * s833) + (s711 * s934 - s713 * s932)
-    s955 = k17 * s838 + (s368 * s833 - s367 * s834) + (s712 * s932 - s711 * s933)
-    s956 = s458 * s827 + s459 * s828 + s460 * s829 + (s455 * s830 + s456 * s831 - s457 * s832)
-    s957 = s459 * s834 - s458 * s833 + s460 * s835 + (s455 * s836 + s456 * s837 - s457 * s838)
-    s958 = s275 * s656 - s277 * s655 + s944 - (s351 * s949 + s352 * s948)
-    s959 = s277 * s654 - s269 * s656 + s945 + (s352 * s947 + s350 * s949)
-    s960 = s269 * s655 - s275 * s654 + s946 + (s351 * s947 - s350 * s948)
-    s961 = s950 - (s351 * s955 + s352 * s954)
-    s962 = s951 + (s352 * s953 + s350 * s955)
-    s963 = s952 + (s351 * s953 - s350 * s954)
-    s964 = s461 * s802 + s462 * s803 + s463 * s804 + (s455 * s805 + s456 * s806 - s457 * s807)
-    s965 = s461 * s808 - s462 * s809 - s463 * s810 + (s455 * s811 - s456 * s812 - s457 * s813)
-    s966 = s958 + (s333 * s949 + s334 * s948)
-    s967 = s959 - (s334 * s947 + s332 * s949)
-    s968 = s961 + (s333 * s955 + s334 * s954)
-    s969 = s962 - (s334 * s953 + s332 * s955)
-    s970 = s464 * s780 + s465 * s781 + s466 * s782 + (s455 * s783 + s456 * s784 - s457 * s785)
-    s971 = s758 * s936 + s759 * s938
-    s972 = s464 * s768 + s465 * s769 + s466 * s786 + (s455 * s787 + s456 * s788 - s457 * s789)
-    s973 = sin_q_1 * s936 - cos_q_1 * s938
-    s974 = 2.0 * s280
-    s975 = 2.0 * s282
-    s976 = 2.0 * s286
-    s977 = s702 * s974
-    s978 = s977 - s705 * s975 - s708 * s976
-    s979 = s706 * s975
-    s980 = s703 * s974 - s979 + s709 * s976
-    s981 = s710 * s976
-    s982 = s704 * s974 - s707 * s975 + s981
-    s983 = 2.0 * s845
-    s984 = 2.0 * s846
-    s985 = 2.0 * s847
-    s986 = s376 * s854 + s381 * s855 + s384 * s856 - (s368 * s859 + s369 * s858) + (s702 * s983 + s703 * s984 - s704 * s985)
-    s987 = s381 * s854 + s377 * s855 + s387 * s856 + (s369 * s857 - s367 * s859) + (s705 * s983 + s706 * s984 - s707 * s985)
-    s988 = s384 * s854 + s387 * s855 + s378 * s856 + (s367 * s858 + s368 * s857) + (s709 * s984 - s708 * s983 - s710 * s985)
-    s989 = s986 - (s282 * s653 + s286 * s652)
-    s990 = s286 * s651 - s280 * s653 + s987
-    s991 = s280 * s652 + s282 * s651 + s988
-    s992 = m_6 * s857 + (s369 * s855 + s368 * s856) + (s695 * s984 + s694 * s985) - (s282 * s640 + s286 * s639)
-    s993 = s286 * s638 - s280 * s640 + (m_6 * s858 + (s367 * s856 - s369 * s854) - (s693 * s985 + s695 * s983))
-    s994 = s280 * s639 + s282 * s638 + (m_6 * s859 - (s368 * s854 + s367 * s855) + (s694 * s983 - s693 * s984))
-    s995 = s376 * s860 + s381 * s861 - s384 * s862 + (s368 * s865 - s369 * s864) + (s977 - s703 * s975 + s704 * s976)
-    s996 = s381 * s860 + s377 * s861 - s387 * s862 + (s369 * s863 + s367 * s865) + (s705 * s974 - s979 + s707 * s976)
-    s997 = s384 * s860 + s387 * s861 - s378 * s862 + (s367 * s864 + s368 * s863) + (s981 - (s708 * s974 + s709 * s975))
-    s998 = m_6 * s863 + (s369 * s861 - s368 * s862) - (s695 * s975 + s694 * s976)
-    s999 = m_6 * s864 - (s367 * s862 + s369 * s860) + (s693 * s976 - s695 * s974)
-    s1000 = s694 * s974 + s693 * s975 - (m_6 * s865 + (s368 * s860 + s367 * s861))
-    s1001 = s472 * s854 + s473 * s855 + s474 * s856 + (s469 * s857 + s470 * s858 + s471 * s859)
-    s1002 = s1001 + (s845 * s978 + s846 * s980 - s847 * s982)
-    s1003 = s472 * s860 + s473 * s861 - s474 * s862 + (s469 * s863 + s470 * s864 - s471 * s865)
-    s1004 = s1003 + (s280 * s978 - s282 * s980 + s286 * s982)
-    s1005 = s472 * s827 + s473 * s828 + s474 * s829 + (s469 * s830 + s470 * s831 + s471 * s832)
-    s1006 = s1005 + (s819 * s980 - s818 * s978 + s820 * s982)
-    s1007 = s473 * s834 - s472 * s833 + s474 * s835 + (s469 * s836 + s470 * s837 + s471 * s838)
-    s1008 = s1007 + (s269 * s978 + s275 * s980 + s277 * s982)
-    s1009 = s989 - (s351 * s994 + s352 * s993)
-    s1010 = s990 + (s352 * s992 + s350 * s994)
-    s1011 = s991 + (s351 * s992 - s350 * s993)
-    s1012 = s995 - (s351 * s1000 + s352 * s999)
-    s1013 = s996 + (s352 * s998 + s350 * s1000)
-    s1014 = s997 + (s351 * s998 - s350 * s999)
-    s1015 = s476 * s802 + s477 * s803 + s478 * s804 + (s469 * s805 + s470 * s806 + s471 * s807)
-    s1016 = s1015 + (s793 * s978 - s794 * s980 - s795 * s982)
-    s1017 = s476 * s808 - s477 * s809 - s478 * s810 + (s469 * s811 - s470 * s812 + s471 * s813)
-    s1018 = s1017 + (s265 * s982 - (s257 * s978 + s261 * s980))
-    s1019 = s1009 + (s333 * s994 + s334 * s993)
-    s1020 = s1010 - (s334 * s992 + s332 * s994)
-    s1021 = s1012 + (s333 * s1000 + s334 * s999)
-    s1022 = s1013 - (s334 * s998 + s332 * s1000)
-    s1023 = s480 * s780 + s481 * s781 + s482 * s782 + (s469 * s783 + s470 * s784 + s471 * s785)
-    s1024 = s758 * s978 + s759 * s980
-    s1025 = s1023 + (s1024 + s771 * s982)
-    s1026 = s480 * s768 + s481 * s769 + s482 * s786 + (s469 * s787 + s470 * s788 + s471 * s789)
-    s1027 = sin_q_1 * s978 - cos_q_1 * s980
-    s1028 = s1026 + s1027
-    s1029 = s1024 + (s484 * s766 + s485 * s767 + (s469 * s762 + s470 * s763))
-    s1030 = s1027 + (s484 * s768 + s485 * s769)
-    s1031 = s488 * s1029 - (s971 + (s467 * s766 + s468 * s767 + (s455 * s762 + s456 * s763)))
-    s1032 = s489 * s1029 - (s928 + (s453 * s766 + s454 * s767 + (s444 * s762 + s445 * s763)))
-    s1033 = s490 * s1029 - (s893 + (s442 * s766 + s443 * s767 - (s436 * s762 + s437 * s763)))
-    s1034 = s492 * s1029 - (sin_q_1 * s673 + cos_q_1 * s672 + (s869 + (s756 * s870 + s757 * s871)))
-    s1035 = s1032 - s497 * s1031
-    s1036 = s1033 - s498 * s1031 - s504 * s1035
-    s1037 = s491 * s1029 - (s872 + (s758 * s867 + s759 * s868)) - s499 * s1031 - s505 * s1035
-    s1038 = s1037 - s512 * s1036
-    s1039 = (s1034 - s500 * s1031 - s506 * s1035 - s513 * s1036 - s515 * s1038) / pivot_q_1_dot
-    s1040 = s1038 / pivot_q_2_dot - s515 * s1039
-    s1041 = s1036 / pivot_q_3_dot - s512 * s1040 - s513 * s1039
-    s1042 = s1035 / pivot_q_4_dot - s504 * s1041 - s505 * s1040 - s506 * s1039
-    s1043 = s1031 / pivot_q_5_dot - s497 * s1042 - s498 * s1041 - s499 * s1040 - s500 * s1039
-    s1044 = s1029 / pivot_q_6_dot + s488 * s1043 + s489 * s1042 + s490 * s1041 + s491 * s1040
-    s1045 = cos_q_1 * (s881 - sin_q_1 * s668 + (s313 * s883 - s311 * s885)) - sin_q_1 * (s880 - cos_q_1 * s668 + (s312 * s885 - s313 * s884))
-    s1046 = s488 * s1025 - (s970 + (s971 + s771 * s940))
-    s1047 = s492 * s1025 - (sin_q_1 * s667 + cos_q_1 * s666 + s882 + (s311 * s884 - s312 * s883))
-    s1048 = s489 * s1025 - (s927 + (s928 + s771 * s905)) - s497 * s1046
-    s1049 = s490 * s1025 - (s892 + (s893 + s771 * (s877 - s878))) - s498 * s1046 - s504 * s1048
-    s1050 = s1045 + s491 * s1025 - s499 * s1046 - s505 * s1048 - s512 * s1049
-    s1051 = (s1047 - s500 * s1046 - s506 * s1048 - s513 * s1049 - s515 * s1050) / pivot_q_1_dot
-    s1052 = s1050 / pivot_q_2_dot - s515 * s1051
-    s1053 = s1049 / pivot_q_3_dot - s512 * s1052 - s513 * s1051
-    s1054 = s1048 / pivot_q_4_dot - s504 * s1053 - s505 * s1052 - s506 * s1051
-    s1055 = s1046 / pivot_q_5_dot - s497 * s1054 - s498 * s1053 - s499 * s1052 - s500 * s1051
-    s1056 = s1025 / pivot_q_6_dot + s488 * s1055 + s489 * s1054 + s490 * s1053 + s491 * s1052
-    s1057 = cos_q_1 * (s924 + (s313 * s912 - s311 * s914)) - sin_q_1 * (s923 + (s312 * s914 - s313 * s913))
-    s1058 = s488 * s1016 - (s964 + (s793 * s936 - s794 * s938 - s795 * s940))
-    s1059 = s489 * s1016 - (s921 + (s793 * s900 - s794 * s902 - s795 * s905)) - s497 * s1058
-    s1060 = cos_q_1 * s924 - sin_q_1 * s923 + s490 * s1016 - s498 * s1058 - s504 * s1059
-    s1061 = s1057 + s491 * s1016 - s499 * s1058 - s505 * s1059 - s512 * s1060
-    s1062 = s492 * s1016 - s931 - s500 * s1058 - s506 * s1059 - s513 * s1060 - s515 * s1061
-    s1063 = s1062 / pivot_q_1_dot
-    s1064 = s1061 / pivot_q_2_dot - s515 * s1063
-    s1065 = s1060 / pivot_q_3_dot - s512 * s1064 - s513 * s1063
-    s1066 = s1059 / pivot_q_4_dot - s504 * s1065 - s505 * s1064 - s506 * s1063
-    s1067 = s1058 / pivot_q_5_dot - s497 * s1066 - s498 * s1065 - s499 * s1064 - s500 * s1063
-    s1068 = s1016 / pivot_q_6_dot + s488 * s1067 + s489 * s1066 + s490 * s1065 + s491 * s1064
-    s1069 = cos_q_1 * (s967 + (s313 * s947 - s311 * s949)) - sin_q_1 * (s966 + (s312 * s949 - s313 * s948))
-    s1070 = s488 * s1006 - (s956 + (s819 * s938 - s818 * s936 + s820 * s940))
-    s1071 = s492 * s1006 - (s960 + (s332 * s948 - s333 * s947) + (s311 * s948 - s312 * s947))
-    s1072 = s257 * s958 + s261 * s959 - s265 * s960 + s489 * s1006 - s497 * s1070
-    s1073 = cos_q_1 * s967 - sin_q_1 * s966 + s490 * s1006 - s498 * s1070 - s504 * s1072
-    s1074 = s1069 + s491 * s1006 - s499 * s1070 - s505 * s1072 - s512 * s1073
-    s1075 = (s1071 - s500 * s1070 - s506 * s1072 - s513 * s1073 - s515 * s1074) / pivot_q_1_dot
-    s1076 = s1074 / pivot_q_2_dot - s515 * s1075
-    s1077 = s1073 / pivot_q_3_dot - s512 * s1076 - s513 * s1075
-    s1078 = s1072 / pivot_q_4_dot - s504 * s1077 - s505 * s1076 - s506 * s1075
-    s1079 = s1070 / pivot_q_5_dot - s497 * s1078 - s498 * s1077 - s499 * s1076 - s500 * s1075
-    s1080 = s1006 / pivot_q_6_dot + s488 * s1079 + s489 * s1078 + s490 * s1077 + s491 * s1076
-    s1081 = cos_q_1 * (s1020 + (s313 * s992 - s311 * s994)) - sin_q_1 * (s1019 + (s312 * s994 - s313 * s993))
-    s1082 = s488 * s1002 - (s269 * s989 + s275 * s990 + s277 * s991)
-    s1083 = s492 * s1002 - (s1011 + (s332 * s993 - s333 * s992) + (s311 * s993 - s312 * s992))
-    s1084 = s257 * s1009 + s261 * s1010 - s265 * s1011 + s489 * s1002 - s497 * s1082
-    s1085 = cos_q_1 * s1020 - sin_q_1 * s1019 + s490 * s1002 - s498 * s1082 - s504 * s1084
-    s1086 = s1081 + s491 * s1002 - s499 * s1082 - s505 * s1084 - s512 * s1085
-    s1087 = (s1083 - s500 * s1082 - s506 * s1084 - s513 * s1085 - s515 * s1086) / pivot_q_1_dot
-    s1088 = s1086 / pivot_q_2_dot - s515 * s1087
-    s1089 = s1085 / pivot_q_3_dot - s512 * s1088 - s513 * s1087
-    s1090 = s1084 / pivot_q_4_dot - s504 * s1089 - s505 * s1088 - s506 * s1087
-    s1091 = s1082 / pivot_q_5_dot - s497 * s1090 - s498 * s1089 - s499 * s1088 - s500 * s1087
-    s1092 = s1002 / pivot_q_6_dot + s488 * s1091 + s489 * s1090 + s490 * s1089 + s491 * s1088
-    s1093 = s252 * (omega_link_2_x_2 * s602 - q_1_dot * s604 + (s749 - s313 * s742)) - (s516 * s602 - q_1_dot * s310 + (s746 - s313 * s741)) * s866
-    s1094 = s488 * s982 - s940
-    s1095 = s903 - s904 + s489 * s982 - s497 * s1094
-    s1096 = s492 * s982 - 2.0 * (s676 - s675 + (s752 + (s753 + s754))) - s500 * s1094
-    s1097 = s878 - s877 + s490 * s982 - s498 * s1094 - s504 * s1095
-    s1098 = s1093 + s491 * s982 - s499 * s1094 - s505 * s1095 - s512 * s1097
-    s1099 = (s1096 - s506 * s1095 - s513 * s1097 - s515 * s1098) / pivot_q_1_dot
-    s1100 = s1098 / pivot_q_2_dot - s515 * s1099
-    s1101 = s1097 / pivot_q_3_dot - s512 * s1100 - s513 * s1099
-    s1102 = s1095 / pivot_q_4_dot - s504 * s1101 - s505 * s1100 - s506 * s1099
-    s1103 = s1094 / pivot_q_5_dot - s497 * s1102 - s498 * s1101 - s499 * s1100 - s500 * s1099
-    s1104 = s982 / pivot_q_6_dot + s488 * s1103 + s489 * s1102 + s490 * s1101 + s491 * s1100
-    s1105 = s488 * s1030 - (s973 + (s467 * s768 + s468 * s769))
-    s1106 = s491 * s1030 - (s434 * s768 + s435 * s769 + (sin_q_1 * s867 - cos_q_1 * s868))
-    s1107 = s489 * s1030 - (s930 + (s453 * s768 + s454 * s769)) - s497 * s1105
-    s1108 = s492 * s1030 - (s432 * s768 + s433 * s769 + (s756 * s866 - s252 * s757)) - s500 * s1105
-    s1109 = s490 * s1030 - (s895 + (s442 * s768 + s443 * s769)) - s498 * s1105 - s504 * s1107
-    s1110 = s1106 - s499 * s1105 - s505 * s1107 - s512 * s1109
-    s1111 = (s1108 - s506 * s1107 - s513 * s1109 - s515 * s1110) / pivot_q_1_dot
-    s1112 = s1110 / pivot_q_2_dot - s515 * s1111
-    s1113 = s1109 / pivot_q_3_dot - s512 * s1112 - s513 * s1111
-    s1114 = s1107 / pivot_q_4_dot - s504 * s1113 - s505 * s1112 - s506 * s1111
-    s1115 = s1105 / pivot_q_5_dot - s497 * s1114 - s498 * s1113 - s499 * s1112 - s500 * s1111
-    s1116 = s1030 / pivot_q_6_dot + s488 * s1115 + s489 * s1114 + s490 * s1113 + s491 * s1112
-    s1117 = cos_q_1 * (s887 + (s313 * s889 - s311 * s891)) - sin_q_1 * (s886 + (s312 * s891 - s313 * s890))
-    s1118 = s488 * s1028 - (s972 + s973)
-    s1119 = s489 * s1028 - (s929 + s930) - s497 * s1118
-    s1120 = s490 * s1028 - (s894 + s895) - s498 * s1118 - s504 * s1119
-    s1121 = s492 * s1028 - (s888 + (s311 * s890 - s312 * s889)) - s500 * s1118 - s506 * s1119
-    s1122 = s1117 + s491 * s1028 - s499 * s1118 - s505 * s1119 - s512 * s1120
-    s1123 = (s1121 - s513 * s1120 - s515 * s1122) / pivot_q_1_dot
-    s1124 = s1122 / pivot_q_2_dot - s515 * s1123
-    s1125 = s1120 / pivot_q_3_dot - s512 * s1124 - s513 * s1123
-    s1126 = s1119 / pivot_q_4_dot - s504 * s1125 - s505 * s1124 - s506 * s1123
-    s1127 = s1118 / pivot_q_5_dot - s497 * s1126 - s498 * s1125 - s499 * s1124 - s500 * s1123
-    s1128 = s1028 / pivot_q_6_dot + s488 * s1127 + s489 * s1126 + s490 * s1125 + s491 * s1124
-    s1129 = cos_q_1 * (s926 + (s313 * s918 - s311 * s920)) - sin_q_1 * (s925 + (s312 * s920 - s313 * s919))
-    s1130 = s488 * s1018 - (s965 + (s265 * s940 - (s257 * s936 + s261 * s938)))
-    s1131 = s492 * s1018 - (s917 + (s332 * s919 - s333 * s918) + (s311 * s919 - s312 * s918))
-    s1132 = s489 * s1018 - (s922 + (s265 * s905 - (s257 * s900 + s261 * s902))) - s497 * s1130
-    s1133 = cos_q_1 * s926 - sin_q_1 * s925 + s490 * s1018 - s498 * s1130 - s504 * s1132
-    s1134 = s1129 + s491 * s1018 - s499 * s1130 - s505 * s1132 - s512 * s1133
-    s1135 = (s1131 - s500 * s1130 - s506 * s1132 - s513 * s1133 - s515 * s1134) / pivot_q_1_dot
-    s1136 = s1134 / pivot_q_2_dot - s515 * s1135
-    s1137 = s1133 / pivot_q_3_dot - s512 * s1136 - s513 * s1135
-    s1138 = s1132 / pivot_q_4_dot - s504 * s1137 - s505 * s1136 - s506 * s1135
-    s1139 = s1130 / pivot_q_5_dot - s497 * s1138 - s498 * s1137 - s499 * s1136 - s500 * s1135
-    s1140 = s1018 / pivot_q_6_dot + s488 * s1139 + s489 * s1138 + s490 * s1137 + s491 * s1136
-    s1141 = cos_q_1 * (s969 + (s313 * s953 - s311 * s955)) - sin_q_1 * (s968 + (s312 * s955 - s313 * s954))
-    s1142 = s488 * s1008 - (s957 + (s269 * s936 + s275 * s938 + s277 * s940))
-    s1143 = s492 * s1008 - (s963 + (s332 * s954 - s333 * s953) + (s311 * s954 - s312 * s953))
-    s1144 = s257 * s961 + s261 * s962 - s265 * s963 + s489 * s1008 - s497 * s1142
-    s1145 = cos_q_1 * s969 - sin_q_1 * s968 + s490 * s1008 - s498 * s1142 - s504 * s1144
-    s1146 = s1141 + s491 * s1008 - s499 * s1142 - s505 * s1144 - s512 * s1145
-    s1147 = (s1143 - s500 * s1142 - s506 * s1144 - s513 * s1145 - s515 * s1146) / pivot_q_1_dot
-    s1148 = s1146 / pivot_q_2_dot - s515 * s1147
-    s1149 = s1145 / pivot_q_3_dot - s512 * s1148 - s513 * s1147
-    s1150 = s1144 / pivot_q_4_dot - s504 * s1149 - s505 * s1148 - s506 * s1147
-    s1151 = s1142 / pivot_q_5_dot - s497 * s1150 - s498 * s1149 - s499 * s1148 - s500 * s1147
-    s1152 = s1008 / pivot_q_6_dot + s488 * s1151 + s489 * s1150 + s490 * s1149 + s491 * s1148
-    s1153 = cos_q_1 * (s1022 + (s313 * s998 - s311 * s1000)) - sin_q_1 * (s1021 + (s312 * s1000 - s313 * s999))
-    s1154 = s488 * s1004 - (s269 * s995 + s275 * s996 + s277 * s997)
-    s1155 = s492 * s1004 - (s1014 + (s332 * s999 - s333 * s998) + (s311 * s999 - s312 * s998))
-    s1156 = s257 * s1012 + s261 * s1013 - s265 * s1014 + s489 * s1004 - s497 * s1154
-    s1157 = cos_q_1 * s1022 - sin_q_1 * s1021 + s490 * s1004 - s498 * s1154 - s504 * s1156
-    s1158 = s1153 + s491 * s1004 - s499 * s1154 - s505 * s1156 - s512 * s1157
-    s1159 = (s1155 - s500 * s1154 - s506 * s1156 - s513 * s1157 - s515 * s1158) / pivot_q_1_dot
-    s1160 = s1158 / pivot_q_2_dot - s515 * s1159
-    s1161 = s1157 / pivot_q_3_dot - s512 * s1160 - s513 * s1159
-    s1162 = s1156 / pivot_q_4_dot - s504 * s1161 - s505 * s1160 - s506 * s1159
-    s1163 = s1154 / pivot_q_5_dot - s497 * s1162 - s498 * s1161 - s499 * s1160 - s500 * s1159
-    s1164 = s1004 / pivot_q_6_dot + s488 * s1163 + s489 * s1162 + s490 * s1161 + s491 * s1160
+    s572 = omega_link_6_x_2 * omega_link_6_y
+    s573 = omega_link_6_x_2 * omega_link_6_z_2
+    s574 = omega_link_6_y * omega_link_6_z_2
+    s575 = s572 - s571
+    s576 = s570 + s573
+    s577 = s571 + s572
+    s578 = s574 - s569
+    s579 = s573 - s570
+    s580 = s569 + s574
+    s581 = s297 - s296
+    s582 = s299 - s298
+    s583 = s529 * s581 - s528 * s582 - s300 * (q_1_dot_squared - s525) + s293 * s523
+    s584 = s300 * s527 - s530 * s581 + (omega_link_2_x_squared_2 - q_1_dot_squared) * s582
+    s585 = s317 - s316
+    s586 = s318 - s319
+    s587 = s320 - s321
+    s588 = s544 * s585 - s541 * s586 + (q_1_dot_squared - s534) * s587 + s312 * s532
+    s589 = (omega_link_3_x_squared - q_1_dot_squared) * s586 - (s539 * s587 + s545 * s585)
+    s590 = (s534 - omega_link_3_x_squared) * s585 - (s543 * s586 + s540 * s587) + s315 * s531
+    s591 = s306 * a_link_3_x - s304 * a_link_3_z + (s589 + s314 * s533 + s536 * (s312 - s315))
+    s592 = s338 * s557 - s337 * s560 - s339 * (omega_link_4_z_squared - s550) + s334 * s547
+    s593 = s339 * s555 + s337 * s561 - s338 * (omega_link_4_x_squared - omega_link_4_z_squared)
+    s594 = s338 * s559 + s339 * s556 - s337 * (s550 - omega_link_4_x_squared) + s336 * s549
+    s595 = s327 * a_link_4_x + s325 * a_link_4_z + (s593 + s335 * s548 + s552 * (s334 - s336))
+    s596 = s353 - s352
+    s597 = s356 - s355
+    s598 = (s567 - s564) * s596 + s354 * (s565 + s566) + (omega_link_5_z_squared - omega_link_5_y_squared) * s597
+    s599 = (s566 - s565) * s597 - (s563 + s568) * s596 - s354 * (omega_link_5_x_squared - omega_link_5_z_squared)
+    s600 = (omega_link_5_y_squared - omega_link_5_x_squared) * s596 - (s354 * (s568 - s563) + (s564 + s567) * s597)
+    s601 = s359 * s576 - (s357 * (omega_link_6_y_squared + omega_link_6_z_squared) + s358 * s575)
+    s602 = s357 * s577 + s358 * (omega_link_6_x_squared + omega_link_6_z_squared) + s359 * s578
+    s603 = s357 * s579 - s358 * s580 - s359 * (omega_link_6_x_squared + omega_link_6_y_squared)
+    s604 = m_6 * a_link_5_x + s601
+    s605 = m_6 * a_link_5_y + s602
+    s606 = m_6 * a_link_5_z + s603
+    s607 = s370 - s369
+    s608 = s372 - s373
+    s609 = s376 - s375
+    s610 = s579 * s607 - s577 * s608 + (omega_link_6_z_squared - omega_link_6_y_squared) * s609
+    s611 = s575 * s609 - s580 * s607 + (omega_link_6_x_squared - omega_link_6_z_squared) * s608
+    s612 = s578 * s608 - s576 * s609 + (omega_link_6_y_squared - omega_link_6_x_squared) * s607
+    s613 = s610 + s366 * s569 + s574 * (s368 - s367) - (s358 * a_link_5_z + s359 * a_link_5_y)
+    s614 = s359 * a_link_5_x - s357 * a_link_5_z + (s611 + s367 * s570 + s573 * (s366 - s368))
+    s615 = s357 * a_link_5_y + s358 * a_link_5_x + (s612 + s368 * s571 + s572 * (s367 - s366))
+    s616 = s598 + s349 * s563 + s568 * (s351 - s350) + s613
+    s617 = s599 + s350 * s564 + s567 * (s349 - s351) + s614
+    s618 = s600 + s351 * s565 + s566 * (s350 - s349) + s615
+    s619 = m_5 * a_link_5_x + s604
+    s620 = m_5 * a_link_5_y + s605
+    s621 = m_5 * a_link_5_z + s606
+    s622 = s592 - s553 * (s336 - s335) - (s326 * a_link_4_z + s327 * a_link_4_y) + (s616 - (s341 * s621 + s342 * s620))
+    s623 = s595 + (s617 + (s342 * s619 + s340 * s621))
+    s624 = s326 * a_link_4_x - s325 * a_link_4_y + (s594 - s551 * (s335 - s334)) + (s618 + (s341 * s619 - s340 * s620))
+    s625 = m_4 * a_link_4_x + (s325 * s554 + s326 * s555 + s327 * s556) + s619
+    s626 = m_4 * a_link_4_y + (s326 * s558 - s325 * s557 - s327 * s559) + s620
+    s627 = m_4 * a_link_4_z - (s325 * s560 + s326 * s561 + s327 * s562) + s621
+    s628 = s588 - s537 * (s315 - s314) - (s305 * a_link_3_z + s306 * a_link_3_y) + (s622 + (s323 * s627 + s324 * s626))
+    s629 = s591 + (s623 - (s324 * s625 + s322 * s627))
+    s630 = s304 * a_link_3_y + s305 * a_link_3_x + (s590 - s535 * (s314 - s312)) + (s624 + (s322 * s626 - s323 * s625))
+    s631 = m_3 * a_link_3_x + (s305 * s539 - s304 * s538 + s306 * s540) + s625
+    s632 = m_3 * a_link_3_y + (s304 * s541 + s305 * s542 - s306 * s543) + s626
+    s633 = m_3 * a_link_3_z + (s304 * s544 - s305 * s545 - s306 * s546) + s627
+    s634 = gravity_g * s287 + (s583 - s521 * (s295 - s294)) + (s628 + (s302 * s633 - s303 * s632))
+    s635 = s584 + s294 * s524 + s522 * (s293 - s295) - gravity_g * s286 + (s629 + (s303 * s631 - s301 * s633))
+    s636 = 0.5 * (s295 + (s293 + s294))
+    s637 = s636 - s293
+    s638 = s636 - s294
+    s639 = s636 - s295
+    s640 = q_1_dot * s581
+    s641 = s506 * s582
+    s642 = s300 * omega_link_2_x_2
+    s643 = 0.5 * (s315 + (s312 + s314))
+    s644 = s643 - s312
+    s645 = s643 - s314
+    s646 = s643 - s315
+    s647 = q_1_dot * s585
+    s648 = s510 * s586
+    s649 = omega_link_3_x * s587
+    s650 = s304 * s507
+    s651 = s305 * velocity_link_3_y
+    s652 = s306 * velocity_link_3_z
+    s653 = m_4 * velocity_link_4_y - (s325 * omega_link_4_z_2 + s327 * omega_link_4_x_2)
+    s654 = s511 - omega_link_3_x
+    s655 = 0.5 * (s336 + (s334 + s335))
+    s656 = s655 - s334
+    s657 = s655 - s335
+    s658 = s655 - s336
+    s659 = s337 * omega_link_4_z_2
+    s660 = s338 * s514
+    s661 = s325 * velocity_link_4_x
+    s662 = s326 * velocity_link_4_y
+    s663 = s327 * velocity_link_4_z
+    s664 = s514 - s516
+    s665 = 0.5 * (s351 + (s349 + s350))
+    s666 = s665 - s349
+    s667 = s665 - s350
+    s668 = s665 - s351
+    s669 = omega_link_5_z_2 * s596
+    s670 = omega_link_5_x_2 * s597
+    s671 = m_6 * velocity_link_5_x + (s359 * omega_link_6_y + s358 * omega_link_6_z_2)
+    s672 = m_6 * velocity_link_5_y + (s357 * omega_link_6_z_2 - s359 * omega_link_6_x_2)
+    s673 = m_6 * velocity_link_5_z - (s358 * omega_link_6_x_2 + s357 * omega_link_6_y)
+    s674 = s519 - omega_link_5_y_2
+    s675 = 0.5 * (s368 + (s366 + s367))
+    s676 = s675 - s366
+    s677 = s675 - s367
+    s678 = s675 - s368
+    s679 = omega_link_6_z_2 * s607
+    s680 = omega_link_6_x_2 * s609
+    s681 = s357 * velocity_link_5_x
+    s682 = s358 * velocity_link_5_y
+    s683 = s359 * velocity_link_5_z
+    s684 = s683 - s682 + (s679 - omega_link_6_y * s608)
+    s685 = s358 * velocity_link_5_x + (omega_link_6_z_2 * s677 - omega_link_6_y * s609)
+    s686 = omega_link_6_z_2 * s609 - omega_link_6_y * s678 - s359 * velocity_link_5_x
+    s687 = omega_link_6_x_2 * s608 - omega_link_6_z_2 * s676 - s357 * velocity_link_5_y
+    s688 = s681 + s683 + (s680 - s679)
+    s689 = omega_link_6_x_2 * s678 - omega_link_6_z_2 * s608 - s359 * velocity_link_5_y
+    s690 = s357 * velocity_link_5_z + (s674 * s676 + omega_link_6_x_2 * s607)
+    s691 = s358 * velocity_link_5_z - (s607 * s674 + omega_link_6_x_2 * s677)
+    s692 = s681 - s682 - (s680 + s608 * s674)
+    s693 = m_5 * velocity_link_5_x + s671
+    s694 = m_5 * velocity_link_5_y + s672
+    s695 = m_5 * velocity_link_5_z + s673
+    s696 = s669 + s354 * omega_link_5_y_2 + s684
+    s697 = omega_link_5_z_2 * s667 - omega_link_5_y_2 * s597 + s685
+    s698 = omega_link_5_z_2 * s597 - omega_link_5_y_2 * s668 + s686
+    s699 = s687 - (s354 * omega_link_5_x_2 + omega_link_5_z_2 * s666)
+    s700 = s670 - s669 + s688
+    s701 = s354 * omega_link_5_z_2 + omega_link_5_x_2 * s668 + s689
+    s702 = s664 * s666 + omega_link_5_x_2 * s596 + s690
+    s703 = s691 - (s596 * s664 + omega_link_5_x_2 * s667)
+    s704 = s354 * s664 - s670 + s692
+    s705 = s340 * s693
+    s706 = s341 * s694
+    s707 = s342 * s695
+    s708 = m_4 * velocity_link_4_x + (s326 * omega_link_4_z_2 - s327 * s514) + s693
+    s709 = s653 + s694
+    s710 = m_4 * velocity_link_4_z - (s326 * omega_link_4_x_2 + s325 * s514) + s695
+    s711 = s663 - s662 - (s659 + s660) + (s696 + (s707 - s706))
+    s712 = s326 * velocity_link_4_x + (omega_link_4_z_2 * s657 - s339 * s514) + (s697 + s341 * s693)
+    s713 = s514 * s658 - s339 * omega_link_4_z_2 - s327 * velocity_link_4_x + (s698 - s342 * s693)
+    s714 = s325 * velocity_link_4_y + (s338 * s654 - omega_link_4_z_2 * s656) + (s699 + s340 * s694)
+    s715 = s659 + s339 * s654 + (s663 - s661) + (s700 + (s707 - s705))
+    s716 = s338 * omega_link_4_z_2 - s654 * s658 - s327 * velocity_link_4_y + (s701 - s342 * s694)
+    s717 = s325 * velocity_link_4_z + (s337 * omega_link_4_x_2 - s514 * s656) + (s340 * s695 - s702)
+    s718 = s326 * velocity_link_4_z + (s337 * s514 - omega_link_4_x_2 * s657) + (s703 + s341 * s695)
+    s719 = s660 + s339 * omega_link_4_x_2 - (s661 + s662) + (s704 - (s705 + s706))
+    s720 = s322 * s708
+    s721 = s323 * s709
+    s722 = s324 * s710
+    s723 = q_1_dot * s305 - s306 * s510 - m_3 * s507 + s708
+    s724 = m_3 * velocity_link_3_y + (q_1_dot * s304 - s306 * omega_link_3_x) + s709
+    s725 = m_3 * velocity_link_3_z + (s304 * s510 - s305 * omega_link_3_x) + s710
+    s726 = s647 + s648 + (s652 - s651) + (s711 + (s721 - s722))
+    s727 = q_1_dot * s645 + s510 * s587 - s305 * s507 + (s712 - s323 * s708)
+    s728 = s306 * s507 + (q_1_dot * s587 + s510 * s646) + (s713 + s324 * s708)
+    s729 = omega_link_3_x * s586 - q_1_dot * s644 - s304 * velocity_link_3_y + (s714 - s322 * s709)
+    s730 = s652 - s650 + (s649 - s647) + (s715 + (s720 - s722))
+    s731 = omega_link_3_x * s646 - q_1_dot * s586 - s306 * velocity_link_3_y + (s716 + s324 * s709)
+    s732 = s717 - s322 * s710 - (s304 * velocity_link_3_z + (s510 * s644 + omega_link_3_x * s585))
+    s733 = s305 * velocity_link_3_z - (s510 * s585 + omega_link_3_x * s645) + (s718 - s323 * s710)
+    s734 = s719 + (s720 + s721) - (s648 + s649 + (s650 + s651))
+    s735 = s301 * s723
+    s736 = s302 * s724
+    s737 = s303 * s725
+    s738 = s732 - s301 * s725 - (s506 * s637 + omega_link_2_x_2 * s581)
+    s739 = s733 - s302 * s725 - (s506 * s581 + omega_link_2_x_2 * s638)
+    s740 = q_1_dot * cos_q_1
+    s741 = q_1_dot * sin_q_1
+    s742 = cos_q_1 * alpha_link_1_y
+    s743 = sin_q_1 * alpha_link_1_y
+    s744 = gravity_g * cos_q_1
+    s745 = gravity_g * sin_q_1
+    s746 = q_1_dot * s741
+    s747 = q_1_dot * s740
+    s748 = s742 - s746
+    s749 = s743 + s747
+    s750 = s740 + s740
+    s751 = s741 + s741
+    s752 = a_link_3_z - (omega_link_2_x_2 * velocity_link_3_y - s506 * s507)
+    s753 = sin_q_1 * s506 - cos_q_1 * omega_link_2_x_2
+    s754 = cos_q_1 * velocity_link_3_z
+    s755 = sin_q_1 * velocity_link_3_z
+    s756 = cos_q_1 * s507 - sin_q_1 * velocity_link_3_y
+    s757 = cos_q_1 * (a_link_3_x + (s506 * velocity_link_3_z + q_1_dot * velocity_link_3_y))
+    s758 = sin_q_1 * (a_link_3_y + (q_1_dot * s507 + omega_link_2_x_2 * velocity_link_3_z))
+    s759 = velocity_link_3_y * s753 - velocity_link_3_z * s741 - (s506 * s756 + q_1_dot * s755)
+    s760 = velocity_link_3_z * s740 + s507 * s753 + (q_1_dot * s754 - omega_link_2_x_2 * s756)
+    s761 = omega_link_2_x_2 * s755 + s506 * s754 - (s507 * s741 + velocity_link_3_y * s740)
+    s762 = s742 - (s746 + s506 * s753)
+    s763 = s743 + (s747 - omega_link_2_x_2 * s753)
+    s764 = omega_link_2_x_2 * s741 + s506 * s740 - (cos_q_1 * s523 + sin_q_1 * s524)
+    s765 = cos_q_1 * s752 + s759
+    s766 = sin_q_1 * s752 + s760
+    s767 = s761 - (s757 + s758)
+    s768 = s753 + s753
+    s769 = s754 + s754
+    s770 = s755 + s755
+    s771 = s756 + s756
+    s772 = a_link_4_x + (s510 * velocity_link_4_z + q_1_dot * velocity_link_4_y)
+    s773 = a_link_4_y - (q_1_dot * velocity_link_4_x - omega_link_3_x * velocity_link_4_z)
+    s774 = a_link_4_z - (omega_link_3_x * velocity_link_4_y + s510 * velocity_link_4_x)
+    s775 = q_1_dot * s251 - s255 * s510
+    s776 = q_1_dot * s247 + s255 * omega_link_3_x
+    s777 = s251 * omega_link_3_x + s247 * s510
+    s778 = s255 * velocity_link_4_y + s251 * velocity_link_4_z
+    s779 = s247 * velocity_link_4_z + s255 * velocity_link_4_x
+    s780 = s247 * velocity_link_4_y - s251 * velocity_link_4_x
+    s781 = velocity_link_4_z * s776 - velocity_link_4_y * s777 + (q_1_dot * s779 - s510 * s780)
+    s782 = velocity_link_4_z * s775 + velocity_link_4_x * s777 + (q_1_dot * s778 - omega_link_3_x * s780)
+    s783 = s510 * s778 - omega_link_3_x * s779 - (velocity_link_4_x * s776 + velocity_link_4_y * s775)
+    s784 = s255 * s533 + s251 * s531 + (s510 * s777 + q_1_dot * s776)
+    s785 = q_1_dot * s775 + omega_link_3_x * s777 - (s247 * s531 + s255 * s532)
+    s786 = s247 * s533 - s251 * s532 + (s510 * s775 - omega_link_3_x * s776)
+    s787 = s255 * s773 + s251 * s774 + s781
+    s788 = s782 - (s247 * s774 + s255 * s772)
+    s789 = s247 * s773 - s251 * s772 + s783
+    s790 = s775 + s775
+    s791 = s776 + s776
+    s792 = s777 + s777
+    s793 = s778 + s778
+    s794 = s779 + s779
+    s795 = s780 + s780
+    s796 = omega_link_4_z_2 * velocity_link_5_x - omega_link_4_x_2 * velocity_link_5_z
+    s797 = a_link_5_x + (s514 * velocity_link_5_z + omega_link_4_z_2 * velocity_link_5_y)
+    s798 = a_link_5_y - s796
+    s799 = a_link_5_z - (omega_link_4_x_2 * velocity_link_5_y + s514 * velocity_link_5_x)
+    s800 = s267 * s514 + s265 * omega_link_4_z_2
+    s801 = s259 * omega_link_4_z_2 - s267 * omega_link_4_x_2
+    s802 = s265 * omega_link_4_x_2 + s259 * s514
+    s803 = s267 * velocity_link_5_y - s265 * velocity_link_5_z
+    s804 = s259 * velocity_link_5_z - s267 * velocity_link_5_x
+    s805 = s265 * velocity_link_5_x - s259 * velocity_link_5_y
+    s806 = velocity_link_5_y * s802 - velocity_link_5_z * s801 - (s514 * s805 + omega_link_4_z_2 * s804)
+    s807 = omega_link_4_z_2 * s803 - omega_link_4_x_2 * s805 - (velocity_link_5_z * s800 + velocity_link_5_x * s802)
+    s808 = velocity_link_5_x * s801 + velocity_link_5_y * s800 + (omega_link_4_x_2 * s804 + s514 * s803)
+    s809 = s267 * s548 - s265 * s549 - (s514 * s802 + omega_link_4_z_2 * s801)
+    s810 = s259 * s549 - s267 * s547 - (omega_link_4_z_2 * s800 + omega_link_4_x_2 * s802)
+    s811 = s265 * s547 - s259 * s548 + (omega_link_4_x_2 * s801 - s514 * s800)
+    s812 = s267 * s798 - s265 * s799 + s806
+    s813 = s259 * s799 - s267 * s797 + s807
+    s814 = s265 * s797 - s259 * s798 + s808
+    s815 = s800 + s800
+    s816 = s801 + s801
+    s817 = s802 + s802
+    s818 = s803 + s803
+    s819 = s804 + s804
+    s820 = s805 + s805
+    s821 = velocity_link_5_z * omega_link_5_y_2 - velocity_link_5_y * omega_link_5_z_2
+    s822 = velocity_link_5_x * omega_link_5_z_2 - velocity_link_5_z * omega_link_5_x_2
+    s823 = velocity_link_5_y * omega_link_5_x_2 - velocity_link_5_x * omega_link_5_y_2
+    s824 = a_link_5_x - s821
+    s825 = a_link_5_y - s822
+    s826 = a_link_5_z - s823
+    s827 = s277 * omega_link_5_y_2 + s273 * omega_link_5_z_2
+    s828 = s271 * omega_link_5_z_2 - s277 * omega_link_5_x_2
+    s829 = s273 * omega_link_5_x_2 + s271 * omega_link_5_y_2
+    s830 = s277 * velocity_link_5_y + s273 * velocity_link_5_z
+    s831 = s271 * velocity_link_5_z - s277 * velocity_link_5_x
+    s832 = s273 * velocity_link_5_x + s271 * velocity_link_5_y
+    s833 = velocity_link_5_y * s829 + velocity_link_5_z * s828 + (omega_link_5_y_2 * s832 + omega_link_5_z_2 * s831)
+    s834 = velocity_link_5_z * s827 + velocity_link_5_x * s829 + (omega_link_5_z_2 * s830 + omega_link_5_x_2 * s832)
+    s835 = velocity_link_5_x * s828 - velocity_link_5_y * s827 + (omega_link_5_x_2 * s831 - omega_link_5_y_2 * s830)
+    s836 = s277 * s564 + s273 * s565 - (omega_link_5_y_2 * s829 + omega_link_5_z_2 * s828)
+    s837 = s271 * s565 - s277 * s563 + (omega_link_5_z_2 * s827 + omega_link_5_x_2 * s829)
+    s838 = omega_link_5_x_2 * s828 - omega_link_5_y_2 * s827 - (s273 * s563 + s271 * s564)
+    s839 = s277 * s825 + s273 * s826 - s833
+    s840 = s271 * s826 - s277 * s824 + s834
+    s841 = s835 - (s273 * s824 + s271 * s825)
+    s842 = s827 + s827
+    s843 = s828 + s828
+    s844 = s829 + s829
+    s845 = s830 + s830
+    s846 = s831 + s831
+    s847 = s832 + s832
+    s848 = sin_q_1 * 2.0
+    s849 = (s640 + s641 + (s726 + (s736 + s737))) * s848 - s242 * (omega_link_2_x_2 * s582 - q_1_dot * s637 + (s729 - s301 * s724))
+    s850 = (q_1_dot * s638 - s300 * s506 + (s727 - s302 * s723)) * s848 - s242 * (s730 + (s735 + s737) - (s640 + s642))
+    s851 = s422 * s748 + s423 * s749 + ((s286 + s414) * s745 - (s287 + s415) * s744)
+    s852 = 2.0 * s740
+    s853 = 2.0 * s741
+    s854 = s424 * s748 + s425 * s749 - (cos_q_1 * s420 * s744 + sin_q_1 * s420 * s745)
+    s855 = s726 * s848
+    s856 = s855 - s242 * s729
+    s857 = s242 * s730
+    s858 = s727 * s848 - s857
+    s859 = s728 * s848
+    s860 = s242 * s731
+    s861 = 2.0 * s753
+    s862 = s408 * s762 + s409 * s763 + s410 * s764 + (s406 * s767 - s407 * s766) + (s726 * s852 + s727 * s853 + s728 * s861)
+    s863 = s409 * s762 + s411 * s763 + s412 * s764 + (s407 * s765 - s405 * s767) + (s729 * s852 + s730 * s853 + s731 * s861)
+    s864 = s410 * s762 + s412 * s763 + s413 * s764 + (s405 * s766 - s406 * s765) + (s732 * s852 + s733 * s853 + s734 * s861)
+    s865 = k39 * s765 + (s407 * s763 - s406 * s764) + (s725 * s853 - s724 * s861) - cos_q_1 * s633
+    s866 = k39 * s766 + (s405 * s764 - s407 * s762) + (s723 * s861 - s725 * s852) - sin_q_1 * s633
+    s867 = sin_q_1 * s632 + cos_q_1 * s631 + (k39 * s767 + (s406 * s762 - s405 * s763) + (s724 * s852 - s723 * s853))
+    s868 = s408 * s750 + s409 * s751 + s410 * s768 + (s406 * s771 - s407 * s770) + (s855 - s242 * s727)
+    s869 = s409 * s750 + s411 * s751 + s412 * s768 + (s407 * s769 - s405 * s771) + (s729 * s848 - s857)
+    s870 = s410 * s750 + s412 * s751 + s413 * s768 + (s405 * s770 - s406 * s769) + (s732 * s848 - s242 * s733)
+    s871 = k39 * s769 + (s407 * s751 - s406 * s768) - s242 * s725
+    s872 = k39 * s770 + (s405 * s768 - s407 * s750) - s725 * s848
+    s873 = k39 * s771 + (s406 * s750 - s405 * s751) + (s724 * s848 + s242 * s723)
+    s874 = s429 * s762 + s430 * s763 + s431 * s764 + (s428 * s767 - (s426 * s765 + s427 * s766))
+    s875 = s740 * s856 + s741 * s858
+    s876 = s429 * s750 + s430 * s751 + s431 * s768 + (s428 * s771 - (s426 * s769 + s427 * s770))
+    s877 = sin_q_1 * s856 - cos_q_1 * s858
+    s878 = 2.0 * s247
+    s879 = 2.0 * s251
+    s880 = 2.0 * s255
+    s881 = s711 * s878
+    s882 = s717 * s880 - (s881 + s714 * s879)
+    s883 = s715 * s879
+    s884 = s718 * s880 - (s712 * s878 + s883)
+    s885 = s713 * s878 + s716 * s879
+    s886 = s719 * s880
+    s887 = s886 - s885
+    s888 = 2.0 * s775
+    s889 = 2.0 * s776
+    s890 = 2.0 * s777
+    s891 = s393 * s784 + s394 * s785 + s395 * s786 - (s391 * s789 + s392 * s788) + (s711 * s888 - s712 * s889 - s713 * s890)
+    s892 = s394 * s784 + s396 * s785 + s397 * s786 + (s392 * s787 - s390 * s789) + (s714 * s888 - s715 * s889 - s716 * s890)
+    s893 = s395 * s784 + s397 * s785 + s398 * s786 + (s390 * s788 + s391 * s787) + (s717 * s888 - s718 * s889 - s719 * s890)
+    s894 = k19 * s787 + (s392 * s785 + s391 * s786) + (s709 * s890 - s710 * s889) - (s251 * s627 + s255 * s626)
+    s895 = s255 * s625 + s247 * s627 + (k19 * s788 + (s390 * s786 - s392 * s784) - (s708 * s890 + s710 * s888))
+    s896 = s251 * s625 - s247 * s626 + (k19 * s789 - (s391 * s784 + s390 * s785) + (s709 * s888 + s708 * s889))
+    s897 = s393 * s790 - s394 * s791 - s395 * s792 + (s392 * s794 - s391 * s795) + (s713 * s880 - (s881 + s712 * s879))
+    s898 = s394 * s790 - s396 * s791 - s397 * s792 + (s392 * s793 - s390 * s795) + (s716 * s880 - (s883 + s714 * s878))
+    s899 = s395 * s790 - s397 * s791 - s398 * s792 + (s391 * s793 - s390 * s794) + (s886 - (s717 * s878 + s718 * s879))
+    s900 = k19 * s793 - (s392 * s791 + s391 * s792) - (s710 * s879 + s709 * s880)
+    s901 = s708 * s880 + s710 * s878 - (k19 * s794 + (s390 * s792 + s392 * s790))
+    s902 = k19 * s795 + (s390 * s791 - s391 * s790) + (s708 * s879 - s709 * s878)
+    s903 = s437 * s784 + s438 * s785 + s439 * s786 + (s434 * s787 + s435 * s788 + s436 * s789)
+    s904 = s437 * s790 - s438 * s791 - s439 * s792 + (s434 * s793 - s435 * s794 + s436 * s795)
+    s905 = s891 - (s251 * s624 + s255 * s623) + (s323 * s896 + s324 * s895)
+    s906 = s255 * s622 + s247 * s624 + s892 - (s324 * s894 + s322 * s896)
+    s907 = s897 + (s323 * s902 + s324 * s901)
+    s908 = s898 - (s324 * s900 + s322 * s902)
+    s909 = s440 * s762 + s441 * s763 + s442 * s764 + (s434 * s765 + s435 * s766 + s436 * s767)
+    s910 = s740 * s882 + s741 * s884
+    s911 = s440 * s750 + s441 * s751 + s442 * s768 + (s434 * s769 + s435 * s770 + s436 * s771)
+    s912 = sin_q_1 * s882 - cos_q_1 * s884
+    s913 = s251 * s622 - s247 * s623 + s893 + (s322 * s895 - s323 * s894) + (s301 * s895 - s302 * s894)
+    s914 = 2.0 * s259
+    s915 = 2.0 * s265
+    s916 = 2.0 * s267
+    s917 = s696 * s914
+    s918 = s917 + s699 * s915 - s702 * s916
+    s919 = s700 * s915
+    s920 = s697 * s914 + s919 + s703 * s916
+    s921 = s704 * s916
+    s922 = s698 * s914 + s701 * s915 + s921
+    s923 = 2.0 * s800
+    s924 = 2.0 * s801
+    s925 = 2.0 * s802
+    s926 = s378 * s809 + s379 * s810 + s380 * s811 - (s358 * s814 + s359 * s813) + (s697 * s924 - s696 * s923 + s698 * s925)
+    s927 = s379 * s809 + s381 * s810 + s382 * s811 + (s359 * s812 - s357 * s814) + (s700 * s924 - s699 * s923 + s701 * s925)
+    s928 = s380 * s809 + s382 * s810 + s383 * s811 + (s357 * s813 + s358 * s812) + (s702 * s923 + s703 * s924 + s704 * s925)
+    s929 = s265 * s621 - s267 * s620 + (k17 * s812 + (s359 * s810 + s358 * s811) + (s695 * s924 - s694 * s925))
+    s930 = s267 * s619 - s259 * s621 + (k17 * s813 + (s357 * s811 - s359 * s809) + (s693 * s925 + s695 * s923))
+    s931 = s259 * s620 - s265 * s619 + (k17 * s814 - (s358 * s809 + s357 * s810) - (s694 * s923 + s693 * s924))
+    s932 = s379 * s816 - s378 * s815 + s380 * s817 - (s358 * s820 + s359 * s819) + (s917 + s697 * s915 + s698 * s916)
+    s933 = s381 * s816 - s379 * s815 + s382 * s817 + (s359 * s818 - s357 * s820) + (s919 + s699 * s914 + s701 * s916)
+    s934 = s382 * s816 - s380 * s815 + s383 * s817 + (s357 * s819 + s358 * s818) + (s921 + (s703 * s915 - s702 * s914))
+    s935 = k17 * s818 + (s359 * s816 + s358 * s817) + (s695 * s915 - s694 * s916)
+    s936 = k17 * s819 + (s357 * s817 + s359 * s815) + (s693 * s916 - s695 * s914)
+    s937 = k17 * s820 + (s358 * s815 - s357 * s816) + (s694 * s914 - s693 * s915)
+    s938 = s448 * s809 + s449 * s810 + s450 * s811 + (s445 * s812 + s446 * s813 - s447 * s814)
+    s939 = s449 * s816 - s448 * s815 + s450 * s817 + (s445 * s818 + s446 * s819 - s447 * s820)
+    s940 = s265 * s618 - s267 * s617 + s926 - (s341 * s931 + s342 * s930)
+    s941 = s267 * s616 - s259 * s618 + s927 + (s342 * s929 + s340 * s931)
+    s942 = s259 * s617 - s265 * s616 + s928 + (s341 * s929 - s340 * s930)
+    s943 = s932 - (s341 * s937 + s342 * s936)
+    s944 = s933 + (s342 * s935 + s340 * s937)
+    s945 = s934 + (s341 * s935 - s340 * s936)
+    s946 = s451 * s784 + s452 * s785 + s453 * s786 + (s445 * s787 + s446 * s788 - s447 * s789)
+    s947 = s451 * s790 - s452 * s791 - s453 * s792 + (s445 * s793 - s446 * s794 - s447 * s795)
+    s948 = s940 + (s323 * s931 + s324 * s930)
+    s949 = s941 - (s324 * s929 + s322 * s931)
+    s950 = s943 + (s323 * s937 + s324 * s936)
+    s951 = s944 - (s324 * s935 + s322 * s937)
+    s952 = s454 * s762 + s455 * s763 + s456 * s764 + (s445 * s765 + s446 * s766 - s447 * s767)
+    s953 = s740 * s918 + s741 * s920
+    s954 = s454 * s750 + s455 * s751 + s456 * s768 + (s445 * s769 + s446 * s770 - s447 * s771)
+    s955 = sin_q_1 * s918 - cos_q_1 * s920
+    s956 = 2.0 * s271
+    s957 = 2.0 * s273
+    s958 = 2.0 * s277
+    s959 = s684 * s956
+    s960 = s959 - s687 * s957 - s690 * s958
+    s961 = s688 * s957
+    s962 = s685 * s956 - s961 + s691 * s958
+    s963 = s692 * s958
+    s964 = s686 * s956 - s689 * s957 + s963
+    s965 = 2.0 * s827
+    s966 = 2.0 * s828
+    s967 = 2.0 * s829
+    s968 = s366 * s836 + s371 * s837 + s374 * s838 - (s358 * s841 + s359 * s840) + (s684 * s965 + s685 * s966 - s686 * s967)
+    s969 = s371 * s836 + s367 * s837 + s377 * s838 + (s359 * s839 - s357 * s841) + (s687 * s965 + s688 * s966 - s689 * s967)
+    s970 = s374 * s836 + s377 * s837 + s368 * s838 + (s357 * s840 + s358 * s839) + (s691 * s966 - s690 * s965 - s692 * s967)
+    s971 = s968 - (s273 * s615 + s277 * s614)
+    s972 = s277 * s613 - s271 * s615 + s969
+    s973 = s271 * s614 + s273 * s613 + s970
+    s974 = m_6 * s839 + (s359 * s837 + s358 * s838) + (s673 * s966 + s672 * s967) - (s273 * s606 + s277 * s605)
+    s975 = s277 * s604 - s271 * s606 + (m_6 * s840 + (s357 * s838 - s359 * s836) - (s671 * s967 + s673 * s965))
+    s976 = s271 * s605 + s273 * s604 + (m_6 * s841 - (s358 * s836 + s357 * s837) + (s672 * s965 - s671 * s966))
+    s977 = s366 * s842 + s371 * s843 - s374 * s844 + (s358 * s847 - s359 * s846) + (s959 - s685 * s957 + s686 * s958)
+    s978 = s371 * s842 + s367 * s843 - s377 * s844 + (s359 * s845 + s357 * s847) + (s687 * s956 - s961 + s689 * s958)
+    s979 = s374 * s842 + s377 * s843 - s368 * s844 + (s357 * s846 + s358 * s845) + (s963 - (s690 * s956 + s691 * s957))
+    s980 = m_6 * s845 + (s359 * s843 - s358 * s844) - (s673 * s957 + s672 * s958)
+    s981 = m_6 * s846 - (s357 * s844 + s359 * s842) + (s671 * s958 - s673 * s956)
+    s982 = s672 * s956 + s671 * s957 - (m_6 * s847 + (s358 * s842 + s357 * s843))
+    s983 = s462 * s836 + s463 * s837 + s464 * s838 + (s459 * s839 + s460 * s840 + s461 * s841)
+    s984 = s983 + (s827 * s960 + s828 * s962 - s829 * s964)
+    s985 = s462 * s842 + s463 * s843 - s464 * s844 + (s459 * s845 + s460 * s846 - s461 * s847)
+    s986 = s985 + (s271 * s960 - s273 * s962 + s277 * s964)
+    s987 = s462 * s809 + s463 * s810 + s464 * s811 + (s459 * s812 + s460 * s813 + s461 * s814)
+    s988 = s987 + (s801 * s962 - s800 * s960 + s802 * s964)
+    s989 = s463 * s816 - s462 * s815 + s464 * s817 + (s459 * s818 + s460 * s819 + s461 * s820)
+    s990 = s989 + (s259 * s960 + s265 * s962 + s267 * s964)
+    s991 = s971 - (s341 * s976 + s342 * s975)
+    s992 = s972 + (s342 * s974 + s340 * s976)
+    s993 = s973 + (s341 * s974 - s340 * s975)
+    s994 = s977 - (s341 * s982 + s342 * s981)
+    s995 = s978 + (s342 * s980 + s340 * s982)
+    s996 = s979 + (s341 * s980 - s340 * s981)
+    s997 = s466 * s784 + s467 * s785 + s468 * s786 + (s459 * s787 + s460 * s788 + s461 * s789)
+    s998 = s997 + (s775 * s960 - s776 * s962 - s777 * s964)
+    s999 = s466 * s790 - s467 * s791 - s468 * s792 + (s459 * s793 - s460 * s794 + s461 * s795)
+    s1000 = s999 + (s255 * s964 - (s247 * s960 + s251 * s962))
+    s1001 = s991 + (s323 * s976 + s324 * s975)
+    s1002 = s992 - (s324 * s974 + s322 * s976)
+    s1003 = s994 + (s323 * s982 + s324 * s981)
+    s1004 = s995 - (s324 * s980 + s322 * s982)
+    s1005 = s470 * s762 + s471 * s763 + s472 * s764 + (s459 * s765 + s460 * s766 + s461 * s767)
+    s1006 = s740 * s960 + s741 * s962
+    s1007 = s1005 + (s1006 + s753 * s964)
+    s1008 = s470 * s750 + s471 * s751 + s472 * s768 + (s459 * s769 + s460 * s770 + s461 * s771)
+    s1009 = sin_q_1 * s960 - cos_q_1 * s962
+    s1010 = s1008 + s1009
+    s1011 = s1006 + (s474 * s748 + s475 * s749 + (s459 * s744 + s460 * s745))
+    s1012 = s1009 + (s474 * s750 + s475 * s751)
+    s1013 = s478 * s1011 - (s953 + (s457 * s748 + s458 * s749 + (s445 * s744 + s446 * s745)))
+    s1014 = s479 * s1011 - (s910 + (s443 * s748 + s444 * s749 + (s434 * s744 + s435 * s745)))
+    s1015 = s480 * s1011 - (s875 + (s432 * s748 + s433 * s749 - (s426 * s744 + s427 * s745)))
+    s1016 = s482 * s1011 - (sin_q_1 * s635 + cos_q_1 * s634 + (s851 + (s738 * s852 + s739 * s853)))
+    s1017 = s1014 - s487 * s1013
+    s1018 = s1015 - s488 * s1013 - s494 * s1017
+    s1019 = s481 * s1011 - (s854 + (s740 * s849 + s741 * s850)) - s489 * s1013 - s495 * s1017
+    s1020 = s1019 - s502 * s1018
+    s1021 = (s1016 - s490 * s1013 - s496 * s1017 - s503 * s1018 - s505 * s1020) / pivot_q_1_dot
+    s1022 = s1020 / pivot_q_2_dot - s505 * s1021
+    s1023 = s1018 / pivot_q_3_dot - s502 * s1022 - s503 * s1021
+    s1024 = s1017 / pivot_q_4_dot - s494 * s1023 - s495 * s1022 - s496 * s1021
+    s1025 = s1013 / pivot_q_5_dot - s487 * s1024 - s488 * s1023 - s489 * s1022 - s490 * s1021
+    s1026 = s1011 / pivot_q_6_dot + s478 * s1025 + s479 * s1024 + s480 * s1023 + s481 * s1022
+    s1027 = cos_q_1 * (s863 - sin_q_1 * s630 + (s303 * s865 - s301 * s867)) - sin_q_1 * (s862 - cos_q_1 * s630 + (s302 * s867 - s303 * s866))
+    s1028 = s478 * s1007 - (s952 + (s953 + s753 * s922))
+    s1029 = s482 * s1007 - (sin_q_1 * s629 + cos_q_1 * s628 + s864 + (s301 * s866 - s302 * s865))
+    s1030 = s479 * s1007 - (s909 + (s910 + s753 * s887)) - s487 * s1028
+    s1031 = s480 * s1007 - (s874 + (s875 + s753 * (s859 - s860))) - s488 * s1028 - s494 * s1030
+    s1032 = s1027 + s481 * s1007 - s489 * s1028 - s495 * s1030 - s502 * s1031
+    s1033 = (s1029 - s490 * s1028 - s496 * s1030 - s503 * s1031 - s505 * s1032) / pivot_q_1_dot
+    s1034 = s1032 / pivot_q_2_dot - s505 * s1033
+    s1035 = s1031 / pivot_q_3_dot - s502 * s1034 - s503 * s1033
+    s1036 = s1030 / pivot_q_4_dot - s494 * s1035 - s495 * s1034 - s496 * s1033
+    s1037 = s1028 / pivot_q_5_dot - s487 * s1036 - s488 * s1035 - s489 * s1034 - s490 * s1033
+    s1038 = s1007 / pivot_q_6_dot + s478 * s1037 + s479 * s1036 + s480 * s1035 + s481 * s1034
+    s1039 = cos_q_1 * (s906 + (s303 * s894 - s301 * s896)) - sin_q_1 * (s905 + (s302 * s896 - s303 * s895))
+    s1040 = s478 * s998 - (s946 + (s775 * s918 - s776 * s920 - s777 * s922))
+    s1041 = s479 * s998 - (s903 + (s775 * s882 - s776 * s884 - s777 * s887)) - s487 * s1040
+    s1042 = cos_q_1 * s906 - sin_q_1 * s905 + s480 * s998 - s488 * s1040 - s494 * s1041
+    s1043 = s1039 + s481 * s998 - s489 * s1040 - s495 * s1041 - s502 * s1042
+    s1044 = s482 * s998 - s913 - s490 * s1040 - s496 * s1041 - s503 * s1042 - s505 * s1043
+    s1045 = s1044 / pivot_q_1_dot
+    s1046 = s1043 / pivot_q_2_dot - s505 * s1045
+    s1047 = s1042 / pivot_q_3_dot - s502 * s1046 - s503 * s1045
+    s1048 = s1041 / pivot_q_4_dot - s494 * s1047 - s495 * s1046 - s496 * s1045
+    s1049 = s1040 / pivot_q_5_dot - s487 * s1048 - s488 * s1047 - s489 * s1046 - s490 * s1045
+    s1050 = s998 / pivot_q_6_dot + s478 * s1049 + s479 * s1048 + s480 * s1047 + s481 * s1046
+    s1051 = cos_q_1 * (s949 + (s303 * s929 - s301 * s931)) - sin_q_1 * (s948 + (s302 * s931 - s303 * s930))
+    s1052 = s478 * s988 - (s938 + (s801 * s920 - s800 * s918 + s802 * s922))
+    s1053 = s482 * s988 - (s942 + (s322 * s930 - s323 * s929) + (s301 * s930 - s302 * s929))
+    s1054 = s247 * s940 + s251 * s941 - s255 * s942 + s479 * s988 - s487 * s1052
+    s1055 = cos_q_1 * s949 - sin_q_1 * s948 + s480 * s988 - s488 * s1052 - s494 * s1054
+    s1056 = s1051 + s481 * s988 - s489 * s1052 - s495 * s1054 - s502 * s1055
+    s1057 = (s1053 - s490 * s1052 - s496 * s1054 - s503 * s1055 - s505 * s1056) / pivot_q_1_dot
+    s1058 = s1056 / pivot_q_2_dot - s505 * s1057
+    s1059 = s1055 / pivot_q_3_dot - s502 * s1058 - s503 * s1057
+    s1060 = s1054 / pivot_q_4_dot - s494 * s1059 - s495 * s1058 - s496 * s1057
+    s1061 = s1052 / pivot_q_5_dot - s487 * s1060 - s488 * s1059 - s489 * s1058 - s490 * s1057
+    s1062 = s988 / pivot_q_6_dot + s478 * s1061 + s479 * s1060 + s480 * s1059 + s481 * s1058
+    s1063 = cos_q_1 * (s1002 + (s303 * s974 - s301 * s976)) - sin_q_1 * (s1001 + (s302 * s976 - s303 * s975))
+    s1064 = s478 * s984 - (s259 * s971 + s265 * s972 + s267 * s973)
+    s1065 = s482 * s984 - (s993 + (s322 * s975 - s323 * s974) + (s301 * s975 - s302 * s974))
+    s1066 = s247 * s991 + s251 * s992 - s255 * s993 + s479 * s984 - s487 * s1064
+    s1067 = cos_q_1 * s1002 - sin_q_1 * s1001 + s480 * s984 - s488 * s1064 - s494 * s1066
+    s1068 = s1063 + s481 * s984 - s489 * s1064 - s495 * s1066 - s502 * s1067
+    s1069 = (s1065 - s490 * s1064 - s496 * s1066 - s503 * s1067 - s505 * s1068) / pivot_q_1_dot
+    s1070 = s1068 / pivot_q_2_dot - s505 * s1069
+    s1071 = s1067 / pivot_q_3_dot - s502 * s1070 - s503 * s1069
+    s1072 = s1066 / pivot_q_4_dot - s494 * s1071 - s495 * s1070 - s496 * s1069
+    s1073 = s1064 / pivot_q_5_dot - s487 * s1072 - s488 * s1071 - s489 * s1070 - s490 * s1069
+    s1074 = s984 / pivot_q_6_dot + s478 * s1073 + s479 * s1072 + s480 * s1071 + s481 * s1070
+    s1075 = s242 * (omega_link_2_x_2 * s639 - q_1_dot * s582 + (s731 - s303 * s724)) - (s506 * s639 - q_1_dot * s300 + (s728 - s303 * s723)) * s848
+    s1076 = s478 * s964 - s922
+    s1077 = s885 - s886 + s479 * s964 - s487 * s1076
+    s1078 = s482 * s964 - 2.0 * (s642 - s641 + (s734 + (s735 + s736))) - s490 * s1076
+    s1079 = s860 - s859 + s480 * s964 - s488 * s1076 - s494 * s1077
+    s1080 = s1075 + s481 * s964 - s489 * s1076 - s495 * s1077 - s502 * s1079
+    s1081 = (s1078 - s496 * s1077 - s503 * s1079 - s505 * s1080) / pivot_q_1_dot
+    s1082 = s1080 / pivot_q_2_dot - s505 * s1081
+    s1083 = s1079 / pivot_q_3_dot - s502 * s1082 - s503 * s1081
+    s1084 = s1077 / pivot_q_4_dot - s494 * s1083 - s495 * s1082 - s496 * s1081
+    s1085 = s1076 / pivot_q_5_dot - s487 * s1084 - s488 * s1083 - s489 * s1082 - s490 * s1081
+    s1086 = s964 / pivot_q_6_dot + s478 * s1085 + s479 * s1084 + s480 * s1083 + s481 * s1082
+    s1087 = s478 * s1012 - (s955 + (s457 * s750 + s458 * s751))
+    s1088 = s481 * s1012 - (s424 * s750 + s425 * s751 + (sin_q_1 * s849 - cos_q_1 * s850))
+    s1089 = s479 * s1012 - (s912 + (s443 * s750 + s444 * s751)) - s487 * s1087
+    s1090 = s482 * s1012 - (s422 * s750 + s423 * s751 + (s738 * s848 - s242 * s739)) - s490 * s1087
+    s1091 = s480 * s1012 - (s877 + (s432 * s750 + s433 * s751)) - s488 * s1087 - s494 * s1089
+    s1092 = s1088 - s489 * s1087 - s495 * s1089 - s502 * s1091
+    s1093 = (s1090 - s496 * s1089 - s503 * s1091 - s505 * s1092) / pivot_q_1_dot
+    s1094 = s1092 / pivot_q_2_dot - s505 * s1093
+    s1095 = s1091 / pivot_q_3_dot - s502 * s1094 - s503 * s1093
+    s1096 = s1089 / pivot_q_4_dot - s494 * s1095 - s495 * s1094 - s496 * s1093
+    s1097 = s1087 / pivot_q_5_dot - s487 * s1096 - s488 * s1095 - s489 * s1094 - s490 * s1093
+    s1098 = s1012 / pivot_q_6_dot + s478 * s1097 + s479 * s1096 + s480 * s1095 + s481 * s1094
+    s1099 = cos_q_1 * (s869 + (s303 * s871 - s301 * s873)) - sin_q_1 * (s868 + (s302 * s873 - s303 * s872))
+    s1100 = s478 * s1010 - (s954 + s955)
+    s1101 = s479 * s1010 - (s911 + s912) - s487 * s1100
+    s1102 = s480 * s1010 - (s876 + s877) - s488 * s1100 - s494 * s1101
+    s1103 = s482 * s1010 - (s870 + (s301 * s872 - s302 * s871)) - s490 * s1100 - s496 * s1101
+    s1104 = s1099 + s481 * s1010 - s489 * s1100 - s495 * s1101 - s502 * s1102
+    s1105 = (s1103 - s503 * s1102 - s505 * s1104) / pivot_q_1_dot
+    s1106 = s1104 / pivot_q_2_dot - s505 * s1105
+    s1107 = s1102 / pivot_q_3_dot - s502 * s1106 - s503 * s1105
+    s1108 = s1101 / pivot_q_4_dot - s494 * s1107 - s495 * s1106 - s496 * s1105
+    s1109 = s1100 / pivot_q_5_dot - s487 * s1108 - s488 * s1107 - s489 * s1106 - s490 * s1105
+    s1110 = s1010 / pivot_q_6_dot + s478 * s1109 + s479 * s1108 + s480 * s1107 + s481 * s1106
+    s1111 = cos_q_1 * (s908 + (s303 * s900 - s301 * s902)) - sin_q_1 * (s907 + (s302 * s902 - s303 * s901))
+    s1112 = s478 * s1000 - (s947 + (s255 * s922 - (s247 * s918 + s251 * s920)))
+    s1113 = s482 * s1000 - (s899 + (s322 * s901 - s323 * s900) + (s301 * s901 - s302 * s900))
+    s1114 = s479 * s1000 - (s904 + (s255 * s887 - (s247 * s882 + s251 * s884))) - s487 * s1112
+    s1115 = cos_q_1 * s908 - sin_q_1 * s907 + s480 * s1000 - s488 * s1112 - s494 * s1114
+    s1116 = s1111 + s481 * s1000 - s489 * s1112 - s495 * s1114 - s502 * s1115
+    s1117 = (s1113 - s490 * s1112 - s496 * s1114 - s503 * s1115 - s505 * s1116) / pivot_q_1_dot
+    s1118 = s1116 / pivot_q_2_dot - s505 * s1117
+    s1119 = s1115 / pivot_q_3_dot - s502 * s1118 - s503 * s1117
+    s1120 = s1114 / pivot_q_4_dot - s494 * s1119 - s495 * s1118 - s496 * s1117
+    s1121 = s1112 / pivot_q_5_dot - s487 * s1120 - s488 * s1119 - s489 * s1118 - s490 * s1117
+    s1122 = s1000 / pivot_q_6_dot + s478 * s1121 + s479 * s1120 + s480 * s1119 + s481 * s1118
+    s1123 = cos_q_1 * (s951 + (s303 * s935 - s301 * s937)) - sin_q_1 * (s950 + (s302 * s937 - s303 * s936))
+    s1124 = s478 * s990 - (s939 + (s259 * s918 + s265 * s920 + s267 * s922))
+    s1125 = s482 * s990 - (s945 + (s322 * s936 - s323 * s935) + (s301 * s936 - s302 * s935))
+    s1126 = s247 * s943 + s251 * s944 - s255 * s945 + s479 * s990 - s487 * s1124
+    s1127 = cos_q_1 * s951 - sin_q_1 * s950 + s480 * s990 - s488 * s1124 - s494 * s1126
+    s1128 = s1123 + s481 * s990 - s489 * s1124 - s495 * s1126 - s502 * s1127
+    s1129 = (s1125 - s490 * s1124 - s496 * s1126 - s503 * s1127 - s505 * s1128) / pivot_q_1_dot
+    s1130 = s1128 / pivot_q_2_dot - s505 * s1129
+    s1131 = s1127 / pivot_q_3_dot - s502 * s1130 - s503 * s1129
+    s1132 = s1126 / pivot_q_4_dot - s494 * s1131 - s495 * s1130 - s496 * s1129
+    s1133 = s1124 / pivot_q_5_dot - s487 * s1132 - s488 * s1131 - s489 * s1130 - s490 * s1129
+    s1134 = s990 / pivot_q_6_dot + s478 * s1133 + s479 * s1132 + s480 * s1131 + s481 * s1130
+    s1135 = cos_q_1 * (s1004 + (s303 * s980 - s301 * s982)) - sin_q_1 * (s1003 + (s302 * s982 - s303 * s981))
+    s1136 = s478 * s986 - (s259 * s977 + s265 * s978 + s267 * s979)
+    s1137 = s482 * s986 - (s996 + (s322 * s981 - s323 * s980) + (s301 * s981 - s302 * s980))
+    s1138 = s247 * s994 + s251 * s995 - s255 * s996 + s479 * s986 - s487 * s1136
+    s1139 = cos_q_1 * s1004 - sin_q_1 * s1003 + s480 * s986 - s488 * s1136 - s494 * s1138
+    s1140 = s1135 + s481 * s986 - s489 * s1136 - s495 * s1138 - s502 * s1139
+    s1141 = (s1137 - s490 * s1136 - s496 * s1138 - s503 * s1139 - s505 * s1140) / pivot_q_1_dot
+    s1142 = s1140 / pivot_q_2_dot - s505 * s1141
+    s1143 = s1139 / pivot_q_3_dot - s502 * s1142 - s503 * s1141
+    s1144 = s1138 / pivot_q_4_dot - s494 * s1143 - s495 * s1142 - s496 * s1141
+    s1145 = s1136 / pivot_q_5_dot - s487 * s1144 - s488 * s1143 - s489 * s1142 - s490 * s1141
+    s1146 = s986 / pivot_q_6_dot + s478 * s1145 + s479 * s1144 + s480 * s1143 + s481 * s1142
     return (
         0.0,
         0.0,
@@ -2178,83 +2053,83 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         1.0,
         0.0,
-        s1039,
-        s1051,
-        s1063,
-        s1075,
-        s1087,
-        s1099,
-        s1111,
-        s1123,
-        s1135,
-        s1147,
-        s1159,
+        s1021,
+        s1033,
+        s1045,
+        s1057,
+        s1069,
+        s1081,
+        s1093,
+        s1105,
+        s1117,
+        s1129,
+        s1141,
         0.0,
-        s1040,
-        s1052,
-        s1064,
-        s1076,
-        s1088,
-        s1100,
-        s1112,
-        s1124,
-        s1136,
-        s1148,
-        s1160,
+        s1022,
+        s1034,
+        s1046,
+        s1058,
+        s1070,
+        s1082,
+        s1094,
+        s1106,
+        s1118,
+        s1130,
+        s1142,
         0.0,
-        s1041,
-        s1053,
-        s1065,
-        s1077,
-        s1089,
-        s1101,
-        s1113,
-        s1125,
-        s1137,
-        s1149,
-        s1161,
+        s1023,
+        s1035,
+        s1047,
+        s1059,
+        s1071,
+        s1083,
+        s1095,
+        s1107,
+        s1119,
+        s1131,
+        s1143,
         0.0,
-        s1042,
-        s1054,
-        s1066,
-        s1078,
-        s1090,
-        s1102,
-        s1114,
-        s1126,
-        s1138,
-        s1150,
-        s1162,
+        s1024,
+        s1036,
+        s1048,
+        s1060,
+        s1072,
+        s1084,
+        s1096,
+        s1108,
+        s1120,
+        s1132,
+        s1144,
         0.0,
-        s1043,
-        s1055,
-        s1067,
-        s1079,
-        s1091,
-        s1103,
-        s1115,
-        s1127,
-        s1139,
-        s1151,
-        s1163,
+        s1025,
+        s1037,
+        s1049,
+        s1061,
+        s1073,
+        s1085,
+        s1097,
+        s1109,
+        s1121,
+        s1133,
+        s1145,
         0.0,
-        -(s1044 + s492 * s1039),
-        -(s1056 + s492 * s1051),
-        -(s1068 + s492 * s1063),
-        -(s1080 + s492 * s1075),
-        -(s1092 + s492 * s1087),
-        -(s1104 + s492 * s1099),
-        -(s1116 + s492 * s1111),
-        -(s1128 + s492 * s1123),
-        -(s1140 + s492 * s1135),
-        -(s1152 + s492 * s1147),
-        -(s1164 + s492 * s1159),
+        -(s1026 + s482 * s1021),
+        -(s1038 + s482 * s1033),
+        -(s1050 + s482 * s1045),
+        -(s1062 + s482 * s1057),
+        -(s1074 + s482 * s1069),
+        -(s1086 + s482 * s1081),
+        -(s1098 + s482 * s1093),
+        -(s1110 + s482 * s1105),
+        -(s1122 + s482 * s1117),
+        -(s1134 + s482 * s1129),
+        -(s1146 + s482 * s1141),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """926 operations: 225 add, 216 sub, 452 mul, 23 div, 5 sin, 5 cos."""
-    m_3, m_4, I_4y, m_5, I_5x, m_6, gravity_g, k1, k2, k3, k4, k5, k6, k7, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35 = k
+    """910 operations: 223 add, 203 sub, 451 mul, 23 div, 5 sin, 5 cos."""
+    m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k1, k2, k3, k4, k5, k6, k7, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, pivot_link_6, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36 = k
     _, q_2, q_3, q_4, q_5, q_6, q_1_dot, q_2_dot, q_3_dot, q_4_dot, q_5_dot, q_6_dot = y
     tau_1, tau_2, tau_3, tau_4, tau_5, tau_6 = u
     tau__q_1_dot, tau__q_2_dot, tau__q_3_dot, tau__q_4_dot, tau__q_5_dot, tau__q_6_dot = extra
@@ -2273,311 +2148,301 @@ def _forward_dynamics(y, k, u=(), extra=(), cos=cos, sin=sin):
     s3 = sin_q_6 * k14
     s4 = sin_q_6 * s3
     s5 = cos_q_6 * s3
-    s6 = 2.0 * s5 - s5
-    s7 = s4 + k15
-    pivot_link_5 = k7 + s7
+    s6 = s4 + k15
+    pivot_link_5 = k7 + s6
+    s7 = s5 / pivot_link_5
     s8 = s6 / pivot_link_5
-    s9 = s7 / pivot_link_5
-    s10 = moment_link_6_z / pivot_link_5
-    s11 = I_5x + (inertia_link_6_xx - s4) - s6 * s8
-    s12 = s6 - s7 * s8
-    s13 = k17 - moment_link_6_z * s10
-    s14 = moment_link_6_z * s8
-    s15 = moment_link_6_z - moment_link_6_z * s9
-    s16 = sin_q_5 * (k16 - s11)
-    s17 = sin_q_5 * s16
-    s18 = sin_q_5 * s14
-    s19 = sin_q_5 * s18
-    s20 = cos_q_5 * s18
-    s21 = cos_q_5 * s15
-    s22 = moment_link_6_z * sin_q_5
-    s23 = moment_link_6_z * cos_q_5
-    s24 = s19 - s14
-    s25 = sin_q_5 * (k17 - s13)
-    s26 = sin_q_5 * s25
-    s27 = s13 + s26
-    s28 = cos_q_5 * s25
-    s29 = s23 + k18
-    s30 = s21 + k6 * s27
-    s31 = k6 * s22 - cos_q_5 * s16
-    s32 = k6 * s20 - sin_q_5 * s12
-    s33 = I_4y + (k16 - s17)
-    pivot_link_4 = k5 + s33
-    s34 = s31 / pivot_link_4
-    s35 = s33 / pivot_link_4
-    s36 = s32 / pivot_link_4
-    s37 = s20 / pivot_link_4
-    s38 = s19 / pivot_link_4
-    s39 = s22 / pivot_link_4
-    s40 = inertia_link_4_xx + (s11 + s17 + k6 * (s23 + s29)) - s31 * s34
-    s41 = inertia_link_4_zz + (s7 - s7 * s9 + k6 * (s21 + s30)) - s32 * s36
-    s42 = s31 - s33 * s34
-    s43 = cos_q_5 * s12 + k6 * s24 + s32 * s34
-    s44 = s32 - s32 * s35
-    s45 = m_4 + s27 - s20 * s37
-    s46 = m_4 + (k17 - s26) - s19 * s38
-    s47 = k19 - s22 * s39
-    s48 = s28 + s19 * s37
-    s49 = s22 * s37
-    s50 = s22 * s38
-    s51 = s24 + s20 * s34
-    s52 = s19 * s34 - s20
-    s53 = moment_link_4_y + s29 - s22 * s34
-    s54 = s20 * s35 - s20
-    s55 = s22 - s22 * s35
-    s56 = s20 * s36 - (moment_link_4_y + s30)
-    s57 = k6 * s28 - sin_q_5 * s15 + s19 * s36
-    s58 = s22 * s36
-    s59 = sin_q_4 * (s41 - s40) - s2 * s43
-    s60 = sin_q_4 * s59
-    s61 = cos_q_4 * (s53 + s56) - sin_q_4 * (s51 + s58)
-    s62 = sin_q_4 * s61
-    s63 = cos_q_4 * s61
-    s64 = cos_q_4 * s55 - sin_q_4 * s54
-    s65 = sin_q_4 * s55 + cos_q_4 * s54
-    s66 = cos_q_4 * s57 - sin_q_4 * s52
-    s67 = sin_q_4 * s57 + cos_q_4 * s52
-    s68 = s58 + s62
-    s69 = s51 + s62
-    s70 = s56 - s63
-    s71 = s53 - s63
-    s72 = sin_q_4 * (s47 - s45) + s2 * s49
-    s73 = sin_q_4 * s72
-    s74 = cos_q_4 * s50 + sin_q_4 * s48
-    s75 = s47 - s73
-    s76 = s45 + s73
-    s77 = cos_q_4 * s48 - sin_q_4 * s50
-    s78 = s49 - cos_q_4 * s72
-    s79 = k4 * s77
-    s80 = k3 * s74
-    s81 = k4 * s46 - s67
-    s82 = s68 + s80
-    s83 = s66 - k3 * s46
-    s84 = k3 * s78 - k4 * s76 - s65
-    s85 = s64 + (k3 * s75 - k4 * s78)
-    s86 = s19 * s35 - s19 + (s80 - s79)
-    s87 = inertia_link_3_xy + (k3 * s67 + k4 * s83 - (s43 + cos_q_4 * s59))
-    s88 = inertia_link_3_xz + (k3 * s70 - k4 * s69 + k4 * s86 - (sin_q_4 * s44 + cos_q_4 * s42))
-    s89 = inertia_link_3_yy + (s41 - s60 - k3 * (s66 + s83))
-    s90 = cos_q_4 * s44 - sin_q_4 * s42 - (k3 * s68 + k4 * s71 + k3 * s86) - k12
-    s91 = inertia_link_3_zz + (s33 - s33 * s35 + (k3 * s64 + k4 * s65 + (k3 * s85 - k4 * s84)))
-    s92 = moment_link_3_z + (s71 - k3 * s77)
-    s93 = k11 + s83
-    pivot_link_3 = k2 + s89
-    s94 = s87 / pivot_link_3
+    s9 = moment_link_6_z / pivot_link_5
+    s10 = I_5x + (inertia_link_6_xx - s4) - s5 * s7
+    s11 = s5 - s6 * s7
+    s12 = k17 - moment_link_6_z * s9
+    s13 = moment_link_6_z * s7
+    s14 = moment_link_6_z - moment_link_6_z * s8
+    s15 = sin_q_5 * (k16 - s10)
+    s16 = sin_q_5 * s15
+    s17 = sin_q_5 * s13
+    s18 = sin_q_5 * s17
+    s19 = cos_q_5 * s17
+    s20 = cos_q_5 * s14
+    s21 = moment_link_6_z * sin_q_5
+    s22 = moment_link_6_z * cos_q_5
+    s23 = s18 - s13
+    s24 = sin_q_5 * (k17 - s12)
+    s25 = sin_q_5 * s24
+    s26 = s12 + s25
+    s27 = cos_q_5 * s24
+    s28 = s22 + k18
+    s29 = s20 + k6 * s26
+    s30 = k6 * s21 - cos_q_5 * s15
+    s31 = k6 * s19 - sin_q_5 * s11
+    s32 = I_4y + (k16 - s16)
+    pivot_link_4 = k5 + s32
+    s33 = s30 / pivot_link_4
+    s34 = s32 / pivot_link_4
+    s35 = s31 / pivot_link_4
+    s36 = s19 / pivot_link_4
+    s37 = s18 / pivot_link_4
+    s38 = s21 / pivot_link_4
+    s39 = inertia_link_4_xx + (s10 + s16 + k6 * (s22 + s28)) - s30 * s33
+    s40 = inertia_link_4_zz + (s6 - s6 * s8 + k6 * (s20 + s29)) - s31 * s35
+    s41 = s30 - s32 * s33
+    s42 = cos_q_5 * s11 + k6 * s23 + s31 * s33
+    s43 = s31 - s31 * s34
+    s44 = m_4 + s26 - s19 * s36
+    s45 = m_4 + (k17 - s25) - s18 * s37
+    s46 = k19 - s21 * s38
+    s47 = s27 + s18 * s36
+    s48 = s21 * s36
+    s49 = s21 * s37
+    s50 = s23 + s19 * s33
+    s51 = s18 * s33 - s19
+    s52 = moment_link_4_y + s28 - s21 * s33
+    s53 = s19 * s34 - s19
+    s54 = s21 - s21 * s34
+    s55 = s19 * s35 - (moment_link_4_y + s29)
+    s56 = k6 * s27 - sin_q_5 * s14 + s18 * s35
+    s57 = s21 * s35
+    s58 = sin_q_4 * (s40 - s39) - s2 * s42
+    s59 = sin_q_4 * s58
+    s60 = cos_q_4 * (s52 + s55) - sin_q_4 * (s50 + s57)
+    s61 = sin_q_4 * s60
+    s62 = cos_q_4 * s60
+    s63 = cos_q_4 * s54 - sin_q_4 * s53
+    s64 = sin_q_4 * s54 + cos_q_4 * s53
+    s65 = cos_q_4 * s56 - sin_q_4 * s51
+    s66 = sin_q_4 * s56 + cos_q_4 * s51
+    s67 = s57 + s61
+    s68 = s50 + s61
+    s69 = s55 - s62
+    s70 = s52 - s62
+    s71 = sin_q_4 * (s46 - s44) + s2 * s48
+    s72 = sin_q_4 * s71
+    s73 = cos_q_4 * s49 + sin_q_4 * s47
+    s74 = s46 - s72
+    s75 = s44 + s72
+    s76 = s48 - cos_q_4 * s71
+    s77 = cos_q_4 * s47 - sin_q_4 * s49
+    s78 = k4 * s77
+    s79 = k3 * s73
+    s80 = k4 * s45 - s66
+    s81 = s67 + s79
+    s82 = s65 - k3 * s45
+    s83 = k3 * s76 - k4 * s75 - s64
+    s84 = s63 + (k3 * s74 - k4 * s76)
+    s85 = s18 * s34 - s18 + (s79 - s78)
+    s86 = inertia_link_3_xy + (k3 * s66 + k4 * s82 - (s42 + cos_q_4 * s58))
+    s87 = inertia_link_3_xz + (k3 * s69 - k4 * s68 + k4 * s85 - (sin_q_4 * s43 + cos_q_4 * s41))
+    s88 = inertia_link_3_yy + (s40 - s59 - k3 * (s65 + s82))
+    s89 = cos_q_4 * s43 - sin_q_4 * s41 - (k3 * s67 + k4 * s70 + k3 * s85) - k12
+    s90 = inertia_link_3_zz + (s32 - s32 * s34 + (k3 * s63 + k4 * s64 + (k3 * s84 - k4 * s83)))
+    s91 = moment_link_3_z + (s70 - k3 * s77)
+    s92 = k11 + s82
+    pivot_link_3 = k2 + s88
+    s93 = s86 / pivot_link_3
+    s94 = s88 / pivot_link_3
     s95 = s89 / pivot_link_3
-    s96 = s90 / pivot_link_3
-    s97 = s92 / pivot_link_3
-    s98 = s82 / pivot_link_3
-    s99 = s93 / pivot_link_3
-    s100 = inertia_link_3_xx + (s40 + s60 + k4 * (s81 - s67)) - s87 * s94
-    s101 = s91 - s90 * s96
-    s102 = s87 - s89 * s94
-    s103 = s88 - s90 * s94
-    s104 = s90 - s90 * s95
-    s105 = m_3 + s46 - s93 * s99
-    s106 = s70 + k4 * s74 - moment_link_3_z + s82 * s94
-    s107 = s84 - moment_link_3_y - s92 * s96
-    s108 = s85 - k11 + s82 * s96
-    s109 = s86 - s93 * s96
-    s110 = sin_q_3 * (s101 - s100) + s1 * s103
-    s111 = sin_q_3 * s110
-    s112 = sin_q_3 * (s109 - (s69 + s79 - s92 * s94)) + cos_q_3 * (moment_link_3_y + s81 - s93 * s94 + s107)
-    s113 = cos_q_3 * (s93 - s93 * s95) - sin_q_3 * (s92 - s92 * s95)
-    s114 = cos_q_3 * s108 - sin_q_3 * s106
-    s115 = sin_q_3 * (sin_q_3 * (s105 - (m_3 + s76 - s92 * s97)) + s1 * (s77 - s93 * s97))
-    s116 = s82 * s95 - s82 + k1 * (cos_q_3 * (s74 + s93 * s98) - sin_q_3 * (s78 + s82 * s97))
-    s117 = k1 * (s107 - cos_q_3 * s112) - (sin_q_3 * s104 + cos_q_3 * s102) - k9
-    s118 = inertia_link_2_yy + (s101 - s111 - k1 * (s114 + (s114 - k1 * (m_3 + s75 - s82 * s98))))
-    s119 = cos_q_3 * s104 - sin_q_3 * s102 + k1 * (s109 - sin_q_3 * s112 - s116) - k10
-    pivot_link_2 = k20 + (k1 * (s113 + k1 * (s105 - s115)) + (s89 - s89 * s95 + k1 * s113))
-    s120 = s117 / pivot_link_2
-    s121 = s119 / pivot_link_2
-    s122 = s118 - s119 * s121
-    s123 = s103 - cos_q_3 * s110 + k1 * (sin_q_3 * s108 + cos_q_3 * s106) - k8 - s119 * s120
-    s124 = sin_q_2 * (inertia_link_2_xx + (s100 + s111) - s117 * s120 - s122) + 2.0 * cos_q_2 * s123
+    s96 = s91 / pivot_link_3
+    s97 = s81 / pivot_link_3
+    s98 = s92 / pivot_link_3
+    s99 = inertia_link_3_xx + (s39 + s59 + k4 * (s80 - s66)) - s86 * s93
+    s100 = s90 - s89 * s95
+    s101 = s86 - s88 * s93
+    s102 = s87 - s89 * s93
+    s103 = s89 - s89 * s94
+    s104 = m_3 + s45 - s92 * s98
+    s105 = s69 + k4 * s73 - moment_link_3_z + s81 * s93
+    s106 = s83 - moment_link_3_y - s91 * s95
+    s107 = s84 - k11 + s81 * s95
+    s108 = s85 - s92 * s95
+    s109 = sin_q_3 * (s100 - s99) + s1 * s102
+    s110 = sin_q_3 * s109
+    s111 = sin_q_3 * (s108 - (s68 + s78 - s91 * s93)) + cos_q_3 * (moment_link_3_y + s80 - s92 * s93 + s106)
+    s112 = cos_q_3 * (s92 - s92 * s94) - sin_q_3 * (s91 - s91 * s94)
+    s113 = cos_q_3 * s107 - sin_q_3 * s105
+    s114 = sin_q_3 * (sin_q_3 * (s104 - (m_3 + s75 - s91 * s96)) + s1 * (s77 - s92 * s96))
+    s115 = s81 * s94 - s81 + k1 * (cos_q_3 * (s73 + s92 * s97) - sin_q_3 * (s76 + s81 * s96))
+    s116 = k1 * (s106 - cos_q_3 * s111) - (sin_q_3 * s103 + cos_q_3 * s101) - k9
+    s117 = inertia_link_2_yy + (s100 - s110 - k1 * (s113 + (s113 - k1 * (m_3 + s74 - s81 * s97))))
+    s118 = cos_q_3 * s103 - sin_q_3 * s101 + k1 * (s108 - sin_q_3 * s111 - s115) - k10
+    pivot_link_2 = k20 + (k1 * (s112 + k1 * (s104 - s114)) + (s88 - s88 * s94 + k1 * s112))
+    s119 = s116 / pivot_link_2
+    s120 = s118 / pivot_link_2
+    s121 = s117 - s118 * s120
+    s122 = s102 - cos_q_3 * s109 + k1 * (sin_q_3 * s107 + cos_q_3 * s105) - k8 - s118 * s119
+    s123 = sin_q_2 * (inertia_link_2_xx + (s99 + s110) - s116 * s119 - s121) + 2.0 * cos_q_2 * s122
     omega_link_2_x = q_1_dot * sin_q_2
     omega_link_2_y = q_1_dot * cos_q_2
     omega_link_3_z = cos_q_3 * omega_link_2_y - sin_q_3 * omega_link_2_x
-    s125 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
+    s124 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
     omega_link_3_y = q_2_dot + q_3_dot
-    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s125
-    s126 = cos_q_4 * s125
-    s127 = sin_q_4 * omega_link_3_y
-    omega_link_4_x = s126 - s127
+    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s124
+    s125 = cos_q_4 * s124
+    s126 = sin_q_4 * omega_link_3_y
+    omega_link_4_x = s125 - s126
     omega_link_4_y = q_4_dot + omega_link_3_z
-    s128 = s127 - s126
-    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s128
-    s129 = cos_q_5 * s128
-    s130 = sin_q_5 * omega_link_4_y
-    omega_link_5_x = s129 - s130
+    s127 = s126 - s125
+    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s127
+    s128 = cos_q_5 * s127
+    s129 = sin_q_5 * omega_link_4_y
+    omega_link_5_x = s128 - s129
     omega_link_5_y = q_5_dot + omega_link_4_z
-    s131 = s130 - s129
-    omega_link_6_x = cos_q_6 * s131 - sin_q_6 * omega_link_5_y
-    s132 = cos_q_6 * omega_link_5_y + sin_q_6 * s131
+    s130 = s129 - s128
+    omega_link_6_x = cos_q_6 * s130 - sin_q_6 * omega_link_5_y
+    s131 = cos_q_6 * omega_link_5_y + sin_q_6 * s130
     omega_link_6_z = q_6_dot + omega_link_5_z
     bias_link_2_x = gravity_g * sin_q_2
     bias_link_2_y = gravity_g * cos_q_2
-    s133 = q_2_dot * omega_link_2_y
-    s134 = q_2_dot * omega_link_2_x
+    s132 = q_2_dot * omega_link_2_y
+    s133 = q_2_dot * omega_link_2_x
     omega_link_2_x_squared = omega_link_2_x * omega_link_2_x
     omega_link_2_y_squared = omega_link_2_y * omega_link_2_y
     q_2_dot_squared = q_2_dot * q_2_dot
-    s135 = omega_link_2_x * omega_link_2_y
-    s136 = s134 + s134
-    s137 = s133 + s133
-    s138 = sin_q_3 * s134 - cos_q_3 * s133
-    bias_link_3_y = k1 * s136
-    s139 = bias_link_2_y + k1 * s135
-    s140 = k1 * (omega_link_2_y_squared + q_2_dot_squared) - bias_link_2_x
-    bias_link_3_z = cos_q_3 * s139 + sin_q_3 * s140
-    bias_link_3_x = cos_q_3 * s140 - sin_q_3 * s139
-    s141 = q_3_dot * omega_link_3_z
-    s142 = s138 - s141
-    s143 = cos_q_3 * s134 + sin_q_3 * s133 + q_3_dot * s125
-    s144 = s125 * s125
+    s134 = omega_link_2_x * omega_link_2_y
+    s135 = s133 + s133
+    s136 = sin_q_3 * s133 - cos_q_3 * s132
+    bias_link_3_y = k1 * s135
+    s137 = bias_link_2_y + k1 * s134
+    s138 = k1 * (omega_link_2_y_squared + q_2_dot_squared) - bias_link_2_x
+    bias_link_3_z = cos_q_3 * s137 + sin_q_3 * s138
+    bias_link_3_x = cos_q_3 * s138 - sin_q_3 * s137
+    s139 = q_3_dot * omega_link_3_z
+    s140 = s136 - s139
+    s141 = cos_q_3 * s133 + sin_q_3 * s132 + q_3_dot * s124
+    s142 = s124 * s124
     omega_link_3_y_squared = omega_link_3_y * omega_link_3_y
     omega_link_3_z_squared = omega_link_3_z * omega_link_3_z
-    s145 = s125 * omega_link_3_y
-    s146 = omega_link_3_z * s125
-    s147 = omega_link_3_z * omega_link_3_y
-    s148 = omega_link_3_y_squared + omega_link_3_z_squared
-    s149 = s143 - s145
-    s150 = s143 + s145
-    s151 = s144 + omega_link_3_z_squared
-    s152 = s147 - s142
-    s153 = s142 + s147
-    s154 = s141 - s138
-    s155 = cos_q_4 * s154
-    s156 = bias_link_3_x + (k4 * s149 - k3 * s148)
-    s157 = bias_link_3_y - (k3 * s150 + k4 * s151)
-    bias_link_4_y = bias_link_3_z + (k4 * s153 - k3 * s146)
-    bias_link_4_z = cos_q_4 * s157 - sin_q_4 * s156
-    s158 = cos_q_4 * s156 + sin_q_4 * s157
-    s159 = q_4_dot * omega_link_4_z
-    s160 = s155 - s159
-    s161 = sin_q_4 * s154 + q_4_dot * omega_link_4_x
-    s162 = omega_link_4_x * omega_link_4_y
-    s163 = omega_link_4_z * omega_link_4_x
-    s164 = omega_link_4_z * omega_link_4_y
-    s165 = s162 - s161
-    s166 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
-    s167 = s160 + s164
-    s168 = s159 - s155
-    s169 = cos_q_5 * s168 + sin_q_5 * s143
-    s170 = bias_link_4_y - k6 * s166
-    bias_link_5_y = bias_link_4_z + k6 * s167
-    s171 = s158 - k6 * s165
-    bias_link_5_z = cos_q_5 * s170 + sin_q_5 * s171
-    s172 = cos_q_5 * s171
-    s173 = sin_q_5 * s170
-    s174 = q_5_dot * omega_link_5_z
-    s175 = s169 - s174
-    s176 = sin_q_5 * s168 - cos_q_5 * s143 + q_5_dot * omega_link_5_x
-    s177 = omega_link_5_x * omega_link_5_y
-    s178 = omega_link_5_z * omega_link_5_x
-    s179 = omega_link_5_z * omega_link_5_y
-    s180 = s174 - s169
-    s181 = s173 - s172
-    bias_link_6_x = cos_q_6 * s181 - sin_q_6 * bias_link_5_y
-    s182 = cos_q_6 * bias_link_5_y + sin_q_6 * s181
-    s183 = cos_q_6 * s180 - sin_q_6 * s161 - q_6_dot * s132
-    s184 = cos_q_6 * s161 + sin_q_6 * s180 + q_6_dot * omega_link_6_x
-    s185 = omega_link_6_x * s132
-    s186 = omega_link_6_x * omega_link_6_z
-    s187 = s132 * omega_link_6_z
-    s188 = s186 - s184
-    s189 = s183 + s187
-    s190 = k8 * s136 - k9 * s135 + k10 * (q_2_dot_squared - omega_link_2_y_squared) + s137 * k23
-    s191 = k10 * s135 - k8 * s137 + k9 * (omega_link_2_x_squared - q_2_dot_squared) - s136 * k22
-    s192 = k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + s135 * k22 - s135 * k23
-    s193 = k11 * s146 + moment_link_3_y * s153 - moment_link_3_z * (s144 + omega_link_3_y_squared)
-    s194 = m_3 * bias_link_3_x + (k11 * s148 + moment_link_3_y * s149 - moment_link_3_z * s146)
-    s195 = m_3 * bias_link_3_y + (k11 * s150 - moment_link_3_y * s151 + moment_link_3_z * s152)
-    s196 = inertia_link_3_xy * s146 - inertia_link_3_xz * s150 + k12 * (omega_link_3_z_squared - omega_link_3_y_squared)
-    s197 = k12 * s149 + inertia_link_3_xy * s153 - inertia_link_3_xz * (s144 - omega_link_3_z_squared)
-    s198 = k12 * s146 - inertia_link_3_xz * s152 - inertia_link_3_xy * (omega_link_3_y_squared - s144)
-    s199 = moment_link_3_y * bias_link_3_z - moment_link_3_z * bias_link_3_y + (s196 + s153 * k25 - s152 * k26)
-    s200 = moment_link_3_z * bias_link_3_x + k11 * bias_link_3_z + (s197 - s146 * k26 + s146 * k24)
-    s201 = s198 - s150 * k24 - s149 * k25 - (k11 * bias_link_3_y + moment_link_3_y * bias_link_3_x)
-    s202 = m_6 * bias_link_6_x + moment_link_6_z * s188
-    s203 = m_6 * s182 + moment_link_6_z * s189
-    s204 = m_6 * bias_link_5_z - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s132 * s132)
-    s205 = (s176 - s185) * k33 + (s176 + s185) * k34
-    s206 = moment_link_6_z * s182 + ((s183 - s187) * k34 + s189 * k35)
-    s207 = moment_link_6_z * bias_link_6_x + (s188 * k35 - (s184 + s186) * k33)
-    s209 = (s175 + s179) * k31 - (s179 - s175) * k32 + (sin_q_6 * s207 - cos_q_6 * s206)
-    s210 = (s161 + s178) * k32 - (s178 - s161) * k30 - (sin_q_6 * s206 + cos_q_6 * s207)
-    s212 = m_5 * bias_link_5_y + (cos_q_6 * s203 - sin_q_6 * s202)
-    s213 = m_5 * bias_link_5_z + s204
-    s1165 = tau_6 + tau__q_6_dot - s205
-    s1166 = (s176 + s177) * k30 - (s177 - s176) * k31 + (s205 + k13 * s1165)
-    s1167 = tau_5 + tau__q_5_dot - s210
-    s1168 = s209 + s8 * s1167
-    s1169 = m_5 * (s172 - s173) - (cos_q_6 * s202 + sin_q_6 * s203) + s10 * s1167
-    s1170 = sin_q_5 * s213 + cos_q_5 * s1169
-    s1171 = moment_link_4_y * bias_link_4_z + (s167 * k28 - (s164 - s160) * k29) + (k6 * s212 - (sin_q_5 * s1166 + cos_q_5 * s1168))
-    s1172 = (s163 - s143) * k29 - (s143 + s163) * k27 + (cos_q_5 * s1166 - sin_q_5 * s1168)
-    s1173 = moment_link_4_y * s158 + ((s161 + s162) * k27 - s165 * k28) + (s210 + s9 * s1167 + k6 * s1170)
-    s1174 = m_4 * bias_link_4_y - moment_link_4_y * s166 + (cos_q_5 * s213 - sin_q_5 * s1169)
-    s1175 = tau_4 + tau__q_4_dot - s1172
-    s1176 = s1171 + s34 * s1175
-    s1177 = s1173 + s36 * s1175
-    s1178 = moment_link_4_y * s165 - m_4 * s158 - s1170 - s37 * s1175
-    s1179 = s1174 - s38 * s1175
-    s1180 = m_4 * bias_link_4_z + moment_link_4_y * s167 + s212 + s39 * s1175
-    s1181 = cos_q_4 * s1180 - sin_q_4 * s1178
-    s1182 = sin_q_4 * s1180 + cos_q_4 * s1178
-    s1183 = s200 + (cos_q_4 * s1177 - sin_q_4 * s1176 - k3 * s1179)
-    s1184 = tau_3 + tau__q_3_dot - s1183
-    s1185 = s199 + (k4 * s1179 - (sin_q_4 * s1177 + cos_q_4 * s1176)) + s94 * s1184
-    s1186 = s201 + (s1172 + s35 * s1175 + (k3 * s1181 + k4 * s1182)) + s96 * s1184
-    s1187 = cos_q_3 * (m_3 * bias_link_3_z + s193 + s1179 + s99 * s1184) - sin_q_3 * (s194 - s1182 + s97 * s1184)
-    s1188 = s190 - moment_link_2_z * bias_link_2_y - (sin_q_3 * s1186 + cos_q_3 * s1185)
-    s1189 = moment_link_2_z * bias_link_2_x + s191 + (cos_q_3 * s1186 - sin_q_3 * s1185 - k1 * (s195 + s1181 - s98 * s1184))
-    s1190 = moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + s192 + (s1183 + s95 * s1184 + k1 * s1187)
-    s1191 = tau_2 + tau__q_2_dot - s1190
-    s1192 = tau_1 + tau__q_1_dot - (sin_q_2 * (s1188 + s120 * s1191) + cos_q_2 * (s1189 + s121 * s1191))
-    alpha_link_1_y_2 = s1192 / (s122 + sin_q_2 * s124 + k21)
+    s143 = s124 * omega_link_3_y
+    s144 = omega_link_3_z * s124
+    s145 = omega_link_3_z * omega_link_3_y
+    s146 = omega_link_3_y_squared + omega_link_3_z_squared
+    s147 = s141 - s143
+    s148 = s141 + s143
+    s149 = s142 + omega_link_3_z_squared
+    s150 = s145 - s140
+    s151 = s140 + s145
+    s152 = s139 - s136
+    s153 = cos_q_4 * s152
+    s154 = bias_link_3_x + (k4 * s147 - k3 * s146)
+    s155 = bias_link_3_y - (k3 * s148 + k4 * s149)
+    bias_link_4_y = bias_link_3_z + (k4 * s151 - k3 * s144)
+    bias_link_4_z = cos_q_4 * s155 - sin_q_4 * s154
+    s156 = cos_q_4 * s154 + sin_q_4 * s155
+    s157 = q_4_dot * omega_link_4_z
+    s158 = s153 - s157
+    s159 = sin_q_4 * s152 + q_4_dot * omega_link_4_x
+    s160 = omega_link_4_x * omega_link_4_y
+    s161 = omega_link_4_z * omega_link_4_y
+    s162 = s160 - s159
+    s163 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
+    s164 = s158 + s161
+    s165 = s157 - s153
+    s166 = cos_q_5 * s165 + sin_q_5 * s141
+    s167 = bias_link_4_y - k6 * s163
+    bias_link_5_y = bias_link_4_z + k6 * s164
+    s168 = s156 - k6 * s162
+    bias_link_5_z = cos_q_5 * s167 + sin_q_5 * s168
+    s169 = cos_q_5 * s168
+    s170 = sin_q_5 * s167
+    s171 = q_5_dot * omega_link_5_z
+    s172 = sin_q_5 * s165 - cos_q_5 * s141 + q_5_dot * omega_link_5_x
+    s173 = s171 - s166
+    s174 = s170 - s169
+    bias_link_6_x = cos_q_6 * s174 - sin_q_6 * bias_link_5_y
+    s175 = cos_q_6 * bias_link_5_y + sin_q_6 * s174
+    s176 = cos_q_6 * s173 - sin_q_6 * s159 - q_6_dot * s131
+    s177 = cos_q_6 * s159 + sin_q_6 * s173 + q_6_dot * omega_link_6_x
+    s178 = omega_link_6_x * omega_link_6_z
+    s179 = s131 * omega_link_6_z
+    s180 = k8 * s135 - k9 * s134 + k10 * (q_2_dot_squared - omega_link_2_y_squared) + inertia_link_2_xx * s132
+    s181 = k10 * s134 - k8 * (s132 + s132) + k9 * (omega_link_2_x_squared - q_2_dot_squared)
+    s182 = moment_link_2_z * bias_link_2_x + (s181 - inertia_link_2_yy * s133 + s133 * k23)
+    s183 = moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + (k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + s134 * k24)
+    s184 = k11 * s144 + moment_link_3_y * s151 - moment_link_3_z * (s142 + omega_link_3_y_squared)
+    s185 = m_3 * bias_link_3_x + (k11 * s146 + moment_link_3_y * s147 - moment_link_3_z * s144)
+    s186 = m_3 * bias_link_3_y + (k11 * s148 - moment_link_3_y * s149 + moment_link_3_z * s150)
+    s187 = inertia_link_3_xy * s144 - inertia_link_3_xz * s148 + k12 * (omega_link_3_z_squared - omega_link_3_y_squared)
+    s188 = k12 * s147 + inertia_link_3_xy * s151 - inertia_link_3_xz * (s142 - omega_link_3_z_squared)
+    s189 = k12 * s144 - inertia_link_3_xz * s150 - inertia_link_3_xy * (omega_link_3_y_squared - s142)
+    s190 = moment_link_3_y * bias_link_3_z - moment_link_3_z * bias_link_3_y + (s187 + inertia_link_3_xx * s140 + s145 * k25)
+    s191 = moment_link_3_z * bias_link_3_x + k11 * bias_link_3_z + (s188 - s144 * k26)
+    s192 = s189 - inertia_link_3_zz * s141 - s143 * k27 - (k11 * bias_link_3_y + moment_link_3_y * bias_link_3_x)
+    s193 = moment_link_4_y * bias_link_4_z + (inertia_link_4_xx * s158 + s161 * k28)
+    s194 = m_6 * bias_link_6_x + moment_link_6_z * (s178 - s177)
+    s195 = m_6 * s175 + moment_link_6_z * (s176 + s179)
+    s196 = m_6 * bias_link_5_z - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s131 * s131)
+    s197 = I_6z * s172 - omega_link_6_x * s131 * k36
+    s198 = moment_link_6_z * s175 + (inertia_link_6_xx * s176 - s179 * k34)
+    s199 = moment_link_6_z * bias_link_6_x + (s178 * k35 - inertia_link_6_yy * s177)
+    s201 = I_5x * (s166 - s171) + omega_link_5_z * omega_link_5_y * k31 + (sin_q_6 * s199 - cos_q_6 * s198)
+    s202 = I_5y * s159 + omega_link_5_z * omega_link_5_x * k32 - (sin_q_6 * s198 + cos_q_6 * s199)
+    s204 = m_5 * bias_link_5_y + (cos_q_6 * s195 - sin_q_6 * s194)
+    s205 = m_5 * bias_link_5_z + s196
+    s1147 = tau_6 + tau__q_6_dot - s197
+    s1148 = I_5z * s172 + omega_link_5_x * omega_link_5_y * k33 + (s197 + k13 * s1147)
+    s1149 = tau_5 + tau__q_5_dot - s202
+    s1150 = s201 + s7 * s1149
+    s1151 = m_5 * (s169 - s170) - (cos_q_6 * s194 + sin_q_6 * s195) + s9 * s1149
+    s1152 = sin_q_5 * s205 + cos_q_5 * s1151
+    s1153 = omega_link_4_z * omega_link_4_x * k29 - I_4y * s141 + (cos_q_5 * s1148 - sin_q_5 * s1150)
+    s1154 = moment_link_4_y * s156 + (inertia_link_4_zz * s159 + s160 * k30) + (s202 + s8 * s1149 + k6 * s1152)
+    s1155 = m_4 * bias_link_4_y - moment_link_4_y * s163 + (cos_q_5 * s205 - sin_q_5 * s1151)
+    s1156 = tau_4 + tau__q_4_dot - s1153
+    s1157 = s193 + (k6 * s204 - (sin_q_5 * s1148 + cos_q_5 * s1150)) + s33 * s1156
+    s1158 = s1154 + s35 * s1156
+    s1159 = moment_link_4_y * s162 - m_4 * s156 - s1152 - s36 * s1156
+    s1160 = s1155 - s37 * s1156
+    s1161 = m_4 * bias_link_4_z + moment_link_4_y * s164 + s204 + s38 * s1156
+    s1162 = cos_q_4 * s1161 - sin_q_4 * s1159
+    s1163 = sin_q_4 * s1161 + cos_q_4 * s1159
+    s1164 = s191 + (cos_q_4 * s1158 - sin_q_4 * s1157 - k3 * s1160)
+    s1165 = tau_3 + tau__q_3_dot - s1164
+    s1166 = s190 + (k4 * s1160 - (sin_q_4 * s1158 + cos_q_4 * s1157)) + s93 * s1165
+    s1167 = s192 + (s1153 + s34 * s1156 + (k3 * s1162 + k4 * s1163)) + s95 * s1165
+    s1168 = cos_q_3 * (m_3 * bias_link_3_z + s184 + s1160 + s98 * s1165) - sin_q_3 * (s185 - s1163 + s96 * s1165)
+    s1169 = s180 + s132 * k22 - moment_link_2_z * bias_link_2_y - (sin_q_3 * s1167 + cos_q_3 * s1166)
+    s1170 = s182 + (cos_q_3 * s1167 - sin_q_3 * s1166 - k1 * (s186 + s1162 - s97 * s1165))
+    s1171 = tau_2 + tau__q_2_dot - (s183 + (s1164 + s94 * s1165 + k1 * s1168))
+    s1172 = tau_1 + tau__q_1_dot - (sin_q_2 * (s1169 + s119 * s1171) + cos_q_2 * (s1170 + s120 * s1171))
+    alpha_link_1_y_2 = s1172 / (s121 + sin_q_2 * s123 + k21)
     alpha_link_2_x_2 = sin_q_2 * alpha_link_1_y_2
     alpha_link_2_y_2 = cos_q_2 * alpha_link_1_y_2
-    alpha_link_2_z_2 = s1191 / pivot_link_2 - (s120 * alpha_link_2_x_2 + s121 * alpha_link_2_y_2)
+    alpha_link_2_z_2 = s1171 / pivot_link_2 - (s119 * alpha_link_2_x_2 + s120 * alpha_link_2_y_2)
     alpha_link_3_z_2 = cos_q_3 * alpha_link_2_y_2 - sin_q_3 * alpha_link_2_x_2
-    s1193 = cos_q_3 * alpha_link_2_x_2 + sin_q_3 * alpha_link_2_y_2
-    s1194 = k1 * alpha_link_2_z_2
-    s1195 = k1 * alpha_link_2_y_2
-    delta_link_3_z_2 = cos_q_3 * s1194
-    s1196 = sin_q_3 * s1194
-    s1197 = s95 * alpha_link_2_z_2 - s94 * s1193 + s96 * alpha_link_3_z_2 + (s98 * s1195 - s97 * s1196 + s99 * delta_link_3_z_2)
-    q_3_ddot_2 = s1184 / pivot_link_3 - s1197
+    s1173 = cos_q_3 * alpha_link_2_x_2 + sin_q_3 * alpha_link_2_y_2
+    s1174 = k1 * alpha_link_2_z_2
+    s1175 = k1 * alpha_link_2_y_2
+    delta_link_3_z_2 = cos_q_3 * s1174
+    s1176 = sin_q_3 * s1174
+    s1177 = s94 * alpha_link_2_z_2 - s93 * s1173 + s95 * alpha_link_3_z_2 + (s97 * s1175 - s96 * s1176 + s98 * delta_link_3_z_2)
+    q_3_ddot_2 = s1165 / pivot_link_3 - s1177
     alpha_link_3_y_2 = alpha_link_2_z_2 + q_3_ddot_2
-    alpha_link_4_z_2 = cos_q_4 * alpha_link_3_y_2 + sin_q_4 * s1193
-    s1198 = cos_q_4 * s1193
-    s1199 = sin_q_4 * alpha_link_3_y_2
-    s1200 = s1196 + k4 * alpha_link_3_z_2
-    s1201 = k3 * alpha_link_3_z_2 - s1195
-    delta_link_4_y_2 = delta_link_3_z_2 - (k4 * s1193 + k3 * alpha_link_3_y_2)
-    delta_link_4_x_2 = cos_q_4 * s1200 - sin_q_4 * s1201
-    s1202 = s39 * (cos_q_4 * s1201 + sin_q_4 * s1200) - (s37 * delta_link_4_x_2 + s38 * delta_link_4_y_2)
-    s1203 = s34 * (s1198 - s1199) + s35 * alpha_link_3_z_2 + s36 * alpha_link_4_z_2 + s1202
-    q_4_ddot_2 = s1175 / pivot_link_4 - s1203
+    alpha_link_4_z_2 = cos_q_4 * alpha_link_3_y_2 + sin_q_4 * s1173
+    s1178 = cos_q_4 * s1173
+    s1179 = sin_q_4 * alpha_link_3_y_2
+    s1180 = s1176 + k4 * alpha_link_3_z_2
+    s1181 = k3 * alpha_link_3_z_2 - s1175
+    delta_link_4_y_2 = delta_link_3_z_2 - (k4 * s1173 + k3 * alpha_link_3_y_2)
+    delta_link_4_x_2 = cos_q_4 * s1180 - sin_q_4 * s1181
+    s1182 = s38 * (cos_q_4 * s1181 + sin_q_4 * s1180) - (s36 * delta_link_4_x_2 + s37 * delta_link_4_y_2)
+    s1183 = s33 * (s1178 - s1179) + s34 * alpha_link_3_z_2 + s35 * alpha_link_4_z_2 + s1182
+    q_4_ddot_2 = s1156 / pivot_link_4 - s1183
     alpha_link_4_y_2 = alpha_link_3_z_2 + q_4_ddot_2
-    s1204 = s1199 - s1198
+    s1184 = s1179 - s1178
     delta_link_5_x_2 = cos_q_5 * (k6 * alpha_link_4_z_2 - delta_link_4_x_2) - sin_q_5 * delta_link_4_y_2
-    s1205 = s8 * (cos_q_5 * s1204 - sin_q_5 * alpha_link_4_y_2) + s9 * alpha_link_4_z_2
+    s1185 = s7 * (cos_q_5 * s1184 - sin_q_5 * alpha_link_4_y_2) + s8 * alpha_link_4_z_2
     return (
         alpha_link_1_y_2,
         alpha_link_2_z_2,
         q_3_ddot_2,
         q_4_ddot_2,
-        s1167 / pivot_link_5 - (s1205 + s10 * delta_link_5_x_2),
-        s1165 / pivot_link_6 - k13 * (cos_q_5 * alpha_link_4_y_2 + sin_q_5 * s1204),
+        s1149 / pivot_link_5 - (s1185 + s9 * delta_link_5_x_2),
+        s1147 / pivot_link_6 - k13 * (cos_q_5 * alpha_link_4_y_2 + sin_q_5 * s1184),
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """465 operations: 124 add, 96 sub, 235 mul, 5 sin, 5 cos."""
-    m_3, m_4, m_5, m_6, gravity_g, k39, k36, k1, k2, k3, k4, k5, k6, k7, k37, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, moment_link_4_y, moment_link_6_z, k40, k22, k23, k41, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35 = k
+    """450 operations: 121 add, 84 sub, 235 mul, 5 sin, 5 cos."""
+    I_1y, m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, gravity_g, k40, k37, k1, k2, k3, k4, k5, k6, k7, k38, moment_link_2_x, moment_link_2_y, moment_link_2_z, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36 = k
     _, q_2, q_3, q_4, q_5, q_6, q_1_dot, q_2_dot, q_3_dot, q_4_dot, q_5_dot, q_6_dot = y
     tau_1, tau_2, tau_3, tau_4, tau_5, tau_6 = u
     vd__q_1_dot, vd__q_2_dot, vd__q_3_dot, vd__q_4_dot, vd__q_5_dot, vd__q_6_dot = extra
@@ -2594,401 +2459,390 @@ def _inverse_dynamics(y, k, u=(), extra=(), cos=cos, sin=sin):
     omega_link_2_x = q_1_dot * sin_q_2
     omega_link_2_y = q_1_dot * cos_q_2
     omega_link_3_z = cos_q_3 * omega_link_2_y - sin_q_3 * omega_link_2_x
-    s125 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
+    s124 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
     omega_link_3_y = q_2_dot + q_3_dot
-    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s125
-    s126 = cos_q_4 * s125
-    s127 = sin_q_4 * omega_link_3_y
-    omega_link_4_x = s126 - s127
+    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s124
+    s125 = cos_q_4 * s124
+    s126 = sin_q_4 * omega_link_3_y
+    omega_link_4_x = s125 - s126
     omega_link_4_y = q_4_dot + omega_link_3_z
-    s128 = s127 - s126
-    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s128
-    s129 = cos_q_5 * s128
-    s130 = sin_q_5 * omega_link_4_y
-    omega_link_5_x = s129 - s130
+    s127 = s126 - s125
+    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s127
+    s128 = cos_q_5 * s127
+    s129 = sin_q_5 * omega_link_4_y
+    omega_link_5_x = s128 - s129
     omega_link_5_y = q_5_dot + omega_link_4_z
-    s131 = s130 - s129
-    omega_link_6_x = cos_q_6 * s131 - sin_q_6 * omega_link_5_y
-    s132 = cos_q_6 * omega_link_5_y + sin_q_6 * s131
+    s130 = s129 - s128
+    omega_link_6_x = cos_q_6 * s130 - sin_q_6 * omega_link_5_y
+    s131 = cos_q_6 * omega_link_5_y + sin_q_6 * s130
     omega_link_6_z = q_6_dot + omega_link_5_z
     bias_link_2_x = gravity_g * sin_q_2
     bias_link_2_y = gravity_g * cos_q_2
-    s133 = q_2_dot * omega_link_2_y
-    s134 = q_2_dot * omega_link_2_x
+    s132 = q_2_dot * omega_link_2_y
+    s133 = q_2_dot * omega_link_2_x
     omega_link_2_x_squared = omega_link_2_x * omega_link_2_x
     omega_link_2_y_squared = omega_link_2_y * omega_link_2_y
     q_2_dot_squared = q_2_dot * q_2_dot
-    s135 = omega_link_2_x * omega_link_2_y
-    s140 = k1 * (omega_link_2_y_squared + q_2_dot_squared) - bias_link_2_x
-    s144 = s125 * s125
+    s134 = omega_link_2_x * omega_link_2_y
+    s138 = k1 * (omega_link_2_y_squared + q_2_dot_squared) - bias_link_2_x
+    s142 = s124 * s124
     omega_link_3_y_squared = omega_link_3_y * omega_link_3_y
     omega_link_3_z_squared = omega_link_3_z * omega_link_3_z
-    s145 = s125 * omega_link_3_y
-    s146 = omega_link_3_z * s125
-    s147 = omega_link_3_z * omega_link_3_y
-    s148 = omega_link_3_y_squared + omega_link_3_z_squared
-    s151 = s144 + omega_link_3_z_squared
-    s159 = q_4_dot * omega_link_4_z
-    s162 = omega_link_4_x * omega_link_4_y
-    s163 = omega_link_4_z * omega_link_4_x
-    s164 = omega_link_4_z * omega_link_4_y
-    s166 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
-    s174 = q_5_dot * omega_link_5_z
-    s177 = omega_link_5_x * omega_link_5_y
-    s178 = omega_link_5_z * omega_link_5_x
-    s179 = omega_link_5_z * omega_link_5_y
-    s185 = omega_link_6_x * s132
-    s186 = omega_link_6_x * omega_link_6_z
-    s187 = s132 * omega_link_6_z
-    s1206 = s133 + sin_q_2 * vd__q_1_dot
-    s1207 = cos_q_2 * vd__q_1_dot - s134
-    s1208 = s135 - vd__q_2_dot
-    s1209 = s134 + s1207
-    s1210 = s135 + vd__q_2_dot
-    s1211 = s133 - s1206
-    s1212 = s134 - s1207
-    s1213 = s133 + s1206
-    a_link_3_y_2 = k1 * s1212
-    s1214 = bias_link_2_y + k1 * s1210
-    a_link_3_z_2 = sin_q_3 * s140 + cos_q_3 * s1214
-    a_link_3_x_2 = cos_q_3 * s140 - sin_q_3 * s1214
-    s1215 = q_3_dot * omega_link_3_z + (cos_q_3 * s1206 + sin_q_3 * s1207)
-    s1216 = cos_q_3 * s1207 - sin_q_3 * s1206 - q_3_dot * s125
-    s1217 = vd__q_2_dot + vd__q_3_dot
-    s1218 = s145 + s1216
-    s1219 = s1217 - s146
-    s1220 = s1216 - s145
-    s1221 = s147 + s1215
-    s1222 = s146 + s1217
-    s1223 = s147 - s1215
-    s1224 = cos_q_4 * s1215 - sin_q_4 * s1217
-    s1225 = a_link_3_y_2 + (k3 * s1220 - k4 * s151)
-    a_link_4_y_2 = a_link_3_z_2 + (k4 * s1223 - k3 * s1222)
-    s1226 = k3 * s148 + k4 * s1218 - a_link_3_x_2
-    a_link_4_z_2 = cos_q_4 * s1225 + sin_q_4 * s1226
-    a_link_4_x_2 = cos_q_4 * s1226 - sin_q_4 * s1225
-    s1227 = s1224 - s159
-    s1228 = q_4_dot * omega_link_4_x + (cos_q_4 * s1217 + sin_q_4 * s1215)
-    s1229 = vd__q_4_dot + s1216
-    s1230 = s162 - s1228
-    s1231 = s164 + s1227
-    s1232 = s159 - s1224
-    s1233 = cos_q_5 * s1232 - sin_q_5 * s1229
-    s1234 = a_link_4_x_2 + k6 * s1230
-    s1235 = a_link_4_y_2 - k6 * s166
-    a_link_5_y_2 = a_link_4_z_2 + k6 * s1231
-    a_link_5_z_2 = cos_q_5 * s1235 - sin_q_5 * s1234
-    s1236 = cos_q_5 * s1234 + sin_q_5 * s1235
-    s1237 = s1233 - s174
-    s1238 = q_5_dot * omega_link_5_x + (cos_q_5 * s1229 + sin_q_5 * s1232)
-    s1239 = vd__q_5_dot + s1228
-    s1240 = s174 - s1233
-    a_link_6_x = cos_q_6 * s1236 - sin_q_6 * a_link_5_y_2
-    s1241 = cos_q_6 * a_link_5_y_2 + sin_q_6 * s1236
-    s1242 = cos_q_6 * s1240 - sin_q_6 * s1239 - q_6_dot * s132
-    s1243 = q_6_dot * omega_link_6_x + (cos_q_6 * s1239 + sin_q_6 * s1240)
-    s1244 = vd__q_6_dot + s1238
-    s1245 = s186 - s1243
-    s1246 = s187 + s1242
-    s1247 = k40 * vd__q_1_dot
-    s1248 = k10 * (q_2_dot_squared - omega_link_2_y_squared) + (k8 * s1212 - k9 * s1210)
-    s1249 = k9 * (omega_link_2_x_squared - q_2_dot_squared) + (k10 * s1208 - k8 * s1213)
-    s1250 = k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + (k9 * s1211 - k10 * s1209)
-    s1251 = moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + (s1250 + k22 * s1210 - k23 * s1208)
-    s1252 = k11 * s1222 + moment_link_3_y * s1223 - moment_link_3_z * (s144 + omega_link_3_y_squared)
-    s1253 = m_3 * a_link_3_x_2 + (k11 * s148 - moment_link_3_y * s1218 + moment_link_3_z * s1219)
-    s1254 = m_3 * a_link_3_y_2 + (moment_link_3_z * s1221 - (moment_link_3_y * s151 + k11 * s1220))
-    s1255 = k12 * (omega_link_3_z_squared - omega_link_3_y_squared) + (inertia_link_3_xy * s1222 + inertia_link_3_xz * s1220)
-    s1256 = inertia_link_3_xy * s1223 - k12 * s1218 - inertia_link_3_xz * (s144 - omega_link_3_z_squared)
-    s1257 = inertia_link_3_xy * (omega_link_3_y_squared - s144) + (inertia_link_3_xz * s1221 + k12 * s1219)
-    s1258 = moment_link_3_y * a_link_3_z_2 - moment_link_3_z * a_link_3_y_2 + (s1255 + k25 * s1223 - k26 * s1221)
-    s1259 = moment_link_3_z * a_link_3_x_2 + k11 * a_link_3_z_2 + (s1256 + k26 * s1219 + k24 * s1222)
-    s1260 = k24 * s1220 - s1257 + k25 * s1218 - (k11 * a_link_3_y_2 + moment_link_3_y * a_link_3_x_2)
-    s1261 = m_6 * a_link_6_x + moment_link_6_z * s1245
-    s1262 = m_6 * s1241 + moment_link_6_z * s1246
-    s1263 = m_6 * a_link_5_z_2 - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s132 * s132)
-    s1264 = k33 * (s1244 - s185) + k34 * (s185 + s1244)
-    s1265 = moment_link_6_z * s1241 + (k34 * (s1242 - s187) + k35 * s1246)
-    s1266 = moment_link_6_z * a_link_6_x + (k35 * s1245 - k33 * (s186 + s1243))
-    s1267 = k31 * (s179 + s1237) - k32 * (s179 - s1237) + (sin_q_6 * s1266 - cos_q_6 * s1265)
-    s1268 = k32 * (s178 + s1239) - k30 * (s178 - s1239) - (sin_q_6 * s1265 + cos_q_6 * s1266)
-    s1269 = k30 * (s177 + s1238) - k31 * (s177 - s1238) + s1264
-    s1270 = m_5 * s1236 + (cos_q_6 * s1261 + sin_q_6 * s1262)
-    s1271 = m_5 * a_link_5_y_2 + (cos_q_6 * s1262 - sin_q_6 * s1261)
-    s1272 = m_5 * a_link_5_z_2 + s1263
-    s1273 = cos_q_5 * s1270 - sin_q_5 * s1272
-    s1274 = moment_link_4_y * a_link_4_z_2 + (k28 * s1231 - k29 * (s164 - s1227)) + (k6 * s1271 - (sin_q_5 * s1269 + cos_q_5 * s1267))
-    s1275 = k29 * (s163 + s1229) - k27 * (s163 - s1229) + (cos_q_5 * s1269 - sin_q_5 * s1267)
-    s1276 = k27 * (s162 + s1228) - k28 * s1230 - moment_link_4_y * a_link_4_x_2 + (s1268 - k6 * s1273)
-    s1277 = m_4 * a_link_4_x_2 + moment_link_4_y * s1230 + s1273
-    s1278 = m_4 * a_link_4_y_2 - moment_link_4_y * s166 + (cos_q_5 * s1272 + sin_q_5 * s1270)
-    s1279 = m_4 * a_link_4_z_2 + moment_link_4_y * s1231 + s1271
-    s1280 = cos_q_4 * s1279 - sin_q_4 * s1277
-    s1281 = sin_q_4 * s1279 + cos_q_4 * s1277
-    s1282 = s1258 + (k4 * s1278 - (sin_q_4 * s1276 + cos_q_4 * s1274))
-    s1283 = s1259 + (cos_q_4 * s1276 - sin_q_4 * s1274 - k3 * s1278)
-    s1284 = s1260 + (s1275 + (k3 * s1280 + k4 * s1281))
-    s1285 = cos_q_3 * (m_3 * a_link_3_z_2 + s1252 + s1278) - sin_q_3 * (s1253 - s1281)
-    s1286 = s1248 + k23 * s1213 - k41 * s1211 - moment_link_2_z * bias_link_2_y - (sin_q_3 * s1284 + cos_q_3 * s1282)
-    s1287 = moment_link_2_z * bias_link_2_x + (s1249 + k41 * s1209 - k22 * s1212) + (cos_q_3 * s1284 - sin_q_3 * s1282 - k1 * (s1254 + s1280))
+    s143 = s124 * omega_link_3_y
+    s144 = omega_link_3_z * s124
+    s145 = omega_link_3_z * omega_link_3_y
+    s146 = omega_link_3_y_squared + omega_link_3_z_squared
+    s149 = s142 + omega_link_3_z_squared
+    s157 = q_4_dot * omega_link_4_z
+    s160 = omega_link_4_x * omega_link_4_y
+    s161 = omega_link_4_z * omega_link_4_y
+    s163 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
+    s171 = q_5_dot * omega_link_5_z
+    s178 = omega_link_6_x * omega_link_6_z
+    s179 = s131 * omega_link_6_z
+    s1186 = s132 + sin_q_2 * vd__q_1_dot
+    s1187 = cos_q_2 * vd__q_1_dot - s133
+    s1188 = s134 + vd__q_2_dot
+    s1189 = s133 - s1187
+    a_link_3_y_2 = k1 * s1189
+    s1190 = bias_link_2_y + k1 * s1188
+    a_link_3_z_2 = sin_q_3 * s138 + cos_q_3 * s1190
+    a_link_3_x_2 = cos_q_3 * s138 - sin_q_3 * s1190
+    s1191 = q_3_dot * omega_link_3_z + (cos_q_3 * s1186 + sin_q_3 * s1187)
+    s1192 = cos_q_3 * s1187 - sin_q_3 * s1186 - q_3_dot * s124
+    s1193 = vd__q_2_dot + vd__q_3_dot
+    s1194 = s143 + s1192
+    s1195 = s1193 - s144
+    s1196 = s1192 - s143
+    s1197 = s145 + s1191
+    s1198 = s144 + s1193
+    s1199 = s145 - s1191
+    s1200 = cos_q_4 * s1191 - sin_q_4 * s1193
+    s1201 = a_link_3_y_2 + (k3 * s1196 - k4 * s149)
+    a_link_4_y_2 = a_link_3_z_2 + (k4 * s1199 - k3 * s1198)
+    s1202 = k3 * s146 + k4 * s1194 - a_link_3_x_2
+    a_link_4_z_2 = cos_q_4 * s1201 + sin_q_4 * s1202
+    a_link_4_x_2 = cos_q_4 * s1202 - sin_q_4 * s1201
+    s1203 = s1200 - s157
+    s1204 = q_4_dot * omega_link_4_x + (cos_q_4 * s1193 + sin_q_4 * s1191)
+    s1205 = vd__q_4_dot + s1192
+    s1206 = s160 - s1204
+    s1207 = s161 + s1203
+    s1208 = s157 - s1200
+    s1209 = cos_q_5 * s1208 - sin_q_5 * s1205
+    s1210 = a_link_4_x_2 + k6 * s1206
+    s1211 = a_link_4_y_2 - k6 * s163
+    a_link_5_y_2 = a_link_4_z_2 + k6 * s1207
+    a_link_5_z_2 = cos_q_5 * s1211 - sin_q_5 * s1210
+    s1212 = cos_q_5 * s1210 + sin_q_5 * s1211
+    s1213 = q_5_dot * omega_link_5_x + (cos_q_5 * s1205 + sin_q_5 * s1208)
+    s1214 = vd__q_5_dot + s1204
+    s1215 = s171 - s1209
+    a_link_6_x = cos_q_6 * s1212 - sin_q_6 * a_link_5_y_2
+    s1216 = cos_q_6 * a_link_5_y_2 + sin_q_6 * s1212
+    s1217 = cos_q_6 * s1215 - sin_q_6 * s1214 - q_6_dot * s131
+    s1218 = q_6_dot * omega_link_6_x + (cos_q_6 * s1214 + sin_q_6 * s1215)
+    s1219 = k10 * (q_2_dot_squared - omega_link_2_y_squared) + (k8 * s1189 - k9 * s1188)
+    s1220 = k9 * (omega_link_2_x_squared - q_2_dot_squared) + (k10 * (s134 - vd__q_2_dot) - k8 * (s132 + s1186))
+    s1221 = k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + (k9 * (s132 - s1186) - k10 * (s133 + s1187))
+    s1222 = s132 * k22 + (s1219 + inertia_link_2_xx * s1186) - moment_link_2_z * bias_link_2_y
+    s1223 = moment_link_2_z * bias_link_2_x + (s133 * k23 + (s1220 + inertia_link_2_yy * s1187))
+    s1224 = moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + (s134 * k24 + (s1221 + inertia_link_2_zz * vd__q_2_dot))
+    s1225 = k11 * s1198 + moment_link_3_y * s1199 - moment_link_3_z * (s142 + omega_link_3_y_squared)
+    s1226 = m_3 * a_link_3_x_2 + (k11 * s146 - moment_link_3_y * s1194 + moment_link_3_z * s1195)
+    s1227 = m_3 * a_link_3_y_2 + (moment_link_3_z * s1197 - (moment_link_3_y * s149 + k11 * s1196))
+    s1228 = k12 * (omega_link_3_z_squared - omega_link_3_y_squared) + (inertia_link_3_xy * s1198 + inertia_link_3_xz * s1196)
+    s1229 = inertia_link_3_xy * s1199 - k12 * s1194 - inertia_link_3_xz * (s142 - omega_link_3_z_squared)
+    s1230 = inertia_link_3_xy * (omega_link_3_y_squared - s142) + (inertia_link_3_xz * s1197 + k12 * s1195)
+    s1231 = moment_link_3_y * a_link_3_z_2 - moment_link_3_z * a_link_3_y_2 + (s145 * k25 + (s1228 - inertia_link_3_xx * s1191))
+    s1232 = moment_link_3_z * a_link_3_x_2 + k11 * a_link_3_z_2 + (s1229 + inertia_link_3_yy * s1193 - s144 * k26)
+    s1233 = inertia_link_3_zz * s1192 - s1230 - s143 * k27 - (k11 * a_link_3_y_2 + moment_link_3_y * a_link_3_x_2)
+    s1234 = moment_link_4_y * a_link_4_z_2 + (s161 * k28 + inertia_link_4_xx * s1203)
+    s1235 = m_6 * a_link_6_x + moment_link_6_z * (s178 - s1218)
+    s1236 = m_6 * s1216 + moment_link_6_z * (s179 + s1217)
+    s1237 = m_6 * a_link_5_z_2 - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s131 * s131)
+    s1238 = I_6z * (vd__q_6_dot + s1213) - omega_link_6_x * s131 * k36
+    s1239 = moment_link_6_z * s1216 + (inertia_link_6_xx * s1217 - s179 * k34)
+    s1240 = moment_link_6_z * a_link_6_x + (s178 * k35 - inertia_link_6_yy * s1218)
+    s1241 = omega_link_5_z * omega_link_5_y * k31 + I_5x * (s1209 - s171) + (sin_q_6 * s1240 - cos_q_6 * s1239)
+    s1242 = omega_link_5_z * omega_link_5_x * k32 + I_5y * s1214 - (sin_q_6 * s1239 + cos_q_6 * s1240)
+    s1243 = omega_link_5_x * omega_link_5_y * k33 + I_5z * s1213 + s1238
+    s1244 = m_5 * s1212 + (cos_q_6 * s1235 + sin_q_6 * s1236)
+    s1245 = m_5 * a_link_5_y_2 + (cos_q_6 * s1236 - sin_q_6 * s1235)
+    s1246 = m_5 * a_link_5_z_2 + s1237
+    s1247 = cos_q_5 * s1244 - sin_q_5 * s1246
+    s1248 = s1234 + (k6 * s1245 - (sin_q_5 * s1243 + cos_q_5 * s1241))
+    s1249 = omega_link_4_z * omega_link_4_x * k29 + I_4y * s1205 + (cos_q_5 * s1243 - sin_q_5 * s1241)
+    s1250 = s160 * k30 + inertia_link_4_zz * s1204 - moment_link_4_y * a_link_4_x_2 + (s1242 - k6 * s1247)
+    s1251 = m_4 * a_link_4_x_2 + moment_link_4_y * s1206 + s1247
+    s1252 = m_4 * a_link_4_y_2 - moment_link_4_y * s163 + (cos_q_5 * s1246 + sin_q_5 * s1244)
+    s1253 = m_4 * a_link_4_z_2 + moment_link_4_y * s1207 + s1245
+    s1254 = cos_q_4 * s1253 - sin_q_4 * s1251
+    s1255 = sin_q_4 * s1253 + cos_q_4 * s1251
+    s1256 = s1231 + (k4 * s1252 - (sin_q_4 * s1250 + cos_q_4 * s1248))
+    s1257 = s1232 + (cos_q_4 * s1250 - sin_q_4 * s1248 - k3 * s1252)
+    s1258 = s1233 + (s1249 + (k3 * s1254 + k4 * s1255))
+    s1259 = cos_q_3 * (m_3 * a_link_3_z_2 + s1225 + s1252) - sin_q_3 * (s1226 - s1255)
+    s1260 = cos_q_2 * (s1223 + (cos_q_3 * s1258 - sin_q_3 * s1256 - k1 * (s1227 + s1254)))
+    s1261 = I_1y * vd__q_1_dot + (sin_q_2 * (s1222 - (sin_q_3 * s1258 + cos_q_3 * s1256)) + s1260)
     return (
-        s1247 + s1247 + (sin_q_2 * s1286 + cos_q_2 * s1287) + k39 * vd__q_1_dot - tau_1,
-        s1251 + (s1283 + k1 * s1285) + k36 * vd__q_2_dot - tau_2,
-        s1283 + k2 * vd__q_3_dot - tau_3,
-        s1275 + k5 * vd__q_4_dot - tau_4,
-        s1268 + k7 * vd__q_5_dot - tau_5,
-        s1264 + k37 * vd__q_6_dot - tau_6,
+        s1261 + k40 * vd__q_1_dot - tau_1,
+        s1224 + (s1257 + k1 * s1259) + k37 * vd__q_2_dot - tau_2,
+        s1257 + k2 * vd__q_3_dot - tau_3,
+        s1249 + k5 * vd__q_4_dot - tau_4,
+        s1242 + k7 * vd__q_5_dot - tau_5,
+        s1238 + k38 * vd__q_6_dot - tau_6,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
     """744 operations: 187 add, 128 sub, 417 mul, 6 sin, 6 cos."""
-    I_4y, I_5x, I_5y, I_5z, I_6z, k36, k1, k2, k3, k4, k5, k6, k7, k37, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, k17, k19, k21, k38 = k
+    I_4y, I_5x, I_5y, I_5z, I_6z, k37, k1, k2, k3, k4, k5, k6, k7, k38, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, inertia_link_2_zz, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_yy, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, k17, k19, k21, k39 = k
     q_1, q_2, q_3, q_4, q_5, q_6, _, _, _, _, _, _ = y
     cos_q_1 = cos(q_1)
     sin_q_1 = sin(q_1)
     cos_q_2 = cos(q_2)
     sin_q_2 = sin(q_2)
-    s253 = cos_q_1 * cos_q_2
-    s254 = cos_q_1 * sin_q_2
-    s255 = sin_q_1 * cos_q_2
-    s256 = sin_q_1 * sin_q_2
+    s243 = cos_q_1 * cos_q_2
+    s244 = cos_q_1 * sin_q_2
+    s245 = sin_q_1 * cos_q_2
+    s246 = sin_q_1 * sin_q_2
     cos_q_3 = cos(q_3)
     sin_q_3 = sin(q_3)
-    s257 = s254 * cos_q_3 + s253 * sin_q_3
-    s258 = s253 * cos_q_3
-    s259 = s254 * sin_q_3
-    s260 = s259 - s258
-    s261 = s256 * cos_q_3 + s255 * sin_q_3
-    s262 = s255 * cos_q_3
-    s263 = s256 * sin_q_3
-    s264 = s263 - s262
-    s265 = cos_q_2 * cos_q_3 - sin_q_2 * sin_q_3
-    s266 = sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3
+    s247 = s244 * cos_q_3 + s243 * sin_q_3
+    s248 = s243 * cos_q_3
+    s249 = s244 * sin_q_3
+    s250 = s249 - s248
+    s251 = s246 * cos_q_3 + s245 * sin_q_3
+    s252 = s245 * cos_q_3
+    s253 = s246 * sin_q_3
+    s254 = s253 - s252
+    s255 = cos_q_2 * cos_q_3 - sin_q_2 * sin_q_3
+    s256 = sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3
     cos_q_4 = cos(q_4)
     sin_q_4 = sin(q_4)
-    s267 = s258 - s259
-    s268 = s262 - s263
-    s269 = sin_q_1 * cos_q_4 + sin_q_4 * s267
-    s270 = cos_q_4 * s267
-    s271 = sin_q_1 * sin_q_4
-    s272 = s270 - s271
-    s273 = cos_q_1 * cos_q_4
-    s274 = sin_q_4 * s268
-    s275 = s274 - s273
-    s276 = cos_q_4 * s268 + cos_q_1 * sin_q_4
-    s277 = s266 * sin_q_4
-    s278 = s266 * cos_q_4
+    s257 = s248 - s249
+    s258 = s252 - s253
+    s259 = sin_q_1 * cos_q_4 + sin_q_4 * s257
+    s260 = cos_q_4 * s257
+    s261 = sin_q_1 * sin_q_4
+    s262 = s260 - s261
+    s263 = cos_q_1 * cos_q_4
+    s264 = sin_q_4 * s258
+    s265 = s264 - s263
+    s266 = cos_q_4 * s258 + cos_q_1 * sin_q_4
+    s267 = s256 * sin_q_4
+    s268 = s256 * cos_q_4
     cos_q_5 = cos(q_5)
     sin_q_5 = sin(q_5)
-    s279 = s271 - s270
-    s280 = sin_q_5 * s279 - s257 * cos_q_5
-    s281 = cos_q_5 * s279 + s257 * sin_q_5
-    s282 = s261 * cos_q_5 + s276 * sin_q_5
-    s283 = s276 * cos_q_5
-    s284 = s261 * sin_q_5
-    s285 = s284 - s283
-    s286 = s265 * cos_q_5 - s278 * sin_q_5
-    s287 = s278 * cos_q_5 + s265 * sin_q_5
+    s269 = s263 - s264
+    s270 = s261 - s260
+    s271 = sin_q_5 * s270 - s247 * cos_q_5
+    s272 = cos_q_5 * s270 + s247 * sin_q_5
+    s273 = s251 * cos_q_5 + s266 * sin_q_5
+    s274 = s266 * cos_q_5
+    s275 = s251 * sin_q_5
+    s276 = s275 - s274
+    s277 = s255 * cos_q_5 - s268 * sin_q_5
+    s278 = s268 * cos_q_5 + s255 * sin_q_5
     cos_q_6 = cos(q_6)
     sin_q_6 = sin(q_6)
-    s288 = s283 - s284
-    s289 = s273 - s274
-    s290 = s281 * cos_q_6 + s269 * sin_q_6
-    s291 = s281 * sin_q_6 - s269 * cos_q_6
-    s292 = cos_q_6 * s288 + sin_q_6 * s289
-    s293 = cos_q_6 * s289 - sin_q_6 * s288
-    s294 = s287 * cos_q_6 - s277 * sin_q_6
-    s295 = s277 * cos_q_6 + s287 * sin_q_6
-    s298 = inertia_link_2_xx * s253 + k8 * s254 - k9 * sin_q_1
-    s299 = k8 * s253 + inertia_link_2_yy * s254 + k10 * sin_q_1
-    s300 = k10 * s254 - k9 * s253 + inertia_link_2_zz * sin_q_1
-    s301 = inertia_link_2_xx * s255 + k8 * s256 + k9 * cos_q_1
-    s302 = k10 * cos_q_1 - (k8 * s255 + inertia_link_2_yy * s256)
-    s304 = s255 * s301 - s256 * s302 - cos_q_1 * (k10 * s256 - k9 * s255 - inertia_link_2_zz * cos_q_1)
-    s305 = sin_q_2 * (inertia_link_2_xx * sin_q_2 - k8 * cos_q_2) + cos_q_2 * (inertia_link_2_yy * cos_q_2 - k8 * sin_q_2)
-    s311 = k1 * s253
-    s312 = k1 * s255
-    s313 = k1 * sin_q_2
-    s317 = inertia_link_3_xx * s260 + inertia_link_3_xy * sin_q_1 - inertia_link_3_xz * s257
-    s318 = inertia_link_3_xy * s260 + inertia_link_3_yy * sin_q_1 + k12 * s257
-    s319 = inertia_link_3_xz * s260 - k12 * sin_q_1 - inertia_link_3_zz * s257
-    s320 = inertia_link_3_xx * s264 - inertia_link_3_xy * cos_q_1 - inertia_link_3_xz * s261
-    s321 = inertia_link_3_xz * s264 + k12 * cos_q_1 - inertia_link_3_zz * s261
-    s323 = cos_q_1 * (inertia_link_3_xy * s264 - inertia_link_3_yy * cos_q_1 + k12 * s261)
-    s325 = s265 * (inertia_link_3_zz * s265 - inertia_link_3_xz * s266) - s266 * (inertia_link_3_xz * s265 - inertia_link_3_xx * s266)
-    s332 = k3 * s260 + k4 * sin_q_1
-    s333 = k3 * s264 - k4 * cos_q_1
-    s334 = k3 * s266
-    s338 = inertia_link_4_xx * s272
-    s339 = I_4y * s257
-    s340 = inertia_link_4_zz * s269
-    s341 = inertia_link_4_xx * s276
-    s342 = I_4y * s261
-    s343 = inertia_link_4_zz * s275
-    s346 = s278 * (inertia_link_4_xx * s278) + s265 * (I_4y * s265) + s277 * (inertia_link_4_zz * s277)
-    s350 = k6 * s257
-    s351 = k6 * s261
-    s352 = k6 * s265
-    s353 = I_5x * s281
-    s354 = I_5y * s269
-    s355 = I_5z * s280
-    s356 = I_5x * s285
-    s357 = I_5y * s275
-    s358 = I_5z * s282
-    s367 = moment_link_6_z * s280
-    s368 = moment_link_6_z * s282
-    s369 = moment_link_6_z * s286
-    s370 = inertia_link_6_xx * s290
-    s371 = inertia_link_6_yy * s291
-    s372 = I_6z * s280
-    s373 = inertia_link_6_xx * s292
-    s374 = inertia_link_6_yy * s293
-    s375 = I_6z * s282
-    s376 = s290 * s370 + s291 * s371 + s280 * s372
-    s377 = s292 * s373 + s293 * s374 + s282 * s375
-    s378 = s294 * (inertia_link_6_xx * s294) + s295 * (inertia_link_6_yy * s295) + s286 * (I_6z * s286)
-    s381 = s293 * s371 - s292 * s370 - s282 * s372
-    s384 = s286 * s372 - (s294 * s370 + s295 * s371)
-    s387 = s294 * s373 - s295 * s374 - s286 * s375
-    s388 = s281 * s353 + s269 * s354 + s280 * s355 + s376
-    s389 = s285 * s353 + s275 * s354 - s282 * s355 + s381
-    s390 = s277 * s354 - s287 * s353 + s286 * s355 + s384
-    s391 = s285 * s356 + s275 * s357 + s282 * s358 + s377
-    s392 = s277 * s357 - s287 * s356 - s286 * s358 + s387
-    s393 = s287 * (I_5x * s287) + s277 * (I_5y * s277) + s286 * (I_5z * s286) + s378
-    s394 = s367 - k17 * s350
-    s395 = s368 + k17 * s351
-    s396 = s369 + k17 * s352
-    s397 = s350 * (s367 + s394)
-    s398 = s351 * (s368 + s395)
-    s399 = s352 * (s369 + s396)
-    s400 = s394 - moment_link_4_y * s257
-    s401 = moment_link_4_y * s261 + s395
-    s402 = moment_link_4_y * s265 + s396
-    s403 = s272 * s338 + s257 * s339 + s269 * s340 + (s388 + (s398 + s399))
-    s404 = s276 * s338 + s261 * s339 + s275 * s340 + (s389 + (s351 * s367 - s350 * s395))
-    s405 = s278 * s338 - s265 * s339 + s277 * s340 + (s390 + (s350 * s396 - s352 * s367))
-    s406 = s276 * s341 + s261 * s342 + s275 * s343 + (s391 + (s399 - s397))
-    s407 = s278 * s341 - s265 * s342 + s277 * s343 + (s392 + (s351 * s396 + s352 * s368))
-    s408 = s346 + (s393 + (s398 - s397))
-    s409 = s400 + k19 * s332
-    s410 = k19 * s333 - s401
-    s411 = s402 - k19 * s334
-    s412 = s332 * (s400 + s409)
-    s413 = s333 * (s410 - s401)
-    s414 = s334 * (s402 + s411)
-    s415 = moment_link_3_y * sin_q_1 - k11 * s260 - moment_link_3_z * s257 + s409
-    s416 = s410 - (k11 * s264 + moment_link_3_y * cos_q_1 + moment_link_3_z * s261)
-    s417 = k11 * s266 + moment_link_3_z * s265 + s411
-    s418 = s260 * s317 + sin_q_1 * s318 - s257 * s319 + (s403 + (s413 - s414))
-    s419 = s264 * s317 - cos_q_1 * s318 - s261 * s319 + (s404 - (s332 * s410 + s333 * s400))
-    s420 = s265 * s319 - s266 * s317 + (s405 + (s334 * s400 - s332 * s411))
-    s421 = s264 * s320 - s323 - s261 * s321 + (s406 + (s412 - s414))
-    s422 = s265 * s321 - s266 * s320 + (s407 - (s333 * s411 + s334 * s401))
-    s425 = s416 + s312 * k38
-    s426 = s417 + s313 * k38
-    s427 = s311 * (s415 + (s415 + s311 * k38))
-    s428 = s312 * (s416 + s425)
-    s429 = s313 * (s417 + s426)
-    s431 = s255 * s298 + s256 * s299 - cos_q_1 * s300 + (s419 - (s311 * s425 + s312 * s415))
-    s1288 = sin_q_1 * (s253 * s298 + s254 * s299 + sin_q_1 * s300 + (s418 + (s428 + s429)))
-    s1289 = sin_q_1 * (sin_q_2 * s298 - cos_q_2 * s299 + (s420 - (s311 * s426 + s313 * s415)))
-    s1290 = cos_q_1 * (sin_q_2 * s301 + cos_q_2 * s302 + (s422 - (s312 * s426 + s313 * s416)))
-    s1291 = s1289 - s1290
-    s1292 = sin_q_1 * (s1288 - cos_q_1 * s431) - cos_q_1 * (sin_q_1 * s431 - cos_q_1 * (s304 + (s421 + (s427 + s429))))
-    s436 = cos_q_1 * s417
-    s437 = sin_q_1 * s417
-    s438 = sin_q_1 * s416 + cos_q_1 * s415
-    s439 = sin_q_1 * s418 - cos_q_1 * s419
-    s440 = sin_q_1 * s419 - cos_q_1 * s421
-    s1293 = sin_q_1 * s420 - cos_q_1 * s422 + (s312 * s436 - s311 * s437)
-    s1294 = sin_q_1 * (s439 + (s312 * s438 + s313 * s437)) - cos_q_1 * (s440 - (s313 * s436 + s311 * s438))
-    s444 = s265 * s401 - s261 * s402
-    s445 = s265 * s400 + s257 * s402
-    s446 = s257 * s401 + s261 * s400
-    s447 = s265 * s405 - (s257 * s403 + s261 * s404)
-    s448 = s265 * s407 - (s257 * s404 + s261 * s406)
-    s449 = s265 * s408 - (s257 * s405 + s261 * s407)
-    s450 = s447 + (s333 * s446 + s334 * s445)
-    s451 = s448 - (s334 * s444 + s332 * s446)
-    s1295 = sin_q_1 * s450 - cos_q_1 * s451
-    s1296 = s449 + (s332 * s445 - s333 * s444) + (s311 * s445 - s312 * s444)
-    s1297 = sin_q_1 * (s450 + (s312 * s446 - s313 * s445)) - cos_q_1 * (s451 + (s313 * s444 - s311 * s446))
-    s455 = s275 * s369 + s277 * s368
-    s456 = s277 * s367 - s269 * s369
-    s457 = s269 * s368 + s275 * s367
-    s458 = s269 * s388 + s275 * s389 + s277 * s390
-    s459 = s269 * s389 + s275 * s391 + s277 * s392
-    s460 = s269 * s390 + s275 * s392 + s277 * s393
-    s461 = s458 + (s351 * s457 - s352 * s456)
-    s462 = s459 + (s352 * s455 - s350 * s457)
-    s463 = s460 + (s351 * s455 - s350 * s456)
-    s1298 = s265 * s463 - (s257 * s461 + s261 * s462)
-    s464 = s461 + (s334 * s456 - s333 * s457)
-    s465 = s462 + (s332 * s457 - s334 * s455)
-    s1299 = sin_q_1 * s464 - cos_q_1 * s465
-    s1300 = s463 + (s332 * s456 - s333 * s455) + (s311 * s456 - s312 * s455)
-    s1301 = sin_q_1 * (s464 - (s312 * s457 + s313 * s456)) - cos_q_1 * (s465 + (s313 * s455 + s311 * s457))
-    s469 = s286 * s368 - s282 * s369
-    s470 = s286 * s367 - s280 * s369
-    s471 = s282 * s367 - s280 * s368
-    s472 = s280 * s376 - s282 * s381 + s286 * s384
-    s473 = s280 * s381 - s282 * s377 + s286 * s387
-    s474 = s280 * s384 - s282 * s387 + s286 * s378
-    s475 = s269 * s472 + s275 * s473 + s277 * s474
-    s476 = s472 - (s351 * s471 + s352 * s470)
-    s477 = s473 + (s352 * s469 + s350 * s471)
-    s478 = s474 + (s351 * s469 - s350 * s470)
-    s479 = s265 * s478 - (s257 * s476 + s261 * s477)
-    s480 = s476 + (s333 * s471 + s334 * s470)
-    s481 = s477 - (s334 * s469 + s332 * s471)
-    s483 = sin_q_1 * s480 - cos_q_1 * s481
-    s486 = s478 + (s332 * s470 - s333 * s469) + (s311 * s470 - s312 * s469)
-    s487 = sin_q_1 * (s480 + (s312 * s471 - s313 * s470)) - cos_q_1 * (s481 + (s313 * s469 - s311 * s471))
+    s279 = s274 - s275
+    s280 = s272 * cos_q_6 + s259 * sin_q_6
+    s281 = s272 * sin_q_6 - s259 * cos_q_6
+    s282 = cos_q_6 * s279 + s269 * sin_q_6
+    s283 = s269 * cos_q_6 - sin_q_6 * s279
+    s284 = s278 * cos_q_6 - s267 * sin_q_6
+    s285 = s267 * cos_q_6 + s278 * sin_q_6
+    s288 = inertia_link_2_xx * s243 + k8 * s244 - k9 * sin_q_1
+    s289 = k8 * s243 + inertia_link_2_yy * s244 + k10 * sin_q_1
+    s290 = k10 * s244 - k9 * s243 + inertia_link_2_zz * sin_q_1
+    s291 = inertia_link_2_xx * s245 + k8 * s246 + k9 * cos_q_1
+    s292 = k10 * cos_q_1 - (k8 * s245 + inertia_link_2_yy * s246)
+    s294 = s245 * s291 - s246 * s292 - cos_q_1 * (k10 * s246 - k9 * s245 - inertia_link_2_zz * cos_q_1)
+    s295 = sin_q_2 * (inertia_link_2_xx * sin_q_2 - k8 * cos_q_2) + cos_q_2 * (inertia_link_2_yy * cos_q_2 - k8 * sin_q_2)
+    s301 = k1 * s243
+    s302 = k1 * s245
+    s303 = k1 * sin_q_2
+    s307 = inertia_link_3_xx * s250 + inertia_link_3_xy * sin_q_1 - inertia_link_3_xz * s247
+    s308 = inertia_link_3_xy * s250 + inertia_link_3_yy * sin_q_1 + k12 * s247
+    s309 = inertia_link_3_xz * s250 - k12 * sin_q_1 - inertia_link_3_zz * s247
+    s310 = inertia_link_3_xx * s254 - inertia_link_3_xy * cos_q_1 - inertia_link_3_xz * s251
+    s311 = inertia_link_3_xz * s254 + k12 * cos_q_1 - inertia_link_3_zz * s251
+    s313 = cos_q_1 * (inertia_link_3_xy * s254 - inertia_link_3_yy * cos_q_1 + k12 * s251)
+    s315 = s255 * (inertia_link_3_zz * s255 - inertia_link_3_xz * s256) - s256 * (inertia_link_3_xz * s255 - inertia_link_3_xx * s256)
+    s322 = k3 * s250 + k4 * sin_q_1
+    s323 = k3 * s254 - k4 * cos_q_1
+    s324 = k3 * s256
+    s328 = inertia_link_4_xx * s262
+    s329 = I_4y * s247
+    s330 = inertia_link_4_zz * s259
+    s331 = inertia_link_4_xx * s266
+    s332 = I_4y * s251
+    s333 = inertia_link_4_zz * s265
+    s336 = s268 * (inertia_link_4_xx * s268) + s255 * (I_4y * s255) + s267 * (inertia_link_4_zz * s267)
+    s340 = k6 * s247
+    s341 = k6 * s251
+    s342 = k6 * s255
+    s343 = I_5x * s272
+    s344 = I_5y * s259
+    s345 = I_5z * s271
+    s346 = I_5x * s276
+    s347 = I_5y * s265
+    s348 = I_5z * s273
+    s357 = moment_link_6_z * s271
+    s358 = moment_link_6_z * s273
+    s359 = moment_link_6_z * s277
+    s360 = inertia_link_6_xx * s280
+    s361 = inertia_link_6_yy * s281
+    s362 = I_6z * s271
+    s363 = inertia_link_6_xx * s282
+    s364 = inertia_link_6_yy * s283
+    s365 = I_6z * s273
+    s366 = s280 * s360 + s281 * s361 + s271 * s362
+    s367 = s282 * s363 + s283 * s364 + s273 * s365
+    s368 = s284 * (inertia_link_6_xx * s284) + s285 * (inertia_link_6_yy * s285) + s277 * (I_6z * s277)
+    s371 = s283 * s361 - s282 * s360 - s273 * s362
+    s374 = s277 * s362 - (s284 * s360 + s285 * s361)
+    s377 = s284 * s363 - s285 * s364 - s277 * s365
+    s378 = s272 * s343 + s259 * s344 + s271 * s345 + s366
+    s379 = s276 * s343 + s265 * s344 - s273 * s345 + s371
+    s380 = s267 * s344 - s278 * s343 + s277 * s345 + s374
+    s381 = s276 * s346 + s265 * s347 + s273 * s348 + s367
+    s382 = s267 * s347 - s278 * s346 - s277 * s348 + s377
+    s383 = s278 * (I_5x * s278) + s267 * (I_5y * s267) + s277 * (I_5z * s277) + s368
+    s384 = s357 - k17 * s340
+    s385 = s358 + k17 * s341
+    s386 = s359 + k17 * s342
+    s387 = s340 * (s357 + s384)
+    s388 = s341 * (s358 + s385)
+    s389 = s342 * (s359 + s386)
+    s390 = s384 - moment_link_4_y * s247
+    s391 = moment_link_4_y * s251 + s385
+    s392 = moment_link_4_y * s255 + s386
+    s393 = s262 * s328 + s247 * s329 + s259 * s330 + (s378 + (s388 + s389))
+    s394 = s266 * s328 + s251 * s329 + s265 * s330 + (s379 + (s341 * s357 - s340 * s385))
+    s395 = s268 * s328 - s255 * s329 + s267 * s330 + (s380 + (s340 * s386 - s342 * s357))
+    s396 = s266 * s331 + s251 * s332 + s265 * s333 + (s381 + (s389 - s387))
+    s397 = s268 * s331 - s255 * s332 + s267 * s333 + (s382 + (s341 * s386 + s342 * s358))
+    s398 = s336 + (s383 + (s388 - s387))
+    s399 = s390 + k19 * s322
+    s400 = k19 * s323 - s391
+    s401 = s392 - k19 * s324
+    s402 = s322 * (s390 + s399)
+    s403 = s323 * (s400 - s391)
+    s404 = s324 * (s392 + s401)
+    s405 = moment_link_3_y * sin_q_1 - k11 * s250 - moment_link_3_z * s247 + s399
+    s406 = s400 - (k11 * s254 + moment_link_3_y * cos_q_1 + moment_link_3_z * s251)
+    s407 = k11 * s256 + moment_link_3_z * s255 + s401
+    s408 = s250 * s307 + sin_q_1 * s308 - s247 * s309 + (s393 + (s403 - s404))
+    s409 = s254 * s307 - cos_q_1 * s308 - s251 * s309 + (s394 - (s322 * s400 + s323 * s390))
+    s410 = s255 * s309 - s256 * s307 + (s395 + (s324 * s390 - s322 * s401))
+    s411 = s254 * s310 - s313 - s251 * s311 + (s396 + (s402 - s404))
+    s412 = s255 * s311 - s256 * s310 + (s397 - (s323 * s401 + s324 * s391))
+    s415 = s406 + s302 * k39
+    s416 = s407 + s303 * k39
+    s417 = s301 * (s405 + (s405 + s301 * k39))
+    s418 = s302 * (s406 + s415)
+    s419 = s303 * (s407 + s416)
+    s421 = s245 * s288 + s246 * s289 - cos_q_1 * s290 + (s409 - (s301 * s415 + s302 * s405))
+    s1262 = sin_q_1 * (s243 * s288 + s244 * s289 + sin_q_1 * s290 + (s408 + (s418 + s419)))
+    s1263 = sin_q_1 * (sin_q_2 * s288 - cos_q_2 * s289 + (s410 - (s301 * s416 + s303 * s405)))
+    s1264 = cos_q_1 * (sin_q_2 * s291 + cos_q_2 * s292 + (s412 - (s302 * s416 + s303 * s406)))
+    s1265 = s1263 - s1264
+    s1266 = sin_q_1 * (s1262 - cos_q_1 * s421) - cos_q_1 * (sin_q_1 * s421 - cos_q_1 * (s294 + (s411 + (s417 + s419))))
+    s426 = cos_q_1 * s407
+    s427 = sin_q_1 * s407
+    s428 = sin_q_1 * s406 + cos_q_1 * s405
+    s429 = sin_q_1 * s408 - cos_q_1 * s409
+    s430 = sin_q_1 * s409 - cos_q_1 * s411
+    s1267 = sin_q_1 * s410 - cos_q_1 * s412 + (s302 * s426 - s301 * s427)
+    s1268 = sin_q_1 * (s429 + (s302 * s428 + s303 * s427)) - cos_q_1 * (s430 - (s303 * s426 + s301 * s428))
+    s434 = s255 * s391 - s251 * s392
+    s435 = s255 * s390 + s247 * s392
+    s436 = s247 * s391 + s251 * s390
+    s437 = s255 * s395 - (s247 * s393 + s251 * s394)
+    s438 = s255 * s397 - (s247 * s394 + s251 * s396)
+    s439 = s255 * s398 - (s247 * s395 + s251 * s397)
+    s440 = s437 + (s323 * s436 + s324 * s435)
+    s441 = s438 - (s324 * s434 + s322 * s436)
+    s1269 = sin_q_1 * s440 - cos_q_1 * s441
+    s1270 = s439 + (s322 * s435 - s323 * s434) + (s301 * s435 - s302 * s434)
+    s1271 = sin_q_1 * (s440 + (s302 * s436 - s303 * s435)) - cos_q_1 * (s441 + (s303 * s434 - s301 * s436))
+    s445 = s265 * s359 + s267 * s358
+    s446 = s267 * s357 - s259 * s359
+    s447 = s259 * s358 + s265 * s357
+    s448 = s259 * s378 + s265 * s379 + s267 * s380
+    s449 = s259 * s379 + s265 * s381 + s267 * s382
+    s450 = s259 * s380 + s265 * s382 + s267 * s383
+    s451 = s448 + (s341 * s447 - s342 * s446)
+    s452 = s449 + (s342 * s445 - s340 * s447)
+    s453 = s450 + (s341 * s445 - s340 * s446)
+    s1272 = s255 * s453 - (s247 * s451 + s251 * s452)
+    s454 = s451 + (s324 * s446 - s323 * s447)
+    s455 = s452 + (s322 * s447 - s324 * s445)
+    s1273 = sin_q_1 * s454 - cos_q_1 * s455
+    s1274 = s453 + (s322 * s446 - s323 * s445) + (s301 * s446 - s302 * s445)
+    s1275 = sin_q_1 * (s454 - (s302 * s447 + s303 * s446)) - cos_q_1 * (s455 + (s303 * s445 + s301 * s447))
+    s459 = s277 * s358 - s273 * s359
+    s460 = s277 * s357 - s271 * s359
+    s461 = s273 * s357 - s271 * s358
+    s462 = s271 * s366 - s273 * s371 + s277 * s374
+    s463 = s271 * s371 - s273 * s367 + s277 * s377
+    s464 = s271 * s374 - s273 * s377 + s277 * s368
+    s465 = s259 * s462 + s265 * s463 + s267 * s464
+    s466 = s462 - (s341 * s461 + s342 * s460)
+    s467 = s463 + (s342 * s459 + s340 * s461)
+    s468 = s464 + (s341 * s459 - s340 * s460)
+    s469 = s255 * s468 - (s247 * s466 + s251 * s467)
+    s470 = s466 + (s323 * s461 + s324 * s460)
+    s471 = s467 - (s324 * s459 + s322 * s461)
+    s473 = sin_q_1 * s470 - cos_q_1 * s471
+    s476 = s468 + (s322 * s460 - s323 * s459) + (s301 * s460 - s302 * s459)
+    s477 = sin_q_1 * (s470 + (s302 * s461 - s303 * s460)) - cos_q_1 * (s471 + (s303 * s459 - s301 * s461))
     return (
-        k21 + (s428 + (s427 + (s305 + (s325 + (s408 + (s412 + s413)))))),
-        s1291,
-        s1293,
-        s1296,
-        s1300,
-        s486,
-        s1291,
-        k36 + s1292,
-        s1294,
-        s1297,
-        s1301,
-        s487,
-        s1293,
-        s1294,
-        k2 + (sin_q_1 * s439 - cos_q_1 * s440),
-        s1295,
-        s1299,
-        s483,
-        s1296,
-        s1297,
-        s1295,
-        k5 + (s265 * s449 - (s257 * s447 + s261 * s448)),
-        s1298,
-        s479,
-        s1300,
-        s1301,
-        s1299,
-        s1298,
-        k7 + (s269 * s458 + s275 * s459 + s277 * s460),
-        s475,
-        s486,
-        s487,
-        s483,
-        s479,
-        s475,
-        k37 + (s280 * s472 - s282 * s473 + s286 * s474),
+        k21 + (s418 + (s417 + (s295 + (s315 + (s398 + (s402 + s403)))))),
+        s1265,
+        s1267,
+        s1270,
+        s1274,
+        s476,
+        s1265,
+        k37 + s1266,
+        s1268,
+        s1271,
+        s1275,
+        s477,
+        s1267,
+        s1268,
+        k2 + (sin_q_1 * s429 - cos_q_1 * s430),
+        s1269,
+        s1273,
+        s473,
+        s1270,
+        s1271,
+        s1269,
+        k5 + (s255 * s439 - (s247 * s437 + s251 * s438)),
+        s1272,
+        s469,
+        s1274,
+        s1275,
+        s1273,
+        s1272,
+        k7 + (s259 * s448 + s265 * s449 + s267 * s450),
+        s465,
+        s476,
+        s477,
+        s473,
+        s469,
+        s465,
+        k38 + (s271 * s462 - s273 * s463 + s277 * s464),
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """408 operations: 97 add, 87 sub, 214 mul, 5 sin, 5 cos."""
-    m_3, m_4, m_5, m_6, k1, k3, k4, k6, k8, k9, k10, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, moment_link_4_y, moment_link_6_z, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35 = k
+    """394 operations: 95 add, 75 sub, 214 mul, 5 sin, 5 cos."""
+    m_3, m_4, I_4y, m_5, I_5x, I_5y, I_5z, m_6, I_6z, k1, k3, k4, k6, k8, k9, k10, inertia_link_2_xx, inertia_link_2_yy, k11, moment_link_3_y, moment_link_3_z, inertia_link_3_xy, inertia_link_3_xz, k12, inertia_link_3_xx, inertia_link_3_zz, moment_link_4_y, inertia_link_4_xx, inertia_link_4_zz, moment_link_6_z, inertia_link_6_xx, inertia_link_6_yy, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36 = k
     _, q_2, q_3, q_4, q_5, q_6, q_1_dot, q_2_dot, q_3_dot, q_4_dot, q_5_dot, q_6_dot = y
     cos_q_2 = cos(q_2)
     sin_q_2 = sin(q_2)
@@ -3003,138 +2857,129 @@ def _velocity_force(y, k, u=(), extra=(), cos=cos, sin=sin):
     omega_link_2_x = q_1_dot * sin_q_2
     omega_link_2_y = q_1_dot * cos_q_2
     omega_link_3_z = cos_q_3 * omega_link_2_y - sin_q_3 * omega_link_2_x
-    s125 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
+    s124 = cos_q_3 * omega_link_2_x + sin_q_3 * omega_link_2_y
     omega_link_3_y = q_2_dot + q_3_dot
-    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s125
-    s126 = cos_q_4 * s125
-    s127 = sin_q_4 * omega_link_3_y
-    omega_link_4_x = s126 - s127
+    omega_link_4_z = cos_q_4 * omega_link_3_y + sin_q_4 * s124
+    s125 = cos_q_4 * s124
+    s126 = sin_q_4 * omega_link_3_y
+    omega_link_4_x = s125 - s126
     omega_link_4_y = q_4_dot + omega_link_3_z
-    s128 = s127 - s126
-    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s128
-    s129 = cos_q_5 * s128
-    s130 = sin_q_5 * omega_link_4_y
-    omega_link_5_x = s129 - s130
+    s127 = s126 - s125
+    omega_link_5_z = cos_q_5 * omega_link_4_y + sin_q_5 * s127
+    s128 = cos_q_5 * s127
+    s129 = sin_q_5 * omega_link_4_y
+    omega_link_5_x = s128 - s129
     omega_link_5_y = q_5_dot + omega_link_4_z
-    s131 = s130 - s129
-    omega_link_6_x = cos_q_6 * s131 - sin_q_6 * omega_link_5_y
-    s132 = cos_q_6 * omega_link_5_y + sin_q_6 * s131
+    s130 = s129 - s128
+    omega_link_6_x = cos_q_6 * s130 - sin_q_6 * omega_link_5_y
+    s131 = cos_q_6 * omega_link_5_y + sin_q_6 * s130
     omega_link_6_z = q_6_dot + omega_link_5_z
-    s133 = q_2_dot * omega_link_2_y
-    s134 = q_2_dot * omega_link_2_x
+    s132 = q_2_dot * omega_link_2_y
+    s133 = q_2_dot * omega_link_2_x
     omega_link_2_x_squared = omega_link_2_x * omega_link_2_x
     omega_link_2_y_squared = omega_link_2_y * omega_link_2_y
     q_2_dot_squared = q_2_dot * q_2_dot
-    s135 = omega_link_2_x * omega_link_2_y
-    s136 = s134 + s134
-    s137 = s133 + s133
-    s138 = sin_q_3 * s134 - cos_q_3 * s133
-    s1302 = k1 * (omega_link_2_y_squared + q_2_dot_squared)
-    s1303 = k1 * s135
-    bias_link_3_y = k1 * s136
-    s141 = q_3_dot * omega_link_3_z
-    s142 = s138 - s141
-    s143 = cos_q_3 * s134 + sin_q_3 * s133 + q_3_dot * s125
-    s144 = s125 * s125
+    s134 = omega_link_2_x * omega_link_2_y
+    s135 = s133 + s133
+    s136 = sin_q_3 * s133 - cos_q_3 * s132
+    s1276 = k1 * (omega_link_2_y_squared + q_2_dot_squared)
+    s1277 = k1 * s134
+    bias_link_3_y = k1 * s135
+    s139 = q_3_dot * omega_link_3_z
+    s140 = s136 - s139
+    s141 = cos_q_3 * s133 + sin_q_3 * s132 + q_3_dot * s124
+    s142 = s124 * s124
     omega_link_3_y_squared = omega_link_3_y * omega_link_3_y
     omega_link_3_z_squared = omega_link_3_z * omega_link_3_z
-    s145 = s125 * omega_link_3_y
-    s146 = omega_link_3_z * s125
-    s147 = omega_link_3_z * omega_link_3_y
-    s148 = omega_link_3_y_squared + omega_link_3_z_squared
-    s149 = s143 - s145
-    s150 = s143 + s145
-    s151 = s144 + omega_link_3_z_squared
-    s152 = s147 - s142
-    s153 = s142 + s147
-    s154 = s141 - s138
-    s155 = cos_q_4 * s154
-    s157 = bias_link_3_y - (k3 * s150 + k4 * s151)
-    s159 = q_4_dot * omega_link_4_z
-    s160 = s155 - s159
-    s161 = sin_q_4 * s154 + q_4_dot * omega_link_4_x
-    s162 = omega_link_4_x * omega_link_4_y
-    s163 = omega_link_4_z * omega_link_4_x
-    s164 = omega_link_4_z * omega_link_4_y
-    s165 = s162 - s161
-    s166 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
-    s167 = s160 + s164
-    s168 = s159 - s155
-    s169 = cos_q_5 * s168 + sin_q_5 * s143
-    s174 = q_5_dot * omega_link_5_z
-    s175 = s169 - s174
-    s176 = sin_q_5 * s168 - cos_q_5 * s143 + q_5_dot * omega_link_5_x
-    s177 = omega_link_5_x * omega_link_5_y
-    s178 = omega_link_5_z * omega_link_5_x
-    s179 = omega_link_5_z * omega_link_5_y
-    s180 = s174 - s169
-    s183 = cos_q_6 * s180 - sin_q_6 * s161 - q_6_dot * s132
-    s184 = cos_q_6 * s161 + sin_q_6 * s180 + q_6_dot * omega_link_6_x
-    s185 = omega_link_6_x * s132
-    s186 = omega_link_6_x * omega_link_6_z
-    s187 = s132 * omega_link_6_z
-    s188 = s186 - s184
-    s189 = s183 + s187
-    s190 = k8 * s136 - k9 * s135 + k10 * (q_2_dot_squared - omega_link_2_y_squared) + s137 * k23
-    s191 = k10 * s135 - k8 * s137 + k9 * (omega_link_2_x_squared - q_2_dot_squared) - s136 * k22
-    s192 = k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + s135 * k22 - s135 * k23
-    s193 = k11 * s146 + moment_link_3_y * s153 - moment_link_3_z * (s144 + omega_link_3_y_squared)
-    s195 = m_3 * bias_link_3_y + (k11 * s150 - moment_link_3_y * s151 + moment_link_3_z * s152)
-    s196 = inertia_link_3_xy * s146 - inertia_link_3_xz * s150 + k12 * (omega_link_3_z_squared - omega_link_3_y_squared)
-    s197 = k12 * s149 + inertia_link_3_xy * s153 - inertia_link_3_xz * (s144 - omega_link_3_z_squared)
-    s198 = k12 * s146 - inertia_link_3_xz * s152 - inertia_link_3_xy * (omega_link_3_y_squared - s144)
-    s205 = (s176 - s185) * k33 + (s176 + s185) * k34
-    bias_link_3_z_2 = cos_q_3 * s1303 + sin_q_3 * s1302
-    bias_link_3_x_2 = cos_q_3 * s1302 - sin_q_3 * s1303
-    s1304 = k4 * s149 - k3 * s148 + bias_link_3_x_2
-    bias_link_4_y_2 = k4 * s153 - k3 * s146 + bias_link_3_z_2
-    bias_link_4_z_2 = cos_q_4 * s157 - sin_q_4 * s1304
-    s1305 = sin_q_4 * s157 + cos_q_4 * s1304
-    s1306 = bias_link_4_y_2 - k6 * s166
-    bias_link_5_y_2 = k6 * s167 + bias_link_4_z_2
-    s1307 = s1305 - k6 * s165
-    bias_link_5_z_2 = cos_q_5 * s1306 + sin_q_5 * s1307
-    s1308 = cos_q_5 * s1307
-    s1309 = sin_q_5 * s1306
-    s1310 = s1309 - s1308
-    bias_link_6_x_2 = cos_q_6 * s1310 - sin_q_6 * bias_link_5_y_2
-    s1311 = cos_q_6 * bias_link_5_y_2 + sin_q_6 * s1310
-    s1312 = k11 * s148 + moment_link_3_y * s149 - moment_link_3_z * s146 + m_3 * bias_link_3_x_2
-    s1313 = s196 + s153 * k25 - s152 * k26 + (moment_link_3_y * bias_link_3_z_2 - moment_link_3_z * bias_link_3_y)
-    s1314 = s197 - s146 * k26 + s146 * k24 + (moment_link_3_z * bias_link_3_x_2 + k11 * bias_link_3_z_2)
-    s1315 = s198 - s150 * k24 - s149 * k25 - (k11 * bias_link_3_y + moment_link_3_y * bias_link_3_x_2)
-    s1316 = moment_link_6_z * s188 + m_6 * bias_link_6_x_2
-    s1317 = moment_link_6_z * s189 + m_6 * s1311
-    s1318 = m_6 * bias_link_5_z_2 - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s132 * s132)
-    s1319 = (s183 - s187) * k34 + s189 * k35 + moment_link_6_z * s1311
-    s1320 = s188 * k35 - (s184 + s186) * k33 + moment_link_6_z * bias_link_6_x_2
-    s1321 = (s175 + s179) * k31 - (s179 - s175) * k32 + (sin_q_6 * s1320 - cos_q_6 * s1319)
-    s1322 = (s161 + s178) * k32 - (s178 - s161) * k30 - (sin_q_6 * s1319 + cos_q_6 * s1320)
-    s1323 = (s176 + s177) * k30 - (s177 - s176) * k31 + s205
-    s1324 = m_5 * (s1308 - s1309) - (cos_q_6 * s1316 + sin_q_6 * s1317)
-    s1325 = m_5 * bias_link_5_y_2 + (cos_q_6 * s1317 - sin_q_6 * s1316)
-    s1326 = m_5 * bias_link_5_z_2 + s1318
-    s1327 = sin_q_5 * s1326 + cos_q_5 * s1324
-    s1328 = s167 * k28 - (s164 - s160) * k29 + moment_link_4_y * bias_link_4_z_2 + (k6 * s1325 - (sin_q_5 * s1323 + cos_q_5 * s1321))
-    s1329 = (s163 - s143) * k29 - (s143 + s163) * k27 + (cos_q_5 * s1323 - sin_q_5 * s1321)
-    s1330 = (s161 + s162) * k27 - s165 * k28 + moment_link_4_y * s1305 + (s1322 + k6 * s1327)
-    s1331 = moment_link_4_y * s165 - m_4 * s1305 - s1327
-    s1332 = m_4 * bias_link_4_y_2 - moment_link_4_y * s166 + (cos_q_5 * s1326 - sin_q_5 * s1324)
-    s1333 = moment_link_4_y * s167 + m_4 * bias_link_4_z_2 + s1325
-    s1334 = cos_q_4 * s1333 - sin_q_4 * s1331
-    s1335 = sin_q_4 * s1333 + cos_q_4 * s1331
-    s1336 = s1313 + (k4 * s1332 - (sin_q_4 * s1330 + cos_q_4 * s1328))
-    s1337 = s1314 + (cos_q_4 * s1330 - sin_q_4 * s1328 - k3 * s1332)
-    s1338 = s1315 + (s1329 + (k3 * s1334 + k4 * s1335))
-    s1339 = cos_q_3 * (s193 + m_3 * bias_link_3_z_2 + s1332) - sin_q_3 * (s1312 - s1335)
-    s1340 = cos_q_2 * (s191 + (cos_q_3 * s1338 - sin_q_3 * s1336 - k1 * (s195 + s1334)))
+    s143 = s124 * omega_link_3_y
+    s144 = omega_link_3_z * s124
+    s145 = omega_link_3_z * omega_link_3_y
+    s146 = omega_link_3_y_squared + omega_link_3_z_squared
+    s147 = s141 - s143
+    s148 = s141 + s143
+    s149 = s142 + omega_link_3_z_squared
+    s150 = s145 - s140
+    s151 = s140 + s145
+    s152 = s139 - s136
+    s153 = cos_q_4 * s152
+    s155 = bias_link_3_y - (k3 * s148 + k4 * s149)
+    s157 = q_4_dot * omega_link_4_z
+    s158 = s153 - s157
+    s159 = sin_q_4 * s152 + q_4_dot * omega_link_4_x
+    s160 = omega_link_4_x * omega_link_4_y
+    s161 = omega_link_4_z * omega_link_4_y
+    s162 = s160 - s159
+    s163 = omega_link_4_x * omega_link_4_x + omega_link_4_z * omega_link_4_z
+    s164 = s158 + s161
+    s165 = s157 - s153
+    s166 = cos_q_5 * s165 + sin_q_5 * s141
+    s171 = q_5_dot * omega_link_5_z
+    s172 = sin_q_5 * s165 - cos_q_5 * s141 + q_5_dot * omega_link_5_x
+    s173 = s171 - s166
+    s176 = cos_q_6 * s173 - sin_q_6 * s159 - q_6_dot * s131
+    s177 = cos_q_6 * s159 + sin_q_6 * s173 + q_6_dot * omega_link_6_x
+    s178 = omega_link_6_x * omega_link_6_z
+    s179 = s131 * omega_link_6_z
+    s180 = k8 * s135 - k9 * s134 + k10 * (q_2_dot_squared - omega_link_2_y_squared) + inertia_link_2_xx * s132
+    s181 = k10 * s134 - k8 * (s132 + s132) + k9 * (omega_link_2_x_squared - q_2_dot_squared)
+    s184 = k11 * s144 + moment_link_3_y * s151 - moment_link_3_z * (s142 + omega_link_3_y_squared)
+    s186 = m_3 * bias_link_3_y + (k11 * s148 - moment_link_3_y * s149 + moment_link_3_z * s150)
+    s187 = inertia_link_3_xy * s144 - inertia_link_3_xz * s148 + k12 * (omega_link_3_z_squared - omega_link_3_y_squared)
+    s188 = k12 * s147 + inertia_link_3_xy * s151 - inertia_link_3_xz * (s142 - omega_link_3_z_squared)
+    s189 = k12 * s144 - inertia_link_3_xz * s150 - inertia_link_3_xy * (omega_link_3_y_squared - s142)
+    s197 = I_6z * s172 - omega_link_6_x * s131 * k36
+    bias_link_3_z_2 = cos_q_3 * s1277 + sin_q_3 * s1276
+    bias_link_3_x_2 = cos_q_3 * s1276 - sin_q_3 * s1277
+    s1278 = k4 * s147 - k3 * s146 + bias_link_3_x_2
+    bias_link_4_y_2 = k4 * s151 - k3 * s144 + bias_link_3_z_2
+    bias_link_4_z_2 = cos_q_4 * s155 - sin_q_4 * s1278
+    s1279 = sin_q_4 * s155 + cos_q_4 * s1278
+    s1280 = bias_link_4_y_2 - k6 * s163
+    bias_link_5_y_2 = k6 * s164 + bias_link_4_z_2
+    s1281 = s1279 - k6 * s162
+    bias_link_5_z_2 = cos_q_5 * s1280 + sin_q_5 * s1281
+    s1282 = cos_q_5 * s1281
+    s1283 = sin_q_5 * s1280
+    s1284 = s1283 - s1282
+    bias_link_6_x_2 = cos_q_6 * s1284 - sin_q_6 * bias_link_5_y_2
+    s1285 = cos_q_6 * bias_link_5_y_2 + sin_q_6 * s1284
+    s1286 = k11 * s146 + moment_link_3_y * s147 - moment_link_3_z * s144 + m_3 * bias_link_3_x_2
+    s1287 = s187 + inertia_link_3_xx * s140 + s145 * k25 + (moment_link_3_y * bias_link_3_z_2 - moment_link_3_z * bias_link_3_y)
+    s1288 = s188 - s144 * k26 + (moment_link_3_z * bias_link_3_x_2 + k11 * bias_link_3_z_2)
+    s1289 = s189 - inertia_link_3_zz * s141 - s143 * k27 - (k11 * bias_link_3_y + moment_link_3_y * bias_link_3_x_2)
+    s1290 = inertia_link_4_xx * s158 + s161 * k28 + moment_link_4_y * bias_link_4_z_2
+    s1291 = moment_link_6_z * (s178 - s177) + m_6 * bias_link_6_x_2
+    s1292 = moment_link_6_z * (s176 + s179) + m_6 * s1285
+    s1293 = m_6 * bias_link_5_z_2 - moment_link_6_z * (omega_link_6_x * omega_link_6_x + s131 * s131)
+    s1294 = inertia_link_6_xx * s176 - s179 * k34 + moment_link_6_z * s1285
+    s1295 = s178 * k35 - inertia_link_6_yy * s177 + moment_link_6_z * bias_link_6_x_2
+    s1296 = I_5x * (s166 - s171) + omega_link_5_z * omega_link_5_y * k31 + (sin_q_6 * s1295 - cos_q_6 * s1294)
+    s1297 = I_5y * s159 + omega_link_5_z * omega_link_5_x * k32 - (sin_q_6 * s1294 + cos_q_6 * s1295)
+    s1298 = I_5z * s172 + omega_link_5_x * omega_link_5_y * k33 + s197
+    s1299 = m_5 * (s1282 - s1283) - (cos_q_6 * s1291 + sin_q_6 * s1292)
+    s1300 = m_5 * bias_link_5_y_2 + (cos_q_6 * s1292 - sin_q_6 * s1291)
+    s1301 = m_5 * bias_link_5_z_2 + s1293
+    s1302 = sin_q_5 * s1301 + cos_q_5 * s1299
+    s1303 = s1290 + (k6 * s1300 - (sin_q_5 * s1298 + cos_q_5 * s1296))
+    s1304 = omega_link_4_z * omega_link_4_x * k29 - I_4y * s141 + (cos_q_5 * s1298 - sin_q_5 * s1296)
+    s1305 = inertia_link_4_zz * s159 + s160 * k30 + moment_link_4_y * s1279 + (s1297 + k6 * s1302)
+    s1306 = moment_link_4_y * s162 - m_4 * s1279 - s1302
+    s1307 = m_4 * bias_link_4_y_2 - moment_link_4_y * s163 + (cos_q_5 * s1301 - sin_q_5 * s1299)
+    s1308 = moment_link_4_y * s164 + m_4 * bias_link_4_z_2 + s1300
+    s1309 = cos_q_4 * s1308 - sin_q_4 * s1306
+    s1310 = sin_q_4 * s1308 + cos_q_4 * s1306
+    s1311 = s1287 + (k4 * s1307 - (sin_q_4 * s1305 + cos_q_4 * s1303))
+    s1312 = s1288 + (cos_q_4 * s1305 - sin_q_4 * s1303 - k3 * s1307)
+    s1313 = s1289 + (s1304 + (k3 * s1309 + k4 * s1310))
+    s1314 = cos_q_3 * (s184 + m_3 * bias_link_3_z_2 + s1307) - sin_q_3 * (s1286 - s1310)
+    s1315 = s181 - inertia_link_2_yy * s133 + s133 * k23 + (cos_q_3 * s1313 - sin_q_3 * s1311 - k1 * (s186 + s1309))
     return (
-        sin_q_2 * (s190 - (sin_q_3 * s1338 + cos_q_3 * s1336)) + s1340,
-        s192 + (s1337 + k1 * s1339),
-        s1337,
-        s1329,
-        s1322,
-        s205,
+        sin_q_2 * (s180 + s132 * k22 - (sin_q_3 * s1313 + cos_q_3 * s1311)) + cos_q_2 * s1315,
+        k8 * (omega_link_2_y_squared - omega_link_2_x_squared) + s134 * k24 + (s1312 + k1 * s1314),
+        s1312,
+        s1304,
+        s1297,
+        s197,
     )
 
 
@@ -3155,42 +3000,42 @@ def _gravity_force(y, k, u=(), extra=(), cos=cos, sin=sin):
     bias_link_2_x = gravity_g * sin_q_2
     bias_link_2_y = gravity_g * cos_q_2
     bias_link_3_z_3 = cos_q_3 * bias_link_2_y - sin_q_3 * bias_link_2_x
-    s1341 = cos_q_3 * bias_link_2_x + sin_q_3 * bias_link_2_y
-    bias_link_4_z_3 = sin_q_4 * s1341
-    bias_link_4_x = cos_q_4 * s1341
-    s1342 = cos_q_5 * bias_link_4_x + sin_q_5 * bias_link_3_z_3
-    bias_link_6_x_3 = cos_q_6 * s1342 - sin_q_6 * bias_link_4_z_3
-    s1343 = cos_q_6 * bias_link_4_z_3 + sin_q_6 * s1342
-    s1344 = m_6 * bias_link_6_x_3
-    s1345 = m_6 * s1343
-    s1346 = moment_link_6_z * s1343
-    s1347 = moment_link_6_z * bias_link_6_x_3
-    s1348 = sin_q_6 * s1346 + cos_q_6 * s1347
-    s1349 = sin_q_6 * s1347 - cos_q_6 * s1346
-    s1350 = m_5 * s1342 + (cos_q_6 * s1344 + sin_q_6 * s1345)
-    s1351 = m_5 * bias_link_4_z_3 + (cos_q_6 * s1345 - sin_q_6 * s1344)
-    s1352 = k17 * (cos_q_5 * bias_link_3_z_3 - sin_q_5 * bias_link_4_x)
-    s1353 = cos_q_5 * s1350 - sin_q_5 * s1352
-    s1354 = sin_q_5 * s1349
-    s1355 = moment_link_4_y * bias_link_4_z_3 + (k6 * s1351 - cos_q_5 * s1349)
-    s1356 = moment_link_4_y * bias_link_4_x + (s1348 + k6 * s1353)
-    s1357 = m_4 * bias_link_4_x + s1353
-    s1358 = m_4 * bias_link_3_z_3 + (cos_q_5 * s1352 + sin_q_5 * s1350)
-    s1359 = m_4 * bias_link_4_z_3 + s1351
-    s1360 = cos_q_4 * s1359 - sin_q_4 * s1357
-    s1361 = sin_q_4 * s1359 + cos_q_4 * s1357
-    s1362 = moment_link_3_y * bias_link_3_z_3 + (sin_q_4 * s1356 - cos_q_4 * s1355 + k4 * s1358)
-    s1363 = k11 * bias_link_3_z_3 - moment_link_3_z * s1341 - (cos_q_4 * s1356 + sin_q_4 * s1355 + k3 * s1358)
-    s1364 = moment_link_3_y * s1341 + (k3 * s1360 + k4 * s1361 - s1354)
-    s1365 = cos_q_3 * (m_3 * bias_link_3_z_3 + s1358) + sin_q_3 * (m_3 * s1341 + s1361)
-    s1366 = moment_link_2_z * bias_link_2_x + (cos_q_3 * s1364 - sin_q_3 * s1362 - k1 * s1360)
-    s1367 = sin_q_2 * (moment_link_2_z * bias_link_2_y + (sin_q_3 * s1364 + cos_q_3 * s1362))
+    s1316 = cos_q_3 * bias_link_2_x + sin_q_3 * bias_link_2_y
+    bias_link_4_z_3 = sin_q_4 * s1316
+    bias_link_4_x = cos_q_4 * s1316
+    s1317 = cos_q_5 * bias_link_4_x + sin_q_5 * bias_link_3_z_3
+    bias_link_6_x_3 = cos_q_6 * s1317 - sin_q_6 * bias_link_4_z_3
+    s1318 = cos_q_6 * bias_link_4_z_3 + sin_q_6 * s1317
+    s1319 = m_6 * bias_link_6_x_3
+    s1320 = m_6 * s1318
+    s1321 = moment_link_6_z * s1318
+    s1322 = moment_link_6_z * bias_link_6_x_3
+    s1323 = sin_q_6 * s1321 + cos_q_6 * s1322
+    s1324 = sin_q_6 * s1322 - cos_q_6 * s1321
+    s1325 = m_5 * s1317 + (cos_q_6 * s1319 + sin_q_6 * s1320)
+    s1326 = m_5 * bias_link_4_z_3 + (cos_q_6 * s1320 - sin_q_6 * s1319)
+    s1327 = k17 * (cos_q_5 * bias_link_3_z_3 - sin_q_5 * bias_link_4_x)
+    s1328 = cos_q_5 * s1325 - sin_q_5 * s1327
+    s1329 = sin_q_5 * s1324
+    s1330 = moment_link_4_y * bias_link_4_z_3 + (k6 * s1326 - cos_q_5 * s1324)
+    s1331 = moment_link_4_y * bias_link_4_x + (s1323 + k6 * s1328)
+    s1332 = m_4 * bias_link_4_x + s1328
+    s1333 = m_4 * bias_link_3_z_3 + (cos_q_5 * s1327 + sin_q_5 * s1325)
+    s1334 = m_4 * bias_link_4_z_3 + s1326
+    s1335 = cos_q_4 * s1334 - sin_q_4 * s1332
+    s1336 = sin_q_4 * s1334 + cos_q_4 * s1332
+    s1337 = moment_link_3_y * bias_link_3_z_3 + (sin_q_4 * s1331 - cos_q_4 * s1330 + k4 * s1333)
+    s1338 = k11 * bias_link_3_z_3 - moment_link_3_z * s1316 - (cos_q_4 * s1331 + sin_q_4 * s1330 + k3 * s1333)
+    s1339 = moment_link_3_y * s1316 + (k3 * s1335 + k4 * s1336 - s1329)
+    s1340 = cos_q_3 * (m_3 * bias_link_3_z_3 + s1333) + sin_q_3 * (m_3 * s1316 + s1336)
+    s1341 = moment_link_2_z * bias_link_2_x + (cos_q_3 * s1339 - sin_q_3 * s1337 - k1 * s1335)
+    s1342 = sin_q_2 * (moment_link_2_z * bias_link_2_y + (sin_q_3 * s1339 + cos_q_3 * s1337))
     return (
-        cos_q_2 * s1366 - s1367,
-        moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + (s1363 + k1 * s1365),
-        s1363,
-        -s1354,
-        -s1348,
+        cos_q_2 * s1341 - s1342,
+        moment_link_2_x * bias_link_2_y - moment_link_2_y * bias_link_2_x + (s1338 + k1 * s1340),
+        s1338,
+        -s1329,
+        -s1323,
         0.0,
     )
 
@@ -3203,15 +3048,15 @@ def _point_positions(y, k, u=(), extra=(), cos=cos, sin=sin):
     sin_q_1 = sin(q_1)
     cos_q_2 = cos(q_2)
     sin_q_2 = sin(q_2)
-    s253 = cos_q_1 * cos_q_2
-    s254 = cos_q_1 * sin_q_2
-    s255 = sin_q_1 * cos_q_2
-    s256 = sin_q_1 * sin_q_2
+    s243 = cos_q_1 * cos_q_2
+    s244 = cos_q_1 * sin_q_2
+    s245 = sin_q_1 * cos_q_2
+    s246 = sin_q_1 * sin_q_2
     cos_q_3 = cos(q_3)
     sin_q_3 = sin(q_3)
     return (
-        k1 * s253 + (k3 * (s254 * sin_q_3 - s253 * cos_q_3) + k4 * sin_q_1) - k6 * (s254 * cos_q_3 + s253 * sin_q_3),
-        k1 * s255 + (k3 * (s256 * sin_q_3 - s255 * cos_q_3) - k4 * cos_q_1) - k6 * (s256 * cos_q_3 + s255 * sin_q_3),
+        k1 * s243 + (k3 * (s244 * sin_q_3 - s243 * cos_q_3) + k4 * sin_q_1) - k6 * (s244 * cos_q_3 + s243 * sin_q_3),
+        k1 * s245 + (k3 * (s246 * sin_q_3 - s245 * cos_q_3) - k4 * cos_q_1) - k6 * (s246 * cos_q_3 + s245 * sin_q_3),
         k6 * (cos_q_2 * cos_q_3 - sin_q_2 * sin_q_3) + (d_1 + k1 * sin_q_2 - k3 * (sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3)),
     )
 
@@ -3224,120 +3069,86 @@ def _point_jacobians(y, k, u=(), extra=(), cos=cos, sin=sin):
     sin_q_1 = sin(q_1)
     cos_q_2 = cos(q_2)
     sin_q_2 = sin(q_2)
-    s253 = cos_q_1 * cos_q_2
-    s254 = cos_q_1 * sin_q_2
-    s255 = sin_q_1 * cos_q_2
-    s256 = sin_q_1 * sin_q_2
+    s243 = cos_q_1 * cos_q_2
+    s244 = cos_q_1 * sin_q_2
+    s245 = sin_q_1 * cos_q_2
+    s246 = sin_q_1 * sin_q_2
     cos_q_3 = cos(q_3)
     sin_q_3 = sin(q_3)
-    s257 = s254 * cos_q_3 + s253 * sin_q_3
-    s261 = s256 * cos_q_3 + s255 * sin_q_3
-    s265 = cos_q_2 * cos_q_3 - sin_q_2 * sin_q_3
-    s311 = k1 * s253
-    s312 = k1 * s255
-    s351 = k6 * s261
-    s1368 = d_1 + k1 * sin_q_2
-    s1369 = s311 + (k3 * (s254 * sin_q_3 - s253 * cos_q_3) + k4 * sin_q_1)
-    s1370 = s312 + (k3 * (s256 * sin_q_3 - s255 * cos_q_3) - k4 * cos_q_1)
-    s1371 = s1368 - k3 * (sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3)
-    s1372 = s1369 - k6 * s257
-    s1373 = s1370 - s351
-    s1374 = k6 * s265 + s1371
-    s1375 = s1372 - s1369
-    s1376 = s1373 - s1370
-    s1377 = s1374 - s1371
-    s1378 = s1374 - s1368
-    s1379 = s1374 - d_1
+    s247 = s244 * cos_q_3 + s243 * sin_q_3
+    s251 = s246 * cos_q_3 + s245 * sin_q_3
+    s255 = cos_q_2 * cos_q_3 - sin_q_2 * sin_q_3
+    s301 = k1 * s243
+    s302 = k1 * s245
+    s341 = k6 * s251
+    s1343 = d_1 + k1 * sin_q_2
+    s1344 = s301 + (k3 * (s244 * sin_q_3 - s243 * cos_q_3) + k4 * sin_q_1)
+    s1345 = s302 + (k3 * (s246 * sin_q_3 - s245 * cos_q_3) - k4 * cos_q_1)
+    s1346 = s1343 - k3 * (sin_q_2 * cos_q_3 + cos_q_2 * sin_q_3)
+    s1347 = s1344 - k6 * s247
+    s1348 = s1345 - s341
+    s1349 = k6 * s255 + s1346
+    s1350 = s1347 - s1344
+    s1351 = s1348 - s1345
+    s1352 = s1349 - s1346
+    s1353 = s1349 - s1343
+    s1354 = s1349 - d_1
     return (
-        s351 - s1370,
-        -cos_q_1 * s1379,
-        -cos_q_1 * s1378,
-        -(s261 * s1377 + s265 * s1376),
+        s341 - s1345,
+        -cos_q_1 * s1354,
+        -cos_q_1 * s1353,
+        -(s251 * s1352 + s255 * s1351),
         0.0,
         0.0,
-        s1372,
-        -sin_q_1 * s1379,
-        -sin_q_1 * s1378,
-        s265 * s1375 + s257 * s1377,
+        s1347,
+        -sin_q_1 * s1354,
+        -sin_q_1 * s1353,
+        s255 * s1350 + s247 * s1352,
         0.0,
         0.0,
         0.0,
-        sin_q_1 * s1373 + cos_q_1 * s1372,
-        sin_q_1 * (s1373 - s312) + cos_q_1 * (s1372 - s311),
-        s261 * s1375 - s257 * s1376,
+        sin_q_1 * s1348 + cos_q_1 * s1347,
+        sin_q_1 * (s1348 - s302) + cos_q_1 * (s1347 - s301),
+        s251 * s1350 - s247 * s1351,
         0.0,
         0.0,
     )
 
 
-_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
-_LARGEST = 1e+100
-
-
-def _numbers(values, what):
-    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
-    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
-        return values
-    if np.ma.is_masked(values):
-        raise ValueError(f"{what}: some are masked; leave those out")
-    try:
-        array = np.asarray(values)
-    except ValueError:
-        raise ValueError(f"{what}: not an array: its rows differ in length") from None
-    kind = array.dtype.kind
-    if kind not in "biuf" or array.dtype.itemsize > 8:
-        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
-    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
-        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
-    return array.astype(float)
-
-
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; a wrong name, shape or value is an error."""
-    names = tuple(defaults)
+def _named(values, names, defaults, what):
+    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
+        for name in values:
+            if name not in names:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = _numbers(values, f"{what}s")
+    array = np.asarray(values, dtype=float)
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    for name, value in zip(names, array.tolist()):
+    result = tuple(array.tolist())
+    for name, value in zip(names, result):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-        if abs(value) > most:
-            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
-    return array
+    return result
 
 
 def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+    try:
+        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
+    except ZeroDivisionError:
+        raise ValueError("the mass matrix is singular: change the parameters") from None
 
 
 def _inputs(u, columns):
-    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
+        array = np.asarray(u, dtype=float)
+        if array.shape != (len(INPUTS), columns):
+            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
+        return tuple(array)
+    return _named(u, tuple(INPUTS), INPUTS, "input")
 
 
-def _beside(values, what, count, columns):
-    """Numbers given beside a state, (count,), or (count, k) beside columns."""
-    array = _numbers(values, what)
-    if array.shape not in ((count,), (count, *columns)):
-        raise ValueError(f"{what} has shape {array.shape}, not ({count},)")
-    if not columns and not np.isfinite(array).all():
-        raise ValueError(f"{what} has a number that is not finite")
-    return array.tolist() if array.ndim == 1 else array
-
-
-_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
-_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
+_DEFAULT = _constants(tuple(PARAMETERS.values()))
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 6
 _COLUMNS = {
@@ -3346,131 +3157,34 @@ _COLUMNS = {
 }
 
 
-def _trouble(name, state, error=None):
-    """Why an output has no value at a state, as an exception."""
-    for label, value in zip(STATES, state):
-        if not isfinite(value):
-            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
-    if isinstance(error, ZeroDivisionError):
-        why = "its mass matrix is singular, or a formula infinite"
-        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
-    if isinstance(error, ValueError):
-        return ValueError(f"{name}: a formula has no value at this state ({error})")
-    size, label = max((abs(value), label) for value, label in zip(state, STATES))
-    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
-    return kind(
-        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
-        f" of size {size:g}; choose other units"
-    )
-
-
-def _states(y):
-    """A state or columns of states as an array."""
-    y = _numbers(y, "y")
-    if y.ndim not in (1, 2) or len(y) != 12:
-        raise ValueError(f"y has shape {y.shape}, not (12,) or (12, k): {', '.join(STATES)}")
-    return y
-
-
-def _strict(reach):
-    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
-    under = "ignore" if reach else "raise"
-    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
-
-
-def _alone(call, y, name, reach):
-    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
-
-    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
-    """
-    state = y.tolist()
-    try:
-        values = call(state)
-        if not (reach and hypot(*values, *state) < reach):
-            with _strict(reach):
-                call(list(y))
-            if not all(np.isfinite(part).all() for part in (y, *values)):
-                raise FloatingPointError
-        return values
-    except (ArithmeticError, ValueError) as error:
-        raise _trouble(name, state, error) from None
-
-
-def _together(call, result, given, reach):
-    """Fill a result of many states, a row a value; a column of it that has no value is nan.
-
-    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
-    """
-    arrays = [part for part in given if part.__class__ is _ARRAY]
-    with _strict(reach):
-        try:
-            for row, value in zip(result, call(*given)):
-                row[:] = value
-            if all(isfinite(part.sum()) for part in arrays):
-                return result
-        except ArithmeticError:
-            pass
-    result[:] = nan
-    with np.errstate(all="ignore"):
-        try:
-            for row, value in zip(result, call(*given)):
-                row[:] = value
-        except ArithmeticError:
-            return result
-        sizes = np.zeros(result.shape[-1])
-        for part in map(np.abs, (*arrays, result)):
-            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
-    result[..., ~np.isfinite(sizes)] = nan
-    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
-        with _strict(reach):
-            try:
-                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
-            except ArithmeticError:
-                result[..., i] = nan
-    return result
-
-
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
-    y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
-    u = _NO_INPUT if u is None else _inputs(u, columns)
-    if not columns:
-        values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
-        return _from(values, _FLOAT, size).reshape(shape)
-    functions = {f: _COLUMNS[f] for f in functions}
-    result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
-        np.empty((size, *columns)),
-        (y, u, extra),
-        reach,
-    )
-    return result.reshape(shape + columns)
+    y = np.asarray(y, dtype=float)
+    k = (_DEFAULT if p is None else _parameters(p))[name]
+    if y.shape == (12,):
+        u = _NO_INPUT if u is None else _inputs(u, 0)
+        return np.array(kernel(y.tolist(), k, u, extra)).reshape(shape)
+    if y.ndim != 2 or y.shape[0] != 12:
+        raise ValueError(f"y has shape {y.shape}, not (12,) or (12, k): {', '.join(STATES)}")
+    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
+    values = kernel(y, k, u, extra, **{f: _COLUMNS[f] for f in functions})
+    result = np.empty((len(values), y.shape[1]))
+    for row, value in zip(result, values):
+        row[:] = value
+    return result.reshape(shape + (y.shape[1],))
 
 
 def initial_state(p=None):
     """The scene's initial state, (12,); momenta follow the parameters."""
-    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
-    if not all(map(isfinite, values)):
-        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
-    return _from(values, _FLOAT, 12)
+    k = _DEFAULT if p is None else _parameters(p)
+    return np.array(_initial_state((), k["initial_state"]))
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (12,), or (12, k) for k states."""
-    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
-        k, reach = _DERIVATIVE, _REACH
-        if p is not None:
-            made = _parameters(p)
-            k, reach = made["derivative"], made["reach"]
-        try:
-            state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
-            if hypot(*values) < reach and -reach < state[0] < reach:
-                return _from(values, _FLOAT, 12)
-        except (ArithmeticError, ValueError):
-            pass
+    if u is None and y.__class__ is np.ndarray and y.shape == (12,):
+        k = _DEFAULT if p is None else _parameters(p)
+        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT))
     return _evaluate(_derivative, "derivative", (12,), ('cos', 'sin'), y, p, u)
 
 
@@ -3481,7 +3195,7 @@ def jacobian(t, y, p=None, u=None):
 
 def _joined(q, v):
     """[q, v] of lengths 6 and 6, or with columns."""
-    q, v = _numbers(q, "q"), _numbers(v, "v")
+    q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
     if q.shape != (6, *q.shape[1:]) or v.shape != (6, *q.shape[1:]) or q.ndim > 2:
         raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (6,) and (6,)")
     return np.concatenate((q, v))
@@ -3490,14 +3204,20 @@ def _joined(q, v):
 def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
     """Accelerations (nv,) under generalised forces `tau` beside the effects."""
     y = _joined(q, v)
-    extra = _beside(_NO_FORCE if tau is None else tau, "tau", 6, y.shape[1:])
+    extra = np.asarray(_NO_FORCE if tau is None else tau, dtype=float)
+    if extra.shape not in ((6,), (6, *y.shape[1:])):
+        raise ValueError(f"tau has shape {extra.shape}, not (6,)")
+    extra = extra.tolist() if extra.ndim == 1 else extra
     return _evaluate(_forward_dynamics, "forward_dynamics", (6,), ('cos', 'sin'), y, p, u, extra)
 
 
 def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
     """Generalised forces (nv,) that give accelerations `vd` beside the effects."""
     y = _joined(q, v)
-    extra = _beside(vd, "vd", 6, y.shape[1:])
+    extra = np.asarray(_NO_FORCE if vd is None else vd, dtype=float)
+    if extra.shape not in ((6,), (6, *y.shape[1:])):
+        raise ValueError(f"vd has shape {extra.shape}, not (6,)")
+    extra = extra.tolist() if extra.ndim == 1 else extra
     return _evaluate(_inverse_dynamics, "inverse_dynamics", (6,), ('cos', 'sin'), y, p, u, extra)
 
 

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Literal, Protocol, Self
 
 from eomgen.language.base import Identifier, Table
 from eomgen.language.conditions import Condition
+from eomgen.language.exact import Real
 from eomgen.language.formula import ZERO, Formula
 
 Scalar = Any
@@ -45,7 +46,9 @@ class Load:
 
     `force` in world axes (N) acts at `at`, measured from the centre of mass in body axes (m);
     `torque` in world axes (N m) has one component in the plane, about z, and three in space; ()
-    is none. `kind` says on which side of M v̇ + V + G = F it stands.
+    is none. `kind` says on which side of M v̇ + V + G = F it stands. `in_body` has the same force
+    and torque in body axes, if it is these that are given: to the world's and back they would be
+    rounded, and a force that goes all but through the centre of mass would turn the body otherwise.
     """
 
     body: str
@@ -53,6 +56,7 @@ class Load:
     at: Vector
     kind: Literal["gravity", "applied"]
     torque: Vector = ()
+    in_body: tuple[Vector, Vector] | None = None
 
 
 @dataclass(frozen=True)
@@ -153,8 +157,8 @@ class Mechanism(Protocol):
     def state(self, name: str) -> Scalar:
         """Value of an extra state."""
 
-    def number(self, value: float) -> Scalar:
-        """A number as a scalar."""
+    def number(self, value: Real) -> Scalar:
+        """A number as a scalar, a double or one of more digits (`language.exact`)."""
 
     def call(self, function: str, *arguments: Scalar) -> Scalar:
         """A function of formulas (`language.formula.FUNCTIONS`)."""
@@ -209,7 +213,7 @@ class Unmoved:
         """Never asked for."""
         raise AssertionError(name)
 
-    def number(self, value: float) -> Scalar:
+    def number(self, value: Real) -> Scalar:
         """Never asked for."""
         raise AssertionError(value)
 

@@ -27,6 +27,7 @@ from eomgen.errors import SceneError
 from eomgen.joints.base import WORLD
 from eomgen.language.base import Identifier
 from eomgen.language.conditions import Condition, a_part, can_meet, not_negative
+from eomgen.language.exact import direction
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity, with_components
 
@@ -166,15 +167,12 @@ class BodyContact(OnBodies):
         return self
 
     def checked(self, dimensions: int, place: str) -> Self:
-        """Its normal has a direction, and length 1."""
+        """Its normal has a direction."""
         up = (0.0,) * (dimensions - 1) + (1.0,)
         normal = with_components(self.normal or up, 0.0, dimensions, f"{place}.normal")
-        largest = max(map(abs, normal))
-        if largest == 0.0:
+        if not any(normal):
             raise SceneError(f"{place}.normal: has no direction; give one that is not zero")
-        scaled = tuple(x / largest for x in normal)
-        size = sum(x * x for x in scaled) ** 0.5
-        return self.replaced(normal=tuple(x / size for x in scaled))
+        return self.replaced(normal=normal)
 
     def conditions(self, place: str) -> Iterator[Condition]:
         """No radius is negative, spheres have one, restitution is from 0 to 1."""
@@ -321,7 +319,7 @@ class BodyContact(OnBodies):
             yield from (on_ball(mechanism, first, ball) for first in balls)
             return
         zeros = (mechanism.number(0.0),) * mechanism.dimensions
-        normal = tuple(mechanism.number(x) for x in self.normal)
+        normal = tuple(mechanism.number(x) for x in direction(self.normal))
         plane = Plane(self.other, zeros, normal, mechanism.value(self.offset))
         corners: Components | None = None
         if self.corners is not None:
