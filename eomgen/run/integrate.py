@@ -15,6 +15,7 @@ from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.stepping import Asked, adaptive_steps, equal_steps
+from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Event, Trajectory
 from eomgen.run.works import Account, Powers
 
@@ -39,13 +40,14 @@ def integrate(
     powers: Powers | None = None,
     resume: Resume | None = None,
     guard: Guard | None = None,
+    tally: Tally | None = None,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
     integrator  a name in `eomgen.run.integrators.INTEGRATORS`
     dt          step in s of the fixed-step methods, which need it; the last one is shortened
     rtol, atol  what the adaptive methods hold the error of each step to; without `atol`, each state
-                has 1e-12 of its size in `problem.sizes`
+                has 1e-12 of its size in `problem.sizes`, less where rtol is below 1e-9
     samples     how many rows to keep: for fixed steps every k-th one such that there are about
                 this many (default: all), for adaptive methods this many equally spaced times
                 (default: 1001); the first and the last are always kept
@@ -63,6 +65,7 @@ def integrate(
                 not ended, if method and step or tolerances are the same
     guard       watches the derivative's rounding at every step, and stops the run where digits are
                 lost, or repairs it (`run.guard`); what it lets pass is what it is without
+    tally       kept up to date at every step, at which it may end the run
 
     Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
     has begun, Ctrl-C included, ends it early instead: the trajectory then holds the finite rows
@@ -95,6 +98,8 @@ def integrate(
         derivative=derivatives.of(watch.derivative if watch else problem.derivative),
         jacobian=jacobians.of(problem.jacobian),
     )
+    if tally and problem.contacts:
+        counted = replace(counted, contacts=tally.counting(problem.contacts))
     if isinstance(method, FixedStep):
         # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
@@ -108,10 +113,12 @@ def integrate(
     advances = _advances(stepper, counted, asked, watch, rest_speed)
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
     run = _Run(asked.t_start, problem.initial, account)
+    if tally:
+        tally.begin(problem.initial)
     counts, told = (derivatives, jacobians), progress or _ignore
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")
-        trouble = _follow(run, advances, counts, problem, method, asked.t_end, told)
+        trouble = _follow(run, advances, counts, problem, method, asked.t_end, told, tally)
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
     said = (trouble, watch.words() if watch else "", remarks)
@@ -239,6 +246,7 @@ def _follow(
     method: FixedStep | Adaptive,
     t_end: float,
     progress: Progress,
+    tally: Tally | None,
 ) -> str:
     """Carry `run` on to `t_end`; return "" or, if it stops before, the trouble in one line."""
     t_start, told = run.t, throttled(progress)
@@ -249,6 +257,8 @@ def _follow(
                 if not _is_finite(advance):
                     raise StepFailure(f"the state left the finite numbers; {method.remedy}")
                 run.take(advance)
+                if tally:
+                    tally.take(advance, counts[0].calls, counts[1].calls)
                 told((run.t - t_start) / (t_end - t_start))
         return ""
     except KeyboardInterrupt:

@@ -3,6 +3,7 @@
 import importlib.abc
 import importlib.util
 from collections.abc import Callable, Iterable
+from functools import cache, partial
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -10,12 +11,15 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.run.explain import explain_by
+from eomgen.run.noise import step_noise
 from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
 
 CORNERS = ("abs", "max", "min", "select", "step")
 """Functions that have a corner or a jump."""
+COUNTED = frozenset({"derivative", "jacobian"})
+"""Functions whose operations tell what a run costs."""
 
 
 class GeneratedModule(Protocol):
@@ -138,6 +142,9 @@ def as_problem(
         explain=explain,
         corners=any(kind in module.COST["derivative"] for kind in CORNERS),
         sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
+        noise=cache(partial(step_noise, derivative, jacobian, 0.0, initial)),
+        operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
+        columns=hasattr(module, "_along"),
     )
 
 

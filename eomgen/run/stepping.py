@@ -95,7 +95,7 @@ def adaptive_steps(asked: Asked, method: Adaptive, problem: Problem) -> tuple[Be
     longest = longest_step(asked.max_step, asked.span, problem.corners)
     if asked.resume is not None and asked.max_step is None:
         longest = float(asked.resume.get("longest", longest))
-    atol = allowed_errors(problem, asked.atol)
+    atol = allowed_errors(problem, asked.integrator, asked.rtol, asked.atol, asked.span)
 
     def begin(
         problem: Problem, t: float, made: int, resume: Resume | None = None

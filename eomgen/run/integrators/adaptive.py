@@ -65,6 +65,7 @@ def advances(
             )
         if here == _ENOUGH_TO_LOOK and not method.uses_jacobian and method.one_step:
             _check_stiff(problem, solver, (t_start, t_end), here)
+        factored = solver.nlu
         complaint = solver.step()
         if solver.status == "failed":
             cause = (complaint or "the method gave up").rstrip(".")
@@ -88,7 +89,15 @@ def advances(
         stands = None
         if method.memory and not finished:
             stands = partial(_stands, t, y, {name: getattr(solver, name) for name in method.memory})
-        yield Advance(t, y, samples, problem, partial(_between, problem, dense), resume=stands)
+        yield Advance(
+            t,
+            y,
+            samples,
+            problem,
+            partial(_between, problem, dense),
+            factorisations=int(solver.nlu - factored),
+            resume=stands,
+        )
         sampled = passed
         if finished:
             return
