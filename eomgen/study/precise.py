@@ -97,10 +97,7 @@ def precise(
     watch = Watch() if watched and any(name in names for name in CORNERS) else None
     with digits(bits):
         functions = {**BY_MPFR, **(watch.functions() if watch else {})}
-        # The module keeps constants by value, and a long 1 is equal to a double 1: go round that.
-        constants = _over(module._constants.__wrapped__, BY_MPFR)(
-            _long(parameters, module.PARAMETERS)
-        )["derivative"]
+        constants = constants_of(module, parameters)["derivative"]
         u = _long(inputs, module.INPUTS)
         start = tuple(map(mpfr, initial.tolist()))
         kernel = _over(module._derivative, functions)
@@ -114,6 +111,17 @@ def precise(
         return cast(Sequence[Long], kernel(y, constants, u, **time, **called))
 
     return Precise(derivative, start, watch)
+
+
+def constants_of(module: Any, parameters: Any) -> Mapping[str, tuple[Long, ...]]:
+    """What each function of a module takes that depends on parameters alone, in long numbers; to be
+    used within `digits()`.
+    """
+    # The module keeps constants by value, and a long 1 is equal to a double 1: go round that.
+    return cast(
+        Mapping[str, tuple[Long, ...]],
+        _over(module._constants.__wrapped__, BY_MPFR)(_long(parameters, module.PARAMETERS)),
+    )
 
 
 def _over(function: Any, functions: Mapping[str, Callable[..., Long]]) -> Any:
