@@ -1,42 +1,79 @@
-"""The command line: parse, call, say what was done; exit code 0 done, 1 at fault, 2 wrong usage."""
+"""The command line: parse, call, say what was done.
+
+Exit codes: 0 done, 1 the scene or the run is at fault, 2 wrong usage, 130 interrupted.
+"""
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
-from eomgen.errors import EomgenError
+from eomgen.errors import EomgenError, InterruptedRunError
+from eomgen.streams import steady_streams
+from eomgen.text import breaks_lines, one_line
 
 Arguments = argparse.Namespace
+INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code."""
+    """Run one command; returns the exit code. Raises `SystemExit` for wrong usage and for help.
+
+    Streams that fail end no command: it does what it is to do, and what was lost is said then.
+    """
+    with steady_streams() as output:
+        stopped = False
+        try:
+            code = _run(arguments)
+        except SystemExit as stop:
+            stopped, code = True, int(stop.code or 0)
+        if why := output.lost():
+            print(f"eomgen: standard output cannot be written: {why}", file=sys.stderr)
+            code = code or 1
+        if stopped:
+            raise SystemExit(code)
+        return code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         parser = _parser()
         given = parser.parse_args(arguments)
         if "scenes" in given and not (given.scenes or given.all):
             parser.error("generate: no scene; name one, or give --all for the built-in ones")
         code: int = given.run(given)
-        sys.stdout.flush()
     except EomgenError as error:
-        for line in str(error).splitlines():
+        for line in error.lines:
             print(f"eomgen: {line}", file=sys.stderr)
-        return 1
-    except BrokenPipeError:  # the reader of our output has gone; nothing is left to say
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return INTERRUPTED if isinstance(error, InterruptedRunError) else 1
+    except (OSError, MemoryError) as error:
+        why = "out of memory" if isinstance(error, MemoryError) else one_line(str(error))
+        print(f"eomgen: {why}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("eomgen: interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
     return code
+
+
+def _path(text: str) -> Path:
+    if breaks_lines(text):
+        raise argparse.ArgumentTypeError(f"{text} has a control character in its name")
+    return Path(text)
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that repeats what it does not understand as one line, not as it is."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(one_line(message))
 
 
 def _parser() -> argparse.ArgumentParser:
     from eomgen import commands  # here, where an interrupt during its imports is caught
 
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="eomgen",
         description="Equations of motion from a scene: derived, solved once, written as code.",
         epilog="SCENE is a file or the name of a built-in scene (eomgen list).",
@@ -66,11 +103,11 @@ def _parser() -> argparse.ArgumentParser:
     _form(check)
     derive = _form(command("derive", commands.derive, "print the derivation, step by step"))
     derive.add_argument("--format", choices=("text", "latex", "html"), default="text")
-    derive.add_argument("-o", "--output", metavar="FILE", type=Path, help="write it to a file")
+    derive.add_argument("-o", "--output", metavar="FILE", type=_path, help="write it to a file")
     _force(derive)
     generate = command("generate", commands.generate, "write the module of a scene", "scenes")
     _code(_form(generate))
-    generate.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("generated"))
+    generate.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("generated"))
     generate.add_argument("--all", action="store_true", help="all built-in scenes")
     generate.add_argument("--check", action="store_true", help="say which is stale, write nothing")
     generate.add_argument("--explain", action="store_true", help="say why its route was taken")
@@ -92,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
     costing.add_argument(
         "--motion-time", metavar="S", type=float, default=10.0, help="time to compare motions, 10 s"
     )
-    costing.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
+    costing.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     _force(costing)
     _linearisation(command("linearise", commands.linearise, "A, B and modes about an equilibrium"))
     return parser
@@ -166,14 +203,14 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
         "--from",
         metavar="FILE.npz",
         dest="resume",
-        type=Path,
+        type=_path,
         help="go on where an earlier run ended, as if it had not",
     )
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument("--works", action="store_true", help="book the work of each effect")
     _values(parser)
-    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
-    parser.add_argument("--plot", metavar="FILE", type=Path, help="figure (DIR/NAME.png)")
+    parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
+    parser.add_argument("--plot", metavar="FILE", type=_path, help="figure (DIR/NAME.png)")
     parser.add_argument("--view", action="store_true", help="open the page when done")
     _force(parser)
 
@@ -198,7 +235,7 @@ def _accuracy(parser: argparse.ArgumentParser) -> None:
         "--states", metavar="N", type=int, help="states of each kind for it (100, 20 if large)"
     )
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="of its random states")
-    parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("out"))
+    parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     _force(parser)
 
 
@@ -221,7 +258,7 @@ def _verification(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--save",
         metavar="DIR",
-        type=Path,
+        type=_path,
         nargs="?",
         const=Path("generated"),
         help="write the evidence beside the module, in DIR (generated)",
@@ -260,10 +297,6 @@ def _linearisation(parser: argparse.ArgumentParser) -> None:
     _values(parser)
     _route(parser)
     parser.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, help="write A and B to FILE.npz or FILE.csv"
+        "-o", "--output", metavar="FILE", type=_path, help="write A and B to FILE.npz or FILE.csv"
     )
     _force(parser)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -3,9 +3,21 @@
 import difflib
 from collections.abc import Iterable
 
+from eomgen.text import one_line
+
 
 class EomgenError(Exception):
-    """A fault in what the user gave; its text is one line fit for the terminal."""
+    """A fault in what the user gave, in one line or several fit for the terminal.
+
+    Each argument is a line and stays one, whatever text of others is in it: see `text.one_line`.
+    """
+
+    def __init__(self, *lines: str) -> None:
+        self.lines = tuple(one_line(line) for line in lines)
+        super().__init__("\n".join(self.lines))
+
+    def __reduce__(self) -> tuple[type, tuple[str, ...]]:
+        return type(self), self.lines
 
 
 class SceneError(EomgenError):
@@ -14,6 +26,10 @@ class SceneError(EomgenError):
 
 class RunError(EomgenError):
     """A simulation, or a file it needs or writes, that cannot go on."""
+
+
+class InterruptedRunError(RunError):
+    """A run that an interrupt ended; what it had computed is kept."""
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

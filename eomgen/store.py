@@ -1,85 +1,108 @@
-"""Generated code kept by content, so that a scene whose module is fresh is not derived again.
+"""Generated code kept, so that a scene whose module is fresh is not derived again.
 
-The key is a digest of what enters the code: the model without its looks, and every file of this
-program that has a say. What is found under it is taken only if it is whole.
+The key is a digest of what enters the code: the model without its looks, every file of this program
+that has a say, and the libraries it is made with. What is found under it is taken only as this
+program wrote it, see `eomgen.entries`.
 """
 
 import hashlib
 import importlib.metadata
 import json
 import os
-from contextlib import suppress
-from dataclasses import astuple, dataclass, replace
+import platform
+from dataclasses import astuple, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import platformdirs
 
-from eomgen.errors import RunError
-from eomgen.files import write_whole
+from eomgen.entries import Entries
 from eomgen.model import Model
 from eomgen.program.passes import PassReport
 from eomgen.scene.look import Camera
 from eomgen.scene.schema import Simulation
 from eomgen.templating import PACKAGE, templates_folder
 
-SOURCES = ("language", "joints", "effects", "derivation", "program", "backends")
-"""Folders of this program that have a say in the code; the single files are named below."""
-SINGLE = ("model.py", "pipeline.py", "templating.py")
+AFTER = ("store.py", "entries.py", "run", "study", "show", "commands", "cli.py", "__main__.py")
+"""Files and folders of this program that have no say in the code; all others have."""
+LIBRARIES = (
+    *("gmpy2", "jinja2", "markupsafe", "mpmath", "numpy", "pydantic", "pydantic_core", "sympy"),
+)
+"""Whatever is loaded to generate code, but for what only states types."""
 
 
-def folder() -> Path:
-    """Where generated code is kept: `EOMGEN_CACHE`, or the user's cache folder."""
-    chosen = os.environ.get("EOMGEN_CACHE")
-    return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("eomgen"))
+def folder(within: str = "") -> Path | None:
+    """Where code is kept, or what is kept `within`: `EOMGEN_CACHE`, or the user's cache folder.
+
+    None if the user has no home.
+    """
+    chosen = os.environ.get("EOMGEN_CACHE") or platformdirs.user_cache_dir("eomgen")
+    try:
+        return Path(chosen).expanduser() / within
+    except RuntimeError:  # there is no home to expand ~ to
+        return None
 
 
 @dataclass(frozen=True)
 class Code:
-    """What a model is compiled to, as `eomgen.pipeline.Generated`, and whether only just now."""
+    """What a model is compiled to, as `eomgen.pipeline.Generated`, and whether only just now.
+
+    `notice` is what there is to say of the store: why it was not used; or "".
+    """
 
     module: str
     poses: str
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
     derived: bool
+    notice: str = ""
 
 
-def generated_code(model: Model) -> Code:
+def generated_code(model: Model, *, anew: bool = False) -> Code:
     """A model's code, from the store or derived now.
 
-    A store that cannot be read or written, or is damaged, is done without.
+    A store that cannot be trusted, read or written is done without, with a notice; what is damaged
+    in it is made again. With `anew` nothing that it holds is believed.
     """
-    path = folder() / f"{_key(model)}.json"
-    kept = _kept(path)
-    if kept is not None:
+    place, key = folder(), _key(model)
+    kept = _code(Entries(place).get(key)) if place else None
+    if kept and not anew:
         return kept
     # Imported here because it brings what derives, which takes long to load.
     from eomgen.pipeline import generate
 
     made = generate(model)
-    parts = [made.module, made.poses, [astuple(r) for r in made.reports], made.explanation]
-    with suppress(RunError):
-        write_whole(path, json.dumps({"digest": _digest(parts), "parts": parts}), force=True)
-    return Code(made.module, made.poses, made.reports, made.explanation, derived=True)
+    code = Code(made.module, made.poses, made.reports, made.explanation, derived=True)
+    if place is None:
+        return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
+    trouble = Entries(place).put(key, _content(code))
+    if trouble:
+        return replace(code, notice=f"the store {place} is not used: {trouble}")
+    if kept and (kept.module, kept.poses) != (code.module, code.poses):
+        notice = f"the store {place} held other code for this scene, which was put right"
+        return replace(code, notice=notice)
+    return code
 
 
-def _kept(path: Path) -> Code | None:
-    """What a file of the store holds, or None if it is not whole."""
+def _content(code: Code) -> bytes:
+    """The bytes that are kept of code."""
+    reports = [astuple(report) for report in code.reports]
+    return json.dumps([code.module, code.poses, reports, code.explanation]).encode()
+
+
+def _code(content: bytes | None) -> Code | None:
+    """The code of which these bytes were kept; None for anything else."""
     try:
-        entry = json.loads(path.read_text("utf-8"))
-        module, poses, reports, explanation = entry["parts"]
-        if entry["digest"] != _digest(entry["parts"]):
-            return None
-        reports = tuple(PassReport(*report) for report in reports)
-        return Code(module, poses, reports, tuple(explanation), derived=False)
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        module, poses, reports, explanation = json.loads(content or b"")
+        made = tuple(PassReport(*report) for report in reports)
+        texts = [module, poses, *explanation, *(report.name for report in made)]
+        "".join(texts).encode()  # which half of a surrogate pair cannot be
+    except (ValueError, TypeError, RecursionError):
         return None
-
-
-def _digest(parts: list[Any]) -> str:
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+    counts = [getattr(r, f.name) for r in made for f in fields(r) if f.name != "name"]
+    if not (type(reports) is type(explanation) is list and all(type(n) is int for n in counts)):
+        return None
+    return Code(module, poses, made, tuple(explanation), derived=False)
 
 
 def _key(model: Model) -> str:
@@ -92,14 +115,30 @@ def _key(model: Model) -> str:
 
 @cache
 def _generator_digest() -> bytes:
-    digest = hashlib.sha256(importlib.metadata.version("sympy").encode())
-    files = [PACKAGE / name for name in SINGLE]
-    files += [path for name in SOURCES for path in (PACKAGE / name).rglob("*.py")]
-    files += [path for name in ("python", "javascript") for path in _templates(name)]
-    for path in sorted(files, key=lambda path: path.as_posix()):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    """A digest of all that makes code of a model: Python, libraries, this program, templates."""
+    python = (platform.python_implementation(), platform.python_version(), platform.machine())
+    digest = hashlib.sha256(repr((python, [_version(name) for name in LIBRARIES])).encode())
+    for root, files in ((PACKAGE, _sources()), (templates_folder(), _templates())):
+        for path in sorted(files, key=lambda path: path.as_posix()):
+            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.digest()
 
 
-def _templates(name: str) -> list[Path]:
-    return list((templates_folder() / name).rglob("*.jinja"))
+def _version(library: str) -> str:
+    try:
+        return importlib.metadata.version(library)
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+
+
+def _sources() -> list[Path]:
+    files = PACKAGE.rglob("*.py")
+    return [path for path in files if path.relative_to(PACKAGE).parts[0] not in AFTER]
+
+
+def _templates() -> list[Path]:
+    return [
+        path
+        for name in ("python", "javascript")
+        for path in (templates_folder() / name).rglob("*.jinja")
+    ]

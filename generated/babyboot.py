@@ -26,10 +26,14 @@ parameters alone are done once.
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (4, k); then every result has a last axis of length k.
+
+All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
+where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
+results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin
+from math import cos, hypot, inf, isfinite, nan, prod, sin
 
 import numpy as np
 
@@ -100,24 +104,22 @@ COST = {
 }
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g = values
+def _fixed(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
+    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_A > 0.0:
-        raise ValueError("mass of A is not positive: change the parameters")
+        return "mass of A is not positive"
     if not I_A >= 0.0:
-        raise ValueError("inertia_com xx of A is negative: change the parameters")
+        return "inertia_com xx of A is negative"
     if not I_A >= 0.0:
-        raise ValueError("inertia_com yy of A is negative: change the parameters")
+        return "inertia_com yy of A is negative"
     if not m_B > 0.0:
-        raise ValueError("mass of B is not positive: change the parameters")
+        return "mass of B is not positive"
     if not I_Bx >= 0.0:
-        raise ValueError("inertia_com xx of B is negative: change the parameters")
+        return "inertia_com xx of B is negative"
     if not I_By >= 0.0:
-        raise ValueError("inertia_com yy of B is negative: change the parameters")
+        return "inertia_com yy of B is negative"
     if not I_Bz >= 0.0:
-        raise ValueError("inertia_com zz of B is negative: change the parameters")
+        return "inertia_com zz of B is negative"
     l_A_squared = l_A * l_A
     k22 = m_A * l_A_squared
     l_B_squared = l_B * l_B
@@ -169,6 +171,32 @@ def _constants(values):
         "body_poses": (l_A, k19),
         "body_velocities": (l_A, k19),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+
+    `reach` is how large states and results may be without a thought of overflow; with constants
+    so large or so small that any product may be lost, it is 0.
+    """
+    values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _fixed(*values.tolist())
+        with np.errstate(over="raise", under="raise", invalid="raise"):
+            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+    except ArithmeticError as error:
+        made = "the mass matrix is singular"
+        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
+        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
+            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
+            made = f"numbers are too large or too small for floats, with sizes from {ends}"
+    except ValueError as error:
+        made = f"a formula has no value ({error})"
+    if made.__class__ is str:
+        raise ValueError(f"{made}: change the parameters")
+    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -600,40 +628,74 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
-def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
+_LARGEST = 1e+100
+
+
+def _numbers(values, what):
+    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what}: some are masked; leave those out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what}: not an array: its rows differ in length") from None
+    kind = array.dtype.kind
+    if kind not in "biuf" or array.dtype.itemsize > 8:
+        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
+        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
+    return array.astype(float)
+
+
+def _named(values, defaults, what, most=inf):
+    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values:
-            if name not in names:
+        for name in values.keys():
+            if name not in defaults:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, f"{what}s")
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+        if abs(value) > most:
+            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
+    return array
 
 
 def _parameters(p):
-    try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
-    except ZeroDivisionError:
-        raise ValueError("the mass matrix is singular: change the parameters") from None
+    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
 
 
 def _inputs(u, columns):
-    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
-        array = np.asarray(u, dtype=float)
-        if array.shape != (len(INPUTS), columns):
-            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
-        return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    if columns and not hasattr(u, "keys"):
+        u = _numbers(u, "inputs")
+        if u.ndim == 2:
+            if u.shape != (len(INPUTS), *columns):
+                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
+            return u
+    return tuple(_named(u, INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+def _beside(values, what, count, columns):
+    """Numbers given beside a state, (count,), or (count, k) beside columns."""
+    array = _numbers(values, what)
+    if array.shape not in ((count,), (count, *columns)):
+        raise ValueError(f"{what} has shape {array.shape}, not ({count},)")
+    if not columns and not np.isfinite(array).all():
+        raise ValueError(f"{what} has a number that is not finite")
+    return array.tolist() if array.ndim == 1 else array
+
+
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
+_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
 _NO_INPUT = (0.0,) * len(INPUTS)
 _NO_FORCE = (0.0,) * 2
 _COLUMNS = {
@@ -642,34 +704,130 @@ _COLUMNS = {
 }
 
 
+def _trouble(name, state, error=None):
+    """Why an output has no value at a state, as an exception."""
+    for label, value in zip(STATES, state):
+        if not isfinite(value):
+            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
+    if isinstance(error, ZeroDivisionError):
+        why = "its mass matrix is singular, or a formula infinite"
+        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
+    if isinstance(error, ValueError):
+        return ValueError(f"{name}: a formula has no value at this state ({error})")
+    size, label = max((abs(value), label) for value, label in zip(state, STATES))
+    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
+    return kind(
+        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
+        f" of size {size:g}; choose other units"
+    )
+
+
+def _states(y):
+    """A state or columns of states as an array."""
+    y = _numbers(y, "y")
+    if y.ndim not in (1, 2) or len(y) != 4:
+        raise ValueError(f"y has shape {y.shape}, not (4,) or (4, k): {', '.join(STATES)}")
+    return y
+
+
+def _strict(reach):
+    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    under = "ignore" if reach else "raise"
+    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
+
+
+def _alone(call, y, name, reach):
+    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+
+    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    """
+    state = y.tolist()
+    try:
+        values = call(state)
+        if not (reach and hypot(*values, *state) < reach):
+            with _strict(reach):
+                call(list(y))
+            if not all(np.isfinite(part).all() for part in (y, *values)):
+                raise FloatingPointError
+        return values
+    except (ArithmeticError, ValueError) as error:
+        raise _trouble(name, state, error) from None
+
+
+def _together(call, result, given, reach):
+    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    """
+    arrays = [part for part in given if part.__class__ is _ARRAY]
+    with _strict(reach):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+            if all(isfinite(part.sum()) for part in arrays):
+                return result
+        except ArithmeticError:
+            pass
+    result[:] = nan
+    with np.errstate(all="ignore"):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+        except ArithmeticError:
+            return result
+        sizes = np.zeros(result.shape[-1])
+        for part in map(np.abs, (*arrays, result)):
+            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
+    result[..., ~np.isfinite(sizes)] = nan
+    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
+        with _strict(reach):
+            try:
+                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
+            except ArithmeticError:
+                result[..., i] = nan
+    return result
+
+
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    if y.shape == (4,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        return np.array(kernel(y.tolist(), k, u, extra)).reshape(shape)
-    if y.ndim != 2 or y.shape[0] != 4:
-        raise ValueError(f"y has shape {y.shape}, not (4,) or (4, k): {', '.join(STATES)}")
-    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
-    values = kernel(y, k, u, extra, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty((len(values), y.shape[1]))
-    for row, value in zip(result, values):
-        row[:] = value
-    return result.reshape(shape + (y.shape[1],))
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    if not columns:
+        values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
+        return _from(values, _FLOAT, size).reshape(shape)
+    functions = {f: _COLUMNS[f] for f in functions}
+    result = _together(
+        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        np.empty((size, *columns)),
+        (y, u, extra),
+        reach,
+    )
+    return result.reshape(shape + columns)
 
 
 def initial_state(p=None):
     """The scene's initial state, (4,); momenta follow the parameters."""
-    k = _DEFAULT if p is None else _parameters(p)
-    return np.array(_initial_state((), k["initial_state"]))
+    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
+    if not all(map(isfinite, values)):
+        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+    return _from(values, _FLOAT, 4)
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (4,), or (4, k) for k states."""
-    if u is None and y.__class__ is np.ndarray and y.shape == (4,):
-        k = _DEFAULT if p is None else _parameters(p)
-        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT))
+    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
+        k, reach = _DERIVATIVE, _REACH
+        if p is not None:
+            made = _parameters(p)
+            k, reach = made["derivative"], made["reach"]
+        try:
+            values = _derivative(y.tolist(), k, _NO_INPUT)
+            if hypot(*values) < reach:
+                return _from(values, _FLOAT, 4)
+        except (ArithmeticError, ValueError):
+            pass
     return _evaluate(_derivative, "derivative", (4,), ('cos', 'sin'), y, p, u)
 
 
@@ -685,7 +843,7 @@ def parameter_jacobian(t, y, p=None, u=None):
 
 def _joined(q, v):
     """[q, v] of lengths 2 and 2, or with columns."""
-    q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
+    q, v = _numbers(q, "q"), _numbers(v, "v")
     if q.shape != (2, *q.shape[1:]) or v.shape != (2, *q.shape[1:]) or q.ndim > 2:
         raise ValueError(f"q and v have shapes {q.shape} and {v.shape}, not (2,) and (2,)")
     return np.concatenate((q, v))
@@ -694,20 +852,14 @@ def _joined(q, v):
 def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
     """Accelerations (nv,) under generalised forces `tau` beside the effects."""
     y = _joined(q, v)
-    extra = np.asarray(_NO_FORCE if tau is None else tau, dtype=float)
-    if extra.shape not in ((2,), (2, *y.shape[1:])):
-        raise ValueError(f"tau has shape {extra.shape}, not (2,)")
-    extra = extra.tolist() if extra.ndim == 1 else extra
+    extra = _beside(_NO_FORCE if tau is None else tau, "tau", 2, y.shape[1:])
     return _evaluate(_forward_dynamics, "forward_dynamics", (2,), ('cos', 'sin'), y, p, u, extra)
 
 
 def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
     """Generalised forces (nv,) that give accelerations `vd` beside the effects."""
     y = _joined(q, v)
-    extra = np.asarray(_NO_FORCE if vd is None else vd, dtype=float)
-    if extra.shape not in ((2,), (2, *y.shape[1:])):
-        raise ValueError(f"vd has shape {extra.shape}, not (2,)")
-    extra = extra.tolist() if extra.ndim == 1 else extra
+    extra = _beside(vd, "vd", 2, y.shape[1:])
     return _evaluate(_inverse_dynamics, "inverse_dynamics", (2,), ('cos', 'sin'), y, p, u, extra)
 
 

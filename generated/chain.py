@@ -73,10 +73,14 @@ more on parameters alone are done once.
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (20, k); then every result has a last axis of length k.
+
+All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
+where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
+results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin
+from math import cos, hypot, inf, isfinite, nan, prod, sin
 
 import numpy as np
 
@@ -225,50 +229,48 @@ COST = {
 }
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    link_1_mass, link_1_inertia_com, link_joint_1_r_child_x, link_2_mass, link_2_inertia_com, link_joint_2_r_parent_x, link_joint_2_r_child_x, link_3_mass, link_3_inertia_com, link_joint_3_r_parent_x, link_joint_3_r_child_x, link_4_mass, link_4_inertia_com, link_joint_4_r_parent_x, link_joint_4_r_child_x, link_5_mass, link_5_inertia_com, link_joint_5_r_parent_x, link_joint_5_r_child_x, link_6_mass, link_6_inertia_com, link_joint_6_r_parent_x, link_joint_6_r_child_x, link_7_mass, link_7_inertia_com, link_joint_7_r_parent_x, link_joint_7_r_child_x, link_8_mass, link_8_inertia_com, link_joint_8_r_parent_x, link_joint_8_r_child_x, link_9_mass, link_9_inertia_com, link_joint_9_r_parent_x, link_joint_9_r_child_x, link_10_mass, link_10_inertia_com, link_joint_10_r_parent_x, link_joint_10_r_child_x, gravity_g = values
+def _fixed(link_1_mass, link_1_inertia_com, link_joint_1_r_child_x, link_2_mass, link_2_inertia_com, link_joint_2_r_parent_x, link_joint_2_r_child_x, link_3_mass, link_3_inertia_com, link_joint_3_r_parent_x, link_joint_3_r_child_x, link_4_mass, link_4_inertia_com, link_joint_4_r_parent_x, link_joint_4_r_child_x, link_5_mass, link_5_inertia_com, link_joint_5_r_parent_x, link_joint_5_r_child_x, link_6_mass, link_6_inertia_com, link_joint_6_r_parent_x, link_joint_6_r_child_x, link_7_mass, link_7_inertia_com, link_joint_7_r_parent_x, link_joint_7_r_child_x, link_8_mass, link_8_inertia_com, link_joint_8_r_parent_x, link_joint_8_r_child_x, link_9_mass, link_9_inertia_com, link_joint_9_r_parent_x, link_joint_9_r_child_x, link_10_mass, link_10_inertia_com, link_joint_10_r_parent_x, link_joint_10_r_child_x, gravity_g):
+    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not link_1_mass > 0.0:
-        raise ValueError("mass of link_1 is not positive: change the parameters")
+        return "mass of link_1 is not positive"
     if not link_1_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_1 is negative: change the parameters")
+        return "inertia_com of link_1 is negative"
     if not link_2_mass > 0.0:
-        raise ValueError("mass of link_2 is not positive: change the parameters")
+        return "mass of link_2 is not positive"
     if not link_2_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_2 is negative: change the parameters")
+        return "inertia_com of link_2 is negative"
     if not link_3_mass > 0.0:
-        raise ValueError("mass of link_3 is not positive: change the parameters")
+        return "mass of link_3 is not positive"
     if not link_3_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_3 is negative: change the parameters")
+        return "inertia_com of link_3 is negative"
     if not link_4_mass > 0.0:
-        raise ValueError("mass of link_4 is not positive: change the parameters")
+        return "mass of link_4 is not positive"
     if not link_4_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_4 is negative: change the parameters")
+        return "inertia_com of link_4 is negative"
     if not link_5_mass > 0.0:
-        raise ValueError("mass of link_5 is not positive: change the parameters")
+        return "mass of link_5 is not positive"
     if not link_5_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_5 is negative: change the parameters")
+        return "inertia_com of link_5 is negative"
     if not link_6_mass > 0.0:
-        raise ValueError("mass of link_6 is not positive: change the parameters")
+        return "mass of link_6 is not positive"
     if not link_6_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_6 is negative: change the parameters")
+        return "inertia_com of link_6 is negative"
     if not link_7_mass > 0.0:
-        raise ValueError("mass of link_7 is not positive: change the parameters")
+        return "mass of link_7 is not positive"
     if not link_7_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_7 is negative: change the parameters")
+        return "inertia_com of link_7 is negative"
     if not link_8_mass > 0.0:
-        raise ValueError("mass of link_8 is not positive: change the parameters")
+        return "mass of link_8 is not positive"
     if not link_8_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_8 is negative: change the parameters")
+        return "inertia_com of link_8 is negative"
     if not link_9_mass > 0.0:
-        raise ValueError("mass of link_9 is not positive: change the parameters")
+        return "mass of link_9 is not positive"
     if not link_9_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_9 is negative: change the parameters")
+        return "inertia_com of link_9 is negative"
     if not link_10_mass > 0.0:
-        raise ValueError("mass of link_10 is not positive: change the parameters")
+        return "mass of link_10 is not positive"
     if not link_10_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_10 is negative: change the parameters")
+        return "inertia_com of link_10 is negative"
     k1 = link_joint_2_r_parent_x - link_joint_1_r_child_x
     k2 = link_joint_3_r_parent_x - link_joint_2_r_child_x
     k3 = link_joint_4_r_parent_x - link_joint_3_r_child_x
@@ -313,6 +315,32 @@ def _constants(values):
         "derivative": (link_2_mass, link_3_mass, link_4_mass, link_5_mass, link_6_mass, link_7_mass, link_8_mass, link_9_mass, link_10_mass, gravity_g, k1, k2, k3, k4, k5, k6, k7, k8, k9, inertia_link_1_zz, k10, inertia_link_2_zz, k11, inertia_link_3_zz, k12, inertia_link_4_zz, k13, inertia_link_5_zz, k14, inertia_link_6_zz, k15, inertia_link_7_zz, k16, inertia_link_8_zz, k17, inertia_link_9_zz, k18, inertia_link_10_zz, k19),
         "jacobian": (link_2_mass, link_3_mass, link_4_mass, link_5_mass, link_6_mass, link_7_mass, link_8_mass, link_9_mass, link_10_mass, gravity_g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k20, inertia_link_1_zz, k10, inertia_link_2_zz, k11, inertia_link_3_zz, k12, inertia_link_4_zz, k13, inertia_link_5_zz, k14, inertia_link_6_zz, k15, inertia_link_7_zz, k16, inertia_link_8_zz, k17, inertia_link_9_zz, k18, inertia_link_10_zz, k21, k22, k23, k24, k25, k26, k27, k28, k19, k29),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+
+    `reach` is how large states and results may be without a thought of overflow; with constants
+    so large or so small that any product may be lost, it is 0.
+    """
+    values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _fixed(*values.tolist())
+        with np.errstate(over="raise", under="raise", invalid="raise"):
+            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+    except ArithmeticError as error:
+        made = "the mass matrix is singular"
+        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
+        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
+            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
+            made = f"numbers are too large or too small for floats, with sizes from {ends}"
+    except ValueError as error:
+        made = f"a formula has no value ({error})"
+    if made.__class__ is str:
+        raise ValueError(f"{made}: change the parameters")
+    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -2349,76 +2377,195 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
-def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
+_LARGEST = 1e+100
+
+
+def _numbers(values, what):
+    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what}: some are masked; leave those out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what}: not an array: its rows differ in length") from None
+    kind = array.dtype.kind
+    if kind not in "biuf" or array.dtype.itemsize > 8:
+        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
+        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
+    return array.astype(float)
+
+
+def _named(values, defaults, what, most=inf):
+    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values:
-            if name not in names:
+        for name in values.keys():
+            if name not in defaults:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, f"{what}s")
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+        if abs(value) > most:
+            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
+    return array
 
 
 def _parameters(p):
-    try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
-    except ZeroDivisionError:
-        raise ValueError("the mass matrix is singular: change the parameters") from None
+    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
 
 
 def _inputs(u, columns):
-    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
-        array = np.asarray(u, dtype=float)
-        if array.shape != (len(INPUTS), columns):
-            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
-        return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    if columns and not hasattr(u, "keys"):
+        u = _numbers(u, "inputs")
+        if u.ndim == 2:
+            if u.shape != (len(INPUTS), *columns):
+                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
+            return u
+    return tuple(_named(u, INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
+_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
 _NO_INPUT = (0.0,) * len(INPUTS)
-_NO_FORCE = (0.0,) * 10
 _COLUMNS = {
     "sin": np.sin,
     "cos": np.cos,
 }
 
 
+def _trouble(name, state, error=None):
+    """Why an output has no value at a state, as an exception."""
+    for label, value in zip(STATES, state):
+        if not isfinite(value):
+            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
+    if isinstance(error, ZeroDivisionError):
+        why = "its mass matrix is singular, or a formula infinite"
+        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
+    if isinstance(error, ValueError):
+        return ValueError(f"{name}: a formula has no value at this state ({error})")
+    size, label = max((abs(value), label) for value, label in zip(state, STATES))
+    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
+    return kind(
+        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
+        f" of size {size:g}; choose other units"
+    )
+
+
+def _states(y):
+    """A state or columns of states as an array."""
+    y = _numbers(y, "y")
+    if y.ndim not in (1, 2) or len(y) != 20:
+        raise ValueError(f"y has shape {y.shape}, not (20,) or (20, k): {', '.join(STATES)}")
+    return y
+
+
+def _strict(reach):
+    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    under = "ignore" if reach else "raise"
+    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
+
+
+def _alone(call, y, name, reach):
+    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+
+    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    """
+    state = y.tolist()
+    try:
+        values = call(state)
+        if not (reach and hypot(*values, *state) < reach):
+            with _strict(reach):
+                call(list(y))
+            if not all(np.isfinite(part).all() for part in (y, *values)):
+                raise FloatingPointError
+        return values
+    except (ArithmeticError, ValueError) as error:
+        raise _trouble(name, state, error) from None
+
+
+def _together(call, result, given, reach):
+    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    """
+    arrays = [part for part in given if part.__class__ is _ARRAY]
+    with _strict(reach):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+            if all(isfinite(part.sum()) for part in arrays):
+                return result
+        except ArithmeticError:
+            pass
+    result[:] = nan
+    with np.errstate(all="ignore"):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+        except ArithmeticError:
+            return result
+        sizes = np.zeros(result.shape[-1])
+        for part in map(np.abs, (*arrays, result)):
+            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
+    result[..., ~np.isfinite(sizes)] = nan
+    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
+        with _strict(reach):
+            try:
+                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
+            except ArithmeticError:
+                result[..., i] = nan
+    return result
+
+
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    if y.shape == (20,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        return np.array(kernel(y.tolist(), k, u, extra)).reshape(shape)
-    if y.ndim != 2 or y.shape[0] != 20:
-        raise ValueError(f"y has shape {y.shape}, not (20,) or (20, k): {', '.join(STATES)}")
-    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
-    values = kernel(y, k, u, extra, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty((len(values), y.shape[1]))
-    for row, value in zip(result, values):
-        row[:] = value
-    return result.reshape(shape + (y.shape[1],))
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    if not columns:
+        values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
+        return _from(values, _FLOAT, size).reshape(shape)
+    functions = {f: _COLUMNS[f] for f in functions}
+    result = _together(
+        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        np.empty((size, *columns)),
+        (y, u, extra),
+        reach,
+    )
+    return result.reshape(shape + columns)
 
 
 def initial_state(p=None):
     """The scene's initial state, (20,); momenta follow the parameters."""
-    k = _DEFAULT if p is None else _parameters(p)
-    return np.array(_initial_state((), k["initial_state"]))
+    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
+    if not all(map(isfinite, values)):
+        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+    return _from(values, _FLOAT, 20)
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (20,), or (20, k) for k states."""
-    if u is None and y.__class__ is np.ndarray and y.shape == (20,):
-        k = _DEFAULT if p is None else _parameters(p)
-        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT))
+    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
+        k, reach = _DERIVATIVE, _REACH
+        if p is not None:
+            made = _parameters(p)
+            k, reach = made["derivative"], made["reach"]
+        try:
+            values = _derivative(y.tolist(), k, _NO_INPUT)
+            if hypot(*values) < reach:
+                return _from(values, _FLOAT, 20)
+        except (ArithmeticError, ValueError):
+            pass
     return _evaluate(_derivative, "derivative", (20,), ('cos', 'sin'), y, p, u)
 
 

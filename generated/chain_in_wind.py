@@ -67,10 +67,14 @@ cos, 8 exp, 8 sqrt, 8 max; 35 more on parameters alone are done once.
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (16, k); then every result has a last axis of length k.
+
+All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
+where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
+results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import cos, exp, isfinite, sin, sqrt
+from math import cos, exp, hypot, inf, isfinite, nan, prod, sin, sqrt
 
 import numpy as np
 
@@ -204,6 +208,7 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 162, "sub": 155, "mul": 359, "div": 30, "neg": 2, "sin": 18, "cos": 8, "exp": 8, "sqrt": 8, "max": 8, "total": 758, "parameters": 35},
     "jacobian": {"add": 1120, "sub": 1930, "mul": 3026, "div": 294, "neg": 1, "sin": 18, "cos": 16, "exp": 8, "sqrt": 8, "max": 8, "select": 72, "total": 6501, "parameters": 42},
+    "switching_functions": {"add": 57, "sub": 51, "mul": 113, "div": 8, "neg": 1, "sin": 18, "cos": 8, "exp": 8, "total": 264, "parameters": 7},
 }
 
 
@@ -211,42 +216,40 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    rho, gust, depth, link_1_mass, link_1_inertia_com, link_joint_1_r_child_x, link_2_mass, link_2_inertia_com, link_joint_2_r_parent_x, link_joint_2_r_child_x, link_3_mass, link_3_inertia_com, link_joint_3_r_parent_x, link_joint_3_r_child_x, link_4_mass, link_4_inertia_com, link_joint_4_r_parent_x, link_joint_4_r_child_x, link_5_mass, link_5_inertia_com, link_joint_5_r_parent_x, link_joint_5_r_child_x, link_6_mass, link_6_inertia_com, link_joint_6_r_parent_x, link_joint_6_r_child_x, link_7_mass, link_7_inertia_com, link_joint_7_r_parent_x, link_joint_7_r_child_x, link_8_mass, link_8_inertia_com, link_joint_8_r_parent_x, link_joint_8_r_child_x, gravity_g, air_area, air_coefficient, air_turning_linear = values
+def _fixed(rho, gust, depth, link_1_mass, link_1_inertia_com, link_joint_1_r_child_x, link_2_mass, link_2_inertia_com, link_joint_2_r_parent_x, link_joint_2_r_child_x, link_3_mass, link_3_inertia_com, link_joint_3_r_parent_x, link_joint_3_r_child_x, link_4_mass, link_4_inertia_com, link_joint_4_r_parent_x, link_joint_4_r_child_x, link_5_mass, link_5_inertia_com, link_joint_5_r_parent_x, link_joint_5_r_child_x, link_6_mass, link_6_inertia_com, link_joint_6_r_parent_x, link_joint_6_r_child_x, link_7_mass, link_7_inertia_com, link_joint_7_r_parent_x, link_joint_7_r_child_x, link_8_mass, link_8_inertia_com, link_joint_8_r_parent_x, link_joint_8_r_child_x, gravity_g, air_area, air_coefficient, air_turning_linear):
+    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not link_1_mass > 0.0:
-        raise ValueError("mass of link_1 is not positive: change the parameters")
+        return "mass of link_1 is not positive"
     if not link_1_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_1 is negative: change the parameters")
+        return "inertia_com of link_1 is negative"
     if not link_2_mass > 0.0:
-        raise ValueError("mass of link_2 is not positive: change the parameters")
+        return "mass of link_2 is not positive"
     if not link_2_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_2 is negative: change the parameters")
+        return "inertia_com of link_2 is negative"
     if not link_3_mass > 0.0:
-        raise ValueError("mass of link_3 is not positive: change the parameters")
+        return "mass of link_3 is not positive"
     if not link_3_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_3 is negative: change the parameters")
+        return "inertia_com of link_3 is negative"
     if not link_4_mass > 0.0:
-        raise ValueError("mass of link_4 is not positive: change the parameters")
+        return "mass of link_4 is not positive"
     if not link_4_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_4 is negative: change the parameters")
+        return "inertia_com of link_4 is negative"
     if not link_5_mass > 0.0:
-        raise ValueError("mass of link_5 is not positive: change the parameters")
+        return "mass of link_5 is not positive"
     if not link_5_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_5 is negative: change the parameters")
+        return "inertia_com of link_5 is negative"
     if not link_6_mass > 0.0:
-        raise ValueError("mass of link_6 is not positive: change the parameters")
+        return "mass of link_6 is not positive"
     if not link_6_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_6 is negative: change the parameters")
+        return "inertia_com of link_6 is negative"
     if not link_7_mass > 0.0:
-        raise ValueError("mass of link_7 is not positive: change the parameters")
+        return "mass of link_7 is not positive"
     if not link_7_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_7 is negative: change the parameters")
+        return "inertia_com of link_7 is negative"
     if not link_8_mass > 0.0:
-        raise ValueError("mass of link_8 is not positive: change the parameters")
+        return "mass of link_8 is not positive"
     if not link_8_inertia_com >= 0.0:
-        raise ValueError("inertia_com of link_8 is negative: change the parameters")
+        return "inertia_com of link_8 is negative"
     k1 = air_coefficient * (air_area * (rho * 0.5))
     k2 = link_joint_2_r_parent_x - link_joint_1_r_child_x
     k3 = link_joint_3_r_parent_x - link_joint_2_r_child_x
@@ -283,7 +286,34 @@ def _constants(values):
         "initial_state": (),
         "derivative": (gust, depth, link_joint_1_r_child_x, link_2_mass, link_joint_2_r_child_x, link_3_mass, link_joint_3_r_child_x, link_4_mass, link_joint_4_r_child_x, link_5_mass, link_joint_5_r_child_x, link_6_mass, link_joint_6_r_child_x, link_7_mass, link_joint_7_r_child_x, link_8_mass, link_joint_8_r_child_x, gravity_g, air_turning_linear, k1, k2, k3, k4, k5, k6, k7, k8, inertia_link_1_zz, k9, inertia_link_2_zz, k10, inertia_link_3_zz, k11, inertia_link_4_zz, k12, inertia_link_5_zz, k13, inertia_link_6_zz, k14, inertia_link_7_zz, k15, inertia_link_8_zz, k16),
         "jacobian": (gust, depth, link_joint_1_r_child_x, link_2_mass, link_joint_2_r_child_x, link_3_mass, link_joint_3_r_child_x, link_4_mass, link_joint_4_r_child_x, link_5_mass, link_joint_5_r_child_x, link_6_mass, link_joint_6_r_child_x, link_7_mass, link_joint_7_r_child_x, link_8_mass, link_joint_8_r_child_x, gravity_g, air_turning_linear, k1, k2, k3, k4, k5, k6, k7, k8, k17, inertia_link_1_zz, k9, inertia_link_2_zz, k10, inertia_link_3_zz, k11, inertia_link_4_zz, k12, inertia_link_5_zz, k13, inertia_link_6_zz, k14, inertia_link_7_zz, k15, inertia_link_8_zz, k18, k19, k20, k21, k22, k23, k16, k24),
+        "switching_functions": (gust, depth, link_joint_1_r_child_x, link_joint_2_r_child_x, link_joint_3_r_child_x, link_joint_4_r_child_x, link_joint_5_r_child_x, link_joint_6_r_child_x, link_joint_7_r_child_x, link_joint_8_r_child_x, k2, k3, k4, k5, k6, k7, k8),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+
+    `reach` is how large states and results may be without a thought of overflow; with constants
+    so large or so small that any product may be lost, it is 0.
+    """
+    values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _fixed(*values.tolist())
+        with np.errstate(over="raise", under="raise", invalid="raise"):
+            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+    except ArithmeticError as error:
+        made = "the mass matrix is singular"
+        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
+        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
+            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
+            made = f"numbers are too large or too small for floats, with sizes from {ends}"
+    except ValueError as error:
+        made = f"a formula has no value ({error})"
+    if made.__class__ is str:
+        raise ValueError(f"{made}: change the parameters")
+    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -2563,42 +2593,197 @@ def _jacobian(y, k, u=(), extra=(), t=0.0, cos=cos, sin=sin, exp=exp, max=max, s
     )
 
 
-def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+def _switching_functions(y, k, u=(), extra=(), t=0.0, cos=cos, sin=sin, exp=exp):
+    """264 operations: 57 add, 51 sub, 113 mul, 8 div, 1 neg, 18 sin, 8 cos, 8 exp."""
+    gust, depth, link_joint_1_r_child_x, link_joint_2_r_child_x, link_joint_3_r_child_x, link_joint_4_r_child_x, link_joint_5_r_child_x, link_joint_6_r_child_x, link_joint_7_r_child_x, link_joint_8_r_child_x, k2, k3, k4, k5, k6, k7, k8 = k
+    link_joint_1_angle, link_joint_2_angle, link_joint_3_angle, link_joint_4_angle, link_joint_5_angle, link_joint_6_angle, link_joint_7_angle, link_joint_8_angle, link_joint_1_angle_dot, link_joint_2_angle_dot, link_joint_3_angle_dot, link_joint_4_angle_dot, link_joint_5_angle_dot, link_joint_6_angle_dot, link_joint_7_angle_dot, link_joint_8_angle_dot = y
+    cos_link_joint_1_angle = cos(link_joint_1_angle)
+    sin_link_joint_1_angle = sin(link_joint_1_angle)
+    angle_link_2 = link_joint_1_angle + link_joint_2_angle
+    cos_angle_link_2 = cos(angle_link_2)
+    sin_angle_link_2 = sin(angle_link_2)
+    s1 = k2 * cos_link_joint_1_angle
+    s2 = k2 * sin_link_joint_1_angle
+    angle_link_3 = link_joint_3_angle + angle_link_2
+    cos_angle_link_3 = cos(angle_link_3)
+    sin_angle_link_3 = sin(angle_link_3)
+    s5 = k3 * cos_angle_link_2
+    s6 = k3 * sin_angle_link_2
+    angle_link_4 = link_joint_4_angle + angle_link_3
+    cos_angle_link_4 = cos(angle_link_4)
+    sin_angle_link_4 = sin(angle_link_4)
+    s9 = k4 * cos_angle_link_3
+    s10 = k4 * sin_angle_link_3
+    angle_link_5 = link_joint_5_angle + angle_link_4
+    cos_angle_link_5 = cos(angle_link_5)
+    sin_angle_link_5 = sin(angle_link_5)
+    s13 = k5 * cos_angle_link_4
+    s14 = k5 * sin_angle_link_4
+    angle_link_6 = link_joint_6_angle + angle_link_5
+    cos_angle_link_6 = cos(angle_link_6)
+    sin_angle_link_6 = sin(angle_link_6)
+    s17 = k6 * cos_angle_link_5
+    s18 = k6 * sin_angle_link_5
+    angle_link_7 = link_joint_7_angle + angle_link_6
+    cos_angle_link_7 = cos(angle_link_7)
+    sin_angle_link_7 = sin(angle_link_7)
+    s21 = k7 * cos_angle_link_6
+    s22 = k7 * sin_angle_link_6
+    angle_link_8 = link_joint_8_angle + angle_link_7
+    s25 = k8 * cos_angle_link_7
+    s26 = k8 * sin_angle_link_7
+    s29 = link_joint_1_angle_dot * s2
+    velocity_link_2_y = link_joint_1_angle_dot * s1
+    omega_link_2_z = link_joint_1_angle_dot + link_joint_2_angle_dot
+    s30 = s29 + s6 * omega_link_2_z
+    velocity_link_3_y = velocity_link_2_y + s5 * omega_link_2_z
+    omega_link_3_z = link_joint_3_angle_dot + omega_link_2_z
+    s31 = s30 + s10 * omega_link_3_z
+    velocity_link_4_y = velocity_link_3_y + s9 * omega_link_3_z
+    omega_link_4_z = link_joint_4_angle_dot + omega_link_3_z
+    s32 = s31 + s14 * omega_link_4_z
+    velocity_link_5_y = velocity_link_4_y + s13 * omega_link_4_z
+    omega_link_5_z = link_joint_5_angle_dot + omega_link_4_z
+    s33 = s32 + s18 * omega_link_5_z
+    velocity_link_6_y = velocity_link_5_y + s17 * omega_link_5_z
+    omega_link_6_z = link_joint_6_angle_dot + omega_link_5_z
+    s34 = s33 + s22 * omega_link_6_z
+    velocity_link_7_y = velocity_link_6_y + s21 * omega_link_6_z
+    omega_link_7_z = link_joint_7_angle_dot + omega_link_6_z
+    omega_link_8_z = link_joint_8_angle_dot + omega_link_7_z
+    s35 = link_joint_1_r_child_x * cos_link_joint_1_angle
+    s36 = link_joint_1_r_child_x * sin_link_joint_1_angle
+    s37 = link_joint_1_angle_dot * s35
+    s38 = s1 + s5
+    s39 = s2 + s6
+    s40 = s9 + s38
+    s41 = s10 + s39
+    s42 = s13 + s40
+    s43 = s14 + s41
+    s44 = s17 + s42
+    s45 = s18 + s43
+    s46 = s21 + s44
+    s47 = s22 + s45
+    s48 = 1.0 + 0.5 * sin(t * 2.1) * sin(1.0 + t * 0.7)
+    s49 = t * 5.3
+    s50 = link_joint_1_angle_dot * s36 - gust * exp(-s36 / depth) * (s48 + 0.2 * sin(s49 + 2.0 * s35))
+    s52 = link_joint_2_r_child_x * cos_angle_link_2
+    s53 = link_joint_2_r_child_x * sin_angle_link_2
+    s54 = velocity_link_2_y - omega_link_2_z * s52
+    s55 = gust * exp((s2 - s53) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s1 - s52)))
+    s56 = omega_link_2_z * s53 - s29 - s55
+    s60 = link_joint_3_r_child_x * cos_angle_link_3
+    s61 = link_joint_3_r_child_x * sin_angle_link_3
+    s62 = velocity_link_3_y - omega_link_3_z * s60
+    s63 = gust * exp((s39 - s61) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s38 - s60)))
+    s64 = omega_link_3_z * s61 - s30 - s63
+    s68 = link_joint_4_r_child_x * cos_angle_link_4
+    s69 = link_joint_4_r_child_x * sin_angle_link_4
+    s70 = velocity_link_4_y - omega_link_4_z * s68
+    s71 = gust * exp((s41 - s69) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s40 - s68)))
+    s72 = omega_link_4_z * s69 - s31 - s71
+    s76 = link_joint_5_r_child_x * cos_angle_link_5
+    s77 = link_joint_5_r_child_x * sin_angle_link_5
+    s78 = velocity_link_5_y - omega_link_5_z * s76
+    s79 = gust * exp((s43 - s77) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s42 - s76)))
+    s80 = omega_link_5_z * s77 - s32 - s79
+    s84 = link_joint_6_r_child_x * cos_angle_link_6
+    s85 = link_joint_6_r_child_x * sin_angle_link_6
+    s86 = velocity_link_6_y - omega_link_6_z * s84
+    s87 = gust * exp((s45 - s85) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s44 - s84)))
+    s88 = omega_link_6_z * s85 - s33 - s87
+    s92 = link_joint_7_r_child_x * cos_angle_link_7
+    s93 = link_joint_7_r_child_x * sin_angle_link_7
+    s94 = velocity_link_7_y - omega_link_7_z * s92
+    s95 = gust * exp((s47 - s93) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s46 - s92)))
+    s96 = omega_link_7_z * s93 - s34 - s95
+    s100 = link_joint_8_r_child_x * cos(angle_link_8)
+    s101 = link_joint_8_r_child_x * sin(angle_link_8)
+    s102 = velocity_link_7_y + s25 * omega_link_7_z - omega_link_8_z * s100
+    s103 = gust * exp((s26 + s47 - s101) / depth) * (s48 + 0.2 * sin(s49 - 2.0 * (s25 + s46 - s100)))
+    s104 = omega_link_8_z * s101 - (s34 + s26 * omega_link_7_z) - s103
+    return (
+        s50 * s50 + s37 * s37 - 1e-300,
+        s56 * s56 + s54 * s54 - 1e-300,
+        s64 * s64 + s62 * s62 - 1e-300,
+        s72 * s72 + s70 * s70 - 1e-300,
+        s80 * s80 + s78 * s78 - 1e-300,
+        s88 * s88 + s86 * s86 - 1e-300,
+        s96 * s96 + s94 * s94 - 1e-300,
+        s104 * s104 + s102 * s102 - 1e-300,
+    )
+
+
+_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
+_LARGEST = 1e+100
+
+
+def _numbers(values, what):
+    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what}: some are masked; leave those out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what}: not an array: its rows differ in length") from None
+    kind = array.dtype.kind
+    if kind not in "biuf" or array.dtype.itemsize > 8:
+        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
+        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
+    return array.astype(float)
+
+
+def _named(values, defaults, what, most=inf):
+    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values:
-            if name not in names:
+        for name in values.keys():
+            if name not in defaults:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, f"{what}s")
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+        if abs(value) > most:
+            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
+    return array
 
 
 def _parameters(p):
-    try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
-    except ZeroDivisionError:
-        raise ValueError("the mass matrix is singular: change the parameters") from None
+    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
 
 
 def _inputs(u, columns):
-    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
-        array = np.asarray(u, dtype=float)
-        if array.shape != (len(INPUTS), columns):
-            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
-        return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    if columns and not hasattr(u, "keys"):
+        u = _numbers(u, "inputs")
+        if u.ndim == 2:
+            if u.shape != (len(INPUTS), *columns):
+                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
+            return u
+    return tuple(_named(u, INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+def _time(t, columns=()):
+    """Time as a float; beside columns it may be an array of as many."""
+    if t.__class__ is not np.float64:
+        t = _numbers(t, "t")
+    if t.shape not in ((), columns):
+        raise ValueError(f"t has shape {t.shape}, not ()")
+    if t.shape == () and not isfinite(t):
+        raise ValueError(f"t is {t}, not a finite number")
+    return t if t.shape else float(t)
+
+
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
+_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
 _NO_INPUT = (0.0,) * len(INPUTS)
-_NO_FORCE = (0.0,) * 8
 _COLUMNS = {
     "sin": np.sin,
     "cos": np.cos,
@@ -2609,37 +2794,139 @@ _COLUMNS = {
 }
 
 
-def _evaluate(kernel, name, shape, functions, y, p, u, extra=(), **time):
-    """Any output of one state or of columns of states."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    if y.shape == (16,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        return np.array(kernel(y.tolist(), k, u, extra, **time)).reshape(shape)
-    if y.ndim != 2 or y.shape[0] != 16:
+def _trouble(name, state, error=None):
+    """Why an output has no value at a state, as an exception."""
+    for label, value in zip(STATES, state):
+        if not isfinite(value):
+            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
+    if isinstance(error, ZeroDivisionError):
+        why = "its mass matrix is singular, or a formula infinite"
+        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
+    if isinstance(error, ValueError):
+        return ValueError(f"{name}: a formula has no value at this state ({error})")
+    size, label = max((abs(value), label) for value, label in zip(state, STATES))
+    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
+    return kind(
+        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
+        f" of size {size:g}; choose other units"
+    )
+
+
+def _states(y):
+    """A state or columns of states as an array."""
+    y = _numbers(y, "y")
+    if y.ndim not in (1, 2) or len(y) != 16:
         raise ValueError(f"y has shape {y.shape}, not (16,) or (16, k): {', '.join(STATES)}")
-    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
-    values = kernel(y, k, u, extra, **time, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty((len(values), y.shape[1]))
-    for row, value in zip(result, values):
-        row[:] = value
-    return result.reshape(shape + (y.shape[1],))
+    return y
+
+
+def _strict(reach):
+    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    under = "ignore" if reach else "raise"
+    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
+
+
+def _alone(call, y, name, reach):
+    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+
+    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    """
+    state = y.tolist()
+    try:
+        values = call(state)
+        if not (reach and hypot(*values, *state) < reach):
+            with _strict(reach):
+                call(list(y))
+            if not all(np.isfinite(part).all() for part in (y, *values)):
+                raise FloatingPointError
+        return values
+    except (ArithmeticError, ValueError) as error:
+        raise _trouble(name, state, error) from None
+
+
+def _together(call, result, given, reach):
+    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    """
+    arrays = [part for part in given if part.__class__ is _ARRAY]
+    with _strict(reach):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+            if all(isfinite(part.sum()) for part in arrays):
+                return result
+        except ArithmeticError:
+            pass
+    result[:] = nan
+    with np.errstate(all="ignore"):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+        except ArithmeticError:
+            return result
+        sizes = np.zeros(result.shape[-1])
+        for part in map(np.abs, (*arrays, result)):
+            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
+    result[..., ~np.isfinite(sizes)] = nan
+    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
+        with _strict(reach):
+            try:
+                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
+            except ArithmeticError:
+                result[..., i] = nan
+    return result
+
+
+def _evaluate(kernel, name, shape, functions, y, p, u, extra=(), *time):
+    """Any output of one state or of columns of states."""
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    time = [_time(t, columns) for t in time]
+    if not columns:
+        values = _alone(lambda y: kernel(y, k, u, extra, *time), y, name, reach)
+        return _from(values, _FLOAT, size).reshape(shape)
+    functions = {f: _COLUMNS[f] for f in functions}
+    result = _together(
+        lambda y, u, extra, *time: kernel(y, k, u, extra, *time, **functions),
+        np.empty((size, *columns)),
+        (y, u, extra, *time),
+        reach,
+    )
+    return result.reshape(shape + columns)
 
 
 def initial_state(p=None):
     """The scene's initial state, (16,); momenta follow the parameters."""
-    k = _DEFAULT if p is None else _parameters(p)
-    return np.array(_initial_state((), k["initial_state"]))
+    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
+    if not all(map(isfinite, values)):
+        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+    return _from(values, _FLOAT, 16)
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (16,), or (16, k) for k states."""
-    if u is None and y.__class__ is np.ndarray and y.shape == (16,):
-        k = _DEFAULT if p is None else _parameters(p)
-        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT, t=t))
-    return _evaluate(_derivative, "derivative", (16,), ('cos', 'sin', 'exp', 'max', 'sqrt'), y, p, u, t=t)
+    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
+        k, reach = _DERIVATIVE, _REACH
+        if p is not None:
+            made = _parameters(p)
+            k, reach = made["derivative"], made["reach"]
+        try:
+            values = _derivative(y.tolist(), k, _NO_INPUT, t=t if t.__class__ is float else _time(t))
+            if hypot(*values) < reach:
+                return _from(values, _FLOAT, 16)
+        except (ArithmeticError, ValueError):
+            pass
+    return _evaluate(_derivative, "derivative", (16,), ('cos', 'sin', 'exp', 'max', 'sqrt'), y, p, u, (), t)
 
 
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
-    return _evaluate(_jacobian, "jacobian", (16, 16), ('cos', 'sin', 'exp', 'max', 'sqrt', 'select'), y, p, u, t=t)
+    return _evaluate(_jacobian, "jacobian", (16, 16), ('cos', 'sin', 'exp', 'max', 'sqrt', 'select'), y, p, u, (), t)
+
+
+def switching_functions(t, y, p=None, u=None):
+    """`derivative` has another branch where one of these passes 0."""
+    return _evaluate(_switching_functions, "switching_functions", (8,), ('cos', 'sin', 'exp'), y, p, u, (), t)

@@ -170,10 +170,14 @@ sin, 14 cos; 261 more on parameters alone are done once.
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (90, k); then every result has a last axis of length k.
+
+All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
+where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
+results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin
+from math import cos, hypot, inf, isfinite, nan, prod, sin
 
 import numpy as np
 
@@ -516,10 +520,8 @@ COST = {
 }
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, g = values
+def _fixed(body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, g):
+    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     mass_pelvis = body_mass * m_pelvis
     k65 = l_pelvis * kx_pelvis
     k66 = l_pelvis * ky_pelvis
@@ -579,133 +581,133 @@ def _constants(values):
     k107 = l_hand * kz_hand
     inertia_hand_left_zz = mass_hand_left * (k107 * k107)
     if not mass_pelvis > 0.0:
-        raise ValueError("mass of pelvis is not positive: change the parameters")
+        return "mass of pelvis is not positive"
     if not mass_pelvis * (k65 * k65) >= 0.0:
-        raise ValueError("inertia_com xx of pelvis is negative: change the parameters")
+        return "inertia_com xx of pelvis is negative"
     if not mass_pelvis * (k66 * k66) >= 0.0:
-        raise ValueError("inertia_com yy of pelvis is negative: change the parameters")
+        return "inertia_com yy of pelvis is negative"
     if not mass_pelvis * (k67 * k67) >= 0.0:
-        raise ValueError("inertia_com zz of pelvis is negative: change the parameters")
+        return "inertia_com zz of pelvis is negative"
     if not mass_abdomen > 0.0:
-        raise ValueError("mass of abdomen is not positive: change the parameters")
+        return "mass of abdomen is not positive"
     if not mass_abdomen * (k68 * k68) >= 0.0:
-        raise ValueError("inertia_com xx of abdomen is negative: change the parameters")
+        return "inertia_com xx of abdomen is negative"
     if not mass_abdomen * (k69 * k69) >= 0.0:
-        raise ValueError("inertia_com yy of abdomen is negative: change the parameters")
+        return "inertia_com yy of abdomen is negative"
     if not mass_abdomen * (k70 * k70) >= 0.0:
-        raise ValueError("inertia_com zz of abdomen is negative: change the parameters")
+        return "inertia_com zz of abdomen is negative"
     if not mass_thigh_left > 0.0:
-        raise ValueError("mass of thigh_left is not positive: change the parameters")
+        return "mass of thigh_left is not positive"
     if not k72 >= 0.0:
-        raise ValueError("inertia_com xx of thigh_left is negative: change the parameters")
+        return "inertia_com xx of thigh_left is negative"
     if not k74 >= 0.0:
-        raise ValueError("inertia_com yy of thigh_left is negative: change the parameters")
+        return "inertia_com yy of thigh_left is negative"
     if not inertia_thigh_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of thigh_left is negative: change the parameters")
+        return "inertia_com zz of thigh_left is negative"
     if not mass_thigh_left > 0.0:
-        raise ValueError("mass of thigh_right is not positive: change the parameters")
+        return "mass of thigh_right is not positive"
     if not k72 >= 0.0:
-        raise ValueError("inertia_com xx of thigh_right is negative: change the parameters")
+        return "inertia_com xx of thigh_right is negative"
     if not k74 >= 0.0:
-        raise ValueError("inertia_com yy of thigh_right is negative: change the parameters")
+        return "inertia_com yy of thigh_right is negative"
     if not inertia_thigh_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of thigh_right is negative: change the parameters")
+        return "inertia_com zz of thigh_right is negative"
     if not mass_thorax > 0.0:
-        raise ValueError("mass of thorax is not positive: change the parameters")
+        return "mass of thorax is not positive"
     if not mass_thorax * (k76 * k76) >= 0.0:
-        raise ValueError("inertia_com xx of thorax is negative: change the parameters")
+        return "inertia_com xx of thorax is negative"
     if not mass_thorax * (k77 * k77) >= 0.0:
-        raise ValueError("inertia_com yy of thorax is negative: change the parameters")
+        return "inertia_com yy of thorax is negative"
     if not mass_thorax * (k78 * k78) >= 0.0:
-        raise ValueError("inertia_com zz of thorax is negative: change the parameters")
+        return "inertia_com zz of thorax is negative"
     if not mass_shank_left > 0.0:
-        raise ValueError("mass of shank_left is not positive: change the parameters")
+        return "mass of shank_left is not positive"
     if not k80 >= 0.0:
-        raise ValueError("inertia_com xx of shank_left is negative: change the parameters")
+        return "inertia_com xx of shank_left is negative"
     if not k82 >= 0.0:
-        raise ValueError("inertia_com yy of shank_left is negative: change the parameters")
+        return "inertia_com yy of shank_left is negative"
     if not inertia_shank_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of shank_left is negative: change the parameters")
+        return "inertia_com zz of shank_left is negative"
     if not mass_shank_left > 0.0:
-        raise ValueError("mass of shank_right is not positive: change the parameters")
+        return "mass of shank_right is not positive"
     if not k80 >= 0.0:
-        raise ValueError("inertia_com xx of shank_right is negative: change the parameters")
+        return "inertia_com xx of shank_right is negative"
     if not k82 >= 0.0:
-        raise ValueError("inertia_com yy of shank_right is negative: change the parameters")
+        return "inertia_com yy of shank_right is negative"
     if not inertia_shank_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of shank_right is negative: change the parameters")
+        return "inertia_com zz of shank_right is negative"
     if not mass_head > 0.0:
-        raise ValueError("mass of head is not positive: change the parameters")
+        return "mass of head is not positive"
     if not mass_head * (k84 * k84) >= 0.0:
-        raise ValueError("inertia_com xx of head is negative: change the parameters")
+        return "inertia_com xx of head is negative"
     if not mass_head * (k85 * k85) >= 0.0:
-        raise ValueError("inertia_com yy of head is negative: change the parameters")
+        return "inertia_com yy of head is negative"
     if not mass_head * (k86 * k86) >= 0.0:
-        raise ValueError("inertia_com zz of head is negative: change the parameters")
+        return "inertia_com zz of head is negative"
     if not mass_upper_arm_left > 0.0:
-        raise ValueError("mass of upper_arm_left is not positive: change the parameters")
+        return "mass of upper_arm_left is not positive"
     if not k88 >= 0.0:
-        raise ValueError("inertia_com xx of upper_arm_left is negative: change the parameters")
+        return "inertia_com xx of upper_arm_left is negative"
     if not k90 >= 0.0:
-        raise ValueError("inertia_com yy of upper_arm_left is negative: change the parameters")
+        return "inertia_com yy of upper_arm_left is negative"
     if not inertia_upper_arm_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of upper_arm_left is negative: change the parameters")
+        return "inertia_com zz of upper_arm_left is negative"
     if not mass_upper_arm_left > 0.0:
-        raise ValueError("mass of upper_arm_right is not positive: change the parameters")
+        return "mass of upper_arm_right is not positive"
     if not k88 >= 0.0:
-        raise ValueError("inertia_com xx of upper_arm_right is negative: change the parameters")
+        return "inertia_com xx of upper_arm_right is negative"
     if not k90 >= 0.0:
-        raise ValueError("inertia_com yy of upper_arm_right is negative: change the parameters")
+        return "inertia_com yy of upper_arm_right is negative"
     if not inertia_upper_arm_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of upper_arm_right is negative: change the parameters")
+        return "inertia_com zz of upper_arm_right is negative"
     if not mass_foot_left > 0.0:
-        raise ValueError("mass of foot_left is not positive: change the parameters")
+        return "mass of foot_left is not positive"
     if not k93 >= 0.0:
-        raise ValueError("inertia_com xx of foot_left is negative: change the parameters")
+        return "inertia_com xx of foot_left is negative"
     if not k95 >= 0.0:
-        raise ValueError("inertia_com yy of foot_left is negative: change the parameters")
+        return "inertia_com yy of foot_left is negative"
     if not k97 >= 0.0:
-        raise ValueError("inertia_com zz of foot_left is negative: change the parameters")
+        return "inertia_com zz of foot_left is negative"
     if not mass_foot_left > 0.0:
-        raise ValueError("mass of foot_right is not positive: change the parameters")
+        return "mass of foot_right is not positive"
     if not k93 >= 0.0:
-        raise ValueError("inertia_com xx of foot_right is negative: change the parameters")
+        return "inertia_com xx of foot_right is negative"
     if not k95 >= 0.0:
-        raise ValueError("inertia_com yy of foot_right is negative: change the parameters")
+        return "inertia_com yy of foot_right is negative"
     if not k97 >= 0.0:
-        raise ValueError("inertia_com zz of foot_right is negative: change the parameters")
+        return "inertia_com zz of foot_right is negative"
     if not mass_forearm_left > 0.0:
-        raise ValueError("mass of forearm_left is not positive: change the parameters")
+        return "mass of forearm_left is not positive"
     if not k99 >= 0.0:
-        raise ValueError("inertia_com xx of forearm_left is negative: change the parameters")
+        return "inertia_com xx of forearm_left is negative"
     if not k101 >= 0.0:
-        raise ValueError("inertia_com yy of forearm_left is negative: change the parameters")
+        return "inertia_com yy of forearm_left is negative"
     if not inertia_forearm_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of forearm_left is negative: change the parameters")
+        return "inertia_com zz of forearm_left is negative"
     if not mass_forearm_left > 0.0:
-        raise ValueError("mass of forearm_right is not positive: change the parameters")
+        return "mass of forearm_right is not positive"
     if not k99 >= 0.0:
-        raise ValueError("inertia_com xx of forearm_right is negative: change the parameters")
+        return "inertia_com xx of forearm_right is negative"
     if not k101 >= 0.0:
-        raise ValueError("inertia_com yy of forearm_right is negative: change the parameters")
+        return "inertia_com yy of forearm_right is negative"
     if not inertia_forearm_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of forearm_right is negative: change the parameters")
+        return "inertia_com zz of forearm_right is negative"
     if not mass_hand_left > 0.0:
-        raise ValueError("mass of hand_left is not positive: change the parameters")
+        return "mass of hand_left is not positive"
     if not k104 >= 0.0:
-        raise ValueError("inertia_com xx of hand_left is negative: change the parameters")
+        return "inertia_com xx of hand_left is negative"
     if not k106 >= 0.0:
-        raise ValueError("inertia_com yy of hand_left is negative: change the parameters")
+        return "inertia_com yy of hand_left is negative"
     if not inertia_hand_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of hand_left is negative: change the parameters")
+        return "inertia_com zz of hand_left is negative"
     if not mass_hand_left > 0.0:
-        raise ValueError("mass of hand_right is not positive: change the parameters")
+        return "mass of hand_right is not positive"
     if not k104 >= 0.0:
-        raise ValueError("inertia_com xx of hand_right is negative: change the parameters")
+        return "inertia_com xx of hand_right is negative"
     if not k106 >= 0.0:
-        raise ValueError("inertia_com yy of hand_right is negative: change the parameters")
+        return "inertia_com yy of hand_right is negative"
     if not inertia_hand_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of hand_right is negative: change the parameters")
+        return "inertia_com zz of hand_right is negative"
     inertia_pelvis_xx = mass_pelvis * (k65 * k65)
     inertia_pelvis_yy = mass_pelvis * (k66 * k66)
     inertia_pelvis_zz = mass_pelvis * (k67 * k67)
@@ -838,6 +840,32 @@ def _constants(values):
         "derivative": (w_shoulder, w_hip, g, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k1, mass_abdomen, inertia_abdomen_zz, k2, mass_thigh_left, inertia_thigh_left_zz, k3, mass_thorax, inertia_thorax_zz, k4, mass_shank_left, inertia_shank_left_zz, k5, mass_head, inertia_head_zz, k6, mass_upper_arm_left, inertia_upper_arm_left_zz, k7, mass_foot_left, k8, mass_forearm_left, inertia_forearm_left_zz, k9, mass_hand_left, inertia_hand_left_zz, k10, inertia_abdomen_xx, inertia_abdomen_yy, k11, inertia_thigh_left_xx, inertia_thigh_left_yy, k12, inertia_thorax_xx, inertia_thorax_yy, k13, inertia_shank_left_xx, inertia_shank_left_yy, k14, inertia_head_xx, inertia_head_yy, k15, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k16, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k17, inertia_forearm_left_xx, inertia_forearm_left_yy, k18, inertia_hand_left_xx, inertia_hand_left_yy, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64),
         "jacobian": (w_shoulder, w_hip, g, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k1, mass_abdomen, inertia_abdomen_zz, k2, mass_thigh_left, inertia_thigh_left_zz, k3, mass_thorax, inertia_thorax_zz, k4, mass_shank_left, inertia_shank_left_zz, k5, mass_head, inertia_head_zz, k6, mass_upper_arm_left, inertia_upper_arm_left_zz, k7, mass_foot_left, k8, mass_forearm_left, inertia_forearm_left_zz, k9, mass_hand_left, inertia_hand_left_zz, k10, inertia_abdomen_xx, inertia_abdomen_yy, k11, inertia_thigh_left_xx, inertia_thigh_left_yy, k12, inertia_thorax_xx, inertia_thorax_yy, k13, inertia_shank_left_xx, inertia_shank_left_yy, k14, inertia_head_xx, inertia_head_yy, k15, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k16, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k17, inertia_forearm_left_xx, inertia_forearm_left_yy, k18, inertia_hand_left_xx, inertia_hand_left_yy, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+
+    `reach` is how large states and results may be without a thought of overflow; with constants
+    so large or so small that any product may be lost, it is 0.
+    """
+    values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _fixed(*values.tolist())
+        with np.errstate(over="raise", under="raise", invalid="raise"):
+            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+    except ArithmeticError as error:
+        made = "the mass matrix is singular"
+        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
+        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
+            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
+            made = f"numbers are too large or too small for floats, with sizes from {ends}"
+    except ValueError as error:
+        made = f"a formula has no value ({error})"
+    if made.__class__ is str:
+        raise ValueError(f"{made}: change the parameters")
+    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -6350,96 +6378,223 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
-def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
+_LARGEST = 1e+100
+
+
+def _numbers(values, what):
+    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what}: some are masked; leave those out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what}: not an array: its rows differ in length") from None
+    kind = array.dtype.kind
+    if kind not in "biuf" or array.dtype.itemsize > 8:
+        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
+        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
+    return array.astype(float)
+
+
+def _named(values, defaults, what, most=inf):
+    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values:
-            if name not in names:
+        for name in values.keys():
+            if name not in defaults:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, f"{what}s")
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+        if abs(value) > most:
+            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
+    return array
 
 
 def _parameters(p):
-    try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
-    except ZeroDivisionError:
-        raise ValueError("the mass matrix is singular: change the parameters") from None
+    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
 
 
 def _inputs(u, columns):
-    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
-        array = np.asarray(u, dtype=float)
-        if array.shape != (len(INPUTS), columns):
-            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
-        return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    if columns and not hasattr(u, "keys"):
+        u = _numbers(u, "inputs")
+        if u.ndim == 2:
+            if u.shape != (len(INPUTS), *columns):
+                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
+            return u
+    return tuple(_named(u, INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
+_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
 _NO_INPUT = (0.0,) * len(INPUTS)
-_NO_FORCE = (0.0,) * 41
 _COLUMNS = {
     "sin": np.sin,
     "cos": np.cos,
 }
 
 
+def _trouble(name, state, error=None):
+    """Why an output has no value at a state, as an exception."""
+    for label, value in zip(STATES, state):
+        if not isfinite(value):
+            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
+    for indices in QUATERNIONS:
+        length = hypot(*(state[i] for i in indices))
+        if not 1e-150 < length < 1e150:
+            label = STATES[indices[0]]
+            return ValueError(f"{name}: the quaternion from {label!r} on has length {length:g}; scale it to 1")
+    if isinstance(error, ZeroDivisionError):
+        why = "its mass matrix is singular, or a formula infinite"
+        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
+    if isinstance(error, ValueError):
+        return ValueError(f"{name}: a formula has no value at this state ({error})")
+    size, label = max((abs(value), label) for value, label in zip(state, STATES))
+    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
+    return kind(
+        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
+        f" of size {size:g}; choose other units"
+    )
+
+
+def _states(y):
+    """A state or columns of states as an array."""
+    y = _numbers(y, "y")
+    if y.ndim not in (1, 2) or len(y) != 90:
+        raise ValueError(f"y has shape {y.shape}, not (90,) or (90, k): {', '.join(STATES)}")
+    return y
+
+
+def _strict(reach):
+    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    under = "ignore" if reach else "raise"
+    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
+
+
+def _alone(call, y, name, reach):
+    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+
+    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    """
+    state = y.tolist()
+    try:
+        values = call(state)
+        if not (reach and hypot(*values, *state) < reach):
+            with _strict(reach):
+                call(list(y))
+            if not all(np.isfinite(part).all() for part in (y, *values)):
+                raise FloatingPointError
+        return values
+    except (ArithmeticError, ValueError) as error:
+        raise _trouble(name, state, error) from None
+
+
+def _together(call, result, given, reach):
+    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    """
+    arrays = [part for part in given if part.__class__ is _ARRAY]
+    with _strict(reach):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+            if all(isfinite(part.sum()) for part in arrays):
+                return result
+        except ArithmeticError:
+            pass
+    result[:] = nan
+    with np.errstate(all="ignore"):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+        except ArithmeticError:
+            return result
+        sizes = np.zeros(result.shape[-1])
+        for part in map(np.abs, (*arrays, result)):
+            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
+    result[..., ~np.isfinite(sizes)] = nan
+    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
+        with _strict(reach):
+            try:
+                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
+            except ArithmeticError:
+                result[..., i] = nan
+    return result
+
+
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    if y.shape == (90,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        return np.array(kernel(y.tolist(), k, u, extra)).reshape(shape)
-    if y.ndim != 2 or y.shape[0] != 90:
-        raise ValueError(f"y has shape {y.shape}, not (90,) or (90, k): {', '.join(STATES)}")
-    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
-    values = kernel(y, k, u, extra, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty((len(values), y.shape[1]))
-    for row, value in zip(result, values):
-        row[:] = value
-    return result.reshape(shape + (y.shape[1],))
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    if not columns:
+        values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
+        return _from(values, _FLOAT, size).reshape(shape)
+    functions = {f: _COLUMNS[f] for f in functions}
+    result = _together(
+        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        np.empty((size, *columns)),
+        (y, u, extra),
+        reach,
+    )
+    return result.reshape(shape + columns)
 
 
 def _along(kernel, name, shape, functions, y, p, u):
     """A matrix of derivatives, all its columns at once: the change along each unit direction."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    directions = np.eye(shape[1])
-    if y.shape == (90,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        values, columns = kernel(y.tolist(), k, u, directions), ()
-    else:
-        if y.ndim != 2 or y.shape[0] != 90:
-            raise ValueError(f"y has shape {y.shape}, not (90,) or (90, k): {', '.join(STATES)}")
-        columns = y.shape[1:]
-        u = _NO_INPUT if u is None else _inputs(u, *columns)
-        values = kernel(y, k, u, directions[:, :, None], **{f: _COLUMNS[f] for f in functions})
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, directions = made[name], made["reach"], y.shape[1:], np.eye(shape[1])
+    u = _NO_INPUT if u is None else _inputs(u, columns)
     result = np.empty(shape + columns)
-    for row, value in zip(result, values):
-        row[:] = value
-    return result
+    if not columns:
+        with np.errstate(all="ignore"):
+            values = _alone(lambda y: kernel(y, k, u, directions), y, name, 0.0)
+        for row, value in zip(result, values):
+            row[:] = value
+        return result
+    functions, directions = {f: _COLUMNS[f] for f in functions}, directions[:, :, None]
+    return _together(
+        lambda y, u: kernel(y, k, u, directions, **functions),
+        result,
+        (y, u),
+        reach,
+    )
 
 
 def initial_state(p=None):
     """The scene's initial state, (90,); momenta follow the parameters."""
-    k = _DEFAULT if p is None else _parameters(p)
-    return np.array(_initial_state((), k["initial_state"]))
+    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
+    if not all(map(isfinite, values)):
+        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+    return _from(values, _FLOAT, 90)
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (90,), or (90, k) for k states."""
-    if u is None and y.__class__ is np.ndarray and y.shape == (90,):
-        k = _DEFAULT if p is None else _parameters(p)
-        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT))
+    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
+        k, reach = _DERIVATIVE, _REACH
+        if p is not None:
+            made = _parameters(p)
+            k, reach = made["derivative"], made["reach"]
+        try:
+            state = y.tolist()
+            values = _derivative(state, k, _NO_INPUT)
+            if hypot(*values) < reach and hypot(*state) < reach:
+                return _from(values, _FLOAT, 90)
+        except (ArithmeticError, ValueError):
+            pass
     return _evaluate(_derivative, "derivative", (90,), ('cos', 'sin'), y, p, u)
 
 

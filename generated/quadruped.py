@@ -82,10 +82,14 @@ One call of `derivative` takes 3034 operations: 762 add, 693 sub, 1468 mul, 74 d
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (37, k); then every result has a last axis of length k.
+
+All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
+where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
+results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin
+from math import cos, hypot, inf, isfinite, nan, prod, sin
 
 import numpy as np
 
@@ -252,114 +256,112 @@ COST = {
 }
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g = values
+def _fixed(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g):
+    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_trunk > 0.0:
-        raise ValueError("mass of trunk is not positive: change the parameters")
+        return "mass of trunk is not positive"
     if not I_trunk_x >= 0.0:
-        raise ValueError("inertia_com xx of trunk is negative: change the parameters")
+        return "inertia_com xx of trunk is negative"
     if not I_trunk_y >= 0.0:
-        raise ValueError("inertia_com yy of trunk is negative: change the parameters")
+        return "inertia_com yy of trunk is negative"
     if not I_trunk_z >= 0.0:
-        raise ValueError("inertia_com zz of trunk is negative: change the parameters")
+        return "inertia_com zz of trunk is negative"
     if not m_hip > 0.0:
-        raise ValueError("mass of front_left_hip is not positive: change the parameters")
+        return "mass of front_left_hip is not positive"
     if not I_hip_xx >= 0.0:
-        raise ValueError("inertia_com xx of front_left_hip is negative: change the parameters")
+        return "inertia_com xx of front_left_hip is negative"
     if not I_hip_yy >= 0.0:
-        raise ValueError("inertia_com yy of front_left_hip is negative: change the parameters")
+        return "inertia_com yy of front_left_hip is negative"
     if not I_hip_zz >= 0.0:
-        raise ValueError("inertia_com zz of front_left_hip is negative: change the parameters")
+        return "inertia_com zz of front_left_hip is negative"
     if not m_hip > 0.0:
-        raise ValueError("mass of front_right_hip is not positive: change the parameters")
+        return "mass of front_right_hip is not positive"
     if not I_hip_xx >= 0.0:
-        raise ValueError("inertia_com xx of front_right_hip is negative: change the parameters")
+        return "inertia_com xx of front_right_hip is negative"
     if not I_hip_yy >= 0.0:
-        raise ValueError("inertia_com yy of front_right_hip is negative: change the parameters")
+        return "inertia_com yy of front_right_hip is negative"
     if not I_hip_zz >= 0.0:
-        raise ValueError("inertia_com zz of front_right_hip is negative: change the parameters")
+        return "inertia_com zz of front_right_hip is negative"
     if not m_hip > 0.0:
-        raise ValueError("mass of hind_left_hip is not positive: change the parameters")
+        return "mass of hind_left_hip is not positive"
     if not I_hip_xx >= 0.0:
-        raise ValueError("inertia_com xx of hind_left_hip is negative: change the parameters")
+        return "inertia_com xx of hind_left_hip is negative"
     if not I_hip_yy >= 0.0:
-        raise ValueError("inertia_com yy of hind_left_hip is negative: change the parameters")
+        return "inertia_com yy of hind_left_hip is negative"
     if not I_hip_zz >= 0.0:
-        raise ValueError("inertia_com zz of hind_left_hip is negative: change the parameters")
+        return "inertia_com zz of hind_left_hip is negative"
     if not m_hip > 0.0:
-        raise ValueError("mass of hind_right_hip is not positive: change the parameters")
+        return "mass of hind_right_hip is not positive"
     if not I_hip_xx >= 0.0:
-        raise ValueError("inertia_com xx of hind_right_hip is negative: change the parameters")
+        return "inertia_com xx of hind_right_hip is negative"
     if not I_hip_yy >= 0.0:
-        raise ValueError("inertia_com yy of hind_right_hip is negative: change the parameters")
+        return "inertia_com yy of hind_right_hip is negative"
     if not I_hip_zz >= 0.0:
-        raise ValueError("inertia_com zz of hind_right_hip is negative: change the parameters")
+        return "inertia_com zz of hind_right_hip is negative"
     if not m_thigh > 0.0:
-        raise ValueError("mass of front_left_thigh is not positive: change the parameters")
+        return "mass of front_left_thigh is not positive"
     if not I_thigh_x >= 0.0:
-        raise ValueError("inertia_com xx of front_left_thigh is negative: change the parameters")
+        return "inertia_com xx of front_left_thigh is negative"
     if not I_thigh_y >= 0.0:
-        raise ValueError("inertia_com yy of front_left_thigh is negative: change the parameters")
+        return "inertia_com yy of front_left_thigh is negative"
     if not I_thigh_z >= 0.0:
-        raise ValueError("inertia_com zz of front_left_thigh is negative: change the parameters")
+        return "inertia_com zz of front_left_thigh is negative"
     if not m_thigh > 0.0:
-        raise ValueError("mass of front_right_thigh is not positive: change the parameters")
+        return "mass of front_right_thigh is not positive"
     if not I_thigh_x >= 0.0:
-        raise ValueError("inertia_com xx of front_right_thigh is negative: change the parameters")
+        return "inertia_com xx of front_right_thigh is negative"
     if not I_thigh_y >= 0.0:
-        raise ValueError("inertia_com yy of front_right_thigh is negative: change the parameters")
+        return "inertia_com yy of front_right_thigh is negative"
     if not I_thigh_z >= 0.0:
-        raise ValueError("inertia_com zz of front_right_thigh is negative: change the parameters")
+        return "inertia_com zz of front_right_thigh is negative"
     if not m_thigh > 0.0:
-        raise ValueError("mass of hind_left_thigh is not positive: change the parameters")
+        return "mass of hind_left_thigh is not positive"
     if not I_thigh_x >= 0.0:
-        raise ValueError("inertia_com xx of hind_left_thigh is negative: change the parameters")
+        return "inertia_com xx of hind_left_thigh is negative"
     if not I_thigh_y >= 0.0:
-        raise ValueError("inertia_com yy of hind_left_thigh is negative: change the parameters")
+        return "inertia_com yy of hind_left_thigh is negative"
     if not I_thigh_z >= 0.0:
-        raise ValueError("inertia_com zz of hind_left_thigh is negative: change the parameters")
+        return "inertia_com zz of hind_left_thigh is negative"
     if not m_thigh > 0.0:
-        raise ValueError("mass of hind_right_thigh is not positive: change the parameters")
+        return "mass of hind_right_thigh is not positive"
     if not I_thigh_x >= 0.0:
-        raise ValueError("inertia_com xx of hind_right_thigh is negative: change the parameters")
+        return "inertia_com xx of hind_right_thigh is negative"
     if not I_thigh_y >= 0.0:
-        raise ValueError("inertia_com yy of hind_right_thigh is negative: change the parameters")
+        return "inertia_com yy of hind_right_thigh is negative"
     if not I_thigh_z >= 0.0:
-        raise ValueError("inertia_com zz of hind_right_thigh is negative: change the parameters")
+        return "inertia_com zz of hind_right_thigh is negative"
     if not m_shank > 0.0:
-        raise ValueError("mass of front_left_shank is not positive: change the parameters")
+        return "mass of front_left_shank is not positive"
     if not I_shank_x >= 0.0:
-        raise ValueError("inertia_com xx of front_left_shank is negative: change the parameters")
+        return "inertia_com xx of front_left_shank is negative"
     if not I_shank_y >= 0.0:
-        raise ValueError("inertia_com yy of front_left_shank is negative: change the parameters")
+        return "inertia_com yy of front_left_shank is negative"
     if not I_shank_z >= 0.0:
-        raise ValueError("inertia_com zz of front_left_shank is negative: change the parameters")
+        return "inertia_com zz of front_left_shank is negative"
     if not m_shank > 0.0:
-        raise ValueError("mass of front_right_shank is not positive: change the parameters")
+        return "mass of front_right_shank is not positive"
     if not I_shank_x >= 0.0:
-        raise ValueError("inertia_com xx of front_right_shank is negative: change the parameters")
+        return "inertia_com xx of front_right_shank is negative"
     if not I_shank_y >= 0.0:
-        raise ValueError("inertia_com yy of front_right_shank is negative: change the parameters")
+        return "inertia_com yy of front_right_shank is negative"
     if not I_shank_z >= 0.0:
-        raise ValueError("inertia_com zz of front_right_shank is negative: change the parameters")
+        return "inertia_com zz of front_right_shank is negative"
     if not m_shank > 0.0:
-        raise ValueError("mass of hind_left_shank is not positive: change the parameters")
+        return "mass of hind_left_shank is not positive"
     if not I_shank_x >= 0.0:
-        raise ValueError("inertia_com xx of hind_left_shank is negative: change the parameters")
+        return "inertia_com xx of hind_left_shank is negative"
     if not I_shank_y >= 0.0:
-        raise ValueError("inertia_com yy of hind_left_shank is negative: change the parameters")
+        return "inertia_com yy of hind_left_shank is negative"
     if not I_shank_z >= 0.0:
-        raise ValueError("inertia_com zz of hind_left_shank is negative: change the parameters")
+        return "inertia_com zz of hind_left_shank is negative"
     if not m_shank > 0.0:
-        raise ValueError("mass of hind_right_shank is not positive: change the parameters")
+        return "mass of hind_right_shank is not positive"
     if not I_shank_x >= 0.0:
-        raise ValueError("inertia_com xx of hind_right_shank is negative: change the parameters")
+        return "inertia_com xx of hind_right_shank is negative"
     if not I_shank_y >= 0.0:
-        raise ValueError("inertia_com yy of hind_right_shank is negative: change the parameters")
+        return "inertia_com yy of hind_right_shank is negative"
     if not I_shank_z >= 0.0:
-        raise ValueError("inertia_com zz of hind_right_shank is negative: change the parameters")
+        return "inertia_com zz of hind_right_shank is negative"
     k1 = J_rotor * (G_hip * G_hip)
     k2 = c_hip + (l_hip - c_hip)
     k3 = c_hip - l_hip - c_hip
@@ -418,6 +420,32 @@ def _constants(values):
         "derivative": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27),
         "jacobian": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, k28, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k29, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k30),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+
+    `reach` is how large states and results may be without a thought of overflow; with constants
+    so large or so small that any product may be lost, it is 0.
+    """
+    values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _fixed(*values.tolist())
+        with np.errstate(over="raise", under="raise", invalid="raise"):
+            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+    except ArithmeticError as error:
+        made = "the mass matrix is singular"
+        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
+        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
+            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
+            made = f"numbers are too large or too small for floats, with sizes from {ends}"
+    except ValueError as error:
+        made = f"a formula has no value ({error})"
+    if made.__class__ is str:
+        raise ValueError(f"{made}: change the parameters")
+    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -8433,76 +8461,201 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
-def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
+_LARGEST = 1e+100
+
+
+def _numbers(values, what):
+    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what}: some are masked; leave those out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what}: not an array: its rows differ in length") from None
+    kind = array.dtype.kind
+    if kind not in "biuf" or array.dtype.itemsize > 8:
+        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
+        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
+    return array.astype(float)
+
+
+def _named(values, defaults, what, most=inf):
+    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values:
-            if name not in names:
+        for name in values.keys():
+            if name not in defaults:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, f"{what}s")
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+        if abs(value) > most:
+            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
+    return array
 
 
 def _parameters(p):
-    try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
-    except ZeroDivisionError:
-        raise ValueError("the mass matrix is singular: change the parameters") from None
+    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
 
 
 def _inputs(u, columns):
-    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
-        array = np.asarray(u, dtype=float)
-        if array.shape != (len(INPUTS), columns):
-            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
-        return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    if columns and not hasattr(u, "keys"):
+        u = _numbers(u, "inputs")
+        if u.ndim == 2:
+            if u.shape != (len(INPUTS), *columns):
+                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
+            return u
+    return tuple(_named(u, INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
+_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
 _NO_INPUT = (0.0,) * len(INPUTS)
-_NO_FORCE = (0.0,) * 18
 _COLUMNS = {
     "sin": np.sin,
     "cos": np.cos,
 }
 
 
+def _trouble(name, state, error=None):
+    """Why an output has no value at a state, as an exception."""
+    for label, value in zip(STATES, state):
+        if not isfinite(value):
+            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
+    for indices in QUATERNIONS:
+        length = hypot(*(state[i] for i in indices))
+        if not 1e-150 < length < 1e150:
+            label = STATES[indices[0]]
+            return ValueError(f"{name}: the quaternion from {label!r} on has length {length:g}; scale it to 1")
+    if isinstance(error, ZeroDivisionError):
+        why = "its mass matrix is singular, or a formula infinite"
+        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
+    if isinstance(error, ValueError):
+        return ValueError(f"{name}: a formula has no value at this state ({error})")
+    size, label = max((abs(value), label) for value, label in zip(state, STATES))
+    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
+    return kind(
+        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
+        f" of size {size:g}; choose other units"
+    )
+
+
+def _states(y):
+    """A state or columns of states as an array."""
+    y = _numbers(y, "y")
+    if y.ndim not in (1, 2) or len(y) != 37:
+        raise ValueError(f"y has shape {y.shape}, not (37,) or (37, k): {', '.join(STATES)}")
+    return y
+
+
+def _strict(reach):
+    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    under = "ignore" if reach else "raise"
+    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
+
+
+def _alone(call, y, name, reach):
+    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+
+    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    """
+    state = y.tolist()
+    try:
+        values = call(state)
+        if not (reach and hypot(*values, *state) < reach):
+            with _strict(reach):
+                call(list(y))
+            if not all(np.isfinite(part).all() for part in (y, *values)):
+                raise FloatingPointError
+        return values
+    except (ArithmeticError, ValueError) as error:
+        raise _trouble(name, state, error) from None
+
+
+def _together(call, result, given, reach):
+    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    """
+    arrays = [part for part in given if part.__class__ is _ARRAY]
+    with _strict(reach):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+            if all(isfinite(part.sum()) for part in arrays):
+                return result
+        except ArithmeticError:
+            pass
+    result[:] = nan
+    with np.errstate(all="ignore"):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+        except ArithmeticError:
+            return result
+        sizes = np.zeros(result.shape[-1])
+        for part in map(np.abs, (*arrays, result)):
+            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
+    result[..., ~np.isfinite(sizes)] = nan
+    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
+        with _strict(reach):
+            try:
+                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
+            except ArithmeticError:
+                result[..., i] = nan
+    return result
+
+
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    if y.shape == (37,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        return np.array(kernel(y.tolist(), k, u, extra)).reshape(shape)
-    if y.ndim != 2 or y.shape[0] != 37:
-        raise ValueError(f"y has shape {y.shape}, not (37,) or (37, k): {', '.join(STATES)}")
-    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
-    values = kernel(y, k, u, extra, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty((len(values), y.shape[1]))
-    for row, value in zip(result, values):
-        row[:] = value
-    return result.reshape(shape + (y.shape[1],))
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    if not columns:
+        values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
+        return _from(values, _FLOAT, size).reshape(shape)
+    functions = {f: _COLUMNS[f] for f in functions}
+    result = _together(
+        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        np.empty((size, *columns)),
+        (y, u, extra),
+        reach,
+    )
+    return result.reshape(shape + columns)
 
 
 def initial_state(p=None):
     """The scene's initial state, (37,); momenta follow the parameters."""
-    k = _DEFAULT if p is None else _parameters(p)
-    return np.array(_initial_state((), k["initial_state"]))
+    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
+    if not all(map(isfinite, values)):
+        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+    return _from(values, _FLOAT, 37)
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (37,), or (37, k) for k states."""
-    if u is None and y.__class__ is np.ndarray and y.shape == (37,):
-        k = _DEFAULT if p is None else _parameters(p)
-        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT))
+    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
+        k, reach = _DERIVATIVE, _REACH
+        if p is not None:
+            made = _parameters(p)
+            k, reach = made["derivative"], made["reach"]
+        try:
+            state = y.tolist()
+            values = _derivative(state, k, _NO_INPUT)
+            if hypot(*values) < reach and hypot(*state) < reach:
+                return _from(values, _FLOAT, 37)
+        except (ArithmeticError, ValueError):
+            pass
     return _evaluate(_derivative, "derivative", (37,), ('cos', 'sin'), y, p, u)
 
 

@@ -202,10 +202,14 @@ done once.
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (90, k); then every result has a last axis of length k.
+
+All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
+where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
+results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import atan2, cos, isfinite, sin, sqrt
+from math import atan2, cos, hypot, inf, isfinite, nan, prod, sin, sqrt
 
 import numpy as np
 
@@ -603,6 +607,7 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 2390, "sub": 1533, "mul": 4819, "div": 192, "neg": 40, "sin": 14, "cos": 14, "sqrt": 55, "atan2": 7, "abs": 7, "min": 35, "max": 106, "select": 49, "total": 9261, "parameters": 274},
     "jacobian": {"add": 7312, "sub": 3642, "mul": 12877, "div": 326, "neg": 63, "sin": 14, "cos": 14, "sqrt": 55, "atan2": 7, "abs": 7, "min": 35, "max": 106, "select": 239, "total": 24697, "parameters": 274},
+    "switching_functions": {"add": 762, "sub": 361, "mul": 1439, "div": 15, "neg": 14, "sin": 14, "cos": 14, "sqrt": 23, "atan2": 7, "abs": 7, "min": 21, "max": 53, "select": 7, "total": 2737, "parameters": 43},
 }
 
 
@@ -610,10 +615,8 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, g, slack, damping, stop, flesh, loss, grip, air_density, air_area, air_coefficient, trunk_on_ground_radius, trunk_on_ground_slip_speed, limbs_on_ground_radius, limbs_on_ground_slip_speed, spine_range_high, shoulder_range_high, hip_range_high, knee_range_high, elbow_left_range_high, forearm_left_range_low, forearm_left_range_high, elbow_right_range_high, forearm_right_range_low, forearm_right_range_high, small_ranges_low, small_ranges_high = values
+def _fixed(body_mass, m_head, l_head, c_head, kx_head, ky_head, kz_head, m_thorax, l_thorax, c_thorax, kx_thorax, ky_thorax, kz_thorax, m_abdomen, l_abdomen, c_abdomen, kx_abdomen, ky_abdomen, kz_abdomen, m_pelvis, l_pelvis, c_pelvis, kx_pelvis, ky_pelvis, kz_pelvis, m_upper_arm, l_upper_arm, c_upper_arm, kx_upper_arm, ky_upper_arm, kz_upper_arm, m_forearm, l_forearm, c_forearm, kx_forearm, ky_forearm, kz_forearm, m_hand, l_hand, c_hand, kx_hand, ky_hand, kz_hand, m_thigh, l_thigh, c_thigh, kx_thigh, ky_thigh, kz_thigh, m_shank, l_shank, c_shank, kx_shank, ky_shank, kz_shank, m_foot, l_foot, c_foot, kx_foot, ky_foot, kz_foot, d_shoulder, w_shoulder, w_hip, d_ankle, h_ankle, g, slack, damping, stop, flesh, loss, grip, air_density, air_area, air_coefficient, trunk_on_ground_radius, trunk_on_ground_slip_speed, limbs_on_ground_radius, limbs_on_ground_slip_speed, spine_range_high, shoulder_range_high, hip_range_high, knee_range_high, elbow_left_range_high, forearm_left_range_low, forearm_left_range_high, elbow_right_range_high, forearm_right_range_low, forearm_right_range_high, small_ranges_low, small_ranges_high):
+    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     mass_pelvis = body_mass * m_pelvis
     k80 = l_pelvis * kx_pelvis
     k81 = l_pelvis * ky_pelvis
@@ -673,133 +676,133 @@ def _constants(values):
     k122 = l_hand * kz_hand
     inertia_hand_left_zz = mass_hand_left * (k122 * k122)
     if not mass_pelvis > 0.0:
-        raise ValueError("mass of pelvis is not positive: change the parameters")
+        return "mass of pelvis is not positive"
     if not mass_pelvis * (k80 * k80) >= 0.0:
-        raise ValueError("inertia_com xx of pelvis is negative: change the parameters")
+        return "inertia_com xx of pelvis is negative"
     if not mass_pelvis * (k81 * k81) >= 0.0:
-        raise ValueError("inertia_com yy of pelvis is negative: change the parameters")
+        return "inertia_com yy of pelvis is negative"
     if not mass_pelvis * (k82 * k82) >= 0.0:
-        raise ValueError("inertia_com zz of pelvis is negative: change the parameters")
+        return "inertia_com zz of pelvis is negative"
     if not mass_abdomen > 0.0:
-        raise ValueError("mass of abdomen is not positive: change the parameters")
+        return "mass of abdomen is not positive"
     if not mass_abdomen * (k83 * k83) >= 0.0:
-        raise ValueError("inertia_com xx of abdomen is negative: change the parameters")
+        return "inertia_com xx of abdomen is negative"
     if not mass_abdomen * (k84 * k84) >= 0.0:
-        raise ValueError("inertia_com yy of abdomen is negative: change the parameters")
+        return "inertia_com yy of abdomen is negative"
     if not mass_abdomen * (k85 * k85) >= 0.0:
-        raise ValueError("inertia_com zz of abdomen is negative: change the parameters")
+        return "inertia_com zz of abdomen is negative"
     if not mass_thigh_left > 0.0:
-        raise ValueError("mass of thigh_left is not positive: change the parameters")
+        return "mass of thigh_left is not positive"
     if not k87 >= 0.0:
-        raise ValueError("inertia_com xx of thigh_left is negative: change the parameters")
+        return "inertia_com xx of thigh_left is negative"
     if not k89 >= 0.0:
-        raise ValueError("inertia_com yy of thigh_left is negative: change the parameters")
+        return "inertia_com yy of thigh_left is negative"
     if not inertia_thigh_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of thigh_left is negative: change the parameters")
+        return "inertia_com zz of thigh_left is negative"
     if not mass_thigh_left > 0.0:
-        raise ValueError("mass of thigh_right is not positive: change the parameters")
+        return "mass of thigh_right is not positive"
     if not k87 >= 0.0:
-        raise ValueError("inertia_com xx of thigh_right is negative: change the parameters")
+        return "inertia_com xx of thigh_right is negative"
     if not k89 >= 0.0:
-        raise ValueError("inertia_com yy of thigh_right is negative: change the parameters")
+        return "inertia_com yy of thigh_right is negative"
     if not inertia_thigh_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of thigh_right is negative: change the parameters")
+        return "inertia_com zz of thigh_right is negative"
     if not mass_thorax > 0.0:
-        raise ValueError("mass of thorax is not positive: change the parameters")
+        return "mass of thorax is not positive"
     if not mass_thorax * (k91 * k91) >= 0.0:
-        raise ValueError("inertia_com xx of thorax is negative: change the parameters")
+        return "inertia_com xx of thorax is negative"
     if not mass_thorax * (k92 * k92) >= 0.0:
-        raise ValueError("inertia_com yy of thorax is negative: change the parameters")
+        return "inertia_com yy of thorax is negative"
     if not mass_thorax * (k93 * k93) >= 0.0:
-        raise ValueError("inertia_com zz of thorax is negative: change the parameters")
+        return "inertia_com zz of thorax is negative"
     if not mass_shank_left > 0.0:
-        raise ValueError("mass of shank_left is not positive: change the parameters")
+        return "mass of shank_left is not positive"
     if not k95 >= 0.0:
-        raise ValueError("inertia_com xx of shank_left is negative: change the parameters")
+        return "inertia_com xx of shank_left is negative"
     if not k97 >= 0.0:
-        raise ValueError("inertia_com yy of shank_left is negative: change the parameters")
+        return "inertia_com yy of shank_left is negative"
     if not inertia_shank_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of shank_left is negative: change the parameters")
+        return "inertia_com zz of shank_left is negative"
     if not mass_shank_left > 0.0:
-        raise ValueError("mass of shank_right is not positive: change the parameters")
+        return "mass of shank_right is not positive"
     if not k95 >= 0.0:
-        raise ValueError("inertia_com xx of shank_right is negative: change the parameters")
+        return "inertia_com xx of shank_right is negative"
     if not k97 >= 0.0:
-        raise ValueError("inertia_com yy of shank_right is negative: change the parameters")
+        return "inertia_com yy of shank_right is negative"
     if not inertia_shank_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of shank_right is negative: change the parameters")
+        return "inertia_com zz of shank_right is negative"
     if not mass_head > 0.0:
-        raise ValueError("mass of head is not positive: change the parameters")
+        return "mass of head is not positive"
     if not mass_head * (k99 * k99) >= 0.0:
-        raise ValueError("inertia_com xx of head is negative: change the parameters")
+        return "inertia_com xx of head is negative"
     if not mass_head * (k100 * k100) >= 0.0:
-        raise ValueError("inertia_com yy of head is negative: change the parameters")
+        return "inertia_com yy of head is negative"
     if not mass_head * (k101 * k101) >= 0.0:
-        raise ValueError("inertia_com zz of head is negative: change the parameters")
+        return "inertia_com zz of head is negative"
     if not mass_upper_arm_left > 0.0:
-        raise ValueError("mass of upper_arm_left is not positive: change the parameters")
+        return "mass of upper_arm_left is not positive"
     if not k103 >= 0.0:
-        raise ValueError("inertia_com xx of upper_arm_left is negative: change the parameters")
+        return "inertia_com xx of upper_arm_left is negative"
     if not k105 >= 0.0:
-        raise ValueError("inertia_com yy of upper_arm_left is negative: change the parameters")
+        return "inertia_com yy of upper_arm_left is negative"
     if not inertia_upper_arm_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of upper_arm_left is negative: change the parameters")
+        return "inertia_com zz of upper_arm_left is negative"
     if not mass_upper_arm_left > 0.0:
-        raise ValueError("mass of upper_arm_right is not positive: change the parameters")
+        return "mass of upper_arm_right is not positive"
     if not k103 >= 0.0:
-        raise ValueError("inertia_com xx of upper_arm_right is negative: change the parameters")
+        return "inertia_com xx of upper_arm_right is negative"
     if not k105 >= 0.0:
-        raise ValueError("inertia_com yy of upper_arm_right is negative: change the parameters")
+        return "inertia_com yy of upper_arm_right is negative"
     if not inertia_upper_arm_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of upper_arm_right is negative: change the parameters")
+        return "inertia_com zz of upper_arm_right is negative"
     if not mass_foot_left > 0.0:
-        raise ValueError("mass of foot_left is not positive: change the parameters")
+        return "mass of foot_left is not positive"
     if not k108 >= 0.0:
-        raise ValueError("inertia_com xx of foot_left is negative: change the parameters")
+        return "inertia_com xx of foot_left is negative"
     if not k110 >= 0.0:
-        raise ValueError("inertia_com yy of foot_left is negative: change the parameters")
+        return "inertia_com yy of foot_left is negative"
     if not k112 >= 0.0:
-        raise ValueError("inertia_com zz of foot_left is negative: change the parameters")
+        return "inertia_com zz of foot_left is negative"
     if not mass_foot_left > 0.0:
-        raise ValueError("mass of foot_right is not positive: change the parameters")
+        return "mass of foot_right is not positive"
     if not k108 >= 0.0:
-        raise ValueError("inertia_com xx of foot_right is negative: change the parameters")
+        return "inertia_com xx of foot_right is negative"
     if not k110 >= 0.0:
-        raise ValueError("inertia_com yy of foot_right is negative: change the parameters")
+        return "inertia_com yy of foot_right is negative"
     if not k112 >= 0.0:
-        raise ValueError("inertia_com zz of foot_right is negative: change the parameters")
+        return "inertia_com zz of foot_right is negative"
     if not mass_forearm_left > 0.0:
-        raise ValueError("mass of forearm_left is not positive: change the parameters")
+        return "mass of forearm_left is not positive"
     if not k114 >= 0.0:
-        raise ValueError("inertia_com xx of forearm_left is negative: change the parameters")
+        return "inertia_com xx of forearm_left is negative"
     if not k116 >= 0.0:
-        raise ValueError("inertia_com yy of forearm_left is negative: change the parameters")
+        return "inertia_com yy of forearm_left is negative"
     if not inertia_forearm_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of forearm_left is negative: change the parameters")
+        return "inertia_com zz of forearm_left is negative"
     if not mass_forearm_left > 0.0:
-        raise ValueError("mass of forearm_right is not positive: change the parameters")
+        return "mass of forearm_right is not positive"
     if not k114 >= 0.0:
-        raise ValueError("inertia_com xx of forearm_right is negative: change the parameters")
+        return "inertia_com xx of forearm_right is negative"
     if not k116 >= 0.0:
-        raise ValueError("inertia_com yy of forearm_right is negative: change the parameters")
+        return "inertia_com yy of forearm_right is negative"
     if not inertia_forearm_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of forearm_right is negative: change the parameters")
+        return "inertia_com zz of forearm_right is negative"
     if not mass_hand_left > 0.0:
-        raise ValueError("mass of hand_left is not positive: change the parameters")
+        return "mass of hand_left is not positive"
     if not k119 >= 0.0:
-        raise ValueError("inertia_com xx of hand_left is negative: change the parameters")
+        return "inertia_com xx of hand_left is negative"
     if not k121 >= 0.0:
-        raise ValueError("inertia_com yy of hand_left is negative: change the parameters")
+        return "inertia_com yy of hand_left is negative"
     if not inertia_hand_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of hand_left is negative: change the parameters")
+        return "inertia_com zz of hand_left is negative"
     if not mass_hand_left > 0.0:
-        raise ValueError("mass of hand_right is not positive: change the parameters")
+        return "mass of hand_right is not positive"
     if not k119 >= 0.0:
-        raise ValueError("inertia_com xx of hand_right is negative: change the parameters")
+        return "inertia_com xx of hand_right is negative"
     if not k121 >= 0.0:
-        raise ValueError("inertia_com yy of hand_right is negative: change the parameters")
+        return "inertia_com yy of hand_right is negative"
     if not inertia_hand_left_zz >= 0.0:
-        raise ValueError("inertia_com zz of hand_right is negative: change the parameters")
+        return "inertia_com zz of hand_right is negative"
     k1 = air_coefficient * (air_area * (air_density * 0.5))
     inertia_pelvis_xx = mass_pelvis * (k80 * k80)
     inertia_pelvis_yy = mass_pelvis * (k81 * k81)
@@ -939,7 +942,34 @@ def _constants(values):
         "initial_state": (),
         "derivative": (w_shoulder, w_hip, g, slack, damping, stop, flesh, grip, trunk_on_ground_radius, limbs_on_ground_radius, spine_range_high, shoulder_range_high, hip_range_high, knee_range_high, elbow_left_range_high, forearm_left_range_low, forearm_left_range_high, elbow_right_range_high, forearm_right_range_low, forearm_right_range_high, small_ranges_low, small_ranges_high, k1, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k2, k3, mass_abdomen, inertia_abdomen_zz, k4, k5, mass_thigh_left, inertia_thigh_left_zz, k6, k7, mass_thorax, inertia_thorax_zz, k8, k9, mass_shank_left, inertia_shank_left_zz, k10, k11, mass_head, inertia_head_zz, k12, k13, mass_upper_arm_left, inertia_upper_arm_left_zz, k14, k15, k16, mass_foot_left, k17, k18, mass_forearm_left, inertia_forearm_left_zz, k19, k20, mass_hand_left, inertia_hand_left_zz, k21, inertia_abdomen_xx, inertia_abdomen_yy, k22, inertia_thigh_left_xx, inertia_thigh_left_yy, k23, inertia_thorax_xx, inertia_thorax_yy, k24, inertia_shank_left_xx, inertia_shank_left_yy, k25, inertia_head_xx, inertia_head_yy, k26, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k27, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k28, inertia_forearm_left_xx, inertia_forearm_left_yy, k29, inertia_hand_left_xx, inertia_hand_left_yy, k30, trunk_on_ground_slip_speed_squared, limbs_on_ground_slip_speed_squared, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73, k74, k75, k76, k77, k78, k79),
         "jacobian": (w_shoulder, w_hip, g, slack, damping, stop, flesh, grip, trunk_on_ground_radius, limbs_on_ground_radius, spine_range_high, shoulder_range_high, hip_range_high, knee_range_high, elbow_left_range_high, forearm_left_range_low, forearm_left_range_high, elbow_right_range_high, forearm_right_range_low, forearm_right_range_high, small_ranges_low, small_ranges_high, k1, mass_pelvis, inertia_pelvis_xx, inertia_pelvis_yy, inertia_pelvis_zz, k2, k3, mass_abdomen, inertia_abdomen_zz, k4, k5, mass_thigh_left, inertia_thigh_left_zz, k6, k7, mass_thorax, inertia_thorax_zz, k8, k9, mass_shank_left, inertia_shank_left_zz, k10, k11, mass_head, inertia_head_zz, k12, k13, mass_upper_arm_left, inertia_upper_arm_left_zz, k14, k15, k16, mass_foot_left, k17, k18, mass_forearm_left, inertia_forearm_left_zz, k19, k20, mass_hand_left, inertia_hand_left_zz, k21, inertia_abdomen_xx, inertia_abdomen_yy, k22, inertia_thigh_left_xx, inertia_thigh_left_yy, k23, inertia_thorax_xx, inertia_thorax_yy, k24, inertia_shank_left_xx, inertia_shank_left_yy, k25, inertia_head_xx, inertia_head_yy, k26, inertia_upper_arm_left_xx, inertia_upper_arm_left_yy, moment_foot_left_x, k27, inertia_foot_left_xz, inertia_foot_left_xx, inertia_foot_left_yy, k28, inertia_forearm_left_xx, inertia_forearm_left_yy, k29, inertia_hand_left_xx, inertia_hand_left_yy, k30, trunk_on_ground_slip_speed_squared, limbs_on_ground_slip_speed_squared, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73, k74, k75, k76, k77, k78, k79),
+        "switching_functions": (w_shoulder, w_hip, damping, stop, flesh, trunk_on_ground_radius, limbs_on_ground_radius, spine_range_high, shoulder_range_high, hip_range_high, knee_range_high, elbow_left_range_high, forearm_left_range_low, forearm_left_range_high, elbow_right_range_high, forearm_right_range_low, forearm_right_range_high, small_ranges_low, small_ranges_high, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k30, k31, k32, k33),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+
+    `reach` is how large states and results may be without a thought of overflow; with constants
+    so large or so small that any product may be lost, it is 0.
+    """
+    values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _fixed(*values.tolist())
+        with np.errstate(over="raise", under="raise", invalid="raise"):
+            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+    except ArithmeticError as error:
+        made = "the mass matrix is singular"
+        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
+        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
+            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
+            made = f"numbers are too large or too small for floats, with sizes from {ends}"
+    except ValueError as error:
+        made = f"a formula has no value ({error})"
+    if made.__class__ is str:
+        raise ValueError(f"{made}: change the parameters")
+    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -10213,42 +10243,1126 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt, abs=ab
     )
 
 
-def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+def _switching_functions(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt, abs=abs, atan2=atan2, select=select, min=min):
+    """2737 operations: 762 add, 361 sub, 1439 mul, 15 div, 14 neg, 14 sin, 14 cos, 23 sqrt, 7 atan2, 7 abs, 21 min, 53 max, 7 select."""
+    w_shoulder, w_hip, damping, stop, flesh, trunk_on_ground_radius, limbs_on_ground_radius, spine_range_high, shoulder_range_high, hip_range_high, knee_range_high, elbow_left_range_high, forearm_left_range_low, forearm_left_range_high, elbow_right_range_high, forearm_right_range_low, forearm_right_range_high, small_ranges_low, small_ranges_high, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k30, k31, k32, k33 = k
+    _, _, pelvis_z, pelvis_qw, pelvis_qx, pelvis_qy, pelvis_qz, lumbar_qw, lumbar_qx, lumbar_qy, lumbar_qz, hip_left_qw, hip_left_qx, hip_left_qy, hip_left_qz, hip_right_qw, hip_right_qx, hip_right_qy, hip_right_qz, thoracic_qw, thoracic_qx, thoracic_qy, thoracic_qz, knee_left_flexion, knee_right_flexion, neck_qw, neck_qx, neck_qy, neck_qz, shoulder_left_qw, shoulder_left_qx, shoulder_left_qy, shoulder_left_qz, shoulder_right_qw, shoulder_right_qx, shoulder_right_qy, shoulder_right_qz, ankle_left_flexion, ankle_left_inversion, ankle_right_flexion, ankle_right_inversion, elbow_left_flexion, elbow_left_pronation, elbow_right_flexion, elbow_right_pronation, wrist_left_flexion, wrist_left_deviation, wrist_right_flexion, wrist_right_deviation, pelvis_x_dot, pelvis_y_dot, pelvis_z_dot, pelvis_wx, pelvis_wy, pelvis_wz, lumbar_wx, lumbar_wy, lumbar_wz, hip_left_wx, hip_left_wy, hip_left_wz, hip_right_wx, hip_right_wy, hip_right_wz, thoracic_wx, thoracic_wy, thoracic_wz, knee_left_flexion_dot, knee_right_flexion_dot, neck_wx, neck_wy, neck_wz, shoulder_left_wx, shoulder_left_wy, shoulder_left_wz, shoulder_right_wx, shoulder_right_wy, shoulder_right_wz, ankle_left_flexion_dot, ankle_left_inversion_dot, ankle_right_flexion_dot, ankle_right_inversion_dot, elbow_left_flexion_dot, elbow_left_pronation_dot, elbow_right_flexion_dot, elbow_right_pronation_dot, wrist_left_flexion_dot, wrist_left_deviation_dot, wrist_right_flexion_dot, wrist_right_deviation_dot = y
+    s1 = pelvis_qw * pelvis_qw + pelvis_qx * pelvis_qx + pelvis_qy * pelvis_qy + pelvis_qz * pelvis_qz
+    s2 = 2.0 / s1
+    s3 = pelvis_qx * s2
+    s4 = pelvis_qy * s2
+    s5 = pelvis_qz * s2
+    s6 = pelvis_qw * s3
+    s7 = pelvis_qw * s4
+    s8 = pelvis_qw * s5
+    s9 = pelvis_qx * s3
+    s10 = pelvis_qy * s4
+    s11 = pelvis_qz * s5
+    s12 = pelvis_qy * s3
+    s13 = pelvis_qz * s3
+    s14 = pelvis_qz * s4
+    s15 = 1.0 - (s10 + s11)
+    s16 = s12 - s8
+    s17 = s7 + s13
+    s18 = s8 + s12
+    s19 = 1.0 - (s9 + s11)
+    s20 = s14 - s6
+    s21 = s13 - s7
+    s22 = s6 + s14
+    s23 = 1.0 - (s9 + s10)
+    lumbar_qx_squared = lumbar_qx * lumbar_qx
+    lumbar_qy_squared = lumbar_qy * lumbar_qy
+    lumbar_qz_squared = lumbar_qz * lumbar_qz
+    s24 = lumbar_qw * lumbar_qw + lumbar_qx_squared + lumbar_qy_squared + lumbar_qz_squared
+    s25 = 2.0 / s24
+    s26 = lumbar_qx * s25
+    s27 = lumbar_qy * s25
+    s28 = lumbar_qz * s25
+    s29 = lumbar_qw * s26
+    s30 = lumbar_qw * s27
+    s31 = lumbar_qw * s28
+    s32 = lumbar_qx * s26
+    s33 = lumbar_qy * s27
+    s34 = lumbar_qz * s28
+    s35 = lumbar_qy * s26
+    s36 = lumbar_qz * s26
+    s37 = lumbar_qz * s27
+    s38 = 1.0 - (s33 + s34)
+    s39 = s35 - s31
+    s40 = s30 + s36
+    s41 = s31 + s35
+    s42 = 1.0 - (s32 + s34)
+    s43 = s37 - s29
+    s44 = s36 - s30
+    s45 = s29 + s37
+    s46 = 1.0 - (s32 + s33)
+    s47 = s15 * s38 + s16 * s41 + s17 * s44
+    s48 = s15 * s39 + s16 * s42 + s17 * s45
+    s49 = s15 * s40 + s16 * s43 + s17 * s46
+    s50 = s18 * s38 + s19 * s41 + s20 * s44
+    s51 = s18 * s39 + s19 * s42 + s20 * s45
+    s52 = s18 * s40 + s19 * s43 + s20 * s46
+    s53 = s21 * s38 + s22 * s41 + s23 * s44
+    s54 = s21 * s39 + s22 * s42 + s23 * s45
+    s55 = s21 * s40 + s22 * s43 + s23 * s46
+    hip_left_qx_squared = hip_left_qx * hip_left_qx
+    hip_left_qy_squared = hip_left_qy * hip_left_qy
+    hip_left_qz_squared = hip_left_qz * hip_left_qz
+    s56 = hip_left_qw * hip_left_qw + hip_left_qx_squared + hip_left_qy_squared + hip_left_qz_squared
+    s57 = 2.0 / s56
+    s58 = hip_left_qx * s57
+    s59 = hip_left_qy * s57
+    s60 = hip_left_qz * s57
+    s61 = hip_left_qw * s58
+    s62 = hip_left_qw * s59
+    s63 = hip_left_qw * s60
+    s64 = hip_left_qx * s58
+    s65 = hip_left_qy * s59
+    s66 = hip_left_qz * s60
+    s67 = hip_left_qy * s58
+    s68 = hip_left_qz * s58
+    s69 = hip_left_qz * s59
+    s70 = 1.0 - (s65 + s66)
+    s71 = s67 - s63
+    s72 = s62 + s68
+    s73 = s63 + s67
+    s74 = 1.0 - (s64 + s66)
+    s75 = s69 - s61
+    s76 = s68 - s62
+    s77 = s61 + s69
+    s78 = 1.0 - (s64 + s65)
+    s79 = s15 * s70 + s16 * s73 + s17 * s76
+    s80 = s15 * s71 + s16 * s74 + s17 * s77
+    s81 = s15 * s72 + s16 * s75 + s17 * s78
+    s82 = s18 * s70 + s19 * s73 + s20 * s76
+    s83 = s18 * s71 + s19 * s74 + s20 * s77
+    s84 = s18 * s72 + s19 * s75 + s20 * s78
+    s85 = s21 * s70 + s22 * s73 + s23 * s76
+    s86 = s21 * s71 + s22 * s74 + s23 * s77
+    s87 = s21 * s72 + s22 * s75 + s23 * s78
+    hip_right_qx_squared = hip_right_qx * hip_right_qx
+    hip_right_qy_squared = hip_right_qy * hip_right_qy
+    s88 = hip_right_qw * hip_right_qw + hip_right_qx_squared + hip_right_qy_squared
+    hip_right_qz_squared = hip_right_qz * hip_right_qz
+    s89 = 2.0 / (s88 + hip_right_qz_squared)
+    s90 = hip_right_qx * s89
+    s91 = hip_right_qy * s89
+    s92 = hip_right_qz * s89
+    s93 = hip_right_qw * s90
+    s94 = hip_right_qw * s91
+    s95 = hip_right_qw * s92
+    s96 = hip_right_qx * s90
+    s97 = hip_right_qy * s91
+    s98 = hip_right_qz * s92
+    s99 = hip_right_qy * s90
+    s100 = hip_right_qz * s90
+    s101 = hip_right_qz * s91
+    s102 = 1.0 - (s97 + s98)
+    s103 = s99 - s95
+    s104 = s94 + s100
+    s105 = s95 + s99
+    s106 = 1.0 - (s96 + s98)
+    s107 = s101 - s93
+    s108 = s100 - s94
+    s109 = s93 + s101
+    s110 = 1.0 - (s96 + s97)
+    s111 = s15 * s102 + s16 * s105 + s17 * s108
+    s112 = s15 * s103 + s16 * s106 + s17 * s109
+    s113 = s15 * s104 + s16 * s107 + s17 * s110
+    s114 = s18 * s102 + s19 * s105 + s20 * s108
+    s115 = s18 * s103 + s19 * s106 + s20 * s109
+    s116 = s18 * s104 + s19 * s107 + s20 * s110
+    s117 = s21 * s102 + s22 * s105 + s23 * s108
+    s118 = s21 * s103 + s22 * s106 + s23 * s109
+    s119 = s21 * s104 + s22 * s107 + s23 * s110
+    thoracic_qx_squared = thoracic_qx * thoracic_qx
+    thoracic_qy_squared = thoracic_qy * thoracic_qy
+    thoracic_qz_squared = thoracic_qz * thoracic_qz
+    s120 = thoracic_qw * thoracic_qw + thoracic_qx_squared + thoracic_qy_squared + thoracic_qz_squared
+    s121 = 2.0 / s120
+    s122 = thoracic_qx * s121
+    s123 = thoracic_qy * s121
+    s124 = thoracic_qz * s121
+    s125 = thoracic_qw * s122
+    s126 = thoracic_qw * s123
+    s127 = thoracic_qw * s124
+    s128 = thoracic_qx * s122
+    s129 = thoracic_qy * s123
+    s130 = thoracic_qz * s124
+    s131 = thoracic_qy * s122
+    s132 = thoracic_qz * s122
+    s133 = thoracic_qz * s123
+    s134 = 1.0 - (s129 + s130)
+    s135 = s131 - s127
+    s136 = s126 + s132
+    s137 = s127 + s131
+    s138 = 1.0 - (s128 + s130)
+    s139 = s133 - s125
+    s140 = s132 - s126
+    s141 = s125 + s133
+    s142 = 1.0 - (s128 + s129)
+    s143 = s47 * s134 + s48 * s137 + s49 * s140
+    s144 = s47 * s135 + s48 * s138 + s49 * s141
+    s145 = s47 * s136 + s48 * s139 + s49 * s142
+    s146 = s50 * s134 + s51 * s137 + s52 * s140
+    s147 = s50 * s135 + s51 * s138 + s52 * s141
+    s148 = s50 * s136 + s51 * s139 + s52 * s142
+    s149 = s53 * s134 + s54 * s137 + s55 * s140
+    s150 = s53 * s135 + s54 * s138 + s55 * s141
+    s151 = s53 * s136 + s54 * s139 + s55 * s142
+    cos_knee_left_flexion = cos(knee_left_flexion)
+    sin_knee_left_flexion = sin(knee_left_flexion)
+    s153 = s81 * cos_knee_left_flexion + s79 * sin_knee_left_flexion
+    s154 = s79 * cos_knee_left_flexion - s81 * sin_knee_left_flexion
+    s155 = s84 * cos_knee_left_flexion + s82 * sin_knee_left_flexion
+    s156 = s82 * cos_knee_left_flexion - s84 * sin_knee_left_flexion
+    s157 = s87 * cos_knee_left_flexion + s85 * sin_knee_left_flexion
+    s158 = s85 * cos_knee_left_flexion - s87 * sin_knee_left_flexion
+    cos_knee_right_flexion = cos(knee_right_flexion)
+    sin_knee_right_flexion = sin(knee_right_flexion)
+    s160 = s113 * cos_knee_right_flexion + s111 * sin_knee_right_flexion
+    s161 = s111 * cos_knee_right_flexion - s113 * sin_knee_right_flexion
+    s162 = s116 * cos_knee_right_flexion + s114 * sin_knee_right_flexion
+    s163 = s114 * cos_knee_right_flexion - s116 * sin_knee_right_flexion
+    s164 = s119 * cos_knee_right_flexion + s117 * sin_knee_right_flexion
+    s165 = s117 * cos_knee_right_flexion - s119 * sin_knee_right_flexion
+    neck_qx_squared = neck_qx * neck_qx
+    neck_qy_squared = neck_qy * neck_qy
+    neck_qz_squared = neck_qz * neck_qz
+    s166 = 2.0 / (neck_qw * neck_qw + neck_qx_squared + neck_qy_squared + neck_qz_squared)
+    s167 = neck_qx * s166
+    s168 = neck_qy * s166
+    s169 = neck_qz * s166
+    s170 = neck_qw * s167
+    s171 = neck_qw * s168
+    s172 = neck_qw * s169
+    s173 = neck_qx * s167
+    s174 = neck_qy * s168
+    s175 = neck_qz * s169
+    s176 = neck_qy * s167
+    s177 = neck_qz * s167
+    s178 = neck_qz * s168
+    s179 = 1.0 - (s174 + s175)
+    s180 = s176 - s172
+    s181 = s171 + s177
+    s182 = s172 + s176
+    s183 = 1.0 - (s173 + s175)
+    s184 = s178 - s170
+    s185 = s177 - s171
+    s186 = s170 + s178
+    s187 = 1.0 - (s173 + s174)
+    s188 = s143 * s179 + s144 * s182 + s145 * s185
+    s189 = s143 * s180 + s144 * s183 + s145 * s186
+    s190 = s143 * s181 + s144 * s184 + s145 * s187
+    s191 = s146 * s179 + s147 * s182 + s148 * s185
+    s192 = s146 * s180 + s147 * s183 + s148 * s186
+    s193 = s146 * s181 + s147 * s184 + s148 * s187
+    s194 = s149 * s179 + s150 * s182 + s151 * s185
+    s195 = s149 * s180 + s150 * s183 + s151 * s186
+    s196 = s149 * s181 + s150 * s184 + s151 * s187
+    shoulder_left_qx_squared = shoulder_left_qx * shoulder_left_qx
+    shoulder_left_qy_squared = shoulder_left_qy * shoulder_left_qy
+    s197 = shoulder_left_qw * shoulder_left_qw + shoulder_left_qx_squared + shoulder_left_qy_squared
+    shoulder_left_qz_squared = shoulder_left_qz * shoulder_left_qz
+    s198 = 2.0 / (s197 + shoulder_left_qz_squared)
+    s199 = shoulder_left_qx * s198
+    s200 = shoulder_left_qy * s198
+    s201 = shoulder_left_qz * s198
+    s202 = shoulder_left_qw * s199
+    s203 = shoulder_left_qw * s200
+    s204 = shoulder_left_qw * s201
+    s205 = shoulder_left_qx * s199
+    s206 = shoulder_left_qy * s200
+    s207 = shoulder_left_qz * s201
+    s208 = shoulder_left_qy * s199
+    s209 = shoulder_left_qz * s199
+    s210 = shoulder_left_qz * s200
+    s211 = 1.0 - (s206 + s207)
+    s212 = s208 - s204
+    s213 = s203 + s209
+    s214 = s204 + s208
+    s215 = 1.0 - (s205 + s207)
+    s216 = s210 - s202
+    s217 = s209 - s203
+    s218 = s202 + s210
+    s219 = 1.0 - (s205 + s206)
+    s220 = s143 * s211 + s144 * s214 + s145 * s217
+    s221 = s143 * s212 + s144 * s215 + s145 * s218
+    s222 = s143 * s213 + s144 * s216 + s145 * s219
+    s223 = s146 * s211 + s147 * s214 + s148 * s217
+    s224 = s146 * s212 + s147 * s215 + s148 * s218
+    s225 = s146 * s213 + s147 * s216 + s148 * s219
+    s226 = s149 * s211 + s150 * s214 + s151 * s217
+    s227 = s149 * s212 + s150 * s215 + s151 * s218
+    s228 = s149 * s213 + s150 * s216 + s151 * s219
+    shoulder_right_qx_squared = shoulder_right_qx * shoulder_right_qx
+    shoulder_right_qy_squared = shoulder_right_qy * shoulder_right_qy
+    s229 = shoulder_right_qw * shoulder_right_qw + shoulder_right_qx_squared + shoulder_right_qy_squared
+    shoulder_right_qz_squared = shoulder_right_qz * shoulder_right_qz
+    s230 = 2.0 / (s229 + shoulder_right_qz_squared)
+    s231 = shoulder_right_qx * s230
+    s232 = shoulder_right_qy * s230
+    s233 = shoulder_right_qz * s230
+    s234 = shoulder_right_qw * s231
+    s235 = shoulder_right_qw * s232
+    s236 = shoulder_right_qw * s233
+    s237 = shoulder_right_qx * s231
+    s238 = shoulder_right_qy * s232
+    s239 = shoulder_right_qz * s233
+    s240 = shoulder_right_qy * s231
+    s241 = shoulder_right_qz * s231
+    s242 = shoulder_right_qz * s232
+    s243 = 1.0 - (s238 + s239)
+    s244 = s240 - s236
+    s245 = s235 + s241
+    s246 = s236 + s240
+    s247 = 1.0 - (s237 + s239)
+    s248 = s242 - s234
+    s249 = s241 - s235
+    s250 = s234 + s242
+    s251 = 1.0 - (s237 + s238)
+    s252 = s143 * s243 + s144 * s246 + s145 * s249
+    s253 = s143 * s244 + s144 * s247 + s145 * s250
+    s254 = s143 * s245 + s144 * s248 + s145 * s251
+    s255 = s146 * s243 + s147 * s246 + s148 * s249
+    s256 = s146 * s244 + s147 * s247 + s148 * s250
+    s257 = s146 * s245 + s147 * s248 + s148 * s251
+    s258 = s149 * s243 + s150 * s246 + s151 * s249
+    s259 = s149 * s244 + s150 * s247 + s151 * s250
+    s260 = s149 * s245 + s150 * s248 + s151 * s251
+    cos_ankle_left_flexion = cos(ankle_left_flexion)
+    sin_ankle_left_flexion = sin(ankle_left_flexion)
+    s261 = s153 * cos_ankle_left_flexion + s154 * sin_ankle_left_flexion
+    s262 = s154 * cos_ankle_left_flexion - s153 * sin_ankle_left_flexion
+    s263 = s155 * cos_ankle_left_flexion + s156 * sin_ankle_left_flexion
+    s264 = s156 * cos_ankle_left_flexion - s155 * sin_ankle_left_flexion
+    s265 = s157 * cos_ankle_left_flexion + s158 * sin_ankle_left_flexion
+    s266 = s158 * cos_ankle_left_flexion - s157 * sin_ankle_left_flexion
+    cos_ankle_left_inversion = cos(ankle_left_inversion)
+    sin_ankle_left_inversion = sin(ankle_left_inversion)
+    s267 = s80 * cos_ankle_left_inversion + s261 * sin_ankle_left_inversion
+    s268 = s261 * cos_ankle_left_inversion - s80 * sin_ankle_left_inversion
+    s269 = s83 * cos_ankle_left_inversion + s263 * sin_ankle_left_inversion
+    s270 = s263 * cos_ankle_left_inversion - s83 * sin_ankle_left_inversion
+    s271 = s86 * cos_ankle_left_inversion + s265 * sin_ankle_left_inversion
+    s272 = s265 * cos_ankle_left_inversion - s86 * sin_ankle_left_inversion
+    cos_ankle_right_flexion = cos(ankle_right_flexion)
+    sin_ankle_right_flexion = sin(ankle_right_flexion)
+    s273 = s160 * cos_ankle_right_flexion + s161 * sin_ankle_right_flexion
+    s274 = s161 * cos_ankle_right_flexion - s160 * sin_ankle_right_flexion
+    s275 = s162 * cos_ankle_right_flexion + s163 * sin_ankle_right_flexion
+    s276 = s163 * cos_ankle_right_flexion - s162 * sin_ankle_right_flexion
+    s277 = s164 * cos_ankle_right_flexion + s165 * sin_ankle_right_flexion
+    s278 = s165 * cos_ankle_right_flexion - s164 * sin_ankle_right_flexion
+    cos_ankle_right_inversion = cos(ankle_right_inversion)
+    sin_ankle_right_inversion = sin(ankle_right_inversion)
+    s279 = s112 * cos_ankle_right_inversion + s273 * sin_ankle_right_inversion
+    s280 = s273 * cos_ankle_right_inversion - s112 * sin_ankle_right_inversion
+    s281 = s115 * cos_ankle_right_inversion + s275 * sin_ankle_right_inversion
+    s282 = s275 * cos_ankle_right_inversion - s115 * sin_ankle_right_inversion
+    s283 = s118 * cos_ankle_right_inversion + s277 * sin_ankle_right_inversion
+    s284 = s277 * cos_ankle_right_inversion - s118 * sin_ankle_right_inversion
+    cos_elbow_left_flexion = cos(elbow_left_flexion)
+    sin_elbow_left_flexion = sin(elbow_left_flexion)
+    s285 = s222 * cos_elbow_left_flexion - s220 * sin_elbow_left_flexion
+    s286 = s220 * cos_elbow_left_flexion + s222 * sin_elbow_left_flexion
+    s287 = s225 * cos_elbow_left_flexion - s223 * sin_elbow_left_flexion
+    s288 = s223 * cos_elbow_left_flexion + s225 * sin_elbow_left_flexion
+    s289 = s228 * cos_elbow_left_flexion - s226 * sin_elbow_left_flexion
+    s290 = s226 * cos_elbow_left_flexion + s228 * sin_elbow_left_flexion
+    cos_elbow_left_pronation = cos(elbow_left_pronation)
+    sin_elbow_left_pronation = sin(elbow_left_pronation)
+    s292 = s286 * cos_elbow_left_pronation + s221 * sin_elbow_left_pronation
+    s293 = s221 * cos_elbow_left_pronation - s286 * sin_elbow_left_pronation
+    s294 = s288 * cos_elbow_left_pronation + s224 * sin_elbow_left_pronation
+    s295 = s224 * cos_elbow_left_pronation - s288 * sin_elbow_left_pronation
+    s296 = s290 * cos_elbow_left_pronation + s227 * sin_elbow_left_pronation
+    s297 = s227 * cos_elbow_left_pronation - s290 * sin_elbow_left_pronation
+    cos_elbow_right_flexion = cos(elbow_right_flexion)
+    sin_elbow_right_flexion = sin(elbow_right_flexion)
+    s298 = s254 * cos_elbow_right_flexion - s252 * sin_elbow_right_flexion
+    s299 = s252 * cos_elbow_right_flexion + s254 * sin_elbow_right_flexion
+    s300 = s257 * cos_elbow_right_flexion - s255 * sin_elbow_right_flexion
+    s301 = s255 * cos_elbow_right_flexion + s257 * sin_elbow_right_flexion
+    s302 = s260 * cos_elbow_right_flexion - s258 * sin_elbow_right_flexion
+    s303 = s258 * cos_elbow_right_flexion + s260 * sin_elbow_right_flexion
+    cos_elbow_right_pronation = cos(elbow_right_pronation)
+    sin_elbow_right_pronation = sin(elbow_right_pronation)
+    s305 = s299 * cos_elbow_right_pronation + s253 * sin_elbow_right_pronation
+    s306 = s253 * cos_elbow_right_pronation - s299 * sin_elbow_right_pronation
+    s307 = s301 * cos_elbow_right_pronation + s256 * sin_elbow_right_pronation
+    s308 = s256 * cos_elbow_right_pronation - s301 * sin_elbow_right_pronation
+    s309 = s303 * cos_elbow_right_pronation + s259 * sin_elbow_right_pronation
+    s310 = s259 * cos_elbow_right_pronation - s303 * sin_elbow_right_pronation
+    cos_wrist_left_flexion = cos(wrist_left_flexion)
+    sin_wrist_left_flexion = sin(wrist_left_flexion)
+    s311 = s285 * cos_wrist_left_flexion - s292 * sin_wrist_left_flexion
+    s312 = s292 * cos_wrist_left_flexion + s285 * sin_wrist_left_flexion
+    s313 = s287 * cos_wrist_left_flexion - s294 * sin_wrist_left_flexion
+    s314 = s294 * cos_wrist_left_flexion + s287 * sin_wrist_left_flexion
+    s315 = s289 * cos_wrist_left_flexion - s296 * sin_wrist_left_flexion
+    s316 = s296 * cos_wrist_left_flexion + s289 * sin_wrist_left_flexion
+    cos_wrist_left_deviation = cos(wrist_left_deviation)
+    sin_wrist_left_deviation = sin(wrist_left_deviation)
+    s317 = s293 * cos_wrist_left_deviation + s311 * sin_wrist_left_deviation
+    s318 = s311 * cos_wrist_left_deviation - s293 * sin_wrist_left_deviation
+    s319 = s295 * cos_wrist_left_deviation + s313 * sin_wrist_left_deviation
+    s320 = s313 * cos_wrist_left_deviation - s295 * sin_wrist_left_deviation
+    s321 = s297 * cos_wrist_left_deviation + s315 * sin_wrist_left_deviation
+    s322 = s315 * cos_wrist_left_deviation - s297 * sin_wrist_left_deviation
+    cos_wrist_right_flexion = cos(wrist_right_flexion)
+    sin_wrist_right_flexion = sin(wrist_right_flexion)
+    s323 = s298 * cos_wrist_right_flexion - s305 * sin_wrist_right_flexion
+    s324 = s305 * cos_wrist_right_flexion + s298 * sin_wrist_right_flexion
+    s325 = s300 * cos_wrist_right_flexion - s307 * sin_wrist_right_flexion
+    s326 = s307 * cos_wrist_right_flexion + s300 * sin_wrist_right_flexion
+    s327 = s302 * cos_wrist_right_flexion - s309 * sin_wrist_right_flexion
+    s328 = s309 * cos_wrist_right_flexion + s302 * sin_wrist_right_flexion
+    cos_wrist_right_deviation = cos(wrist_right_deviation)
+    sin_wrist_right_deviation = sin(wrist_right_deviation)
+    s329 = s306 * cos_wrist_right_deviation + s323 * sin_wrist_right_deviation
+    s330 = s323 * cos_wrist_right_deviation - s306 * sin_wrist_right_deviation
+    s331 = s308 * cos_wrist_right_deviation + s325 * sin_wrist_right_deviation
+    s332 = s325 * cos_wrist_right_deviation - s308 * sin_wrist_right_deviation
+    s333 = s310 * cos_wrist_right_deviation + s327 * sin_wrist_right_deviation
+    s334 = s327 * cos_wrist_right_deviation - s310 * sin_wrist_right_deviation
+    velocity_pelvis_x = pelvis_x_dot * s15 + pelvis_y_dot * s18 + pelvis_z_dot * s21
+    velocity_pelvis_y = pelvis_x_dot * s16 + pelvis_y_dot * s19 + pelvis_z_dot * s22
+    velocity_pelvis_z = pelvis_x_dot * s17 + pelvis_y_dot * s20 + pelvis_z_dot * s23
+    s338 = velocity_pelvis_x + pelvis_wy * k2
+    s339 = velocity_pelvis_y - pelvis_wx * k2
+    velocity_abdomen_x = s38 * s338 + s41 * s339 + s44 * velocity_pelvis_z
+    velocity_abdomen_y = s39 * s338 + s42 * s339 + s45 * velocity_pelvis_z
+    velocity_abdomen_z = s40 * s338 + s43 * s339 + s46 * velocity_pelvis_z
+    omega_abdomen_x = lumbar_wx + (pelvis_wx * s38 + pelvis_wy * s41 + pelvis_wz * s44)
+    omega_abdomen_y = lumbar_wy + (pelvis_wx * s39 + pelvis_wy * s42 + pelvis_wz * s45)
+    omega_abdomen_z = lumbar_wz + (pelvis_wx * s40 + pelvis_wy * s43 + pelvis_wz * s46)
+    s343 = pelvis_wy * k4
+    s344 = w_hip * pelvis_wz
+    s345 = w_hip * pelvis_wx
+    s346 = velocity_pelvis_x + (s343 - s344)
+    s347 = velocity_pelvis_y - pelvis_wx * k4
+    s348 = velocity_pelvis_z + s345
+    velocity_thigh_left_x = s70 * s346 + s73 * s347 + s76 * s348
+    velocity_thigh_left_y = s71 * s346 + s74 * s347 + s77 * s348
+    velocity_thigh_left_z = s72 * s346 + s75 * s347 + s78 * s348
+    omega_thigh_left_x = hip_left_wx + (pelvis_wx * s70 + pelvis_wy * s73 + pelvis_wz * s76)
+    omega_thigh_left_y = hip_left_wy + (pelvis_wx * s71 + pelvis_wy * s74 + pelvis_wz * s77)
+    omega_thigh_left_z = hip_left_wz + (pelvis_wx * s72 + pelvis_wy * s75 + pelvis_wz * s78)
+    s352 = velocity_pelvis_x + (s343 + s344)
+    s353 = velocity_pelvis_z - s345
+    velocity_thigh_right_x = s102 * s352 + s105 * s347 + s108 * s353
+    velocity_thigh_right_y = s103 * s352 + s106 * s347 + s109 * s353
+    velocity_thigh_right_z = s104 * s352 + s107 * s347 + s110 * s353
+    omega_thigh_right_x = hip_right_wx + (pelvis_wx * s102 + pelvis_wy * s105 + pelvis_wz * s108)
+    omega_thigh_right_y = hip_right_wy + (pelvis_wx * s103 + pelvis_wy * s106 + pelvis_wz * s109)
+    omega_thigh_right_z = hip_right_wz + (pelvis_wx * s104 + pelvis_wy * s107 + pelvis_wz * s110)
+    s357 = velocity_abdomen_x + k6 * omega_abdomen_y
+    s358 = velocity_abdomen_y - k6 * omega_abdomen_x
+    velocity_thorax_x = s134 * s357 + s137 * s358 + s140 * velocity_abdomen_z
+    velocity_thorax_y = s135 * s357 + s138 * s358 + s141 * velocity_abdomen_z
+    velocity_thorax_z = s136 * s357 + s139 * s358 + s142 * velocity_abdomen_z
+    omega_thorax_x = thoracic_wx + (s134 * omega_abdomen_x + s137 * omega_abdomen_y + s140 * omega_abdomen_z)
+    omega_thorax_y = thoracic_wy + (s135 * omega_abdomen_x + s138 * omega_abdomen_y + s141 * omega_abdomen_z)
+    omega_thorax_z = thoracic_wz + (s136 * omega_abdomen_x + s139 * omega_abdomen_y + s142 * omega_abdomen_z)
+    omega_shank_left_z = cos_knee_left_flexion * omega_thigh_left_z + sin_knee_left_flexion * omega_thigh_left_x
+    omega_shank_left_x = cos_knee_left_flexion * omega_thigh_left_x - sin_knee_left_flexion * omega_thigh_left_z
+    s359 = velocity_thigh_left_x + k8 * omega_thigh_left_y
+    velocity_shank_left_y = velocity_thigh_left_y - k8 * omega_thigh_left_x
+    velocity_shank_left_z = cos_knee_left_flexion * velocity_thigh_left_z + sin_knee_left_flexion * s359
+    velocity_shank_left_x = cos_knee_left_flexion * s359 - sin_knee_left_flexion * velocity_thigh_left_z
+    omega_shank_left_y = knee_left_flexion_dot + omega_thigh_left_y
+    omega_shank_right_z = cos_knee_right_flexion * omega_thigh_right_z + sin_knee_right_flexion * omega_thigh_right_x
+    omega_shank_right_x = cos_knee_right_flexion * omega_thigh_right_x - sin_knee_right_flexion * omega_thigh_right_z
+    s360 = velocity_thigh_right_x + k8 * omega_thigh_right_y
+    velocity_shank_right_y = velocity_thigh_right_y - k8 * omega_thigh_right_x
+    velocity_shank_right_z = cos_knee_right_flexion * velocity_thigh_right_z + sin_knee_right_flexion * s360
+    velocity_shank_right_x = cos_knee_right_flexion * s360 - sin_knee_right_flexion * velocity_thigh_right_z
+    omega_shank_right_y = knee_right_flexion_dot + omega_thigh_right_y
+    s364 = velocity_thorax_x + k10 * omega_thorax_y
+    s365 = velocity_thorax_y - k10 * omega_thorax_x
+    velocity_head_x = s179 * s364 + s182 * s365 + s185 * velocity_thorax_z
+    velocity_head_y = s180 * s364 + s183 * s365 + s186 * velocity_thorax_z
+    velocity_head_z = s181 * s364 + s184 * s365 + s187 * velocity_thorax_z
+    omega_head_x = neck_wx + (s179 * omega_thorax_x + s182 * omega_thorax_y + s185 * omega_thorax_z)
+    omega_head_y = neck_wy + (s180 * omega_thorax_x + s183 * omega_thorax_y + s186 * omega_thorax_z)
+    omega_head_z = neck_wz + (s181 * omega_thorax_x + s184 * omega_thorax_y + s187 * omega_thorax_z)
+    s369 = k12 * omega_thorax_y
+    s370 = w_shoulder * omega_thorax_z
+    s371 = w_shoulder * omega_thorax_x
+    s372 = velocity_thorax_x + (s369 - s370)
+    s373 = velocity_thorax_y - k12 * omega_thorax_x
+    s374 = velocity_thorax_z + s371
+    velocity_upper_arm_left_x = s211 * s372 + s214 * s373 + s217 * s374
+    velocity_upper_arm_left_y = s212 * s372 + s215 * s373 + s218 * s374
+    velocity_upper_arm_left_z = s213 * s372 + s216 * s373 + s219 * s374
+    omega_upper_arm_left_x = shoulder_left_wx + (s211 * omega_thorax_x + s214 * omega_thorax_y + s217 * omega_thorax_z)
+    omega_upper_arm_left_y = shoulder_left_wy + (s212 * omega_thorax_x + s215 * omega_thorax_y + s218 * omega_thorax_z)
+    omega_upper_arm_left_z = shoulder_left_wz + (s213 * omega_thorax_x + s216 * omega_thorax_y + s219 * omega_thorax_z)
+    s378 = velocity_thorax_x + (s369 + s370)
+    s379 = velocity_thorax_z - s371
+    velocity_upper_arm_right_x = s243 * s378 + s246 * s373 + s249 * s379
+    velocity_upper_arm_right_y = s244 * s378 + s247 * s373 + s250 * s379
+    velocity_upper_arm_right_z = s245 * s378 + s248 * s373 + s251 * s379
+    omega_upper_arm_right_x = shoulder_right_wx + (s243 * omega_thorax_x + s246 * omega_thorax_y + s249 * omega_thorax_z)
+    omega_upper_arm_right_y = shoulder_right_wy + (s244 * omega_thorax_x + s247 * omega_thorax_y + s250 * omega_thorax_z)
+    omega_upper_arm_right_z = shoulder_right_wz + (s245 * omega_thorax_x + s248 * omega_thorax_y + s251 * omega_thorax_z)
+    omega_foot_left_1_z = cos_ankle_left_flexion * omega_shank_left_z + sin_ankle_left_flexion * omega_shank_left_x
+    omega_foot_left_1_x = cos_ankle_left_flexion * omega_shank_left_x - sin_ankle_left_flexion * omega_shank_left_z
+    s380 = velocity_shank_left_x + k14 * omega_shank_left_y
+    velocity_foot_left_1_y = velocity_shank_left_y - k14 * omega_shank_left_x
+    velocity_foot_left_1_z = cos_ankle_left_flexion * velocity_shank_left_z + sin_ankle_left_flexion * s380
+    velocity_foot_left_1_x = cos_ankle_left_flexion * s380 - sin_ankle_left_flexion * velocity_shank_left_z
+    omega_foot_left_1_y = ankle_left_flexion_dot + omega_shank_left_y
+    omega_foot_left_y = cos_ankle_left_inversion * omega_foot_left_1_y + sin_ankle_left_inversion * omega_foot_left_1_z
+    omega_foot_left_z = cos_ankle_left_inversion * omega_foot_left_1_z - sin_ankle_left_inversion * omega_foot_left_1_y
+    velocity_foot_left_y = cos_ankle_left_inversion * velocity_foot_left_1_y + sin_ankle_left_inversion * velocity_foot_left_1_z
+    velocity_foot_left_z = cos_ankle_left_inversion * velocity_foot_left_1_z - sin_ankle_left_inversion * velocity_foot_left_1_y
+    omega_foot_left_x = ankle_left_inversion_dot + omega_foot_left_1_x
+    omega_foot_right_1_z = cos_ankle_right_flexion * omega_shank_right_z + sin_ankle_right_flexion * omega_shank_right_x
+    omega_foot_right_1_x = cos_ankle_right_flexion * omega_shank_right_x - sin_ankle_right_flexion * omega_shank_right_z
+    s381 = velocity_shank_right_x + k14 * omega_shank_right_y
+    velocity_foot_right_1_y = velocity_shank_right_y - k14 * omega_shank_right_x
+    velocity_foot_right_1_z = cos_ankle_right_flexion * velocity_shank_right_z + sin_ankle_right_flexion * s381
+    velocity_foot_right_1_x = cos_ankle_right_flexion * s381 - sin_ankle_right_flexion * velocity_shank_right_z
+    omega_foot_right_1_y = ankle_right_flexion_dot + omega_shank_right_y
+    omega_foot_right_y = cos_ankle_right_inversion * omega_foot_right_1_y + sin_ankle_right_inversion * omega_foot_right_1_z
+    omega_foot_right_z = cos_ankle_right_inversion * omega_foot_right_1_z - sin_ankle_right_inversion * omega_foot_right_1_y
+    velocity_foot_right_y = cos_ankle_right_inversion * velocity_foot_right_1_y + sin_ankle_right_inversion * velocity_foot_right_1_z
+    velocity_foot_right_z = cos_ankle_right_inversion * velocity_foot_right_1_z - sin_ankle_right_inversion * velocity_foot_right_1_y
+    omega_foot_right_x = ankle_right_inversion_dot + omega_foot_right_1_x
+    omega_forearm_left_1_z = cos_elbow_left_flexion * omega_upper_arm_left_z - sin_elbow_left_flexion * omega_upper_arm_left_x
+    s382 = cos_elbow_left_flexion * omega_upper_arm_left_x + sin_elbow_left_flexion * omega_upper_arm_left_z
+    s383 = velocity_upper_arm_left_x + k17 * omega_upper_arm_left_y
+    s384 = velocity_upper_arm_left_y - k17 * omega_upper_arm_left_x
+    velocity_forearm_left_1_z = cos_elbow_left_flexion * velocity_upper_arm_left_z - sin_elbow_left_flexion * s383
+    s385 = cos_elbow_left_flexion * s383 + sin_elbow_left_flexion * velocity_upper_arm_left_z
+    s386 = omega_upper_arm_left_y - elbow_left_flexion_dot
+    omega_forearm_left_x = cos_elbow_left_pronation * s382 + sin_elbow_left_pronation * s386
+    s387 = cos_elbow_left_pronation * s386
+    s388 = sin_elbow_left_pronation * s382
+    omega_forearm_left_y = s387 - s388
+    velocity_forearm_left_x = cos_elbow_left_pronation * s385 + sin_elbow_left_pronation * s384
+    velocity_forearm_left_y = cos_elbow_left_pronation * s384 - sin_elbow_left_pronation * s385
+    omega_forearm_left_z = elbow_left_pronation_dot + omega_forearm_left_1_z
+    omega_forearm_right_1_z = cos_elbow_right_flexion * omega_upper_arm_right_z - sin_elbow_right_flexion * omega_upper_arm_right_x
+    s389 = cos_elbow_right_flexion * omega_upper_arm_right_x + sin_elbow_right_flexion * omega_upper_arm_right_z
+    s390 = velocity_upper_arm_right_x + k17 * omega_upper_arm_right_y
+    s391 = velocity_upper_arm_right_y - k17 * omega_upper_arm_right_x
+    velocity_forearm_right_1_z = cos_elbow_right_flexion * velocity_upper_arm_right_z - sin_elbow_right_flexion * s390
+    s392 = cos_elbow_right_flexion * s390 + sin_elbow_right_flexion * velocity_upper_arm_right_z
+    s393 = omega_upper_arm_right_y - elbow_right_flexion_dot
+    omega_forearm_right_x = cos_elbow_right_pronation * s389 + sin_elbow_right_pronation * s393
+    s394 = cos_elbow_right_pronation * s393
+    s395 = sin_elbow_right_pronation * s389
+    omega_forearm_right_y = s394 - s395
+    velocity_forearm_right_x = cos_elbow_right_pronation * s392 + sin_elbow_right_pronation * s391
+    velocity_forearm_right_y = cos_elbow_right_pronation * s391 - sin_elbow_right_pronation * s392
+    omega_forearm_right_z = elbow_right_pronation_dot + omega_forearm_right_1_z
+    omega_hand_left_1_z = cos_wrist_left_flexion * omega_forearm_left_z - sin_wrist_left_flexion * omega_forearm_left_x
+    s396 = cos_wrist_left_flexion * omega_forearm_left_x + sin_wrist_left_flexion * omega_forearm_left_z
+    s397 = velocity_forearm_left_x + k19 * omega_forearm_left_y
+    s398 = velocity_forearm_left_y - k19 * omega_forearm_left_x
+    velocity_hand_left_1_z = cos_wrist_left_flexion * velocity_forearm_left_1_z - sin_wrist_left_flexion * s397
+    velocity_hand_left_x = cos_wrist_left_flexion * s397 + sin_wrist_left_flexion * velocity_forearm_left_1_z
+    omega_hand_left_1_y = wrist_left_flexion_dot + (s388 - s387)
+    omega_hand_left_y = sin_wrist_left_deviation * omega_hand_left_1_z - cos_wrist_left_deviation * omega_hand_left_1_y
+    omega_hand_left_z = cos_wrist_left_deviation * omega_hand_left_1_z + sin_wrist_left_deviation * omega_hand_left_1_y
+    velocity_hand_left_y = cos_wrist_left_deviation * s398 + sin_wrist_left_deviation * velocity_hand_left_1_z
+    velocity_hand_left_z = cos_wrist_left_deviation * velocity_hand_left_1_z - sin_wrist_left_deviation * s398
+    omega_hand_left_x = wrist_left_deviation_dot + s396
+    omega_hand_right_1_z = cos_wrist_right_flexion * omega_forearm_right_z - sin_wrist_right_flexion * omega_forearm_right_x
+    s399 = cos_wrist_right_flexion * omega_forearm_right_x + sin_wrist_right_flexion * omega_forearm_right_z
+    s400 = velocity_forearm_right_x + k19 * omega_forearm_right_y
+    s401 = velocity_forearm_right_y - k19 * omega_forearm_right_x
+    velocity_hand_right_1_z = cos_wrist_right_flexion * velocity_forearm_right_1_z - sin_wrist_right_flexion * s400
+    velocity_hand_right_x = cos_wrist_right_flexion * s400 + sin_wrist_right_flexion * velocity_forearm_right_1_z
+    omega_hand_right_1_y = wrist_right_flexion_dot + (s395 - s394)
+    omega_hand_right_y = sin_wrist_right_deviation * omega_hand_right_1_z - cos_wrist_right_deviation * omega_hand_right_1_y
+    omega_hand_right_z = cos_wrist_right_deviation * omega_hand_right_1_z + sin_wrist_right_deviation * omega_hand_right_1_y
+    velocity_hand_right_y = cos_wrist_right_deviation * s401 + sin_wrist_right_deviation * velocity_hand_right_1_z
+    velocity_hand_right_z = cos_wrist_right_deviation * velocity_hand_right_1_z - sin_wrist_right_deviation * s401
+    omega_hand_right_x = wrist_right_deviation_dot + s399
+    s402 = s15 * velocity_pelvis_x + s16 * velocity_pelvis_y + s17 * velocity_pelvis_z
+    s403 = s18 * velocity_pelvis_x + s19 * velocity_pelvis_y + s20 * velocity_pelvis_z
+    s404 = s21 * velocity_pelvis_x + s22 * velocity_pelvis_y + s23 * velocity_pelvis_z
+    s409 = s47 * omega_abdomen_x + s48 * omega_abdomen_y + s49 * omega_abdomen_z
+    s410 = s50 * omega_abdomen_x + s51 * omega_abdomen_y + s52 * omega_abdomen_z
+    s411 = s53 * omega_abdomen_x + s54 * omega_abdomen_y + s55 * omega_abdomen_z
+    s412 = s47 * velocity_abdomen_x + s48 * velocity_abdomen_y + s49 * velocity_abdomen_z
+    s413 = s50 * velocity_abdomen_x + s51 * velocity_abdomen_y + s52 * velocity_abdomen_z
+    s414 = s53 * velocity_abdomen_x + s54 * velocity_abdomen_y + s55 * velocity_abdomen_z
+    s415 = k3 * s49
+    s416 = k3 * s52
+    s417 = k3 * s55
+    s418 = s412 + (s411 * s416 - s410 * s417)
+    s419 = s413 + (s409 * s417 - s411 * s415)
+    s420 = s414 + (s410 * s415 - s409 * s416)
+    s425 = s79 * omega_thigh_left_x + s80 * omega_thigh_left_y + s81 * omega_thigh_left_z
+    s426 = s82 * omega_thigh_left_x + s83 * omega_thigh_left_y + s84 * omega_thigh_left_z
+    s427 = s85 * omega_thigh_left_x + s86 * omega_thigh_left_y + s87 * omega_thigh_left_z
+    s428 = s79 * velocity_thigh_left_x + s80 * velocity_thigh_left_y + s81 * velocity_thigh_left_z
+    s429 = s82 * velocity_thigh_left_x + s83 * velocity_thigh_left_y + s84 * velocity_thigh_left_z
+    s430 = s85 * velocity_thigh_left_x + s86 * velocity_thigh_left_y + s87 * velocity_thigh_left_z
+    s431 = k5 * s81
+    s432 = k5 * s84
+    s433 = k5 * s87
+    s434 = s428 + (s427 * s432 - s426 * s433)
+    s435 = s429 + (s425 * s433 - s427 * s431)
+    s436 = s430 + (s426 * s431 - s425 * s432)
+    s441 = s111 * omega_thigh_right_x + s112 * omega_thigh_right_y + s113 * omega_thigh_right_z
+    s442 = s114 * omega_thigh_right_x + s115 * omega_thigh_right_y + s116 * omega_thigh_right_z
+    s443 = s117 * omega_thigh_right_x + s118 * omega_thigh_right_y + s119 * omega_thigh_right_z
+    s444 = s111 * velocity_thigh_right_x + s112 * velocity_thigh_right_y + s113 * velocity_thigh_right_z
+    s445 = s114 * velocity_thigh_right_x + s115 * velocity_thigh_right_y + s116 * velocity_thigh_right_z
+    s446 = s117 * velocity_thigh_right_x + s118 * velocity_thigh_right_y + s119 * velocity_thigh_right_z
+    s447 = k5 * s113
+    s448 = k5 * s116
+    s449 = k5 * s119
+    s450 = s444 + (s443 * s448 - s442 * s449)
+    s451 = s445 + (s441 * s449 - s443 * s447)
+    s452 = s446 + (s442 * s447 - s441 * s448)
+    s457 = s143 * omega_thorax_x + s144 * omega_thorax_y + s145 * omega_thorax_z
+    s458 = s146 * omega_thorax_x + s147 * omega_thorax_y + s148 * omega_thorax_z
+    s459 = s149 * omega_thorax_x + s150 * omega_thorax_y + s151 * omega_thorax_z
+    s460 = s143 * velocity_thorax_x + s144 * velocity_thorax_y + s145 * velocity_thorax_z
+    s461 = s146 * velocity_thorax_x + s147 * velocity_thorax_y + s148 * velocity_thorax_z
+    s462 = s149 * velocity_thorax_x + s150 * velocity_thorax_y + s151 * velocity_thorax_z
+    s463 = k7 * s145
+    s464 = k7 * s148
+    s465 = k7 * s151
+    s466 = s460 + (s459 * s464 - s458 * s465)
+    s467 = s461 + (s457 * s465 - s459 * s463)
+    s468 = s462 + (s458 * s463 - s457 * s464)
+    s473 = s154 * omega_shank_left_x + s80 * omega_shank_left_y + s153 * omega_shank_left_z
+    s474 = s156 * omega_shank_left_x + s83 * omega_shank_left_y + s155 * omega_shank_left_z
+    s475 = s158 * omega_shank_left_x + s86 * omega_shank_left_y + s157 * omega_shank_left_z
+    s476 = s154 * velocity_shank_left_x + s80 * velocity_shank_left_y + s153 * velocity_shank_left_z
+    s477 = s156 * velocity_shank_left_x + s83 * velocity_shank_left_y + s155 * velocity_shank_left_z
+    s478 = s158 * velocity_shank_left_x + s86 * velocity_shank_left_y + s157 * velocity_shank_left_z
+    s479 = k9 * s153
+    s480 = k9 * s155
+    s481 = k9 * s157
+    s482 = s476 + (s475 * s480 - s474 * s481)
+    s483 = s477 + (s473 * s481 - s475 * s479)
+    s484 = s478 + (s474 * s479 - s473 * s480)
+    s489 = s161 * omega_shank_right_x + s112 * omega_shank_right_y + s160 * omega_shank_right_z
+    s490 = s163 * omega_shank_right_x + s115 * omega_shank_right_y + s162 * omega_shank_right_z
+    s491 = s165 * omega_shank_right_x + s118 * omega_shank_right_y + s164 * omega_shank_right_z
+    s492 = s161 * velocity_shank_right_x + s112 * velocity_shank_right_y + s160 * velocity_shank_right_z
+    s493 = s163 * velocity_shank_right_x + s115 * velocity_shank_right_y + s162 * velocity_shank_right_z
+    s494 = s165 * velocity_shank_right_x + s118 * velocity_shank_right_y + s164 * velocity_shank_right_z
+    s495 = k9 * s160
+    s496 = k9 * s162
+    s497 = k9 * s164
+    s498 = s492 + (s491 * s496 - s490 * s497)
+    s499 = s493 + (s489 * s497 - s491 * s495)
+    s500 = s494 + (s490 * s495 - s489 * s496)
+    s505 = s188 * omega_head_x + s189 * omega_head_y + s190 * omega_head_z
+    s506 = s191 * omega_head_x + s192 * omega_head_y + s193 * omega_head_z
+    s507 = s194 * omega_head_x + s195 * omega_head_y + s196 * omega_head_z
+    s508 = k11 * s190
+    s509 = k11 * s193
+    s510 = k11 * s196
+    s511 = s188 * velocity_head_x + s189 * velocity_head_y + s190 * velocity_head_z + (s507 * s509 - s506 * s510)
+    s512 = s191 * velocity_head_x + s192 * velocity_head_y + s193 * velocity_head_z + (s505 * s510 - s507 * s508)
+    s513 = s194 * velocity_head_x + s195 * velocity_head_y + s196 * velocity_head_z + (s506 * s508 - s505 * s509)
+    s518 = s220 * omega_upper_arm_left_x + s221 * omega_upper_arm_left_y + s222 * omega_upper_arm_left_z
+    s519 = s223 * omega_upper_arm_left_x + s224 * omega_upper_arm_left_y + s225 * omega_upper_arm_left_z
+    s520 = s226 * omega_upper_arm_left_x + s227 * omega_upper_arm_left_y + s228 * omega_upper_arm_left_z
+    s521 = s220 * velocity_upper_arm_left_x + s221 * velocity_upper_arm_left_y + s222 * velocity_upper_arm_left_z
+    s522 = s223 * velocity_upper_arm_left_x + s224 * velocity_upper_arm_left_y + s225 * velocity_upper_arm_left_z
+    s523 = s226 * velocity_upper_arm_left_x + s227 * velocity_upper_arm_left_y + s228 * velocity_upper_arm_left_z
+    s524 = k13 * s222
+    s525 = k13 * s225
+    s526 = k13 * s228
+    s527 = s521 + (s520 * s525 - s519 * s526)
+    s528 = s522 + (s518 * s526 - s520 * s524)
+    s529 = s523 + (s519 * s524 - s518 * s525)
+    s534 = s252 * omega_upper_arm_right_x + s253 * omega_upper_arm_right_y + s254 * omega_upper_arm_right_z
+    s535 = s255 * omega_upper_arm_right_x + s256 * omega_upper_arm_right_y + s257 * omega_upper_arm_right_z
+    s536 = s258 * omega_upper_arm_right_x + s259 * omega_upper_arm_right_y + s260 * omega_upper_arm_right_z
+    s537 = s252 * velocity_upper_arm_right_x + s253 * velocity_upper_arm_right_y + s254 * velocity_upper_arm_right_z
+    s538 = s255 * velocity_upper_arm_right_x + s256 * velocity_upper_arm_right_y + s257 * velocity_upper_arm_right_z
+    s539 = s258 * velocity_upper_arm_right_x + s259 * velocity_upper_arm_right_y + s260 * velocity_upper_arm_right_z
+    s540 = k13 * s254
+    s541 = k13 * s257
+    s542 = k13 * s260
+    s543 = s537 + (s536 * s541 - s535 * s542)
+    s544 = s538 + (s534 * s542 - s536 * s540)
+    s545 = s539 + (s535 * s540 - s534 * s541)
+    s550 = s262 * omega_foot_left_x + s267 * omega_foot_left_y + s268 * omega_foot_left_z
+    s551 = s264 * omega_foot_left_x + s269 * omega_foot_left_y + s270 * omega_foot_left_z
+    s552 = s266 * omega_foot_left_x + s271 * omega_foot_left_y + s272 * omega_foot_left_z
+    s553 = s262 * velocity_foot_left_1_x + s267 * velocity_foot_left_y + s268 * velocity_foot_left_z
+    s554 = s264 * velocity_foot_left_1_x + s269 * velocity_foot_left_y + s270 * velocity_foot_left_z
+    s555 = s266 * velocity_foot_left_1_x + s271 * velocity_foot_left_y + s272 * velocity_foot_left_z
+    s556 = k15 * s268
+    s557 = k16 * s262 - s556
+    s558 = k15 * s270
+    s559 = k16 * s264 - s558
+    s560 = k15 * s272
+    s561 = k16 * s266 - s560
+    s562 = s553 + (s551 * s561 - s552 * s559)
+    s563 = s554 + (s552 * s557 - s550 * s561)
+    s564 = s555 + (s550 * s559 - s551 * s557)
+    s569 = s274 * omega_foot_right_x + s279 * omega_foot_right_y + s280 * omega_foot_right_z
+    s570 = s276 * omega_foot_right_x + s281 * omega_foot_right_y + s282 * omega_foot_right_z
+    s571 = s278 * omega_foot_right_x + s283 * omega_foot_right_y + s284 * omega_foot_right_z
+    s572 = s274 * velocity_foot_right_1_x + s279 * velocity_foot_right_y + s280 * velocity_foot_right_z
+    s573 = s276 * velocity_foot_right_1_x + s281 * velocity_foot_right_y + s282 * velocity_foot_right_z
+    s574 = s278 * velocity_foot_right_1_x + s283 * velocity_foot_right_y + s284 * velocity_foot_right_z
+    s575 = k15 * s280
+    s576 = k16 * s274 - s575
+    s577 = k15 * s282
+    s578 = k16 * s276 - s577
+    s579 = k15 * s284
+    s580 = k16 * s278 - s579
+    s581 = s572 + (s570 * s580 - s571 * s578)
+    s582 = s573 + (s571 * s576 - s569 * s580)
+    s583 = s574 + (s569 * s578 - s570 * s576)
+    s588 = s292 * omega_forearm_left_x + s293 * omega_forearm_left_y + s285 * omega_forearm_left_z
+    s589 = s294 * omega_forearm_left_x + s295 * omega_forearm_left_y + s287 * omega_forearm_left_z
+    s590 = s296 * omega_forearm_left_x + s297 * omega_forearm_left_y + s289 * omega_forearm_left_z
+    s591 = s292 * velocity_forearm_left_x + s293 * velocity_forearm_left_y + s285 * velocity_forearm_left_1_z
+    s592 = s294 * velocity_forearm_left_x + s295 * velocity_forearm_left_y + s287 * velocity_forearm_left_1_z
+    s593 = s296 * velocity_forearm_left_x + s297 * velocity_forearm_left_y + s289 * velocity_forearm_left_1_z
+    s594 = k18 * s285
+    s595 = k18 * s287
+    s596 = k18 * s289
+    s597 = s591 + (s590 * s595 - s589 * s596)
+    s598 = s592 + (s588 * s596 - s590 * s594)
+    s599 = s593 + (s589 * s594 - s588 * s595)
+    s604 = s305 * omega_forearm_right_x + s306 * omega_forearm_right_y + s298 * omega_forearm_right_z
+    s605 = s307 * omega_forearm_right_x + s308 * omega_forearm_right_y + s300 * omega_forearm_right_z
+    s606 = s309 * omega_forearm_right_x + s310 * omega_forearm_right_y + s302 * omega_forearm_right_z
+    s607 = s305 * velocity_forearm_right_x + s306 * velocity_forearm_right_y + s298 * velocity_forearm_right_1_z
+    s608 = s307 * velocity_forearm_right_x + s308 * velocity_forearm_right_y + s300 * velocity_forearm_right_1_z
+    s609 = s309 * velocity_forearm_right_x + s310 * velocity_forearm_right_y + s302 * velocity_forearm_right_1_z
+    s610 = k18 * s298
+    s611 = k18 * s300
+    s612 = k18 * s302
+    s613 = s607 + (s606 * s611 - s605 * s612)
+    s614 = s608 + (s604 * s612 - s606 * s610)
+    s615 = s609 + (s605 * s610 - s604 * s611)
+    s620 = s312 * omega_hand_left_x + s317 * omega_hand_left_y + s318 * omega_hand_left_z
+    s621 = s314 * omega_hand_left_x + s319 * omega_hand_left_y + s320 * omega_hand_left_z
+    s622 = s316 * omega_hand_left_x + s321 * omega_hand_left_y + s322 * omega_hand_left_z
+    s623 = s312 * velocity_hand_left_x + s317 * velocity_hand_left_y + s318 * velocity_hand_left_z
+    s624 = s314 * velocity_hand_left_x + s319 * velocity_hand_left_y + s320 * velocity_hand_left_z
+    s625 = s316 * velocity_hand_left_x + s321 * velocity_hand_left_y + s322 * velocity_hand_left_z
+    s626 = k20 * s318
+    s627 = k20 * s320
+    s628 = k20 * s322
+    s629 = s623 + (s622 * s627 - s621 * s628)
+    s630 = s624 + (s620 * s628 - s622 * s626)
+    s631 = s625 + (s621 * s626 - s620 * s627)
+    s636 = s324 * omega_hand_right_x + s329 * omega_hand_right_y + s330 * omega_hand_right_z
+    s637 = s326 * omega_hand_right_x + s331 * omega_hand_right_y + s332 * omega_hand_right_z
+    s638 = s328 * omega_hand_right_x + s333 * omega_hand_right_y + s334 * omega_hand_right_z
+    s639 = s324 * velocity_hand_right_x + s329 * velocity_hand_right_y + s330 * velocity_hand_right_z
+    s640 = s326 * velocity_hand_right_x + s331 * velocity_hand_right_y + s332 * velocity_hand_right_z
+    s641 = s328 * velocity_hand_right_x + s333 * velocity_hand_right_y + s334 * velocity_hand_right_z
+    s642 = k20 * s330
+    s643 = k20 * s332
+    s644 = k20 * s334
+    s645 = s639 + (s638 * s643 - s637 * s644)
+    s646 = s640 + (s636 * s644 - s638 * s642)
+    s647 = s641 + (s637 * s642 - s636 * s643)
+    s2476 = lumbar_qz_squared + (lumbar_qx_squared + lumbar_qy_squared)
+    s652 = sqrt(max(s2476, 1e-300))
+    s653 = atan2(s652, abs(lumbar_qw))
+    s654 = 1.0 / s652
+    s655 = select(-lumbar_qw, -s654, s654)
+    s659 = s653 + s653
+    s2478 = hip_left_qz_squared + (hip_left_qx_squared + hip_left_qy_squared)
+    s662 = sqrt(max(s2478, 1e-300))
+    s663 = atan2(s662, abs(hip_left_qw))
+    s664 = 1.0 / s662
+    s665 = select(-hip_left_qw, -s664, s664)
+    s669 = s663 + s663
+    s2480 = hip_right_qz_squared + (hip_right_qx_squared + hip_right_qy_squared)
+    s672 = sqrt(max(s2480, 1e-300))
+    s673 = atan2(s672, abs(hip_right_qw))
+    s674 = 1.0 / s672
+    s675 = select(-hip_right_qw, -s674, s674)
+    s679 = s673 + s673
+    s2482 = thoracic_qz_squared + (thoracic_qx_squared + thoracic_qy_squared)
+    s682 = sqrt(max(s2482, 1e-300))
+    s683 = atan2(s682, abs(thoracic_qw))
+    s684 = 1.0 / s682
+    s685 = select(-thoracic_qw, -s684, s684)
+    s689 = s683 + s683
+    s2484 = neck_qz_squared + (neck_qx_squared + neck_qy_squared)
+    s693 = sqrt(max(s2484, 1e-300))
+    s694 = atan2(s693, abs(neck_qw))
+    s695 = 1.0 / s693
+    s696 = select(-neck_qw, -s695, s695)
+    s700 = s694 + s694
+    s702 = shoulder_left_qz_squared + (shoulder_left_qx_squared + shoulder_left_qy_squared)
+    s703 = sqrt(max(s702, 1e-300))
+    s704 = atan2(s703, abs(shoulder_left_qw))
+    s705 = 1.0 / s703
+    s706 = select(-shoulder_left_qw, -s705, s705)
+    s710 = s704 + s704
+    s712 = shoulder_right_qz_squared + (shoulder_right_qx_squared + shoulder_right_qy_squared)
+    s713 = sqrt(max(s712, 1e-300))
+    s714 = atan2(s713, abs(shoulder_right_qw))
+    s715 = 1.0 / s713
+    s716 = select(-shoulder_right_qw, -s715, s715)
+    s720 = s714 + s714
+    s734 = pelvis_z + k2 * s23
+    s735 = w_hip * s22
+    s736 = k4 * s23
+    s737 = s734 + k6 * s55
+    s741 = pelvis_z + (s735 + s736) + k8 * s87
+    s745 = pelvis_z + (s736 - s735) + k8 * s119
+    s746 = w_shoulder * s150
+    s747 = k12 * s151
+    s748 = s737 + (s746 + s747)
+    s749 = s737 + (s747 - s746)
+    s750 = s741 + k14 * s157
+    s751 = s745 + k14 * s164
+    s755 = s748 + k17 * s228
+    s759 = s749 + k17 * s260
+    s2488 = trunk_on_ground_radius - (s737 + k10 * s151 - s510)
+    s762 = max(s2488, 0.0)
+    s2495 = trunk_on_ground_radius - (s737 - s465)
+    s771 = max(s2495, 0.0)
+    s2502 = trunk_on_ground_radius - (s734 - s417)
+    s780 = max(s2502, 0.0)
+    s2509 = trunk_on_ground_radius - pelvis_z
+    s791 = max(s2509, 0.0)
+    s2516 = limbs_on_ground_radius - s748
+    s802 = max(s2516, 0.0)
+    s2523 = limbs_on_ground_radius - s755
+    s811 = max(s2523, 0.0)
+    s2529 = limbs_on_ground_radius - (s755 + k19 * s289 + s322 * k31)
+    s824 = max(s2529, 0.0)
+    s2535 = limbs_on_ground_radius - s741
+    s834 = max(s2535, 0.0)
+    s2541 = limbs_on_ground_radius - (s750 + (s266 * k32 - s560))
+    s849 = max(s2541, 0.0)
+    s2545 = 1.0 - k30 * (s555 + (s550 * (s264 * k32 - s558) - s551 * (s262 * k32 - s556)))
+    s2547 = limbs_on_ground_radius - (s750 + (s266 * k33 - s560))
+    s862 = max(s2547, 0.0)
+    s2551 = 1.0 - k30 * (s555 + (s550 * (s264 * k33 - s558) - s551 * (s262 * k33 - s556)))
+    s2553 = limbs_on_ground_radius - s749
+    s874 = max(s2553, 0.0)
+    s2560 = limbs_on_ground_radius - s759
+    s883 = max(s2560, 0.0)
+    s2566 = limbs_on_ground_radius - (s759 + k19 * s302 + s334 * k31)
+    s896 = max(s2566, 0.0)
+    s2572 = limbs_on_ground_radius - s745
+    s906 = max(s2572, 0.0)
+    s2578 = limbs_on_ground_radius - (s751 + (s278 * k32 - s579))
+    s921 = max(s2578, 0.0)
+    s2582 = 1.0 - k30 * (s574 + (s569 * (s276 * k32 - s577) - s570 * (s274 * k32 - s575)))
+    s2584 = limbs_on_ground_radius - (s751 + (s278 * k33 - s579))
+    s934 = max(s2584, 0.0)
+    s2588 = 1.0 - k30 * (s574 + (s569 * (s276 * k33 - s577) - s570 * (s274 * k33 - s575)))
+    s942 = min(s659, spine_range_high)
+    s943 = s659 - s942
+    s5862 = lumbar_wx * (lumbar_qx * s655) + lumbar_wy * (lumbar_qy * s655) + lumbar_wz * (lumbar_qz * s655)
+    s946 = min(s689, spine_range_high)
+    s947 = s689 - s946
+    s5863 = thoracic_wx * (thoracic_qx * s685) + thoracic_wy * (thoracic_qy * s685) + thoracic_wz * (thoracic_qz * s685)
+    s950 = min(s700, spine_range_high)
+    s951 = s700 - s950
+    s5864 = neck_wx * (neck_qx * s696) + neck_wy * (neck_qy * s696) + neck_wz * (neck_qz * s696)
+    s954 = min(s710, shoulder_range_high)
+    s955 = s710 - s954
+    s5865 = shoulder_left_wx * (shoulder_left_qx * s706) + shoulder_left_wy * (shoulder_left_qy * s706)
+    s958 = min(s720, shoulder_range_high)
+    s959 = s720 - s958
+    s5866 = shoulder_right_wx * (shoulder_right_qx * s716) + shoulder_right_wy * (shoulder_right_qy * s716)
+    s962 = min(s669, hip_range_high)
+    s963 = s669 - s962
+    s5867 = hip_left_wx * (hip_left_qx * s665) + hip_left_wy * (hip_left_qy * s665) + hip_left_wz * (hip_left_qz * s665)
+    s966 = min(s679, hip_range_high)
+    s967 = s679 - s966
+    s5868 = hip_right_wx * (hip_right_qx * s675) + hip_right_wy * (hip_right_qy * s675)
+    s2600 = min(knee_left_flexion, knee_range_high)
+    s970 = max(s2600, 0.0)
+    s971 = knee_left_flexion - s970
+    s2602 = min(knee_right_flexion, knee_range_high)
+    s974 = max(s2602, 0.0)
+    s975 = knee_right_flexion - s974
+    s2604 = min(elbow_left_flexion, elbow_left_range_high)
+    s978 = max(s2604, 0.0)
+    s979 = elbow_left_flexion - s978
+    s2606 = min(elbow_left_pronation, forearm_left_range_high)
+    s982 = max(s2606, forearm_left_range_low)
+    s983 = elbow_left_pronation - s982
+    s2608 = min(elbow_right_flexion, elbow_right_range_high)
+    s986 = max(s2608, 0.0)
+    s987 = elbow_right_flexion - s986
+    s2610 = min(elbow_right_pronation, forearm_right_range_high)
+    s990 = max(s2610, forearm_right_range_low)
+    s991 = elbow_right_pronation - s990
+    s2612 = min(wrist_left_flexion, small_ranges_high)
+    s994 = max(s2612, small_ranges_low)
+    s995 = wrist_left_flexion - s994
+    s2614 = min(wrist_left_deviation, small_ranges_high)
+    s998 = max(s2614, small_ranges_low)
+    s999 = wrist_left_deviation - s998
+    s2616 = min(wrist_right_flexion, small_ranges_high)
+    s1002 = max(s2616, small_ranges_low)
+    s1003 = wrist_right_flexion - s1002
+    s2618 = min(wrist_right_deviation, small_ranges_high)
+    s1006 = max(s2618, small_ranges_low)
+    s1007 = wrist_right_deviation - s1006
+    s2620 = min(ankle_left_flexion, small_ranges_high)
+    s1010 = max(s2620, small_ranges_low)
+    s1011 = ankle_left_flexion - s1010
+    s2622 = min(ankle_left_inversion, small_ranges_high)
+    s1014 = max(s2622, small_ranges_low)
+    s1015 = ankle_left_inversion - s1014
+    s2624 = min(ankle_right_flexion, small_ranges_high)
+    s1018 = max(s2624, small_ranges_low)
+    s1019 = ankle_right_flexion - s1018
+    s2626 = min(ankle_right_inversion, small_ranges_high)
+    s1022 = max(s2626, small_ranges_low)
+    s1023 = ankle_right_inversion - s1022
+    return (
+        s402 * s402 + s403 * s403 + s404 * s404 - 1e-300,
+        s418 * s418 + s419 * s419 + s420 * s420 - 1e-300,
+        s434 * s434 + s435 * s435 + s436 * s436 - 1e-300,
+        s450 * s450 + s451 * s451 + s452 * s452 - 1e-300,
+        s466 * s466 + s467 * s467 + s468 * s468 - 1e-300,
+        s482 * s482 + s483 * s483 + s484 * s484 - 1e-300,
+        s498 * s498 + s499 * s499 + s500 * s500 - 1e-300,
+        s511 * s511 + s512 * s512 + s513 * s513 - 1e-300,
+        s527 * s527 + s528 * s528 + s529 * s529 - 1e-300,
+        s543 * s543 + s544 * s544 + s545 * s545 - 1e-300,
+        s562 * s562 + s563 * s563 + s564 * s564 - 1e-300,
+        s581 * s581 + s582 * s582 + s583 * s583 - 1e-300,
+        s597 * s597 + s598 * s598 + s599 * s599 - 1e-300,
+        s613 * s613 + s614 * s614 + s615 * s615 - 1e-300,
+        s629 * s629 + s630 * s630 + s631 * s631 - 1e-300,
+        s645 * s645 + s646 * s646 + s647 * s647 - 1e-300,
+        s2476 - 1e-300,
+        lumbar_qw,
+        s2478 - 1e-300,
+        hip_left_qw,
+        s2480 - 1e-300,
+        hip_right_qw,
+        s2482 - 1e-300,
+        thoracic_qw,
+        s2484 - 1e-300,
+        neck_qw,
+        s702 - 1e-300,
+        shoulder_left_qw,
+        s712 - 1e-300,
+        shoulder_right_qw,
+        s2488,
+        s762 - 1e-300,
+        flesh * s762 * sqrt(max(s762, 1e-300)) * (1.0 - s513 * k30),
+        s2495,
+        s771 - 1e-300,
+        flesh * s771 * sqrt(max(s771, 1e-300)) * (1.0 - s468 * k30),
+        s2502,
+        s780 - 1e-300,
+        flesh * s780 * sqrt(max(s780, 1e-300)) * (1.0 - s420 * k30),
+        s2509,
+        s791 - 1e-300,
+        flesh * s791 * sqrt(max(s791, 1e-300)) * (1.0 - s404 * k30),
+        s2516,
+        s802 - 1e-300,
+        flesh * s802 * sqrt(max(s802, 1e-300)) * (1.0 - s523 * k30),
+        s2523,
+        s811 - 1e-300,
+        flesh * s811 * sqrt(max(s811, 1e-300)) * (1.0 - k30 * (s523 + (s518 * (k17 * s225) - s519 * (k17 * s222)))),
+        s2529,
+        s824 - 1e-300,
+        flesh * s824 * sqrt(max(s824, 1e-300)) * (1.0 - k30 * (s625 + (s620 * (s320 * k31) - s621 * (s318 * k31)))),
+        s2535,
+        s834 - 1e-300,
+        flesh * s834 * sqrt(max(s834, 1e-300)) * (1.0 - k30 * (s430 + (s425 * (k8 * s84) - s426 * (k8 * s81)))),
+        s2541,
+        s849 - 1e-300,
+        flesh * s849 * sqrt(max(s849, 1e-300)) * s2545,
+        s2547,
+        s862 - 1e-300,
+        flesh * s862 * sqrt(max(s862, 1e-300)) * s2551,
+        s2553,
+        s874 - 1e-300,
+        flesh * s874 * sqrt(max(s874, 1e-300)) * (1.0 - s539 * k30),
+        s2560,
+        s883 - 1e-300,
+        flesh * s883 * sqrt(max(s883, 1e-300)) * (1.0 - k30 * (s539 + (s534 * (k17 * s257) - s535 * (k17 * s254)))),
+        s2566,
+        s896 - 1e-300,
+        flesh * s896 * sqrt(max(s896, 1e-300)) * (1.0 - k30 * (s641 + (s636 * (s332 * k31) - s637 * (s330 * k31)))),
+        s2572,
+        s906 - 1e-300,
+        flesh * s906 * sqrt(max(s906, 1e-300)) * (1.0 - k30 * (s446 + (s441 * (k8 * s116) - s442 * (k8 * s113)))),
+        s2578,
+        s921 - 1e-300,
+        flesh * s921 * sqrt(max(s921, 1e-300)) * s2582,
+        s2584,
+        s934 - 1e-300,
+        flesh * s934 * sqrt(max(s934, 1e-300)) * s2588,
+        spine_range_high - s659,
+        stop * s943 + damping * s5862,
+        s942 - s659,
+        s943,
+        spine_range_high - s689,
+        stop * s947 + damping * s5863,
+        s946 - s689,
+        s947,
+        spine_range_high - s700,
+        stop * s951 + damping * s5864,
+        s950 - s700,
+        s951,
+        shoulder_range_high - s710,
+        stop * s955 + damping * (s5865 + shoulder_left_wz * (shoulder_left_qz * s706)),
+        s954 - s710,
+        s955,
+        shoulder_range_high - s720,
+        stop * s959 + damping * (s5866 + shoulder_right_wz * (shoulder_right_qz * s716)),
+        s958 - s720,
+        s959,
+        hip_range_high - s669,
+        stop * s963 + damping * s5867,
+        s962 - s669,
+        s963,
+        hip_range_high - s679,
+        stop * s967 + damping * (s5868 + hip_right_wz * (hip_right_qz * s675)),
+        s966 - s679,
+        s967,
+        knee_range_high - knee_left_flexion,
+        s2600,
+        damping * knee_left_flexion_dot + stop * s971,
+        s970 - knee_left_flexion,
+        s971,
+        knee_range_high - knee_right_flexion,
+        s2602,
+        damping * knee_right_flexion_dot + stop * s975,
+        s974 - knee_right_flexion,
+        s975,
+        elbow_left_range_high - elbow_left_flexion,
+        s2604,
+        damping * elbow_left_flexion_dot + stop * s979,
+        s978 - elbow_left_flexion,
+        s979,
+        forearm_left_range_high - elbow_left_pronation,
+        s2606 - forearm_left_range_low,
+        damping * elbow_left_pronation_dot + stop * s983,
+        s982 - elbow_left_pronation,
+        s983,
+        elbow_right_range_high - elbow_right_flexion,
+        s2608,
+        damping * elbow_right_flexion_dot + stop * s987,
+        s986 - elbow_right_flexion,
+        s987,
+        forearm_right_range_high - elbow_right_pronation,
+        s2610 - forearm_right_range_low,
+        damping * elbow_right_pronation_dot + stop * s991,
+        s990 - elbow_right_pronation,
+        s991,
+        small_ranges_high - wrist_left_flexion,
+        s2612 - small_ranges_low,
+        damping * wrist_left_flexion_dot + stop * s995,
+        s994 - wrist_left_flexion,
+        s995,
+        small_ranges_high - wrist_left_deviation,
+        s2614 - small_ranges_low,
+        damping * wrist_left_deviation_dot + stop * s999,
+        s998 - wrist_left_deviation,
+        s999,
+        small_ranges_high - wrist_right_flexion,
+        s2616 - small_ranges_low,
+        damping * wrist_right_flexion_dot + stop * s1003,
+        s1002 - wrist_right_flexion,
+        s1003,
+        small_ranges_high - wrist_right_deviation,
+        s2618 - small_ranges_low,
+        damping * wrist_right_deviation_dot + stop * s1007,
+        s1006 - wrist_right_deviation,
+        s1007,
+        small_ranges_high - ankle_left_flexion,
+        s2620 - small_ranges_low,
+        damping * ankle_left_flexion_dot + stop * s1011,
+        s1010 - ankle_left_flexion,
+        s1011,
+        small_ranges_high - ankle_left_inversion,
+        s2622 - small_ranges_low,
+        damping * ankle_left_inversion_dot + stop * s1015,
+        s1014 - ankle_left_inversion,
+        s1015,
+        small_ranges_high - ankle_right_flexion,
+        s2624 - small_ranges_low,
+        damping * ankle_right_flexion_dot + stop * s1019,
+        s1018 - ankle_right_flexion,
+        s1019,
+        small_ranges_high - ankle_right_inversion,
+        s2626 - small_ranges_low,
+        damping * ankle_right_inversion_dot + stop * s1023,
+        s1022 - ankle_right_inversion,
+        s1023,
+    )
+
+
+_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
+_LARGEST = 1e+100
+
+
+def _numbers(values, what):
+    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what}: some are masked; leave those out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what}: not an array: its rows differ in length") from None
+    kind = array.dtype.kind
+    if kind not in "biuf" or array.dtype.itemsize > 8:
+        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
+        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
+    return array.astype(float)
+
+
+def _named(values, defaults, what, most=inf):
+    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values:
-            if name not in names:
+        for name in values.keys():
+            if name not in defaults:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, f"{what}s")
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+        if abs(value) > most:
+            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
+    return array
 
 
 def _parameters(p):
-    try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
-    except ZeroDivisionError:
-        raise ValueError("the mass matrix is singular: change the parameters") from None
+    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
 
 
 def _inputs(u, columns):
-    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
-        array = np.asarray(u, dtype=float)
-        if array.shape != (len(INPUTS), columns):
-            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
-        return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    if columns and not hasattr(u, "keys"):
+        u = _numbers(u, "inputs")
+        if u.ndim == 2:
+            if u.shape != (len(INPUTS), *columns):
+                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
+            return u
+    return tuple(_named(u, INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
+_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
 _NO_INPUT = (0.0,) * len(INPUTS)
-_NO_FORCE = (0.0,) * 41
 _COLUMNS = {
     "sin": np.sin,
     "cos": np.cos,
@@ -10261,57 +11375,166 @@ _COLUMNS = {
 }
 
 
+def _trouble(name, state, error=None):
+    """Why an output has no value at a state, as an exception."""
+    for label, value in zip(STATES, state):
+        if not isfinite(value):
+            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
+    for indices in QUATERNIONS:
+        length = hypot(*(state[i] for i in indices))
+        if not 1e-150 < length < 1e150:
+            label = STATES[indices[0]]
+            return ValueError(f"{name}: the quaternion from {label!r} on has length {length:g}; scale it to 1")
+    if isinstance(error, ZeroDivisionError):
+        why = "its mass matrix is singular, or a formula infinite"
+        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
+    if isinstance(error, ValueError):
+        return ValueError(f"{name}: a formula has no value at this state ({error})")
+    size, label = max((abs(value), label) for value, label in zip(state, STATES))
+    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
+    return kind(
+        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
+        f" of size {size:g}; choose other units"
+    )
+
+
+def _states(y):
+    """A state or columns of states as an array."""
+    y = _numbers(y, "y")
+    if y.ndim not in (1, 2) or len(y) != 90:
+        raise ValueError(f"y has shape {y.shape}, not (90,) or (90, k): {', '.join(STATES)}")
+    return y
+
+
+def _strict(reach):
+    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    under = "ignore" if reach else "raise"
+    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
+
+
+def _alone(call, y, name, reach):
+    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+
+    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    """
+    state = y.tolist()
+    try:
+        values = call(state)
+        if not (reach and hypot(*values, *state) < reach):
+            with _strict(reach):
+                call(list(y))
+            if not all(np.isfinite(part).all() for part in (y, *values)):
+                raise FloatingPointError
+        return values
+    except (ArithmeticError, ValueError) as error:
+        raise _trouble(name, state, error) from None
+
+
+def _together(call, result, given, reach):
+    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    """
+    arrays = [part for part in given if part.__class__ is _ARRAY]
+    with _strict(reach):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+            if all(isfinite(part.sum()) for part in arrays):
+                return result
+        except ArithmeticError:
+            pass
+    result[:] = nan
+    with np.errstate(all="ignore"):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+        except ArithmeticError:
+            return result
+        sizes = np.zeros(result.shape[-1])
+        for part in map(np.abs, (*arrays, result)):
+            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
+    result[..., ~np.isfinite(sizes)] = nan
+    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
+        with _strict(reach):
+            try:
+                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
+            except ArithmeticError:
+                result[..., i] = nan
+    return result
+
+
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    if y.shape == (90,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        return np.array(kernel(y.tolist(), k, u, extra)).reshape(shape)
-    if y.ndim != 2 or y.shape[0] != 90:
-        raise ValueError(f"y has shape {y.shape}, not (90,) or (90, k): {', '.join(STATES)}")
-    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
-    values = kernel(y, k, u, extra, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty((len(values), y.shape[1]))
-    for row, value in zip(result, values):
-        row[:] = value
-    return result.reshape(shape + (y.shape[1],))
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    if not columns:
+        values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
+        return _from(values, _FLOAT, size).reshape(shape)
+    functions = {f: _COLUMNS[f] for f in functions}
+    result = _together(
+        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        np.empty((size, *columns)),
+        (y, u, extra),
+        reach,
+    )
+    return result.reshape(shape + columns)
 
 
 def _along(kernel, name, shape, functions, y, p, u):
     """A matrix of derivatives, all its columns at once: the change along each unit direction."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    directions = np.eye(shape[1])
-    if y.shape == (90,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        values, columns = kernel(y.tolist(), k, u, directions), ()
-    else:
-        if y.ndim != 2 or y.shape[0] != 90:
-            raise ValueError(f"y has shape {y.shape}, not (90,) or (90, k): {', '.join(STATES)}")
-        columns = y.shape[1:]
-        u = _NO_INPUT if u is None else _inputs(u, *columns)
-        values = kernel(y, k, u, directions[:, :, None], **{f: _COLUMNS[f] for f in functions})
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, directions = made[name], made["reach"], y.shape[1:], np.eye(shape[1])
+    u = _NO_INPUT if u is None else _inputs(u, columns)
     result = np.empty(shape + columns)
-    for row, value in zip(result, values):
-        row[:] = value
-    return result
+    if not columns:
+        with np.errstate(all="ignore"):
+            values = _alone(lambda y: kernel(y, k, u, directions), y, name, 0.0)
+        for row, value in zip(result, values):
+            row[:] = value
+        return result
+    functions, directions = {f: _COLUMNS[f] for f in functions}, directions[:, :, None]
+    return _together(
+        lambda y, u: kernel(y, k, u, directions, **functions),
+        result,
+        (y, u),
+        reach,
+    )
 
 
 def initial_state(p=None):
     """The scene's initial state, (90,); momenta follow the parameters."""
-    k = _DEFAULT if p is None else _parameters(p)
-    return np.array(_initial_state((), k["initial_state"]))
+    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
+    if not all(map(isfinite, values)):
+        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+    return _from(values, _FLOAT, 90)
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (90,), or (90, k) for k states."""
-    if u is None and y.__class__ is np.ndarray and y.shape == (90,):
-        k = _DEFAULT if p is None else _parameters(p)
-        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT))
+    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
+        k, reach = _DERIVATIVE, _REACH
+        if p is not None:
+            made = _parameters(p)
+            k, reach = made["derivative"], made["reach"]
+        try:
+            state = y.tolist()
+            values = _derivative(state, k, _NO_INPUT)
+            if hypot(*values) < reach and hypot(*state) < reach:
+                return _from(values, _FLOAT, 90)
+        except (ArithmeticError, ValueError):
+            pass
     return _evaluate(_derivative, "derivative", (90,), ('cos', 'sin', 'max', 'sqrt', 'abs', 'atan2', 'select', 'min'), y, p, u)
 
 
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
     return _along(_jacobian, "jacobian", (90, 90), ('cos', 'sin', 'max', 'sqrt', 'abs', 'atan2', 'select', 'min'), y, p, u)
+
+
+def switching_functions(t, y, p=None, u=None):
+    """`derivative` has another branch where one of these passes 0."""
+    return _evaluate(_switching_functions, "switching_functions", (176,), ('cos', 'sin', 'max', 'sqrt', 'abs', 'atan2', 'select', 'min'), y, p, u)

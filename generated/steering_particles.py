@@ -78,10 +78,14 @@ One call of `derivative` takes 973 operations: 112 add, 154 sub, 420 mul, 70 div
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (42, k); then every result has a last axis of length k.
+
+All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
+where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
+results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import isfinite, sqrt
+from math import hypot, inf, isfinite, nan, prod, sqrt
 
 import numpy as np
 
@@ -237,6 +241,7 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 112, "sub": 154, "mul": 420, "div": 70, "neg": 35, "sqrt": 35, "min": 28, "max": 91, "select": 28, "total": 973, "parameters": 3},
     "jacobian": {"add": 546, "sub": 420, "mul": 1575, "div": 364, "neg": 266, "sqrt": 35, "min": 28, "max": 91, "select": 434, "total": 3759, "parameters": 4},
+    "switching_functions": {"add": 63, "sub": 203, "mul": 182, "div": 28, "sqrt": 28, "max": 56, "total": 560, "parameters": 3},
 }
 
 
@@ -244,38 +249,36 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    m, I, stream, k_, steer, margin, reach, place_1_r_parent_x, place_1_r_parent_y, place_2_r_parent_x, place_2_r_parent_y, place_3_r_parent_x, place_3_r_parent_y, place_4_r_parent_x, place_4_r_parent_y, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y = values
+def _fixed(m, I, stream, k_, steer, margin, reach, place_1_r_parent_x, place_1_r_parent_y, place_2_r_parent_x, place_2_r_parent_y, place_3_r_parent_x, place_3_r_parent_y, place_4_r_parent_x, place_4_r_parent_y, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y):
+    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m > 0.0:
-        raise ValueError("mass of disc_1 is not positive: change the parameters")
+        return "mass of disc_1 is not positive"
     if not I >= 0.0:
-        raise ValueError("inertia_com of disc_1 is negative: change the parameters")
+        return "inertia_com of disc_1 is negative"
     if not m > 0.0:
-        raise ValueError("mass of disc_2 is not positive: change the parameters")
+        return "mass of disc_2 is not positive"
     if not I >= 0.0:
-        raise ValueError("inertia_com of disc_2 is negative: change the parameters")
+        return "inertia_com of disc_2 is negative"
     if not m > 0.0:
-        raise ValueError("mass of disc_3 is not positive: change the parameters")
+        return "mass of disc_3 is not positive"
     if not I >= 0.0:
-        raise ValueError("inertia_com of disc_3 is negative: change the parameters")
+        return "inertia_com of disc_3 is negative"
     if not m > 0.0:
-        raise ValueError("mass of disc_4 is not positive: change the parameters")
+        return "mass of disc_4 is not positive"
     if not I >= 0.0:
-        raise ValueError("inertia_com of disc_4 is negative: change the parameters")
+        return "inertia_com of disc_4 is negative"
     if not m > 0.0:
-        raise ValueError("mass of disc_5 is not positive: change the parameters")
+        return "mass of disc_5 is not positive"
     if not I >= 0.0:
-        raise ValueError("inertia_com of disc_5 is negative: change the parameters")
+        return "inertia_com of disc_5 is negative"
     if not m > 0.0:
-        raise ValueError("mass of disc_6 is not positive: change the parameters")
+        return "mass of disc_6 is not positive"
     if not I >= 0.0:
-        raise ValueError("inertia_com of disc_6 is negative: change the parameters")
+        return "inertia_com of disc_6 is negative"
     if not m > 0.0:
-        raise ValueError("mass of disc_7 is not positive: change the parameters")
+        return "mass of disc_7 is not positive"
     if not I >= 0.0:
-        raise ValueError("inertia_com of disc_7 is negative: change the parameters")
+        return "inertia_com of disc_7 is negative"
     k1 = margin + 0.35
     k2 = margin + 0.4
     k3 = margin + 0.45
@@ -284,7 +287,34 @@ def _constants(values):
         "initial_state": (),
         "derivative": (m, stream, k_, steer, reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3),
         "jacobian": (m, k_, steer, reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3, k4),
+        "switching_functions": (reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+
+    `reach` is how large states and results may be without a thought of overflow; with constants
+    so large or so small that any product may be lost, it is 0.
+    """
+    values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _fixed(*values.tolist())
+        with np.errstate(over="raise", under="raise", invalid="raise"):
+            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+    except ArithmeticError as error:
+        made = "the mass matrix is singular"
+        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
+        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
+            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
+            made = f"numbers are too large or too small for floats, with sizes from {ends}"
+    except ValueError as error:
+        made = f"a formula has no value ({error})"
+    if made.__class__ is str:
+        raise ValueError(f"{made}: change the parameters")
+    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -3550,42 +3580,332 @@ def _jacobian(y, k, u=(), extra=(), max=max, sqrt=sqrt, min=min, select=select):
     )
 
 
-def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+def _switching_functions(y, k, u=(), extra=(), max=max, sqrt=sqrt):
+    """560 operations: 63 add, 203 sub, 182 mul, 28 div, 28 sqrt, 56 max."""
+    reach, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y, k1, k2, k3 = k
+    disc_1_x, disc_1_y, _, disc_2_x, disc_2_y, _, disc_3_x, disc_3_y, _, disc_4_x, disc_4_y, _, disc_5_x, disc_5_y, _, disc_6_x, disc_6_y, _, disc_7_x, disc_7_y, _, disc_1_x_dot, disc_1_y_dot, _, disc_2_x_dot, disc_2_y_dot, _, disc_3_x_dot, disc_3_y_dot, _, disc_4_x_dot, disc_4_y_dot, _, disc_5_x_dot, disc_5_y_dot, _, disc_6_x_dot, disc_6_y_dot, _, disc_7_x_dot, disc_7_y_dot, _ = y
+    s1 = avoid_1_center_x - disc_1_x
+    s2 = avoid_1_center_y - disc_1_y
+    s218 = s1 * s1 + s2 * s2
+    s1191 = 1.0 - (sqrt(max(s218, 1e-300)) - k1) / reach
+    s9 = avoid_1_center_x - disc_2_x
+    s10 = avoid_1_center_y - disc_2_y
+    s229 = s9 * s9 + s10 * s10
+    s1192 = 1.0 - (sqrt(max(s229, 1e-300)) - k1) / reach
+    s17 = avoid_1_center_x - disc_3_x
+    s18 = avoid_1_center_y - disc_3_y
+    s240 = s17 * s17 + s18 * s18
+    s1193 = 1.0 - (sqrt(max(s240, 1e-300)) - k1) / reach
+    s25 = avoid_1_center_x - disc_4_x
+    s26 = avoid_1_center_y - disc_4_y
+    s251 = s25 * s25 + s26 * s26
+    s1194 = 1.0 - (sqrt(max(s251, 1e-300)) - k1) / reach
+    s33 = avoid_1_center_x - disc_5_x
+    s34 = avoid_1_center_y - disc_5_y
+    s262 = s33 * s33 + s34 * s34
+    s1195 = 1.0 - (sqrt(max(s262, 1e-300)) - k1) / reach
+    s41 = avoid_1_center_x - disc_6_x
+    s42 = avoid_1_center_y - disc_6_y
+    s273 = s41 * s41 + s42 * s42
+    s1196 = 1.0 - (sqrt(max(s273, 1e-300)) - k1) / reach
+    s49 = avoid_1_center_x - disc_7_x
+    s50 = avoid_1_center_y - disc_7_y
+    s284 = s49 * s49 + s50 * s50
+    s1197 = 1.0 - (sqrt(max(s284, 1e-300)) - k1) / reach
+    s57 = avoid_2_center_x - disc_1_x
+    s58 = avoid_2_center_y - disc_1_y
+    s295 = s57 * s57 + s58 * s58
+    s1198 = 1.0 - (sqrt(max(s295, 1e-300)) - k2) / reach
+    s64 = avoid_2_center_x - disc_2_x
+    s65 = avoid_2_center_y - disc_2_y
+    s305 = s64 * s64 + s65 * s65
+    s1199 = 1.0 - (sqrt(max(s305, 1e-300)) - k2) / reach
+    s71 = avoid_2_center_x - disc_3_x
+    s72 = avoid_2_center_y - disc_3_y
+    s315 = s71 * s71 + s72 * s72
+    s1200 = 1.0 - (sqrt(max(s315, 1e-300)) - k2) / reach
+    s78 = avoid_2_center_x - disc_4_x
+    s79 = avoid_2_center_y - disc_4_y
+    s325 = s78 * s78 + s79 * s79
+    s1201 = 1.0 - (sqrt(max(s325, 1e-300)) - k2) / reach
+    s85 = avoid_2_center_x - disc_5_x
+    s86 = avoid_2_center_y - disc_5_y
+    s335 = s85 * s85 + s86 * s86
+    s1202 = 1.0 - (sqrt(max(s335, 1e-300)) - k2) / reach
+    s92 = avoid_2_center_x - disc_6_x
+    s93 = avoid_2_center_y - disc_6_y
+    s345 = s92 * s92 + s93 * s93
+    s1203 = 1.0 - (sqrt(max(s345, 1e-300)) - k2) / reach
+    s99 = avoid_2_center_x - disc_7_x
+    s100 = avoid_2_center_y - disc_7_y
+    s355 = s99 * s99 + s100 * s100
+    s1204 = 1.0 - (sqrt(max(s355, 1e-300)) - k2) / reach
+    s106 = avoid_3_center_x - disc_1_x
+    s107 = avoid_3_center_y - disc_1_y
+    s365 = s106 * s106 + s107 * s107
+    s1205 = 1.0 - (sqrt(max(s365, 1e-300)) - k3) / reach
+    s113 = avoid_3_center_x - disc_2_x
+    s114 = avoid_3_center_y - disc_2_y
+    s375 = s113 * s113 + s114 * s114
+    s1206 = 1.0 - (sqrt(max(s375, 1e-300)) - k3) / reach
+    s120 = avoid_3_center_x - disc_3_x
+    s121 = avoid_3_center_y - disc_3_y
+    s385 = s120 * s120 + s121 * s121
+    s1207 = 1.0 - (sqrt(max(s385, 1e-300)) - k3) / reach
+    s127 = avoid_3_center_x - disc_4_x
+    s128 = avoid_3_center_y - disc_4_y
+    s395 = s127 * s127 + s128 * s128
+    s1208 = 1.0 - (sqrt(max(s395, 1e-300)) - k3) / reach
+    s134 = avoid_3_center_x - disc_5_x
+    s135 = avoid_3_center_y - disc_5_y
+    s405 = s134 * s134 + s135 * s135
+    s1209 = 1.0 - (sqrt(max(s405, 1e-300)) - k3) / reach
+    s141 = avoid_3_center_x - disc_6_x
+    s142 = avoid_3_center_y - disc_6_y
+    s415 = s141 * s141 + s142 * s142
+    s1210 = 1.0 - (sqrt(max(s415, 1e-300)) - k3) / reach
+    s148 = avoid_3_center_x - disc_7_x
+    s149 = avoid_3_center_y - disc_7_y
+    s425 = s148 * s148 + s149 * s149
+    s1211 = 1.0 - (sqrt(max(s425, 1e-300)) - k3) / reach
+    s155 = avoid_4_center_x - disc_1_x
+    s156 = avoid_4_center_y - disc_1_y
+    s435 = s155 * s155 + s156 * s156
+    s1212 = 1.0 - (sqrt(max(s435, 1e-300)) - k2) / reach
+    s162 = avoid_4_center_x - disc_2_x
+    s163 = avoid_4_center_y - disc_2_y
+    s445 = s162 * s162 + s163 * s163
+    s1213 = 1.0 - (sqrt(max(s445, 1e-300)) - k2) / reach
+    s169 = avoid_4_center_x - disc_3_x
+    s170 = avoid_4_center_y - disc_3_y
+    s455 = s169 * s169 + s170 * s170
+    s1214 = 1.0 - (sqrt(max(s455, 1e-300)) - k2) / reach
+    s176 = avoid_4_center_x - disc_4_x
+    s177 = avoid_4_center_y - disc_4_y
+    s465 = s176 * s176 + s177 * s177
+    s1215 = 1.0 - (sqrt(max(s465, 1e-300)) - k2) / reach
+    s183 = avoid_4_center_x - disc_5_x
+    s184 = avoid_4_center_y - disc_5_y
+    s475 = s183 * s183 + s184 * s184
+    s1216 = 1.0 - (sqrt(max(s475, 1e-300)) - k2) / reach
+    s190 = avoid_4_center_x - disc_6_x
+    s191 = avoid_4_center_y - disc_6_y
+    s485 = s190 * s190 + s191 * s191
+    s1217 = 1.0 - (sqrt(max(s485, 1e-300)) - k2) / reach
+    s197 = avoid_4_center_x - disc_7_x
+    s198 = avoid_4_center_y - disc_7_y
+    s495 = s197 * s197 + s198 * s198
+    s1218 = 1.0 - (sqrt(max(s495, 1e-300)) - k2) / reach
+    return (
+        s218 - 1e-300,
+        disc_1_x_dot * disc_1_x_dot + disc_1_y_dot * disc_1_y_dot - 1e-300,
+        s1191,
+        1.0 - max(0.0, s1191),
+        disc_1_x_dot * s1 + disc_1_y_dot * s2,
+        disc_1_y_dot * s1 - disc_1_x_dot * s2,
+        s229 - 1e-300,
+        disc_2_x_dot * disc_2_x_dot + disc_2_y_dot * disc_2_y_dot - 1e-300,
+        s1192,
+        1.0 - max(0.0, s1192),
+        disc_2_x_dot * s9 + disc_2_y_dot * s10,
+        disc_2_y_dot * s9 - disc_2_x_dot * s10,
+        s240 - 1e-300,
+        disc_3_x_dot * disc_3_x_dot + disc_3_y_dot * disc_3_y_dot - 1e-300,
+        s1193,
+        1.0 - max(0.0, s1193),
+        disc_3_x_dot * s17 + disc_3_y_dot * s18,
+        disc_3_y_dot * s17 - disc_3_x_dot * s18,
+        s251 - 1e-300,
+        disc_4_x_dot * disc_4_x_dot + disc_4_y_dot * disc_4_y_dot - 1e-300,
+        s1194,
+        1.0 - max(0.0, s1194),
+        disc_4_x_dot * s25 + disc_4_y_dot * s26,
+        disc_4_y_dot * s25 - disc_4_x_dot * s26,
+        s262 - 1e-300,
+        disc_5_x_dot * disc_5_x_dot + disc_5_y_dot * disc_5_y_dot - 1e-300,
+        s1195,
+        1.0 - max(0.0, s1195),
+        disc_5_x_dot * s33 + disc_5_y_dot * s34,
+        disc_5_y_dot * s33 - disc_5_x_dot * s34,
+        s273 - 1e-300,
+        disc_6_x_dot * disc_6_x_dot + disc_6_y_dot * disc_6_y_dot - 1e-300,
+        s1196,
+        1.0 - max(0.0, s1196),
+        disc_6_x_dot * s41 + disc_6_y_dot * s42,
+        disc_6_y_dot * s41 - disc_6_x_dot * s42,
+        s284 - 1e-300,
+        disc_7_x_dot * disc_7_x_dot + disc_7_y_dot * disc_7_y_dot - 1e-300,
+        s1197,
+        1.0 - max(0.0, s1197),
+        disc_7_x_dot * s49 + disc_7_y_dot * s50,
+        disc_7_y_dot * s49 - disc_7_x_dot * s50,
+        s295 - 1e-300,
+        s1198,
+        1.0 - max(0.0, s1198),
+        disc_1_x_dot * s57 + disc_1_y_dot * s58,
+        disc_1_y_dot * s57 - disc_1_x_dot * s58,
+        s305 - 1e-300,
+        s1199,
+        1.0 - max(0.0, s1199),
+        disc_2_x_dot * s64 + disc_2_y_dot * s65,
+        disc_2_y_dot * s64 - disc_2_x_dot * s65,
+        s315 - 1e-300,
+        s1200,
+        1.0 - max(0.0, s1200),
+        disc_3_x_dot * s71 + disc_3_y_dot * s72,
+        disc_3_y_dot * s71 - disc_3_x_dot * s72,
+        s325 - 1e-300,
+        s1201,
+        1.0 - max(0.0, s1201),
+        disc_4_x_dot * s78 + disc_4_y_dot * s79,
+        disc_4_y_dot * s78 - disc_4_x_dot * s79,
+        s335 - 1e-300,
+        s1202,
+        1.0 - max(0.0, s1202),
+        disc_5_x_dot * s85 + disc_5_y_dot * s86,
+        disc_5_y_dot * s85 - disc_5_x_dot * s86,
+        s345 - 1e-300,
+        s1203,
+        1.0 - max(0.0, s1203),
+        disc_6_x_dot * s92 + disc_6_y_dot * s93,
+        disc_6_y_dot * s92 - disc_6_x_dot * s93,
+        s355 - 1e-300,
+        s1204,
+        1.0 - max(0.0, s1204),
+        disc_7_x_dot * s99 + disc_7_y_dot * s100,
+        disc_7_y_dot * s99 - disc_7_x_dot * s100,
+        s365 - 1e-300,
+        s1205,
+        1.0 - max(0.0, s1205),
+        disc_1_x_dot * s106 + disc_1_y_dot * s107,
+        disc_1_y_dot * s106 - disc_1_x_dot * s107,
+        s375 - 1e-300,
+        s1206,
+        1.0 - max(0.0, s1206),
+        disc_2_x_dot * s113 + disc_2_y_dot * s114,
+        disc_2_y_dot * s113 - disc_2_x_dot * s114,
+        s385 - 1e-300,
+        s1207,
+        1.0 - max(0.0, s1207),
+        disc_3_x_dot * s120 + disc_3_y_dot * s121,
+        disc_3_y_dot * s120 - disc_3_x_dot * s121,
+        s395 - 1e-300,
+        s1208,
+        1.0 - max(0.0, s1208),
+        disc_4_x_dot * s127 + disc_4_y_dot * s128,
+        disc_4_y_dot * s127 - disc_4_x_dot * s128,
+        s405 - 1e-300,
+        s1209,
+        1.0 - max(0.0, s1209),
+        disc_5_x_dot * s134 + disc_5_y_dot * s135,
+        disc_5_y_dot * s134 - disc_5_x_dot * s135,
+        s415 - 1e-300,
+        s1210,
+        1.0 - max(0.0, s1210),
+        disc_6_x_dot * s141 + disc_6_y_dot * s142,
+        disc_6_y_dot * s141 - disc_6_x_dot * s142,
+        s425 - 1e-300,
+        s1211,
+        1.0 - max(0.0, s1211),
+        disc_7_x_dot * s148 + disc_7_y_dot * s149,
+        disc_7_y_dot * s148 - disc_7_x_dot * s149,
+        s435 - 1e-300,
+        s1212,
+        1.0 - max(0.0, s1212),
+        disc_1_x_dot * s155 + disc_1_y_dot * s156,
+        disc_1_y_dot * s155 - disc_1_x_dot * s156,
+        s445 - 1e-300,
+        s1213,
+        1.0 - max(0.0, s1213),
+        disc_2_x_dot * s162 + disc_2_y_dot * s163,
+        disc_2_y_dot * s162 - disc_2_x_dot * s163,
+        s455 - 1e-300,
+        s1214,
+        1.0 - max(0.0, s1214),
+        disc_3_x_dot * s169 + disc_3_y_dot * s170,
+        disc_3_y_dot * s169 - disc_3_x_dot * s170,
+        s465 - 1e-300,
+        s1215,
+        1.0 - max(0.0, s1215),
+        disc_4_x_dot * s176 + disc_4_y_dot * s177,
+        disc_4_y_dot * s176 - disc_4_x_dot * s177,
+        s475 - 1e-300,
+        s1216,
+        1.0 - max(0.0, s1216),
+        disc_5_x_dot * s183 + disc_5_y_dot * s184,
+        disc_5_y_dot * s183 - disc_5_x_dot * s184,
+        s485 - 1e-300,
+        s1217,
+        1.0 - max(0.0, s1217),
+        disc_6_x_dot * s190 + disc_6_y_dot * s191,
+        disc_6_y_dot * s190 - disc_6_x_dot * s191,
+        s495 - 1e-300,
+        s1218,
+        1.0 - max(0.0, s1218),
+        disc_7_x_dot * s197 + disc_7_y_dot * s198,
+        disc_7_y_dot * s197 - disc_7_x_dot * s198,
+    )
+
+
+_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
+_LARGEST = 1e+100
+
+
+def _numbers(values, what):
+    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what}: some are masked; leave those out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what}: not an array: its rows differ in length") from None
+    kind = array.dtype.kind
+    if kind not in "biuf" or array.dtype.itemsize > 8:
+        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
+        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
+    return array.astype(float)
+
+
+def _named(values, defaults, what, most=inf):
+    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values:
-            if name not in names:
+        for name in values.keys():
+            if name not in defaults:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, f"{what}s")
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+        if abs(value) > most:
+            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
+    return array
 
 
 def _parameters(p):
-    try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
-    except ZeroDivisionError:
-        raise ValueError("the mass matrix is singular: change the parameters") from None
+    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
 
 
 def _inputs(u, columns):
-    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
-        array = np.asarray(u, dtype=float)
-        if array.shape != (len(INPUTS), columns):
-            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
-        return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    if columns and not hasattr(u, "keys"):
+        u = _numbers(u, "inputs")
+        if u.ndim == 2:
+            if u.shape != (len(INPUTS), *columns):
+                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
+            return u
+    return tuple(_named(u, INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
+_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
 _NO_INPUT = (0.0,) * len(INPUTS)
-_NO_FORCE = (0.0,) * 21
 _COLUMNS = {
     "sqrt": np.sqrt,
     "min": np.minimum,
@@ -3594,37 +3914,139 @@ _COLUMNS = {
 }
 
 
+def _trouble(name, state, error=None):
+    """Why an output has no value at a state, as an exception."""
+    for label, value in zip(STATES, state):
+        if not isfinite(value):
+            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
+    if isinstance(error, ZeroDivisionError):
+        why = "its mass matrix is singular, or a formula infinite"
+        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
+    if isinstance(error, ValueError):
+        return ValueError(f"{name}: a formula has no value at this state ({error})")
+    size, label = max((abs(value), label) for value, label in zip(state, STATES))
+    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
+    return kind(
+        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
+        f" of size {size:g}; choose other units"
+    )
+
+
+def _states(y):
+    """A state or columns of states as an array."""
+    y = _numbers(y, "y")
+    if y.ndim not in (1, 2) or len(y) != 42:
+        raise ValueError(f"y has shape {y.shape}, not (42,) or (42, k): {', '.join(STATES)}")
+    return y
+
+
+def _strict(reach):
+    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    under = "ignore" if reach else "raise"
+    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
+
+
+def _alone(call, y, name, reach):
+    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+
+    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    """
+    state = y.tolist()
+    try:
+        values = call(state)
+        if not (reach and hypot(*values, *state) < reach):
+            with _strict(reach):
+                call(list(y))
+            if not all(np.isfinite(part).all() for part in (y, *values)):
+                raise FloatingPointError
+        return values
+    except (ArithmeticError, ValueError) as error:
+        raise _trouble(name, state, error) from None
+
+
+def _together(call, result, given, reach):
+    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    """
+    arrays = [part for part in given if part.__class__ is _ARRAY]
+    with _strict(reach):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+            if all(isfinite(part.sum()) for part in arrays):
+                return result
+        except ArithmeticError:
+            pass
+    result[:] = nan
+    with np.errstate(all="ignore"):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+        except ArithmeticError:
+            return result
+        sizes = np.zeros(result.shape[-1])
+        for part in map(np.abs, (*arrays, result)):
+            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
+    result[..., ~np.isfinite(sizes)] = nan
+    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
+        with _strict(reach):
+            try:
+                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
+            except ArithmeticError:
+                result[..., i] = nan
+    return result
+
+
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    if y.shape == (42,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        return np.array(kernel(y.tolist(), k, u, extra)).reshape(shape)
-    if y.ndim != 2 or y.shape[0] != 42:
-        raise ValueError(f"y has shape {y.shape}, not (42,) or (42, k): {', '.join(STATES)}")
-    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
-    values = kernel(y, k, u, extra, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty((len(values), y.shape[1]))
-    for row, value in zip(result, values):
-        row[:] = value
-    return result.reshape(shape + (y.shape[1],))
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    if not columns:
+        values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
+        return _from(values, _FLOAT, size).reshape(shape)
+    functions = {f: _COLUMNS[f] for f in functions}
+    result = _together(
+        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        np.empty((size, *columns)),
+        (y, u, extra),
+        reach,
+    )
+    return result.reshape(shape + columns)
 
 
 def initial_state(p=None):
     """The scene's initial state, (42,); momenta follow the parameters."""
-    k = _DEFAULT if p is None else _parameters(p)
-    return np.array(_initial_state((), k["initial_state"]))
+    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
+    if not all(map(isfinite, values)):
+        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+    return _from(values, _FLOAT, 42)
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (42,), or (42, k) for k states."""
-    if u is None and y.__class__ is np.ndarray and y.shape == (42,):
-        k = _DEFAULT if p is None else _parameters(p)
-        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT))
+    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
+        k, reach = _DERIVATIVE, _REACH
+        if p is not None:
+            made = _parameters(p)
+            k, reach = made["derivative"], made["reach"]
+        try:
+            state = y.tolist()
+            values = _derivative(state, k, _NO_INPUT)
+            if hypot(*values) < reach and hypot(*state) < reach:
+                return _from(values, _FLOAT, 42)
+        except (ArithmeticError, ValueError):
+            pass
     return _evaluate(_derivative, "derivative", (42,), ('max', 'sqrt', 'min', 'select'), y, p, u)
 
 
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
     return _evaluate(_jacobian, "jacobian", (42, 42), ('max', 'sqrt', 'min', 'select'), y, p, u)
+
+
+def switching_functions(t, y, p=None, u=None):
+    """`derivative` has another branch where one of these passes 0."""
+    return _evaluate(_switching_functions, "switching_functions", (147,), ('max', 'sqrt'), y, p, u)

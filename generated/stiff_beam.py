@@ -97,10 +97,14 @@ One call of `derivative` takes 2623 operations: 697 add, 508 sub, 1216 mul, 118 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (80, k); then every result has a last axis of length k.
+
+All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
+where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
+results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin
+from math import cos, hypot, inf, isfinite, nan, prod, sin
 
 import numpy as np
 
@@ -294,6 +298,7 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 697, "sub": 508, "mul": 1216, "div": 118, "neg": 1, "sin": 41, "cos": 40, "step": 1, "select": 1, "total": 2623, "parameters": 6},
     "jacobian": {"add": 2050, "sub": 1057, "mul": 3016, "div": 158, "sin": 41, "cos": 40, "step": 1, "select": 1, "total": 6364, "parameters": 6},
+    "switching_functions_of_time": {"sub": 2, "step": 1, "total": 3, "parameters": 0},
 }
 
 
@@ -305,90 +310,88 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    h, m, EI, load = values
+def _fixed(h, m, EI, load):
+    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m > 0.0:
-        raise ValueError("mass of rod_1 is not positive: change the parameters")
+        return "mass of rod_1 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_2 is not positive: change the parameters")
+        return "mass of rod_2 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_3 is not positive: change the parameters")
+        return "mass of rod_3 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_4 is not positive: change the parameters")
+        return "mass of rod_4 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_5 is not positive: change the parameters")
+        return "mass of rod_5 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_6 is not positive: change the parameters")
+        return "mass of rod_6 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_7 is not positive: change the parameters")
+        return "mass of rod_7 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_8 is not positive: change the parameters")
+        return "mass of rod_8 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_9 is not positive: change the parameters")
+        return "mass of rod_9 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_10 is not positive: change the parameters")
+        return "mass of rod_10 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_11 is not positive: change the parameters")
+        return "mass of rod_11 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_12 is not positive: change the parameters")
+        return "mass of rod_12 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_13 is not positive: change the parameters")
+        return "mass of rod_13 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_14 is not positive: change the parameters")
+        return "mass of rod_14 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_15 is not positive: change the parameters")
+        return "mass of rod_15 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_16 is not positive: change the parameters")
+        return "mass of rod_16 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_17 is not positive: change the parameters")
+        return "mass of rod_17 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_18 is not positive: change the parameters")
+        return "mass of rod_18 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_19 is not positive: change the parameters")
+        return "mass of rod_19 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_20 is not positive: change the parameters")
+        return "mass of rod_20 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_21 is not positive: change the parameters")
+        return "mass of rod_21 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_22 is not positive: change the parameters")
+        return "mass of rod_22 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_23 is not positive: change the parameters")
+        return "mass of rod_23 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_24 is not positive: change the parameters")
+        return "mass of rod_24 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_25 is not positive: change the parameters")
+        return "mass of rod_25 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_26 is not positive: change the parameters")
+        return "mass of rod_26 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_27 is not positive: change the parameters")
+        return "mass of rod_27 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_28 is not positive: change the parameters")
+        return "mass of rod_28 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_29 is not positive: change the parameters")
+        return "mass of rod_29 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_30 is not positive: change the parameters")
+        return "mass of rod_30 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_31 is not positive: change the parameters")
+        return "mass of rod_31 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_32 is not positive: change the parameters")
+        return "mass of rod_32 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_33 is not positive: change the parameters")
+        return "mass of rod_33 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_34 is not positive: change the parameters")
+        return "mass of rod_34 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_35 is not positive: change the parameters")
+        return "mass of rod_35 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_36 is not positive: change the parameters")
+        return "mass of rod_36 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_37 is not positive: change the parameters")
+        return "mass of rod_37 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_38 is not positive: change the parameters")
+        return "mass of rod_38 is not positive"
     if not m > 0.0:
-        raise ValueError("mass of rod_39 is not positive: change the parameters")
+        return "mass of rod_39 is not positive"
     if not m / 2.0 > 0.0:
-        raise ValueError("mass of tip_1 is not positive: change the parameters")
+        return "mass of tip_1 is not positive"
     k1 = EI / h
     mass_tip_1 = m / 2.0
     moment_rod_1_x = h * m
@@ -399,7 +402,34 @@ def _constants(values):
         "initial_state": (),
         "derivative": (h, m, load, k1, mass_tip_1, moment_rod_1_x, inertia_rod_1_zz, moment_tip_1_x, inertia_tip_1_zz),
         "jacobian": (h, m, load, k1, mass_tip_1, moment_rod_1_x, inertia_rod_1_zz, moment_tip_1_x, inertia_tip_1_zz),
+        "switching_functions_of_time": (),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+
+    `reach` is how large states and results may be without a thought of overflow; with constants
+    so large or so small that any product may be lost, it is 0.
+    """
+    values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _fixed(*values.tolist())
+        with np.errstate(over="raise", under="raise", invalid="raise"):
+            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+    except ArithmeticError as error:
+        made = "the mass matrix is singular"
+        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
+        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
+            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
+            made = f"numbers are too large or too small for floats, with sizes from {ends}"
+    except ValueError as error:
+        made = f"a formula has no value ({error})"
+    if made.__class__ is str:
+        raise ValueError(f"{made}: change the parameters")
+    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -4125,42 +4155,85 @@ def _jacobian(y, k, u=(), extra=(), t=0.0, step=step, sin=sin, select=select, co
     )
 
 
-def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+def _switching_functions_of_time(y, k, u=(), extra=(), t=0.0, step=step):
+    """3 operations: 2 sub, 1 step."""
+    s1981 = t - 3.141592653589793
+    return (
+        s1981,
+        1.0 - step(s1981),
+    )
+
+
+_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
+_LARGEST = 1e+100
+
+
+def _numbers(values, what):
+    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what}: some are masked; leave those out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what}: not an array: its rows differ in length") from None
+    kind = array.dtype.kind
+    if kind not in "biuf" or array.dtype.itemsize > 8:
+        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
+        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
+    return array.astype(float)
+
+
+def _named(values, defaults, what, most=inf):
+    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values:
-            if name not in names:
+        for name in values.keys():
+            if name not in defaults:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, f"{what}s")
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+        if abs(value) > most:
+            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
+    return array
 
 
 def _parameters(p):
-    try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
-    except ZeroDivisionError:
-        raise ValueError("the mass matrix is singular: change the parameters") from None
+    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
 
 
 def _inputs(u, columns):
-    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
-        array = np.asarray(u, dtype=float)
-        if array.shape != (len(INPUTS), columns):
-            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
-        return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    if columns and not hasattr(u, "keys"):
+        u = _numbers(u, "inputs")
+        if u.ndim == 2:
+            if u.shape != (len(INPUTS), *columns):
+                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
+            return u
+    return tuple(_named(u, INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+def _time(t, columns=()):
+    """Time as a float; beside columns it may be an array of as many."""
+    if t.__class__ is not np.float64:
+        t = _numbers(t, "t")
+    if t.shape not in ((), columns):
+        raise ValueError(f"t has shape {t.shape}, not ()")
+    if t.shape == () and not isfinite(t):
+        raise ValueError(f"t is {t}, not a finite number")
+    return t if t.shape else float(t)
+
+
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
+_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
 _NO_INPUT = (0.0,) * len(INPUTS)
-_NO_FORCE = (0.0,) * 40
 _COLUMNS = {
     "sin": np.sin,
     "cos": np.cos,
@@ -4169,57 +4242,162 @@ _COLUMNS = {
 }
 
 
-def _evaluate(kernel, name, shape, functions, y, p, u, extra=(), **time):
-    """Any output of one state or of columns of states."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    if y.shape == (80,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        return np.array(kernel(y.tolist(), k, u, extra, **time)).reshape(shape)
-    if y.ndim != 2 or y.shape[0] != 80:
+def _trouble(name, state, error=None):
+    """Why an output has no value at a state, as an exception."""
+    for label, value in zip(STATES, state):
+        if not isfinite(value):
+            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
+    if isinstance(error, ZeroDivisionError):
+        why = "its mass matrix is singular, or a formula infinite"
+        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
+    if isinstance(error, ValueError):
+        return ValueError(f"{name}: a formula has no value at this state ({error})")
+    size, label = max((abs(value), label) for value, label in zip(state, STATES))
+    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
+    return kind(
+        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
+        f" of size {size:g}; choose other units"
+    )
+
+
+def _states(y):
+    """A state or columns of states as an array."""
+    y = _numbers(y, "y")
+    if y.ndim not in (1, 2) or len(y) != 80:
         raise ValueError(f"y has shape {y.shape}, not (80,) or (80, k): {', '.join(STATES)}")
-    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
-    values = kernel(y, k, u, extra, **time, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty((len(values), y.shape[1]))
-    for row, value in zip(result, values):
-        row[:] = value
-    return result.reshape(shape + (y.shape[1],))
+    return y
 
 
-def _along(kernel, name, shape, functions, y, p, u, **time):
-    """A matrix of derivatives, all its columns at once: the change along each unit direction."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    directions = np.eye(shape[1])
-    if y.shape == (80,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        values, columns = kernel(y.tolist(), k, u, directions, **time), ()
-    else:
-        if y.ndim != 2 or y.shape[0] != 80:
-            raise ValueError(f"y has shape {y.shape}, not (80,) or (80, k): {', '.join(STATES)}")
-        columns = y.shape[1:]
-        u = _NO_INPUT if u is None else _inputs(u, *columns)
-        values = kernel(y, k, u, directions[:, :, None], **time, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty(shape + columns)
-    for row, value in zip(result, values):
-        row[:] = value
+def _strict(reach):
+    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    under = "ignore" if reach else "raise"
+    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
+
+
+def _alone(call, y, name, reach):
+    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+
+    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    """
+    state = y.tolist()
+    try:
+        values = call(state)
+        if not (reach and hypot(*values, *state) < reach):
+            with _strict(reach):
+                call(list(y))
+            if not all(np.isfinite(part).all() for part in (y, *values)):
+                raise FloatingPointError
+        return values
+    except (ArithmeticError, ValueError) as error:
+        raise _trouble(name, state, error) from None
+
+
+def _together(call, result, given, reach):
+    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    """
+    arrays = [part for part in given if part.__class__ is _ARRAY]
+    with _strict(reach):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+            if all(isfinite(part.sum()) for part in arrays):
+                return result
+        except ArithmeticError:
+            pass
+    result[:] = nan
+    with np.errstate(all="ignore"):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+        except ArithmeticError:
+            return result
+        sizes = np.zeros(result.shape[-1])
+        for part in map(np.abs, (*arrays, result)):
+            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
+    result[..., ~np.isfinite(sizes)] = nan
+    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
+        with _strict(reach):
+            try:
+                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
+            except ArithmeticError:
+                result[..., i] = nan
     return result
+
+
+def _evaluate(kernel, name, shape, functions, y, p, u, extra=(), *time):
+    """Any output of one state or of columns of states."""
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    time = [_time(t, columns) for t in time]
+    if not columns:
+        values = _alone(lambda y: kernel(y, k, u, extra, *time), y, name, reach)
+        return _from(values, _FLOAT, size).reshape(shape)
+    functions = {f: _COLUMNS[f] for f in functions}
+    result = _together(
+        lambda y, u, extra, *time: kernel(y, k, u, extra, *time, **functions),
+        np.empty((size, *columns)),
+        (y, u, extra, *time),
+        reach,
+    )
+    return result.reshape(shape + columns)
+
+
+def _along(kernel, name, shape, functions, y, p, u, *time):
+    """A matrix of derivatives, all its columns at once: the change along each unit direction."""
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, directions = made[name], made["reach"], y.shape[1:], np.eye(shape[1])
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    time = [_time(t, columns) for t in time]
+    result = np.empty(shape + columns)
+    if not columns:
+        with np.errstate(all="ignore"):
+            values = _alone(lambda y: kernel(y, k, u, directions, *time), y, name, 0.0)
+        for row, value in zip(result, values):
+            row[:] = value
+        return result
+    functions, directions = {f: _COLUMNS[f] for f in functions}, directions[:, :, None]
+    return _together(
+        lambda y, u, *time: kernel(y, k, u, directions, *time, **functions),
+        result,
+        (y, u, *time),
+        reach,
+    )
 
 
 def initial_state(p=None):
     """The scene's initial state, (80,); momenta follow the parameters."""
-    k = _DEFAULT if p is None else _parameters(p)
-    return np.array(_initial_state((), k["initial_state"]))
+    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
+    if not all(map(isfinite, values)):
+        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+    return _from(values, _FLOAT, 80)
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (80,), or (80, k) for k states."""
-    if u is None and y.__class__ is np.ndarray and y.shape == (80,):
-        k = _DEFAULT if p is None else _parameters(p)
-        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT, t=t))
-    return _evaluate(_derivative, "derivative", (80,), ('step', 'sin', 'select', 'cos'), y, p, u, t=t)
+    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
+        k, reach = _DERIVATIVE, _REACH
+        if p is not None:
+            made = _parameters(p)
+            k, reach = made["derivative"], made["reach"]
+        try:
+            values = _derivative(y.tolist(), k, _NO_INPUT, t=t if t.__class__ is float else _time(t))
+            if hypot(*values) < reach:
+                return _from(values, _FLOAT, 80)
+        except (ArithmeticError, ValueError):
+            pass
+    return _evaluate(_derivative, "derivative", (80,), ('step', 'sin', 'select', 'cos'), y, p, u, (), t)
 
 
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
-    return _along(_jacobian, "jacobian", (80, 80), ('step', 'sin', 'select', 'cos'), y, p, u, t=t)
+    return _along(_jacobian, "jacobian", (80, 80), ('step', 'sin', 'select', 'cos'), y, p, u, t)
+
+
+def switching_functions_of_time(t, y, p=None, u=None):
+    """As `switching_functions`; these depend on time alone."""
+    return _evaluate(_switching_functions_of_time, "switching_functions_of_time", (2,), ('step',), y, p, u, (), t)

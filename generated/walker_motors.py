@@ -96,10 +96,14 @@ One call of `derivative` takes 3923 operations: 969 add, 832 sub, 1960 mul, 79 d
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (37, k); then every result has a last axis of length k.
+
+All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
+where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
+results of such a state are nan, and those of the others are as they would be alone.
 """
 
 from functools import lru_cache
-from math import cos, isfinite, sin, sqrt
+from math import cos, hypot, inf, isfinite, nan, prod, sin, sqrt
 
 import numpy as np
 
@@ -291,6 +295,8 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 969, "sub": 832, "mul": 1960, "div": 79, "neg": 10, "sin": 13, "cos": 13, "sqrt": 8, "min": 13, "max": 26, "total": 3923, "parameters": 75},
     "jacobian": {"add": 8823, "sub": 9830, "mul": 21757, "div": 760, "neg": 163, "sin": 13, "cos": 13, "sqrt": 8, "min": 13, "max": 26, "select": 180, "total": 41586, "parameters": 81},
+    "switching_functions": {"add": 152, "sub": 141, "mul": 400, "div": 2, "neg": 5, "sin": 13, "cos": 13, "sqrt": 4, "min": 13, "max": 10, "total": 753, "parameters": 11},
+    "switching_functions_of_time": {"sub": 1, "mul": 1, "div": 1, "cos": 1, "total": 4, "parameters": 0},
 }
 
 
@@ -298,114 +304,112 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
-@lru_cache(maxsize=64)
-def _constants(values):
-    """Everything that depends on parameters alone, once for each set of them."""
-    m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, ground_dissipation, ground_friction, ground_slip_speed = values
+def _fixed(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, ground_dissipation, ground_friction, ground_slip_speed):
+    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_trunk > 0.0:
-        raise ValueError("mass of trunk is not positive: change the parameters")
+        return "mass of trunk is not positive"
     if not I_trunk_x >= 0.0:
-        raise ValueError("inertia_com xx of trunk is negative: change the parameters")
+        return "inertia_com xx of trunk is negative"
     if not I_trunk_y >= 0.0:
-        raise ValueError("inertia_com yy of trunk is negative: change the parameters")
+        return "inertia_com yy of trunk is negative"
     if not I_trunk_z >= 0.0:
-        raise ValueError("inertia_com zz of trunk is negative: change the parameters")
+        return "inertia_com zz of trunk is negative"
     if not m_hip > 0.0:
-        raise ValueError("mass of front_left_hip is not positive: change the parameters")
+        return "mass of front_left_hip is not positive"
     if not I_hip_xx >= 0.0:
-        raise ValueError("inertia_com xx of front_left_hip is negative: change the parameters")
+        return "inertia_com xx of front_left_hip is negative"
     if not I_hip_yy >= 0.0:
-        raise ValueError("inertia_com yy of front_left_hip is negative: change the parameters")
+        return "inertia_com yy of front_left_hip is negative"
     if not I_hip_zz >= 0.0:
-        raise ValueError("inertia_com zz of front_left_hip is negative: change the parameters")
+        return "inertia_com zz of front_left_hip is negative"
     if not m_hip > 0.0:
-        raise ValueError("mass of front_right_hip is not positive: change the parameters")
+        return "mass of front_right_hip is not positive"
     if not I_hip_xx >= 0.0:
-        raise ValueError("inertia_com xx of front_right_hip is negative: change the parameters")
+        return "inertia_com xx of front_right_hip is negative"
     if not I_hip_yy >= 0.0:
-        raise ValueError("inertia_com yy of front_right_hip is negative: change the parameters")
+        return "inertia_com yy of front_right_hip is negative"
     if not I_hip_zz >= 0.0:
-        raise ValueError("inertia_com zz of front_right_hip is negative: change the parameters")
+        return "inertia_com zz of front_right_hip is negative"
     if not m_hip > 0.0:
-        raise ValueError("mass of hind_left_hip is not positive: change the parameters")
+        return "mass of hind_left_hip is not positive"
     if not I_hip_xx >= 0.0:
-        raise ValueError("inertia_com xx of hind_left_hip is negative: change the parameters")
+        return "inertia_com xx of hind_left_hip is negative"
     if not I_hip_yy >= 0.0:
-        raise ValueError("inertia_com yy of hind_left_hip is negative: change the parameters")
+        return "inertia_com yy of hind_left_hip is negative"
     if not I_hip_zz >= 0.0:
-        raise ValueError("inertia_com zz of hind_left_hip is negative: change the parameters")
+        return "inertia_com zz of hind_left_hip is negative"
     if not m_hip > 0.0:
-        raise ValueError("mass of hind_right_hip is not positive: change the parameters")
+        return "mass of hind_right_hip is not positive"
     if not I_hip_xx >= 0.0:
-        raise ValueError("inertia_com xx of hind_right_hip is negative: change the parameters")
+        return "inertia_com xx of hind_right_hip is negative"
     if not I_hip_yy >= 0.0:
-        raise ValueError("inertia_com yy of hind_right_hip is negative: change the parameters")
+        return "inertia_com yy of hind_right_hip is negative"
     if not I_hip_zz >= 0.0:
-        raise ValueError("inertia_com zz of hind_right_hip is negative: change the parameters")
+        return "inertia_com zz of hind_right_hip is negative"
     if not m_thigh > 0.0:
-        raise ValueError("mass of front_left_thigh is not positive: change the parameters")
+        return "mass of front_left_thigh is not positive"
     if not I_thigh_x >= 0.0:
-        raise ValueError("inertia_com xx of front_left_thigh is negative: change the parameters")
+        return "inertia_com xx of front_left_thigh is negative"
     if not I_thigh_y >= 0.0:
-        raise ValueError("inertia_com yy of front_left_thigh is negative: change the parameters")
+        return "inertia_com yy of front_left_thigh is negative"
     if not I_thigh_z >= 0.0:
-        raise ValueError("inertia_com zz of front_left_thigh is negative: change the parameters")
+        return "inertia_com zz of front_left_thigh is negative"
     if not m_thigh > 0.0:
-        raise ValueError("mass of front_right_thigh is not positive: change the parameters")
+        return "mass of front_right_thigh is not positive"
     if not I_thigh_x >= 0.0:
-        raise ValueError("inertia_com xx of front_right_thigh is negative: change the parameters")
+        return "inertia_com xx of front_right_thigh is negative"
     if not I_thigh_y >= 0.0:
-        raise ValueError("inertia_com yy of front_right_thigh is negative: change the parameters")
+        return "inertia_com yy of front_right_thigh is negative"
     if not I_thigh_z >= 0.0:
-        raise ValueError("inertia_com zz of front_right_thigh is negative: change the parameters")
+        return "inertia_com zz of front_right_thigh is negative"
     if not m_thigh > 0.0:
-        raise ValueError("mass of hind_left_thigh is not positive: change the parameters")
+        return "mass of hind_left_thigh is not positive"
     if not I_thigh_x >= 0.0:
-        raise ValueError("inertia_com xx of hind_left_thigh is negative: change the parameters")
+        return "inertia_com xx of hind_left_thigh is negative"
     if not I_thigh_y >= 0.0:
-        raise ValueError("inertia_com yy of hind_left_thigh is negative: change the parameters")
+        return "inertia_com yy of hind_left_thigh is negative"
     if not I_thigh_z >= 0.0:
-        raise ValueError("inertia_com zz of hind_left_thigh is negative: change the parameters")
+        return "inertia_com zz of hind_left_thigh is negative"
     if not m_thigh > 0.0:
-        raise ValueError("mass of hind_right_thigh is not positive: change the parameters")
+        return "mass of hind_right_thigh is not positive"
     if not I_thigh_x >= 0.0:
-        raise ValueError("inertia_com xx of hind_right_thigh is negative: change the parameters")
+        return "inertia_com xx of hind_right_thigh is negative"
     if not I_thigh_y >= 0.0:
-        raise ValueError("inertia_com yy of hind_right_thigh is negative: change the parameters")
+        return "inertia_com yy of hind_right_thigh is negative"
     if not I_thigh_z >= 0.0:
-        raise ValueError("inertia_com zz of hind_right_thigh is negative: change the parameters")
+        return "inertia_com zz of hind_right_thigh is negative"
     if not m_shank > 0.0:
-        raise ValueError("mass of front_left_shank is not positive: change the parameters")
+        return "mass of front_left_shank is not positive"
     if not I_shank_x >= 0.0:
-        raise ValueError("inertia_com xx of front_left_shank is negative: change the parameters")
+        return "inertia_com xx of front_left_shank is negative"
     if not I_shank_y >= 0.0:
-        raise ValueError("inertia_com yy of front_left_shank is negative: change the parameters")
+        return "inertia_com yy of front_left_shank is negative"
     if not I_shank_z >= 0.0:
-        raise ValueError("inertia_com zz of front_left_shank is negative: change the parameters")
+        return "inertia_com zz of front_left_shank is negative"
     if not m_shank > 0.0:
-        raise ValueError("mass of front_right_shank is not positive: change the parameters")
+        return "mass of front_right_shank is not positive"
     if not I_shank_x >= 0.0:
-        raise ValueError("inertia_com xx of front_right_shank is negative: change the parameters")
+        return "inertia_com xx of front_right_shank is negative"
     if not I_shank_y >= 0.0:
-        raise ValueError("inertia_com yy of front_right_shank is negative: change the parameters")
+        return "inertia_com yy of front_right_shank is negative"
     if not I_shank_z >= 0.0:
-        raise ValueError("inertia_com zz of front_right_shank is negative: change the parameters")
+        return "inertia_com zz of front_right_shank is negative"
     if not m_shank > 0.0:
-        raise ValueError("mass of hind_left_shank is not positive: change the parameters")
+        return "mass of hind_left_shank is not positive"
     if not I_shank_x >= 0.0:
-        raise ValueError("inertia_com xx of hind_left_shank is negative: change the parameters")
+        return "inertia_com xx of hind_left_shank is negative"
     if not I_shank_y >= 0.0:
-        raise ValueError("inertia_com yy of hind_left_shank is negative: change the parameters")
+        return "inertia_com yy of hind_left_shank is negative"
     if not I_shank_z >= 0.0:
-        raise ValueError("inertia_com zz of hind_left_shank is negative: change the parameters")
+        return "inertia_com zz of hind_left_shank is negative"
     if not m_shank > 0.0:
-        raise ValueError("mass of hind_right_shank is not positive: change the parameters")
+        return "mass of hind_right_shank is not positive"
     if not I_shank_x >= 0.0:
-        raise ValueError("inertia_com xx of hind_right_shank is negative: change the parameters")
+        return "inertia_com xx of hind_right_shank is negative"
     if not I_shank_y >= 0.0:
-        raise ValueError("inertia_com yy of hind_right_shank is negative: change the parameters")
+        return "inertia_com yy of hind_right_shank is negative"
     if not I_shank_z >= 0.0:
-        raise ValueError("inertia_com zz of hind_right_shank is negative: change the parameters")
+        return "inertia_com zz of hind_right_shank is negative"
     k1 = J_rotor * (G_hip * G_hip)
     k2 = c_hip + (l_hip - c_hip)
     k3 = c_hip - l_hip - c_hip
@@ -470,7 +474,35 @@ def _constants(values):
         "initial_state": (),
         "derivative": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, ground_friction, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, k7, k8, ground_slip_speed_squared, k9, k10, pivot_hind_right_shank, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31),
         "jacobian": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, ground_friction, k1, k2, k3, k4, k32, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, k7, k8, ground_slip_speed_squared, k9, k10, pivot_hind_right_shank, k11, k12, k13, k14, k15, k16, k17, k18, k33, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k34, k35, k36),
+        "switching_functions": (x_hip, y_hip, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, k2, k3, k4, k7, k8, k9, k10),
+        "switching_functions_of_time": (pace, settle),
     }
+
+
+@lru_cache(maxsize=64)
+def _constants(key):
+    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+
+    `reach` is how large states and results may be without a thought of overflow; with constants
+    so large or so small that any product may be lost, it is 0.
+    """
+    values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _fixed(*values.tolist())
+        with np.errstate(over="raise", under="raise", invalid="raise"):
+            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+    except ArithmeticError as error:
+        made = "the mass matrix is singular"
+        sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
+        if not (isinstance(error, ZeroDivisionError) and 1e-50 < sizes[0][0] <= sizes[-1][0] < 1e50):
+            ends = " to ".join(f"{size:g} ({name})" for size, name in (sizes[0], sizes[-1]))
+            made = f"numbers are too large or too small for floats, with sizes from {ends}"
+    except ValueError as error:
+        made = f"a formula has no value ({error})"
+    if made.__class__ is str:
+        raise ValueError(f"{made}: change the parameters")
+    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    return {**made, "reach": 1e20 if usual else 0.0}
 
 
 def _initial_state(y, k, u=(), extra=()):
@@ -12589,42 +12621,380 @@ def _jacobian(y, k, u=(), extra=(), t=0.0, cos=cos, sin=sin, max=max, sqrt=sqrt,
     )
 
 
-def _named(values, names, defaults, what):
-    """Values by name or in order as a tuple of floats; a wrong name or shape is an error."""
+def _switching_functions(y, k, u=(), extra=(), t=0.0, cos=cos, sin=sin, max=max, sqrt=sqrt, min=min):
+    """753 operations: 152 add, 141 sub, 400 mul, 2 div, 5 neg, 13 sin, 13 cos, 4 sqrt, 13 min, 10 max."""
+    x_hip, y_hip, stance_thigh, stance_knee, stride, lift, pace, settle, kp, kd, strong, ground_radius, ground_stiffness, k2, k3, k4, k7, k8, k9, k10 = k
+    _, _, trunk_z, trunk_qw, trunk_qx, trunk_qy, trunk_qz, front_left_abduction_angle, front_right_abduction_angle, hind_left_abduction_angle, hind_right_abduction_angle, front_left_swing_angle, front_right_swing_angle, hind_left_swing_angle, hind_right_swing_angle, front_left_knee_angle, front_right_knee_angle, hind_left_knee_angle, hind_right_knee_angle, trunk_x_dot, trunk_y_dot, trunk_z_dot, trunk_wx, trunk_wy, trunk_wz, front_left_abduction_angle_dot, front_right_abduction_angle_dot, hind_left_abduction_angle_dot, hind_right_abduction_angle_dot, front_left_swing_angle_dot, front_right_swing_angle_dot, hind_left_swing_angle_dot, hind_right_swing_angle_dot, front_left_knee_angle_dot, front_right_knee_angle_dot, hind_left_knee_angle_dot, hind_right_knee_angle_dot = y
+    s1 = trunk_qw * trunk_qw + trunk_qx * trunk_qx + trunk_qy * trunk_qy + trunk_qz * trunk_qz
+    s2 = 2.0 / s1
+    s3 = trunk_qx * s2
+    s4 = trunk_qy * s2
+    s5 = trunk_qz * s2
+    s6 = trunk_qw * s3
+    s7 = trunk_qw * s4
+    s8 = trunk_qw * s5
+    s9 = trunk_qx * s3
+    s10 = trunk_qy * s4
+    s11 = trunk_qz * s5
+    s12 = trunk_qy * s3
+    s13 = trunk_qz * s3
+    s14 = trunk_qz * s4
+    s15 = 1.0 - (s10 + s11)
+    s16 = s12 - s8
+    s17 = s7 + s13
+    s18 = s8 + s12
+    s19 = 1.0 - (s9 + s11)
+    s20 = s14 - s6
+    s21 = s13 - s7
+    s22 = s6 + s14
+    s23 = 1.0 - (s9 + s10)
+    cos_front_left_abduction_angle = cos(front_left_abduction_angle)
+    sin_front_left_abduction_angle = sin(front_left_abduction_angle)
+    s25 = s16 * cos_front_left_abduction_angle + s17 * sin_front_left_abduction_angle
+    s26 = s17 * cos_front_left_abduction_angle - s16 * sin_front_left_abduction_angle
+    s27 = s19 * cos_front_left_abduction_angle + s20 * sin_front_left_abduction_angle
+    s28 = s20 * cos_front_left_abduction_angle - s19 * sin_front_left_abduction_angle
+    s29 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
+    s30 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
+    cos_front_right_abduction_angle = cos(front_right_abduction_angle)
+    sin_front_right_abduction_angle = sin(front_right_abduction_angle)
+    s32 = s16 * cos_front_right_abduction_angle + s17 * sin_front_right_abduction_angle
+    s33 = s17 * cos_front_right_abduction_angle - s16 * sin_front_right_abduction_angle
+    s34 = s19 * cos_front_right_abduction_angle + s20 * sin_front_right_abduction_angle
+    s35 = s20 * cos_front_right_abduction_angle - s19 * sin_front_right_abduction_angle
+    s36 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
+    s37 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
+    cos_hind_left_abduction_angle = cos(hind_left_abduction_angle)
+    sin_hind_left_abduction_angle = sin(hind_left_abduction_angle)
+    s39 = s16 * cos_hind_left_abduction_angle + s17 * sin_hind_left_abduction_angle
+    s40 = s17 * cos_hind_left_abduction_angle - s16 * sin_hind_left_abduction_angle
+    s41 = s19 * cos_hind_left_abduction_angle + s20 * sin_hind_left_abduction_angle
+    s42 = s20 * cos_hind_left_abduction_angle - s19 * sin_hind_left_abduction_angle
+    s43 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
+    s44 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
+    cos_hind_right_abduction_angle = cos(hind_right_abduction_angle)
+    sin_hind_right_abduction_angle = sin(hind_right_abduction_angle)
+    s46 = s16 * cos_hind_right_abduction_angle + s17 * sin_hind_right_abduction_angle
+    s47 = s17 * cos_hind_right_abduction_angle - s16 * sin_hind_right_abduction_angle
+    s48 = s19 * cos_hind_right_abduction_angle + s20 * sin_hind_right_abduction_angle
+    s49 = s20 * cos_hind_right_abduction_angle - s19 * sin_hind_right_abduction_angle
+    s50 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
+    s51 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
+    cos_front_left_swing_angle = cos(front_left_swing_angle)
+    sin_front_left_swing_angle = sin(front_left_swing_angle)
+    s53 = s26 * cos_front_left_swing_angle + s15 * sin_front_left_swing_angle
+    s54 = s15 * cos_front_left_swing_angle - s26 * sin_front_left_swing_angle
+    s55 = s28 * cos_front_left_swing_angle + s18 * sin_front_left_swing_angle
+    s56 = s18 * cos_front_left_swing_angle - s28 * sin_front_left_swing_angle
+    s57 = s30 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
+    s58 = s21 * cos_front_left_swing_angle - s30 * sin_front_left_swing_angle
+    cos_front_right_swing_angle = cos(front_right_swing_angle)
+    sin_front_right_swing_angle = sin(front_right_swing_angle)
+    s60 = s33 * cos_front_right_swing_angle + s15 * sin_front_right_swing_angle
+    s61 = s15 * cos_front_right_swing_angle - s33 * sin_front_right_swing_angle
+    s62 = s35 * cos_front_right_swing_angle + s18 * sin_front_right_swing_angle
+    s63 = s18 * cos_front_right_swing_angle - s35 * sin_front_right_swing_angle
+    s64 = s37 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
+    s65 = s21 * cos_front_right_swing_angle - s37 * sin_front_right_swing_angle
+    cos_hind_left_swing_angle = cos(hind_left_swing_angle)
+    sin_hind_left_swing_angle = sin(hind_left_swing_angle)
+    s67 = s40 * cos_hind_left_swing_angle + s15 * sin_hind_left_swing_angle
+    s68 = s15 * cos_hind_left_swing_angle - s40 * sin_hind_left_swing_angle
+    s69 = s42 * cos_hind_left_swing_angle + s18 * sin_hind_left_swing_angle
+    s70 = s18 * cos_hind_left_swing_angle - s42 * sin_hind_left_swing_angle
+    s71 = s44 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
+    s72 = s21 * cos_hind_left_swing_angle - s44 * sin_hind_left_swing_angle
+    cos_hind_right_swing_angle = cos(hind_right_swing_angle)
+    sin_hind_right_swing_angle = sin(hind_right_swing_angle)
+    s74 = s47 * cos_hind_right_swing_angle + s15 * sin_hind_right_swing_angle
+    s75 = s15 * cos_hind_right_swing_angle - s47 * sin_hind_right_swing_angle
+    s76 = s49 * cos_hind_right_swing_angle + s18 * sin_hind_right_swing_angle
+    s77 = s18 * cos_hind_right_swing_angle - s49 * sin_hind_right_swing_angle
+    s78 = s51 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
+    s79 = s21 * cos_hind_right_swing_angle - s51 * sin_hind_right_swing_angle
+    cos_front_left_knee_angle = cos(front_left_knee_angle)
+    sin_front_left_knee_angle = sin(front_left_knee_angle)
+    s80 = s53 * cos_front_left_knee_angle + s54 * sin_front_left_knee_angle
+    s82 = s55 * cos_front_left_knee_angle + s56 * sin_front_left_knee_angle
+    s84 = s57 * cos_front_left_knee_angle + s58 * sin_front_left_knee_angle
+    cos_front_right_knee_angle = cos(front_right_knee_angle)
+    sin_front_right_knee_angle = sin(front_right_knee_angle)
+    s86 = s60 * cos_front_right_knee_angle + s61 * sin_front_right_knee_angle
+    s88 = s62 * cos_front_right_knee_angle + s63 * sin_front_right_knee_angle
+    s90 = s64 * cos_front_right_knee_angle + s65 * sin_front_right_knee_angle
+    cos_hind_left_knee_angle = cos(hind_left_knee_angle)
+    sin_hind_left_knee_angle = sin(hind_left_knee_angle)
+    s92 = s67 * cos_hind_left_knee_angle + s68 * sin_hind_left_knee_angle
+    s94 = s69 * cos_hind_left_knee_angle + s70 * sin_hind_left_knee_angle
+    s96 = s71 * cos_hind_left_knee_angle + s72 * sin_hind_left_knee_angle
+    cos_hind_right_knee_angle = cos(hind_right_knee_angle)
+    sin_hind_right_knee_angle = sin(hind_right_knee_angle)
+    s98 = s74 * cos_hind_right_knee_angle + s75 * sin_hind_right_knee_angle
+    s100 = s76 * cos_hind_right_knee_angle + s77 * sin_hind_right_knee_angle
+    s102 = s78 * cos_hind_right_knee_angle + s79 * sin_hind_right_knee_angle
+    s104 = x_hip * s21
+    s105 = y_hip * s22
+    s106 = s104 + s105
+    velocity_trunk_x = trunk_x_dot * s15 + trunk_y_dot * s18 + trunk_z_dot * s21
+    velocity_trunk_y = trunk_x_dot * s16 + trunk_y_dot * s19 + trunk_z_dot * s22
+    velocity_trunk_z = trunk_x_dot * s17 + trunk_y_dot * s20 + trunk_z_dot * s23
+    omega_front_left_hip_y = trunk_wy * cos_front_left_abduction_angle + trunk_wz * sin_front_left_abduction_angle
+    omega_front_left_hip_z = trunk_wz * cos_front_left_abduction_angle - trunk_wy * sin_front_left_abduction_angle
+    s110 = y_hip * trunk_wz
+    s111 = x_hip * trunk_wz
+    s112 = y_hip * trunk_wx
+    s113 = x_hip * trunk_wy
+    velocity_front_left_hip_x = velocity_trunk_x - s110
+    s114 = velocity_trunk_y + s111
+    s115 = velocity_trunk_z + (s112 - s113)
+    velocity_front_left_hip_y = cos_front_left_abduction_angle * s114 + sin_front_left_abduction_angle * s115
+    velocity_front_left_hip_z = cos_front_left_abduction_angle * s115 - sin_front_left_abduction_angle * s114
+    omega_front_left_hip_x = trunk_wx + front_left_abduction_angle_dot
+    omega_front_right_hip_y = trunk_wy * cos_front_right_abduction_angle + trunk_wz * sin_front_right_abduction_angle
+    omega_front_right_hip_z = trunk_wz * cos_front_right_abduction_angle - trunk_wy * sin_front_right_abduction_angle
+    s116 = s112 + s113
+    velocity_front_right_hip_x = velocity_trunk_x + s110
+    s117 = velocity_trunk_z - s116
+    velocity_front_right_hip_y = cos_front_right_abduction_angle * s114 + sin_front_right_abduction_angle * s117
+    velocity_front_right_hip_z = cos_front_right_abduction_angle * s117 - sin_front_right_abduction_angle * s114
+    omega_front_right_hip_x = trunk_wx + front_right_abduction_angle_dot
+    omega_hind_left_hip_y = trunk_wy * cos_hind_left_abduction_angle + trunk_wz * sin_hind_left_abduction_angle
+    omega_hind_left_hip_z = trunk_wz * cos_hind_left_abduction_angle - trunk_wy * sin_hind_left_abduction_angle
+    s118 = velocity_trunk_y - s111
+    s119 = velocity_trunk_z + s116
+    velocity_hind_left_hip_y = cos_hind_left_abduction_angle * s118 + sin_hind_left_abduction_angle * s119
+    velocity_hind_left_hip_z = cos_hind_left_abduction_angle * s119 - sin_hind_left_abduction_angle * s118
+    omega_hind_left_hip_x = trunk_wx + hind_left_abduction_angle_dot
+    omega_hind_right_hip_y = trunk_wy * cos_hind_right_abduction_angle + trunk_wz * sin_hind_right_abduction_angle
+    omega_hind_right_hip_z = trunk_wz * cos_hind_right_abduction_angle - trunk_wy * sin_hind_right_abduction_angle
+    s120 = velocity_trunk_z + (s113 - s112)
+    velocity_hind_right_hip_y = cos_hind_right_abduction_angle * s118 + sin_hind_right_abduction_angle * s120
+    velocity_hind_right_hip_z = cos_hind_right_abduction_angle * s120 - sin_hind_right_abduction_angle * s118
+    omega_hind_right_hip_x = trunk_wx + hind_right_abduction_angle_dot
+    omega_front_left_thigh_z = cos_front_left_swing_angle * omega_front_left_hip_z + sin_front_left_swing_angle * omega_front_left_hip_x
+    omega_front_left_thigh_x = cos_front_left_swing_angle * omega_front_left_hip_x - sin_front_left_swing_angle * omega_front_left_hip_z
+    s121 = velocity_front_left_hip_x - k2 * omega_front_left_hip_z
+    s122 = velocity_front_left_hip_z + k2 * omega_front_left_hip_x
+    velocity_front_left_thigh_z = cos_front_left_swing_angle * s122 + sin_front_left_swing_angle * s121
+    omega_front_left_thigh_y = front_left_swing_angle_dot + omega_front_left_hip_y
+    omega_front_right_thigh_z = cos_front_right_swing_angle * omega_front_right_hip_z + sin_front_right_swing_angle * omega_front_right_hip_x
+    omega_front_right_thigh_x = cos_front_right_swing_angle * omega_front_right_hip_x - sin_front_right_swing_angle * omega_front_right_hip_z
+    s123 = velocity_front_right_hip_x - k3 * omega_front_right_hip_z
+    s124 = velocity_front_right_hip_z + k3 * omega_front_right_hip_x
+    velocity_front_right_thigh_z = cos_front_right_swing_angle * s124 + sin_front_right_swing_angle * s123
+    omega_front_right_thigh_y = front_right_swing_angle_dot + omega_front_right_hip_y
+    omega_hind_left_thigh_z = cos_hind_left_swing_angle * omega_hind_left_hip_z + sin_hind_left_swing_angle * omega_hind_left_hip_x
+    omega_hind_left_thigh_x = cos_hind_left_swing_angle * omega_hind_left_hip_x - sin_hind_left_swing_angle * omega_hind_left_hip_z
+    s125 = velocity_front_left_hip_x - k2 * omega_hind_left_hip_z
+    s126 = velocity_hind_left_hip_z + k2 * omega_hind_left_hip_x
+    velocity_hind_left_thigh_z = cos_hind_left_swing_angle * s126 + sin_hind_left_swing_angle * s125
+    omega_hind_left_thigh_y = hind_left_swing_angle_dot + omega_hind_left_hip_y
+    omega_hind_right_thigh_z = cos_hind_right_swing_angle * omega_hind_right_hip_z + sin_hind_right_swing_angle * omega_hind_right_hip_x
+    omega_hind_right_thigh_x = cos_hind_right_swing_angle * omega_hind_right_hip_x - sin_hind_right_swing_angle * omega_hind_right_hip_z
+    s127 = velocity_front_right_hip_x - k3 * omega_hind_right_hip_z
+    s128 = velocity_hind_right_hip_z + k3 * omega_hind_right_hip_x
+    velocity_hind_right_thigh_z = cos_hind_right_swing_angle * s128 + sin_hind_right_swing_angle * s127
+    omega_hind_right_thigh_y = hind_right_swing_angle_dot + omega_hind_right_hip_y
+    omega_front_left_shank_z = cos_front_left_knee_angle * omega_front_left_thigh_z + sin_front_left_knee_angle * omega_front_left_thigh_x
+    omega_front_left_shank_x = cos_front_left_knee_angle * omega_front_left_thigh_x - sin_front_left_knee_angle * omega_front_left_thigh_z
+    s129 = cos_front_left_swing_angle * s121 - sin_front_left_swing_angle * s122 + k4 * omega_front_left_thigh_y
+    velocity_front_left_shank_z = cos_front_left_knee_angle * velocity_front_left_thigh_z + sin_front_left_knee_angle * s129
+    velocity_front_left_shank_x = cos_front_left_knee_angle * s129 - sin_front_left_knee_angle * velocity_front_left_thigh_z
+    omega_front_left_shank_y = front_left_knee_angle_dot + omega_front_left_thigh_y
+    omega_front_right_shank_z = cos_front_right_knee_angle * omega_front_right_thigh_z + sin_front_right_knee_angle * omega_front_right_thigh_x
+    omega_front_right_shank_x = cos_front_right_knee_angle * omega_front_right_thigh_x - sin_front_right_knee_angle * omega_front_right_thigh_z
+    s130 = cos_front_right_swing_angle * s123 - sin_front_right_swing_angle * s124 + k4 * omega_front_right_thigh_y
+    velocity_front_right_shank_z = cos_front_right_knee_angle * velocity_front_right_thigh_z + sin_front_right_knee_angle * s130
+    velocity_front_right_shank_x = cos_front_right_knee_angle * s130 - sin_front_right_knee_angle * velocity_front_right_thigh_z
+    omega_front_right_shank_y = front_right_knee_angle_dot + omega_front_right_thigh_y
+    omega_hind_left_shank_z = cos_hind_left_knee_angle * omega_hind_left_thigh_z + sin_hind_left_knee_angle * omega_hind_left_thigh_x
+    omega_hind_left_shank_x = cos_hind_left_knee_angle * omega_hind_left_thigh_x - sin_hind_left_knee_angle * omega_hind_left_thigh_z
+    s131 = cos_hind_left_swing_angle * s125 - sin_hind_left_swing_angle * s126 + k4 * omega_hind_left_thigh_y
+    velocity_hind_left_shank_z = cos_hind_left_knee_angle * velocity_hind_left_thigh_z + sin_hind_left_knee_angle * s131
+    velocity_hind_left_shank_x = cos_hind_left_knee_angle * s131 - sin_hind_left_knee_angle * velocity_hind_left_thigh_z
+    omega_hind_left_shank_y = hind_left_knee_angle_dot + omega_hind_left_thigh_y
+    omega_hind_right_shank_z = cos_hind_right_knee_angle * omega_hind_right_thigh_z + sin_hind_right_knee_angle * omega_hind_right_thigh_x
+    omega_hind_right_shank_x = cos_hind_right_knee_angle * omega_hind_right_thigh_x - sin_hind_right_knee_angle * omega_hind_right_thigh_z
+    s132 = cos_hind_right_swing_angle * s127 - sin_hind_right_swing_angle * s128 + k4 * omega_hind_right_thigh_y
+    velocity_hind_right_shank_z = cos_hind_right_knee_angle * velocity_hind_right_thigh_z + sin_hind_right_knee_angle * s132
+    velocity_hind_right_shank_x = cos_hind_right_knee_angle * s132 - sin_hind_right_knee_angle * velocity_hind_right_thigh_z
+    omega_hind_right_shank_y = hind_right_knee_angle_dot + omega_hind_right_thigh_y
+    s8949 = (s54 * cos_front_left_knee_angle - s53 * sin_front_left_knee_angle) * omega_front_left_shank_x
+    s8950 = (s56 * cos_front_left_knee_angle - s55 * sin_front_left_knee_angle) * omega_front_left_shank_x
+    s8951 = (s58 * cos_front_left_knee_angle - s57 * sin_front_left_knee_angle) * velocity_front_left_shank_x
+    s8952 = s8951 + s29 * (velocity_front_left_hip_y - k4 * omega_front_left_thigh_x)
+    s8953 = s82 * k7 * (s8949 + s25 * omega_front_left_shank_y + s80 * omega_front_left_shank_z)
+    s8954 = s80 * k7 * (s8950 + s27 * omega_front_left_shank_y + s82 * omega_front_left_shank_z)
+    s1164 = ground_radius - (trunk_z + s106 + k2 * s29 + k4 * s57 + s84 * k7)
+    s141 = max(s1164, 0.0)
+    s8955 = (s61 * cos_front_right_knee_angle - s60 * sin_front_right_knee_angle) * omega_front_right_shank_x
+    s152 = s8955 + s32 * omega_front_right_shank_y + s86 * omega_front_right_shank_z
+    s8956 = (s63 * cos_front_right_knee_angle - s62 * sin_front_right_knee_angle) * omega_front_right_shank_x
+    s153 = s8956 + s34 * omega_front_right_shank_y + s88 * omega_front_right_shank_z
+    s8957 = (s65 * cos_front_right_knee_angle - s64 * sin_front_right_knee_angle) * velocity_front_right_shank_x
+    s8958 = s8957 + s36 * (velocity_front_right_hip_y - k4 * omega_front_right_thigh_x)
+    s8959 = s8958 + s90 * velocity_front_right_shank_z + (s88 * k7 * s152 - s86 * k7 * s153)
+    s1170 = ground_radius - (trunk_z + (s104 - s105) + k3 * s36 + k4 * s64 + s90 * k7)
+    s160 = max(s1170, 0.0)
+    s8960 = (s68 * cos_hind_left_knee_angle - s67 * sin_hind_left_knee_angle) * omega_hind_left_shank_x
+    s8961 = (s70 * cos_hind_left_knee_angle - s69 * sin_hind_left_knee_angle) * omega_hind_left_shank_x
+    s8962 = (s72 * cos_hind_left_knee_angle - s71 * sin_hind_left_knee_angle) * velocity_hind_left_shank_x
+    s176 = s8962 + s43 * (velocity_hind_left_hip_y - k4 * omega_hind_left_thigh_x) + s96 * velocity_hind_left_shank_z
+    s8963 = s94 * k7 * (s8960 + s39 * omega_hind_left_shank_y + s92 * omega_hind_left_shank_z)
+    s8964 = s92 * k7 * (s8961 + s41 * omega_hind_left_shank_y + s94 * omega_hind_left_shank_z)
+    s1176 = ground_radius - (trunk_z + (s105 - s104) + k2 * s43 + k4 * s71 + s96 * k7)
+    s179 = max(s1176, 0.0)
+    s8965 = (s75 * cos_hind_right_knee_angle - s74 * sin_hind_right_knee_angle) * omega_hind_right_shank_x
+    s8966 = (s77 * cos_hind_right_knee_angle - s76 * sin_hind_right_knee_angle) * omega_hind_right_shank_x
+    s8967 = (s79 * cos_hind_right_knee_angle - s78 * sin_hind_right_knee_angle) * velocity_hind_right_shank_x
+    s8968 = s8967 + s50 * (velocity_hind_right_hip_y - k4 * omega_hind_right_thigh_x)
+    s8969 = s100 * k7 * (s8965 + s46 * omega_hind_right_shank_y + s98 * omega_hind_right_shank_z)
+    s8970 = s98 * k7 * (s8966 + s48 * omega_hind_right_shank_y + s100 * omega_hind_right_shank_z)
+    s1182 = ground_radius - (trunk_z - s106 + k3 * s50 + k4 * s78 + s102 * k7)
+    s198 = max(s1182, 0.0)
+    s1186 = 1.0 - k8 * (s8968 + s102 * velocity_hind_right_shank_z + (s8969 - s8970))
+    s8971 = -(kp * front_left_abduction_angle + kd * front_left_abduction_angle_dot)
+    s207 = min(1.0, t / settle)
+    s208 = pace * t
+    s209 = stride * sin(s208)
+    s210 = cos(s208)
+    s211 = max(0.0, -s210)
+    s212 = stance_thigh + s207 * (s209 + k10 * s211)
+    s1189 = kp * (s212 - front_left_swing_angle) - kd * front_left_swing_angle_dot
+    s214 = lift * s207
+    s215 = stance_knee - s211 * s214
+    s1190 = kp * (s215 - front_left_knee_angle) - kd * front_left_knee_angle_dot
+    s217 = -(kp * front_right_abduction_angle + kd * front_right_abduction_angle_dot)
+    s218 = max(0.0, s210)
+    s219 = stance_thigh + s207 * (k10 * s218 - s209)
+    s1193 = kp * (s219 - front_right_swing_angle) - kd * front_right_swing_angle_dot
+    s221 = stance_knee - s214 * s218
+    s1194 = kp * (s221 - front_right_knee_angle) - kd * front_right_knee_angle_dot
+    s8972 = -(kp * hind_left_abduction_angle + kd * hind_left_abduction_angle_dot)
+    s1196 = kp * (s219 - hind_left_swing_angle) - kd * hind_left_swing_angle_dot
+    s1197 = kp * (s221 - hind_left_knee_angle) - kd * hind_left_knee_angle_dot
+    s8973 = -(kp * hind_right_abduction_angle + kd * hind_right_abduction_angle_dot)
+    s1199 = kp * (s212 - hind_right_swing_angle) - kd * hind_right_swing_angle_dot
+    s1200 = kp * (s215 - hind_right_knee_angle) - kd * hind_right_knee_angle_dot
+    return (
+        s1164,
+        s141 - 1e-300,
+        ground_stiffness * s141 * sqrt(max(s141, 1e-300)) * (1.0 - (s8952 + s84 * velocity_front_left_shank_z + (s8953 - s8954)) * k8),
+        s1170,
+        s160 - 1e-300,
+        ground_stiffness * s160 * sqrt(max(s160, 1e-300)) * (1.0 - k8 * s8959),
+        s1176,
+        s179 - 1e-300,
+        ground_stiffness * s179 * sqrt(max(s179, 1e-300)) * (1.0 - k8 * (s176 + (s8963 - s8964))),
+        s1182,
+        s198 - 1e-300,
+        ground_stiffness * s198 * sqrt(max(s198, 1e-300)) * s1186,
+        strong - s8971,
+        k9 - min(strong, s8971),
+        s1189 - strong,
+        k9 - min(strong, s1189),
+        s1190 - strong,
+        k9 - min(strong, s1190),
+        strong - s217,
+        k9 - min(strong, s217),
+        s1193 - strong,
+        k9 - min(strong, s1193),
+        s1194 - strong,
+        k9 - min(strong, s1194),
+        strong - s8972,
+        k9 - min(strong, s8972),
+        s1196 - strong,
+        k9 - min(strong, s1196),
+        s1197 - strong,
+        k9 - min(strong, s1197),
+        strong - s8973,
+        k9 - min(strong, s8973),
+        s1199 - strong,
+        k9 - min(strong, s1199),
+        s1200 - strong,
+        k9 - min(strong, s1200),
+    )
+
+
+def _switching_functions_of_time(y, k, u=(), extra=(), t=0.0, cos=cos):
+    """4 operations: 1 sub, 1 mul, 1 div, 1 cos."""
+    pace, settle = k
+    return (
+        1.0 - t / settle,
+        cos(pace * t),
+    )
+
+
+_ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
+_LARGEST = 1e+100
+
+
+def _numbers(values, what):
+    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    if values.__class__ is _ARRAY and values.dtype is _FLOAT:
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(f"{what}: some are masked; leave those out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{what}: not an array: its rows differ in length") from None
+    kind = array.dtype.kind
+    if kind not in "biuf" or array.dtype.itemsize > 8:
+        raise ValueError(f"{what}: of type {array.dtype.name}; convert to float, with astype(float) for example")
+    if kind in "iu" and array.size and max(int(array.max()), -int(array.min())) > 2**53:
+        raise ValueError(f"{what}: has whole numbers beyond 2**53, which floats cannot hold")
+    return array.astype(float)
+
+
+def _named(values, defaults, what, most=inf):
+    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values:
-            if name not in names:
+        for name in values.keys():
+            if name not in defaults:
                 raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
         values = [values.get(name, default) for name, default in defaults.items()]
-    array = np.asarray(values, dtype=float)
+    array = _numbers(values, f"{what}s")
     if array.shape != (len(names),):
         raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
-    result = tuple(array.tolist())
-    for name, value in zip(names, result):
+    for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
-    return result
+        if abs(value) > most:
+            raise ValueError(f"{what} {name!r} is {value:g}, larger than {most:g}; choose other units")
+    return array
 
 
 def _parameters(p):
-    try:
-        return _constants(_named(p, tuple(PARAMETERS), PARAMETERS, "parameter"))
-    except ZeroDivisionError:
-        raise ValueError("the mass matrix is singular: change the parameters") from None
+    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
 
 
 def _inputs(u, columns):
-    if columns and not hasattr(u, "keys") and np.ndim(u) == 2:
-        array = np.asarray(u, dtype=float)
-        if array.shape != (len(INPUTS), columns):
-            raise ValueError(f"inputs have shape {array.shape}, not ({len(INPUTS)}, {columns})")
-        return tuple(array)
-    return _named(u, tuple(INPUTS), INPUTS, "input")
+    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    if columns and not hasattr(u, "keys"):
+        u = _numbers(u, "inputs")
+        if u.ndim == 2:
+            if u.shape != (len(INPUTS), *columns):
+                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
+            return u
+    return tuple(_named(u, INPUTS, "input").tolist())
 
 
-_DEFAULT = _constants(tuple(PARAMETERS.values()))
+def _time(t, columns=()):
+    """Time as a float; beside columns it may be an array of as many."""
+    if t.__class__ is not np.float64:
+        t = _numbers(t, "t")
+    if t.shape not in ((), columns):
+        raise ValueError(f"t has shape {t.shape}, not ()")
+    if t.shape == () and not isfinite(t):
+        raise ValueError(f"t is {t}, not a finite number")
+    return t if t.shape else float(t)
+
+
+_DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
+_DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
 _NO_INPUT = (0.0,) * len(INPUTS)
-_NO_FORCE = (0.0,) * 18
 _COLUMNS = {
     "sin": np.sin,
     "cos": np.cos,
@@ -12635,37 +13005,150 @@ _COLUMNS = {
 }
 
 
-def _evaluate(kernel, name, shape, functions, y, p, u, extra=(), **time):
-    """Any output of one state or of columns of states."""
-    y = np.asarray(y, dtype=float)
-    k = (_DEFAULT if p is None else _parameters(p))[name]
-    if y.shape == (37,):
-        u = _NO_INPUT if u is None else _inputs(u, 0)
-        return np.array(kernel(y.tolist(), k, u, extra, **time)).reshape(shape)
-    if y.ndim != 2 or y.shape[0] != 37:
+def _trouble(name, state, error=None):
+    """Why an output has no value at a state, as an exception."""
+    for label, value in zip(STATES, state):
+        if not isfinite(value):
+            return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
+    for indices in QUATERNIONS:
+        length = hypot(*(state[i] for i in indices))
+        if not 1e-150 < length < 1e150:
+            label = STATES[indices[0]]
+            return ValueError(f"{name}: the quaternion from {label!r} on has length {length:g}; scale it to 1")
+    if isinstance(error, ZeroDivisionError):
+        why = "its mass matrix is singular, or a formula infinite"
+        return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
+    if isinstance(error, ValueError):
+        return ValueError(f"{name}: a formula has no value at this state ({error})")
+    size, label = max((abs(value), label) for value, label in zip(state, STATES))
+    kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
+    return kind(
+        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
+        f" of size {size:g}; choose other units"
+    )
+
+
+def _states(y):
+    """A state or columns of states as an array."""
+    y = _numbers(y, "y")
+    if y.ndim not in (1, 2) or len(y) != 37:
         raise ValueError(f"y has shape {y.shape}, not (37,) or (37, k): {', '.join(STATES)}")
-    u = _NO_INPUT if u is None else _inputs(u, y.shape[1])
-    values = kernel(y, k, u, extra, **time, **{f: _COLUMNS[f] for f in functions})
-    result = np.empty((len(values), y.shape[1]))
-    for row, value in zip(result, values):
-        row[:] = value
-    return result.reshape(shape + (y.shape[1],))
+    return y
+
+
+def _strict(reach):
+    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    under = "ignore" if reach else "raise"
+    return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
+
+
+def _alone(call, y, name, reach):
+    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+
+    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    """
+    state = y.tolist()
+    try:
+        values = call(state)
+        if not (reach and hypot(*values, *state) < reach):
+            with _strict(reach):
+                call(list(y))
+            if not all(np.isfinite(part).all() for part in (y, *values)):
+                raise FloatingPointError
+        return values
+    except (ArithmeticError, ValueError) as error:
+        raise _trouble(name, state, error) from None
+
+
+def _together(call, result, given, reach):
+    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    """
+    arrays = [part for part in given if part.__class__ is _ARRAY]
+    with _strict(reach):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+            if all(isfinite(part.sum()) for part in arrays):
+                return result
+        except ArithmeticError:
+            pass
+    result[:] = nan
+    with np.errstate(all="ignore"):
+        try:
+            for row, value in zip(result, call(*given)):
+                row[:] = value
+        except ArithmeticError:
+            return result
+        sizes = np.zeros(result.shape[-1])
+        for part in map(np.abs, (*arrays, result)):
+            sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
+    result[..., ~np.isfinite(sizes)] = nan
+    for i in np.flatnonzero(np.isfinite(sizes) & (sizes >= reach)):
+        with _strict(reach):
+            try:
+                call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
+            except ArithmeticError:
+                result[..., i] = nan
+    return result
+
+
+def _evaluate(kernel, name, shape, functions, y, p, u, extra=(), *time):
+    """Any output of one state or of columns of states."""
+    y = _states(y)
+    made = _DEFAULT if p is None else _parameters(p)
+    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    u = _NO_INPUT if u is None else _inputs(u, columns)
+    time = [_time(t, columns) for t in time]
+    if not columns:
+        values = _alone(lambda y: kernel(y, k, u, extra, *time), y, name, reach)
+        return _from(values, _FLOAT, size).reshape(shape)
+    functions = {f: _COLUMNS[f] for f in functions}
+    result = _together(
+        lambda y, u, extra, *time: kernel(y, k, u, extra, *time, **functions),
+        np.empty((size, *columns)),
+        (y, u, extra, *time),
+        reach,
+    )
+    return result.reshape(shape + columns)
 
 
 def initial_state(p=None):
     """The scene's initial state, (37,); momenta follow the parameters."""
-    k = _DEFAULT if p is None else _parameters(p)
-    return np.array(_initial_state((), k["initial_state"]))
+    values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
+    if not all(map(isfinite, values)):
+        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+    return _from(values, _FLOAT, 37)
 
 
 def derivative(t, y, p=None, u=None):
     """Time derivative of the state: (37,), or (37, k) for k states."""
-    if u is None and y.__class__ is np.ndarray and y.shape == (37,):
-        k = _DEFAULT if p is None else _parameters(p)
-        return np.array(_derivative(y.tolist(), k["derivative"], _NO_INPUT, t=t))
-    return _evaluate(_derivative, "derivative", (37,), ('cos', 'sin', 'max', 'sqrt', 'min'), y, p, u, t=t)
+    if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
+        k, reach = _DERIVATIVE, _REACH
+        if p is not None:
+            made = _parameters(p)
+            k, reach = made["derivative"], made["reach"]
+        try:
+            state = y.tolist()
+            values = _derivative(state, k, _NO_INPUT, t=t if t.__class__ is float else _time(t))
+            if hypot(*values) < reach and hypot(*state) < reach:
+                return _from(values, _FLOAT, 37)
+        except (ArithmeticError, ValueError):
+            pass
+    return _evaluate(_derivative, "derivative", (37,), ('cos', 'sin', 'max', 'sqrt', 'min'), y, p, u, (), t)
 
 
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` by the state."""
-    return _evaluate(_jacobian, "jacobian", (37, 37), ('cos', 'sin', 'max', 'sqrt', 'min', 'select'), y, p, u, t=t)
+    return _evaluate(_jacobian, "jacobian", (37, 37), ('cos', 'sin', 'max', 'sqrt', 'min', 'select'), y, p, u, (), t)
+
+
+def switching_functions(t, y, p=None, u=None):
+    """`derivative` has another branch where one of these passes 0."""
+    return _evaluate(_switching_functions, "switching_functions", (36,), ('cos', 'sin', 'max', 'sqrt', 'min'), y, p, u, (), t)
+
+
+def switching_functions_of_time(t, y, p=None, u=None):
+    """As `switching_functions`; these depend on time alone."""
+    return _evaluate(_switching_functions_of_time, "switching_functions_of_time", (2,), ('cos',), y, p, u, (), t)

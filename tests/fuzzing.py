@@ -18,11 +18,12 @@ from typing import Any
 from eomgen.build import build_model
 from eomgen.errors import SceneError
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene
+from eomgen.text import LONGEST_LINE
 
 LONGEST = 3000
 """Letters of the scenes that are changed: long ones take long."""
 HANGS = 10.0
-"""After so many seconds a reader hangs."""
+"""After so many seconds of its own processor time a reader hangs; a busy machine is no hang."""
 VALUES = (
     *("0", "-1", "1e308", "-1e308", "nan", "inf", "-inf", "1e-320", "-0.0", "1_0", "0x1F", "true"),
     *("2026-01-01", "07:32:00", '""', "[]", "{}", "[[]]", "[1, 2, 3]", "[nan, 0]", '["m"]'),
@@ -49,8 +50,26 @@ VALUES = (
     '"' + "sin(" * 60 + "m" + ")" * 60 + '"',
     '"' + "+".join(["m"] * 2000) + '"',
     "[" * 200 + "]" * 200,
+    "[" * 5000 + "]" * 5000,
+    "{ a = " * 3000 + "1" + " }" * 3000,
+    "9" * 5000,
+    "-1" + "0" * 4299,
+    "0x" + "f" * 30_000,
+    "1e999",
+    "1." + "1" * 20_000,
+    "2026-01-01T00:00:00.123456+23:59",
+    '"\\u001b[31mred\\u001b[0m"',
+    '"a\\neomgen: forged"',
+    '"\\u202egnp.exe\\u2028\\u009b2J\\u200d"',
+    '"' + "k" * 20_000 + '"',
+    '"' + "k " * 9_000 + '"',
+    "[" + "1, " * 20_000 + "]",
     "{ value = 1, unit = 'kg', about = 'x' }",
     "{ value = 'm', unit = '' }",
+)
+KEYS = (
+    *('"\\u001b[31mred"', '"a\\neomgen: forged"', '"\\u202e\\u2028\\u0085\\u009b"', '""', '" "'),
+    *('"' + "k" * 20_000 + '"', '"' + "k " * 9_000 + '"', "a.b.c", ".".join("a" * 30)),
 )
 FORBIDDEN = ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect", "exec")
 """What a scene may not bring about, by the names of Python's audit events; nor files opened."""
@@ -77,7 +96,10 @@ def scene(number: int) -> str:
 
 def _letters(text: str, r: random.Random) -> str:
     at, size = r.randrange(len(text) + 1), r.choice((0, 0, 1, 1, 2, 10))
-    new = "".join(r.choice("[]{}=\"'#.,-+*/()\n\\ 0e_aé\0") for _ in range(r.choice((0, 1, 2))))
+    new = "".join(
+        r.choice("[]{}=\"'#.,-+*/()\n\\ 0e_aé\0\r\t\x1b\x7f\x9b\u2028\u202e\ufeff")
+        for _ in range(r.choice((0, 1, 2)))
+    )
     return text[:at] + new + text[at + size :]
 
 
@@ -106,6 +128,11 @@ def _words(text: str, r: random.Random) -> str:
     return _replaced(text, r, r"\b([A-Za-z_]\w*)\b", r.choice(words))
 
 
+def _keys(text: str, r: random.Random) -> str:
+    """A key becomes one that a terminal would obey, forges a line, or has no end."""
+    return _replaced(text, r, r"(?m)(?:^|[{,]) *([a-z_]+) *=", r.choice(KEYS))
+
+
 def _numbers(text: str, r: random.Random) -> str:
     number = r.choice(("0", "-1", "1e-300", "1e300", "1e16", "nan", "2", "-0.5", "1e-9", "1/3"))
     return _replaced(text, r, r"\b(\d[\d.e+-]*)\b", number)
@@ -119,7 +146,7 @@ def _replaced(text: str, r: random.Random, pattern: str, new: str) -> str:
     return text[: match.start(1)] + new + text[match.end(1) :]
 
 
-CHANGES = (_letters, _lines, _values, _values, _words, _words, _numbers)
+CHANGES = (_letters, _lines, _values, _values, _words, _words, _numbers, _keys)
 
 
 # What comes of them.
@@ -141,15 +168,15 @@ def _watched() -> Iterator[list[str]]:
     def hangs(*given: Any) -> None:
         raise Failure(f"hangs for {HANGS:g} s")
 
-    before = signal.signal(signal.SIGALRM, hangs)
-    signal.setitimer(signal.ITIMER_REAL, HANGS)
+    before = signal.signal(signal.SIGPROF, hangs)
+    signal.setitimer(signal.ITIMER_PROF, HANGS)
     _events = heard = []
     try:
         yield heard
     finally:
         _events = None
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def outcome(text: str) -> str:
@@ -161,8 +188,7 @@ def outcome(text: str) -> str:
                 found = "model"
             except SceneError as error:
                 found = "message"
-                if not str(error).strip():
-                    raise Failure("an empty message") from None
+                _check_message(error)
     except Failure:
         raise
     except BaseException as error:
@@ -170,6 +196,16 @@ def outcome(text: str) -> str:
     if events:
         raise Failure(f"it brought about {events[0]}")
     return found
+
+
+def _check_message(error: SceneError) -> None:
+    """Raise `Failure` unless a message is a few lines that can be seen and have an end."""
+    lines = str(error).split("\n")
+    if not (str(error).strip() and lines == list(error.lines) and len(lines) <= 12):
+        raise Failure(f"a message of {len(lines)} lines: {str(error)[:200]!r}") from None
+    for line in lines:
+        if not line.isprintable() or len(line) > LONGEST_LINE:
+            raise Failure(f"a line of {len(line)} letters: {line[:200]!r}") from None
 
 
 @cache
@@ -191,10 +227,10 @@ def tried(numbers: range) -> tuple[Counter[str], float, list[str]]:
     failures: list[str] = []
     longest = 0.0
     for number in numbers:
-        began = time.perf_counter()
+        began = time.process_time()
         try:
             counts[outcome(scene(number))] += 1
         except Failure as failure:
             failures.append(f"scene {number}: {failure}")
-        longest = max(longest, time.perf_counter() - began)
+        longest = max(longest, time.process_time() - began)
     return counts, longest, failures

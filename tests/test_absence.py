@@ -110,9 +110,6 @@ def names_used(scope: symtable.SymbolTable) -> set[str]:
 def check_kernel(function: ast.FunctionDef, scope: symtable.SymbolTable) -> None:
     """Every value of a function is used in it."""
     made = {symbol.get_name() for symbol in scope.get_symbols() if symbol.is_assigned()}
-    if function.name == "_constants":  # a parameter may be without effect, and stays one
-        unpacked = next(node for node in ast.walk(function) if isinstance(node, ast.Assign))
-        made -= {node.id for node in ast.walk(unpacked.targets[0]) if isinstance(node, ast.Name)}
     used = names_used(scope)
     assert made <= used | {"_"}, (function.name, made - used)
 

@@ -16,7 +16,7 @@ from matplotlib.colors import same_color
 from eomgen.cli import main
 from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.problem import Floats, Problem
-from eomgen.run.trajectory import Trajectory
+from eomgen.run.trajectory import COUNTS, Trajectory
 from eomgen.show.work_precision import COLOURS, TOP, Diagram, draw
 from eomgen.study import records, work_precision
 from eomgen.study import reference as truths
@@ -214,7 +214,7 @@ def test_rows_are_compared_at_their_own_times() -> None:
 
     t = np.insert(truth.t, 101, truth.t[100])
     y = np.insert(truth.y, 100, truth.y[100] + 5, axis=0)
-    counts = dict.fromkeys(("steps", "derivatives", "jacobians", "impacts"), 0)
+    counts = dict.fromkeys(COUNTS, 0)
     run = Trajectory("x", found.problem.states, t, y, "rk4", True, "", counts)
     assert errors(run, truth) == (0.0, 0.0)
 

@@ -20,8 +20,11 @@ ROOT = Path(__file__).parent.parent
 
 # Each room may import from itself and from those before it.
 ORDER = (
+    ("text",),
     ("errors",),
+    ("streams",),
     ("files",),
+    ("entries",),
     ("language",),
     ("joints",),
     ("effects",),

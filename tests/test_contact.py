@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
 from itertools import islice, product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
+from eomgen.cli import main
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.effects.base import Contact, JointLoad, Load
 from eomgen.effects.vectors import NEAREST
@@ -760,3 +762,29 @@ def test_what_feeds_energy_in_must_be_asked_for() -> None:
     """allow_active = true."""
     table = contact('body = "a"', 'law = "spring_damper"', "stiffness = -1", "allow_active = true")
     build_model(parse_scene(free("a") + table))
+
+
+def test_what_starts_pressed_in_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A soft contact or stop that overlaps at the start holds energy: ½ k d² and 2/5 k d^2.5."""
+    lines = [
+        free("a") + WEIGHT,
+        contact('body = "a"', *DAMPED, "radius = 0.25", name="floor"),
+        contact('body = "a"', *HERTZ, "radius = 0.25", "normal = [1, 0]", name="wall"),
+        contact('body = "a"', *SPRING, "radius = 0.25", "offset = -9", name="far"),
+        '[[bodies]]\nname = "s"\nmass = 1\ninertia_com = 0\n',
+        '[[joints]]\ntype = "prismatic"\nname = "rail"\nparent = "world"\nchild = "s"\n',
+        'axis = [1, 0]\ncoordinate = "x"\n',
+        '[[effects]]\ntype = "joint_stop"\nname = "end"\njoint = "rail"\n',
+        "low = 0.5\nstiffness = 100.0\n",
+        "[initial]\nq = { a_x = 0.09, a_y = 0.19, x = 0.2 }\n",
+    ]
+    scene = tmp_path / "deep.toml"
+    scene.write_text("".join(lines))
+    expected = [
+        f"contact 'floor' starts 0.06 m deep, with {450 * 0.06**2:.3g} J in it",
+        f"contact 'wall' starts 0.16 m deep, with {360 * 0.16**2.5:.3g} J in it",
+        f"stop 'end' starts 0.3 m deep, with {50 * 0.3**2:.3g} J in it",
+    ]
+    assert main(["check", str(scene)]) == 0
+    told = [line for line in capsys.readouterr().out.splitlines() if "starts" in line]
+    assert told == [f"at start    {line}" for line in expected]

@@ -1,5 +1,6 @@
 """Rigid contacts: gaps, impacts and forces that hold, against hand formulas and dense algebra."""
 
+from contextlib import nullcontext, suppress
 from typing import Any
 
 import numpy as np
@@ -384,7 +385,9 @@ def test_friction_where_one_way_is_open() -> None:
 
 
 def test_no_input_makes_what_is_no_number() -> None:
-    """Rest, tiny and huge speeds, no friction and much, poses and wires that let nothing move."""
+    """Rest, tiny and huge speeds, no friction and much, poses and wires that let nothing move; at
+    speeds whose powers floats cannot hold, a number or a refusal.
+    """
     rng = np.random.default_rng(3)
     wire = 'name = "wire"\ndimensions = 3\n' + MATERIAL + SLIDE.format([0.3, 0.2, 0.7])
     flat = wire.replace("dimensions = 3\n", "").replace("[0.03, 0.03, 0.03]", "0.03")
@@ -394,19 +397,20 @@ def test_no_input_makes_what_is_no_number() -> None:
     models += [(wire, FLOOR_3.replaced(turned=turn)) for turn in (0.0, 0.5, 1.0, 2.0)]
     for scene, effect in models:
         engine = striking(scene, effect)
-        for size in (0.0, 1e-200, 1e-30, 1e6, 1e100):
+        for size in (0.0, 1e-200, 1e-30, 1e6, 1e18, 1e100):
             for mu in (0.0, 1e-12, 1e12):
                 y = engine.module.initial_state()
                 ways = rng.integers(-1, 2, size=len(engine.model.velocities))
                 y[len(engine.model.coordinates) :] = size * ways
                 y[: len(engine.model.coordinates)] += 0.0 if effect is not SLOPE else 1e-3
-                for k in range(len(engine.module.CONTACTS)):
-                    for rest in (0.0, 1.0):
-                        found = engine.module.impact(0.0, y, k, p={"mu": mu, "rest": rest})
-                        assert np.isfinite(found).all()
                 forces = np.full(len(engine.module.CONTACTS), 2.0)
-                held = engine.module.held(0.0, y, forces, p={"mu": mu, "creep": 0.0})
-                assert size > 1e6 or np.isfinite(held).all()
+                with suppress(FloatingPointError) if size > 1e20 else nullcontext():
+                    for k in range(len(engine.module.CONTACTS)):
+                        for rest in (0.0, 1.0):
+                            found = engine.module.impact(0.0, y, k, p={"mu": mu, "rest": rest})
+                            assert np.isfinite(found).all()
+                    held = engine.module.held(0.0, y, forces, p={"mu": mu, "creep": 0.0})
+                    assert np.isfinite(held).all()
 
 
 @pytest.mark.parametrize("route", ["aba", "ldl"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from eomgen.errors import RunError
-from eomgen.run.trajectory import Event, Trajectory, load_npz, save_csv, save_npz
+from eomgen.run.trajectory import COUNTS, Event, Trajectory, load_npz, save_csv, save_npz
 
 # Numbers that a careless format loses: no short decimal, subnormal, huge, minus zero.
 AWKWARD = np.array([[0.1 + 0.2, -0.0], [5e-324, 1.7976931348623157e308], [1 / 3, -2e-17]])
@@ -19,7 +19,7 @@ RUN = Trajectory(
     integrator="rk4",
     finished=False,
     message="stopped at t = 0.43, crank=0.3: the state left the finite numbers",
-    counts={"steps": 2, "derivatives": 8, "jacobians": 0, "impacts": 1},
+    counts={"steps": 2, "derivatives": 8, "jacobians": 0, "impacts": 1, "capped": 0, "cut": 0},
     events=(
         Event(0.1, "floor_crank", "impact", 1 / 3),
         Event(0.4, "floor_crank", "rest", 5e-324),
@@ -66,7 +66,7 @@ def test_what_does_not_fit_together_is_refused(change, message):
 
 def test_arrays_are_read_only_copies():
     t, y = np.array([0.0]), np.array([[1.0]])
-    counts = dict.fromkeys(("steps", "derivatives", "jacobians", "impacts"), 0)
+    counts = dict.fromkeys(COUNTS, 0)
     trajectory = Trajectory("one", ("x",), t, y, "rk4", True, "", counts)
     y[0, 0] = counts["steps"] = 7
     assert trajectory.y[0, 0] == 1.0

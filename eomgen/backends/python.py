@@ -8,10 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from eomgen.language.base import LARGEST
 from eomgen.language.formula import FUNCTIONS, written
 from eomgen.model import Model
 from eomgen.program.printing import Block, Dialect, Names, print_block
-from eomgen.program.program import cost
+from eomgen.program.program import Program, cost, live_steps
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.templating import render
@@ -23,6 +24,10 @@ RESERVED = frozenset(
     | set(keyword.kwlist)
     | {"float", "len", "list", "tuple", "ValueError", "zip"}
 )
+SHELL = ("hypot", "inf", "isfinite", "nan", "prod")
+"""What the shell needs of `math`."""
+SHOWING = ("sin", "cos", "tan", "asin", "acos", "log", "sqrt", "abs")
+"""Functions that have no finite value for an argument that is not finite."""
 DIALECT = Dialect({name: name for name in FUNCTIONS}, RESERVED)
 COLUMNS = {
     **{name: f"np.{name}" for name in ("sin", "cos", "tan", "exp", "log", "tanh", "sqrt", "abs")},
@@ -61,6 +66,8 @@ ABOUT = {
     "point_jacobians": "J of each of `POINTS`: its world velocity is J v.",
     "gaps": "How far apart each of `CONTACTS` is, m or rad; negative where they overlap.",
     "gap_rates": "How fast each of `gaps` grows, m/s or rad/s.",
+    "switching_functions": "`derivative` has another branch where one of these passes 0.",
+    "switching_functions_of_time": "As `switching_functions`; these depend on time alone.",
     "driving_forces": "What each of `DRIVEN` takes, N m or N, on the child and back on the parent.",
 }
 ABOUT_PLANE = {
@@ -127,7 +134,7 @@ def python_module(system: System) -> str:
         "positions": repr(tuple(i for i, s in enumerate(states) if s.position)),
         "quaternions": repr(quaternions),
         "parameters": model.parameters,
-        "parameter_names": _joined([names.safe(p.name) for p in model.parameters]),
+        "parameter_names": ", ".join(names.safe(p.name) for p in model.parameters),
         "inputs": model.inputs,
         "units": _units(system),
         "effects": repr(tuple(effect.type for effect in model.effects)),
@@ -142,11 +149,13 @@ def python_module(system: System) -> str:
         "held": kernels.get("held"),
         "costs": [(name, json.dumps(counts)) for name, counts in costs.items()],
         "kernels": list(kernels.values()),
-        "math_functions": sorted({"isfinite", *(f for f in called if hasattr(math, f))}),
+        "math_functions": sorted({*SHELL, *(f for f in called if hasattr(math, f))}),
+        "largest": repr(LARGEST),
         "own_functions": [(f, *OWN[f]) for f in called if f in OWN],
         "columns": [(f, COLUMNS[f]) for f in called if f in moving],
         "timed": any(kernel.time for kernel in kernels.values()),
         "derivative": kernels["derivative"],
+        "watched": watched(program, [s.name for s in states]),
         "outputs": [kernel for name, kernel in kernels.items() if name not in special],
         "derivatives": [kernel for name, kernel in kernels.items() if name in DERIVATIVES],
         "dynamics": [(kernels[name], *rest) for name, *rest in dynamics if name in kernels],
@@ -174,6 +183,37 @@ def _kernel(
         tangent=name in system.tangents,
         time=TIME in block.inputs,
     )
+
+
+def watched(program: Program, states: Sequence[str]) -> str:
+    """What must hold, besides that the entries of `derivative` are less than `reach` in size, for
+    nothing to have gone wrong on the way to them that they do not show; a condition on `state`.
+
+    A quotient may be finite though its divisor is not, and so may the functions that are not
+    `SHOWING`. So a state must be less than `reach`, too, if it goes into one of these other than
+    by sine and cosine, and finite if nothing else would show that it is not.
+    """
+    nodes = program.outputs["derivative"].nodes
+    steps, live = program.steps, live_steps(program, nodes)
+    hidden, seen = set[int](), set(nodes)
+    for i in reversed(live):
+        operation, operands, _, _ = steps[i]
+        hides = operation in FUNCTIONS and operation not in SHOWING
+        if hides or (i in hidden and operation not in ("sin", "cos")):
+            hidden.update(operands)
+        if operation == "div":
+            hidden.add(operands[1])
+        if i in seen and not hides:
+            seen.update(operands[:1] if operation == "div" else operands)
+    given = {str(steps[i].value): i for i in live if steps[i].operation == "input"}
+    large = [k for k, s in enumerate(states) if given.get(s) in hidden.difference(nodes)]
+    unseen = [k for k, s in enumerate(states) if given.get(s) not in seen and k not in large]
+    if len(large) > 2:
+        return "hypot(*state) < reach"
+    sums = [f"state[{k}]" for k in large]
+    if unseen:
+        sums.append(" + ".join(f"state[{k}]" for k in unseen))
+    return " and ".join(f"-reach < {part} < reach" for part in sums)
 
 
 def _fixed(

@@ -11,7 +11,8 @@ import numpy as np
 
 from eomgen.build import in_order
 from eomgen.commands.arithmetic import check_arithmetic, print_arithmetic
-from eomgen.commands.shared import Arguments, assignments, code_of, located, read_model
+from eomgen.commands.shared import Arguments, assignments, code_of, located, note, read_model
+from eomgen.entries import Entries
 from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable
 from eomgen.model import Model
@@ -87,7 +88,7 @@ def _runs(given: Arguments, model: Model, name: str) -> None:
             inputs or None,
             t_end,
             progress=progress,
-            folder=folder() / "references",
+            folder=_references(given),
         )
         bench = _bench(model, module, parameters, inputs, truth)
         _check_reference(bench)
@@ -116,6 +117,14 @@ def _runs(given: Arguments, model: Model, name: str) -> None:
     _draw(name, model, bench, t_end, shown, paths["png"], given.force)
     for path in paths.values():
         print(f"    wrote {path}")
+
+
+def _references(given: Arguments) -> Path | None:
+    """Where references are kept; what is wrong with it is said."""
+    kept = folder("references")
+    if kept and (trouble := Entries(kept).trouble()):
+        note(given, f"the store {kept} is not used: {trouble}")
+    return kept
 
 
 def _bench(

@@ -1,5 +1,6 @@
 """The derivation told: `derive`."""
 
+import sys
 from typing import TYPE_CHECKING
 
 from eomgen.commands.shared import Arguments, located, read_model
@@ -23,8 +24,12 @@ def derive(given: Arguments) -> int:
 
     with located(given.scene), terminal_notice(f"deriving {model.name} …"):
         steps = _steps(model)
-    write = {"text": as_text, "latex": as_latex, "html": as_html}[given.format]
-    text = write(model.name, model.title, steps)
+    if given.format == "text":
+        encoding = "utf-8" if given.output else sys.stdout.encoding
+        text = as_text(model.name, model.title, steps, encoding=encoding)
+    else:
+        write = {"latex": as_latex, "html": as_html}[given.format]
+        text = write(model.name, model.title, steps)
     if given.output is None:
         print(text)
     else:

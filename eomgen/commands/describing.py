@@ -1,11 +1,13 @@
 """What there is and what a scene is made of: `list`, `schema`, `reference`, `check`."""
 
+import shlex
 import sys
 
 from eomgen.commands.shared import (
     FEW,
     Arguments,
     located,
+    overlap_lines,
     print_listed,
     print_wrapped,
     read_model,
@@ -71,11 +73,13 @@ def check(given: Arguments) -> int:
         for name in dict.fromkeys(effects)
     ]
     print_listed("effects     ", counted)
+    for line in shortened(overlap_lines(model), most):
+        print_wrapped("at start    ", line)
     print_listed("inputs      ", shortened([i.name for i in model.inputs], most))
     values = [f"{p.name} = {p.default:g}" for p in model.parameters]
     print_listed("parameters  ", shortened(values, most))
     if max(len(values), len(model.bodies), len(model.points), len(model.inputs)) > most:
-        print(f"            eomgen check {given.scene} --long lists all")
+        print(f"            eomgen check {shlex.quote(given.scene)} --long lists all")
     return 0
 
 

@@ -5,9 +5,12 @@ from pathlib import Path
 
 from eomgen.commands.shared import Arguments, code_of, read_model
 from eomgen.errors import RunError
-from eomgen.files import check_folder, check_writable, write_whole
+from eomgen.files import check_folder, check_writable, read_plain, write_whole
 from eomgen.scene.reader import built_in_names
 from eomgen.store import Code
+
+LARGEST = 2**30
+"""Bytes of a module beyond which it is none of ours."""
 
 
 def generate(given: Arguments) -> int:
@@ -26,7 +29,8 @@ def generate(given: Arguments) -> int:
         if not given.check:
             check_folder(given.output)
             check_writable(path, force=given.force)
-        code, _ = code_of(scene, model, given)
+        # What is checked is what would be derived now, whatever the store holds.
+        code, _ = code_of(scene, model, given, anew=given.check)
         current = _text(path)
         if given.check:
             state = "fresh" if current == code.module else "missing" if current is None else "stale"
@@ -43,7 +47,8 @@ def generate(given: Arguments) -> int:
             _print_report(code)
     if stale:
         raise RunError(
-            f"{len(stale)} stale; run: eomgen generate {' '.join(stale)} -o {given.output}"
+            f"{len(stale)} stale; run: eomgen generate {shlex.join(stale)} "
+            f"-o {shlex.quote(str(given.output))}"
             + "".join(
                 f" --{option} {shlex.quote(value)}"
                 for option in ("form", "route", "outputs")
@@ -54,10 +59,10 @@ def generate(given: Arguments) -> int:
 
 
 def _text(path: Path) -> str | None:
-    try:
-        return path.read_text("utf-8")
-    except (OSError, UnicodeDecodeError):
+    """What a file holds, of any encoding; None if there is none. Raises `RunError` for others."""
+    if not path.exists():
         return None
+    return read_plain(path, LARGEST).decode("utf-8", "replace")
 
 
 def _print_explanation(code: Code) -> None:

@@ -20,13 +20,14 @@ from eomgen.commands.shared import (
     Arguments,
     assignments,
     code_of,
+    overlap_lines,
     print_listed,
     print_wrapped,
     read_model,
     shortened,
 )
 from eomgen.effects import JointStop
-from eomgen.errors import RunError
+from eomgen.errors import InterruptedRunError, RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.joints.base import Geared
 from eomgen.model import Model, ways_of
@@ -108,7 +109,8 @@ def simulate(given: Arguments) -> int:
     warn_of_energy(motion)
     trouble = missed if trajectory.finished else f"{model.name}: {trajectory.message}"
     if trouble or drawing:
-        raise RunError("\n".join(line for line in (trouble, drawing) if line))
+        kind = InterruptedRunError if tried.interrupted else RunError
+        raise kind(*(line for line in (trouble, drawing) if line))
     if given.view:
         _open(paths["html"])
     return 0
@@ -153,6 +155,11 @@ def _report(
     )
     if words:
         print(f"    {words}")
+    else:
+        for line in shortened(overlap_lines(model)):
+            print(f"    {line}")
+    for line in _bounded(given, trajectory):
+        print(f"    {line}")
     missed = print_choice(choice, given) if choice else ""
     if given.estimate and not choice and trajectory.finished:
         print_estimate(case, tried)
@@ -166,6 +173,28 @@ def _report(
     for line in locks(model, trajectory):
         print(f"    {line}")
     return missed
+
+
+def _bounded(given: Arguments, trajectory: Trajectory) -> list[str]:
+    """What else than their error kept steps short, and how often."""
+    from eomgen.run.checks import LEAST_STEPS
+
+    steps, capped, cut = (trajectory.counts[name] for name in ("steps", "capped", "cut"))
+    lines = []
+    if cut:
+        times = "once" if cut == 1 else f"{cut} times"
+        lines.append(
+            f"a step was made again, shorter, {times}: it had passed over a contact, a stop, a "
+            "pulse or the like"
+        )
+    if capped and given.max_step is not None:
+        lines.append(f"{capped} of {steps} steps as long as --max-step allows")
+    elif capped:
+        lines.append(
+            f"{capped} of {steps} steps held to 1/{LEAST_STEPS} of the run: what longer ones would "
+            "pass over cannot be told; --max-step sets another length"
+        )
+    return lines
 
 
 def _guard(
@@ -208,10 +237,12 @@ def _save_pictures(
     try:
         save_figure(motion, paths["png"], force=force)
         save_page(motion, poses, parameters, paths["html"], force=force)
-    except RunError as error:
+    except (RunError, KeyboardInterrupt) as error:
         # Pictures of an earlier run must not stand beside the numbers of this one.
         for kind in ("png", "html"):
             remove_ours(paths.pop(kind))
+        if isinstance(error, KeyboardInterrupt):
+            raise
         return str(error)
     return ""
 

@@ -10,13 +10,16 @@ from dataclasses import replace
 from typing import Literal
 
 from eomgen.build import build_model, outputs_for
+from eomgen.derivation.recursive.finite import initial_overlaps
+from eomgen.effects import JointStop
 from eomgen.errors import EomgenError, RunError, SceneError, nearest
-from eomgen.model import Model
+from eomgen.model import Model, ways_of
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import terminal_notice
 from eomgen.scene.reader import find_scene, read_scene
 from eomgen.scene.schema import OUTPUTS
 from eomgen.store import Code, generated_code
+from eomgen.text import one_line
 
 Arguments = argparse.Namespace
 
@@ -65,15 +68,18 @@ def _output_names(text: str) -> Literal["all"] | Sequence[str]:
     return names
 
 
-def code_of(scene: str, model: Model, given: Arguments) -> tuple[Code, GeneratedModule]:
-    """A model's code, derived now or before, and its module, loaded and tried.
+def code_of(
+    scene: str, model: Model, given: Arguments, *, anew: bool = False
+) -> tuple[Code, GeneratedModule]:
+    """A model's code, derived now or, unless `anew`, before, and its module, loaded and tried.
 
-    Raises `SceneError` if it cannot be evaluated as the scene is, or has no output that the command
-    line names.
+    Why the store was not used is said on standard error, once. Raises `SceneError` if it cannot be
+    evaluated as the scene is, or has no output that the command line names.
     """
     with located(scene):
         with terminal_notice(f"deriving {model.name} …"):
-            code = generated_code(model)
+            code = generated_code(model, anew=anew)
+        note(given, code.notice)
         module = load_module(code.module, model.name)
         as_problem(module, model=model)
         if getattr(given, "outputs", None) not in (None, "all"):
@@ -83,13 +89,20 @@ def code_of(scene: str, model: Model, given: Arguments) -> tuple[Code, Generated
     return code, module
 
 
+def note(given: Arguments, notice: str) -> None:
+    """Say on standard error what a command did without, if anything, once."""
+    if notice and notice not in vars(given).setdefault("noted", []):
+        print(f"eomgen: note: {one_line(notice)}", file=sys.stderr)
+        given.noted.append(notice)
+
+
 @contextmanager
 def located(scene: str) -> Iterator[None]:
     """Name the scene's file in front of what is said of the scene."""
     try:
         yield
     except EomgenError as error:
-        raise SceneError(f"{find_scene(scene).name}: {error}") from None
+        raise SceneError(*(f"{find_scene(scene).name}: {line}" for line in error.lines)) from None
 
 
 def assignments(texts: list[str], known: Collection[str], option: str) -> dict[str, float]:
@@ -107,8 +120,29 @@ def assignments(texts: list[str], known: Collection[str], option: str) -> dict[s
             value = math.nan
         if not (sign and math.isfinite(value)):
             raise RunError(f"{option} {text}: gives no finite number; write {option} {name}=1.5")
-        values[name] = value
+        values[name] = value + 0.0  # -0.0 becomes 0.0, as in a scene
     return values
+
+
+def overlap_lines(model: Model) -> list[str]:
+    """A line for each soft contact or stop that is pressed in at the initial state.
+
+    Such an effect starts with energy in it, and may throw the bodies apart.
+    """
+    lines = []
+    effects = {effect.name: effect for effect in model.effects}
+    joints = ways_of(model.bodies, model.dimensions)
+    for overlap in initial_overlaps(model):
+        effect, kind, unit = effects[overlap.effect], "contact", "m"
+        if isinstance(effect, JointStop):
+            slides = {way == "slide" for joint in effect.acted_on(joints) for way in joints[joint]}
+            kind = "stop"
+            unit = "rad or m" if len(slides) == 2 else "m" if True in slides else "rad"
+        lines.append(
+            f"{kind} '{overlap.effect}' starts {overlap.depth:.3g} {unit} deep, "
+            f"with {overlap.energy:.3g} J in it"
+        )
+    return lines
 
 
 def shortened(words: Sequence[str], most: int = FEW) -> list[str]:

@@ -51,7 +51,7 @@ def verify(given: Arguments) -> int:
         for path in evidence.save(given.save, name, lines, data, force=given.force):
             print(f"    wrote {path}")
     if found.missed:
-        raise RunError("\n".join(f"{name}: {line}" for line in evidence.missed(found)))
+        raise RunError(*(f"{name}: {line}" for line in evidence.missed(found)))
     return 0
 
 

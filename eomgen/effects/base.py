@@ -279,6 +279,10 @@ class EffectTable(Table):
         """Its rigid contacts, which are events of a run instead of loads."""
         return ()
 
+    def overlap(self, mechanism: Mechanism) -> Scalar:
+        """How deep its soft contacts or stops are pressed in, the deepest of them, m or rad."""
+        return mechanism.number(0.0)
+
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """J; 0 for an effect that brings energy in or takes it out."""
         return mechanism.value(ZERO)

@@ -229,6 +229,15 @@ class BodyContact(OnBodies):
             total = total + part
         return total
 
+    def overlap(self, mechanism: Mechanism) -> Scalar:
+        """The greatest depth d of a soft law, m."""
+        deepest = mechanism.number(0.0)
+        if self.law == "impact":
+            return deepest
+        for touch in self._touches(mechanism):
+            deepest = mechanism.call("max", deepest, -touch.gap)
+        return deepest
+
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
         """Of rigid contacts: `<effect>_<body>`, or `<effect>_<point>`, with the corner's number or
         the other body's name behind it if there is one.

@@ -118,6 +118,16 @@ class JointStop(OnJoints):
             total = total + half * (beyond * beyond)
         return total
 
+    def overlap(self, mechanism: Mechanism) -> Scalar:
+        """How far the farthest coordinate is beyond a soft stop, rad or m."""
+        farthest = mechanism.number(0.0)
+        if self.restitution is not None:
+            return farthest
+        for way in self.ways(mechanism):
+            beyond = mechanism.call("abs", self._beyond(mechanism, way))
+            farthest = mechanism.call("max", farthest, beyond)
+        return farthest
+
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
         """Of a rigid stop: one for each limit."""
         ends = (("low", self.low), ("high", self.high))

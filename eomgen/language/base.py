@@ -58,7 +58,7 @@ LARGEST = 1e100
 def _size(value: float) -> float:
     if abs(value) > LARGEST:
         raise ValueError(f"is larger than {LARGEST:g}; choose other units")
-    return value
+    return value + 0.0  # -0.0 becomes 0.0
 
 
 def _line(text: str) -> str:
@@ -69,7 +69,7 @@ def _line(text: str) -> str:
 
 
 Number = Annotated[float, Strict(), Field(allow_inf_nan=False), AfterValidator(_size)]
-"""A finite number; whole numbers are taken too, text and booleans are not."""
+"""A finite number; whole numbers are taken too, text and booleans are not. Zero has no sign."""
 
 Positive = Annotated[Number, Field(gt=0)]
 Text = Annotated[str, Field(max_length=400), AfterValidator(_line)]

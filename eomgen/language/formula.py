@@ -30,6 +30,8 @@ FUNCTIONS = {
 what comparisons and `a if x < y else b` become. Both a and b are computed, so both must have a
 value: write sqrt(max(x, 0)), not sqrt(x) if x > 0 else 0.
 """
+CORNERS = ("abs", "max", "min", "select", "step")
+"""Functions that have a corner or a jump: they go on by another branch where one is reached."""
 CONSTANTS = {"pi": math.pi}
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+",
@@ -54,9 +56,13 @@ class FormulaError(ValueError):
 
 @dataclass(frozen=True)
 class Constant:
-    """A number as it stands in the scene."""
+    """A number as it stands in the scene. Its zero has no sign: 0.0 and -0.0 are one number."""
 
     value: float
+
+    def __post_init__(self) -> None:
+        # They compare as equal, and so share one entry in a table, but atan2 tells them apart.
+        object.__setattr__(self, "value", float(self.value) + 0.0)
 
 
 @dataclass(frozen=True)

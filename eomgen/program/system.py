@@ -7,6 +7,7 @@ from eomgen.derivation.states import State
 from eomgen.model import Model
 from eomgen.program.passes import PassReport, optimise
 from eomgen.program.program import Check, Output, Program, finish
+from eomgen.program.switching import with_switching_functions
 from eomgen.program.tape import Node, Tape
 
 LARGEST_JACOBIAN = 30_000
@@ -56,10 +57,11 @@ def make_system(
     tangents: frozenset[str],
     contacts: tuple[ContactLabel, ...] = (),
 ) -> System:
-    """Finish a tape's program and run the passes over it."""
+    """Finish a tape's program, run the passes over it, and add its switching functions."""
     outputs = {
         name: Output(shape, tuple(node.index for node in nodes))
         for name, (shape, nodes) in made.items()
     }
     program, reports = optimise(finish(tape, outputs, checks))
+    program = with_switching_functions(program, [state.name for state in states])
     return System(model, route, tuple(states), program, extra, tangents, reports, contacts)

@@ -12,7 +12,7 @@ from eomgen.run.problem import Floats, Problem
 SMALLEST_RTOL = 2.3e-14
 """SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
 LEAST_STEPS = 1000
-"""Of an adaptive method on a derivative with corners."""
+"""Of an adaptive method where it cannot be told what longer steps pass over."""
 MOST_SAMPLES = 1_000_000
 ATOL, OF_RTOL, LEAST_ATOL = 1e-12, 1e-3, 1e-15
 """Of each state, in parts of its size: the most, a part of rtol, and the least. At a tighter rtol
@@ -20,13 +20,15 @@ than 1e-9 an atol that stayed would be what errors come from; less than a few un
 place of a state's size, or than what rounding makes of a stiff step, nothing can meet."""
 
 
-def longest_step(max_step: float | None, span: float, corners: bool) -> float:
-    """The longest step of an adaptive method, s."""
+def longest_steps(max_step: float | None, span: float) -> tuple[float, float]:
+    """The longest step of an adaptive method, s, and the longest where it cannot be told whether it
+    passes over a branch of the derivative. Raises `RunError` for a step that is none.
+    """
     if max_step is None:
-        return span / LEAST_STEPS if corners else math.inf
+        return math.inf, span / LEAST_STEPS
     if not (math.isfinite(max_step) and max_step > 0):
         raise RunError(f"max_step: {max_step:g} is not a positive step; give e.g. --max-step 0.01")
-    return max_step
+    return max_step, max_step
 
 
 def check_times(t_start: float, t_end: float) -> None:

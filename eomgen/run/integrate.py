@@ -53,8 +53,9 @@ def integrate(
                 (default: 1001); the first and the last are always kept
     progress    told the fraction done, at most about ten times a second
     max_step    longest step in s of the adaptive methods; without it, they may go as far as their
-                error allows, but where the derivative has corners no more than 1/1000 of the run:
-                else they might leap over a contact or a pulse
+                error allows. Where the derivative has corners, a step that has passed over a
+                contact or a pulse is made again (`run.branches`); where that cannot be told, steps
+                take no more than 1/1000 of the run
     rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
                 that then neither part nor close are held, so that bouncing comes to an end;
                 without it, it is √(1e-7 a size), of contacts that bounce by less than 5e-8 of the
@@ -92,7 +93,7 @@ def integrate(
     )
     check_rest_speed(rest_speed)
     watch = _watch(guard, problem, method, asked) if guard else None
-    derivatives, jacobians = _Count(), _Count()
+    derivatives, jacobians = _Count(1), _Count(2)
     counted = replace(
         problem,
         derivative=derivatives.of(watch.derivative if watch else problem.derivative),
@@ -135,6 +136,8 @@ def integrate(
             "derivatives": derivatives.calls,
             "jacobians": jacobians.calls,
             "impacts": sum(event.kind == "impact" for event in run.events),
+            "capped": run.capped,
+            "cut": run.cut,
         },
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
@@ -156,8 +159,13 @@ def _watch(guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: 
 
 @dataclass
 class _Count:
-    """How often functions of t and y are called, and where one last raised an error."""
+    """How often functions of t and y are called, and where one last raised an error.
 
+    `axes` is the number of axes of their values, which are nan at a state that is not finite: then
+    a method rejects the step that led there.
+    """
+
+    axes: int
     calls: int = 0
     failed: tuple[float, Floats] | None = None
 
@@ -169,6 +177,8 @@ class _Count:
             try:
                 return function(t, y)
             except (ArithmeticError, ValueError):
+                if not np.isfinite(y).all():
+                    return np.full((len(y),) * self.axes, np.nan)
                 self.failed = float(t), np.array(y)
                 raise
 
@@ -185,6 +195,8 @@ class _Run:
     rows: list[tuple[float, Floats]] = field(default_factory=list)
     works: list[Floats] = field(default_factory=list)
     steps: int = 0
+    capped: int = 0
+    cut: int = 0
     events: list[Event] = field(default_factory=list)
     resume: Callable[[], Resume] | None = None
 
@@ -198,6 +210,8 @@ class _Run:
         self.t, self.y = advance.t, advance.y
         self.rows.extend(advance.samples)
         self.steps += advance.is_step
+        self.capped += advance.capped
+        self.cut += advance.cut
         self.events.extend(advance.events)
         self.resume = advance.resume or self.resume
 

@@ -2,7 +2,8 @@
 
 import importlib.abc
 import importlib.util
-from collections.abc import Callable, Iterable
+import inspect
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache, partial
 from typing import Any, Protocol, cast
 
@@ -11,13 +12,12 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.run.explain import explain_by
+from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise
-from eomgen.run.problem import Contacts, Floats, Problem
+from eomgen.run.problem import Contacts, Floats, Problem, Switching
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
 
-CORNERS = ("abs", "max", "min", "select", "step")
-"""Functions that have a corner or a jump."""
 COUNTED = frozenset({"derivative", "jacobian"})
 """Functions whose operations tell what a run costs."""
 
@@ -81,14 +81,12 @@ def _by_differences(module: GeneratedModule) -> Callable[[float, Floats], Floats
 
 def _unsolvable(error: Exception) -> str:
     """Why there is no derivative at the start, as far as the module itself tells."""
-    if isinstance(error, ArithmeticError):
+    if isinstance(error, ZeroDivisionError):
         return (
             "the mass matrix is singular at the initial state, or an effect infinite: change that, "
             "or lengths, masses or inertias"
         )
-    if str(error) == "math domain error":
-        return "a formula has no value at the initial state (math domain error): change either"
-    return str(error)
+    return str(error).removeprefix("derivative: ").replace("at this state", "at the initial state")
 
 
 def as_problem(
@@ -105,15 +103,21 @@ def as_problem(
     Raises `RunError` if the module refuses them, or has no derivative to start from.
     """
     if parameters is None and inputs is None:  # the module's shortest way
-        derivative = module.derivative
+        exactly = module.derivative
         jacobian = getattr(module, "jacobian", _by_differences(module))
     else:
 
-        def derivative(t: float, y: Floats) -> Floats:
+        def exactly(t: float, y: Floats) -> Floats:
             return module.derivative(t, y, parameters, inputs)
 
         def jacobian(t: float, y: Floats) -> Floats:
             return module.jacobian(t, y, parameters, inputs)
+
+    def derivative(t: float, y: Floats) -> Floats:
+        try:
+            return exactly(t, y)
+        except FloatingPointError:  # y is so large that a method had better not have tried it
+            return np.full(len(y), np.nan)
 
     explain = explain_by(
         model, _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
@@ -123,13 +127,14 @@ def as_problem(
     except (ValueError, ArithmeticError) as error:
         raise RunError(_unsolvable(error)) from None
     try:
-        slope = derivative(0.0, initial)
+        slope = exactly(0.0, initial)
     except (ValueError, ArithmeticError) as error:
         why = explain(0.0, initial, initial)
         raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None
     values = {**module.PARAMETERS, **_by_name(module.PARAMETERS, parameters)}
     start = dict(zip(module.STATES, initial.tolist(), strict=True))
     size = mechanism_size(module.UNITS, values, start)
+    switching = _switching(module, parameters, inputs)
     return Problem(
         name=module.NAME,
         states=module.STATES,
@@ -140,7 +145,8 @@ def as_problem(
         quaternions=module.QUATERNIONS,
         contacts=_contacts(module, parameters, inputs, size),
         explain=explain,
-        corners=any(kind in module.COST["derivative"] for kind in CORNERS),
+        corners=switching is not None,
+        switching=switching,
         sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
         noise=cache(partial(step_noise, derivative, jacobian, 0.0, initial)),
         operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
@@ -160,6 +166,37 @@ def as_powers(module: Any, parameters: Any = None, inputs: Any = None) -> Powers
         powers=lambda t, y: module.effect_powers(t, y, parameters, inputs),
         kinetic_energy=lambda t, y: float(module.kinetic_energy(t, y, parameters, inputs)),
     )
+
+
+def _switching(module: Any, parameters: Any, inputs: Any) -> Switching | None:
+    """The switching functions of a module, if its derivative has any."""
+    of_state = getattr(module, "switching_functions", None)
+    of_time = getattr(module, "_switching_functions_of_time", None)
+    if of_state is None and of_time is None:
+        return None
+    positions = [module.STATES[i] for i in module.POSITIONS]
+    return Switching(
+        of_state and (lambda t, y: np.asarray(of_state(t, y, parameters, inputs))),
+        of_state is not None and "t" in inspect.signature(module._switching_functions).parameters,
+        tuple(i for i, name in enumerate(positions) if module.UNITS[name] == "rad"),
+        of_time and _over_intervals(module, of_time, parameters, inputs),
+    )
+
+
+def _over_intervals(
+    module: Any, kernel: Any, parameters: Any, inputs: Any
+) -> Callable[[Interval], Sequence[Interval]]:
+    """A kernel of functions of time alone as one of intervals of time."""
+    wanted = inspect.signature(kernel).parameters
+    functions = {name: BY_INTERVALS[name] for name in BY_INTERVALS if name in wanted}
+    name = kernel.__name__.removeprefix("_")
+    constants = (module._DEFAULT if parameters is None else module._parameters(parameters))[name]
+    u = module._NO_INPUT if inputs is None else module._inputs(inputs, 0)
+
+    def values(t: Interval) -> Sequence[Interval]:
+        return cast(Sequence[Interval], kernel((), constants, u, t=t, **functions))
+
+    return values
 
 
 def _contacts(module: Any, parameters: Any, inputs: Any, size: float) -> Contacts | None:

@@ -1,13 +1,14 @@
 """What an integrator needs to know of a mechanism: its derivative, its Jacobian, its start."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.errors import RunError
+from eomgen.run.intervals import Interval
 
 Floats = NDArray[np.float64]
 """An array of 64-bit floats; every state vector is one."""
@@ -48,6 +49,22 @@ class Contacts:
 
 
 @dataclass(frozen=True, eq=False)
+class Switching:
+    """The switching functions of a derivative, which is smooth as long as none of them passes 0.
+
+    of_state  (t, y) -> (ns,), those that depend on the state; None if there are none
+    timed     whether they depend on time, too
+    angles    indices of the states that are angles, rad, which sines are taken of
+    of_time   those that depend on time alone, over an interval of it; None if there are none
+    """
+
+    of_state: Callable[[float, Floats], Floats] | None = None
+    timed: bool = False
+    angles: tuple[int, ...] = ()
+    of_time: Callable[[Interval], Sequence[Interval]] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """The initial-value problem y' = f(t, y), y(t_start) = initial.
 
@@ -69,6 +86,7 @@ class Problem:
     columns     whether the Jacobian is computed along all directions at once
     corners     whether the derivative has corners or jumps, as one-sided forces have: a long step
                 might leap over what begins and ends within it
+    switching   where these corners are; None where that is not known
 
     Raises `RunError` if `initial` has not one finite number per state, or if a quaternion has no
     length there.
@@ -84,6 +102,7 @@ class Problem:
     contacts: Contacts | None = None
     explain: Explain = lambda _t, _y, _initial: ""
     corners: bool = False
+    switching: Switching | None = None
     sizes: tuple[float, ...] = ()
     noise: Callable[[float], Floats] | None = None
     operations: Mapping[str, int] = field(default_factory=dict)

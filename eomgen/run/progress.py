@@ -10,6 +10,8 @@ Progress = Callable[[float], None]
 """Told the fraction done, 0 to 1."""
 
 _BAR = 30
+WIDEST = 500
+"""Columns of a terminal that are used."""
 
 
 def throttled(progress: Progress, interval: float = 0.1) -> Progress:
@@ -60,8 +62,9 @@ def terminal_line() -> Iterator[Callable[[str], None]]:
     if not stream.isatty():
         yield lambda text: None
         return
-    # One column short of the edge, or the line would wrap and \r could not come back over it.
-    width = shutil.get_terminal_size().columns - 1
+    # One column short of the edge, or the line would wrap and \r could not come back over it; and
+    # COLUMNS may say anything.
+    width = min(shutil.get_terminal_size().columns, WIDEST) - 1
 
     def write(text: str) -> None:
         stream.write("\r" + text[:width].ljust(width))

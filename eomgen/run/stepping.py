@@ -13,7 +13,7 @@ from eomgen.run.checks import (
     check_steps,
     check_times,
     check_tolerances,
-    longest_step,
+    longest_steps,
     numbers,
 )
 from eomgen.run.integrators import FixedStep, adaptive, fixed_step
@@ -82,7 +82,7 @@ def equal_steps(
             resume=resume,
         )
 
-    return begin, _remembered(asked, dt, None)
+    return begin, _remembered(asked, dt)
 
 
 def adaptive_steps(asked: Asked, method: Adaptive, problem: Problem) -> tuple[Begin, Resume]:
@@ -92,10 +92,11 @@ def adaptive_steps(asked: Asked, method: Adaptive, problem: Problem) -> tuple[Be
     """
     check_no_step(asked.integrator, asked.dt)
     times = np.linspace(asked.t_start, asked.t_end, asked.samples or ADAPTIVE_SAMPLES)
-    longest = longest_step(asked.max_step, asked.span, problem.corners)
+    longest, unseen = longest_steps(asked.max_step, asked.span)
     if asked.resume is not None and asked.max_step is None:
-        longest = float(asked.resume.get("longest", longest))
+        longest, unseen = float(asked.resume["longest"]), float(asked.resume["unseen"])
     atol = allowed_errors(problem, asked.integrator, asked.rtol, asked.atol, asked.span)
+    bounds = adaptive.Bounds(asked.rtol, atol, longest, unseen, asked.max_steps)
 
     def begin(
         problem: Problem, t: float, made: int, resume: Resume | None = None
@@ -105,17 +106,14 @@ def adaptive_steps(asked: Asked, method: Adaptive, problem: Problem) -> tuple[Be
             problem,
             t,
             asked.t_end,
-            rtol=asked.rtol,
-            atol=atol,
-            max_step=longest,
+            bounds=bounds,
             times=times,
             made=made,
-            max_steps=asked.max_steps,
             resume=resume,
         )
 
-    return begin, _remembered(asked, None, longest)
+    return begin, {**_remembered(asked, None), **numbers(longest=longest, unseen=unseen)}
 
 
-def _remembered(asked: Asked, dt: float | None, longest: float | None) -> Resume:
-    return numbers(grid=asked.grid, dt=dt, rtol=asked.rtol, atol=asked.atol, longest=longest)
+def _remembered(asked: Asked, dt: float | None) -> Resume:
+    return numbers(grid=asked.grid, dt=dt, rtol=asked.rtol, atol=asked.atol)

@@ -16,7 +16,7 @@ from eomgen.run.problem import Floats
 FORMAT = "trajectory 2"
 RESUME = "resume_"
 """Begins the names of members of a file that a later run goes on from."""
-COUNTS = ("steps", "derivatives", "jacobians", "impacts")
+COUNTS = ("steps", "derivatives", "jacobians", "impacts", "capped", "cut")
 Kind = Literal["impact", "rest", "lift"]
 
 
@@ -46,7 +46,8 @@ class Trajectory:
     finished      whether it reached the end time
     message       why not, and what to change; "" if there is nothing to say
     counts        how many `steps` were made, `derivatives` and `jacobians` evaluated, and `impacts`
-                  met
+                  met; how many steps were as long as any may be (`capped`), and how many made
+                  again, shorter, so as not to pass over a branch of the derivative (`cut`)
     events        what happened to contacts, in time; the rows just before and just after an impact
                   have the same t
     works         (n, m), J: what each effect has done since the start; None if it was not asked for

@@ -9,12 +9,20 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from eomgen.errors import SceneError, nearest
+from eomgen.files import read_plain
+from eomgen.language.base import LARGEST
 from eomgen.scene.schema import MOST, Scene
+from eomgen.text import breaks_lines, brief
 
 BUILT_IN = Path(__file__).parent.parent / "scenes"
-LARGEST_FILE = 4_000_000
+LARGEST_FILE = 2_000_000
 MOST_MESSAGES = 10
-DEEPEST_KEY = 50
+LONGEST_LIST = 10 * MOST
+"""The state of as many free bodies as there may be is shorter."""
+DEEPEST_KEY = 20
+LARGEST_WHOLE = 2**1023
+"""Whole numbers beyond it are no doubles: they are refused before anything makes one of them."""
+REMEDY = f"give at most {LARGEST:g}, or choose other units"
 _DEEP_KEY = re.compile(
     rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}"""
 )
@@ -31,6 +39,8 @@ def find_scene(scene: str) -> Path:
         return BUILT_IN / f"{scene}.toml"
     if not scene:
         raise SceneError("the scene's name is empty; give a file or a built-in name")
+    if breaks_lines(scene):
+        raise SceneError(f"{scene}: has a control character in its name; rename it")
     path = Path(scene)
     try:
         folder, there = path.is_dir(), path.exists()
@@ -50,13 +60,7 @@ def read_scene(scene: str | Path) -> Scene:
     Raises `SceneError` with one line for each mistake: place, value, remedy.
     """
     path = find_scene(scene) if isinstance(scene, str) else scene
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise SceneError(f"{path.name}: cannot be read: {error.strerror}") from None
-    if len(data) > LARGEST_FILE:
-        raise SceneError(f"{path.name}: is larger than {LARGEST_FILE} bytes")
+    data = read_plain(path, LARGEST_FILE, name=path.name, error=SceneError)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -71,9 +75,12 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
         raise SceneError(f"{source}: is not read: a key has more than {DEEPEST_KEY} parts")
     try:
         table = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        why = "nested too deep" if isinstance(error, RecursionError) else str(error)
-        raise SceneError(f"{source}: is not TOML: {why}") from None
+    except RecursionError:
+        raise SceneError(f"{source}: is not TOML: nested too deep") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{source}: is not TOML: {error}") from None
+    except ValueError:  # what Python says of it is advice to programmers
+        raise SceneError(f"{source}: has a whole number of thousands of digits; {REMEDY}") from None
     _check_sizes(table, source)
     try:
         return Scene.model_validate(table)
@@ -82,14 +89,26 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
         more = len(lines) - MOST_MESSAGES
         tail = [f"{source}: and {more} more"] if more > 0 else []
         shown = [f"{source}: {line}" for line in lines[:MOST_MESSAGES]]
-        raise SceneError("\n".join([*shown, *tail])) from None
+        raise SceneError(*shown, *tail) from None
 
 
 def _check_sizes(table: dict[str, Any], source: str) -> None:
-    """Refuse lists that are too long before each of their entries is looked at."""
-    for key, value in table.items():
-        if key in Scene.model_fields and isinstance(value, list | dict) and len(value) > MOST:
-            raise SceneError(f"{source}: {key}: has {len(value)} entries; give at most {MOST}")
+    """Refuse lists that are too long and numbers that are too large before each entry is looked at.
+
+    Raises `SceneError` that names the place.
+    """
+    rest: list[tuple[str, Any]] = [("", table)]
+    while rest:
+        place, value = rest.pop()
+        most = MOST if place in Scene.model_fields else LONGEST_LIST
+        if isinstance(value, list | dict) and place and len(value) > most:
+            raise SceneError(f"{source}: {place}: has {len(value)} entries; give at most {most}")
+        if isinstance(value, dict):
+            rest += [(f"{place}.{brief(key)}".lstrip("."), entry) for key, entry in value.items()]
+        elif isinstance(value, list):
+            rest += [(f"{place}[{i}]", entry) for i, entry in enumerate(value)]
+        elif isinstance(value, int) and abs(value) > LARGEST_WHOLE:
+            raise SceneError(f"{source}: {place}: is a number of hundreds of digits; {REMEDY}")
 
 
 def _lines(details: list[ErrorDetails]) -> list[str]:
@@ -100,7 +119,7 @@ def _lines(details: list[ErrorDetails]) -> list[str]:
         detail = _of_the_whole_list(detail)
         place, weight = _place(detail["loc"]), _weight(detail)
         if detail["type"] in ("unknown_key", "keys"):
-            place = f"{place}.{detail['ctx']['key']}"
+            place = f"{place}.{brief(detail['ctx']['key'])}"
         outer |= {place[:i] for i, character in enumerate(place) if character in ".["}
         if place not in lines or weight >= lines[place][0]:
             lines[place] = weight, _line(detail)
@@ -149,7 +168,8 @@ def _line(detail: ErrorDetails) -> str:
     value, place = _shown(detail["input"]), _place(detail["loc"])
     match kind:
         case "unknown_key":
-            place = f"{place}.{context['key']}" if place else str(context["key"])
+            key = brief(context["key"])
+            place = f"{place}.{key}" if place else key
             return f"{place}: unknown key{context['hint']}"
         case "keys":
             return f"{place}.{context['key']}: {detail['msg']}"
@@ -163,7 +183,7 @@ def _line(detail: ErrorDetails) -> str:
             known = [tag.strip().strip("'") for tag in context["expected_tags"].split(",")]
             tag = str(context["tag"])
             hint = nearest(tag, known) or f"; known: {', '.join(known)}"
-            return f"{place}.type: unknown value '{tag}'{hint}"
+            return f"{place}.type: unknown value '{brief(tag)}'{hint}"
         case "union_tag_not_found":
             return f"{place}.type: missing; it says what kind this is"
         case "literal_error":
@@ -236,7 +256,7 @@ def _place(location: tuple[int | str, ...]) -> str:
         elif part == "[key]" or part.startswith(_UNION_MEMBERS):
             continue
         else:
-            place += f".{part}" if place else part
+            place += f".{brief(part)}" if place else brief(part)
     return place
 
 
@@ -245,4 +265,4 @@ def _shown(value: Any) -> str:
         text = repr(value)
     except RecursionError:
         text = "what is nested so deep"
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return brief(text)

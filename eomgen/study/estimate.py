@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from eomgen.run.checks import longest_step
+from eomgen.run.checks import longest_steps
 from eomgen.run.problem import Floats
 from eomgen.run.trajectory import Trajectory
 from eomgen.study.measure import WRONG
@@ -41,6 +41,8 @@ ALIKE = 2.0
 alike; and it is the nearest of several that is asked."""
 WIDER = 10.0
 """Times a run's tolerances: those of the run that tells its error."""
+MOSTLY = 0.3
+"""Share of a run's steps: with so many as long as any may be, its tolerance does not make them."""
 CHANCE = 1.5
 """Times what a run and another sample of rounding differ by: the error is taken to be no less."""
 SLOPES = (0.6, 1.2)
@@ -192,8 +194,10 @@ def representable(run: Tried, scale: Floats) -> tuple[float, int]:
 
 
 def looser(case: Case, run: Tried) -> tuple[Setting, Case]:
-    """What tells a run's error: ten times its tolerances, or twice its step; where steps may be
-    kept short for other reasons, these may be twice as long.
+    """What tells a run's error: ten times its tolerances, or twice its step.
+
+    Where most steps are kept short for other reasons, that makes no other steps: they are to be
+    twice as long where the user bounds them, and half as long where nothing else can be had.
     """
     given = run.setting
     if given.dt is not None:
@@ -201,10 +205,13 @@ def looser(case: Case, run: Tried) -> tuple[Setting, Case]:
     assert given.rtol is not None
     atol = None if given.atol is None else _plain(given.atol * WIDER)
     setting = replace(given, rtol=_plain(given.rtol * WIDER), atol=atol)
-    longest = longest_step(case.kept.get("max_step"), case.t_end, case.problem.corners)
-    if not math.isfinite(longest):
-        return setting, case
-    return setting, replace(case, kept={**case.kept, "max_step": 2 * longest})
+    counts, bound = run.trajectory.counts, case.kept.get("max_step")
+    if bound is not None:
+        return setting, replace(case, kept={**case.kept, "max_step": 2 * bound})
+    if counts["capped"] > MOSTLY * counts["steps"]:
+        _, unseen = longest_steps(None, case.t_end)
+        return given, replace(case, kept={**case.kept, "max_step": unseen / 2})
+    return setting, case
 
 
 def by_looser_run(

@@ -22,8 +22,6 @@ TIMES = 2.0
 """Constants that are rounded are moved by so many times that, or a unit in the last place."""
 UNIT = float(np.finfo(float).eps)
 
-Constants = Mapping[str, tuple[float, ...]]
-
 
 def moved_problem(
     module: GeneratedModule,
@@ -57,17 +55,17 @@ def moved(module: GeneratedModule, parameters: Any = None, way: int = 0) -> Gene
         exact = constants_of(module, parameters)
         values = given._parameters(parameters) if parameters is not None else given._DEFAULT
         random, known = np.random.default_rng(way), {}
-        for name, own in values.items():
-            for value, true in zip(own, exact[name], strict=True):
+        for name, constants in exact.items():
+            for value, true in zip(values[name], constants, strict=True):
                 if value not in known:
                     off = TIMES * abs(float(value - true))
                     off = max(off, UNIT * abs(value)) if off else 0.0
                     known[value] = value + float(random.choice([-1.0, 1.0])) * off
-    found: Constants = {name: tuple(known[value] for value in own) for name, own in values.items()}
-    return _over(module, found)
+    found = {name: tuple(known[value] for value in values[name]) for name in exact}
+    return _over(module, {**values, **found})
 
 
-def _over(module: GeneratedModule, constants: Constants) -> GeneratedModule:
+def _over(module: GeneratedModule, constants: Mapping[str, Any]) -> GeneratedModule:
     """A module's functions over other constants, whatever the parameters."""
     original = cast(ModuleType, module)
     twin = ModuleType(original.__name__)
@@ -78,6 +76,6 @@ def _over(module: GeneratedModule, constants: Constants) -> GeneratedModule:
             names[name] = FunctionType(
                 value.__code__, names, name, value.__defaults__, value.__closure__
             )
-    names["_DEFAULT"] = constants
+    names["_DEFAULT"], names["_DERIVATIVE"] = constants, constants["derivative"]
     names["_parameters"] = lambda _: constants
     return cast(GeneratedModule, twin)

@@ -15,7 +15,7 @@ import gmpy2
 from gmpy2 import mpfr
 
 from eomgen.language.digits import BY_MPFR
-from eomgen.run.module import CORNERS
+from eomgen.language.formula import CORNERS
 from eomgen.run.problem import Floats
 
 BITS = 113
@@ -117,11 +117,8 @@ def constants_of(module: Any, parameters: Any) -> Mapping[str, tuple[Long, ...]]
     """What each function of a module takes that depends on parameters alone, in long numbers; to be
     used within `digits()`.
     """
-    # The module keeps constants by value, and a long 1 is equal to a double 1: go round that.
-    return cast(
-        Mapping[str, tuple[Long, ...]],
-        _over(module._constants.__wrapped__, BY_MPFR)(_long(parameters, module.PARAMETERS)),
-    )
+    given = _long(parameters, module.PARAMETERS)
+    return cast(Mapping[str, tuple[Long, ...]], _over(module._fixed, BY_MPFR)(*given))
 
 
 def _over(function: Any, functions: Mapping[str, Callable[..., Long]]) -> Any:

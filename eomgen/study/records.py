@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from eomgen.files import is_ours, write_whole
+from eomgen.errors import RunError
+from eomgen.files import is_ours, read_plain, write_whole
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.study.ladder import Rung, Status, Work, kind, order
 
@@ -47,6 +48,8 @@ COLUMNS = (
     "reason",
 )
 """Errors and drifts are numbers without a unit: parts of the motion's own scale, or its energy."""
+LARGEST = 100_000_000
+"""Bytes of a table beyond which it is none of ours."""
 TIMES = ("time_s", "repeats")
 """Columns that depend on the machine."""
 AT_MOST, MEASURED = "at most", "measured"
@@ -103,7 +106,7 @@ def load(path: Path, key: str) -> tuple[Mapping[Rung, Work], float | None]:
     A table of another key, or one that is damaged, counts as none.
     """
     try:
-        data = path.read_bytes()
+        data = read_plain(path, LARGEST)
         lines = data.decode("utf-8").splitlines(keepends=True)
         if not (is_ours(data) and lines[0].rstrip().endswith(f", key {key}")):
             return {}, None
@@ -111,7 +114,7 @@ def load(path: Path, key: str) -> tuple[Mapping[Rung, Work], float | None]:
         generation = float(times[0].removeprefix(GENERATION)) if times else None
         table = csv.DictReader([line for line in lines if not line.startswith("#")])
         works = [_work(row) for row in table]
-    except (OSError, ValueError, KeyError, TypeError, csv.Error):
+    except (RunError, ValueError, KeyError, TypeError, csv.Error):
         return {}, None
     return {work.rung: work for work in works}, generation
 

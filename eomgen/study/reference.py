@@ -10,7 +10,6 @@ is the stated error, and the origin says so.
 import hashlib
 import io
 import time
-import zipfile
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -18,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.entries import Entries
 from eomgen.errors import RunError
-from eomgen.files import is_ours, write_whole
+from eomgen.files import write_whole
 from eomgen.model import Model
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
@@ -93,18 +93,19 @@ def reference(
     model     what the module was made of, for messages; or None
     progress  told the fraction done
     seconds   of processor time that long numbers may take; 0 for doubles at once
-    folder    where references are kept, so that none is computed twice; or None
+    folder    where references are kept, so that none is computed twice; or None. One that cannot
+              be trusted, read or written (`eomgen.entries`) is done without
     doubles   whether they may stand in where there is no run in long numbers
 
     Raises `RunError` if the module refuses parameters or inputs, if the motion does not get to
-    `t_end`, if a reference cannot be kept, or if doubles would stand in that may not.
+    `t_end`, or if doubles would stand in that may not.
     """
     problem = as_problem(module, parameters, inputs, model)
     told = progress or _ignore
     rest_speed = model.simulation.rest_speed if model else None
     key = _key(module, problem, parameters, inputs, t_end, seconds, rest_speed)
-    path = folder and folder / f"{key}.npz"
-    kept = path and load(path)
+    entries = folder and Entries(folder)
+    kept = entries and _kept(entries.get(key))
     if kept:
         told(1.0)
         return kept
@@ -128,8 +129,8 @@ def reference(
     apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)
     spent = time.monotonic() - began
     made = Reference(times, y, scale, float(apart.max()), float(apart[-1]), origin, spent)
-    if path:
-        save(made, path)
+    if entries:
+        entries.put(key, _content(made))
     return made
 
 
@@ -259,6 +260,11 @@ def _key(
 
 def save(made: Reference, path: Path) -> None:
     """Write a reference as NumPy's .npz, whole. Raises `RunError` if that cannot be."""
+    write_whole(path, _content(made))
+
+
+def _content(made: Reference) -> bytes:
+    """A reference as NumPy's .npz."""
     buffer = io.BytesIO()
     np.savez(  # `eomgen` comes first, where it marks the file as ours
         buffer,
@@ -269,30 +275,17 @@ def save(made: Reference, path: Path) -> None:
         errors=np.array([made.error, made.final_error, made.seconds]),
         origin=np.array(made.origin),
     )
-    write_whole(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
-def load(path: Path) -> Reference | None:
-    """The reference that a file holds; None if there is none, or it is damaged or of old."""
-    try:
-        data = path.read_bytes()
-        if not is_ours(data):
-            return None
-        with np.load(io.BytesIO(data), allow_pickle=False) as members:
-            if str(members["eomgen"]) != FORMAT:
-                return None
-            error, final_error, seconds = members["errors"].tolist()
-            return Reference(
-                members["t"],
-                members["y"],
-                members["scale"],
-                error,
-                final_error,
-                str(members["origin"]),
-                seconds,
-            )
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+def _kept(content: bytes | None) -> Reference | None:
+    """The reference that was kept as these bytes; None if there are none."""
+    if content is None:
         return None
+    with np.load(io.BytesIO(content), allow_pickle=False) as members:
+        error, final_error, seconds = members["errors"].tolist()
+        y, scale, origin = members["y"], members["scale"], str(members["origin"])
+        return Reference(members["t"], y, scale, error, final_error, origin, seconds)
 
 
 def _ignore(fraction: float) -> None:

@@ -16,9 +16,7 @@ import numpy as np
 from scipy.integrate import Radau
 
 from eomgen.pipeline import compile_scene
-from eomgen.run.checks import LEAST_STEPS
 from eomgen.run.module import as_problem, load_module
-from eomgen.run.problem import Problem
 from eomgen.scene.reader import read_scene
 
 STIFF = {
@@ -69,7 +67,6 @@ def run(scene: str, rtol: float, *, exact: bool) -> Run:
         STIFF[scene],
         rtol=rtol,
         atol=rtol / 10,
-        max_step=STIFF[scene] / LEAST_STEPS if limited(scene, problem) else np.inf,
         jac=problem.jacobian if exact else None,
     )
     steps = 0
@@ -81,11 +78,6 @@ def run(scene: str, rtol: float, *, exact: bool) -> Run:
     assert solver.status == "finished"
     seconds = time.process_time() - began
     return Run(seconds, steps, count, solver.njev, solver.nlu, solver.y)
-
-
-def limited(scene: str, problem: Problem) -> bool:
-    """Whether steps are kept short for corners; the beam's load has one that nothing leaps over."""
-    return problem.corners and scene != "stiff_beam"
 
 
 def seconds_a_call(f: Callable[[float, np.ndarray], np.ndarray], y: np.ndarray) -> float:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
@@ -40,6 +40,33 @@ def effect_sizes(model: Model, values: Values) -> dict[str, float]:
     """
     dynamics = Dynamics(model, values, FloatScalars())
     return {effect.name: _size(effect, dynamics) for effect in model.effects}
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """A soft contact or stop that is pressed in: how deep at most, m or rad, and its energy, J."""
+
+    effect: str
+    depth: float
+    energy: float
+
+
+def initial_overlaps(model: Model) -> list[Overlap]:
+    """The soft contacts and stops of a model that are pressed in at its initial state.
+
+    None where an effect has no finite value there, which is an error of its own.
+    """
+    start = [*model.initial_q, *model.initial_v, *(x.initial for x in model.states)]
+    dynamics = Dynamics(model, values_at(model, 0.0, start, {}, {}), FloatScalars())
+    found = []
+    try:
+        for effect in model.effects:
+            depth = float(effect.overlap(dynamics))
+            if depth > 0.0:
+                found.append(Overlap(effect.name, depth, float(effect.potential_energy(dynamics))))
+    except (ArithmeticError, ValueError):
+        return []
+    return found
 
 
 def _size(effect: Effect, dynamics: Dynamics) -> float:

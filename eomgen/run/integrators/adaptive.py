@@ -6,12 +6,14 @@ implicit ones are given the problem's exact Jacobian; left without it, as `Radau
 `BDF_differences` are, they make one of derivatives, which count as such.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
+from eomgen.run.branches import Again, Lookout, Made
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume, StepFailure
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.problem import Floats, Problem
@@ -23,18 +25,36 @@ _ENOUGH_TO_JUDGE = 100_000
 """Steps after which the pace so far tells whether the end will ever be reached."""
 
 
+@dataclass(frozen=True)
+class Bounds:
+    """What bounds the steps of a run.
+
+    rtol, atol  what the error of a step may be
+    longest     a step, s
+    unseen      the longest step, s, where it cannot be told what it passes over
+    most        steps in all
+    """
+
+    rtol: float
+    atol: float | Floats
+    longest: float
+    unseen: float
+    most: int
+
+    def allowed(self, y: Floats) -> Floats:
+        """What a step that ends in the state y (ny,) may be off, (ny,)."""
+        return self.atol + self.rtol * np.abs(y)
+
+
 def advances(
     method: Adaptive,
     problem: Problem,
     t_start: float,
     t_end: float,
     *,
-    rtol: float,
-    atol: float | Floats,
-    max_step: float,
+    bounds: Bounds,
     times: Floats,
     made: int,
-    max_steps: int,
     resume: Resume | None = None,
 ) -> Iterator[Advance]:
     """Yield the steps of `method`, with a sample at those of `times` (ascending) that each spans.
@@ -42,71 +62,164 @@ def advances(
     Between steps the method's own dense output is used, which is of its accuracy. The sample at
     `t_start` is the caller's. Quaternions are scaled to unit length in every state that is yielded;
     one-step methods go on from there, multistep ones from their own history. `made` steps went
-    before, which `max_steps` counts, too.
-    Raises `StepFailure` if the method gives up, or after `max_steps`.
+    before, which `bounds.most` counts, too. A step that passed over a branch of the derivative is
+    made again, up to there: see `eomgen.run.branches`.
+    Raises `StepFailure` if the method gives up, or after `bounds.most` steps.
     """
-    options: dict[str, Any] = {"rtol": rtol, "atol": atol, "max_step": max_step}
-    if method.uses_jacobian:
-        options["jac"] = problem.jacobian
-    # A copy: LSODA's compiled code works on state arrays in place.
-    start = problem.initial.copy()
-    solver = method.solver(problem.derivative, t_start, start, t_end, **options)
-    if resume is not None:
-        for name in method.memory:
-            kind = type(getattr(solver, name))
-            setattr(solver, name, _restored(resume[name], kind))
-    sampled, stalled = int(np.searchsorted(times, t_start, side="right")), 0
-    left = max_steps - made
+    course = _Course(method, problem, t_end, bounds)
+    course.begin(t_start, resume)
+    sampled, stalled, cut = int(np.searchsorted(times, t_start, side="right")), 0, 0
+    left, factored = bounds.most - made, 0
     for here in range(left):
-        if here == _ENOUGH_TO_JUDGE and (solver.t - t_start) * left < (t_end - t_start) * here:
-            raise StepFailure(
-                f"{here} steps came to {solver.t:g} s only, at which pace the end is more than "
-                f"{left} steps away; take a shorter --t-end, or {method.remedy}"
-            )
-        if here == _ENOUGH_TO_LOOK and not method.uses_jacobian and method.one_step:
-            _check_stiff(problem, solver, (t_start, t_end), here)
-        factored = solver.nlu
-        complaint = solver.step()
-        if solver.status == "failed":
-            cause = (complaint or "the method gave up").rstrip(".")
-            raise StepFailure(f"{cause}; {method.remedy}")
-        t, y = float(solver.t), problem.unit(solver.y.copy())
+        _check_pace(problem, course, t_start, here, left)
+        taken = course.step()
+        t, y = taken.end, taken.last
         # LSODA steps on and on where t + h rounds to t; the others notice by themselves. Far from
         # zero its first few steps may do so and still grow.
-        stalled = 0 if t > solver.t_old else stalled + 1
+        stalled = 0 if t > taken.start else stalled + 1
         if stalled == _STALLED:
             raise StepFailure(f"the steps have shrunk to nothing; {method.remedy}")
+        again = course.passed_over(taken)
+        if again:
+            cut += again.seen
+            continue
         passed = int(np.searchsorted(times, t, side="right"))
-        dense = cache(solver.dense_output)
         spanned = times[sampled:passed]
         # The step's end is known without what dense output costs.
         within = spanned[spanned < t]
-        states = dense()(within).T if within.size else ()
+        states = taken.states(within) if within.size else ()
         samples = list(zip(within.tolist(), map(problem.unit, states), strict=True))
         samples += [(t, y)] * (spanned.size - within.size)
-        finished = solver.status == "finished"
-        # The last step is cut short by the end, but no step before it knows of that.
-        stands = None
-        if method.memory and not finished:
-            stands = partial(_stands, t, y, {name: getattr(solver, name) for name in method.memory})
         yield Advance(
             t,
             y,
             samples,
             problem,
-            partial(_between, problem, dense),
-            factorisations=int(solver.nlu - factored),
-            resume=stands,
+            partial(_between, problem, taken),
+            factorisations=course.factorisations - factored,
+            resume=course.stands(),
+            capped=course.is_capped(taken),
+            cut=cut,
         )
-        sampled = passed
-        if finished:
+        sampled, cut, factored = passed, 0, course.factorisations
+        if course.ended:
             return
-        if method.one_step:
+        course.go_on(taken)
+    raise StepFailure(f"{bounds.most} steps did not suffice; {method.remedy}")
+
+
+class _Course:
+    """The solver of a run, as it stands."""
+
+    def __init__(self, method: Adaptive, problem: Problem, t_end: float, bounds: Bounds) -> None:
+        self.method, self.t_end, self._problem, self._bounds = method, t_end, problem, bounds
+        self._longest, self._lookout = bounds.longest, None
+        if problem.switching:
+            self._lookout = Lookout(
+                problem, problem.switching, bounds.allowed, bounds.unseen, method.sees_end
+            )
+        elif problem.corners:
+            self._longest = min(bounds.longest, bounds.unseen)
+        self._whole, self._unseen, self.factorisations = True, False, 0
+
+    def begin(self, t: float, resume: Resume | None) -> None:
+        """Begin at a time with the problem's initial state, or go on from what `stands` gave."""
+        until = self.t_end
+        if resume and self._lookout:
+            until = min(float(resume["until"]), until)
+            self._lookout.turned = float(resume["turned"])
+        self._start(t, self._problem.initial, until, resume or {})
+
+    def _start(self, t: float, y: Floats, until: float, memory: Mapping[str, Any]) -> None:
+        options: dict[str, Any] = {"rtol": self._bounds.rtol, "atol": self._bounds.atol}
+        if self.method.uses_jacobian:
+            options["jac"] = self._problem.jacobian
+        # A copy: LSODA's compiled code works on state arrays in place.
+        self.solver: Any = self.method.solver(
+            self._problem.derivative, t, y.copy(), until, max_step=self._longest, **options
+        )
+        self._until = until
+        for name in self.method.memory if memory else ():
+            setattr(self.solver, name, _restored(memory[name], type(getattr(self.solver, name))))
+
+    def step(self) -> Made:
+        """Make a step. Raises `StepFailure` if the method gives up."""
+        solver = self.solver
+        self._before = (float(solver.t), solver.y.copy(), self._memory())
+        factored = int(solver.nlu)
+        complaint = solver.step()
+        self.factorisations += int(solver.nlu) - factored
+        if solver.status == "failed":
+            cause = (complaint or "the method gave up").rstrip(".")
+            raise StepFailure(f"{cause}; {self.method.remedy}")
+        if not self.method.sees_end and solver.status == "finished" and not self.ended:
+            solver.turn()
+        dense = cache(solver.dense_output)
+        t, y, _ = self._before
+        end = self._problem.unit(solver.y.copy())
+        return Made(t, float(solver.t), y, end, lambda times: dense()(times).T)
+
+    def passed_over(self, taken: Made) -> Again | None:
+        """How a step has to be made again, which is then begun; None if it is good."""
+        if self._lookout is None or not taken.start < taken.end:
+            return None
+        again = self._lookout.look(taken)
+        if again:
+            # A longer run would have looked at a longer step.
+            self._whole = self._whole and taken.end < self.t_end
+            self._unseen = not again.seen
+            t, y, memory = self._before
+            self._start(t, y, again.until, memory)
+        return again
+
+    def go_on(self, taken: Made) -> None:
+        """Make ready for the next step."""
+        if self.solver.status == "finished":  # up to where one was cut
+            self._start(taken.end, taken.last, self.t_end, self._memory())
+        elif self.method.one_step:
             # The slope that the next step takes over stays: what it is off is of the size of this
             # step's error, and the next step multiplies that by its length. Measured: evaluating
             # it again changes no error, and costs a derivative a step.
-            solver.y = y.copy()
-    raise StepFailure(f"{max_steps} steps did not suffice; {method.remedy}")
+            self.solver.y = taken.last.copy()
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run has come to its end."""
+        return bool(self.solver.status == "finished" and self._until == self.t_end)
+
+    def is_capped(self, taken: Made) -> bool:
+        """Whether a step is as long as any may be, there at least."""
+        held = self._unseen and self.solver.status == "finished" and not self.ended
+        return held or taken.length >= self._longest * (1 - 1e-9)
+
+    def stands(self) -> Callable[[], Resume] | None:
+        """What a later run needs to go on from here, if it can: the last step is cut short by the
+        end, but no step before it knows of that.
+        """
+        if not self.method.memory or self.ended or not self._whole:
+            return None
+        memory = self._memory()
+        if self._lookout:
+            reached = self.solver.status == "finished"
+            memory["until"] = np.inf if reached or self._until == self.t_end else self._until
+            memory["turned"] = self._lookout.turned
+        t, y = float(self.solver.t), self._problem.unit(self.solver.y.copy())
+        return partial(_stands, t, y, memory)
+
+    def _memory(self) -> dict[str, Any]:
+        return {name: getattr(self.solver, name) for name in self.method.memory}
+
+
+def _check_pace(problem: Problem, course: _Course, t_start: float, here: int, left: int) -> None:
+    """Raise `StepFailure` if the end is hopelessly far, after `here` of `left` steps."""
+    solver, method, t_end = course.solver, course.method, course.t_end
+    if here == _ENOUGH_TO_JUDGE and (solver.t - t_start) * left < (t_end - t_start) * here:
+        raise StepFailure(
+            f"{here} steps came to {solver.t:g} s only, at which pace the end is more than "
+            f"{left} steps away; take a shorter --t-end, or {method.remedy}"
+        )
+    if here == _ENOUGH_TO_LOOK and not method.uses_jacobian and method.one_step:
+        _check_stiff(problem, solver, (t_start, t_end), here)
 
 
 def _check_stiff(problem: Problem, solver: Any, span: tuple[float, float], made: int) -> None:
@@ -124,11 +237,11 @@ def _stands(t: float, y: Floats, memory: dict[str, Any]) -> Resume:
     return {"t": np.array(t), "y": y, **arrays}
 
 
-def _restored(value: Floats, kind: type) -> Any:
-    """An array as one of its own, a number as of its kind."""
-    return value.copy() if value.ndim else kind(value)
+def _restored(value: Any, kind: type) -> Any:
+    """An array as one of its own, a number as one of its kind."""
+    return np.array(value) if np.ndim(value) else kind(value)
 
 
-def _between(problem: Problem, dense: Callable[[], Any], t: float) -> Floats:
+def _between(problem: Problem, taken: Made, t: float) -> Floats:
     """The state at a time within a step, by its dense output, which is made when first asked."""
-    return problem.unit(dense()(t))
+    return problem.unit(taken.states(t))

@@ -7,7 +7,7 @@ changes since the step's start, which rounding hurts less than states.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from math import comb, factorial, inf, isfinite, log10, nextafter, sqrt
 from typing import Any
@@ -33,6 +33,8 @@ _ERROR, _STEP, _LEAST, _MOST, _LOWER, _HIGHER, _REFUSED = 0.65, 0.94, 0.02, 4.0,
 
 _LOOKS = np.array([-0.75, -0.5, 0.5, 0.75])
 """Where in a step, from -1 to 1, dense outputs of more and of fewer rows are compared."""
+_ASIDE = 1e-6
+"""Of a step: so far from a corner the derivative is that of one side of it."""
 _SETTLED = 10.0
 """Such a difference, in parts of what is allowed, is the error of the one of fewer."""
 
@@ -196,6 +198,20 @@ class GraggBulirschStoer(OdeSolver[Any]):
         else:
             ahead = row < k and price(row) < _HIGHER * price(row - 1)
             self.length = lengths[row] * WORK[min(best + ahead, MOST_ROWS - 1)] / WORK[row]
+
+    def turn(self) -> None:
+        """Take note that the derivative has a corner at the end of the step just made: the slope
+        that its dense output ends with, and that of the next step's start, are taken just aside.
+        """
+        assert self.taken is not None
+        step = _ASIDE * self.taken.step
+        self.taken = replace(self.taken, after=self._slope_beside(-step))
+        self.slope = self._slope_beside(step)
+
+    def _slope_beside(self, step: float) -> Floats:
+        """The slope here, extrapolated from two moments, one and two small steps away."""
+        near, far = (self.fun(self.t + h, self.y + h * self.slope) for h in (step, 2 * step))
+        return np.asarray(2 * near - far)
 
     def _dense_output_impl(self) -> DenseOutput:
         assert self.taken is not None

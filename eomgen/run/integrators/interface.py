@@ -49,6 +49,7 @@ class Adaptive:
     remedy         what to change when a run goes astray
     memory         attributes of the solver, numbers or arrays, that with time and state are all
                    that the next step goes on from; none where there is more to it
+    sees_end       whether its error estimate sees the derivative at the end of a step
     """
 
     solver: "Callable[..., OdeSolver[Any]]"
@@ -56,6 +57,7 @@ class Adaptive:
     one_step: bool
     remedy: str
     memory: tuple[str, ...] = ()
+    sees_end: bool = True
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,8 @@ class Advance:
     factorisations  LU factors that the step took, as far as its method says
     resume   gives what a later run needs to go on from here as this one does; None where this one
              would not have stopped here, or its method cannot
+    capped   whether the step is as long as any may be
+    cut      how often it was made again, shorter, for what it would have passed over
     """
 
     t: float
@@ -86,6 +90,8 @@ class Advance:
     contact_powers: Callable[[float, Floats], Floats] | None = None
     factorisations: int = 0
     resume: Callable[[], Resume] | None = None
+    capped: bool = False
+    cut: int = 0
 
 
 class Begin(Protocol):

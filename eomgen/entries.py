@@ -1,0 +1,166 @@
+"""A folder of results under keys that this user alone can write.
+
+What is found in it is run later, so it is taken only as this program wrote it: a plain file of this
+user that nobody else can write, of a sane size, in a folder of which the same is true, whose digest
+covers its key and its content. The digest shows damage, and entries under a wrong key. It is no
+signature: the key of one would have to lie where the entries lie, and who can write there as this
+user can read it, and can change this program as well.
+"""
+
+import hashlib
+import os
+import re
+import secrets
+import stat
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+LARGEST = 100_000_000
+"""Bytes of the largest entry that is kept: a thousand links with every output take 72 million."""
+MOST_BYTES = 500_000_000
+"""Bytes that all entries may have; those that were not used for longest go first."""
+LONGEST_UNUSED = 90 * 86400.0
+"""Seconds after which an entry that nobody has used goes."""
+LONGEST_WRITING = 3600.0
+"""Seconds after which a file that was begun and not finished is taken to be left behind."""
+
+_MARK = b"eomgen entry 1 "
+_NAME = re.compile(r"([0-9a-f]{32})\.entry")
+_BEGUN = re.compile(r"[0-9a-f]{32}\.[0-9a-f]{16}\.begun")
+_FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+
+
+@dataclass(frozen=True)
+class Entries:
+    """The entries of a folder, each bytes under a key of 32 hexadecimal digits."""
+
+    folder: Path
+
+    def trouble(self) -> str:
+        """Why the folder cannot be trusted, and what to do; "" if it can, or is not there yet."""
+        try:
+            about = self.folder.lstat()
+        except FileNotFoundError:
+            return ""
+        except (OSError, ValueError) as error:
+            return f"it cannot be read: {_why(error)}"
+        if stat.S_ISLNK(about.st_mode):
+            return "it is a symbolic link; name the folder itself in EOMGEN_CACHE"
+        if not stat.S_ISDIR(about.st_mode):
+            return "it is no folder; name one in EOMGEN_CACHE"
+        if not _is_own(about):
+            return "it belongs to another user; name a folder of your own in EOMGEN_CACHE"
+        if not _is_private(about):
+            return f"others can write to it; run: chmod go-w {self.folder}"
+        return ""
+
+    def get(self, key: str) -> bytes | None:
+        """What is kept under a key; None if nothing is, or not as `put` wrote it."""
+        if self.trouble():
+            return None
+        with suppress(OSError, ValueError):
+            handle = os.open(self._path(key), os.O_RDONLY | _FLAGS)
+            with os.fdopen(handle, "rb") as file:
+                about = os.fstat(handle)
+                if not (_is_trusted(about) and about.st_size <= LARGEST):
+                    return None
+                head, content = file.readline(len(_head(key, b""))), file.read(about.st_size)
+                if head != _head(key, content):
+                    return None
+                with suppress(OSError):  # of a file system that cannot be written to
+                    os.utime(handle if os.utime in os.supports_fd else self._path(key))
+            return content
+        return None
+
+    def put(self, key: str, content: bytes) -> str:
+        """Keep `content` under a key, whole or not at all, and let go of what is old.
+
+        What is too large is not kept. Returns why nothing could be kept, and what to do, or "".
+        """
+        entry = _head(key, content) + content
+        if len(entry) > LARGEST:
+            return ""
+        begun = self.folder / f"{key}.{secrets.token_hex(8)}.begun"
+        try:
+            if trouble := self.trouble() or self._made():
+                return trouble
+            handle = os.open(begun, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _FLAGS, 0o600)
+            with os.fdopen(handle, "wb") as file:
+                file.write(entry)
+            begun.replace(self._path(key))
+            self._let_go(time.time())
+        except (OSError, ValueError) as error:
+            return f"it cannot be written: {_why(error)}"
+        finally:
+            with suppress(OSError, ValueError):
+                begun.unlink(missing_ok=True)
+        return ""
+
+    def _made(self) -> str:
+        """Make the folder where there is none; again what `trouble` says, if another came first."""
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return self.trouble()
+
+    def _path(self, key: str) -> Path:
+        path = self.folder / f"{key}.entry"
+        assert _NAME.fullmatch(path.name), key
+        return path
+
+    def _let_go(self, now: float) -> None:
+        """Remove entries that are too old or too many, and what was begun and left behind.
+
+        Another process may do the same, or use what goes: it then has it open, or derives anew.
+        """
+        size = 0
+        for about, path in sorted(self._ours(), key=lambda found: -found[0].st_mtime):
+            size += about.st_size
+            if size > MOST_BYTES or now - about.st_mtime > LONGEST_UNUSED:
+                with suppress(OSError):
+                    path.unlink()
+        for path in self.folder.iterdir():
+            with suppress(OSError):
+                if _BEGUN.fullmatch(path.name) and _is_left_behind(path.lstat(), now):
+                    path.unlink()
+
+    def _ours(self) -> Iterator[tuple[os.stat_result, Path]]:
+        """The files that `put` wrote, by name, owner and first line, with sizes and times."""
+        for path in self.folder.iterdir():
+            name = _NAME.fullmatch(path.name)
+            if not name:
+                continue
+            with suppress(OSError):
+                handle = os.open(path, os.O_RDONLY | _FLAGS)
+                with os.fdopen(handle, "rb") as file:
+                    about = os.fstat(handle)
+                    if _is_trusted(about) and file.read(len(_MARK)) == _MARK:
+                        yield about, path
+
+
+def _head(key: str, content: bytes) -> bytes:
+    """The first line of an entry."""
+    digest = hashlib.sha256(key.encode() + b"\n" + content).hexdigest()
+    return _MARK + f"{key} {digest}\n".encode()
+
+
+def _is_own(about: os.stat_result) -> bool:
+    return not hasattr(os, "geteuid") or about.st_uid == os.geteuid()
+
+
+def _is_private(about: os.stat_result) -> bool:
+    """Whether nobody else may write; where there is no such mode the user's own folder is so."""
+    return os.name != "posix" or not about.st_mode & 0o022
+
+
+def _is_trusted(about: os.stat_result) -> bool:
+    return stat.S_ISREG(about.st_mode) and _is_own(about) and _is_private(about)
+
+
+def _is_left_behind(about: os.stat_result, now: float) -> bool:
+    return stat.S_ISREG(about.st_mode) and _is_own(about) and now - about.st_mtime > LONGEST_WRITING
+
+
+def _why(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)

@@ -1,0 +1,83 @@
+"""Text of others made fit to be shown: it moves no cursor, forges no line, and has an end.
+
+A scene, a file's name or another library may hold anything: escape sequences that a terminal obeys,
+line breaks after which a message of this program seems to follow, marks that turn the order of
+letters around, a hundred thousand letters.
+"""
+
+import re
+import unicodedata
+
+LONGEST_LINE = 1000
+"""Letters of a message's line; more are left out in its middle, since its end says what to do."""
+LONGEST_WORD = 200
+LONGEST_VALUE = 60
+_LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
+
+
+def escaped(text: str) -> str:
+    r"""A text whose every character can be seen: those that cannot be as \n, \x1b, \u202e.
+
+    Lone halves of surrogate pairs, which no encoding takes, are among them.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def brief(text: str, most: int = LONGEST_VALUE) -> str:
+    """A text of any length and characters as a name or a value in a message."""
+    if len(text) > 4 * most:  # what is left out need not be escaped first
+        text = text[: 2 * most] + text[-2 * most :]
+    return _without_middle(escaped(text), most)
+
+
+def one_line(text: str) -> str:
+    """A text of any length and characters as one line for a message."""
+    line = brief(text, 4 * LONGEST_LINE)
+    line = _LONG_WORD.sub(lambda word: _without_middle(word[0], LONGEST_WORD), line)
+    return _without_middle(line, LONGEST_LINE)
+
+
+def breaks_lines(text: str) -> bool:
+    """Whether a text has line breaks or other control characters."""
+    return any(unicodedata.category(c) in ("Cc", "Zl", "Zp") for c in text)
+
+
+def _without_middle(text: str, most: int) -> str:
+    if len(text) <= most:
+        return text
+    return f"{text[: 2 * most // 3]}…{text[len(text) - most // 3 + 1 :]}"
+
+
+def spelled(text: str, encoding: str) -> str:
+    """A text in characters that an encoding has: θ as theta, v̇ as v_dot, ² as ^2, … as ..."""
+    return "".join(_spelled(c, encoding) for c in text)
+
+
+_SPELLED = {
+    "·": "*", "⋅": "*", "×": "x", "−": "-", "–": "-", "±": "+-", "∓": "-+", "≤": "<=", "≥": ">=",
+    "°": " deg", "µ": "u", "½": "1/2", "√": "sqrt", "∂": "d", "∫": "integral of ", "∘": "o",
+    "\u0307": "_dot", "\u0308": "_ddot", "→": "->", "‘": "'", "’": "'", "“": '"', "”": '"',
+}  # fmt: skip
+_GREEK = re.compile(r"GREEK (SMALL|CAPITAL) LETTER ([A-Z]+)")
+
+
+def _spelled(character: str, encoding: str) -> str:
+    try:
+        character.encode(encoding)
+    except UnicodeEncodeError:
+        pass
+    else:
+        return character
+    if character in _SPELLED:
+        return _SPELLED[character]
+    greek = _GREEK.fullmatch(unicodedata.name(character, ""))
+    if greek:
+        word = greek[2].lower().replace("lamda", "lambda")
+        return word if greek[1] == "SMALL" else word.capitalize()
+    parts = unicodedata.normalize("NFKD", character)
+    raised = "^" if "<super>" in unicodedata.decomposition(character) else ""
+    accent = "_dot" if parts.endswith("\u0307") else ""
+    plain = parts.encode("ascii", "ignore").decode()
+    return raised + plain + accent if plain else ascii(character)[1:-1]

@@ -1,0 +1,325 @@
+"""Steps of adaptive methods: as long as their error allows, and nothing brief is passed over.
+
+Pulses have areas in closed form; contacts, stops, ropes and kicks of random trees are compared with
+runs whose steps are so short that they can miss nothing.
+"""
+
+import math
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from campaign import FULL, some
+
+from eomgen.cli import main
+from eomgen.language.formula import BY_MATH, FUNCTIONS
+from eomgen.pipeline import compile_scene
+from eomgen.run.integrate import integrate
+from eomgen.run.integrators import INTEGRATORS, Adaptive
+from eomgen.run.intervals import BY_INTERVALS, Interval
+from eomgen.run.module import as_problem, load_module
+from eomgen.run.problem import Problem
+from eomgen.run.schedule import Schedule
+from eomgen.scene.reader import parse_scene
+
+ADAPTIVE = [
+    name
+    for name, method in INTEGRATORS.items()
+    if isinstance(method, Adaptive) and not name.endswith("_differences")
+]
+INERTIA = 0.4
+WHEEL = """
+name = "wheel"
+parameters = {{ a = 1.0, w = 0.1 }}
+bodies = [{{ name = "disc", mass = 1.0, inertia_com = 0.4 }}]
+[[joints]]
+name = "axle"
+type = "revolute"
+parent = "world"
+child = "disc"
+coordinate = "q"
+[[effects]]
+type = "motor"
+name = "m"
+joint = "axle"
+torque = "{torque}"
+"""
+PULSES = {
+    "product": ("step(t - a)*step(a + w - t)", 1.0),
+    "difference": ("step(t - a) - step(t - a - w)", 1.0),
+    "one condition": ("1 if (t - a)*(a + w - t) > 0 else 0", 1.0),
+    "triangle": ("max(0, 1 - abs(t - a)/w)", 1.0),
+    "parabola": ("max(0, 1 - ((t - a)/w)**2)", 4 / 3),
+    "bell": ("step(exp(-((t - a)/w)**2) - exp(-1))", 2.0),
+    "ramps": ("min(max((t - a)/w, 0), 1) - min(max((t - a - 3*w)/w, 0), 1)", 3.0),
+}
+"""Torques, and their areas in parts of w."""
+
+
+@cache
+def module(scene: str):
+    """A scene's module."""
+    return load_module(compile_scene(parse_scene(scene)))
+
+
+@pytest.mark.parametrize("method", ADAPTIVE)
+@pytest.mark.parametrize("shape", PULSES)
+def test_pulses_are_found(shape: str, method: str) -> None:
+    """However short, and wherever in a run that is otherwise one step to the method."""
+    torque, area = PULSES[shape]
+    rng = np.random.default_rng(sum(map(ord, shape + method)))
+    for _ in range(40 if FULL else 2):
+        width = 10 ** rng.uniform(-6, -0.5)
+        values = {"a": rng.uniform(0.5, 9.0), "w": width}
+        problem = as_problem(module(WHEEL.format(torque=torque)), values)
+        run = integrate(problem, method, 10.0, samples=2)
+        assert run.y[-1, 1] == pytest.approx(area * width / INERTIA, rel=2e-3, abs=2e-9)
+        assert run.counts["cut"] >= (width < 1e-3)
+        assert run.counts["steps"] < 1000
+
+
+@pytest.mark.parametrize("method", ADAPTIVE)
+def test_every_pulse_of_many_is_found(method: str) -> None:
+    """One part in a hundred of each period of 0.1 s."""
+    scene = WHEEL.format(torque="step(sin(20*pi*t) - cos(pi/100))")
+    run = integrate(as_problem(module(scene)), method, 1.0, rtol=1e-6, samples=2)
+    assert run.y[-1, 1] == pytest.approx(0.01 / INERTIA, rel=1e-3)
+
+
+def test_extrapolation_sees_a_jump_anywhere_in_a_step() -> None:
+    """Its rows ask for no derivative near the ends of a step; its rows between are right, too."""
+    problem = as_problem(module(WHEEL.format(torque="step(t - a)")), {"a": 1.0, "w": 1.0})
+    for at in np.linspace(0.5, 9.0, 20):
+        problem = as_problem(module(WHEEL.format(torque="step(t - a)")), {"a": at, "w": 1.0})
+        run = integrate(problem, "gragg_bulirsch_stoer", 10.0)
+        assert run.y[:, 1] == pytest.approx(np.maximum(run.t - at, 0) / INERTIA, abs=1e-8)
+
+
+QUADROTOR = """
+name = "quadrotor"
+parameters = { arm = 0.2, most = 12.0 }
+[definitions]
+lift = "min(max(9.81*0.6 - 4*body_y - 3*body_y_dot, 0), most)/2"
+roll = "min(max(0.3*body_x + 0.3*body_x_dot - 2*body_angle - 0.4*body_angle_dot, -1), 1)"
+left = "lift - roll"
+right = "lift + roll"
+[[bodies]]
+name = "body"
+mass = 0.6
+inertia_com = 0.02
+[[joints]]
+name = "flight"
+type = "free"
+child = "body"
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "external_force"
+name = "left"
+body = "body"
+at = ["-arm", 0]
+force = ["-left*sin(body_angle)", "left*cos(body_angle)"]
+[[effects]]
+type = "external_force"
+name = "right"
+body = "body"
+at = ["arm", 0]
+force = ["-right*sin(body_angle)", "right*cos(body_angle)"]
+[initial]
+q = { body_x = 0.3, body_y = -0.2 }
+"""
+ROPE = """
+name = "rope"
+bodies = [{ name = "ball", mass = 1.0, inertia_com = 0.1 }]
+joints = [{ name = "flight", type = "free", child = "ball" }]
+[[effects]]
+type = "spring"
+name = "rope"
+body_1 = "ball"
+body_2 = "world"
+stiffness = 20.0
+rest_length = 0.5
+tension_only = true
+[initial]
+q = { ball_x = 2.0 }
+v = { ball_y_dot = 3.0 }
+"""
+
+
+@pytest.mark.parametrize("method", ADAPTIVE)
+@pytest.mark.parametrize("scene", [QUADROTOR, ROPE], ids=["quadrotor", "rope"])
+def test_steps_are_as_long_as_their_error_allows(scene: str, method: str) -> None:
+    """A saturated controller and a rope that stays taut: as many steps as if nothing could be
+    passed over.
+    """
+    problem = as_problem(module(scene))
+    free = integrate(replace(problem, corners=False, switching=None), method, 10.0, rtol=1e-6)
+    run = integrate(problem, method, 10.0, rtol=1e-6)
+    assert run.finished and problem.corners
+    assert run.counts["steps"] <= 1.1 * free.counts["steps"]
+    assert run.counts["derivatives"] <= 1.5 * free.counts["derivatives"]
+    assert run.counts["capped"] == 0
+
+
+def tree(seed: int) -> str:
+    """A random tree in the plane that meets stops, the ground, a rope and a kick, each but briefly
+    or not at all.
+    """
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 4))
+    lines = ['name = "tree"']
+    if rng.random() < 0.5:
+        lines += ["[[effects]]", 'type = "gravity"', "g = 2.0"]
+    for i in range(count):
+        kind = str(rng.choice(["revolute", "prismatic", "revolute" if i else "free"]))
+        lines += ["[[bodies]]", f'name = "b{i}"', f"mass = {rng.uniform(0.3, 2)}"]
+        lines += [f"inertia_com = {rng.uniform(0.01, 0.1)}"]
+        lines += ["[[joints]]", f'name = "j{i}"', f'type = "{kind}"', f'child = "b{i}"']
+        if kind == "free":
+            continue
+        parent = f"b{rng.integers(0, i)}" if i else "world"
+        lines += [f'parent = "{parent}"', f"r_parent = {rng.normal(size=2).tolist()}"]
+        lines += [f"r_child = {(0.5 * rng.normal(size=2)).tolist()}"]
+        if kind == "prismatic":
+            lines += [f"axis = {rng.normal(size=2).tolist()}"]
+        if rng.random() < 0.6:
+            limit = rng.uniform(0.1, 2)
+            lines += ["[[effects]]", 'type = "joint_stop"', f'name = "stop{i}"', f'joint = "j{i}"']
+            lines += [f"low = {-limit}", f"high = {limit}"]
+            lines += [f"stiffness = {10 ** rng.uniform(1, 5)}"]
+            lines += [f"damping = {10 ** rng.uniform(-2, 1)}"]
+    last = f"b{count - 1}"
+    if rng.random() < 0.6:
+        lines += ["[[effects]]", 'type = "contact"', 'name = "ground"', f'body = "{last}"']
+        lines += ['law = "spring_damper"', "radius = 0.1", f"offset = {-rng.uniform(0.3, 3)}"]
+        lines += [f"stiffness = {10 ** rng.uniform(2, 6)}", f"damping = {10 ** rng.uniform(-1, 1)}"]
+    if rng.random() < 0.4:
+        lines += ["[[effects]]", 'type = "spring"', 'name = "rope"', f'body_1 = "{last}"']
+        lines += ['body_2 = "world"', f"at_2 = {rng.normal(size=2).tolist()}"]
+        lines += [f"stiffness = {10 ** rng.uniform(1, 4)}", "tension_only = true"]
+        lines += [f"rest_length = {rng.uniform(1, 4)}"]
+    start, width = rng.uniform(0.2, 2), 10 ** rng.uniform(-4, -1)
+    kick = f"{1 / width}*step(t - {start})*step({start + width} - t)"
+    lines += ["[[effects]]", 'type = "external_force"', 'name = "kick"', 'body = "b0"']
+    lines += [f'force = ["{kick}", 0]']
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("seed", range(60 if FULL else 2))
+def test_brief_contacts_of_random_trees(seed: int) -> None:
+    """As close to runs in very short steps as runs in 1000 steps are, but for what the motion
+    magnifies, which a run at another tolerance tells.
+    """
+    problem, t_end = as_problem(module(tree(seed))), some(1.5, 3.0)
+    y = problem.initial.copy()
+    y[len(y) // 2 :] = 2 * np.random.default_rng(seed).normal(size=len(y) - len(y) // 2)
+    problem = replace(problem, initial=y)
+    brief = {"samples": 2, "max_step": t_end / some(2000, 5000)}
+    true, other = (integrate(problem, "DOP853", t_end, rtol=r, **brief) for r in (1e-11, 1e-10))
+    scale = np.maximum(1.0, np.abs(true.y[-1]))
+    noise = float(np.max(np.abs(other.y[-1] - true.y[-1]) / scale))
+    for method in some(("DOP853", "gragg_bulirsch_stoer"), ADAPTIVE):
+        short = integrate(problem, method, t_end, samples=2, max_step=t_end / 1000)
+        run = integrate(problem, method, t_end, samples=2)
+        off, before = (float(np.max(np.abs(r.y[-1] - true.y[-1]) / scale)) for r in (run, short))
+        assert off <= max(1e-6, 1e4 * noise, 30 * before), (method, off, before, noise)
+
+
+def test_what_turns_fast_is_looked_at_in_every_turn() -> None:
+    """A rotor that nothing turns but a cam of 4° once a turn: to a method its motion is a straight
+    line, and one step spans the whole run.
+    """
+    scene = WHEEL.format(torque="-0.01*step(cos(q) - cos(pi/90))")
+    problem = replace(as_problem(module(scene)), initial=np.array([1.0, 3.0]))
+    true = integrate(problem, "DOP853", 10.0, rtol=1e-11, max_step=0.01, samples=2)
+    assert true.y[-1, 1] < 2.999
+    for method in ("DOP853", "LSODA"):
+        run = integrate(problem, method, 10.0, samples=2)
+        assert run.y[-1] == pytest.approx(true.y[-1], abs=1e-6), method
+
+
+@pytest.mark.usefixtures("blank_figures")
+def test_a_step_that_cannot_be_followed_is_held_and_told(capsys, tmp_path) -> None:
+    """A cam that turns a million times: no steps can see it all, and the run says so."""
+    scene = tmp_path / "wheel.toml"
+    cam = WHEEL.format(torque="-1e-9*step(cos(q) - cos(pi/90))")
+    scene.write_text(cam + "[initial]\nv = { q_dot = 1e6 }\n[simulation]\nt_end = 5\n")
+    command = ["simulate", str(scene), "-o", str(tmp_path / "out"), "--rtol", "1e-6"]
+    assert main(command) == 0
+    held = re.search(r"(\d+) of (\d+) steps held to 1/1000 of the run", capsys.readouterr().out)
+    assert held and 990 <= int(held[1]) <= int(held[2])
+    assert main([*command, "--max-step", "0.1"]) == 0
+    held = re.search(r"(\d+) of (\d+) steps as long as --max-step", capsys.readouterr().out)
+    assert held and 40 <= int(held[1]) <= int(held[2]) <= 80
+
+
+def test_without_switching_functions_steps_are_held() -> None:
+    """Where the corners of a derivative are not known, and where a step is cut, it is counted."""
+    problem = Problem(
+        name="kicked",
+        states=("q", "v"),
+        positions=(0,),
+        derivative=lambda t, y: np.array([y[1], float(1.0 < t < 1.02)]),
+        jacobian=lambda t, y: np.array([[0.0, 1.0], [0.0, 0.0]]),
+        initial=np.zeros(2),
+        corners=True,
+    )
+    run = integrate(problem, "DOP853", 10.0, samples=2)
+    assert run.y[-1, 1] == pytest.approx(0.02, abs=1e-9)
+    assert 900 <= run.counts["capped"] <= run.counts["steps"]
+    free = integrate(replace(problem, corners=False), "DOP853", 10.0, samples=2, max_step=2.0)
+    assert free.counts["capped"] >= 3
+
+
+def test_functions_of_intervals_enclose() -> None:
+    """What a function makes of numbers in an interval lies in what it makes of the interval."""
+    rng = np.random.default_rng(5)
+    for name, arity in FUNCTIONS.items():
+        for _ in range(200):
+            centres, radii = rng.normal(size=arity) * 3, 10 ** rng.uniform(-9, 1, arity)
+            boxes = [Interval(c - r, c + r) for c, r in zip(centres, radii, strict=True)]
+            found = BY_INTERVALS[name](*boxes)
+            for share in rng.uniform(-1, 1, (10, arity)):
+                try:
+                    value = BY_MATH[name](*(centres + share * radii).tolist())
+                except (ValueError, ArithmeticError):
+                    continue
+                assert found.low <= value <= found.high, (name, boxes)
+
+
+def test_arithmetic_of_intervals_encloses() -> None:
+    """Sums, products and quotients, with numbers, too, and those of something with itself."""
+    rng = np.random.default_rng(6)
+    for _ in range(2000):
+        (a, b), (r, s) = rng.normal(size=2), 10 ** rng.uniform(-6, 0.5, 2)
+        x, y = Interval(a - r, a + r), Interval(b - s, b + s)
+        u, v = a + rng.uniform(-1, 1) * r, b + rng.uniform(-1, 1) * s
+        pairs = [(x + y, u + v), (x - y, u - v), (x * y, u * v), (x * x, u * u), (2.0 - x, 2 - u)]
+        pairs += [(x / y, u / v), (3.0 / y, 3 / v), (x * -2.0, -2 * u), (-x, -u)]
+        assert all(found.low <= value <= found.high for found, value in pairs)
+    assert (x * x).low >= 0 or x.low > 0
+
+
+def test_changes_in_time_are_found_where_they_are() -> None:
+    """All zeros of a wave within a step, to its last digits, however many."""
+    sine = BY_INTERVALS["sin"]
+    schedule = Schedule(lambda t: [sine(t * 40.0)])
+    found, whole = schedule.changes(0.01, 3.0)
+    zeros = math.pi / 40 * np.arange(1, 39)
+    assert whole and found == pytest.approx(zeros[zeros < 3.0], abs=1e-11)
+    assert Schedule(lambda t: [sine(t * 1e9)]).changes(0.01, 3.0)[1] is False
+    assert schedule.changes(3.0, 3.01) == ([], True)
+
+
+def test_scenes_without_corners_have_no_such_functions() -> None:
+    """Nor are their bytes other ones for it."""
+    smooth = module(WHEEL.format(torque="sin(t)"))
+    assert not hasattr(smooth, "switching_functions")
+    assert not hasattr(smooth, "switching_functions_of_time")
+    timed, both = module(WHEEL.format(torque="step(t - a)")), module(QUADROTOR)
+    assert timed.switching_functions_of_time(3.0, np.zeros(2)).tolist() == [2.0]
+    assert not hasattr(timed, "switching_functions")
+    assert both.switching_functions(0.0, both.initial_state()).shape == (4,)

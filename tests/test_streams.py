@@ -1,0 +1,389 @@
+"""Standard streams that are closed, full, read by nobody or of ASCII; and Ctrl-C at any moment.
+
+Real processes: what counts is the exit code, what is said, and which files are there.
+"""
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import pytest
+from campaign import some
+
+import eomgen.files
+from eomgen.cli import _parser, main
+from eomgen.files import write_whole
+from eomgen.streams import Steady, steady_streams
+from eomgen.text import spelled
+
+EOMGEN = (sys.executable, "-m", "eomgen")
+QUICK = "--no-arithmetic --quick --methods rk4 --t-end 0.1 --run-time 1"
+COMMANDS = {
+    "list": "list",
+    "schema": "schema",
+    "reference": "reference",
+    "check": "check two_body",
+    "derive": "derive two_body",
+    "generate": "generate pendulum -o {out}",
+    "simulate": "simulate pendulum --t-end 0.1 -o {out}",
+    "view": "view pendulum --t-end 0.1 -o {out}",
+    "verify": "verify pendulum --states 1",
+    "accuracy": f"accuracy pendulum {QUICK} -o {{out}}",
+    "effects": "effects pendulum --no-motion -o {out}",
+    "linearise": "linearise cart_pole",
+}
+WRITES = {"generate": 1, "simulate": 5, "view": 5, "accuracy": 3, "effects": 1}
+FAULTS = {
+    "full": ("> /dev/full", 1),
+    "closed": (">&-", 0),
+    "errors closed": ("2>&-", 0),
+    "errors full": ("2> /dev/full", 0),
+    "both closed": (">&- 2>&-", 0),
+    "both full": ("> /dev/full 2>&1", 1),
+    "input closed": ("<&-", 0),
+}
+"""What the shell does to the streams, and the exit code of a command that writes and goes well."""
+FEW = (
+    ("check", "full"),
+    ("check", "closed"),
+    ("check", "both full"),
+    ("simulate", "errors closed"),
+)
+
+
+def environment(**changes: str) -> dict[str, str]:
+    """The environment without a display, with what changes."""
+    kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    return {**kept, **changes}
+
+
+def run(
+    command: str, out: Path, redirected: str = "", **changes: str
+) -> subprocess.CompletedProcess[str]:
+    """A command in a process of its own, its streams as the shell leads them."""
+    words = [word.format(out=out) for word in command.split()]
+    return subprocess.run(
+        ["sh", "-c", f'exec "$@" {redirected}', "sh", *EOMGEN, *words],
+        check=False,
+        capture_output=True,
+        encoding="utf-8",
+        env=environment(**changes),
+        timeout=120,
+    )
+
+
+def quiet(done: subprocess.CompletedProcess[str]) -> bool:
+    """Whether nothing was said that is not meant for people."""
+    said = done.stdout + done.stderr
+    return not any(word in said for word in ("Traceback", "Exception ignored", "Error:"))
+
+
+def test_every_command_is_tried() -> None:
+    """A new command is to join the table."""
+    (commands,) = (a for a in _parser()._actions if isinstance(a.choices, dict))
+    assert set(COMMANDS) == set(commands.choices or ())
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"), some(FEW, [(name, fault) for name in COMMANDS for fault in FAULTS])
+)
+def test_streams_that_fail_end_no_command(tmp_path: Path, name: str, fault: str) -> None:
+    """All files are written, what was lost is said where it can be, and the exit code is known."""
+    redirected, code = FAULTS[fault]
+    done = run(COMMANDS[name], tmp_path, redirected)
+    assert done.returncode == code and quiet(done)
+    if fault == "full":
+        assert done.stderr.splitlines()[-1] == (
+            "eomgen: standard output cannot be written: No space left on device"
+        )
+    assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
+
+
+@pytest.mark.parametrize("name", some(("check",), tuple(COMMANDS)))
+def test_a_reader_that_has_enough_is_no_fault(tmp_path: Path, name: str) -> None:
+    """As of `| head -1`, here one that is gone before anything is written."""
+    theirs, ours = os.pipe()
+    os.close(theirs)
+    words = [word.format(out=tmp_path) for word in COMMANDS[name].split()]
+    done = subprocess.run(
+        [*EOMGEN, *words], check=False, stdout=ours, stderr=subprocess.PIPE, env=environment()
+    )
+    os.close(ours)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
+
+
+@pytest.mark.parametrize("name", some(("reference",), tuple(COMMANDS)))
+@pytest.mark.parametrize("how", some(("python",), ("python", "locale")))
+def test_a_terminal_of_ascii(tmp_path: Path, name: str, how: str) -> None:
+    """Everything is said in its letters: nothing is missing, nothing escaped."""
+    ascii_alone = {
+        "python": {"PYTHONIOENCODING": "ascii"},
+        "locale": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    }[how]
+    done = run(COMMANDS[name], tmp_path, **ascii_alone)
+    assert done.returncode == 0 and quiet(done)
+    assert done.stdout.isascii() and done.stderr.isascii() and "\\u" not in done.stdout
+
+
+def test_a_derivation_in_ascii(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its formulas are drawn of ASCII; a file of it is the same whatever the terminal is."""
+    target = tmp_path / "derivation.txt"
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", terminal)
+    assert main(["derive", "two_body"]) == 0
+    assert main(["derive", "two_body", "-o", str(target)]) == 0
+    terminal.seek(0)
+    told = terminal.read()
+    assert "omega_B = phidot + thetadot" in told and "\\u" not in told
+    assert "ψ_A = θ" in target.read_text("utf-8")
+
+
+def test_spelling() -> None:
+    """Letters that an encoding lacks; those that it has stay."""
+    assert spelled("θ̈ = ω·v̇ − 2·ẋ² µs, ½ Σ ≤ 90° …", "ascii") == (
+        "theta_ddot = omega*v_dot - 2*x_dot^2 us, 1/2 Sigma <= 90 deg ..."
+    )
+    assert spelled("Übung: ö² … λ", "latin-1") == "Übung: ö² ... lambda"
+    assert spelled("Ü 漢", "ascii") == "U \\u6f22"
+
+
+class _Full(io.StringIO):
+    """A stream that takes a few letters."""
+
+    def write(self, text: str) -> int:
+        if len(self.getvalue()) > 5:
+            raise OSError(28, "No space left on device")
+        return super().write(text)
+
+
+def test_a_steady_stream(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a terminal would obey is escaped; the first failure is kept; nothing is raised."""
+    inner = io.StringIO()
+    stream = Steady(inner)
+    print("a\x1b[31mb\u202ec\ud800\x9b\nd", file=stream)
+    stream.write("\rbar")
+    stream.write("over\rwritten")
+    assert inner.getvalue() == "a\\x1b[31mb\\u202ec\\ud800\\x9b\nd\n\rbarover\\rwritten"
+    full = _Full()
+    stream = Steady(full)
+    for _ in range(5):
+        print("1234", file=stream)
+    assert full.getvalue() == "1234\n1234"
+    assert stream.lost() == "No space left on device"
+    monkeypatch.setattr(sys, "stdout", None)
+    with steady_streams() as output:
+        print("nowhere")
+        assert output.lost() == ""
+    assert sys.stdout is None
+
+
+# Interrupts.
+
+
+LONG = "simulate two_body --integrator rk4 --dt 1e-5 --t-end 1000 -o {out}"
+STOPS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
+DELAYS = [0.0, *(0.02 * 1.15**k for k in range(36))]
+"""Seconds, from before the first import to long after the run has begun."""
+LISTENING = """
+import sys
+import eomgen.__main__ as process
+listen = process._listen
+process._listen = lambda: (listen(), print("listening", flush=True))
+sys.exit(process.main())
+"""
+
+
+def whole(folder: Path) -> bool:
+    """Whether every file in a folder is whole, and nothing else is there."""
+    for path in folder.iterdir():
+        data = path.read_bytes()
+        ends = {".py": b"\n", ".csv": b"\n", ".html": b"</html>\n", ".png": b"IEND\xaeB`\x82"}
+        if path.suffix == ".npz":
+            with zipfile.ZipFile(path) as archive:
+                assert archive.testzip() is None
+        elif path.suffix not in ends or not data.endswith(ends[path.suffix]):
+            return False
+    return True
+
+
+@pytest.fixture
+def began() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Starts a command, and waits until it hears; what still runs in the end is killed."""
+    processes = []
+
+    def start(out: Path, command: str = LONG) -> subprocess.Popen[str]:
+        words = [word.format(out=out) for word in command.split()]
+        process = subprocess.Popen(
+            [sys.executable, "-c", LISTENING, *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            env=environment(),
+        )
+        processes.append(process)
+        assert process.stdout is not None and process.stdout.readline() == "listening\n"
+        return process
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize("number", some((signal.SIGINT,), tuple(STOPS)), ids=lambda n: n.name)
+@pytest.mark.parametrize("delay", some((0.0, 0.3, 2.0), DELAYS), ids="{:.2g}".format)
+def test_a_stop_has_one_exit_code(
+    tmp_path: Path,
+    began: Callable[..., subprocess.Popen[str]],
+    number: signal.Signals,
+    delay: float,
+) -> None:
+    """Whatever the moment, once Python itself has started, whose way to stop is the same but for
+    its first hundredths of a second; what is written is whole.
+    """
+    process = began(tmp_path)
+    time.sleep(delay)
+    process.send_signal(number)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode == STOPS[number], said
+    assert said == "eomgen: interrupted\n" or said.startswith(
+        "eomgen: two_body: interrupted at t = "
+    )
+    assert whole(tmp_path)
+
+
+INJECTED = """
+import signal, sys
+import eomgen.__main__
+number, calls, last = signal.Signals[sys.argv[1]], 0, int(sys.argv[2])
+sys.argv = ["eomgen", *sys.argv[3:]]
+def heard(frame, event, given):
+    global calls
+    if event == "call":
+        calls += 1
+        if calls == last:
+            sys.setprofile(None)
+            signal.raise_signal(number)
+sys.setprofile(heard)
+code = eomgen.__main__.main()
+sys.setprofile(None)
+print("calls", calls, file=sys.stderr)
+sys.exit(code)
+"""
+
+
+def injected(number: str, last: int, command: str, out: Path) -> subprocess.CompletedProcess[str]:
+    """A command that is told to stop at its n-th call of a function, or 0 for never."""
+    words = [word.format(out=out) for word in command.split()]
+    return subprocess.run(
+        [sys.executable, "-c", INJECTED, number, str(last), *words],
+        check=False,
+        capture_output=True,
+        encoding="utf-8",
+        env=environment(),
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize("number", some(("SIGINT",), ("SIGINT", "SIGTERM")))
+@pytest.mark.parametrize("name", some(("check",), ("check", "generate", "simulate", "derive")))
+def test_a_stop_at_any_call(tmp_path: Path, name: str, number: str) -> None:
+    """Among imports, while deriving, running, drawing, writing: one exit code, and whole files."""
+    command, first = COMMANDS[name], 100  # before it listens, Python's own way to stop is 130, too
+    for _ in range(2):  # the second time the module is in the store
+        counted = injected(number, 0, command, tmp_path)
+    assert counted.returncode == 0
+    calls = int(counted.stderr.split()[-1])
+    parts = some(3, 100)
+    for k in range(parts):
+        done = injected(number, first + (calls - first) * k // parts, command, tmp_path)
+        assert done.returncode == STOPS[signal.Signals[number]], (k, done.stderr)
+        assert quiet(done) and whole(tmp_path), (k, done.stderr)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # not closed
+@pytest.mark.parametrize("before", [None, b"# eomgen trajectory of an earlier run\n"])
+def test_a_file_is_whole_or_not_there(tmp_path: Path, before: bytes | None) -> None:
+    """Interrupted at any line of the writing: what was there, or all that is new; nothing else."""
+    path, data = tmp_path / "made" / "run.csv", b"# eomgen trajectory of this run\n" * 1000
+    outcomes = set()
+    for last in range(1, 200):
+        if before is not None:
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(before)
+        lines = 0
+
+        def stopping(frame: FrameType, event: str, given: object, last: int = last) -> Any:
+            nonlocal lines
+            if frame.f_code.co_filename != eomgen.files.__file__:
+                return None
+            lines += event == "line"
+            if lines == last:
+                sys.settrace(None)
+                raise KeyboardInterrupt
+            return stopping
+
+        traced = sys.gettrace()
+        try:
+            sys.settrace(stopping)
+            write_whole(path, data)
+            ended = True
+        except KeyboardInterrupt:
+            ended = False
+        finally:
+            sys.settrace(traced)
+        held = (
+            {p.name: p.read_bytes() for p in path.parent.iterdir()} if path.parent.exists() else {}
+        )
+        assert set(held) <= {path.name}, f"left behind after line {last}: {sorted(held)}"
+        outcomes.add(held.get(path.name))
+        if ended:
+            break
+        path.unlink(missing_ok=True)
+    assert ended and outcomes == {before, data}
+
+
+def test_a_stop_that_gets_lost_comes_again(tmp_path: Path) -> None:
+    """Where nothing can be raised, as while something is deleted, Python would only print it."""
+    code = (
+        "import signal, sys, time\n"
+        "import eomgen.__main__, eomgen.cli\n"
+        "class Deaf:\n"
+        "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
+        "def run():\n"
+        "    Deaf()\n"
+        "    time.sleep(20)\n"
+        "    return 0\n"
+        "eomgen.cli.main = run\n"
+        "sys.exit(eomgen.__main__.main())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=False, capture_output=True, timeout=15
+    )
+    assert (done.returncode, done.stderr) == (130, b"eomgen: interrupted\n")
+
+
+def test_an_interrupt_within_this_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """130 when the run keeps what it has, and 130 when there is nothing to keep."""
+
+    def stopped(*given: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("eomgen.run.integrate._is_finite", stopped)
+    assert main(["simulate", "pendulum", "-o", str(tmp_path)]) == 130
+    assert capsys.readouterr().err == "eomgen: pendulum: interrupted at t = 0\n"
+    assert len(list(tmp_path.iterdir())) == 5
+    monkeypatch.setattr("eomgen.commands.describing.read_model", stopped)
+    assert main(["check", "pendulum"]) == 130
+    assert capsys.readouterr().err == "eomgen: interrupted\n"
