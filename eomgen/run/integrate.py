@@ -99,8 +99,8 @@ def integrate(
         derivative=derivatives.of(watch.derivative if watch else problem.derivative),
         jacobian=jacobians.of(problem.jacobian),
     )
-    if tally and problem.contacts:
-        counted = replace(counted, contacts=tally.counting(problem.contacts))
+    if tally:
+        counted = tally.counting(counted)
     if isinstance(method, FixedStep):
         # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from eomgen.run.integrators.interface import Advance
-from eomgen.run.problem import Contacts, Floats
+from eomgen.run.problem import Floats, Problem
 
 
 def _unlimited(tally: "Tally", t: float) -> None:
@@ -23,6 +24,7 @@ class Tally:
     factorisations  LU factors made by methods that report them
     rows            rows kept
     held, looks     calls of `Contacts.held`, and of `Contacts.gaps` and `rates`
+    switches        calls of `Switching.of_state`
     low, high       (ny,), between which each state was at the ends of steps; None before the first
     """
 
@@ -34,6 +36,7 @@ class Tally:
     rows: int = 0
     held: int = 0
     looks: int = 0
+    switches: int = 0
     low: Floats | None = field(default=None, repr=False)
     high: Floats | None = field(default=None, repr=False)
 
@@ -55,19 +58,23 @@ class Tally:
         self.high = np.maximum(self.high, advance.y)
         self.check(self, advance.t)
 
-    def counting(self, contacts: Contacts) -> Contacts:
-        """The same contacts, their calls counted here."""
+    def counting(self, problem: Problem) -> Problem:
+        """The same problem, calls of its contacts and of its switching functions counted here."""
+        contacts, switching = problem.contacts, problem.switching
+        if contacts is not None:
+            contacts = replace(
+                contacts,
+                gaps=self._counted("looks", contacts.gaps),
+                rates=self._counted("looks", contacts.rates),
+                held=self._counted("held", contacts.held),
+            )
+        if switching is not None and switching.of_state is not None:
+            switching = replace(switching, of_state=self._counted("switches", switching.of_state))
+        return replace(problem, contacts=contacts, switching=switching)
 
-        def gaps(t: float, y: Floats) -> Floats:
-            self.looks += 1
-            return contacts.gaps(t, y)
+    def _counted(self, name: str, function: Callable[..., Floats]) -> Callable[..., Floats]:
+        def counted(*given: Any) -> Floats:
+            setattr(self, name, getattr(self, name) + 1)
+            return function(*given)
 
-        def rates(t: float, y: Floats) -> Floats:
-            self.looks += 1
-            return contacts.rates(t, y)
-
-        def held(t: float, y: Floats, forces: Floats) -> Floats:
-            self.held += 1
-            return contacts.held(t, y, forces)
-
-        return replace(contacts, gaps=gaps, rates=rates, held=held)
+        return counted

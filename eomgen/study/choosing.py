@@ -62,6 +62,8 @@ SLIGHT = 0.02
 """Of the error asked for: where rounding makes less, one sample of it is enough."""
 NO_WAY = 1e-9
 """Share of a run's work that any beginning is taken to be at least."""
+NEAR = 100.0
+"""Times what rounding the last state makes: what is aimed at where no run can do."""
 FIRST_STEPS = 64
 """Of equal steps, in the first run of a method."""
 
@@ -84,8 +86,8 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         best = min(search.runs, key=lambda run: judged[id(run)])
         floor, state = search.representable(best)
         aim, why = target, ""
-        if floor > ENOUGH * target:  # the best that can be had is then sought
-            aim = floor / ENOUGH
+        if floor > ENOUGH * target:
+            aim = NEAR * floor
             why = f"{state} as a double is known to {floor:.1g} of what it moves by"
         sure = [run for run in search.runs if id(run) in search.second]
         enough = [run for run in sure if judged[id(run)] <= ENOUGH * aim]

@@ -27,8 +27,9 @@ CAUTION = 0.8
 """Of the exponent that a method has in theory: taken where one difference alone is known."""
 MORE = 1.5
 """Times the steps: other steps."""
-ROUNDING = 2.0**-52
-"""No state of doubles is known to less."""
+ROUNDING, FEW = 2.0**-52, 8.0
+"""No state of doubles is known to less; and by a second run no run is known to less than a few
+times that."""
 SMALL = 1e-3
 """Once differences are less than this, errors of equal steps fall as theory has it."""
 APART = 30.0
@@ -235,7 +236,8 @@ def by_looser_run(
     if not all(other.trajectory.finished for other in (second, *samples)):
         return Estimate(math.inf, math.inf, math.nan, second)
     method, one = method_of(run.setting.integrator), run.trajectory
-    last = max(difference(one, second.trajectory, scale), representable(run, scale)[0], ROUNDING)
+    floor = max(representable(run, scale)[0], FEW * ROUNDING)
+    last = max(difference(one, second.trajectory, scale), floor)
     for other in others:
         gap = difference(one, other.trajectory, scale)
         theory = math.pow(other.tolerance / run.tolerance, CAUTION * method.exponent)
