@@ -6,6 +6,7 @@ and the end of the time are all that a clock says.
 """
 
 import math
+from dataclasses import dataclass
 
 from eomgen.errors import RunError
 from eomgen.study.choosing import TIGHTER, error_law, growth, patience, race, rung
@@ -41,18 +42,20 @@ def within(
     while search.runs:
         judged = search.judged()
         best = min(search.runs, key=lambda run: judged[id(run)])
-        left = FULL * (budget - search.spent) / search.unit
+        left = (budget - search.spent) / search.unit
         if left > SECOND * best.work and id(best) not in search.second:
             search.verify(best)
             continue
-        plans = [_tightest(search, method_of(name), judged, left) for name in names]
-        if asked is None and left > 0 and patience(search, names, plans, left):
+        left *= FULL
+        least = WORTH * judged[id(best)]
+        aims = [_tightest(search, method_of(name), judged, left) for name in names]
+        aims = [aim if aim and aim.reach <= least else None for aim in aims]
+        if asked is None and left > 0 and patience(search, names, aims, left):
             continue
-        possible = [plan for plan in plans if plan]
-        worth = [p for p in possible if not p.known or p.error <= WORTH * judged[id(best)]]
+        worth = [aim for aim in aims if aim]
         if not worth:
             return search.chosen(best, judged, True)
-        search.make(min(worth, key=lambda plan: (plan.error, plan.cost)))
+        search.make(min(worth, key=lambda aim: (aim.reach, aim.plan.cost)).plan)
     if all(tried.cut for tried in search.broken):
         raise RunError(
             f"--budget: no run of {case.problem.name} to t = {case.t_end:g} s fits into "
@@ -61,7 +64,15 @@ def within(
     return search.nothing()
 
 
-def _tightest(search: Search, method: Method, judged: dict[int, float], left: float) -> Plan | None:
+@dataclass(frozen=True)
+class _Aim:
+    """A method's next run, and the error that it may get to in the time that is left."""
+
+    plan: Plan
+    reach: float
+
+
+def _tightest(search: Search, method: Method, judged: dict[int, float], left: float) -> _Aim | None:
     """A method's tightest run for `left` units of work, with the one that tells its error; where
     little is known of its errors, one on the way to that; None if it can be held no tighter.
     """
@@ -71,13 +82,16 @@ def _tightest(search: Search, method: Method, judged: dict[int, float], left: fl
     last, tightest = own[-1].tolerance, search.tightest(method)
     law, known = error_law(search, method, judged)
     work = growth(method, own)
-    tolerance = max(work.tolerance(left / (1 + SECOND)), tightest)
+    whole = max(work.tolerance(left / (1 + SECOND)), tightest)
     sure = known and _falls(own, judged)
-    if not sure:
-        tolerance = max(tolerance, last / rung(method, RUNG))
+    tolerance = whole if sure else max(whole, last / rung(method, RUNG))
     if tolerance > last / rung(method, TIGHTER) and not last > tolerance == tightest:
         return None
-    return Plan(method, tolerance, law.at(tolerance), sure, work.at(tolerance), work.at(tolerance))
+    if search.repeats(method, tolerance):
+        return None
+    cost = work.at(tolerance)
+    reach = law.at(whole) if known else 0.0
+    return _Aim(Plan(method, tolerance, law.at(tolerance), sure, cost, cost), reach)
 
 
 def _falls(own: list[Tried], judged: dict[int, float]) -> bool:

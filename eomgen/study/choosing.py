@@ -176,9 +176,9 @@ def race(search: Search, asked: str | None, loose: bool) -> list[str]:
     return [*names, *more]
 
 
-def patience(search: Search, names: list[str], plans: Sequence[Plan | None], most: float) -> bool:
+def patience(search: Search, names: list[str], plans: Sequence[object], most: float) -> bool:
     """Try `PATIENT`, too, for `most` units of work, if it is for this motion, is not among the
-    `names`, and the explicit ones of these can be held no tighter.
+    `names`, and none of the `plans` for these, by name, is one for an explicit method.
     """
     explicit = [plan for name, plan in zip(names, plans, strict=True) if name != STIFF]
     if PATIENT in names or any(explicit) or not (_spent(search) and _smooth(search.case)):

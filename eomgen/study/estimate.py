@@ -30,6 +30,9 @@ MORE = 1.5
 ROUNDING, FEW = 2.0**-52, 8.0
 """No state of doubles is known to less; and by a second run no run is known to less than a few
 times that."""
+STRIKES = 1e-13
+"""Moments of strikes are found to 1e-14 of a step: nor is a run among rigid contacts known to less
+than some times that."""
 SMALL = 1e-3
 """Once differences are less than this, errors of equal steps fall as theory has it."""
 APART = 30.0
@@ -237,6 +240,7 @@ def by_looser_run(
         return Estimate(math.inf, math.inf, math.nan, second)
     method, one = method_of(run.setting.integrator), run.trajectory
     floor = max(representable(run, scale)[0], FEW * ROUNDING)
+    floor = floor if case.problem.contacts is None else max(floor, STRIKES)
     last = max(difference(one, second.trajectory, scale), floor)
     for other in others:
         gap = difference(one, other.trajectory, scale)

@@ -33,6 +33,11 @@ UNIT = 1e-6
 Say = Callable[[str], None]
 
 
+def _now() -> float:
+    """What the clock shows, s."""
+    return time.perf_counter()
+
+
 @dataclass(frozen=True)
 class Plan:
     """A method's next run.
@@ -96,14 +101,14 @@ class Search:
     second: dict[int, Tried] = field(default_factory=dict)
     samples: dict[int, list[Tried]] = field(default_factory=dict)
     left_out: set[str] = field(default_factory=set)
-    started: float = field(default_factory=time.perf_counter)
+    started: float = field(default_factory=_now)
     _fast: dict[int, Fast] = field(default_factory=dict)
     _disturbed: float | None = None
 
     @property
     def spent(self) -> float:
         """s by the clock since the search began."""
-        return time.perf_counter() - self.started
+        return _now() - self.started
 
     @property
     def made(self) -> list[Tried]:
