@@ -361,13 +361,13 @@ def test_a_stop_that_gets_lost_comes_again(tmp_path: Path) -> None:
         "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
         "def run():\n"
         "    Deaf()\n"
-        "    time.sleep(20)\n"
+        "    time.sleep(100)\n"
         "    return 0\n"
         "eomgen.cli.main = run\n"
         "sys.exit(eomgen.__main__.main())"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], check=False, capture_output=True, timeout=15
+        [sys.executable, "-c", code], check=False, capture_output=True, timeout=90
     )
     assert (done.returncode, done.stderr) == (130, b"eomgen: interrupted\n")
 
