@@ -18,9 +18,11 @@ from eomgen.run.trajectory import COUNTS, Trajectory
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.store import generated_code
 from eomgen.study import choosing
-from eomgen.study.choosing import meet, within
+from eomgen.study.budgeting import within
+from eomgen.study.choosing import meet
 from eomgen.study.estimate import by_second_run, difference, errors, fit, remaining
 from eomgen.study.measure import error
+from eomgen.study.moved import moved_problem
 from eomgen.study.reference import Reference, reference
 from eomgen.study.trial import Case, Setting, Tried, method_of
 
@@ -67,7 +69,8 @@ def case_of(scene: str) -> Case:
     module = load_module(generated_code(model).module, model.name)
     kept = {"samples": 1001, "rest_speed": model.simulation.rest_speed}
     problem = as_problem(module, model=model)
-    return Case(problem, model.simulation.t_end, module.UNITS, kept)
+    moved = moved_problem(module, model=model)
+    return Case(problem, model.simulation.t_end, module.UNITS, kept, moved=moved)
 
 
 def truth(case: Case, integrator: str = "DOP853", rtol: float = SMALLEST_RTOL) -> Floats:
@@ -174,7 +177,7 @@ def test_one_method_alone() -> None:
 
 def test_few_equal_steps() -> None:
     """A loose error and few rows may be had by few equal steps, at the end of each a row."""
-    case = case_of("two_body")
+    case = case_of("pendulum")
     few = replace(case, kept={**case.kept, "samples": 201})
     true = truth(case)
     tried: list[Tried] = []
@@ -187,9 +190,9 @@ def test_few_equal_steps() -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Case, "run", kept)
         assert meet(few, 1e-3).met
-        (equal,) = [one for one in tried if one.setting.integrator == "rk4"]
+        equal = next(one for one in tried if one.setting.integrator == "rk4")
         assert len(equal.trajectory.t) >= 201
-        assert error(equal.trajectory.y[-1], true[-1], case.scale(true)) < 1e-6
+        assert error(equal.trajectory.y[-1], true[-1], case.scale(true)) < 1e-3
         tried.clear()
         assert meet(case, 1e-3).met
         assert all(one.setting.dt is None for one in tried)
@@ -262,8 +265,11 @@ def test_what_was_put_aside(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Case, "run", slow)
     choice = meet(case, 1e-16)
     assert not choice.met
-    tightest = {s.integrator: s.rtol for s in made}
-    assert tightest == {"LSODA": 1e-12, "DOP853": 1e-13, "gauss_6": None}
+    tightest = {
+        name: min(one.rtol or 0 for one in made if one.integrator == name)
+        for name in {one.integrator for one in made}
+    }
+    assert tightest == {"LSODA": 1e-12, "DOP853": 1e-13, "gauss_6": 0}
 
 
 def test_impacts_have_a_floor_of_their_own() -> None:
@@ -320,7 +326,7 @@ def rows(folder: Path) -> Floats:
 def test_the_same_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The options that are told make the same run, to the last bit, works or not, few rows or many.
 
-    Which they are may differ from time to time: it is times that are compared.
+    Which they are is the same each time.
     """
 
     def made(name: str, *options: str) -> Floats:
@@ -331,7 +337,7 @@ def test_the_same_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         one = made(name, "--accuracy", "5e-6", *more)
         out = capsys.readouterr().out
         (told,) = re.findall(r"chosen: (--integrator .*)", out)
-        assert re.search(r"error estimate \S+ of the motion's scale; it took", out)
+        assert re.search(r"error estimate \S+ of the motion's scale at the end, at most", out)
         two = made(f"{name} again", *told.split(), "--samples", "300")
         assert len(one) == int(more[-1]) and np.array_equal(two[-1], one[-1])
         assert name == "few" or np.array_equal(one, two)
@@ -342,8 +348,8 @@ def test_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert main(["simulate", "pendulum", "--accuracy", "1e-16", "-o", str(tmp_path)]) == 1
     said = capsys.readouterr()
     assert re.fullmatch(
-        r"eomgen: --accuracy 1e-16: not reached, the best run's estimate is \S+: rounding or chaos "
-        r"stands in the way; take a shorter --t-end\n",
+        r"eomgen: --accuracy 1e-16: not reached, the best run's estimate is \S+: theta as a double "
+        r"is known to \S+ of what it moves by; take a shorter --t-end\n",
         said.err,
     )
     assert (tmp_path / "pendulum.npz").exists()

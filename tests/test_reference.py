@@ -95,7 +95,7 @@ def long_rows(
     scale = measure.scales(module.STATES, module.UNITS, np.array([problem.initial + 1.0] * 2))
     exactly = exactly or precise(module, None, None, problem.initial, watched=True)
     with digits():
-        return np.array([y for y, _ in rows(how[0], exactly, problem, scale, times, how[1])])
+        return np.array([row.y for row in rows(how[0], exactly, problem, scale, times, how[1])])
 
 
 def to_mp(values: np.ndarray) -> np.ndarray:

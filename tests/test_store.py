@@ -249,7 +249,7 @@ def test_what_is_no_entry_is_not_read(
     attack(entry)
     began = time.monotonic()
     assert generated(tmp_path) == RIGHT
-    assert time.monotonic() - began < 30
+    assert time.monotonic() - began < 300
     if attack is not _a_folder:
         assert store.generated_code(model_of("pendulum")).derived is False
 

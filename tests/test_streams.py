@@ -423,7 +423,7 @@ def test_a_stop_counts_whatever_is_made_of_it(command: str, said: bytes) -> None
         f"{command}\neomgen.cli.main = run\nsys.exit(eomgen.__main__.main())"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], check=False, capture_output=True, timeout=15
+        [sys.executable, "-c", code], check=False, capture_output=True, timeout=90
     )
     assert (done.returncode, done.stderr) == (130, said)
 

@@ -51,7 +51,8 @@ def seconds_of(text: str) -> float:
 
 def choose(case: "Case", given: Arguments) -> "Choice":
     """The run that is asked for by its error or its time; each run tried for it is told."""
-    from eomgen.study.choosing import meet, within
+    from eomgen.study.budgeting import within
+    from eomgen.study.choosing import meet
 
     def say(text: str) -> None:
         print(f"    trying {text}", flush=True)
@@ -75,14 +76,13 @@ def print_choice(choice: "Choice", given: Arguments) -> str:
     if not run.trajectory.finished:
         return ""
     print(f"    chosen: {run.setting.options}")
-    print(
-        f"    error estimate {_error(choice.error)}; it took {run.seconds:.2g} s, "
-        f"all {choice.runs} runs tried {choice.seconds:.2g} s"
-    )
+    print(f"    error estimate {_error(choice.error)} at the end{_most(choice)}")
+    print(f"    it took {run.seconds:.2g} s, all {choice.runs} runs tried {choice.seconds:.2g} s")
     if not choice.met:
+        why = choice.reason or "rounding or chaos stands in the way"
         return (
             f"--accuracy {given.accuracy:g}: not reached, the best run's estimate is "
-            f"{choice.error:.1g}: rounding or chaos stands in the way; take a shorter --t-end"
+            f"{choice.error:.1g}: {why}; take a shorter --t-end"
         )
     return ""
 
@@ -130,6 +130,13 @@ def warn_of_energy(motion: "Motion") -> None:
 
 def _error(value: float) -> str:
     return f"{value:.1e} of the motion's scale" if math.isfinite(value) else "none: a single run"
+
+
+def _most(choice: "Choice") -> str:
+    """What is known of the rows before the end."""
+    if not math.isfinite(choice.most):
+        return ""
+    return f", at most {choice.most:.1e} before, at t = {choice.at:.4g} s"
 
 
 def _warn(text: str) -> None:

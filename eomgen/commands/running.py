@@ -51,6 +51,7 @@ def simulate(given: Arguments) -> int:
     from eomgen.run.resume import going_on
     from eomgen.run.trajectory import load_npz
     from eomgen.show.observe import observe
+    from eomgen.study.moved import moved_problem
     from eomgen.study.trial import Case
 
     check_choice(given)
@@ -92,6 +93,7 @@ def simulate(given: Arguments) -> int:
         module.UNITS,
         kept,
         terminal_progress,
+        moved_problem(module, *values, model),
     )
     powers = as_powers(module, *values) if given.works else None
     choice = None

@@ -6,6 +6,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run.integrators import INTEGRATORS, FixedStep, fixed_step
+from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import Floats, Problem
 
 SMALLEST_RTOL = 2.3e-14
@@ -13,8 +14,10 @@ SMALLEST_RTOL = 2.3e-14
 LEAST_STEPS = 1000
 """Of an adaptive method where it cannot be told what longer steps pass over."""
 MOST_SAMPLES = 1_000_000
-ATOL = 1e-12
-"""Of each state, in parts of its size."""
+ATOL, OF_RTOL, LEAST_ATOL = 1e-12, 1e-3, 1e-15
+"""Of each state, in parts of its size: the most, a part of rtol, and the least. At a tighter rtol
+than 1e-9 an atol that stayed would be what errors come from; less than a few units in the last
+place of a state's size, or than what rounding makes of a stiff step, nothing can meet."""
 
 
 def longest_steps(max_step: float | None, span: float) -> tuple[float, float]:
@@ -42,11 +45,20 @@ def numbers(**values: float | None) -> dict[str, Floats]:
     return {name: np.array(math.nan if x is None else x) for name, x in values.items()}
 
 
-def allowed_errors(problem: Problem, atol: float | None) -> float | Floats:
+def allowed_errors(
+    problem: Problem, method: str, rtol: float, atol: float | None, span: float
+) -> float | Floats:
     """The absolute tolerance, of each state where none was given and they have sizes."""
     if atol is not None:
         return atol
-    return ATOL * np.array(problem.sizes) if problem.sizes else ATOL
+    part = min(ATOL, max(OF_RTOL * rtol, LEAST_ATOL))
+    if not problem.sizes:
+        return part
+    sizes = np.array(problem.sizes)
+    if part < ATOL and problem.noise is not None:
+        met = np.maximum(part * sizes, least_tolerance(method, rtol) * problem.noise(span))
+        return np.asarray(np.minimum(met, ATOL * sizes))
+    return np.asarray(part * sizes)
 
 
 def check_tolerances(rtol: float, atol: float | None) -> None:

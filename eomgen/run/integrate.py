@@ -16,6 +16,7 @@ from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.stepping import ANEW, Asked, adaptive_steps, begun, can_go_on, equal_steps
+from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Event, Trajectory
 from eomgen.run.works import Account, Powers
 
@@ -41,13 +42,14 @@ def integrate(
     resume: Resume | None = None,
     guard: Guard | None = None,
     unstable: bool = False,
+    tally: Tally | None = None,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
     integrator  a name in `eomgen.run.integrators.INTEGRATORS`
     dt          step in s of the fixed-step methods, which need it; the last one is shortened
     rtol, atol  what the adaptive methods hold the error of each step to; without `atol`, each state
-                has 1e-12 of its size in `problem.sizes`
+                has 1e-12 of its size in `problem.sizes`, less where rtol is below 1e-9
     samples     how many rows to keep: for fixed steps every k-th one such that there are about
                 this many (default: all), for adaptive methods this many equally spaced times
                 (default: 1001); the first and the last are always kept
@@ -68,6 +70,7 @@ def integrate(
                 lost, or repairs it (`run.guard`); what it lets pass is what it is without
     unstable    lets equal steps of an explicit method be too long for stability, to show what they
                 then do; else the run stops there and says how long they may be
+    tally       kept up to date at every step, at which it may end the run
 
     Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
     has begun, Ctrl-C included, ends it early instead: the trajectory then holds the finite rows
@@ -102,6 +105,8 @@ def integrate(
         derivative=derivatives.of(watch.derivative if watch else problem.derivative),
         jacobian=jacobians.of(problem.jacobian),
     )
+    if tally:
+        counted = tally.counting(counted)
     if isinstance(method, FixedStep):
         # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
@@ -118,10 +123,12 @@ def integrate(
     run = _Run(asked.t_start, problem.initial, account)
     if can_go_on(method) and not (watch and watch.guard.repairs):
         run.resume = partial(begun, asked, problem)
+    if tally:
+        tally.begin(problem.initial)
     counts, told = (derivatives, jacobians), progress or _ignore
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")
-        trouble = _follow(run, advances, counts, problem, method, asked.t_end, told)
+        trouble = _follow(run, advances, counts, problem, method, asked.t_end, told, tally)
         kept = _kept(run, problem, {**remembered, **numbers(rest_speed=rest_speed)})
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
@@ -277,6 +284,7 @@ def _follow(
     method: FixedStep | Adaptive,
     t_end: float,
     progress: Progress,
+    tally: Tally | None,
 ) -> str:
     """Carry `run` on to `t_end`; return "" or, if it stops before, the trouble in one line."""
     t_start, told = run.t, throttled(progress)
@@ -287,6 +295,8 @@ def _follow(
                 if not _is_finite(advance):
                     raise StepFailure(f"the state left the finite numbers; {method.remedy}")
                 run.take(advance)
+                if tally:
+                    tally.take(advance, counts[0].calls, counts[1].calls)
                 told((run.t - t_start) / (t_end - t_start))
         return ""
     except KeyboardInterrupt:

@@ -4,6 +4,7 @@ import importlib.abc
 import importlib.util
 import inspect
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache, partial
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -12,10 +13,14 @@ from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.run.explain import explain_by
 from eomgen.run.intervals import BY_INTERVALS, Interval
+from eomgen.run.noise import step_noise
 from eomgen.run.origin import origin_of
 from eomgen.run.problem import Contacts, Floats, Problem, Switching
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
+
+COUNTED = frozenset({"derivative", "jacobian"})
+"""Functions whose operations tell what a run costs."""
 
 
 class GeneratedModule(Protocol):
@@ -144,6 +149,9 @@ def as_problem(
         switching=switching,
         sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
         origin=origin_of(model, *given) if model else None,
+        noise=cache(partial(step_noise, derivative, jacobian, 0.0, initial)),
+        operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
+        columns=hasattr(module, "_along"),
     )
 
 

@@ -1,8 +1,8 @@
 """What an integrator needs to know of a mechanism: its derivative, its Jacobian, its start."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +81,10 @@ class Problem:
     explain     see `Explain`
     sizes       (ny,), of each state, in its unit, what the default of atol is a part of; 1 of each
                 if not given
+    noise       gives (ny,), the most that rounding of the derivative moves each state in a step at
+                the start of a run of some s (`run.noise`); None where that is not known
+    operations  of one call of a function, by its name, as far as they are known
+    columns     whether the Jacobian is computed along all directions at once
     corners     whether the derivative has corners or jumps, as one-sided forces have: a long step
                 might leap over what begins and ends within it
     switching   where these corners are; None where that is not known
@@ -103,6 +107,9 @@ class Problem:
     switching: Switching | None = None
     sizes: tuple[float, ...] = ()
     origin: Origin | None = None
+    noise: Callable[[float], Floats] | None = None
+    operations: Mapping[str, int] = field(default_factory=dict)
+    columns: bool = False
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

@@ -99,7 +99,7 @@ def adaptive_steps(asked: Asked, method: Adaptive, problem: Problem) -> tuple[Be
     longest, unseen = longest_steps(asked.max_step, asked.span)
     if asked.resume is not None and asked.max_step is None:
         longest, unseen = float(asked.resume["longest"]), float(asked.resume["unseen"])
-    atol = allowed_errors(problem, asked.atol)
+    atol = allowed_errors(problem, asked.integrator, asked.rtol, asked.atol, asked.span)
     bounds = adaptive.Bounds(asked.rtol, atol, longest, unseen, asked.max_steps)
 
     def begin(

@@ -153,7 +153,8 @@ class Simulation(Table):
 
     Rigid contacts that close more slowly than `rest_speed`, in m/s or rad/s, do not bounce; without
     it, those that would not rise by 5e-8 of the mechanism's size. Without `atol` each state is held
-    to 1e-12 of its own size, which comes of the scene's lengths and first motion.
+    to 1e-12 of its own size, which comes of the scene's lengths and first motion, and where
+    `rtol` is below 1e-9 to a thousandth of `rtol` of it, as far as rounding allows.
     """
 
     t_end: Positive = Field(default=10.0, description="end, s")

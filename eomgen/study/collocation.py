@@ -115,12 +115,14 @@ def _legendre(degree: int, x: Long) -> list[Long]:
 @dataclass(frozen=True, eq=False)
 class Step:
     """The state `y` (ny, long) at the end of a step, about how far off it is, in parts of the
-    scale, and the margins of corners (n, corners) at its start, at its stages, and at its end.
+    scale, the margins of corners (n, corners) at its start, at its stages, and at its end, and its
+    `extent` (2, ny), between which its stages and its end lie.
     """
 
     y: Longs
     error: float
     margins: Floats
+    extent: Floats
 
 
 def advance(
@@ -164,7 +166,10 @@ def advance(
             end = y + method.d @ moves
             if precise.watch:
                 margins = [_margins(precise, t, y), *margins, _margins(precise, t + h, end)]
-            return Step(end, _error(method, moves, scale), np.array(margins, dtype=float))
+            passed = np.vstack([(y + moves).astype(float), end.astype(float)])
+            extent = np.array([passed.min(axis=0), passed.max(axis=0)])
+            error = _error(method, moves, scale)
+            return Step(end, error, np.array(margins, dtype=float), extent)
         if rate > 0.5:
             raise NoStep("the corrections do not shrink")
         last = size
@@ -255,11 +260,14 @@ class _Way:
 
     def __init__(self, ladder: Sequence[int], t: Long, y: Longs, length: Long) -> None:
         self.t, self.y, self.length, self.made = t, y, length, 0
+        self.extent = np.array([y.astype(float)] * 2)
         self.ladder, self.stages = ladder, ladder[-1]
 
     def take(self, h: Long, step: Step, tolerance: float, *, spare: bool) -> None:
         """Go on to the end of a step; where it was short only because of a row, with `spare`."""
         self.t, self.y, self.made = self.t + h, step.y, self.made + 1
+        self.extent[0] = np.minimum(self.extent[0], step.extent[0])
+        self.extent[1] = np.maximum(self.extent[1], step.extent[1])
         factor = _factor(step.error, tolerance, self.stages)
         self.length = max(h * factor, self.length) if factor > 1 else h * factor
         fewer = self.ladder[max(self.ladder.index(self.stages) - 1, 0)]
@@ -286,6 +294,17 @@ def _factor(error: float, tolerance: float, stages: int) -> float:
     return min(max(factor, SHRINK), GROW)
 
 
+@dataclass(frozen=True, eq=False)
+class Row:
+    """The state `y` (ny, long) at a time, how many `steps` were made up to then, and the `extent`
+    (2, ny) between which all states were.
+    """
+
+    y: Longs
+    steps: int
+    extent: Floats
+
+
 def rows(
     ladder: Sequence[int],
     precise: Precise,
@@ -294,8 +313,8 @@ def rows(
     times: Floats,
     tolerance: float,
     told: Callable[[float], None] = lambda t: None,
-) -> Iterator[tuple[Longs, int]]:
-    """The state at each of `times` (ascending; the first is the start) and the steps made so far.
+) -> Iterator[Row]:
+    """The motion at each of `times`, ascending; the first is the start.
 
     ladder     numbers of stages, ascending; a step takes the least that serve
     tolerance  what each step's error is held to, in parts of the scale
@@ -305,10 +324,10 @@ def rows(
     Long numbers must be on (`digits`) wherever this is resumed. Raises `NoStep` if steps shrink to
     nothing, or corners turn again and again.
     """
-    forecast = Forecast(problem, scale, float(times[-1]))
     start = np.array(precise.initial, dtype=object)
     way = _Way(ladder, mpfr(float(times[0])), start, mpfr(float(times[1] - times[0])))
-    yield start, 0
+    forecast = Forecast(problem, scale, float(times[-1]), lambda: told(float(way.t)))
+    yield Row(start, 0, way.extent)
     for end in times[1:]:
         target = mpfr(float(end))
         turn, tried, h = None, 0, mpfr(0)
@@ -341,7 +360,7 @@ def rows(
             tried = 0
             if count == 1 and abs(target - way.t) <= abs(target) * 2.0 ** (3 - BITS):
                 way.t = target
-        yield way.y, way.made
+        yield Row(way.y, way.made, way.extent)
 
 
 def _turned(

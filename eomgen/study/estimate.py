@@ -15,10 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from eomgen.run.checks import longest_steps
 from eomgen.run.problem import Floats
 from eomgen.run.trajectory import Trajectory
 from eomgen.study.measure import WRONG
-from eomgen.study.trial import TIGHTEST_OF_ALL, Case, Tried, method_of
+from eomgen.study.trial import TIGHTEST_OF_ALL, Case, Setting, Tried, method_of
 
 LAST = 0.1
 """Part of a run's time over whose rows differences are taken."""
@@ -26,8 +27,12 @@ CAUTION = 0.8
 """Of the exponent that a method has in theory: taken where one difference alone is known."""
 MORE = 1.5
 """Times the steps: other steps."""
-ROUNDING = 2.0**-52
-"""No state of doubles is known to less."""
+ROUNDING, FEW = 2.0**-52, 8.0
+"""No state of doubles is known to less; and by a second run no run is known to less than a few
+times that."""
+STRIKES = 1e-13
+"""Moments of strikes are found to 1e-14 of a step: nor is a run among rigid contacts known to less
+than some times that."""
 SMALL = 1e-3
 """Once differences are less than this, errors of equal steps fall as theory has it."""
 APART = 30.0
@@ -38,6 +43,12 @@ taken so many times."""
 ALIKE = 2.0
 """Runs of two methods are taken to be off by so many times what they differ by, for they may be off
 alike; and it is the nearest of several that is asked."""
+WIDER = 10.0
+"""Times a run's tolerances: those of the run that tells its error."""
+MOSTLY = 0.3
+"""Share of a run's steps: with so many as long as any may be, its tolerance does not make them."""
+CHANCE = 1.5
+"""Times what a run and another sample of rounding differ by: the error is taken to be no less."""
 SLOPES = (0.6, 1.2)
 """Of the exponent in theory: what a fitted one is kept to."""
 
@@ -177,8 +188,83 @@ class Estimate:
     second: Tried
 
 
+def representable(run: Tried, scale: Floats) -> tuple[float, int]:
+    """What rounding of the last state to doubles may make its error, and of which state: half a
+    unit in the last place, in parts of the scale.
+    """
+    floors = np.spacing(np.abs(run.trajectory.y[-1])) / 2 / scale
+    worst = int(np.argmax(floors))
+    return float(floors[worst]), worst
+
+
+def looser(case: Case, run: Tried) -> tuple[Setting, Case]:
+    """What tells a run's error: ten times its tolerances, or twice its step.
+
+    Where most steps are kept short for other reasons, that makes no other steps: they are to be
+    twice as long where the user bounds them, and half as long where nothing else can be had.
+    """
+    given = run.setting
+    if given.dt is not None:
+        return replace(given, dt=2 * given.dt), case
+    assert given.rtol is not None
+    atol = None if given.atol is None else _plain(given.atol * WIDER)
+    setting = replace(given, rtol=_plain(given.rtol * WIDER), atol=atol)
+    counts, bound = run.trajectory.counts, case.kept.get("max_step")
+    if bound is not None:
+        return setting, replace(case, kept={**case.kept, "max_step": 2 * bound})
+    if counts["capped"] > MOSTLY * counts["steps"]:
+        _, unseen = longest_steps(None, case.t_end)
+        return given, replace(case, kept={**case.kept, "max_step": unseen / 2})
+    return setting, case
+
+
+def by_looser_run(
+    case: Case,
+    run: Tried,
+    second: Tried,
+    others: Sequence[Tried],
+    samples: Sequence[Tried],
+    scale: Floats,
+) -> Estimate:
+    """A run's error by a second one as `looser` has it, whose constants were moved by rounding.
+
+    others   looser runs of the same method
+    samples  of the same setting, with constants moved in other ways
+
+    What the two differ by is the error of the second, mostly; so it is more than that of the run,
+    but not by much where errors do not fall with the tolerance, as those of LSODA near rounding, or
+    where rounding makes them. Two runs may be near each other by accident: no less is stated than
+    what the others' differences make, carried on by theory, nor than what samples tell of rounding.
+    """
+    if not all(other.trajectory.finished for other in (second, *samples)):
+        return Estimate(math.inf, math.inf, math.nan, second)
+    method, one = method_of(run.setting.integrator), run.trajectory
+    floor = max(representable(run, scale)[0], FEW * ROUNDING)
+    floor = floor if case.problem.contacts is None else max(floor, STRIKES)
+    last = max(difference(one, second.trajectory, scale), floor)
+    for other in others:
+        gap = difference(one, other.trajectory, scale)
+        theory = math.pow(other.tolerance / run.tolerance, CAUTION * method.exponent)
+        if gap < WRONG:
+            last = max(last, gap / theory)
+    for sample in samples:
+        last = max(last, CHANCE * difference(one, sample.trajectory, scale))
+    if case.problem.contacts is not None:
+        return Estimate(last, last, float(one.t[-1]), second)
+    most, at = _greatest(one, second.trajectory, scale)
+    return Estimate(last, max(last, most), at, second)
+
+
+def _greatest(one: Trajectory, two: Trajectory, scale: Floats) -> tuple[float, float]:
+    """The greatest difference of rows at the same times, in parts of the scale, and when."""
+    t, i, j = np.intersect1d(one.t, two.t, return_indices=True)
+    apart = np.max(np.abs(one.y[i] - two.y[j]) / scale, axis=1)
+    worst = int(np.argmax(apart))
+    return float(apart[worst]), float(t[worst])
+
+
 def by_second_run(case: Case, first: Tried) -> Estimate:
-    """A run's error by another run, which is made here.
+    """A run's error by another run, which is made here, with constants moved by rounding.
 
     The other has a tenth of its tolerances, or half its step; where they are near the tightest, ten
     times them.
@@ -191,23 +277,21 @@ def by_second_run(case: Case, first: Tried) -> Estimate:
         factor = 0.1 if given.rtol >= 10 * tightest else 10.0
         atol = None if given.atol is None else _plain(given.atol * factor)
         other = replace(given, rtol=_plain(given.rtol * factor), atol=atol)
-    second = case.run(other)
+    second = case.run(other, moved=0)
     if second.interrupted:
         raise KeyboardInterrupt
     one, two = first.trajectory, second.trajectory
     if not (one.finished and two.finished):
         return Estimate(math.inf, math.inf, math.nan, second)
     exponent = method_of(given.integrator).exponent * (CAUTION if given.dt is None else 1)
-    # What they are apart by is one error less the other.
-    share = abs(1 - math.pow(second.tolerance / first.tolerance, exponent))
-    scale = case.scale(two.y)
+    # What they are apart by is one error less the other; near rounding that is all there is.
+    share = min(abs(1 - math.pow(second.tolerance / first.tolerance, exponent)), 1.0)
+    scale = case.scale(second.extent)
     last = difference(one, two, scale) / share
     if case.problem.contacts is not None:
         return Estimate(last, last, float(one.t[-1]), second)
-    t, i, j = np.intersect1d(one.t, two.t, return_indices=True)
-    apart = np.max(np.abs(one.y[i] - two.y[j]) / scale, axis=1) / share
-    worst = int(np.argmax(apart))
-    return Estimate(last, max(last, float(apart[worst])), float(t[worst]), second)
+    most, at = _greatest(one, two, scale)
+    return Estimate(last, max(last, most / share), at, second)
 
 
 def _plain(value: float) -> float:

@@ -1,17 +1,29 @@
-"""The motion ahead, roughly: LSODA's, which takes stiff motion as it takes any."""
+"""The motion ahead, roughly: LSODA's, or Radau's where LSODA takes too many steps.
+
+LSODA is the cheaper one of the two by far, stiff motion or not. But where rounding of a stiff
+derivative is more than its tolerance, its steps shrink to nothing; Radau's then do not, its
+tolerance being looser and more than what rounding makes.
+"""
 
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.integrate import LSODA
+from scipy.integrate import LSODA, Radau
 
+from eomgen.run.noise import step_noise
 from eomgen.run.problem import Floats, Problem
 
-FORECAST = 1e-10
-"""Relative tolerance of the forecast; what it is off makes the first correction."""
+FORECAST, ROUGHLY = 1e-10, 1e-5
+"""Relative tolerance of the forecast by LSODA, and by Radau; what it is off makes the first
+correction."""
+OF_NOISE = 10.0
+"""Times what rounding makes of a state: no tolerance is less."""
 ASTRAY = 1e-6
 """A forecast this far off, in parts of the scale, begins anew."""
+MANY = 500
+"""Steps of LSODA that one call may take: a step of the method that is forecast has a few dozen."""
 
 
 class NoStep(ArithmeticError):
@@ -19,10 +31,18 @@ class NoStep(ArithmeticError):
 
 
 class Forecast:
-    """The motion ahead, roughly: what one double-precision run yields, begun anew as it strays."""
+    """The motion ahead, roughly: what one double-precision run yields, begun anew as it strays.
 
-    def __init__(self, problem: Problem, scale: Floats, t_end: float) -> None:
+    `check` is called at every step; what it raises ends this.
+    """
+
+    def __init__(
+        self, problem: Problem, scale: Floats, t_end: float, check: Callable[[], None]
+    ) -> None:
+        self._check = check
         self._problem, self._scale, self._t_end = problem, scale, t_end
+        self._method: Any = LSODA
+        self._tolerance, self._astray = FORECAST, ASTRAY * scale
         self._pieces: list[Any] = []
         self._solver: Any = None
 
@@ -34,28 +54,39 @@ class Forecast:
         if self._solver is None or not self._reaches(t, t):
             self._begin(t, y)
         shift = y - self._at(t)
-        if np.max(np.abs(shift) / self._scale) > ASTRAY:
+        if np.any(np.abs(shift) > self._astray):
             self._begin(t, y)
             shift = np.zeros_like(y)
+        steps = 0
         while not self._reaches(t, times[-1]):
+            steps += 1
+            if steps > MANY and self._method is LSODA:
+                self._method, self._tolerance = Radau, ROUGHLY
+                self._begin(t, y)
+                shift = np.zeros_like(y)
             self._go_on()
         self._pieces = [piece for piece in self._pieces if piece.t >= t]
         return np.array([self._at(float(time)) + shift for time in times])
 
     def _begin(self, t: float, y: Floats) -> None:
         self._pieces = []
-        self._solver = LSODA(
+        noise = step_noise(self._problem.derivative, self._problem.jacobian, t, y, self._t_end)
+        atol = np.maximum(self._tolerance * self._scale, OF_NOISE * noise)
+        off = OF_NOISE * (atol + self._tolerance * self._scale)
+        self._astray = np.maximum(ASTRAY * self._scale, off)
+        self._solver = self._method(
             self._problem.derivative,
             t,
             y.copy(),
             self._t_end,
-            rtol=FORECAST,
-            atol=FORECAST * self._scale,
+            rtol=self._tolerance,
+            atol=atol,
             jac=self._problem.jacobian,
         )
         self._go_on()
 
     def _go_on(self) -> None:
+        self._check()
         before = self._solver.t
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # LSODA says in one what it then fails with

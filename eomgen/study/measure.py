@@ -19,6 +19,9 @@ WRONG = 0.1
 def scales(states: Sequence[str], units: Mapping[str, str], y: Floats) -> Floats:
     """The scale of each state (ny,) of a motion y (n, ny), in the state's unit; positive.
 
+    y may hold no more than the least and the greatest value of each state. Rows at equal times are
+    not enough: those of an orbit, a period apart, do not move at all.
+
     A group that does not move at all has the greatest value in it as its scale, and 1 if all its
     values are 0.
     """

@@ -97,8 +97,7 @@ def precise(
     watch = Watch() if watched and any(name in names for name in CORNERS) else None
     with digits(bits):
         functions = {**BY_MPFR, **(watch.functions() if watch else {})}
-        given = _long(parameters, module.PARAMETERS)
-        constants = _over(module._fixed, BY_MPFR)(*given)["derivative"]
+        constants = constants_of(module, parameters)["derivative"]
         u = _long(inputs, module.INPUTS)
         start = tuple(map(mpfr, initial.tolist()))
         kernel = _over(module._derivative, functions)
@@ -112,6 +111,14 @@ def precise(
         return cast(Sequence[Long], kernel(y, constants, u, **time, **called))
 
     return Precise(derivative, start, watch)
+
+
+def constants_of(module: Any, parameters: Any) -> Mapping[str, tuple[Long, ...]]:
+    """What each function of a module takes that depends on parameters alone, in long numbers; to be
+    used within `digits()`.
+    """
+    given = _long(parameters, module.PARAMETERS)
+    return cast(Mapping[str, tuple[Long, ...]], _over(module._fixed, BY_MPFR)(*given))
 
 
 def _over(function: Any, functions: Mapping[str, Callable[..., Long]]) -> Any:

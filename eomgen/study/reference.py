@@ -11,6 +11,7 @@ import hashlib
 import io
 import time
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +27,9 @@ from eomgen.run.integrators import INTEGRATORS
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
+from eomgen.run.tally import Tally
 from eomgen.study import measure
-from eomgen.study.collocation import Longs, rows
+from eomgen.study.collocation import Longs, Row, rows
 from eomgen.study.precise import BITS, digits, precise
 
 ROWS = 201
@@ -35,12 +37,14 @@ SECONDS = 300.0
 """Of processor time that a reference in long numbers may take; one in doubles comes on top."""
 TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
 """Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
-FORMAT = "reference 3"
+FORMAT = "reference 4"
 """Changes whenever a reference would come out otherwise."""
 _SOON = 1.0
 """A run in doubles may always take so long, s."""
 _LOOKS = 64
 """Derivatives after which a run in doubles looks at the clock."""
+SELDOM = 50
+"""Of so many steps in long numbers, one looks at the clock."""
 _JUDGED = 0.1
 """Share of the time after which the pace tells whether it will suffice."""
 
@@ -65,6 +69,11 @@ class Reference:
     final_error: float
     origin: str
     seconds: float
+
+
+_Found = tuple[Floats, Floats, Floats, str]
+"""The motion (n, ny), the same plus what it may be off, between which states lie (2, ny), and how
+all that was found."""
 
 
 class TooLongError(Exception):
@@ -128,7 +137,7 @@ def reference(
     times = np.linspace(0.0, t_end, ROWS)
     watched = problem if doubles else paced(problem, t_end, seconds, lambda _: told(0.0))
     try:
-        rough = _roughly(watched, times, rest_speed)
+        rough = _roughly(watched, t_end, rest_speed)
     except TooLongError as reason:
         raise RunError(f"no run of {t_end:g} s: {reason} already") from None
     scale = measure.scales(module.STATES, module.UNITS, rough)
@@ -144,8 +153,8 @@ def reference(
         why = "rigid contacts" if problem.contacts else "as asked"
     if not (found or doubles):
         raise RunError(f"no run of {t_end:g} s in long numbers: {why}")
-    y, other, origin = found or _in_doubles(problem, times, scale, rest_speed, why, told)
-    scale = measure.scales(module.STATES, module.UNITS, y)
+    y, other, extent, origin = found or _in_doubles(problem, times, scale, rest_speed, why, told)
+    scale = measure.scales(module.STATES, module.UNITS, extent)
     apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)
     spent = time.monotonic() - began
     made = Reference(times, y, scale, float(apart.max()), float(apart[-1]), origin, spent)
@@ -163,39 +172,41 @@ def _in_long_numbers(
     scale: Floats,
     seconds: float,
     progress: Progress,
-) -> tuple[Floats, Floats, str]:
-    """The motion (n, ny), the same plus what the looser run is off, and how they were found."""
+) -> _Found:
+    """The motion by Gauss collocation. Raises `TooLongError` where that takes longer."""
     began = time.process_time()
 
     def run(
         stages: tuple[int, ...], tolerance: float, before: float, share: float
-    ) -> tuple[Longs, int]:
-        found = []
+    ) -> tuple[Longs, Row]:
+        found: list[Longs] = []
+        calls = count()
 
         def told(t: float) -> None:
+            if next(calls) % SELDOM:  # to look at the clock takes as long as a step
+                return
             done = before + share * t / float(times[-1])
             progress(done)
             _check_pace(time.process_time() - began, done, seconds, "long numbers")
 
         exactly = precise(module, parameters, inputs, problem.initial, watched=True)
         with digits():
-            for y, made in rows(stages, exactly, problem, scale, times, tolerance, told):
-                found.append(y)
-                steps = made
+            for row in rows(stages, exactly, problem, scale, times, tolerance, told):
+                found.append(row.y)
         progress(before + share)
-        return np.array(found), steps
+        return np.array(found), row
 
     # The looser one goes first: it is the cheaper one to give up.
     loose, _ = run(*LOOSE, 0.0, 0.4)
-    tight, steps = run(*TIGHT, 0.4, 0.6)
+    tight, last = run(*TIGHT, 0.4, 0.6)
     with digits():
         off = np.abs(loose - tight).astype(float)
     y = tight.astype(float)
     origin = (
-        f"Gauss collocation of order up to {2 * TIGHT[0][-1]} in {BITS} bits, {steps} steps; "
+        f"Gauss collocation of order up to {2 * TIGHT[0][-1]} in {BITS} bits, {last.steps} steps; "
         "error: of the same with fewer stages and a looser tolerance, and of rounding to doubles"
     )
-    return y, y + off, origin
+    return y, y + off, last.extent, origin
 
 
 def _check_pace(spent: float, done: float, seconds: float, numbers: str) -> None:
@@ -204,20 +215,18 @@ def _check_pace(spent: float, done: float, seconds: float, numbers: str) -> None
         raise TooLongError(f"more than {seconds:g} s in {numbers}")
 
 
-def _roughly(problem: Problem, times: Floats, rest_speed: float | None) -> Floats:
-    """A quick run, for the scale. Raises `RunError` if it does not get to the end."""
+def _roughly(problem: Problem, t_end: float, rest_speed: float | None) -> Floats:
+    """Between which states lie in a quick run, (2, ny).
+
+    Raises `RunError` if that does not get to the end.
+    """
+    tally = Tally()
     run = integrate(
-        problem,
-        "LSODA",
-        float(times[-1]),
-        rtol=1e-6,
-        atol=1e-8,
-        samples=len(times),
-        rest_speed=rest_speed,
+        problem, "LSODA", t_end, rtol=1e-6, atol=1e-8, samples=2, rest_speed=rest_speed, tally=tally
     )
     if not run.finished:
         raise RunError(f"reference: {run.message}")
-    return run.y
+    return np.array([tally.low, tally.high])
 
 
 def _in_doubles(
@@ -227,11 +236,12 @@ def _in_doubles(
     rest_speed: float | None,
     why: str,
     progress: Progress,
-) -> tuple[Floats, Floats, str]:
-    """The motion by two methods, and how."""
+) -> _Found:
+    """The motion by two methods."""
     other = "gragg_bulirsch_stoer" if "gragg_bulirsch_stoer" in INTEGRATORS else "Radau"
     found = []
     for i, (method, rtol) in enumerate((("DOP853", SMALLEST_RTOL), (other, 1e-12))):
+        tally = Tally()
 
         def told(done: float, i: int = i) -> None:
             progress((i + done) / 2)
@@ -245,6 +255,7 @@ def _in_doubles(
             samples=len(times),
             progress=told,
             rest_speed=rest_speed,
+            tally=tally,
         )
         if not run.finished:
             raise RunError(f"reference: {method}: {run.message}")
@@ -252,6 +263,7 @@ def _in_doubles(
     return (
         found[0],
         2 * found[1] - found[0],  # which of the two is better is not known
+        np.array([tally.low, tally.high]),
         f"DOP853 in doubles at rtol {SMALLEST_RTOL:g} ({why}); error: twice the difference from "
         f"{other} at rtol 1e-12",
     )

@@ -11,11 +11,14 @@ import numpy as np
 
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
+from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
 from eomgen.run.stepping import ADAPTIVE_SAMPLES
+from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Trajectory
 from eomgen.run.works import Powers
+from eomgen.study.cost import meter
 from eomgen.study.measure import scales
 
 TIGHTEST = {"LSODA": 1e-12}
@@ -28,11 +31,13 @@ LEAST = 1e-9
 """Less than this, s, no clock tells apart."""
 OVER = "no time for more"
 SOON = 0.2
-"""Part of the time allowed after which a run's pace is judged."""
+"""Part of the work allowed after which a run's pace is judged."""
 HARDLY = 0.3
 """Power of 2 by which equal steps may be longer than asked: twice the steps are twice the time."""
+MARKS = 500
+"""Times at which a run's pace is noted, about."""
 SLOW = 2.5
-"""So many times the time allowed, at the pace so far, end a run early."""
+"""So many times the work allowed, at the pace so far, end a run early."""
 
 Watch = Callable[[str], AbstractContextManager[Progress]]
 """Shows what is being tried, and how far it is."""
@@ -97,14 +102,20 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A run, and what it took, s: by the clock on the wall, and of the processor, which tells
-    methods apart where the machine has other work, too.
+    """A run, and what it took.
+
+    seconds  by the clock on the wall
+    work     counted, in units of `cost`: what methods are compared by
+    extent   (2, ny), the least and the greatest value of each state at the ends of steps
+    pace     (2, n), times, s, and the work done up to then
     """
 
     setting: Setting
     trajectory: Trajectory
     seconds: float
     work: float
+    extent: Floats
+    pace: Floats
 
     @property
     def tolerance(self) -> float:
@@ -129,6 +140,8 @@ class Case:
     units    of the states, by name
     kept     what else `integrate` is told, the same for all runs
     watch    shows each run
+    moved    gives the problem with its constants moved by rounding in one way or another, by
+             number (see `moved`); None where that is not known
     """
 
     problem: Problem
@@ -136,6 +149,7 @@ class Case:
     units: Mapping[str, str]
     kept: Mapping[str, Any] = field(default_factory=dict)
     watch: Watch = unseen
+    moved: Callable[[int], Problem] | None = None
 
     @property
     def rows(self) -> int:
@@ -148,16 +162,19 @@ class Case:
         return self.problem.corners or self.kept.get("max_step") is not None
 
     def scale(self, y: Floats) -> Floats:
-        """The scale of each state (ny,) of a motion y (n, ny)."""
+        """The scale of each state (ny,) of a motion y (n, ny), or of its extent (2, ny)."""
         return scales(self.problem.states, self.units, y)
 
-    def setting(self, method: Method, tolerance: float, like: Floats) -> Setting:
+    def setting(
+        self, method: Method, tolerance: float, extent: Floats, noise: float = 0.0
+    ) -> Setting:
         """A method at about a tolerance of few digits, or in equal steps, s, of about a length.
 
         Equal steps are the distance of the rows, halved so often that they are hardly longer than
         asked: all runs then have rows at the very same moments. The absolute tolerance is that part
-        of the smallest scale in the motion `like` (n, ny): no kind of state is then held to less
-        than the relative tolerance of its own scale.
+        of the smallest scale in the motion of this `extent` (2, ny): no kind of state is then held
+        to less than the relative tolerance of its own scale. It is no less than what the method
+        can meet where rounding moves a state by `noise` in a step.
         """
         if method.equal_steps:
             dt = self.t_end / (self.rows - 1)
@@ -165,8 +182,9 @@ class Case:
                 dt /= 2
             return Setting(method.name, dt=dt)
         rtol = max(_plain(tolerance), method.tightest)
-        size = 10.0 ** math.floor(math.log10(float(np.min(self.scale(like)))))
-        return Setting(method.name, rtol=rtol, atol=float(f"{rtol * size:.0e}"))
+        size = 10.0 ** math.floor(math.log10(float(np.min(self.scale(extent)))))
+        atol = max(rtol * size, least_tolerance(method.name, rtol) * noise)
+        return Setting(method.name, rtol=rtol, atol=float(f"{atol:.0e}"))
 
     def run(
         self,
@@ -174,38 +192,84 @@ class Case:
         *,
         most: float = math.inf,
         due: float = math.inf,
+        like: Tried | None = None,
         powers: Powers | None = None,
+        moved: int | None = None,
     ) -> Tried:
-        """Make a run. It ends early when it takes `most` s of the processor, or is sure to, and
-        when `time.perf_counter` is at `due`. `powers` asks for the works of effects.
+        """Make a run. It ends early when it takes `most` units of work, or is sure to, and when
+        `time.perf_counter` is at `due`.
+
+        like    a run whose pace this one's is judged by; else it is taken to be even
+        powers  asks for the works of effects
+        moved   the way in which constants are moved by rounding, where that is known
         """
-        with self.watch(f"simulating {self.problem.name}") as progress:
-            started, began = time.perf_counter(), time.thread_time()
+        problem = self.problem if moved is None or not self.moved else self.moved(moved)
+        spent = meter(problem, setting.integrator)
+        pace = _Pace(spent, most, due, self.t_end, like)
+        tally = Tally(pace.check)
+        with self.watch(f"simulating {problem.name}") as progress:
+            started = time.perf_counter()
             trajectory = integrate(
-                self.problem,
+                problem,
                 setting.integrator,
                 self.t_end,
                 dt=setting.dt,
                 **setting.tolerances,
                 **self.kept,
-                progress=_limited(progress, began, most, due),
+                progress=progress,
                 powers=powers,
+                tally=tally,
             )
-            seconds, work = time.perf_counter() - started, time.thread_time() - began
-        return Tried(setting, trajectory, max(seconds, LEAST), max(work, LEAST))
+            seconds = time.perf_counter() - started
+        extent = np.array([tally.low, tally.high])
+        work = max(spent(tally), 1.0)
+        return Tried(setting, trajectory, max(seconds, LEAST), work, extent, pace.made(work))
 
 
-def _limited(progress: Progress, began: float, most: float, due: float) -> Progress:
-    """`progress`, which ends the run when its time is over."""
+@dataclass
+class _Pace:
+    """How a run gets on; it is ended when its work or its time is over, or is sure to be.
 
-    def told(fraction: float) -> None:
-        progress(fraction)
-        spent = time.thread_time() - began
-        hopeless = spent > SOON * most and spent > SLOW * most * fraction
-        if fraction < 1 and (spent > most or hopeless or time.perf_counter() > due):
+    spent  its work so far
+    like   a run whose pace is what is to be expected
+    marks  times, s, and the work done up to then
+    """
+
+    spent: Callable[[Tally], float]
+    most: float
+    due: float
+    t_end: float
+    like: Tried | None
+    marks: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
+
+    def check(self, tally: Tally, t: float) -> None:
+        """Take note of a step that ends at t. Raises `StepFailure` to end the run."""
+        marked = t >= self.marks[-1][0] + self.t_end / MARKS
+        bounded = t < self.t_end and math.isfinite(self.most)
+        if marked or bounded:
+            work = self.spent(tally)
+            if marked:
+                self.marks.append((t, work))
+            if bounded:
+                hopeless = work > SOON * self.most and work > SLOW * self.most * self._share(t)
+                if work > self.most or hopeless:
+                    raise StepFailure(OVER)
+        if t < self.t_end and math.isfinite(self.due) and time.perf_counter() > self.due:
             raise StepFailure(OVER)
 
-    return told
+    def made(self, work: float) -> Floats:
+        """The pace of the whole run, which took some `work`."""
+        return np.array([*self.marks, (self.t_end, work)]).T
+
+    def _share(self, t: float) -> float:
+        return done(self.like, t, self.t_end)
+
+
+def done(run: Tried | None, t: float, t_end: float) -> float:
+    """Which share of a run's work was done up to a time, s; of none, the share of the time."""
+    if run is None:
+        return t / t_end
+    return float(np.interp(t, run.pace[0], run.pace[1])) / run.work
 
 
 def _plain(value: float) -> float:

@@ -69,7 +69,7 @@ def advances(
     course = _Course(method, problem, t_end, bounds)
     course.begin(t_start, resume)
     sampled, stalled, cut = int(np.searchsorted(times, t_start, side="right")), 0, 0
-    left = bounds.most - made
+    left, factored = bounds.most - made, 0
     for here in range(left):
         _check_pace(problem, course, t_start, here, left)
         taken = course.step()
@@ -96,11 +96,12 @@ def advances(
             samples,
             problem,
             partial(_between, problem, taken),
+            factorisations=course.factorisations - factored,
             resume=course.stands(),
             capped=course.is_capped(taken),
             cut=cut,
         )
-        sampled, cut = passed, 0
+        sampled, cut, factored = passed, 0, course.factorisations
         if course.ended:
             return
         course.go_on(taken)
@@ -119,7 +120,7 @@ class _Course:
             )
         elif problem.corners:
             self._longest = min(bounds.longest, bounds.unseen)
-        self._whole, self._unseen = True, False
+        self._whole, self._unseen, self.factorisations = True, False, 0
 
     def begin(self, t: float, resume: Resume | None) -> None:
         """Begin at a time with the problem's initial state, or go on from what `stands` gave."""
@@ -152,7 +153,9 @@ class _Course:
             # One that is tried up to the end only is tried again in another length if refused.
             length = min(getattr(solver, self.method.memory[0]), self._longest)
             self._whole = self._whole and solver.t + length < self.t_end
+        factored = int(solver.nlu)
         complaint = solver.step()
+        self.factorisations += int(solver.nlu) - factored
         if solver.status == "failed":
             cause = (complaint or "the method gave up").rstrip(".")
             raise StepFailure(f"{cause}; {self.method.remedy}")

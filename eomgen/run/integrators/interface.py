@@ -81,6 +81,7 @@ class Advance:
     events   what happened at its end
     contact_powers  (t, y) -> (nc + nd,), powers of the contacts, of which some were held during the
                     step, and of the drives, W
+    factorisations  LU factors that the step took, as far as its method says
     resume   gives what a later run needs to go on from here as this one does; None where this one
              would not have stopped here, or its method cannot
     capped   whether the step is as long as any may be
@@ -96,6 +97,7 @@ class Advance:
     struck: int | None = None
     events: tuple[Event, ...] = ()
     contact_powers: Callable[[float, Floats], Floats] | None = None
+    factorisations: int = 0
     resume: Callable[[], Resume] | None = None
     capped: bool = False
     cut: int = 0

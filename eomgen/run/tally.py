@@ -1,0 +1,80 @@
+"""What a run takes, counted rather than timed, and how far its motion goes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from eomgen.run.integrators.interface import Advance
+from eomgen.run.problem import Floats, Problem
+
+
+def _unlimited(tally: "Tally", t: float) -> None:
+    """Let every run go on."""
+
+
+@dataclass
+class Tally:
+    """Counts of one run; `integrate` keeps it up to date at every step.
+
+    check           told this tally and the time, s, after each step; raises `StepFailure` to end
+                    the run
+    steps, derivatives, jacobians  as in `Trajectory.counts`
+    factorisations  LU factors made by methods that report them
+    rows            rows kept
+    held, looks     calls of `Contacts.held`, and of `Contacts.gaps` and `rates`
+    switches        calls of `Switching.of_state`
+    low, high       (ny,), between which each state was at the ends of steps; None before the first
+    """
+
+    check: Callable[["Tally", float], None] = _unlimited
+    steps: int = 0
+    derivatives: int = 0
+    jacobians: int = 0
+    factorisations: int = 0
+    rows: int = 0
+    held: int = 0
+    looks: int = 0
+    switches: int = 0
+    low: Floats | None = field(default=None, repr=False)
+    high: Floats | None = field(default=None, repr=False)
+
+    def begin(self, y: Floats) -> None:
+        """Take note of the initial state."""
+        self.low = self.high = y
+
+    def take(self, advance: Advance, derivatives: int, jacobians: int) -> None:
+        """Take note of a step or strike, and of the calls made so far.
+
+        Raises `StepFailure` where `check` does.
+        """
+        assert self.low is not None and self.high is not None
+        self.steps += advance.is_step
+        self.factorisations += advance.factorisations
+        self.rows += len(advance.samples)
+        self.derivatives, self.jacobians = derivatives, jacobians
+        self.low = np.minimum(self.low, advance.y)
+        self.high = np.maximum(self.high, advance.y)
+        self.check(self, advance.t)
+
+    def counting(self, problem: Problem) -> Problem:
+        """The same problem, calls of its contacts and of its switching functions counted here."""
+        contacts, switching = problem.contacts, problem.switching
+        if contacts is not None:
+            contacts = replace(
+                contacts,
+                gaps=self._counted("looks", contacts.gaps),
+                rates=self._counted("looks", contacts.rates),
+                held=self._counted("held", contacts.held),
+            )
+        if switching is not None and switching.of_state is not None:
+            switching = replace(switching, of_state=self._counted("switches", switching.of_state))
+        return replace(problem, contacts=contacts, switching=switching)
+
+    def _counted(self, name: str, function: Callable[..., Floats]) -> Callable[..., Floats]:
+        def counted(*given: Any) -> Floats:
+            setattr(self, name, getattr(self, name) + 1)
+            return function(*given)
+
+        return counted
