@@ -42,9 +42,10 @@ def tell_refusal(error: EomgenError) -> None:
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return ``" (did you mean 'x'?)"`` for the known word nearest to `word`, or ``""``."""
     # Small and capital letters are the least of differences: rk45 is RK45 rather than rk4.
-    alike = {name.casefold(): name for name in known}
-    close = difflib.get_close_matches(word.casefold(), list(alike), n=1, cutoff=0.6)
-    return f" (did you mean '{alike[close[0]]}'?)" if close else ""
+    names = list(known)
+    close = [name for name in names if name.casefold() == word.casefold()]
+    close = close or difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    return f" (did you mean '{close[0]}'?)" if close else ""
 
 
 def listed(names: Iterable[str]) -> str:

@@ -386,7 +386,7 @@ def test_scenes_by_form(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ("--methods rk5", "unknown name 'rk5' (did you mean 'RK45'?)"),
+        ("--methods rk5", "unknown name 'rk5' (did you mean 'rk4'?)"),
         ("--methods ,", "--methods: names no integrator"),
         ("--run-time 0", "--run-time: 0 is no positive time"),
         ("--time nan", "--time: nan is no positive time"),

@@ -569,7 +569,7 @@ def test_adaptive_run_stops_after_max_steps():
         (
             "rk5",
             {},
-            "integrator: unknown name 'rk5' (did you mean 'RK45'?); known: euler, "
+            "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
             "semi_implicit_euler, leapfrog, rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
             "DOP853, gragg_bulirsch_stoer, Radau, Radau_differences, BDF, BDF_differences, LSODA",
         ),

@@ -22,7 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent.parent
 SCENES = ("pendulum", "two_body", "tumbling_body", "bouncing_two_body")
 METHODS = ("LSODA", "Radau", "DOP853", "gragg_bulirsch_stoer", "gauss_6")
-TESTS = ("formula", "integrators", "bouncing", "quaternions", "sensitivity")
+TESTS = ("formula", "trajectory", "small_faults")
 RUNNERS = ("pytest", "pytest-xdist")
 """What these tests need of the packages for tests."""
 _NAMED = re.compile(r"python3\.(\d+)")
