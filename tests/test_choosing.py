@@ -14,7 +14,7 @@ from eomgen.cli import main
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Contacts, Floats, Problem
-from eomgen.run.trajectory import Trajectory
+from eomgen.run.trajectory import COUNTS, Trajectory
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.store import generated_code
 from eomgen.study import choosing
@@ -84,7 +84,7 @@ def in_long_numbers(scene: str, t_end: float | None = None) -> Reference:
 
 def motion(t: Floats, y: Floats) -> Trajectory:
     """A run of one state, finished."""
-    counts = dict.fromkeys(("steps", "derivatives", "jacobians", "impacts"), 0)
+    counts = dict.fromkeys(COUNTS, 0)
     return Trajectory("made up", ("q",), t, y[:, None], "RK45", True, "", counts)
 
 
