@@ -27,6 +27,7 @@ from eomgen.study import search, trial
 from eomgen.study.budgeting import within
 from eomgen.study.choosing import meet
 from eomgen.study.estimate import looser
+from eomgen.study.ladder import Ladder, Rung, Work, next_rung
 from eomgen.study.measure import error
 from eomgen.study.moved import moved, moved_problem
 from eomgen.study.reference import reference
@@ -267,3 +268,18 @@ def test_steps_as_long_as_any_may_be() -> None:
     assert setting == run.setting and other.kept["max_step"] < case.t_end / 1000
     _, other = looser(replace(case, kept={**case.kept, "max_step": 0.01}), capped)
     assert other.kept["max_step"] == 0.02
+
+
+def test_the_study_asks_for_what_rounding_allows() -> None:
+    """No rung of `eomgen accuracy` has an atol below what rounding makes of a step."""
+    noise = 1e-10
+    quiet = Ladder(t_end=1.0, first=25, atol_scale=1e-11, quick=False, run_time=60.0)
+    for method in ("LSODA", "DOP853", "Radau"):
+        for ladder, least in ((quiet, 0.0), (replace(quiet, noise=noise), noise)):
+            done: dict[Rung, Work] = {}
+            while rung := next_rung(ladder, method, done):
+                assert rung.rtol is not None and rung.atol is not None
+                assert rung.atol == pytest.approx(1e-11 * rung.rtol) or least
+                assert rung.atol >= 10 * least
+                done[rung] = Work(rung, "ok", 0.0, 1, error=rung.rtol)
+            assert len(done) == 12

@@ -183,13 +183,14 @@ def _check_reference(bench: "Bench") -> None:
 def _ladder(bench: "Bench", t_end: float, given: Arguments) -> "Ladder":
     from eomgen.study.ladder import Ladder, atol_scale, first_steps
 
-    truth = bench.reference
+    truth, noise = bench.reference, bench.problem.noise
     return Ladder(
         t_end=t_end,
         first=first_steps(bench.problem, truth.t, truth.y, truth.scale),
         atol_scale=atol_scale(truth.y, truth.scale),
         quick=given.quick,
         run_time=given.run_time,
+        noise=float(max(noise(t_end))) if noise else 0.0,
     )
 
 

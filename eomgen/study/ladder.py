@@ -13,6 +13,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run.integrators import INTEGRATORS, FixedStep, find_integrator
+from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import Floats, Problem
 
 Status = Literal["ok", "wrong", "failed", "over", "refused"]
@@ -95,6 +96,8 @@ class Ladder:
     quick       every second rung alone
     run_time    a run that takes longer, s, ends its ladder
     most_steps  equal steps of the finest run at most
+    noise       the most that rounding moves a state in a step, where the motion is fast: atol is
+                no less than what a method can then meet
     """
 
     t_end: float
@@ -103,6 +106,7 @@ class Ladder:
     quick: bool
     run_time: float
     most_steps: int = MOST_STEPS
+    noise: float = 0.0
 
 
 def kind(method: str) -> Kind:
@@ -165,11 +169,12 @@ def _fixed(ladder: Ladder, method: str) -> list[Rung]:
 
 def _adaptive(ladder: Ladder, method: str) -> list[Rung]:
     powers = range(LOOSEST, TIGHTEST + 1, 2 if ladder.quick else 1)
-    rtols = [float(f"1e-{power}") for power in powers]
-    # Four digits: what a user can repeat by hand.
-    return [
-        Rung(method, rtol=rtol, atol=float(f"{rtol * ladder.atol_scale:.3e}")) for rtol in rtols
-    ]
+    rungs = []
+    for rtol in (float(f"1e-{power}") for power in powers):
+        atol = max(rtol * ladder.atol_scale, least_tolerance(method, rtol) * ladder.noise)
+        # Four digits: what a user can repeat by hand.
+        rungs.append(Rung(method, rtol=rtol, atol=float(f"{atol:.3e}")))
+    return rungs
 
 
 def _ends(ladder: Ladder, climbed: Sequence[Work], fixed: bool) -> bool:
