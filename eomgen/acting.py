@@ -9,7 +9,8 @@ from eomgen.effects.base import ExtraState, Input
 from eomgen.errors import SceneError
 from eomgen.joints import Prismatic, Revolute
 from eomgen.joints.base import WORLD
-from eomgen.language.formula import ZERO, Floats, evaluate
+from eomgen.language.conditions import Condition, require
+from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, about_slides, of_joint, with_components
 from eomgen.model import Body, ways_of
 from eomgen.naming import check_known, check_names, named
@@ -43,18 +44,21 @@ def acting_effects(
     sliding: Collection[str],
     known: dict[str, float],
     parameters: list[Parameter],
+    conditions: list[Condition],
     motion: Sequence[str],
 ) -> list[Effect]:
     """Effects with bodies, points and joints that there are, and vectors of the right length.
 
     `sliding` are the joints and coordinates that slide; `known` holds the values of the scene's
     own parameters, `motion` names what changes as it moves; `parameters` grows by those of bare
-    numbers. Raises `SceneError`, naming the place, for an effect that cannot act.
+    numbers, `conditions` by what values are to keep. Raises `SceneError`, naming the place, for an
+    effect that cannot act.
     """
     check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
     ways = ways_of(bodies, scene.dimensions)
     names_of_ways = {b.joint.name: [c.name for c in b.positions] for b in bodies}
     there = _there(scene, bodies, ways)
+    types = {b.joint.name: b.joint.type for b in bodies}
     effects: list[Effect] = []
     for i, effect in enumerate(scene.effects):
         place = f"effects[{i}]"
@@ -62,6 +66,12 @@ def acting_effects(
             raise SceneError(f"{place}.type: a second 'gravity'; give one")
         for fields, (what, names) in there.items():
             for name, spot in _names_in(effect, getattr(effect, fields), place):
+                if "joint" in what and name in types and name not in names:
+                    one = what if fields == "joint_fields" else f"{what} and is not free"
+                    raise SceneError(
+                        f"{spot}: '{name}' is a {types[name]} joint, which '{effect.type}' does "
+                        f"not act on; name a {one}"
+                    )
                 check_known(name, spot, names, what)
         effect.check_ways(ways, names_of_ways, place)
         vectors = {
@@ -72,8 +82,11 @@ def acting_effects(
         effect = effect.replaced(**vectors).checked(scene.dimensions, place)
         if isinstance(effect, Driven):
             check_drive(effect, place, bodies, effects, known, motion)
-        effects.append(named(effect, effect.name, place, known, parameters, motion, sliding))
-        effect.check_values(lambda formula: float(evaluate(formula, known, Floats())), place)
+        effect = named(effect, effect.name, place, known, parameters, conditions, motion, sliding)
+        together = list(effect.conditions(place))
+        require(together, {**known, **{p.name: p.default for p in parameters}})
+        conditions += together
+        effects.append(effect)
     return effects
 
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 from typing import Literal
 
 from eomgen.acting import acting_effects, at_joint, check_contacts, sliding_in
-from eomgen.effects.base import ExtraState, Input
+from eomgen.effects import Effect
 from eomgen.errors import SceneError
 from eomgen.joints import Joint
-from eomgen.joints.base import WORLD, Coordinate
+from eomgen.joints.base import WORLD
+from eomgen.language.conditions import Condition, of_inertia, require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, with_components
 from eomgen.model import Body, Model, Point
@@ -18,7 +19,7 @@ from eomgen.scene.chains import written_out
 from eomgen.scene.definitions import with_definitions
 from eomgen.scene.look import check_look
 from eomgen.scene.schema import OUTPUTS, Scene
-from eomgen.straighten import checked_inertia, straightened_joint, unit_quaternions
+from eomgen.straighten import entries_of_inertia, straightened_joint, unit_quaternions
 
 
 def build_model(scene: Scene) -> Model:
@@ -29,18 +30,17 @@ def build_model(scene: Scene) -> Model:
     parameters, known = _scene_parameters(scene)
     motion = _motion(scene)
     scene = with_definitions(scene, motion)
-    bodies, notices = _bodies(scene, known, parameters, motion)
+    conditions: list[Condition] = []
+    bodies, notices = _bodies(scene, known, parameters, conditions, motion)
     names = {body.name: i for i, body in enumerate(bodies)}
     sliding = sliding_in(bodies, scene.dimensions)
-    effects = acting_effects(scene, bodies, sliding, known, parameters, motion)
-    points = _points(scene, names, known, parameters, motion)
+    effects = acting_effects(scene, bodies, sliding, known, parameters, conditions, motion)
+    points = _points(scene, names, known, parameters, conditions, motion)
     inputs = [at_joint(x, e, sliding) for e in effects for x in e.inputs(scene.dimensions)]
     states = [at_joint(x, e, sliding) for e in effects for x in e.states(scene.dimensions)]
-    coordinates = [c for body in bodies for c in body.positions]
-    velocities = [c for body in bodies for c in body.velocities]
-    if not velocities:
+    if not any(body.velocities for body in bodies):
         raise SceneError("joints: nothing can move; give at least one that is no weld")
-    _check_symbols(parameters, coordinates, velocities, inputs, states)
+    _check_symbols(scene, parameters, bodies, effects)
     check_contacts(effects, list(names))
     locked = locked_values(scene.locked, bodies, effects)
     check_look((), scene.camera, scene.dimensions, "camera")
@@ -51,6 +51,7 @@ def build_model(scene: Scene) -> Model:
         title=scene.title or scene.name,
         dimensions=scene.dimensions,
         parameters=tuple(parameters),
+        conditions=tuple(conditions),
         inputs=tuple(inputs),
         bodies=tuple(bodies),
         points=tuple(points),
@@ -64,6 +65,10 @@ def build_model(scene: Scene) -> Model:
         simulation=scene.simulation,
         camera=scene.camera,
         locked=tuple(locked.items()),
+        # What is not there by its own name is there in degrees.
+        locked_deg=tuple(
+            (name, scene.locked[f"{name}_deg"]) for name in locked if name not in scene.locked
+        ),
         leave_out=scene.leave_out,
         notices=notices,
     )
@@ -126,10 +131,11 @@ def in_order(outputs: Collection[str]) -> tuple[str, ...]:
 def _scene_parameters(scene: Scene) -> tuple[list[Parameter], dict[str, float]]:
     parameters = []
     for name, entry in scene.parameters.items():
+        place = f"parameters.{name}"
         if isinstance(entry, float | int):
-            parameters.append(Parameter(name, float(entry), "", ""))
+            parameters.append(Parameter(name, float(entry), "", "", place))
         else:
-            parameters.append(Parameter(name, float(entry.value), entry.unit, entry.about))
+            parameters.append(Parameter(name, float(entry.value), entry.unit, entry.about, place))
     return parameters, {p.name: p.default for p in parameters}
 
 
@@ -146,7 +152,11 @@ def _motion(scene: Scene) -> list[str]:
 
 
 def _bodies(
-    scene: Scene, known: dict[str, float], parameters: list[Parameter], motion: Sequence[str]
+    scene: Scene,
+    known: dict[str, float],
+    parameters: list[Parameter],
+    conditions: list[Condition],
+    motion: Sequence[str],
 ) -> tuple[list[Body], tuple[str, ...]]:
     """Bodies with their joints, parents first and otherwise in the scene's order; and notices."""
     bodies, joints = written_out(scene)
@@ -156,6 +166,11 @@ def _bodies(
     anchors = dict.fromkeys([WORLD, *names])
     holding: dict[str, tuple[Joint, str]] = {}
     for joint, place in joints:
+        if joint.child == WORLD:
+            raise SceneError(
+                f"{place}.child: '{WORLD}' is the ground, which hangs on nothing; name it as the "
+                "parent, and give no body a second joint: loops are not closed"
+            )
         check_known(joint.child, f"{place}.child", names, "body")
         if joint.parent != WORLD:
             check_known(joint.parent, f"{place}.parent", anchors, "body")
@@ -181,15 +196,19 @@ def _bodies(
         joint, joint_place = holding[name]
         joint = straightened_joint(joint, joint_place, scene.dimensions, notices)
         check_look(body.shapes, None, scene.dimensions, place)
-        count = len(parameters)
-        body = named(body, body.name, place, known, parameters, motion)
-        own = {p.name: p.default for p in parameters[count:]}
-        joint = named(joint, joint.name, joint_place, known, parameters, motion)
+        body = named(body, body.name, place, known, parameters, conditions, motion)
+        inertia_com = entries_of_inertia(body, place, scene.dimensions)
+        values = {**known, **{p.name: p.default for p in parameters}}
+        at = f"{place}.inertia_com"
+        sound = list(of_inertia(at, body.name, body.mass, inertia_com, values))
+        require(sound, values)
+        conditions += sound
+        joint = named(joint, joint.name, joint_place, known, parameters, conditions, motion)
         built.append(
             Body(
                 name=name,
                 mass=body.mass,
-                inertia_com=checked_inertia(body, place, scene.dimensions, {**known, **own}),
+                inertia_com=inertia_com,
                 joint=joint,
                 parent=-1 if joint.parent == WORLD else index[joint.parent],
                 positions=joint.positions(scene.dimensions),
@@ -225,6 +244,7 @@ def _points(
     names: dict[str, int],
     known: dict[str, float],
     parameters: list[Parameter],
+    conditions: list[Condition],
     motion: Sequence[str],
 ) -> list[Point]:
     check_names([(point.name, f"points[{i}]") for i, point in enumerate(scene.points)])
@@ -233,30 +253,36 @@ def _points(
         place = f"points[{i}]"
         check_known(point.body, f"{place}.body", names, "body")
         at = with_components(point.at, ZERO, scene.dimensions, f"{place}.at")
-        point = named(point.replaced(at=at), point.name, place, known, parameters, motion)
+        point = point.replaced(at=at)
+        point = named(point, point.name, place, known, parameters, conditions, motion)
         points.append(Point(point.name, names[point.body], point.at))
     return points
 
 
 def _check_symbols(
+    scene: Scene,
     parameters: Sequence[Parameter],
-    coordinates: Sequence[Coordinate],
-    velocities: Sequence[Coordinate],
-    inputs: Sequence[Input],
-    states: Sequence[ExtraState],
+    bodies: Sequence[Body],
+    effects: Sequence[Effect],
 ) -> None:
-    """No name may stand for two things in the equations."""
-    taken = {"t": "time", "pi": "the number π"}
-    uses = [(p.name, "a parameter") for p in parameters]
-    uses += [(c.name, "a coordinate") for c in coordinates]
-    uses += [(c.name, "a velocity") for c in velocities]
-    uses += [(c.acceleration, "an acceleration") for c in velocities]
-    uses += [(i.name, "an input") for i in inputs]
-    uses += [(x.name, "a state") for x in states]
-    for name, use in uses:
+    """No name may stand for two things in the equations. Raises `SceneError` with both places."""
+    places = {joint.name: place for joint, place in written_out(scene)[1]}
+    moving = [(body, places[body.joint.name]) for body in bodies]
+    acting = [(effect, f"effects[{i}]") for i, effect in enumerate(effects)]
+    n = scene.dimensions
+    uses = [(p.name, "a parameter", p.place) for p in parameters]
+    uses += [(c.name, "a coordinate", at) for body, at in moving for c in body.positions]
+    uses += [(c.name, "a velocity", at) for body, at in moving for c in body.velocities]
+    uses += [(c.acceleration, "an acceleration", at) for b, at in moving for c in b.velocities]
+    uses += [(i.name, "an input", at) for effect, at in acting for i in effect.inputs(n)]
+    uses += [(x.name, "a state", at) for effect, at in acting for x in effect.states(n)]
+    taken = {"t": ("time", ""), "pi": ("the number π", "")}
+    for name, use, place in uses:
         if name in taken:
-            other = "another" if use == taken[name] else taken[name]
+            other, at = taken[name]
+            other = "another" if use == other else other
             raise SceneError(
-                f"'{name}' would be the name of {use} and of {other}; rename one of them"
+                f"{place}: '{name}' would be the name of {use} and of {other}"
+                f"{f' ({at})' if at else ''}; rename one of them"
             )
-        taken[name] = use
+        taken[name] = use, place

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from eomgen.errors import EomgenError, InterruptedRunError
+from eomgen.errors import EomgenError, InterruptedRunError, tell_refusal
 from eomgen.streams import steady_streams
 from eomgen.text import breaks_lines, one_line
 
@@ -44,8 +44,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             parser.error("generate: no scene; name one, or give --all for the built-in ones")
         code: int = given.run(given)
     except EomgenError as error:
-        for line in error.lines:
-            print(f"eomgen: {line}", file=sys.stderr)
+        tell_refusal(error)
         return INTERRUPTED if isinstance(error, InterruptedRunError) else 1
     except (OSError, MemoryError) as error:
         why = "out of memory" if isinstance(error, MemoryError) else one_line(str(error))
@@ -101,7 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     check = command("check", commands.check, "validate a scene and say what it is made of")
     check.add_argument("--long", action="store_true", help="list everything, however much")
     _form(check)
-    derive = _form(command("derive", commands.derive, "print the derivation, step by step"))
+    derive = command("derive", commands.derive, "print the derivation, step by step")
     derive.add_argument("--format", choices=("text", "latex", "html"), default="text")
     derive.add_argument("-o", "--output", metavar="FILE", type=_path, help="write it to a file")
     _force(derive)
@@ -176,6 +175,11 @@ def _force(parser: argparse.ArgumentParser) -> None:
 def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
     parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
+    parser.add_argument(
+        "--unstable",
+        action="store_true",
+        help="let steps of an explicit method be too long, to see the motion blow up",
+    )
     parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
     parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
     parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")

@@ -1,6 +1,7 @@
 """Errors that are the user's to mend: one clear line each, with place, value and remedy."""
 
 import difflib
+import sys
 from collections.abc import Iterable
 
 from eomgen.text import one_line
@@ -32,9 +33,18 @@ class InterruptedRunError(RunError):
     """A run that an interrupt ended; what it had computed is kept."""
 
 
+def tell_refusal(error: EomgenError) -> None:
+    """Say on standard error what is wrong, each line as one of this program."""
+    for line in error.lines:
+        print(f"eomgen: {line}", file=sys.stderr)
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return ``" (did you mean 'x'?)"`` for the known word nearest to `word`, or ``""``."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    # Small and capital letters are the least of differences: rk45 is RK45 rather than rk4.
+    names = list(known)
+    close = [name for name in names if name.casefold() == word.casefold()]
+    close = close or difflib.get_close_matches(word, names, n=1, cutoff=0.6)
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 

@@ -7,6 +7,7 @@ import secrets
 import stat
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from eomgen.errors import EomgenError, RunError
 
@@ -25,6 +26,7 @@ SIGNATURES = (
 )
 """Every file this program writes has one of these within its first `SIGNED_WITHIN` bytes."""
 SIGNED_WITHIN = 2048
+PIECE = 2**20
 
 
 def is_ours(head: bytes) -> bool:
@@ -46,14 +48,26 @@ def read_plain(
         _check_plain(path.stat(), shown, error)  # to open a device may do something to it
         handle = os.open(path, flags)
         with os.fdopen(handle, "rb") as file:
-            _check_plain(os.fstat(handle), shown, error)
-            data = file.read(most + 1)
+            about = os.fstat(handle)
+            _check_plain(about, shown, error)
+            data = b"" if about.st_size > most else _read(file, most)
     except (OSError, ValueError) as reason:  # ValueError: a name with a NUL in it
         why = getattr(reason, "strerror", None) or reason
         raise error(f"{shown}: cannot be read: {why}") from None
-    if len(data) > most:
+    if about.st_size > most or len(data) > most:
         raise error(f"{shown}: is larger than {most} bytes")
     return data
+
+
+def _read(file: BinaryIO, most: int) -> bytes:
+    """What a file holds, or a little more than `most` bytes of one that grows without end.
+
+    In pieces, since one call takes memory for as much as it is asked for.
+    """
+    data = bytearray()
+    while len(data) <= most and (piece := file.read(PIECE)):
+        data += piece
+    return bytes(data)
 
 
 def _check_plain(about: os.stat_result, shown: str, error: type[EomgenError]) -> None:

@@ -11,6 +11,8 @@ from eomgen.effects import Driven, Effect
 from eomgen.effects.base import ExtraState, Input
 from eomgen.joints import Free, Joint, Revolute
 from eomgen.joints.base import Coordinate
+from eomgen.language.conditions import Condition, require
+from eomgen.language.exact import Real, radians
 from eomgen.language.formula import Constant, Floats, Formula, evaluate
 from eomgen.language.quantity import Parameter
 from eomgen.scene.look import Camera, Shape
@@ -116,8 +118,10 @@ class Seat:
 class Model:
     """A mechanism with everything that acts on it; see `build_model`.
 
+    `conditions` are what values of the parameters keep.
     `states` are those that effects bring along, after coordinates and velocities.
-    `locked` holds each coordinate that is held fast, by name, with its value.
+    `locked` holds each coordinate that is held fast, by name, with its value; `locked_deg` those
+    of them that the scene gives in degrees, in which a quarter turn is one.
     `notices` say what was put right on the way, a line each.
     """
 
@@ -125,6 +129,7 @@ class Model:
     title: str
     dimensions: int
     parameters: tuple[Parameter, ...]
+    conditions: tuple[Condition, ...]
     inputs: tuple[Input, ...]
     bodies: tuple[Body, ...]
     points: tuple[Point, ...]
@@ -138,6 +143,7 @@ class Model:
     simulation: Simulation
     camera: Camera
     locked: tuple[tuple[str, float], ...] = ()
+    locked_deg: tuple[tuple[str, float], ...] = ()
     leave_out: tuple[LeftOut, ...] = ()
     notices: tuple[str, ...] = ()
 
@@ -256,6 +262,11 @@ class Model:
         for point in self.points:
             yield from point.at
 
+    def locked_angle(self, name: str) -> Real:
+        """The value of a locked angle, rad, of more digits than a double has."""
+        degrees = dict(self.locked_deg)
+        return radians(degrees[name]) if name in degrees else dict(self.locked)[name]
+
     @cached_property
     def magnitude(self) -> float:
         """The order of its lengths, a power of 2^40: 1 for all from a micrometre to a megametre.
@@ -271,9 +282,14 @@ class Model:
         return float(2.0 ** (40 * round(math.log2(largest) / 40)))
 
     def with_parameters(self, values: Mapping[str, float]) -> "Model":
-        """The same model with other values for some parameters."""
+        """The same model with other values for some parameters.
+
+        Raises `SceneError` for values that a scene may not have.
+        """
         parameters = (replace(p, default=values.get(p.name, p.default)) for p in self.parameters)
-        return replace(self, parameters=tuple(parameters))
+        model = replace(self, parameters=tuple(parameters))
+        require(self.conditions, model.defaults)
+        return model
 
     def value(self, formula: Formula) -> float:
         """A quantity's value at the scene's parameters."""

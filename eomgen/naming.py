@@ -6,6 +6,7 @@ from typing import TypeVar
 from eomgen.errors import SceneError, listed, nearest
 from eomgen.joints.base import WORLD
 from eomgen.language.base import Table
+from eomgen.language.conditions import Condition, require
 from eomgen.language.quantity import Parameter, name_quantities
 
 AnyTable = TypeVar("AnyTable", bound=Table)
@@ -37,13 +38,18 @@ def named(
     place: str,
     known: dict[str, float],
     parameters: list[Parameter],
+    conditions: list[Condition],
     motion: Sequence[str],
     sliding: Collection[str] = (),
 ) -> AnyTable:
-    """A table with its bare numbers as parameters, which are added to `parameters`.
+    """A table with its bare numbers as parameters, which are added to `parameters`; what its values
+    are to keep is added to `conditions`.
 
-    The other arguments are those of `name_quantities`, which says what it raises.
+    The other arguments are those of `name_quantities`. Raises `SceneError` for what that does, and
+    for a value that does not keep its conditions.
     """
-    fields, new = name_quantities(table, prefix, place, known, motion, sliding)
+    fields, new, kept = name_quantities(table, prefix, place, known, motion, sliding)
+    require(kept, {**known, **{p.name: p.default for p in new}})
     parameters += new
+    conditions += kept
     return table.replaced(**fields)

@@ -17,14 +17,15 @@ from eomgen.scene.schema import Scene
 
 @dataclass(frozen=True)
 class Generated:
-    """What a model is compiled to: a Python module, the page's `bodyPoses`, what passes saved, and
-    why its route was taken.
+    """What a model is compiled to: a Python module, the page's `bodyPoses`, what passes saved, why
+    its route was taken, and what a user must be told of it.
     """
 
     module: str
     poses: str
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
+    notices: tuple[str, ...]
 
 
 def generate(model: Model, *, jacobian: bool = True) -> Generated:
@@ -43,6 +44,7 @@ def generate(model: Model, *, jacobian: bool = True) -> Generated:
             javascript_poses(choice.system) if "body_poses" in model.outputs else "",
             choice.system.reports,
             tuple(choice.explanation()),
+            tuple(choice.notices()),
         )
 
 

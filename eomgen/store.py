@@ -54,6 +54,7 @@ class Code:
     poses: str
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
+    notices: tuple[str, ...]
     derived: bool
     notice: str = ""
 
@@ -72,7 +73,7 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     from eomgen.pipeline import generate
 
     made = generate(model)
-    code = Code(made.module, made.poses, made.reports, made.explanation, derived=True)
+    code = Code(**vars(made), derived=True)
     if place is None:
         return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
     trouble = Entries(place).put(key, _content(code))
@@ -87,22 +88,23 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
 def _content(code: Code) -> bytes:
     """The bytes that are kept of code."""
     reports = [astuple(report) for report in code.reports]
-    return json.dumps([code.module, code.poses, reports, code.explanation]).encode()
+    return json.dumps([code.module, code.poses, reports, code.explanation, code.notices]).encode()
 
 
 def _code(content: bytes | None) -> Code | None:
     """The code of which these bytes were kept; None for anything else."""
     try:
-        module, poses, reports, explanation = json.loads(content or b"")
+        module, poses, reports, explanation, notices = json.loads(content or b"")
         made = tuple(PassReport(*report) for report in reports)
-        texts = [module, poses, *explanation, *(report.name for report in made)]
+        texts = [module, poses, *explanation, *notices, *(report.name for report in made)]
         "".join(texts).encode()  # which half of a surrogate pair cannot be
     except (ValueError, TypeError, RecursionError):
         return None
     counts = [getattr(r, f.name) for r in made for f in fields(r) if f.name != "name"]
-    if not (type(reports) is type(explanation) is list and all(type(n) is int for n in counts)):
+    lists = all(type(part) is list for part in (reports, explanation, notices))
+    if not (lists and all(type(n) is int for n in counts)):
         return None
-    return Code(module, poses, made, tuple(explanation), derived=False)
+    return Code(module, poses, made, tuple(explanation), tuple(notices), derived=False)
 
 
 def _key(model: Model) -> str:

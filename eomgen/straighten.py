@@ -4,27 +4,25 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from eomgen.errors import SceneError
 from eomgen.joints import Free, Joint
 from eomgen.joints.base import Geared
-from eomgen.language.formula import ZERO, Constant, Floats, Formula, evaluate
+from eomgen.language.conditions import ROUNDING
+from eomgen.language.exact import sine_between
+from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import with_components
 from eomgen.model import Model
 from eomgen.scene.schema import BodyTable
 
-PARALLEL = 1e-6
-"""Sine of the angle below which the two axes of a universal joint count as one."""
-ROUNDING = 1e-9
-"""How far numbers of a scene may be from what they should be, for having been rounded."""
+PARALLEL = 1e-15
+"""Sine of the angle below which two axes are as good as parallel: their last digits say which."""
 
 
 def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[str]) -> Joint:
-    """A joint with vectors of the right length and axes of length 1.
+    """A joint with vectors of the right length and axes that have a direction.
 
-    Adds a notice for every axis that was scaled. Raises `SceneError` for a joint that there is not
-    in this space, an axis of no length, parallel axes, limits upside down.
+    Adds a notice for every axis that is not of length 1. Raises `SceneError` for a joint that there
+    is not in this space, an axis of no length, parallel axes, limits upside down.
     """
     if dimensions not in joint.spaces:
         raise SceneError(
@@ -45,13 +43,13 @@ def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[
     if axis is not None:
         if joint.type == "revolute" and dimensions == 2:
             raise SceneError(f"{place}.axis: in the plane a pin turns about z; leave it out")
-        fields["axis"] = _unit(axis, f"{place}.axis", dimensions, notices)
+        fields["axis"] = _direction(axis, f"{place}.axis", dimensions, notices)
     axes = getattr(joint, "axes", None)
     if axes is not None:
         first, second = (
-            _unit(a, f"{place}.axes[{i}]", dimensions, notices) for i, a in enumerate(axes)
+            _direction(a, f"{place}.axes[{i}]", dimensions, notices) for i, a in enumerate(axes)
         )
-        if float(np.linalg.norm(np.cross(first, second))) < PARALLEL:
+        if sine_between(first, second) < PARALLEL:
             raise SceneError(f"{place}.axes: are parallel; give two that cross, or a revolute")
         fields["axes"] = (first, second)
     if isinstance(joint, Geared):
@@ -65,9 +63,10 @@ def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[
     return joint.replaced(**fields)
 
 
-def _unit(
+def _direction(
     axis: tuple[float, ...], place: str, dimensions: int, notices: list[str]
 ) -> tuple[float, ...]:
+    """The axis itself: rounded to length 1 it would no longer be what the scene says."""
     axis = with_components(axis, 0.0, dimensions, place)
     if not any(axis):
         raise SceneError(f"{place}: has no length; give a direction, for example {_example(axis)}")
@@ -75,35 +74,20 @@ def _unit(
         notices.append(
             f"{place}: has length {math.hypot(*axis):g}; taken as a direction of length 1"
         )
-    # By a power of two first, which is exact: the length of a tiny axis would have few digits.
-    _, exponent = math.frexp(max(map(abs, axis)))
-    axis = tuple(math.ldexp(a, -exponent) for a in axis)
-    length = math.hypot(*axis)
-    # A direction along a coordinate axis stays exact, so that what it makes zero is folded away.
-    return tuple(math.copysign(1.0, a) if abs(a) == length else a / length for a in axis)
+    return axis
 
 
 def _example(axis: Sequence[float]) -> str:
     return str([1.0, *([0.0] * (len(axis) - 1))])
 
 
-def checked_inertia(
-    body: BodyTable, place: str, dimensions: int, known: Mapping[str, float]
-) -> tuple[Formula, ...]:
-    """The entries of a body's inertia: one in the plane, six in space; `known` are parameters.
+def entries_of_inertia(body: BodyTable, place: str, dimensions: int) -> tuple[Formula, ...]:
+    """The entries of a body's inertia: one in the plane, six in space.
 
-    Raises `SceneError`, naming the body, if its values are no inertia of any body: not positive, or
-    against the triangle inequality; or if it has inertia but no mass.
+    Raises `SceneError`, naming the body, if there are not as many as there should be.
     """
     given = body.inertia_com
-    values = [
-        float(evaluate(f, known, Floats()))
-        for f in (given if isinstance(given, tuple) else (given,))
-    ]
-    mass = float(evaluate(body.mass, known, Floats()))
     where = f"{place}.inertia_com: body '{body.name}'"
-    if mass == 0.0 and any(values):
-        raise SceneError(f"{where} has inertia but no mass; give it a mass, or inertia_com = 0")
     if dimensions == 2:
         if isinstance(given, tuple):
             raise SceneError(f"{where} has {len(given)} entries; the plane takes one number")
@@ -113,30 +97,10 @@ def checked_inertia(
             raise SceneError(
                 f"{where} has {len(given)} entries; give [xx, yy, zz], or those and xy, xz, yz"
             )
-        _check_matrix(values + [0.0] * (6 - len(values)), where)
-        return (*given, *([Constant(0.0)] * (6 - len(given))))
-    if values != [0.0]:
+        return (*given, *([ZERO] * (6 - len(given))))
+    if given != ZERO:
         raise SceneError(f"{where} has one number; space takes [xx, yy, zz], or 0 for a particle")
     return (ZERO,) * 6
-
-
-def _check_matrix(values: Sequence[float], where: str) -> None:
-    """The principal moments are not negative, and none is larger than the other two together."""
-    xx, yy, zz, xy, xz, yz = values
-    scale = max(map(abs, values)) or 1.0
-    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / scale
-    a, b, c = np.linalg.eigvalsh(matrix).tolist()
-    shown = ", ".join(f"{scale * moment:.6g}" for moment in (a, b, c))
-    if a < -ROUNDING:
-        raise SceneError(
-            f"{where} has principal moments {shown}; none may be negative: "
-            "make the products xy, xz, yz smaller"
-        )
-    if c > a + b + ROUNDING:
-        raise SceneError(
-            f"{where} has principal moments {shown}; no body has one larger than the other two "
-            "together: change xx, yy or zz"
-        )
 
 
 def unit_quaternions(model: Model, given: Collection[object]) -> Model:

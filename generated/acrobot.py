@@ -110,6 +110,14 @@ COST = {
 }
 
 
+def _refused(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = c_1 - l_1
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters c_1, l_1: joints[1].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k1)
+    return None
+
+
 def _fixed(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_1 > 0.0:
@@ -215,10 +223,17 @@ def _fixed(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -233,7 +248,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 

@@ -104,6 +104,23 @@ COST = {
 }
 
 
+def _refused(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = I_A + I_A
+    k2 = 5e-10 * k1
+    k3 = I_A + k2 - I_A
+    k4 = I_Bx + I_By
+    k5 = 5e-10 * (I_Bz + k4)
+    k6 = l_A - l_B
+    if not min(min(k3, k3), k1 + k2) >= 0.0:
+        return "parameters I_A: bodies[0].inertia_com: body 'A' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_A, I_A, 0.0)
+    if not min(min(I_By + I_Bz + k5 - I_Bx, k5 + (I_Bx + I_Bz) - I_By), k4 + k5 - I_Bz) >= 0.0:
+        return "parameters I_By, I_Bz, I_Bx: bodies[1].inertia_com: body 'B' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_Bx, I_By, I_Bz)
+    if not -1e+100 <= k6 <= 1e+100:
+        return 'parameters l_A, l_B: joints[1].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k6)
+    return None
+
+
 def _fixed(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_A > 0.0:
@@ -177,10 +194,17 @@ def _fixed(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -195,7 +219,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -823,7 +849,7 @@ def derivative(t, y, p=None, u=None):
             made = _parameters(p)
             k, reach = made["derivative"], made["reach"]
         try:
-            values = _derivative(y.tolist(), k, _NO_INPUT)
+            values = _derivative(y.tolist(), k)
             if hypot(*values) < reach:
                 return _from(values, _FLOAT, 4)
         except (ArithmeticError, ValueError):

@@ -128,6 +128,19 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
+def _refused(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, ground_friction, ground_slip_speed):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    if not ground_radius >= 0.0:
+        return 'parameters ground_radius: effects[1].radius: {:g} is negative; give a number >= 0 in m'.format(ground_radius)
+    if not ground_friction >= 0.0:
+        return 'parameters ground_friction: effects[1].friction: {:g} is negative; give a number >= 0 in '.format(ground_friction)
+    if not ground_slip_speed > 0.0:
+        return 'parameters ground_slip_speed: effects[1].slip_speed: {:g} is not positive; give a number > 0 in m/s'.format(ground_slip_speed)
+    if not 0.0 <= ground_restitution <= 1.0:
+        return 'parameters ground_restitution: effects[1].restitution: {:g} is not from 0 to 1; give one that is'.format(ground_restitution)
+    return None
+
+
 def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, ground_friction, ground_slip_speed):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_A > 0.0:
@@ -159,10 +172,17 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, g
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -177,7 +197,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -796,7 +818,7 @@ def initial_state(p=None):
 
 
 def derivative(t, y, p=None, u=None):
-    """Time derivative of the state: (8,), or (8, k) for k states."""
+    """Time derivative of the state: (8,), or (8, k) for k states. Forces of held contacts are left out."""
     if u is None and y.__class__ is _ARRAY and y.ndim == 1 and y.dtype is _FLOAT:
         k, reach = _DERIVATIVE, _REACH
         if p is not None:
@@ -804,7 +826,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and -reach < state[0] + state[1] < reach:
                 return _from(values, _FLOAT, 8)
         except (ArithmeticError, ValueError):

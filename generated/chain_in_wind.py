@@ -216,6 +216,19 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
+def _refused(rho, gust, depth, link_1_mass, link_1_inertia_com, link_joint_1_r_child_x, link_2_mass, link_2_inertia_com, link_joint_2_r_parent_x, link_joint_2_r_child_x, link_3_mass, link_3_inertia_com, link_joint_3_r_parent_x, link_joint_3_r_child_x, link_4_mass, link_4_inertia_com, link_joint_4_r_parent_x, link_joint_4_r_child_x, link_5_mass, link_5_inertia_com, link_joint_5_r_parent_x, link_joint_5_r_child_x, link_6_mass, link_6_inertia_com, link_joint_6_r_parent_x, link_joint_6_r_child_x, link_7_mass, link_7_inertia_com, link_joint_7_r_parent_x, link_joint_7_r_child_x, link_8_mass, link_8_inertia_com, link_joint_8_r_parent_x, link_joint_8_r_child_x, gravity_g, air_area, air_coefficient, air_turning_linear):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    if not rho >= 0.0:
+        return 'parameters rho: effects[1].density: {:g} is negative; give a number >= 0 in kg/m^3'.format(rho)
+    if not air_area >= 0.0:
+        return 'parameters air_area: effects[1].area: {:g} is negative; give a number >= 0 in m^2'.format(air_area)
+    if not air_coefficient >= 0.0:
+        return 'parameters air_coefficient: effects[1].coefficient: {:g} is negative; give a number >= 0 in '.format(air_coefficient)
+    if not air_turning_linear >= 0.0:
+        return 'parameters air_turning_linear: effects[1].turning_linear: {:g} is negative; give a number >= 0 in N m s/rad'.format(air_turning_linear)
+    return None
+
+
 def _fixed(rho, gust, depth, link_1_mass, link_1_inertia_com, link_joint_1_r_child_x, link_2_mass, link_2_inertia_com, link_joint_2_r_parent_x, link_joint_2_r_child_x, link_3_mass, link_3_inertia_com, link_joint_3_r_parent_x, link_joint_3_r_child_x, link_4_mass, link_4_inertia_com, link_joint_4_r_parent_x, link_joint_4_r_child_x, link_5_mass, link_5_inertia_com, link_joint_5_r_parent_x, link_joint_5_r_child_x, link_6_mass, link_6_inertia_com, link_joint_6_r_parent_x, link_joint_6_r_child_x, link_7_mass, link_7_inertia_com, link_joint_7_r_parent_x, link_joint_7_r_child_x, link_8_mass, link_8_inertia_com, link_joint_8_r_parent_x, link_joint_8_r_child_x, gravity_g, air_area, air_coefficient, air_turning_linear):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not link_1_mass > 0.0:
@@ -294,10 +307,17 @@ def _fixed(rho, gust, depth, link_1_mass, link_1_inertia_com, link_joint_1_r_chi
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -312,7 +332,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -2914,7 +2936,7 @@ def derivative(t, y, p=None, u=None):
             made = _parameters(p)
             k, reach = made["derivative"], made["reach"]
         try:
-            values = _derivative(y.tolist(), k, _NO_INPUT, t=t if t.__class__ is float else _time(t))
+            values = _derivative(y.tolist(), k, t=t if t.__class__ is float else _time(t))
             if hypot(*values) < reach:
                 return _from(values, _FLOAT, 16)
         except (ArithmeticError, ValueError):

@@ -92,6 +92,26 @@ COST = {
 }
 
 
+def _refused(m_1, m_2, l_1, l_2, g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = m_1 * (l_1 * l_1) / 12.0
+    k2 = l_1 / 2.0
+    k3 = -k2
+    k4 = m_2 * (l_2 * l_2) / 12.0
+    k5 = -l_2 / 2.0
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters m_1, l_1: bodies[0].inertia_com: {:g} is larger than 1e+100; choose other units'.format(k1)
+    if not -1e+100 <= k3 <= 1e+100:
+        return 'parameters l_1: joints[0].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k3)
+    if not -1e+100 <= k4 <= 1e+100:
+        return 'parameters m_2, l_2: bodies[1].inertia_com: {:g} is larger than 1e+100; choose other units'.format(k4)
+    if not -1e+100 <= k2 <= 1e+100:
+        return 'parameters l_1: joints[1].r_parent[0]: {:g} is larger than 1e+100; choose other units'.format(k2)
+    if not -1e+100 <= k5 <= 1e+100:
+        return 'parameters l_2: joints[1].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k5)
+    return None
+
+
 def _fixed(m_1, m_2, l_1, l_2, g):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m_1 > 0.0:
@@ -182,10 +202,17 @@ def _fixed(m_1, m_2, l_1, l_2, g):
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -200,7 +227,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -776,7 +805,7 @@ def derivative(t, y, p=None, u=None):
             made = _parameters(p)
             k, reach = made["derivative"], made["reach"]
         try:
-            values = _derivative(y.tolist(), k, _NO_INPUT)
+            values = _derivative(y.tolist(), k)
             if hypot(*values) < reach:
                 return _from(values, _FLOAT, 4)
         except (ArithmeticError, ValueError):

@@ -107,6 +107,45 @@ COST = {
 }
 
 
+def _refused(m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = m_arm * (l_arm * l_arm) / 12.0
+    k2 = k1 + k1
+    k3 = k2 * 5e-10
+    k4 = k1 + k3 - k1
+    k5 = l_arm / 2.0
+    k6 = -k5
+    k7 = m_pendulum * (l_pendulum * l_pendulum) / 12.0
+    k8 = k7 + k7
+    k9 = 5e-10 * k8
+    k10 = k7 + k9 - k7
+    k11 = l_pendulum / 2.0
+    k12 = -k11
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters m_arm, l_arm: bodies[0].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k1)
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters m_arm, l_arm: bodies[0].inertia_com[2]: {:g} is larger than 1e+100; choose other units'.format(k1)
+    if not min(min(k2 + k3, k4), k4) >= 0.0:
+        return "parameters m_arm, l_arm: bodies[0].inertia_com: body 'arm' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(0.0, k1, k1)
+    if not -1e+100 <= k6 <= 1e+100:
+        return 'parameters l_arm: joints[0].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k6)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[0].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not -1e+100 <= k7 <= 1e+100:
+        return 'parameters m_pendulum, l_pendulum: bodies[1].inertia_com[0]: {:g} is larger than 1e+100; choose other units'.format(k7)
+    if not -1e+100 <= k7 <= 1e+100:
+        return 'parameters m_pendulum, l_pendulum: bodies[1].inertia_com[1]: {:g} is larger than 1e+100; choose other units'.format(k7)
+    if not min(min(k10, k10), k8 + k9) >= 0.0:
+        return "parameters m_pendulum, l_pendulum: bodies[1].inertia_com: body 'pendulum' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(k7, k7, 0.0)
+    if not -1e+100 <= k5 <= 1e+100:
+        return 'parameters l_arm: joints[1].r_parent[0]: {:g} is larger than 1e+100; choose other units'.format(k5)
+    if not -1e+100 <= k11 <= 1e+100:
+        return 'parameters l_pendulum: joints[1].r_child[2]: {:g} is larger than 1e+100; choose other units'.format(k11)
+    if not -1e+100 <= k12 <= 1e+100:
+        return 'parameters l_pendulum: points[0].at[2]: {:g} is larger than 1e+100; choose other units'.format(k12)
+    return None
+
+
 def _fixed(m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     k33 = m_arm * (l_arm * l_arm) / 12.0
@@ -217,10 +256,17 @@ def _fixed(m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g):
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -235,7 +281,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 

@@ -123,8 +123,9 @@ def _fixed(bob_mass, pivot_r_child_x, gravity_g):
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
     try:
@@ -141,7 +142,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -538,7 +541,7 @@ def derivative(t, y, p=None, u=None):
             made = _parameters(p)
             k, reach = made["derivative"], made["reach"]
         try:
-            values = _derivative(y.tolist(), k, _NO_INPUT)
+            values = _derivative(y.tolist(), k)
             if hypot(*values) < reach:
                 return _from(values, _FLOAT, 2)
         except (ArithmeticError, ValueError):

@@ -76,8 +76,8 @@ Parameters p, with the scene's values:
     g = 9.81              m/s^2   gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 3034 operations: 762 add, 693 sub, 1468 mul, 74 div, 13 neg, 12 sin,
-12 cos; 69 more on parameters alone are done once.
+One call of `derivative` takes 3002 operations: 778 add, 649 sub, 1464 mul, 74 div, 13 neg, 12 sin,
+12 cos; 54 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
@@ -251,9 +251,135 @@ JOINTS = ('front_left_abduction', 'front_right_abduction', 'hind_left_abduction'
 POINTS = ('front_left_foot', 'front_right_foot', 'hind_left_foot', 'hind_right_foot')
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 762, "sub": 693, "mul": 1468, "div": 74, "neg": 13, "sin": 12, "cos": 12, "total": 3034, "parameters": 69},
-    "jacobian": {"add": 5631, "sub": 6292, "mul": 12784, "div": 515, "neg": 122, "sin": 12, "cos": 12, "total": 25368, "parameters": 73},
+    "derivative": {"add": 778, "sub": 649, "mul": 1464, "div": 74, "neg": 13, "sin": 12, "cos": 12, "total": 3002, "parameters": 54},
+    "jacobian": {"add": 5683, "sub": 6248, "mul": 12780, "div": 515, "neg": 122, "sin": 12, "cos": 12, "total": 25372, "parameters": 58},
 }
+
+
+def select(c, a, b):
+    return a if c > 0.0 else b
+
+
+def _refused(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = I_trunk_x + I_trunk_y
+    k2 = 5e-10 * (I_trunk_z + k1)
+    k3 = min(I_trunk_y + I_trunk_z + k2 - I_trunk_x, k2 + (I_trunk_x + I_trunk_z) - I_trunk_y)
+    k4 = abs(I_hip_xx) + abs(I_hip_yy) + abs(I_hip_zz)
+    abs_I_hip_xz = abs(I_hip_xz)
+    k5 = k4 + abs(I_hip_xy) + abs_I_hip_xz + abs(I_hip_yz)
+    k6 = select(k5, k5, 1.0)
+    k7 = I_hip_xx / k6
+    k8 = I_hip_yy / k6
+    k9 = I_hip_zz / k6
+    k10 = 5e-10 + (k7 + k8 + k9)
+    k11 = k10 - k7 * 2.0
+    k12 = 2.0 * (I_hip_xy / k6)
+    k13 = k11 * (k10 - k8 * 2.0) - k12 * k12
+    k14 = 2.0 * (I_hip_xz / k6)
+    k15 = k11 * (2.0 * (I_hip_yz / k6)) + k12 * k14
+    k16 = min(min(k11, k13), k13 * (k11 * (k10 - k9 * 2.0) - k14 * k14) - k15 * k15)
+    k17 = -I_hip_xy
+    k18 = -I_hip_yz
+    k19 = abs_I_hip_xz + (k4 + abs(k17)) + abs(k18)
+    k20 = select(k19, k19, 1.0)
+    k21 = I_hip_xx / k20
+    k22 = I_hip_yy / k20
+    k23 = I_hip_zz / k20
+    k24 = 5e-10 + (k21 + k22 + k23)
+    k25 = k24 - 2.0 * k21
+    k26 = 2.0 * (I_hip_xy / k20)
+    k27 = k25 * (k24 - 2.0 * k22) - k26 * k26
+    k28 = 2.0 * (I_hip_xz / k20)
+    k29 = k25 * (2.0 * (I_hip_yz / k20)) + k26 * k28
+    k30 = min(min(k25, k27), k27 * (k25 * (k24 - 2.0 * k23) - k28 * k28) - k29 * k29)
+    k31 = I_thigh_x + I_thigh_y
+    k32 = 5e-10 * (I_thigh_z + k31)
+    k33 = min(I_thigh_y + I_thigh_z + k32 - I_thigh_x, k32 + (I_thigh_x + I_thigh_z) - I_thigh_y)
+    k34 = min(k33, k31 + k32 - I_thigh_z)
+    k35 = l_hip - c_hip
+    k36 = c_hip - l_hip
+    k37 = I_shank_x + I_shank_y
+    k38 = 5e-10 * (I_shank_z + k37)
+    k39 = min(I_shank_y + I_shank_z + k38 - I_shank_x, k38 + (I_shank_x + I_shank_z) - I_shank_y)
+    k40 = min(k39, k37 + k38 - I_shank_z)
+    k41 = c_thigh - l_thigh
+    k42 = c_shank - l_shank
+    if not min(k3, k1 + k2 - I_trunk_z) >= 0.0:
+        return "parameters I_trunk_y, I_trunk_z, I_trunk_x: bodies[0].inertia_com: body 'trunk' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_trunk_x, I_trunk_y, I_trunk_z)
+    if not k16 > 0.0:
+        return "parameters I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz: bodies[1].inertia_com: body 'front_left_hip' has moments {:.6g}, {:.6g}, {:.6g} and products {:.6g}, {:.6g}, {:.6g}; so one of its principal moments is negative, or larger than the other two together: make the products smaller, or change xx, yy or zz".format(I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[1].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k30 > 0.0:
+        return "parameters I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz: bodies[4].inertia_com: body 'front_right_hip' has moments {:.6g}, {:.6g}, {:.6g} and products {:.6g}, {:.6g}, {:.6g}; so one of its principal moments is negative, or larger than the other two together: make the products smaller, or change xx, yy or zz".format(I_hip_xx, I_hip_yy, I_hip_zz, k17, I_hip_xz, k18)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[4].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k16 > 0.0:
+        return "parameters I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz: bodies[7].inertia_com: body 'hind_left_hip' has moments {:.6g}, {:.6g}, {:.6g} and products {:.6g}, {:.6g}, {:.6g}; so one of its principal moments is negative, or larger than the other two together: make the products smaller, or change xx, yy or zz".format(I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[7].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k30 > 0.0:
+        return "parameters I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz: bodies[10].inertia_com: body 'hind_right_hip' has moments {:.6g}, {:.6g}, {:.6g} and products {:.6g}, {:.6g}, {:.6g}; so one of its principal moments is negative, or larger than the other two together: make the products smaller, or change xx, yy or zz".format(I_hip_xx, I_hip_yy, I_hip_zz, k17, I_hip_xz, k18)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[10].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k34 >= 0.0:
+        return "parameters I_thigh_y, I_thigh_z, I_thigh_x: bodies[2].inertia_com: body 'front_left_thigh' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_thigh_x, I_thigh_y, I_thigh_z)
+    if not -1e+100 <= k35 <= 1e+100:
+        return 'parameters l_hip, c_hip: joints[2].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k35)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[2].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k34 >= 0.0:
+        return "parameters I_thigh_y, I_thigh_z, I_thigh_x: bodies[5].inertia_com: body 'front_right_thigh' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_thigh_x, I_thigh_y, I_thigh_z)
+    if not -1e+100 <= k36 <= 1e+100:
+        return 'parameters c_hip, l_hip: joints[5].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k36)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[5].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k34 >= 0.0:
+        return "parameters I_thigh_y, I_thigh_z, I_thigh_x: bodies[8].inertia_com: body 'hind_left_thigh' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_thigh_x, I_thigh_y, I_thigh_z)
+    if not -1e+100 <= k35 <= 1e+100:
+        return 'parameters l_hip, c_hip: joints[8].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k35)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[8].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k34 >= 0.0:
+        return "parameters I_thigh_y, I_thigh_z, I_thigh_x: bodies[11].inertia_com: body 'hind_right_thigh' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_thigh_x, I_thigh_y, I_thigh_z)
+    if not -1e+100 <= k36 <= 1e+100:
+        return 'parameters c_hip, l_hip: joints[11].r_parent[1]: {:g} is larger than 1e+100; choose other units'.format(k36)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[11].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k40 >= 0.0:
+        return "parameters I_shank_y, I_shank_z, I_shank_x: bodies[3].inertia_com: body 'front_left_shank' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_shank_x, I_shank_y, I_shank_z)
+    if not -1e+100 <= k41 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[3].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k41)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[3].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k40 >= 0.0:
+        return "parameters I_shank_y, I_shank_z, I_shank_x: bodies[6].inertia_com: body 'front_right_shank' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_shank_x, I_shank_y, I_shank_z)
+    if not -1e+100 <= k41 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[6].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k41)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[6].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k40 >= 0.0:
+        return "parameters I_shank_y, I_shank_z, I_shank_x: bodies[9].inertia_com: body 'hind_left_shank' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_shank_x, I_shank_y, I_shank_z)
+    if not -1e+100 <= k41 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[9].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k41)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[9].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not k40 >= 0.0:
+        return "parameters I_shank_y, I_shank_z, I_shank_x: bodies[12].inertia_com: body 'hind_right_shank' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_shank_x, I_shank_y, I_shank_z)
+    if not -1e+100 <= k41 <= 1e+100:
+        return 'parameters c_thigh, l_thigh: joints[12].r_parent[2]: {:g} is larger than 1e+100; choose other units'.format(k41)
+    if not J_rotor >= 0.0:
+        return 'parameters J_rotor: joints[12].motor_inertia: {:g} is negative; give a number >= 0 in kg m^2'.format(J_rotor)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters c_shank, l_shank: points[0].at[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters c_shank, l_shank: points[1].at[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters c_shank, l_shank: points[2].at[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    if not -1e+100 <= k42 <= 1e+100:
+        return 'parameters c_shank, l_shank: points[3].at[2]: {:g} is larger than 1e+100; choose other units'.format(k42)
+    return None
 
 
 def _fixed(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip, l_hip, I_hip_xx, I_hip_yy, I_hip_zz, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, y_thigh, c_thigh, l_thigh, I_thigh_x, I_thigh_y, I_thigh_z, m_shank, c_shank, l_shank, I_shank_x, I_shank_y, I_shank_z, J_rotor, G_hip, G_knee, g):
@@ -394,30 +520,22 @@ def _fixed(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip,
     k14 = inertia_front_left_thigh_yy + (inertia_front_left_shank_yy - inertia_front_left_shank_yy * k7)
     k29 = m_thigh + m_shank
     k15 = m_hip + k29
-    k35 = 0.5 * (I_trunk_z + (I_trunk_x + I_trunk_y))
-    k36 = k35 - I_trunk_x
-    k37 = k35 - I_trunk_y
-    k38 = k35 - I_trunk_z
-    k16 = k37 - k38
-    k17 = k38 - k36
-    k18 = k36 - k37
-    k39 = 0.5 * (inertia_front_left_hip_zz + (I_hip_yy + inertia_front_left_hip_xx))
-    k19 = k39 - inertia_front_left_hip_xx
-    k20 = k39 - I_hip_yy
-    k21 = k39 - inertia_front_left_hip_zz
-    k40 = inertia_front_left_thigh_zz + (inertia_front_left_thigh_xx + inertia_front_left_thigh_yy)
-    k41 = 0.5 * k40
-    k22 = k41 - inertia_front_left_thigh_xx
-    k23 = k41 - inertia_front_left_thigh_yy
-    k24 = k41 - inertia_front_left_thigh_zz
-    k42 = 0.5 * (I_shank_z + (inertia_front_left_shank_xx + inertia_front_left_shank_yy))
-    k25 = k42 - inertia_front_left_shank_xx
-    k26 = k42 - inertia_front_left_shank_yy
-    k27 = k42 - I_shank_z
+    k16 = I_trunk_z - I_trunk_y
+    k17 = I_trunk_x - I_trunk_z
+    k18 = I_trunk_y - I_trunk_x
+    k19 = inertia_front_left_hip_zz - I_hip_yy
+    k20 = inertia_front_left_hip_xx - inertia_front_left_hip_zz
+    k21 = I_hip_yy - inertia_front_left_hip_xx
+    k22 = inertia_front_left_thigh_zz - inertia_front_left_thigh_yy
+    k23 = inertia_front_left_thigh_xx - inertia_front_left_thigh_zz
+    k24 = inertia_front_left_thigh_yy - inertia_front_left_thigh_xx
+    k25 = I_shank_z - inertia_front_left_shank_yy
+    k26 = inertia_front_left_shank_xx - I_shank_z
+    k27 = inertia_front_left_shank_yy - inertia_front_left_shank_xx
     k30 = k15 + (k15 + (k15 + (m_trunk + k15)))
     return {
         "initial_state": (),
-        "derivative": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27),
+        "derivative": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27),
         "jacobian": (m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, k28, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k29, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k30),
     }
 
@@ -426,10 +544,17 @@ def _fixed(m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, c_hip,
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -444,7 +569,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -492,8 +619,8 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """3034 operations: 762 add, 693 sub, 1468 mul, 74 div, 13 neg, 12 sin, 12 cos."""
-    m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27 = k
+    """3002 operations: 778 add, 649 sub, 1464 mul, 74 div, 13 neg, 12 sin, 12 cos."""
+    m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27 = k
     _, _, _, trunk_qw, trunk_qx, trunk_qy, trunk_qz, front_left_abduction_angle, front_right_abduction_angle, hind_left_abduction_angle, hind_right_abduction_angle, front_left_swing_angle, front_right_swing_angle, hind_left_swing_angle, hind_right_swing_angle, front_left_knee_angle, front_right_knee_angle, hind_left_knee_angle, hind_right_knee_angle, trunk_x_dot, trunk_y_dot, trunk_z_dot, trunk_wx, trunk_wy, trunk_wz, front_left_abduction_angle_dot, front_right_abduction_angle_dot, hind_left_abduction_angle_dot, hind_right_abduction_angle_dot, front_left_swing_angle_dot, front_right_swing_angle_dot, hind_left_swing_angle_dot, hind_right_swing_angle_dot, front_left_knee_angle_dot, front_right_knee_angle_dot, hind_left_knee_angle_dot, hind_right_knee_angle_dot = y
     s1 = trunk_qw * trunk_qw + trunk_qx * trunk_qx + trunk_qy * trunk_qy + trunk_qz * trunk_qz
     s2 = 2.0 / s1
@@ -1112,482 +1239,456 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
     s535 = omega_front_left_hip_z * omega_front_left_hip_x
     s536 = omega_front_left_hip_y * omega_front_left_hip_z
     s537 = s533 + s534
-    s538 = s532 + s535
-    s539 = s534 - s533
-    s540 = omega_front_left_hip_x_squared + omega_front_left_hip_z_squared
-    s541 = s535 - s532
+    s538 = omega_front_left_hip_x_squared + omega_front_left_hip_z_squared
     bias_hind_left_hip_x = s524 + s525
-    s542 = s526 + s527
-    s543 = s529 - s530
-    bias_front_right_hip_y = cos_front_right_abduction_angle * s542 + sin_front_right_abduction_angle * s543
-    bias_front_right_hip_z = cos_front_right_abduction_angle * s543 - sin_front_right_abduction_angle * s542
-    s544 = front_right_abduction_angle_dot * omega_front_right_hip_z
-    s545 = front_right_abduction_angle_dot * omega_front_right_hip_y
+    s539 = s526 + s527
+    s540 = s529 - s530
+    bias_front_right_hip_y = cos_front_right_abduction_angle * s539 + sin_front_right_abduction_angle * s540
+    bias_front_right_hip_z = cos_front_right_abduction_angle * s540 - sin_front_right_abduction_angle * s539
+    s541 = front_right_abduction_angle_dot * omega_front_right_hip_z
+    s542 = front_right_abduction_angle_dot * omega_front_right_hip_y
     omega_front_right_hip_x_squared = omega_front_right_hip_x * omega_front_right_hip_x
     omega_front_right_hip_y_squared = omega_front_right_hip_y * omega_front_right_hip_y
     omega_front_right_hip_z_squared = omega_front_right_hip_z * omega_front_right_hip_z
-    s546 = omega_front_right_hip_y * omega_front_right_hip_x
-    s547 = omega_front_right_hip_z * omega_front_right_hip_x
-    s548 = omega_front_right_hip_y * omega_front_right_hip_z
-    s549 = s545 + s546
-    s550 = s544 + s547
-    s551 = s546 - s545
-    s552 = omega_front_right_hip_x_squared + omega_front_right_hip_z_squared
-    s553 = s547 - s544
-    s554 = s530 - s529
-    bias_hind_left_hip_y = sin_hind_left_abduction_angle * s554 - cos_hind_left_abduction_angle * s542
-    bias_hind_left_hip_z = cos_hind_left_abduction_angle * s554 + sin_hind_left_abduction_angle * s542
-    s555 = hind_left_abduction_angle_dot * omega_hind_left_hip_z
-    s556 = hind_left_abduction_angle_dot * omega_hind_left_hip_y
+    s543 = omega_front_right_hip_y * omega_front_right_hip_x
+    s544 = omega_front_right_hip_z * omega_front_right_hip_x
+    s545 = omega_front_right_hip_y * omega_front_right_hip_z
+    s546 = s542 + s543
+    s547 = omega_front_right_hip_x_squared + omega_front_right_hip_z_squared
+    s548 = s530 - s529
+    bias_hind_left_hip_y = sin_hind_left_abduction_angle * s548 - cos_hind_left_abduction_angle * s539
+    bias_hind_left_hip_z = cos_hind_left_abduction_angle * s548 + sin_hind_left_abduction_angle * s539
+    s549 = hind_left_abduction_angle_dot * omega_hind_left_hip_z
+    s550 = hind_left_abduction_angle_dot * omega_hind_left_hip_y
     omega_hind_left_hip_x_squared = omega_hind_left_hip_x * omega_hind_left_hip_x
     omega_hind_left_hip_y_squared = omega_hind_left_hip_y * omega_hind_left_hip_y
     omega_hind_left_hip_z_squared = omega_hind_left_hip_z * omega_hind_left_hip_z
-    s557 = omega_hind_left_hip_y * omega_hind_left_hip_x
-    s558 = omega_hind_left_hip_z * omega_hind_left_hip_x
-    s559 = omega_hind_left_hip_y * omega_hind_left_hip_z
-    s560 = s556 + s557
-    s561 = s555 + s558
-    s562 = s557 - s556
-    s563 = omega_hind_left_hip_x_squared + omega_hind_left_hip_z_squared
-    s564 = s558 - s555
+    s551 = omega_hind_left_hip_y * omega_hind_left_hip_x
+    s552 = omega_hind_left_hip_z * omega_hind_left_hip_x
+    s553 = omega_hind_left_hip_y * omega_hind_left_hip_z
+    s554 = s550 + s551
+    s555 = omega_hind_left_hip_x_squared + omega_hind_left_hip_z_squared
     bias_hind_right_hip_x = s524 - s525
-    s565 = s527 - s526
-    bias_hind_right_hip_y = cos_hind_right_abduction_angle * s565 - sin_hind_right_abduction_angle * s531
-    s566 = cos_hind_right_abduction_angle * s531 + sin_hind_right_abduction_angle * s565
-    s567 = hind_right_abduction_angle_dot * omega_hind_right_hip_z
-    s568 = hind_right_abduction_angle_dot * omega_hind_right_hip_y
+    s556 = s527 - s526
+    bias_hind_right_hip_y = cos_hind_right_abduction_angle * s556 - sin_hind_right_abduction_angle * s531
+    s557 = cos_hind_right_abduction_angle * s531 + sin_hind_right_abduction_angle * s556
+    s558 = hind_right_abduction_angle_dot * omega_hind_right_hip_z
+    s559 = hind_right_abduction_angle_dot * omega_hind_right_hip_y
     omega_hind_right_hip_x_squared = omega_hind_right_hip_x * omega_hind_right_hip_x
     omega_hind_right_hip_y_squared = omega_hind_right_hip_y * omega_hind_right_hip_y
     omega_hind_right_hip_z_squared = omega_hind_right_hip_z * omega_hind_right_hip_z
-    s569 = omega_hind_right_hip_y * omega_hind_right_hip_x
-    s570 = omega_hind_right_hip_z * omega_hind_right_hip_x
-    s571 = omega_hind_right_hip_y * omega_hind_right_hip_z
-    s572 = s568 + s569
-    s573 = s567 + s570
-    s574 = s569 - s568
-    s575 = omega_hind_right_hip_x_squared + omega_hind_right_hip_z_squared
-    s576 = s570 - s567
-    s577 = bias_front_left_hip_x + k2 * s537
-    bias_front_left_thigh_y = bias_front_left_hip_y - k2 * s540
-    s578 = bias_front_left_hip_z + k2 * s536
-    bias_front_left_thigh_z = cos_front_left_swing_angle * s578 + sin_front_left_swing_angle * s577
-    bias_front_left_thigh_x = cos_front_left_swing_angle * s577 - sin_front_left_swing_angle * s578
-    s579 = sin_front_left_swing_angle * s533 - front_left_swing_angle_dot * omega_front_left_thigh_z
-    s580 = front_left_swing_angle_dot * omega_front_left_thigh_x - cos_front_left_swing_angle * s533
+    s560 = omega_hind_right_hip_y * omega_hind_right_hip_x
+    s561 = omega_hind_right_hip_z * omega_hind_right_hip_x
+    s562 = omega_hind_right_hip_y * omega_hind_right_hip_z
+    s563 = s559 + s560
+    s564 = omega_hind_right_hip_x_squared + omega_hind_right_hip_z_squared
+    s565 = bias_front_left_hip_x + k2 * s537
+    bias_front_left_thigh_y = bias_front_left_hip_y - k2 * s538
+    s566 = bias_front_left_hip_z + k2 * s536
+    bias_front_left_thigh_z = cos_front_left_swing_angle * s566 + sin_front_left_swing_angle * s565
+    bias_front_left_thigh_x = cos_front_left_swing_angle * s565 - sin_front_left_swing_angle * s566
+    s567 = sin_front_left_swing_angle * s533 - front_left_swing_angle_dot * omega_front_left_thigh_z
+    s568 = front_left_swing_angle_dot * omega_front_left_thigh_x - cos_front_left_swing_angle * s533
     omega_front_left_thigh_x_squared = omega_front_left_thigh_x * omega_front_left_thigh_x
     omega_front_left_thigh_y_squared = omega_front_left_thigh_y * omega_front_left_thigh_y
     omega_front_left_thigh_z_squared = omega_front_left_thigh_z * omega_front_left_thigh_z
-    s581 = omega_front_left_thigh_x * omega_front_left_thigh_y
-    s582 = omega_front_left_thigh_z * omega_front_left_thigh_x
-    s583 = omega_front_left_thigh_z * omega_front_left_thigh_y
-    s584 = s581 - s580
-    s585 = s532 + s582
-    s586 = s583 - s579
-    s587 = s579 + s583
-    s588 = omega_front_left_thigh_x_squared + omega_front_left_thigh_y_squared
-    s589 = k3 * s549 - bias_hind_left_hip_x
-    bias_front_right_thigh_y = bias_front_right_hip_y - k3 * s552
-    s590 = bias_front_right_hip_z + k3 * s548
-    bias_front_right_thigh_z = cos_front_right_swing_angle * s590 + sin_front_right_swing_angle * s589
-    bias_front_right_thigh_x = cos_front_right_swing_angle * s589 - sin_front_right_swing_angle * s590
-    s591 = sin_front_right_swing_angle * s545 - front_right_swing_angle_dot * omega_front_right_thigh_z
-    s592 = front_right_swing_angle_dot * omega_front_right_thigh_x - cos_front_right_swing_angle * s545
+    s569 = omega_front_left_thigh_x * omega_front_left_thigh_y
+    s570 = omega_front_left_thigh_z * omega_front_left_thigh_x
+    s571 = omega_front_left_thigh_z * omega_front_left_thigh_y
+    s572 = s569 - s568
+    s573 = s532 + s570
+    s574 = s571 - s567
+    s575 = omega_front_left_thigh_x_squared + omega_front_left_thigh_y_squared
+    s576 = k3 * s546 - bias_hind_left_hip_x
+    bias_front_right_thigh_y = bias_front_right_hip_y - k3 * s547
+    s577 = bias_front_right_hip_z + k3 * s545
+    bias_front_right_thigh_z = cos_front_right_swing_angle * s577 + sin_front_right_swing_angle * s576
+    bias_front_right_thigh_x = cos_front_right_swing_angle * s576 - sin_front_right_swing_angle * s577
+    s578 = sin_front_right_swing_angle * s542 - front_right_swing_angle_dot * omega_front_right_thigh_z
+    s579 = front_right_swing_angle_dot * omega_front_right_thigh_x - cos_front_right_swing_angle * s542
     omega_front_right_thigh_x_squared = omega_front_right_thigh_x * omega_front_right_thigh_x
     omega_front_right_thigh_y_squared = omega_front_right_thigh_y * omega_front_right_thigh_y
     omega_front_right_thigh_z_squared = omega_front_right_thigh_z * omega_front_right_thigh_z
-    s593 = omega_front_right_thigh_x * omega_front_right_thigh_y
-    s594 = omega_front_right_thigh_z * omega_front_right_thigh_x
-    s595 = omega_front_right_thigh_z * omega_front_right_thigh_y
-    s596 = s593 - s592
-    s597 = s544 + s594
-    s598 = s595 - s591
-    s599 = s591 + s595
-    s600 = omega_front_right_thigh_x_squared + omega_front_right_thigh_y_squared
-    s601 = bias_hind_left_hip_x + k2 * s560
-    bias_hind_left_thigh_y = bias_hind_left_hip_y - k2 * s563
-    s602 = bias_hind_left_hip_z + k2 * s559
-    bias_hind_left_thigh_z = cos_hind_left_swing_angle * s602 + sin_hind_left_swing_angle * s601
-    bias_hind_left_thigh_x = cos_hind_left_swing_angle * s601 - sin_hind_left_swing_angle * s602
-    s603 = sin_hind_left_swing_angle * s556 - hind_left_swing_angle_dot * omega_hind_left_thigh_z
-    s604 = hind_left_swing_angle_dot * omega_hind_left_thigh_x - cos_hind_left_swing_angle * s556
+    s580 = omega_front_right_thigh_x * omega_front_right_thigh_y
+    s581 = omega_front_right_thigh_z * omega_front_right_thigh_x
+    s582 = omega_front_right_thigh_z * omega_front_right_thigh_y
+    s583 = s580 - s579
+    s584 = s541 + s581
+    s585 = s582 - s578
+    s586 = omega_front_right_thigh_x_squared + omega_front_right_thigh_y_squared
+    s587 = bias_hind_left_hip_x + k2 * s554
+    bias_hind_left_thigh_y = bias_hind_left_hip_y - k2 * s555
+    s588 = bias_hind_left_hip_z + k2 * s553
+    bias_hind_left_thigh_z = cos_hind_left_swing_angle * s588 + sin_hind_left_swing_angle * s587
+    bias_hind_left_thigh_x = cos_hind_left_swing_angle * s587 - sin_hind_left_swing_angle * s588
+    s589 = sin_hind_left_swing_angle * s550 - hind_left_swing_angle_dot * omega_hind_left_thigh_z
+    s590 = hind_left_swing_angle_dot * omega_hind_left_thigh_x - cos_hind_left_swing_angle * s550
     omega_hind_left_thigh_x_squared = omega_hind_left_thigh_x * omega_hind_left_thigh_x
     omega_hind_left_thigh_y_squared = omega_hind_left_thigh_y * omega_hind_left_thigh_y
     omega_hind_left_thigh_z_squared = omega_hind_left_thigh_z * omega_hind_left_thigh_z
-    s605 = omega_hind_left_thigh_x * omega_hind_left_thigh_y
-    s606 = omega_hind_left_thigh_z * omega_hind_left_thigh_x
-    s607 = omega_hind_left_thigh_z * omega_hind_left_thigh_y
-    s608 = s605 - s604
-    s609 = s555 + s606
-    s610 = s607 - s603
-    s611 = s603 + s607
-    s612 = omega_hind_left_thigh_x_squared + omega_hind_left_thigh_y_squared
-    s613 = bias_hind_right_hip_x + k3 * s572
-    bias_hind_right_thigh_y = bias_hind_right_hip_y - k3 * s575
-    s614 = k3 * s571 - s566
-    bias_hind_right_thigh_z = cos_hind_right_swing_angle * s614 + sin_hind_right_swing_angle * s613
-    bias_hind_right_thigh_x = cos_hind_right_swing_angle * s613 - sin_hind_right_swing_angle * s614
-    s615 = sin_hind_right_swing_angle * s568 - hind_right_swing_angle_dot * omega_hind_right_thigh_z
-    s616 = hind_right_swing_angle_dot * omega_hind_right_thigh_x - cos_hind_right_swing_angle * s568
+    s591 = omega_hind_left_thigh_x * omega_hind_left_thigh_y
+    s592 = omega_hind_left_thigh_z * omega_hind_left_thigh_x
+    s593 = omega_hind_left_thigh_z * omega_hind_left_thigh_y
+    s594 = s591 - s590
+    s595 = s549 + s592
+    s596 = s593 - s589
+    s597 = omega_hind_left_thigh_x_squared + omega_hind_left_thigh_y_squared
+    s598 = bias_hind_right_hip_x + k3 * s563
+    bias_hind_right_thigh_y = bias_hind_right_hip_y - k3 * s564
+    s599 = k3 * s562 - s557
+    bias_hind_right_thigh_z = cos_hind_right_swing_angle * s599 + sin_hind_right_swing_angle * s598
+    bias_hind_right_thigh_x = cos_hind_right_swing_angle * s598 - sin_hind_right_swing_angle * s599
+    s600 = sin_hind_right_swing_angle * s559 - hind_right_swing_angle_dot * omega_hind_right_thigh_z
+    s601 = hind_right_swing_angle_dot * omega_hind_right_thigh_x - cos_hind_right_swing_angle * s559
     omega_hind_right_thigh_x_squared = omega_hind_right_thigh_x * omega_hind_right_thigh_x
     omega_hind_right_thigh_y_squared = omega_hind_right_thigh_y * omega_hind_right_thigh_y
     omega_hind_right_thigh_z_squared = omega_hind_right_thigh_z * omega_hind_right_thigh_z
-    s617 = omega_hind_right_thigh_x * omega_hind_right_thigh_y
-    s618 = omega_hind_right_thigh_z * omega_hind_right_thigh_x
-    s619 = omega_hind_right_thigh_z * omega_hind_right_thigh_y
-    s620 = s617 - s616
-    s621 = s567 + s618
-    s622 = s619 - s615
-    s623 = s615 + s619
-    s624 = omega_hind_right_thigh_x_squared + omega_hind_right_thigh_y_squared
-    s625 = bias_front_left_thigh_x + k4 * s585
-    bias_front_left_shank_y = bias_front_left_thigh_y + k4 * s586
-    s626 = bias_front_left_thigh_z - k4 * s588
-    bias_front_left_shank_x = cos_front_left_knee_angle * s625 - sin_front_left_knee_angle * s626
-    s627 = cos_front_left_knee_angle * s579 - sin_front_left_knee_angle * s580 - front_left_knee_angle_dot * omega_front_left_shank_z
-    s628 = cos_front_left_knee_angle * s580 + sin_front_left_knee_angle * s579 + front_left_knee_angle_dot * omega_front_left_shank_x
-    s629 = omega_front_left_shank_x * omega_front_left_shank_y
-    s630 = omega_front_left_shank_z * omega_front_left_shank_x
-    s631 = omega_front_left_shank_z * omega_front_left_shank_y
-    s632 = s532 + s630
-    s633 = s631 - s627
-    s634 = omega_front_left_shank_x * omega_front_left_shank_x + omega_front_left_shank_y * omega_front_left_shank_y
-    s635 = bias_front_right_thigh_x + k4 * s597
-    bias_front_right_shank_y = bias_front_right_thigh_y + k4 * s598
-    s636 = bias_front_right_thigh_z - k4 * s600
-    bias_front_right_shank_x = cos_front_right_knee_angle * s635 - sin_front_right_knee_angle * s636
-    s637 = cos_front_right_knee_angle * s591 - sin_front_right_knee_angle * s592 - front_right_knee_angle_dot * omega_front_right_shank_z
-    s638 = cos_front_right_knee_angle * s592 + sin_front_right_knee_angle * s591 + front_right_knee_angle_dot * omega_front_right_shank_x
-    s639 = omega_front_right_shank_x * omega_front_right_shank_y
-    s640 = omega_front_right_shank_z * omega_front_right_shank_x
-    s641 = omega_front_right_shank_z * omega_front_right_shank_y
-    s642 = s544 + s640
-    s643 = s641 - s637
-    s644 = omega_front_right_shank_x * omega_front_right_shank_x + omega_front_right_shank_y * omega_front_right_shank_y
-    s645 = bias_hind_left_thigh_x + k4 * s609
-    bias_hind_left_shank_y = bias_hind_left_thigh_y + k4 * s610
-    s646 = bias_hind_left_thigh_z - k4 * s612
-    bias_hind_left_shank_x = cos_hind_left_knee_angle * s645 - sin_hind_left_knee_angle * s646
-    s647 = cos_hind_left_knee_angle * s603 - sin_hind_left_knee_angle * s604 - hind_left_knee_angle_dot * omega_hind_left_shank_z
-    s648 = cos_hind_left_knee_angle * s604 + sin_hind_left_knee_angle * s603 + hind_left_knee_angle_dot * omega_hind_left_shank_x
-    s649 = omega_hind_left_shank_x * omega_hind_left_shank_y
-    s650 = omega_hind_left_shank_z * omega_hind_left_shank_x
-    s651 = omega_hind_left_shank_z * omega_hind_left_shank_y
-    s652 = s555 + s650
-    s653 = s651 - s647
-    s654 = omega_hind_left_shank_x * omega_hind_left_shank_x + omega_hind_left_shank_y * omega_hind_left_shank_y
-    s655 = bias_hind_right_thigh_x + k4 * s621
-    bias_hind_right_shank_y = bias_hind_right_thigh_y + k4 * s622
-    s656 = bias_hind_right_thigh_z - k4 * s624
-    bias_hind_right_shank_x = cos_hind_right_knee_angle * s655 - sin_hind_right_knee_angle * s656
-    s657 = cos_hind_right_knee_angle * s615 - sin_hind_right_knee_angle * s616 - hind_right_knee_angle_dot * omega_hind_right_shank_z
-    s658 = cos_hind_right_knee_angle * s616 + sin_hind_right_knee_angle * s615 + hind_right_knee_angle_dot * omega_hind_right_shank_x
-    s659 = omega_hind_right_shank_x * omega_hind_right_shank_y
-    s660 = omega_hind_right_shank_z * omega_hind_right_shank_x
-    s661 = omega_hind_right_shank_z * omega_hind_right_shank_y
-    s662 = s567 + s660
-    s663 = s661 - s657
-    s664 = omega_hind_right_shank_x * omega_hind_right_shank_x + omega_hind_right_shank_y * omega_hind_right_shank_y
-    s665 = I_hip_yz * (omega_front_left_hip_z_squared - omega_front_left_hip_y_squared)
-    s666 = I_hip_xz * (omega_front_left_hip_x_squared - omega_front_left_hip_z_squared)
-    s667 = I_hip_xy * (omega_front_left_hip_y_squared - omega_front_left_hip_x_squared)
-    s668 = moment_front_left_hip_y * bias_front_left_hip_z + (I_hip_xz * s539 - I_hip_xy * s541 - s665 + s536 * k20 - s536 * k21)
-    s669 = I_hip_yz * s538 - I_hip_xz * s536 - s667 + s539 * k19 - s537 * k20 - moment_front_left_hip_y * bias_front_left_hip_x
-    s670 = m_hip * bias_hind_left_hip_x
-    s671 = moment_front_left_hip_y * bias_hind_left_hip_x
-    s672 = I_hip_yz * (omega_front_right_hip_z_squared - omega_front_right_hip_y_squared)
-    s673 = I_hip_xz * (omega_front_right_hip_x_squared - omega_front_right_hip_z_squared)
-    s674 = I_hip_xy * (omega_front_right_hip_y_squared - omega_front_right_hip_x_squared)
-    s675 = I_hip_xy * s553 + I_hip_xz * s551 + s672 + s548 * k20 - s548 * k21 - moment_front_left_hip_y * bias_front_right_hip_z
-    s676 = s674 - (I_hip_xz * s548 + I_hip_yz * s550) + s551 * k19 - s549 * k20 - s671
-    s677 = I_hip_yz * (omega_hind_left_hip_z_squared - omega_hind_left_hip_y_squared)
-    s678 = I_hip_xz * (omega_hind_left_hip_x_squared - omega_hind_left_hip_z_squared)
-    s679 = I_hip_xy * (omega_hind_left_hip_y_squared - omega_hind_left_hip_x_squared)
-    s680 = moment_front_left_hip_y * bias_hind_left_hip_z + (I_hip_xz * s562 - I_hip_xy * s564 - s677 + s559 * k20 - s559 * k21)
-    s681 = I_hip_yz * s561 - I_hip_xz * s559 - s679 + s562 * k19 - s560 * k20 - s671
-    s682 = I_hip_yz * (omega_hind_right_hip_z_squared - omega_hind_right_hip_y_squared)
-    s683 = I_hip_xz * (omega_hind_right_hip_x_squared - omega_hind_right_hip_z_squared)
-    s684 = I_hip_xy * (omega_hind_right_hip_y_squared - omega_hind_right_hip_x_squared)
-    s685 = moment_front_left_hip_y * s566 + (I_hip_xy * s576 + I_hip_xz * s574 + s682 + s571 * k20 - s571 * k21)
-    s686 = moment_front_left_hip_y * bias_hind_right_hip_x + (s684 - (I_hip_xz * s571 + I_hip_yz * s573) + s574 * k19 - s572 * k20)
-    s687 = moment_front_left_thigh_y * (omega_front_left_thigh_x_squared + omega_front_left_thigh_z_squared)
-    s688 = m_thigh * bias_front_left_thigh_x + (moment_front_left_thigh_y * s584 - k5 * s585)
-    s689 = m_thigh * bias_front_left_thigh_z + (moment_front_left_thigh_y * s587 + k5 * s588)
-    s690 = moment_front_left_thigh_y * bias_front_left_thigh_z + k5 * bias_front_left_thigh_y
-    s691 = inertia_front_left_thigh_yz * (omega_front_left_thigh_z_squared - omega_front_left_thigh_y_squared)
-    s692 = s585 * k24 - inertia_front_left_thigh_yz * s584 - (s582 - s532) * k22 - k5 * bias_front_left_thigh_x
-    s693 = inertia_front_left_thigh_yz * s585 + (s580 + s581) * k22 - s584 * k23 - moment_front_left_thigh_y * bias_front_left_thigh_x
-    s694 = moment_front_left_thigh_y * (omega_front_right_thigh_x_squared + omega_front_right_thigh_z_squared)
-    s695 = m_thigh * bias_front_right_thigh_x - (moment_front_left_thigh_y * s596 + k5 * s597)
-    s696 = m_thigh * bias_front_right_thigh_z + (k5 * s600 - moment_front_left_thigh_y * s599)
-    s697 = k5 * bias_front_right_thigh_y - moment_front_left_thigh_y * bias_front_right_thigh_z
-    s698 = inertia_front_left_thigh_yz * (omega_front_right_thigh_z_squared - omega_front_right_thigh_y_squared)
-    s699 = inertia_front_left_thigh_yz * s596 + s597 * k24 - (s594 - s544) * k22 - k5 * bias_front_right_thigh_x
-    s700 = moment_front_left_thigh_y * bias_front_right_thigh_x + ((s592 + s593) * k22 - inertia_front_left_thigh_yz * s597 - s596 * k23)
-    s701 = moment_front_left_thigh_y * (omega_hind_left_thigh_x_squared + omega_hind_left_thigh_z_squared)
-    s702 = m_thigh * bias_hind_left_thigh_x + (moment_front_left_thigh_y * s608 - k5 * s609)
-    s703 = m_thigh * bias_hind_left_thigh_z + (moment_front_left_thigh_y * s611 + k5 * s612)
-    s704 = moment_front_left_thigh_y * bias_hind_left_thigh_z + k5 * bias_hind_left_thigh_y
-    s705 = inertia_front_left_thigh_yz * (omega_hind_left_thigh_z_squared - omega_hind_left_thigh_y_squared)
-    s706 = s609 * k24 - inertia_front_left_thigh_yz * s608 - (s606 - s555) * k22 - k5 * bias_hind_left_thigh_x
-    s707 = inertia_front_left_thigh_yz * s609 + (s604 + s605) * k22 - s608 * k23 - moment_front_left_thigh_y * bias_hind_left_thigh_x
-    s708 = moment_front_left_thigh_y * (omega_hind_right_thigh_x_squared + omega_hind_right_thigh_z_squared)
-    s709 = m_thigh * bias_hind_right_thigh_x - (moment_front_left_thigh_y * s620 + k5 * s621)
-    s710 = m_thigh * bias_hind_right_thigh_z + (k5 * s624 - moment_front_left_thigh_y * s623)
-    s711 = k5 * bias_hind_right_thigh_y - moment_front_left_thigh_y * bias_hind_right_thigh_z
-    s712 = inertia_front_left_thigh_yz * (omega_hind_right_thigh_z_squared - omega_hind_right_thigh_y_squared)
-    s713 = inertia_front_left_thigh_yz * s620 + s621 * k24 - (s618 - s567) * k22 - k5 * bias_hind_right_thigh_x
-    s714 = moment_front_left_thigh_y * bias_hind_right_thigh_x + ((s616 + s617) * k22 - inertia_front_left_thigh_yz * s621 - s620 * k23)
-    s715 = m_shank * (cos_front_left_knee_angle * s626 + sin_front_left_knee_angle * s625)
-    s716 = m_shank * bias_front_left_shank_y - k6 * s633
-    s717 = s715 + k6 * s634
-    s718 = k6 * bias_front_left_shank_x
-    s719 = s632 * k27 - (s630 - s532) * k25
-    s720 = (s628 + s629) * k25 - (s629 - s628) * k26
-    s721 = k6 * bias_front_left_shank_y + ((s627 + s631) * k26 - s633 * k27)
-    s722 = m_shank * (cos_front_right_knee_angle * s636 + sin_front_right_knee_angle * s635)
-    s723 = m_shank * bias_front_right_shank_y - k6 * s643
-    s724 = s722 + k6 * s644
-    s725 = k6 * bias_front_right_shank_x
-    s726 = s642 * k27 - (s640 - s544) * k25
-    s727 = (s638 + s639) * k25 - (s639 - s638) * k26
-    s728 = k6 * bias_front_right_shank_y + ((s637 + s641) * k26 - s643 * k27)
-    s729 = m_shank * (cos_hind_left_knee_angle * s646 + sin_hind_left_knee_angle * s645)
-    s730 = m_shank * bias_hind_left_shank_y - k6 * s653
-    s731 = s729 + k6 * s654
-    s732 = k6 * bias_hind_left_shank_x
-    s733 = s652 * k27 - (s650 - s555) * k25
-    s734 = (s648 + s649) * k25 - (s649 - s648) * k26
-    s735 = k6 * bias_hind_left_shank_y + ((s647 + s651) * k26 - s653 * k27)
-    s736 = m_shank * (cos_hind_right_knee_angle * s656 + sin_hind_right_knee_angle * s655)
-    s737 = m_shank * bias_hind_right_shank_y - k6 * s663
-    s738 = s736 + k6 * s664
-    s739 = k6 * bias_hind_right_shank_x
-    s740 = s662 * k27 - (s660 - s567) * k25
-    s741 = (s658 + s659) * k25 - (s659 - s658) * k26
-    s742 = k6 * bias_hind_right_shank_y + ((s657 + s661) * k26 - s663 * k27)
-    s743 = s739 - s740
-    s744 = m_shank * bias_hind_right_shank_x - k6 * s662 - k8 * s743
-    s745 = sin_hind_right_knee_angle * s738 + cos_hind_right_knee_angle * s744
-    s746 = sin_hind_right_knee_angle * s741 + cos_hind_right_knee_angle * s742 - k4 * s737
-    s747 = s711 + (s712 + s623 * k23 - s622 * k24) + s746
-    s748 = s713 + (s740 - s739 + k7 * s743 + k4 * s745)
-    s749 = s714 + (cos_hind_right_knee_angle * s741 - sin_hind_right_knee_angle * s742)
-    s750 = s710 + (cos_hind_right_knee_angle * s738 - sin_hind_right_knee_angle * s744)
-    s751 = s732 - s733
-    s752 = m_shank * bias_hind_left_shank_x - k6 * s652 - k8 * s751
-    s753 = sin_hind_left_knee_angle * s731 + cos_hind_left_knee_angle * s752
-    s754 = sin_hind_left_knee_angle * s734 + cos_hind_left_knee_angle * s735 - k4 * s730
-    s755 = s704 + (s611 * k23 - s705 - s610 * k24) + s754
-    s756 = s706 + (s733 - s732 + k7 * s751 + k4 * s753)
-    s757 = s707 + (cos_hind_left_knee_angle * s734 - sin_hind_left_knee_angle * s735)
-    s758 = s703 + (cos_hind_left_knee_angle * s731 - sin_hind_left_knee_angle * s752)
-    s759 = s725 - s726
-    s760 = m_shank * bias_front_right_shank_x - k6 * s642 - k8 * s759
-    s761 = sin_front_right_knee_angle * s724 + cos_front_right_knee_angle * s760
-    s762 = sin_front_right_knee_angle * s727 + cos_front_right_knee_angle * s728 - k4 * s723
-    s763 = s697 + (s698 + s599 * k23 - s598 * k24) + s762
-    s764 = s699 + (s726 - s725 + k7 * s759 + k4 * s761)
-    s765 = s700 + (cos_front_right_knee_angle * s727 - sin_front_right_knee_angle * s728)
-    s766 = s696 + (cos_front_right_knee_angle * s724 - sin_front_right_knee_angle * s760)
-    s767 = s718 - s719
-    s768 = m_shank * bias_front_left_shank_x - k6 * s632 - k8 * s767
-    s769 = sin_front_left_knee_angle * s717 + cos_front_left_knee_angle * s768
-    s770 = sin_front_left_knee_angle * s720 + cos_front_left_knee_angle * s721 - k4 * s716
-    s771 = s690 + (s587 * k23 - s691 - s586 * k24) + s770
-    s772 = s692 + (s719 - s718 + k7 * s767 + k4 * s769)
-    s773 = s693 + (cos_front_left_knee_angle * s720 - sin_front_left_knee_angle * s721)
-    s774 = s689 + (cos_front_left_knee_angle * s717 - sin_front_left_knee_angle * s768)
-    s775 = s749 + s101 * s748
-    s776 = s709 + s745 - s102 * s748
-    s777 = s750 - s103 * s748
-    s778 = cos_hind_right_swing_angle * s777 - sin_hind_right_swing_angle * s776
-    s779 = sin_hind_right_swing_angle * s777 + cos_hind_right_swing_angle * s776
-    s780 = sin_hind_right_swing_angle * s775 + cos_hind_right_swing_angle * s747 + k3 * s778
-    s781 = cos_hind_right_swing_angle * s775 - sin_hind_right_swing_angle * s747 - k3 * s779
-    s782 = s685 + s780
-    s783 = I_hip_yz * s572 - I_hip_xy * s571 - s683 + s573 * k21 - s576 * k19 + (s748 - s100 * s748)
-    s784 = m_hip * bias_hind_right_hip_y + moment_front_left_hip_y * s575 + (m_thigh * bias_hind_right_thigh_y + (s708 - k5 * s622) + s737)
-    s785 = s757 - s138 * s756
-    s786 = s702 + s753 - s139 * s756
-    s787 = s758 - s140 * s756
-    s788 = cos_hind_left_swing_angle * s787 - sin_hind_left_swing_angle * s786
-    s789 = sin_hind_left_swing_angle * s787 + cos_hind_left_swing_angle * s786
-    s790 = sin_hind_left_swing_angle * s785 + cos_hind_left_swing_angle * s755 + k2 * s788
-    s791 = cos_hind_left_swing_angle * s785 - sin_hind_left_swing_angle * s755 - k2 * s789
-    s792 = s680 + s790
-    s793 = I_hip_xy * s559 - I_hip_yz * s560 - s678 + s561 * k21 - s564 * k19 + (s756 - s137 * s756)
-    s794 = m_hip * bias_hind_left_hip_y - moment_front_left_hip_y * s563 + (m_thigh * bias_hind_left_thigh_y - (s701 + k5 * s610) + s730)
-    s795 = s765 + s175 * s764
-    s796 = s695 + s761 - s176 * s764
-    s797 = s766 - s177 * s764
-    s798 = cos_front_right_swing_angle * s797 - sin_front_right_swing_angle * s796
-    s799 = sin_front_right_swing_angle * s797 + cos_front_right_swing_angle * s796
-    s800 = sin_front_right_swing_angle * s795 + cos_front_right_swing_angle * s763 + k3 * s798
-    s801 = cos_front_right_swing_angle * s795 - sin_front_right_swing_angle * s763 - k3 * s799
-    s802 = s675 + s800
-    s803 = I_hip_yz * s549 - I_hip_xy * s548 - s673 + s550 * k21 - s553 * k19 + (s764 - s174 * s764)
-    s804 = m_hip * bias_front_right_hip_y + moment_front_left_hip_y * s552 + (m_thigh * bias_front_right_thigh_y + (s694 - k5 * s598) + s723)
-    s805 = s773 - s212 * s772
-    s806 = s688 + s769 - s213 * s772
-    s807 = s774 - s214 * s772
-    s808 = cos_front_left_swing_angle * s807 - sin_front_left_swing_angle * s806
-    s809 = sin_front_left_swing_angle * s807 + cos_front_left_swing_angle * s806
-    s810 = sin_front_left_swing_angle * s805 + cos_front_left_swing_angle * s771 + k2 * s808
-    s811 = cos_front_left_swing_angle * s805 - sin_front_left_swing_angle * s771 - k2 * s809
-    s812 = s668 + s810
-    s813 = I_hip_xy * s536 - I_hip_yz * s537 - s666 + s538 * k21 - s541 * k19 + (s772 - s211 * s772)
-    s814 = m_hip * bias_front_left_hip_y - moment_front_left_hip_y * s540 + (m_thigh * bias_front_left_thigh_y - (s687 + k5 * s586) + s716)
-    s815 = s783 - s249 * s782
-    s816 = s686 + s781 - s250 * s782
-    s817 = m_hip * bias_hind_right_hip_x - moment_front_left_hip_y * s572 + s779 - s251 * s782
-    s818 = s784 - s252 * s782
-    s819 = s778 - (m_hip * s566 + moment_front_left_hip_y * s571) - s253 * s782
-    s820 = cos_hind_right_abduction_angle * s818 - sin_hind_right_abduction_angle * s819
-    s821 = sin_hind_right_abduction_angle * s818 + cos_hind_right_abduction_angle * s819
-    s822 = cos_hind_right_abduction_angle * s815 - sin_hind_right_abduction_angle * s816
-    s823 = sin_hind_right_abduction_angle * s815 + cos_hind_right_abduction_angle * s816
-    s824 = s793 - s305 * s792
-    s825 = s681 + s791 - s306 * s792
-    s826 = s670 + moment_front_left_hip_y * s560 + s789 - s307 * s792
-    s827 = s794 - s308 * s792
-    s828 = m_hip * bias_hind_left_hip_z + moment_front_left_hip_y * s559 + s788 - s309 * s792
-    s829 = cos_hind_left_abduction_angle * s827 - sin_hind_left_abduction_angle * s828
-    s830 = sin_hind_left_abduction_angle * s827 + cos_hind_left_abduction_angle * s828
-    s831 = cos_hind_left_abduction_angle * s824 - sin_hind_left_abduction_angle * s825
-    s832 = sin_hind_left_abduction_angle * s824 + cos_hind_left_abduction_angle * s825
-    s833 = s523 * k16 + (s782 - s248 * s782 - y_hip * s821) + (s792 - s304 * s792 + y_hip * s830)
-    s834 = s521 * k18 + (s823 + (y_hip * s817 - x_hip * s820)) + (s832 - (x_hip * s829 + y_hip * s826))
-    s835 = s803 - s365 * s802
-    s836 = s676 + s801 - s366 * s802
-    s837 = s799 - (s670 + moment_front_left_hip_y * s549) - s367 * s802
-    s838 = s804 - s368 * s802
-    s839 = m_hip * bias_front_right_hip_z - moment_front_left_hip_y * s548 + s798 - s369 * s802
-    s840 = cos_front_right_abduction_angle * s838 - sin_front_right_abduction_angle * s839
-    s841 = sin_front_right_abduction_angle * s838 + cos_front_right_abduction_angle * s839
-    s842 = cos_front_right_abduction_angle * s835 - sin_front_right_abduction_angle * s836
-    s843 = sin_front_right_abduction_angle * s835 + cos_front_right_abduction_angle * s836
-    s844 = s522 * k17 + (s822 + x_hip * s821) + (s831 + x_hip * s830) + (s842 - x_hip * s841)
-    s845 = s813 - s421 * s812
-    s846 = s669 + s811 - s422 * s812
-    s847 = m_hip * bias_front_left_hip_x + moment_front_left_hip_y * s537 + s809 - s423 * s812
-    s848 = s814 - s424 * s812
-    s849 = m_hip * bias_front_left_hip_z + moment_front_left_hip_y * s536 + s808 - s425 * s812
-    s850 = cos_front_left_abduction_angle * s848 - sin_front_left_abduction_angle * s849
-    s851 = sin_front_left_abduction_angle * s848 + cos_front_left_abduction_angle * s849
-    s852 = cos_front_left_abduction_angle * s845 - sin_front_left_abduction_angle * s846
-    s853 = sin_front_left_abduction_angle * s845 + cos_front_left_abduction_angle * s846
-    s854 = s833 + (s802 - s364 * s802 - y_hip * s841) + (s812 - s420 * s812 + y_hip * s851)
-    s855 = s834 + (s843 + (x_hip * s840 + y_hip * s837)) + (s853 + (x_hip * s850 - y_hip * s847))
-    s856 = s483 * s854 - (s844 + (s852 - x_hip * s851))
-    s857 = s855 - s484 * s854 + s492 * s856
-    s858 = s817 + s826 + s837 + s847 - s485 * s854 + s493 * s856 - s499 * s857
-    s859 = s820 + s829 + s840 + s850 - s486 * s854 + s494 * s856 - s500 * s857
-    s860 = s821 + s830 + s841 + s851 - s487 * s854 + s495 * s856 - s501 * s857
-    s861 = s21 * s858 + s22 * s859 + s23 * s860
-    s862 = s518 * s861 - (s18 * s858 + s19 * s859 + s20 * s860)
-    s863 = (s15 * s858 + s16 * s859 + s17 * s860 - s517 * s861 + s520 * s862) / (s15 * s508 + s16 * s509 + s17 * s510 - s515 * s517 - s519 * s520)
-    delta_trunk_2_y = s862 / pivot_trunk_2_2 + s520 * s863
-    s864 = s861 / pivot_trunk_3_2 + (s518 * delta_trunk_2_y - s517 * s863)
-    delta_trunk_x = s18 * delta_trunk_2_y - s15 * s863 - s21 * s864
-    delta_trunk_y = s19 * delta_trunk_2_y - s16 * s863 - s22 * s864
-    delta_trunk_z = s20 * delta_trunk_2_y - s17 * s863 - s23 * s864
-    s865 = s857 / pivot_trunk_3 + (s499 * delta_trunk_x + s500 * delta_trunk_y + s501 * delta_trunk_z)
-    s866 = s493 * delta_trunk_x + s494 * delta_trunk_y + s495 * delta_trunk_z - s492 * s865
-    alpha_trunk_y = s856 / pivot_trunk_2 - s866
-    s867 = s483 * alpha_trunk_y - s484 * s865 + (s485 * delta_trunk_x + s486 * delta_trunk_y + s487 * delta_trunk_z)
-    s868 = s854 / pivot_trunk + s867
-    alpha_front_left_hip_y = cos_front_left_abduction_angle * alpha_trunk_y - sin_front_left_abduction_angle * s865
-    s869 = cos_front_left_abduction_angle * s865 + sin_front_left_abduction_angle * alpha_trunk_y
-    s870 = y_hip * s865
-    s871 = x_hip * s865
-    s872 = y_hip * s868
-    s873 = x_hip * alpha_trunk_y
-    s874 = s872 + s873
-    delta_front_left_hip_x = delta_trunk_x + s870
-    s875 = delta_trunk_y - s871
-    s876 = delta_trunk_z - s874
-    delta_front_left_hip_y = cos_front_left_abduction_angle * s875 + sin_front_left_abduction_angle * s876
-    delta_front_left_hip_z = cos_front_left_abduction_angle * s876 - sin_front_left_abduction_angle * s875
-    s877 = s423 * delta_front_left_hip_x + s424 * delta_front_left_hip_y + s425 * delta_front_left_hip_z
-    s878 = s812 / pivot_front_left_hip + (s421 * alpha_front_left_hip_y - s420 * s868 - s422 * s869 + s877)
-    s879 = s868 + s878
-    alpha_front_right_hip_y = cos_front_right_abduction_angle * alpha_trunk_y - sin_front_right_abduction_angle * s865
-    s880 = cos_front_right_abduction_angle * s865 + sin_front_right_abduction_angle * alpha_trunk_y
-    delta_front_right_hip_x = delta_trunk_x - s870
-    s881 = delta_trunk_z + (s872 - s873)
-    delta_front_right_hip_y = cos_front_right_abduction_angle * s875 + sin_front_right_abduction_angle * s881
-    delta_front_right_hip_z = cos_front_right_abduction_angle * s881 - sin_front_right_abduction_angle * s875
-    s882 = s367 * delta_front_right_hip_x + s368 * delta_front_right_hip_y + s369 * delta_front_right_hip_z
-    s883 = s802 / pivot_front_right_hip + (s365 * alpha_front_right_hip_y - s364 * s868 - s366 * s880 + s882)
-    s884 = s868 + s883
-    alpha_hind_left_hip_y = cos_hind_left_abduction_angle * alpha_trunk_y - sin_hind_left_abduction_angle * s865
-    s885 = cos_hind_left_abduction_angle * s865 + sin_hind_left_abduction_angle * alpha_trunk_y
-    s886 = delta_trunk_y + s871
-    s887 = delta_trunk_z + (s873 - s872)
-    delta_hind_left_hip_y = cos_hind_left_abduction_angle * s886 + sin_hind_left_abduction_angle * s887
-    delta_hind_left_hip_z = cos_hind_left_abduction_angle * s887 - sin_hind_left_abduction_angle * s886
-    s888 = s307 * delta_front_left_hip_x + s308 * delta_hind_left_hip_y + s309 * delta_hind_left_hip_z
-    s889 = s792 / pivot_hind_left_hip + (s305 * alpha_hind_left_hip_y - s304 * s868 - s306 * s885 + s888)
-    s890 = s868 + s889
-    alpha_hind_right_hip_y = cos_hind_right_abduction_angle * alpha_trunk_y - sin_hind_right_abduction_angle * s865
-    s891 = cos_hind_right_abduction_angle * s865 + sin_hind_right_abduction_angle * alpha_trunk_y
-    s892 = delta_trunk_z + s874
-    delta_hind_right_hip_y = cos_hind_right_abduction_angle * s886 + sin_hind_right_abduction_angle * s892
-    delta_hind_right_hip_z = cos_hind_right_abduction_angle * s892 - sin_hind_right_abduction_angle * s886
-    s893 = s251 * delta_front_right_hip_x + s252 * delta_hind_right_hip_y + s253 * delta_hind_right_hip_z
-    s894 = s782 / pivot_hind_right_hip + (s249 * alpha_hind_right_hip_y - s248 * s868 - s250 * s891 + s893)
-    s895 = s868 + s894
-    s896 = delta_front_left_hip_x + k2 * s869
-    s897 = delta_front_left_hip_z - k2 * s879
-    delta_front_left_thigh_z = cos_front_left_swing_angle * s897 + sin_front_left_swing_angle * s896
-    delta_front_left_thigh_x = cos_front_left_swing_angle * s896 - sin_front_left_swing_angle * s897
-    s898 = s212 * (cos_front_left_swing_angle * s869 + sin_front_left_swing_angle * s879)
-    s899 = s211 * alpha_front_left_hip_y - s898 + (s213 * delta_front_left_thigh_x + s214 * delta_front_left_thigh_z)
-    s900 = s772 / pivot_front_left_thigh + s899
-    alpha_front_left_thigh_y = alpha_front_left_hip_y - s900
-    s901 = delta_front_right_hip_x + k3 * s880
-    s902 = delta_front_right_hip_z - k3 * s884
-    delta_front_right_thigh_z = cos_front_right_swing_angle * s902 + sin_front_right_swing_angle * s901
-    delta_front_right_thigh_x = cos_front_right_swing_angle * s901 - sin_front_right_swing_angle * s902
-    s903 = s175 * (cos_front_right_swing_angle * s880 + sin_front_right_swing_angle * s884)
-    s904 = s174 * alpha_front_right_hip_y + s903 + (s176 * delta_front_right_thigh_x + s177 * delta_front_right_thigh_z)
-    s905 = s764 / pivot_front_right_thigh + s904
-    alpha_front_right_thigh_y = alpha_front_right_hip_y - s905
-    s906 = delta_front_left_hip_x + k2 * s885
-    s907 = delta_hind_left_hip_z - k2 * s890
-    delta_hind_left_thigh_z = cos_hind_left_swing_angle * s907 + sin_hind_left_swing_angle * s906
-    delta_hind_left_thigh_x = cos_hind_left_swing_angle * s906 - sin_hind_left_swing_angle * s907
-    s908 = s138 * (cos_hind_left_swing_angle * s885 + sin_hind_left_swing_angle * s890)
-    s909 = s137 * alpha_hind_left_hip_y - s908 + (s139 * delta_hind_left_thigh_x + s140 * delta_hind_left_thigh_z)
-    s910 = s756 / pivot_hind_left_thigh + s909
-    alpha_hind_left_thigh_y = alpha_hind_left_hip_y - s910
-    s911 = delta_front_right_hip_x + k3 * s891
-    s912 = delta_hind_right_hip_z - k3 * s895
-    delta_hind_right_thigh_z = cos_hind_right_swing_angle * s912 + sin_hind_right_swing_angle * s911
-    delta_hind_right_thigh_x = cos_hind_right_swing_angle * s911 - sin_hind_right_swing_angle * s912
-    s913 = s101 * (cos_hind_right_swing_angle * s891 + sin_hind_right_swing_angle * s895)
-    s914 = s100 * alpha_hind_right_hip_y + s913 + (s102 * delta_hind_right_thigh_x + s103 * delta_hind_right_thigh_z)
-    s915 = s748 / pivot_hind_right_thigh + s914
-    alpha_hind_right_thigh_y = alpha_hind_right_hip_y - s915
-    s916 = cos_front_left_knee_angle * (delta_front_left_thigh_x + k4 * alpha_front_left_thigh_y)
-    s917 = k7 * alpha_front_left_thigh_y - k8 * (s916 - sin_front_left_knee_angle * delta_front_left_thigh_z)
-    s918 = cos_front_right_knee_angle * (delta_front_right_thigh_x + k4 * alpha_front_right_thigh_y)
-    s919 = k7 * alpha_front_right_thigh_y - k8 * (s918 - sin_front_right_knee_angle * delta_front_right_thigh_z)
-    s920 = cos_hind_left_knee_angle * (delta_hind_left_thigh_x + k4 * alpha_hind_left_thigh_y)
-    s921 = k7 * alpha_hind_left_thigh_y - k8 * (s920 - sin_hind_left_knee_angle * delta_hind_left_thigh_z)
-    s922 = cos_hind_right_knee_angle * (delta_hind_right_thigh_x + k4 * alpha_hind_right_thigh_y)
-    s923 = k7 * alpha_hind_right_thigh_y - k8 * (s922 - sin_hind_right_knee_angle * delta_hind_right_thigh_z)
-    s924 = trunk_wx * 0.5
-    s925 = trunk_wy * 0.5
-    s926 = trunk_wz * 0.5
+    s602 = omega_hind_right_thigh_x * omega_hind_right_thigh_y
+    s603 = omega_hind_right_thigh_z * omega_hind_right_thigh_x
+    s604 = omega_hind_right_thigh_z * omega_hind_right_thigh_y
+    s605 = s602 - s601
+    s606 = s558 + s603
+    s607 = s604 - s600
+    s608 = omega_hind_right_thigh_x_squared + omega_hind_right_thigh_y_squared
+    s609 = bias_front_left_thigh_x + k4 * s573
+    bias_front_left_shank_y = bias_front_left_thigh_y + k4 * s574
+    s610 = bias_front_left_thigh_z - k4 * s575
+    bias_front_left_shank_x = cos_front_left_knee_angle * s609 - sin_front_left_knee_angle * s610
+    s611 = cos_front_left_knee_angle * s567 - sin_front_left_knee_angle * s568 - front_left_knee_angle_dot * omega_front_left_shank_z
+    s612 = cos_front_left_knee_angle * s568 + sin_front_left_knee_angle * s567 + front_left_knee_angle_dot * omega_front_left_shank_x
+    s613 = omega_front_left_shank_z * omega_front_left_shank_x
+    s614 = omega_front_left_shank_z * omega_front_left_shank_y
+    s615 = omega_front_left_shank_x * omega_front_left_shank_x + omega_front_left_shank_y * omega_front_left_shank_y
+    s616 = bias_front_right_thigh_x + k4 * s584
+    bias_front_right_shank_y = bias_front_right_thigh_y + k4 * s585
+    s617 = bias_front_right_thigh_z - k4 * s586
+    bias_front_right_shank_x = cos_front_right_knee_angle * s616 - sin_front_right_knee_angle * s617
+    s618 = cos_front_right_knee_angle * s578 - sin_front_right_knee_angle * s579 - front_right_knee_angle_dot * omega_front_right_shank_z
+    s619 = cos_front_right_knee_angle * s579 + sin_front_right_knee_angle * s578 + front_right_knee_angle_dot * omega_front_right_shank_x
+    s620 = omega_front_right_shank_z * omega_front_right_shank_x
+    s621 = omega_front_right_shank_z * omega_front_right_shank_y
+    s622 = omega_front_right_shank_x * omega_front_right_shank_x + omega_front_right_shank_y * omega_front_right_shank_y
+    s623 = bias_hind_left_thigh_x + k4 * s595
+    bias_hind_left_shank_y = bias_hind_left_thigh_y + k4 * s596
+    s624 = bias_hind_left_thigh_z - k4 * s597
+    bias_hind_left_shank_x = cos_hind_left_knee_angle * s623 - sin_hind_left_knee_angle * s624
+    s625 = cos_hind_left_knee_angle * s589 - sin_hind_left_knee_angle * s590 - hind_left_knee_angle_dot * omega_hind_left_shank_z
+    s626 = cos_hind_left_knee_angle * s590 + sin_hind_left_knee_angle * s589 + hind_left_knee_angle_dot * omega_hind_left_shank_x
+    s627 = omega_hind_left_shank_z * omega_hind_left_shank_x
+    s628 = omega_hind_left_shank_z * omega_hind_left_shank_y
+    s629 = omega_hind_left_shank_x * omega_hind_left_shank_x + omega_hind_left_shank_y * omega_hind_left_shank_y
+    s630 = bias_hind_right_thigh_x + k4 * s606
+    bias_hind_right_shank_y = bias_hind_right_thigh_y + k4 * s607
+    s631 = bias_hind_right_thigh_z - k4 * s608
+    bias_hind_right_shank_x = cos_hind_right_knee_angle * s630 - sin_hind_right_knee_angle * s631
+    s632 = cos_hind_right_knee_angle * s600 - sin_hind_right_knee_angle * s601 - hind_right_knee_angle_dot * omega_hind_right_shank_z
+    s633 = cos_hind_right_knee_angle * s601 + sin_hind_right_knee_angle * s600 + hind_right_knee_angle_dot * omega_hind_right_shank_x
+    s634 = omega_hind_right_shank_z * omega_hind_right_shank_x
+    s635 = omega_hind_right_shank_z * omega_hind_right_shank_y
+    s636 = omega_hind_right_shank_x * omega_hind_right_shank_x + omega_hind_right_shank_y * omega_hind_right_shank_y
+    s637 = I_hip_yz * (omega_front_left_hip_z_squared - omega_front_left_hip_y_squared)
+    s638 = I_hip_xz * (omega_front_left_hip_x_squared - omega_front_left_hip_z_squared)
+    s639 = I_hip_xy * (omega_front_left_hip_y_squared - omega_front_left_hip_x_squared)
+    s640 = I_hip_yz * (s532 + s535) - I_hip_xz * s536 - s639 - inertia_front_left_hip_zz * s533
+    s641 = moment_front_left_hip_y * bias_front_left_hip_z + (I_hip_xz * (s534 - s533) - I_hip_xy * (s535 - s532) - s637 + s536 * k19)
+    s642 = m_hip * bias_hind_left_hip_x
+    s643 = moment_front_left_hip_y * bias_hind_left_hip_x
+    s644 = I_hip_yz * (omega_front_right_hip_z_squared - omega_front_right_hip_y_squared)
+    s645 = I_hip_xz * (omega_front_right_hip_x_squared - omega_front_right_hip_z_squared)
+    s646 = I_hip_xy * (omega_front_right_hip_y_squared - omega_front_right_hip_x_squared)
+    s647 = s646 - (I_hip_xz * s545 + I_hip_yz * (s541 + s544)) - inertia_front_left_hip_zz * s542
+    s648 = I_hip_xy * (s544 - s541) + I_hip_xz * (s543 - s542) + s644 + s545 * k19 - moment_front_left_hip_y * bias_front_right_hip_z
+    s649 = I_hip_yz * (omega_hind_left_hip_z_squared - omega_hind_left_hip_y_squared)
+    s650 = I_hip_xz * (omega_hind_left_hip_x_squared - omega_hind_left_hip_z_squared)
+    s651 = I_hip_xy * (omega_hind_left_hip_y_squared - omega_hind_left_hip_x_squared)
+    s652 = I_hip_yz * (s549 + s552) - I_hip_xz * s553 - s651 - inertia_front_left_hip_zz * s550
+    s653 = moment_front_left_hip_y * bias_hind_left_hip_z + (I_hip_xz * (s551 - s550) - I_hip_xy * (s552 - s549) - s649 + s553 * k19)
+    s654 = I_hip_yz * (omega_hind_right_hip_z_squared - omega_hind_right_hip_y_squared)
+    s655 = I_hip_xz * (omega_hind_right_hip_x_squared - omega_hind_right_hip_z_squared)
+    s656 = I_hip_xy * (omega_hind_right_hip_y_squared - omega_hind_right_hip_x_squared)
+    s657 = s656 - (I_hip_xz * s562 + I_hip_yz * (s558 + s561)) - inertia_front_left_hip_zz * s559
+    s658 = moment_front_left_hip_y * s557 + (I_hip_xy * (s561 - s558) + I_hip_xz * (s560 - s559) + s654 + s562 * k19)
+    s659 = moment_front_left_thigh_y * (omega_front_left_thigh_x_squared + omega_front_left_thigh_z_squared)
+    s660 = m_thigh * bias_front_left_thigh_x + (moment_front_left_thigh_y * s572 - k5 * s573)
+    s661 = m_thigh * bias_front_left_thigh_z + (moment_front_left_thigh_y * (s567 + s571) + k5 * s575)
+    s662 = moment_front_left_thigh_y * bias_front_left_thigh_z + k5 * bias_front_left_thigh_y
+    s663 = inertia_front_left_thigh_yz * (omega_front_left_thigh_z_squared - omega_front_left_thigh_y_squared)
+    s664 = inertia_front_left_thigh_yy * s532 - inertia_front_left_thigh_yz * s572 + s570 * k23
+    s665 = inertia_front_left_thigh_yz * s573 + inertia_front_left_thigh_zz * s568 + s569 * k24
+    s666 = moment_front_left_thigh_y * (omega_front_right_thigh_x_squared + omega_front_right_thigh_z_squared)
+    s667 = m_thigh * bias_front_right_thigh_x - (moment_front_left_thigh_y * s583 + k5 * s584)
+    s668 = m_thigh * bias_front_right_thigh_z + (k5 * s586 - moment_front_left_thigh_y * (s578 + s582))
+    s669 = k5 * bias_front_right_thigh_y - moment_front_left_thigh_y * bias_front_right_thigh_z
+    s670 = inertia_front_left_thigh_yz * (omega_front_right_thigh_z_squared - omega_front_right_thigh_y_squared)
+    s671 = inertia_front_left_thigh_yz * s583 + inertia_front_left_thigh_yy * s541 + s581 * k23
+    s672 = inertia_front_left_thigh_zz * s579 - inertia_front_left_thigh_yz * s584 + s580 * k24
+    s673 = moment_front_left_thigh_y * (omega_hind_left_thigh_x_squared + omega_hind_left_thigh_z_squared)
+    s674 = m_thigh * bias_hind_left_thigh_x + (moment_front_left_thigh_y * s594 - k5 * s595)
+    s675 = m_thigh * bias_hind_left_thigh_z + (moment_front_left_thigh_y * (s589 + s593) + k5 * s597)
+    s676 = moment_front_left_thigh_y * bias_hind_left_thigh_z + k5 * bias_hind_left_thigh_y
+    s677 = inertia_front_left_thigh_yz * (omega_hind_left_thigh_z_squared - omega_hind_left_thigh_y_squared)
+    s678 = inertia_front_left_thigh_yy * s549 - inertia_front_left_thigh_yz * s594 + s592 * k23
+    s679 = inertia_front_left_thigh_yz * s595 + inertia_front_left_thigh_zz * s590 + s591 * k24
+    s680 = moment_front_left_thigh_y * (omega_hind_right_thigh_x_squared + omega_hind_right_thigh_z_squared)
+    s681 = m_thigh * bias_hind_right_thigh_x - (moment_front_left_thigh_y * s605 + k5 * s606)
+    s682 = m_thigh * bias_hind_right_thigh_z + (k5 * s608 - moment_front_left_thigh_y * (s600 + s604))
+    s683 = k5 * bias_hind_right_thigh_y - moment_front_left_thigh_y * bias_hind_right_thigh_z
+    s684 = inertia_front_left_thigh_yz * (omega_hind_right_thigh_z_squared - omega_hind_right_thigh_y_squared)
+    s685 = inertia_front_left_thigh_yz * s605 + inertia_front_left_thigh_yy * s558 + s603 * k23
+    s686 = inertia_front_left_thigh_zz * s601 - inertia_front_left_thigh_yz * s606 + s602 * k24
+    s687 = m_shank * (cos_front_left_knee_angle * s610 + sin_front_left_knee_angle * s609)
+    s688 = m_shank * bias_front_left_shank_y - k6 * (s614 - s611)
+    s689 = s687 + k6 * s615
+    s690 = k6 * bias_front_left_shank_x
+    s691 = inertia_front_left_shank_yy * s532 + s613 * k26
+    s692 = I_shank_z * s612 + omega_front_left_shank_x * omega_front_left_shank_y * k27
+    s693 = k6 * bias_front_left_shank_y + (inertia_front_left_shank_xx * s611 + s614 * k25)
+    s694 = m_shank * (cos_front_right_knee_angle * s617 + sin_front_right_knee_angle * s616)
+    s695 = m_shank * bias_front_right_shank_y - k6 * (s621 - s618)
+    s696 = s694 + k6 * s622
+    s697 = k6 * bias_front_right_shank_x
+    s698 = inertia_front_left_shank_yy * s541 + s620 * k26
+    s699 = I_shank_z * s619 + omega_front_right_shank_x * omega_front_right_shank_y * k27
+    s700 = k6 * bias_front_right_shank_y + (inertia_front_left_shank_xx * s618 + s621 * k25)
+    s701 = m_shank * (cos_hind_left_knee_angle * s624 + sin_hind_left_knee_angle * s623)
+    s702 = m_shank * bias_hind_left_shank_y - k6 * (s628 - s625)
+    s703 = s701 + k6 * s629
+    s704 = k6 * bias_hind_left_shank_x
+    s705 = inertia_front_left_shank_yy * s549 + s627 * k26
+    s706 = I_shank_z * s626 + omega_hind_left_shank_x * omega_hind_left_shank_y * k27
+    s707 = k6 * bias_hind_left_shank_y + (inertia_front_left_shank_xx * s625 + s628 * k25)
+    s708 = m_shank * (cos_hind_right_knee_angle * s631 + sin_hind_right_knee_angle * s630)
+    s709 = m_shank * bias_hind_right_shank_y - k6 * (s635 - s632)
+    s710 = s708 + k6 * s636
+    s711 = k6 * bias_hind_right_shank_x
+    s712 = inertia_front_left_shank_yy * s558 + s634 * k26
+    s713 = I_shank_z * s633 + omega_hind_right_shank_x * omega_hind_right_shank_y * k27
+    s714 = k6 * bias_hind_right_shank_y + (inertia_front_left_shank_xx * s632 + s635 * k25)
+    s715 = s711 - s712
+    s716 = m_shank * bias_hind_right_shank_x - k6 * (s558 + s634) - k8 * s715
+    s717 = sin_hind_right_knee_angle * s710 + cos_hind_right_knee_angle * s716
+    s718 = sin_hind_right_knee_angle * s713 + cos_hind_right_knee_angle * s714 - k4 * s709
+    s719 = s683 + (s684 + inertia_front_left_thigh_xx * s600 + s604 * k22) + s718
+    s720 = s685 - k5 * bias_hind_right_thigh_x + (s712 - s711 + k7 * s715 + k4 * s717)
+    s721 = moment_front_left_thigh_y * bias_hind_right_thigh_x + s686 + (cos_hind_right_knee_angle * s713 - sin_hind_right_knee_angle * s714)
+    s722 = s682 + (cos_hind_right_knee_angle * s710 - sin_hind_right_knee_angle * s716)
+    s723 = s704 - s705
+    s724 = m_shank * bias_hind_left_shank_x - k6 * (s549 + s627) - k8 * s723
+    s725 = sin_hind_left_knee_angle * s703 + cos_hind_left_knee_angle * s724
+    s726 = sin_hind_left_knee_angle * s706 + cos_hind_left_knee_angle * s707 - k4 * s702
+    s727 = s676 + (inertia_front_left_thigh_xx * s589 - s677 + s593 * k22) + s726
+    s728 = s678 - k5 * bias_hind_left_thigh_x + (s705 - s704 + k7 * s723 + k4 * s725)
+    s729 = s679 - moment_front_left_thigh_y * bias_hind_left_thigh_x + (cos_hind_left_knee_angle * s706 - sin_hind_left_knee_angle * s707)
+    s730 = s675 + (cos_hind_left_knee_angle * s703 - sin_hind_left_knee_angle * s724)
+    s731 = s697 - s698
+    s732 = m_shank * bias_front_right_shank_x - k6 * (s541 + s620) - k8 * s731
+    s733 = sin_front_right_knee_angle * s696 + cos_front_right_knee_angle * s732
+    s734 = sin_front_right_knee_angle * s699 + cos_front_right_knee_angle * s700 - k4 * s695
+    s735 = s669 + (s670 + inertia_front_left_thigh_xx * s578 + s582 * k22) + s734
+    s736 = s671 - k5 * bias_front_right_thigh_x + (s698 - s697 + k7 * s731 + k4 * s733)
+    s737 = moment_front_left_thigh_y * bias_front_right_thigh_x + s672 + (cos_front_right_knee_angle * s699 - sin_front_right_knee_angle * s700)
+    s738 = s668 + (cos_front_right_knee_angle * s696 - sin_front_right_knee_angle * s732)
+    s739 = s690 - s691
+    s740 = m_shank * bias_front_left_shank_x - k6 * (s532 + s613) - k8 * s739
+    s741 = sin_front_left_knee_angle * s689 + cos_front_left_knee_angle * s740
+    s742 = sin_front_left_knee_angle * s692 + cos_front_left_knee_angle * s693 - k4 * s688
+    s743 = s662 + (inertia_front_left_thigh_xx * s567 - s663 + s571 * k22) + s742
+    s744 = s664 - k5 * bias_front_left_thigh_x + (s691 - s690 + k7 * s739 + k4 * s741)
+    s745 = s665 - moment_front_left_thigh_y * bias_front_left_thigh_x + (cos_front_left_knee_angle * s692 - sin_front_left_knee_angle * s693)
+    s746 = s661 + (cos_front_left_knee_angle * s689 - sin_front_left_knee_angle * s740)
+    s747 = s721 + s101 * s720
+    s748 = s681 + s717 - s102 * s720
+    s749 = s722 - s103 * s720
+    s750 = cos_hind_right_swing_angle * s749 - sin_hind_right_swing_angle * s748
+    s751 = sin_hind_right_swing_angle * s749 + cos_hind_right_swing_angle * s748
+    s752 = sin_hind_right_swing_angle * s747 + cos_hind_right_swing_angle * s719 + k3 * s750
+    s753 = cos_hind_right_swing_angle * s747 - sin_hind_right_swing_angle * s719 - k3 * s751
+    s754 = s658 + s752
+    s755 = I_hip_yz * s563 - I_hip_xy * s562 - s655 + I_hip_yy * s558 + s561 * k20 + (s720 - s100 * s720)
+    s756 = moment_front_left_hip_y * bias_hind_right_hip_x + (s657 + s560 * k21) + s753
+    s757 = m_hip * bias_hind_right_hip_y + moment_front_left_hip_y * s564 + (m_thigh * bias_hind_right_thigh_y + (s680 - k5 * s607) + s709)
+    s758 = s729 - s138 * s728
+    s759 = s674 + s725 - s139 * s728
+    s760 = s730 - s140 * s728
+    s761 = cos_hind_left_swing_angle * s760 - sin_hind_left_swing_angle * s759
+    s762 = sin_hind_left_swing_angle * s760 + cos_hind_left_swing_angle * s759
+    s763 = sin_hind_left_swing_angle * s758 + cos_hind_left_swing_angle * s727 + k2 * s761
+    s764 = cos_hind_left_swing_angle * s758 - sin_hind_left_swing_angle * s727 - k2 * s762
+    s765 = s653 + s763
+    s766 = I_hip_xy * s553 - I_hip_yz * s554 - s650 + I_hip_yy * s549 + s552 * k20 + (s728 - s137 * s728)
+    s767 = m_hip * bias_hind_left_hip_y - moment_front_left_hip_y * s555 + (m_thigh * bias_hind_left_thigh_y - (s673 + k5 * s596) + s702)
+    s768 = s737 + s175 * s736
+    s769 = s667 + s733 - s176 * s736
+    s770 = s738 - s177 * s736
+    s771 = cos_front_right_swing_angle * s770 - sin_front_right_swing_angle * s769
+    s772 = sin_front_right_swing_angle * s770 + cos_front_right_swing_angle * s769
+    s773 = sin_front_right_swing_angle * s768 + cos_front_right_swing_angle * s735 + k3 * s771
+    s774 = cos_front_right_swing_angle * s768 - sin_front_right_swing_angle * s735 - k3 * s772
+    s775 = s648 + s773
+    s776 = I_hip_yz * s546 - I_hip_xy * s545 - s645 + I_hip_yy * s541 + s544 * k20 + (s736 - s174 * s736)
+    s777 = m_hip * bias_front_right_hip_y + moment_front_left_hip_y * s547 + (m_thigh * bias_front_right_thigh_y + (s666 - k5 * s585) + s695)
+    s778 = s745 - s212 * s744
+    s779 = s660 + s741 - s213 * s744
+    s780 = s746 - s214 * s744
+    s781 = cos_front_left_swing_angle * s780 - sin_front_left_swing_angle * s779
+    s782 = sin_front_left_swing_angle * s780 + cos_front_left_swing_angle * s779
+    s783 = sin_front_left_swing_angle * s778 + cos_front_left_swing_angle * s743 + k2 * s781
+    s784 = cos_front_left_swing_angle * s778 - sin_front_left_swing_angle * s743 - k2 * s782
+    s785 = s641 + s783
+    s786 = I_hip_xy * s536 - I_hip_yz * s537 - s638 + I_hip_yy * s532 + s535 * k20 + (s744 - s211 * s744)
+    s787 = s640 + s534 * k21 - moment_front_left_hip_y * bias_front_left_hip_x + s784
+    s788 = m_hip * bias_front_left_hip_y - moment_front_left_hip_y * s538 + (m_thigh * bias_front_left_thigh_y - (s659 + k5 * s574) + s688)
+    s789 = s755 - s249 * s754
+    s790 = s756 - s250 * s754
+    s791 = m_hip * bias_hind_right_hip_x - moment_front_left_hip_y * s563 + s751 - s251 * s754
+    s792 = s757 - s252 * s754
+    s793 = s750 - (m_hip * s557 + moment_front_left_hip_y * s562) - s253 * s754
+    s794 = cos_hind_right_abduction_angle * s792 - sin_hind_right_abduction_angle * s793
+    s795 = sin_hind_right_abduction_angle * s792 + cos_hind_right_abduction_angle * s793
+    s796 = cos_hind_right_abduction_angle * s789 - sin_hind_right_abduction_angle * s790
+    s797 = sin_hind_right_abduction_angle * s789 + cos_hind_right_abduction_angle * s790
+    s798 = s766 - s305 * s765
+    s799 = s652 + s551 * k21 - s643 + s764 - s306 * s765
+    s800 = s642 + moment_front_left_hip_y * s554 + s762 - s307 * s765
+    s801 = s767 - s308 * s765
+    s802 = m_hip * bias_hind_left_hip_z + moment_front_left_hip_y * s553 + s761 - s309 * s765
+    s803 = cos_hind_left_abduction_angle * s801 - sin_hind_left_abduction_angle * s802
+    s804 = sin_hind_left_abduction_angle * s801 + cos_hind_left_abduction_angle * s802
+    s805 = cos_hind_left_abduction_angle * s798 - sin_hind_left_abduction_angle * s799
+    s806 = sin_hind_left_abduction_angle * s798 + cos_hind_left_abduction_angle * s799
+    s807 = s523 * k16 + (s754 - s248 * s754 - y_hip * s795) + (s765 - s304 * s765 + y_hip * s804)
+    s808 = s521 * k18 + (s797 + (y_hip * s791 - x_hip * s794)) + (s806 - (x_hip * s803 + y_hip * s800))
+    s809 = s776 - s365 * s775
+    s810 = s647 + s543 * k21 - s643 + s774 - s366 * s775
+    s811 = s772 - (s642 + moment_front_left_hip_y * s546) - s367 * s775
+    s812 = s777 - s368 * s775
+    s813 = m_hip * bias_front_right_hip_z - moment_front_left_hip_y * s545 + s771 - s369 * s775
+    s814 = cos_front_right_abduction_angle * s812 - sin_front_right_abduction_angle * s813
+    s815 = sin_front_right_abduction_angle * s812 + cos_front_right_abduction_angle * s813
+    s816 = cos_front_right_abduction_angle * s809 - sin_front_right_abduction_angle * s810
+    s817 = sin_front_right_abduction_angle * s809 + cos_front_right_abduction_angle * s810
+    s818 = s522 * k17 + (s796 + x_hip * s795) + (s805 + x_hip * s804) + (s816 - x_hip * s815)
+    s819 = s786 - s421 * s785
+    s820 = s787 - s422 * s785
+    s821 = m_hip * bias_front_left_hip_x + moment_front_left_hip_y * s537 + s782 - s423 * s785
+    s822 = s788 - s424 * s785
+    s823 = m_hip * bias_front_left_hip_z + moment_front_left_hip_y * s536 + s781 - s425 * s785
+    s824 = cos_front_left_abduction_angle * s822 - sin_front_left_abduction_angle * s823
+    s825 = sin_front_left_abduction_angle * s822 + cos_front_left_abduction_angle * s823
+    s826 = cos_front_left_abduction_angle * s819 - sin_front_left_abduction_angle * s820
+    s827 = sin_front_left_abduction_angle * s819 + cos_front_left_abduction_angle * s820
+    s828 = s807 + (s775 - s364 * s775 - y_hip * s815) + (s785 - s420 * s785 + y_hip * s825)
+    s829 = s808 + (s817 + (x_hip * s814 + y_hip * s811)) + (s827 + (x_hip * s824 - y_hip * s821))
+    s830 = s483 * s828 - (s818 + (s826 - x_hip * s825))
+    s831 = s829 - s484 * s828 + s492 * s830
+    s832 = s791 + s800 + s811 + s821 - s485 * s828 + s493 * s830 - s499 * s831
+    s833 = s794 + s803 + s814 + s824 - s486 * s828 + s494 * s830 - s500 * s831
+    s834 = s795 + s804 + s815 + s825 - s487 * s828 + s495 * s830 - s501 * s831
+    s835 = s21 * s832 + s22 * s833 + s23 * s834
+    s836 = s518 * s835 - (s18 * s832 + s19 * s833 + s20 * s834)
+    s837 = (s15 * s832 + s16 * s833 + s17 * s834 - s517 * s835 + s520 * s836) / (s15 * s508 + s16 * s509 + s17 * s510 - s515 * s517 - s519 * s520)
+    delta_trunk_2_y = s836 / pivot_trunk_2_2 + s520 * s837
+    s838 = s835 / pivot_trunk_3_2 + (s518 * delta_trunk_2_y - s517 * s837)
+    delta_trunk_x = s18 * delta_trunk_2_y - s15 * s837 - s21 * s838
+    delta_trunk_y = s19 * delta_trunk_2_y - s16 * s837 - s22 * s838
+    delta_trunk_z = s20 * delta_trunk_2_y - s17 * s837 - s23 * s838
+    s839 = s831 / pivot_trunk_3 + (s499 * delta_trunk_x + s500 * delta_trunk_y + s501 * delta_trunk_z)
+    s840 = s493 * delta_trunk_x + s494 * delta_trunk_y + s495 * delta_trunk_z - s492 * s839
+    alpha_trunk_y = s830 / pivot_trunk_2 - s840
+    s841 = s483 * alpha_trunk_y - s484 * s839 + (s485 * delta_trunk_x + s486 * delta_trunk_y + s487 * delta_trunk_z)
+    s842 = s828 / pivot_trunk + s841
+    alpha_front_left_hip_y = cos_front_left_abduction_angle * alpha_trunk_y - sin_front_left_abduction_angle * s839
+    s843 = cos_front_left_abduction_angle * s839 + sin_front_left_abduction_angle * alpha_trunk_y
+    s844 = y_hip * s839
+    s845 = x_hip * s839
+    s846 = y_hip * s842
+    s847 = x_hip * alpha_trunk_y
+    s848 = s846 + s847
+    delta_front_left_hip_x = delta_trunk_x + s844
+    s849 = delta_trunk_y - s845
+    s850 = delta_trunk_z - s848
+    delta_front_left_hip_y = cos_front_left_abduction_angle * s849 + sin_front_left_abduction_angle * s850
+    delta_front_left_hip_z = cos_front_left_abduction_angle * s850 - sin_front_left_abduction_angle * s849
+    s851 = s423 * delta_front_left_hip_x + s424 * delta_front_left_hip_y + s425 * delta_front_left_hip_z
+    s852 = s785 / pivot_front_left_hip + (s421 * alpha_front_left_hip_y - s420 * s842 - s422 * s843 + s851)
+    s853 = s842 + s852
+    alpha_front_right_hip_y = cos_front_right_abduction_angle * alpha_trunk_y - sin_front_right_abduction_angle * s839
+    s854 = cos_front_right_abduction_angle * s839 + sin_front_right_abduction_angle * alpha_trunk_y
+    delta_front_right_hip_x = delta_trunk_x - s844
+    s855 = delta_trunk_z + (s846 - s847)
+    delta_front_right_hip_y = cos_front_right_abduction_angle * s849 + sin_front_right_abduction_angle * s855
+    delta_front_right_hip_z = cos_front_right_abduction_angle * s855 - sin_front_right_abduction_angle * s849
+    s856 = s367 * delta_front_right_hip_x + s368 * delta_front_right_hip_y + s369 * delta_front_right_hip_z
+    s857 = s775 / pivot_front_right_hip + (s365 * alpha_front_right_hip_y - s364 * s842 - s366 * s854 + s856)
+    s858 = s842 + s857
+    alpha_hind_left_hip_y = cos_hind_left_abduction_angle * alpha_trunk_y - sin_hind_left_abduction_angle * s839
+    s859 = cos_hind_left_abduction_angle * s839 + sin_hind_left_abduction_angle * alpha_trunk_y
+    s860 = delta_trunk_y + s845
+    s861 = delta_trunk_z + (s847 - s846)
+    delta_hind_left_hip_y = cos_hind_left_abduction_angle * s860 + sin_hind_left_abduction_angle * s861
+    delta_hind_left_hip_z = cos_hind_left_abduction_angle * s861 - sin_hind_left_abduction_angle * s860
+    s862 = s307 * delta_front_left_hip_x + s308 * delta_hind_left_hip_y + s309 * delta_hind_left_hip_z
+    s863 = s765 / pivot_hind_left_hip + (s305 * alpha_hind_left_hip_y - s304 * s842 - s306 * s859 + s862)
+    s864 = s842 + s863
+    alpha_hind_right_hip_y = cos_hind_right_abduction_angle * alpha_trunk_y - sin_hind_right_abduction_angle * s839
+    s865 = cos_hind_right_abduction_angle * s839 + sin_hind_right_abduction_angle * alpha_trunk_y
+    s866 = delta_trunk_z + s848
+    delta_hind_right_hip_y = cos_hind_right_abduction_angle * s860 + sin_hind_right_abduction_angle * s866
+    delta_hind_right_hip_z = cos_hind_right_abduction_angle * s866 - sin_hind_right_abduction_angle * s860
+    s867 = s251 * delta_front_right_hip_x + s252 * delta_hind_right_hip_y + s253 * delta_hind_right_hip_z
+    s868 = s754 / pivot_hind_right_hip + (s249 * alpha_hind_right_hip_y - s248 * s842 - s250 * s865 + s867)
+    s869 = s842 + s868
+    s870 = delta_front_left_hip_x + k2 * s843
+    s871 = delta_front_left_hip_z - k2 * s853
+    delta_front_left_thigh_z = cos_front_left_swing_angle * s871 + sin_front_left_swing_angle * s870
+    delta_front_left_thigh_x = cos_front_left_swing_angle * s870 - sin_front_left_swing_angle * s871
+    s872 = s212 * (cos_front_left_swing_angle * s843 + sin_front_left_swing_angle * s853)
+    s873 = s211 * alpha_front_left_hip_y - s872 + (s213 * delta_front_left_thigh_x + s214 * delta_front_left_thigh_z)
+    s874 = s744 / pivot_front_left_thigh + s873
+    alpha_front_left_thigh_y = alpha_front_left_hip_y - s874
+    s875 = delta_front_right_hip_x + k3 * s854
+    s876 = delta_front_right_hip_z - k3 * s858
+    delta_front_right_thigh_z = cos_front_right_swing_angle * s876 + sin_front_right_swing_angle * s875
+    delta_front_right_thigh_x = cos_front_right_swing_angle * s875 - sin_front_right_swing_angle * s876
+    s877 = s175 * (cos_front_right_swing_angle * s854 + sin_front_right_swing_angle * s858)
+    s878 = s174 * alpha_front_right_hip_y + s877 + (s176 * delta_front_right_thigh_x + s177 * delta_front_right_thigh_z)
+    s879 = s736 / pivot_front_right_thigh + s878
+    alpha_front_right_thigh_y = alpha_front_right_hip_y - s879
+    s880 = delta_front_left_hip_x + k2 * s859
+    s881 = delta_hind_left_hip_z - k2 * s864
+    delta_hind_left_thigh_z = cos_hind_left_swing_angle * s881 + sin_hind_left_swing_angle * s880
+    delta_hind_left_thigh_x = cos_hind_left_swing_angle * s880 - sin_hind_left_swing_angle * s881
+    s882 = s138 * (cos_hind_left_swing_angle * s859 + sin_hind_left_swing_angle * s864)
+    s883 = s137 * alpha_hind_left_hip_y - s882 + (s139 * delta_hind_left_thigh_x + s140 * delta_hind_left_thigh_z)
+    s884 = s728 / pivot_hind_left_thigh + s883
+    alpha_hind_left_thigh_y = alpha_hind_left_hip_y - s884
+    s885 = delta_front_right_hip_x + k3 * s865
+    s886 = delta_hind_right_hip_z - k3 * s869
+    delta_hind_right_thigh_z = cos_hind_right_swing_angle * s886 + sin_hind_right_swing_angle * s885
+    delta_hind_right_thigh_x = cos_hind_right_swing_angle * s885 - sin_hind_right_swing_angle * s886
+    s887 = s101 * (cos_hind_right_swing_angle * s865 + sin_hind_right_swing_angle * s869)
+    s888 = s100 * alpha_hind_right_hip_y + s887 + (s102 * delta_hind_right_thigh_x + s103 * delta_hind_right_thigh_z)
+    s889 = s720 / pivot_hind_right_thigh + s888
+    alpha_hind_right_thigh_y = alpha_hind_right_hip_y - s889
+    s890 = cos_front_left_knee_angle * (delta_front_left_thigh_x + k4 * alpha_front_left_thigh_y)
+    s891 = k7 * alpha_front_left_thigh_y - k8 * (s890 - sin_front_left_knee_angle * delta_front_left_thigh_z)
+    s892 = cos_front_right_knee_angle * (delta_front_right_thigh_x + k4 * alpha_front_right_thigh_y)
+    s893 = k7 * alpha_front_right_thigh_y - k8 * (s892 - sin_front_right_knee_angle * delta_front_right_thigh_z)
+    s894 = cos_hind_left_knee_angle * (delta_hind_left_thigh_x + k4 * alpha_hind_left_thigh_y)
+    s895 = k7 * alpha_hind_left_thigh_y - k8 * (s894 - sin_hind_left_knee_angle * delta_hind_left_thigh_z)
+    s896 = cos_hind_right_knee_angle * (delta_hind_right_thigh_x + k4 * alpha_hind_right_thigh_y)
+    s897 = k7 * alpha_hind_right_thigh_y - k8 * (s896 - sin_hind_right_knee_angle * delta_hind_right_thigh_z)
+    s898 = trunk_wx * 0.5
+    s899 = trunk_wy * 0.5
+    s900 = trunk_wz * 0.5
     return (
         trunk_x_dot,
         trunk_y_dot,
         trunk_z_dot,
-        -(trunk_qx * s924 + trunk_qy * s925 + trunk_qz * s926),
-        trunk_qw * s924 + trunk_qy * s926 - trunk_qz * s925,
-        trunk_qw * s925 + trunk_qz * s924 - trunk_qx * s926,
-        trunk_qw * s926 + trunk_qx * s925 - trunk_qy * s924,
+        -(trunk_qx * s898 + trunk_qy * s899 + trunk_qz * s900),
+        trunk_qw * s898 + trunk_qy * s900 - trunk_qz * s899,
+        trunk_qw * s899 + trunk_qz * s898 - trunk_qx * s900,
+        trunk_qw * s900 + trunk_qx * s899 - trunk_qy * s898,
         front_left_abduction_angle_dot,
         front_right_abduction_angle_dot,
         hind_left_abduction_angle_dot,
@@ -1600,29 +1701,29 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
         front_right_knee_angle_dot,
         hind_left_knee_angle_dot,
         hind_right_knee_angle_dot,
-        -s863,
+        -s837,
         delta_trunk_2_y,
-        -(g + s864),
-        -s868,
+        -(g + s838),
+        -s842,
         alpha_trunk_y,
-        -s865,
-        -s878,
-        -s883,
+        -s839,
+        -s852,
+        -s857,
+        -s863,
+        -s868,
+        -s874,
+        -s879,
+        -s884,
         -s889,
-        -s894,
-        -s900,
-        -s905,
-        -s910,
-        -s915,
-        s767 / pivot_hind_right_shank - s917,
-        s759 / pivot_hind_right_shank - s919,
-        s751 / pivot_hind_right_shank - s921,
-        s743 / pivot_hind_right_shank - s923,
+        s739 / pivot_hind_right_shank - s891,
+        s731 / pivot_hind_right_shank - s893,
+        s723 / pivot_hind_right_shank - s895,
+        s715 / pivot_hind_right_shank - s897,
     )
 
 
 def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """25368 operations: 5631 add, 6292 sub, 12784 mul, 515 div, 122 neg, 12 sin, 12 cos."""
+    """25372 operations: 5683 add, 6248 sub, 12780 mul, 515 div, 122 neg, 12 sin, 12 cos."""
     m_trunk, I_trunk_x, I_trunk_y, I_trunk_z, x_hip, y_hip, m_hip, I_hip_yy, I_hip_xy, I_hip_xz, I_hip_yz, m_thigh, m_shank, I_shank_z, g, k1, k2, k3, k4, k28, moment_front_left_hip_y, inertia_front_left_hip_xx, inertia_front_left_hip_zz, moment_front_left_thigh_y, k5, inertia_front_left_thigh_yz, inertia_front_left_thigh_xx, inertia_front_left_thigh_yy, inertia_front_left_thigh_zz, k6, inertia_front_left_shank_xx, inertia_front_left_shank_yy, pivot_hind_right_shank, k7, k8, k9, k10, k11, k12, k13, k14, k29, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k30 = k
     _, _, _, trunk_qw, trunk_qx, trunk_qy, trunk_qz, front_left_abduction_angle, front_right_abduction_angle, hind_left_abduction_angle, hind_right_abduction_angle, front_left_swing_angle, front_right_swing_angle, hind_left_swing_angle, hind_right_swing_angle, front_left_knee_angle, front_right_knee_angle, hind_left_knee_angle, hind_right_knee_angle, trunk_x_dot, trunk_y_dot, trunk_z_dot, trunk_wx, trunk_wy, trunk_wz, front_left_abduction_angle_dot, front_right_abduction_angle_dot, hind_left_abduction_angle_dot, hind_right_abduction_angle_dot, front_left_swing_angle_dot, front_right_swing_angle_dot, hind_left_swing_angle_dot, hind_right_swing_angle_dot, front_left_knee_angle_dot, front_right_knee_angle_dot, hind_left_knee_angle_dot, hind_right_knee_angle_dot = y
     s1 = trunk_qw * trunk_qw + trunk_qx * trunk_qx + trunk_qy * trunk_qy + trunk_qz * trunk_qz
@@ -1651,107 +1752,107 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     cos_front_left_abduction_angle = cos(front_left_abduction_angle)
     sin_front_left_abduction_angle = sin(front_left_abduction_angle)
     s24 = 2.0 * cos_front_left_abduction_angle
-    s927 = s16 * cos_front_left_abduction_angle + s17 * sin_front_left_abduction_angle
-    s928 = s17 * cos_front_left_abduction_angle - s16 * sin_front_left_abduction_angle
-    s929 = s19 * cos_front_left_abduction_angle + s20 * sin_front_left_abduction_angle
-    s930 = s20 * cos_front_left_abduction_angle - s19 * sin_front_left_abduction_angle
-    s931 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
-    s932 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
+    s901 = s16 * cos_front_left_abduction_angle + s17 * sin_front_left_abduction_angle
+    s902 = s17 * cos_front_left_abduction_angle - s16 * sin_front_left_abduction_angle
+    s903 = s19 * cos_front_left_abduction_angle + s20 * sin_front_left_abduction_angle
+    s904 = s20 * cos_front_left_abduction_angle - s19 * sin_front_left_abduction_angle
+    s905 = s22 * cos_front_left_abduction_angle + s23 * sin_front_left_abduction_angle
+    s906 = s23 * cos_front_left_abduction_angle - s22 * sin_front_left_abduction_angle
     cos_front_right_abduction_angle = cos(front_right_abduction_angle)
     sin_front_right_abduction_angle = sin(front_right_abduction_angle)
     s25 = 2.0 * cos_front_right_abduction_angle
-    s933 = s16 * cos_front_right_abduction_angle + s17 * sin_front_right_abduction_angle
-    s934 = s17 * cos_front_right_abduction_angle - s16 * sin_front_right_abduction_angle
-    s935 = s19 * cos_front_right_abduction_angle + s20 * sin_front_right_abduction_angle
-    s936 = s20 * cos_front_right_abduction_angle - s19 * sin_front_right_abduction_angle
-    s937 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
-    s938 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
+    s907 = s16 * cos_front_right_abduction_angle + s17 * sin_front_right_abduction_angle
+    s908 = s17 * cos_front_right_abduction_angle - s16 * sin_front_right_abduction_angle
+    s909 = s19 * cos_front_right_abduction_angle + s20 * sin_front_right_abduction_angle
+    s910 = s20 * cos_front_right_abduction_angle - s19 * sin_front_right_abduction_angle
+    s911 = s22 * cos_front_right_abduction_angle + s23 * sin_front_right_abduction_angle
+    s912 = s23 * cos_front_right_abduction_angle - s22 * sin_front_right_abduction_angle
     cos_hind_left_abduction_angle = cos(hind_left_abduction_angle)
     sin_hind_left_abduction_angle = sin(hind_left_abduction_angle)
     s26 = 2.0 * cos_hind_left_abduction_angle
-    s939 = s16 * cos_hind_left_abduction_angle + s17 * sin_hind_left_abduction_angle
-    s940 = s17 * cos_hind_left_abduction_angle - s16 * sin_hind_left_abduction_angle
-    s941 = s19 * cos_hind_left_abduction_angle + s20 * sin_hind_left_abduction_angle
-    s942 = s20 * cos_hind_left_abduction_angle - s19 * sin_hind_left_abduction_angle
-    s943 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
-    s944 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
+    s913 = s16 * cos_hind_left_abduction_angle + s17 * sin_hind_left_abduction_angle
+    s914 = s17 * cos_hind_left_abduction_angle - s16 * sin_hind_left_abduction_angle
+    s915 = s19 * cos_hind_left_abduction_angle + s20 * sin_hind_left_abduction_angle
+    s916 = s20 * cos_hind_left_abduction_angle - s19 * sin_hind_left_abduction_angle
+    s917 = s22 * cos_hind_left_abduction_angle + s23 * sin_hind_left_abduction_angle
+    s918 = s23 * cos_hind_left_abduction_angle - s22 * sin_hind_left_abduction_angle
     cos_hind_right_abduction_angle = cos(hind_right_abduction_angle)
     sin_hind_right_abduction_angle = sin(hind_right_abduction_angle)
     s27 = 2.0 * cos_hind_right_abduction_angle
-    s945 = s16 * cos_hind_right_abduction_angle + s17 * sin_hind_right_abduction_angle
-    s946 = s17 * cos_hind_right_abduction_angle - s16 * sin_hind_right_abduction_angle
-    s947 = s19 * cos_hind_right_abduction_angle + s20 * sin_hind_right_abduction_angle
-    s948 = s20 * cos_hind_right_abduction_angle - s19 * sin_hind_right_abduction_angle
-    s949 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
-    s950 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
+    s919 = s16 * cos_hind_right_abduction_angle + s17 * sin_hind_right_abduction_angle
+    s920 = s17 * cos_hind_right_abduction_angle - s16 * sin_hind_right_abduction_angle
+    s921 = s19 * cos_hind_right_abduction_angle + s20 * sin_hind_right_abduction_angle
+    s922 = s20 * cos_hind_right_abduction_angle - s19 * sin_hind_right_abduction_angle
+    s923 = s22 * cos_hind_right_abduction_angle + s23 * sin_hind_right_abduction_angle
+    s924 = s23 * cos_hind_right_abduction_angle - s22 * sin_hind_right_abduction_angle
     cos_front_left_swing_angle = cos(front_left_swing_angle)
     sin_front_left_swing_angle = sin(front_left_swing_angle)
     s28 = 2.0 * cos_front_left_swing_angle
-    s951 = s928 * cos_front_left_swing_angle + s15 * sin_front_left_swing_angle
-    s952 = s15 * cos_front_left_swing_angle - s928 * sin_front_left_swing_angle
-    s953 = s930 * cos_front_left_swing_angle + s18 * sin_front_left_swing_angle
-    s954 = s18 * cos_front_left_swing_angle - s930 * sin_front_left_swing_angle
-    s955 = s932 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
-    s956 = s21 * cos_front_left_swing_angle - s932 * sin_front_left_swing_angle
+    s925 = s902 * cos_front_left_swing_angle + s15 * sin_front_left_swing_angle
+    s926 = s15 * cos_front_left_swing_angle - s902 * sin_front_left_swing_angle
+    s927 = s904 * cos_front_left_swing_angle + s18 * sin_front_left_swing_angle
+    s928 = s18 * cos_front_left_swing_angle - s904 * sin_front_left_swing_angle
+    s929 = s906 * cos_front_left_swing_angle + s21 * sin_front_left_swing_angle
+    s930 = s21 * cos_front_left_swing_angle - s906 * sin_front_left_swing_angle
     cos_front_right_swing_angle = cos(front_right_swing_angle)
     sin_front_right_swing_angle = sin(front_right_swing_angle)
     s29 = 2.0 * cos_front_right_swing_angle
-    s957 = s934 * cos_front_right_swing_angle + s15 * sin_front_right_swing_angle
-    s958 = s15 * cos_front_right_swing_angle - s934 * sin_front_right_swing_angle
-    s959 = s936 * cos_front_right_swing_angle + s18 * sin_front_right_swing_angle
-    s960 = s18 * cos_front_right_swing_angle - s936 * sin_front_right_swing_angle
-    s961 = s938 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
-    s962 = s21 * cos_front_right_swing_angle - s938 * sin_front_right_swing_angle
+    s931 = s908 * cos_front_right_swing_angle + s15 * sin_front_right_swing_angle
+    s932 = s15 * cos_front_right_swing_angle - s908 * sin_front_right_swing_angle
+    s933 = s910 * cos_front_right_swing_angle + s18 * sin_front_right_swing_angle
+    s934 = s18 * cos_front_right_swing_angle - s910 * sin_front_right_swing_angle
+    s935 = s912 * cos_front_right_swing_angle + s21 * sin_front_right_swing_angle
+    s936 = s21 * cos_front_right_swing_angle - s912 * sin_front_right_swing_angle
     cos_hind_left_swing_angle = cos(hind_left_swing_angle)
     sin_hind_left_swing_angle = sin(hind_left_swing_angle)
     s30 = 2.0 * cos_hind_left_swing_angle
-    s963 = s940 * cos_hind_left_swing_angle + s15 * sin_hind_left_swing_angle
-    s964 = s15 * cos_hind_left_swing_angle - s940 * sin_hind_left_swing_angle
-    s965 = s942 * cos_hind_left_swing_angle + s18 * sin_hind_left_swing_angle
-    s966 = s18 * cos_hind_left_swing_angle - s942 * sin_hind_left_swing_angle
-    s967 = s944 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
-    s968 = s21 * cos_hind_left_swing_angle - s944 * sin_hind_left_swing_angle
+    s937 = s914 * cos_hind_left_swing_angle + s15 * sin_hind_left_swing_angle
+    s938 = s15 * cos_hind_left_swing_angle - s914 * sin_hind_left_swing_angle
+    s939 = s916 * cos_hind_left_swing_angle + s18 * sin_hind_left_swing_angle
+    s940 = s18 * cos_hind_left_swing_angle - s916 * sin_hind_left_swing_angle
+    s941 = s918 * cos_hind_left_swing_angle + s21 * sin_hind_left_swing_angle
+    s942 = s21 * cos_hind_left_swing_angle - s918 * sin_hind_left_swing_angle
     cos_hind_right_swing_angle = cos(hind_right_swing_angle)
     sin_hind_right_swing_angle = sin(hind_right_swing_angle)
     s31 = 2.0 * cos_hind_right_swing_angle
-    s969 = s946 * cos_hind_right_swing_angle + s15 * sin_hind_right_swing_angle
-    s970 = s15 * cos_hind_right_swing_angle - s946 * sin_hind_right_swing_angle
-    s971 = s948 * cos_hind_right_swing_angle + s18 * sin_hind_right_swing_angle
-    s972 = s18 * cos_hind_right_swing_angle - s948 * sin_hind_right_swing_angle
-    s973 = s950 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
-    s974 = s21 * cos_hind_right_swing_angle - s950 * sin_hind_right_swing_angle
+    s943 = s920 * cos_hind_right_swing_angle + s15 * sin_hind_right_swing_angle
+    s944 = s15 * cos_hind_right_swing_angle - s920 * sin_hind_right_swing_angle
+    s945 = s922 * cos_hind_right_swing_angle + s18 * sin_hind_right_swing_angle
+    s946 = s18 * cos_hind_right_swing_angle - s922 * sin_hind_right_swing_angle
+    s947 = s924 * cos_hind_right_swing_angle + s21 * sin_hind_right_swing_angle
+    s948 = s21 * cos_hind_right_swing_angle - s924 * sin_hind_right_swing_angle
     cos_front_left_knee_angle = cos(front_left_knee_angle)
     sin_front_left_knee_angle = sin(front_left_knee_angle)
-    s975 = s951 * cos_front_left_knee_angle + s952 * sin_front_left_knee_angle
-    s976 = s952 * cos_front_left_knee_angle - s951 * sin_front_left_knee_angle
-    s977 = s953 * cos_front_left_knee_angle + s954 * sin_front_left_knee_angle
-    s978 = s954 * cos_front_left_knee_angle - s953 * sin_front_left_knee_angle
-    s979 = s955 * cos_front_left_knee_angle + s956 * sin_front_left_knee_angle
-    s980 = s956 * cos_front_left_knee_angle - s955 * sin_front_left_knee_angle
+    s949 = s925 * cos_front_left_knee_angle + s926 * sin_front_left_knee_angle
+    s950 = s926 * cos_front_left_knee_angle - s925 * sin_front_left_knee_angle
+    s951 = s927 * cos_front_left_knee_angle + s928 * sin_front_left_knee_angle
+    s952 = s928 * cos_front_left_knee_angle - s927 * sin_front_left_knee_angle
+    s953 = s929 * cos_front_left_knee_angle + s930 * sin_front_left_knee_angle
+    s954 = s930 * cos_front_left_knee_angle - s929 * sin_front_left_knee_angle
     cos_front_right_knee_angle = cos(front_right_knee_angle)
     sin_front_right_knee_angle = sin(front_right_knee_angle)
-    s981 = s957 * cos_front_right_knee_angle + s958 * sin_front_right_knee_angle
-    s982 = s958 * cos_front_right_knee_angle - s957 * sin_front_right_knee_angle
-    s983 = s959 * cos_front_right_knee_angle + s960 * sin_front_right_knee_angle
-    s984 = s960 * cos_front_right_knee_angle - s959 * sin_front_right_knee_angle
-    s985 = s961 * cos_front_right_knee_angle + s962 * sin_front_right_knee_angle
-    s986 = s962 * cos_front_right_knee_angle - s961 * sin_front_right_knee_angle
+    s955 = s931 * cos_front_right_knee_angle + s932 * sin_front_right_knee_angle
+    s956 = s932 * cos_front_right_knee_angle - s931 * sin_front_right_knee_angle
+    s957 = s933 * cos_front_right_knee_angle + s934 * sin_front_right_knee_angle
+    s958 = s934 * cos_front_right_knee_angle - s933 * sin_front_right_knee_angle
+    s959 = s935 * cos_front_right_knee_angle + s936 * sin_front_right_knee_angle
+    s960 = s936 * cos_front_right_knee_angle - s935 * sin_front_right_knee_angle
     cos_hind_left_knee_angle = cos(hind_left_knee_angle)
     sin_hind_left_knee_angle = sin(hind_left_knee_angle)
-    s987 = s963 * cos_hind_left_knee_angle + s964 * sin_hind_left_knee_angle
-    s988 = s964 * cos_hind_left_knee_angle - s963 * sin_hind_left_knee_angle
-    s989 = s965 * cos_hind_left_knee_angle + s966 * sin_hind_left_knee_angle
-    s990 = s966 * cos_hind_left_knee_angle - s965 * sin_hind_left_knee_angle
-    s991 = s967 * cos_hind_left_knee_angle + s968 * sin_hind_left_knee_angle
-    s992 = s968 * cos_hind_left_knee_angle - s967 * sin_hind_left_knee_angle
+    s961 = s937 * cos_hind_left_knee_angle + s938 * sin_hind_left_knee_angle
+    s962 = s938 * cos_hind_left_knee_angle - s937 * sin_hind_left_knee_angle
+    s963 = s939 * cos_hind_left_knee_angle + s940 * sin_hind_left_knee_angle
+    s964 = s940 * cos_hind_left_knee_angle - s939 * sin_hind_left_knee_angle
+    s965 = s941 * cos_hind_left_knee_angle + s942 * sin_hind_left_knee_angle
+    s966 = s942 * cos_hind_left_knee_angle - s941 * sin_hind_left_knee_angle
     cos_hind_right_knee_angle = cos(hind_right_knee_angle)
     sin_hind_right_knee_angle = sin(hind_right_knee_angle)
-    s993 = s969 * cos_hind_right_knee_angle + s970 * sin_hind_right_knee_angle
-    s994 = s970 * cos_hind_right_knee_angle - s969 * sin_hind_right_knee_angle
-    s995 = s971 * cos_hind_right_knee_angle + s972 * sin_hind_right_knee_angle
-    s996 = s972 * cos_hind_right_knee_angle - s971 * sin_hind_right_knee_angle
-    s997 = s973 * cos_hind_right_knee_angle + s974 * sin_hind_right_knee_angle
-    s998 = s974 * cos_hind_right_knee_angle - s973 * sin_hind_right_knee_angle
+    s967 = s943 * cos_hind_right_knee_angle + s944 * sin_hind_right_knee_angle
+    s968 = s944 * cos_hind_right_knee_angle - s943 * sin_hind_right_knee_angle
+    s969 = s945 * cos_hind_right_knee_angle + s946 * sin_hind_right_knee_angle
+    s970 = s946 * cos_hind_right_knee_angle - s945 * sin_hind_right_knee_angle
+    s971 = s947 * cos_hind_right_knee_angle + s948 * sin_hind_right_knee_angle
+    s972 = s948 * cos_hind_right_knee_angle - s947 * sin_hind_right_knee_angle
     s32 = sin_hind_right_knee_angle * k11
     s33 = sin_hind_right_knee_angle * s32
     s34 = cos_hind_right_knee_angle * k10
@@ -2314,4780 +2415,4766 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     s535 = omega_front_left_hip_z * omega_front_left_hip_x
     s536 = omega_front_left_hip_y * omega_front_left_hip_z
     s537 = s533 + s534
-    s538 = s532 + s535
-    s539 = s534 - s533
-    s540 = omega_front_left_hip_x_squared + omega_front_left_hip_z_squared
-    s541 = s535 - s532
+    s538 = omega_front_left_hip_x_squared + omega_front_left_hip_z_squared
     bias_hind_left_hip_x = s524 + s525
-    s542 = s526 + s527
-    s543 = s529 - s530
-    bias_front_right_hip_y = cos_front_right_abduction_angle * s542 + sin_front_right_abduction_angle * s543
-    bias_front_right_hip_z = cos_front_right_abduction_angle * s543 - sin_front_right_abduction_angle * s542
-    s544 = front_right_abduction_angle_dot * omega_front_right_hip_z
-    s545 = front_right_abduction_angle_dot * omega_front_right_hip_y
+    s539 = s526 + s527
+    s540 = s529 - s530
+    bias_front_right_hip_y = cos_front_right_abduction_angle * s539 + sin_front_right_abduction_angle * s540
+    bias_front_right_hip_z = cos_front_right_abduction_angle * s540 - sin_front_right_abduction_angle * s539
+    s541 = front_right_abduction_angle_dot * omega_front_right_hip_z
+    s542 = front_right_abduction_angle_dot * omega_front_right_hip_y
     omega_front_right_hip_x_squared = omega_front_right_hip_x * omega_front_right_hip_x
     omega_front_right_hip_y_squared = omega_front_right_hip_y * omega_front_right_hip_y
     omega_front_right_hip_z_squared = omega_front_right_hip_z * omega_front_right_hip_z
-    s546 = omega_front_right_hip_y * omega_front_right_hip_x
-    s547 = omega_front_right_hip_z * omega_front_right_hip_x
-    s548 = omega_front_right_hip_y * omega_front_right_hip_z
-    s549 = s545 + s546
-    s550 = s544 + s547
-    s551 = s546 - s545
-    s552 = omega_front_right_hip_x_squared + omega_front_right_hip_z_squared
-    s553 = s547 - s544
-    s554 = s530 - s529
-    bias_hind_left_hip_y = sin_hind_left_abduction_angle * s554 - cos_hind_left_abduction_angle * s542
-    bias_hind_left_hip_z = cos_hind_left_abduction_angle * s554 + sin_hind_left_abduction_angle * s542
-    s555 = hind_left_abduction_angle_dot * omega_hind_left_hip_z
-    s556 = hind_left_abduction_angle_dot * omega_hind_left_hip_y
+    s543 = omega_front_right_hip_y * omega_front_right_hip_x
+    s544 = omega_front_right_hip_z * omega_front_right_hip_x
+    s545 = omega_front_right_hip_y * omega_front_right_hip_z
+    s546 = s542 + s543
+    s547 = omega_front_right_hip_x_squared + omega_front_right_hip_z_squared
+    s548 = s530 - s529
+    bias_hind_left_hip_y = sin_hind_left_abduction_angle * s548 - cos_hind_left_abduction_angle * s539
+    bias_hind_left_hip_z = cos_hind_left_abduction_angle * s548 + sin_hind_left_abduction_angle * s539
+    s549 = hind_left_abduction_angle_dot * omega_hind_left_hip_z
+    s550 = hind_left_abduction_angle_dot * omega_hind_left_hip_y
     omega_hind_left_hip_x_squared = omega_hind_left_hip_x * omega_hind_left_hip_x
     omega_hind_left_hip_y_squared = omega_hind_left_hip_y * omega_hind_left_hip_y
     omega_hind_left_hip_z_squared = omega_hind_left_hip_z * omega_hind_left_hip_z
-    s557 = omega_hind_left_hip_y * omega_hind_left_hip_x
-    s558 = omega_hind_left_hip_z * omega_hind_left_hip_x
-    s559 = omega_hind_left_hip_y * omega_hind_left_hip_z
-    s560 = s556 + s557
-    s561 = s555 + s558
-    s562 = s557 - s556
-    s563 = omega_hind_left_hip_x_squared + omega_hind_left_hip_z_squared
-    s564 = s558 - s555
+    s551 = omega_hind_left_hip_y * omega_hind_left_hip_x
+    s552 = omega_hind_left_hip_z * omega_hind_left_hip_x
+    s553 = omega_hind_left_hip_y * omega_hind_left_hip_z
+    s554 = s550 + s551
+    s555 = omega_hind_left_hip_x_squared + omega_hind_left_hip_z_squared
     bias_hind_right_hip_x = s524 - s525
-    s565 = s527 - s526
-    bias_hind_right_hip_y = cos_hind_right_abduction_angle * s565 - sin_hind_right_abduction_angle * s531
-    s566 = cos_hind_right_abduction_angle * s531 + sin_hind_right_abduction_angle * s565
-    s567 = hind_right_abduction_angle_dot * omega_hind_right_hip_z
-    s568 = hind_right_abduction_angle_dot * omega_hind_right_hip_y
+    s556 = s527 - s526
+    bias_hind_right_hip_y = cos_hind_right_abduction_angle * s556 - sin_hind_right_abduction_angle * s531
+    s557 = cos_hind_right_abduction_angle * s531 + sin_hind_right_abduction_angle * s556
+    s558 = hind_right_abduction_angle_dot * omega_hind_right_hip_z
+    s559 = hind_right_abduction_angle_dot * omega_hind_right_hip_y
     omega_hind_right_hip_x_squared = omega_hind_right_hip_x * omega_hind_right_hip_x
     omega_hind_right_hip_y_squared = omega_hind_right_hip_y * omega_hind_right_hip_y
     omega_hind_right_hip_z_squared = omega_hind_right_hip_z * omega_hind_right_hip_z
-    s569 = omega_hind_right_hip_y * omega_hind_right_hip_x
-    s570 = omega_hind_right_hip_z * omega_hind_right_hip_x
-    s571 = omega_hind_right_hip_y * omega_hind_right_hip_z
-    s572 = s568 + s569
-    s573 = s567 + s570
-    s574 = s569 - s568
-    s575 = omega_hind_right_hip_x_squared + omega_hind_right_hip_z_squared
-    s576 = s570 - s567
-    s577 = bias_front_left_hip_x + k2 * s537
-    bias_front_left_thigh_y = bias_front_left_hip_y - k2 * s540
-    s578 = bias_front_left_hip_z + k2 * s536
-    bias_front_left_thigh_z = cos_front_left_swing_angle * s578 + sin_front_left_swing_angle * s577
-    bias_front_left_thigh_x = cos_front_left_swing_angle * s577 - sin_front_left_swing_angle * s578
-    s579 = sin_front_left_swing_angle * s533 - front_left_swing_angle_dot * omega_front_left_thigh_z
-    s580 = front_left_swing_angle_dot * omega_front_left_thigh_x - cos_front_left_swing_angle * s533
+    s560 = omega_hind_right_hip_y * omega_hind_right_hip_x
+    s561 = omega_hind_right_hip_z * omega_hind_right_hip_x
+    s562 = omega_hind_right_hip_y * omega_hind_right_hip_z
+    s563 = s559 + s560
+    s564 = omega_hind_right_hip_x_squared + omega_hind_right_hip_z_squared
+    s565 = bias_front_left_hip_x + k2 * s537
+    bias_front_left_thigh_y = bias_front_left_hip_y - k2 * s538
+    s566 = bias_front_left_hip_z + k2 * s536
+    bias_front_left_thigh_z = cos_front_left_swing_angle * s566 + sin_front_left_swing_angle * s565
+    bias_front_left_thigh_x = cos_front_left_swing_angle * s565 - sin_front_left_swing_angle * s566
+    s567 = sin_front_left_swing_angle * s533 - front_left_swing_angle_dot * omega_front_left_thigh_z
+    s568 = front_left_swing_angle_dot * omega_front_left_thigh_x - cos_front_left_swing_angle * s533
     omega_front_left_thigh_x_squared = omega_front_left_thigh_x * omega_front_left_thigh_x
     omega_front_left_thigh_y_squared = omega_front_left_thigh_y * omega_front_left_thigh_y
     omega_front_left_thigh_z_squared = omega_front_left_thigh_z * omega_front_left_thigh_z
-    s581 = omega_front_left_thigh_x * omega_front_left_thigh_y
-    s582 = omega_front_left_thigh_z * omega_front_left_thigh_x
-    s583 = omega_front_left_thigh_z * omega_front_left_thigh_y
-    s584 = s581 - s580
-    s585 = s532 + s582
-    s586 = s583 - s579
-    s587 = s579 + s583
-    s588 = omega_front_left_thigh_x_squared + omega_front_left_thigh_y_squared
-    s589 = k3 * s549 - bias_hind_left_hip_x
-    bias_front_right_thigh_y = bias_front_right_hip_y - k3 * s552
-    s590 = bias_front_right_hip_z + k3 * s548
-    bias_front_right_thigh_z = cos_front_right_swing_angle * s590 + sin_front_right_swing_angle * s589
-    bias_front_right_thigh_x = cos_front_right_swing_angle * s589 - sin_front_right_swing_angle * s590
-    s591 = sin_front_right_swing_angle * s545 - front_right_swing_angle_dot * omega_front_right_thigh_z
-    s592 = front_right_swing_angle_dot * omega_front_right_thigh_x - cos_front_right_swing_angle * s545
+    s569 = omega_front_left_thigh_x * omega_front_left_thigh_y
+    s570 = omega_front_left_thigh_z * omega_front_left_thigh_x
+    s571 = omega_front_left_thigh_z * omega_front_left_thigh_y
+    s572 = s569 - s568
+    s573 = s532 + s570
+    s574 = s571 - s567
+    s575 = omega_front_left_thigh_x_squared + omega_front_left_thigh_y_squared
+    s576 = k3 * s546 - bias_hind_left_hip_x
+    bias_front_right_thigh_y = bias_front_right_hip_y - k3 * s547
+    s577 = bias_front_right_hip_z + k3 * s545
+    bias_front_right_thigh_z = cos_front_right_swing_angle * s577 + sin_front_right_swing_angle * s576
+    bias_front_right_thigh_x = cos_front_right_swing_angle * s576 - sin_front_right_swing_angle * s577
+    s578 = sin_front_right_swing_angle * s542 - front_right_swing_angle_dot * omega_front_right_thigh_z
+    s579 = front_right_swing_angle_dot * omega_front_right_thigh_x - cos_front_right_swing_angle * s542
     omega_front_right_thigh_x_squared = omega_front_right_thigh_x * omega_front_right_thigh_x
     omega_front_right_thigh_y_squared = omega_front_right_thigh_y * omega_front_right_thigh_y
     omega_front_right_thigh_z_squared = omega_front_right_thigh_z * omega_front_right_thigh_z
-    s593 = omega_front_right_thigh_x * omega_front_right_thigh_y
-    s594 = omega_front_right_thigh_z * omega_front_right_thigh_x
-    s595 = omega_front_right_thigh_z * omega_front_right_thigh_y
-    s596 = s593 - s592
-    s597 = s544 + s594
-    s598 = s595 - s591
-    s599 = s591 + s595
-    s600 = omega_front_right_thigh_x_squared + omega_front_right_thigh_y_squared
-    s601 = bias_hind_left_hip_x + k2 * s560
-    bias_hind_left_thigh_y = bias_hind_left_hip_y - k2 * s563
-    s602 = bias_hind_left_hip_z + k2 * s559
-    bias_hind_left_thigh_z = cos_hind_left_swing_angle * s602 + sin_hind_left_swing_angle * s601
-    bias_hind_left_thigh_x = cos_hind_left_swing_angle * s601 - sin_hind_left_swing_angle * s602
-    s603 = sin_hind_left_swing_angle * s556 - hind_left_swing_angle_dot * omega_hind_left_thigh_z
-    s604 = hind_left_swing_angle_dot * omega_hind_left_thigh_x - cos_hind_left_swing_angle * s556
+    s580 = omega_front_right_thigh_x * omega_front_right_thigh_y
+    s581 = omega_front_right_thigh_z * omega_front_right_thigh_x
+    s582 = omega_front_right_thigh_z * omega_front_right_thigh_y
+    s583 = s580 - s579
+    s584 = s541 + s581
+    s585 = s582 - s578
+    s586 = omega_front_right_thigh_x_squared + omega_front_right_thigh_y_squared
+    s587 = bias_hind_left_hip_x + k2 * s554
+    bias_hind_left_thigh_y = bias_hind_left_hip_y - k2 * s555
+    s588 = bias_hind_left_hip_z + k2 * s553
+    bias_hind_left_thigh_z = cos_hind_left_swing_angle * s588 + sin_hind_left_swing_angle * s587
+    bias_hind_left_thigh_x = cos_hind_left_swing_angle * s587 - sin_hind_left_swing_angle * s588
+    s589 = sin_hind_left_swing_angle * s550 - hind_left_swing_angle_dot * omega_hind_left_thigh_z
+    s590 = hind_left_swing_angle_dot * omega_hind_left_thigh_x - cos_hind_left_swing_angle * s550
     omega_hind_left_thigh_x_squared = omega_hind_left_thigh_x * omega_hind_left_thigh_x
     omega_hind_left_thigh_y_squared = omega_hind_left_thigh_y * omega_hind_left_thigh_y
     omega_hind_left_thigh_z_squared = omega_hind_left_thigh_z * omega_hind_left_thigh_z
-    s605 = omega_hind_left_thigh_x * omega_hind_left_thigh_y
-    s606 = omega_hind_left_thigh_z * omega_hind_left_thigh_x
-    s607 = omega_hind_left_thigh_z * omega_hind_left_thigh_y
-    s608 = s605 - s604
-    s609 = s555 + s606
-    s610 = s607 - s603
-    s611 = s603 + s607
-    s612 = omega_hind_left_thigh_x_squared + omega_hind_left_thigh_y_squared
-    s613 = bias_hind_right_hip_x + k3 * s572
-    bias_hind_right_thigh_y = bias_hind_right_hip_y - k3 * s575
-    s614 = k3 * s571 - s566
-    bias_hind_right_thigh_z = cos_hind_right_swing_angle * s614 + sin_hind_right_swing_angle * s613
-    bias_hind_right_thigh_x = cos_hind_right_swing_angle * s613 - sin_hind_right_swing_angle * s614
-    s615 = sin_hind_right_swing_angle * s568 - hind_right_swing_angle_dot * omega_hind_right_thigh_z
-    s616 = hind_right_swing_angle_dot * omega_hind_right_thigh_x - cos_hind_right_swing_angle * s568
+    s591 = omega_hind_left_thigh_x * omega_hind_left_thigh_y
+    s592 = omega_hind_left_thigh_z * omega_hind_left_thigh_x
+    s593 = omega_hind_left_thigh_z * omega_hind_left_thigh_y
+    s594 = s591 - s590
+    s595 = s549 + s592
+    s596 = s593 - s589
+    s597 = omega_hind_left_thigh_x_squared + omega_hind_left_thigh_y_squared
+    s598 = bias_hind_right_hip_x + k3 * s563
+    bias_hind_right_thigh_y = bias_hind_right_hip_y - k3 * s564
+    s599 = k3 * s562 - s557
+    bias_hind_right_thigh_z = cos_hind_right_swing_angle * s599 + sin_hind_right_swing_angle * s598
+    bias_hind_right_thigh_x = cos_hind_right_swing_angle * s598 - sin_hind_right_swing_angle * s599
+    s600 = sin_hind_right_swing_angle * s559 - hind_right_swing_angle_dot * omega_hind_right_thigh_z
+    s601 = hind_right_swing_angle_dot * omega_hind_right_thigh_x - cos_hind_right_swing_angle * s559
     omega_hind_right_thigh_x_squared = omega_hind_right_thigh_x * omega_hind_right_thigh_x
     omega_hind_right_thigh_y_squared = omega_hind_right_thigh_y * omega_hind_right_thigh_y
     omega_hind_right_thigh_z_squared = omega_hind_right_thigh_z * omega_hind_right_thigh_z
-    s617 = omega_hind_right_thigh_x * omega_hind_right_thigh_y
-    s618 = omega_hind_right_thigh_z * omega_hind_right_thigh_x
-    s619 = omega_hind_right_thigh_z * omega_hind_right_thigh_y
-    s620 = s617 - s616
-    s621 = s567 + s618
-    s622 = s619 - s615
-    s623 = s615 + s619
-    s624 = omega_hind_right_thigh_x_squared + omega_hind_right_thigh_y_squared
-    s625 = bias_front_left_thigh_x + k4 * s585
-    bias_front_left_shank_y = bias_front_left_thigh_y + k4 * s586
-    s626 = bias_front_left_thigh_z - k4 * s588
-    bias_front_left_shank_x = cos_front_left_knee_angle * s625 - sin_front_left_knee_angle * s626
-    s627 = cos_front_left_knee_angle * s579 - sin_front_left_knee_angle * s580 - front_left_knee_angle_dot * omega_front_left_shank_z
-    s628 = cos_front_left_knee_angle * s580 + sin_front_left_knee_angle * s579 + front_left_knee_angle_dot * omega_front_left_shank_x
-    s629 = omega_front_left_shank_x * omega_front_left_shank_y
-    s630 = omega_front_left_shank_z * omega_front_left_shank_x
-    s631 = omega_front_left_shank_z * omega_front_left_shank_y
-    s632 = s532 + s630
-    s633 = s631 - s627
-    s634 = omega_front_left_shank_x * omega_front_left_shank_x + omega_front_left_shank_y * omega_front_left_shank_y
-    s635 = bias_front_right_thigh_x + k4 * s597
-    bias_front_right_shank_y = bias_front_right_thigh_y + k4 * s598
-    s636 = bias_front_right_thigh_z - k4 * s600
-    bias_front_right_shank_x = cos_front_right_knee_angle * s635 - sin_front_right_knee_angle * s636
-    s637 = cos_front_right_knee_angle * s591 - sin_front_right_knee_angle * s592 - front_right_knee_angle_dot * omega_front_right_shank_z
-    s638 = cos_front_right_knee_angle * s592 + sin_front_right_knee_angle * s591 + front_right_knee_angle_dot * omega_front_right_shank_x
-    s639 = omega_front_right_shank_x * omega_front_right_shank_y
-    s640 = omega_front_right_shank_z * omega_front_right_shank_x
-    s641 = omega_front_right_shank_z * omega_front_right_shank_y
-    s642 = s544 + s640
-    s643 = s641 - s637
-    s644 = omega_front_right_shank_x * omega_front_right_shank_x + omega_front_right_shank_y * omega_front_right_shank_y
-    s645 = bias_hind_left_thigh_x + k4 * s609
-    bias_hind_left_shank_y = bias_hind_left_thigh_y + k4 * s610
-    s646 = bias_hind_left_thigh_z - k4 * s612
-    bias_hind_left_shank_x = cos_hind_left_knee_angle * s645 - sin_hind_left_knee_angle * s646
-    s647 = cos_hind_left_knee_angle * s603 - sin_hind_left_knee_angle * s604 - hind_left_knee_angle_dot * omega_hind_left_shank_z
-    s648 = cos_hind_left_knee_angle * s604 + sin_hind_left_knee_angle * s603 + hind_left_knee_angle_dot * omega_hind_left_shank_x
-    s649 = omega_hind_left_shank_x * omega_hind_left_shank_y
-    s650 = omega_hind_left_shank_z * omega_hind_left_shank_x
-    s651 = omega_hind_left_shank_z * omega_hind_left_shank_y
-    s652 = s555 + s650
-    s653 = s651 - s647
-    s654 = omega_hind_left_shank_x * omega_hind_left_shank_x + omega_hind_left_shank_y * omega_hind_left_shank_y
-    s655 = bias_hind_right_thigh_x + k4 * s621
-    bias_hind_right_shank_y = bias_hind_right_thigh_y + k4 * s622
-    s656 = bias_hind_right_thigh_z - k4 * s624
-    bias_hind_right_shank_x = cos_hind_right_knee_angle * s655 - sin_hind_right_knee_angle * s656
-    s657 = cos_hind_right_knee_angle * s615 - sin_hind_right_knee_angle * s616 - hind_right_knee_angle_dot * omega_hind_right_shank_z
-    s658 = cos_hind_right_knee_angle * s616 + sin_hind_right_knee_angle * s615 + hind_right_knee_angle_dot * omega_hind_right_shank_x
-    s659 = omega_hind_right_shank_x * omega_hind_right_shank_y
-    s660 = omega_hind_right_shank_z * omega_hind_right_shank_x
-    s661 = omega_hind_right_shank_z * omega_hind_right_shank_y
-    s662 = s567 + s660
-    s663 = s661 - s657
-    s664 = omega_hind_right_shank_x * omega_hind_right_shank_x + omega_hind_right_shank_y * omega_hind_right_shank_y
-    s665 = I_hip_yz * (omega_front_left_hip_z_squared - omega_front_left_hip_y_squared)
-    s666 = I_hip_xz * (omega_front_left_hip_x_squared - omega_front_left_hip_z_squared)
-    s667 = I_hip_xy * (omega_front_left_hip_y_squared - omega_front_left_hip_x_squared)
-    s668 = moment_front_left_hip_y * bias_front_left_hip_z + (I_hip_xz * s539 - I_hip_xy * s541 - s665 + s536 * k20 - s536 * k21)
-    s669 = I_hip_yz * s538 - I_hip_xz * s536 - s667 + s539 * k19 - s537 * k20 - moment_front_left_hip_y * bias_front_left_hip_x
-    s670 = m_hip * bias_hind_left_hip_x
-    s671 = moment_front_left_hip_y * bias_hind_left_hip_x
-    s672 = I_hip_yz * (omega_front_right_hip_z_squared - omega_front_right_hip_y_squared)
-    s673 = I_hip_xz * (omega_front_right_hip_x_squared - omega_front_right_hip_z_squared)
-    s674 = I_hip_xy * (omega_front_right_hip_y_squared - omega_front_right_hip_x_squared)
-    s675 = I_hip_xy * s553 + I_hip_xz * s551 + s672 + s548 * k20 - s548 * k21 - moment_front_left_hip_y * bias_front_right_hip_z
-    s676 = s674 - (I_hip_xz * s548 + I_hip_yz * s550) + s551 * k19 - s549 * k20 - s671
-    s677 = I_hip_yz * (omega_hind_left_hip_z_squared - omega_hind_left_hip_y_squared)
-    s678 = I_hip_xz * (omega_hind_left_hip_x_squared - omega_hind_left_hip_z_squared)
-    s679 = I_hip_xy * (omega_hind_left_hip_y_squared - omega_hind_left_hip_x_squared)
-    s680 = moment_front_left_hip_y * bias_hind_left_hip_z + (I_hip_xz * s562 - I_hip_xy * s564 - s677 + s559 * k20 - s559 * k21)
-    s681 = I_hip_yz * s561 - I_hip_xz * s559 - s679 + s562 * k19 - s560 * k20 - s671
-    s682 = I_hip_yz * (omega_hind_right_hip_z_squared - omega_hind_right_hip_y_squared)
-    s683 = I_hip_xz * (omega_hind_right_hip_x_squared - omega_hind_right_hip_z_squared)
-    s684 = I_hip_xy * (omega_hind_right_hip_y_squared - omega_hind_right_hip_x_squared)
-    s685 = moment_front_left_hip_y * s566 + (I_hip_xy * s576 + I_hip_xz * s574 + s682 + s571 * k20 - s571 * k21)
-    s686 = moment_front_left_hip_y * bias_hind_right_hip_x + (s684 - (I_hip_xz * s571 + I_hip_yz * s573) + s574 * k19 - s572 * k20)
-    s687 = moment_front_left_thigh_y * (omega_front_left_thigh_x_squared + omega_front_left_thigh_z_squared)
-    s688 = m_thigh * bias_front_left_thigh_x + (moment_front_left_thigh_y * s584 - k5 * s585)
-    s689 = m_thigh * bias_front_left_thigh_z + (moment_front_left_thigh_y * s587 + k5 * s588)
-    s690 = moment_front_left_thigh_y * bias_front_left_thigh_z + k5 * bias_front_left_thigh_y
-    s691 = inertia_front_left_thigh_yz * (omega_front_left_thigh_z_squared - omega_front_left_thigh_y_squared)
-    s692 = s585 * k24 - inertia_front_left_thigh_yz * s584 - (s582 - s532) * k22 - k5 * bias_front_left_thigh_x
-    s693 = inertia_front_left_thigh_yz * s585 + (s580 + s581) * k22 - s584 * k23 - moment_front_left_thigh_y * bias_front_left_thigh_x
-    s694 = moment_front_left_thigh_y * (omega_front_right_thigh_x_squared + omega_front_right_thigh_z_squared)
-    s695 = m_thigh * bias_front_right_thigh_x - (moment_front_left_thigh_y * s596 + k5 * s597)
-    s696 = m_thigh * bias_front_right_thigh_z + (k5 * s600 - moment_front_left_thigh_y * s599)
-    s697 = k5 * bias_front_right_thigh_y - moment_front_left_thigh_y * bias_front_right_thigh_z
-    s698 = inertia_front_left_thigh_yz * (omega_front_right_thigh_z_squared - omega_front_right_thigh_y_squared)
-    s699 = inertia_front_left_thigh_yz * s596 + s597 * k24 - (s594 - s544) * k22 - k5 * bias_front_right_thigh_x
-    s700 = moment_front_left_thigh_y * bias_front_right_thigh_x + ((s592 + s593) * k22 - inertia_front_left_thigh_yz * s597 - s596 * k23)
-    s701 = moment_front_left_thigh_y * (omega_hind_left_thigh_x_squared + omega_hind_left_thigh_z_squared)
-    s702 = m_thigh * bias_hind_left_thigh_x + (moment_front_left_thigh_y * s608 - k5 * s609)
-    s703 = m_thigh * bias_hind_left_thigh_z + (moment_front_left_thigh_y * s611 + k5 * s612)
-    s704 = moment_front_left_thigh_y * bias_hind_left_thigh_z + k5 * bias_hind_left_thigh_y
-    s705 = inertia_front_left_thigh_yz * (omega_hind_left_thigh_z_squared - omega_hind_left_thigh_y_squared)
-    s706 = s609 * k24 - inertia_front_left_thigh_yz * s608 - (s606 - s555) * k22 - k5 * bias_hind_left_thigh_x
-    s707 = inertia_front_left_thigh_yz * s609 + (s604 + s605) * k22 - s608 * k23 - moment_front_left_thigh_y * bias_hind_left_thigh_x
-    s708 = moment_front_left_thigh_y * (omega_hind_right_thigh_x_squared + omega_hind_right_thigh_z_squared)
-    s709 = m_thigh * bias_hind_right_thigh_x - (moment_front_left_thigh_y * s620 + k5 * s621)
-    s710 = m_thigh * bias_hind_right_thigh_z + (k5 * s624 - moment_front_left_thigh_y * s623)
-    s711 = k5 * bias_hind_right_thigh_y - moment_front_left_thigh_y * bias_hind_right_thigh_z
-    s712 = inertia_front_left_thigh_yz * (omega_hind_right_thigh_z_squared - omega_hind_right_thigh_y_squared)
-    s713 = inertia_front_left_thigh_yz * s620 + s621 * k24 - (s618 - s567) * k22 - k5 * bias_hind_right_thigh_x
-    s714 = moment_front_left_thigh_y * bias_hind_right_thigh_x + ((s616 + s617) * k22 - inertia_front_left_thigh_yz * s621 - s620 * k23)
-    s715 = m_shank * (cos_front_left_knee_angle * s626 + sin_front_left_knee_angle * s625)
-    s716 = m_shank * bias_front_left_shank_y - k6 * s633
-    s717 = s715 + k6 * s634
-    s718 = k6 * bias_front_left_shank_x
-    s719 = s632 * k27 - (s630 - s532) * k25
-    s720 = (s628 + s629) * k25 - (s629 - s628) * k26
-    s721 = k6 * bias_front_left_shank_y + ((s627 + s631) * k26 - s633 * k27)
-    s722 = m_shank * (cos_front_right_knee_angle * s636 + sin_front_right_knee_angle * s635)
-    s723 = m_shank * bias_front_right_shank_y - k6 * s643
-    s724 = s722 + k6 * s644
-    s725 = k6 * bias_front_right_shank_x
-    s726 = s642 * k27 - (s640 - s544) * k25
-    s727 = (s638 + s639) * k25 - (s639 - s638) * k26
-    s728 = k6 * bias_front_right_shank_y + ((s637 + s641) * k26 - s643 * k27)
-    s729 = m_shank * (cos_hind_left_knee_angle * s646 + sin_hind_left_knee_angle * s645)
-    s730 = m_shank * bias_hind_left_shank_y - k6 * s653
-    s731 = s729 + k6 * s654
-    s732 = k6 * bias_hind_left_shank_x
-    s733 = s652 * k27 - (s650 - s555) * k25
-    s734 = (s648 + s649) * k25 - (s649 - s648) * k26
-    s735 = k6 * bias_hind_left_shank_y + ((s647 + s651) * k26 - s653 * k27)
-    s736 = m_shank * (cos_hind_right_knee_angle * s656 + sin_hind_right_knee_angle * s655)
-    s737 = m_shank * bias_hind_right_shank_y - k6 * s663
-    s738 = s736 + k6 * s664
-    s739 = k6 * bias_hind_right_shank_x
-    s740 = s662 * k27 - (s660 - s567) * k25
-    s741 = (s658 + s659) * k25 - (s659 - s658) * k26
-    s742 = k6 * bias_hind_right_shank_y + ((s657 + s661) * k26 - s663 * k27)
-    s743 = s739 - s740
-    s744 = m_shank * bias_hind_right_shank_x - k6 * s662 - k8 * s743
-    s745 = sin_hind_right_knee_angle * s738 + cos_hind_right_knee_angle * s744
-    s746 = sin_hind_right_knee_angle * s741 + cos_hind_right_knee_angle * s742 - k4 * s737
-    s747 = s711 + (s712 + s623 * k23 - s622 * k24) + s746
-    s748 = s713 + (s740 - s739 + k7 * s743 + k4 * s745)
-    s749 = s714 + (cos_hind_right_knee_angle * s741 - sin_hind_right_knee_angle * s742)
-    s750 = s710 + (cos_hind_right_knee_angle * s738 - sin_hind_right_knee_angle * s744)
-    s751 = s732 - s733
-    s752 = m_shank * bias_hind_left_shank_x - k6 * s652 - k8 * s751
-    s753 = sin_hind_left_knee_angle * s731 + cos_hind_left_knee_angle * s752
-    s754 = sin_hind_left_knee_angle * s734 + cos_hind_left_knee_angle * s735 - k4 * s730
-    s755 = s704 + (s611 * k23 - s705 - s610 * k24) + s754
-    s756 = s706 + (s733 - s732 + k7 * s751 + k4 * s753)
-    s757 = s707 + (cos_hind_left_knee_angle * s734 - sin_hind_left_knee_angle * s735)
-    s758 = s703 + (cos_hind_left_knee_angle * s731 - sin_hind_left_knee_angle * s752)
-    s759 = s725 - s726
-    s760 = m_shank * bias_front_right_shank_x - k6 * s642 - k8 * s759
-    s761 = sin_front_right_knee_angle * s724 + cos_front_right_knee_angle * s760
-    s762 = sin_front_right_knee_angle * s727 + cos_front_right_knee_angle * s728 - k4 * s723
-    s763 = s697 + (s698 + s599 * k23 - s598 * k24) + s762
-    s764 = s699 + (s726 - s725 + k7 * s759 + k4 * s761)
-    s765 = s700 + (cos_front_right_knee_angle * s727 - sin_front_right_knee_angle * s728)
-    s766 = s696 + (cos_front_right_knee_angle * s724 - sin_front_right_knee_angle * s760)
-    s767 = s718 - s719
-    s768 = m_shank * bias_front_left_shank_x - k6 * s632 - k8 * s767
-    s769 = sin_front_left_knee_angle * s717 + cos_front_left_knee_angle * s768
-    s770 = sin_front_left_knee_angle * s720 + cos_front_left_knee_angle * s721 - k4 * s716
-    s771 = s690 + (s587 * k23 - s691 - s586 * k24) + s770
-    s772 = s692 + (s719 - s718 + k7 * s767 + k4 * s769)
-    s773 = s693 + (cos_front_left_knee_angle * s720 - sin_front_left_knee_angle * s721)
-    s774 = s689 + (cos_front_left_knee_angle * s717 - sin_front_left_knee_angle * s768)
-    s775 = s749 + s101 * s748
-    s776 = s709 + s745 - s102 * s748
-    s777 = s750 - s103 * s748
-    s778 = cos_hind_right_swing_angle * s777 - sin_hind_right_swing_angle * s776
-    s779 = sin_hind_right_swing_angle * s777 + cos_hind_right_swing_angle * s776
-    s780 = sin_hind_right_swing_angle * s775 + cos_hind_right_swing_angle * s747 + k3 * s778
-    s781 = cos_hind_right_swing_angle * s775 - sin_hind_right_swing_angle * s747 - k3 * s779
-    s782 = s685 + s780
-    s783 = I_hip_yz * s572 - I_hip_xy * s571 - s683 + s573 * k21 - s576 * k19 + (s748 - s100 * s748)
-    s784 = m_hip * bias_hind_right_hip_y + moment_front_left_hip_y * s575 + (m_thigh * bias_hind_right_thigh_y + (s708 - k5 * s622) + s737)
-    s785 = s757 - s138 * s756
-    s786 = s702 + s753 - s139 * s756
-    s787 = s758 - s140 * s756
-    s788 = cos_hind_left_swing_angle * s787 - sin_hind_left_swing_angle * s786
-    s789 = sin_hind_left_swing_angle * s787 + cos_hind_left_swing_angle * s786
-    s790 = sin_hind_left_swing_angle * s785 + cos_hind_left_swing_angle * s755 + k2 * s788
-    s791 = cos_hind_left_swing_angle * s785 - sin_hind_left_swing_angle * s755 - k2 * s789
-    s792 = s680 + s790
-    s793 = I_hip_xy * s559 - I_hip_yz * s560 - s678 + s561 * k21 - s564 * k19 + (s756 - s137 * s756)
-    s794 = m_hip * bias_hind_left_hip_y - moment_front_left_hip_y * s563 + (m_thigh * bias_hind_left_thigh_y - (s701 + k5 * s610) + s730)
-    s795 = s765 + s175 * s764
-    s796 = s695 + s761 - s176 * s764
-    s797 = s766 - s177 * s764
-    s798 = cos_front_right_swing_angle * s797 - sin_front_right_swing_angle * s796
-    s799 = sin_front_right_swing_angle * s797 + cos_front_right_swing_angle * s796
-    s800 = sin_front_right_swing_angle * s795 + cos_front_right_swing_angle * s763 + k3 * s798
-    s801 = cos_front_right_swing_angle * s795 - sin_front_right_swing_angle * s763 - k3 * s799
-    s802 = s675 + s800
-    s803 = I_hip_yz * s549 - I_hip_xy * s548 - s673 + s550 * k21 - s553 * k19 + (s764 - s174 * s764)
-    s804 = m_hip * bias_front_right_hip_y + moment_front_left_hip_y * s552 + (m_thigh * bias_front_right_thigh_y + (s694 - k5 * s598) + s723)
-    s805 = s773 - s212 * s772
-    s806 = s688 + s769 - s213 * s772
-    s807 = s774 - s214 * s772
-    s808 = cos_front_left_swing_angle * s807 - sin_front_left_swing_angle * s806
-    s809 = sin_front_left_swing_angle * s807 + cos_front_left_swing_angle * s806
-    s810 = sin_front_left_swing_angle * s805 + cos_front_left_swing_angle * s771 + k2 * s808
-    s811 = cos_front_left_swing_angle * s805 - sin_front_left_swing_angle * s771 - k2 * s809
-    s812 = s668 + s810
-    s813 = I_hip_xy * s536 - I_hip_yz * s537 - s666 + s538 * k21 - s541 * k19 + (s772 - s211 * s772)
-    s814 = m_hip * bias_front_left_hip_y - moment_front_left_hip_y * s540 + (m_thigh * bias_front_left_thigh_y - (s687 + k5 * s586) + s716)
-    s815 = s783 - s249 * s782
-    s816 = s686 + s781 - s250 * s782
-    s817 = m_hip * bias_hind_right_hip_x - moment_front_left_hip_y * s572 + s779 - s251 * s782
-    s818 = s784 - s252 * s782
-    s819 = s778 - (m_hip * s566 + moment_front_left_hip_y * s571) - s253 * s782
-    s820 = cos_hind_right_abduction_angle * s818 - sin_hind_right_abduction_angle * s819
-    s821 = sin_hind_right_abduction_angle * s818 + cos_hind_right_abduction_angle * s819
-    s822 = cos_hind_right_abduction_angle * s815 - sin_hind_right_abduction_angle * s816
-    s823 = sin_hind_right_abduction_angle * s815 + cos_hind_right_abduction_angle * s816
-    s824 = s793 - s305 * s792
-    s825 = s681 + s791 - s306 * s792
-    s826 = s670 + moment_front_left_hip_y * s560 + s789 - s307 * s792
-    s827 = s794 - s308 * s792
-    s828 = m_hip * bias_hind_left_hip_z + moment_front_left_hip_y * s559 + s788 - s309 * s792
-    s829 = cos_hind_left_abduction_angle * s827 - sin_hind_left_abduction_angle * s828
-    s830 = sin_hind_left_abduction_angle * s827 + cos_hind_left_abduction_angle * s828
-    s831 = cos_hind_left_abduction_angle * s824 - sin_hind_left_abduction_angle * s825
-    s832 = sin_hind_left_abduction_angle * s824 + cos_hind_left_abduction_angle * s825
-    s833 = s523 * k16 + (s782 - s248 * s782 - y_hip * s821) + (s792 - s304 * s792 + y_hip * s830)
-    s834 = s521 * k18 + (s823 + (y_hip * s817 - x_hip * s820)) + (s832 - (x_hip * s829 + y_hip * s826))
-    s835 = s803 - s365 * s802
-    s836 = s676 + s801 - s366 * s802
-    s837 = s799 - (s670 + moment_front_left_hip_y * s549) - s367 * s802
-    s838 = s804 - s368 * s802
-    s839 = m_hip * bias_front_right_hip_z - moment_front_left_hip_y * s548 + s798 - s369 * s802
-    s840 = cos_front_right_abduction_angle * s838 - sin_front_right_abduction_angle * s839
-    s841 = sin_front_right_abduction_angle * s838 + cos_front_right_abduction_angle * s839
-    s842 = cos_front_right_abduction_angle * s835 - sin_front_right_abduction_angle * s836
-    s843 = sin_front_right_abduction_angle * s835 + cos_front_right_abduction_angle * s836
-    s844 = s522 * k17 + (s822 + x_hip * s821) + (s831 + x_hip * s830) + (s842 - x_hip * s841)
-    s845 = s813 - s421 * s812
-    s846 = s669 + s811 - s422 * s812
-    s847 = m_hip * bias_front_left_hip_x + moment_front_left_hip_y * s537 + s809 - s423 * s812
-    s848 = s814 - s424 * s812
-    s849 = m_hip * bias_front_left_hip_z + moment_front_left_hip_y * s536 + s808 - s425 * s812
-    s850 = cos_front_left_abduction_angle * s848 - sin_front_left_abduction_angle * s849
-    s851 = sin_front_left_abduction_angle * s848 + cos_front_left_abduction_angle * s849
-    s852 = cos_front_left_abduction_angle * s845 - sin_front_left_abduction_angle * s846
-    s853 = sin_front_left_abduction_angle * s845 + cos_front_left_abduction_angle * s846
-    s854 = s833 + (s802 - s364 * s802 - y_hip * s841) + (s812 - s420 * s812 + y_hip * s851)
-    s855 = s834 + (s843 + (x_hip * s840 + y_hip * s837)) + (s853 + (x_hip * s850 - y_hip * s847))
-    s856 = s483 * s854 - (s844 + (s852 - x_hip * s851))
-    s857 = s855 - s484 * s854 + s492 * s856
-    s858 = s817 + s826 + s837 + s847 - s485 * s854 + s493 * s856 - s499 * s857
-    s859 = s820 + s829 + s840 + s850 - s486 * s854 + s494 * s856 - s500 * s857
-    s860 = s821 + s830 + s841 + s851 - s487 * s854 + s495 * s856 - s501 * s857
-    s861 = s21 * s858 + s22 * s859 + s23 * s860
-    s862 = s518 * s861 - (s18 * s858 + s19 * s859 + s20 * s860)
-    s863 = (s15 * s858 + s16 * s859 + s17 * s860 - s517 * s861 + s520 * s862) / (s15 * s508 + s16 * s509 + s17 * s510 - s515 * s517 - s519 * s520)
-    delta_trunk_2_y = s862 / pivot_trunk_2_2 + s520 * s863
-    s864 = s861 / pivot_trunk_3_2 + (s518 * delta_trunk_2_y - s517 * s863)
-    delta_trunk_x = s18 * delta_trunk_2_y - s15 * s863 - s21 * s864
-    delta_trunk_y = s19 * delta_trunk_2_y - s16 * s863 - s22 * s864
-    delta_trunk_z = s20 * delta_trunk_2_y - s17 * s863 - s23 * s864
-    s865 = s857 / pivot_trunk_3 + (s499 * delta_trunk_x + s500 * delta_trunk_y + s501 * delta_trunk_z)
-    s866 = s493 * delta_trunk_x + s494 * delta_trunk_y + s495 * delta_trunk_z - s492 * s865
-    alpha_trunk_y = s856 / pivot_trunk_2 - s866
-    s867 = s483 * alpha_trunk_y - s484 * s865 + (s485 * delta_trunk_x + s486 * delta_trunk_y + s487 * delta_trunk_z)
-    s868 = s854 / pivot_trunk + s867
-    alpha_front_left_hip_y = cos_front_left_abduction_angle * alpha_trunk_y - sin_front_left_abduction_angle * s865
-    s869 = cos_front_left_abduction_angle * s865 + sin_front_left_abduction_angle * alpha_trunk_y
-    s870 = y_hip * s865
-    s871 = x_hip * s865
-    s872 = y_hip * s868
-    s873 = x_hip * alpha_trunk_y
-    s874 = s872 + s873
-    delta_front_left_hip_x = delta_trunk_x + s870
-    s875 = delta_trunk_y - s871
-    s876 = delta_trunk_z - s874
-    delta_front_left_hip_y = cos_front_left_abduction_angle * s875 + sin_front_left_abduction_angle * s876
-    delta_front_left_hip_z = cos_front_left_abduction_angle * s876 - sin_front_left_abduction_angle * s875
-    s877 = s423 * delta_front_left_hip_x + s424 * delta_front_left_hip_y + s425 * delta_front_left_hip_z
-    s878 = s812 / pivot_front_left_hip + (s421 * alpha_front_left_hip_y - s420 * s868 - s422 * s869 + s877)
-    s879 = s868 + s878
-    alpha_front_right_hip_y = cos_front_right_abduction_angle * alpha_trunk_y - sin_front_right_abduction_angle * s865
-    s880 = cos_front_right_abduction_angle * s865 + sin_front_right_abduction_angle * alpha_trunk_y
-    delta_front_right_hip_x = delta_trunk_x - s870
-    s881 = delta_trunk_z + (s872 - s873)
-    delta_front_right_hip_y = cos_front_right_abduction_angle * s875 + sin_front_right_abduction_angle * s881
-    delta_front_right_hip_z = cos_front_right_abduction_angle * s881 - sin_front_right_abduction_angle * s875
-    s882 = s367 * delta_front_right_hip_x + s368 * delta_front_right_hip_y + s369 * delta_front_right_hip_z
-    s883 = s802 / pivot_front_right_hip + (s365 * alpha_front_right_hip_y - s364 * s868 - s366 * s880 + s882)
-    s884 = s868 + s883
-    alpha_hind_left_hip_y = cos_hind_left_abduction_angle * alpha_trunk_y - sin_hind_left_abduction_angle * s865
-    s885 = cos_hind_left_abduction_angle * s865 + sin_hind_left_abduction_angle * alpha_trunk_y
-    s886 = delta_trunk_y + s871
-    s887 = delta_trunk_z + (s873 - s872)
-    delta_hind_left_hip_y = cos_hind_left_abduction_angle * s886 + sin_hind_left_abduction_angle * s887
-    delta_hind_left_hip_z = cos_hind_left_abduction_angle * s887 - sin_hind_left_abduction_angle * s886
-    s888 = s307 * delta_front_left_hip_x + s308 * delta_hind_left_hip_y + s309 * delta_hind_left_hip_z
-    s889 = s792 / pivot_hind_left_hip + (s305 * alpha_hind_left_hip_y - s304 * s868 - s306 * s885 + s888)
-    s890 = s868 + s889
-    alpha_hind_right_hip_y = cos_hind_right_abduction_angle * alpha_trunk_y - sin_hind_right_abduction_angle * s865
-    s891 = cos_hind_right_abduction_angle * s865 + sin_hind_right_abduction_angle * alpha_trunk_y
-    s892 = delta_trunk_z + s874
-    delta_hind_right_hip_y = cos_hind_right_abduction_angle * s886 + sin_hind_right_abduction_angle * s892
-    delta_hind_right_hip_z = cos_hind_right_abduction_angle * s892 - sin_hind_right_abduction_angle * s886
-    s893 = s251 * delta_front_right_hip_x + s252 * delta_hind_right_hip_y + s253 * delta_hind_right_hip_z
-    s894 = s782 / pivot_hind_right_hip + (s249 * alpha_hind_right_hip_y - s248 * s868 - s250 * s891 + s893)
-    s895 = s868 + s894
-    s896 = delta_front_left_hip_x + k2 * s869
-    s897 = delta_front_left_hip_z - k2 * s879
-    delta_front_left_thigh_z = cos_front_left_swing_angle * s897 + sin_front_left_swing_angle * s896
-    delta_front_left_thigh_x = cos_front_left_swing_angle * s896 - sin_front_left_swing_angle * s897
-    s898 = s212 * (cos_front_left_swing_angle * s869 + sin_front_left_swing_angle * s879)
-    s899 = s211 * alpha_front_left_hip_y - s898 + (s213 * delta_front_left_thigh_x + s214 * delta_front_left_thigh_z)
-    s900 = s772 / pivot_front_left_thigh + s899
-    alpha_front_left_thigh_y = alpha_front_left_hip_y - s900
-    s901 = delta_front_right_hip_x + k3 * s880
-    s902 = delta_front_right_hip_z - k3 * s884
-    delta_front_right_thigh_z = cos_front_right_swing_angle * s902 + sin_front_right_swing_angle * s901
-    delta_front_right_thigh_x = cos_front_right_swing_angle * s901 - sin_front_right_swing_angle * s902
-    s903 = s175 * (cos_front_right_swing_angle * s880 + sin_front_right_swing_angle * s884)
-    s904 = s174 * alpha_front_right_hip_y + s903 + (s176 * delta_front_right_thigh_x + s177 * delta_front_right_thigh_z)
-    s905 = s764 / pivot_front_right_thigh + s904
-    alpha_front_right_thigh_y = alpha_front_right_hip_y - s905
-    s906 = delta_front_left_hip_x + k2 * s885
-    s907 = delta_hind_left_hip_z - k2 * s890
-    delta_hind_left_thigh_z = cos_hind_left_swing_angle * s907 + sin_hind_left_swing_angle * s906
-    delta_hind_left_thigh_x = cos_hind_left_swing_angle * s906 - sin_hind_left_swing_angle * s907
-    s908 = s138 * (cos_hind_left_swing_angle * s885 + sin_hind_left_swing_angle * s890)
-    s909 = s137 * alpha_hind_left_hip_y - s908 + (s139 * delta_hind_left_thigh_x + s140 * delta_hind_left_thigh_z)
-    s910 = s756 / pivot_hind_left_thigh + s909
-    alpha_hind_left_thigh_y = alpha_hind_left_hip_y - s910
-    s911 = delta_front_right_hip_x + k3 * s891
-    s912 = delta_hind_right_hip_z - k3 * s895
-    delta_hind_right_thigh_z = cos_hind_right_swing_angle * s912 + sin_hind_right_swing_angle * s911
-    delta_hind_right_thigh_x = cos_hind_right_swing_angle * s911 - sin_hind_right_swing_angle * s912
-    s913 = s101 * (cos_hind_right_swing_angle * s891 + sin_hind_right_swing_angle * s895)
-    s914 = s100 * alpha_hind_right_hip_y + s913 + (s102 * delta_hind_right_thigh_x + s103 * delta_hind_right_thigh_z)
-    s915 = s748 / pivot_hind_right_thigh + s914
-    alpha_hind_right_thigh_y = alpha_hind_right_hip_y - s915
-    s916 = cos_front_left_knee_angle * (delta_front_left_thigh_x + k4 * alpha_front_left_thigh_y)
-    s917 = k7 * alpha_front_left_thigh_y - k8 * (s916 - sin_front_left_knee_angle * delta_front_left_thigh_z)
-    front_left_knee_angle_ddot = s767 / pivot_hind_right_shank - s917
-    s918 = cos_front_right_knee_angle * (delta_front_right_thigh_x + k4 * alpha_front_right_thigh_y)
-    s919 = k7 * alpha_front_right_thigh_y - k8 * (s918 - sin_front_right_knee_angle * delta_front_right_thigh_z)
-    front_right_knee_angle_ddot = s759 / pivot_hind_right_shank - s919
-    s920 = cos_hind_left_knee_angle * (delta_hind_left_thigh_x + k4 * alpha_hind_left_thigh_y)
-    s921 = k7 * alpha_hind_left_thigh_y - k8 * (s920 - sin_hind_left_knee_angle * delta_hind_left_thigh_z)
-    hind_left_knee_angle_ddot = s751 / pivot_hind_right_shank - s921
-    s922 = cos_hind_right_knee_angle * (delta_hind_right_thigh_x + k4 * alpha_hind_right_thigh_y)
-    s923 = k7 * alpha_hind_right_thigh_y - k8 * (s922 - sin_hind_right_knee_angle * delta_hind_right_thigh_z)
-    hind_right_knee_angle_ddot = s743 / pivot_hind_right_shank - s923
-    s924 = trunk_wx * 0.5
-    s925 = trunk_wy * 0.5
-    s926 = trunk_wz * 0.5
-    s999 = I_trunk_x * s15
-    s1000 = I_trunk_y * s16
-    s1001 = I_trunk_z * s17
-    s1002 = I_trunk_x * s18
-    s1003 = I_trunk_y * s19
-    s1004 = I_trunk_z * s20
-    s1005 = s15 * s999 + s16 * s1000 + s17 * s1001
-    s1006 = s18 * s1002 + s19 * s1003 + s20 * s1004
-    s1007 = s21 * (I_trunk_x * s21) + s22 * (I_trunk_y * s22) + s23 * (I_trunk_z * s23)
-    s1008 = s18 * s999 + s19 * s1000 + s20 * s1001
-    s1009 = s21 * s999 + s22 * s1000 + s23 * s1001
-    s1010 = s21 * s1002 + s22 * s1003 + s23 * s1004
-    s1011 = x_hip * s15
-    s1012 = y_hip * s16
-    s1013 = s1011 + s1012
-    s1014 = x_hip * s18
-    s1015 = y_hip * s19
-    s1016 = s1014 + s1015
-    s1017 = x_hip * s21
-    s1018 = y_hip * s22
-    s1019 = s1017 + s1018
-    s1020 = moment_front_left_hip_y * s927
-    s1021 = moment_front_left_hip_y * s929
-    s1022 = moment_front_left_hip_y * s931
-    s1023 = inertia_front_left_hip_xx * s15
-    s1024 = s1023 + I_hip_xy * s927 + I_hip_xz * s928
-    s1025 = I_hip_xy * s15
-    s1026 = s1025 + I_hip_yy * s927 + I_hip_yz * s928
-    s1027 = I_hip_xz * s15
-    s1028 = s1027 + I_hip_yz * s927 + inertia_front_left_hip_zz * s928
-    s1029 = inertia_front_left_hip_xx * s18
-    s1030 = s1029 + I_hip_xy * s929 + I_hip_xz * s930
-    s1031 = I_hip_xy * s18
-    s1032 = s1031 + I_hip_yy * s929 + I_hip_yz * s930
-    s1033 = I_hip_xz * s18
-    s1034 = s1033 + I_hip_yz * s929 + inertia_front_left_hip_zz * s930
-    s1035 = inertia_front_left_hip_xx * s21
-    s1036 = I_hip_xy * s21
-    s1037 = I_hip_xz * s21
-    s1038 = s15 * s1024 + s927 * s1026 + s928 * s1028
-    s1039 = s18 * s1030 + s929 * s1032 + s930 * s1034
-    s1040 = s21 * (s1035 + I_hip_xy * s931 + I_hip_xz * s932) + s931 * (s1036 + I_hip_yy * s931 + I_hip_yz * s932)
-    s1041 = s1040 + s932 * (s1037 + I_hip_yz * s931 + inertia_front_left_hip_zz * s932)
-    s1042 = s18 * s1024 + s929 * s1026 + s930 * s1028
-    s1043 = s21 * s1024 + s931 * s1026 + s932 * s1028
-    s1044 = s21 * s1030 + s931 * s1032 + s932 * s1034
-    s1045 = s1011 - s1012
-    s1046 = s1014 - s1015
-    s1047 = s1017 - s1018
-    s1048 = moment_front_left_hip_y * s933
-    s1049 = moment_front_left_hip_y * s935
-    s1050 = moment_front_left_hip_y * s937
-    s1051 = s1023 - I_hip_xy * s933 + I_hip_xz * s934
-    s1052 = I_hip_yy * s933 - s1025 - I_hip_yz * s934
-    s1053 = s1027 - I_hip_yz * s933 + inertia_front_left_hip_zz * s934
-    s1054 = s1029 - I_hip_xy * s935 + I_hip_xz * s936
-    s1055 = I_hip_yy * s935 - s1031 - I_hip_yz * s936
-    s1056 = s1033 - I_hip_yz * s935 + inertia_front_left_hip_zz * s936
-    s1057 = s15 * s1051 + s933 * s1052 + s934 * s1053
-    s1058 = s18 * s1054 + s935 * s1055 + s936 * s1056
-    s1059 = s21 * (s1035 - I_hip_xy * s937 + I_hip_xz * s938) + s937 * (I_hip_yy * s937 - s1036 - I_hip_yz * s938)
-    s1060 = s1059 + s938 * (s1037 - I_hip_yz * s937 + inertia_front_left_hip_zz * s938)
-    s1061 = s18 * s1051 + s935 * s1052 + s936 * s1053
-    s1062 = s21 * s1051 + s937 * s1052 + s938 * s1053
-    s1063 = s21 * s1054 + s937 * s1055 + s938 * s1056
-    s1064 = s1012 - s1011
-    s1065 = s1015 - s1014
-    s1066 = s1018 - s1017
-    s1067 = moment_front_left_hip_y * s939
-    s1068 = moment_front_left_hip_y * s941
-    s1069 = moment_front_left_hip_y * s943
-    s1070 = s1023 + I_hip_xy * s939 + I_hip_xz * s940
-    s1071 = s1025 + I_hip_yy * s939 + I_hip_yz * s940
-    s1072 = s1027 + I_hip_yz * s939 + inertia_front_left_hip_zz * s940
-    s1073 = s1029 + I_hip_xy * s941 + I_hip_xz * s942
-    s1074 = s1031 + I_hip_yy * s941 + I_hip_yz * s942
-    s1075 = s1033 + I_hip_yz * s941 + inertia_front_left_hip_zz * s942
-    s1076 = s15 * s1070 + s939 * s1071 + s940 * s1072
-    s1077 = s18 * s1073 + s941 * s1074 + s942 * s1075
-    s1078 = s21 * (s1035 + I_hip_xy * s943 + I_hip_xz * s944) + s943 * (s1036 + I_hip_yy * s943 + I_hip_yz * s944)
-    s1079 = s1078 + s944 * (s1037 + I_hip_yz * s943 + inertia_front_left_hip_zz * s944)
-    s1080 = s18 * s1070 + s941 * s1071 + s942 * s1072
-    s1081 = s21 * s1070 + s943 * s1071 + s944 * s1072
-    s1082 = s21 * s1073 + s943 * s1074 + s944 * s1075
-    s1083 = moment_front_left_hip_y * s945
-    s1084 = moment_front_left_hip_y * s947
-    s1085 = moment_front_left_hip_y * s949
-    s1086 = s1023 - I_hip_xy * s945 + I_hip_xz * s946
-    s1087 = I_hip_yy * s945 - s1025 - I_hip_yz * s946
-    s1088 = s1027 - I_hip_yz * s945 + inertia_front_left_hip_zz * s946
-    s1089 = s1029 - I_hip_xy * s947 + I_hip_xz * s948
-    s1090 = I_hip_yy * s947 - s1031 - I_hip_yz * s948
-    s1091 = s1033 - I_hip_yz * s947 + inertia_front_left_hip_zz * s948
-    s1092 = s15 * s1086 + s945 * s1087 + s946 * s1088
-    s1093 = s18 * s1089 + s947 * s1090 + s948 * s1091
-    s1094 = s21 * (s1035 - I_hip_xy * s949 + I_hip_xz * s950) + s949 * (I_hip_yy * s949 - s1036 - I_hip_yz * s950)
-    s1095 = s1094 + s950 * (s1037 - I_hip_yz * s949 + inertia_front_left_hip_zz * s950)
-    s1096 = s18 * s1086 + s947 * s1087 + s948 * s1088
-    s1097 = s21 * s1086 + s949 * s1087 + s950 * s1088
-    s1098 = s21 * s1089 + s949 * s1090 + s950 * s1091
-    s1099 = k2 * s927
-    s1100 = k2 * s929
-    s1101 = k2 * s931
-    s1102 = moment_front_left_thigh_y * s927 - k5 * s951
-    s1103 = moment_front_left_thigh_y * s929 - k5 * s953
-    s1104 = moment_front_left_thigh_y * s931 - k5 * s955
-    s1105 = inertia_front_left_thigh_xx * s952
-    s1106 = inertia_front_left_thigh_yy * s927 + inertia_front_left_thigh_yz * s951
-    s1107 = inertia_front_left_thigh_yz * s927 + inertia_front_left_thigh_zz * s951
-    s1108 = inertia_front_left_thigh_xx * s954
-    s1109 = inertia_front_left_thigh_yy * s929 + inertia_front_left_thigh_yz * s953
-    s1110 = inertia_front_left_thigh_yz * s929 + inertia_front_left_thigh_zz * s953
-    s1111 = s952 * s1105 + s927 * s1106 + s951 * s1107
-    s1112 = s954 * s1108 + s929 * s1109 + s953 * s1110
-    s1113 = s931 * (inertia_front_left_thigh_yy * s931 + inertia_front_left_thigh_yz * s955)
-    s1114 = s955 * (inertia_front_left_thigh_yz * s931 + inertia_front_left_thigh_zz * s955)
-    s1115 = s956 * (inertia_front_left_thigh_xx * s956) + s1113 + s1114
-    s1116 = s954 * s1105 + s929 * s1106 + s953 * s1107
-    s1117 = s956 * s1105 + s931 * s1106 + s955 * s1107
-    s1118 = s956 * s1108 + s931 * s1109 + s955 * s1110
-    s1119 = k3 * s933
-    s1120 = k3 * s935
-    s1121 = k3 * s937
-    s1122 = moment_front_left_thigh_y * s933 + k5 * s957
-    s1123 = moment_front_left_thigh_y * s935 + k5 * s959
-    s1124 = moment_front_left_thigh_y * s937 + k5 * s961
-    s1125 = inertia_front_left_thigh_xx * s958
-    s1126 = inertia_front_left_thigh_yy * s933 - inertia_front_left_thigh_yz * s957
-    s1127 = inertia_front_left_thigh_zz * s957 - inertia_front_left_thigh_yz * s933
-    s1128 = inertia_front_left_thigh_xx * s960
-    s1129 = inertia_front_left_thigh_yy * s935 - inertia_front_left_thigh_yz * s959
-    s1130 = inertia_front_left_thigh_zz * s959 - inertia_front_left_thigh_yz * s935
-    s1131 = s958 * s1125 + s933 * s1126 + s957 * s1127
-    s1132 = s960 * s1128 + s935 * s1129 + s959 * s1130
-    s1133 = s937 * (inertia_front_left_thigh_yy * s937 - inertia_front_left_thigh_yz * s961)
-    s1134 = s961 * (inertia_front_left_thigh_zz * s961 - inertia_front_left_thigh_yz * s937)
-    s1135 = s962 * (inertia_front_left_thigh_xx * s962) + s1133 + s1134
-    s1136 = s960 * s1125 + s935 * s1126 + s959 * s1127
-    s1137 = s962 * s1125 + s937 * s1126 + s961 * s1127
-    s1138 = s962 * s1128 + s937 * s1129 + s961 * s1130
-    s1139 = k2 * s939
-    s1140 = k2 * s941
-    s1141 = k2 * s943
-    s1142 = moment_front_left_thigh_y * s939 - k5 * s963
-    s1143 = moment_front_left_thigh_y * s941 - k5 * s965
-    s1144 = moment_front_left_thigh_y * s943 - k5 * s967
-    s1145 = inertia_front_left_thigh_xx * s964
-    s1146 = inertia_front_left_thigh_yy * s939 + inertia_front_left_thigh_yz * s963
-    s1147 = inertia_front_left_thigh_yz * s939 + inertia_front_left_thigh_zz * s963
-    s1148 = inertia_front_left_thigh_xx * s966
-    s1149 = inertia_front_left_thigh_yy * s941 + inertia_front_left_thigh_yz * s965
-    s1150 = inertia_front_left_thigh_yz * s941 + inertia_front_left_thigh_zz * s965
-    s1151 = s964 * s1145 + s939 * s1146 + s963 * s1147
-    s1152 = s966 * s1148 + s941 * s1149 + s965 * s1150
-    s1153 = s943 * (inertia_front_left_thigh_yy * s943 + inertia_front_left_thigh_yz * s967)
-    s1154 = s967 * (inertia_front_left_thigh_yz * s943 + inertia_front_left_thigh_zz * s967)
-    s1155 = s968 * (inertia_front_left_thigh_xx * s968) + s1153 + s1154
-    s1156 = s966 * s1145 + s941 * s1146 + s965 * s1147
-    s1157 = s968 * s1145 + s943 * s1146 + s967 * s1147
-    s1158 = s968 * s1148 + s943 * s1149 + s967 * s1150
-    s1159 = k3 * s945
-    s1160 = k3 * s947
-    s1161 = k3 * s949
-    s1162 = moment_front_left_thigh_y * s945 + k5 * s969
-    s1163 = moment_front_left_thigh_y * s947 + k5 * s971
-    s1164 = moment_front_left_thigh_y * s949 + k5 * s973
-    s1165 = inertia_front_left_thigh_xx * s970
-    s1166 = inertia_front_left_thigh_yy * s945 - inertia_front_left_thigh_yz * s969
-    s1167 = inertia_front_left_thigh_zz * s969 - inertia_front_left_thigh_yz * s945
-    s1168 = inertia_front_left_thigh_xx * s972
-    s1169 = inertia_front_left_thigh_yy * s947 - inertia_front_left_thigh_yz * s971
-    s1170 = inertia_front_left_thigh_zz * s971 - inertia_front_left_thigh_yz * s947
-    s1171 = s970 * s1165 + s945 * s1166 + s969 * s1167
-    s1172 = s972 * s1168 + s947 * s1169 + s971 * s1170
-    s1173 = s949 * (inertia_front_left_thigh_yy * s949 - inertia_front_left_thigh_yz * s973)
-    s1174 = s973 * (inertia_front_left_thigh_zz * s973 - inertia_front_left_thigh_yz * s949)
-    s1175 = s974 * (inertia_front_left_thigh_xx * s974) + s1173 + s1174
-    s1176 = s972 * s1165 + s947 * s1166 + s971 * s1167
-    s1177 = s974 * s1165 + s949 * s1166 + s973 * s1167
-    s1178 = s974 * s1168 + s949 * s1169 + s973 * s1170
-    s1179 = k4 * s951
-    s1180 = k4 * s953
-    s1181 = k4 * s955
-    s1182 = k6 * s975
-    s1183 = k6 * s977
-    s1184 = k6 * s979
-    s1185 = inertia_front_left_shank_xx * s976
-    s1186 = inertia_front_left_shank_yy * s927
-    s1187 = I_shank_z * s975
-    s1188 = inertia_front_left_shank_xx * s978
-    s1189 = inertia_front_left_shank_yy * s929
-    s1190 = I_shank_z * s977
-    s1191 = s976 * s1185 + s927 * s1186 + s975 * s1187
-    s1192 = s978 * s1188 + s929 * s1189 + s977 * s1190
-    s1193 = s980 * (inertia_front_left_shank_xx * s980) + s931 * (inertia_front_left_shank_yy * s931)
-    s1194 = s1193 + s979 * (I_shank_z * s979)
-    s1195 = s978 * s1185 + s929 * s1186 + s977 * s1187
-    s1196 = s980 * s1185 + s931 * s1186 + s979 * s1187
-    s1197 = s980 * s1188 + s931 * s1189 + s979 * s1190
-    s1198 = k4 * s957
-    s1199 = k4 * s959
-    s1200 = k4 * s961
-    s1201 = k6 * s981
-    s1202 = k6 * s983
-    s1203 = k6 * s985
-    s1204 = inertia_front_left_shank_xx * s982
-    s1205 = inertia_front_left_shank_yy * s933
-    s1206 = I_shank_z * s981
-    s1207 = inertia_front_left_shank_xx * s984
-    s1208 = inertia_front_left_shank_yy * s935
-    s1209 = I_shank_z * s983
-    s1210 = s982 * s1204 + s933 * s1205 + s981 * s1206
-    s1211 = s984 * s1207 + s935 * s1208 + s983 * s1209
-    s1212 = s986 * (inertia_front_left_shank_xx * s986) + s937 * (inertia_front_left_shank_yy * s937)
-    s1213 = s1212 + s985 * (I_shank_z * s985)
-    s1214 = s984 * s1204 + s935 * s1205 + s983 * s1206
-    s1215 = s986 * s1204 + s937 * s1205 + s985 * s1206
-    s1216 = s986 * s1207 + s937 * s1208 + s985 * s1209
-    s1217 = k4 * s963
-    s1218 = k4 * s965
-    s1219 = k4 * s967
-    s1220 = k6 * s987
-    s1221 = k6 * s989
-    s1222 = k6 * s991
-    s1223 = inertia_front_left_shank_xx * s988
-    s1224 = inertia_front_left_shank_yy * s939
-    s1225 = I_shank_z * s987
-    s1226 = inertia_front_left_shank_xx * s990
-    s1227 = inertia_front_left_shank_yy * s941
-    s1228 = I_shank_z * s989
-    s1229 = s988 * s1223 + s939 * s1224 + s987 * s1225
-    s1230 = s990 * s1226 + s941 * s1227 + s989 * s1228
-    s1231 = s992 * (inertia_front_left_shank_xx * s992) + s943 * (inertia_front_left_shank_yy * s943)
-    s1232 = s1231 + s991 * (I_shank_z * s991)
-    s1233 = s990 * s1223 + s941 * s1224 + s989 * s1225
-    s1234 = s992 * s1223 + s943 * s1224 + s991 * s1225
-    s1235 = s992 * s1226 + s943 * s1227 + s991 * s1228
-    s1236 = k4 * s969
-    s1237 = k4 * s971
-    s1238 = k4 * s973
-    s1239 = k6 * s993
-    s1240 = k6 * s995
-    s1241 = k6 * s997
-    s1242 = inertia_front_left_shank_xx * s994
-    s1243 = inertia_front_left_shank_yy * s945
-    s1244 = I_shank_z * s993
-    s1245 = inertia_front_left_shank_xx * s996
-    s1246 = inertia_front_left_shank_yy * s947
-    s1247 = I_shank_z * s995
-    s1248 = s994 * s1242 + s945 * s1243 + s993 * s1244
-    s1249 = s996 * s1245 + s947 * s1246 + s995 * s1247
-    s1250 = s998 * (inertia_front_left_shank_xx * s998) + s949 * (inertia_front_left_shank_yy * s949)
-    s1251 = s1250 + s997 * (I_shank_z * s997)
-    s1252 = s996 * s1242 + s947 * s1243 + s995 * s1244
-    s1253 = s998 * s1242 + s949 * s1243 + s997 * s1244
-    s1254 = s998 * s1245 + s949 * s1246 + s997 * s1247
-    s1255 = m_shank * s1236 - s1239
-    s1256 = m_shank * s1237 - s1240
-    s1257 = m_shank * s1238 - s1241
-    s1258 = s1236 * (s1255 - s1239)
-    s1259 = s1237 * (s1256 - s1240)
-    s1260 = s1238 * (s1257 - s1241)
-    s1261 = s1255 - s1162
-    s1262 = s1256 - s1163
-    s1263 = s1257 - s1164
-    s1264 = s1171 + (s1248 + (s1259 + s1260))
-    s1265 = s1176 + (s1252 + (s1237 * s1239 - s1236 * s1256))
-    s1266 = s1177 + (s1253 + (s1238 * s1239 - s1236 * s1257))
-    s1267 = s1172 + (s1249 + (s1258 + s1260))
-    s1268 = s1178 + (s1254 + (s1238 * s1240 - s1237 * s1257))
-    s1269 = s1175 + (s1251 + (s1258 + s1259))
-    s1270 = m_shank * s1217 - s1220
-    s1271 = m_shank * s1218 - s1221
-    s1272 = m_shank * s1219 - s1222
-    s1273 = s1217 * (s1270 - s1220)
-    s1274 = s1218 * (s1271 - s1221)
-    s1275 = s1219 * (s1272 - s1222)
-    s1276 = s1142 + s1270
-    s1277 = s1143 + s1271
-    s1278 = s1144 + s1272
-    s1279 = s1151 + (s1229 + (s1274 + s1275))
-    s1280 = s1156 + (s1233 + (s1218 * s1220 - s1217 * s1271))
-    s1281 = s1157 + (s1234 + (s1219 * s1220 - s1217 * s1272))
-    s1282 = s1152 + (s1230 + (s1273 + s1275))
-    s1283 = s1158 + (s1235 + (s1219 * s1221 - s1218 * s1272))
-    s1284 = s1155 + (s1232 + (s1273 + s1274))
-    s1285 = m_shank * s1198 - s1201
-    s1286 = m_shank * s1199 - s1202
-    s1287 = m_shank * s1200 - s1203
-    s1288 = s1198 * (s1285 - s1201)
-    s1289 = s1199 * (s1286 - s1202)
-    s1290 = s1200 * (s1287 - s1203)
-    s1291 = s1285 - s1122
-    s1292 = s1286 - s1123
-    s1293 = s1287 - s1124
-    s1294 = s1131 + (s1210 + (s1289 + s1290))
-    s1295 = s1136 + (s1214 + (s1199 * s1201 - s1198 * s1286))
-    s1296 = s1137 + (s1215 + (s1200 * s1201 - s1198 * s1287))
-    s1297 = s1132 + (s1211 + (s1288 + s1290))
-    s1298 = s1138 + (s1216 + (s1200 * s1202 - s1199 * s1287))
-    s1299 = s1135 + (s1213 + (s1288 + s1289))
-    s1300 = m_shank * s1179 - s1182
-    s1301 = m_shank * s1180 - s1183
-    s1302 = m_shank * s1181 - s1184
-    s1303 = s1179 * (s1300 - s1182)
-    s1304 = s1180 * (s1301 - s1183)
-    s1305 = s1181 * (s1302 - s1184)
-    s1306 = s1102 + s1300
-    s1307 = s1103 + s1301
-    s1308 = s1104 + s1302
-    s1309 = s1111 + (s1191 + (s1304 + s1305))
-    s1310 = s1116 + (s1195 + (s1180 * s1182 - s1179 * s1301))
-    s1311 = s1117 + (s1196 + (s1181 * s1182 - s1179 * s1302))
-    s1312 = s1112 + (s1192 + (s1303 + s1305))
-    s1313 = s1118 + (s1197 + (s1181 * s1183 - s1180 * s1302))
-    s1314 = s1115 + (s1194 + (s1303 + s1304))
-    s1315 = s1261 + k29 * s1159
-    s1316 = s1262 + k29 * s1160
-    s1317 = s1263 + k29 * s1161
-    s1318 = s1159 * (s1261 + s1315)
-    s1319 = s1160 * (s1262 + s1316)
-    s1320 = s1161 * (s1263 + s1317)
-    s1321 = s1315 - s1083
-    s1322 = s1316 - s1084
-    s1323 = s1317 - s1085
-    s1324 = s1092 + (s1264 + (s1319 + s1320))
-    s1325 = s1096 + (s1265 - (s1159 * s1316 + s1160 * s1261))
-    s1326 = s1097 + (s1266 - (s1159 * s1317 + s1161 * s1261))
-    s1327 = s1093 + (s1267 + (s1318 + s1320))
-    s1328 = s1098 + (s1268 - (s1160 * s1317 + s1161 * s1262))
-    s1329 = s1095 + (s1269 + (s1318 + s1319))
-    s1330 = s1276 + k29 * s1139
-    s1331 = s1277 + k29 * s1140
-    s1332 = s1278 + k29 * s1141
-    s1333 = s1139 * (s1276 + s1330)
-    s1334 = s1140 * (s1277 + s1331)
-    s1335 = s1141 * (s1278 + s1332)
-    s1336 = s1067 + s1330
-    s1337 = s1068 + s1331
-    s1338 = s1069 + s1332
-    s1339 = s1076 + (s1279 + (s1334 + s1335))
-    s1340 = s1080 + (s1280 - (s1139 * s1331 + s1140 * s1276))
-    s1341 = s1081 + (s1281 - (s1139 * s1332 + s1141 * s1276))
-    s1342 = s1077 + (s1282 + (s1333 + s1335))
-    s1343 = s1082 + (s1283 - (s1140 * s1332 + s1141 * s1277))
-    s1344 = s1079 + (s1284 + (s1333 + s1334))
-    s1345 = s1291 + k29 * s1119
-    s1346 = s1292 + k29 * s1120
-    s1347 = s1293 + k29 * s1121
-    s1348 = s1119 * (s1291 + s1345)
-    s1349 = s1120 * (s1292 + s1346)
-    s1350 = s1121 * (s1293 + s1347)
-    s1351 = s1345 - s1048
-    s1352 = s1346 - s1049
-    s1353 = s1347 - s1050
-    s1354 = s1057 + (s1294 + (s1349 + s1350))
-    s1355 = s1061 + (s1295 - (s1119 * s1346 + s1120 * s1291))
-    s1356 = s1062 + (s1296 - (s1119 * s1347 + s1121 * s1291))
-    s1357 = s1058 + (s1297 + (s1348 + s1350))
-    s1358 = s1063 + (s1298 - (s1120 * s1347 + s1121 * s1292))
-    s1359 = s1060 + (s1299 + (s1348 + s1349))
-    s1360 = s1306 + k29 * s1099
-    s1361 = s1307 + k29 * s1100
-    s1362 = s1308 + k29 * s1101
-    s1363 = s1099 * (s1306 + s1360)
-    s1364 = s1100 * (s1307 + s1361)
-    s1365 = s1101 * (s1308 + s1362)
-    s1366 = s1020 + s1360
-    s1367 = s1021 + s1361
-    s1368 = s1022 + s1362
-    s1369 = s1038 + (s1309 + (s1364 + s1365))
-    s1370 = s1042 + (s1310 - (s1099 * s1361 + s1100 * s1306))
-    s1371 = s1043 + (s1311 - (s1099 * s1362 + s1101 * s1306))
-    s1372 = s1039 + (s1312 + (s1363 + s1365))
-    s1373 = s1044 + (s1313 - (s1100 * s1362 + s1101 * s1307))
-    s1374 = s1041 + (s1314 + (s1363 + s1364))
-    s1375 = k15 * s1013
-    s1376 = k15 * s1016
-    s1377 = k15 * s1019
-    s1378 = s1321 - s1375
-    s1379 = s1322 - s1376
-    s1380 = s1323 - s1377
-    s1381 = s1013 * (s1321 + s1378)
-    s1382 = s1016 * (s1322 + s1379)
-    s1383 = s1019 * (s1323 + s1380)
-    s1384 = s1336 + k15 * s1064
-    s1385 = s1337 + k15 * s1065
-    s1386 = s1338 + k15 * s1066
-    s1387 = s1064 * (s1336 + s1384)
-    s1388 = s1065 * (s1337 + s1385)
-    s1389 = s1066 * (s1338 + s1386)
-    s1390 = s1008 + (s1325 + (s1013 * s1379 + s1016 * s1321)) + (s1340 - (s1064 * s1385 + s1065 * s1336))
-    s1391 = s1009 + (s1326 + (s1013 * s1380 + s1019 * s1321)) + (s1341 - (s1064 * s1386 + s1066 * s1336))
-    s1392 = s1010 + (s1328 + (s1016 * s1380 + s1019 * s1322)) + (s1343 - (s1065 * s1386 + s1066 * s1337))
-    s1393 = s1351 + k15 * s1045
-    s1394 = s1352 + k15 * s1046
-    s1395 = s1353 + k15 * s1047
-    s1396 = s1045 * (s1351 + s1393)
-    s1397 = s1046 * (s1352 + s1394)
-    s1398 = s1047 * (s1353 + s1395)
-    s1399 = s1005 + (s1324 - (s1382 + s1383)) + (s1339 + (s1388 + s1389)) + (s1354 + (s1397 + s1398))
-    s1400 = s1006 + (s1327 - (s1381 + s1383)) + (s1342 + (s1387 + s1389)) + (s1357 + (s1396 + s1398))
-    s1401 = s1007 + (s1329 - (s1381 + s1382)) + (s1344 + (s1387 + s1388)) + (s1359 + (s1396 + s1397))
-    s1402 = s1366 + s1375
-    s1403 = s1367 + s1376
-    s1404 = s1368 + s1377
-    s1405 = s1013 * (s1366 + s1402)
-    s1406 = s1016 * (s1367 + s1403)
-    s1407 = s1019 * (s1368 + s1404)
-    s1408 = s1378 + s1384 + s1393 + s1402
-    s1409 = s1379 + s1385 + s1394 + s1403
-    s1410 = s1380 + s1386 + s1395 + s1404
-    s1411 = s1399 + (s1369 + (s1406 + s1407))
-    s1412 = s1390 + (s1355 - (s1045 * s1394 + s1046 * s1351)) + (s1370 - (s1013 * s1403 + s1016 * s1366))
-    s1413 = s1391 + (s1356 - (s1045 * s1395 + s1047 * s1351)) + (s1371 - (s1013 * s1404 + s1019 * s1366))
-    s1414 = s1400 + (s1372 + (s1405 + s1407))
-    s1415 = s1392 + (s1358 - (s1046 * s1395 + s1047 * s1352)) + (s1373 - (s1016 * s1404 + s1019 * s1367))
-    s1416 = s1401 + (s1374 + (s1405 + s1406))
-    s1417 = s18 * s1410 - s21 * s1409
-    s1418 = s21 * s1408 - s15 * s1410
-    s1419 = s15 * s1409 - s18 * s1408
-    s1420 = s15 * s1411 + s18 * s1412 + s21 * s1413
-    s1421 = s15 * s1412 + s18 * s1414 + s21 * s1415
-    s1422 = s15 * s1413 + s18 * s1415 + s21 * s1416
-    s1423 = s19 * s1410 - s22 * s1409
-    s1424 = s22 * s1408 - s16 * s1410
-    s1425 = s16 * s1409 - s19 * s1408
-    s1426 = s16 * s1411 + s19 * s1412 + s22 * s1413
-    s1427 = s16 * s1412 + s19 * s1414 + s22 * s1415
-    s1428 = s16 * s1413 + s19 * s1415 + s22 * s1416
-    s1429 = s20 * s1410 - s23 * s1409
-    s1430 = s23 * s1408 - s17 * s1410
-    s1431 = s17 * s1409 - s20 * s1408
-    s1432 = s17 * s1411 + s20 * s1412 + s23 * s1413
-    s1433 = s17 * s1412 + s20 * s1414 + s23 * s1415
-    s1434 = s17 * s1413 + s20 * s1415 + s23 * s1416
-    s1435 = s18 * s1368 - s21 * s1367
-    s1436 = s21 * s1366 - s15 * s1368
-    s1437 = s15 * s1367 - s18 * s1366
-    s1438 = s15 * s1369 + s18 * s1370 + s21 * s1371
-    s1439 = s15 * s1370 + s18 * s1372 + s21 * s1373
-    s1440 = s15 * s1371 + s18 * s1373 + s21 * s1374
-    s1441 = s1438 + (s1016 * s1437 - s1019 * s1436)
-    s1442 = s1439 + (s1019 * s1435 - s1013 * s1437)
-    s1443 = s1440 + (s1013 * s1436 - s1016 * s1435)
-    s1444 = s18 * s1353 - s21 * s1352
-    s1445 = s21 * s1351 - s15 * s1353
-    s1446 = s15 * s1352 - s18 * s1351
-    s1447 = s15 * s1354 + s18 * s1355 + s21 * s1356
-    s1448 = s15 * s1355 + s18 * s1357 + s21 * s1358
-    s1449 = s15 * s1356 + s18 * s1358 + s21 * s1359
-    s1450 = s1447 + (s1046 * s1446 - s1047 * s1445)
-    s1451 = s1448 + (s1047 * s1444 - s1045 * s1446)
-    s1452 = s1449 + (s1045 * s1445 - s1046 * s1444)
-    s1453 = s18 * s1338 - s21 * s1337
-    s1454 = s21 * s1336 - s15 * s1338
-    s1455 = s15 * s1337 - s18 * s1336
-    s1456 = s15 * s1339 + s18 * s1340 + s21 * s1341
-    s1457 = s15 * s1340 + s18 * s1342 + s21 * s1343
-    s1458 = s15 * s1341 + s18 * s1343 + s21 * s1344
-    s1459 = s1456 + (s1065 * s1455 - s1066 * s1454)
-    s1460 = s1457 + (s1066 * s1453 - s1064 * s1455)
-    s1461 = s1458 + (s1064 * s1454 - s1065 * s1453)
-    s1462 = s18 * s1323 - s21 * s1322
-    s1463 = s21 * s1321 - s15 * s1323
-    s1464 = s15 * s1322 - s18 * s1321
-    s1465 = s15 * s1324 + s18 * s1325 + s21 * s1326
-    s1466 = s15 * s1325 + s18 * s1327 + s21 * s1328
-    s1467 = s15 * s1326 + s18 * s1328 + s21 * s1329
-    s1468 = s1465 + (s1019 * s1463 - s1016 * s1464)
-    s1469 = s1466 + (s1013 * s1464 - s1019 * s1462)
-    s1470 = s1467 + (s1016 * s1462 - s1013 * s1463)
-    s1471 = s929 * s1308 - s931 * s1307
-    s1472 = s931 * s1306 - s927 * s1308
-    s1473 = s927 * s1307 - s929 * s1306
-    s1474 = s927 * s1309 + s929 * s1310 + s931 * s1311
-    s1475 = s927 * s1310 + s929 * s1312 + s931 * s1313
-    s1476 = s927 * s1311 + s929 * s1313 + s931 * s1314
-    s1477 = s1474 + (s1100 * s1473 - s1101 * s1472)
-    s1478 = s1475 + (s1101 * s1471 - s1099 * s1473)
-    s1479 = s1476 + (s1099 * s1472 - s1100 * s1471)
-    s1480 = s1477 + (s1016 * s1473 - s1019 * s1472)
-    s1481 = s1478 + (s1019 * s1471 - s1013 * s1473)
-    s1482 = s1479 + (s1013 * s1472 - s1016 * s1471)
-    s1483 = s935 * s1293 - s937 * s1292
-    s1484 = s937 * s1291 - s933 * s1293
-    s1485 = s933 * s1292 - s935 * s1291
-    s1486 = s933 * s1294 + s935 * s1295 + s937 * s1296
-    s1487 = s933 * s1295 + s935 * s1297 + s937 * s1298
-    s1488 = s933 * s1296 + s935 * s1298 + s937 * s1299
-    s1489 = s1486 + (s1120 * s1485 - s1121 * s1484)
-    s1490 = s1487 + (s1121 * s1483 - s1119 * s1485)
-    s1491 = s1488 + (s1119 * s1484 - s1120 * s1483)
-    s1492 = s1489 + (s1046 * s1485 - s1047 * s1484)
-    s1493 = s1490 + (s1047 * s1483 - s1045 * s1485)
-    s1494 = s1491 + (s1045 * s1484 - s1046 * s1483)
-    s1495 = s941 * s1278 - s943 * s1277
-    s1496 = s943 * s1276 - s939 * s1278
-    s1497 = s939 * s1277 - s941 * s1276
-    s1498 = s939 * s1279 + s941 * s1280 + s943 * s1281
-    s1499 = s939 * s1280 + s941 * s1282 + s943 * s1283
-    s1500 = s939 * s1281 + s941 * s1283 + s943 * s1284
-    s1501 = s1498 + (s1140 * s1497 - s1141 * s1496)
-    s1502 = s1499 + (s1141 * s1495 - s1139 * s1497)
-    s1503 = s1500 + (s1139 * s1496 - s1140 * s1495)
-    s1504 = s1501 + (s1065 * s1497 - s1066 * s1496)
-    s1505 = s1502 + (s1066 * s1495 - s1064 * s1497)
-    s1506 = s1503 + (s1064 * s1496 - s1065 * s1495)
-    s1507 = s947 * s1263 - s949 * s1262
-    s1508 = s949 * s1261 - s945 * s1263
-    s1509 = s945 * s1262 - s947 * s1261
-    s1510 = s945 * s1264 + s947 * s1265 + s949 * s1266
-    s1511 = s945 * s1265 + s947 * s1267 + s949 * s1268
-    s1512 = s945 * s1266 + s947 * s1268 + s949 * s1269
-    s1513 = s1510 + (s1160 * s1509 - s1161 * s1508)
-    s1514 = s1511 + (s1161 * s1507 - s1159 * s1509)
-    s1515 = s1512 + (s1159 * s1508 - s1160 * s1507)
-    s1516 = s1513 + (s1019 * s1508 - s1016 * s1509)
-    s1517 = s1514 + (s1013 * s1509 - s1019 * s1507)
-    s1518 = s1515 + (s1016 * s1507 - s1013 * s1508)
-    s1519 = s931 * s1183 - s929 * s1184
-    s1520 = s927 * s1184 - s931 * s1182
-    s1521 = s929 * s1182 - s927 * s1183
-    s1522 = s927 * s1191 + s929 * s1195 + s931 * s1196
-    s1523 = s927 * s1195 + s929 * s1192 + s931 * s1197
-    s1524 = s927 * s1196 + s929 * s1197 + s931 * s1194
-    pivot_front_left_knee_angle_dot = k28 + (s927 * s1522 + s929 * s1523 + s931 * s1524)
-    s1525 = s1522 + (s1180 * s1521 - s1181 * s1520)
-    s1526 = s1523 + (s1181 * s1519 - s1179 * s1521)
-    s1527 = s1524 + (s1179 * s1520 - s1180 * s1519)
-    s1528 = s927 * s1525 + s929 * s1526 + s931 * s1527
-    s1529 = s1525 + (s1100 * s1521 - s1101 * s1520)
-    s1530 = s1526 + (s1101 * s1519 - s1099 * s1521)
-    s1531 = s1527 + (s1099 * s1520 - s1100 * s1519)
-    s1532 = s15 * s1529 + s18 * s1530 + s21 * s1531
-    s1533 = s1529 + (s1016 * s1521 - s1019 * s1520)
-    s1534 = s1530 + (s1019 * s1519 - s1013 * s1521)
-    s1535 = s1531 + (s1013 * s1520 - s1016 * s1519)
-    s1536 = s15 * s1533 + s18 * s1534 + s21 * s1535
-    s1537 = s16 * s1533 + s19 * s1534 + s22 * s1535
-    s1538 = s17 * s1533 + s20 * s1534 + s23 * s1535
-    s1539 = s937 * s1202 - s935 * s1203
-    s1540 = s933 * s1203 - s937 * s1201
-    s1541 = s935 * s1201 - s933 * s1202
-    s1542 = s933 * s1210 + s935 * s1214 + s937 * s1215
-    s1543 = s933 * s1214 + s935 * s1211 + s937 * s1216
-    s1544 = s933 * s1215 + s935 * s1216 + s937 * s1213
-    pivot_front_right_knee_angle_dot = k28 + (s933 * s1542 + s935 * s1543 + s937 * s1544)
-    s1545 = s1542 + (s1199 * s1541 - s1200 * s1540)
-    s1546 = s1543 + (s1200 * s1539 - s1198 * s1541)
-    s1547 = s1544 + (s1198 * s1540 - s1199 * s1539)
-    s1548 = s933 * s1545 + s935 * s1546 + s937 * s1547
-    s1549 = s1545 + (s1120 * s1541 - s1121 * s1540)
-    s1550 = s1546 + (s1121 * s1539 - s1119 * s1541)
-    s1551 = s1547 + (s1119 * s1540 - s1120 * s1539)
-    s1552 = s15 * s1549 + s18 * s1550 + s21 * s1551
-    s1553 = s1549 + (s1046 * s1541 - s1047 * s1540)
-    s1554 = s1550 + (s1047 * s1539 - s1045 * s1541)
-    s1555 = s1551 + (s1045 * s1540 - s1046 * s1539)
-    s1556 = s15 * s1553 + s18 * s1554 + s21 * s1555
-    s1557 = s16 * s1553 + s19 * s1554 + s22 * s1555
-    s1558 = s17 * s1553 + s20 * s1554 + s23 * s1555
-    s1559 = s943 * s1221 - s941 * s1222
-    s1560 = s939 * s1222 - s943 * s1220
-    s1561 = s941 * s1220 - s939 * s1221
-    s1562 = s939 * s1229 + s941 * s1233 + s943 * s1234
-    s1563 = s939 * s1233 + s941 * s1230 + s943 * s1235
-    s1564 = s939 * s1234 + s941 * s1235 + s943 * s1232
-    pivot_hind_left_knee_angle_dot = k28 + (s939 * s1562 + s941 * s1563 + s943 * s1564)
-    s1565 = s1562 + (s1218 * s1561 - s1219 * s1560)
-    s1566 = s1563 + (s1219 * s1559 - s1217 * s1561)
-    s1567 = s1564 + (s1217 * s1560 - s1218 * s1559)
-    s1568 = s939 * s1565 + s941 * s1566 + s943 * s1567
-    s1569 = s1565 + (s1140 * s1561 - s1141 * s1560)
-    s1570 = s1566 + (s1141 * s1559 - s1139 * s1561)
-    s1571 = s1567 + (s1139 * s1560 - s1140 * s1559)
-    s1572 = s15 * s1569 + s18 * s1570 + s21 * s1571
-    s1573 = s1569 + (s1065 * s1561 - s1066 * s1560)
-    s1574 = s1570 + (s1066 * s1559 - s1064 * s1561)
-    s1575 = s1571 + (s1064 * s1560 - s1065 * s1559)
-    s1576 = s15 * s1573 + s18 * s1574 + s21 * s1575
-    s1577 = s16 * s1573 + s19 * s1574 + s22 * s1575
-    s1578 = s17 * s1573 + s20 * s1574 + s23 * s1575
-    s1579 = s949 * s1240 - s947 * s1241
-    s1580 = s945 * s1241 - s949 * s1239
-    s1581 = s947 * s1239 - s945 * s1240
-    s1582 = s945 * s1248 + s947 * s1252 + s949 * s1253
-    s1583 = s945 * s1252 + s947 * s1249 + s949 * s1254
-    s1584 = s945 * s1253 + s947 * s1254 + s949 * s1251
-    pivot_hind_right_knee_angle_dot = k28 + (s945 * s1582 + s947 * s1583 + s949 * s1584)
-    s1585 = s1582 + (s1237 * s1581 - s1238 * s1580)
-    s1586 = s1583 + (s1238 * s1579 - s1236 * s1581)
-    s1587 = s1584 + (s1236 * s1580 - s1237 * s1579)
-    s1588 = s945 * s1585 + s947 * s1586 + s949 * s1587
-    s1589 = s1585 + (s1160 * s1581 - s1161 * s1580)
-    s1590 = s1586 + (s1161 * s1579 - s1159 * s1581)
-    s1591 = s1587 + (s1159 * s1580 - s1160 * s1579)
-    s1592 = s15 * s1589 + s18 * s1590 + s21 * s1591
-    s1593 = s1589 + (s1019 * s1580 - s1016 * s1581)
-    s1594 = s1590 + (s1013 * s1581 - s1019 * s1579)
-    s1595 = s1591 + (s1016 * s1579 - s1013 * s1580)
-    s1596 = s15 * s1593 + s18 * s1594 + s21 * s1595
-    s1597 = s16 * s1593 + s19 * s1594 + s22 * s1595
-    s1598 = s17 * s1593 + s20 * s1594 + s23 * s1595
-    s1599 = s1528 / pivot_front_left_knee_angle_dot
-    s1600 = s1532 / pivot_front_left_knee_angle_dot
-    s1601 = s1538 / pivot_front_left_knee_angle_dot
-    s1602 = s1537 / pivot_front_left_knee_angle_dot
-    s1603 = s1536 / pivot_front_left_knee_angle_dot
-    s1604 = s1521 / pivot_front_left_knee_angle_dot
-    s1605 = s1520 / pivot_front_left_knee_angle_dot
-    s1606 = s1519 / pivot_front_left_knee_angle_dot
-    pivot_front_left_swing_angle_dot = k1 + (s927 * s1474 + s929 * s1475 + s931 * s1476) - s1528 * s1599
-    s1607 = s15 * s1477 + s18 * s1478 + s21 * s1479 - s1532 * s1599
-    s1608 = s17 * s1480 + s20 * s1481 + s23 * s1482 - s1538 * s1599
-    s1609 = s16 * s1480 + s19 * s1481 + s22 * s1482 - s1537 * s1599
-    s1610 = s15 * s1480 + s18 * s1481 + s21 * s1482 - s1536 * s1599
-    s1611 = s1473 - s1521 * s1599
-    s1612 = s1472 - s1520 * s1599
-    s1613 = s1471 - s1519 * s1599
-    s1614 = s1548 / pivot_front_right_knee_angle_dot
-    s1615 = s1552 / pivot_front_right_knee_angle_dot
-    s1616 = s1558 / pivot_front_right_knee_angle_dot
-    s1617 = s1557 / pivot_front_right_knee_angle_dot
-    s1618 = s1556 / pivot_front_right_knee_angle_dot
-    s1619 = s1541 / pivot_front_right_knee_angle_dot
-    s1620 = s1540 / pivot_front_right_knee_angle_dot
-    s1621 = s1539 / pivot_front_right_knee_angle_dot
-    pivot_front_right_swing_angle_dot = k1 + (s933 * s1486 + s935 * s1487 + s937 * s1488) - s1548 * s1614
-    s1622 = s15 * s1489 + s18 * s1490 + s21 * s1491 - s1552 * s1614
-    s1623 = s17 * s1492 + s20 * s1493 + s23 * s1494 - s1558 * s1614
-    s1624 = s16 * s1492 + s19 * s1493 + s22 * s1494 - s1557 * s1614
-    s1625 = s15 * s1492 + s18 * s1493 + s21 * s1494 - s1556 * s1614
-    s1626 = s1485 - s1541 * s1614
-    s1627 = s1484 - s1540 * s1614
-    s1628 = s1483 - s1539 * s1614
-    s1629 = s1568 / pivot_hind_left_knee_angle_dot
-    s1630 = s1572 / pivot_hind_left_knee_angle_dot
-    s1631 = s1578 / pivot_hind_left_knee_angle_dot
-    s1632 = s1577 / pivot_hind_left_knee_angle_dot
-    s1633 = s1576 / pivot_hind_left_knee_angle_dot
-    s1634 = s1561 / pivot_hind_left_knee_angle_dot
-    s1635 = s1560 / pivot_hind_left_knee_angle_dot
-    s1636 = s1559 / pivot_hind_left_knee_angle_dot
-    pivot_hind_left_swing_angle_dot = k1 + (s939 * s1498 + s941 * s1499 + s943 * s1500) - s1568 * s1629
-    s1637 = s15 * s1501 + s18 * s1502 + s21 * s1503 - s1572 * s1629
-    s1638 = s17 * s1504 + s20 * s1505 + s23 * s1506 - s1578 * s1629
-    s1639 = s16 * s1504 + s19 * s1505 + s22 * s1506 - s1577 * s1629
-    s1640 = s15 * s1504 + s18 * s1505 + s21 * s1506 - s1576 * s1629
-    s1641 = s1497 - s1561 * s1629
-    s1642 = s1496 - s1560 * s1629
-    s1643 = s1495 - s1559 * s1629
-    s1644 = s17 * s1432 + s20 * s1433 + s23 * s1434 - s1538 * s1601 - s1558 * s1616 - s1578 * s1631
-    s1645 = s16 * s1432 + s19 * s1433 + s22 * s1434 - s1537 * s1601 - s1557 * s1616 - s1577 * s1631
-    s1646 = s15 * s1432 + s18 * s1433 + s21 * s1434 - s1536 * s1601 - s1556 * s1616 - s1576 * s1631
-    s1647 = s16 * s1426 + s19 * s1427 + s22 * s1428 - s1537 * s1602 - s1557 * s1617 - s1577 * s1632
-    s1648 = s15 * s1426 + s18 * s1427 + s21 * s1428 - s1536 * s1602 - s1556 * s1617 - s1576 * s1632
-    s1649 = s15 * s1420 + s18 * s1421 + s21 * s1422 - s1536 * s1603 - s1556 * s1618 - s1576 * s1633
-    s1650 = s1588 / pivot_hind_right_knee_angle_dot
-    s1651 = s1592 / pivot_hind_right_knee_angle_dot
-    s1652 = s1598 / pivot_hind_right_knee_angle_dot
-    s1653 = s1597 / pivot_hind_right_knee_angle_dot
-    s1654 = s1596 / pivot_hind_right_knee_angle_dot
-    s1655 = s1581 / pivot_hind_right_knee_angle_dot
-    s1656 = s1580 / pivot_hind_right_knee_angle_dot
-    s1657 = s1579 / pivot_hind_right_knee_angle_dot
-    pivot_hind_right_swing_angle_dot = k1 + (s945 * s1510 + s947 * s1511 + s949 * s1512) - s1588 * s1650
-    s1658 = s15 * s1513 + s18 * s1514 + s21 * s1515 - s1592 * s1650
-    s1659 = s17 * s1516 + s20 * s1517 + s23 * s1518 - s1598 * s1650
-    s1660 = s16 * s1516 + s19 * s1517 + s22 * s1518 - s1597 * s1650
-    s1661 = s15 * s1516 + s18 * s1517 + s21 * s1518 - s1596 * s1650
-    s1662 = s1509 - s1581 * s1650
-    s1663 = s1508 - s1580 * s1650
-    s1664 = s1507 - s1579 * s1650
-    s1665 = s1607 / pivot_front_left_swing_angle_dot
-    s1666 = s1608 / pivot_front_left_swing_angle_dot
-    s1667 = s1609 / pivot_front_left_swing_angle_dot
-    s1668 = s1610 / pivot_front_left_swing_angle_dot
-    s1669 = s1611 / pivot_front_left_swing_angle_dot
-    s1670 = s1612 / pivot_front_left_swing_angle_dot
-    s1671 = s1613 / pivot_front_left_swing_angle_dot
-    pivot_front_left_abduction_angle_dot = k1 + (s15 * s1438 + s18 * s1439 + s21 * s1440) - s1532 * s1600 - s1607 * s1665
-    s1672 = s17 * s1441 + s20 * s1442 + s23 * s1443 - s1538 * s1600 - s1608 * s1665
-    s1673 = s16 * s1441 + s19 * s1442 + s22 * s1443 - s1537 * s1600 - s1609 * s1665
-    s1674 = s15 * s1441 + s18 * s1442 + s21 * s1443 - s1536 * s1600 - s1610 * s1665
-    s1675 = s1437 - s1521 * s1600 - s1611 * s1665
-    s1676 = s1436 - s1520 * s1600 - s1612 * s1665
-    s1677 = s1435 - s1519 * s1600 - s1613 * s1665
-    s1678 = s1431 - s1521 * s1601 - s1541 * s1616 - s1561 * s1631 - s1581 * s1652 - s1611 * s1666
-    s1679 = s1430 - s1520 * s1601 - s1540 * s1616 - s1560 * s1631 - s1580 * s1652 - s1612 * s1666
-    s1680 = s1429 - s1519 * s1601 - s1539 * s1616 - s1559 * s1631 - s1579 * s1652 - s1613 * s1666
-    s1681 = s1425 - s1521 * s1602 - s1541 * s1617 - s1561 * s1632 - s1581 * s1653 - s1611 * s1667
-    s1682 = s1424 - s1520 * s1602 - s1540 * s1617 - s1560 * s1632 - s1580 * s1653 - s1612 * s1667
-    s1683 = s1423 - s1519 * s1602 - s1539 * s1617 - s1559 * s1632 - s1579 * s1653 - s1613 * s1667
-    s1684 = s1419 - s1521 * s1603 - s1541 * s1618 - s1561 * s1633 - s1581 * s1654 - s1611 * s1668
-    s1685 = s1418 - s1520 * s1603 - s1540 * s1618 - s1560 * s1633 - s1580 * s1654 - s1612 * s1668
-    s1686 = s1417 - s1519 * s1603 - s1539 * s1618 - s1559 * s1633 - s1579 * s1654 - s1613 * s1668
-    s1687 = k30 - s1521 * s1604 - s1541 * s1619 - s1561 * s1634 - s1581 * s1655 - s1611 * s1669
-    s1688 = s1520 * s1604 + s1540 * s1619 + s1560 * s1634 + s1580 * s1655 + s1612 * s1669
-    s1689 = s1519 * s1604 + s1539 * s1619 + s1559 * s1634 + s1579 * s1655 + s1613 * s1669
-    s1690 = k30 - s1520 * s1605 - s1540 * s1620 - s1560 * s1635 - s1580 * s1656 - s1612 * s1670
-    s1691 = s1519 * s1605 + s1539 * s1620 + s1559 * s1635 + s1579 * s1656 + s1613 * s1670
-    s1692 = k30 - s1519 * s1606 - s1539 * s1621 - s1559 * s1636 - s1579 * s1657 - s1613 * s1671
-    s1693 = s1622 / pivot_front_right_swing_angle_dot
-    s1694 = s1623 / pivot_front_right_swing_angle_dot
-    s1695 = s1624 / pivot_front_right_swing_angle_dot
-    s1696 = s1625 / pivot_front_right_swing_angle_dot
-    s1697 = s1626 / pivot_front_right_swing_angle_dot
-    s1698 = s1627 / pivot_front_right_swing_angle_dot
-    s1699 = s1628 / pivot_front_right_swing_angle_dot
-    pivot_front_right_abduction_angle_dot = k1 + (s15 * s1447 + s18 * s1448 + s21 * s1449) - s1552 * s1615 - s1622 * s1693
-    s1700 = s17 * s1450 + s20 * s1451 + s23 * s1452 - s1558 * s1615 - s1623 * s1693
-    s1701 = s16 * s1450 + s19 * s1451 + s22 * s1452 - s1557 * s1615 - s1624 * s1693
-    s1702 = s15 * s1450 + s18 * s1451 + s21 * s1452 - s1556 * s1615 - s1625 * s1693
-    s1703 = s1446 - s1541 * s1615 - s1626 * s1693
-    s1704 = s1445 - s1540 * s1615 - s1627 * s1693
-    s1705 = s1444 - s1539 * s1615 - s1628 * s1693
-    s1706 = s1637 / pivot_hind_left_swing_angle_dot
-    s1707 = s1638 / pivot_hind_left_swing_angle_dot
-    s1708 = s1639 / pivot_hind_left_swing_angle_dot
-    s1709 = s1640 / pivot_hind_left_swing_angle_dot
-    s1710 = s1641 / pivot_hind_left_swing_angle_dot
-    s1711 = s1642 / pivot_hind_left_swing_angle_dot
-    s1712 = s1643 / pivot_hind_left_swing_angle_dot
-    pivot_hind_left_abduction_angle_dot = k1 + (s15 * s1456 + s18 * s1457 + s21 * s1458) - s1572 * s1630 - s1637 * s1706
-    s1713 = s17 * s1459 + s20 * s1460 + s23 * s1461 - s1578 * s1630 - s1638 * s1706
-    s1714 = s16 * s1459 + s19 * s1460 + s22 * s1461 - s1577 * s1630 - s1639 * s1706
-    s1715 = s15 * s1459 + s18 * s1460 + s21 * s1461 - s1576 * s1630 - s1640 * s1706
-    s1716 = s1455 - s1561 * s1630 - s1641 * s1706
-    s1717 = s1454 - s1560 * s1630 - s1642 * s1706
-    s1718 = s1453 - s1559 * s1630 - s1643 * s1706
-    s1719 = s1658 / pivot_hind_right_swing_angle_dot
-    s1720 = s1659 / pivot_hind_right_swing_angle_dot
-    s1721 = s1660 / pivot_hind_right_swing_angle_dot
-    s1722 = s1661 / pivot_hind_right_swing_angle_dot
-    s1723 = s1662 / pivot_hind_right_swing_angle_dot
-    s1724 = s1663 / pivot_hind_right_swing_angle_dot
-    s1725 = s1664 / pivot_hind_right_swing_angle_dot
-    pivot_hind_right_abduction_angle_dot = k1 + (s15 * s1465 + s18 * s1466 + s21 * s1467) - s1592 * s1651 - s1658 * s1719
-    s1726 = s17 * s1468 + s20 * s1469 + s23 * s1470 - s1598 * s1651 - s1659 * s1719
-    s1727 = s16 * s1468 + s19 * s1469 + s22 * s1470 - s1597 * s1651 - s1660 * s1719
-    s1728 = s15 * s1468 + s18 * s1469 + s21 * s1470 - s1596 * s1651 - s1661 * s1719
-    s1729 = s1464 - s1581 * s1651 - s1662 * s1719
-    s1730 = s1463 - s1580 * s1651 - s1663 * s1719
-    s1731 = s1462 - s1579 * s1651 - s1664 * s1719
-    s1732 = s1644 - s1598 * s1652 - s1608 * s1666 - s1623 * s1694 - s1638 * s1707 - s1659 * s1720
-    s1733 = s1645 - s1597 * s1652 - s1609 * s1666 - s1624 * s1694 - s1639 * s1707 - s1660 * s1720
-    s1734 = s1646 - s1596 * s1652 - s1610 * s1666 - s1625 * s1694 - s1640 * s1707 - s1661 * s1720
-    s1735 = s1647 - s1597 * s1653 - s1609 * s1667 - s1624 * s1695 - s1639 * s1708 - s1660 * s1721
-    s1736 = s1648 - s1596 * s1653 - s1610 * s1667 - s1625 * s1695 - s1640 * s1708 - s1661 * s1721
-    s1737 = s1649 - s1596 * s1654 - s1610 * s1668 - s1625 * s1696 - s1640 * s1709 - s1661 * s1722
-    s1738 = s1672 / pivot_front_left_abduction_angle_dot
-    s1739 = s1673 / pivot_front_left_abduction_angle_dot
-    s1740 = s1674 / pivot_front_left_abduction_angle_dot
-    s1741 = s1675 / pivot_front_left_abduction_angle_dot
-    s1742 = s1676 / pivot_front_left_abduction_angle_dot
-    s1743 = s1677 / pivot_front_left_abduction_angle_dot
-    s1744 = s1700 / pivot_front_right_abduction_angle_dot
-    s1745 = s1701 / pivot_front_right_abduction_angle_dot
-    s1746 = s1702 / pivot_front_right_abduction_angle_dot
-    s1747 = s1703 / pivot_front_right_abduction_angle_dot
-    s1748 = s1704 / pivot_front_right_abduction_angle_dot
-    s1749 = s1705 / pivot_front_right_abduction_angle_dot
-    s1750 = s1678 - s1626 * s1694 - s1641 * s1707 - s1662 * s1720 - s1675 * s1738 - s1703 * s1744
-    s1751 = s1679 - s1627 * s1694 - s1642 * s1707 - s1663 * s1720 - s1676 * s1738 - s1704 * s1744
-    s1752 = s1680 - s1628 * s1694 - s1643 * s1707 - s1664 * s1720 - s1677 * s1738 - s1705 * s1744
-    s1753 = s1681 - s1626 * s1695 - s1641 * s1708 - s1662 * s1721 - s1675 * s1739 - s1703 * s1745
-    s1754 = s1682 - s1627 * s1695 - s1642 * s1708 - s1663 * s1721 - s1676 * s1739 - s1704 * s1745
-    s1755 = s1683 - s1628 * s1695 - s1643 * s1708 - s1664 * s1721 - s1677 * s1739 - s1705 * s1745
-    s1756 = s1684 - s1626 * s1696 - s1641 * s1709 - s1662 * s1722 - s1675 * s1740 - s1703 * s1746
-    s1757 = s1685 - s1627 * s1696 - s1642 * s1709 - s1663 * s1722 - s1676 * s1740 - s1704 * s1746
-    s1758 = s1686 - s1628 * s1696 - s1643 * s1709 - s1664 * s1722 - s1677 * s1740 - s1705 * s1746
-    s1759 = s1687 - s1626 * s1697 - s1641 * s1710 - s1662 * s1723 - s1675 * s1741 - s1703 * s1747
-    s1760 = s1688 + s1627 * s1697 + s1642 * s1710 + s1663 * s1723 + s1676 * s1741 + s1704 * s1747
-    s1761 = s1689 + s1628 * s1697 + s1643 * s1710 + s1664 * s1723 + s1677 * s1741 + s1705 * s1747
-    s1762 = s1690 - s1627 * s1698 - s1642 * s1711 - s1663 * s1724 - s1676 * s1742 - s1704 * s1748
-    s1763 = s1691 + s1628 * s1698 + s1643 * s1711 + s1664 * s1724 + s1677 * s1742 + s1705 * s1748
-    s1764 = s1692 - s1628 * s1699 - s1643 * s1712 - s1664 * s1725 - s1677 * s1743 - s1705 * s1749
-    s1765 = s1713 / pivot_hind_left_abduction_angle_dot
-    s1766 = s1714 / pivot_hind_left_abduction_angle_dot
-    s1767 = s1715 / pivot_hind_left_abduction_angle_dot
-    s1768 = s1716 / pivot_hind_left_abduction_angle_dot
-    s1769 = s1717 / pivot_hind_left_abduction_angle_dot
-    s1770 = s1718 / pivot_hind_left_abduction_angle_dot
-    s1771 = s1726 / pivot_hind_right_abduction_angle_dot
-    s1772 = s1727 / pivot_hind_right_abduction_angle_dot
-    s1773 = s1728 / pivot_hind_right_abduction_angle_dot
-    s1774 = s1729 / pivot_hind_right_abduction_angle_dot
-    s1775 = s1730 / pivot_hind_right_abduction_angle_dot
-    s1776 = s1731 / pivot_hind_right_abduction_angle_dot
-    pivot_trunk_wz = s1732 - s1672 * s1738 - s1700 * s1744 - s1713 * s1765 - s1726 * s1771
-    s1777 = s1733 - s1673 * s1738 - s1701 * s1744 - s1714 * s1765 - s1727 * s1771
-    s1778 = s1734 - s1674 * s1738 - s1702 * s1744 - s1715 * s1765 - s1728 * s1771
-    s1779 = s1750 - s1716 * s1765 - s1729 * s1771
-    s1780 = s1751 - s1717 * s1765 - s1730 * s1771
-    s1781 = s1752 - s1718 * s1765 - s1731 * s1771
-    s1782 = s1777 / pivot_trunk_wz
-    s1783 = s1778 / pivot_trunk_wz
-    s1784 = s1779 / pivot_trunk_wz
-    s1785 = s1780 / pivot_trunk_wz
-    s1786 = s1781 / pivot_trunk_wz
-    pivot_trunk_wy = s1735 - s1673 * s1739 - s1701 * s1745 - s1714 * s1766 - s1727 * s1772 - s1777 * s1782
-    s1787 = s1736 - s1674 * s1739 - s1702 * s1745 - s1715 * s1766 - s1728 * s1772 - s1778 * s1782
-    s1788 = s1753 - s1716 * s1766 - s1729 * s1772 - s1779 * s1782
-    s1789 = s1754 - s1717 * s1766 - s1730 * s1772 - s1780 * s1782
-    s1790 = s1755 - s1718 * s1766 - s1731 * s1772 - s1781 * s1782
-    s1791 = s1737 - s1674 * s1740 - s1702 * s1746 - s1715 * s1767 - s1728 * s1773 - s1778 * s1783
-    s1792 = s1787 / pivot_trunk_wy
-    s1793 = s1788 / pivot_trunk_wy
-    s1794 = s1789 / pivot_trunk_wy
-    s1795 = s1790 / pivot_trunk_wy
-    pivot_trunk_wx = s1791 - s1787 * s1792
-    s1796 = s1756 - s1716 * s1767 - s1729 * s1773 - s1779 * s1783 - s1788 * s1792
-    s1797 = s1757 - s1717 * s1767 - s1730 * s1773 - s1780 * s1783 - s1789 * s1792
-    s1798 = s1758 - s1718 * s1767 - s1731 * s1773 - s1781 * s1783 - s1790 * s1792
-    s1799 = s1796 / pivot_trunk_wx
-    s1800 = s1797 / pivot_trunk_wx
-    s1801 = s1798 / pivot_trunk_wx
-    pivot_trunk_z_dot = s1759 - s1716 * s1768 - s1729 * s1774 - s1779 * s1784 - s1788 * s1793 - s1796 * s1799
-    s1802 = s1760 + s1717 * s1768 + s1730 * s1774 + s1780 * s1784 + s1789 * s1793 + s1797 * s1799
-    s1803 = s1761 + s1718 * s1768 + s1731 * s1774 + s1781 * s1784 + s1790 * s1793 + s1798 * s1799
-    s1804 = s1762 - s1717 * s1769 - s1730 * s1775 - s1780 * s1785 - s1789 * s1794 - s1797 * s1800
-    s1805 = s1763 + s1718 * s1769 + s1731 * s1775 + s1781 * s1785 + s1790 * s1794 + s1798 * s1800
-    s1806 = s1764 - s1718 * s1770 - s1731 * s1776 - s1781 * s1786 - s1790 * s1795 - s1798 * s1801
-    s1807 = s1802 / pivot_trunk_z_dot
-    s1808 = s1803 / pivot_trunk_z_dot
-    pivot_trunk_y_dot = s1804 - s1802 * s1807
-    s1809 = s1805 + s1803 * s1807
-    s1810 = s1809 / pivot_trunk_y_dot
-    pivot_trunk_x_dot = s1806 - s1803 * s1808 - s1809 * s1810
+    s602 = omega_hind_right_thigh_x * omega_hind_right_thigh_y
+    s603 = omega_hind_right_thigh_z * omega_hind_right_thigh_x
+    s604 = omega_hind_right_thigh_z * omega_hind_right_thigh_y
+    s605 = s602 - s601
+    s606 = s558 + s603
+    s607 = s604 - s600
+    s608 = omega_hind_right_thigh_x_squared + omega_hind_right_thigh_y_squared
+    s609 = bias_front_left_thigh_x + k4 * s573
+    bias_front_left_shank_y = bias_front_left_thigh_y + k4 * s574
+    s610 = bias_front_left_thigh_z - k4 * s575
+    bias_front_left_shank_x = cos_front_left_knee_angle * s609 - sin_front_left_knee_angle * s610
+    s611 = cos_front_left_knee_angle * s567 - sin_front_left_knee_angle * s568 - front_left_knee_angle_dot * omega_front_left_shank_z
+    s612 = cos_front_left_knee_angle * s568 + sin_front_left_knee_angle * s567 + front_left_knee_angle_dot * omega_front_left_shank_x
+    s613 = omega_front_left_shank_z * omega_front_left_shank_x
+    s614 = omega_front_left_shank_z * omega_front_left_shank_y
+    s615 = omega_front_left_shank_x * omega_front_left_shank_x + omega_front_left_shank_y * omega_front_left_shank_y
+    s616 = bias_front_right_thigh_x + k4 * s584
+    bias_front_right_shank_y = bias_front_right_thigh_y + k4 * s585
+    s617 = bias_front_right_thigh_z - k4 * s586
+    bias_front_right_shank_x = cos_front_right_knee_angle * s616 - sin_front_right_knee_angle * s617
+    s618 = cos_front_right_knee_angle * s578 - sin_front_right_knee_angle * s579 - front_right_knee_angle_dot * omega_front_right_shank_z
+    s619 = cos_front_right_knee_angle * s579 + sin_front_right_knee_angle * s578 + front_right_knee_angle_dot * omega_front_right_shank_x
+    s620 = omega_front_right_shank_z * omega_front_right_shank_x
+    s621 = omega_front_right_shank_z * omega_front_right_shank_y
+    s622 = omega_front_right_shank_x * omega_front_right_shank_x + omega_front_right_shank_y * omega_front_right_shank_y
+    s623 = bias_hind_left_thigh_x + k4 * s595
+    bias_hind_left_shank_y = bias_hind_left_thigh_y + k4 * s596
+    s624 = bias_hind_left_thigh_z - k4 * s597
+    bias_hind_left_shank_x = cos_hind_left_knee_angle * s623 - sin_hind_left_knee_angle * s624
+    s625 = cos_hind_left_knee_angle * s589 - sin_hind_left_knee_angle * s590 - hind_left_knee_angle_dot * omega_hind_left_shank_z
+    s626 = cos_hind_left_knee_angle * s590 + sin_hind_left_knee_angle * s589 + hind_left_knee_angle_dot * omega_hind_left_shank_x
+    s627 = omega_hind_left_shank_z * omega_hind_left_shank_x
+    s628 = omega_hind_left_shank_z * omega_hind_left_shank_y
+    s629 = omega_hind_left_shank_x * omega_hind_left_shank_x + omega_hind_left_shank_y * omega_hind_left_shank_y
+    s630 = bias_hind_right_thigh_x + k4 * s606
+    bias_hind_right_shank_y = bias_hind_right_thigh_y + k4 * s607
+    s631 = bias_hind_right_thigh_z - k4 * s608
+    bias_hind_right_shank_x = cos_hind_right_knee_angle * s630 - sin_hind_right_knee_angle * s631
+    s632 = cos_hind_right_knee_angle * s600 - sin_hind_right_knee_angle * s601 - hind_right_knee_angle_dot * omega_hind_right_shank_z
+    s633 = cos_hind_right_knee_angle * s601 + sin_hind_right_knee_angle * s600 + hind_right_knee_angle_dot * omega_hind_right_shank_x
+    s634 = omega_hind_right_shank_z * omega_hind_right_shank_x
+    s635 = omega_hind_right_shank_z * omega_hind_right_shank_y
+    s636 = omega_hind_right_shank_x * omega_hind_right_shank_x + omega_hind_right_shank_y * omega_hind_right_shank_y
+    s637 = I_hip_yz * (omega_front_left_hip_z_squared - omega_front_left_hip_y_squared)
+    s638 = I_hip_xz * (omega_front_left_hip_x_squared - omega_front_left_hip_z_squared)
+    s639 = I_hip_xy * (omega_front_left_hip_y_squared - omega_front_left_hip_x_squared)
+    s640 = I_hip_yz * (s532 + s535) - I_hip_xz * s536 - s639 - inertia_front_left_hip_zz * s533
+    s641 = moment_front_left_hip_y * bias_front_left_hip_z + (I_hip_xz * (s534 - s533) - I_hip_xy * (s535 - s532) - s637 + s536 * k19)
+    s642 = m_hip * bias_hind_left_hip_x
+    s643 = moment_front_left_hip_y * bias_hind_left_hip_x
+    s644 = I_hip_yz * (omega_front_right_hip_z_squared - omega_front_right_hip_y_squared)
+    s645 = I_hip_xz * (omega_front_right_hip_x_squared - omega_front_right_hip_z_squared)
+    s646 = I_hip_xy * (omega_front_right_hip_y_squared - omega_front_right_hip_x_squared)
+    s647 = s646 - (I_hip_xz * s545 + I_hip_yz * (s541 + s544)) - inertia_front_left_hip_zz * s542
+    s648 = I_hip_xy * (s544 - s541) + I_hip_xz * (s543 - s542) + s644 + s545 * k19 - moment_front_left_hip_y * bias_front_right_hip_z
+    s649 = I_hip_yz * (omega_hind_left_hip_z_squared - omega_hind_left_hip_y_squared)
+    s650 = I_hip_xz * (omega_hind_left_hip_x_squared - omega_hind_left_hip_z_squared)
+    s651 = I_hip_xy * (omega_hind_left_hip_y_squared - omega_hind_left_hip_x_squared)
+    s652 = I_hip_yz * (s549 + s552) - I_hip_xz * s553 - s651 - inertia_front_left_hip_zz * s550
+    s653 = moment_front_left_hip_y * bias_hind_left_hip_z + (I_hip_xz * (s551 - s550) - I_hip_xy * (s552 - s549) - s649 + s553 * k19)
+    s654 = I_hip_yz * (omega_hind_right_hip_z_squared - omega_hind_right_hip_y_squared)
+    s655 = I_hip_xz * (omega_hind_right_hip_x_squared - omega_hind_right_hip_z_squared)
+    s656 = I_hip_xy * (omega_hind_right_hip_y_squared - omega_hind_right_hip_x_squared)
+    s657 = s656 - (I_hip_xz * s562 + I_hip_yz * (s558 + s561)) - inertia_front_left_hip_zz * s559
+    s658 = moment_front_left_hip_y * s557 + (I_hip_xy * (s561 - s558) + I_hip_xz * (s560 - s559) + s654 + s562 * k19)
+    s659 = moment_front_left_thigh_y * (omega_front_left_thigh_x_squared + omega_front_left_thigh_z_squared)
+    s660 = m_thigh * bias_front_left_thigh_x + (moment_front_left_thigh_y * s572 - k5 * s573)
+    s661 = m_thigh * bias_front_left_thigh_z + (moment_front_left_thigh_y * (s567 + s571) + k5 * s575)
+    s662 = moment_front_left_thigh_y * bias_front_left_thigh_z + k5 * bias_front_left_thigh_y
+    s663 = inertia_front_left_thigh_yz * (omega_front_left_thigh_z_squared - omega_front_left_thigh_y_squared)
+    s664 = inertia_front_left_thigh_yy * s532 - inertia_front_left_thigh_yz * s572 + s570 * k23
+    s665 = inertia_front_left_thigh_yz * s573 + inertia_front_left_thigh_zz * s568 + s569 * k24
+    s666 = moment_front_left_thigh_y * (omega_front_right_thigh_x_squared + omega_front_right_thigh_z_squared)
+    s667 = m_thigh * bias_front_right_thigh_x - (moment_front_left_thigh_y * s583 + k5 * s584)
+    s668 = m_thigh * bias_front_right_thigh_z + (k5 * s586 - moment_front_left_thigh_y * (s578 + s582))
+    s669 = k5 * bias_front_right_thigh_y - moment_front_left_thigh_y * bias_front_right_thigh_z
+    s670 = inertia_front_left_thigh_yz * (omega_front_right_thigh_z_squared - omega_front_right_thigh_y_squared)
+    s671 = inertia_front_left_thigh_yz * s583 + inertia_front_left_thigh_yy * s541 + s581 * k23
+    s672 = inertia_front_left_thigh_zz * s579 - inertia_front_left_thigh_yz * s584 + s580 * k24
+    s673 = moment_front_left_thigh_y * (omega_hind_left_thigh_x_squared + omega_hind_left_thigh_z_squared)
+    s674 = m_thigh * bias_hind_left_thigh_x + (moment_front_left_thigh_y * s594 - k5 * s595)
+    s675 = m_thigh * bias_hind_left_thigh_z + (moment_front_left_thigh_y * (s589 + s593) + k5 * s597)
+    s676 = moment_front_left_thigh_y * bias_hind_left_thigh_z + k5 * bias_hind_left_thigh_y
+    s677 = inertia_front_left_thigh_yz * (omega_hind_left_thigh_z_squared - omega_hind_left_thigh_y_squared)
+    s678 = inertia_front_left_thigh_yy * s549 - inertia_front_left_thigh_yz * s594 + s592 * k23
+    s679 = inertia_front_left_thigh_yz * s595 + inertia_front_left_thigh_zz * s590 + s591 * k24
+    s680 = moment_front_left_thigh_y * (omega_hind_right_thigh_x_squared + omega_hind_right_thigh_z_squared)
+    s681 = m_thigh * bias_hind_right_thigh_x - (moment_front_left_thigh_y * s605 + k5 * s606)
+    s682 = m_thigh * bias_hind_right_thigh_z + (k5 * s608 - moment_front_left_thigh_y * (s600 + s604))
+    s683 = k5 * bias_hind_right_thigh_y - moment_front_left_thigh_y * bias_hind_right_thigh_z
+    s684 = inertia_front_left_thigh_yz * (omega_hind_right_thigh_z_squared - omega_hind_right_thigh_y_squared)
+    s685 = inertia_front_left_thigh_yz * s605 + inertia_front_left_thigh_yy * s558 + s603 * k23
+    s686 = inertia_front_left_thigh_zz * s601 - inertia_front_left_thigh_yz * s606 + s602 * k24
+    s687 = m_shank * (cos_front_left_knee_angle * s610 + sin_front_left_knee_angle * s609)
+    s688 = m_shank * bias_front_left_shank_y - k6 * (s614 - s611)
+    s689 = s687 + k6 * s615
+    s690 = k6 * bias_front_left_shank_x
+    s691 = inertia_front_left_shank_yy * s532 + s613 * k26
+    s692 = I_shank_z * s612 + omega_front_left_shank_x * omega_front_left_shank_y * k27
+    s693 = k6 * bias_front_left_shank_y + (inertia_front_left_shank_xx * s611 + s614 * k25)
+    s694 = m_shank * (cos_front_right_knee_angle * s617 + sin_front_right_knee_angle * s616)
+    s695 = m_shank * bias_front_right_shank_y - k6 * (s621 - s618)
+    s696 = s694 + k6 * s622
+    s697 = k6 * bias_front_right_shank_x
+    s698 = inertia_front_left_shank_yy * s541 + s620 * k26
+    s699 = I_shank_z * s619 + omega_front_right_shank_x * omega_front_right_shank_y * k27
+    s700 = k6 * bias_front_right_shank_y + (inertia_front_left_shank_xx * s618 + s621 * k25)
+    s701 = m_shank * (cos_hind_left_knee_angle * s624 + sin_hind_left_knee_angle * s623)
+    s702 = m_shank * bias_hind_left_shank_y - k6 * (s628 - s625)
+    s703 = s701 + k6 * s629
+    s704 = k6 * bias_hind_left_shank_x
+    s705 = inertia_front_left_shank_yy * s549 + s627 * k26
+    s706 = I_shank_z * s626 + omega_hind_left_shank_x * omega_hind_left_shank_y * k27
+    s707 = k6 * bias_hind_left_shank_y + (inertia_front_left_shank_xx * s625 + s628 * k25)
+    s708 = m_shank * (cos_hind_right_knee_angle * s631 + sin_hind_right_knee_angle * s630)
+    s709 = m_shank * bias_hind_right_shank_y - k6 * (s635 - s632)
+    s710 = s708 + k6 * s636
+    s711 = k6 * bias_hind_right_shank_x
+    s712 = inertia_front_left_shank_yy * s558 + s634 * k26
+    s713 = I_shank_z * s633 + omega_hind_right_shank_x * omega_hind_right_shank_y * k27
+    s714 = k6 * bias_hind_right_shank_y + (inertia_front_left_shank_xx * s632 + s635 * k25)
+    s715 = s711 - s712
+    s716 = m_shank * bias_hind_right_shank_x - k6 * (s558 + s634) - k8 * s715
+    s717 = sin_hind_right_knee_angle * s710 + cos_hind_right_knee_angle * s716
+    s718 = sin_hind_right_knee_angle * s713 + cos_hind_right_knee_angle * s714 - k4 * s709
+    s719 = s683 + (s684 + inertia_front_left_thigh_xx * s600 + s604 * k22) + s718
+    s720 = s685 - k5 * bias_hind_right_thigh_x + (s712 - s711 + k7 * s715 + k4 * s717)
+    s721 = moment_front_left_thigh_y * bias_hind_right_thigh_x + s686 + (cos_hind_right_knee_angle * s713 - sin_hind_right_knee_angle * s714)
+    s722 = s682 + (cos_hind_right_knee_angle * s710 - sin_hind_right_knee_angle * s716)
+    s723 = s704 - s705
+    s724 = m_shank * bias_hind_left_shank_x - k6 * (s549 + s627) - k8 * s723
+    s725 = sin_hind_left_knee_angle * s703 + cos_hind_left_knee_angle * s724
+    s726 = sin_hind_left_knee_angle * s706 + cos_hind_left_knee_angle * s707 - k4 * s702
+    s727 = s676 + (inertia_front_left_thigh_xx * s589 - s677 + s593 * k22) + s726
+    s728 = s678 - k5 * bias_hind_left_thigh_x + (s705 - s704 + k7 * s723 + k4 * s725)
+    s729 = s679 - moment_front_left_thigh_y * bias_hind_left_thigh_x + (cos_hind_left_knee_angle * s706 - sin_hind_left_knee_angle * s707)
+    s730 = s675 + (cos_hind_left_knee_angle * s703 - sin_hind_left_knee_angle * s724)
+    s731 = s697 - s698
+    s732 = m_shank * bias_front_right_shank_x - k6 * (s541 + s620) - k8 * s731
+    s733 = sin_front_right_knee_angle * s696 + cos_front_right_knee_angle * s732
+    s734 = sin_front_right_knee_angle * s699 + cos_front_right_knee_angle * s700 - k4 * s695
+    s735 = s669 + (s670 + inertia_front_left_thigh_xx * s578 + s582 * k22) + s734
+    s736 = s671 - k5 * bias_front_right_thigh_x + (s698 - s697 + k7 * s731 + k4 * s733)
+    s737 = moment_front_left_thigh_y * bias_front_right_thigh_x + s672 + (cos_front_right_knee_angle * s699 - sin_front_right_knee_angle * s700)
+    s738 = s668 + (cos_front_right_knee_angle * s696 - sin_front_right_knee_angle * s732)
+    s739 = s690 - s691
+    s740 = m_shank * bias_front_left_shank_x - k6 * (s532 + s613) - k8 * s739
+    s741 = sin_front_left_knee_angle * s689 + cos_front_left_knee_angle * s740
+    s742 = sin_front_left_knee_angle * s692 + cos_front_left_knee_angle * s693 - k4 * s688
+    s743 = s662 + (inertia_front_left_thigh_xx * s567 - s663 + s571 * k22) + s742
+    s744 = s664 - k5 * bias_front_left_thigh_x + (s691 - s690 + k7 * s739 + k4 * s741)
+    s745 = s665 - moment_front_left_thigh_y * bias_front_left_thigh_x + (cos_front_left_knee_angle * s692 - sin_front_left_knee_angle * s693)
+    s746 = s661 + (cos_front_left_knee_angle * s689 - sin_front_left_knee_angle * s740)
+    s747 = s721 + s101 * s720
+    s748 = s681 + s717 - s102 * s720
+    s749 = s722 - s103 * s720
+    s750 = cos_hind_right_swing_angle * s749 - sin_hind_right_swing_angle * s748
+    s751 = sin_hind_right_swing_angle * s749 + cos_hind_right_swing_angle * s748
+    s752 = sin_hind_right_swing_angle * s747 + cos_hind_right_swing_angle * s719 + k3 * s750
+    s753 = cos_hind_right_swing_angle * s747 - sin_hind_right_swing_angle * s719 - k3 * s751
+    s754 = s658 + s752
+    s755 = I_hip_yz * s563 - I_hip_xy * s562 - s655 + I_hip_yy * s558 + s561 * k20 + (s720 - s100 * s720)
+    s756 = moment_front_left_hip_y * bias_hind_right_hip_x + (s657 + s560 * k21) + s753
+    s757 = m_hip * bias_hind_right_hip_y + moment_front_left_hip_y * s564 + (m_thigh * bias_hind_right_thigh_y + (s680 - k5 * s607) + s709)
+    s758 = s729 - s138 * s728
+    s759 = s674 + s725 - s139 * s728
+    s760 = s730 - s140 * s728
+    s761 = cos_hind_left_swing_angle * s760 - sin_hind_left_swing_angle * s759
+    s762 = sin_hind_left_swing_angle * s760 + cos_hind_left_swing_angle * s759
+    s763 = sin_hind_left_swing_angle * s758 + cos_hind_left_swing_angle * s727 + k2 * s761
+    s764 = cos_hind_left_swing_angle * s758 - sin_hind_left_swing_angle * s727 - k2 * s762
+    s765 = s653 + s763
+    s766 = I_hip_xy * s553 - I_hip_yz * s554 - s650 + I_hip_yy * s549 + s552 * k20 + (s728 - s137 * s728)
+    s767 = m_hip * bias_hind_left_hip_y - moment_front_left_hip_y * s555 + (m_thigh * bias_hind_left_thigh_y - (s673 + k5 * s596) + s702)
+    s768 = s737 + s175 * s736
+    s769 = s667 + s733 - s176 * s736
+    s770 = s738 - s177 * s736
+    s771 = cos_front_right_swing_angle * s770 - sin_front_right_swing_angle * s769
+    s772 = sin_front_right_swing_angle * s770 + cos_front_right_swing_angle * s769
+    s773 = sin_front_right_swing_angle * s768 + cos_front_right_swing_angle * s735 + k3 * s771
+    s774 = cos_front_right_swing_angle * s768 - sin_front_right_swing_angle * s735 - k3 * s772
+    s775 = s648 + s773
+    s776 = I_hip_yz * s546 - I_hip_xy * s545 - s645 + I_hip_yy * s541 + s544 * k20 + (s736 - s174 * s736)
+    s777 = m_hip * bias_front_right_hip_y + moment_front_left_hip_y * s547 + (m_thigh * bias_front_right_thigh_y + (s666 - k5 * s585) + s695)
+    s778 = s745 - s212 * s744
+    s779 = s660 + s741 - s213 * s744
+    s780 = s746 - s214 * s744
+    s781 = cos_front_left_swing_angle * s780 - sin_front_left_swing_angle * s779
+    s782 = sin_front_left_swing_angle * s780 + cos_front_left_swing_angle * s779
+    s783 = sin_front_left_swing_angle * s778 + cos_front_left_swing_angle * s743 + k2 * s781
+    s784 = cos_front_left_swing_angle * s778 - sin_front_left_swing_angle * s743 - k2 * s782
+    s785 = s641 + s783
+    s786 = I_hip_xy * s536 - I_hip_yz * s537 - s638 + I_hip_yy * s532 + s535 * k20 + (s744 - s211 * s744)
+    s787 = s640 + s534 * k21 - moment_front_left_hip_y * bias_front_left_hip_x + s784
+    s788 = m_hip * bias_front_left_hip_y - moment_front_left_hip_y * s538 + (m_thigh * bias_front_left_thigh_y - (s659 + k5 * s574) + s688)
+    s789 = s755 - s249 * s754
+    s790 = s756 - s250 * s754
+    s791 = m_hip * bias_hind_right_hip_x - moment_front_left_hip_y * s563 + s751 - s251 * s754
+    s792 = s757 - s252 * s754
+    s793 = s750 - (m_hip * s557 + moment_front_left_hip_y * s562) - s253 * s754
+    s794 = cos_hind_right_abduction_angle * s792 - sin_hind_right_abduction_angle * s793
+    s795 = sin_hind_right_abduction_angle * s792 + cos_hind_right_abduction_angle * s793
+    s796 = cos_hind_right_abduction_angle * s789 - sin_hind_right_abduction_angle * s790
+    s797 = sin_hind_right_abduction_angle * s789 + cos_hind_right_abduction_angle * s790
+    s798 = s766 - s305 * s765
+    s799 = s652 + s551 * k21 - s643 + s764 - s306 * s765
+    s800 = s642 + moment_front_left_hip_y * s554 + s762 - s307 * s765
+    s801 = s767 - s308 * s765
+    s802 = m_hip * bias_hind_left_hip_z + moment_front_left_hip_y * s553 + s761 - s309 * s765
+    s803 = cos_hind_left_abduction_angle * s801 - sin_hind_left_abduction_angle * s802
+    s804 = sin_hind_left_abduction_angle * s801 + cos_hind_left_abduction_angle * s802
+    s805 = cos_hind_left_abduction_angle * s798 - sin_hind_left_abduction_angle * s799
+    s806 = sin_hind_left_abduction_angle * s798 + cos_hind_left_abduction_angle * s799
+    s807 = s523 * k16 + (s754 - s248 * s754 - y_hip * s795) + (s765 - s304 * s765 + y_hip * s804)
+    s808 = s521 * k18 + (s797 + (y_hip * s791 - x_hip * s794)) + (s806 - (x_hip * s803 + y_hip * s800))
+    s809 = s776 - s365 * s775
+    s810 = s647 + s543 * k21 - s643 + s774 - s366 * s775
+    s811 = s772 - (s642 + moment_front_left_hip_y * s546) - s367 * s775
+    s812 = s777 - s368 * s775
+    s813 = m_hip * bias_front_right_hip_z - moment_front_left_hip_y * s545 + s771 - s369 * s775
+    s814 = cos_front_right_abduction_angle * s812 - sin_front_right_abduction_angle * s813
+    s815 = sin_front_right_abduction_angle * s812 + cos_front_right_abduction_angle * s813
+    s816 = cos_front_right_abduction_angle * s809 - sin_front_right_abduction_angle * s810
+    s817 = sin_front_right_abduction_angle * s809 + cos_front_right_abduction_angle * s810
+    s818 = s522 * k17 + (s796 + x_hip * s795) + (s805 + x_hip * s804) + (s816 - x_hip * s815)
+    s819 = s786 - s421 * s785
+    s820 = s787 - s422 * s785
+    s821 = m_hip * bias_front_left_hip_x + moment_front_left_hip_y * s537 + s782 - s423 * s785
+    s822 = s788 - s424 * s785
+    s823 = m_hip * bias_front_left_hip_z + moment_front_left_hip_y * s536 + s781 - s425 * s785
+    s824 = cos_front_left_abduction_angle * s822 - sin_front_left_abduction_angle * s823
+    s825 = sin_front_left_abduction_angle * s822 + cos_front_left_abduction_angle * s823
+    s826 = cos_front_left_abduction_angle * s819 - sin_front_left_abduction_angle * s820
+    s827 = sin_front_left_abduction_angle * s819 + cos_front_left_abduction_angle * s820
+    s828 = s807 + (s775 - s364 * s775 - y_hip * s815) + (s785 - s420 * s785 + y_hip * s825)
+    s829 = s808 + (s817 + (x_hip * s814 + y_hip * s811)) + (s827 + (x_hip * s824 - y_hip * s821))
+    s830 = s483 * s828 - (s818 + (s826 - x_hip * s825))
+    s831 = s829 - s484 * s828 + s492 * s830
+    s832 = s791 + s800 + s811 + s821 - s485 * s828 + s493 * s830 - s499 * s831
+    s833 = s794 + s803 + s814 + s824 - s486 * s828 + s494 * s830 - s500 * s831
+    s834 = s795 + s804 + s815 + s825 - s487 * s828 + s495 * s830 - s501 * s831
+    s835 = s21 * s832 + s22 * s833 + s23 * s834
+    s836 = s518 * s835 - (s18 * s832 + s19 * s833 + s20 * s834)
+    s837 = (s15 * s832 + s16 * s833 + s17 * s834 - s517 * s835 + s520 * s836) / (s15 * s508 + s16 * s509 + s17 * s510 - s515 * s517 - s519 * s520)
+    delta_trunk_2_y = s836 / pivot_trunk_2_2 + s520 * s837
+    s838 = s835 / pivot_trunk_3_2 + (s518 * delta_trunk_2_y - s517 * s837)
+    delta_trunk_x = s18 * delta_trunk_2_y - s15 * s837 - s21 * s838
+    delta_trunk_y = s19 * delta_trunk_2_y - s16 * s837 - s22 * s838
+    delta_trunk_z = s20 * delta_trunk_2_y - s17 * s837 - s23 * s838
+    s839 = s831 / pivot_trunk_3 + (s499 * delta_trunk_x + s500 * delta_trunk_y + s501 * delta_trunk_z)
+    s840 = s493 * delta_trunk_x + s494 * delta_trunk_y + s495 * delta_trunk_z - s492 * s839
+    alpha_trunk_y = s830 / pivot_trunk_2 - s840
+    s841 = s483 * alpha_trunk_y - s484 * s839 + (s485 * delta_trunk_x + s486 * delta_trunk_y + s487 * delta_trunk_z)
+    s842 = s828 / pivot_trunk + s841
+    alpha_front_left_hip_y = cos_front_left_abduction_angle * alpha_trunk_y - sin_front_left_abduction_angle * s839
+    s843 = cos_front_left_abduction_angle * s839 + sin_front_left_abduction_angle * alpha_trunk_y
+    s844 = y_hip * s839
+    s845 = x_hip * s839
+    s846 = y_hip * s842
+    s847 = x_hip * alpha_trunk_y
+    s848 = s846 + s847
+    delta_front_left_hip_x = delta_trunk_x + s844
+    s849 = delta_trunk_y - s845
+    s850 = delta_trunk_z - s848
+    delta_front_left_hip_y = cos_front_left_abduction_angle * s849 + sin_front_left_abduction_angle * s850
+    delta_front_left_hip_z = cos_front_left_abduction_angle * s850 - sin_front_left_abduction_angle * s849
+    s851 = s423 * delta_front_left_hip_x + s424 * delta_front_left_hip_y + s425 * delta_front_left_hip_z
+    s852 = s785 / pivot_front_left_hip + (s421 * alpha_front_left_hip_y - s420 * s842 - s422 * s843 + s851)
+    s853 = s842 + s852
+    alpha_front_right_hip_y = cos_front_right_abduction_angle * alpha_trunk_y - sin_front_right_abduction_angle * s839
+    s854 = cos_front_right_abduction_angle * s839 + sin_front_right_abduction_angle * alpha_trunk_y
+    delta_front_right_hip_x = delta_trunk_x - s844
+    s855 = delta_trunk_z + (s846 - s847)
+    delta_front_right_hip_y = cos_front_right_abduction_angle * s849 + sin_front_right_abduction_angle * s855
+    delta_front_right_hip_z = cos_front_right_abduction_angle * s855 - sin_front_right_abduction_angle * s849
+    s856 = s367 * delta_front_right_hip_x + s368 * delta_front_right_hip_y + s369 * delta_front_right_hip_z
+    s857 = s775 / pivot_front_right_hip + (s365 * alpha_front_right_hip_y - s364 * s842 - s366 * s854 + s856)
+    s858 = s842 + s857
+    alpha_hind_left_hip_y = cos_hind_left_abduction_angle * alpha_trunk_y - sin_hind_left_abduction_angle * s839
+    s859 = cos_hind_left_abduction_angle * s839 + sin_hind_left_abduction_angle * alpha_trunk_y
+    s860 = delta_trunk_y + s845
+    s861 = delta_trunk_z + (s847 - s846)
+    delta_hind_left_hip_y = cos_hind_left_abduction_angle * s860 + sin_hind_left_abduction_angle * s861
+    delta_hind_left_hip_z = cos_hind_left_abduction_angle * s861 - sin_hind_left_abduction_angle * s860
+    s862 = s307 * delta_front_left_hip_x + s308 * delta_hind_left_hip_y + s309 * delta_hind_left_hip_z
+    s863 = s765 / pivot_hind_left_hip + (s305 * alpha_hind_left_hip_y - s304 * s842 - s306 * s859 + s862)
+    s864 = s842 + s863
+    alpha_hind_right_hip_y = cos_hind_right_abduction_angle * alpha_trunk_y - sin_hind_right_abduction_angle * s839
+    s865 = cos_hind_right_abduction_angle * s839 + sin_hind_right_abduction_angle * alpha_trunk_y
+    s866 = delta_trunk_z + s848
+    delta_hind_right_hip_y = cos_hind_right_abduction_angle * s860 + sin_hind_right_abduction_angle * s866
+    delta_hind_right_hip_z = cos_hind_right_abduction_angle * s866 - sin_hind_right_abduction_angle * s860
+    s867 = s251 * delta_front_right_hip_x + s252 * delta_hind_right_hip_y + s253 * delta_hind_right_hip_z
+    s868 = s754 / pivot_hind_right_hip + (s249 * alpha_hind_right_hip_y - s248 * s842 - s250 * s865 + s867)
+    s869 = s842 + s868
+    s870 = delta_front_left_hip_x + k2 * s843
+    s871 = delta_front_left_hip_z - k2 * s853
+    delta_front_left_thigh_z = cos_front_left_swing_angle * s871 + sin_front_left_swing_angle * s870
+    delta_front_left_thigh_x = cos_front_left_swing_angle * s870 - sin_front_left_swing_angle * s871
+    s872 = s212 * (cos_front_left_swing_angle * s843 + sin_front_left_swing_angle * s853)
+    s873 = s211 * alpha_front_left_hip_y - s872 + (s213 * delta_front_left_thigh_x + s214 * delta_front_left_thigh_z)
+    s874 = s744 / pivot_front_left_thigh + s873
+    alpha_front_left_thigh_y = alpha_front_left_hip_y - s874
+    s875 = delta_front_right_hip_x + k3 * s854
+    s876 = delta_front_right_hip_z - k3 * s858
+    delta_front_right_thigh_z = cos_front_right_swing_angle * s876 + sin_front_right_swing_angle * s875
+    delta_front_right_thigh_x = cos_front_right_swing_angle * s875 - sin_front_right_swing_angle * s876
+    s877 = s175 * (cos_front_right_swing_angle * s854 + sin_front_right_swing_angle * s858)
+    s878 = s174 * alpha_front_right_hip_y + s877 + (s176 * delta_front_right_thigh_x + s177 * delta_front_right_thigh_z)
+    s879 = s736 / pivot_front_right_thigh + s878
+    alpha_front_right_thigh_y = alpha_front_right_hip_y - s879
+    s880 = delta_front_left_hip_x + k2 * s859
+    s881 = delta_hind_left_hip_z - k2 * s864
+    delta_hind_left_thigh_z = cos_hind_left_swing_angle * s881 + sin_hind_left_swing_angle * s880
+    delta_hind_left_thigh_x = cos_hind_left_swing_angle * s880 - sin_hind_left_swing_angle * s881
+    s882 = s138 * (cos_hind_left_swing_angle * s859 + sin_hind_left_swing_angle * s864)
+    s883 = s137 * alpha_hind_left_hip_y - s882 + (s139 * delta_hind_left_thigh_x + s140 * delta_hind_left_thigh_z)
+    s884 = s728 / pivot_hind_left_thigh + s883
+    alpha_hind_left_thigh_y = alpha_hind_left_hip_y - s884
+    s885 = delta_front_right_hip_x + k3 * s865
+    s886 = delta_hind_right_hip_z - k3 * s869
+    delta_hind_right_thigh_z = cos_hind_right_swing_angle * s886 + sin_hind_right_swing_angle * s885
+    delta_hind_right_thigh_x = cos_hind_right_swing_angle * s885 - sin_hind_right_swing_angle * s886
+    s887 = s101 * (cos_hind_right_swing_angle * s865 + sin_hind_right_swing_angle * s869)
+    s888 = s100 * alpha_hind_right_hip_y + s887 + (s102 * delta_hind_right_thigh_x + s103 * delta_hind_right_thigh_z)
+    s889 = s720 / pivot_hind_right_thigh + s888
+    alpha_hind_right_thigh_y = alpha_hind_right_hip_y - s889
+    s890 = cos_front_left_knee_angle * (delta_front_left_thigh_x + k4 * alpha_front_left_thigh_y)
+    s891 = k7 * alpha_front_left_thigh_y - k8 * (s890 - sin_front_left_knee_angle * delta_front_left_thigh_z)
+    front_left_knee_angle_ddot = s739 / pivot_hind_right_shank - s891
+    s892 = cos_front_right_knee_angle * (delta_front_right_thigh_x + k4 * alpha_front_right_thigh_y)
+    s893 = k7 * alpha_front_right_thigh_y - k8 * (s892 - sin_front_right_knee_angle * delta_front_right_thigh_z)
+    front_right_knee_angle_ddot = s731 / pivot_hind_right_shank - s893
+    s894 = cos_hind_left_knee_angle * (delta_hind_left_thigh_x + k4 * alpha_hind_left_thigh_y)
+    s895 = k7 * alpha_hind_left_thigh_y - k8 * (s894 - sin_hind_left_knee_angle * delta_hind_left_thigh_z)
+    hind_left_knee_angle_ddot = s723 / pivot_hind_right_shank - s895
+    s896 = cos_hind_right_knee_angle * (delta_hind_right_thigh_x + k4 * alpha_hind_right_thigh_y)
+    s897 = k7 * alpha_hind_right_thigh_y - k8 * (s896 - sin_hind_right_knee_angle * delta_hind_right_thigh_z)
+    hind_right_knee_angle_ddot = s715 / pivot_hind_right_shank - s897
+    s898 = trunk_wx * 0.5
+    s899 = trunk_wy * 0.5
+    s900 = trunk_wz * 0.5
+    s973 = I_trunk_x * s15
+    s974 = I_trunk_y * s16
+    s975 = I_trunk_z * s17
+    s976 = I_trunk_x * s18
+    s977 = I_trunk_y * s19
+    s978 = I_trunk_z * s20
+    s979 = s15 * s973 + s16 * s974 + s17 * s975
+    s980 = s18 * s976 + s19 * s977 + s20 * s978
+    s981 = s21 * (I_trunk_x * s21) + s22 * (I_trunk_y * s22) + s23 * (I_trunk_z * s23)
+    s982 = s18 * s973 + s19 * s974 + s20 * s975
+    s983 = s21 * s973 + s22 * s974 + s23 * s975
+    s984 = s21 * s976 + s22 * s977 + s23 * s978
+    s985 = x_hip * s15
+    s986 = y_hip * s16
+    s987 = s985 + s986
+    s988 = x_hip * s18
+    s989 = y_hip * s19
+    s990 = s988 + s989
+    s991 = x_hip * s21
+    s992 = y_hip * s22
+    s993 = s991 + s992
+    s994 = moment_front_left_hip_y * s901
+    s995 = moment_front_left_hip_y * s903
+    s996 = moment_front_left_hip_y * s905
+    s997 = inertia_front_left_hip_xx * s15
+    s998 = s997 + I_hip_xy * s901 + I_hip_xz * s902
+    s999 = I_hip_xy * s15
+    s1000 = s999 + I_hip_yy * s901 + I_hip_yz * s902
+    s1001 = I_hip_xz * s15
+    s1002 = s1001 + I_hip_yz * s901 + inertia_front_left_hip_zz * s902
+    s1003 = inertia_front_left_hip_xx * s18
+    s1004 = s1003 + I_hip_xy * s903 + I_hip_xz * s904
+    s1005 = I_hip_xy * s18
+    s1006 = s1005 + I_hip_yy * s903 + I_hip_yz * s904
+    s1007 = I_hip_xz * s18
+    s1008 = s1007 + I_hip_yz * s903 + inertia_front_left_hip_zz * s904
+    s1009 = inertia_front_left_hip_xx * s21
+    s1010 = I_hip_xy * s21
+    s1011 = I_hip_xz * s21
+    s1012 = s15 * s998 + s901 * s1000 + s902 * s1002
+    s1013 = s18 * s1004 + s903 * s1006 + s904 * s1008
+    s1014 = s21 * (s1009 + I_hip_xy * s905 + I_hip_xz * s906) + s905 * (s1010 + I_hip_yy * s905 + I_hip_yz * s906)
+    s1015 = s1014 + s906 * (s1011 + I_hip_yz * s905 + inertia_front_left_hip_zz * s906)
+    s1016 = s18 * s998 + s903 * s1000 + s904 * s1002
+    s1017 = s21 * s998 + s905 * s1000 + s906 * s1002
+    s1018 = s21 * s1004 + s905 * s1006 + s906 * s1008
+    s1019 = s985 - s986
+    s1020 = s988 - s989
+    s1021 = s991 - s992
+    s1022 = moment_front_left_hip_y * s907
+    s1023 = moment_front_left_hip_y * s909
+    s1024 = moment_front_left_hip_y * s911
+    s1025 = s997 - I_hip_xy * s907 + I_hip_xz * s908
+    s1026 = I_hip_yy * s907 - s999 - I_hip_yz * s908
+    s1027 = s1001 - I_hip_yz * s907 + inertia_front_left_hip_zz * s908
+    s1028 = s1003 - I_hip_xy * s909 + I_hip_xz * s910
+    s1029 = I_hip_yy * s909 - s1005 - I_hip_yz * s910
+    s1030 = s1007 - I_hip_yz * s909 + inertia_front_left_hip_zz * s910
+    s1031 = s15 * s1025 + s907 * s1026 + s908 * s1027
+    s1032 = s18 * s1028 + s909 * s1029 + s910 * s1030
+    s1033 = s21 * (s1009 - I_hip_xy * s911 + I_hip_xz * s912) + s911 * (I_hip_yy * s911 - s1010 - I_hip_yz * s912)
+    s1034 = s1033 + s912 * (s1011 - I_hip_yz * s911 + inertia_front_left_hip_zz * s912)
+    s1035 = s18 * s1025 + s909 * s1026 + s910 * s1027
+    s1036 = s21 * s1025 + s911 * s1026 + s912 * s1027
+    s1037 = s21 * s1028 + s911 * s1029 + s912 * s1030
+    s1038 = s986 - s985
+    s1039 = s989 - s988
+    s1040 = s992 - s991
+    s1041 = moment_front_left_hip_y * s913
+    s1042 = moment_front_left_hip_y * s915
+    s1043 = moment_front_left_hip_y * s917
+    s1044 = s997 + I_hip_xy * s913 + I_hip_xz * s914
+    s1045 = s999 + I_hip_yy * s913 + I_hip_yz * s914
+    s1046 = s1001 + I_hip_yz * s913 + inertia_front_left_hip_zz * s914
+    s1047 = s1003 + I_hip_xy * s915 + I_hip_xz * s916
+    s1048 = s1005 + I_hip_yy * s915 + I_hip_yz * s916
+    s1049 = s1007 + I_hip_yz * s915 + inertia_front_left_hip_zz * s916
+    s1050 = s15 * s1044 + s913 * s1045 + s914 * s1046
+    s1051 = s18 * s1047 + s915 * s1048 + s916 * s1049
+    s1052 = s21 * (s1009 + I_hip_xy * s917 + I_hip_xz * s918) + s917 * (s1010 + I_hip_yy * s917 + I_hip_yz * s918)
+    s1053 = s1052 + s918 * (s1011 + I_hip_yz * s917 + inertia_front_left_hip_zz * s918)
+    s1054 = s18 * s1044 + s915 * s1045 + s916 * s1046
+    s1055 = s21 * s1044 + s917 * s1045 + s918 * s1046
+    s1056 = s21 * s1047 + s917 * s1048 + s918 * s1049
+    s1057 = moment_front_left_hip_y * s919
+    s1058 = moment_front_left_hip_y * s921
+    s1059 = moment_front_left_hip_y * s923
+    s1060 = s997 - I_hip_xy * s919 + I_hip_xz * s920
+    s1061 = I_hip_yy * s919 - s999 - I_hip_yz * s920
+    s1062 = s1001 - I_hip_yz * s919 + inertia_front_left_hip_zz * s920
+    s1063 = s1003 - I_hip_xy * s921 + I_hip_xz * s922
+    s1064 = I_hip_yy * s921 - s1005 - I_hip_yz * s922
+    s1065 = s1007 - I_hip_yz * s921 + inertia_front_left_hip_zz * s922
+    s1066 = s15 * s1060 + s919 * s1061 + s920 * s1062
+    s1067 = s18 * s1063 + s921 * s1064 + s922 * s1065
+    s1068 = s21 * (s1009 - I_hip_xy * s923 + I_hip_xz * s924) + s923 * (I_hip_yy * s923 - s1010 - I_hip_yz * s924)
+    s1069 = s1068 + s924 * (s1011 - I_hip_yz * s923 + inertia_front_left_hip_zz * s924)
+    s1070 = s18 * s1060 + s921 * s1061 + s922 * s1062
+    s1071 = s21 * s1060 + s923 * s1061 + s924 * s1062
+    s1072 = s21 * s1063 + s923 * s1064 + s924 * s1065
+    s1073 = k2 * s901
+    s1074 = k2 * s903
+    s1075 = k2 * s905
+    s1076 = moment_front_left_thigh_y * s901 - k5 * s925
+    s1077 = moment_front_left_thigh_y * s903 - k5 * s927
+    s1078 = moment_front_left_thigh_y * s905 - k5 * s929
+    s1079 = inertia_front_left_thigh_xx * s926
+    s1080 = inertia_front_left_thigh_yy * s901 + inertia_front_left_thigh_yz * s925
+    s1081 = inertia_front_left_thigh_yz * s901 + inertia_front_left_thigh_zz * s925
+    s1082 = inertia_front_left_thigh_xx * s928
+    s1083 = inertia_front_left_thigh_yy * s903 + inertia_front_left_thigh_yz * s927
+    s1084 = inertia_front_left_thigh_yz * s903 + inertia_front_left_thigh_zz * s927
+    s1085 = s926 * s1079 + s901 * s1080 + s925 * s1081
+    s1086 = s928 * s1082 + s903 * s1083 + s927 * s1084
+    s1087 = s905 * (inertia_front_left_thigh_yy * s905 + inertia_front_left_thigh_yz * s929)
+    s1088 = s929 * (inertia_front_left_thigh_yz * s905 + inertia_front_left_thigh_zz * s929)
+    s1089 = s930 * (inertia_front_left_thigh_xx * s930) + s1087 + s1088
+    s1090 = s928 * s1079 + s903 * s1080 + s927 * s1081
+    s1091 = s930 * s1079 + s905 * s1080 + s929 * s1081
+    s1092 = s930 * s1082 + s905 * s1083 + s929 * s1084
+    s1093 = k3 * s907
+    s1094 = k3 * s909
+    s1095 = k3 * s911
+    s1096 = moment_front_left_thigh_y * s907 + k5 * s931
+    s1097 = moment_front_left_thigh_y * s909 + k5 * s933
+    s1098 = moment_front_left_thigh_y * s911 + k5 * s935
+    s1099 = inertia_front_left_thigh_xx * s932
+    s1100 = inertia_front_left_thigh_yy * s907 - inertia_front_left_thigh_yz * s931
+    s1101 = inertia_front_left_thigh_zz * s931 - inertia_front_left_thigh_yz * s907
+    s1102 = inertia_front_left_thigh_xx * s934
+    s1103 = inertia_front_left_thigh_yy * s909 - inertia_front_left_thigh_yz * s933
+    s1104 = inertia_front_left_thigh_zz * s933 - inertia_front_left_thigh_yz * s909
+    s1105 = s932 * s1099 + s907 * s1100 + s931 * s1101
+    s1106 = s934 * s1102 + s909 * s1103 + s933 * s1104
+    s1107 = s911 * (inertia_front_left_thigh_yy * s911 - inertia_front_left_thigh_yz * s935)
+    s1108 = s935 * (inertia_front_left_thigh_zz * s935 - inertia_front_left_thigh_yz * s911)
+    s1109 = s936 * (inertia_front_left_thigh_xx * s936) + s1107 + s1108
+    s1110 = s934 * s1099 + s909 * s1100 + s933 * s1101
+    s1111 = s936 * s1099 + s911 * s1100 + s935 * s1101
+    s1112 = s936 * s1102 + s911 * s1103 + s935 * s1104
+    s1113 = k2 * s913
+    s1114 = k2 * s915
+    s1115 = k2 * s917
+    s1116 = moment_front_left_thigh_y * s913 - k5 * s937
+    s1117 = moment_front_left_thigh_y * s915 - k5 * s939
+    s1118 = moment_front_left_thigh_y * s917 - k5 * s941
+    s1119 = inertia_front_left_thigh_xx * s938
+    s1120 = inertia_front_left_thigh_yy * s913 + inertia_front_left_thigh_yz * s937
+    s1121 = inertia_front_left_thigh_yz * s913 + inertia_front_left_thigh_zz * s937
+    s1122 = inertia_front_left_thigh_xx * s940
+    s1123 = inertia_front_left_thigh_yy * s915 + inertia_front_left_thigh_yz * s939
+    s1124 = inertia_front_left_thigh_yz * s915 + inertia_front_left_thigh_zz * s939
+    s1125 = s938 * s1119 + s913 * s1120 + s937 * s1121
+    s1126 = s940 * s1122 + s915 * s1123 + s939 * s1124
+    s1127 = s917 * (inertia_front_left_thigh_yy * s917 + inertia_front_left_thigh_yz * s941)
+    s1128 = s941 * (inertia_front_left_thigh_yz * s917 + inertia_front_left_thigh_zz * s941)
+    s1129 = s942 * (inertia_front_left_thigh_xx * s942) + s1127 + s1128
+    s1130 = s940 * s1119 + s915 * s1120 + s939 * s1121
+    s1131 = s942 * s1119 + s917 * s1120 + s941 * s1121
+    s1132 = s942 * s1122 + s917 * s1123 + s941 * s1124
+    s1133 = k3 * s919
+    s1134 = k3 * s921
+    s1135 = k3 * s923
+    s1136 = moment_front_left_thigh_y * s919 + k5 * s943
+    s1137 = moment_front_left_thigh_y * s921 + k5 * s945
+    s1138 = moment_front_left_thigh_y * s923 + k5 * s947
+    s1139 = inertia_front_left_thigh_xx * s944
+    s1140 = inertia_front_left_thigh_yy * s919 - inertia_front_left_thigh_yz * s943
+    s1141 = inertia_front_left_thigh_zz * s943 - inertia_front_left_thigh_yz * s919
+    s1142 = inertia_front_left_thigh_xx * s946
+    s1143 = inertia_front_left_thigh_yy * s921 - inertia_front_left_thigh_yz * s945
+    s1144 = inertia_front_left_thigh_zz * s945 - inertia_front_left_thigh_yz * s921
+    s1145 = s944 * s1139 + s919 * s1140 + s943 * s1141
+    s1146 = s946 * s1142 + s921 * s1143 + s945 * s1144
+    s1147 = s923 * (inertia_front_left_thigh_yy * s923 - inertia_front_left_thigh_yz * s947)
+    s1148 = s947 * (inertia_front_left_thigh_zz * s947 - inertia_front_left_thigh_yz * s923)
+    s1149 = s948 * (inertia_front_left_thigh_xx * s948) + s1147 + s1148
+    s1150 = s946 * s1139 + s921 * s1140 + s945 * s1141
+    s1151 = s948 * s1139 + s923 * s1140 + s947 * s1141
+    s1152 = s948 * s1142 + s923 * s1143 + s947 * s1144
+    s1153 = k4 * s925
+    s1154 = k4 * s927
+    s1155 = k4 * s929
+    s1156 = k6 * s949
+    s1157 = k6 * s951
+    s1158 = k6 * s953
+    s1159 = inertia_front_left_shank_xx * s950
+    s1160 = inertia_front_left_shank_yy * s901
+    s1161 = I_shank_z * s949
+    s1162 = inertia_front_left_shank_xx * s952
+    s1163 = inertia_front_left_shank_yy * s903
+    s1164 = I_shank_z * s951
+    s1165 = s950 * s1159 + s901 * s1160 + s949 * s1161
+    s1166 = s952 * s1162 + s903 * s1163 + s951 * s1164
+    s1167 = s954 * (inertia_front_left_shank_xx * s954) + s905 * (inertia_front_left_shank_yy * s905)
+    s1168 = s1167 + s953 * (I_shank_z * s953)
+    s1169 = s952 * s1159 + s903 * s1160 + s951 * s1161
+    s1170 = s954 * s1159 + s905 * s1160 + s953 * s1161
+    s1171 = s954 * s1162 + s905 * s1163 + s953 * s1164
+    s1172 = k4 * s931
+    s1173 = k4 * s933
+    s1174 = k4 * s935
+    s1175 = k6 * s955
+    s1176 = k6 * s957
+    s1177 = k6 * s959
+    s1178 = inertia_front_left_shank_xx * s956
+    s1179 = inertia_front_left_shank_yy * s907
+    s1180 = I_shank_z * s955
+    s1181 = inertia_front_left_shank_xx * s958
+    s1182 = inertia_front_left_shank_yy * s909
+    s1183 = I_shank_z * s957
+    s1184 = s956 * s1178 + s907 * s1179 + s955 * s1180
+    s1185 = s958 * s1181 + s909 * s1182 + s957 * s1183
+    s1186 = s960 * (inertia_front_left_shank_xx * s960) + s911 * (inertia_front_left_shank_yy * s911)
+    s1187 = s1186 + s959 * (I_shank_z * s959)
+    s1188 = s958 * s1178 + s909 * s1179 + s957 * s1180
+    s1189 = s960 * s1178 + s911 * s1179 + s959 * s1180
+    s1190 = s960 * s1181 + s911 * s1182 + s959 * s1183
+    s1191 = k4 * s937
+    s1192 = k4 * s939
+    s1193 = k4 * s941
+    s1194 = k6 * s961
+    s1195 = k6 * s963
+    s1196 = k6 * s965
+    s1197 = inertia_front_left_shank_xx * s962
+    s1198 = inertia_front_left_shank_yy * s913
+    s1199 = I_shank_z * s961
+    s1200 = inertia_front_left_shank_xx * s964
+    s1201 = inertia_front_left_shank_yy * s915
+    s1202 = I_shank_z * s963
+    s1203 = s962 * s1197 + s913 * s1198 + s961 * s1199
+    s1204 = s964 * s1200 + s915 * s1201 + s963 * s1202
+    s1205 = s966 * (inertia_front_left_shank_xx * s966) + s917 * (inertia_front_left_shank_yy * s917)
+    s1206 = s1205 + s965 * (I_shank_z * s965)
+    s1207 = s964 * s1197 + s915 * s1198 + s963 * s1199
+    s1208 = s966 * s1197 + s917 * s1198 + s965 * s1199
+    s1209 = s966 * s1200 + s917 * s1201 + s965 * s1202
+    s1210 = k4 * s943
+    s1211 = k4 * s945
+    s1212 = k4 * s947
+    s1213 = k6 * s967
+    s1214 = k6 * s969
+    s1215 = k6 * s971
+    s1216 = inertia_front_left_shank_xx * s968
+    s1217 = inertia_front_left_shank_yy * s919
+    s1218 = I_shank_z * s967
+    s1219 = inertia_front_left_shank_xx * s970
+    s1220 = inertia_front_left_shank_yy * s921
+    s1221 = I_shank_z * s969
+    s1222 = s968 * s1216 + s919 * s1217 + s967 * s1218
+    s1223 = s970 * s1219 + s921 * s1220 + s969 * s1221
+    s1224 = s972 * (inertia_front_left_shank_xx * s972) + s923 * (inertia_front_left_shank_yy * s923)
+    s1225 = s1224 + s971 * (I_shank_z * s971)
+    s1226 = s970 * s1216 + s921 * s1217 + s969 * s1218
+    s1227 = s972 * s1216 + s923 * s1217 + s971 * s1218
+    s1228 = s972 * s1219 + s923 * s1220 + s971 * s1221
+    s1229 = m_shank * s1210 - s1213
+    s1230 = m_shank * s1211 - s1214
+    s1231 = m_shank * s1212 - s1215
+    s1232 = s1210 * (s1229 - s1213)
+    s1233 = s1211 * (s1230 - s1214)
+    s1234 = s1212 * (s1231 - s1215)
+    s1235 = s1229 - s1136
+    s1236 = s1230 - s1137
+    s1237 = s1231 - s1138
+    s1238 = s1145 + (s1222 + (s1233 + s1234))
+    s1239 = s1150 + (s1226 + (s1211 * s1213 - s1210 * s1230))
+    s1240 = s1151 + (s1227 + (s1212 * s1213 - s1210 * s1231))
+    s1241 = s1146 + (s1223 + (s1232 + s1234))
+    s1242 = s1152 + (s1228 + (s1212 * s1214 - s1211 * s1231))
+    s1243 = s1149 + (s1225 + (s1232 + s1233))
+    s1244 = m_shank * s1191 - s1194
+    s1245 = m_shank * s1192 - s1195
+    s1246 = m_shank * s1193 - s1196
+    s1247 = s1191 * (s1244 - s1194)
+    s1248 = s1192 * (s1245 - s1195)
+    s1249 = s1193 * (s1246 - s1196)
+    s1250 = s1116 + s1244
+    s1251 = s1117 + s1245
+    s1252 = s1118 + s1246
+    s1253 = s1125 + (s1203 + (s1248 + s1249))
+    s1254 = s1130 + (s1207 + (s1192 * s1194 - s1191 * s1245))
+    s1255 = s1131 + (s1208 + (s1193 * s1194 - s1191 * s1246))
+    s1256 = s1126 + (s1204 + (s1247 + s1249))
+    s1257 = s1132 + (s1209 + (s1193 * s1195 - s1192 * s1246))
+    s1258 = s1129 + (s1206 + (s1247 + s1248))
+    s1259 = m_shank * s1172 - s1175
+    s1260 = m_shank * s1173 - s1176
+    s1261 = m_shank * s1174 - s1177
+    s1262 = s1172 * (s1259 - s1175)
+    s1263 = s1173 * (s1260 - s1176)
+    s1264 = s1174 * (s1261 - s1177)
+    s1265 = s1259 - s1096
+    s1266 = s1260 - s1097
+    s1267 = s1261 - s1098
+    s1268 = s1105 + (s1184 + (s1263 + s1264))
+    s1269 = s1110 + (s1188 + (s1173 * s1175 - s1172 * s1260))
+    s1270 = s1111 + (s1189 + (s1174 * s1175 - s1172 * s1261))
+    s1271 = s1106 + (s1185 + (s1262 + s1264))
+    s1272 = s1112 + (s1190 + (s1174 * s1176 - s1173 * s1261))
+    s1273 = s1109 + (s1187 + (s1262 + s1263))
+    s1274 = m_shank * s1153 - s1156
+    s1275 = m_shank * s1154 - s1157
+    s1276 = m_shank * s1155 - s1158
+    s1277 = s1153 * (s1274 - s1156)
+    s1278 = s1154 * (s1275 - s1157)
+    s1279 = s1155 * (s1276 - s1158)
+    s1280 = s1076 + s1274
+    s1281 = s1077 + s1275
+    s1282 = s1078 + s1276
+    s1283 = s1085 + (s1165 + (s1278 + s1279))
+    s1284 = s1090 + (s1169 + (s1154 * s1156 - s1153 * s1275))
+    s1285 = s1091 + (s1170 + (s1155 * s1156 - s1153 * s1276))
+    s1286 = s1086 + (s1166 + (s1277 + s1279))
+    s1287 = s1092 + (s1171 + (s1155 * s1157 - s1154 * s1276))
+    s1288 = s1089 + (s1168 + (s1277 + s1278))
+    s1289 = s1235 + k29 * s1133
+    s1290 = s1236 + k29 * s1134
+    s1291 = s1237 + k29 * s1135
+    s1292 = s1133 * (s1235 + s1289)
+    s1293 = s1134 * (s1236 + s1290)
+    s1294 = s1135 * (s1237 + s1291)
+    s1295 = s1289 - s1057
+    s1296 = s1290 - s1058
+    s1297 = s1291 - s1059
+    s1298 = s1066 + (s1238 + (s1293 + s1294))
+    s1299 = s1070 + (s1239 - (s1133 * s1290 + s1134 * s1235))
+    s1300 = s1071 + (s1240 - (s1133 * s1291 + s1135 * s1235))
+    s1301 = s1067 + (s1241 + (s1292 + s1294))
+    s1302 = s1072 + (s1242 - (s1134 * s1291 + s1135 * s1236))
+    s1303 = s1069 + (s1243 + (s1292 + s1293))
+    s1304 = s1250 + k29 * s1113
+    s1305 = s1251 + k29 * s1114
+    s1306 = s1252 + k29 * s1115
+    s1307 = s1113 * (s1250 + s1304)
+    s1308 = s1114 * (s1251 + s1305)
+    s1309 = s1115 * (s1252 + s1306)
+    s1310 = s1041 + s1304
+    s1311 = s1042 + s1305
+    s1312 = s1043 + s1306
+    s1313 = s1050 + (s1253 + (s1308 + s1309))
+    s1314 = s1054 + (s1254 - (s1113 * s1305 + s1114 * s1250))
+    s1315 = s1055 + (s1255 - (s1113 * s1306 + s1115 * s1250))
+    s1316 = s1051 + (s1256 + (s1307 + s1309))
+    s1317 = s1056 + (s1257 - (s1114 * s1306 + s1115 * s1251))
+    s1318 = s1053 + (s1258 + (s1307 + s1308))
+    s1319 = s1265 + k29 * s1093
+    s1320 = s1266 + k29 * s1094
+    s1321 = s1267 + k29 * s1095
+    s1322 = s1093 * (s1265 + s1319)
+    s1323 = s1094 * (s1266 + s1320)
+    s1324 = s1095 * (s1267 + s1321)
+    s1325 = s1319 - s1022
+    s1326 = s1320 - s1023
+    s1327 = s1321 - s1024
+    s1328 = s1031 + (s1268 + (s1323 + s1324))
+    s1329 = s1035 + (s1269 - (s1093 * s1320 + s1094 * s1265))
+    s1330 = s1036 + (s1270 - (s1093 * s1321 + s1095 * s1265))
+    s1331 = s1032 + (s1271 + (s1322 + s1324))
+    s1332 = s1037 + (s1272 - (s1094 * s1321 + s1095 * s1266))
+    s1333 = s1034 + (s1273 + (s1322 + s1323))
+    s1334 = s1280 + k29 * s1073
+    s1335 = s1281 + k29 * s1074
+    s1336 = s1282 + k29 * s1075
+    s1337 = s1073 * (s1280 + s1334)
+    s1338 = s1074 * (s1281 + s1335)
+    s1339 = s1075 * (s1282 + s1336)
+    s1340 = s994 + s1334
+    s1341 = s995 + s1335
+    s1342 = s996 + s1336
+    s1343 = s1012 + (s1283 + (s1338 + s1339))
+    s1344 = s1016 + (s1284 - (s1073 * s1335 + s1074 * s1280))
+    s1345 = s1017 + (s1285 - (s1073 * s1336 + s1075 * s1280))
+    s1346 = s1013 + (s1286 + (s1337 + s1339))
+    s1347 = s1018 + (s1287 - (s1074 * s1336 + s1075 * s1281))
+    s1348 = s1015 + (s1288 + (s1337 + s1338))
+    s1349 = k15 * s987
+    s1350 = k15 * s990
+    s1351 = k15 * s993
+    s1352 = s1295 - s1349
+    s1353 = s1296 - s1350
+    s1354 = s1297 - s1351
+    s1355 = s987 * (s1295 + s1352)
+    s1356 = s990 * (s1296 + s1353)
+    s1357 = s993 * (s1297 + s1354)
+    s1358 = s1310 + k15 * s1038
+    s1359 = s1311 + k15 * s1039
+    s1360 = s1312 + k15 * s1040
+    s1361 = s1038 * (s1310 + s1358)
+    s1362 = s1039 * (s1311 + s1359)
+    s1363 = s1040 * (s1312 + s1360)
+    s1364 = s982 + (s1299 + (s987 * s1353 + s990 * s1295)) + (s1314 - (s1038 * s1359 + s1039 * s1310))
+    s1365 = s983 + (s1300 + (s987 * s1354 + s993 * s1295)) + (s1315 - (s1038 * s1360 + s1040 * s1310))
+    s1366 = s984 + (s1302 + (s990 * s1354 + s993 * s1296)) + (s1317 - (s1039 * s1360 + s1040 * s1311))
+    s1367 = s1325 + k15 * s1019
+    s1368 = s1326 + k15 * s1020
+    s1369 = s1327 + k15 * s1021
+    s1370 = s1019 * (s1325 + s1367)
+    s1371 = s1020 * (s1326 + s1368)
+    s1372 = s1021 * (s1327 + s1369)
+    s1373 = s979 + (s1298 - (s1356 + s1357)) + (s1313 + (s1362 + s1363)) + (s1328 + (s1371 + s1372))
+    s1374 = s980 + (s1301 - (s1355 + s1357)) + (s1316 + (s1361 + s1363)) + (s1331 + (s1370 + s1372))
+    s1375 = s981 + (s1303 - (s1355 + s1356)) + (s1318 + (s1361 + s1362)) + (s1333 + (s1370 + s1371))
+    s1376 = s1340 + s1349
+    s1377 = s1341 + s1350
+    s1378 = s1342 + s1351
+    s1379 = s987 * (s1340 + s1376)
+    s1380 = s990 * (s1341 + s1377)
+    s1381 = s993 * (s1342 + s1378)
+    s1382 = s1352 + s1358 + s1367 + s1376
+    s1383 = s1353 + s1359 + s1368 + s1377
+    s1384 = s1354 + s1360 + s1369 + s1378
+    s1385 = s1373 + (s1343 + (s1380 + s1381))
+    s1386 = s1364 + (s1329 - (s1019 * s1368 + s1020 * s1325)) + (s1344 - (s987 * s1377 + s990 * s1340))
+    s1387 = s1365 + (s1330 - (s1019 * s1369 + s1021 * s1325)) + (s1345 - (s987 * s1378 + s993 * s1340))
+    s1388 = s1374 + (s1346 + (s1379 + s1381))
+    s1389 = s1366 + (s1332 - (s1020 * s1369 + s1021 * s1326)) + (s1347 - (s990 * s1378 + s993 * s1341))
+    s1390 = s1375 + (s1348 + (s1379 + s1380))
+    s1391 = s18 * s1384 - s21 * s1383
+    s1392 = s21 * s1382 - s15 * s1384
+    s1393 = s15 * s1383 - s18 * s1382
+    s1394 = s15 * s1385 + s18 * s1386 + s21 * s1387
+    s1395 = s15 * s1386 + s18 * s1388 + s21 * s1389
+    s1396 = s15 * s1387 + s18 * s1389 + s21 * s1390
+    s1397 = s19 * s1384 - s22 * s1383
+    s1398 = s22 * s1382 - s16 * s1384
+    s1399 = s16 * s1383 - s19 * s1382
+    s1400 = s16 * s1385 + s19 * s1386 + s22 * s1387
+    s1401 = s16 * s1386 + s19 * s1388 + s22 * s1389
+    s1402 = s16 * s1387 + s19 * s1389 + s22 * s1390
+    s1403 = s20 * s1384 - s23 * s1383
+    s1404 = s23 * s1382 - s17 * s1384
+    s1405 = s17 * s1383 - s20 * s1382
+    s1406 = s17 * s1385 + s20 * s1386 + s23 * s1387
+    s1407 = s17 * s1386 + s20 * s1388 + s23 * s1389
+    s1408 = s17 * s1387 + s20 * s1389 + s23 * s1390
+    s1409 = s18 * s1342 - s21 * s1341
+    s1410 = s21 * s1340 - s15 * s1342
+    s1411 = s15 * s1341 - s18 * s1340
+    s1412 = s15 * s1343 + s18 * s1344 + s21 * s1345
+    s1413 = s15 * s1344 + s18 * s1346 + s21 * s1347
+    s1414 = s15 * s1345 + s18 * s1347 + s21 * s1348
+    s1415 = s1412 + (s990 * s1411 - s993 * s1410)
+    s1416 = s1413 + (s993 * s1409 - s987 * s1411)
+    s1417 = s1414 + (s987 * s1410 - s990 * s1409)
+    s1418 = s18 * s1327 - s21 * s1326
+    s1419 = s21 * s1325 - s15 * s1327
+    s1420 = s15 * s1326 - s18 * s1325
+    s1421 = s15 * s1328 + s18 * s1329 + s21 * s1330
+    s1422 = s15 * s1329 + s18 * s1331 + s21 * s1332
+    s1423 = s15 * s1330 + s18 * s1332 + s21 * s1333
+    s1424 = s1421 + (s1020 * s1420 - s1021 * s1419)
+    s1425 = s1422 + (s1021 * s1418 - s1019 * s1420)
+    s1426 = s1423 + (s1019 * s1419 - s1020 * s1418)
+    s1427 = s18 * s1312 - s21 * s1311
+    s1428 = s21 * s1310 - s15 * s1312
+    s1429 = s15 * s1311 - s18 * s1310
+    s1430 = s15 * s1313 + s18 * s1314 + s21 * s1315
+    s1431 = s15 * s1314 + s18 * s1316 + s21 * s1317
+    s1432 = s15 * s1315 + s18 * s1317 + s21 * s1318
+    s1433 = s1430 + (s1039 * s1429 - s1040 * s1428)
+    s1434 = s1431 + (s1040 * s1427 - s1038 * s1429)
+    s1435 = s1432 + (s1038 * s1428 - s1039 * s1427)
+    s1436 = s18 * s1297 - s21 * s1296
+    s1437 = s21 * s1295 - s15 * s1297
+    s1438 = s15 * s1296 - s18 * s1295
+    s1439 = s15 * s1298 + s18 * s1299 + s21 * s1300
+    s1440 = s15 * s1299 + s18 * s1301 + s21 * s1302
+    s1441 = s15 * s1300 + s18 * s1302 + s21 * s1303
+    s1442 = s1439 + (s993 * s1437 - s990 * s1438)
+    s1443 = s1440 + (s987 * s1438 - s993 * s1436)
+    s1444 = s1441 + (s990 * s1436 - s987 * s1437)
+    s1445 = s903 * s1282 - s905 * s1281
+    s1446 = s905 * s1280 - s901 * s1282
+    s1447 = s901 * s1281 - s903 * s1280
+    s1448 = s901 * s1283 + s903 * s1284 + s905 * s1285
+    s1449 = s901 * s1284 + s903 * s1286 + s905 * s1287
+    s1450 = s901 * s1285 + s903 * s1287 + s905 * s1288
+    s1451 = s1448 + (s1074 * s1447 - s1075 * s1446)
+    s1452 = s1449 + (s1075 * s1445 - s1073 * s1447)
+    s1453 = s1450 + (s1073 * s1446 - s1074 * s1445)
+    s1454 = s1451 + (s990 * s1447 - s993 * s1446)
+    s1455 = s1452 + (s993 * s1445 - s987 * s1447)
+    s1456 = s1453 + (s987 * s1446 - s990 * s1445)
+    s1457 = s909 * s1267 - s911 * s1266
+    s1458 = s911 * s1265 - s907 * s1267
+    s1459 = s907 * s1266 - s909 * s1265
+    s1460 = s907 * s1268 + s909 * s1269 + s911 * s1270
+    s1461 = s907 * s1269 + s909 * s1271 + s911 * s1272
+    s1462 = s907 * s1270 + s909 * s1272 + s911 * s1273
+    s1463 = s1460 + (s1094 * s1459 - s1095 * s1458)
+    s1464 = s1461 + (s1095 * s1457 - s1093 * s1459)
+    s1465 = s1462 + (s1093 * s1458 - s1094 * s1457)
+    s1466 = s1463 + (s1020 * s1459 - s1021 * s1458)
+    s1467 = s1464 + (s1021 * s1457 - s1019 * s1459)
+    s1468 = s1465 + (s1019 * s1458 - s1020 * s1457)
+    s1469 = s915 * s1252 - s917 * s1251
+    s1470 = s917 * s1250 - s913 * s1252
+    s1471 = s913 * s1251 - s915 * s1250
+    s1472 = s913 * s1253 + s915 * s1254 + s917 * s1255
+    s1473 = s913 * s1254 + s915 * s1256 + s917 * s1257
+    s1474 = s913 * s1255 + s915 * s1257 + s917 * s1258
+    s1475 = s1472 + (s1114 * s1471 - s1115 * s1470)
+    s1476 = s1473 + (s1115 * s1469 - s1113 * s1471)
+    s1477 = s1474 + (s1113 * s1470 - s1114 * s1469)
+    s1478 = s1475 + (s1039 * s1471 - s1040 * s1470)
+    s1479 = s1476 + (s1040 * s1469 - s1038 * s1471)
+    s1480 = s1477 + (s1038 * s1470 - s1039 * s1469)
+    s1481 = s921 * s1237 - s923 * s1236
+    s1482 = s923 * s1235 - s919 * s1237
+    s1483 = s919 * s1236 - s921 * s1235
+    s1484 = s919 * s1238 + s921 * s1239 + s923 * s1240
+    s1485 = s919 * s1239 + s921 * s1241 + s923 * s1242
+    s1486 = s919 * s1240 + s921 * s1242 + s923 * s1243
+    s1487 = s1484 + (s1134 * s1483 - s1135 * s1482)
+    s1488 = s1485 + (s1135 * s1481 - s1133 * s1483)
+    s1489 = s1486 + (s1133 * s1482 - s1134 * s1481)
+    s1490 = s1487 + (s993 * s1482 - s990 * s1483)
+    s1491 = s1488 + (s987 * s1483 - s993 * s1481)
+    s1492 = s1489 + (s990 * s1481 - s987 * s1482)
+    s1493 = s905 * s1157 - s903 * s1158
+    s1494 = s901 * s1158 - s905 * s1156
+    s1495 = s903 * s1156 - s901 * s1157
+    s1496 = s901 * s1165 + s903 * s1169 + s905 * s1170
+    s1497 = s901 * s1169 + s903 * s1166 + s905 * s1171
+    s1498 = s901 * s1170 + s903 * s1171 + s905 * s1168
+    pivot_front_left_knee_angle_dot = k28 + (s901 * s1496 + s903 * s1497 + s905 * s1498)
+    s1499 = s1496 + (s1154 * s1495 - s1155 * s1494)
+    s1500 = s1497 + (s1155 * s1493 - s1153 * s1495)
+    s1501 = s1498 + (s1153 * s1494 - s1154 * s1493)
+    s1502 = s901 * s1499 + s903 * s1500 + s905 * s1501
+    s1503 = s1499 + (s1074 * s1495 - s1075 * s1494)
+    s1504 = s1500 + (s1075 * s1493 - s1073 * s1495)
+    s1505 = s1501 + (s1073 * s1494 - s1074 * s1493)
+    s1506 = s15 * s1503 + s18 * s1504 + s21 * s1505
+    s1507 = s1503 + (s990 * s1495 - s993 * s1494)
+    s1508 = s1504 + (s993 * s1493 - s987 * s1495)
+    s1509 = s1505 + (s987 * s1494 - s990 * s1493)
+    s1510 = s15 * s1507 + s18 * s1508 + s21 * s1509
+    s1511 = s16 * s1507 + s19 * s1508 + s22 * s1509
+    s1512 = s17 * s1507 + s20 * s1508 + s23 * s1509
+    s1513 = s911 * s1176 - s909 * s1177
+    s1514 = s907 * s1177 - s911 * s1175
+    s1515 = s909 * s1175 - s907 * s1176
+    s1516 = s907 * s1184 + s909 * s1188 + s911 * s1189
+    s1517 = s907 * s1188 + s909 * s1185 + s911 * s1190
+    s1518 = s907 * s1189 + s909 * s1190 + s911 * s1187
+    pivot_front_right_knee_angle_dot = k28 + (s907 * s1516 + s909 * s1517 + s911 * s1518)
+    s1519 = s1516 + (s1173 * s1515 - s1174 * s1514)
+    s1520 = s1517 + (s1174 * s1513 - s1172 * s1515)
+    s1521 = s1518 + (s1172 * s1514 - s1173 * s1513)
+    s1522 = s907 * s1519 + s909 * s1520 + s911 * s1521
+    s1523 = s1519 + (s1094 * s1515 - s1095 * s1514)
+    s1524 = s1520 + (s1095 * s1513 - s1093 * s1515)
+    s1525 = s1521 + (s1093 * s1514 - s1094 * s1513)
+    s1526 = s15 * s1523 + s18 * s1524 + s21 * s1525
+    s1527 = s1523 + (s1020 * s1515 - s1021 * s1514)
+    s1528 = s1524 + (s1021 * s1513 - s1019 * s1515)
+    s1529 = s1525 + (s1019 * s1514 - s1020 * s1513)
+    s1530 = s15 * s1527 + s18 * s1528 + s21 * s1529
+    s1531 = s16 * s1527 + s19 * s1528 + s22 * s1529
+    s1532 = s17 * s1527 + s20 * s1528 + s23 * s1529
+    s1533 = s917 * s1195 - s915 * s1196
+    s1534 = s913 * s1196 - s917 * s1194
+    s1535 = s915 * s1194 - s913 * s1195
+    s1536 = s913 * s1203 + s915 * s1207 + s917 * s1208
+    s1537 = s913 * s1207 + s915 * s1204 + s917 * s1209
+    s1538 = s913 * s1208 + s915 * s1209 + s917 * s1206
+    pivot_hind_left_knee_angle_dot = k28 + (s913 * s1536 + s915 * s1537 + s917 * s1538)
+    s1539 = s1536 + (s1192 * s1535 - s1193 * s1534)
+    s1540 = s1537 + (s1193 * s1533 - s1191 * s1535)
+    s1541 = s1538 + (s1191 * s1534 - s1192 * s1533)
+    s1542 = s913 * s1539 + s915 * s1540 + s917 * s1541
+    s1543 = s1539 + (s1114 * s1535 - s1115 * s1534)
+    s1544 = s1540 + (s1115 * s1533 - s1113 * s1535)
+    s1545 = s1541 + (s1113 * s1534 - s1114 * s1533)
+    s1546 = s15 * s1543 + s18 * s1544 + s21 * s1545
+    s1547 = s1543 + (s1039 * s1535 - s1040 * s1534)
+    s1548 = s1544 + (s1040 * s1533 - s1038 * s1535)
+    s1549 = s1545 + (s1038 * s1534 - s1039 * s1533)
+    s1550 = s15 * s1547 + s18 * s1548 + s21 * s1549
+    s1551 = s16 * s1547 + s19 * s1548 + s22 * s1549
+    s1552 = s17 * s1547 + s20 * s1548 + s23 * s1549
+    s1553 = s923 * s1214 - s921 * s1215
+    s1554 = s919 * s1215 - s923 * s1213
+    s1555 = s921 * s1213 - s919 * s1214
+    s1556 = s919 * s1222 + s921 * s1226 + s923 * s1227
+    s1557 = s919 * s1226 + s921 * s1223 + s923 * s1228
+    s1558 = s919 * s1227 + s921 * s1228 + s923 * s1225
+    pivot_hind_right_knee_angle_dot = k28 + (s919 * s1556 + s921 * s1557 + s923 * s1558)
+    s1559 = s1556 + (s1211 * s1555 - s1212 * s1554)
+    s1560 = s1557 + (s1212 * s1553 - s1210 * s1555)
+    s1561 = s1558 + (s1210 * s1554 - s1211 * s1553)
+    s1562 = s919 * s1559 + s921 * s1560 + s923 * s1561
+    s1563 = s1559 + (s1134 * s1555 - s1135 * s1554)
+    s1564 = s1560 + (s1135 * s1553 - s1133 * s1555)
+    s1565 = s1561 + (s1133 * s1554 - s1134 * s1553)
+    s1566 = s15 * s1563 + s18 * s1564 + s21 * s1565
+    s1567 = s1563 + (s993 * s1554 - s990 * s1555)
+    s1568 = s1564 + (s987 * s1555 - s993 * s1553)
+    s1569 = s1565 + (s990 * s1553 - s987 * s1554)
+    s1570 = s15 * s1567 + s18 * s1568 + s21 * s1569
+    s1571 = s16 * s1567 + s19 * s1568 + s22 * s1569
+    s1572 = s17 * s1567 + s20 * s1568 + s23 * s1569
+    s1573 = s1502 / pivot_front_left_knee_angle_dot
+    s1574 = s1506 / pivot_front_left_knee_angle_dot
+    s1575 = s1512 / pivot_front_left_knee_angle_dot
+    s1576 = s1511 / pivot_front_left_knee_angle_dot
+    s1577 = s1510 / pivot_front_left_knee_angle_dot
+    s1578 = s1495 / pivot_front_left_knee_angle_dot
+    s1579 = s1494 / pivot_front_left_knee_angle_dot
+    s1580 = s1493 / pivot_front_left_knee_angle_dot
+    pivot_front_left_swing_angle_dot = k1 + (s901 * s1448 + s903 * s1449 + s905 * s1450) - s1502 * s1573
+    s1581 = s15 * s1451 + s18 * s1452 + s21 * s1453 - s1506 * s1573
+    s1582 = s17 * s1454 + s20 * s1455 + s23 * s1456 - s1512 * s1573
+    s1583 = s16 * s1454 + s19 * s1455 + s22 * s1456 - s1511 * s1573
+    s1584 = s15 * s1454 + s18 * s1455 + s21 * s1456 - s1510 * s1573
+    s1585 = s1447 - s1495 * s1573
+    s1586 = s1446 - s1494 * s1573
+    s1587 = s1445 - s1493 * s1573
+    s1588 = s1522 / pivot_front_right_knee_angle_dot
+    s1589 = s1526 / pivot_front_right_knee_angle_dot
+    s1590 = s1532 / pivot_front_right_knee_angle_dot
+    s1591 = s1531 / pivot_front_right_knee_angle_dot
+    s1592 = s1530 / pivot_front_right_knee_angle_dot
+    s1593 = s1515 / pivot_front_right_knee_angle_dot
+    s1594 = s1514 / pivot_front_right_knee_angle_dot
+    s1595 = s1513 / pivot_front_right_knee_angle_dot
+    pivot_front_right_swing_angle_dot = k1 + (s907 * s1460 + s909 * s1461 + s911 * s1462) - s1522 * s1588
+    s1596 = s15 * s1463 + s18 * s1464 + s21 * s1465 - s1526 * s1588
+    s1597 = s17 * s1466 + s20 * s1467 + s23 * s1468 - s1532 * s1588
+    s1598 = s16 * s1466 + s19 * s1467 + s22 * s1468 - s1531 * s1588
+    s1599 = s15 * s1466 + s18 * s1467 + s21 * s1468 - s1530 * s1588
+    s1600 = s1459 - s1515 * s1588
+    s1601 = s1458 - s1514 * s1588
+    s1602 = s1457 - s1513 * s1588
+    s1603 = s1542 / pivot_hind_left_knee_angle_dot
+    s1604 = s1546 / pivot_hind_left_knee_angle_dot
+    s1605 = s1552 / pivot_hind_left_knee_angle_dot
+    s1606 = s1551 / pivot_hind_left_knee_angle_dot
+    s1607 = s1550 / pivot_hind_left_knee_angle_dot
+    s1608 = s1535 / pivot_hind_left_knee_angle_dot
+    s1609 = s1534 / pivot_hind_left_knee_angle_dot
+    s1610 = s1533 / pivot_hind_left_knee_angle_dot
+    pivot_hind_left_swing_angle_dot = k1 + (s913 * s1472 + s915 * s1473 + s917 * s1474) - s1542 * s1603
+    s1611 = s15 * s1475 + s18 * s1476 + s21 * s1477 - s1546 * s1603
+    s1612 = s17 * s1478 + s20 * s1479 + s23 * s1480 - s1552 * s1603
+    s1613 = s16 * s1478 + s19 * s1479 + s22 * s1480 - s1551 * s1603
+    s1614 = s15 * s1478 + s18 * s1479 + s21 * s1480 - s1550 * s1603
+    s1615 = s1471 - s1535 * s1603
+    s1616 = s1470 - s1534 * s1603
+    s1617 = s1469 - s1533 * s1603
+    s1618 = s17 * s1406 + s20 * s1407 + s23 * s1408 - s1512 * s1575 - s1532 * s1590 - s1552 * s1605
+    s1619 = s16 * s1406 + s19 * s1407 + s22 * s1408 - s1511 * s1575 - s1531 * s1590 - s1551 * s1605
+    s1620 = s15 * s1406 + s18 * s1407 + s21 * s1408 - s1510 * s1575 - s1530 * s1590 - s1550 * s1605
+    s1621 = s16 * s1400 + s19 * s1401 + s22 * s1402 - s1511 * s1576 - s1531 * s1591 - s1551 * s1606
+    s1622 = s15 * s1400 + s18 * s1401 + s21 * s1402 - s1510 * s1576 - s1530 * s1591 - s1550 * s1606
+    s1623 = s15 * s1394 + s18 * s1395 + s21 * s1396 - s1510 * s1577 - s1530 * s1592 - s1550 * s1607
+    s1624 = s1562 / pivot_hind_right_knee_angle_dot
+    s1625 = s1566 / pivot_hind_right_knee_angle_dot
+    s1626 = s1572 / pivot_hind_right_knee_angle_dot
+    s1627 = s1571 / pivot_hind_right_knee_angle_dot
+    s1628 = s1570 / pivot_hind_right_knee_angle_dot
+    s1629 = s1555 / pivot_hind_right_knee_angle_dot
+    s1630 = s1554 / pivot_hind_right_knee_angle_dot
+    s1631 = s1553 / pivot_hind_right_knee_angle_dot
+    pivot_hind_right_swing_angle_dot = k1 + (s919 * s1484 + s921 * s1485 + s923 * s1486) - s1562 * s1624
+    s1632 = s15 * s1487 + s18 * s1488 + s21 * s1489 - s1566 * s1624
+    s1633 = s17 * s1490 + s20 * s1491 + s23 * s1492 - s1572 * s1624
+    s1634 = s16 * s1490 + s19 * s1491 + s22 * s1492 - s1571 * s1624
+    s1635 = s15 * s1490 + s18 * s1491 + s21 * s1492 - s1570 * s1624
+    s1636 = s1483 - s1555 * s1624
+    s1637 = s1482 - s1554 * s1624
+    s1638 = s1481 - s1553 * s1624
+    s1639 = s1581 / pivot_front_left_swing_angle_dot
+    s1640 = s1582 / pivot_front_left_swing_angle_dot
+    s1641 = s1583 / pivot_front_left_swing_angle_dot
+    s1642 = s1584 / pivot_front_left_swing_angle_dot
+    s1643 = s1585 / pivot_front_left_swing_angle_dot
+    s1644 = s1586 / pivot_front_left_swing_angle_dot
+    s1645 = s1587 / pivot_front_left_swing_angle_dot
+    pivot_front_left_abduction_angle_dot = k1 + (s15 * s1412 + s18 * s1413 + s21 * s1414) - s1506 * s1574 - s1581 * s1639
+    s1646 = s17 * s1415 + s20 * s1416 + s23 * s1417 - s1512 * s1574 - s1582 * s1639
+    s1647 = s16 * s1415 + s19 * s1416 + s22 * s1417 - s1511 * s1574 - s1583 * s1639
+    s1648 = s15 * s1415 + s18 * s1416 + s21 * s1417 - s1510 * s1574 - s1584 * s1639
+    s1649 = s1411 - s1495 * s1574 - s1585 * s1639
+    s1650 = s1410 - s1494 * s1574 - s1586 * s1639
+    s1651 = s1409 - s1493 * s1574 - s1587 * s1639
+    s1652 = s1405 - s1495 * s1575 - s1515 * s1590 - s1535 * s1605 - s1555 * s1626 - s1585 * s1640
+    s1653 = s1404 - s1494 * s1575 - s1514 * s1590 - s1534 * s1605 - s1554 * s1626 - s1586 * s1640
+    s1654 = s1403 - s1493 * s1575 - s1513 * s1590 - s1533 * s1605 - s1553 * s1626 - s1587 * s1640
+    s1655 = s1399 - s1495 * s1576 - s1515 * s1591 - s1535 * s1606 - s1555 * s1627 - s1585 * s1641
+    s1656 = s1398 - s1494 * s1576 - s1514 * s1591 - s1534 * s1606 - s1554 * s1627 - s1586 * s1641
+    s1657 = s1397 - s1493 * s1576 - s1513 * s1591 - s1533 * s1606 - s1553 * s1627 - s1587 * s1641
+    s1658 = s1393 - s1495 * s1577 - s1515 * s1592 - s1535 * s1607 - s1555 * s1628 - s1585 * s1642
+    s1659 = s1392 - s1494 * s1577 - s1514 * s1592 - s1534 * s1607 - s1554 * s1628 - s1586 * s1642
+    s1660 = s1391 - s1493 * s1577 - s1513 * s1592 - s1533 * s1607 - s1553 * s1628 - s1587 * s1642
+    s1661 = k30 - s1495 * s1578 - s1515 * s1593 - s1535 * s1608 - s1555 * s1629 - s1585 * s1643
+    s1662 = s1494 * s1578 + s1514 * s1593 + s1534 * s1608 + s1554 * s1629 + s1586 * s1643
+    s1663 = s1493 * s1578 + s1513 * s1593 + s1533 * s1608 + s1553 * s1629 + s1587 * s1643
+    s1664 = k30 - s1494 * s1579 - s1514 * s1594 - s1534 * s1609 - s1554 * s1630 - s1586 * s1644
+    s1665 = s1493 * s1579 + s1513 * s1594 + s1533 * s1609 + s1553 * s1630 + s1587 * s1644
+    s1666 = k30 - s1493 * s1580 - s1513 * s1595 - s1533 * s1610 - s1553 * s1631 - s1587 * s1645
+    s1667 = s1596 / pivot_front_right_swing_angle_dot
+    s1668 = s1597 / pivot_front_right_swing_angle_dot
+    s1669 = s1598 / pivot_front_right_swing_angle_dot
+    s1670 = s1599 / pivot_front_right_swing_angle_dot
+    s1671 = s1600 / pivot_front_right_swing_angle_dot
+    s1672 = s1601 / pivot_front_right_swing_angle_dot
+    s1673 = s1602 / pivot_front_right_swing_angle_dot
+    pivot_front_right_abduction_angle_dot = k1 + (s15 * s1421 + s18 * s1422 + s21 * s1423) - s1526 * s1589 - s1596 * s1667
+    s1674 = s17 * s1424 + s20 * s1425 + s23 * s1426 - s1532 * s1589 - s1597 * s1667
+    s1675 = s16 * s1424 + s19 * s1425 + s22 * s1426 - s1531 * s1589 - s1598 * s1667
+    s1676 = s15 * s1424 + s18 * s1425 + s21 * s1426 - s1530 * s1589 - s1599 * s1667
+    s1677 = s1420 - s1515 * s1589 - s1600 * s1667
+    s1678 = s1419 - s1514 * s1589 - s1601 * s1667
+    s1679 = s1418 - s1513 * s1589 - s1602 * s1667
+    s1680 = s1611 / pivot_hind_left_swing_angle_dot
+    s1681 = s1612 / pivot_hind_left_swing_angle_dot
+    s1682 = s1613 / pivot_hind_left_swing_angle_dot
+    s1683 = s1614 / pivot_hind_left_swing_angle_dot
+    s1684 = s1615 / pivot_hind_left_swing_angle_dot
+    s1685 = s1616 / pivot_hind_left_swing_angle_dot
+    s1686 = s1617 / pivot_hind_left_swing_angle_dot
+    pivot_hind_left_abduction_angle_dot = k1 + (s15 * s1430 + s18 * s1431 + s21 * s1432) - s1546 * s1604 - s1611 * s1680
+    s1687 = s17 * s1433 + s20 * s1434 + s23 * s1435 - s1552 * s1604 - s1612 * s1680
+    s1688 = s16 * s1433 + s19 * s1434 + s22 * s1435 - s1551 * s1604 - s1613 * s1680
+    s1689 = s15 * s1433 + s18 * s1434 + s21 * s1435 - s1550 * s1604 - s1614 * s1680
+    s1690 = s1429 - s1535 * s1604 - s1615 * s1680
+    s1691 = s1428 - s1534 * s1604 - s1616 * s1680
+    s1692 = s1427 - s1533 * s1604 - s1617 * s1680
+    s1693 = s1632 / pivot_hind_right_swing_angle_dot
+    s1694 = s1633 / pivot_hind_right_swing_angle_dot
+    s1695 = s1634 / pivot_hind_right_swing_angle_dot
+    s1696 = s1635 / pivot_hind_right_swing_angle_dot
+    s1697 = s1636 / pivot_hind_right_swing_angle_dot
+    s1698 = s1637 / pivot_hind_right_swing_angle_dot
+    s1699 = s1638 / pivot_hind_right_swing_angle_dot
+    pivot_hind_right_abduction_angle_dot = k1 + (s15 * s1439 + s18 * s1440 + s21 * s1441) - s1566 * s1625 - s1632 * s1693
+    s1700 = s17 * s1442 + s20 * s1443 + s23 * s1444 - s1572 * s1625 - s1633 * s1693
+    s1701 = s16 * s1442 + s19 * s1443 + s22 * s1444 - s1571 * s1625 - s1634 * s1693
+    s1702 = s15 * s1442 + s18 * s1443 + s21 * s1444 - s1570 * s1625 - s1635 * s1693
+    s1703 = s1438 - s1555 * s1625 - s1636 * s1693
+    s1704 = s1437 - s1554 * s1625 - s1637 * s1693
+    s1705 = s1436 - s1553 * s1625 - s1638 * s1693
+    s1706 = s1618 - s1572 * s1626 - s1582 * s1640 - s1597 * s1668 - s1612 * s1681 - s1633 * s1694
+    s1707 = s1619 - s1571 * s1626 - s1583 * s1640 - s1598 * s1668 - s1613 * s1681 - s1634 * s1694
+    s1708 = s1620 - s1570 * s1626 - s1584 * s1640 - s1599 * s1668 - s1614 * s1681 - s1635 * s1694
+    s1709 = s1621 - s1571 * s1627 - s1583 * s1641 - s1598 * s1669 - s1613 * s1682 - s1634 * s1695
+    s1710 = s1622 - s1570 * s1627 - s1584 * s1641 - s1599 * s1669 - s1614 * s1682 - s1635 * s1695
+    s1711 = s1623 - s1570 * s1628 - s1584 * s1642 - s1599 * s1670 - s1614 * s1683 - s1635 * s1696
+    s1712 = s1646 / pivot_front_left_abduction_angle_dot
+    s1713 = s1647 / pivot_front_left_abduction_angle_dot
+    s1714 = s1648 / pivot_front_left_abduction_angle_dot
+    s1715 = s1649 / pivot_front_left_abduction_angle_dot
+    s1716 = s1650 / pivot_front_left_abduction_angle_dot
+    s1717 = s1651 / pivot_front_left_abduction_angle_dot
+    s1718 = s1674 / pivot_front_right_abduction_angle_dot
+    s1719 = s1675 / pivot_front_right_abduction_angle_dot
+    s1720 = s1676 / pivot_front_right_abduction_angle_dot
+    s1721 = s1677 / pivot_front_right_abduction_angle_dot
+    s1722 = s1678 / pivot_front_right_abduction_angle_dot
+    s1723 = s1679 / pivot_front_right_abduction_angle_dot
+    s1724 = s1652 - s1600 * s1668 - s1615 * s1681 - s1636 * s1694 - s1649 * s1712 - s1677 * s1718
+    s1725 = s1653 - s1601 * s1668 - s1616 * s1681 - s1637 * s1694 - s1650 * s1712 - s1678 * s1718
+    s1726 = s1654 - s1602 * s1668 - s1617 * s1681 - s1638 * s1694 - s1651 * s1712 - s1679 * s1718
+    s1727 = s1655 - s1600 * s1669 - s1615 * s1682 - s1636 * s1695 - s1649 * s1713 - s1677 * s1719
+    s1728 = s1656 - s1601 * s1669 - s1616 * s1682 - s1637 * s1695 - s1650 * s1713 - s1678 * s1719
+    s1729 = s1657 - s1602 * s1669 - s1617 * s1682 - s1638 * s1695 - s1651 * s1713 - s1679 * s1719
+    s1730 = s1658 - s1600 * s1670 - s1615 * s1683 - s1636 * s1696 - s1649 * s1714 - s1677 * s1720
+    s1731 = s1659 - s1601 * s1670 - s1616 * s1683 - s1637 * s1696 - s1650 * s1714 - s1678 * s1720
+    s1732 = s1660 - s1602 * s1670 - s1617 * s1683 - s1638 * s1696 - s1651 * s1714 - s1679 * s1720
+    s1733 = s1661 - s1600 * s1671 - s1615 * s1684 - s1636 * s1697 - s1649 * s1715 - s1677 * s1721
+    s1734 = s1662 + s1601 * s1671 + s1616 * s1684 + s1637 * s1697 + s1650 * s1715 + s1678 * s1721
+    s1735 = s1663 + s1602 * s1671 + s1617 * s1684 + s1638 * s1697 + s1651 * s1715 + s1679 * s1721
+    s1736 = s1664 - s1601 * s1672 - s1616 * s1685 - s1637 * s1698 - s1650 * s1716 - s1678 * s1722
+    s1737 = s1665 + s1602 * s1672 + s1617 * s1685 + s1638 * s1698 + s1651 * s1716 + s1679 * s1722
+    s1738 = s1666 - s1602 * s1673 - s1617 * s1686 - s1638 * s1699 - s1651 * s1717 - s1679 * s1723
+    s1739 = s1687 / pivot_hind_left_abduction_angle_dot
+    s1740 = s1688 / pivot_hind_left_abduction_angle_dot
+    s1741 = s1689 / pivot_hind_left_abduction_angle_dot
+    s1742 = s1690 / pivot_hind_left_abduction_angle_dot
+    s1743 = s1691 / pivot_hind_left_abduction_angle_dot
+    s1744 = s1692 / pivot_hind_left_abduction_angle_dot
+    s1745 = s1700 / pivot_hind_right_abduction_angle_dot
+    s1746 = s1701 / pivot_hind_right_abduction_angle_dot
+    s1747 = s1702 / pivot_hind_right_abduction_angle_dot
+    s1748 = s1703 / pivot_hind_right_abduction_angle_dot
+    s1749 = s1704 / pivot_hind_right_abduction_angle_dot
+    s1750 = s1705 / pivot_hind_right_abduction_angle_dot
+    pivot_trunk_wz = s1706 - s1646 * s1712 - s1674 * s1718 - s1687 * s1739 - s1700 * s1745
+    s1751 = s1707 - s1647 * s1712 - s1675 * s1718 - s1688 * s1739 - s1701 * s1745
+    s1752 = s1708 - s1648 * s1712 - s1676 * s1718 - s1689 * s1739 - s1702 * s1745
+    s1753 = s1724 - s1690 * s1739 - s1703 * s1745
+    s1754 = s1725 - s1691 * s1739 - s1704 * s1745
+    s1755 = s1726 - s1692 * s1739 - s1705 * s1745
+    s1756 = s1751 / pivot_trunk_wz
+    s1757 = s1752 / pivot_trunk_wz
+    s1758 = s1753 / pivot_trunk_wz
+    s1759 = s1754 / pivot_trunk_wz
+    s1760 = s1755 / pivot_trunk_wz
+    pivot_trunk_wy = s1709 - s1647 * s1713 - s1675 * s1719 - s1688 * s1740 - s1701 * s1746 - s1751 * s1756
+    s1761 = s1710 - s1648 * s1713 - s1676 * s1719 - s1689 * s1740 - s1702 * s1746 - s1752 * s1756
+    s1762 = s1727 - s1690 * s1740 - s1703 * s1746 - s1753 * s1756
+    s1763 = s1728 - s1691 * s1740 - s1704 * s1746 - s1754 * s1756
+    s1764 = s1729 - s1692 * s1740 - s1705 * s1746 - s1755 * s1756
+    s1765 = s1711 - s1648 * s1714 - s1676 * s1720 - s1689 * s1741 - s1702 * s1747 - s1752 * s1757
+    s1766 = s1761 / pivot_trunk_wy
+    s1767 = s1762 / pivot_trunk_wy
+    s1768 = s1763 / pivot_trunk_wy
+    s1769 = s1764 / pivot_trunk_wy
+    pivot_trunk_wx = s1765 - s1761 * s1766
+    s1770 = s1730 - s1690 * s1741 - s1703 * s1747 - s1753 * s1757 - s1762 * s1766
+    s1771 = s1731 - s1691 * s1741 - s1704 * s1747 - s1754 * s1757 - s1763 * s1766
+    s1772 = s1732 - s1692 * s1741 - s1705 * s1747 - s1755 * s1757 - s1764 * s1766
+    s1773 = s1770 / pivot_trunk_wx
+    s1774 = s1771 / pivot_trunk_wx
+    s1775 = s1772 / pivot_trunk_wx
+    pivot_trunk_z_dot = s1733 - s1690 * s1742 - s1703 * s1748 - s1753 * s1758 - s1762 * s1767 - s1770 * s1773
+    s1776 = s1734 + s1691 * s1742 + s1704 * s1748 + s1754 * s1758 + s1763 * s1767 + s1771 * s1773
+    s1777 = s1735 + s1692 * s1742 + s1705 * s1748 + s1755 * s1758 + s1764 * s1767 + s1772 * s1773
+    s1778 = s1736 - s1691 * s1743 - s1704 * s1749 - s1754 * s1759 - s1763 * s1768 - s1771 * s1774
+    s1779 = s1737 + s1692 * s1743 + s1705 * s1749 + s1755 * s1759 + s1764 * s1768 + s1772 * s1774
+    s1780 = s1738 - s1692 * s1744 - s1705 * s1750 - s1755 * s1760 - s1764 * s1769 - s1772 * s1775
+    s1781 = s1776 / pivot_trunk_z_dot
+    s1782 = s1777 / pivot_trunk_z_dot
+    pivot_trunk_y_dot = s1778 - s1776 * s1781
+    s1783 = s1779 + s1777 * s1781
+    s1784 = s1783 / pivot_trunk_y_dot
+    pivot_trunk_x_dot = s1780 - s1777 * s1782 - s1783 * s1784
     omega_trunk_x = trunk_wx * s15 + trunk_wy * s16 + trunk_wz * s17
     omega_trunk_y = trunk_wx * s18 + trunk_wy * s19 + trunk_wz * s20
     omega_trunk_z = trunk_wx * s21 + trunk_wy * s22 + trunk_wz * s23
-    s1811 = s1019 * omega_trunk_y
-    s1812 = s1016 * omega_trunk_z
-    s1813 = s1013 * omega_trunk_z
-    s1814 = s1019 * omega_trunk_x
-    s1815 = s1016 * omega_trunk_x
-    s1816 = s1013 * omega_trunk_y
-    velocity_front_left_hip_x = trunk_x_dot + (s1811 - s1812)
-    velocity_front_left_hip_y = trunk_y_dot + (s1813 - s1814)
-    velocity_front_left_hip_z = trunk_z_dot + (s1815 - s1816)
-    s1817 = front_left_abduction_angle_dot * s15
-    s1818 = front_left_abduction_angle_dot * s18
-    s1819 = front_left_abduction_angle_dot * s21
-    omega_front_left_hip_x_2 = omega_trunk_x + s1817
-    omega_front_left_hip_y_2 = omega_trunk_y + s1818
-    omega_front_left_hip_z_2 = omega_trunk_z + s1819
-    velocity_front_right_hip_x = trunk_x_dot + (s1047 * omega_trunk_y - s1046 * omega_trunk_z)
-    velocity_front_right_hip_y = trunk_y_dot + (s1045 * omega_trunk_z - s1047 * omega_trunk_x)
-    velocity_front_right_hip_z = trunk_z_dot + (s1046 * omega_trunk_x - s1045 * omega_trunk_y)
-    s1820 = front_right_abduction_angle_dot * s15
-    s1821 = front_right_abduction_angle_dot * s18
-    s1822 = front_right_abduction_angle_dot * s21
-    omega_front_right_hip_x_2 = omega_trunk_x + s1820
-    omega_front_right_hip_y_2 = omega_trunk_y + s1821
-    omega_front_right_hip_z_2 = omega_trunk_z + s1822
-    velocity_hind_left_hip_x = trunk_x_dot + (s1066 * omega_trunk_y - s1065 * omega_trunk_z)
-    velocity_hind_left_hip_y = trunk_y_dot + (s1064 * omega_trunk_z - s1066 * omega_trunk_x)
-    velocity_hind_left_hip_z = trunk_z_dot + (s1065 * omega_trunk_x - s1064 * omega_trunk_y)
-    s1823 = hind_left_abduction_angle_dot * s15
-    s1824 = hind_left_abduction_angle_dot * s18
-    s1825 = hind_left_abduction_angle_dot * s21
-    omega_hind_left_hip_x_2 = omega_trunk_x + s1823
-    omega_hind_left_hip_y_2 = omega_trunk_y + s1824
-    omega_hind_left_hip_z_2 = omega_trunk_z + s1825
-    velocity_hind_right_hip_x = trunk_x_dot + (s1812 - s1811)
-    velocity_hind_right_hip_y = trunk_y_dot + (s1814 - s1813)
-    velocity_hind_right_hip_z = trunk_z_dot + (s1816 - s1815)
-    s1826 = hind_right_abduction_angle_dot * s15
-    s1827 = hind_right_abduction_angle_dot * s18
-    s1828 = hind_right_abduction_angle_dot * s21
-    omega_hind_right_hip_x_2 = omega_trunk_x + s1826
-    omega_hind_right_hip_y_2 = omega_trunk_y + s1827
-    omega_hind_right_hip_z_2 = omega_trunk_z + s1828
-    velocity_front_left_thigh_x = velocity_front_left_hip_x + (s1101 * omega_front_left_hip_y_2 - s1100 * omega_front_left_hip_z_2)
-    velocity_front_left_thigh_y = velocity_front_left_hip_y + (s1099 * omega_front_left_hip_z_2 - s1101 * omega_front_left_hip_x_2)
-    velocity_front_left_thigh_z = velocity_front_left_hip_z + (s1100 * omega_front_left_hip_x_2 - s1099 * omega_front_left_hip_y_2)
-    s1829 = front_left_swing_angle_dot * s927
-    s1830 = front_left_swing_angle_dot * s929
-    s1831 = front_left_swing_angle_dot * s931
-    omega_front_left_thigh_x_2 = omega_front_left_hip_x_2 + s1829
-    omega_front_left_thigh_y_2 = omega_front_left_hip_y_2 + s1830
-    omega_front_left_thigh_z_2 = omega_front_left_hip_z_2 + s1831
-    velocity_front_right_thigh_x = velocity_front_right_hip_x + (s1121 * omega_front_right_hip_y_2 - s1120 * omega_front_right_hip_z_2)
-    velocity_front_right_thigh_y = velocity_front_right_hip_y + (s1119 * omega_front_right_hip_z_2 - s1121 * omega_front_right_hip_x_2)
-    velocity_front_right_thigh_z = velocity_front_right_hip_z + (s1120 * omega_front_right_hip_x_2 - s1119 * omega_front_right_hip_y_2)
-    s1832 = front_right_swing_angle_dot * s933
-    s1833 = front_right_swing_angle_dot * s935
-    s1834 = front_right_swing_angle_dot * s937
-    omega_front_right_thigh_x_2 = omega_front_right_hip_x_2 + s1832
-    omega_front_right_thigh_y_2 = omega_front_right_hip_y_2 + s1833
-    omega_front_right_thigh_z_2 = omega_front_right_hip_z_2 + s1834
-    velocity_hind_left_thigh_x = velocity_hind_left_hip_x + (s1141 * omega_hind_left_hip_y_2 - s1140 * omega_hind_left_hip_z_2)
-    velocity_hind_left_thigh_y = velocity_hind_left_hip_y + (s1139 * omega_hind_left_hip_z_2 - s1141 * omega_hind_left_hip_x_2)
-    velocity_hind_left_thigh_z = velocity_hind_left_hip_z + (s1140 * omega_hind_left_hip_x_2 - s1139 * omega_hind_left_hip_y_2)
-    s1835 = hind_left_swing_angle_dot * s939
-    s1836 = hind_left_swing_angle_dot * s941
-    s1837 = hind_left_swing_angle_dot * s943
-    omega_hind_left_thigh_x_2 = omega_hind_left_hip_x_2 + s1835
-    omega_hind_left_thigh_y_2 = omega_hind_left_hip_y_2 + s1836
-    omega_hind_left_thigh_z_2 = omega_hind_left_hip_z_2 + s1837
-    velocity_hind_right_thigh_x = velocity_hind_right_hip_x + (s1161 * omega_hind_right_hip_y_2 - s1160 * omega_hind_right_hip_z_2)
-    velocity_hind_right_thigh_y = velocity_hind_right_hip_y + (s1159 * omega_hind_right_hip_z_2 - s1161 * omega_hind_right_hip_x_2)
-    velocity_hind_right_thigh_z = velocity_hind_right_hip_z + (s1160 * omega_hind_right_hip_x_2 - s1159 * omega_hind_right_hip_y_2)
-    s1838 = hind_right_swing_angle_dot * s945
-    s1839 = hind_right_swing_angle_dot * s947
-    s1840 = hind_right_swing_angle_dot * s949
-    omega_hind_right_thigh_x_2 = omega_hind_right_hip_x_2 + s1838
-    omega_hind_right_thigh_y_2 = omega_hind_right_hip_y_2 + s1839
-    omega_hind_right_thigh_z_2 = omega_hind_right_hip_z_2 + s1840
-    velocity_front_left_shank_x = velocity_front_left_thigh_x + (s1181 * omega_front_left_thigh_y_2 - s1180 * omega_front_left_thigh_z_2)
-    velocity_front_left_shank_y = velocity_front_left_thigh_y + (s1179 * omega_front_left_thigh_z_2 - s1181 * omega_front_left_thigh_x_2)
-    velocity_front_left_shank_z = velocity_front_left_thigh_z + (s1180 * omega_front_left_thigh_x_2 - s1179 * omega_front_left_thigh_y_2)
-    s1841 = front_left_knee_angle_dot * s927
-    s1842 = front_left_knee_angle_dot * s929
-    s1843 = front_left_knee_angle_dot * s931
-    omega_front_left_shank_x_2 = omega_front_left_thigh_x_2 + s1841
-    omega_front_left_shank_y_2 = omega_front_left_thigh_y_2 + s1842
-    omega_front_left_shank_z_2 = omega_front_left_thigh_z_2 + s1843
-    s1844 = s1200 * omega_front_right_thigh_y_2 - s1199 * omega_front_right_thigh_z_2
-    s1845 = s1198 * omega_front_right_thigh_z_2 - s1200 * omega_front_right_thigh_x_2
-    s1846 = s1199 * omega_front_right_thigh_x_2 - s1198 * omega_front_right_thigh_y_2
-    velocity_front_right_shank_x = velocity_front_right_thigh_x + s1844
-    velocity_front_right_shank_y = velocity_front_right_thigh_y + s1845
-    velocity_front_right_shank_z = velocity_front_right_thigh_z + s1846
-    s1847 = front_right_knee_angle_dot * s933
-    s1848 = front_right_knee_angle_dot * s935
-    s1849 = front_right_knee_angle_dot * s937
-    omega_front_right_shank_x_2 = omega_front_right_thigh_x_2 + s1847
-    omega_front_right_shank_y_2 = omega_front_right_thigh_y_2 + s1848
-    omega_front_right_shank_z_2 = omega_front_right_thigh_z_2 + s1849
-    velocity_hind_left_shank_x = velocity_hind_left_thigh_x + (s1219 * omega_hind_left_thigh_y_2 - s1218 * omega_hind_left_thigh_z_2)
-    velocity_hind_left_shank_y = velocity_hind_left_thigh_y + (s1217 * omega_hind_left_thigh_z_2 - s1219 * omega_hind_left_thigh_x_2)
-    velocity_hind_left_shank_z = velocity_hind_left_thigh_z + (s1218 * omega_hind_left_thigh_x_2 - s1217 * omega_hind_left_thigh_y_2)
-    s1850 = hind_left_knee_angle_dot * s939
-    s1851 = hind_left_knee_angle_dot * s941
-    s1852 = hind_left_knee_angle_dot * s943
-    omega_hind_left_shank_x_2 = omega_hind_left_thigh_x_2 + s1850
-    omega_hind_left_shank_y_2 = omega_hind_left_thigh_y_2 + s1851
-    omega_hind_left_shank_z_2 = omega_hind_left_thigh_z_2 + s1852
-    velocity_hind_right_shank_x = velocity_hind_right_thigh_x + (s1238 * omega_hind_right_thigh_y_2 - s1237 * omega_hind_right_thigh_z_2)
-    velocity_hind_right_shank_y = velocity_hind_right_thigh_y + (s1236 * omega_hind_right_thigh_z_2 - s1238 * omega_hind_right_thigh_x_2)
-    velocity_hind_right_shank_z = velocity_hind_right_thigh_z + (s1237 * omega_hind_right_thigh_x_2 - s1236 * omega_hind_right_thigh_y_2)
-    s1853 = hind_right_knee_angle_dot * s945
-    s1854 = hind_right_knee_angle_dot * s947
-    s1855 = hind_right_knee_angle_dot * s949
-    omega_hind_right_shank_x_2 = omega_hind_right_thigh_x_2 + s1853
-    omega_hind_right_shank_y_2 = omega_hind_right_thigh_y_2 + s1854
-    omega_hind_right_shank_z_2 = omega_hind_right_thigh_z_2 + s1855
-    a_trunk_3_z = g - (g + s864)
-    s1856 = s16 * alpha_trunk_y - s15 * s868 - s17 * s865
-    s1857 = s19 * alpha_trunk_y - s18 * s868 - s20 * s865
-    s1858 = s22 * alpha_trunk_y - s21 * s868 - s23 * s865
+    s1785 = s993 * omega_trunk_y
+    s1786 = s990 * omega_trunk_z
+    s1787 = s987 * omega_trunk_z
+    s1788 = s993 * omega_trunk_x
+    s1789 = s990 * omega_trunk_x
+    s1790 = s987 * omega_trunk_y
+    velocity_front_left_hip_x = trunk_x_dot + (s1785 - s1786)
+    velocity_front_left_hip_y = trunk_y_dot + (s1787 - s1788)
+    velocity_front_left_hip_z = trunk_z_dot + (s1789 - s1790)
+    s1791 = front_left_abduction_angle_dot * s15
+    s1792 = front_left_abduction_angle_dot * s18
+    s1793 = front_left_abduction_angle_dot * s21
+    omega_front_left_hip_x_2 = omega_trunk_x + s1791
+    omega_front_left_hip_y_2 = omega_trunk_y + s1792
+    omega_front_left_hip_z_2 = omega_trunk_z + s1793
+    velocity_front_right_hip_x = trunk_x_dot + (s1021 * omega_trunk_y - s1020 * omega_trunk_z)
+    velocity_front_right_hip_y = trunk_y_dot + (s1019 * omega_trunk_z - s1021 * omega_trunk_x)
+    velocity_front_right_hip_z = trunk_z_dot + (s1020 * omega_trunk_x - s1019 * omega_trunk_y)
+    s1794 = front_right_abduction_angle_dot * s15
+    s1795 = front_right_abduction_angle_dot * s18
+    s1796 = front_right_abduction_angle_dot * s21
+    omega_front_right_hip_x_2 = omega_trunk_x + s1794
+    omega_front_right_hip_y_2 = omega_trunk_y + s1795
+    omega_front_right_hip_z_2 = omega_trunk_z + s1796
+    velocity_hind_left_hip_x = trunk_x_dot + (s1040 * omega_trunk_y - s1039 * omega_trunk_z)
+    velocity_hind_left_hip_y = trunk_y_dot + (s1038 * omega_trunk_z - s1040 * omega_trunk_x)
+    velocity_hind_left_hip_z = trunk_z_dot + (s1039 * omega_trunk_x - s1038 * omega_trunk_y)
+    s1797 = hind_left_abduction_angle_dot * s15
+    s1798 = hind_left_abduction_angle_dot * s18
+    s1799 = hind_left_abduction_angle_dot * s21
+    omega_hind_left_hip_x_2 = omega_trunk_x + s1797
+    omega_hind_left_hip_y_2 = omega_trunk_y + s1798
+    omega_hind_left_hip_z_2 = omega_trunk_z + s1799
+    velocity_hind_right_hip_x = trunk_x_dot + (s1786 - s1785)
+    velocity_hind_right_hip_y = trunk_y_dot + (s1788 - s1787)
+    velocity_hind_right_hip_z = trunk_z_dot + (s1790 - s1789)
+    s1800 = hind_right_abduction_angle_dot * s15
+    s1801 = hind_right_abduction_angle_dot * s18
+    s1802 = hind_right_abduction_angle_dot * s21
+    omega_hind_right_hip_x_2 = omega_trunk_x + s1800
+    omega_hind_right_hip_y_2 = omega_trunk_y + s1801
+    omega_hind_right_hip_z_2 = omega_trunk_z + s1802
+    velocity_front_left_thigh_x = velocity_front_left_hip_x + (s1075 * omega_front_left_hip_y_2 - s1074 * omega_front_left_hip_z_2)
+    velocity_front_left_thigh_y = velocity_front_left_hip_y + (s1073 * omega_front_left_hip_z_2 - s1075 * omega_front_left_hip_x_2)
+    velocity_front_left_thigh_z = velocity_front_left_hip_z + (s1074 * omega_front_left_hip_x_2 - s1073 * omega_front_left_hip_y_2)
+    s1803 = front_left_swing_angle_dot * s901
+    s1804 = front_left_swing_angle_dot * s903
+    s1805 = front_left_swing_angle_dot * s905
+    omega_front_left_thigh_x_2 = omega_front_left_hip_x_2 + s1803
+    omega_front_left_thigh_y_2 = omega_front_left_hip_y_2 + s1804
+    omega_front_left_thigh_z_2 = omega_front_left_hip_z_2 + s1805
+    velocity_front_right_thigh_x = velocity_front_right_hip_x + (s1095 * omega_front_right_hip_y_2 - s1094 * omega_front_right_hip_z_2)
+    velocity_front_right_thigh_y = velocity_front_right_hip_y + (s1093 * omega_front_right_hip_z_2 - s1095 * omega_front_right_hip_x_2)
+    velocity_front_right_thigh_z = velocity_front_right_hip_z + (s1094 * omega_front_right_hip_x_2 - s1093 * omega_front_right_hip_y_2)
+    s1806 = front_right_swing_angle_dot * s907
+    s1807 = front_right_swing_angle_dot * s909
+    s1808 = front_right_swing_angle_dot * s911
+    omega_front_right_thigh_x_2 = omega_front_right_hip_x_2 + s1806
+    omega_front_right_thigh_y_2 = omega_front_right_hip_y_2 + s1807
+    omega_front_right_thigh_z_2 = omega_front_right_hip_z_2 + s1808
+    velocity_hind_left_thigh_x = velocity_hind_left_hip_x + (s1115 * omega_hind_left_hip_y_2 - s1114 * omega_hind_left_hip_z_2)
+    velocity_hind_left_thigh_y = velocity_hind_left_hip_y + (s1113 * omega_hind_left_hip_z_2 - s1115 * omega_hind_left_hip_x_2)
+    velocity_hind_left_thigh_z = velocity_hind_left_hip_z + (s1114 * omega_hind_left_hip_x_2 - s1113 * omega_hind_left_hip_y_2)
+    s1809 = hind_left_swing_angle_dot * s913
+    s1810 = hind_left_swing_angle_dot * s915
+    s1811 = hind_left_swing_angle_dot * s917
+    omega_hind_left_thigh_x_2 = omega_hind_left_hip_x_2 + s1809
+    omega_hind_left_thigh_y_2 = omega_hind_left_hip_y_2 + s1810
+    omega_hind_left_thigh_z_2 = omega_hind_left_hip_z_2 + s1811
+    velocity_hind_right_thigh_x = velocity_hind_right_hip_x + (s1135 * omega_hind_right_hip_y_2 - s1134 * omega_hind_right_hip_z_2)
+    velocity_hind_right_thigh_y = velocity_hind_right_hip_y + (s1133 * omega_hind_right_hip_z_2 - s1135 * omega_hind_right_hip_x_2)
+    velocity_hind_right_thigh_z = velocity_hind_right_hip_z + (s1134 * omega_hind_right_hip_x_2 - s1133 * omega_hind_right_hip_y_2)
+    s1812 = hind_right_swing_angle_dot * s919
+    s1813 = hind_right_swing_angle_dot * s921
+    s1814 = hind_right_swing_angle_dot * s923
+    omega_hind_right_thigh_x_2 = omega_hind_right_hip_x_2 + s1812
+    omega_hind_right_thigh_y_2 = omega_hind_right_hip_y_2 + s1813
+    omega_hind_right_thigh_z_2 = omega_hind_right_hip_z_2 + s1814
+    velocity_front_left_shank_x = velocity_front_left_thigh_x + (s1155 * omega_front_left_thigh_y_2 - s1154 * omega_front_left_thigh_z_2)
+    velocity_front_left_shank_y = velocity_front_left_thigh_y + (s1153 * omega_front_left_thigh_z_2 - s1155 * omega_front_left_thigh_x_2)
+    velocity_front_left_shank_z = velocity_front_left_thigh_z + (s1154 * omega_front_left_thigh_x_2 - s1153 * omega_front_left_thigh_y_2)
+    s1815 = front_left_knee_angle_dot * s901
+    s1816 = front_left_knee_angle_dot * s903
+    s1817 = front_left_knee_angle_dot * s905
+    omega_front_left_shank_x_2 = omega_front_left_thigh_x_2 + s1815
+    omega_front_left_shank_y_2 = omega_front_left_thigh_y_2 + s1816
+    omega_front_left_shank_z_2 = omega_front_left_thigh_z_2 + s1817
+    s1818 = s1174 * omega_front_right_thigh_y_2 - s1173 * omega_front_right_thigh_z_2
+    s1819 = s1172 * omega_front_right_thigh_z_2 - s1174 * omega_front_right_thigh_x_2
+    s1820 = s1173 * omega_front_right_thigh_x_2 - s1172 * omega_front_right_thigh_y_2
+    velocity_front_right_shank_x = velocity_front_right_thigh_x + s1818
+    velocity_front_right_shank_y = velocity_front_right_thigh_y + s1819
+    velocity_front_right_shank_z = velocity_front_right_thigh_z + s1820
+    s1821 = front_right_knee_angle_dot * s907
+    s1822 = front_right_knee_angle_dot * s909
+    s1823 = front_right_knee_angle_dot * s911
+    omega_front_right_shank_x_2 = omega_front_right_thigh_x_2 + s1821
+    omega_front_right_shank_y_2 = omega_front_right_thigh_y_2 + s1822
+    omega_front_right_shank_z_2 = omega_front_right_thigh_z_2 + s1823
+    velocity_hind_left_shank_x = velocity_hind_left_thigh_x + (s1193 * omega_hind_left_thigh_y_2 - s1192 * omega_hind_left_thigh_z_2)
+    velocity_hind_left_shank_y = velocity_hind_left_thigh_y + (s1191 * omega_hind_left_thigh_z_2 - s1193 * omega_hind_left_thigh_x_2)
+    velocity_hind_left_shank_z = velocity_hind_left_thigh_z + (s1192 * omega_hind_left_thigh_x_2 - s1191 * omega_hind_left_thigh_y_2)
+    s1824 = hind_left_knee_angle_dot * s913
+    s1825 = hind_left_knee_angle_dot * s915
+    s1826 = hind_left_knee_angle_dot * s917
+    omega_hind_left_shank_x_2 = omega_hind_left_thigh_x_2 + s1824
+    omega_hind_left_shank_y_2 = omega_hind_left_thigh_y_2 + s1825
+    omega_hind_left_shank_z_2 = omega_hind_left_thigh_z_2 + s1826
+    velocity_hind_right_shank_x = velocity_hind_right_thigh_x + (s1212 * omega_hind_right_thigh_y_2 - s1211 * omega_hind_right_thigh_z_2)
+    velocity_hind_right_shank_y = velocity_hind_right_thigh_y + (s1210 * omega_hind_right_thigh_z_2 - s1212 * omega_hind_right_thigh_x_2)
+    velocity_hind_right_shank_z = velocity_hind_right_thigh_z + (s1211 * omega_hind_right_thigh_x_2 - s1210 * omega_hind_right_thigh_y_2)
+    s1827 = hind_right_knee_angle_dot * s919
+    s1828 = hind_right_knee_angle_dot * s921
+    s1829 = hind_right_knee_angle_dot * s923
+    omega_hind_right_shank_x_2 = omega_hind_right_thigh_x_2 + s1827
+    omega_hind_right_shank_y_2 = omega_hind_right_thigh_y_2 + s1828
+    omega_hind_right_shank_z_2 = omega_hind_right_thigh_z_2 + s1829
+    a_trunk_3_z = g - (g + s838)
+    s1830 = s16 * alpha_trunk_y - s15 * s842 - s17 * s839
+    s1831 = s19 * alpha_trunk_y - s18 * s842 - s20 * s839
+    s1832 = s22 * alpha_trunk_y - s21 * s842 - s23 * s839
     omega_trunk_x_squared = omega_trunk_x * omega_trunk_x
     omega_trunk_y_squared = omega_trunk_y * omega_trunk_y
     omega_trunk_z_squared = omega_trunk_z * omega_trunk_z
-    s1859 = omega_trunk_x * omega_trunk_y
-    s1860 = omega_trunk_x * omega_trunk_z
-    s1861 = omega_trunk_y * omega_trunk_z
-    s1862 = omega_trunk_y_squared + omega_trunk_z_squared
-    s1863 = s1859 - s1858
-    s1864 = s1857 + s1860
-    s1865 = s1858 + s1859
-    s1866 = omega_trunk_x_squared + omega_trunk_z_squared
-    s1867 = s1861 - s1856
-    s1868 = s1860 - s1857
-    s1869 = s1856 + s1861
-    s1870 = omega_trunk_x_squared + omega_trunk_y_squared
-    s1871 = s1013 * s1862
-    s1872 = s1016 * s1863
-    s1873 = s1019 * s1864
-    s1874 = s1013 * s1865
-    s1875 = s1016 * s1866
-    s1876 = s1019 * s1867
-    s1877 = s1013 * s1868 + s1016 * s1869
-    s1878 = s1019 * s1870
-    a_front_left_hip_x = s1872 - s1871 + s1873 - s863
-    a_front_left_hip_y = delta_trunk_2_y + (s1874 - s1875 + s1876)
-    a_front_left_hip_z = a_trunk_3_z + (s1877 - s1878)
-    s1879 = s1856 + (omega_trunk_y * s1819 - omega_trunk_z * s1818) - s15 * s878
-    s1880 = s1857 + (omega_trunk_z * s1817 - omega_trunk_x * s1819) - s18 * s878
-    s1881 = s1858 + (omega_trunk_x * s1818 - omega_trunk_y * s1817) - s21 * s878
+    s1833 = omega_trunk_x * omega_trunk_y
+    s1834 = omega_trunk_x * omega_trunk_z
+    s1835 = omega_trunk_y * omega_trunk_z
+    s1836 = omega_trunk_y_squared + omega_trunk_z_squared
+    s1837 = s1833 - s1832
+    s1838 = s1831 + s1834
+    s1839 = s1832 + s1833
+    s1840 = omega_trunk_x_squared + omega_trunk_z_squared
+    s1841 = s1835 - s1830
+    s1842 = s1834 - s1831
+    s1843 = s1830 + s1835
+    s1844 = omega_trunk_x_squared + omega_trunk_y_squared
+    s1845 = s987 * s1836
+    s1846 = s990 * s1837
+    s1847 = s993 * s1838
+    s1848 = s987 * s1839
+    s1849 = s990 * s1840
+    s1850 = s993 * s1841
+    s1851 = s987 * s1842 + s990 * s1843
+    s1852 = s993 * s1844
+    a_front_left_hip_x = s1846 - s1845 + s1847 - s837
+    a_front_left_hip_y = delta_trunk_2_y + (s1848 - s1849 + s1850)
+    a_front_left_hip_z = a_trunk_3_z + (s1851 - s1852)
+    s1853 = s1830 + (omega_trunk_y * s1793 - omega_trunk_z * s1792) - s15 * s852
+    s1854 = s1831 + (omega_trunk_z * s1791 - omega_trunk_x * s1793) - s18 * s852
+    s1855 = s1832 + (omega_trunk_x * s1792 - omega_trunk_y * s1791) - s21 * s852
     omega_front_left_hip_x_squared_2 = omega_front_left_hip_x_2 * omega_front_left_hip_x_2
     omega_front_left_hip_y_squared_2 = omega_front_left_hip_y_2 * omega_front_left_hip_y_2
     omega_front_left_hip_z_squared_2 = omega_front_left_hip_z_2 * omega_front_left_hip_z_2
-    s1882 = omega_front_left_hip_x_2 * omega_front_left_hip_y_2
-    s1883 = omega_front_left_hip_x_2 * omega_front_left_hip_z_2
-    s1884 = omega_front_left_hip_y_2 * omega_front_left_hip_z_2
-    s1885 = omega_front_left_hip_y_squared_2 + omega_front_left_hip_z_squared_2
-    s1886 = s1882 - s1881
-    s1887 = s1880 + s1883
-    s1888 = s1881 + s1882
-    s1889 = omega_front_left_hip_x_squared_2 + omega_front_left_hip_z_squared_2
-    s1890 = s1884 - s1879
-    s1891 = s1883 - s1880
-    s1892 = s1879 + s1884
-    s1893 = omega_front_left_hip_x_squared_2 + omega_front_left_hip_y_squared_2
-    a_front_right_hip_x = s1046 * s1863 - s1045 * s1862 + s1047 * s1864 - s863
-    a_front_right_hip_y = delta_trunk_2_y + (s1045 * s1865 - s1046 * s1866 + s1047 * s1867)
-    a_front_right_hip_z = a_trunk_3_z + (s1045 * s1868 + s1046 * s1869 - s1047 * s1870)
-    s1894 = s1856 + (omega_trunk_y * s1822 - omega_trunk_z * s1821) - s15 * s883
-    s1895 = s1857 + (omega_trunk_z * s1820 - omega_trunk_x * s1822) - s18 * s883
-    s1896 = s1858 + (omega_trunk_x * s1821 - omega_trunk_y * s1820) - s21 * s883
+    s1856 = omega_front_left_hip_x_2 * omega_front_left_hip_y_2
+    s1857 = omega_front_left_hip_x_2 * omega_front_left_hip_z_2
+    s1858 = omega_front_left_hip_y_2 * omega_front_left_hip_z_2
+    s1859 = omega_front_left_hip_y_squared_2 + omega_front_left_hip_z_squared_2
+    s1860 = s1856 - s1855
+    s1861 = s1854 + s1857
+    s1862 = s1855 + s1856
+    s1863 = omega_front_left_hip_x_squared_2 + omega_front_left_hip_z_squared_2
+    s1864 = s1858 - s1853
+    s1865 = s1857 - s1854
+    s1866 = s1853 + s1858
+    s1867 = omega_front_left_hip_x_squared_2 + omega_front_left_hip_y_squared_2
+    a_front_right_hip_x = s1020 * s1837 - s1019 * s1836 + s1021 * s1838 - s837
+    a_front_right_hip_y = delta_trunk_2_y + (s1019 * s1839 - s1020 * s1840 + s1021 * s1841)
+    a_front_right_hip_z = a_trunk_3_z + (s1019 * s1842 + s1020 * s1843 - s1021 * s1844)
+    s1868 = s1830 + (omega_trunk_y * s1796 - omega_trunk_z * s1795) - s15 * s857
+    s1869 = s1831 + (omega_trunk_z * s1794 - omega_trunk_x * s1796) - s18 * s857
+    s1870 = s1832 + (omega_trunk_x * s1795 - omega_trunk_y * s1794) - s21 * s857
     omega_front_right_hip_x_squared_2 = omega_front_right_hip_x_2 * omega_front_right_hip_x_2
     omega_front_right_hip_y_squared_2 = omega_front_right_hip_y_2 * omega_front_right_hip_y_2
     omega_front_right_hip_z_squared_2 = omega_front_right_hip_z_2 * omega_front_right_hip_z_2
-    s1897 = omega_front_right_hip_x_2 * omega_front_right_hip_y_2
-    s1898 = omega_front_right_hip_x_2 * omega_front_right_hip_z_2
-    s1899 = omega_front_right_hip_y_2 * omega_front_right_hip_z_2
-    s1900 = omega_front_right_hip_y_squared_2 + omega_front_right_hip_z_squared_2
-    s1901 = s1897 - s1896
-    s1902 = s1895 + s1898
-    s1903 = s1896 + s1897
-    s1904 = omega_front_right_hip_x_squared_2 + omega_front_right_hip_z_squared_2
-    s1905 = s1899 - s1894
-    s1906 = s1898 - s1895
-    s1907 = s1894 + s1899
-    s1908 = omega_front_right_hip_x_squared_2 + omega_front_right_hip_y_squared_2
-    a_hind_left_hip_x = s1065 * s1863 - s1064 * s1862 + s1066 * s1864 - s863
-    a_hind_left_hip_y = delta_trunk_2_y + (s1064 * s1865 - s1065 * s1866 + s1066 * s1867)
-    a_hind_left_hip_z = a_trunk_3_z + (s1064 * s1868 + s1065 * s1869 - s1066 * s1870)
-    s1909 = s1856 + (omega_trunk_y * s1825 - omega_trunk_z * s1824) - s15 * s889
-    s1910 = s1857 + (omega_trunk_z * s1823 - omega_trunk_x * s1825) - s18 * s889
-    s1911 = s1858 + (omega_trunk_x * s1824 - omega_trunk_y * s1823) - s21 * s889
+    s1871 = omega_front_right_hip_x_2 * omega_front_right_hip_y_2
+    s1872 = omega_front_right_hip_x_2 * omega_front_right_hip_z_2
+    s1873 = omega_front_right_hip_y_2 * omega_front_right_hip_z_2
+    s1874 = omega_front_right_hip_y_squared_2 + omega_front_right_hip_z_squared_2
+    s1875 = s1871 - s1870
+    s1876 = s1869 + s1872
+    s1877 = s1870 + s1871
+    s1878 = omega_front_right_hip_x_squared_2 + omega_front_right_hip_z_squared_2
+    s1879 = s1873 - s1868
+    s1880 = s1872 - s1869
+    s1881 = s1868 + s1873
+    s1882 = omega_front_right_hip_x_squared_2 + omega_front_right_hip_y_squared_2
+    a_hind_left_hip_x = s1039 * s1837 - s1038 * s1836 + s1040 * s1838 - s837
+    a_hind_left_hip_y = delta_trunk_2_y + (s1038 * s1839 - s1039 * s1840 + s1040 * s1841)
+    a_hind_left_hip_z = a_trunk_3_z + (s1038 * s1842 + s1039 * s1843 - s1040 * s1844)
+    s1883 = s1830 + (omega_trunk_y * s1799 - omega_trunk_z * s1798) - s15 * s863
+    s1884 = s1831 + (omega_trunk_z * s1797 - omega_trunk_x * s1799) - s18 * s863
+    s1885 = s1832 + (omega_trunk_x * s1798 - omega_trunk_y * s1797) - s21 * s863
     omega_hind_left_hip_x_squared_2 = omega_hind_left_hip_x_2 * omega_hind_left_hip_x_2
     omega_hind_left_hip_y_squared_2 = omega_hind_left_hip_y_2 * omega_hind_left_hip_y_2
     omega_hind_left_hip_z_squared_2 = omega_hind_left_hip_z_2 * omega_hind_left_hip_z_2
-    s1912 = omega_hind_left_hip_x_2 * omega_hind_left_hip_y_2
-    s1913 = omega_hind_left_hip_x_2 * omega_hind_left_hip_z_2
-    s1914 = omega_hind_left_hip_y_2 * omega_hind_left_hip_z_2
-    s1915 = omega_hind_left_hip_y_squared_2 + omega_hind_left_hip_z_squared_2
-    s1916 = s1912 - s1911
-    s1917 = s1910 + s1913
-    s1918 = s1911 + s1912
-    s1919 = omega_hind_left_hip_x_squared_2 + omega_hind_left_hip_z_squared_2
-    s1920 = s1914 - s1909
-    s1921 = s1913 - s1910
-    s1922 = s1909 + s1914
-    s1923 = omega_hind_left_hip_x_squared_2 + omega_hind_left_hip_y_squared_2
-    a_hind_right_hip_x = s1871 - s1872 - s1873 - s863
-    a_hind_right_hip_y = delta_trunk_2_y + (s1875 - s1874 - s1876)
-    a_hind_right_hip_z = a_trunk_3_z + (s1878 - s1877)
-    s1924 = s1856 + (omega_trunk_y * s1828 - omega_trunk_z * s1827) - s15 * s894
-    s1925 = s1857 + (omega_trunk_z * s1826 - omega_trunk_x * s1828) - s18 * s894
-    s1926 = s1858 + (omega_trunk_x * s1827 - omega_trunk_y * s1826) - s21 * s894
+    s1886 = omega_hind_left_hip_x_2 * omega_hind_left_hip_y_2
+    s1887 = omega_hind_left_hip_x_2 * omega_hind_left_hip_z_2
+    s1888 = omega_hind_left_hip_y_2 * omega_hind_left_hip_z_2
+    s1889 = omega_hind_left_hip_y_squared_2 + omega_hind_left_hip_z_squared_2
+    s1890 = s1886 - s1885
+    s1891 = s1884 + s1887
+    s1892 = s1885 + s1886
+    s1893 = omega_hind_left_hip_x_squared_2 + omega_hind_left_hip_z_squared_2
+    s1894 = s1888 - s1883
+    s1895 = s1887 - s1884
+    s1896 = s1883 + s1888
+    s1897 = omega_hind_left_hip_x_squared_2 + omega_hind_left_hip_y_squared_2
+    a_hind_right_hip_x = s1845 - s1846 - s1847 - s837
+    a_hind_right_hip_y = delta_trunk_2_y + (s1849 - s1848 - s1850)
+    a_hind_right_hip_z = a_trunk_3_z + (s1852 - s1851)
+    s1898 = s1830 + (omega_trunk_y * s1802 - omega_trunk_z * s1801) - s15 * s868
+    s1899 = s1831 + (omega_trunk_z * s1800 - omega_trunk_x * s1802) - s18 * s868
+    s1900 = s1832 + (omega_trunk_x * s1801 - omega_trunk_y * s1800) - s21 * s868
     omega_hind_right_hip_x_squared_2 = omega_hind_right_hip_x_2 * omega_hind_right_hip_x_2
     omega_hind_right_hip_y_squared_2 = omega_hind_right_hip_y_2 * omega_hind_right_hip_y_2
     omega_hind_right_hip_z_squared_2 = omega_hind_right_hip_z_2 * omega_hind_right_hip_z_2
-    s1927 = omega_hind_right_hip_x_2 * omega_hind_right_hip_y_2
-    s1928 = omega_hind_right_hip_x_2 * omega_hind_right_hip_z_2
-    s1929 = omega_hind_right_hip_y_2 * omega_hind_right_hip_z_2
-    s1930 = omega_hind_right_hip_y_squared_2 + omega_hind_right_hip_z_squared_2
-    s1931 = s1927 - s1926
-    s1932 = s1925 + s1928
-    s1933 = s1926 + s1927
-    s1934 = omega_hind_right_hip_x_squared_2 + omega_hind_right_hip_z_squared_2
-    s1935 = s1929 - s1924
-    s1936 = s1928 - s1925
-    s1937 = s1924 + s1929
-    s1938 = omega_hind_right_hip_x_squared_2 + omega_hind_right_hip_y_squared_2
-    a_front_left_thigh_x = a_front_left_hip_x + (s1100 * s1886 - s1099 * s1885 + s1101 * s1887)
-    a_front_left_thigh_y = a_front_left_hip_y + (s1099 * s1888 - s1100 * s1889 + s1101 * s1890)
-    a_front_left_thigh_z = a_front_left_hip_z + (s1099 * s1891 + s1100 * s1892 - s1101 * s1893)
-    s1939 = s1879 + (omega_front_left_hip_y_2 * s1831 - omega_front_left_hip_z_2 * s1830)
-    s1940 = s1880 + (omega_front_left_hip_z_2 * s1829 - omega_front_left_hip_x_2 * s1831)
-    s1941 = s1881 + (omega_front_left_hip_x_2 * s1830 - omega_front_left_hip_y_2 * s1829)
-    s1942 = s1939 - s927 * s900
-    s1943 = s1940 - s929 * s900
-    s1944 = s1941 - s931 * s900
+    s1901 = omega_hind_right_hip_x_2 * omega_hind_right_hip_y_2
+    s1902 = omega_hind_right_hip_x_2 * omega_hind_right_hip_z_2
+    s1903 = omega_hind_right_hip_y_2 * omega_hind_right_hip_z_2
+    s1904 = omega_hind_right_hip_y_squared_2 + omega_hind_right_hip_z_squared_2
+    s1905 = s1901 - s1900
+    s1906 = s1899 + s1902
+    s1907 = s1900 + s1901
+    s1908 = omega_hind_right_hip_x_squared_2 + omega_hind_right_hip_z_squared_2
+    s1909 = s1903 - s1898
+    s1910 = s1902 - s1899
+    s1911 = s1898 + s1903
+    s1912 = omega_hind_right_hip_x_squared_2 + omega_hind_right_hip_y_squared_2
+    a_front_left_thigh_x = a_front_left_hip_x + (s1074 * s1860 - s1073 * s1859 + s1075 * s1861)
+    a_front_left_thigh_y = a_front_left_hip_y + (s1073 * s1862 - s1074 * s1863 + s1075 * s1864)
+    a_front_left_thigh_z = a_front_left_hip_z + (s1073 * s1865 + s1074 * s1866 - s1075 * s1867)
+    s1913 = s1853 + (omega_front_left_hip_y_2 * s1805 - omega_front_left_hip_z_2 * s1804)
+    s1914 = s1854 + (omega_front_left_hip_z_2 * s1803 - omega_front_left_hip_x_2 * s1805)
+    s1915 = s1855 + (omega_front_left_hip_x_2 * s1804 - omega_front_left_hip_y_2 * s1803)
+    s1916 = s1913 - s901 * s874
+    s1917 = s1914 - s903 * s874
+    s1918 = s1915 - s905 * s874
     omega_front_left_thigh_x_squared_2 = omega_front_left_thigh_x_2 * omega_front_left_thigh_x_2
     omega_front_left_thigh_y_squared_2 = omega_front_left_thigh_y_2 * omega_front_left_thigh_y_2
     omega_front_left_thigh_z_squared_2 = omega_front_left_thigh_z_2 * omega_front_left_thigh_z_2
-    s1945 = omega_front_left_thigh_x_2 * omega_front_left_thigh_y_2
-    s1946 = omega_front_left_thigh_x_2 * omega_front_left_thigh_z_2
-    s1947 = omega_front_left_thigh_y_2 * omega_front_left_thigh_z_2
-    s1948 = omega_front_left_thigh_y_squared_2 + omega_front_left_thigh_z_squared_2
-    s1949 = s1945 - s1944
-    s1950 = s1943 + s1946
-    s1951 = s1944 + s1945
-    s1952 = omega_front_left_thigh_x_squared_2 + omega_front_left_thigh_z_squared_2
-    s1953 = s1947 - s1942
-    s1954 = s1946 - s1943
-    s1955 = s1942 + s1947
-    s1956 = omega_front_left_thigh_x_squared_2 + omega_front_left_thigh_y_squared_2
-    a_front_right_thigh_x = a_front_right_hip_x + (s1120 * s1901 - s1119 * s1900 + s1121 * s1902)
-    a_front_right_thigh_y = a_front_right_hip_y + (s1119 * s1903 - s1120 * s1904 + s1121 * s1905)
-    a_front_right_thigh_z = a_front_right_hip_z + (s1119 * s1906 + s1120 * s1907 - s1121 * s1908)
-    s1957 = s1894 + (omega_front_right_hip_y_2 * s1834 - omega_front_right_hip_z_2 * s1833)
-    s1958 = s1895 + (omega_front_right_hip_z_2 * s1832 - omega_front_right_hip_x_2 * s1834)
-    s1959 = s1896 + (omega_front_right_hip_x_2 * s1833 - omega_front_right_hip_y_2 * s1832)
-    s1960 = s1957 - s933 * s905
-    s1961 = s1958 - s935 * s905
-    s1962 = s1959 - s937 * s905
+    s1919 = omega_front_left_thigh_x_2 * omega_front_left_thigh_y_2
+    s1920 = omega_front_left_thigh_x_2 * omega_front_left_thigh_z_2
+    s1921 = omega_front_left_thigh_y_2 * omega_front_left_thigh_z_2
+    s1922 = omega_front_left_thigh_y_squared_2 + omega_front_left_thigh_z_squared_2
+    s1923 = s1919 - s1918
+    s1924 = s1917 + s1920
+    s1925 = s1918 + s1919
+    s1926 = omega_front_left_thigh_x_squared_2 + omega_front_left_thigh_z_squared_2
+    s1927 = s1921 - s1916
+    s1928 = s1920 - s1917
+    s1929 = s1916 + s1921
+    s1930 = omega_front_left_thigh_x_squared_2 + omega_front_left_thigh_y_squared_2
+    a_front_right_thigh_x = a_front_right_hip_x + (s1094 * s1875 - s1093 * s1874 + s1095 * s1876)
+    a_front_right_thigh_y = a_front_right_hip_y + (s1093 * s1877 - s1094 * s1878 + s1095 * s1879)
+    a_front_right_thigh_z = a_front_right_hip_z + (s1093 * s1880 + s1094 * s1881 - s1095 * s1882)
+    s1931 = s1868 + (omega_front_right_hip_y_2 * s1808 - omega_front_right_hip_z_2 * s1807)
+    s1932 = s1869 + (omega_front_right_hip_z_2 * s1806 - omega_front_right_hip_x_2 * s1808)
+    s1933 = s1870 + (omega_front_right_hip_x_2 * s1807 - omega_front_right_hip_y_2 * s1806)
+    s1934 = s1931 - s907 * s879
+    s1935 = s1932 - s909 * s879
+    s1936 = s1933 - s911 * s879
     omega_front_right_thigh_x_squared_2 = omega_front_right_thigh_x_2 * omega_front_right_thigh_x_2
     omega_front_right_thigh_y_squared_2 = omega_front_right_thigh_y_2 * omega_front_right_thigh_y_2
     omega_front_right_thigh_z_squared_2 = omega_front_right_thigh_z_2 * omega_front_right_thigh_z_2
-    s1963 = omega_front_right_thigh_x_2 * omega_front_right_thigh_y_2
-    s1964 = omega_front_right_thigh_x_2 * omega_front_right_thigh_z_2
-    s1965 = omega_front_right_thigh_y_2 * omega_front_right_thigh_z_2
-    s1966 = omega_front_right_thigh_y_squared_2 + omega_front_right_thigh_z_squared_2
-    s1967 = s1963 - s1962
-    s1968 = s1961 + s1964
-    s1969 = s1962 + s1963
-    s1970 = omega_front_right_thigh_x_squared_2 + omega_front_right_thigh_z_squared_2
-    s1971 = s1965 - s1960
-    s1972 = s1964 - s1961
-    s1973 = s1960 + s1965
-    s1974 = omega_front_right_thigh_x_squared_2 + omega_front_right_thigh_y_squared_2
-    s1975 = omega_front_right_thigh_z_squared_2 - omega_front_right_thigh_y_squared_2
-    s1976 = omega_front_right_thigh_x_squared_2 - omega_front_right_thigh_z_squared_2
-    s1977 = omega_front_right_thigh_y_squared_2 - omega_front_right_thigh_x_squared_2
-    a_hind_left_thigh_x = a_hind_left_hip_x + (s1140 * s1916 - s1139 * s1915 + s1141 * s1917)
-    a_hind_left_thigh_y = a_hind_left_hip_y + (s1139 * s1918 - s1140 * s1919 + s1141 * s1920)
-    a_hind_left_thigh_z = a_hind_left_hip_z + (s1139 * s1921 + s1140 * s1922 - s1141 * s1923)
-    s1978 = s1909 + (omega_hind_left_hip_y_2 * s1837 - omega_hind_left_hip_z_2 * s1836)
-    s1979 = s1910 + (omega_hind_left_hip_z_2 * s1835 - omega_hind_left_hip_x_2 * s1837)
-    s1980 = s1911 + (omega_hind_left_hip_x_2 * s1836 - omega_hind_left_hip_y_2 * s1835)
-    s1981 = s1978 - s939 * s910
-    s1982 = s1979 - s941 * s910
-    s1983 = s1980 - s943 * s910
+    s1937 = omega_front_right_thigh_x_2 * omega_front_right_thigh_y_2
+    s1938 = omega_front_right_thigh_x_2 * omega_front_right_thigh_z_2
+    s1939 = omega_front_right_thigh_y_2 * omega_front_right_thigh_z_2
+    s1940 = omega_front_right_thigh_y_squared_2 + omega_front_right_thigh_z_squared_2
+    s1941 = s1937 - s1936
+    s1942 = s1935 + s1938
+    s1943 = s1936 + s1937
+    s1944 = omega_front_right_thigh_x_squared_2 + omega_front_right_thigh_z_squared_2
+    s1945 = s1939 - s1934
+    s1946 = s1938 - s1935
+    s1947 = s1934 + s1939
+    s1948 = omega_front_right_thigh_x_squared_2 + omega_front_right_thigh_y_squared_2
+    s1949 = omega_front_right_thigh_z_squared_2 - omega_front_right_thigh_y_squared_2
+    s1950 = omega_front_right_thigh_x_squared_2 - omega_front_right_thigh_z_squared_2
+    s1951 = omega_front_right_thigh_y_squared_2 - omega_front_right_thigh_x_squared_2
+    a_hind_left_thigh_x = a_hind_left_hip_x + (s1114 * s1890 - s1113 * s1889 + s1115 * s1891)
+    a_hind_left_thigh_y = a_hind_left_hip_y + (s1113 * s1892 - s1114 * s1893 + s1115 * s1894)
+    a_hind_left_thigh_z = a_hind_left_hip_z + (s1113 * s1895 + s1114 * s1896 - s1115 * s1897)
+    s1952 = s1883 + (omega_hind_left_hip_y_2 * s1811 - omega_hind_left_hip_z_2 * s1810)
+    s1953 = s1884 + (omega_hind_left_hip_z_2 * s1809 - omega_hind_left_hip_x_2 * s1811)
+    s1954 = s1885 + (omega_hind_left_hip_x_2 * s1810 - omega_hind_left_hip_y_2 * s1809)
+    s1955 = s1952 - s913 * s884
+    s1956 = s1953 - s915 * s884
+    s1957 = s1954 - s917 * s884
     omega_hind_left_thigh_x_squared_2 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_x_2
     omega_hind_left_thigh_y_squared_2 = omega_hind_left_thigh_y_2 * omega_hind_left_thigh_y_2
     omega_hind_left_thigh_z_squared_2 = omega_hind_left_thigh_z_2 * omega_hind_left_thigh_z_2
-    s1984 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_y_2
-    s1985 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_z_2
-    s1986 = omega_hind_left_thigh_y_2 * omega_hind_left_thigh_z_2
-    s1987 = omega_hind_left_thigh_y_squared_2 + omega_hind_left_thigh_z_squared_2
-    s1988 = s1984 - s1983
-    s1989 = s1982 + s1985
-    s1990 = s1983 + s1984
-    s1991 = omega_hind_left_thigh_x_squared_2 + omega_hind_left_thigh_z_squared_2
-    s1992 = s1986 - s1981
-    s1993 = s1985 - s1982
-    s1994 = s1981 + s1986
-    s1995 = omega_hind_left_thigh_x_squared_2 + omega_hind_left_thigh_y_squared_2
-    a_hind_right_thigh_x = a_hind_right_hip_x + (s1160 * s1931 - s1159 * s1930 + s1161 * s1932)
-    a_hind_right_thigh_y = a_hind_right_hip_y + (s1159 * s1933 - s1160 * s1934 + s1161 * s1935)
-    a_hind_right_thigh_z = a_hind_right_hip_z + (s1159 * s1936 + s1160 * s1937 - s1161 * s1938)
-    s1996 = s1924 + (omega_hind_right_hip_y_2 * s1840 - omega_hind_right_hip_z_2 * s1839)
-    s1997 = s1925 + (omega_hind_right_hip_z_2 * s1838 - omega_hind_right_hip_x_2 * s1840)
-    s1998 = s1926 + (omega_hind_right_hip_x_2 * s1839 - omega_hind_right_hip_y_2 * s1838)
-    s1999 = s1996 - s945 * s915
-    s2000 = s1997 - s947 * s915
-    s2001 = s1998 - s949 * s915
+    s1958 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_y_2
+    s1959 = omega_hind_left_thigh_x_2 * omega_hind_left_thigh_z_2
+    s1960 = omega_hind_left_thigh_y_2 * omega_hind_left_thigh_z_2
+    s1961 = omega_hind_left_thigh_y_squared_2 + omega_hind_left_thigh_z_squared_2
+    s1962 = s1958 - s1957
+    s1963 = s1956 + s1959
+    s1964 = s1957 + s1958
+    s1965 = omega_hind_left_thigh_x_squared_2 + omega_hind_left_thigh_z_squared_2
+    s1966 = s1960 - s1955
+    s1967 = s1959 - s1956
+    s1968 = s1955 + s1960
+    s1969 = omega_hind_left_thigh_x_squared_2 + omega_hind_left_thigh_y_squared_2
+    a_hind_right_thigh_x = a_hind_right_hip_x + (s1134 * s1905 - s1133 * s1904 + s1135 * s1906)
+    a_hind_right_thigh_y = a_hind_right_hip_y + (s1133 * s1907 - s1134 * s1908 + s1135 * s1909)
+    a_hind_right_thigh_z = a_hind_right_hip_z + (s1133 * s1910 + s1134 * s1911 - s1135 * s1912)
+    s1970 = s1898 + (omega_hind_right_hip_y_2 * s1814 - omega_hind_right_hip_z_2 * s1813)
+    s1971 = s1899 + (omega_hind_right_hip_z_2 * s1812 - omega_hind_right_hip_x_2 * s1814)
+    s1972 = s1900 + (omega_hind_right_hip_x_2 * s1813 - omega_hind_right_hip_y_2 * s1812)
+    s1973 = s1970 - s919 * s889
+    s1974 = s1971 - s921 * s889
+    s1975 = s1972 - s923 * s889
     omega_hind_right_thigh_x_squared_2 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_x_2
     omega_hind_right_thigh_y_squared_2 = omega_hind_right_thigh_y_2 * omega_hind_right_thigh_y_2
     omega_hind_right_thigh_z_squared_2 = omega_hind_right_thigh_z_2 * omega_hind_right_thigh_z_2
-    s2002 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_y_2
-    s2003 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_z_2
-    s2004 = omega_hind_right_thigh_y_2 * omega_hind_right_thigh_z_2
-    s2005 = omega_hind_right_thigh_y_squared_2 + omega_hind_right_thigh_z_squared_2
-    s2006 = s2002 - s2001
-    s2007 = s2000 + s2003
-    s2008 = s2001 + s2002
-    s2009 = omega_hind_right_thigh_x_squared_2 + omega_hind_right_thigh_z_squared_2
-    s2010 = s2004 - s1999
-    s2011 = s2003 - s2000
-    s2012 = s1999 + s2004
-    s2013 = omega_hind_right_thigh_x_squared_2 + omega_hind_right_thigh_y_squared_2
-    a_front_left_shank_x = a_front_left_thigh_x + (s1180 * s1949 - s1179 * s1948 + s1181 * s1950)
-    a_front_left_shank_y = a_front_left_thigh_y + (s1179 * s1951 - s1180 * s1952 + s1181 * s1953)
-    a_front_left_shank_z = a_front_left_thigh_z + (s1179 * s1954 + s1180 * s1955 - s1181 * s1956)
-    s2014 = s1942 + (omega_front_left_thigh_y_2 * s1843 - omega_front_left_thigh_z_2 * s1842)
-    s2015 = s1943 + (omega_front_left_thigh_z_2 * s1841 - omega_front_left_thigh_x_2 * s1843)
-    s2016 = s1944 + (omega_front_left_thigh_x_2 * s1842 - omega_front_left_thigh_y_2 * s1841)
-    s2017 = s2014 + s927 * front_left_knee_angle_ddot
-    s2018 = s2015 + s929 * front_left_knee_angle_ddot
-    s2019 = s2016 + s931 * front_left_knee_angle_ddot
+    s1976 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_y_2
+    s1977 = omega_hind_right_thigh_x_2 * omega_hind_right_thigh_z_2
+    s1978 = omega_hind_right_thigh_y_2 * omega_hind_right_thigh_z_2
+    s1979 = omega_hind_right_thigh_y_squared_2 + omega_hind_right_thigh_z_squared_2
+    s1980 = s1976 - s1975
+    s1981 = s1974 + s1977
+    s1982 = s1975 + s1976
+    s1983 = omega_hind_right_thigh_x_squared_2 + omega_hind_right_thigh_z_squared_2
+    s1984 = s1978 - s1973
+    s1985 = s1977 - s1974
+    s1986 = s1973 + s1978
+    s1987 = omega_hind_right_thigh_x_squared_2 + omega_hind_right_thigh_y_squared_2
+    a_front_left_shank_x = a_front_left_thigh_x + (s1154 * s1923 - s1153 * s1922 + s1155 * s1924)
+    a_front_left_shank_y = a_front_left_thigh_y + (s1153 * s1925 - s1154 * s1926 + s1155 * s1927)
+    a_front_left_shank_z = a_front_left_thigh_z + (s1153 * s1928 + s1154 * s1929 - s1155 * s1930)
+    s1988 = s1916 + (omega_front_left_thigh_y_2 * s1817 - omega_front_left_thigh_z_2 * s1816)
+    s1989 = s1917 + (omega_front_left_thigh_z_2 * s1815 - omega_front_left_thigh_x_2 * s1817)
+    s1990 = s1918 + (omega_front_left_thigh_x_2 * s1816 - omega_front_left_thigh_y_2 * s1815)
+    s1991 = s1988 + s901 * front_left_knee_angle_ddot
+    s1992 = s1989 + s903 * front_left_knee_angle_ddot
+    s1993 = s1990 + s905 * front_left_knee_angle_ddot
     omega_front_left_shank_x_squared = omega_front_left_shank_x_2 * omega_front_left_shank_x_2
     omega_front_left_shank_y_squared = omega_front_left_shank_y_2 * omega_front_left_shank_y_2
     omega_front_left_shank_z_squared = omega_front_left_shank_z_2 * omega_front_left_shank_z_2
-    s2020 = omega_front_left_shank_x_2 * omega_front_left_shank_y_2
-    s2021 = omega_front_left_shank_x_2 * omega_front_left_shank_z_2
-    s2022 = omega_front_left_shank_y_2 * omega_front_left_shank_z_2
-    s2023 = s2020 - s2019
-    s2024 = s2018 + s2021
-    s2025 = s2019 + s2020
-    s2026 = s2022 - s2017
-    s2027 = s2021 - s2018
-    s2028 = s2017 + s2022
-    a_front_right_shank_x = a_front_right_thigh_x + (s1199 * s1967 - s1198 * s1966 + s1200 * s1968)
-    a_front_right_shank_y = a_front_right_thigh_y + (s1198 * s1969 - s1199 * s1970 + s1200 * s1971)
-    a_front_right_shank_z = a_front_right_thigh_z + (s1198 * s1972 + s1199 * s1973 - s1200 * s1974)
-    s2029 = omega_front_right_thigh_y_2 * s1849 - omega_front_right_thigh_z_2 * s1848
-    s2030 = omega_front_right_thigh_z_2 * s1847 - omega_front_right_thigh_x_2 * s1849
-    s2031 = omega_front_right_thigh_x_2 * s1848 - omega_front_right_thigh_y_2 * s1847
-    s2032 = s1960 + s2029 + s933 * front_right_knee_angle_ddot
-    s2033 = s1961 + s2030 + s935 * front_right_knee_angle_ddot
-    s2034 = s1962 + s2031 + s937 * front_right_knee_angle_ddot
+    s1994 = omega_front_left_shank_x_2 * omega_front_left_shank_y_2
+    s1995 = omega_front_left_shank_x_2 * omega_front_left_shank_z_2
+    s1996 = omega_front_left_shank_y_2 * omega_front_left_shank_z_2
+    s1997 = s1994 - s1993
+    s1998 = s1992 + s1995
+    s1999 = s1993 + s1994
+    s2000 = s1996 - s1991
+    s2001 = s1995 - s1992
+    s2002 = s1991 + s1996
+    a_front_right_shank_x = a_front_right_thigh_x + (s1173 * s1941 - s1172 * s1940 + s1174 * s1942)
+    a_front_right_shank_y = a_front_right_thigh_y + (s1172 * s1943 - s1173 * s1944 + s1174 * s1945)
+    a_front_right_shank_z = a_front_right_thigh_z + (s1172 * s1946 + s1173 * s1947 - s1174 * s1948)
+    s2003 = omega_front_right_thigh_y_2 * s1823 - omega_front_right_thigh_z_2 * s1822
+    s2004 = omega_front_right_thigh_z_2 * s1821 - omega_front_right_thigh_x_2 * s1823
+    s2005 = omega_front_right_thigh_x_2 * s1822 - omega_front_right_thigh_y_2 * s1821
+    s2006 = s1934 + s2003 + s907 * front_right_knee_angle_ddot
+    s2007 = s1935 + s2004 + s909 * front_right_knee_angle_ddot
+    s2008 = s1936 + s2005 + s911 * front_right_knee_angle_ddot
     omega_front_right_shank_x_squared = omega_front_right_shank_x_2 * omega_front_right_shank_x_2
     omega_front_right_shank_y_squared = omega_front_right_shank_y_2 * omega_front_right_shank_y_2
     omega_front_right_shank_z_squared = omega_front_right_shank_z_2 * omega_front_right_shank_z_2
-    s2035 = omega_front_right_shank_x_2 * omega_front_right_shank_y_2
-    s2036 = omega_front_right_shank_x_2 * omega_front_right_shank_z_2
-    s2037 = omega_front_right_shank_y_2 * omega_front_right_shank_z_2
-    s2038 = s2035 - s2034
-    s2039 = s2033 + s2036
-    s2040 = s2034 + s2035
-    s2041 = s2037 - s2032
-    s2042 = s2036 - s2033
-    s2043 = s2032 + s2037
-    a_hind_left_shank_x = a_hind_left_thigh_x + (s1218 * s1988 - s1217 * s1987 + s1219 * s1989)
-    a_hind_left_shank_y = a_hind_left_thigh_y + (s1217 * s1990 - s1218 * s1991 + s1219 * s1992)
-    a_hind_left_shank_z = a_hind_left_thigh_z + (s1217 * s1993 + s1218 * s1994 - s1219 * s1995)
-    s2044 = s1981 + (omega_hind_left_thigh_y_2 * s1852 - omega_hind_left_thigh_z_2 * s1851)
-    s2045 = s1982 + (omega_hind_left_thigh_z_2 * s1850 - omega_hind_left_thigh_x_2 * s1852)
-    s2046 = s1983 + (omega_hind_left_thigh_x_2 * s1851 - omega_hind_left_thigh_y_2 * s1850)
-    s2047 = s2044 + s939 * hind_left_knee_angle_ddot
-    s2048 = s2045 + s941 * hind_left_knee_angle_ddot
-    s2049 = s2046 + s943 * hind_left_knee_angle_ddot
+    s2009 = omega_front_right_shank_x_2 * omega_front_right_shank_y_2
+    s2010 = omega_front_right_shank_x_2 * omega_front_right_shank_z_2
+    s2011 = omega_front_right_shank_y_2 * omega_front_right_shank_z_2
+    s2012 = s2009 - s2008
+    s2013 = s2007 + s2010
+    s2014 = s2008 + s2009
+    s2015 = s2011 - s2006
+    s2016 = s2010 - s2007
+    s2017 = s2006 + s2011
+    a_hind_left_shank_x = a_hind_left_thigh_x + (s1192 * s1962 - s1191 * s1961 + s1193 * s1963)
+    a_hind_left_shank_y = a_hind_left_thigh_y + (s1191 * s1964 - s1192 * s1965 + s1193 * s1966)
+    a_hind_left_shank_z = a_hind_left_thigh_z + (s1191 * s1967 + s1192 * s1968 - s1193 * s1969)
+    s2018 = s1955 + (omega_hind_left_thigh_y_2 * s1826 - omega_hind_left_thigh_z_2 * s1825)
+    s2019 = s1956 + (omega_hind_left_thigh_z_2 * s1824 - omega_hind_left_thigh_x_2 * s1826)
+    s2020 = s1957 + (omega_hind_left_thigh_x_2 * s1825 - omega_hind_left_thigh_y_2 * s1824)
+    s2021 = s2018 + s913 * hind_left_knee_angle_ddot
+    s2022 = s2019 + s915 * hind_left_knee_angle_ddot
+    s2023 = s2020 + s917 * hind_left_knee_angle_ddot
     omega_hind_left_shank_x_squared = omega_hind_left_shank_x_2 * omega_hind_left_shank_x_2
     omega_hind_left_shank_y_squared = omega_hind_left_shank_y_2 * omega_hind_left_shank_y_2
     omega_hind_left_shank_z_squared = omega_hind_left_shank_z_2 * omega_hind_left_shank_z_2
-    s2050 = omega_hind_left_shank_x_2 * omega_hind_left_shank_y_2
-    s2051 = omega_hind_left_shank_x_2 * omega_hind_left_shank_z_2
-    s2052 = omega_hind_left_shank_y_2 * omega_hind_left_shank_z_2
-    s2053 = s2050 - s2049
-    s2054 = s2048 + s2051
-    s2055 = s2049 + s2050
-    s2056 = s2052 - s2047
-    s2057 = s2051 - s2048
-    s2058 = s2047 + s2052
-    a_hind_right_shank_x = a_hind_right_thigh_x + (s1237 * s2006 - s1236 * s2005 + s1238 * s2007)
-    a_hind_right_shank_y = a_hind_right_thigh_y + (s1236 * s2008 - s1237 * s2009 + s1238 * s2010)
-    a_hind_right_shank_z = a_hind_right_thigh_z + (s1236 * s2011 + s1237 * s2012 - s1238 * s2013)
-    s2059 = s1999 + (omega_hind_right_thigh_y_2 * s1855 - omega_hind_right_thigh_z_2 * s1854)
-    s2060 = s2000 + (omega_hind_right_thigh_z_2 * s1853 - omega_hind_right_thigh_x_2 * s1855)
-    s2061 = s2001 + (omega_hind_right_thigh_x_2 * s1854 - omega_hind_right_thigh_y_2 * s1853)
-    s2062 = s2059 + s945 * hind_right_knee_angle_ddot
-    s2063 = s2060 + s947 * hind_right_knee_angle_ddot
-    s2064 = s2061 + s949 * hind_right_knee_angle_ddot
+    s2024 = omega_hind_left_shank_x_2 * omega_hind_left_shank_y_2
+    s2025 = omega_hind_left_shank_x_2 * omega_hind_left_shank_z_2
+    s2026 = omega_hind_left_shank_y_2 * omega_hind_left_shank_z_2
+    s2027 = s2024 - s2023
+    s2028 = s2022 + s2025
+    s2029 = s2023 + s2024
+    s2030 = s2026 - s2021
+    s2031 = s2025 - s2022
+    s2032 = s2021 + s2026
+    a_hind_right_shank_x = a_hind_right_thigh_x + (s1211 * s1980 - s1210 * s1979 + s1212 * s1981)
+    a_hind_right_shank_y = a_hind_right_thigh_y + (s1210 * s1982 - s1211 * s1983 + s1212 * s1984)
+    a_hind_right_shank_z = a_hind_right_thigh_z + (s1210 * s1985 + s1211 * s1986 - s1212 * s1987)
+    s2033 = s1973 + (omega_hind_right_thigh_y_2 * s1829 - omega_hind_right_thigh_z_2 * s1828)
+    s2034 = s1974 + (omega_hind_right_thigh_z_2 * s1827 - omega_hind_right_thigh_x_2 * s1829)
+    s2035 = s1975 + (omega_hind_right_thigh_x_2 * s1828 - omega_hind_right_thigh_y_2 * s1827)
+    s2036 = s2033 + s919 * hind_right_knee_angle_ddot
+    s2037 = s2034 + s921 * hind_right_knee_angle_ddot
+    s2038 = s2035 + s923 * hind_right_knee_angle_ddot
     omega_hind_right_shank_x_squared = omega_hind_right_shank_x_2 * omega_hind_right_shank_x_2
     omega_hind_right_shank_y_squared = omega_hind_right_shank_y_2 * omega_hind_right_shank_y_2
     omega_hind_right_shank_z_squared = omega_hind_right_shank_z_2 * omega_hind_right_shank_z_2
-    s2065 = omega_hind_right_shank_x_2 * omega_hind_right_shank_y_2
-    s2066 = omega_hind_right_shank_x_2 * omega_hind_right_shank_z_2
-    s2067 = omega_hind_right_shank_y_2 * omega_hind_right_shank_z_2
-    s2068 = s2065 - s2064
-    s2069 = s2063 + s2066
-    s2070 = s2064 + s2065
-    s2071 = s2067 - s2062
-    s2072 = s2066 - s2063
-    s2073 = s2062 + s2067
-    s2074 = 0.5 * (s1007 + (s1005 + s1006))
-    s2075 = s2074 - s1005
-    s2076 = s2074 - s1006
-    s2077 = s2074 - s1007
-    s2078 = m_hip * a_front_left_hip_x + (s1021 * s1886 - s1020 * s1885 + s1022 * s1887)
-    s2079 = m_hip * a_front_left_hip_y + (s1020 * s1888 - s1021 * s1889 + s1022 * s1890)
-    s2080 = m_hip * a_front_left_hip_z + (s1020 * s1891 + s1021 * s1892 - s1022 * s1893)
-    s2081 = 0.5 * (s1041 + (s1038 + s1039))
-    s2082 = s2081 - s1038
-    s2083 = s2081 - s1039
-    s2084 = s2081 - s1041
-    s2085 = s1044 * (omega_front_left_hip_z_squared_2 - omega_front_left_hip_y_squared_2)
-    s2086 = s1043 * (omega_front_left_hip_x_squared_2 - omega_front_left_hip_z_squared_2)
-    s2087 = s1042 * (omega_front_left_hip_y_squared_2 - omega_front_left_hip_x_squared_2)
-    s2088 = s1021 * a_front_left_hip_z - s1022 * a_front_left_hip_y + (s1043 * s1888 - s1042 * s1891 - s2085 + s1892 * s2083 - s1890 * s2084)
-    s2089 = s1022 * a_front_left_hip_x - s1020 * a_front_left_hip_z + (s1042 * s1892 - s1044 * s1886 - s2086 + s1887 * s2084 - s1891 * s2082)
-    s2090 = s1020 * a_front_left_hip_y - s1021 * a_front_left_hip_x + (s1044 * s1887 - s1043 * s1890 - s2087 + s1888 * s2082 - s1886 * s2083)
-    s2091 = m_hip * a_front_right_hip_x + (s1048 * s1900 - s1049 * s1901 - s1050 * s1902)
-    s2092 = m_hip * a_front_right_hip_y + (s1049 * s1904 - s1048 * s1903 - s1050 * s1905)
-    s2093 = m_hip * a_front_right_hip_z + (s1050 * s1908 - (s1048 * s1906 + s1049 * s1907))
-    s2094 = 0.5 * (s1060 + (s1057 + s1058))
-    s2095 = s2094 - s1057
-    s2096 = s2094 - s1058
-    s2097 = s2094 - s1060
-    s2098 = s1063 * (omega_front_right_hip_z_squared_2 - omega_front_right_hip_y_squared_2)
-    s2099 = s1062 * (omega_front_right_hip_x_squared_2 - omega_front_right_hip_z_squared_2)
-    s2100 = s1061 * (omega_front_right_hip_y_squared_2 - omega_front_right_hip_x_squared_2)
-    s2101 = s1050 * a_front_right_hip_y - s1049 * a_front_right_hip_z + (s1062 * s1903 - s1061 * s1906 - s2098 + s1907 * s2096 - s1905 * s2097)
-    s2102 = s1048 * a_front_right_hip_z - s1050 * a_front_right_hip_x + (s1061 * s1907 - s1063 * s1901 - s2099 + s1902 * s2097 - s1906 * s2095)
-    s2103 = s1049 * a_front_right_hip_x - s1048 * a_front_right_hip_y + (s1063 * s1902 - s1062 * s1905 - s2100 + s1903 * s2095 - s1901 * s2096)
-    s2104 = m_hip * a_hind_left_hip_x + (s1068 * s1916 - s1067 * s1915 + s1069 * s1917)
-    s2105 = m_hip * a_hind_left_hip_y + (s1067 * s1918 - s1068 * s1919 + s1069 * s1920)
-    s2106 = m_hip * a_hind_left_hip_z + (s1067 * s1921 + s1068 * s1922 - s1069 * s1923)
-    s2107 = 0.5 * (s1079 + (s1076 + s1077))
-    s2108 = s2107 - s1076
-    s2109 = s2107 - s1077
-    s2110 = s2107 - s1079
-    s2111 = s1082 * (omega_hind_left_hip_z_squared_2 - omega_hind_left_hip_y_squared_2)
-    s2112 = s1081 * (omega_hind_left_hip_x_squared_2 - omega_hind_left_hip_z_squared_2)
-    s2113 = s1080 * (omega_hind_left_hip_y_squared_2 - omega_hind_left_hip_x_squared_2)
-    s2114 = s1068 * a_hind_left_hip_z - s1069 * a_hind_left_hip_y + (s1081 * s1918 - s1080 * s1921 - s2111 + s1922 * s2109 - s1920 * s2110)
-    s2115 = s1069 * a_hind_left_hip_x - s1067 * a_hind_left_hip_z + (s1080 * s1922 - s1082 * s1916 - s2112 + s1917 * s2110 - s1921 * s2108)
-    s2116 = s1067 * a_hind_left_hip_y - s1068 * a_hind_left_hip_x + (s1082 * s1917 - s1081 * s1920 - s2113 + s1918 * s2108 - s1916 * s2109)
-    s2117 = m_hip * a_hind_right_hip_x + (s1083 * s1930 - s1084 * s1931 - s1085 * s1932)
-    s2118 = m_hip * a_hind_right_hip_y + (s1084 * s1934 - s1083 * s1933 - s1085 * s1935)
-    s2119 = m_hip * a_hind_right_hip_z + (s1085 * s1938 - (s1083 * s1936 + s1084 * s1937))
-    s2120 = 0.5 * (s1095 + (s1092 + s1093))
-    s2121 = s2120 - s1092
-    s2122 = s2120 - s1093
-    s2123 = s2120 - s1095
-    s2124 = s1098 * (omega_hind_right_hip_z_squared_2 - omega_hind_right_hip_y_squared_2)
-    s2125 = s1097 * (omega_hind_right_hip_x_squared_2 - omega_hind_right_hip_z_squared_2)
-    s2126 = s1096 * (omega_hind_right_hip_y_squared_2 - omega_hind_right_hip_x_squared_2)
-    s2127 = s1085 * a_hind_right_hip_y - s1084 * a_hind_right_hip_z + (s1097 * s1933 - s1096 * s1936 - s2124 + s1937 * s2122 - s1935 * s2123)
-    s2128 = s1083 * a_hind_right_hip_z - s1085 * a_hind_right_hip_x + (s1096 * s1937 - s1098 * s1931 - s2125 + s1932 * s2123 - s1936 * s2121)
-    s2129 = s1084 * a_hind_right_hip_x - s1083 * a_hind_right_hip_y + (s1098 * s1932 - s1097 * s1935 - s2126 + s1933 * s2121 - s1931 * s2122)
-    s2130 = m_thigh * a_front_left_thigh_x + (s1103 * s1949 - s1102 * s1948 + s1104 * s1950)
-    s2131 = m_thigh * a_front_left_thigh_y + (s1102 * s1951 - s1103 * s1952 + s1104 * s1953)
-    s2132 = m_thigh * a_front_left_thigh_z + (s1102 * s1954 + s1103 * s1955 - s1104 * s1956)
-    s2133 = 0.5 * (s1115 + (s1111 + s1112))
-    s2134 = s2133 - s1111
-    s2135 = s2133 - s1112
-    s2136 = s2133 - s1115
-    s2137 = s1118 * (omega_front_left_thigh_z_squared_2 - omega_front_left_thigh_y_squared_2)
-    s2138 = s1117 * (omega_front_left_thigh_x_squared_2 - omega_front_left_thigh_z_squared_2)
-    s2139 = s1116 * (omega_front_left_thigh_y_squared_2 - omega_front_left_thigh_x_squared_2)
-    s2140 = s1103 * a_front_left_thigh_z - s1104 * a_front_left_thigh_y + (s1117 * s1951 - s1116 * s1954 - s2137 + s1955 * s2135 - s1953 * s2136)
-    s2141 = s1104 * a_front_left_thigh_x - s1102 * a_front_left_thigh_z + (s1116 * s1955 - s1118 * s1949 - s2138 + s1950 * s2136 - s1954 * s2134)
-    s2142 = s1102 * a_front_left_thigh_y - s1103 * a_front_left_thigh_x + (s1118 * s1950 - s1117 * s1953 - s2139 + s1951 * s2134 - s1949 * s2135)
-    s2143 = m_thigh * a_front_right_thigh_x + (s1122 * s1966 - s1123 * s1967 - s1124 * s1968)
-    s2144 = m_thigh * a_front_right_thigh_y + (s1123 * s1970 - s1122 * s1969 - s1124 * s1971)
-    s2145 = m_thigh * a_front_right_thigh_z + (s1124 * s1974 - (s1122 * s1972 + s1123 * s1973))
-    s2146 = 0.5 * (s1135 + (s1131 + s1132))
-    s2147 = s2146 - s1131
-    s2148 = s2146 - s1132
-    s2149 = s2146 - s1135
-    s2150 = s1137 * s1969 - s1136 * s1972 - s1138 * s1975 + s1973 * s2148 - s1971 * s2149
-    s2151 = s1136 * s1973 - s1138 * s1967 - s1137 * s1976 + s1968 * s2149 - s1972 * s2147
-    s2152 = s1138 * s1968 - s1137 * s1971 - s1136 * s1977 + s1969 * s2147 - s1967 * s2148
-    s2153 = m_thigh * a_hind_left_thigh_x + (s1143 * s1988 - s1142 * s1987 + s1144 * s1989)
-    s2154 = m_thigh * a_hind_left_thigh_y + (s1142 * s1990 - s1143 * s1991 + s1144 * s1992)
-    s2155 = m_thigh * a_hind_left_thigh_z + (s1142 * s1993 + s1143 * s1994 - s1144 * s1995)
-    s2156 = 0.5 * (s1155 + (s1151 + s1152))
-    s2157 = s2156 - s1151
-    s2158 = s2156 - s1152
-    s2159 = s2156 - s1155
-    s2160 = s1158 * (omega_hind_left_thigh_z_squared_2 - omega_hind_left_thigh_y_squared_2)
-    s2161 = s1157 * (omega_hind_left_thigh_x_squared_2 - omega_hind_left_thigh_z_squared_2)
-    s2162 = s1156 * (omega_hind_left_thigh_y_squared_2 - omega_hind_left_thigh_x_squared_2)
-    s2163 = s1143 * a_hind_left_thigh_z - s1144 * a_hind_left_thigh_y + (s1157 * s1990 - s1156 * s1993 - s2160 + s1994 * s2158 - s1992 * s2159)
-    s2164 = s1144 * a_hind_left_thigh_x - s1142 * a_hind_left_thigh_z + (s1156 * s1994 - s1158 * s1988 - s2161 + s1989 * s2159 - s1993 * s2157)
-    s2165 = s1142 * a_hind_left_thigh_y - s1143 * a_hind_left_thigh_x + (s1158 * s1989 - s1157 * s1992 - s2162 + s1990 * s2157 - s1988 * s2158)
-    s2166 = m_thigh * a_hind_right_thigh_x + (s1162 * s2005 - s1163 * s2006 - s1164 * s2007)
-    s2167 = m_thigh * a_hind_right_thigh_y + (s1163 * s2009 - s1162 * s2008 - s1164 * s2010)
-    s2168 = m_thigh * a_hind_right_thigh_z + (s1164 * s2013 - (s1162 * s2011 + s1163 * s2012))
-    s2169 = 0.5 * (s1175 + (s1171 + s1172))
-    s2170 = s2169 - s1171
-    s2171 = s2169 - s1172
-    s2172 = s2169 - s1175
-    s2173 = s1178 * (omega_hind_right_thigh_z_squared_2 - omega_hind_right_thigh_y_squared_2)
-    s2174 = s1177 * (omega_hind_right_thigh_x_squared_2 - omega_hind_right_thigh_z_squared_2)
-    s2175 = s1176 * (omega_hind_right_thigh_y_squared_2 - omega_hind_right_thigh_x_squared_2)
-    s2176 = s1164 * a_hind_right_thigh_y - s1163 * a_hind_right_thigh_z + (s1177 * s2008 - s1176 * s2011 - s2173 + s2012 * s2171 - s2010 * s2172)
-    s2177 = s1162 * a_hind_right_thigh_z - s1164 * a_hind_right_thigh_x + (s1176 * s2012 - s1178 * s2006 - s2174 + s2007 * s2172 - s2011 * s2170)
-    s2178 = s1163 * a_hind_right_thigh_x - s1162 * a_hind_right_thigh_y + (s1178 * s2007 - s1177 * s2010 - s2175 + s2008 * s2170 - s2006 * s2171)
-    s2179 = s1182 * (omega_front_left_shank_y_squared + omega_front_left_shank_z_squared)
-    s2180 = s1183 * (omega_front_left_shank_x_squared + omega_front_left_shank_z_squared)
-    s2181 = s1184 * (omega_front_left_shank_x_squared + omega_front_left_shank_y_squared)
-    s2182 = m_shank * a_front_left_shank_x + (s2179 - s1183 * s2023 - s1184 * s2024)
-    s2183 = m_shank * a_front_left_shank_y + (s2180 - s1182 * s2025 - s1184 * s2026)
-    s2184 = m_shank * a_front_left_shank_z + (s2181 - (s1182 * s2027 + s1183 * s2028))
-    s2185 = 0.5 * (s1194 + (s1191 + s1192))
-    s2186 = s2185 - s1191
-    s2187 = s2185 - s1192
-    s2188 = s2185 - s1194
-    s2189 = s1197 * (omega_front_left_shank_z_squared - omega_front_left_shank_y_squared)
-    s2190 = s1196 * (omega_front_left_shank_x_squared - omega_front_left_shank_z_squared)
-    s2191 = s1195 * (omega_front_left_shank_y_squared - omega_front_left_shank_x_squared)
-    s2192 = s1184 * a_front_left_shank_y - s1183 * a_front_left_shank_z + (s1196 * s2025 - s1195 * s2027 - s2189 + s2028 * s2187 - s2026 * s2188)
-    s2193 = s1182 * a_front_left_shank_z - s1184 * a_front_left_shank_x + (s1195 * s2028 - s1197 * s2023 - s2190 + s2024 * s2188 - s2027 * s2186)
-    s2194 = s1183 * a_front_left_shank_x - s1182 * a_front_left_shank_y + (s1197 * s2024 - s1196 * s2026 - s2191 + s2025 * s2186 - s2023 * s2187)
-    s2195 = s1201 * (omega_front_right_shank_y_squared + omega_front_right_shank_z_squared)
-    s2196 = s1202 * (omega_front_right_shank_x_squared + omega_front_right_shank_z_squared)
-    s2197 = s1203 * (omega_front_right_shank_x_squared + omega_front_right_shank_y_squared)
-    s2198 = m_shank * a_front_right_shank_x + (s2195 - s1202 * s2038 - s1203 * s2039)
-    s2199 = m_shank * a_front_right_shank_y + (s2196 - s1201 * s2040 - s1203 * s2041)
-    s2200 = m_shank * a_front_right_shank_z + (s2197 - (s1201 * s2042 + s1202 * s2043))
-    s2201 = 0.5 * (s1213 + (s1210 + s1211))
-    s2202 = s2201 - s1210
-    s2203 = s2201 - s1211
-    s2204 = s2201 - s1213
-    s2205 = s1216 * (omega_front_right_shank_z_squared - omega_front_right_shank_y_squared)
-    s2206 = s1215 * (omega_front_right_shank_x_squared - omega_front_right_shank_z_squared)
-    s2207 = s1214 * (omega_front_right_shank_y_squared - omega_front_right_shank_x_squared)
-    s2208 = s1203 * a_front_right_shank_y - s1202 * a_front_right_shank_z + (s1215 * s2040 - s1214 * s2042 - s2205 + s2043 * s2203 - s2041 * s2204)
-    s2209 = s1201 * a_front_right_shank_z - s1203 * a_front_right_shank_x + (s1214 * s2043 - s1216 * s2038 - s2206 + s2039 * s2204 - s2042 * s2202)
-    s2210 = s1202 * a_front_right_shank_x - s1201 * a_front_right_shank_y + (s1216 * s2039 - s1215 * s2041 - s2207 + s2040 * s2202 - s2038 * s2203)
-    s2211 = s1220 * (omega_hind_left_shank_y_squared + omega_hind_left_shank_z_squared)
-    s2212 = s1221 * (omega_hind_left_shank_x_squared + omega_hind_left_shank_z_squared)
-    s2213 = s1222 * (omega_hind_left_shank_x_squared + omega_hind_left_shank_y_squared)
-    s2214 = m_shank * a_hind_left_shank_x + (s2211 - s1221 * s2053 - s1222 * s2054)
-    s2215 = m_shank * a_hind_left_shank_y + (s2212 - s1220 * s2055 - s1222 * s2056)
-    s2216 = m_shank * a_hind_left_shank_z + (s2213 - (s1220 * s2057 + s1221 * s2058))
-    s2217 = 0.5 * (s1232 + (s1229 + s1230))
-    s2218 = s2217 - s1229
-    s2219 = s2217 - s1230
-    s2220 = s2217 - s1232
-    s2221 = s1235 * (omega_hind_left_shank_z_squared - omega_hind_left_shank_y_squared)
-    s2222 = s1234 * (omega_hind_left_shank_x_squared - omega_hind_left_shank_z_squared)
-    s2223 = s1233 * (omega_hind_left_shank_y_squared - omega_hind_left_shank_x_squared)
-    s2224 = s1222 * a_hind_left_shank_y - s1221 * a_hind_left_shank_z + (s1234 * s2055 - s1233 * s2057 - s2221 + s2058 * s2219 - s2056 * s2220)
-    s2225 = s1220 * a_hind_left_shank_z - s1222 * a_hind_left_shank_x + (s1233 * s2058 - s1235 * s2053 - s2222 + s2054 * s2220 - s2057 * s2218)
-    s2226 = s1221 * a_hind_left_shank_x - s1220 * a_hind_left_shank_y + (s1235 * s2054 - s1234 * s2056 - s2223 + s2055 * s2218 - s2053 * s2219)
-    s2227 = s1239 * (omega_hind_right_shank_y_squared + omega_hind_right_shank_z_squared)
-    s2228 = s1240 * (omega_hind_right_shank_x_squared + omega_hind_right_shank_z_squared)
-    s2229 = s1241 * (omega_hind_right_shank_x_squared + omega_hind_right_shank_y_squared)
-    s2230 = m_shank * a_hind_right_shank_x + (s2227 - s1240 * s2068 - s1241 * s2069)
-    s2231 = m_shank * a_hind_right_shank_y + (s2228 - s1239 * s2070 - s1241 * s2071)
-    s2232 = m_shank * a_hind_right_shank_z + (s2229 - (s1239 * s2072 + s1240 * s2073))
-    s2233 = 0.5 * (s1251 + (s1248 + s1249))
-    s2234 = s2233 - s1248
-    s2235 = s2233 - s1249
-    s2236 = s2233 - s1251
-    s2237 = s1254 * (omega_hind_right_shank_z_squared - omega_hind_right_shank_y_squared)
-    s2238 = s1253 * (omega_hind_right_shank_x_squared - omega_hind_right_shank_z_squared)
-    s2239 = s1252 * (omega_hind_right_shank_y_squared - omega_hind_right_shank_x_squared)
-    s2240 = s1241 * a_hind_right_shank_y - s1240 * a_hind_right_shank_z + (s1253 * s2070 - s1252 * s2072 - s2237 + s2073 * s2235 - s2071 * s2236)
-    s2241 = s1239 * a_hind_right_shank_z - s1241 * a_hind_right_shank_x + (s1252 * s2073 - s1254 * s2068 - s2238 + s2069 * s2236 - s2072 * s2234)
-    s2242 = s1240 * a_hind_right_shank_x - s1239 * a_hind_right_shank_y + (s1254 * s2069 - s1253 * s2071 - s2239 + s2070 * s2234 - s2068 * s2235)
-    s2243 = s2176 + (s2240 + (s1237 * s2232 - s1238 * s2231))
-    s2244 = s2177 + (s2241 + (s1238 * s2230 - s1236 * s2232))
-    s2245 = s2178 + (s2242 + (s1236 * s2231 - s1237 * s2230))
-    s2246 = s2166 + s2230
-    s2247 = s2167 + s2231
-    s2248 = s2168 + s2232
-    s2249 = s2163 + (s2224 + (s1218 * s2216 - s1219 * s2215))
-    s2250 = s2164 + (s2225 + (s1219 * s2214 - s1217 * s2216))
-    s2251 = s2165 + (s2226 + (s1217 * s2215 - s1218 * s2214))
-    s2252 = s2153 + s2214
-    s2253 = s2154 + s2215
-    s2254 = s2155 + s2216
-    s2255 = s1124 * a_front_right_thigh_y - s1123 * a_front_right_thigh_z + s2150 + (s2208 + (s1199 * s2200 - s1200 * s2199))
-    s2256 = s1122 * a_front_right_thigh_z - s1124 * a_front_right_thigh_x + s2151 + (s2209 + (s1200 * s2198 - s1198 * s2200))
-    s2257 = s1123 * a_front_right_thigh_x - s1122 * a_front_right_thigh_y + s2152 + (s2210 + (s1198 * s2199 - s1199 * s2198))
-    s2258 = s2143 + s2198
-    s2259 = s2144 + s2199
-    s2260 = s2145 + s2200
-    s2261 = s2140 + (s2192 + (s1180 * s2184 - s1181 * s2183))
-    s2262 = s2141 + (s2193 + (s1181 * s2182 - s1179 * s2184))
-    s2263 = s2142 + (s2194 + (s1179 * s2183 - s1180 * s2182))
-    s2264 = s2130 + s2182
-    s2265 = s2131 + s2183
-    s2266 = s2132 + s2184
-    s2267 = s2127 + (s2243 + (s1160 * s2248 - s1161 * s2247))
-    s2268 = s2128 + (s2244 + (s1161 * s2246 - s1159 * s2248))
-    s2269 = s2129 + (s2245 + (s1159 * s2247 - s1160 * s2246))
-    s2270 = s2117 + s2246
-    s2271 = s2118 + s2247
-    s2272 = s2119 + s2248
-    s2273 = s2114 + (s2249 + (s1140 * s2254 - s1141 * s2253))
-    s2274 = s2115 + (s2250 + (s1141 * s2252 - s1139 * s2254))
-    s2275 = s2116 + (s2251 + (s1139 * s2253 - s1140 * s2252))
-    s2276 = s2104 + s2252
-    s2277 = s2105 + s2253
-    s2278 = s2106 + s2254
-    s2279 = s2101 + (s2255 + (s1120 * s2260 - s1121 * s2259))
-    s2280 = s2102 + (s2256 + (s1121 * s2258 - s1119 * s2260))
-    s2281 = s2103 + (s2257 + (s1119 * s2259 - s1120 * s2258))
-    s2282 = s2091 + s2258
-    s2283 = s2092 + s2259
-    s2284 = s2093 + s2260
-    s2285 = s2088 + (s2261 + (s1100 * s2266 - s1101 * s2265))
-    s2286 = s2089 + (s2262 + (s1101 * s2264 - s1099 * s2266))
-    s2287 = s2090 + (s2263 + (s1099 * s2265 - s1100 * s2264))
-    s2288 = s2078 + s2264
-    s2289 = s2079 + s2265
-    s2290 = s2080 + s2266
-    s2291 = s2288 + (s2282 + (s2276 + (s2270 - m_trunk * s863)))
-    s2292 = s2289 + (s2283 + (s2277 + (m_trunk * delta_trunk_2_y + s2271)))
-    s2293 = s2290 + (s2284 + (s2278 + (m_trunk * a_trunk_3_z + s2272)))
-    s2294 = s1008 * omega_trunk_z
-    s2295 = s1009 * omega_trunk_y
-    s2296 = s1010 * omega_trunk_x
-    s2297 = m_hip * velocity_front_left_hip_x + (s1022 * omega_front_left_hip_y_2 - s1021 * omega_front_left_hip_z_2)
-    s2298 = m_hip * velocity_front_left_hip_y + (s1020 * omega_front_left_hip_z_2 - s1022 * omega_front_left_hip_x_2)
-    s2299 = m_hip * velocity_front_left_hip_z + (s1021 * omega_front_left_hip_x_2 - s1020 * omega_front_left_hip_y_2)
-    s2300 = s1042 * omega_front_left_hip_z_2
-    s2301 = s1043 * omega_front_left_hip_y_2
-    s2302 = s1044 * omega_front_left_hip_x_2
-    s2303 = s1020 * velocity_front_left_hip_x
-    s2304 = s1021 * velocity_front_left_hip_y
-    s2305 = s1022 * velocity_front_left_hip_z
-    s2306 = s1044 * omega_front_left_hip_y_2 + omega_front_left_hip_z_2 * s2083 - s1021 * velocity_front_left_hip_x
-    s2307 = s1022 * velocity_front_left_hip_x + (s1044 * omega_front_left_hip_z_2 + omega_front_left_hip_y_2 * s2084)
-    s2308 = s1020 * velocity_front_left_hip_y + (s1043 * omega_front_left_hip_x_2 + omega_front_left_hip_z_2 * s2082)
-    s2309 = s1043 * omega_front_left_hip_z_2 + omega_front_left_hip_x_2 * s2084 - s1022 * velocity_front_left_hip_y
-    s2310 = s1042 * omega_front_left_hip_x_2 + omega_front_left_hip_y_2 * s2082 - s1020 * velocity_front_left_hip_z
-    s2311 = s1021 * velocity_front_left_hip_z + (s1042 * omega_front_left_hip_y_2 + omega_front_left_hip_x_2 * s2083)
-    s2312 = m_hip * velocity_front_right_hip_x + (s1049 * omega_front_right_hip_z_2 - s1050 * omega_front_right_hip_y_2)
-    s2313 = m_hip * velocity_front_right_hip_y + (s1050 * omega_front_right_hip_x_2 - s1048 * omega_front_right_hip_z_2)
-    s2314 = m_hip * velocity_front_right_hip_z + (s1048 * omega_front_right_hip_y_2 - s1049 * omega_front_right_hip_x_2)
-    s2315 = s1061 * omega_front_right_hip_z_2
-    s2316 = s1062 * omega_front_right_hip_y_2
-    s2317 = s1063 * omega_front_right_hip_x_2
-    s2318 = s1048 * velocity_front_right_hip_x
-    s2319 = s1049 * velocity_front_right_hip_y
-    s2320 = s1050 * velocity_front_right_hip_z
-    s2321 = s1049 * velocity_front_right_hip_x + (s1063 * omega_front_right_hip_y_2 + omega_front_right_hip_z_2 * s2096)
-    s2322 = s1050 * velocity_front_right_hip_x - (s1063 * omega_front_right_hip_z_2 + omega_front_right_hip_y_2 * s2097)
-    s2323 = s1048 * velocity_front_right_hip_y - (s1062 * omega_front_right_hip_x_2 + omega_front_right_hip_z_2 * s2095)
-    s2324 = s1050 * velocity_front_right_hip_y + (s1062 * omega_front_right_hip_z_2 + omega_front_right_hip_x_2 * s2097)
-    s2325 = s1048 * velocity_front_right_hip_z + (s1061 * omega_front_right_hip_x_2 + omega_front_right_hip_y_2 * s2095)
-    s2326 = s1049 * velocity_front_right_hip_z - (s1061 * omega_front_right_hip_y_2 + omega_front_right_hip_x_2 * s2096)
-    s2327 = m_hip * velocity_hind_left_hip_x + (s1069 * omega_hind_left_hip_y_2 - s1068 * omega_hind_left_hip_z_2)
-    s2328 = m_hip * velocity_hind_left_hip_y + (s1067 * omega_hind_left_hip_z_2 - s1069 * omega_hind_left_hip_x_2)
-    s2329 = m_hip * velocity_hind_left_hip_z + (s1068 * omega_hind_left_hip_x_2 - s1067 * omega_hind_left_hip_y_2)
-    s2330 = s1080 * omega_hind_left_hip_z_2
-    s2331 = s1081 * omega_hind_left_hip_y_2
-    s2332 = s1082 * omega_hind_left_hip_x_2
-    s2333 = s1067 * velocity_hind_left_hip_x
-    s2334 = s1068 * velocity_hind_left_hip_y
-    s2335 = s1069 * velocity_hind_left_hip_z
-    s2336 = s1082 * omega_hind_left_hip_y_2 + omega_hind_left_hip_z_2 * s2109 - s1068 * velocity_hind_left_hip_x
-    s2337 = s1069 * velocity_hind_left_hip_x + (s1082 * omega_hind_left_hip_z_2 + omega_hind_left_hip_y_2 * s2110)
-    s2338 = s1067 * velocity_hind_left_hip_y + (s1081 * omega_hind_left_hip_x_2 + omega_hind_left_hip_z_2 * s2108)
-    s2339 = s1081 * omega_hind_left_hip_z_2 + omega_hind_left_hip_x_2 * s2110 - s1069 * velocity_hind_left_hip_y
-    s2340 = s1080 * omega_hind_left_hip_x_2 + omega_hind_left_hip_y_2 * s2108 - s1067 * velocity_hind_left_hip_z
-    s2341 = s1068 * velocity_hind_left_hip_z + (s1080 * omega_hind_left_hip_y_2 + omega_hind_left_hip_x_2 * s2109)
-    s2342 = m_hip * velocity_hind_right_hip_x + (s1084 * omega_hind_right_hip_z_2 - s1085 * omega_hind_right_hip_y_2)
-    s2343 = m_hip * velocity_hind_right_hip_y + (s1085 * omega_hind_right_hip_x_2 - s1083 * omega_hind_right_hip_z_2)
-    s2344 = m_hip * velocity_hind_right_hip_z + (s1083 * omega_hind_right_hip_y_2 - s1084 * omega_hind_right_hip_x_2)
-    s2345 = s1096 * omega_hind_right_hip_z_2
-    s2346 = s1097 * omega_hind_right_hip_y_2
-    s2347 = s1098 * omega_hind_right_hip_x_2
-    s2348 = s1083 * velocity_hind_right_hip_x
-    s2349 = s1084 * velocity_hind_right_hip_y
-    s2350 = s1085 * velocity_hind_right_hip_z
-    s2351 = s1084 * velocity_hind_right_hip_x + (s1098 * omega_hind_right_hip_y_2 + omega_hind_right_hip_z_2 * s2122)
-    s2352 = s1085 * velocity_hind_right_hip_x - (s1098 * omega_hind_right_hip_z_2 + omega_hind_right_hip_y_2 * s2123)
-    s2353 = s1083 * velocity_hind_right_hip_y - (s1097 * omega_hind_right_hip_x_2 + omega_hind_right_hip_z_2 * s2121)
-    s2354 = s1085 * velocity_hind_right_hip_y + (s1097 * omega_hind_right_hip_z_2 + omega_hind_right_hip_x_2 * s2123)
-    s2355 = s1083 * velocity_hind_right_hip_z + (s1096 * omega_hind_right_hip_x_2 + omega_hind_right_hip_y_2 * s2121)
-    s2356 = s1084 * velocity_hind_right_hip_z - (s1096 * omega_hind_right_hip_y_2 + omega_hind_right_hip_x_2 * s2122)
-    s2357 = m_thigh * velocity_front_left_thigh_x + (s1104 * omega_front_left_thigh_y_2 - s1103 * omega_front_left_thigh_z_2)
-    s2358 = m_thigh * velocity_front_left_thigh_y + (s1102 * omega_front_left_thigh_z_2 - s1104 * omega_front_left_thigh_x_2)
-    s2359 = m_thigh * velocity_front_left_thigh_z + (s1103 * omega_front_left_thigh_x_2 - s1102 * omega_front_left_thigh_y_2)
-    s2360 = s1116 * omega_front_left_thigh_z_2
-    s2361 = s1117 * omega_front_left_thigh_y_2
-    s2362 = s1118 * omega_front_left_thigh_x_2
-    s2363 = s1102 * velocity_front_left_thigh_x
-    s2364 = s1103 * velocity_front_left_thigh_y
-    s2365 = s1104 * velocity_front_left_thigh_z
-    s2366 = s1118 * omega_front_left_thigh_y_2 + omega_front_left_thigh_z_2 * s2135 - s1103 * velocity_front_left_thigh_x
-    s2367 = s1104 * velocity_front_left_thigh_x + (s1118 * omega_front_left_thigh_z_2 + omega_front_left_thigh_y_2 * s2136)
-    s2368 = s1102 * velocity_front_left_thigh_y + (s1117 * omega_front_left_thigh_x_2 + omega_front_left_thigh_z_2 * s2134)
-    s2369 = s1117 * omega_front_left_thigh_z_2 + omega_front_left_thigh_x_2 * s2136 - s1104 * velocity_front_left_thigh_y
-    s2370 = s1116 * omega_front_left_thigh_x_2 + omega_front_left_thigh_y_2 * s2134 - s1102 * velocity_front_left_thigh_z
-    s2371 = s1103 * velocity_front_left_thigh_z + (s1116 * omega_front_left_thigh_y_2 + omega_front_left_thigh_x_2 * s2135)
-    s2372 = s1123 * omega_front_right_thigh_z_2 - s1124 * omega_front_right_thigh_y_2
-    s2373 = s1124 * omega_front_right_thigh_x_2 - s1122 * omega_front_right_thigh_z_2
-    s2374 = s1122 * omega_front_right_thigh_y_2 - s1123 * omega_front_right_thigh_x_2
-    s2375 = s1136 * omega_front_right_thigh_z_2
-    s2376 = s1137 * omega_front_right_thigh_y_2
-    s2377 = s1138 * omega_front_right_thigh_y_2 + omega_front_right_thigh_z_2 * s2148
-    s2378 = s1138 * omega_front_right_thigh_z_2 + omega_front_right_thigh_y_2 * s2149
-    s2379 = s1137 * omega_front_right_thigh_x_2 + omega_front_right_thigh_z_2 * s2147
-    s2380 = s1138 * omega_front_right_thigh_x_2
-    s2381 = s1137 * omega_front_right_thigh_z_2 + omega_front_right_thigh_x_2 * s2149
-    s2382 = s1136 * omega_front_right_thigh_x_2 + omega_front_right_thigh_y_2 * s2147
-    s2383 = s1136 * omega_front_right_thigh_y_2 + omega_front_right_thigh_x_2 * s2148
-    s2384 = s1122 * velocity_front_right_thigh_x
-    s2385 = s1123 * velocity_front_right_thigh_y
-    s2386 = s1124 * velocity_front_right_thigh_z
-    s2387 = m_thigh * velocity_hind_left_thigh_x + (s1144 * omega_hind_left_thigh_y_2 - s1143 * omega_hind_left_thigh_z_2)
-    s2388 = m_thigh * velocity_hind_left_thigh_y + (s1142 * omega_hind_left_thigh_z_2 - s1144 * omega_hind_left_thigh_x_2)
-    s2389 = m_thigh * velocity_hind_left_thigh_z + (s1143 * omega_hind_left_thigh_x_2 - s1142 * omega_hind_left_thigh_y_2)
-    s2390 = s1156 * omega_hind_left_thigh_z_2
-    s2391 = s1157 * omega_hind_left_thigh_y_2
-    s2392 = s1158 * omega_hind_left_thigh_x_2
-    s2393 = s1142 * velocity_hind_left_thigh_x
-    s2394 = s1143 * velocity_hind_left_thigh_y
-    s2395 = s1144 * velocity_hind_left_thigh_z
-    s2396 = s1158 * omega_hind_left_thigh_y_2 + omega_hind_left_thigh_z_2 * s2158 - s1143 * velocity_hind_left_thigh_x
-    s2397 = s1144 * velocity_hind_left_thigh_x + (s1158 * omega_hind_left_thigh_z_2 + omega_hind_left_thigh_y_2 * s2159)
-    s2398 = s1142 * velocity_hind_left_thigh_y + (s1157 * omega_hind_left_thigh_x_2 + omega_hind_left_thigh_z_2 * s2157)
-    s2399 = s1157 * omega_hind_left_thigh_z_2 + omega_hind_left_thigh_x_2 * s2159 - s1144 * velocity_hind_left_thigh_y
-    s2400 = s1156 * omega_hind_left_thigh_x_2 + omega_hind_left_thigh_y_2 * s2157 - s1142 * velocity_hind_left_thigh_z
-    s2401 = s1143 * velocity_hind_left_thigh_z + (s1156 * omega_hind_left_thigh_y_2 + omega_hind_left_thigh_x_2 * s2158)
-    s2402 = m_thigh * velocity_hind_right_thigh_x + (s1163 * omega_hind_right_thigh_z_2 - s1164 * omega_hind_right_thigh_y_2)
-    s2403 = m_thigh * velocity_hind_right_thigh_y + (s1164 * omega_hind_right_thigh_x_2 - s1162 * omega_hind_right_thigh_z_2)
-    s2404 = m_thigh * velocity_hind_right_thigh_z + (s1162 * omega_hind_right_thigh_y_2 - s1163 * omega_hind_right_thigh_x_2)
-    s2405 = s1176 * omega_hind_right_thigh_z_2
-    s2406 = s1177 * omega_hind_right_thigh_y_2
-    s2407 = s1178 * omega_hind_right_thigh_x_2
-    s2408 = s1162 * velocity_hind_right_thigh_x
-    s2409 = s1163 * velocity_hind_right_thigh_y
-    s2410 = s1164 * velocity_hind_right_thigh_z
-    s2411 = s1163 * velocity_hind_right_thigh_x + (s1178 * omega_hind_right_thigh_y_2 + omega_hind_right_thigh_z_2 * s2171)
-    s2412 = s1164 * velocity_hind_right_thigh_x - (s1178 * omega_hind_right_thigh_z_2 + omega_hind_right_thigh_y_2 * s2172)
-    s2413 = s1162 * velocity_hind_right_thigh_y - (s1177 * omega_hind_right_thigh_x_2 + omega_hind_right_thigh_z_2 * s2170)
-    s2414 = s1164 * velocity_hind_right_thigh_y + (s1177 * omega_hind_right_thigh_z_2 + omega_hind_right_thigh_x_2 * s2172)
-    s2415 = s1162 * velocity_hind_right_thigh_z + (s1176 * omega_hind_right_thigh_x_2 + omega_hind_right_thigh_y_2 * s2170)
-    s2416 = s1163 * velocity_hind_right_thigh_z - (s1176 * omega_hind_right_thigh_y_2 + omega_hind_right_thigh_x_2 * s2171)
-    s2417 = m_shank * velocity_front_left_shank_x + (s1183 * omega_front_left_shank_z_2 - s1184 * omega_front_left_shank_y_2)
-    s2418 = m_shank * velocity_front_left_shank_y + (s1184 * omega_front_left_shank_x_2 - s1182 * omega_front_left_shank_z_2)
-    s2419 = m_shank * velocity_front_left_shank_z + (s1182 * omega_front_left_shank_y_2 - s1183 * omega_front_left_shank_x_2)
-    s2420 = s1195 * omega_front_left_shank_z_2
-    s2421 = s1196 * omega_front_left_shank_y_2
-    s2422 = s1197 * omega_front_left_shank_x_2
-    s2423 = s1182 * velocity_front_left_shank_x
-    s2424 = s1183 * velocity_front_left_shank_y
-    s2425 = s1184 * velocity_front_left_shank_z
-    s2426 = s2421 - s2420 - (s2424 + s2425)
-    s2427 = s1183 * velocity_front_left_shank_x + (s1197 * omega_front_left_shank_y_2 + omega_front_left_shank_z_2 * s2187)
-    s2428 = s1184 * velocity_front_left_shank_x - (s1197 * omega_front_left_shank_z_2 + omega_front_left_shank_y_2 * s2188)
-    s2429 = s1182 * velocity_front_left_shank_y - (s1196 * omega_front_left_shank_x_2 + omega_front_left_shank_z_2 * s2186)
-    s2430 = s2420 - s2422 - (s2423 + s2425)
-    s2431 = s1184 * velocity_front_left_shank_y + (s1196 * omega_front_left_shank_z_2 + omega_front_left_shank_x_2 * s2188)
-    s2432 = s1182 * velocity_front_left_shank_z + (s1195 * omega_front_left_shank_x_2 + omega_front_left_shank_y_2 * s2186)
-    s2433 = s1183 * velocity_front_left_shank_z - (s1195 * omega_front_left_shank_y_2 + omega_front_left_shank_x_2 * s2187)
-    s2434 = s2422 - s2421 - (s2423 + s2424)
-    s2435 = s1202 * omega_front_right_shank_z_2 - s1203 * omega_front_right_shank_y_2
-    s2436 = s1203 * omega_front_right_shank_x_2 - s1201 * omega_front_right_shank_z_2
-    s2437 = s1201 * omega_front_right_shank_y_2 - s1202 * omega_front_right_shank_x_2
-    s2438 = m_shank * velocity_front_right_shank_x + s2435
-    s2439 = m_shank * velocity_front_right_shank_y + s2436
-    s2440 = m_shank * velocity_front_right_shank_z + s2437
-    s2441 = s1214 * omega_front_right_shank_z_2
-    s2442 = s1215 * omega_front_right_shank_y_2
-    s2443 = s1216 * omega_front_right_shank_y_2 + omega_front_right_shank_z_2 * s2203
-    s2444 = s1216 * omega_front_right_shank_z_2 + omega_front_right_shank_y_2 * s2204
-    s2445 = s1215 * omega_front_right_shank_x_2 + omega_front_right_shank_z_2 * s2202
-    s2446 = s1216 * omega_front_right_shank_x_2
-    s2447 = s1215 * omega_front_right_shank_z_2 + omega_front_right_shank_x_2 * s2204
-    s2448 = s1214 * omega_front_right_shank_x_2 + omega_front_right_shank_y_2 * s2202
-    s2449 = s1214 * omega_front_right_shank_y_2 + omega_front_right_shank_x_2 * s2203
-    s2450 = s1201 * velocity_front_right_shank_x
-    s2451 = s1202 * velocity_front_right_shank_y
-    s2452 = s1203 * velocity_front_right_shank_z
-    s2453 = s2442 - s2441 - (s2451 + s2452)
-    s2454 = s1202 * velocity_front_right_shank_x + s2443
-    s2455 = s1203 * velocity_front_right_shank_x - s2444
-    s2456 = s1201 * velocity_front_right_shank_y - s2445
-    s2457 = s2441 - s2446 - (s2450 + s2452)
-    s2458 = s1203 * velocity_front_right_shank_y + s2447
-    s2459 = s1201 * velocity_front_right_shank_z + s2448
-    s2460 = s1202 * velocity_front_right_shank_z - s2449
-    s2461 = s2446 - s2442 - (s2450 + s2451)
-    s2462 = m_shank * velocity_hind_left_shank_x + (s1221 * omega_hind_left_shank_z_2 - s1222 * omega_hind_left_shank_y_2)
-    s2463 = m_shank * velocity_hind_left_shank_y + (s1222 * omega_hind_left_shank_x_2 - s1220 * omega_hind_left_shank_z_2)
-    s2464 = m_shank * velocity_hind_left_shank_z + (s1220 * omega_hind_left_shank_y_2 - s1221 * omega_hind_left_shank_x_2)
-    s2465 = s1233 * omega_hind_left_shank_z_2
-    s2466 = s1234 * omega_hind_left_shank_y_2
-    s2467 = s1235 * omega_hind_left_shank_x_2
-    s2468 = s1220 * velocity_hind_left_shank_x
-    s2469 = s1221 * velocity_hind_left_shank_y
-    s2470 = s1222 * velocity_hind_left_shank_z
-    s2471 = s2466 - s2465 - (s2469 + s2470)
-    s2472 = s1221 * velocity_hind_left_shank_x + (s1235 * omega_hind_left_shank_y_2 + omega_hind_left_shank_z_2 * s2219)
-    s2473 = s1222 * velocity_hind_left_shank_x - (s1235 * omega_hind_left_shank_z_2 + omega_hind_left_shank_y_2 * s2220)
-    s2474 = s1220 * velocity_hind_left_shank_y - (s1234 * omega_hind_left_shank_x_2 + omega_hind_left_shank_z_2 * s2218)
-    s2475 = s2465 - s2467 - (s2468 + s2470)
-    s2476 = s1222 * velocity_hind_left_shank_y + (s1234 * omega_hind_left_shank_z_2 + omega_hind_left_shank_x_2 * s2220)
-    s2477 = s1220 * velocity_hind_left_shank_z + (s1233 * omega_hind_left_shank_x_2 + omega_hind_left_shank_y_2 * s2218)
-    s2478 = s1221 * velocity_hind_left_shank_z - (s1233 * omega_hind_left_shank_y_2 + omega_hind_left_shank_x_2 * s2219)
-    s2479 = s2467 - s2466 - (s2468 + s2469)
-    s2480 = m_shank * velocity_hind_right_shank_x + (s1240 * omega_hind_right_shank_z_2 - s1241 * omega_hind_right_shank_y_2)
-    s2481 = m_shank * velocity_hind_right_shank_y + (s1241 * omega_hind_right_shank_x_2 - s1239 * omega_hind_right_shank_z_2)
-    s2482 = m_shank * velocity_hind_right_shank_z + (s1239 * omega_hind_right_shank_y_2 - s1240 * omega_hind_right_shank_x_2)
-    s2483 = s1252 * omega_hind_right_shank_z_2
-    s2484 = s1253 * omega_hind_right_shank_y_2
-    s2485 = s1254 * omega_hind_right_shank_x_2
-    s2486 = s1239 * velocity_hind_right_shank_x
-    s2487 = s1240 * velocity_hind_right_shank_y
-    s2488 = s1241 * velocity_hind_right_shank_z
-    s2489 = s2484 - s2483 - (s2487 + s2488)
-    s2490 = s1240 * velocity_hind_right_shank_x + (s1254 * omega_hind_right_shank_y_2 + omega_hind_right_shank_z_2 * s2235)
-    s2491 = s1241 * velocity_hind_right_shank_x - (s1254 * omega_hind_right_shank_z_2 + omega_hind_right_shank_y_2 * s2236)
-    s2492 = s1239 * velocity_hind_right_shank_y - (s1253 * omega_hind_right_shank_x_2 + omega_hind_right_shank_z_2 * s2234)
-    s2493 = s2483 - s2485 - (s2486 + s2488)
-    s2494 = s1241 * velocity_hind_right_shank_y + (s1253 * omega_hind_right_shank_z_2 + omega_hind_right_shank_x_2 * s2236)
-    s2495 = s1239 * velocity_hind_right_shank_z + (s1252 * omega_hind_right_shank_x_2 + omega_hind_right_shank_y_2 * s2234)
-    s2496 = s1240 * velocity_hind_right_shank_z - (s1252 * omega_hind_right_shank_y_2 + omega_hind_right_shank_x_2 * s2235)
-    s2497 = s2485 - s2484 - (s2486 + s2487)
-    s2498 = s1236 * s2480
-    s2499 = s1237 * s2481
-    s2500 = s1238 * s2482
-    s2501 = s2402 + s2480
-    s2502 = s2403 + s2481
-    s2503 = s2404 + s2482
-    s2504 = s2406 - s2405 - (s2409 + s2410) + (s2489 + (s2499 + s2500))
-    s2505 = s2411 + (s2490 - s1237 * s2480)
-    s2506 = s2412 + (s2491 - s1238 * s2480)
-    s2507 = s2413 + (s2492 - s1236 * s2481)
-    s2508 = s2405 - s2407 - (s2408 + s2410) + (s2493 + (s2498 + s2500))
-    s2509 = s2414 + (s2494 - s1238 * s2481)
-    s2510 = s2415 + (s2495 - s1236 * s2482)
-    s2511 = s2416 + (s2496 - s1237 * s2482)
-    s2512 = s2407 - s2406 - (s2408 + s2409) + (s2497 + (s2498 + s2499))
-    s2513 = s1217 * s2462
-    s2514 = s1218 * s2463
-    s2515 = s1219 * s2464
-    s2516 = s2387 + s2462
-    s2517 = s2388 + s2463
-    s2518 = s2389 + s2464
-    s2519 = s2394 + s2395 + (s2391 - s2390) + (s2471 + (s2514 + s2515))
-    s2520 = s2396 + (s2472 - s1218 * s2462)
-    s2521 = s2473 - s1219 * s2462 - s2397
-    s2522 = s2474 - s1217 * s2463 - s2398
-    s2523 = s2393 + s2395 + (s2390 - s2392) + (s2475 + (s2513 + s2515))
-    s2524 = s2399 + (s2476 - s1219 * s2463)
-    s2525 = s2400 + (s2477 - s1217 * s2464)
-    s2526 = s2478 - s1218 * s2464 - s2401
-    s2527 = s2393 + s2394 + (s2392 - s2391) + (s2479 + (s2513 + s2514))
-    s2528 = s1198 * s2438
-    s2529 = s1199 * s2439
-    s2530 = s1200 * s2440
-    s2531 = m_thigh * velocity_front_right_thigh_x + s2372 + s2438
-    s2532 = m_thigh * velocity_front_right_thigh_y + s2373 + s2439
-    s2533 = m_thigh * velocity_front_right_thigh_z + s2374 + s2440
-    s2534 = s2376 - s2375 - (s2385 + s2386) + (s2453 + (s2529 + s2530))
-    s2535 = s1123 * velocity_front_right_thigh_x + s2377 + (s2454 - s1199 * s2438)
-    s2536 = s1124 * velocity_front_right_thigh_x - s2378 + (s2455 - s1200 * s2438)
-    s2537 = s1122 * velocity_front_right_thigh_y - s2379 + (s2456 - s1198 * s2439)
-    s2538 = s2375 - s2380 - (s2384 + s2386) + (s2457 + (s2528 + s2530))
-    s2539 = s1124 * velocity_front_right_thigh_y + s2381 + (s2458 - s1200 * s2439)
-    s2540 = s1122 * velocity_front_right_thigh_z + s2382 + (s2459 - s1198 * s2440)
-    s2541 = s1123 * velocity_front_right_thigh_z - s2383 + (s2460 - s1199 * s2440)
-    s2542 = s2380 - s2376 - (s2384 + s2385) + (s2461 + (s2528 + s2529))
-    s2543 = s1179 * s2417
-    s2544 = s1180 * s2418
-    s2545 = s1181 * s2419
-    s2546 = s2357 + s2417
-    s2547 = s2358 + s2418
-    s2548 = s2359 + s2419
-    s2549 = s2364 + s2365 + (s2361 - s2360) + (s2426 + (s2544 + s2545))
-    s2550 = s2366 + (s2427 - s1180 * s2417)
-    s2551 = s2428 - s1181 * s2417 - s2367
-    s2552 = s2429 - s1179 * s2418 - s2368
-    s2553 = s2363 + s2365 + (s2360 - s2362) + (s2430 + (s2543 + s2545))
-    s2554 = s2369 + (s2431 - s1181 * s2418)
-    s2555 = s2370 + (s2432 - s1179 * s2419)
-    s2556 = s2433 - s1180 * s2419 - s2371
-    s2557 = s2363 + s2364 + (s2362 - s2361) + (s2434 + (s2543 + s2544))
-    s2558 = s1159 * s2501
-    s2559 = s1160 * s2502
-    s2560 = s1161 * s2503
-    s2561 = s2342 + s2501
-    s2562 = s2343 + s2502
-    s2563 = s2344 + s2503
-    s2564 = s2346 - s2345 - (s2349 + s2350) + (s2504 + (s2559 + s2560))
-    s2565 = s2351 + (s2505 - s1160 * s2501)
-    s2566 = s2352 + (s2506 - s1161 * s2501)
-    s2567 = s2353 + (s2507 - s1159 * s2502)
-    s2568 = s2345 - s2347 - (s2348 + s2350) + (s2508 + (s2558 + s2560))
-    s2569 = s2354 + (s2509 - s1161 * s2502)
-    s2570 = s2355 + (s2510 - s1159 * s2503)
-    s2571 = s2356 + (s2511 - s1160 * s2503)
-    s2572 = s2347 - s2346 - (s2348 + s2349) + (s2512 + (s2558 + s2559))
-    s2573 = s1139 * s2516
-    s2574 = s1140 * s2517
-    s2575 = s1141 * s2518
-    s2576 = s2327 + s2516
-    s2577 = s2328 + s2517
-    s2578 = s2329 + s2518
-    s2579 = s2334 + s2335 + (s2331 - s2330) + (s2519 + (s2574 + s2575))
-    s2580 = s2336 + (s2520 - s1140 * s2516)
-    s2581 = s2521 - s1141 * s2516 - s2337
-    s2582 = s2522 - s1139 * s2517 - s2338
-    s2583 = s2333 + s2335 + (s2330 - s2332) + (s2523 + (s2573 + s2575))
-    s2584 = s2339 + (s2524 - s1141 * s2517)
-    s2585 = s2340 + (s2525 - s1139 * s2518)
-    s2586 = s2526 - s1140 * s2518 - s2341
-    s2587 = s2333 + s2334 + (s2332 - s2331) + (s2527 + (s2573 + s2574))
-    s2588 = s1119 * s2531
-    s2589 = s1120 * s2532
-    s2590 = s1121 * s2533
-    s2591 = s2312 + s2531
-    s2592 = s2313 + s2532
-    s2593 = s2314 + s2533
-    s2594 = s2316 - s2315 - (s2319 + s2320) + (s2534 + (s2589 + s2590))
-    s2595 = s2321 + (s2535 - s1120 * s2531)
-    s2596 = s2322 + (s2536 - s1121 * s2531)
-    s2597 = s2323 + (s2537 - s1119 * s2532)
-    s2598 = s2315 - s2317 - (s2318 + s2320) + (s2538 + (s2588 + s2590))
-    s2599 = s2324 + (s2539 - s1121 * s2532)
-    s2600 = s2325 + (s2540 - s1119 * s2533)
-    s2601 = s2326 + (s2541 - s1120 * s2533)
-    s2602 = s2317 - s2316 - (s2318 + s2319) + (s2542 + (s2588 + s2589))
-    s2603 = s1099 * s2546
-    s2604 = s1100 * s2547
-    s2605 = s1101 * s2548
-    s2606 = s2297 + s2546
-    s2607 = s2298 + s2547
-    s2608 = s2299 + s2548
-    s2609 = s2304 + s2305 + (s2301 - s2300) + (s2549 + (s2604 + s2605))
-    s2610 = s2306 + (s2550 - s1100 * s2546)
-    s2611 = s2551 - s1101 * s2546 - s2307
-    s2612 = s2552 - s1099 * s2547 - s2308
-    s2613 = s2303 + s2305 + (s2300 - s2302) + (s2553 + (s2603 + s2605))
-    s2614 = s2309 + (s2554 - s1101 * s2547)
-    s2615 = s2310 + (s2555 - s1099 * s2548)
-    s2616 = s2556 - s1100 * s2548 - s2311
-    s2617 = s2303 + s2304 + (s2302 - s2301) + (s2557 + (s2603 + s2604))
-    s2618 = s1013 * s2561
-    s2619 = s1016 * s2562
-    s2620 = s1019 * s2563
-    s2621 = s1064 * s2576
-    s2622 = s1065 * s2577
-    s2623 = s1066 * s2578
-    s2624 = s1010 * omega_trunk_y + omega_trunk_z * s2076 + (s2565 + s1016 * s2561) + (s2580 - s1065 * s2576)
-    s2625 = s2566 + s1019 * s2561 - (s1010 * omega_trunk_z + omega_trunk_y * s2077) + (s2581 - s1066 * s2576)
-    s2626 = s2567 + s1013 * s2562 - (s1009 * omega_trunk_x + omega_trunk_z * s2075) + (s2582 - s1064 * s2577)
-    s2627 = s1009 * omega_trunk_z + omega_trunk_x * s2077 + (s2569 + s1019 * s2562) + (s2584 - s1066 * s2577)
-    s2628 = s1008 * omega_trunk_x + omega_trunk_y * s2075 + (s2570 + s1013 * s2563) + (s2585 - s1064 * s2578)
-    s2629 = s2571 + s1016 * s2563 - (s1008 * omega_trunk_y + omega_trunk_x * s2076) + (s2586 - s1065 * s2578)
-    s2630 = s1045 * s2591
-    s2631 = s1046 * s2592
-    s2632 = s1047 * s2593
-    s2633 = s2295 - s2294 + (s2564 - (s2619 + s2620)) + (s2579 + (s2622 + s2623)) + (s2594 + (s2631 + s2632))
-    s2634 = s2294 - s2296 + (s2568 - (s2618 + s2620)) + (s2583 + (s2621 + s2623)) + (s2598 + (s2630 + s2632))
-    s2635 = s2296 - s2295 + (s2572 - (s2618 + s2619)) + (s2587 + (s2621 + s2622)) + (s2602 + (s2630 + s2631))
-    s2636 = s1013 * s2606
-    s2637 = s1016 * s2607
-    s2638 = s1019 * s2608
-    s2639 = s2606 + (s2591 + (s2576 + (m_trunk * trunk_x_dot + s2561)))
-    s2640 = s2607 + (s2592 + (s2577 + (m_trunk * trunk_y_dot + s2562)))
-    s2641 = s2608 + (s2593 + (s2578 + (m_trunk * trunk_z_dot + s2563)))
-    s2642 = s2633 + (s2609 + (s2637 + s2638))
-    s2643 = s2624 + (s2595 - s1046 * s2591) + (s2610 - s1016 * s2606)
-    s2644 = s2625 + (s2596 - s1047 * s2591) + (s2611 - s1019 * s2606)
-    s2645 = s2626 + (s2597 - s1045 * s2592) + (s2612 - s1013 * s2607)
-    s2646 = s2634 + (s2613 + (s2636 + s2638))
-    s2647 = s2627 + (s2599 - s1047 * s2592) + (s2614 - s1019 * s2607)
-    s2648 = s2628 + (s2600 - s1045 * s2593) + (s2615 - s1013 * s2608)
-    s2649 = s2629 + (s2601 - s1046 * s2593) + (s2616 - s1016 * s2608)
-    s2650 = s2635 + (s2617 + (s2636 + s2637))
-    s2651 = trunk_y_dot * s21 - trunk_z_dot * s18
-    s2652 = trunk_z_dot * s15 - trunk_x_dot * s21
-    s2653 = trunk_x_dot * s18 - trunk_y_dot * s15
-    s2654 = s21 * delta_trunk_2_y - s18 * a_trunk_3_z
-    s2655 = s15 * a_trunk_3_z + s21 * s863
-    s2656 = s18 * s863 + s15 * delta_trunk_2_y
-    s2657 = s21 * omega_trunk_y - s18 * omega_trunk_z
-    s2658 = s15 * omega_trunk_z - s21 * omega_trunk_x
-    s2659 = s18 * omega_trunk_x - s15 * omega_trunk_y
+    s2039 = omega_hind_right_shank_x_2 * omega_hind_right_shank_y_2
+    s2040 = omega_hind_right_shank_x_2 * omega_hind_right_shank_z_2
+    s2041 = omega_hind_right_shank_y_2 * omega_hind_right_shank_z_2
+    s2042 = s2039 - s2038
+    s2043 = s2037 + s2040
+    s2044 = s2038 + s2039
+    s2045 = s2041 - s2036
+    s2046 = s2040 - s2037
+    s2047 = s2036 + s2041
+    s2048 = m_hip * a_front_left_hip_x + (s995 * s1860 - s994 * s1859 + s996 * s1861)
+    s2049 = m_hip * a_front_left_hip_y + (s994 * s1862 - s995 * s1863 + s996 * s1864)
+    s2050 = m_hip * a_front_left_hip_z + (s994 * s1865 + s995 * s1866 - s996 * s1867)
+    s2051 = s1018 * (omega_front_left_hip_z_squared_2 - omega_front_left_hip_y_squared_2)
+    s2052 = s1017 * s1862 - s1016 * s1865 - s2051 + s1012 * s1853 + s1858 * (s1015 - s1013)
+    s2053 = s1017 * (omega_front_left_hip_x_squared_2 - omega_front_left_hip_z_squared_2)
+    s2054 = s1016 * s1866 - s1018 * s1860 - s2053 + s1013 * s1854 + s1857 * (s1012 - s1015)
+    s2055 = s1016 * (omega_front_left_hip_y_squared_2 - omega_front_left_hip_x_squared_2)
+    s2056 = s1018 * s1861 - s1017 * s1864 - s2055 + s1015 * s1855 + s1856 * (s1013 - s1012)
+    s2057 = m_hip * a_front_right_hip_x + (s1022 * s1874 - s1023 * s1875 - s1024 * s1876)
+    s2058 = m_hip * a_front_right_hip_y + (s1023 * s1878 - s1022 * s1877 - s1024 * s1879)
+    s2059 = m_hip * a_front_right_hip_z + (s1024 * s1882 - (s1022 * s1880 + s1023 * s1881))
+    s2060 = s1037 * (omega_front_right_hip_z_squared_2 - omega_front_right_hip_y_squared_2)
+    s2061 = s1036 * s1877 - s1035 * s1880 - s2060 + s1031 * s1868 + s1873 * (s1034 - s1032)
+    s2062 = s1036 * (omega_front_right_hip_x_squared_2 - omega_front_right_hip_z_squared_2)
+    s2063 = s1035 * s1881 - s1037 * s1875 - s2062 + s1032 * s1869 + s1872 * (s1031 - s1034)
+    s2064 = s1035 * (omega_front_right_hip_y_squared_2 - omega_front_right_hip_x_squared_2)
+    s2065 = s1037 * s1876 - s1036 * s1879 - s2064 + s1034 * s1870 + s1871 * (s1032 - s1031)
+    s2066 = m_hip * a_hind_left_hip_x + (s1042 * s1890 - s1041 * s1889 + s1043 * s1891)
+    s2067 = m_hip * a_hind_left_hip_y + (s1041 * s1892 - s1042 * s1893 + s1043 * s1894)
+    s2068 = m_hip * a_hind_left_hip_z + (s1041 * s1895 + s1042 * s1896 - s1043 * s1897)
+    s2069 = s1056 * (omega_hind_left_hip_z_squared_2 - omega_hind_left_hip_y_squared_2)
+    s2070 = s1055 * s1892 - s1054 * s1895 - s2069 + s1050 * s1883 + s1888 * (s1053 - s1051)
+    s2071 = s1055 * (omega_hind_left_hip_x_squared_2 - omega_hind_left_hip_z_squared_2)
+    s2072 = s1054 * s1896 - s1056 * s1890 - s2071 + s1051 * s1884 + s1887 * (s1050 - s1053)
+    s2073 = s1054 * (omega_hind_left_hip_y_squared_2 - omega_hind_left_hip_x_squared_2)
+    s2074 = s1056 * s1891 - s1055 * s1894 - s2073 + s1053 * s1885 + s1886 * (s1051 - s1050)
+    s2075 = m_hip * a_hind_right_hip_x + (s1057 * s1904 - s1058 * s1905 - s1059 * s1906)
+    s2076 = m_hip * a_hind_right_hip_y + (s1058 * s1908 - s1057 * s1907 - s1059 * s1909)
+    s2077 = m_hip * a_hind_right_hip_z + (s1059 * s1912 - (s1057 * s1910 + s1058 * s1911))
+    s2078 = s1072 * (omega_hind_right_hip_z_squared_2 - omega_hind_right_hip_y_squared_2)
+    s2079 = s1071 * s1907 - s1070 * s1910 - s2078 + s1066 * s1898 + s1903 * (s1069 - s1067)
+    s2080 = s1071 * (omega_hind_right_hip_x_squared_2 - omega_hind_right_hip_z_squared_2)
+    s2081 = s1070 * s1911 - s1072 * s1905 - s2080 + s1067 * s1899 + s1902 * (s1066 - s1069)
+    s2082 = s1070 * (omega_hind_right_hip_y_squared_2 - omega_hind_right_hip_x_squared_2)
+    s2083 = s1072 * s1906 - s1071 * s1909 - s2082 + s1069 * s1900 + s1901 * (s1067 - s1066)
+    s2084 = m_thigh * a_front_left_thigh_x + (s1077 * s1923 - s1076 * s1922 + s1078 * s1924)
+    s2085 = m_thigh * a_front_left_thigh_y + (s1076 * s1925 - s1077 * s1926 + s1078 * s1927)
+    s2086 = m_thigh * a_front_left_thigh_z + (s1076 * s1928 + s1077 * s1929 - s1078 * s1930)
+    s2087 = s1092 * (omega_front_left_thigh_z_squared_2 - omega_front_left_thigh_y_squared_2)
+    s2088 = s1091 * s1925 - s1090 * s1928 - s2087 + s1085 * s1916 + s1921 * (s1089 - s1086)
+    s2089 = s1091 * (omega_front_left_thigh_x_squared_2 - omega_front_left_thigh_z_squared_2)
+    s2090 = s1090 * s1929 - s1092 * s1923 - s2089 + s1086 * s1917 + s1920 * (s1085 - s1089)
+    s2091 = s1090 * (omega_front_left_thigh_y_squared_2 - omega_front_left_thigh_x_squared_2)
+    s2092 = s1092 * s1924 - s1091 * s1927 - s2091 + s1089 * s1918 + s1919 * (s1086 - s1085)
+    s2093 = m_thigh * a_front_right_thigh_x + (s1096 * s1940 - s1097 * s1941 - s1098 * s1942)
+    s2094 = m_thigh * a_front_right_thigh_y + (s1097 * s1944 - s1096 * s1943 - s1098 * s1945)
+    s2095 = m_thigh * a_front_right_thigh_z + (s1098 * s1948 - (s1096 * s1946 + s1097 * s1947))
+    s2096 = s1111 * s1943 - s1110 * s1946 - s1112 * s1949 + s1105 * s1934 + s1939 * (s1109 - s1106)
+    s2097 = s1110 * s1947 - s1112 * s1941 - s1111 * s1950 + s1106 * s1935 + s1938 * (s1105 - s1109)
+    s2098 = s1112 * s1942 - s1111 * s1945 - s1110 * s1951 + s1109 * s1936 + s1937 * (s1106 - s1105)
+    s2099 = m_thigh * a_hind_left_thigh_x + (s1117 * s1962 - s1116 * s1961 + s1118 * s1963)
+    s2100 = m_thigh * a_hind_left_thigh_y + (s1116 * s1964 - s1117 * s1965 + s1118 * s1966)
+    s2101 = m_thigh * a_hind_left_thigh_z + (s1116 * s1967 + s1117 * s1968 - s1118 * s1969)
+    s2102 = s1132 * (omega_hind_left_thigh_z_squared_2 - omega_hind_left_thigh_y_squared_2)
+    s2103 = s1131 * s1964 - s1130 * s1967 - s2102 + s1125 * s1955 + s1960 * (s1129 - s1126)
+    s2104 = s1131 * (omega_hind_left_thigh_x_squared_2 - omega_hind_left_thigh_z_squared_2)
+    s2105 = s1130 * s1968 - s1132 * s1962 - s2104 + s1126 * s1956 + s1959 * (s1125 - s1129)
+    s2106 = s1130 * (omega_hind_left_thigh_y_squared_2 - omega_hind_left_thigh_x_squared_2)
+    s2107 = s1132 * s1963 - s1131 * s1966 - s2106 + s1129 * s1957 + s1958 * (s1126 - s1125)
+    s2108 = m_thigh * a_hind_right_thigh_x + (s1136 * s1979 - s1137 * s1980 - s1138 * s1981)
+    s2109 = m_thigh * a_hind_right_thigh_y + (s1137 * s1983 - s1136 * s1982 - s1138 * s1984)
+    s2110 = m_thigh * a_hind_right_thigh_z + (s1138 * s1987 - (s1136 * s1985 + s1137 * s1986))
+    s2111 = s1152 * (omega_hind_right_thigh_z_squared_2 - omega_hind_right_thigh_y_squared_2)
+    s2112 = s1151 * s1982 - s1150 * s1985 - s2111 + s1145 * s1973 + s1978 * (s1149 - s1146)
+    s2113 = s1151 * (omega_hind_right_thigh_x_squared_2 - omega_hind_right_thigh_z_squared_2)
+    s2114 = s1150 * s1986 - s1152 * s1980 - s2113 + s1146 * s1974 + s1977 * (s1145 - s1149)
+    s2115 = s1150 * (omega_hind_right_thigh_y_squared_2 - omega_hind_right_thigh_x_squared_2)
+    s2116 = s1152 * s1981 - s1151 * s1984 - s2115 + s1149 * s1975 + s1976 * (s1146 - s1145)
+    s2117 = s1156 * (omega_front_left_shank_y_squared + omega_front_left_shank_z_squared)
+    s2118 = s1157 * (omega_front_left_shank_x_squared + omega_front_left_shank_z_squared)
+    s2119 = s1158 * (omega_front_left_shank_x_squared + omega_front_left_shank_y_squared)
+    s2120 = m_shank * a_front_left_shank_x + (s2117 - s1157 * s1997 - s1158 * s1998)
+    s2121 = m_shank * a_front_left_shank_y + (s2118 - s1156 * s1999 - s1158 * s2000)
+    s2122 = m_shank * a_front_left_shank_z + (s2119 - (s1156 * s2001 + s1157 * s2002))
+    s2123 = s1171 * (omega_front_left_shank_z_squared - omega_front_left_shank_y_squared)
+    s2124 = s1170 * s1999 - s1169 * s2001 - s2123 + s1165 * s1991 + s1996 * (s1168 - s1166)
+    s2125 = s1170 * (omega_front_left_shank_x_squared - omega_front_left_shank_z_squared)
+    s2126 = s1169 * s2002 - s1171 * s1997 - s2125 + s1166 * s1992 + s1995 * (s1165 - s1168)
+    s2127 = s1169 * (omega_front_left_shank_y_squared - omega_front_left_shank_x_squared)
+    s2128 = s1171 * s1998 - s1170 * s2000 - s2127 + s1168 * s1993 + s1994 * (s1166 - s1165)
+    s2129 = s1158 * a_front_left_shank_y - s1157 * a_front_left_shank_z + s2124
+    s2130 = s1156 * a_front_left_shank_z - s1158 * a_front_left_shank_x + s2126
+    s2131 = s1157 * a_front_left_shank_x - s1156 * a_front_left_shank_y + s2128
+    s2132 = s1175 * (omega_front_right_shank_y_squared + omega_front_right_shank_z_squared)
+    s2133 = s1176 * (omega_front_right_shank_x_squared + omega_front_right_shank_z_squared)
+    s2134 = s1177 * (omega_front_right_shank_x_squared + omega_front_right_shank_y_squared)
+    s2135 = m_shank * a_front_right_shank_x + (s2132 - s1176 * s2012 - s1177 * s2013)
+    s2136 = m_shank * a_front_right_shank_y + (s2133 - s1175 * s2014 - s1177 * s2015)
+    s2137 = m_shank * a_front_right_shank_z + (s2134 - (s1175 * s2016 + s1176 * s2017))
+    s2138 = s1190 * (omega_front_right_shank_z_squared - omega_front_right_shank_y_squared)
+    s2139 = s1189 * s2014 - s1188 * s2016 - s2138 + s1184 * s2006 + s2011 * (s1187 - s1185)
+    s2140 = s1189 * (omega_front_right_shank_x_squared - omega_front_right_shank_z_squared)
+    s2141 = s1188 * s2017 - s1190 * s2012 - s2140 + s1185 * s2007 + s2010 * (s1184 - s1187)
+    s2142 = s1188 * (omega_front_right_shank_y_squared - omega_front_right_shank_x_squared)
+    s2143 = s1190 * s2013 - s1189 * s2015 - s2142 + s1187 * s2008 + s2009 * (s1185 - s1184)
+    s2144 = s1177 * a_front_right_shank_y - s1176 * a_front_right_shank_z + s2139
+    s2145 = s1175 * a_front_right_shank_z - s1177 * a_front_right_shank_x + s2141
+    s2146 = s1176 * a_front_right_shank_x - s1175 * a_front_right_shank_y + s2143
+    s2147 = s1194 * (omega_hind_left_shank_y_squared + omega_hind_left_shank_z_squared)
+    s2148 = s1195 * (omega_hind_left_shank_x_squared + omega_hind_left_shank_z_squared)
+    s2149 = s1196 * (omega_hind_left_shank_x_squared + omega_hind_left_shank_y_squared)
+    s2150 = m_shank * a_hind_left_shank_x + (s2147 - s1195 * s2027 - s1196 * s2028)
+    s2151 = m_shank * a_hind_left_shank_y + (s2148 - s1194 * s2029 - s1196 * s2030)
+    s2152 = m_shank * a_hind_left_shank_z + (s2149 - (s1194 * s2031 + s1195 * s2032))
+    s2153 = s1209 * (omega_hind_left_shank_z_squared - omega_hind_left_shank_y_squared)
+    s2154 = s1208 * s2029 - s1207 * s2031 - s2153 + s1203 * s2021 + s2026 * (s1206 - s1204)
+    s2155 = s1208 * (omega_hind_left_shank_x_squared - omega_hind_left_shank_z_squared)
+    s2156 = s1207 * s2032 - s1209 * s2027 - s2155 + s1204 * s2022 + s2025 * (s1203 - s1206)
+    s2157 = s1207 * (omega_hind_left_shank_y_squared - omega_hind_left_shank_x_squared)
+    s2158 = s1209 * s2028 - s1208 * s2030 - s2157 + s1206 * s2023 + s2024 * (s1204 - s1203)
+    s2159 = s1196 * a_hind_left_shank_y - s1195 * a_hind_left_shank_z + s2154
+    s2160 = s1194 * a_hind_left_shank_z - s1196 * a_hind_left_shank_x + s2156
+    s2161 = s1195 * a_hind_left_shank_x - s1194 * a_hind_left_shank_y + s2158
+    s2162 = s1213 * (omega_hind_right_shank_y_squared + omega_hind_right_shank_z_squared)
+    s2163 = s1214 * (omega_hind_right_shank_x_squared + omega_hind_right_shank_z_squared)
+    s2164 = s1215 * (omega_hind_right_shank_x_squared + omega_hind_right_shank_y_squared)
+    s2165 = m_shank * a_hind_right_shank_x + (s2162 - s1214 * s2042 - s1215 * s2043)
+    s2166 = m_shank * a_hind_right_shank_y + (s2163 - s1213 * s2044 - s1215 * s2045)
+    s2167 = m_shank * a_hind_right_shank_z + (s2164 - (s1213 * s2046 + s1214 * s2047))
+    s2168 = s1228 * (omega_hind_right_shank_z_squared - omega_hind_right_shank_y_squared)
+    s2169 = s1227 * s2044 - s1226 * s2046 - s2168 + s1222 * s2036 + s2041 * (s1225 - s1223)
+    s2170 = s1227 * (omega_hind_right_shank_x_squared - omega_hind_right_shank_z_squared)
+    s2171 = s1226 * s2047 - s1228 * s2042 - s2170 + s1223 * s2037 + s2040 * (s1222 - s1225)
+    s2172 = s1226 * (omega_hind_right_shank_y_squared - omega_hind_right_shank_x_squared)
+    s2173 = s1228 * s2043 - s1227 * s2045 - s2172 + s1225 * s2038 + s2039 * (s1223 - s1222)
+    s2174 = s1215 * a_hind_right_shank_y - s1214 * a_hind_right_shank_z + s2169
+    s2175 = s1213 * a_hind_right_shank_z - s1215 * a_hind_right_shank_x + s2171
+    s2176 = s1214 * a_hind_right_shank_x - s1213 * a_hind_right_shank_y + s2173
+    s2177 = s1138 * a_hind_right_thigh_y - s1137 * a_hind_right_thigh_z + s2112 + (s2174 + (s1211 * s2167 - s1212 * s2166))
+    s2178 = s1136 * a_hind_right_thigh_z - s1138 * a_hind_right_thigh_x + s2114 + (s2175 + (s1212 * s2165 - s1210 * s2167))
+    s2179 = s1137 * a_hind_right_thigh_x - s1136 * a_hind_right_thigh_y + s2116 + (s2176 + (s1210 * s2166 - s1211 * s2165))
+    s2180 = s2108 + s2165
+    s2181 = s2109 + s2166
+    s2182 = s2110 + s2167
+    s2183 = s1117 * a_hind_left_thigh_z - s1118 * a_hind_left_thigh_y + s2103 + (s2159 + (s1192 * s2152 - s1193 * s2151))
+    s2184 = s1118 * a_hind_left_thigh_x - s1116 * a_hind_left_thigh_z + s2105 + (s2160 + (s1193 * s2150 - s1191 * s2152))
+    s2185 = s1116 * a_hind_left_thigh_y - s1117 * a_hind_left_thigh_x + s2107 + (s2161 + (s1191 * s2151 - s1192 * s2150))
+    s2186 = s2099 + s2150
+    s2187 = s2100 + s2151
+    s2188 = s2101 + s2152
+    s2189 = s1098 * a_front_right_thigh_y - s1097 * a_front_right_thigh_z + s2096 + (s2144 + (s1173 * s2137 - s1174 * s2136))
+    s2190 = s1096 * a_front_right_thigh_z - s1098 * a_front_right_thigh_x + s2097 + (s2145 + (s1174 * s2135 - s1172 * s2137))
+    s2191 = s1097 * a_front_right_thigh_x - s1096 * a_front_right_thigh_y + s2098 + (s2146 + (s1172 * s2136 - s1173 * s2135))
+    s2192 = s2093 + s2135
+    s2193 = s2094 + s2136
+    s2194 = s2095 + s2137
+    s2195 = s1077 * a_front_left_thigh_z - s1078 * a_front_left_thigh_y + s2088 + (s2129 + (s1154 * s2122 - s1155 * s2121))
+    s2196 = s1078 * a_front_left_thigh_x - s1076 * a_front_left_thigh_z + s2090 + (s2130 + (s1155 * s2120 - s1153 * s2122))
+    s2197 = s1076 * a_front_left_thigh_y - s1077 * a_front_left_thigh_x + s2092 + (s2131 + (s1153 * s2121 - s1154 * s2120))
+    s2198 = s2084 + s2120
+    s2199 = s2085 + s2121
+    s2200 = s2086 + s2122
+    s2201 = s1059 * a_hind_right_hip_y - s1058 * a_hind_right_hip_z + s2079 + (s2177 + (s1134 * s2182 - s1135 * s2181))
+    s2202 = s1057 * a_hind_right_hip_z - s1059 * a_hind_right_hip_x + s2081 + (s2178 + (s1135 * s2180 - s1133 * s2182))
+    s2203 = s1058 * a_hind_right_hip_x - s1057 * a_hind_right_hip_y + s2083 + (s2179 + (s1133 * s2181 - s1134 * s2180))
+    s2204 = s2075 + s2180
+    s2205 = s2076 + s2181
+    s2206 = s2077 + s2182
+    s2207 = s1042 * a_hind_left_hip_z - s1043 * a_hind_left_hip_y + s2070 + (s2183 + (s1114 * s2188 - s1115 * s2187))
+    s2208 = s1043 * a_hind_left_hip_x - s1041 * a_hind_left_hip_z + s2072 + (s2184 + (s1115 * s2186 - s1113 * s2188))
+    s2209 = s1041 * a_hind_left_hip_y - s1042 * a_hind_left_hip_x + s2074 + (s2185 + (s1113 * s2187 - s1114 * s2186))
+    s2210 = s2066 + s2186
+    s2211 = s2067 + s2187
+    s2212 = s2068 + s2188
+    s2213 = s1024 * a_front_right_hip_y - s1023 * a_front_right_hip_z + s2061 + (s2189 + (s1094 * s2194 - s1095 * s2193))
+    s2214 = s1022 * a_front_right_hip_z - s1024 * a_front_right_hip_x + s2063 + (s2190 + (s1095 * s2192 - s1093 * s2194))
+    s2215 = s1023 * a_front_right_hip_x - s1022 * a_front_right_hip_y + s2065 + (s2191 + (s1093 * s2193 - s1094 * s2192))
+    s2216 = s2057 + s2192
+    s2217 = s2058 + s2193
+    s2218 = s2059 + s2194
+    s2219 = s995 * a_front_left_hip_z - s996 * a_front_left_hip_y + s2052 + (s2195 + (s1074 * s2200 - s1075 * s2199))
+    s2220 = s996 * a_front_left_hip_x - s994 * a_front_left_hip_z + s2054 + (s2196 + (s1075 * s2198 - s1073 * s2200))
+    s2221 = s994 * a_front_left_hip_y - s995 * a_front_left_hip_x + s2056 + (s2197 + (s1073 * s2199 - s1074 * s2198))
+    s2222 = s2048 + s2198
+    s2223 = s2049 + s2199
+    s2224 = s2050 + s2200
+    s2225 = s2222 + (s2216 + (s2210 + (s2204 - m_trunk * s837)))
+    s2226 = s2223 + (s2217 + (s2211 + (m_trunk * delta_trunk_2_y + s2205)))
+    s2227 = s2224 + (s2218 + (s2212 + (m_trunk * a_trunk_3_z + s2206)))
+    s2228 = 0.5 * (s981 + (s979 + s980))
+    s2229 = s2228 - s979
+    s2230 = s2228 - s980
+    s2231 = s2228 - s981
+    s2232 = s982 * omega_trunk_z
+    s2233 = s983 * omega_trunk_y
+    s2234 = s984 * omega_trunk_x
+    s2235 = m_hip * velocity_front_left_hip_x + (s996 * omega_front_left_hip_y_2 - s995 * omega_front_left_hip_z_2)
+    s2236 = m_hip * velocity_front_left_hip_y + (s994 * omega_front_left_hip_z_2 - s996 * omega_front_left_hip_x_2)
+    s2237 = m_hip * velocity_front_left_hip_z + (s995 * omega_front_left_hip_x_2 - s994 * omega_front_left_hip_y_2)
+    s2238 = 0.5 * (s1015 + (s1012 + s1013))
+    s2239 = s2238 - s1012
+    s2240 = s2238 - s1013
+    s2241 = s2238 - s1015
+    s2242 = s1016 * omega_front_left_hip_z_2
+    s2243 = s1017 * omega_front_left_hip_y_2
+    s2244 = s1018 * omega_front_left_hip_x_2
+    s2245 = s994 * velocity_front_left_hip_x
+    s2246 = s995 * velocity_front_left_hip_y
+    s2247 = s996 * velocity_front_left_hip_z
+    s2248 = s1018 * omega_front_left_hip_y_2 + omega_front_left_hip_z_2 * s2240 - s995 * velocity_front_left_hip_x
+    s2249 = s996 * velocity_front_left_hip_x + (s1018 * omega_front_left_hip_z_2 + omega_front_left_hip_y_2 * s2241)
+    s2250 = s994 * velocity_front_left_hip_y + (s1017 * omega_front_left_hip_x_2 + omega_front_left_hip_z_2 * s2239)
+    s2251 = s1017 * omega_front_left_hip_z_2 + omega_front_left_hip_x_2 * s2241 - s996 * velocity_front_left_hip_y
+    s2252 = s1016 * omega_front_left_hip_x_2 + omega_front_left_hip_y_2 * s2239 - s994 * velocity_front_left_hip_z
+    s2253 = s995 * velocity_front_left_hip_z + (s1016 * omega_front_left_hip_y_2 + omega_front_left_hip_x_2 * s2240)
+    s2254 = m_hip * velocity_front_right_hip_x + (s1023 * omega_front_right_hip_z_2 - s1024 * omega_front_right_hip_y_2)
+    s2255 = m_hip * velocity_front_right_hip_y + (s1024 * omega_front_right_hip_x_2 - s1022 * omega_front_right_hip_z_2)
+    s2256 = m_hip * velocity_front_right_hip_z + (s1022 * omega_front_right_hip_y_2 - s1023 * omega_front_right_hip_x_2)
+    s2257 = 0.5 * (s1034 + (s1031 + s1032))
+    s2258 = s2257 - s1031
+    s2259 = s2257 - s1032
+    s2260 = s2257 - s1034
+    s2261 = s1035 * omega_front_right_hip_z_2
+    s2262 = s1036 * omega_front_right_hip_y_2
+    s2263 = s1037 * omega_front_right_hip_x_2
+    s2264 = s1022 * velocity_front_right_hip_x
+    s2265 = s1023 * velocity_front_right_hip_y
+    s2266 = s1024 * velocity_front_right_hip_z
+    s2267 = s1023 * velocity_front_right_hip_x + (s1037 * omega_front_right_hip_y_2 + omega_front_right_hip_z_2 * s2259)
+    s2268 = s1024 * velocity_front_right_hip_x - (s1037 * omega_front_right_hip_z_2 + omega_front_right_hip_y_2 * s2260)
+    s2269 = s1022 * velocity_front_right_hip_y - (s1036 * omega_front_right_hip_x_2 + omega_front_right_hip_z_2 * s2258)
+    s2270 = s1024 * velocity_front_right_hip_y + (s1036 * omega_front_right_hip_z_2 + omega_front_right_hip_x_2 * s2260)
+    s2271 = s1022 * velocity_front_right_hip_z + (s1035 * omega_front_right_hip_x_2 + omega_front_right_hip_y_2 * s2258)
+    s2272 = s1023 * velocity_front_right_hip_z - (s1035 * omega_front_right_hip_y_2 + omega_front_right_hip_x_2 * s2259)
+    s2273 = m_hip * velocity_hind_left_hip_x + (s1043 * omega_hind_left_hip_y_2 - s1042 * omega_hind_left_hip_z_2)
+    s2274 = m_hip * velocity_hind_left_hip_y + (s1041 * omega_hind_left_hip_z_2 - s1043 * omega_hind_left_hip_x_2)
+    s2275 = m_hip * velocity_hind_left_hip_z + (s1042 * omega_hind_left_hip_x_2 - s1041 * omega_hind_left_hip_y_2)
+    s2276 = 0.5 * (s1053 + (s1050 + s1051))
+    s2277 = s2276 - s1050
+    s2278 = s2276 - s1051
+    s2279 = s2276 - s1053
+    s2280 = s1054 * omega_hind_left_hip_z_2
+    s2281 = s1055 * omega_hind_left_hip_y_2
+    s2282 = s1056 * omega_hind_left_hip_x_2
+    s2283 = s1041 * velocity_hind_left_hip_x
+    s2284 = s1042 * velocity_hind_left_hip_y
+    s2285 = s1043 * velocity_hind_left_hip_z
+    s2286 = s1056 * omega_hind_left_hip_y_2 + omega_hind_left_hip_z_2 * s2278 - s1042 * velocity_hind_left_hip_x
+    s2287 = s1043 * velocity_hind_left_hip_x + (s1056 * omega_hind_left_hip_z_2 + omega_hind_left_hip_y_2 * s2279)
+    s2288 = s1041 * velocity_hind_left_hip_y + (s1055 * omega_hind_left_hip_x_2 + omega_hind_left_hip_z_2 * s2277)
+    s2289 = s1055 * omega_hind_left_hip_z_2 + omega_hind_left_hip_x_2 * s2279 - s1043 * velocity_hind_left_hip_y
+    s2290 = s1054 * omega_hind_left_hip_x_2 + omega_hind_left_hip_y_2 * s2277 - s1041 * velocity_hind_left_hip_z
+    s2291 = s1042 * velocity_hind_left_hip_z + (s1054 * omega_hind_left_hip_y_2 + omega_hind_left_hip_x_2 * s2278)
+    s2292 = m_hip * velocity_hind_right_hip_x + (s1058 * omega_hind_right_hip_z_2 - s1059 * omega_hind_right_hip_y_2)
+    s2293 = m_hip * velocity_hind_right_hip_y + (s1059 * omega_hind_right_hip_x_2 - s1057 * omega_hind_right_hip_z_2)
+    s2294 = m_hip * velocity_hind_right_hip_z + (s1057 * omega_hind_right_hip_y_2 - s1058 * omega_hind_right_hip_x_2)
+    s2295 = 0.5 * (s1069 + (s1066 + s1067))
+    s2296 = s2295 - s1066
+    s2297 = s2295 - s1067
+    s2298 = s2295 - s1069
+    s2299 = s1070 * omega_hind_right_hip_z_2
+    s2300 = s1071 * omega_hind_right_hip_y_2
+    s2301 = s1072 * omega_hind_right_hip_x_2
+    s2302 = s1057 * velocity_hind_right_hip_x
+    s2303 = s1058 * velocity_hind_right_hip_y
+    s2304 = s1059 * velocity_hind_right_hip_z
+    s2305 = s1058 * velocity_hind_right_hip_x + (s1072 * omega_hind_right_hip_y_2 + omega_hind_right_hip_z_2 * s2297)
+    s2306 = s1059 * velocity_hind_right_hip_x - (s1072 * omega_hind_right_hip_z_2 + omega_hind_right_hip_y_2 * s2298)
+    s2307 = s1057 * velocity_hind_right_hip_y - (s1071 * omega_hind_right_hip_x_2 + omega_hind_right_hip_z_2 * s2296)
+    s2308 = s1059 * velocity_hind_right_hip_y + (s1071 * omega_hind_right_hip_z_2 + omega_hind_right_hip_x_2 * s2298)
+    s2309 = s1057 * velocity_hind_right_hip_z + (s1070 * omega_hind_right_hip_x_2 + omega_hind_right_hip_y_2 * s2296)
+    s2310 = s1058 * velocity_hind_right_hip_z - (s1070 * omega_hind_right_hip_y_2 + omega_hind_right_hip_x_2 * s2297)
+    s2311 = m_thigh * velocity_front_left_thigh_x + (s1078 * omega_front_left_thigh_y_2 - s1077 * omega_front_left_thigh_z_2)
+    s2312 = m_thigh * velocity_front_left_thigh_y + (s1076 * omega_front_left_thigh_z_2 - s1078 * omega_front_left_thigh_x_2)
+    s2313 = m_thigh * velocity_front_left_thigh_z + (s1077 * omega_front_left_thigh_x_2 - s1076 * omega_front_left_thigh_y_2)
+    s2314 = 0.5 * (s1089 + (s1085 + s1086))
+    s2315 = s2314 - s1085
+    s2316 = s2314 - s1086
+    s2317 = s2314 - s1089
+    s2318 = s1090 * omega_front_left_thigh_z_2
+    s2319 = s1091 * omega_front_left_thigh_y_2
+    s2320 = s1092 * omega_front_left_thigh_x_2
+    s2321 = s1076 * velocity_front_left_thigh_x
+    s2322 = s1077 * velocity_front_left_thigh_y
+    s2323 = s1078 * velocity_front_left_thigh_z
+    s2324 = s1092 * omega_front_left_thigh_y_2 + omega_front_left_thigh_z_2 * s2316 - s1077 * velocity_front_left_thigh_x
+    s2325 = s1078 * velocity_front_left_thigh_x + (s1092 * omega_front_left_thigh_z_2 + omega_front_left_thigh_y_2 * s2317)
+    s2326 = s1076 * velocity_front_left_thigh_y + (s1091 * omega_front_left_thigh_x_2 + omega_front_left_thigh_z_2 * s2315)
+    s2327 = s1091 * omega_front_left_thigh_z_2 + omega_front_left_thigh_x_2 * s2317 - s1078 * velocity_front_left_thigh_y
+    s2328 = s1090 * omega_front_left_thigh_x_2 + omega_front_left_thigh_y_2 * s2315 - s1076 * velocity_front_left_thigh_z
+    s2329 = s1077 * velocity_front_left_thigh_z + (s1090 * omega_front_left_thigh_y_2 + omega_front_left_thigh_x_2 * s2316)
+    s2330 = s1097 * omega_front_right_thigh_z_2 - s1098 * omega_front_right_thigh_y_2
+    s2331 = s1098 * omega_front_right_thigh_x_2 - s1096 * omega_front_right_thigh_z_2
+    s2332 = s1096 * omega_front_right_thigh_y_2 - s1097 * omega_front_right_thigh_x_2
+    s2333 = 0.5 * (s1109 + (s1105 + s1106))
+    s2334 = s2333 - s1105
+    s2335 = s2333 - s1106
+    s2336 = s2333 - s1109
+    s2337 = s1110 * omega_front_right_thigh_z_2
+    s2338 = s1111 * omega_front_right_thigh_y_2
+    s2339 = s1112 * omega_front_right_thigh_y_2 + omega_front_right_thigh_z_2 * s2335
+    s2340 = s1112 * omega_front_right_thigh_z_2 + omega_front_right_thigh_y_2 * s2336
+    s2341 = s1111 * omega_front_right_thigh_x_2 + omega_front_right_thigh_z_2 * s2334
+    s2342 = s1112 * omega_front_right_thigh_x_2
+    s2343 = s1111 * omega_front_right_thigh_z_2 + omega_front_right_thigh_x_2 * s2336
+    s2344 = s1110 * omega_front_right_thigh_x_2 + omega_front_right_thigh_y_2 * s2334
+    s2345 = s1110 * omega_front_right_thigh_y_2 + omega_front_right_thigh_x_2 * s2335
+    s2346 = s1096 * velocity_front_right_thigh_x
+    s2347 = s1097 * velocity_front_right_thigh_y
+    s2348 = s1098 * velocity_front_right_thigh_z
+    s2349 = m_thigh * velocity_hind_left_thigh_x + (s1118 * omega_hind_left_thigh_y_2 - s1117 * omega_hind_left_thigh_z_2)
+    s2350 = m_thigh * velocity_hind_left_thigh_y + (s1116 * omega_hind_left_thigh_z_2 - s1118 * omega_hind_left_thigh_x_2)
+    s2351 = m_thigh * velocity_hind_left_thigh_z + (s1117 * omega_hind_left_thigh_x_2 - s1116 * omega_hind_left_thigh_y_2)
+    s2352 = 0.5 * (s1129 + (s1125 + s1126))
+    s2353 = s2352 - s1125
+    s2354 = s2352 - s1126
+    s2355 = s2352 - s1129
+    s2356 = s1130 * omega_hind_left_thigh_z_2
+    s2357 = s1131 * omega_hind_left_thigh_y_2
+    s2358 = s1132 * omega_hind_left_thigh_x_2
+    s2359 = s1116 * velocity_hind_left_thigh_x
+    s2360 = s1117 * velocity_hind_left_thigh_y
+    s2361 = s1118 * velocity_hind_left_thigh_z
+    s2362 = s1132 * omega_hind_left_thigh_y_2 + omega_hind_left_thigh_z_2 * s2354 - s1117 * velocity_hind_left_thigh_x
+    s2363 = s1118 * velocity_hind_left_thigh_x + (s1132 * omega_hind_left_thigh_z_2 + omega_hind_left_thigh_y_2 * s2355)
+    s2364 = s1116 * velocity_hind_left_thigh_y + (s1131 * omega_hind_left_thigh_x_2 + omega_hind_left_thigh_z_2 * s2353)
+    s2365 = s1131 * omega_hind_left_thigh_z_2 + omega_hind_left_thigh_x_2 * s2355 - s1118 * velocity_hind_left_thigh_y
+    s2366 = s1130 * omega_hind_left_thigh_x_2 + omega_hind_left_thigh_y_2 * s2353 - s1116 * velocity_hind_left_thigh_z
+    s2367 = s1117 * velocity_hind_left_thigh_z + (s1130 * omega_hind_left_thigh_y_2 + omega_hind_left_thigh_x_2 * s2354)
+    s2368 = m_thigh * velocity_hind_right_thigh_x + (s1137 * omega_hind_right_thigh_z_2 - s1138 * omega_hind_right_thigh_y_2)
+    s2369 = m_thigh * velocity_hind_right_thigh_y + (s1138 * omega_hind_right_thigh_x_2 - s1136 * omega_hind_right_thigh_z_2)
+    s2370 = m_thigh * velocity_hind_right_thigh_z + (s1136 * omega_hind_right_thigh_y_2 - s1137 * omega_hind_right_thigh_x_2)
+    s2371 = 0.5 * (s1149 + (s1145 + s1146))
+    s2372 = s2371 - s1145
+    s2373 = s2371 - s1146
+    s2374 = s2371 - s1149
+    s2375 = s1150 * omega_hind_right_thigh_z_2
+    s2376 = s1151 * omega_hind_right_thigh_y_2
+    s2377 = s1152 * omega_hind_right_thigh_x_2
+    s2378 = s1136 * velocity_hind_right_thigh_x
+    s2379 = s1137 * velocity_hind_right_thigh_y
+    s2380 = s1138 * velocity_hind_right_thigh_z
+    s2381 = s1137 * velocity_hind_right_thigh_x + (s1152 * omega_hind_right_thigh_y_2 + omega_hind_right_thigh_z_2 * s2373)
+    s2382 = s1138 * velocity_hind_right_thigh_x - (s1152 * omega_hind_right_thigh_z_2 + omega_hind_right_thigh_y_2 * s2374)
+    s2383 = s1136 * velocity_hind_right_thigh_y - (s1151 * omega_hind_right_thigh_x_2 + omega_hind_right_thigh_z_2 * s2372)
+    s2384 = s1138 * velocity_hind_right_thigh_y + (s1151 * omega_hind_right_thigh_z_2 + omega_hind_right_thigh_x_2 * s2374)
+    s2385 = s1136 * velocity_hind_right_thigh_z + (s1150 * omega_hind_right_thigh_x_2 + omega_hind_right_thigh_y_2 * s2372)
+    s2386 = s1137 * velocity_hind_right_thigh_z - (s1150 * omega_hind_right_thigh_y_2 + omega_hind_right_thigh_x_2 * s2373)
+    s2387 = m_shank * velocity_front_left_shank_x + (s1157 * omega_front_left_shank_z_2 - s1158 * omega_front_left_shank_y_2)
+    s2388 = m_shank * velocity_front_left_shank_y + (s1158 * omega_front_left_shank_x_2 - s1156 * omega_front_left_shank_z_2)
+    s2389 = m_shank * velocity_front_left_shank_z + (s1156 * omega_front_left_shank_y_2 - s1157 * omega_front_left_shank_x_2)
+    s2390 = 0.5 * (s1168 + (s1165 + s1166))
+    s2391 = s2390 - s1165
+    s2392 = s2390 - s1166
+    s2393 = s2390 - s1168
+    s2394 = s1169 * omega_front_left_shank_z_2
+    s2395 = s1170 * omega_front_left_shank_y_2
+    s2396 = s1171 * omega_front_left_shank_x_2
+    s2397 = s1156 * velocity_front_left_shank_x
+    s2398 = s1157 * velocity_front_left_shank_y
+    s2399 = s1158 * velocity_front_left_shank_z
+    s2400 = s2395 - s2394 - (s2398 + s2399)
+    s2401 = s1157 * velocity_front_left_shank_x + (s1171 * omega_front_left_shank_y_2 + omega_front_left_shank_z_2 * s2392)
+    s2402 = s1158 * velocity_front_left_shank_x - (s1171 * omega_front_left_shank_z_2 + omega_front_left_shank_y_2 * s2393)
+    s2403 = s1156 * velocity_front_left_shank_y - (s1170 * omega_front_left_shank_x_2 + omega_front_left_shank_z_2 * s2391)
+    s2404 = s2394 - s2396 - (s2397 + s2399)
+    s2405 = s1158 * velocity_front_left_shank_y + (s1170 * omega_front_left_shank_z_2 + omega_front_left_shank_x_2 * s2393)
+    s2406 = s1156 * velocity_front_left_shank_z + (s1169 * omega_front_left_shank_x_2 + omega_front_left_shank_y_2 * s2391)
+    s2407 = s1157 * velocity_front_left_shank_z - (s1169 * omega_front_left_shank_y_2 + omega_front_left_shank_x_2 * s2392)
+    s2408 = s2396 - s2395 - (s2397 + s2398)
+    s2409 = s1176 * omega_front_right_shank_z_2 - s1177 * omega_front_right_shank_y_2
+    s2410 = s1177 * omega_front_right_shank_x_2 - s1175 * omega_front_right_shank_z_2
+    s2411 = s1175 * omega_front_right_shank_y_2 - s1176 * omega_front_right_shank_x_2
+    s2412 = m_shank * velocity_front_right_shank_x + s2409
+    s2413 = m_shank * velocity_front_right_shank_y + s2410
+    s2414 = m_shank * velocity_front_right_shank_z + s2411
+    s2415 = 0.5 * (s1187 + (s1184 + s1185))
+    s2416 = s2415 - s1184
+    s2417 = s2415 - s1185
+    s2418 = s2415 - s1187
+    s2419 = s1188 * omega_front_right_shank_z_2
+    s2420 = s1189 * omega_front_right_shank_y_2
+    s2421 = s1190 * omega_front_right_shank_y_2 + omega_front_right_shank_z_2 * s2417
+    s2422 = s1190 * omega_front_right_shank_z_2 + omega_front_right_shank_y_2 * s2418
+    s2423 = s1189 * omega_front_right_shank_x_2 + omega_front_right_shank_z_2 * s2416
+    s2424 = s1190 * omega_front_right_shank_x_2
+    s2425 = s1189 * omega_front_right_shank_z_2 + omega_front_right_shank_x_2 * s2418
+    s2426 = s1188 * omega_front_right_shank_x_2 + omega_front_right_shank_y_2 * s2416
+    s2427 = s1188 * omega_front_right_shank_y_2 + omega_front_right_shank_x_2 * s2417
+    s2428 = s1175 * velocity_front_right_shank_x
+    s2429 = s1176 * velocity_front_right_shank_y
+    s2430 = s1177 * velocity_front_right_shank_z
+    s2431 = s2420 - s2419 - (s2429 + s2430)
+    s2432 = s1176 * velocity_front_right_shank_x + s2421
+    s2433 = s1177 * velocity_front_right_shank_x - s2422
+    s2434 = s1175 * velocity_front_right_shank_y - s2423
+    s2435 = s2419 - s2424 - (s2428 + s2430)
+    s2436 = s1177 * velocity_front_right_shank_y + s2425
+    s2437 = s1175 * velocity_front_right_shank_z + s2426
+    s2438 = s1176 * velocity_front_right_shank_z - s2427
+    s2439 = s2424 - s2420 - (s2428 + s2429)
+    s2440 = m_shank * velocity_hind_left_shank_x + (s1195 * omega_hind_left_shank_z_2 - s1196 * omega_hind_left_shank_y_2)
+    s2441 = m_shank * velocity_hind_left_shank_y + (s1196 * omega_hind_left_shank_x_2 - s1194 * omega_hind_left_shank_z_2)
+    s2442 = m_shank * velocity_hind_left_shank_z + (s1194 * omega_hind_left_shank_y_2 - s1195 * omega_hind_left_shank_x_2)
+    s2443 = 0.5 * (s1206 + (s1203 + s1204))
+    s2444 = s2443 - s1203
+    s2445 = s2443 - s1204
+    s2446 = s2443 - s1206
+    s2447 = s1207 * omega_hind_left_shank_z_2
+    s2448 = s1208 * omega_hind_left_shank_y_2
+    s2449 = s1209 * omega_hind_left_shank_x_2
+    s2450 = s1194 * velocity_hind_left_shank_x
+    s2451 = s1195 * velocity_hind_left_shank_y
+    s2452 = s1196 * velocity_hind_left_shank_z
+    s2453 = s2448 - s2447 - (s2451 + s2452)
+    s2454 = s1195 * velocity_hind_left_shank_x + (s1209 * omega_hind_left_shank_y_2 + omega_hind_left_shank_z_2 * s2445)
+    s2455 = s1196 * velocity_hind_left_shank_x - (s1209 * omega_hind_left_shank_z_2 + omega_hind_left_shank_y_2 * s2446)
+    s2456 = s1194 * velocity_hind_left_shank_y - (s1208 * omega_hind_left_shank_x_2 + omega_hind_left_shank_z_2 * s2444)
+    s2457 = s2447 - s2449 - (s2450 + s2452)
+    s2458 = s1196 * velocity_hind_left_shank_y + (s1208 * omega_hind_left_shank_z_2 + omega_hind_left_shank_x_2 * s2446)
+    s2459 = s1194 * velocity_hind_left_shank_z + (s1207 * omega_hind_left_shank_x_2 + omega_hind_left_shank_y_2 * s2444)
+    s2460 = s1195 * velocity_hind_left_shank_z - (s1207 * omega_hind_left_shank_y_2 + omega_hind_left_shank_x_2 * s2445)
+    s2461 = s2449 - s2448 - (s2450 + s2451)
+    s2462 = m_shank * velocity_hind_right_shank_x + (s1214 * omega_hind_right_shank_z_2 - s1215 * omega_hind_right_shank_y_2)
+    s2463 = m_shank * velocity_hind_right_shank_y + (s1215 * omega_hind_right_shank_x_2 - s1213 * omega_hind_right_shank_z_2)
+    s2464 = m_shank * velocity_hind_right_shank_z + (s1213 * omega_hind_right_shank_y_2 - s1214 * omega_hind_right_shank_x_2)
+    s2465 = 0.5 * (s1225 + (s1222 + s1223))
+    s2466 = s2465 - s1222
+    s2467 = s2465 - s1223
+    s2468 = s2465 - s1225
+    s2469 = s1226 * omega_hind_right_shank_z_2
+    s2470 = s1227 * omega_hind_right_shank_y_2
+    s2471 = s1228 * omega_hind_right_shank_x_2
+    s2472 = s1213 * velocity_hind_right_shank_x
+    s2473 = s1214 * velocity_hind_right_shank_y
+    s2474 = s1215 * velocity_hind_right_shank_z
+    s2475 = s2470 - s2469 - (s2473 + s2474)
+    s2476 = s1214 * velocity_hind_right_shank_x + (s1228 * omega_hind_right_shank_y_2 + omega_hind_right_shank_z_2 * s2467)
+    s2477 = s1215 * velocity_hind_right_shank_x - (s1228 * omega_hind_right_shank_z_2 + omega_hind_right_shank_y_2 * s2468)
+    s2478 = s1213 * velocity_hind_right_shank_y - (s1227 * omega_hind_right_shank_x_2 + omega_hind_right_shank_z_2 * s2466)
+    s2479 = s2469 - s2471 - (s2472 + s2474)
+    s2480 = s1215 * velocity_hind_right_shank_y + (s1227 * omega_hind_right_shank_z_2 + omega_hind_right_shank_x_2 * s2468)
+    s2481 = s1213 * velocity_hind_right_shank_z + (s1226 * omega_hind_right_shank_x_2 + omega_hind_right_shank_y_2 * s2466)
+    s2482 = s1214 * velocity_hind_right_shank_z - (s1226 * omega_hind_right_shank_y_2 + omega_hind_right_shank_x_2 * s2467)
+    s2483 = s2471 - s2470 - (s2472 + s2473)
+    s2484 = s1210 * s2462
+    s2485 = s1211 * s2463
+    s2486 = s1212 * s2464
+    s2487 = s2368 + s2462
+    s2488 = s2369 + s2463
+    s2489 = s2370 + s2464
+    s2490 = s2376 - s2375 - (s2379 + s2380) + (s2475 + (s2485 + s2486))
+    s2491 = s2381 + (s2476 - s1211 * s2462)
+    s2492 = s2382 + (s2477 - s1212 * s2462)
+    s2493 = s2383 + (s2478 - s1210 * s2463)
+    s2494 = s2375 - s2377 - (s2378 + s2380) + (s2479 + (s2484 + s2486))
+    s2495 = s2384 + (s2480 - s1212 * s2463)
+    s2496 = s2385 + (s2481 - s1210 * s2464)
+    s2497 = s2386 + (s2482 - s1211 * s2464)
+    s2498 = s2377 - s2376 - (s2378 + s2379) + (s2483 + (s2484 + s2485))
+    s2499 = s1191 * s2440
+    s2500 = s1192 * s2441
+    s2501 = s1193 * s2442
+    s2502 = s2349 + s2440
+    s2503 = s2350 + s2441
+    s2504 = s2351 + s2442
+    s2505 = s2360 + s2361 + (s2357 - s2356) + (s2453 + (s2500 + s2501))
+    s2506 = s2362 + (s2454 - s1192 * s2440)
+    s2507 = s2455 - s1193 * s2440 - s2363
+    s2508 = s2456 - s1191 * s2441 - s2364
+    s2509 = s2359 + s2361 + (s2356 - s2358) + (s2457 + (s2499 + s2501))
+    s2510 = s2365 + (s2458 - s1193 * s2441)
+    s2511 = s2366 + (s2459 - s1191 * s2442)
+    s2512 = s2460 - s1192 * s2442 - s2367
+    s2513 = s2359 + s2360 + (s2358 - s2357) + (s2461 + (s2499 + s2500))
+    s2514 = s1172 * s2412
+    s2515 = s1173 * s2413
+    s2516 = s1174 * s2414
+    s2517 = m_thigh * velocity_front_right_thigh_x + s2330 + s2412
+    s2518 = m_thigh * velocity_front_right_thigh_y + s2331 + s2413
+    s2519 = m_thigh * velocity_front_right_thigh_z + s2332 + s2414
+    s2520 = s2338 - s2337 - (s2347 + s2348) + (s2431 + (s2515 + s2516))
+    s2521 = s1097 * velocity_front_right_thigh_x + s2339 + (s2432 - s1173 * s2412)
+    s2522 = s1098 * velocity_front_right_thigh_x - s2340 + (s2433 - s1174 * s2412)
+    s2523 = s1096 * velocity_front_right_thigh_y - s2341 + (s2434 - s1172 * s2413)
+    s2524 = s2337 - s2342 - (s2346 + s2348) + (s2435 + (s2514 + s2516))
+    s2525 = s1098 * velocity_front_right_thigh_y + s2343 + (s2436 - s1174 * s2413)
+    s2526 = s1096 * velocity_front_right_thigh_z + s2344 + (s2437 - s1172 * s2414)
+    s2527 = s1097 * velocity_front_right_thigh_z - s2345 + (s2438 - s1173 * s2414)
+    s2528 = s2342 - s2338 - (s2346 + s2347) + (s2439 + (s2514 + s2515))
+    s2529 = s1153 * s2387
+    s2530 = s1154 * s2388
+    s2531 = s1155 * s2389
+    s2532 = s2311 + s2387
+    s2533 = s2312 + s2388
+    s2534 = s2313 + s2389
+    s2535 = s2322 + s2323 + (s2319 - s2318) + (s2400 + (s2530 + s2531))
+    s2536 = s2324 + (s2401 - s1154 * s2387)
+    s2537 = s2402 - s1155 * s2387 - s2325
+    s2538 = s2403 - s1153 * s2388 - s2326
+    s2539 = s2321 + s2323 + (s2318 - s2320) + (s2404 + (s2529 + s2531))
+    s2540 = s2327 + (s2405 - s1155 * s2388)
+    s2541 = s2328 + (s2406 - s1153 * s2389)
+    s2542 = s2407 - s1154 * s2389 - s2329
+    s2543 = s2321 + s2322 + (s2320 - s2319) + (s2408 + (s2529 + s2530))
+    s2544 = s1133 * s2487
+    s2545 = s1134 * s2488
+    s2546 = s1135 * s2489
+    s2547 = s2292 + s2487
+    s2548 = s2293 + s2488
+    s2549 = s2294 + s2489
+    s2550 = s2300 - s2299 - (s2303 + s2304) + (s2490 + (s2545 + s2546))
+    s2551 = s2305 + (s2491 - s1134 * s2487)
+    s2552 = s2306 + (s2492 - s1135 * s2487)
+    s2553 = s2307 + (s2493 - s1133 * s2488)
+    s2554 = s2299 - s2301 - (s2302 + s2304) + (s2494 + (s2544 + s2546))
+    s2555 = s2308 + (s2495 - s1135 * s2488)
+    s2556 = s2309 + (s2496 - s1133 * s2489)
+    s2557 = s2310 + (s2497 - s1134 * s2489)
+    s2558 = s2301 - s2300 - (s2302 + s2303) + (s2498 + (s2544 + s2545))
+    s2559 = s1113 * s2502
+    s2560 = s1114 * s2503
+    s2561 = s1115 * s2504
+    s2562 = s2273 + s2502
+    s2563 = s2274 + s2503
+    s2564 = s2275 + s2504
+    s2565 = s2284 + s2285 + (s2281 - s2280) + (s2505 + (s2560 + s2561))
+    s2566 = s2286 + (s2506 - s1114 * s2502)
+    s2567 = s2507 - s1115 * s2502 - s2287
+    s2568 = s2508 - s1113 * s2503 - s2288
+    s2569 = s2283 + s2285 + (s2280 - s2282) + (s2509 + (s2559 + s2561))
+    s2570 = s2289 + (s2510 - s1115 * s2503)
+    s2571 = s2290 + (s2511 - s1113 * s2504)
+    s2572 = s2512 - s1114 * s2504 - s2291
+    s2573 = s2283 + s2284 + (s2282 - s2281) + (s2513 + (s2559 + s2560))
+    s2574 = s1093 * s2517
+    s2575 = s1094 * s2518
+    s2576 = s1095 * s2519
+    s2577 = s2254 + s2517
+    s2578 = s2255 + s2518
+    s2579 = s2256 + s2519
+    s2580 = s2262 - s2261 - (s2265 + s2266) + (s2520 + (s2575 + s2576))
+    s2581 = s2267 + (s2521 - s1094 * s2517)
+    s2582 = s2268 + (s2522 - s1095 * s2517)
+    s2583 = s2269 + (s2523 - s1093 * s2518)
+    s2584 = s2261 - s2263 - (s2264 + s2266) + (s2524 + (s2574 + s2576))
+    s2585 = s2270 + (s2525 - s1095 * s2518)
+    s2586 = s2271 + (s2526 - s1093 * s2519)
+    s2587 = s2272 + (s2527 - s1094 * s2519)
+    s2588 = s2263 - s2262 - (s2264 + s2265) + (s2528 + (s2574 + s2575))
+    s2589 = s1073 * s2532
+    s2590 = s1074 * s2533
+    s2591 = s1075 * s2534
+    s2592 = s2235 + s2532
+    s2593 = s2236 + s2533
+    s2594 = s2237 + s2534
+    s2595 = s2246 + s2247 + (s2243 - s2242) + (s2535 + (s2590 + s2591))
+    s2596 = s2248 + (s2536 - s1074 * s2532)
+    s2597 = s2537 - s1075 * s2532 - s2249
+    s2598 = s2538 - s1073 * s2533 - s2250
+    s2599 = s2245 + s2247 + (s2242 - s2244) + (s2539 + (s2589 + s2591))
+    s2600 = s2251 + (s2540 - s1075 * s2533)
+    s2601 = s2252 + (s2541 - s1073 * s2534)
+    s2602 = s2542 - s1074 * s2534 - s2253
+    s2603 = s2245 + s2246 + (s2244 - s2243) + (s2543 + (s2589 + s2590))
+    s2604 = s987 * s2547
+    s2605 = s990 * s2548
+    s2606 = s993 * s2549
+    s2607 = s1038 * s2562
+    s2608 = s1039 * s2563
+    s2609 = s1040 * s2564
+    s2610 = s984 * omega_trunk_y + omega_trunk_z * s2230 + (s2551 + s990 * s2547) + (s2566 - s1039 * s2562)
+    s2611 = s2552 + s993 * s2547 - (s984 * omega_trunk_z + omega_trunk_y * s2231) + (s2567 - s1040 * s2562)
+    s2612 = s2553 + s987 * s2548 - (s983 * omega_trunk_x + omega_trunk_z * s2229) + (s2568 - s1038 * s2563)
+    s2613 = s983 * omega_trunk_z + omega_trunk_x * s2231 + (s2555 + s993 * s2548) + (s2570 - s1040 * s2563)
+    s2614 = s982 * omega_trunk_x + omega_trunk_y * s2229 + (s2556 + s987 * s2549) + (s2571 - s1038 * s2564)
+    s2615 = s2557 + s990 * s2549 - (s982 * omega_trunk_y + omega_trunk_x * s2230) + (s2572 - s1039 * s2564)
+    s2616 = s1019 * s2577
+    s2617 = s1020 * s2578
+    s2618 = s1021 * s2579
+    s2619 = s2233 - s2232 + (s2550 - (s2605 + s2606)) + (s2565 + (s2608 + s2609)) + (s2580 + (s2617 + s2618))
+    s2620 = s2232 - s2234 + (s2554 - (s2604 + s2606)) + (s2569 + (s2607 + s2609)) + (s2584 + (s2616 + s2618))
+    s2621 = s2234 - s2233 + (s2558 - (s2604 + s2605)) + (s2573 + (s2607 + s2608)) + (s2588 + (s2616 + s2617))
+    s2622 = s987 * s2592
+    s2623 = s990 * s2593
+    s2624 = s993 * s2594
+    s2625 = s2592 + (s2577 + (s2562 + (m_trunk * trunk_x_dot + s2547)))
+    s2626 = s2593 + (s2578 + (s2563 + (m_trunk * trunk_y_dot + s2548)))
+    s2627 = s2594 + (s2579 + (s2564 + (m_trunk * trunk_z_dot + s2549)))
+    s2628 = s2619 + (s2595 + (s2623 + s2624))
+    s2629 = s2610 + (s2581 - s1020 * s2577) + (s2596 - s990 * s2592)
+    s2630 = s2611 + (s2582 - s1021 * s2577) + (s2597 - s993 * s2592)
+    s2631 = s2612 + (s2583 - s1019 * s2578) + (s2598 - s987 * s2593)
+    s2632 = s2620 + (s2599 + (s2622 + s2624))
+    s2633 = s2613 + (s2585 - s1021 * s2578) + (s2600 - s993 * s2593)
+    s2634 = s2614 + (s2586 - s1019 * s2579) + (s2601 - s987 * s2594)
+    s2635 = s2615 + (s2587 - s1020 * s2579) + (s2602 - s990 * s2594)
+    s2636 = s2621 + (s2603 + (s2622 + s2623))
+    s2637 = trunk_y_dot * s21 - trunk_z_dot * s18
+    s2638 = trunk_z_dot * s15 - trunk_x_dot * s21
+    s2639 = trunk_x_dot * s18 - trunk_y_dot * s15
+    s2640 = s21 * delta_trunk_2_y - s18 * a_trunk_3_z
+    s2641 = s15 * a_trunk_3_z + s21 * s837
+    s2642 = s18 * s837 + s15 * delta_trunk_2_y
+    s2643 = s21 * omega_trunk_y - s18 * omega_trunk_z
+    s2644 = s15 * omega_trunk_z - s21 * omega_trunk_x
+    s2645 = s18 * omega_trunk_x - s15 * omega_trunk_y
+    s2646 = s2637 + s2637
+    s2647 = s2638 + s2638
+    s2648 = s2639 + s2639
+    s2649 = trunk_y_dot * s22 - trunk_z_dot * s19
+    s2650 = trunk_z_dot * s16 - trunk_x_dot * s22
+    s2651 = trunk_x_dot * s19 - trunk_y_dot * s16
+    s2652 = s22 * delta_trunk_2_y - s19 * a_trunk_3_z
+    s2653 = s16 * a_trunk_3_z + s22 * s837
+    s2654 = s19 * s837 + s16 * delta_trunk_2_y
+    s2655 = s22 * omega_trunk_y - s19 * omega_trunk_z
+    s2656 = s16 * omega_trunk_z - s22 * omega_trunk_x
+    s2657 = s19 * omega_trunk_x - s16 * omega_trunk_y
+    s2658 = s2649 + s2649
+    s2659 = s2650 + s2650
     s2660 = s2651 + s2651
-    s2661 = s2652 + s2652
-    s2662 = s2653 + s2653
-    s2663 = trunk_y_dot * s22 - trunk_z_dot * s19
-    s2664 = trunk_z_dot * s16 - trunk_x_dot * s22
-    s2665 = trunk_x_dot * s19 - trunk_y_dot * s16
-    s2666 = s22 * delta_trunk_2_y - s19 * a_trunk_3_z
-    s2667 = s16 * a_trunk_3_z + s22 * s863
-    s2668 = s19 * s863 + s16 * delta_trunk_2_y
-    s2669 = s22 * omega_trunk_y - s19 * omega_trunk_z
-    s2670 = s16 * omega_trunk_z - s22 * omega_trunk_x
-    s2671 = s19 * omega_trunk_x - s16 * omega_trunk_y
+    s2661 = trunk_y_dot * s23 - trunk_z_dot * s20
+    s2662 = trunk_z_dot * s17 - trunk_x_dot * s23
+    s2663 = trunk_x_dot * s20 - trunk_y_dot * s17
+    s2664 = s23 * delta_trunk_2_y - s20 * a_trunk_3_z
+    s2665 = s17 * a_trunk_3_z + s23 * s837
+    s2666 = s20 * s837 + s17 * delta_trunk_2_y
+    s2667 = s23 * omega_trunk_y - s20 * omega_trunk_z
+    s2668 = s17 * omega_trunk_z - s23 * omega_trunk_x
+    s2669 = s20 * omega_trunk_x - s17 * omega_trunk_y
+    s2670 = s2661 + s2661
+    s2671 = s2662 + s2662
     s2672 = s2663 + s2663
-    s2673 = s2664 + s2664
-    s2674 = s2665 + s2665
-    s2675 = trunk_y_dot * s23 - trunk_z_dot * s20
-    s2676 = trunk_z_dot * s17 - trunk_x_dot * s23
-    s2677 = trunk_x_dot * s20 - trunk_y_dot * s17
-    s2678 = s23 * delta_trunk_2_y - s20 * a_trunk_3_z
-    s2679 = s17 * a_trunk_3_z + s23 * s863
-    s2680 = s20 * s863 + s17 * delta_trunk_2_y
-    s2681 = s23 * omega_trunk_y - s20 * omega_trunk_z
-    s2682 = s17 * omega_trunk_z - s23 * omega_trunk_x
-    s2683 = s20 * omega_trunk_x - s17 * omega_trunk_y
-    s2684 = s2675 + s2675
-    s2685 = s2676 + s2676
-    s2686 = s2677 + s2677
-    s2687 = omega_trunk_y * velocity_front_left_hip_z - omega_trunk_z * velocity_front_left_hip_y
-    s2688 = omega_trunk_z * velocity_front_left_hip_x - omega_trunk_x * velocity_front_left_hip_z
-    s2689 = omega_trunk_x * velocity_front_left_hip_y - omega_trunk_y * velocity_front_left_hip_x
-    s2690 = a_front_left_hip_x - s2687
-    s2691 = a_front_left_hip_y - s2688
-    s2692 = a_front_left_hip_z - s2689
-    s2693 = s21 * velocity_front_left_hip_y - s18 * velocity_front_left_hip_z
-    s2694 = s15 * velocity_front_left_hip_z - s21 * velocity_front_left_hip_x
-    s2695 = s18 * velocity_front_left_hip_x - s15 * velocity_front_left_hip_y
-    s2696 = velocity_front_left_hip_y * s2659 - velocity_front_left_hip_z * s2658 + (omega_trunk_y * s2695 - omega_trunk_z * s2694)
-    s2697 = velocity_front_left_hip_z * s2657 - velocity_front_left_hip_x * s2659 + (omega_trunk_z * s2693 - omega_trunk_x * s2695)
-    s2698 = velocity_front_left_hip_x * s2658 - velocity_front_left_hip_y * s2657 + (omega_trunk_x * s2694 - omega_trunk_y * s2693)
-    s2699 = s21 * s1857 - s18 * s1858 + (omega_trunk_y * s2659 - omega_trunk_z * s2658)
-    s2700 = s15 * s1858 - s21 * s1856 + (omega_trunk_z * s2657 - omega_trunk_x * s2659)
-    s2701 = s18 * s1856 - s15 * s1857 + (omega_trunk_x * s2658 - omega_trunk_y * s2657)
-    s2702 = s21 * s2691 - s18 * s2692 + s2696
-    s2703 = s15 * s2692 - s21 * s2690 + s2697
-    s2704 = s18 * s2690 - s15 * s2691 + s2698
-    s2705 = s2657 + s2657
-    s2706 = s2658 + s2658
-    s2707 = s2659 + s2659
-    s2708 = s2693 + s2693
-    s2709 = s2694 + s2694
-    s2710 = s2695 + s2695
-    s2711 = omega_trunk_y * velocity_front_right_hip_z - omega_trunk_z * velocity_front_right_hip_y
-    s2712 = omega_trunk_z * velocity_front_right_hip_x - omega_trunk_x * velocity_front_right_hip_z
-    s2713 = omega_trunk_x * velocity_front_right_hip_y - omega_trunk_y * velocity_front_right_hip_x
-    s2714 = a_front_right_hip_x - s2711
-    s2715 = a_front_right_hip_y - s2712
-    s2716 = a_front_right_hip_z - s2713
-    s2717 = s21 * velocity_front_right_hip_y - s18 * velocity_front_right_hip_z
-    s2718 = s15 * velocity_front_right_hip_z - s21 * velocity_front_right_hip_x
-    s2719 = s18 * velocity_front_right_hip_x - s15 * velocity_front_right_hip_y
-    s2720 = velocity_front_right_hip_y * s2659 - velocity_front_right_hip_z * s2658 + (omega_trunk_y * s2719 - omega_trunk_z * s2718)
-    s2721 = velocity_front_right_hip_z * s2657 - velocity_front_right_hip_x * s2659 + (omega_trunk_z * s2717 - omega_trunk_x * s2719)
-    s2722 = velocity_front_right_hip_x * s2658 - velocity_front_right_hip_y * s2657 + (omega_trunk_x * s2718 - omega_trunk_y * s2717)
-    s2723 = s21 * s2715 - s18 * s2716 + s2720
-    s2724 = s15 * s2716 - s21 * s2714 + s2721
-    s2725 = s18 * s2714 - s15 * s2715 + s2722
-    s2726 = s2717 + s2717
-    s2727 = s2718 + s2718
-    s2728 = s2719 + s2719
-    s2729 = omega_trunk_y * velocity_hind_left_hip_z - omega_trunk_z * velocity_hind_left_hip_y
-    s2730 = omega_trunk_z * velocity_hind_left_hip_x - omega_trunk_x * velocity_hind_left_hip_z
-    s2731 = omega_trunk_x * velocity_hind_left_hip_y - omega_trunk_y * velocity_hind_left_hip_x
-    s2732 = a_hind_left_hip_x - s2729
-    s2733 = a_hind_left_hip_y - s2730
-    s2734 = a_hind_left_hip_z - s2731
-    s2735 = s21 * velocity_hind_left_hip_y - s18 * velocity_hind_left_hip_z
-    s2736 = s15 * velocity_hind_left_hip_z - s21 * velocity_hind_left_hip_x
-    s2737 = s18 * velocity_hind_left_hip_x - s15 * velocity_hind_left_hip_y
-    s2738 = velocity_hind_left_hip_y * s2659 - velocity_hind_left_hip_z * s2658 + (omega_trunk_y * s2737 - omega_trunk_z * s2736)
-    s2739 = velocity_hind_left_hip_z * s2657 - velocity_hind_left_hip_x * s2659 + (omega_trunk_z * s2735 - omega_trunk_x * s2737)
-    s2740 = velocity_hind_left_hip_x * s2658 - velocity_hind_left_hip_y * s2657 + (omega_trunk_x * s2736 - omega_trunk_y * s2735)
-    s2741 = s21 * s2733 - s18 * s2734 + s2738
-    s2742 = s15 * s2734 - s21 * s2732 + s2739
-    s2743 = s18 * s2732 - s15 * s2733 + s2740
-    s2744 = s2735 + s2735
-    s2745 = s2736 + s2736
-    s2746 = s2737 + s2737
-    s2747 = omega_trunk_y * velocity_hind_right_hip_z - omega_trunk_z * velocity_hind_right_hip_y
-    s2748 = omega_trunk_z * velocity_hind_right_hip_x - omega_trunk_x * velocity_hind_right_hip_z
-    s2749 = omega_trunk_x * velocity_hind_right_hip_y - omega_trunk_y * velocity_hind_right_hip_x
-    s2750 = a_hind_right_hip_x - s2747
-    s2751 = a_hind_right_hip_y - s2748
-    s2752 = a_hind_right_hip_z - s2749
-    s2753 = s21 * velocity_hind_right_hip_y - s18 * velocity_hind_right_hip_z
-    s2754 = s15 * velocity_hind_right_hip_z - s21 * velocity_hind_right_hip_x
-    s2755 = s18 * velocity_hind_right_hip_x - s15 * velocity_hind_right_hip_y
-    s2756 = velocity_hind_right_hip_y * s2659 - velocity_hind_right_hip_z * s2658 + (omega_trunk_y * s2755 - omega_trunk_z * s2754)
-    s2757 = velocity_hind_right_hip_z * s2657 - velocity_hind_right_hip_x * s2659 + (omega_trunk_z * s2753 - omega_trunk_x * s2755)
-    s2758 = velocity_hind_right_hip_x * s2658 - velocity_hind_right_hip_y * s2657 + (omega_trunk_x * s2754 - omega_trunk_y * s2753)
-    s2759 = s21 * s2751 - s18 * s2752 + s2756
-    s2760 = s15 * s2752 - s21 * s2750 + s2757
-    s2761 = s18 * s2750 - s15 * s2751 + s2758
-    s2762 = s2753 + s2753
-    s2763 = s2754 + s2754
-    s2764 = s2755 + s2755
-    s2765 = omega_front_left_hip_y_2 * velocity_front_left_thigh_z - omega_front_left_hip_z_2 * velocity_front_left_thigh_y
-    s2766 = omega_front_left_hip_z_2 * velocity_front_left_thigh_x - omega_front_left_hip_x_2 * velocity_front_left_thigh_z
-    s2767 = omega_front_left_hip_x_2 * velocity_front_left_thigh_y - omega_front_left_hip_y_2 * velocity_front_left_thigh_x
-    s2768 = a_front_left_thigh_x - s2765
-    s2769 = a_front_left_thigh_y - s2766
-    s2770 = a_front_left_thigh_z - s2767
-    s2771 = s931 * omega_front_left_hip_y_2 - s929 * omega_front_left_hip_z_2
-    s2772 = s927 * omega_front_left_hip_z_2 - s931 * omega_front_left_hip_x_2
-    s2773 = s929 * omega_front_left_hip_x_2 - s927 * omega_front_left_hip_y_2
-    s2774 = s931 * velocity_front_left_thigh_y - s929 * velocity_front_left_thigh_z
-    s2775 = s927 * velocity_front_left_thigh_z - s931 * velocity_front_left_thigh_x
-    s2776 = s929 * velocity_front_left_thigh_x - s927 * velocity_front_left_thigh_y
-    s2777 = velocity_front_left_thigh_y * s2773 - velocity_front_left_thigh_z * s2772
-    s2778 = velocity_front_left_thigh_z * s2771 - velocity_front_left_thigh_x * s2773
-    s2779 = velocity_front_left_thigh_x * s2772 - velocity_front_left_thigh_y * s2771
-    s2780 = s2777 + (omega_front_left_hip_y_2 * s2776 - omega_front_left_hip_z_2 * s2775)
-    s2781 = s2778 + (omega_front_left_hip_z_2 * s2774 - omega_front_left_hip_x_2 * s2776)
-    s2782 = s2779 + (omega_front_left_hip_x_2 * s2775 - omega_front_left_hip_y_2 * s2774)
-    s2783 = s931 * s1880 - s929 * s1881 + (omega_front_left_hip_y_2 * s2773 - omega_front_left_hip_z_2 * s2772)
-    s2784 = s927 * s1881 - s931 * s1879 + (omega_front_left_hip_z_2 * s2771 - omega_front_left_hip_x_2 * s2773)
-    s2785 = s929 * s1879 - s927 * s1880 + (omega_front_left_hip_x_2 * s2772 - omega_front_left_hip_y_2 * s2771)
-    s2786 = s931 * s2769 - s929 * s2770 + s2780
-    s2787 = s927 * s2770 - s931 * s2768 + s2781
-    s2788 = s929 * s2768 - s927 * s2769 + s2782
-    s2789 = s2771 + s2771
-    s2790 = s2772 + s2772
-    s2791 = s2773 + s2773
-    s2792 = s2774 + s2774
-    s2793 = s2775 + s2775
-    s2794 = s2776 + s2776
-    s2795 = omega_front_right_hip_y_2 * velocity_front_right_thigh_z - omega_front_right_hip_z_2 * velocity_front_right_thigh_y
-    s2796 = omega_front_right_hip_z_2 * velocity_front_right_thigh_x - omega_front_right_hip_x_2 * velocity_front_right_thigh_z
-    s2797 = omega_front_right_hip_x_2 * velocity_front_right_thigh_y - omega_front_right_hip_y_2 * velocity_front_right_thigh_x
-    s2798 = a_front_right_thigh_x - s2795
-    s2799 = a_front_right_thigh_y - s2796
-    s2800 = a_front_right_thigh_z - s2797
-    s2801 = s937 * omega_front_right_hip_y_2 - s935 * omega_front_right_hip_z_2
-    s2802 = s933 * omega_front_right_hip_z_2 - s937 * omega_front_right_hip_x_2
-    s2803 = s935 * omega_front_right_hip_x_2 - s933 * omega_front_right_hip_y_2
-    s2804 = s937 * velocity_front_right_thigh_y - s935 * velocity_front_right_thigh_z
-    s2805 = s933 * velocity_front_right_thigh_z - s937 * velocity_front_right_thigh_x
-    s2806 = s935 * velocity_front_right_thigh_x - s933 * velocity_front_right_thigh_y
-    s2807 = velocity_front_right_thigh_y * s2803 - velocity_front_right_thigh_z * s2802
-    s2808 = velocity_front_right_thigh_z * s2801 - velocity_front_right_thigh_x * s2803
-    s2809 = velocity_front_right_thigh_x * s2802 - velocity_front_right_thigh_y * s2801
-    s2810 = s2807 + (omega_front_right_hip_y_2 * s2806 - omega_front_right_hip_z_2 * s2805)
-    s2811 = s2808 + (omega_front_right_hip_z_2 * s2804 - omega_front_right_hip_x_2 * s2806)
-    s2812 = s2809 + (omega_front_right_hip_x_2 * s2805 - omega_front_right_hip_y_2 * s2804)
-    s2813 = s937 * s1895 - s935 * s1896 + (omega_front_right_hip_y_2 * s2803 - omega_front_right_hip_z_2 * s2802)
-    s2814 = s933 * s1896 - s937 * s1894 + (omega_front_right_hip_z_2 * s2801 - omega_front_right_hip_x_2 * s2803)
-    s2815 = s935 * s1894 - s933 * s1895 + (omega_front_right_hip_x_2 * s2802 - omega_front_right_hip_y_2 * s2801)
-    s2816 = s937 * s2799 - s935 * s2800 + s2810
-    s2817 = s933 * s2800 - s937 * s2798 + s2811
-    s2818 = s935 * s2798 - s933 * s2799 + s2812
-    s2819 = s2801 + s2801
-    s2820 = s2802 + s2802
-    s2821 = s2803 + s2803
-    s2822 = s2804 + s2804
-    s2823 = s2805 + s2805
-    s2824 = s2806 + s2806
-    s2825 = omega_hind_left_hip_y_2 * velocity_hind_left_thigh_z - omega_hind_left_hip_z_2 * velocity_hind_left_thigh_y
-    s2826 = omega_hind_left_hip_z_2 * velocity_hind_left_thigh_x - omega_hind_left_hip_x_2 * velocity_hind_left_thigh_z
-    s2827 = omega_hind_left_hip_x_2 * velocity_hind_left_thigh_y - omega_hind_left_hip_y_2 * velocity_hind_left_thigh_x
-    s2828 = a_hind_left_thigh_x - s2825
-    s2829 = a_hind_left_thigh_y - s2826
-    s2830 = a_hind_left_thigh_z - s2827
-    s2831 = s943 * omega_hind_left_hip_y_2 - s941 * omega_hind_left_hip_z_2
-    s2832 = s939 * omega_hind_left_hip_z_2 - s943 * omega_hind_left_hip_x_2
-    s2833 = s941 * omega_hind_left_hip_x_2 - s939 * omega_hind_left_hip_y_2
-    s2834 = s943 * velocity_hind_left_thigh_y - s941 * velocity_hind_left_thigh_z
-    s2835 = s939 * velocity_hind_left_thigh_z - s943 * velocity_hind_left_thigh_x
-    s2836 = s941 * velocity_hind_left_thigh_x - s939 * velocity_hind_left_thigh_y
-    s2837 = velocity_hind_left_thigh_y * s2833 - velocity_hind_left_thigh_z * s2832 + (omega_hind_left_hip_y_2 * s2836 - omega_hind_left_hip_z_2 * s2835)
-    s2838 = velocity_hind_left_thigh_z * s2831 - velocity_hind_left_thigh_x * s2833 + (omega_hind_left_hip_z_2 * s2834 - omega_hind_left_hip_x_2 * s2836)
-    s2839 = velocity_hind_left_thigh_x * s2832 - velocity_hind_left_thigh_y * s2831 + (omega_hind_left_hip_x_2 * s2835 - omega_hind_left_hip_y_2 * s2834)
-    s2840 = s943 * s1910 - s941 * s1911 + (omega_hind_left_hip_y_2 * s2833 - omega_hind_left_hip_z_2 * s2832)
-    s2841 = s939 * s1911 - s943 * s1909 + (omega_hind_left_hip_z_2 * s2831 - omega_hind_left_hip_x_2 * s2833)
-    s2842 = s941 * s1909 - s939 * s1910 + (omega_hind_left_hip_x_2 * s2832 - omega_hind_left_hip_y_2 * s2831)
-    s2843 = s943 * s2829 - s941 * s2830 + s2837
-    s2844 = s939 * s2830 - s943 * s2828 + s2838
-    s2845 = s941 * s2828 - s939 * s2829 + s2839
-    s2846 = s2831 + s2831
-    s2847 = s2832 + s2832
-    s2848 = s2833 + s2833
-    s2849 = s2834 + s2834
-    s2850 = s2835 + s2835
-    s2851 = s2836 + s2836
-    s2852 = omega_hind_right_hip_y_2 * velocity_hind_right_thigh_z - omega_hind_right_hip_z_2 * velocity_hind_right_thigh_y
-    s2853 = omega_hind_right_hip_z_2 * velocity_hind_right_thigh_x - omega_hind_right_hip_x_2 * velocity_hind_right_thigh_z
-    s2854 = omega_hind_right_hip_x_2 * velocity_hind_right_thigh_y - omega_hind_right_hip_y_2 * velocity_hind_right_thigh_x
-    s2855 = a_hind_right_thigh_x - s2852
-    s2856 = a_hind_right_thigh_y - s2853
-    s2857 = a_hind_right_thigh_z - s2854
-    s2858 = s949 * omega_hind_right_hip_y_2 - s947 * omega_hind_right_hip_z_2
-    s2859 = s945 * omega_hind_right_hip_z_2 - s949 * omega_hind_right_hip_x_2
-    s2860 = s947 * omega_hind_right_hip_x_2 - s945 * omega_hind_right_hip_y_2
-    s2861 = s949 * velocity_hind_right_thigh_y - s947 * velocity_hind_right_thigh_z
-    s2862 = s945 * velocity_hind_right_thigh_z - s949 * velocity_hind_right_thigh_x
-    s2863 = s947 * velocity_hind_right_thigh_x - s945 * velocity_hind_right_thigh_y
-    s2864 = velocity_hind_right_thigh_y * s2860 - velocity_hind_right_thigh_z * s2859
-    s2865 = velocity_hind_right_thigh_z * s2858 - velocity_hind_right_thigh_x * s2860
-    s2866 = velocity_hind_right_thigh_x * s2859 - velocity_hind_right_thigh_y * s2858
-    s2867 = s2864 + (omega_hind_right_hip_y_2 * s2863 - omega_hind_right_hip_z_2 * s2862)
-    s2868 = s2865 + (omega_hind_right_hip_z_2 * s2861 - omega_hind_right_hip_x_2 * s2863)
-    s2869 = s2866 + (omega_hind_right_hip_x_2 * s2862 - omega_hind_right_hip_y_2 * s2861)
-    s2870 = s949 * s1925 - s947 * s1926 + (omega_hind_right_hip_y_2 * s2860 - omega_hind_right_hip_z_2 * s2859)
-    s2871 = s945 * s1926 - s949 * s1924 + (omega_hind_right_hip_z_2 * s2858 - omega_hind_right_hip_x_2 * s2860)
-    s2872 = s947 * s1924 - s945 * s1925 + (omega_hind_right_hip_x_2 * s2859 - omega_hind_right_hip_y_2 * s2858)
-    s2873 = s949 * s2856 - s947 * s2857 + s2867
-    s2874 = s945 * s2857 - s949 * s2855 + s2868
-    s2875 = s947 * s2855 - s945 * s2856 + s2869
-    s2876 = s2858 + s2858
-    s2877 = s2859 + s2859
-    s2878 = s2860 + s2860
-    s2879 = s2861 + s2861
-    s2880 = s2862 + s2862
-    s2881 = s2863 + s2863
-    s2882 = omega_front_left_thigh_y_2 * velocity_front_left_shank_z - omega_front_left_thigh_z_2 * velocity_front_left_shank_y
-    s2883 = omega_front_left_thigh_z_2 * velocity_front_left_shank_x - omega_front_left_thigh_x_2 * velocity_front_left_shank_z
-    s2884 = omega_front_left_thigh_x_2 * velocity_front_left_shank_y - omega_front_left_thigh_y_2 * velocity_front_left_shank_x
-    s2885 = a_front_left_shank_x - s2882
-    s2886 = a_front_left_shank_y - s2883
-    s2887 = a_front_left_shank_z - s2884
-    s2888 = s931 * omega_front_left_thigh_y_2 - s929 * omega_front_left_thigh_z_2
-    s2889 = s927 * omega_front_left_thigh_z_2 - s931 * omega_front_left_thigh_x_2
-    s2890 = s929 * omega_front_left_thigh_x_2 - s927 * omega_front_left_thigh_y_2
-    s2891 = s931 * velocity_front_left_shank_y - s929 * velocity_front_left_shank_z
-    s2892 = s927 * velocity_front_left_shank_z - s931 * velocity_front_left_shank_x
-    s2893 = s929 * velocity_front_left_shank_x - s927 * velocity_front_left_shank_y
-    s2894 = velocity_front_left_shank_y * s2890 - velocity_front_left_shank_z * s2889
-    s2895 = velocity_front_left_shank_z * s2888 - velocity_front_left_shank_x * s2890
-    s2896 = velocity_front_left_shank_x * s2889 - velocity_front_left_shank_y * s2888
-    s2897 = s2894 + (omega_front_left_thigh_y_2 * s2893 - omega_front_left_thigh_z_2 * s2892)
-    s2898 = s2895 + (omega_front_left_thigh_z_2 * s2891 - omega_front_left_thigh_x_2 * s2893)
-    s2899 = s2896 + (omega_front_left_thigh_x_2 * s2892 - omega_front_left_thigh_y_2 * s2891)
-    s2900 = s931 * s1943 - s929 * s1944 + (omega_front_left_thigh_y_2 * s2890 - omega_front_left_thigh_z_2 * s2889)
-    s2901 = s927 * s1944 - s931 * s1942 + (omega_front_left_thigh_z_2 * s2888 - omega_front_left_thigh_x_2 * s2890)
-    s2902 = s929 * s1942 - s927 * s1943 + (omega_front_left_thigh_x_2 * s2889 - omega_front_left_thigh_y_2 * s2888)
-    s2903 = s931 * s2886 - s929 * s2887 + s2897
-    s2904 = s927 * s2887 - s931 * s2885 + s2898
-    s2905 = s929 * s2885 - s927 * s2886 + s2899
-    s2906 = s2888 + s2888
-    s2907 = s2889 + s2889
-    s2908 = s2890 + s2890
-    s2909 = s2891 + s2891
-    s2910 = s2892 + s2892
-    s2911 = s2893 + s2893
-    s2912 = omega_front_right_thigh_y_2 * velocity_front_right_shank_z - omega_front_right_thigh_z_2 * velocity_front_right_shank_y
-    s2913 = omega_front_right_thigh_z_2 * velocity_front_right_shank_x - omega_front_right_thigh_x_2 * velocity_front_right_shank_z
-    s2914 = omega_front_right_thigh_x_2 * velocity_front_right_shank_y - omega_front_right_thigh_y_2 * velocity_front_right_shank_x
-    s2915 = a_front_right_shank_x - s2912
-    s2916 = a_front_right_shank_y - s2913
-    s2917 = a_front_right_shank_z - s2914
-    s2918 = s937 * omega_front_right_thigh_y_2 - s935 * omega_front_right_thigh_z_2
-    s2919 = s933 * omega_front_right_thigh_z_2 - s937 * omega_front_right_thigh_x_2
-    s2920 = s935 * omega_front_right_thigh_x_2 - s933 * omega_front_right_thigh_y_2
-    s2921 = s937 * velocity_front_right_shank_y - s935 * velocity_front_right_shank_z
-    s2922 = s933 * velocity_front_right_shank_z - s937 * velocity_front_right_shank_x
-    s2923 = s935 * velocity_front_right_shank_x - s933 * velocity_front_right_shank_y
-    s2924 = omega_front_right_thigh_y_2 * s2920 - omega_front_right_thigh_z_2 * s2919
-    s2925 = omega_front_right_thigh_z_2 * s2918 - omega_front_right_thigh_x_2 * s2920
-    s2926 = omega_front_right_thigh_x_2 * s2919 - omega_front_right_thigh_y_2 * s2918
-    s2927 = velocity_front_right_shank_y * s2920 - velocity_front_right_shank_z * s2919
-    s2928 = velocity_front_right_shank_z * s2918 - velocity_front_right_shank_x * s2920
-    s2929 = velocity_front_right_shank_x * s2919 - velocity_front_right_shank_y * s2918
-    s2930 = omega_front_right_thigh_y_2 * s2923 - omega_front_right_thigh_z_2 * s2922
-    s2931 = omega_front_right_thigh_z_2 * s2921 - omega_front_right_thigh_x_2 * s2923
-    s2932 = omega_front_right_thigh_x_2 * s2922 - omega_front_right_thigh_y_2 * s2921
-    s2933 = s937 * s1961 - s935 * s1962 + s2924
-    s2934 = s933 * s1962 - s937 * s1960 + s2925
-    s2935 = s935 * s1960 - s933 * s1961 + s2926
-    s2936 = s937 * s2916 - s935 * s2917 + (s2927 + s2930)
-    s2937 = s933 * s2917 - s937 * s2915 + (s2928 + s2931)
-    s2938 = s935 * s2915 - s933 * s2916 + (s2929 + s2932)
-    s2939 = s2918 + s2918
-    s2940 = s2919 + s2919
-    s2941 = s2920 + s2920
-    s2942 = s2921 + s2921
-    s2943 = s2922 + s2922
-    s2944 = s2923 + s2923
-    s2945 = omega_hind_left_thigh_y_2 * velocity_hind_left_shank_z - omega_hind_left_thigh_z_2 * velocity_hind_left_shank_y
-    s2946 = omega_hind_left_thigh_z_2 * velocity_hind_left_shank_x - omega_hind_left_thigh_x_2 * velocity_hind_left_shank_z
-    s2947 = omega_hind_left_thigh_x_2 * velocity_hind_left_shank_y - omega_hind_left_thigh_y_2 * velocity_hind_left_shank_x
-    s2948 = a_hind_left_shank_x - s2945
-    s2949 = a_hind_left_shank_y - s2946
-    s2950 = a_hind_left_shank_z - s2947
-    s2951 = s943 * omega_hind_left_thigh_y_2 - s941 * omega_hind_left_thigh_z_2
-    s2952 = s939 * omega_hind_left_thigh_z_2 - s943 * omega_hind_left_thigh_x_2
-    s2953 = s941 * omega_hind_left_thigh_x_2 - s939 * omega_hind_left_thigh_y_2
-    s2954 = s943 * velocity_hind_left_shank_y - s941 * velocity_hind_left_shank_z
-    s2955 = s939 * velocity_hind_left_shank_z - s943 * velocity_hind_left_shank_x
-    s2956 = s941 * velocity_hind_left_shank_x - s939 * velocity_hind_left_shank_y
-    s2957 = velocity_hind_left_shank_y * s2953 - velocity_hind_left_shank_z * s2952 + (omega_hind_left_thigh_y_2 * s2956 - omega_hind_left_thigh_z_2 * s2955)
-    s2958 = velocity_hind_left_shank_z * s2951 - velocity_hind_left_shank_x * s2953 + (omega_hind_left_thigh_z_2 * s2954 - omega_hind_left_thigh_x_2 * s2956)
-    s2959 = velocity_hind_left_shank_x * s2952 - velocity_hind_left_shank_y * s2951 + (omega_hind_left_thigh_x_2 * s2955 - omega_hind_left_thigh_y_2 * s2954)
-    s2960 = s943 * s1982 - s941 * s1983 + (omega_hind_left_thigh_y_2 * s2953 - omega_hind_left_thigh_z_2 * s2952)
-    s2961 = s939 * s1983 - s943 * s1981 + (omega_hind_left_thigh_z_2 * s2951 - omega_hind_left_thigh_x_2 * s2953)
-    s2962 = s941 * s1981 - s939 * s1982 + (omega_hind_left_thigh_x_2 * s2952 - omega_hind_left_thigh_y_2 * s2951)
-    s2963 = s943 * s2949 - s941 * s2950 + s2957
-    s2964 = s939 * s2950 - s943 * s2948 + s2958
-    s2965 = s941 * s2948 - s939 * s2949 + s2959
-    s2966 = s2951 + s2951
-    s2967 = s2952 + s2952
-    s2968 = s2953 + s2953
-    s2969 = s2954 + s2954
-    s2970 = s2955 + s2955
-    s2971 = s2956 + s2956
-    s2972 = omega_hind_right_thigh_y_2 * velocity_hind_right_shank_z - omega_hind_right_thigh_z_2 * velocity_hind_right_shank_y
-    s2973 = omega_hind_right_thigh_z_2 * velocity_hind_right_shank_x - omega_hind_right_thigh_x_2 * velocity_hind_right_shank_z
-    s2974 = omega_hind_right_thigh_x_2 * velocity_hind_right_shank_y - omega_hind_right_thigh_y_2 * velocity_hind_right_shank_x
-    s2975 = a_hind_right_shank_x - s2972
-    s2976 = a_hind_right_shank_y - s2973
-    s2977 = a_hind_right_shank_z - s2974
-    s2978 = s949 * omega_hind_right_thigh_y_2 - s947 * omega_hind_right_thigh_z_2
-    s2979 = s945 * omega_hind_right_thigh_z_2 - s949 * omega_hind_right_thigh_x_2
-    s2980 = s947 * omega_hind_right_thigh_x_2 - s945 * omega_hind_right_thigh_y_2
-    s2981 = s949 * velocity_hind_right_shank_y - s947 * velocity_hind_right_shank_z
-    s2982 = s945 * velocity_hind_right_shank_z - s949 * velocity_hind_right_shank_x
-    s2983 = s947 * velocity_hind_right_shank_x - s945 * velocity_hind_right_shank_y
-    s2984 = velocity_hind_right_shank_y * s2980 - velocity_hind_right_shank_z * s2979
-    s2985 = velocity_hind_right_shank_z * s2978 - velocity_hind_right_shank_x * s2980
-    s2986 = velocity_hind_right_shank_x * s2979 - velocity_hind_right_shank_y * s2978
-    s2987 = s2984 + (omega_hind_right_thigh_y_2 * s2983 - omega_hind_right_thigh_z_2 * s2982)
-    s2988 = s2985 + (omega_hind_right_thigh_z_2 * s2981 - omega_hind_right_thigh_x_2 * s2983)
-    s2989 = s2986 + (omega_hind_right_thigh_x_2 * s2982 - omega_hind_right_thigh_y_2 * s2981)
-    s2990 = s949 * s2000 - s947 * s2001 + (omega_hind_right_thigh_y_2 * s2980 - omega_hind_right_thigh_z_2 * s2979)
-    s2991 = s945 * s2001 - s949 * s1999 + (omega_hind_right_thigh_z_2 * s2978 - omega_hind_right_thigh_x_2 * s2980)
-    s2992 = s947 * s1999 - s945 * s2000 + (omega_hind_right_thigh_x_2 * s2979 - omega_hind_right_thigh_y_2 * s2978)
-    s2993 = s949 * s2976 - s947 * s2977 + s2987
-    s2994 = s945 * s2977 - s949 * s2975 + s2988
-    s2995 = s947 * s2975 - s945 * s2976 + s2989
-    s2996 = s2978 + s2978
-    s2997 = s2979 + s2979
-    s2998 = s2980 + s2980
-    s2999 = s2981 + s2981
-    s3000 = s2982 + s2982
-    s3001 = s2983 + s2983
-    s3002 = 2.0 * s15
-    s3003 = 2.0 * s18
-    s3004 = 2.0 * s21
-    s3005 = s2642 * s3002 + s2645 * s3003 + s2648 * s3004
-    s3006 = s2643 * s3002 + s2646 * s3003 + s2649 * s3004
-    s3007 = s2644 * s3002 + s2647 * s3003 + s2650 * s3004
-    s3008 = s18 * s2293 - s21 * s2292 + k30 * s2654
-    s3009 = s21 * s2291 - s15 * s2293 + k30 * s2655
-    s3010 = s15 * s2292 - s18 * s2291 - k30 * s2656
-    s3011 = k30 * s2660 + (s1410 * s2658 - s1409 * s2659) + (s2641 * s3003 - s2640 * s3004)
-    s3012 = k30 * s2661 + (s1408 * s2659 - s1410 * s2657) + (s2639 * s3004 - s2641 * s3002)
-    s3013 = k30 * s2662 + (s1409 * s2657 - s1408 * s2658) + (s2640 * s3002 - s2639 * s3003)
-    s3014 = s1417 * s2654 + s1418 * s2655 - s1419 * s2656
-    s3015 = s1420 * s2657 + s1421 * s2658 + s1422 * s2659 + (s1417 * s2660 + s1418 * s2661 + s1419 * s2662)
-    s3016 = s1417 * s2666 + s1418 * s2667 - s1419 * s2668
-    s3017 = s1420 * s2669 + s1421 * s2670 + s1422 * s2671 + (s1417 * s2672 + s1418 * s2673 + s1419 * s2674)
-    s3018 = s1417 * s2678 + s1418 * s2679 - s1419 * s2680
-    s3019 = s1420 * s2681 + s1421 * s2682 + s1422 * s2683 + (s1417 * s2684 + s1418 * s2685 + s1419 * s2686)
-    s3020 = 2.0 * s16
-    s3021 = 2.0 * s19
-    s3022 = 2.0 * s22
-    s3023 = s2642 * s3020 + s2645 * s3021 + s2648 * s3022
-    s3024 = s2643 * s3020 + s2646 * s3021 + s2649 * s3022
-    s3025 = s2644 * s3020 + s2647 * s3021 + s2650 * s3022
-    s3026 = s19 * s2293 - s22 * s2292 + k30 * s2666
-    s3027 = s22 * s2291 - s16 * s2293 + k30 * s2667
-    s3028 = s16 * s2292 - s19 * s2291 - k30 * s2668
-    s3029 = k30 * s2672 + (s1410 * s2670 - s1409 * s2671) + (s2641 * s3021 - s2640 * s3022)
-    s3030 = k30 * s2673 + (s1408 * s2671 - s1410 * s2669) + (s2639 * s3022 - s2641 * s3020)
-    s3031 = k30 * s2674 + (s1409 * s2669 - s1408 * s2670) + (s2640 * s3020 - s2639 * s3021)
-    s3032 = s1423 * s2654 + s1424 * s2655 - s1425 * s2656
-    s3033 = s1426 * s2657 + s1427 * s2658 + s1428 * s2659 + (s1423 * s2660 + s1424 * s2661 + s1425 * s2662)
-    s3034 = s1423 * s2666 + s1424 * s2667 - s1425 * s2668
-    s3035 = s1426 * s2669 + s1427 * s2670 + s1428 * s2671 + (s1423 * s2672 + s1424 * s2673 + s1425 * s2674)
-    s3036 = s1423 * s2678 + s1424 * s2679 - s1425 * s2680
-    s3037 = s1426 * s2681 + s1427 * s2682 + s1428 * s2683 + (s1423 * s2684 + s1424 * s2685 + s1425 * s2686)
-    s3038 = 2.0 * s17
-    s3039 = 2.0 * s20
-    s3040 = 2.0 * s23
-    s3041 = s2642 * s3038 + s2645 * s3039 + s2648 * s3040
-    s3042 = s2643 * s3038 + s2646 * s3039 + s2649 * s3040
-    s3043 = s2644 * s3038 + s2647 * s3039 + s2650 * s3040
-    s3044 = s20 * s2293 - s23 * s2292 + k30 * s2678
-    s3045 = s23 * s2291 - s17 * s2293 + k30 * s2679
-    s3046 = s17 * s2292 - s20 * s2291 - k30 * s2680
-    s3047 = k30 * s2684 + (s1410 * s2682 - s1409 * s2683) + (s2641 * s3039 - s2640 * s3040)
-    s3048 = k30 * s2685 + (s1408 * s2683 - s1410 * s2681) + (s2639 * s3040 - s2641 * s3038)
-    s3049 = k30 * s2686 + (s1409 * s2681 - s1408 * s2682) + (s2640 * s3038 - s2639 * s3039)
-    s3050 = s1429 * s2654 + s1430 * s2655 - s1431 * s2656
-    s3051 = s1432 * s2657 + s1433 * s2658 + s1434 * s2659 + (s1429 * s2660 + s1430 * s2661 + s1431 * s2662)
-    s3052 = s1429 * s2666 + s1430 * s2667 - s1431 * s2668
-    s3053 = s1432 * s2669 + s1433 * s2670 + s1434 * s2671 + (s1429 * s2672 + s1430 * s2673 + s1431 * s2674)
-    s3054 = s1429 * s2678 + s1430 * s2679 - s1431 * s2680
-    s3055 = s1432 * s2681 + s1433 * s2682 + s1434 * s2683 + (s1429 * s2684 + s1430 * s2685 + s1431 * s2686)
-    s3056 = s2609 * s3002
-    s3057 = s3056 + s2612 * s3003 + s2615 * s3004
-    s3058 = s2613 * s3003
-    s3059 = s2610 * s3002 + s3058 + s2616 * s3004
-    s3060 = s2617 * s3004
-    s3061 = s2611 * s3002 + s2614 * s3003 + s3060
-    s3062 = s1369 * s2699 + s1370 * s2700 + s1371 * s2701 + (s1367 * s2704 - s1368 * s2703)
-    s3063 = s1370 * s2699 + s1372 * s2700 + s1373 * s2701 + (s1368 * s2702 - s1366 * s2704)
-    s3064 = s1371 * s2699 + s1373 * s2700 + s1374 * s2701 + (s1366 * s2703 - s1367 * s2702)
-    s3065 = 2.0 * s2657
-    s3066 = 2.0 * s2658
-    s3067 = 2.0 * s2659
-    s3068 = k15 * s2702 + (s1368 * s2700 - s1367 * s2701) + (s2608 * s3066 - s2607 * s3067)
-    s3069 = k15 * s2703 + (s1366 * s2701 - s1368 * s2699) + (s2606 * s3067 - s2608 * s3065)
-    s3070 = k15 * s2704 + (s1367 * s2699 - s1366 * s2700) + (s2607 * s3065 - s2606 * s3066)
-    s3071 = s18 * s2287 - s21 * s2286 + (s3062 + (s2609 * s3065 + s2610 * s3066 + s2611 * s3067))
-    s3072 = s21 * s2285 - s15 * s2287 + (s3063 + (s2612 * s3065 + s2613 * s3066 + s2614 * s3067))
-    s3073 = s15 * s2286 - s18 * s2285 + (s3064 + (s2615 * s3065 + s2616 * s3066 + s2617 * s3067))
-    s3074 = s18 * s2290 - s21 * s2289 + s3068
-    s3075 = s21 * s2288 - s15 * s2290 + s3069
-    s3076 = s15 * s2289 - s18 * s2288 + s3070
-    s3077 = s1369 * s2705 + s1370 * s2706 + s1371 * s2707 + (s1367 * s2710 - s1368 * s2709)
-    s3078 = s1370 * s2705 + s1372 * s2706 + s1373 * s2707 + (s1368 * s2708 - s1366 * s2710)
-    s3079 = s1371 * s2705 + s1373 * s2706 + s1374 * s2707 + (s1366 * s2709 - s1367 * s2708)
-    s3080 = k15 * s2708 + (s1368 * s2706 - s1367 * s2707) + (s2608 * s3003 - s2607 * s3004)
-    s3081 = k15 * s2709 + (s1366 * s2707 - s1368 * s2705) + (s2606 * s3004 - s2608 * s3002)
-    s3082 = k15 * s2710 + (s1367 * s2705 - s1366 * s2706) + (s2607 * s3002 - s2606 * s3003)
-    s3083 = s1438 * s2699 + s1439 * s2700 + s1440 * s2701 + (s1435 * s2702 + s1436 * s2703 + s1437 * s2704)
-    s3084 = s1438 * s2705 + s1439 * s2706 + s1440 * s2707 + (s1435 * s2708 + s1436 * s2709 + s1437 * s2710)
-    s3085 = s15 * s3057 + s18 * s3059 + s21 * s3061
-    s3086 = s3071 + (s1016 * s3076 - s1019 * s3075)
-    s3087 = s3072 + (s1019 * s3074 - s1013 * s3076)
-    s3088 = s3073 + (s1013 * s3075 - s1016 * s3074)
-    s3089 = s3077 + (s3056 + s2610 * s3003 + s2611 * s3004) + (s1016 * s3082 - s1019 * s3081)
-    s3090 = s3078 + (s3058 + s2612 * s3002 + s2614 * s3004) + (s1019 * s3080 - s1013 * s3082)
-    s3091 = s3079 + (s3060 + (s2615 * s3002 + s2616 * s3003)) + (s1013 * s3081 - s1016 * s3080)
-    s3092 = s1435 * s2654 + s1436 * s2655 - s1437 * s2656
-    s3093 = s1441 * s2657 + s1442 * s2658 + s1443 * s2659 + (s1435 * s2660 + s1436 * s2661 + s1437 * s2662)
-    s3094 = s1435 * s2666 + s1436 * s2667 - s1437 * s2668
-    s3095 = s1441 * s2669 + s1442 * s2670 + s1443 * s2671 + (s1435 * s2672 + s1436 * s2673 + s1437 * s2674)
-    s3096 = s1435 * s2678 + s1436 * s2679 - s1437 * s2680
-    s3097 = s1441 * s2681 + s1442 * s2682 + s1443 * s2683 + (s1435 * s2684 + s1436 * s2685 + s1437 * s2686)
-    s3098 = s2594 * s3002
-    s3099 = s3098 + s2597 * s3003 + s2600 * s3004
-    s3100 = s2598 * s3003
-    s3101 = s2595 * s3002 + s3100 + s2601 * s3004
-    s3102 = s2602 * s3004
-    s3103 = s2596 * s3002 + s2599 * s3003 + s3102
-    s3104 = s1354 * s2699 + s1355 * s2700 + s1356 * s2701 + (s1352 * s2725 - s1353 * s2724)
-    s3105 = s1355 * s2699 + s1357 * s2700 + s1358 * s2701 + (s1353 * s2723 - s1351 * s2725)
-    s3106 = s1356 * s2699 + s1358 * s2700 + s1359 * s2701 + (s1351 * s2724 - s1352 * s2723)
-    s3107 = k15 * s2723 + (s1353 * s2700 - s1352 * s2701) + (s2593 * s3066 - s2592 * s3067)
-    s3108 = k15 * s2724 + (s1351 * s2701 - s1353 * s2699) + (s2591 * s3067 - s2593 * s3065)
-    s3109 = k15 * s2725 + (s1352 * s2699 - s1351 * s2700) + (s2592 * s3065 - s2591 * s3066)
-    s3110 = s18 * s2281 - s21 * s2280 + (s3104 + (s2594 * s3065 + s2595 * s3066 + s2596 * s3067))
-    s3111 = s21 * s2279 - s15 * s2281 + (s3105 + (s2597 * s3065 + s2598 * s3066 + s2599 * s3067))
-    s3112 = s15 * s2280 - s18 * s2279 + (s3106 + (s2600 * s3065 + s2601 * s3066 + s2602 * s3067))
-    s3113 = s18 * s2284 - s21 * s2283 + s3107
-    s3114 = s21 * s2282 - s15 * s2284 + s3108
-    s3115 = s15 * s2283 - s18 * s2282 + s3109
-    s3116 = s1354 * s2705 + s1355 * s2706 + s1356 * s2707 + (s1352 * s2728 - s1353 * s2727)
-    s3117 = s1355 * s2705 + s1357 * s2706 + s1358 * s2707 + (s1353 * s2726 - s1351 * s2728)
-    s3118 = s1356 * s2705 + s1358 * s2706 + s1359 * s2707 + (s1351 * s2727 - s1352 * s2726)
-    s3119 = k15 * s2726 + (s1353 * s2706 - s1352 * s2707) + (s2593 * s3003 - s2592 * s3004)
-    s3120 = k15 * s2727 + (s1351 * s2707 - s1353 * s2705) + (s2591 * s3004 - s2593 * s3002)
-    s3121 = k15 * s2728 + (s1352 * s2705 - s1351 * s2706) + (s2592 * s3002 - s2591 * s3003)
-    s3122 = s1447 * s2699 + s1448 * s2700 + s1449 * s2701 + (s1444 * s2723 + s1445 * s2724 + s1446 * s2725)
-    s3123 = s1447 * s2705 + s1448 * s2706 + s1449 * s2707 + (s1444 * s2726 + s1445 * s2727 + s1446 * s2728)
-    s3124 = s15 * s3099 + s18 * s3101 + s21 * s3103
-    s3125 = s3110 + (s1046 * s3115 - s1047 * s3114)
-    s3126 = s3111 + (s1047 * s3113 - s1045 * s3115)
-    s3127 = s3112 + (s1045 * s3114 - s1046 * s3113)
-    s3128 = s3116 + (s3098 + s2595 * s3003 + s2596 * s3004) + (s1046 * s3121 - s1047 * s3120)
-    s3129 = s3117 + (s3100 + s2597 * s3002 + s2599 * s3004) + (s1047 * s3119 - s1045 * s3121)
-    s3130 = s3118 + (s3102 + (s2600 * s3002 + s2601 * s3003)) + (s1045 * s3120 - s1046 * s3119)
-    s3131 = s1444 * s2654 + s1445 * s2655 - s1446 * s2656
-    s3132 = s1450 * s2657 + s1451 * s2658 + s1452 * s2659 + (s1444 * s2660 + s1445 * s2661 + s1446 * s2662)
-    s3133 = s1444 * s2666 + s1445 * s2667 - s1446 * s2668
-    s3134 = s1450 * s2669 + s1451 * s2670 + s1452 * s2671 + (s1444 * s2672 + s1445 * s2673 + s1446 * s2674)
-    s3135 = s1444 * s2678 + s1445 * s2679 - s1446 * s2680
-    s3136 = s1450 * s2681 + s1451 * s2682 + s1452 * s2683 + (s1444 * s2684 + s1445 * s2685 + s1446 * s2686)
-    s3137 = s2579 * s3002
-    s3138 = s3137 + s2582 * s3003 + s2585 * s3004
-    s3139 = s2583 * s3003
-    s3140 = s2580 * s3002 + s3139 + s2586 * s3004
-    s3141 = s2587 * s3004
-    s3142 = s2581 * s3002 + s2584 * s3003 + s3141
-    s3143 = s1339 * s2699 + s1340 * s2700 + s1341 * s2701 + (s1337 * s2743 - s1338 * s2742)
-    s3144 = s1340 * s2699 + s1342 * s2700 + s1343 * s2701 + (s1338 * s2741 - s1336 * s2743)
-    s3145 = s1341 * s2699 + s1343 * s2700 + s1344 * s2701 + (s1336 * s2742 - s1337 * s2741)
-    s3146 = k15 * s2741 + (s1338 * s2700 - s1337 * s2701) + (s2578 * s3066 - s2577 * s3067)
-    s3147 = k15 * s2742 + (s1336 * s2701 - s1338 * s2699) + (s2576 * s3067 - s2578 * s3065)
-    s3148 = k15 * s2743 + (s1337 * s2699 - s1336 * s2700) + (s2577 * s3065 - s2576 * s3066)
-    s3149 = s18 * s2275 - s21 * s2274 + (s3143 + (s2579 * s3065 + s2580 * s3066 + s2581 * s3067))
-    s3150 = s21 * s2273 - s15 * s2275 + (s3144 + (s2582 * s3065 + s2583 * s3066 + s2584 * s3067))
-    s3151 = s15 * s2274 - s18 * s2273 + (s3145 + (s2585 * s3065 + s2586 * s3066 + s2587 * s3067))
-    s3152 = s18 * s2278 - s21 * s2277 + s3146
-    s3153 = s21 * s2276 - s15 * s2278 + s3147
-    s3154 = s15 * s2277 - s18 * s2276 + s3148
-    s3155 = s1339 * s2705 + s1340 * s2706 + s1341 * s2707 + (s1337 * s2746 - s1338 * s2745)
-    s3156 = s1340 * s2705 + s1342 * s2706 + s1343 * s2707 + (s1338 * s2744 - s1336 * s2746)
-    s3157 = s1341 * s2705 + s1343 * s2706 + s1344 * s2707 + (s1336 * s2745 - s1337 * s2744)
-    s3158 = k15 * s2744 + (s1338 * s2706 - s1337 * s2707) + (s2578 * s3003 - s2577 * s3004)
-    s3159 = k15 * s2745 + (s1336 * s2707 - s1338 * s2705) + (s2576 * s3004 - s2578 * s3002)
-    s3160 = k15 * s2746 + (s1337 * s2705 - s1336 * s2706) + (s2577 * s3002 - s2576 * s3003)
-    s3161 = s1456 * s2699 + s1457 * s2700 + s1458 * s2701 + (s1453 * s2741 + s1454 * s2742 + s1455 * s2743)
-    s3162 = s1456 * s2705 + s1457 * s2706 + s1458 * s2707 + (s1453 * s2744 + s1454 * s2745 + s1455 * s2746)
-    s3163 = s15 * s3138 + s18 * s3140 + s21 * s3142
-    s3164 = s3149 + (s1065 * s3154 - s1066 * s3153)
-    s3165 = s3150 + (s1066 * s3152 - s1064 * s3154)
-    s3166 = s3151 + (s1064 * s3153 - s1065 * s3152)
-    s3167 = s3155 + (s3137 + s2580 * s3003 + s2581 * s3004) + (s1065 * s3160 - s1066 * s3159)
-    s3168 = s3156 + (s3139 + s2582 * s3002 + s2584 * s3004) + (s1066 * s3158 - s1064 * s3160)
-    s3169 = s3157 + (s3141 + (s2585 * s3002 + s2586 * s3003)) + (s1064 * s3159 - s1065 * s3158)
-    s3170 = s1453 * s2654 + s1454 * s2655 - s1455 * s2656
-    s3171 = s1459 * s2657 + s1460 * s2658 + s1461 * s2659 + (s1453 * s2660 + s1454 * s2661 + s1455 * s2662)
-    s3172 = s1453 * s2666 + s1454 * s2667 - s1455 * s2668
-    s3173 = s1459 * s2669 + s1460 * s2670 + s1461 * s2671 + (s1453 * s2672 + s1454 * s2673 + s1455 * s2674)
-    s3174 = s1453 * s2678 + s1454 * s2679 - s1455 * s2680
-    s3175 = s1459 * s2681 + s1460 * s2682 + s1461 * s2683 + (s1453 * s2684 + s1454 * s2685 + s1455 * s2686)
-    s3176 = s2564 * s3002
-    s3177 = s3176 + s2567 * s3003 + s2570 * s3004
-    s3178 = s2568 * s3003
-    s3179 = s2565 * s3002 + s3178 + s2571 * s3004
-    s3180 = s2572 * s3004
-    s3181 = s2566 * s3002 + s2569 * s3003 + s3180
-    s3182 = s1324 * s2699 + s1325 * s2700 + s1326 * s2701 + (s1322 * s2761 - s1323 * s2760)
-    s3183 = s1325 * s2699 + s1327 * s2700 + s1328 * s2701 + (s1323 * s2759 - s1321 * s2761)
-    s3184 = s1326 * s2699 + s1328 * s2700 + s1329 * s2701 + (s1321 * s2760 - s1322 * s2759)
-    s3185 = k15 * s2759 + (s1323 * s2700 - s1322 * s2701) + (s2563 * s3066 - s2562 * s3067)
-    s3186 = k15 * s2760 + (s1321 * s2701 - s1323 * s2699) + (s2561 * s3067 - s2563 * s3065)
-    s3187 = k15 * s2761 + (s1322 * s2699 - s1321 * s2700) + (s2562 * s3065 - s2561 * s3066)
-    s3188 = s18 * s2269 - s21 * s2268 + (s3182 + (s2564 * s3065 + s2565 * s3066 + s2566 * s3067))
-    s3189 = s21 * s2267 - s15 * s2269 + (s3183 + (s2567 * s3065 + s2568 * s3066 + s2569 * s3067))
-    s3190 = s15 * s2268 - s18 * s2267 + (s3184 + (s2570 * s3065 + s2571 * s3066 + s2572 * s3067))
-    s3191 = s18 * s2272 - s21 * s2271 + s3185
-    s3192 = s21 * s2270 - s15 * s2272 + s3186
-    s3193 = s15 * s2271 - s18 * s2270 + s3187
-    s3194 = s1324 * s2705 + s1325 * s2706 + s1326 * s2707 + (s1322 * s2764 - s1323 * s2763)
-    s3195 = s1325 * s2705 + s1327 * s2706 + s1328 * s2707 + (s1323 * s2762 - s1321 * s2764)
-    s3196 = s1326 * s2705 + s1328 * s2706 + s1329 * s2707 + (s1321 * s2763 - s1322 * s2762)
-    s3197 = k15 * s2762 + (s1323 * s2706 - s1322 * s2707) + (s2563 * s3003 - s2562 * s3004)
-    s3198 = k15 * s2763 + (s1321 * s2707 - s1323 * s2705) + (s2561 * s3004 - s2563 * s3002)
-    s3199 = k15 * s2764 + (s1322 * s2705 - s1321 * s2706) + (s2562 * s3002 - s2561 * s3003)
-    s3200 = s1465 * s2699 + s1466 * s2700 + s1467 * s2701 + (s1462 * s2759 + s1463 * s2760 + s1464 * s2761)
-    s3201 = s1465 * s2705 + s1466 * s2706 + s1467 * s2707 + (s1462 * s2762 + s1463 * s2763 + s1464 * s2764)
-    s3202 = s15 * s3177 + s18 * s3179 + s21 * s3181
-    s3203 = s3188 + (s1019 * s3192 - s1016 * s3193)
-    s3204 = s3189 + (s1013 * s3193 - s1019 * s3191)
-    s3205 = s3190 + (s1016 * s3191 - s1013 * s3192)
-    s3206 = s3194 + (s3176 + s2565 * s3003 + s2566 * s3004) + (s1019 * s3198 - s1016 * s3199)
-    s3207 = s3195 + (s3178 + s2567 * s3002 + s2569 * s3004) + (s1013 * s3199 - s1019 * s3197)
-    s3208 = s3196 + (s3180 + (s2570 * s3002 + s2571 * s3003)) + (s1016 * s3197 - s1013 * s3198)
-    s3209 = s1462 * s2654 + s1463 * s2655 - s1464 * s2656
-    s3210 = s1468 * s2657 + s1469 * s2658 + s1470 * s2659 + (s1462 * s2660 + s1463 * s2661 + s1464 * s2662)
-    s3211 = s1462 * s2666 + s1463 * s2667 - s1464 * s2668
-    s3212 = s1468 * s2669 + s1469 * s2670 + s1470 * s2671 + (s1462 * s2672 + s1463 * s2673 + s1464 * s2674)
-    s3213 = s1462 * s2678 + s1463 * s2679 - s1464 * s2680
-    s3214 = s1468 * s2681 + s1469 * s2682 + s1470 * s2683 + (s1462 * s2684 + s1463 * s2685 + s1464 * s2686)
-    s3215 = 2.0 * s927
-    s3216 = 2.0 * s929
-    s3217 = 2.0 * s931
-    s3218 = s2549 * s3215
-    s3219 = s3218 + s2552 * s3216 + s2555 * s3217
-    s3220 = s2553 * s3216
-    s3221 = s2550 * s3215 + s3220 + s2556 * s3217
-    s3222 = s2557 * s3217
-    s3223 = s2551 * s3215 + s2554 * s3216 + s3222
-    s3224 = s1309 * s2783 + s1310 * s2784 + s1311 * s2785 + (s1307 * s2788 - s1308 * s2787)
-    s3225 = s1310 * s2783 + s1312 * s2784 + s1313 * s2785 + (s1308 * s2786 - s1306 * s2788)
-    s3226 = s1311 * s2783 + s1313 * s2784 + s1314 * s2785 + (s1306 * s2787 - s1307 * s2786)
-    s3227 = 2.0 * s2771
-    s3228 = 2.0 * s2772
-    s3229 = 2.0 * s2773
-    s3230 = k29 * s2786 + (s1308 * s2784 - s1307 * s2785) + (s2548 * s3228 - s2547 * s3229)
-    s3231 = k29 * s2787 + (s1306 * s2785 - s1308 * s2783) + (s2546 * s3229 - s2548 * s3227)
-    s3232 = k29 * s2788 + (s1307 * s2783 - s1306 * s2784) + (s2547 * s3227 - s2546 * s3228)
-    s3233 = s929 * s2263 - s931 * s2262 + (s3224 + (s2549 * s3227 + s2550 * s3228 + s2551 * s3229))
-    s3234 = s931 * s2261 - s927 * s2263 + (s3225 + (s2552 * s3227 + s2553 * s3228 + s2554 * s3229))
-    s3235 = s927 * s2262 - s929 * s2261 + (s3226 + (s2555 * s3227 + s2556 * s3228 + s2557 * s3229))
-    s3236 = s929 * s2266 - s931 * s2265 + s3230
-    s3237 = s931 * s2264 - s927 * s2266 + s3231
-    s3238 = s927 * s2265 - s929 * s2264 + s3232
-    s3239 = s1309 * s2789 + s1310 * s2790 + s1311 * s2791 + (s1307 * s2794 - s1308 * s2793)
-    s3240 = s1310 * s2789 + s1312 * s2790 + s1313 * s2791 + (s1308 * s2792 - s1306 * s2794)
-    s3241 = s1311 * s2789 + s1313 * s2790 + s1314 * s2791 + (s1306 * s2793 - s1307 * s2792)
-    s3242 = k29 * s2792 + (s1308 * s2790 - s1307 * s2791) + (s2548 * s3216 - s2547 * s3217)
-    s3243 = k29 * s2793 + (s1306 * s2791 - s1308 * s2789) + (s2546 * s3217 - s2548 * s3215)
-    s3244 = k29 * s2794 + (s1307 * s2789 - s1306 * s2790) + (s2547 * s3215 - s2546 * s3216)
-    s3245 = s1474 * s2783 + s1475 * s2784 + s1476 * s2785 + (s1471 * s2786 + s1472 * s2787 + s1473 * s2788)
-    s3246 = s1474 * s2789 + s1475 * s2790 + s1476 * s2791 + (s1471 * s2792 + s1472 * s2793 + s1473 * s2794)
-    s3247 = s3233 + (s1100 * s3238 - s1101 * s3237)
-    s3248 = s3234 + (s1101 * s3236 - s1099 * s3238)
-    s3249 = s3235 + (s1099 * s3237 - s1100 * s3236)
-    s3250 = s3239 + (s3218 + s2550 * s3216 + s2551 * s3217) + (s1100 * s3244 - s1101 * s3243)
-    s3251 = s3240 + (s3220 + s2552 * s3215 + s2554 * s3217) + (s1101 * s3242 - s1099 * s3244)
-    s3252 = s3241 + (s3222 + (s2555 * s3215 + s2556 * s3216)) + (s1099 * s3243 - s1100 * s3242)
-    s3253 = s1477 * s2699 + s1478 * s2700 + s1479 * s2701 + (s1471 * s2702 + s1472 * s2703 + s1473 * s2704)
-    s3254 = s1477 * s2705 + s1478 * s2706 + s1479 * s2707 + (s1471 * s2708 + s1472 * s2709 + s1473 * s2710)
-    s3255 = s15 * s3219 + s18 * s3221 + s21 * s3223
-    s3256 = s3247 + (s1016 * s3238 - s1019 * s3237)
-    s3257 = s3248 + (s1019 * s3236 - s1013 * s3238)
-    s3258 = s3249 + (s1013 * s3237 - s1016 * s3236)
-    s3259 = s3250 + (s1016 * s3244 - s1019 * s3243)
-    s3260 = s3251 + (s1019 * s3242 - s1013 * s3244)
-    s3261 = s3252 + (s1013 * s3243 - s1016 * s3242)
-    s3262 = s1471 * s2654 + s1472 * s2655 - s1473 * s2656
-    s3263 = s1480 * s2657 + s1481 * s2658 + s1482 * s2659 + (s1471 * s2660 + s1472 * s2661 + s1473 * s2662)
-    s3264 = s1471 * s2666 + s1472 * s2667 - s1473 * s2668
-    s3265 = s1480 * s2669 + s1481 * s2670 + s1482 * s2671 + (s1471 * s2672 + s1472 * s2673 + s1473 * s2674)
-    s3266 = s1471 * s2678 + s1472 * s2679 - s1473 * s2680
-    s3267 = s1480 * s2681 + s1481 * s2682 + s1482 * s2683 + (s1471 * s2684 + s1472 * s2685 + s1473 * s2686)
-    s3268 = 2.0 * s933
-    s3269 = 2.0 * s935
-    s3270 = 2.0 * s937
-    s3271 = s2534 * s3268
-    s3272 = s3271 + s2537 * s3269 + s2540 * s3270
-    s3273 = s2538 * s3269
-    s3274 = s2535 * s3268 + s3273 + s2541 * s3270
-    s3275 = s2542 * s3270
-    s3276 = s2536 * s3268 + s2539 * s3269 + s3275
-    s3277 = s1294 * s2813 + s1295 * s2814 + s1296 * s2815 + (s1292 * s2818 - s1293 * s2817)
-    s3278 = s1295 * s2813 + s1297 * s2814 + s1298 * s2815 + (s1293 * s2816 - s1291 * s2818)
-    s3279 = s1296 * s2813 + s1298 * s2814 + s1299 * s2815 + (s1291 * s2817 - s1292 * s2816)
-    s3280 = 2.0 * s2801
-    s3281 = 2.0 * s2802
-    s3282 = 2.0 * s2803
-    s3283 = k29 * s2816 + (s1293 * s2814 - s1292 * s2815) + (s2533 * s3281 - s2532 * s3282)
-    s3284 = k29 * s2817 + (s1291 * s2815 - s1293 * s2813) + (s2531 * s3282 - s2533 * s3280)
-    s3285 = k29 * s2818 + (s1292 * s2813 - s1291 * s2814) + (s2532 * s3280 - s2531 * s3281)
-    s3286 = s935 * s2257 - s937 * s2256 + (s3277 + (s2534 * s3280 + s2535 * s3281 + s2536 * s3282))
-    s3287 = s937 * s2255 - s933 * s2257 + (s3278 + (s2537 * s3280 + s2538 * s3281 + s2539 * s3282))
-    s3288 = s933 * s2256 - s935 * s2255 + (s3279 + (s2540 * s3280 + s2541 * s3281 + s2542 * s3282))
-    s3289 = s935 * s2260 - s937 * s2259 + s3283
-    s3290 = s937 * s2258 - s933 * s2260 + s3284
-    s3291 = s933 * s2259 - s935 * s2258 + s3285
-    s3292 = s1294 * s2819 + s1295 * s2820 + s1296 * s2821 + (s1292 * s2824 - s1293 * s2823)
-    s3293 = s1295 * s2819 + s1297 * s2820 + s1298 * s2821 + (s1293 * s2822 - s1291 * s2824)
-    s3294 = s1296 * s2819 + s1298 * s2820 + s1299 * s2821 + (s1291 * s2823 - s1292 * s2822)
-    s3295 = k29 * s2822 + (s1293 * s2820 - s1292 * s2821) + (s2533 * s3269 - s2532 * s3270)
-    s3296 = k29 * s2823 + (s1291 * s2821 - s1293 * s2819) + (s2531 * s3270 - s2533 * s3268)
-    s3297 = k29 * s2824 + (s1292 * s2819 - s1291 * s2820) + (s2532 * s3268 - s2531 * s3269)
-    s3298 = s1486 * s2813 + s1487 * s2814 + s1488 * s2815 + (s1483 * s2816 + s1484 * s2817 + s1485 * s2818)
-    s3299 = s1486 * s2819 + s1487 * s2820 + s1488 * s2821 + (s1483 * s2822 + s1484 * s2823 + s1485 * s2824)
-    s3300 = s3286 + (s1120 * s3291 - s1121 * s3290)
-    s3301 = s3287 + (s1121 * s3289 - s1119 * s3291)
-    s3302 = s3288 + (s1119 * s3290 - s1120 * s3289)
-    s3303 = s3292 + (s3271 + s2535 * s3269 + s2536 * s3270) + (s1120 * s3297 - s1121 * s3296)
-    s3304 = s3293 + (s3273 + s2537 * s3268 + s2539 * s3270) + (s1121 * s3295 - s1119 * s3297)
-    s3305 = s3294 + (s3275 + (s2540 * s3268 + s2541 * s3269)) + (s1119 * s3296 - s1120 * s3295)
-    s3306 = s1489 * s2699 + s1490 * s2700 + s1491 * s2701 + (s1483 * s2723 + s1484 * s2724 + s1485 * s2725)
-    s3307 = s1489 * s2705 + s1490 * s2706 + s1491 * s2707 + (s1483 * s2726 + s1484 * s2727 + s1485 * s2728)
-    s3308 = s15 * s3272 + s18 * s3274 + s21 * s3276
-    s3309 = s3300 + (s1046 * s3291 - s1047 * s3290)
-    s3310 = s3301 + (s1047 * s3289 - s1045 * s3291)
-    s3311 = s3302 + (s1045 * s3290 - s1046 * s3289)
-    s3312 = s3303 + (s1046 * s3297 - s1047 * s3296)
-    s3313 = s3304 + (s1047 * s3295 - s1045 * s3297)
-    s3314 = s3305 + (s1045 * s3296 - s1046 * s3295)
-    s3315 = s1483 * s2654 + s1484 * s2655 - s1485 * s2656
-    s3316 = s1492 * s2657 + s1493 * s2658 + s1494 * s2659 + (s1483 * s2660 + s1484 * s2661 + s1485 * s2662)
-    s3317 = s1483 * s2666 + s1484 * s2667 - s1485 * s2668
-    s3318 = s1492 * s2669 + s1493 * s2670 + s1494 * s2671 + (s1483 * s2672 + s1484 * s2673 + s1485 * s2674)
-    s3319 = s1483 * s2678 + s1484 * s2679 - s1485 * s2680
-    s3320 = s1492 * s2681 + s1493 * s2682 + s1494 * s2683 + (s1483 * s2684 + s1484 * s2685 + s1485 * s2686)
-    s3321 = 2.0 * s939
-    s3322 = 2.0 * s941
-    s3323 = 2.0 * s943
-    s3324 = s2519 * s3321
-    s3325 = s3324 + s2522 * s3322 + s2525 * s3323
-    s3326 = s2523 * s3322
-    s3327 = s2520 * s3321 + s3326 + s2526 * s3323
-    s3328 = s2527 * s3323
-    s3329 = s2521 * s3321 + s2524 * s3322 + s3328
-    s3330 = s1279 * s2840 + s1280 * s2841 + s1281 * s2842 + (s1277 * s2845 - s1278 * s2844)
-    s3331 = s1280 * s2840 + s1282 * s2841 + s1283 * s2842 + (s1278 * s2843 - s1276 * s2845)
-    s3332 = s1281 * s2840 + s1283 * s2841 + s1284 * s2842 + (s1276 * s2844 - s1277 * s2843)
-    s3333 = 2.0 * s2831
-    s3334 = 2.0 * s2832
-    s3335 = 2.0 * s2833
-    s3336 = k29 * s2843 + (s1278 * s2841 - s1277 * s2842) + (s2518 * s3334 - s2517 * s3335)
-    s3337 = k29 * s2844 + (s1276 * s2842 - s1278 * s2840) + (s2516 * s3335 - s2518 * s3333)
-    s3338 = k29 * s2845 + (s1277 * s2840 - s1276 * s2841) + (s2517 * s3333 - s2516 * s3334)
-    s3339 = s941 * s2251 - s943 * s2250 + (s3330 + (s2519 * s3333 + s2520 * s3334 + s2521 * s3335))
-    s3340 = s943 * s2249 - s939 * s2251 + (s3331 + (s2522 * s3333 + s2523 * s3334 + s2524 * s3335))
-    s3341 = s939 * s2250 - s941 * s2249 + (s3332 + (s2525 * s3333 + s2526 * s3334 + s2527 * s3335))
-    s3342 = s941 * s2254 - s943 * s2253 + s3336
-    s3343 = s943 * s2252 - s939 * s2254 + s3337
-    s3344 = s939 * s2253 - s941 * s2252 + s3338
-    s3345 = s1279 * s2846 + s1280 * s2847 + s1281 * s2848 + (s1277 * s2851 - s1278 * s2850)
-    s3346 = s1280 * s2846 + s1282 * s2847 + s1283 * s2848 + (s1278 * s2849 - s1276 * s2851)
-    s3347 = s1281 * s2846 + s1283 * s2847 + s1284 * s2848 + (s1276 * s2850 - s1277 * s2849)
-    s3348 = k29 * s2849 + (s1278 * s2847 - s1277 * s2848) + (s2518 * s3322 - s2517 * s3323)
-    s3349 = k29 * s2850 + (s1276 * s2848 - s1278 * s2846) + (s2516 * s3323 - s2518 * s3321)
-    s3350 = k29 * s2851 + (s1277 * s2846 - s1276 * s2847) + (s2517 * s3321 - s2516 * s3322)
-    s3351 = s1498 * s2840 + s1499 * s2841 + s1500 * s2842 + (s1495 * s2843 + s1496 * s2844 + s1497 * s2845)
-    s3352 = s1498 * s2846 + s1499 * s2847 + s1500 * s2848 + (s1495 * s2849 + s1496 * s2850 + s1497 * s2851)
-    s3353 = s3339 + (s1140 * s3344 - s1141 * s3343)
-    s3354 = s3340 + (s1141 * s3342 - s1139 * s3344)
-    s3355 = s3341 + (s1139 * s3343 - s1140 * s3342)
-    s3356 = s3345 + (s3324 + s2520 * s3322 + s2521 * s3323) + (s1140 * s3350 - s1141 * s3349)
-    s3357 = s3346 + (s3326 + s2522 * s3321 + s2524 * s3323) + (s1141 * s3348 - s1139 * s3350)
-    s3358 = s3347 + (s3328 + (s2525 * s3321 + s2526 * s3322)) + (s1139 * s3349 - s1140 * s3348)
-    s3359 = s1501 * s2699 + s1502 * s2700 + s1503 * s2701 + (s1495 * s2741 + s1496 * s2742 + s1497 * s2743)
-    s3360 = s1501 * s2705 + s1502 * s2706 + s1503 * s2707 + (s1495 * s2744 + s1496 * s2745 + s1497 * s2746)
-    s3361 = s15 * s3325 + s18 * s3327 + s21 * s3329
-    s3362 = s3353 + (s1065 * s3344 - s1066 * s3343)
-    s3363 = s3354 + (s1066 * s3342 - s1064 * s3344)
-    s3364 = s3355 + (s1064 * s3343 - s1065 * s3342)
-    s3365 = s3356 + (s1065 * s3350 - s1066 * s3349)
-    s3366 = s3357 + (s1066 * s3348 - s1064 * s3350)
-    s3367 = s3358 + (s1064 * s3349 - s1065 * s3348)
-    s3368 = s1495 * s2654 + s1496 * s2655 - s1497 * s2656
-    s3369 = s1504 * s2657 + s1505 * s2658 + s1506 * s2659 + (s1495 * s2660 + s1496 * s2661 + s1497 * s2662)
-    s3370 = s1495 * s2666 + s1496 * s2667 - s1497 * s2668
-    s3371 = s1504 * s2669 + s1505 * s2670 + s1506 * s2671 + (s1495 * s2672 + s1496 * s2673 + s1497 * s2674)
-    s3372 = s1495 * s2678 + s1496 * s2679 - s1497 * s2680
-    s3373 = s1504 * s2681 + s1505 * s2682 + s1506 * s2683 + (s1495 * s2684 + s1496 * s2685 + s1497 * s2686)
-    s3374 = 2.0 * s945
-    s3375 = 2.0 * s947
-    s3376 = 2.0 * s949
-    s3377 = s2504 * s3374
-    s3378 = s3377 + s2507 * s3375 + s2510 * s3376
-    s3379 = s2508 * s3375
-    s3380 = s2505 * s3374 + s3379 + s2511 * s3376
-    s3381 = s2512 * s3376
-    s3382 = s2506 * s3374 + s2509 * s3375 + s3381
-    s3383 = s1264 * s2870 + s1265 * s2871 + s1266 * s2872 + (s1262 * s2875 - s1263 * s2874)
-    s3384 = s1265 * s2870 + s1267 * s2871 + s1268 * s2872 + (s1263 * s2873 - s1261 * s2875)
-    s3385 = s1266 * s2870 + s1268 * s2871 + s1269 * s2872 + (s1261 * s2874 - s1262 * s2873)
-    s3386 = 2.0 * s2858
-    s3387 = 2.0 * s2859
-    s3388 = 2.0 * s2860
-    s3389 = k29 * s2873 + (s1263 * s2871 - s1262 * s2872) + (s2503 * s3387 - s2502 * s3388)
-    s3390 = k29 * s2874 + (s1261 * s2872 - s1263 * s2870) + (s2501 * s3388 - s2503 * s3386)
-    s3391 = k29 * s2875 + (s1262 * s2870 - s1261 * s2871) + (s2502 * s3386 - s2501 * s3387)
-    s3392 = s947 * s2245 - s949 * s2244 + (s3383 + (s2504 * s3386 + s2505 * s3387 + s2506 * s3388))
-    s3393 = s949 * s2243 - s945 * s2245 + (s3384 + (s2507 * s3386 + s2508 * s3387 + s2509 * s3388))
-    s3394 = s945 * s2244 - s947 * s2243 + (s3385 + (s2510 * s3386 + s2511 * s3387 + s2512 * s3388))
-    s3395 = s947 * s2248 - s949 * s2247 + s3389
-    s3396 = s949 * s2246 - s945 * s2248 + s3390
-    s3397 = s945 * s2247 - s947 * s2246 + s3391
-    s3398 = s1264 * s2876 + s1265 * s2877 + s1266 * s2878 + (s1262 * s2881 - s1263 * s2880)
-    s3399 = s1265 * s2876 + s1267 * s2877 + s1268 * s2878 + (s1263 * s2879 - s1261 * s2881)
-    s3400 = s1266 * s2876 + s1268 * s2877 + s1269 * s2878 + (s1261 * s2880 - s1262 * s2879)
-    s3401 = k29 * s2879 + (s1263 * s2877 - s1262 * s2878) + (s2503 * s3375 - s2502 * s3376)
-    s3402 = k29 * s2880 + (s1261 * s2878 - s1263 * s2876) + (s2501 * s3376 - s2503 * s3374)
-    s3403 = k29 * s2881 + (s1262 * s2876 - s1261 * s2877) + (s2502 * s3374 - s2501 * s3375)
-    s3404 = s1510 * s2870 + s1511 * s2871 + s1512 * s2872 + (s1507 * s2873 + s1508 * s2874 + s1509 * s2875)
-    s3405 = s1510 * s2876 + s1511 * s2877 + s1512 * s2878 + (s1507 * s2879 + s1508 * s2880 + s1509 * s2881)
-    s3406 = s3392 + (s1160 * s3397 - s1161 * s3396)
-    s3407 = s3393 + (s1161 * s3395 - s1159 * s3397)
-    s3408 = s3394 + (s1159 * s3396 - s1160 * s3395)
-    s3409 = s3398 + (s3377 + s2505 * s3375 + s2506 * s3376) + (s1160 * s3403 - s1161 * s3402)
-    s3410 = s3399 + (s3379 + s2507 * s3374 + s2509 * s3376) + (s1161 * s3401 - s1159 * s3403)
-    s3411 = s3400 + (s3381 + (s2510 * s3374 + s2511 * s3375)) + (s1159 * s3402 - s1160 * s3401)
-    s3412 = s1513 * s2699 + s1514 * s2700 + s1515 * s2701 + (s1507 * s2759 + s1508 * s2760 + s1509 * s2761)
-    s3413 = s1513 * s2705 + s1514 * s2706 + s1515 * s2707 + (s1507 * s2762 + s1508 * s2763 + s1509 * s2764)
-    s3414 = s15 * s3378 + s18 * s3380 + s21 * s3382
-    s3415 = s3406 + (s1019 * s3396 - s1016 * s3397)
-    s3416 = s3407 + (s1013 * s3397 - s1019 * s3395)
-    s3417 = s3408 + (s1016 * s3395 - s1013 * s3396)
-    s3418 = s3409 + (s1019 * s3402 - s1016 * s3403)
-    s3419 = s3410 + (s1013 * s3403 - s1019 * s3401)
-    s3420 = s3411 + (s1016 * s3401 - s1013 * s3402)
-    s3421 = s1507 * s2654 + s1508 * s2655 - s1509 * s2656
-    s3422 = s1516 * s2657 + s1517 * s2658 + s1518 * s2659 + (s1507 * s2660 + s1508 * s2661 + s1509 * s2662)
-    s3423 = s1507 * s2666 + s1508 * s2667 - s1509 * s2668
-    s3424 = s1516 * s2669 + s1517 * s2670 + s1518 * s2671 + (s1507 * s2672 + s1508 * s2673 + s1509 * s2674)
-    s3425 = s1507 * s2678 + s1508 * s2679 - s1509 * s2680
-    s3426 = s1516 * s2681 + s1517 * s2682 + s1518 * s2683 + (s1507 * s2684 + s1508 * s2685 + s1509 * s2686)
-    s3427 = s2426 * s3215
-    s3428 = s3427 + s2429 * s3216 + s2432 * s3217
-    s3429 = s2430 * s3216
-    s3430 = s2427 * s3215 + s3429 + s2433 * s3217
-    s3431 = s2434 * s3217
-    s3432 = s2428 * s3215 + s2431 * s3216 + s3431
-    s3433 = s1191 * s2900 + s1195 * s2901 + s1196 * s2902 + (s1184 * s2904 - s1183 * s2905)
-    s3434 = s1195 * s2900 + s1192 * s2901 + s1197 * s2902 + (s1182 * s2905 - s1184 * s2903)
-    s3435 = s1196 * s2900 + s1197 * s2901 + s1194 * s2902 + (s1183 * s2903 - s1182 * s2904)
-    s3436 = 2.0 * s2888
-    s3437 = 2.0 * s2889
-    s3438 = 2.0 * s2890
-    s3439 = m_shank * s2903 + (s1183 * s2902 - s1184 * s2901) + (s2419 * s3437 - s2418 * s3438)
-    s3440 = m_shank * s2904 + (s1184 * s2900 - s1182 * s2902) + (s2417 * s3438 - s2419 * s3436)
-    s3441 = m_shank * s2905 + (s1182 * s2901 - s1183 * s2900) + (s2418 * s3436 - s2417 * s3437)
-    s3442 = s929 * s2194 - s931 * s2193 + (s3433 + (s2426 * s3436 + s2427 * s3437 + s2428 * s3438))
-    s3443 = s931 * s2192 - s927 * s2194 + (s3434 + (s2429 * s3436 + s2430 * s3437 + s2431 * s3438))
-    s3444 = s927 * s2193 - s929 * s2192 + (s3435 + (s2432 * s3436 + s2433 * s3437 + s2434 * s3438))
-    s3445 = s929 * s2184 - s931 * s2183 + s3439
-    s3446 = s931 * s2182 - s927 * s2184 + s3440
-    s3447 = s927 * s2183 - s929 * s2182 + s3441
-    s3448 = s1191 * s2906 + s1195 * s2907 + s1196 * s2908 + (s1184 * s2910 - s1183 * s2911)
-    s3449 = s1195 * s2906 + s1192 * s2907 + s1197 * s2908 + (s1182 * s2911 - s1184 * s2909)
-    s3450 = s1196 * s2906 + s1197 * s2907 + s1194 * s2908 + (s1183 * s2909 - s1182 * s2910)
-    s3451 = m_shank * s2909 + (s1183 * s2908 - s1184 * s2907) + (s2419 * s3216 - s2418 * s3217)
-    s3452 = m_shank * s2910 + (s1184 * s2906 - s1182 * s2908) + (s2417 * s3217 - s2419 * s3215)
-    s3453 = m_shank * s2911 + (s1182 * s2907 - s1183 * s2906) + (s2418 * s3215 - s2417 * s3216)
-    s3454 = s1522 * s2900 + s1523 * s2901 + s1524 * s2902 + (s1519 * s2903 + s1520 * s2904 + s1521 * s2905)
-    s3455 = s3454 + (s2888 * s3428 + s2889 * s3430 + s2890 * s3432)
-    s3456 = s1522 * s2906 + s1523 * s2907 + s1524 * s2908 + (s1519 * s2909 + s1520 * s2910 + s1521 * s2911)
-    s3457 = s927 * s3428 + s929 * s3430 + s931 * s3432
-    s3458 = s3456 + s3457
-    s3459 = s3442 + (s1180 * s3447 - s1181 * s3446)
-    s3460 = s3443 + (s1181 * s3445 - s1179 * s3447)
-    s3461 = s3444 + (s1179 * s3446 - s1180 * s3445)
-    s3462 = s3448 + (s3427 + s2427 * s3216 + s2428 * s3217) + (s1180 * s3453 - s1181 * s3452)
-    s3463 = s3449 + (s3429 + s2429 * s3215 + s2431 * s3217) + (s1181 * s3451 - s1179 * s3453)
-    s3464 = s3450 + (s3431 + (s2432 * s3215 + s2433 * s3216)) + (s1179 * s3452 - s1180 * s3451)
-    s3465 = s1525 * s2783 + s1526 * s2784 + s1527 * s2785 + (s1519 * s2786 + s1520 * s2787 + s1521 * s2788)
-    s3466 = s3465 + (s2771 * s3428 + s2772 * s3430 + s2773 * s3432)
-    s3467 = s1525 * s2789 + s1526 * s2790 + s1527 * s2791 + (s1519 * s2792 + s1520 * s2793 + s1521 * s2794)
-    s3468 = s3457 + s3467
-    s3469 = s3459 + (s1100 * s3447 - s1101 * s3446)
-    s3470 = s3460 + (s1101 * s3445 - s1099 * s3447)
-    s3471 = s3461 + (s1099 * s3446 - s1100 * s3445)
-    s3472 = s3462 + (s1100 * s3453 - s1101 * s3452)
-    s3473 = s3463 + (s1101 * s3451 - s1099 * s3453)
-    s3474 = s3464 + (s1099 * s3452 - s1100 * s3451)
-    s3475 = s1529 * s2699 + s1530 * s2700 + s1531 * s2701 + (s1519 * s2702 + s1520 * s2703 + s1521 * s2704)
-    s3476 = s3475 + (s2657 * s3428 + s2658 * s3430 + s2659 * s3432)
-    s3477 = s1529 * s2705 + s1530 * s2706 + s1531 * s2707 + (s1519 * s2708 + s1520 * s2709 + s1521 * s2710)
-    s3478 = s15 * s3428 + s18 * s3430 + s21 * s3432
-    s3479 = s3477 + s3478
-    s3480 = s3469 + (s1016 * s3447 - s1019 * s3446)
-    s3481 = s3470 + (s1019 * s3445 - s1013 * s3447)
-    s3482 = s3471 + (s1013 * s3446 - s1016 * s3445)
-    s3483 = s3472 + (s1016 * s3453 - s1019 * s3452)
-    s3484 = s3473 + (s1019 * s3451 - s1013 * s3453)
-    s3485 = s3474 + (s1013 * s3452 - s1016 * s3451)
-    s3486 = s1519 * s2654 + s1520 * s2655 - s1521 * s2656
-    s3487 = s1533 * s2657 + s1534 * s2658 + s1535 * s2659 + (s1519 * s2660 + s1520 * s2661 + s1521 * s2662)
-    s3488 = s3478 + s3487
-    s3489 = s1519 * s2666 + s1520 * s2667 - s1521 * s2668
-    s3490 = s1533 * s2669 + s1534 * s2670 + s1535 * s2671 + (s1519 * s2672 + s1520 * s2673 + s1521 * s2674)
-    s3491 = s3490 + (s16 * s3428 + s19 * s3430 + s22 * s3432)
-    s3492 = s1519 * s2678 + s1520 * s2679 - s1521 * s2680
-    s3493 = s1533 * s2681 + s1534 * s2682 + s1535 * s2683 + (s1519 * s2684 + s1520 * s2685 + s1521 * s2686)
-    s3494 = s3493 + (s17 * s3428 + s20 * s3430 + s23 * s3432)
-    s3495 = s2453 * s3268
-    s3496 = s3495 + s2456 * s3269 + s2459 * s3270
-    s3497 = s2457 * s3269
-    s3498 = s2454 * s3268 + s3497 + s2460 * s3270
-    s3499 = s2461 * s3270
-    s3500 = s2455 * s3268 + s2458 * s3269 + s3499
-    s3501 = s1210 * s2933 + s1214 * s2934 + s1215 * s2935 + (s1203 * s2937 - s1202 * s2938)
-    s3502 = s1214 * s2933 + s1211 * s2934 + s1216 * s2935 + (s1201 * s2938 - s1203 * s2936)
-    s3503 = s1215 * s2933 + s1216 * s2934 + s1213 * s2935 + (s1202 * s2936 - s1201 * s2937)
-    s3504 = 2.0 * s2918
-    s3505 = 2.0 * s2919
-    s3506 = 2.0 * s2920
-    s3507 = m_shank * s2936 + (s1202 * s2935 - s1203 * s2934) + (s2440 * s3505 - s2439 * s3506)
-    s3508 = m_shank * s2937 + (s1203 * s2933 - s1201 * s2935) + (s2438 * s3506 - s2440 * s3504)
-    s3509 = m_shank * s2938 + (s1201 * s2934 - s1202 * s2933) + (s2439 * s3504 - s2438 * s3505)
-    s3510 = s935 * s2210 - s937 * s2209 + (s3501 + (s2453 * s3504 + s2454 * s3505 + s2455 * s3506))
-    s3511 = s937 * s2208 - s933 * s2210 + (s3502 + (s2456 * s3504 + s2457 * s3505 + s2458 * s3506))
-    s3512 = s933 * s2209 - s935 * s2208 + (s3503 + (s2459 * s3504 + s2460 * s3505 + s2461 * s3506))
-    s3513 = s935 * s2200 - s937 * s2199 + s3507
-    s3514 = s937 * s2198 - s933 * s2200 + s3508
-    s3515 = s933 * s2199 - s935 * s2198 + s3509
-    s3516 = s1210 * s2939 + s1214 * s2940 + s1215 * s2941 + (s1203 * s2943 - s1202 * s2944)
-    s3517 = s1214 * s2939 + s1211 * s2940 + s1216 * s2941 + (s1201 * s2944 - s1203 * s2942)
-    s3518 = s1215 * s2939 + s1216 * s2940 + s1213 * s2941 + (s1202 * s2942 - s1201 * s2943)
-    s3519 = m_shank * s2942 + (s1202 * s2941 - s1203 * s2940) + (s2440 * s3269 - s2439 * s3270)
-    s3520 = m_shank * s2943 + (s1203 * s2939 - s1201 * s2941) + (s2438 * s3270 - s2440 * s3268)
-    s3521 = m_shank * s2944 + (s1201 * s2940 - s1202 * s2939) + (s2439 * s3268 - s2438 * s3269)
-    s3522 = s1542 * s2933 + s1543 * s2934 + s1544 * s2935 + (s1539 * s2936 + s1540 * s2937 + s1541 * s2938)
-    s3523 = s3522 + (s2918 * s3496 + s2919 * s3498 + s2920 * s3500)
-    s3524 = s1542 * s2939 + s1543 * s2940 + s1544 * s2941 + (s1539 * s2942 + s1540 * s2943 + s1541 * s2944)
-    s3525 = s933 * s3496 + s935 * s3498 + s937 * s3500
-    s3526 = s3524 + s3525
-    s3527 = s3510 + (s1199 * s3515 - s1200 * s3514)
-    s3528 = s3511 + (s1200 * s3513 - s1198 * s3515)
-    s3529 = s3512 + (s1198 * s3514 - s1199 * s3513)
-    s3530 = s3516 + (s3495 + s2454 * s3269 + s2455 * s3270) + (s1199 * s3521 - s1200 * s3520)
-    s3531 = s3517 + (s3497 + s2456 * s3268 + s2458 * s3270) + (s1200 * s3519 - s1198 * s3521)
-    s3532 = s3518 + (s3499 + (s2459 * s3268 + s2460 * s3269)) + (s1198 * s3520 - s1199 * s3519)
-    s3533 = s1545 * s2813 + s1546 * s2814 + s1547 * s2815 + (s1539 * s2816 + s1540 * s2817 + s1541 * s2818)
-    s3534 = s3533 + (s2801 * s3496 + s2802 * s3498 + s2803 * s3500)
-    s3535 = s1545 * s2819 + s1546 * s2820 + s1547 * s2821 + (s1539 * s2822 + s1540 * s2823 + s1541 * s2824)
-    s3536 = s3525 + s3535
-    s3537 = s3527 + (s1120 * s3515 - s1121 * s3514)
-    s3538 = s3528 + (s1121 * s3513 - s1119 * s3515)
-    s3539 = s3529 + (s1119 * s3514 - s1120 * s3513)
-    s3540 = s3530 + (s1120 * s3521 - s1121 * s3520)
-    s3541 = s3531 + (s1121 * s3519 - s1119 * s3521)
-    s3542 = s3532 + (s1119 * s3520 - s1120 * s3519)
-    s3543 = s1549 * s2699 + s1550 * s2700 + s1551 * s2701 + (s1539 * s2723 + s1540 * s2724 + s1541 * s2725)
-    s3544 = s3543 + (s2657 * s3496 + s2658 * s3498 + s2659 * s3500)
-    s3545 = s1549 * s2705 + s1550 * s2706 + s1551 * s2707 + (s1539 * s2726 + s1540 * s2727 + s1541 * s2728)
-    s3546 = s15 * s3496 + s18 * s3498 + s21 * s3500
-    s3547 = s3545 + s3546
-    s3548 = s3537 + (s1046 * s3515 - s1047 * s3514)
-    s3549 = s3538 + (s1047 * s3513 - s1045 * s3515)
-    s3550 = s3539 + (s1045 * s3514 - s1046 * s3513)
-    s3551 = s3540 + (s1046 * s3521 - s1047 * s3520)
-    s3552 = s3541 + (s1047 * s3519 - s1045 * s3521)
-    s3553 = s3542 + (s1045 * s3520 - s1046 * s3519)
-    s3554 = s1539 * s2654 + s1540 * s2655 - s1541 * s2656
-    s3555 = s1553 * s2657 + s1554 * s2658 + s1555 * s2659 + (s1539 * s2660 + s1540 * s2661 + s1541 * s2662)
-    s3556 = s3546 + s3555
-    s3557 = s1539 * s2666 + s1540 * s2667 - s1541 * s2668
-    s3558 = s1553 * s2669 + s1554 * s2670 + s1555 * s2671 + (s1539 * s2672 + s1540 * s2673 + s1541 * s2674)
-    s3559 = s3558 + (s16 * s3496 + s19 * s3498 + s22 * s3500)
-    s3560 = s1539 * s2678 + s1540 * s2679 - s1541 * s2680
-    s3561 = s1553 * s2681 + s1554 * s2682 + s1555 * s2683 + (s1539 * s2684 + s1540 * s2685 + s1541 * s2686)
-    s3562 = s3561 + (s17 * s3496 + s20 * s3498 + s23 * s3500)
-    s3563 = s2471 * s3321
-    s3564 = s3563 + s2474 * s3322 + s2477 * s3323
-    s3565 = s2475 * s3322
-    s3566 = s2472 * s3321 + s3565 + s2478 * s3323
-    s3567 = s2479 * s3323
-    s3568 = s2473 * s3321 + s2476 * s3322 + s3567
-    s3569 = s1229 * s2960 + s1233 * s2961 + s1234 * s2962 + (s1222 * s2964 - s1221 * s2965)
-    s3570 = s1233 * s2960 + s1230 * s2961 + s1235 * s2962 + (s1220 * s2965 - s1222 * s2963)
-    s3571 = s1234 * s2960 + s1235 * s2961 + s1232 * s2962 + (s1221 * s2963 - s1220 * s2964)
-    s3572 = 2.0 * s2951
-    s3573 = 2.0 * s2952
-    s3574 = 2.0 * s2953
-    s3575 = m_shank * s2963 + (s1221 * s2962 - s1222 * s2961) + (s2464 * s3573 - s2463 * s3574)
-    s3576 = m_shank * s2964 + (s1222 * s2960 - s1220 * s2962) + (s2462 * s3574 - s2464 * s3572)
-    s3577 = m_shank * s2965 + (s1220 * s2961 - s1221 * s2960) + (s2463 * s3572 - s2462 * s3573)
-    s3578 = s941 * s2226 - s943 * s2225 + (s3569 + (s2471 * s3572 + s2472 * s3573 + s2473 * s3574))
-    s3579 = s943 * s2224 - s939 * s2226 + (s3570 + (s2474 * s3572 + s2475 * s3573 + s2476 * s3574))
-    s3580 = s939 * s2225 - s941 * s2224 + (s3571 + (s2477 * s3572 + s2478 * s3573 + s2479 * s3574))
-    s3581 = s941 * s2216 - s943 * s2215 + s3575
-    s3582 = s943 * s2214 - s939 * s2216 + s3576
-    s3583 = s939 * s2215 - s941 * s2214 + s3577
-    s3584 = s1229 * s2966 + s1233 * s2967 + s1234 * s2968 + (s1222 * s2970 - s1221 * s2971)
-    s3585 = s1233 * s2966 + s1230 * s2967 + s1235 * s2968 + (s1220 * s2971 - s1222 * s2969)
-    s3586 = s1234 * s2966 + s1235 * s2967 + s1232 * s2968 + (s1221 * s2969 - s1220 * s2970)
-    s3587 = m_shank * s2969 + (s1221 * s2968 - s1222 * s2967) + (s2464 * s3322 - s2463 * s3323)
-    s3588 = m_shank * s2970 + (s1222 * s2966 - s1220 * s2968) + (s2462 * s3323 - s2464 * s3321)
-    s3589 = m_shank * s2971 + (s1220 * s2967 - s1221 * s2966) + (s2463 * s3321 - s2462 * s3322)
-    s3590 = s1562 * s2960 + s1563 * s2961 + s1564 * s2962 + (s1559 * s2963 + s1560 * s2964 + s1561 * s2965)
-    s3591 = s3590 + (s2951 * s3564 + s2952 * s3566 + s2953 * s3568)
-    s3592 = s1562 * s2966 + s1563 * s2967 + s1564 * s2968 + (s1559 * s2969 + s1560 * s2970 + s1561 * s2971)
-    s3593 = s939 * s3564 + s941 * s3566 + s943 * s3568
-    s3594 = s3592 + s3593
-    s3595 = s3578 + (s1218 * s3583 - s1219 * s3582)
-    s3596 = s3579 + (s1219 * s3581 - s1217 * s3583)
-    s3597 = s3580 + (s1217 * s3582 - s1218 * s3581)
-    s3598 = s3584 + (s3563 + s2472 * s3322 + s2473 * s3323) + (s1218 * s3589 - s1219 * s3588)
-    s3599 = s3585 + (s3565 + s2474 * s3321 + s2476 * s3323) + (s1219 * s3587 - s1217 * s3589)
-    s3600 = s3586 + (s3567 + (s2477 * s3321 + s2478 * s3322)) + (s1217 * s3588 - s1218 * s3587)
-    s3601 = s1565 * s2840 + s1566 * s2841 + s1567 * s2842 + (s1559 * s2843 + s1560 * s2844 + s1561 * s2845)
-    s3602 = s3601 + (s2831 * s3564 + s2832 * s3566 + s2833 * s3568)
-    s3603 = s1565 * s2846 + s1566 * s2847 + s1567 * s2848 + (s1559 * s2849 + s1560 * s2850 + s1561 * s2851)
-    s3604 = s3593 + s3603
-    s3605 = s3595 + (s1140 * s3583 - s1141 * s3582)
-    s3606 = s3596 + (s1141 * s3581 - s1139 * s3583)
-    s3607 = s3597 + (s1139 * s3582 - s1140 * s3581)
-    s3608 = s3598 + (s1140 * s3589 - s1141 * s3588)
-    s3609 = s3599 + (s1141 * s3587 - s1139 * s3589)
-    s3610 = s3600 + (s1139 * s3588 - s1140 * s3587)
-    s3611 = s1569 * s2699 + s1570 * s2700 + s1571 * s2701 + (s1559 * s2741 + s1560 * s2742 + s1561 * s2743)
-    s3612 = s3611 + (s2657 * s3564 + s2658 * s3566 + s2659 * s3568)
-    s3613 = s1569 * s2705 + s1570 * s2706 + s1571 * s2707 + (s1559 * s2744 + s1560 * s2745 + s1561 * s2746)
-    s3614 = s15 * s3564 + s18 * s3566 + s21 * s3568
-    s3615 = s3613 + s3614
-    s3616 = s3605 + (s1065 * s3583 - s1066 * s3582)
-    s3617 = s3606 + (s1066 * s3581 - s1064 * s3583)
-    s3618 = s3607 + (s1064 * s3582 - s1065 * s3581)
-    s3619 = s3608 + (s1065 * s3589 - s1066 * s3588)
-    s3620 = s3609 + (s1066 * s3587 - s1064 * s3589)
-    s3621 = s3610 + (s1064 * s3588 - s1065 * s3587)
-    s3622 = s1559 * s2654 + s1560 * s2655 - s1561 * s2656
-    s3623 = s1573 * s2657 + s1574 * s2658 + s1575 * s2659 + (s1559 * s2660 + s1560 * s2661 + s1561 * s2662)
-    s3624 = s3614 + s3623
-    s3625 = s1559 * s2666 + s1560 * s2667 - s1561 * s2668
-    s3626 = s1573 * s2669 + s1574 * s2670 + s1575 * s2671 + (s1559 * s2672 + s1560 * s2673 + s1561 * s2674)
-    s3627 = s3626 + (s16 * s3564 + s19 * s3566 + s22 * s3568)
-    s3628 = s1559 * s2678 + s1560 * s2679 - s1561 * s2680
-    s3629 = s1573 * s2681 + s1574 * s2682 + s1575 * s2683 + (s1559 * s2684 + s1560 * s2685 + s1561 * s2686)
-    s3630 = s3629 + (s17 * s3564 + s20 * s3566 + s23 * s3568)
-    s3631 = s2489 * s3374
-    s3632 = s3631 + s2492 * s3375 + s2495 * s3376
-    s3633 = s2493 * s3375
-    s3634 = s2490 * s3374 + s3633 + s2496 * s3376
-    s3635 = s2497 * s3376
-    s3636 = s2491 * s3374 + s2494 * s3375 + s3635
-    s3637 = s1248 * s2990 + s1252 * s2991 + s1253 * s2992 + (s1241 * s2994 - s1240 * s2995)
-    s3638 = s1252 * s2990 + s1249 * s2991 + s1254 * s2992 + (s1239 * s2995 - s1241 * s2993)
-    s3639 = s1253 * s2990 + s1254 * s2991 + s1251 * s2992 + (s1240 * s2993 - s1239 * s2994)
-    s3640 = 2.0 * s2978
-    s3641 = 2.0 * s2979
-    s3642 = 2.0 * s2980
-    s3643 = m_shank * s2993 + (s1240 * s2992 - s1241 * s2991) + (s2482 * s3641 - s2481 * s3642)
-    s3644 = m_shank * s2994 + (s1241 * s2990 - s1239 * s2992) + (s2480 * s3642 - s2482 * s3640)
-    s3645 = m_shank * s2995 + (s1239 * s2991 - s1240 * s2990) + (s2481 * s3640 - s2480 * s3641)
-    s3646 = s947 * s2242 - s949 * s2241 + (s3637 + (s2489 * s3640 + s2490 * s3641 + s2491 * s3642))
-    s3647 = s949 * s2240 - s945 * s2242 + (s3638 + (s2492 * s3640 + s2493 * s3641 + s2494 * s3642))
-    s3648 = s945 * s2241 - s947 * s2240 + (s3639 + (s2495 * s3640 + s2496 * s3641 + s2497 * s3642))
-    s3649 = s947 * s2232 - s949 * s2231 + s3643
-    s3650 = s949 * s2230 - s945 * s2232 + s3644
-    s3651 = s945 * s2231 - s947 * s2230 + s3645
-    s3652 = s1248 * s2996 + s1252 * s2997 + s1253 * s2998 + (s1241 * s3000 - s1240 * s3001)
-    s3653 = s1252 * s2996 + s1249 * s2997 + s1254 * s2998 + (s1239 * s3001 - s1241 * s2999)
-    s3654 = s1253 * s2996 + s1254 * s2997 + s1251 * s2998 + (s1240 * s2999 - s1239 * s3000)
-    s3655 = m_shank * s2999 + (s1240 * s2998 - s1241 * s2997) + (s2482 * s3375 - s2481 * s3376)
-    s3656 = m_shank * s3000 + (s1241 * s2996 - s1239 * s2998) + (s2480 * s3376 - s2482 * s3374)
-    s3657 = m_shank * s3001 + (s1239 * s2997 - s1240 * s2996) + (s2481 * s3374 - s2480 * s3375)
-    s3658 = s1582 * s2990 + s1583 * s2991 + s1584 * s2992 + (s1579 * s2993 + s1580 * s2994 + s1581 * s2995)
-    s3659 = s3658 + (s2978 * s3632 + s2979 * s3634 + s2980 * s3636)
-    s3660 = s1582 * s2996 + s1583 * s2997 + s1584 * s2998 + (s1579 * s2999 + s1580 * s3000 + s1581 * s3001)
-    s3661 = s945 * s3632 + s947 * s3634 + s949 * s3636
-    s3662 = s3660 + s3661
-    s3663 = s3646 + (s1237 * s3651 - s1238 * s3650)
-    s3664 = s3647 + (s1238 * s3649 - s1236 * s3651)
-    s3665 = s3648 + (s1236 * s3650 - s1237 * s3649)
-    s3666 = s3652 + (s3631 + s2490 * s3375 + s2491 * s3376) + (s1237 * s3657 - s1238 * s3656)
-    s3667 = s3653 + (s3633 + s2492 * s3374 + s2494 * s3376) + (s1238 * s3655 - s1236 * s3657)
-    s3668 = s3654 + (s3635 + (s2495 * s3374 + s2496 * s3375)) + (s1236 * s3656 - s1237 * s3655)
-    s3669 = s1585 * s2870 + s1586 * s2871 + s1587 * s2872 + (s1579 * s2873 + s1580 * s2874 + s1581 * s2875)
-    s3670 = s3669 + (s2858 * s3632 + s2859 * s3634 + s2860 * s3636)
-    s3671 = s1585 * s2876 + s1586 * s2877 + s1587 * s2878 + (s1579 * s2879 + s1580 * s2880 + s1581 * s2881)
-    s3672 = s3661 + s3671
-    s3673 = s3663 + (s1160 * s3651 - s1161 * s3650)
-    s3674 = s3664 + (s1161 * s3649 - s1159 * s3651)
-    s3675 = s3665 + (s1159 * s3650 - s1160 * s3649)
-    s3676 = s3666 + (s1160 * s3657 - s1161 * s3656)
-    s3677 = s3667 + (s1161 * s3655 - s1159 * s3657)
-    s3678 = s3668 + (s1159 * s3656 - s1160 * s3655)
-    s3679 = s1589 * s2699 + s1590 * s2700 + s1591 * s2701 + (s1579 * s2759 + s1580 * s2760 + s1581 * s2761)
-    s3680 = s3679 + (s2657 * s3632 + s2658 * s3634 + s2659 * s3636)
-    s3681 = s1589 * s2705 + s1590 * s2706 + s1591 * s2707 + (s1579 * s2762 + s1580 * s2763 + s1581 * s2764)
-    s3682 = s15 * s3632 + s18 * s3634 + s21 * s3636
-    s3683 = s3681 + s3682
-    s3684 = s3673 + (s1019 * s3650 - s1016 * s3651)
-    s3685 = s3674 + (s1013 * s3651 - s1019 * s3649)
-    s3686 = s3675 + (s1016 * s3649 - s1013 * s3650)
-    s3687 = s3676 + (s1019 * s3656 - s1016 * s3657)
-    s3688 = s3677 + (s1013 * s3657 - s1019 * s3655)
-    s3689 = s3678 + (s1016 * s3655 - s1013 * s3656)
-    s3690 = s1579 * s2654 + s1580 * s2655 - s1581 * s2656
-    s3691 = s1593 * s2657 + s1594 * s2658 + s1595 * s2659 + (s1579 * s2660 + s1580 * s2661 + s1581 * s2662)
-    s3692 = s3682 + s3691
-    s3693 = s1579 * s2666 + s1580 * s2667 - s1581 * s2668
-    s3694 = s1593 * s2669 + s1594 * s2670 + s1595 * s2671 + (s1579 * s2672 + s1580 * s2673 + s1581 * s2674)
-    s3695 = s3694 + (s16 * s3632 + s19 * s3634 + s22 * s3636)
-    s3696 = s1579 * s2678 + s1580 * s2679 - s1581 * s2680
-    s3697 = s1593 * s2681 + s1594 * s2682 + s1595 * s2683 + (s1579 * s2684 + s1580 * s2685 + s1581 * s2686)
-    s3698 = s3697 + (s17 * s3632 + s20 * s3634 + s23 * s3636)
-    s3699 = s3 * s3486 + s4 * s3489 + s5 * s3492
-    s3700 = s3 * s3554 + s4 * s3557 + s5 * s3560
-    s3701 = s3 * s3622 + s4 * s3625 + s5 * s3628
-    s3702 = s3 * s3690 + s4 * s3693 + s5 * s3696
-    s3703 = trunk_qw * s2
-    s3704 = s3486 * s3703 - s5 * s3489 + s4 * s3492
-    s3705 = s3554 * s3703 - s5 * s3557 + s4 * s3560
-    s3706 = s3622 * s3703 - s5 * s3625 + s4 * s3628
-    s3707 = s3690 * s3703 - s5 * s3693 + s4 * s3696
-    s3708 = s3 * s3489 - s4 * s3486 + s3492 * s3703
-    s3709 = s3 * s3557 - s4 * s3554 + s3560 * s3703
-    s3710 = s3 * s3625 - s4 * s3622 + s3628 * s3703
-    s3711 = s3 * s3693 - s4 * s3690 + s3696 * s3703
-    s3712 = s3 * s3262 + s4 * s3264 + s5 * s3266 - s1599 * s3699
-    s3713 = s3 * s3315 + s4 * s3317 + s5 * s3319 - s1614 * s3700
-    s3714 = s3 * s3368 + s4 * s3370 + s5 * s3372 - s1629 * s3701
-    s3715 = s3 * s3050 + s4 * s3052 + s5 * s3054 - s1601 * s3699 - s1616 * s3700 - s1631 * s3701
-    s3716 = s3 * s3032 + s4 * s3034 + s5 * s3036 - s1602 * s3699 - s1617 * s3700 - s1632 * s3701
-    s3717 = s3 * s3014 + s4 * s3016 + s5 * s3018 - s1603 * s3699 - s1618 * s3700 - s1633 * s3701
-    s3718 = s3 * s3010 + s4 * s3028 + s5 * s3046 - s1604 * s3699 - s1619 * s3700 - s1634 * s3701
-    s3719 = s3 * s3009 + s4 * s3027 + s5 * s3045 - s1605 * s3699 - s1620 * s3700 - s1635 * s3701
-    s3720 = s3 * s3008 + s4 * s3026 + s5 * s3044 - s1606 * s3699 - s1621 * s3700 - s1636 * s3701
-    s3721 = s3 * s3421 + s4 * s3423 + s5 * s3425 - s1650 * s3702
-    s3722 = s3 * s3092 + s4 * s3094 + s5 * s3096 - s1600 * s3699 - s1665 * s3712
-    s3723 = s3 * s3131 + s4 * s3133 + s5 * s3135 - s1615 * s3700 - s1693 * s3713
-    s3724 = s3 * s3170 + s4 * s3172 + s5 * s3174 - s1630 * s3701 - s1706 * s3714
-    s3725 = s3 * s3209 + s4 * s3211 + s5 * s3213 - s1651 * s3702 - s1719 * s3721
-    s3726 = s3715 - s1652 * s3702 - s1666 * s3712 - s1694 * s3713 - s1707 * s3714 - s1720 * s3721
-    s3727 = s3716 - s1653 * s3702 - s1667 * s3712 - s1695 * s3713 - s1708 * s3714 - s1721 * s3721
-    s3728 = s3717 - s1654 * s3702 - s1668 * s3712 - s1696 * s3713 - s1709 * s3714 - s1722 * s3721
-    s3729 = s3718 - s1655 * s3702 - s1669 * s3712 - s1697 * s3713 - s1710 * s3714 - s1723 * s3721
-    s3730 = s3719 - s1656 * s3702 - s1670 * s3712 - s1698 * s3713 - s1711 * s3714 - s1724 * s3721
-    s3731 = s3720 - s1657 * s3702 - s1671 * s3712 - s1699 * s3713 - s1712 * s3714 - s1725 * s3721
-    s3732 = s3726 - s1738 * s3722 - s1744 * s3723 - s1765 * s3724 - s1771 * s3725
-    s3733 = s3727 - s1739 * s3722 - s1745 * s3723 - s1766 * s3724 - s1772 * s3725 - s1782 * s3732
-    s3734 = s3728 - s1740 * s3722 - s1746 * s3723 - s1767 * s3724 - s1773 * s3725 - s1783 * s3732
-    s3735 = s3729 - s1741 * s3722 - s1747 * s3723 - s1768 * s3724 - s1774 * s3725 - s1784 * s3732
-    s3736 = s3730 - s1742 * s3722 - s1748 * s3723 - s1769 * s3724 - s1775 * s3725 - s1785 * s3732
-    s3737 = s3731 - s1743 * s3722 - s1749 * s3723 - s1770 * s3724 - s1776 * s3725 - s1786 * s3732
-    s3738 = s3734 - s1792 * s3733
-    s3739 = s3735 - s1793 * s3733 - s1799 * s3738
-    s3740 = s3736 - s1794 * s3733 - s1800 * s3738 + s1807 * s3739
-    s3741 = (s3737 - s1795 * s3733 - s1801 * s3738 + s1808 * s3739 + s1810 * s3740) / pivot_trunk_x_dot
-    s3742 = s3740 / pivot_trunk_y_dot + s1810 * s3741
-    s3743 = s3739 / pivot_trunk_z_dot + s1807 * s3742 + s1808 * s3741
-    s3744 = s3738 / pivot_trunk_wx - s1799 * s3743 - s1800 * s3742 - s1801 * s3741
-    s3745 = s3733 / pivot_trunk_wy - s1792 * s3744 - s1793 * s3743 - s1794 * s3742 - s1795 * s3741
-    s3746 = s3732 / pivot_trunk_wz - s1782 * s3745 - s1783 * s3744 - s1784 * s3743 - s1785 * s3742
-    s3747 = s3746 - s1786 * s3741
-    s3748 = s3725 / pivot_hind_right_abduction_angle_dot - s1771 * s3747 - s1772 * s3745
-    s3749 = s3748 - s1773 * s3744 - s1774 * s3743 - s1775 * s3742 - s1776 * s3741
-    s3750 = s3724 / pivot_hind_left_abduction_angle_dot - s1765 * s3747 - s1766 * s3745
-    s3751 = s3750 - s1767 * s3744 - s1768 * s3743 - s1769 * s3742 - s1770 * s3741
-    s3752 = s3723 / pivot_front_right_abduction_angle_dot - s1744 * s3747 - s1745 * s3745
-    s3753 = s3752 - s1746 * s3744 - s1747 * s3743 - s1748 * s3742 - s1749 * s3741
-    s3754 = s3722 / pivot_front_left_abduction_angle_dot - s1738 * s3747 - s1739 * s3745
-    s3755 = s3754 - s1740 * s3744 - s1741 * s3743 - s1742 * s3742 - s1743 * s3741
-    s3756 = s3721 / pivot_hind_right_swing_angle_dot - s1719 * s3749 - s1720 * s3747 - s1721 * s3745
-    s3757 = s3756 - s1722 * s3744 - s1723 * s3743 - s1724 * s3742 - s1725 * s3741
-    s3758 = s3714 / pivot_hind_left_swing_angle_dot - s1706 * s3751 - s1707 * s3747 - s1708 * s3745
-    s3759 = s3758 - s1709 * s3744 - s1710 * s3743 - s1711 * s3742 - s1712 * s3741
-    s3760 = s3713 / pivot_front_right_swing_angle_dot - s1693 * s3753 - s1694 * s3747
-    s3761 = s3760 - s1695 * s3745 - s1696 * s3744 - s1697 * s3743 - s1698 * s3742 - s1699 * s3741
-    s3762 = s3712 / pivot_front_left_swing_angle_dot - s1665 * s3755 - s1666 * s3747 - s1667 * s3745
-    s3763 = s3762 - s1668 * s3744 - s1669 * s3743 - s1670 * s3742 - s1671 * s3741
-    s3764 = s3702 / pivot_hind_right_knee_angle_dot - s1650 * s3757 - s1651 * s3749 - s1652 * s3747
-    s3765 = s3701 / pivot_hind_left_knee_angle_dot - s1629 * s3759 - s1630 * s3751 - s1631 * s3747
-    s3766 = s3700 / pivot_front_right_knee_angle_dot - s1614 * s3761 - s1615 * s3753 - s1616 * s3747
-    s3767 = s3699 / pivot_front_left_knee_angle_dot - s1599 * s3763 - s1600 * s3755 - s1601 * s3747
-    s3768 = s1599 * s3704 - (s3262 * s3703 - s5 * s3264 + s4 * s3266)
-    s3769 = s1614 * s3705 - (s3315 * s3703 - s5 * s3317 + s4 * s3319)
-    s3770 = s1601 * s3704 - (s3050 * s3703 - s5 * s3052 + s4 * s3054) + s1616 * s3705
-    s3771 = s1602 * s3704 - (s3032 * s3703 - s5 * s3034 + s4 * s3036) + s1617 * s3705
-    s3772 = s1603 * s3704 - (s3014 * s3703 - s5 * s3016 + s4 * s3018) + s1618 * s3705
-    s3773 = s1604 * s3704 - (s3010 * s3703 - s5 * s3028 + s4 * s3046) + s1619 * s3705
-    s3774 = s1605 * s3704 - (s3009 * s3703 - s5 * s3027 + s4 * s3045) + s1620 * s3705
-    s3775 = s1606 * s3704 - (s3008 * s3703 - s5 * s3026 + s4 * s3044) + s1621 * s3705
-    s3776 = s1629 * s3706 - (s3368 * s3703 - s5 * s3370 + s4 * s3372)
-    s3777 = s1650 * s3707 - (s3421 * s3703 - s5 * s3423 + s4 * s3425)
-    s3778 = s1600 * s3704 - (s3092 * s3703 - s5 * s3094 + s4 * s3096) - s1665 * s3768
-    s3779 = s1615 * s3705 - (s3131 * s3703 - s5 * s3133 + s4 * s3135) - s1693 * s3769
-    s3780 = s1630 * s3706 - (s3170 * s3703 - s5 * s3172 + s4 * s3174) - s1706 * s3776
-    s3781 = s3770 + s1631 * s3706 + s1652 * s3707 - s1666 * s3768 - s1694 * s3769 - s1707 * s3776
-    s3782 = s3771 + s1632 * s3706 + s1653 * s3707 - s1667 * s3768 - s1695 * s3769 - s1708 * s3776
-    s3783 = s3772 + s1633 * s3706 + s1654 * s3707 - s1668 * s3768 - s1696 * s3769 - s1709 * s3776
-    s3784 = s3773 + s1634 * s3706 + s1655 * s3707 - s1669 * s3768 - s1697 * s3769 - s1710 * s3776
-    s3785 = s3774 + s1635 * s3706 + s1656 * s3707 - s1670 * s3768 - s1698 * s3769 - s1711 * s3776
-    s3786 = s3775 + s1636 * s3706 + s1657 * s3707 - s1671 * s3768 - s1699 * s3769 - s1712 * s3776
-    s3787 = s1651 * s3707 - (s3209 * s3703 - s5 * s3211 + s4 * s3213) - s1719 * s3777
-    s3788 = s3781 - s1720 * s3777 - s1738 * s3778 - s1744 * s3779 - s1765 * s3780 - s1771 * s3787
-    s3789 = s3782 - s1721 * s3777 - s1739 * s3778 - s1745 * s3779 - s1766 * s3780 - s1772 * s3787
-    s3790 = s3783 - s1722 * s3777 - s1740 * s3778 - s1746 * s3779 - s1767 * s3780 - s1773 * s3787
-    s3791 = s3784 - s1723 * s3777 - s1741 * s3778 - s1747 * s3779 - s1768 * s3780 - s1774 * s3787
-    s3792 = s3785 - s1724 * s3777 - s1742 * s3778 - s1748 * s3779 - s1769 * s3780 - s1775 * s3787
-    s3793 = s3786 - s1725 * s3777 - s1743 * s3778 - s1749 * s3779 - s1770 * s3780 - s1776 * s3787
-    s3794 = s3789 - s1782 * s3788
-    s3795 = s3790 - s1783 * s3788 - s1792 * s3794
-    s3796 = s3791 - s1784 * s3788 - s1793 * s3794 - s1799 * s3795
-    s3797 = s3792 - s1785 * s3788 - s1794 * s3794 - s1800 * s3795 + s1807 * s3796
-    s3798 = s3793 - s1786 * s3788 - s1795 * s3794 - s1801 * s3795 + s1808 * s3796 + s1810 * s3797
-    s3799 = s3798 / pivot_trunk_x_dot
-    s3800 = s3797 / pivot_trunk_y_dot + s1810 * s3799
-    s3801 = s3796 / pivot_trunk_z_dot + s1807 * s3800 + s1808 * s3799
-    s3802 = s3795 / pivot_trunk_wx - s1799 * s3801 - s1800 * s3800 - s1801 * s3799
-    s3803 = s3794 / pivot_trunk_wy - s1792 * s3802 - s1793 * s3801 - s1794 * s3800 - s1795 * s3799
-    s3804 = s3788 / pivot_trunk_wz - s1782 * s3803 - s1783 * s3802 - s1784 * s3801 - s1785 * s3800
-    s3805 = s3804 - s1786 * s3799
-    s3806 = s3787 / pivot_hind_right_abduction_angle_dot - s1771 * s3805 - s1772 * s3803
-    s3807 = s3806 - s1773 * s3802 - s1774 * s3801 - s1775 * s3800 - s1776 * s3799
-    s3808 = s3780 / pivot_hind_left_abduction_angle_dot - s1765 * s3805 - s1766 * s3803
-    s3809 = s3808 - s1767 * s3802 - s1768 * s3801 - s1769 * s3800 - s1770 * s3799
-    s3810 = s3779 / pivot_front_right_abduction_angle_dot - s1744 * s3805 - s1745 * s3803
-    s3811 = s3810 - s1746 * s3802 - s1747 * s3801 - s1748 * s3800 - s1749 * s3799
-    s3812 = s3778 / pivot_front_left_abduction_angle_dot - s1738 * s3805 - s1739 * s3803
-    s3813 = s3812 - s1740 * s3802 - s1741 * s3801 - s1742 * s3800 - s1743 * s3799
-    s3814 = s3777 / pivot_hind_right_swing_angle_dot - s1719 * s3807 - s1720 * s3805 - s1721 * s3803
-    s3815 = s3814 - s1722 * s3802 - s1723 * s3801 - s1724 * s3800 - s1725 * s3799
-    s3816 = s3776 / pivot_hind_left_swing_angle_dot - s1706 * s3809 - s1707 * s3805 - s1708 * s3803
-    s3817 = s3816 - s1709 * s3802 - s1710 * s3801 - s1711 * s3800 - s1712 * s3799
-    s3818 = s3769 / pivot_front_right_swing_angle_dot - s1693 * s3811 - s1694 * s3805
-    s3819 = s3818 - s1695 * s3803 - s1696 * s3802 - s1697 * s3801 - s1698 * s3800 - s1699 * s3799
-    s3820 = s3768 / pivot_front_left_swing_angle_dot - s1665 * s3813 - s1666 * s3805 - s1667 * s3803
-    s3821 = s3820 - s1668 * s3802 - s1669 * s3801 - s1670 * s3800 - s1671 * s3799
-    s3822 = s3707 / pivot_hind_right_knee_angle_dot + s1650 * s3815 + s1651 * s3807 + s1652 * s3805
-    s3823 = s3822 + s1653 * s3803 + s1654 * s3802 + s1655 * s3801 + s1656 * s3800 + s1657 * s3799
-    s3824 = s3706 / pivot_hind_left_knee_angle_dot + s1629 * s3817 + s1630 * s3809 + s1631 * s3805
-    s3825 = s3824 + s1632 * s3803 + s1633 * s3802 + s1634 * s3801 + s1635 * s3800 + s1636 * s3799
-    s3826 = s3705 / pivot_front_right_knee_angle_dot + s1614 * s3819 + s1615 * s3811 + s1616 * s3805
-    s3827 = s3826 + s1617 * s3803 + s1618 * s3802 + s1619 * s3801 + s1620 * s3800 + s1621 * s3799
-    s3828 = s3704 / pivot_front_left_knee_angle_dot + s1599 * s3821 + s1600 * s3813 + s1601 * s3805
-    s3829 = s3828 + s1602 * s3803 + s1603 * s3802 + s1604 * s3801 + s1605 * s3800 + s1606 * s3799
-    s3830 = s3 * s3492 - (s5 * s3486 + s3489 * s3703)
-    s3831 = s3 * s3560 - (s5 * s3554 + s3557 * s3703)
-    s3832 = s3 * s3628 - (s5 * s3622 + s3625 * s3703)
-    s3833 = s3 * s3696 - (s5 * s3690 + s3693 * s3703)
-    s3834 = s3 * s3266 - (s5 * s3262 + s3264 * s3703) - s1599 * s3830
-    s3835 = s3 * s3319 - (s5 * s3315 + s3317 * s3703) - s1614 * s3831
-    s3836 = s3 * s3054 - (s5 * s3050 + s3052 * s3703) - s1601 * s3830 - s1616 * s3831
-    s3837 = s3 * s3036 - (s5 * s3032 + s3034 * s3703) - s1602 * s3830 - s1617 * s3831
-    s3838 = s3 * s3018 - (s5 * s3014 + s3016 * s3703) - s1603 * s3830 - s1618 * s3831
-    s3839 = s3 * s3046 - (s5 * s3010 + s3028 * s3703) - s1604 * s3830 - s1619 * s3831
-    s3840 = s3 * s3045 - (s5 * s3009 + s3027 * s3703) - s1605 * s3830 - s1620 * s3831
-    s3841 = s3 * s3044 - (s5 * s3008 + s3026 * s3703) - s1606 * s3830 - s1621 * s3831
-    s3842 = s3 * s3372 - (s5 * s3368 + s3370 * s3703) - s1629 * s3832
-    s3843 = s3 * s3425 - (s5 * s3421 + s3423 * s3703) - s1650 * s3833
-    s3844 = s3 * s3096 - (s5 * s3092 + s3094 * s3703) - s1600 * s3830 - s1665 * s3834
-    s3845 = s3 * s3135 - (s5 * s3131 + s3133 * s3703) - s1615 * s3831 - s1693 * s3835
-    s3846 = s3 * s3174 - (s5 * s3170 + s3172 * s3703) - s1630 * s3832 - s1706 * s3842
-    s3847 = s3836 - s1631 * s3832 - s1652 * s3833 - s1666 * s3834 - s1694 * s3835 - s1707 * s3842
-    s3848 = s3837 - s1632 * s3832 - s1653 * s3833 - s1667 * s3834 - s1695 * s3835 - s1708 * s3842
-    s3849 = s3838 - s1633 * s3832 - s1654 * s3833 - s1668 * s3834 - s1696 * s3835 - s1709 * s3842
-    s3850 = s3839 - s1634 * s3832 - s1655 * s3833 - s1669 * s3834 - s1697 * s3835 - s1710 * s3842
-    s3851 = s3840 - s1635 * s3832 - s1656 * s3833 - s1670 * s3834 - s1698 * s3835 - s1711 * s3842
-    s3852 = s3841 - s1636 * s3832 - s1657 * s3833 - s1671 * s3834 - s1699 * s3835 - s1712 * s3842
-    s3853 = s3 * s3213 - (s5 * s3209 + s3211 * s3703) - s1651 * s3833 - s1719 * s3843
-    s3854 = s3847 - s1720 * s3843 - s1738 * s3844 - s1744 * s3845 - s1765 * s3846 - s1771 * s3853
-    s3855 = s3848 - s1721 * s3843 - s1739 * s3844 - s1745 * s3845 - s1766 * s3846 - s1772 * s3853
-    s3856 = s3849 - s1722 * s3843 - s1740 * s3844 - s1746 * s3845 - s1767 * s3846 - s1773 * s3853
-    s3857 = s3850 - s1723 * s3843 - s1741 * s3844 - s1747 * s3845 - s1768 * s3846 - s1774 * s3853
-    s3858 = s3851 - s1724 * s3843 - s1742 * s3844 - s1748 * s3845 - s1769 * s3846 - s1775 * s3853
-    s3859 = s3852 - s1725 * s3843 - s1743 * s3844 - s1749 * s3845 - s1770 * s3846 - s1776 * s3853
-    s3860 = s3855 - s1782 * s3854
-    s3861 = s3856 - s1783 * s3854 - s1792 * s3860
-    s3862 = s3857 - s1784 * s3854 - s1793 * s3860 - s1799 * s3861
-    s3863 = s3858 - s1785 * s3854 - s1794 * s3860 - s1800 * s3861 + s1807 * s3862
-    s3864 = s3859 - s1786 * s3854 - s1795 * s3860 - s1801 * s3861 + s1808 * s3862 + s1810 * s3863
-    s3865 = s3864 / pivot_trunk_x_dot
-    s3866 = s3863 / pivot_trunk_y_dot + s1810 * s3865
-    s3867 = s3862 / pivot_trunk_z_dot + s1807 * s3866 + s1808 * s3865
-    s3868 = s3861 / pivot_trunk_wx - s1799 * s3867 - s1800 * s3866 - s1801 * s3865
-    s3869 = s3860 / pivot_trunk_wy - s1792 * s3868 - s1793 * s3867 - s1794 * s3866 - s1795 * s3865
-    s3870 = s3854 / pivot_trunk_wz - s1782 * s3869 - s1783 * s3868 - s1784 * s3867 - s1785 * s3866
-    s3871 = s3870 - s1786 * s3865
-    s3872 = s3853 / pivot_hind_right_abduction_angle_dot - s1771 * s3871 - s1772 * s3869
-    s3873 = s3872 - s1773 * s3868 - s1774 * s3867 - s1775 * s3866 - s1776 * s3865
-    s3874 = s3846 / pivot_hind_left_abduction_angle_dot - s1765 * s3871 - s1766 * s3869
-    s3875 = s3874 - s1767 * s3868 - s1768 * s3867 - s1769 * s3866 - s1770 * s3865
-    s3876 = s3845 / pivot_front_right_abduction_angle_dot - s1744 * s3871 - s1745 * s3869
-    s3877 = s3876 - s1746 * s3868 - s1747 * s3867 - s1748 * s3866 - s1749 * s3865
-    s3878 = s3844 / pivot_front_left_abduction_angle_dot - s1738 * s3871 - s1739 * s3869
-    s3879 = s3878 - s1740 * s3868 - s1741 * s3867 - s1742 * s3866 - s1743 * s3865
-    s3880 = s3843 / pivot_hind_right_swing_angle_dot - s1719 * s3873 - s1720 * s3871 - s1721 * s3869
-    s3881 = s3880 - s1722 * s3868 - s1723 * s3867 - s1724 * s3866 - s1725 * s3865
-    s3882 = s3842 / pivot_hind_left_swing_angle_dot - s1706 * s3875 - s1707 * s3871 - s1708 * s3869
-    s3883 = s3882 - s1709 * s3868 - s1710 * s3867 - s1711 * s3866 - s1712 * s3865
-    s3884 = s3835 / pivot_front_right_swing_angle_dot - s1693 * s3877 - s1694 * s3871
-    s3885 = s3884 - s1695 * s3869 - s1696 * s3868 - s1697 * s3867 - s1698 * s3866 - s1699 * s3865
-    s3886 = s3834 / pivot_front_left_swing_angle_dot - s1665 * s3879 - s1666 * s3871 - s1667 * s3869
-    s3887 = s3886 - s1668 * s3868 - s1669 * s3867 - s1670 * s3866 - s1671 * s3865
-    s3888 = s3833 / pivot_hind_right_knee_angle_dot - s1650 * s3881 - s1651 * s3873 - s1652 * s3871
-    s3889 = s3832 / pivot_hind_left_knee_angle_dot - s1629 * s3883 - s1630 * s3875 - s1631 * s3871
-    s3890 = s3831 / pivot_front_right_knee_angle_dot - s1614 * s3885 - s1615 * s3877 - s1616 * s3871
-    s3891 = s3830 / pivot_front_left_knee_angle_dot - s1599 * s3887 - s1600 * s3879 - s1601 * s3871
-    s3892 = s1599 * s3708 - (s3 * s3264 - s4 * s3262 + s3266 * s3703)
-    s3893 = s1614 * s3709 - (s3 * s3317 - s4 * s3315 + s3319 * s3703)
-    s3894 = s1601 * s3708 - (s3 * s3052 - s4 * s3050 + s3054 * s3703) + s1616 * s3709
-    s3895 = s1602 * s3708 - (s3 * s3034 - s4 * s3032 + s3036 * s3703) + s1617 * s3709
-    s3896 = s1603 * s3708 - (s3 * s3016 - s4 * s3014 + s3018 * s3703) + s1618 * s3709
-    s3897 = s1604 * s3708 - (s3 * s3028 - s4 * s3010 + s3046 * s3703) + s1619 * s3709
-    s3898 = s1605 * s3708 - (s3 * s3027 - s4 * s3009 + s3045 * s3703) + s1620 * s3709
-    s3899 = s1606 * s3708 - (s3 * s3026 - s4 * s3008 + s3044 * s3703) + s1621 * s3709
-    s3900 = s1629 * s3710 - (s3 * s3370 - s4 * s3368 + s3372 * s3703)
-    s3901 = s1650 * s3711 - (s3 * s3423 - s4 * s3421 + s3425 * s3703)
-    s3902 = s1600 * s3708 - (s3 * s3094 - s4 * s3092 + s3096 * s3703) - s1665 * s3892
-    s3903 = s1615 * s3709 - (s3 * s3133 - s4 * s3131 + s3135 * s3703) - s1693 * s3893
-    s3904 = s1630 * s3710 - (s3 * s3172 - s4 * s3170 + s3174 * s3703) - s1706 * s3900
-    s3905 = s3894 + s1631 * s3710 + s1652 * s3711 - s1666 * s3892 - s1694 * s3893 - s1707 * s3900
-    s3906 = s3895 + s1632 * s3710 + s1653 * s3711 - s1667 * s3892 - s1695 * s3893 - s1708 * s3900
-    s3907 = s3896 + s1633 * s3710 + s1654 * s3711 - s1668 * s3892 - s1696 * s3893 - s1709 * s3900
-    s3908 = s3897 + s1634 * s3710 + s1655 * s3711 - s1669 * s3892 - s1697 * s3893 - s1710 * s3900
-    s3909 = s3898 + s1635 * s3710 + s1656 * s3711 - s1670 * s3892 - s1698 * s3893 - s1711 * s3900
-    s3910 = s3899 + s1636 * s3710 + s1657 * s3711 - s1671 * s3892 - s1699 * s3893 - s1712 * s3900
-    s3911 = s1651 * s3711 - (s3 * s3211 - s4 * s3209 + s3213 * s3703) - s1719 * s3901
-    s3912 = s3905 - s1720 * s3901 - s1738 * s3902 - s1744 * s3903 - s1765 * s3904 - s1771 * s3911
-    s3913 = s3906 - s1721 * s3901 - s1739 * s3902 - s1745 * s3903 - s1766 * s3904 - s1772 * s3911
-    s3914 = s3907 - s1722 * s3901 - s1740 * s3902 - s1746 * s3903 - s1767 * s3904 - s1773 * s3911
-    s3915 = s3908 - s1723 * s3901 - s1741 * s3902 - s1747 * s3903 - s1768 * s3904 - s1774 * s3911
-    s3916 = s3909 - s1724 * s3901 - s1742 * s3902 - s1748 * s3903 - s1769 * s3904 - s1775 * s3911
-    s3917 = s3910 - s1725 * s3901 - s1743 * s3902 - s1749 * s3903 - s1770 * s3904 - s1776 * s3911
-    s3918 = s3913 - s1782 * s3912
-    s3919 = s3914 - s1783 * s3912 - s1792 * s3918
-    s3920 = s3915 - s1784 * s3912 - s1793 * s3918 - s1799 * s3919
-    s3921 = s3916 - s1785 * s3912 - s1794 * s3918 - s1800 * s3919 + s1807 * s3920
-    s3922 = s3917 - s1786 * s3912 - s1795 * s3918 - s1801 * s3919 + s1808 * s3920 + s1810 * s3921
-    s3923 = s3922 / pivot_trunk_x_dot
-    s3924 = s3921 / pivot_trunk_y_dot + s1810 * s3923
-    s3925 = s3920 / pivot_trunk_z_dot + s1807 * s3924 + s1808 * s3923
-    s3926 = s3919 / pivot_trunk_wx - s1799 * s3925 - s1800 * s3924 - s1801 * s3923
-    s3927 = s3918 / pivot_trunk_wy - s1792 * s3926 - s1793 * s3925 - s1794 * s3924 - s1795 * s3923
-    s3928 = s3912 / pivot_trunk_wz - s1782 * s3927 - s1783 * s3926 - s1784 * s3925 - s1785 * s3924
-    s3929 = s3928 - s1786 * s3923
-    s3930 = s3911 / pivot_hind_right_abduction_angle_dot - s1771 * s3929 - s1772 * s3927
-    s3931 = s3930 - s1773 * s3926 - s1774 * s3925 - s1775 * s3924 - s1776 * s3923
-    s3932 = s3904 / pivot_hind_left_abduction_angle_dot - s1765 * s3929 - s1766 * s3927
-    s3933 = s3932 - s1767 * s3926 - s1768 * s3925 - s1769 * s3924 - s1770 * s3923
-    s3934 = s3903 / pivot_front_right_abduction_angle_dot - s1744 * s3929 - s1745 * s3927
-    s3935 = s3934 - s1746 * s3926 - s1747 * s3925 - s1748 * s3924 - s1749 * s3923
-    s3936 = s3902 / pivot_front_left_abduction_angle_dot - s1738 * s3929 - s1739 * s3927
-    s3937 = s3936 - s1740 * s3926 - s1741 * s3925 - s1742 * s3924 - s1743 * s3923
-    s3938 = s3901 / pivot_hind_right_swing_angle_dot - s1719 * s3931 - s1720 * s3929 - s1721 * s3927
-    s3939 = s3938 - s1722 * s3926 - s1723 * s3925 - s1724 * s3924 - s1725 * s3923
-    s3940 = s3900 / pivot_hind_left_swing_angle_dot - s1706 * s3933 - s1707 * s3929 - s1708 * s3927
-    s3941 = s3940 - s1709 * s3926 - s1710 * s3925 - s1711 * s3924 - s1712 * s3923
-    s3942 = s3893 / pivot_front_right_swing_angle_dot - s1693 * s3935 - s1694 * s3929
-    s3943 = s3942 - s1695 * s3927 - s1696 * s3926 - s1697 * s3925 - s1698 * s3924 - s1699 * s3923
-    s3944 = s3892 / pivot_front_left_swing_angle_dot - s1665 * s3937 - s1666 * s3929 - s1667 * s3927
-    s3945 = s3944 - s1668 * s3926 - s1669 * s3925 - s1670 * s3924 - s1671 * s3923
-    s3946 = s3711 / pivot_hind_right_knee_angle_dot + s1650 * s3939 + s1651 * s3931 + s1652 * s3929
-    s3947 = s3946 + s1653 * s3927 + s1654 * s3926 + s1655 * s3925 + s1656 * s3924 + s1657 * s3923
-    s3948 = s3710 / pivot_hind_left_knee_angle_dot + s1629 * s3941 + s1630 * s3933 + s1631 * s3929
-    s3949 = s3948 + s1632 * s3927 + s1633 * s3926 + s1634 * s3925 + s1635 * s3924 + s1636 * s3923
-    s3950 = s3709 / pivot_front_right_knee_angle_dot + s1614 * s3943 + s1615 * s3935 + s1616 * s3929
-    s3951 = s3950 + s1617 * s3927 + s1618 * s3926 + s1619 * s3925 + s1620 * s3924 + s1621 * s3923
-    s3952 = s3708 / pivot_front_left_knee_angle_dot + s1599 * s3945 + s1600 * s3937 + s1601 * s3929
-    s3953 = s3952 + s1602 * s3927 + s1603 * s3926 + s1604 * s3925 + s1605 * s3924 + s1606 * s3923
-    s3954 = s1599 * s3476 - (s3253 + (s2657 * s3219 + s2658 * s3221 + s2659 * s3223))
-    s3955 = s1600 * s3476 - (s3083 + (s2657 * s3057 + s2658 * s3059 + s2659 * s3061))
-    s3956 = s3955 - s1665 * s3954
-    s3957 = s1601 * s3476 - (s17 * s3086 + s20 * s3087 + s23 * s3088) - s1666 * s3954
-    s3958 = s1602 * s3476 - (s16 * s3086 + s19 * s3087 + s22 * s3088) - s1667 * s3954
-    s3959 = s1603 * s3476 - (s15 * s3086 + s18 * s3087 + s21 * s3088) - s1668 * s3954
-    s3960 = s3957 - s1738 * s3956
-    s3961 = s3958 - s1739 * s3956 - s1782 * s3960
-    s3962 = s3959 - s1740 * s3956 - s1783 * s3960 - s1792 * s3961
-    s3963 = s1604 * s3476 - s3076 - s1669 * s3954 - s1741 * s3956 - s1784 * s3960 - s1793 * s3961
-    s3964 = s1605 * s3476 - s3075 - s1670 * s3954 - s1742 * s3956 - s1785 * s3960 - s1794 * s3961
-    s3965 = s1606 * s3476 - s3074 - s1671 * s3954 - s1743 * s3956 - s1786 * s3960 - s1795 * s3961
-    s3966 = s3963 - s1799 * s3962
-    s3967 = s3964 - s1800 * s3962 + s1807 * s3966
-    s3968 = (s3965 - s1801 * s3962 + s1808 * s3966 + s1810 * s3967) / pivot_trunk_x_dot
-    s3969 = s3967 / pivot_trunk_y_dot + s1810 * s3968
-    s3970 = s3966 / pivot_trunk_z_dot + s1807 * s3969 + s1808 * s3968
-    s3971 = s3962 / pivot_trunk_wx - s1799 * s3970 - s1800 * s3969 - s1801 * s3968
-    s3972 = s3961 / pivot_trunk_wy - s1792 * s3971 - s1793 * s3970 - s1794 * s3969 - s1795 * s3968
-    s3973 = s3960 / pivot_trunk_wz - s1782 * s3972 - s1783 * s3971 - s1784 * s3970 - s1785 * s3969
-    s3974 = s3973 - s1786 * s3968
-    s3975 = s1771 * s3974 + s1772 * s3972 + s1773 * s3971 + s1774 * s3970 + s1775 * s3969
-    s3976 = s3975 + s1776 * s3968
-    s3977 = s1765 * s3974 + s1766 * s3972 + s1767 * s3971 + s1768 * s3970 + s1769 * s3969
-    s3978 = s3977 + s1770 * s3968
-    s3979 = s1744 * s3974 + s1745 * s3972 + s1746 * s3971 + s1747 * s3970 + s1748 * s3969
-    s3980 = s3979 + s1749 * s3968
-    s3981 = s3956 / pivot_front_left_abduction_angle_dot - s1738 * s3974 - s1739 * s3972
-    s3982 = s3981 - s1740 * s3971 - s1741 * s3970 - s1742 * s3969 - s1743 * s3968
-    s3983 = s1719 * s3976 - s1720 * s3974 - s1721 * s3972 - s1722 * s3971 - s1723 * s3970
-    s3984 = s3983 - s1724 * s3969 - s1725 * s3968
-    s3985 = s1706 * s3978 - s1707 * s3974 - s1708 * s3972 - s1709 * s3971 - s1710 * s3970
-    s3986 = s3985 - s1711 * s3969 - s1712 * s3968
-    s3987 = s1693 * s3980 - s1694 * s3974 - s1695 * s3972 - s1696 * s3971 - s1697 * s3970
-    s3988 = s3987 - s1698 * s3969 - s1699 * s3968
-    s3989 = s3954 / pivot_front_left_swing_angle_dot - s1665 * s3982 - s1666 * s3974 - s1667 * s3972
-    s3990 = s3989 - s1668 * s3971 - s1669 * s3970 - s1670 * s3969 - s1671 * s3968
-    s3991 = s1651 * s3976 - s1650 * s3984 - s1652 * s3974 - s1653 * s3972 - s1654 * s3971
-    s3992 = s1630 * s3978 - s1629 * s3986 - s1631 * s3974 - s1632 * s3972 - s1633 * s3971
-    s3993 = s1615 * s3980 - s1614 * s3988 - s1616 * s3974 - s1617 * s3972 - s1618 * s3971
-    s3994 = s3476 / pivot_front_left_knee_angle_dot + s1599 * s3990 + s1600 * s3982 + s1601 * s3974
-    s3995 = s3994 + s1602 * s3972 + s1603 * s3971 + s1604 * s3970 + s1605 * s3969 + s1606 * s3968
-    s3996 = s1614 * s3544 - (s3306 + (s2657 * s3272 + s2658 * s3274 + s2659 * s3276))
-    s3997 = s1615 * s3544 - (s3122 + (s2657 * s3099 + s2658 * s3101 + s2659 * s3103))
-    s3998 = s3997 - s1693 * s3996
-    s3999 = s1616 * s3544 - (s17 * s3125 + s20 * s3126 + s23 * s3127) - s1694 * s3996
-    s4000 = s1617 * s3544 - (s16 * s3125 + s19 * s3126 + s22 * s3127) - s1695 * s3996
-    s4001 = s1618 * s3544 - (s15 * s3125 + s18 * s3126 + s21 * s3127) - s1696 * s3996
-    s4002 = s3999 - s1744 * s3998
-    s4003 = s4000 - s1745 * s3998 - s1782 * s4002
-    s4004 = s4001 - s1746 * s3998 - s1783 * s4002 - s1792 * s4003
-    s4005 = s1619 * s3544 - s3115 - s1697 * s3996 - s1747 * s3998 - s1784 * s4002 - s1793 * s4003
-    s4006 = s1620 * s3544 - s3114 - s1698 * s3996 - s1748 * s3998 - s1785 * s4002 - s1794 * s4003
-    s4007 = s1621 * s3544 - s3113 - s1699 * s3996 - s1749 * s3998 - s1786 * s4002 - s1795 * s4003
-    s4008 = s4005 - s1799 * s4004
-    s4009 = s4006 - s1800 * s4004 + s1807 * s4008
-    s4010 = (s4007 - s1801 * s4004 + s1808 * s4008 + s1810 * s4009) / pivot_trunk_x_dot
-    s4011 = s4009 / pivot_trunk_y_dot + s1810 * s4010
-    s4012 = s4008 / pivot_trunk_z_dot + s1807 * s4011 + s1808 * s4010
-    s4013 = s4004 / pivot_trunk_wx - s1799 * s4012 - s1800 * s4011 - s1801 * s4010
-    s4014 = s4003 / pivot_trunk_wy - s1792 * s4013 - s1793 * s4012 - s1794 * s4011 - s1795 * s4010
-    s4015 = s4002 / pivot_trunk_wz - s1782 * s4014 - s1783 * s4013 - s1784 * s4012 - s1785 * s4011
-    s4016 = s4015 - s1786 * s4010
-    s4017 = s1771 * s4016 + s1772 * s4014 + s1773 * s4013 + s1774 * s4012 + s1775 * s4011
-    s4018 = s4017 + s1776 * s4010
-    s4019 = s1765 * s4016 + s1766 * s4014 + s1767 * s4013 + s1768 * s4012 + s1769 * s4011
-    s4020 = s4019 + s1770 * s4010
-    s4021 = s3998 / pivot_front_right_abduction_angle_dot - s1744 * s4016 - s1745 * s4014
-    s4022 = s4021 - s1746 * s4013 - s1747 * s4012 - s1748 * s4011 - s1749 * s4010
-    s4023 = s1738 * s4016 + s1739 * s4014 + s1740 * s4013 + s1741 * s4012 + s1742 * s4011
-    s4024 = s4023 + s1743 * s4010
-    s4025 = s1719 * s4018 - s1720 * s4016 - s1721 * s4014 - s1722 * s4013 - s1723 * s4012
-    s4026 = s4025 - s1724 * s4011 - s1725 * s4010
-    s4027 = s1706 * s4020 - s1707 * s4016 - s1708 * s4014 - s1709 * s4013 - s1710 * s4012
-    s4028 = s4027 - s1711 * s4011 - s1712 * s4010
-    s4029 = s3996 / pivot_front_right_swing_angle_dot - s1693 * s4022 - s1694 * s4016
-    s4030 = s4029 - s1695 * s4014 - s1696 * s4013 - s1697 * s4012 - s1698 * s4011 - s1699 * s4010
-    s4031 = s1665 * s4024 - s1666 * s4016 - s1667 * s4014 - s1668 * s4013 - s1669 * s4012
-    s4032 = s4031 - s1670 * s4011 - s1671 * s4010
-    s4033 = s1651 * s4018 - s1650 * s4026 - s1652 * s4016 - s1653 * s4014 - s1654 * s4013
-    s4034 = s1630 * s4020 - s1629 * s4028 - s1631 * s4016 - s1632 * s4014 - s1633 * s4013
-    s4035 = s3544 / pivot_front_right_knee_angle_dot + s1614 * s4030 + s1615 * s4022 + s1616 * s4016
-    s4036 = s4035 + s1617 * s4014 + s1618 * s4013 + s1619 * s4012 + s1620 * s4011 + s1621 * s4010
-    s4037 = s1600 * s4024 - s1599 * s4032 - s1601 * s4016 - s1602 * s4014 - s1603 * s4013
-    s4038 = s1629 * s3612 - (s3359 + (s2657 * s3325 + s2658 * s3327 + s2659 * s3329))
-    s4039 = s1630 * s3612 - (s3161 + (s2657 * s3138 + s2658 * s3140 + s2659 * s3142))
-    s4040 = s4039 - s1706 * s4038
-    s4041 = s1631 * s3612 - (s17 * s3164 + s20 * s3165 + s23 * s3166) - s1707 * s4038
-    s4042 = s1632 * s3612 - (s16 * s3164 + s19 * s3165 + s22 * s3166) - s1708 * s4038
-    s4043 = s1633 * s3612 - (s15 * s3164 + s18 * s3165 + s21 * s3166) - s1709 * s4038
-    s4044 = s4041 - s1765 * s4040
-    s4045 = s4042 - s1766 * s4040 - s1782 * s4044
-    s4046 = s4043 - s1767 * s4040 - s1783 * s4044 - s1792 * s4045
-    s4047 = s1634 * s3612 - s3154 - s1710 * s4038 - s1768 * s4040 - s1784 * s4044 - s1793 * s4045
-    s4048 = s1635 * s3612 - s3153 - s1711 * s4038 - s1769 * s4040 - s1785 * s4044 - s1794 * s4045
-    s4049 = s1636 * s3612 - s3152 - s1712 * s4038 - s1770 * s4040 - s1786 * s4044 - s1795 * s4045
-    s4050 = s4047 - s1799 * s4046
-    s4051 = s4048 - s1800 * s4046 + s1807 * s4050
-    s4052 = (s4049 - s1801 * s4046 + s1808 * s4050 + s1810 * s4051) / pivot_trunk_x_dot
-    s4053 = s4051 / pivot_trunk_y_dot + s1810 * s4052
-    s4054 = s4050 / pivot_trunk_z_dot + s1807 * s4053 + s1808 * s4052
-    s4055 = s4046 / pivot_trunk_wx - s1799 * s4054 - s1800 * s4053 - s1801 * s4052
-    s4056 = s4045 / pivot_trunk_wy - s1792 * s4055 - s1793 * s4054 - s1794 * s4053 - s1795 * s4052
-    s4057 = s4044 / pivot_trunk_wz - s1782 * s4056 - s1783 * s4055 - s1784 * s4054 - s1785 * s4053
-    s4058 = s4057 - s1786 * s4052
-    s4059 = s1771 * s4058 + s1772 * s4056 + s1773 * s4055 + s1774 * s4054 + s1775 * s4053
-    s4060 = s4059 + s1776 * s4052
-    s4061 = s4040 / pivot_hind_left_abduction_angle_dot - s1765 * s4058 - s1766 * s4056
-    s4062 = s4061 - s1767 * s4055 - s1768 * s4054 - s1769 * s4053 - s1770 * s4052
-    s4063 = s1744 * s4058 + s1745 * s4056 + s1746 * s4055 + s1747 * s4054 + s1748 * s4053
-    s4064 = s4063 + s1749 * s4052
-    s4065 = s1738 * s4058 + s1739 * s4056 + s1740 * s4055 + s1741 * s4054 + s1742 * s4053
-    s4066 = s4065 + s1743 * s4052
-    s4067 = s1719 * s4060 - s1720 * s4058 - s1721 * s4056 - s1722 * s4055 - s1723 * s4054
-    s4068 = s4067 - s1724 * s4053 - s1725 * s4052
-    s4069 = s4038 / pivot_hind_left_swing_angle_dot - s1706 * s4062 - s1707 * s4058 - s1708 * s4056
-    s4070 = s4069 - s1709 * s4055 - s1710 * s4054 - s1711 * s4053 - s1712 * s4052
-    s4071 = s1693 * s4064 - s1694 * s4058 - s1695 * s4056 - s1696 * s4055 - s1697 * s4054
-    s4072 = s4071 - s1698 * s4053 - s1699 * s4052
-    s4073 = s1665 * s4066 - s1666 * s4058 - s1667 * s4056 - s1668 * s4055 - s1669 * s4054
-    s4074 = s4073 - s1670 * s4053 - s1671 * s4052
-    s4075 = s1651 * s4060 - s1650 * s4068 - s1652 * s4058 - s1653 * s4056 - s1654 * s4055
-    s4076 = s3612 / pivot_hind_left_knee_angle_dot + s1629 * s4070 + s1630 * s4062 + s1631 * s4058
-    s4077 = s4076 + s1632 * s4056 + s1633 * s4055 + s1634 * s4054 + s1635 * s4053 + s1636 * s4052
-    s4078 = s1615 * s4064 - s1614 * s4072 - s1616 * s4058 - s1617 * s4056 - s1618 * s4055
-    s4079 = s1600 * s4066 - s1599 * s4074 - s1601 * s4058 - s1602 * s4056 - s1603 * s4055
-    s4080 = s1650 * s3680 - (s3412 + (s2657 * s3378 + s2658 * s3380 + s2659 * s3382))
-    s4081 = s1651 * s3680 - (s3200 + (s2657 * s3177 + s2658 * s3179 + s2659 * s3181))
-    s4082 = s4081 - s1719 * s4080
-    s4083 = s1652 * s3680 - (s17 * s3203 + s20 * s3204 + s23 * s3205) - s1720 * s4080
-    s4084 = s1653 * s3680 - (s16 * s3203 + s19 * s3204 + s22 * s3205) - s1721 * s4080
-    s4085 = s1654 * s3680 - (s15 * s3203 + s18 * s3204 + s21 * s3205) - s1722 * s4080
-    s4086 = s4083 - s1771 * s4082
-    s4087 = s4084 - s1772 * s4082 - s1782 * s4086
-    s4088 = s4085 - s1773 * s4082 - s1783 * s4086 - s1792 * s4087
-    s4089 = s1655 * s3680 - s3193 - s1723 * s4080 - s1774 * s4082 - s1784 * s4086 - s1793 * s4087
-    s4090 = s1656 * s3680 - s3192 - s1724 * s4080 - s1775 * s4082 - s1785 * s4086 - s1794 * s4087
-    s4091 = s1657 * s3680 - s3191 - s1725 * s4080 - s1776 * s4082 - s1786 * s4086 - s1795 * s4087
-    s4092 = s4089 - s1799 * s4088
-    s4093 = s4090 - s1800 * s4088 + s1807 * s4092
-    s4094 = (s4091 - s1801 * s4088 + s1808 * s4092 + s1810 * s4093) / pivot_trunk_x_dot
-    s4095 = s4093 / pivot_trunk_y_dot + s1810 * s4094
-    s4096 = s4092 / pivot_trunk_z_dot + s1807 * s4095 + s1808 * s4094
-    s4097 = s4088 / pivot_trunk_wx - s1799 * s4096 - s1800 * s4095 - s1801 * s4094
-    s4098 = s4087 / pivot_trunk_wy - s1792 * s4097 - s1793 * s4096 - s1794 * s4095 - s1795 * s4094
-    s4099 = s4086 / pivot_trunk_wz - s1782 * s4098 - s1783 * s4097 - s1784 * s4096 - s1785 * s4095
-    s4100 = s4099 - s1786 * s4094
-    s4101 = s4082 / pivot_hind_right_abduction_angle_dot - s1771 * s4100 - s1772 * s4098
-    s4102 = s4101 - s1773 * s4097 - s1774 * s4096 - s1775 * s4095 - s1776 * s4094
-    s4103 = s1765 * s4100 + s1766 * s4098 + s1767 * s4097 + s1768 * s4096 + s1769 * s4095
-    s4104 = s4103 + s1770 * s4094
-    s4105 = s1744 * s4100 + s1745 * s4098 + s1746 * s4097 + s1747 * s4096 + s1748 * s4095
-    s4106 = s4105 + s1749 * s4094
-    s4107 = s1738 * s4100 + s1739 * s4098 + s1740 * s4097 + s1741 * s4096 + s1742 * s4095
-    s4108 = s4107 + s1743 * s4094
-    s4109 = s4080 / pivot_hind_right_swing_angle_dot - s1719 * s4102 - s1720 * s4100 - s1721 * s4098
-    s4110 = s4109 - s1722 * s4097 - s1723 * s4096 - s1724 * s4095 - s1725 * s4094
-    s4111 = s1706 * s4104 - s1707 * s4100 - s1708 * s4098 - s1709 * s4097 - s1710 * s4096
-    s4112 = s4111 - s1711 * s4095 - s1712 * s4094
-    s4113 = s1693 * s4106 - s1694 * s4100 - s1695 * s4098 - s1696 * s4097 - s1697 * s4096
-    s4114 = s4113 - s1698 * s4095 - s1699 * s4094
-    s4115 = s1665 * s4108 - s1666 * s4100 - s1667 * s4098 - s1668 * s4097 - s1669 * s4096
-    s4116 = s4115 - s1670 * s4095 - s1671 * s4094
-    s4117 = s3680 / pivot_hind_right_knee_angle_dot + s1650 * s4110 + s1651 * s4102 + s1652 * s4100
-    s4118 = s4117 + s1653 * s4098 + s1654 * s4097 + s1655 * s4096 + s1656 * s4095 + s1657 * s4094
-    s4119 = s1630 * s4104 - s1629 * s4112 - s1631 * s4100 - s1632 * s4098 - s1633 * s4097
-    s4120 = s1615 * s4106 - s1614 * s4114 - s1616 * s4100 - s1617 * s4098 - s1618 * s4097
-    s4121 = s1600 * s4108 - s1599 * s4116 - s1601 * s4100 - s1602 * s4098 - s1603 * s4097
-    s4122 = s1599 * s3466 - (s3245 + (s2771 * s3219 + s2772 * s3221 + s2773 * s3223))
-    s4123 = s1600 * s3466 - (s15 * s3247 + s18 * s3248 + s21 * s3249) - s1665 * s4122
-    s4124 = s1601 * s3466 - (s17 * s3256 + s20 * s3257 + s23 * s3258) - s1666 * s4122
-    s4125 = s1602 * s3466 - (s16 * s3256 + s19 * s3257 + s22 * s3258) - s1667 * s4122
-    s4126 = s1603 * s3466 - (s15 * s3256 + s18 * s3257 + s21 * s3258) - s1668 * s4122
-    s4127 = s4124 - s1738 * s4123
-    s4128 = s4125 - s1739 * s4123 - s1782 * s4127
-    s4129 = s4126 - s1740 * s4123 - s1783 * s4127 - s1792 * s4128
-    s4130 = s1604 * s3466 - s3238 - s1669 * s4122 - s1741 * s4123 - s1784 * s4127 - s1793 * s4128
-    s4131 = s1605 * s3466 - s3237 - s1670 * s4122 - s1742 * s4123 - s1785 * s4127 - s1794 * s4128
-    s4132 = s1606 * s3466 - s3236 - s1671 * s4122 - s1743 * s4123 - s1786 * s4127 - s1795 * s4128
-    s4133 = s4130 - s1799 * s4129
-    s4134 = s4131 - s1800 * s4129 + s1807 * s4133
-    s4135 = (s4132 - s1801 * s4129 + s1808 * s4133 + s1810 * s4134) / pivot_trunk_x_dot
-    s4136 = s4134 / pivot_trunk_y_dot + s1810 * s4135
-    s4137 = s4133 / pivot_trunk_z_dot + s1807 * s4136 + s1808 * s4135
-    s4138 = s4129 / pivot_trunk_wx - s1799 * s4137 - s1800 * s4136 - s1801 * s4135
-    s4139 = s4128 / pivot_trunk_wy - s1792 * s4138 - s1793 * s4137 - s1794 * s4136 - s1795 * s4135
-    s4140 = s4127 / pivot_trunk_wz - s1782 * s4139 - s1783 * s4138 - s1784 * s4137 - s1785 * s4136
-    s4141 = s4140 - s1786 * s4135
-    s4142 = s1771 * s4141 + s1772 * s4139 + s1773 * s4138 + s1774 * s4137 + s1775 * s4136
-    s4143 = s4142 + s1776 * s4135
-    s4144 = s1765 * s4141 + s1766 * s4139 + s1767 * s4138 + s1768 * s4137 + s1769 * s4136
-    s4145 = s4144 + s1770 * s4135
-    s4146 = s1744 * s4141 + s1745 * s4139 + s1746 * s4138 + s1747 * s4137 + s1748 * s4136
-    s4147 = s4146 + s1749 * s4135
-    s4148 = s4123 / pivot_front_left_abduction_angle_dot - s1738 * s4141 - s1739 * s4139
-    s4149 = s4148 - s1740 * s4138 - s1741 * s4137 - s1742 * s4136 - s1743 * s4135
-    s4150 = s1719 * s4143 - s1720 * s4141 - s1721 * s4139 - s1722 * s4138 - s1723 * s4137
-    s4151 = s4150 - s1724 * s4136 - s1725 * s4135
-    s4152 = s1706 * s4145 - s1707 * s4141 - s1708 * s4139 - s1709 * s4138 - s1710 * s4137
-    s4153 = s4152 - s1711 * s4136 - s1712 * s4135
-    s4154 = s1693 * s4147 - s1694 * s4141 - s1695 * s4139 - s1696 * s4138 - s1697 * s4137
-    s4155 = s4154 - s1698 * s4136 - s1699 * s4135
-    s4156 = s4122 / pivot_front_left_swing_angle_dot - s1665 * s4149 - s1666 * s4141 - s1667 * s4139
-    s4157 = s4156 - s1668 * s4138 - s1669 * s4137 - s1670 * s4136 - s1671 * s4135
-    s4158 = s1651 * s4143 - s1650 * s4151 - s1652 * s4141 - s1653 * s4139 - s1654 * s4138
-    s4159 = s1630 * s4145 - s1629 * s4153 - s1631 * s4141 - s1632 * s4139 - s1633 * s4138
-    s4160 = s1615 * s4147 - s1614 * s4155 - s1616 * s4141 - s1617 * s4139 - s1618 * s4138
-    s4161 = s3466 / pivot_front_left_knee_angle_dot + s1599 * s4157 + s1600 * s4149 + s1601 * s4141
-    s4162 = s4161 + s1602 * s4139 + s1603 * s4138 + s1604 * s4137 + s1605 * s4136 + s1606 * s4135
-    s4163 = s1614 * s3534 - (s3298 + (s2801 * s3272 + s2802 * s3274 + s2803 * s3276))
-    s4164 = s1615 * s3534 - (s15 * s3300 + s18 * s3301 + s21 * s3302) - s1693 * s4163
-    s4165 = s1616 * s3534 - (s17 * s3309 + s20 * s3310 + s23 * s3311) - s1694 * s4163
-    s4166 = s1617 * s3534 - (s16 * s3309 + s19 * s3310 + s22 * s3311) - s1695 * s4163
-    s4167 = s1618 * s3534 - (s15 * s3309 + s18 * s3310 + s21 * s3311) - s1696 * s4163
-    s4168 = s4165 - s1744 * s4164
-    s4169 = s4166 - s1745 * s4164 - s1782 * s4168
-    s4170 = s4167 - s1746 * s4164 - s1783 * s4168 - s1792 * s4169
-    s4171 = s1619 * s3534 - s3291 - s1697 * s4163 - s1747 * s4164 - s1784 * s4168 - s1793 * s4169
-    s4172 = s1620 * s3534 - s3290 - s1698 * s4163 - s1748 * s4164 - s1785 * s4168 - s1794 * s4169
-    s4173 = s1621 * s3534 - s3289 - s1699 * s4163 - s1749 * s4164 - s1786 * s4168 - s1795 * s4169
-    s4174 = s4171 - s1799 * s4170
-    s4175 = s4172 - s1800 * s4170 + s1807 * s4174
-    s4176 = (s4173 - s1801 * s4170 + s1808 * s4174 + s1810 * s4175) / pivot_trunk_x_dot
-    s4177 = s4175 / pivot_trunk_y_dot + s1810 * s4176
-    s4178 = s4174 / pivot_trunk_z_dot + s1807 * s4177 + s1808 * s4176
-    s4179 = s4170 / pivot_trunk_wx - s1799 * s4178 - s1800 * s4177 - s1801 * s4176
-    s4180 = s4169 / pivot_trunk_wy - s1792 * s4179 - s1793 * s4178 - s1794 * s4177 - s1795 * s4176
-    s4181 = s4168 / pivot_trunk_wz - s1782 * s4180 - s1783 * s4179 - s1784 * s4178 - s1785 * s4177
-    s4182 = s4181 - s1786 * s4176
-    s4183 = s1771 * s4182 + s1772 * s4180 + s1773 * s4179 + s1774 * s4178 + s1775 * s4177
-    s4184 = s4183 + s1776 * s4176
-    s4185 = s1765 * s4182 + s1766 * s4180 + s1767 * s4179 + s1768 * s4178 + s1769 * s4177
-    s4186 = s4185 + s1770 * s4176
-    s4187 = s4164 / pivot_front_right_abduction_angle_dot - s1744 * s4182 - s1745 * s4180
-    s4188 = s4187 - s1746 * s4179 - s1747 * s4178 - s1748 * s4177 - s1749 * s4176
-    s4189 = s1738 * s4182 + s1739 * s4180 + s1740 * s4179 + s1741 * s4178 + s1742 * s4177
-    s4190 = s4189 + s1743 * s4176
-    s4191 = s1719 * s4184 - s1720 * s4182 - s1721 * s4180 - s1722 * s4179 - s1723 * s4178
-    s4192 = s4191 - s1724 * s4177 - s1725 * s4176
-    s4193 = s1706 * s4186 - s1707 * s4182 - s1708 * s4180 - s1709 * s4179 - s1710 * s4178
-    s4194 = s4193 - s1711 * s4177 - s1712 * s4176
-    s4195 = s4163 / pivot_front_right_swing_angle_dot - s1693 * s4188 - s1694 * s4182
-    s4196 = s4195 - s1695 * s4180 - s1696 * s4179 - s1697 * s4178 - s1698 * s4177 - s1699 * s4176
-    s4197 = s1665 * s4190 - s1666 * s4182 - s1667 * s4180 - s1668 * s4179 - s1669 * s4178
-    s4198 = s4197 - s1670 * s4177 - s1671 * s4176
-    s4199 = s1651 * s4184 - s1650 * s4192 - s1652 * s4182 - s1653 * s4180 - s1654 * s4179
-    s4200 = s1630 * s4186 - s1629 * s4194 - s1631 * s4182 - s1632 * s4180 - s1633 * s4179
-    s4201 = s3534 / pivot_front_right_knee_angle_dot + s1614 * s4196 + s1615 * s4188 + s1616 * s4182
-    s4202 = s4201 + s1617 * s4180 + s1618 * s4179 + s1619 * s4178 + s1620 * s4177 + s1621 * s4176
-    s4203 = s1600 * s4190 - s1599 * s4198 - s1601 * s4182 - s1602 * s4180 - s1603 * s4179
-    s4204 = s1629 * s3602 - (s3351 + (s2831 * s3325 + s2832 * s3327 + s2833 * s3329))
-    s4205 = s1630 * s3602 - (s15 * s3353 + s18 * s3354 + s21 * s3355) - s1706 * s4204
-    s4206 = s1631 * s3602 - (s17 * s3362 + s20 * s3363 + s23 * s3364) - s1707 * s4204
-    s4207 = s1632 * s3602 - (s16 * s3362 + s19 * s3363 + s22 * s3364) - s1708 * s4204
-    s4208 = s1633 * s3602 - (s15 * s3362 + s18 * s3363 + s21 * s3364) - s1709 * s4204
-    s4209 = s4206 - s1765 * s4205
-    s4210 = s4207 - s1766 * s4205 - s1782 * s4209
-    s4211 = s4208 - s1767 * s4205 - s1783 * s4209 - s1792 * s4210
-    s4212 = s1634 * s3602 - s3344 - s1710 * s4204 - s1768 * s4205 - s1784 * s4209 - s1793 * s4210
-    s4213 = s1635 * s3602 - s3343 - s1711 * s4204 - s1769 * s4205 - s1785 * s4209 - s1794 * s4210
-    s4214 = s1636 * s3602 - s3342 - s1712 * s4204 - s1770 * s4205 - s1786 * s4209 - s1795 * s4210
-    s4215 = s4212 - s1799 * s4211
-    s4216 = s4213 - s1800 * s4211 + s1807 * s4215
-    s4217 = (s4214 - s1801 * s4211 + s1808 * s4215 + s1810 * s4216) / pivot_trunk_x_dot
-    s4218 = s4216 / pivot_trunk_y_dot + s1810 * s4217
-    s4219 = s4215 / pivot_trunk_z_dot + s1807 * s4218 + s1808 * s4217
-    s4220 = s4211 / pivot_trunk_wx - s1799 * s4219 - s1800 * s4218 - s1801 * s4217
-    s4221 = s4210 / pivot_trunk_wy - s1792 * s4220 - s1793 * s4219 - s1794 * s4218 - s1795 * s4217
-    s4222 = s4209 / pivot_trunk_wz - s1782 * s4221 - s1783 * s4220 - s1784 * s4219 - s1785 * s4218
-    s4223 = s4222 - s1786 * s4217
-    s4224 = s1771 * s4223 + s1772 * s4221 + s1773 * s4220 + s1774 * s4219 + s1775 * s4218
-    s4225 = s4224 + s1776 * s4217
-    s4226 = s4205 / pivot_hind_left_abduction_angle_dot - s1765 * s4223 - s1766 * s4221
-    s4227 = s4226 - s1767 * s4220 - s1768 * s4219 - s1769 * s4218 - s1770 * s4217
-    s4228 = s1744 * s4223 + s1745 * s4221 + s1746 * s4220 + s1747 * s4219 + s1748 * s4218
-    s4229 = s4228 + s1749 * s4217
-    s4230 = s1738 * s4223 + s1739 * s4221 + s1740 * s4220 + s1741 * s4219 + s1742 * s4218
-    s4231 = s4230 + s1743 * s4217
-    s4232 = s1719 * s4225 - s1720 * s4223 - s1721 * s4221 - s1722 * s4220 - s1723 * s4219
-    s4233 = s4232 - s1724 * s4218 - s1725 * s4217
-    s4234 = s4204 / pivot_hind_left_swing_angle_dot - s1706 * s4227 - s1707 * s4223 - s1708 * s4221
-    s4235 = s4234 - s1709 * s4220 - s1710 * s4219 - s1711 * s4218 - s1712 * s4217
-    s4236 = s1693 * s4229 - s1694 * s4223 - s1695 * s4221 - s1696 * s4220 - s1697 * s4219
-    s4237 = s4236 - s1698 * s4218 - s1699 * s4217
-    s4238 = s1665 * s4231 - s1666 * s4223 - s1667 * s4221 - s1668 * s4220 - s1669 * s4219
-    s4239 = s4238 - s1670 * s4218 - s1671 * s4217
-    s4240 = s1651 * s4225 - s1650 * s4233 - s1652 * s4223 - s1653 * s4221 - s1654 * s4220
-    s4241 = s3602 / pivot_hind_left_knee_angle_dot + s1629 * s4235 + s1630 * s4227 + s1631 * s4223
-    s4242 = s4241 + s1632 * s4221 + s1633 * s4220 + s1634 * s4219 + s1635 * s4218 + s1636 * s4217
-    s4243 = s1615 * s4229 - s1614 * s4237 - s1616 * s4223 - s1617 * s4221 - s1618 * s4220
-    s4244 = s1600 * s4231 - s1599 * s4239 - s1601 * s4223 - s1602 * s4221 - s1603 * s4220
-    s4245 = s1650 * s3670 - (s3404 + (s2858 * s3378 + s2859 * s3380 + s2860 * s3382))
-    s4246 = s1651 * s3670 - (s15 * s3406 + s18 * s3407 + s21 * s3408) - s1719 * s4245
-    s4247 = s1652 * s3670 - (s17 * s3415 + s20 * s3416 + s23 * s3417) - s1720 * s4245
-    s4248 = s1653 * s3670 - (s16 * s3415 + s19 * s3416 + s22 * s3417) - s1721 * s4245
-    s4249 = s1654 * s3670 - (s15 * s3415 + s18 * s3416 + s21 * s3417) - s1722 * s4245
-    s4250 = s4247 - s1771 * s4246
-    s4251 = s4248 - s1772 * s4246 - s1782 * s4250
-    s4252 = s4249 - s1773 * s4246 - s1783 * s4250 - s1792 * s4251
-    s4253 = s1655 * s3670 - s3397 - s1723 * s4245 - s1774 * s4246 - s1784 * s4250 - s1793 * s4251
-    s4254 = s1656 * s3670 - s3396 - s1724 * s4245 - s1775 * s4246 - s1785 * s4250 - s1794 * s4251
-    s4255 = s1657 * s3670 - s3395 - s1725 * s4245 - s1776 * s4246 - s1786 * s4250 - s1795 * s4251
-    s4256 = s4253 - s1799 * s4252
-    s4257 = s4254 - s1800 * s4252 + s1807 * s4256
-    s4258 = (s4255 - s1801 * s4252 + s1808 * s4256 + s1810 * s4257) / pivot_trunk_x_dot
-    s4259 = s4257 / pivot_trunk_y_dot + s1810 * s4258
-    s4260 = s4256 / pivot_trunk_z_dot + s1807 * s4259 + s1808 * s4258
-    s4261 = s4252 / pivot_trunk_wx - s1799 * s4260 - s1800 * s4259 - s1801 * s4258
-    s4262 = s4251 / pivot_trunk_wy - s1792 * s4261 - s1793 * s4260 - s1794 * s4259 - s1795 * s4258
-    s4263 = s4250 / pivot_trunk_wz - s1782 * s4262 - s1783 * s4261 - s1784 * s4260 - s1785 * s4259
-    s4264 = s4263 - s1786 * s4258
-    s4265 = s4246 / pivot_hind_right_abduction_angle_dot - s1771 * s4264 - s1772 * s4262
-    s4266 = s4265 - s1773 * s4261 - s1774 * s4260 - s1775 * s4259 - s1776 * s4258
-    s4267 = s1765 * s4264 + s1766 * s4262 + s1767 * s4261 + s1768 * s4260 + s1769 * s4259
-    s4268 = s4267 + s1770 * s4258
-    s4269 = s1744 * s4264 + s1745 * s4262 + s1746 * s4261 + s1747 * s4260 + s1748 * s4259
-    s4270 = s4269 + s1749 * s4258
-    s4271 = s1738 * s4264 + s1739 * s4262 + s1740 * s4261 + s1741 * s4260 + s1742 * s4259
-    s4272 = s4271 + s1743 * s4258
-    s4273 = s4245 / pivot_hind_right_swing_angle_dot - s1719 * s4266 - s1720 * s4264 - s1721 * s4262
-    s4274 = s4273 - s1722 * s4261 - s1723 * s4260 - s1724 * s4259 - s1725 * s4258
-    s4275 = s1706 * s4268 - s1707 * s4264 - s1708 * s4262 - s1709 * s4261 - s1710 * s4260
-    s4276 = s4275 - s1711 * s4259 - s1712 * s4258
-    s4277 = s1693 * s4270 - s1694 * s4264 - s1695 * s4262 - s1696 * s4261 - s1697 * s4260
-    s4278 = s4277 - s1698 * s4259 - s1699 * s4258
-    s4279 = s1665 * s4272 - s1666 * s4264 - s1667 * s4262 - s1668 * s4261 - s1669 * s4260
-    s4280 = s4279 - s1670 * s4259 - s1671 * s4258
-    s4281 = s3670 / pivot_hind_right_knee_angle_dot + s1650 * s4274 + s1651 * s4266 + s1652 * s4264
-    s4282 = s4281 + s1653 * s4262 + s1654 * s4261 + s1655 * s4260 + s1656 * s4259 + s1657 * s4258
-    s4283 = s1630 * s4268 - s1629 * s4276 - s1631 * s4264 - s1632 * s4262 - s1633 * s4261
-    s4284 = s1615 * s4270 - s1614 * s4278 - s1616 * s4264 - s1617 * s4262 - s1618 * s4261
-    s4285 = s1600 * s4272 - s1599 * s4280 - s1601 * s4264 - s1602 * s4262 - s1603 * s4261
-    s4286 = s1599 * s3455 - (s927 * s3459 + s929 * s3460 + s931 * s3461)
-    s4287 = s1600 * s3455 - (s15 * s3469 + s18 * s3470 + s21 * s3471) - s1665 * s4286
-    s4288 = s1601 * s3455 - (s17 * s3480 + s20 * s3481 + s23 * s3482) - s1666 * s4286
-    s4289 = s1602 * s3455 - (s16 * s3480 + s19 * s3481 + s22 * s3482) - s1667 * s4286
-    s4290 = s1603 * s3455 - (s15 * s3480 + s18 * s3481 + s21 * s3482) - s1668 * s4286
-    s4291 = s4288 - s1738 * s4287
-    s4292 = s4289 - s1739 * s4287 - s1782 * s4291
-    s4293 = s4290 - s1740 * s4287 - s1783 * s4291 - s1792 * s4292
-    s4294 = s1604 * s3455 - s3447 - s1669 * s4286 - s1741 * s4287 - s1784 * s4291 - s1793 * s4292
-    s4295 = s1605 * s3455 - s3446 - s1670 * s4286 - s1742 * s4287 - s1785 * s4291 - s1794 * s4292
-    s4296 = s1606 * s3455 - s3445 - s1671 * s4286 - s1743 * s4287 - s1786 * s4291 - s1795 * s4292
-    s4297 = s4294 - s1799 * s4293
-    s4298 = s4295 - s1800 * s4293 + s1807 * s4297
-    s4299 = (s4296 - s1801 * s4293 + s1808 * s4297 + s1810 * s4298) / pivot_trunk_x_dot
-    s4300 = s4298 / pivot_trunk_y_dot + s1810 * s4299
-    s4301 = s4297 / pivot_trunk_z_dot + s1807 * s4300 + s1808 * s4299
-    s4302 = s4293 / pivot_trunk_wx - s1799 * s4301 - s1800 * s4300 - s1801 * s4299
-    s4303 = s4292 / pivot_trunk_wy - s1792 * s4302 - s1793 * s4301 - s1794 * s4300 - s1795 * s4299
-    s4304 = s4291 / pivot_trunk_wz - s1782 * s4303 - s1783 * s4302 - s1784 * s4301 - s1785 * s4300
-    s4305 = s4304 - s1786 * s4299
-    s4306 = s1771 * s4305 + s1772 * s4303 + s1773 * s4302 + s1774 * s4301 + s1775 * s4300
-    s4307 = s4306 + s1776 * s4299
-    s4308 = s1765 * s4305 + s1766 * s4303 + s1767 * s4302 + s1768 * s4301 + s1769 * s4300
-    s4309 = s4308 + s1770 * s4299
-    s4310 = s1744 * s4305 + s1745 * s4303 + s1746 * s4302 + s1747 * s4301 + s1748 * s4300
-    s4311 = s4310 + s1749 * s4299
-    s4312 = s4287 / pivot_front_left_abduction_angle_dot - s1738 * s4305 - s1739 * s4303
-    s4313 = s4312 - s1740 * s4302 - s1741 * s4301 - s1742 * s4300 - s1743 * s4299
-    s4314 = s1719 * s4307 - s1720 * s4305 - s1721 * s4303 - s1722 * s4302 - s1723 * s4301
-    s4315 = s4314 - s1724 * s4300 - s1725 * s4299
-    s4316 = s1706 * s4309 - s1707 * s4305 - s1708 * s4303 - s1709 * s4302 - s1710 * s4301
-    s4317 = s4316 - s1711 * s4300 - s1712 * s4299
-    s4318 = s1693 * s4311 - s1694 * s4305 - s1695 * s4303 - s1696 * s4302 - s1697 * s4301
-    s4319 = s4318 - s1698 * s4300 - s1699 * s4299
-    s4320 = s4286 / pivot_front_left_swing_angle_dot - s1665 * s4313 - s1666 * s4305 - s1667 * s4303
-    s4321 = s4320 - s1668 * s4302 - s1669 * s4301 - s1670 * s4300 - s1671 * s4299
-    s4322 = s1651 * s4307 - s1650 * s4315 - s1652 * s4305 - s1653 * s4303 - s1654 * s4302
-    s4323 = s1630 * s4309 - s1629 * s4317 - s1631 * s4305 - s1632 * s4303 - s1633 * s4302
-    s4324 = s1615 * s4311 - s1614 * s4319 - s1616 * s4305 - s1617 * s4303 - s1618 * s4302
-    s4325 = s3455 / pivot_front_left_knee_angle_dot + s1599 * s4321 + s1600 * s4313 + s1601 * s4305
-    s4326 = s4325 + s1602 * s4303 + s1603 * s4302 + s1604 * s4301 + s1605 * s4300 + s1606 * s4299
-    s4327 = s1614 * s3523 - (s933 * s3527 + s935 * s3528 + s937 * s3529)
-    s4328 = s1615 * s3523 - (s15 * s3537 + s18 * s3538 + s21 * s3539) - s1693 * s4327
-    s4329 = s1616 * s3523 - (s17 * s3548 + s20 * s3549 + s23 * s3550) - s1694 * s4327
-    s4330 = s1617 * s3523 - (s16 * s3548 + s19 * s3549 + s22 * s3550) - s1695 * s4327
-    s4331 = s1618 * s3523 - (s15 * s3548 + s18 * s3549 + s21 * s3550) - s1696 * s4327
-    s4332 = s4329 - s1744 * s4328
-    s4333 = s4330 - s1745 * s4328 - s1782 * s4332
-    s4334 = s4331 - s1746 * s4328 - s1783 * s4332 - s1792 * s4333
-    s4335 = s1619 * s3523 - s3515 - s1697 * s4327 - s1747 * s4328 - s1784 * s4332 - s1793 * s4333
-    s4336 = s1620 * s3523 - s3514 - s1698 * s4327 - s1748 * s4328 - s1785 * s4332 - s1794 * s4333
-    s4337 = s1621 * s3523 - s3513 - s1699 * s4327 - s1749 * s4328 - s1786 * s4332 - s1795 * s4333
-    s4338 = s4335 - s1799 * s4334
-    s4339 = s4336 - s1800 * s4334 + s1807 * s4338
-    s4340 = (s4337 - s1801 * s4334 + s1808 * s4338 + s1810 * s4339) / pivot_trunk_x_dot
-    s4341 = s4339 / pivot_trunk_y_dot + s1810 * s4340
-    s4342 = s4338 / pivot_trunk_z_dot + s1807 * s4341 + s1808 * s4340
-    s4343 = s4334 / pivot_trunk_wx - s1799 * s4342 - s1800 * s4341 - s1801 * s4340
-    s4344 = s4333 / pivot_trunk_wy - s1792 * s4343 - s1793 * s4342 - s1794 * s4341 - s1795 * s4340
-    s4345 = s4332 / pivot_trunk_wz - s1782 * s4344 - s1783 * s4343 - s1784 * s4342 - s1785 * s4341
-    s4346 = s4345 - s1786 * s4340
-    s4347 = s1771 * s4346 + s1772 * s4344 + s1773 * s4343 + s1774 * s4342 + s1775 * s4341
-    s4348 = s4347 + s1776 * s4340
-    s4349 = s1765 * s4346 + s1766 * s4344 + s1767 * s4343 + s1768 * s4342 + s1769 * s4341
-    s4350 = s4349 + s1770 * s4340
-    s4351 = s4328 / pivot_front_right_abduction_angle_dot - s1744 * s4346 - s1745 * s4344
-    s4352 = s4351 - s1746 * s4343 - s1747 * s4342 - s1748 * s4341 - s1749 * s4340
-    s4353 = s1738 * s4346 + s1739 * s4344 + s1740 * s4343 + s1741 * s4342 + s1742 * s4341
-    s4354 = s4353 + s1743 * s4340
-    s4355 = s1719 * s4348 - s1720 * s4346 - s1721 * s4344 - s1722 * s4343 - s1723 * s4342
-    s4356 = s4355 - s1724 * s4341 - s1725 * s4340
-    s4357 = s1706 * s4350 - s1707 * s4346 - s1708 * s4344 - s1709 * s4343 - s1710 * s4342
-    s4358 = s4357 - s1711 * s4341 - s1712 * s4340
-    s4359 = s4327 / pivot_front_right_swing_angle_dot - s1693 * s4352 - s1694 * s4346
-    s4360 = s4359 - s1695 * s4344 - s1696 * s4343 - s1697 * s4342 - s1698 * s4341 - s1699 * s4340
-    s4361 = s1665 * s4354 - s1666 * s4346 - s1667 * s4344 - s1668 * s4343 - s1669 * s4342
-    s4362 = s4361 - s1670 * s4341 - s1671 * s4340
-    s4363 = s1651 * s4348 - s1650 * s4356 - s1652 * s4346 - s1653 * s4344 - s1654 * s4343
-    s4364 = s1630 * s4350 - s1629 * s4358 - s1631 * s4346 - s1632 * s4344 - s1633 * s4343
-    s4365 = s3523 / pivot_front_right_knee_angle_dot + s1614 * s4360 + s1615 * s4352 + s1616 * s4346
-    s4366 = s4365 + s1617 * s4344 + s1618 * s4343 + s1619 * s4342 + s1620 * s4341 + s1621 * s4340
-    s4367 = s1600 * s4354 - s1599 * s4362 - s1601 * s4346 - s1602 * s4344 - s1603 * s4343
-    s4368 = s1629 * s3591 - (s939 * s3595 + s941 * s3596 + s943 * s3597)
-    s4369 = s1630 * s3591 - (s15 * s3605 + s18 * s3606 + s21 * s3607) - s1706 * s4368
-    s4370 = s1631 * s3591 - (s17 * s3616 + s20 * s3617 + s23 * s3618) - s1707 * s4368
-    s4371 = s1632 * s3591 - (s16 * s3616 + s19 * s3617 + s22 * s3618) - s1708 * s4368
-    s4372 = s1633 * s3591 - (s15 * s3616 + s18 * s3617 + s21 * s3618) - s1709 * s4368
-    s4373 = s4370 - s1765 * s4369
-    s4374 = s4371 - s1766 * s4369 - s1782 * s4373
-    s4375 = s4372 - s1767 * s4369 - s1783 * s4373 - s1792 * s4374
-    s4376 = s1634 * s3591 - s3583 - s1710 * s4368 - s1768 * s4369 - s1784 * s4373 - s1793 * s4374
-    s4377 = s1635 * s3591 - s3582 - s1711 * s4368 - s1769 * s4369 - s1785 * s4373 - s1794 * s4374
-    s4378 = s1636 * s3591 - s3581 - s1712 * s4368 - s1770 * s4369 - s1786 * s4373 - s1795 * s4374
-    s4379 = s4376 - s1799 * s4375
-    s4380 = s4377 - s1800 * s4375 + s1807 * s4379
-    s4381 = (s4378 - s1801 * s4375 + s1808 * s4379 + s1810 * s4380) / pivot_trunk_x_dot
-    s4382 = s4380 / pivot_trunk_y_dot + s1810 * s4381
-    s4383 = s4379 / pivot_trunk_z_dot + s1807 * s4382 + s1808 * s4381
-    s4384 = s4375 / pivot_trunk_wx - s1799 * s4383 - s1800 * s4382 - s1801 * s4381
-    s4385 = s4374 / pivot_trunk_wy - s1792 * s4384 - s1793 * s4383 - s1794 * s4382 - s1795 * s4381
-    s4386 = s4373 / pivot_trunk_wz - s1782 * s4385 - s1783 * s4384 - s1784 * s4383 - s1785 * s4382
-    s4387 = s4386 - s1786 * s4381
-    s4388 = s1771 * s4387 + s1772 * s4385 + s1773 * s4384 + s1774 * s4383 + s1775 * s4382
-    s4389 = s4388 + s1776 * s4381
-    s4390 = s4369 / pivot_hind_left_abduction_angle_dot - s1765 * s4387 - s1766 * s4385
-    s4391 = s4390 - s1767 * s4384 - s1768 * s4383 - s1769 * s4382 - s1770 * s4381
-    s4392 = s1744 * s4387 + s1745 * s4385 + s1746 * s4384 + s1747 * s4383 + s1748 * s4382
-    s4393 = s4392 + s1749 * s4381
-    s4394 = s1738 * s4387 + s1739 * s4385 + s1740 * s4384 + s1741 * s4383 + s1742 * s4382
-    s4395 = s4394 + s1743 * s4381
-    s4396 = s1719 * s4389 - s1720 * s4387 - s1721 * s4385 - s1722 * s4384 - s1723 * s4383
-    s4397 = s4396 - s1724 * s4382 - s1725 * s4381
-    s4398 = s4368 / pivot_hind_left_swing_angle_dot - s1706 * s4391 - s1707 * s4387 - s1708 * s4385
-    s4399 = s4398 - s1709 * s4384 - s1710 * s4383 - s1711 * s4382 - s1712 * s4381
-    s4400 = s1693 * s4393 - s1694 * s4387 - s1695 * s4385 - s1696 * s4384 - s1697 * s4383
-    s4401 = s4400 - s1698 * s4382 - s1699 * s4381
-    s4402 = s1665 * s4395 - s1666 * s4387 - s1667 * s4385 - s1668 * s4384 - s1669 * s4383
-    s4403 = s4402 - s1670 * s4382 - s1671 * s4381
-    s4404 = s1651 * s4389 - s1650 * s4397 - s1652 * s4387 - s1653 * s4385 - s1654 * s4384
-    s4405 = s3591 / pivot_hind_left_knee_angle_dot + s1629 * s4399 + s1630 * s4391 + s1631 * s4387
-    s4406 = s4405 + s1632 * s4385 + s1633 * s4384 + s1634 * s4383 + s1635 * s4382 + s1636 * s4381
-    s4407 = s1615 * s4393 - s1614 * s4401 - s1616 * s4387 - s1617 * s4385 - s1618 * s4384
-    s4408 = s1600 * s4395 - s1599 * s4403 - s1601 * s4387 - s1602 * s4385 - s1603 * s4384
-    s4409 = s1650 * s3659 - (s945 * s3663 + s947 * s3664 + s949 * s3665)
-    s4410 = s1651 * s3659 - (s15 * s3673 + s18 * s3674 + s21 * s3675) - s1719 * s4409
-    s4411 = s1652 * s3659 - (s17 * s3684 + s20 * s3685 + s23 * s3686) - s1720 * s4409
-    s4412 = s1653 * s3659 - (s16 * s3684 + s19 * s3685 + s22 * s3686) - s1721 * s4409
-    s4413 = s1654 * s3659 - (s15 * s3684 + s18 * s3685 + s21 * s3686) - s1722 * s4409
-    s4414 = s4411 - s1771 * s4410
-    s4415 = s4412 - s1772 * s4410 - s1782 * s4414
-    s4416 = s4413 - s1773 * s4410 - s1783 * s4414 - s1792 * s4415
-    s4417 = s1655 * s3659 - s3651 - s1723 * s4409 - s1774 * s4410 - s1784 * s4414 - s1793 * s4415
-    s4418 = s1656 * s3659 - s3650 - s1724 * s4409 - s1775 * s4410 - s1785 * s4414 - s1794 * s4415
-    s4419 = s1657 * s3659 - s3649 - s1725 * s4409 - s1776 * s4410 - s1786 * s4414 - s1795 * s4415
-    s4420 = s4417 - s1799 * s4416
-    s4421 = s4418 - s1800 * s4416 + s1807 * s4420
-    s4422 = (s4419 - s1801 * s4416 + s1808 * s4420 + s1810 * s4421) / pivot_trunk_x_dot
-    s4423 = s4421 / pivot_trunk_y_dot + s1810 * s4422
-    s4424 = s4420 / pivot_trunk_z_dot + s1807 * s4423 + s1808 * s4422
-    s4425 = s4416 / pivot_trunk_wx - s1799 * s4424 - s1800 * s4423 - s1801 * s4422
-    s4426 = s4415 / pivot_trunk_wy - s1792 * s4425 - s1793 * s4424 - s1794 * s4423 - s1795 * s4422
-    s4427 = s4414 / pivot_trunk_wz - s1782 * s4426 - s1783 * s4425 - s1784 * s4424 - s1785 * s4423
-    s4428 = s4427 - s1786 * s4422
-    s4429 = s4410 / pivot_hind_right_abduction_angle_dot - s1771 * s4428 - s1772 * s4426
-    s4430 = s4429 - s1773 * s4425 - s1774 * s4424 - s1775 * s4423 - s1776 * s4422
-    s4431 = s1765 * s4428 + s1766 * s4426 + s1767 * s4425 + s1768 * s4424 + s1769 * s4423
-    s4432 = s4431 + s1770 * s4422
-    s4433 = s1744 * s4428 + s1745 * s4426 + s1746 * s4425 + s1747 * s4424 + s1748 * s4423
-    s4434 = s4433 + s1749 * s4422
-    s4435 = s1738 * s4428 + s1739 * s4426 + s1740 * s4425 + s1741 * s4424 + s1742 * s4423
-    s4436 = s4435 + s1743 * s4422
-    s4437 = s4409 / pivot_hind_right_swing_angle_dot - s1719 * s4430 - s1720 * s4428 - s1721 * s4426
-    s4438 = s4437 - s1722 * s4425 - s1723 * s4424 - s1724 * s4423 - s1725 * s4422
-    s4439 = s1706 * s4432 - s1707 * s4428 - s1708 * s4426 - s1709 * s4425 - s1710 * s4424
-    s4440 = s4439 - s1711 * s4423 - s1712 * s4422
-    s4441 = s1693 * s4434 - s1694 * s4428 - s1695 * s4426 - s1696 * s4425 - s1697 * s4424
-    s4442 = s4441 - s1698 * s4423 - s1699 * s4422
-    s4443 = s1665 * s4436 - s1666 * s4428 - s1667 * s4426 - s1668 * s4425 - s1669 * s4424
-    s4444 = s4443 - s1670 * s4423 - s1671 * s4422
-    s4445 = s3659 / pivot_hind_right_knee_angle_dot + s1650 * s4438 + s1651 * s4430 + s1652 * s4428
-    s4446 = s4445 + s1653 * s4426 + s1654 * s4425 + s1655 * s4424 + s1656 * s4423 + s1657 * s4422
-    s4447 = s1630 * s4432 - s1629 * s4440 - s1631 * s4428 - s1632 * s4426 - s1633 * s4425
-    s4448 = s1615 * s4434 - s1614 * s4442 - s1616 * s4428 - s1617 * s4426 - s1618 * s4425
-    s4449 = s1600 * s4436 - s1599 * s4444 - s1601 * s4428 - s1602 * s4426 - s1603 * s4425
-    s4450 = s1599 * s3488 - (s3255 + s3263)
-    s4451 = s1614 * s3556 - (s3308 + s3316)
-    s4452 = s1601 * s3488 - (s3051 + (s15 * s3041 + s18 * s3042 + s21 * s3043)) + s1616 * s3556
-    s4453 = s1602 * s3488 - (s3033 + (s15 * s3023 + s18 * s3024 + s21 * s3025)) + s1617 * s3556
-    s4454 = s1603 * s3488 - (s3015 + (s15 * s3005 + s18 * s3006 + s21 * s3007)) + s1618 * s3556
-    s4455 = s1629 * s3624 - (s3361 + s3369)
-    s4456 = s1650 * s3692 - (s3414 + s3422)
-    s4457 = s1600 * s3488 - (s3085 + s3093) - s1665 * s4450
-    s4458 = s1604 * s3488 - s3013 + s1619 * s3556 + s1634 * s3624 + s1655 * s3692 - s1669 * s4450
-    s4459 = s1605 * s3488 - s3012 + s1620 * s3556 + s1635 * s3624 + s1656 * s3692 - s1670 * s4450
-    s4460 = s1606 * s3488 - s3011 + s1621 * s3556 + s1636 * s3624 + s1657 * s3692 - s1671 * s4450
-    s4461 = s1615 * s3556 - (s3124 + s3132) - s1693 * s4451
-    s4462 = s1630 * s3624 - (s3163 + s3171) - s1706 * s4455
-    s4463 = s4452 + s1631 * s3624 + s1652 * s3692 - s1666 * s4450 - s1694 * s4451 - s1707 * s4455
-    s4464 = s4453 + s1632 * s3624 + s1653 * s3692 - s1667 * s4450 - s1695 * s4451 - s1708 * s4455
-    s4465 = s4454 + s1633 * s3624 + s1654 * s3692 - s1668 * s4450 - s1696 * s4451 - s1709 * s4455
-    s4466 = s1651 * s3692 - (s3202 + s3210) - s1719 * s4456
-    s4467 = s4458 - s1697 * s4451 - s1710 * s4455 - s1723 * s4456 - s1741 * s4457 - s1747 * s4461
-    s4468 = s4459 - s1698 * s4451 - s1711 * s4455 - s1724 * s4456 - s1742 * s4457 - s1748 * s4461
-    s4469 = s4460 - s1699 * s4451 - s1712 * s4455 - s1725 * s4456 - s1743 * s4457 - s1749 * s4461
-    s4470 = s4463 - s1720 * s4456 - s1738 * s4457 - s1744 * s4461 - s1765 * s4462 - s1771 * s4466
-    s4471 = s4464 - s1721 * s4456 - s1739 * s4457 - s1745 * s4461 - s1766 * s4462 - s1772 * s4466
-    s4472 = s4465 - s1722 * s4456 - s1740 * s4457 - s1746 * s4461 - s1767 * s4462 - s1773 * s4466
-    s4473 = s4471 - s1782 * s4470
-    s4474 = s4472 - s1783 * s4470 - s1792 * s4473
-    s4475 = s4467 - s1768 * s4462 - s1774 * s4466 - s1784 * s4470 - s1793 * s4473 - s1799 * s4474
-    s4476 = s4468 - s1769 * s4462 - s1775 * s4466 - s1785 * s4470 - s1794 * s4473 - s1800 * s4474
-    s4477 = s4469 - s1770 * s4462 - s1776 * s4466 - s1786 * s4470 - s1795 * s4473 - s1801 * s4474
-    s4478 = s4476 + s1807 * s4475
-    s4479 = (s4477 + s1808 * s4475 + s1810 * s4478) / pivot_trunk_x_dot
-    s4480 = s4478 / pivot_trunk_y_dot + s1810 * s4479
-    s4481 = s4475 / pivot_trunk_z_dot + s1807 * s4480 + s1808 * s4479
-    s4482 = s4474 / pivot_trunk_wx - s1799 * s4481 - s1800 * s4480 - s1801 * s4479
-    s4483 = s4473 / pivot_trunk_wy - s1792 * s4482 - s1793 * s4481 - s1794 * s4480 - s1795 * s4479
-    s4484 = s4470 / pivot_trunk_wz - s1782 * s4483 - s1783 * s4482 - s1784 * s4481 - s1785 * s4480
-    s4485 = s4484 - s1786 * s4479
-    s4486 = s4466 / pivot_hind_right_abduction_angle_dot - s1771 * s4485 - s1772 * s4483
-    s4487 = s4486 - s1773 * s4482 - s1774 * s4481 - s1775 * s4480 - s1776 * s4479
-    s4488 = s4462 / pivot_hind_left_abduction_angle_dot - s1765 * s4485 - s1766 * s4483
-    s4489 = s4488 - s1767 * s4482 - s1768 * s4481 - s1769 * s4480 - s1770 * s4479
-    s4490 = s4461 / pivot_front_right_abduction_angle_dot - s1744 * s4485 - s1745 * s4483
-    s4491 = s4490 - s1746 * s4482 - s1747 * s4481 - s1748 * s4480 - s1749 * s4479
-    s4492 = s4457 / pivot_front_left_abduction_angle_dot - s1738 * s4485 - s1739 * s4483
-    s4493 = s4492 - s1740 * s4482 - s1741 * s4481 - s1742 * s4480 - s1743 * s4479
-    s4494 = s4456 / pivot_hind_right_swing_angle_dot - s1719 * s4487 - s1720 * s4485 - s1721 * s4483
-    s4495 = s4494 - s1722 * s4482 - s1723 * s4481 - s1724 * s4480 - s1725 * s4479
-    s4496 = s4455 / pivot_hind_left_swing_angle_dot - s1706 * s4489 - s1707 * s4485 - s1708 * s4483
-    s4497 = s4496 - s1709 * s4482 - s1710 * s4481 - s1711 * s4480 - s1712 * s4479
-    s4498 = s4451 / pivot_front_right_swing_angle_dot - s1693 * s4491 - s1694 * s4485
-    s4499 = s4498 - s1695 * s4483 - s1696 * s4482 - s1697 * s4481 - s1698 * s4480 - s1699 * s4479
-    s4500 = s4450 / pivot_front_left_swing_angle_dot - s1665 * s4493 - s1666 * s4485 - s1667 * s4483
-    s4501 = s4500 - s1668 * s4482 - s1669 * s4481 - s1670 * s4480 - s1671 * s4479
-    s4502 = s3692 / pivot_hind_right_knee_angle_dot + s1650 * s4495 + s1651 * s4487 + s1652 * s4485
-    s4503 = s4502 + s1653 * s4483 + s1654 * s4482 + s1655 * s4481 + s1656 * s4480 + s1657 * s4479
-    s4504 = s3624 / pivot_hind_left_knee_angle_dot + s1629 * s4497 + s1630 * s4489 + s1631 * s4485
-    s4505 = s4504 + s1632 * s4483 + s1633 * s4482 + s1634 * s4481 + s1635 * s4480 + s1636 * s4479
-    s4506 = s3556 / pivot_front_right_knee_angle_dot + s1614 * s4499 + s1615 * s4491 + s1616 * s4485
-    s4507 = s4506 + s1617 * s4483 + s1618 * s4482 + s1619 * s4481 + s1620 * s4480 + s1621 * s4479
-    s4508 = s3488 / pivot_front_left_knee_angle_dot + s1599 * s4501 + s1600 * s4493 + s1601 * s4485
-    s4509 = s4508 + s1602 * s4483 + s1603 * s4482 + s1604 * s4481 + s1605 * s4480 + s1606 * s4479
-    s4510 = s1599 * s3491 - (s3265 + (s16 * s3219 + s19 * s3221 + s22 * s3223))
-    s4511 = s1614 * s3559 - (s3318 + (s16 * s3272 + s19 * s3274 + s22 * s3276))
-    s4512 = s1601 * s3491 - (s3053 + (s16 * s3041 + s19 * s3042 + s22 * s3043)) + s1616 * s3559
-    s4513 = s1602 * s3491 - (s3035 + (s16 * s3023 + s19 * s3024 + s22 * s3025)) + s1617 * s3559
-    s4514 = s1603 * s3491 - (s3017 + (s16 * s3005 + s19 * s3006 + s22 * s3007)) + s1618 * s3559
-    s4515 = s1629 * s3627 - (s3371 + (s16 * s3325 + s19 * s3327 + s22 * s3329))
-    s4516 = s1650 * s3695 - (s3424 + (s16 * s3378 + s19 * s3380 + s22 * s3382))
-    s4517 = s1600 * s3491 - (s3095 + (s16 * s3057 + s19 * s3059 + s22 * s3061)) - s1665 * s4510
-    s4518 = s1604 * s3491 - s3031 + s1619 * s3559 + s1634 * s3627 + s1655 * s3695 - s1669 * s4510
-    s4519 = s1605 * s3491 - s3030 + s1620 * s3559 + s1635 * s3627 + s1656 * s3695 - s1670 * s4510
-    s4520 = s1606 * s3491 - s3029 + s1621 * s3559 + s1636 * s3627 + s1657 * s3695 - s1671 * s4510
-    s4521 = s1615 * s3559 - (s3134 + (s16 * s3099 + s19 * s3101 + s22 * s3103)) - s1693 * s4511
-    s4522 = s1630 * s3627 - (s3173 + (s16 * s3138 + s19 * s3140 + s22 * s3142)) - s1706 * s4515
-    s4523 = s4512 + s1631 * s3627 + s1652 * s3695 - s1666 * s4510 - s1694 * s4511 - s1707 * s4515
-    s4524 = s4513 + s1632 * s3627 + s1653 * s3695 - s1667 * s4510 - s1695 * s4511 - s1708 * s4515
-    s4525 = s4514 + s1633 * s3627 + s1654 * s3695 - s1668 * s4510 - s1696 * s4511 - s1709 * s4515
-    s4526 = s1651 * s3695 - (s3212 + (s16 * s3177 + s19 * s3179 + s22 * s3181)) - s1719 * s4516
-    s4527 = s4518 - s1697 * s4511 - s1710 * s4515 - s1723 * s4516 - s1741 * s4517 - s1747 * s4521
-    s4528 = s4519 - s1698 * s4511 - s1711 * s4515 - s1724 * s4516 - s1742 * s4517 - s1748 * s4521
-    s4529 = s4520 - s1699 * s4511 - s1712 * s4515 - s1725 * s4516 - s1743 * s4517 - s1749 * s4521
-    s4530 = s4523 - s1720 * s4516 - s1738 * s4517 - s1744 * s4521 - s1765 * s4522 - s1771 * s4526
-    s4531 = s4524 - s1721 * s4516 - s1739 * s4517 - s1745 * s4521 - s1766 * s4522 - s1772 * s4526
-    s4532 = s4525 - s1722 * s4516 - s1740 * s4517 - s1746 * s4521 - s1767 * s4522 - s1773 * s4526
-    s4533 = s4531 - s1782 * s4530
-    s4534 = s4532 - s1783 * s4530 - s1792 * s4533
-    s4535 = s4527 - s1768 * s4522 - s1774 * s4526 - s1784 * s4530 - s1793 * s4533 - s1799 * s4534
-    s4536 = s4528 - s1769 * s4522 - s1775 * s4526 - s1785 * s4530 - s1794 * s4533 - s1800 * s4534
-    s4537 = s4529 - s1770 * s4522 - s1776 * s4526 - s1786 * s4530 - s1795 * s4533 - s1801 * s4534
-    s4538 = s4536 + s1807 * s4535
-    s4539 = (s4537 + s1808 * s4535 + s1810 * s4538) / pivot_trunk_x_dot
-    s4540 = s4538 / pivot_trunk_y_dot + s1810 * s4539
-    s4541 = s4535 / pivot_trunk_z_dot + s1807 * s4540 + s1808 * s4539
-    s4542 = s4534 / pivot_trunk_wx - s1799 * s4541 - s1800 * s4540 - s1801 * s4539
-    s4543 = s4533 / pivot_trunk_wy - s1792 * s4542 - s1793 * s4541 - s1794 * s4540 - s1795 * s4539
-    s4544 = s4530 / pivot_trunk_wz - s1782 * s4543 - s1783 * s4542 - s1784 * s4541 - s1785 * s4540
-    s4545 = s4544 - s1786 * s4539
-    s4546 = s4526 / pivot_hind_right_abduction_angle_dot - s1771 * s4545 - s1772 * s4543
-    s4547 = s4546 - s1773 * s4542 - s1774 * s4541 - s1775 * s4540 - s1776 * s4539
-    s4548 = s4522 / pivot_hind_left_abduction_angle_dot - s1765 * s4545 - s1766 * s4543
-    s4549 = s4548 - s1767 * s4542 - s1768 * s4541 - s1769 * s4540 - s1770 * s4539
-    s4550 = s4521 / pivot_front_right_abduction_angle_dot - s1744 * s4545 - s1745 * s4543
-    s4551 = s4550 - s1746 * s4542 - s1747 * s4541 - s1748 * s4540 - s1749 * s4539
-    s4552 = s4517 / pivot_front_left_abduction_angle_dot - s1738 * s4545 - s1739 * s4543
-    s4553 = s4552 - s1740 * s4542 - s1741 * s4541 - s1742 * s4540 - s1743 * s4539
-    s4554 = s4516 / pivot_hind_right_swing_angle_dot - s1719 * s4547 - s1720 * s4545 - s1721 * s4543
-    s4555 = s4554 - s1722 * s4542 - s1723 * s4541 - s1724 * s4540 - s1725 * s4539
-    s4556 = s4515 / pivot_hind_left_swing_angle_dot - s1706 * s4549 - s1707 * s4545 - s1708 * s4543
-    s4557 = s4556 - s1709 * s4542 - s1710 * s4541 - s1711 * s4540 - s1712 * s4539
-    s4558 = s4511 / pivot_front_right_swing_angle_dot - s1693 * s4551 - s1694 * s4545
-    s4559 = s4558 - s1695 * s4543 - s1696 * s4542 - s1697 * s4541 - s1698 * s4540 - s1699 * s4539
-    s4560 = s4510 / pivot_front_left_swing_angle_dot - s1665 * s4553 - s1666 * s4545 - s1667 * s4543
-    s4561 = s4560 - s1668 * s4542 - s1669 * s4541 - s1670 * s4540 - s1671 * s4539
-    s4562 = s3695 / pivot_hind_right_knee_angle_dot + s1650 * s4555 + s1651 * s4547 + s1652 * s4545
-    s4563 = s4562 + s1653 * s4543 + s1654 * s4542 + s1655 * s4541 + s1656 * s4540 + s1657 * s4539
-    s4564 = s3627 / pivot_hind_left_knee_angle_dot + s1629 * s4557 + s1630 * s4549 + s1631 * s4545
-    s4565 = s4564 + s1632 * s4543 + s1633 * s4542 + s1634 * s4541 + s1635 * s4540 + s1636 * s4539
-    s4566 = s3559 / pivot_front_right_knee_angle_dot + s1614 * s4559 + s1615 * s4551 + s1616 * s4545
-    s4567 = s4566 + s1617 * s4543 + s1618 * s4542 + s1619 * s4541 + s1620 * s4540 + s1621 * s4539
-    s4568 = s3491 / pivot_front_left_knee_angle_dot + s1599 * s4561 + s1600 * s4553 + s1601 * s4545
-    s4569 = s4568 + s1602 * s4543 + s1603 * s4542 + s1604 * s4541 + s1605 * s4540 + s1606 * s4539
-    s4570 = s1599 * s3494 - (s3267 + (s17 * s3219 + s20 * s3221 + s23 * s3223))
-    s4571 = s1614 * s3562 - (s3320 + (s17 * s3272 + s20 * s3274 + s23 * s3276))
-    s4572 = s1601 * s3494 - (s3055 + (s17 * s3041 + s20 * s3042 + s23 * s3043)) + s1616 * s3562
-    s4573 = s1602 * s3494 - (s3037 + (s17 * s3023 + s20 * s3024 + s23 * s3025)) + s1617 * s3562
-    s4574 = s1603 * s3494 - (s3019 + (s17 * s3005 + s20 * s3006 + s23 * s3007)) + s1618 * s3562
-    s4575 = s1629 * s3630 - (s3373 + (s17 * s3325 + s20 * s3327 + s23 * s3329))
-    s4576 = s1650 * s3698 - (s3426 + (s17 * s3378 + s20 * s3380 + s23 * s3382))
-    s4577 = s1600 * s3494 - (s3097 + (s17 * s3057 + s20 * s3059 + s23 * s3061)) - s1665 * s4570
-    s4578 = s1604 * s3494 - s3049 + s1619 * s3562 + s1634 * s3630 + s1655 * s3698 - s1669 * s4570
-    s4579 = s1605 * s3494 - s3048 + s1620 * s3562 + s1635 * s3630 + s1656 * s3698 - s1670 * s4570
-    s4580 = s1606 * s3494 - s3047 + s1621 * s3562 + s1636 * s3630 + s1657 * s3698 - s1671 * s4570
-    s4581 = s1615 * s3562 - (s3136 + (s17 * s3099 + s20 * s3101 + s23 * s3103)) - s1693 * s4571
-    s4582 = s1630 * s3630 - (s3175 + (s17 * s3138 + s20 * s3140 + s23 * s3142)) - s1706 * s4575
-    s4583 = s4572 + s1631 * s3630 + s1652 * s3698 - s1666 * s4570 - s1694 * s4571 - s1707 * s4575
-    s4584 = s4573 + s1632 * s3630 + s1653 * s3698 - s1667 * s4570 - s1695 * s4571 - s1708 * s4575
-    s4585 = s4574 + s1633 * s3630 + s1654 * s3698 - s1668 * s4570 - s1696 * s4571 - s1709 * s4575
-    s4586 = s1651 * s3698 - (s3214 + (s17 * s3177 + s20 * s3179 + s23 * s3181)) - s1719 * s4576
-    s4587 = s4578 - s1697 * s4571 - s1710 * s4575 - s1723 * s4576 - s1741 * s4577 - s1747 * s4581
-    s4588 = s4579 - s1698 * s4571 - s1711 * s4575 - s1724 * s4576 - s1742 * s4577 - s1748 * s4581
-    s4589 = s4580 - s1699 * s4571 - s1712 * s4575 - s1725 * s4576 - s1743 * s4577 - s1749 * s4581
-    s4590 = s4583 - s1720 * s4576 - s1738 * s4577 - s1744 * s4581 - s1765 * s4582 - s1771 * s4586
-    s4591 = s4584 - s1721 * s4576 - s1739 * s4577 - s1745 * s4581 - s1766 * s4582 - s1772 * s4586
-    s4592 = s4585 - s1722 * s4576 - s1740 * s4577 - s1746 * s4581 - s1767 * s4582 - s1773 * s4586
-    s4593 = s4591 - s1782 * s4590
-    s4594 = s4592 - s1783 * s4590 - s1792 * s4593
-    s4595 = s4587 - s1768 * s4582 - s1774 * s4586 - s1784 * s4590 - s1793 * s4593 - s1799 * s4594
-    s4596 = s4588 - s1769 * s4582 - s1775 * s4586 - s1785 * s4590 - s1794 * s4593 - s1800 * s4594
-    s4597 = s4589 - s1770 * s4582 - s1776 * s4586 - s1786 * s4590 - s1795 * s4593 - s1801 * s4594
-    s4598 = s4596 + s1807 * s4595
-    s4599 = (s4597 + s1808 * s4595 + s1810 * s4598) / pivot_trunk_x_dot
-    s4600 = s4598 / pivot_trunk_y_dot + s1810 * s4599
-    s4601 = s4595 / pivot_trunk_z_dot + s1807 * s4600 + s1808 * s4599
-    s4602 = s4594 / pivot_trunk_wx - s1799 * s4601 - s1800 * s4600 - s1801 * s4599
-    s4603 = s4593 / pivot_trunk_wy - s1792 * s4602 - s1793 * s4601 - s1794 * s4600 - s1795 * s4599
-    s4604 = s4590 / pivot_trunk_wz - s1782 * s4603 - s1783 * s4602 - s1784 * s4601 - s1785 * s4600
-    s4605 = s4604 - s1786 * s4599
-    s4606 = s4586 / pivot_hind_right_abduction_angle_dot - s1771 * s4605 - s1772 * s4603
-    s4607 = s4606 - s1773 * s4602 - s1774 * s4601 - s1775 * s4600 - s1776 * s4599
-    s4608 = s4582 / pivot_hind_left_abduction_angle_dot - s1765 * s4605 - s1766 * s4603
-    s4609 = s4608 - s1767 * s4602 - s1768 * s4601 - s1769 * s4600 - s1770 * s4599
-    s4610 = s4581 / pivot_front_right_abduction_angle_dot - s1744 * s4605 - s1745 * s4603
-    s4611 = s4610 - s1746 * s4602 - s1747 * s4601 - s1748 * s4600 - s1749 * s4599
-    s4612 = s4577 / pivot_front_left_abduction_angle_dot - s1738 * s4605 - s1739 * s4603
-    s4613 = s4612 - s1740 * s4602 - s1741 * s4601 - s1742 * s4600 - s1743 * s4599
-    s4614 = s4576 / pivot_hind_right_swing_angle_dot - s1719 * s4607 - s1720 * s4605 - s1721 * s4603
-    s4615 = s4614 - s1722 * s4602 - s1723 * s4601 - s1724 * s4600 - s1725 * s4599
-    s4616 = s4575 / pivot_hind_left_swing_angle_dot - s1706 * s4609 - s1707 * s4605 - s1708 * s4603
-    s4617 = s4616 - s1709 * s4602 - s1710 * s4601 - s1711 * s4600 - s1712 * s4599
-    s4618 = s4571 / pivot_front_right_swing_angle_dot - s1693 * s4611 - s1694 * s4605
-    s4619 = s4618 - s1695 * s4603 - s1696 * s4602 - s1697 * s4601 - s1698 * s4600 - s1699 * s4599
-    s4620 = s4570 / pivot_front_left_swing_angle_dot - s1665 * s4613 - s1666 * s4605 - s1667 * s4603
-    s4621 = s4620 - s1668 * s4602 - s1669 * s4601 - s1670 * s4600 - s1671 * s4599
-    s4622 = s3698 / pivot_hind_right_knee_angle_dot + s1650 * s4615 + s1651 * s4607 + s1652 * s4605
-    s4623 = s4622 + s1653 * s4603 + s1654 * s4602 + s1655 * s4601 + s1656 * s4600 + s1657 * s4599
-    s4624 = s3630 / pivot_hind_left_knee_angle_dot + s1629 * s4617 + s1630 * s4609 + s1631 * s4605
-    s4625 = s4624 + s1632 * s4603 + s1633 * s4602 + s1634 * s4601 + s1635 * s4600 + s1636 * s4599
-    s4626 = s3562 / pivot_front_right_knee_angle_dot + s1614 * s4619 + s1615 * s4611 + s1616 * s4605
-    s4627 = s4626 + s1617 * s4603 + s1618 * s4602 + s1619 * s4601 + s1620 * s4600 + s1621 * s4599
-    s4628 = s3494 / pivot_front_left_knee_angle_dot + s1599 * s4621 + s1600 * s4613 + s1601 * s4605
-    s4629 = s4628 + s1602 * s4603 + s1603 * s4602 + s1604 * s4601 + s1605 * s4600 + s1606 * s4599
-    s4630 = s1599 * s3479 - (s3254 + s3255)
-    s4631 = s1600 * s3479 - (s3084 + s3085) - s1665 * s4630
-    s4632 = s1601 * s3479 - (s17 * s3089 + s20 * s3090 + s23 * s3091) - s1666 * s4630
-    s4633 = s1602 * s3479 - (s16 * s3089 + s19 * s3090 + s22 * s3091) - s1667 * s4630
-    s4634 = s1603 * s3479 - (s15 * s3089 + s18 * s3090 + s21 * s3091) - s1668 * s4630
-    s4635 = s4632 - s1738 * s4631
-    s4636 = s4633 - s1739 * s4631 - s1782 * s4635
-    s4637 = s4634 - s1740 * s4631 - s1783 * s4635 - s1792 * s4636
-    s4638 = s1604 * s3479 - s3082 - s1669 * s4630 - s1741 * s4631 - s1784 * s4635 - s1793 * s4636
-    s4639 = s1605 * s3479 - s3081 - s1670 * s4630 - s1742 * s4631 - s1785 * s4635 - s1794 * s4636
-    s4640 = s1606 * s3479 - s3080 - s1671 * s4630 - s1743 * s4631 - s1786 * s4635 - s1795 * s4636
-    s4641 = s4638 - s1799 * s4637
-    s4642 = s4639 - s1800 * s4637 + s1807 * s4641
-    s4643 = (s4640 - s1801 * s4637 + s1808 * s4641 + s1810 * s4642) / pivot_trunk_x_dot
-    s4644 = s4642 / pivot_trunk_y_dot + s1810 * s4643
-    s4645 = s4641 / pivot_trunk_z_dot + s1807 * s4644 + s1808 * s4643
-    s4646 = s4637 / pivot_trunk_wx - s1799 * s4645 - s1800 * s4644 - s1801 * s4643
-    s4647 = s4636 / pivot_trunk_wy - s1792 * s4646 - s1793 * s4645 - s1794 * s4644 - s1795 * s4643
-    s4648 = s4635 / pivot_trunk_wz - s1782 * s4647 - s1783 * s4646 - s1784 * s4645 - s1785 * s4644
-    s4649 = s4648 - s1786 * s4643
-    s4650 = s1771 * s4649 + s1772 * s4647 + s1773 * s4646 + s1774 * s4645 + s1775 * s4644
-    s4651 = s4650 + s1776 * s4643
-    s4652 = s1765 * s4649 + s1766 * s4647 + s1767 * s4646 + s1768 * s4645 + s1769 * s4644
-    s4653 = s4652 + s1770 * s4643
-    s4654 = s1744 * s4649 + s1745 * s4647 + s1746 * s4646 + s1747 * s4645 + s1748 * s4644
-    s4655 = s4654 + s1749 * s4643
-    s4656 = s4631 / pivot_front_left_abduction_angle_dot - s1738 * s4649 - s1739 * s4647
-    s4657 = s4656 - s1740 * s4646 - s1741 * s4645 - s1742 * s4644 - s1743 * s4643
-    s4658 = s1719 * s4651 - s1720 * s4649 - s1721 * s4647 - s1722 * s4646 - s1723 * s4645
-    s4659 = s4658 - s1724 * s4644 - s1725 * s4643
-    s4660 = s1706 * s4653 - s1707 * s4649 - s1708 * s4647 - s1709 * s4646 - s1710 * s4645
-    s4661 = s4660 - s1711 * s4644 - s1712 * s4643
-    s4662 = s1693 * s4655 - s1694 * s4649 - s1695 * s4647 - s1696 * s4646 - s1697 * s4645
-    s4663 = s4662 - s1698 * s4644 - s1699 * s4643
-    s4664 = s4630 / pivot_front_left_swing_angle_dot - s1665 * s4657 - s1666 * s4649 - s1667 * s4647
-    s4665 = s4664 - s1668 * s4646 - s1669 * s4645 - s1670 * s4644 - s1671 * s4643
-    s4666 = s1651 * s4651 - s1650 * s4659 - s1652 * s4649 - s1653 * s4647 - s1654 * s4646
-    s4667 = s1630 * s4653 - s1629 * s4661 - s1631 * s4649 - s1632 * s4647 - s1633 * s4646
-    s4668 = s1615 * s4655 - s1614 * s4663 - s1616 * s4649 - s1617 * s4647 - s1618 * s4646
-    s4669 = s3479 / pivot_front_left_knee_angle_dot + s1599 * s4665 + s1600 * s4657 + s1601 * s4649
-    s4670 = s4669 + s1602 * s4647 + s1603 * s4646 + s1604 * s4645 + s1605 * s4644 + s1606 * s4643
-    s4671 = s1614 * s3547 - (s3307 + s3308)
-    s4672 = s1615 * s3547 - (s3123 + s3124) - s1693 * s4671
-    s4673 = s1616 * s3547 - (s17 * s3128 + s20 * s3129 + s23 * s3130) - s1694 * s4671
-    s4674 = s1617 * s3547 - (s16 * s3128 + s19 * s3129 + s22 * s3130) - s1695 * s4671
-    s4675 = s1618 * s3547 - (s15 * s3128 + s18 * s3129 + s21 * s3130) - s1696 * s4671
-    s4676 = s4673 - s1744 * s4672
-    s4677 = s4674 - s1745 * s4672 - s1782 * s4676
-    s4678 = s4675 - s1746 * s4672 - s1783 * s4676 - s1792 * s4677
-    s4679 = s1619 * s3547 - s3121 - s1697 * s4671 - s1747 * s4672 - s1784 * s4676 - s1793 * s4677
-    s4680 = s1620 * s3547 - s3120 - s1698 * s4671 - s1748 * s4672 - s1785 * s4676 - s1794 * s4677
-    s4681 = s1621 * s3547 - s3119 - s1699 * s4671 - s1749 * s4672 - s1786 * s4676 - s1795 * s4677
-    s4682 = s4679 - s1799 * s4678
-    s4683 = s4680 - s1800 * s4678 + s1807 * s4682
-    s4684 = (s4681 - s1801 * s4678 + s1808 * s4682 + s1810 * s4683) / pivot_trunk_x_dot
-    s4685 = s4683 / pivot_trunk_y_dot + s1810 * s4684
-    s4686 = s4682 / pivot_trunk_z_dot + s1807 * s4685 + s1808 * s4684
-    s4687 = s4678 / pivot_trunk_wx - s1799 * s4686 - s1800 * s4685 - s1801 * s4684
-    s4688 = s4677 / pivot_trunk_wy - s1792 * s4687 - s1793 * s4686 - s1794 * s4685 - s1795 * s4684
-    s4689 = s4676 / pivot_trunk_wz - s1782 * s4688 - s1783 * s4687 - s1784 * s4686 - s1785 * s4685
-    s4690 = s4689 - s1786 * s4684
-    s4691 = s1771 * s4690 + s1772 * s4688 + s1773 * s4687 + s1774 * s4686 + s1775 * s4685
-    s4692 = s4691 + s1776 * s4684
-    s4693 = s1765 * s4690 + s1766 * s4688 + s1767 * s4687 + s1768 * s4686 + s1769 * s4685
-    s4694 = s4693 + s1770 * s4684
-    s4695 = s4672 / pivot_front_right_abduction_angle_dot - s1744 * s4690 - s1745 * s4688
-    s4696 = s4695 - s1746 * s4687 - s1747 * s4686 - s1748 * s4685 - s1749 * s4684
-    s4697 = s1738 * s4690 + s1739 * s4688 + s1740 * s4687 + s1741 * s4686 + s1742 * s4685
-    s4698 = s4697 + s1743 * s4684
-    s4699 = s1719 * s4692 - s1720 * s4690 - s1721 * s4688 - s1722 * s4687 - s1723 * s4686
-    s4700 = s4699 - s1724 * s4685 - s1725 * s4684
-    s4701 = s1706 * s4694 - s1707 * s4690 - s1708 * s4688 - s1709 * s4687 - s1710 * s4686
-    s4702 = s4701 - s1711 * s4685 - s1712 * s4684
-    s4703 = s4671 / pivot_front_right_swing_angle_dot - s1693 * s4696 - s1694 * s4690
-    s4704 = s4703 - s1695 * s4688 - s1696 * s4687 - s1697 * s4686 - s1698 * s4685 - s1699 * s4684
-    s4705 = s1665 * s4698 - s1666 * s4690 - s1667 * s4688 - s1668 * s4687 - s1669 * s4686
-    s4706 = s4705 - s1670 * s4685 - s1671 * s4684
-    s4707 = s1651 * s4692 - s1650 * s4700 - s1652 * s4690 - s1653 * s4688 - s1654 * s4687
-    s4708 = s1630 * s4694 - s1629 * s4702 - s1631 * s4690 - s1632 * s4688 - s1633 * s4687
-    s4709 = s3547 / pivot_front_right_knee_angle_dot + s1614 * s4704 + s1615 * s4696 + s1616 * s4690
-    s4710 = s4709 + s1617 * s4688 + s1618 * s4687 + s1619 * s4686 + s1620 * s4685 + s1621 * s4684
-    s4711 = s1600 * s4698 - s1599 * s4706 - s1601 * s4690 - s1602 * s4688 - s1603 * s4687
-    s4712 = s1629 * s3615 - (s3360 + s3361)
-    s4713 = s1630 * s3615 - (s3162 + s3163) - s1706 * s4712
-    s4714 = s1631 * s3615 - (s17 * s3167 + s20 * s3168 + s23 * s3169) - s1707 * s4712
-    s4715 = s1632 * s3615 - (s16 * s3167 + s19 * s3168 + s22 * s3169) - s1708 * s4712
-    s4716 = s1633 * s3615 - (s15 * s3167 + s18 * s3168 + s21 * s3169) - s1709 * s4712
-    s4717 = s4714 - s1765 * s4713
-    s4718 = s4715 - s1766 * s4713 - s1782 * s4717
-    s4719 = s4716 - s1767 * s4713 - s1783 * s4717 - s1792 * s4718
-    s4720 = s1634 * s3615 - s3160 - s1710 * s4712 - s1768 * s4713 - s1784 * s4717 - s1793 * s4718
-    s4721 = s1635 * s3615 - s3159 - s1711 * s4712 - s1769 * s4713 - s1785 * s4717 - s1794 * s4718
-    s4722 = s1636 * s3615 - s3158 - s1712 * s4712 - s1770 * s4713 - s1786 * s4717 - s1795 * s4718
-    s4723 = s4720 - s1799 * s4719
-    s4724 = s4721 - s1800 * s4719 + s1807 * s4723
-    s4725 = (s4722 - s1801 * s4719 + s1808 * s4723 + s1810 * s4724) / pivot_trunk_x_dot
-    s4726 = s4724 / pivot_trunk_y_dot + s1810 * s4725
-    s4727 = s4723 / pivot_trunk_z_dot + s1807 * s4726 + s1808 * s4725
-    s4728 = s4719 / pivot_trunk_wx - s1799 * s4727 - s1800 * s4726 - s1801 * s4725
-    s4729 = s4718 / pivot_trunk_wy - s1792 * s4728 - s1793 * s4727 - s1794 * s4726 - s1795 * s4725
-    s4730 = s4717 / pivot_trunk_wz - s1782 * s4729 - s1783 * s4728 - s1784 * s4727 - s1785 * s4726
-    s4731 = s4730 - s1786 * s4725
-    s4732 = s1771 * s4731 + s1772 * s4729 + s1773 * s4728 + s1774 * s4727 + s1775 * s4726
-    s4733 = s4732 + s1776 * s4725
-    s4734 = s4713 / pivot_hind_left_abduction_angle_dot - s1765 * s4731 - s1766 * s4729
-    s4735 = s4734 - s1767 * s4728 - s1768 * s4727 - s1769 * s4726 - s1770 * s4725
-    s4736 = s1744 * s4731 + s1745 * s4729 + s1746 * s4728 + s1747 * s4727 + s1748 * s4726
-    s4737 = s4736 + s1749 * s4725
-    s4738 = s1738 * s4731 + s1739 * s4729 + s1740 * s4728 + s1741 * s4727 + s1742 * s4726
-    s4739 = s4738 + s1743 * s4725
-    s4740 = s1719 * s4733 - s1720 * s4731 - s1721 * s4729 - s1722 * s4728 - s1723 * s4727
-    s4741 = s4740 - s1724 * s4726 - s1725 * s4725
-    s4742 = s4712 / pivot_hind_left_swing_angle_dot - s1706 * s4735 - s1707 * s4731 - s1708 * s4729
-    s4743 = s4742 - s1709 * s4728 - s1710 * s4727 - s1711 * s4726 - s1712 * s4725
-    s4744 = s1693 * s4737 - s1694 * s4731 - s1695 * s4729 - s1696 * s4728 - s1697 * s4727
-    s4745 = s4744 - s1698 * s4726 - s1699 * s4725
-    s4746 = s1665 * s4739 - s1666 * s4731 - s1667 * s4729 - s1668 * s4728 - s1669 * s4727
-    s4747 = s4746 - s1670 * s4726 - s1671 * s4725
-    s4748 = s1651 * s4733 - s1650 * s4741 - s1652 * s4731 - s1653 * s4729 - s1654 * s4728
-    s4749 = s3615 / pivot_hind_left_knee_angle_dot + s1629 * s4743 + s1630 * s4735 + s1631 * s4731
-    s4750 = s4749 + s1632 * s4729 + s1633 * s4728 + s1634 * s4727 + s1635 * s4726 + s1636 * s4725
-    s4751 = s1615 * s4737 - s1614 * s4745 - s1616 * s4731 - s1617 * s4729 - s1618 * s4728
-    s4752 = s1600 * s4739 - s1599 * s4747 - s1601 * s4731 - s1602 * s4729 - s1603 * s4728
-    s4753 = s1650 * s3683 - (s3413 + s3414)
-    s4754 = s1651 * s3683 - (s3201 + s3202) - s1719 * s4753
-    s4755 = s1652 * s3683 - (s17 * s3206 + s20 * s3207 + s23 * s3208) - s1720 * s4753
-    s4756 = s1653 * s3683 - (s16 * s3206 + s19 * s3207 + s22 * s3208) - s1721 * s4753
-    s4757 = s1654 * s3683 - (s15 * s3206 + s18 * s3207 + s21 * s3208) - s1722 * s4753
-    s4758 = s4755 - s1771 * s4754
-    s4759 = s4756 - s1772 * s4754 - s1782 * s4758
-    s4760 = s4757 - s1773 * s4754 - s1783 * s4758 - s1792 * s4759
-    s4761 = s1655 * s3683 - s3199 - s1723 * s4753 - s1774 * s4754 - s1784 * s4758 - s1793 * s4759
-    s4762 = s1656 * s3683 - s3198 - s1724 * s4753 - s1775 * s4754 - s1785 * s4758 - s1794 * s4759
-    s4763 = s1657 * s3683 - s3197 - s1725 * s4753 - s1776 * s4754 - s1786 * s4758 - s1795 * s4759
-    s4764 = s4761 - s1799 * s4760
-    s4765 = s4762 - s1800 * s4760 + s1807 * s4764
-    s4766 = (s4763 - s1801 * s4760 + s1808 * s4764 + s1810 * s4765) / pivot_trunk_x_dot
-    s4767 = s4765 / pivot_trunk_y_dot + s1810 * s4766
-    s4768 = s4764 / pivot_trunk_z_dot + s1807 * s4767 + s1808 * s4766
-    s4769 = s4760 / pivot_trunk_wx - s1799 * s4768 - s1800 * s4767 - s1801 * s4766
-    s4770 = s4759 / pivot_trunk_wy - s1792 * s4769 - s1793 * s4768 - s1794 * s4767 - s1795 * s4766
-    s4771 = s4758 / pivot_trunk_wz - s1782 * s4770 - s1783 * s4769 - s1784 * s4768 - s1785 * s4767
-    s4772 = s4771 - s1786 * s4766
-    s4773 = s4754 / pivot_hind_right_abduction_angle_dot - s1771 * s4772 - s1772 * s4770
-    s4774 = s4773 - s1773 * s4769 - s1774 * s4768 - s1775 * s4767 - s1776 * s4766
-    s4775 = s1765 * s4772 + s1766 * s4770 + s1767 * s4769 + s1768 * s4768 + s1769 * s4767
-    s4776 = s4775 + s1770 * s4766
-    s4777 = s1744 * s4772 + s1745 * s4770 + s1746 * s4769 + s1747 * s4768 + s1748 * s4767
-    s4778 = s4777 + s1749 * s4766
-    s4779 = s1738 * s4772 + s1739 * s4770 + s1740 * s4769 + s1741 * s4768 + s1742 * s4767
-    s4780 = s4779 + s1743 * s4766
-    s4781 = s4753 / pivot_hind_right_swing_angle_dot - s1719 * s4774 - s1720 * s4772 - s1721 * s4770
-    s4782 = s4781 - s1722 * s4769 - s1723 * s4768 - s1724 * s4767 - s1725 * s4766
-    s4783 = s1706 * s4776 - s1707 * s4772 - s1708 * s4770 - s1709 * s4769 - s1710 * s4768
-    s4784 = s4783 - s1711 * s4767 - s1712 * s4766
-    s4785 = s1693 * s4778 - s1694 * s4772 - s1695 * s4770 - s1696 * s4769 - s1697 * s4768
-    s4786 = s4785 - s1698 * s4767 - s1699 * s4766
-    s4787 = s1665 * s4780 - s1666 * s4772 - s1667 * s4770 - s1668 * s4769 - s1669 * s4768
-    s4788 = s4787 - s1670 * s4767 - s1671 * s4766
-    s4789 = s3683 / pivot_hind_right_knee_angle_dot + s1650 * s4782 + s1651 * s4774 + s1652 * s4772
-    s4790 = s4789 + s1653 * s4770 + s1654 * s4769 + s1655 * s4768 + s1656 * s4767 + s1657 * s4766
-    s4791 = s1630 * s4776 - s1629 * s4784 - s1631 * s4772 - s1632 * s4770 - s1633 * s4769
-    s4792 = s1615 * s4778 - s1614 * s4786 - s1616 * s4772 - s1617 * s4770 - s1618 * s4769
-    s4793 = s1600 * s4780 - s1599 * s4788 - s1601 * s4772 - s1602 * s4770 - s1603 * s4769
-    s4794 = s1599 * s3468 - (s3246 + (s927 * s3219 + s929 * s3221 + s931 * s3223))
-    s4795 = s1600 * s3468 - (s15 * s3250 + s18 * s3251 + s21 * s3252) - s1665 * s4794
-    s4796 = s1601 * s3468 - (s17 * s3259 + s20 * s3260 + s23 * s3261) - s1666 * s4794
-    s4797 = s1602 * s3468 - (s16 * s3259 + s19 * s3260 + s22 * s3261) - s1667 * s4794
-    s4798 = s1603 * s3468 - (s15 * s3259 + s18 * s3260 + s21 * s3261) - s1668 * s4794
-    s4799 = s4796 - s1738 * s4795
-    s4800 = s4797 - s1739 * s4795 - s1782 * s4799
-    s4801 = s4798 - s1740 * s4795 - s1783 * s4799 - s1792 * s4800
-    s4802 = s1604 * s3468 - s3244 - s1669 * s4794 - s1741 * s4795 - s1784 * s4799 - s1793 * s4800
-    s4803 = s1605 * s3468 - s3243 - s1670 * s4794 - s1742 * s4795 - s1785 * s4799 - s1794 * s4800
-    s4804 = s1606 * s3468 - s3242 - s1671 * s4794 - s1743 * s4795 - s1786 * s4799 - s1795 * s4800
-    s4805 = s4802 - s1799 * s4801
-    s4806 = s4803 - s1800 * s4801 + s1807 * s4805
-    s4807 = (s4804 - s1801 * s4801 + s1808 * s4805 + s1810 * s4806) / pivot_trunk_x_dot
-    s4808 = s4806 / pivot_trunk_y_dot + s1810 * s4807
-    s4809 = s4805 / pivot_trunk_z_dot + s1807 * s4808 + s1808 * s4807
-    s4810 = s4801 / pivot_trunk_wx - s1799 * s4809 - s1800 * s4808 - s1801 * s4807
-    s4811 = s4800 / pivot_trunk_wy - s1792 * s4810 - s1793 * s4809 - s1794 * s4808 - s1795 * s4807
-    s4812 = s4799 / pivot_trunk_wz - s1782 * s4811 - s1783 * s4810 - s1784 * s4809 - s1785 * s4808
-    s4813 = s4812 - s1786 * s4807
-    s4814 = s1771 * s4813 + s1772 * s4811 + s1773 * s4810 + s1774 * s4809 + s1775 * s4808
-    s4815 = s4814 + s1776 * s4807
-    s4816 = s1765 * s4813 + s1766 * s4811 + s1767 * s4810 + s1768 * s4809 + s1769 * s4808
-    s4817 = s4816 + s1770 * s4807
-    s4818 = s1744 * s4813 + s1745 * s4811 + s1746 * s4810 + s1747 * s4809 + s1748 * s4808
-    s4819 = s4818 + s1749 * s4807
-    s4820 = s4795 / pivot_front_left_abduction_angle_dot - s1738 * s4813 - s1739 * s4811
-    s4821 = s4820 - s1740 * s4810 - s1741 * s4809 - s1742 * s4808 - s1743 * s4807
-    s4822 = s1719 * s4815 - s1720 * s4813 - s1721 * s4811 - s1722 * s4810 - s1723 * s4809
-    s4823 = s4822 - s1724 * s4808 - s1725 * s4807
-    s4824 = s1706 * s4817 - s1707 * s4813 - s1708 * s4811 - s1709 * s4810 - s1710 * s4809
-    s4825 = s4824 - s1711 * s4808 - s1712 * s4807
-    s4826 = s1693 * s4819 - s1694 * s4813 - s1695 * s4811 - s1696 * s4810 - s1697 * s4809
-    s4827 = s4826 - s1698 * s4808 - s1699 * s4807
-    s4828 = s4794 / pivot_front_left_swing_angle_dot - s1665 * s4821 - s1666 * s4813 - s1667 * s4811
-    s4829 = s4828 - s1668 * s4810 - s1669 * s4809 - s1670 * s4808 - s1671 * s4807
-    s4830 = s1651 * s4815 - s1650 * s4823 - s1652 * s4813 - s1653 * s4811 - s1654 * s4810
-    s4831 = s1630 * s4817 - s1629 * s4825 - s1631 * s4813 - s1632 * s4811 - s1633 * s4810
-    s4832 = s1615 * s4819 - s1614 * s4827 - s1616 * s4813 - s1617 * s4811 - s1618 * s4810
-    s4833 = s3468 / pivot_front_left_knee_angle_dot + s1599 * s4829 + s1600 * s4821 + s1601 * s4813
-    s4834 = s4833 + s1602 * s4811 + s1603 * s4810 + s1604 * s4809 + s1605 * s4808 + s1606 * s4807
-    s4835 = s1614 * s3536 - (s3299 + (s933 * s3272 + s935 * s3274 + s937 * s3276))
-    s4836 = s1615 * s3536 - (s15 * s3303 + s18 * s3304 + s21 * s3305) - s1693 * s4835
-    s4837 = s1616 * s3536 - (s17 * s3312 + s20 * s3313 + s23 * s3314) - s1694 * s4835
-    s4838 = s1617 * s3536 - (s16 * s3312 + s19 * s3313 + s22 * s3314) - s1695 * s4835
-    s4839 = s1618 * s3536 - (s15 * s3312 + s18 * s3313 + s21 * s3314) - s1696 * s4835
-    s4840 = s4837 - s1744 * s4836
-    s4841 = s4838 - s1745 * s4836 - s1782 * s4840
-    s4842 = s4839 - s1746 * s4836 - s1783 * s4840 - s1792 * s4841
-    s4843 = s1619 * s3536 - s3297 - s1697 * s4835 - s1747 * s4836 - s1784 * s4840 - s1793 * s4841
-    s4844 = s1620 * s3536 - s3296 - s1698 * s4835 - s1748 * s4836 - s1785 * s4840 - s1794 * s4841
-    s4845 = s1621 * s3536 - s3295 - s1699 * s4835 - s1749 * s4836 - s1786 * s4840 - s1795 * s4841
-    s4846 = s4843 - s1799 * s4842
-    s4847 = s4844 - s1800 * s4842 + s1807 * s4846
-    s4848 = (s4845 - s1801 * s4842 + s1808 * s4846 + s1810 * s4847) / pivot_trunk_x_dot
-    s4849 = s4847 / pivot_trunk_y_dot + s1810 * s4848
-    s4850 = s4846 / pivot_trunk_z_dot + s1807 * s4849 + s1808 * s4848
-    s4851 = s4842 / pivot_trunk_wx - s1799 * s4850 - s1800 * s4849 - s1801 * s4848
-    s4852 = s4841 / pivot_trunk_wy - s1792 * s4851 - s1793 * s4850 - s1794 * s4849 - s1795 * s4848
-    s4853 = s4840 / pivot_trunk_wz - s1782 * s4852 - s1783 * s4851 - s1784 * s4850 - s1785 * s4849
-    s4854 = s4853 - s1786 * s4848
-    s4855 = s1771 * s4854 + s1772 * s4852 + s1773 * s4851 + s1774 * s4850 + s1775 * s4849
-    s4856 = s4855 + s1776 * s4848
-    s4857 = s1765 * s4854 + s1766 * s4852 + s1767 * s4851 + s1768 * s4850 + s1769 * s4849
-    s4858 = s4857 + s1770 * s4848
-    s4859 = s4836 / pivot_front_right_abduction_angle_dot - s1744 * s4854 - s1745 * s4852
-    s4860 = s4859 - s1746 * s4851 - s1747 * s4850 - s1748 * s4849 - s1749 * s4848
-    s4861 = s1738 * s4854 + s1739 * s4852 + s1740 * s4851 + s1741 * s4850 + s1742 * s4849
-    s4862 = s4861 + s1743 * s4848
-    s4863 = s1719 * s4856 - s1720 * s4854 - s1721 * s4852 - s1722 * s4851 - s1723 * s4850
-    s4864 = s4863 - s1724 * s4849 - s1725 * s4848
-    s4865 = s1706 * s4858 - s1707 * s4854 - s1708 * s4852 - s1709 * s4851 - s1710 * s4850
-    s4866 = s4865 - s1711 * s4849 - s1712 * s4848
-    s4867 = s4835 / pivot_front_right_swing_angle_dot - s1693 * s4860 - s1694 * s4854
-    s4868 = s4867 - s1695 * s4852 - s1696 * s4851 - s1697 * s4850 - s1698 * s4849 - s1699 * s4848
-    s4869 = s1665 * s4862 - s1666 * s4854 - s1667 * s4852 - s1668 * s4851 - s1669 * s4850
-    s4870 = s4869 - s1670 * s4849 - s1671 * s4848
-    s4871 = s1651 * s4856 - s1650 * s4864 - s1652 * s4854 - s1653 * s4852 - s1654 * s4851
-    s4872 = s1630 * s4858 - s1629 * s4866 - s1631 * s4854 - s1632 * s4852 - s1633 * s4851
-    s4873 = s3536 / pivot_front_right_knee_angle_dot + s1614 * s4868 + s1615 * s4860 + s1616 * s4854
-    s4874 = s4873 + s1617 * s4852 + s1618 * s4851 + s1619 * s4850 + s1620 * s4849 + s1621 * s4848
-    s4875 = s1600 * s4862 - s1599 * s4870 - s1601 * s4854 - s1602 * s4852 - s1603 * s4851
-    s4876 = s1629 * s3604 - (s3352 + (s939 * s3325 + s941 * s3327 + s943 * s3329))
-    s4877 = s1630 * s3604 - (s15 * s3356 + s18 * s3357 + s21 * s3358) - s1706 * s4876
-    s4878 = s1631 * s3604 - (s17 * s3365 + s20 * s3366 + s23 * s3367) - s1707 * s4876
-    s4879 = s1632 * s3604 - (s16 * s3365 + s19 * s3366 + s22 * s3367) - s1708 * s4876
-    s4880 = s1633 * s3604 - (s15 * s3365 + s18 * s3366 + s21 * s3367) - s1709 * s4876
-    s4881 = s4878 - s1765 * s4877
-    s4882 = s4879 - s1766 * s4877 - s1782 * s4881
-    s4883 = s4880 - s1767 * s4877 - s1783 * s4881 - s1792 * s4882
-    s4884 = s1634 * s3604 - s3350 - s1710 * s4876 - s1768 * s4877 - s1784 * s4881 - s1793 * s4882
-    s4885 = s1635 * s3604 - s3349 - s1711 * s4876 - s1769 * s4877 - s1785 * s4881 - s1794 * s4882
-    s4886 = s1636 * s3604 - s3348 - s1712 * s4876 - s1770 * s4877 - s1786 * s4881 - s1795 * s4882
-    s4887 = s4884 - s1799 * s4883
-    s4888 = s4885 - s1800 * s4883 + s1807 * s4887
-    s4889 = (s4886 - s1801 * s4883 + s1808 * s4887 + s1810 * s4888) / pivot_trunk_x_dot
-    s4890 = s4888 / pivot_trunk_y_dot + s1810 * s4889
-    s4891 = s4887 / pivot_trunk_z_dot + s1807 * s4890 + s1808 * s4889
-    s4892 = s4883 / pivot_trunk_wx - s1799 * s4891 - s1800 * s4890 - s1801 * s4889
-    s4893 = s4882 / pivot_trunk_wy - s1792 * s4892 - s1793 * s4891 - s1794 * s4890 - s1795 * s4889
-    s4894 = s4881 / pivot_trunk_wz - s1782 * s4893 - s1783 * s4892 - s1784 * s4891 - s1785 * s4890
-    s4895 = s4894 - s1786 * s4889
-    s4896 = s1771 * s4895 + s1772 * s4893 + s1773 * s4892 + s1774 * s4891 + s1775 * s4890
-    s4897 = s4896 + s1776 * s4889
-    s4898 = s4877 / pivot_hind_left_abduction_angle_dot - s1765 * s4895 - s1766 * s4893
-    s4899 = s4898 - s1767 * s4892 - s1768 * s4891 - s1769 * s4890 - s1770 * s4889
-    s4900 = s1744 * s4895 + s1745 * s4893 + s1746 * s4892 + s1747 * s4891 + s1748 * s4890
-    s4901 = s4900 + s1749 * s4889
-    s4902 = s1738 * s4895 + s1739 * s4893 + s1740 * s4892 + s1741 * s4891 + s1742 * s4890
-    s4903 = s4902 + s1743 * s4889
-    s4904 = s1719 * s4897 - s1720 * s4895 - s1721 * s4893 - s1722 * s4892 - s1723 * s4891
-    s4905 = s4904 - s1724 * s4890 - s1725 * s4889
-    s4906 = s4876 / pivot_hind_left_swing_angle_dot - s1706 * s4899 - s1707 * s4895 - s1708 * s4893
-    s4907 = s4906 - s1709 * s4892 - s1710 * s4891 - s1711 * s4890 - s1712 * s4889
-    s4908 = s1693 * s4901 - s1694 * s4895 - s1695 * s4893 - s1696 * s4892 - s1697 * s4891
-    s4909 = s4908 - s1698 * s4890 - s1699 * s4889
-    s4910 = s1665 * s4903 - s1666 * s4895 - s1667 * s4893 - s1668 * s4892 - s1669 * s4891
-    s4911 = s4910 - s1670 * s4890 - s1671 * s4889
-    s4912 = s1651 * s4897 - s1650 * s4905 - s1652 * s4895 - s1653 * s4893 - s1654 * s4892
-    s4913 = s3604 / pivot_hind_left_knee_angle_dot + s1629 * s4907 + s1630 * s4899 + s1631 * s4895
-    s4914 = s4913 + s1632 * s4893 + s1633 * s4892 + s1634 * s4891 + s1635 * s4890 + s1636 * s4889
-    s4915 = s1615 * s4901 - s1614 * s4909 - s1616 * s4895 - s1617 * s4893 - s1618 * s4892
-    s4916 = s1600 * s4903 - s1599 * s4911 - s1601 * s4895 - s1602 * s4893 - s1603 * s4892
-    s4917 = s1650 * s3672 - (s3405 + (s945 * s3378 + s947 * s3380 + s949 * s3382))
-    s4918 = s1651 * s3672 - (s15 * s3409 + s18 * s3410 + s21 * s3411) - s1719 * s4917
-    s4919 = s1652 * s3672 - (s17 * s3418 + s20 * s3419 + s23 * s3420) - s1720 * s4917
-    s4920 = s1653 * s3672 - (s16 * s3418 + s19 * s3419 + s22 * s3420) - s1721 * s4917
-    s4921 = s1654 * s3672 - (s15 * s3418 + s18 * s3419 + s21 * s3420) - s1722 * s4917
-    s4922 = s4919 - s1771 * s4918
-    s4923 = s4920 - s1772 * s4918 - s1782 * s4922
-    s4924 = s4921 - s1773 * s4918 - s1783 * s4922 - s1792 * s4923
-    s4925 = s1655 * s3672 - s3403 - s1723 * s4917 - s1774 * s4918 - s1784 * s4922 - s1793 * s4923
-    s4926 = s1656 * s3672 - s3402 - s1724 * s4917 - s1775 * s4918 - s1785 * s4922 - s1794 * s4923
-    s4927 = s1657 * s3672 - s3401 - s1725 * s4917 - s1776 * s4918 - s1786 * s4922 - s1795 * s4923
-    s4928 = s4925 - s1799 * s4924
-    s4929 = s4926 - s1800 * s4924 + s1807 * s4928
-    s4930 = (s4927 - s1801 * s4924 + s1808 * s4928 + s1810 * s4929) / pivot_trunk_x_dot
-    s4931 = s4929 / pivot_trunk_y_dot + s1810 * s4930
-    s4932 = s4928 / pivot_trunk_z_dot + s1807 * s4931 + s1808 * s4930
-    s4933 = s4924 / pivot_trunk_wx - s1799 * s4932 - s1800 * s4931 - s1801 * s4930
-    s4934 = s4923 / pivot_trunk_wy - s1792 * s4933 - s1793 * s4932 - s1794 * s4931 - s1795 * s4930
-    s4935 = s4922 / pivot_trunk_wz - s1782 * s4934 - s1783 * s4933 - s1784 * s4932 - s1785 * s4931
-    s4936 = s4935 - s1786 * s4930
-    s4937 = s4918 / pivot_hind_right_abduction_angle_dot - s1771 * s4936 - s1772 * s4934
-    s4938 = s4937 - s1773 * s4933 - s1774 * s4932 - s1775 * s4931 - s1776 * s4930
-    s4939 = s1765 * s4936 + s1766 * s4934 + s1767 * s4933 + s1768 * s4932 + s1769 * s4931
-    s4940 = s4939 + s1770 * s4930
-    s4941 = s1744 * s4936 + s1745 * s4934 + s1746 * s4933 + s1747 * s4932 + s1748 * s4931
-    s4942 = s4941 + s1749 * s4930
-    s4943 = s1738 * s4936 + s1739 * s4934 + s1740 * s4933 + s1741 * s4932 + s1742 * s4931
-    s4944 = s4943 + s1743 * s4930
-    s4945 = s4917 / pivot_hind_right_swing_angle_dot - s1719 * s4938 - s1720 * s4936 - s1721 * s4934
-    s4946 = s4945 - s1722 * s4933 - s1723 * s4932 - s1724 * s4931 - s1725 * s4930
-    s4947 = s1706 * s4940 - s1707 * s4936 - s1708 * s4934 - s1709 * s4933 - s1710 * s4932
-    s4948 = s4947 - s1711 * s4931 - s1712 * s4930
-    s4949 = s1693 * s4942 - s1694 * s4936 - s1695 * s4934 - s1696 * s4933 - s1697 * s4932
-    s4950 = s4949 - s1698 * s4931 - s1699 * s4930
-    s4951 = s1665 * s4944 - s1666 * s4936 - s1667 * s4934 - s1668 * s4933 - s1669 * s4932
-    s4952 = s4951 - s1670 * s4931 - s1671 * s4930
-    s4953 = s3672 / pivot_hind_right_knee_angle_dot + s1650 * s4946 + s1651 * s4938 + s1652 * s4936
-    s4954 = s4953 + s1653 * s4934 + s1654 * s4933 + s1655 * s4932 + s1656 * s4931 + s1657 * s4930
-    s4955 = s1630 * s4940 - s1629 * s4948 - s1631 * s4936 - s1632 * s4934 - s1633 * s4933
-    s4956 = s1615 * s4942 - s1614 * s4950 - s1616 * s4936 - s1617 * s4934 - s1618 * s4933
-    s4957 = s1600 * s4944 - s1599 * s4952 - s1601 * s4936 - s1602 * s4934 - s1603 * s4933
-    s4958 = s1599 * s3458 - (s927 * s3462 + s929 * s3463 + s931 * s3464)
-    s4959 = s1600 * s3458 - (s15 * s3472 + s18 * s3473 + s21 * s3474) - s1665 * s4958
-    s4960 = s1601 * s3458 - (s17 * s3483 + s20 * s3484 + s23 * s3485) - s1666 * s4958
-    s4961 = s1602 * s3458 - (s16 * s3483 + s19 * s3484 + s22 * s3485) - s1667 * s4958
-    s4962 = s1603 * s3458 - (s15 * s3483 + s18 * s3484 + s21 * s3485) - s1668 * s4958
-    s4963 = s4960 - s1738 * s4959
-    s4964 = s4961 - s1739 * s4959 - s1782 * s4963
-    s4965 = s4962 - s1740 * s4959 - s1783 * s4963 - s1792 * s4964
-    s4966 = s1604 * s3458 - s3453 - s1669 * s4958 - s1741 * s4959 - s1784 * s4963 - s1793 * s4964
-    s4967 = s1605 * s3458 - s3452 - s1670 * s4958 - s1742 * s4959 - s1785 * s4963 - s1794 * s4964
-    s4968 = s1606 * s3458 - s3451 - s1671 * s4958 - s1743 * s4959 - s1786 * s4963 - s1795 * s4964
-    s4969 = s4966 - s1799 * s4965
-    s4970 = s4967 - s1800 * s4965 + s1807 * s4969
-    s4971 = (s4968 - s1801 * s4965 + s1808 * s4969 + s1810 * s4970) / pivot_trunk_x_dot
-    s4972 = s4970 / pivot_trunk_y_dot + s1810 * s4971
-    s4973 = s4969 / pivot_trunk_z_dot + s1807 * s4972 + s1808 * s4971
-    s4974 = s4965 / pivot_trunk_wx - s1799 * s4973 - s1800 * s4972 - s1801 * s4971
-    s4975 = s4964 / pivot_trunk_wy - s1792 * s4974 - s1793 * s4973 - s1794 * s4972 - s1795 * s4971
-    s4976 = s4963 / pivot_trunk_wz - s1782 * s4975 - s1783 * s4974 - s1784 * s4973 - s1785 * s4972
-    s4977 = s4976 - s1786 * s4971
-    s4978 = s1771 * s4977 + s1772 * s4975 + s1773 * s4974 + s1774 * s4973 + s1775 * s4972
-    s4979 = s4978 + s1776 * s4971
-    s4980 = s1765 * s4977 + s1766 * s4975 + s1767 * s4974 + s1768 * s4973 + s1769 * s4972
-    s4981 = s4980 + s1770 * s4971
-    s4982 = s1744 * s4977 + s1745 * s4975 + s1746 * s4974 + s1747 * s4973 + s1748 * s4972
-    s4983 = s4982 + s1749 * s4971
-    s4984 = s4959 / pivot_front_left_abduction_angle_dot - s1738 * s4977 - s1739 * s4975
-    s4985 = s4984 - s1740 * s4974 - s1741 * s4973 - s1742 * s4972 - s1743 * s4971
-    s4986 = s1719 * s4979 - s1720 * s4977 - s1721 * s4975 - s1722 * s4974 - s1723 * s4973
-    s4987 = s4986 - s1724 * s4972 - s1725 * s4971
-    s4988 = s1706 * s4981 - s1707 * s4977 - s1708 * s4975 - s1709 * s4974 - s1710 * s4973
-    s4989 = s4988 - s1711 * s4972 - s1712 * s4971
-    s4990 = s1693 * s4983 - s1694 * s4977 - s1695 * s4975 - s1696 * s4974 - s1697 * s4973
-    s4991 = s4990 - s1698 * s4972 - s1699 * s4971
-    s4992 = s4958 / pivot_front_left_swing_angle_dot - s1665 * s4985 - s1666 * s4977 - s1667 * s4975
-    s4993 = s4992 - s1668 * s4974 - s1669 * s4973 - s1670 * s4972 - s1671 * s4971
-    s4994 = s1651 * s4979 - s1650 * s4987 - s1652 * s4977 - s1653 * s4975 - s1654 * s4974
-    s4995 = s1630 * s4981 - s1629 * s4989 - s1631 * s4977 - s1632 * s4975 - s1633 * s4974
-    s4996 = s1615 * s4983 - s1614 * s4991 - s1616 * s4977 - s1617 * s4975 - s1618 * s4974
-    s4997 = s3458 / pivot_front_left_knee_angle_dot + s1599 * s4993 + s1600 * s4985 + s1601 * s4977
-    s4998 = s4997 + s1602 * s4975 + s1603 * s4974 + s1604 * s4973 + s1605 * s4972 + s1606 * s4971
-    s4999 = s1614 * s3526 - (s933 * s3530 + s935 * s3531 + s937 * s3532)
-    s5000 = s1615 * s3526 - (s15 * s3540 + s18 * s3541 + s21 * s3542) - s1693 * s4999
-    s5001 = s1616 * s3526 - (s17 * s3551 + s20 * s3552 + s23 * s3553) - s1694 * s4999
-    s5002 = s1617 * s3526 - (s16 * s3551 + s19 * s3552 + s22 * s3553) - s1695 * s4999
-    s5003 = s1618 * s3526 - (s15 * s3551 + s18 * s3552 + s21 * s3553) - s1696 * s4999
-    s5004 = s5001 - s1744 * s5000
-    s5005 = s5002 - s1745 * s5000 - s1782 * s5004
-    s5006 = s5003 - s1746 * s5000 - s1783 * s5004 - s1792 * s5005
-    s5007 = s1619 * s3526 - s3521 - s1697 * s4999 - s1747 * s5000 - s1784 * s5004 - s1793 * s5005
-    s5008 = s1620 * s3526 - s3520 - s1698 * s4999 - s1748 * s5000 - s1785 * s5004 - s1794 * s5005
-    s5009 = s1621 * s3526 - s3519 - s1699 * s4999 - s1749 * s5000 - s1786 * s5004 - s1795 * s5005
-    s5010 = s5007 - s1799 * s5006
-    s5011 = s5008 - s1800 * s5006 + s1807 * s5010
-    s5012 = (s5009 - s1801 * s5006 + s1808 * s5010 + s1810 * s5011) / pivot_trunk_x_dot
-    s5013 = s5011 / pivot_trunk_y_dot + s1810 * s5012
-    s5014 = s5010 / pivot_trunk_z_dot + s1807 * s5013 + s1808 * s5012
-    s5015 = s5006 / pivot_trunk_wx - s1799 * s5014 - s1800 * s5013 - s1801 * s5012
-    s5016 = s5005 / pivot_trunk_wy - s1792 * s5015 - s1793 * s5014 - s1794 * s5013 - s1795 * s5012
-    s5017 = s5004 / pivot_trunk_wz - s1782 * s5016 - s1783 * s5015 - s1784 * s5014 - s1785 * s5013
-    s5018 = s5017 - s1786 * s5012
-    s5019 = s1771 * s5018 + s1772 * s5016 + s1773 * s5015 + s1774 * s5014 + s1775 * s5013
-    s5020 = s5019 + s1776 * s5012
-    s5021 = s1765 * s5018 + s1766 * s5016 + s1767 * s5015 + s1768 * s5014 + s1769 * s5013
-    s5022 = s5021 + s1770 * s5012
-    s5023 = s5000 / pivot_front_right_abduction_angle_dot - s1744 * s5018 - s1745 * s5016
-    s5024 = s5023 - s1746 * s5015 - s1747 * s5014 - s1748 * s5013 - s1749 * s5012
-    s5025 = s1738 * s5018 + s1739 * s5016 + s1740 * s5015 + s1741 * s5014 + s1742 * s5013
-    s5026 = s5025 + s1743 * s5012
-    s5027 = s1719 * s5020 - s1720 * s5018 - s1721 * s5016 - s1722 * s5015 - s1723 * s5014
-    s5028 = s5027 - s1724 * s5013 - s1725 * s5012
-    s5029 = s1706 * s5022 - s1707 * s5018 - s1708 * s5016 - s1709 * s5015 - s1710 * s5014
-    s5030 = s5029 - s1711 * s5013 - s1712 * s5012
-    s5031 = s4999 / pivot_front_right_swing_angle_dot - s1693 * s5024 - s1694 * s5018
-    s5032 = s5031 - s1695 * s5016 - s1696 * s5015 - s1697 * s5014 - s1698 * s5013 - s1699 * s5012
-    s5033 = s1665 * s5026 - s1666 * s5018 - s1667 * s5016 - s1668 * s5015 - s1669 * s5014
-    s5034 = s5033 - s1670 * s5013 - s1671 * s5012
-    s5035 = s1651 * s5020 - s1650 * s5028 - s1652 * s5018 - s1653 * s5016 - s1654 * s5015
-    s5036 = s1630 * s5022 - s1629 * s5030 - s1631 * s5018 - s1632 * s5016 - s1633 * s5015
-    s5037 = s3526 / pivot_front_right_knee_angle_dot + s1614 * s5032 + s1615 * s5024 + s1616 * s5018
-    s5038 = s5037 + s1617 * s5016 + s1618 * s5015 + s1619 * s5014 + s1620 * s5013 + s1621 * s5012
-    s5039 = s1600 * s5026 - s1599 * s5034 - s1601 * s5018 - s1602 * s5016 - s1603 * s5015
-    s5040 = s1629 * s3594 - (s939 * s3598 + s941 * s3599 + s943 * s3600)
-    s5041 = s1630 * s3594 - (s15 * s3608 + s18 * s3609 + s21 * s3610) - s1706 * s5040
-    s5042 = s1631 * s3594 - (s17 * s3619 + s20 * s3620 + s23 * s3621) - s1707 * s5040
-    s5043 = s1632 * s3594 - (s16 * s3619 + s19 * s3620 + s22 * s3621) - s1708 * s5040
-    s5044 = s1633 * s3594 - (s15 * s3619 + s18 * s3620 + s21 * s3621) - s1709 * s5040
-    s5045 = s5042 - s1765 * s5041
-    s5046 = s5043 - s1766 * s5041 - s1782 * s5045
-    s5047 = s5044 - s1767 * s5041 - s1783 * s5045 - s1792 * s5046
-    s5048 = s1634 * s3594 - s3589 - s1710 * s5040 - s1768 * s5041 - s1784 * s5045 - s1793 * s5046
-    s5049 = s1635 * s3594 - s3588 - s1711 * s5040 - s1769 * s5041 - s1785 * s5045 - s1794 * s5046
-    s5050 = s1636 * s3594 - s3587 - s1712 * s5040 - s1770 * s5041 - s1786 * s5045 - s1795 * s5046
-    s5051 = s5048 - s1799 * s5047
-    s5052 = s5049 - s1800 * s5047 + s1807 * s5051
-    s5053 = (s5050 - s1801 * s5047 + s1808 * s5051 + s1810 * s5052) / pivot_trunk_x_dot
-    s5054 = s5052 / pivot_trunk_y_dot + s1810 * s5053
-    s5055 = s5051 / pivot_trunk_z_dot + s1807 * s5054 + s1808 * s5053
-    s5056 = s5047 / pivot_trunk_wx - s1799 * s5055 - s1800 * s5054 - s1801 * s5053
-    s5057 = s5046 / pivot_trunk_wy - s1792 * s5056 - s1793 * s5055 - s1794 * s5054 - s1795 * s5053
-    s5058 = s5045 / pivot_trunk_wz - s1782 * s5057 - s1783 * s5056 - s1784 * s5055 - s1785 * s5054
-    s5059 = s5058 - s1786 * s5053
-    s5060 = s1771 * s5059 + s1772 * s5057 + s1773 * s5056 + s1774 * s5055 + s1775 * s5054
-    s5061 = s5060 + s1776 * s5053
-    s5062 = s5041 / pivot_hind_left_abduction_angle_dot - s1765 * s5059 - s1766 * s5057
-    s5063 = s5062 - s1767 * s5056 - s1768 * s5055 - s1769 * s5054 - s1770 * s5053
-    s5064 = s1744 * s5059 + s1745 * s5057 + s1746 * s5056 + s1747 * s5055 + s1748 * s5054
-    s5065 = s5064 + s1749 * s5053
-    s5066 = s1738 * s5059 + s1739 * s5057 + s1740 * s5056 + s1741 * s5055 + s1742 * s5054
-    s5067 = s5066 + s1743 * s5053
-    s5068 = s1719 * s5061 - s1720 * s5059 - s1721 * s5057 - s1722 * s5056 - s1723 * s5055
-    s5069 = s5068 - s1724 * s5054 - s1725 * s5053
-    s5070 = s5040 / pivot_hind_left_swing_angle_dot - s1706 * s5063 - s1707 * s5059 - s1708 * s5057
-    s5071 = s5070 - s1709 * s5056 - s1710 * s5055 - s1711 * s5054 - s1712 * s5053
-    s5072 = s1693 * s5065 - s1694 * s5059 - s1695 * s5057 - s1696 * s5056 - s1697 * s5055
-    s5073 = s5072 - s1698 * s5054 - s1699 * s5053
-    s5074 = s1665 * s5067 - s1666 * s5059 - s1667 * s5057 - s1668 * s5056 - s1669 * s5055
-    s5075 = s5074 - s1670 * s5054 - s1671 * s5053
-    s5076 = s1651 * s5061 - s1650 * s5069 - s1652 * s5059 - s1653 * s5057 - s1654 * s5056
-    s5077 = s3594 / pivot_hind_left_knee_angle_dot + s1629 * s5071 + s1630 * s5063 + s1631 * s5059
-    s5078 = s5077 + s1632 * s5057 + s1633 * s5056 + s1634 * s5055 + s1635 * s5054 + s1636 * s5053
-    s5079 = s1615 * s5065 - s1614 * s5073 - s1616 * s5059 - s1617 * s5057 - s1618 * s5056
-    s5080 = s1600 * s5067 - s1599 * s5075 - s1601 * s5059 - s1602 * s5057 - s1603 * s5056
-    s5081 = s1650 * s3662 - (s945 * s3666 + s947 * s3667 + s949 * s3668)
-    s5082 = s1651 * s3662 - (s15 * s3676 + s18 * s3677 + s21 * s3678) - s1719 * s5081
-    s5083 = s1652 * s3662 - (s17 * s3687 + s20 * s3688 + s23 * s3689) - s1720 * s5081
-    s5084 = s1653 * s3662 - (s16 * s3687 + s19 * s3688 + s22 * s3689) - s1721 * s5081
-    s5085 = s1654 * s3662 - (s15 * s3687 + s18 * s3688 + s21 * s3689) - s1722 * s5081
-    s5086 = s5083 - s1771 * s5082
-    s5087 = s5084 - s1772 * s5082 - s1782 * s5086
-    s5088 = s5085 - s1773 * s5082 - s1783 * s5086 - s1792 * s5087
-    s5089 = s1655 * s3662 - s3657 - s1723 * s5081 - s1774 * s5082 - s1784 * s5086 - s1793 * s5087
-    s5090 = s1656 * s3662 - s3656 - s1724 * s5081 - s1775 * s5082 - s1785 * s5086 - s1794 * s5087
-    s5091 = s1657 * s3662 - s3655 - s1725 * s5081 - s1776 * s5082 - s1786 * s5086 - s1795 * s5087
-    s5092 = s5089 - s1799 * s5088
-    s5093 = s5090 - s1800 * s5088 + s1807 * s5092
-    s5094 = (s5091 - s1801 * s5088 + s1808 * s5092 + s1810 * s5093) / pivot_trunk_x_dot
-    s5095 = s5093 / pivot_trunk_y_dot + s1810 * s5094
-    s5096 = s5092 / pivot_trunk_z_dot + s1807 * s5095 + s1808 * s5094
-    s5097 = s5088 / pivot_trunk_wx - s1799 * s5096 - s1800 * s5095 - s1801 * s5094
-    s5098 = s5087 / pivot_trunk_wy - s1792 * s5097 - s1793 * s5096 - s1794 * s5095 - s1795 * s5094
-    s5099 = s5086 / pivot_trunk_wz - s1782 * s5098 - s1783 * s5097 - s1784 * s5096 - s1785 * s5095
-    s5100 = s5099 - s1786 * s5094
-    s5101 = s5082 / pivot_hind_right_abduction_angle_dot - s1771 * s5100 - s1772 * s5098
-    s5102 = s5101 - s1773 * s5097 - s1774 * s5096 - s1775 * s5095 - s1776 * s5094
-    s5103 = s1765 * s5100 + s1766 * s5098 + s1767 * s5097 + s1768 * s5096 + s1769 * s5095
-    s5104 = s5103 + s1770 * s5094
-    s5105 = s1744 * s5100 + s1745 * s5098 + s1746 * s5097 + s1747 * s5096 + s1748 * s5095
-    s5106 = s5105 + s1749 * s5094
-    s5107 = s1738 * s5100 + s1739 * s5098 + s1740 * s5097 + s1741 * s5096 + s1742 * s5095
-    s5108 = s5107 + s1743 * s5094
-    s5109 = s5081 / pivot_hind_right_swing_angle_dot - s1719 * s5102 - s1720 * s5100 - s1721 * s5098
-    s5110 = s5109 - s1722 * s5097 - s1723 * s5096 - s1724 * s5095 - s1725 * s5094
-    s5111 = s1706 * s5104 - s1707 * s5100 - s1708 * s5098 - s1709 * s5097 - s1710 * s5096
-    s5112 = s5111 - s1711 * s5095 - s1712 * s5094
-    s5113 = s1693 * s5106 - s1694 * s5100 - s1695 * s5098 - s1696 * s5097 - s1697 * s5096
-    s5114 = s5113 - s1698 * s5095 - s1699 * s5094
-    s5115 = s1665 * s5108 - s1666 * s5100 - s1667 * s5098 - s1668 * s5097 - s1669 * s5096
-    s5116 = s5115 - s1670 * s5095 - s1671 * s5094
-    s5117 = s3662 / pivot_hind_right_knee_angle_dot + s1650 * s5110 + s1651 * s5102 + s1652 * s5100
-    s5118 = s5117 + s1653 * s5098 + s1654 * s5097 + s1655 * s5096 + s1656 * s5095 + s1657 * s5094
-    s5119 = s1630 * s5104 - s1629 * s5112 - s1631 * s5100 - s1632 * s5098 - s1633 * s5097
-    s5120 = s1615 * s5106 - s1614 * s5114 - s1616 * s5100 - s1617 * s5098 - s1618 * s5097
-    s5121 = s1600 * s5108 - s1599 * s5116 - s1601 * s5100 - s1602 * s5098 - s1603 * s5097
-    s5122 = -s924
-    s5123 = -s926
-    s5124 = -s925
-    s5125 = trunk_qx * 0.5
-    s5126 = -s5125
-    s5127 = trunk_qw * 0.5
-    s5128 = trunk_qz * 0.5
-    s5129 = trunk_qy * 0.5
-    s5130 = -s5129
-    s5131 = -s5128
+    s2673 = omega_trunk_y * velocity_front_left_hip_z - omega_trunk_z * velocity_front_left_hip_y
+    s2674 = omega_trunk_z * velocity_front_left_hip_x - omega_trunk_x * velocity_front_left_hip_z
+    s2675 = omega_trunk_x * velocity_front_left_hip_y - omega_trunk_y * velocity_front_left_hip_x
+    s2676 = a_front_left_hip_x - s2673
+    s2677 = a_front_left_hip_y - s2674
+    s2678 = a_front_left_hip_z - s2675
+    s2679 = s21 * velocity_front_left_hip_y - s18 * velocity_front_left_hip_z
+    s2680 = s15 * velocity_front_left_hip_z - s21 * velocity_front_left_hip_x
+    s2681 = s18 * velocity_front_left_hip_x - s15 * velocity_front_left_hip_y
+    s2682 = velocity_front_left_hip_y * s2645 - velocity_front_left_hip_z * s2644 + (omega_trunk_y * s2681 - omega_trunk_z * s2680)
+    s2683 = velocity_front_left_hip_z * s2643 - velocity_front_left_hip_x * s2645 + (omega_trunk_z * s2679 - omega_trunk_x * s2681)
+    s2684 = velocity_front_left_hip_x * s2644 - velocity_front_left_hip_y * s2643 + (omega_trunk_x * s2680 - omega_trunk_y * s2679)
+    s2685 = s21 * s1831 - s18 * s1832 + (omega_trunk_y * s2645 - omega_trunk_z * s2644)
+    s2686 = s15 * s1832 - s21 * s1830 + (omega_trunk_z * s2643 - omega_trunk_x * s2645)
+    s2687 = s18 * s1830 - s15 * s1831 + (omega_trunk_x * s2644 - omega_trunk_y * s2643)
+    s2688 = s21 * s2677 - s18 * s2678 + s2682
+    s2689 = s15 * s2678 - s21 * s2676 + s2683
+    s2690 = s18 * s2676 - s15 * s2677 + s2684
+    s2691 = s2643 + s2643
+    s2692 = s2644 + s2644
+    s2693 = s2645 + s2645
+    s2694 = s2679 + s2679
+    s2695 = s2680 + s2680
+    s2696 = s2681 + s2681
+    s2697 = omega_trunk_y * velocity_front_right_hip_z - omega_trunk_z * velocity_front_right_hip_y
+    s2698 = omega_trunk_z * velocity_front_right_hip_x - omega_trunk_x * velocity_front_right_hip_z
+    s2699 = omega_trunk_x * velocity_front_right_hip_y - omega_trunk_y * velocity_front_right_hip_x
+    s2700 = a_front_right_hip_x - s2697
+    s2701 = a_front_right_hip_y - s2698
+    s2702 = a_front_right_hip_z - s2699
+    s2703 = s21 * velocity_front_right_hip_y - s18 * velocity_front_right_hip_z
+    s2704 = s15 * velocity_front_right_hip_z - s21 * velocity_front_right_hip_x
+    s2705 = s18 * velocity_front_right_hip_x - s15 * velocity_front_right_hip_y
+    s2706 = velocity_front_right_hip_y * s2645 - velocity_front_right_hip_z * s2644 + (omega_trunk_y * s2705 - omega_trunk_z * s2704)
+    s2707 = velocity_front_right_hip_z * s2643 - velocity_front_right_hip_x * s2645 + (omega_trunk_z * s2703 - omega_trunk_x * s2705)
+    s2708 = velocity_front_right_hip_x * s2644 - velocity_front_right_hip_y * s2643 + (omega_trunk_x * s2704 - omega_trunk_y * s2703)
+    s2709 = s21 * s2701 - s18 * s2702 + s2706
+    s2710 = s15 * s2702 - s21 * s2700 + s2707
+    s2711 = s18 * s2700 - s15 * s2701 + s2708
+    s2712 = s2703 + s2703
+    s2713 = s2704 + s2704
+    s2714 = s2705 + s2705
+    s2715 = omega_trunk_y * velocity_hind_left_hip_z - omega_trunk_z * velocity_hind_left_hip_y
+    s2716 = omega_trunk_z * velocity_hind_left_hip_x - omega_trunk_x * velocity_hind_left_hip_z
+    s2717 = omega_trunk_x * velocity_hind_left_hip_y - omega_trunk_y * velocity_hind_left_hip_x
+    s2718 = a_hind_left_hip_x - s2715
+    s2719 = a_hind_left_hip_y - s2716
+    s2720 = a_hind_left_hip_z - s2717
+    s2721 = s21 * velocity_hind_left_hip_y - s18 * velocity_hind_left_hip_z
+    s2722 = s15 * velocity_hind_left_hip_z - s21 * velocity_hind_left_hip_x
+    s2723 = s18 * velocity_hind_left_hip_x - s15 * velocity_hind_left_hip_y
+    s2724 = velocity_hind_left_hip_y * s2645 - velocity_hind_left_hip_z * s2644 + (omega_trunk_y * s2723 - omega_trunk_z * s2722)
+    s2725 = velocity_hind_left_hip_z * s2643 - velocity_hind_left_hip_x * s2645 + (omega_trunk_z * s2721 - omega_trunk_x * s2723)
+    s2726 = velocity_hind_left_hip_x * s2644 - velocity_hind_left_hip_y * s2643 + (omega_trunk_x * s2722 - omega_trunk_y * s2721)
+    s2727 = s21 * s2719 - s18 * s2720 + s2724
+    s2728 = s15 * s2720 - s21 * s2718 + s2725
+    s2729 = s18 * s2718 - s15 * s2719 + s2726
+    s2730 = s2721 + s2721
+    s2731 = s2722 + s2722
+    s2732 = s2723 + s2723
+    s2733 = omega_trunk_y * velocity_hind_right_hip_z - omega_trunk_z * velocity_hind_right_hip_y
+    s2734 = omega_trunk_z * velocity_hind_right_hip_x - omega_trunk_x * velocity_hind_right_hip_z
+    s2735 = omega_trunk_x * velocity_hind_right_hip_y - omega_trunk_y * velocity_hind_right_hip_x
+    s2736 = a_hind_right_hip_x - s2733
+    s2737 = a_hind_right_hip_y - s2734
+    s2738 = a_hind_right_hip_z - s2735
+    s2739 = s21 * velocity_hind_right_hip_y - s18 * velocity_hind_right_hip_z
+    s2740 = s15 * velocity_hind_right_hip_z - s21 * velocity_hind_right_hip_x
+    s2741 = s18 * velocity_hind_right_hip_x - s15 * velocity_hind_right_hip_y
+    s2742 = velocity_hind_right_hip_y * s2645 - velocity_hind_right_hip_z * s2644 + (omega_trunk_y * s2741 - omega_trunk_z * s2740)
+    s2743 = velocity_hind_right_hip_z * s2643 - velocity_hind_right_hip_x * s2645 + (omega_trunk_z * s2739 - omega_trunk_x * s2741)
+    s2744 = velocity_hind_right_hip_x * s2644 - velocity_hind_right_hip_y * s2643 + (omega_trunk_x * s2740 - omega_trunk_y * s2739)
+    s2745 = s21 * s2737 - s18 * s2738 + s2742
+    s2746 = s15 * s2738 - s21 * s2736 + s2743
+    s2747 = s18 * s2736 - s15 * s2737 + s2744
+    s2748 = s2739 + s2739
+    s2749 = s2740 + s2740
+    s2750 = s2741 + s2741
+    s2751 = omega_front_left_hip_y_2 * velocity_front_left_thigh_z - omega_front_left_hip_z_2 * velocity_front_left_thigh_y
+    s2752 = omega_front_left_hip_z_2 * velocity_front_left_thigh_x - omega_front_left_hip_x_2 * velocity_front_left_thigh_z
+    s2753 = omega_front_left_hip_x_2 * velocity_front_left_thigh_y - omega_front_left_hip_y_2 * velocity_front_left_thigh_x
+    s2754 = a_front_left_thigh_x - s2751
+    s2755 = a_front_left_thigh_y - s2752
+    s2756 = a_front_left_thigh_z - s2753
+    s2757 = s905 * omega_front_left_hip_y_2 - s903 * omega_front_left_hip_z_2
+    s2758 = s901 * omega_front_left_hip_z_2 - s905 * omega_front_left_hip_x_2
+    s2759 = s903 * omega_front_left_hip_x_2 - s901 * omega_front_left_hip_y_2
+    s2760 = s905 * velocity_front_left_thigh_y - s903 * velocity_front_left_thigh_z
+    s2761 = s901 * velocity_front_left_thigh_z - s905 * velocity_front_left_thigh_x
+    s2762 = s903 * velocity_front_left_thigh_x - s901 * velocity_front_left_thigh_y
+    s2763 = velocity_front_left_thigh_y * s2759 - velocity_front_left_thigh_z * s2758
+    s2764 = velocity_front_left_thigh_z * s2757 - velocity_front_left_thigh_x * s2759
+    s2765 = velocity_front_left_thigh_x * s2758 - velocity_front_left_thigh_y * s2757
+    s2766 = s2763 + (omega_front_left_hip_y_2 * s2762 - omega_front_left_hip_z_2 * s2761)
+    s2767 = s2764 + (omega_front_left_hip_z_2 * s2760 - omega_front_left_hip_x_2 * s2762)
+    s2768 = s2765 + (omega_front_left_hip_x_2 * s2761 - omega_front_left_hip_y_2 * s2760)
+    s2769 = s905 * s1854 - s903 * s1855 + (omega_front_left_hip_y_2 * s2759 - omega_front_left_hip_z_2 * s2758)
+    s2770 = s901 * s1855 - s905 * s1853 + (omega_front_left_hip_z_2 * s2757 - omega_front_left_hip_x_2 * s2759)
+    s2771 = s903 * s1853 - s901 * s1854 + (omega_front_left_hip_x_2 * s2758 - omega_front_left_hip_y_2 * s2757)
+    s2772 = s905 * s2755 - s903 * s2756 + s2766
+    s2773 = s901 * s2756 - s905 * s2754 + s2767
+    s2774 = s903 * s2754 - s901 * s2755 + s2768
+    s2775 = s2757 + s2757
+    s2776 = s2758 + s2758
+    s2777 = s2759 + s2759
+    s2778 = s2760 + s2760
+    s2779 = s2761 + s2761
+    s2780 = s2762 + s2762
+    s2781 = omega_front_right_hip_y_2 * velocity_front_right_thigh_z - omega_front_right_hip_z_2 * velocity_front_right_thigh_y
+    s2782 = omega_front_right_hip_z_2 * velocity_front_right_thigh_x - omega_front_right_hip_x_2 * velocity_front_right_thigh_z
+    s2783 = omega_front_right_hip_x_2 * velocity_front_right_thigh_y - omega_front_right_hip_y_2 * velocity_front_right_thigh_x
+    s2784 = a_front_right_thigh_x - s2781
+    s2785 = a_front_right_thigh_y - s2782
+    s2786 = a_front_right_thigh_z - s2783
+    s2787 = s911 * omega_front_right_hip_y_2 - s909 * omega_front_right_hip_z_2
+    s2788 = s907 * omega_front_right_hip_z_2 - s911 * omega_front_right_hip_x_2
+    s2789 = s909 * omega_front_right_hip_x_2 - s907 * omega_front_right_hip_y_2
+    s2790 = s911 * velocity_front_right_thigh_y - s909 * velocity_front_right_thigh_z
+    s2791 = s907 * velocity_front_right_thigh_z - s911 * velocity_front_right_thigh_x
+    s2792 = s909 * velocity_front_right_thigh_x - s907 * velocity_front_right_thigh_y
+    s2793 = velocity_front_right_thigh_y * s2789 - velocity_front_right_thigh_z * s2788
+    s2794 = velocity_front_right_thigh_z * s2787 - velocity_front_right_thigh_x * s2789
+    s2795 = velocity_front_right_thigh_x * s2788 - velocity_front_right_thigh_y * s2787
+    s2796 = s2793 + (omega_front_right_hip_y_2 * s2792 - omega_front_right_hip_z_2 * s2791)
+    s2797 = s2794 + (omega_front_right_hip_z_2 * s2790 - omega_front_right_hip_x_2 * s2792)
+    s2798 = s2795 + (omega_front_right_hip_x_2 * s2791 - omega_front_right_hip_y_2 * s2790)
+    s2799 = s911 * s1869 - s909 * s1870 + (omega_front_right_hip_y_2 * s2789 - omega_front_right_hip_z_2 * s2788)
+    s2800 = s907 * s1870 - s911 * s1868 + (omega_front_right_hip_z_2 * s2787 - omega_front_right_hip_x_2 * s2789)
+    s2801 = s909 * s1868 - s907 * s1869 + (omega_front_right_hip_x_2 * s2788 - omega_front_right_hip_y_2 * s2787)
+    s2802 = s911 * s2785 - s909 * s2786 + s2796
+    s2803 = s907 * s2786 - s911 * s2784 + s2797
+    s2804 = s909 * s2784 - s907 * s2785 + s2798
+    s2805 = s2787 + s2787
+    s2806 = s2788 + s2788
+    s2807 = s2789 + s2789
+    s2808 = s2790 + s2790
+    s2809 = s2791 + s2791
+    s2810 = s2792 + s2792
+    s2811 = omega_hind_left_hip_y_2 * velocity_hind_left_thigh_z - omega_hind_left_hip_z_2 * velocity_hind_left_thigh_y
+    s2812 = omega_hind_left_hip_z_2 * velocity_hind_left_thigh_x - omega_hind_left_hip_x_2 * velocity_hind_left_thigh_z
+    s2813 = omega_hind_left_hip_x_2 * velocity_hind_left_thigh_y - omega_hind_left_hip_y_2 * velocity_hind_left_thigh_x
+    s2814 = a_hind_left_thigh_x - s2811
+    s2815 = a_hind_left_thigh_y - s2812
+    s2816 = a_hind_left_thigh_z - s2813
+    s2817 = s917 * omega_hind_left_hip_y_2 - s915 * omega_hind_left_hip_z_2
+    s2818 = s913 * omega_hind_left_hip_z_2 - s917 * omega_hind_left_hip_x_2
+    s2819 = s915 * omega_hind_left_hip_x_2 - s913 * omega_hind_left_hip_y_2
+    s2820 = s917 * velocity_hind_left_thigh_y - s915 * velocity_hind_left_thigh_z
+    s2821 = s913 * velocity_hind_left_thigh_z - s917 * velocity_hind_left_thigh_x
+    s2822 = s915 * velocity_hind_left_thigh_x - s913 * velocity_hind_left_thigh_y
+    s2823 = velocity_hind_left_thigh_y * s2819 - velocity_hind_left_thigh_z * s2818 + (omega_hind_left_hip_y_2 * s2822 - omega_hind_left_hip_z_2 * s2821)
+    s2824 = velocity_hind_left_thigh_z * s2817 - velocity_hind_left_thigh_x * s2819 + (omega_hind_left_hip_z_2 * s2820 - omega_hind_left_hip_x_2 * s2822)
+    s2825 = velocity_hind_left_thigh_x * s2818 - velocity_hind_left_thigh_y * s2817 + (omega_hind_left_hip_x_2 * s2821 - omega_hind_left_hip_y_2 * s2820)
+    s2826 = s917 * s1884 - s915 * s1885 + (omega_hind_left_hip_y_2 * s2819 - omega_hind_left_hip_z_2 * s2818)
+    s2827 = s913 * s1885 - s917 * s1883 + (omega_hind_left_hip_z_2 * s2817 - omega_hind_left_hip_x_2 * s2819)
+    s2828 = s915 * s1883 - s913 * s1884 + (omega_hind_left_hip_x_2 * s2818 - omega_hind_left_hip_y_2 * s2817)
+    s2829 = s917 * s2815 - s915 * s2816 + s2823
+    s2830 = s913 * s2816 - s917 * s2814 + s2824
+    s2831 = s915 * s2814 - s913 * s2815 + s2825
+    s2832 = s2817 + s2817
+    s2833 = s2818 + s2818
+    s2834 = s2819 + s2819
+    s2835 = s2820 + s2820
+    s2836 = s2821 + s2821
+    s2837 = s2822 + s2822
+    s2838 = omega_hind_right_hip_y_2 * velocity_hind_right_thigh_z - omega_hind_right_hip_z_2 * velocity_hind_right_thigh_y
+    s2839 = omega_hind_right_hip_z_2 * velocity_hind_right_thigh_x - omega_hind_right_hip_x_2 * velocity_hind_right_thigh_z
+    s2840 = omega_hind_right_hip_x_2 * velocity_hind_right_thigh_y - omega_hind_right_hip_y_2 * velocity_hind_right_thigh_x
+    s2841 = a_hind_right_thigh_x - s2838
+    s2842 = a_hind_right_thigh_y - s2839
+    s2843 = a_hind_right_thigh_z - s2840
+    s2844 = s923 * omega_hind_right_hip_y_2 - s921 * omega_hind_right_hip_z_2
+    s2845 = s919 * omega_hind_right_hip_z_2 - s923 * omega_hind_right_hip_x_2
+    s2846 = s921 * omega_hind_right_hip_x_2 - s919 * omega_hind_right_hip_y_2
+    s2847 = s923 * velocity_hind_right_thigh_y - s921 * velocity_hind_right_thigh_z
+    s2848 = s919 * velocity_hind_right_thigh_z - s923 * velocity_hind_right_thigh_x
+    s2849 = s921 * velocity_hind_right_thigh_x - s919 * velocity_hind_right_thigh_y
+    s2850 = velocity_hind_right_thigh_y * s2846 - velocity_hind_right_thigh_z * s2845
+    s2851 = velocity_hind_right_thigh_z * s2844 - velocity_hind_right_thigh_x * s2846
+    s2852 = velocity_hind_right_thigh_x * s2845 - velocity_hind_right_thigh_y * s2844
+    s2853 = s2850 + (omega_hind_right_hip_y_2 * s2849 - omega_hind_right_hip_z_2 * s2848)
+    s2854 = s2851 + (omega_hind_right_hip_z_2 * s2847 - omega_hind_right_hip_x_2 * s2849)
+    s2855 = s2852 + (omega_hind_right_hip_x_2 * s2848 - omega_hind_right_hip_y_2 * s2847)
+    s2856 = s923 * s1899 - s921 * s1900 + (omega_hind_right_hip_y_2 * s2846 - omega_hind_right_hip_z_2 * s2845)
+    s2857 = s919 * s1900 - s923 * s1898 + (omega_hind_right_hip_z_2 * s2844 - omega_hind_right_hip_x_2 * s2846)
+    s2858 = s921 * s1898 - s919 * s1899 + (omega_hind_right_hip_x_2 * s2845 - omega_hind_right_hip_y_2 * s2844)
+    s2859 = s923 * s2842 - s921 * s2843 + s2853
+    s2860 = s919 * s2843 - s923 * s2841 + s2854
+    s2861 = s921 * s2841 - s919 * s2842 + s2855
+    s2862 = s2844 + s2844
+    s2863 = s2845 + s2845
+    s2864 = s2846 + s2846
+    s2865 = s2847 + s2847
+    s2866 = s2848 + s2848
+    s2867 = s2849 + s2849
+    s2868 = omega_front_left_thigh_y_2 * velocity_front_left_shank_z - omega_front_left_thigh_z_2 * velocity_front_left_shank_y
+    s2869 = omega_front_left_thigh_z_2 * velocity_front_left_shank_x - omega_front_left_thigh_x_2 * velocity_front_left_shank_z
+    s2870 = omega_front_left_thigh_x_2 * velocity_front_left_shank_y - omega_front_left_thigh_y_2 * velocity_front_left_shank_x
+    s2871 = a_front_left_shank_x - s2868
+    s2872 = a_front_left_shank_y - s2869
+    s2873 = a_front_left_shank_z - s2870
+    s2874 = s905 * omega_front_left_thigh_y_2 - s903 * omega_front_left_thigh_z_2
+    s2875 = s901 * omega_front_left_thigh_z_2 - s905 * omega_front_left_thigh_x_2
+    s2876 = s903 * omega_front_left_thigh_x_2 - s901 * omega_front_left_thigh_y_2
+    s2877 = s905 * velocity_front_left_shank_y - s903 * velocity_front_left_shank_z
+    s2878 = s901 * velocity_front_left_shank_z - s905 * velocity_front_left_shank_x
+    s2879 = s903 * velocity_front_left_shank_x - s901 * velocity_front_left_shank_y
+    s2880 = velocity_front_left_shank_y * s2876 - velocity_front_left_shank_z * s2875
+    s2881 = velocity_front_left_shank_z * s2874 - velocity_front_left_shank_x * s2876
+    s2882 = velocity_front_left_shank_x * s2875 - velocity_front_left_shank_y * s2874
+    s2883 = s2880 + (omega_front_left_thigh_y_2 * s2879 - omega_front_left_thigh_z_2 * s2878)
+    s2884 = s2881 + (omega_front_left_thigh_z_2 * s2877 - omega_front_left_thigh_x_2 * s2879)
+    s2885 = s2882 + (omega_front_left_thigh_x_2 * s2878 - omega_front_left_thigh_y_2 * s2877)
+    s2886 = s905 * s1917 - s903 * s1918 + (omega_front_left_thigh_y_2 * s2876 - omega_front_left_thigh_z_2 * s2875)
+    s2887 = s901 * s1918 - s905 * s1916 + (omega_front_left_thigh_z_2 * s2874 - omega_front_left_thigh_x_2 * s2876)
+    s2888 = s903 * s1916 - s901 * s1917 + (omega_front_left_thigh_x_2 * s2875 - omega_front_left_thigh_y_2 * s2874)
+    s2889 = s905 * s2872 - s903 * s2873 + s2883
+    s2890 = s901 * s2873 - s905 * s2871 + s2884
+    s2891 = s903 * s2871 - s901 * s2872 + s2885
+    s2892 = s2874 + s2874
+    s2893 = s2875 + s2875
+    s2894 = s2876 + s2876
+    s2895 = s2877 + s2877
+    s2896 = s2878 + s2878
+    s2897 = s2879 + s2879
+    s2898 = omega_front_right_thigh_y_2 * velocity_front_right_shank_z - omega_front_right_thigh_z_2 * velocity_front_right_shank_y
+    s2899 = omega_front_right_thigh_z_2 * velocity_front_right_shank_x - omega_front_right_thigh_x_2 * velocity_front_right_shank_z
+    s2900 = omega_front_right_thigh_x_2 * velocity_front_right_shank_y - omega_front_right_thigh_y_2 * velocity_front_right_shank_x
+    s2901 = a_front_right_shank_x - s2898
+    s2902 = a_front_right_shank_y - s2899
+    s2903 = a_front_right_shank_z - s2900
+    s2904 = s911 * omega_front_right_thigh_y_2 - s909 * omega_front_right_thigh_z_2
+    s2905 = s907 * omega_front_right_thigh_z_2 - s911 * omega_front_right_thigh_x_2
+    s2906 = s909 * omega_front_right_thigh_x_2 - s907 * omega_front_right_thigh_y_2
+    s2907 = s911 * velocity_front_right_shank_y - s909 * velocity_front_right_shank_z
+    s2908 = s907 * velocity_front_right_shank_z - s911 * velocity_front_right_shank_x
+    s2909 = s909 * velocity_front_right_shank_x - s907 * velocity_front_right_shank_y
+    s2910 = omega_front_right_thigh_y_2 * s2906 - omega_front_right_thigh_z_2 * s2905
+    s2911 = omega_front_right_thigh_z_2 * s2904 - omega_front_right_thigh_x_2 * s2906
+    s2912 = omega_front_right_thigh_x_2 * s2905 - omega_front_right_thigh_y_2 * s2904
+    s2913 = velocity_front_right_shank_y * s2906 - velocity_front_right_shank_z * s2905
+    s2914 = velocity_front_right_shank_z * s2904 - velocity_front_right_shank_x * s2906
+    s2915 = velocity_front_right_shank_x * s2905 - velocity_front_right_shank_y * s2904
+    s2916 = omega_front_right_thigh_y_2 * s2909 - omega_front_right_thigh_z_2 * s2908
+    s2917 = omega_front_right_thigh_z_2 * s2907 - omega_front_right_thigh_x_2 * s2909
+    s2918 = omega_front_right_thigh_x_2 * s2908 - omega_front_right_thigh_y_2 * s2907
+    s2919 = s911 * s1935 - s909 * s1936 + s2910
+    s2920 = s907 * s1936 - s911 * s1934 + s2911
+    s2921 = s909 * s1934 - s907 * s1935 + s2912
+    s2922 = s911 * s2902 - s909 * s2903 + (s2913 + s2916)
+    s2923 = s907 * s2903 - s911 * s2901 + (s2914 + s2917)
+    s2924 = s909 * s2901 - s907 * s2902 + (s2915 + s2918)
+    s2925 = s2904 + s2904
+    s2926 = s2905 + s2905
+    s2927 = s2906 + s2906
+    s2928 = s2907 + s2907
+    s2929 = s2908 + s2908
+    s2930 = s2909 + s2909
+    s2931 = omega_hind_left_thigh_y_2 * velocity_hind_left_shank_z - omega_hind_left_thigh_z_2 * velocity_hind_left_shank_y
+    s2932 = omega_hind_left_thigh_z_2 * velocity_hind_left_shank_x - omega_hind_left_thigh_x_2 * velocity_hind_left_shank_z
+    s2933 = omega_hind_left_thigh_x_2 * velocity_hind_left_shank_y - omega_hind_left_thigh_y_2 * velocity_hind_left_shank_x
+    s2934 = a_hind_left_shank_x - s2931
+    s2935 = a_hind_left_shank_y - s2932
+    s2936 = a_hind_left_shank_z - s2933
+    s2937 = s917 * omega_hind_left_thigh_y_2 - s915 * omega_hind_left_thigh_z_2
+    s2938 = s913 * omega_hind_left_thigh_z_2 - s917 * omega_hind_left_thigh_x_2
+    s2939 = s915 * omega_hind_left_thigh_x_2 - s913 * omega_hind_left_thigh_y_2
+    s2940 = s917 * velocity_hind_left_shank_y - s915 * velocity_hind_left_shank_z
+    s2941 = s913 * velocity_hind_left_shank_z - s917 * velocity_hind_left_shank_x
+    s2942 = s915 * velocity_hind_left_shank_x - s913 * velocity_hind_left_shank_y
+    s2943 = velocity_hind_left_shank_y * s2939 - velocity_hind_left_shank_z * s2938 + (omega_hind_left_thigh_y_2 * s2942 - omega_hind_left_thigh_z_2 * s2941)
+    s2944 = velocity_hind_left_shank_z * s2937 - velocity_hind_left_shank_x * s2939 + (omega_hind_left_thigh_z_2 * s2940 - omega_hind_left_thigh_x_2 * s2942)
+    s2945 = velocity_hind_left_shank_x * s2938 - velocity_hind_left_shank_y * s2937 + (omega_hind_left_thigh_x_2 * s2941 - omega_hind_left_thigh_y_2 * s2940)
+    s2946 = s917 * s1956 - s915 * s1957 + (omega_hind_left_thigh_y_2 * s2939 - omega_hind_left_thigh_z_2 * s2938)
+    s2947 = s913 * s1957 - s917 * s1955 + (omega_hind_left_thigh_z_2 * s2937 - omega_hind_left_thigh_x_2 * s2939)
+    s2948 = s915 * s1955 - s913 * s1956 + (omega_hind_left_thigh_x_2 * s2938 - omega_hind_left_thigh_y_2 * s2937)
+    s2949 = s917 * s2935 - s915 * s2936 + s2943
+    s2950 = s913 * s2936 - s917 * s2934 + s2944
+    s2951 = s915 * s2934 - s913 * s2935 + s2945
+    s2952 = s2937 + s2937
+    s2953 = s2938 + s2938
+    s2954 = s2939 + s2939
+    s2955 = s2940 + s2940
+    s2956 = s2941 + s2941
+    s2957 = s2942 + s2942
+    s2958 = omega_hind_right_thigh_y_2 * velocity_hind_right_shank_z - omega_hind_right_thigh_z_2 * velocity_hind_right_shank_y
+    s2959 = omega_hind_right_thigh_z_2 * velocity_hind_right_shank_x - omega_hind_right_thigh_x_2 * velocity_hind_right_shank_z
+    s2960 = omega_hind_right_thigh_x_2 * velocity_hind_right_shank_y - omega_hind_right_thigh_y_2 * velocity_hind_right_shank_x
+    s2961 = a_hind_right_shank_x - s2958
+    s2962 = a_hind_right_shank_y - s2959
+    s2963 = a_hind_right_shank_z - s2960
+    s2964 = s923 * omega_hind_right_thigh_y_2 - s921 * omega_hind_right_thigh_z_2
+    s2965 = s919 * omega_hind_right_thigh_z_2 - s923 * omega_hind_right_thigh_x_2
+    s2966 = s921 * omega_hind_right_thigh_x_2 - s919 * omega_hind_right_thigh_y_2
+    s2967 = s923 * velocity_hind_right_shank_y - s921 * velocity_hind_right_shank_z
+    s2968 = s919 * velocity_hind_right_shank_z - s923 * velocity_hind_right_shank_x
+    s2969 = s921 * velocity_hind_right_shank_x - s919 * velocity_hind_right_shank_y
+    s2970 = velocity_hind_right_shank_y * s2966 - velocity_hind_right_shank_z * s2965
+    s2971 = velocity_hind_right_shank_z * s2964 - velocity_hind_right_shank_x * s2966
+    s2972 = velocity_hind_right_shank_x * s2965 - velocity_hind_right_shank_y * s2964
+    s2973 = s2970 + (omega_hind_right_thigh_y_2 * s2969 - omega_hind_right_thigh_z_2 * s2968)
+    s2974 = s2971 + (omega_hind_right_thigh_z_2 * s2967 - omega_hind_right_thigh_x_2 * s2969)
+    s2975 = s2972 + (omega_hind_right_thigh_x_2 * s2968 - omega_hind_right_thigh_y_2 * s2967)
+    s2976 = s923 * s1974 - s921 * s1975 + (omega_hind_right_thigh_y_2 * s2966 - omega_hind_right_thigh_z_2 * s2965)
+    s2977 = s919 * s1975 - s923 * s1973 + (omega_hind_right_thigh_z_2 * s2964 - omega_hind_right_thigh_x_2 * s2966)
+    s2978 = s921 * s1973 - s919 * s1974 + (omega_hind_right_thigh_x_2 * s2965 - omega_hind_right_thigh_y_2 * s2964)
+    s2979 = s923 * s2962 - s921 * s2963 + s2973
+    s2980 = s919 * s2963 - s923 * s2961 + s2974
+    s2981 = s921 * s2961 - s919 * s2962 + s2975
+    s2982 = s2964 + s2964
+    s2983 = s2965 + s2965
+    s2984 = s2966 + s2966
+    s2985 = s2967 + s2967
+    s2986 = s2968 + s2968
+    s2987 = s2969 + s2969
+    s2988 = 2.0 * s15
+    s2989 = 2.0 * s18
+    s2990 = 2.0 * s21
+    s2991 = s2628 * s2988 + s2631 * s2989 + s2634 * s2990
+    s2992 = s2629 * s2988 + s2632 * s2989 + s2635 * s2990
+    s2993 = s2630 * s2988 + s2633 * s2989 + s2636 * s2990
+    s2994 = s18 * s2227 - s21 * s2226 + k30 * s2640
+    s2995 = s21 * s2225 - s15 * s2227 + k30 * s2641
+    s2996 = s15 * s2226 - s18 * s2225 - k30 * s2642
+    s2997 = k30 * s2646 + (s1384 * s2644 - s1383 * s2645) + (s2627 * s2989 - s2626 * s2990)
+    s2998 = k30 * s2647 + (s1382 * s2645 - s1384 * s2643) + (s2625 * s2990 - s2627 * s2988)
+    s2999 = k30 * s2648 + (s1383 * s2643 - s1382 * s2644) + (s2626 * s2988 - s2625 * s2989)
+    s3000 = s1391 * s2640 + s1392 * s2641 - s1393 * s2642
+    s3001 = s1394 * s2643 + s1395 * s2644 + s1396 * s2645 + (s1391 * s2646 + s1392 * s2647 + s1393 * s2648)
+    s3002 = s1391 * s2652 + s1392 * s2653 - s1393 * s2654
+    s3003 = s1394 * s2655 + s1395 * s2656 + s1396 * s2657 + (s1391 * s2658 + s1392 * s2659 + s1393 * s2660)
+    s3004 = s1391 * s2664 + s1392 * s2665 - s1393 * s2666
+    s3005 = s1394 * s2667 + s1395 * s2668 + s1396 * s2669 + (s1391 * s2670 + s1392 * s2671 + s1393 * s2672)
+    s3006 = 2.0 * s16
+    s3007 = 2.0 * s19
+    s3008 = 2.0 * s22
+    s3009 = s2628 * s3006 + s2631 * s3007 + s2634 * s3008
+    s3010 = s2629 * s3006 + s2632 * s3007 + s2635 * s3008
+    s3011 = s2630 * s3006 + s2633 * s3007 + s2636 * s3008
+    s3012 = s19 * s2227 - s22 * s2226 + k30 * s2652
+    s3013 = s22 * s2225 - s16 * s2227 + k30 * s2653
+    s3014 = s16 * s2226 - s19 * s2225 - k30 * s2654
+    s3015 = k30 * s2658 + (s1384 * s2656 - s1383 * s2657) + (s2627 * s3007 - s2626 * s3008)
+    s3016 = k30 * s2659 + (s1382 * s2657 - s1384 * s2655) + (s2625 * s3008 - s2627 * s3006)
+    s3017 = k30 * s2660 + (s1383 * s2655 - s1382 * s2656) + (s2626 * s3006 - s2625 * s3007)
+    s3018 = s1397 * s2640 + s1398 * s2641 - s1399 * s2642
+    s3019 = s1400 * s2643 + s1401 * s2644 + s1402 * s2645 + (s1397 * s2646 + s1398 * s2647 + s1399 * s2648)
+    s3020 = s1397 * s2652 + s1398 * s2653 - s1399 * s2654
+    s3021 = s1400 * s2655 + s1401 * s2656 + s1402 * s2657 + (s1397 * s2658 + s1398 * s2659 + s1399 * s2660)
+    s3022 = s1397 * s2664 + s1398 * s2665 - s1399 * s2666
+    s3023 = s1400 * s2667 + s1401 * s2668 + s1402 * s2669 + (s1397 * s2670 + s1398 * s2671 + s1399 * s2672)
+    s3024 = 2.0 * s17
+    s3025 = 2.0 * s20
+    s3026 = 2.0 * s23
+    s3027 = s2628 * s3024 + s2631 * s3025 + s2634 * s3026
+    s3028 = s2629 * s3024 + s2632 * s3025 + s2635 * s3026
+    s3029 = s2630 * s3024 + s2633 * s3025 + s2636 * s3026
+    s3030 = s20 * s2227 - s23 * s2226 + k30 * s2664
+    s3031 = s23 * s2225 - s17 * s2227 + k30 * s2665
+    s3032 = s17 * s2226 - s20 * s2225 - k30 * s2666
+    s3033 = k30 * s2670 + (s1384 * s2668 - s1383 * s2669) + (s2627 * s3025 - s2626 * s3026)
+    s3034 = k30 * s2671 + (s1382 * s2669 - s1384 * s2667) + (s2625 * s3026 - s2627 * s3024)
+    s3035 = k30 * s2672 + (s1383 * s2667 - s1382 * s2668) + (s2626 * s3024 - s2625 * s3025)
+    s3036 = s1403 * s2640 + s1404 * s2641 - s1405 * s2642
+    s3037 = s1406 * s2643 + s1407 * s2644 + s1408 * s2645 + (s1403 * s2646 + s1404 * s2647 + s1405 * s2648)
+    s3038 = s1403 * s2652 + s1404 * s2653 - s1405 * s2654
+    s3039 = s1406 * s2655 + s1407 * s2656 + s1408 * s2657 + (s1403 * s2658 + s1404 * s2659 + s1405 * s2660)
+    s3040 = s1403 * s2664 + s1404 * s2665 - s1405 * s2666
+    s3041 = s1406 * s2667 + s1407 * s2668 + s1408 * s2669 + (s1403 * s2670 + s1404 * s2671 + s1405 * s2672)
+    s3042 = s2595 * s2988
+    s3043 = s3042 + s2598 * s2989 + s2601 * s2990
+    s3044 = s2599 * s2989
+    s3045 = s2596 * s2988 + s3044 + s2602 * s2990
+    s3046 = s2603 * s2990
+    s3047 = s2597 * s2988 + s2600 * s2989 + s3046
+    s3048 = s1343 * s2685 + s1344 * s2686 + s1345 * s2687 + (s1341 * s2690 - s1342 * s2689)
+    s3049 = s1344 * s2685 + s1346 * s2686 + s1347 * s2687 + (s1342 * s2688 - s1340 * s2690)
+    s3050 = s1345 * s2685 + s1347 * s2686 + s1348 * s2687 + (s1340 * s2689 - s1341 * s2688)
+    s3051 = 2.0 * s2643
+    s3052 = 2.0 * s2644
+    s3053 = 2.0 * s2645
+    s3054 = k15 * s2688 + (s1342 * s2686 - s1341 * s2687) + (s2594 * s3052 - s2593 * s3053)
+    s3055 = k15 * s2689 + (s1340 * s2687 - s1342 * s2685) + (s2592 * s3053 - s2594 * s3051)
+    s3056 = k15 * s2690 + (s1341 * s2685 - s1340 * s2686) + (s2593 * s3051 - s2592 * s3052)
+    s3057 = s18 * s2221 - s21 * s2220 + (s3048 + (s2595 * s3051 + s2596 * s3052 + s2597 * s3053))
+    s3058 = s21 * s2219 - s15 * s2221 + (s3049 + (s2598 * s3051 + s2599 * s3052 + s2600 * s3053))
+    s3059 = s15 * s2220 - s18 * s2219 + (s3050 + (s2601 * s3051 + s2602 * s3052 + s2603 * s3053))
+    s3060 = s18 * s2224 - s21 * s2223 + s3054
+    s3061 = s21 * s2222 - s15 * s2224 + s3055
+    s3062 = s15 * s2223 - s18 * s2222 + s3056
+    s3063 = s1343 * s2691 + s1344 * s2692 + s1345 * s2693 + (s1341 * s2696 - s1342 * s2695)
+    s3064 = s1344 * s2691 + s1346 * s2692 + s1347 * s2693 + (s1342 * s2694 - s1340 * s2696)
+    s3065 = s1345 * s2691 + s1347 * s2692 + s1348 * s2693 + (s1340 * s2695 - s1341 * s2694)
+    s3066 = k15 * s2694 + (s1342 * s2692 - s1341 * s2693) + (s2594 * s2989 - s2593 * s2990)
+    s3067 = k15 * s2695 + (s1340 * s2693 - s1342 * s2691) + (s2592 * s2990 - s2594 * s2988)
+    s3068 = k15 * s2696 + (s1341 * s2691 - s1340 * s2692) + (s2593 * s2988 - s2592 * s2989)
+    s3069 = s1412 * s2685 + s1413 * s2686 + s1414 * s2687 + (s1409 * s2688 + s1410 * s2689 + s1411 * s2690)
+    s3070 = s1412 * s2691 + s1413 * s2692 + s1414 * s2693 + (s1409 * s2694 + s1410 * s2695 + s1411 * s2696)
+    s3071 = s15 * s3043 + s18 * s3045 + s21 * s3047
+    s3072 = s3057 + (s990 * s3062 - s993 * s3061)
+    s3073 = s3058 + (s993 * s3060 - s987 * s3062)
+    s3074 = s3059 + (s987 * s3061 - s990 * s3060)
+    s3075 = s3063 + (s3042 + s2596 * s2989 + s2597 * s2990) + (s990 * s3068 - s993 * s3067)
+    s3076 = s3064 + (s3044 + s2598 * s2988 + s2600 * s2990) + (s993 * s3066 - s987 * s3068)
+    s3077 = s3065 + (s3046 + (s2601 * s2988 + s2602 * s2989)) + (s987 * s3067 - s990 * s3066)
+    s3078 = s1409 * s2640 + s1410 * s2641 - s1411 * s2642
+    s3079 = s1415 * s2643 + s1416 * s2644 + s1417 * s2645 + (s1409 * s2646 + s1410 * s2647 + s1411 * s2648)
+    s3080 = s1409 * s2652 + s1410 * s2653 - s1411 * s2654
+    s3081 = s1415 * s2655 + s1416 * s2656 + s1417 * s2657 + (s1409 * s2658 + s1410 * s2659 + s1411 * s2660)
+    s3082 = s1409 * s2664 + s1410 * s2665 - s1411 * s2666
+    s3083 = s1415 * s2667 + s1416 * s2668 + s1417 * s2669 + (s1409 * s2670 + s1410 * s2671 + s1411 * s2672)
+    s3084 = s2580 * s2988
+    s3085 = s3084 + s2583 * s2989 + s2586 * s2990
+    s3086 = s2584 * s2989
+    s3087 = s2581 * s2988 + s3086 + s2587 * s2990
+    s3088 = s2588 * s2990
+    s3089 = s2582 * s2988 + s2585 * s2989 + s3088
+    s3090 = s1328 * s2685 + s1329 * s2686 + s1330 * s2687 + (s1326 * s2711 - s1327 * s2710)
+    s3091 = s1329 * s2685 + s1331 * s2686 + s1332 * s2687 + (s1327 * s2709 - s1325 * s2711)
+    s3092 = s1330 * s2685 + s1332 * s2686 + s1333 * s2687 + (s1325 * s2710 - s1326 * s2709)
+    s3093 = k15 * s2709 + (s1327 * s2686 - s1326 * s2687) + (s2579 * s3052 - s2578 * s3053)
+    s3094 = k15 * s2710 + (s1325 * s2687 - s1327 * s2685) + (s2577 * s3053 - s2579 * s3051)
+    s3095 = k15 * s2711 + (s1326 * s2685 - s1325 * s2686) + (s2578 * s3051 - s2577 * s3052)
+    s3096 = s18 * s2215 - s21 * s2214 + (s3090 + (s2580 * s3051 + s2581 * s3052 + s2582 * s3053))
+    s3097 = s21 * s2213 - s15 * s2215 + (s3091 + (s2583 * s3051 + s2584 * s3052 + s2585 * s3053))
+    s3098 = s15 * s2214 - s18 * s2213 + (s3092 + (s2586 * s3051 + s2587 * s3052 + s2588 * s3053))
+    s3099 = s18 * s2218 - s21 * s2217 + s3093
+    s3100 = s21 * s2216 - s15 * s2218 + s3094
+    s3101 = s15 * s2217 - s18 * s2216 + s3095
+    s3102 = s1328 * s2691 + s1329 * s2692 + s1330 * s2693 + (s1326 * s2714 - s1327 * s2713)
+    s3103 = s1329 * s2691 + s1331 * s2692 + s1332 * s2693 + (s1327 * s2712 - s1325 * s2714)
+    s3104 = s1330 * s2691 + s1332 * s2692 + s1333 * s2693 + (s1325 * s2713 - s1326 * s2712)
+    s3105 = k15 * s2712 + (s1327 * s2692 - s1326 * s2693) + (s2579 * s2989 - s2578 * s2990)
+    s3106 = k15 * s2713 + (s1325 * s2693 - s1327 * s2691) + (s2577 * s2990 - s2579 * s2988)
+    s3107 = k15 * s2714 + (s1326 * s2691 - s1325 * s2692) + (s2578 * s2988 - s2577 * s2989)
+    s3108 = s1421 * s2685 + s1422 * s2686 + s1423 * s2687 + (s1418 * s2709 + s1419 * s2710 + s1420 * s2711)
+    s3109 = s1421 * s2691 + s1422 * s2692 + s1423 * s2693 + (s1418 * s2712 + s1419 * s2713 + s1420 * s2714)
+    s3110 = s15 * s3085 + s18 * s3087 + s21 * s3089
+    s3111 = s3096 + (s1020 * s3101 - s1021 * s3100)
+    s3112 = s3097 + (s1021 * s3099 - s1019 * s3101)
+    s3113 = s3098 + (s1019 * s3100 - s1020 * s3099)
+    s3114 = s3102 + (s3084 + s2581 * s2989 + s2582 * s2990) + (s1020 * s3107 - s1021 * s3106)
+    s3115 = s3103 + (s3086 + s2583 * s2988 + s2585 * s2990) + (s1021 * s3105 - s1019 * s3107)
+    s3116 = s3104 + (s3088 + (s2586 * s2988 + s2587 * s2989)) + (s1019 * s3106 - s1020 * s3105)
+    s3117 = s1418 * s2640 + s1419 * s2641 - s1420 * s2642
+    s3118 = s1424 * s2643 + s1425 * s2644 + s1426 * s2645 + (s1418 * s2646 + s1419 * s2647 + s1420 * s2648)
+    s3119 = s1418 * s2652 + s1419 * s2653 - s1420 * s2654
+    s3120 = s1424 * s2655 + s1425 * s2656 + s1426 * s2657 + (s1418 * s2658 + s1419 * s2659 + s1420 * s2660)
+    s3121 = s1418 * s2664 + s1419 * s2665 - s1420 * s2666
+    s3122 = s1424 * s2667 + s1425 * s2668 + s1426 * s2669 + (s1418 * s2670 + s1419 * s2671 + s1420 * s2672)
+    s3123 = s2565 * s2988
+    s3124 = s3123 + s2568 * s2989 + s2571 * s2990
+    s3125 = s2569 * s2989
+    s3126 = s2566 * s2988 + s3125 + s2572 * s2990
+    s3127 = s2573 * s2990
+    s3128 = s2567 * s2988 + s2570 * s2989 + s3127
+    s3129 = s1313 * s2685 + s1314 * s2686 + s1315 * s2687 + (s1311 * s2729 - s1312 * s2728)
+    s3130 = s1314 * s2685 + s1316 * s2686 + s1317 * s2687 + (s1312 * s2727 - s1310 * s2729)
+    s3131 = s1315 * s2685 + s1317 * s2686 + s1318 * s2687 + (s1310 * s2728 - s1311 * s2727)
+    s3132 = k15 * s2727 + (s1312 * s2686 - s1311 * s2687) + (s2564 * s3052 - s2563 * s3053)
+    s3133 = k15 * s2728 + (s1310 * s2687 - s1312 * s2685) + (s2562 * s3053 - s2564 * s3051)
+    s3134 = k15 * s2729 + (s1311 * s2685 - s1310 * s2686) + (s2563 * s3051 - s2562 * s3052)
+    s3135 = s18 * s2209 - s21 * s2208 + (s3129 + (s2565 * s3051 + s2566 * s3052 + s2567 * s3053))
+    s3136 = s21 * s2207 - s15 * s2209 + (s3130 + (s2568 * s3051 + s2569 * s3052 + s2570 * s3053))
+    s3137 = s15 * s2208 - s18 * s2207 + (s3131 + (s2571 * s3051 + s2572 * s3052 + s2573 * s3053))
+    s3138 = s18 * s2212 - s21 * s2211 + s3132
+    s3139 = s21 * s2210 - s15 * s2212 + s3133
+    s3140 = s15 * s2211 - s18 * s2210 + s3134
+    s3141 = s1313 * s2691 + s1314 * s2692 + s1315 * s2693 + (s1311 * s2732 - s1312 * s2731)
+    s3142 = s1314 * s2691 + s1316 * s2692 + s1317 * s2693 + (s1312 * s2730 - s1310 * s2732)
+    s3143 = s1315 * s2691 + s1317 * s2692 + s1318 * s2693 + (s1310 * s2731 - s1311 * s2730)
+    s3144 = k15 * s2730 + (s1312 * s2692 - s1311 * s2693) + (s2564 * s2989 - s2563 * s2990)
+    s3145 = k15 * s2731 + (s1310 * s2693 - s1312 * s2691) + (s2562 * s2990 - s2564 * s2988)
+    s3146 = k15 * s2732 + (s1311 * s2691 - s1310 * s2692) + (s2563 * s2988 - s2562 * s2989)
+    s3147 = s1430 * s2685 + s1431 * s2686 + s1432 * s2687 + (s1427 * s2727 + s1428 * s2728 + s1429 * s2729)
+    s3148 = s1430 * s2691 + s1431 * s2692 + s1432 * s2693 + (s1427 * s2730 + s1428 * s2731 + s1429 * s2732)
+    s3149 = s15 * s3124 + s18 * s3126 + s21 * s3128
+    s3150 = s3135 + (s1039 * s3140 - s1040 * s3139)
+    s3151 = s3136 + (s1040 * s3138 - s1038 * s3140)
+    s3152 = s3137 + (s1038 * s3139 - s1039 * s3138)
+    s3153 = s3141 + (s3123 + s2566 * s2989 + s2567 * s2990) + (s1039 * s3146 - s1040 * s3145)
+    s3154 = s3142 + (s3125 + s2568 * s2988 + s2570 * s2990) + (s1040 * s3144 - s1038 * s3146)
+    s3155 = s3143 + (s3127 + (s2571 * s2988 + s2572 * s2989)) + (s1038 * s3145 - s1039 * s3144)
+    s3156 = s1427 * s2640 + s1428 * s2641 - s1429 * s2642
+    s3157 = s1433 * s2643 + s1434 * s2644 + s1435 * s2645 + (s1427 * s2646 + s1428 * s2647 + s1429 * s2648)
+    s3158 = s1427 * s2652 + s1428 * s2653 - s1429 * s2654
+    s3159 = s1433 * s2655 + s1434 * s2656 + s1435 * s2657 + (s1427 * s2658 + s1428 * s2659 + s1429 * s2660)
+    s3160 = s1427 * s2664 + s1428 * s2665 - s1429 * s2666
+    s3161 = s1433 * s2667 + s1434 * s2668 + s1435 * s2669 + (s1427 * s2670 + s1428 * s2671 + s1429 * s2672)
+    s3162 = s2550 * s2988
+    s3163 = s3162 + s2553 * s2989 + s2556 * s2990
+    s3164 = s2554 * s2989
+    s3165 = s2551 * s2988 + s3164 + s2557 * s2990
+    s3166 = s2558 * s2990
+    s3167 = s2552 * s2988 + s2555 * s2989 + s3166
+    s3168 = s1298 * s2685 + s1299 * s2686 + s1300 * s2687 + (s1296 * s2747 - s1297 * s2746)
+    s3169 = s1299 * s2685 + s1301 * s2686 + s1302 * s2687 + (s1297 * s2745 - s1295 * s2747)
+    s3170 = s1300 * s2685 + s1302 * s2686 + s1303 * s2687 + (s1295 * s2746 - s1296 * s2745)
+    s3171 = k15 * s2745 + (s1297 * s2686 - s1296 * s2687) + (s2549 * s3052 - s2548 * s3053)
+    s3172 = k15 * s2746 + (s1295 * s2687 - s1297 * s2685) + (s2547 * s3053 - s2549 * s3051)
+    s3173 = k15 * s2747 + (s1296 * s2685 - s1295 * s2686) + (s2548 * s3051 - s2547 * s3052)
+    s3174 = s18 * s2203 - s21 * s2202 + (s3168 + (s2550 * s3051 + s2551 * s3052 + s2552 * s3053))
+    s3175 = s21 * s2201 - s15 * s2203 + (s3169 + (s2553 * s3051 + s2554 * s3052 + s2555 * s3053))
+    s3176 = s15 * s2202 - s18 * s2201 + (s3170 + (s2556 * s3051 + s2557 * s3052 + s2558 * s3053))
+    s3177 = s18 * s2206 - s21 * s2205 + s3171
+    s3178 = s21 * s2204 - s15 * s2206 + s3172
+    s3179 = s15 * s2205 - s18 * s2204 + s3173
+    s3180 = s1298 * s2691 + s1299 * s2692 + s1300 * s2693 + (s1296 * s2750 - s1297 * s2749)
+    s3181 = s1299 * s2691 + s1301 * s2692 + s1302 * s2693 + (s1297 * s2748 - s1295 * s2750)
+    s3182 = s1300 * s2691 + s1302 * s2692 + s1303 * s2693 + (s1295 * s2749 - s1296 * s2748)
+    s3183 = k15 * s2748 + (s1297 * s2692 - s1296 * s2693) + (s2549 * s2989 - s2548 * s2990)
+    s3184 = k15 * s2749 + (s1295 * s2693 - s1297 * s2691) + (s2547 * s2990 - s2549 * s2988)
+    s3185 = k15 * s2750 + (s1296 * s2691 - s1295 * s2692) + (s2548 * s2988 - s2547 * s2989)
+    s3186 = s1439 * s2685 + s1440 * s2686 + s1441 * s2687 + (s1436 * s2745 + s1437 * s2746 + s1438 * s2747)
+    s3187 = s1439 * s2691 + s1440 * s2692 + s1441 * s2693 + (s1436 * s2748 + s1437 * s2749 + s1438 * s2750)
+    s3188 = s15 * s3163 + s18 * s3165 + s21 * s3167
+    s3189 = s3174 + (s993 * s3178 - s990 * s3179)
+    s3190 = s3175 + (s987 * s3179 - s993 * s3177)
+    s3191 = s3176 + (s990 * s3177 - s987 * s3178)
+    s3192 = s3180 + (s3162 + s2551 * s2989 + s2552 * s2990) + (s993 * s3184 - s990 * s3185)
+    s3193 = s3181 + (s3164 + s2553 * s2988 + s2555 * s2990) + (s987 * s3185 - s993 * s3183)
+    s3194 = s3182 + (s3166 + (s2556 * s2988 + s2557 * s2989)) + (s990 * s3183 - s987 * s3184)
+    s3195 = s1436 * s2640 + s1437 * s2641 - s1438 * s2642
+    s3196 = s1442 * s2643 + s1443 * s2644 + s1444 * s2645 + (s1436 * s2646 + s1437 * s2647 + s1438 * s2648)
+    s3197 = s1436 * s2652 + s1437 * s2653 - s1438 * s2654
+    s3198 = s1442 * s2655 + s1443 * s2656 + s1444 * s2657 + (s1436 * s2658 + s1437 * s2659 + s1438 * s2660)
+    s3199 = s1436 * s2664 + s1437 * s2665 - s1438 * s2666
+    s3200 = s1442 * s2667 + s1443 * s2668 + s1444 * s2669 + (s1436 * s2670 + s1437 * s2671 + s1438 * s2672)
+    s3201 = 2.0 * s901
+    s3202 = 2.0 * s903
+    s3203 = 2.0 * s905
+    s3204 = s2535 * s3201
+    s3205 = s3204 + s2538 * s3202 + s2541 * s3203
+    s3206 = s2539 * s3202
+    s3207 = s2536 * s3201 + s3206 + s2542 * s3203
+    s3208 = s2543 * s3203
+    s3209 = s2537 * s3201 + s2540 * s3202 + s3208
+    s3210 = s1283 * s2769 + s1284 * s2770 + s1285 * s2771 + (s1281 * s2774 - s1282 * s2773)
+    s3211 = s1284 * s2769 + s1286 * s2770 + s1287 * s2771 + (s1282 * s2772 - s1280 * s2774)
+    s3212 = s1285 * s2769 + s1287 * s2770 + s1288 * s2771 + (s1280 * s2773 - s1281 * s2772)
+    s3213 = 2.0 * s2757
+    s3214 = 2.0 * s2758
+    s3215 = 2.0 * s2759
+    s3216 = k29 * s2772 + (s1282 * s2770 - s1281 * s2771) + (s2534 * s3214 - s2533 * s3215)
+    s3217 = k29 * s2773 + (s1280 * s2771 - s1282 * s2769) + (s2532 * s3215 - s2534 * s3213)
+    s3218 = k29 * s2774 + (s1281 * s2769 - s1280 * s2770) + (s2533 * s3213 - s2532 * s3214)
+    s3219 = s903 * s2197 - s905 * s2196 + (s3210 + (s2535 * s3213 + s2536 * s3214 + s2537 * s3215))
+    s3220 = s905 * s2195 - s901 * s2197 + (s3211 + (s2538 * s3213 + s2539 * s3214 + s2540 * s3215))
+    s3221 = s901 * s2196 - s903 * s2195 + (s3212 + (s2541 * s3213 + s2542 * s3214 + s2543 * s3215))
+    s3222 = s903 * s2200 - s905 * s2199 + s3216
+    s3223 = s905 * s2198 - s901 * s2200 + s3217
+    s3224 = s901 * s2199 - s903 * s2198 + s3218
+    s3225 = s1283 * s2775 + s1284 * s2776 + s1285 * s2777 + (s1281 * s2780 - s1282 * s2779)
+    s3226 = s1284 * s2775 + s1286 * s2776 + s1287 * s2777 + (s1282 * s2778 - s1280 * s2780)
+    s3227 = s1285 * s2775 + s1287 * s2776 + s1288 * s2777 + (s1280 * s2779 - s1281 * s2778)
+    s3228 = k29 * s2778 + (s1282 * s2776 - s1281 * s2777) + (s2534 * s3202 - s2533 * s3203)
+    s3229 = k29 * s2779 + (s1280 * s2777 - s1282 * s2775) + (s2532 * s3203 - s2534 * s3201)
+    s3230 = k29 * s2780 + (s1281 * s2775 - s1280 * s2776) + (s2533 * s3201 - s2532 * s3202)
+    s3231 = s1448 * s2769 + s1449 * s2770 + s1450 * s2771 + (s1445 * s2772 + s1446 * s2773 + s1447 * s2774)
+    s3232 = s1448 * s2775 + s1449 * s2776 + s1450 * s2777 + (s1445 * s2778 + s1446 * s2779 + s1447 * s2780)
+    s3233 = s3219 + (s1074 * s3224 - s1075 * s3223)
+    s3234 = s3220 + (s1075 * s3222 - s1073 * s3224)
+    s3235 = s3221 + (s1073 * s3223 - s1074 * s3222)
+    s3236 = s3225 + (s3204 + s2536 * s3202 + s2537 * s3203) + (s1074 * s3230 - s1075 * s3229)
+    s3237 = s3226 + (s3206 + s2538 * s3201 + s2540 * s3203) + (s1075 * s3228 - s1073 * s3230)
+    s3238 = s3227 + (s3208 + (s2541 * s3201 + s2542 * s3202)) + (s1073 * s3229 - s1074 * s3228)
+    s3239 = s1451 * s2685 + s1452 * s2686 + s1453 * s2687 + (s1445 * s2688 + s1446 * s2689 + s1447 * s2690)
+    s3240 = s1451 * s2691 + s1452 * s2692 + s1453 * s2693 + (s1445 * s2694 + s1446 * s2695 + s1447 * s2696)
+    s3241 = s15 * s3205 + s18 * s3207 + s21 * s3209
+    s3242 = s3233 + (s990 * s3224 - s993 * s3223)
+    s3243 = s3234 + (s993 * s3222 - s987 * s3224)
+    s3244 = s3235 + (s987 * s3223 - s990 * s3222)
+    s3245 = s3236 + (s990 * s3230 - s993 * s3229)
+    s3246 = s3237 + (s993 * s3228 - s987 * s3230)
+    s3247 = s3238 + (s987 * s3229 - s990 * s3228)
+    s3248 = s1445 * s2640 + s1446 * s2641 - s1447 * s2642
+    s3249 = s1454 * s2643 + s1455 * s2644 + s1456 * s2645 + (s1445 * s2646 + s1446 * s2647 + s1447 * s2648)
+    s3250 = s1445 * s2652 + s1446 * s2653 - s1447 * s2654
+    s3251 = s1454 * s2655 + s1455 * s2656 + s1456 * s2657 + (s1445 * s2658 + s1446 * s2659 + s1447 * s2660)
+    s3252 = s1445 * s2664 + s1446 * s2665 - s1447 * s2666
+    s3253 = s1454 * s2667 + s1455 * s2668 + s1456 * s2669 + (s1445 * s2670 + s1446 * s2671 + s1447 * s2672)
+    s3254 = 2.0 * s907
+    s3255 = 2.0 * s909
+    s3256 = 2.0 * s911
+    s3257 = s2520 * s3254
+    s3258 = s3257 + s2523 * s3255 + s2526 * s3256
+    s3259 = s2524 * s3255
+    s3260 = s2521 * s3254 + s3259 + s2527 * s3256
+    s3261 = s2528 * s3256
+    s3262 = s2522 * s3254 + s2525 * s3255 + s3261
+    s3263 = s1268 * s2799 + s1269 * s2800 + s1270 * s2801 + (s1266 * s2804 - s1267 * s2803)
+    s3264 = s1269 * s2799 + s1271 * s2800 + s1272 * s2801 + (s1267 * s2802 - s1265 * s2804)
+    s3265 = s1270 * s2799 + s1272 * s2800 + s1273 * s2801 + (s1265 * s2803 - s1266 * s2802)
+    s3266 = 2.0 * s2787
+    s3267 = 2.0 * s2788
+    s3268 = 2.0 * s2789
+    s3269 = k29 * s2802 + (s1267 * s2800 - s1266 * s2801) + (s2519 * s3267 - s2518 * s3268)
+    s3270 = k29 * s2803 + (s1265 * s2801 - s1267 * s2799) + (s2517 * s3268 - s2519 * s3266)
+    s3271 = k29 * s2804 + (s1266 * s2799 - s1265 * s2800) + (s2518 * s3266 - s2517 * s3267)
+    s3272 = s909 * s2191 - s911 * s2190 + (s3263 + (s2520 * s3266 + s2521 * s3267 + s2522 * s3268))
+    s3273 = s911 * s2189 - s907 * s2191 + (s3264 + (s2523 * s3266 + s2524 * s3267 + s2525 * s3268))
+    s3274 = s907 * s2190 - s909 * s2189 + (s3265 + (s2526 * s3266 + s2527 * s3267 + s2528 * s3268))
+    s3275 = s909 * s2194 - s911 * s2193 + s3269
+    s3276 = s911 * s2192 - s907 * s2194 + s3270
+    s3277 = s907 * s2193 - s909 * s2192 + s3271
+    s3278 = s1268 * s2805 + s1269 * s2806 + s1270 * s2807 + (s1266 * s2810 - s1267 * s2809)
+    s3279 = s1269 * s2805 + s1271 * s2806 + s1272 * s2807 + (s1267 * s2808 - s1265 * s2810)
+    s3280 = s1270 * s2805 + s1272 * s2806 + s1273 * s2807 + (s1265 * s2809 - s1266 * s2808)
+    s3281 = k29 * s2808 + (s1267 * s2806 - s1266 * s2807) + (s2519 * s3255 - s2518 * s3256)
+    s3282 = k29 * s2809 + (s1265 * s2807 - s1267 * s2805) + (s2517 * s3256 - s2519 * s3254)
+    s3283 = k29 * s2810 + (s1266 * s2805 - s1265 * s2806) + (s2518 * s3254 - s2517 * s3255)
+    s3284 = s1460 * s2799 + s1461 * s2800 + s1462 * s2801 + (s1457 * s2802 + s1458 * s2803 + s1459 * s2804)
+    s3285 = s1460 * s2805 + s1461 * s2806 + s1462 * s2807 + (s1457 * s2808 + s1458 * s2809 + s1459 * s2810)
+    s3286 = s3272 + (s1094 * s3277 - s1095 * s3276)
+    s3287 = s3273 + (s1095 * s3275 - s1093 * s3277)
+    s3288 = s3274 + (s1093 * s3276 - s1094 * s3275)
+    s3289 = s3278 + (s3257 + s2521 * s3255 + s2522 * s3256) + (s1094 * s3283 - s1095 * s3282)
+    s3290 = s3279 + (s3259 + s2523 * s3254 + s2525 * s3256) + (s1095 * s3281 - s1093 * s3283)
+    s3291 = s3280 + (s3261 + (s2526 * s3254 + s2527 * s3255)) + (s1093 * s3282 - s1094 * s3281)
+    s3292 = s1463 * s2685 + s1464 * s2686 + s1465 * s2687 + (s1457 * s2709 + s1458 * s2710 + s1459 * s2711)
+    s3293 = s1463 * s2691 + s1464 * s2692 + s1465 * s2693 + (s1457 * s2712 + s1458 * s2713 + s1459 * s2714)
+    s3294 = s15 * s3258 + s18 * s3260 + s21 * s3262
+    s3295 = s3286 + (s1020 * s3277 - s1021 * s3276)
+    s3296 = s3287 + (s1021 * s3275 - s1019 * s3277)
+    s3297 = s3288 + (s1019 * s3276 - s1020 * s3275)
+    s3298 = s3289 + (s1020 * s3283 - s1021 * s3282)
+    s3299 = s3290 + (s1021 * s3281 - s1019 * s3283)
+    s3300 = s3291 + (s1019 * s3282 - s1020 * s3281)
+    s3301 = s1457 * s2640 + s1458 * s2641 - s1459 * s2642
+    s3302 = s1466 * s2643 + s1467 * s2644 + s1468 * s2645 + (s1457 * s2646 + s1458 * s2647 + s1459 * s2648)
+    s3303 = s1457 * s2652 + s1458 * s2653 - s1459 * s2654
+    s3304 = s1466 * s2655 + s1467 * s2656 + s1468 * s2657 + (s1457 * s2658 + s1458 * s2659 + s1459 * s2660)
+    s3305 = s1457 * s2664 + s1458 * s2665 - s1459 * s2666
+    s3306 = s1466 * s2667 + s1467 * s2668 + s1468 * s2669 + (s1457 * s2670 + s1458 * s2671 + s1459 * s2672)
+    s3307 = 2.0 * s913
+    s3308 = 2.0 * s915
+    s3309 = 2.0 * s917
+    s3310 = s2505 * s3307
+    s3311 = s3310 + s2508 * s3308 + s2511 * s3309
+    s3312 = s2509 * s3308
+    s3313 = s2506 * s3307 + s3312 + s2512 * s3309
+    s3314 = s2513 * s3309
+    s3315 = s2507 * s3307 + s2510 * s3308 + s3314
+    s3316 = s1253 * s2826 + s1254 * s2827 + s1255 * s2828 + (s1251 * s2831 - s1252 * s2830)
+    s3317 = s1254 * s2826 + s1256 * s2827 + s1257 * s2828 + (s1252 * s2829 - s1250 * s2831)
+    s3318 = s1255 * s2826 + s1257 * s2827 + s1258 * s2828 + (s1250 * s2830 - s1251 * s2829)
+    s3319 = 2.0 * s2817
+    s3320 = 2.0 * s2818
+    s3321 = 2.0 * s2819
+    s3322 = k29 * s2829 + (s1252 * s2827 - s1251 * s2828) + (s2504 * s3320 - s2503 * s3321)
+    s3323 = k29 * s2830 + (s1250 * s2828 - s1252 * s2826) + (s2502 * s3321 - s2504 * s3319)
+    s3324 = k29 * s2831 + (s1251 * s2826 - s1250 * s2827) + (s2503 * s3319 - s2502 * s3320)
+    s3325 = s915 * s2185 - s917 * s2184 + (s3316 + (s2505 * s3319 + s2506 * s3320 + s2507 * s3321))
+    s3326 = s917 * s2183 - s913 * s2185 + (s3317 + (s2508 * s3319 + s2509 * s3320 + s2510 * s3321))
+    s3327 = s913 * s2184 - s915 * s2183 + (s3318 + (s2511 * s3319 + s2512 * s3320 + s2513 * s3321))
+    s3328 = s915 * s2188 - s917 * s2187 + s3322
+    s3329 = s917 * s2186 - s913 * s2188 + s3323
+    s3330 = s913 * s2187 - s915 * s2186 + s3324
+    s3331 = s1253 * s2832 + s1254 * s2833 + s1255 * s2834 + (s1251 * s2837 - s1252 * s2836)
+    s3332 = s1254 * s2832 + s1256 * s2833 + s1257 * s2834 + (s1252 * s2835 - s1250 * s2837)
+    s3333 = s1255 * s2832 + s1257 * s2833 + s1258 * s2834 + (s1250 * s2836 - s1251 * s2835)
+    s3334 = k29 * s2835 + (s1252 * s2833 - s1251 * s2834) + (s2504 * s3308 - s2503 * s3309)
+    s3335 = k29 * s2836 + (s1250 * s2834 - s1252 * s2832) + (s2502 * s3309 - s2504 * s3307)
+    s3336 = k29 * s2837 + (s1251 * s2832 - s1250 * s2833) + (s2503 * s3307 - s2502 * s3308)
+    s3337 = s1472 * s2826 + s1473 * s2827 + s1474 * s2828 + (s1469 * s2829 + s1470 * s2830 + s1471 * s2831)
+    s3338 = s1472 * s2832 + s1473 * s2833 + s1474 * s2834 + (s1469 * s2835 + s1470 * s2836 + s1471 * s2837)
+    s3339 = s3325 + (s1114 * s3330 - s1115 * s3329)
+    s3340 = s3326 + (s1115 * s3328 - s1113 * s3330)
+    s3341 = s3327 + (s1113 * s3329 - s1114 * s3328)
+    s3342 = s3331 + (s3310 + s2506 * s3308 + s2507 * s3309) + (s1114 * s3336 - s1115 * s3335)
+    s3343 = s3332 + (s3312 + s2508 * s3307 + s2510 * s3309) + (s1115 * s3334 - s1113 * s3336)
+    s3344 = s3333 + (s3314 + (s2511 * s3307 + s2512 * s3308)) + (s1113 * s3335 - s1114 * s3334)
+    s3345 = s1475 * s2685 + s1476 * s2686 + s1477 * s2687 + (s1469 * s2727 + s1470 * s2728 + s1471 * s2729)
+    s3346 = s1475 * s2691 + s1476 * s2692 + s1477 * s2693 + (s1469 * s2730 + s1470 * s2731 + s1471 * s2732)
+    s3347 = s15 * s3311 + s18 * s3313 + s21 * s3315
+    s3348 = s3339 + (s1039 * s3330 - s1040 * s3329)
+    s3349 = s3340 + (s1040 * s3328 - s1038 * s3330)
+    s3350 = s3341 + (s1038 * s3329 - s1039 * s3328)
+    s3351 = s3342 + (s1039 * s3336 - s1040 * s3335)
+    s3352 = s3343 + (s1040 * s3334 - s1038 * s3336)
+    s3353 = s3344 + (s1038 * s3335 - s1039 * s3334)
+    s3354 = s1469 * s2640 + s1470 * s2641 - s1471 * s2642
+    s3355 = s1478 * s2643 + s1479 * s2644 + s1480 * s2645 + (s1469 * s2646 + s1470 * s2647 + s1471 * s2648)
+    s3356 = s1469 * s2652 + s1470 * s2653 - s1471 * s2654
+    s3357 = s1478 * s2655 + s1479 * s2656 + s1480 * s2657 + (s1469 * s2658 + s1470 * s2659 + s1471 * s2660)
+    s3358 = s1469 * s2664 + s1470 * s2665 - s1471 * s2666
+    s3359 = s1478 * s2667 + s1479 * s2668 + s1480 * s2669 + (s1469 * s2670 + s1470 * s2671 + s1471 * s2672)
+    s3360 = 2.0 * s919
+    s3361 = 2.0 * s921
+    s3362 = 2.0 * s923
+    s3363 = s2490 * s3360
+    s3364 = s3363 + s2493 * s3361 + s2496 * s3362
+    s3365 = s2494 * s3361
+    s3366 = s2491 * s3360 + s3365 + s2497 * s3362
+    s3367 = s2498 * s3362
+    s3368 = s2492 * s3360 + s2495 * s3361 + s3367
+    s3369 = s1238 * s2856 + s1239 * s2857 + s1240 * s2858 + (s1236 * s2861 - s1237 * s2860)
+    s3370 = s1239 * s2856 + s1241 * s2857 + s1242 * s2858 + (s1237 * s2859 - s1235 * s2861)
+    s3371 = s1240 * s2856 + s1242 * s2857 + s1243 * s2858 + (s1235 * s2860 - s1236 * s2859)
+    s3372 = 2.0 * s2844
+    s3373 = 2.0 * s2845
+    s3374 = 2.0 * s2846
+    s3375 = k29 * s2859 + (s1237 * s2857 - s1236 * s2858) + (s2489 * s3373 - s2488 * s3374)
+    s3376 = k29 * s2860 + (s1235 * s2858 - s1237 * s2856) + (s2487 * s3374 - s2489 * s3372)
+    s3377 = k29 * s2861 + (s1236 * s2856 - s1235 * s2857) + (s2488 * s3372 - s2487 * s3373)
+    s3378 = s921 * s2179 - s923 * s2178 + (s3369 + (s2490 * s3372 + s2491 * s3373 + s2492 * s3374))
+    s3379 = s923 * s2177 - s919 * s2179 + (s3370 + (s2493 * s3372 + s2494 * s3373 + s2495 * s3374))
+    s3380 = s919 * s2178 - s921 * s2177 + (s3371 + (s2496 * s3372 + s2497 * s3373 + s2498 * s3374))
+    s3381 = s921 * s2182 - s923 * s2181 + s3375
+    s3382 = s923 * s2180 - s919 * s2182 + s3376
+    s3383 = s919 * s2181 - s921 * s2180 + s3377
+    s3384 = s1238 * s2862 + s1239 * s2863 + s1240 * s2864 + (s1236 * s2867 - s1237 * s2866)
+    s3385 = s1239 * s2862 + s1241 * s2863 + s1242 * s2864 + (s1237 * s2865 - s1235 * s2867)
+    s3386 = s1240 * s2862 + s1242 * s2863 + s1243 * s2864 + (s1235 * s2866 - s1236 * s2865)
+    s3387 = k29 * s2865 + (s1237 * s2863 - s1236 * s2864) + (s2489 * s3361 - s2488 * s3362)
+    s3388 = k29 * s2866 + (s1235 * s2864 - s1237 * s2862) + (s2487 * s3362 - s2489 * s3360)
+    s3389 = k29 * s2867 + (s1236 * s2862 - s1235 * s2863) + (s2488 * s3360 - s2487 * s3361)
+    s3390 = s1484 * s2856 + s1485 * s2857 + s1486 * s2858 + (s1481 * s2859 + s1482 * s2860 + s1483 * s2861)
+    s3391 = s1484 * s2862 + s1485 * s2863 + s1486 * s2864 + (s1481 * s2865 + s1482 * s2866 + s1483 * s2867)
+    s3392 = s3378 + (s1134 * s3383 - s1135 * s3382)
+    s3393 = s3379 + (s1135 * s3381 - s1133 * s3383)
+    s3394 = s3380 + (s1133 * s3382 - s1134 * s3381)
+    s3395 = s3384 + (s3363 + s2491 * s3361 + s2492 * s3362) + (s1134 * s3389 - s1135 * s3388)
+    s3396 = s3385 + (s3365 + s2493 * s3360 + s2495 * s3362) + (s1135 * s3387 - s1133 * s3389)
+    s3397 = s3386 + (s3367 + (s2496 * s3360 + s2497 * s3361)) + (s1133 * s3388 - s1134 * s3387)
+    s3398 = s1487 * s2685 + s1488 * s2686 + s1489 * s2687 + (s1481 * s2745 + s1482 * s2746 + s1483 * s2747)
+    s3399 = s1487 * s2691 + s1488 * s2692 + s1489 * s2693 + (s1481 * s2748 + s1482 * s2749 + s1483 * s2750)
+    s3400 = s15 * s3364 + s18 * s3366 + s21 * s3368
+    s3401 = s3392 + (s993 * s3382 - s990 * s3383)
+    s3402 = s3393 + (s987 * s3383 - s993 * s3381)
+    s3403 = s3394 + (s990 * s3381 - s987 * s3382)
+    s3404 = s3395 + (s993 * s3388 - s990 * s3389)
+    s3405 = s3396 + (s987 * s3389 - s993 * s3387)
+    s3406 = s3397 + (s990 * s3387 - s987 * s3388)
+    s3407 = s1481 * s2640 + s1482 * s2641 - s1483 * s2642
+    s3408 = s1490 * s2643 + s1491 * s2644 + s1492 * s2645 + (s1481 * s2646 + s1482 * s2647 + s1483 * s2648)
+    s3409 = s1481 * s2652 + s1482 * s2653 - s1483 * s2654
+    s3410 = s1490 * s2655 + s1491 * s2656 + s1492 * s2657 + (s1481 * s2658 + s1482 * s2659 + s1483 * s2660)
+    s3411 = s1481 * s2664 + s1482 * s2665 - s1483 * s2666
+    s3412 = s1490 * s2667 + s1491 * s2668 + s1492 * s2669 + (s1481 * s2670 + s1482 * s2671 + s1483 * s2672)
+    s3413 = s2400 * s3201
+    s3414 = s3413 + s2403 * s3202 + s2406 * s3203
+    s3415 = s2404 * s3202
+    s3416 = s2401 * s3201 + s3415 + s2407 * s3203
+    s3417 = s2408 * s3203
+    s3418 = s2402 * s3201 + s2405 * s3202 + s3417
+    s3419 = s1165 * s2886 + s1169 * s2887 + s1170 * s2888 + (s1158 * s2890 - s1157 * s2891)
+    s3420 = s1169 * s2886 + s1166 * s2887 + s1171 * s2888 + (s1156 * s2891 - s1158 * s2889)
+    s3421 = s1170 * s2886 + s1171 * s2887 + s1168 * s2888 + (s1157 * s2889 - s1156 * s2890)
+    s3422 = 2.0 * s2874
+    s3423 = 2.0 * s2875
+    s3424 = 2.0 * s2876
+    s3425 = m_shank * s2889 + (s1157 * s2888 - s1158 * s2887) + (s2389 * s3423 - s2388 * s3424)
+    s3426 = m_shank * s2890 + (s1158 * s2886 - s1156 * s2888) + (s2387 * s3424 - s2389 * s3422)
+    s3427 = m_shank * s2891 + (s1156 * s2887 - s1157 * s2886) + (s2388 * s3422 - s2387 * s3423)
+    s3428 = s903 * s2131 - s905 * s2130 + (s3419 + (s2400 * s3422 + s2401 * s3423 + s2402 * s3424))
+    s3429 = s905 * s2129 - s901 * s2131 + (s3420 + (s2403 * s3422 + s2404 * s3423 + s2405 * s3424))
+    s3430 = s901 * s2130 - s903 * s2129 + (s3421 + (s2406 * s3422 + s2407 * s3423 + s2408 * s3424))
+    s3431 = s903 * s2122 - s905 * s2121 + s3425
+    s3432 = s905 * s2120 - s901 * s2122 + s3426
+    s3433 = s901 * s2121 - s903 * s2120 + s3427
+    s3434 = s1165 * s2892 + s1169 * s2893 + s1170 * s2894 + (s1158 * s2896 - s1157 * s2897)
+    s3435 = s1169 * s2892 + s1166 * s2893 + s1171 * s2894 + (s1156 * s2897 - s1158 * s2895)
+    s3436 = s1170 * s2892 + s1171 * s2893 + s1168 * s2894 + (s1157 * s2895 - s1156 * s2896)
+    s3437 = m_shank * s2895 + (s1157 * s2894 - s1158 * s2893) + (s2389 * s3202 - s2388 * s3203)
+    s3438 = m_shank * s2896 + (s1158 * s2892 - s1156 * s2894) + (s2387 * s3203 - s2389 * s3201)
+    s3439 = m_shank * s2897 + (s1156 * s2893 - s1157 * s2892) + (s2388 * s3201 - s2387 * s3202)
+    s3440 = s1496 * s2886 + s1497 * s2887 + s1498 * s2888 + (s1493 * s2889 + s1494 * s2890 + s1495 * s2891)
+    s3441 = s3440 + (s2874 * s3414 + s2875 * s3416 + s2876 * s3418)
+    s3442 = s1496 * s2892 + s1497 * s2893 + s1498 * s2894 + (s1493 * s2895 + s1494 * s2896 + s1495 * s2897)
+    s3443 = s901 * s3414 + s903 * s3416 + s905 * s3418
+    s3444 = s3442 + s3443
+    s3445 = s3428 + (s1154 * s3433 - s1155 * s3432)
+    s3446 = s3429 + (s1155 * s3431 - s1153 * s3433)
+    s3447 = s3430 + (s1153 * s3432 - s1154 * s3431)
+    s3448 = s3434 + (s3413 + s2401 * s3202 + s2402 * s3203) + (s1154 * s3439 - s1155 * s3438)
+    s3449 = s3435 + (s3415 + s2403 * s3201 + s2405 * s3203) + (s1155 * s3437 - s1153 * s3439)
+    s3450 = s3436 + (s3417 + (s2406 * s3201 + s2407 * s3202)) + (s1153 * s3438 - s1154 * s3437)
+    s3451 = s1499 * s2769 + s1500 * s2770 + s1501 * s2771 + (s1493 * s2772 + s1494 * s2773 + s1495 * s2774)
+    s3452 = s3451 + (s2757 * s3414 + s2758 * s3416 + s2759 * s3418)
+    s3453 = s1499 * s2775 + s1500 * s2776 + s1501 * s2777 + (s1493 * s2778 + s1494 * s2779 + s1495 * s2780)
+    s3454 = s3443 + s3453
+    s3455 = s3445 + (s1074 * s3433 - s1075 * s3432)
+    s3456 = s3446 + (s1075 * s3431 - s1073 * s3433)
+    s3457 = s3447 + (s1073 * s3432 - s1074 * s3431)
+    s3458 = s3448 + (s1074 * s3439 - s1075 * s3438)
+    s3459 = s3449 + (s1075 * s3437 - s1073 * s3439)
+    s3460 = s3450 + (s1073 * s3438 - s1074 * s3437)
+    s3461 = s1503 * s2685 + s1504 * s2686 + s1505 * s2687 + (s1493 * s2688 + s1494 * s2689 + s1495 * s2690)
+    s3462 = s3461 + (s2643 * s3414 + s2644 * s3416 + s2645 * s3418)
+    s3463 = s1503 * s2691 + s1504 * s2692 + s1505 * s2693 + (s1493 * s2694 + s1494 * s2695 + s1495 * s2696)
+    s3464 = s15 * s3414 + s18 * s3416 + s21 * s3418
+    s3465 = s3463 + s3464
+    s3466 = s3455 + (s990 * s3433 - s993 * s3432)
+    s3467 = s3456 + (s993 * s3431 - s987 * s3433)
+    s3468 = s3457 + (s987 * s3432 - s990 * s3431)
+    s3469 = s3458 + (s990 * s3439 - s993 * s3438)
+    s3470 = s3459 + (s993 * s3437 - s987 * s3439)
+    s3471 = s3460 + (s987 * s3438 - s990 * s3437)
+    s3472 = s1493 * s2640 + s1494 * s2641 - s1495 * s2642
+    s3473 = s1507 * s2643 + s1508 * s2644 + s1509 * s2645 + (s1493 * s2646 + s1494 * s2647 + s1495 * s2648)
+    s3474 = s3464 + s3473
+    s3475 = s1493 * s2652 + s1494 * s2653 - s1495 * s2654
+    s3476 = s1507 * s2655 + s1508 * s2656 + s1509 * s2657 + (s1493 * s2658 + s1494 * s2659 + s1495 * s2660)
+    s3477 = s3476 + (s16 * s3414 + s19 * s3416 + s22 * s3418)
+    s3478 = s1493 * s2664 + s1494 * s2665 - s1495 * s2666
+    s3479 = s1507 * s2667 + s1508 * s2668 + s1509 * s2669 + (s1493 * s2670 + s1494 * s2671 + s1495 * s2672)
+    s3480 = s3479 + (s17 * s3414 + s20 * s3416 + s23 * s3418)
+    s3481 = s2431 * s3254
+    s3482 = s3481 + s2434 * s3255 + s2437 * s3256
+    s3483 = s2435 * s3255
+    s3484 = s2432 * s3254 + s3483 + s2438 * s3256
+    s3485 = s2439 * s3256
+    s3486 = s2433 * s3254 + s2436 * s3255 + s3485
+    s3487 = s1184 * s2919 + s1188 * s2920 + s1189 * s2921 + (s1177 * s2923 - s1176 * s2924)
+    s3488 = s1188 * s2919 + s1185 * s2920 + s1190 * s2921 + (s1175 * s2924 - s1177 * s2922)
+    s3489 = s1189 * s2919 + s1190 * s2920 + s1187 * s2921 + (s1176 * s2922 - s1175 * s2923)
+    s3490 = 2.0 * s2904
+    s3491 = 2.0 * s2905
+    s3492 = 2.0 * s2906
+    s3493 = m_shank * s2922 + (s1176 * s2921 - s1177 * s2920) + (s2414 * s3491 - s2413 * s3492)
+    s3494 = m_shank * s2923 + (s1177 * s2919 - s1175 * s2921) + (s2412 * s3492 - s2414 * s3490)
+    s3495 = m_shank * s2924 + (s1175 * s2920 - s1176 * s2919) + (s2413 * s3490 - s2412 * s3491)
+    s3496 = s909 * s2146 - s911 * s2145 + (s3487 + (s2431 * s3490 + s2432 * s3491 + s2433 * s3492))
+    s3497 = s911 * s2144 - s907 * s2146 + (s3488 + (s2434 * s3490 + s2435 * s3491 + s2436 * s3492))
+    s3498 = s907 * s2145 - s909 * s2144 + (s3489 + (s2437 * s3490 + s2438 * s3491 + s2439 * s3492))
+    s3499 = s909 * s2137 - s911 * s2136 + s3493
+    s3500 = s911 * s2135 - s907 * s2137 + s3494
+    s3501 = s907 * s2136 - s909 * s2135 + s3495
+    s3502 = s1184 * s2925 + s1188 * s2926 + s1189 * s2927 + (s1177 * s2929 - s1176 * s2930)
+    s3503 = s1188 * s2925 + s1185 * s2926 + s1190 * s2927 + (s1175 * s2930 - s1177 * s2928)
+    s3504 = s1189 * s2925 + s1190 * s2926 + s1187 * s2927 + (s1176 * s2928 - s1175 * s2929)
+    s3505 = m_shank * s2928 + (s1176 * s2927 - s1177 * s2926) + (s2414 * s3255 - s2413 * s3256)
+    s3506 = m_shank * s2929 + (s1177 * s2925 - s1175 * s2927) + (s2412 * s3256 - s2414 * s3254)
+    s3507 = m_shank * s2930 + (s1175 * s2926 - s1176 * s2925) + (s2413 * s3254 - s2412 * s3255)
+    s3508 = s1516 * s2919 + s1517 * s2920 + s1518 * s2921 + (s1513 * s2922 + s1514 * s2923 + s1515 * s2924)
+    s3509 = s3508 + (s2904 * s3482 + s2905 * s3484 + s2906 * s3486)
+    s3510 = s1516 * s2925 + s1517 * s2926 + s1518 * s2927 + (s1513 * s2928 + s1514 * s2929 + s1515 * s2930)
+    s3511 = s907 * s3482 + s909 * s3484 + s911 * s3486
+    s3512 = s3510 + s3511
+    s3513 = s3496 + (s1173 * s3501 - s1174 * s3500)
+    s3514 = s3497 + (s1174 * s3499 - s1172 * s3501)
+    s3515 = s3498 + (s1172 * s3500 - s1173 * s3499)
+    s3516 = s3502 + (s3481 + s2432 * s3255 + s2433 * s3256) + (s1173 * s3507 - s1174 * s3506)
+    s3517 = s3503 + (s3483 + s2434 * s3254 + s2436 * s3256) + (s1174 * s3505 - s1172 * s3507)
+    s3518 = s3504 + (s3485 + (s2437 * s3254 + s2438 * s3255)) + (s1172 * s3506 - s1173 * s3505)
+    s3519 = s1519 * s2799 + s1520 * s2800 + s1521 * s2801 + (s1513 * s2802 + s1514 * s2803 + s1515 * s2804)
+    s3520 = s3519 + (s2787 * s3482 + s2788 * s3484 + s2789 * s3486)
+    s3521 = s1519 * s2805 + s1520 * s2806 + s1521 * s2807 + (s1513 * s2808 + s1514 * s2809 + s1515 * s2810)
+    s3522 = s3511 + s3521
+    s3523 = s3513 + (s1094 * s3501 - s1095 * s3500)
+    s3524 = s3514 + (s1095 * s3499 - s1093 * s3501)
+    s3525 = s3515 + (s1093 * s3500 - s1094 * s3499)
+    s3526 = s3516 + (s1094 * s3507 - s1095 * s3506)
+    s3527 = s3517 + (s1095 * s3505 - s1093 * s3507)
+    s3528 = s3518 + (s1093 * s3506 - s1094 * s3505)
+    s3529 = s1523 * s2685 + s1524 * s2686 + s1525 * s2687 + (s1513 * s2709 + s1514 * s2710 + s1515 * s2711)
+    s3530 = s3529 + (s2643 * s3482 + s2644 * s3484 + s2645 * s3486)
+    s3531 = s1523 * s2691 + s1524 * s2692 + s1525 * s2693 + (s1513 * s2712 + s1514 * s2713 + s1515 * s2714)
+    s3532 = s15 * s3482 + s18 * s3484 + s21 * s3486
+    s3533 = s3531 + s3532
+    s3534 = s3523 + (s1020 * s3501 - s1021 * s3500)
+    s3535 = s3524 + (s1021 * s3499 - s1019 * s3501)
+    s3536 = s3525 + (s1019 * s3500 - s1020 * s3499)
+    s3537 = s3526 + (s1020 * s3507 - s1021 * s3506)
+    s3538 = s3527 + (s1021 * s3505 - s1019 * s3507)
+    s3539 = s3528 + (s1019 * s3506 - s1020 * s3505)
+    s3540 = s1513 * s2640 + s1514 * s2641 - s1515 * s2642
+    s3541 = s1527 * s2643 + s1528 * s2644 + s1529 * s2645 + (s1513 * s2646 + s1514 * s2647 + s1515 * s2648)
+    s3542 = s3532 + s3541
+    s3543 = s1513 * s2652 + s1514 * s2653 - s1515 * s2654
+    s3544 = s1527 * s2655 + s1528 * s2656 + s1529 * s2657 + (s1513 * s2658 + s1514 * s2659 + s1515 * s2660)
+    s3545 = s3544 + (s16 * s3482 + s19 * s3484 + s22 * s3486)
+    s3546 = s1513 * s2664 + s1514 * s2665 - s1515 * s2666
+    s3547 = s1527 * s2667 + s1528 * s2668 + s1529 * s2669 + (s1513 * s2670 + s1514 * s2671 + s1515 * s2672)
+    s3548 = s3547 + (s17 * s3482 + s20 * s3484 + s23 * s3486)
+    s3549 = s2453 * s3307
+    s3550 = s3549 + s2456 * s3308 + s2459 * s3309
+    s3551 = s2457 * s3308
+    s3552 = s2454 * s3307 + s3551 + s2460 * s3309
+    s3553 = s2461 * s3309
+    s3554 = s2455 * s3307 + s2458 * s3308 + s3553
+    s3555 = s1203 * s2946 + s1207 * s2947 + s1208 * s2948 + (s1196 * s2950 - s1195 * s2951)
+    s3556 = s1207 * s2946 + s1204 * s2947 + s1209 * s2948 + (s1194 * s2951 - s1196 * s2949)
+    s3557 = s1208 * s2946 + s1209 * s2947 + s1206 * s2948 + (s1195 * s2949 - s1194 * s2950)
+    s3558 = 2.0 * s2937
+    s3559 = 2.0 * s2938
+    s3560 = 2.0 * s2939
+    s3561 = m_shank * s2949 + (s1195 * s2948 - s1196 * s2947) + (s2442 * s3559 - s2441 * s3560)
+    s3562 = m_shank * s2950 + (s1196 * s2946 - s1194 * s2948) + (s2440 * s3560 - s2442 * s3558)
+    s3563 = m_shank * s2951 + (s1194 * s2947 - s1195 * s2946) + (s2441 * s3558 - s2440 * s3559)
+    s3564 = s915 * s2161 - s917 * s2160 + (s3555 + (s2453 * s3558 + s2454 * s3559 + s2455 * s3560))
+    s3565 = s917 * s2159 - s913 * s2161 + (s3556 + (s2456 * s3558 + s2457 * s3559 + s2458 * s3560))
+    s3566 = s913 * s2160 - s915 * s2159 + (s3557 + (s2459 * s3558 + s2460 * s3559 + s2461 * s3560))
+    s3567 = s915 * s2152 - s917 * s2151 + s3561
+    s3568 = s917 * s2150 - s913 * s2152 + s3562
+    s3569 = s913 * s2151 - s915 * s2150 + s3563
+    s3570 = s1203 * s2952 + s1207 * s2953 + s1208 * s2954 + (s1196 * s2956 - s1195 * s2957)
+    s3571 = s1207 * s2952 + s1204 * s2953 + s1209 * s2954 + (s1194 * s2957 - s1196 * s2955)
+    s3572 = s1208 * s2952 + s1209 * s2953 + s1206 * s2954 + (s1195 * s2955 - s1194 * s2956)
+    s3573 = m_shank * s2955 + (s1195 * s2954 - s1196 * s2953) + (s2442 * s3308 - s2441 * s3309)
+    s3574 = m_shank * s2956 + (s1196 * s2952 - s1194 * s2954) + (s2440 * s3309 - s2442 * s3307)
+    s3575 = m_shank * s2957 + (s1194 * s2953 - s1195 * s2952) + (s2441 * s3307 - s2440 * s3308)
+    s3576 = s1536 * s2946 + s1537 * s2947 + s1538 * s2948 + (s1533 * s2949 + s1534 * s2950 + s1535 * s2951)
+    s3577 = s3576 + (s2937 * s3550 + s2938 * s3552 + s2939 * s3554)
+    s3578 = s1536 * s2952 + s1537 * s2953 + s1538 * s2954 + (s1533 * s2955 + s1534 * s2956 + s1535 * s2957)
+    s3579 = s913 * s3550 + s915 * s3552 + s917 * s3554
+    s3580 = s3578 + s3579
+    s3581 = s3564 + (s1192 * s3569 - s1193 * s3568)
+    s3582 = s3565 + (s1193 * s3567 - s1191 * s3569)
+    s3583 = s3566 + (s1191 * s3568 - s1192 * s3567)
+    s3584 = s3570 + (s3549 + s2454 * s3308 + s2455 * s3309) + (s1192 * s3575 - s1193 * s3574)
+    s3585 = s3571 + (s3551 + s2456 * s3307 + s2458 * s3309) + (s1193 * s3573 - s1191 * s3575)
+    s3586 = s3572 + (s3553 + (s2459 * s3307 + s2460 * s3308)) + (s1191 * s3574 - s1192 * s3573)
+    s3587 = s1539 * s2826 + s1540 * s2827 + s1541 * s2828 + (s1533 * s2829 + s1534 * s2830 + s1535 * s2831)
+    s3588 = s3587 + (s2817 * s3550 + s2818 * s3552 + s2819 * s3554)
+    s3589 = s1539 * s2832 + s1540 * s2833 + s1541 * s2834 + (s1533 * s2835 + s1534 * s2836 + s1535 * s2837)
+    s3590 = s3579 + s3589
+    s3591 = s3581 + (s1114 * s3569 - s1115 * s3568)
+    s3592 = s3582 + (s1115 * s3567 - s1113 * s3569)
+    s3593 = s3583 + (s1113 * s3568 - s1114 * s3567)
+    s3594 = s3584 + (s1114 * s3575 - s1115 * s3574)
+    s3595 = s3585 + (s1115 * s3573 - s1113 * s3575)
+    s3596 = s3586 + (s1113 * s3574 - s1114 * s3573)
+    s3597 = s1543 * s2685 + s1544 * s2686 + s1545 * s2687 + (s1533 * s2727 + s1534 * s2728 + s1535 * s2729)
+    s3598 = s3597 + (s2643 * s3550 + s2644 * s3552 + s2645 * s3554)
+    s3599 = s1543 * s2691 + s1544 * s2692 + s1545 * s2693 + (s1533 * s2730 + s1534 * s2731 + s1535 * s2732)
+    s3600 = s15 * s3550 + s18 * s3552 + s21 * s3554
+    s3601 = s3599 + s3600
+    s3602 = s3591 + (s1039 * s3569 - s1040 * s3568)
+    s3603 = s3592 + (s1040 * s3567 - s1038 * s3569)
+    s3604 = s3593 + (s1038 * s3568 - s1039 * s3567)
+    s3605 = s3594 + (s1039 * s3575 - s1040 * s3574)
+    s3606 = s3595 + (s1040 * s3573 - s1038 * s3575)
+    s3607 = s3596 + (s1038 * s3574 - s1039 * s3573)
+    s3608 = s1533 * s2640 + s1534 * s2641 - s1535 * s2642
+    s3609 = s1547 * s2643 + s1548 * s2644 + s1549 * s2645 + (s1533 * s2646 + s1534 * s2647 + s1535 * s2648)
+    s3610 = s3600 + s3609
+    s3611 = s1533 * s2652 + s1534 * s2653 - s1535 * s2654
+    s3612 = s1547 * s2655 + s1548 * s2656 + s1549 * s2657 + (s1533 * s2658 + s1534 * s2659 + s1535 * s2660)
+    s3613 = s3612 + (s16 * s3550 + s19 * s3552 + s22 * s3554)
+    s3614 = s1533 * s2664 + s1534 * s2665 - s1535 * s2666
+    s3615 = s1547 * s2667 + s1548 * s2668 + s1549 * s2669 + (s1533 * s2670 + s1534 * s2671 + s1535 * s2672)
+    s3616 = s3615 + (s17 * s3550 + s20 * s3552 + s23 * s3554)
+    s3617 = s2475 * s3360
+    s3618 = s3617 + s2478 * s3361 + s2481 * s3362
+    s3619 = s2479 * s3361
+    s3620 = s2476 * s3360 + s3619 + s2482 * s3362
+    s3621 = s2483 * s3362
+    s3622 = s2477 * s3360 + s2480 * s3361 + s3621
+    s3623 = s1222 * s2976 + s1226 * s2977 + s1227 * s2978 + (s1215 * s2980 - s1214 * s2981)
+    s3624 = s1226 * s2976 + s1223 * s2977 + s1228 * s2978 + (s1213 * s2981 - s1215 * s2979)
+    s3625 = s1227 * s2976 + s1228 * s2977 + s1225 * s2978 + (s1214 * s2979 - s1213 * s2980)
+    s3626 = 2.0 * s2964
+    s3627 = 2.0 * s2965
+    s3628 = 2.0 * s2966
+    s3629 = m_shank * s2979 + (s1214 * s2978 - s1215 * s2977) + (s2464 * s3627 - s2463 * s3628)
+    s3630 = m_shank * s2980 + (s1215 * s2976 - s1213 * s2978) + (s2462 * s3628 - s2464 * s3626)
+    s3631 = m_shank * s2981 + (s1213 * s2977 - s1214 * s2976) + (s2463 * s3626 - s2462 * s3627)
+    s3632 = s921 * s2176 - s923 * s2175 + (s3623 + (s2475 * s3626 + s2476 * s3627 + s2477 * s3628))
+    s3633 = s923 * s2174 - s919 * s2176 + (s3624 + (s2478 * s3626 + s2479 * s3627 + s2480 * s3628))
+    s3634 = s919 * s2175 - s921 * s2174 + (s3625 + (s2481 * s3626 + s2482 * s3627 + s2483 * s3628))
+    s3635 = s921 * s2167 - s923 * s2166 + s3629
+    s3636 = s923 * s2165 - s919 * s2167 + s3630
+    s3637 = s919 * s2166 - s921 * s2165 + s3631
+    s3638 = s1222 * s2982 + s1226 * s2983 + s1227 * s2984 + (s1215 * s2986 - s1214 * s2987)
+    s3639 = s1226 * s2982 + s1223 * s2983 + s1228 * s2984 + (s1213 * s2987 - s1215 * s2985)
+    s3640 = s1227 * s2982 + s1228 * s2983 + s1225 * s2984 + (s1214 * s2985 - s1213 * s2986)
+    s3641 = m_shank * s2985 + (s1214 * s2984 - s1215 * s2983) + (s2464 * s3361 - s2463 * s3362)
+    s3642 = m_shank * s2986 + (s1215 * s2982 - s1213 * s2984) + (s2462 * s3362 - s2464 * s3360)
+    s3643 = m_shank * s2987 + (s1213 * s2983 - s1214 * s2982) + (s2463 * s3360 - s2462 * s3361)
+    s3644 = s1556 * s2976 + s1557 * s2977 + s1558 * s2978 + (s1553 * s2979 + s1554 * s2980 + s1555 * s2981)
+    s3645 = s3644 + (s2964 * s3618 + s2965 * s3620 + s2966 * s3622)
+    s3646 = s1556 * s2982 + s1557 * s2983 + s1558 * s2984 + (s1553 * s2985 + s1554 * s2986 + s1555 * s2987)
+    s3647 = s919 * s3618 + s921 * s3620 + s923 * s3622
+    s3648 = s3646 + s3647
+    s3649 = s3632 + (s1211 * s3637 - s1212 * s3636)
+    s3650 = s3633 + (s1212 * s3635 - s1210 * s3637)
+    s3651 = s3634 + (s1210 * s3636 - s1211 * s3635)
+    s3652 = s3638 + (s3617 + s2476 * s3361 + s2477 * s3362) + (s1211 * s3643 - s1212 * s3642)
+    s3653 = s3639 + (s3619 + s2478 * s3360 + s2480 * s3362) + (s1212 * s3641 - s1210 * s3643)
+    s3654 = s3640 + (s3621 + (s2481 * s3360 + s2482 * s3361)) + (s1210 * s3642 - s1211 * s3641)
+    s3655 = s1559 * s2856 + s1560 * s2857 + s1561 * s2858 + (s1553 * s2859 + s1554 * s2860 + s1555 * s2861)
+    s3656 = s3655 + (s2844 * s3618 + s2845 * s3620 + s2846 * s3622)
+    s3657 = s1559 * s2862 + s1560 * s2863 + s1561 * s2864 + (s1553 * s2865 + s1554 * s2866 + s1555 * s2867)
+    s3658 = s3647 + s3657
+    s3659 = s3649 + (s1134 * s3637 - s1135 * s3636)
+    s3660 = s3650 + (s1135 * s3635 - s1133 * s3637)
+    s3661 = s3651 + (s1133 * s3636 - s1134 * s3635)
+    s3662 = s3652 + (s1134 * s3643 - s1135 * s3642)
+    s3663 = s3653 + (s1135 * s3641 - s1133 * s3643)
+    s3664 = s3654 + (s1133 * s3642 - s1134 * s3641)
+    s3665 = s1563 * s2685 + s1564 * s2686 + s1565 * s2687 + (s1553 * s2745 + s1554 * s2746 + s1555 * s2747)
+    s3666 = s3665 + (s2643 * s3618 + s2644 * s3620 + s2645 * s3622)
+    s3667 = s1563 * s2691 + s1564 * s2692 + s1565 * s2693 + (s1553 * s2748 + s1554 * s2749 + s1555 * s2750)
+    s3668 = s15 * s3618 + s18 * s3620 + s21 * s3622
+    s3669 = s3667 + s3668
+    s3670 = s3659 + (s993 * s3636 - s990 * s3637)
+    s3671 = s3660 + (s987 * s3637 - s993 * s3635)
+    s3672 = s3661 + (s990 * s3635 - s987 * s3636)
+    s3673 = s3662 + (s993 * s3642 - s990 * s3643)
+    s3674 = s3663 + (s987 * s3643 - s993 * s3641)
+    s3675 = s3664 + (s990 * s3641 - s987 * s3642)
+    s3676 = s1553 * s2640 + s1554 * s2641 - s1555 * s2642
+    s3677 = s1567 * s2643 + s1568 * s2644 + s1569 * s2645 + (s1553 * s2646 + s1554 * s2647 + s1555 * s2648)
+    s3678 = s3668 + s3677
+    s3679 = s1553 * s2652 + s1554 * s2653 - s1555 * s2654
+    s3680 = s1567 * s2655 + s1568 * s2656 + s1569 * s2657 + (s1553 * s2658 + s1554 * s2659 + s1555 * s2660)
+    s3681 = s3680 + (s16 * s3618 + s19 * s3620 + s22 * s3622)
+    s3682 = s1553 * s2664 + s1554 * s2665 - s1555 * s2666
+    s3683 = s1567 * s2667 + s1568 * s2668 + s1569 * s2669 + (s1553 * s2670 + s1554 * s2671 + s1555 * s2672)
+    s3684 = s3683 + (s17 * s3618 + s20 * s3620 + s23 * s3622)
+    s3685 = s3 * s3472 + s4 * s3475 + s5 * s3478
+    s3686 = s3 * s3540 + s4 * s3543 + s5 * s3546
+    s3687 = s3 * s3608 + s4 * s3611 + s5 * s3614
+    s3688 = s3 * s3676 + s4 * s3679 + s5 * s3682
+    s3689 = trunk_qw * s2
+    s3690 = s3472 * s3689 - s5 * s3475 + s4 * s3478
+    s3691 = s3540 * s3689 - s5 * s3543 + s4 * s3546
+    s3692 = s3608 * s3689 - s5 * s3611 + s4 * s3614
+    s3693 = s3676 * s3689 - s5 * s3679 + s4 * s3682
+    s3694 = s3 * s3475 - s4 * s3472 + s3478 * s3689
+    s3695 = s3 * s3543 - s4 * s3540 + s3546 * s3689
+    s3696 = s3 * s3611 - s4 * s3608 + s3614 * s3689
+    s3697 = s3 * s3679 - s4 * s3676 + s3682 * s3689
+    s3698 = s3 * s3248 + s4 * s3250 + s5 * s3252 - s1573 * s3685
+    s3699 = s3 * s3301 + s4 * s3303 + s5 * s3305 - s1588 * s3686
+    s3700 = s3 * s3354 + s4 * s3356 + s5 * s3358 - s1603 * s3687
+    s3701 = s3 * s3036 + s4 * s3038 + s5 * s3040 - s1575 * s3685 - s1590 * s3686 - s1605 * s3687
+    s3702 = s3 * s3018 + s4 * s3020 + s5 * s3022 - s1576 * s3685 - s1591 * s3686 - s1606 * s3687
+    s3703 = s3 * s3000 + s4 * s3002 + s5 * s3004 - s1577 * s3685 - s1592 * s3686 - s1607 * s3687
+    s3704 = s3 * s2996 + s4 * s3014 + s5 * s3032 - s1578 * s3685 - s1593 * s3686 - s1608 * s3687
+    s3705 = s3 * s2995 + s4 * s3013 + s5 * s3031 - s1579 * s3685 - s1594 * s3686 - s1609 * s3687
+    s3706 = s3 * s2994 + s4 * s3012 + s5 * s3030 - s1580 * s3685 - s1595 * s3686 - s1610 * s3687
+    s3707 = s3 * s3407 + s4 * s3409 + s5 * s3411 - s1624 * s3688
+    s3708 = s3 * s3078 + s4 * s3080 + s5 * s3082 - s1574 * s3685 - s1639 * s3698
+    s3709 = s3 * s3117 + s4 * s3119 + s5 * s3121 - s1589 * s3686 - s1667 * s3699
+    s3710 = s3 * s3156 + s4 * s3158 + s5 * s3160 - s1604 * s3687 - s1680 * s3700
+    s3711 = s3 * s3195 + s4 * s3197 + s5 * s3199 - s1625 * s3688 - s1693 * s3707
+    s3712 = s3701 - s1626 * s3688 - s1640 * s3698 - s1668 * s3699 - s1681 * s3700 - s1694 * s3707
+    s3713 = s3702 - s1627 * s3688 - s1641 * s3698 - s1669 * s3699 - s1682 * s3700 - s1695 * s3707
+    s3714 = s3703 - s1628 * s3688 - s1642 * s3698 - s1670 * s3699 - s1683 * s3700 - s1696 * s3707
+    s3715 = s3704 - s1629 * s3688 - s1643 * s3698 - s1671 * s3699 - s1684 * s3700 - s1697 * s3707
+    s3716 = s3705 - s1630 * s3688 - s1644 * s3698 - s1672 * s3699 - s1685 * s3700 - s1698 * s3707
+    s3717 = s3706 - s1631 * s3688 - s1645 * s3698 - s1673 * s3699 - s1686 * s3700 - s1699 * s3707
+    s3718 = s3712 - s1712 * s3708 - s1718 * s3709 - s1739 * s3710 - s1745 * s3711
+    s3719 = s3713 - s1713 * s3708 - s1719 * s3709 - s1740 * s3710 - s1746 * s3711 - s1756 * s3718
+    s3720 = s3714 - s1714 * s3708 - s1720 * s3709 - s1741 * s3710 - s1747 * s3711 - s1757 * s3718
+    s3721 = s3715 - s1715 * s3708 - s1721 * s3709 - s1742 * s3710 - s1748 * s3711 - s1758 * s3718
+    s3722 = s3716 - s1716 * s3708 - s1722 * s3709 - s1743 * s3710 - s1749 * s3711 - s1759 * s3718
+    s3723 = s3717 - s1717 * s3708 - s1723 * s3709 - s1744 * s3710 - s1750 * s3711 - s1760 * s3718
+    s3724 = s3720 - s1766 * s3719
+    s3725 = s3721 - s1767 * s3719 - s1773 * s3724
+    s3726 = s3722 - s1768 * s3719 - s1774 * s3724 + s1781 * s3725
+    s3727 = (s3723 - s1769 * s3719 - s1775 * s3724 + s1782 * s3725 + s1784 * s3726) / pivot_trunk_x_dot
+    s3728 = s3726 / pivot_trunk_y_dot + s1784 * s3727
+    s3729 = s3725 / pivot_trunk_z_dot + s1781 * s3728 + s1782 * s3727
+    s3730 = s3724 / pivot_trunk_wx - s1773 * s3729 - s1774 * s3728 - s1775 * s3727
+    s3731 = s3719 / pivot_trunk_wy - s1766 * s3730 - s1767 * s3729 - s1768 * s3728 - s1769 * s3727
+    s3732 = s3718 / pivot_trunk_wz - s1756 * s3731 - s1757 * s3730 - s1758 * s3729 - s1759 * s3728
+    s3733 = s3732 - s1760 * s3727
+    s3734 = s3711 / pivot_hind_right_abduction_angle_dot - s1745 * s3733 - s1746 * s3731
+    s3735 = s3734 - s1747 * s3730 - s1748 * s3729 - s1749 * s3728 - s1750 * s3727
+    s3736 = s3710 / pivot_hind_left_abduction_angle_dot - s1739 * s3733 - s1740 * s3731
+    s3737 = s3736 - s1741 * s3730 - s1742 * s3729 - s1743 * s3728 - s1744 * s3727
+    s3738 = s3709 / pivot_front_right_abduction_angle_dot - s1718 * s3733 - s1719 * s3731
+    s3739 = s3738 - s1720 * s3730 - s1721 * s3729 - s1722 * s3728 - s1723 * s3727
+    s3740 = s3708 / pivot_front_left_abduction_angle_dot - s1712 * s3733 - s1713 * s3731
+    s3741 = s3740 - s1714 * s3730 - s1715 * s3729 - s1716 * s3728 - s1717 * s3727
+    s3742 = s3707 / pivot_hind_right_swing_angle_dot - s1693 * s3735 - s1694 * s3733 - s1695 * s3731
+    s3743 = s3742 - s1696 * s3730 - s1697 * s3729 - s1698 * s3728 - s1699 * s3727
+    s3744 = s3700 / pivot_hind_left_swing_angle_dot - s1680 * s3737 - s1681 * s3733 - s1682 * s3731
+    s3745 = s3744 - s1683 * s3730 - s1684 * s3729 - s1685 * s3728 - s1686 * s3727
+    s3746 = s3699 / pivot_front_right_swing_angle_dot - s1667 * s3739 - s1668 * s3733
+    s3747 = s3746 - s1669 * s3731 - s1670 * s3730 - s1671 * s3729 - s1672 * s3728 - s1673 * s3727
+    s3748 = s3698 / pivot_front_left_swing_angle_dot - s1639 * s3741 - s1640 * s3733 - s1641 * s3731
+    s3749 = s3748 - s1642 * s3730 - s1643 * s3729 - s1644 * s3728 - s1645 * s3727
+    s3750 = s3688 / pivot_hind_right_knee_angle_dot - s1624 * s3743 - s1625 * s3735 - s1626 * s3733
+    s3751 = s3687 / pivot_hind_left_knee_angle_dot - s1603 * s3745 - s1604 * s3737 - s1605 * s3733
+    s3752 = s3686 / pivot_front_right_knee_angle_dot - s1588 * s3747 - s1589 * s3739 - s1590 * s3733
+    s3753 = s3685 / pivot_front_left_knee_angle_dot - s1573 * s3749 - s1574 * s3741 - s1575 * s3733
+    s3754 = s1573 * s3690 - (s3248 * s3689 - s5 * s3250 + s4 * s3252)
+    s3755 = s1588 * s3691 - (s3301 * s3689 - s5 * s3303 + s4 * s3305)
+    s3756 = s1575 * s3690 - (s3036 * s3689 - s5 * s3038 + s4 * s3040) + s1590 * s3691
+    s3757 = s1576 * s3690 - (s3018 * s3689 - s5 * s3020 + s4 * s3022) + s1591 * s3691
+    s3758 = s1577 * s3690 - (s3000 * s3689 - s5 * s3002 + s4 * s3004) + s1592 * s3691
+    s3759 = s1578 * s3690 - (s2996 * s3689 - s5 * s3014 + s4 * s3032) + s1593 * s3691
+    s3760 = s1579 * s3690 - (s2995 * s3689 - s5 * s3013 + s4 * s3031) + s1594 * s3691
+    s3761 = s1580 * s3690 - (s2994 * s3689 - s5 * s3012 + s4 * s3030) + s1595 * s3691
+    s3762 = s1603 * s3692 - (s3354 * s3689 - s5 * s3356 + s4 * s3358)
+    s3763 = s1624 * s3693 - (s3407 * s3689 - s5 * s3409 + s4 * s3411)
+    s3764 = s1574 * s3690 - (s3078 * s3689 - s5 * s3080 + s4 * s3082) - s1639 * s3754
+    s3765 = s1589 * s3691 - (s3117 * s3689 - s5 * s3119 + s4 * s3121) - s1667 * s3755
+    s3766 = s1604 * s3692 - (s3156 * s3689 - s5 * s3158 + s4 * s3160) - s1680 * s3762
+    s3767 = s3756 + s1605 * s3692 + s1626 * s3693 - s1640 * s3754 - s1668 * s3755 - s1681 * s3762
+    s3768 = s3757 + s1606 * s3692 + s1627 * s3693 - s1641 * s3754 - s1669 * s3755 - s1682 * s3762
+    s3769 = s3758 + s1607 * s3692 + s1628 * s3693 - s1642 * s3754 - s1670 * s3755 - s1683 * s3762
+    s3770 = s3759 + s1608 * s3692 + s1629 * s3693 - s1643 * s3754 - s1671 * s3755 - s1684 * s3762
+    s3771 = s3760 + s1609 * s3692 + s1630 * s3693 - s1644 * s3754 - s1672 * s3755 - s1685 * s3762
+    s3772 = s3761 + s1610 * s3692 + s1631 * s3693 - s1645 * s3754 - s1673 * s3755 - s1686 * s3762
+    s3773 = s1625 * s3693 - (s3195 * s3689 - s5 * s3197 + s4 * s3199) - s1693 * s3763
+    s3774 = s3767 - s1694 * s3763 - s1712 * s3764 - s1718 * s3765 - s1739 * s3766 - s1745 * s3773
+    s3775 = s3768 - s1695 * s3763 - s1713 * s3764 - s1719 * s3765 - s1740 * s3766 - s1746 * s3773
+    s3776 = s3769 - s1696 * s3763 - s1714 * s3764 - s1720 * s3765 - s1741 * s3766 - s1747 * s3773
+    s3777 = s3770 - s1697 * s3763 - s1715 * s3764 - s1721 * s3765 - s1742 * s3766 - s1748 * s3773
+    s3778 = s3771 - s1698 * s3763 - s1716 * s3764 - s1722 * s3765 - s1743 * s3766 - s1749 * s3773
+    s3779 = s3772 - s1699 * s3763 - s1717 * s3764 - s1723 * s3765 - s1744 * s3766 - s1750 * s3773
+    s3780 = s3775 - s1756 * s3774
+    s3781 = s3776 - s1757 * s3774 - s1766 * s3780
+    s3782 = s3777 - s1758 * s3774 - s1767 * s3780 - s1773 * s3781
+    s3783 = s3778 - s1759 * s3774 - s1768 * s3780 - s1774 * s3781 + s1781 * s3782
+    s3784 = s3779 - s1760 * s3774 - s1769 * s3780 - s1775 * s3781 + s1782 * s3782 + s1784 * s3783
+    s3785 = s3784 / pivot_trunk_x_dot
+    s3786 = s3783 / pivot_trunk_y_dot + s1784 * s3785
+    s3787 = s3782 / pivot_trunk_z_dot + s1781 * s3786 + s1782 * s3785
+    s3788 = s3781 / pivot_trunk_wx - s1773 * s3787 - s1774 * s3786 - s1775 * s3785
+    s3789 = s3780 / pivot_trunk_wy - s1766 * s3788 - s1767 * s3787 - s1768 * s3786 - s1769 * s3785
+    s3790 = s3774 / pivot_trunk_wz - s1756 * s3789 - s1757 * s3788 - s1758 * s3787 - s1759 * s3786
+    s3791 = s3790 - s1760 * s3785
+    s3792 = s3773 / pivot_hind_right_abduction_angle_dot - s1745 * s3791 - s1746 * s3789
+    s3793 = s3792 - s1747 * s3788 - s1748 * s3787 - s1749 * s3786 - s1750 * s3785
+    s3794 = s3766 / pivot_hind_left_abduction_angle_dot - s1739 * s3791 - s1740 * s3789
+    s3795 = s3794 - s1741 * s3788 - s1742 * s3787 - s1743 * s3786 - s1744 * s3785
+    s3796 = s3765 / pivot_front_right_abduction_angle_dot - s1718 * s3791 - s1719 * s3789
+    s3797 = s3796 - s1720 * s3788 - s1721 * s3787 - s1722 * s3786 - s1723 * s3785
+    s3798 = s3764 / pivot_front_left_abduction_angle_dot - s1712 * s3791 - s1713 * s3789
+    s3799 = s3798 - s1714 * s3788 - s1715 * s3787 - s1716 * s3786 - s1717 * s3785
+    s3800 = s3763 / pivot_hind_right_swing_angle_dot - s1693 * s3793 - s1694 * s3791 - s1695 * s3789
+    s3801 = s3800 - s1696 * s3788 - s1697 * s3787 - s1698 * s3786 - s1699 * s3785
+    s3802 = s3762 / pivot_hind_left_swing_angle_dot - s1680 * s3795 - s1681 * s3791 - s1682 * s3789
+    s3803 = s3802 - s1683 * s3788 - s1684 * s3787 - s1685 * s3786 - s1686 * s3785
+    s3804 = s3755 / pivot_front_right_swing_angle_dot - s1667 * s3797 - s1668 * s3791
+    s3805 = s3804 - s1669 * s3789 - s1670 * s3788 - s1671 * s3787 - s1672 * s3786 - s1673 * s3785
+    s3806 = s3754 / pivot_front_left_swing_angle_dot - s1639 * s3799 - s1640 * s3791 - s1641 * s3789
+    s3807 = s3806 - s1642 * s3788 - s1643 * s3787 - s1644 * s3786 - s1645 * s3785
+    s3808 = s3693 / pivot_hind_right_knee_angle_dot + s1624 * s3801 + s1625 * s3793 + s1626 * s3791
+    s3809 = s3808 + s1627 * s3789 + s1628 * s3788 + s1629 * s3787 + s1630 * s3786 + s1631 * s3785
+    s3810 = s3692 / pivot_hind_left_knee_angle_dot + s1603 * s3803 + s1604 * s3795 + s1605 * s3791
+    s3811 = s3810 + s1606 * s3789 + s1607 * s3788 + s1608 * s3787 + s1609 * s3786 + s1610 * s3785
+    s3812 = s3691 / pivot_front_right_knee_angle_dot + s1588 * s3805 + s1589 * s3797 + s1590 * s3791
+    s3813 = s3812 + s1591 * s3789 + s1592 * s3788 + s1593 * s3787 + s1594 * s3786 + s1595 * s3785
+    s3814 = s3690 / pivot_front_left_knee_angle_dot + s1573 * s3807 + s1574 * s3799 + s1575 * s3791
+    s3815 = s3814 + s1576 * s3789 + s1577 * s3788 + s1578 * s3787 + s1579 * s3786 + s1580 * s3785
+    s3816 = s3 * s3478 - (s5 * s3472 + s3475 * s3689)
+    s3817 = s3 * s3546 - (s5 * s3540 + s3543 * s3689)
+    s3818 = s3 * s3614 - (s5 * s3608 + s3611 * s3689)
+    s3819 = s3 * s3682 - (s5 * s3676 + s3679 * s3689)
+    s3820 = s3 * s3252 - (s5 * s3248 + s3250 * s3689) - s1573 * s3816
+    s3821 = s3 * s3305 - (s5 * s3301 + s3303 * s3689) - s1588 * s3817
+    s3822 = s3 * s3040 - (s5 * s3036 + s3038 * s3689) - s1575 * s3816 - s1590 * s3817
+    s3823 = s3 * s3022 - (s5 * s3018 + s3020 * s3689) - s1576 * s3816 - s1591 * s3817
+    s3824 = s3 * s3004 - (s5 * s3000 + s3002 * s3689) - s1577 * s3816 - s1592 * s3817
+    s3825 = s3 * s3032 - (s5 * s2996 + s3014 * s3689) - s1578 * s3816 - s1593 * s3817
+    s3826 = s3 * s3031 - (s5 * s2995 + s3013 * s3689) - s1579 * s3816 - s1594 * s3817
+    s3827 = s3 * s3030 - (s5 * s2994 + s3012 * s3689) - s1580 * s3816 - s1595 * s3817
+    s3828 = s3 * s3358 - (s5 * s3354 + s3356 * s3689) - s1603 * s3818
+    s3829 = s3 * s3411 - (s5 * s3407 + s3409 * s3689) - s1624 * s3819
+    s3830 = s3 * s3082 - (s5 * s3078 + s3080 * s3689) - s1574 * s3816 - s1639 * s3820
+    s3831 = s3 * s3121 - (s5 * s3117 + s3119 * s3689) - s1589 * s3817 - s1667 * s3821
+    s3832 = s3 * s3160 - (s5 * s3156 + s3158 * s3689) - s1604 * s3818 - s1680 * s3828
+    s3833 = s3822 - s1605 * s3818 - s1626 * s3819 - s1640 * s3820 - s1668 * s3821 - s1681 * s3828
+    s3834 = s3823 - s1606 * s3818 - s1627 * s3819 - s1641 * s3820 - s1669 * s3821 - s1682 * s3828
+    s3835 = s3824 - s1607 * s3818 - s1628 * s3819 - s1642 * s3820 - s1670 * s3821 - s1683 * s3828
+    s3836 = s3825 - s1608 * s3818 - s1629 * s3819 - s1643 * s3820 - s1671 * s3821 - s1684 * s3828
+    s3837 = s3826 - s1609 * s3818 - s1630 * s3819 - s1644 * s3820 - s1672 * s3821 - s1685 * s3828
+    s3838 = s3827 - s1610 * s3818 - s1631 * s3819 - s1645 * s3820 - s1673 * s3821 - s1686 * s3828
+    s3839 = s3 * s3199 - (s5 * s3195 + s3197 * s3689) - s1625 * s3819 - s1693 * s3829
+    s3840 = s3833 - s1694 * s3829 - s1712 * s3830 - s1718 * s3831 - s1739 * s3832 - s1745 * s3839
+    s3841 = s3834 - s1695 * s3829 - s1713 * s3830 - s1719 * s3831 - s1740 * s3832 - s1746 * s3839
+    s3842 = s3835 - s1696 * s3829 - s1714 * s3830 - s1720 * s3831 - s1741 * s3832 - s1747 * s3839
+    s3843 = s3836 - s1697 * s3829 - s1715 * s3830 - s1721 * s3831 - s1742 * s3832 - s1748 * s3839
+    s3844 = s3837 - s1698 * s3829 - s1716 * s3830 - s1722 * s3831 - s1743 * s3832 - s1749 * s3839
+    s3845 = s3838 - s1699 * s3829 - s1717 * s3830 - s1723 * s3831 - s1744 * s3832 - s1750 * s3839
+    s3846 = s3841 - s1756 * s3840
+    s3847 = s3842 - s1757 * s3840 - s1766 * s3846
+    s3848 = s3843 - s1758 * s3840 - s1767 * s3846 - s1773 * s3847
+    s3849 = s3844 - s1759 * s3840 - s1768 * s3846 - s1774 * s3847 + s1781 * s3848
+    s3850 = s3845 - s1760 * s3840 - s1769 * s3846 - s1775 * s3847 + s1782 * s3848 + s1784 * s3849
+    s3851 = s3850 / pivot_trunk_x_dot
+    s3852 = s3849 / pivot_trunk_y_dot + s1784 * s3851
+    s3853 = s3848 / pivot_trunk_z_dot + s1781 * s3852 + s1782 * s3851
+    s3854 = s3847 / pivot_trunk_wx - s1773 * s3853 - s1774 * s3852 - s1775 * s3851
+    s3855 = s3846 / pivot_trunk_wy - s1766 * s3854 - s1767 * s3853 - s1768 * s3852 - s1769 * s3851
+    s3856 = s3840 / pivot_trunk_wz - s1756 * s3855 - s1757 * s3854 - s1758 * s3853 - s1759 * s3852
+    s3857 = s3856 - s1760 * s3851
+    s3858 = s3839 / pivot_hind_right_abduction_angle_dot - s1745 * s3857 - s1746 * s3855
+    s3859 = s3858 - s1747 * s3854 - s1748 * s3853 - s1749 * s3852 - s1750 * s3851
+    s3860 = s3832 / pivot_hind_left_abduction_angle_dot - s1739 * s3857 - s1740 * s3855
+    s3861 = s3860 - s1741 * s3854 - s1742 * s3853 - s1743 * s3852 - s1744 * s3851
+    s3862 = s3831 / pivot_front_right_abduction_angle_dot - s1718 * s3857 - s1719 * s3855
+    s3863 = s3862 - s1720 * s3854 - s1721 * s3853 - s1722 * s3852 - s1723 * s3851
+    s3864 = s3830 / pivot_front_left_abduction_angle_dot - s1712 * s3857 - s1713 * s3855
+    s3865 = s3864 - s1714 * s3854 - s1715 * s3853 - s1716 * s3852 - s1717 * s3851
+    s3866 = s3829 / pivot_hind_right_swing_angle_dot - s1693 * s3859 - s1694 * s3857 - s1695 * s3855
+    s3867 = s3866 - s1696 * s3854 - s1697 * s3853 - s1698 * s3852 - s1699 * s3851
+    s3868 = s3828 / pivot_hind_left_swing_angle_dot - s1680 * s3861 - s1681 * s3857 - s1682 * s3855
+    s3869 = s3868 - s1683 * s3854 - s1684 * s3853 - s1685 * s3852 - s1686 * s3851
+    s3870 = s3821 / pivot_front_right_swing_angle_dot - s1667 * s3863 - s1668 * s3857
+    s3871 = s3870 - s1669 * s3855 - s1670 * s3854 - s1671 * s3853 - s1672 * s3852 - s1673 * s3851
+    s3872 = s3820 / pivot_front_left_swing_angle_dot - s1639 * s3865 - s1640 * s3857 - s1641 * s3855
+    s3873 = s3872 - s1642 * s3854 - s1643 * s3853 - s1644 * s3852 - s1645 * s3851
+    s3874 = s3819 / pivot_hind_right_knee_angle_dot - s1624 * s3867 - s1625 * s3859 - s1626 * s3857
+    s3875 = s3818 / pivot_hind_left_knee_angle_dot - s1603 * s3869 - s1604 * s3861 - s1605 * s3857
+    s3876 = s3817 / pivot_front_right_knee_angle_dot - s1588 * s3871 - s1589 * s3863 - s1590 * s3857
+    s3877 = s3816 / pivot_front_left_knee_angle_dot - s1573 * s3873 - s1574 * s3865 - s1575 * s3857
+    s3878 = s1573 * s3694 - (s3 * s3250 - s4 * s3248 + s3252 * s3689)
+    s3879 = s1588 * s3695 - (s3 * s3303 - s4 * s3301 + s3305 * s3689)
+    s3880 = s1575 * s3694 - (s3 * s3038 - s4 * s3036 + s3040 * s3689) + s1590 * s3695
+    s3881 = s1576 * s3694 - (s3 * s3020 - s4 * s3018 + s3022 * s3689) + s1591 * s3695
+    s3882 = s1577 * s3694 - (s3 * s3002 - s4 * s3000 + s3004 * s3689) + s1592 * s3695
+    s3883 = s1578 * s3694 - (s3 * s3014 - s4 * s2996 + s3032 * s3689) + s1593 * s3695
+    s3884 = s1579 * s3694 - (s3 * s3013 - s4 * s2995 + s3031 * s3689) + s1594 * s3695
+    s3885 = s1580 * s3694 - (s3 * s3012 - s4 * s2994 + s3030 * s3689) + s1595 * s3695
+    s3886 = s1603 * s3696 - (s3 * s3356 - s4 * s3354 + s3358 * s3689)
+    s3887 = s1624 * s3697 - (s3 * s3409 - s4 * s3407 + s3411 * s3689)
+    s3888 = s1574 * s3694 - (s3 * s3080 - s4 * s3078 + s3082 * s3689) - s1639 * s3878
+    s3889 = s1589 * s3695 - (s3 * s3119 - s4 * s3117 + s3121 * s3689) - s1667 * s3879
+    s3890 = s1604 * s3696 - (s3 * s3158 - s4 * s3156 + s3160 * s3689) - s1680 * s3886
+    s3891 = s3880 + s1605 * s3696 + s1626 * s3697 - s1640 * s3878 - s1668 * s3879 - s1681 * s3886
+    s3892 = s3881 + s1606 * s3696 + s1627 * s3697 - s1641 * s3878 - s1669 * s3879 - s1682 * s3886
+    s3893 = s3882 + s1607 * s3696 + s1628 * s3697 - s1642 * s3878 - s1670 * s3879 - s1683 * s3886
+    s3894 = s3883 + s1608 * s3696 + s1629 * s3697 - s1643 * s3878 - s1671 * s3879 - s1684 * s3886
+    s3895 = s3884 + s1609 * s3696 + s1630 * s3697 - s1644 * s3878 - s1672 * s3879 - s1685 * s3886
+    s3896 = s3885 + s1610 * s3696 + s1631 * s3697 - s1645 * s3878 - s1673 * s3879 - s1686 * s3886
+    s3897 = s1625 * s3697 - (s3 * s3197 - s4 * s3195 + s3199 * s3689) - s1693 * s3887
+    s3898 = s3891 - s1694 * s3887 - s1712 * s3888 - s1718 * s3889 - s1739 * s3890 - s1745 * s3897
+    s3899 = s3892 - s1695 * s3887 - s1713 * s3888 - s1719 * s3889 - s1740 * s3890 - s1746 * s3897
+    s3900 = s3893 - s1696 * s3887 - s1714 * s3888 - s1720 * s3889 - s1741 * s3890 - s1747 * s3897
+    s3901 = s3894 - s1697 * s3887 - s1715 * s3888 - s1721 * s3889 - s1742 * s3890 - s1748 * s3897
+    s3902 = s3895 - s1698 * s3887 - s1716 * s3888 - s1722 * s3889 - s1743 * s3890 - s1749 * s3897
+    s3903 = s3896 - s1699 * s3887 - s1717 * s3888 - s1723 * s3889 - s1744 * s3890 - s1750 * s3897
+    s3904 = s3899 - s1756 * s3898
+    s3905 = s3900 - s1757 * s3898 - s1766 * s3904
+    s3906 = s3901 - s1758 * s3898 - s1767 * s3904 - s1773 * s3905
+    s3907 = s3902 - s1759 * s3898 - s1768 * s3904 - s1774 * s3905 + s1781 * s3906
+    s3908 = s3903 - s1760 * s3898 - s1769 * s3904 - s1775 * s3905 + s1782 * s3906 + s1784 * s3907
+    s3909 = s3908 / pivot_trunk_x_dot
+    s3910 = s3907 / pivot_trunk_y_dot + s1784 * s3909
+    s3911 = s3906 / pivot_trunk_z_dot + s1781 * s3910 + s1782 * s3909
+    s3912 = s3905 / pivot_trunk_wx - s1773 * s3911 - s1774 * s3910 - s1775 * s3909
+    s3913 = s3904 / pivot_trunk_wy - s1766 * s3912 - s1767 * s3911 - s1768 * s3910 - s1769 * s3909
+    s3914 = s3898 / pivot_trunk_wz - s1756 * s3913 - s1757 * s3912 - s1758 * s3911 - s1759 * s3910
+    s3915 = s3914 - s1760 * s3909
+    s3916 = s3897 / pivot_hind_right_abduction_angle_dot - s1745 * s3915 - s1746 * s3913
+    s3917 = s3916 - s1747 * s3912 - s1748 * s3911 - s1749 * s3910 - s1750 * s3909
+    s3918 = s3890 / pivot_hind_left_abduction_angle_dot - s1739 * s3915 - s1740 * s3913
+    s3919 = s3918 - s1741 * s3912 - s1742 * s3911 - s1743 * s3910 - s1744 * s3909
+    s3920 = s3889 / pivot_front_right_abduction_angle_dot - s1718 * s3915 - s1719 * s3913
+    s3921 = s3920 - s1720 * s3912 - s1721 * s3911 - s1722 * s3910 - s1723 * s3909
+    s3922 = s3888 / pivot_front_left_abduction_angle_dot - s1712 * s3915 - s1713 * s3913
+    s3923 = s3922 - s1714 * s3912 - s1715 * s3911 - s1716 * s3910 - s1717 * s3909
+    s3924 = s3887 / pivot_hind_right_swing_angle_dot - s1693 * s3917 - s1694 * s3915 - s1695 * s3913
+    s3925 = s3924 - s1696 * s3912 - s1697 * s3911 - s1698 * s3910 - s1699 * s3909
+    s3926 = s3886 / pivot_hind_left_swing_angle_dot - s1680 * s3919 - s1681 * s3915 - s1682 * s3913
+    s3927 = s3926 - s1683 * s3912 - s1684 * s3911 - s1685 * s3910 - s1686 * s3909
+    s3928 = s3879 / pivot_front_right_swing_angle_dot - s1667 * s3921 - s1668 * s3915
+    s3929 = s3928 - s1669 * s3913 - s1670 * s3912 - s1671 * s3911 - s1672 * s3910 - s1673 * s3909
+    s3930 = s3878 / pivot_front_left_swing_angle_dot - s1639 * s3923 - s1640 * s3915 - s1641 * s3913
+    s3931 = s3930 - s1642 * s3912 - s1643 * s3911 - s1644 * s3910 - s1645 * s3909
+    s3932 = s3697 / pivot_hind_right_knee_angle_dot + s1624 * s3925 + s1625 * s3917 + s1626 * s3915
+    s3933 = s3932 + s1627 * s3913 + s1628 * s3912 + s1629 * s3911 + s1630 * s3910 + s1631 * s3909
+    s3934 = s3696 / pivot_hind_left_knee_angle_dot + s1603 * s3927 + s1604 * s3919 + s1605 * s3915
+    s3935 = s3934 + s1606 * s3913 + s1607 * s3912 + s1608 * s3911 + s1609 * s3910 + s1610 * s3909
+    s3936 = s3695 / pivot_front_right_knee_angle_dot + s1588 * s3929 + s1589 * s3921 + s1590 * s3915
+    s3937 = s3936 + s1591 * s3913 + s1592 * s3912 + s1593 * s3911 + s1594 * s3910 + s1595 * s3909
+    s3938 = s3694 / pivot_front_left_knee_angle_dot + s1573 * s3931 + s1574 * s3923 + s1575 * s3915
+    s3939 = s3938 + s1576 * s3913 + s1577 * s3912 + s1578 * s3911 + s1579 * s3910 + s1580 * s3909
+    s3940 = s1573 * s3462 - (s3239 + (s2643 * s3205 + s2644 * s3207 + s2645 * s3209))
+    s3941 = s1574 * s3462 - (s3069 + (s2643 * s3043 + s2644 * s3045 + s2645 * s3047))
+    s3942 = s3941 - s1639 * s3940
+    s3943 = s1575 * s3462 - (s17 * s3072 + s20 * s3073 + s23 * s3074) - s1640 * s3940
+    s3944 = s1576 * s3462 - (s16 * s3072 + s19 * s3073 + s22 * s3074) - s1641 * s3940
+    s3945 = s1577 * s3462 - (s15 * s3072 + s18 * s3073 + s21 * s3074) - s1642 * s3940
+    s3946 = s3943 - s1712 * s3942
+    s3947 = s3944 - s1713 * s3942 - s1756 * s3946
+    s3948 = s3945 - s1714 * s3942 - s1757 * s3946 - s1766 * s3947
+    s3949 = s1578 * s3462 - s3062 - s1643 * s3940 - s1715 * s3942 - s1758 * s3946 - s1767 * s3947
+    s3950 = s1579 * s3462 - s3061 - s1644 * s3940 - s1716 * s3942 - s1759 * s3946 - s1768 * s3947
+    s3951 = s1580 * s3462 - s3060 - s1645 * s3940 - s1717 * s3942 - s1760 * s3946 - s1769 * s3947
+    s3952 = s3949 - s1773 * s3948
+    s3953 = s3950 - s1774 * s3948 + s1781 * s3952
+    s3954 = (s3951 - s1775 * s3948 + s1782 * s3952 + s1784 * s3953) / pivot_trunk_x_dot
+    s3955 = s3953 / pivot_trunk_y_dot + s1784 * s3954
+    s3956 = s3952 / pivot_trunk_z_dot + s1781 * s3955 + s1782 * s3954
+    s3957 = s3948 / pivot_trunk_wx - s1773 * s3956 - s1774 * s3955 - s1775 * s3954
+    s3958 = s3947 / pivot_trunk_wy - s1766 * s3957 - s1767 * s3956 - s1768 * s3955 - s1769 * s3954
+    s3959 = s3946 / pivot_trunk_wz - s1756 * s3958 - s1757 * s3957 - s1758 * s3956 - s1759 * s3955
+    s3960 = s3959 - s1760 * s3954
+    s3961 = s1745 * s3960 + s1746 * s3958 + s1747 * s3957 + s1748 * s3956 + s1749 * s3955
+    s3962 = s3961 + s1750 * s3954
+    s3963 = s1739 * s3960 + s1740 * s3958 + s1741 * s3957 + s1742 * s3956 + s1743 * s3955
+    s3964 = s3963 + s1744 * s3954
+    s3965 = s1718 * s3960 + s1719 * s3958 + s1720 * s3957 + s1721 * s3956 + s1722 * s3955
+    s3966 = s3965 + s1723 * s3954
+    s3967 = s3942 / pivot_front_left_abduction_angle_dot - s1712 * s3960 - s1713 * s3958
+    s3968 = s3967 - s1714 * s3957 - s1715 * s3956 - s1716 * s3955 - s1717 * s3954
+    s3969 = s1693 * s3962 - s1694 * s3960 - s1695 * s3958 - s1696 * s3957 - s1697 * s3956
+    s3970 = s3969 - s1698 * s3955 - s1699 * s3954
+    s3971 = s1680 * s3964 - s1681 * s3960 - s1682 * s3958 - s1683 * s3957 - s1684 * s3956
+    s3972 = s3971 - s1685 * s3955 - s1686 * s3954
+    s3973 = s1667 * s3966 - s1668 * s3960 - s1669 * s3958 - s1670 * s3957 - s1671 * s3956
+    s3974 = s3973 - s1672 * s3955 - s1673 * s3954
+    s3975 = s3940 / pivot_front_left_swing_angle_dot - s1639 * s3968 - s1640 * s3960 - s1641 * s3958
+    s3976 = s3975 - s1642 * s3957 - s1643 * s3956 - s1644 * s3955 - s1645 * s3954
+    s3977 = s1625 * s3962 - s1624 * s3970 - s1626 * s3960 - s1627 * s3958 - s1628 * s3957
+    s3978 = s1604 * s3964 - s1603 * s3972 - s1605 * s3960 - s1606 * s3958 - s1607 * s3957
+    s3979 = s1589 * s3966 - s1588 * s3974 - s1590 * s3960 - s1591 * s3958 - s1592 * s3957
+    s3980 = s3462 / pivot_front_left_knee_angle_dot + s1573 * s3976 + s1574 * s3968 + s1575 * s3960
+    s3981 = s3980 + s1576 * s3958 + s1577 * s3957 + s1578 * s3956 + s1579 * s3955 + s1580 * s3954
+    s3982 = s1588 * s3530 - (s3292 + (s2643 * s3258 + s2644 * s3260 + s2645 * s3262))
+    s3983 = s1589 * s3530 - (s3108 + (s2643 * s3085 + s2644 * s3087 + s2645 * s3089))
+    s3984 = s3983 - s1667 * s3982
+    s3985 = s1590 * s3530 - (s17 * s3111 + s20 * s3112 + s23 * s3113) - s1668 * s3982
+    s3986 = s1591 * s3530 - (s16 * s3111 + s19 * s3112 + s22 * s3113) - s1669 * s3982
+    s3987 = s1592 * s3530 - (s15 * s3111 + s18 * s3112 + s21 * s3113) - s1670 * s3982
+    s3988 = s3985 - s1718 * s3984
+    s3989 = s3986 - s1719 * s3984 - s1756 * s3988
+    s3990 = s3987 - s1720 * s3984 - s1757 * s3988 - s1766 * s3989
+    s3991 = s1593 * s3530 - s3101 - s1671 * s3982 - s1721 * s3984 - s1758 * s3988 - s1767 * s3989
+    s3992 = s1594 * s3530 - s3100 - s1672 * s3982 - s1722 * s3984 - s1759 * s3988 - s1768 * s3989
+    s3993 = s1595 * s3530 - s3099 - s1673 * s3982 - s1723 * s3984 - s1760 * s3988 - s1769 * s3989
+    s3994 = s3991 - s1773 * s3990
+    s3995 = s3992 - s1774 * s3990 + s1781 * s3994
+    s3996 = (s3993 - s1775 * s3990 + s1782 * s3994 + s1784 * s3995) / pivot_trunk_x_dot
+    s3997 = s3995 / pivot_trunk_y_dot + s1784 * s3996
+    s3998 = s3994 / pivot_trunk_z_dot + s1781 * s3997 + s1782 * s3996
+    s3999 = s3990 / pivot_trunk_wx - s1773 * s3998 - s1774 * s3997 - s1775 * s3996
+    s4000 = s3989 / pivot_trunk_wy - s1766 * s3999 - s1767 * s3998 - s1768 * s3997 - s1769 * s3996
+    s4001 = s3988 / pivot_trunk_wz - s1756 * s4000 - s1757 * s3999 - s1758 * s3998 - s1759 * s3997
+    s4002 = s4001 - s1760 * s3996
+    s4003 = s1745 * s4002 + s1746 * s4000 + s1747 * s3999 + s1748 * s3998 + s1749 * s3997
+    s4004 = s4003 + s1750 * s3996
+    s4005 = s1739 * s4002 + s1740 * s4000 + s1741 * s3999 + s1742 * s3998 + s1743 * s3997
+    s4006 = s4005 + s1744 * s3996
+    s4007 = s3984 / pivot_front_right_abduction_angle_dot - s1718 * s4002 - s1719 * s4000
+    s4008 = s4007 - s1720 * s3999 - s1721 * s3998 - s1722 * s3997 - s1723 * s3996
+    s4009 = s1712 * s4002 + s1713 * s4000 + s1714 * s3999 + s1715 * s3998 + s1716 * s3997
+    s4010 = s4009 + s1717 * s3996
+    s4011 = s1693 * s4004 - s1694 * s4002 - s1695 * s4000 - s1696 * s3999 - s1697 * s3998
+    s4012 = s4011 - s1698 * s3997 - s1699 * s3996
+    s4013 = s1680 * s4006 - s1681 * s4002 - s1682 * s4000 - s1683 * s3999 - s1684 * s3998
+    s4014 = s4013 - s1685 * s3997 - s1686 * s3996
+    s4015 = s3982 / pivot_front_right_swing_angle_dot - s1667 * s4008 - s1668 * s4002
+    s4016 = s4015 - s1669 * s4000 - s1670 * s3999 - s1671 * s3998 - s1672 * s3997 - s1673 * s3996
+    s4017 = s1639 * s4010 - s1640 * s4002 - s1641 * s4000 - s1642 * s3999 - s1643 * s3998
+    s4018 = s4017 - s1644 * s3997 - s1645 * s3996
+    s4019 = s1625 * s4004 - s1624 * s4012 - s1626 * s4002 - s1627 * s4000 - s1628 * s3999
+    s4020 = s1604 * s4006 - s1603 * s4014 - s1605 * s4002 - s1606 * s4000 - s1607 * s3999
+    s4021 = s3530 / pivot_front_right_knee_angle_dot + s1588 * s4016 + s1589 * s4008 + s1590 * s4002
+    s4022 = s4021 + s1591 * s4000 + s1592 * s3999 + s1593 * s3998 + s1594 * s3997 + s1595 * s3996
+    s4023 = s1574 * s4010 - s1573 * s4018 - s1575 * s4002 - s1576 * s4000 - s1577 * s3999
+    s4024 = s1603 * s3598 - (s3345 + (s2643 * s3311 + s2644 * s3313 + s2645 * s3315))
+    s4025 = s1604 * s3598 - (s3147 + (s2643 * s3124 + s2644 * s3126 + s2645 * s3128))
+    s4026 = s4025 - s1680 * s4024
+    s4027 = s1605 * s3598 - (s17 * s3150 + s20 * s3151 + s23 * s3152) - s1681 * s4024
+    s4028 = s1606 * s3598 - (s16 * s3150 + s19 * s3151 + s22 * s3152) - s1682 * s4024
+    s4029 = s1607 * s3598 - (s15 * s3150 + s18 * s3151 + s21 * s3152) - s1683 * s4024
+    s4030 = s4027 - s1739 * s4026
+    s4031 = s4028 - s1740 * s4026 - s1756 * s4030
+    s4032 = s4029 - s1741 * s4026 - s1757 * s4030 - s1766 * s4031
+    s4033 = s1608 * s3598 - s3140 - s1684 * s4024 - s1742 * s4026 - s1758 * s4030 - s1767 * s4031
+    s4034 = s1609 * s3598 - s3139 - s1685 * s4024 - s1743 * s4026 - s1759 * s4030 - s1768 * s4031
+    s4035 = s1610 * s3598 - s3138 - s1686 * s4024 - s1744 * s4026 - s1760 * s4030 - s1769 * s4031
+    s4036 = s4033 - s1773 * s4032
+    s4037 = s4034 - s1774 * s4032 + s1781 * s4036
+    s4038 = (s4035 - s1775 * s4032 + s1782 * s4036 + s1784 * s4037) / pivot_trunk_x_dot
+    s4039 = s4037 / pivot_trunk_y_dot + s1784 * s4038
+    s4040 = s4036 / pivot_trunk_z_dot + s1781 * s4039 + s1782 * s4038
+    s4041 = s4032 / pivot_trunk_wx - s1773 * s4040 - s1774 * s4039 - s1775 * s4038
+    s4042 = s4031 / pivot_trunk_wy - s1766 * s4041 - s1767 * s4040 - s1768 * s4039 - s1769 * s4038
+    s4043 = s4030 / pivot_trunk_wz - s1756 * s4042 - s1757 * s4041 - s1758 * s4040 - s1759 * s4039
+    s4044 = s4043 - s1760 * s4038
+    s4045 = s1745 * s4044 + s1746 * s4042 + s1747 * s4041 + s1748 * s4040 + s1749 * s4039
+    s4046 = s4045 + s1750 * s4038
+    s4047 = s4026 / pivot_hind_left_abduction_angle_dot - s1739 * s4044 - s1740 * s4042
+    s4048 = s4047 - s1741 * s4041 - s1742 * s4040 - s1743 * s4039 - s1744 * s4038
+    s4049 = s1718 * s4044 + s1719 * s4042 + s1720 * s4041 + s1721 * s4040 + s1722 * s4039
+    s4050 = s4049 + s1723 * s4038
+    s4051 = s1712 * s4044 + s1713 * s4042 + s1714 * s4041 + s1715 * s4040 + s1716 * s4039
+    s4052 = s4051 + s1717 * s4038
+    s4053 = s1693 * s4046 - s1694 * s4044 - s1695 * s4042 - s1696 * s4041 - s1697 * s4040
+    s4054 = s4053 - s1698 * s4039 - s1699 * s4038
+    s4055 = s4024 / pivot_hind_left_swing_angle_dot - s1680 * s4048 - s1681 * s4044 - s1682 * s4042
+    s4056 = s4055 - s1683 * s4041 - s1684 * s4040 - s1685 * s4039 - s1686 * s4038
+    s4057 = s1667 * s4050 - s1668 * s4044 - s1669 * s4042 - s1670 * s4041 - s1671 * s4040
+    s4058 = s4057 - s1672 * s4039 - s1673 * s4038
+    s4059 = s1639 * s4052 - s1640 * s4044 - s1641 * s4042 - s1642 * s4041 - s1643 * s4040
+    s4060 = s4059 - s1644 * s4039 - s1645 * s4038
+    s4061 = s1625 * s4046 - s1624 * s4054 - s1626 * s4044 - s1627 * s4042 - s1628 * s4041
+    s4062 = s3598 / pivot_hind_left_knee_angle_dot + s1603 * s4056 + s1604 * s4048 + s1605 * s4044
+    s4063 = s4062 + s1606 * s4042 + s1607 * s4041 + s1608 * s4040 + s1609 * s4039 + s1610 * s4038
+    s4064 = s1589 * s4050 - s1588 * s4058 - s1590 * s4044 - s1591 * s4042 - s1592 * s4041
+    s4065 = s1574 * s4052 - s1573 * s4060 - s1575 * s4044 - s1576 * s4042 - s1577 * s4041
+    s4066 = s1624 * s3666 - (s3398 + (s2643 * s3364 + s2644 * s3366 + s2645 * s3368))
+    s4067 = s1625 * s3666 - (s3186 + (s2643 * s3163 + s2644 * s3165 + s2645 * s3167))
+    s4068 = s4067 - s1693 * s4066
+    s4069 = s1626 * s3666 - (s17 * s3189 + s20 * s3190 + s23 * s3191) - s1694 * s4066
+    s4070 = s1627 * s3666 - (s16 * s3189 + s19 * s3190 + s22 * s3191) - s1695 * s4066
+    s4071 = s1628 * s3666 - (s15 * s3189 + s18 * s3190 + s21 * s3191) - s1696 * s4066
+    s4072 = s4069 - s1745 * s4068
+    s4073 = s4070 - s1746 * s4068 - s1756 * s4072
+    s4074 = s4071 - s1747 * s4068 - s1757 * s4072 - s1766 * s4073
+    s4075 = s1629 * s3666 - s3179 - s1697 * s4066 - s1748 * s4068 - s1758 * s4072 - s1767 * s4073
+    s4076 = s1630 * s3666 - s3178 - s1698 * s4066 - s1749 * s4068 - s1759 * s4072 - s1768 * s4073
+    s4077 = s1631 * s3666 - s3177 - s1699 * s4066 - s1750 * s4068 - s1760 * s4072 - s1769 * s4073
+    s4078 = s4075 - s1773 * s4074
+    s4079 = s4076 - s1774 * s4074 + s1781 * s4078
+    s4080 = (s4077 - s1775 * s4074 + s1782 * s4078 + s1784 * s4079) / pivot_trunk_x_dot
+    s4081 = s4079 / pivot_trunk_y_dot + s1784 * s4080
+    s4082 = s4078 / pivot_trunk_z_dot + s1781 * s4081 + s1782 * s4080
+    s4083 = s4074 / pivot_trunk_wx - s1773 * s4082 - s1774 * s4081 - s1775 * s4080
+    s4084 = s4073 / pivot_trunk_wy - s1766 * s4083 - s1767 * s4082 - s1768 * s4081 - s1769 * s4080
+    s4085 = s4072 / pivot_trunk_wz - s1756 * s4084 - s1757 * s4083 - s1758 * s4082 - s1759 * s4081
+    s4086 = s4085 - s1760 * s4080
+    s4087 = s4068 / pivot_hind_right_abduction_angle_dot - s1745 * s4086 - s1746 * s4084
+    s4088 = s4087 - s1747 * s4083 - s1748 * s4082 - s1749 * s4081 - s1750 * s4080
+    s4089 = s1739 * s4086 + s1740 * s4084 + s1741 * s4083 + s1742 * s4082 + s1743 * s4081
+    s4090 = s4089 + s1744 * s4080
+    s4091 = s1718 * s4086 + s1719 * s4084 + s1720 * s4083 + s1721 * s4082 + s1722 * s4081
+    s4092 = s4091 + s1723 * s4080
+    s4093 = s1712 * s4086 + s1713 * s4084 + s1714 * s4083 + s1715 * s4082 + s1716 * s4081
+    s4094 = s4093 + s1717 * s4080
+    s4095 = s4066 / pivot_hind_right_swing_angle_dot - s1693 * s4088 - s1694 * s4086 - s1695 * s4084
+    s4096 = s4095 - s1696 * s4083 - s1697 * s4082 - s1698 * s4081 - s1699 * s4080
+    s4097 = s1680 * s4090 - s1681 * s4086 - s1682 * s4084 - s1683 * s4083 - s1684 * s4082
+    s4098 = s4097 - s1685 * s4081 - s1686 * s4080
+    s4099 = s1667 * s4092 - s1668 * s4086 - s1669 * s4084 - s1670 * s4083 - s1671 * s4082
+    s4100 = s4099 - s1672 * s4081 - s1673 * s4080
+    s4101 = s1639 * s4094 - s1640 * s4086 - s1641 * s4084 - s1642 * s4083 - s1643 * s4082
+    s4102 = s4101 - s1644 * s4081 - s1645 * s4080
+    s4103 = s3666 / pivot_hind_right_knee_angle_dot + s1624 * s4096 + s1625 * s4088 + s1626 * s4086
+    s4104 = s4103 + s1627 * s4084 + s1628 * s4083 + s1629 * s4082 + s1630 * s4081 + s1631 * s4080
+    s4105 = s1604 * s4090 - s1603 * s4098 - s1605 * s4086 - s1606 * s4084 - s1607 * s4083
+    s4106 = s1589 * s4092 - s1588 * s4100 - s1590 * s4086 - s1591 * s4084 - s1592 * s4083
+    s4107 = s1574 * s4094 - s1573 * s4102 - s1575 * s4086 - s1576 * s4084 - s1577 * s4083
+    s4108 = s1573 * s3452 - (s3231 + (s2757 * s3205 + s2758 * s3207 + s2759 * s3209))
+    s4109 = s1574 * s3452 - (s15 * s3233 + s18 * s3234 + s21 * s3235) - s1639 * s4108
+    s4110 = s1575 * s3452 - (s17 * s3242 + s20 * s3243 + s23 * s3244) - s1640 * s4108
+    s4111 = s1576 * s3452 - (s16 * s3242 + s19 * s3243 + s22 * s3244) - s1641 * s4108
+    s4112 = s1577 * s3452 - (s15 * s3242 + s18 * s3243 + s21 * s3244) - s1642 * s4108
+    s4113 = s4110 - s1712 * s4109
+    s4114 = s4111 - s1713 * s4109 - s1756 * s4113
+    s4115 = s4112 - s1714 * s4109 - s1757 * s4113 - s1766 * s4114
+    s4116 = s1578 * s3452 - s3224 - s1643 * s4108 - s1715 * s4109 - s1758 * s4113 - s1767 * s4114
+    s4117 = s1579 * s3452 - s3223 - s1644 * s4108 - s1716 * s4109 - s1759 * s4113 - s1768 * s4114
+    s4118 = s1580 * s3452 - s3222 - s1645 * s4108 - s1717 * s4109 - s1760 * s4113 - s1769 * s4114
+    s4119 = s4116 - s1773 * s4115
+    s4120 = s4117 - s1774 * s4115 + s1781 * s4119
+    s4121 = (s4118 - s1775 * s4115 + s1782 * s4119 + s1784 * s4120) / pivot_trunk_x_dot
+    s4122 = s4120 / pivot_trunk_y_dot + s1784 * s4121
+    s4123 = s4119 / pivot_trunk_z_dot + s1781 * s4122 + s1782 * s4121
+    s4124 = s4115 / pivot_trunk_wx - s1773 * s4123 - s1774 * s4122 - s1775 * s4121
+    s4125 = s4114 / pivot_trunk_wy - s1766 * s4124 - s1767 * s4123 - s1768 * s4122 - s1769 * s4121
+    s4126 = s4113 / pivot_trunk_wz - s1756 * s4125 - s1757 * s4124 - s1758 * s4123 - s1759 * s4122
+    s4127 = s4126 - s1760 * s4121
+    s4128 = s1745 * s4127 + s1746 * s4125 + s1747 * s4124 + s1748 * s4123 + s1749 * s4122
+    s4129 = s4128 + s1750 * s4121
+    s4130 = s1739 * s4127 + s1740 * s4125 + s1741 * s4124 + s1742 * s4123 + s1743 * s4122
+    s4131 = s4130 + s1744 * s4121
+    s4132 = s1718 * s4127 + s1719 * s4125 + s1720 * s4124 + s1721 * s4123 + s1722 * s4122
+    s4133 = s4132 + s1723 * s4121
+    s4134 = s4109 / pivot_front_left_abduction_angle_dot - s1712 * s4127 - s1713 * s4125
+    s4135 = s4134 - s1714 * s4124 - s1715 * s4123 - s1716 * s4122 - s1717 * s4121
+    s4136 = s1693 * s4129 - s1694 * s4127 - s1695 * s4125 - s1696 * s4124 - s1697 * s4123
+    s4137 = s4136 - s1698 * s4122 - s1699 * s4121
+    s4138 = s1680 * s4131 - s1681 * s4127 - s1682 * s4125 - s1683 * s4124 - s1684 * s4123
+    s4139 = s4138 - s1685 * s4122 - s1686 * s4121
+    s4140 = s1667 * s4133 - s1668 * s4127 - s1669 * s4125 - s1670 * s4124 - s1671 * s4123
+    s4141 = s4140 - s1672 * s4122 - s1673 * s4121
+    s4142 = s4108 / pivot_front_left_swing_angle_dot - s1639 * s4135 - s1640 * s4127 - s1641 * s4125
+    s4143 = s4142 - s1642 * s4124 - s1643 * s4123 - s1644 * s4122 - s1645 * s4121
+    s4144 = s1625 * s4129 - s1624 * s4137 - s1626 * s4127 - s1627 * s4125 - s1628 * s4124
+    s4145 = s1604 * s4131 - s1603 * s4139 - s1605 * s4127 - s1606 * s4125 - s1607 * s4124
+    s4146 = s1589 * s4133 - s1588 * s4141 - s1590 * s4127 - s1591 * s4125 - s1592 * s4124
+    s4147 = s3452 / pivot_front_left_knee_angle_dot + s1573 * s4143 + s1574 * s4135 + s1575 * s4127
+    s4148 = s4147 + s1576 * s4125 + s1577 * s4124 + s1578 * s4123 + s1579 * s4122 + s1580 * s4121
+    s4149 = s1588 * s3520 - (s3284 + (s2787 * s3258 + s2788 * s3260 + s2789 * s3262))
+    s4150 = s1589 * s3520 - (s15 * s3286 + s18 * s3287 + s21 * s3288) - s1667 * s4149
+    s4151 = s1590 * s3520 - (s17 * s3295 + s20 * s3296 + s23 * s3297) - s1668 * s4149
+    s4152 = s1591 * s3520 - (s16 * s3295 + s19 * s3296 + s22 * s3297) - s1669 * s4149
+    s4153 = s1592 * s3520 - (s15 * s3295 + s18 * s3296 + s21 * s3297) - s1670 * s4149
+    s4154 = s4151 - s1718 * s4150
+    s4155 = s4152 - s1719 * s4150 - s1756 * s4154
+    s4156 = s4153 - s1720 * s4150 - s1757 * s4154 - s1766 * s4155
+    s4157 = s1593 * s3520 - s3277 - s1671 * s4149 - s1721 * s4150 - s1758 * s4154 - s1767 * s4155
+    s4158 = s1594 * s3520 - s3276 - s1672 * s4149 - s1722 * s4150 - s1759 * s4154 - s1768 * s4155
+    s4159 = s1595 * s3520 - s3275 - s1673 * s4149 - s1723 * s4150 - s1760 * s4154 - s1769 * s4155
+    s4160 = s4157 - s1773 * s4156
+    s4161 = s4158 - s1774 * s4156 + s1781 * s4160
+    s4162 = (s4159 - s1775 * s4156 + s1782 * s4160 + s1784 * s4161) / pivot_trunk_x_dot
+    s4163 = s4161 / pivot_trunk_y_dot + s1784 * s4162
+    s4164 = s4160 / pivot_trunk_z_dot + s1781 * s4163 + s1782 * s4162
+    s4165 = s4156 / pivot_trunk_wx - s1773 * s4164 - s1774 * s4163 - s1775 * s4162
+    s4166 = s4155 / pivot_trunk_wy - s1766 * s4165 - s1767 * s4164 - s1768 * s4163 - s1769 * s4162
+    s4167 = s4154 / pivot_trunk_wz - s1756 * s4166 - s1757 * s4165 - s1758 * s4164 - s1759 * s4163
+    s4168 = s4167 - s1760 * s4162
+    s4169 = s1745 * s4168 + s1746 * s4166 + s1747 * s4165 + s1748 * s4164 + s1749 * s4163
+    s4170 = s4169 + s1750 * s4162
+    s4171 = s1739 * s4168 + s1740 * s4166 + s1741 * s4165 + s1742 * s4164 + s1743 * s4163
+    s4172 = s4171 + s1744 * s4162
+    s4173 = s4150 / pivot_front_right_abduction_angle_dot - s1718 * s4168 - s1719 * s4166
+    s4174 = s4173 - s1720 * s4165 - s1721 * s4164 - s1722 * s4163 - s1723 * s4162
+    s4175 = s1712 * s4168 + s1713 * s4166 + s1714 * s4165 + s1715 * s4164 + s1716 * s4163
+    s4176 = s4175 + s1717 * s4162
+    s4177 = s1693 * s4170 - s1694 * s4168 - s1695 * s4166 - s1696 * s4165 - s1697 * s4164
+    s4178 = s4177 - s1698 * s4163 - s1699 * s4162
+    s4179 = s1680 * s4172 - s1681 * s4168 - s1682 * s4166 - s1683 * s4165 - s1684 * s4164
+    s4180 = s4179 - s1685 * s4163 - s1686 * s4162
+    s4181 = s4149 / pivot_front_right_swing_angle_dot - s1667 * s4174 - s1668 * s4168
+    s4182 = s4181 - s1669 * s4166 - s1670 * s4165 - s1671 * s4164 - s1672 * s4163 - s1673 * s4162
+    s4183 = s1639 * s4176 - s1640 * s4168 - s1641 * s4166 - s1642 * s4165 - s1643 * s4164
+    s4184 = s4183 - s1644 * s4163 - s1645 * s4162
+    s4185 = s1625 * s4170 - s1624 * s4178 - s1626 * s4168 - s1627 * s4166 - s1628 * s4165
+    s4186 = s1604 * s4172 - s1603 * s4180 - s1605 * s4168 - s1606 * s4166 - s1607 * s4165
+    s4187 = s3520 / pivot_front_right_knee_angle_dot + s1588 * s4182 + s1589 * s4174 + s1590 * s4168
+    s4188 = s4187 + s1591 * s4166 + s1592 * s4165 + s1593 * s4164 + s1594 * s4163 + s1595 * s4162
+    s4189 = s1574 * s4176 - s1573 * s4184 - s1575 * s4168 - s1576 * s4166 - s1577 * s4165
+    s4190 = s1603 * s3588 - (s3337 + (s2817 * s3311 + s2818 * s3313 + s2819 * s3315))
+    s4191 = s1604 * s3588 - (s15 * s3339 + s18 * s3340 + s21 * s3341) - s1680 * s4190
+    s4192 = s1605 * s3588 - (s17 * s3348 + s20 * s3349 + s23 * s3350) - s1681 * s4190
+    s4193 = s1606 * s3588 - (s16 * s3348 + s19 * s3349 + s22 * s3350) - s1682 * s4190
+    s4194 = s1607 * s3588 - (s15 * s3348 + s18 * s3349 + s21 * s3350) - s1683 * s4190
+    s4195 = s4192 - s1739 * s4191
+    s4196 = s4193 - s1740 * s4191 - s1756 * s4195
+    s4197 = s4194 - s1741 * s4191 - s1757 * s4195 - s1766 * s4196
+    s4198 = s1608 * s3588 - s3330 - s1684 * s4190 - s1742 * s4191 - s1758 * s4195 - s1767 * s4196
+    s4199 = s1609 * s3588 - s3329 - s1685 * s4190 - s1743 * s4191 - s1759 * s4195 - s1768 * s4196
+    s4200 = s1610 * s3588 - s3328 - s1686 * s4190 - s1744 * s4191 - s1760 * s4195 - s1769 * s4196
+    s4201 = s4198 - s1773 * s4197
+    s4202 = s4199 - s1774 * s4197 + s1781 * s4201
+    s4203 = (s4200 - s1775 * s4197 + s1782 * s4201 + s1784 * s4202) / pivot_trunk_x_dot
+    s4204 = s4202 / pivot_trunk_y_dot + s1784 * s4203
+    s4205 = s4201 / pivot_trunk_z_dot + s1781 * s4204 + s1782 * s4203
+    s4206 = s4197 / pivot_trunk_wx - s1773 * s4205 - s1774 * s4204 - s1775 * s4203
+    s4207 = s4196 / pivot_trunk_wy - s1766 * s4206 - s1767 * s4205 - s1768 * s4204 - s1769 * s4203
+    s4208 = s4195 / pivot_trunk_wz - s1756 * s4207 - s1757 * s4206 - s1758 * s4205 - s1759 * s4204
+    s4209 = s4208 - s1760 * s4203
+    s4210 = s1745 * s4209 + s1746 * s4207 + s1747 * s4206 + s1748 * s4205 + s1749 * s4204
+    s4211 = s4210 + s1750 * s4203
+    s4212 = s4191 / pivot_hind_left_abduction_angle_dot - s1739 * s4209 - s1740 * s4207
+    s4213 = s4212 - s1741 * s4206 - s1742 * s4205 - s1743 * s4204 - s1744 * s4203
+    s4214 = s1718 * s4209 + s1719 * s4207 + s1720 * s4206 + s1721 * s4205 + s1722 * s4204
+    s4215 = s4214 + s1723 * s4203
+    s4216 = s1712 * s4209 + s1713 * s4207 + s1714 * s4206 + s1715 * s4205 + s1716 * s4204
+    s4217 = s4216 + s1717 * s4203
+    s4218 = s1693 * s4211 - s1694 * s4209 - s1695 * s4207 - s1696 * s4206 - s1697 * s4205
+    s4219 = s4218 - s1698 * s4204 - s1699 * s4203
+    s4220 = s4190 / pivot_hind_left_swing_angle_dot - s1680 * s4213 - s1681 * s4209 - s1682 * s4207
+    s4221 = s4220 - s1683 * s4206 - s1684 * s4205 - s1685 * s4204 - s1686 * s4203
+    s4222 = s1667 * s4215 - s1668 * s4209 - s1669 * s4207 - s1670 * s4206 - s1671 * s4205
+    s4223 = s4222 - s1672 * s4204 - s1673 * s4203
+    s4224 = s1639 * s4217 - s1640 * s4209 - s1641 * s4207 - s1642 * s4206 - s1643 * s4205
+    s4225 = s4224 - s1644 * s4204 - s1645 * s4203
+    s4226 = s1625 * s4211 - s1624 * s4219 - s1626 * s4209 - s1627 * s4207 - s1628 * s4206
+    s4227 = s3588 / pivot_hind_left_knee_angle_dot + s1603 * s4221 + s1604 * s4213 + s1605 * s4209
+    s4228 = s4227 + s1606 * s4207 + s1607 * s4206 + s1608 * s4205 + s1609 * s4204 + s1610 * s4203
+    s4229 = s1589 * s4215 - s1588 * s4223 - s1590 * s4209 - s1591 * s4207 - s1592 * s4206
+    s4230 = s1574 * s4217 - s1573 * s4225 - s1575 * s4209 - s1576 * s4207 - s1577 * s4206
+    s4231 = s1624 * s3656 - (s3390 + (s2844 * s3364 + s2845 * s3366 + s2846 * s3368))
+    s4232 = s1625 * s3656 - (s15 * s3392 + s18 * s3393 + s21 * s3394) - s1693 * s4231
+    s4233 = s1626 * s3656 - (s17 * s3401 + s20 * s3402 + s23 * s3403) - s1694 * s4231
+    s4234 = s1627 * s3656 - (s16 * s3401 + s19 * s3402 + s22 * s3403) - s1695 * s4231
+    s4235 = s1628 * s3656 - (s15 * s3401 + s18 * s3402 + s21 * s3403) - s1696 * s4231
+    s4236 = s4233 - s1745 * s4232
+    s4237 = s4234 - s1746 * s4232 - s1756 * s4236
+    s4238 = s4235 - s1747 * s4232 - s1757 * s4236 - s1766 * s4237
+    s4239 = s1629 * s3656 - s3383 - s1697 * s4231 - s1748 * s4232 - s1758 * s4236 - s1767 * s4237
+    s4240 = s1630 * s3656 - s3382 - s1698 * s4231 - s1749 * s4232 - s1759 * s4236 - s1768 * s4237
+    s4241 = s1631 * s3656 - s3381 - s1699 * s4231 - s1750 * s4232 - s1760 * s4236 - s1769 * s4237
+    s4242 = s4239 - s1773 * s4238
+    s4243 = s4240 - s1774 * s4238 + s1781 * s4242
+    s4244 = (s4241 - s1775 * s4238 + s1782 * s4242 + s1784 * s4243) / pivot_trunk_x_dot
+    s4245 = s4243 / pivot_trunk_y_dot + s1784 * s4244
+    s4246 = s4242 / pivot_trunk_z_dot + s1781 * s4245 + s1782 * s4244
+    s4247 = s4238 / pivot_trunk_wx - s1773 * s4246 - s1774 * s4245 - s1775 * s4244
+    s4248 = s4237 / pivot_trunk_wy - s1766 * s4247 - s1767 * s4246 - s1768 * s4245 - s1769 * s4244
+    s4249 = s4236 / pivot_trunk_wz - s1756 * s4248 - s1757 * s4247 - s1758 * s4246 - s1759 * s4245
+    s4250 = s4249 - s1760 * s4244
+    s4251 = s4232 / pivot_hind_right_abduction_angle_dot - s1745 * s4250 - s1746 * s4248
+    s4252 = s4251 - s1747 * s4247 - s1748 * s4246 - s1749 * s4245 - s1750 * s4244
+    s4253 = s1739 * s4250 + s1740 * s4248 + s1741 * s4247 + s1742 * s4246 + s1743 * s4245
+    s4254 = s4253 + s1744 * s4244
+    s4255 = s1718 * s4250 + s1719 * s4248 + s1720 * s4247 + s1721 * s4246 + s1722 * s4245
+    s4256 = s4255 + s1723 * s4244
+    s4257 = s1712 * s4250 + s1713 * s4248 + s1714 * s4247 + s1715 * s4246 + s1716 * s4245
+    s4258 = s4257 + s1717 * s4244
+    s4259 = s4231 / pivot_hind_right_swing_angle_dot - s1693 * s4252 - s1694 * s4250 - s1695 * s4248
+    s4260 = s4259 - s1696 * s4247 - s1697 * s4246 - s1698 * s4245 - s1699 * s4244
+    s4261 = s1680 * s4254 - s1681 * s4250 - s1682 * s4248 - s1683 * s4247 - s1684 * s4246
+    s4262 = s4261 - s1685 * s4245 - s1686 * s4244
+    s4263 = s1667 * s4256 - s1668 * s4250 - s1669 * s4248 - s1670 * s4247 - s1671 * s4246
+    s4264 = s4263 - s1672 * s4245 - s1673 * s4244
+    s4265 = s1639 * s4258 - s1640 * s4250 - s1641 * s4248 - s1642 * s4247 - s1643 * s4246
+    s4266 = s4265 - s1644 * s4245 - s1645 * s4244
+    s4267 = s3656 / pivot_hind_right_knee_angle_dot + s1624 * s4260 + s1625 * s4252 + s1626 * s4250
+    s4268 = s4267 + s1627 * s4248 + s1628 * s4247 + s1629 * s4246 + s1630 * s4245 + s1631 * s4244
+    s4269 = s1604 * s4254 - s1603 * s4262 - s1605 * s4250 - s1606 * s4248 - s1607 * s4247
+    s4270 = s1589 * s4256 - s1588 * s4264 - s1590 * s4250 - s1591 * s4248 - s1592 * s4247
+    s4271 = s1574 * s4258 - s1573 * s4266 - s1575 * s4250 - s1576 * s4248 - s1577 * s4247
+    s4272 = s1573 * s3441 - (s901 * s3445 + s903 * s3446 + s905 * s3447)
+    s4273 = s1574 * s3441 - (s15 * s3455 + s18 * s3456 + s21 * s3457) - s1639 * s4272
+    s4274 = s1575 * s3441 - (s17 * s3466 + s20 * s3467 + s23 * s3468) - s1640 * s4272
+    s4275 = s1576 * s3441 - (s16 * s3466 + s19 * s3467 + s22 * s3468) - s1641 * s4272
+    s4276 = s1577 * s3441 - (s15 * s3466 + s18 * s3467 + s21 * s3468) - s1642 * s4272
+    s4277 = s4274 - s1712 * s4273
+    s4278 = s4275 - s1713 * s4273 - s1756 * s4277
+    s4279 = s4276 - s1714 * s4273 - s1757 * s4277 - s1766 * s4278
+    s4280 = s1578 * s3441 - s3433 - s1643 * s4272 - s1715 * s4273 - s1758 * s4277 - s1767 * s4278
+    s4281 = s1579 * s3441 - s3432 - s1644 * s4272 - s1716 * s4273 - s1759 * s4277 - s1768 * s4278
+    s4282 = s1580 * s3441 - s3431 - s1645 * s4272 - s1717 * s4273 - s1760 * s4277 - s1769 * s4278
+    s4283 = s4280 - s1773 * s4279
+    s4284 = s4281 - s1774 * s4279 + s1781 * s4283
+    s4285 = (s4282 - s1775 * s4279 + s1782 * s4283 + s1784 * s4284) / pivot_trunk_x_dot
+    s4286 = s4284 / pivot_trunk_y_dot + s1784 * s4285
+    s4287 = s4283 / pivot_trunk_z_dot + s1781 * s4286 + s1782 * s4285
+    s4288 = s4279 / pivot_trunk_wx - s1773 * s4287 - s1774 * s4286 - s1775 * s4285
+    s4289 = s4278 / pivot_trunk_wy - s1766 * s4288 - s1767 * s4287 - s1768 * s4286 - s1769 * s4285
+    s4290 = s4277 / pivot_trunk_wz - s1756 * s4289 - s1757 * s4288 - s1758 * s4287 - s1759 * s4286
+    s4291 = s4290 - s1760 * s4285
+    s4292 = s1745 * s4291 + s1746 * s4289 + s1747 * s4288 + s1748 * s4287 + s1749 * s4286
+    s4293 = s4292 + s1750 * s4285
+    s4294 = s1739 * s4291 + s1740 * s4289 + s1741 * s4288 + s1742 * s4287 + s1743 * s4286
+    s4295 = s4294 + s1744 * s4285
+    s4296 = s1718 * s4291 + s1719 * s4289 + s1720 * s4288 + s1721 * s4287 + s1722 * s4286
+    s4297 = s4296 + s1723 * s4285
+    s4298 = s4273 / pivot_front_left_abduction_angle_dot - s1712 * s4291 - s1713 * s4289
+    s4299 = s4298 - s1714 * s4288 - s1715 * s4287 - s1716 * s4286 - s1717 * s4285
+    s4300 = s1693 * s4293 - s1694 * s4291 - s1695 * s4289 - s1696 * s4288 - s1697 * s4287
+    s4301 = s4300 - s1698 * s4286 - s1699 * s4285
+    s4302 = s1680 * s4295 - s1681 * s4291 - s1682 * s4289 - s1683 * s4288 - s1684 * s4287
+    s4303 = s4302 - s1685 * s4286 - s1686 * s4285
+    s4304 = s1667 * s4297 - s1668 * s4291 - s1669 * s4289 - s1670 * s4288 - s1671 * s4287
+    s4305 = s4304 - s1672 * s4286 - s1673 * s4285
+    s4306 = s4272 / pivot_front_left_swing_angle_dot - s1639 * s4299 - s1640 * s4291 - s1641 * s4289
+    s4307 = s4306 - s1642 * s4288 - s1643 * s4287 - s1644 * s4286 - s1645 * s4285
+    s4308 = s1625 * s4293 - s1624 * s4301 - s1626 * s4291 - s1627 * s4289 - s1628 * s4288
+    s4309 = s1604 * s4295 - s1603 * s4303 - s1605 * s4291 - s1606 * s4289 - s1607 * s4288
+    s4310 = s1589 * s4297 - s1588 * s4305 - s1590 * s4291 - s1591 * s4289 - s1592 * s4288
+    s4311 = s3441 / pivot_front_left_knee_angle_dot + s1573 * s4307 + s1574 * s4299 + s1575 * s4291
+    s4312 = s4311 + s1576 * s4289 + s1577 * s4288 + s1578 * s4287 + s1579 * s4286 + s1580 * s4285
+    s4313 = s1588 * s3509 - (s907 * s3513 + s909 * s3514 + s911 * s3515)
+    s4314 = s1589 * s3509 - (s15 * s3523 + s18 * s3524 + s21 * s3525) - s1667 * s4313
+    s4315 = s1590 * s3509 - (s17 * s3534 + s20 * s3535 + s23 * s3536) - s1668 * s4313
+    s4316 = s1591 * s3509 - (s16 * s3534 + s19 * s3535 + s22 * s3536) - s1669 * s4313
+    s4317 = s1592 * s3509 - (s15 * s3534 + s18 * s3535 + s21 * s3536) - s1670 * s4313
+    s4318 = s4315 - s1718 * s4314
+    s4319 = s4316 - s1719 * s4314 - s1756 * s4318
+    s4320 = s4317 - s1720 * s4314 - s1757 * s4318 - s1766 * s4319
+    s4321 = s1593 * s3509 - s3501 - s1671 * s4313 - s1721 * s4314 - s1758 * s4318 - s1767 * s4319
+    s4322 = s1594 * s3509 - s3500 - s1672 * s4313 - s1722 * s4314 - s1759 * s4318 - s1768 * s4319
+    s4323 = s1595 * s3509 - s3499 - s1673 * s4313 - s1723 * s4314 - s1760 * s4318 - s1769 * s4319
+    s4324 = s4321 - s1773 * s4320
+    s4325 = s4322 - s1774 * s4320 + s1781 * s4324
+    s4326 = (s4323 - s1775 * s4320 + s1782 * s4324 + s1784 * s4325) / pivot_trunk_x_dot
+    s4327 = s4325 / pivot_trunk_y_dot + s1784 * s4326
+    s4328 = s4324 / pivot_trunk_z_dot + s1781 * s4327 + s1782 * s4326
+    s4329 = s4320 / pivot_trunk_wx - s1773 * s4328 - s1774 * s4327 - s1775 * s4326
+    s4330 = s4319 / pivot_trunk_wy - s1766 * s4329 - s1767 * s4328 - s1768 * s4327 - s1769 * s4326
+    s4331 = s4318 / pivot_trunk_wz - s1756 * s4330 - s1757 * s4329 - s1758 * s4328 - s1759 * s4327
+    s4332 = s4331 - s1760 * s4326
+    s4333 = s1745 * s4332 + s1746 * s4330 + s1747 * s4329 + s1748 * s4328 + s1749 * s4327
+    s4334 = s4333 + s1750 * s4326
+    s4335 = s1739 * s4332 + s1740 * s4330 + s1741 * s4329 + s1742 * s4328 + s1743 * s4327
+    s4336 = s4335 + s1744 * s4326
+    s4337 = s4314 / pivot_front_right_abduction_angle_dot - s1718 * s4332 - s1719 * s4330
+    s4338 = s4337 - s1720 * s4329 - s1721 * s4328 - s1722 * s4327 - s1723 * s4326
+    s4339 = s1712 * s4332 + s1713 * s4330 + s1714 * s4329 + s1715 * s4328 + s1716 * s4327
+    s4340 = s4339 + s1717 * s4326
+    s4341 = s1693 * s4334 - s1694 * s4332 - s1695 * s4330 - s1696 * s4329 - s1697 * s4328
+    s4342 = s4341 - s1698 * s4327 - s1699 * s4326
+    s4343 = s1680 * s4336 - s1681 * s4332 - s1682 * s4330 - s1683 * s4329 - s1684 * s4328
+    s4344 = s4343 - s1685 * s4327 - s1686 * s4326
+    s4345 = s4313 / pivot_front_right_swing_angle_dot - s1667 * s4338 - s1668 * s4332
+    s4346 = s4345 - s1669 * s4330 - s1670 * s4329 - s1671 * s4328 - s1672 * s4327 - s1673 * s4326
+    s4347 = s1639 * s4340 - s1640 * s4332 - s1641 * s4330 - s1642 * s4329 - s1643 * s4328
+    s4348 = s4347 - s1644 * s4327 - s1645 * s4326
+    s4349 = s1625 * s4334 - s1624 * s4342 - s1626 * s4332 - s1627 * s4330 - s1628 * s4329
+    s4350 = s1604 * s4336 - s1603 * s4344 - s1605 * s4332 - s1606 * s4330 - s1607 * s4329
+    s4351 = s3509 / pivot_front_right_knee_angle_dot + s1588 * s4346 + s1589 * s4338 + s1590 * s4332
+    s4352 = s4351 + s1591 * s4330 + s1592 * s4329 + s1593 * s4328 + s1594 * s4327 + s1595 * s4326
+    s4353 = s1574 * s4340 - s1573 * s4348 - s1575 * s4332 - s1576 * s4330 - s1577 * s4329
+    s4354 = s1603 * s3577 - (s913 * s3581 + s915 * s3582 + s917 * s3583)
+    s4355 = s1604 * s3577 - (s15 * s3591 + s18 * s3592 + s21 * s3593) - s1680 * s4354
+    s4356 = s1605 * s3577 - (s17 * s3602 + s20 * s3603 + s23 * s3604) - s1681 * s4354
+    s4357 = s1606 * s3577 - (s16 * s3602 + s19 * s3603 + s22 * s3604) - s1682 * s4354
+    s4358 = s1607 * s3577 - (s15 * s3602 + s18 * s3603 + s21 * s3604) - s1683 * s4354
+    s4359 = s4356 - s1739 * s4355
+    s4360 = s4357 - s1740 * s4355 - s1756 * s4359
+    s4361 = s4358 - s1741 * s4355 - s1757 * s4359 - s1766 * s4360
+    s4362 = s1608 * s3577 - s3569 - s1684 * s4354 - s1742 * s4355 - s1758 * s4359 - s1767 * s4360
+    s4363 = s1609 * s3577 - s3568 - s1685 * s4354 - s1743 * s4355 - s1759 * s4359 - s1768 * s4360
+    s4364 = s1610 * s3577 - s3567 - s1686 * s4354 - s1744 * s4355 - s1760 * s4359 - s1769 * s4360
+    s4365 = s4362 - s1773 * s4361
+    s4366 = s4363 - s1774 * s4361 + s1781 * s4365
+    s4367 = (s4364 - s1775 * s4361 + s1782 * s4365 + s1784 * s4366) / pivot_trunk_x_dot
+    s4368 = s4366 / pivot_trunk_y_dot + s1784 * s4367
+    s4369 = s4365 / pivot_trunk_z_dot + s1781 * s4368 + s1782 * s4367
+    s4370 = s4361 / pivot_trunk_wx - s1773 * s4369 - s1774 * s4368 - s1775 * s4367
+    s4371 = s4360 / pivot_trunk_wy - s1766 * s4370 - s1767 * s4369 - s1768 * s4368 - s1769 * s4367
+    s4372 = s4359 / pivot_trunk_wz - s1756 * s4371 - s1757 * s4370 - s1758 * s4369 - s1759 * s4368
+    s4373 = s4372 - s1760 * s4367
+    s4374 = s1745 * s4373 + s1746 * s4371 + s1747 * s4370 + s1748 * s4369 + s1749 * s4368
+    s4375 = s4374 + s1750 * s4367
+    s4376 = s4355 / pivot_hind_left_abduction_angle_dot - s1739 * s4373 - s1740 * s4371
+    s4377 = s4376 - s1741 * s4370 - s1742 * s4369 - s1743 * s4368 - s1744 * s4367
+    s4378 = s1718 * s4373 + s1719 * s4371 + s1720 * s4370 + s1721 * s4369 + s1722 * s4368
+    s4379 = s4378 + s1723 * s4367
+    s4380 = s1712 * s4373 + s1713 * s4371 + s1714 * s4370 + s1715 * s4369 + s1716 * s4368
+    s4381 = s4380 + s1717 * s4367
+    s4382 = s1693 * s4375 - s1694 * s4373 - s1695 * s4371 - s1696 * s4370 - s1697 * s4369
+    s4383 = s4382 - s1698 * s4368 - s1699 * s4367
+    s4384 = s4354 / pivot_hind_left_swing_angle_dot - s1680 * s4377 - s1681 * s4373 - s1682 * s4371
+    s4385 = s4384 - s1683 * s4370 - s1684 * s4369 - s1685 * s4368 - s1686 * s4367
+    s4386 = s1667 * s4379 - s1668 * s4373 - s1669 * s4371 - s1670 * s4370 - s1671 * s4369
+    s4387 = s4386 - s1672 * s4368 - s1673 * s4367
+    s4388 = s1639 * s4381 - s1640 * s4373 - s1641 * s4371 - s1642 * s4370 - s1643 * s4369
+    s4389 = s4388 - s1644 * s4368 - s1645 * s4367
+    s4390 = s1625 * s4375 - s1624 * s4383 - s1626 * s4373 - s1627 * s4371 - s1628 * s4370
+    s4391 = s3577 / pivot_hind_left_knee_angle_dot + s1603 * s4385 + s1604 * s4377 + s1605 * s4373
+    s4392 = s4391 + s1606 * s4371 + s1607 * s4370 + s1608 * s4369 + s1609 * s4368 + s1610 * s4367
+    s4393 = s1589 * s4379 - s1588 * s4387 - s1590 * s4373 - s1591 * s4371 - s1592 * s4370
+    s4394 = s1574 * s4381 - s1573 * s4389 - s1575 * s4373 - s1576 * s4371 - s1577 * s4370
+    s4395 = s1624 * s3645 - (s919 * s3649 + s921 * s3650 + s923 * s3651)
+    s4396 = s1625 * s3645 - (s15 * s3659 + s18 * s3660 + s21 * s3661) - s1693 * s4395
+    s4397 = s1626 * s3645 - (s17 * s3670 + s20 * s3671 + s23 * s3672) - s1694 * s4395
+    s4398 = s1627 * s3645 - (s16 * s3670 + s19 * s3671 + s22 * s3672) - s1695 * s4395
+    s4399 = s1628 * s3645 - (s15 * s3670 + s18 * s3671 + s21 * s3672) - s1696 * s4395
+    s4400 = s4397 - s1745 * s4396
+    s4401 = s4398 - s1746 * s4396 - s1756 * s4400
+    s4402 = s4399 - s1747 * s4396 - s1757 * s4400 - s1766 * s4401
+    s4403 = s1629 * s3645 - s3637 - s1697 * s4395 - s1748 * s4396 - s1758 * s4400 - s1767 * s4401
+    s4404 = s1630 * s3645 - s3636 - s1698 * s4395 - s1749 * s4396 - s1759 * s4400 - s1768 * s4401
+    s4405 = s1631 * s3645 - s3635 - s1699 * s4395 - s1750 * s4396 - s1760 * s4400 - s1769 * s4401
+    s4406 = s4403 - s1773 * s4402
+    s4407 = s4404 - s1774 * s4402 + s1781 * s4406
+    s4408 = (s4405 - s1775 * s4402 + s1782 * s4406 + s1784 * s4407) / pivot_trunk_x_dot
+    s4409 = s4407 / pivot_trunk_y_dot + s1784 * s4408
+    s4410 = s4406 / pivot_trunk_z_dot + s1781 * s4409 + s1782 * s4408
+    s4411 = s4402 / pivot_trunk_wx - s1773 * s4410 - s1774 * s4409 - s1775 * s4408
+    s4412 = s4401 / pivot_trunk_wy - s1766 * s4411 - s1767 * s4410 - s1768 * s4409 - s1769 * s4408
+    s4413 = s4400 / pivot_trunk_wz - s1756 * s4412 - s1757 * s4411 - s1758 * s4410 - s1759 * s4409
+    s4414 = s4413 - s1760 * s4408
+    s4415 = s4396 / pivot_hind_right_abduction_angle_dot - s1745 * s4414 - s1746 * s4412
+    s4416 = s4415 - s1747 * s4411 - s1748 * s4410 - s1749 * s4409 - s1750 * s4408
+    s4417 = s1739 * s4414 + s1740 * s4412 + s1741 * s4411 + s1742 * s4410 + s1743 * s4409
+    s4418 = s4417 + s1744 * s4408
+    s4419 = s1718 * s4414 + s1719 * s4412 + s1720 * s4411 + s1721 * s4410 + s1722 * s4409
+    s4420 = s4419 + s1723 * s4408
+    s4421 = s1712 * s4414 + s1713 * s4412 + s1714 * s4411 + s1715 * s4410 + s1716 * s4409
+    s4422 = s4421 + s1717 * s4408
+    s4423 = s4395 / pivot_hind_right_swing_angle_dot - s1693 * s4416 - s1694 * s4414 - s1695 * s4412
+    s4424 = s4423 - s1696 * s4411 - s1697 * s4410 - s1698 * s4409 - s1699 * s4408
+    s4425 = s1680 * s4418 - s1681 * s4414 - s1682 * s4412 - s1683 * s4411 - s1684 * s4410
+    s4426 = s4425 - s1685 * s4409 - s1686 * s4408
+    s4427 = s1667 * s4420 - s1668 * s4414 - s1669 * s4412 - s1670 * s4411 - s1671 * s4410
+    s4428 = s4427 - s1672 * s4409 - s1673 * s4408
+    s4429 = s1639 * s4422 - s1640 * s4414 - s1641 * s4412 - s1642 * s4411 - s1643 * s4410
+    s4430 = s4429 - s1644 * s4409 - s1645 * s4408
+    s4431 = s3645 / pivot_hind_right_knee_angle_dot + s1624 * s4424 + s1625 * s4416 + s1626 * s4414
+    s4432 = s4431 + s1627 * s4412 + s1628 * s4411 + s1629 * s4410 + s1630 * s4409 + s1631 * s4408
+    s4433 = s1604 * s4418 - s1603 * s4426 - s1605 * s4414 - s1606 * s4412 - s1607 * s4411
+    s4434 = s1589 * s4420 - s1588 * s4428 - s1590 * s4414 - s1591 * s4412 - s1592 * s4411
+    s4435 = s1574 * s4422 - s1573 * s4430 - s1575 * s4414 - s1576 * s4412 - s1577 * s4411
+    s4436 = s1573 * s3474 - (s3241 + s3249)
+    s4437 = s1588 * s3542 - (s3294 + s3302)
+    s4438 = s1575 * s3474 - (s3037 + (s15 * s3027 + s18 * s3028 + s21 * s3029)) + s1590 * s3542
+    s4439 = s1576 * s3474 - (s3019 + (s15 * s3009 + s18 * s3010 + s21 * s3011)) + s1591 * s3542
+    s4440 = s1577 * s3474 - (s3001 + (s15 * s2991 + s18 * s2992 + s21 * s2993)) + s1592 * s3542
+    s4441 = s1603 * s3610 - (s3347 + s3355)
+    s4442 = s1624 * s3678 - (s3400 + s3408)
+    s4443 = s1574 * s3474 - (s3071 + s3079) - s1639 * s4436
+    s4444 = s1578 * s3474 - s2999 + s1593 * s3542 + s1608 * s3610 + s1629 * s3678 - s1643 * s4436
+    s4445 = s1579 * s3474 - s2998 + s1594 * s3542 + s1609 * s3610 + s1630 * s3678 - s1644 * s4436
+    s4446 = s1580 * s3474 - s2997 + s1595 * s3542 + s1610 * s3610 + s1631 * s3678 - s1645 * s4436
+    s4447 = s1589 * s3542 - (s3110 + s3118) - s1667 * s4437
+    s4448 = s1604 * s3610 - (s3149 + s3157) - s1680 * s4441
+    s4449 = s4438 + s1605 * s3610 + s1626 * s3678 - s1640 * s4436 - s1668 * s4437 - s1681 * s4441
+    s4450 = s4439 + s1606 * s3610 + s1627 * s3678 - s1641 * s4436 - s1669 * s4437 - s1682 * s4441
+    s4451 = s4440 + s1607 * s3610 + s1628 * s3678 - s1642 * s4436 - s1670 * s4437 - s1683 * s4441
+    s4452 = s1625 * s3678 - (s3188 + s3196) - s1693 * s4442
+    s4453 = s4444 - s1671 * s4437 - s1684 * s4441 - s1697 * s4442 - s1715 * s4443 - s1721 * s4447
+    s4454 = s4445 - s1672 * s4437 - s1685 * s4441 - s1698 * s4442 - s1716 * s4443 - s1722 * s4447
+    s4455 = s4446 - s1673 * s4437 - s1686 * s4441 - s1699 * s4442 - s1717 * s4443 - s1723 * s4447
+    s4456 = s4449 - s1694 * s4442 - s1712 * s4443 - s1718 * s4447 - s1739 * s4448 - s1745 * s4452
+    s4457 = s4450 - s1695 * s4442 - s1713 * s4443 - s1719 * s4447 - s1740 * s4448 - s1746 * s4452
+    s4458 = s4451 - s1696 * s4442 - s1714 * s4443 - s1720 * s4447 - s1741 * s4448 - s1747 * s4452
+    s4459 = s4457 - s1756 * s4456
+    s4460 = s4458 - s1757 * s4456 - s1766 * s4459
+    s4461 = s4453 - s1742 * s4448 - s1748 * s4452 - s1758 * s4456 - s1767 * s4459 - s1773 * s4460
+    s4462 = s4454 - s1743 * s4448 - s1749 * s4452 - s1759 * s4456 - s1768 * s4459 - s1774 * s4460
+    s4463 = s4455 - s1744 * s4448 - s1750 * s4452 - s1760 * s4456 - s1769 * s4459 - s1775 * s4460
+    s4464 = s4462 + s1781 * s4461
+    s4465 = (s4463 + s1782 * s4461 + s1784 * s4464) / pivot_trunk_x_dot
+    s4466 = s4464 / pivot_trunk_y_dot + s1784 * s4465
+    s4467 = s4461 / pivot_trunk_z_dot + s1781 * s4466 + s1782 * s4465
+    s4468 = s4460 / pivot_trunk_wx - s1773 * s4467 - s1774 * s4466 - s1775 * s4465
+    s4469 = s4459 / pivot_trunk_wy - s1766 * s4468 - s1767 * s4467 - s1768 * s4466 - s1769 * s4465
+    s4470 = s4456 / pivot_trunk_wz - s1756 * s4469 - s1757 * s4468 - s1758 * s4467 - s1759 * s4466
+    s4471 = s4470 - s1760 * s4465
+    s4472 = s4452 / pivot_hind_right_abduction_angle_dot - s1745 * s4471 - s1746 * s4469
+    s4473 = s4472 - s1747 * s4468 - s1748 * s4467 - s1749 * s4466 - s1750 * s4465
+    s4474 = s4448 / pivot_hind_left_abduction_angle_dot - s1739 * s4471 - s1740 * s4469
+    s4475 = s4474 - s1741 * s4468 - s1742 * s4467 - s1743 * s4466 - s1744 * s4465
+    s4476 = s4447 / pivot_front_right_abduction_angle_dot - s1718 * s4471 - s1719 * s4469
+    s4477 = s4476 - s1720 * s4468 - s1721 * s4467 - s1722 * s4466 - s1723 * s4465
+    s4478 = s4443 / pivot_front_left_abduction_angle_dot - s1712 * s4471 - s1713 * s4469
+    s4479 = s4478 - s1714 * s4468 - s1715 * s4467 - s1716 * s4466 - s1717 * s4465
+    s4480 = s4442 / pivot_hind_right_swing_angle_dot - s1693 * s4473 - s1694 * s4471 - s1695 * s4469
+    s4481 = s4480 - s1696 * s4468 - s1697 * s4467 - s1698 * s4466 - s1699 * s4465
+    s4482 = s4441 / pivot_hind_left_swing_angle_dot - s1680 * s4475 - s1681 * s4471 - s1682 * s4469
+    s4483 = s4482 - s1683 * s4468 - s1684 * s4467 - s1685 * s4466 - s1686 * s4465
+    s4484 = s4437 / pivot_front_right_swing_angle_dot - s1667 * s4477 - s1668 * s4471
+    s4485 = s4484 - s1669 * s4469 - s1670 * s4468 - s1671 * s4467 - s1672 * s4466 - s1673 * s4465
+    s4486 = s4436 / pivot_front_left_swing_angle_dot - s1639 * s4479 - s1640 * s4471 - s1641 * s4469
+    s4487 = s4486 - s1642 * s4468 - s1643 * s4467 - s1644 * s4466 - s1645 * s4465
+    s4488 = s3678 / pivot_hind_right_knee_angle_dot + s1624 * s4481 + s1625 * s4473 + s1626 * s4471
+    s4489 = s4488 + s1627 * s4469 + s1628 * s4468 + s1629 * s4467 + s1630 * s4466 + s1631 * s4465
+    s4490 = s3610 / pivot_hind_left_knee_angle_dot + s1603 * s4483 + s1604 * s4475 + s1605 * s4471
+    s4491 = s4490 + s1606 * s4469 + s1607 * s4468 + s1608 * s4467 + s1609 * s4466 + s1610 * s4465
+    s4492 = s3542 / pivot_front_right_knee_angle_dot + s1588 * s4485 + s1589 * s4477 + s1590 * s4471
+    s4493 = s4492 + s1591 * s4469 + s1592 * s4468 + s1593 * s4467 + s1594 * s4466 + s1595 * s4465
+    s4494 = s3474 / pivot_front_left_knee_angle_dot + s1573 * s4487 + s1574 * s4479 + s1575 * s4471
+    s4495 = s4494 + s1576 * s4469 + s1577 * s4468 + s1578 * s4467 + s1579 * s4466 + s1580 * s4465
+    s4496 = s1573 * s3477 - (s3251 + (s16 * s3205 + s19 * s3207 + s22 * s3209))
+    s4497 = s1588 * s3545 - (s3304 + (s16 * s3258 + s19 * s3260 + s22 * s3262))
+    s4498 = s1575 * s3477 - (s3039 + (s16 * s3027 + s19 * s3028 + s22 * s3029)) + s1590 * s3545
+    s4499 = s1576 * s3477 - (s3021 + (s16 * s3009 + s19 * s3010 + s22 * s3011)) + s1591 * s3545
+    s4500 = s1577 * s3477 - (s3003 + (s16 * s2991 + s19 * s2992 + s22 * s2993)) + s1592 * s3545
+    s4501 = s1603 * s3613 - (s3357 + (s16 * s3311 + s19 * s3313 + s22 * s3315))
+    s4502 = s1624 * s3681 - (s3410 + (s16 * s3364 + s19 * s3366 + s22 * s3368))
+    s4503 = s1574 * s3477 - (s3081 + (s16 * s3043 + s19 * s3045 + s22 * s3047)) - s1639 * s4496
+    s4504 = s1578 * s3477 - s3017 + s1593 * s3545 + s1608 * s3613 + s1629 * s3681 - s1643 * s4496
+    s4505 = s1579 * s3477 - s3016 + s1594 * s3545 + s1609 * s3613 + s1630 * s3681 - s1644 * s4496
+    s4506 = s1580 * s3477 - s3015 + s1595 * s3545 + s1610 * s3613 + s1631 * s3681 - s1645 * s4496
+    s4507 = s1589 * s3545 - (s3120 + (s16 * s3085 + s19 * s3087 + s22 * s3089)) - s1667 * s4497
+    s4508 = s1604 * s3613 - (s3159 + (s16 * s3124 + s19 * s3126 + s22 * s3128)) - s1680 * s4501
+    s4509 = s4498 + s1605 * s3613 + s1626 * s3681 - s1640 * s4496 - s1668 * s4497 - s1681 * s4501
+    s4510 = s4499 + s1606 * s3613 + s1627 * s3681 - s1641 * s4496 - s1669 * s4497 - s1682 * s4501
+    s4511 = s4500 + s1607 * s3613 + s1628 * s3681 - s1642 * s4496 - s1670 * s4497 - s1683 * s4501
+    s4512 = s1625 * s3681 - (s3198 + (s16 * s3163 + s19 * s3165 + s22 * s3167)) - s1693 * s4502
+    s4513 = s4504 - s1671 * s4497 - s1684 * s4501 - s1697 * s4502 - s1715 * s4503 - s1721 * s4507
+    s4514 = s4505 - s1672 * s4497 - s1685 * s4501 - s1698 * s4502 - s1716 * s4503 - s1722 * s4507
+    s4515 = s4506 - s1673 * s4497 - s1686 * s4501 - s1699 * s4502 - s1717 * s4503 - s1723 * s4507
+    s4516 = s4509 - s1694 * s4502 - s1712 * s4503 - s1718 * s4507 - s1739 * s4508 - s1745 * s4512
+    s4517 = s4510 - s1695 * s4502 - s1713 * s4503 - s1719 * s4507 - s1740 * s4508 - s1746 * s4512
+    s4518 = s4511 - s1696 * s4502 - s1714 * s4503 - s1720 * s4507 - s1741 * s4508 - s1747 * s4512
+    s4519 = s4517 - s1756 * s4516
+    s4520 = s4518 - s1757 * s4516 - s1766 * s4519
+    s4521 = s4513 - s1742 * s4508 - s1748 * s4512 - s1758 * s4516 - s1767 * s4519 - s1773 * s4520
+    s4522 = s4514 - s1743 * s4508 - s1749 * s4512 - s1759 * s4516 - s1768 * s4519 - s1774 * s4520
+    s4523 = s4515 - s1744 * s4508 - s1750 * s4512 - s1760 * s4516 - s1769 * s4519 - s1775 * s4520
+    s4524 = s4522 + s1781 * s4521
+    s4525 = (s4523 + s1782 * s4521 + s1784 * s4524) / pivot_trunk_x_dot
+    s4526 = s4524 / pivot_trunk_y_dot + s1784 * s4525
+    s4527 = s4521 / pivot_trunk_z_dot + s1781 * s4526 + s1782 * s4525
+    s4528 = s4520 / pivot_trunk_wx - s1773 * s4527 - s1774 * s4526 - s1775 * s4525
+    s4529 = s4519 / pivot_trunk_wy - s1766 * s4528 - s1767 * s4527 - s1768 * s4526 - s1769 * s4525
+    s4530 = s4516 / pivot_trunk_wz - s1756 * s4529 - s1757 * s4528 - s1758 * s4527 - s1759 * s4526
+    s4531 = s4530 - s1760 * s4525
+    s4532 = s4512 / pivot_hind_right_abduction_angle_dot - s1745 * s4531 - s1746 * s4529
+    s4533 = s4532 - s1747 * s4528 - s1748 * s4527 - s1749 * s4526 - s1750 * s4525
+    s4534 = s4508 / pivot_hind_left_abduction_angle_dot - s1739 * s4531 - s1740 * s4529
+    s4535 = s4534 - s1741 * s4528 - s1742 * s4527 - s1743 * s4526 - s1744 * s4525
+    s4536 = s4507 / pivot_front_right_abduction_angle_dot - s1718 * s4531 - s1719 * s4529
+    s4537 = s4536 - s1720 * s4528 - s1721 * s4527 - s1722 * s4526 - s1723 * s4525
+    s4538 = s4503 / pivot_front_left_abduction_angle_dot - s1712 * s4531 - s1713 * s4529
+    s4539 = s4538 - s1714 * s4528 - s1715 * s4527 - s1716 * s4526 - s1717 * s4525
+    s4540 = s4502 / pivot_hind_right_swing_angle_dot - s1693 * s4533 - s1694 * s4531 - s1695 * s4529
+    s4541 = s4540 - s1696 * s4528 - s1697 * s4527 - s1698 * s4526 - s1699 * s4525
+    s4542 = s4501 / pivot_hind_left_swing_angle_dot - s1680 * s4535 - s1681 * s4531 - s1682 * s4529
+    s4543 = s4542 - s1683 * s4528 - s1684 * s4527 - s1685 * s4526 - s1686 * s4525
+    s4544 = s4497 / pivot_front_right_swing_angle_dot - s1667 * s4537 - s1668 * s4531
+    s4545 = s4544 - s1669 * s4529 - s1670 * s4528 - s1671 * s4527 - s1672 * s4526 - s1673 * s4525
+    s4546 = s4496 / pivot_front_left_swing_angle_dot - s1639 * s4539 - s1640 * s4531 - s1641 * s4529
+    s4547 = s4546 - s1642 * s4528 - s1643 * s4527 - s1644 * s4526 - s1645 * s4525
+    s4548 = s3681 / pivot_hind_right_knee_angle_dot + s1624 * s4541 + s1625 * s4533 + s1626 * s4531
+    s4549 = s4548 + s1627 * s4529 + s1628 * s4528 + s1629 * s4527 + s1630 * s4526 + s1631 * s4525
+    s4550 = s3613 / pivot_hind_left_knee_angle_dot + s1603 * s4543 + s1604 * s4535 + s1605 * s4531
+    s4551 = s4550 + s1606 * s4529 + s1607 * s4528 + s1608 * s4527 + s1609 * s4526 + s1610 * s4525
+    s4552 = s3545 / pivot_front_right_knee_angle_dot + s1588 * s4545 + s1589 * s4537 + s1590 * s4531
+    s4553 = s4552 + s1591 * s4529 + s1592 * s4528 + s1593 * s4527 + s1594 * s4526 + s1595 * s4525
+    s4554 = s3477 / pivot_front_left_knee_angle_dot + s1573 * s4547 + s1574 * s4539 + s1575 * s4531
+    s4555 = s4554 + s1576 * s4529 + s1577 * s4528 + s1578 * s4527 + s1579 * s4526 + s1580 * s4525
+    s4556 = s1573 * s3480 - (s3253 + (s17 * s3205 + s20 * s3207 + s23 * s3209))
+    s4557 = s1588 * s3548 - (s3306 + (s17 * s3258 + s20 * s3260 + s23 * s3262))
+    s4558 = s1575 * s3480 - (s3041 + (s17 * s3027 + s20 * s3028 + s23 * s3029)) + s1590 * s3548
+    s4559 = s1576 * s3480 - (s3023 + (s17 * s3009 + s20 * s3010 + s23 * s3011)) + s1591 * s3548
+    s4560 = s1577 * s3480 - (s3005 + (s17 * s2991 + s20 * s2992 + s23 * s2993)) + s1592 * s3548
+    s4561 = s1603 * s3616 - (s3359 + (s17 * s3311 + s20 * s3313 + s23 * s3315))
+    s4562 = s1624 * s3684 - (s3412 + (s17 * s3364 + s20 * s3366 + s23 * s3368))
+    s4563 = s1574 * s3480 - (s3083 + (s17 * s3043 + s20 * s3045 + s23 * s3047)) - s1639 * s4556
+    s4564 = s1578 * s3480 - s3035 + s1593 * s3548 + s1608 * s3616 + s1629 * s3684 - s1643 * s4556
+    s4565 = s1579 * s3480 - s3034 + s1594 * s3548 + s1609 * s3616 + s1630 * s3684 - s1644 * s4556
+    s4566 = s1580 * s3480 - s3033 + s1595 * s3548 + s1610 * s3616 + s1631 * s3684 - s1645 * s4556
+    s4567 = s1589 * s3548 - (s3122 + (s17 * s3085 + s20 * s3087 + s23 * s3089)) - s1667 * s4557
+    s4568 = s1604 * s3616 - (s3161 + (s17 * s3124 + s20 * s3126 + s23 * s3128)) - s1680 * s4561
+    s4569 = s4558 + s1605 * s3616 + s1626 * s3684 - s1640 * s4556 - s1668 * s4557 - s1681 * s4561
+    s4570 = s4559 + s1606 * s3616 + s1627 * s3684 - s1641 * s4556 - s1669 * s4557 - s1682 * s4561
+    s4571 = s4560 + s1607 * s3616 + s1628 * s3684 - s1642 * s4556 - s1670 * s4557 - s1683 * s4561
+    s4572 = s1625 * s3684 - (s3200 + (s17 * s3163 + s20 * s3165 + s23 * s3167)) - s1693 * s4562
+    s4573 = s4564 - s1671 * s4557 - s1684 * s4561 - s1697 * s4562 - s1715 * s4563 - s1721 * s4567
+    s4574 = s4565 - s1672 * s4557 - s1685 * s4561 - s1698 * s4562 - s1716 * s4563 - s1722 * s4567
+    s4575 = s4566 - s1673 * s4557 - s1686 * s4561 - s1699 * s4562 - s1717 * s4563 - s1723 * s4567
+    s4576 = s4569 - s1694 * s4562 - s1712 * s4563 - s1718 * s4567 - s1739 * s4568 - s1745 * s4572
+    s4577 = s4570 - s1695 * s4562 - s1713 * s4563 - s1719 * s4567 - s1740 * s4568 - s1746 * s4572
+    s4578 = s4571 - s1696 * s4562 - s1714 * s4563 - s1720 * s4567 - s1741 * s4568 - s1747 * s4572
+    s4579 = s4577 - s1756 * s4576
+    s4580 = s4578 - s1757 * s4576 - s1766 * s4579
+    s4581 = s4573 - s1742 * s4568 - s1748 * s4572 - s1758 * s4576 - s1767 * s4579 - s1773 * s4580
+    s4582 = s4574 - s1743 * s4568 - s1749 * s4572 - s1759 * s4576 - s1768 * s4579 - s1774 * s4580
+    s4583 = s4575 - s1744 * s4568 - s1750 * s4572 - s1760 * s4576 - s1769 * s4579 - s1775 * s4580
+    s4584 = s4582 + s1781 * s4581
+    s4585 = (s4583 + s1782 * s4581 + s1784 * s4584) / pivot_trunk_x_dot
+    s4586 = s4584 / pivot_trunk_y_dot + s1784 * s4585
+    s4587 = s4581 / pivot_trunk_z_dot + s1781 * s4586 + s1782 * s4585
+    s4588 = s4580 / pivot_trunk_wx - s1773 * s4587 - s1774 * s4586 - s1775 * s4585
+    s4589 = s4579 / pivot_trunk_wy - s1766 * s4588 - s1767 * s4587 - s1768 * s4586 - s1769 * s4585
+    s4590 = s4576 / pivot_trunk_wz - s1756 * s4589 - s1757 * s4588 - s1758 * s4587 - s1759 * s4586
+    s4591 = s4590 - s1760 * s4585
+    s4592 = s4572 / pivot_hind_right_abduction_angle_dot - s1745 * s4591 - s1746 * s4589
+    s4593 = s4592 - s1747 * s4588 - s1748 * s4587 - s1749 * s4586 - s1750 * s4585
+    s4594 = s4568 / pivot_hind_left_abduction_angle_dot - s1739 * s4591 - s1740 * s4589
+    s4595 = s4594 - s1741 * s4588 - s1742 * s4587 - s1743 * s4586 - s1744 * s4585
+    s4596 = s4567 / pivot_front_right_abduction_angle_dot - s1718 * s4591 - s1719 * s4589
+    s4597 = s4596 - s1720 * s4588 - s1721 * s4587 - s1722 * s4586 - s1723 * s4585
+    s4598 = s4563 / pivot_front_left_abduction_angle_dot - s1712 * s4591 - s1713 * s4589
+    s4599 = s4598 - s1714 * s4588 - s1715 * s4587 - s1716 * s4586 - s1717 * s4585
+    s4600 = s4562 / pivot_hind_right_swing_angle_dot - s1693 * s4593 - s1694 * s4591 - s1695 * s4589
+    s4601 = s4600 - s1696 * s4588 - s1697 * s4587 - s1698 * s4586 - s1699 * s4585
+    s4602 = s4561 / pivot_hind_left_swing_angle_dot - s1680 * s4595 - s1681 * s4591 - s1682 * s4589
+    s4603 = s4602 - s1683 * s4588 - s1684 * s4587 - s1685 * s4586 - s1686 * s4585
+    s4604 = s4557 / pivot_front_right_swing_angle_dot - s1667 * s4597 - s1668 * s4591
+    s4605 = s4604 - s1669 * s4589 - s1670 * s4588 - s1671 * s4587 - s1672 * s4586 - s1673 * s4585
+    s4606 = s4556 / pivot_front_left_swing_angle_dot - s1639 * s4599 - s1640 * s4591 - s1641 * s4589
+    s4607 = s4606 - s1642 * s4588 - s1643 * s4587 - s1644 * s4586 - s1645 * s4585
+    s4608 = s3684 / pivot_hind_right_knee_angle_dot + s1624 * s4601 + s1625 * s4593 + s1626 * s4591
+    s4609 = s4608 + s1627 * s4589 + s1628 * s4588 + s1629 * s4587 + s1630 * s4586 + s1631 * s4585
+    s4610 = s3616 / pivot_hind_left_knee_angle_dot + s1603 * s4603 + s1604 * s4595 + s1605 * s4591
+    s4611 = s4610 + s1606 * s4589 + s1607 * s4588 + s1608 * s4587 + s1609 * s4586 + s1610 * s4585
+    s4612 = s3548 / pivot_front_right_knee_angle_dot + s1588 * s4605 + s1589 * s4597 + s1590 * s4591
+    s4613 = s4612 + s1591 * s4589 + s1592 * s4588 + s1593 * s4587 + s1594 * s4586 + s1595 * s4585
+    s4614 = s3480 / pivot_front_left_knee_angle_dot + s1573 * s4607 + s1574 * s4599 + s1575 * s4591
+    s4615 = s4614 + s1576 * s4589 + s1577 * s4588 + s1578 * s4587 + s1579 * s4586 + s1580 * s4585
+    s4616 = s1573 * s3465 - (s3240 + s3241)
+    s4617 = s1574 * s3465 - (s3070 + s3071) - s1639 * s4616
+    s4618 = s1575 * s3465 - (s17 * s3075 + s20 * s3076 + s23 * s3077) - s1640 * s4616
+    s4619 = s1576 * s3465 - (s16 * s3075 + s19 * s3076 + s22 * s3077) - s1641 * s4616
+    s4620 = s1577 * s3465 - (s15 * s3075 + s18 * s3076 + s21 * s3077) - s1642 * s4616
+    s4621 = s4618 - s1712 * s4617
+    s4622 = s4619 - s1713 * s4617 - s1756 * s4621
+    s4623 = s4620 - s1714 * s4617 - s1757 * s4621 - s1766 * s4622
+    s4624 = s1578 * s3465 - s3068 - s1643 * s4616 - s1715 * s4617 - s1758 * s4621 - s1767 * s4622
+    s4625 = s1579 * s3465 - s3067 - s1644 * s4616 - s1716 * s4617 - s1759 * s4621 - s1768 * s4622
+    s4626 = s1580 * s3465 - s3066 - s1645 * s4616 - s1717 * s4617 - s1760 * s4621 - s1769 * s4622
+    s4627 = s4624 - s1773 * s4623
+    s4628 = s4625 - s1774 * s4623 + s1781 * s4627
+    s4629 = (s4626 - s1775 * s4623 + s1782 * s4627 + s1784 * s4628) / pivot_trunk_x_dot
+    s4630 = s4628 / pivot_trunk_y_dot + s1784 * s4629
+    s4631 = s4627 / pivot_trunk_z_dot + s1781 * s4630 + s1782 * s4629
+    s4632 = s4623 / pivot_trunk_wx - s1773 * s4631 - s1774 * s4630 - s1775 * s4629
+    s4633 = s4622 / pivot_trunk_wy - s1766 * s4632 - s1767 * s4631 - s1768 * s4630 - s1769 * s4629
+    s4634 = s4621 / pivot_trunk_wz - s1756 * s4633 - s1757 * s4632 - s1758 * s4631 - s1759 * s4630
+    s4635 = s4634 - s1760 * s4629
+    s4636 = s1745 * s4635 + s1746 * s4633 + s1747 * s4632 + s1748 * s4631 + s1749 * s4630
+    s4637 = s4636 + s1750 * s4629
+    s4638 = s1739 * s4635 + s1740 * s4633 + s1741 * s4632 + s1742 * s4631 + s1743 * s4630
+    s4639 = s4638 + s1744 * s4629
+    s4640 = s1718 * s4635 + s1719 * s4633 + s1720 * s4632 + s1721 * s4631 + s1722 * s4630
+    s4641 = s4640 + s1723 * s4629
+    s4642 = s4617 / pivot_front_left_abduction_angle_dot - s1712 * s4635 - s1713 * s4633
+    s4643 = s4642 - s1714 * s4632 - s1715 * s4631 - s1716 * s4630 - s1717 * s4629
+    s4644 = s1693 * s4637 - s1694 * s4635 - s1695 * s4633 - s1696 * s4632 - s1697 * s4631
+    s4645 = s4644 - s1698 * s4630 - s1699 * s4629
+    s4646 = s1680 * s4639 - s1681 * s4635 - s1682 * s4633 - s1683 * s4632 - s1684 * s4631
+    s4647 = s4646 - s1685 * s4630 - s1686 * s4629
+    s4648 = s1667 * s4641 - s1668 * s4635 - s1669 * s4633 - s1670 * s4632 - s1671 * s4631
+    s4649 = s4648 - s1672 * s4630 - s1673 * s4629
+    s4650 = s4616 / pivot_front_left_swing_angle_dot - s1639 * s4643 - s1640 * s4635 - s1641 * s4633
+    s4651 = s4650 - s1642 * s4632 - s1643 * s4631 - s1644 * s4630 - s1645 * s4629
+    s4652 = s1625 * s4637 - s1624 * s4645 - s1626 * s4635 - s1627 * s4633 - s1628 * s4632
+    s4653 = s1604 * s4639 - s1603 * s4647 - s1605 * s4635 - s1606 * s4633 - s1607 * s4632
+    s4654 = s1589 * s4641 - s1588 * s4649 - s1590 * s4635 - s1591 * s4633 - s1592 * s4632
+    s4655 = s3465 / pivot_front_left_knee_angle_dot + s1573 * s4651 + s1574 * s4643 + s1575 * s4635
+    s4656 = s4655 + s1576 * s4633 + s1577 * s4632 + s1578 * s4631 + s1579 * s4630 + s1580 * s4629
+    s4657 = s1588 * s3533 - (s3293 + s3294)
+    s4658 = s1589 * s3533 - (s3109 + s3110) - s1667 * s4657
+    s4659 = s1590 * s3533 - (s17 * s3114 + s20 * s3115 + s23 * s3116) - s1668 * s4657
+    s4660 = s1591 * s3533 - (s16 * s3114 + s19 * s3115 + s22 * s3116) - s1669 * s4657
+    s4661 = s1592 * s3533 - (s15 * s3114 + s18 * s3115 + s21 * s3116) - s1670 * s4657
+    s4662 = s4659 - s1718 * s4658
+    s4663 = s4660 - s1719 * s4658 - s1756 * s4662
+    s4664 = s4661 - s1720 * s4658 - s1757 * s4662 - s1766 * s4663
+    s4665 = s1593 * s3533 - s3107 - s1671 * s4657 - s1721 * s4658 - s1758 * s4662 - s1767 * s4663
+    s4666 = s1594 * s3533 - s3106 - s1672 * s4657 - s1722 * s4658 - s1759 * s4662 - s1768 * s4663
+    s4667 = s1595 * s3533 - s3105 - s1673 * s4657 - s1723 * s4658 - s1760 * s4662 - s1769 * s4663
+    s4668 = s4665 - s1773 * s4664
+    s4669 = s4666 - s1774 * s4664 + s1781 * s4668
+    s4670 = (s4667 - s1775 * s4664 + s1782 * s4668 + s1784 * s4669) / pivot_trunk_x_dot
+    s4671 = s4669 / pivot_trunk_y_dot + s1784 * s4670
+    s4672 = s4668 / pivot_trunk_z_dot + s1781 * s4671 + s1782 * s4670
+    s4673 = s4664 / pivot_trunk_wx - s1773 * s4672 - s1774 * s4671 - s1775 * s4670
+    s4674 = s4663 / pivot_trunk_wy - s1766 * s4673 - s1767 * s4672 - s1768 * s4671 - s1769 * s4670
+    s4675 = s4662 / pivot_trunk_wz - s1756 * s4674 - s1757 * s4673 - s1758 * s4672 - s1759 * s4671
+    s4676 = s4675 - s1760 * s4670
+    s4677 = s1745 * s4676 + s1746 * s4674 + s1747 * s4673 + s1748 * s4672 + s1749 * s4671
+    s4678 = s4677 + s1750 * s4670
+    s4679 = s1739 * s4676 + s1740 * s4674 + s1741 * s4673 + s1742 * s4672 + s1743 * s4671
+    s4680 = s4679 + s1744 * s4670
+    s4681 = s4658 / pivot_front_right_abduction_angle_dot - s1718 * s4676 - s1719 * s4674
+    s4682 = s4681 - s1720 * s4673 - s1721 * s4672 - s1722 * s4671 - s1723 * s4670
+    s4683 = s1712 * s4676 + s1713 * s4674 + s1714 * s4673 + s1715 * s4672 + s1716 * s4671
+    s4684 = s4683 + s1717 * s4670
+    s4685 = s1693 * s4678 - s1694 * s4676 - s1695 * s4674 - s1696 * s4673 - s1697 * s4672
+    s4686 = s4685 - s1698 * s4671 - s1699 * s4670
+    s4687 = s1680 * s4680 - s1681 * s4676 - s1682 * s4674 - s1683 * s4673 - s1684 * s4672
+    s4688 = s4687 - s1685 * s4671 - s1686 * s4670
+    s4689 = s4657 / pivot_front_right_swing_angle_dot - s1667 * s4682 - s1668 * s4676
+    s4690 = s4689 - s1669 * s4674 - s1670 * s4673 - s1671 * s4672 - s1672 * s4671 - s1673 * s4670
+    s4691 = s1639 * s4684 - s1640 * s4676 - s1641 * s4674 - s1642 * s4673 - s1643 * s4672
+    s4692 = s4691 - s1644 * s4671 - s1645 * s4670
+    s4693 = s1625 * s4678 - s1624 * s4686 - s1626 * s4676 - s1627 * s4674 - s1628 * s4673
+    s4694 = s1604 * s4680 - s1603 * s4688 - s1605 * s4676 - s1606 * s4674 - s1607 * s4673
+    s4695 = s3533 / pivot_front_right_knee_angle_dot + s1588 * s4690 + s1589 * s4682 + s1590 * s4676
+    s4696 = s4695 + s1591 * s4674 + s1592 * s4673 + s1593 * s4672 + s1594 * s4671 + s1595 * s4670
+    s4697 = s1574 * s4684 - s1573 * s4692 - s1575 * s4676 - s1576 * s4674 - s1577 * s4673
+    s4698 = s1603 * s3601 - (s3346 + s3347)
+    s4699 = s1604 * s3601 - (s3148 + s3149) - s1680 * s4698
+    s4700 = s1605 * s3601 - (s17 * s3153 + s20 * s3154 + s23 * s3155) - s1681 * s4698
+    s4701 = s1606 * s3601 - (s16 * s3153 + s19 * s3154 + s22 * s3155) - s1682 * s4698
+    s4702 = s1607 * s3601 - (s15 * s3153 + s18 * s3154 + s21 * s3155) - s1683 * s4698
+    s4703 = s4700 - s1739 * s4699
+    s4704 = s4701 - s1740 * s4699 - s1756 * s4703
+    s4705 = s4702 - s1741 * s4699 - s1757 * s4703 - s1766 * s4704
+    s4706 = s1608 * s3601 - s3146 - s1684 * s4698 - s1742 * s4699 - s1758 * s4703 - s1767 * s4704
+    s4707 = s1609 * s3601 - s3145 - s1685 * s4698 - s1743 * s4699 - s1759 * s4703 - s1768 * s4704
+    s4708 = s1610 * s3601 - s3144 - s1686 * s4698 - s1744 * s4699 - s1760 * s4703 - s1769 * s4704
+    s4709 = s4706 - s1773 * s4705
+    s4710 = s4707 - s1774 * s4705 + s1781 * s4709
+    s4711 = (s4708 - s1775 * s4705 + s1782 * s4709 + s1784 * s4710) / pivot_trunk_x_dot
+    s4712 = s4710 / pivot_trunk_y_dot + s1784 * s4711
+    s4713 = s4709 / pivot_trunk_z_dot + s1781 * s4712 + s1782 * s4711
+    s4714 = s4705 / pivot_trunk_wx - s1773 * s4713 - s1774 * s4712 - s1775 * s4711
+    s4715 = s4704 / pivot_trunk_wy - s1766 * s4714 - s1767 * s4713 - s1768 * s4712 - s1769 * s4711
+    s4716 = s4703 / pivot_trunk_wz - s1756 * s4715 - s1757 * s4714 - s1758 * s4713 - s1759 * s4712
+    s4717 = s4716 - s1760 * s4711
+    s4718 = s1745 * s4717 + s1746 * s4715 + s1747 * s4714 + s1748 * s4713 + s1749 * s4712
+    s4719 = s4718 + s1750 * s4711
+    s4720 = s4699 / pivot_hind_left_abduction_angle_dot - s1739 * s4717 - s1740 * s4715
+    s4721 = s4720 - s1741 * s4714 - s1742 * s4713 - s1743 * s4712 - s1744 * s4711
+    s4722 = s1718 * s4717 + s1719 * s4715 + s1720 * s4714 + s1721 * s4713 + s1722 * s4712
+    s4723 = s4722 + s1723 * s4711
+    s4724 = s1712 * s4717 + s1713 * s4715 + s1714 * s4714 + s1715 * s4713 + s1716 * s4712
+    s4725 = s4724 + s1717 * s4711
+    s4726 = s1693 * s4719 - s1694 * s4717 - s1695 * s4715 - s1696 * s4714 - s1697 * s4713
+    s4727 = s4726 - s1698 * s4712 - s1699 * s4711
+    s4728 = s4698 / pivot_hind_left_swing_angle_dot - s1680 * s4721 - s1681 * s4717 - s1682 * s4715
+    s4729 = s4728 - s1683 * s4714 - s1684 * s4713 - s1685 * s4712 - s1686 * s4711
+    s4730 = s1667 * s4723 - s1668 * s4717 - s1669 * s4715 - s1670 * s4714 - s1671 * s4713
+    s4731 = s4730 - s1672 * s4712 - s1673 * s4711
+    s4732 = s1639 * s4725 - s1640 * s4717 - s1641 * s4715 - s1642 * s4714 - s1643 * s4713
+    s4733 = s4732 - s1644 * s4712 - s1645 * s4711
+    s4734 = s1625 * s4719 - s1624 * s4727 - s1626 * s4717 - s1627 * s4715 - s1628 * s4714
+    s4735 = s3601 / pivot_hind_left_knee_angle_dot + s1603 * s4729 + s1604 * s4721 + s1605 * s4717
+    s4736 = s4735 + s1606 * s4715 + s1607 * s4714 + s1608 * s4713 + s1609 * s4712 + s1610 * s4711
+    s4737 = s1589 * s4723 - s1588 * s4731 - s1590 * s4717 - s1591 * s4715 - s1592 * s4714
+    s4738 = s1574 * s4725 - s1573 * s4733 - s1575 * s4717 - s1576 * s4715 - s1577 * s4714
+    s4739 = s1624 * s3669 - (s3399 + s3400)
+    s4740 = s1625 * s3669 - (s3187 + s3188) - s1693 * s4739
+    s4741 = s1626 * s3669 - (s17 * s3192 + s20 * s3193 + s23 * s3194) - s1694 * s4739
+    s4742 = s1627 * s3669 - (s16 * s3192 + s19 * s3193 + s22 * s3194) - s1695 * s4739
+    s4743 = s1628 * s3669 - (s15 * s3192 + s18 * s3193 + s21 * s3194) - s1696 * s4739
+    s4744 = s4741 - s1745 * s4740
+    s4745 = s4742 - s1746 * s4740 - s1756 * s4744
+    s4746 = s4743 - s1747 * s4740 - s1757 * s4744 - s1766 * s4745
+    s4747 = s1629 * s3669 - s3185 - s1697 * s4739 - s1748 * s4740 - s1758 * s4744 - s1767 * s4745
+    s4748 = s1630 * s3669 - s3184 - s1698 * s4739 - s1749 * s4740 - s1759 * s4744 - s1768 * s4745
+    s4749 = s1631 * s3669 - s3183 - s1699 * s4739 - s1750 * s4740 - s1760 * s4744 - s1769 * s4745
+    s4750 = s4747 - s1773 * s4746
+    s4751 = s4748 - s1774 * s4746 + s1781 * s4750
+    s4752 = (s4749 - s1775 * s4746 + s1782 * s4750 + s1784 * s4751) / pivot_trunk_x_dot
+    s4753 = s4751 / pivot_trunk_y_dot + s1784 * s4752
+    s4754 = s4750 / pivot_trunk_z_dot + s1781 * s4753 + s1782 * s4752
+    s4755 = s4746 / pivot_trunk_wx - s1773 * s4754 - s1774 * s4753 - s1775 * s4752
+    s4756 = s4745 / pivot_trunk_wy - s1766 * s4755 - s1767 * s4754 - s1768 * s4753 - s1769 * s4752
+    s4757 = s4744 / pivot_trunk_wz - s1756 * s4756 - s1757 * s4755 - s1758 * s4754 - s1759 * s4753
+    s4758 = s4757 - s1760 * s4752
+    s4759 = s4740 / pivot_hind_right_abduction_angle_dot - s1745 * s4758 - s1746 * s4756
+    s4760 = s4759 - s1747 * s4755 - s1748 * s4754 - s1749 * s4753 - s1750 * s4752
+    s4761 = s1739 * s4758 + s1740 * s4756 + s1741 * s4755 + s1742 * s4754 + s1743 * s4753
+    s4762 = s4761 + s1744 * s4752
+    s4763 = s1718 * s4758 + s1719 * s4756 + s1720 * s4755 + s1721 * s4754 + s1722 * s4753
+    s4764 = s4763 + s1723 * s4752
+    s4765 = s1712 * s4758 + s1713 * s4756 + s1714 * s4755 + s1715 * s4754 + s1716 * s4753
+    s4766 = s4765 + s1717 * s4752
+    s4767 = s4739 / pivot_hind_right_swing_angle_dot - s1693 * s4760 - s1694 * s4758 - s1695 * s4756
+    s4768 = s4767 - s1696 * s4755 - s1697 * s4754 - s1698 * s4753 - s1699 * s4752
+    s4769 = s1680 * s4762 - s1681 * s4758 - s1682 * s4756 - s1683 * s4755 - s1684 * s4754
+    s4770 = s4769 - s1685 * s4753 - s1686 * s4752
+    s4771 = s1667 * s4764 - s1668 * s4758 - s1669 * s4756 - s1670 * s4755 - s1671 * s4754
+    s4772 = s4771 - s1672 * s4753 - s1673 * s4752
+    s4773 = s1639 * s4766 - s1640 * s4758 - s1641 * s4756 - s1642 * s4755 - s1643 * s4754
+    s4774 = s4773 - s1644 * s4753 - s1645 * s4752
+    s4775 = s3669 / pivot_hind_right_knee_angle_dot + s1624 * s4768 + s1625 * s4760 + s1626 * s4758
+    s4776 = s4775 + s1627 * s4756 + s1628 * s4755 + s1629 * s4754 + s1630 * s4753 + s1631 * s4752
+    s4777 = s1604 * s4762 - s1603 * s4770 - s1605 * s4758 - s1606 * s4756 - s1607 * s4755
+    s4778 = s1589 * s4764 - s1588 * s4772 - s1590 * s4758 - s1591 * s4756 - s1592 * s4755
+    s4779 = s1574 * s4766 - s1573 * s4774 - s1575 * s4758 - s1576 * s4756 - s1577 * s4755
+    s4780 = s1573 * s3454 - (s3232 + (s901 * s3205 + s903 * s3207 + s905 * s3209))
+    s4781 = s1574 * s3454 - (s15 * s3236 + s18 * s3237 + s21 * s3238) - s1639 * s4780
+    s4782 = s1575 * s3454 - (s17 * s3245 + s20 * s3246 + s23 * s3247) - s1640 * s4780
+    s4783 = s1576 * s3454 - (s16 * s3245 + s19 * s3246 + s22 * s3247) - s1641 * s4780
+    s4784 = s1577 * s3454 - (s15 * s3245 + s18 * s3246 + s21 * s3247) - s1642 * s4780
+    s4785 = s4782 - s1712 * s4781
+    s4786 = s4783 - s1713 * s4781 - s1756 * s4785
+    s4787 = s4784 - s1714 * s4781 - s1757 * s4785 - s1766 * s4786
+    s4788 = s1578 * s3454 - s3230 - s1643 * s4780 - s1715 * s4781 - s1758 * s4785 - s1767 * s4786
+    s4789 = s1579 * s3454 - s3229 - s1644 * s4780 - s1716 * s4781 - s1759 * s4785 - s1768 * s4786
+    s4790 = s1580 * s3454 - s3228 - s1645 * s4780 - s1717 * s4781 - s1760 * s4785 - s1769 * s4786
+    s4791 = s4788 - s1773 * s4787
+    s4792 = s4789 - s1774 * s4787 + s1781 * s4791
+    s4793 = (s4790 - s1775 * s4787 + s1782 * s4791 + s1784 * s4792) / pivot_trunk_x_dot
+    s4794 = s4792 / pivot_trunk_y_dot + s1784 * s4793
+    s4795 = s4791 / pivot_trunk_z_dot + s1781 * s4794 + s1782 * s4793
+    s4796 = s4787 / pivot_trunk_wx - s1773 * s4795 - s1774 * s4794 - s1775 * s4793
+    s4797 = s4786 / pivot_trunk_wy - s1766 * s4796 - s1767 * s4795 - s1768 * s4794 - s1769 * s4793
+    s4798 = s4785 / pivot_trunk_wz - s1756 * s4797 - s1757 * s4796 - s1758 * s4795 - s1759 * s4794
+    s4799 = s4798 - s1760 * s4793
+    s4800 = s1745 * s4799 + s1746 * s4797 + s1747 * s4796 + s1748 * s4795 + s1749 * s4794
+    s4801 = s4800 + s1750 * s4793
+    s4802 = s1739 * s4799 + s1740 * s4797 + s1741 * s4796 + s1742 * s4795 + s1743 * s4794
+    s4803 = s4802 + s1744 * s4793
+    s4804 = s1718 * s4799 + s1719 * s4797 + s1720 * s4796 + s1721 * s4795 + s1722 * s4794
+    s4805 = s4804 + s1723 * s4793
+    s4806 = s4781 / pivot_front_left_abduction_angle_dot - s1712 * s4799 - s1713 * s4797
+    s4807 = s4806 - s1714 * s4796 - s1715 * s4795 - s1716 * s4794 - s1717 * s4793
+    s4808 = s1693 * s4801 - s1694 * s4799 - s1695 * s4797 - s1696 * s4796 - s1697 * s4795
+    s4809 = s4808 - s1698 * s4794 - s1699 * s4793
+    s4810 = s1680 * s4803 - s1681 * s4799 - s1682 * s4797 - s1683 * s4796 - s1684 * s4795
+    s4811 = s4810 - s1685 * s4794 - s1686 * s4793
+    s4812 = s1667 * s4805 - s1668 * s4799 - s1669 * s4797 - s1670 * s4796 - s1671 * s4795
+    s4813 = s4812 - s1672 * s4794 - s1673 * s4793
+    s4814 = s4780 / pivot_front_left_swing_angle_dot - s1639 * s4807 - s1640 * s4799 - s1641 * s4797
+    s4815 = s4814 - s1642 * s4796 - s1643 * s4795 - s1644 * s4794 - s1645 * s4793
+    s4816 = s1625 * s4801 - s1624 * s4809 - s1626 * s4799 - s1627 * s4797 - s1628 * s4796
+    s4817 = s1604 * s4803 - s1603 * s4811 - s1605 * s4799 - s1606 * s4797 - s1607 * s4796
+    s4818 = s1589 * s4805 - s1588 * s4813 - s1590 * s4799 - s1591 * s4797 - s1592 * s4796
+    s4819 = s3454 / pivot_front_left_knee_angle_dot + s1573 * s4815 + s1574 * s4807 + s1575 * s4799
+    s4820 = s4819 + s1576 * s4797 + s1577 * s4796 + s1578 * s4795 + s1579 * s4794 + s1580 * s4793
+    s4821 = s1588 * s3522 - (s3285 + (s907 * s3258 + s909 * s3260 + s911 * s3262))
+    s4822 = s1589 * s3522 - (s15 * s3289 + s18 * s3290 + s21 * s3291) - s1667 * s4821
+    s4823 = s1590 * s3522 - (s17 * s3298 + s20 * s3299 + s23 * s3300) - s1668 * s4821
+    s4824 = s1591 * s3522 - (s16 * s3298 + s19 * s3299 + s22 * s3300) - s1669 * s4821
+    s4825 = s1592 * s3522 - (s15 * s3298 + s18 * s3299 + s21 * s3300) - s1670 * s4821
+    s4826 = s4823 - s1718 * s4822
+    s4827 = s4824 - s1719 * s4822 - s1756 * s4826
+    s4828 = s4825 - s1720 * s4822 - s1757 * s4826 - s1766 * s4827
+    s4829 = s1593 * s3522 - s3283 - s1671 * s4821 - s1721 * s4822 - s1758 * s4826 - s1767 * s4827
+    s4830 = s1594 * s3522 - s3282 - s1672 * s4821 - s1722 * s4822 - s1759 * s4826 - s1768 * s4827
+    s4831 = s1595 * s3522 - s3281 - s1673 * s4821 - s1723 * s4822 - s1760 * s4826 - s1769 * s4827
+    s4832 = s4829 - s1773 * s4828
+    s4833 = s4830 - s1774 * s4828 + s1781 * s4832
+    s4834 = (s4831 - s1775 * s4828 + s1782 * s4832 + s1784 * s4833) / pivot_trunk_x_dot
+    s4835 = s4833 / pivot_trunk_y_dot + s1784 * s4834
+    s4836 = s4832 / pivot_trunk_z_dot + s1781 * s4835 + s1782 * s4834
+    s4837 = s4828 / pivot_trunk_wx - s1773 * s4836 - s1774 * s4835 - s1775 * s4834
+    s4838 = s4827 / pivot_trunk_wy - s1766 * s4837 - s1767 * s4836 - s1768 * s4835 - s1769 * s4834
+    s4839 = s4826 / pivot_trunk_wz - s1756 * s4838 - s1757 * s4837 - s1758 * s4836 - s1759 * s4835
+    s4840 = s4839 - s1760 * s4834
+    s4841 = s1745 * s4840 + s1746 * s4838 + s1747 * s4837 + s1748 * s4836 + s1749 * s4835
+    s4842 = s4841 + s1750 * s4834
+    s4843 = s1739 * s4840 + s1740 * s4838 + s1741 * s4837 + s1742 * s4836 + s1743 * s4835
+    s4844 = s4843 + s1744 * s4834
+    s4845 = s4822 / pivot_front_right_abduction_angle_dot - s1718 * s4840 - s1719 * s4838
+    s4846 = s4845 - s1720 * s4837 - s1721 * s4836 - s1722 * s4835 - s1723 * s4834
+    s4847 = s1712 * s4840 + s1713 * s4838 + s1714 * s4837 + s1715 * s4836 + s1716 * s4835
+    s4848 = s4847 + s1717 * s4834
+    s4849 = s1693 * s4842 - s1694 * s4840 - s1695 * s4838 - s1696 * s4837 - s1697 * s4836
+    s4850 = s4849 - s1698 * s4835 - s1699 * s4834
+    s4851 = s1680 * s4844 - s1681 * s4840 - s1682 * s4838 - s1683 * s4837 - s1684 * s4836
+    s4852 = s4851 - s1685 * s4835 - s1686 * s4834
+    s4853 = s4821 / pivot_front_right_swing_angle_dot - s1667 * s4846 - s1668 * s4840
+    s4854 = s4853 - s1669 * s4838 - s1670 * s4837 - s1671 * s4836 - s1672 * s4835 - s1673 * s4834
+    s4855 = s1639 * s4848 - s1640 * s4840 - s1641 * s4838 - s1642 * s4837 - s1643 * s4836
+    s4856 = s4855 - s1644 * s4835 - s1645 * s4834
+    s4857 = s1625 * s4842 - s1624 * s4850 - s1626 * s4840 - s1627 * s4838 - s1628 * s4837
+    s4858 = s1604 * s4844 - s1603 * s4852 - s1605 * s4840 - s1606 * s4838 - s1607 * s4837
+    s4859 = s3522 / pivot_front_right_knee_angle_dot + s1588 * s4854 + s1589 * s4846 + s1590 * s4840
+    s4860 = s4859 + s1591 * s4838 + s1592 * s4837 + s1593 * s4836 + s1594 * s4835 + s1595 * s4834
+    s4861 = s1574 * s4848 - s1573 * s4856 - s1575 * s4840 - s1576 * s4838 - s1577 * s4837
+    s4862 = s1603 * s3590 - (s3338 + (s913 * s3311 + s915 * s3313 + s917 * s3315))
+    s4863 = s1604 * s3590 - (s15 * s3342 + s18 * s3343 + s21 * s3344) - s1680 * s4862
+    s4864 = s1605 * s3590 - (s17 * s3351 + s20 * s3352 + s23 * s3353) - s1681 * s4862
+    s4865 = s1606 * s3590 - (s16 * s3351 + s19 * s3352 + s22 * s3353) - s1682 * s4862
+    s4866 = s1607 * s3590 - (s15 * s3351 + s18 * s3352 + s21 * s3353) - s1683 * s4862
+    s4867 = s4864 - s1739 * s4863
+    s4868 = s4865 - s1740 * s4863 - s1756 * s4867
+    s4869 = s4866 - s1741 * s4863 - s1757 * s4867 - s1766 * s4868
+    s4870 = s1608 * s3590 - s3336 - s1684 * s4862 - s1742 * s4863 - s1758 * s4867 - s1767 * s4868
+    s4871 = s1609 * s3590 - s3335 - s1685 * s4862 - s1743 * s4863 - s1759 * s4867 - s1768 * s4868
+    s4872 = s1610 * s3590 - s3334 - s1686 * s4862 - s1744 * s4863 - s1760 * s4867 - s1769 * s4868
+    s4873 = s4870 - s1773 * s4869
+    s4874 = s4871 - s1774 * s4869 + s1781 * s4873
+    s4875 = (s4872 - s1775 * s4869 + s1782 * s4873 + s1784 * s4874) / pivot_trunk_x_dot
+    s4876 = s4874 / pivot_trunk_y_dot + s1784 * s4875
+    s4877 = s4873 / pivot_trunk_z_dot + s1781 * s4876 + s1782 * s4875
+    s4878 = s4869 / pivot_trunk_wx - s1773 * s4877 - s1774 * s4876 - s1775 * s4875
+    s4879 = s4868 / pivot_trunk_wy - s1766 * s4878 - s1767 * s4877 - s1768 * s4876 - s1769 * s4875
+    s4880 = s4867 / pivot_trunk_wz - s1756 * s4879 - s1757 * s4878 - s1758 * s4877 - s1759 * s4876
+    s4881 = s4880 - s1760 * s4875
+    s4882 = s1745 * s4881 + s1746 * s4879 + s1747 * s4878 + s1748 * s4877 + s1749 * s4876
+    s4883 = s4882 + s1750 * s4875
+    s4884 = s4863 / pivot_hind_left_abduction_angle_dot - s1739 * s4881 - s1740 * s4879
+    s4885 = s4884 - s1741 * s4878 - s1742 * s4877 - s1743 * s4876 - s1744 * s4875
+    s4886 = s1718 * s4881 + s1719 * s4879 + s1720 * s4878 + s1721 * s4877 + s1722 * s4876
+    s4887 = s4886 + s1723 * s4875
+    s4888 = s1712 * s4881 + s1713 * s4879 + s1714 * s4878 + s1715 * s4877 + s1716 * s4876
+    s4889 = s4888 + s1717 * s4875
+    s4890 = s1693 * s4883 - s1694 * s4881 - s1695 * s4879 - s1696 * s4878 - s1697 * s4877
+    s4891 = s4890 - s1698 * s4876 - s1699 * s4875
+    s4892 = s4862 / pivot_hind_left_swing_angle_dot - s1680 * s4885 - s1681 * s4881 - s1682 * s4879
+    s4893 = s4892 - s1683 * s4878 - s1684 * s4877 - s1685 * s4876 - s1686 * s4875
+    s4894 = s1667 * s4887 - s1668 * s4881 - s1669 * s4879 - s1670 * s4878 - s1671 * s4877
+    s4895 = s4894 - s1672 * s4876 - s1673 * s4875
+    s4896 = s1639 * s4889 - s1640 * s4881 - s1641 * s4879 - s1642 * s4878 - s1643 * s4877
+    s4897 = s4896 - s1644 * s4876 - s1645 * s4875
+    s4898 = s1625 * s4883 - s1624 * s4891 - s1626 * s4881 - s1627 * s4879 - s1628 * s4878
+    s4899 = s3590 / pivot_hind_left_knee_angle_dot + s1603 * s4893 + s1604 * s4885 + s1605 * s4881
+    s4900 = s4899 + s1606 * s4879 + s1607 * s4878 + s1608 * s4877 + s1609 * s4876 + s1610 * s4875
+    s4901 = s1589 * s4887 - s1588 * s4895 - s1590 * s4881 - s1591 * s4879 - s1592 * s4878
+    s4902 = s1574 * s4889 - s1573 * s4897 - s1575 * s4881 - s1576 * s4879 - s1577 * s4878
+    s4903 = s1624 * s3658 - (s3391 + (s919 * s3364 + s921 * s3366 + s923 * s3368))
+    s4904 = s1625 * s3658 - (s15 * s3395 + s18 * s3396 + s21 * s3397) - s1693 * s4903
+    s4905 = s1626 * s3658 - (s17 * s3404 + s20 * s3405 + s23 * s3406) - s1694 * s4903
+    s4906 = s1627 * s3658 - (s16 * s3404 + s19 * s3405 + s22 * s3406) - s1695 * s4903
+    s4907 = s1628 * s3658 - (s15 * s3404 + s18 * s3405 + s21 * s3406) - s1696 * s4903
+    s4908 = s4905 - s1745 * s4904
+    s4909 = s4906 - s1746 * s4904 - s1756 * s4908
+    s4910 = s4907 - s1747 * s4904 - s1757 * s4908 - s1766 * s4909
+    s4911 = s1629 * s3658 - s3389 - s1697 * s4903 - s1748 * s4904 - s1758 * s4908 - s1767 * s4909
+    s4912 = s1630 * s3658 - s3388 - s1698 * s4903 - s1749 * s4904 - s1759 * s4908 - s1768 * s4909
+    s4913 = s1631 * s3658 - s3387 - s1699 * s4903 - s1750 * s4904 - s1760 * s4908 - s1769 * s4909
+    s4914 = s4911 - s1773 * s4910
+    s4915 = s4912 - s1774 * s4910 + s1781 * s4914
+    s4916 = (s4913 - s1775 * s4910 + s1782 * s4914 + s1784 * s4915) / pivot_trunk_x_dot
+    s4917 = s4915 / pivot_trunk_y_dot + s1784 * s4916
+    s4918 = s4914 / pivot_trunk_z_dot + s1781 * s4917 + s1782 * s4916
+    s4919 = s4910 / pivot_trunk_wx - s1773 * s4918 - s1774 * s4917 - s1775 * s4916
+    s4920 = s4909 / pivot_trunk_wy - s1766 * s4919 - s1767 * s4918 - s1768 * s4917 - s1769 * s4916
+    s4921 = s4908 / pivot_trunk_wz - s1756 * s4920 - s1757 * s4919 - s1758 * s4918 - s1759 * s4917
+    s4922 = s4921 - s1760 * s4916
+    s4923 = s4904 / pivot_hind_right_abduction_angle_dot - s1745 * s4922 - s1746 * s4920
+    s4924 = s4923 - s1747 * s4919 - s1748 * s4918 - s1749 * s4917 - s1750 * s4916
+    s4925 = s1739 * s4922 + s1740 * s4920 + s1741 * s4919 + s1742 * s4918 + s1743 * s4917
+    s4926 = s4925 + s1744 * s4916
+    s4927 = s1718 * s4922 + s1719 * s4920 + s1720 * s4919 + s1721 * s4918 + s1722 * s4917
+    s4928 = s4927 + s1723 * s4916
+    s4929 = s1712 * s4922 + s1713 * s4920 + s1714 * s4919 + s1715 * s4918 + s1716 * s4917
+    s4930 = s4929 + s1717 * s4916
+    s4931 = s4903 / pivot_hind_right_swing_angle_dot - s1693 * s4924 - s1694 * s4922 - s1695 * s4920
+    s4932 = s4931 - s1696 * s4919 - s1697 * s4918 - s1698 * s4917 - s1699 * s4916
+    s4933 = s1680 * s4926 - s1681 * s4922 - s1682 * s4920 - s1683 * s4919 - s1684 * s4918
+    s4934 = s4933 - s1685 * s4917 - s1686 * s4916
+    s4935 = s1667 * s4928 - s1668 * s4922 - s1669 * s4920 - s1670 * s4919 - s1671 * s4918
+    s4936 = s4935 - s1672 * s4917 - s1673 * s4916
+    s4937 = s1639 * s4930 - s1640 * s4922 - s1641 * s4920 - s1642 * s4919 - s1643 * s4918
+    s4938 = s4937 - s1644 * s4917 - s1645 * s4916
+    s4939 = s3658 / pivot_hind_right_knee_angle_dot + s1624 * s4932 + s1625 * s4924 + s1626 * s4922
+    s4940 = s4939 + s1627 * s4920 + s1628 * s4919 + s1629 * s4918 + s1630 * s4917 + s1631 * s4916
+    s4941 = s1604 * s4926 - s1603 * s4934 - s1605 * s4922 - s1606 * s4920 - s1607 * s4919
+    s4942 = s1589 * s4928 - s1588 * s4936 - s1590 * s4922 - s1591 * s4920 - s1592 * s4919
+    s4943 = s1574 * s4930 - s1573 * s4938 - s1575 * s4922 - s1576 * s4920 - s1577 * s4919
+    s4944 = s1573 * s3444 - (s901 * s3448 + s903 * s3449 + s905 * s3450)
+    s4945 = s1574 * s3444 - (s15 * s3458 + s18 * s3459 + s21 * s3460) - s1639 * s4944
+    s4946 = s1575 * s3444 - (s17 * s3469 + s20 * s3470 + s23 * s3471) - s1640 * s4944
+    s4947 = s1576 * s3444 - (s16 * s3469 + s19 * s3470 + s22 * s3471) - s1641 * s4944
+    s4948 = s1577 * s3444 - (s15 * s3469 + s18 * s3470 + s21 * s3471) - s1642 * s4944
+    s4949 = s4946 - s1712 * s4945
+    s4950 = s4947 - s1713 * s4945 - s1756 * s4949
+    s4951 = s4948 - s1714 * s4945 - s1757 * s4949 - s1766 * s4950
+    s4952 = s1578 * s3444 - s3439 - s1643 * s4944 - s1715 * s4945 - s1758 * s4949 - s1767 * s4950
+    s4953 = s1579 * s3444 - s3438 - s1644 * s4944 - s1716 * s4945 - s1759 * s4949 - s1768 * s4950
+    s4954 = s1580 * s3444 - s3437 - s1645 * s4944 - s1717 * s4945 - s1760 * s4949 - s1769 * s4950
+    s4955 = s4952 - s1773 * s4951
+    s4956 = s4953 - s1774 * s4951 + s1781 * s4955
+    s4957 = (s4954 - s1775 * s4951 + s1782 * s4955 + s1784 * s4956) / pivot_trunk_x_dot
+    s4958 = s4956 / pivot_trunk_y_dot + s1784 * s4957
+    s4959 = s4955 / pivot_trunk_z_dot + s1781 * s4958 + s1782 * s4957
+    s4960 = s4951 / pivot_trunk_wx - s1773 * s4959 - s1774 * s4958 - s1775 * s4957
+    s4961 = s4950 / pivot_trunk_wy - s1766 * s4960 - s1767 * s4959 - s1768 * s4958 - s1769 * s4957
+    s4962 = s4949 / pivot_trunk_wz - s1756 * s4961 - s1757 * s4960 - s1758 * s4959 - s1759 * s4958
+    s4963 = s4962 - s1760 * s4957
+    s4964 = s1745 * s4963 + s1746 * s4961 + s1747 * s4960 + s1748 * s4959 + s1749 * s4958
+    s4965 = s4964 + s1750 * s4957
+    s4966 = s1739 * s4963 + s1740 * s4961 + s1741 * s4960 + s1742 * s4959 + s1743 * s4958
+    s4967 = s4966 + s1744 * s4957
+    s4968 = s1718 * s4963 + s1719 * s4961 + s1720 * s4960 + s1721 * s4959 + s1722 * s4958
+    s4969 = s4968 + s1723 * s4957
+    s4970 = s4945 / pivot_front_left_abduction_angle_dot - s1712 * s4963 - s1713 * s4961
+    s4971 = s4970 - s1714 * s4960 - s1715 * s4959 - s1716 * s4958 - s1717 * s4957
+    s4972 = s1693 * s4965 - s1694 * s4963 - s1695 * s4961 - s1696 * s4960 - s1697 * s4959
+    s4973 = s4972 - s1698 * s4958 - s1699 * s4957
+    s4974 = s1680 * s4967 - s1681 * s4963 - s1682 * s4961 - s1683 * s4960 - s1684 * s4959
+    s4975 = s4974 - s1685 * s4958 - s1686 * s4957
+    s4976 = s1667 * s4969 - s1668 * s4963 - s1669 * s4961 - s1670 * s4960 - s1671 * s4959
+    s4977 = s4976 - s1672 * s4958 - s1673 * s4957
+    s4978 = s4944 / pivot_front_left_swing_angle_dot - s1639 * s4971 - s1640 * s4963 - s1641 * s4961
+    s4979 = s4978 - s1642 * s4960 - s1643 * s4959 - s1644 * s4958 - s1645 * s4957
+    s4980 = s1625 * s4965 - s1624 * s4973 - s1626 * s4963 - s1627 * s4961 - s1628 * s4960
+    s4981 = s1604 * s4967 - s1603 * s4975 - s1605 * s4963 - s1606 * s4961 - s1607 * s4960
+    s4982 = s1589 * s4969 - s1588 * s4977 - s1590 * s4963 - s1591 * s4961 - s1592 * s4960
+    s4983 = s3444 / pivot_front_left_knee_angle_dot + s1573 * s4979 + s1574 * s4971 + s1575 * s4963
+    s4984 = s4983 + s1576 * s4961 + s1577 * s4960 + s1578 * s4959 + s1579 * s4958 + s1580 * s4957
+    s4985 = s1588 * s3512 - (s907 * s3516 + s909 * s3517 + s911 * s3518)
+    s4986 = s1589 * s3512 - (s15 * s3526 + s18 * s3527 + s21 * s3528) - s1667 * s4985
+    s4987 = s1590 * s3512 - (s17 * s3537 + s20 * s3538 + s23 * s3539) - s1668 * s4985
+    s4988 = s1591 * s3512 - (s16 * s3537 + s19 * s3538 + s22 * s3539) - s1669 * s4985
+    s4989 = s1592 * s3512 - (s15 * s3537 + s18 * s3538 + s21 * s3539) - s1670 * s4985
+    s4990 = s4987 - s1718 * s4986
+    s4991 = s4988 - s1719 * s4986 - s1756 * s4990
+    s4992 = s4989 - s1720 * s4986 - s1757 * s4990 - s1766 * s4991
+    s4993 = s1593 * s3512 - s3507 - s1671 * s4985 - s1721 * s4986 - s1758 * s4990 - s1767 * s4991
+    s4994 = s1594 * s3512 - s3506 - s1672 * s4985 - s1722 * s4986 - s1759 * s4990 - s1768 * s4991
+    s4995 = s1595 * s3512 - s3505 - s1673 * s4985 - s1723 * s4986 - s1760 * s4990 - s1769 * s4991
+    s4996 = s4993 - s1773 * s4992
+    s4997 = s4994 - s1774 * s4992 + s1781 * s4996
+    s4998 = (s4995 - s1775 * s4992 + s1782 * s4996 + s1784 * s4997) / pivot_trunk_x_dot
+    s4999 = s4997 / pivot_trunk_y_dot + s1784 * s4998
+    s5000 = s4996 / pivot_trunk_z_dot + s1781 * s4999 + s1782 * s4998
+    s5001 = s4992 / pivot_trunk_wx - s1773 * s5000 - s1774 * s4999 - s1775 * s4998
+    s5002 = s4991 / pivot_trunk_wy - s1766 * s5001 - s1767 * s5000 - s1768 * s4999 - s1769 * s4998
+    s5003 = s4990 / pivot_trunk_wz - s1756 * s5002 - s1757 * s5001 - s1758 * s5000 - s1759 * s4999
+    s5004 = s5003 - s1760 * s4998
+    s5005 = s1745 * s5004 + s1746 * s5002 + s1747 * s5001 + s1748 * s5000 + s1749 * s4999
+    s5006 = s5005 + s1750 * s4998
+    s5007 = s1739 * s5004 + s1740 * s5002 + s1741 * s5001 + s1742 * s5000 + s1743 * s4999
+    s5008 = s5007 + s1744 * s4998
+    s5009 = s4986 / pivot_front_right_abduction_angle_dot - s1718 * s5004 - s1719 * s5002
+    s5010 = s5009 - s1720 * s5001 - s1721 * s5000 - s1722 * s4999 - s1723 * s4998
+    s5011 = s1712 * s5004 + s1713 * s5002 + s1714 * s5001 + s1715 * s5000 + s1716 * s4999
+    s5012 = s5011 + s1717 * s4998
+    s5013 = s1693 * s5006 - s1694 * s5004 - s1695 * s5002 - s1696 * s5001 - s1697 * s5000
+    s5014 = s5013 - s1698 * s4999 - s1699 * s4998
+    s5015 = s1680 * s5008 - s1681 * s5004 - s1682 * s5002 - s1683 * s5001 - s1684 * s5000
+    s5016 = s5015 - s1685 * s4999 - s1686 * s4998
+    s5017 = s4985 / pivot_front_right_swing_angle_dot - s1667 * s5010 - s1668 * s5004
+    s5018 = s5017 - s1669 * s5002 - s1670 * s5001 - s1671 * s5000 - s1672 * s4999 - s1673 * s4998
+    s5019 = s1639 * s5012 - s1640 * s5004 - s1641 * s5002 - s1642 * s5001 - s1643 * s5000
+    s5020 = s5019 - s1644 * s4999 - s1645 * s4998
+    s5021 = s1625 * s5006 - s1624 * s5014 - s1626 * s5004 - s1627 * s5002 - s1628 * s5001
+    s5022 = s1604 * s5008 - s1603 * s5016 - s1605 * s5004 - s1606 * s5002 - s1607 * s5001
+    s5023 = s3512 / pivot_front_right_knee_angle_dot + s1588 * s5018 + s1589 * s5010 + s1590 * s5004
+    s5024 = s5023 + s1591 * s5002 + s1592 * s5001 + s1593 * s5000 + s1594 * s4999 + s1595 * s4998
+    s5025 = s1574 * s5012 - s1573 * s5020 - s1575 * s5004 - s1576 * s5002 - s1577 * s5001
+    s5026 = s1603 * s3580 - (s913 * s3584 + s915 * s3585 + s917 * s3586)
+    s5027 = s1604 * s3580 - (s15 * s3594 + s18 * s3595 + s21 * s3596) - s1680 * s5026
+    s5028 = s1605 * s3580 - (s17 * s3605 + s20 * s3606 + s23 * s3607) - s1681 * s5026
+    s5029 = s1606 * s3580 - (s16 * s3605 + s19 * s3606 + s22 * s3607) - s1682 * s5026
+    s5030 = s1607 * s3580 - (s15 * s3605 + s18 * s3606 + s21 * s3607) - s1683 * s5026
+    s5031 = s5028 - s1739 * s5027
+    s5032 = s5029 - s1740 * s5027 - s1756 * s5031
+    s5033 = s5030 - s1741 * s5027 - s1757 * s5031 - s1766 * s5032
+    s5034 = s1608 * s3580 - s3575 - s1684 * s5026 - s1742 * s5027 - s1758 * s5031 - s1767 * s5032
+    s5035 = s1609 * s3580 - s3574 - s1685 * s5026 - s1743 * s5027 - s1759 * s5031 - s1768 * s5032
+    s5036 = s1610 * s3580 - s3573 - s1686 * s5026 - s1744 * s5027 - s1760 * s5031 - s1769 * s5032
+    s5037 = s5034 - s1773 * s5033
+    s5038 = s5035 - s1774 * s5033 + s1781 * s5037
+    s5039 = (s5036 - s1775 * s5033 + s1782 * s5037 + s1784 * s5038) / pivot_trunk_x_dot
+    s5040 = s5038 / pivot_trunk_y_dot + s1784 * s5039
+    s5041 = s5037 / pivot_trunk_z_dot + s1781 * s5040 + s1782 * s5039
+    s5042 = s5033 / pivot_trunk_wx - s1773 * s5041 - s1774 * s5040 - s1775 * s5039
+    s5043 = s5032 / pivot_trunk_wy - s1766 * s5042 - s1767 * s5041 - s1768 * s5040 - s1769 * s5039
+    s5044 = s5031 / pivot_trunk_wz - s1756 * s5043 - s1757 * s5042 - s1758 * s5041 - s1759 * s5040
+    s5045 = s5044 - s1760 * s5039
+    s5046 = s1745 * s5045 + s1746 * s5043 + s1747 * s5042 + s1748 * s5041 + s1749 * s5040
+    s5047 = s5046 + s1750 * s5039
+    s5048 = s5027 / pivot_hind_left_abduction_angle_dot - s1739 * s5045 - s1740 * s5043
+    s5049 = s5048 - s1741 * s5042 - s1742 * s5041 - s1743 * s5040 - s1744 * s5039
+    s5050 = s1718 * s5045 + s1719 * s5043 + s1720 * s5042 + s1721 * s5041 + s1722 * s5040
+    s5051 = s5050 + s1723 * s5039
+    s5052 = s1712 * s5045 + s1713 * s5043 + s1714 * s5042 + s1715 * s5041 + s1716 * s5040
+    s5053 = s5052 + s1717 * s5039
+    s5054 = s1693 * s5047 - s1694 * s5045 - s1695 * s5043 - s1696 * s5042 - s1697 * s5041
+    s5055 = s5054 - s1698 * s5040 - s1699 * s5039
+    s5056 = s5026 / pivot_hind_left_swing_angle_dot - s1680 * s5049 - s1681 * s5045 - s1682 * s5043
+    s5057 = s5056 - s1683 * s5042 - s1684 * s5041 - s1685 * s5040 - s1686 * s5039
+    s5058 = s1667 * s5051 - s1668 * s5045 - s1669 * s5043 - s1670 * s5042 - s1671 * s5041
+    s5059 = s5058 - s1672 * s5040 - s1673 * s5039
+    s5060 = s1639 * s5053 - s1640 * s5045 - s1641 * s5043 - s1642 * s5042 - s1643 * s5041
+    s5061 = s5060 - s1644 * s5040 - s1645 * s5039
+    s5062 = s1625 * s5047 - s1624 * s5055 - s1626 * s5045 - s1627 * s5043 - s1628 * s5042
+    s5063 = s3580 / pivot_hind_left_knee_angle_dot + s1603 * s5057 + s1604 * s5049 + s1605 * s5045
+    s5064 = s5063 + s1606 * s5043 + s1607 * s5042 + s1608 * s5041 + s1609 * s5040 + s1610 * s5039
+    s5065 = s1589 * s5051 - s1588 * s5059 - s1590 * s5045 - s1591 * s5043 - s1592 * s5042
+    s5066 = s1574 * s5053 - s1573 * s5061 - s1575 * s5045 - s1576 * s5043 - s1577 * s5042
+    s5067 = s1624 * s3648 - (s919 * s3652 + s921 * s3653 + s923 * s3654)
+    s5068 = s1625 * s3648 - (s15 * s3662 + s18 * s3663 + s21 * s3664) - s1693 * s5067
+    s5069 = s1626 * s3648 - (s17 * s3673 + s20 * s3674 + s23 * s3675) - s1694 * s5067
+    s5070 = s1627 * s3648 - (s16 * s3673 + s19 * s3674 + s22 * s3675) - s1695 * s5067
+    s5071 = s1628 * s3648 - (s15 * s3673 + s18 * s3674 + s21 * s3675) - s1696 * s5067
+    s5072 = s5069 - s1745 * s5068
+    s5073 = s5070 - s1746 * s5068 - s1756 * s5072
+    s5074 = s5071 - s1747 * s5068 - s1757 * s5072 - s1766 * s5073
+    s5075 = s1629 * s3648 - s3643 - s1697 * s5067 - s1748 * s5068 - s1758 * s5072 - s1767 * s5073
+    s5076 = s1630 * s3648 - s3642 - s1698 * s5067 - s1749 * s5068 - s1759 * s5072 - s1768 * s5073
+    s5077 = s1631 * s3648 - s3641 - s1699 * s5067 - s1750 * s5068 - s1760 * s5072 - s1769 * s5073
+    s5078 = s5075 - s1773 * s5074
+    s5079 = s5076 - s1774 * s5074 + s1781 * s5078
+    s5080 = (s5077 - s1775 * s5074 + s1782 * s5078 + s1784 * s5079) / pivot_trunk_x_dot
+    s5081 = s5079 / pivot_trunk_y_dot + s1784 * s5080
+    s5082 = s5078 / pivot_trunk_z_dot + s1781 * s5081 + s1782 * s5080
+    s5083 = s5074 / pivot_trunk_wx - s1773 * s5082 - s1774 * s5081 - s1775 * s5080
+    s5084 = s5073 / pivot_trunk_wy - s1766 * s5083 - s1767 * s5082 - s1768 * s5081 - s1769 * s5080
+    s5085 = s5072 / pivot_trunk_wz - s1756 * s5084 - s1757 * s5083 - s1758 * s5082 - s1759 * s5081
+    s5086 = s5085 - s1760 * s5080
+    s5087 = s5068 / pivot_hind_right_abduction_angle_dot - s1745 * s5086 - s1746 * s5084
+    s5088 = s5087 - s1747 * s5083 - s1748 * s5082 - s1749 * s5081 - s1750 * s5080
+    s5089 = s1739 * s5086 + s1740 * s5084 + s1741 * s5083 + s1742 * s5082 + s1743 * s5081
+    s5090 = s5089 + s1744 * s5080
+    s5091 = s1718 * s5086 + s1719 * s5084 + s1720 * s5083 + s1721 * s5082 + s1722 * s5081
+    s5092 = s5091 + s1723 * s5080
+    s5093 = s1712 * s5086 + s1713 * s5084 + s1714 * s5083 + s1715 * s5082 + s1716 * s5081
+    s5094 = s5093 + s1717 * s5080
+    s5095 = s5067 / pivot_hind_right_swing_angle_dot - s1693 * s5088 - s1694 * s5086 - s1695 * s5084
+    s5096 = s5095 - s1696 * s5083 - s1697 * s5082 - s1698 * s5081 - s1699 * s5080
+    s5097 = s1680 * s5090 - s1681 * s5086 - s1682 * s5084 - s1683 * s5083 - s1684 * s5082
+    s5098 = s5097 - s1685 * s5081 - s1686 * s5080
+    s5099 = s1667 * s5092 - s1668 * s5086 - s1669 * s5084 - s1670 * s5083 - s1671 * s5082
+    s5100 = s5099 - s1672 * s5081 - s1673 * s5080
+    s5101 = s1639 * s5094 - s1640 * s5086 - s1641 * s5084 - s1642 * s5083 - s1643 * s5082
+    s5102 = s5101 - s1644 * s5081 - s1645 * s5080
+    s5103 = s3648 / pivot_hind_right_knee_angle_dot + s1624 * s5096 + s1625 * s5088 + s1626 * s5086
+    s5104 = s5103 + s1627 * s5084 + s1628 * s5083 + s1629 * s5082 + s1630 * s5081 + s1631 * s5080
+    s5105 = s1604 * s5090 - s1603 * s5098 - s1605 * s5086 - s1606 * s5084 - s1607 * s5083
+    s5106 = s1589 * s5092 - s1588 * s5100 - s1590 * s5086 - s1591 * s5084 - s1592 * s5083
+    s5107 = s1574 * s5094 - s1573 * s5102 - s1575 * s5086 - s1576 * s5084 - s1577 * s5083
+    s5108 = -s898
+    s5109 = -s900
+    s5110 = -s899
+    s5111 = trunk_qx * 0.5
+    s5112 = -s5111
+    s5113 = trunk_qw * 0.5
+    s5114 = trunk_qz * 0.5
+    s5115 = trunk_qy * 0.5
+    s5116 = -s5115
+    s5117 = -s5114
     return (
         0.0,
         0.0,
@@ -7204,9 +7291,9 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s5122,
-        s5124,
-        s5123,
+        s5108,
+        s5110,
+        s5109,
         0.0,
         0.0,
         0.0,
@@ -7222,9 +7309,9 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s5126,
-        s5130,
-        s5131,
+        s5112,
+        s5116,
+        s5117,
         0.0,
         0.0,
         0.0,
@@ -7240,10 +7327,10 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s924,
+        s898,
         0.0,
-        s926,
-        s5124,
+        s900,
+        s5110,
         0.0,
         0.0,
         0.0,
@@ -7259,9 +7346,9 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s5127,
-        s5131,
-        s5129,
+        s5113,
+        s5117,
+        s5115,
         0.0,
         0.0,
         0.0,
@@ -7277,10 +7364,10 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s925,
-        s5123,
+        s899,
+        s5109,
         0.0,
-        s924,
+        s898,
         0.0,
         0.0,
         0.0,
@@ -7296,9 +7383,9 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s5128,
-        s5127,
-        s5126,
+        s5114,
+        s5113,
+        s5112,
         0.0,
         0.0,
         0.0,
@@ -7314,9 +7401,9 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s926,
-        s925,
-        s5122,
+        s900,
+        s899,
+        s5108,
         0.0,
         0.0,
         0.0,
@@ -7333,9 +7420,9 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s5130,
-        s5125,
-        s5127,
+        s5116,
+        s5111,
+        s5113,
         0.0,
         0.0,
         0.0,
@@ -7792,6 +7879,228 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         1.0,
+        0.0,
+        0.0,
+        0.0,
+        s3727,
+        s3785,
+        s3851,
+        s3909,
+        s3954,
+        s3996,
+        s4038,
+        s4080,
+        s4121,
+        s4162,
+        s4203,
+        s4244,
+        s4285,
+        s4326,
+        s4367,
+        s4408,
+        0.0,
+        0.0,
+        0.0,
+        s4465,
+        s4525,
+        s4585,
+        s4629,
+        s4670,
+        s4711,
+        s4752,
+        s4793,
+        s4834,
+        s4875,
+        s4916,
+        s4957,
+        s4998,
+        s5039,
+        s5080,
+        0.0,
+        0.0,
+        0.0,
+        s3728,
+        s3786,
+        s3852,
+        s3910,
+        s3955,
+        s3997,
+        s4039,
+        s4081,
+        s4122,
+        s4163,
+        s4204,
+        s4245,
+        s4286,
+        s4327,
+        s4368,
+        s4409,
+        0.0,
+        0.0,
+        0.0,
+        s4466,
+        s4526,
+        s4586,
+        s4630,
+        s4671,
+        s4712,
+        s4753,
+        s4794,
+        s4835,
+        s4876,
+        s4917,
+        s4958,
+        s4999,
+        s5040,
+        s5081,
+        0.0,
+        0.0,
+        0.0,
+        s3729,
+        s3787,
+        s3853,
+        s3911,
+        s3956,
+        s3998,
+        s4040,
+        s4082,
+        s4123,
+        s4164,
+        s4205,
+        s4246,
+        s4287,
+        s4328,
+        s4369,
+        s4410,
+        0.0,
+        0.0,
+        0.0,
+        s4467,
+        s4527,
+        s4587,
+        s4631,
+        s4672,
+        s4713,
+        s4754,
+        s4795,
+        s4836,
+        s4877,
+        s4918,
+        s4959,
+        s5000,
+        s5041,
+        s5082,
+        0.0,
+        0.0,
+        0.0,
+        s3730,
+        s3788,
+        s3854,
+        s3912,
+        s3957,
+        s3999,
+        s4041,
+        s4083,
+        s4124,
+        s4165,
+        s4206,
+        s4247,
+        s4288,
+        s4329,
+        s4370,
+        s4411,
+        0.0,
+        0.0,
+        0.0,
+        s4468,
+        s4528,
+        s4588,
+        s4632,
+        s4673,
+        s4714,
+        s4755,
+        s4796,
+        s4837,
+        s4878,
+        s4919,
+        s4960,
+        s5001,
+        s5042,
+        s5083,
+        0.0,
+        0.0,
+        0.0,
+        s3731,
+        s3789,
+        s3855,
+        s3913,
+        s3958,
+        s4000,
+        s4042,
+        s4084,
+        s4125,
+        s4166,
+        s4207,
+        s4248,
+        s4289,
+        s4330,
+        s4371,
+        s4412,
+        0.0,
+        0.0,
+        0.0,
+        s4469,
+        s4529,
+        s4589,
+        s4633,
+        s4674,
+        s4715,
+        s4756,
+        s4797,
+        s4838,
+        s4879,
+        s4920,
+        s4961,
+        s5002,
+        s5043,
+        s5084,
+        0.0,
+        0.0,
+        0.0,
+        s3733,
+        s3791,
+        s3857,
+        s3915,
+        s3960,
+        s4002,
+        s4044,
+        s4086,
+        s4127,
+        s4168,
+        s4209,
+        s4250,
+        s4291,
+        s4332,
+        s4373,
+        s4414,
+        0.0,
+        0.0,
+        0.0,
+        s4471,
+        s4531,
+        s4591,
+        s4635,
+        s4676,
+        s4717,
+        s4758,
+        s4799,
+        s4840,
+        s4881,
+        s4922,
+        s4963,
+        s5004,
+        s5045,
+        s5086,
         0.0,
         0.0,
         0.0,
@@ -7800,17 +8109,17 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         s3865,
         s3923,
         s3968,
-        s4010,
-        s4052,
-        s4094,
+        -s4010,
+        -s4052,
+        -s4094,
         s4135,
-        s4176,
-        s4217,
-        s4258,
+        -s4176,
+        -s4217,
+        -s4258,
         s4299,
-        s4340,
-        s4381,
-        s4422,
+        -s4340,
+        -s4381,
+        -s4422,
         0.0,
         0.0,
         0.0,
@@ -7818,165 +8127,165 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         s4539,
         s4599,
         s4643,
-        s4684,
-        s4725,
-        s4766,
+        -s4684,
+        -s4725,
+        -s4766,
         s4807,
-        s4848,
-        s4889,
-        s4930,
+        -s4848,
+        -s4889,
+        -s4930,
         s4971,
-        s5012,
-        s5053,
-        s5094,
+        -s5012,
+        -s5053,
+        -s5094,
         0.0,
         0.0,
         0.0,
-        s3742,
-        s3800,
-        s3866,
-        s3924,
-        s3969,
-        s4011,
-        s4053,
-        s4095,
-        s4136,
-        s4177,
-        s4218,
-        s4259,
-        s4300,
-        s4341,
-        s4382,
-        s4423,
+        s3739,
+        s3797,
+        s3863,
+        s3921,
+        -s3966,
+        s4008,
+        -s4050,
+        -s4092,
+        -s4133,
+        s4174,
+        -s4215,
+        -s4256,
+        -s4297,
+        s4338,
+        -s4379,
+        -s4420,
         0.0,
         0.0,
         0.0,
-        s4480,
-        s4540,
-        s4600,
-        s4644,
-        s4685,
-        s4726,
-        s4767,
-        s4808,
-        s4849,
-        s4890,
-        s4931,
-        s4972,
-        s5013,
-        s5054,
-        s5095,
+        s4477,
+        s4537,
+        s4597,
+        -s4641,
+        s4682,
+        -s4723,
+        -s4764,
+        -s4805,
+        s4846,
+        -s4887,
+        -s4928,
+        -s4969,
+        s5010,
+        -s5051,
+        -s5092,
         0.0,
         0.0,
         0.0,
-        s3743,
-        s3801,
-        s3867,
-        s3925,
-        s3970,
-        s4012,
-        s4054,
-        s4096,
-        s4137,
-        s4178,
-        s4219,
-        s4260,
-        s4301,
-        s4342,
-        s4383,
-        s4424,
+        s3737,
+        s3795,
+        s3861,
+        s3919,
+        -s3964,
+        -s4006,
+        s4048,
+        -s4090,
+        -s4131,
+        -s4172,
+        s4213,
+        -s4254,
+        -s4295,
+        -s4336,
+        s4377,
+        -s4418,
         0.0,
         0.0,
         0.0,
-        s4481,
-        s4541,
-        s4601,
-        s4645,
-        s4686,
-        s4727,
-        s4768,
-        s4809,
-        s4850,
-        s4891,
-        s4932,
-        s4973,
-        s5014,
-        s5055,
-        s5096,
+        s4475,
+        s4535,
+        s4595,
+        -s4639,
+        -s4680,
+        s4721,
+        -s4762,
+        -s4803,
+        -s4844,
+        s4885,
+        -s4926,
+        -s4967,
+        -s5008,
+        s5049,
+        -s5090,
         0.0,
         0.0,
         0.0,
-        s3744,
-        s3802,
-        s3868,
-        s3926,
-        s3971,
-        s4013,
-        s4055,
-        s4097,
-        s4138,
-        s4179,
-        s4220,
-        s4261,
-        s4302,
-        s4343,
-        s4384,
-        s4425,
+        s3735,
+        s3793,
+        s3859,
+        s3917,
+        -s3962,
+        -s4004,
+        -s4046,
+        s4088,
+        -s4129,
+        -s4170,
+        -s4211,
+        s4252,
+        -s4293,
+        -s4334,
+        -s4375,
+        s4416,
         0.0,
         0.0,
         0.0,
-        s4482,
-        s4542,
-        s4602,
-        s4646,
-        s4687,
-        s4728,
-        s4769,
-        s4810,
-        s4851,
-        s4892,
-        s4933,
-        s4974,
-        s5015,
-        s5056,
-        s5097,
+        s4473,
+        s4533,
+        s4593,
+        -s4637,
+        -s4678,
+        -s4719,
+        s4760,
+        -s4801,
+        -s4842,
+        -s4883,
+        s4924,
+        -s4965,
+        -s5006,
+        -s5047,
+        s5088,
         0.0,
         0.0,
         0.0,
-        s3745,
-        s3803,
-        s3869,
-        s3927,
-        s3972,
-        s4014,
-        s4056,
-        s4098,
-        s4139,
-        s4180,
-        s4221,
-        s4262,
-        s4303,
-        s4344,
-        s4385,
-        s4426,
+        s3749,
+        s3807,
+        s3873,
+        s3931,
+        s3976,
+        s4018,
+        s4060,
+        s4102,
+        s4143,
+        s4184,
+        s4225,
+        s4266,
+        s4307,
+        s4348,
+        s4389,
+        s4430,
         0.0,
         0.0,
         0.0,
-        s4483,
-        s4543,
-        s4603,
-        s4647,
-        s4688,
-        s4729,
-        s4770,
-        s4811,
-        s4852,
-        s4893,
-        s4934,
-        s4975,
-        s5016,
-        s5057,
-        s5098,
+        s4487,
+        s4547,
+        s4607,
+        s4651,
+        s4692,
+        s4733,
+        s4774,
+        s4815,
+        s4856,
+        s4897,
+        s4938,
+        s4979,
+        s5020,
+        s5061,
+        s5102,
         0.0,
         0.0,
         0.0,
@@ -8017,447 +8326,225 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        s3755,
-        s3813,
-        s3879,
-        s3937,
-        s3982,
-        -s4024,
-        -s4066,
-        -s4108,
-        s4149,
-        -s4190,
-        -s4231,
-        -s4272,
-        s4313,
-        -s4354,
-        -s4395,
-        -s4436,
+        s3745,
+        s3803,
+        s3869,
+        s3927,
+        s3972,
+        s4014,
+        s4056,
+        s4098,
+        s4139,
+        s4180,
+        s4221,
+        s4262,
+        s4303,
+        s4344,
+        s4385,
+        s4426,
         0.0,
         0.0,
         0.0,
-        s4493,
-        s4553,
-        s4613,
-        s4657,
-        -s4698,
-        -s4739,
-        -s4780,
-        s4821,
-        -s4862,
-        -s4903,
-        -s4944,
-        s4985,
-        -s5026,
-        -s5067,
-        -s5108,
+        s4483,
+        s4543,
+        s4603,
+        s4647,
+        s4688,
+        s4729,
+        s4770,
+        s4811,
+        s4852,
+        s4893,
+        s4934,
+        s4975,
+        s5016,
+        s5057,
+        s5098,
         0.0,
         0.0,
         0.0,
-        s3753,
-        s3811,
-        s3877,
-        s3935,
-        -s3980,
-        s4022,
-        -s4064,
-        -s4106,
-        -s4147,
-        s4188,
-        -s4229,
-        -s4270,
-        -s4311,
-        s4352,
-        -s4393,
-        -s4434,
+        s3743,
+        s3801,
+        s3867,
+        s3925,
+        s3970,
+        s4012,
+        s4054,
+        s4096,
+        s4137,
+        s4178,
+        s4219,
+        s4260,
+        s4301,
+        s4342,
+        s4383,
+        s4424,
         0.0,
         0.0,
         0.0,
-        s4491,
-        s4551,
-        s4611,
-        -s4655,
-        s4696,
-        -s4737,
-        -s4778,
-        -s4819,
-        s4860,
-        -s4901,
-        -s4942,
-        -s4983,
-        s5024,
-        -s5065,
-        -s5106,
+        s4481,
+        s4541,
+        s4601,
+        s4645,
+        s4686,
+        s4727,
+        s4768,
+        s4809,
+        s4850,
+        s4891,
+        s4932,
+        s4973,
+        s5014,
+        s5055,
+        s5096,
         0.0,
         0.0,
         0.0,
-        s3751,
-        s3809,
-        s3875,
-        s3933,
-        -s3978,
-        -s4020,
-        s4062,
+        s3753 - s1576 * s3731 - s1577 * s3730 - s1578 * s3729 - s1579 * s3728 - s1580 * s3727,
+        -s3815,
+        s3877 - s1576 * s3855 - s1577 * s3854 - s1578 * s3853 - s1579 * s3852 - s1580 * s3851,
+        -s3939,
+        -s3981,
+        s4023 - s1578 * s3998 - s1579 * s3997 - s1580 * s3996,
+        s4065 - s1578 * s4040 - s1579 * s4039 - s1580 * s4038,
+        s4107 - s1578 * s4082 - s1579 * s4081 - s1580 * s4080,
+        -s4148,
+        s4189 - s1578 * s4164 - s1579 * s4163 - s1580 * s4162,
+        s4230 - s1578 * s4205 - s1579 * s4204 - s1580 * s4203,
+        s4271 - s1578 * s4246 - s1579 * s4245 - s1580 * s4244,
+        -s4312,
+        s4353 - s1578 * s4328 - s1579 * s4327 - s1580 * s4326,
+        s4394 - s1578 * s4369 - s1579 * s4368 - s1580 * s4367,
+        s4435 - s1578 * s4410 - s1579 * s4409 - s1580 * s4408,
+        0.0,
+        0.0,
+        0.0,
+        -s4495,
+        -s4555,
+        -s4615,
+        -s4656,
+        s4697 - s1578 * s4672 - s1579 * s4671 - s1580 * s4670,
+        s4738 - s1578 * s4713 - s1579 * s4712 - s1580 * s4711,
+        s4779 - s1578 * s4754 - s1579 * s4753 - s1580 * s4752,
+        -s4820,
+        s4861 - s1578 * s4836 - s1579 * s4835 - s1580 * s4834,
+        s4902 - s1578 * s4877 - s1579 * s4876 - s1580 * s4875,
+        s4943 - s1578 * s4918 - s1579 * s4917 - s1580 * s4916,
+        -s4984,
+        s5025 - s1578 * s5000 - s1579 * s4999 - s1580 * s4998,
+        s5066 - s1578 * s5041 - s1579 * s5040 - s1580 * s5039,
+        s5107 - s1578 * s5082 - s1579 * s5081 - s1580 * s5080,
+        0.0,
+        0.0,
+        0.0,
+        s3752 - s1591 * s3731 - s1592 * s3730 - s1593 * s3729 - s1594 * s3728 - s1595 * s3727,
+        -s3813,
+        s3876 - s1591 * s3855 - s1592 * s3854 - s1593 * s3853 - s1594 * s3852 - s1595 * s3851,
+        -s3937,
+        s3979 - s1593 * s3956 - s1594 * s3955 - s1595 * s3954,
+        -s4022,
+        s4064 - s1593 * s4040 - s1594 * s4039 - s1595 * s4038,
+        s4106 - s1593 * s4082 - s1594 * s4081 - s1595 * s4080,
+        s4146 - s1593 * s4123 - s1594 * s4122 - s1595 * s4121,
+        -s4188,
+        s4229 - s1593 * s4205 - s1594 * s4204 - s1595 * s4203,
+        s4270 - s1593 * s4246 - s1594 * s4245 - s1595 * s4244,
+        s4310 - s1593 * s4287 - s1594 * s4286 - s1595 * s4285,
+        -s4352,
+        s4393 - s1593 * s4369 - s1594 * s4368 - s1595 * s4367,
+        s4434 - s1593 * s4410 - s1594 * s4409 - s1595 * s4408,
+        0.0,
+        0.0,
+        0.0,
+        -s4493,
+        -s4553,
+        -s4613,
+        s4654 - s1593 * s4631 - s1594 * s4630 - s1595 * s4629,
+        -s4696,
+        s4737 - s1593 * s4713 - s1594 * s4712 - s1595 * s4711,
+        s4778 - s1593 * s4754 - s1594 * s4753 - s1595 * s4752,
+        s4818 - s1593 * s4795 - s1594 * s4794 - s1595 * s4793,
+        -s4860,
+        s4901 - s1593 * s4877 - s1594 * s4876 - s1595 * s4875,
+        s4942 - s1593 * s4918 - s1594 * s4917 - s1595 * s4916,
+        s4982 - s1593 * s4959 - s1594 * s4958 - s1595 * s4957,
+        -s5024,
+        s5065 - s1593 * s5041 - s1594 * s5040 - s1595 * s5039,
+        s5106 - s1593 * s5082 - s1594 * s5081 - s1595 * s5080,
+        0.0,
+        0.0,
+        0.0,
+        s3751 - s1606 * s3731 - s1607 * s3730 - s1608 * s3729 - s1609 * s3728 - s1610 * s3727,
+        -s3811,
+        s3875 - s1606 * s3855 - s1607 * s3854 - s1608 * s3853 - s1609 * s3852 - s1610 * s3851,
+        -s3935,
+        s3978 - s1608 * s3956 - s1609 * s3955 - s1610 * s3954,
+        s4020 - s1608 * s3998 - s1609 * s3997 - s1610 * s3996,
+        -s4063,
+        s4105 - s1608 * s4082 - s1609 * s4081 - s1610 * s4080,
+        s4145 - s1608 * s4123 - s1609 * s4122 - s1610 * s4121,
+        s4186 - s1608 * s4164 - s1609 * s4163 - s1610 * s4162,
+        -s4228,
+        s4269 - s1608 * s4246 - s1609 * s4245 - s1610 * s4244,
+        s4309 - s1608 * s4287 - s1609 * s4286 - s1610 * s4285,
+        s4350 - s1608 * s4328 - s1609 * s4327 - s1610 * s4326,
+        -s4392,
+        s4433 - s1608 * s4410 - s1609 * s4409 - s1610 * s4408,
+        0.0,
+        0.0,
+        0.0,
+        -s4491,
+        -s4551,
+        -s4611,
+        s4653 - s1608 * s4631 - s1609 * s4630 - s1610 * s4629,
+        s4694 - s1608 * s4672 - s1609 * s4671 - s1610 * s4670,
+        -s4736,
+        s4777 - s1608 * s4754 - s1609 * s4753 - s1610 * s4752,
+        s4817 - s1608 * s4795 - s1609 * s4794 - s1610 * s4793,
+        s4858 - s1608 * s4836 - s1609 * s4835 - s1610 * s4834,
+        -s4900,
+        s4941 - s1608 * s4918 - s1609 * s4917 - s1610 * s4916,
+        s4981 - s1608 * s4959 - s1609 * s4958 - s1610 * s4957,
+        s5022 - s1608 * s5000 - s1609 * s4999 - s1610 * s4998,
+        -s5064,
+        s5105 - s1608 * s5082 - s1609 * s5081 - s1610 * s5080,
+        0.0,
+        0.0,
+        0.0,
+        s3750 - s1627 * s3731 - s1628 * s3730 - s1629 * s3729 - s1630 * s3728 - s1631 * s3727,
+        -s3809,
+        s3874 - s1627 * s3855 - s1628 * s3854 - s1629 * s3853 - s1630 * s3852 - s1631 * s3851,
+        -s3933,
+        s3977 - s1629 * s3956 - s1630 * s3955 - s1631 * s3954,
+        s4019 - s1629 * s3998 - s1630 * s3997 - s1631 * s3996,
+        s4061 - s1629 * s4040 - s1630 * s4039 - s1631 * s4038,
         -s4104,
-        -s4145,
-        -s4186,
-        s4227,
+        s4144 - s1629 * s4123 - s1630 * s4122 - s1631 * s4121,
+        s4185 - s1629 * s4164 - s1630 * s4163 - s1631 * s4162,
+        s4226 - s1629 * s4205 - s1630 * s4204 - s1631 * s4203,
         -s4268,
-        -s4309,
-        -s4350,
-        s4391,
+        s4308 - s1629 * s4287 - s1630 * s4286 - s1631 * s4285,
+        s4349 - s1629 * s4328 - s1630 * s4327 - s1631 * s4326,
+        s4390 - s1629 * s4369 - s1630 * s4368 - s1631 * s4367,
         -s4432,
         0.0,
         0.0,
         0.0,
-        s4489,
-        s4549,
-        s4609,
-        -s4653,
-        -s4694,
-        s4735,
+        -s4489,
+        -s4549,
+        -s4609,
+        s4652 - s1629 * s4631 - s1630 * s4630 - s1631 * s4629,
+        s4693 - s1629 * s4672 - s1630 * s4671 - s1631 * s4670,
+        s4734 - s1629 * s4713 - s1630 * s4712 - s1631 * s4711,
         -s4776,
-        -s4817,
-        -s4858,
-        s4899,
+        s4816 - s1629 * s4795 - s1630 * s4794 - s1631 * s4793,
+        s4857 - s1629 * s4836 - s1630 * s4835 - s1631 * s4834,
+        s4898 - s1629 * s4877 - s1630 * s4876 - s1631 * s4875,
         -s4940,
-        -s4981,
-        -s5022,
-        s5063,
+        s4980 - s1629 * s4959 - s1630 * s4958 - s1631 * s4957,
+        s5021 - s1629 * s5000 - s1630 * s4999 - s1631 * s4998,
+        s5062 - s1629 * s5041 - s1630 * s5040 - s1631 * s5039,
         -s5104,
-        0.0,
-        0.0,
-        0.0,
-        s3749,
-        s3807,
-        s3873,
-        s3931,
-        -s3976,
-        -s4018,
-        -s4060,
-        s4102,
-        -s4143,
-        -s4184,
-        -s4225,
-        s4266,
-        -s4307,
-        -s4348,
-        -s4389,
-        s4430,
-        0.0,
-        0.0,
-        0.0,
-        s4487,
-        s4547,
-        s4607,
-        -s4651,
-        -s4692,
-        -s4733,
-        s4774,
-        -s4815,
-        -s4856,
-        -s4897,
-        s4938,
-        -s4979,
-        -s5020,
-        -s5061,
-        s5102,
-        0.0,
-        0.0,
-        0.0,
-        s3763,
-        s3821,
-        s3887,
-        s3945,
-        s3990,
-        s4032,
-        s4074,
-        s4116,
-        s4157,
-        s4198,
-        s4239,
-        s4280,
-        s4321,
-        s4362,
-        s4403,
-        s4444,
-        0.0,
-        0.0,
-        0.0,
-        s4501,
-        s4561,
-        s4621,
-        s4665,
-        s4706,
-        s4747,
-        s4788,
-        s4829,
-        s4870,
-        s4911,
-        s4952,
-        s4993,
-        s5034,
-        s5075,
-        s5116,
-        0.0,
-        0.0,
-        0.0,
-        s3761,
-        s3819,
-        s3885,
-        s3943,
-        s3988,
-        s4030,
-        s4072,
-        s4114,
-        s4155,
-        s4196,
-        s4237,
-        s4278,
-        s4319,
-        s4360,
-        s4401,
-        s4442,
-        0.0,
-        0.0,
-        0.0,
-        s4499,
-        s4559,
-        s4619,
-        s4663,
-        s4704,
-        s4745,
-        s4786,
-        s4827,
-        s4868,
-        s4909,
-        s4950,
-        s4991,
-        s5032,
-        s5073,
-        s5114,
-        0.0,
-        0.0,
-        0.0,
-        s3759,
-        s3817,
-        s3883,
-        s3941,
-        s3986,
-        s4028,
-        s4070,
-        s4112,
-        s4153,
-        s4194,
-        s4235,
-        s4276,
-        s4317,
-        s4358,
-        s4399,
-        s4440,
-        0.0,
-        0.0,
-        0.0,
-        s4497,
-        s4557,
-        s4617,
-        s4661,
-        s4702,
-        s4743,
-        s4784,
-        s4825,
-        s4866,
-        s4907,
-        s4948,
-        s4989,
-        s5030,
-        s5071,
-        s5112,
-        0.0,
-        0.0,
-        0.0,
-        s3757,
-        s3815,
-        s3881,
-        s3939,
-        s3984,
-        s4026,
-        s4068,
-        s4110,
-        s4151,
-        s4192,
-        s4233,
-        s4274,
-        s4315,
-        s4356,
-        s4397,
-        s4438,
-        0.0,
-        0.0,
-        0.0,
-        s4495,
-        s4555,
-        s4615,
-        s4659,
-        s4700,
-        s4741,
-        s4782,
-        s4823,
-        s4864,
-        s4905,
-        s4946,
-        s4987,
-        s5028,
-        s5069,
-        s5110,
-        0.0,
-        0.0,
-        0.0,
-        s3767 - s1602 * s3745 - s1603 * s3744 - s1604 * s3743 - s1605 * s3742 - s1606 * s3741,
-        -s3829,
-        s3891 - s1602 * s3869 - s1603 * s3868 - s1604 * s3867 - s1605 * s3866 - s1606 * s3865,
-        -s3953,
-        -s3995,
-        s4037 - s1604 * s4012 - s1605 * s4011 - s1606 * s4010,
-        s4079 - s1604 * s4054 - s1605 * s4053 - s1606 * s4052,
-        s4121 - s1604 * s4096 - s1605 * s4095 - s1606 * s4094,
-        -s4162,
-        s4203 - s1604 * s4178 - s1605 * s4177 - s1606 * s4176,
-        s4244 - s1604 * s4219 - s1605 * s4218 - s1606 * s4217,
-        s4285 - s1604 * s4260 - s1605 * s4259 - s1606 * s4258,
-        -s4326,
-        s4367 - s1604 * s4342 - s1605 * s4341 - s1606 * s4340,
-        s4408 - s1604 * s4383 - s1605 * s4382 - s1606 * s4381,
-        s4449 - s1604 * s4424 - s1605 * s4423 - s1606 * s4422,
-        0.0,
-        0.0,
-        0.0,
-        -s4509,
-        -s4569,
-        -s4629,
-        -s4670,
-        s4711 - s1604 * s4686 - s1605 * s4685 - s1606 * s4684,
-        s4752 - s1604 * s4727 - s1605 * s4726 - s1606 * s4725,
-        s4793 - s1604 * s4768 - s1605 * s4767 - s1606 * s4766,
-        -s4834,
-        s4875 - s1604 * s4850 - s1605 * s4849 - s1606 * s4848,
-        s4916 - s1604 * s4891 - s1605 * s4890 - s1606 * s4889,
-        s4957 - s1604 * s4932 - s1605 * s4931 - s1606 * s4930,
-        -s4998,
-        s5039 - s1604 * s5014 - s1605 * s5013 - s1606 * s5012,
-        s5080 - s1604 * s5055 - s1605 * s5054 - s1606 * s5053,
-        s5121 - s1604 * s5096 - s1605 * s5095 - s1606 * s5094,
-        0.0,
-        0.0,
-        0.0,
-        s3766 - s1617 * s3745 - s1618 * s3744 - s1619 * s3743 - s1620 * s3742 - s1621 * s3741,
-        -s3827,
-        s3890 - s1617 * s3869 - s1618 * s3868 - s1619 * s3867 - s1620 * s3866 - s1621 * s3865,
-        -s3951,
-        s3993 - s1619 * s3970 - s1620 * s3969 - s1621 * s3968,
-        -s4036,
-        s4078 - s1619 * s4054 - s1620 * s4053 - s1621 * s4052,
-        s4120 - s1619 * s4096 - s1620 * s4095 - s1621 * s4094,
-        s4160 - s1619 * s4137 - s1620 * s4136 - s1621 * s4135,
-        -s4202,
-        s4243 - s1619 * s4219 - s1620 * s4218 - s1621 * s4217,
-        s4284 - s1619 * s4260 - s1620 * s4259 - s1621 * s4258,
-        s4324 - s1619 * s4301 - s1620 * s4300 - s1621 * s4299,
-        -s4366,
-        s4407 - s1619 * s4383 - s1620 * s4382 - s1621 * s4381,
-        s4448 - s1619 * s4424 - s1620 * s4423 - s1621 * s4422,
-        0.0,
-        0.0,
-        0.0,
-        -s4507,
-        -s4567,
-        -s4627,
-        s4668 - s1619 * s4645 - s1620 * s4644 - s1621 * s4643,
-        -s4710,
-        s4751 - s1619 * s4727 - s1620 * s4726 - s1621 * s4725,
-        s4792 - s1619 * s4768 - s1620 * s4767 - s1621 * s4766,
-        s4832 - s1619 * s4809 - s1620 * s4808 - s1621 * s4807,
-        -s4874,
-        s4915 - s1619 * s4891 - s1620 * s4890 - s1621 * s4889,
-        s4956 - s1619 * s4932 - s1620 * s4931 - s1621 * s4930,
-        s4996 - s1619 * s4973 - s1620 * s4972 - s1621 * s4971,
-        -s5038,
-        s5079 - s1619 * s5055 - s1620 * s5054 - s1621 * s5053,
-        s5120 - s1619 * s5096 - s1620 * s5095 - s1621 * s5094,
-        0.0,
-        0.0,
-        0.0,
-        s3765 - s1632 * s3745 - s1633 * s3744 - s1634 * s3743 - s1635 * s3742 - s1636 * s3741,
-        -s3825,
-        s3889 - s1632 * s3869 - s1633 * s3868 - s1634 * s3867 - s1635 * s3866 - s1636 * s3865,
-        -s3949,
-        s3992 - s1634 * s3970 - s1635 * s3969 - s1636 * s3968,
-        s4034 - s1634 * s4012 - s1635 * s4011 - s1636 * s4010,
-        -s4077,
-        s4119 - s1634 * s4096 - s1635 * s4095 - s1636 * s4094,
-        s4159 - s1634 * s4137 - s1635 * s4136 - s1636 * s4135,
-        s4200 - s1634 * s4178 - s1635 * s4177 - s1636 * s4176,
-        -s4242,
-        s4283 - s1634 * s4260 - s1635 * s4259 - s1636 * s4258,
-        s4323 - s1634 * s4301 - s1635 * s4300 - s1636 * s4299,
-        s4364 - s1634 * s4342 - s1635 * s4341 - s1636 * s4340,
-        -s4406,
-        s4447 - s1634 * s4424 - s1635 * s4423 - s1636 * s4422,
-        0.0,
-        0.0,
-        0.0,
-        -s4505,
-        -s4565,
-        -s4625,
-        s4667 - s1634 * s4645 - s1635 * s4644 - s1636 * s4643,
-        s4708 - s1634 * s4686 - s1635 * s4685 - s1636 * s4684,
-        -s4750,
-        s4791 - s1634 * s4768 - s1635 * s4767 - s1636 * s4766,
-        s4831 - s1634 * s4809 - s1635 * s4808 - s1636 * s4807,
-        s4872 - s1634 * s4850 - s1635 * s4849 - s1636 * s4848,
-        -s4914,
-        s4955 - s1634 * s4932 - s1635 * s4931 - s1636 * s4930,
-        s4995 - s1634 * s4973 - s1635 * s4972 - s1636 * s4971,
-        s5036 - s1634 * s5014 - s1635 * s5013 - s1636 * s5012,
-        -s5078,
-        s5119 - s1634 * s5096 - s1635 * s5095 - s1636 * s5094,
-        0.0,
-        0.0,
-        0.0,
-        s3764 - s1653 * s3745 - s1654 * s3744 - s1655 * s3743 - s1656 * s3742 - s1657 * s3741,
-        -s3823,
-        s3888 - s1653 * s3869 - s1654 * s3868 - s1655 * s3867 - s1656 * s3866 - s1657 * s3865,
-        -s3947,
-        s3991 - s1655 * s3970 - s1656 * s3969 - s1657 * s3968,
-        s4033 - s1655 * s4012 - s1656 * s4011 - s1657 * s4010,
-        s4075 - s1655 * s4054 - s1656 * s4053 - s1657 * s4052,
-        -s4118,
-        s4158 - s1655 * s4137 - s1656 * s4136 - s1657 * s4135,
-        s4199 - s1655 * s4178 - s1656 * s4177 - s1657 * s4176,
-        s4240 - s1655 * s4219 - s1656 * s4218 - s1657 * s4217,
-        -s4282,
-        s4322 - s1655 * s4301 - s1656 * s4300 - s1657 * s4299,
-        s4363 - s1655 * s4342 - s1656 * s4341 - s1657 * s4340,
-        s4404 - s1655 * s4383 - s1656 * s4382 - s1657 * s4381,
-        -s4446,
-        0.0,
-        0.0,
-        0.0,
-        -s4503,
-        -s4563,
-        -s4623,
-        s4666 - s1655 * s4645 - s1656 * s4644 - s1657 * s4643,
-        s4707 - s1655 * s4686 - s1656 * s4685 - s1657 * s4684,
-        s4748 - s1655 * s4727 - s1656 * s4726 - s1657 * s4725,
-        -s4790,
-        s4830 - s1655 * s4809 - s1656 * s4808 - s1657 * s4807,
-        s4871 - s1655 * s4850 - s1656 * s4849 - s1657 * s4848,
-        s4912 - s1655 * s4891 - s1656 * s4890 - s1657 * s4889,
-        -s4954,
-        s4994 - s1655 * s4973 - s1656 * s4972 - s1657 * s4971,
-        s5035 - s1655 * s5014 - s1656 * s5013 - s1657 * s5012,
-        s5076 - s1655 * s5055 - s1656 * s5054 - s1657 * s5053,
-        -s5118,
     )
 
 
@@ -8651,7 +8738,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and hypot(*state) < reach:
                 return _from(values, _FLOAT, 37)
         except (ArithmeticError, ValueError):

@@ -249,6 +249,48 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
+def _refused(m, I, stream, k_, steer, margin, reach, place_1_r_parent_x, place_1_r_parent_y, place_2_r_parent_x, place_2_r_parent_y, place_3_r_parent_x, place_3_r_parent_y, place_4_r_parent_x, place_4_r_parent_y, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = margin + 0.35
+    k2 = margin + 0.4
+    k3 = margin + 0.45
+    if not k_ >= 0.0:
+        return 'parameters k: effects[0].linear: {:g} is negative; give a number >= 0 in N s/m'.format(k_)
+    if not steer >= 0.0:
+        return 'parameters steer: effects[1].steering: {:g} is negative; give a number >= 0 in kg/m'.format(steer)
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters margin: effects[1].radius: {:g} is larger than 1e+100; choose other units'.format(k1)
+    if not k1 >= 0.0:
+        return 'parameters margin: effects[1].radius: {:g} is negative; give a number >= 0 in m'.format(k1)
+    if not reach > 0.0:
+        return 'parameters reach: effects[1].reach: {:g} is not positive; give a number > 0 in m'.format(reach)
+    if not steer >= 0.0:
+        return 'parameters steer: effects[2].steering: {:g} is negative; give a number >= 0 in kg/m'.format(steer)
+    if not -1e+100 <= k2 <= 1e+100:
+        return 'parameters margin: effects[2].radius: {:g} is larger than 1e+100; choose other units'.format(k2)
+    if not k2 >= 0.0:
+        return 'parameters margin: effects[2].radius: {:g} is negative; give a number >= 0 in m'.format(k2)
+    if not reach > 0.0:
+        return 'parameters reach: effects[2].reach: {:g} is not positive; give a number > 0 in m'.format(reach)
+    if not steer >= 0.0:
+        return 'parameters steer: effects[3].steering: {:g} is negative; give a number >= 0 in kg/m'.format(steer)
+    if not -1e+100 <= k3 <= 1e+100:
+        return 'parameters margin: effects[3].radius: {:g} is larger than 1e+100; choose other units'.format(k3)
+    if not k3 >= 0.0:
+        return 'parameters margin: effects[3].radius: {:g} is negative; give a number >= 0 in m'.format(k3)
+    if not reach > 0.0:
+        return 'parameters reach: effects[3].reach: {:g} is not positive; give a number > 0 in m'.format(reach)
+    if not steer >= 0.0:
+        return 'parameters steer: effects[4].steering: {:g} is negative; give a number >= 0 in kg/m'.format(steer)
+    if not -1e+100 <= k2 <= 1e+100:
+        return 'parameters margin: effects[4].radius: {:g} is larger than 1e+100; choose other units'.format(k2)
+    if not k2 >= 0.0:
+        return 'parameters margin: effects[4].radius: {:g} is negative; give a number >= 0 in m'.format(k2)
+    if not reach > 0.0:
+        return 'parameters reach: effects[4].reach: {:g} is not positive; give a number > 0 in m'.format(reach)
+    return None
+
+
 def _fixed(m, I, stream, k_, steer, margin, reach, place_1_r_parent_x, place_1_r_parent_y, place_2_r_parent_x, place_2_r_parent_y, place_3_r_parent_x, place_3_r_parent_y, place_4_r_parent_x, place_4_r_parent_y, avoid_1_center_x, avoid_1_center_y, avoid_2_center_x, avoid_2_center_y, avoid_3_center_x, avoid_3_center_y, avoid_4_center_x, avoid_4_center_y):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m > 0.0:
@@ -295,10 +337,17 @@ def _fixed(m, I, stream, k_, steer, margin, reach, place_1_r_parent_x, place_1_r
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -313,7 +362,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -4034,7 +4085,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and hypot(*state) < reach:
                 return _from(values, _FLOAT, 42)
         except (ArithmeticError, ValueError):

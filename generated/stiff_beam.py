@@ -310,6 +310,23 @@ def select(c, a, b):
     return a if c > 0.0 else b
 
 
+def _refused(h, m, EI, load):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = m / 2.0
+    k2 = EI / h
+    if not -1e+100 <= k1 <= 1e+100:
+        return 'parameters m: chains[1].mass: {:g} is larger than 1e+100; choose other units'.format(k1)
+    if not -1e+100 <= k2 <= 1e+100:
+        return 'parameters EI, h: effects[0].stiffness: {:g} is larger than 1e+100; choose other units'.format(k2)
+    if not k2 >= 0.0:
+        return 'parameters EI, h: effects[0].stiffness: {:g} is negative; give a number >= 0 in N m/rad'.format(k2)
+    if not -1e+100 <= k2 <= 1e+100:
+        return 'parameters EI, h: effects[1].stiffness: {:g} is larger than 1e+100; choose other units'.format(k2)
+    if not k2 >= 0.0:
+        return 'parameters EI, h: effects[1].stiffness: {:g} is negative; give a number >= 0 in N m/rad'.format(k2)
+    return None
+
+
 def _fixed(h, m, EI, load):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m > 0.0:
@@ -410,10 +427,17 @@ def _fixed(h, m, EI, load):
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -428,7 +452,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -4385,7 +4411,7 @@ def derivative(t, y, p=None, u=None):
             made = _parameters(p)
             k, reach = made["derivative"], made["reach"]
         try:
-            values = _derivative(y.tolist(), k, _NO_INPUT, t=t if t.__class__ is float else _time(t))
+            values = _derivative(y.tolist(), k, t=t if t.__class__ is float else _time(t))
             if hypot(*values) < reach:
                 return _from(values, _FLOAT, 80)
         except (ArithmeticError, ValueError):

@@ -122,6 +122,15 @@ COST = {
 }
 
 
+def _refused(m, I_1, I_2, I_3, stem_at_y):
+    """What the scene would refuse in these parameters, in words; or nothing."""
+    k1 = I_1 + I_2
+    k2 = 5e-10 * (I_3 + k1)
+    if not min(min(I_2 + I_3 + k2 - I_1, k2 + (I_1 + I_3) - I_2), k1 + k2 - I_3) >= 0.0:
+        return "parameters I_2, I_3, I_1: bodies[0].inertia_com: body 'nut' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_1, I_2, I_3)
+    return None
+
+
 def _fixed(m, I_1, I_2, I_3, stem_at_y):
     """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
     if not m > 0.0:
@@ -178,10 +187,17 @@ def _fixed(m, I_1, I_2, I_3, stem_at_y):
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
+    try:
+        made = _refused(*values.tolist())
+    except (ArithmeticError, ValueError):
+        made = "a formula has no value: change the parameters"
+    if made:
+        raise ValueError(made)
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
@@ -196,7 +212,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -1115,7 +1133,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and -reach < state[0] + state[1] + state[2] < reach:
                 return _from(values, _FLOAT, 13)
         except (ArithmeticError, ValueError):

@@ -223,8 +223,9 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g):
 def _constants(key):
     """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
 
-    `reach` is how large states and results may be without a thought of overflow; with constants
-    so large or so small that any product may be lost, it is 0.
+    `reach` is how large states and results may be without a thought of overflow. It is 0 if
+    parameters or constants are so large or small that a product may be lost; not for the constants
+    near 1e-200 that weigh what must never count.
     """
     values = np.frombuffer(key) if key else np.empty(0)
     try:
@@ -241,7 +242,9 @@ def _constants(key):
         made = f"a formula has no value ({error})"
     if made.__class__ is str:
         raise ValueError(f"{made}: change the parameters")
-    usual = all(1e-100 < abs(value) < 1e100 for k in made.values() for value in k if value)
+    sizes = [abs(value) for k in made.values() for value in k if not 1e-240 < abs(value) < 1e-160]
+    usual = all(1e-60 < abs(value) < 1e60 for value in values if value)
+    usual = usual and all(1e-100 < size < 1e100 for size in sizes if size)
     return {**made, "reach": 1e20 if usual else 0.0}
 
 
@@ -981,7 +984,7 @@ def derivative(t, y, p=None, u=None):
             k, reach = made["derivative"], made["reach"]
         try:
             state = y.tolist()
-            values = _derivative(state, k, _NO_INPUT)
+            values = _derivative(state, k)
             if hypot(*values) < reach and -reach < state[0] + state[1] < reach:
                 return _from(values, _FLOAT, 8)
         except (ArithmeticError, ValueError):

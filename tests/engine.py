@@ -11,6 +11,7 @@ import pytest
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.language.digits import MP, Digits, exact
+from eomgen.language.formula import names_in
 from eomgen.model import Model
 from eomgen.program import from_recursion as recording
 from eomgen.program.digits import evaluator
@@ -22,7 +23,19 @@ from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Scene
 from eomgen.study.states import random_state
 
-__all__ = ["MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "quick", "read"]
+__all__ = [
+    "MP",
+    "STEP",
+    "Digits",
+    "Engine",
+    "along",
+    "apart",
+    "engine",
+    "exact",
+    "quick",
+    "read",
+    "varied",
+]
 
 STEP = MP.mpf(10) ** -20
 """Of central differences, which are off by its square."""
@@ -75,6 +88,16 @@ class Engine:
     def random_inputs(self, rng: np.random.Generator) -> dict[str, float]:
         """A value for every input."""
         return {name: float(rng.uniform(-9.0, 9.0)) for name in self.module.INPUTS}
+
+
+def varied(model: Model, rng: np.random.Generator, least: float, most: float) -> dict[str, float]:
+    """Each parameter times a factor of its own; but those that break a condition together, those of
+    a lamina for example, stay as they are.
+    """
+    p = {x.name: x.default * float(rng.uniform(least, most)) for x in model.parameters}
+    while broken := [c for c in model.conditions if c.problem(p)]:
+        p |= {name: model.defaults[name] for c in broken for name in names_in(c.value)}
+    return p
 
 
 def read(scene: str) -> Scene:

@@ -80,7 +80,8 @@ class Failure(AssertionError):
 
 
 @cache
-def _texts() -> tuple[str, ...]:
+def texts() -> tuple[str, ...]:
+    """The built-in scenes that are changed."""
     every = (find_scene(name).read_text() for name in built_in_names())
     return tuple(text for text in every if len(text) < LONGEST)
 
@@ -88,7 +89,7 @@ def _texts() -> tuple[str, ...]:
 def scene(number: int) -> str:
     """The scene of a number."""
     r = random.Random(number)
-    text = r.choice(_texts())
+    text = r.choice(texts())
     for _ in range(r.choice((1, 1, 1, 2, 3, 6))):
         text = r.choice(CHANGES)(text, r)
     return text
@@ -114,7 +115,7 @@ def _lines(text: str, r: random.Random) -> str:
         case 2:
             lines[i], lines[j] = lines[j], lines[i]
         case _:
-            lines.insert(i, r.choice(r.choice(_texts()).split("\n")))
+            lines.insert(i, r.choice(r.choice(texts()).split("\n")))
     return "\n".join(lines)
 
 
@@ -124,7 +125,7 @@ def _values(text: str, r: random.Random) -> str:
 
 def _words(text: str, r: random.Random) -> str:
     """A word, in a formula or a name or a key, becomes another one of some scene."""
-    words = re.findall(r"[A-Za-z_]\w*", r.choice(_texts()))
+    words = re.findall(r"[A-Za-z_]\w*", r.choice(texts()))
     return _replaced(text, r, r"\b([A-Za-z_]\w*)\b", r.choice(words))
 
 
@@ -211,7 +212,7 @@ def _check_message(error: SceneError) -> None:
 @cache
 def _listening() -> None:
     """Hear what scenes bring about, once all that is imported late has been."""
-    for text in _texts():
+    for text in texts():
         build_model(parse_scene(text))
     for value in VALUES:
         outcome(f'name = "x"\nbodies = [{{name = "a", mass = {value}, inertia_com = 1}}]')

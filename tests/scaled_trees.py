@@ -1,5 +1,6 @@
 """Random trees with parameters over many decades, and what their data let one know of v̇."""
 
+import math
 import random
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,15 +11,17 @@ from engine import MP
 from spatial_trees import random_spatial_tree
 
 from eomgen.build import build_model
-from eomgen.derivation.recursive.digits import digits_lost
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import ArrayScalars
+from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.language.digits import Bits, out_of_bits, sixty_digits
 from eomgen.language.formula import Constant
 from eomgen.model import Model
-from eomgen.program.route import MOST_LOST, MOST_LOST_OF_ALL
+from eomgen.program.program import interpret
+from eomgen.program.route import Routed, routed
+from eomgen.program.system import System
+from eomgen.program.tape import TIME
 from eomgen.scene.reader import parse_scene
 
 SPECIAL = (0.0, np.pi / 2, -np.pi / 2, np.pi, np.pi / 4)
@@ -99,40 +102,25 @@ def dynamics(model: Model, p: Any, q: Any, v: Any, u: Any, scalars: Any) -> Dyna
     return Dynamics(model, values, scalars, "own")
 
 
-class Refused(Exception):
-    """No recursion keeps its digits."""
+def taken(model: Model) -> Routed:
+    """The steps of the route that `auto` takes, `closed` left out, and what it tells of its digits.
 
-
-def taken(model: Model) -> str:
-    """The recursion that `auto` takes, by the digits that each loses at the scene's masses.
-
-    Raises `Refused` where it refuses the scene.
+    Raises `SceneError` where it refuses the scene.
     """
-    for closely in (False, True):
-        lost = digits_lost(model, closely=closely)
-        for route in ("aba", "ldl"):
-            if lost[route] <= MOST_LOST:
-                return route
-    if lost["orthogonal"] > MOST_LOST_OF_ALL:
-        raise Refused
-    return "orthogonal"
+    return routed(model, jacobian=False, closed=False)
 
 
-def found(model: Model, q: Sequence[float], v: Sequence[float], u: dict[str, float]) -> list[float]:
-    """v̇ in doubles, by the recursion taken. Raises `Refused`.
-
-    Beside the state stands one at random, so that nothing is left out as 0 that is not always.
-    """
-    r = random.Random(1)
-    places, rates = ([np.array([x, r.uniform(-1, 1)]) for x in own] for own in (q, v))
-    at = dynamics(model, model.defaults, places, rates, u, ArrayScalars())
-    forward = {
-        "aba": at.articulated_forward,
-        "ldl": at.factored_forward,
-        "orthogonal": at.orthogonal_forward,
-    }
-    with np.errstate(all="ignore"):
-        return [float(np.broadcast_to(x, 2)[0]) for x in forward[taken(model)]()]
+def found(
+    system: System, q: Sequence[float], v: Sequence[float], u: dict[str, float]
+) -> list[float]:
+    """v̇ in doubles by the steps of a system; nan where there is no number."""
+    model = system.model
+    names = [c.name for c in (*model.coordinates, *model.velocities)]
+    given = {**model.defaults, **u, **dict(zip(names, (*q, *v), strict=True)), TIME: 0.0}
+    try:
+        return interpret(system.program, "derivative", given, FloatScalars())[-len(v) :]
+    except (ArithmeticError, ValueError):
+        return [math.nan] * len(v)
 
 
 def truth(

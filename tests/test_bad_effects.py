@@ -330,19 +330,23 @@ def test_keys(kind: str) -> None:
 
 CLASHES = [
     ('[[effects]]\ntype = "motor"\nname = "swing"\njoint = "rail"\ntorque = "input"\n',
-     "'swing' would be the name of an input and of a coordinate; rename one of them"),
+     "effects[1]: 'swing' would be the name of an input and of a coordinate (joints[0]); rename "
+     "one of them"),
     ('[[effects]]\ntype = "motor"\nname = "stiff"\njoint = "rail"\ntorque = "input"\n',
-     "'stiff' would be the name of an input and of a parameter; rename one of them"),
+     "effects[1]: 'stiff' would be the name of an input and of a parameter (parameters.stiff); "
+     "rename one of them"),
     ('[[effects]]\ntype = "external_force"\nname = "effect"\nbody = "boom"\nforce = "input"\n',
      "effects[1].name: 'effect' is the name of effects[0] too; give each its own"),
     ('[[effects]]\ntype = "motor"\nname = "effect_stiffness"\njoint = "rail"\ntorque = "input"\n',
-     "'effect_stiffness' would be the name of an input and of a parameter; rename one of them"),
+     "effects[1]: 'effect_stiffness' would be the name of an input and of a parameter "
+     "(effects[0].stiffness); rename one of them"),
     ('[[effects]]\ntype = "gravity"\ng = 1\n[[effects]]\ntype = "gravity"\nname = "g2"\ng = 1\n',
      "effects[2].type: a second 'gravity'; give one"),
     ('[[effects]]\ntype = "pid"\nname = "hold"\njoint = "rail"\ntarget = 0\nstiffness = 1\n'
      'integral_gain = 1\n[[effects]]\ntype = "motor"\nname = "hold_integral"\njoint = "rail"\n'
      'torque = "input"\n',
-     "'hold_integral' would be the name of a state and of an input; rename one of them"),
+     "effects[1]: 'hold_integral' would be the name of a state and of an input (effects[2]); "
+     "rename one of them"),
     ('[[effects]]\nname = "blank"\n', "effects[1].type: missing; it says what kind this is"),
     ('[[effects]]\nname = "blank"\ntype = "sprin"\n',
      "effects[1].type: unknown value 'sprin' (did you mean 'spring'?)"),

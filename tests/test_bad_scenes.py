@@ -12,6 +12,7 @@ from newton_euler import Mechanism, solve
 
 from eomgen.build import build_model
 from eomgen.cli import main
+from eomgen.language.exact import direction
 from eomgen.pipeline import compile_scene
 from eomgen.scene.reader import parse_scene
 
@@ -198,7 +199,8 @@ MISTAKES = [
     (
         "r_child = [-0.5, 0]",
         'r_child = [-0.5, 0]\ncoordinate = "m"',
-        "'m' would be the name of a coordinate and of a parameter; rename one of them",
+        "joints[0]: 'm' would be the name of a coordinate and of a parameter (parameters.m); "
+        "rename one of them",
     ),
     (
         "q = [0.1, 0.2]",
@@ -357,7 +359,8 @@ MISTAKES = [
     (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b"]',
      "joints[1].coordinates[2]: missing; the list is too short"),
     (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b", "a"]\n',
-     "'a' would be the name of a coordinate and of another; rename one of them"),
+     "joints[1]: 'a' would be the name of a coordinate and of another (joints[1]); rename one of "
+     "them"),
     (None, FORCE + "force = 3\n", "effects[1].force: 3 is not a list; give one"),
     (None, FORCE + 'force = "inptu"\n',
      "effects[1].force: unknown value 'inptu' (did you mean 'input'?)"),
@@ -527,14 +530,16 @@ MISTAKES_IN_SPACE = [
     (INERTIA, "inertia_com = [1, -1, 1]",
      "bodies[1].inertia_com[1]: -1 is negative; give a number >= 0 in kg m^2"),
     (INERTIA, "inertia_com = [1, 1, 1, 2, 0, 0]",
-     "bodies[1].inertia_com: body 'hand' has principal moments -1, 1, 3; none may be negative: "
-     "make the products xy, xz, yz smaller"),
+     "bodies[1].inertia_com: body 'hand' has moments 1, 1, 1 and products 2, 0, 0; so one of its "
+     "principal moments is negative, or larger than the other two together: make the products "
+     "smaller, or change xx, yy or zz"),
     (INERTIA, 'inertia_com = [1, "m", "3*m"]',
      "bodies[1].inertia_com: body 'hand' has principal moments 1, 1, 3; no body has one larger "
      "than the other two together: change xx, yy or zz"),
     (INERTIA, "inertia_com = [2, 2, 1.5, -1.2, 0, 0]",
-     "bodies[1].inertia_com: body 'hand' has principal moments 0.8, 1.5, 3.2; no body has one "
-     "larger than the other two together: change xx, yy or zz"),
+     "bodies[1].inertia_com: body 'hand' has moments 2, 2, 1.5 and products -1.2, 0, 0; so one "
+     "of its principal moments is negative, or larger than the other two together: make the "
+     "products smaller, or change xx, yy or zz"),
     (INERTIA, "", "bodies[1].inertia_com: missing; every such table needs it"),
     # Directions.
     (AXIS, "axis = [0, 0, 0]",
@@ -547,7 +552,7 @@ MISTAKES_IN_SPACE = [
     (AXIS, 'axis = ["m", 0, 0]', "joints[0].axis[0]: 'm' is not a number; give one"),
     (AXIS, "axis = [0, inf, 0]",
      "joints[0].axis[1]: inf is not a finite number; give one that is"),
-    (BALL, UNIVERSAL + "[[1, 0, 0], [-2, 0, 1e-9]]",
+    (BALL, UNIVERSAL + "[[1, 0, 0], [-2, 0, 1e-15]]",
      "joints[1].axes: are parallel; give two that cross, or a revolute"),
     (BALL, UNIVERSAL + "[[1, 0, 0], [0, 0, 0]]",
      "joints[1].axes[1]: has no length; give a direction, for example [1.0, 0.0, 0.0]"),
@@ -687,14 +692,14 @@ NOTICES = [
 def test_what_is_put_right_is_said(
     scene: Path, capsys: pytest.CaptureFixture[str], good: str, old: str, new: str, notice: str
 ) -> None:
-    """An axis or a quaternion that is not of length 1 is scaled, with one line to say so."""
+    """An axis or a quaternion not of length 1 counts as if it were, with one line to say so."""
     assert old in good
     text = good.replace(old, new, 1)
     model = build_model(parse_scene(text))
     assert model.notices == (notice,)
     for body in model.bodies:
-        axis = getattr(body.joint, "axis", None)
-        assert axis is None or math.hypot(*axis) == pytest.approx(1.0, rel=1e-15)
+        if (axis := getattr(body.joint, "axis", None)) is not None:
+            assert math.hypot(*map(float, direction(axis))) == pytest.approx(1.0, rel=1e-15)
     for indices in model.quaternions:
         parts = [model.initial_q[i] for i in indices]
         assert math.hypot(*parts) == pytest.approx(1.0, rel=1e-15)
@@ -868,6 +873,52 @@ def test_two_scenes_of_one_name(scene: Path, capsys: pytest.CaptureFixture[str])
     assert capsys.readouterr().err == (
         f"eomgen: {output}/swing.py: would be written for {scene} and for {other}; rename one\n"
     )
+
+
+def test_a_refusal_stops_no_other_scene(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each refusal is told, the other modules are written, and the exit code is 1."""
+    scene.write_text(GOOD)
+    bad = scene.parent / "bad.toml"
+    bad.write_text(GOOD.replace("mass = 0.5", "mass = -1"))
+    made = scene.parent / "made"
+    command = ["generate", str(bad), "no_such", str(scene), "pendulum", "-o", str(made)]
+    for option, state in (["--check"], "missing"), ([], "written"), (["--check"], "fresh"):
+        assert main([*command, *option]) == 1
+        out, err = capsys.readouterr()
+        refusals = err.splitlines()
+        assert refusals[0].startswith("eomgen: bad.toml: bodies[1].mass: ")
+        assert refusals[1].startswith("eomgen: no_such: no such file")
+        assert len(refusals) == 2 + (state == "missing")
+        assert [line.partition(",")[0] for line in out.splitlines()] == [
+            f"{made}/swing.py: {state}",
+            f"{made}/pendulum.py: {state}",
+        ]
+    blocked = scene / "out"
+    assert main(["generate", str(scene), "pendulum", "-o", str(blocked)]) == 1
+    assert capsys.readouterr().err == (
+        f"eomgen: {blocked}: cannot be made a folder: Not a directory\n"
+    )
+
+
+def test_all_unknown_keys_are_told(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of one table and of another, each with its hint; of thousands the first, and soon."""
+    text = GOOD.replace("mass = 0.5", "mass = 0.5\nmas = 1\ncolour = 2\ninertia = 3")
+    scene.write_text(text.replace('type = "gravity"', 'type = "gravity"\ngg = 1'))
+    assert main(["check", str(scene)]) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        "eomgen: swing.toml: bodies[1].mas: unknown key (did you mean 'mass'?)",
+        "eomgen: swing.toml: bodies[1].colour: unknown key; known here: name, mass, inertia_com, "
+        "shapes",
+        "eomgen: swing.toml: bodies[1].inertia: unknown key (did you mean 'inertia_com'?)",
+        "eomgen: swing.toml: effects[0].gg: unknown key (did you mean 'g'?)",
+    ]
+    many = "".join(f"key_{k} = {k}\n" for k in range(5000))
+    scene.write_text(GOOD.replace("mass = 0.5\n", f"mass = 0.5\n{many}"))
+    began = time.process_time()
+    assert main(["check", str(scene)]) == 1
+    assert time.process_time() - began < 5.0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 11 and lines[-1] == "eomgen: swing.toml: and 4990 more"
 
 
 def test_a_tree_too_large_for_the_closed_form(

@@ -239,7 +239,7 @@ def test_notices_and_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     )
     assert said
     since, farthest, at = map(float, said.groups())
-    rows = np.loadtxt(tmp_path / "out" / "arm.csv", delimiter=",", skiprows=2)
+    rows = np.loadtxt(tmp_path / "out" / "arm.csv", delimiter=",", skiprows=1)
     outside = (rows[:, 1] < -0.5) | (rows[:, 1] > 1.0)
     assert since == pytest.approx(rows[outside][0, 0], rel=1e-3)
     assert farthest == pytest.approx(rows[:, 1].max(), rel=1e-3)
@@ -309,7 +309,7 @@ def test_works_are_booked_where_they_are_asked_for(
         said, table = capsys.readouterr().out, (tmp_path / "pendulum.csv").read_text("utf-8")
         assert ("    work: gravity " in said) is bool(asked)
         assert ("J unaccounted for" in said) is bool(asked)
-        assert table.splitlines()[1].endswith(",work_gravity") is bool(asked)
+        assert table.splitlines()[0].endswith(",work_gravity") is bool(asked)
         module = (tmp_path / "pendulum.py").read_text("utf-8")
         assert ("def effect_powers" in module) is bool(asked)
 

@@ -344,7 +344,8 @@ def test_rotations_turn_as_they_are_said_to(seed: int) -> None:
         length = np.sqrt(sum(numbers[symbols.q[i]] ** 2 for i in four))
         for i in four:
             numbers[symbols.q[i]] /= length
-    coordinates = {*symbols.q}
+    numbers |= {symbol: float(x) for x, symbol in symbols.numbers.items()}
+    coordinates = {*symbols.q, *symbols.numbers.values()}
     for c in state_joints(model, symbols, ledger):
         written = c.rotation
         while not written.free_symbols <= coordinates:

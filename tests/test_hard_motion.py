@@ -13,6 +13,7 @@ from engine import read
 
 from eomgen.cli import main
 from eomgen.pipeline import compile_scene
+from eomgen.run.archive import checked, packed, unpacked
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
@@ -198,6 +199,40 @@ def test_a_run_goes_on_to_the_same_bytes(method: str) -> None:
     assert run.t[-1] == whole.t[-1]
 
 
+LEGS = {
+    "gragg_bulirsch_stoer": ("tumbling_body", (0.607, 1.0, 1.7), {"rtol": 1e-9}),
+    "DOP853": ("two_body", (1.0, 1.001, 1.701), {"rtol": 1e-9}),
+    "RK45": (PENDULUM, (1e-6, 0.3, 0.31, 0.3101, 1.0), {"rtol": 1e-6}),
+    "rk4": ("two_body", (0.001, 0.02, 0.025, 1.0), {"dt": 0.01}),
+    "gauss_4": ("two_body", (0.001, 0.02, 0.025, 1.0), {"dt": 0.01}),
+}
+
+
+@pytest.mark.parametrize("method", LEGS)
+def test_legs_of_no_whole_step_keep_what_the_next_goes_on_from(method: str) -> None:
+    """Shorter than a step, at the start too, where the method chooses its first one."""
+    scene, ends, given = LEGS[method]
+    asked = problem(scene)
+    whole = ran(asked, method, ends[-1], **given)
+    run = ran(asked, method, ends[0], **given)
+    for t_end in ends[1:]:
+        run = ran(asked, method, t_end, resume=run.resume, **given)
+    assert run.y[-1].tobytes() == whole.y[-1].tobytes()
+
+
+@pytest.mark.parametrize(("method", "rtol"), [("DOP853", 1e-8), ("gragg_bulirsch_stoer", 1e-6)])
+def test_a_step_that_the_end_cut_short_is_not_gone_on_from(method: str, rtol: float) -> None:
+    """Even where it was refused then, and is tried again in a length that still knows of the end:
+    whatever the end.
+    """
+    asked = problem(PENDULUM)
+    whole = ran(asked, method, 1.5, rtol=rtol)
+    for t_end in np.linspace(0.2, 1.4, 40):
+        first = ran(asked, method, float(t_end), rtol=rtol)
+        run = ran(asked, method, 1.5, rtol=rtol, resume=first.resume)
+        assert run.y[-1].tobytes() == whole.y[-1].tobytes()
+
+
 def test_a_bouncing_run_goes_on_to_the_same_bytes() -> None:
     """In flight, and when it lies: what is held, and since where, goes along."""
     asked, dt = problem("bouncing_two_body"), 2.0**-9
@@ -234,3 +269,88 @@ def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     wrong = ["simulate", "pendulum", "--from", str(tmp_path / "first/swing.npz")]
     assert main([*wrong, "-o", str(tmp_path / "other")]) == 1
     assert "give a run of this scene" in capsys.readouterr().err
+
+
+DRIVEN = f"""{PENDULUM}
+[[effects]]
+type = "motor"
+name = "drive"
+joint = "j"
+torque = "input"
+"""
+SPRUNG = f"""{DRIVEN}
+[[effects]]
+type = "joint_spring"
+name = "coil"
+joint = "j"
+stiffness = 1
+damping = 0
+"""
+
+
+@pytest.mark.usefixtures("blank_figures")
+def test_what_differs_from_the_run_that_goes_on_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = tmp_path / "swing.toml"
+    scene.write_text(DRIVEN)
+    given = ["simulate", str(scene), "--integrator", "DOP853", "--samples", "3"]
+    base = ["--set", "b_mass=2", "--input", "drive=0.5", "--rtol", "1e-8"]
+    assert main([*given, *base, "--t-end", "1", "-o", str(tmp_path / "first")]) == 0
+    saved = tmp_path / "first/swing.npz"
+    given += ["--from", str(saved), "--t-end", "2", "-o", str(tmp_path / "second")]
+
+    def told(*changed: str) -> str:
+        capsys.readouterr()
+        code = main([*given, *changed])
+        said = capsys.readouterr()
+        assert code == (1 if said.err else 0)
+        return said.out + said.err
+
+    assert "as if the run had not ended" in told(*base)
+    anew = "begins anew from the state at t = 1 s: that run had "
+    assert f"{anew}b_mass = 2.0, not 50.0" in told(*base, "--set", "b_mass=50")
+    assert f"{anew}drive = 0.5, not 0.0" in told(*base[:2], *base[4:])
+    assert f"{anew}--rtol 1e-08, not 1e-06" in told(*base, "--rtol", "1e-6")
+    assert f"{anew}--max-step at its default, not 0.01" in told(*base, "--max-step", "0.01")
+    text = scene.read_text()
+    scene.write_text(text.replace("j_angle = 1.0", "j_angle = 0.9"))
+    assert f"{anew}another initial state" in told(*base)
+    scene.write_text(SPRUNG)
+    assert (
+        f"eomgen: --from: {saved} is a run of another 'swing': it differs in effect 'coil'; "
+        "give a run of this scene" in told(*base)
+    )
+    scene.write_text(f"{text}[camera]\nheight = 3.0\n")
+    assert "as if the run had not ended" in told(*base)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"resume_t": np.array([1.0, 2.0])},
+        {"resume_lost": None},
+        {"resume_y": np.zeros(3)},
+        {"resume_y": np.full(2, np.nan)},
+        {"resume_dt": np.array(-1.0)},
+        {"resume_f": np.zeros(2)},
+        {"resume_grid": np.array(np.inf)},
+    ],
+    ids=str,
+)
+@pytest.mark.usefixtures("blank_figures")
+def test_what_a_run_cannot_have_left_is_refused(
+    change: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In one line, though the file's digest is right."""
+    scene, saved = tmp_path / "swing.toml", tmp_path / "swing.npz"
+    scene.write_text(PENDULUM)
+    given = ["simulate", str(scene), "--integrator", "rk4", "--dt", "0.1", "--samples", "3"]
+    assert main([*given, "--t-end", "1", "-o", str(tmp_path)]) == 0
+    changed = checked(unpacked(saved.read_bytes())) | change
+    saved.write_bytes(packed({name: value for name, value in changed.items() if value is not None}))
+    capsys.readouterr()
+    assert main([*given, "--t-end", "2", "-o", str(tmp_path / "b"), "--from", str(saved)]) == 1
+    assert capsys.readouterr().err == (
+        f"eomgen: {saved}: what it holds to go on from does not fit rk4; simulate again\n"
+    )

@@ -2,12 +2,14 @@
 
 import re
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from bookkeeping import light
 
+from eomgen.cli import main
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
 from eomgen.run.problem import Problem
@@ -129,3 +131,58 @@ def test_what_holds_is_left_alone() -> None:
     assert run.finished
     energy = 0.5 * run.y[-1, 1] ** 2 + 9.81 * run.y[-1, 0]
     assert abs(energy - 0.5 * 9.81) < 0.02 * energy
+
+
+@pytest.mark.parametrize("method", ["euler", "semi_implicit_euler", "rk4"])
+def test_wild_forces_are_looked_into_seldom_and_what_cannot_be_held_at_once(method: str) -> None:
+    """Forces on 40 freedoms that jump at every step, to no harm; from 4 s on a damper on one of
+    them, too strong by far. A Jacobian takes as long as 40 derivatives.
+    """
+    n, looks = 40, list[float]()
+
+    def strengths(t: float) -> Any:
+        return np.where(np.arange(n) == 7, 300.0 if t >= 4.0 else 0.0, 0.0)
+
+    def derivative(t: float, y: Any) -> Any:
+        force = np.copysign(10.0, np.sin(997.0 * t + np.arange(n)))
+        return np.concatenate((y[n:], force - strengths(t) * y[n:]))
+
+    def jacobian(t: float, y: Any) -> Any:
+        looks.append(t)
+        return np.block([[np.zeros((n, n)), np.eye(n)], [np.zeros((n, n)), -np.diag(strengths(t))]])
+
+    states = tuple(f"y{i}" for i in range(2 * n))
+    asked = Problem("wild", states, tuple(range(n)), derivative, jacobian, np.ones(2 * n))
+    run = integrate(asked, method, 6.0, dt=0.01)
+    derivatives = 400 * {"rk4": 4}.get(method, 1)
+    assert 2 <= len([t for t in looks if t < 3.98]) * n < 0.5 * derivatives + 8000 / n
+    assert stopped(run) < 0.01
+    assert 3.9 < run.t[-1] < 4.1 and np.abs(run.y).max() < 500
+
+
+@pytest.mark.parametrize("method", EXPLICIT)
+def test_a_lecture_may_show_a_step_that_is_too_long(method: str) -> None:
+    """It grows from step to step, and so it ends, with all rows up to there."""
+    run = integrate(problem("spring"), method, 1.0, dt=1e-5, unstable=True)
+    assert not run.finished and "left the finite numbers" in run.message
+    sizes = np.abs(run.y[:, 0])
+    assert len(sizes) > 30 and sizes[-1] > 1e100
+    held = integrate(problem("spring"), method, 1e-5, dt=1e-7, unstable=True)
+    assert held.finished
+
+
+@pytest.mark.usefixtures("blank_figures")
+def test_unstable_steps_from_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = tmp_path / "spring.toml"
+    scene.write_text(SPRING)
+    given = ["simulate", str(scene), "-o", str(tmp_path), "--unstable"]
+    steps = ["--integrator", "euler", "--dt", "1e-5"]
+    assert main([*given, *steps, "--t-end", "1e-4"]) == 0
+    assert "steps were let be too long for stability (--unstable)" in capsys.readouterr().out
+    for other in (["--integrator", "Radau"], ["--integrator", "gauss_4", "--dt", "0.1"]):
+        assert main([*given, *other]) == 1
+        assert "--unstable: steps of" in capsys.readouterr().err
+    assert main([*given, "--accuracy", "1e-3"]) == 1
+    assert "--unstable: is for a step that is given" in capsys.readouterr().err

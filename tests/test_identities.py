@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from campaign import some
-from engine import along, exact
+from engine import along, exact, varied
 from mechanisms import BUILT_IN, Compiled, compiled, random_tree
 
 TREES = some((9, 22, 37), (9, 22, 38))
@@ -212,7 +212,7 @@ def test_jacobians_by_inputs_and_parameters(scene: str | int, form: str) -> None
     module, rng = c.module, np.random.default_rng(34)
     names = {"input": tuple(module.INPUTS), "parameter": tuple(module.PARAMETERS)}
     y, u = rng.uniform(-3.0, 3.0, len(module.STATES)), c.scene.random_inputs(rng)
-    values = {n: v * float(rng.uniform(0.5, 2.0)) for n, v in module.PARAMETERS.items()} | u
+    values = varied(c.model, rng, 0.5, 2.0) | u
 
     def rates(by: tuple[str, ...], at: np.ndarray) -> np.ndarray:
         changed = {**values, **dict(zip(by, at, strict=True))}

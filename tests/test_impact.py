@@ -592,6 +592,10 @@ def test_absence_is_free() -> None:
     for name in ("derivative", "jacobian", "joint_forces"):
         assert (getattr(beside, name)(0.0, y) == getattr(bare.module, name)(0.0, y)).all()
         assert beside.COST[name] == bare.module.COST[name]
+    lacks = "Forces of held contacts are left out."
+    for name in ("derivative", "joint_forces"):
+        assert getattr(beside, name).__doc__.endswith(lacks)
+        assert lacks not in getattr(bare.module, name).__doc__
 
 
 def test_no_closed_form() -> None:

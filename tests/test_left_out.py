@@ -438,8 +438,8 @@ BAD = [
      "change the formula"),
     ("A*sin(w*t)", "A/t", f"{AT}: it, its rate or its acceleration is not finite at t = 0; change "
      "the formula"),
-    ('joint = "first"', 'joint = "loose"', "effects[1].joint: no revolute or prismatic joint is "
-     "named 'loose'; known: first, second"),
+    ('joint = "first"', 'joint = "loose"', "effects[1].joint: 'loose' is a free joint, which "
+     "'driven' does not act on; name a revolute or prismatic joint"),
     ("[parameters]", MORE.format("other", "first", 0.2) + "[parameters]", "effects[2].joint: "
      "'first' is driven by 'swing' too; give one of them"),
     ("[parameters]", "[initial.q]\nfirst_angle_deg = 5\n[parameters]", "initial.q.first_angle_deg: "

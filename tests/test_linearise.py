@@ -359,3 +359,96 @@ def test_faults_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str
         err = capsys.readouterr().err
         assert text in err and err.count("\n") == 1, err
     assert not list(tmp_path.iterdir())
+
+
+# --- controllers with states --------------------------------------------------------------------
+
+ROD = """
+name = "rod"
+bodies = [{ name = "rod", mass = 1, inertia_com = 0.02 }]
+[[joints]]
+name = "pin"
+type = "revolute"
+parent = "world"
+child = "rod"
+r_child = [-0.25, 0]
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+name = "c"
+"""
+LAW = 'joint = "pin"\ntarget = "-0.6"\nstiffness = 20\n'
+CONTROLLED = {
+    "pid": f'{ROD}type = "pid"\n{LAW}damping = 2\nintegral_gain = 10',
+    "lag": f'{ROD}type = "pd"\n{LAW}damping = 2\nlag = 0.05',
+    "own": f'{ROD}type = "controller"\n'
+    'states = { z = { initial = 0.0, rate = "5*(2 - z)" } }\ntorques = { pin = "z" }',
+    "never": f'{ROD}type = "controller"\n'
+    'states = { z = { initial = 0.0, rate = "1 + z**2" } }\ntorques = { pin = "z" }',
+}
+WEIGHT, ABOUT_PIN = 9.81 * 0.25, 0.02 + 0.25**2
+
+
+@pytest.mark.parametrize("settle", [False, True])
+@pytest.mark.parametrize("controller", ["pid", "lag", "own"])
+def test_states_of_controllers_come_to_rest_too(controller: str, settle: bool) -> None:
+    """Where moments balance, and A by hand: I q'' = M - m g l cos q with the law of M."""
+    module = module_of(controller, CONTROLLED[controller])
+    y, _ = equilibrium(module, np.array([0.3, 5.0, -1.0]), settle=settle)
+    q, v, x = y
+    load = WEIGHT * math.cos(q)
+    steep = WEIGHT * math.sin(q)
+    a = np.array([[0.0, 1.0, 0.0], [steep, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    if controller == "pid":  # M = 20 (-0.6 - q) - 2 v + 10 x, x' = -0.6 - q
+        np.testing.assert_allclose([q, 10 * x], [-0.6, load], atol=1e-12)
+        a[1] += [-20.0, -2.0, 10.0]
+        a[2] = [-1.0, 0.0, 0.0]
+    elif controller == "lag":  # M = x, 0.05 x' = 20 (-0.6 - q) - 2 v - x
+        np.testing.assert_allclose([20 * (-0.6 - q), x], [load, load], atol=1e-11)
+        a[1] += [0.0, 0.0, 1.0]
+        a[2] = np.array([-20.0, -2.0, -1.0]) / 0.05
+    else:  # M = x, x' = 5 (2 - x)
+        np.testing.assert_allclose([x, load], [2.0, 2.0], atol=1e-12)
+        a[1] += [0.0, 0.0, 1.0]
+        a[2] = [0.0, 0.0, -5.0]
+    a[1] /= ABOUT_PIN
+    assert v == 0.0
+    np.testing.assert_allclose(linearise(module, y).A, a, rtol=1e-12, atol=1e-12 * np.abs(a).max())
+
+
+def test_what_of_a_controller_never_rests_is_named() -> None:
+    module = module_of("never", CONTROLLED["never"])
+    with pytest.raises(RunError, match=r"no equilibrium: z still changes by 1 1/s, and nothing"):
+        equilibrium(module, np.array([0.3, 0.0, 0.0]))
+
+
+def test_states_of_controllers_on_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Given, found, and with their units."""
+    scene = tmp_path / "rod.toml"
+    scene.write_text(CONTROLLED["pid"])
+    assert main(["linearise", str(scene), "--state", "c_integral=3"]) == 0
+    assert "pin_angle = -0.6 (-34.3775 deg), c_integral = 0.202414 rad s" in capsys.readouterr().out
+    here = ["--at", "initial", "--state", "pin_angle=-0.5", "--state", "c_integral=3"]
+    assert main(["linearise", str(scene), *here]) == 0
+    said = capsys.readouterr().out
+    assert "c_integral = 3 rad s" in said and "no equilibrium: pin_angle_dot changes by" in said
+    scene.write_text(CONTROLLED["lag"])
+    assert main(["linearise", str(scene), "--at", "initial"]) == 0
+    assert "c_torque changes by -240 N m/s" in capsys.readouterr().out
+
+
+def test_a_steady_motion_is_told_from_one_that_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    """A top that sleeps goes on as it is; one that leans does not, nor what only passes through."""
+    top = ["linearise", "spinning_top", "--at", "initial", "--state", "tip_wz=70"]
+    assert main([*top, "--state", "tip_qw=1", "--state", "tip_qx=0"]) == 0
+    assert "note        a steady motion: no velocity changes" in capsys.readouterr().out
+    assert main(top) == 0
+    assert "steady" not in capsys.readouterr().out
+    cart = ["linearise", "cart_pole", "--at", "initial", "--state", "x_dot=1"]
+    assert main([*cart, "--state", "theta=0", "--state", "theta_dot=0"]) == 0
+    assert "a steady motion" in capsys.readouterr().out
+    assert main([*cart, "--state", "theta=0", "--state", "theta_dot=1e-7"]) == 0
+    assert "steady" not in capsys.readouterr().out

@@ -3,6 +3,7 @@
 import random
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,10 +11,12 @@ import scaled_trees
 from campaign import some
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scaled_trees import Refused, apart, drawn, dynamics, found, size_of, state, truth
+from scaled_trees import apart, drawn, dynamics, found, size_of, state, truth
 
 from eomgen.errors import SceneError
 from eomgen.language.digits import Bits, sixty_digits
+from eomgen.model import Model
+from eomgen.program.route import Routed, routed
 
 BOUND, TIMES = 1e-10, 1e3
 """Of v̇ relative to its largest component, or that of ω v; and of what half a unit in the last place
@@ -21,9 +24,12 @@ of all data changes it by."""
 
 
 def tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) -> str:
-    """What came of a case: 'right', 'refused', or, in words, an error that is too large."""
+    """What came of a case: 'right', 'told' where it is as far off as is said of its digits,
+    'refused'; or, in words, an error that is too large.
+    """
     try:
         tree = drawn(seed, dimensions, decades)
+        made = scaled_trees.taken(tree)
     except SceneError:
         return "refused"
     q, v = state(tree, seed, special)
@@ -31,11 +37,16 @@ def tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) -
     u = {i.name: float(r.uniform(-9, 9)) for i in tree.inputs}
     try:
         true, allowed = truth(tree, q, v, u)
-        off = apart(found(tree, q, v, u), true, size_of(true, tree, v))
-    except (Refused, ZeroDivisionError):
+        off = apart(found(made.system, q, v, u), true, size_of(true, tree, v))
+    except ZeroDivisionError:
         return "refused"
     bound = BOUND + TIMES * allowed
+    if made.digits is not None and bound < off <= bound + 10.0**-made.digits:
+        return "told"
     return "right" if off <= bound else f"off by {off:.1e}, allowed {bound:.1e}"
+
+
+WELL = ("right", "told", "refused")
 
 
 def case(number: int) -> tuple[int, int, list[float], bool]:
@@ -46,7 +57,7 @@ def case(number: int) -> tuple[int, int, list[float], bool]:
 
 
 @settings(
-    max_examples=some(150, 100_000),
+    max_examples=some(100, 100_000),
     deadline=None,
     derandomize=True,
     database=None,
@@ -62,10 +73,10 @@ def test_right_or_refused(seed: int, dimensions: int, decades: list[float], spec
     """No error beyond its bound goes unsaid. `campaigns.silent_errors` tries 1e5 cases."""
     outcome = tried(seed, dimensions, decades, special)
 
-    assert outcome in ("right", "refused"), outcome
+    assert outcome in WELL, outcome
 
 
-REFUSED = (100309, 100504, 100755, 103937, 5315, 5867, 78448)
+REFUSED, TOLD = (100309, 100755, 103937, 5315), (5867,)
 ONCE_SILENT = {
     33: "forces on a body whose inertia is nothing beside m r²",
     145: "the same",
@@ -89,8 +100,8 @@ ONCE_SILENT = {
 
 @pytest.mark.parametrize("number", ONCE_SILENT)
 def test_not_silent_again(number: int) -> None:
-    """What the campaign found. No route keeps its digits for those that are refused."""
-    outcome = "refused" if number in REFUSED else "right"
+    """What the campaign found. No route keeps its digits for those that are refused, or told."""
+    outcome = "refused" if number in REFUSED else "told" if number in TOLD else "right"
     assert tried(*case(number)) == outcome, ONCE_SILENT[number]
 
 
@@ -100,6 +111,10 @@ ONCE_REFUSED = {
     1086: "slight beside masses it carries on arms",
     9273: "slight beside moments of inertia that it carries",
     5369: "slight beside a rotor",
+    33: "judged by what rounding leaves of accelerations of 0",
+    45: "judged by more than a unit in the last place of its directions",
+    193: "loses digits near alignment only, and is told",
+    328: "loses six digits, and is told",
 }
 
 
@@ -137,7 +152,11 @@ def test_most_are_right() -> None:
 
 def test_it_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     """Articulated bodies alone are silently wrong."""
-    monkeypatch.setattr(scaled_trees, "taken", lambda model: "aba")
+
+    def by_one(model: Model) -> Routed:
+        return routed(replace(model, route="aba"), jacobian=False)
+
+    monkeypatch.setattr(scaled_trees, "taken", by_one)
     r = np.random.default_rng(1)
     cases = ((seed, 2, r.uniform(-12, 12, 30).tolist(), False) for seed in range(60))
     assert any(tried(*case).startswith("off") for case in cases)

@@ -61,6 +61,15 @@ def test_commands_exist(capsys: pytest.CaptureFixture[str]) -> None:
             assert not word.startswith("-") or word in options, call
 
 
+@pytest.mark.usefixtures("blank_figures")
+def test_a_run_goes_on_as_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The line of `--from`, after the first command has run."""
+    monkeypatch.chdir(tmp_path)
+    (line,) = re.findall(r"^eomgen (simulate .*--from [^#]*)#", README, re.MULTILINE)
+    assert main(["simulate", "two_body"]) == 0
+    assert main(shlex.split(line)) == 0
+
+
 def test_links_and_pictures_are_there() -> None:
     """Nothing the README points to inside the project is missing."""
     for target in re.findall(r"\]\(([^)#:]+)\)", README):

@@ -10,7 +10,7 @@ import gmpy2
 import numpy as np
 import pytest
 from campaign import some
-from engine import MP, engine
+from engine import MP, engine, varied
 from gmpy2 import mpfr
 from mpmath import mp
 
@@ -120,7 +120,7 @@ def test_the_derivative_is_the_program_in_long_numbers(scene: str) -> None:
     for watched in (False, True):
         y = made.random_state(rng)
         u = made.random_inputs(rng)
-        p = {name: value * rng.uniform(0.99, 1.01) for name, value in module.PARAMETERS.items()}
+        p = varied(made.model, rng, 0.99, 1.01)
         exactly = made.exactly("derivative", y, u, p, t=0.7)
         module.derivative(0.7, y, p, u)  # keeps what it computed of these parameters, in doubles
         found = precise(module, p, u, y, watched=watched)

@@ -6,7 +6,7 @@ a module says, with those too, to 1e-12 of the largest entry.
 
 import numpy as np
 import pytest
-from engine import Engine, along, apart, engine, exact
+from engine import Engine, along, apart, engine, exact, varied
 from mechanisms import random_tree
 from spatial_trees import random_spatial_tree
 
@@ -175,7 +175,7 @@ def state(e: Engine, seed: int) -> tuple[np.ndarray, dict, dict]:
     y, u = e.random_state(rng), e.random_inputs(rng)
     for indices in map(list, e.module.QUATERNIONS):
         y[indices] *= rng.uniform(0.7, 1.5)
-    p = {name: value * rng.uniform(0.9, 1.1) for name, value in e.module.PARAMETERS.items()}
+    p = varied(e.model, rng, 0.9, 1.1)
     return y, u, p
 
 

@@ -208,9 +208,8 @@ def _a_folder(path: Path) -> None:
 
 
 def _linked(path: Path) -> None:
-    aside = path.with_name("aside")
-    generate_entry(aside)
-    path.symlink_to(aside)
+    generate_entry(path)
+    path.symlink_to(path.rename(path.with_name("aside")))
 
 
 def generate_entry(path: Path) -> None:

@@ -60,9 +60,9 @@ FEW = (
 
 
 def environment(**changes: str) -> dict[str, str]:
-    """The environment without a display, with what changes."""
-    kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    return {**kept, **changes}
+    """The environment without a display and without wishes for Python, with what changes."""
+    wishes = ("DISPLAY", "WAYLAND_DISPLAY", "PYTHONUNBUFFERED", "PYTHONIOENCODING", "PYTHONUTF8")
+    return {**{k: v for k, v in os.environ.items() if k not in wishes}, **changes}
 
 
 def run(
@@ -131,7 +131,36 @@ def test_a_terminal_of_ascii(tmp_path: Path, name: str, how: str) -> None:
     }[how]
     done = run(COMMANDS[name], tmp_path, **ascii_alone)
     assert done.returncode == 0 and quiet(done)
-    assert done.stdout.isascii() and done.stderr.isascii() and "\\u" not in done.stdout
+    assert done.stdout.isascii() and done.stderr.isascii()
+    assert "\\u" not in done.stdout or name == "schema"  # as JSON spells it anywhere
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_full_output_ends_no_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    """Of each command: all its files, one line of what was lost, and 1."""
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        assert main([word.format(out=tmp_path) for word in COMMANDS[name].split()]) == 1
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1] == "eomgen: standard output cannot be written: No space left on device"
+    assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
+
+
+@pytest.mark.parametrize("name", some([n for n in COMMANDS if n != "accuracy"], list(COMMANDS)))
+def test_ascii_and_a_closed_error_stream(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Of each command: all its files, all it prints in letters of ASCII, and 0."""
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.setattr(sys, "stderr", None)
+    assert main([word.format(out=tmp_path) for word in COMMANDS[name].split()]) == 0
+    terminal.seek(0)
+    told = terminal.read()
+    assert told and ("\\u" not in told or name == "schema")  # as JSON spells it anywhere
+    assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
 
 
 def test_a_derivation_in_ascii(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -239,8 +268,14 @@ def began() -> Iterator[Callable[..., subprocess.Popen[str]]]:
         process.communicate()
 
 
-@pytest.mark.parametrize("number", some((signal.SIGINT,), tuple(STOPS)), ids=lambda n: n.name)
-@pytest.mark.parametrize("delay", some((0.0, 0.3, 2.0), DELAYS), ids="{:.2g}".format)
+SOME_STOPS = ((signal.SIGINT, 0.0), (signal.SIGTERM, 0.3), (signal.SIGINT, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("number", "delay"),
+    some(SOME_STOPS, tuple((number, delay) for number in STOPS for delay in DELAYS)),
+    ids=str,
+)
 def test_a_stop_has_one_exit_code(
     tmp_path: Path,
     began: Callable[..., subprocess.Popen[str]],
@@ -352,24 +387,45 @@ def test_a_file_is_whole_or_not_there(tmp_path: Path, before: bytes | None) -> N
     assert ended and outcomes == {before, data}
 
 
-def test_a_stop_that_gets_lost_comes_again(tmp_path: Path) -> None:
-    """Where nothing can be raised, as while something is deleted, Python would only print it."""
+LOST = """
+class Deaf:
+    def __del__(self): signal.raise_signal(signal.SIGINT)
+def run():
+    Deaf()
+    time.sleep(20)
+"""
+"""A stop where nothing can be raised, as while something is deleted: Python would only print it."""
+TURNED = """
+def run():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        raise ImportError("half a module")
+"""
+SWALLOWED = """
+def run():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        return 0
+"""
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [(LOST, b"eomgen: interrupted\n"), (TURNED, b"eomgen: interrupted\n"), (SWALLOWED, b"")],
+    ids=["lost", "turned", "swallowed"],
+)
+def test_a_stop_counts_whatever_is_made_of_it(command: str, said: bytes) -> None:
+    """Lost, turned into another error, or swallowed by a library."""
     code = (
-        "import signal, sys, time\n"
-        "import eomgen.__main__, eomgen.cli\n"
-        "class Deaf:\n"
-        "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
-        "def run():\n"
-        "    Deaf()\n"
-        "    time.sleep(100)\n"
-        "    return 0\n"
-        "eomgen.cli.main = run\n"
-        "sys.exit(eomgen.__main__.main())"
+        "import signal, sys, time\nimport eomgen.__main__, eomgen.cli\n"
+        f"{command}\neomgen.cli.main = run\nsys.exit(eomgen.__main__.main())"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], check=False, capture_output=True, timeout=90
     )
-    assert (done.returncode, done.stderr) == (130, b"eomgen: interrupted\n")
+    assert (done.returncode, done.stderr) == (130, said)
 
 
 def test_an_interrupt_within_this_process(

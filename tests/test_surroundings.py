@@ -350,7 +350,7 @@ def test_many_works_are_summed_by_type(
     assert main(["simulate", str(scene), "--works", "--t-end", "1", "-o", str(tmp_path)]) == 0
     said = re.search(r"    work: (.*?)\n    kinetic", capsys.readouterr().out, re.DOTALL)
     assert said is not None
-    head, *rows = (tmp_path / "many.csv").read_text("utf-8").splitlines()[1:]
+    head, *rows = (tmp_path / "many.csv").read_text("utf-8").splitlines()
     last = dict(zip(head.split(","), map(float, rows[-1].split(",")), strict=True))
     works = {name[5:]: last[name] for name in last if name.startswith("work_")}
     assert len(works) == 3 + count

@@ -6,9 +6,12 @@ import pickle
 import re
 import socket
 import sys
+import tracemalloc
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from eomgen.cli import main
@@ -16,6 +19,7 @@ from eomgen.errors import RunError, SceneError
 from eomgen.files import read_plain
 from eomgen.run.module import load_module
 from eomgen.run.progress import terminal_progress
+from eomgen.run.trajectory import load_npz
 from eomgen.scene.reader import BUILT_IN
 from eomgen.streams import steady_streams
 from eomgen.text import LONGEST_LINE
@@ -76,6 +80,72 @@ def test_a_scene_is_a_plain_file(
     assert main(["check", str(strange[kind])]) == 1
     said = capsys.readouterr().err
     assert said.startswith(f"eomgen: {kind}: is a ") and "no plain file; save" in said
+
+
+@pytest.mark.parametrize("kind", ["pipe", "socket", "device", "endless", "folder"])
+@pytest.mark.parametrize(
+    ("command", "place"),
+    [
+        ("simulate pendulum -o {out} --from {place}", "run.npz"),
+        ("generate pendulum -o {out}", "pendulum.py"),
+        ("generate pendulum -o {out} --check", "pendulum.py"),
+        ("simulate pendulum --t-end 0.1 -o {out}", "pendulum.csv"),
+        ("simulate pendulum --t-end 0.1 -o {out} --force", "pendulum.npz"),
+        ("derive pendulum -o {place}", "derivation.txt"),
+        ("linearise pendulum -o {place}", "matrices.npz"),
+    ],
+)
+def test_no_command_waits_for_a_file(
+    strange: dict[str, Path], capsys: pytest.CaptureFixture[str],
+    kind: str, command: str, place: str,
+) -> None:  # fmt: skip
+    """What is there under a name that a command reads or writes is asked for its kind first."""
+    out = strange[kind].parent / "out"
+    out.mkdir()
+    strange[kind].rename(out / place)
+    assert main([word.format(out=out, place=out / place) for word in command.split()]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"eomgen: {out / place}: is ")
+    assert [path.name for path in out.iterdir()] == [place]
+
+
+@pytest.fixture(scope="module")
+def members(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+    """The arrays that a run leaves."""
+    out = tmp_path_factory.mktemp("run")
+    assert main(["simulate", "pendulum", "--t-end", "0.1", "-o", str(out)]) == 0
+    with np.load(out / "pendulum.npz") as archive:
+        return dict(archive)
+
+
+@pytest.mark.parametrize("attack", ["packed", "nothing many times"])
+def test_a_small_archive_does_not_become_large(
+    members: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str], attack: str
+) -> None:
+    """Zeros that are packed would take a thousand times its size, and a list of entries that have
+    no bytes as much as one likes.
+    """
+    path = tmp_path / "run.npz"
+    if attack == "packed":
+        zeros = np.zeros((5_000_000, 2))
+        np.savez_compressed(path, **{**members, "t": np.arange(5_000_000.0) * 0, "y": zeros})
+    else:
+        states = np.ndarray(20_000_000, np.dtype("<U0"))
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, array in {**members, "states": states}.items():
+                with archive.open(f"{name}.npy", "w") as file:
+                    np.lib.format.write_array(file, array)
+    size = path.stat().st_size
+    tracemalloc.start()
+    try:
+        with pytest.raises(RunError, match="is damaged") as caught:
+            load_npz(path)
+        assert tracemalloc.get_traced_memory()[1] < 4 * size + 2_000_000
+    finally:
+        tracemalloc.stop()
+    command = ["simulate", "pendulum", "--t-end", "0.2", "-o", str(tmp_path), "--from", str(path)]
+    assert main(command) == 1
+    assert capsys.readouterr().err == f"eomgen: {caught.value}\n"
 
 
 HOSTILE = "\x1b[31mred\x1b]0;t\x07\x9b2J\neomgen: all is well\u2028forged\u202egnp\u200b"
@@ -208,6 +278,11 @@ def test_a_name_with_control_characters_is_refused(
     assert capsys.readouterr().err.endswith(
         r"a\nb.toml: has a control character in its name; rename it" + "\n"
     )
+    for option in (["-o", str(tmp_path / "a\nb")], ["--plot", "a\x9b.png"], ["--from", "\u2028"]):
+        with pytest.raises(SystemExit) as stop:
+            main(["simulate", "pendulum", "--t-end", "0.1", *option])
+        assert stop.value.code == 2
+        assert "has a control character in its name" in capsys.readouterr().err
     odd = tmp_path / "pendül \u202e\udcff.toml"  # and others are no fault
     odd.write_bytes(scene.read_bytes())
     with steady_streams():

@@ -19,7 +19,7 @@ from eomgen.errors import RunError
 from eomgen.model import Model
 from eomgen.program.route import routed
 from eomgen.run.module import load_module
-from eomgen.scene.reader import find_scene
+from eomgen.scene.reader import find_scene, parse_scene
 from eomgen.study import drift as drifting
 from eomgen.study import horizon as horizons
 from eomgen.study import visited as visiting
@@ -36,6 +36,7 @@ SCREW = """
 name = "screw"
 dimensions = 3
 parameters = { m = 1.7, J = 0.3 }
+simulation = { t_end = 5.0 }
 bodies = [
     { name = "a", mass = "m", inertia_com = [0.2, "J", 0.25, 0.01, -0.02, 0.03] },
     { name = "b", mass = 0.8, inertia_com = [0.05, 0.06, 0.07] },
@@ -389,6 +390,29 @@ def test_a_module_that_gives_no_number_misses_its_bound() -> None:
 
 
 # How long doubles mean anything.
+
+
+DRY = """
+name = "dry"
+route = "aba"
+bodies = [{ name = "b", mass = 1.0, inertia_com = 0.1 }]
+joints = [{ name = "j", type = "revolute", parent = "world", child = "b", r_child = [0, 1] }]
+initial = { q = { j_angle = 1.0 } }
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "motor", name = "f", joint = "j", torque = "3 - 6*step(j_angle_dot)" },
+]
+"""
+
+
+def test_a_horizon_that_chatters_keeps_to_its_time_and_tells_how_far_it_is() -> None:
+    """Dry friction that sticks turns at every step, in doubles too, which had all the time."""
+    model = build_model(parse_scene(DRY))
+    module = load_module(python_module(routed(model).system))
+    told: list[float] = []
+    with pytest.raises(RunError, match=r"^horizon: no run of 10 s.*: more than 1 s in .*; give a"):
+        horizon_of(model, module, seconds=0.5, progress=told.append)
+    assert told and all(0.0 <= part < 1.0 for part in told)
 
 
 def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from eomgen.backends.conditions import refusals
 from eomgen.language.base import LARGEST
 from eomgen.language.formula import FUNCTIONS, written
 from eomgen.model import Model
@@ -82,6 +83,15 @@ ABOUT_SPACE = {
     "body_poses": "[world_R_body | centre of mass (m)] of each body, 3 x 4.",
     "body_velocities": "Velocity of each centre of mass (m/s) and angular velocity (rad/s), world.",
 }
+ABOUT_CONTACTS = (
+    "derivative",
+    "forward_dynamics",
+    "inverse_dynamics",
+    "applied_force",
+    "joint_forces",
+    "driving_forces",
+)
+"""What rigid contacts would change while they are held."""
 DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 
 
@@ -115,7 +125,8 @@ def python_module(system: System) -> str:
     kernels = {name: _kernel(system, name, blocks[name], names, costs[name]) for name in blocks}
     moving = {f for block in blocks.values() for f in block.functions}
     fixed, once = _fixed(system, blocks, names)
-    called = [f for f in FUNCTIONS if f in moving or f in once]
+    refused = refusals(model, DIALECT)
+    called = [f for f in FUNCTIONS if f in moving or f in once or f in refused.functions]
     dynamics = (("forward_dynamics", "tau", "=None"), ("inverse_dynamics", "vd", ""))
     special = {"initial_state", "derivative", *DERIVATIVES, *(name for name, _, _ in dynamics)}
     special |= {"impact", "held"}
@@ -135,6 +146,7 @@ def python_module(system: System) -> str:
         "quaternions": repr(quaternions),
         "parameters": model.parameters,
         "parameter_names": ", ".join(names.safe(p.name) for p in model.parameters),
+        "refused": refused,
         "inputs": model.inputs,
         "units": _units(system),
         "effects": repr(tuple(effect.type for effect in model.effects)),
@@ -171,7 +183,7 @@ def _kernel(
     special = ABOUT_PLANE if system.model.dimensions == 2 else ABOUT_SPACE
     return Kernel(
         name=name,
-        about=special.get(name, ABOUT.get(name, "")),
+        about=special.get(name, ABOUT.get(name, "")) + _left_out(system, name),
         shape=repr(shape),
         block=block,
         state=_unpacking([s.name for s in system.states], block, names),
@@ -183,6 +195,12 @@ def _kernel(
         tangent=name in system.tangents,
         time=TIME in block.inputs,
     )
+
+
+def _left_out(system: System, name: str) -> str:
+    """What an output lacks where there are rigid contacts, whose forces only a run finds."""
+    lacks = name in ABOUT_CONTACTS and bool(system.contacts)
+    return " Forces of held contacts are left out." if lacks else ""
 
 
 def watched(program: Program, states: Sequence[str]) -> str:

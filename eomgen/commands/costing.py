@@ -37,7 +37,10 @@ def effects(given: Arguments) -> int:
             motion=0.0 if given.no_motion else given.motion_time,
             progress=progress,
         )
-    print(f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs")
+    print(
+        f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs "
+        f"(±{_us(found.spread)})"
+    )
     _print_items(found)
     _print_routes(found)
     if found.extent is not None:
@@ -48,14 +51,16 @@ def effects(given: Arguments) -> int:
 
 
 def _print_items(bill: "Bill") -> None:
-    operations, seconds = bill.shared
+    from eomgen.study.bill import difference
+
+    operations, seconds, spread = bill.shared
     width = max(len(OWN), *(len(item.label) for item in bill.items), 0)
     motion = "   motion  from 1 %" if bill.extent is not None else ""
     print(f"    {'':<{width}}  operations   share        µs  states  inputs{motion}")
 
-    def line(label: str, operations: int, seconds: float, rest: str = "") -> None:
+    def line(label: str, operations: int, took: str, rest: str = "") -> None:
         share = operations / bill.operations if bill.operations else 0.0
-        text = f"    {label:<{width}}  {operations:>10}  {share:6.1%}  {_us(seconds):>8}  {rest}"
+        text = f"    {label:<{width}}  {operations:>10}  {share:6.1%}  {took:>8}  {rest}"
         print(text.rstrip())
 
     def lines(kind: str) -> None:
@@ -63,7 +68,8 @@ def _print_items(bill: "Bill") -> None:
             if item.kind == kind and item.needed_by:
                 print(f"    {item.label:<{width}}  {_needed(item)}")
             elif item.kind == kind:
-                line(item.label, item.operations, item.seconds, _rest(bill, item))
+                took = difference(item.seconds, item.spread)
+                line(item.label, item.operations, took, _rest(bill, item))
 
     kinds = [item.kind for item in bill.items]
     by = (
@@ -71,10 +77,10 @@ def _print_items(bill: "Bill") -> None:
         if bill.bare_route == bill.route
         else f"{'':>14}{motion and ' ' * 19}  ({bill.bare_route})"
     )
-    line(OWN, bill.bare_operations, bill.bare_seconds, by)
+    line(OWN, bill.bare_operations, _us(bill.bare_seconds), by)
     lines("effect")
     if kinds.count("effect") > 1 or operations:
-        line(SHARED, operations, seconds)
+        line(SHARED, operations, difference(seconds, spread))
     if "mechanism" in kinds:
         print("    of the mechanism itself, what might be left out:")
         lines("mechanism")

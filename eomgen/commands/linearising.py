@@ -24,7 +24,7 @@ from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import find_scene
 from eomgen.study.equilibrium import equilibrium
-from eomgen.study.linearise import Linearisation, save
+from eomgen.study.linearise import Linearisation, is_steady, rate_unit, save
 from eomgen.study.linearise import linearise as linearised
 from eomgen.study.modes import Mode, controllable_rank, modes, stability
 
@@ -64,11 +64,17 @@ def linearise(given: Arguments) -> int:
         elif given.hold or given.trim:
             raise RunError("--hold, --trim: are for finding an equilibrium; leave out --at initial")
         whole = linearised(module, y, u, parameters)
+        steady = given.at == "initial" and is_steady(module, whole, parameters)
     least = whole.reduced()
     found = modes(least.A)
     _print_place(module, whole, given.at, given.trim)
     if given.at != "initial":
         _print_stopped(model, start)
+    elif steady:
+        print_wrapped(
+            "note        ",
+            "a steady motion: no velocity changes, and A and B stay as they are along it",
+        )
     _print_matrices(least)
     _print_modes(found)
     verdict = {
@@ -88,13 +94,13 @@ def linearise(given: Arguments) -> int:
 
 def _state(given: Arguments, model: Model, initial: Floats) -> Floats:
     """The scene's initial state with what `--state` changes, quaternions scaled with a notice."""
-    names = [c.name for c in (*model.coordinates, *model.velocities)]
-    units = [c.unit for c in (*model.coordinates, *model.velocities)]
-    degrees = {f"{n}_deg": n for n, unit in zip(names, units, strict=True) if "rad" in unit}
+    known = (*model.coordinates, *model.velocities)
+    names = [*(c.name for c in known), *(state.name for state in model.states)]
+    degrees = {f"{c.name}_deg": c.name for c in known if "rad" in c.unit}
     y = initial.copy()
     for name, value in assignments(given.state, [*names, *degrees], "--state").items():
         index = names.index(degrees.get(name, name))
-        if given.at != "initial" and index >= len(model.coordinates):
+        if given.at != "initial" and len(model.coordinates) <= index < len(known):
             raise RunError(
                 f"--state {name}: an equilibrium is at rest; leave it out, or give --at initial"
             )
@@ -124,13 +130,17 @@ def _print_place(
         "initial": "the state given",
     }
     print(f"{module.NAME}: linearised about {kind[at]}")
-    shown = nq if at != "initial" else len(whole.y)
+    velocities = range(nq, 2 * nq - len(module.QUATERNIONS))
     values = []
-    for name, value in zip(whole.state_names[:shown], whole.y[:shown].tolist(), strict=True):
+    for i, (name, value) in enumerate(zip(whole.state_names, whole.y.tolist(), strict=True)):
+        if at != "initial" and i in velocities:
+            continue
         value = value if abs(value) > STILL else 0.0
-        angle = module.UNITS[name] == "rad" and value
-        degrees = f" ({_number(math.degrees(value))} deg)" if angle else ""
-        values.append(f"{name} = {_number(value)}{degrees}")
+        unit = module.UNITS[name]
+        after = f" ({_number(math.degrees(value))} deg)" if unit == "rad" and value else ""
+        if i >= velocities.stop and unit:  # of a controller: what it is in, no name tells
+            after = f" {unit}"
+        values.append(f"{name} = {_number(value)}{after}")
     print_listed("state       ", shortened(values, 80))
     inputs = []
     for name, value in zip(whole.input_names, whole.u.tolist(), strict=True):
@@ -141,10 +151,10 @@ def _print_place(
     if at == "initial" and np.max(np.abs(changes), initial=0.0) > STILL:
         worst = int(np.argmax(np.abs(changes)))
         name = whole.state_names[nq + worst]
-        unit = module.UNITS[name].replace("/s", "/s^2")
         print_wrapped(
             "note        ",
-            f"no equilibrium: {name} changes by {_number(changes[worst])} {unit}; A and B are for "
+            f"no equilibrium: {name} changes by {_number(changes[worst])} "
+            f"{rate_unit(module.UNITS[name])}; A and B are for "
             "deviations from this motion, at this instant",
         )
 

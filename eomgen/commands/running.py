@@ -34,7 +34,7 @@ from eomgen.model import Model, ways_of
 from eomgen.run.limits import excursions, locks
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_progress
-from eomgen.run.trajectory import Trajectory
+from eomgen.run.trajectory import Trajectory, is_own_table
 from eomgen.scene.schema import SHOWN
 from eomgen.store import Code
 
@@ -67,6 +67,7 @@ def simulate(given: Arguments) -> int:
             "--from: goes on with a method that is named; leave --accuracy, --budget out"
         )
     setting = None if chosen else _setting(given, model)
+    _check_unstable(given, setting)
     paths = _output_paths(given, name)
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
@@ -77,12 +78,14 @@ def simulate(given: Arguments) -> int:
         "max_step": given.max_step,
         "rest_speed": wanted.rest_speed,
         "guard": _guard(given, module, values),
+        "unstable": given.unstable,
     }
-    problem, words = as_problem(module, *values, model), ""
+    problem, start = as_problem(module, *values, model), None
     if given.resume is not None:
         assert setting is not None
-        start = going_on(load_npz(given.resume), given.resume, problem, setting)
-        problem, words = start.problem, start.words
+        bounds = {name: kept[name] for name in ("max_step", "rest_speed")}
+        start = going_on(load_npz(given.resume), given.resume, problem, setting, **bounds)
+        problem = start.problem
         kept |= start.options
     case = Case(
         problem,
@@ -103,6 +106,7 @@ def simulate(given: Arguments) -> int:
     model = model.with_parameters(parameters)
     motion = observe(model, module, trajectory, inputs)
     drawing = _write(code, trajectory, motion, tuple(model.defaults.values()), paths, given.force)
+    words = start.told(trajectory) if start else ""
     missed = _report(given, model, code, case, tried, choice, motion, words)
     for path in paths.values():
         print(f"    wrote {path}")
@@ -128,8 +132,9 @@ def _write(
     from eomgen.run.trajectory import save_csv, save_npz
 
     write_whole(paths["py"], code.module, force=force)
-    save_npz(trajectory, paths["npz"], force=force)
+    # The table first: the archive of an earlier run is what tells whose table it overwrites.
     save_csv(trajectory, paths["csv"], force=force)
+    save_npz(trajectory, paths["npz"], force=force)
     return _save_pictures(motion, code.poses, parameters, paths, force)
 
 
@@ -176,11 +181,13 @@ def _report(
 
 
 def _bounded(given: Arguments, trajectory: Trajectory) -> list[str]:
-    """What else than their error kept steps short, and how often."""
+    """What else than their error kept steps short, and how often; that nothing did, if asked."""
     from eomgen.run.checks import LEAST_STEPS
 
     steps, capped, cut = (trajectory.counts[name] for name in ("steps", "capped", "cut"))
     lines = []
+    if given.unstable:
+        lines.append("steps were let be too long for stability (--unstable)")
     if cut:
         times = "once" if cut == 1 else f"{cut} times"
         lines.append(
@@ -195,6 +202,22 @@ def _bounded(given: Arguments, trajectory: Trajectory) -> list[str]:
             "pass over cannot be told; --max-step sets another length"
         )
     return lines
+
+
+def _check_unstable(given: Arguments, setting: "Setting | None") -> None:
+    """Raise `RunError` for `--unstable` where no step can be too long."""
+    from eomgen.run.integrators import FixedStep, find_integrator
+
+    if not given.unstable:
+        return
+    if setting is None:
+        raise RunError("--unstable: is for a step that is given; leave --accuracy, --budget out")
+    method = find_integrator(setting.integrator)
+    if not (isinstance(method, FixedStep) and method.explicit):
+        raise RunError(
+            f"--unstable: steps of {setting.integrator} are stable however long, or its own "
+            "choice; leave it out, or take --integrator euler, leapfrog or rk4"
+        )
 
 
 def _guard(
@@ -322,9 +345,10 @@ def _output_paths(given: Arguments, name: str) -> dict[str, Path]:
     paths = {kind: given.output / f"{name}.{kind}" for kind in kinds}
     paths["png"] = _or(given.plot, paths["png"])
     check_figure(paths["png"], force=given.force)
-    for path in paths.values():
+    for kind, path in paths.items():
         check_folder(path.parent)
-        check_writable(path, force=given.force)
+        own = kind == "csv" and path.is_file() and is_own_table(path)
+        check_writable(path, force=given.force or own)
     return paths
 
 

@@ -80,6 +80,8 @@ def code_of(
         with terminal_notice(f"deriving {model.name} …"):
             code = generated_code(model, anew=anew)
         note(given, code.notice)
+        for notice in code.notices:
+            note(given, f"{find_scene(scene).name}: {notice}")
         module = load_module(code.module, model.name)
         as_problem(module, model=model)
         if getattr(given, "outputs", None) not in (None, "all"):

@@ -50,7 +50,7 @@ def why_not_plain(model: Model) -> str:
         return f"it leaves nothing out ('{words}')"
     for effect in model.effects:
         if not effect.is_plain(model.defaults):
-            return f"it takes no '{effect.type}' that depends on the motion ('{effect.name}')"
+            return f"it takes no '{effect.type}' {effect.why_not_plain()} ('{effect.name}')"
     return ""
 
 

@@ -1,10 +1,12 @@
 """What effects share: what they may ask of a mechanism, and the loads they put on it."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, Self
 
 from eomgen.language.base import Identifier, Table
+from eomgen.language.conditions import Condition
+from eomgen.language.exact import Real
 from eomgen.language.formula import ZERO, Formula
 
 Scalar = Any
@@ -44,7 +46,9 @@ class Load:
 
     `force` in world axes (N) acts at `at`, measured from the centre of mass in body axes (m);
     `torque` in world axes (N m) has one component in the plane, about z, and three in space; ()
-    is none. `kind` says on which side of M v̇ + V + G = F it stands.
+    is none. `kind` says on which side of M v̇ + V + G = F it stands. `in_body` has the same force
+    and torque in body axes, if it is these that are given: to the world's and back they would be
+    rounded, and a force that goes all but through the centre of mass would turn the body otherwise.
     """
 
     body: str
@@ -52,6 +56,7 @@ class Load:
     at: Vector
     kind: Literal["gravity", "applied"]
     torque: Vector = ()
+    in_body: tuple[Vector, Vector] | None = None
 
 
 @dataclass(frozen=True)
@@ -152,8 +157,8 @@ class Mechanism(Protocol):
     def state(self, name: str) -> Scalar:
         """Value of an extra state."""
 
-    def number(self, value: float) -> Scalar:
-        """A number as a scalar."""
+    def number(self, value: Real) -> Scalar:
+        """A number as a scalar, a double or one of more digits (`language.exact`)."""
 
     def call(self, function: str, *arguments: Scalar) -> Scalar:
         """A function of formulas (`language.formula.FUNCTIONS`)."""
@@ -208,7 +213,7 @@ class Unmoved:
         """Never asked for."""
         raise AssertionError(name)
 
-    def number(self, value: float) -> Scalar:
+    def number(self, value: Real) -> Scalar:
         """Never asked for."""
         raise AssertionError(value)
 
@@ -252,8 +257,9 @@ class EffectTable(Table):
         `joints` has the kinds of ways of all that move but the free ones, `names` the coordinates.
         """
 
-    def check_values(self, value: Callable[[Formula], float], place: str) -> None:
-        """Raise `SceneError` for quantities that do not go together, by their values."""
+    def conditions(self, place: str) -> Iterable[Condition]:
+        """What its quantities are to keep beside their own bounds; `place` is the effect's."""
+        return ()
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
         """Inputs that it takes."""
@@ -292,3 +298,7 @@ class EffectTable(Table):
         closed form takes them.
         """
         return False
+
+    def why_not_plain(self) -> str:
+        """What keeps one that is not from the closed form, in a few words."""
+        return "that depends on the motion"

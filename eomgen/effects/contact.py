@@ -1,6 +1,6 @@
 """Contact: bodies that do not go through a plane or each other, soft or rigid."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import ClassVar, Literal, Self
 
@@ -26,7 +26,9 @@ from eomgen.effects.vectors import LEAST_SQUARE, dot
 from eomgen.errors import SceneError
 from eomgen.joints.base import WORLD
 from eomgen.language.base import Identifier
-from eomgen.language.formula import ZERO, Formula
+from eomgen.language.conditions import Condition, a_part, can_meet, not_negative
+from eomgen.language.exact import direction
+from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity, with_components
 
 LAWS = {
@@ -165,35 +167,30 @@ class BodyContact(OnBodies):
         return self
 
     def checked(self, dimensions: int, place: str) -> Self:
-        """Its normal has a direction, and length 1."""
+        """Its normal has a direction."""
         up = (0.0,) * (dimensions - 1) + (1.0,)
         normal = with_components(self.normal or up, 0.0, dimensions, f"{place}.normal")
-        largest = max(map(abs, normal))
-        if largest == 0.0:
+        if not any(normal):
             raise SceneError(f"{place}.normal: has no direction; give one that is not zero")
-        scaled = tuple(x / largest for x in normal)
-        size = sum(x * x for x in scaled) ** 0.5
-        return self.replaced(normal=tuple(x / size for x in scaled))
+        return self.replaced(normal=normal)
 
-    def check_values(self, value: Callable[[Formula], float], place: str) -> None:
+    def conditions(self, place: str) -> Iterator[Condition]:
         """No radius is negative, spheres have one, restitution is from 0 to 1."""
-        radii = {f"radii.{name}": value(radius) for name, radius in self.radii.items()}
-        radii |= {"radius": value(self.radius), "other_radius": value(self.other_radius)}
+        radii = {f"radii.{name}": radius for name, radius in self.radii.items()}
+        radii |= {"radius": self.radius, "other_radius": self.other_radius}
         for key, radius in radii.items():
-            if radius < 0:
-                raise SceneError(f"{place}.{key}: {radius:g} is negative; give a number >= 0 in m")
-        if not 0 <= (restitution := value(self.restitution)) <= 1:
-            raise SceneError(
-                f"{place}.restitution: {restitution:g} is not from 0 to 1; give one that is"
-            )
+            yield not_negative(f"{place}.{key}", radius, "m")
+        yield a_part(f"{place}.restitution", self.restitution)
         listed = self.points or (self.bodies if isinstance(self.bodies, tuple) else (self.body,))
         if self.bodies == "all" and self.radii:
             return  # which bodies are left to be points is not known here
-        points = sum(radii.get(f"radii.{name}", radii["radius"]) == 0 for name in listed)
-        if self.against == "ball" and radii["other_radius"] == 0 and points:
-            raise SceneError(f"{place}.other_radius: two points never meet; give a radius > 0")
-        if self.against == "each_other" and (points > 1 or (points and self.bodies == "all")):
-            raise SceneError(f"{place}.radius: two points never meet; give a radius > 0")
+        own = [radii.get(f"radii.{name}", self.radius) for name in listed]
+        if self.against == "ball":
+            for radius in dict.fromkeys(own):
+                yield can_meet(f"{place}.other_radius", (radius, self.other_radius))
+        if self.against == "each_other":
+            both = (*own, self.radius) if self.bodies == "all" else own
+            yield can_meet(f"{place}.radius", both)
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """One load a body and touching point of it, for the corners of a box in one."""
@@ -322,7 +319,7 @@ class BodyContact(OnBodies):
             yield from (on_ball(mechanism, first, ball) for first in balls)
             return
         zeros = (mechanism.number(0.0),) * mechanism.dimensions
-        normal = tuple(mechanism.number(x) for x in self.normal)
+        normal = tuple(mechanism.number(x) for x in direction(self.normal))
         plane = Plane(self.other, zeros, normal, mechanism.value(self.offset))
         corners: Components | None = None
         if self.corners is not None:

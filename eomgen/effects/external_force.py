@@ -46,8 +46,10 @@ class ExternalForce(EffectTable):
         else:
             force = tuple(mechanism.input(i.name) for i in self.inputs(mechanism.dimensions))
         if self.axes == "body":
-            force = mechanism.outward(self.body, force)
-        yield Load(self.body, force, at, "applied")
+            outside = mechanism.outward(self.body, force)
+            yield Load(self.body, outside, at, "applied", in_body=(force, ()))
+        else:
+            yield Load(self.body, force, at, "applied")
 
     def is_plain(self, parameters: Collection[str]) -> bool:
         """In world axes, unless its formula uses the motion or the time."""

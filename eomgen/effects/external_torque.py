@@ -57,7 +57,9 @@ class ExternalTorque(EffectTable):
             torque = tuple(mechanism.value(part) for part in self.torque)
         else:
             torque = (mechanism.value(self.torque),)
-        if self.axes == "body" and mechanism.dimensions == 3:
-            torque = mechanism.outward(self.body, torque)
         zeros = (mechanism.value(ZERO),) * mechanism.dimensions
-        yield Load(self.body, zeros, zeros, "applied", torque)
+        if self.axes == "body" and mechanism.dimensions == 3:
+            outside = mechanism.outward(self.body, torque)
+            yield Load(self.body, zeros, zeros, "applied", outside, in_body=(zeros, torque))
+        else:
+            yield Load(self.body, zeros, zeros, "applied", torque)

@@ -1,6 +1,5 @@
 """Uniform gravity, downwards or in any other direction."""
 
-import math
 from collections.abc import Collection, Iterator
 from typing import Literal
 
@@ -8,6 +7,7 @@ from pydantic import Field, field_validator
 
 from eomgen.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
 from eomgen.language.base import Identifier
+from eomgen.language.exact import direction
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Numbers, Quantity, quantity
 
@@ -41,10 +41,7 @@ class Gravity(EffectTable):
         g = mechanism.value(self.g)
         if self.direction is None:
             return (*(mechanism.value(ZERO),) * (mechanism.dimensions - 1), -g)
-        largest = max(abs(part) for part in self.direction)
-        scaled = [part / largest for part in self.direction]
-        length = math.hypot(*scaled)
-        return tuple(mechanism.number(part / length) * g for part in scaled)
+        return tuple(mechanism.number(part) * g for part in direction(self.direction))
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """The weight of each body, at its centre of mass."""
@@ -79,3 +76,7 @@ class Gravity(EffectTable):
     def is_plain(self, parameters: Collection[str]) -> bool:
         """Downwards, on all bodies."""
         return self.direction is None and not self.except_bodies
+
+    def why_not_plain(self) -> str:
+        """It has a direction of its own, or leaves bodies alone."""
+        return "with except_bodies" if self.except_bodies else "with a direction of its own"

@@ -1,6 +1,6 @@
 """Stops at the ends of a joint's range, as springs and dampers or rigid."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, Self
 
 from pydantic import Field
@@ -9,7 +9,8 @@ from eomgen.effects.base import Contact, JointLoad, Mechanism, Scalar
 from eomgen.effects.vectors import negative
 from eomgen.effects.ways import OnJoints, Way
 from eomgen.errors import SceneError
-from eomgen.language.formula import ZERO, Formula
+from eomgen.language.conditions import Condition, a_part, in_order
+from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 
 
@@ -50,16 +51,12 @@ class JointStop(OnJoints):
                 raise SceneError(f"{place}.{key}: a restitution stands in its place; give one")
         return self
 
-    def check_values(self, value: Callable[[Formula], float], place: str) -> None:
+    def conditions(self, place: str) -> Iterator[Condition]:
         """There is room between two limits, and restitution is from 0 to 1."""
-        if self.restitution is not None and not 0 <= (e := value(self.restitution)) <= 1:
-            raise SceneError(f"{place}.restitution: {e:g} is not from 0 to 1; give one that is")
+        if self.restitution is not None:
+            yield a_part(f"{place}.restitution", self.restitution)
         if self.low is not None and self.high is not None:
-            low, high = value(self.low), value(self.high)
-            if not low < high:
-                raise SceneError(
-                    f"{place}.low: {low:g} is not below high, {high:g}; make low < high"
-                )
+            yield in_order(f"{place}.low", self.low, self.high)
 
     def check_ways(
         self,

@@ -1,6 +1,6 @@
 """A spring and damper between two points, or a rope."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, Self
 
@@ -11,6 +11,7 @@ from eomgen.effects.base import Vector as Components
 from eomgen.effects.vectors import dot, nearest_square, negative, sub
 from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
+from eomgen.language.conditions import Condition, not_negative
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Quantity, Vector, quantity
 
@@ -68,13 +69,9 @@ class Spring(EffectTable):
         check_law(self, self.law, place)
         return self
 
-    def check_values(self, value: Callable[[Formula], float], place: str) -> None:
+    def conditions(self, place: str) -> Iterator[Condition]:
         """A length is not negative, whatever else may be."""
-        length = value(self.rest_length)
-        if length < 0:
-            raise SceneError(
-                f"{place}.rest_length: {length:g} is negative; give a number >= 0 in m"
-            )
+        yield not_negative(f"{place}.rest_length", self.rest_length, "m")
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """Equal and opposite on the two bodies; the world takes its own."""

@@ -37,7 +37,7 @@ class Coordinate:
 class Move:
     """An elementary motion of the child against the parent, in the axes the moves before it left.
 
-    `turn` and `slide` go about or along the unit vector `axis` by one coordinate. `spin` turns by a
+    `turn` and `slide` go about or along `axis`, of any length, by one coordinate. `spin` turns by a
     unit quaternion w, x, y, z; its velocities are the angular velocity in the turned axes.
     """
 

@@ -2,6 +2,7 @@
 
 import keyword
 import re
+from itertools import zip_longest
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
@@ -10,6 +11,8 @@ from pydantic_core import PydanticCustomError
 from eomgen.errors import nearest
 
 LONGEST_NAME = 40
+MOST_HINTS = 10
+"""Unknown keys of a table with a hint each; a table may have thousands."""
 
 
 class Table(BaseModel):
@@ -22,13 +25,13 @@ class Table(BaseModel):
     def _only_known_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
             known = [field.alias or name for name, field in cls.model_fields.items()]
-            for key in data:
-                if key not in known:
-                    hint = nearest(str(key), known)
-                    hint = hint or f"; known here: {', '.join(known)}"
-                    raise PydanticCustomError(
-                        "unknown_key", "unknown key{hint}", {"key": str(key), "hint": hint}
-                    )
+            unknown = [str(key) for key in data if key not in known]
+            # Only as many are shown, and to look for what is nearest takes time.
+            near = [nearest(key, known) for key in unknown[:MOST_HINTS]]
+            hints = [hint or f"; known here: {', '.join(known)}" for hint in near]
+            if unknown:
+                pairs = list(zip_longest(unknown, hints, fillvalue=""))
+                raise PydanticCustomError("unknown_keys", "unknown keys", {"keys": pairs})
         return data
 
     def replaced(self, **values: Any) -> Self:

@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 from gmpy2 import mpfr
 
+from eomgen.language.exact import Real
 from eomgen.language.formula import FUNCTIONS
 
 DIGITS = 60
@@ -36,11 +37,12 @@ BY_MPFR = _functions(gmpy2, mpfr)
 class Digits:
     """60-digit numbers as scalars."""
 
-    exact = True
-
-    def number(self, value: float) -> Any:
-        """The double itself, exactly."""
-        return MP.mpf(value)
+    def number(self, value: Real) -> Any:
+        """The double itself, exactly; the number next to one of more digits."""
+        if isinstance(value, float | int):
+            return MP.mpf(value)
+        with sixty_digits():
+            return MP.mpf(tuple(map(int, mpfr(value).as_mantissa_exp())))
 
     def call(self, function: str, *arguments: Any) -> Any:
         """Any function of formulas."""
@@ -66,11 +68,9 @@ class Bits:
     fast as mpmath's.
     """
 
-    exact = True
-
-    def number(self, value: float) -> Any:
-        """The double itself, exactly."""
-        return mpfr(value, 53)  # all its bits, in any context
+    def number(self, value: Real) -> Any:
+        """The double itself, exactly, in any context; the number next to one of more digits."""
+        return mpfr(value, 53) if isinstance(value, float) else mpfr(value)
 
     def call(self, function: str, *arguments: Any) -> Any:
         """A function of formulas."""

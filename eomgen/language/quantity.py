@@ -7,26 +7,24 @@ the scene's `[parameters]`; a bare 0 is structure: it is folded away and is no p
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as data_field
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from eomgen.errors import SceneError, nearest
-from eomgen.language.base import LARGEST, Number, Table
+from eomgen.language.base import Number, Table
+from eomgen.language.conditions import Condition, of_moving, of_quantity
 from eomgen.language.formula import (
     CONSTANTS,
     FUNCTIONS,
-    Apply,
     Constant,
-    Floats,
     Formula,
     FormulaError,
     Name,
-    evaluate,
     names_in,
     parse,
-    written,
 )
 
 
@@ -107,12 +105,13 @@ def about_slides(table: Table, sliding: Collection[str]) -> bool | None:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A named number of the generated module."""
+    """A named number of the generated module; `place` is where the scene gives it, for messages."""
 
     name: str
     default: float
     unit: str
     about: str
+    place: str = data_field(default="", repr=False, compare=False)
 
 
 def with_components(
@@ -137,26 +136,30 @@ def name_quantities(
     known: Mapping[str, float],
     motion: Sequence[str] = (),
     sliding: Collection[str] = (),
-) -> tuple[dict[str, Any], list[Parameter]]:
+) -> tuple[dict[str, Any], list[Parameter], list[Condition]]:
     """Give every bare nonzero number among a table's quantities a name.
 
-    Returns the replaced fields (for `Table.replaced`) and the new parameters. `known` holds the
-    values of the scene's own parameters, `motion` names what else a field may see. `sliding` are
-    joints and coordinates that slide; which one a quantity is of says its key in a field that is a
-    table by joints, or else the table. Raises `SceneError` for a name that is not there and for a
-    value outside the field's bound.
+    Returns the replaced fields (for `Table.replaced`), the new parameters, and the conditions that
+    values are to keep. `known` holds the values of the scene's own parameters, `motion` names what
+    else a field may see. `sliding` are joints and coordinates that slide; which one a quantity is
+    of says its key in a field that is a table by joints, or else the table. Raises `SceneError` for
+    a name that is not there.
     """
     fields: dict[str, Any] = {}
     parameters: list[Parameter] = []
+    conditions: list[Condition] = []
     for field, info in type(table).model_fields.items():
         extra, value = info.json_schema_extra, getattr(table, field)
         if isinstance(value, dict) and any(isinstance(x, Table) for x in value.values()):
             tables = {}
             for key, inner in value.items():
                 at = f"{place}.{info.alias or field}.{key}"
-                inside, new = name_quantities(inner, f"{prefix}_{key}", at, known, motion, sliding)
+                inside, new, kept = name_quantities(
+                    inner, f"{prefix}_{key}", at, known, motion, sliding
+                )
                 tables[key] = inner.replaced(**inside)
                 parameters += new
+                conditions += kept
             fields[field] = tables
         if not isinstance(extra, dict) or "unit" not in extra:
             continue
@@ -180,22 +183,26 @@ def name_quantities(
                         f"{where}: '{name}' changes with the motion, which this value must not; "
                         "use parameters"
                     )
-            _check(formula, where, bound, unit, known, seen)
+            moving = _check_names(formula, where, known, seen)
             if isinstance(formula, Constant) and formula.value != 0.0:
                 what = of_joint(str(info.description), here)
                 about = f"{what} of {prefix}{suffix.replace('_', ', ', 1)}"
                 name = f"{prefix}_{field}{suffix}"
-                parameters.append(Parameter(name, formula.value, unit, about))
-                named.append(Name(name))
-            else:
-                named.append(formula)
+                parameters.append(Parameter(name, formula.value, unit, about, where))
+                formula = Name(name)
+            named.append(formula)
+            conditions += (
+                of_moving(where, formula, known)
+                if moving
+                else of_quantity(where, formula, bound, unit)
+            )
         if isinstance(value, tuple):
             fields[field] = tuple(named)
         elif isinstance(value, dict):
             fields[field] = dict(zip(value, named, strict=True))
         elif named:
             fields[field] = named[0]
-    return fields, parameters
+    return fields, parameters, conditions
 
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -220,14 +227,10 @@ def _listed(value: Any) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else []
 
 
-def _check(
-    formula: Formula,
-    where: str,
-    bound: str,
-    unit: str,
-    known: Mapping[str, float],
-    seen: Sequence[str],
-) -> None:
+def _check_names(
+    formula: Formula, where: str, known: Mapping[str, float], seen: Sequence[str]
+) -> bool:
+    """Whether a formula changes with the motion; its names are there, or that is an error."""
     moving = False
     for name in names_in(formula):
         moving = moving or name in seen
@@ -239,42 +242,4 @@ def _check(
             if name in FUNCTIONS:
                 hint = f"; the function is written {name}({', '.join('xyz'[: FUNCTIONS[name]])})"
             raise SceneError(f"{where}: unknown parameter '{name}'{hint}")
-    if moving:  # then it has no value before the motion, but its still parts have
-        for part in _still(formula, known):
-            if not math.isfinite(_value(part, known)):
-                raise SceneError(
-                    f"{where}: its part '{_shortened(written(part))}' is not a finite number; "
-                    "change it or its parameters"
-                )
-        return
-    value = _value(formula, known)
-    if not math.isfinite(value):
-        raise SceneError(f"{where}: its value is not a finite number; change its parameters")
-    if abs(value) > LARGEST:
-        raise SceneError(f"{where}: {value:g} is larger than {LARGEST:g}; choose other units")
-    if bound == "positive" and not value > 0:
-        raise SceneError(f"{where}: {value:g} is not positive; give a number > 0 in {unit}")
-    if bound == "nonnegative" and value < 0:
-        raise SceneError(f"{where}: {value:g} is negative; give a number >= 0 in {unit}")
-
-
-def _value(formula: Formula, known: Mapping[str, float]) -> float:
-    """The value of a formula, nan where it has none."""
-    try:
-        return float(evaluate(formula, known, Floats()))
-    except (ArithmeticError, ValueError):
-        return math.nan
-
-
-def _still(formula: Formula, known: Mapping[str, float]) -> Iterator[Apply]:
-    """The largest parts of a formula that depend on nothing but parameters."""
-    if isinstance(formula, Apply):
-        if all(name in known for name in names_in(formula)):
-            yield formula
-        else:
-            for operand in formula.operands:
-                yield from _still(operand, known)
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return moving

@@ -38,6 +38,7 @@ class Lowered:
         }
         for formula, symbol in s.formulas.items():
             self._given[symbol] = evaluate(formula, record.parameters, record.scalars)
+        self._given |= {symbol: self._tape.constant(float(x)) for x, symbol in s.numbers.items()}
         self._given |= dict(zip((*s.q, *s.v), (*record.q, *record.v), strict=True))
         self._given |= {symbol: record.inputs[name] for name, symbol in s.inputs.items()}
 

@@ -1,24 +1,31 @@
 """Which route a model's equations take, and why."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from eomgen.derivation.recursive.digits import ALL, Accelerations, digits_lost
+from eomgen.derivation.recursive.digits import ALL, Route, digits_lost
+from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.moving import Values
-from eomgen.derivation.recursive.numbers import FloatScalars
+from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.errors import SceneError
 from eomgen.model import Model
 from eomgen.program.from_recursion import Recording, from_recursion
-from eomgen.program.program import Output, cost, finish, interpreter
+from eomgen.program.passes import optimise
+from eomgen.program.program import Output, Program, cost, finish, interpreter
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
 
 MOST_LOST = 4.0
 """Decimal digits of v̇ that a route may lose at ordinary states and still be taken by itself."""
 
-MOST_LOST_OF_ALL = 5.0
-"""That the last of all routes may lose; a scene for which it loses more is refused."""
+SPARE = 1.0
+"""Digits that the last of all routes may lose at some state more than at those it was judged at."""
+ENOUGH = 10
+"""Digits of v̇ of which nothing is said if so many are right."""
+FEWEST = 6
+"""Digits of v̇ that must be right, be it said; a scene of which fewer would be is refused."""
 
 MOST_FACTORING = 20_000
 """Operations of factoring alone beyond which `ldl` is not tried only to be compared."""
@@ -39,10 +46,22 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Routed:
-    """A system, and the routes it was chosen from."""
+    """A system, and the routes it was chosen from. So many `digits` of accelerations are right, if
+    fewer than `ENOUGH`; then its user must be told.
+    """
 
     system: System
     candidates: tuple[Candidate, ...]
+    digits: int | None = None
+
+    def notices(self) -> list[str]:
+        """What its user must be told."""
+        if self.digits is None:
+            return []
+        return [
+            "bodies and joints so uneven cost every route digits; by the best, 'orthogonal', "
+            f"{self.digits} of {ALL:.0f} digits of accelerations are right"
+        ]
 
     def explanation(self) -> list[str]:
         """Lines for a reader: each route, its operations, and why the one taken was taken."""
@@ -54,9 +73,23 @@ class Routed:
         return lines
 
 
-def routed(model: Model, *, jacobian: bool = True) -> Routed:
+@dataclass(frozen=True)
+class Tried:
+    """A route recorded, and the steps that its derivative takes, alone and after all passes."""
+
+    record: Recording
+    program: Program
+
+    @property
+    def operations(self) -> int:
+        """Of the derivative."""
+        return cost(self.program, "derivative")["total"]
+
+
+def routed(model: Model, *, jacobian: bool = True, closed: bool = True) -> Routed:
     """The system of a model by the route it names, or by the one of the fewest operations that
-    keeps its digits; with the derivative's Jacobian or without.
+    keeps its digits; with the derivative's Jacobian or without. Without `closed` that is not tried
+    of itself, which takes a second or two.
 
     Raises `SceneError` if it names one that is not for it.
     """
@@ -75,38 +108,60 @@ def routed(model: Model, *, jacobian: bool = True) -> Routed:
         return _taken(_closed(model, jacobian), words)
     if model.route != "auto":
         return _taken(from_recursion(recorded(model, model.route), jacobian=jacobian), "named")
-    candidates = []
-    closed: System | None = None
-    if why_not:
-        candidates.append(Candidate("closed", None, why_not))
-    elif words := why_not_tried(model):
+    return _chosen(model, why_not, jacobian, closed)
+
+
+def _chosen(model: Model, why_not: str, jacobian: bool, closed: bool) -> Routed:
+    """The route of the fewest operations that keeps its digits."""
+    candidates, routes = [], dict[str, Route]()
+    system: System | None = None
+    if words := why_not or why_not_tried(model):
         candidates.append(Candidate("closed", None, words))
-    else:
-        closed = _closed(model, jacobian)
-        candidates.append(_candidate("closed", _operations(closed)))
-    records = {"aba": recorded(model, "aba")}
-    aba, least = _operations_of(records["aba"]), least_factoring(model)
-    candidates.append(_candidate("aba", aba))
-    if least > aba:
+    elif closed:
+        system = _closed(model, jacobian)
+        alone = _alone(system.program)
+        candidates.append(_candidate("closed", cost(alone, "derivative")["total"]))
+        routes["closed"] = _route(model, alone, None)
+    tried = {"aba": _tried(model, "aba")}
+    candidates.append(_candidate("aba", tried["aba"].operations))
+    least = least_factoring(model)
+    if least > tried["aba"].operations:
         words = f"not tried: factoring alone takes {least} operations"
         candidates.append(Candidate("ldl", None, words))
     else:
-        records["ldl"] = recorded(model, "ldl")
-        candidates.append(_candidate("ldl", _operations_of(records["ldl"])))
-    by_closed = None if closed is None else _accelerations(closed)
-    ldl = "ldl" in records
-    tried = _weighed(candidates, digits_lost(model, by_closed, ldl=ldl))
-    if not _kept(tried):
-        lost = digits_lost(model, by_closed, ldl=ldl, closely=True)
-        tried = _weighed(candidates, lost)
-        if not _kept(tried):
-            records["orthogonal"] = recorded(model, "orthogonal")
-            tried.append(_last_resort(records["orthogonal"], lost))
-    candidates = tried
-    best = min(_kept(candidates), key=lambda c: c.operations or 0)
-    if closed is None or best.route != "closed":
-        closed = from_recursion(records[best.route], jacobian=jacobian)
-    return Routed(closed, tuple(candidates))
+        tried["ldl"] = _tried(model, "ldl")
+        candidates.append(_candidate("ldl", tried["ldl"].operations))
+    routes |= {name: _route(model, t.program, t.record.dynamics.axes) for name, t in tried.items()}
+    weighed, digits = _weighed(candidates, digits_lost(model, routes)), None
+    if not _kept(weighed):
+        last = tried["orthogonal"] = _tried(model, "orthogonal")
+        routes["orthogonal"] = _route(model, last.program, "own")
+        lost = digits_lost(model, routes, closely=True)
+        weighed = _weighed(candidates, lost)
+        if not _kept(weighed):
+            words = (
+                f"keeps digits that bodies and joints take from others, {lost['aba']:.0f} of aba"
+            )
+            weighed.append(Candidate("orthogonal", last.operations, words))
+            digits = _right(lost["orthogonal"])
+    best = min(_kept(weighed), key=lambda c: c.operations or 0)
+    if system is None or best.route != "closed":
+        system = from_recursion(tried[best.route].record, jacobian=jacobian)
+    return Routed(system, tuple(weighed), digits)
+
+
+def _right(lost: float) -> int | None:
+    """The digits that are right where the last of all routes loses so many; None if `ENOUGH`.
+    Raises `SceneError` if too few are left.
+    """
+    right = max(0, math.floor(ALL - lost - SPARE))
+    if right < FEWEST:
+        raise SceneError(
+            "route: bodies and joints so uneven cost every route digits; by the best, "
+            f"'orthogonal', only {right} of {ALL:.0f} digits of accelerations would be right; make "
+            "them less uneven, or give route = 'orthogonal' to take it all the same"
+        )
+    return right if right < ENOUGH else None
 
 
 def recorded(model: Model, route: str) -> Recording:
@@ -115,17 +170,40 @@ def recorded(model: Model, route: str) -> Recording:
     In the plane those are the world's, in which angles add up, unless bodies that turn carry
     slides; in space they are the frames' own.
     """
-    record = Recording(model, route)
-    if route == "orthogonal":
-        return record
-    if model.dimensions == 2 and any(
-        move.kind == "slide"
-        for body in model.bodies
-        if body.parent >= 0
-        for move in body.joint.moves(2)
+    return _tried(model, route).record
+
+
+def _tried(model: Model, route: str) -> Tried:
+    """The same, with its steps."""
+    axes: list[Axes | None] = [None]
+    if (
+        route != "orthogonal"
+        and model.dimensions == 2
+        and any(
+            move.kind == "slide"
+            for body in model.bodies
+            if body.parent >= 0
+            for move in body.joint.moves(2)
+        )
     ):
-        return min(record, Recording(model, route, axes="own"), key=_operations_of)
-    return record
+        axes.append("own")
+    found = []
+    for own in axes:
+        record = Recording(model, route, axes=own)
+        outputs = {"derivative": _output(node.index for node in record.rates)}
+        found.append(Tried(record, optimise(finish(record.tape, outputs, ()))[0]))
+    return min(found, key=lambda one: one.operations)
+
+
+def _output(nodes: Iterable[int]) -> Output:
+    found = tuple(nodes)
+    return Output((len(found),), found)
+
+
+def _alone(program: Program) -> Program:
+    """The steps that a derivative takes alone and after all passes."""
+    outputs = {"derivative": program.outputs["derivative"]}
+    return optimise(replace(program, outputs=outputs, checks=()))[0]
 
 
 def least_factoring(model: Model) -> int:
@@ -180,30 +258,18 @@ def _kept(candidates: Sequence[Candidate]) -> list[Candidate]:
     return [c for c in candidates if c.operations is not None and not c.refused]
 
 
-def _last_resort(record: Recording, lost: Mapping[str, float]) -> Candidate:
-    """Orthogonal elimination. Raises `SceneError` if it loses too many digits, too."""
-    if lost["orthogonal"] > MOST_LOST_OF_ALL:
-        raise SceneError(
-            f"route: every one loses digits at these masses and lengths, 'orthogonal' "
-            f"{lost['orthogonal']:.0f} of {ALL:.0f}; make them less uneven, or name the route to "
-            "take it all the same"
-        )
-    words = f"keeps the digits that these masses take from the others, {lost['aba']:.0f} of aba"
-    return Candidate("orthogonal", _operations_of(record), words)
-
-
-def _accelerations(system: System) -> Accelerations:
-    """v̇ as a system in velocity form has it."""
-    model = system.model
-    run = interpreter(system.program, "derivative", FloatScalars())
+def _route(model: Model, program: Program, axes: Axes | None) -> Route:
+    """How a program in velocity form computes v̇, of one state or of several."""
+    run = interpreter(program, "derivative", ArrayScalars())
+    names = [c.name for c in (*model.coordinates, *model.velocities)]
+    first = len(model.coordinates)
 
     def found(values: Values) -> Sequence[float]:
-        names = [c.name for c in (*model.coordinates, *model.velocities)]
-        given = {**values.parameters, **values.inputs, TIME: 0.0}
+        given = {**values.parameters, **values.inputs, **values.states, TIME: 0.0}
         given |= dict(zip(names, (*values.q, *values.v), strict=True))
-        return run(given)[-len(model.velocities) :]
+        return run(given)[first : first + len(model.velocities)]
 
-    return found
+    return Route(found, axes)
 
 
 def _candidate(route: str, operations: int) -> Candidate:
@@ -212,9 +278,3 @@ def _candidate(route: str, operations: int) -> Candidate:
 
 def _operations(system: System) -> int:
     return cost(system.program, "derivative")["total"]
-
-
-def _operations_of(record: Recording) -> int:
-    rates = record.rates
-    outputs = {"derivative": Output((len(rates),), tuple(node.index for node in rates))}
-    return cost(finish(record.tape, outputs, ()), "derivative")["total"]

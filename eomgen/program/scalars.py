@@ -1,5 +1,6 @@
 """The tape's nodes as the abstract scalars of formulas and recursions."""
 
+from eomgen.language.exact import Real, in_doubles
 from eomgen.program.tape import ExactTape, Node, Tape
 
 
@@ -8,11 +9,17 @@ class TapeScalars:
 
     def __init__(self, tape: Tape) -> None:
         self._tape = tape
-        self.exact = isinstance(tape, ExactTape)
+        self._exact = isinstance(tape, ExactTape)
 
-    def number(self, value: float) -> Node:
-        """A constant."""
-        return self._tape.constant(value)
+    def number(self, value: Real) -> Node:
+        """A constant: a double, or what is next to a number of more digits; of an exact tape such
+        a number as a sum of doubles.
+        """
+        first, *others = in_doubles(value) if self._exact else (float(value),)
+        found = self._tape.constant(first)
+        for part in others:
+            found = found + self._tape.constant(part)
+        return found
 
     def call(self, function: str, *arguments: Node) -> Node:
         """A function of formulas."""

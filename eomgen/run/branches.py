@@ -16,7 +16,7 @@ lies near the ends of a step is made to end its steps at the changes themselves.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -112,6 +112,17 @@ class Lookout:
     def __post_init__(self) -> None:
         of_time = self.switching.of_time
         self._schedule = Schedule(of_time) if of_time else None
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """What the looks at the next steps go on from: numbers and arrays by name."""
+        looked = [[t, *values] for t, values in self._ends] or np.empty((0, 0))
+        return {"turned": self.turned, "looked": np.array(looked)}
+
+    def restore(self, memory: Mapping[str, Any]) -> None:
+        """Go on from what `memory` gave."""
+        self.turned = float(memory["turned"])
+        self._ends = [(float(row[0]), np.array(row[1:])) for row in memory["looked"]]
 
     def look(self, made: Made) -> Again | None:
         """Whether a step is to be made again; None if it is good.

@@ -2,19 +2,20 @@
 
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from eomgen.run import events
-from eomgen.run.checks import check_repairs, check_rest_speed
+from eomgen.run.checks import check_repairs, check_rest_speed, numbers
 from eomgen.run.guard import OF_TOLERANCE, Guard, Watch, repaired, watched
 from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
-from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
-from eomgen.run.stepping import Asked, adaptive_steps, equal_steps
+from eomgen.run.stepping import ANEW, Asked, adaptive_steps, begun, can_go_on, equal_steps
 from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Event, Trajectory
 from eomgen.run.works import Account, Powers
@@ -40,6 +41,7 @@ def integrate(
     powers: Powers | None = None,
     resume: Resume | None = None,
     guard: Guard | None = None,
+    unstable: bool = False,
     tally: Tally | None = None,
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
@@ -63,9 +65,11 @@ def integrate(
     powers      asks for the works of effects
     resume      what an earlier run left in `Trajectory.resume`: this one goes on from there,
                 whatever `t_start` and `problem.initial` say, to the same bytes as if that one had
-                not ended, if method and step or tolerances are the same
+                not ended, if problem, method and step or tolerances are the same
     guard       watches the derivative's rounding at every step, and stops the run where digits are
                 lost, or repairs it (`run.guard`); what it lets pass is what it is without
+    unstable    lets equal steps of an explicit method be too long for stability, to show what they
+                then do; else the run stops there and says how long they may be
     tally       kept up to date at every step, at which it may end the run
 
     Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
@@ -78,6 +82,8 @@ def integrate(
         t_start = float(resume["t"])
         problem = replace(problem, initial=resume["y"])
         grid = float(resume.get("grid", t_start))
+        if ANEW in resume:  # no step of that run was whole
+            resume = None
     asked = Asked(
         integrator=integrator,
         t_start=float(t_start),
@@ -104,7 +110,8 @@ def integrate(
     if isinstance(method, FixedStep):
         # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
-        looked_at = problem if method.explicit and not (watch and watch.guard.repairs) else None
+        unseen = unstable or not method.explicit or (watch and watch.guard.repairs)
+        looked_at = None if unseen else problem
         begin, remembered = equal_steps(asked, method, counted, looked_at)
     else:
         begin, remembered = adaptive_steps(asked, method, problem)
@@ -114,12 +121,15 @@ def integrate(
     advances = _advances(stepper, counted, asked, watch, rest_speed)
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
     run = _Run(asked.t_start, problem.initial, account)
+    if can_go_on(method) and not (watch and watch.guard.repairs):
+        run.resume = partial(begun, asked, problem)
     if tally:
         tally.begin(problem.initial)
     counts, told = (derivatives, jacobians), progress or _ignore
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")
         trouble = _follow(run, advances, counts, problem, method, asked.t_end, told, tally)
+        kept = _kept(run, problem, {**remembered, **numbers(rest_speed=rest_speed)})
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
     said = (trouble, watch.words() if watch else "", remarks)
@@ -142,8 +152,22 @@ def integrate(
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
         work_names=account.names if account else (),
-        resume={**run.resume(), **remembered} if run.resume else {},
+        resume=kept,
+        origin=problem.origin,
     )
+
+
+def _kept(run: "_Run", problem: Problem, remembered: Resume) -> Resume:
+    """What a later run needs to go on, and to tell whether it is the same motion; none where it
+    cannot.
+    """
+    stands = run.resume() if run.resume else {}
+    if not stands:
+        return {}
+    rate = np.full(len(problem.states), np.nan)  # not known, if it is interrupted
+    with np.errstate(all="ignore"), suppress(ArithmeticError, ValueError, KeyboardInterrupt):
+        rate = np.array(problem.derivative(float(stands["t"]), stands["y"]))
+    return {**stands, **remembered, "derivative": rate}
 
 
 def _watch(guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: Asked) -> Watch:
@@ -277,8 +301,6 @@ def _follow(
         return ""
     except KeyboardInterrupt:
         trouble = f"interrupted at t = {run.t:.6g}"
-    except UnstableStepError as failure:
-        trouble = f"stopped at {_place(problem, run)}: {failure}"
     except StepFailure as failure:
         why = problem.explain(run.t, run.y, problem.initial)
         cause = f"{str(failure).partition(';')[0]}: {why}" if why else str(failure)

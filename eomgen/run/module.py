@@ -14,6 +14,7 @@ from eomgen.model import Model
 from eomgen.run.explain import explain_by
 from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise
+from eomgen.run.origin import origin_of
 from eomgen.run.problem import Contacts, Floats, Problem, Switching
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
@@ -119,9 +120,8 @@ def as_problem(
         except FloatingPointError:  # y is so large that a method had better not have tried it
             return np.full(len(y), np.nan)
 
-    explain = explain_by(
-        model, _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
-    )
+    given = _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
+    explain = explain_by(model, *given)
     try:
         initial = module.initial_state(parameters)
     except (ValueError, ArithmeticError) as error:
@@ -131,7 +131,7 @@ def as_problem(
     except (ValueError, ArithmeticError) as error:
         why = explain(0.0, initial, initial)
         raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None
-    values = {**module.PARAMETERS, **_by_name(module.PARAMETERS, parameters)}
+    values = {**module.PARAMETERS, **given[0]}
     start = dict(zip(module.STATES, initial.tolist(), strict=True))
     size = mechanism_size(module.UNITS, values, start)
     switching = _switching(module, parameters, inputs)
@@ -148,6 +148,7 @@ def as_problem(
         corners=switching is not None,
         switching=switching,
         sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
+        origin=origin_of(model, *given) if model else None,
         noise=cache(partial(step_noise, derivative, jacobian, 0.0, initial)),
         operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
         columns=hasattr(module, "_along"),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from eomgen.errors import RunError
 from eomgen.run.intervals import Interval
+from eomgen.run.origin import Origin
 
 Floats = NDArray[np.float64]
 """An array of 64-bit floats; every state vector is one."""
@@ -87,6 +88,7 @@ class Problem:
     corners     whether the derivative has corners or jumps, as one-sided forces have: a long step
                 might leap over what begins and ends within it
     switching   where these corners are; None where that is not known
+    origin      what it was made of, which a run that goes on is held to; None if not known
 
     Raises `RunError` if `initial` has not one finite number per state, or if a quaternion has no
     length there.
@@ -104,6 +106,7 @@ class Problem:
     corners: bool = False
     switching: Switching | None = None
     sizes: tuple[float, ...] = ()
+    origin: Origin | None = None
     noise: Callable[[float], Floats] | None = None
     operations: Mapping[str, int] = field(default_factory=dict)
     columns: bool = False

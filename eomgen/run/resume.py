@@ -1,6 +1,6 @@
 """Runs that go on where an earlier one ended."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -8,8 +8,16 @@ from typing import Any, Protocol
 import numpy as np
 
 from eomgen.errors import RunError
+from eomgen.run.integrators import FixedStep, find_integrator
+from eomgen.run.integrators.gragg_bulirsch_stoer import MOST_ROWS
+from eomgen.run.integrators.interface import Adaptive
+from eomgen.run.origin import START, UNITS
 from eomgen.run.problem import Problem
+from eomgen.run.stepping import ANEW, can_go_on
 from eomgen.run.trajectory import Trajectory
+
+LISTED = 4
+"""Differences that are named; of more, their number is."""
 
 
 class Asked(Protocol):
@@ -32,51 +40,219 @@ class Asked(Protocol):
 class Start:
     """Where a run begins: the problem with its initial state, what `integrate` is told, and what
     there is to say of it.
+
+    capped  whether steps of that run were held to a part of its length; None if the words do not
+            say that it is as if it had not ended
     """
 
     problem: Problem
     options: Mapping[str, Any]
     words: str
+    capped: bool | None = None
+
+    def told(self, run: Trajectory) -> str:
+        """What there is to say once it has run."""
+        capped = self.capped is not None and (self.capped or run.counts["capped"])
+        if capped and np.isnan(run.resume.get("max_step", np.nan)):
+            return f"{self.words}, but that steps are held to a part of that run's length"
+        return self.words
 
 
-def going_on(ended: Trajectory, path: Path, problem: Problem, asked: Asked) -> Start:
+def going_on(
+    ended: Trajectory,
+    path: Path,
+    problem: Problem,
+    asked: Asked,
+    *,
+    max_step: float | None = None,
+    rest_speed: float | None = None,
+) -> Start:
     """How a problem goes on where a run ended that was read from `path`.
 
-    With the same method and step or tolerances it goes on from the last whole step, to the same
-    bytes as if that run had not ended: all methods of equal steps do, and without rigid contacts
-    RK45, DOP853 and gragg_bulirsch_stoer. The others, and those with another step, begin anew at
-    the last state.
-    Raises `RunError` if the states are not those of the problem.
+    With the same scene, parameters, inputs, method and step or tolerances it goes on from the last
+    whole step, to the same bytes as if that run had not ended: all methods of equal steps do, and
+    without rigid contacts RK45, DOP853 and gragg_bulirsch_stoer. What differs is told; then, as
+    with the other methods, the run begins anew at the last state.
+    Raises `RunError` if the run is one of another scene, or what it kept does not fit its method.
     """
+    _check_scene(ended, path, problem)
+    _check_kept(ended, path, problem)
+    settings: dict[str, float | None] = {"dt": asked.dt}
+    if asked.dt is None:
+        settings = {"rtol": asked.rtol, "atol": asked.atol, "max_step": max_step}
+    if problem.contacts:
+        settings["rest_speed"] = rest_speed
+    begin = float(ended.t[-1])
+    why = _reasons(ended, problem, asked, settings)
+    if why:
+        words = f"begins anew from the state at t = {begin:g} s: {why}"
+        return Start(replace(problem, initial=ended.y[-1]), {"t_start": begin}, words)
+    begin = float(ended.resume["t"])
+    words = f"goes on from t = {begin:g} s as if the run had not ended"
+    exactly = False
+    if not _same_bits(ended, problem):
+        words = (
+            f"goes on from t = {begin:g} s; the derivative there has other last bits than in that "
+            "run, by another --route, version or machine"
+        )
+    elif asked.dt is None and problem.contacts and ANEW not in ended.resume:
+        words += ", within its tolerances: the last contacts were found in a step that the end cut"
+    else:
+        exactly = True
+    capped = bool(ended.counts["capped"]) if exactly else None
+    return Start(problem, {"resume": ended.resume}, words, capped)
+
+
+def _check_scene(ended: Trajectory, path: Path, problem: Problem) -> None:
+    """Raise `RunError` if a run is of another scene than the problem, and say in what."""
     if ended.states != problem.states:
         raise RunError(
             f"--from: {path} has the states of '{ended.name}', {_few(ended.states)}, not those of "
             f"'{problem.name}', {_few(problem.states)}; give a run of this scene"
         )
-    begin = float(ended.t[-1])
-    same = ("rtol", "atol") if asked.dt is None else ("dt",)
+    then, now = ended.origin, problem.origin
+    if then is None or now is None:
+        return
+    different = [
+        part
+        for part in dict.fromkeys((*then.scene, *now.scene))
+        if part != START and then.scene.get(part) != now.scene.get(part)
+    ]
+    if len(different) > 1 and UNITS in different:  # new parts bring new parameters
+        different.remove(UNITS)
+    for kind in ("parameters", "inputs"):
+        mine, its = getattr(now, kind), getattr(then, kind)
+        if not different and set(mine) != set(its):
+            different.append(kind)
+    if not different and [*then.scene] != [*now.scene]:
+        different = ["order of bodies or effects"]
+    if different:
+        raise RunError(
+            f"--from: {path} is a run of another '{ended.name}': it differs in "
+            f"{_listed(different)}; give a run of this scene, or change values with --set"
+        )
+
+
+def _reasons(
+    ended: Trajectory, problem: Problem, asked: Asked, settings: Mapping[str, float | None]
+) -> str:
+    """Why a problem cannot go on as if a run had not ended; "" if it can."""
+    then, now = ended.origin, problem.origin
+    if ended.integrator != asked.integrator:
+        return f"that run was by {ended.integrator}"
     if not ended.resume:
-        why = f"{ended.integrator} keeps a history of its own"
-    elif ended.integrator != asked.integrator:
-        why = f"that run was by {ended.integrator}"
-    elif any(_differ(ended, name, getattr(asked, name)) for name in same):
-        why = "that run had another step, or other tolerances"
+        method = find_integrator(ended.integrator)
+        kept = f"{ended.integrator} keeps a history of its own, which no file holds"
+        return "that run was repaired on its way" if can_go_on(method) else kept
+    if then is None or now is None:
+        return "it is not known of what scene that run is"
+    found = [
+        f"--{name.replace('_', '-')} {_value(_kept(ended, name))}, not {_value(value)}"
+        for name, value in settings.items()
+        if _kept(ended, name) != value
+    ]
+    for mine, its in ((now.parameters, then.parameters), (now.inputs, then.inputs)):
+        found += [
+            f"{name} = {its[name]!r}, not {mine[name]!r}"
+            for name in mine
+            if np.float64(its[name]).tobytes() != np.float64(mine[name]).tobytes()
+        ]
+    measured = problem.contacts or (asked.dt is None and asked.atol is None)
+    if measured and then.scene.get(START) != now.scene.get(START):
+        found.append("another initial state, by which tolerances are measured")
+    return f"that run had {_listed(found)}" if found else ""
+
+
+def _kept(ended: Trajectory, name: str) -> float | None:
+    """A setting of the run; none is kept as nan."""
+    value = float(ended.resume[name]) if name in ended.resume else np.nan
+    return None if np.isnan(value) else value
+
+
+def _same_bits(ended: Trajectory, problem: Problem) -> bool:
+    """Whether the derivative where the run goes on is what it was, to the last bit; or unknown."""
+    if np.isnan(ended.resume["derivative"]).any():
+        return True
+    try:
+        now = problem.derivative(float(ended.resume["t"]), ended.resume["y"])
+    except (ArithmeticError, ValueError):
+        return False
+    return bool(np.asarray(now).tobytes() == ended.resume["derivative"].tobytes())
+
+
+def _check_kept(ended: Trajectory, path: Path, problem: Problem) -> None:
+    """Raise `RunError` unless what a run left is what its method needs to go on."""
+    method = find_integrator(ended.integrator)
+    if not ended.resume or not can_go_on(method):
+        return
+    needed = dict(_needed(ended, problem, method))
+    fits = set(needed) == set(ended.resume) and all(
+        shape is None or ended.resume[name].shape == shape for name, shape in needed.items()
+    )
+    if not (fits and _is_sane(ended.resume, problem)):
+        raise RunError(
+            f"{path}: what it holds to go on from does not fit {ended.integrator}; simulate again"
+        )
+
+
+def _needed(
+    ended: Trajectory, problem: Problem, method: FixedStep | Adaptive
+) -> Iterator[tuple[str, tuple[int, ...] | None]]:
+    """What goes on needs by name, and its shapes; None where any will do."""
+    ny = len(ended.states)
+    yield from dict.fromkeys(("y", "derivative"), (ny,)).items()
+    yield from dict.fromkeys(
+        ("t", "grid", "dt", "rtol", "atol", "max_step", "rest_speed"), ()
+    ).items()
+    if not isinstance(method, FixedStep):
+        yield from dict.fromkeys(("longest", "unseen"), ()).items()
+    if ANEW in ended.resume:
+        yield ANEW, ()
+        return
+    if isinstance(method, FixedStep):
+        yield "lost", (ny,)
     else:
-        begin = float(ended.resume["t"])
-        words = f"goes on from t = {begin:g} s as if the run had not ended"
-        if asked.dt is None and problem.contacts:
-            words += (
-                ", within its tolerances: the last contacts were found in a step that the end cut"
-            )
-        return Start(problem, {"resume": ended.resume}, words)
-    words = f"begins anew from the state at t = {begin:g} s: {why}"
-    return Start(replace(problem, initial=ended.y[-1]), {"t_start": begin}, words)
+        for name in method.memory:
+            yield name, (ny,) if name in method.vectors else ()
+        if problem.switching:
+            yield from (("until", ()), ("turned", ()), ("looked", None))
+    if problem.contacts:
+        yield from dict.fromkeys(("alpha", "fastest", "begun_t"), ()).items()
+        yield from (("slack", (len(problem.contacts.names),)), ("begun_y", (ny,)), ("held", None))
 
 
-def _differ(ended: Trajectory, name: str, value: float | None) -> bool:
-    """Whether the run had another value; none is kept as nan."""
-    kept = float(ended.resume[name]) if name in ended.resume else np.nan
-    return not (np.isnan(kept) if value is None else kept == value)
+def _is_sane(kept: Mapping[str, Any], problem: Problem) -> bool:
+    """Whether numbers are such as a run leaves."""
+    free = {"dt", "rtol", "atol", "max_step", "rest_speed"}
+    endless = {"longest", "until", "turned", "looked"}
+    for name, value in kept.items():
+        if name == "derivative":
+            continue
+        if name in free:
+            sane = np.isnan(value) or (np.isfinite(value) and value > 0)
+        else:
+            sane = not np.isnan(value).any() if name in endless else np.isfinite(value).all()
+        if not sane:
+            return False
+    lengths = [kept[name] for name in ("h_abs", "length", "longest", "unseen") if name in kept]
+    count = len(problem.contacts.names) if problem.contacts else 0
+    held = kept.get("held", np.empty(0))
+    return (
+        all(length > 0 for length in lengths)
+        and 0 <= kept.get("target", 0) < MOST_ROWS - 1
+        and held.ndim == 1
+        and bool(np.isin(held, np.arange(count)).all())
+        and kept.get("looked", np.empty((0, 0))).ndim == 2
+    )
+
+
+def _value(value: float | None) -> str:
+    return "at its default" if value is None else repr(value)
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - LISTED
+    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _few(states: tuple[str, ...]) -> str:

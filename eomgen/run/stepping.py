@@ -21,6 +21,9 @@ from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Resume
 from eomgen.run.problem import Problem
 
 ADAPTIVE_SAMPLES = 1001
+ANEW = "anew"
+"""Says in a `Resume` that no step was whole: what goes on from it begins like the run that left it.
+"""
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,7 @@ def equal_steps(
             dt=dt,
             every=every,
             watched=problem if looked_at and problem.contacts else looked_at,
+            stability=method.stability,
             resume=resume,
         )
 
@@ -116,4 +120,17 @@ def adaptive_steps(asked: Asked, method: Adaptive, problem: Problem) -> tuple[Be
 
 
 def _remembered(asked: Asked, dt: float | None) -> Resume:
-    return numbers(grid=asked.grid, dt=dt, rtol=asked.rtol, atol=asked.atol)
+    given = {"rtol": asked.rtol, "atol": asked.atol, "max_step": asked.max_step}
+    return numbers(grid=asked.grid, dt=dt, **given)
+
+
+def can_go_on(method: FixedStep | Adaptive) -> bool:
+    """Whether a run by a method can go on where another one ended, as if it had not."""
+    return isinstance(method, FixedStep) or bool(method.memory)
+
+
+def begun(asked: Asked, problem: Problem) -> Resume:
+    """What a later run needs to go on from the start of this one, where no step has been whole."""
+    if asked.resume is not None:
+        return asked.resume
+    return {"t": np.array(asked.t_start), "y": problem.initial, ANEW: np.array(1.0)}

@@ -10,10 +10,14 @@ from typing import Any, Literal
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.files import is_ours, write_whole
+from eomgen.files import is_ours, read_plain, write_whole
+from eomgen.run.archive import Array, checked, packed, unpacked
+from eomgen.run.origin import Origin
 from eomgen.run.problem import Floats
 
-FORMAT = "trajectory 2"
+FORMAT = "trajectory 3"
+LARGEST = 2**32
+"""Bytes of the largest file that is read: a run of a million samples of 500 states."""
 RESUME = "resume_"
 """Begins the names of members of a file that a later run goes on from."""
 COUNTS = ("steps", "derivatives", "jacobians", "impacts", "capped", "cut")
@@ -54,6 +58,7 @@ class Trajectory:
     work_names    names of these m effects
     resume        what a later run goes on from, to the same bytes as this one would have: arrays by
                   name, see `integrate`; none where the method cannot
+    origin        what motion it is of; None if that was not known
 
     Raises `ValueError` if these do not fit together.
     """
@@ -70,6 +75,7 @@ class Trajectory:
     works: Floats | None = None
     work_names: tuple[str, ...] = ()
     resume: Mapping[str, Floats] = field(default_factory=dict)
+    origin: Origin | None = None
 
     def __post_init__(self) -> None:
         t, y = np.array(self.t, dtype=np.float64), np.array(self.y, dtype=np.float64)
@@ -105,104 +111,162 @@ def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
 
     Raises `RunError` if `path` cannot be written or holds a foreign file (then give `force`).
     """
-    buffer = io.BytesIO()
+    events = trajectory.events
     # Members keep this order: `eomgen` comes first, where it marks the file as ours.
-    np.savez(
-        buffer,
-        eomgen=np.array(FORMAT),
-        t=trajectory.t,
-        y=trajectory.y,
-        states=np.array(trajectory.states, dtype=np.str_),
-        name=np.array(trajectory.name),
-        integrator=np.array(trajectory.integrator),
-        finished=np.array(trajectory.finished),
-        message=np.array(trajectory.message),
-        counts=np.array([trajectory.counts[key] for key in COUNTS], dtype=np.int64),
-        events=np.array([(event.t, event.speed) for event in trajectory.events]).reshape(-1, 2),
-        event_names=np.array(
-            [(event.contact, event.kind) for event in trajectory.events], dtype=np.str_
-        ).reshape(-1, 2),
-        **_worked(trajectory),
-        **_resumed(trajectory),
-    )
-    write_whole(path, buffer.getvalue(), force=force)
+    members: dict[str, Array] = {
+        "eomgen": np.array(FORMAT),
+        "t": trajectory.t,
+        "y": trajectory.y,
+        "states": _names(trajectory.states),
+        "name": np.array(trajectory.name),
+        "integrator": np.array(trajectory.integrator),
+        "finished": np.array(trajectory.finished),
+        "message": np.array(trajectory.message),
+        "counts": np.array([trajectory.counts[key] for key in COUNTS], dtype=np.int64),
+        "events": np.array([(event.t, event.speed) for event in events]).reshape(-1, 2),
+        "event_names": _names([(event.contact, event.kind) for event in events]).reshape(-1, 2),
+    }
+    if trajectory.works is not None:
+        members |= {"works": trajectory.works, "work_names": _names(trajectory.work_names)}
+    if trajectory.origin is not None:
+        members |= _origin_members(trajectory.origin)
+    members |= {f"{RESUME}{name}": trajectory.resume[name] for name in sorted(trajectory.resume)}
+    write_whole(path, packed(members), force=force)
 
 
-def _worked(trajectory: Trajectory) -> dict[str, Any]:
-    """The members of a file that hold works; none where they were not asked for."""
-    if trajectory.works is None:
-        return {}
-    names = np.array(trajectory.work_names, dtype=np.str_)
-    return {"works": trajectory.works, "work_names": names}
+def _names(names: Any) -> Array:
+    return np.array(names, dtype=np.str_)
 
 
-def _resumed(trajectory: Trajectory) -> dict[str, Any]:
-    """The members of a file that a later run goes on from."""
-    return {f"{RESUME}{name}": trajectory.resume[name] for name in sorted(trajectory.resume)}
+def _origin_members(origin: Origin) -> dict[str, Array]:
+    """The members of a file that hold where a motion comes from."""
+    members = {"scene": _names([*origin.scene.items()]).reshape(-1, 2)}
+    for kind in ("parameters", "inputs"):
+        values: Mapping[str, float] = getattr(origin, kind)
+        members[f"{kind}_names"] = _names([*values])
+        members[kind] = np.array([*values.values()], dtype=np.float64)
+    return members
 
 
 def load_npz(path: Path) -> Trajectory:
     """Return the trajectory that `save_npz` wrote; runs no code that the file may hold.
 
-    Raises `RunError` if the file is missing, not a trajectory of ours, or damaged.
+    What is read is what was written, by a digest over all of it. Raises `RunError` if the file is
+    missing, not a trajectory of ours, or damaged.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RunError(f"{path}: cannot be read: {error.strerror}") from None
+    data = read_plain(path, LARGEST)
     if not is_ours(data):
         raise RunError(f"{path}: is no trajectory written by eomgen")
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as members:
-            form = str(members["eomgen"])
-            if form == FORMAT:
-                return Trajectory(
-                    name=str(members["name"]),
-                    states=tuple(members["states"].tolist()),
-                    t=members["t"],
-                    y=members["y"],
-                    integrator=str(members["integrator"]),
-                    finished=bool(members["finished"]),
-                    message=str(members["message"]),
-                    counts=dict(zip(COUNTS, members["counts"].tolist(), strict=True)),
-                    events=tuple(
-                        Event(t, contact, kind, speed)
-                        for (t, speed), (contact, kind) in zip(
-                            members["events"].tolist(), members["event_names"].tolist(), strict=True
-                        )
-                    ),
-                    works=members.get("works"),
-                    work_names=tuple(members.get("work_names", np.array(())).tolist()),
-                    resume={
-                        name.removeprefix(RESUME): members[name]
-                        for name in members
-                        if name.startswith(RESUME)
-                    },
-                )
     # What a broken archive makes zipfile and NumPy raise has no common base.
-    except Exception as error:
-        text = " ".join(str(error).split())
-        raise RunError(f"{path}: is damaged ({text}); simulate again") from None
+    try:
+        members = unpacked(data)
+        form = _text(members["eomgen"])
+        if form == FORMAT:
+            return _trajectory(checked(members))
+    except Exception:
+        raise RunError(f"{path}: is damaged; simulate again") from None
     raise RunError(
         f"{path}: is in format '{form}', but this eomgen reads '{FORMAT}'; simulate again"
     )
 
 
-def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
-    """Write `trajectory` as a table: a comment line, the header, one row of t and y per time, and
-    where works were asked for, of these: work_<effect>, J.
+def _trajectory(members: dict[str, Array]) -> Trajectory:
+    """The trajectory of an archive's members, each of the type that it was written as, no others.
 
-    Numbers are the shortest that read back exactly; `np.loadtxt(path, delimiter=",",
-    skiprows=2)` loads them. Raises `RunError` as `save_npz` does.
+    Raises `ValueError` or `KeyError` if it holds none.
     """
-    comment = f"# eomgen trajectory of {trajectory.name}, integrator {trajectory.integrator}"
-    if not trajectory.finished:
-        comment += f", unfinished: {trajectory.message}"
+    rest = dict(members)
+    del rest["eomgen"]
+    counts, finished = rest.pop("counts"), rest.pop("finished")
+    if counts.dtype != np.int64 or counts.ndim != 1 or finished.dtype != np.bool_ or finished.ndim:
+        raise ValueError("numbers of another type")
+    worked, known = "works" in rest, "scene" in rest
+    pairs = zip(
+        _floats(rest.pop("events"), 2).tolist(), _strings(rest.pop("event_names"), 2), strict=True
+    )
+    made = Trajectory(
+        name=_text(rest.pop("name")),
+        states=tuple(_strings(rest.pop("states"), 1)),
+        t=_floats(rest.pop("t"), 1),
+        y=_floats(rest.pop("y"), 2),
+        integrator=_text(rest.pop("integrator")),
+        finished=bool(finished),
+        message=_text(rest.pop("message")),
+        counts=dict(zip(COUNTS, counts.tolist(), strict=True)),
+        events=tuple(Event(t, contact, kind, speed) for (t, speed), (contact, kind) in pairs),
+        works=_floats(rest.pop("works"), 2) if worked else None,
+        work_names=tuple(_strings(rest.pop("work_names"), 1)) if worked else (),
+        resume={
+            name.removeprefix(RESUME): _floats(rest.pop(name))
+            for name in members
+            if name.startswith(RESUME)
+        },
+        origin=_origin(rest) if known else None,
+    )
+    if rest:
+        raise ValueError("members that no trajectory has")
+    return made
+
+
+def _origin(rest: dict[str, Array]) -> Origin:
+    """Where a motion comes from; takes its members out."""
+    values = []
+    for kind in ("parameters", "inputs"):
+        names = _strings(rest.pop(f"{kind}_names"), 1)
+        values.append(dict(zip(names, _floats(rest.pop(kind), 1).tolist(), strict=True)))
+    return Origin(dict(_strings(rest.pop("scene"), 2)), *values)
+
+
+def _floats(array: Array, dimensions: int | None = None) -> Floats:
+    """An array of doubles. Raises `ValueError` for any other."""
+    if array.dtype != np.float64 or dimensions not in (None, array.ndim):
+        raise ValueError("no doubles, or not in that shape")
+    return array
+
+
+def _strings(array: Array, dimensions: int) -> list[Any]:
+    """Texts, or lists of them. Raises `ValueError` for anything else."""
+    if array.dtype.kind != "U" or array.ndim != dimensions:
+        raise ValueError("no texts, or not in that shape")
+    found: list[Any] = array.tolist()
+    return found
+
+
+def _text(array: Array) -> str:
+    """A text. Raises `ValueError` for anything else."""
+    if array.dtype.kind != "U" or array.ndim:
+        raise ValueError("no text")
+    return str(array)
+
+
+def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
+    """Write `trajectory` as a table: a line of names, one row of t and y per time, and where works
+    were asked for, of these: work_<effect>, J.
+
+    Numbers are the shortest that read back exactly. `pandas.read_csv(path)` loads it, and
+    `np.genfromtxt(path, delimiter=",", names=True)`. All else that there is to say of a trajectory
+    stands in the archive that `save_npz` writes. Raises `RunError` as `save_npz` does.
+    """
     buffer = io.StringIO()
-    buffer.write(" ".join(comment.split()) + "\n")
     table = csv.writer(buffer, lineterminator="\n")
     works = [] if trajectory.works is None else [trajectory.works]
-    names = [f"work_{name}" for name in trajectory.work_names]
-    table.writerow(["t", *trajectory.states, *names])
+    table.writerow(_columns(trajectory))
     table.writerows(np.column_stack([trajectory.t, trajectory.y, *works]).tolist())
-    write_whole(path, buffer.getvalue(), force=force)
+    write_whole(path, buffer.getvalue(), force=force or is_own_table(path))
+
+
+def is_own_table(path: Path) -> bool:
+    """Whether a table has the columns of a trajectory of ours beside it, in the .npz of its name.
+
+    A table that others read has no room for a mark of whose it is.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            head = next(csv.reader(file), [])
+        return head == _columns(load_npz(path.with_suffix(".npz")))
+    except (OSError, UnicodeDecodeError, csv.Error, RunError):
+        return False
+
+
+def _columns(trajectory: Trajectory) -> list[str]:
+    return ["t", *trajectory.states, *(f"work_{name}" for name in trajectory.work_names)]

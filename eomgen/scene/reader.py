@@ -115,8 +115,8 @@ def _lines(details: list[ErrorDetails]) -> list[str]:
     """One line for each place: a mistake fails every member of a union, the deepest says most."""
     lines: dict[str, tuple[int, str]] = {}
     outer: set[str] = set()
-    for detail in details:
-        detail = _of_the_whole_list(detail)
+    for single in (single for detail in details for single in _singles(detail)):
+        detail = _of_the_whole_list(single)
         place, weight = _place(detail["loc"]), _weight(detail)
         if detail["type"] in ("unknown_key", "keys"):
             place = f"{place}.{brief(detail['ctx']['key'])}"
@@ -124,6 +124,14 @@ def _lines(details: list[ErrorDetails]) -> list[str]:
         if place not in lines or weight >= lines[place][0]:
             lines[place] = weight, _line(detail)
     return [line for place, (_, line) in lines.items() if place not in outer]
+
+
+def _singles(detail: ErrorDetails) -> list[ErrorDetails]:
+    """An error for each of the unknown keys of a table; any other error as it is."""
+    if detail["type"] != "unknown_keys":
+        return [detail]
+    single: ErrorDetails = {**detail, "type": "unknown_key", "input": None}  # which may be long
+    return [{**single, "ctx": {"key": key, "hint": hint}} for key, hint in detail["ctx"]["keys"]]
 
 
 def _of_the_whole_list(detail: ErrorDetails) -> ErrorDetails:

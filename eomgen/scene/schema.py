@@ -3,7 +3,7 @@
 import sys
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import AfterValidator, Field, Strict
+from pydantic import AfterValidator, BeforeValidator, Field, Strict
 
 from eomgen.effects import Effect
 from eomgen.joints import Joint
@@ -169,12 +169,17 @@ class Simulation(Table):
     )
 
 
+def _all(value: Any) -> Any:
+    """["all"] is "all"."""
+    return "all" if value == ["all"] else value
+
+
 class Scene(Table):
     """A whole scene."""
 
     name: ModuleName
     title: Text = Field(default="", description="a line for people")
-    outputs: Literal["all"] | tuple[Output, ...] = Field(
+    outputs: Annotated[Literal["all"] | tuple[Output, ...], BeforeValidator(_all)] = Field(
         default=(), union_mode="left_to_right", description="what the module computes"
     )
     form: Form = Field(default="velocity", description="what the state is made of")

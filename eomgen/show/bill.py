@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from eomgen.show.style import FAINT, PALETTE, plain, style, write_figure
-from eomgen.study.bill import Bill, Item
+from eomgen.study.bill import Bill, Item, difference
 from eomgen.study.omission import Change
 from eomgen.study.variants import Kind
 
@@ -25,15 +25,18 @@ def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
     """
     known = [item for item in bill.items if not item.needed_by]
     items = sorted(known, key=lambda item: -item.operations)[:MOST_BARS]
-    operations, seconds = bill.shared
+    operations, seconds, spread = bill.shared
     labels = ["the mechanism itself", *map(_label, items), "shared by effects"]
     colours = [OWN, *(COLOURS[item.kind] for item in items), OWN]
     counts = [bill.bare_operations, *(item.operations for item in items), operations]
     times = [1e6 * s for s in (bill.bare_seconds, *(item.seconds for item in items), seconds)]
+    took = [f"{times[0]:.1f}", *(difference(item.seconds, item.spread) for item in items)]
+    took.append(difference(seconds, spread))
+    times = [0.0 if text[0] == "<" else time for time, text in zip(times, took, strict=True)]
     changes = [math.nan, *(_percent(item.change) for item in items), math.nan]
     panels: list[tuple[str, Sequence[float], Sequence[str]]] = [
         ("operations of a derivative", counts, [str(count) for count in counts]),
-        ("time of a call, µs", times, [f"{time:.1f}" for time in times]),
+        ("time of a call, µs", times, took),
     ]
     if bill.extent is not None:
         percents = ["" if item.change is None else item.change.percent for item in items]

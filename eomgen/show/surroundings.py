@@ -5,13 +5,17 @@ from collections.abc import Iterator
 from eomgen.effects.contact import BodyContact
 from eomgen.effects.field import ForceField
 from eomgen.joints.base import WORLD
+from eomgen.language.exact import direction
 from eomgen.model import Model
 from eomgen.show.motion import Ball, Plane
 
 
 def planes_of(model: Model) -> tuple[Plane, ...]:
     """The planes of contacts with the world, at the values of the parameters, each once."""
-    found = (Plane(c.normal, model.value(c.offset)) for c in _with_world(model, "plane"))
+    found = (
+        Plane(tuple(map(float, direction(c.normal))), model.value(c.offset))
+        for c in _with_world(model, "plane")
+    )
     return tuple(dict.fromkeys(found))
 
 

@@ -19,7 +19,7 @@ from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route, Scene
 from eomgen.study.omission import Change, Run, change, extent, run
-from eomgen.study.timing import least_seconds
+from eomgen.study.timing import least_and_spread
 from eomgen.study.variants import Kind, Variant, bare, counted
 
 MOTION = 10.0
@@ -32,6 +32,7 @@ class Item:
     """One thing that the scene has, or that it leaves out on purpose: see `Kind`.
 
     operations, seconds  of a call of `derivative` that it adds, or would add
+    spread               of the times that `seconds` is the difference of, s: see `Bill.spread`
     states, inputs       that it brings; below 0 for what takes states away, a driven joint
     route                of the equations without it, or of those with what is left out
     needed_by            effects that cannot be without it: then nothing is known of it alone
@@ -42,6 +43,7 @@ class Item:
     kind: Kind
     operations: int = 0
     seconds: float = 0.0
+    spread: float = 0.0
     states: int = 0
     inputs: int = 0
     route: str = ""
@@ -64,14 +66,16 @@ class Bill:
     """The whole and its items; `bare` is the mechanism without any effect.
 
     `route` and `bare_route` are those of their equations. `extent` is that of the scene's motion,
-    m, or None if no motion was asked for. `at_contacts` are the operations of what rigid contacts
-    bring besides `derivative`, by name: they are no part of it.
+    m, or None if no motion was asked for. `spread` is how far apart times of the same call are on
+    this machine now, s: a difference within it is none that was measured. `at_contacts` are the
+    operations of what rigid contacts bring besides `derivative`, by name: they are no part of it.
     """
 
     name: str
     route: str
     operations: int
     seconds: float
+    spread: float
     bare_route: str
     bare_operations: int
     bare_seconds: float
@@ -82,8 +86,8 @@ class Bill:
     at_contacts: Mapping[str, int]
 
     @property
-    def shared(self) -> tuple[int, float]:
-        """Operations and time, s, that go with no item alone.
+    def shared(self) -> tuple[int, float, float]:
+        """Operations and time, s, that go with no item alone, and the spread of that time.
 
         Effects share work: two that ask for the velocity of one point pay for it once, and it stays
         when one of them goes. So does what another route costs that only the bare mechanism lets
@@ -93,6 +97,7 @@ class Bill:
         return (
             self.operations - self.bare_operations - sum(item.operations for item in items),
             self.seconds - self.bare_seconds - sum(item.seconds for item in items),
+            self.spread + sum(item.spread for item in items),
         )
 
 
@@ -105,6 +110,7 @@ class _Made:
     route: str
     operations: int
     seconds: float = 0.0
+    spread: float = 0.0
 
 
 def bill(
@@ -142,6 +148,7 @@ def bill(
         route=whole.route,
         operations=whole.operations,
         seconds=whole.seconds,
+        spread=whole.spread,
         bare_route=without.route,
         bare_operations=without.operations,
         bare_seconds=without.seconds,
@@ -154,6 +161,12 @@ def bill(
         extent=size,
         at_contacts={name: cost[name]["total"] for name in AT_CONTACTS if name in cost},
     )
+
+
+def difference(seconds: float, spread: float) -> str:
+    """A difference of times in µs; of one within the spread of times no more than that it is."""
+    text = f"{1e6 * seconds:.1f}"
+    return text if abs(seconds) > spread and float(text) else f"< {max(1e6 * spread, 0.1):.1f}"
 
 
 def _there(made: _Made | None) -> _Made:
@@ -194,6 +207,7 @@ def _item(whole: _Made, part: Variant, other: _Made | None, change: Change | Non
         part.kind,
         more.operations - less.operations,
         more.seconds - less.seconds,
+        more.spread + less.spread,
         len(more.module.STATES) - len(less.module.STATES),
         len(more.model.inputs) - len(less.model.inputs),
         route=other.route,
@@ -202,10 +216,15 @@ def _item(whole: _Made, part: Variant, other: _Made | None, change: Change | Non
 
 
 def _timed(made: Sequence[_Made | None]) -> list[_Made | None]:
-    """With the least time of a call in s."""
-    least = least_seconds([_call(one.module) for one in made if one is not None])
-    found = iter(least)
-    return [None if one is None else replace(one, seconds=next(found)) for one in made]
+    """With the least time of a call in s, and its spread."""
+    found = iter(least_and_spread([_call(one.module) for one in made if one is not None]))
+    timed = []
+    for one in made:
+        if one is not None:
+            seconds, spread = next(found)
+            one = replace(one, seconds=seconds, spread=spread)
+        timed.append(one)
+    return timed
 
 
 def _call(module: GeneratedModule) -> Callable[[], object]:

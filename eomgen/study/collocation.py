@@ -312,27 +312,27 @@ def rows(
     scale: Floats,
     times: Floats,
     tolerance: float,
-    check: Callable[[], None] = lambda: None,
+    told: Callable[[float], None] = lambda t: None,
 ) -> Iterator[Row]:
     """The motion at each of `times`, ascending; the first is the start.
 
     ladder     numbers of stages, ascending; a step takes the least that serve
     tolerance  what each step's error is held to, in parts of the scale
-    check      called now and then; what it raises ends this
+    told       where each step begins, s, whether it is taken or not; may raise to end it
 
     Every row ends a step, so that rows are as accurate as the end; so does every turn of a corner.
     Long numbers must be on (`digits`) wherever this is resumed. Raises `NoStep` if steps shrink to
     nothing, or corners turn again and again.
     """
-    forecast = Forecast(problem, scale, float(times[-1]), check)
     start = np.array(precise.initial, dtype=object)
     way = _Way(ladder, mpfr(float(times[0])), start, mpfr(float(times[1] - times[0])))
+    forecast = Forecast(problem, scale, float(times[-1]), lambda: told(float(way.t)))
     yield Row(start, 0, way.extent)
     for end in times[1:]:
         target = mpfr(float(end))
         turn, tried, h = None, 0, mpfr(0)
         while way.t < target:
-            check()
+            told(float(way.t))
             left = target - way.t
             count = max(1, math.ceil(left / way.length * 0.999))
             h = left / count if turn is None else h + h * turn.beyond

@@ -1,4 +1,6 @@
-"""Where a mechanism can stay at rest: positions, and inputs, at which no velocity changes."""
+"""Where a mechanism can stay at rest: positions, states of controllers and inputs at which nothing
+changes.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -10,7 +12,13 @@ from numpy.typing import NDArray
 from eomgen.errors import RunError, nearest
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
-from eomgen.study.linearise import evaluated, input_jacobian, input_values, tangents
+from eomgen.study.linearise import (
+    evaluated,
+    input_jacobian,
+    input_values,
+    rate_unit,
+    tangents,
+)
 
 MOST_STEPS = 60
 """Steps to the nearest equilibrium: from near they are few, and what takes more is far."""
@@ -47,7 +55,8 @@ def equilibrium(
     trim: Sequence[str] = (),
     settle: bool = False,
 ) -> Equilibrium:
-    """Find an equilibrium near the positions of `guess` (ny,), stable or not.
+    """Find an equilibrium near the positions and states of controllers of `guess` (ny,), stable or
+    not. Its velocities are 0, whatever those of the guess.
 
     hold    coordinates that stay as guessed; one component of a quaternion stands for all four
     trim    inputs to be found too, near their values in `u`
@@ -55,7 +64,7 @@ def equilibrium(
             nearest; that is also where it goes if there is none near. Without `trim`
 
     Coordinates that do not matter, such as the place of what floats, stay as guessed. Raises
-    `RunError`, naming the largest acceleration that is left, if there is none or none is found.
+    `RunError`, naming the fastest change that is left, if there is none or none is found.
     """
     if settle and trim:
         raise RunError("equilibrium: inputs are trimmed for the nearest equilibrium only")
@@ -72,28 +81,31 @@ def equilibrium(
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """The mechanism at rest at the positions of `y` under `u`, and its `accelerations` (nv,)."""
+    """The mechanism at rest at the positions of `y` under `u`, and its `changes` (nv + nx,): the
+    rates of velocities and of states of controllers.
+    """
 
     y: Floats
     u: Floats
-    accelerations: Floats
+    changes: Floats
 
     @property
     def largest(self) -> float:
-        """The largest acceleration, m/s² or rad/s²."""
-        return float(np.max(np.abs(self.accelerations), initial=0.0))
+        """The largest change, in SI units."""
+        return float(np.max(np.abs(self.changes), initial=0.0))
 
     @property
     def size(self) -> float:
-        """That of all accelerations together; not a number if they are none."""
-        return float(np.sqrt(np.sum(self.accelerations**2)))
+        """That of all changes together; not a number if they are none."""
+        return float(np.sqrt(np.sum(self.changes**2)))
 
 
 class _Search:
     """Places of one module, and the steps between them.
 
-    The unknowns are small displacements, three rotations for a quaternion, and then the inputs;
-    `free` are those among them that may change, `moving` the displacements that may.
+    The unknowns are small displacements, three rotations for a quaternion, then the states of
+    controllers, then the inputs; `free` are those among them that may change, `moving` those of
+    them that are no inputs.
     """
 
     def __init__(
@@ -101,7 +113,9 @@ class _Search:
     ) -> None:
         self._module, self._p = module, p
         self._nq, self._nv = len(module.POSITIONS), len(held)
-        self._turns = _turns(module)
+        self._nx = len(module.STATES) - self._nq - self._nv
+        self._turns = np.append(_turns(module), np.zeros(self._nx, dtype=np.bool_))
+        held = np.append(held, np.zeros(self._nx, dtype=np.bool_))
         self.free = np.flatnonzero(np.concatenate([~held, trimmed]))
         self.moving = np.flatnonzero(~held)
 
@@ -110,38 +124,41 @@ class _Search:
         if not np.isfinite(y).all():
             raise RunError("equilibrium: the positions are not finite; start elsewhere")
         y = y.copy()
-        y[self._nq :] = 0.0
+        y[self._nq : self._nq + self._nv] = 0.0
         for indices in self._module.QUATERNIONS:
             y[list(indices)] /= np.linalg.norm(y[list(indices)])
         return _Place(y, u, self._asked(self._module.derivative, y, u)[self._nq :])
 
     def slopes(self, place: _Place) -> Floats:
-        """Derivatives of the accelerations by the free unknowns, (nv, nf)."""
-        by_state = self._asked(self._module.jacobian, place.y, place.u)[self._nq :, : self._nq]
-        by_place = by_state @ self._tangents(place)
-        if np.max(self.free, initial=0) < self._nv:
+        """Derivatives of the changes by the free unknowns, (nv + nx, nf)."""
+        by_state = self._asked(self._module.jacobian, place.y, place.u)[self._nq :]
+        by_position = by_state[:, : self._nq] @ self._tangents(place)
+        by_place = np.hstack([by_position, by_state[:, self._nq + self._nv :]])
+        if np.max(self.free, initial=0) < self._nv + self._nx:
             return np.asarray(by_place[:, self.free])
         by_input = self._asked(input_jacobian(self._module), place.y, place.u)[self._nq :]
         return np.hstack([by_place, by_input])[:, self.free]
 
     def at_rest(self, place: _Place, slopes: Floats | None = None) -> bool:
-        """Whether the accelerations that are left are rounding."""
+        """Whether the changes that are left are rounding."""
         slopes = self.slopes(place) if slopes is None else slopes
         return place.largest <= CLOSE * max(1.0, float(np.max(np.abs(slopes), initial=0.0)))
 
     def turn(self, step: Floats) -> float:
-        """The most by which a step of displacements that may move turns anything, rad."""
+        """The most by which a step of what may move turns anything, rad."""
         return float(np.max(np.abs(step[self._turns[self.moving]]), initial=0.0))
 
     def moved(self, place: _Place, step: Floats) -> _Place:
         """The place a step of the free unknowns away, shortened if it turns anything too far."""
-        whole = np.zeros(self._nv + len(place.u))
+        nv, inputs = self._nv, self._nv + self._nx
+        whole = np.zeros(inputs + len(place.u))
         whole[self.free] = step
-        turn = float(np.max(np.abs(whole[: self._nv][self._turns]), initial=0.0))
+        turn = float(np.max(np.abs(whole[:inputs][self._turns]), initial=0.0))
         whole *= min(1.0, LONGEST / turn) if turn else 1.0
         y = place.y.copy()
-        y[: self._nq] += self._tangents(place) @ whole[: self._nv]
-        return self.look(y, place.u + whole[self._nv :])
+        y[: self._nq] += self._tangents(place) @ whole[:nv]
+        y[self._nq + nv :] += whole[nv:inputs]
+        return self.look(y, place.u + whole[inputs:])
 
     def _tangents(self, place: _Place) -> Floats:
         return tangents(place.y[: self._nq], self._module.QUATERNIONS)
@@ -151,7 +168,7 @@ class _Search:
 
 
 def _nearest(search: _Search, place: _Place) -> _Place:
-    """Follow Levenberg and Marquardt's method down to where no step makes accelerations less.
+    """Follow Levenberg and Marquardt's method down to where no step makes the changes less.
 
     Nocedal, Wright, Numerical Optimization, section 10.3; a damped step leaves alone what does not
     matter.
@@ -163,7 +180,7 @@ def _nearest(search: _Search, place: _Place) -> _Place:
         # What matters by rounding only must not be scaled up to matter.
         scales = np.maximum(scale, 1e-8 * np.max(scale)) if np.any(scale) else np.ones(len(scale))
         matrix = np.vstack([slopes / scales, np.sqrt(damping) * np.eye(len(scale))])
-        right = np.concatenate([-place.accelerations, np.zeros(len(scale))])
+        right = np.concatenate([-place.changes, np.zeros(len(scale))])
         new = search.moved(place, np.linalg.lstsq(matrix, right)[0] / scales)
         better = new.size < place.size
         done = search.at_rest(place, slopes) and not new.size < place.size / 2
@@ -178,7 +195,8 @@ def _nearest(search: _Search, place: _Place) -> _Place:
 
 
 def _fallen(search: _Search, place: _Place) -> _Place:
-    """Follow q' = v̇(q), the fall through treacle, by implicit steps that grow as it slows down.
+    """Follow q' = v̇(q), the fall through treacle, by implicit steps that grow as it slows down;
+    states of controllers follow their own rates.
 
     Pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35 (1998), 508.
     A step is kept shorter than the time in which it falls off what is unstable; a longer one would
@@ -217,7 +235,7 @@ def _implicit_step(
     """A step of the fall, and its duration: less than what was asked for if it turns much."""
     while True:
         matrix = np.eye(len(square)) / duration - square
-        step: Floats = np.linalg.lstsq(matrix, place.accelerations[search.moving])[0].astype(float)
+        step: Floats = np.linalg.lstsq(matrix, place.changes[search.moving])[0].astype(float)
         turn = search.turn(step)
         if not turn > LONGEST_FALL:
             return step, duration
@@ -262,11 +280,10 @@ def _trimmed(module: GeneratedModule, names: Iterable[str]) -> NDArray[np.bool_]
 
 
 def _not_found(module: GeneratedModule, place: _Place, slopes: Floats) -> str:
-    worst = int(np.argmax(np.abs(place.accelerations)))
+    worst = int(np.argmax(np.abs(place.changes)))
     name = module.STATES[len(module.POSITIONS) + worst]
-    unit = module.UNITS[name].replace("/s", "/s^2")
-    left = f"{name} still changes by {place.accelerations[worst]:.4g} {unit}"
-    downhill = np.linalg.norm(slopes.T @ place.accelerations)
+    left = f"{name} still changes by {place.changes[worst]:.4g} {rate_unit(module.UNITS[name])}"
+    downhill = np.linalg.norm(slopes.T @ place.changes)
     if downhill <= 1e-6 * np.linalg.norm(slopes) * place.size:
         return (
             f"no equilibrium: {left}, and nothing that may move changes that; "

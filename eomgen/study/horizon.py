@@ -10,9 +10,11 @@ from eomgen.model import Model
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.problem import Problem
 from eomgen.run.progress import Progress
+from eomgen.run.trajectory import Trajectory
 from eomgen.study.precise import BITS
-from eomgen.study.reference import ROWS, reference
+from eomgen.study.reference import ROWS, Reference, TooLongError, paced, reference
 
 PARTED = 0.01
 """Of the motion's scale (see `measure`): doubles that are this far off mean nothing any more."""
@@ -61,7 +63,7 @@ def horizon(
 ) -> Horizon:
     """Compare the scene's own run, held as tight as doubles go, with the motion in long numbers.
 
-    seconds  of processor time that the long numbers may take
+    seconds  of processor time that the long numbers may take, and each run in doubles
 
     Raises `RunError` where contacts strike or where that time does not suffice, which leaves
     nothing to compare with, and where a run does not get to its end.
@@ -85,15 +87,14 @@ def horizon(
         raise RunError(
             f"horizon: {error}; give a longer --horizon, or a shorter t_end in the scene"
         ) from None
-    run = integrate(
-        problem,
-        METHOD,
-        t_end,
-        rtol=SMALLEST_RTOL,
-        atol=SMALLEST_RTOL * 0.1 * float(np.min(true.scale)),
-        samples=ROWS,
-        progress=lambda part: progress(0.9 + 0.1 * part),
-    )
+    watched = paced(problem, t_end, seconds, lambda part: progress(0.9 + 0.1 * part))
+    try:
+        run = _tight(watched, t_end, true)
+    except TooLongError as reason:
+        raise RunError(
+            f"horizon: {METHOD} takes {reason}; give a longer --horizon, or a shorter t_end in the "
+            "scene"
+        ) from None
     if run.message.startswith("interrupted"):
         raise KeyboardInterrupt
     if not run.finished:
@@ -103,3 +104,15 @@ def horizon(
     parted = np.flatnonzero(off > PARTED)
     time = float(true.t[parted[0]]) if len(parted) else None
     return Horizon(time, t_end, float(np.max(off)), true.error, f"{BITS}-bit Gauss collocation")
+
+
+def _tight(problem: Problem, t_end: float, true: Reference) -> Trajectory:
+    """The run as tight as doubles go."""
+    return integrate(
+        problem,
+        METHOD,
+        t_end,
+        rtol=SMALLEST_RTOL,
+        atol=SMALLEST_RTOL * 0.1 * float(np.min(true.scale)),
+        samples=ROWS,
+    )

@@ -16,6 +16,8 @@ from eomgen.run.problem import Floats
 FORMAT = "linearisation 1"
 BOUND = 1e100
 """Numbers from here on are taken for infinite: their squares nearly are."""
+_STEADY = 1e-9
+"""Of the largest of A: less is rounding."""
 _UNIT = 1e-9
 """How far from 1 a quaternion's length may be."""
 
@@ -101,6 +103,30 @@ def linearise(module: GeneratedModule, y: Floats, u: Any = None, p: Any = None) 
     )
 
 
+def is_steady(module: GeneratedModule, made: Linearisation, p: Any = None) -> bool:
+    """Whether `made` is about a steady motion: its velocities are not all 0 and, with the states of
+    controllers, do not change, and half a radian or metre on, A and B are the same but for
+    rounding.
+    """
+    nq = len(module.POSITIONS)
+    fastest = float(np.max(np.abs(made.rates[:nq]), initial=0.0))
+    rest = float(np.max(np.abs(made.rates[nq:]), initial=0.0))
+    here = made.reduced()
+    size = max(1.0, float(np.max(np.abs(here.A), initial=0.0)))
+    if not fastest > 0 or rest > _STEADY * size:
+        return False
+    y = made.y + 0.5 / fastest * made.rates
+    for indices in map(list, module.QUATERNIONS):
+        y[indices] /= np.linalg.norm(y[indices])
+    try:
+        there = linearise(module, y, made.u, p)
+    except RunError:
+        return False
+    on = there.reduced()
+    left = (there.rates[nq:], here.A - on.A, here.B - on.B)
+    return all(float(np.max(np.abs(part), initial=0.0)) <= _STEADY * size for part in left)
+
+
 def evaluated(function: Callable[..., Floats], y: Floats, p: Any, u: Floats, what: str) -> Floats:
     """A function of a module at a state. Raises `RunError` if it refuses or knows no bounds."""
     try:
@@ -123,6 +149,13 @@ def input_jacobian(module: GeneratedModule) -> Callable[..., Floats]:
             "linearise: the module has no input_jacobian; generate it with --outputs input_jacobian"
         )
     return function
+
+
+def rate_unit(unit: str) -> str:
+    """The unit of the rate of what has a unit: m/s^2 for m/s, rad for rad s, N m/s for N m."""
+    if unit.endswith("/s"):
+        return f"{unit}^2"
+    return unit.removesuffix(" s") if unit.endswith(" s") else f"{unit or '1'}/s"
 
 
 def input_values(module: GeneratedModule, u: Any) -> Floats:

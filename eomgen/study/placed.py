@@ -57,6 +57,9 @@ class Placed:
         self._time = mpfr(t)
         y, nq = long(y), len(model.coordinates)
         given = [self._prescribed(c.value) for c in model.prescribed]
+        for n, c in enumerate(model.prescribed):
+            if (degrees := dict(model.locked_deg).get(c.position.name)) is not None:
+                given[n] = (mpfr(degrees) * gmpy2.const_pi() / 180, *given[n][1:])
         self.q: list[Long] = [*y[:nq], *(x for x, _, _ in given)]
         self.v: list[Long] = [*y[nq : nq + self.nv], *(v for _, v, _ in given)]
         self.driven_rates = long([a for _, _, a in given[: len(model.driven)]])
@@ -140,7 +143,7 @@ class Placed:
         """An extra state."""
         return self._states[name]
 
-    def number(self, value: float) -> Long:
+    def number(self, value: Any) -> Long:
         """A number."""
         return self.scalars.number(value)
 

@@ -10,7 +10,7 @@ is the stated error, and the origin says so.
 import hashlib
 import io
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats, Problem
-from eomgen.run.progress import Progress
+from eomgen.run.progress import Progress, throttled
 from eomgen.run.tally import Tally
 from eomgen.study import measure
 from eomgen.study.collocation import Longs, Row, rows
@@ -39,8 +39,12 @@ TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
 """Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
 FORMAT = "reference 4"
 """Changes whenever a reference would come out otherwise."""
+_SOON = 1.0
+"""A run in doubles may always take so long, s."""
+_LOOKS = 64
+"""Derivatives after which a run in doubles looks at the clock."""
 SELDOM = 50
-"""Of so many steps, one looks at the clock."""
+"""Of so many steps in long numbers, one looks at the clock."""
 _JUDGED = 0.1
 """Share of the time after which the pace tells whether it will suffice."""
 
@@ -72,8 +76,28 @@ _Found = tuple[Floats, Floats, Floats, str]
 all that was found."""
 
 
-class _TooLongError(Exception):
+class TooLongError(Exception):
     """It would take longer than allowed."""
+
+
+def paced(problem: Problem, t_end: float, seconds: float, progress: Progress) -> Problem:
+    """The same problem, of which a run up to `t_end`, s, tells how far it is and ends where it
+    clearly takes more than `seconds` of processor time, or a second: by `TooLongError` from its
+    derivative, since a step may be tried again and again.
+    """
+    began, calls, told = time.process_time(), 0, throttled(progress)
+    allowed = max(seconds, _SOON)
+
+    def derivative(t: float, y: Floats) -> Floats:
+        nonlocal calls
+        calls += 1
+        if not calls % _LOOKS:
+            done = min(max(float(t) / t_end, 0.0), 1.0)
+            told(done)
+            _check_pace(time.process_time() - began, done, allowed, "doubles")
+        return problem.derivative(t, y)
+
+    return replace(problem, derivative=derivative)
 
 
 def reference(
@@ -111,14 +135,19 @@ def reference(
         return kept
     began = time.monotonic()
     times = np.linspace(0.0, t_end, ROWS)
-    scale = measure.scales(module.STATES, module.UNITS, _roughly(problem, t_end, rest_speed))
+    watched = problem if doubles else paced(problem, t_end, seconds, lambda _: told(0.0))
+    try:
+        rough = _roughly(watched, t_end, rest_speed)
+    except TooLongError as reason:
+        raise RunError(f"no run of {t_end:g} s: {reason} already") from None
+    scale = measure.scales(module.STATES, module.UNITS, rough)
     found = None
     if problem.contacts is None and seconds > 0:
         try:
             found = _in_long_numbers(
                 module, problem, parameters, inputs, times, scale, seconds, told
             )
-        except (_TooLongError, ArithmeticError, ValueError) as reason:
+        except (TooLongError, ArithmeticError, ValueError) as reason:
             why = str(reason)
     else:
         why = "rigid contacts" if problem.contacts else "as asked"
@@ -144,7 +173,7 @@ def _in_long_numbers(
     seconds: float,
     progress: Progress,
 ) -> _Found:
-    """The motion by Gauss collocation. Raises `_TooLongError` where that takes longer."""
+    """The motion by Gauss collocation. Raises `TooLongError` where that takes longer."""
     began = time.process_time()
 
     def run(
@@ -153,17 +182,18 @@ def _in_long_numbers(
         found: list[Longs] = []
         calls = count()
 
-        def check() -> None:
+        def told(t: float) -> None:
             if next(calls) % SELDOM:  # to look at the clock takes as long as a step
                 return
-            done = before + share * len(found) / len(times)
-            _check_pace(time.process_time() - began, done, seconds)
+            done = before + share * t / float(times[-1])
+            progress(done)
+            _check_pace(time.process_time() - began, done, seconds, "long numbers")
 
         exactly = precise(module, parameters, inputs, problem.initial, watched=True)
         with digits():
-            for row in rows(stages, exactly, problem, scale, times, tolerance, check):
+            for row in rows(stages, exactly, problem, scale, times, tolerance, told):
                 found.append(row.y)
-                progress(before + share * len(found) / len(times))
+        progress(before + share)
         return np.array(found), row
 
     # The looser one goes first: it is the cheaper one to give up.
@@ -179,10 +209,10 @@ def _in_long_numbers(
     return y, y + off, last.extent, origin
 
 
-def _check_pace(spent: float, done: float, seconds: float) -> None:
-    """Raise `_TooLongError` if the time is over, or clearly will be."""
+def _check_pace(spent: float, done: float, seconds: float, numbers: str) -> None:
+    """Raise `TooLongError` if the time is over, or clearly will be."""
     if spent > seconds or (spent > _JUDGED * seconds and spent > 1.5 * done * seconds):
-        raise _TooLongError(f"more than {seconds:g} s in long numbers")
+        raise TooLongError(f"more than {seconds:g} s in {numbers}")
 
 
 def _roughly(problem: Problem, t_end: float, rest_speed: float | None) -> Floats:

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Sequence
-from math import inf
 
 TIMING = 1.0
 """About how long all calls that are timed take together, s."""
@@ -13,13 +12,21 @@ LEAST_ROUNDS = 7
 
 def least_seconds(calls: Sequence[Callable[[], object]]) -> list[float]:
     """The least time of a call of each, s, all in turn: a busy machine is busy for all."""
+    return [least for least, _ in least_and_spread(calls)]
+
+
+def least_and_spread(calls: Sequence[Callable[[], object]]) -> list[tuple[float, float]]:
+    """The same, and how far above it, s, a quarter of the rounds stay: what is to be thought of a
+    difference that is no larger.
+    """
     counts = [1 + int(CHUNK / min(_seconds(call, 1) for _ in range(5))) for call in calls]
-    least, rounds, begin = [inf] * len(calls), 0, time.perf_counter()
+    times: list[list[float]] = [[] for _ in calls]
+    rounds, begin = 0, time.perf_counter()
     while rounds < LEAST_ROUNDS or time.perf_counter() < begin + TIMING:
-        for k, (call, count) in enumerate(zip(calls, counts, strict=True)):
-            least[k] = min(least[k], _seconds(call, count))
+        for own, call, count in zip(times, calls, counts, strict=True):
+            own.append(_seconds(call, count))
         rounds += 1
-    return least
+    return [(min(own), sorted(own)[len(own) // 4] - min(own)) for own in times]
 
 
 def _seconds(call: Callable[[], object], count: int) -> float:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parent.parent))
 
-from test_no_silent_error import case, tried
+from test_no_silent_error import WELL, case, tried
 
 BATCH = 500
 
@@ -29,8 +29,8 @@ def main() -> None:
     gc.disable()  # a quarter of the time goes into it, and there is nothing much to find
     for number in range(given.first, given.first + given.count):
         outcome = tried(*case(number))
-        counts[outcome if outcome in ("right", "refused") else "silent"] += 1
-        if outcome not in ("right", "refused"):
+        counts[outcome if outcome in WELL else "silent"] += 1
+        if outcome not in WELL:
             print(f"{number}: {outcome}", flush=True)
         if (number + 1) % BATCH == 0:
             print(f"to {number + 1}: {dict(counts)}", flush=True)

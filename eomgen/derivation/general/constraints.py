@@ -8,17 +8,16 @@ components. A point that is fixed in axes turning at ω moves by r' + ω x r.
     constraint     x_child + r_child = x_parent + r_parent + E s(q)
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import sympy as sp
 
 from eomgen.derivation.general.symbols import Ledger, Symbols, rate, real, triple
 from eomgen.derivation.symbols import Expr
 from eomgen.joints import Free, Joint
 from eomgen.joints.base import Move
+from eomgen.language.exact import direction, orientation, quarters, radians
 from eomgen.model import Body, Model
 
 
@@ -92,10 +91,11 @@ def _differentiated(
     joint = body.joint
     axes, r_parent, arm = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
     if not isinstance(joint, Free):
-        axes = _orientation(joint.orientation_deg)
+        fixed = orientation(joint.orientation_deg)
+        axes = sp.Matrix([[symbols.number(entry) for entry in row] for row in fixed])
         r_parent, arm = symbols.vector(joint.r_parent), symbols.vector(joint.r_child)
     moves = joint.moves(model.dimensions)
-    rotation, turning, slide = _moved(body.name, moves, q, v, ledger)
+    rotation, turning, slide = _moved(body.name, moves, q, v, symbols, ledger)
     if moves and not all(_simple(move) for move in moves):
         rotation = _entries(body.name, rotation, turning, ledger)
     inward, back = axes.T, rotation.T
@@ -116,7 +116,7 @@ def _differentiated(
         reach=reach,
         arm=arm,
         turning=turning,
-        turn=_turn_of(joint, moves, q, model.dimensions),
+        turn=_turn_of(joint, moves, q, symbols, model.dimensions),
         parent=parent,
         own=own,
         omega=omega,
@@ -128,7 +128,12 @@ def _differentiated(
 
 
 def _moved(
-    name: str, moves: Sequence[Move], q: Sequence[Expr], v: Sequence[Expr], ledger: Ledger
+    name: str,
+    moves: Sequence[Move],
+    q: Sequence[Expr],
+    v: Sequence[Expr],
+    symbols: Symbols,
+    ledger: Ledger,
 ) -> tuple[Expr, Expr, Expr]:
     """Rotation, angular velocity in the turned axes, and slide of a row of moves; q' by the way."""
     rotation, turning, slide = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
@@ -149,7 +154,7 @@ def _moved(
             q, v = q[4:], v[3:]
             continue
         ledger.rates[q[0]] = v[0]
-        axis = sp.Matrix([number(part) for part in move.axis])
+        axis = sp.Matrix([symbols.number(part) for part in direction(move.axis)])
         if move.kind == "slide":
             slide += rotation * axis * q[0]
         else:
@@ -160,7 +165,7 @@ def _moved(
 
 
 def _turn_of(
-    joint: Joint, moves: Sequence[Move], q: Sequence[Expr], dimensions: int
+    joint: Joint, moves: Sequence[Move], q: Sequence[Expr], symbols: Symbols, dimensions: int
 ) -> tuple[Expr, Expr] | None:
     """Coordinate axis and angle of a joint whose turns are all about one; the angle is 0 of none.
 
@@ -169,24 +174,24 @@ def _turn_of(
     axis, angle = sp.zeros(3, 1), sp.Integer(0)
     degrees = 0.0 if isinstance(joint, Free) else joint.orientation_deg
     if dimensions == 2 and not isinstance(degrees, tuple) and degrees != 0.0:
-        quarters, rest = divmod(degrees, 90.0)
-        axis = sp.Matrix([0, 0, 1])
-        angle = sp.Float(math.radians(degrees)) if rest else int(quarters) * sp.pi / 2
+        count, rest = quarters(radians(degrees))
+        axis, angle = sp.Matrix([0, 0, 1]), count * sp.pi / 2 + symbols.number(rest)
     elif degrees not in (0.0, (0.0, 0.0, 0.0)):
         return None
     for move, coordinate in zip(moves, q, strict=False):  # a spin has four
         if move.kind == "slide":
             continue
-        along = sp.Matrix([abs(number(part)) for part in move.axis])
+        along = sp.Matrix([int(part != 0) for part in move.axis])
         if not _simple(move) or (any(axis) and along != axis):
             return None
-        axis, angle = along, angle + sum(number(part) for part in move.axis) * coordinate
+        way = sum(symbols.number(part) for part in direction(move.axis))
+        axis, angle = along, angle + way * coordinate
     return axis, angle
 
 
 def _simple(move: Move) -> bool:
     """Whether a move's rotation has one sine or cosine in an entry: slides, and coordinate axes."""
-    along = sorted(map(abs, move.axis)) == [0.0, 0.0, 1.0]
+    along = sum(part != 0.0 for part in move.axis) == 1
     return move.kind == "slide" or (move.kind == "turn" and along)
 
 
@@ -211,15 +216,15 @@ def _place(symbol: Expr) -> tuple[int, int]:
     return "xyz".index(row), "xyz".index(column)
 
 
-def number(value: float) -> Expr:
-    """A number of the scene's structure: whole ones exact, so that what they make zero vanishes."""
-    return sp.Integer(int(value)) if value.is_integer() else sp.Float(value)
-
-
 def about(axis: Expr, angle: Expr) -> Expr:
-    """The rotation about a unit vector: n nᵀ + cos (1 - n nᵀ) + sin [n]x."""
+    """The rotation about a unit vector: n nᵀ + cos (1 - n nᵀ) + sin [n]x.
+
+    1 - n_x² is n_y² + n_z², of which nothing cancels where n is nearly x.
+    """
     along = axis * axis.T
-    return along + sp.cos(angle) * (sp.eye(3) - along) + sp.sin(angle) * hat(axis)
+    x, y, z = (along[i, i] for i in range(3))
+    across = sp.diag(y + z, x + z, x + y) + sp.diag(x, y, z) - along
+    return along + sp.cos(angle) * across + sp.sin(angle) * hat(axis)
 
 
 def hat(a: Expr) -> Expr:
@@ -238,22 +243,3 @@ def of_quaternion(q: Sequence[Expr], k: Expr) -> Expr:
             [k * (x * z - w * y), k * (y * z + w * x), 1 - k * (x**2 + y**2)],
         ]
     )
-
-
-def _orientation(degrees: float | tuple[float, float, float]) -> Expr:
-    """E = Rz Ry Rx of three angles; exact for quarter turns."""
-    x, y, z = degrees if isinstance(degrees, tuple) else (0.0, 0.0, degrees)
-    matrix = _turn(2, z) @ _turn(1, y) @ _turn(0, x)
-    return sp.Matrix(3, 3, lambda i, j: number(float(matrix[i, j])))
-
-
-def _turn(k: int, degrees: float) -> np.ndarray:
-    quarters, rest = divmod(degrees, 90.0)
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    if rest == 0.0:
-        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
-    i, j = (k + 1) % 3, (k + 2) % 3
-    matrix = np.eye(3)
-    matrix[i, i] = matrix[j, j] = c
-    matrix[i, j], matrix[j, i] = -s, s
-    return matrix

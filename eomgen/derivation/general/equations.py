@@ -245,7 +245,7 @@ class World:
     def _rotation(self, body: int, base: int) -> Expr:
         turn = self.turn(body, base)
         if turn is not None:
-            return about(*turn)
+            return about(*turn) if any(turn[0]) else sp.eye(3)
         c, parent = self._constraints[body], self._model.bodies[body].parent
         whole = self.rotation(parent, base) * (c.axes * c.rotation)
         if parent == base and c.axes == sp.eye(3):

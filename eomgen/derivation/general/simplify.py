@@ -113,7 +113,7 @@ def _nested(expression: Expr) -> Expr:
 
 def _factored(coefficient: Expr) -> Expr:
     """A coefficient over one denominator, its numerator factored where that is quick."""
-    if coefficient.is_Atom or coefficient.has(sp.Float):
+    if coefficient.is_Atom:
         return coefficient
     top, bottom = sp.fraction(sp.together(coefficient))
     top = sp.expand(top)

@@ -7,7 +7,9 @@ import sympy as sp
 
 from eomgen.derivation.general.simplify import gathered
 from eomgen.derivation.symbols import Expr, SympyScalars
+from eomgen.joints import Free
 from eomgen.joints.base import Geared
+from eomgen.language.exact import Real, direction, opposite, orientation, quarters, radians
 from eomgen.language.formula import Formula, Name, calls_function, evaluate
 from eomgen.model import Model
 
@@ -18,11 +20,13 @@ class Symbols:
 
     `q`, `v`, `a` are coordinates, velocities and their derivatives v̇, `tau` generalised forces
     beside those of the effects. `formulas` are quantities with functions in them, each one symbol
-    to the derivation. `fixed` holds all symbols that depend on parameters alone.
+    to the derivation; `numbers` are those of fixed rotations, axes and angles, by their sizes.
+    `fixed` holds all symbols that depend on parameters alone.
     """
 
     parameters: dict[str, Expr]
     formulas: dict[Formula, Expr]
+    numbers: dict[Real, Expr]
     inputs: dict[str, Expr]
     q: tuple[Expr, ...]
     v: tuple[Expr, ...]
@@ -32,7 +36,16 @@ class Symbols:
     @property
     def fixed(self) -> frozenset[Expr]:
         """What does not change with time."""
-        return frozenset((*self.parameters.values(), *self.formulas.values()))
+        named = (self.parameters, self.formulas, self.numbers)
+        return frozenset(symbol for symbols in named for symbol in symbols.values())
+
+    def number(self, value: Real) -> Expr:
+        """A number of the scene's geometry: 0 and 1 themselves, so that what they make zero
+        vanishes, any other a symbol, so that SymPy rounds nothing.
+        """
+        if value in (0, 1, -1):
+            return sp.Integer(int(value))
+        return self.numbers[value] if value > 0 else -self.numbers[opposite(value)]
 
     def value(self, formula: Formula) -> Expr:
         """A quantity over the parameters' symbols."""
@@ -68,12 +81,32 @@ def make_symbols(model: Model) -> Symbols:
             for p in model.parameters
         },
         formulas={formula: real(f"formula__{i}") for i, formula in enumerate(called, 1)},
+        numbers={
+            x: sp.Symbol(f"number__{i}", positive=True) for i, x in enumerate(_sizes(model), 1)
+        },
         inputs={i.name: real(i.name) for i in model.inputs},
         q=tuple(real(c.name) for c in model.coordinates),
         v=tuple(real(c.name) for c in model.velocities),
         a=tuple(real(c.acceleration) for c in model.velocities),
         tau=tuple(real(f"tau__{c.name}") for c in model.velocities),
     )
+
+
+def _sizes(model: Model) -> dict[Real, None]:
+    """The sizes of all numbers in fixed rotations, axes and angles that are neither 0 nor 1."""
+    found: dict[Real, None] = {}
+    for body in model.bodies:
+        joint, parts = body.joint, list[Real]()
+        if not isinstance(joint, Free):
+            parts += [x for row in orientation(joint.orientation_deg) for x in row]
+            if not isinstance(joint.orientation_deg, tuple):
+                parts.append(quarters(radians(joint.orientation_deg))[1])
+        for move in joint.moves(model.dimensions):
+            if move.kind != "spin":
+                parts += direction(move.axis)
+        sizes = (opposite(x) if x < 0 else x for x in parts)
+        found |= dict.fromkeys(x for x in sizes if x not in (0, 1))
+    return found
 
 
 @dataclass

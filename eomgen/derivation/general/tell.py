@@ -25,9 +25,10 @@ ROTATIONS = ("R__", "k__")
 def tell_general(equations: GeneralEquations) -> tuple[Step, ...]:
     """Every step from the state to the closed form, in symbols meant for reading."""
     shown = _readable(equations)
+    given = equations.symbols.numbers.items()
+    numbers = {symbol: sp.Float(float(x), DIGITS) for x, symbol in given}
 
     def read(expression: Expr) -> Expr:
-        numbers = {x: sp.Float(x, DIGITS) for x in expression.atoms(sp.Float)}
         return expression.xreplace(numbers).xreplace(shown)
 
     steps = []

@@ -1,21 +1,24 @@
 """Axes and origins of frames chosen so that what is fixed between them is as simple as can be.
 
-A frame that turns about its axis k may have its own axes turned about k by any fixed angle: the
-turn then starts from another angle, and nothing else changes. A fixed rotation between two such
-frames is R_i(a) R_m(b) R_k(c) with i the parent's axis and k the frame's own; c goes into the
-frame's axes, a into the parent's, and R_m(b) is left: Denavit's and Hartenberg's choice. A parent
-can make it for one of its children; the others keep R_i(a). Likewise the origin may lie anywhere on
-the axis of a turn, which takes one component off its offset, and of a slide anywhere at all.
+A fixed rotation before a turn is R_i(a) R_m(b) R_k(c) with k the axis of the turn: the turn may
+start from another angle, c, and nothing else changes. A parent that turns about i may have its own
+axes turned about i by a, and start from another angle: R_m(b) is left, Denavit's and Hartenberg's
+choice. A parent can make it for one of its children; the others keep R_i(a). Likewise the origin
+may lie anywhere on the axis of a turn, which takes one component off its offset, and of a slide
+anywhere at all.
+
+What is carried is then written in other axes, and rounded, so that what was small beside the rest
+of it no longer is. In a scene that has such things (`is_graded`) nothing is written in other axes
+but those that quarter turns lead to.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from eomgen.derivation.recursive.frames import Array, Frame, Mount, turn_matrix
+from eomgen.derivation.recursive.frames import Frame, Mount
 from eomgen.derivation.recursive.vectors import (
+    AXES,
+    ENTRIES,
     Scalars,
     Vec,
     add,
@@ -27,16 +30,36 @@ from eomgen.derivation.recursive.vectors import (
     unit,
     zeros,
 )
+from eomgen.language import exact
+from eomgen.language.exact import Matrix
+
+SLIGHT = 2.0**-20
+"""What is less than this part of what it stands beside is slight: rounding in the rest of it costs
+it more digits than six."""
+
+
+def is_graded(frames: Sequence[Frame], mounts: Sequence[Mount], beside: Sequence[Vec]) -> bool:
+    """Whether any rotation, arm or inertia over floats, or vector `beside` them, has components
+    that are slight beside others but not 0: axes that all but coincide, a rod that is all but a
+    needle.
+    """
+    rotations = (*(frame.fixed for frame in frames), *(mount.axes for mount in mounts))
+    vectors: list[Sequence[float]] = [[float(x) for row in r for x in row] for r in rotations]
+    vectors += [frame.offset for frame in frames]
+    vectors += [mount.at for mount in mounts]
+    vectors += [[mount.inertia[i][j] for i, j in ENTRIES] for mount in mounts]
+    vectors += beside
+    return any(0.0 < abs(x) < SLIGHT * max(map(abs, vector)) for vector in vectors for x in vector)
 
 
 def with_simple_origins(
-    frames: Sequence[Frame], mounts: Sequence[Mount], scalars: Scalars
+    frames: Sequence[Frame], mounts: Sequence[Mount], scalars: Scalars, *, graded: bool
 ) -> tuple[list[Frame], list[Mount]]:
     """The same mechanism with offsets of as few components as can be."""
     frames, mounts = list(frames), list(mounts)
     for k, (children, riders) in enumerate(_carried(frames, mounts)):
         frame = frames[k]
-        if frame.kind == "spin":
+        if frame.kind == "spin" or (graded and not is_straight(frame.fixed)):
             continue
         offset, shift = _better_origin(frame, scalars)
         offsets = [frames[n].offset for n in children]
@@ -70,13 +93,14 @@ def _carried(frames: Sequence[Frame], mounts: Sequence[Mount]) -> tuple[Carried,
 
 def _better_origin(frame: Frame, scalars: Scalars) -> tuple[Vec, Vec]:
     """Another offset of a frame, and how far its origin moves for it, in its own axes."""
-    fixed = frame.fixed
+    back = constant(exact.transposed(frame.fixed), scalars)
     if frame.kind == "slide":
-        return zeros(scalars), times(constant(-fixed.T, scalars), frame.offset)
-    image = fixed[:, frame.axis]
-    j = int(np.argmax(np.abs(image)))
-    way = frame.offset[j] / scalars.number(-float(image[j]))
-    moved = add(frame.offset, scale(way, constant(fixed.T, scalars)[frame.axis]))
+        x, y, z = ((-a, -b, -c) for a, b, c in back)
+        return zeros(scalars), times((x, y, z), frame.offset)
+    image = [row[frame.axis] for row in frame.fixed]
+    j = max(AXES, key=lambda i: abs(image[i]))
+    way = frame.offset[j] / scalars.number(exact.opposite(image[j]))
+    moved = add(frame.offset, scale(way, back[frame.axis]))
     # Zero by choice; a program that computed it would see rounding.
     offset = replaced(moved, j, scalars.number(0.0))
     return offset, scale(way, unit(frame.axis, scalars))
@@ -93,7 +117,7 @@ def _parts(offsets: Sequence[Vec], centres: Sequence[Vec], scalars: Scalars) -> 
 
 
 def with_simple_axes(
-    frames: Sequence[Frame], mounts: Sequence[Mount], scalars: Scalars
+    frames: Sequence[Frame], mounts: Sequence[Mount], scalars: Scalars, *, graded: bool
 ) -> tuple[list[Frame], list[Mount]]:
     """The same mechanism with fixed rotations as simple as they can be."""
     frames, mounts = list(frames), list(mounts)
@@ -101,55 +125,47 @@ def with_simple_axes(
     fitted: set[int] = set()
     for k in range(len(frames)):
         frame = frames[k]
-        if frame.kind != "turn" or _is_signed_permutation(frame.fixed):
+        if frame.kind != "turn" or is_straight(frame.fixed):
             continue
         above = frames[frame.parent] if frame.parent >= 0 else None
-        fits = above is not None and above.kind == "turn" and frame.parent not in fitted
-        i = above.axis if above is not None and fits else (frame.axis + 1) % 3
-        a, m, b, c = _factors(frame.fixed, i, frame.axis)
-        _turn_axes(frames, mounts, carried[k], turn_matrix(frame.axis, c), scalars)
-        rest = turn_matrix(m, b)
-        if fits:
-            above = frames[frame.parent]
+        fits = not graded and above is not None and above.kind == "turn"
+        fits = fits and frame.parent not in fitted
+        i = above.axis if above is not None and fits else _across(frame)
+        a, m, b, c = exact.turns_to(frame.fixed, i, frame.axis)
+        rest = exact.turn(m, b)
+        if above is not None and fits:
             fitted.add(frame.parent)
-            _turn_axes(frames, mounts, carried[frame.parent], turn_matrix(i, -a), scalars)
-            frames[frame.parent] = replace(above, lead=above.lead + a)
+            back = exact.turn(i, exact.opposite(a))
+            _turn_axes(frames, mounts, carried[frame.parent], back, scalars)
+            frames[frame.parent] = replace(above, lead=exact.total(above.lead, a))
         else:
-            rest = turn_matrix(i, a) @ rest
-        frames[k] = replace(frames[k], fixed=rest)
+            rest = exact.product(exact.turn(i, a), rest)
+        frames[k] = replace(frames[k], fixed=rest, lead=exact.total(frames[k].lead, c))
     return frames, mounts
 
 
+def _across(frame: Frame) -> int:
+    """The axis, of the parent's, that a frame's own is farthest from: then R_m(b) is no quarter
+    turn, in which a and c would be about one axis, and neither of them sure.
+    """
+    others = [(frame.axis + 1) % 3, (frame.axis + 2) % 3]
+    return min(others, key=lambda i: abs(frame.fixed[i][frame.axis]))
+
+
 def _turn_axes(
-    frames: list[Frame], mounts: list[Mount], carried: Carried, turned: Array, scalars: Scalars
+    frames: list[Frame], mounts: list[Mount], carried: Carried, turned: Matrix, scalars: Scalars
 ) -> None:
     """Write what a frame carries in other axes of its own; `turned` takes vectors into them."""
     children, riders = carried
     node = constant(turned, scalars)
     for n in children:
-        fixed, offset = turned @ frames[n].fixed, times(node, frames[n].offset)
+        fixed, offset = exact.product(turned, frames[n].fixed), times(node, frames[n].offset)
         frames[n] = replace(frames[n], fixed=fixed, offset=offset)
     for n in riders:
-        axes, at = turned @ mounts[n].axes, times(node, mounts[n].at)
+        axes, at = exact.product(turned, mounts[n].axes), times(node, mounts[n].at)
         mounts[n] = replace(mounts[n], axes=axes, at=at)
 
 
-def _is_signed_permutation(matrix: Array) -> bool:
-    return bool(np.all((matrix == 0.0) | (np.abs(matrix) == 1.0)))
-
-
-def _factors(matrix: Array, i: int, k: int) -> tuple[float, int, float, float]:
-    """a, m, b, c with matrix = R_i(a) R_m(b) R_k(c)."""
-    m = (k + 1) % 3 if i == k else 3 - i - k
-    # R_i(-a) brings the image of axis k into the plane that turns about m leave alone.
-    image = matrix[:, k]
-    p, q = (i + 1) % 3, (i + 2) % 3
-    a = math.atan2(-image[p], image[q]) if m == p else math.atan2(image[q], image[p])
-    a -= math.copysign(math.pi, a) if abs(a) > math.pi / 2 else 0.0
-    rest = turn_matrix(i, -a) @ matrix
-    u, v = (m + 1) % 3, (m + 2) % 3
-    reached = rest[:, k]
-    b = math.atan2(reached[v], reached[u]) if k == u else math.atan2(-reached[u], reached[v])
-    last = turn_matrix(m, -b) @ rest
-    y, z = (k + 1) % 3, (k + 2) % 3
-    return a, m, b, math.atan2(last[z, y], last[y, y])
+def is_straight(rotation: Matrix) -> bool:
+    """Whether a rotation takes coordinate axes to coordinate axes."""
+    return all(sum(entry != 0 for entry in row) == 1 for row in rotation)

@@ -1,18 +1,22 @@
-"""How many digits a route loses on a model, measured in numbers before code is written."""
+"""How many digits a route loses on a model, measured in numbers before code is written: by the
+very steps that are to be written.
+"""
 
 import math
 import random
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import cache, partial
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.derivation.recursive.askew import askew
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.frames import Linkage
+from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.linkage import make_linkage
 from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.effects import Driven, Gravity
@@ -21,10 +25,11 @@ from eomgen.model import Model
 
 Array = NDArray[np.float64]
 
-KINDS = ("anywhere", "aligned", "in line")
+KINDS = ("anywhere", "aligned", "in line", "nearly")
 """Of states: at random; with angles of multiples of 45 degrees, where levers vanish and axes meet;
-and with some angles of 0, the only one of these that is a double, where they do so to the last
-digit.
+with some angles of 0, the only one of these that is a double, where they do so to the last digit;
+and with some that are off 0 or a quarter turn by 1e-17 to 1, where what is left of levers and of
+axes that meet is all that there is.
 """
 EACH, CLOSELY, ROUGHLY = 120, 3, 1
 """States of a kind; and at how many of these the routes are judged by many digits: those where two
@@ -39,28 +44,32 @@ states.
 """
 PUSH = 10.0
 """The size of inputs, at most."""
-ROUTES = ("closed", "ldl", "aba", "orthogonal")
 EPSILON = sys.float_info.epsilon
 ALL = -math.log10(EPSILON)
 """The digits of a double."""
 
-Accelerations = Callable[[Values], Sequence[float]]
-"""v̇ at values of a model."""
+Accelerations = Callable[[Values], Sequence[Any]]
+"""v̇ at values of a model, numbers or arrays of them for several states."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """How a route computes v̇, by the steps that are to be written; and in which axes its recursion
+    works, None if it is none.
+    """
+
+    accelerations: Accelerations
+    axes: Axes | None
 
 
 def digits_lost(
-    model: Model,
-    closed: Accelerations | None = None,
-    *,
-    ldl: bool = True,
-    closely: bool = False,
+    model: Model, routes: Mapping[str, Route], *, closely: bool = False
 ) -> Mapping[str, float]:
-    """The decimal digits that routes lose on v̇, at the worst of some seeded states, random and
-    aligned ones; 0 to `ALL`. They count from its largest component, but at a state where that is
-    less than usual from the usual one, of at most 1: v̇ may vanish at a state.
+    """The decimal digits that each route, and `orthogonal`, loses on v̇, at the worst of some seeded
+    states, half of them at rest; 0 to `ALL`. They count from its largest component, or from ω v,
+    which turning makes of rates and of which terms may cancel; but at a state where that is less
+    than usual from the usual one, of at most 1: v̇ may vanish at a state.
 
-    closed   v̇ by the closed form, which is judged, too
-    ldl      whether that is, too; it takes long for many bodies
     closely  whether routes are judged by many digits at all states that are in doubt, and what half
              a unit in the last place of all numbers given would change counts as nothing. Else they
              are compared with `orthogonal`, and by many digits at a state of a kind, which takes a
@@ -72,10 +81,10 @@ def digits_lost(
     """
     rng = random.Random(6)
     q = [_position(model, kind, rng) for kind in KINDS for _ in range(EACH)]
-    v = [[rng.uniform(-1.5, 1.5) for _ in model.velocities] for _ in q]
+    v = [[n % 2 * rng.uniform(-1.5, 1.5) for _ in model.velocities] for n in range(len(q))]
     pushes = [{i.name: rng.uniform(-PUSH, PUSH) for i in model.inputs} for _ in q]
     still = model
-    if closed is None:
+    if all(route.axes for route in routes.values()):
         kept = tuple(e for e in model.effects if isinstance(e, Gravity | Driven))
         still = replace(model, effects=kept)
     nothing = {i.name: 0.0 for i in model.inputs}
@@ -83,12 +92,36 @@ def digits_lost(
     parts = [(still, [nothing] * len(q))]
     if model.inputs or len(still.effects) < len(model.effects):
         parts.append((model, pushes))
-    worst = dict.fromkeys(ROUTES, 0.0)
+    worst = dict.fromkeys((*routes, "orthogonal"), 0.0)
     for acting, inputs in parts:
         at = [Values(model.defaults, *rest, states) for rest in zip(inputs, q, v, strict=True)]
-        for route, off in _off(acting, at, closed, ldl, closely).items():
-            worst[route] = max(worst[route], off)
+        ways = {name: _way(name, route, model, acting) for name, route in routes.items()}
+        for name, off in _off(acting, at, ways, closely).items():
+            worst[name] = max(worst[name], off)
     return {route: _digits(off) for route, off in worst.items()}
+
+
+def _way(name: str, route: Route, model: Model, acting: Model) -> Accelerations:
+    """v̇ by a route, of a model on which other effects may be `acting`."""
+    if acting is model or route.axes is None:
+        return route.accelerations
+    return _recursion(name, acting, route.axes)
+
+
+def _recursion(name: str, model: Model, axes: Axes) -> Accelerations:
+    """v̇ by a recursion over arrays."""
+
+    def found(values: Values) -> Sequence[Any]:
+        # All states at once: what is 0 at some of them only, is none of a program's zeros.
+        d = Dynamics(model, values, ArrayScalars(), axes)
+        forward: dict[str, Callable[[], Sequence[Any]]] = {
+            "aba": d.articulated_forward,
+            "ldl": d.factored_forward,
+            "orthogonal": d.orthogonal_forward,
+        }
+        return forward[name]()
+
+    return found
 
 
 def _position(model: Model, kind: str, rng: random.Random) -> list[float]:
@@ -98,50 +131,57 @@ def _position(model: Model, kind: str, rng: random.Random) -> list[float]:
         anywhere = rng.uniform(-1.5, 1.5)
         lined = rng.randrange(-4, 5) * (math.pi / 4) if kind == "aligned" else 0.0
         lined = lined if c.unit == "rad" else rng.choice((0.0, 1.0))
-        usual = kind == "anywhere" or (kind == "in line" and rng.random() < 0.5)
+        if kind == "nearly":
+            quarter = rng.choice((0.0, 0.0, math.pi / 2)) if c.unit == "rad" else lined
+            lined = quarter + _slight(rng)
+        usual = kind == "anywhere" or (kind in ("in line", "nearly") and rng.random() < 0.5)
         q.append(anywhere if usual else lined)
     for indices in model.quaternions:
         for n, i in enumerate(indices):
-            q[i] = q[i] if kind == "anywhere" else float(n == 0)
+            lined = float(n == 0) if n == 0 or kind != "nearly" else _slight(rng)
+            q[i] = q[i] if kind == "anywhere" else lined
         length = math.hypot(*(q[i] for i in indices))
         for i in indices:
             q[i] /= length
     return q
 
 
+def _slight(rng: random.Random) -> float:
+    """1e-17 to 1, of either sign."""
+    return rng.choice((-1.0, 1.0)) * math.pow(10.0, rng.uniform(-17.0, 0.0))
+
+
 def _off(
-    model: Model,
-    at: Sequence[Values],
-    closed: Accelerations | None,
-    ldl: bool,
-    closely: bool,
+    model: Model, at: Sequence[Values], ways: Mapping[str, Accelerations], closely: bool
 ) -> dict[str, float]:
     """What the v̇ of each route is off, in parts of its size and of what must be allowed, at the
     worst of some states; infinite where it gives no number.
     """
-    found = _found(model, _together(at), len(at), "orthogonal", "aba", *["ldl"] * ldl)
-    if closed is not None:
-        shape = (len(model.velocities),)
-        found["closed"] = np.column_stack([_numbers(partial(closed, x), shape) for x in at])
-    true = found["orthogonal"]
-    least = _usual(true)
+    together, shape = _together(at), (len(model.velocities), len(at))
+    sure = _recursion("orthogonal", model, "own")
+    true = _numbers(sure, together, shape)
+    named = {name: _numbers(way, together, shape) for name, way in ways.items()}
+    found = {"orthogonal": true, **named}
+    least = _least(model, true, at)
     change = np.zeros(len(at))
-    doubts = [_shares(found["aba"], true, least)]
+    doubts = [_shares(found["aba"], true, least)] if "aba" in found else []
     if closely:
-        nudged = _found(model, _nudged(_together(at), len(at)), len(at), "orthogonal")
-        change = _shares(nudged["orthogonal"], true, least)
+        nudged = _recursion("orthogonal", askew(model), "own")
+        change = _shares(_numbers(nudged, _nudged(together, len(at)), shape), true, least)
         doubts.append(change)
     worst = dict.fromkeys(found, 0.0)
-    exactly = _in_many_digits(model, least, nudge=closely)
+    exactly = _in_many_digits(model, nudge=closely)
     for n in _doubtful(doubts, CLOSELY if closely else ROUGHLY):
         try:
-            long, allowed = exactly(at[n])
+            long, change_here = exactly(at[n])
         except (ArithmeticError, ValueError):
             continue  # no v̇ there to lose digits of
+        size = max([float(least[n]), *(float(abs(x)) for x in long)])
+        allowed = size * max(EPSILON, change_here / size / SURE)
         for route, rates in found.items():
             own = rates[:, n]
             off = _apart(own.tolist(), long) if np.isfinite(own).all() else math.inf
-            worst[route] = max(worst[route], off / _size(long, least) / allowed)
+            worst[route] = max(worst[route], off / allowed)
     if closely and worst["orthogonal"] > TRUSTED:
         return worst
     known = np.isfinite(true).all(axis=0)
@@ -149,20 +189,6 @@ def _off(
         known = np.any([np.isfinite(rates).all(axis=0) for rates in found.values()], axis=0)
     beside = _worst(found, true, least, np.fmax(change / SURE, EPSILON), np.asarray(known))
     return {route: max(off, beside[route]) for route, off in worst.items()}
-
-
-def _found(model: Model, values: Values, count: int, *routes: str) -> dict[str, Array]:
-    """v̇ by the recursions (nv, count) at so many states; nan where there is no number."""
-    # All states at once: what is 0 at some of them only, is none of a program's zeros.
-    d = Dynamics(model, values, ArrayScalars(), "own")
-    forward: dict[str, Callable[[], Sequence[Any]]] = {
-        "aba": d.articulated_forward,
-        "ldl": d.factored_forward,
-        "orthogonal": d.orthogonal_forward,
-    }
-    shape = len(model.velocities), count
-    with np.errstate(all="ignore"):
-        return {route: _numbers(forward[route], shape) for route in routes}
 
 
 def _doubtful(doubts: Sequence[Array], count: int) -> list[int]:
@@ -201,10 +227,11 @@ def _nudged(values: Values, count: int) -> Values:
     return Values(fixed, inputs, [*map(near, values.q)], [*map(near, values.v)], states)
 
 
-def _numbers(forward: Callable[[], Sequence[Any]], shape: tuple[int, ...]) -> Array:
-    """v̇ as an array of a shape; nan where there is no number."""
+def _numbers(way: Accelerations, values: Values, shape: tuple[int, ...]) -> Array:
+    """v̇ at several states (nv, count); nan where there is no number."""
     try:
-        rows = [np.broadcast_to(np.asarray(x, dtype=float), shape[1:]) for x in forward()]
+        with np.errstate(all="ignore"):
+            rows = [np.broadcast_to(np.asarray(x, dtype=float), shape[1:]) for x in way(values)]
     except (ArithmeticError, ValueError):
         return np.full(shape, np.nan)
     return np.reshape(rows, shape)
@@ -213,7 +240,7 @@ def _numbers(forward: Callable[[], Sequence[Any]], shape: tuple[int, ...]) -> Ar
 def _worst(
     found: Mapping[str, Array],
     true: Array,
-    least: float,
+    least: Array,
     allowed: Array,
     known: NDArray[np.bool_],
 ) -> dict[str, float]:
@@ -227,28 +254,34 @@ def _worst(
     return worst
 
 
-def _usual(rates: Array) -> float:
-    """The size of v̇ (nv, n) at the middle of n states, at most 1; 1 if there v̇ is 0 or none."""
-    sizes = np.sort(np.abs(rates).max(axis=0, initial=0.0))
-    middle = float(sizes[len(sizes) // 2])
-    return middle if 0.0 < middle < 1.0 else 1.0
+def _least(model: Model, rates: Array, at: Sequence[Values]) -> Array:
+    """What sizes of v̇ (nv, n) count as at least, (n,): at the middle of all states at rest, or of
+    those in motion, and at most 1; 1 if there v̇ is 0 or none. Or ω v, if that is more.
+    """
+    sizes, least = np.abs(rates).max(axis=0, initial=0.0), np.ones(len(at))
+    for first in (0, 1):
+        own = np.sort(sizes[first::2])
+        middle = float(own[len(own) // 2])
+        least[first::2] = middle if 0.0 < middle < 1.0 else 1.0
+    v = np.abs([values.v for values in at])
+    turning = [i for i, c in enumerate(model.velocities) if c.unit == "rad/s"]
+    made: Array = np.maximum(least, v[:, turning].max(axis=1, initial=0.0) * v.max(axis=1))
+    return made
 
 
-def _shares(rates: Array, true: Array, least: float) -> Array:
+def _shares(rates: Array, true: Array, least: Array) -> Array:
     """The greatest difference at each of n states, in parts of the size of v̇ there."""
     with np.errstate(all="ignore"):
         off = np.abs(rates - true).max(axis=0, initial=0.0)
-        return np.asarray(off / np.abs(true).max(axis=0, initial=least))
+        return np.asarray(off / np.maximum(np.abs(true).max(axis=0, initial=0.0), least))
 
 
-def _in_many_digits(
-    model: Model, least: float, *, nudge: bool
-) -> Callable[[Values], tuple[list[Any], float]]:
-    """A function of values with the model's own parameters: v̇ in 60 digits, and what may be off in
-    parts of its size: `EPSILON`, or the part of what it is off where all numbers are by half a unit
-    in the last place, where it is asked for.
+def _in_many_digits(model: Model, *, nudge: bool) -> Callable[[Values], tuple[list[Any], float]]:
+    """A function of values with the model's own parameters: v̇ in 60 digits, and what that is off
+    where all numbers are by half a unit in the last place, if it is asked for.
     """
     scalars = Bits()
+    own = {0.0: model, EPSILON / 2: askew(model)}
 
     def near(x: float, nudge: float, rng: random.Random) -> Any:
         return scalars.number(x) * (1 + scalars.number(nudge * rng.uniform(-1, 1)))
@@ -257,7 +290,7 @@ def _in_many_digits(
     def made(nudge: float) -> tuple[dict[str, Any], Linkage]:
         rng = random.Random(7)
         parameters = {name: near(x, nudge, rng) for name, x in model.defaults.items()}
-        return parameters, make_linkage(model, parameters, scalars)
+        return parameters, make_linkage(own[nudge], parameters, scalars)
 
     def forward(values: Values, nudge: float) -> list[Any]:
         rng = random.Random(8)
@@ -269,21 +302,14 @@ def _in_many_digits(
             )
             q, v = ([near(x, nudge, rng) for x in own] for own in (values.q, values.v))
             near_by = Values(parameters, inputs, q, v, states, scalars.number(0.0))
-            d = Dynamics(model, near_by, scalars, "own", linkage)
+            d = Dynamics(own[nudge], near_by, scalars, "own", linkage)
             return out_of_bits(d.articulated_forward())
 
     def exactly(values: Values) -> tuple[list[Any], float]:
         true = forward(values, 0.0)
-        if not nudge:
-            return true, EPSILON
-        change = _apart(forward(values, EPSILON / 2), true)
-        return true, max(EPSILON, change / _size(true, least) / SURE)
+        return true, _apart(forward(values, EPSILON / 2), true) if nudge else 0.0
 
     return exactly
-
-
-def _size(values: Sequence[Any], least: float) -> float:
-    return max([least, *(float(abs(x)) for x in values)])
 
 
 def _apart(one: Sequence[Any], other: Sequence[Any]) -> float:

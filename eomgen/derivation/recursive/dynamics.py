@@ -38,13 +38,14 @@ from eomgen.derivation.recursive.orthogonal import Elimination
 from eomgen.derivation.recursive.solids import Solid, centres, ranked, solids
 from eomgen.derivation.recursive.vectors import (
     Scalar,
+    Vec,
     no_matrix,
     sub,
     turning_in_space,
     zeros,
 )
 from eomgen.effects import Driven, Effect, Gravity
-from eomgen.effects.base import Contact, JointLoad, Load
+from eomgen.effects.base import Contact, JointLoad, Load, Vector
 from eomgen.joints import Free
 from eomgen.joints.base import WORLD
 
@@ -108,9 +109,11 @@ class Dynamics(Moving):
         return tuple(points), tuple(joints)
 
     def _point_force(self, load: Load) -> fc.PointForce:
-        at, force = self._in_space(load.at), self._in_space(load.force)
-        torque = turning_in_space(load.torque, self.scalars)
-        return fc.PointForce(self.index[load.body], at, force, torque)
+        def in_space(force: Vector, torque: Vector) -> tuple[Vec, Vec]:
+            return self._in_space(force), turning_in_space(torque, self.scalars)
+
+        at, own = self._in_space(load.at), load.in_body and in_space(*load.in_body)
+        return fc.PointForce(self.index[load.body], at, *in_space(load.force, load.torque), own)
 
     @cached_property
     def wrenches(self) -> tuple[fc.Force, ...]:
@@ -218,7 +221,8 @@ class Dynamics(Moving):
     def orthogonal_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """M⁻¹ of impulses on the velocities by orthogonal elimination."""
         nothing, matrix = zeros(self.scalars), no_matrix(self.scalars)
-        still = [Acceleration(nothing, nothing, matrix, nothing)] * len(self.instant.links)
+        frame = Acceleration(nothing, nothing, matrix, nothing, nothing)
+        still = [frame] * len(self.instant.links)
         wrenches = [fc.no_force(self.scalars)] * len(still)
         return self._eliminated.respond(still, wrenches, impulse)
 

@@ -31,14 +31,15 @@ class Force:
 
 @dataclass(frozen=True)
 class PointForce:
-    """A force and a torque on a body, in world axes; the force acts at a point, given from the
-    centre of mass in body axes.
+    """A force and a torque on a body, in world axes, and `in_body` axes if they are given in those.
+    The force acts at a point, given from the centre of mass in body axes.
     """
 
     body: int
     at: Vec
     force: Vec
     torque: Vec
+    in_body: tuple[Vec, Vec] | None = None
 
 
 def no_force(scalars: Scalars) -> Force:
@@ -80,11 +81,17 @@ def wrenches(
         mount = linkage.mounts[load.body]
         if mount.frame >= 0:
             at = mount.at if about is None else sub(mount.at, about[mount.frame])
-            at = add(at, times(constant(mount.axes, scalars), load.at))
-            force = instant.from_world(mount.frame, load.force)
-            arm = instant.of_frame(mount.frame, at)
-            torque = instant.from_world(mount.frame, load.torque)
-            wrench = Force(add(torque, cross(arm, force)), force)
+            axes = constant(mount.axes, scalars)
+            at = add(at, times(axes, load.at))
+            if load.in_body is not None:
+                force, torque = (times(axes, part) for part in load.in_body)
+                moment = instant.of_frame(mount.frame, add(torque, cross(at, force)))
+                wrench = Force(moment, instant.of_frame(mount.frame, force))
+            else:
+                force = instant.from_world(mount.frame, load.force)
+                arm = instant.of_frame(mount.frame, at)
+                torque = instant.from_world(mount.frame, load.torque)
+                wrench = Force(add(torque, cross(arm, force)), force)
             found[mount.frame] = total(found[mount.frame], wrench)
     return tuple(found)
 

@@ -1,15 +1,10 @@
 """What a linkage is made of: frames with their moves, and the bodies mounted on them."""
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from eomgen.derivation.recursive.vectors import Scalar, Symmetric, Vec, add, plus
-
-Array = NDArray[np.float64]
+from eomgen.language.exact import Matrix, Real
 
 
 @dataclass(frozen=True)
@@ -33,18 +28,18 @@ class Frame:
     `offset` is its origin at zero from the parent's, in the parent's axes; the columns of `fixed`
     are its axes at zero in the parent's; the move goes about or along coordinate axis `axis` of
     its own, a turn by `lead` more than its coordinate. In the plane `angle` is that of its axes at
-    zero in the parent's. `q` and `v` index its coordinates and velocities.
+    zero in the parent's. All three are exact. `q` and `v` index its coordinates and velocities.
     `armature` is the inertia of a motor's rotor on the coordinate. A `driven` move is given.
     """
 
     name: str
     parent: int
     offset: Vec
-    fixed: Array
+    fixed: Matrix
     kind: Literal["turn", "slide", "spin"]
     axis: int
-    angle: float
-    lead: float
+    angle: Real
+    lead: Real
     q: tuple[int, ...]
     v: tuple[int, ...]
     armature: Scalar
@@ -62,8 +57,8 @@ class Mount:
     """
 
     frame: int
-    axes: Array
-    angle: float
+    axes: Matrix
+    angle: Real
     at: Vec
     joint: Vec
     mass: Scalar
@@ -77,17 +72,3 @@ class Linkage:
     frames: tuple[Frame, ...]
     mounts: tuple[Mount, ...]
     planar: bool
-
-
-def turn_matrix(k: int, angle: float) -> Array:
-    """The rotation by `angle` about coordinate axis k."""
-    return turn_of(k, math.cos(angle), math.sin(angle))
-
-
-def turn_of(k: int, c: float, s: float) -> Array:
-    """The rotation about coordinate axis k by the angle of cosine c and sine s."""
-    i, j = (k + 1) % 3, (k + 2) % 3
-    matrix = np.eye(3)
-    matrix[i, i] = matrix[j, j] = c
-    matrix[i, j], matrix[j, i] = -s, s
-    return matrix

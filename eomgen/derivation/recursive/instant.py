@@ -9,16 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from eomgen.derivation.recursive.frames import Frame, Linkage, Rigid
 from eomgen.derivation.recursive.rotations import (
-    AxisTurn,
-    Both,
     Rotation,
-    Turned,
     Unturned,
     axis_turn,
+    both,
+    cosine_and_sine,
+    fixed_rotation,
     from_quaternion,
 )
 from eomgen.derivation.recursive.vectors import (
@@ -29,15 +27,37 @@ from eomgen.derivation.recursive.vectors import (
     Vec,
     add,
     congruent,
-    constant,
-    product,
     scale,
     times,
     transposed,
     unit,
 )
+from eomgen.language.exact import ZERO, Real, quarters, total
 
 Axes = Literal["own", "world"]
+
+
+@dataclass(frozen=True)
+class Angle:
+    """Of a planar frame's axes from the world's: what of it moves, and what is fixed, exactly.
+
+    Angles add up: one sine and cosine of a sum, and no product of matrices. Quarter turns stay out
+    of that, for no double is a right angle.
+    """
+
+    moving: Scalar
+    fixed: Real
+
+    def and_more(self, angle: Real, scalars: Scalars) -> Scalar:
+        """The whole angle, and a fixed one more, rad."""
+        return self.moving + scalars.number(total(self.fixed, angle))
+
+    def matrix(self, scalars: Scalars) -> Mat:
+        """From the frame's axes to the world's."""
+        count, rest = quarters(self.fixed)
+        c, s = cosine_and_sine(self.moving + scalars.number(rest), count, scalars)
+        zero, one = scalars.number(0.0), scalars.number(1.0)
+        return ((c, -s, zero), (s, c, zero), (zero, zero, one))
 
 
 @dataclass(frozen=True)
@@ -87,7 +107,7 @@ class Instant:
 
     links: tuple[Link, ...]
     world: tuple[Mat, ...]
-    angles: tuple[Scalar, ...]
+    angles: tuple[Angle, ...]
     axes: Axes
 
     def to_world(self, k: int, a: Vec) -> Vec:
@@ -112,23 +132,24 @@ def at_instant(linkage: Linkage, q: Sequence[Scalar], axes: Axes, scalars: Scala
     eye = (unit(0, scalars), unit(1, scalars), unit(2, scalars))
     links: list[Link] = []
     world: list[Mat] = []
-    angles: list[Scalar] = []
+    angles: list[Angle] = []
     for frame in linkage.frames:
-        fixed = _fixed(frame, scalars)
+        fixed = fixed_rotation(frame.fixed, scalars)
         turn, arm = fixed, frame.offset
         directions: tuple[Axis, ...] = (Axis(frame.kind == "turn", eye[frame.axis], frame.axis),)
         if frame.kind == "spin":
-            turn = _both(fixed, from_quaternion([q[i] for i in frame.q], scalars))
+            turn = both(fixed, from_quaternion([q[i] for i in frame.q], scalars))
             directions = tuple(Axis(True, eye[k], k) for k in AXES)
         elif frame.kind == "turn":
-            angle = q[frame.q[0]] + scalars.number(frame.lead)
-            turn = _both(fixed, axis_turn(frame.axis, angle, scalars))
+            count, lead = quarters(frame.lead)
+            angle = q[frame.q[0]] + scalars.number(lead)
+            turn = both(fixed, axis_turn(frame.axis, angle, count, scalars))
         else:
             arm = add(arm, fixed.out(scale(q[frame.q[0]], eye[frame.axis])))
         base = world[frame.parent] if frame.parent >= 0 else eye
         if linkage.planar:
-            angles.append(_angle(frame, fixed, angles, q, scalars))
-            world.append(_in_plane(angles[-1], scalars))
+            angles.append(_angle(frame, angles, q, scalars))
+            world.append(angles[-1].matrix(scalars))
         else:
             world.append(turn.after(base))
         rigid = frame.rigid
@@ -153,63 +174,13 @@ def at_instant(linkage: Linkage, q: Sequence[Scalar], axes: Axes, scalars: Scala
     return Instant(tuple(links), tuple(world), tuple(angles), axes)
 
 
-def _fixed(frame: Frame, scalars: Scalars) -> Rotation:
-    """The fixed rotation, as a turn about one axis where it is one."""
-    if np.array_equal(frame.fixed, np.eye(3)):
-        return Unturned()
-    for k in AXES:
-        if frame.fixed[k, k] == 1.0:
-            i, j = (k + 1) % 3, (k + 2) % 3
-            doubles = float(frame.fixed[i, i]), float(frame.fixed[j, i])
-            c, s = map(scalars.number, doubles)
-            if scalars.exact and all(doubles):
-                length = scalars.call("sqrt", c * c + s * s)
-                c, s = c / length, s / length
-            return AxisTurn(k, c, s, scalars.number(2.0) * c)
-    return Turned(_orthogonal(constant(frame.fixed, scalars), scalars))
-
-
-def _orthogonal(matrix: Mat, scalars: Scalars) -> Mat:
-    """The rotation that a matrix of doubles is rounded from: heavy things on light ones show what
-    is none. Newton's steps R (3 - Rᵀ R) / 2 (Higham, Functions of Matrices, 8.3) bring 32 and 64
-    digits.
-    """
-    half, three = scalars.number(0.5), scalars.number(3.0)
-    for _ in range(2 * scalars.exact):
-        a, b, c = product(transposed(matrix), matrix)
-        rest = (
-            (half * (three - a[0]), -(half * a[1]), -(half * a[2])),
-            (-(half * b[0]), half * (three - b[1]), -(half * b[2])),
-            (-(half * c[0]), -(half * c[1]), half * (three - c[2])),
-        )
-        matrix = product(matrix, rest)
-    return matrix
-
-
-def _both(fixed: Rotation, moving: Rotation) -> Rotation:
-    return moving if isinstance(fixed, Unturned) else Both(fixed, moving)
-
-
-def _angle(
-    frame: Frame, fixed: Rotation, angles: list[Scalar], q: Sequence[Scalar], scalars: Scalars
-) -> Scalar:
-    """In the plane angles add up: one sine and cosine of a sum, and no product of matrices."""
-    angle = angles[frame.parent] if frame.parent >= 0 else scalars.number(0.0)
-    own = scalars.number(frame.angle)
-    if scalars.exact and frame.angle:
-        # No double is a right angle.
-        x, y, _ = fixed.into(transposed(_in_plane(own, scalars))[0])
-        own = own - scalars.call("atan2", y, x)
-    angle = angle + own
+def _angle(frame: Frame, angles: Sequence[Angle], q: Sequence[Scalar], scalars: Scalars) -> Angle:
+    """A planar frame's angle, by that of its parent."""
+    base = angles[frame.parent] if frame.parent >= 0 else Angle(scalars.number(0.0), ZERO)
+    fixed = total(base.fixed, frame.angle)
     if frame.kind != "turn":
-        return angle
-    return scalars.named(angle + q[frame.q[0]], f"angle_{frame.name}")
-
-
-def _in_plane(angle: Scalar, scalars: Scalars) -> Mat:
-    zero, one = scalars.number(0.0), scalars.number(1.0)
-    c, s = scalars.call("cos", angle), scalars.call("sin", angle)
-    return ((c, -s, zero), (s, c, zero), (zero, zero, one))
+        return Angle(base.moving, fixed)
+    return Angle(scalars.named(base.moving + q[frame.q[0]], f"angle_{frame.name}"), fixed)
 
 
 def _turned(axis: Axis, world: Mat, planar: bool) -> Axis:

@@ -6,23 +6,17 @@ frame are those of the body it carries, turned by a fixed rotation where that ma
 move a coordinate axis.
 """
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from eomgen.derivation.recursive.axes import with_simple_axes, with_simple_origins
-from eomgen.derivation.recursive.frames import (
-    Array,
-    Frame,
-    Linkage,
-    Mount,
-    Rigid,
-    joined,
-    turn_matrix,
-    turn_of,
+from eomgen.derivation.recursive.axes import (
+    is_graded,
+    is_straight,
+    with_simple_axes,
+    with_simple_origins,
 )
+from eomgen.derivation.recursive.frames import Frame, Linkage, Mount, Rigid, joined
+from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.vectors import (
     ENTRIES,
     Scalar,
@@ -41,8 +35,11 @@ from eomgen.derivation.recursive.vectors import (
     times,
     zeros,
 )
+from eomgen.effects import Gravity
 from eomgen.joints import Free
 from eomgen.joints.base import Geared, Move
+from eomgen.language import exact
+from eomgen.language.exact import EYE, ZERO, Matrix, Real
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model import Body, Model
 
@@ -50,9 +47,10 @@ from eomgen.model import Body, Model
 def make_linkage(model: Model, parameters: Mapping[str, Scalar], scalars: Scalars) -> Linkage:
     """The frames of a model, its quantities over given values of its parameters."""
     frames, mounts = _drafted(model, parameters, scalars)
+    graded = not all(is_straight(frame.fixed) for frame in frames) and _is_graded(model)
     if model.dimensions == 3:
-        frames, mounts = with_simple_axes(frames, mounts, scalars)
-    frames, mounts = with_simple_origins(frames, mounts, scalars)
+        frames, mounts = with_simple_axes(frames, mounts, scalars, graded=graded)
+    frames, mounts = with_simple_origins(frames, mounts, scalars, graded=graded)
     rigids = [_nothing(scalars)] * len(frames)
     for mount in mounts:
         if mount.frame >= 0:
@@ -62,6 +60,14 @@ def make_linkage(model: Model, parameters: Mapping[str, Scalar], scalars: Scalar
         for frame, rigid in zip(frames, rigids, strict=True)
     )
     return Linkage(tuple(finished), tuple(mounts), model.dimensions == 2)
+
+
+def _is_graded(model: Model) -> bool:
+    """Whether anything of a model's geometry, or a direction of gravity, is slight (see `axes`)."""
+    floats = FloatScalars()
+    frames, mounts = _drafted(model, model.defaults, floats)
+    ways = (e.direction for e in model.effects if isinstance(e, Gravity) and e.direction)
+    return is_graded(frames, mounts, [in_space(way, floats) for way in ways])
 
 
 def _drafted(
@@ -81,17 +87,17 @@ def _drafted(
     nv = len(model.velocities)
     for seat in model.seats:
         body = seat.body
-        frame, axes, angle, at = -1, np.eye(3), 0.0, zeros(scalars)
+        frame, axes, angle, at = -1, EYE, ZERO, zeros(scalars)
         if body.parent >= 0:
             parent = mounts[body.parent]
             frame, axes, angle, at = parent.frame, parent.axes, parent.angle, parent.at
         joint, point, armature = body.joint, zeros(scalars), scalars.number(0.0)
         if not isinstance(joint, Free):
             at = add(at, times(constant(axes, scalars), vector(joint.r_parent)))
-            axes = axes @ _orientation(joint.orientation_deg)
+            axes = exact.product(axes, exact.orientation(joint.orientation_deg))
             if model.dimensions == 2:
                 assert isinstance(joint.orientation_deg, float | int)
-                angle += math.radians(joint.orientation_deg)
+                angle = exact.total(angle, exact.radians(joint.orientation_deg))
             point = vector(joint.r_child)
             if isinstance(joint, Geared):
                 armature = value(joint.motor_inertia)
@@ -100,16 +106,18 @@ def _drafted(
         moves = joint.moves(model.dimensions)
         for i, move in enumerate(moves):
             to_axis, k = _to_coordinate_axis(move)
-            held = locked.get(body.positions[i].name)
-            if held is not None and move.kind == "slide":
-                way = np.array(move.axis) * held
-                at = add(at, _numbers(axes @ way, scalars))
+            name = body.positions[i].name
+            if name in locked and move.kind == "slide":
+                way = exact.turned(exact.product(axes, to_axis), k, locked[name])
+                at = add(at, _numbers(way, scalars))
                 continue
-            if held is not None:
-                axes = axes @ (to_axis @ _turn(k, math.degrees(held)) @ to_axis.T)
-                angle += move.axis[2] * held
+            if name in locked:
+                held = model.locked_angle(name)
+                back = exact.product(exact.turn(k, held), exact.transposed(to_axis))
+                axes = exact.product(axes, exact.product(to_axis, back))
+                angle = exact.total(angle, held if move.axis[2] > 0 else exact.opposite(held))
                 continue
-            tilt = math.atan2(to_axis[1, 0], to_axis[0, 0])
+            tilt = exact.angle_of(to_axis[0][0], to_axis[1][0])
             spins = move.kind == "spin"
             v = seat.spin if spins else seat.v[i : i + 1]
             drafts.append(
@@ -117,11 +125,11 @@ def _drafted(
                     name=body.name if i == len(moves) - 1 else f"{body.name}_{i + 1}",
                     parent=frame,
                     offset=at,
-                    fixed=axes @ to_axis,
+                    fixed=exact.product(axes, to_axis),
                     kind=move.kind,
                     axis=k,
-                    angle=angle + tilt,
-                    lead=0.0,
+                    angle=exact.total(angle, tilt),
+                    lead=ZERO,
                     q=seat.quaternion if spins else seat.q[i : i + 1],
                     v=v,
                     armature=armature,
@@ -129,7 +137,8 @@ def _drafted(
                     driven=v[0] >= nv,
                 )
             )
-            frame, axes, angle, at = len(drafts) - 1, to_axis.T, -tilt, zeros(scalars)
+            frame, at = len(drafts) - 1, zeros(scalars)
+            axes, angle = exact.transposed(to_axis), exact.opposite(tilt)
         at = sub(at, times(constant(axes, scalars), point))
         mounts.append(
             Mount(
@@ -145,8 +154,8 @@ def _drafted(
     return drafts, mounts
 
 
-def _numbers(vector: Array, scalars: Scalars) -> Vec:
-    x, y, z = (scalars.number(part) for part in vector.tolist())
+def _numbers(vector: Sequence[Real], scalars: Scalars) -> Vec:
+    x, y, z = (scalars.number(part) for part in vector)
     return (x, y, z)
 
 
@@ -191,38 +200,6 @@ def _named(rigid: Rigid, name: str, scalars: Scalars) -> Rigid:
     return Rigid(m, (first[0], first[1], first[2]), symmetric(entries))
 
 
-def _orientation(degrees: float | tuple[float, float, float]) -> Array:
-    """The fixed rotation of a joint: Rz Ry Rx of three angles; exact for quarter turns."""
-    x, y, z = degrees if isinstance(degrees, tuple) else (0.0, 0.0, degrees)
-    turned: Array = _turn(2, z) @ _turn(1, y) @ _turn(0, x)
-    return turned
-
-
-def _turn(k: int, degrees: float) -> Array:
-    quarters, rest = divmod(degrees, 90.0)
-    if rest == 0.0:
-        c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
-        return turn_of(k, c, s)
-    return turn_matrix(k, math.radians(degrees))
-
-
-def _to_coordinate_axis(move: Move) -> tuple[Array, int]:
+def _to_coordinate_axis(move: Move) -> tuple[Matrix, int]:
     """A rotation R and a coordinate axis k with R e_k = the axis of the move."""
-    if move.kind == "spin":
-        return np.eye(3), 2
-    axis = np.array(move.axis)
-    for k in range(3):
-        if axis[k] == 1.0:
-            return np.eye(3), k
-        if axis[k] == -1.0:  # half a turn, about z where that will do: the plane stays the plane
-            return np.diag([-1.0, -1.0, 1.0] if k < 2 else [1.0, -1.0, -1.0]), k
-    if axis[2] == 0.0:  # stay in the plane
-        c, s = axis[0], axis[1]
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), 0
-    # The shortest turn from z to the axis (Rodrigues), or from -z if that is nearer.
-    x, y, z = axis if axis[2] > 0 else -axis
-    k = 1.0 / (1.0 + z)
-    matrix = np.array(
-        [[1.0 - k * x * x, -k * x * y, x], [-k * x * y, 1.0 - k * y * y, y], [-x, -y, z]]
-    )
-    return (matrix if axis[2] > 0 else matrix @ np.diag([1.0, -1.0, -1.0])), 2
+    return (EYE, 2) if move.kind == "spin" else exact.to_axis(move.axis)

@@ -33,13 +33,15 @@ class Acceleration:
     """Of a frame: angular acceleration, acceleration of its origin, and the matrix W with
     a_p = a + W (p - origin) for every point p fixed in the frame: W = [α]x + [ω]x².
 
-    `spread` is W_zz - W_yy, W_xx - W_zz, W_yy - W_xx, where squares cancel.
+    `spread` is W_zz - W_yy, W_xx - W_zz, W_yy - W_xx, where squares cancel, and `mixed` what W has
+    of [ω]x² off its diagonal: ω_y ω_z, ω_x ω_z, ω_x ω_y.
     """
 
     angular: Vec
     linear: Vec
     field: Mat
     spread: Vec
+    mixed: Vec
 
 
 def velocities(instant: Instant, v: Sequence[Scalar], scalars: Scalars) -> tuple[Twist, ...]:
@@ -108,8 +110,8 @@ def accelerations(
     return tuple(found)
 
 
-def _field(w: Vec, a: Vec) -> tuple[Mat, Vec]:
-    """W and its spread."""
+def _field(w: Vec, a: Vec) -> tuple[Mat, Vec, Vec]:
+    """W, its spread, and what is mixed in it."""
     xx, yy, zz = w[0] * w[0], w[1] * w[1], w[2] * w[2]
     xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
     field = (
@@ -117,7 +119,7 @@ def _field(w: Vec, a: Vec) -> tuple[Mat, Vec]:
         (xy + a[2], -(xx + zz), yz - a[0]),
         (xz - a[1], yz + a[0], -(xx + yy)),
     )
-    return field, (zz - yy, xx - zz, yy - xx)
+    return field, (zz - yy, xx - zz, yy - xx), (yz, xz, xy)
 
 
 def inertial_force(link: Link, a: Acceleration, scalars: Scalars) -> tuple[Vec, Vec]:
@@ -135,20 +137,19 @@ def moment_about_centre(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
     """Σ m r x (W r) = J α + ω x J ω from the inertia matrix.
 
     With E = Σ m r rᵀ = ½ tr(J) 1 - J its entries are those of W E less those of its transpose,
-    n_x = (W E)_zy - (W E)_yz and so on in turn, where W_zz - W_yy, … stand in `spread`.
+    n_x = (W E)_zy - (W E)_yz and so on in turn, where W_zz - W_yy, … stand in `spread`. What E has
+    on its diagonal makes J_xx α_x + (J_zz - J_yy) ω_y ω_z of it: a slight moment beside others
+    would be nothing but rounding in E.
     """
-    w = a.field
-    half, zero = scalars.number(0.5), scalars.number(0.0)
+    w, (ax, ay, az), (wyz, wxz, wxy) = a.field, a.angular, a.mixed
+    zero = scalars.number(0.0)
     xx, yy, zz = inertia[0][0], inertia[1][1], inertia[2][2]
     if scalars.is_zero(xx) and scalars.is_zero(yy):  # a planar body: J α
         return (zero, zero, zz * w[1][0])
-    total = half * (xx + yy + zz)
-    # Entries of E, which depend on parameters alone in own axes.
-    ex, ey, ez = total - xx, total - yy, total - zz
     exy, exz, eyz = -inertia[0][1], -inertia[0][2], -inertia[1][2]
-    x = w[2][0] * exy - w[1][0] * exz + a.spread[0] * eyz + w[2][1] * ey - w[1][2] * ez
-    y = w[0][1] * eyz - w[2][1] * exy + a.spread[1] * exz + w[0][2] * ez - w[2][0] * ex
-    z = w[1][2] * exz - w[0][2] * eyz + a.spread[2] * exy + w[1][0] * ex - w[0][1] * ey
+    x = w[2][0] * exy - w[1][0] * exz + a.spread[0] * eyz + xx * ax + (zz - yy) * wyz
+    y = w[0][1] * eyz - w[2][1] * exy + a.spread[1] * exz + yy * ay + (xx - zz) * wxz
+    z = w[1][2] * exz - w[0][2] * eyz + a.spread[2] * exy + zz * az + (yy - xx) * wxy
     return (x, y, z)
 
 

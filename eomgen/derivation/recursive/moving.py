@@ -19,6 +19,7 @@ from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, in_space, 
 from eomgen.effects import Gravity
 from eomgen.effects.base import Vector
 from eomgen.joints.base import WORLD
+from eomgen.language.exact import Real
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.slopes import with_rates
 from eomgen.model import Model, Seat, ways_of
@@ -142,7 +143,7 @@ class Moving:
         """An extra state."""
         return self.values.states[name]
 
-    def number(self, value: float) -> Scalar:
+    def number(self, value: Real) -> Scalar:
         """A number."""
         return self.scalars.number(value)
 
@@ -239,8 +240,9 @@ class Moving:
     def angle(self, body: int) -> Scalar:
         """The angle of a planar body from the world's x axis."""
         mount = self.linkage.mounts[body]
-        angle = self.instant.angles[mount.frame] if mount.frame >= 0 else self.scalars.number(0.0)
-        return angle + self.scalars.number(mount.angle)
+        if mount.frame < 0:
+            return self.scalars.number(mount.angle)
+        return self.instant.angles[mount.frame].and_more(mount.angle, self.scalars)
 
     @cached_property
     def moving(self) -> tuple[Twist, ...]:

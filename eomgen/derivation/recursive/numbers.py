@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.derivation.recursive.vectors import Scalar
+from eomgen.language.exact import Real
 from eomgen.language.formula import BY_MATH, FUNCTIONS
 
 BY_NUMPY: dict[str, Callable[..., Any]] = {
@@ -21,11 +22,9 @@ BY_NUMPY: dict[str, Callable[..., Any]] = {
 class FloatScalars:
     """What `Scalars` asks for, by `math`."""
 
-    exact = False
-
-    def number(self, value: float) -> float:
-        """The value itself."""
-        return value
+    def number(self, value: Real) -> float:
+        """The value itself, or the double next to a number of more digits."""
+        return float(value)
 
     def call(self, function: str, *arguments: float) -> float:
         """A function of formulas."""
@@ -43,11 +42,9 @@ class FloatScalars:
 class ArrayScalars:
     """What `Scalars` asks for where scalars are floats or arrays (n,) of them, of one length n."""
 
-    exact = False
-
-    def number(self, value: float) -> float:
-        """The value itself, the same in all of them."""
-        return value
+    def number(self, value: Real) -> float:
+        """The value itself, or the double next to it, the same in all of them."""
+        return float(value)
 
     def call(self, function: str, *arguments: Scalar) -> Scalar:
         """A function of formulas, entry by entry."""

@@ -332,7 +332,8 @@ class Elimination:
         push = sub(term.force, scale(pushed, pivot.linear))
         if not s.is_zero(link.armature):
             # Its row is that of the joint's acceleration, the frame's less the parent's.
-            row = replace(self._rows.empty(column), weight=link.armature, force=tau)
+            empty = self._rows.empty(column)
+            row = self._rows.make(link.armature, empty.angular, empty.linear, back, tau)
             rotor = row.index
             pivot, row = self._rows.rotated(pivot, row, column, turns)
             minus = with_component(way, row.angular, row.linear, -self._rows.one)
@@ -381,7 +382,8 @@ class Elimination:
         self, taken: Taken, residuals: Mapping[int, Scalar], angular: Vec, linear: Vec
     ) -> Scalar:
         """The acceleration along an axis from rows that hold it, where the others are known. Each
-        of several tells it, and better the more of it is in the row, however light that is.
+        of several tells it, and better the more of it is in the row beside noise, however light
+        that is.
         """
         above, below = self._rows.zero, self._rows.zero
         for row in taken.rows:
@@ -391,5 +393,6 @@ class Elimination:
             held = row.right + residuals[row.index] - known
             if len(taken.rows) == 1:
                 return held / x
-            above, below = above + x * held, below + x * x
+            share = x / row.noise
+            above, below = above + share * held, below + share * x
         return above / below

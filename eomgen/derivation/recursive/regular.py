@@ -24,6 +24,7 @@ from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.derivation.recursive.vectors import Mat, Scalars
 from eomgen.errors import SceneError
 from eomgen.joints.base import Geared
+from eomgen.language.exact import exactly
 from eomgen.language.formula import Constant, Formula
 from eomgen.model import Body, Model
 
@@ -34,8 +35,8 @@ TOGETHER = 4096
 """Poses that are looked at at once: a long run has more than memory for all of them."""
 VANISHED = 1e-12
 """A pivot below this share of the diagonal entry it came from may be rounding."""
-NOTHING = 1e-48
-"""And is, in 60 digits: lengths that are as many decades apart as masses leave more."""
+NOTHING = 1e-300
+"""And is, in the digits of `exact`: axes that are 1e-100 from parallel leave more."""
 UNDERFLOW = 1e-290
 """A pivot below this is nothing in doubles."""
 
@@ -46,16 +47,16 @@ def check_regular(model: Model) -> None:
     M is singular where some motion moves no mass, however large the masses are; so all of them are
     taken as 1, which leaves few questions of rounding. A pivot of the articulated-body algorithm is
     the inertia that a velocity feels when all that it carries is free; one that vanishes at seeded
-    random poses vanishes at all, or at almost all. One that might is looked at in 60 digits.
+    random poses vanishes at all, or at almost all. One that might is looked at in many digits.
     """
     count = len(model.coordinates) + len(model.driven)
     even, poses = _evened(model), _seeded(random.Random(20), count)
     if not _vanishing(_pivots(even, poses, ArrayScalars()), VANISHED):
         return
     # Imported here because a model that is regular has no need of it, nor has a run.
-    from eomgen.language.digits import Bits, sixty_digits
+    from eomgen.language.digits import Bits
 
-    with sixty_digits():
+    with exactly():
         (first, *_), bits = poses, Bits()
         pose = np.array([[bits.number(x) for x in first.tolist()]], dtype=object)
         vanishing = _vanishing(_pivots(even, pose, bits, NOTHING), NOTHING)

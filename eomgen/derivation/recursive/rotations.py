@@ -11,10 +11,12 @@ from eomgen.derivation.recursive.vectors import (
     Symmetric,
     Vec,
     congruent,
+    constant,
     product,
     times,
     transposed,
 )
+from eomgen.language.exact import Matrix, turns_in
 
 
 class Rotation(Protocol):
@@ -117,6 +119,42 @@ class AxisTurn:
 
 
 @dataclass(frozen=True)
+class QuarterTurns:
+    """Quarter turns about coordinate axis k, 1 to 3: nothing is computed."""
+
+    k: int
+    count: int
+
+    def out(self, a: Vec) -> Vec:
+        """Two components change places, or signs."""
+        return self._turned(a, self.count)
+
+    def into(self, a: Vec) -> Vec:
+        """So they do back."""
+        return self._turned(a, 4 - self.count)
+
+    def out_symmetric(self, a: Symmetric) -> Symmetric:
+        """Rows and columns change places, and signs."""
+        return self.out_matrix(a)
+
+    def out_matrix(self, a: Mat) -> Mat:
+        """Of a R^T first, which turns rows, then of its columns."""
+        rows = transposed((self.out(a[0]), self.out(a[1]), self.out(a[2])))
+        return transposed((self.out(rows[0]), self.out(rows[1]), self.out(rows[2])))
+
+    def after(self, world: Mat) -> Mat:
+        """Two columns change places, or signs."""
+        return (self.into(world[0]), self.into(world[1]), self.into(world[2]))
+
+    def _turned(self, a: Vec, count: int) -> Vec:
+        i, j = (self.k + 1) % 3, (self.k + 2) % 3
+        x, y = _by_quarters(a[i], a[j], count)
+        result = list(a)
+        result[i], result[j] = x, y
+        return (result[0], result[1], result[2])
+
+
+@dataclass(frozen=True)
 class Turned:
     """Any rotation, by its matrix: own axes as columns."""
 
@@ -171,10 +209,40 @@ class Both:
         return self.inner.after(self.outer.after(world))
 
 
-def axis_turn(k: int, angle: Scalar, scalars: Scalars) -> AxisTurn:
-    """A turn about coordinate axis k."""
-    c, s = scalars.call("cos", angle), scalars.call("sin", angle)
+def axis_turn(k: int, angle: Scalar, quarters: int, scalars: Scalars) -> AxisTurn:
+    """A turn about coordinate axis k by quarter turns and an angle."""
+    c, s = cosine_and_sine(angle, quarters, scalars)
     return AxisTurn(k, c, s, scalars.number(2.0) * c)
+
+
+def cosine_and_sine(angle: Scalar, quarters: int, scalars: Scalars) -> tuple[Scalar, Scalar]:
+    """Of an angle and quarter turns, of which no number is one exactly."""
+    return _by_quarters(scalars.call("cos", angle), scalars.call("sin", angle), quarters)
+
+
+def fixed_rotation(rotation: Matrix, scalars: Scalars) -> Rotation:
+    """A rotation that a scene fixes, by turns about coordinate axes where it is one or two."""
+    turns = turns_in(rotation)
+    if turns is None:
+        return Turned(constant(rotation, scalars))
+    found: Rotation = Unturned()
+    for turn in turns:
+        if turn.quarters:
+            found = both(found, QuarterTurns(turn.k, turn.quarters))
+        if turn.s:
+            c, s = scalars.number(turn.c), scalars.number(turn.s)
+            found = both(found, AxisTurn(turn.k, c, s, scalars.number(2.0) * c))
+    return found
+
+
+def both(outer: Rotation, inner: Rotation) -> Rotation:
+    """outer inner."""
+    return inner if isinstance(outer, Unturned) else Both(outer, inner)
+
+
+def _by_quarters(x: Scalar, y: Scalar, count: int) -> tuple[Scalar, Scalar]:
+    """Components x and y after quarter turns from x to y."""
+    return ((x, y), (-y, x), (-x, -y), (y, -x))[count % 4]
 
 
 def from_quaternion(q: Sequence[Scalar], scalars: Scalars) -> Turned:

@@ -19,6 +19,8 @@ from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, add,
 
 TINY = 1e-200
 """The weight of an empty row, and the least of any: so small that it never counts."""
+UNKNOWN = 1e100
+"""The noise of an empty row, which says nothing."""
 
 Column = tuple[bool, int]
 """Whether an acceleration is angular, and its axis."""
@@ -28,6 +30,10 @@ Column = tuple[bool, int]
 class Row:
     """angular · α + linear · a = right, times weight, and a force on that sum; `index` names its
     residual.
+
+    `noise` is what rounding leaves of it, squared, in parts of what it leaves of a body's own row.
+    A row that began as an empty one is that of others over what little they may hold of its axis,
+    and has their rounding over that, too. Of all others it counts as 1.
     """
 
     index: int
@@ -36,6 +42,7 @@ class Row:
     linear: Vec
     right: Scalar
     force: Scalar
+    noise: Scalar
 
 
 @dataclass(frozen=True)
@@ -103,18 +110,19 @@ class Rows:
     def __init__(self, scalars: Scalars) -> None:
         self._scalars = scalars
         self._indices = count()
-        self.zero, self.one, self.tiny = (scalars.number(x) for x in (0.0, 1.0, TINY))
+        numbers = (0.0, 1.0, TINY, UNKNOWN)
+        self.zero, self.one, self.tiny, self.unknown = map(scalars.number, numbers)
 
     def make(self, weight: Scalar, angular: Vec, linear: Vec, right: Scalar, force: Scalar) -> Row:
         """A row."""
-        return Row(next(self._indices), weight, angular, linear, right, force)
+        return Row(next(self._indices), weight, angular, linear, right, force, self.one)
 
     def empty(self, column: Column) -> Row:
         """One that holds one acceleration, and of which nothing is asked."""
         angular, axis = column
         one, zero = unit(axis, self._scalars), zeros(self._scalars)
         ways = (one, zero) if angular else (zero, one)
-        return self.make(self.tiny, *ways, self.zero, self.zero)
+        return replace(self.make(self.tiny, *ways, self.zero, self.zero), noise=self.unknown)
 
     def of(self, columns: Collection[Column], row: Row) -> Row:
         """A row where only some accelerations can be other than nothing."""
@@ -210,9 +218,21 @@ class Rows:
         move, left_move = both(pivot.linear, row.linear, not angular)
         right, left_right = mixed(pivot.right, row.right)
         force, left_force = pivot.force + x * row.force, c * row.force - s * pivot.force
+        noise, left_noise = pivot.noise, row.noise
+        if noise is not self.one:
+            left_noise = left_noise + x * x * noise
+            noise = c * c * noise + s * s * row.noise
         return (
-            Row(pivot.index, d, turn, move, right, force),
-            Row(row.index, row.weight * c, left_turn, left_move, left_right, left_force),
+            Row(pivot.index, d, turn, move, right, force, noise),
+            Row(
+                row.index,
+                row.weight * c,
+                left_turn,
+                left_move,
+                left_right,
+                left_force,
+                left_noise,
+            ),
         )
 
 

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from eomgen.language.exact import Matrix, Real
 
 Scalar = Any
 """Program nodes, floats, SymPy expressions, mpmath numbers."""
@@ -20,17 +19,10 @@ ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class Scalars(Protocol):
-    """What the recursions need of scalars, besides + - * / and unary minus.
+    """What the recursions need of scalars, besides + - * / and unary minus."""
 
-    `exact` says whether they keep more digits than doubles; what doubles round of a model's
-    geometry is then put right.
-    """
-
-    @property
-    def exact(self) -> bool: ...
-
-    def number(self, value: float) -> Scalar:
-        """The scalar that stands for a float."""
+    def number(self, value: Real) -> Scalar:
+        """The scalar that stands for a double, or is next to a number of more digits."""
 
     def call(self, function: str, *arguments: Scalar) -> Scalar:
         """A function of formulas (`language.formula.FUNCTIONS`)."""
@@ -160,7 +152,7 @@ def no_matrix(scalars: Scalars) -> Mat:
     return (row, row, row)
 
 
-def constant(matrix: NDArray[np.float64], scalars: Scalars) -> Mat:
-    """A 3 x 3 matrix of numbers."""
-    a, b, c = ([scalars.number(x) for x in row] for row in matrix.tolist())
+def constant(matrix: Matrix, scalars: Scalars) -> Mat:
+    """A fixed rotation as scalars."""
+    a, b, c = ([scalars.number(x) for x in row] for row in matrix)
     return ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2]))

@@ -18,7 +18,7 @@ from eomgen.run.integrators import (
 )
 from eomgen.run.integrators.gragg_bulirsch_stoer import GraggBulirschStoer
 from eomgen.run.integrators.implicit_stages import REMEDY, ImplicitMethod
-from eomgen.run.integrators.interface import Adaptive, Change, FixedStep, StepFailure
+from eomgen.run.integrators.interface import Adaptive, Change, FixedStep, Stability, StepFailure
 
 __all__ = ["INTEGRATORS", "Adaptive", "FixedStep", "StepFailure", "find_integrator"]
 
@@ -26,9 +26,9 @@ _SHORTER = "take a smaller --dt, or an implicit or adaptive method (--integrator
 _LOOSER = "try another --integrator, or a looser --rtol and --atol"
 
 
-def _any(change: Change, order: int, remedy: str) -> FixedStep:
+def _any(change: Change, order: int, stability: Stability | None = None) -> FixedStep:
     """A method that serves every problem alike."""
-    return FixedStep(lambda _: change, order, remedy)
+    return FixedStep(lambda _: change, order, _SHORTER, stability=stability)
 
 
 def _implicit(method: ImplicitMethod) -> FixedStep:
@@ -41,12 +41,10 @@ def _explicit(solver: "Callable[..., OdeSolver[Any]]", *memory: str) -> Adaptive
 
 INTEGRATORS: Mapping[str, FixedStep | Adaptive] = MappingProxyType(
     {
-        "euler": _any(euler.change, euler.ORDER, _SHORTER),
-        "semi_implicit_euler": _any(
-            semi_implicit_euler.change, semi_implicit_euler.ORDER, _SHORTER
-        ),
+        "euler": _any(euler.change, euler.ORDER, euler.stability),
+        "semi_implicit_euler": _any(semi_implicit_euler.change, semi_implicit_euler.ORDER),
         "leapfrog": FixedStep(leapfrog.prepare, leapfrog.ORDER, _SHORTER),
-        "rk4": _any(runge_kutta_4.change, runge_kutta_4.ORDER, _SHORTER),
+        "rk4": _any(runge_kutta_4.change, runge_kutta_4.ORDER, runge_kutta_4.TABLEAU.stability),
         "implicit_midpoint": _implicit(implicit_midpoint.METHOD),
         "gauss_4": _implicit(gauss_4.METHOD),
         "gauss_6": _implicit(gauss_6.METHOD),

@@ -127,7 +127,7 @@ class _Course:
         until = self.t_end
         if resume and self._lookout:
             until = min(float(resume["until"]), until)
-            self._lookout.turned = float(resume["turned"])
+            self._lookout.restore(resume)
         self._start(t, self._problem.initial, until, resume or {})
 
     def _start(self, t: float, y: Floats, until: float, memory: Mapping[str, Any]) -> None:
@@ -135,9 +135,12 @@ class _Course:
         if self.method.uses_jacobian:
             options["jac"] = self._problem.jacobian
         # A copy: LSODA's compiled code works on state arrays in place.
+        # What can go on as if it had not ended must not choose its first step by its end.
+        bound = np.inf if self.method.memory else until
         self.solver: Any = self.method.solver(
-            self._problem.derivative, t, y.copy(), until, max_step=self._longest, **options
+            self._problem.derivative, t, y.copy(), bound, max_step=self._longest, **options
         )
+        self.solver.t_bound = until
         self._until = until
         for name in self.method.memory if memory else ():
             setattr(self.solver, name, _restored(memory[name], type(getattr(self.solver, name))))
@@ -146,6 +149,10 @@ class _Course:
         """Make a step. Raises `StepFailure` if the method gives up."""
         solver = self.solver
         self._before = (float(solver.t), solver.y.copy(), self._memory())
+        if self.method.memory and self._until == self.t_end:
+            # One that is tried up to the end only is tried again in another length if refused.
+            length = min(getattr(solver, self.method.memory[0]), self._longest)
+            self._whole = self._whole and solver.t + length < self.t_end
         factored = int(solver.nlu)
         complaint = solver.step()
         self.factorisations += int(solver.nlu) - factored
@@ -193,8 +200,8 @@ class _Course:
         return held or taken.length >= self._longest * (1 - 1e-9)
 
     def stands(self) -> Callable[[], Resume] | None:
-        """What a later run needs to go on from here, if it can: the last step is cut short by the
-        end, but no step before it knows of that.
+        """What a later run needs to go on from here, if it can: if no step knows of the end, which
+        cuts short the last one, and what it would have passed over.
         """
         if not self.method.memory or self.ended or not self._whole:
             return None
@@ -202,7 +209,7 @@ class _Course:
         if self._lookout:
             reached = self.solver.status == "finished"
             memory["until"] = np.inf if reached or self._until == self.t_end else self._until
-            memory["turned"] = self._lookout.turned
+            memory |= self._lookout.memory
         t, y = float(self.solver.t), self._problem.unit(self.solver.y.copy())
         return partial(_stands, t, y, memory)
 

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance, Change, Resume
+from eomgen.run.integrators.interface import Advance, Change, Resume, Stability
 from eomgen.run.integrators.stability import Watch
 from eomgen.run.problem import Floats, Problem
 
@@ -31,6 +31,7 @@ def advances(
     dt: float,
     every: int,
     watched: Problem | None = None,
+    stability: Stability | None = None,
     resume: Resume | None = None,
 ) -> Iterator[Advance]:
     """Yield the steps of a method from time `t` on, with a sample at every `every`-th and the last.
@@ -40,13 +41,14 @@ def advances(
     after a shorter one. What rounding cuts off a step's change is added to the next one's: else
     it would gather in long runs (Hairer, Lubich, Wanner, Geometric Numerical Integration, VIII.5).
     Steps of an explicit method are watched for being too long, the problem to look at being
-    `watched`; `resume` is what an `Advance` gave.
+    `watched`, its function `stability`, if it has one; `resume` is what an `Advance` gave.
     """
     steps = int(count_steps(t_end - t_start, dt))
     first = min(math.floor((t - t_start) / dt + 1e-9) + 1, steps)
     regular, y = t == t_start or resume is not None, problem.initial
     lost = np.zeros_like(y) if resume is None else resume["lost"]
-    watch = Watch(change)
+    watch = Watch(change, stability)
+    seen = watch.seeing(problem) if watched else problem
     for i in range(first, steps + 1):
         # From the start each time: adding up dt would gather rounding.
         mark = t_start + i * dt
@@ -54,9 +56,11 @@ def advances(
         end = min(mark, t_end) if i < steps else t_end
         within = partial(_shorter, change, problem, t, y)
         length = dt if regular and whole else end - t
-        step = change(problem, t, y, length)
+        step = change(seen, t, y, length)
         if watched:
             watch.see(watched, t, y, step, length)
+            if i == steps:
+                watch.settle(watched)
         y, lost = _sum(y, step + lost)
         y = problem.unit(y)
         t, regular = end, True

@@ -10,12 +10,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from math import comb, factorial, inf, isfinite, log10, nextafter, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.integrate import DenseOutput, OdeSolver
 
 from eomgen.run.problem import Floats
+
+if TYPE_CHECKING:
+    Solver = OdeSolver[Any]
+else:
+    Solver = OdeSolver  # which is generic from SciPy 1.17 on
 
 Slope = Callable[[float, Floats], Floats]
 
@@ -73,7 +78,7 @@ class _Table:
         return WORK[row] / self.lengths[row]
 
 
-class GraggBulirschStoer(OdeSolver[Any]):
+class GraggBulirschStoer(Solver):
     """A method as SciPy's own are, for `y' = fun(t, y)` from `t0` to `t_bound`."""
 
     def __init__(

@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import OdeSolver
 
 from eomgen.errors import RunError
@@ -13,6 +15,9 @@ from eomgen.run.trajectory import Event
 Change = Callable[[Problem, float, Floats, float], Floats]
 """`change(problem, t, y, h) -> d`: one step of size h leads to y + d; leaves `y` (ny,) as it is."""
 
+Stability = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
+"""The stability function R of a method: of hλ (n,), what a step multiplies modes exp(λt) by, (n,).
+"""
 
 Resume = Mapping[str, Floats]
 """Where a run stands, by name: `t` (), `y` (ny,), and what else its method and contacts go on from.
@@ -32,12 +37,14 @@ class FixedStep:
     order    global error O(h^order)
     remedy   what to change when a run goes astray
     explicit whether steps may be too long for stability
+    stability  its stability function, if that is a function of hλ alone
     """
 
     prepare: Callable[[Problem], Change]
     order: int
     remedy: str
     explicit: bool = True
+    stability: Stability | None = None
 
 
 @dataclass(frozen=True)
@@ -48,7 +55,8 @@ class Adaptive:
     one_step       whether it steps on from a state alone, which then may be put right between steps
     remedy         what to change when a run goes astray
     memory         attributes of the solver, numbers or arrays, that with time and state are all
-                   that the next step goes on from; none where there is more to it
+                   that the next step goes on from, the first its length; none where there is more
+    vectors        those of memory that have a number for each state
     sees_end       whether its error estimate sees the derivative at the end of a step
     """
 
@@ -57,6 +65,7 @@ class Adaptive:
     one_step: bool
     remedy: str
     memory: tuple[str, ...] = ()
+    vectors: tuple[str, ...] = ("f", "slope")
     sees_end: bool = True
 
 

@@ -12,6 +12,7 @@ from itertools import combinations_with_replacement, product
 from math import prod
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eomgen.run.problem import Floats
 
@@ -79,6 +80,17 @@ class ButcherTableau:
         for i in range(1, len(b)):
             slopes[i] = derivative(t + self.c[i] * h, y + h * (a[i, :i] @ slopes[:i]))
         return h * (b @ slopes)
+
+    def stability(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """R(z) of an explicit method at z = hλ (n,): what a step multiplies exp(λt) by.
+
+        Hairer, Wanner, Solving ODEs II, (IV.2.9), stage after stage.
+        """
+        a, b, _ = self.arrays
+        stages = np.ones((len(b), *z.shape), dtype=complex)
+        for i in range(1, len(b)):
+            stages[i] += z * (a[i, :i] @ stages[:i])
+        return np.asarray(1 + z * (b @ stages))
 
 
 @cache

@@ -1,0 +1,218 @@
+"""What values of parameters must keep: one rule for a scene, for --set, and for a module's p."""
+
+import math
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from eomgen.errors import SceneError
+from eomgen.language.base import LARGEST
+from eomgen.language.formula import (
+    ZERO,
+    Apply,
+    Constant,
+    Floats,
+    Formula,
+    Name,
+    evaluate,
+    names_in,
+    written,
+)
+
+ROUNDING = 1e-9
+"""How far numbers of a scene may be from what they should be, for having been rounded."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A formula of parameters that must be >= low, or > low if it is `strict`, and <= high.
+
+    place   where the scene gives it
+    words   what is wrong where it is not kept, with braces for the values of the formulas `shown`
+    """
+
+    place: str
+    value: Formula
+    words: str
+    shown: tuple[Formula, ...]
+    low: float = 0.0
+    strict: bool = False
+    high: float = math.inf
+
+    def problem(self, known: Mapping[str, float]) -> str:
+        """What is wrong at these parameters, or ""."""
+        value = value_of(self.value, known)
+        if self.shown and not math.isfinite(value):
+            return f"{self.place}: its value is not a finite number; change its parameters"
+        if value <= self.high and (value > self.low or (value == self.low and not self.strict)):
+            return ""
+        shown = (value_of(formula, known) for formula in self.shown)
+        return f"{self.place}: {self.words.format(*shown)}"
+
+    @property
+    def depends(self) -> bool:
+        """Whether there are parameters in it: then it may hold with some values and not others."""
+        return next(names_in(self.value), None) is not None
+
+
+def require(conditions: Iterable[Condition], known: Mapping[str, float]) -> None:
+    """Raise `SceneError`, saying what is wrong, unless all hold at these parameters."""
+    for condition in conditions:
+        if problem := condition.problem(known):
+            raise SceneError(problem)
+
+
+def value_of(formula: Formula, known: Mapping[str, float]) -> float:
+    """The value of a formula, nan where it has none."""
+    try:
+        return float(evaluate(formula, known, Floats()))
+    except (ArithmeticError, ValueError):
+        return math.nan
+
+
+def of_quantity(place: str, formula: Formula, bound: str, unit: str) -> Iterator[Condition]:
+    """A quantity is finite, has a square, and keeps its bound."""
+    words = f"{{:g}} is larger than {LARGEST:g}; choose other units"
+    yield Condition(place, formula, words, (formula,), low=-LARGEST, high=LARGEST)
+    if bound == "positive":
+        words = f"{{:g}} is not positive; give a number > 0 in {unit}"
+        yield Condition(place, formula, words, (formula,), strict=True)
+    if bound == "nonnegative":
+        yield not_negative(place, formula, unit)
+
+
+def of_moving(place: str, formula: Formula, known: Mapping[str, float]) -> Iterator[Condition]:
+    """What changes with the motion has no value before it, but its still parts have."""
+    for part in _still(formula, known):
+        text = written(part).replace("{", "{{").replace("}", "}}")
+        shown = text if len(text) <= 60 else f"{text[:57]}..."
+        words = f"its part '{shown}' is not a finite number; change it or its parameters"
+        most = sys.float_info.max
+        yield Condition(place, part, words, (), low=-most, high=most)
+
+
+def _still(formula: Formula, known: Mapping[str, float]) -> Iterator[Apply]:
+    """The largest parts of a formula that depend on nothing but parameters."""
+    if isinstance(formula, Apply):
+        if all(name in known for name in names_in(formula)):
+            yield formula
+        else:
+            for operand in formula.operands:
+                yield from _still(operand, known)
+
+
+def not_negative(place: str, formula: Formula, unit: str) -> Condition:
+    """A number >= 0."""
+    words = f"{{:g}} is negative; give a number >= 0 in {unit}"
+    return Condition(place, formula, words, (formula,))
+
+
+def a_part(place: str, formula: Formula) -> Condition:
+    """A number from 0 to 1."""
+    words = "{:g} is not from 0 to 1; give one that is"
+    return Condition(place, formula, words, (formula,), high=1.0)
+
+
+def in_order(place: str, low: Formula, high: Formula) -> Condition:
+    """Two numbers, the first below the second."""
+    words = "{:g} is not below high, {:g}; make low < high"
+    return Condition(place, _difference(high, low), words, (low, high), strict=True)
+
+
+def can_meet(place: str, radii: Sequence[Formula]) -> Condition:
+    """Of spheres, with radii >= 0 in m, no two are points: at most one radius is 0."""
+    spheres = _sum(*(Apply("step", (radius,)) for radius in radii))
+    words = "two points never meet; give a radius > 0"
+    return Condition(place, spheres, words, (), low=len(radii) - 1.0)
+
+
+def of_inertia(
+    place: str, body: str, mass: Formula, entries: Sequence[Formula], known: Mapping[str, float]
+) -> Iterator[Condition]:
+    """That there is a body of such an inertia about its centre of mass: one moment in the plane, or
+    xx, yy, zz, xy, xz, yz, of which moments are not negative; and none if it has no mass. A body
+    that has some at the `known` parameters is to keep some, which its equations ask for themselves.
+
+    In space its principal moments are not negative, and none is larger than the other two together,
+    which is to say that Σ = ½ tr(I) 1 - I, the integral of r rᵀ dm, is positive semidefinite:
+    P. M. Wensing, S. Kim, J.-J. E. Slotine, IEEE Robotics and Automation Letters 3 (2018) 60-67.
+    A lamina or a rod is on the edge of that, so `ROUNDING` in parts of the trace is allowed for.
+    """
+    trace = _sum(*entries[:3])
+    words = f"body '{body}' has inertia but no mass; give it a mass, or inertia_com = 0"
+    if value_of(mass, known) == 0.0:
+        yield Condition(place, Apply("select", (mass, Constant(1.0), _minus(trace))), words, ())
+    if len(entries) == 1:
+        return
+    xx, yy, zz, *products = entries
+    if all(product == ZERO for product in products):
+        words = (
+            f"body '{body}' has principal moments {{:.6g}}, {{:.6g}}, {{:.6g}}; no body has one "
+            "larger than the other two together: change xx, yy or zz"
+        )
+        allowed = _product(Constant(ROUNDING / 2), trace)
+        excesses = (
+            _difference(_sum(b, c, allowed), a)
+            for a, b, c in ((xx, yy, zz), (yy, zz, xx), (zz, xx, yy))
+        )
+        yield Condition(place, _least(*excesses), words, (xx, yy, zz))
+        return
+    words = (
+        f"body '{body}' has moments {{:.6g}}, {{:.6g}}, {{:.6g}} and products {{:.6g}}, {{:.6g}}, "
+        "{:.6g}; so one of its principal moments is negative, or larger than the other two "
+        "together: make the products smaller, or change xx, yy or zz"
+    )
+    least = _least(*_leading_minors(entries))
+    yield Condition(place, least, words, tuple(entries), strict=True)
+
+
+def _leading_minors(entries: Sequence[Formula]) -> tuple[Formula, ...]:
+    """Three numbers that are > 0 if and only if 2 Σ / s + `ROUNDING`/2 is positive definite, where
+    s is the sum of the sizes of all entries, or 1.
+
+    Sylvester's criterion; the determinant is multiplied by the first minor, so that nothing is
+    divided by it (E. H. Bareiss, Math. Comp. 22 (1968) 565-578). What is added is far larger than
+    the rounding of the minors of a rod in any pose.
+    """
+    size = _sum(*(Apply("abs", (entry,)) for entry in entries))
+    size = Apply("select", (size, size, Constant(1.0)))
+    xx, yy, zz, xy, xz, yz = (Apply("/", (entry, size)) for entry in entries)
+    one = _sum(xx, yy, zz, Constant(ROUNDING / 2))
+    a, b, c = (_difference(one, _product(Constant(2.0), x)) for x in (xx, yy, zz))
+    p, q, r = (_product(Constant(-2.0), x) for x in (xy, xz, yz))
+    second = _difference(_product(a, b), _product(p, p))
+    other = _difference(_product(a, c), _product(q, q))
+    mixed = _difference(_product(a, r), _product(p, q))
+    return a, second, _difference(_product(second, other), _product(mixed, mixed))
+
+
+def is_of_size(condition: Condition) -> bool:
+    """Whether it asks no more of a parameter than the size that all keep."""
+    value = condition.value
+    if isinstance(value, Apply) and value.operation == "neg":
+        (value,) = value.operands
+    return isinstance(value, Name) and condition.low <= -LARGEST
+
+
+def _sum(first: Formula, *rest: Formula) -> Formula:
+    for term in rest:
+        first = Apply("+", (first, term))
+    return first
+
+
+def _least(first: Formula, *rest: Formula) -> Formula:
+    for term in rest:
+        first = Apply("min", (first, term))
+    return first
+
+
+def _product(a: Formula, b: Formula) -> Formula:
+    return Apply("*", (a, b))
+
+
+def _difference(a: Formula, b: Formula) -> Formula:
+    return Apply("-", (a, b))
+
+
+def _minus(a: Formula) -> Formula:
+    return Apply("neg", (a,))

@@ -1,0 +1,142 @@
+"""Does the main job run with the oldest versions that pyproject.toml allows, and on the newest
+Python there is?
+
+    python tests/campaigns/versions.py [oldest] [newest]
+
+Both unless one is named. Each makes a virtual environment of its own, installs this folder, and
+there generates, simulates and verifies a few scenes and runs a small part of the tests. `oldest`:
+the lowest version of each dependency as pyproject.toml has it, on the lowest Python. `newest`: what
+the package index has, on the highest Python found here, which it names. Where Python or the index
+is missing it says NOT CHECKED and why, and counts as no failure; all else that goes wrong does.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent.parent
+SCENES = ("pendulum", "two_body", "tumbling_body", "bouncing_two_body")
+METHODS = ("LSODA", "Radau", "DOP853", "gragg_bulirsch_stoer", "gauss_6")
+TESTS = ("formula", "trajectory", "small_faults")
+RUNNERS = ("pytest", "pytest-xdist")
+"""What these tests need of the packages for tests."""
+_NAMED = re.compile(r"python3\.(\d+)")
+
+
+def pythons() -> dict[tuple[int, int], Path]:
+    """Each Python 3 that starts: on the path, or beside the one that runs this."""
+    folders = [Path(folder) for folder in os.environ["PATH"].split(os.pathsep) if folder]
+    folders += sorted(Path(sys.base_prefix).parent.glob("*/bin"))
+    found = {sys.version_info[:2]: Path(sys.executable)}
+    for path in (p for folder in folders for p in sorted(folder.glob("python3.*"))):
+        name = _NAMED.fullmatch(path.name)
+        if name is None or (3, int(name[1])) in found:
+            continue
+        code = "import sys, venv, ensurepip; sys.exit(sys.version_info.releaselevel != 'final')"
+        if not subprocess.run([path, "-c", code], capture_output=True).returncode:
+            found[3, int(name[1])] = path
+    return found
+
+
+def lowest(requirements: Sequence[str]) -> list[str]:
+    """Each of some requirements NAME>=VERSION as NAME==VERSION."""
+    for text in requirements:
+        if not re.fullmatch(r"[\w-]+>=[\d.]+", text):
+            raise SystemExit(f"pyproject.toml: '{text}' is not NAME>=VERSION")
+    return [text.replace(">=", "==") for text in requirements]
+
+
+def chosen(which: str) -> tuple[Path | None, str, list[str]]:
+    """The Python of one of the two checks, its version, and the packages with their versions."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    tests = [
+        text for text in project["optional-dependencies"]["test"] if text.split(">=")[0] in RUNNERS
+    ]
+    there = pythons()
+    if which == "newest":
+        version = max(there)
+        return there[version], f"3.{version[1]}", [t.split(">=")[0] for t in tests]
+    match = re.fullmatch(r">=3\.(\d+)", project["requires-python"])
+    assert match is not None, project["requires-python"]
+    packages = lowest([*project["dependencies"], *tests])
+    return there.get((3, int(match[1]))), f"3.{match[1]}", packages
+
+
+def check(which: str, work: Path) -> bool:
+    """Whether the main job and the tests ran; true also where that could not be checked."""
+    python, version, packages = chosen(which)
+    print(f"== {which}: Python {version} with {', '.join(packages)}", flush=True)
+    if python is None:
+        print(f"NOT CHECKED: there is no Python {version} here")
+        return True
+    own = work / "venv" / "bin"
+    subprocess.run([python, "-m", "venv", own.parent], check=True)
+    install = [own / "python", "-m", "pip", "install", "-q", "--disable-pip-version-check"]
+    index = subprocess.run([*install, "hatchling"], capture_output=True, text=True)
+    if index.returncode:
+        print(f"NOT CHECKED: no package index: {index.stderr.strip().splitlines()[-1]}")
+        return True
+    subprocess.run([*install, *packages, ROOT], check=True, stderr=subprocess.DEVNULL)
+    return all([main_job(own, work), small_tests(own, work)])
+
+
+def main_job(own: Path, work: Path) -> bool:
+    """Generate, simulate and verify scenes; the modules are those that are committed."""
+    commands = [["generate", *SCENES, "-o", "made"]]
+    commands += [["simulate", scene, "-o", "out"] for scene in SCENES]
+    commands += [["simulate", "pendulum", "--integrator", m, "-o", f"out_{m}"] for m in METHODS]
+    commands += [["verify", scene] for scene in SCENES[:2]]
+    good = True
+    for command in commands:
+        done = run([own / "eomgen", *command], work)
+        print(f"{'ok' if done else 'FAILED'}  eomgen {' '.join(command)}", flush=True)
+        good = good and done
+    for scene in SCENES if good else ():
+        name = f"{scene}.py"
+        if (work / "made" / name).read_bytes() != (ROOT / "generated" / name).read_bytes():
+            # SymPy writes what is equal in another form; what it computes is verified above.
+            print(f"note  made/{name} differs from generated/{name}")
+    return good
+
+
+def small_tests(own: Path, work: Path) -> bool:
+    """A part of the tests, on what was installed. What old packages say of new ones that they use,
+    Matplotlib of pyparsing for example, is no fault of this program.
+    """
+    quiet = ["-n", "2", "-W", "ignore::DeprecationWarning"]
+    files = [str(ROOT / "tests" / f"test_{name}.py") for name in TESTS]
+    done = run([own / "python", "-m", "pytest", "-p", "no:cacheprovider", *quiet, *files], work)
+    print(f"{'ok' if done else 'FAILED'}  pytest {' '.join(TESTS)}", flush=True)
+    return done
+
+
+def run(command: Sequence[str | Path], work: Path) -> bool:
+    """Whether a command ends well; if not, its output is shown."""
+    env = {**os.environ, "EOMGEN_CACHE": str(work / "store"), "PYTHONDONTWRITEBYTECODE": "1"}
+    env.pop("PYTHONPATH", None)
+    done = subprocess.run(command, cwd=work, env=env, capture_output=True, text=True)
+    if done.returncode:
+        print((done.stdout + done.stderr)[-4000:])
+    return done.returncode == 0
+
+
+def main() -> int:
+    """All that is asked for; 1 if any failed."""
+    wanted = sys.argv[1:] or ["oldest", "newest"]
+    if not set(wanted) <= {"oldest", "newest"}:
+        print(__doc__)
+        return 2
+    good = True
+    for which in wanted:
+        with tempfile.TemporaryDirectory() as folder:
+            good = check(which, Path(folder)) and good
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
