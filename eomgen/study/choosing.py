@@ -113,6 +113,9 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         aside = None if _lost(search, judged) else _again(search, names)
         if not possible:
             possible = [plan for plan in (_beside(search, best), aside) if plan][:1]
+        if not possible and id(best) not in search.samples:
+            search.sample(best)
+            continue
         if not possible:
             return _missed(search, best, judged, target, why)
         plan = min(possible, key=lambda plan: plan.work)
@@ -132,8 +135,6 @@ def _missed(
     search: Search, best: Tried, judged: dict[int, float], target: float, why: str
 ) -> Choice:
     """The best run where none will do, and `why`, if that is not rounding of all steps."""
-    if id(best) not in search.samples:
-        search.sample(best)
     moved = search.rounded(best)
     if not why and moved > ENOUGH * target:
         why = f"rounding alone, of constants and of each step, moves its end by {moved:.1g}"

@@ -233,7 +233,8 @@ def by_looser_run(
 
     What the two differ by is the error of the second, mostly; so it is more than that of the run,
     but not by much where errors do not fall with the tolerance, as those of LSODA near rounding, or
-    where rounding makes them. Two runs may be near each other by accident: no less is stated than
+    where rounding makes them. Those of equal steps fall as theory has it, but for rounding, which
+    samples tell of. Two runs may be near each other by accident: no less is stated than
     what the others' differences make, carried on by theory, nor than what samples tell of rounding.
     """
     if not all(other.trajectory.finished for other in (second, *samples)):
@@ -241,7 +242,10 @@ def by_looser_run(
     method, one = method_of(run.setting.integrator), run.trajectory
     floor = max(representable(run, scale)[0], FEW * ROUNDING)
     floor = floor if case.problem.contacts is None else max(floor, STRIKES)
-    last = max(difference(one, second.trajectory, scale), floor)
+    last = difference(one, second.trajectory, scale)
+    if samples and method.equal_steps and last < SMALL:
+        last /= math.pow(second.tolerance / run.tolerance, CAUTION * method.exponent)
+    last = max(last, floor)
     for other in others:
         gap = difference(one, other.trajectory, scale)
         theory = math.pow(other.tolerance / run.tolerance, CAUTION * method.exponent)

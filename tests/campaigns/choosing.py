@@ -148,18 +148,12 @@ def case_rows(scene: str, given: argparse.Namespace) -> list[dict[str, Any]]:
 
 
 def show(rows: list[dict[str, Any]]) -> None:
-    """The table, and what it amounts to."""
-    print("| scene | target | true error | estimate | run, s | × quickest | search, s | by |")
-    print("|---|---|---|---|---|---|---|---|")
-    for row in rows:
-        rough = row["reference"] > row["target"] / 3
-        said = "refused: " if not row["met"] else ""
-        print(
-            f"| {row['scene']} | {row['target']:.0e} | {said}{row['true']:.1e}"
-            f"{' (reference too rough)' if rough else ''} | {row['estimate']:.1e} "
-            f"| {row['seconds']:.2g} | {row['seconds'] / row['quickest']:.1f} "
-            f"| {row['search']:.2g} | {row['options'].split()[1]} ({row['by'].split()[1]}) |"
-        )
+    """The table, a scene a line, and what it amounts to."""
+    heads = " | ".join(f"{target:.0e}" for target in TARGETS)
+    print(f"| scene | {heads} |\n|---|" + "---|" * len(TARGETS))
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        cells = [cell(row) for row in rows if row["scene"] == scene]
+        print(f"| {scene} | {' | '.join(cells)} |")
     met = [row for row in rows if row["met"]]
     judged = [row for row in met if row["reference"] < row["target"] / 3]
     below = sum(row["true"] <= row["target"] for row in judged)
@@ -177,6 +171,16 @@ def show(rows: list[dict[str, Any]]) -> None:
         f"{quick} of {len(met)} within {FACTOR:g} times the quickest, median {median(times):.2g}; "
         f"with the search, median {median(search):.2g}"
     )
+
+
+def cell(row: dict[str, Any]) -> str:
+    """One scene at one target: true error, time and its ratio to the quickest, and the methods."""
+    if not row["met"]:
+        return f"refused, at {row['true']:.0e}"
+    own, by = row["options"].split()[1], row["by"].split()[1]
+    ratio = row["seconds"] / row["quickest"]
+    found = f"{row['true']:.0e} in {row['seconds']:.2g} s by {own}"
+    return f"{found}, {ratio:.1f} × {by}" if ratio > 1 else found
 
 
 def median(values: list[float]) -> float:
