@@ -92,8 +92,16 @@ def exact_dynamics(found: Engine, y: np.ndarray) -> Dynamics:
     nq = len(model.coordinates)
     values = [MP.mpf(x) for x in y]
     return Dynamics(
-        model, Values(parameters, {}, values[:nq], values[nq:], {}, MP.mpf(0)), Digits()
+        model, Values(parameters, {}, values[:nq], values[nq:], {}, MP.mpf(0)), Written()
     )
+
+
+class Written(Digits):
+    """60 digits, but directions and rotations of the scene are doubles, as in the module."""
+
+    def number(self, value: Real) -> Any:
+        """The double next to the value, exactly."""
+        return super().number(float(value))
 
 
 # One body on the ground, in closed form.

@@ -103,7 +103,7 @@ def test_a_lone_body_is_as_large_as_its_inertia_says() -> None:
     assert isinstance(box, Box) and np.allclose(box.size, 0.1)
 
 
-@pytest.mark.parametrize("length", [1e-150, 1e150, 1e308])
+@pytest.mark.parametrize("length", [1e-150, 1e100])
 def test_lengths_that_no_picture_has_are_left_out(length: float) -> None:
     """They may come from parameters of a run; the others are drawn."""
     names = ("shoulder_r_child_z", "wrist_r_parent_z")

@@ -80,11 +80,6 @@ class Tried:
     record: Recording
     program: Program
 
-    @property
-    def operations(self) -> int:
-        """Of the derivative."""
-        return cost(self.program, "derivative")["total"]
-
 
 def routed(model: Model, *, jacobian: bool = True, closed: bool = True) -> Routed:
     """The system of a model by the route it names, or by the one of the fewest operations that
@@ -119,18 +114,20 @@ def _chosen(model: Model, why_not: str, jacobian: bool, closed: bool) -> Routed:
         candidates.append(Candidate("closed", None, words))
     elif closed:
         system = _closed(model, jacobian)
-        alone = _alone(system.program)
-        candidates.append(_candidate("closed", cost(alone, "derivative")["total"]))
-        routes["closed"] = _route(model, alone, None)
+        candidates.append(_candidate("closed", _operations(system)))
+        routes["closed"] = _route(model, _alone(system.program), None)
+    # Beside the closed form, which is counted as its module has it, the others are, too: among all
+    # outputs. That takes little time where a closed form is tried.
+    count = _operations_alone if system is None else _operations_in_module
     tried = {"aba": _tried(model, "aba")}
-    candidates.append(_candidate("aba", tried["aba"].operations))
-    least = least_factoring(model)
-    if least > tried["aba"].operations:
+    aba, least = count(tried["aba"]), least_factoring(model)
+    candidates.append(_candidate("aba", aba))
+    if least > aba:
         words = f"not tried: factoring alone takes {least} operations"
         candidates.append(Candidate("ldl", None, words))
     else:
         tried["ldl"] = _tried(model, "ldl")
-        candidates.append(_candidate("ldl", tried["ldl"].operations))
+        candidates.append(_candidate("ldl", count(tried["ldl"])))
     routes |= {name: _route(model, t.program, t.record.dynamics.axes) for name, t in tried.items()}
     weighed, digits = _weighed(candidates, digits_lost(model, routes)), None
     if not _kept(weighed):
@@ -142,7 +139,7 @@ def _chosen(model: Model, why_not: str, jacobian: bool, closed: bool) -> Routed:
             words = (
                 f"keeps digits that bodies and joints take from others, {lost['aba']:.0f} of aba"
             )
-            weighed.append(Candidate("orthogonal", last.operations, words))
+            weighed.append(Candidate("orthogonal", count(last), words))
             digits = _right(lost["orthogonal"])
     best = min(_kept(weighed), key=lambda c: c.operations or 0)
     if system is None or best.route != "closed":
@@ -192,7 +189,7 @@ def _tried(model: Model, route: str) -> Tried:
         record = Recording(model, route, axes=own)
         outputs = {"derivative": _output(node.index for node in record.rates)}
         found.append(Tried(record, optimise(finish(record.tape, outputs, ()))[0]))
-    return min(found, key=lambda one: one.operations)
+    return min(found, key=_operations_alone)
 
 
 def _output(nodes: Iterable[int]) -> Output:
@@ -278,3 +275,14 @@ def _candidate(route: str, operations: int) -> Candidate:
 
 def _operations(system: System) -> int:
     return cost(system.program, "derivative")["total"]
+
+
+def _operations_alone(tried: Tried) -> int:
+    """Of the derivative, computed alone."""
+    return cost(tried.program, "derivative")["total"]
+
+
+def _operations_in_module(tried: Tried) -> int:
+    """Of the derivative, beside all other outputs."""
+    again = recorded(tried.record.model, tried.record.route)
+    return _operations(from_recursion(again, jacobian=False))

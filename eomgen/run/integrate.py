@@ -165,7 +165,8 @@ def _kept(run: "_Run", problem: Problem, remembered: Resume) -> Resume:
     if not stands:
         return {}
     rate = np.full(len(problem.states), np.nan)  # not known, if it is interrupted
-    with np.errstate(all="ignore"), suppress(ArithmeticError, ValueError, KeyboardInterrupt):
+    stops = (ArithmeticError, ValueError, StepFailure, KeyboardInterrupt)
+    with np.errstate(all="ignore"), suppress(*stops):
         rate = np.array(problem.derivative(float(stands["t"]), stands["y"]))
     return {**stands, **remembered, "derivative": rate}
 

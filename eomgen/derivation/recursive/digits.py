@@ -170,18 +170,23 @@ def _off(
         change = _shares(_numbers(nudged, _nudged(together, len(at)), shape), true, least)
         doubts.append(change)
     worst = dict.fromkeys(found, 0.0)
-    exactly = _in_many_digits(model, nudge=closely)
+    exactly, known_somewhere = _in_many_digits(model, nudge=closely), False
     for n in _doubtful(doubts, CLOSELY if closely else ROUGHLY):
         try:
             long, change_here = exactly(at[n])
         except (ArithmeticError, ValueError):
             continue  # no v̇ there to lose digits of
+        if not all(math.isfinite(x) for x in map(float, long)):
+            continue  # nor one that doubles could hold
+        known_somewhere = True
         size = max([float(least[n]), *(float(abs(x)) for x in long)])
         allowed = size * max(EPSILON, change_here / size / SURE)
         for route, rates in found.items():
             own = rates[:, n]
             off = _apart(own.tolist(), long) if np.isfinite(own).all() else math.inf
             worst[route] = max(worst[route], off / allowed)
+    if not known_somewhere:
+        return worst
     if closely and worst["orthogonal"] > TRUSTED:
         return worst
     known = np.isfinite(true).all(axis=0)
