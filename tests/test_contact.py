@@ -27,6 +27,7 @@ from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.effects.base import Contact, JointLoad, Load
 from eomgen.effects.vectors import NEAREST
 from eomgen.errors import SceneError
+from eomgen.language.exact import Real
 from eomgen.program.route import routed
 from eomgen.scene.reader import parse_scene
 from eomgen.scene.schema import OUTPUTS
