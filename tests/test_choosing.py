@@ -288,7 +288,7 @@ def test_impacts_have_a_floor_of_their_own() -> None:
 def test_a_budget() -> None:
     """With time enough the run goes as far as rounding lets it, and says what it is worth."""
     case, true = case_of("two_body"), in_long_numbers("two_body")
-    choice = within(case, 10.0)
+    choice = within(case, 4.0)
     off = error(choice.tried.trajectory.y[-1], true.y[-1], true.scale)
     assert off < 1e-9 and off < 10 * choice.error
 

@@ -120,11 +120,11 @@ def agree(model: Model, seed: int, error: float) -> None:
 
 
 # All but trees with inertias like -I/5, whose quotients the tape must round to doubles.
-SMALL = [(seed, dims, 3) for seed in range(some(6, 8)) for dims in (PLANE, SPACE)]
+SMALL = [(seed, dims, 3) for seed in range(some(5, 8)) for dims in (PLANE, SPACE)]
 if not FULL:  # the one that takes longest
     SMALL.remove((4, SPACE, 3))
-FEW = [(0, SPACE, 3), (1, SPACE, 3), (2, SPACE, 3), (9, PLANE, 3)]
-FEW += some([], [(3, SPACE, 3), (22, PLANE, 3), (6, PLANE, 5)])
+FEW = [(1, SPACE, 3), (2, SPACE, 3), (9, PLANE, 3)]
+FEW += some([], [(0, SPACE, 3), (3, SPACE, 3), (22, PLANE, 3), (6, PLANE, 5)])
 FIVE = [(2, SPACE, 5), (6, PLANE, 5), (11, SPACE, 5)]
 
 
@@ -138,7 +138,7 @@ def is_regular(model: Model) -> bool:
 
 
 SQUARED = [case for case in (*SMALL, *FIVE) if is_regular(squared(tree(*case)))]
-assert len(SQUARED) >= some(12, 16)
+assert len(SQUARED) >= some(10, 16)
 
 
 @pytest.mark.parametrize(("seed", "dimensions", "most"), SQUARED)

@@ -27,7 +27,7 @@ from eomgen.scene.reader import parse_scene
 
 ROUNDING = 1e-11
 """What the recursions keep to in floats; of the trees here the worst is off by 2e-13."""
-TREES = [*product((PLANE, SPACE), range(some(60, 120)))]
+TREES = [*product((PLANE, SPACE), range(some(40, 120)))]
 FEW = [(PLANE, 3), (PLANE, 38), (SPACE, 11), (SPACE, 14), (SPACE, 47)]
 ROUTES = ("aba", "ldl")
 

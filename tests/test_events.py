@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from campaign import some
 from scipy.optimize import brentq
 
 from eomgen.errors import RunError
@@ -21,6 +22,7 @@ G = 9.81
 FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
 # Leapfrog knows no contacts.
 GENERAL = [name for name in INTEGRATORS if name != "leapfrog"]
+A_FEW = some([n for n in GENERAL if not n.endswith(("_differences", "_6", "euler"))], GENERAL)
 EXACT = {"rtol": 1e-12, "atol": 1e-14}
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
@@ -348,7 +350,7 @@ def shaken(t):
     return 0.1 * np.sin(12 * t), 1.2 * np.cos(12 * t), -14.4 * np.sin(12 * t)
 
 
-@pytest.mark.parametrize("name", GENERAL)
+@pytest.mark.parametrize("name", A_FEW)
 def test_mass_leaves_a_shaken_table(name):
     """Where the table falls faster than g; then it flies, and meets it again."""
     problem = mechanism([0.0], [1.2], [[1.0]], force=weight, ground=shaken, bounce=0.0)
@@ -540,7 +542,7 @@ def test_works_follow_the_order_of_the_method():
     assert math.log2(errors[0] / errors[1]) > 3.8
 
 
-@pytest.mark.parametrize("name", GENERAL)
+@pytest.mark.parametrize("name", A_FEW)
 def test_every_integrator_books_works(name):
     problem, powers = airy()
     order = getattr(INTEGRATORS[name], "order", 4)

@@ -28,10 +28,10 @@ from eomgen.derivation.recursive.reactions import reactions
 from eomgen.model import Model
 from eomgen.scene.reader import parse_scene
 
-SEEDS = range(some(75, 150))
+SEEDS = range(some(45, 150))
 MOST = (6, 14, 30)
 """Bodies up to which every third tree has."""
-SMALL = range(some(10, 14))
+SMALL = range(some(7, 14))
 CLOSE = 1e-9
 ROUNDING = 1e-11
 """What our own routes keep to; of 300 trees the worst is off by 2e-13."""
