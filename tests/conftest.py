@@ -2,16 +2,19 @@
 
 import gc
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
 from mechanisms import BUILT_IN, Compiled, compiled
+from xdist.scheduler import LoadScopeScheduling
 
 TOGETHER = {
     "closed": "generated handout identities pivots program routes".split(),
     "effects": "absence bookkeeping".split(),
 }
 """Files whose tests ask for the same compiled scenes: these are made once a process."""
+GROUPS = {name: group for group, names in TOGETHER.items() for name in names}
 FIRST = "closed effects laws events closed_general no_silent_error orthogonal cli choosing".split()
 """Groups and files that take longest, so that no process is left with one of them at the end."""
 
@@ -23,16 +26,30 @@ def pytest_configure() -> None:
     gc.set_threshold(100_000, 20, 20)
 
 
-@pytest.hookimpl(tryfirst=True)
+def _group(nodeid: str) -> str:
+    """What of the tests runs in one process: a file of its own, or several together."""
+    name = nodeid.partition("::")[0].rpartition("/")[2].removeprefix("test_").removesuffix(".py")
+    return GROUPS.get(name, name)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Groups for pytest-xdist: each runs in one process, a file of its own or several together."""
-    groups = {name: group for group, names in TOGETHER.items() for name in names}
-    names = [item.path.stem.removeprefix("test_") for item in items]
-    group = {item: groups.get(name, name) for item, name in zip(items, names, strict=True)}
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group(group[item]))
+    """What takes longest comes first."""
     rank = {name: i for i, name in enumerate(FIRST)}
-    items.sort(key=lambda item: rank.get(group[item], len(FIRST)))
+    items.sort(key=lambda item: rank.get(_group(item.nodeid), len(FIRST)))
+
+
+class ByGroup(LoadScopeScheduling):  # type: ignore[misc]
+    """Deals out groups. That of xdist's own marks does nothing with a pytest that keeps the
+    name of a test elsewhere, as 9.2 does.
+    """
+
+    def _split_scope(self, nodeid: str) -> str:
+        return _group(nodeid)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByGroup:
+    """Called by xdist."""
+    return ByGroup(config, log)
 
 
 @pytest.fixture(scope="session", params=BUILT_IN)

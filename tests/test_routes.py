@@ -28,7 +28,7 @@ from eomgen.derivation.recursive.reactions import reactions
 from eomgen.model import Model
 from eomgen.scene.reader import parse_scene
 
-SEEDS = range(some(45, 150))
+SEEDS = range(some(75, 150))
 MOST = (6, 14, 30)
 """Bodies up to which every third tree has."""
 SMALL = range(some(7, 14))
