@@ -108,7 +108,8 @@ def read(scene: str) -> Scene:
 def engine(
     scene: str, route: str = "", *, leave_out: tuple[str, ...] = (), tangents: bool = False
 ) -> Engine:
-    """Compile a scene, once, with all outputs but some, by a route or by its own.
+    """Compile a scene, once, with all outputs but some, by a route or by its own; a text that names
+    none by `aba`, without judging the others.
 
     Without "jacobian" and what else is in `DERIVATIVES`, most of the work is left out. `tangents`:
     as large models have it, no matrix of derivatives is written out.
@@ -126,6 +127,8 @@ def quick(scene: str, route: str = "", *, tangents: bool = False) -> Engine:
 def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) -> Engine:
     model = build_model(read(scene).replaced(outputs="all"))
     outputs = tuple(name for name in model.outputs if name not in leave_out)
+    if not route and model.route == "auto" and model.form == "velocity":
+        route = "auto" if scene in built_in_names() else "aba"
     model = replace(model, outputs=outputs, route=route or model.route)
     with pytest.MonkeyPatch.context() as patch:
         if tangents:

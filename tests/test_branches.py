@@ -70,7 +70,7 @@ def test_pulses_are_found(shape: str, method: str) -> None:
     """However short, and wherever in a run that is otherwise one step to the method."""
     torque, area = PULSES[shape]
     rng = np.random.default_rng(sum(map(ord, shape + method)))
-    for _ in range(40 if FULL else 2):
+    for _ in range(40 if FULL else 1):
         width = 10 ** rng.uniform(-6, -0.5)
         values = {"a": rng.uniform(0.5, 9.0), "w": width}
         problem = as_problem(module(WHEEL.format(torque=torque)), values)
@@ -208,7 +208,7 @@ def tree(seed: int) -> str:
     return "\n".join(lines)
 
 
-@pytest.mark.parametrize("seed", range(60 if FULL else 2))
+@pytest.mark.parametrize("seed", range(60 if FULL else 1))
 def test_brief_contacts_of_random_trees(seed: int) -> None:
     """As close to runs in very short steps as runs in 1000 steps are, but for what the motion
     magnifies, which a run at another tolerance tells.

@@ -19,17 +19,19 @@ from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene
 from eomgen.store import generated_code
 
 ROOT = Path(__file__).parent.parent
+LARGE = "chain hanging_figure human_figure quadruped ragdoll stiff_beam walker_motors".split()
 pytestmark = pytest.mark.usefixtures("blank_figures")
 
 
 @pytest.mark.parametrize("seed", some(("1",), ("0", "1", "2")))
 def test_committed_modules_are_what_is_generated(tmp_path: Path, seed: str) -> None:
-    """Every built-in scene derived anew gives the committed bytes, whatever the seed of Python's
-    hashes; nothing else is there.
+    """Built-in scenes derived anew give the committed bytes, whatever the seed of Python's hashes;
+    nothing else is there. The large ones take longest; `.ci/run` has them all.
     """
+    names = [name for name in built_in_names() if name not in some(LARGE, ())]
     committed = ROOT / "generated"
     done = subprocess.run(
-        [sys.executable, "-m", "eomgen", "generate", "--all", "--check", "-o", str(committed)],
+        [sys.executable, "-m", "eomgen", "generate", *names, "--check", "-o", str(committed)],
         env={**os.environ, "PYTHONHASHSEED": seed, "EOMGEN_CACHE": str(tmp_path)},
         check=False,
         capture_output=True,
@@ -37,7 +39,7 @@ def test_committed_modules_are_what_is_generated(tmp_path: Path, seed: str) -> N
     )
     lines = done.stdout.splitlines()
     assert [line for line in lines if not line.endswith(": fresh")] == []
-    assert done.returncode == 0 and len(lines) == len(built_in_names())
+    assert done.returncode == 0 and len(lines) == len(names)
     assert sorted(path.stem for path in committed.glob("*.py")) == sorted(built_in_names())
 
 

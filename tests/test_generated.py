@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import some
 from mechanisms import BUILT_IN, SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
 from newton_euler import Mechanism, Motion, solve
 
@@ -15,6 +16,7 @@ from eomgen.pipeline import compile_scene
 from eomgen.scene.reader import parse_scene
 
 TOLERANCE = 1e-12
+MANY = some(300, 1000)
 TREES = [random_tree(seed) for seed in SEEDS]
 
 
@@ -63,8 +65,8 @@ def pin_wrenches(
     return np.column_stack((motion.pin_forces, moments))[c.scene.pin_rows(c.module)]
 
 
-def test_thousand_random_states(built_in: Compiled) -> None:
-    """At 1000 states, with forces and torques if there are any, one by one and as columns.
+def test_random_states(built_in: Compiled) -> None:
+    """At many states, with forces and torques if there are any, one by one and as columns.
 
     Inputs are given by name and in order; both mean the same.
     """
@@ -72,7 +74,7 @@ def test_thousand_random_states(built_in: Compiled) -> None:
     rng = np.random.default_rng(20)
     states, inputs, expected = [], [], []
     assert tuple(module.INPUTS) == scene.inputs
-    for _ in range(1000):
+    for _ in range(MANY):
         y, u = scene.random_state(module, rng), scene.random_inputs(rng)
         motion = assert_agrees(built_in, y, u or None)
         ordered = np.array([u[name] for name in module.INPUTS])
@@ -84,9 +86,9 @@ def test_thousand_random_states(built_in: Compiled) -> None:
         expected.append(motion)
     columns, u = np.array(states).T, np.array(inputs).T
     rates = module.derivative(0.0, columns, u=u)
-    assert rates.shape == (len(module.STATES), 1000)
+    assert rates.shape == (len(module.STATES), MANY)
     forces = module.joint_forces(0.0, columns, u=u)
-    assert forces.shape == (len(module.JOINTS), 3, 1000)
+    assert forces.shape == (len(module.JOINTS), 3, MANY)
     for i, motion in enumerate(expected):
         accelerations = rates[scene.places(module, "_dot"), i]
         assert difference(accelerations, motion.accelerations) <= TOLERANCE

@@ -91,7 +91,7 @@ NEARLY = {
 
 
 @pytest.mark.parametrize("small", SMALL)
-@pytest.mark.parametrize("scene", NEARLY)
+@pytest.mark.parametrize("scene", some([*NEARLY][::2], [*NEARLY]))
 def test_nearly_singular_models_are_solved_to_their_condition(scene: str, small: float) -> None:
     """Against 60 digits, at random poses, straight and all but straight ones."""
     model = replace(build_model(parse_scene(NEARLY[scene](small))), outputs=("mass_matrix",))

@@ -20,7 +20,7 @@ from eomgen.program import system as finishing
 from eomgen.program.differentiate import jacobian
 from eomgen.program.digits import evaluator
 from eomgen.program.from_equations import from_equations
-from eomgen.program.passes import PASSES, optimise
+from eomgen.program.passes import PASSES, optimise_and_report
 from eomgen.program.program import Output, Program, cost, finish, interpret, live_steps
 from eomgen.program.tape import Node, Stage, Tape, power, total
 from eomgen.scene.reader import parse_scene
@@ -186,11 +186,11 @@ def lowered(case: str | int) -> Program:
 
     def keep(program: Program) -> tuple:
         received.append(program)
-        return optimise(program)
+        return optimise_and_report(program)
 
     scene = compiled(case if isinstance(case, str) else random_tree(case))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(finishing, "optimise", keep)
+        patch.setattr(finishing, "optimise_and_report", keep)
         system = from_equations(scene.equations)
     assert system.program == scene.system.program
     return received[0]
@@ -250,7 +250,7 @@ def test_factored_sums() -> None:
         "derivative": Output((3,), tuple(n.index for n in (a * x + y * a, a * x, a * y))),
         "jacobian": Output((2,), ((x * b - b * y).index, (b * b + a * b).index)),
     }
-    better, reports = optimise(finish(tape, outputs, ()))
+    better, reports = optimise_and_report(finish(tape, outputs, ()))
     assert reports[0].derivative == reports[-1].derivative == 3
     assert reports[0].jacobian == 6
     assert reports[-1].jacobian == 4  # (x - y)·b, (a + b)·b

@@ -321,7 +321,7 @@ def test_columns_are_one_by_one(dimensions: int, seed: int, route: str) -> None:
 # In 60 digits.
 
 FEW = range(20, some(23, 25))
-CLOSED = [(seed, 4) for seed in some((4, 9, 15, 22, 37), (4, 9, 15, 22, 27, 36, 37))]
+CLOSED = [(seed, 4) for seed in some((4, 15, 37), (4, 9, 15, 22, 27, 36, 37))]
 CLOSED += some([], [(13, 5), (20, 5)])
 OUTPUTS = (
     "derivative mass_matrix velocity_force gravity_force bias_force applied_force kinetic_energy "

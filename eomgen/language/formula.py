@@ -303,23 +303,40 @@ def written(formula: Formula) -> str:
 
 def evaluate(formula: Formula, names: Mapping[str, Any], scalars: Scalars) -> Any:
     """The value of a formula over given scalars. Raises `KeyError` for a name not in `names`."""
+    return _evaluated(formula, names, scalars, {})
+
+
+def _evaluated(
+    formula: Formula, names: Mapping[str, Any], scalars: Scalars, known: dict[int, Any]
+) -> Any:
+    """`evaluate`, in which an object that is a part of a formula at several places, as of a
+    determinant, is evaluated once: it is `known` by its id.
+    """
     match formula:
         case Constant(value):
             return scalars.number(value)
         case Name(name):
             return names[name]
         case Apply(operation, operands):
-            values = [evaluate(operand, names, scalars) for operand in operands]
-            if operation == "**":
-                power = operands[1]
-                assert isinstance(power, Constant)
-                result = scalars.number(1.0)
-                for _ in range(int(power.value)):
-                    result = result * values[0]
-                return result
-            if operation in _ARITHMETIC:
-                return _ARITHMETIC[operation](*values)
-            return scalars.call(operation, *values)
+            if (found := known.get(id(formula))) is None:
+                values = [_evaluated(operand, names, scalars, known) for operand in operands]
+                found = known[id(formula)] = _applied(operation, operands, values, scalars)
+            return found
+
+
+def _applied(
+    operation: str, operands: tuple[Formula, ...], values: list[Any], scalars: Scalars
+) -> Any:
+    if operation == "**":
+        power = operands[1]
+        assert isinstance(power, Constant)
+        result = scalars.number(1.0)
+        for _ in range(int(power.value)):
+            result = result * values[0]
+        return result
+    if operation in _ARITHMETIC:
+        return _ARITHMETIC[operation](*values)
+    return scalars.call(operation, *values)
 
 
 _ARITHMETIC: dict[str, Callable[..., Any]] = {

@@ -21,8 +21,15 @@ class PassReport:
     jacobian: int
 
 
-def optimise(program: Program) -> tuple[Program, tuple[PassReport, ...]]:
-    """Run all passes in order; the report has a line for the program as it came and one a pass."""
+def optimise(program: Program) -> Program:
+    """Run all passes in order."""
+    for run in PASSES:
+        program = run(program)
+    return program
+
+
+def optimise_and_report(program: Program) -> tuple[Program, tuple[PassReport, ...]]:
+    """The same, and a line for the program as it came and one a pass."""
     reports = [_report("as lowered", program)]
     for run in PASSES:
         program = run(program)

@@ -188,7 +188,7 @@ def _tried(model: Model, route: str) -> Tried:
     for own in axes:
         record = Recording(model, route, axes=own)
         outputs = {"derivative": _output(node.index for node in record.rates)}
-        found.append(Tried(record, optimise(finish(record.tape, outputs, ()))[0]))
+        found.append(Tried(record, optimise(finish(record.tape, outputs, ()))))
     return min(found, key=_operations_alone)
 
 
@@ -200,7 +200,7 @@ def _output(nodes: Iterable[int]) -> Output:
 def _alone(program: Program) -> Program:
     """The steps that a derivative takes alone and after all passes."""
     outputs = {"derivative": program.outputs["derivative"]}
-    return optimise(replace(program, outputs=outputs, checks=()))[0]
+    return optimise(replace(program, outputs=outputs, checks=()))
 
 
 def least_factoring(model: Model) -> int:

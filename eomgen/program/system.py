@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from eomgen.derivation.states import State
 from eomgen.model import Model
-from eomgen.program.passes import PassReport, optimise
+from eomgen.program.passes import PassReport, optimise_and_report
 from eomgen.program.program import Check, Output, Program, finish
 from eomgen.program.switching import with_switching_functions
 from eomgen.program.tape import Node, Tape
@@ -62,6 +62,6 @@ def make_system(
         name: Output(shape, tuple(node.index for node in nodes))
         for name, (shape, nodes) in made.items()
     }
-    program, reports = optimise(finish(tape, outputs, checks))
+    program, reports = optimise_and_report(finish(tape, outputs, checks))
     program = with_switching_functions(program, [state.name for state in states])
     return System(model, route, tuple(states), program, extra, tangents, reports, contacts)
