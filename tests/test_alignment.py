@@ -104,6 +104,13 @@ def test_not_silent_again(number: int) -> None:
     assert tried(case(number)) == "right", ONCE_SILENT[number]
 
 
+def test_digits_told_are_those_of_accelerations() -> None:
+    """Two slides 9e-15 from each other: 5e-7 off, more than a thousand times what half a unit in the
+    last place of the data does. It was told 8 digits.
+    """
+    assert tried(case(13863)) == "refused"
+
+
 def test_it_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     """Entries of rotations that are less than 1e-8 taken for nothing, as rounding did."""
     monkeypatch.setattr(exact, "SMALLEST", exact.mpfr(1e-8))

@@ -38,6 +38,8 @@ last place.
 """
 SURE = 100.0
 """A change of v̇ by half a unit in the last place of all numbers counts as nothing in this part."""
+UNEXPLAINED = 1000.0
+"""An error of more than so many times that change is none of its kind, and counts in full."""
 TRUSTED = 100.0
 """How far off in parts of what is allowed `orthogonal` may be there, to judge the others at all
 states.
@@ -180,11 +182,11 @@ def _off(
             continue  # nor one that doubles could hold
         known_somewhere = True
         size = max([float(least[n]), *(float(abs(x)) for x in long)])
-        allowed = size * max(EPSILON, change_here / size / SURE)
         for route, rates in found.items():
             own = rates[:, n]
             off = _apart(own.tolist(), long) if np.isfinite(own).all() else math.inf
-            worst[route] = max(worst[route], off / allowed)
+            shares = _in_parts(np.array([off / size]), np.array([change_here / size]))
+            worst[route] = max(worst[route], float(shares[0]))
     if not known_somewhere:
         return worst
     if closely and worst["orthogonal"] > TRUSTED:
@@ -192,7 +194,7 @@ def _off(
     known = np.isfinite(true).all(axis=0)
     if not closely:  # what one route has no number for, others may
         known = np.any([np.isfinite(rates).all(axis=0) for rates in found.values()], axis=0)
-    beside = _worst(found, true, least, np.fmax(change / SURE, EPSILON), np.asarray(known))
+    beside = _worst(found, true, least, change, np.asarray(known))
     return {route: max(off, beside[route]) for route, off in worst.items()}
 
 
@@ -246,7 +248,7 @@ def _worst(
     found: Mapping[str, Array],
     true: Array,
     least: Array,
-    allowed: Array,
+    change: Array,
     known: NDArray[np.bool_],
 ) -> dict[str, float]:
     """What v̇ is off (nv, n), in parts of its size and of what is allowed, at the worst of those
@@ -254,9 +256,17 @@ def _worst(
     """
     worst = {}
     for route, rates in found.items():
-        off = _shares(rates, true, least) / allowed
+        off = _in_parts(_shares(rates, true, least), change)
         worst[route] = float(np.where(np.isnan(off), np.inf, off)[known].max(initial=0.0))
     return worst
+
+
+def _in_parts(off: Array, change: Array) -> Array:
+    """Errors in parts of what is allowed: the rounding of a number, or a part of the `change` of v̇
+    by that of all numbers. All but the result in parts of the size of v̇.
+    """
+    allowed = np.fmax(change / SURE, EPSILON)
+    return np.asarray(off / np.where(off > UNEXPLAINED * change, EPSILON, allowed))
 
 
 def _least(model: Model, rates: Array, at: Sequence[Values]) -> Array:
