@@ -105,7 +105,7 @@ def test_not_silent_again(number: int) -> None:
 
 
 def test_digits_told_are_those_of_accelerations() -> None:
-    """Two slides 9e-15 from each other: 5e-7 off, more than a thousand times what half a unit in the
+    """Two slides 9e-15 from each other: 5e-7 off, over a thousand times what half a unit in the
     last place of the data does. It was told 8 digits.
     """
     assert tried(case(13863)) == "refused"
