@@ -272,12 +272,28 @@ def test_what_the_jacobian_saves() -> None:
     assert saved_by_jacobian(works) == {"Radau": 3.5}
 
 
+def test_methods_are_ranked_by_counted_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long each took on a busy machine; that spreads from the least to the median."""
+    monkeypatch.setattr(work_precision, "ONCE", 1.0)
+    found = bench(error=1e-9)
+    slow = measure(found, Rung("euler", dt=0.001), 60.0)
+    works = [measure(found, Rung("DOP853", rtol=1e-9, atol=1e-12), 60.0), slow]
+    assert works[0].units < works[1].units and works[0].spread >= 0
+    busy = [replace(works[0], seconds=1e3), works[1]]
+    assert [w.rung.method for w in cheapest(busy, 0.1)] == ["DOP853", "euler"]
+    again = measure(found, slow.rung, 60.0)
+    assert again.units == slow.units
+
+
 def cells(path: Path, *, times: bool = False) -> list[dict[str, str]]:
-    """The rows of a table, without what depends on the machine."""
-    lines = [line for line in path.read_text("utf-8").splitlines() if line[0] != "#"]
-    rows = list(csv.DictReader(lines))
-    assert tuple(rows[0]) == records.COLUMNS
-    return [{k: v for k, v in row.items() if times or k not in records.TIMES} for row in rows]
+    """What a table holds of each run, without what depends on the machine."""
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    same = ["t_end_s", "given", "reference_error", "derivative_s", "jacobian_s"]
+    assert [*rows[0]] == [*records.COLUMNS, *same, records.GENERATION, records.KEY]
+    assert {row["t_end_s"] for row in rows} == {rows[0]["t_end_s"]}
+    kept = [k for k in records.COLUMNS if times or k not in records.TIMES]
+    return [{k: row[k] for k in kept} for row in rows]
 
 
 def test_records_come_back_as_they_were(tmp_path: Path) -> None:
@@ -286,7 +302,7 @@ def test_records_come_back_as_they_were(tmp_path: Path) -> None:
     stiff = climbed(bench(rate=4e4), ["rk4"], most_steps=200)["rk4"]
     works = [w for own in climbed(found, ["DOP853", "Radau"]).values() for w in own] + stiff
     path = tmp_path / "x_accuracy.csv"
-    records.save(path, "x", "ab12", works, generation=1.25, comments=["of an\noscillator"])
+    records.save(path, "ab12", works, generation=1.25, same={"given": 'of an\n"oscillator"'})
     back, generation = records.load(path, "ab12")
     assert generation == 1.25
     assert repr([back[work.rung] for work in works]) == repr(works)  # nan is not nan

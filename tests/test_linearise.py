@@ -286,8 +286,9 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     table = tmp_path / "furuta.csv"
     for _ in range(2):  # its own file it replaces
         assert main([*command, "-o", str(table)]) == 0
-    rows = [line.split(",") for line in table.read_text("utf-8").splitlines()[1:]]
-    assert rows[0] == ["", "theta", "phi", "theta_dot", "phi_dot", "tau"]
+    rows = [line.split(",") for line in table.read_text("utf-8").splitlines()]
+    corner = "eomgen linearisation of furuta_pendulum"
+    assert rows[0] == [corner, "theta", "phi", "theta_dot", "phi_dot", "tau"]
     np.testing.assert_array_equal([[float(x) for x in row[1:5]] for row in rows[1:]], a)
     capsys.readouterr()
     table.write_text("mine")

@@ -43,7 +43,7 @@ def accuracy(given: Arguments) -> int:
 def _runs(given: Arguments, model: Model, name: str) -> None:
     """Run every method over its ladder; print the table, write it and draw it."""
     from eomgen import pipeline  # here, so that loading SymPy is not counted as deriving
-    from eomgen.commands.accuracy_table import comments, print_table
+    from eomgen.commands.accuracy_table import about, print_table
     from eomgen.show.style import check_figure
     from eomgen.study import records
     from eomgen.study.ladder import methods_named
@@ -94,16 +94,15 @@ def _runs(given: Arguments, model: Model, name: str) -> None:
         _check_reference(bench)
         costs = call_times(bench.problem, truth)
     ladder = _ladder(bench, t_end, given)
-    about = comments(bench, costs, t_end, parameters, inputs)
+    same = about(bench, costs, t_end, parameters, inputs)
 
     def keep(works: Mapping["Rung", "Work"]) -> None:
         records.save(
             paths["csv"],
-            name,
             key,
             works.values(),
             generation=generation,
-            comments=about,
+            same=same,
             force=given.force,
         )
 

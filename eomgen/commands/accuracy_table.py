@@ -13,26 +13,22 @@ RUNNERS_UP = 2
 """Methods that are named beside the cheapest."""
 
 
-def comments(
+def about(
     bench: Bench,
     costs: tuple[float, float],
     t_end: float,
     parameters: Mapping[str, float],
     inputs: Mapping[str, float],
-) -> list[str]:
-    """Lines above the columns of the CSV: what its numbers are, and were measured by."""
-    truth = bench.reference
-    values = [f"{name}={value:g}" for name, value in {**parameters, **inputs}.items()]
-    return [
-        f"t_end {t_end:g} s" + (f", {', '.join(values)}" if values else ""),
-        f"reference: {truth.origin}; error {truth.error:.2g}, at the end {truth.final_error:.2g}",
-        f"one derivative {1e6 * costs[0]:.2f} us, one Jacobian {1e6 * costs[1]:.2f} us",
-        "error, final_error: greatest difference of any state over the rows, and at the end, in "
-        "parts of the motion's own scale; 'at most': below 100 times the reference's own error",
-        "time_s: least wall time of that many repeats, outputs off; 1: made once, being slow",
-        f"energy_drift: {_energy(bench)}",
-        f"quaternion_defect: {_quaternions(bench)}",
-    ]
+) -> dict[str, object]:
+    """Columns of the CSV that are the same in every row: what its runs were measured by."""
+    given = {**parameters, **inputs}
+    return {
+        "t_end_s": t_end,
+        "given": " ".join(f"{name}={value!r}" for name, value in given.items()),
+        "reference_error": bench.reference.error,
+        "derivative_s": costs[0],
+        "jacobian_s": costs[1],
+    }
 
 
 def _energy(bench: Bench) -> str:
@@ -175,7 +171,7 @@ def _print_orders(methods: Sequence[str], works: Sequence[Work]) -> None:
 
 def _print_reading(works: Sequence[Work]) -> None:
     """The cheapest runs for a few errors, and what the generated Jacobian saves."""
-    print("    cheapest run for an error within")
+    print("    cheapest run, by counted work, for an error within")
     for target in TARGETS:
         best = cheapest(works, target)
         if not best:
@@ -184,7 +180,7 @@ def _print_reading(works: Sequence[Work]) -> None:
         first = best[0]
         text = f"{first.rung.method} at {first.rung.setting}, {_time(first.seconds)}"
         others = [
-            f"{other.rung.method} {other.seconds / first.seconds:.1f} times"
+            f"{other.rung.method} {other.units / first.units:.1f} times"
             for other in best[1 : 1 + RUNNERS_UP]
         ]
         print(f"        {target:.0e}  {'; '.join([text, *others])}")

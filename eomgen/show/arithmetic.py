@@ -85,7 +85,8 @@ def _bar(axes: Axes, row: int, ulps: Floats, colour: str) -> None:
 
 
 def save_table(found: Arithmetic, path: Path, *, force: bool = False) -> None:
-    """Write a row a state: its kind, time, condition, ulps of each way, and the state itself.
+    """Write a row a state: its kind, time, condition, what accelerations are off by each way, in
+    ulp, and the state itself.
 
     The numbers of the states are exact, so that the worst of them can be looked at again; those in
     float32 were computed at the same states rounded to that. Raises `RunError` as `write_whole`
@@ -93,10 +94,9 @@ def save_table(found: Arithmetic, path: Path, *, force: bool = False) -> None:
     """
     ways = [way for way in found.ways if way.operations is not None]
     text = io.StringIO()
-    text.write(f"# eomgen arithmetic of {found.name}: errors of accelerations in ulp\n")
     table = csv.writer(text, lineterminator="\n")
     heads = [f"{way.name} {way.precision}" for way in ways]
-    table.writerow(["states", "t", "condition", *heads, *found.states])
+    table.writerow(["state_kind", "t", "condition", *heads, *found.states])
     for k, sample in enumerate(found.samples):
         columns = [way.errors[k].ulps for way in ways]
         for i, (t, y) in enumerate(zip(sample.t.tolist(), sample.y.tolist(), strict=True)):

@@ -107,8 +107,8 @@ def draw(diagram: Diagram, works: Sequence[Work]) -> Figure:
         )
         grid = figure.add_gridspec(len(panels), 2, width_ratios=(1.5, 1))
         main = figure.add_subplot(grid[:, 0])
-        _draw_errors(main, diagram, works, lambda work: work.seconds)
-        main.set_xlabel("time of a run, s")
+        _draw_errors(main, diagram, works, lambda work: work.seconds, spread=True)
+        main.set_xlabel("time of a run, s: the least, and beside it to the median of repeated runs")
         main.set_title("Error over the whole run, in parts of the motion's own scale")
         for row, panel in enumerate(panels):
             panel(figure.add_subplot(grid[row, 1]))
@@ -150,9 +150,17 @@ def _by_method(works: Sequence[Work]) -> dict[str, list[Work]]:
 
 
 def _draw_errors(
-    axes: Axes, diagram: Diagram, works: Sequence[Work], cost: Value, *, words: bool = True
+    axes: Axes,
+    diagram: Diagram,
+    works: Sequence[Work],
+    cost: Value,
+    *,
+    words: bool = True,
+    spread: bool = False,
 ) -> None:
-    """One line a method through its right runs; the others as marks, where their errors are."""
+    """One line a method through its right runs, with the spread of their times or without; the
+    others as marks, where their errors are.
+    """
     axes.set_xscale("log")
     axes.set_yscale("log")
     for method, own in _by_method(works).items():
@@ -163,6 +171,14 @@ def _draw_errors(
             label=method,
             **_line(method),  # type: ignore[arg-type]
         )
+        if spread:
+            axes.hlines(
+                [work.error for work in right],
+                [cost(work) for work in right],
+                [cost(work) + (work.spread if work.spread > 0 else 0.0) for work in right],
+                color=colour(method),
+                linewidth=0.8,
+            )
         bounds = [work for work in right if work.at_most[0]]
         axes.plot(
             [cost(work) for work in bounds],

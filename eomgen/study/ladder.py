@@ -66,6 +66,8 @@ class Work:
     joint_gap          greatest gap in a joint, m
     quaternion_defect  how far the length of a quaternion was from 1 before it was scaled back
     seconds            least wall time of `repeats` runs; of a run that stopped, until then
+    spread             how far above that the lower half of them stay, s
+    units              counted work (see `study.cost`): the same on every machine
     steps, derivatives, jacobians   counts of one run
     reason             why it is not "ok", or an integrator's remark
     """
@@ -84,6 +86,8 @@ class Work:
     derivatives: int = 0
     jacobians: int = 0
     reason: str = ""
+    spread: float = np.nan
+    units: float = np.nan
 
 
 @dataclass(frozen=True)

@@ -217,8 +217,9 @@ def save(linearisation: Linearisation, name: str, path: Path, force: bool = Fals
     """
     least = linearisation.reduced()
     if path.suffix == ".csv":
-        lines = [f"# eomgen linearisation of {name}: rates of the rows by the columns"]
-        lines.append(",".join(["", *least.state_names, *least.input_names]))
+        # The corner says whose file it is: a comment would be none to readers of CSV.
+        corner = f"eomgen linearisation of {name}"
+        lines = [",".join([corner, *least.state_names, *least.input_names])]
         for row, numbers in zip(least.state_names, np.hstack([least.A, least.B]), strict=True):
             lines.append(",".join([row, *map(repr, numbers.tolist())]))
         write_whole(path, "\n".join(lines) + "\n", force=force)

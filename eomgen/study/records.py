@@ -1,8 +1,9 @@
 """Measured runs kept in a table, so that what was begun goes on from there.
 
-The table is the CSV that a user reads. Its first line names what was measured by a digest: of the
-module, the parameters and inputs, the end, the integrators, and this machine. Where any of them is
-another, the records are of no use and are begun anew.
+The table is the CSV that a user reads, without lines that a reader of CSV would stumble over: what
+is the same for all runs is a column, too. One names what was measured by a digest: of the module,
+the parameters and inputs, the end, the integrators, and this machine. Where any of them is another,
+the records are of no use and are begun anew.
 """
 
 import csv
@@ -11,8 +12,9 @@ import io
 import json
 import math
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import scipy
@@ -22,8 +24,6 @@ from eomgen.files import is_ours, read_plain, write_whole
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.study.ladder import Rung, Status, Work, kind, order
 
-MARK = "# eomgen accuracy of "
-GENERATION = "# generation_s "
 STATUSES: tuple[Status, ...] = ("ok", "wrong", "failed", "over", "refused")
 COLUMNS = (
     "method",
@@ -41,16 +41,20 @@ COLUMNS = (
     "joint_gap_m",
     "quaternion_defect",
     "time_s",
+    "time_spread_s",
     "repeats",
+    "work_units",
     "steps",
     "derivatives",
     "jacobians",
     "reason",
 )
 """Errors and drifts are numbers without a unit: parts of the motion's own scale, or its energy."""
+GENERATION, KEY = "generation_s", "eomgen_key"
+"""Columns after these and those that the caller gives."""
 LARGEST = 100_000_000
 """Bytes of a table beyond which it is none of ours."""
-TIMES = ("time_s", "repeats")
+TIMES = ("time_s", "time_spread_s", "repeats")
 """Columns that depend on the machine."""
 AT_MOST, MEASURED = "at most", "measured"
 
@@ -70,27 +74,24 @@ def key(*what: object) -> str:
 
 def save(
     path: Path,
-    name: str,
     key: str,
     works: Iterable[Work],
     *,
     generation: float | None,
-    comments: Sequence[str] = (),
+    same: Mapping[str, object] = MappingProxyType({}),
     force: bool = False,
 ) -> None:
-    """Write the table: a first line with the key, lines of comment, the columns, a row for each.
+    """Write the table: a line of names, and a row for each run. In all rows are the `same` values,
+    by their columns' names, the time that generating the module took, s, and the key.
 
     Rows are in the order of the methods and from coarse to fine, whatever order they were made in.
     Raises `RunError` if it cannot be written.
     """
     buffer = io.StringIO()
-    buffer.write(f"{MARK}{name}, key {key}\n")
-    if generation is not None:
-        buffer.write(f"{GENERATION}{generation!r}\n")
-    buffer.writelines(f"# {' '.join(line.split())}\n" for line in comments)
     table = csv.writer(buffer, lineterminator="\n")
-    table.writerow(COLUMNS)
-    table.writerows(_row(work) for work in ordered(works))
+    table.writerow([*COLUMNS, *same, GENERATION, KEY])
+    rest = [*same.values(), _cell(generation), key]
+    table.writerows([*_row(work), *rest] for work in ordered(works))
     write_whole(path, buffer.getvalue(), force=force)
 
 
@@ -107,13 +108,11 @@ def load(path: Path, key: str) -> tuple[Mapping[Rung, Work], float | None]:
     """
     try:
         data = read_plain(path, LARGEST)
-        lines = data.decode("utf-8").splitlines(keepends=True)
-        if not (is_ours(data) and lines[0].rstrip().endswith(f", key {key}")):
+        rows = list(csv.DictReader(io.StringIO(data.decode("utf-8"))))
+        if not (is_ours(data) and rows and all(row[KEY] == key for row in rows)):
             return {}, None
-        times = [line for line in lines if line.startswith(GENERATION)]
-        generation = float(times[0].removeprefix(GENERATION)) if times else None
-        table = csv.DictReader([line for line in lines if not line.startswith("#")])
-        works = [_work(row) for row in table]
+        generation = float(rows[0][GENERATION]) if rows[0][GENERATION] else None
+        works = [_work(row) for row in rows]
     except (RunError, ValueError, KeyError, TypeError, csv.Error):
         return {}, None
     return {work.rung: work for work in works}, generation
@@ -138,7 +137,9 @@ def _row(work: Work) -> list[object]:
         _cell(work.joint_gap),
         _cell(work.quaternion_defect),
         repr(work.seconds),
+        _cell(work.spread),
         work.repeats,
+        _cell(work.units),
         work.steps,
         work.derivatives,
         work.jacobians,
@@ -179,4 +180,6 @@ def _work(row: Mapping[str, str]) -> Work:
         derivatives=int(row["derivatives"]),
         jacobians=int(row["jacobians"]),
         reason=row["reason"],
+        spread=number("time_spread_s"),
+        units=number("work_units"),
     )

@@ -1,10 +1,12 @@
 """Runs made and measured: error against a reference, drift, time, and counts.
 
 The first run keeps the rows that the error is taken from; it warms up. Then the same run is made
-again without rows, and the least time counts. A run that takes long is made once.
+again without rows, and the least time counts. A run that takes long is made once. Methods are
+ranked by counted work, which is the same on a busy machine.
 """
 
 import math
+import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,8 +17,10 @@ from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import StepFailure
 from eomgen.run.problem import Floats, Problem
+from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Trajectory
 from eomgen.run.works import Powers
+from eomgen.study.cost import meter
 from eomgen.study.ladder import Ladder, Rung, Work, next_rung
 from eomgen.study.measure import WRONG, error
 from eomgen.study.reference import Reference
@@ -92,10 +96,13 @@ class _Watched(Problem):
 
 @dataclass(frozen=True)
 class _Run:
-    """A run made: its trajectory (None if it was refused), how long it took, why it ended."""
+    """A run made: its trajectory (None if it was refused), how long it took, the work counted, why
+    it ended.
+    """
 
     trajectory: Trajectory | None
     seconds: float
+    units: float
     over: bool = False
     refusal: str = ""
 
@@ -146,10 +153,10 @@ def measure(bench: Bench, rung: Rung, run_time: float) -> Work:
     if first.trajectory is None:
         return Work(rung, "refused", first.seconds, 1, reason=first.refusal)
     if first.over:
-        return _worked(Work(rung, "over", first.seconds, 1, reason=OVER), first.trajectory)
+        return _worked(Work(rung, "over", first.seconds, 1, reason=OVER), first)
     if not first.trajectory.finished:
         failed = Work(rung, "failed", first.seconds, 1, reason=first.trajectory.message)
-        return _worked(failed, first.trajectory)
+        return _worked(failed, first)
     last = first
     times: list[float] = []
     if first.seconds < ONCE * run_time:
@@ -166,7 +173,6 @@ def measure(bench: Bench, rung: Rung, run_time: float) -> Work:
     reason = first.trajectory.message
     if wrong:
         reason = f"reported success, but is {found:.2g} of the motion's own scale off"
-    assert last.trajectory is not None
     work = Work(
         rung,
         "wrong" if wrong else "ok",
@@ -179,14 +185,17 @@ def measure(bench: Bench, rung: Rung, run_time: float) -> Work:
         joint_gap=_greatest(bench.gap, first.trajectory),
         quaternion_defect=defect.largest if problem.quaternions else math.nan,
         reason=reason,
+        spread=statistics.median(times) - min(times) if times else math.nan,
     )
-    return _worked(work, last.trajectory)
+    return _worked(work, last)
 
 
-def _worked(work: Work, trajectory: Trajectory) -> Work:
-    counts = trajectory.counts
+def _worked(work: Work, run: _Run) -> Work:
+    assert run.trajectory is not None
+    counts = run.trajectory.counts
     return replace(
         work,
+        units=run.units,
         steps=counts["steps"],
         derivatives=counts["derivatives"],
         jacobians=counts["jacobians"],
@@ -202,7 +211,7 @@ def _run(
     powers: Powers | None = None,
 ) -> _Run:
     t = bench.reference.t
-    over = False
+    over, tally = False, Tally()
     begin = time.perf_counter()
 
     def told(fraction: float) -> None:
@@ -224,17 +233,19 @@ def _run(
             rest_speed=bench.rest_speed,
             progress=told,
             powers=powers,
+            tally=tally,
             rtol=rung.rtol or 1.0,  # which equal steps do not look at
             atol=rung.atol or 1.0,
         )
     except StepFailure:
         raise
     except RunError as refusal:
-        return _Run(None, time.perf_counter() - begin, refusal=str(refusal))
+        return _Run(None, time.perf_counter() - begin, math.nan, refusal=str(refusal))
     seconds = time.perf_counter() - begin
     if trajectory.message.startswith("interrupted"):
         raise KeyboardInterrupt
-    return _Run(trajectory, seconds, over=over and not trajectory.finished)
+    units = meter(problem, rung.method)(tally)
+    return _Run(trajectory, seconds, units, over=over and not trajectory.finished)
 
 
 def errors(trajectory: Trajectory, reference: Reference) -> tuple[float, float]:
