@@ -1,6 +1,7 @@
 """What the tests share: fixtures, and which of them run in one process."""
 
 import gc
+import signal
 from collections.abc import Iterator
 from typing import Any
 
@@ -21,9 +22,12 @@ FIRST = "closed effects laws events closed_general no_silent_error orthogonal cl
 
 def pytest_configure() -> None:
     """Look for garbage seldom: a compiled scene is a hundred thousand things that are kept, and to
-    go through them again and again takes a fifth of the time.
+    go through them again and again takes a fifth of the time. And listen to interrupts, so that
+    processes that tests start do: a shell starts what runs in the background deaf to them.
     """
     gc.set_threshold(100_000, 20, 20)
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _group(nodeid: str) -> str:
