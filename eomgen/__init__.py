@@ -1,1 +1,63 @@
-"""Generates equations of motion: from a scene to a NumPy module of straight-line arithmetic."""
+"""Generates equations of motion: from a scene to a NumPy module of straight-line arithmetic.
+
+The functions of `eomgen.api` and what they return are here by name. They are loaded when they are
+first asked for, so that what a program does not use takes no time.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from eomgen.api import (
+        check,
+        derive,
+        generate,
+        linearise,
+        load,
+        read,
+        simulate,
+        verify,
+    )
+    from eomgen.errors import EomgenError, RunError, SceneError
+    from eomgen.results import Derivation, Module, Run
+    from eomgen.scene.reader import built_in_names
+    from eomgen.scene.schema import Scene
+
+__all__ = [
+    "Derivation",
+    "EomgenError",
+    "Module",
+    "Run",
+    "RunError",
+    "Scene",
+    "SceneError",
+    "built_in_names",
+    "check",
+    "derive",
+    "generate",
+    "linearise",
+    "load",
+    "read",
+    "simulate",
+    "verify",
+]
+
+_PLACES = {
+    **dict.fromkeys(
+        ("check", "derive", "generate", "linearise", "load", "read", "simulate", "verify"), "api"
+    ),
+    **dict.fromkeys(("Derivation", "Module", "Run"), "results"),
+    **dict.fromkeys(("EomgenError", "RunError", "SceneError"), "errors"),
+    "Scene": "scene.schema",
+    "built_in_names": "scene.reader",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'eomgen' has no attribute '{name}'")
+    return getattr(import_module(f"eomgen.{_PLACES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

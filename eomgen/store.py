@@ -23,7 +23,10 @@ from eomgen.scene.look import Camera
 from eomgen.scene.schema import Simulation
 from eomgen.templating import PACKAGE, templates_folder
 
-AFTER = ("store.py", "entries.py", "run", "study", "show", "commands", "cli.py", "__main__.py")
+AFTER = (
+    *("store.py", "entries.py", "run", "study", "show", "results.py", "api.py", "commands"),
+    *("cli.py", "__main__.py", "__init__.py"),
+)
 """Files and folders of this program that have no say in the code; all others have."""
 LIBRARIES = (
     *("gmpy2", "jinja2", "markupsafe", "mpmath", "numpy", "pydantic", "pydantic_core", "sympy"),

@@ -44,6 +44,8 @@ ORDER = (
     ("run",),
     ("study",),
     ("show",),
+    ("results",),
+    ("api",),
     ("commands",),
     ("cli",),
     ("__main__",),

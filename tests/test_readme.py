@@ -8,20 +8,23 @@ from pathlib import Path
 
 import pytest
 
+import eomgen
 from eomgen.cli import main
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text("utf-8")
+API = (ROOT / "docs" / "api.md").read_text("utf-8")
 
 
-def blocks(language: str) -> list[str]:
+def blocks(language: str, text: str = README) -> list[str]:
     """The fenced blocks of one language, in order."""
-    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-def test_python_examples_run_and_print_what_they_say() -> None:
+@pytest.mark.parametrize("text", [README, API], ids=["README", "api"])
+def test_python_examples_run_and_print_what_they_say(text: str) -> None:
     """Each Python block runs from the checkout; a `# prints` comment holds its output."""
-    examples = blocks("python")
+    examples = blocks("python", text)
     assert examples
     for source in examples:
         run = subprocess.run(
@@ -72,6 +75,9 @@ def test_a_run_goes_on_as_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_links_and_pictures_are_there() -> None:
     """Nothing the README points to inside the project is missing."""
+    for name in eomgen.__all__:
+        if callable(getattr(eomgen, name)) and name.islower():
+            assert name == "built_in_names" or f"| `{name}(" in API
     for target in re.findall(r"\]\(([^)#:]+)\)", README):
         assert (ROOT / target).exists(), target
 

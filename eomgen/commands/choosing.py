@@ -3,7 +3,6 @@
 import math
 import re
 import sys
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,6 @@ from eomgen.commands.shared import Arguments
 from eomgen.errors import RunError
 
 if TYPE_CHECKING:
-    from eomgen.run.works import Powers
     from eomgen.show.motion import Motion
     from eomgen.study.search import Choice
     from eomgen.study.trial import Case, Tried
@@ -21,8 +19,6 @@ SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0}
 DRIFTED = 2e-3
 """Of the greatest kinetic energy: where a run gains or loses more than it may, speeds are off by
 half that part, which over a few swings makes another motion."""
-FEWEST = 201
-"""Rows by which runs are compared."""
 BETTER = "take tighter tolerances or a shorter step, or let --accuracy 1e-3 choose"
 
 
@@ -51,23 +47,13 @@ def seconds_of(text: str) -> float:
 
 def choose(case: "Case", given: Arguments) -> "Choice":
     """The run that is asked for by its error or its time; each run tried for it is told."""
-    from eomgen.study.budgeting import within
-    from eomgen.study.choosing import meet
+    from eomgen.study.aimed import aimed
 
     def say(text: str) -> None:
         print(f"    trying {text}", flush=True)
 
-    case = replace(case, kept={**case.kept, "samples": max(given.samples, FEWEST)})
-    if given.budget is not None:
-        return within(case, seconds_of(given.budget), given.integrator, say)
-    return meet(case, given.accuracy, given.integrator, say)
-
-
-def made_again(case: "Case", choice: "Choice", powers: "Powers | None") -> "Tried":
-    """The chosen run, made again only where it has no works or not the rows that are asked for."""
-    if powers is None and case.kept["samples"] >= FEWEST:
-        return choice.tried
-    return case.run(choice.tried.setting, powers=powers)
+    budget = None if given.budget is None else seconds_of(given.budget)
+    return aimed(case, accuracy=given.accuracy, budget=budget, integrator=given.integrator, say=say)
 
 
 def print_choice(choice: "Choice", given: Arguments) -> str:
@@ -79,7 +65,9 @@ def print_choice(choice: "Choice", given: Arguments) -> str:
     print(f"    error estimate {_error(choice.error)} at the end{_most(choice)}")
     print(f"    it took {run.seconds:.2g} s, all {choice.runs} runs tried {choice.seconds:.2g} s")
     if not choice.met:
-        why = choice.reason or "rounding or chaos stands in the way"
+        from eomgen.study.aimed import UNKNOWN
+
+        why = choice.reason or UNKNOWN
         return (
             f"--accuracy {given.accuracy:g}: not reached, the best run's estimate is "
             f"{choice.error:.1g}: {why}; take a shorter --t-end"

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from eomgen.api import setting_of
 from eomgen.build import in_order
 from eomgen.commands.choosing import (
     check_choice,
     choose,
-    made_again,
     print_choice,
     print_estimate,
     warn_of_energy,
@@ -51,6 +51,7 @@ def simulate(given: Arguments) -> int:
     from eomgen.run.resume import going_on
     from eomgen.run.trajectory import load_npz
     from eomgen.show.observe import observe
+    from eomgen.study.aimed import made_again
     from eomgen.study.moved import moved_problem
     from eomgen.study.trial import Case
 
@@ -66,7 +67,10 @@ def simulate(given: Arguments) -> int:
         raise RunError(
             "--from: goes on with a method that is named; leave --accuracy, --budget out"
         )
-    setting = None if chosen else _setting(given, model)
+    setting = None
+    if not chosen:
+        bounds = {name: getattr(given, name) for name in ("dt", "rtol", "atol")}
+        setting = setting_of(model, given.integrator, **bounds, dashes="--")
     _check_unstable(given, setting)
     paths = _output_paths(given, name)
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
@@ -83,8 +87,8 @@ def simulate(given: Arguments) -> int:
     problem, start = as_problem(module, *values, model), None
     if given.resume is not None:
         assert setting is not None
-        bounds = {name: kept[name] for name in ("max_step", "rest_speed")}
-        start = going_on(load_npz(given.resume), given.resume, problem, setting, **bounds)
+        limits = {name: kept[name] for name in ("max_step", "rest_speed")}
+        start = going_on(load_npz(given.resume), given.resume, problem, setting, **limits)
         problem = start.problem
         kept |= start.options
     case = Case(
@@ -229,21 +233,6 @@ def _guard(
     from eomgen.study.guarding import guard_of
 
     return guard_of(module, *values, repairs=given.guard == "repair")
-
-
-def _setting(given: Arguments, model: Model) -> "Setting":
-    """The method asked for, or the scene's, with tolerances or a step."""
-    from eomgen.run.integrators import FixedStep, find_integrator
-    from eomgen.study.trial import Setting
-
-    wanted = model.simulation
-    integrator = _or(given.integrator, wanted.integrator)
-    if not isinstance(find_integrator(integrator), FixedStep):
-        rtol, atol = _or(given.rtol, wanted.rtol), _or(given.atol, wanted.atol)
-        return Setting(integrator, rtol, atol, given.dt)
-    if given.rtol is not None or given.atol is not None:
-        raise RunError(f"--rtol, --atol: {integrator} takes equal steps; give --dt instead")
-    return Setting(integrator, dt=_or(given.dt, wanted.dt))
 
 
 def _save_pictures(

@@ -6,8 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance
+from eomgen.run.integrators.interface import Advance, StepFailure
 from eomgen.run.problem import Floats, Problem
+
+Follow = Callable[[float, Floats], object]
+"""Told time, s, and state (ny,) after each step; what it returns ends the run if it is true."""
 
 
 def _unlimited(tally: "Tally", t: float) -> None:
@@ -20,6 +23,7 @@ class Tally:
 
     check           told this tally and the time, s, after each step; raises `StepFailure` to end
                     the run
+    follow          told the time and the state after each step; may end the run, too
     steps, derivatives, jacobians  as in `Trajectory.counts`
     factorisations  LU factors made by methods that report them
     rows            rows kept
@@ -29,6 +33,7 @@ class Tally:
     """
 
     check: Callable[["Tally", float], None] = _unlimited
+    follow: Follow | None = None
     steps: int = 0
     derivatives: int = 0
     jacobians: int = 0
@@ -57,6 +62,8 @@ class Tally:
         self.low = np.minimum(self.low, advance.y)
         self.high = np.maximum(self.high, advance.y)
         self.check(self, advance.t)
+        if self.follow and self.follow(advance.t, advance.y.copy()):
+            raise StepFailure("ended by who follows it")
 
     def counting(self, problem: Problem) -> Problem:
         """The same problem, calls of its contacts and of its switching functions counted here."""

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,33 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
         raise SceneError(f"{source}: is not TOML: {error}") from None
     except ValueError:  # what Python says of it is advice to programmers
         raise SceneError(f"{source}: has a whole number of thousands of digits; {REMEDY}") from None
+    return _scene(table, source)
+
+
+def read_tables(tables: Mapping[Any, Any], source: str = "scene") -> Scene:
+    """Read a scene from tables as a file would hold them; NumPy's numbers and arrays may stand for
+    numbers and lists. Raises `SceneError`.
+    """
+    try:
+        table = _plain(tables)
+    except RecursionError:
+        raise SceneError(f"{source}: is nested too deep") from None
+    return _scene(table, source)
+
+
+def _plain(value: Any) -> Any:
+    """A value in the types that TOML is read to; others as they are, for the schema to refuse."""
+    if isinstance(value, Mapping):
+        return {key if isinstance(key, str) else str(key): _plain(x) for key, x in value.items()}
+    if hasattr(value, "tolist"):  # of NumPy
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(x) for x in value]
+    return value
+
+
+def _scene(table: dict[str, Any], source: str) -> Scene:
+    """The scene of a table. Raises `SceneError` with a line for each mistake."""
     _check_sizes(table, source)
     try:
         return Scene.model_validate(table)

@@ -15,7 +15,7 @@ from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
 from eomgen.run.stepping import ADAPTIVE_SAMPLES
-from eomgen.run.tally import Tally
+from eomgen.run.tally import Follow, Tally
 from eomgen.run.trajectory import Trajectory
 from eomgen.run.works import Powers
 from eomgen.study.cost import meter
@@ -195,6 +195,7 @@ class Case:
         like: Tried | None = None,
         powers: Powers | None = None,
         moved: int | None = None,
+        follow: Follow | None = None,
     ) -> Tried:
         """Make a run. It ends early when it takes `most` units of work, or is sure to, and when
         `time.perf_counter` is at `due`.
@@ -202,11 +203,12 @@ class Case:
         like    a run whose pace this one's is judged by; else it is taken to be even
         powers  asks for the works of effects
         moved   the way in which constants are moved by rounding, where that is known
+        follow  is told time and state after each step, and may end the run
         """
         problem = self.problem if moved is None or not self.moved else self.moved(moved)
         spent = meter(problem, setting.integrator)
         pace = _Pace(spent, most, due, self.t_end, like)
-        tally = Tally(pace.check)
+        tally = Tally(pace.check, follow)
         with self.watch(f"simulating {problem.name}") as progress:
             started = time.perf_counter()
             trajectory = integrate(

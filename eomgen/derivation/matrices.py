@@ -1,0 +1,113 @@
+"""The derived equations as matrices of SymPy, with nothing in them but what a scene names."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import sympy as sp
+
+from eomgen.derivation.closed import Equations, derive
+from eomgen.derivation.general.derive import GeneralEquations, derive_general
+from eomgen.derivation.general.tell import tell_general
+from eomgen.derivation.solution import Definition
+from eomgen.derivation.steps import Step, tell
+from eomgen.derivation.supported import MOST_TOLD, why_not_pins
+from eomgen.derivation.symbols import Expr
+from eomgen.errors import SceneError
+from eomgen.language.formula import Formula, written
+from eomgen.model import Model
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """M v̇ + V + G = F, and v̇.
+
+    q, v, a      symbols of coordinates, velocities and accelerations v̇
+    M, V, G, F   mass matrix (nv, nv); forces of velocity, gravity and all else (nv, 1)
+    definitions  the solution in order: each symbol over those before it, in the end all of `a`
+    formulas     symbols that stand for formulas of the scene with functions in them, written out
+    steps        the derivation, to be read
+    """
+
+    q: tuple[Expr, ...]
+    v: tuple[Expr, ...]
+    a: tuple[Expr, ...]
+    M: Expr
+    V: Expr
+    G: Expr
+    F: Expr
+    definitions: tuple[Definition, ...]
+    formulas: dict[Expr, str]
+    steps: tuple[Step, ...]
+
+
+def matrices(model: Model) -> Matrices:
+    """Derive by the handout's way where it is for the model, by the general one elsewhere.
+
+    Raises `SceneError` for a model that is too large to be read, or not for a closed form.
+    """
+    if len(model.bodies) > MOST_TOLD:
+        raise SceneError(
+            f"derive: tells mechanisms of up to {MOST_TOLD} bodies, and this has "
+            f"{len(model.bodies)}; generate writes the module of any"
+        )
+    if why_not_pins(model):
+        return _general(derive_general(model))
+    return _of_pins(derive(model))
+
+
+def written_out(expression: Expr, definitions: Iterable[Definition]) -> Expr:
+    """An expression without the symbols that are defined. Of a long solution it is very long."""
+    for symbol, value in reversed(tuple(definitions)):
+        expression = expression.xreplace({symbol: value})
+    return expression
+
+
+def _of_pins(equations: Equations) -> Matrices:
+    s, rows = equations.symbols, equations.symmetric
+    still = dict.fromkeys(s.tau, sp.S.Zero)
+    poses = _poses(equations)
+    solved = [(symbol, value.xreplace(still)) for symbol, value in equations.solution.definitions]
+    M, V, G, F = (written_out(m, poses) for m in (rows.M, rows.V, rows.G, rows.F))
+    return Matrices(
+        *(s.q, s.v, s.a, M, V, G, F),
+        (*poses, *solved),
+        _formulas(s.formulas),
+        tell(equations),
+    )
+
+
+def _poses(equations: Equations) -> list[Definition]:
+    """Poses and velocities of the bodies over q and v; the root of a floating tree has its own."""
+    s, k = equations.symbols, equations.kinematics
+    pairs = [
+        *zip(s.angle, k.angle, strict=True),
+        *zip(s.omega, k.omega, strict=True),
+        *((a, b) for own, found in zip(zip(s.x, s.y, strict=True), k.position, strict=True)
+          for a, b in zip(own, found, strict=True)),
+        *((a, b) for own, found in zip(zip(s.xd, s.yd, strict=True), k.velocity, strict=True)
+          for a, b in zip(own, found, strict=True)),
+    ]  # fmt: skip
+    return [(symbol, value) for symbol, value in pairs if symbol != value]
+
+
+def _general(equations: GeneralEquations) -> Matrices:
+    s, found = equations.symbols, equations.balance
+    numbers = {symbol: sp.Float(float(x)) for x, symbol in s.numbers.items()}
+    given = {**numbers, **dict.fromkeys(s.tau, sp.S.Zero)}
+    definitions = [
+        (symbol, value.xreplace(given)) for symbol, value in equations.solution.definitions.items()
+    ]
+    motion = definitions[: equations.motion_definitions]
+    M, V, G, F = (
+        written_out(m.xreplace(given), motion) for m in (found.M, found.V, found.G, found.F)
+    )
+    return Matrices(
+        *(s.q, s.v, s.a, M, V, G, F),
+        tuple(definitions),
+        _formulas(s.formulas),
+        tell_general(equations),
+    )
+
+
+def _formulas(symbols: dict[Formula, Expr]) -> dict[Expr, str]:
+    return {symbol: written(formula) for formula, symbol in symbols.items()}

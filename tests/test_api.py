@@ -1,0 +1,203 @@
+"""The public functions: what they take, what they return, and that nothing else is public."""
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen
+from eomgen.cli import main
+from eomgen.run.trajectory import load_npz
+from eomgen.scene.reader import BUILT_IN
+
+DROP: dict[str, Any] = {
+    "name": "drop",
+    "bodies": [{"name": "ball", "mass": np.float64(2.0), "inertia_com": 0.1}],
+    "joints": ({"name": "flight", "type": "free", "child": "ball"},),
+    "effects": [{"type": "gravity", "g": 9.81}],
+    "initial": {"q": {"ball_y": np.int64(3)}},
+}
+
+
+def test_all_names_are_there() -> None:
+    """Sorted, each once; each there, and said what it is; anything else is refused."""
+    assert eomgen.__all__ == sorted(set(eomgen.__all__)) == dir(eomgen)
+    for name in eomgen.__all__:
+        assert getattr(eomgen, name).__doc__, name
+    with pytest.raises(AttributeError, match="no attribute 'integrate'"):
+        getattr(eomgen, "integrate")  # noqa: B009  # ty: as a user writes it
+
+
+def test_importing_takes_no_time() -> None:
+    """What is not used is not loaded."""
+    code = "import sys, eomgen; sys.exit(any(m in sys.modules for m in ('numpy', 'sympy')))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_scene_in_every_way(tmp_path: Path) -> None:
+    """A name, a path as text or as a path, a text, tables, and a scene are one scene."""
+    path = BUILT_IN / "pendulum.toml"
+    text = path.read_text("utf-8")
+    found = [eomgen.read(x) for x in ("pendulum", str(path), path, text, eomgen.read(text))]
+    assert all(scene == found[0] for scene in found)
+    model = eomgen.check(DROP)
+    assert model.value(model.bodies[0].mass) == 2.0
+    assert [c.name for c in model.coordinates] == ["ball_x", "ball_y", "ball_angle"]
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ({**DROP, "bodeis": {1, 2}}, "scene: bodeis: unknown key (did you mean 'bodies'?)"),
+        ({**DROP, "name": 7}, "scene: name: 7 is not a text; give one"),
+        ({**DROP, "points": np.zeros(2)}, "scene: points[0]: 0.0 is not a table; give one"),
+        (7, "a scene is no int; give a path, a name, a text, a mapping or a Scene"),
+        ("pendulam", "pendulam: no such file, nor a built-in scene (did you mean 'pendulum'?)"),
+    ],
+)
+def test_a_mistake_is_a_line(source: Any, said: str) -> None:
+    """As on the command line, in `lines` of the error."""
+    with pytest.raises(eomgen.SceneError) as caught:
+        eomgen.check(source)
+    assert caught.value.lines[0] == said
+
+
+@pytest.mark.parametrize("scene", ["two_body_forced", "cart_pole", "furuta_pendulum"])
+def test_the_matrices_are_the_equations(scene: str) -> None:
+    """M v̇ + V + G = F, with v̇ of the generated module, and of the solution written out."""
+    import sympy as sp
+
+    found = eomgen.derive(scene)
+    module: Any = eomgen.load(eomgen.generate(scene))
+    rng = np.random.default_rng(3)
+    y = rng.uniform(-1.0, 1.0, len(module.STATES))
+    u = {name: float(rng.uniform(-2.0, 2.0)) for name in module.INPUTS}
+    names = {**module.PARAMETERS, **u, **dict(zip(module.STATES, y.tolist(), strict=True))}
+    rates = module.derivative(0.0, y, None, u)[len(found.matrices.q) :]
+
+    def number(expression: Any) -> Any:
+        free = {s: sp.Float(names[s.name]) for s in expression.free_symbols}
+        return np.array(expression.xreplace(free).tolist(), dtype=float)
+
+    M, rest = number(found.M), number(found.F - found.V - found.G).ravel()
+    assert found.M == found.M.T
+    assert M @ rates == pytest.approx(rest, rel=1e-12, abs=1e-12)
+    solved = number(sp.Matrix([found.solution[a] for a in found.matrices.a])).ravel()
+    assert solved == pytest.approx(rates, rel=1e-12)
+    assert found._repr_latex_().startswith("$\\displaystyle ")
+    assert found.text().startswith(found.title) and "<html" in found.html()
+    again = pickle.loads(pickle.dumps(found))
+    assert again.M == found.M and again.solution == found.solution
+
+
+def test_what_is_too_large_to_read_is_said() -> None:
+    with pytest.raises(eomgen.SceneError, match="derive: tells mechanisms of up to"):
+        eomgen.derive("human_figure")
+
+
+def test_a_module(tmp_path: Path) -> None:
+    """The same bytes as by the command; loaded as a value or from its file, and no other file."""
+    made = eomgen.generate("cart_pole", outputs=["mass_matrix"], route="aba")
+    command = ["generate", "cart_pole", "--outputs", "mass_matrix", "--route", "aba"]
+    assert main([*command, "-o", str(tmp_path)]) == 0
+    path = tmp_path / "cart_pole_aba.py"
+    assert path.read_text("utf-8") == made.source
+    made.save(path)
+    for functions in (eomgen.load(made), eomgen.load(path)):
+        assert functions.mass_matrix(0.0, functions.initial_state()).shape == (2, 2)  # type: ignore[attr-defined]
+    assert "<pre>aba" in made._repr_html_()
+    (tmp_path / "mine.py").write_text("raise SystemExit")
+    with pytest.raises(eomgen.RunError, match=r"mine\.py: is no module generated by eomgen"):
+        eomgen.load(tmp_path / "mine.py")
+    with pytest.raises(eomgen.SceneError, match=r"no output 'masses_matrix' \(did you mean"):
+        eomgen.generate("cart_pole", outputs=["masses_matrix"])
+
+
+def test_a_run_is_that_of_the_command(tmp_path: Path) -> None:
+    """To the last bit; kept in files, pickled, shown."""
+    command = "simulate cart_pole --t-end 1 --set m_pole=0.3 --input push=2 --integrator Radau"
+    assert main([*command.split(), "-o", str(tmp_path)]) == 0
+    theirs = load_npz(tmp_path / "cart_pole.npz")
+    run = eomgen.simulate(
+        "cart_pole",
+        t_end=1.0,
+        parameters={"m_pole": 0.3},
+        inputs={"push": 2.0},
+        integrator="Radau",
+        works=True,
+    )
+    assert np.array_equal(run.y, theirs.y) and np.array_equal(run.t, theirs.t)
+    assert np.array_equal(run["theta"], run.y[:, run.states.index("theta")])
+    assert run.finished and run.report["steps"] == theirs.counts["steps"]
+    assert run.trajectory.works is not None and "push" in run.trajectory.work_names
+    again = pickle.loads(pickle.dumps(run))
+    assert np.array_equal(again.y, run.y) and again.model == run.model
+    assert {path.suffix for path in run.save(tmp_path / "kept")} == {".py", ".csv", ".npz", ".html"}
+    assert "<td>steps</td>" in run._repr_html_()
+    with pytest.raises(KeyError, match="no state 'thta'; known: x, theta"):
+        run["thta"]
+
+
+def test_a_run_is_followed_and_stopped() -> None:
+    """Told every step; what it is told is a copy; a true result ends the run there."""
+    seen: list[float] = []
+
+    def follow(t: float, y: np.ndarray) -> bool:
+        seen.append(t)
+        y[:] = np.nan
+        return t > 1.0
+
+    run = eomgen.simulate("pendulum", t_end=5.0, follow=follow)
+    assert seen == sorted(seen) and len(seen) == run.report["steps"]
+    assert not run.finished and "ended by who follows it" in run.message
+    assert run.t[-1] <= seen[-1] and np.isfinite(run.y).all()
+    whole = eomgen.simulate("pendulum", t_end=5.0, follow=lambda t, y: None)
+    assert np.array_equal(whole.y, eomgen.simulate("pendulum", t_end=5.0).y)
+
+
+def test_a_run_by_its_error() -> None:
+    """Estimated below what is asked for; out of reach, it is said and the best run returned."""
+    run = eomgen.simulate("pendulum", t_end=2.0, accuracy=1e-6)
+    assert run.error < 1e-6 and not run.warnings
+    (said,) = eomgen.simulate("pendulum", t_end=2.0, accuracy=1e-17).warnings
+    assert said.startswith("accuracy: not reached, the estimate is ")
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"parameters": {"lenght": 1.0}}, "parameters: no parameter 'lenght'"),
+        ({"parameters": {"bob_mass": "1 kg"}}, "parameters: bob_mass is no finite number"),
+        ({"inputs": {"push": 1.0}}, "inputs: no input 'push'; known: none"),
+        ({"integrator": "rk5"}, "rk5"),
+        ({"integrator": "rk4", "rtol": 1e-3}, "rtol, atol: rk4 takes equal steps; give dt instead"),
+        ({"accuracy": 1e-3, "budget": 1.0}, "a run has one aim"),
+        ({"accuracy": 1e-3, "dt": 1.0}, "these choose dt, rtol and atol"),
+        ({"t_end": -1.0}, "t_end"),
+    ],
+)
+def test_what_cannot_be_run_is_said(asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(eomgen.RunError) as caught:
+        eomgen.simulate("pendulum", **asked)
+    assert said in str(caught.value)
+
+
+def test_a_linearisation() -> None:
+    """About the nearest equilibrium, where it comes to rest, or a state that is given."""
+    up = eomgen.linearise("cart_pole", state={"theta": 3.0})
+    down = eomgen.linearise("cart_pole", at="rest")
+    assert max(np.linalg.eigvals(up.A).real) > 1 > max(np.linalg.eigvals(down.A).real)
+    here = eomgen.linearise("cart_pole", at="initial", state={"theta": 0.5}, inputs={"push": 1.0})
+    module = eomgen.load(eomgen.generate("cart_pole"))
+    assert np.array_equal(here.A, module.jacobian(0.0, here.y, None, {"push": 1.0}))
+    assert here.input_names == ("push",) and here.B.shape == (4, 1)
+    with pytest.raises(eomgen.RunError, match="state: no state 'tetha'"):
+        eomgen.linearise("cart_pole", state={"tetha": 0.1})
+
+
+def test_a_verification() -> None:
+    assert eomgen.verify("pendulum", states=1).missed == ()
