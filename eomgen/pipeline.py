@@ -1,8 +1,5 @@
 """The whole way from a scene to generated code; each line of `generate` is one stage."""
 
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 from eomgen.backends.javascript import javascript_poses
@@ -36,16 +33,15 @@ def generate(model: Model, *, jacobian: bool = True) -> Generated:
 
     Raises `SceneError` if the mass matrix is singular or the route is not for the model.
     """
-    with _garbage_looked_for_seldom():
-        check_regular(model)
-        choice = routed(model, jacobian=jacobian)
-        return Generated(
-            python_module(choice.system),
-            javascript_poses(choice.system) if "body_poses" in model.outputs else "",
-            choice.system.reports,
-            tuple(choice.explanation()),
-            tuple(choice.notices()),
-        )
+    check_regular(model)
+    choice = routed(model, jacobian=jacobian)
+    return Generated(
+        python_module(choice.system),
+        javascript_poses(choice.system) if "body_poses" in model.outputs else "",
+        choice.system.reports,
+        tuple(choice.explanation()),
+        tuple(choice.notices()),
+    )
 
 
 def compile_model(model: Model) -> str:
@@ -56,16 +52,3 @@ def compile_model(model: Model) -> str:
 def compile_scene(scene: Scene) -> str:
     """The source of a scene's module. Raises `SceneError` if the scene makes no mechanism."""
     return compile_model(build_model(scene))
-
-
-@contextmanager
-def _garbage_looked_for_seldom() -> Iterator[None]:
-    """A program is a hundred thousand things that are kept: to go through them again and again for
-    what is not takes a fifth of the time.
-    """
-    usual = gc.get_threshold()
-    gc.set_threshold(100_000, 20, 20)
-    try:
-        yield
-    finally:
-        gc.set_threshold(*usual)

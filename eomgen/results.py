@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from eomgen.files import write_whole
 from eomgen.model import Model
 from eomgen.run.problem import Floats
-from eomgen.run.trajectory import Trajectory, save_csv, save_npz
+from eomgen.run.trajectory import Outcome, Trajectory, save_csv, save_npz
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -157,6 +157,11 @@ class Run:
     def finished(self) -> bool:
         """Whether it came to its end."""
         return self.trajectory.finished
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it came to its end: its kind, the reason, and what to change."""
+        return self.trajectory.outcome
 
     @property
     def message(self) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 import eomgen
 from eomgen.cli import main
-from eomgen.run.trajectory import load_npz
+from eomgen.run.trajectory import Outcome, load_npz
 from eomgen.scene.reader import BUILT_IN
 
 DROP: dict[str, Any] = {
@@ -154,9 +154,31 @@ def test_a_run_is_followed_and_stopped() -> None:
     run = eomgen.simulate("pendulum", t_end=5.0, follow=follow)
     assert seen == sorted(seen) and len(seen) == run.report["steps"]
     assert not run.finished and "ended by who follows it" in run.message
+    assert (run.outcome.kind, run.outcome.remedy) == ("ended", "")
     assert run.t[-1] <= seen[-1] and np.isfinite(run.y).all()
     whole = eomgen.simulate("pendulum", t_end=5.0, follow=lambda t, y: None)
     assert np.array_equal(whole.y, eomgen.simulate("pendulum", t_end=5.0).y)
+
+
+def test_how_a_run_ends_is_data() -> None:
+    """Not a text to be searched: its kind, why, and what to change."""
+    assert eomgen.simulate("pendulum", t_end=1.0).outcome == Outcome("finished")
+    stuck = eomgen.simulate("double_pendulum", integrator="euler", dt=0.2, t_end=20.0)
+    assert stuck.outcome.kind == "stopped" and not stuck.finished
+    assert stuck.outcome.reason in stuck.message and "step" in stuck.outcome.remedy
+
+    def interrupt(t: float, y: np.ndarray) -> None:
+        raise KeyboardInterrupt
+
+    run = eomgen.simulate("pendulum", follow=interrupt)
+    assert run.outcome.kind == "interrupted" and run.message.startswith("interrupted at t = ")
+
+
+def test_nothing_of_the_process_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The collector of whoever calls is left as it is."""
+    monkeypatch.setattr("gc.set_threshold", None)
+    monkeypatch.setattr("gc.disable", None)
+    assert eomgen.load(eomgen.generate("chain")).NAME == "chain"
 
 
 def test_a_run_by_its_error() -> None:

@@ -11,13 +11,13 @@ import numpy as np
 from eomgen.run import events
 from eomgen.run.checks import check_repairs, check_rest_speed, numbers
 from eomgen.run.guard import OF_TOLERANCE, Guard, Watch, repaired, watched
-from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
+from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.stepping import ANEW, Asked, adaptive_steps, begun, can_go_on, equal_steps
 from eomgen.run.tally import Tally
-from eomgen.run.trajectory import Event, Trajectory
+from eomgen.run.trajectory import Event, Outcome, Trajectory
 from eomgen.run.works import Account, Powers
 
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -128,7 +128,7 @@ def integrate(
     counts, told = (derivatives, jacobians), progress or _ignore
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("default")
-        trouble = _follow(run, advances, counts, problem, method, asked.t_end, told, tally)
+        outcome, trouble = _follow(run, advances, counts, problem, method, asked.t_end, told, tally)
         kept = _kept(run, problem, {**remembered, **numbers(rest_speed=rest_speed)})
     # LSODA says why it failed in a warning only.
     remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
@@ -139,7 +139,7 @@ def integrate(
         t=np.array([t for t, _ in run.rows]),
         y=np.array([y for _, y in run.rows]),
         integrator=integrator,
-        finished=not trouble,
+        finished=outcome.kind == "finished",
         message=" ".join("; ".join(filter(None, said)).split()),
         counts={
             "steps": run.steps,
@@ -154,6 +154,7 @@ def integrate(
         work_names=account.names if account else (),
         resume=kept,
         origin=problem.origin,
+        outcome=outcome,
     )
 
 
@@ -286,8 +287,8 @@ def _follow(
     t_end: float,
     progress: Progress,
     tally: Tally | None,
-) -> str:
-    """Carry `run` on to `t_end`; return "" or, if it stops before, the trouble in one line."""
+) -> tuple[Outcome, str]:
+    """Carry `run` on to `t_end`; return how that ended and, if before, the trouble in one line."""
     t_start, told = run.t, throttled(progress)
     try:
         with np.errstate(all="ignore"):
@@ -299,20 +300,24 @@ def _follow(
                 if tally:
                     tally.take(advance, counts[0].calls, counts[1].calls)
                 told((run.t - t_start) / (t_end - t_start))
-        return ""
+        return Outcome(), ""
     except KeyboardInterrupt:
-        trouble = f"interrupted at t = {run.t:.6g}"
+        run.end()
+        return Outcome("interrupted", "interrupted"), f"interrupted at t = {run.t:.6g}"
+    except EndedRunError as end:
+        run.end()
+        return Outcome("ended", str(end)), f"stopped at {_place(problem, run)}: {end}"
     except StepFailure as failure:
         why = problem.explain(run.t, run.y, problem.initial)
         cause = f"{str(failure).partition(';')[0]}: {why}" if why else str(failure)
-        trouble = f"stopped at {_place(problem, run)}: {cause}"
     # Plain Python arithmetic raises where NumPy would give inf or nan: math.exp(1000), 1 / 0.0,
     # math.sqrt(-1); a ValueError is also how SciPy's factorizations refuse a nan.
     except (ArithmeticError, ValueError) as error:
         plain = f"{type(error).__name__}: {error}; {method.remedy}"
-        trouble = f"stopped at {_place(problem, run)}: {_why(counts, problem, run, plain)}"
+        cause = _why(counts, problem, run, plain)
     run.end()
-    return trouble
+    reason, _, remedy = (part.strip() for part in cause.partition(";"))
+    return Outcome("stopped", reason, remedy), f"stopped at {_place(problem, run)}: {cause}"
 
 
 def _why(counts: tuple[_Count, _Count], problem: Problem, run: _Run, error: str) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance, StepFailure
+from eomgen.run.integrators.interface import Advance, EndedRunError
 from eomgen.run.problem import Floats, Problem
 
 Follow = Callable[[float, Floats], object]
@@ -21,8 +21,8 @@ def _unlimited(tally: "Tally", t: float) -> None:
 class Tally:
     """Counts of one run; `integrate` keeps it up to date at every step.
 
-    check           told this tally and the time, s, after each step; raises `StepFailure` to end
-                    the run
+    check           told this tally and the time, s, after each step; raises `EndedRunError` to
+                    end the run
     follow          told the time and the state after each step; may end the run, too
     steps, derivatives, jacobians  as in `Trajectory.counts`
     factorisations  LU factors made by methods that report them
@@ -52,7 +52,7 @@ class Tally:
     def take(self, advance: Advance, derivatives: int, jacobians: int) -> None:
         """Take note of a step or strike, and of the calls made so far.
 
-        Raises `StepFailure` where `check` does.
+        Raises `EndedRunError` where `check` does, or where `follow` says so.
         """
         assert self.low is not None and self.high is not None
         self.steps += advance.is_step
@@ -63,7 +63,7 @@ class Tally:
         self.high = np.maximum(self.high, advance.y)
         self.check(self, advance.t)
         if self.follow and self.follow(advance.t, advance.y.copy()):
-            raise StepFailure("ended by who follows it")
+            raise EndedRunError("ended by who follows it")
 
     def counting(self, problem: Problem) -> Problem:
         """The same problem, calls of its contacts and of its switching functions counted here."""

@@ -25,6 +25,21 @@ Kind = Literal["impact", "rest", "lift"]
 
 
 @dataclass(frozen=True)
+class Outcome:
+    """How a run came to its end.
+
+    kind    "finished": at its end time; "interrupted": by the user; "ended": by who watches or
+            follows it; "stopped": it could not go on
+    reason  why it did not finish
+    remedy  what to change; "" if that is not known
+    """
+
+    kind: Literal["finished", "interrupted", "ended", "stopped"] = "finished"
+    reason: str = ""
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
 class Event:
     """What happened to a contact at time `t`, s.
 
@@ -59,6 +74,7 @@ class Trajectory:
     resume        what a later run goes on from, to the same bytes as this one would have: arrays by
                   name, see `integrate`; none where the method cannot
     origin        what motion it is of; None if that was not known
+    outcome       how it came to its end; of a run read from a file that did not finish, "stopped"
 
     Raises `ValueError` if these do not fit together.
     """
@@ -76,8 +92,11 @@ class Trajectory:
     work_names: tuple[str, ...] = ()
     resume: Mapping[str, Floats] = field(default_factory=dict)
     origin: Origin | None = None
+    outcome: Outcome = Outcome()
 
     def __post_init__(self) -> None:
+        if not self.finished and self.outcome.kind == "finished":
+            object.__setattr__(self, "outcome", Outcome("stopped", self.message))
         t, y = np.array(self.t, dtype=np.float64), np.array(self.y, dtype=np.float64)
         if t.ndim != 1 or not t.size:
             raise ValueError(f"trajectory: t has shape {t.shape}, not (n,) with n >= 1")

@@ -8,7 +8,7 @@ import numpy as np
 
 from eomgen.model import Model
 from eomgen.run.integrate import integrate
-from eomgen.run.integrators import StepFailure
+from eomgen.run.integrators import EndedRunError
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
@@ -70,7 +70,7 @@ def drift(
         nonlocal calls
         calls += 1
         if calls > most:
-            raise StepFailure(ENOUGH)
+            raise EndedRunError(ENOUGH)
         return problem.derivative(t, y)
 
     run = integrate(
@@ -84,7 +84,7 @@ def drift(
         rest_speed=model.simulation.rest_speed,
         powers=None if model.leave_out else as_powers(full),  # else energy is not kept
     )
-    if run.message.startswith("interrupted"):
+    if run.outcome.kind == "interrupted":
         raise KeyboardInterrupt
     kinetic = _along(full.kinetic_energy, run.t, run.y)
     total = kinetic + _along(full.potential_energy, run.t, run.y)
@@ -105,7 +105,7 @@ def drift(
     unit = 0.0
     for indices in map(list, module.QUATERNIONS):
         unit = max(unit, float(np.max(np.abs(np.linalg.norm(run.y[:, indices], axis=1) - 1))))
-    stopped = "" if run.finished or ENOUGH in run.message else run.message
+    stopped = "" if run.outcome.kind in ("finished", "ended") else run.message
     return Drift(float(run.t[-1]), run.counts["steps"], stopped, keeps, lost, books, unit)
 
 

@@ -95,7 +95,7 @@ def horizon(
             f"horizon: {METHOD} takes {reason}; give a longer --horizon, or a shorter t_end in the "
             "scene"
         ) from None
-    if run.message.startswith("interrupted"):
+    if run.outcome.kind == "interrupted":
         raise KeyboardInterrupt
     if not run.finished:
         raise RunError(f"horizon: {METHOD}: {run.message}")

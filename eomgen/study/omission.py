@@ -17,7 +17,7 @@ import numpy as np
 
 from eomgen.model import Model
 from eomgen.run.integrate import integrate
-from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
+from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
@@ -91,12 +91,13 @@ def run(
         atol=None if wanted.atol is None else max(wanted.atol, FINEST[1]),
         progress=progress,
     )
-    if trajectory.message.startswith("interrupted"):
+    if trajectory.outcome.kind == "interrupted":
         raise KeyboardInterrupt
     ended = ""
     if not trajectory.finished:
-        known = [reason for reason in (OVER, FAR_ENOUGH) if reason in trajectory.message]
-        ended = known[0] if known else f"it breaks off at t = {trajectory.t[-1]:.4g} s"
+        outcome = trajectory.outcome
+        breaks_off = f"it breaks off at t = {trajectory.t[-1]:.4g} s"
+        ended = outcome.reason if outcome.kind == "ended" else breaks_off
     few = slice(None, None, math.ceil(len(trajectory.t) / MOST_ROWS))
     t = trajectory.t[few]
     with np.errstate(all="ignore"):  # driven joints are where the time has them
@@ -110,9 +111,9 @@ def _timed(module: GeneratedModule, due: float, until: float) -> Problem:
 
     def derivative(t: float, y: Floats) -> Floats:
         if time.perf_counter() > due:
-            raise StepFailure(OVER)
+            raise EndedRunError(OVER)
         if t > until:
-            raise StepFailure(FAR_ENOUGH)
+            raise EndedRunError(FAR_ENOUGH)
         return problem.derivative(t, y)
 
     return replace(problem, derivative=derivative)

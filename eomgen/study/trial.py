@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.run.integrate import integrate
-from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
+from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
@@ -125,12 +125,12 @@ class Tried:
     @property
     def interrupted(self) -> bool:
         """Whether the user ended it."""
-        return self.trajectory.message.startswith("interrupted")
+        return self.trajectory.outcome.kind == "interrupted"
 
     @property
     def cut(self) -> bool:
         """Whether it was ended for taking too long."""
-        return OVER in self.trajectory.message
+        return self.trajectory.outcome.kind == "ended"
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +245,7 @@ class _Pace:
     marks: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
 
     def check(self, tally: Tally, t: float) -> None:
-        """Take note of a step that ends at t. Raises `StepFailure` to end the run."""
+        """Take note of a step that ends at t. Raises `EndedRunError` to end the run."""
         marked = t >= self.marks[-1][0] + self.t_end / MARKS
         bounded = t < self.t_end and math.isfinite(self.most)
         if marked or bounded:
@@ -255,9 +255,9 @@ class _Pace:
             if bounded:
                 hopeless = work > SOON * self.most and work > SLOW * self.most * self._share(t)
                 if work > self.most or hopeless:
-                    raise StepFailure(OVER)
+                    raise EndedRunError(OVER)
         if t < self.t_end and math.isfinite(self.due) and time.perf_counter() > self.due:
-            raise StepFailure(OVER)
+            raise EndedRunError(OVER)
 
     def made(self, work: float) -> Floats:
         """The pace of the whole run, which took some `work`."""

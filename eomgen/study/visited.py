@@ -6,7 +6,7 @@ import numpy as np
 
 from eomgen.model import Model
 from eomgen.run.integrate import integrate
-from eomgen.run.integrators import FixedStep, StepFailure, find_integrator
+from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
@@ -53,7 +53,7 @@ def visited(
         atol=wanted.atol,
         progress=progress,
     )
-    if run.message.startswith("interrupted"):
+    if run.outcome.kind == "interrupted":
         raise KeyboardInterrupt
     chosen = np.unique(np.linspace(0, len(keep.rows) - 1, count).round().astype(int))
     rows = [keep.rows[i] for i in chosen]
@@ -70,9 +70,9 @@ class _Keep:
         self._every, self._seen = 1, 0
 
     def see(self, t: float, y: Floats) -> None:
-        """Take note of a state. Raises `StepFailure` when there have been enough."""
+        """Take note of a state. Raises `EndedRunError` when there have been enough."""
         if self._seen >= self._most:
-            raise StepFailure(ENOUGH)
+            raise EndedRunError(ENOUGH)
         if self._seen % self._every == 0 and np.all(np.isfinite(y)):
             self.rows.append((float(t), np.array(y, dtype=float)))
             self.last = max(self.last, float(t))

@@ -15,7 +15,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
-from eomgen.run.integrators import StepFailure
+from eomgen.run.integrators import EndedRunError, StepFailure
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Trajectory
@@ -218,7 +218,7 @@ def _run(
         nonlocal over
         if time.perf_counter() - begin > limit:
             over = True
-            raise StepFailure(OVER)
+            raise EndedRunError(OVER)
 
     # Fewer steps than rows: all are kept.
     few = rung.dt is not None and (t[-1] - t[0]) / rung.dt < rows
@@ -242,7 +242,7 @@ def _run(
     except RunError as refusal:
         return _Run(None, time.perf_counter() - begin, math.nan, refusal=str(refusal))
     seconds = time.perf_counter() - begin
-    if trajectory.message.startswith("interrupted"):
+    if trajectory.outcome.kind == "interrupted":
         raise KeyboardInterrupt
     units = meter(problem, rung.method)(tally)
     return _Run(trajectory, seconds, units, over=over and not trajectory.finished)

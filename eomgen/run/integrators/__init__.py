@@ -18,9 +18,23 @@ from eomgen.run.integrators import (
 )
 from eomgen.run.integrators.gragg_bulirsch_stoer import GraggBulirschStoer
 from eomgen.run.integrators.implicit_stages import REMEDY, ImplicitMethod
-from eomgen.run.integrators.interface import Adaptive, Change, FixedStep, Stability, StepFailure
+from eomgen.run.integrators.interface import (
+    Adaptive,
+    Change,
+    EndedRunError,
+    FixedStep,
+    Stability,
+    StepFailure,
+)
 
-__all__ = ["INTEGRATORS", "Adaptive", "FixedStep", "StepFailure", "find_integrator"]
+__all__ = [
+    "INTEGRATORS",
+    "Adaptive",
+    "EndedRunError",
+    "FixedStep",
+    "StepFailure",
+    "find_integrator",
+]
 
 _SHORTER = "take a smaller --dt, or an implicit or adaptive method (--integrator Radau)"
 _LOOSER = "try another --integrator, or a looser --rtol and --atol"

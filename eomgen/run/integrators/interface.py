@@ -28,6 +28,10 @@ class StepFailure(RunError):
     """A step that cannot be made; the text says why and what to change."""
 
 
+class EndedRunError(StepFailure):
+    """Raised by who watches or follows a run, to end it; the text says why."""
+
+
 @dataclass(frozen=True)
 class FixedStep:
     """A method whose steps the user chooses.
