@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from campaign import some
 
 from eomgen.build import build_model
 from eomgen.cli import main
@@ -355,7 +356,9 @@ def test_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert (tmp_path / "pendulum.npz").exists()
 
 
-@pytest.mark.parametrize("integrator", ["RK45", "DOP853", "LSODA", "BDF", "Radau"])
+@pytest.mark.parametrize(
+    "integrator", some(["DOP853", "BDF"], ["RK45", "DOP853", "LSODA", "BDF", "Radau"])
+)
 def test_a_wrong_run_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], integrator: str
 ) -> None:

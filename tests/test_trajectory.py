@@ -12,7 +12,15 @@ import pytest
 from eomgen.errors import RunError
 from eomgen.run.archive import checked, packed, unpacked
 from eomgen.run.origin import Origin
-from eomgen.run.trajectory import COUNTS, Event, Trajectory, load_npz, save_csv, save_npz
+from eomgen.run.trajectory import (
+    COUNTS,
+    Event,
+    Outcome,
+    Trajectory,
+    load_npz,
+    save_csv,
+    save_npz,
+)
 
 # Numbers that a careless format loses: no short decimal, subnormal, huge, minus zero.
 AWKWARD = np.array([[0.1 + 0.2, -0.0], [5e-324, 1.7976931348623157e308], [1 / 3, -2e-17]])
@@ -30,7 +38,7 @@ RUN = Trajectory(
         Event(0.4, "floor_crank", "rest", 5e-324),
     ),
 )
-FINISHED = replace(RUN, finished=True, message="")
+FINISHED = replace(RUN, finished=True, message="", outcome=Outcome())
 WORKED = replace(FINISHED, works=AWKWARD[:, ::-1], work_names=("gravity", "air"))
 KEPT = replace(
     FINISHED,
@@ -111,7 +119,7 @@ def test_npz_is_recognisable_and_needs_no_pickle(tmp_path):
             *("eomgen", "t", "y", "states", "name"),
             *("integrator", "finished", "message", "counts", "events", "event_names", "digest"),
         ]
-        assert str(members["eomgen"]) == "trajectory 3"
+        assert str(members["eomgen"]) == "trajectory 4"
 
 
 def error_of(action, *arguments):
@@ -127,7 +135,7 @@ def test_npz_that_cannot_be_read(tmp_path):
     assert error_of(load_npz, foreign) == f"{foreign}: is no trajectory written by eomgen"
     older.write_bytes(packed({"eomgen": np.array("trajectory 1")}))
     assert error_of(load_npz, older) == (
-        f"{older}: is in format 'trajectory 1', but this eomgen reads 'trajectory 3'; "
+        f"{older}: is in format 'trajectory 1', but this eomgen reads 'trajectory 4'; "
         "simulate again"
     )
 
@@ -211,7 +219,7 @@ def test_an_archive_that_would_grow_is_refused(tmp_path):
     """Packed members, and a header that promises a terabyte."""
     path = tmp_path / "run.npz"
     with path.open("wb") as file:
-        np.savez_compressed(file, eomgen=np.array("trajectory 3"), t=np.zeros(10**6))
+        np.savez_compressed(file, eomgen=np.array("trajectory 4"), t=np.zeros(10**6))
     assert error_of(load_npz, path) == f"{path}: is damaged; simulate again"
     save_npz(KEPT, path)
     with zipfile.ZipFile(path, "w") as archive:
@@ -226,7 +234,7 @@ def test_an_archive_that_would_grow_is_refused(tmp_path):
 
 
 def members_of_kept():
-    return {"eomgen": np.array("trajectory 3"), "t": KEPT.t, "y": KEPT.y}
+    return {"eomgen": np.array("trajectory 4"), "t": KEPT.t, "y": KEPT.y}
 
 
 class Trap:
@@ -243,7 +251,7 @@ def test_code_in_npz_is_not_run(tmp_path):
     path, sprung = tmp_path / "run.npz", tmp_path / "sprung"
     with path.open("wb") as file:
         trap = np.array([Trap(str(sprung))], dtype=object)
-        np.savez(file, eomgen=np.array("trajectory 3"), name=trap)
+        np.savez(file, eomgen=np.array("trajectory 4"), name=trap)
     assert error_of(load_npz, path).endswith("; simulate again")
     assert not sprung.exists()
 

@@ -2,10 +2,10 @@
 
 import csv
 import io
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -15,13 +15,15 @@ from eomgen.run.archive import Array, checked, packed, unpacked
 from eomgen.run.origin import Origin
 from eomgen.run.problem import Floats
 
-FORMAT = "trajectory 3"
+FORMAT = "trajectory 4"
 LARGEST = 2**32
 """Bytes of the largest file that is read: a run of a million samples of 500 states."""
 RESUME = "resume_"
 """Begins the names of members of a file that a later run goes on from."""
 COUNTS = ("steps", "derivatives", "jacobians", "impacts", "capped", "cut")
 Kind = Literal["impact", "rest", "lift"]
+Ending = Literal["finished", "interrupted", "ended", "stopped"]
+ENDINGS: tuple[Ending, ...] = get_args(Ending)
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Outcome:
     remedy  what to change; "" if that is not known
     """
 
-    kind: Literal["finished", "interrupted", "ended", "stopped"] = "finished"
+    kind: Ending = "finished"
     reason: str = ""
     remedy: str = ""
 
@@ -74,7 +76,7 @@ class Trajectory:
     resume        what a later run goes on from, to the same bytes as this one would have: arrays by
                   name, see `integrate`; none where the method cannot
     origin        what motion it is of; None if that was not known
-    outcome       how it came to its end; of a run read from a file that did not finish, "stopped"
+    outcome       how it came to its end
 
     Raises `ValueError` if these do not fit together.
     """
@@ -97,6 +99,8 @@ class Trajectory:
     def __post_init__(self) -> None:
         if not self.finished and self.outcome.kind == "finished":
             object.__setattr__(self, "outcome", Outcome("stopped", self.message))
+        if self.finished != (self.outcome.kind == "finished"):
+            raise ValueError(f"trajectory: is finished, and its outcome is {self.outcome.kind}")
         t, y = np.array(self.t, dtype=np.float64), np.array(self.y, dtype=np.float64)
         if t.ndim != 1 or not t.size:
             raise ValueError(f"trajectory: t has shape {t.shape}, not (n,) with n >= 1")
@@ -141,6 +145,7 @@ def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
         "integrator": np.array(trajectory.integrator),
         "finished": np.array(trajectory.finished),
         "message": np.array(trajectory.message),
+        "outcome": _names(astuple(trajectory.outcome)),
         "counts": np.array([trajectory.counts[key] for key in COUNTS], dtype=np.int64),
         "events": np.array([(event.t, event.speed) for event in events]).reshape(-1, 2),
         "event_names": _names([(event.contact, event.kind) for event in events]).reshape(-1, 2),
@@ -221,10 +226,18 @@ def _trajectory(members: dict[str, Array]) -> Trajectory:
             if name.startswith(RESUME)
         },
         origin=_origin(rest) if known else None,
+        outcome=_outcome(_strings(rest.pop("outcome"), 1)),
     )
     if rest:
         raise ValueError("members that no trajectory has")
     return made
+
+
+def _outcome(texts: Sequence[str]) -> Outcome:
+    """How a run ended. Raises `ValueError` for an end that there is not."""
+    kind, reason, remedy = texts
+    (known,) = (ending for ending in ENDINGS if ending == kind)
+    return Outcome(known, reason, remedy)
 
 
 def _origin(rest: dict[str, Array]) -> Origin:
