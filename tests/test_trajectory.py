@@ -117,7 +117,8 @@ def test_npz_is_recognisable_and_needs_no_pickle(tmp_path):
     with np.load(path, allow_pickle=False) as members:
         assert members.files == [
             *("eomgen", "t", "y", "states", "name"),
-            *("integrator", "finished", "message", "counts", "events", "event_names", "digest"),
+            *("integrator", "finished", "message", "outcome"),
+            *("counts", "events", "event_names", "digest"),
         ]
         assert str(members["eomgen"]) == "trajectory 4"
 
