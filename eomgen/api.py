@@ -20,11 +20,12 @@ from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.files import read_plain
 from eomgen.model import Model
+from eomgen.outputs import OUTPUTS
 from eomgen.results import Derivation, Module, Run
 from eomgen.run.module import GeneratedModule, as_powers, as_problem, load_module
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import parse_scene, read_scene, read_tables
-from eomgen.scene.schema import OUTPUTS, SHOWN, Form, Route, Scene
+from eomgen.scene.schema import SHOWN, Form, Route, Scene
 from eomgen.store import Code, generated_code
 
 if TYPE_CHECKING:

@@ -14,11 +14,12 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, with_components
 from eomgen.model import Body, Model, Point
 from eomgen.naming import check_known, check_names, named
+from eomgen.outputs import OUTPUTS
 from eomgen.prescribed import initial_values, locked_values
 from eomgen.scene.chains import written_out
 from eomgen.scene.definitions import with_definitions
 from eomgen.scene.look import check_look
-from eomgen.scene.schema import OUTPUTS, Scene
+from eomgen.scene.schema import Scene
 from eomgen.straighten import entries_of_inertia, straightened_joint, unit_quaternions
 
 
@@ -101,12 +102,7 @@ def outputs_for(
 
     `wanted` holds names in `OUTPUTS`; `place` says where the one of number `{}` was asked for.
     """
-    needs = {
-        **dict.fromkeys(("point_positions", "point_velocities", "point_jacobians"), "points"),
-        "input_jacobian": "inputs",
-        "parameter_jacobian": "parameters",
-        "driving_forces": "driven joints",
-    }
+    needs = {name: spec.needs for name, spec in OUTPUTS.items() if spec.needs}
     there = {
         "points": points,
         "inputs": inputs,

@@ -10,6 +10,8 @@ from functools import cache
 from pathlib import Path
 
 import eomgen
+from eomgen.outputs import DERIVATIVES, OUTPUTS
+from eomgen.program.from_recursion import BESIDE, OBSERVED, OF_DYNAMICS
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.scene.json_schema import json_schema
 from eomgen.scene.reader import BUILT_IN, built_in_names, read_scene
@@ -28,6 +30,7 @@ ORDER = (
     ("language",),
     ("joints",),
     ("effects",),
+    ("outputs",),
     ("scene",),
     ("model",),
     ("straighten",),
@@ -182,7 +185,9 @@ def test_each_fact_lives_once() -> None:
     from eomgen.scene import schema
 
     assert set(schema.Integrator.__args__) == set(INTEGRATORS)
-    assert schema.Output.__args__ == schema.OUTPUTS
+    assert schema.Output.__args__ == tuple(OUTPUTS)
+    made = [*BESIDE, *OF_DYNAMICS, *OBSERVED, *DERIVATIVES[1:]]
+    assert sorted(made) == sorted(OUTPUTS)
     assert (BUILT_IN / "scene.schema.json").read_text("utf-8") == json_schema()
     assert (ROOT / "docs" / "reference.md").read_text("utf-8") == reference()
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]

@@ -28,9 +28,9 @@ from eomgen.effects.base import Contact, JointLoad, Load
 from eomgen.effects.vectors import NEAREST
 from eomgen.errors import SceneError
 from eomgen.language.exact import Real
+from eomgen.outputs import OUTPUTS
 from eomgen.program.route import routed
 from eomgen.scene.reader import parse_scene
-from eomgen.scene.schema import OUTPUTS
 
 M, R, G = 2.0, 0.25, 9.81
 KEPT = ("applied_force", "kinetic_energy", "potential_energy", "momentum")

@@ -10,7 +10,7 @@ from engine import Engine, along, apart, engine, exact, varied
 from mechanisms import random_tree
 from spatial_trees import random_spatial_tree
 
-from eomgen.scene.schema import OUTPUTS
+from eomgen.outputs import OUTPUTS
 
 ROUNDING = 1e-12
 EXACT = 1e-13

@@ -10,11 +10,11 @@ import pytest
 from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.errors import RunError, SceneError, nearest
+from eomgen.outputs import OUTPUTS
 from eomgen.program.program import cost
 from eomgen.program.route import routed
 from eomgen.run.integrators import find_integrator
 from eomgen.scene.reader import parse_scene, read_scene
-from eomgen.scene.schema import OUTPUTS
 from eomgen.study.bill import difference
 
 ROOT = Path(__file__).parent.parent

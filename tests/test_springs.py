@@ -23,9 +23,9 @@ from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.effects.vectors import NEAREST
 from eomgen.errors import SceneError
+from eomgen.outputs import OUTPUTS
 from eomgen.program.route import routed
 from eomgen.scene.reader import parse_scene
-from eomgen.scene.schema import OUTPUTS
 
 EXACT = 1e-12
 KEPT = ("applied_force", "kinetic_energy", "potential_energy", "momentum")

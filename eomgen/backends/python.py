@@ -12,6 +12,7 @@ from eomgen.backends.conditions import refusals
 from eomgen.language.base import LARGEST
 from eomgen.language.formula import FUNCTIONS, written
 from eomgen.model import Model
+from eomgen.outputs import DERIVATIVES, JACOBIAN, OUTPUTS
 from eomgen.program.printing import Block, Dialect, Names, print_block
 from eomgen.program.program import Program, cost, live_steps
 from eomgen.program.system import System
@@ -48,51 +49,13 @@ OWN = {
 
 ABOUT = {
     "derivative": "Time derivative of the state.",
-    "jacobian": "Exact Jacobian of `derivative` by the state.",
-    "input_jacobian": "Exact Jacobian of `derivative` by the inputs.",
-    "parameter_jacobian": "Exact Jacobian of `derivative` by the parameters.",
-    "forward_dynamics": "Accelerations (nv,) under generalised forces `tau` beside the effects.",
-    "inverse_dynamics": "Generalised forces (nv,) that give accelerations `vd` beside the effects.",
-    "mass_matrix": "Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v.",
-    "velocity_force": "V(q, v) of M v̇ + V + G = F, (nv,).",
-    "gravity_force": "G(q) of M v̇ + V + G = F, (nv,).",
-    "bias_force": "h = V + G of M v̇ + h = F, (nv,).",
-    "applied_force": "F of M v̇ + V + G = F, (nv,): applied forces and torques.",
-    "kinetic_energy": "Kinetic energy, J.",
-    "potential_energy": "Potential energy, J.",
-    "effect_powers": "What each of `EFFECT_NAMES` does to the motion, W.",
-    "centre_of_mass": "World place of the centre of mass of all bodies, m.",
-    "point_positions": "World place of each of `POINTS`, m.",
-    "point_velocities": "World velocity of each of `POINTS`, m/s.",
-    "point_jacobians": "J of each of `POINTS`: its world velocity is J v.",
+    "jacobian": JACOBIAN.about,
     "gaps": "How far apart each of `CONTACTS` is, m or rad; negative where they overlap.",
     "gap_rates": "How fast each of `gaps` grows, m/s or rad/s.",
     "switching_functions": "`derivative` has another branch where one of these passes 0.",
     "switching_functions_of_time": "As `switching_functions`; these depend on time alone.",
-    "driving_forces": "What each of `DRIVEN` takes, N m or N, on the child and back on the parent.",
 }
-ABOUT_PLANE = {
-    "momentum": "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
-    "joint_forces": "What each of `JOINTS` puts on its parent: world x, y (N), moment (N m).",
-    "body_poses": "World x, y (m) of each centre of mass and angle (rad), a row a body.",
-    "body_velocities": "World velocity x, y (m/s) of each centre of mass and rate of turn (rad/s).",
-}
-ABOUT_SPACE = {
-    "momentum": "Momentum x, y, z (kg m/s), angular about the world's origin (kg m^2/s).",
-    "joint_forces": "Force (N) and moment (N m) of each of `JOINTS` on its parent, world axes.",
-    "body_poses": "[world_R_body | centre of mass (m)] of each body, 3 x 4.",
-    "body_velocities": "Velocity of each centre of mass (m/s) and angular velocity (rad/s), world.",
-}
-ABOUT_CONTACTS = (
-    "derivative",
-    "forward_dynamics",
-    "inverse_dynamics",
-    "applied_force",
-    "joint_forces",
-    "driving_forces",
-)
-"""What rigid contacts would change while they are held."""
-DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
+"""What is there by itself; the other outputs are in the table."""
 
 
 @dataclass(frozen=True)
@@ -180,10 +143,9 @@ def _kernel(
     system: System, name: str, block: Block, names: Names, counts: Mapping[str, int]
 ) -> Kernel:
     shape = tuple(system.program.outputs[name].shape)
-    special = ABOUT_PLANE if system.model.dimensions == 2 else ABOUT_SPACE
     return Kernel(
         name=name,
-        about=special.get(name, ABOUT.get(name, "")) + _left_out(system, name),
+        about=_about(name, system.model.dimensions) + _left_out(system, name),
         shape=repr(shape),
         block=block,
         state=_unpacking([s.name for s in system.states], block, names),
@@ -197,9 +159,16 @@ def _kernel(
     )
 
 
+def _about(name: str, dimensions: int) -> str:
+    if name in OUTPUTS:
+        return OUTPUTS[name].of(dimensions)[1]
+    return ABOUT.get(name, "")
+
+
 def _left_out(system: System, name: str) -> str:
     """What an output lacks where there are rigid contacts, whose forces only a run finds."""
-    lacks = name in ABOUT_CONTACTS and bool(system.contacts)
+    lacks = name == "derivative" or (name in OUTPUTS and OUTPUTS[name].contacts)
+    lacks = lacks and bool(system.contacts)
     return " Forces of held contacts are left out." if lacks else ""
 
 

@@ -12,24 +12,13 @@ from eomgen.derivation.symbols import Vec, rotate
 from eomgen.effects.base import JointLoad
 from eomgen.language.formula import evaluate
 from eomgen.model import Point, is_zero, off_centre
+from eomgen.outputs import OUTPUTS
 from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
-from eomgen.program.system import Made, System, make_system
+from eomgen.program.system import Made, System, make_system, output_shape
 from eomgen.program.tape import Node, Stage, Tape
-
-NEEDS_VELOCITIES = (
-    "forward_dynamics",
-    "inverse_dynamics",
-    "mass_matrix",
-    "velocity_force",
-    "gravity_force",
-    "bias_force",
-    "applied_force",
-    "point_jacobians",
-)
-"""Outputs in generalised coordinates, made for the form [q, v] only."""
 
 
 def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
@@ -87,12 +76,13 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
             slopes = slopes_of(rates, by[name])
             made[name] = ((len(rates), len(by[name])), [node for row in slopes for node in row])
         elif name == "point_jacobians" and model.form == "velocity":
-            shape, expressions = recipes["point_velocities"]
-            slopes = slopes_of(rows(passive, expressions), [states[s] for s in symbols.v])
-            made[name] = ((*shape, len(symbols.v)), [node for row in slopes for node in row])
-        elif model.form == "velocity" or name not in NEEDS_VELOCITIES:
-            shape, expressions = recipes[name]
-            made[name] = (shape, rows(lowerings.get(name, passive), expressions))
+            slopes = slopes_of(
+                rows(passive, recipes["point_velocities"]), [states[s] for s in symbols.v]
+            )
+            made[name] = (output_shape(name, model), [node for row in slopes for node in row])
+        elif model.form == "velocity" or OUTPUTS[name].forms:
+            nodes = rows(lowerings.get(name, passive), recipes[name])
+            made[name] = (output_shape(name, model), nodes)
     extra = {
         "forward_dynamics": tuple(str(node.step.value) for node in tau.values()),
         "inverse_dynamics": tuple(str(node.step.value) for node in vd.values()),
@@ -101,35 +91,32 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
     return make_system(model, "closed", form.states, tape, made, checks, extra, frozenset())
 
 
-def _recipes(equations: Equations) -> dict[str, tuple[tuple[int, ...], list[Any]]]:
-    """Shape and expressions of every output, over the symbols of bodies and coordinates."""
+def _recipes(equations: Equations) -> dict[str, list[Any]]:
+    """Expressions of every output, over the symbols of bodies and coordinates."""
     s, symmetric, bodies = equations.symbols, equations.symmetric, equations.model.bodies
     balance = symmetric.M * sp.Matrix(s.a) + symmetric.V + symmetric.G - symmetric.F
     held = [k for k, body in enumerate(bodies) if body.joint.type != "free"]
     pins = [(*s.force[k], -equations.free_bodies.motor[k]) for k in held]
-    n, nb, np = len(s.a), len(bodies), len(equations.model.points)
     points = [_point(equations, point) for point in equations.model.points]
+    each = range(len(bodies))
     return {
-        "forward_dynamics": ((n,), list(s.a)),
-        "inverse_dynamics": ((n,), list(balance)),
-        "mass_matrix": ((n, n), list(symmetric.M)),
-        "velocity_force": ((n,), list(symmetric.V)),
-        "gravity_force": ((n,), list(symmetric.G)),
-        "bias_force": ((n,), list(symmetric.V + symmetric.G)),
-        "applied_force": ((n,), list(symmetric.F)),
-        "kinetic_energy": ((), [_kinetic_energy(equations)]),
-        "potential_energy": ((), [equations.free_bodies.potential_energy]),
-        "effect_powers": ((len(equations.model.effects),), _powers(equations)),
-        "momentum": ((3,), _momentum(equations)),
-        "centre_of_mass": ((2,), _centre_of_mass(equations)),
-        "joint_forces": ((len(pins), 3), [component for force in pins for component in force]),
-        "body_poses": ((nb, 3), [z for k in range(nb) for z in (s.x[k], s.y[k], s.angle[k])]),
-        "body_velocities": (
-            (nb, 3),
-            [z for k in range(nb) for z in (s.xd[k], s.yd[k], s.omega[k])],
-        ),
-        "point_positions": ((np, 2), [z for place, _ in points for z in place]),
-        "point_velocities": ((np, 2), [z for _, rate in points for z in rate]),
+        "forward_dynamics": list(s.a),
+        "inverse_dynamics": list(balance),
+        "mass_matrix": list(symmetric.M),
+        "velocity_force": list(symmetric.V),
+        "gravity_force": list(symmetric.G),
+        "bias_force": list(symmetric.V + symmetric.G),
+        "applied_force": list(symmetric.F),
+        "kinetic_energy": [_kinetic_energy(equations)],
+        "potential_energy": [equations.free_bodies.potential_energy],
+        "effect_powers": _powers(equations),
+        "momentum": _momentum(equations),
+        "centre_of_mass": _centre_of_mass(equations),
+        "joint_forces": [component for force in pins for component in force],
+        "body_poses": [z for k in each for z in (s.x[k], s.y[k], s.angle[k])],
+        "body_velocities": [z for k in each for z in (s.xd[k], s.yd[k], s.omega[k])],
+        "point_positions": [z for place, _ in points for z in place],
+        "point_velocities": [z for _, rate in points for z in rate],
     }
 
 

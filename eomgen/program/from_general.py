@@ -10,9 +10,9 @@ from typing import Any
 from eomgen.derivation.general.derive import GeneralEquations
 from eomgen.derivation.states import velocity_states
 from eomgen.language.formula import evaluate
+from eomgen.outputs import DERIVATIVES
 from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.from_recursion import (
-    DERIVATIVES,
     Recording,
     along_directions,
     checks,
@@ -22,7 +22,7 @@ from eomgen.program.from_recursion import (
 )
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
-from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system
+from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system, output_shape
 from eomgen.program.tape import Node
 
 
@@ -88,7 +88,9 @@ def from_general(equations: GeneralEquations, *, jacobian: bool = True) -> Syste
     for name in model.outputs:
         if name not in DERIVATIVES:
             found = _dynamics(lowered, record, name, extra)
-            made[name] = output(record, name, extra) if found is None else found
+            made[name] = (
+                output(record, name, extra) if found is None else (output_shape(name, model), found)
+            )
     divisors = [
         Check(f"inertia_com of {body}", lowered.rows([moment])[0].index, may_vanish=False)
         for body, moment in equations.solution.divisors
@@ -107,8 +109,8 @@ def from_general(equations: GeneralEquations, *, jacobian: bool = True) -> Syste
 
 def _dynamics(
     lowered: Lowered, record: Recording, name: str, extra: dict[str, tuple[str, ...]]
-) -> tuple[tuple[int, ...], list[Node]] | None:
-    """Shape and nodes of an output that SymPy's equations give."""
+) -> list[Node] | None:
+    """Nodes of an output that SymPy's equations give."""
     terms, symbols = lowered.equations.balance, lowered.equations.symbols
     n = len(record.v)
     match name:
@@ -117,15 +119,15 @@ def _dynamics(
             extra[name] = tuple(str(node.step.value) for node in vd)
             unknown = type(terms.V)(n, 1, symbols.a)
             needed = terms.M * unknown + terms.V + terms.G - terms.F
-            return (n,), lowered.rows(list(needed), dict(zip(symbols.a, vd, strict=True)))
+            return lowered.rows(list(needed), dict(zip(symbols.a, vd, strict=True)))
         case "mass_matrix":
-            return (n, n), lowered.rows(list(terms.M))
+            return lowered.rows(list(terms.M))
         case "velocity_force":
-            return (n,), lowered.rows(list(terms.V))
+            return lowered.rows(list(terms.V))
         case "gravity_force":
-            return (n,), lowered.rows(list(terms.G))
+            return lowered.rows(list(terms.G))
         case "bias_force":
-            return (n,), lowered.rows(list(terms.V + terms.G))
+            return lowered.rows(list(terms.V + terms.G))
         case "applied_force":
-            return (n,), lowered.rows(list(terms.F))
+            return lowered.rows(list(terms.F))
     return None

@@ -1,6 +1,6 @@
 """The recursions run over the tape: the state's derivative and every output a model asks for."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from eomgen.derivation.recursive import observe
 from eomgen.derivation.recursive.composite import Entries, full, solved
@@ -12,16 +12,16 @@ from eomgen.derivation.recursive.sensitivity import sensitivity
 from eomgen.derivation.recursive.vectors import Vec, in_space, sub, zeros
 from eomgen.derivation.states import velocity_states
 from eomgen.model import Model, is_zero
+from eomgen.outputs import DERIVATIVES
 from eomgen.program.contacts import Forward, contact_labels, contact_outputs
 from eomgen.program.differentiate import jacobian, substituted, tangent
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
-from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system
+from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system, output_shape
 from eomgen.program.tape import TIME, Node, Stage, Tape
 
 DIFFERENTIATED = ("closed", "orthogonal")
 """Routes whose own steps are differentiated: the factors of M have lost what `orthogonal` keeps."""
-DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 
 
 class Recording:
@@ -143,74 +143,73 @@ def output(
     record: Recording, name: str, extra: dict[str, tuple[str, ...]]
 ) -> tuple[tuple[int, ...], list[Node]]:
     """Shape and nodes of one output that is no matrix of derivatives."""
-    d, model, scalars = record.dynamics, record.model, record.scalars
-    nv, nb, dims = len(record.v), len(model.bodies), model.dimensions
-    match name:
-        case "forward_dynamics":
-            tau = record.beside("tau")
-            extra[name] = tuple(str(node.step.value) for node in tau)
-            return (nv,), record.forward(tau)
-        case "inverse_dynamics":
-            vd = record.beside("vd")
-            extra[name] = tuple(str(node.step.value) for node in vd)
-            pairs = zip(d.inverse(vd), d.applied_force, strict=True)
-            return (nv,), [needed - applied for needed, applied in pairs]
-        case "mass_matrix":
-            return (nv, nv), full(d.mass_entries, nv, scalars)
-        case "velocity_force":
-            return (nv,), d.bias(weightless=True)
-        case "gravity_force":
-            return (nv,), d.bias(still=True)
-        case "bias_force":
-            return (nv,), d.bias()
-        case "applied_force":
-            return (nv,), d.applied_force
-        case "kinetic_energy":
-            return (), [d.kinetic_energy]
-        case "potential_energy":
-            return (), [d.potential_energy]
-        case "effect_powers":
-            powers = [d.power(effect) for effect in model.effects]
-            return (len(powers),), powers
-        case "momentum":
-            p, about = observe.momentum(d.instant, d.places, d.moving, scalars)
-            return ((3,), [p[0], p[1], about[2]]) if dims == 2 else ((6,), [*p, *about])
-        case "centre_of_mass":
-            place = observe.centre_of_mass(d.linkage, d.instant, d.places, scalars)
-            return (dims,), list(place[:dims])
-        case "body_poses":
-            return _poses(record)
-        case "body_velocities":
-            moved = [_velocity(record, k, zeros(scalars)) for k in range(nb)]
-            if dims == 2:
-                return (nb, 3), [x for u, w in moved for x in (u[0], u[1], w[2])]
-            return (nb, 6), [x for u, w in moved for x in (*u, *w)]
-        case "driving_forces":
-            return (len(d.driving_forces),), d.driving_forces
-        case "joint_forces":
-            found = reactions(d, record.vd)
-            width = 3 if dims == 2 else 6
-            rows = [
-                (f.force[0], f.force[1], f.moment[2]) if dims == 2 else (*f.force, *f.moment)
-                for f in found
-            ]
-            return (len(found), width), [x for row in rows for x in row]
-        case _:
-            return _points(record, name)
+    d = record.dynamics
+    if name in BESIDE:
+        prefix, compute = BESIDE[name]
+        given = record.beside(prefix)
+        extra[name] = tuple(str(node.step.value) for node in given)
+        nodes = compute(record, given)
+    elif name in OBSERVED:
+        nodes = OBSERVED[name](record)
+    else:
+        nodes = OF_DYNAMICS[name](d)
+    return output_shape(name, record.model), nodes
 
 
-def _poses(record: Recording) -> tuple[tuple[int, ...], list[Node]]:
+def _inverse(record: Recording, vd: Sequence[Node]) -> list[Node]:
+    pairs = zip(record.dynamics.inverse(vd), record.dynamics.applied_force, strict=True)
+    return [needed - applied for needed, applied in pairs]
+
+
+def _mass_matrix(record: Recording) -> list[Node]:
+    return full(record.dynamics.mass_entries, len(record.v), record.scalars)
+
+
+def _powers(record: Recording) -> list[Node]:
+    return [record.dynamics.power(effect) for effect in record.model.effects]
+
+
+def _momentum(record: Recording) -> list[Node]:
+    d = record.dynamics
+    p, about = observe.momentum(d.instant, d.places, d.moving, record.scalars)
+    return [p[0], p[1], about[2]] if record.model.dimensions == 2 else [*p, *about]
+
+
+def _centre_of_mass(record: Recording) -> list[Node]:
+    d = record.dynamics
+    place = observe.centre_of_mass(d.linkage, d.instant, d.places, record.scalars)
+    return list(place[: record.model.dimensions])
+
+
+def _joint_forces(record: Recording) -> list[Node]:
+    rows = [
+        (f.force[0], f.force[1], f.moment[2])
+        if record.model.dimensions == 2
+        else (*f.force, *f.moment)
+        for f in reactions(record.dynamics, record.vd)
+    ]
+    return [x for row in rows for x in row]
+
+
+def _poses(record: Recording) -> list[Node]:
     d, scalars = record.dynamics, record.scalars
-    count = len(record.model.bodies)
     nodes: list[Node] = []
-    for k in range(count):
+    for k in range(len(record.model.bodies)):
         place = d.centre(k)
         if record.model.dimensions == 2:
             nodes += [place[0], place[1], d.angle(k)]
         else:
             matrix = observe.orientation(d.linkage, d.instant, k, scalars)
             nodes += [x for row, y in zip(matrix, place, strict=True) for x in (*row, y)]
-    return ((count, 3) if record.model.dimensions == 2 else (count, 3, 4)), nodes
+    return nodes
+
+
+def _velocities(record: Recording) -> list[Node]:
+    count = len(record.model.bodies)
+    moved = [_velocity(record, k, zeros(record.scalars)) for k in range(count)]
+    if record.model.dimensions == 2:
+        return [x for u, w in moved for x in (u[0], u[1], w[2])]
+    return [x for u, w in moved for x in (*u, *w)]
 
 
 def _velocity(record: Recording, body: int, at: Vec) -> tuple[Vec, Vec]:
@@ -218,24 +217,57 @@ def _velocity(record: Recording, body: int, at: Vec) -> tuple[Vec, Vec]:
     return observe.velocity(d.linkage, d.instant, d.moving, body, at, record.scalars)
 
 
-def _points(record: Recording, name: str) -> tuple[tuple[int, ...], list[Node]]:
-    """Places, velocities or Jacobians of the named points."""
-    d, model, scalars = record.dynamics, record.model, record.scalars
-    dims, nv = model.dimensions, len(record.v)
+def _points(record: Recording, of: Callable[[Recording, int, Vec], Sequence[Node]]) -> list[Node]:
+    """What is asked of each named point, by its body and its place in the body's axes."""
     nodes: list[Node] = []
-    for point in model.points:
-        at = in_space([d.value(part) for part in point.at], scalars)
-        if name == "point_positions":
-            nodes += d.position(point.body, at)[:dims]
-        elif name == "point_velocities":
-            nodes += _velocity(record, point.body, at)[0][:dims]
-        else:
-            columns = observe.point_jacobian(
-                d.linkage, d.instant, d.places, point.body, at, nv, scalars
-            )
-            nodes += [column[i] for i in range(dims) for column in columns]
-    shape = (len(model.points), dims)
-    return (shape if name != "point_jacobians" else (*shape, nv)), nodes
+    for point in record.model.points:
+        at = in_space([record.dynamics.value(part) for part in point.at], record.scalars)
+        nodes += of(record, point.body, at)
+    return nodes
+
+
+def _point_position(record: Recording, body: int, at: Vec) -> Sequence[Node]:
+    return record.dynamics.position(body, at)[: record.model.dimensions]
+
+
+def _point_velocity(record: Recording, body: int, at: Vec) -> Sequence[Node]:
+    return _velocity(record, body, at)[0][: record.model.dimensions]
+
+
+def _point_jacobian(record: Recording, body: int, at: Vec) -> Sequence[Node]:
+    d, nv = record.dynamics, len(record.v)
+    columns = observe.point_jacobian(d.linkage, d.instant, d.places, body, at, nv, record.scalars)
+    return [column[i] for i in range(record.model.dimensions) for column in columns]
+
+
+BESIDE: Mapping[str, tuple[str, Callable[[Recording, Sequence[Node]], list[Node]]]] = {
+    "forward_dynamics": ("tau", lambda record, tau: record.forward(tau)),
+    "inverse_dynamics": ("vd", _inverse),
+}
+"""Outputs that take something beside the state, by what that is called and what computes them."""
+OF_DYNAMICS: Mapping[str, Callable[[Dynamics], list[Node]]] = {
+    "velocity_force": lambda d: d.bias(weightless=True),
+    "gravity_force": lambda d: d.bias(still=True),
+    "bias_force": lambda d: d.bias(),
+    "applied_force": lambda d: d.applied_force,
+    "kinetic_energy": lambda d: [d.kinetic_energy],
+    "potential_energy": lambda d: [d.potential_energy],
+    "driving_forces": lambda d: d.driving_forces,
+}
+"""Outputs that the recursions give as they are."""
+OBSERVED: Mapping[str, Callable[[Recording], list[Node]]] = {
+    "mass_matrix": _mass_matrix,
+    "effect_powers": _powers,
+    "momentum": _momentum,
+    "centre_of_mass": _centre_of_mass,
+    "joint_forces": _joint_forces,
+    "body_poses": _poses,
+    "body_velocities": _velocities,
+    "point_positions": lambda record: _points(record, _point_position),
+    "point_velocities": lambda record: _points(record, _point_velocity),
+    "point_jacobians": lambda record: _points(record, _point_jacobian),
+}
+"""All other outputs but matrices of derivatives."""
 
 
 def along_directions(

@@ -1,10 +1,12 @@
 """A program with the meaning of its inputs: what a backend needs to write a module."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from eomgen.derivation.states import State
 from eomgen.model import Model
+from eomgen.outputs import shape_of
 from eomgen.program.passes import PassReport, optimise_and_report
 from eomgen.program.program import Check, Output, Program, finish
 from eomgen.program.switching import with_switching_functions
@@ -46,6 +48,20 @@ class System:
     contacts: tuple[ContactLabel, ...] = ()
 
 
+def output_shape(name: str, model: Model) -> tuple[int, ...]:
+    """The shape of an output of a model that is no matrix of derivatives."""
+    sizes = {
+        "nv": len(model.velocities),
+        "bodies": len(model.bodies),
+        "joints": len(model.holding),
+        "effects": len(model.effects),
+        "driven": len(model.driven),
+        "points": len(model.points),
+        "dimensions": model.dimensions,
+    }
+    return shape_of(name, model.dimensions, sizes)
+
+
 def make_system(
     model: Model,
     route: str,
@@ -58,6 +74,8 @@ def make_system(
     contacts: tuple[ContactLabel, ...] = (),
 ) -> System:
     """Finish a tape's program, run the passes over it, and add its switching functions."""
+    for name, (shape, nodes) in made.items():
+        assert math.prod(shape) == len(nodes), f"{name}: {len(nodes)} nodes for {shape}"
     outputs = {
         name: Output(shape, tuple(node.index for node in nodes))
         for name, (shape, nodes) in made.items()

@@ -1,7 +1,7 @@
 """The scene: every table and key of the language, as data."""
 
 import sys
-from typing import Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict
 
@@ -9,36 +9,16 @@ from eomgen.effects import Effect
 from eomgen.joints import Joint
 from eomgen.language.base import Identifier, Number, Positive, Table, Text
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
+from eomgen.outputs import OUTPUTS
 from eomgen.scene.look import Camera, Shape
 
 MOST = 1000
 """Most bodies, joints, effects or parameters a scene may list."""
 
-Output = Literal[
-    "forward_dynamics",
-    "inverse_dynamics",
-    "mass_matrix",
-    "velocity_force",
-    "gravity_force",
-    "bias_force",
-    "applied_force",
-    "kinetic_energy",
-    "potential_energy",
-    "effect_powers",
-    "momentum",
-    "centre_of_mass",
-    "joint_forces",
-    "driving_forces",
-    "body_poses",
-    "body_velocities",
-    "point_positions",
-    "point_velocities",
-    "point_jacobians",
-    "input_jacobian",
-    "parameter_jacobian",
-]
-OUTPUTS: tuple[Output, ...] = get_args(Output)
-"""What a generated module can compute beside `derivative` and `jacobian`."""
+if TYPE_CHECKING:
+    Output = str
+else:  # one of the names
+    Output = Literal[tuple(OUTPUTS)]
 
 SHOWN = ("kinetic_energy", "potential_energy", "body_poses")
 """The outputs that figures and pages are drawn from."""
