@@ -325,7 +325,7 @@ r_child = [-0.1, 0.01]
 type = "gravity"
 g = 9.81
 """
-    e = engine(text, "aba", leave_out=OUTPUTS)
+    e = engine(text, "aba", leave_out=tuple(OUTPUTS))
     assert e.system.tangents == {"jacobian"}
     y = e.random_state(np.random.default_rng(79)) * 0.5
     J = e.module.jacobian(0.0, y)

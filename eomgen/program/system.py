@@ -75,7 +75,8 @@ def make_system(
 ) -> System:
     """Finish a tape's program, run the passes over it, and add its switching functions."""
     for name, (shape, nodes) in made.items():
-        assert math.prod(shape) == len(nodes), f"{name}: {len(nodes)} nodes for {shape}"
+        entries = shape[0] if name in tangents else math.prod(shape)
+        assert entries == len(nodes), f"{name}: {len(nodes)} nodes for {shape}"
     outputs = {
         name: Output(shape, tuple(node.index for node in nodes))
         for name, (shape, nodes) in made.items()
