@@ -4,17 +4,17 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from eomgen.effects import Driven, Effect, Gravity
-from eomgen.effects.base import ExtraState, Input
 from eomgen.errors import SceneError
-from eomgen.joints import Prismatic, Revolute
-from eomgen.joints.base import WORLD
 from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, about_slides, of_joint, with_components
 from eomgen.model import Body, ways_of
 from eomgen.naming import check_known, check_names, named
 from eomgen.prescribed import check_drive
+from eomgen.scene.effects import Driven, Effect, Gravity
+from eomgen.scene.effects.base import ExtraState, Input
+from eomgen.scene.joints import Prismatic, Revolute
+from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import Scene
 
 Given = TypeVar("Given", Input, ExtraState)

@@ -5,10 +5,7 @@ from dataclasses import replace
 from typing import Literal
 
 from eomgen.acting import acting_effects, at_joint, check_contacts, sliding_in
-from eomgen.effects import Effect
 from eomgen.errors import SceneError
-from eomgen.joints import Joint
-from eomgen.joints.base import WORLD
 from eomgen.language.conditions import Condition, of_inertia, require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, with_components
@@ -18,6 +15,9 @@ from eomgen.outputs import OUTPUTS
 from eomgen.prescribed import initial_values, locked_values
 from eomgen.scene.chains import written_out
 from eomgen.scene.definitions import with_definitions
+from eomgen.scene.effects import Effect
+from eomgen.scene.joints import Joint
+from eomgen.scene.joints.base import WORLD
 from eomgen.scene.look import check_look
 from eomgen.scene.schema import Scene
 from eomgen.straighten import entries_of_inertia, straightened_joint, unit_quaternions

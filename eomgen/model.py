@@ -7,14 +7,14 @@ from functools import cached_property
 from itertools import accumulate
 from typing import TypeGuard
 
-from eomgen.effects import Driven, Effect
-from eomgen.effects.base import ExtraState, Input
-from eomgen.joints import Free, Joint, Revolute
-from eomgen.joints.base import Coordinate
 from eomgen.language.conditions import Condition, require
 from eomgen.language.exact import Real, radians
 from eomgen.language.formula import Constant, Floats, Formula, evaluate
 from eomgen.language.quantity import Parameter
+from eomgen.scene.effects import Driven, Effect
+from eomgen.scene.effects.base import ExtraState, Input
+from eomgen.scene.joints import Free, Joint, Revolute
+from eomgen.scene.joints.base import Coordinate
 from eomgen.scene.look import Camera, Shape
 from eomgen.scene.schema import Form, LeftOut, Route, Simulation
 

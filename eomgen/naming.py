@@ -4,10 +4,10 @@ from collections.abc import Collection, Sequence
 from typing import TypeVar
 
 from eomgen.errors import SceneError, listed, nearest
-from eomgen.joints.base import WORLD
 from eomgen.language.base import Table
 from eomgen.language.conditions import Condition, require
 from eomgen.language.quantity import Parameter, name_quantities
+from eomgen.scene.joints.base import WORLD
 
 AnyTable = TypeVar("AnyTable", bound=Table)
 

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Sequence
 
-from eomgen.effects import Driven, Effect
 from eomgen.errors import SceneError, listed, nearest
-from eomgen.joints.base import Coordinate
 from eomgen.language.formula import Floats, names_in
 from eomgen.language.slopes import with_rates
 from eomgen.model import Body, Prescribed
+from eomgen.scene.effects import Driven, Effect
+from eomgen.scene.joints.base import Coordinate
 
 
 def initial_values(

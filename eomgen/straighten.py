@@ -5,13 +5,13 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from eomgen.errors import SceneError
-from eomgen.joints import Free, Joint
-from eomgen.joints.base import Geared
 from eomgen.language.conditions import ROUNDING
 from eomgen.language.exact import sine_between
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import with_components
 from eomgen.model import Model
+from eomgen.scene.joints import Free, Joint
+from eomgen.scene.joints.base import Geared
 from eomgen.scene.schema import BodyTable
 
 PARALLEL = 1e-15

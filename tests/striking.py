@@ -12,10 +12,18 @@ from engine import Engine, read
 
 from eomgen.backends.python import python_module
 from eomgen.build import build_model
-from eomgen.effects.base import Contact, EffectTable, JointLoad, Load, Mechanism, Scalar, Vector
 from eomgen.language.formula import parse
 from eomgen.program.route import routed
 from eomgen.run.module import load_module
+from eomgen.scene.effects.base import (
+    Contact,
+    EffectTable,
+    JointLoad,
+    Load,
+    Mechanism,
+    Scalar,
+    Vector,
+)
 
 MATERIAL = """\
 [parameters]

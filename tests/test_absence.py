@@ -18,8 +18,8 @@ from engine import Engine
 
 from eomgen.backends.python import OWN
 from eomgen.build import build_model
-from eomgen.effects import Effect
 from eomgen.pipeline import compile_scene
+from eomgen.scene.effects import Effect
 from eomgen.scene.reader import parse_scene
 from eomgen.study.variants import removed, without_effects
 

@@ -6,10 +6,10 @@ import re
 import subprocess
 import sys
 import tomllib
-from functools import cache
 from pathlib import Path
 
-import eomgen
+from floors import FLOORS, PACKAGE, imports, modules, nodes, room
+
 from eomgen.outputs import DERIVATIVES, OUTPUTS
 from eomgen.program.from_recursion import BESIDE, OBSERVED, OF_DYNAMICS
 from eomgen.run.integrators import INTEGRATORS
@@ -17,99 +17,27 @@ from eomgen.scene.json_schema import json_schema
 from eomgen.scene.reader import BUILT_IN, built_in_names, read_scene
 from eomgen.scene.reference import reference
 
-PACKAGE = Path(eomgen.__file__).parent
 ROOT = Path(__file__).parent.parent
-
-# Each room may import from itself and from those before it.
-ORDER = (
-    ("text",),
-    ("errors",),
-    ("streams",),
-    ("files",),
-    ("entries",),
-    ("language",),
-    ("joints",),
-    ("effects",),
-    ("outputs",),
-    ("scene",),
-    ("model",),
-    ("straighten",),
-    ("prescribed",),
-    ("naming",),
-    ("acting",),
-    ("build",),
-    ("derivation",),
-    ("templating",),
-    ("program",),
-    ("backends",),
-    ("pipeline",),
-    ("store",),
-    ("run",),
-    ("study",),
-    ("show",),
-    ("results",),
-    ("api",),
-    ("commands",),
-    ("cli",),
-    ("__main__",),
-)
-
-
-@cache
-def nodes(path: Path) -> list[ast.AST]:
-    """Everything that a module is made of."""
-    return list(ast.walk(ast.parse(path.read_text("utf-8"))))
-
-
-@cache
-def imports(path: Path) -> list[str]:
-    """The package's own modules that a module imports, wherever in it."""
-    found = []
-    for node in nodes(path):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("eomgen"):
-            found += [f"{node.module}.{alias.name}" for alias in node.names]
-        elif isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names if alias.name.startswith("eomgen")]
-    return found
-
-
-def room(module: str) -> str:
-    """`derivation` of `eomgen.derivation.closed`."""
-    return module.split(".")[1]
 
 
 def test_imports_go_one_way() -> None:
     """A later stage is never imported by an earlier one, not even inside a function."""
-    rank = {name: i for i, names in enumerate(ORDER) for name in names}
-    for path in sorted(PACKAGE.rglob("*.py")):
-        parts = path.relative_to(PACKAGE).with_suffix("").parts
-        if parts == ("__init__",):
-            continue
-        for other in imports(path):
-            target = room(other) if "." in other else "cli"
-            if other == "eomgen.commands":
-                target = "commands"
-            assert rank[target] <= rank[parts[0]], f"{'/'.join(parts)} imports {other}"
+    rank = {name: i for i, name in enumerate(FLOORS)}
+    for name in modules():
+        for other in imports(name) if name else ():
+            assert rank[room(other)] <= rank[room(name)], f"{name} imports {other}"
 
 
 def test_no_import_cycle() -> None:
     """No module reaches itself through what it imports."""
-    files = {}
-    for path in PACKAGE.rglob("*.py"):
-        parts = ("eomgen", *path.relative_to(PACKAGE).with_suffix("").parts)
-        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
-    edges = {
-        name: {m for i in imports(path) for m in (i, i.rpartition(".")[0]) if m in files} - {name}
-        for name, path in files.items()
-    }
-    for start in files:
+    for start in modules():
         seen: set[str] = set()
-        stack = list(edges[start])
+        stack = list(imports(start))
         while stack:
             name = stack.pop()
             if name not in seen:
                 seen.add(name)
-                stack += edges[name]
+                stack += imports(name)
         assert start not in seen, f"{start} imports itself"
 
 

@@ -11,10 +11,10 @@ import pytest
 
 from eomgen.build import build_model
 from eomgen.cli import main
-from eomgen.effects import Effect
-from eomgen.effects.base import EffectTable
 from eomgen.errors import SceneError
 from eomgen.language.formula import Formula
+from eomgen.scene.effects import Effect
+from eomgen.scene.effects.base import EffectTable
 from eomgen.scene.reader import parse_scene
 
 CRANE = """\

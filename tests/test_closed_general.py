@@ -25,7 +25,6 @@ from eomgen.derivation.general.tell import tell_general
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
 from eomgen.errors import SceneError
-from eomgen.joints import Free
 from eomgen.model import Model
 from eomgen.pipeline import compile_model
 from eomgen.program.digits import evaluator
@@ -34,6 +33,7 @@ from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.route import routed
 from eomgen.program.system import System
 from eomgen.run.module import load_module
+from eomgen.scene.joints import Free
 from eomgen.scene.reader import parse_scene, read_scene
 
 TOLD = ("cart_pole", "furuta_pendulum", "spinning_top", "babyboot", "tumbling_body")

@@ -24,12 +24,12 @@ from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.effects.base import Contact, JointLoad, Load
-from eomgen.effects.vectors import NEAREST
 from eomgen.errors import SceneError
 from eomgen.language.exact import Real
 from eomgen.outputs import OUTPUTS
 from eomgen.program.route import routed
+from eomgen.scene.effects.base import Contact, JointLoad, Load
+from eomgen.scene.effects.vectors import NEAREST
 from eomgen.scene.reader import parse_scene
 
 M, R, G = 2.0, 0.25, 9.81

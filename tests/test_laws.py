@@ -20,15 +20,15 @@ from spatial_trees import ENDS, random_spatial_tree
 
 from eomgen.build import build_model
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.effects import ExternalForce, Gravity, Motor
-from eomgen.effects.base import JointLoad, Load
-from eomgen.joints import Free
-from eomgen.joints.base import Geared
 from eomgen.language.formula import Floats, Formula, evaluate
 from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, Program, cost, finish, live_steps
 from eomgen.program.route import routed
 from eomgen.program.tape import TIME, Stage
+from eomgen.scene.effects import ExternalForce, Gravity, Motor
+from eomgen.scene.effects.base import JointLoad, Load
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import Geared
 from eomgen.scene.reader import built_in_names, parse_scene
 
 FIGURES = ("human_figure", "hanging_figure", "quadruped")

@@ -21,10 +21,10 @@ from eomgen.backends.python import python_module
 from eomgen.build import build_model
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
-from eomgen.effects.vectors import NEAREST
 from eomgen.errors import SceneError
 from eomgen.outputs import OUTPUTS
 from eomgen.program.route import routed
+from eomgen.scene.effects.vectors import NEAREST
 from eomgen.scene.reader import parse_scene
 
 EXACT = 1e-12

@@ -14,9 +14,9 @@ from eomgen.commands.shared import (
     shortened,
 )
 from eomgen.derivation.recursive.regular import check_regular
-from eomgen.joints.base import WORLD, Geared
 from eomgen.language.formula import written
 from eomgen.model import Body, Model
+from eomgen.scene.joints.base import WORLD, Geared
 from eomgen.scene.reader import built_in_names, read_scene
 
 

@@ -26,15 +26,15 @@ from eomgen.commands.shared import (
     read_model,
     shortened,
 )
-from eomgen.effects import JointStop
 from eomgen.errors import InterruptedRunError, RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
-from eomgen.joints.base import Geared
 from eomgen.model import Model, ways_of
 from eomgen.run.limits import excursions, locks
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory, is_own_table
+from eomgen.scene.effects import JointStop
+from eomgen.scene.joints.base import Geared
 from eomgen.scene.schema import SHOWN
 from eomgen.store import Code
 

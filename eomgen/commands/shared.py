@@ -11,12 +11,12 @@ from typing import Literal
 
 from eomgen.build import build_model, outputs_for
 from eomgen.derivation.recursive.finite import initial_overlaps
-from eomgen.effects import JointStop
 from eomgen.errors import EomgenError, RunError, SceneError, nearest
 from eomgen.model import Model, ways_of
 from eomgen.outputs import OUTPUTS
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import terminal_notice
+from eomgen.scene.effects import JointStop
 from eomgen.scene.reader import find_scene, read_scene
 from eomgen.store import Code, generated_code
 from eomgen.text import one_line

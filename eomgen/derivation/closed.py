@@ -18,8 +18,8 @@ from eomgen.derivation.solution import Definition, Solution, gathered, solve
 from eomgen.derivation.supported import why_not_pins
 from eomgen.derivation.symbols import Expr, Symbols, make_symbols, over_bodies
 from eomgen.errors import SceneError
-from eomgen.joints import Free
 from eomgen.model import Model
+from eomgen.scene.joints import Free
 
 
 @dataclass(frozen=True)

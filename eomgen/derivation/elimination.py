@@ -18,8 +18,8 @@ from eomgen.derivation.symbols import (
     scale,
     tidy,
 )
-from eomgen.joints import Free
 from eomgen.model import Model
+from eomgen.scene.joints import Free
 
 
 @dataclass(frozen=True)

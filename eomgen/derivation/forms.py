@@ -13,8 +13,8 @@ from eomgen.derivation.closed import Equations
 from eomgen.derivation.states import State, velocity_states
 from eomgen.derivation.symbols import Expr, over_bodies, over_coordinates
 from eomgen.errors import SceneError
-from eomgen.joints import Free
-from eomgen.joints.base import WORLD
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import WORLD
 
 
 @dataclass(frozen=True)

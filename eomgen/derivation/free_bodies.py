@@ -7,10 +7,10 @@ import sympy as sp
 
 from eomgen.derivation.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, cross, rotate, scale
-from eomgen.effects.base import JointLoad, Load, Unmoved
-from eomgen.joints import Free
 from eomgen.language.formula import Formula
 from eomgen.model import Model
+from eomgen.scene.effects.base import JointLoad, Load, Unmoved
+from eomgen.scene.joints import Free
 
 Wrench = tuple[Vec, Expr]
 """Force in world axes at the centre of mass, and torque about z."""

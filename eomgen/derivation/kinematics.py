@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, rotate, scale
-from eomgen.joints import Revolute
 from eomgen.model import Model
+from eomgen.scene.joints import Revolute
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import sympy as sp
 from eomgen.derivation.closed import Equations
 from eomgen.derivation.elimination import trees
 from eomgen.derivation.symbols import Expr
-from eomgen.joints import Free
 from eomgen.language.formula import written
+from eomgen.scene.joints import Free
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Which models the closed form is for, and which of its two derivations."""
 
-from eomgen.joints import Free, Revolute
 from eomgen.language.formula import ZERO
 from eomgen.model import Model, off_centre
+from eomgen.scene.joints import Free, Revolute
 
 MOST_BODIES = 12
 """Bodies of one tree of pins in the plane; twelve take about a minute, one more a third more."""

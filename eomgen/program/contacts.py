@@ -5,10 +5,10 @@ from itertools import chain
 
 from eomgen.derivation.recursive.dynamics import Dynamics
 from eomgen.derivation.recursive.impulses import generalised, pressed, rough, scaled, struck
-from eomgen.effects.base import Contact, JointLoad
 from eomgen.program.differentiate import tangent
 from eomgen.program.system import ContactLabel, Made
 from eomgen.program.tape import Node, Stage, Tape, total
+from eomgen.scene.effects.base import Contact, JointLoad
 
 Forward = Callable[[Sequence[Node] | None], list[Node]]
 """v̇ under the effects and, if given, forces beside them, one a velocity."""

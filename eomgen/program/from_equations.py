@@ -9,7 +9,6 @@ from eomgen.derivation.closed import Equations, written_out_forces
 from eomgen.derivation.forms import state_form
 from eomgen.derivation.free_bodies import SymbolicMechanism
 from eomgen.derivation.symbols import Vec, rotate
-from eomgen.effects.base import JointLoad
 from eomgen.language.formula import evaluate
 from eomgen.model import Point, is_zero, off_centre
 from eomgen.outputs import OUTPUTS
@@ -19,6 +18,7 @@ from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.system import Made, System, make_system, output_shape
 from eomgen.program.tape import Node, Stage, Tape
+from eomgen.scene.effects.base import JointLoad
 
 
 def from_equations(equations: Equations, *, jacobian: bool = True) -> System:

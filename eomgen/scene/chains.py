@@ -1,10 +1,10 @@
 """Chains written out: one line of a scene becomes its links and pins."""
 
 from eomgen.errors import SceneError
-from eomgen.joints import Joint, Revolute
 from eomgen.language.base import LONGEST_NAME
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import with_components
+from eomgen.scene.joints import Joint, Revolute
 from eomgen.scene.schema import MOST, BodyTable, ChainTable, Scene
 
 

@@ -7,12 +7,12 @@ from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
 
-from eomgen.effects import Effect
 from eomgen.errors import SceneError, nearest
-from eomgen.joints import Joint
 from eomgen.language.base import Table
 from eomgen.language.formula import CONSTANTS, FUNCTIONS, ZERO, Constant, Formula
 from eomgen.language.quantity import of_any_joint
+from eomgen.scene.effects import Effect
+from eomgen.scene.joints import Joint
 from eomgen.scene.schema import BodyTable, ChainTable, Initial, PointTable, Scene, Simulation
 
 HEAD = """\

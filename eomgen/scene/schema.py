@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict
 
-from eomgen.effects import Effect
-from eomgen.joints import Joint
 from eomgen.language.base import Identifier, Number, Positive, Table, Text
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.outputs import OUTPUTS
+from eomgen.scene.effects import Effect
+from eomgen.scene.joints import Joint
 from eomgen.scene.look import Camera, Shape
 
 MOST = 1000

@@ -4,19 +4,19 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from eomgen.effects import Effect
-from eomgen.effects.attraction import PointGravity
-from eomgen.effects.contact import BodyContact
-from eomgen.effects.external_force import ExternalForce
-from eomgen.effects.external_torque import ExternalTorque
-from eomgen.effects.field import ForceField
-from eomgen.effects.gravity import Gravity
-from eomgen.effects.joint_spring import JointSpring
-from eomgen.effects.joint_stop import JointStop
-from eomgen.effects.motor import Motor
-from eomgen.effects.spring import Spring
 from eomgen.language.formula import Formula
 from eomgen.model import Model
+from eomgen.scene.effects import Effect
+from eomgen.scene.effects.attraction import PointGravity
+from eomgen.scene.effects.contact import BodyContact
+from eomgen.scene.effects.external_force import ExternalForce
+from eomgen.scene.effects.external_torque import ExternalTorque
+from eomgen.scene.effects.field import ForceField
+from eomgen.scene.effects.gravity import Gravity
+from eomgen.scene.effects.joint_spring import JointSpring
+from eomgen.scene.effects.joint_stop import JointStop
+from eomgen.scene.effects.motor import Motor
+from eomgen.scene.effects.spring import Spring
 from eomgen.show.motion import Array
 
 MOST_WORKS = 6

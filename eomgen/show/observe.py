@@ -6,11 +6,11 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.joints.base import WORLD
 from eomgen.language.formula import Formula
 from eomgen.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.joints.base import WORLD
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.motion import Anchor, Motion
 from eomgen.show.skeleton import shapes_of

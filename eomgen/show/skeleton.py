@@ -3,10 +3,10 @@
 import math
 from statistics import median
 
-from eomgen.joints import Free
-from eomgen.joints.base import WORLD
 from eomgen.language.formula import Formula
 from eomgen.model import Model
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import WORLD
 from eomgen.scene.look import Box, Rod, Shape
 
 BOX, ROD = 0.25, 0.07

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 
-from eomgen.effects.contact import BodyContact
-from eomgen.effects.field import ForceField
-from eomgen.joints.base import WORLD
 from eomgen.language.exact import direction
 from eomgen.model import Model
+from eomgen.scene.effects.contact import BodyContact
+from eomgen.scene.effects.field import ForceField
+from eomgen.scene.joints.base import WORLD
 from eomgen.show.motion import Ball, Plane
 
 

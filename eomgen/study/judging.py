@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.effects import Gravity
 from eomgen.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
+from eomgen.scene.effects import Gravity
 from eomgen.study.hard_states import State
 from eomgen.study.longs import Array, doubles, long, long_digits, solved
 from eomgen.study.truth import Truth

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.effects import Driven
-from eomgen.effects.base import JointLoad
-from eomgen.joints import Free
-from eomgen.joints.base import WORLD
 from eomgen.model import Model
 from eomgen.run.module import GeneratedModule
+from eomgen.scene.effects import Driven
+from eomgen.scene.effects.base import JointLoad
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import WORLD
 from eomgen.study.hard_states import State
 from eomgen.study.judging import ulps
 from eomgen.study.longs import NOTHING, Array, long, long_digits, zeros

@@ -10,12 +10,12 @@ from typing import Any
 import gmpy2
 from gmpy2 import mpfr
 
-from eomgen.effects.base import Vector
-from eomgen.joints import Free
-from eomgen.joints.base import WORLD, Move
 from eomgen.language.digits import Bits
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model import Model, Seat, ways_of
+from eomgen.scene.effects.base import Vector
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import WORLD, Move
 from eomgen.study.longs import Array, along, long, zeros
 from eomgen.study.poses import Pose, about, orientation, spun, turned_about, world_pose
 from eomgen.study.precise import Long

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from eomgen.build import build_model
-from eomgen.effects import Driven, Effect
 from eomgen.language.base import Table
 from eomgen.language.formula import Apply, Constant, Floats, Name, names_in
 from eomgen.language.slopes import with_rates
 from eomgen.model import Model
+from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.schema import Scene
 
 Kind = Literal["effect", "mechanism", "left out"]

@@ -21,8 +21,8 @@ from functools import cached_property
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.effects.base import JointLoad, Load
-from eomgen.joints.base import WORLD, Geared
+from eomgen.scene.effects.base import JointLoad, Load
+from eomgen.scene.joints.base import WORLD, Geared
 from eomgen.study.longs import NOTHING, Array, along, long, solved, zeros
 from eomgen.study.placed import Placed
 from eomgen.study.poses import composed

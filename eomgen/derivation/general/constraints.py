@@ -15,10 +15,10 @@ import sympy as sp
 
 from eomgen.derivation.general.symbols import Ledger, Symbols, rate, real, triple
 from eomgen.derivation.symbols import Expr
-from eomgen.joints import Free, Joint
-from eomgen.joints.base import Move
 from eomgen.language.exact import direction, orientation, quarters, radians
 from eomgen.model import Body, Model
+from eomgen.scene.joints import Free, Joint
+from eomgen.scene.joints.base import Move
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from eomgen.derivation.general.constraints import Constraint, Moving, about
 from eomgen.derivation.general.simplify import gathered
 from eomgen.derivation.general.symbols import Ledger, Symbols
 from eomgen.derivation.symbols import Expr
-from eomgen.effects.base import JointLoad, Load, Unmoved
-from eomgen.joints.base import Geared
 from eomgen.language.formula import Formula
 from eomgen.model import Model
+from eomgen.scene.effects.base import JointLoad, Load, Unmoved
+from eomgen.scene.joints.base import Geared
 
 ROTATIONS = ("R__", "k__", "W__")
 """How names of entries of rotations begin: these stay."""

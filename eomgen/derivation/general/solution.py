@@ -32,8 +32,8 @@ from eomgen.derivation.general.simplify import nested, sum_of_squares
 from eomgen.derivation.general.symbols import Ledger, Symbols
 from eomgen.derivation.solution import is_sum_of_positive_terms
 from eomgen.derivation.symbols import Expr
-from eomgen.joints import Free
 from eomgen.model import Model
+from eomgen.scene.joints import Free
 
 
 @dataclass

@@ -7,11 +7,11 @@ import sympy as sp
 
 from eomgen.derivation.general.simplify import gathered
 from eomgen.derivation.symbols import Expr, SympyScalars
-from eomgen.joints import Free
-from eomgen.joints.base import Geared
 from eomgen.language.exact import Real, direction, opposite, orientation, quarters, radians
 from eomgen.language.formula import Formula, Name, calls_function, evaluate
 from eomgen.model import Model
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import Geared
 
 
 @dataclass(frozen=True)

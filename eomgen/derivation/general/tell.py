@@ -9,8 +9,8 @@ from eomgen.derivation.general.derive import GeneralEquations
 from eomgen.derivation.general.simplify import gathered
 from eomgen.derivation.steps import Equation, Pairs, Step
 from eomgen.derivation.symbols import Expr
-from eomgen.joints.base import WORLD
 from eomgen.language.formula import written
+from eomgen.scene.joints.base import WORLD
 
 DIGITS = 6
 """Digits of a number of the scene as it is shown."""

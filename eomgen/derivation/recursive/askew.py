@@ -7,9 +7,9 @@ import math
 import random
 from dataclasses import replace
 
-from eomgen.effects import Effect, Gravity
-from eomgen.joints import Free, Joint
 from eomgen.model import Model
+from eomgen.scene.effects import Effect, Gravity
+from eomgen.scene.joints import Free, Joint
 
 
 def askew(model: Model, seed: int = 9) -> Model:

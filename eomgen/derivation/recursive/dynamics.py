@@ -44,10 +44,10 @@ from eomgen.derivation.recursive.vectors import (
     turning_in_space,
     zeros,
 )
-from eomgen.effects import Driven, Effect, Gravity
-from eomgen.effects.base import Contact, JointLoad, Load, Vector
-from eomgen.joints import Free
-from eomgen.joints.base import WORLD
+from eomgen.scene.effects import Driven, Effect, Gravity
+from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import WORLD
 
 __all__ = ["Dynamics", "Values"]
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
-from eomgen.effects import Driven, Effect
-from eomgen.effects.base import JointLoad
 from eomgen.model import Model
+from eomgen.scene.effects import Driven, Effect
+from eomgen.scene.effects.base import JointLoad
 
 
 def values_at(

@@ -32,8 +32,8 @@ from eomgen.derivation.recursive.vectors import (
     turning_in_space,
     zeros,
 )
-from eomgen.effects.base import Contact, JointLoad, Load, Vector
-from eomgen.joints.base import WORLD
+from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
+from eomgen.scene.joints.base import WORLD
 
 AnyLoad = Load | JointLoad
 

@@ -35,13 +35,13 @@ from eomgen.derivation.recursive.vectors import (
     times,
     zeros,
 )
-from eomgen.effects import Gravity
-from eomgen.joints import Free
-from eomgen.joints.base import Geared, Move
 from eomgen.language import exact
 from eomgen.language.exact import EYE, ZERO, Matrix, Real
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model import Body, Model
+from eomgen.scene.effects import Gravity
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import Geared, Move
 
 
 def make_linkage(model: Model, parameters: Mapping[str, Scalar], scalars: Scalars) -> Linkage:

@@ -16,13 +16,13 @@ from eomgen.derivation.recursive.observe import (
     velocity,
 )
 from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, in_space, times, zeros
-from eomgen.effects import Gravity
-from eomgen.effects.base import Vector
-from eomgen.joints.base import WORLD
 from eomgen.language.exact import Real
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.slopes import with_rates
 from eomgen.model import Model, Seat, ways_of
+from eomgen.scene.effects import Gravity
+from eomgen.scene.effects.base import Vector
+from eomgen.scene.joints.base import WORLD
 
 
 @dataclass(frozen=True)

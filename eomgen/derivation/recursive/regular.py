@@ -23,10 +23,10 @@ from eomgen.derivation.recursive.linkage import make_linkage
 from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.derivation.recursive.vectors import Mat, Scalars
 from eomgen.errors import SceneError
-from eomgen.joints.base import Geared
 from eomgen.language.exact import exactly
 from eomgen.language.formula import Constant, Formula
 from eomgen.model import Body, Model
+from eomgen.scene.joints.base import Geared
 
 Array = npt.NDArray[np.float64]
 

@@ -1,0 +1,59 @@
+"""Gravity toward a point: of a planet or a star that does not move."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from eomgen.language.base import Identifier
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Quantity, quantity
+from eomgen.language.quantity import Vector as VectorField
+from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
+from eomgen.scene.effects.vectors import dot, negative, scale, sub
+
+
+class PointGravity(EffectTable):
+    """Newton's attraction f = -μ m r/|r|³ of every body, at its centre of mass, by a mass that
+    stays at `at` of the world: r runs from there, μ = G M.
+
+    A body's own extent is left out (no gravity gradient). The force is infinite at the point.
+    """
+
+    body_fields = ("except_bodies",)
+    vector_fields = ("at",)
+
+    type: Literal["point_gravity"]
+    name: Identifier
+    mu: Quantity = quantity("m^3/s^2", "μ = G M of what attracts", "nonnegative")
+    at: VectorField = quantity(
+        "m", "point it pulls toward, world axes", default=(), validate_default=False
+    )
+    except_bodies: tuple[Identifier, ...] = Field(default=(), description="bodies it leaves alone")
+
+    def loads(self, mechanism: Mechanism) -> Iterator[Load]:
+        """The attraction of each body, at its centre of mass."""
+        zeros, mu = (mechanism.value(ZERO),) * mechanism.dimensions, mechanism.value(self.mu)
+        for body in self._attracted(mechanism):
+            arm, squared = self._from_point(mechanism, body)
+            cubed = squared * mechanism.call("sqrt", squared)
+            pull = mu * mechanism.mass(body) / cubed
+            yield Load(body, negative(scale(pull, arm)), zeros, "applied")
+
+    def potential_energy(self, mechanism: Mechanism) -> Scalar:
+        """-Σ μ m/|r|, J, zero far away."""
+        total, mu = mechanism.value(ZERO), mechanism.value(self.mu)
+        for body in self._attracted(mechanism):
+            _, squared = self._from_point(mechanism, body)
+            total = total - mu * mechanism.mass(body) / mechanism.call("sqrt", squared)
+        return total
+
+    def _attracted(self, mechanism: Mechanism) -> list[str]:
+        return [body for body in mechanism.bodies if body not in self.except_bodies]
+
+    def _from_point(self, mechanism: Mechanism, body: str) -> tuple[Vector, Scalar]:
+        """r, and its square."""
+        zeros = (mechanism.value(ZERO),) * mechanism.dimensions
+        centre = tuple(mechanism.value(part) for part in self.at)
+        arm = sub(mechanism.place(body, zeros), centre)
+        return arm, dot(arm, arm)

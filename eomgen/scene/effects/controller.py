@@ -1,0 +1,59 @@
+"""A controller that a scene writes itself: its states and torques as formulas."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from eomgen.language.base import Identifier, Number, Table, Text
+from eomgen.language.quantity import Quantity, quantity
+from eomgen.scene.effects.base import EffectTable, ExtraState, JointLoad, Mechanism, Scalar
+
+MOST = 100
+"""Most states or torques of one controller."""
+
+
+class StateTable(Table):
+    """A state z of a controller: dz/dt = `rate`, z = `initial` at the start."""
+
+    initial: Number = 0.0
+    rate: Quantity = quantity("1/s", "time derivative", sees=("motion",))
+    unit: Annotated[str, Field(max_length=40, pattern=r"^[A-Za-z0-9 /^*.()-]*$")] = ""
+    about: Text = ""
+
+
+class Controller(EffectTable):
+    """dz/dt = f and τ = g, formulas of t, coordinates, velocities, inputs and states.
+
+    `states = { z = { initial = 0.0, rate = "q - z" } }` names the states as formulas call them;
+    `torques = { joint = "-k*z" }` gives each joint its torque, on its child and back on its parent,
+    at a sliding joint a force. No formula can hang on itself: rates depend on states, never on
+    rates or torques.
+    """
+
+    joint_fields = ("torques",)
+
+    type: Literal["controller"]
+    name: Identifier
+    own_states: Annotated[dict[Identifier, StateTable], Field(max_length=MOST)] = Field(
+        default={}, alias="states", description="its states by name"
+    )
+    torques: Annotated[dict[Identifier, Quantity], Field(min_length=1, max_length=MOST)] = quantity(
+        "N m | N", "torque | force", sees=("motion",)
+    )
+
+    def states(self, dimensions: int) -> tuple[ExtraState, ...]:
+        """As the scene has them."""
+        return tuple(
+            ExtraState(name, state.unit, state.about or f"state of {self.name}", state.initial)
+            for name, state in self.own_states.items()
+        )
+
+    def rates(self, mechanism: Mechanism) -> tuple[Scalar, ...]:
+        """The formulas of the states."""
+        return tuple(mechanism.value(state.rate) for state in self.own_states.values())
+
+    def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
+        """The formulas of the torques."""
+        for joint, torque in self.torques.items():
+            yield JointLoad(joint, mechanism.value(torque))

@@ -1,0 +1,109 @@
+"""Drag of a fluid that may move: linear and quadratic, of the motion and of the turning."""
+
+from collections.abc import Iterator
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Quantity, quantity
+from eomgen.language.quantity import Vector as VectorField
+from eomgen.scene.effects.base import Load, Mechanism, Scalar, Vector
+from eomgen.scene.effects.bodies import OnBodies, local_names, wrong
+from eomgen.scene.effects.vectors import length, negative, scale, sub
+
+MADE_OF = ("density", "area", "coefficient")
+
+
+class Drag(OnBodies):
+    """Drag f = -(linear + quadratic |w|) w at a point that moves at w = v - wind.
+
+    Also on the turning at ω: torque = -(turning_linear + turning_quadratic |ω|) ω. Instead of
+    `quadratic` there may be the ½ density area coefficient of Rayleigh's drag equation. All vectors
+    in world axes; all coefficients are those of each body. Defined and differentiable at rest.
+    """
+
+    vector_fields = ("at", "wind")
+
+    type: Literal["drag"]
+    linear: Quantity = quantity(
+        "N s/m", "linear drag", "nonnegative", default=ZERO, validate_default=False
+    )
+    quadratic: Quantity = quantity(
+        "N s^2/m^2", "quadratic drag", "nonnegative", default=ZERO, validate_default=False
+    )
+    density: Quantity | None = quantity(
+        "kg/m^3", "density of the fluid", "nonnegative", default=None
+    )
+    area: Quantity | None = quantity("m^2", "reference area", "nonnegative", default=None)
+    coefficient: Quantity | None = quantity("", "drag coefficient", "nonnegative", default=None)
+    turning_linear: Quantity = quantity(
+        "N m s/rad", "linear drag on turning", "nonnegative", default=ZERO, validate_default=False
+    )
+    turning_quadratic: Quantity = quantity(
+        "N m s^2/rad^2",
+        "quadratic drag on turning",
+        "nonnegative",
+        default=ZERO,
+        validate_default=False,
+    )
+    wind: VectorField = quantity(
+        "m/s",
+        "velocity of the fluid",
+        sees=("motion", "x", "y", "z"),
+        default=(),
+        validate_default=False,
+    )
+    allow_active: bool = Field(
+        default=False, strict=True, description="whether coefficients may be negative"
+    )
+
+    @model_validator(mode="after")
+    def _one_quadratic(self) -> Self:
+        given = [key for key in MADE_OF if getattr(self, key) is not None]
+        if given and self.quadratic != ZERO:
+            raise wrong("quadratic", f"is given beside '{given[0]}'; leave one of them out")
+        missing = [key for key in MADE_OF if key not in given]
+        if given and missing:
+            raise wrong(missing[0], "is missing; give density, area and coefficient together")
+        turning = (self.turning_linear, self.turning_quadratic)
+        if not given and all(x == ZERO for x in (self.linear, self.quadratic, *turning)):
+            keys = "linear, quadratic, turning_linear or turning_quadratic"
+            raise wrong("linear", f"there is no drag at all; give {keys}")
+        return self
+
+    def loads(self, mechanism: Mechanism) -> Iterator[Load]:
+        """Force at the point, and torque, on each body."""
+        linear, quadratic = mechanism.value(self.linear), self._quadratic(mechanism)
+        turning = tuple(mechanism.value(x) for x in (self.turning_linear, self.turning_quadratic))
+        blows = any(part != ZERO for part in self.wind)
+        pushes = self.linear != ZERO or quadratic is not None
+        turns = self.turning_linear != ZERO or self.turning_quadratic != ZERO
+        for body, at in self.places(mechanism):
+            force: Vector = (mechanism.number(0.0),) * mechanism.dimensions
+            if pushes:
+                speed = mechanism.velocity(body, at)
+                if blows:
+                    names = local_names(mechanism, self.wind, body, at)
+                    wind = tuple(mechanism.value(part, **names) for part in self.wind)
+                    speed = sub(speed, wind)
+                force = _drag(mechanism, linear, quadratic, speed)
+            torque: Vector = ()
+            if turns:
+                square = turning[1] if self.turning_quadratic != ZERO else None
+                torque = _drag(mechanism, turning[0], square, mechanism.turning(body))
+            yield Load(body, force, at, "applied", torque)
+
+    def _quadratic(self, mechanism: Mechanism) -> Scalar | None:
+        """The quadratic coefficient, N s²/m²; None if there is none."""
+        if self.density is not None and self.area is not None and self.coefficient is not None:
+            half = mechanism.number(0.5) * mechanism.value(self.density)
+            return half * mechanism.value(self.area) * mechanism.value(self.coefficient)
+        return mechanism.value(self.quadratic) if self.quadratic != ZERO else None
+
+
+def _drag(mechanism: Mechanism, linear: Scalar, quadratic: Scalar | None, speed: Vector) -> Vector:
+    factor = linear
+    if quadratic is not None:
+        factor = factor + quadratic * length(mechanism, speed)
+    return negative(scale(factor, speed))

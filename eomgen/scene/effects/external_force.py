@@ -1,0 +1,60 @@
+"""A force from outside at a point of a body."""
+
+from collections.abc import Collection, Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from eomgen.language.base import Identifier
+from eomgen.language.formula import names_in
+from eomgen.language.quantity import Vector, quantity
+from eomgen.scene.effects.base import EffectTable, Input, Load, Mechanism
+
+
+class ExternalForce(EffectTable):
+    """A force f_e at r_e of a body (handout (29)-(34)), in world axes or in those of the body.
+
+    `force = "input"` makes its components the inputs `<name>_x`, `<name>_y` and, in space,
+    `<name>_z`.
+    """
+
+    body_fields = ("body",)
+    vector_fields = ("at", "force")
+
+    type: Literal["external_force"]
+    body: Identifier = Field(description="body it acts on")
+    axes: Literal["world", "body"] = Field(default="world", description="axes of its components")
+    at: Vector = quantity("m", "point from the centre of mass", default=(), validate_default=False)
+    force: Literal["input"] | Vector = quantity(
+        "N", "force", sees=("motion",), union_mode="left_to_right"
+    )
+
+    def inputs(self, dimensions: int) -> tuple[Input, ...]:
+        """One input a component if the force is one."""
+        if self.force != "input":
+            return ()
+        about = f"force {self.name} on {self.body}" + ", body axes" * (self.axes == "body")
+        return tuple(
+            Input(f"{self.name}_{axis}", "N", f"{about}, {axis}") for axis in "xyz"[:dimensions]
+        )
+
+    def loads(self, mechanism: Mechanism) -> Iterator[Load]:
+        """The force itself."""
+        at = tuple(mechanism.value(part) for part in self.at)
+        if isinstance(self.force, tuple):
+            force = tuple(mechanism.value(part) for part in self.force)
+        else:
+            force = tuple(mechanism.input(i.name) for i in self.inputs(mechanism.dimensions))
+        if self.axes == "body":
+            outside = mechanism.outward(self.body, force)
+            yield Load(self.body, outside, at, "applied", in_body=(force, ()))
+        else:
+            yield Load(self.body, force, at, "applied")
+
+    def is_plain(self, parameters: Collection[str]) -> bool:
+        """In world axes, unless its formula uses the motion or the time."""
+        if self.axes == "body":
+            return False
+        if not isinstance(self.force, tuple):
+            return True
+        return all(n in parameters for part in self.force for n in names_in(part))

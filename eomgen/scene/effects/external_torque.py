@@ -1,0 +1,65 @@
+"""A torque from outside on a body."""
+
+from collections.abc import Iterator
+from typing import Literal, Self
+
+from pydantic import Field
+
+from eomgen.errors import SceneError
+from eomgen.language.base import Identifier
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Quantity, Vector, quantity
+from eomgen.scene.effects.base import EffectTable, Input, Load, Mechanism
+
+
+class ExternalTorque(EffectTable):
+    """A torque on a body: in the plane a number, about z; in space three, in world or body axes.
+
+    `torque = "input"` makes it the input `<name>`, in space `<name>_x`, `<name>_y`, `<name>_z`.
+    """
+
+    body_fields = ("body",)
+
+    type: Literal["external_torque"]
+    name: Identifier
+    body: Identifier = Field(description="body it acts on")
+    axes: Literal["world", "body"] = Field(default="world", description="axes of its components")
+    torque: Literal["input"] | Quantity | Vector = quantity(
+        "N m", "torque", sees=("motion",), union_mode="left_to_right"
+    )
+
+    def checked(self, dimensions: int, place: str) -> Self:
+        """Refuse a number in space, and a vector in the plane."""
+        if dimensions == 2 and isinstance(self.torque, tuple):
+            raise SceneError(f"{place}.torque: is a list; in the plane give one number, about z")
+        if dimensions == 3 and self.torque != "input":
+            parts = len(self.torque) if isinstance(self.torque, tuple) else 1
+            if parts != 3:
+                count = f"{parts} component" + "s" * (parts > 1)
+                raise SceneError(f"{place}.torque: has {count}; space takes 3")
+        return self
+
+    def inputs(self, dimensions: int) -> tuple[Input, ...]:
+        """One input a component if the torque is one."""
+        if self.torque != "input":
+            return ()
+        about = f"torque {self.name} on {self.body}"
+        if dimensions == 2:
+            return (Input(self.name, "N m", about),)
+        about += f", {self.axes} axes"
+        return tuple(Input(f"{self.name}_{axis}", "N m", f"{about}, {axis}") for axis in "xyz")
+
+    def loads(self, mechanism: Mechanism) -> Iterator[Load]:
+        """The torque itself."""
+        if self.torque == "input":
+            torque = tuple(mechanism.input(i.name) for i in self.inputs(mechanism.dimensions))
+        elif isinstance(self.torque, tuple):
+            torque = tuple(mechanism.value(part) for part in self.torque)
+        else:
+            torque = (mechanism.value(self.torque),)
+        zeros = (mechanism.value(ZERO),) * mechanism.dimensions
+        if self.axes == "body" and mechanism.dimensions == 3:
+            outside = mechanism.outward(self.body, torque)
+            yield Load(self.body, zeros, zeros, "applied", outside, in_body=(zeros, torque))
+        else:
+            yield Load(self.body, zeros, zeros, "applied", torque)

@@ -1,0 +1,180 @@
+"""Force fields: formulas of place, velocity and time, and some that are ready."""
+
+from collections.abc import Iterator
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from eomgen.language.base import Number
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Quantity, quantity
+from eomgen.language.quantity import Vector as VectorField
+from eomgen.scene.effects.base import Load, Mechanism, Scalar, Vector
+from eomgen.scene.effects.bodies import OnBodies, local_names, wrong
+from eomgen.scene.effects.vectors import cross, dot, length, negative, scale, sub
+
+Kind = Literal["formula", "attract", "repel", "vortex", "avoid"]
+CENTRAL = ("center", "strength", "power", "softening")
+KEYS: dict[str, tuple[str, ...]] = {
+    "formula": ("force",),
+    "attract": CENTRAL,
+    "repel": CENTRAL,
+    "vortex": CENTRAL,
+    "avoid": ("center", "steering", "radius", "reach"),
+}
+"""What each kind takes beside what all take."""
+NEEDED = {"formula": ("force",), "avoid": ("steering", "radius", "reach")}
+MOST_POWER = 12
+HEAD_ON = 1e-18
+"""Square of the sine up to which a heading counts as straight at the obstacle."""
+
+
+class ForceField(OnBodies):
+    """A force at a point of a body that depends on where that is, how it moves, and the time.
+
+    With r the way from `center` to the point, s² = r·r + softening², in world axes:
+
+    - "formula": `force`, of x, y, z and vx, vy, vz of the point and of t and the motion;
+    - "attract", "repel": ∓strength r / s^(power+1), which has a potential energy;
+    - "vortex": strength ẑ × r / s^(power+1), anticlockwise about the z axis through `center`; r and
+      s are then those in the x-y plane;
+    - "avoid": the field that steers away from an obstacle (handout, section 1), here a ball of
+      `radius`, within `reach` of its surface. It pushes sideways alone, and so does no work:
+      steering h² c² |v| v × n, n the unit vector along v × d for the way d to the centre; h falls
+      from 1 at the surface to 0 at `reach`, c is the cosine between v and d, or 0 on the way off.
+      The way taken past an obstacle is the same at any speed. Straight at the centre n is ẑ: to
+      the right. It is no wall: too weak, it lets a body through, and a heading is all it changes.
+
+    Without softening the central fields are infinite at the centre. A run with adaptive steps ends
+    there; equal steps may leap over it and go on, far off.
+    """
+
+    vector_fields = ("at", "center", "force")
+
+    type: Literal["field"]
+    kind: Kind = "formula"
+    force: VectorField = quantity(
+        "N",
+        "force",
+        sees=("motion", "x", "y", "z", "vx", "vy", "vz"),
+        default=(),
+        validate_default=False,
+    )
+    center: VectorField = quantity("m", "centre in the world", default=(), validate_default=False)
+    strength: Quantity | None = quantity("N m^power", "strength", "nonnegative", default=None)
+    steering: Quantity | None = quantity(
+        "kg/m", "steering away, mass times curvature of the way", "nonnegative", default=None
+    )
+    power: Number = Field(default=2.0, ge=0, le=MOST_POWER, description="of the distance, whole")
+    softening: Quantity = quantity(
+        "m", "softening length", "nonnegative", default=ZERO, validate_default=False
+    )
+    radius: Quantity | None = quantity("m", "radius of the obstacle", "nonnegative", default=None)
+    reach: Quantity | None = quantity("m", "reach from the surface", "positive", default=None)
+
+    @model_validator(mode="after")
+    def _keys_of_kind(self) -> Self:
+        every = dict.fromkeys(key for keys in KEYS.values() for key in keys)
+        for key in every:
+            if key in self.model_fields_set and key not in KEYS[self.kind]:
+                known = ", ".join(KEYS[self.kind])
+                raise wrong(key, f"is nothing that kind '{self.kind}' takes; it takes {known}")
+        for key in NEEDED.get(self.kind, ("strength",)):
+            if key not in self.model_fields_set:
+                raise wrong(key, f"is missing; kind '{self.kind}' needs it")
+        if not self.power.is_integer():
+            raise wrong("power", f"{self.power:g} is not a whole number; give one")
+        return self
+
+    def loads(self, mechanism: Mechanism) -> Iterator[Load]:
+        """The force on each body."""
+        for body, at in self.places(mechanism):
+            if self.kind == "formula":
+                names = local_names(mechanism, self.force, body, at)
+                force: Vector = tuple(mechanism.value(part, **names) for part in self.force)
+            elif self.kind == "avoid":
+                force = self._sideways(mechanism, body, at)
+            else:
+                force = self._central(mechanism, body, at)
+            yield Load(body, force, at, "applied")
+
+    def potential_energy(self, mechanism: Mechanism) -> Scalar:
+        """Of "attract" and "repel", J: 0 at infinity for powers above 1, else at s = 0 or 1 m."""
+        total = mechanism.number(0.0)
+        if self.kind not in ("attract", "repel"):
+            return total
+        for body, at in self.places(mechanism):
+            square = self._square(mechanism, self._way(mechanism, body, at))
+            if self.power == 1:
+                part = mechanism.number(0.5) * mechanism.call("log", square)
+            else:
+                shared = mechanism.number(1 - self.power)
+                part = mechanism.number(1.0) / (shared * _raised(mechanism, square, self.power - 1))
+            total = total + part
+        total = total * self._value(mechanism, self.strength)
+        return total if self.kind == "attract" else -total
+
+    def _way(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
+        """From the centre to the point."""
+        centre = tuple(mechanism.value(part) for part in self.center)
+        return sub(mechanism.place(body, at), centre)
+
+    def _square(self, mechanism: Mechanism, way: Vector) -> Scalar:
+        softening = mechanism.value(self.softening)
+        return dot(way, way) + softening * softening
+
+    def _value(self, mechanism: Mechanism, given: Quantity | None) -> Scalar:
+        assert given is not None  # by the kind
+        return mechanism.value(given)
+
+    def _central(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
+        way, zero = self._way(mechanism, body, at), mechanism.number(0.0)
+        if self.kind == "vortex":
+            way = way[:2]
+        square = self._square(mechanism, way)
+        factor = self._value(mechanism, self.strength)
+        factor = factor / _raised(mechanism, square, self.power + 1)
+        if self.kind == "vortex":
+            return (-(factor * way[1]), factor * way[0], zero)[: mechanism.dimensions]
+        if self.kind == "attract":
+            factor = -factor
+        return scale(factor, way)
+
+    def _sideways(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
+        call, zero, one = mechanism.call, mechanism.number(0.0), mechanism.number(1.0)
+        ahead = negative(self._way(mechanism, body, at))
+        v = mechanism.velocity(body, at)
+        distance, speed = length(mechanism, ahead), length(mechanism, v)
+        gap = distance - self._value(mechanism, self.radius)
+        near = call("max", zero, one - gap / self._value(mechanism, self.reach))
+        near = call("min", near, one)
+        towards = call("max", zero, dot(v, ahead))
+        # Twice the cosine and |v| in one: nothing is divided by a speed that may be 0.
+        cosine = towards / (distance * speed)
+        factor = self._value(mechanism, self.steering) * near * near * cosine * cosine * speed
+        if mechanism.dimensions == 2:
+            left = v[0] * ahead[1] - v[1] * ahead[0]  # where the obstacle is
+            factor = call("select", -left, -factor, factor)
+            return (factor * v[1], -(factor * v[0]))
+        n = self._turn(mechanism, v, ahead, (distance * speed) * (distance * speed))
+        return scale(factor, cross(v, n))
+
+    def _turn(self, mechanism: Mechanism, v: Vector, ahead: Vector, scale: Scalar) -> Vector:
+        """The axis of the turn away, in space: a unit vector."""
+        call, zero, one = mechanism.call, mechanism.number(0.0), mechanism.number(1.0)
+        about = cross(v, ahead)
+        beside = dot(about, about) - mechanism.number(HEAD_ON) * scale
+        upright = (zero, zero, one)
+        axis = tuple(call("select", beside, a, b) for a, b in zip(about, upright, strict=True))
+        size = length(mechanism, axis)
+        return tuple(part / size for part in axis)
+
+
+def _raised(mechanism: Mechanism, square: Scalar, power: float) -> Scalar:
+    """A length to a whole power, -1 or more, from its square."""
+    if power < 0:
+        return mechanism.number(1.0) / mechanism.call("sqrt", square)
+    result = mechanism.number(1.0)
+    for _ in range(int(power) // 2):
+        result = result * square
+    return result * mechanism.call("sqrt", square) if int(power) % 2 else result

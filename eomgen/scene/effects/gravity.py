@@ -1,0 +1,82 @@
+"""Uniform gravity, downwards or in any other direction."""
+
+from collections.abc import Collection, Iterator
+from typing import Literal
+
+from pydantic import Field, field_validator
+
+from eomgen.language.base import Identifier
+from eomgen.language.exact import direction
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Numbers, Quantity, quantity
+from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
+
+
+class Gravity(EffectTable):
+    """Weight m g of every body, along -y in the plane (handout (5), (9)), along -z in space.
+
+    `direction` (world axes, of any length but 0) turns it elsewhere. It does not act on the bodies
+    in `except_bodies`; where there are any, the weights of the others are applied forces, in F of
+    M v̇ + V + G = F, and not in G.
+    """
+
+    body_fields = ("except_bodies",)
+    vector_fields = ("direction",)
+
+    type: Literal["gravity"]
+    name: Identifier = "gravity"
+    g: Quantity = quantity("m/s^2", "gravitational acceleration, downwards")
+    direction: Numbers | None = Field(default=None, description="where it pulls, world axes")
+    except_bodies: tuple[Identifier, ...] = Field(default=(), description="bodies it leaves alone")
+
+    @field_validator("direction")
+    @classmethod
+    def _points_somewhere(cls, direction: Numbers | None) -> Numbers | None:
+        if direction is not None and not any(direction):
+            raise ValueError("has no direction; give a vector that is not zero")
+        return direction
+
+    def acceleration(self, mechanism: Mechanism) -> Vector:
+        """Of a body that falls freely, world axes, m/s^2."""
+        g = mechanism.value(self.g)
+        if self.direction is None:
+            return (*(mechanism.value(ZERO),) * (mechanism.dimensions - 1), -g)
+        return tuple(mechanism.number(part) * g for part in direction(self.direction))
+
+    def loads(self, mechanism: Mechanism) -> Iterator[Load]:
+        """The weight of each body, at its centre of mass."""
+        zeros = (mechanism.value(ZERO),) * mechanism.dimensions
+        if self.direction is None and not self.except_bodies:
+            g = mechanism.value(self.g)
+            for body in mechanism.bodies:
+                yield Load(body, (*zeros[1:], -mechanism.mass(body) * g), zeros, "gravity")
+            return
+        fall = self.acceleration(mechanism)
+        for body in self._falling(mechanism):
+            force = tuple(mechanism.mass(body) * part for part in fall)
+            yield Load(body, force, zeros, "applied" if self.except_bodies else "gravity")
+
+    def potential_energy(self, mechanism: Mechanism) -> Scalar:
+        """Σ m g times height, J, zero at the world's origin."""
+        total = mechanism.value(ZERO)
+        if self.direction is None:
+            g = mechanism.value(self.g)
+            for body in self._falling(mechanism):
+                total = total + mechanism.mass(body) * g * mechanism.height(body)
+            return total
+        fall, zeros = self.acceleration(mechanism), (total,) * mechanism.dimensions
+        for body in self._falling(mechanism):
+            for part, place in zip(fall, mechanism.place(body, zeros), strict=True):
+                total = total - mechanism.mass(body) * part * place
+        return total
+
+    def _falling(self, mechanism: Mechanism) -> list[str]:
+        return [body for body in mechanism.bodies if body not in self.except_bodies]
+
+    def is_plain(self, parameters: Collection[str]) -> bool:
+        """Downwards, on all bodies."""
+        return self.direction is None and not self.except_bodies
+
+    def why_not_plain(self) -> str:
+        """It has a direction of its own, or leaves bodies alone."""
+        return "with except_bodies" if self.except_bodies else "with a direction of its own"

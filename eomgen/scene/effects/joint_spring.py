@@ -1,0 +1,85 @@
+"""A spring and damper at a joint."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal, Self
+
+from pydantic import Field
+
+from eomgen.errors import SceneError
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Quantity, quantity
+from eomgen.scene.effects.base import JointLoad, Mechanism, Scalar
+from eomgen.scene.effects.spring import check_law
+from eomgen.scene.effects.ways import OnJoints, Way
+
+
+class JointSpring(OnJoints):
+    """Pulls a joint's coordinate q back to `rest`: -(k s + c ds/dt) with s = q - rest.
+
+    A torque (N m, s in rad) where it turns, a force (N, s in m) where it slides, on the child and
+    back on the parent. A `law` over `stretch` s and `rate` ds/dt stands for k s; positive pulls
+    back. Potential energy is ½ k s²; a law has none, what it gives and takes is power. At a ball
+    joint s is the angle of the whole turn, the shorter way round, and the torque -k s n - c ω, n
+    the axis of that turn; it has no `rest` but 0, and turns over at half a turn.
+    """
+
+    type: Literal["joint_spring"]
+    stiffness: Quantity = quantity(
+        "N m/rad | N/m", "stiffness", "nonnegative", default=ZERO, validate_default=False
+    )
+    damping: Quantity = quantity(
+        "N m s/rad | N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
+    )
+    rest: Quantity = quantity("rad | m", "coordinate at rest", default=ZERO, validate_default=False)
+    law: Quantity | None = quantity(
+        "N m | N",
+        "pull back in place of stiffness",
+        sees=("motion", "stretch", "rate"),
+        default=None,
+    )
+    allow_active: bool = Field(
+        default=False, strict=True, description="whether stiffness and damping may be negative"
+    )
+
+    def checked(self, dimensions: int, place: str) -> Self:
+        """Something must pull, and a law stands alone."""
+        check_law(self, self.law, place)
+        return self
+
+    def check_ways(
+        self,
+        joints: Mapping[str, tuple[str, ...]],
+        names: Mapping[str, Sequence[str]],
+        place: str,
+    ) -> None:
+        """A ball rests in one place only."""
+        super().check_ways(joints, names, place)
+        for joint in self.acted_on(joints):
+            if "spin" in joints[joint] and self.rest != ZERO:
+                raise SceneError(f"{place}.rest: at a ball joint ('{joint}') it is 0; leave it out")
+
+    def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
+        """Equal and opposite on the joint's two bodies; the world takes its own."""
+        for way in self.ways(mechanism):
+            stretch = self._stretch(mechanism, way)
+            if self.law is not None:
+                back = mechanism.value(self.law, stretch=stretch, rate=way.rate)
+            else:
+                back = mechanism.value(self.stiffness) * stretch
+            damping = mechanism.value(self.damping)
+            pairs = zip(way.along(back), way.rates, strict=True)
+            yield from way.loads([-(force + damping * rate) for force, rate in pairs])
+
+    def potential_energy(self, mechanism: Mechanism) -> Scalar:
+        """½ k s², J."""
+        total = mechanism.number(0.0)
+        if self.law is not None:
+            return total
+        for way in self.ways(mechanism):
+            stretch = self._stretch(mechanism, way)
+            half = mechanism.number(0.5) * mechanism.value(self.stiffness)
+            total = total + half * (stretch * stretch)
+        return total
+
+    def _stretch(self, mechanism: Mechanism, way: Way) -> Scalar:
+        return way.value - mechanism.value(self.rest)

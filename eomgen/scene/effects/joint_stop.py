@@ -1,0 +1,166 @@
+"""Stops at the ends of a joint's range, as springs and dampers or rigid."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal, Self
+
+from pydantic import Field
+
+from eomgen.errors import SceneError
+from eomgen.language.conditions import Condition, a_part, in_order
+from eomgen.language.formula import ZERO
+from eomgen.language.quantity import Quantity, quantity
+from eomgen.scene.effects.base import Contact, JointLoad, Mechanism, Scalar
+from eomgen.scene.effects.vectors import negative
+from eomgen.scene.effects.ways import OnJoints, Way
+
+
+class JointStop(OnJoints):
+    """Pushes a joint's coordinate q back into `low` to `high`, and does nothing within.
+
+    Beyond a limit by x (q - high > 0 or q - low < 0) it puts -(k x + c dq/dt) on the child and back
+    on the parent, a torque (N m) where it turns, a force (N) where it slides; it never pulls
+    towards the limit, however fast q comes back. Damping sets in with a jump. Potential energy is
+    ½ k x². Either limit may be left out. Of a ball joint q is the angle of the whole turn, which
+    has no `low`. With `restitution` instead of stiffness it is rigid, of one joint that moves in
+    one way: no load, and each limit is a contact, `<effect>_low` and `<effect>_high`.
+    """
+
+    type: Literal["joint_stop"]
+    low: Quantity | None = quantity("rad | m", "lower limit", default=None)
+    high: Quantity | None = quantity("rad | m", "upper limit", default=None)
+    stiffness: Quantity = quantity(
+        "N m/rad | N/m", "stiffness", "nonnegative", default=ZERO, validate_default=False
+    )
+    damping: Quantity = quantity(
+        "N m s/rad | N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
+    )
+    restitution: Quantity | None = quantity("", "coefficient of restitution, 0 to 1", default=None)
+    allow_active: bool = Field(
+        default=False, strict=True, description="whether stiffness and damping may be negative"
+    )
+
+    def checked(self, dimensions: int, place: str) -> Self:
+        """There is a limit, and one law."""
+        if self.low is None and self.high is None:
+            raise SceneError(f"{place}.low: missing, and high too; give one of them or both")
+        given = self.model_fields_set
+        if self.restitution is None and "stiffness" not in given:
+            raise SceneError(f"{place}.stiffness: missing; give it or a restitution")
+        for key in ("stiffness", "damping", "allow_active"):
+            if self.restitution is not None and key in given:
+                raise SceneError(f"{place}.{key}: a restitution stands in its place; give one")
+        return self
+
+    def conditions(self, place: str) -> Iterator[Condition]:
+        """There is room between two limits, and restitution is from 0 to 1."""
+        if self.restitution is not None:
+            yield a_part(f"{place}.restitution", self.restitution)
+        if self.low is not None and self.high is not None:
+            yield in_order(f"{place}.low", self.low, self.high)
+
+    def check_ways(
+        self,
+        joints: Mapping[str, tuple[str, ...]],
+        names: Mapping[str, Sequence[str]],
+        place: str,
+    ) -> None:
+        """The turn of a ball is at least 0; a rigid stop is of one way."""
+        super().check_ways(joints, names, place)
+        acted_on = self.acted_on(joints)
+        for joint in acted_on:
+            if "spin" in joints[joint] and self.low is not None:
+                raise SceneError(
+                    f"{place}.low: the turn of a ball joint ('{joint}') is never below 0; give high"
+                )
+        if self.restitution is not None:
+            if self.joints is not None:
+                raise SceneError(f"{place}.joints: a rigid stop is of one joint; name it as joint")
+            if self.coordinate is None and len(joints[acted_on[0]]) > 1:
+                raise SceneError(
+                    f"{place}.coordinate: missing; a rigid stop is of one coordinate, and "
+                    f"'{self.joint}' has {', '.join(names[acted_on[0]])}"
+                )
+
+    def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
+        """Equal and opposite on the joint's two bodies; the world takes its own."""
+        if self.restitution is not None:
+            return
+        for way in self.ways(mechanism):
+            yield from way.loads(negative(way.along(self._back(mechanism, way))))
+
+    def _back(self, mechanism: Mechanism, way: Way) -> Scalar:
+        """k x + c dq/dt, as far as it pushes back."""
+        beyond, nothing = self._beyond(mechanism, way), mechanism.number(0.0)
+        back = mechanism.value(self.stiffness) * beyond
+        if self.damping == ZERO:
+            return back
+        back = back + mechanism.value(self.damping) * way.rate
+        above = mechanism.call("max", back, nothing)
+        below = mechanism.call("min", back, nothing)
+        if self.low is None:
+            below = nothing
+        if self.high is None:
+            above = nothing
+        under = mechanism.call("select", -beyond, below, nothing)
+        return mechanism.call("select", beyond, above, under)
+
+    def potential_energy(self, mechanism: Mechanism) -> Scalar:
+        """½ k x², J; of a rigid stop 0."""
+        total = mechanism.number(0.0)
+        if self.restitution is not None:
+            return total
+        for way in self.ways(mechanism):
+            beyond = self._beyond(mechanism, way)
+            half = mechanism.number(0.5) * mechanism.value(self.stiffness)
+            total = total + half * (beyond * beyond)
+        return total
+
+    def overlap(self, mechanism: Mechanism) -> Scalar:
+        """How far the farthest coordinate is beyond a soft stop, rad or m."""
+        farthest = mechanism.number(0.0)
+        if self.restitution is not None:
+            return farthest
+        for way in self.ways(mechanism):
+            beyond = mechanism.call("abs", self._beyond(mechanism, way))
+            farthest = mechanism.call("max", farthest, beyond)
+        return farthest
+
+    def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
+        """Of a rigid stop: one for each limit."""
+        ends = (("low", self.low), ("high", self.high))
+        rigid = self.restitution is not None
+        return tuple(f"{self.name}_{end}" for end, limit in ends if rigid and limit is not None)
+
+    def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
+        """Of a rigid stop: the gaps q - low and high - q; no friction."""
+        if self.restitution is None:
+            return ()
+        (way,), one = self.ways(mechanism), mechanism.number(1.0)
+        ends = []
+        if self.low is not None:
+            ends.append((way.value - mechanism.value(self.low), one))
+        if self.high is not None:
+            ends.append((mechanism.value(self.high) - way.value, -one))
+        restitution, none = mechanism.value(self.restitution), mechanism.number(0.0)
+        return tuple(
+            Contact(
+                name,
+                self.name,
+                gap,
+                tuple(way.loads(way.along(sign))),
+                (),
+                restitution,
+                none,
+                one,
+            )
+            for name, (gap, sign) in zip(self.contact_names(()), ends, strict=True)
+        )
+
+    def _beyond(self, mechanism: Mechanism, way: Way) -> Scalar:
+        """How far q is beyond its limits, negative below: 0 within."""
+        q = within = way.value
+        if self.high is not None:
+            within = mechanism.call("min", within, mechanism.value(self.high))
+        if self.low is not None:
+            within = mechanism.call("max", within, mechanism.value(self.low))
+        return q - within

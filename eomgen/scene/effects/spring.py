@@ -1,0 +1,167 @@
+"""A spring and damper between two points, or a rope."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, Self
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from eomgen.errors import SceneError
+from eomgen.language.base import Identifier
+from eomgen.language.conditions import Condition, not_negative
+from eomgen.language.formula import ZERO, Formula
+from eomgen.language.quantity import Quantity, Vector, quantity
+from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar
+from eomgen.scene.effects.base import Vector as Components
+from eomgen.scene.effects.vectors import dot, nearest_square, negative, sub
+
+
+class Spring(EffectTable):
+    """Pulls two points together with k s + c ds/dt along the line between them (N).
+
+    d runs from point 1 to point 2, s = |d| - rest length. A `law` over `stretch` s (m) and `rate`
+    ds/dt (m/s) stands for k s; positive pulls. With `tension_only` it is a rope: nothing where
+    s <= 0, and damping never makes it push. Potential energy is ½ k s²; a law has none, what it
+    gives and takes is power.
+
+    Points nearer than ε = 1e-9 m have no sure line between them. There |d| counts as ε and the
+    force falls with d to nothing, T(ε) d/ε; damping becomes that of the whole relative velocity,
+    c ((u·ḋ) u + (1 - u·u) ḋ) with u = d/ε. Everything is continuous and finite, the energy that
+    of the force; without rest length the spring is k d anywhere.
+    """
+
+    anchor_fields = ("body_1", "body_2")
+    vector_fields = ("at_1", "at_2")
+
+    type: Literal["spring"]
+    body_1: Identifier = Field(description="body of its first end, or 'world'")
+    at_1: Vector = quantity(
+        "m", "first end from the centre of mass", default=(), validate_default=False
+    )
+    body_2: Identifier = Field(description="body of its second end, or 'world'")
+    at_2: Vector = quantity(
+        "m", "second end from the centre of mass", default=(), validate_default=False
+    )
+    stiffness: Quantity = quantity(
+        "N/m", "stiffness", "nonnegative", default=ZERO, validate_default=False
+    )
+    damping: Quantity = quantity(
+        "N s/m", "damping", "nonnegative", default=ZERO, validate_default=False
+    )
+    rest_length: Quantity = quantity("m", "rest length", default=ZERO, validate_default=False)
+    tension_only: bool = Field(default=False, strict=True, description="whether it is a rope")
+    law: Quantity | None = quantity(
+        "N", "pull in place of stiffness", sees=("motion", "stretch", "rate"), default=None
+    )
+    allow_active: bool = Field(
+        default=False, strict=True, description="whether stiffness and damping may be negative"
+    )
+
+    @field_validator("body_2")
+    @classmethod
+    def _another_body(cls, name: str, info: ValidationInfo) -> str:
+        if name == info.data.get("body_1"):
+            raise ValueError("is body_1 too, whose points keep their distance; name another body")
+        return name
+
+    def checked(self, dimensions: int, place: str) -> Self:
+        """Something must pull, and a law stands alone."""
+        check_law(self, self.law, place)
+        return self
+
+    def conditions(self, place: str) -> Iterator[Condition]:
+        """A length is not negative, whatever else may be."""
+        yield not_negative(f"{place}.rest_length", self.rest_length, "m")
+
+    def loads(self, mechanism: Mechanism) -> Iterator[Load]:
+        """Equal and opposite on the two bodies; the world takes its own."""
+        line = _line(self, mechanism)
+        pull = self._pull(mechanism, line)
+        yield Load(self.body_1, pull, line.at_1, "applied")
+        yield Load(self.body_2, negative(pull), line.at_2, "applied")
+
+    def _pull(self, mechanism: Mechanism, line: "_Line") -> tuple[Scalar, ...]:
+        """The force on point 1, world axes."""
+        damping, stretch, rate = mechanism.value(self.damping), line.stretch, line.rate
+        if self.law is not None:
+            tension = mechanism.value(self.law, stretch=stretch, rate=rate)
+            per_length = tension / line.length
+        else:
+            per_length = mechanism.value(self.stiffness)
+            tension = per_length * stretch
+            if self.rest_length != ZERO:
+                per_length = tension / line.length
+        against = line.resisted(mechanism.number(1.0))
+        pull = tuple(per_length * d + damping * w for d, w in zip(line.d, against, strict=True))
+        if not self.tension_only:
+            return pull
+        taut = mechanism.call("min", stretch, tension + damping * rate)
+        nothing = mechanism.number(0.0)
+        return tuple(mechanism.call("select", taut, part, nothing) for part in pull)
+
+    def potential_energy(self, mechanism: Mechanism) -> Scalar:
+        """½ k s², J, of a rope only where it is taut."""
+        half, nothing = mechanism.number(0.5), mechanism.number(0.0)
+        if self.law is not None:
+            return nothing
+        line = _line(self, mechanism)
+        if self.rest_length == ZERO:  # no rope is slack then
+            return half * mechanism.value(self.stiffness) * line.square
+        # The second term is 0 but for points that nearly meet, where it has the force for a slope.
+        one, stretch = mechanism.number(1.0), line.stretch
+        rest = mechanism.value(self.rest_length)
+        meeting = (line.square - line.larger) * (one - rest / line.length)
+        energy = half * mechanism.value(self.stiffness) * (stretch * stretch + meeting)
+        if self.tension_only:
+            return mechanism.call("select", stretch, energy, nothing)
+        return energy
+
+
+@dataclass(frozen=True)
+class _Line:
+    """The line between the ends of a spring: m and m/s, vectors in world axes."""
+
+    at_1: Components
+    at_2: Components
+    d: Components
+    d_dot: Components
+    square: Scalar
+    """|d|²"""
+    larger: Scalar
+    """|d|², at least ε²"""
+    length: Scalar
+    """Its root."""
+    stretch: Scalar
+
+    @property
+    def rate(self) -> Scalar:
+        """ds/dt, m/s; it falls to 0 where points meet."""
+        return dot(self.d, self.d_dot) / self.length
+
+    def resisted(self, one: Scalar) -> Components:
+        """What damping acts against, m/s: (u·ḋ) u + (1 - u·u) ḋ, whose last term is 0 but for
+        points that meet.
+        """
+        along, across = dot(self.d, self.d_dot) / self.larger, one - self.square / self.larger
+        return tuple(along * x + across * y for x, y in zip(self.d, self.d_dot, strict=True))
+
+
+def _line(spring: Spring, mechanism: Mechanism) -> _Line:
+    at_1 = tuple(mechanism.value(part) for part in spring.at_1)
+    at_2 = tuple(mechanism.value(part) for part in spring.at_2)
+    d = sub(mechanism.place(spring.body_2, at_2), mechanism.place(spring.body_1, at_1))
+    d_dot = sub(mechanism.velocity(spring.body_2, at_2), mechanism.velocity(spring.body_1, at_1))
+    square = dot(d, d)
+    larger = mechanism.call("max", square, nearest_square(mechanism))
+    length = mechanism.call("sqrt", larger)
+    stretch = length - mechanism.value(spring.rest_length)
+    return _Line(at_1, at_2, d, d_dot, square, larger, length, stretch)
+
+
+def check_law(table: EffectTable, law: Formula | None, place: str) -> None:
+    """Raise `SceneError` unless a spring has stiffness, damping or a law, and no law too many."""
+    given = table.model_fields_set
+    if law is None and not given & {"stiffness", "damping"}:
+        raise SceneError(f"{place}.stiffness: missing; give it, or damping or a law")
+    if law is not None and "stiffness" in given:
+        raise SceneError(f"{place}.stiffness: a law stands in its place; give one of them")

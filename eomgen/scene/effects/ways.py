@@ -1,0 +1,166 @@
+"""What effects share that act on the ways in which joints move: one, several, or all."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from eomgen.errors import SceneError, nearest
+from eomgen.language.base import Identifier
+from eomgen.scene.effects.base import EffectTable, JointLoad, Mechanism, Scalar, Vector
+from eomgen.scene.effects.bodies import wrong
+from eomgen.scene.effects.vectors import dot, length, scale
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way in which a joint moves: a turn or slide by one coordinate, or all turns of a ball.
+
+    `value` is how far it has gone from 0, rad or m; of a ball the angle of the whole turn, 0 to π,
+    about the unit vector n. `rates` are its velocities from number `first` of the joint's on, rad/s
+    or m/s; of a ball the angular velocity ω in the child's axes, in which n is the same as in the
+    parent's. `direction` is 1, or n; so that dvalue/dt = direction · rates.
+    """
+
+    joint: str
+    first: int
+    value: Scalar
+    direction: Vector
+    rates: Vector
+
+    @property
+    def rate(self) -> Scalar:
+        """dvalue/dt."""
+        return self.rates[0] if len(self.rates) == 1 else dot(self.direction, self.rates)
+
+    def loads(self, forces: Sequence[Scalar]) -> Iterator[JointLoad]:
+        """Forces on its velocities, on the child and back on the parent."""
+        for i, force in enumerate(forces):
+            yield JointLoad(self.joint, force, self.first + i)
+
+    def along(self, force: Scalar) -> tuple[Scalar, ...]:
+        """A force in its direction."""
+        if len(self.rates) == 1:
+            return (force,)
+        return scale(force, self.direction)
+
+
+def way(mechanism: Mechanism, joint: str, kind: str, place: int) -> Way:
+    """The way of a joint whose coordinate, or quaternion, is number `place` of the joint's."""
+    if kind != "spin":
+        value, rate = mechanism.coordinate(joint, place), mechanism.rate(joint, place)
+        return Way(joint, place, value, (mechanism.number(1.0),), (rate,))
+    w, *vector = (mechanism.coordinate(joint, place + i) for i in range(4))
+    rates = tuple(mechanism.rate(joint, place + i) for i in range(3))
+    # Quaternions w, r and -w, -r are one turn; the shorter way has w >= 0.
+    sine = length(mechanism, tuple(vector))
+    half = mechanism.call("atan2", sine, mechanism.call("abs", w))
+    per_sine = mechanism.number(1.0) / sine
+    per_sine = mechanism.call("select", -w, -per_sine, per_sine)
+    direction = scale(per_sine, vector)
+    return Way(joint, place, half + half, direction, rates)
+
+
+class OnJoints(EffectTable):
+    """An effect on the ways in which `joint` moves, or each of `joints`, which may be "all"; or on
+    one `coordinate` of a joint that has several.
+    """
+
+    way_fields: ClassVar[tuple[str, ...]] = ("joint", "joints")
+
+    joint: Identifier | None = Field(default=None, description="joint it acts on")
+    joints: Literal["all"] | Annotated[tuple[Identifier, ...], Field(min_length=1)] | None = Field(
+        default=None,
+        description="joints it acts on, if several; 'all' are all but the free ones",
+    )
+    coordinate: Identifier | None = Field(
+        default=None, description="the one it acts on, of a joint that has several"
+    )
+
+    @model_validator(mode="after")
+    def _one_or_several(self) -> Self:
+        if (self.joint is None) == (self.joints is None):
+            what = "is missing" if self.joint is None else "is given beside 'joints'"
+            raise wrong("joint", f"{what}; give one of joint, joints")
+        if self.coordinate is not None and self.joint is None:
+            raise wrong("coordinate", "is one of a joint; name that as joint")
+        listed = self.joints if isinstance(self.joints, tuple) else ()
+        for i, name in enumerate(listed):
+            if name in listed[:i]:
+                raise wrong(f"joints[{i}]", f"'{name}' is listed twice; leave one out")
+        return self
+
+    def acted_on(self, joints: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+        """Names of its joints, of all `joints` that move."""
+        if self.joint is not None:
+            return (self.joint,)
+        return self.joints if isinstance(self.joints, tuple) else tuple(joints)
+
+    def check_ways(
+        self,
+        joints: Mapping[str, tuple[str, ...]],
+        names: Mapping[str, Sequence[str]],
+        place: str,
+    ) -> None:
+        """There is such a coordinate."""
+        if self.coordinate is not None:
+            assert self.joint is not None
+            known = _plain(joints, names, self.joint)
+            _check_coordinate(self.coordinate, self.joint, known, place)
+
+    def ways(self, mechanism: Mechanism) -> Iterator[Way]:
+        """Every way it acts on."""
+        for joint in self.acted_on(mechanism.joints):
+            for place, kind in enumerate(mechanism.joints[joint]):
+                name = mechanism.coordinate_name(joint, place)
+                if self.coordinate in (None, name):
+                    yield way(mechanism, joint, kind, place)
+
+
+class OnCoordinate(EffectTable):
+    """An effect on the coordinate of `joint`, or on that `coordinate` of one that has several."""
+
+    way_fields: ClassVar[tuple[str, ...]] = ("joint",)
+
+    joint: Identifier = Field(description="joint it acts on")
+    coordinate: Identifier | None = Field(
+        default=None, description="the one it acts on, of a joint that has several"
+    )
+
+    def check_ways(
+        self,
+        joints: Mapping[str, tuple[str, ...]],
+        names: Mapping[str, Sequence[str]],
+        place: str,
+    ) -> None:
+        """There is one such coordinate."""
+        known = _plain(joints, names, self.joint)
+        if not known:
+            raise SceneError(f"{place}.joint: '{self.joint}' is a ball joint and has no angle")
+        if self.coordinate is None and len(known) > 1:
+            raise SceneError(
+                f"{place}.coordinate: missing; '{self.joint}' has {', '.join(known)}: give one"
+            )
+        _check_coordinate(self.coordinate, self.joint, known, place)
+
+    def place(self, mechanism: Mechanism) -> int:
+        """Which of the joint's coordinates."""
+        if self.coordinate is None:
+            return 0
+        count = len(mechanism.joints[self.joint])
+        names = [mechanism.coordinate_name(self.joint, i) for i in range(count)]
+        return names.index(self.coordinate)
+
+
+def _plain(
+    joints: Mapping[str, tuple[str, ...]], names: Mapping[str, Sequence[str]], joint: str
+) -> Sequence[str]:
+    """The coordinates of a joint that are angles or slides."""
+    return names[joint][: sum(kind != "spin" for kind in joints[joint])]
+
+
+def _check_coordinate(name: str | None, joint: str, known: Sequence[str], place: str) -> None:
+    if name is not None and name not in known:
+        hint = nearest(name, known) or f"; known: {', '.join(known) or 'none'}"
+        raise SceneError(f"{place}.coordinate: '{joint}' has no angle or slide '{name}'{hint}")

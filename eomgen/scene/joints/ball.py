@@ -1,0 +1,39 @@
+"""The ball joint, with a unit quaternion for its three angles."""
+
+from typing import ClassVar, Literal
+
+from eomgen.scene.joints.base import Coordinate, JointTable, Move
+
+
+class Ball(JointTable):
+    """The child turns freely about a point: world_R_child = world_R_parent E R(quaternion).
+
+    Its velocities are the child's angular velocity relative to the parent, in the child's axes.
+    """
+
+    spaces: ClassVar[tuple[int, ...]] = (3,)
+    type: Literal["ball"]
+
+    def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """A unit quaternion w, x, y, z."""
+        return quaternion(self.name, self.child, self.parent)
+
+    def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Three components of the angular velocity."""
+        return angular_velocity(self.name, self.child, self.parent)
+
+    def moves(self, dimensions: int) -> tuple[Move, ...]:
+        """One spin."""
+        return (Move("spin"),)
+
+
+def quaternion(prefix: str, child: str, parent: str) -> tuple[Coordinate, ...]:
+    """The four coordinates of an orientation."""
+    about = f"of the unit quaternion of {child} in {parent}"
+    return tuple(Coordinate(f"{prefix}_q{part}", "", f"{part} {about}") for part in "wxyz")
+
+
+def angular_velocity(prefix: str, child: str, parent: str) -> tuple[Coordinate, ...]:
+    """The three velocities that belong to an orientation."""
+    about = f"of the angular velocity of {child} against {parent}, axes of {child}"
+    return tuple(Coordinate(f"{prefix}_w{part}", "rad/s", f"{part} {about}") for part in "xyz")

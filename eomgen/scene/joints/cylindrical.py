@@ -1,0 +1,37 @@
+"""The cylindrical joint: a bolt in a sleeve."""
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from eomgen.language.base import Identifier
+from eomgen.language.quantity import Numbers
+from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Move, spatial
+
+
+class Cylindrical(JointTable):
+    """The child slides along `axis` and turns about it."""
+
+    spaces: ClassVar[tuple[int, ...]] = (3,)
+    type: Literal["cylindrical"]
+    axis: Numbers = Field(default=Z_AXIS, description="direction in the child's axes")
+    coordinates: tuple[Identifier, Identifier] | None = Field(
+        default=None, description="names of slide and angle; <name>_slide, <name>_angle if absent"
+    )
+
+    def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Slide and angle."""
+        slide, angle = self.coordinates or (f"{self.name}_slide", f"{self.name}_angle")
+        return (
+            Coordinate(slide, "m", f"way of {self.child} along {self.parent}"),
+            Coordinate(angle, "rad", f"angle of {self.child} from {self.parent}"),
+        )
+
+    def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Their rates."""
+        return tuple(c.rate for c in self.positions(dimensions))
+
+    def moves(self, dimensions: int) -> tuple[Move, ...]:
+        """A slide, then a turn, on one axis."""
+        axis = spatial(self.axis)
+        return (Move("slide", axis), Move("turn", axis))

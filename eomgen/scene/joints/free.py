@@ -1,0 +1,58 @@
+"""The free joint: a body that nothing holds."""
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from eomgen.language.base import Identifier, Table
+from eomgen.scene.joints.ball import angular_velocity, quaternion
+from eomgen.scene.joints.base import WORLD, Z_AXIS, Coordinate, Move
+
+PLANE, SPACE = 2, 3
+
+
+class Free(Table):
+    """A body free in the plane or in space.
+
+    In the plane x, y of its centre of mass and its angle, in world axes. In space x, y, z of its
+    centre of mass and the unit quaternion of world_R_body; its velocities are those of the centre
+    of mass in world axes, and its angular velocity in its own axes.
+    """
+
+    spaces: ClassVar[tuple[int, ...]] = (PLANE, SPACE)
+    type: Literal["free"]
+    name: Identifier
+    parent: Literal["world"] = "world"
+    child: Identifier = Field(description="body that moves freely")
+    coordinates: tuple[Identifier, Identifier, Identifier] | None = Field(
+        default=None,
+        description="names of x, y and angle, in space of x, y and z; <child>_x, … if absent",
+    )
+
+    def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """The joint's coordinates, in the order they take in `q`."""
+        last = "angle" if dimensions == PLANE else "z"
+        names = self.coordinates or (f"{self.child}_x", f"{self.child}_y", f"{self.child}_{last}")
+        axes = "xyz"[:dimensions]
+        place = tuple(
+            Coordinate(name, "m", f"{axis} of the centre of mass of {self.child}")
+            for name, axis in zip(names, axes, strict=False)
+        )
+        if dimensions == PLANE:
+            about = f"angle of {self.child} from the {WORLD}'s x axis"
+            return (*place, Coordinate(names[2], "rad", about))
+        return (*place, *quaternion(self.child, self.child, WORLD))
+
+    def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Rates of the coordinates; of a quaternion, the angular velocity."""
+        positions = self.positions(dimensions)
+        if dimensions == PLANE:
+            return tuple(c.rate for c in positions)
+        rates = tuple(c.rate for c in positions[:SPACE])
+        return (*rates, *angular_velocity(self.child, self.child, WORLD))
+
+    def moves(self, dimensions: int) -> tuple[Move, ...]:
+        """Slides along the world's axes, then a turn or a spin."""
+        axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), Z_AXIS)
+        slides = tuple(Move("slide", axis) for axis in axes[:dimensions])
+        return (*slides, Move("turn", Z_AXIS) if dimensions == PLANE else Move("spin"))

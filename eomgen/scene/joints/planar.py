@@ -1,0 +1,43 @@
+"""The planar joint: a body that slides and turns on a plane of its parent."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from eomgen.language.base import Identifier
+from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Move
+
+
+class Planar(JointTable):
+    """The child slides along x and y of the joint's axes, and turns about their z."""
+
+    type: Literal["planar"]
+    coordinates: tuple[Identifier, Identifier, Identifier] | None = Field(
+        default=None,
+        description="names of x, y and angle; <name>_x, <name>_y, <name>_angle if absent",
+    )
+
+    def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Two slides and an angle."""
+        x, y, angle = self.coordinates or (
+            f"{self.name}_x",
+            f"{self.name}_y",
+            f"{self.name}_angle",
+        )
+        return (
+            Coordinate(x, "m", f"way of {self.child} along x of {self.parent}"),
+            Coordinate(y, "m", f"way of {self.child} along y of {self.parent}"),
+            Coordinate(angle, "rad", f"angle of {self.child} from {self.parent}"),
+        )
+
+    def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Their rates."""
+        return tuple(c.rate for c in self.positions(dimensions))
+
+    def moves(self, dimensions: int) -> tuple[Move, ...]:
+        """Two slides, then a turn."""
+        return (
+            Move("slide", (1.0, 0.0, 0.0)),
+            Move("slide", (0.0, 1.0, 0.0)),
+            Move("turn", Z_AXIS),
+        )

@@ -1,0 +1,29 @@
+"""The sliding joint."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from eomgen.language.quantity import Numbers
+from eomgen.scene.joints.base import WORLD, Coordinate, Geared, Move, spatial
+
+
+class Prismatic(Geared):
+    """The child slides along `axis`, a direction of both bodies, and does not turn."""
+
+    type: Literal["prismatic"]
+    axis: Numbers = Field(description="direction in the child's axes")
+
+    def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """The way from the joint's point on the parent to that on the child."""
+        base = "the world" if self.parent == WORLD else self.parent
+        name = self.coordinate or f"{self.name}_slide"
+        return (Coordinate(name, "m", f"way of {self.child} along {base}"),)
+
+    def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Its rate."""
+        return tuple(c.rate for c in self.positions(dimensions))
+
+    def moves(self, dimensions: int) -> tuple[Move, ...]:
+        """One slide."""
+        return (Move("slide", spatial(self.axis)),)

@@ -1,0 +1,36 @@
+"""The rotational joint: a pin that two bodies share, or a body and the world."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from eomgen.language.quantity import Numbers
+from eomgen.scene.joints.base import WORLD, Z_AXIS, Coordinate, Geared, Move, spatial
+
+
+class Revolute(Geared):
+    """A pin: x_child = x_parent + r_parent - r_child (handout (21)).
+
+    `r_parent` runs from the parent's centre of mass (or the world's origin) to the pin in the
+    parent's axes, `r_child` from the child's centre of mass to the pin in the child's axes. In the
+    plane it turns about z.
+    """
+
+    type: Literal["revolute"]
+    axis: Numbers | None = Field(default=None, description="direction in space; z if absent")
+
+    def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """The child's angle relative to the parent."""
+        base = "the world's x axis" if self.parent == WORLD else self.parent
+        if dimensions == 3:
+            base = "the world" if self.parent == WORLD else self.parent
+        name = self.coordinate or f"{self.name}_angle"
+        return (Coordinate(name, "rad", f"angle of {self.child} from {base}"),)
+
+    def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Its rate."""
+        return tuple(c.rate for c in self.positions(dimensions))
+
+    def moves(self, dimensions: int) -> tuple[Move, ...]:
+        """One turn."""
+        return (Move("turn", spatial(self.axis or Z_AXIS)),)

@@ -1,0 +1,39 @@
+"""The universal joint: two pins that cross."""
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from eomgen.language.base import Identifier
+from eomgen.language.quantity import Numbers
+from eomgen.scene.joints.base import Coordinate, JointTable, Move, spatial
+
+
+class Universal(JointTable):
+    """The child turns about the first axis, and then about the second, which the first carries."""
+
+    spaces: ClassVar[tuple[int, ...]] = (3,)
+    type: Literal["universal"]
+    axes: tuple[Numbers, Numbers] = Field(
+        default=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+        description="two directions; in the joint's axes, and in those that the first turn leaves",
+    )
+    coordinates: tuple[Identifier, Identifier] | None = Field(
+        default=None, description="names of the angles; <name>_angle_1, <name>_angle_2 if absent"
+    )
+
+    def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Two angles."""
+        names = self.coordinates or (f"{self.name}_angle_1", f"{self.name}_angle_2")
+        return tuple(
+            Coordinate(name, "rad", f"{order} angle of {self.child} from {self.parent}")
+            for name, order in zip(names, ("first", "second"), strict=True)
+        )
+
+    def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
+        """Their rates."""
+        return tuple(c.rate for c in self.positions(dimensions))
+
+    def moves(self, dimensions: int) -> tuple[Move, ...]:
+        """Two turns."""
+        return tuple(Move("turn", spatial(axis)) for axis in self.axes)
