@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from eomgen.build import build_model, in_order, outputs_for
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.files import read_plain
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model, in_order, outputs_for
+from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
 from eomgen.results import Derivation, Module, Run
 from eomgen.run.module import GeneratedModule, as_powers, as_problem, load_module

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from eomgen.files import write_whole
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.problem import Floats
 from eomgen.run.trajectory import Outcome, Trajectory, save_csv, save_npz
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import platformdirs
 
 from eomgen.entries import Entries
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
 from eomgen.scene.look import Camera
 from eomgen.scene.schema import Simulation

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
 from eomgen.language.digits import MP, Digits, exact
 from eomgen.language.formula import names_in
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.program import from_recursion as recording
 from eomgen.program.digits import evaluator
 from eomgen.program.route import routed

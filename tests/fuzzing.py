@@ -15,8 +15,8 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
-from eomgen.build import build_model
 from eomgen.errors import SceneError
+from eomgen.model.elaborate import build_model
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene
 from eomgen.text import LONGEST_LINE
 

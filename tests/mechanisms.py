@@ -12,8 +12,8 @@ from engine import Engine
 from newton_euler import Mechanism, Motion, solve
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
 from eomgen.derivation.closed import Equations, derive
+from eomgen.model.elaborate import build_model
 from eomgen.program.from_equations import from_equations
 from eomgen.scene.reader import parse_scene, read_scene
 

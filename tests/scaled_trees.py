@@ -10,14 +10,14 @@ import numpy as np
 from engine import MP
 from spatial_trees import random_spatial_tree
 
-from eomgen.build import build_model
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.language.digits import Bits, out_of_bits, sixty_digits
 from eomgen.language.formula import Constant
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.program.program import interpret
 from eomgen.program.route import Routed, routed
 from eomgen.program.system import System

@@ -17,7 +17,7 @@ from effect_cases import BASES, CASES, TRIED, Case
 from engine import Engine
 
 from eomgen.backends.python import OWN
-from eomgen.build import build_model
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_scene
 from eomgen.scene.effects import Effect
 from eomgen.scene.reader import parse_scene

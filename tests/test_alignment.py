@@ -15,13 +15,13 @@ import pytest
 from aligned_trees import Case, case, exactly, names, nearby, scene
 from campaign import some
 
-from eomgen.build import build_model
 from eomgen.derivation.recursive.digits import Route, digits_lost
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import ArrayScalars, FloatScalars
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.language import exact
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate
 from eomgen.program.program import interpreter
 from eomgen.program.route import ENOUGH, FEWEST, routed

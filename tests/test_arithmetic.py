@@ -14,10 +14,10 @@ import pytest
 from engine import MP, Digits, apart, exact, read
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.language.formula import FUNCTIONS
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.program.digits import evaluator
 from eomgen.program.program import Output, Program, finish, interpret
 from eomgen.program.route import routed

@@ -9,10 +9,10 @@ from typing import Any, get_args
 
 import pytest
 
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.errors import SceneError
 from eomgen.language.formula import Formula
+from eomgen.model.elaborate import build_model
 from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import EffectTable
 from eomgen.scene.reader import parse_scene

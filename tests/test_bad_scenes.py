@@ -10,9 +10,9 @@ import pytest
 from mechanisms import load
 from newton_euler import Mechanism, solve
 
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.language.exact import direction
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_scene
 from eomgen.scene.reader import parse_scene
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eomgen.build import build_model
 from eomgen.cli import main
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_model, compile_scene
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene, read_scene

@@ -15,9 +15,9 @@ import pytest
 from accuracy_scenes import closed_end, text
 from mpmath import mp, mpf
 
-from eomgen.build import build_model
 from eomgen.cli import main
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.run.checks import allowed_errors
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import Floats, Problem

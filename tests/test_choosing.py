@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.build import build_model
 from eomgen.cli import main
+from eomgen.model.elaborate import build_model
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Contacts, Floats, Problem

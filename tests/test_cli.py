@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.files import remove_ours
+from eomgen.model.elaborate import build_model
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene
 from eomgen.store import generated_code
 

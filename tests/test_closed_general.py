@@ -15,7 +15,6 @@ from engine import MP
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
 import eomgen.derivation.general
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.derivation.general.constraints import about, hat, of_quaternion, state_joints
 from eomgen.derivation.general.derive import GeneralEquations, derive_general
@@ -25,7 +24,8 @@ from eomgen.derivation.general.tell import tell_general
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
 from eomgen.errors import SceneError
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.pipeline import compile_model
 from eomgen.program.digits import evaluator
 from eomgen.program.from_general import from_general

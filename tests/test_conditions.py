@@ -7,11 +7,11 @@ import pytest
 from campaign import some
 from engine import quick
 
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.errors import RunError, SceneError
 from eomgen.language.conditions import of_inertia
 from eomgen.language.formula import Constant
+from eomgen.model.elaborate import build_model
 from eomgen.run.module import as_problem
 from eomgen.scene.reader import parse_scene
 

@@ -21,11 +21,11 @@ from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.language.exact import Real
+from eomgen.model.elaborate import build_model
 from eomgen.outputs import OUTPUTS
 from eomgen.program.route import routed
 from eomgen.scene.effects.base import Contact, JointLoad, Load

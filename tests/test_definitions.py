@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from eomgen.build import build_model
 from eomgen.errors import SceneError
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_scene
 from eomgen.program.from_recursion import Recording
 from eomgen.run.module import load_module

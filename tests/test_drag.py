@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from spatial_newton_euler import solve
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
-from eomgen.build import build_model
 from eomgen.errors import SceneError
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene

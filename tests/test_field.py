@@ -7,8 +7,8 @@ from engine import Engine, apart, engine, quick
 from scipy.integrate import solve_ivp
 from spatial_trees import PLANE, SPACE
 
-from eomgen.build import build_model
 from eomgen.errors import SceneError
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate
 from eomgen.scene.reader import parse_scene, read_scene
 

@@ -12,8 +12,8 @@ import pytest
 from engine import MP, engine, quick
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
 from eomgen.language.formula import Constant, Floats, Formula, evaluate, parse
+from eomgen.model.elaborate import build_model
 from eomgen.program.route import routed
 from eomgen.program.tape import Tape
 from eomgen.run.integrate import integrate

@@ -5,8 +5,8 @@ import pytest
 from engine import engine, quick
 from scipy.integrate import solve_ivp
 
-from eomgen.build import build_model
 from eomgen.errors import SceneError
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_scene
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.errors import RunError
+from eomgen.model.elaborate import build_model
 from eomgen.program.route import routed
 from eomgen.run.guard import LOST, Guard, Watch
 from eomgen.run.integrate import integrate

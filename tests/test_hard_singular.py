@@ -10,10 +10,10 @@ import pytest
 from campaign import some
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
 from eomgen.derivation.recursive.regular import check_regular, resistances
 from eomgen.errors import SceneError
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.program.route import routed
 from eomgen.run.integrate import integrate
 from eomgen.run.limits import locks

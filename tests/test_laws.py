@@ -18,9 +18,9 @@ from campaign import some
 from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
-from eomgen.build import build_model
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.language.formula import Floats, Formula, evaluate
+from eomgen.model.elaborate import build_model
 from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, Program, cost, finish, live_steps
 from eomgen.program.route import routed

@@ -14,10 +14,10 @@ from spatial_trees import PLANE, SPACE, random_spatial_tree
 from test_show_space import page_parts
 
 from eomgen.backends.javascript import javascript_poses
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import SceneError
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.errors import RunError
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module

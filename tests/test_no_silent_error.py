@@ -15,7 +15,7 @@ from scaled_trees import apart, drawn, dynamics, found, size_of, state, truth
 
 from eomgen.errors import SceneError
 from eomgen.language.digits import Bits, sixty_digits
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.program.route import Routed, routed
 
 BOUND, TIMES = 1e-10, 1e3

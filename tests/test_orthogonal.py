@@ -17,14 +17,14 @@ import pytest
 from campaign import some
 from engine import MP, Digits, apart, engine
 
-from eomgen.build import build_model
 from eomgen.derivation.recursive.digits import Route, digits_lost
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.impulses import response
 from eomgen.derivation.recursive.numbers import ArrayScalars, FloatScalars
 from eomgen.language.digits import Bits, out_of_bits, sixty_digits
 from eomgen.language.formula import Constant
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.program import Output, cost, finish, interpret
 from eomgen.program.route import recorded, routed

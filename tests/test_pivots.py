@@ -11,8 +11,8 @@ from campaign import some
 from mechanisms import BUILT_IN, SEEDS, TOLD, Scene, compiled, random_tree
 from newton_euler import Mechanism, solve
 
-from eomgen.build import build_model
 from eomgen.derivation.closed import Equations, derive
+from eomgen.model.elaborate import build_model
 from eomgen.scene.reader import parse_scene
 
 POSITIVE, NONNEGATIVE = "positive", "nonnegative"

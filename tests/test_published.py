@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipj
 
-from eomgen.build import build_model
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_model, compile_scene
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module

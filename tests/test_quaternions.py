@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.build import build_model
 from eomgen.errors import RunError
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, Adaptive

@@ -14,9 +14,9 @@ from engine import MP, engine, varied
 from gmpy2 import mpfr
 from mpmath import mp
 
-from eomgen.build import build_model
 from eomgen.errors import RunError
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.run.module import as_problem, load_module
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.store import generated_code

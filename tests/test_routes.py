@@ -20,12 +20,12 @@ from mechanisms import compiled, random_tree
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
-from eomgen.build import build_model
 from eomgen.derivation.recursive import observe
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.reactions import reactions
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.scene.reader import parse_scene
 
 SEEDS = range(some(75, 150))

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eomgen.build import build_model
 from eomgen.cli import main
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module

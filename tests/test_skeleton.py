@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from eomgen.build import build_model
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.scene.look import Box, Rod, Sphere
 from eomgen.scene.reader import parse_scene
 from eomgen.show.skeleton import shapes_of

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.errors import RunError, SceneError, nearest
+from eomgen.model.elaborate import build_model
 from eomgen.outputs import OUTPUTS
 from eomgen.program.program import cost
 from eomgen.program.route import routed

@@ -18,10 +18,10 @@ from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.errors import SceneError
+from eomgen.model.elaborate import build_model
 from eomgen.outputs import OUTPUTS
 from eomgen.program.route import routed
 from eomgen.scene.effects.vectors import NEAREST

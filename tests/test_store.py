@@ -17,10 +17,10 @@ from campaign import some
 
 import eomgen.entries
 from eomgen import store
-from eomgen.build import build_model
 from eomgen.cli import main
 from eomgen.entries import LARGEST, LONGEST_UNUSED, LONGEST_WRITING, Entries
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.pipeline import generate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import BUILT_IN, parse_scene, read_scene

@@ -18,8 +18,8 @@ from test_show import ARM, POSES, panel, swinging
 from test_show_space import HEIGHT, sliding
 from test_show_space import POSES as POSES_IN_SPACE
 
-from eomgen.build import build_model
 from eomgen.cli import main
+from eomgen.model.elaborate import build_model
 from eomgen.scene.reader import parse_scene
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.figure import draw_motion

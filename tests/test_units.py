@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from eomgen.build import build_model
 from eomgen.errors import SceneError
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.scene.json_schema import json_schema
 from eomgen.scene.reader import parse_scene
 

@@ -14,10 +14,10 @@ from engine import MP, read
 from gmpy2 import mpfr
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model, in_order
 from eomgen.cli import main
 from eomgen.errors import RunError
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model, in_order
+from eomgen.model.model import Model
 from eomgen.program.route import routed
 from eomgen.run.module import load_module
 from eomgen.scene.reader import find_scene, parse_scene

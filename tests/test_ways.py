@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from engine import MP, Engine, along, apart, exact, quick
 
-from eomgen.build import build_model
 from eomgen.errors import SceneError
+from eomgen.model.elaborate import build_model
 from eomgen.scene.reader import parse_scene
 
 BODY = """

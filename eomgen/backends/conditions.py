@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from eomgen.errors import listed
 from eomgen.language.conditions import Condition, is_of_size
 from eomgen.language.formula import evaluate, names_in
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.program.printing import Dialect, Names, print_block
 from eomgen.program.program import finish
 from eomgen.program.scalars import TapeScalars

@@ -11,7 +11,7 @@ from typing import Any
 from eomgen.backends.conditions import refusals
 from eomgen.language.base import LARGEST
 from eomgen.language.formula import FUNCTIONS, written
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.outputs import DERIVATIVES, JACOBIAN, OUTPUTS
 from eomgen.program.printing import Block, Dialect, Names, print_block
 from eomgen.program.program import Program, cost, live_steps

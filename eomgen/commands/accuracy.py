@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.build import in_order
 from eomgen.commands.arithmetic import check_arithmetic, print_arithmetic
 from eomgen.commands.shared import Arguments, assignments, code_of, located, note, read_model
 from eomgen.entries import Entries
 from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable
-from eomgen.model import Model
+from eomgen.model.elaborate import in_order
+from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_line, terminal_notice, terminal_progress
 from eomgen.scene.schema import SHOWN

@@ -9,7 +9,7 @@ import numpy as np
 from eomgen.commands.shared import Arguments, assignments, located, print_wrapped
 from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.progress import terminal_progress
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from eomgen.commands.shared import (
 )
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.language.formula import written
-from eomgen.model import Body, Model
+from eomgen.model.model import Body, Model
 from eomgen.scene.joints.base import WORLD, Geared
 from eomgen.scene.reader import built_in_names, read_scene
 

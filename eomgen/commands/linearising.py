@@ -19,7 +19,7 @@ from eomgen.commands.shared import (
 )
 from eomgen.errors import RunError
 from eomgen.files import check_writable
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import find_scene

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eomgen.api import setting_of
-from eomgen.build import in_order
 from eomgen.commands.choosing import (
     check_choice,
     choose,
@@ -28,7 +27,8 @@ from eomgen.commands.shared import (
 )
 from eomgen.errors import InterruptedRunError, RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
-from eomgen.model import Model, ways_of
+from eomgen.model.elaborate import in_order
+from eomgen.model.model import Model, ways_of
 from eomgen.run.limits import excursions, locks
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_progress

@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Literal
 
-from eomgen.build import build_model, outputs_for
 from eomgen.derivation.recursive.finite import initial_overlaps
 from eomgen.errors import EomgenError, RunError, SceneError, nearest
-from eomgen.model import Model, ways_of
+from eomgen.model.elaborate import build_model, outputs_for
+from eomgen.model.model import Model, ways_of
 from eomgen.outputs import OUTPUTS
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import terminal_notice

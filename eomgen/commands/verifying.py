@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from eomgen.commands.shared import Arguments, located, read_model
 from eomgen.errors import RunError
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.module import load_module
 from eomgen.run.progress import terminal_progress
 from eomgen.store import generated_code

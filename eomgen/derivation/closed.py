@@ -18,7 +18,7 @@ from eomgen.derivation.solution import Definition, Solution, gathered, solve
 from eomgen.derivation.supported import why_not_pins
 from eomgen.derivation.symbols import Expr, Symbols, make_symbols, over_bodies
 from eomgen.errors import SceneError
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.joints import Free
 
 

@@ -18,7 +18,7 @@ from eomgen.derivation.symbols import (
     scale,
     tidy,
 )
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.joints import Free
 
 

@@ -8,7 +8,7 @@ import sympy as sp
 from eomgen.derivation.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, cross, rotate, scale
 from eomgen.language.formula import Formula
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load, Unmoved
 from eomgen.scene.joints import Free
 

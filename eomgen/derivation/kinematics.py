@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, rotate, scale
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.joints import Revolute
 
 

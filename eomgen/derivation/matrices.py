@@ -14,7 +14,7 @@ from eomgen.derivation.supported import MOST_TOLD, why_not_pins
 from eomgen.derivation.symbols import Expr
 from eomgen.errors import SceneError
 from eomgen.language.formula import Formula, written
-from eomgen.model import Model
+from eomgen.model.model import Model
 
 
 @dataclass(frozen=True)

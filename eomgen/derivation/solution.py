@@ -21,7 +21,7 @@ import sympy as sp
 from eomgen.derivation.elimination import Tree, trees
 from eomgen.derivation.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, over_bodies, scale, tidy
-from eomgen.model import Model
+from eomgen.model.model import Model
 
 Definition = tuple[Expr, Expr]
 """A symbol and what it stands for, in terms of symbols defined before it."""

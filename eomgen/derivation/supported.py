@@ -1,7 +1,7 @@
 """Which models the closed form is for, and which of its two derivations."""
 
 from eomgen.language.formula import ZERO
-from eomgen.model import Model, off_centre
+from eomgen.model.model import Model, off_centre
 from eomgen.scene.joints import Free, Revolute
 
 MOST_BODIES = 12

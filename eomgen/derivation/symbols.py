@@ -7,7 +7,7 @@ from typing import Any
 import sympy as sp
 
 from eomgen.language.formula import Formula, Name, calls_function, evaluate
-from eomgen.model import Model
+from eomgen.model.model import Model
 
 Expr = Any
 """A SymPy expression (SymPy carries no types)."""

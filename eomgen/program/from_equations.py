@@ -10,7 +10,7 @@ from eomgen.derivation.forms import state_form
 from eomgen.derivation.free_bodies import SymbolicMechanism
 from eomgen.derivation.symbols import Vec, rotate
 from eomgen.language.formula import evaluate
-from eomgen.model import Point, is_zero, off_centre
+from eomgen.model.model import Point, is_zero, off_centre
 from eomgen.outputs import OUTPUTS
 from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from eomgen.derivation.general.derive import GeneralEquations
-from eomgen.derivation.states import velocity_states
 from eomgen.language.formula import evaluate
+from eomgen.model.states import velocity_states
 from eomgen.outputs import DERIVATIVES
 from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.from_recursion import (

@@ -10,8 +10,8 @@ from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.reactions import reactions
 from eomgen.derivation.recursive.sensitivity import sensitivity
 from eomgen.derivation.recursive.vectors import Vec, in_space, sub, zeros
-from eomgen.derivation.states import velocity_states
-from eomgen.model import Model, is_zero
+from eomgen.model.model import Model, is_zero
+from eomgen.model.states import velocity_states
 from eomgen.outputs import DERIVATIVES
 from eomgen.program.contacts import Forward, contact_labels, contact_outputs
 from eomgen.program.differentiate import jacobian, substituted, tangent

@@ -10,7 +10,7 @@ from eomgen.derivation.recursive.moving import Values
 from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.errors import SceneError
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.passes import optimise
 from eomgen.program.program import Output, Program, cost, finish, interpreter

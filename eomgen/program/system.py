@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from eomgen.derivation.states import State
-from eomgen.model import Model
+from eomgen.model.model import Model
+from eomgen.model.states import State
 from eomgen.outputs import shape_of
 from eomgen.program.passes import PassReport, optimise_and_report
 from eomgen.program.program import Check, Output, Program, finish

@@ -6,7 +6,7 @@ import numpy as np
 
 from eomgen.derivation.recursive.finite import effect_sizes, is_singular, values_at
 from eomgen.derivation.recursive.regular import resistances, why_unresisted
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.problem import Explain, Floats
 
 GROWN = 1e9

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eomgen.derivation.recursive.regular import resistances, why_unresisted
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.trajectory import Trajectory
 
 NEAR = 1e-4

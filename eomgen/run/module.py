@@ -10,7 +10,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.explain import explain_by
 from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise

@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from eomgen.model import Model
+from eomgen.model.model import Model
 
 UNITS = "units of parameters"
 START = "initial state"

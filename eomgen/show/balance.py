@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from eomgen.language.formula import Formula
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.effects import Effect
 from eomgen.scene.effects.attraction import PointGravity
 from eomgen.scene.effects.contact import BodyContact

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.language.formula import Formula
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.joints.base import WORLD

@@ -4,7 +4,7 @@ import math
 from statistics import median
 
 from eomgen.language.formula import Formula
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.look import Box, Rod, Shape

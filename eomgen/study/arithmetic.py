@@ -16,7 +16,7 @@ import numpy as np
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import RunError
 from eomgen.language.digits import DIGITS
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.program.route import routed
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress

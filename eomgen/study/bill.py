@@ -11,9 +11,9 @@ from math import inf
 from typing import get_args
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
 from eomgen.derivation.recursive.regular import check_regular
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.program.route import routed, why_not_compared
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.problem import Floats
 from eomgen.study.drift import RTOL, Drift
 from eomgen.study.judging import Judged

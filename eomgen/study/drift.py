@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError
 from eomgen.run.module import GeneratedModule, as_powers, as_problem

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
 from eomgen.scene.effects import Gravity

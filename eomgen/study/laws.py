@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.scene.effects import Driven
 from eomgen.scene.effects.base import JointLoad

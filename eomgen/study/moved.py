@@ -13,7 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Problem
 from eomgen.study.precise import constants_of, digits

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule, as_problem

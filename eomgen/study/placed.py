@@ -12,7 +12,7 @@ from gmpy2 import mpfr
 
 from eomgen.language.digits import Bits
 from eomgen.language.formula import Formula, evaluate
-from eomgen.model import Model, Seat, ways_of
+from eomgen.model.model import Model, Seat, ways_of
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD, Move

@@ -20,7 +20,7 @@ import numpy as np
 from eomgen.entries import Entries
 from eomgen.errors import RunError
 from eomgen.files import write_whole
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS

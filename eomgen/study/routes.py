@@ -5,7 +5,7 @@ from typing import get_args
 
 from eomgen.backends.python import python_module
 from eomgen.errors import EomgenError
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.program.route import routed, why_not_compared
 from eomgen.program.system import System
 from eomgen.run.module import GeneratedModule, load_module

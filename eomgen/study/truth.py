@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from eomgen.derivation.recursive.dynamics import Dynamics
 from eomgen.derivation.recursive.finite import values_at
-from eomgen.derivation.states import velocity_states
 from eomgen.language.digits import MP, Bits, Digits, exact
-from eomgen.model import Model
+from eomgen.model.model import Model
+from eomgen.model.states import velocity_states
 from eomgen.program.digits import evaluator
 from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, finish, interpreter

@@ -4,11 +4,11 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from eomgen.build import build_model
 from eomgen.language.base import Table
 from eomgen.language.formula import Apply, Constant, Floats, Name, names_in
 from eomgen.language.slopes import with_rates
-from eomgen.model import Model
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.schema import Scene
 

@@ -9,10 +9,10 @@ from typing import get_args
 
 import numpy as np
 
-from eomgen.build import in_order
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import RunError
-from eomgen.model import Model
+from eomgen.model.elaborate import in_order
+from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress

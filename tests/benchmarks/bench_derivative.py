@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from eomgen.build import build_model
 from eomgen.derivation.closed import derive
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_model
 from eomgen.run.module import load_module
 from eomgen.scene.reader import read_scene

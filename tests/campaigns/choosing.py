@@ -27,8 +27,8 @@ sys.path.append(str(Path(__file__).parent.parent))
 
 from accuracy_scenes import SCENES, closed_end, text
 
-from eomgen.build import build_model
 from eomgen.errors import RunError
+from eomgen.model.elaborate import build_model
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene, read_scene

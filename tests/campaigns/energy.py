@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from eomgen.build import build_model
+from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module

@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 from spatial_trees import ORIGIN, PLANE, SPACE, SpatialTree, TreeBody, TreeJoint
 
 from eomgen.backends.python import python_module
-from eomgen.build import build_model
+from eomgen.model.elaborate import build_model
 from eomgen.program.route import routed
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene

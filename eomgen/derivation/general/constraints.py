@@ -16,7 +16,7 @@ import sympy as sp
 from eomgen.derivation.general.symbols import Ledger, Symbols, rate, real, triple
 from eomgen.derivation.symbols import Expr
 from eomgen.language.exact import direction, orientation, quarters, radians
-from eomgen.model import Body, Model
+from eomgen.model.model import Body, Model
 from eomgen.scene.joints import Free, Joint
 from eomgen.scene.joints.base import Move
 

@@ -18,7 +18,7 @@ from eomgen.derivation.general.solution import Solution, solve
 from eomgen.derivation.general.symbols import Ledger, Symbols, make_symbols
 from eomgen.derivation.supported import FEW_VELOCITIES, why_not_closed
 from eomgen.errors import SceneError
-from eomgen.model import Model
+from eomgen.model.model import Model
 
 WRITTEN, NAMED = (20, 160), (6, 40)
 """`inline` and `longest` of a `Ledger` for few velocities and for many."""

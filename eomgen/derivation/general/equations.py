@@ -14,7 +14,7 @@ from eomgen.derivation.general.simplify import gathered
 from eomgen.derivation.general.symbols import Ledger, Symbols
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Formula
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load, Unmoved
 from eomgen.scene.joints.base import Geared
 

@@ -32,7 +32,7 @@ from eomgen.derivation.general.simplify import nested, sum_of_squares
 from eomgen.derivation.general.symbols import Ledger, Symbols
 from eomgen.derivation.solution import is_sum_of_positive_terms
 from eomgen.derivation.symbols import Expr
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.joints import Free
 
 

@@ -7,7 +7,7 @@ import math
 import random
 from dataclasses import replace
 
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.effects import Effect, Gravity
 from eomgen.scene.joints import Free, Joint
 

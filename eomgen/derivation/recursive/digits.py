@@ -20,7 +20,7 @@ from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.linkage import make_linkage
 from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.language.digits import Bits, out_of_bits, sixty_digits
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.effects import Driven, Gravity
 
 Array = NDArray[np.float64]

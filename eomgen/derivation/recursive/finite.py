@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.numbers import FloatScalars
-from eomgen.model import Model
+from eomgen.model.model import Model
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import JointLoad
 

@@ -38,7 +38,7 @@ from eomgen.derivation.recursive.vectors import (
 from eomgen.language import exact
 from eomgen.language.exact import EYE, ZERO, Matrix, Real
 from eomgen.language.formula import Formula, evaluate
-from eomgen.model import Body, Model
+from eomgen.model.model import Body, Model
 from eomgen.scene.effects import Gravity
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import Geared, Move

@@ -19,7 +19,7 @@ from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, in_space, 
 from eomgen.language.exact import Real
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.slopes import with_rates
-from eomgen.model import Model, Seat, ways_of
+from eomgen.model.model import Model, Seat, ways_of
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD

@@ -25,7 +25,7 @@ from eomgen.derivation.recursive.vectors import Mat, Scalars
 from eomgen.errors import SceneError
 from eomgen.language.exact import exactly
 from eomgen.language.formula import Constant, Formula
-from eomgen.model import Body, Model
+from eomgen.model.model import Body, Model
 from eomgen.scene.joints.base import Geared
 
 Array = npt.NDArray[np.float64]

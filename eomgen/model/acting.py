@@ -8,9 +8,9 @@ from eomgen.errors import SceneError
 from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, about_slides, of_joint, with_components
-from eomgen.model import Body, ways_of
-from eomgen.naming import check_known, check_names, named
-from eomgen.prescribed import check_drive
+from eomgen.model.model import Body, ways_of
+from eomgen.model.names import check_known, check_names, named
+from eomgen.model.prescribed import check_drive
 from eomgen.scene.effects import Driven, Effect, Gravity
 from eomgen.scene.effects.base import ExtraState, Input
 from eomgen.scene.joints import Prismatic, Revolute

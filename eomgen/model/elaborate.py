@@ -4,23 +4,23 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from eomgen.acting import acting_effects, at_joint, check_contacts, sliding_in
 from eomgen.errors import SceneError
 from eomgen.language.conditions import Condition, of_inertia, require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, with_components
-from eomgen.model import Body, Model, Point
-from eomgen.naming import check_known, check_names, named
+from eomgen.model.acting import acting_effects, at_joint, check_contacts, sliding_in
+from eomgen.model.chains import written_out
+from eomgen.model.definitions import with_definitions
+from eomgen.model.geometry import entries_of_inertia, straightened_joint, unit_quaternions
+from eomgen.model.model import Body, Model, Point
+from eomgen.model.names import check_known, check_names, named
+from eomgen.model.prescribed import initial_values, locked_values
 from eomgen.outputs import OUTPUTS
-from eomgen.prescribed import initial_values, locked_values
-from eomgen.scene.chains import written_out
-from eomgen.scene.definitions import with_definitions
 from eomgen.scene.effects import Effect
 from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.look import check_look
 from eomgen.scene.schema import Scene
-from eomgen.straighten import entries_of_inertia, straightened_joint, unit_quaternions
 
 
 def build_model(scene: Scene) -> Model:

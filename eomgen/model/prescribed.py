@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from eomgen.errors import SceneError, listed, nearest
 from eomgen.language.formula import Floats, names_in
 from eomgen.language.slopes import with_rates
-from eomgen.model import Body, Prescribed
+from eomgen.model.model import Body, Prescribed
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.joints.base import Coordinate
 

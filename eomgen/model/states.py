@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from eomgen.model import Model
+from eomgen.model.model import Model
 
 
 @dataclass(frozen=True)
