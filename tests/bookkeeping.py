@@ -8,10 +8,10 @@ from engine import MP, STEP, Engine, along, exact, read
 
 from eomgen.backends.python import python_module
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.model.elaborate import build_model
 from eomgen.program.route import routed
 from eomgen.run.module import load_module
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.schema import Scene
 
 ENERGIES = ("kinetic_energy", "potential_energy", "effect_powers")

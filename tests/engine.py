@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from eomgen.backends.python import python_module
-from eomgen.language.digits import MP, Digits, exact
 from eomgen.language.formula import names_in
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
@@ -19,6 +18,7 @@ from eomgen.program.route import routed
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.run.module import load_module
+from eomgen.scalars.extended import MP, Digits, exact
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Scene
 from eomgen.study.states import random_state

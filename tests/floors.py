@@ -16,6 +16,7 @@ FLOORS = (
     "streams",
     "files",
     "entries",
+    "scalars",
     "language",
     "scene.joints",
     "scene.effects",

@@ -11,10 +11,8 @@ from engine import MP
 from spatial_trees import random_spatial_tree
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import SceneError
-from eomgen.language.digits import Bits, out_of_bits, sixty_digits
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
@@ -22,6 +20,8 @@ from eomgen.program.program import interpret
 from eomgen.program.route import Routed, routed
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
+from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import parse_scene
 
 SPECIAL = (0.0, np.pi / 2, -np.pi / 2, np.pi, np.pi / 4)

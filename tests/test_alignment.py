@@ -17,16 +17,16 @@ from campaign import some
 
 from eomgen.derivation.recursive.digits import Route, digits_lost
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import ArrayScalars, FloatScalars
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import SceneError
-from eomgen.language import exact
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate
 from eomgen.program.program import interpreter
 from eomgen.program.route import ENOUGH, FEWEST, routed
 from eomgen.program.tape import TIME
 from eomgen.run.module import GeneratedModule, load_module
+from eomgen.scalars import exact
+from eomgen.scalars.floats import ArrayScalars, FloatScalars
 from eomgen.scene.reader import find_scene, parse_scene
 from eomgen.study.longs import doubles, long_digits
 from eomgen.study.truth import Truth

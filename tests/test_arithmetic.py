@@ -15,7 +15,6 @@ from engine import MP, Digits, apart, exact, read
 
 from eomgen.backends.python import python_module
 from eomgen.cli import main
-from eomgen.language.formula import FUNCTIONS
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.program.digits import evaluator
@@ -24,6 +23,7 @@ from eomgen.program.route import routed
 from eomgen.program.system import System
 from eomgen.program.tape import TIME, ExactTape, Stage, Tape
 from eomgen.run.module import load_module
+from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.schema import Route
 from eomgen.study import timing
 from eomgen.study import visited as visiting

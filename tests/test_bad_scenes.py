@@ -11,9 +11,9 @@ from mechanisms import load
 from newton_euler import Mechanism, solve
 
 from eomgen.cli import main
-from eomgen.language.exact import direction
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_scene
+from eomgen.scalars.exact import direction
 from eomgen.scene.reader import parse_scene
 
 GOOD = """\

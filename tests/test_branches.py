@@ -14,7 +14,6 @@ import pytest
 from campaign import FULL, some
 
 from eomgen.cli import main
-from eomgen.language.formula import BY_MATH, FUNCTIONS
 from eomgen.pipeline import compile_scene
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, Adaptive
@@ -22,6 +21,7 @@ from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
 from eomgen.run.schedule import Schedule
+from eomgen.scalars.functions import BY_MATH, FUNCTIONS
 from eomgen.scene.reader import parse_scene
 
 ADAPTIVE = [

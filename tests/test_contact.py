@@ -24,10 +24,10 @@ from eomgen.backends.python import python_module
 from eomgen.cli import main
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
-from eomgen.language.exact import Real
 from eomgen.model.elaborate import build_model
 from eomgen.outputs import OUTPUTS
 from eomgen.program.route import routed
+from eomgen.scalars.exact import Real
 from eomgen.scene.effects.base import Contact, JointLoad, Load
 from eomgen.scene.effects.vectors import NEAREST
 from eomgen.scene.reader import parse_scene

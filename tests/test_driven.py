@@ -18,11 +18,12 @@ from spatial_newton_euler import solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.reactions import reactions
-from eomgen.language.formula import FUNCTIONS, parse
-from eomgen.language.slopes import with_rates
+from eomgen.language.formula import parse
+from eomgen.language.rates import with_rates
 from eomgen.model.elaborate import build_model
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.reader import parse_scene
 
 ROUNDING = 1e-11

@@ -13,11 +13,8 @@ from eomgen.backends.javascript import DIALECT
 from eomgen.errors import SceneError
 from eomgen.language import formula as reader
 from eomgen.language.formula import (
-    BY_MATH,
-    FUNCTIONS,
     Apply,
     Constant,
-    Floats,
     Formula,
     FormulaError,
     Name,
@@ -27,6 +24,8 @@ from eomgen.language.formula import (
     written,
 )
 from eomgen.pipeline import compile_scene
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scalars.functions import BY_MATH, FUNCTIONS
 from eomgen.scene.reader import parse_scene
 
 NO = "has {!r} at column {}, which no formula may hold"
@@ -205,7 +204,7 @@ def _grown(rng: random.Random, depth: int) -> str:
 def as_python(formula: Formula, names: dict[str, float]) -> float | str:
     """The value, or the kind of error that there is none."""
     try:
-        return float(evaluate(formula, names, Floats()))
+        return float(evaluate(formula, names, FloatScalars()))
     except (ArithmeticError, ValueError) as error:
         return type(error).__name__
 
@@ -314,7 +313,7 @@ def test_the_longest_formulas_stay_small(formula: str) -> None:
     assert time.process_time() - start < 60.0
     assert module.COST["derivative"]["total"] <= 16 * len(formula)
     y = np.array([0.4, 0.0])
-    wanted = evaluate(parse(formula), {"x": 0.4, "a": 2.0}, Floats())
+    wanted = evaluate(parse(formula), {"x": 0.4, "a": 2.0}, FloatScalars())
     assert module.derivative(0.0, y)[1] == pytest.approx(wanted, rel=1e-12)
     assert np.isfinite(module.jacobian(0.0, y)).all()
 

@@ -12,12 +12,13 @@ import pytest
 from engine import MP, engine, quick
 
 from eomgen.backends.python import python_module
-from eomgen.language.formula import Constant, Floats, Formula, evaluate, parse
+from eomgen.language.formula import Constant, Formula, evaluate, parse
 from eomgen.model.elaborate import build_model
 from eomgen.program.route import routed
 from eomgen.program.tape import Tape
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import parse_scene
 
 TURNED = """
@@ -67,7 +68,7 @@ def test_zeros_of_a_scene_have_no_sign(route: str) -> None:
         assert math.copysign(1.0, model.defaults["a"]) == 1.0
         module = load_module(python_module(routed(model, jacobian=False).system))
         assert module.derivative(0.0, STILL)[1] == 0.0
-    assert evaluate(parse("atan2(b, -0.0)"), {"b": 0.0}, Floats()) == 0.0
+    assert evaluate(parse("atan2(b, -0.0)"), {"b": 0.0}, FloatScalars()) == 0.0
 
 
 def test_constants_of_a_tape_and_of_formulas_are_floats() -> None:

@@ -9,11 +9,11 @@ from campaign import some
 from eomgen.backends.python import python_module
 from eomgen.derivation.recursive.dynamics import Dynamics
 from eomgen.derivation.recursive.finite import values_at
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.program.route import routed
 from eomgen.run.module import load_module
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import BUILT_IN, parse_scene
 from eomgen.study.truth import Truth
 

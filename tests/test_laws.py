@@ -19,12 +19,13 @@ from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.language.formula import Floats, Formula, evaluate
+from eomgen.language.formula import Formula, evaluate
 from eomgen.model.elaborate import build_model
 from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, Program, cost, finish, live_steps
 from eomgen.program.route import routed
 from eomgen.program.tape import TIME, Stage
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import ExternalForce, Gravity, Motor
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints import Free
@@ -134,7 +135,7 @@ class Moment:
 
     def value(self, formula: Formula) -> Any:
         """A quantity, as doubles have it; a formula of time now."""
-        return MP.mpf(evaluate(formula, {**self.model.defaults, TIME: self.t}, Floats()))
+        return MP.mpf(evaluate(formula, {**self.model.defaults, TIME: self.t}, FloatScalars()))
 
     def vector(self, parts: tuple[Formula, ...]) -> np.ndarray:
         """A vector of the scene."""

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from scaled_trees import apart, drawn, dynamics, found, size_of, state, truth
 
 from eomgen.errors import SceneError
-from eomgen.language.digits import Bits, sixty_digits
 from eomgen.model.model import Model
 from eomgen.program.route import Routed, routed
+from eomgen.scalars.extended import Bits, sixty_digits
 
 BOUND, TIMES = 1e-10, 1e3
 """Of v̇ relative to its largest component, or that of ω v; and of what half a unit in the last place

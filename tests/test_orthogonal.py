@@ -20,14 +20,14 @@ from engine import MP, Digits, apart, engine
 from eomgen.derivation.recursive.digits import Route, digits_lost
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.impulses import response
-from eomgen.derivation.recursive.numbers import ArrayScalars, FloatScalars
-from eomgen.language.digits import Bits, out_of_bits, sixty_digits
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.program import Output, cost, finish, interpret
 from eomgen.program.route import recorded, routed
+from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
+from eomgen.scalars.floats import ArrayScalars, FloatScalars
 from eomgen.scene.reader import find_scene, parse_scene
 
 PLANE, SPACE = 2, 3

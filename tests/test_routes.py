@@ -22,10 +22,10 @@ from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random
 
 from eomgen.derivation.recursive import observe
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.reactions import reactions
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import parse_scene
 
 SEEDS = range(some(75, 150))

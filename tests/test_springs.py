@@ -19,11 +19,11 @@ from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random
 
 from eomgen.backends.python import python_module
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.outputs import OUTPUTS
 from eomgen.program.route import routed
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.vectors import NEAREST
 from eomgen.scene.reader import parse_scene
 

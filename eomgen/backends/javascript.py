@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from eomgen.language.formula import FUNCTIONS
 from eomgen.program.printing import Dialect, Names, print_block
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
+from eomgen.scalars.functions import FUNCTIONS
 from eomgen.templating import render
 
 RESERVED = frozenset(

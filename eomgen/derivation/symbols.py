@@ -8,20 +8,21 @@ import sympy as sp
 
 from eomgen.language.formula import Formula, Name, calls_function, evaluate
 from eomgen.model.model import Model
+from eomgen.scalars.protocol import Scalars
 
 Expr = Any
 """A SymPy expression (SymPy carries no types)."""
 Vec = tuple[Expr, Expr]
 
 
-class SympyScalars:
+class SympyScalars(Scalars):
     """SymPy expressions as scalars for formulas; decimals stay exact."""
 
     def number(self, value: float) -> Expr:
         """The exact rational that the scene's decimal says."""
         return sp.Rational(repr(value))
 
-    def call(self, function: str, argument: Expr) -> Expr:
+    def call(self, function: str, *arguments: Expr) -> Expr:
         """No function is ever called: such a formula is one symbol, see `_quantity`."""
         raise AssertionError(function)
 

@@ -11,13 +11,13 @@ from eomgen.language.formula import (
     ZERO,
     Apply,
     Constant,
-    Floats,
     Formula,
     Name,
     evaluate,
     names_in,
     written,
 )
+from eomgen.scalars.floats import FloatScalars
 
 ROUNDING = 1e-9
 """How far numbers of a scene may be from what they should be, for having been rounded."""
@@ -65,7 +65,7 @@ def require(conditions: Iterable[Condition], known: Mapping[str, float]) -> None
 def value_of(formula: Formula, known: Mapping[str, float]) -> float:
     """The value of a formula, nan where it has none."""
     try:
-        return float(evaluate(formula, known, Floats()))
+        return float(evaluate(formula, known, FloatScalars()))
     except (ArithmeticError, ValueError):
         return math.nan
 

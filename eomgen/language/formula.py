@@ -11,27 +11,15 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn
 
 from eomgen.errors import nearest
+from eomgen.scalars.functions import FUNCTIONS
+from eomgen.scalars.protocol import Scalars
 
 LONGEST_TEXT = 500
 DEEPEST = 150
 LARGEST_POWER = 16
-FUNCTIONS = {
-    **dict.fromkeys(("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh"), 1),
-    **dict.fromkeys(("sqrt", "abs", "step"), 1),
-    **dict.fromkeys(("atan2", "min", "max"), 2),
-    "select": 3,
-}
-"""Functions of a formula, with how many arguments each takes.
-
-`step(x)` is 1 where x > 0 and else 0; `select(c, a, b)` is a where c > 0 and else b, which is also
-what comparisons and `a if x < y else b` become. Both a and b are computed, so both must have a
-value: write sqrt(max(x, 0)), not sqrt(x) if x > 0 else 0.
-"""
-CORNERS = ("abs", "max", "min", "select", "step")
-"""Functions that have a corner or a jump: they go on by another branch where one is reached."""
 CONSTANTS = {"pi": math.pi}
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+",
@@ -82,38 +70,6 @@ class Apply:
 
 Formula = Constant | Name | Apply
 ZERO = Constant(0.0)
-
-
-class Scalars(Protocol):
-    """What a formula needs of the scalars it is evaluated over, besides + - * / and unary minus."""
-
-    def number(self, value: float) -> Any:
-        """The scalar that stands for a float."""
-
-    def call(self, function: str, *arguments: Any) -> Any:
-        """One of `FUNCTIONS` of scalars."""
-
-
-class Floats:
-    """Plain floats as scalars."""
-
-    def number(self, value: float) -> float:
-        """Return the value itself."""
-        return value
-
-    def call(self, function: str, *arguments: float) -> float:
-        """Return the function's value, by `math`."""
-        return float(BY_MATH[function](*arguments))
-
-
-BY_MATH: dict[str, Callable[..., float]] = {
-    **{name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)},
-    "abs": math.fabs,
-    "step": lambda x: 1.0 if x > 0.0 else 0.0,
-    "min": min,
-    "max": max,
-    "select": lambda c, a, b: a if c > 0.0 else b,
-}
 
 
 _TOKEN = re.compile(

@@ -18,7 +18,6 @@ from eomgen.language.base import Number, Table
 from eomgen.language.conditions import Condition, of_moving, of_quantity
 from eomgen.language.formula import (
     CONSTANTS,
-    FUNCTIONS,
     Constant,
     Formula,
     FormulaError,
@@ -26,6 +25,7 @@ from eomgen.language.formula import (
     names_in,
     parse,
 )
+from eomgen.scalars.functions import FUNCTIONS
 
 
 def _read_quantity(value: Any) -> Formula:

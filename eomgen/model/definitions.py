@@ -6,15 +6,8 @@ from typing import Any
 
 from eomgen.errors import SceneError, nearest
 from eomgen.language.base import Table
-from eomgen.language.formula import (
-    CONSTANTS,
-    DEEPEST,
-    FUNCTIONS,
-    Apply,
-    Formula,
-    Name,
-    names_in,
-)
+from eomgen.language.formula import CONSTANTS, DEEPEST, Apply, Formula, Name, names_in
+from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.schema import Scene
 
 LARGEST = 2000

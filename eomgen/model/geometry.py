@@ -6,10 +6,10 @@ from dataclasses import replace
 
 from eomgen.errors import SceneError
 from eomgen.language.conditions import ROUNDING
-from eomgen.language.exact import sine_between
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import with_components
 from eomgen.model.model import Model
+from eomgen.scalars.exact import sine_between
 from eomgen.scene.joints import Free, Joint
 from eomgen.scene.joints.base import Geared
 from eomgen.scene.schema import BodyTable

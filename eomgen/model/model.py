@@ -8,9 +8,10 @@ from itertools import accumulate
 from typing import TypeGuard
 
 from eomgen.language.conditions import Condition, require
-from eomgen.language.exact import Real, radians
-from eomgen.language.formula import Constant, Floats, Formula, evaluate
+from eomgen.language.formula import Constant, Formula, evaluate
 from eomgen.language.quantity import Parameter
+from eomgen.scalars.exact import Real, radians
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import ExtraState, Input
 from eomgen.scene.joints import Free, Joint, Revolute
@@ -293,7 +294,7 @@ class Model:
 
     def value(self, formula: Formula) -> float:
         """A quantity's value at the scene's parameters."""
-        return float(evaluate(formula, self.defaults, Floats()))
+        return float(evaluate(formula, self.defaults, FloatScalars()))
 
 
 def off_centre(joint: Joint) -> TypeGuard[Revolute]:

@@ -4,9 +4,10 @@ import math
 from collections.abc import Sequence
 
 from eomgen.errors import SceneError, listed, nearest
-from eomgen.language.formula import Floats, names_in
-from eomgen.language.slopes import with_rates
+from eomgen.language.formula import names_in
+from eomgen.language.rates import with_rates
 from eomgen.model.model import Body, Prescribed
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.joints.base import Coordinate
 
@@ -122,7 +123,7 @@ def check_drive(
         if name not in known and name != "t":
             return  # unknown, which is said where all such names are
     try:
-        start = with_rates(drive.coordinate, known, 0.0, Floats())
+        start = with_rates(drive.coordinate, known, 0.0, FloatScalars())
     except (ArithmeticError, ValueError):
         start = (math.nan, math.nan, math.nan)
     if not all(map(math.isfinite, start)):

@@ -2,9 +2,9 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-from eomgen.language.slopes import slope
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import Node, Step, Tape
+from eomgen.scalars.functions import slope
 
 
 def jacobian(outputs: Sequence[Node], inputs: Sequence[Node]) -> list[list[Node]]:

@@ -6,8 +6,8 @@ from typing import Any
 import gmpy2
 from gmpy2 import mpfr
 
-from eomgen.language.digits import MP, Bits, out_of_bits, sixty_digits
 from eomgen.program.program import Program, interpreter
+from eomgen.scalars.extended import MP, Bits, out_of_bits, sixty_digits
 
 
 def evaluator(program: Program, output: str) -> Callable[[Mapping[str, Any]], list[Any]]:

@@ -5,9 +5,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from operator import neg
-from typing import Any, Protocol
+from typing import Any
 
 from eomgen.program.tape import ARITHMETIC, COUNTED, FUNCTIONS, Stage, Step, Tape
+from eomgen.scalars.protocol import Scalars
 
 
 @dataclass(frozen=True)
@@ -88,18 +89,8 @@ def cost(program: Program, output: str) -> dict[str, int]:
     return {**by_kind, "total": sum(by_kind.values()), "parameters": parameters}
 
 
-class Arithmetic(Protocol):
-    """Scalars a program can be run over: they add, subtract, multiply and divide themselves."""
-
-    def number(self, value: float) -> Any:
-        """The scalar that stands for a float."""
-
-    def call(self, function: str, *arguments: Any) -> Any:
-        """A function of formulas (`language.formula.FUNCTIONS`)."""
-
-
 def interpret(
-    program: Program, output: str, inputs: Mapping[str, Any], scalars: Arithmetic
+    program: Program, output: str, inputs: Mapping[str, Any], scalars: Scalars
 ) -> list[Any]:
     """Run the steps of one output over any scalars (floats, 60-digit numbers, arrays).
 
@@ -109,7 +100,7 @@ def interpret(
 
 
 def interpreter(
-    program: Program, output: str, scalars: Arithmetic
+    program: Program, output: str, scalars: Scalars
 ) -> Callable[[Mapping[str, Any]], list[Any]]:
     """`interpret` for many inputs: which steps to run, and how, is found once."""
     live = live_steps(program, program.outputs[output].nodes)

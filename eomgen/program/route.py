@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from eomgen.derivation.recursive.digits import ALL, Route, digits_lost
 from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.moving import Values
-from eomgen.derivation.recursive.numbers import ArrayScalars
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
@@ -16,6 +15,7 @@ from eomgen.program.passes import optimise
 from eomgen.program.program import Output, Program, cost, finish, interpreter
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
+from eomgen.scalars.floats import ArrayScalars
 
 MOST_LOST = 4.0
 """Decimal digits of v̇ that a route may lose at ordinary states and still be taken by itself."""

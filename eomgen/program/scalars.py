@@ -1,10 +1,11 @@
 """The tape's nodes as the abstract scalars of formulas and recursions."""
 
-from eomgen.language.exact import Real, in_doubles
 from eomgen.program.tape import ExactTape, Node, Tape
+from eomgen.scalars.exact import Real, in_doubles
+from eomgen.scalars.protocol import Scalars
 
 
-class TapeScalars:
+class TapeScalars(Scalars):
     """Nodes as scalars for formulas and recursions."""
 
     def __init__(self, tape: Tape) -> None:

@@ -7,9 +7,9 @@ over a branch that begins and ends within it, as a brief contact does.
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
-from eomgen.language.formula import CORNERS
 from eomgen.program.program import Output, Program, live_steps
 from eomgen.program.tape import TIME, Stage, Step
+from eomgen.scalars.functions import CORNERS
 
 OF_STATE, OF_TIME = "switching_functions", "switching_functions_of_time"
 """Outputs: those that depend on the state, or not."""

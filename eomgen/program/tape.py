@@ -12,7 +12,7 @@ from enum import IntEnum
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from eomgen.language.formula import BY_MATH
+from eomgen.scalars.functions import BY_MATH
 
 TIME = "t"
 """The input that stands for time; no name of a scene."""

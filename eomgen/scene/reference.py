@@ -9,8 +9,9 @@ from pydantic.fields import FieldInfo
 
 from eomgen.errors import SceneError, nearest
 from eomgen.language.base import Table
-from eomgen.language.formula import CONSTANTS, FUNCTIONS, ZERO, Constant, Formula
+from eomgen.language.formula import CONSTANTS, ZERO, Constant, Formula
 from eomgen.language.quantity import of_any_joint
+from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.effects import Effect
 from eomgen.scene.joints import Joint
 from eomgen.scene.schema import BodyTable, ChainTable, Initial, PointTable, Scene, Simulation

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from eomgen.language.exact import direction
 from eomgen.model.model import Model
+from eomgen.scalars.exact import direction
 from eomgen.scene.effects.contact import BodyContact
 from eomgen.scene.effects.field import ForceField
 from eomgen.scene.joints.base import WORLD

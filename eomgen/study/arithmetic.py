@@ -15,11 +15,11 @@ import numpy as np
 
 from eomgen.derivation.recursive.regular import check_regular
 from eomgen.errors import RunError
-from eomgen.language.digits import DIGITS
 from eomgen.model.model import Model
 from eomgen.program.route import routed
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
+from eomgen.scalars.extended import DIGITS
 from eomgen.scene.schema import Route
 from eomgen.study.routes import Made, compiled, loaded, velocities
 from eomgen.study.samples import Sample, agreement, condition_numbers, judging_states

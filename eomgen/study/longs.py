@@ -8,8 +8,8 @@ import gmpy2
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.language.digits import MP
 from eomgen.run.problem import Floats
+from eomgen.scalars.extended import MP
 
 BITS = MP.prec
 """Of the significand: 60 digits."""

@@ -10,9 +10,9 @@ from typing import Any
 import gmpy2
 from gmpy2 import mpfr
 
-from eomgen.language.digits import Bits
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import Model, Seat, ways_of
+from eomgen.scalars.extended import Bits
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD, Move

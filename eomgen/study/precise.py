@@ -14,9 +14,9 @@ from typing import Any, cast
 import gmpy2
 from gmpy2 import mpfr
 
-from eomgen.language.digits import BY_MPFR
-from eomgen.language.formula import CORNERS
 from eomgen.run.problem import Floats
+from eomgen.scalars.extended import BY_MPFR
+from eomgen.scalars.functions import CORNERS
 
 BITS = 113
 """Of the significand: unit roundoff 2^-113 = 1e-34."""

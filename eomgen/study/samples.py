@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.language.digits import DIGITS
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
+from eomgen.scalars.extended import DIGITS
 from eomgen.study.states import random_state
 from eomgen.study.truth import Exact, Truth
 from eomgen.study.visited import visited

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.language.formula import FUNCTIONS
 from eomgen.program.program import interpret
 from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.run.problem import Floats
+from eomgen.scalars.functions import FUNCTIONS
+from eomgen.scalars.protocol import Scalars
 
 Singles = NDArray[np.float32]
 LEAST: np.float32 = np.finfo(np.float32).smallest_normal
@@ -27,7 +28,7 @@ _NUMPY: dict[str, Callable[..., Any]] = {
 }
 
 
-class Single:
+class Single(Scalars):
     """float32 numbers, or arrays of them, as scalars of a program."""
 
     def number(self, value: float) -> np.float32:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from eomgen.derivation.recursive.dynamics import Dynamics
 from eomgen.derivation.recursive.finite import values_at
-from eomgen.language.digits import MP, Bits, Digits, exact
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
 from eomgen.program.digits import evaluator
@@ -16,6 +15,7 @@ from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, finish, interpreter
 from eomgen.program.tape import TIME, ExactTape
 from eomgen.run.problem import Floats
+from eomgen.scalars.extended import MP, Bits, Digits, exact
 from eomgen.study.longs import Array, long
 
 Exact = NDArray[np.object_]

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.language.digits import MP
 from eomgen.run.problem import Floats
+from eomgen.scalars.extended import MP
 from eomgen.study.truth import Exact
 
 HARDLY = 1e-3

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from eomgen.language.base import Table
-from eomgen.language.formula import Apply, Constant, Floats, Name, names_in
-from eomgen.language.slopes import with_rates
+from eomgen.language.formula import Apply, Constant, Name, names_in
+from eomgen.language.rates import with_rates
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.schema import Scene
 
@@ -65,7 +66,7 @@ def _started(scene: Scene, by: Collection[str | None]) -> Scene:
     q = dict(zip((c.name for c in model.coordinates), model.initial_q, strict=True))
     v = dict(zip((c.name for c in model.velocities), model.initial_v, strict=True))
     for c in (c for c in model.prescribed if c.by in by):
-        value, rate, _ = with_rates(c.value, model.defaults, 0.0, Floats())
+        value, rate, _ = with_rates(c.value, model.defaults, 0.0, FloatScalars())
         q[c.position.name], v[c.velocity.name] = float(value), float(rate)
     return scene.replaced(initial=scene.initial.replaced(q=q, v=v))
 

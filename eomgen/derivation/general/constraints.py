@@ -15,8 +15,8 @@ import sympy as sp
 
 from eomgen.derivation.general.symbols import Ledger, Symbols, rate, real, triple
 from eomgen.derivation.symbols import Expr
-from eomgen.language.exact import direction, orientation, quarters, radians
 from eomgen.model.model import Body, Model
+from eomgen.scalars.exact import direction, orientation, quarters, radians
 from eomgen.scene.joints import Free, Joint
 from eomgen.scene.joints.base import Move
 

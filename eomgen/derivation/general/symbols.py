@@ -7,9 +7,9 @@ import sympy as sp
 
 from eomgen.derivation.general.simplify import gathered
 from eomgen.derivation.symbols import Expr, SympyScalars
-from eomgen.language.exact import Real, direction, opposite, orientation, quarters, radians
 from eomgen.language.formula import Formula, Name, calls_function, evaluate
 from eomgen.model.model import Model
+from eomgen.scalars.exact import Real, direction, opposite, orientation, quarters, radians
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import Geared
 

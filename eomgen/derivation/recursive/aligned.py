@@ -13,7 +13,8 @@ from eomgen.derivation.recursive.forces import Force
 from eomgen.derivation.recursive.instant import Link
 from eomgen.derivation.recursive.rotations import AxisTurn, Both, Rotation, Unturned
 from eomgen.derivation.recursive.solids import Ranks, Solid
-from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, add, sub, zeros
+from eomgen.derivation.recursive.vectors import AXES, Vec, add, sub, zeros
+from eomgen.scalars.protocol import Scalar, Scalars
 
 
 @dataclass(frozen=True)

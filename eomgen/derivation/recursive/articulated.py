@@ -22,8 +22,6 @@ from eomgen.derivation.recursive.vectors import (
     AXES,
     ENTRIES,
     Mat,
-    Scalar,
-    Scalars,
     Symmetric,
     Vec,
     add,
@@ -38,6 +36,7 @@ from eomgen.derivation.recursive.vectors import (
     times,
     transposed,
 )
+from eomgen.scalars.protocol import Scalar, Scalars
 
 
 @dataclass(frozen=True)

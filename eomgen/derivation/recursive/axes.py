@@ -19,7 +19,6 @@ from eomgen.derivation.recursive.frames import Frame, Mount
 from eomgen.derivation.recursive.vectors import (
     AXES,
     ENTRIES,
-    Scalars,
     Vec,
     add,
     constant,
@@ -30,8 +29,9 @@ from eomgen.derivation.recursive.vectors import (
     unit,
     zeros,
 )
-from eomgen.language import exact
-from eomgen.language.exact import Matrix
+from eomgen.scalars import exact
+from eomgen.scalars.exact import Matrix
+from eomgen.scalars.protocol import Scalars
 
 SLIGHT = 2.0**-20
 """What is less than this part of what it stands beside is slight: rounding in the rest of it costs

@@ -8,8 +8,6 @@ from eomgen.derivation.recursive.frames import Rigid, joined
 from eomgen.derivation.recursive.instant import Instant, Link
 from eomgen.derivation.recursive.vectors import (
     ENTRIES,
-    Scalar,
-    Scalars,
     Vec,
     add,
     cross,
@@ -18,6 +16,7 @@ from eomgen.derivation.recursive.vectors import (
     symmetric,
     times,
 )
+from eomgen.scalars.protocol import Scalar, Scalars
 
 Entries = Mapping[tuple[int, int], Scalar]
 """Entries (i, j) of a symmetric matrix over the tree of velocities: j carries i, or is i."""

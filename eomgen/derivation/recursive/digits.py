@@ -18,9 +18,9 @@ from eomgen.derivation.recursive.dynamics import Dynamics, Values
 from eomgen.derivation.recursive.frames import Linkage
 from eomgen.derivation.recursive.instant import Axes
 from eomgen.derivation.recursive.linkage import make_linkage
-from eomgen.derivation.recursive.numbers import ArrayScalars
-from eomgen.language.digits import Bits, out_of_bits, sixty_digits
 from eomgen.model.model import Model
+from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
+from eomgen.scalars.floats import ArrayScalars
 from eomgen.scene.effects import Driven, Gravity
 
 Array = NDArray[np.float64]

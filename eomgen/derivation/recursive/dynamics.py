@@ -33,17 +33,11 @@ from eomgen.derivation.recursive.motion import (
     velocities,
 )
 from eomgen.derivation.recursive.moving import Moving, Values
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.orthogonal import Elimination
 from eomgen.derivation.recursive.solids import Solid, centres, ranked, solids
-from eomgen.derivation.recursive.vectors import (
-    Scalar,
-    Vec,
-    no_matrix,
-    sub,
-    turning_in_space,
-    zeros,
-)
+from eomgen.derivation.recursive.vectors import Vec, no_matrix, sub, turning_in_space, zeros
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scalars.protocol import Scalar
 from eomgen.scene.effects import Driven, Effect, Gravity
 from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
 from eomgen.scene.joints import Free

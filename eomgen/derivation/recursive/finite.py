@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.model.model import Model
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import JointLoad
 

@@ -7,8 +7,6 @@ from eomgen.derivation.recursive.frames import Linkage
 from eomgen.derivation.recursive.instant import Instant, Link
 from eomgen.derivation.recursive.motion import Acceleration, inertial_force
 from eomgen.derivation.recursive.vectors import (
-    Scalar,
-    Scalars,
     Vec,
     add,
     constant,
@@ -19,6 +17,7 @@ from eomgen.derivation.recursive.vectors import (
     times,
     zeros,
 )
+from eomgen.scalars.protocol import Scalar, Scalars
 
 
 @dataclass(frozen=True)

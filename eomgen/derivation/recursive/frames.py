@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from eomgen.derivation.recursive.vectors import Scalar, Symmetric, Vec, add, plus
-from eomgen.language.exact import Matrix, Real
+from eomgen.derivation.recursive.vectors import Symmetric, Vec, add, plus
+from eomgen.scalars.exact import Matrix, Real
+from eomgen.scalars.protocol import Scalar
 
 
 @dataclass(frozen=True)

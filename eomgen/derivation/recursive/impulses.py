@@ -22,16 +22,8 @@ from eomgen.derivation.recursive.articulated import respond
 from eomgen.derivation.recursive.composite import solved
 from eomgen.derivation.recursive.dynamics import Dynamics
 from eomgen.derivation.recursive.observe import arm
-from eomgen.derivation.recursive.vectors import (
-    Scalar,
-    Scalars,
-    Vec,
-    add,
-    cross,
-    in_space,
-    turning_in_space,
-    zeros,
-)
+from eomgen.derivation.recursive.vectors import Vec, add, cross, in_space, turning_in_space, zeros
+from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
 from eomgen.scene.joints.base import WORLD
 

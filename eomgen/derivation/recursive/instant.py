@@ -22,8 +22,6 @@ from eomgen.derivation.recursive.rotations import (
 from eomgen.derivation.recursive.vectors import (
     AXES,
     Mat,
-    Scalar,
-    Scalars,
     Vec,
     add,
     congruent,
@@ -32,7 +30,8 @@ from eomgen.derivation.recursive.vectors import (
     transposed,
     unit,
 )
-from eomgen.language.exact import ZERO, Real, quarters, total
+from eomgen.scalars.exact import ZERO, Real, quarters, total
+from eomgen.scalars.protocol import Scalar, Scalars
 
 Axes = Literal["own", "world"]
 

@@ -16,11 +16,8 @@ from eomgen.derivation.recursive.axes import (
     with_simple_origins,
 )
 from eomgen.derivation.recursive.frames import Frame, Linkage, Mount, Rigid, joined
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.vectors import (
     ENTRIES,
-    Scalar,
-    Scalars,
     Symmetric,
     Vec,
     add,
@@ -35,10 +32,12 @@ from eomgen.derivation.recursive.vectors import (
     times,
     zeros,
 )
-from eomgen.language import exact
-from eomgen.language.exact import EYE, ZERO, Matrix, Real
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import Body, Model
+from eomgen.scalars import exact
+from eomgen.scalars.exact import EYE, ZERO, Matrix, Real
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects import Gravity
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import Geared, Move

@@ -7,8 +7,6 @@ from eomgen.derivation.recursive.instant import Instant, Link
 from eomgen.derivation.recursive.solids import Solid
 from eomgen.derivation.recursive.vectors import (
     Mat,
-    Scalar,
-    Scalars,
     Vec,
     add,
     cross,
@@ -18,6 +16,7 @@ from eomgen.derivation.recursive.vectors import (
     times,
     zeros,
 )
+from eomgen.scalars.protocol import Scalar, Scalars
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,12 @@ from eomgen.derivation.recursive.observe import (
     position,
     velocity,
 )
-from eomgen.derivation.recursive.vectors import Scalar, Scalars, Vec, in_space, times, zeros
-from eomgen.language.exact import Real
+from eomgen.derivation.recursive.vectors import Vec, in_space, times, zeros
 from eomgen.language.formula import Formula, evaluate, names_in
-from eomgen.language.slopes import with_rates
+from eomgen.language.rates import with_rates
 from eomgen.model.model import Model, Seat, ways_of
+from eomgen.scalars.exact import Real
+from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD

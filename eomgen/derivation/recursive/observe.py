@@ -7,7 +7,6 @@ from eomgen.derivation.recursive.instant import Instant
 from eomgen.derivation.recursive.motion import Twist, momentum_of
 from eomgen.derivation.recursive.vectors import (
     Mat,
-    Scalars,
     Vec,
     add,
     constant,
@@ -18,6 +17,7 @@ from eomgen.derivation.recursive.vectors import (
     times,
     zeros,
 )
+from eomgen.scalars.protocol import Scalars
 
 Places = tuple[Vec, ...]
 """The origin of every frame in the world."""

@@ -56,8 +56,6 @@ from eomgen.derivation.recursive.rows import (
 from eomgen.derivation.recursive.solids import Ranks, Solid
 from eomgen.derivation.recursive.vectors import (
     AXES,
-    Scalar,
-    Scalars,
     Vec,
     add,
     cross,
@@ -70,6 +68,7 @@ from eomgen.derivation.recursive.vectors import (
     unit,
     zeros,
 )
+from eomgen.scalars.protocol import Scalar, Scalars
 
 SLIGHT = 1e-16
 """The least share of a diagonal entry that a pivot of an inertia matrix keeps."""

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from eomgen.derivation.recursive.instant import Axis, Link
 from eomgen.derivation.recursive.rows import Column, Row
-from eomgen.derivation.recursive.vectors import AXES, Scalars, Vec, cross, unit
+from eomgen.derivation.recursive.vectors import AXES, Vec, cross, unit
+from eomgen.scalars.protocol import Scalars
 
 
 def possible(links: Sequence[Link], scalars: Scalars) -> list[set[Column]]:

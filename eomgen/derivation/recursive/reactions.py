@@ -6,7 +6,6 @@ from eomgen.derivation.recursive import observe
 from eomgen.derivation.recursive.dynamics import Dynamics
 from eomgen.derivation.recursive.forces import Force
 from eomgen.derivation.recursive.vectors import (
-    Scalar,
     Vec,
     add,
     cross,
@@ -17,6 +16,7 @@ from eomgen.derivation.recursive.vectors import (
     transposed,
     zeros,
 )
+from eomgen.scalars.protocol import Scalar
 
 
 def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:

@@ -20,12 +20,13 @@ from eomgen.derivation.recursive.articulated import (
 from eomgen.derivation.recursive.composite import composite_bodies
 from eomgen.derivation.recursive.instant import Axes, at_instant
 from eomgen.derivation.recursive.linkage import make_linkage
-from eomgen.derivation.recursive.numbers import ArrayScalars
-from eomgen.derivation.recursive.vectors import Mat, Scalars
+from eomgen.derivation.recursive.vectors import Mat
 from eomgen.errors import SceneError
-from eomgen.language.exact import exactly
 from eomgen.language.formula import Constant, Formula
 from eomgen.model.model import Body, Model
+from eomgen.scalars.exact import exactly
+from eomgen.scalars.floats import ArrayScalars
+from eomgen.scalars.protocol import Scalars
 from eomgen.scene.joints.base import Geared
 
 Array = npt.NDArray[np.float64]
@@ -54,7 +55,7 @@ def check_regular(model: Model) -> None:
     if not _vanishing(_pivots(even, poses, ArrayScalars()), VANISHED):
         return
     # Imported here because a model that is regular has no need of it, nor has a run.
-    from eomgen.language.digits import Bits
+    from eomgen.scalars.extended import Bits
 
     with exactly():
         (first, *_), bits = poses, Bits()

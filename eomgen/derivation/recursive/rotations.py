@@ -6,8 +6,6 @@ from typing import Protocol
 
 from eomgen.derivation.recursive.vectors import (
     Mat,
-    Scalar,
-    Scalars,
     Symmetric,
     Vec,
     congruent,
@@ -16,7 +14,8 @@ from eomgen.derivation.recursive.vectors import (
     times,
     transposed,
 )
-from eomgen.language.exact import Matrix, turns_in
+from eomgen.scalars.exact import Matrix, turns_in
+from eomgen.scalars.protocol import Scalar, Scalars
 
 
 class Rotation(Protocol):

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 from eomgen.derivation.recursive.instant import Axis, Link
-from eomgen.derivation.recursive.vectors import AXES, Scalar, Scalars, Vec, add, cross, unit, zeros
+from eomgen.derivation.recursive.vectors import AXES, Vec, add, cross, unit, zeros
+from eomgen.scalars.protocol import Scalar, Scalars
 
 TINY = 1e-200
 """The weight of an empty row, and the least of any: so small that it never counts."""

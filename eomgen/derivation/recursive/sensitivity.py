@@ -29,8 +29,6 @@ from eomgen.derivation.recursive.motion import Acceleration, Twist, momentum_of
 from eomgen.derivation.recursive.vectors import (
     AXES,
     Mat,
-    Scalar,
-    Scalars,
     Vec,
     add,
     cross,
@@ -45,6 +43,7 @@ from eomgen.derivation.recursive.vectors import (
     transposed,
     zeros,
 )
+from eomgen.scalars.protocol import Scalar, Scalars
 
 
 @dataclass(frozen=True)

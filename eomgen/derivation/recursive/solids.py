@@ -4,11 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.derivation.recursive.frames import Linkage
-from eomgen.derivation.recursive.numbers import FloatScalars
 from eomgen.derivation.recursive.vectors import (
     AXES,
-    Scalar,
-    Scalars,
     Symmetric,
     Vec,
     add,
@@ -21,6 +18,8 @@ from eomgen.derivation.recursive.vectors import (
     symmetric,
     zeros,
 )
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scalars.protocol import Scalar, Scalars
 
 FIRM = 0.01
 """The part of what may hold a body that its own mass and inertia must be for it to be firm."""

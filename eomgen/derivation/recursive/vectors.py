@@ -1,12 +1,10 @@
 """Vectors and 3 x 3 matrices over any scalars; they only add, subtract, multiply and divide."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol
 
-from eomgen.language.exact import Matrix, Real
+from eomgen.scalars.exact import Matrix
+from eomgen.scalars.protocol import Scalar, Scalars
 
-Scalar = Any
-"""Program nodes, floats, SymPy expressions, mpmath numbers."""
 Vec = tuple[Scalar, Scalar, Scalar]
 Mat = tuple[Vec, Vec, Vec]
 """Rows."""
@@ -16,22 +14,6 @@ Symmetric = Mat
 AXES = (0, 1, 2)
 ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """What of a symmetric matrix is computed, and its order: xx, yy, zz, xy, xz, yz."""
-
-
-class Scalars(Protocol):
-    """What the recursions need of scalars, besides + - * / and unary minus."""
-
-    def number(self, value: Real) -> Scalar:
-        """The scalar that stands for a double, or is next to a number of more digits."""
-
-    def call(self, function: str, *arguments: Scalar) -> Scalar:
-        """A function of formulas (`language.formula.FUNCTIONS`)."""
-
-    def is_zero(self, value: Scalar) -> bool:
-        """Whether a scalar is known to be 0 whatever its inputs."""
-
-    def named(self, value: Scalar, name: str) -> Scalar:
-        """The same scalar; programs remember the name."""
 
 
 def add(a: Vec, b: Vec) -> Vec:

@@ -6,8 +6,8 @@ from typing import Any, ClassVar, Literal, Protocol, Self
 
 from eomgen.language.base import Identifier, Table
 from eomgen.language.conditions import Condition
-from eomgen.language.exact import Real
 from eomgen.language.formula import ZERO, Formula
+from eomgen.scalars.exact import Real
 
 Scalar = Any
 """SymPy expressions, program nodes or floats; effects add, subtract, multiply, divide, and call."""

@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.conditions import Condition, a_part, can_meet, not_negative
-from eomgen.language.exact import direction
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity, with_components
+from eomgen.scalars.exact import direction
 from eomgen.scene.effects.base import Contact, Load, Mechanism, Scalar
 from eomgen.scene.effects.base import Vector as Components
 from eomgen.scene.effects.bodies import OnBodies, wrong

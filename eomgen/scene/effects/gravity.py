@@ -6,9 +6,9 @@ from typing import Literal
 from pydantic import Field, field_validator
 
 from eomgen.language.base import Identifier
-from eomgen.language.exact import direction
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Numbers, Quantity, quantity
+from eomgen.scalars.exact import direction
 from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
 
 

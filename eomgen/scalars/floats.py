@@ -1,13 +1,13 @@
-"""Plain floats as scalars of the recursions, and arrays of them: many poses at once."""
+"""Floats as scalars, and arrays of them: many states at once."""
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from eomgen.derivation.recursive.vectors import Scalar
-from eomgen.language.exact import Real
-from eomgen.language.formula import BY_MATH, FUNCTIONS
+from eomgen.scalars.exact import Real
+from eomgen.scalars.functions import BY_MATH, FUNCTIONS
+from eomgen.scalars.protocol import Scalar, Scalars
 
 BY_NUMPY: dict[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)},
@@ -19,8 +19,8 @@ BY_NUMPY: dict[str, Callable[..., Any]] = {
 }
 
 
-class FloatScalars:
-    """What `Scalars` asks for, by `math`."""
+class FloatScalars(Scalars):
+    """Plain floats, by `math`."""
 
     def number(self, value: Real) -> float:
         """The value itself, or the double next to a number of more digits."""
@@ -30,17 +30,9 @@ class FloatScalars:
         """A function of formulas."""
         return float(BY_MATH[function](*arguments))
 
-    def is_zero(self, value: Scalar) -> bool:
-        """Whether it is 0 here; then the shorter of two ways that agree is taken."""
-        return bool(value == 0.0)
 
-    def named(self, value: Scalar, name: str) -> Scalar:
-        """A float has no name."""
-        return value
-
-
-class ArrayScalars:
-    """What `Scalars` asks for where scalars are floats or arrays (n,) of them, of one length n."""
+class ArrayScalars(Scalars):
+    """Floats or arrays (n,) of them, of one length n, by NumPy."""
 
     def number(self, value: Real) -> float:
         """The value itself, or the double next to it, the same in all of them."""
@@ -53,7 +45,3 @@ class ArrayScalars:
     def is_zero(self, value: Scalar) -> bool:
         """Whether it is 0 in all of them; then the shorter of two ways that agree is taken."""
         return value == 0.0 if isinstance(value, float) else not np.any(value)
-
-    def named(self, value: Scalar, name: str) -> Scalar:
-        """An array has no name."""
-        return value

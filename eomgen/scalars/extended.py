@@ -9,8 +9,9 @@ import mpmath
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.language.exact import Real
-from eomgen.language.formula import FUNCTIONS
+from eomgen.scalars.exact import Real
+from eomgen.scalars.functions import FUNCTIONS
+from eomgen.scalars.protocol import Scalars
 
 DIGITS = 60
 MP = mpmath.MPContext()
@@ -34,7 +35,7 @@ BY_MPFR = _functions(gmpy2, mpfr)
 """The functions of formulas, of MPFR's numbers; as exact as gmpy2's context then is."""
 
 
-class Digits:
+class Digits(Scalars):
     """60-digit numbers as scalars."""
 
     def number(self, value: Real) -> Any:
@@ -48,14 +49,6 @@ class Digits:
         """Any function of formulas."""
         return _BY_MPMATH[function](*arguments)
 
-    def is_zero(self, value: Any) -> bool:
-        """Whether it is 0 here."""
-        return bool(value == 0)
-
-    def named(self, value: Any, name: str) -> Any:
-        """A number has no name."""
-        return value
-
 
 def exact(values: Any) -> Any:
     """Doubles, one or an array of them, as 60-digit numbers: exactly the same."""
@@ -63,7 +56,7 @@ def exact(values: Any) -> Any:
     return np.array([MP.mpf(x) for x in array.ravel()], dtype=object).reshape(array.shape)
 
 
-class Bits:
+class Bits(Scalars):
     """MPFR's numbers as scalars, as exact as gmpy2's context: they add and multiply ten times as
     fast as mpmath's.
     """
@@ -75,14 +68,6 @@ class Bits:
     def call(self, function: str, *arguments: Any) -> Any:
         """A function of formulas."""
         return BY_MPFR[function](*arguments)
-
-    def is_zero(self, value: Any) -> bool:
-        """Whether it is 0 here."""
-        return bool(value == 0)
-
-    def named(self, value: Any, name: str) -> Any:
-        """A number has no name."""
-        return value
 
 
 @contextmanager

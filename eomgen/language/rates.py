@@ -1,0 +1,22 @@
+"""First and second derivatives of formulas by time, over any scalars."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from eomgen.language.formula import Formula, evaluate
+from eomgen.scalars.duals import Dual, Duals
+from eomgen.scalars.protocol import Scalars
+
+
+def with_rates(
+    formula: Formula, names: Mapping[str, Any], time: Any, scalars: Scalars
+) -> tuple[Any, Any, Any]:
+    """A formula of `t` and of `names`, which do not change, with its first and second derivative
+    by t, exactly; where it has corners (step, select, abs, min, max), those of its pieces.
+    """
+    once = Duals(scalars)
+    twice = Duals(once)
+    t = Dual(Dual(time, scalars.number(1.0)), once.number(1.0))
+    still = {name: twice.still(once.still(value)) for name, value in names.items()}
+    found = evaluate(formula, {**still, "t": t}, twice)
+    return found.value.value, found.value.rate, found.rate.rate

@@ -1,0 +1,76 @@
+"""The functions of formulas and programs: their names, arguments, values and derivatives."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from eomgen.scalars.protocol import Scalars
+
+FUNCTIONS = {
+    **dict.fromkeys(("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh"), 1),
+    **dict.fromkeys(("sqrt", "abs", "step"), 1),
+    **dict.fromkeys(("atan2", "min", "max"), 2),
+    "select": 3,
+}
+"""Functions of a formula, with how many arguments each takes.
+
+`step(x)` is 1 where x > 0 and else 0; `select(c, a, b)` is a where c > 0 and else b, which is also
+what comparisons and `a if x < y else b` become. Both a and b are computed, so both must have a
+value: write sqrt(max(x, 0)), not sqrt(x) if x > 0 else 0.
+"""
+CORNERS = ("abs", "max", "min", "select", "step")
+"""Functions that have a corner or a jump: they go on by another branch where one is reached."""
+BY_MATH: dict[str, Callable[..., float]] = {
+    **{name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)},
+    "abs": math.fabs,
+    "step": lambda x: 1.0 if x > 0.0 else 0.0,
+    "min": min,
+    "max": max,
+    "select": lambda c, a, b: a if c > 0.0 else b,
+}
+"""The functions of floats."""
+
+
+def slope(
+    function: str, value: Any, arguments: Sequence[Any], slopes: Sequence[Any], scalars: Scalars
+) -> Any:
+    """How a function of formulas changes where its arguments change by `slopes`.
+
+    `value` is the function's own. Where it has a corner or a step, that of the piece it is on.
+    """
+    one, two = scalars.number(1.0), scalars.number(2.0)
+    x, d = arguments, slopes
+    match function:
+        case "sin":
+            return scalars.call("cos", x[0]) * d[0]
+        case "cos":
+            return -(scalars.call("sin", x[0]) * d[0])
+        case "tan":
+            return (one + value * value) * d[0]
+        case "sqrt":
+            return d[0] / (two * value)
+        case "asin":
+            return d[0] / scalars.call("sqrt", one - x[0] * x[0])
+        case "acos":
+            return -(d[0] / scalars.call("sqrt", one - x[0] * x[0]))
+        case "atan":
+            return d[0] / (one + x[0] * x[0])
+        case "exp":
+            return value * d[0]
+        case "log":
+            return d[0] / x[0]
+        case "tanh":
+            return (one - value * value) * d[0]
+        case "abs":
+            return scalars.call("select", x[0], d[0], -d[0])
+        case "step":
+            return scalars.number(0.0)
+        case "atan2":
+            return (x[1] * d[0] - x[0] * d[1]) / (x[1] * x[1] + x[0] * x[0])
+        case "min":
+            return scalars.call("select", x[1] - x[0], d[0], d[1])
+        case "max":
+            return scalars.call("select", x[0] - x[1], d[0], d[1])
+        case "select":
+            return scalars.call("select", x[0], d[1], d[2])
+    raise AssertionError(f"no derivative is known for {function}")
