@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.regular import check_regular
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.files import read_plain
 from eomgen.model.elaborate import build_model, in_order, outputs_for

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from eomgen.backends.javascript import javascript_poses
 from eomgen.backends.python import python_module
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.regular import check_regular
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport

@@ -7,7 +7,7 @@ import numpy as np
 from engine import MP, STEP, Engine, along, exact, read
 
 from eomgen.backends.python import python_module
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.elaborate import build_model
 from eomgen.program.route import routed
 from eomgen.run.module import load_module

@@ -24,6 +24,7 @@ FLOORS = (
     "scene",
     "model",
     "derivation",
+    "dynamics",
     "templating",
     "program",
     "backends",

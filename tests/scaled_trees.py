@@ -10,8 +10,8 @@ import numpy as np
 from engine import MP
 from spatial_trees import random_spatial_tree
 
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import build_model

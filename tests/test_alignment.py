@@ -15,9 +15,9 @@ import pytest
 from aligned_trees import Case, case, exactly, names, nearby, scene
 from campaign import some
 
-from eomgen.derivation.recursive.digits import Route, digits_lost
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.digits import Route, digits_lost
+from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate

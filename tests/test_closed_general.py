@@ -21,8 +21,8 @@ from eomgen.derivation.general.derive import GeneralEquations, derive_general
 from eomgen.derivation.general.simplify import gathered, sum_of_squares
 from eomgen.derivation.general.symbols import Ledger, make_symbols, rate
 from eomgen.derivation.general.tell import tell_general
-from eomgen.derivation.recursive.regular import check_regular
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
+from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model

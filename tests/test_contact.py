@@ -22,7 +22,7 @@ from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random
 
 from eomgen.backends.python import python_module
 from eomgen.cli import main
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.outputs import OUTPUTS

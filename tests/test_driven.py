@@ -17,8 +17,8 @@ from scipy.integrate import solve_ivp
 from spatial_newton_euler import solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.reactions import reactions
+from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.reactions import reactions
 from eomgen.language.formula import parse
 from eomgen.language.rates import with_rates
 from eomgen.model.elaborate import build_model

@@ -7,8 +7,8 @@ import pytest
 from campaign import some
 
 from eomgen.backends.python import python_module
-from eomgen.derivation.recursive.dynamics import Dynamics
-from eomgen.derivation.recursive.finite import values_at
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.finite import values_at
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.program.route import routed

@@ -10,7 +10,7 @@ import pytest
 from campaign import some
 
 from eomgen.backends.python import python_module
-from eomgen.derivation.recursive.regular import check_regular, resistances
+from eomgen.dynamics.regular import check_regular, resistances
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model

@@ -18,7 +18,7 @@ from campaign import some
 from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.elaborate import build_model
 from eomgen.program.from_recursion import Recording

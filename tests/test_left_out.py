@@ -15,7 +15,7 @@ from test_show_space import page_parts
 
 from eomgen.backends.javascript import javascript_poses
 from eomgen.cli import main
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate

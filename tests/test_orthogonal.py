@@ -17,9 +17,9 @@ import pytest
 from campaign import some
 from engine import MP, Digits, apart, engine
 
-from eomgen.derivation.recursive.digits import Route, digits_lost
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.impulses import response
+from eomgen.dynamics.digits import Route, digits_lost
+from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.impulses import response
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model

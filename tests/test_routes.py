@@ -20,9 +20,9 @@ from mechanisms import compiled, random_tree
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
-from eomgen.derivation.recursive import observe
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.reactions import reactions
+from eomgen.dynamics import observe
+from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.reactions import reactions
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars

@@ -18,7 +18,7 @@ from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
 from eomgen.backends.python import python_module
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.outputs import OUTPUTS

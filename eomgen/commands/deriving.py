@@ -3,7 +3,7 @@
 import sys
 
 from eomgen.commands.shared import Arguments, located, read_model
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.regular import check_regular
 from eomgen.files import check_writable, write_whole
 from eomgen.run.progress import terminal_notice
 

@@ -13,7 +13,7 @@ from eomgen.commands.shared import (
     read_model,
     shortened,
 )
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.regular import check_regular
 from eomgen.language.formula import written
 from eomgen.model.model import Body, Model
 from eomgen.scene.joints.base import WORLD, Geared

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Literal
 
-from eomgen.derivation.recursive.finite import initial_overlaps
+from eomgen.dynamics.finite import initial_overlaps
 from eomgen.errors import EomgenError, RunError, SceneError, nearest
 from eomgen.model.elaborate import build_model, outputs_for
 from eomgen.model.model import Model, ways_of

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from itertools import chain
 
-from eomgen.derivation.recursive.dynamics import Dynamics
-from eomgen.derivation.recursive.impulses import generalised, pressed, rough, scaled, struck
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.impulses import generalised, pressed, rough, scaled, struck
 from eomgen.program.differentiate import tangent
 from eomgen.program.system import ContactLabel, Made
 from eomgen.program.tape import Node, Stage, Tape, total

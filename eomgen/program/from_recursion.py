@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from eomgen.derivation.recursive import observe
-from eomgen.derivation.recursive.composite import Entries, full, solved
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.impulses import response
-from eomgen.derivation.recursive.instant import Axes
-from eomgen.derivation.recursive.reactions import reactions
-from eomgen.derivation.recursive.sensitivity import sensitivity
-from eomgen.derivation.recursive.vectors import Vec, in_space, sub, zeros
+from eomgen.dynamics import observe
+from eomgen.dynamics.composite import Entries, full, solved
+from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.impulses import response
+from eomgen.dynamics.instant import Axes
+from eomgen.dynamics.reactions import reactions
+from eomgen.dynamics.sensitivity import sensitivity
+from eomgen.dynamics.vectors import Vec, in_space, sub, zeros
 from eomgen.model.model import Model, is_zero
 from eomgen.model.states import velocity_states
 from eomgen.outputs import DERIVATIVES

@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from eomgen.derivation.recursive.digits import ALL, Route, digits_lost
-from eomgen.derivation.recursive.instant import Axes
-from eomgen.derivation.recursive.moving import Values
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
+from eomgen.dynamics.digits import ALL, Route, digits_lost
+from eomgen.dynamics.instant import Axes
+from eomgen.dynamics.moving import Values
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.program.from_recursion import Recording, from_recursion

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from eomgen.derivation.recursive.finite import effect_sizes, is_singular, values_at
-from eomgen.derivation.recursive.regular import resistances, why_unresisted
+from eomgen.dynamics.finite import effect_sizes, is_singular, values_at
+from eomgen.dynamics.regular import resistances, why_unresisted
 from eomgen.model.model import Model
 from eomgen.run.problem import Explain, Floats
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eomgen.derivation.recursive.regular import resistances, why_unresisted
+from eomgen.dynamics.regular import resistances, why_unresisted
 from eomgen.model.model import Model
 from eomgen.run.trajectory import Trajectory
 

@@ -13,7 +13,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.regular import check_regular
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.program.route import routed

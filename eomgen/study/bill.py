@@ -11,7 +11,7 @@ from math import inf
 from typing import get_args
 
 from eomgen.backends.python import python_module
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.regular import check_regular
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.program.route import routed, why_not_compared

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.derivation.recursive.dynamics import Dynamics
-from eomgen.derivation.recursive.finite import values_at
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.finite import values_at
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
 from eomgen.program.digits import evaluator

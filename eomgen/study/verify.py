@@ -9,7 +9,7 @@ from typing import get_args
 
 import numpy as np
 
-from eomgen.derivation.recursive.regular import check_regular
+from eomgen.dynamics.regular import check_regular
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from eomgen.derivation.recursive.frames import Linkage
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.frames import Linkage
+from eomgen.dynamics.vectors import (
     AXES,
     Symmetric,
     Vec,

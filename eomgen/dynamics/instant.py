@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from eomgen.derivation.recursive.frames import Frame, Linkage, Rigid
-from eomgen.derivation.recursive.rotations import (
+from eomgen.dynamics.frames import Frame, Linkage, Rigid
+from eomgen.dynamics.rotations import (
     Rotation,
     Unturned,
     axis_turn,
@@ -19,7 +19,7 @@ from eomgen.derivation.recursive.rotations import (
     fixed_rotation,
     from_quaternion,
 )
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.vectors import (
     AXES,
     Mat,
     Vec,

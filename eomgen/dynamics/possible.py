@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from eomgen.derivation.recursive.instant import Axis, Link
-from eomgen.derivation.recursive.rows import Column, Row
-from eomgen.derivation.recursive.vectors import AXES, Vec, cross, unit
+from eomgen.dynamics.instant import Axis, Link
+from eomgen.dynamics.rows import Column, Row
+from eomgen.dynamics.vectors import AXES, Vec, cross, unit
 from eomgen.scalars.protocol import Scalars
 
 

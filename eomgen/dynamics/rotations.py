@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.vectors import (
     Mat,
     Symmetric,
     Vec,

@@ -14,9 +14,9 @@ effects, energies and everything that moves still have them. Energy is then not 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 
-from eomgen.derivation.recursive import forces as fc
-from eomgen.derivation.recursive.articulated import Pivots, articulate, respond
-from eomgen.derivation.recursive.composite import (
+from eomgen.dynamics import forces as fc
+from eomgen.dynamics.articulated import Pivots, articulate, respond
+from eomgen.dynamics.composite import (
     Entries,
     Factors,
     ancestors,
@@ -24,18 +24,18 @@ from eomgen.derivation.recursive.composite import (
     mass_entries,
     solved,
 )
-from eomgen.derivation.recursive.linkage import make_linkage
-from eomgen.derivation.recursive.motion import (
+from eomgen.dynamics.linkage import make_linkage
+from eomgen.dynamics.motion import (
     Acceleration,
     Twist,
     accelerations,
     kinetic_energy,
     velocities,
 )
-from eomgen.derivation.recursive.moving import Moving, Values
-from eomgen.derivation.recursive.orthogonal import Elimination
-from eomgen.derivation.recursive.solids import Solid, centres, ranked, solids
-from eomgen.derivation.recursive.vectors import Vec, no_matrix, sub, turning_in_space, zeros
+from eomgen.dynamics.moving import Moving, Values
+from eomgen.dynamics.orthogonal import Elimination
+from eomgen.dynamics.solids import Solid, centres, ranked, solids
+from eomgen.dynamics.vectors import Vec, no_matrix, sub, turning_in_space, zeros
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.effects import Driven, Effect, Gravity

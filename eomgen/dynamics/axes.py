@@ -15,8 +15,8 @@ but those that quarter turns lead to.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from eomgen.derivation.recursive.frames import Frame, Mount
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.frames import Frame, Mount
+from eomgen.dynamics.vectors import (
     AXES,
     ENTRIES,
     Vec,

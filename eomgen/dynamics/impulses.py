@@ -17,12 +17,12 @@ and leaves the slip -e u_n A_tn / A_nn.
 
 from collections.abc import Iterable, Sequence
 
-from eomgen.derivation.recursive import forces as fc
-from eomgen.derivation.recursive.articulated import respond
-from eomgen.derivation.recursive.composite import solved
-from eomgen.derivation.recursive.dynamics import Dynamics
-from eomgen.derivation.recursive.observe import arm
-from eomgen.derivation.recursive.vectors import Vec, add, cross, in_space, turning_in_space, zeros
+from eomgen.dynamics import forces as fc
+from eomgen.dynamics.articulated import respond
+from eomgen.dynamics.composite import solved
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.observe import arm
+from eomgen.dynamics.vectors import Vec, add, cross, in_space, turning_in_space, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
 from eomgen.scene.joints.base import WORLD

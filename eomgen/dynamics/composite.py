@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from eomgen.derivation.recursive.forces import Force, at_parent
-from eomgen.derivation.recursive.frames import Rigid, joined
-from eomgen.derivation.recursive.instant import Instant, Link
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.forces import Force, at_parent
+from eomgen.dynamics.frames import Rigid, joined
+from eomgen.dynamics.instant import Instant, Link
+from eomgen.dynamics.vectors import (
     ENTRIES,
     Vec,
     add,

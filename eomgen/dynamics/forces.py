@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eomgen.derivation.recursive.frames import Linkage
-from eomgen.derivation.recursive.instant import Instant, Link
-from eomgen.derivation.recursive.motion import Acceleration, inertial_force
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.frames import Linkage
+from eomgen.dynamics.instant import Instant, Link
+from eomgen.dynamics.motion import Acceleration, inertial_force
+from eomgen.dynamics.vectors import (
     Vec,
     add,
     constant,

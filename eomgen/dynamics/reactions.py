@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from eomgen.derivation.recursive import observe
-from eomgen.derivation.recursive.dynamics import Dynamics
-from eomgen.derivation.recursive.forces import Force
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics import observe
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.forces import Force
+from eomgen.dynamics.vectors import (
     Vec,
     add,
     cross,

@@ -9,14 +9,14 @@ move a coordinate axis.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from eomgen.derivation.recursive.axes import (
+from eomgen.dynamics.axes import (
     is_graded,
     is_straight,
     with_simple_axes,
     with_simple_origins,
 )
-from eomgen.derivation.recursive.frames import Frame, Linkage, Mount, Rigid, joined
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.frames import Frame, Linkage, Mount, Rigid, joined
+from eomgen.dynamics.vectors import (
     ENTRIES,
     Symmetric,
     Vec,

@@ -27,9 +27,9 @@ tip hangs in line with all joints, of which rounding of sines and cosines knows 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from eomgen.derivation.recursive.aligned import aligned
-from eomgen.derivation.recursive.articulated import along, with_component
-from eomgen.derivation.recursive.forces import (
+from eomgen.dynamics.aligned import aligned
+from eomgen.dynamics.articulated import along, with_component
+from eomgen.dynamics.forces import (
     Force,
     at_parent,
     moved_to,
@@ -37,10 +37,10 @@ from eomgen.derivation.recursive.forces import (
     on_frames,
     total,
 )
-from eomgen.derivation.recursive.instant import Axis, Instant, Link
-from eomgen.derivation.recursive.motion import Acceleration, moment_about_centre
-from eomgen.derivation.recursive.possible import column_of, moved, possible, slides_of, turns_of
-from eomgen.derivation.recursive.rows import (
+from eomgen.dynamics.instant import Axis, Instant, Link
+from eomgen.dynamics.motion import Acceleration, moment_about_centre
+from eomgen.dynamics.possible import column_of, moved, possible, slides_of, turns_of
+from eomgen.dynamics.rows import (
     Column,
     Eliminated,
     Row,
@@ -53,8 +53,8 @@ from eomgen.derivation.recursive.rows import (
     turned,
     turned_back,
 )
-from eomgen.derivation.recursive.solids import Ranks, Solid
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.solids import Ranks, Solid
+from eomgen.dynamics.vectors import (
     AXES,
     Vec,
     add,

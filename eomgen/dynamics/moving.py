@@ -4,18 +4,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from eomgen.derivation.recursive.frames import Linkage
-from eomgen.derivation.recursive.instant import Axes, Instant, at_instant
-from eomgen.derivation.recursive.linkage import make_linkage
-from eomgen.derivation.recursive.motion import Twist, velocities
-from eomgen.derivation.recursive.observe import (
+from eomgen.dynamics.frames import Linkage
+from eomgen.dynamics.instant import Axes, Instant, at_instant
+from eomgen.dynamics.linkage import make_linkage
+from eomgen.dynamics.motion import Twist, velocities
+from eomgen.dynamics.observe import (
     Places,
     orientation,
     places,
     position,
     velocity,
 )
-from eomgen.derivation.recursive.vectors import Vec, in_space, times, zeros
+from eomgen.dynamics.vectors import Vec, in_space, times, zeros
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.model import Model, Seat, ways_of

@@ -9,11 +9,11 @@ along one line only, and are along that whose turn is the lighter beside what tu
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from eomgen.derivation.recursive.forces import Force
-from eomgen.derivation.recursive.instant import Link
-from eomgen.derivation.recursive.rotations import AxisTurn, Both, Rotation, Unturned
-from eomgen.derivation.recursive.solids import Ranks, Solid
-from eomgen.derivation.recursive.vectors import AXES, Vec, add, sub, zeros
+from eomgen.dynamics.forces import Force
+from eomgen.dynamics.instant import Link
+from eomgen.dynamics.rotations import AxisTurn, Both, Rotation, Unturned
+from eomgen.dynamics.solids import Ranks, Solid
+from eomgen.dynamics.vectors import AXES, Vec, add, sub, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from eomgen.derivation.recursive.frames import Linkage
-from eomgen.derivation.recursive.instant import Instant
-from eomgen.derivation.recursive.motion import Twist, momentum_of
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.frames import Linkage
+from eomgen.dynamics.instant import Instant
+from eomgen.dynamics.motion import Twist, momentum_of
+from eomgen.dynamics.vectors import (
     Mat,
     Vec,
     add,

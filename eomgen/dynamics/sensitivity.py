@@ -21,12 +21,12 @@ moment 2 A x with A = (h·v) 1 - v hᵀ - [ω]x E, where h = Σ m r and E = Σ m
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eomgen.derivation.recursive.composite import Entries, composite_bodies, force_to_move
-from eomgen.derivation.recursive.forces import Force, at_parent, carried, inertial, total
-from eomgen.derivation.recursive.frames import Rigid
-from eomgen.derivation.recursive.instant import Instant, Link
-from eomgen.derivation.recursive.motion import Acceleration, Twist, momentum_of
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.composite import Entries, composite_bodies, force_to_move
+from eomgen.dynamics.forces import Force, at_parent, carried, inertial, total
+from eomgen.dynamics.frames import Rigid
+from eomgen.dynamics.instant import Instant, Link
+from eomgen.dynamics.motion import Acceleration, Twist, momentum_of
+from eomgen.dynamics.vectors import (
     AXES,
     Mat,
     Vec,

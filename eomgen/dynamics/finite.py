@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
+from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import Driven, Effect

@@ -3,9 +3,9 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from eomgen.derivation.recursive.instant import Instant, Link
-from eomgen.derivation.recursive.solids import Solid
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.instant import Instant, Link
+from eomgen.dynamics.solids import Solid
+from eomgen.dynamics.vectors import (
     Mat,
     Vec,
     add,

@@ -14,8 +14,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
-from eomgen.derivation.recursive.instant import Axis, Link
-from eomgen.derivation.recursive.vectors import AXES, Vec, add, cross, unit, zeros
+from eomgen.dynamics.instant import Axis, Link
+from eomgen.dynamics.vectors import AXES, Vec, add, cross, unit, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 
 TINY = 1e-200

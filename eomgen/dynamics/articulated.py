@@ -16,9 +16,9 @@ resistance passes on to the parent.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eomgen.derivation.recursive.forces import Force, at_parent, total
-from eomgen.derivation.recursive.instant import Axis, Instant, Link
-from eomgen.derivation.recursive.vectors import (
+from eomgen.dynamics.forces import Force, at_parent, total
+from eomgen.dynamics.instant import Axis, Instant, Link
+from eomgen.dynamics.vectors import (
     AXES,
     ENTRIES,
     Mat,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eomgen.derivation.recursive.articulated import (
+from eomgen.dynamics.articulated import (
     Resistance,
     eliminated,
     inertia_along,
@@ -17,10 +17,10 @@ from eomgen.derivation.recursive.articulated import (
     moved_to_parent,
     resistance_of,
 )
-from eomgen.derivation.recursive.composite import composite_bodies
-from eomgen.derivation.recursive.instant import Axes, at_instant
-from eomgen.derivation.recursive.linkage import make_linkage
-from eomgen.derivation.recursive.vectors import Mat
+from eomgen.dynamics.composite import composite_bodies
+from eomgen.dynamics.instant import Axes, at_instant
+from eomgen.dynamics.linkage import make_linkage
+from eomgen.dynamics.vectors import Mat
 from eomgen.errors import SceneError
 from eomgen.language.formula import Constant, Formula
 from eomgen.model.model import Body, Model

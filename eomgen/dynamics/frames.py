@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from eomgen.derivation.recursive.vectors import Symmetric, Vec, add, plus
+from eomgen.dynamics.vectors import Symmetric, Vec, add, plus
 from eomgen.scalars.exact import Matrix, Real
 from eomgen.scalars.protocol import Scalar
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.derivation.recursive.askew import askew
-from eomgen.derivation.recursive.dynamics import Dynamics, Values
-from eomgen.derivation.recursive.frames import Linkage
-from eomgen.derivation.recursive.instant import Axes
-from eomgen.derivation.recursive.linkage import make_linkage
+from eomgen.dynamics.askew import askew
+from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.frames import Linkage
+from eomgen.dynamics.instant import Axes
+from eomgen.dynamics.linkage import make_linkage
 from eomgen.model.model import Model
 from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
 from eomgen.scalars.floats import ArrayScalars
