@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-from eomgen.backends.javascript import javascript_poses
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.javascript import javascript_poses
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.dynamics.regular import check_regular
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
-from eomgen.program.route import routed
 from eomgen.scene.schema import Scene
 
 

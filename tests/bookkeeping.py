@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 from engine import MP, STEP, Engine, along, exact, read
 
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.elaborate import build_model
-from eomgen.program.route import routed
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.schema import Scene

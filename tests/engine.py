@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eomgen.backends.python import python_module
+from eomgen.codegen import from_recursion as recording
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
+from eomgen.codegen.system import System
 from eomgen.language.formula import names_in
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
-from eomgen.program import from_recursion as recording
-from eomgen.program.digits import evaluator
-from eomgen.program.route import routed
-from eomgen.program.system import System
+from eomgen.program.extended import evaluator
 from eomgen.program.tape import TIME
 from eomgen.run.module import load_module
 from eomgen.scalars.extended import MP, Digits, exact

@@ -27,7 +27,7 @@ FLOORS = (
     "dynamics",
     "templating",
     "program",
-    "backends",
+    "codegen",
     "pipeline",
     "store",
     "run",

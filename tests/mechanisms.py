@@ -11,10 +11,10 @@ from campaign import some
 from engine import Engine
 from newton_euler import Mechanism, Motion, solve
 
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.from_equations import from_equations
 from eomgen.derivation.closed import Equations, derive
 from eomgen.model.elaborate import build_model
-from eomgen.program.from_equations import from_equations
 from eomgen.scene.reader import parse_scene, read_scene
 
 BUILT_IN = ("double_pendulum", "pendulum", "two_body", "two_body_forced")

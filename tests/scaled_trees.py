@@ -10,6 +10,8 @@ import numpy as np
 from engine import MP
 from spatial_trees import random_spatial_tree
 
+from eomgen.codegen.route import Routed, routed
+from eomgen.codegen.system import System
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
@@ -17,8 +19,6 @@ from eomgen.language.formula import Constant
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.program.program import interpret
-from eomgen.program.route import Routed, routed
-from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
 from eomgen.scalars.floats import FloatScalars

@@ -10,10 +10,10 @@ from typing import Any, Literal
 import numpy as np
 from engine import Engine, read
 
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.language.formula import parse
 from eomgen.model.elaborate import build_model
-from eomgen.program.route import routed
 from eomgen.run.module import load_module
 from eomgen.scene.effects.base import (
     Contact,

@@ -16,7 +16,7 @@ from campaign import FULL
 from effect_cases import BASES, CASES, TRIED, Case
 from engine import Engine
 
-from eomgen.backends.python import OWN
+from eomgen.codegen.backends.python import OWN
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_scene
 from eomgen.scene.effects import Effect

@@ -15,6 +15,7 @@ import pytest
 from aligned_trees import Case, case, exactly, names, nearby, scene
 from campaign import some
 
+from eomgen.codegen.route import ENOUGH, FEWEST, routed
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.regular import check_regular
@@ -22,7 +23,6 @@ from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate
 from eomgen.program.program import interpreter
-from eomgen.program.route import ENOUGH, FEWEST, routed
 from eomgen.program.tape import TIME
 from eomgen.run.module import GeneratedModule, load_module
 from eomgen.scalars import exact

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from floors import FLOORS, PACKAGE, imports, modules, nodes, room
 
+from eomgen.codegen.from_recursion import BESIDE, OBSERVED, OF_DYNAMICS
 from eomgen.outputs import DERIVATIVES, OUTPUTS
-from eomgen.program.from_recursion import BESIDE, OBSERVED, OF_DYNAMICS
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.scene.json_schema import json_schema
 from eomgen.scene.reader import BUILT_IN, built_in_names, read_scene

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from engine import MP, Digits, apart, exact, read
 
-from eomgen.backends.python import python_module
 from eomgen.cli import main
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
+from eomgen.codegen.system import System
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
-from eomgen.program.digits import evaluator
+from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, Program, finish, interpret
-from eomgen.program.route import routed
-from eomgen.program.system import System
 from eomgen.program.tape import TIME, ExactTape, Stage, Tape
 from eomgen.run.module import load_module
 from eomgen.scalars.functions import FUNCTIONS

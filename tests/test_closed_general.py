@@ -16,6 +16,10 @@ from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
 import eomgen.derivation.general
 from eomgen.cli import main
+from eomgen.codegen.from_general import from_general
+from eomgen.codegen.from_recursion import Recording, from_recursion
+from eomgen.codegen.route import routed
+from eomgen.codegen.system import System
 from eomgen.derivation.general.constraints import about, hat, of_quaternion, state_joints
 from eomgen.derivation.general.derive import GeneralEquations, derive_general
 from eomgen.derivation.general.simplify import gathered, sum_of_squares
@@ -27,11 +31,7 @@ from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_model
-from eomgen.program.digits import evaluator
-from eomgen.program.from_general import from_general
-from eomgen.program.from_recursion import Recording, from_recursion
-from eomgen.program.route import routed
-from eomgen.program.system import System
+from eomgen.program.extended import evaluator
 from eomgen.run.module import load_module
 from eomgen.scene.joints import Free
 from eomgen.scene.reader import parse_scene, read_scene

@@ -20,13 +20,13 @@ from scipy.optimize import brentq
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
-from eomgen.backends.python import python_module
 from eomgen.cli import main
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.outputs import OUTPUTS
-from eomgen.program.route import routed
 from eomgen.scalars.exact import Real
 from eomgen.scene.effects.base import Contact, JointLoad, Load
 from eomgen.scene.effects.vectors import NEAREST

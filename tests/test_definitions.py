@@ -5,10 +5,10 @@ import time
 import numpy as np
 import pytest
 
+from eomgen.codegen.from_recursion import Recording
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_scene
-from eomgen.program.from_recursion import Recording
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
 

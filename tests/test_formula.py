@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from engine import engine
 
-from eomgen.backends.javascript import DIALECT
+from eomgen.codegen.backends.javascript import DIALECT
 from eomgen.errors import SceneError
 from eomgen.language import formula as reader
 from eomgen.language.formula import (

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from engine import MP, engine, quick
 
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.language.formula import Constant, Formula, evaluate, parse
 from eomgen.model.elaborate import build_model
-from eomgen.program.route import routed
 from eomgen.program.tape import Tape
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eomgen.backends.python import python_module
 from eomgen.cli import main
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.errors import RunError
 from eomgen.model.elaborate import build_model
-from eomgen.program.route import routed
 from eomgen.run.guard import LOST, Guard, Watch
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import StepFailure

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.finite import values_at
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
-from eomgen.program.route import routed
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import BUILT_IN, parse_scene

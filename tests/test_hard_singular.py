@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.dynamics.regular import check_regular, resistances
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
-from eomgen.program.route import routed
 from eomgen.run.integrate import integrate
 from eomgen.run.limits import locks
 from eomgen.run.module import as_problem, load_module

@@ -16,8 +16,8 @@ from striking import (
     touching_velocities,
 )
 
+from eomgen.codegen import from_recursion as recording
 from eomgen.errors import SceneError
-from eomgen.program import from_recursion as recording
 
 FREE = """\
 [[bodies]]

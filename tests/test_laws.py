@@ -18,12 +18,12 @@ from campaign import some
 from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
+from eomgen.codegen.from_recursion import Recording
+from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.elaborate import build_model
-from eomgen.program.from_recursion import Recording
 from eomgen.program.program import Output, Program, cost, finish, live_steps
-from eomgen.program.route import routed
 from eomgen.program.tape import TIME, Stage
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import ExternalForce, Gravity, Motor

@@ -13,8 +13,8 @@ from engine import DERIVATIVES, along, apart, engine, exact
 from spatial_trees import PLANE, SPACE, random_spatial_tree
 from test_show_space import page_parts
 
-from eomgen.backends.javascript import javascript_poses
 from eomgen.cli import main
+from eomgen.codegen.backends.javascript import javascript_poses
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model

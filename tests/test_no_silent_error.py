@@ -13,9 +13,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scaled_trees import apart, drawn, dynamics, found, size_of, state, truth
 
+from eomgen.codegen.route import Routed, routed
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
-from eomgen.program.route import Routed, routed
 from eomgen.scalars.extended import Bits, sixty_digits
 
 BOUND, TIMES = 1e-10, 1e3

@@ -17,15 +17,15 @@ import pytest
 from campaign import some
 from engine import MP, Digits, apart, engine
 
+from eomgen.codegen.from_recursion import Recording, from_recursion
+from eomgen.codegen.route import recorded, routed
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.impulses import response
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
-from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.program import Output, cost, finish, interpret
-from eomgen.program.route import recorded, routed
 from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
 from eomgen.scalars.floats import ArrayScalars, FloatScalars
 from eomgen.scene.reader import find_scene, parse_scene

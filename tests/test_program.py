@@ -15,11 +15,11 @@ from engine import MP
 from mechanisms import BUILT_IN, compiled, load, random_tree
 from newton_euler import Mechanism, solve
 
+from eomgen.codegen import system as finishing
+from eomgen.codegen.from_equations import from_equations
 from eomgen.pipeline import compile_scene
-from eomgen.program import system as finishing
 from eomgen.program.differentiate import jacobian
-from eomgen.program.digits import evaluator
-from eomgen.program.from_equations import from_equations
+from eomgen.program.extended import evaluator
 from eomgen.program.passes import PASSES, optimise_and_report
 from eomgen.program.program import Output, Program, cost, finish, interpret, live_steps
 from eomgen.program.tape import Node, Stage, Tape, power, total

@@ -16,7 +16,7 @@ import pytest
 from matplotlib.text import Text
 from pydantic import TypeAdapter
 
-from eomgen.backends.javascript import javascript_poses
+from eomgen.codegen.backends.javascript import javascript_poses
 from eomgen.errors import SceneError
 from eomgen.program.program import Output, finish
 from eomgen.program.tape import Stage, Tape

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from eomgen.cli import main
+from eomgen.codegen.route import routed
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.model.elaborate import build_model
 from eomgen.outputs import OUTPUTS
 from eomgen.program.program import cost
-from eomgen.program.route import routed
 from eomgen.run.integrators import find_integrator
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.study.bill import difference

@@ -13,12 +13,12 @@ from campaign import some
 from engine import MP, read
 from gmpy2 import mpfr
 
-from eomgen.backends.python import python_module
 from eomgen.cli import main
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.errors import RunError
 from eomgen.model.elaborate import build_model, in_order
 from eomgen.model.model import Model
-from eomgen.program.route import routed
 from eomgen.run.module import load_module
 from eomgen.scene.reader import find_scene, parse_scene
 from eomgen.study import drift as drifting

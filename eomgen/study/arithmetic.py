@@ -13,10 +13,10 @@ from typing import Any, get_args
 
 import numpy as np
 
+from eomgen.codegen.route import routed
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.program.route import routed
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
 from eomgen.scalars.extended import DIGITS

@@ -10,11 +10,11 @@ from functools import partial
 from math import inf
 from typing import get_args
 
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed, why_not_compared
 from eomgen.dynamics.regular import check_regular
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
-from eomgen.program.route import routed, why_not_compared
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route, Scene

@@ -3,11 +3,11 @@
 from dataclasses import dataclass, replace
 from typing import get_args
 
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed, why_not_compared
+from eomgen.codegen.system import System
 from eomgen.errors import EomgenError
 from eomgen.model.model import Model
-from eomgen.program.route import routed, why_not_compared
-from eomgen.program.system import System
 from eomgen.run.module import GeneratedModule, load_module
 from eomgen.scene.schema import Route
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.codegen.system import System
 from eomgen.program.program import interpret
-from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.run.problem import Floats
 from eomgen.scalars.functions import FUNCTIONS

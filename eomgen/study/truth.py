@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.codegen.from_recursion import Recording
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.finite import values_at
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
-from eomgen.program.digits import evaluator
-from eomgen.program.from_recursion import Recording
+from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, finish, interpreter
 from eomgen.program.tape import TIME, ExactTape
 from eomgen.run.problem import Floats

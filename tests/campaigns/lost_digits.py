@@ -24,9 +24,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from spatial_trees import ORIGIN, PLANE, SPACE, SpatialTree, TreeBody, TreeJoint
 
-from eomgen.backends.python import python_module
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed
 from eomgen.model.elaborate import build_model
-from eomgen.program.route import routed
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
 from eomgen.show.style import FAINT, INK, style

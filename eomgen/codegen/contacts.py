@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from itertools import chain
 
+from eomgen.codegen.system import ContactLabel, Made
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.impulses import generalised, pressed, rough, scaled, struck
 from eomgen.program.differentiate import tangent
-from eomgen.program.system import ContactLabel, Made
 from eomgen.program.tape import Node, Stage, Tape, total
 from eomgen.scene.effects.base import Contact, JointLoad
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from eomgen.codegen.system import System
 from eomgen.program.printing import Dialect, Names, print_block
-from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.templating import render

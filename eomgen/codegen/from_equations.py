@@ -5,6 +5,7 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.codegen.system import Made, System, make_system, output_shape
 from eomgen.derivation.closed import Equations, written_out_forces
 from eomgen.derivation.forms import state_form
 from eomgen.derivation.free_bodies import SymbolicMechanism
@@ -16,7 +17,6 @@ from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
-from eomgen.program.system import Made, System, make_system, output_shape
 from eomgen.program.tape import Node, Stage, Tape
 from eomgen.scene.effects.base import JointLoad
 

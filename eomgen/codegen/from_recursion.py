@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
+from eomgen.codegen.contacts import Forward, contact_labels, contact_outputs
+from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, make_system, output_shape
 from eomgen.dynamics import observe
 from eomgen.dynamics.composite import Entries, full, solved
 from eomgen.dynamics.dynamics import Dynamics, Values
@@ -13,11 +15,9 @@ from eomgen.dynamics.vectors import Vec, in_space, sub, zeros
 from eomgen.model.model import Model, is_zero
 from eomgen.model.states import velocity_states
 from eomgen.outputs import DERIVATIVES
-from eomgen.program.contacts import Forward, contact_labels, contact_outputs
 from eomgen.program.differentiate import jacobian, substituted, tangent
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
-from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system, output_shape
 from eomgen.program.tape import TIME, Node, Stage, Tape
 
 DIFFERENTIATED = ("closed", "orthogonal")

@@ -7,12 +7,7 @@ forces in the joints, comes from the recursions over the same tape.
 from collections.abc import Sequence
 from typing import Any
 
-from eomgen.derivation.general.derive import GeneralEquations
-from eomgen.language.formula import evaluate
-from eomgen.model.states import velocity_states
-from eomgen.outputs import DERIVATIVES
-from eomgen.program.differentiate import jacobian as slopes_of
-from eomgen.program.from_recursion import (
+from eomgen.codegen.from_recursion import (
     Recording,
     along_directions,
     checks,
@@ -20,9 +15,14 @@ from eomgen.program.from_recursion import (
     output,
     variables,
 )
+from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, make_system, output_shape
+from eomgen.derivation.general.derive import GeneralEquations
+from eomgen.language.formula import evaluate
+from eomgen.model.states import velocity_states
+from eomgen.outputs import DERIVATIVES
+from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
-from eomgen.program.system import LARGEST_JACOBIAN, Made, System, make_system, output_shape
 from eomgen.program.tape import Node
 
 

@@ -4,16 +4,16 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from eomgen.codegen.from_recursion import Recording, from_recursion
+from eomgen.codegen.system import System
 from eomgen.derivation.supported import why_not_closed, why_not_pins, why_not_tried
 from eomgen.dynamics.digits import ALL, Route, digits_lost
 from eomgen.dynamics.instant import Axes
 from eomgen.dynamics.moving import Values
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
-from eomgen.program.from_recursion import Recording, from_recursion
 from eomgen.program.passes import optimise
 from eomgen.program.program import Output, Program, cost, finish, interpreter
-from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.scalars.floats import ArrayScalars
 
@@ -225,12 +225,12 @@ def why_not_compared(model: Model, route: str) -> str:
 def _closed(model: Model, jacobian: bool) -> System:
     # Imported here because SymPy takes longer to load than everything else together.
     if why_not_pins(model):
+        from eomgen.codegen.from_general import from_general
         from eomgen.derivation.general.derive import derive_general
-        from eomgen.program.from_general import from_general
 
         return from_general(derive_general(model), jacobian=jacobian)
+    from eomgen.codegen.from_equations import from_equations
     from eomgen.derivation.closed import derive
-    from eomgen.program.from_equations import from_equations
 
     return from_equations(derive(model), jacobian=jacobian)
 

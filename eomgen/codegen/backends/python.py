@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from eomgen.backends.conditions import refusals
+from eomgen.codegen.backends.conditions import refusals
+from eomgen.codegen.system import System
 from eomgen.language.base import LARGEST
 from eomgen.language.formula import written
 from eomgen.model.model import Model
 from eomgen.outputs import DERIVATIVES, JACOBIAN, OUTPUTS
 from eomgen.program.printing import Block, Dialect, Names, print_block
 from eomgen.program.program import Program, cost, live_steps
-from eomgen.program.system import System
 from eomgen.program.tape import TIME
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.templating import render
