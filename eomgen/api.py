@@ -29,9 +29,9 @@ from eomgen.scene.schema import SHOWN, Form, Route, Scene
 from eomgen.store import Code, generated_code
 
 if TYPE_CHECKING:
-    from eomgen.study.linearise import Linearisation
-    from eomgen.study.trial import Setting
-    from eomgen.study.verify import Verified
+    from eomgen.linear.linearise import Linearisation
+    from eomgen.study.accuracy.trial import Setting
+    from eomgen.study.verification.verify import Verified
 
 Source = str | PathLike[str] | Mapping[str, Any] | Scene
 Values = Mapping[str, float]
@@ -156,9 +156,9 @@ def simulate(
     cannot be served.
     """
     from eomgen.show.observe import observe
-    from eomgen.study.aimed import UNKNOWN, aimed, made_again
-    from eomgen.study.moved import moved_problem
-    from eomgen.study.trial import Case
+    from eomgen.study.accuracy.aimed import UNKNOWN, aimed, made_again
+    from eomgen.study.accuracy.moved import moved_problem
+    from eomgen.study.accuracy.trial import Case
 
     model = overridden(check(source), form=form, route=route)
     asked = (*model.outputs, *SHOWN, *(("effect_powers",) if works else ()))
@@ -218,8 +218,8 @@ def linearise(
 
     Raises `RunError` where there is no equilibrium.
     """
-    from eomgen.study.equilibrium import equilibrium
-    from eomgen.study.linearise import linearise as linearised
+    from eomgen.linear.equilibrium import equilibrium
+    from eomgen.linear.linearise import linearise as linearised
 
     if at not in ("equilibrium", "rest", "initial"):
         raise RunError(f"at: '{at}' is none of equilibrium, rest, initial")
@@ -251,7 +251,7 @@ def verify(
     states  how many of each kind; None: as many as are quick
     bound   units in the last place that v̇ may be off; None: what half a unit in the data allows
     """
-    from eomgen.study.verify import verify as verified
+    from eomgen.study.verification.verify import verify as verified
 
     return verified(check(source), states=states, seed=seed, bound=bound)
 
@@ -302,7 +302,7 @@ def setting_of(
     Raises `RunError` for tolerances of a method that takes equal steps.
     """
     from eomgen.run.integrators import FixedStep, find_integrator
-    from eomgen.study.trial import Setting
+    from eomgen.study.accuracy.trial import Setting
 
     wanted = model.simulation
     name = wanted.integrator if integrator is None else integrator

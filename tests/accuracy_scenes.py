@@ -2,7 +2,7 @@
 """Scenes that are not built in, for `--accuracy` to be held against the truth.
 
 Each is the text of a scene. The ends of those in `CLOSED` are known in closed form, to 50 digits;
-the others' come from `eomgen.study.reference`, in 113 bits.
+the others' come from `eomgen.study.accuracy.reference`, in 113 bits.
 """
 
 from collections.abc import Callable

@@ -21,7 +21,7 @@ from eomgen.run.module import load_module
 from eomgen.scalars.extended import MP, Digits, exact
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Scene
-from eomgen.study.states import random_state
+from eomgen.study.verification.states import random_state
 
 __all__ = [
     "MP",

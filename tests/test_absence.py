@@ -21,7 +21,7 @@ from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_scene
 from eomgen.scene.effects import Effect
 from eomgen.scene.reader import parse_scene
-from eomgen.study.variants import removed, without_effects
+from eomgen.study.cost.variants import removed, without_effects
 
 GENERATED = Path(__file__).parent.parent / "generated"
 

@@ -18,13 +18,21 @@ from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.trajectory import COUNTS, Trajectory
 from eomgen.show.work_precision import COLOURS, TOP, Diagram, draw
-from eomgen.study import records, work_precision
-from eomgen.study import reference as truths
-from eomgen.study.ladder import Ladder, Rung, Work, atol_scale, first_steps, next_rung, order
-from eomgen.study.measure import scales
-from eomgen.study.reading import cheapest, observed_order, saved_by_jacobian
-from eomgen.study.reference import Reference
-from eomgen.study.work_precision import Bench, errors, measure, sweep
+from eomgen.study.accuracy import records, work_precision
+from eomgen.study.accuracy import reference as truths
+from eomgen.study.accuracy.ladder import (
+    Ladder,
+    Rung,
+    Work,
+    atol_scale,
+    first_steps,
+    next_rung,
+    order,
+)
+from eomgen.study.accuracy.measure import scales
+from eomgen.study.accuracy.reading import cheapest, observed_order, saved_by_jacobian
+from eomgen.study.accuracy.reference import Reference
+from eomgen.study.accuracy.work_precision import Bench, errors, measure, sweep
 
 FAST = 3.0
 APART = 1e-3

@@ -22,15 +22,15 @@ from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate
+from eomgen.precision.longs import doubles, long_digits
 from eomgen.program.program import interpreter
 from eomgen.program.tape import TIME
 from eomgen.run.module import GeneratedModule, load_module
 from eomgen.scalars import exact
 from eomgen.scalars.floats import ArrayScalars, FloatScalars
 from eomgen.scene.reader import find_scene, parse_scene
-from eomgen.study.longs import doubles, long_digits
-from eomgen.study.truth import Truth
-from eomgen.study.virtual_work import FreeBodies
+from eomgen.study.verification.truth import Truth
+from eomgen.study.verification.virtual_work import FreeBodies
 
 BOUND, TIMES = 1e-10, 1e3
 """Of v̇ relative to its largest component, or that of ω v; and of what half a unit in the last place

@@ -45,7 +45,7 @@ def test_the_running_half_does_without_sympy() -> None:
     """Loading, integrating, drawing: SymPy is neither needed nor imported."""
     code = (
         "import sys, eomgen.store, eomgen.run.integrate, eomgen.run.module, eomgen.commands, "
-        "eomgen.study.linearise, eomgen.study.equilibrium, eomgen.study.modes, "
+        "eomgen.linear.linearise, eomgen.linear.equilibrium, eomgen.linear.modes, "
         "eomgen.show.observe, eomgen.show.figure, eomgen.show.page; "
         "sys.exit('sympy' in sys.modules)"
     )

@@ -26,19 +26,19 @@ from eomgen.run.module import load_module
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.schema import Route
 from eomgen.study import timing
-from eomgen.study import visited as visiting
-from eomgen.study.arithmetic import (
+from eomgen.study.cost.arithmetic import (
     BASELINE,
     Arithmetic,
     Way,
     arithmetic,
     solve_operations,
 )
-from eomgen.study.single import Single, in_single, kernel_in_single
-from eomgen.study.states import random_state
-from eomgen.study.truth import Truth
-from eomgen.study.ulps import component_errors, ulp, vector_errors
-from eomgen.study.visited import visited
+from eomgen.study.cost.single import Single, in_single, kernel_in_single
+from eomgen.study.verification import visited as visiting
+from eomgen.study.verification.states import random_state
+from eomgen.study.verification.truth import Truth
+from eomgen.study.verification.ulps import component_errors, ulp, vector_errors
+from eomgen.study.verification.visited import visited
 
 ROD = """
 name = "rod"

@@ -14,9 +14,9 @@ from eomgen.pipeline import compile_model, compile_scene
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.study import timing
-from eomgen.study.bill import Bill, Item, bill
-from eomgen.study.omission import Run, distances
-from eomgen.study.variants import (
+from eomgen.study.cost.bill import Bill, Item, bill
+from eomgen.study.cost.omission import Run, distances
+from eomgen.study.cost.variants import (
     complete,
     removed,
     variants,

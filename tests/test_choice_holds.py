@@ -23,15 +23,15 @@ from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import Floats, Problem
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.store import generated_code
-from eomgen.study import search, trial
-from eomgen.study.budgeting import within
-from eomgen.study.choosing import meet
-from eomgen.study.estimate import looser
-from eomgen.study.ladder import Ladder, Rung, Work, next_rung
-from eomgen.study.measure import error
-from eomgen.study.moved import moved, moved_problem
-from eomgen.study.reference import reference
-from eomgen.study.trial import Case, Setting, Tried
+from eomgen.study.accuracy import search, trial
+from eomgen.study.accuracy.budgeting import within
+from eomgen.study.accuracy.choosing import meet
+from eomgen.study.accuracy.estimate import looser
+from eomgen.study.accuracy.ladder import Ladder, Rung, Work, next_rung
+from eomgen.study.accuracy.measure import error
+from eomgen.study.accuracy.moved import moved, moved_problem
+from eomgen.study.accuracy.reference import reference
+from eomgen.study.accuracy.trial import Case, Setting, Tried
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 

@@ -18,14 +18,14 @@ from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.trajectory import COUNTS, Trajectory
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.store import generated_code
-from eomgen.study import choosing
-from eomgen.study.budgeting import within
-from eomgen.study.choosing import meet
-from eomgen.study.estimate import by_second_run, difference, errors, fit, remaining
-from eomgen.study.measure import error
-from eomgen.study.moved import moved_problem
-from eomgen.study.reference import Reference, reference
-from eomgen.study.trial import Case, Setting, Tried, method_of
+from eomgen.study.accuracy import choosing
+from eomgen.study.accuracy.budgeting import within
+from eomgen.study.accuracy.choosing import meet
+from eomgen.study.accuracy.estimate import by_second_run, difference, errors, fit, remaining
+from eomgen.study.accuracy.measure import error
+from eomgen.study.accuracy.moved import moved_problem
+from eomgen.study.accuracy.reference import Reference, reference
+from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 

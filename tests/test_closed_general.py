@@ -389,7 +389,7 @@ def test_independent_of_the_recursions() -> None:
     for path in sorted(Path(eomgen.derivation.general.__file__).parent.glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.ImportFrom):
-                assert "recursive" not in str(node.module), path
+                assert "dynamics" not in str(node.module), path
                 assert not str(node.module).startswith("eomgen.program"), path
 
 

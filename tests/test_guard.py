@@ -13,13 +13,13 @@ from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.errors import RunError
 from eomgen.model.elaborate import build_model
+from eomgen.precision.guarding import guard_of
 from eomgen.run.guard import LOST, Guard, Watch
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import StepFailure
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
 from eomgen.scene.reader import parse_scene, read_scene
-from eomgen.study.guarding import guard_of
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 

@@ -15,7 +15,7 @@ from eomgen.model.model import Model
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import BUILT_IN, parse_scene
-from eomgen.study.truth import Truth
+from eomgen.study.verification.truth import Truth
 
 BOUND = 1e-12
 """Of v̇, in parts of its largest component; the worst so far, of 200 links, is 4e-13."""

@@ -18,7 +18,7 @@ from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
 from eomgen.run.trajectory import Trajectory, load_npz
-from eomgen.study.truth import Truth
+from eomgen.study.verification.truth import Truth
 
 DIGITS = np.finfo(float).eps / 2
 PENDULUM = """

@@ -19,7 +19,7 @@ from eomgen.run.integrate import integrate
 from eomgen.run.limits import locks
 from eomgen.run.module import as_problem, load_module
 from eomgen.scene.reader import parse_scene
-from eomgen.study.truth import Truth
+from eomgen.study.verification.truth import Truth
 
 WORSE = 30
 """Units of rounding times the condition number: what an error may be."""

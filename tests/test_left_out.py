@@ -17,6 +17,7 @@ from eomgen.cli import main
 from eomgen.codegen.backends.javascript import javascript_poses
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
+from eomgen.linear.equilibrium import equilibrium
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import generate
 from eomgen.run.integrate import integrate
@@ -24,7 +25,6 @@ from eomgen.run.module import as_problem
 from eomgen.scene.reader import parse_scene
 from eomgen.show.observe import observe
 from eomgen.show.page import render_page
-from eomgen.study.equilibrium import equilibrium
 
 ROUTES = ("aba", "ldl")
 

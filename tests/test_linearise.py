@@ -11,15 +11,15 @@ from scipy.linalg import expm
 
 from eomgen.cli import main
 from eomgen.errors import RunError
+from eomgen.linear.equilibrium import equilibrium
+from eomgen.linear.linearise import linearise
+from eomgen.linear.modes import controllable_rank, modes, stability
 from eomgen.model.elaborate import build_model
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.scene.schema import SHOWN
-from eomgen.study.equilibrium import equilibrium
-from eomgen.study.linearise import linearise
-from eomgen.study.modes import controllable_rank, modes, stability
 
 
 @cache

@@ -17,13 +17,13 @@ from mpmath import mp
 from eomgen.errors import RunError
 from eomgen.model.elaborate import build_model
 from eomgen.model.model import Model
+from eomgen.precision.precise import BITS, Precise, digits, precise
 from eomgen.run.module import as_problem, load_module
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.store import generated_code
-from eomgen.study import measure
-from eomgen.study.collocation import gauss, rows
-from eomgen.study.precise import BITS, Precise, digits, precise
-from eomgen.study.reference import LOOSE, TIGHT, reference
+from eomgen.study.accuracy import measure
+from eomgen.study.accuracy.collocation import gauss, rows
+from eomgen.study.accuracy.reference import LOOSE, TIGHT, reference
 
 ONE_SIDED = """
 name = "one_sided"

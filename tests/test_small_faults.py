@@ -15,7 +15,7 @@ from eomgen.outputs import OUTPUTS
 from eomgen.program.program import cost
 from eomgen.run.integrators import find_integrator
 from eomgen.scene.reader import parse_scene, read_scene
-from eomgen.study.bill import difference
+from eomgen.study.cost.bill import difference
 
 ROOT = Path(__file__).parent.parent
 POLE = """

@@ -24,7 +24,7 @@ from eomgen.model.model import Model
 from eomgen.pipeline import generate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import BUILT_IN, parse_scene, read_scene
-from eomgen.study.reference import reference
+from eomgen.study.accuracy.reference import reference
 
 KEY = "0123456789abcdef" * 2
 OTHER = KEY[::-1]

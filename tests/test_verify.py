@@ -19,19 +19,19 @@ from eomgen.codegen.route import routed
 from eomgen.errors import RunError
 from eomgen.model.elaborate import build_model, in_order
 from eomgen.model.model import Model
+from eomgen.precision.longs import doubles, long, long_digits
 from eomgen.run.module import load_module
 from eomgen.scene.reader import find_scene, parse_scene
-from eomgen.study import drift as drifting
-from eomgen.study import horizon as horizons
-from eomgen.study import visited as visiting
-from eomgen.study.hard_states import KINDS, hard_states
-from eomgen.study.horizon import horizon as horizon_of
-from eomgen.study.judging import judged
-from eomgen.study.laws import kept
-from eomgen.study.longs import doubles, long, long_digits
-from eomgen.study.truth import Truth
-from eomgen.study.verify import OUTPUTS, Verified, verify
-from eomgen.study.virtual_work import FreeBodies
+from eomgen.study.verification import drift as drifting
+from eomgen.study.verification import horizon as horizons
+from eomgen.study.verification import visited as visiting
+from eomgen.study.verification.hard_states import KINDS, hard_states
+from eomgen.study.verification.horizon import horizon as horizon_of
+from eomgen.study.verification.judging import judged
+from eomgen.study.verification.laws import kept
+from eomgen.study.verification.truth import Truth
+from eomgen.study.verification.verify import OUTPUTS, Verified, verify
+from eomgen.study.verification.virtual_work import FreeBodies
 
 SCREW = """
 name = "screw"

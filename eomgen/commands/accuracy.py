@@ -23,9 +23,9 @@ from eomgen.store import folder
 
 if TYPE_CHECKING:
     from eomgen.run.problem import Floats
-    from eomgen.study.ladder import Ladder, Rung, Work
-    from eomgen.study.reference import Reference
-    from eomgen.study.work_precision import Bench
+    from eomgen.study.accuracy.ladder import Ladder, Rung, Work
+    from eomgen.study.accuracy.reference import Reference
+    from eomgen.study.accuracy.work_precision import Bench
 
 
 def accuracy(given: Arguments) -> int:
@@ -45,11 +45,11 @@ def _runs(given: Arguments, model: Model, name: str) -> None:
     from eomgen import pipeline  # here, so that loading SymPy is not counted as deriving
     from eomgen.commands.accuracy_table import about, print_table
     from eomgen.show.style import check_figure
-    from eomgen.study import records
-    from eomgen.study.ladder import methods_named
-    from eomgen.study.reference import reference
-    from eomgen.study.reference import save as save_reference
-    from eomgen.study.work_precision import call_times
+    from eomgen.study.accuracy import records
+    from eomgen.study.accuracy.ladder import methods_named
+    from eomgen.study.accuracy.reference import reference
+    from eomgen.study.accuracy.reference import save as save_reference
+    from eomgen.study.accuracy.work_precision import call_times
 
     for option, value in (("--run-time", given.run_time), ("--time", given.time)):
         if not 0 < value < math.inf:
@@ -136,7 +136,7 @@ def _bench(
     """What runs of a model are measured by."""
     from eomgen.show.balance import keeps_energy
     from eomgen.show.observe import joint_drift
-    from eomgen.study.work_precision import Bench
+    from eomgen.study.accuracy.work_precision import Bench
 
     own = model.with_parameters(parameters)
     p = own.defaults
@@ -170,7 +170,7 @@ def _bench(
 
 def _check_reference(bench: "Bench") -> None:
     """Raise `RunError` where the reference does not even tell right from wrong."""
-    from eomgen.study.measure import WRONG
+    from eomgen.study.accuracy.measure import WRONG
 
     if not bench.floors[0] < WRONG:
         raise RunError(
@@ -180,7 +180,7 @@ def _check_reference(bench: "Bench") -> None:
 
 
 def _ladder(bench: "Bench", t_end: float, given: Arguments) -> "Ladder":
-    from eomgen.study.ladder import Ladder, atol_scale, first_steps
+    from eomgen.study.accuracy.ladder import Ladder, atol_scale, first_steps
 
     truth, noise = bench.reference, bench.problem.noise
     return Ladder(
@@ -203,7 +203,7 @@ def _climb(
     seconds: float,
 ) -> int:
     """Make the runs that are missing, each kept as soon as it is made; return how many."""
-    from eomgen.study.work_precision import sweep
+    from eomgen.study.accuracy.work_precision import sweep
 
     begin, made = time.perf_counter(), 0
     with terminal_line() as say:
@@ -232,7 +232,7 @@ def _print_origin(
 ) -> None:
     """Say which runs were made now, and which not at all."""
     from eomgen.commands.shared import print_listed
-    from eomgen.study.work_precision import left_out
+    from eomgen.study.accuracy.work_precision import left_out
 
     if shown > made:
         print(f"    {made} runs made now, {shown - made} taken from earlier (--fresh begins anew)")

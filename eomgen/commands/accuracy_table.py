@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from eomgen.commands.shared import print_wrapped
-from eomgen.study.ladder import Ladder, Work, order
-from eomgen.study.reading import TARGETS, cheapest, observed_order, saved_by_jacobian
-from eomgen.study.work_precision import Bench
+from eomgen.study.accuracy.ladder import Ladder, Work, order
+from eomgen.study.accuracy.reading import TARGETS, cheapest, observed_order, saved_by_jacobian
+from eomgen.study.accuracy.work_precision import Bench
 
 WORDS = {"wrong": "wrong", "failed": "failed", "over": "over", "refused": "not possible"}
 RUNNERS_UP = 2

@@ -13,7 +13,7 @@ from eomgen.model.model import Model
 from eomgen.run.progress import terminal_progress
 
 if TYPE_CHECKING:
-    from eomgen.study.arithmetic import Arithmetic, Way
+    from eomgen.study.cost.arithmetic import Arithmetic, Way
 
 MOST_STATES = 100_000
 HEADS = {
@@ -39,7 +39,7 @@ def print_arithmetic(given: Arguments, model: Model, name: str) -> None:
     """Judge, print and draw the arithmetic of every route of a scene's model."""
     # Imported here: nothing else needs Matplotlib, or that many digits.
     from eomgen.show.arithmetic import save_figure, save_table
-    from eomgen.study.arithmetic import arithmetic
+    from eomgen.study.cost.arithmetic import arithmetic
 
     check_arithmetic(given, name)
     model = model.with_parameters(assignments(given.set, model.defaults, "--set"))

@@ -12,8 +12,8 @@ from eomgen.errors import RunError
 
 if TYPE_CHECKING:
     from eomgen.show.motion import Motion
-    from eomgen.study.search import Choice
-    from eomgen.study.trial import Case, Tried
+    from eomgen.study.accuracy.search import Choice
+    from eomgen.study.accuracy.trial import Case, Tried
 
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0}
 DRIFTED = 2e-3
@@ -47,7 +47,7 @@ def seconds_of(text: str) -> float:
 
 def choose(case: "Case", given: Arguments) -> "Choice":
     """The run that is asked for by its error or its time; each run tried for it is told."""
-    from eomgen.study.aimed import aimed
+    from eomgen.study.accuracy.aimed import aimed
 
     def say(text: str) -> None:
         print(f"    trying {text}", flush=True)
@@ -65,7 +65,7 @@ def print_choice(choice: "Choice", given: Arguments) -> str:
     print(f"    error estimate {_error(choice.error)} at the end{_most(choice)}")
     print(f"    it took {run.seconds:.2g} s, all {choice.runs} runs tried {choice.seconds:.2g} s")
     if not choice.met:
-        from eomgen.study.aimed import UNKNOWN
+        from eomgen.study.accuracy.aimed import UNKNOWN
 
         why = choice.reason or UNKNOWN
         return (
@@ -77,8 +77,8 @@ def print_choice(choice: "Choice", given: Arguments) -> str:
 
 def print_estimate(case: "Case", tried: "Tried") -> None:
     """Say a run's error by a second run, which is made here."""
-    from eomgen.study.estimate import by_second_run
-    from eomgen.study.measure import WRONG
+    from eomgen.study.accuracy.estimate import by_second_run
+    from eomgen.study.accuracy.measure import WRONG
 
     found = by_second_run(case, tried)
     second = found.second

@@ -10,7 +10,7 @@ from eomgen.run.progress import terminal_progress
 from eomgen.scene.reader import read_scene
 
 if TYPE_CHECKING:
-    from eomgen.study.bill import Bill, Item
+    from eomgen.study.cost.bill import Bill, Item
 
 OWN, SHARED = "the mechanism itself", "shared by effects"
 
@@ -20,8 +20,8 @@ def effects(given: Arguments) -> int:
     # Imported here: nothing else needs Matplotlib for costs.
     from eomgen.show.bill import save_bill
     from eomgen.show.style import check_figure
-    from eomgen.study.bill import bill
-    from eomgen.study.variants import variants
+    from eomgen.study.cost.bill import bill
+    from eomgen.study.cost.variants import variants
 
     if not 0 < given.motion_time < math.inf:
         raise RunError(f"--motion-time: {given.motion_time:g} is no positive time; give one in s")
@@ -51,7 +51,7 @@ def effects(given: Arguments) -> int:
 
 
 def _print_items(bill: "Bill") -> None:
-    from eomgen.study.bill import difference
+    from eomgen.study.cost.bill import difference
 
     operations, seconds, spread = bill.shared
     width = max(len(OWN), *(len(item.label) for item in bill.items), 0)

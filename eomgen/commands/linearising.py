@@ -19,14 +19,14 @@ from eomgen.commands.shared import (
 )
 from eomgen.errors import RunError
 from eomgen.files import check_writable
+from eomgen.linear.equilibrium import equilibrium
+from eomgen.linear.linearise import Linearisation, is_steady, rate_unit, save
+from eomgen.linear.linearise import linearise as linearised
+from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import find_scene
-from eomgen.study.equilibrium import equilibrium
-from eomgen.study.linearise import Linearisation, is_steady, rate_unit, save
-from eomgen.study.linearise import linearise as linearised
-from eomgen.study.modes import Mode, controllable_rank, modes, stability
 
 WIDEST = 12
 """States up to which A and B are printed."""

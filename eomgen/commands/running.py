@@ -41,8 +41,8 @@ from eomgen.store import Code
 if TYPE_CHECKING:
     from eomgen.run.guard import Guard
     from eomgen.show.motion import Motion
-    from eomgen.study.search import Choice
-    from eomgen.study.trial import Case, Setting, Tried
+    from eomgen.study.accuracy.search import Choice
+    from eomgen.study.accuracy.trial import Case, Setting, Tried
 
 
 def simulate(given: Arguments) -> int:
@@ -51,9 +51,9 @@ def simulate(given: Arguments) -> int:
     from eomgen.run.resume import going_on
     from eomgen.run.trajectory import load_npz
     from eomgen.show.observe import observe
-    from eomgen.study.aimed import made_again
-    from eomgen.study.moved import moved_problem
-    from eomgen.study.trial import Case
+    from eomgen.study.accuracy.aimed import made_again
+    from eomgen.study.accuracy.moved import moved_problem
+    from eomgen.study.accuracy.trial import Case
 
     check_choice(given)
     model, name = read_model(given.scene, given)
@@ -230,7 +230,7 @@ def _guard(
     """What watches the run, if that is asked for."""
     if given.guard is None:
         return None
-    from eomgen.study.guarding import guard_of
+    from eomgen.precision.guarding import guard_of
 
     return guard_of(module, *values, repairs=given.guard == "repair")
 

@@ -13,7 +13,7 @@ from eomgen.run.progress import terminal_progress
 from eomgen.store import generated_code
 
 if TYPE_CHECKING:
-    from eomgen.study.horizon import Horizon
+    from eomgen.study.verification.horizon import Horizon
 
 MOST_STATES = 10_000
 
@@ -21,8 +21,8 @@ MOST_STATES = 10_000
 def verify(given: Arguments) -> int:
     """Verify, print, write the evidence if asked; raise `RunError` when a bound is missed."""
     # Imported here: nothing else needs that many digits.
-    from eomgen.study import evidence
-    from eomgen.study.verify import verify as verified
+    from eomgen.study.verification import evidence
+    from eomgen.study.verification.verify import verify as verified
 
     if given.states is not None and not 1 <= given.states <= MOST_STATES:
         raise RunError(f"--states: {given.states} is not a number from 1 to {MOST_STATES}")
@@ -56,7 +56,7 @@ def verify(given: Arguments) -> int:
 
 
 def _horizon(given: Arguments, model: Model, name: str) -> "Horizon | None":
-    from eomgen.study.horizon import horizon
+    from eomgen.study.verification.horizon import horizon
 
     if given.horizon is None:
         return None

@@ -12,7 +12,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from eomgen.files import write_whole
 from eomgen.run.problem import Floats
 from eomgen.show.style import FAINT, INK, PALETTE, plain, style, write_figure
-from eomgen.study.arithmetic import Arithmetic, Way
+from eomgen.study.cost.arithmetic import Arithmetic, Way
 
 LEAST = 0.05
 """What is less stands at the edge: a logarithmic axis has no 0."""

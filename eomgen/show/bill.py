@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from eomgen.show.style import FAINT, PALETTE, plain, style, write_figure
-from eomgen.study.bill import Bill, Item, difference
-from eomgen.study.omission import Change
-from eomgen.study.variants import Kind
+from eomgen.study.cost.bill import Bill, Item, difference
+from eomgen.study.cost.omission import Change
+from eomgen.study.cost.variants import Kind
 
 MOST_BARS = 40
 OWN = FAINT

@@ -14,8 +14,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.show.style import ALARM, FAINT, INK, colours, plain, style, write_figure
-from eomgen.study.ladder import Kind, Work, kind, order
-from eomgen.study.measure import WRONG
+from eomgen.study.accuracy.ladder import Kind, Work, kind, order
+from eomgen.study.accuracy.measure import WRONG
 
 COLOURS = {
     "euler": "#999999",

@@ -7,8 +7,8 @@ For each scene (all built-in ones; with --own those of `tests/accuracy_scenes.py
 the true error of the run chosen, its estimate, its time and that of the whole search, beside that
 of the quickest run of any method over a ladder of tolerances or steps whose true error is below the
 target, found afterwards. Errors are those of the last state, against a closed form where there is
-one and `eomgen.study.reference` where not. Times are of the processor. What is done is kept in
-FOLDER and not done again.
+one and `eomgen.study.accuracy.reference` where not. Times are of the processor. What is done is
+kept in FOLDER and not done again.
 """
 
 import argparse
@@ -33,11 +33,11 @@ from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene, read_scene
 from eomgen.store import generated_code
-from eomgen.study.choosing import meet
-from eomgen.study.measure import error
-from eomgen.study.moved import moved_problem
-from eomgen.study.reference import reference
-from eomgen.study.trial import Case, Setting, Tried, method_of
+from eomgen.study.accuracy.choosing import meet
+from eomgen.study.accuracy.measure import error
+from eomgen.study.accuracy.moved import moved_problem
+from eomgen.study.accuracy.reference import reference
+from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
 
 TARGETS = (1e-3, 1e-6, 1e-9)
 METHODS = "DOP853,LSODA,Radau,gragg_bulirsch_stoer,RK45,rk4,gauss_6"

@@ -30,7 +30,7 @@ from eomgen.model.elaborate import build_model
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
 from eomgen.show.style import FAINT, INK, style
-from eomgen.study.truth import Truth
+from eomgen.study.verification.truth import Truth
 
 WAYS = ("closed", "ldl", "aba", "orthogonal", "linalg.solve", "MuJoCo", "Pinocchio")
 FEW = 3

@@ -23,7 +23,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent.parent
-ROOMS = ("derivation", "joints", "effects", "program/differentiate.py")
+ROOMS = (
+    "derivation",
+    "dynamics",
+    "scene/joints",
+    "scene/effects",
+    "program/differentiate.py",
+)
 """What is changed, below the package."""
 TESTS = (
     *("test_handout", "test_orthogonal", "test_verify", "test_joints", "test_judges"),

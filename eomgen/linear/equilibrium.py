@@ -1,0 +1,292 @@
+"""Where a mechanism can stay at rest: positions, states of controllers and inputs at which nothing
+changes.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.errors import RunError, nearest
+from eomgen.linear.linearise import (
+    evaluated,
+    input_jacobian,
+    input_values,
+    rate_unit,
+    tangents,
+)
+from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import Floats
+
+MOST_STEPS = 60
+"""Steps to the nearest equilibrium: from near they are few, and what takes more is far."""
+MOST_FALLS = 500
+"""Steps of the fall through treacle."""
+LONGEST = 1.0
+"""Most that one step may turn anything, rad: a longer one would pass over nearer equilibria."""
+CLOSE = 1e-10
+"""Accelerations below this share of what a radian or a metre away makes are rounding."""
+LONGEST_FALL = 0.3
+"""The same for a step of the fall through treacle."""
+FALLING = 1e-6
+"""Growth rates, 1/s², above this share of the fastest are those of an unstable equilibrium."""
+NUDGE = 1e-3
+"""Displacement that sends it off an unstable equilibrium, rad or m."""
+LOST = 1e6
+"""A displacement in one step, m, of something that falls and falls."""
+
+
+class Equilibrium(NamedTuple):
+    """A state `y` (ny,) at rest that stays as it is under the inputs `u` (nu,)."""
+
+    y: Floats
+    u: Floats
+
+
+def equilibrium(
+    module: GeneratedModule,
+    guess: Floats,
+    u: Any = None,
+    p: Any = None,
+    *,
+    hold: Sequence[str] = (),
+    trim: Sequence[str] = (),
+    settle: bool = False,
+) -> Equilibrium:
+    """Find an equilibrium near the positions and states of controllers of `guess` (ny,), stable or
+    not. Its velocities are 0, whatever those of the guess.
+
+    hold    coordinates that stay as guessed; one component of a quaternion stands for all four
+    trim    inputs to be found too, near their values in `u`
+    settle  go where it comes to rest in treacle, which is a stable equilibrium, rather than to the
+            nearest; that is also where it goes if there is none near. Without `trim`
+
+    Coordinates that do not matter, such as the place of what floats, stay as guessed. Raises
+    `RunError`, naming the fastest change that is left, if there is none or none is found.
+    """
+    if settle and trim:
+        raise RunError("equilibrium: inputs are trimmed for the nearest equilibrium only")
+    search = _Search(module, p, _held(module, hold), _trimmed(module, trim))
+    start = search.look(np.array(guess, dtype=np.float64), input_values(module, u))
+    best = start
+    for attempt in (_fallen,) if settle else (_nearest,) if trim else (_nearest, _fallen):
+        found = _nearest(search, attempt(search, start))
+        if search.at_rest(found):
+            return Equilibrium(found.y, found.u)
+        best = min(best, found, key=lambda place: place.largest)
+    raise RunError(_not_found(module, best, search.slopes(best)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """The mechanism at rest at the positions of `y` under `u`, and its `changes` (nv + nx,): the
+    rates of velocities and of states of controllers.
+    """
+
+    y: Floats
+    u: Floats
+    changes: Floats
+
+    @property
+    def largest(self) -> float:
+        """The largest change, in SI units."""
+        return float(np.max(np.abs(self.changes), initial=0.0))
+
+    @property
+    def size(self) -> float:
+        """That of all changes together; not a number if they are none."""
+        return float(np.sqrt(np.sum(self.changes**2)))
+
+
+class _Search:
+    """Places of one module, and the steps between them.
+
+    The unknowns are small displacements, three rotations for a quaternion, then the states of
+    controllers, then the inputs; `free` are those among them that may change, `moving` those of
+    them that are no inputs.
+    """
+
+    def __init__(
+        self, module: GeneratedModule, p: Any, held: NDArray[np.bool_], trimmed: NDArray[np.bool_]
+    ) -> None:
+        self._module, self._p = module, p
+        self._nq, self._nv = len(module.POSITIONS), len(held)
+        self._nx = len(module.STATES) - self._nq - self._nv
+        self._turns = np.append(_turns(module), np.zeros(self._nx, dtype=np.bool_))
+        held = np.append(held, np.zeros(self._nx, dtype=np.bool_))
+        self.free = np.flatnonzero(np.concatenate([~held, trimmed]))
+        self.moving = np.flatnonzero(~held)
+
+    def look(self, y: Floats, u: Floats) -> _Place:
+        """The place at the positions of `y`, brought to rest."""
+        if not np.isfinite(y).all():
+            raise RunError("equilibrium: the positions are not finite; start elsewhere")
+        y = y.copy()
+        y[self._nq : self._nq + self._nv] = 0.0
+        for indices in self._module.QUATERNIONS:
+            y[list(indices)] /= np.linalg.norm(y[list(indices)])
+        return _Place(y, u, self._asked(self._module.derivative, y, u)[self._nq :])
+
+    def slopes(self, place: _Place) -> Floats:
+        """Derivatives of the changes by the free unknowns, (nv + nx, nf)."""
+        by_state = self._asked(self._module.jacobian, place.y, place.u)[self._nq :]
+        by_position = by_state[:, : self._nq] @ self._tangents(place)
+        by_place = np.hstack([by_position, by_state[:, self._nq + self._nv :]])
+        if np.max(self.free, initial=0) < self._nv + self._nx:
+            return np.asarray(by_place[:, self.free])
+        by_input = self._asked(input_jacobian(self._module), place.y, place.u)[self._nq :]
+        return np.hstack([by_place, by_input])[:, self.free]
+
+    def at_rest(self, place: _Place, slopes: Floats | None = None) -> bool:
+        """Whether the changes that are left are rounding."""
+        slopes = self.slopes(place) if slopes is None else slopes
+        return place.largest <= CLOSE * max(1.0, float(np.max(np.abs(slopes), initial=0.0)))
+
+    def turn(self, step: Floats) -> float:
+        """The most by which a step of what may move turns anything, rad."""
+        return float(np.max(np.abs(step[self._turns[self.moving]]), initial=0.0))
+
+    def moved(self, place: _Place, step: Floats) -> _Place:
+        """The place a step of the free unknowns away, shortened if it turns anything too far."""
+        nv, inputs = self._nv, self._nv + self._nx
+        whole = np.zeros(inputs + len(place.u))
+        whole[self.free] = step
+        turn = float(np.max(np.abs(whole[:inputs][self._turns]), initial=0.0))
+        whole *= min(1.0, LONGEST / turn) if turn else 1.0
+        y = place.y.copy()
+        y[: self._nq] += self._tangents(place) @ whole[:nv]
+        y[self._nq + nv :] += whole[nv:inputs]
+        return self.look(y, place.u + whole[inputs:])
+
+    def _tangents(self, place: _Place) -> Floats:
+        return tangents(place.y[: self._nq], self._module.QUATERNIONS)
+
+    def _asked(self, function: Callable[..., Floats], y: Floats, u: Floats) -> Floats:
+        return evaluated(function, y, self._p, u, "equilibrium")
+
+
+def _nearest(search: _Search, place: _Place) -> _Place:
+    """Follow Levenberg and Marquardt's method down to where no step makes the changes less.
+
+    Nocedal, Wright, Numerical Optimization, section 10.3; a damped step leaves alone what does not
+    matter.
+    """
+    damping, scale = 1e-3, np.zeros(len(search.free))
+    slopes = search.slopes(place)
+    for _ in range(MOST_STEPS if len(search.free) else 0):
+        scale = np.maximum(scale, np.linalg.norm(slopes, axis=0))
+        # What matters by rounding only must not be scaled up to matter.
+        scales = np.maximum(scale, 1e-8 * np.max(scale)) if np.any(scale) else np.ones(len(scale))
+        matrix = np.vstack([slopes / scales, np.sqrt(damping) * np.eye(len(scale))])
+        right = np.concatenate([-place.changes, np.zeros(len(scale))])
+        new = search.moved(place, np.linalg.lstsq(matrix, right)[0] / scales)
+        better = new.size < place.size
+        done = search.at_rest(place, slopes) and not new.size < place.size / 2
+        if better:
+            place, damping = new, max(damping / 10, 1e-14)
+            slopes = search.slopes(place)
+        else:
+            damping *= 10
+        if done or damping > 1e8:
+            break
+    return place
+
+
+def _fallen(search: _Search, place: _Place) -> _Place:
+    """Follow q' = v̇(q), the fall through treacle, by implicit steps that grow as it slows down;
+    states of controllers follow their own rates.
+
+    Pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35 (1998), 508.
+    A step is kept shorter than the time in which it falls off what is unstable; a longer one would
+    climb back. What rests on an unstable equilibrium is nudged.
+    """
+    duration = 0.0
+    for _ in range(MOST_FALLS if len(search.moving) else 0):
+        slopes = search.slopes(place)
+        square = slopes[search.moving]
+        rates, ways = np.linalg.eig(square)
+        fastest = float(np.max(np.abs(square)))
+        falls = int(np.argmax(rates.real))
+        rate = float(rates.real[falls])
+        if search.at_rest(place, slopes):
+            if rate <= FALLING * fastest:
+                break
+            way = ways[:, falls].real
+            step = NUDGE * way / np.max(np.abs(way))
+        else:
+            duration = duration or 1.0 / max(1.0, fastest)
+            duration = min(duration, 0.5 / rate) if rate > 0 else duration
+            step, duration = _implicit_step(search, place, square, duration)
+            if not np.max(np.abs(step)) < LOST:
+                break
+        new = search.moved(place, step)
+        if not np.isfinite(new.size):
+            break
+        duration *= float(np.clip(2 * place.size / max(new.size, 1e-300), 0.5, 4.0))
+        place = new
+    return place
+
+
+def _implicit_step(
+    search: _Search, place: _Place, square: Floats, duration: float
+) -> tuple[Floats, float]:
+    """A step of the fall, and its duration: less than what was asked for if it turns much."""
+    while True:
+        matrix = np.eye(len(square)) / duration - square
+        step: Floats = np.linalg.lstsq(matrix, place.changes[search.moving])[0].astype(float)
+        turn = search.turn(step)
+        if not turn > LONGEST_FALL:
+            return step, duration
+        duration *= 0.7 * LONGEST_FALL / turn
+
+
+def _turns(module: GeneratedModule) -> NDArray[np.bool_]:
+    """Which small displacements are rotations, rad."""
+    firsts = {indices[0] for indices in module.QUATERNIONS}
+    rest = {i for indices in module.QUATERNIONS for i in indices}
+    found: list[bool] = []
+    for i in range(len(module.POSITIONS)):
+        if i in firsts:
+            found += [True, True, True]
+        elif i not in rest:
+            found.append(module.UNITS[module.STATES[i]] == "rad")
+    return np.array(found, dtype=np.bool_)
+
+
+def _held(module: GeneratedModule, names: Iterable[str]) -> NDArray[np.bool_]:
+    """Which small displacements are held."""
+    positions = module.STATES[: len(module.POSITIONS)]
+    held: set[int] = set()
+    for name in names:
+        if name not in positions:
+            hint = nearest(name, positions) or f"; known: {', '.join(positions)}"
+            raise RunError(f"hold: no coordinate '{name}'{hint}")
+        index = positions.index(name)
+        held.update(*(q for q in module.QUATERNIONS if index in q), (index,))
+    indicator = np.array([float(i in held) for i in range(len(positions))])
+    columns = tangents(np.ones(len(positions)), module.QUATERNIONS)
+    return np.asarray(np.abs(columns).T @ indicator > 0)
+
+
+def _trimmed(module: GeneratedModule, names: Iterable[str]) -> NDArray[np.bool_]:
+    """Which inputs are to be found."""
+    for name in names:
+        if name not in module.INPUTS:
+            hint = nearest(name, module.INPUTS) or f"; known: {', '.join(module.INPUTS) or 'none'}"
+            raise RunError(f"trim: no input '{name}'{hint}")
+    return np.array([name in set(names) for name in module.INPUTS], dtype=np.bool_)
+
+
+def _not_found(module: GeneratedModule, place: _Place, slopes: Floats) -> str:
+    worst = int(np.argmax(np.abs(place.changes)))
+    name = module.STATES[len(module.POSITIONS) + worst]
+    left = f"{name} still changes by {place.changes[worst]:.4g} {rate_unit(module.UNITS[name])}"
+    downhill = np.linalg.norm(slopes.T @ place.changes)
+    if downhill <= 1e-6 * np.linalg.norm(slopes) * place.size:
+        return (
+            f"no equilibrium: {left}, and nothing that may move changes that; "
+            "start elsewhere, trim an input, or change what acts"
+        )
+    return f"no equilibrium found: {left}; start elsewhere, trim an input, or change what acts"

@@ -1,0 +1,43 @@
+"""The guard of a module's runs: its own steps over long numbers; see `run.guard`."""
+
+from typing import Any
+
+import numpy as np
+from gmpy2 import mpfr
+
+from eomgen.precision.longs import BITS
+from eomgen.precision.precise import digits, precise
+from eomgen.run.guard import LOST, Guard
+from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import Floats
+
+
+def guard_of(
+    module: GeneratedModule,
+    parameters: Any = None,
+    inputs: Any = None,
+    *,
+    bound: float = LOST,
+    repairs: bool = False,
+) -> Guard:
+    """A guard for runs of a module at given parameters and constant inputs, which must be valid
+    there.
+    """
+    exactly = precise(module, parameters, inputs, module.initial_state(parameters), bits=BITS)
+
+    def exact(t: float, y: Floats) -> Floats:
+        with digits(BITS):
+            rates = exactly.derivative(mpfr(t), [mpfr(x) for x in y.tolist()])
+            return np.array([float(rate) for rate in rates])
+
+    units = [module.UNITS.get(state, "") for state in module.STATES]
+    groups = tuple(
+        tuple(
+            i
+            for i, other in enumerate(units)
+            if other == unit and (i in module.POSITIONS) == positions
+        )
+        for unit in dict.fromkeys(units)
+        for positions in (True, False)
+    )
+    return Guard(exact, tuple(group for group in groups if group), bound, repairs)

@@ -1,0 +1,89 @@
+"""What measured ladders say: observed orders, cheapest runs, what the exact Jacobian saves."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+
+from eomgen.study.accuracy.ladder import Work
+
+TARGETS = (1e-3, 1e-6, 1e-9)
+AGREE = 0.05
+"""Slopes of the error from step to step are nearly equal while none is farther from their median
+than this, in parts of it."""
+LEAST_SLOPES = 2
+LEAST = 0.5
+"""Slopes below are those of rounding."""
+DIFFERENCES = "_differences"
+"""What a method's name ends in that has its Jacobian by finite differences."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """The order seen: the slope of log error over log step, from step `coarse` to `fine`, s."""
+
+    value: float
+    coarse: float
+    fine: float
+
+
+def observed_order(works: Sequence[Work]) -> Order | None:
+    """The order that equal steps show, from one method's runs; None if they show none.
+
+    The asymptotic range is sought without knowing the order: of all stretches of steps on which the
+    slopes from one step to the next are nearly equal the finest, as far as it goes. Only measured
+    errors of right runs count, and no slopes below `LEAST`. The order is the slope of the straight
+    line there.
+    """
+    usable = [
+        work for work in works if work.status == "ok" and not work.at_most[0] and work.error > 0
+    ]
+    steps = np.log([work.rung.dt or np.nan for work in usable])
+    errors = np.log([work.error for work in usable])
+    if len(usable) <= LEAST_SLOPES:
+        return None
+    slopes = np.diff(errors) / np.diff(steps)
+    found: list[slice] = []
+    for start in range(len(slopes)):
+        for stop in range(start + LEAST_SLOPES, len(slopes) + 1):
+            part = slopes[start:stop]
+            middle = float(np.median(part))
+            if middle > LEAST and float(np.max(np.abs(part - middle))) <= AGREE * middle:
+                found.append(slice(start, stop + 1))
+    if not found:
+        return None
+    span = max(found, key=lambda stretch: (stretch.stop, -stretch.start))
+    slope = float(np.polyfit(steps[span], errors[span], 1)[0])
+    return Order(slope, float(np.exp(steps[span][0])), float(np.exp(steps[span][-1])))
+
+
+def cheapest(works: Iterable[Work], target: float) -> list[Work]:
+    """Of each method the right run of least counted work whose error is within the target; the
+    least first. Wall time would rank them otherwise from hour to hour.
+    """
+    best: dict[str, Work] = {}
+    for work in works:
+        if work.status == "ok" and work.error <= target:
+            method = work.rung.method
+            if method not in best or work.units < best[method].units:
+                best[method] = work
+    return sorted(best.values(), key=lambda work: work.units)
+
+
+def saved_by_jacobian(works: Iterable[Work]) -> dict[str, float]:
+    """By method: median ratio of the time with finite differences to that with the Jacobian.
+
+    Of runs with the same tolerances that both came to their end right.
+    """
+    times = {
+        (work.rung.method, work.rung.rtol, work.rung.atol): work.seconds
+        for work in works
+        if work.status == "ok"
+    }
+    ratios: dict[str, list[float]] = {}
+    for (method, *tolerances), seconds in times.items():
+        other = times.get((f"{method}{DIFFERENCES}", *tolerances))  # type: ignore[arg-type]
+        if other is not None:
+            ratios.setdefault(method, []).append(other / seconds)
+    return {method: median(found) for method, found in ratios.items()}

@@ -1,0 +1,185 @@
+"""Measured runs kept in a table, so that what was begun goes on from there.
+
+The table is the CSV that a user reads, without lines that a reader of CSV would stumble over: what
+is the same for all runs is a column, too. One names what was measured by a digest: of the module,
+the parameters and inputs, the end, the integrators, and this machine. Where any of them is another,
+the records are of no use and are begun anew.
+"""
+
+import csv
+import hashlib
+import io
+import json
+import math
+import platform
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import scipy
+
+from eomgen.errors import RunError
+from eomgen.files import is_ours, read_plain, write_whole
+from eomgen.run.integrators import INTEGRATORS
+from eomgen.study.accuracy.ladder import Rung, Status, Work, kind, order
+
+STATUSES: tuple[Status, ...] = ("ok", "wrong", "failed", "over", "refused")
+COLUMNS = (
+    "method",
+    "kind",
+    "order",
+    "dt_s",
+    "rtol",
+    "atol",
+    "status",
+    "error",
+    "error_is",
+    "final_error",
+    "final_error_is",
+    "energy_drift",
+    "joint_gap_m",
+    "quaternion_defect",
+    "time_s",
+    "time_spread_s",
+    "repeats",
+    "work_units",
+    "steps",
+    "derivatives",
+    "jacobians",
+    "reason",
+)
+"""Errors and drifts are numbers without a unit: parts of the motion's own scale, or its energy."""
+GENERATION, KEY = "generation_s", "eomgen_key"
+"""Columns after these and those that the caller gives."""
+LARGEST = 100_000_000
+"""Bytes of a table beyond which it is none of ours."""
+TIMES = ("time_s", "time_spread_s", "repeats")
+"""Columns that depend on the machine."""
+AT_MOST, MEASURED = "at most", "measured"
+
+
+def key(*what: object) -> str:
+    """A digest of what runs depend on, this machine and its libraries among it."""
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    own = [here / f"{name}.py" for name in ("measure", "reference", "work_precision")]
+    for path in sorted((here.parent.parent / "run").rglob("*.py")) + own:
+        digest.update(path.read_bytes())
+    machine = (platform.node(), platform.machine(), platform.python_version())
+    text = json.dumps([*what, *machine, np.__version__, scipy.__version__], sort_keys=True)
+    digest.update(text.encode())
+    return digest.hexdigest()[:16]
+
+
+def save(
+    path: Path,
+    key: str,
+    works: Iterable[Work],
+    *,
+    generation: float | None,
+    same: Mapping[str, object] = MappingProxyType({}),
+    force: bool = False,
+) -> None:
+    """Write the table: a line of names, and a row for each run. In all rows are the `same` values,
+    by their columns' names, the time that generating the module took, s, and the key.
+
+    Rows are in the order of the methods and from coarse to fine, whatever order they were made in.
+    Raises `RunError` if it cannot be written.
+    """
+    buffer = io.StringIO()
+    table = csv.writer(buffer, lineterminator="\n")
+    table.writerow([*COLUMNS, *same, GENERATION, KEY])
+    rest = [*same.values(), _cell(generation), key]
+    table.writerows([*_row(work), *rest] for work in ordered(works))
+    write_whole(path, buffer.getvalue(), force=force)
+
+
+def ordered(works: Iterable[Work]) -> list[Work]:
+    """By method, each from coarse to fine."""
+    place = {method: k for k, method in enumerate(INTEGRATORS)}
+    return sorted(works, key=lambda w: (place[w.rung.method], -(w.rung.dt or w.rung.rtol or 0.0)))
+
+
+def load(path: Path, key: str) -> tuple[Mapping[Rung, Work], float | None]:
+    """The runs kept under this key, and the generation time, s; none if there are none.
+
+    A table of another key, or one that is damaged, counts as none.
+    """
+    try:
+        data = read_plain(path, LARGEST)
+        rows = list(csv.DictReader(io.StringIO(data.decode("utf-8"))))
+        if not (is_ours(data) and rows and all(row[KEY] == key for row in rows)):
+            return {}, None
+        generation = float(rows[0][GENERATION]) if rows[0][GENERATION] else None
+        works = [_work(row) for row in rows]
+    except (RunError, ValueError, KeyError, TypeError, csv.Error):
+        return {}, None
+    return {work.rung: work for work in works}, generation
+
+
+def _row(work: Work) -> list[object]:
+    rung = work.rung
+    at_most = [AT_MOST if flag else MEASURED for flag in work.at_most]
+    return [
+        rung.method,
+        kind(rung.method),
+        _cell(order(rung.method)),
+        _cell(rung.dt),
+        _cell(rung.rtol),
+        _cell(rung.atol),
+        work.status,
+        _cell(work.error),
+        "" if math.isnan(work.error) else at_most[0],
+        _cell(work.final_error),
+        "" if math.isnan(work.final_error) else at_most[1],
+        _cell(work.energy_drift),
+        _cell(work.joint_gap),
+        _cell(work.quaternion_defect),
+        repr(work.seconds),
+        _cell(work.spread),
+        work.repeats,
+        _cell(work.units),
+        work.steps,
+        work.derivatives,
+        work.jacobians,
+        " ".join(work.reason.split()),
+    ]
+
+
+def _cell(value: float | None) -> str:
+    """The shortest text that reads back exactly; empty for what is not there."""
+    return "" if value is None or math.isnan(value) else repr(value)
+
+
+def _work(row: Mapping[str, str]) -> Work:
+    """Raises `ValueError` or `KeyError` for a row that is none of ours."""
+
+    def number(column: str) -> float:
+        return float(row[column]) if row[column] else math.nan
+
+    def optional(column: str) -> float | None:
+        return float(row[column]) if row[column] else None
+
+    if row["method"] not in INTEGRATORS or row["status"] not in STATUSES:
+        raise ValueError("no such method or status")
+    if None in row.values():
+        raise ValueError("a row breaks off")
+    return Work(
+        Rung(row["method"], optional("dt_s"), optional("rtol"), optional("atol")),
+        next(status for status in STATUSES if status == row["status"]),
+        float(row["time_s"]),
+        int(row["repeats"]),
+        error=number("error"),
+        final_error=number("final_error"),
+        at_most=(row["error_is"] == AT_MOST, row["final_error_is"] == AT_MOST),
+        energy_drift=number("energy_drift"),
+        joint_gap=number("joint_gap_m"),
+        quaternion_defect=number("quaternion_defect"),
+        steps=int(row["steps"]),
+        derivatives=int(row["derivatives"]),
+        jacobians=int(row["jacobians"]),
+        reason=row["reason"],
+        spread=number("time_spread_s"),
+        units=number("work_units"),
+    )

@@ -1,0 +1,322 @@
+"""What a run is compared with: the motion to more digits than any run has, and how sure that is.
+
+The motion is found twice by Gauss collocation in long numbers (`collocation`), once with fewer
+stages and a looser tolerance; the looser one's difference from the tighter, which is what is kept,
+is the stated error, with what rounding to doubles adds. Where contacts strike, or where that would
+take too long, two methods in doubles at their tightest tolerance stand in: twice their difference
+is the stated error, and the origin says so.
+"""
+
+import hashlib
+import io
+import time
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eomgen.entries import Entries
+from eomgen.errors import RunError
+from eomgen.files import write_whole
+from eomgen.model.model import Model
+from eomgen.precision.precise import BITS, digits, precise
+from eomgen.run.checks import SMALLEST_RTOL
+from eomgen.run.integrate import integrate
+from eomgen.run.integrators import INTEGRATORS
+from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.problem import Floats, Problem
+from eomgen.run.progress import Progress, throttled
+from eomgen.run.tally import Tally
+from eomgen.study.accuracy import measure
+from eomgen.study.accuracy.collocation import Longs, Row, rows
+
+ROWS = 201
+SECONDS = 300.0
+"""Of processor time that a reference in long numbers may take; one in doubles comes on top."""
+TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
+"""Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
+FORMAT = "reference 4"
+"""Changes whenever a reference would come out otherwise."""
+_SOON = 1.0
+"""A run in doubles may always take so long, s."""
+_LOOKS = 64
+"""Derivatives after which a run in doubles looks at the clock."""
+SELDOM = 50
+"""Of so many steps in long numbers, one looks at the clock."""
+_JUDGED = 0.1
+"""Share of the time after which the pace tells whether it will suffice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The motion as exactly as it was found.
+
+    t            times (n,), s, equally spaced, both ends included
+    y            states (n, ny), rounded to doubles
+    scale        of each state (ny,): `measure.scales`
+    error        what y may be off, the most of all rows, in parts of the scale
+    final_error  the same of the last row
+    origin       method, digits, and how the error was found, in one line
+    seconds      how long it took
+    """
+
+    t: Floats
+    y: Floats
+    scale: Floats
+    error: float
+    final_error: float
+    origin: str
+    seconds: float
+
+
+_Found = tuple[Floats, Floats, Floats, str]
+"""The motion (n, ny), the same plus what it may be off, between which states lie (2, ny), and how
+all that was found."""
+
+
+class TooLongError(Exception):
+    """It would take longer than allowed."""
+
+
+def paced(problem: Problem, t_end: float, seconds: float, progress: Progress) -> Problem:
+    """The same problem, of which a run up to `t_end`, s, tells how far it is and ends where it
+    clearly takes more than `seconds` of processor time, or a second: by `TooLongError` from its
+    derivative, since a step may be tried again and again.
+    """
+    began, calls, told = time.process_time(), 0, throttled(progress)
+    allowed = max(seconds, _SOON)
+
+    def derivative(t: float, y: Floats) -> Floats:
+        nonlocal calls
+        calls += 1
+        if not calls % _LOOKS:
+            done = min(max(float(t) / t_end, 0.0), 1.0)
+            told(done)
+            _check_pace(time.process_time() - began, done, allowed, "doubles")
+        return problem.derivative(t, y)
+
+    return replace(problem, derivative=derivative)
+
+
+def reference(
+    model: Model | None,
+    module: GeneratedModule,
+    parameters: Any = None,
+    inputs: Any = None,
+    t_end: float = 10.0,
+    *,
+    progress: Progress | None = None,
+    seconds: float = SECONDS,
+    folder: Path | None = None,
+    doubles: bool = True,
+) -> Reference:
+    """The motion of a module from 0 to `t_end`, s, at given parameters and constant inputs.
+
+    model     what the module was made of, for messages; or None
+    progress  told the fraction done
+    seconds   of processor time that long numbers may take; 0 for doubles at once
+    folder    where references are kept, so that none is computed twice; or None. One that cannot
+              be trusted, read or written (`eomgen.entries`) is done without
+    doubles   whether they may stand in where there is no run in long numbers
+
+    Raises `RunError` if the module refuses parameters or inputs, if the motion does not get to
+    `t_end`, or if doubles would stand in that may not.
+    """
+    problem = as_problem(module, parameters, inputs, model)
+    told = progress or _ignore
+    rest_speed = model.simulation.rest_speed if model else None
+    key = _key(module, problem, parameters, inputs, t_end, seconds, rest_speed)
+    entries = folder and Entries(folder)
+    kept = entries and _kept(entries.get(key))
+    if kept:
+        told(1.0)
+        return kept
+    began = time.monotonic()
+    times = np.linspace(0.0, t_end, ROWS)
+    watched = problem if doubles else paced(problem, t_end, seconds, lambda _: told(0.0))
+    try:
+        rough = _roughly(watched, t_end, rest_speed)
+    except TooLongError as reason:
+        raise RunError(f"no run of {t_end:g} s: {reason} already") from None
+    scale = measure.scales(module.STATES, module.UNITS, rough)
+    found = None
+    if problem.contacts is None and seconds > 0:
+        try:
+            found = _in_long_numbers(
+                module, problem, parameters, inputs, times, scale, seconds, told
+            )
+        except (TooLongError, ArithmeticError, ValueError) as reason:
+            why = str(reason)
+    else:
+        why = "rigid contacts" if problem.contacts else "as asked"
+    if not (found or doubles):
+        raise RunError(f"no run of {t_end:g} s in long numbers: {why}")
+    y, other, extent, origin = found or _in_doubles(problem, times, scale, rest_speed, why, told)
+    scale = measure.scales(module.STATES, module.UNITS, extent)
+    apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)
+    spent = time.monotonic() - began
+    made = Reference(times, y, scale, float(apart.max()), float(apart[-1]), origin, spent)
+    if entries:
+        entries.put(key, _content(made))
+    return made
+
+
+def _in_long_numbers(
+    module: GeneratedModule,
+    problem: Problem,
+    parameters: Any,
+    inputs: Any,
+    times: Floats,
+    scale: Floats,
+    seconds: float,
+    progress: Progress,
+) -> _Found:
+    """The motion by Gauss collocation. Raises `TooLongError` where that takes longer."""
+    began = time.process_time()
+
+    def run(
+        stages: tuple[int, ...], tolerance: float, before: float, share: float
+    ) -> tuple[Longs, Row]:
+        found: list[Longs] = []
+        calls = count()
+
+        def told(t: float) -> None:
+            if next(calls) % SELDOM:  # to look at the clock takes as long as a step
+                return
+            done = before + share * t / float(times[-1])
+            progress(done)
+            _check_pace(time.process_time() - began, done, seconds, "long numbers")
+
+        exactly = precise(module, parameters, inputs, problem.initial, watched=True)
+        with digits():
+            for row in rows(stages, exactly, problem, scale, times, tolerance, told):
+                found.append(row.y)
+        progress(before + share)
+        return np.array(found), row
+
+    # The looser one goes first: it is the cheaper one to give up.
+    loose, _ = run(*LOOSE, 0.0, 0.4)
+    tight, last = run(*TIGHT, 0.4, 0.6)
+    with digits():
+        off = np.abs(loose - tight).astype(float)
+    y = tight.astype(float)
+    origin = (
+        f"Gauss collocation of order up to {2 * TIGHT[0][-1]} in {BITS} bits, {last.steps} steps; "
+        "error: of the same with fewer stages and a looser tolerance, and of rounding to doubles"
+    )
+    return y, y + off, last.extent, origin
+
+
+def _check_pace(spent: float, done: float, seconds: float, numbers: str) -> None:
+    """Raise `TooLongError` if the time is over, or clearly will be."""
+    if spent > seconds or (spent > _JUDGED * seconds and spent > 1.5 * done * seconds):
+        raise TooLongError(f"more than {seconds:g} s in {numbers}")
+
+
+def _roughly(problem: Problem, t_end: float, rest_speed: float | None) -> Floats:
+    """Between which states lie in a quick run, (2, ny).
+
+    Raises `RunError` if that does not get to the end.
+    """
+    tally = Tally()
+    run = integrate(
+        problem, "LSODA", t_end, rtol=1e-6, atol=1e-8, samples=2, rest_speed=rest_speed, tally=tally
+    )
+    if not run.finished:
+        raise RunError(f"reference: {run.message}")
+    return np.array([tally.low, tally.high])
+
+
+def _in_doubles(
+    problem: Problem,
+    times: Floats,
+    scale: Floats,
+    rest_speed: float | None,
+    why: str,
+    progress: Progress,
+) -> _Found:
+    """The motion by two methods."""
+    other = "gragg_bulirsch_stoer" if "gragg_bulirsch_stoer" in INTEGRATORS else "Radau"
+    found = []
+    for i, (method, rtol) in enumerate((("DOP853", SMALLEST_RTOL), (other, 1e-12))):
+        tally = Tally()
+
+        def told(done: float, i: int = i) -> None:
+            progress((i + done) / 2)
+
+        run = integrate(
+            problem,
+            method,
+            float(times[-1]),
+            rtol=rtol,
+            atol=0.1 * rtol * float(np.min(scale)),
+            samples=len(times),
+            progress=told,
+            rest_speed=rest_speed,
+            tally=tally,
+        )
+        if not run.finished:
+            raise RunError(f"reference: {method}: {run.message}")
+        found.append(np.array([run.y[np.searchsorted(run.t, t)] for t in times]))
+    return (
+        found[0],
+        2 * found[1] - found[0],  # which of the two is better is not known
+        np.array([tally.low, tally.high]),
+        f"DOP853 in doubles at rtol {SMALLEST_RTOL:g} ({why}); error: twice the difference from "
+        f"{other} at rtol 1e-12",
+    )
+
+
+def _key(
+    module: Any,
+    problem: Problem,
+    parameters: Any,
+    inputs: Any,
+    t_end: float,
+    seconds: float,
+    rest_speed: float | None,
+) -> str:
+    """A digest of all that makes a reference what it is."""
+    source = module.__spec__.loader.get_source(module.__spec__.name) or ""
+    given = [module.PARAMETERS if parameters is None else parameters]
+    given += [module.INPUTS if inputs is None else inputs]
+    values = [list(g.items()) if hasattr(g, "keys") else np.asarray(g).tolist() for g in given]
+    times = (float(t_end), float(seconds))
+    parts = (FORMAT, source, values, problem.initial.tolist(), times, rest_speed)
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
+
+
+def save(made: Reference, path: Path) -> None:
+    """Write a reference as NumPy's .npz, whole. Raises `RunError` if that cannot be."""
+    write_whole(path, _content(made))
+
+
+def _content(made: Reference) -> bytes:
+    """A reference as NumPy's .npz."""
+    buffer = io.BytesIO()
+    np.savez(  # `eomgen` comes first, where it marks the file as ours
+        buffer,
+        eomgen=np.array(FORMAT),
+        t=made.t,
+        y=made.y,
+        scale=made.scale,
+        errors=np.array([made.error, made.final_error, made.seconds]),
+        origin=np.array(made.origin),
+    )
+    return buffer.getvalue()
+
+
+def _kept(content: bytes | None) -> Reference | None:
+    """The reference that was kept as these bytes; None if there are none."""
+    if content is None:
+        return None
+    with np.load(io.BytesIO(content), allow_pickle=False) as members:
+        error, final_error, seconds = members["errors"].tolist()
+        y, scale, origin = members["y"], members["scale"], str(members["origin"])
+        return Reference(members["t"], y, scale, error, final_error, origin, seconds)
+
+
+def _ignore(fraction: float) -> None:
+    """Take no notice of progress."""

@@ -1,0 +1,288 @@
+"""How exact the accelerations are that each route computes, against 60 digits.
+
+Every route that a model can go by, and plain `numpy.linalg.solve(M, F - V - G)` on the module's own
+terms, at seeded random states and at states of the scene's own run: operations, time, and forward
+error of v̇ in units in the last place (see `ulps`). Inputs are 0, and no rigid contact is held.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, get_args
+
+import numpy as np
+
+from eomgen.codegen.route import routed
+from eomgen.dynamics.regular import check_regular
+from eomgen.errors import RunError
+from eomgen.model.model import Model
+from eomgen.run.problem import Floats
+from eomgen.run.progress import Progress
+from eomgen.scalars.extended import DIGITS
+from eomgen.scene.schema import Route
+from eomgen.study.cost.single import in_single, kernel_in_single
+from eomgen.study.timing import least_seconds
+from eomgen.study.verification.routes import Made, compiled, loaded, velocities
+from eomgen.study.verification.samples import Sample, agreement, condition_numbers, judging_states
+from eomgen.study.verification.truth import Exact, Truth
+from eomgen.study.verification.ulps import BITS, component_errors, vector_errors
+
+BASELINE = "linalg.solve"
+TERMS = ("mass_matrix", "bias_force", "applied_force")
+STATES, FEW_STATES = 100, 20
+"""How many of each kind, unless told; few where there are more velocities than `LARGE`."""
+LARGE = 12
+AGREED = 40
+"""Digits to which both ways must agree there."""
+BATCH = 1000
+"""States at once, where many are timed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Of one way at the states of a sample, each in ulps of the way's own precision.
+
+    ulps        (n,) of v̇ as a whole, nan where it gave no finite number
+    components  of all its components, each in its own ulps
+    """
+
+    ulps: Floats
+    components: Floats
+
+    @property
+    def failed(self) -> int:
+        """At how many states there was no finite number."""
+        return int(np.sum(np.isnan(self.ulps)))
+
+    @property
+    def median(self) -> float:
+        """Of the states that have one; nan if none has."""
+        return float(np.nanmedian(self.ulps)) if self.failed < len(self.ulps) else np.nan
+
+    @property
+    def worst(self) -> float:
+        """Of the same."""
+        return float(np.nanmax(self.ulps)) if self.failed < len(self.ulps) else np.nan
+
+    @property
+    def at(self) -> int | None:
+        """Which state of the sample was the worst, None if none has a number."""
+        return int(np.nanargmax(self.ulps)) if self.failed < len(self.ulps) else None
+
+    @property
+    def component(self) -> float:
+        """Median of the components."""
+        return float(np.median(self.components)) if self.components.size else np.nan
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to v̇: a route of the program, or `BASELINE`.
+
+    operations     of a call; None if there is no such way, and `words` say why
+    seconds        of a call for one state
+    batch_seconds  for one of `BATCH` states that are computed at once
+    errors         for each sample
+    words          why it is not there, or what went wrong
+    """
+
+    name: str
+    precision: str
+    operations: int | None
+    seconds: float | None
+    batch_seconds: float | None
+    errors: tuple[Errors, ...]
+    words: str = ""
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """What was found; `taken` is the route that the model takes, `agreed` the number of digits to
+    which the two ways to the truth agree at least.
+    """
+
+    name: str
+    taken: str
+    states: tuple[str, ...]
+    samples: tuple[Sample, ...]
+    ways: tuple[Way, ...]
+    agreed: float
+
+
+def arithmetic(
+    model: Model,
+    *,
+    states: int | None = None,
+    seed: int = 0,
+    single: bool = False,
+    progress: Progress = lambda fraction: None,
+) -> Arithmetic:
+    """Judge all ways to v̇ at `states` seeded states and as many of the scene's own run; with
+    `single` in float32, too, at the same states rounded to that.
+
+    A model of momentum form is judged in its velocity form.
+
+    Raises `SceneError` or `RunError` if no route gives an acceleration at its initial state, or if
+    60 digits are too few to tell the truth.
+    """
+    model = replace(model, form="velocity", outputs=())
+    check_regular(model)
+    taken = routed(model, jacobian=False).system
+    others, missing = compiled(model, but=taken.route)
+    there = {taken.route: loaded(taken), **others}
+    ways = {route: there[route] for route in get_args(Route) if route in there}
+    terms = loaded(routed(replace(model, route="aba", outputs=TERMS), jacobian=False).system)
+    progress(0.2)
+    truth = Truth(model)
+    count = states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
+    samples, truths = judging_states(
+        truth, ways[taken.route].module, count, seed, lambda part: progress(0.2 + 0.4 * part)
+    )
+    agreed = min(agreement(truth, *pair) for pair in zip(samples, truths, strict=True))
+    if agreed < AGREED:
+        raise RunError(
+            f"the mass matrix is so close to singular that two ways in {DIGITS} digits agree to "
+            f"{agreed:.0f} only, nothing to judge by; make masses and lengths less uneven"
+        )
+    samples = [replace(s, condition=condition_numbers(terms.module, s)) for s in samples]
+    found = [Way(route, "float64", None, None, None, (), words) for route, words in missing.items()]
+    for precision in ("float64", "float32") if single else ("float64",):
+        progress(0.7 if precision == "float64" else 0.8)
+        if precision == "float32":
+            samples_in_it = [replace(s, t=_rounded(s.t), y=_rounded(s.y)) for s in samples]
+            truths = [truth(s.t, s.y) for s in samples_in_it]
+        else:
+            samples_in_it = samples
+        pairs = list(zip(samples_in_it, truths, strict=True))
+        found += [_judged(n, made, precision, pairs) for n, made in ways.items()]
+        found.append(_judged(BASELINE, terms, precision, pairs))
+    progress(0.9)
+    return Arithmetic(
+        model.name,
+        taken.route,
+        ways[taken.route].module.STATES,
+        tuple(samples),
+        tuple(_timed(found, {**ways, BASELINE: terms}, samples[0].y)),
+        agreed,
+    )
+
+
+def solve_operations(n: int) -> int:
+    """Of a dense solution with one right-hand side by elimination with row exchanges, as LAPACK's
+    gesv does it: each product, sum and division counted one, comparisons not. About ⅔ n³.
+    """
+    factor = n * (n - 1) // 2 + n * (n - 1) * (2 * n - 1) // 3
+    return factor + 2 * n * (n - 1) + n
+
+
+def _rounded(values: Floats) -> Floats:
+    return values.astype(np.float32).astype(np.float64)
+
+
+def _judged(name: str, made: Made, precision: str, pairs: Sequence[tuple[Sample, Exact]]) -> Way:
+    """A way with its errors, not timed yet."""
+    model, bits = made.system.model, BITS[precision]
+    units = [c.unit for c in model.velocities]
+    compute = _doubles if precision == "float64" else _singles
+    errors, whys = [], []
+    for sample, true in pairs:
+        found, why = compute(name, made, sample)
+        known = np.array([x is not None for x in true[0]])
+        found, true = found[:, known], true[:, known]
+        whys += why
+        errors.append(
+            Errors(vector_errors(found, true, units, bits), component_errors(found, true, bits))
+        )
+    failed, words = sum(e.failed for e in errors), ""
+    if failed:
+        of, why_not = sum(len(e.ulps) for e in errors), next(iter(whys), "not finite")
+        words = f"no number at {failed} of {of} states: {why_not}"
+    return Way(name, precision, _operations(name, made), None, None, tuple(errors), words)
+
+
+def _operations(name: str, made: Made) -> int:
+    cost, n = made.module.COST, len(made.system.model.velocities)
+    if name != BASELINE:
+        return cost["derivative"]["total"]
+    return sum(cost[term]["total"] for term in TERMS) + n + solve_operations(n)
+
+
+def _doubles(name: str, made: Made, sample: Sample) -> tuple[Floats, list[str]]:
+    """v̇ (nv, n) by the generated code, nan where it has none, and why."""
+    at, module = velocities(made), made.module
+    found = np.full((at.stop - at.start, len(sample.y)), np.nan)
+    whys = []
+    for k, (t, y) in enumerate(zip(sample.t, sample.y, strict=True)):
+        try:
+            if name == BASELINE:
+                found[:, k] = _solved(module, t, y)
+            else:
+                found[:, k] = module.derivative(t, y)[at]
+        except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+            whys.append(str(error))
+    return found, whys
+
+
+def _solved(module: Any, t: float, y: Floats) -> Any:
+    """M v̇ = F - V - G, of one state or of columns of states, as anyone would write it."""
+    matrix = module.mass_matrix(t, y)
+    right = module.applied_force(t, y) - module.bias_force(t, y)
+    return _dense(matrix, right)
+
+
+def _dense(matrix: Any, right: Any) -> Any:
+    if right.ndim == 1:
+        return np.linalg.solve(matrix, right)
+    return np.linalg.solve(np.moveaxis(matrix, -1, 0), right.T[..., None])[..., 0].T
+
+
+def _singles(name: str, made: Made, sample: Sample) -> tuple[Any, list[str]]:
+    """The same in float32, step by step as the generated code goes."""
+    if name != BASELINE:
+        return in_single(made.system, "derivative", sample.t, sample.y)[velocities(made)], []
+    matrix, bias, applied = (in_single(made.system, term, sample.t, sample.y) for term in TERMS)
+    right, whys = applied - bias, []
+    found = np.full(right.shape, np.nan, dtype=np.float32)
+    for k in range(len(sample.y)):
+        try:
+            found[:, k] = np.linalg.solve(matrix[..., k], right[:, k])
+        except np.linalg.LinAlgError as error:
+            whys.append(str(error))
+    return found, whys
+
+
+def _timed(found: Sequence[Way], made: Mapping[str, Made], states: Floats) -> list[Way]:
+    """With the least times of calls, all in turn."""
+    many = np.resize(states, (BATCH, states.shape[1])).T.copy()
+    timed, calls, places = list(found), [], []
+    with np.errstate(all="ignore"):
+        for i, way in enumerate(found):
+            if way.operations is None:
+                continue
+            call = _call(way, made[way.name])
+            start = made[way.name].module.initial_state()
+            for key, y in (("seconds", start), ("batch_seconds", many)):
+                given = y if way.precision == "float64" else y.astype(np.float32)
+                with suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
+                    call(given)
+                    calls.append(partial(call, given))
+                    places.append((i, key))
+        for (i, key), least in zip(places, least_seconds(calls), strict=True):
+            part = least / BATCH if key == "batch_seconds" else least
+            timed[i] = replace(timed[i], **{key: part})  # type: ignore[arg-type]
+    return timed
+
+
+def _call(way: Way, made: Made) -> Callable[[Any], Any]:
+    """A way's computation of one state, or of columns of states, at t = 0."""
+    module = made.module
+    if way.precision == "float64":
+        if way.name == BASELINE:
+            return lambda y: _solved(module, 0.0, y)
+        return lambda y: module.derivative(0.0, y)
+    if way.name != BASELINE:
+        return kernel_in_single(module, "derivative")
+    matrix, bias, applied = (kernel_in_single(module, term) for term in TERMS)
+    n = len(made.system.model.velocities)
+    return lambda y: _dense(matrix(y).reshape((n, n, *y.shape[1:])), applied(y) - bias(y))

@@ -1,0 +1,278 @@
+"""What each effect of a scene costs: operations, time, states, inputs; and what it does for that.
+
+Operations are those of `derivative`, counted in modules that hold it and the bodies' places alone.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf
+from typing import get_args
+
+from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.route import routed, why_not_compared
+from eomgen.dynamics.regular import check_regular
+from eomgen.model.elaborate import build_model
+from eomgen.model.model import Model
+from eomgen.run.module import GeneratedModule, as_problem, load_module
+from eomgen.run.progress import Progress
+from eomgen.scene.schema import Route, Scene
+from eomgen.study.cost.omission import Change, Run, change, extent, run
+from eomgen.study.cost.variants import Kind, Variant, bare, counted
+from eomgen.study.timing import least_and_spread
+
+MOTION = 10.0
+"""Most wall time of all motions together, s, unless told."""
+AT_CONTACTS = ("gaps", "gap_rates", "impact", "held")
+
+
+@dataclass(frozen=True)
+class Item:
+    """One thing that the scene has, or that it leaves out on purpose: see `Kind`.
+
+    operations, seconds  of a call of `derivative` that it adds, or would add
+    spread               of the times that `seconds` is the difference of, s: see `Bill.spread`
+    states, inputs       that it brings; below 0 for what takes states away, a driven joint
+    route                of the equations without it, or of those with what is left out
+    needed_by            effects that cannot be without it: then nothing is known of it alone
+    change               what leaving it out does to the motion; None if that was not asked for
+    """
+
+    label: str
+    kind: Kind
+    operations: int = 0
+    seconds: float = 0.0
+    spread: float = 0.0
+    states: int = 0
+    inputs: int = 0
+    route: str = ""
+    needed_by: tuple[str, ...] = ()
+    change: Change | None = None
+
+
+@dataclass(frozen=True)
+class RouteCost:
+    """A route: operations and time, s, of a call of `derivative`, or None and why not."""
+
+    route: str
+    operations: int | None
+    seconds: float | None
+    words: str
+
+
+@dataclass(frozen=True)
+class Bill:
+    """The whole and its items; `bare` is the mechanism without any effect.
+
+    `route` and `bare_route` are those of their equations. `extent` is that of the scene's motion,
+    m, or None if no motion was asked for. `spread` is how far apart times of the same call are on
+    this machine now, s: a difference within it is none that was measured. `at_contacts` are the
+    operations of what rigid contacts bring besides `derivative`, by name: they are no part of it.
+    """
+
+    name: str
+    route: str
+    operations: int
+    seconds: float
+    spread: float
+    bare_route: str
+    bare_operations: int
+    bare_seconds: float
+    items: tuple[Item, ...]
+    routes: tuple[RouteCost, ...]
+    t_end: float
+    extent: float | None
+    at_contacts: Mapping[str, int]
+
+    @property
+    def shared(self) -> tuple[int, float, float]:
+        """Operations and time, s, that go with no item alone, and the spread of that time.
+
+        Effects share work: two that ask for the velocity of one point pay for it once, and it stays
+        when one of them goes. So does what another route costs that only the bare mechanism lets
+        in. Below 0 where one costs more beside another than without it.
+        """
+        items = [item for item in self.items if item.kind == "effect"]
+        return (
+            self.operations - self.bare_operations - sum(item.operations for item in items),
+            self.seconds - self.bare_seconds - sum(item.seconds for item in items),
+            self.spread + sum(item.spread for item in items),
+        )
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A model compiled and timed."""
+
+    model: Model
+    module: GeneratedModule
+    route: str
+    operations: int
+    seconds: float = 0.0
+    spread: float = 0.0
+
+
+def bill(
+    scene: Scene,
+    parts: Sequence[Variant],
+    *,
+    motion: float = MOTION,
+    progress: Progress = lambda fraction: None,
+) -> Bill:
+    """Compile a scene whole, in each of its variants, and bare; count, time and run them all, for
+    `motion` seconds of wall time together at most, 0 for not at all. `parts` are `variants(scene)`
+    or some of them.
+
+    Raises `SceneError` or `RunError` if the whole cannot be compiled or evaluated at its start.
+    """
+    whole = _compiled(build_model(counted(scene)))
+    tries = {route: _try(whole, route) for route in get_args(Route) if route != "auto"}
+    models = [bare(scene), *(part.model for part in parts), *(m for m, _ in tries.values())]
+    made: list[_Made | None] = [whole]
+    for model in models:
+        progress(0.5 * len(made) / (1 + len(models)))
+        made.append(None if model is None else _compiled(model))
+    progress(0.5)
+    timed = _timed(made)
+    whole, without = _there(timed[0]), _there(timed[1])
+    cost = whole.module.COST
+    changed, other_routes = timed[2 : 2 + len(parts)], timed[2 + len(parts) :]
+    size: float | None = None
+    changes: list[Change | None] = [None] * len(parts)
+    if motion:
+        told = partial(_part_of, progress, 1.5, 2.5)
+        size, changes = _changes(whole, parts, changed, motion, told)
+    return Bill(
+        name=whole.model.name,
+        route=whole.route,
+        operations=whole.operations,
+        seconds=whole.seconds,
+        spread=whole.spread,
+        bare_route=without.route,
+        bare_operations=without.operations,
+        bare_seconds=without.seconds,
+        items=tuple(_item(whole, *part) for part in zip(parts, changed, changes, strict=True)),
+        routes=tuple(
+            _route_cost(route, words, whole if route == whole.route else other)
+            for (route, (_, words)), other in zip(tries.items(), other_routes, strict=True)
+        ),
+        t_end=whole.model.simulation.t_end,
+        extent=size,
+        at_contacts={name: cost[name]["total"] for name in AT_CONTACTS if name in cost},
+    )
+
+
+def difference(seconds: float, spread: float) -> str:
+    """A difference of times in µs; of one within the spread of times no more than that it is."""
+    text = f"{1e6 * seconds:.1f}"
+    return text if abs(seconds) > spread and float(text) else f"< {max(1e6 * spread, 0.1):.1f}"
+
+
+def _there(made: _Made | None) -> _Made:
+    assert made is not None
+    return made
+
+
+def _compiled(model: Model) -> _Made:
+    """Raises `SceneError` or `RunError` if that cannot be, or not be evaluated at its start."""
+    check_regular(model)
+    system = routed(model, jacobian=False).system
+    module = load_module(python_module(system), model.name)
+    as_problem(module)
+    return _Made(model, module, system.route, module.COST["derivative"]["total"])
+
+
+def _try(whole: _Made, route: Route) -> tuple[Model | None, str]:
+    """The model by another route, or None and why not."""
+    if route == whole.route:
+        return None, "taken"
+    why_not = why_not_compared(whole.model, route)
+    return (None, why_not) if why_not else (replace(whole.model, route=route), "")
+
+
+def _route_cost(route: str, words: str, made: _Made | None) -> RouteCost:
+    if made is None:
+        return RouteCost(route, None, None, words)
+    return RouteCost(route, made.operations, made.seconds, words)
+
+
+def _item(whole: _Made, part: Variant, other: _Made | None, change: Change | None) -> Item:
+    """The difference between two modules: what one has more than the other."""
+    if other is None:
+        return Item(part.label, part.kind, needed_by=part.needed_by)
+    more, less = (other, whole) if part.kind == "left out" else (whole, other)
+    return Item(
+        part.label,
+        part.kind,
+        more.operations - less.operations,
+        more.seconds - less.seconds,
+        more.spread + less.spread,
+        len(more.module.STATES) - len(less.module.STATES),
+        len(more.model.inputs) - len(less.model.inputs),
+        route=other.route,
+        change=change,
+    )
+
+
+def _timed(made: Sequence[_Made | None]) -> list[_Made | None]:
+    """With the least time of a call in s, and its spread."""
+    found = iter(least_and_spread([_call(one.module) for one in made if one is not None]))
+    timed = []
+    for one in made:
+        if one is not None:
+            seconds, spread = next(found)
+            one = replace(one, seconds=seconds, spread=spread)
+        timed.append(one)
+    return timed
+
+
+def _call(module: GeneratedModule) -> Callable[[], object]:
+    start = module.initial_state()
+    return lambda: module.derivative(0.0, start)
+
+
+def _changes(
+    whole: _Made,
+    parts: Sequence[Variant],
+    changed: Sequence[_Made | None],
+    seconds: float,
+    progress: Progress,
+) -> tuple[float, list[Change | None]]:
+    """The extent of the scene's motion, m, and how each variant's comes apart from it.
+
+    The runs share the time there is; none goes on where that of the scene ended.
+    """
+    count = 1 + sum(made is not None for made in changed)
+    shares = _shares(seconds, count)
+    done = 0
+
+    def ran(made: _Made, until: float) -> Run:
+        nonlocal done
+        before, done = done, done + 1
+        told = partial(_part_of, progress, before, count)
+        return run(made.model, made.module, next(shares), until, told)
+
+    base = ran(whole, inf)
+    size = extent(whole.model, base)
+    found: list[Change | None] = []
+    for part, made in zip(parts, changed, strict=True):
+        if made is None:
+            found.append(None)
+            continue
+        other = ran(made, float(base.t[-1]))
+        # What is left out on purpose is measured in parts of the complete motion.
+        complete = extent(made.model, other) if part.kind == "left out" else size
+        found.append(change(whole.model, base, other, complete))
+    return size, found
+
+
+def _part_of(progress: Progress, done: float, count: float, fraction: float) -> None:
+    progress((done + fraction) / count)
+
+
+def _shares(total: float, count: int) -> Iterator[float]:
+    """An equal share of the time, s, for each; what one leaves is for those after it."""
+    due = time.perf_counter() + total
+    for left in range(count, 0, -1):
+        yield max(0.0, due - time.perf_counter()) / left

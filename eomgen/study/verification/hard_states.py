@@ -1,0 +1,113 @@
+"""States that are hard on arithmetic, the same for the same seed; see `KINDS`."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import Floats
+from eomgen.study.verification.states import random_state
+
+Random = np.random.Generator
+Angle = Callable[[Random, int], float]
+
+KINDS = {
+    "zero": "nothing moves, every coordinate 0",
+    "straight": "every coordinate 0, in motion",
+    "nearly straight": "angles of 1e-12 to 1e-3, in motion",
+    "folded": "every joint turned by half a turn to and fro, in motion",
+    "aligned": "angles multiples of a quarter of pi, in motion",
+    "gimbal": "angles within 1e-9 to 1e-3 of an odd quarter turn, attitudes of half a turn",
+    "fast": "anywhere, speeds of 1e2 to 1e5",
+    "still": "anywhere, at rest",
+    "random": "anywhere, in motion",
+}
+"""Kinds of states and what they are. `anywhere`: angles over two turns, slides within 0.6 m, any
+attitude; `in motion`: 3 rad/s, 1 m/s (see `states.random_state`). Slides are 0 where angles are
+special; inputs and extra states are anywhere but in `zero`.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A state to judge at: number `number` of its kind; `u` are the inputs by name."""
+
+    kind: str
+    number: int
+    t: float
+    y: Floats
+    u: dict[str, float]
+
+    @property
+    def label(self) -> str:
+        """What it is called."""
+        return f"{self.kind} {self.number}"
+
+
+def hard_states(
+    module: GeneratedModule, nv: int, count: int, seed: int, t_end: float
+) -> list[State]:
+    """`count` states [q, v, x] of each kind, one of `zero`, at times of the scene's run; `nv` of
+    them are velocities.
+    """
+    found = []
+    for index, kind in enumerate(KINDS):
+        for number in range(1 if kind == "zero" else count):
+            rng = np.random.default_rng([seed, index, number])
+            y = random_state(module, rng)
+            t = float(rng.uniform(0.0, t_end))
+            u = {name: float(rng.uniform(-1.0, 1.0)) for name in module.INPUTS}
+            if kind == "zero":
+                t, u = 0.0, dict.fromkeys(u, 0.0)
+            found.append(State(kind, number, t, _made(kind, module, nv, y, rng), u))
+    return found
+
+
+def _made(kind: str, module: GeneratedModule, nv: int, y: Floats, rng: Random) -> Floats:
+    """A random state made one of a kind."""
+    nq = len(module.POSITIONS)
+    turning = [i for q in module.QUATERNIONS for i in q]
+    plain = [i for i in module.POSITIONS if i not in turning]
+    if kind in _ANGLES:
+        for order, i in enumerate(plain):
+            turns = module.UNITS[module.STATES[i]] == "rad"
+            y[i] = _ANGLES[kind](rng, order) if turns else 0.0
+        for indices in map(list, module.QUATERNIONS):
+            y[indices] = _attitude(kind, rng)
+    if kind in ("zero", "still"):
+        y[nq : nq + nv] = 0.0
+    if kind == "zero":
+        y[nq + nv :] = 0.0
+    if kind == "fast":
+        y[nq : nq + nv] *= 10.0 ** rng.uniform(2.0, 5.0)
+    return y
+
+
+_ANGLES: dict[str, Angle] = {
+    "zero": lambda rng, order: 0.0,
+    "straight": lambda rng, order: 0.0,
+    "nearly straight": lambda rng, order: rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-12, -3),
+    "folded": lambda rng, order: np.pi if order % 2 else -np.pi,
+    "aligned": lambda rng, order: float(rng.integers(-8, 9)) * (np.pi / 4),
+    "gimbal": lambda rng, order: (
+        rng.choice((-1.5, -0.5, 0.5, 1.5)) * np.pi
+        + rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-9, -3)
+    ),
+}
+
+
+def _attitude(kind: str, rng: Random) -> Floats:
+    """A unit quaternion."""
+    axis = np.eye(3)[rng.integers(3)]
+    half = 0.0
+    if kind == "nearly straight":
+        half = 10.0 ** rng.uniform(-12, -3)
+    elif kind == "folded":
+        return np.array([0.0, *axis])
+    elif kind == "aligned":
+        half = float(rng.integers(-8, 9)) * (np.pi / 8)
+    elif kind == "gimbal":
+        half, axis = np.pi / 2 - 10.0 ** rng.uniform(-9, -3), rng.normal(size=3)
+        axis = axis / np.linalg.norm(axis)
+    return np.array([np.cos(half), *(np.sin(half) * axis)])

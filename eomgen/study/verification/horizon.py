@@ -1,0 +1,118 @@
+"""How long a run in doubles means anything: until it parts from one in long numbers."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from eomgen.errors import RunError
+from eomgen.model.model import Model
+from eomgen.precision.precise import BITS
+from eomgen.run.checks import SMALLEST_RTOL
+from eomgen.run.integrate import integrate
+from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.problem import Problem
+from eomgen.run.progress import Progress
+from eomgen.run.trajectory import Trajectory
+from eomgen.study.accuracy.reference import ROWS, Reference, TooLongError, paced, reference
+
+PARTED = 0.01
+"""Of the motion's scale (see `measure`): doubles that are this far off mean nothing any more."""
+METHOD = "DOP853"
+
+
+@dataclass(frozen=True)
+class Horizon:
+    """The first time at which a run in doubles has parted from one in long numbers.
+
+    time   s; None where it has not by the end
+    t_end  s
+    worst  the most that it was off up to the end, in parts of the scale
+    sure   what the run in long numbers may be off itself, in the same parts
+    origin how that was found
+    """
+
+    time: float | None
+    t_end: float
+    worst: float
+    sure: float
+    origin: str
+
+    @property
+    def words(self) -> str:
+        """In a line."""
+        if self.time is None:
+            means = f"doubles are meaningful for the whole run, {self.t_end:g} s"
+        else:
+            means = f"doubles are meaningful to t = {self.time:.4g} s of {self.t_end:g} s"
+        return (
+            f"{means}: off by {self.worst:.2g} of the motion's scale at most "
+            f"({METHOD} at rtol {SMALLEST_RTOL:g}, against {self.origin}, "
+            f"itself sure to {self.sure:.1g})"
+        )
+
+
+def horizon(
+    model: Model,
+    module: GeneratedModule,
+    parameters: Any = None,
+    inputs: Any = None,
+    *,
+    seconds: float = 60.0,
+    progress: Progress = lambda _: None,
+) -> Horizon:
+    """Compare the scene's own run, held as tight as doubles go, with the motion in long numbers.
+
+    seconds  of processor time that the long numbers may take, and each run in doubles
+
+    Raises `RunError` where contacts strike or where that time does not suffice, which leaves
+    nothing to compare with, and where a run does not get to its end.
+    """
+    t_end = model.simulation.t_end
+    problem = as_problem(module, parameters, inputs, model)
+    if problem.contacts is not None:
+        raise RunError("horizon: rigid contacts strike, and there is no run in long numbers then")
+    try:
+        true = reference(
+            model,
+            module,
+            parameters,
+            inputs,
+            t_end,
+            seconds=seconds,
+            progress=lambda part: progress(0.9 * part),
+            doubles=False,
+        )
+    except RunError as error:
+        raise RunError(
+            f"horizon: {error}; give a longer --horizon, or a shorter t_end in the scene"
+        ) from None
+    watched = paced(problem, t_end, seconds, lambda part: progress(0.9 + 0.1 * part))
+    try:
+        run = _tight(watched, t_end, true)
+    except TooLongError as reason:
+        raise RunError(
+            f"horizon: {METHOD} takes {reason}; give a longer --horizon, or a shorter t_end in the "
+            "scene"
+        ) from None
+    if run.outcome.kind == "interrupted":
+        raise KeyboardInterrupt
+    if not run.finished:
+        raise RunError(f"horizon: {METHOD}: {run.message}")
+    rows = run.y[np.searchsorted(run.t, true.t)]
+    off = np.max(np.abs(rows - true.y) / true.scale, axis=1)
+    parted = np.flatnonzero(off > PARTED)
+    time = float(true.t[parted[0]]) if len(parted) else None
+    return Horizon(time, t_end, float(np.max(off)), true.error, f"{BITS}-bit Gauss collocation")
+
+
+def _tight(problem: Problem, t_end: float, true: Reference) -> Trajectory:
+    """The run as tight as doubles go."""
+    return integrate(
+        problem,
+        METHOD,
+        t_end,
+        rtol=SMALLEST_RTOL,
+        atol=SMALLEST_RTOL * 0.1 * float(np.min(true.scale)),
+        samples=ROWS,
+    )

@@ -1,0 +1,232 @@
+"""Laws of mechanics that a module's accelerations must obey, and what exact motion keeps.
+
+All of it in 60 digits, from free bodies alone: kinetic energy and momentum are differenced along
+the motion that the module says, and what they change by must be the power of all loads and drives,
+and the forces from outside. Its Jacobian is compared with differences of the independent solver.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from gmpy2 import mpfr
+
+from eomgen.model.model import Model
+from eomgen.precision.longs import NOTHING, Array, long, long_digits, zeros
+from eomgen.precision.precise import Long
+from eomgen.run.module import GeneratedModule
+from eomgen.scene.effects import Driven
+from eomgen.scene.effects.base import JointLoad
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import WORLD
+from eomgen.study.verification.hard_states import State
+from eomgen.study.verification.judging import ulps
+from eomgen.study.verification.virtual_work import FreeBodies
+
+_STEP = mpfr(2) ** -66
+"""Of central differences, in parts of the way in a second; off by their square, some 40 digits."""
+_LEFT = 1e-45
+"""Part of what is differenced that rounding leaves of a difference that is 0."""
+SMOOTH = 1e-9
+"""Part of a difference that the difference of two of them may be where there is no corner."""
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Broken:
+    """By how much laws are broken at a state, in ulps of their terms; None where one says nothing.
+
+    energy    kinetic energy changes by the power of loads and drives
+    momentum  momentum, linear and angular, changes by the loads from outside
+    slopes    the Jacobian, along a direction
+    """
+
+    state: State
+    energy: float | None
+    momentum: float | None
+    slopes: float | None
+
+
+def why_no_energy_law(model: Model) -> str:
+    """Why the energy law says nothing of a model; "" if it does."""
+    return "velocity forces are left out on purpose" if model.leave_out else ""
+
+
+def why_no_momentum_law(model: Model) -> str:
+    """Why the momentum law says nothing of a model; "" if it does."""
+    if model.leave_out:
+        return "velocity forces are left out on purpose"
+    held = [b.joint.name for b in model.bodies if b.parent < 0 and not isinstance(b.joint, Free)]
+    given = {c.position.name for c in model.prescribed}
+    held += [
+        b.joint.name
+        for b in model.bodies
+        if b.parent < 0 and any(c.name in given for c in b.positions)
+    ]
+    return f"the world holds {', '.join(dict.fromkeys(held))}" if held else ""
+
+
+def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
+    """Ask the laws that there are at a state where the module has a derivative."""
+    ydot = module.derivative(state.t, state.y, None, state.u or None)
+    nq, nv = len(model.coordinates), len(model.velocities)
+    with long_digits():
+        y = _unit(model, long(state.y))
+        free = FreeBodies(model, state.t, y, state.u)
+        vd = long(ydot[nq : nq + nv])
+        # Coordinates go on at exactly the velocities: rounding of their rates is judged elsewhere.
+        way = np.concatenate([free.state_rates[:nq], vd, free.state_rates[nq + nv :]])
+        ahead, behind, step = _beside(model, state, y, way)
+        energy = momentum = None
+        if not why_no_energy_law(model):
+            change = (ahead.kinetic_energy - behind.kinetic_energy) / step
+            powers, sizes = free.powers
+            power = np.sum(powers, initial=mpfr(0))
+            needed = abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes
+            # At both ends of the difference what rests here has come to move.
+            scale = (abs(free.rates[:nv]) + step * abs(vd)) @ needed
+            scale += np.sum(sizes, initial=mpfr(0))
+            scale += _LEFT * free.kinetic_energy / step
+            if model.driven:
+                power += free.driving_forces(vd) @ free.rates[nv:]
+                scale += free.driving_sizes(vd) @ abs(free.rates[nv:])
+            energy = ulps(long([change - power]), long([scale]))
+        if not why_no_momentum_law(model):
+            change = (ahead.momentum - behind.momentum) / step
+            outside, sizes = _outside(free)
+            sizes = sizes + free.inertial_sizes(vd) + _LEFT * free.momentum_sizes / step
+            # Of force and of moment each by itself: they have no common unit.
+            momentum = max(
+                ulps((change - outside)[part], sizes[part]) for part in (slice(3), slice(3, 6))
+            )
+        return Broken(state, energy, momentum, _slopes(module, state, y, free))
+
+
+def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -> float | None:
+    """What the Jacobian is off along a direction, in ulps of its terms; None at a corner, where
+    there are two slopes.
+    """
+    model = free.model
+    if not hasattr(module, "jacobian"):
+        return None
+    rng = np.random.default_rng(1)
+    way = long(rng.uniform(0.5, 1.0, len(y)) * rng.choice((-1.0, 1.0), len(y)))
+    for indices in map(list, model.quaternions):  # along the sphere of unit quaternions
+        way[indices] = way[indices] - y[indices] * (way[indices] @ y[indices])
+    ahead, behind, step = _beside(model, state, y, way, still=True)
+    bend = ahead.state_rates - 2 * free.state_rates + behind.state_rates
+    change = ahead.state_rates - behind.state_rates
+    if max(abs(bend)) > SMOOTH * max(abs(change)):
+        return None
+    change = change / step
+    given = module.jacobian(state.t, state.y, None, state.u or None)
+    if not np.isfinite(given).all():
+        return float("inf")
+    slopes = long(given)
+    nq, nv = len(model.coordinates), len(model.velocities)
+    scale = abs(slopes) @ abs(way) + abs(change)
+    rows = [c.unit for c in model.velocities]
+    for unit in dict.fromkeys(rows):
+        group = [nq + i for i, other in enumerate(rows) if other == unit]
+        scale[group] = max(scale[group])
+    assert len(rows) == nv
+    return ulps(slopes @ way - change, scale)
+
+
+def _beside(
+    model: Model, state: State, y: Array, way: Array, *, still: bool = False
+) -> tuple[FreeBodies, FreeBodies, Long]:
+    """The model a little further along a way, and a little behind; and how far they are apart.
+
+    Time goes along, at one second a second, unless it stands `still`.
+    """
+    step = _STEP / (1 + max(map(abs, way)))
+    time = mpfr(0) if still else step
+    ahead = FreeBodies(model, state.t + time, y + step * way, state.u)
+    behind = FreeBodies(model, state.t - time, y - step * way, state.u)
+    return ahead, behind, 2 * step
+
+
+def _outside(free: FreeBodies) -> tuple[Array, Array]:
+    """Force and moment about the world's origin of all loads, (6,), and sizes of their terms.
+
+    Forces between bodies cancel; torques in joints act on both sides.
+    """
+    total, sizes = zeros(6), zeros(6)
+    for effect in free.model.effects:
+        if isinstance(effect, Driven):
+            continue
+        for load in effect.loads(free):
+            if isinstance(load, JointLoad) or load.body == WORLD:
+                continue
+            force = free.in_space(load.force)
+            place = free.in_space(free.place(load.body, load.at))
+            wrench = np.concatenate([force, np.cross(place, force) + free.torque(load)])
+            reach, size = np.sum(abs(place)), np.sum(abs(force))
+            total = total + wrench
+            sizes = sizes + np.concatenate(
+                [zeros(3) + size, zeros(3) + reach * size + np.sum(abs(free.torque(load)))]
+            )
+    return total, sizes
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What exact motion keeps, inputs 0, as its rates at some states tell.
+
+    energy    whether kinetic and potential energy together
+    takers    effects that give or take energy
+    momentum  which components, "x", …, "about z"
+    """
+
+    energy: bool
+    takers: tuple[str, ...]
+    momentum: tuple[str, ...]
+
+
+def kept(model: Model, states: Sequence[State]) -> Kept:
+    """What is kept at all of some states; of none, nothing."""
+    lost_energy = not states
+    takers: dict[str, None] = {}
+    names = [*AXES, *(f"about {axis}" for axis in AXES)]
+    if model.dimensions == 2:
+        names = ["x", "y", "", "", "", "about z"]
+    lost = [not (name and states) for name in names]
+    with long_digits():
+        for state in states:
+            y = _unit(model, long(state.y))
+            free = FreeBodies(model, state.t, y, {})
+            still = replace(state, u={})
+            ahead, behind, step = _beside(model, still, y, free.state_rates)
+            powers, sizes = free.powers
+            stored = (ahead.potential_energies - behind.potential_energies) / step
+            for effect, power, gone, size in zip(model.effects, powers, stored, sizes, strict=True):
+                if isinstance(effect, Driven) or not _is_nothing(power + gone, size + abs(gone)):
+                    takers[effect.name] = None
+            change = (ahead.kinetic_energy - behind.kinetic_energy) / step
+            scale = np.sum(sizes, initial=mpfr(0)) + abs(free.rates[: free.nv]) @ free.bias_sizes
+            total = change + np.sum(stored, initial=mpfr(0))
+            lost_energy |= not _is_nothing(total, scale + abs(change))
+            rates = (ahead.momentum - behind.momentum) / step
+            pace = abs(free.state_rates)
+            scale = free.momentum_sizes + np.max(abs(rates)) + np.max(pace) * NOTHING
+            lost = [
+                gone or not _is_nothing(rate, size)
+                for gone, rate, size in zip(lost, rates, scale, strict=True)
+            ]
+    return Kept(
+        not lost_energy,
+        tuple(takers),
+        tuple(name for name, gone in zip(names, lost, strict=True) if not gone),
+    )
+
+
+def _is_nothing(rate: Long, scale: Long) -> bool:
+    return bool(abs(rate) <= NOTHING * scale)
+
+
+def _unit(model: Model, y: Array) -> Array:
+    """A state with quaternions of unit length in 60 digits."""
+    for indices in map(list, model.quaternions):
+        y[indices] = y[indices] / (y[indices] @ y[indices]) ** mpfr(0.5)
+    return y

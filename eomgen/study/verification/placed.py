@@ -1,0 +1,257 @@
+"""A model at a state in long numbers: what effects may ask of it (`effects.base.Mechanism`).
+
+Joints enter by the moves that their types state; drives are differentiated by central differences.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import gmpy2
+from gmpy2 import mpfr
+
+from eomgen.language.formula import Formula, evaluate
+from eomgen.model.model import Model, Seat, ways_of
+from eomgen.precision.longs import Array, along, long, zeros
+from eomgen.precision.precise import Long
+from eomgen.scalars.extended import Bits
+from eomgen.scene.effects.base import Vector
+from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import WORLD, Move
+from eomgen.study.verification.poses import Pose, about, orientation, spun, turned_about, world_pose
+
+_INSTANT, _BITS = mpfr(2) ** -600, 4096
+"""s, of differences, and the bits of the numbers that they are taken of."""
+_LEAST = mpfr(2) ** -500
+"""A rate smaller than this is 0, and what is left of it is of the differences."""
+_JUMP = 1e-30
+"""Part of an acceleration, or of 1, by which it is not the same on both sides of a jump."""
+
+
+class Placed:
+    """A model at a time and a state y = [q, v, x] of form 'velocity'. Each thing is computed when
+    asked for; all of it belongs within `long_digits()`.
+
+    y           (ny,), doubles or long numbers
+    inputs      by name, 0 where not given
+    parameters  by name, the scene's where not given
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        t: Any,
+        y: Any,
+        inputs: Mapping[str, Any] | None = None,
+        parameters: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.model = model
+        self.dimensions = model.dimensions
+        self.scalars = Bits()
+        self.bodies = tuple(body.name for body in model.bodies)
+        self.nv = len(model.velocities)
+        self.moved = self.nv + len(model.driven)
+        self._parameters = _longs({**model.defaults, **(parameters or {})})
+        nothing = dict.fromkeys((i.name for i in model.inputs), 0.0)
+        self._inputs = _longs({**nothing, **(inputs or {})})
+        self._time = mpfr(t)
+        y, nq = long(y), len(model.coordinates)
+        given = [self._prescribed(c.value) for c in model.prescribed]
+        for n, c in enumerate(model.prescribed):
+            if (degrees := dict(model.locked_deg).get(c.position.name)) is not None:
+                given[n] = (mpfr(degrees) * gmpy2.const_pi() / 180, *given[n][1:])
+        self.q: list[Long] = [*y[:nq], *(x for x, _, _ in given)]
+        self.v: list[Long] = [*y[nq : nq + self.nv], *(v for _, v, _ in given)]
+        self.driven_rates = long([a for _, _, a in given[: len(model.driven)]])
+        names = (x.name for x in model.states)
+        self._states = dict(zip(names, y[nq + self.nv :], strict=True))
+        self.index = {name: k for k, name in enumerate(self.bodies)}
+        self.seats = {seat.body.joint.name: seat for seat in model.seats}
+
+    # What effects may ask.
+
+    @property
+    def magnitude(self) -> float:
+        """The order of its lengths, m."""
+        return self.model.magnitude
+
+    @property
+    def joints(self) -> Mapping[str, tuple[str, ...]]:
+        """The joints that move but the free ones, each with the kinds of its ways."""
+        return ways_of(self.model.bodies, self.dimensions)
+
+    def mass(self, body: str) -> Long:
+        """Mass of a body, kg."""
+        return self.value(self.model.bodies[self.index[body]].mass)
+
+    def height(self, body: str) -> Long:
+        """World y of a centre of mass in the plane, z in space, m."""
+        return self.poses[self.index[body]].place[self.dimensions - 1]
+
+    def place(self, body: str, at: Vector) -> Vector:
+        """World place of a point of a body, m."""
+        if body == WORLD:
+            return at
+        pose = self.poses[self.index[body]]
+        return self._cut(pose.place + pose.turn @ self.in_space(at))
+
+    def point(self, name: str) -> tuple[str, Vector]:
+        """A named point: its body, and where on it, m."""
+        point = next(point for point in self.model.points if point.name == name)
+        return self.bodies[point.body], tuple(self.value(part) for part in point.at)
+
+    def velocity(self, body: str, at: Vector) -> Vector:
+        """World velocity of a point of a body, m/s."""
+        if body == WORLD:
+            return self._cut(zeros(3))
+        pose = self.poses[self.index[body]]
+        arm = self.in_space(at)
+        return self._cut(along(self.rates, pose.place_v + pose.turn_v @ arm))
+
+    def turning(self, body: str) -> Vector:
+        """Angular velocity of a body, world axes, rad/s."""
+        w = zeros(3) if body == WORLD else self.spin(self.index[body])
+        return tuple(w if self.dimensions == 3 else w[2:])
+
+    def outward(self, body: str, vector: Vector) -> Vector:
+        """A vector of body axes in world axes."""
+        if body == WORLD:
+            return vector
+        return self._cut(self.poses[self.index[body]].turn @ self.in_space(vector))
+
+    def coordinate(self, joint: str, index: int = 0) -> Long:
+        """A coordinate of a joint."""
+        return self.q[self.seats[joint].q[index]]
+
+    def coordinate_name(self, joint: str, index: int = 0) -> str:
+        """Its name."""
+        return self.seats[joint].body.positions[index].name
+
+    def rate(self, joint: str, index: int = 0) -> Long:
+        """A velocity of a joint."""
+        return self.v[self.seats[joint].v[index]]
+
+    def value(self, formula: Formula, **names: Long) -> Long:
+        """A quantity."""
+        return evaluate(formula, {**self._names, **names} if names else self._names, self.scalars)
+
+    def input(self, name: str) -> Long:
+        """An input."""
+        return self._inputs[name]
+
+    def state(self, name: str) -> Long:
+        """An extra state."""
+        return self._states[name]
+
+    def number(self, value: Any) -> Long:
+        """A number."""
+        return self.scalars.number(value)
+
+    def call(self, function: str, *arguments: Long) -> Long:
+        """A function of formulas."""
+        return self.scalars.call(function, *arguments)
+
+    @cached_property
+    def _names(self) -> dict[str, Long]:
+        model = self.model
+        positions = (*model.coordinates, *(c.position for c in model.prescribed))
+        velocities = (*model.velocities, *(c.velocity for c in model.prescribed))
+        return {
+            "t": self._time,
+            **self._inputs,
+            **self._states,
+            **{c.name: x for c, x in zip(positions, self.q, strict=True)},
+            **{c.name: v for c, v in zip(velocities, self.v, strict=True)},
+            **self._parameters,
+        }
+
+    def _prescribed(self, formula: Formula) -> tuple[Long, Long, Long]:
+        """Value, rate and acceleration of a formula of time; nan at a corner, which has none."""
+        h = _INSTANT
+        with gmpy2.context(precision=_BITS):
+            x = [
+                evaluate(formula, {**self._parameters, "t": self._time + k * h}, self.scalars)
+                for k in range(-2, 3)
+            ]
+            rate = (x[3] - x[1]) / (2 * h)
+            behind, here, ahead = (
+                (a - 2 * b + c) / (h * h) for a, b, c in zip(x, x[1:], x[2:], strict=False)
+            )
+            smooth = max(abs(ahead - here), abs(behind - here)) <= _JUMP * (1 + abs(here))
+            rates = [y if abs(y) > _LEAST else mpfr(0) for y in (rate, here)]
+        if not smooth:
+            return mpfr(x[2]), mpfr("nan"), mpfr("nan")
+        value, rate, acceleration = map(mpfr, (x[2], *rates))  # of the bits that hold outside
+        return value, rate, acceleration
+
+    def in_space(self, vector: Sequence[Any]) -> Array:
+        """A vector of the plane or of space as one of space."""
+        return long([*vector, *(0.0,) * (3 - len(vector))])
+
+    def _cut(self, vector: Array) -> Vector:
+        return tuple(vector[: self.dimensions])
+
+    # Poses, joint by joint.
+
+    @cached_property
+    def rates(self) -> Array:
+        """The velocities that move: those of the state, then the driven ones."""
+        return long(self.v[: self.moved])
+
+    @cached_property
+    def felt(self) -> Array:
+        """Those of them that inertia feels."""
+        left_out = "velocity_forces" in self.model.leave_out
+        return zeros(self.moved) if left_out else self.rates
+
+    @cached_property
+    def poses(self) -> tuple[Pose, ...]:
+        """Of every body."""
+        world, found = world_pose(self.moved), list[Pose]()
+        for seat in self.model.seats:
+            parent = seat.body.parent
+            found.append(self._child(world if parent < 0 else found[parent], seat))
+        return tuple(found)
+
+    @cached_property
+    def carrying(self) -> list[list[int]]:
+        """Of every body the velocities that move it."""
+        found: list[list[int]] = []
+        for seat in self.model.seats:
+            base = found[seat.body.parent] if seat.body.parent >= 0 else []
+            found.append([*base, *(i for i in seat.v if i < self.moved)])
+        return found
+
+    def _child(self, pose: Pose, seat: Seat) -> Pose:
+        joint = seat.body.joint
+        if not isinstance(joint, Free):
+            pose = pose.moved(self.in_space([self.value(r) for r in joint.r_parent]))
+            pose = pose.fixed(orientation(joint.orientation_deg))
+        for i, move in enumerate(joint.moves(self.dimensions)):
+            pose = self._made(pose, move, seat, i)
+        if not isinstance(joint, Free):
+            pose = pose.moved(-self.in_space([self.value(r) for r in joint.r_child]))
+        return pose
+
+    def _made(self, pose: Pose, move: Move, seat: Seat, i: int) -> Pose:
+        """A pose after a move."""
+        if move.kind == "spin":
+            quaternion = long([self.q[j] for j in seat.quaternion])
+            turn, turn_v, turn_b = spun(quaternion, seat.spin, self.felt)
+            return pose.turned(turn, turn_v, turn_b, self.felt)
+        axis = long(move.axis)
+        axis = axis / gmpy2.sqrt(axis @ axis)
+        x, column = self.q[seat.q[i]], seat.v[i] if seat.v[i] < self.moved else None
+        if move.kind == "slide":
+            return pose.slid(axis, x, column, self.felt)
+        if column is None:
+            return pose.fixed(about(axis, gmpy2.cos(x), gmpy2.sin(x)))
+        return pose.turned(*turned_about(axis, x, column, self.felt), self.felt)
+
+    def spin(self, body: int) -> Array:
+        """Angular velocity (3,), world axes, rad/s."""
+        return along(self.rates, self.poses[body].spin_v)
+
+
+def _longs(values: Mapping[str, Any]) -> dict[str, Long]:
+    return {name: mpfr(value) for name, value in values.items()}

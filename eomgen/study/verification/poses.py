@@ -1,0 +1,157 @@
+"""Poses of bodies as power series in time: each rotation and place with its slope along every
+velocity, and its second derivative while no velocity changes. Long numbers (`longs`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import gmpy2
+import numpy as np
+from gmpy2 import mpfr
+
+from eomgen.precision.longs import Array, along, eye, long, zeros
+from eomgen.precision.precise import Long
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Of a body: world_R_body and the place of its centre of mass, in world axes, as series.
+
+    turn, place      (3, 3), (3,)
+    turn_v, place_v  (m, 3, 3), (m, 3): slopes along each of the m velocities
+    turn_b, place_b  second derivatives by time while no velocity changes
+    """
+
+    turn: Array
+    place: Array
+    turn_v: Array
+    place_v: Array
+    turn_b: Array
+    place_b: Array
+
+    def turned(self, turn: Array, turn_v: Array, turn_b: Array, rate: Array) -> "Pose":
+        """Axes turned further, by a matrix that is a series itself. `rate` (m,) are the velocities
+        that second derivatives feel.
+        """
+        here, more = along(rate, self.turn_v), along(rate, turn_v)
+        return Pose(
+            self.turn @ turn,
+            self.place,
+            self.turn_v @ turn + self.turn @ turn_v,
+            self.place_v,
+            self.turn_b @ turn + 2 * (here @ more) + self.turn @ turn_b,
+            self.place_b,
+        )
+
+    def fixed(self, turn: Array) -> "Pose":
+        """Axes turned by a matrix that stays as it is."""
+        return Pose(
+            self.turn @ turn,
+            self.place,
+            self.turn_v @ turn,
+            self.place_v,
+            self.turn_b @ turn,
+            self.place_b,
+        )
+
+    def moved(self, arm: Array) -> "Pose":
+        """The place moved by a vector that is fixed in these axes."""
+        return Pose(
+            self.turn,
+            self.place + self.turn @ arm,
+            self.turn_v,
+            self.place_v + self.turn_v @ arm,
+            self.turn_b,
+            self.place_b + self.turn_b @ arm,
+        )
+
+    def slid(self, axis: Array, way: Long, column: int | None, rate: Array) -> "Pose":
+        """The place moved by `way` along an axis of these axes, which velocity `column` changes."""
+        there = self.moved(axis * way)
+        if column is None:
+            return there
+        place_v = there.place_v.copy()
+        place_v[column] = place_v[column] + self.turn @ axis
+        here = along(rate, self.turn_v)
+        place_b = there.place_b + 2 * rate[column] * (here @ axis)
+        return Pose(there.turn, there.place, there.turn_v, place_v, there.turn_b, place_b)
+
+    @cached_property
+    def spin_v(self) -> Array:
+        """J_w (m, 3), world axes: of Ṙ Rᵀ along each velocity."""
+        return _axial(self.turn_v @ self.turn.T)
+
+    @cached_property
+    def spin_b(self) -> Array:
+        """Angular acceleration while no velocity changes: what is skew of R̈ Rᵀ."""
+        return _axial(self.turn_b @ self.turn.T)
+
+
+def _axial(m: Array) -> Array:
+    """The vectors w (…, 3) of what is skew of matrices (…, 3, 3), [w]x."""
+    pairs = ((2, 1), (0, 2), (1, 0))
+    return np.stack([m[..., i, j] - m[..., j, i] for i, j in pairs], axis=-1) / mpfr(2)
+
+
+def about(axis: Array, c: Long, s: Long) -> Array:
+    """Rotation about a unit vector, of cosine c and sine s (Rodrigues)."""
+    x, y, z = axis
+    cross = long([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    along = np.outer(axis, axis)
+    return (eye() - along) * c + cross * s + along
+
+
+def orientation(degrees: float | tuple[float, float, float]) -> Array:
+    """The fixed rotation of a joint: Rz Ry Rx."""
+    angles = degrees if isinstance(degrees, tuple) else (0.0, 0.0, degrees)
+    turn = eye()
+    for axis, angle in zip(np.eye(3), angles, strict=True):
+        radians = mpfr(angle) * gmpy2.const_pi() / 180
+        turn = about(long(axis), gmpy2.cos(radians), gmpy2.sin(radians)) @ turn
+    return turn
+
+
+def composed(quaternion: Array, spin: Array) -> Array:
+    """quaternion ∘ (0, spin)."""
+    w, axis = quaternion[0], quaternion[1:]
+    return np.concatenate([[-(axis @ spin)], w * spin + np.cross(axis, spin)])
+
+
+def _bilinear(a: Array, b: Array) -> Array:
+    """The symmetric form whose value at a = b is the rotation of the quaternion a, less what only
+    its length adds: (w² - x·x) 1 + 2 x xᵀ + 2 w [x]x of unit length.
+    """
+    (v, x), (w, y) = (a[0], a[1:]), (b[0], b[1:])
+    s = v * y + w * x
+    cross = long([[0.0, -s[2], s[1]], [s[2], 0.0, -s[0]], [-s[1], s[0], 0.0]])
+    return eye() * (v * w - x @ y) + np.outer(x, y) + np.outer(y, x) + cross
+
+
+def spun(quaternion: Array, columns: Sequence[int], rate: Array) -> tuple[Array, Array, Array]:
+    """The rotation of a quaternion as a series; `columns` are its three velocities."""
+    units = [composed(quaternion, axis) / 2 for axis in eye()]
+    spin = long([rate[j] for j in columns])
+    change = composed(quaternion, spin) / 2
+    second = composed(change, spin) / 2
+    turn_v = zeros(len(rate), 3, 3)
+    for j, unit in zip(columns, units, strict=True):
+        turn_v[j] = 2 * _bilinear(quaternion, unit)
+    turn_b = 2 * _bilinear(change, change) + 2 * _bilinear(quaternion, second)
+    return _bilinear(quaternion, quaternion), turn_v, turn_b
+
+
+def turned_about(axis: Array, angle: Long, column: int, rate: Array) -> tuple[Array, Array, Array]:
+    """The rotation about a unit vector by an angle that velocity `column` changes, as a series."""
+    c, s, velocity = gmpy2.cos(angle), gmpy2.sin(angle), rate[column]
+    # Derivatives of c and s along the angle; the rest of the rotation stays as it is.
+    still = about(axis, mpfr(0), mpfr(0))
+    turn_v = zeros(len(rate), 3, 3)
+    turn_v[column] = about(axis, -s, c) - still
+    turn_b = (about(axis, -c, -s) - still) * (velocity * velocity)
+    return about(axis, c, s), turn_v, turn_b
+
+
+def world_pose(m: int) -> Pose:
+    """That of the world, which none of m velocities moves."""
+    return Pose(eye(), zeros(3), zeros(m, 3, 3), zeros(m, 3), zeros(3, 3), zeros(3))

@@ -1,0 +1,85 @@
+"""States to judge arithmetic at, with the truth there in 60 digits."""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from eomgen.errors import RunError
+from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import Floats
+from eomgen.run.progress import Progress
+from eomgen.scalars.extended import DIGITS
+from eomgen.study.verification.states import random_state
+from eomgen.study.verification.truth import Exact, Truth
+from eomgen.study.verification.visited import visited
+
+SEEDED, OWN = "seeded", "own run"
+CHECKED = 3
+"""States of each kind at which the truth is computed in another way, too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """States that all ways are judged at: times t (n,), y (n, ny).
+
+    `condition` (n,) is that of the mass matrix scaled to a diagonal of ones: about how many times
+    a rounding error in it may grow. `left_out` states had no finite acceleration in 60 digits.
+    `until` is how far the run that they come from went, s; None if they come from none.
+    """
+
+    kind: str
+    t: Floats
+    y: Floats
+    condition: Floats = field(default_factory=lambda: np.empty(0))
+    left_out: int = 0
+    until: float | None = None
+
+
+def judging_states(
+    truth: Truth, module: GeneratedModule, count: int, seed: int, progress: Progress
+) -> tuple[list[Sample], list[Exact]]:
+    """`count` seeded states, about as many of the scene's own run, and the truth at each; those
+    left out that have none.
+
+    Raises `RunError` if the scene cannot start, or if no state has any.
+    """
+    rng, t_end = np.random.default_rng(seed), truth.model.simulation.t_end
+    y = np.array([random_state(module, rng) for _ in range(count)])
+    seeded = Sample(SEEDED, rng.uniform(0.0, t_end, count), y)
+    run = visited(truth.model, module, count, lambda part: progress(0.3 * part))
+    samples, truths = [], []
+    for k, sample in enumerate((seeded, Sample(OWN, run.t, run.y, until=run.until))):
+        true = truth(sample.t, sample.y)
+        progress(0.3 + 0.35 * (k + 1))
+        known = np.array([x is not None for x in true[0]])
+        if not np.any(known):
+            raise RunError(f"no finite acceleration in {DIGITS} digits at any {sample.kind} state")
+        there = replace(sample, t=sample.t[known], y=sample.y[known], left_out=int(np.sum(~known)))
+        samples.append(there)
+        truths.append(true[:, known])
+    return samples, truths
+
+
+def agreement(truth: Truth, sample: Sample, true: Exact) -> float:
+    """Digits to which the truth agrees with what LᵀDL gives, at the first states and the state
+    whose acceleration is greatest, relative to the greatest acceleration.
+    """
+    sizes = np.max(np.abs(true), axis=0)
+    worst = 0.0
+    for k in {*range(min(CHECKED, len(sizes))), int(np.argmax(sizes))}:
+        off = np.max(np.abs(truth.factored(sample.t[k], sample.y[k]) - true[:, k]))
+        if off:
+            worst = max(worst, float(off / sizes[k]) if sizes[k] else 1.0)
+    return -math.log10(worst) if worst else float(DIGITS)
+
+
+def condition_numbers(module: Any, sample: Sample) -> Floats:
+    """Condition number (n,) of the mass matrix scaled to a diagonal of ones."""
+    found = []
+    for t, y in zip(sample.t, sample.y, strict=True):
+        matrix = module.mass_matrix(t, y)
+        scale = np.sqrt(np.abs(np.diag(matrix)))
+        found.append(np.linalg.cond(matrix / np.outer(scale, scale)))
+    return np.array(found)

@@ -1,0 +1,74 @@
+"""Accelerations in 60 digits, at exactly the numbers of scene, state and parameters."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.codegen.from_recursion import Recording
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.finite import values_at
+from eomgen.model.model import Model
+from eomgen.model.states import velocity_states
+from eomgen.precision.longs import Array, long
+from eomgen.program.extended import evaluator
+from eomgen.program.program import Output, finish, interpreter
+from eomgen.program.tape import TIME, ExactTape
+from eomgen.run.problem import Floats
+from eomgen.scalars.extended import MP, Bits, Digits, exact
+
+Exact = NDArray[np.object_]
+"""60-digit numbers."""
+
+
+class Truth:
+    """v̇ of a model of form 'velocity', its inputs at 0 and no contact held.
+
+    It is computed by articulated bodies from a recording of its own, in which nothing was rounded
+    nor rearranged; `factored` is the same by another way, LᵀDL factors, from no recording at all.
+    """
+
+    def __init__(self, model: Model) -> None:
+        record = Recording(model, "aba", tape=ExactTape())
+        self.model = model
+        self._states = [state.name for state in velocity_states(model)]
+        nodes = tuple(node.index for node in record.vd)
+        program = finish(record.tape, {"vd": Output((len(nodes),), nodes)}, ())
+        self._accelerations = evaluator(program, "vd")
+        self._long = interpreter(program, "vd", Bits())
+
+    def __call__(self, t: Floats, y: Floats) -> Exact:
+        """v̇ (nv, n) at times t (n,) and states y (n, ny); None all over where there is none."""
+        return np.array(list(map(self._at, t.tolist(), y.tolist())), dtype=object).T
+
+    def _at(self, t: float, y: list[float]) -> list[Any]:
+        states = dict(zip(self._states, y, strict=True))
+        inputs = {i.name: 0.0 for i in self.model.inputs}
+        try:
+            return self._accelerations({**states, **self.model.defaults, **inputs, TIME: t})
+        except (ArithmeticError, ValueError):
+            return [None] * len(self.model.velocities)
+
+    def long(
+        self, t: Any, y: Any, inputs: Mapping[str, Any], parameters: Mapping[str, Any]
+    ) -> Array:
+        """v̇ (nv,) at one state, of the same recording, at numbers of which none need be a double;
+        nan where there is none. To be called within `long_digits()`.
+        """
+        given = dict(zip(self._states, long(y), strict=True))
+        values = {**self.model.defaults, **parameters}
+        values |= {i.name: inputs.get(i.name, 0.0) for i in self.model.inputs} | {TIME: t}
+        given |= dict(zip(values, long(list(values.values())), strict=True))
+        return long(self._long(given))
+
+    def factored(self, t: float, y: Floats) -> Exact:
+        """v̇ (nv,) at one state."""
+        values = values_at(
+            self.model,
+            MP.mpf(t),
+            list(exact(y)),
+            {name: MP.mpf(value) for name, value in self.model.defaults.items()},
+            {i.name: MP.mpf(0) for i in self.model.inputs},
+        )
+        return np.array(Dynamics(self.model, values, Digits()).factored_forward(), dtype=object)

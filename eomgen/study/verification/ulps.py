@@ -1,0 +1,74 @@
+"""Errors counted in units in the last place (ulp) of a floating-point format.
+
+The ulp of x is the distance of neighbouring numbers of the format about x: 2^(e - p) for
+2^(e-1) <= |x| < 2^e and p bits, p = 53 for float64 and 24 for float32. A result that is rounded
+once, and correctly, is off by half a ulp at most.
+
+Of a vector the components of one unit are a group, and an error is counted in ulps of the group's
+greatest component: by itself a component that happens to be near 0 might be off by any number of
+its own. For the same reason a group that is all but nothing, as that of a motion that dies down,
+counts in ulps of a thousandth of what it is at half of all states. The vector's error is that of
+its worst component.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from eomgen.run.problem import Floats
+from eomgen.scalars.extended import MP
+from eomgen.study.verification.truth import Exact
+
+HARDLY = 1e-3
+"""Part of its middle size below which a group is all but nothing."""
+BITS = {"float64": 53, "float32": 24}
+"""Of the significand of each format, the leading one included."""
+
+
+def ulp(x: Any, bits: int) -> Any:
+    """The ulp of a 60-digit number that is not 0, as one."""
+    return MP.ldexp(1, MP.frexp(x)[1] - bits)
+
+
+def vector_errors(found: Floats, true: Exact, units: Sequence[str], bits: int) -> Floats:
+    """Errors (n,) of vectors (n of length m, in columns: (m, n)) in ulps, as this page counts them.
+
+    `units` are those of the components. Where a group is 0 at most states, its greatest size at any
+    of them counts for the others; where that is 0, too, any error is infinite. What was found and
+    is not finite has nan as its error.
+    """
+    finite = np.all(np.isfinite(found), axis=0)
+    errors = np.where(finite, 0.0, np.nan)
+    for group, scale in group_scales(true, units):
+        for k in np.flatnonzero(finite):
+            off = max(abs(MP.mpf(float(found[i, k])) - true[i, k]) for i in group)
+            errors[k] = max(errors[k], _in_ulps(off, scale[k], bits))
+    return errors
+
+
+def group_scales(true: Any, units: Sequence[str]) -> list[tuple[list[int], Any]]:
+    """Of each group of vectors in columns (m, n): its components, and what its errors are counted
+    in ulps of, (n,).
+    """
+    found = []
+    for unit in dict.fromkeys(units):
+        group = [i for i, u in enumerate(units) if u == unit]
+        sizes = np.max(np.abs(true[group]), axis=0)
+        least = HARDLY * (sorted(sizes)[len(sizes) // 2] or max(sizes))
+        found.append((group, np.maximum(sizes, least)))
+    return found
+
+
+def component_errors(found: Floats, true: Exact, bits: int) -> Floats:
+    """Errors of all components, each in its own ulps, those left out that are 0 or not finite."""
+    pairs = zip(found.ravel().tolist(), true.ravel(), strict=True)
+    return np.array(
+        [_in_ulps(abs(MP.mpf(x) - z), z, bits) for x, z in pairs if z and np.isfinite(x)]
+    )
+
+
+def _in_ulps(off: Any, scale: Any, bits: int) -> float:
+    if not off:
+        return 0.0
+    return float(off / ulp(scale, bits)) if scale else float("inf")

@@ -1,0 +1,292 @@
+"""A numeric solver that shares nothing with the recursions: free bodies and virtual work.
+
+Poses alone are written down, joint by joint from the world outwards, as rotation matrices and
+places. Velocities and accelerations are what power series in time give of them: of every rotation
+and place its value, its slope along each velocity, and its second derivative while the velocities
+do not change. Each body is then free, by Newton and Euler, m a = f and I α + ω x I ω = n, and the
+principle of d'Alembert puts them together: reactions of joints do no virtual work, so that
+
+    Σ J_pᵀ (m a - f) + J_wᵀ (I α + ω x I ω - n) = 0,    J_p = ∂ place'/∂v,  J_w = ∂ω/∂v.
+
+No velocity is handed on from body to body, no inertia is moved to another point, no force is
+carried inwards, and the matrix is solved by dense elimination with row exchanges. Joints enter by
+the moves that their types state, effects by the loads and energies that they state.
+
+Numbers are MPFR's, of 60 digits. Drives are differentiated by central differences.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from gmpy2 import mpfr
+
+from eomgen.precision.longs import NOTHING, Array, along, long, solved, zeros
+from eomgen.precision.precise import Long
+from eomgen.scene.effects.base import JointLoad, Load
+from eomgen.scene.joints.base import WORLD, Geared
+from eomgen.study.verification.placed import Placed
+from eomgen.study.verification.poses import composed
+
+
+class FreeBodies(Placed):
+    """M v̇ + V + G = F of a model at a time and a state, its energy, momentum and powers."""
+
+    # Free bodies put together.
+
+    @cached_property
+    def inertias(self) -> list[Array]:
+        """Of every body about its centre of mass, world axes, (3, 3)."""
+        found = []
+        for body, pose in zip(self.model.bodies, self.poses, strict=True):
+            entries = [self.value(entry) for entry in body.inertia_com]
+            if len(entries) == 1:
+                matrix = zeros(3, 3)
+                matrix[2, 2] = entries[0]
+            else:
+                xx, yy, zz, xy, xz, yz = entries
+                matrix = long([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            found.append(pose.turn @ matrix @ pose.turn.T)
+        return found
+
+    @cached_property
+    def _whole_matrix(self) -> Array:
+        """M of all that moves, the driven velocities too, (m, m)."""
+        matrix = zeros(self.moved, self.moved)
+        for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
+            moving = self.carrying[k]
+            place_v, spin_v = pose.place_v[moving], pose.spin_v[moving]
+            part = place_v @ (self.mass(name) * place_v.T) + spin_v @ self.inertias[k] @ spin_v.T
+            at = np.ix_(moving, moving)
+            matrix[at] = matrix[at] + part
+        for i, armature in self._rotors.items():
+            matrix[i, i] = matrix[i, i] + armature
+        return matrix
+
+    @cached_property
+    def _rotors(self) -> dict[int, Long]:
+        """What rotors add to the inertia of the velocities that turn them, kg m² or kg."""
+        found = {}
+        for seat in self.model.seats:
+            joint = seat.body.joint
+            if isinstance(joint, Geared) and seat.v[0] < self.moved:
+                ratio = mpfr(1) if joint.gear_ratio is None else self.value(joint.gear_ratio)
+                found[seat.v[0]] = ratio * ratio * self.value(joint.motor_inertia)
+        return found
+
+    @cached_property
+    def _resisting(self) -> tuple[Array, Array]:
+        """What inertia takes while no velocity changes (m,), and the sizes of its terms."""
+        total, sizes = zeros(self.moved), zeros(self.moved)
+        left_out = "velocity_forces" in self.model.leave_out
+        pace = np.max(abs(self.felt), initial=mpfr(0))
+        # Where all of it cancels, as in a free body that turns evenly, no term is left to count by.
+        least = NOTHING * pace * pace
+        for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
+            force = self.mass(name) * pose.place_b
+            torque = self.inertias[k] @ pose.spin_b
+            if not left_out:
+                w = self.spin(k)
+                torque = torque + np.cross(w, self.inertias[k] @ w)
+            total = total + pose.place_v @ force + pose.spin_v @ torque
+            sizes = sizes + _reach(pose.place_v, force) + _reach(pose.spin_v, torque)
+            sizes = sizes + _reach(pose.place_v, least * self.mass(name) * self.reach)
+            sizes = sizes + _reach(pose.spin_v, least * self.inertias[k])
+        return total, sizes
+
+    def pushed(self, loads: Sequence[Load | JointLoad]) -> tuple[Array, Array]:
+        """What loads put on each velocity (m,), and the sizes of its terms."""
+        total, sizes = zeros(self.moved), zeros(self.moved)
+        for load in loads:
+            if isinstance(load, JointLoad):
+                i = self.seats[load.joint].v[load.coordinate]
+                if i < self.moved:
+                    total[i] = total[i] + load.force
+                    sizes[i] = sizes[i] + abs(load.force)
+            elif load.body != WORLD:
+                pose = self.poses[self.index[load.body]]
+                force, torque = self.in_space(load.force), self.torque(load)
+                at = pose.place_v + pose.turn_v @ self.in_space(load.at)
+                total = total + at @ force + pose.spin_v @ torque
+                sizes = sizes + _reach(at, force) + _reach(pose.spin_v, torque)
+        return total, sizes
+
+    def torque(self, load: Load) -> Array:
+        """Of a load, world axes, (3,), N m."""
+        return long([*(0.0,) * (3 - len(load.torque)), *load.torque] if load.torque else [0.0] * 3)
+
+    @cached_property
+    def _loads(self) -> dict[str, tuple[Array, Array]]:
+        """`pushed` by gravity, and by all else."""
+        kinds: dict[str, list[Load | JointLoad]] = {"gravity": [], "applied": []}
+        for effect in self.model.effects:
+            for load in effect.loads(self):
+                kinds["applied" if isinstance(load, JointLoad) else load.kind].append(load)
+        return {kind: self.pushed(loads) for kind, loads in kinds.items()}
+
+    @cached_property
+    def mass_matrix(self) -> Array:
+        """M (nv, nv)."""
+        return self._whole_matrix[: self.nv, : self.nv]
+
+    @cached_property
+    def velocity_force(self) -> Array:
+        """V (nv,), with what driven accelerations take."""
+        resisting = self._resisting[0][: self.nv]
+        if not self.model.driven:
+            return resisting
+        return resisting + self._whole_matrix[: self.nv, self.nv :] @ self.driven_rates
+
+    @cached_property
+    def gravity_force(self) -> Array:
+        """G (nv,)."""
+        return -self._loads["gravity"][0][: self.nv]
+
+    @cached_property
+    def bias_force(self) -> Array:
+        """h = V + G."""
+        return self.velocity_force + self.gravity_force
+
+    @cached_property
+    def applied_force(self) -> Array:
+        """F (nv,)."""
+        return self._loads["applied"][0][: self.nv]
+
+    @cached_property
+    def bias_sizes(self) -> Array:
+        """Sum of the sizes of all terms of V and G (nv,)."""
+        found = self._resisting[1] + self._loads["gravity"][1]
+        if self.model.driven:
+            found = found + abs(self._whole_matrix[:, self.nv :]) @ abs(self.driven_rates)
+        return found[: self.nv]
+
+    @cached_property
+    def applied_sizes(self) -> Array:
+        """The same of F (nv,)."""
+        return self._loads["applied"][1][: self.nv]
+
+    @cached_property
+    def vd(self) -> Array:
+        """v̇ (nv,). Raises `ZeroDivisionError` if M is singular."""
+        return solved(self.mass_matrix, self.applied_force - self.bias_force)
+
+    @cached_property
+    def state_rates(self) -> Array:
+        """ẏ (ny,): of coordinates, velocities and extra states."""
+        found: list[Long] = []
+        for seat in self.model.seats:
+            found += [self.v[j] for _, j in seat.plain if j < self.nv]
+            if seat.quaternion:
+                spin = long([self.v[j] for j in seat.spin])
+                found += list(composed(long([self.q[i] for i in seat.quaternion]), spin) / 2)
+        extra = [rate for effect in self.model.effects for rate in effect.rates(self)]
+        return long([*found, *self.vd, *extra])
+
+    # Energy and momentum.
+
+    @cached_property
+    def kinetic_energy(self) -> Long:
+        """Of all bodies and rotors, J."""
+        energy = mpfr(0)
+        for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
+            u, w = along(self.rates, pose.place_v), self.spin(k)
+            energy += (self.mass(name) * (u @ u) + w @ self.inertias[k] @ w) / 2
+        for i, armature in self._rotors.items():
+            energy += armature * self.rates[i] ** 2 / 2
+        return energy
+
+    @cached_property
+    def potential_energy(self) -> Long:
+        """Of all effects, J."""
+        return np.sum(self.potential_energies, initial=mpfr(0))
+
+    @cached_property
+    def potential_energies(self) -> Array:
+        """Of each effect, J."""
+        return long([effect.potential_energy(self) for effect in self.model.effects])
+
+    @cached_property
+    def reach(self) -> Long:
+        """Sum of the distances of all bodies from those that carry them, m: no place is farther."""
+        total = mpfr(0)
+        for body, pose in zip(self.model.bodies, self.poses, strict=True):
+            base = self.poses[body.parent].place if body.parent >= 0 else zeros(3)
+            total += np.sum(abs(pose.place - base))
+        return total
+
+    @cached_property
+    def momentum(self) -> Array:
+        """Linear, then angular about the world's origin, of the bodies, world axes, (6,)."""
+        return self._momentum[0]
+
+    @cached_property
+    def momentum_sizes(self) -> Array:
+        """Sum of the sizes of its terms (6,)."""
+        return self._momentum[1]
+
+    @cached_property
+    def _momentum(self) -> tuple[Array, Array]:
+        total, sizes = zeros(6), zeros(6)
+        for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
+            p = self.mass(name) * along(self.rates, pose.place_v)
+            spin = self.inertias[k] @ self.spin(k)
+            total = total + np.concatenate([p, np.cross(pose.place, p) + spin])
+            arm, force = abs(pose.place), abs(p)
+            turning = np.sum(arm) * np.sum(force) + np.sum(abs(spin))
+            sizes = sizes + np.concatenate([zeros(3) + np.sum(force), zeros(3) + turning])
+        return total, sizes
+
+    def inertial_sizes(self, vd: Array) -> Array:
+        """Sum of the sizes of all that momentum changes by at v̇, body for body, (6,)."""
+        whole, sizes = np.concatenate([vd, self.driven_rates]), zeros(6)
+        for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
+            w, inertia = self.spin(k), self.inertias[k]
+            force = self.mass(name) * (abs(pose.place_b) + abs(along(whole, pose.place_v)))
+            spin = abs(inertia) @ (abs(pose.spin_b) + abs(along(whole, pose.spin_v)))
+            spin = spin + abs(np.cross(w, inertia @ w))
+            linear, turning = np.sum(force), np.sum(spin)
+            turning = turning + np.sum(abs(pose.place)) * linear
+            sizes = sizes + np.concatenate([zeros(3) + linear, zeros(3) + turning])
+        return sizes
+
+    @cached_property
+    def powers(self) -> tuple[Array, Array]:
+        """Of each effect's loads, W, and the sizes of its terms; drives have none here."""
+        pushes = [self.pushed(list(effect.loads(self))) for effect in self.model.effects]
+        speeds = abs(self.rates)
+        return (
+            long([push @ self.rates for push, _ in pushes]),
+            long([sizes @ speeds for _, sizes in pushes]),
+        )
+
+    @cached_property
+    def effect_powers(self) -> tuple[Array, Array]:
+        """The same with those of drives, at v̇ under the effects."""
+        powers, sizes = (x.copy() for x in self.powers)
+        if self.model.driven:
+            taken = dict(zip(self.model.driven, self.driving_forces(self.vd), strict=True))
+            speeds = dict(zip(self.model.driven, self.rates[self.nv :], strict=True))
+            at = {effect.name: k for k, effect in enumerate(self.model.effects)}
+            needed = dict(zip(self.model.driven, self.driving_sizes(self.vd), strict=True))
+            for drive, force in taken.items():
+                k = at[str(drive.by)]
+                powers[k] = force * speeds[drive]
+                sizes[k] = needed[drive] * abs(speeds[drive])
+        return powers, sizes
+
+    def driving_forces(self, vd: Array) -> Array:
+        """What each driven velocity takes at v̇ of the others, N m or N."""
+        whole = np.concatenate([vd, self.driven_rates])
+        needed = self._whole_matrix @ whole + self._resisting[0]
+        return (needed - self._loads["gravity"][0] - self._loads["applied"][0])[self.nv :]
+
+    def driving_sizes(self, vd: Array) -> Array:
+        """Sum of the sizes of its terms."""
+        whole = abs(np.concatenate([vd, self.driven_rates]))
+        sizes = abs(self._whole_matrix) @ whole + self._resisting[1]
+        return (sizes + self._loads["gravity"][1] + self._loads["applied"][1])[self.nv :]
+
+
+def _reach(slopes: Array, force: Array | Long) -> Array:
+    """The most that a force does along motions (m, 3), whatever its direction, (m,)."""
+    return np.sum(abs(slopes), axis=1) * np.sum(abs(force))
