@@ -24,8 +24,8 @@ from eomgen.scene.schema import Simulation
 from eomgen.templating import PACKAGE, templates_folder
 
 AFTER = (
-    *("store.py", "entries.py", "run", "study", "show", "results.py", "api.py", "commands"),
-    *("cli.py", "__main__.py", "__init__.py"),
+    *("store.py", "entries.py", "run", "precision", "linear", "study", "show", "results.py"),
+    *("api.py", "commands", "cli.py", "__main__.py", "__init__.py"),
 )
 """Files and folders of this program that have no say in the code; all others have."""
 LIBRARIES = (
