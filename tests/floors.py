@@ -1,4 +1,4 @@
-"""The floors of the package: who may import whom. Run as a command it draws them for docs/."""
+"""The floors of the package: who may import whom."""
 
 import ast
 from functools import cache

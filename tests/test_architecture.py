@@ -8,6 +8,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+from drawing import DRAWING, drawing
 from floors import FLOORS, PACKAGE, imports, modules, nodes, room
 
 from eomgen.codegen.from_recursion import BESIDE, OBSERVED, OF_DYNAMICS
@@ -39,6 +40,11 @@ def test_no_import_cycle() -> None:
                 seen.add(name)
                 stack += imports(name)
         assert start not in seen, f"{start} imports itself"
+
+
+def test_the_drawing_is_fresh() -> None:
+    """`python tests/drawing.py` draws what docs/architecture.md shows."""
+    assert DRAWING.read_text("utf-8") == drawing()
 
 
 def test_the_running_half_does_without_sympy() -> None:

@@ -1,0 +1,1 @@
+"""From model to program and from program to files: routes, outputs, backends."""

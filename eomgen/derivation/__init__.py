@@ -1,0 +1,1 @@
+"""What people read: the equations by SymPy, step by step."""

@@ -1,0 +1,1 @@
+"""Formulas and quantities of scenes: read, never executed."""

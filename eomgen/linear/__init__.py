@@ -1,0 +1,1 @@
+"""Equilibria, linearisation, modes."""

@@ -1,0 +1,1 @@
+"""From scene to model: names bound, geometry normalised, bodies in a tree."""

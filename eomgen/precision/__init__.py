@@ -1,0 +1,1 @@
+"""Runs in more digits than a double has."""

@@ -1,0 +1,1 @@
+"""The straight-line program: tape, passes, derivatives, printing. It knows no mechanics."""

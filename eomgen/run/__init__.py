@@ -1,0 +1,1 @@
+"""Modules loaded and integrated: methods, events, contacts, trajectories."""

@@ -1,0 +1,1 @@
+"""What equations are computed over: floats, arrays, duals, numbers of many digits."""

@@ -1,0 +1,1 @@
+"""Scenes: tables, joints, effects; read and checked, each fault with its place and remedy."""

@@ -1,0 +1,1 @@
+"""What a scene's numbers are worth: accuracy, verification, cost."""

@@ -1,0 +1,1 @@
+"""What each effect and each kind of arithmetic costs."""

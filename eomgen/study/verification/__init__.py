@@ -1,0 +1,1 @@
+"""Whether a module is right: other routes, many digits, laws of mechanics."""
