@@ -9,7 +9,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run.integrators import FixedStep, find_integrator
-from eomgen.run.integrators.gragg_bulirsch_stoer import MOST_ROWS
+from eomgen.run.integrators.extrapolation import MOST_ROWS
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.origin import START, UNITS
 from eomgen.run.problem import Problem

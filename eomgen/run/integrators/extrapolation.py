@@ -1,0 +1,61 @@
+"""The explicit midpoint rule, extrapolated: Hairer, Norsett, Wanner, Solving ODEs I, II.9."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from eomgen.run.problem import Floats
+
+Slope = Callable[[float, Floats], Floats]
+MOST_ROWS = 10
+SUBSTEPS = tuple(2 * row + 2 for row in range(MOST_ROWS))
+"""Of each row of the table of a step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """The explicit midpoint rule over a step: the change of y (ny,) up to the middle and the end,
+    and the slopes after each substep but the last, (substeps, ny).
+    """
+
+    middle: Floats
+    change: Floats
+    slopes: Floats
+
+
+def midpoint(fun: Slope, t: float, y: Floats, step: float, substeps: int, slope: Floats) -> Row:
+    """Hairer, Norsett, Wanner I, (II.9.13), for the change of y; `slope` is that at the start."""
+    h = step / substeps
+    slopes = np.empty((substeps, len(y)))
+    slopes[0] = slope
+    before, change, middle = np.zeros_like(y), h * slope, y
+    for i in range(1, substeps):
+        if 2 * i == substeps:
+            middle = change
+        slope = slopes[i] = fun(t + i * h, y + change)
+        before, change = change, before + 2 * h * slope
+    return Row(middle, change, slopes)
+
+
+def next_row(above: list[Floats], value: Floats, substeps: Sequence[int]) -> list[Floats]:
+    """A row of Aitken and Neville's table in the squares of the substeps, from the one above."""
+    columns = [value]
+    for i, left in enumerate(above):
+        ratio = substeps[-1] / substeps[-2 - i]
+        columns.append(columns[-1] + (columns[-1] - left) / (ratio * ratio - 1))
+    return columns
+
+
+def extrapolated(values: Sequence[Floats], substeps: Sequence[int]) -> Floats:
+    """What values at these numbers of substeps tend to."""
+    columns: list[Floats] = []
+    for row, value in enumerate(values, 1):
+        columns = next_row(columns, value, substeps[:row])
+    return columns[-1]
+
+
+def norm(x: Floats) -> float:
+    """The root mean square."""
+    return sqrt(float(x @ x) / len(x))

@@ -1,0 +1,182 @@
+"""Dense output of Gragg, Bulirsch and Stoer's method (Hairer, Norsett, Wanner I, II.9)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from math import comb, factorial, inf
+from typing import Any
+
+import numpy as np
+from scipy.integrate import DenseOutput
+
+from eomgen.run.integrators.extrapolation import (
+    MOST_ROWS,
+    SUBSTEPS,
+    Row,
+    Slope,
+    extrapolated,
+    midpoint,
+    next_row,
+    norm,
+)
+from eomgen.run.problem import Floats
+
+DENSE_SUBSTEPS = tuple(4 * row + 2 for row in range(MOST_ROWS))
+"""Of each row of the table of the dense output; half of them is odd."""
+_LOOKS = np.array([-0.75, -0.5, 0.5, 0.75])
+"""Where in a step, from -1 to 1, dense outputs of more and of fewer rows are compared."""
+_SETTLED = 10.0
+"""Such a difference, in parts of what is allowed, is the error of the one of fewer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Span:
+    """A step, or half of it: from `start` at `t`, the change over it and the slopes at its ends."""
+
+    t: float
+    start: Floats
+    step: float
+    change: Floats
+    before: Floats
+    after: Floats
+
+
+class Interpolant(DenseOutput):
+    """The state within a step, as accurate as the step's end: a polynomial for each half of it.
+
+    Each has the values and slopes of both ends and, in the middle, the value and derivatives that
+    come of differences of the rows' slopes, extrapolated (Hairer, Norsett, Wanner I, II.9, dense
+    output). The rows are made for it, which costs about as many derivatives as the step did.
+
+    At a single time, which is asked where an event is looked for, a step is made from the start to
+    there instead: one that goes beyond an event may bend behind it, and its polynomial all along.
+    """
+
+    def __init__(self, taken: Span, fun: Slope, rtol: float, atol: float | Floats) -> None:
+        super().__init__(taken.t, taken.t + taken.step)
+        self._fun, self._taken = fun, taken
+        start, step = taken.start, taken.step / 2
+        allowed = atol + rtol * np.maximum(np.abs(start), np.abs(start + taken.change))
+        self._allowed = allowed
+        rows, columns = list[Row](), list[Floats]()
+        for count in range(1, MOST_ROWS + 1):
+            substeps = DENSE_SUBSTEPS[count - 1]
+            rows.append(midpoint(fun, taken.t, start, step, substeps, taken.before))
+            columns = next_row(columns, rows[-1].change, DENSE_SUBSTEPS[:count])
+            if count > 1 and norm((columns[-1] - columns[-2]) / allowed) <= 1:
+                break
+        change, middle = columns[-1], taken.t + step
+        slope = fun(middle, start + change)
+        self._halves = (
+            Span(taken.t, start, step, change, taken.before, slope),
+            Span(middle, start + change, step, taken.change - change, slope, taken.after),
+        )
+        self._coefficients = (
+            _settled(fun, self._halves[0], rows, allowed),
+            _settled(fun, self._halves[1], [], allowed),
+        )
+
+    def _call_impl(self, t: Any) -> Any:
+        times = np.asarray(t)
+        alone = self._stepped(float(times)) if not times.ndim else None
+        if alone is not None:
+            return alone
+        first, second = (
+            half.start + _values(coefficients, 2 * (times - half.t) / half.step - 1)
+            for half, coefficients in zip(self._halves, self._coefficients, strict=True)
+        )
+        late = (times - self._halves[1].t) * self._halves[1].step > 0
+        return np.where(late[..., None], second, first).T
+
+    def _stepped(self, t: float) -> Floats | None:
+        """The state at t by a step from the start; None if its rows do not agree."""
+        taken, columns = self._taken, list[Floats]()
+        if t == taken.t:
+            return taken.start
+        for count in range(1, MOST_ROWS + 1):
+            substeps = SUBSTEPS[count - 1]
+            row = midpoint(self._fun, taken.t, taken.start, t - taken.t, substeps, taken.before)
+            columns = next_row(columns, row.change, SUBSTEPS[:count])
+            if count > 1 and norm((columns[-1] - columns[-2]) / self._allowed) <= 1:
+                return taken.start + columns[-1]
+        return None
+
+
+def _settled(fun: Slope, half: Span, rows: list[Row], allowed: Floats) -> Floats:
+    """The polynomial of so many rows that one more would change nothing, or bring rounding only."""
+    rows, shrunk = list(rows), inf
+    settled: Floats | None = None
+    for count in range(max(1, len(rows) - 1), MOST_ROWS + 1):
+        if count > len(rows):
+            substeps = DENSE_SUBSTEPS[count - 1]
+            rows.append(midpoint(fun, half.t, half.start, half.step, substeps, half.before))
+        coefficients = _polynomial(half, rows[:count])
+        if settled is not None:
+            difference = _values(coefficients, _LOOKS) - _values(settled, _LOOKS)
+            change = max(map(norm, difference / allowed))
+            if not change < shrunk:
+                break
+            shrunk = change
+        settled = coefficients
+        if shrunk <= _SETTLED:
+            break
+    assert settled is not None
+    return settled
+
+
+def _values(coefficients: Floats, z: Floats) -> Floats:
+    """Of a polynomial with coefficients (n, ny), the lowest first, at z (…); (…, ny)."""
+    found = np.zeros((*z.shape, coefficients.shape[1]))
+    for coefficient in coefficients[::-1]:
+        found = found * z[..., None] + coefficient
+    return found
+
+
+def _polynomial(span: Span, rows: Sequence[Row]) -> Floats:
+    """Coefficients (n, ny), the lowest first, of the change of y over z, from -1 to 1."""
+    half = span.step / 2
+    middle = _middle(rows, half)
+    count = len(middle)
+    power = np.arange(count)[:, None]
+    sign = (-1.0) ** power
+    # What the Taylor polynomial about the middle misses of values and slopes at both ends.
+    missing = np.array(
+        [
+            -(sign * middle).sum(axis=0),
+            span.change - middle.sum(axis=0),
+            half * span.before + (sign * power * middle).sum(axis=0),
+            half * span.after - (power * middle).sum(axis=0),
+        ]
+    )
+    return np.vstack((middle, _ends(count) @ missing))
+
+
+def _middle(rows: Sequence[Row], half: float) -> Floats:
+    """Value and derivatives by z in the middle, divided by factorials, one after another.
+
+    That of order κ by one row: its slopes' central difference of order κ - 1, two substeps apart.
+    """
+    substeps = [len(row.slopes) for row in rows]
+    found = [extrapolated([row.middle for row in rows], substeps)]
+    for order in range(1, max(2, 2 * len(rows) - 2)):
+        first = order // 2  # the first row with so many slopes
+        raw = [_difference(row.slopes, order - 1) for row in rows[first:]]
+        found.append(half / factorial(order) * extrapolated(raw, substeps[first:]))
+    return np.array(found)
+
+
+def _difference(slopes: Floats, order: int) -> Floats:
+    """The derivative by z of this order in the middle."""
+    middle = len(slopes) // 2
+    weights = [(-1.0) ** (order - i) * comb(order, i) for i in range(order + 1)]
+    return np.asarray(
+        (len(slopes) / 4) ** order * (weights @ slopes[middle - order : middle + order + 1 : 2])
+    )
+
+
+@cache
+def _ends(count: int) -> Floats:
+    """From values and slopes at z = -1 and 1 to the coefficients of the next four powers."""
+    power = np.arange(count, count + 4)
+    sign = (-1.0) ** power
+    return np.linalg.inv(np.array([sign, np.ones(4), -sign * power, power]))
