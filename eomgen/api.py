@@ -18,7 +18,7 @@ import numpy as np
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.files import read_plain
-from eomgen.model.elaborate import build_model, in_order, outputs_for
+from eomgen.model.elaborate import elaborate, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
 from eomgen.results import Derivation, Module, Run
@@ -69,7 +69,7 @@ def check(source: Source) -> Model:
 
     Raises `SceneError` where it makes no mechanism, or where its mass matrix is singular.
     """
-    model = build_model(read(source))
+    model = elaborate(read(source))
     check_regular(model)
     return model
 

@@ -6,7 +6,7 @@ from eomgen.codegen.backends.javascript import javascript_poses
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.dynamics.regular import check_regular
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
 from eomgen.scene.schema import Scene
@@ -51,4 +51,4 @@ def compile_model(model: Model) -> str:
 
 def compile_scene(scene: Scene) -> str:
     """The source of a scene's module. Raises `SceneError` if the scene makes no mechanism."""
-    return compile_model(build_model(scene))
+    return compile_model(elaborate(scene))

@@ -9,7 +9,7 @@ from engine import MP, STEP, Engine, along, exact, read
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.schema import Scene
@@ -27,7 +27,7 @@ def light(scene: str) -> Engine:
 
 def compiled_light(scene: Scene) -> Engine:
     """The same of a scene that has been read."""
-    model = build_model(scene.replaced(outputs=ENERGIES))
+    model = elaborate(scene.replaced(outputs=ENERGIES))
     plain = model.route == "auto" and model.form == "velocity"
     route = "aba" if plain else model.route  # without judging the others
     system = routed(replace(model, route=route), jacobian=False).system

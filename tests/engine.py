@@ -13,7 +13,7 @@ from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.codegen.system import System
 from eomgen.language.formula import names_in
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.extended import evaluator
 from eomgen.program.tape import TIME
@@ -125,7 +125,7 @@ def quick(scene: str, route: str = "", *, tangents: bool = False) -> Engine:
 
 @cache
 def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) -> Engine:
-    model = build_model(read(scene).replaced(outputs="all"))
+    model = elaborate(read(scene).replaced(outputs="all"))
     outputs = tuple(name for name in model.outputs if name not in leave_out)
     if not route and model.route == "auto" and model.form == "velocity":
         route = "auto" if scene in built_in_names() else "aba"

@@ -16,7 +16,7 @@ from functools import cache
 from typing import Any
 
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene
 from eomgen.text import LONGEST_LINE
 
@@ -185,7 +185,7 @@ def outcome(text: str) -> str:
     try:
         with _watched() as events:
             try:
-                build_model(parse_scene(text))
+                elaborate(parse_scene(text))
                 found = "model"
             except SceneError as error:
                 found = "message"
@@ -213,7 +213,7 @@ def _check_message(error: SceneError) -> None:
 def _listening() -> None:
     """Hear what scenes bring about, once all that is imported late has been."""
     for text in texts():
-        build_model(parse_scene(text))
+        elaborate(parse_scene(text))
     for value in VALUES:
         outcome(f'name = "x"\nbodies = [{{name = "a", mass = {value}, inertia_com = 1}}]')
     sys.addaudithook(_heard)

@@ -14,7 +14,7 @@ from newton_euler import Mechanism, Motion, solve
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.from_equations import from_equations
 from eomgen.derivation.closed import Equations, derive
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import parse_scene, read_scene
 
 BUILT_IN = ("double_pendulum", "pendulum", "two_body", "two_body_forced")
@@ -104,7 +104,7 @@ def compiled(scene: "Scene | str", form: str = "velocity") -> Compiled:
 @cache
 def _compiled(scene: Scene, form: str) -> Compiled:
     read = read_scene(scene.name) if scene.text is None else parse_scene(scene.text)
-    model = replace(build_model(read), form=form)
+    model = replace(elaborate(read), form=form)
     if form == "velocity":
         equations = derive(model)
     else:  # the same equations, to be written in other states

@@ -16,7 +16,7 @@ from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.language.formula import Constant
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.program import interpret
 from eomgen.program.tape import TIME
@@ -39,7 +39,7 @@ def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Model:
     """
     while True:
         try:
-            model = build_model(parse_scene(_scaled(seed, dimensions, decades)))
+            model = elaborate(parse_scene(_scaled(seed, dimensions, decades)))
             break
         except SceneError as error:
             if "principal moments" not in str(error):

@@ -13,7 +13,7 @@ from engine import Engine, read
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.language.formula import parse
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.run.module import load_module
 from eomgen.scene.effects.base import (
     Contact,
@@ -162,7 +162,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
 @cache
 def striking(scene: str, *effects: EffectTable, route: str = "auto") -> Engine:
     """A scene with these effects besides, compiled."""
-    model = build_model(read(scene).replaced(outputs=OUTPUTS))
+    model = elaborate(read(scene).replaced(outputs=OUTPUTS))
     every: Any = (*model.effects, *effects)
     model = replace(model, effects=every, route=route)  # type: ignore[arg-type]
     system = routed(model).system

@@ -17,7 +17,7 @@ from effect_cases import BASES, CASES, TRIED, Case
 from engine import Engine
 
 from eomgen.codegen.backends.python import OWN
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_scene
 from eomgen.scene.effects import Effect
 from eomgen.scene.reader import parse_scene
@@ -39,7 +39,7 @@ def test_absence_is_free(case: Case) -> None:
     """
     scene, made, bare = parse_scene(case.text()), light(case.text()), without(case.base)
     never = removed(scene, scene.effects).replaced(outputs=ENERGIES)
-    assert build_model(never) == bare.model
+    assert elaborate(never) == bare.model
     if FULL:  # the bytes follow from that
         assert compiled_light(removed(scene, scene.effects)).source == bare.source
     (variant,) = without_effects(scene)

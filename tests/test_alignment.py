@@ -20,7 +20,7 @@ from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
 from eomgen.precision.longs import doubles, long_digits
 from eomgen.program.program import interpreter
@@ -47,7 +47,7 @@ def tried(given: Case, *, closed: bool = False, **more: object) -> str:
     form among the routes, or without.
     """
     try:
-        model = build_model(parse_scene(scene(given, **more)))
+        model = elaborate(parse_scene(scene(given, **more)))
         check_regular(model)
         made = routed(model, jacobian=False, closed=closed)
     except SceneError:
@@ -146,7 +146,7 @@ def modules(text: str, *routes: str) -> dict[str, GeneratedModule]:
     """A scene's modules, by routes."""
     found = {}
     for route in routes:
-        model = build_model(parse_scene(f'route = "{route}"\n{text}'))
+        model = elaborate(parse_scene(f'route = "{route}"\n{text}'))
         found[route] = load_module(generate(model, jacobian=False).module, model.name)
     return found
 
@@ -246,7 +246,7 @@ def test_two_solvers_of_60_digits_tell_on_each_other(monkeypatch: pytest.MonkeyP
     y = np.array([0.3, 0.2])
 
     def apart() -> float:
-        model = build_model(parse_scene(text))
+        model = elaborate(parse_scene(text))
         with long_digits():
             one = FreeBodies(model, 0.0, y).vd
             other = Truth(model).long(0.0, y, {}, {})
@@ -272,7 +272,7 @@ def test_routes_are_judged_by_the_steps_that_are_written() -> None:
     """Two slides 1.4e-4 from parallel: articulated bodies lose seven digits in the world's axes,
     which are those that they are written in here, and none in the frames' own.
     """
-    made = routed(build_model(parse_scene(OBLIQUE)))
+    made = routed(elaborate(parse_scene(OBLIQUE)))
     assert made.system.route == "orthogonal"
     lost = {line.split()[0]: line for line in made.explanation()}
     assert lost["aba"].endswith("would lose 7 digits") and lost["orthogonal"].endswith("<- taken")
@@ -283,7 +283,7 @@ def test_routes_are_judged_by_the_steps_that_are_written() -> None:
 
 def test_trial_states_come_near_alignment() -> None:
     """A route that is wrong where an angle is slight, but not where it is 0, does not pass."""
-    model = build_model(parse_scene(find_scene("double_pendulum").read_text()))
+    model = elaborate(parse_scene(find_scene("double_pendulum").read_text()))
 
     def wrong(values: Values) -> Sequence[Any]:
         rates = Dynamics(model, values, ArrayScalars(), "own").articulated_forward()
@@ -295,7 +295,7 @@ def test_trial_states_come_near_alignment() -> None:
 
 def test_trial_states_are_at_rest_too() -> None:
     """Where what velocities do hides what is lost of all else."""
-    model = build_model(parse_scene(find_scene("double_pendulum").read_text()))
+    model = elaborate(parse_scene(find_scene("double_pendulum").read_text()))
 
     def wrong(values: Values) -> Sequence[Any]:
         rates = Dynamics(model, values, ArrayScalars(), "own").articulated_forward()
@@ -333,10 +333,10 @@ def test_what_digits_are_right_is_told() -> None:
     """A moment of inertia of 1e-14 beside masses on arms: run, and told what it costs; one of 1e-6:
     run, and nothing said.
     """
-    few = routed(build_model(parse_scene(UNEVEN.replace("MOMENT", "1e-14"))), jacobian=False)
+    few = routed(elaborate(parse_scene(UNEVEN.replace("MOMENT", "1e-14"))), jacobian=False)
     assert few.digits is not None and FEWEST <= few.digits < ENOUGH
     assert f"{few.digits} of 16 digits of accelerations are right" in few.notices()[0]
-    many = routed(build_model(parse_scene(UNEVEN.replace("MOMENT", "1e-6"))), jacobian=False)
+    many = routed(elaborate(parse_scene(UNEVEN.replace("MOMENT", "1e-6"))), jacobian=False)
     assert many.system.route == "orthogonal" and not many.notices()
 
 
@@ -362,7 +362,7 @@ def test_slight_moments_of_inertia() -> None:
     """A needle on a base that turns faster and faster about the needle's own axis, which resists by
     1e-13 of what the others do: 0.3 rad/s² less 0.7 rad/s².
     """
-    assert routed(build_model(parse_scene(NEEDLE))).digits is None
+    assert routed(elaborate(parse_scene(NEEDLE))).digits is None
     for route, module in modules(NEEDLE, "aba", "ldl", "orthogonal").items():
         found = module.derivative(0.0, [0.2, 0.4])[1]
         assert found == pytest.approx(-0.4, rel=1e-14), route
@@ -375,7 +375,7 @@ def test_nearly_parallel_axes_are_two() -> None:
         text = f'{TILTED}joints = [{{ name = "j", child = "b", {keys} }}]\n{STRAIGHT}'
         if refused:
             with pytest.raises(SceneError, match="are parallel"):
-                build_model(parse_scene(text))
+                elaborate(parse_scene(text))
             continue
-        system = routed(build_model(parse_scene(text)), jacobian=False, closed=False).system
+        system = routed(elaborate(parse_scene(text)), jacobian=False, closed=False).system
         assert system.route

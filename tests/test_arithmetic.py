@@ -17,7 +17,7 @@ from eomgen.cli import main
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.codegen.system import System
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, Program, finish, interpret
@@ -110,7 +110,7 @@ def in_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def model_of(scene: str) -> Model:
     """A built-in scene's model, or one of a text."""
-    return build_model(read(scene))
+    return elaborate(read(scene))
 
 
 @cache

@@ -12,7 +12,7 @@ import pytest
 from eomgen.cli import main
 from eomgen.errors import SceneError
 from eomgen.language.formula import Formula
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import EffectTable
 from eomgen.scene.reader import parse_scene
@@ -124,7 +124,7 @@ def crane(kind: str, dimensions: int = 2, **changed: str | None) -> str:
 def refusal(scene: str) -> str:
     """The one line that a scene is refused with."""
     with pytest.raises(SceneError) as error:
-        build_model(parse_scene(scene, "crane.toml"))
+        elaborate(parse_scene(scene, "crane.toml"))
     message = str(error.value).removeprefix("crane.toml: ")
     assert "\n" not in message and message.isprintable(), message
     return message
@@ -133,7 +133,7 @@ def refusal(scene: str) -> str:
 def quantities(kind: str) -> Iterator[tuple[str, Any, dict[str, Any]]]:
     """Each field of a table that holds a quantity: key, what it holds; unit, there, and bound."""
     member = MEMBERS[kind.split()[0]]
-    effect = build_model(parse_scene(crane(kind))).effects[0]
+    effect = elaborate(parse_scene(crane(kind))).effects[0]
     for field, info in member.model_fields.items():
         extra = info.json_schema_extra
         if field in TABLES[kind] and isinstance(extra, dict) and "unit" in extra:
@@ -156,7 +156,7 @@ def test_all_effects_are_here() -> None:
     assert free == OF_ANY_SIGN
     for kind in TABLES:
         for dimensions in (2, 3):
-            build_model(parse_scene(crane(kind, dimensions)))
+            elaborate(parse_scene(crane(kind, dimensions)))
 
 
 @pytest.mark.parametrize("kind", TABLES)
@@ -206,7 +206,7 @@ def test_quantities(kind: str) -> None:
             "nonnegative": "is negative; give a number >=",
         }.get(str(extra["bound"]))
         if bound is None:
-            build_model(parse_scene(put("0.25")))
+            elaborate(parse_scene(put("0.25")))
             continue
         assert refusal(put("-4")) == f"{place}: -4 {bound} 0 in {extra['unit']}"
         assert refusal(put('"stiff"')) == f"{place}: -4 {bound} 0 in {extra['unit']}"
@@ -215,7 +215,7 @@ def test_quantities(kind: str) -> None:
         elif active and extra["unit"] == "m":  # a length is never negative
             assert refusal(put("-4", allow_active="true")) == refusal(put("-4"))
         elif active:
-            build_model(parse_scene(put("-4", allow_active="true")))
+            elaborate(parse_scene(put("-4", allow_active="true")))
             assert refusal(put("-4", allow_active="false")) == refusal(put("-4"))
 
 
@@ -243,7 +243,7 @@ def test_names_and_vectors(kind: str) -> None:
             f"{place}: 'my boom' is no identifier; use letters a-z, digits and _, a letter first"
         )
         if member.model_fields[field].default == "world":
-            build_model(parse_scene(crane(kind, **{field: None})))
+            elaborate(parse_scene(crane(kind, **{field: None})))
         else:
             missing = refusal(crane(kind, **{field: None}))
             assert missing in (
@@ -296,7 +296,7 @@ def test_joints(kind: str) -> None:
     if member.way_fields:
         joint = TABLES[kind]["joint"].strip('"')
         own, other = ("swing", "run") if joint == "hinge" else ("run", "swing")
-        build_model(parse_scene(crane(kind, coordinate=f'"{own}"')))
+        elaborate(parse_scene(crane(kind, coordinate=f'"{own}"')))
         for name, hint in ((f"{own}s", f" (did you mean '{own}'?)"), (other, f"; known: {own}")):
             assert refusal(crane(kind, coordinate=f'"{name}"')) == (
                 f"effects[0].coordinate: '{joint}' has no angle or slide '{name}'{hint}"

@@ -11,7 +11,7 @@ from mechanisms import load
 from newton_euler import Mechanism, solve
 
 from eomgen.cli import main
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_scene
 from eomgen.scalars.exact import direction
 from eomgen.scene.reader import parse_scene
@@ -695,7 +695,7 @@ def test_what_is_put_right_is_said(
     """An axis or a quaternion not of length 1 counts as if it were, with one line to say so."""
     assert old in good
     text = good.replace(old, new, 1)
-    model = build_model(parse_scene(text))
+    model = elaborate(parse_scene(text))
     assert model.notices == (notice,)
     for body in model.bodies:
         if (axis := getattr(body.joint, "axis", None)) is not None:
@@ -711,7 +711,7 @@ def test_what_is_put_right_is_said(
 @pytest.mark.parametrize("good", [GOOD, SPACE])
 def test_what_is_right_is_not_touched(good: str) -> None:
     """No notice, and no number of a scene changed, where axes and quaternions are of length 1."""
-    model = build_model(parse_scene(good.replace(AXIS, "axis = [0.6, 0.0, -0.8]")))
+    model = elaborate(parse_scene(good.replace(AXIS, "axis = [0.6, 0.0, -0.8]")))
     assert model.notices == ()
     axis = getattr(model.bodies[0].joint, "axis", None)
     assert axis in (None, (0.6, 0.0, -0.8))
@@ -720,7 +720,7 @@ def test_what_is_right_is_not_touched(good: str) -> None:
 
 def test_a_quaternion_that_is_not_given() -> None:
     """It is no turn, and needs no notice."""
-    model = build_model(parse_scene(SPACE.replace("q = [0.1, 1.0, 0.0, 0.0, 0.0]", "")))
+    model = elaborate(parse_scene(SPACE.replace("q = [0.1, 1.0, 0.0, 0.0, 0.0]", "")))
     assert model.initial_q == (0.0, 1.0, 0.0, 0.0, 0.0)
     assert model.notices == ()
 

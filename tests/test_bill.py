@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eomgen.cli import main
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model, compile_scene
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene, read_scene
@@ -164,7 +164,7 @@ def test_inputs_and_removed_effects() -> None:
     assert air.model is not None
     assert not [p for p in air.model.parameters if p.name.startswith("air")]
     bare = parse_scene(STONE[: STONE.index('[[effects]]\ntype = "drag"')])
-    outputs = build_model(bare).outputs
+    outputs = elaborate(bare).outputs
     assert compile_model(replace(air.model, outputs=outputs)) == compile_scene(bare)
 
 
@@ -248,7 +248,7 @@ def test_distance_of_all_mass() -> None:
     bodies = [{{ name = "a", mass = 1.2, inertia_com = {entries} }}]
     joints = [{{ name = "f", type = "free", child = "a" }}]
     """
-    model = build_model(parse_scene(text))
+    model = elaborate(parse_scene(text))
     poses = []
     for _ in range(2):
         turned, _ = np.linalg.qr(rng.normal(size=(3, 3)))
@@ -283,7 +283,7 @@ def test_what_a_scene_leaves_out() -> None:
     by_label = {part.label: part for part in complete(scene)}
     model = by_label["1 locked coordinate"].model
     assert model is not None
-    assert model.initial_q == build_model(freed).initial_q
+    assert model.initial_q == elaborate(freed).initial_q
     assert locked.change is not None and locked.change.relative > 1e-3
     assert without_velocity_forces(scene) == ()
     kept = items(costed(ARM))["velocity forces"]

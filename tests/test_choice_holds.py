@@ -16,7 +16,7 @@ from accuracy_scenes import closed_end, text
 from mpmath import mp, mpf
 
 from eomgen.cli import main
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.run.checks import allowed_errors
 from eomgen.run.module import GeneratedModule, as_problem, load_module
@@ -38,9 +38,7 @@ pytestmark = pytest.mark.usefixtures("blank_figures")
 
 def made(scene: str) -> tuple[Model, GeneratedModule]:
     """A scene's model and module, built in or not."""
-    model = build_model(
-        read_scene(scene) if scene in built_in_names() else parse_scene(text(scene))
-    )
+    model = elaborate(read_scene(scene) if scene in built_in_names() else parse_scene(text(scene)))
     return model, load_module(generated_code(model).module, model.name)
 
 

@@ -11,7 +11,7 @@ import pytest
 from campaign import some
 
 from eomgen.cli import main
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Contacts, Floats, Problem
@@ -66,7 +66,7 @@ simulation = { t_end = 10 }
 
 def case_of(scene: str) -> Case:
     """A built-in scene's own run, or that of a scene's text."""
-    model = build_model(parse_scene(scene) if "\n" in scene else read_scene(scene))
+    model = elaborate(parse_scene(scene) if "\n" in scene else read_scene(scene))
     module = load_module(generated_code(model).module, model.name)
     kept = {"samples": 1001, "rest_speed": model.simulation.rest_speed}
     problem = as_problem(module, model=model)
@@ -81,7 +81,7 @@ def truth(case: Case, integrator: str = "DOP853", rtol: float = SMALLEST_RTOL) -
 
 def in_long_numbers(scene: str, t_end: float | None = None) -> Reference:
     """The motion of a built-in scene to more digits than doubles have."""
-    model = build_model(read_scene(scene))
+    model = elaborate(read_scene(scene))
     module = load_module(generated_code(model).module, model.name)
     return reference(model, module, t_end=t_end or model.simulation.t_end)
 

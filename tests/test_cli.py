@@ -14,7 +14,7 @@ from campaign import some
 
 from eomgen.cli import main
 from eomgen.files import remove_ours
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene
 from eomgen.store import generated_code
 
@@ -437,7 +437,7 @@ def test_looks_and_times_are_not_derived_again(
     monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
     text = (BUILT_IN / "pendulum.toml").read_text("utf-8")
     derived = [
-        generated_code(build_model(parse_scene(text.replace(old, new)))).derived
+        generated_code(elaborate(parse_scene(text.replace(old, new)))).derived
         for old, new in (
             ("", ""),
             ("#33658a", "#000000"),

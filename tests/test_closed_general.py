@@ -28,7 +28,7 @@ from eomgen.derivation.general.tell import tell_general
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_model
 from eomgen.program.extended import evaluator
@@ -106,7 +106,7 @@ def along(axis: Sequence[float] | np.ndarray) -> tuple[float, ...]:
 @cache
 def tree(seed: int, dimensions: int, most: int) -> Model:
     """A random tree that asks for all of the dynamics."""
-    model = build_model(parse_scene(random_spatial_tree(seed, dimensions, most)[1]))
+    model = elaborate(parse_scene(random_spatial_tree(seed, dimensions, most)[1]))
     return replace(model, route="auto", outputs=DYNAMICS)
 
 
@@ -170,7 +170,7 @@ def test_the_trees_are_of_every_kind() -> None:
 @cache
 def scene(name: str) -> GeneralEquations:
     """A built-in scene's equations."""
-    return derive_general(replace(build_model(read_scene(name)), route="auto"))
+    return derive_general(replace(elaborate(read_scene(name)), route="auto"))
 
 
 @pytest.mark.parametrize("name", TOLD)
@@ -310,7 +310,7 @@ def test_pivots_are_sums_of_weighted_squares(case: str | tuple[int, int, int]) -
 
 def test_light_cart() -> None:
     """A cart of a millionth of the pole's mass: no digit is lost where the recursions lose six."""
-    model = build_model(read_scene("cart_pole"))
+    model = elaborate(read_scene("cart_pole"))
     light = {"m_cart": 0.3e-6, "I_pole": 1e-9}
     model = model.with_parameters(light)
     exactly = evaluator(from_recursion(Recording(model, "aba")).program, "derivative")
@@ -399,12 +399,12 @@ def test_independent_of_the_recursions() -> None:
 def test_route_closed_and_auto() -> None:
     """`closed` takes any small tree; `auto` tries it on few velocities and takes what is least."""
     for name in TOLD:
-        choice = routed(build_model(read_scene(name)))
+        choice = routed(elaborate(read_scene(name)))
         assert choice.system.route == "closed", name
-    puma = build_model(read_scene("puma560"))
+    puma = elaborate(read_scene("puma560"))
     assert why_not_closed(puma) == "" and "velocities" not in why_not_tried(puma)
     assert routed(puma).system.route == "aba"
-    figure = build_model(read_scene("quadruped"))
+    figure = elaborate(read_scene("quadruped"))
     assert why_not_closed(figure).startswith(f"it is for {MOST_GENERAL_BODIES} bodies at most")
     floating = tree(1, SPACE, 4)
     many = replace(floating, bodies=(*floating.bodies, replace(floating.bodies[0], name="more")))
@@ -413,13 +413,13 @@ def test_route_closed_and_auto() -> None:
     with pytest.raises(SceneError, match="needs the closed form"):
         routed(replace(figure, route="closed"))
     with pytest.raises(SceneError, match="form: 'momentum' needs the closed form"):
-        routed(replace(build_model(read_scene("cart_pole")), form="momentum"))
+        routed(replace(elaborate(read_scene("cart_pole")), form="momentum"))
 
 
 def test_a_module_observes_what_the_recursions_do() -> None:
     """Energies, places, joint forces and Jacobians of a generated module, in doubles."""
     drawn, text = random_spatial_tree(1, SPACE, 3)
-    model = replace(build_model(parse_scene(text.replace("outputs =", "# outputs ="))))
+    model = replace(elaborate(parse_scene(text.replace("outputs =", "# outputs ="))))
     closed, aba = (load_module(compile_model(replace(model, route=r))) for r in ("closed", "aba"))
     rng = np.random.default_rng(3)
     q, v = random_state(drawn, rng)

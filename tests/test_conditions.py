@@ -11,7 +11,7 @@ from eomgen.cli import main
 from eomgen.errors import RunError, SceneError
 from eomgen.language.conditions import of_inertia
 from eomgen.language.formula import Constant
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.run.module import as_problem
 from eomgen.scene.reader import parse_scene
 
@@ -113,7 +113,7 @@ def test_scene_and_module_refuse_alike(text: str, values: dict[str, float]) -> N
     for case in cases:
         case = {str(name): float(value) for name, value in case.items()}
         try:
-            build_model(parse_scene(written_out(text, values | case)))
+            elaborate(parse_scene(written_out(text, values | case)))
             words = ""
         except SceneError as error:
             words = str(error).splitlines()[0]

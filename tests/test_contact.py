@@ -25,7 +25,7 @@ from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
 from eomgen.scalars.exact import Real
 from eomgen.scene.effects.base import Contact, JointLoad, Load
@@ -629,7 +629,7 @@ def test_absence_is_free() -> None:
     """
     plain = made(free("a", "b", inertia=0.3), tangents=False).source
     text = scene("spheres", PLANE, *HUNT, *RUB)
-    model = replace(build_model(parse_scene(text).replaced(effects=[], outputs="all")), route="aba")
+    model = replace(elaborate(parse_scene(text).replaced(effects=[], outputs="all")), route="aba")
     kept = tuple(name for name in model.outputs if name in KEPT)
     assert python_module(routed(replace(model, outputs=kept)).system) == plain
     assert made(text, tangents=False).source != plain
@@ -750,7 +750,7 @@ def test_bad_input_gets_one_clear_line(lines: tuple[str, ...]) -> None:
         who = f"bodies = {WHO[lines[0]]}" if lines[0] in WHO else 'body = "a"'
         text = free("a", "b") + contact(who, *lines[lines[0] in WHO :])
     with pytest.raises(SceneError) as error:
-        build_model(parse_scene(text))
+        elaborate(parse_scene(text))
     expected = BAD_STOPS[lines] if lines in BAD_STOPS else BAD[lines]
     assert str(error.value).removeprefix("scene: ") == expected
 
@@ -759,9 +759,9 @@ def test_contacts_keep_their_names_apart() -> None:
     """Effect g on a_b and effect g_a on b, say."""
     one, two = (contact(f'body = "{x}"', *RIGID, name=n) for x, n in (("a_b", "g"), ("b", "g_a")))
     soft = contact('body = "b"', *DAMPED, name="g_a")
-    build_model(parse_scene(free("a_b", "b") + one + soft))
+    elaborate(parse_scene(free("a_b", "b") + one + soft))
     with pytest.raises(SceneError) as error:
-        build_model(parse_scene(free("a_b", "b") + one + two))
+        elaborate(parse_scene(free("a_b", "b") + one + two))
     assert str(error.value) == (
         "'g_a_b' would be the name of a contact of 'g' and of one of 'g_a'; rename one of them"
     )
@@ -770,7 +770,7 @@ def test_contacts_keep_their_names_apart() -> None:
 def test_what_feeds_energy_in_must_be_asked_for() -> None:
     """allow_active = true."""
     table = contact('body = "a"', 'law = "spring_damper"', "stiffness = -1", "allow_active = true")
-    build_model(parse_scene(free("a") + table))
+    elaborate(parse_scene(free("a") + table))
 
 
 def test_what_starts_pressed_in_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

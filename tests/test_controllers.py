@@ -8,7 +8,7 @@ from engine import engine, quick
 from scipy.integrate import solve_ivp
 
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.run.module import as_problem
@@ -398,5 +398,5 @@ MISTAKES = [
 def test_mistakes(more: str, message: str) -> None:
     """One line: place, value, remedy."""
     with pytest.raises(SceneError) as caught:
-        build_model(parse_scene(WHEEL + more))
+        elaborate(parse_scene(WHEEL + more))
     assert str(caught.value).removeprefix("scene: ") == message

@@ -7,7 +7,7 @@ import pytest
 
 from eomgen.codegen.from_recursion import Recording
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_scene
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
@@ -102,8 +102,8 @@ def test_what_is_shared_is_computed_once() -> None:
     doubling = '[definitions]\nx1 = "p"\n' + "".join(
         f'x{i} = "x{i - 1}*x{i - 1}"\n' for i in range(2, 10)
     )
-    plain = Recording(build_model(parse_scene(cart(torque='"p"'))), "aba").tape
-    made = Recording(build_model(parse_scene(cart(doubling, torque='"x9"'))), "aba").tape
+    plain = Recording(elaborate(parse_scene(cart(torque='"p"'))), "aba").tape
+    made = Recording(elaborate(parse_scene(cart(doubling, torque='"x9"'))), "aba").tape
     assert len(made.steps) == len(plain.steps) + 8
 
 
@@ -177,6 +177,6 @@ def test_mistakes(text: str, message: str) -> None:
     """One line, at once, whatever the definitions make of each other."""
     start = time.process_time()
     with pytest.raises(SceneError) as error:
-        build_model(parse_scene(text))
+        elaborate(parse_scene(text))
     assert str(error.value).removeprefix("scene: ") == message
     assert time.process_time() - start < 60.0

@@ -11,7 +11,7 @@ from spatial_newton_euler import solve
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
@@ -144,7 +144,7 @@ def test_drag_on_any_tree(dimensions: int) -> None:
         at = np.array([0.2, -0.3, 0.1 if dimensions == SPACE else 0.0])
         text += f'{DRAG}body = "b{k}"\nlinear = 0.3\nquadratic = 0.8\n'
         text += f"at = {at[:dimensions].tolist()}\nwind = {wind}\n"
-        made = generate(build_model(parse_scene(text).replaced(outputs=())))
+        made = generate(elaborate(parse_scene(text).replaced(outputs=())))
         module = load_module(made.module, f"drag_{tree.name}")
         q, v = random_state(tree, rng)
         t = float(rng.uniform(0, 5))
@@ -247,9 +247,9 @@ def test_absence_is_free() -> None:
     root, and a force no torque.
     """
     never, once = parse_scene(CHAIN), parse_scene(CHAIN + BLOWN.replace("vertical", "0.3"))
-    assert generate(build_model(never)).module != generate(build_model(once)).module
+    assert generate(elaborate(never)).module != generate(elaborate(once)).module
     without = once.replaced(effects=once.effects[:1])
-    assert generate(build_model(without)).module == generate(build_model(never)).module
+    assert generate(elaborate(without)).module == generate(elaborate(never)).module
     assert "sqrt" not in drop(f"{BODY}linear = 0.4\n").module.COST["derivative"]
     counted = drop(f"{BODY}quadratic = 0.4\n").module.COST["derivative"]
     assert counted["sqrt"] == counted["max"] == 1
@@ -318,7 +318,7 @@ def test_mistakes(text: str, message: str) -> None:
     """Each in one line, with its place and what to do."""
     scene = DROP.format(PLANE, 0.03) + f"[parameters]\ngust = 3.0\n{DRAG}{text}\n"
     with pytest.raises(SceneError) as found:
-        build_model(parse_scene(scene))
+        elaborate(parse_scene(scene))
     assert message in str(found.value)
     assert "\n" not in str(found.value)
 
@@ -326,9 +326,9 @@ def test_mistakes(text: str, message: str) -> None:
 def test_a_parameter_may_not_hide_a_place() -> None:
     """`x` is the point's own place in a wind."""
     scene = DROP.format(PLANE, 0.03) + f"[parameters]\nx = 3.0\n{BODY}linear = 1\n"
-    build_model(parse_scene(scene))
+    elaborate(parse_scene(scene))
     with pytest.raises(SceneError, match=r"wind\[0\]: 'x' is known here by itself; rename"):
-        build_model(parse_scene(scene + 'wind = ["x", 0]\n'))
+        elaborate(parse_scene(scene + 'wind = ["x", 0]\n'))
 
 
 def test_negative_drag_if_asked_for() -> None:

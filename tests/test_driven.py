@@ -21,7 +21,7 @@ from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.reactions import reactions
 from eomgen.language.formula import parse
 from eomgen.language.rates import with_rates
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.reader import parse_scene
@@ -101,7 +101,7 @@ def test_as_the_judge_has_it(dimensions: int, seed: int) -> None:
     """Accelerations by both routes and in both kinds of axes, driving forces, joint forces."""
     case = given(dimensions, seed, (6, 14, 30)[seed % 3])
     tree = case.tree
-    model = build_model(parse_scene(case.text))
+    model = elaborate(parse_scene(case.text))
     rng = np.random.default_rng(seed)
     (q, v), u, t = random_state(tree, rng), tree.random_inputs(rng), float(rng.uniform(0.0, 3.0))
     at, accelerations = case.values(t, math)

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from spatial_trees import PLANE, SPACE
 
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
 from eomgen.scene.reader import parse_scene, read_scene
 
@@ -183,9 +183,9 @@ def test_absence_is_free() -> None:
         FIELD.replace("pull", kind) + f'body = "ball"\n{keys}\n' for kind, keys in KINDS.items()
     ]
     once = parse_scene(bare + "".join(texts))
-    never = generate(build_model(parse_scene(bare))).module
-    assert generate(build_model(once)).module != never
-    assert generate(build_model(once.replaced(effects=()))).module == never
+    never = generate(elaborate(parse_scene(bare))).module
+    assert generate(elaborate(once)).module != never
+    assert generate(elaborate(once.replaced(effects=()))).module == never
 
 
 def test_the_particles_pass_every_obstacle() -> None:
@@ -251,6 +251,6 @@ def test_the_particles_pass_every_obstacle() -> None:
 def test_mistakes(text: str, message: str) -> None:
     """Each in one line, with its place and what to do."""
     with pytest.raises(SceneError) as found:
-        build_model(parse_scene(f"{BALL.format(PLANE, 0.03)}{BODY}{text}\n"))
+        elaborate(parse_scene(f"{BALL.format(PLANE, 0.03)}{BODY}{text}\n"))
     assert message in str(found.value)
     assert "\n" not in str(found.value)

@@ -55,7 +55,7 @@ def test_faults_are_noticed(
     """The campaign can fail."""
     tried(range(1))
     monkeypatch.setattr(fuzzing, "HANGS", 0.1)
-    monkeypatch.setattr(fuzzing, "build_model", fault)
+    monkeypatch.setattr(fuzzing, "elaborate", fault)
     with pytest.raises(Failure):
         outcome(find_scene("pendulum").read_text())
 

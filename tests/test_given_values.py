@@ -14,7 +14,7 @@ from engine import MP, engine, quick
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.language.formula import Constant, Formula, evaluate, parse
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.program.tape import Tape
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
@@ -64,7 +64,7 @@ def test_zeros_of_a_scene_have_no_sign(route: str) -> None:
     for zeros in permutations(["-0.0", "0.0", "-(0)", "a"]):
         torques = [f"atan2(b, {zero})" for zero in zeros]
         scene = parse_scene(TURNED.format(a=-0.0, torque=" + ".join(torques)))
-        model = build_model(scene.replaced(route=route))
+        model = elaborate(scene.replaced(route=route))
         assert math.copysign(1.0, model.defaults["a"]) == 1.0
         module = load_module(python_module(routed(model, jacobian=False).system))
         assert module.derivative(0.0, STILL)[1] == 0.0

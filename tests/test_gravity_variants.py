@@ -6,7 +6,7 @@ from engine import engine, quick
 from scipy.integrate import solve_ivp
 
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_scene
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
@@ -341,11 +341,11 @@ MISTAKES = [
 def test_mistakes(more: str, message: str) -> None:
     """One line: place, value, remedy."""
     with pytest.raises(SceneError) as caught:
-        build_model(parse_scene(PLANE + more))
+        elaborate(parse_scene(PLANE + more))
     assert str(caught.value).removeprefix("scene: ") == message
 
 
 def test_a_number_in_space() -> None:
     """A torque in space has three components."""
     with pytest.raises(SceneError, match=r"torque: has 1 component; space takes 3"):
-        build_model(parse_scene(SPACE + _torque("torque = 1", "upper")))
+        elaborate(parse_scene(SPACE + _torque("torque = 1", "upper")))

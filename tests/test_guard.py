@@ -12,7 +12,7 @@ from eomgen.cli import main
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.errors import RunError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.precision.guarding import guard_of
 from eomgen.run.guard import LOST, Guard, Watch
 from eomgen.run.integrate import integrate
@@ -51,7 +51,7 @@ r_child = [-0.5, 0]
 @cache
 def heavy(route: str) -> Any:
     """Its module by a route."""
-    model = replace(build_model(parse_scene(HEAVY)), route=route)
+    model = replace(elaborate(parse_scene(HEAVY)), route=route)
     return load_module(python_module(routed(model, jacobian=False).system))
 
 
@@ -101,7 +101,7 @@ def test_a_repaired_run_is_right() -> None:
 @pytest.mark.parametrize("integrator", ["rk4", "DOP853", "LSODA"])
 def test_a_healthy_run_is_the_same_with_and_without(integrator: str) -> None:
     """Byte for byte, counts included, whether the guard would stop or repair."""
-    model = build_model(read_scene("babyboot"))
+    model = elaborate(read_scene("babyboot"))
     module = load_module(python_module(routed(replace(model, outputs=())).system))
     problem = as_problem(module)
     options: dict[str, Any] = {"dt": 0.01} if integrator == "rk4" else {}
@@ -182,7 +182,7 @@ def test_what_doubles_cannot_evaluate_counts_as_lost() -> None:
 
 def test_contacts_cannot_be_repaired() -> None:
     """A line says so, and what can be done."""
-    model = build_model(read_scene("bouncing_two_body"))
+    model = elaborate(read_scene("bouncing_two_body"))
     module = load_module(python_module(routed(replace(model, outputs=()), jacobian=False).system))
     with pytest.raises(RunError, match="cannot be repaired; let it stop instead"):
         integrate(as_problem(module), "DOP853", 1.0, guard=guard_of(module, repairs=True))

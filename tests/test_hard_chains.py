@@ -10,7 +10,7 @@ from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.finite import values_at
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
@@ -25,7 +25,7 @@ DIGITS = np.finfo(float).eps / 2
 def chain(count: int) -> Model:
     """The built-in chain with so many links, and nothing but its derivative."""
     text = (BUILT_IN / "chain.toml").read_text("utf-8").replace("count = 10", f"count = {count}")
-    return replace(build_model(parse_scene(text)), outputs=())
+    return replace(elaborate(parse_scene(text)), outputs=())
 
 
 def states(count: int) -> np.ndarray:

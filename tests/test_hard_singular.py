@@ -13,7 +13,7 @@ from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.dynamics.regular import check_regular, resistances
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.limits import locks
@@ -54,7 +54,7 @@ def pins(*links: tuple[float, float, float], far: float = 1.0) -> str:
 def test_singular_models_are_refused(text: str, body: str, velocity: str) -> None:
     """In one line, with the body, the motion and what to change."""
     with pytest.raises(SceneError) as caught:
-        check_regular(build_model(parse_scene(text)))
+        check_regular(elaborate(parse_scene(text)))
     assert str(caught.value) == (
         f"body '{body}': nothing resists '{velocity}', neither its mass or inertia nor what it "
         "carries; give it some, or a joint that does not move so"
@@ -70,11 +70,11 @@ joints = [
     { name = "j", type = "planar", parent = "world", child = "b", r_child = [1e9, 0] },
 ]
 """
-    check_regular(build_model(parse_scene(text.replace("INERTIA", "1.0"))))
+    check_regular(elaborate(parse_scene(text.replace("INERTIA", "1.0"))))
     with pytest.raises(SceneError, match="nothing resists"):
-        check_regular(build_model(parse_scene(text.replace("INERTIA", "0.0"))))
+        check_regular(elaborate(parse_scene(text.replace("INERTIA", "0.0"))))
     in_space = text.replace("INERTIA", "[1.0, 1.0, 1.0]").replace("[1e9, 0]", "[1e9, 1e9, 0]")
-    model = build_model(parse_scene(in_space + "dimensions = 3\n"))
+    model = elaborate(parse_scene(in_space + "dimensions = 3\n"))
     check_regular(model)
     poses = np.random.default_rng(1).uniform(-3, 3, (50, len(model.coordinates)))
     assert (resistances(model, poses)[0] == 1).all()  # rounding is no lock
@@ -94,7 +94,7 @@ NEARLY = {
 @pytest.mark.parametrize("scene", some([*NEARLY][::2], [*NEARLY]))
 def test_nearly_singular_models_are_solved_to_their_condition(scene: str, small: float) -> None:
     """Against 60 digits, at random poses, straight and all but straight ones."""
-    model = replace(build_model(parse_scene(NEARLY[scene](small))), outputs=("mass_matrix",))
+    model = replace(elaborate(parse_scene(NEARLY[scene](small))), outputs=("mass_matrix",))
     module = load_module(python_module(routed(model, jacobian=False).system), "nearly")
     noise, count = np.random.default_rng(7), len(model.coordinates)
     q = [noise.uniform(-3, 3, count) for _ in range(3)]
@@ -110,7 +110,7 @@ def test_nearly_singular_models_are_solved_to_their_condition(scene: str, small:
 
 def cardan(initial: str) -> Model:
     """A point mass on a universal joint, a metre below: in line with the first axis at 90°."""
-    return build_model(
+    return elaborate(
         parse_scene(f"""
 name = "cardan"
 dimensions = 3

@@ -22,7 +22,7 @@ from eomgen.codegen.from_recursion import Recording
 from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.language.formula import Formula, evaluate
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.program.program import Output, Program, cost, finish, live_steps
 from eomgen.program.tape import TIME, Stage
 from eomgen.scalars.floats import FloatScalars
@@ -618,14 +618,14 @@ def test_jacobian_of_large_scenes(name: str) -> None:
 
 def operations(text: str, route: str) -> int:
     """Of one call of `derivative` of a scene that has no output but those that all have."""
-    model = build_model(read(text).replaced(outputs=()))
+    model = elaborate(read(text).replaced(outputs=()))
     system = routed(replace(model, route=route)).system
     return cost(system.program, "derivative")["total"]
 
 
 def recorded(text: str) -> int:
     """The same by `aba`, before the passes: quicker to find for long chains."""
-    record = Recording(build_model(parse_scene(text)), "aba")
+    record = Recording(elaborate(parse_scene(text)), "aba")
     outputs = {"derivative": Output((len(record.rates),), tuple(n.index for n in record.rates))}
     return cost(finish(record.tape, outputs, ()), "derivative")["total"]
 

@@ -18,7 +18,7 @@ from eomgen.codegen.backends.javascript import javascript_poses
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.linear.equilibrium import equilibrium
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
@@ -376,7 +376,7 @@ def test_the_page_of_a_driven_scene_moves() -> None:
     drive = (
         '[[effects]]\ntype = "driven"\nname = "swing"\njoint = "first"\ncoordinate = "sin(3*t)"\n'
     )
-    model = build_model(parse_scene(DOUBLE + drive))
+    model = elaborate(parse_scene(DOUBLE + drive))
     code = generate(model)
     e = engine(DOUBLE + drive)
     run = integrate(as_problem(e.module), "RK45", 1.0, rtol=1e-6, atol=1e-9, samples=7)
@@ -475,7 +475,7 @@ def test_bad_scenes(old: str, new: str, message: str) -> None:
     """Each a scene with one mistake, and the exact message for it."""
     assert CART.count(old) == 1
     with pytest.raises(SceneError) as error:
-        generate(build_model(parse_scene(CART.replace(old, new))))
+        generate(elaborate(parse_scene(CART.replace(old, new))))
     assert str(error.value).removeprefix("scene: ") == message
 
 
@@ -499,16 +499,16 @@ def test_bad_scenes_in_space(tail: str, head: str, message: str) -> None:
         '[[effects]]\ntype = "drag"\nname = "air"\nbodies = "all"\nquadratic = 0.3\n', ""
     )
     with pytest.raises(SceneError) as error:
-        generate(build_model(parse_scene(text)))
+        generate(elaborate(parse_scene(text)))
     assert str(error.value) == message
 
 
 def test_a_singular_drive_is_no_fault() -> None:
     """A massless body may be driven; one that hangs free on it may not."""
     light = CART.replace("mass = 1.5", "mass = 0")
-    check_regular(build_model(parse_scene(light)))
+    check_regular(elaborate(parse_scene(light)))
     with pytest.raises(SceneError, match="body 'two': nothing resists 'second_angle_dot'"):
-        check_regular(build_model(parse_scene(light.replace("mass = 0.8", "mass = 0"))))
+        check_regular(elaborate(parse_scene(light.replace("mass = 0.8", "mass = 0"))))
 
 
 @pytest.mark.usefixtures("blank_figures")

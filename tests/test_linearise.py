@@ -14,7 +14,7 @@ from eomgen.errors import RunError
 from eomgen.linear.equilibrium import equilibrium
 from eomgen.linear.linearise import linearise
 from eomgen.linear.modes import controllable_rank, modes, stability
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module
@@ -25,7 +25,7 @@ from eomgen.scene.schema import SHOWN
 @cache
 def module_of(scene: str, text: str = "", outputs: bool = True) -> GeneratedModule:
     """The module of a built-in scene, or of a text; by `aba`, which is quick to derive."""
-    model = build_model(parse_scene(text) if text else read_scene(scene))
+    model = elaborate(parse_scene(text) if text else read_scene(scene))
     wanted = ("input_jacobian",) if outputs and model.inputs else ()
     model = replace(model, outputs=(*SHOWN, *wanted), route="aba")
     return load_module(compile_model(model), scene)

@@ -23,7 +23,7 @@ from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.impulses import response
 from eomgen.language.formula import Constant
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.program import Output, cost, finish, interpret
 from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
@@ -132,7 +132,7 @@ def with_masses(model: Model, masses: Sequence[float]) -> Model:
 
 def heavy(kind: str, text: str, seed: int) -> Model:
     """A scene with masses over 24 decades."""
-    model, r = build_model(parse_scene(text)), random.Random(seed)
+    model, r = elaborate(parse_scene(text)), random.Random(seed)
     n = len(model.bodies)
     return with_masses(model, [MASSES[kind](k, n, r) for k in range(n)])
 
@@ -320,7 +320,7 @@ def test_a_route_that_gives_no_number_loses_all_digits_and_hides_nobody_elses() 
             f'child = "b{k}"\nr_parent = [{0.5 if k else 0.0}, 0]\nr_child = [-0.5, 0]'
             + ("\naxis = [1, 0]" if kind == "prismatic" else "")
         )
-    model = build_model(parse_scene("\n".join(lines)))
+    model = elaborate(parse_scene("\n".join(lines)))
     lost = lost_by_recursions(model, closely=True)
     assert lost["ldl"] > 15 and lost["aba"] > 8 and lost["orthogonal"] < 1
     assert routed(model, jacobian=False).system.route == "orthogonal"
@@ -331,7 +331,7 @@ def test_free_pair() -> None:
     text = scene(PLANE, 2, 1, free=True)
     for exponent in range(-12, 13, some(4, 1)):
         for masses in ((1.0, 10.0**exponent), (10.0**exponent, 1.0)):
-            model = with_masses(build_model(parse_scene(text)), masses)
+            model = with_masses(elaborate(parse_scene(text)), masses)
             for seed in range(some(1, 20)):
                 assert off(model, state(model, "random", seed)) < AT_RANDOM, (masses, seed)
 
@@ -347,7 +347,7 @@ def test_cart_of_nothing() -> None:
         f"inertia_com = 0.1\n{rail}axis = [1, 0]\n{pole}r_child = [-0.5, 0]\n"
         '[[effects]]\ntype = "motor"\nname = "drive"\njoint = "rail"\ntorque = "input"\n'
     )
-    model = build_model(parse_scene(text))
+    model = elaborate(parse_scene(text))
     for cart, mass in ((1e-6, 1.0), (1e-12, 1e12), (1e12, 1e-12)):
         for seed in range(some(4, 100)):
             heavier = with_masses(model, (cart, mass))
@@ -365,7 +365,7 @@ def test_force_on_what_is_light() -> None:
         )
     text += '[[effects]]\ntype = "external_force"\nname = "push"\nbody = "base"\nforce = "input"\n'
     for masses in ((1e-12, 1e12), (1e-6, 1e6), (1e12, 1e-12)):
-        model = with_masses(build_model(parse_scene(text)), masses)
+        model = with_masses(elaborate(parse_scene(text)), masses)
         for seed in range(some(3, 100)):
             assert off(model, state(model, "random", seed)) < AT_RANDOM
 
@@ -383,7 +383,7 @@ def test_rows_that_hold_next_to_nothing_of_an_axis(angle: float, rate: float) ->
             f'[[joints]]\nname = "j{k}"\ntype = "revolute"\nchild = "b{k}"\nr_child = [-1, 0]\n'
             f'parent = "{f"b{k - 1}" if k else "world"}"\nr_parent = [{1.0 if k else 0.0}, 0]\n'
         )
-    model = build_model(parse_scene(text))
+    model = elaborate(parse_scene(text))
     q, v = [0.7, 0.5, angle], [rate, -rate, 2 * rate]
     size = max(1.0, *(abs(float(x)) for x in exactly(model, q, v, {})))
     assert off(model, (q, v, {})) < 1e-13 * size
@@ -394,7 +394,7 @@ def test_rows_that_hold_next_to_nothing_of_an_axis(angle: float, rate: float) ->
 
 def operations(text: str, route: str) -> int:
     """Of `derivative`."""
-    record = recorded(build_model(parse_scene(text)), route)
+    record = recorded(elaborate(parse_scene(text)), route)
     outputs = {"v": Output((len(record.rates),), tuple(x.index for x in record.rates))}
     return cost(finish(record.tape, outputs, ()), "v")["total"]
 
@@ -431,13 +431,13 @@ def tip(mass: float, n: int = 3) -> str:
 
 def test_taken_where_masses_call_for_it() -> None:
     """`auto` takes it for a heavy tip and says why; else another route, and says nothing of it."""
-    heavy_tip = routed(build_model(parse_scene(tip(1e12))))
+    heavy_tip = routed(elaborate(parse_scene(tip(1e12))))
     assert heavy_tip.system.route == "orthogonal"
     lines = heavy_tip.explanation()
     assert all("would lose" in line for line in lines if " operations a call" in line)
     assert lines[-1].startswith("orthogonal") and lines[-1].endswith("<- taken")
     assert "keeps digits that bodies and joints take from others" in lines[-1]
-    ordinary = routed(build_model(parse_scene(tip(2.0, 2))))
+    ordinary = routed(elaborate(parse_scene(tip(2.0, 2))))
     assert ordinary.system.route != "orthogonal"
     assert not any("digits" in line or "orthogonal" in line for line in ordinary.explanation())
 
@@ -490,7 +490,7 @@ def test_digits_of_the_jacobian(text: str, masses: str) -> None:
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 def test_answers_impulses(dimensions: int) -> None:
     """M⁻¹ of impulses is that of the other routes."""
-    model = build_model(parse_scene(scene(dimensions, 5, 2, free=True)))
+    model = elaborate(parse_scene(scene(dimensions, 5, 2, free=True)))
     d = dynamics(model, *state(model, "random", 2), FloatScalars())
     impulse = [random.Random(3).uniform(-1, 1) for _ in model.velocities]
     expected = response(d, impulse, "aba")
@@ -568,7 +568,7 @@ def test_every_output() -> None:
     text = find_scene("bouncing_two_body").read_text()
     text = text.replace("outputs = []", 'outputs = "all"') + EVERYTHING
     ours, theirs = (
-        routed(replace(build_model(parse_scene(text)), route=route)).system
+        routed(replace(elaborate(parse_scene(text)), route=route)).system
         for route in ("orthogonal", "aba")
     )
     assert {"impact", "jacobian", "parameter_jacobian", "input_jacobian"} <= {*ours.program.outputs}

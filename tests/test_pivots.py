@@ -12,7 +12,7 @@ from mechanisms import BUILT_IN, SEEDS, TOLD, Scene, compiled, random_tree
 from newton_euler import Mechanism, solve
 
 from eomgen.derivation.closed import Equations, derive
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import parse_scene
 
 POSITIVE, NONNEGATIVE = "positive", "nonnegative"
@@ -32,7 +32,7 @@ def derived(scene: Scene) -> Equations:
     """The derivation alone, without a program."""
     if scene.text is None or len(scene.bodies) < 5:
         return compiled(scene).equations
-    return derive(build_model(parse_scene(scene.text)))
+    return derive(elaborate(parse_scene(scene.text)))
 
 
 class Signs:

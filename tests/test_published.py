@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipj
 
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model, compile_scene
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
@@ -32,7 +32,7 @@ def loaded(scene: str) -> Any:
 
 def unconditional(scene: str) -> Any:
     """The same, of whatever moments of inertia: some published ones are of no body."""
-    model = replace(build_model(read_scene(scene)), conditions=())
+    model = replace(elaborate(read_scene(scene)), conditions=())
     return load_module(compile_model(model), f"published_{scene}")
 
 

@@ -8,7 +8,7 @@ import pytest
 from campaign import some
 
 from eomgen.errors import RunError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, Adaptive
@@ -24,7 +24,7 @@ SCENES = ("tumbling_body", "spinning_top")
 @cache
 def problem(scene: str) -> Problem:
     """A built-in scene."""
-    model = replace(build_model(read_scene(scene)), outputs=SHOWN, route="aba")
+    model = replace(elaborate(read_scene(scene)), outputs=SHOWN, route="aba")
     found = as_problem(load_module(compile_model(model), scene))
     assert len(found.quaternions) == 1
     return found

@@ -15,7 +15,7 @@ from gmpy2 import mpfr
 from mpmath import mp
 
 from eomgen.errors import RunError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.precision.precise import BITS, Precise, digits, precise
 from eomgen.run.module import as_problem, load_module
@@ -79,7 +79,7 @@ force = ["select(x - 0.3, 0.7, 0.1) * a * step(x_dot) - min(abs(x), 0.1) / 3 + s
 
 def compiled(scene: str) -> tuple[Model, Any]:
     """A scene's model and module."""
-    model = build_model(read_scene(scene) if scene in built_in_names() else parse_scene(scene))
+    model = elaborate(read_scene(scene) if scene in built_in_names() else parse_scene(scene))
     return model, load_module(generated_code(model).module)
 
 

@@ -23,7 +23,7 @@ from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random
 from eomgen.dynamics import observe
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.reactions import reactions
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import parse_scene
@@ -61,7 +61,7 @@ def in_floats(
 def test_accelerations(dimensions: int, seed: int) -> None:
     """By both routes, in either kind of axes by turns, or in both, as three others have them."""
     tree, text = drawn(seed, dimensions, MOST[seed % 3])
-    model = build_model(parse_scene(text))
+    model = elaborate(parse_scene(text))
     rng = np.random.default_rng(seed)
     (q, v), u = random_state(tree, rng), tree.random_inputs(rng)
     motion = solve(tree, q, v, u)
@@ -92,7 +92,7 @@ def test_accelerations(dimensions: int, seed: int) -> None:
 def test_accelerations_from_rest(dimensions: int, seed: int) -> None:
     """Where all coordinates are 0, quaternions 1, 0, 0, 0: much is zero, and nothing is lost."""
     tree, text = drawn(seed, dimensions, MOST[1])
-    model = build_model(parse_scene(text))
+    model = elaborate(parse_scene(text))
     q, v = np.zeros(len(tree.coordinates)), np.zeros(len(tree.velocities))
     q[[name.endswith("_qw") for name in tree.coordinates]] = 1.0
     u = tree.random_inputs(np.random.default_rng(seed))

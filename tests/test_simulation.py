@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eomgen.cli import main
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
@@ -20,7 +20,7 @@ from eomgen.show.observe import observe
 
 def loaded(scene: str, form: Any = "velocity") -> tuple[Model, GeneratedModule]:
     """Model and module of a built-in scene in one state form."""
-    model = replace(build_model(read_scene(scene)), form=form)
+    model = replace(elaborate(read_scene(scene)), form=form)
     return model, load_module(compile_model(model), f"{scene}_{form}")
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.look import Box, Rod, Sphere
 from eomgen.scene.reader import parse_scene
@@ -63,7 +63,7 @@ child = "b"
 
 def model_of(text: str) -> Model:
     """The model of a scene."""
-    return build_model(parse_scene(text))
+    return elaborate(parse_scene(text))
 
 
 def test_rods_lead_from_the_centre_of_mass_to_the_joints() -> None:

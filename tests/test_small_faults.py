@@ -10,7 +10,7 @@ import pytest
 from eomgen.cli import main
 from eomgen.codegen.route import routed
 from eomgen.errors import RunError, SceneError, nearest
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
 from eomgen.program.program import cost
 from eomgen.run.integrators import find_integrator
@@ -36,7 +36,7 @@ def test_letters_small_or_capital_are_no_difference(given: str, meant: str) -> N
 
 def test_all_outputs_in_a_list() -> None:
     """["all"] is "all"; beside others it is none."""
-    model = build_model(parse_scene(POLE))
+    model = elaborate(parse_scene(POLE))
     assert len(model.outputs) > 15 and set(model.outputs) < set(OUTPUTS)
     with pytest.raises(SceneError, match=r"outputs\[1\]: unknown value 'all'"):
         parse_scene(POLE.replace('["all"]', '["momentum", "all"]'))
@@ -61,7 +61,7 @@ def test_refusals_say_what_is_wrong(old: str, new: str, message: str) -> None:
             "9.81 }", '9.81 }, { type = "motor", name = "drive", joint = "pivot", torque = 1 }'
         )
     with pytest.raises(SceneError) as error:
-        routed(build_model(parse_scene(text)))
+        routed(elaborate(parse_scene(text)))
     assert str(error.value) == message
 
 
@@ -76,7 +76,7 @@ def test_times_within_their_spread_are_no_times() -> None:
 @pytest.mark.parametrize("name", ["tumbling_body", "pendulum", "furuta_pendulum"])
 def test_routes_are_counted_alike(name: str) -> None:
     """What is told of a route's operations is what its module takes, where closed is tried."""
-    model = replace(build_model(read_scene(name)), route="auto")
+    model = replace(elaborate(read_scene(name)), route="auto")
     told = {c.route: c.operations for c in routed(model, jacobian=False).candidates}
     for route in (route for route, count in told.items() if count is not None):
         system = routed(replace(model, route=route), jacobian=False).system

@@ -21,7 +21,7 @@ from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.vectors import NEAREST
@@ -561,7 +561,7 @@ def test_absence_is_free(kind: str) -> None:
     table = KINDS[kind]
     scene = parse_scene(linked(table)).replaced(outputs="all")
     without = scene.replaced(effects=[e for e in scene.effects if e.name != "e"])
-    model = replace(build_model(without), route="aba")
+    model = replace(elaborate(without), route="aba")
     kept = tuple(name for name in model.outputs if name in KEPT)
     assert python_module(routed(replace(model, outputs=kept)).system) == plain
     assert made(linked(table)).source != plain
@@ -641,7 +641,7 @@ def test_bad_input_gets_one_clear_line(number: int) -> None:
     """Place, value, remedy."""
     table, message = list(BAD.items())[number]
     with pytest.raises(SceneError) as error:
-        build_model(parse_scene(SLIDER + table))
+        elaborate(parse_scene(SLIDER + table))
     assert str(error.value).removeprefix("scene: ") == message
 
 
@@ -653,4 +653,4 @@ def test_what_feeds_energy_in_must_be_asked_for() -> None:
         at_joint("joint_friction", "viscous = -1", "allow_active = true"),
         at_joint("joint_stop", "low = 0", "stiffness = 1", "damping = -1", "allow_active = true"),
     ):
-        build_model(parse_scene(SLIDER + table))
+        elaborate(parse_scene(SLIDER + table))

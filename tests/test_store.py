@@ -19,7 +19,7 @@ import eomgen.entries
 from eomgen import store
 from eomgen.cli import main
 from eomgen.entries import LARGEST, LONGEST_UNUSED, LONGEST_WRITING, Entries
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import generate
 from eomgen.run.module import load_module
@@ -38,7 +38,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def model_of(name: str) -> Model:
-    return build_model(read_scene(name))
+    return elaborate(read_scene(name))
 
 
 def entry_of(folder: Path, name: str) -> Path:
@@ -487,12 +487,12 @@ def test_the_key_names_all_that_shapes_the_code(monkeypatch: pytest.MonkeyPatch)
 def test_every_number_of_a_model_is_in_its_key() -> None:
     """Change any value of a scene by its last digit: the key is another."""
     text = (BUILT_IN / "spinning_top.toml").read_text("utf-8")
-    key = store._key(build_model(parse_scene(text)))
+    key = store._key(elaborate(parse_scene(text)))
     changed = text.replace("9.81", "9.8100000000000005")
     assert text != changed and 9.81 == 9.8100000000000005
-    assert store._key(build_model(parse_scene(changed))) == key
+    assert store._key(elaborate(parse_scene(changed))) == key
     changed = text.replace("9.81", "9.810000000000002")
-    assert store._key(build_model(parse_scene(changed))) != key
+    assert store._key(elaborate(parse_scene(changed))) != key
     assert generate(model_of("pendulum")).module.encode() == RIGHT
 
 

@@ -19,7 +19,7 @@ from test_show_space import HEIGHT, sliding
 from test_show_space import POSES as POSES_IN_SPACE
 
 from eomgen.cli import main
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import parse_scene
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.figure import draw_motion
@@ -78,7 +78,7 @@ PEG, OBSTACLE, HILL = Ball((0.2, -0.5), 0.3), Ball((1.0, 1.0), 0.2, 0.5), Ball((
 def test_what_stands_still_in_a_model() -> None:
     """Planes and balls of the world, each once, at the values of parameters; none that move."""
     effects = "".join(f'[[effects]]\ntype = "contact"\n{SOFT}\n{each}\n' for each in CONTACTS)
-    model = build_model(parse_scene(SCENE + effects + AVOID, "scene"))
+    model = elaborate(parse_scene(SCENE + effects + AVOID, "scene"))
     model = model.with_parameters({"depth": 0.25})
     assert planes_of(model) == (Plane((-0.6, 0.8), -0.5), Plane((0.0, 1.0), 0.0))
     assert balls_of(model) == (Ball((1.0, 2.0), 0.25), Ball((3.0, 0.25), 0.2, 0.4))
@@ -282,7 +282,7 @@ def test_energy_is_kept_where_effects_give_it_back(case: Case) -> None:
     """`test_bookkeeping` measures that these effects give back what they take, and that others have
     no potential energy; of those only what steers sideways, and an input of 0, do nothing.
     """
-    model = build_model(parse_scene(case.text(), "scene"))
+    model = elaborate(parse_scene(case.text(), "scene"))
     idle = "avoid" in case.name or '= "input"' in case.table
     assert keeps_energy(model, {}) == (case.conserves == {} or idle)
     if case.conserves is not None:
@@ -296,8 +296,8 @@ def test_energy_is_kept_where_effects_give_it_back(case: Case) -> None:
 
 def test_energy_is_not_kept_by_equations_that_leave_something_out() -> None:
     text = SCENE.replace("[[bodies]]", 'leave_out = ["velocity_forces"]\n[[bodies]]', 1)
-    assert keeps_energy(build_model(parse_scene(SCENE, "scene")), {})
-    assert not keeps_energy(build_model(parse_scene(text, "scene")), {})
+    assert keeps_energy(elaborate(parse_scene(SCENE, "scene")), {})
+    assert not keeps_energy(elaborate(parse_scene(text, "scene")), {})
 
 
 def test_figure_shows_what_works_leave_over() -> None:
@@ -364,7 +364,7 @@ def test_many_works_are_summed_by_type(
 
 def test_works_keep_their_names_while_they_are_few() -> None:
     effects = [f'[[effects]]\ntype = "{kind}\n' for kind in [*KINDS, *PUSHES]]
-    model = build_model(parse_scene(MANY + "".join(effects), "scene"))
+    model = elaborate(parse_scene(MANY + "".join(effects), "scene"))
     names = tuple(effect.name for effect in model.effects)
     works = np.arange(14.0).reshape(2, 7)
     assert works_by_type(model, names[:6], works[:, :6])[0] == names[:6]

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.json_schema import json_schema
 from eomgen.scene.reader import parse_scene
@@ -113,7 +113,7 @@ UNITS = {
 
 def at(joint: str) -> Model:
     """All of them at a joint."""
-    return build_model(parse_scene(EFFECTS.replace("JOINT", joint)))
+    return elaborate(parse_scene(EFFECTS.replace("JOINT", joint)))
 
 
 @pytest.mark.parametrize(("joint", "kind"), [("pin", 0), ("rail", 1)])
@@ -139,7 +139,7 @@ def test_messages_name_the_unit_of_the_joint() -> None:
     for joint, unit in (("pin", "N m/rad"), ("rail", "N/m")):
         text = EFFECTS.replace("stiffness = 1.0", "stiffness = -1.0", 1).replace("JOINT", joint)
         with pytest.raises(SceneError, match=f"give a number >= 0 in {unit}$"):
-            build_model(parse_scene(text))
+            elaborate(parse_scene(text))
 
 
 def test_the_schema_names_both() -> None:

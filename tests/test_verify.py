@@ -17,7 +17,7 @@ from eomgen.cli import main
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
 from eomgen.errors import RunError
-from eomgen.model.elaborate import build_model, in_order
+from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.precision.longs import doubles, long, long_digits
 from eomgen.run.module import load_module
@@ -130,7 +130,7 @@ def in_little_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 @cache
 def model_of(scene: str) -> Model:
     """A built-in scene's model, or one of a text."""
-    return build_model(read(scene))
+    return elaborate(read(scene))
 
 
 def as_long(x: Any) -> Any:
@@ -408,7 +408,7 @@ effects = [
 
 def test_a_horizon_that_chatters_keeps_to_its_time_and_tells_how_far_it_is() -> None:
     """Dry friction that sticks turns at every step, in doubles too, which had all the time."""
-    model = build_model(parse_scene(DRY))
+    model = elaborate(parse_scene(DRY))
     module = load_module(python_module(routed(model).system))
     told: list[float] = []
     with pytest.raises(RunError, match=r"^horizon: no run of 10 s.*: more than 1 s in .*; give a"):

@@ -7,7 +7,7 @@ import pytest
 from engine import MP, Engine, along, apart, exact, quick
 
 from eomgen.errors import SceneError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import parse_scene
 
 BODY = """
@@ -250,5 +250,5 @@ def test_powers_add_up() -> None:
 def test_bad_input_gets_one_clear_line(effect: str, message: str) -> None:
     """Place, value, remedy."""
     with pytest.raises(SceneError) as error:
-        build_model(parse_scene(TREE + effect))
+        elaborate(parse_scene(TREE + effect))
     assert str(error.value).removeprefix("scene: ") == message

@@ -11,7 +11,7 @@ from typing import Literal
 
 from eomgen.dynamics.finite import initial_overlaps
 from eomgen.errors import EomgenError, RunError, SceneError, nearest
-from eomgen.model.elaborate import build_model, outputs_for
+from eomgen.model.elaborate import elaborate, outputs_for
 from eomgen.model.model import Model, ways_of
 from eomgen.outputs import OUTPUTS
 from eomgen.run.module import GeneratedModule, as_problem, load_module
@@ -37,7 +37,7 @@ def read_model(scene: str, given: Arguments) -> tuple[Model, str]:
     names = () if asked is None else _output_names(asked)
     tables = read_scene(scene)
     with located(scene):
-        model = build_model(tables)
+        model = elaborate(tables)
         name = model.name
         for notice in model.notices:
             print(f"eomgen: note: {find_scene(scene).name}: {notice}", file=sys.stderr)

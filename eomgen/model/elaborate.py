@@ -23,7 +23,7 @@ from eomgen.scene.look import check_look
 from eomgen.scene.schema import Scene
 
 
-def build_model(scene: Scene) -> Model:
+def elaborate(scene: Scene) -> Model:
     """Resolve a scene's names into a tree of bodies.
 
     Raises `SceneError`, naming place, value and remedy, if the scene makes no mechanism.

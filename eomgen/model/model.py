@@ -117,7 +117,7 @@ class Seat:
 
 @dataclass(frozen=True)
 class Model:
-    """A mechanism with everything that acts on it; see `build_model`.
+    """A mechanism with everything that acts on it; see `elaborate`.
 
     `conditions` are what values of the parameters keep.
     `states` are those that effects bring along, after coordinates and velocities.

@@ -16,12 +16,12 @@ import pytest
 import sympy as sp
 
 from eomgen.derivation.closed import derive
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model
 from eomgen.run.module import load_module
 from eomgen.scene.reader import read_scene
 
-MODEL = build_model(read_scene("two_body"))
+MODEL = elaborate(read_scene("two_body"))
 MODULE = load_module(compile_model(MODEL))
 ONE = MODULE.initial_state()
 MANY = np.random.default_rng(1).normal(scale=2.0, size=(8, 1000))

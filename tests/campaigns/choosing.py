@@ -28,7 +28,7 @@ sys.path.append(str(Path(__file__).parent.parent))
 from accuracy_scenes import SCENES, closed_end, text
 
 from eomgen.errors import RunError
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene, read_scene
@@ -61,7 +61,7 @@ class Truth:
 
 def prepared(scene: str, own: bool, folder: Path, seconds: float) -> tuple[Case, Truth]:
     """A scene's own run, at its own parameters, and what it is compared with."""
-    model = build_model(parse_scene(text(scene)) if own else read_scene(scene))
+    model = elaborate(parse_scene(text(scene)) if own else read_scene(scene))
     module = load_module(generated_code(model).module, model.name)
     t_end = model.simulation.t_end
     kept = {"rest_speed": model.simulation.rest_speed, "samples": 1001}

@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module
@@ -77,7 +77,7 @@ def scene() -> tuple[GeneratedModule, Motion]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "two_body.toml"
         path.write_text(text, "utf-8")
-        module = load_module(compile_model(build_model(read_scene(str(path)))))
+        module = load_module(compile_model(elaborate(read_scene(str(path)))))
     p = module.PARAMETERS
     assert p["g"] == 0.0
     problem = as_problem(module)

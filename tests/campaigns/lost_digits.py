@@ -26,7 +26,7 @@ from spatial_trees import ORIGIN, PLANE, SPACE, SpatialTree, TreeBody, TreeJoint
 
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
 from eomgen.show.style import FAINT, INK, style
@@ -160,7 +160,7 @@ def errors(case: Case, states: int) -> dict[str, list[float]]:
     """Of each way that answers, at each state; nan where the answer is no number."""
     r = random.Random(case.name)
     angle, count = ANGLES[case.angles], max(3, round(states * case.share))
-    model = build_model(parse_scene(text(case.tree)))
+    model = elaborate(parse_scene(text(case.tree)))
     n = len(case.tree.velocities)
     q = np.array([[angle(r) for _ in range(n)] for _ in range(count)])
     v = np.array([[r.uniform(-3, 3) for _ in range(n)] for _ in range(count)])

@@ -7,7 +7,7 @@ from typing import Any, Literal
 from eomgen.language.base import Table
 from eomgen.language.formula import Apply, Constant, Name, names_in
 from eomgen.language.rates import with_rates
-from eomgen.model.elaborate import build_model
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import Driven, Effect
@@ -43,7 +43,7 @@ def without_velocity_forces(scene: Scene) -> tuple[Variant, ...]:
     if scene.leave_out or scene.form != "velocity" or scene.route == "closed":
         return ()
     changed = scene.replaced(leave_out=("velocity_forces",))
-    return (Variant("velocity forces", build_model(counted(changed)), "mechanism"),)
+    return (Variant("velocity forces", elaborate(counted(changed)), "mechanism"),)
 
 
 def complete(scene: Scene) -> tuple[Variant, ...]:
@@ -57,12 +57,12 @@ def complete(scene: Scene) -> tuple[Variant, ...]:
         count = len(scene.locked)
         label = f"{count} locked coordinate" + "s" * (count > 1)
         found.append((label, _started(scene, (None,)).replaced(locked={})))
-    return tuple(Variant(label, build_model(counted(s)), "left out") for label, s in found)
+    return tuple(Variant(label, elaborate(counted(s)), "left out") for label, s in found)
 
 
 def _started(scene: Scene, by: Collection[str | None]) -> Scene:
     """The scene with the start of coordinates driven by some effects, or locked (None), too."""
-    model = build_model(counted(scene))
+    model = elaborate(counted(scene))
     q = dict(zip((c.name for c in model.coordinates), model.initial_q, strict=True))
     v = dict(zip((c.name for c in model.velocities), model.initial_v, strict=True))
     for c in (c for c in model.prescribed if c.by in by):
@@ -89,7 +89,7 @@ def without_effects(scene: Scene, *, each: bool = False) -> tuple[Variant, ...]:
 
 def bare(scene: Scene) -> Model:
     """The mechanism without any effect."""
-    return build_model(counted(removed(scene, scene.effects)))
+    return elaborate(counted(removed(scene, scene.effects)))
 
 
 def removed(scene: Scene, effects: Sequence[Effect]) -> Scene:
@@ -105,7 +105,7 @@ def _without(scene: Scene, group: Sequence[Effect]) -> Variant:
     brought = {i.name for effect in group for i in effect.inputs(scene.dimensions)}
     brought |= {x.name for effect in group for x in effect.states(scene.dimensions)}
     needed_by = tuple(e.name for e in rest.effects if brought.intersection(_names(e)))
-    model = None if needed_by else build_model(counted(rest))
+    model = None if needed_by else elaborate(counted(rest))
     return Variant(_label(group), model, needed_by=needed_by)
 
 
