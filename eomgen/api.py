@@ -24,8 +24,9 @@ from eomgen.outputs import OUTPUTS
 from eomgen.results import Derivation, Module, Run
 from eomgen.run.module import GeneratedModule, as_powers, as_problem, load_module
 from eomgen.run.problem import Floats
+from eomgen.scene.appearance import appearance_of
 from eomgen.scene.reader import parse_scene, read_scene, read_tables
-from eomgen.scene.schema import SHOWN, Form, Route, Scene
+from eomgen.scene.schema import SHOWN, Form, Route, Scene, Simulation
 from eomgen.store import Code, generated_code
 
 if TYPE_CHECKING:
@@ -160,7 +161,8 @@ def simulate(
     from eomgen.study.accuracy.moved import moved_problem
     from eomgen.study.accuracy.trial import Case
 
-    model = overridden(check(source), form=form, route=route)
+    scene = read(source)
+    model = overridden(check(scene), form=form, route=route)
     asked = (*model.outputs, *SHOWN, *(("effect_powers",) if works else ()))
     model = replace(model, outputs=in_order(asked))
     given = named(parameters, model.defaults, "parameters", "parameter")
@@ -170,16 +172,16 @@ def simulate(
         raise RunError("accuracy, budget: a run has one aim; give one of them")
     if chosen and (dt, rtol, atol) != (None, None, None):
         raise RunError("accuracy, budget: these choose dt, rtol and atol; leave those out")
-    setting = None if chosen else setting_of(model, integrator, dt=dt, rtol=rtol, atol=atol)
+    wanted = scene.simulation
+    setting = None if chosen else setting_of(wanted, integrator, dt=dt, rtol=rtol, atol=atol)
     module = module_of(generated_code(model), model)
     functions = load(module)
     values = (given or None, pushes or None)
-    rest_speed = model.simulation.rest_speed
     case = Case(
         as_problem(functions, *values, model),
-        model.simulation.t_end if t_end is None else t_end,
+        wanted.t_end if t_end is None else t_end,
         functions.UNITS,
-        {"samples": samples, "max_step": max_step, "rest_speed": rest_speed},
+        {"samples": samples, "max_step": max_step, "rest_speed": wanted.rest_speed},
         moved=moved_problem(functions, *values, model),
     )
     powers = as_powers(functions, *values) if works else None
@@ -194,7 +196,7 @@ def simulate(
     else:
         tried = case.run(setting, powers=powers, follow=follow)
     own = model.with_parameters(given)
-    motion = observe(own, functions, tried.trajectory, pushes)
+    motion = observe(own, functions, tried.trajectory, appearance_of(scene), pushes)
     options = tried.setting.options
     return Run(own, module, tried.trajectory, motion, options, error, tuple(warnings))
 
@@ -253,7 +255,8 @@ def verify(
     """
     from eomgen.study.verification.verify import verify as verified
 
-    return verified(check(source), states=states, seed=seed, bound=bound)
+    scene = read(source)
+    return verified(check(scene), scene.simulation, states=states, seed=seed, bound=bound)
 
 
 # What the commands share with these.
@@ -288,7 +291,7 @@ def module_of(code: Code, model: Model) -> Module:
 
 
 def setting_of(
-    model: Model,
+    wanted: Simulation,
     integrator: str | None = None,
     *,
     dt: float | None = None,
@@ -296,15 +299,14 @@ def setting_of(
     atol: float | None = None,
     dashes: str = "",
 ) -> "Setting":
-    """The method asked for, or the scene's, with tolerances or a step; options of the command line
-    have `dashes`.
+    """The method asked for, or the scene's, `wanted`, with tolerances or a step; options of the
+    command line have `dashes`.
 
     Raises `RunError` for tolerances of a method that takes equal steps.
     """
     from eomgen.run.integrators import FixedStep, find_integrator
     from eomgen.study.accuracy.trial import Setting
 
-    wanted = model.simulation
     name = wanted.integrator if integrator is None else integrator
     if not isinstance(find_integrator(name), FixedStep):
         return Setting(

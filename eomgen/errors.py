@@ -2,7 +2,7 @@
 
 import difflib
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from eomgen.text import one_line
 
@@ -52,3 +52,10 @@ def listed(names: Iterable[str]) -> str:
     """Names in a message, the first few of many."""
     words = list(names)
     return ", ".join(words[:12]) + (f" and {len(words) - 12} more" if len(words) > 12 else "")
+
+
+def check_known(name: str, place: str, known: Collection[str], what: str) -> None:
+    """Raise `SceneError` unless a name is one of those `known`, of a `what`."""
+    if name not in known:
+        hint = nearest(name, known) or f"; known: {listed(known) or 'none'}"
+        raise SceneError(f"{place}: no {what} is named '{name}'{hint}")

@@ -1,8 +1,8 @@
 """Generated code kept, so that a scene whose module is fresh is not derived again.
 
-The key is a digest of what enters the code: the model without its looks, every file of this program
-that has a say, and the libraries it is made with. What is found under it is taken only as this
-program wrote it, see `eomgen.entries`.
+The key is a digest of what enters the code: the model without its notices, every file of this
+program that has a say, and the libraries it is made with. What is found under it is taken only as
+this program wrote it, see `eomgen.entries`.
 """
 
 import hashlib
@@ -19,8 +19,6 @@ import platformdirs
 from eomgen.entries import Entries
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
-from eomgen.scene.look import Camera
-from eomgen.scene.schema import Simulation
 from eomgen.templating import PACKAGE, templates_folder
 
 AFTER = (
@@ -111,10 +109,8 @@ def _code(content: bytes | None) -> Code | None:
 
 
 def _key(model: Model) -> str:
-    bodies = tuple(replace(body, shapes=()) for body in model.bodies)
-    bare = replace(model, bodies=bodies, simulation=Simulation(), camera=Camera(), notices=())
     digest = hashlib.sha256(_generator_digest())
-    digest.update(repr(bare).encode())
+    digest.update(repr(replace(model, notices=())).encode())
     return digest.hexdigest()[:32]
 
 

@@ -24,7 +24,7 @@ from eomgen.program.program import Output, Program, finish, interpret
 from eomgen.program.tape import TIME, ExactTape, Stage, Tape
 from eomgen.run.module import load_module
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.scene.schema import Route
+from eomgen.scene.schema import Route, Simulation
 from eomgen.study import timing
 from eomgen.study.cost.arithmetic import (
     BASELINE,
@@ -113,10 +113,15 @@ def model_of(scene: str) -> Model:
     return elaborate(read(scene))
 
 
+def scene_of(scene: str) -> tuple[Model, Simulation]:
+    """The same, and how the scene is to be run."""
+    return model_of(scene), read(scene).simulation
+
+
 @cache
 def judged(scene: str, states: int = 30, *, single: bool = False) -> Arithmetic:
     """A scene's arithmetic."""
-    return arithmetic(model_of(scene), states=states, single=single)
+    return arithmetic(*scene_of(scene), states=states, single=single)
 
 
 def way(found: Arithmetic, name: str, precision: str = "float64") -> Way:
@@ -437,8 +442,8 @@ def test_a_way_that_fails_says_why() -> None:
 
 def test_the_same_seed_the_same_numbers() -> None:
     """And another one others."""
-    one, two = (arithmetic(model_of("pendulum"), states=5) for _ in range(2))
-    other = arithmetic(model_of("pendulum"), states=5, seed=1)
+    one, two = (arithmetic(*scene_of("pendulum"), states=5) for _ in range(2))
+    other = arithmetic(*scene_of("pendulum"), states=5, seed=1)
     for k in (0, 1):
         np.testing.assert_array_equal(one.samples[k].y, two.samples[k].y)
         for w in one.ways:
@@ -449,7 +454,7 @@ def test_the_same_seed_the_same_numbers() -> None:
 
 def test_states_of_its_own_run() -> None:
     """Evenly among the calls, within the run; fewer calls for it end it sooner."""
-    system = bare("cart_pole")
+    system, wanted = bare("cart_pole"), read("cart_pole").simulation
     module: Any = load_module(python_module(system))
     calls, derivative = [], module.derivative
 
@@ -458,14 +463,14 @@ def test_states_of_its_own_run() -> None:
         return derivative(t, y)
 
     module.derivative = noted
-    run = visited(system.model, module, 9)
+    run = visited(system.model, wanted, module, 9)
     assert len(run.t) == 9 and run.t[0] == 0 and run.until > 9
     at = [calls.index(row) for row in zip(run.t, *run.y.T, strict=True)]
     assert min(np.diff(at)) > 0.9 * max(np.diff(at)) > 20  # among hundreds of calls
     np.testing.assert_array_equal(run.y[0], module.initial_state())
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(visiting, "MOST_OPERATIONS", 60 * 18)
-        assert visited(system.model, module, 40).until < 0.5
+        assert visited(system.model, wanted, module, 40).until < 0.5
 
 
 # The command.

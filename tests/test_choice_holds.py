@@ -22,6 +22,7 @@ from eomgen.run.checks import allowed_errors
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import Floats, Problem
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
+from eomgen.scene.schema import Simulation
 from eomgen.store import generated_code
 from eomgen.study.accuracy import search, trial
 from eomgen.study.accuracy.budgeting import within
@@ -36,18 +37,19 @@ from eomgen.study.accuracy.trial import Case, Setting, Tried
 pytestmark = pytest.mark.usefixtures("blank_figures")
 
 
-def made(scene: str) -> tuple[Model, GeneratedModule]:
-    """A scene's model and module, built in or not."""
-    model = elaborate(read_scene(scene) if scene in built_in_names() else parse_scene(text(scene)))
-    return model, load_module(generated_code(model).module, model.name)
+def made(scene: str) -> tuple[Model, GeneratedModule, Simulation]:
+    """A scene's model and module, built in or not, and how it is to be run."""
+    tables = read_scene(scene) if scene in built_in_names() else parse_scene(text(scene))
+    model = elaborate(tables)
+    return model, load_module(generated_code(model).module, model.name), tables.simulation
 
 
 def case_of(scene: str, t_end: float | None = None, **kept: Any) -> Case:
     """A scene's run, as the command makes it."""
-    model, module = made(scene)
-    kept = {"samples": 1001, "rest_speed": model.simulation.rest_speed, **kept}
+    model, module, wanted = made(scene)
+    kept = {"samples": 1001, "rest_speed": wanted.rest_speed, **kept}
     problem, twin = as_problem(module, model=model), moved_problem(module, model=model)
-    return Case(problem, t_end or model.simulation.t_end, module.UNITS, kept, moved=twin)
+    return Case(problem, t_end or wanted.t_end, module.UNITS, kept, moved=twin)
 
 
 def end_of(scene: str, t_end: float | None = None) -> Floats:
@@ -55,8 +57,8 @@ def end_of(scene: str, t_end: float | None = None) -> Floats:
     known = closed_end(scene) if t_end is None else None
     if known is not None:
         return np.array([float(x) for x in known])
-    model, module = made(scene)
-    return reference(model, module, t_end=t_end or model.simulation.t_end, doubles=False).y[-1]
+    model, module, wanted = made(scene)
+    return reference(model, module, t_end=t_end or wanted.t_end, doubles=False).y[-1]
 
 
 def off(case: Case, run: Tried, true: Floats) -> float:
@@ -97,7 +99,7 @@ def test_near_a_separatrix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 def test_constants_are_moved_by_what_rounding_did_to_them() -> None:
     """1/3 is rounded and moves by a unit in the last place; 2 and 1/2 are not, and stay."""
-    _, module = made("separatrix_1")
+    _, module, _ = made("separatrix_1")
     twin = moved(module)
     own, other = (m._DEFAULT["derivative"] for m in (module, twin))  # type: ignore[attr-defined]
     assert own != other

@@ -66,12 +66,13 @@ simulation = { t_end = 10 }
 
 def case_of(scene: str) -> Case:
     """A built-in scene's own run, or that of a scene's text."""
-    model = elaborate(parse_scene(scene) if "\n" in scene else read_scene(scene))
+    tables = parse_scene(scene) if "\n" in scene else read_scene(scene)
+    model, wanted = elaborate(tables), tables.simulation
     module = load_module(generated_code(model).module, model.name)
-    kept = {"samples": 1001, "rest_speed": model.simulation.rest_speed}
+    kept = {"samples": 1001, "rest_speed": wanted.rest_speed}
     problem = as_problem(module, model=model)
     moved = moved_problem(module, model=model)
-    return Case(problem, model.simulation.t_end, module.UNITS, kept, moved=moved)
+    return Case(problem, wanted.t_end, module.UNITS, kept, moved=moved)
 
 
 def truth(case: Case, integrator: str = "DOP853", rtol: float = SMALLEST_RTOL) -> Floats:

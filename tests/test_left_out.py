@@ -22,6 +22,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
+from eomgen.scene.appearance import Appearance
 from eomgen.scene.reader import parse_scene
 from eomgen.show.observe import observe
 from eomgen.show.page import render_page
@@ -380,7 +381,7 @@ def test_the_page_of_a_driven_scene_moves() -> None:
     code = generate(model)
     e = engine(DOUBLE + drive)
     run = integrate(as_problem(e.module), "RK45", 1.0, rtol=1e-6, atol=1e-9, samples=7)
-    motion = observe(model, e.module, run)
+    motion = observe(model, e.module, run, Appearance())
     expected = [e.module.body_poses(t, y) for t, y in zip(run.t, run.y, strict=True)]
     np.testing.assert_allclose(motion.poses, expected, atol=1e-15)
     assert np.ptp(motion.poses[:, 0, 2]) > 0.9

@@ -14,6 +14,7 @@ from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.trajectory import load_npz
+from eomgen.scene.appearance import Appearance
 from eomgen.scene.reader import read_scene
 from eomgen.show.observe import observe
 
@@ -133,7 +134,7 @@ def test_only_the_redundant_form_pulls_the_joint_apart(two_body: Any) -> None:
     def gap(form: str, dt: float) -> float:
         model, module = two_body[form]
         run = integrate(as_problem(module), "euler", 2.5, dt=dt)
-        return float(observe(model, module, run).joint_drift.max())
+        return float(observe(model, module, run, Appearance()).joint_drift.max())
 
     coarse, fine = gap("redundant", 0.002), gap("redundant", 0.001)
     assert coarse > 1e-3

@@ -21,7 +21,8 @@ from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.precision.longs import doubles, long, long_digits
 from eomgen.run.module import load_module
-from eomgen.scene.reader import find_scene, parse_scene
+from eomgen.scene.reader import find_scene
+from eomgen.scene.schema import Simulation
 from eomgen.study.verification import drift as drifting
 from eomgen.study.verification import horizon as horizons
 from eomgen.study.verification import visited as visiting
@@ -131,6 +132,11 @@ def in_little_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def model_of(scene: str) -> Model:
     """A built-in scene's model, or one of a text."""
     return elaborate(read(scene))
+
+
+def scene_of(scene: str) -> tuple[Model, Simulation]:
+    """The same, and how the scene is to be run."""
+    return model_of(scene), read(scene).simulation
 
 
 def as_long(x: Any) -> Any:
@@ -252,7 +258,7 @@ def test_hard_states_are_what_their_kinds_say() -> None:
 
 def test_a_good_module_passes_by_every_route() -> None:
     """Errors of a few ulps, and every identity holds."""
-    found = verify(model_of("cart_pole"), states=2)
+    found = verify(*scene_of("cart_pole"), states=2)
     assert not found.missed and found.left_out == 0
     assert set(found.ulps) == set(PENDULUM_ROUTES)
     assert max(np.median(errors) for errors in found.ulps.values()) < 10
@@ -263,7 +269,7 @@ def test_a_good_module_passes_by_every_route() -> None:
 
 def test_a_floating_tree_keeps_what_it_should() -> None:
     """Thrown upwards: x of momentum, not y, and the momentum law holds."""
-    found = verify(model_of("two_body"), states=2)
+    found = verify(*scene_of("two_body"), states=2)
     assert not found.missed and check(found, "momentum law").value < 30
     drifts = [line.what for line in found.checks if line.what.startswith("drift")]
     assert drifts == ["drift of energy", "drift of momentum x"]
@@ -280,7 +286,7 @@ def test_what_takes_energy_is_named() -> None:
 
 def test_all_joints_with_drive_rotor_and_spring_are_verified() -> None:
     """Driven coordinates, their powers, and inputs among all else."""
-    found = verify(model_of(SCREW), states=1)
+    found = verify(*scene_of(SCREW), states=1)
     assert not found.missed, [line.what for line in found.missed]
     assert {"effect_powers", "inverse_dynamics", "body_poses"} <= {c.what for c in found.checks}
 
@@ -329,7 +335,7 @@ joints = [{ name = "j", type = "free", child = "a" }]
 @pytest.mark.parametrize("case", some([*QUIET][::2], [*QUIET]))
 def test_where_quantities_vanish_no_rounding_of_the_judge_counts(case: str) -> None:
     """Terms that cancel, drives at rest, what acts for a while: good modules pass."""
-    found = verify(model_of(QUIET[case]), states=2)
+    found = verify(*scene_of(QUIET[case]), states=2)
     assert not found.missed, [line.what for line in found.missed]
     if "a while" in case:
         assert any("push give or take" in note for note in found.notes)
@@ -337,11 +343,11 @@ def test_where_quantities_vanish_no_rounding_of_the_judge_counts(case: str) -> N
 
 def test_a_heavy_body_on_light_ones_is_found_to_lose_digits_by_aba_and_not_by_orthogonal() -> None:
     """Each decade of mass costs the recursion a digit; the other route loses none."""
-    light = model_of(HEAVY.replace("ROUTE", "aba"))
-    lossy = verify(light, states=1)
+    light, wanted = scene_of(HEAVY.replace("ROUTE", "aba"))
+    lossy = verify(light, wanted, states=1)
     line = check(lossy, "forward error of v̇, aba (taken)")
     assert line.missed and line.value > 1e6 and "orthogonal" in lossy.better
-    sound = verify(replace(light, route="orthogonal"), states=1)
+    sound = verify(replace(light, route="orthogonal"), wanted, states=1)
     line = check(sound, "forward error of v̇, orthogonal (taken)")
     assert not line.missed and line.value < 2000
     assert check(sound, "residual").value < 450
@@ -360,21 +366,22 @@ FAULTS = {
 
 
 @cache
-def good() -> tuple[Model, str]:
-    """A model, and the source of its module in which nothing is found."""
-    model = replace(model_of("acrobot"), outputs=in_order(OUTPUTS), route="aba")
+def good() -> tuple[tuple[Model, Simulation], str]:
+    """A model and how it is run, and the source of its module in which nothing is found."""
+    model, wanted = scene_of("acrobot")
+    model = replace(model, outputs=in_order(OUTPUTS), route="aba")
     source = python_module(routed(model).system)
-    assert not verify(model, states=1, module=load_module(source)).missed
-    return model, source
+    assert not verify(model, wanted, states=1, module=load_module(source)).missed
+    return (model, wanted), source
 
 
 @pytest.mark.parametrize("fault", some([*FAULTS][::2], [*FAULTS]))
 def test_a_fault_in_a_module_is_caught(fault: str) -> None:
     """Each seeded in a copy of a good module, in one place."""
-    model, source = good()
+    scene, source = good()
     seeded, places = re.subn(*FAULTS[fault], source, count=1, flags=re.DOTALL)
     assert places == 1 and seeded != source
-    assert verify(model, states=1, module=load_module(seeded)).missed
+    assert verify(*scene, states=1, module=load_module(seeded)).missed
 
 
 def test_a_module_that_gives_no_number_misses_its_bound() -> None:
@@ -408,33 +415,33 @@ effects = [
 
 def test_a_horizon_that_chatters_keeps_to_its_time_and_tells_how_far_it_is() -> None:
     """Dry friction that sticks turns at every step, in doubles too, which had all the time."""
-    model = elaborate(parse_scene(DRY))
-    module = load_module(python_module(routed(model).system))
+    scene = scene_of(DRY)
+    module = load_module(python_module(routed(scene[0]).system))
     told: list[float] = []
     with pytest.raises(RunError, match=r"^horizon: no run of 10 s.*: more than 1 s in .*; give a"):
-        horizon_of(model, module, seconds=0.5, progress=told.append)
+        horizon_of(*scene, module, seconds=0.5, progress=told.append)
     assert told and all(0.0 <= part < 1.0 for part in told)
 
 
 def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     """A short run means something all along; asked for more digits, it has them for a while."""
-    model = model_of("double_pendulum")
-    model = replace(model, simulation=model.simulation.replaced(t_end=1.5), outputs=())
+    model, wanted = scene_of("double_pendulum")
+    model, wanted = replace(model, outputs=()), wanted.replaced(t_end=1.5)
     module = load_module(python_module(routed(model).system))
-    whole = horizon_of(model, module)
+    whole = horizon_of(model, wanted, module)
     assert whole.time is None and 1e-16 < whole.worst < 1e-10 and whole.sure < 1e-15
     assert whole.words.startswith("doubles are meaningful for the whole run, 1.5 s: off by")
     monkeypatch.setattr(horizons, "PARTED", whole.worst / 2)
-    part = horizon_of(model, module)
+    part = horizon_of(model, wanted, module)
     assert part.time is not None and 0.1 < part.time <= 1.5
     assert part.words.startswith(f"doubles are meaningful to t = {part.time:.4g} s of 1.5 s")
     with pytest.raises(
         RunError, match=r"^horizon: no run of 1\.5 s in .* more than 1e-06 s in long"
     ):
-        horizon_of(model, module, seconds=1e-6)
+        horizon_of(model, wanted, module, seconds=1e-6)
     with pytest.raises(RunError, match="rigid contacts strike"):
         bouncing = replace(model_of("bouncing_two_body"), outputs=())
-        horizon_of(bouncing, load_module(python_module(routed(bouncing).system)))
+        horizon_of(bouncing, wanted, load_module(python_module(routed(bouncing).system)))
 
 
 # The command.

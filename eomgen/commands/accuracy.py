@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eomgen.commands.arithmetic import check_arithmetic, print_arithmetic
-from eomgen.commands.shared import Arguments, assignments, code_of, located, note, read_model
+from eomgen.commands.shared import Arguments, assignments, code_of, located, note, read_whole
 from eomgen.entries import Entries
 from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable
@@ -18,7 +18,7 @@ from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_line, terminal_notice, terminal_progress
-from eomgen.scene.schema import SHOWN
+from eomgen.scene.schema import SHOWN, Simulation
 from eomgen.store import folder
 
 if TYPE_CHECKING:
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
 
 def accuracy(given: Arguments) -> int:
     """Print, write and draw what runs cost by every method, and how exact the arithmetic is."""
-    model, name = read_model(given.scene, given)
+    scene, model, name = read_whole(given.scene, given)
     if not given.no_arithmetic:
         check_arithmetic(given, name)
     if not given.arithmetic:
-        _runs(given, model, name)
+        _runs(given, model, scene.simulation, name)
     if not given.no_arithmetic:
-        print_arithmetic(given, model, name)
+        print_arithmetic(given, model, scene.simulation, name)
     return 0
 
 
-def _runs(given: Arguments, model: Model, name: str) -> None:
+def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None:
     """Run every method over its ladder; print the table, write it and draw it."""
     from eomgen import pipeline  # here, so that loading SymPy is not counted as deriving
     from eomgen.commands.accuracy_table import about, print_table
@@ -57,7 +57,7 @@ def _runs(given: Arguments, model: Model, name: str) -> None:
     methods = methods_named(given.methods)
     parameters = assignments(given.set, model.defaults, "--set")
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
-    t_end = model.simulation.t_end if given.t_end is None else given.t_end
+    t_end = wanted.t_end if given.t_end is None else given.t_end
     if not 0 < t_end < math.inf:
         raise RunError(f"--t-end: {t_end:g} is no positive time; give one in s")
     paths = {kind: given.output / f"{name}_accuracy.{kind}" for kind in ("csv", "png")}
@@ -71,7 +71,7 @@ def _runs(given: Arguments, model: Model, name: str) -> None:
     begin = time.perf_counter()
     code, module = code_of(given.scene, model, given)
     generation = time.perf_counter() - begin if code.derived else None
-    key = records.key(code.module, parameters, inputs, t_end, model.simulation.rest_speed)
+    key = records.key(code.module, parameters, inputs, t_end, wanted.rest_speed)
     done, earlier = ({}, None) if given.fresh else records.load(paths["csv"], key)
     if generation is None:
         generation = earlier
@@ -89,8 +89,9 @@ def _runs(given: Arguments, model: Model, name: str) -> None:
             t_end,
             progress=progress,
             folder=_references(given),
+            rest_speed=wanted.rest_speed,
         )
-        bench = _bench(model, module, parameters, inputs, truth)
+        bench = _bench(model, module, parameters, inputs, truth, wanted.rest_speed)
         _check_reference(bench)
         costs = call_times(bench.problem, truth)
     ladder = _ladder(bench, t_end, given)
@@ -132,6 +133,7 @@ def _bench(
     parameters: Mapping[str, float],
     inputs: Mapping[str, float],
     truth: "Reference",
+    rest_speed: float | None,
 ) -> "Bench":
     """What runs of a model are measured by."""
     from eomgen.show.balance import keeps_energy
@@ -159,7 +161,7 @@ def _bench(
     return Bench(
         problem=as_problem(module, *values, own),
         reference=truth,
-        rest_speed=model.simulation.rest_speed,
+        rest_speed=rest_speed,
         kinetic=kinetic,
         energy=energy if keeps else None,
         energy_scale=scale,

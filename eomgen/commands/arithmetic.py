@@ -11,6 +11,7 @@ from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_progress
+from eomgen.scene.schema import Simulation
 
 if TYPE_CHECKING:
     from eomgen.study.cost.arithmetic import Arithmetic, Way
@@ -35,7 +36,7 @@ def check_arithmetic(given: Arguments, name: str) -> None:
     check_writable(given.output / f"{name}_arithmetic.csv", force=given.force)
 
 
-def print_arithmetic(given: Arguments, model: Model, name: str) -> None:
+def print_arithmetic(given: Arguments, model: Model, wanted: Simulation, name: str) -> None:
     """Judge, print and draw the arithmetic of every route of a scene's model."""
     # Imported here: nothing else needs Matplotlib, or that many digits.
     from eomgen.show.arithmetic import save_figure, save_table
@@ -46,7 +47,12 @@ def print_arithmetic(given: Arguments, model: Model, name: str) -> None:
     label = f"arithmetic of {name}"
     with located(given.scene), terminal_progress(label) as progress:
         found = arithmetic(
-            model, states=given.states, seed=given.seed, single=given.float32, progress=progress
+            model,
+            wanted,
+            states=given.states,
+            seed=given.seed,
+            single=given.float32,
+            progress=progress,
         )
     found = replace(found, name=name)
     print(

@@ -22,7 +22,7 @@ from eomgen.commands.shared import (
     overlap_lines,
     print_listed,
     print_wrapped,
-    read_model,
+    read_whole,
     shortened,
 )
 from eomgen.errors import InterruptedRunError, RunError
@@ -33,6 +33,7 @@ from eomgen.run.limits import excursions, locks
 from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory, is_own_table
+from eomgen.scene.appearance import appearance_of
 from eomgen.scene.effects import JointStop
 from eomgen.scene.joints.base import Geared
 from eomgen.scene.schema import SHOWN
@@ -56,12 +57,12 @@ def simulate(given: Arguments) -> int:
     from eomgen.study.accuracy.trial import Case
 
     check_choice(given)
-    model, name = read_model(given.scene, given)
+    scene, model, name = read_whole(given.scene, given)
     asked = (*model.outputs, *SHOWN, *(("effect_powers",) if given.works else ()))
     model = replace(model, outputs=in_order(asked))
     parameters = assignments(given.set, model.defaults, "--set")
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
-    wanted = model.simulation
+    wanted = scene.simulation
     chosen = given.accuracy is not None or given.budget is not None
     if chosen and given.resume is not None:
         raise RunError(
@@ -70,7 +71,7 @@ def simulate(given: Arguments) -> int:
     setting = None
     if not chosen:
         bounds = {name: getattr(given, name) for name in ("dt", "rtol", "atol")}
-        setting = setting_of(model, given.integrator, **bounds, dashes="--")
+        setting = setting_of(wanted, given.integrator, **bounds, dashes="--")
     _check_unstable(given, setting)
     paths = _output_paths(given, name)
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
@@ -108,7 +109,7 @@ def simulate(given: Arguments) -> int:
         tried = case.run(setting, powers=powers)
     trajectory = tried.trajectory
     model = model.with_parameters(parameters)
-    motion = observe(model, module, trajectory, inputs)
+    motion = observe(model, module, trajectory, appearance_of(scene), inputs)
     drawing = _write(code, trajectory, motion, tuple(model.defaults.values()), paths, given.force)
     words = start.told(trajectory) if start else ""
     missed = _report(given, model, code, case, tried, choice, motion, words)

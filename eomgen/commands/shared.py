@@ -18,6 +18,7 @@ from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import terminal_notice
 from eomgen.scene.effects import JointStop
 from eomgen.scene.reader import find_scene, read_scene
+from eomgen.scene.schema import Scene
 from eomgen.store import Code, generated_code
 from eomgen.text import one_line
 
@@ -28,7 +29,12 @@ FEW = 40
 
 
 def read_model(scene: str, given: Arguments) -> tuple[Model, str]:
-    """A scene's model with what the command line overrides, and the name for files made of it.
+    """A scene's model with what the command line overrides, and the name for files made of it."""
+    return read_whole(scene, given)[1:]
+
+
+def read_whole(scene: str, given: Arguments) -> tuple[Scene, Model, str]:
+    """A scene, its model with what the command line overrides, and the name for files made of it.
 
     Files of another form or route than the scene's own are named after these, too. What was put
     right while reading is said on standard error.
@@ -51,7 +57,7 @@ def read_model(scene: str, given: Arguments) -> tuple[Model, str]:
                 names, "--outputs", model.points, model.inputs, model.parameters, model.driven
             )
             model = replace(model, outputs=chosen)
-    return model, name
+    return tables, model, name
 
 
 def _output_names(text: str) -> Literal["all"] | Sequence[str]:

@@ -5,11 +5,12 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from eomgen.commands.shared import Arguments, located, read_model
+from eomgen.commands.shared import Arguments, located, read_whole
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.module import load_module
 from eomgen.run.progress import terminal_progress
+from eomgen.scene.schema import Simulation
 from eomgen.store import generated_code
 
 if TYPE_CHECKING:
@@ -32,17 +33,22 @@ def verify(given: Arguments) -> int:
         raise RunError(f"--bound: {given.bound:g} is no number of ulps from 0.5 on")
     if given.horizon is not None and not 0 < given.horizon < math.inf:
         raise RunError(f"--horizon: {given.horizon:g} is no positive time; give one in s")
-    model, name = read_model(given.scene, given)
+    scene, model, name = read_whole(given.scene, given)
     if given.save is not None:
         evidence.paths(given.save, name, force=given.force)
     with located(given.scene), terminal_progress(f"verifying {name}") as progress:
         found = replace(
             verified(
-                model, states=given.states, seed=given.seed, bound=given.bound, progress=progress
+                model,
+                scene.simulation,
+                states=given.states,
+                seed=given.seed,
+                bound=given.bound,
+                progress=progress,
             ),
             name=name,
         )
-    horizon = _horizon(given, model, name)
+    horizon = _horizon(given, model, scene.simulation, name)
     lines = evidence.report(found, horizon)
     print("\n".join(lines))
     if given.save is not None:
@@ -55,7 +61,7 @@ def verify(given: Arguments) -> int:
     return 0
 
 
-def _horizon(given: Arguments, model: Model, name: str) -> "Horizon | None":
+def _horizon(given: Arguments, model: Model, wanted: Simulation, name: str) -> "Horizon | None":
     from eomgen.study.verification.horizon import horizon
 
     if given.horizon is None:
@@ -63,4 +69,4 @@ def _horizon(given: Arguments, model: Model, name: str) -> "Horizon | None":
     model = replace(model, form="velocity")
     with located(given.scene), terminal_progress(f"horizon of {name}") as progress:
         module = load_module(generated_code(model).module, model.name)
-        return horizon(model, module, seconds=given.horizon, progress=progress)
+        return horizon(model, wanted, module, seconds=given.horizon, progress=progress)

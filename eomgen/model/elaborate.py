@@ -4,90 +4,80 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from eomgen.errors import SceneError
-from eomgen.language.conditions import Condition, of_inertia, require
+from eomgen.errors import SceneError, check_known
+from eomgen.language.conditions import of_inertia, require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, with_components
-from eomgen.model.acting import acting_effects, at_joint, check_contacts, sliding_in
-from eomgen.model.chains import written_out
 from eomgen.model.definitions import with_definitions
-from eomgen.model.geometry import entries_of_inertia, straightened_joint, unit_quaternions
-from eomgen.model.model import Body, Model, Point
-from eomgen.model.names import check_known, check_names, named
-from eomgen.model.prescribed import initial_values, locked_values
+from eomgen.model.effects import check_contacts, effects_in_force, inputs_and_states, sliding_in
+from eomgen.model.geometry import entries_of_inertia, lengths_noticed, normalised_joint
+from eomgen.model.initial import initial_state
+from eomgen.model.model import Body, Model, Point, prescribed_of, velocities_of
+from eomgen.model.names import Bindings, Scope, bind, check_names, joined
+from eomgen.model.prescribed import locked_values
+from eomgen.model.tree import Link, links_of
 from eomgen.outputs import OUTPUTS
+from eomgen.scene.appearance import appearance_of
+from eomgen.scene.chains import written_out
 from eomgen.scene.effects import Effect
-from eomgen.scene.joints import Joint
-from eomgen.scene.joints.base import WORLD
-from eomgen.scene.look import check_look
 from eomgen.scene.schema import Scene
 
 
 def elaborate(scene: Scene) -> Model:
     """Resolve a scene's names into a tree of bodies.
 
-    Raises `SceneError`, naming place, value and remedy, if the scene makes no mechanism.
+    Raises `SceneError`, naming place, value and remedy, if the scene makes no mechanism, or one
+    that cannot be drawn as it says.
     """
-    parameters, known = _scene_parameters(scene)
-    motion = _motion(scene)
-    scene = with_definitions(scene, motion)
-    conditions: list[Condition] = []
-    bodies, notices = _bodies(scene, known, parameters, conditions, motion)
-    names = {body.name: i for i, body in enumerate(bodies)}
-    sliding = sliding_in(bodies, scene.dimensions)
-    effects = acting_effects(scene, bodies, sliding, known, parameters, conditions, motion)
-    points = _points(scene, names, known, parameters, conditions, motion)
-    inputs = [at_joint(x, e, sliding) for e in effects for x in e.inputs(scene.dimensions)]
-    states = [at_joint(x, e, sliding) for e in effects for x in e.states(scene.dimensions)]
+    own = _scene_parameters(scene)
+    scope = Scope({p.name: p.default for p in own}, _moving(scene))
+    scene = with_definitions(scene, scope.moving)
+    n, links = scene.dimensions, links_of(scene)
+    bodies, of_bodies = _bodies(links, scope, n)
+    scope = replace(scope, sliding=sliding_in(bodies, n))
+    effects, of_effects = effects_in_force(scene, bodies, scope)
+    points, of_points = _points(scene, bodies, scope)
+    found = joined([Bindings(own), of_bodies, of_effects, of_points])
+    inputs, states = inputs_and_states(effects, scope, n)
     if not any(body.velocities for body in bodies):
         raise SceneError("joints: nothing can move; give at least one that is no weld")
-    _check_symbols(scene, parameters, bodies, effects)
-    check_contacts(effects, list(names))
+    _check_symbols(n, found.parameters, links, bodies, effects)
+    check_contacts(effects, [body.name for body in bodies])
     locked = locked_values(scene.locked, bodies, effects)
-    check_look((), scene.camera, scene.dimensions, "camera")
-    if scene.camera.follow is not None:
-        check_known(scene.camera.follow, "camera.follow", names, "body")
-    model = Model(
+    appearance_of(scene)  # a scene is taken whole or not at all
+    prescribed = prescribed_of(bodies, effects, locked)
+    if not velocities_of(bodies, prescribed):
+        raise SceneError(
+            "scene: every coordinate is driven or locked, so there is no motion to find; "
+            "leave one free"
+        )
+    start = initial_state(scene.initial, bodies, prescribed)
+    driven = [c for c in prescribed if not c.locked]
+    noticed = (line for link in links for line in lengths_noticed(link.joint, link.joint_place))
+    return Model(
         name=scene.name,
         title=scene.title or scene.name,
-        dimensions=scene.dimensions,
-        parameters=tuple(parameters),
-        conditions=tuple(conditions),
-        inputs=tuple(inputs),
-        bodies=tuple(bodies),
-        points=tuple(points),
-        effects=tuple(effects),
-        states=tuple(states),
-        initial_q=(),
-        initial_v=(),
-        outputs=(),
+        dimensions=n,
+        parameters=found.parameters,
+        conditions=found.conditions,
+        inputs=inputs,
+        bodies=bodies,
+        points=points,
+        effects=effects,
+        states=states,
+        initial_q=start.q,
+        initial_v=start.v,
+        outputs=outputs_for(scene.outputs, "outputs[{}]", points, inputs, found.parameters, driven),
         form=scene.form,
         route=scene.route,
-        simulation=scene.simulation,
-        camera=scene.camera,
         locked=tuple(locked.items()),
         # What is not there by its own name is there in degrees.
         locked_deg=tuple(
             (name, scene.locked[f"{name}_deg"]) for name in locked if name not in scene.locked
         ),
         leave_out=scene.leave_out,
-        notices=notices,
+        notices=(*dict.fromkeys(noticed), *start.notices),
     )
-    if not model.velocities:
-        raise SceneError(
-            "scene: every coordinate is driven or locked, so there is no motion to find; "
-            "leave one free"
-        )
-    q, v = scene.initial.q, scene.initial.v
-    model = replace(
-        model,
-        initial_q=initial_values(q, model.coordinates, "initial.q", model.prescribed),
-        initial_v=initial_values(v, model.velocities, "initial.v", model.prescribed),
-        outputs=outputs_for(
-            scene.outputs, "outputs[{}]", scene.points, inputs, parameters, model.driven
-        ),
-    )
-    return unit_quaternions(model, q)
 
 
 def outputs_for(
@@ -124,7 +114,7 @@ def in_order(outputs: Collection[str]) -> tuple[str, ...]:
     return tuple(name for name in OUTPUTS if name in outputs)
 
 
-def _scene_parameters(scene: Scene) -> tuple[list[Parameter], dict[str, float]]:
+def _scene_parameters(scene: Scene) -> tuple[Parameter, ...]:
     parameters = []
     for name, entry in scene.parameters.items():
         place = f"parameters.{name}"
@@ -132,10 +122,10 @@ def _scene_parameters(scene: Scene) -> tuple[list[Parameter], dict[str, float]]:
             parameters.append(Parameter(name, float(entry), "", "", place))
         else:
             parameters.append(Parameter(name, float(entry.value), entry.unit, entry.about, place))
-    return parameters, {p.name: p.default for p in parameters}
+    return tuple(parameters)
 
 
-def _motion(scene: Scene) -> list[str]:
+def _moving(scene: Scene) -> tuple[str, ...]:
     """Names of what changes while a scene moves: time, coordinates, velocities, inputs, states."""
     names = ["t"]
     for joint, _ in written_out(scene)[1]:
@@ -144,128 +134,67 @@ def _motion(scene: Scene) -> list[str]:
     for effect in scene.effects:
         names += [i.name for i in effect.inputs(scene.dimensions)]
         names += [x.name for x in effect.states(scene.dimensions)]
-    return names
+    return tuple(names)
 
 
 def _bodies(
-    scene: Scene,
-    known: dict[str, float],
-    parameters: list[Parameter],
-    conditions: list[Condition],
-    motion: Sequence[str],
-) -> tuple[list[Body], tuple[str, ...]]:
-    """Bodies with their joints, parents first and otherwise in the scene's order; and notices."""
-    bodies, joints = written_out(scene)
-    check_names([(body.name, place) for body, place in bodies])
-    check_names([(joint.name, place) for joint, place in joints])
-    names = {body.name: i for i, (body, _) in enumerate(bodies)}
-    anchors = dict.fromkeys([WORLD, *names])
-    holding: dict[str, tuple[Joint, str]] = {}
-    for joint, place in joints:
-        if joint.child == WORLD:
-            raise SceneError(
-                f"{place}.child: '{WORLD}' is the ground, which hangs on nothing; name it as the "
-                "parent, and give no body a second joint: loops are not closed"
-            )
-        check_known(joint.child, f"{place}.child", names, "body")
-        if joint.parent != WORLD:
-            check_known(joint.parent, f"{place}.parent", anchors, "body")
-        if joint.child in holding:
-            raise SceneError(
-                f"{place}.child: '{joint.child}' is the child of {holding[joint.child][1]} too; "
-                "in a tree each body has one joint to its parent"
-            )
-        holding[joint.child] = (joint, place)
-    for body, place in bodies:
-        if body.name not in holding:
-            raise SceneError(
-                f"{place}.name: '{body.name}' is attached to nothing; "
-                "give it a joint, of type 'free' if nothing holds it"
-            )
-    depth = _depths(holding)
-    order = sorted(names, key=lambda name: (depth[name], names[name]))
-    index = {name: k for k, name in enumerate(order)}
-    built: list[Body] = []
-    notices: list[str] = []
-    for name in order:
-        body, place = bodies[names[name]]
-        joint, joint_place = holding[name]
-        joint = straightened_joint(joint, joint_place, scene.dimensions, notices)
-        check_look(body.shapes, None, scene.dimensions, place)
-        body = named(body, body.name, place, known, parameters, conditions, motion)
-        inertia_com = entries_of_inertia(body, place, scene.dimensions)
-        values = {**known, **{p.name: p.default for p in parameters}}
-        at = f"{place}.inertia_com"
-        sound = list(of_inertia(at, body.name, body.mass, inertia_com, values))
-        require(sound, values)
-        conditions += sound
-        joint = named(joint, joint.name, joint_place, known, parameters, conditions, motion)
-        built.append(
-            Body(
-                name=name,
-                mass=body.mass,
-                inertia_com=inertia_com,
-                joint=joint,
-                parent=-1 if joint.parent == WORLD else index[joint.parent],
-                positions=joint.positions(scene.dimensions),
-                velocities=joint.velocities(scene.dimensions),
-                shapes=body.shapes,
-            )
-        )
-    return built, tuple(dict.fromkeys(notices))
+    links: Sequence[Link], scope: Scope, dimensions: int
+) -> tuple[tuple[Body, ...], Bindings]:
+    """The bodies of links, in their order, with their joints; and what their quantities bring."""
+    pairs = [_body(link, scope, dimensions) for link in links]
+    return tuple(body for body, _ in pairs), joined(bindings for _, bindings in pairs)
 
 
-def _depths(holding: dict[str, tuple[Joint, str]]) -> dict[str, int]:
-    """How many joints lie between each body and the world. Raises `SceneError` for a cycle."""
-    depth: dict[str, int] = {WORLD: 0}
-    for start in holding:
-        path: dict[str, None] = {}
-        name = start
-        while name not in depth:
-            if name in path:
-                joint, place = holding[name]
-                raise SceneError(
-                    f"{place}.parent: '{joint.parent}' hangs on its own child '{name}': "
-                    "the joints make a cycle; let one tree start at the world"
-                )
-            path[name] = None
-            name = holding[name][0].parent
-        for name in reversed(path):
-            depth[name] = depth[holding[name][0].parent] + 1
-    return depth
+def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
+    joint = normalised_joint(link.joint, link.joint_place, dimensions)
+    table, of_body = bind(link.body, link.body.name, link.place, scope)
+    inertia_com = entries_of_inertia(table, link.place, dimensions)
+    values = of_body.values(scope)
+    at = f"{link.place}.inertia_com"
+    sound = tuple(of_inertia(at, table.name, table.mass, inertia_com, values))
+    require(sound, values)
+    joint, of_joint = bind(joint, joint.name, link.joint_place, scope)
+    body = Body(
+        name=table.name,
+        mass=table.mass,
+        inertia_com=inertia_com,
+        joint=joint,
+        parent=link.parent,
+        positions=joint.positions(dimensions),
+        velocities=joint.velocities(dimensions),
+    )
+    return body, joined([of_body, Bindings(conditions=sound), of_joint])
 
 
 def _points(
-    scene: Scene,
-    names: dict[str, int],
-    known: dict[str, float],
-    parameters: list[Parameter],
-    conditions: list[Condition],
-    motion: Sequence[str],
-) -> list[Point]:
+    scene: Scene, bodies: Sequence[Body], scope: Scope
+) -> tuple[tuple[Point, ...], Bindings]:
+    """The named points, and what their quantities bring."""
     check_names([(point.name, f"points[{i}]") for i, point in enumerate(scene.points)])
-    points = []
+    index = {body.name: k for k, body in enumerate(bodies)}
+    points, found = [], []
     for i, point in enumerate(scene.points):
         place = f"points[{i}]"
-        check_known(point.body, f"{place}.body", names, "body")
+        check_known(point.body, f"{place}.body", index, "body")
         at = with_components(point.at, ZERO, scene.dimensions, f"{place}.at")
-        point = point.replaced(at=at)
-        point = named(point, point.name, place, known, parameters, conditions, motion)
-        points.append(Point(point.name, names[point.body], point.at))
-    return points
+        point, bindings = bind(point.replaced(at=at), point.name, place, scope)
+        points.append(Point(point.name, index[point.body], point.at))
+        found.append(bindings)
+    return tuple(points), joined(found)
 
 
 def _check_symbols(
-    scene: Scene,
+    n: int,
     parameters: Sequence[Parameter],
+    links: Sequence[Link],
     bodies: Sequence[Body],
     effects: Sequence[Effect],
 ) -> None:
-    """No name may stand for two things in the equations. Raises `SceneError` with both places."""
-    places = {joint.name: place for joint, place in written_out(scene)[1]}
-    moving = [(body, places[body.joint.name]) for body in bodies]
+    """No name may stand for two things in the equations of a mechanism in `n` dimensions; `bodies`
+    are those of the `links`. Raises `SceneError` with both places.
+    """
+    moving = [(body, link.joint_place) for body, link in zip(bodies, links, strict=True)]
     acting = [(effect, f"effects[{i}]") for i, effect in enumerate(effects)]
-    n = scene.dimensions
     uses = [(p.name, "a parameter", p.place) for p in parameters]
     uses += [(c.name, "a coordinate", at) for body, at in moving for c in body.positions]
     uses += [(c.name, "a velocity", at) for body, at in moving for c in body.velocities]

@@ -1,14 +1,12 @@
 """What a scene says of directions, orientations and inertias, made sound or refused."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 from eomgen.errors import SceneError
 from eomgen.language.conditions import ROUNDING
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import with_components
-from eomgen.model.model import Model
 from eomgen.scalars.exact import sine_between
 from eomgen.scene.joints import Free, Joint
 from eomgen.scene.joints.base import Geared
@@ -18,11 +16,11 @@ PARALLEL = 1e-15
 """Sine of the angle below which two axes are as good as parallel: their last digits say which."""
 
 
-def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[str]) -> Joint:
+def normalised_joint(joint: Joint, place: str, dimensions: int) -> Joint:
     """A joint with vectors of the right length and axes that have a direction.
 
-    Adds a notice for every axis that is not of length 1. Raises `SceneError` for a joint that there
-    is not in this space, an axis of no length, parallel axes, limits upside down.
+    Raises `SceneError` for a joint that there is not in this space, an axis of no length, parallel
+    axes, limits upside down.
     """
     if dimensions not in joint.spaces:
         raise SceneError(
@@ -43,11 +41,11 @@ def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[
     if axis is not None:
         if joint.type == "revolute" and dimensions == 2:
             raise SceneError(f"{place}.axis: in the plane a pin turns about z; leave it out")
-        fields["axis"] = _direction(axis, f"{place}.axis", dimensions, notices)
+        fields["axis"] = _direction(axis, f"{place}.axis", dimensions)
     axes = getattr(joint, "axes", None)
     if axes is not None:
         first, second = (
-            _direction(a, f"{place}.axes[{i}]", dimensions, notices) for i, a in enumerate(axes)
+            _direction(a, f"{place}.axes[{i}]", dimensions) for i, a in enumerate(axes)
         )
         if sine_between(first, second) < PARALLEL:
             raise SceneError(f"{place}.axes: are parallel; give two that cross, or a revolute")
@@ -63,18 +61,23 @@ def straightened_joint(joint: Joint, place: str, dimensions: int, notices: list[
     return joint.replaced(**fields)
 
 
-def _direction(
-    axis: tuple[float, ...], place: str, dimensions: int, notices: list[str]
-) -> tuple[float, ...]:
+def _direction(axis: tuple[float, ...], place: str, dimensions: int) -> tuple[float, ...]:
     """The axis itself: rounded to length 1 it would no longer be what the scene says."""
     axis = with_components(axis, 0.0, dimensions, place)
     if not any(axis):
         raise SceneError(f"{place}: has no length; give a direction, for example {_example(axis)}")
-    if abs(math.hypot(*axis) - 1.0) > ROUNDING:
-        notices.append(
-            f"{place}: has length {math.hypot(*axis):g}; taken as a direction of length 1"
-        )
     return axis
+
+
+def lengths_noticed(joint: Joint, place: str) -> Iterator[str]:
+    """A line for every axis of a joint that is not of length 1."""
+    one = getattr(joint, "axis", None)
+    axes = {} if one is None else {"axis": one}
+    axes |= {f"axes[{i}]": axis for i, axis in enumerate(getattr(joint, "axes", None) or ())}
+    for key, axis in axes.items():
+        length = math.hypot(*axis)
+        if abs(length - 1.0) > ROUNDING:
+            yield f"{place}.{key}: has length {length:g}; taken as a direction of length 1"
 
 
 def _example(axis: Sequence[float]) -> str:
@@ -101,33 +104,3 @@ def entries_of_inertia(body: BodyTable, place: str, dimensions: int) -> tuple[Fo
     if given != ZERO:
         raise SceneError(f"{where} has one number; space takes [xx, yy, zz], or 0 for a particle")
     return (ZERO,) * 6
-
-
-def unit_quaternions(model: Model, given: Collection[object]) -> Model:
-    """The model with quaternions of length 1 at the start: 1, 0, 0, 0 where none is given.
-
-    `given` is the scene's own `initial.q`: a list of everything, or a table by name.
-
-    Adds a notice for each that was scaled. Raises `SceneError` for one of no length that was given.
-    """
-    q = list(model.initial_q)
-    names = [c.name for c in model.coordinates]
-    notices = list(model.notices)
-    for indices in model.quaternions:
-        parts = [q[i] for i in indices]
-        length = math.hypot(*parts)
-        if length == 0.0:
-            if not isinstance(given, Mapping) or any(names[i] in given for i in indices):
-                raise SceneError(
-                    f"initial.q: the quaternion from {names[indices[0]]} on has no length; "
-                    "give 1, 0, 0, 0 for no turn"
-                )
-            parts, length = [1.0, 0.0, 0.0, 0.0], 1.0
-        elif abs(length - 1.0) > ROUNDING:
-            notices.append(
-                f"initial.q: the quaternion from {names[indices[0]]} on has length {length:g}; "
-                "scaled to 1"
-            )
-        for i, part in zip(indices, parts, strict=True):
-            q[i] = part / length
-    return replace(model, initial_q=tuple(q), notices=tuple(notices))

@@ -1,7 +1,7 @@
 """The model: a scene whose every name is resolved; bodies in a tree, parents before children."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
@@ -16,8 +16,7 @@ from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import ExtraState, Input
 from eomgen.scene.joints import Free, Joint, Revolute
 from eomgen.scene.joints.base import Coordinate
-from eomgen.scene.look import Camera, Shape
-from eomgen.scene.schema import Form, LeftOut, Route, Simulation
+from eomgen.scene.schema import Form, LeftOut, Route
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,6 @@ class Body:
     parent: int
     positions: tuple[Coordinate, ...]
     velocities: tuple[Coordinate, ...]
-    shapes: tuple[Shape, ...]
 
     @property
     def plain(self) -> int:
@@ -79,6 +77,40 @@ class Prescribed:
         return self.by is None
 
 
+def prescribed_of(
+    bodies: Sequence[Body], effects: Iterable[Effect], locked: Mapping[str, float]
+) -> tuple[Prescribed, ...]:
+    """The coordinates that are no states: driven ones in the order of the bodies, then locked ones.
+
+    `locked` holds the values of those, by name.
+    """
+    drives = {e.joint: e for e in effects if isinstance(e, Driven)}
+    driven, fast = [], []
+    for body in bodies if drives or locked else ():
+        for x, v in zip(body.positions, body.velocities, strict=False):
+            if drive := drives.get(body.joint.name):
+                driven.append(Prescribed(x, v, drive.coordinate, drive.name))
+            elif x.name in locked:
+                fast.append(Prescribed(x, v, Constant(locked[x.name]), None))
+    return (*driven, *fast)
+
+
+def positions_of(
+    bodies: Iterable[Body], prescribed: Iterable[Prescribed]
+) -> tuple[Coordinate, ...]:
+    """The coordinates of bodies that are states, in order."""
+    given = {c.position.name for c in prescribed}
+    return tuple(c for body in bodies for c in body.positions if c.name not in given)
+
+
+def velocities_of(
+    bodies: Iterable[Body], prescribed: Iterable[Prescribed]
+) -> tuple[Coordinate, ...]:
+    """The velocities of bodies that are states, in order."""
+    given = {c.velocity.name for c in prescribed}
+    return tuple(c for body in bodies for c in body.velocities if c.name not in given)
+
+
 def ways_of(bodies: Iterable[Body], dimensions: int) -> dict[str, tuple[str, ...]]:
     """The joints that move but the free ones, each with the kinds of its moves."""
     return {
@@ -117,7 +149,9 @@ class Seat:
 
 @dataclass(frozen=True)
 class Model:
-    """A mechanism with everything that acts on it; see `elaborate`.
+    """A mechanism with everything that acts on it, as `elaborate` makes it of a scene.
+
+    It knows nothing of pictures, nor of integrators.
 
     `conditions` are what values of the parameters keep.
     `states` are those that effects bring along, after coordinates and velocities.
@@ -141,8 +175,6 @@ class Model:
     outputs: tuple[str, ...]
     form: Form
     route: Route
-    simulation: Simulation
-    camera: Camera
     locked: tuple[tuple[str, float], ...] = ()
     locked_deg: tuple[tuple[str, float], ...] = ()
     leave_out: tuple[LeftOut, ...] = ()
@@ -151,30 +183,19 @@ class Model:
     @cached_property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """The coordinates of the state, in the order of `q`."""
-        given = {c.position.name for c in self.prescribed}
-        return tuple(c for body in self.bodies for c in body.positions if c.name not in given)
+        return positions_of(self.bodies, self.prescribed)
 
     @cached_property
     def velocities(self) -> tuple[Coordinate, ...]:
         """The velocities of the state, in the order of `v`."""
-        given = {c.velocity.name for c in self.prescribed}
-        return tuple(c for body in self.bodies for c in body.velocities if c.name not in given)
+        return velocities_of(self.bodies, self.prescribed)
 
     @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:
         """The coordinates that are no states: driven ones in the order of the bodies, then locked
         ones.
         """
-        drives = {e.joint: e for e in self.effects if isinstance(e, Driven)}
-        values = dict(self.locked)
-        driven, locked = [], []
-        for body in self.bodies if drives or values else ():
-            for x, v in zip(body.positions, body.velocities, strict=False):
-                if drive := drives.get(body.joint.name):
-                    driven.append(Prescribed(x, v, drive.coordinate, drive.name))
-                elif x.name in values:
-                    locked.append(Prescribed(x, v, Constant(values[x.name]), None))
-        return (*driven, *locked)
+        return prescribed_of(self.bodies, self.effects, dict(self.locked))
 
     @property
     def driven(self) -> tuple[Prescribed, ...]:

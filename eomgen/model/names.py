@@ -1,15 +1,68 @@
 """Names of a scene: each is given once and known where it is used; bare numbers get one."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
-from eomgen.errors import SceneError, listed, nearest
+from eomgen.errors import SceneError
 from eomgen.language.base import Table
 from eomgen.language.conditions import Condition, require
 from eomgen.language.quantity import Parameter, name_quantities
 from eomgen.scene.joints.base import WORLD
 
 AnyTable = TypeVar("AnyTable", bound=Table)
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What the names in a scene's formulas stand for.
+
+    values   of the scene's own parameters, by name
+    moving   what changes with the motion: t, coordinates, velocities, inputs and states of effects
+    sliding  joints and coordinates that slide, whose quantities have the units of that; none as
+             long as there are no joints yet
+    """
+
+    values: Mapping[str, float]
+    moving: tuple[str, ...]
+    sliding: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Bindings:
+    """What the quantities of tables bring along: parameters, of which each bare number makes one,
+    and the conditions that values keep.
+    """
+
+    parameters: tuple[Parameter, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+
+    def values(self, scope: Scope) -> dict[str, float]:
+        """The values of all parameters that these quantities may name."""
+        return {**scope.values, **{p.name: p.default for p in self.parameters}}
+
+
+def joined(parts: Iterable[Bindings]) -> Bindings:
+    """All of them as one, in order."""
+    found = list(parts)
+    return Bindings(
+        tuple(p for part in found for p in part.parameters),
+        tuple(c for part in found for c in part.conditions),
+    )
+
+
+def bind(table: AnyTable, prefix: str, place: str, scope: Scope) -> tuple[AnyTable, Bindings]:
+    """A table with each bare number as a parameter, named after `prefix`, and what that brings.
+
+    Raises `SceneError`, naming the `place`, for a name that is not in scope, and for a value that
+    does not keep its conditions.
+    """
+    fields, parameters, conditions = name_quantities(
+        table, prefix, place, scope.values, scope.moving, scope.sliding
+    )
+    bindings = Bindings(tuple(parameters), tuple(conditions))
+    require(conditions, bindings.values(scope))
+    return table.replaced(**fields), bindings
 
 
 def check_names(tables: Sequence[tuple[str, str]]) -> None:
@@ -23,33 +76,3 @@ def check_names(tables: Sequence[tuple[str, str]]) -> None:
         seen[name] = place
         if name == WORLD and place.startswith("bodies"):
             raise SceneError(f"{place}.name: '{WORLD}' is the ground; choose another name")
-
-
-def check_known(name: str, place: str, known: Collection[str], what: str) -> None:
-    """Raise `SceneError` unless a name is one of those `known`, of a `what`."""
-    if name not in known:
-        hint = nearest(name, known) or f"; known: {listed(known) or 'none'}"
-        raise SceneError(f"{place}: no {what} is named '{name}'{hint}")
-
-
-def named(
-    table: AnyTable,
-    prefix: str,
-    place: str,
-    known: dict[str, float],
-    parameters: list[Parameter],
-    conditions: list[Condition],
-    motion: Sequence[str],
-    sliding: Collection[str] = (),
-) -> AnyTable:
-    """A table with its bare numbers as parameters, which are added to `parameters`; what its values
-    are to keep is added to `conditions`.
-
-    The other arguments are those of `name_quantities`. Raises `SceneError` for what that does, and
-    for a value that does not keep its conditions.
-    """
-    fields, new, kept = name_quantities(table, prefix, place, known, motion, sliding)
-    require(kept, {**known, **{p.name: p.default for p in new}})
-    parameters += new
-    conditions += kept
-    return table.replaced(**fields)

@@ -1,4 +1,4 @@
-"""What is given and not found: initial values, and coordinates that are driven or locked."""
+"""Coordinates whose motion is given: driven by a formula, or locked."""
 
 import math
 from collections.abc import Sequence
@@ -6,41 +6,20 @@ from collections.abc import Sequence
 from eomgen.errors import SceneError, listed, nearest
 from eomgen.language.formula import names_in
 from eomgen.language.rates import with_rates
-from eomgen.model.model import Body, Prescribed
+from eomgen.model.model import Body
+from eomgen.model.names import Scope
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.joints.base import Coordinate
 
 
-def initial_values(
-    given: Sequence[float] | dict[str, float],
-    coordinates: Sequence[Coordinate],
-    place: str,
-    prescribed: Sequence[Prescribed],
-) -> tuple[float, ...]:
-    """The values of coordinates or velocities, in order: 0 for what a table does not name.
-
-    Raises `SceneError`, naming the `place`, for names that are not there or `prescribed`.
-    """
-    names = [c.name for c in coordinates]
-    if not isinstance(given, dict):
-        if len(given) != len(names):
-            raise SceneError(
-                f"{place}: has {len(given)} numbers for {len(names)} coordinates; "
-                f"give one each for {listed(names)}"
-            )
-        return tuple(float(x) for x in given)
-    reasons = _reasons(prescribed)
-    for key in given:
-        if why := reasons.get(key) or reasons.get(key.removesuffix("_deg")):
-            raise SceneError(f"{place}.{key}: {why}; leave it out")
-    return tuple((dict.fromkeys(names, 0.0) | _by_name(given, coordinates, place)).values())
-
-
-def _by_name(
+def values_by_name(
     given: dict[str, float], coordinates: Sequence[Coordinate], place: str
 ) -> dict[str, float]:
-    """The values of a table by the names of coordinates, some of them in degrees."""
+    """The values of a table by the names of coordinates, some of them in degrees.
+
+    Raises `SceneError`, naming the `place`, for a name that is not there, or that is given twice.
+    """
     names = [c.name for c in coordinates]
     degrees = {f"{c.name}_deg": c.name for c in coordinates if c.unit in ("rad", "rad/s")}
     values: dict[str, float] = {}
@@ -57,15 +36,6 @@ def _by_name(
     return values
 
 
-def _reasons(prescribed: Sequence[Prescribed]) -> dict[str, str]:
-    """Why each coordinate or velocity that is no state has no initial value."""
-    return {
-        name: f"'{c.position.name}' is {'locked' if c.locked else f'driven by {c.by!r}'}"
-        for c in prescribed
-        for name in (c.position.name, c.velocity.name)
-    }
-
-
 def locked_values(
     given: dict[str, float], bodies: Sequence[Body], effects: Sequence[Effect]
 ) -> dict[str, float]:
@@ -73,7 +43,7 @@ def locked_values(
 
     Raises `SceneError` for one that is not there, is part of a quaternion, or is driven.
     """
-    values = _by_name(given, [c for body in bodies for c in body.positions], "locked")
+    values = values_by_name(given, [c for body in bodies for c in body.positions], "locked")
     driven = {effect.joint: effect.name for effect in effects if isinstance(effect, Driven)}
     for body in bodies:
         for i, c in enumerate(body.positions):
@@ -95,12 +65,10 @@ def check_drive(
     place: str,
     bodies: Sequence[Body],
     before: Sequence[Effect],
-    known: dict[str, float],
-    motion: Sequence[str],
+    scope: Scope,
 ) -> None:
     """A coordinate follows one formula, of time and parameters, and is finite at the start.
 
-    `known` holds the values of parameters, `motion` names all that a formula of the motion may use.
     Raises `SceneError` for any other.
     """
     for other in before:
@@ -115,15 +83,15 @@ def check_drive(
                 f"{place}.coordinate: '{name}' is the motion that it gives, which is circular; "
                 "use t and parameters"
             )
-        if name in motion and name not in known and name != "t":
+        if name in scope.moving and name not in scope.values and name != "t":
             raise SceneError(
                 f"{place}.coordinate: '{name}' is found only as it moves, and a drive is fixed "
                 "beforehand; use t and parameters"
             )
-        if name not in known and name != "t":
+        if name not in scope.values and name != "t":
             return  # unknown, which is said where all such names are
     try:
-        start = with_rates(drive.coordinate, known, 0.0, FloatScalars())
+        start = with_rates(drive.coordinate, scope.values, 0.0, FloatScalars())
     except (ArithmeticError, ValueError):
         start = (math.nan, math.nan, math.nan)
     if not all(map(math.isfinite, start)):

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from eomgen.model.model import Model
 
@@ -36,7 +36,7 @@ def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str
         START: (model.initial_q, model.initial_v, model.states),
     }
     for body in model.bodies:
-        parts[f"body '{body.name}'"] = replace(body, shapes=())
+        parts[f"body '{body.name}'"] = body
     for point in model.points:
         parts[f"point '{point.name}'"] = point
     for effect in model.effects:

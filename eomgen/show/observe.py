@@ -10,6 +10,7 @@ from eomgen.language.formula import Formula
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.appearance import Appearance
 from eomgen.scene.joints.base import WORLD
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.motion import Anchor, Motion
@@ -38,10 +39,11 @@ def observe(
     model: Model,
     module: GeneratedModule,
     trajectory: Trajectory,
+    appearance: Appearance,
     inputs: Mapping[str, float] | None = None,
 ) -> Motion:
     """What a figure or a page shows of a run, at the values of the model's parameters and those of
-    the `inputs` that are not 0.
+    the `inputs` that are not 0; `appearance` is that of the model's scene.
     """
     columns = trajectory.y.T
     p = {parameter.name: parameter.default for parameter in model.parameters}
@@ -64,13 +66,13 @@ def observe(
         units=tuple(module.UNITS[name] for name in trajectory.states),
         positions=module.POSITIONS,
         bodies=module.BODIES,
-        shapes=shapes_of(model),
+        shapes=shapes_of(model, appearance),
         joints=tuple(joint.name for _, joint in _joints(model, HOLDING)),
         poses=poses,
         kinetic_energy=kinetic,
         potential_energy=potential,
         joint_drift=drift,
-        camera=model.camera,
+        camera=appearance.camera,
         integrator=trajectory.integrator,
         finished=trajectory.finished,
         message=trajectory.message,

@@ -5,6 +5,7 @@ from statistics import median
 
 from eomgen.language.formula import Formula
 from eomgen.model.model import Model
+from eomgen.scene.appearance import Appearance
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.look import Box, Rod, Shape
@@ -15,12 +16,14 @@ DRAWN = (1e-90, 1e90)
 """Lengths between these, m, are drawn; of what is beyond, a dot is left."""
 
 
-def shapes_of(model: Model) -> tuple[tuple[Shape, ...], ...]:
+def shapes_of(model: Model, appearance: Appearance) -> tuple[tuple[Shape, ...], ...]:
     """The shapes of every body, its own or those that stand for it, at the scene's parameters."""
     arms = _arms(model)
-    size = _size(model, arms)
+    own = _size(model, arms)
+    size = appearance.camera.height / 10 if own is None else own
     return tuple(
-        body.shapes or _skeleton(arms[body.name], model.dimensions, size) for body in model.bodies
+        appearance.shapes.get(body.name) or _skeleton(arms[body.name], model.dimensions, size)
+        for body in model.bodies
     )
 
 
@@ -40,15 +43,15 @@ def _arms(model: Model) -> dict[str, list[tuple[float, ...]]]:
     return arms
 
 
-def _size(model: Model, arms: dict[str, list[tuple[float, ...]]]) -> float:
-    """A length of the mechanism, m: of its arms, or of what turns, or of what the camera sees."""
+def _size(model: Model, arms: dict[str, list[tuple[float, ...]]]) -> float | None:
+    """A length of the mechanism, m: of its arms, or of what turns; None where it has none."""
     lengths = [math.hypot(*point) for points in arms.values() for point in points]
     if lengths:
         return median(lengths)
     masses = [model.value(body.mass) for body in model.bodies]
     moments = [max(map(model.value, body.inertia_com)) for body in model.bodies]
     gyrations = [math.sqrt(i / m) for i, m in zip(moments, masses, strict=True) if i > 0 and m > 0]
-    return 2.0 * median(gyrations) if gyrations else model.camera.height / 10
+    return 2.0 * median(gyrations) if gyrations else None
 
 
 def _skeleton(arms: list[tuple[float, ...]], dimensions: int, size: float) -> tuple[Shape, ...]:

@@ -61,10 +61,11 @@ class Truth:
 
 def prepared(scene: str, own: bool, folder: Path, seconds: float) -> tuple[Case, Truth]:
     """A scene's own run, at its own parameters, and what it is compared with."""
-    model = elaborate(parse_scene(text(scene)) if own else read_scene(scene))
+    tables = parse_scene(text(scene)) if own else read_scene(scene)
+    model, wanted = elaborate(tables), tables.simulation
     module = load_module(generated_code(model).module, model.name)
-    t_end = model.simulation.t_end
-    kept = {"rest_speed": model.simulation.rest_speed, "samples": 1001}
+    t_end = wanted.t_end
+    kept = {"rest_speed": wanted.rest_speed, "samples": 1001}
     problem, moved = as_problem(module, model=model), moved_problem(module, model=model)
     case = Case(problem, t_end, module.UNITS, kept, moved=moved)
     end = closed_end(scene) if own else None

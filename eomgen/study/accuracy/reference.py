@@ -111,6 +111,7 @@ def reference(
     seconds: float = SECONDS,
     folder: Path | None = None,
     doubles: bool = True,
+    rest_speed: float | None = None,
 ) -> Reference:
     """The motion of a module from 0 to `t_end`, s, at given parameters and constant inputs.
 
@@ -120,13 +121,13 @@ def reference(
     folder    where references are kept, so that none is computed twice; or None. One that cannot
               be trusted, read or written (`eomgen.entries`) is done without
     doubles   whether they may stand in where there is no run in long numbers
+    rest_speed  below which rigid contacts do not bounce; None for what `integrate` takes
 
     Raises `RunError` if the module refuses parameters or inputs, if the motion does not get to
     `t_end`, or if doubles would stand in that may not.
     """
     problem = as_problem(module, parameters, inputs, model)
     told = progress or _ignore
-    rest_speed = model.simulation.rest_speed if model else None
     key = _key(module, problem, parameters, inputs, t_end, seconds, rest_speed)
     entries = folder and Entries(folder)
     kept = entries and _kept(entries.get(key))

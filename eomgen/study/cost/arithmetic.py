@@ -20,7 +20,7 @@ from eomgen.model.model import Model
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
 from eomgen.scalars.extended import DIGITS
-from eomgen.scene.schema import Route
+from eomgen.scene.schema import Route, Simulation
 from eomgen.study.cost.single import in_single, kernel_in_single
 from eomgen.study.timing import least_seconds
 from eomgen.study.verification.routes import Made, compiled, loaded, velocities
@@ -112,14 +112,15 @@ class Arithmetic:
 
 def arithmetic(
     model: Model,
+    wanted: Simulation,
     *,
     states: int | None = None,
     seed: int = 0,
     single: bool = False,
     progress: Progress = lambda fraction: None,
 ) -> Arithmetic:
-    """Judge all ways to v̇ at `states` seeded states and as many of the scene's own run; with
-    `single` in float32, too, at the same states rounded to that.
+    """Judge all ways to v̇ at `states` seeded states and as many of the scene's own run, the one
+    `wanted`; with `single` in float32, too, at the same states rounded to that.
 
     A model of momentum form is judged in its velocity form.
 
@@ -137,7 +138,12 @@ def arithmetic(
     truth = Truth(model)
     count = states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
     samples, truths = judging_states(
-        truth, ways[taken.route].module, count, seed, lambda part: progress(0.2 + 0.4 * part)
+        truth,
+        wanted,
+        ways[taken.route].module,
+        count,
+        seed,
+        lambda part: progress(0.2 + 0.4 * part),
     )
     agreed = min(agreement(truth, *pair) for pair in zip(samples, truths, strict=True))
     if agreed < AGREED:

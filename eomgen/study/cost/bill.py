@@ -17,7 +17,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
-from eomgen.scene.schema import Route, Scene
+from eomgen.scene.schema import Route, Scene, Simulation
 from eomgen.study.cost.omission import Change, Run, change, extent, run
 from eomgen.study.cost.variants import Kind, Variant, bare, counted
 from eomgen.study.timing import least_and_spread
@@ -142,7 +142,7 @@ def bill(
     changes: list[Change | None] = [None] * len(parts)
     if motion:
         told = partial(_part_of, progress, 1.5, 2.5)
-        size, changes = _changes(whole, parts, changed, motion, told)
+        size, changes = _changes(whole, parts, changed, scene.simulation, motion, told)
     return Bill(
         name=whole.model.name,
         route=whole.route,
@@ -157,7 +157,7 @@ def bill(
             _route_cost(route, words, whole if route == whole.route else other)
             for (route, (_, words)), other in zip(tries.items(), other_routes, strict=True)
         ),
-        t_end=whole.model.simulation.t_end,
+        t_end=scene.simulation.t_end,
         extent=size,
         at_contacts={name: cost[name]["total"] for name in AT_CONTACTS if name in cost},
     )
@@ -236,6 +236,7 @@ def _changes(
     whole: _Made,
     parts: Sequence[Variant],
     changed: Sequence[_Made | None],
+    wanted: Simulation,
     seconds: float,
     progress: Progress,
 ) -> tuple[float, list[Change | None]]:
@@ -251,7 +252,7 @@ def _changes(
         nonlocal done
         before, done = done, done + 1
         told = partial(_part_of, progress, before, count)
-        return run(made.model, made.module, next(shares), until, told)
+        return run(wanted, made.module, next(shares), until, told)
 
     base = ran(whole, inf)
     size = extent(whole.model, base)

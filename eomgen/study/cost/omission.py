@@ -21,6 +21,7 @@ from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress
+from eomgen.scene.schema import Simulation
 
 SMALL = 0.01
 """Part of the extent beyond which a motion counts as changed."""
@@ -73,14 +74,13 @@ class Change:
 
 
 def run(
-    model: Model, module: GeneratedModule, seconds: float, until: float, progress: Progress
+    wanted: Simulation, module: GeneratedModule, seconds: float, until: float, progress: Progress
 ) -> Run:
     """A scene's own run, its inputs at 0, for `seconds` of wall time or up to `until` of its own.
 
-    The scene's integrator and step are used, its tolerances down to `FINEST`, which will do for
+    The integrator and step `wanted` are used, its tolerances down to `FINEST`, which will do for
     fractions of a percent. The module needs its derivative and `body_poses` only.
     """
-    wanted = model.simulation
     fixed = isinstance(find_integrator(wanted.integrator), FixedStep)
     trajectory = integrate(
         _timed(module, time.perf_counter() + seconds, until),

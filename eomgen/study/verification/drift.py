@@ -13,6 +13,7 @@ from eomgen.run.module import GeneratedModule, as_powers, as_problem
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.schema import Simulation
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.laws import AXES, Kept, kept
 from eomgen.study.verification.visited import ENOUGH
@@ -50,12 +51,13 @@ class Drift:
 
 def drift(
     model: Model,
+    wanted: Simulation,
     module: GeneratedModule,
     full: Any,
     states: Sequence[State],
     progress: Progress = lambda _: None,
 ) -> Drift:
-    """Run a module from its initial state, at most `MOST_TIME` and no further than the scene says;
+    """Run a module from its initial state, at most `MOST_TIME` and no further than is `wanted`;
     `full` is one that has energies, momentum and powers. What exact motion keeps is asked at some
     `states`, and where the run's energy changes the most: there something may act for a while only.
 
@@ -76,12 +78,12 @@ def drift(
     run = integrate(
         replace(problem, derivative=derivative),
         METHOD,
-        min(model.simulation.t_end, MOST_TIME),
+        min(wanted.t_end, MOST_TIME),
         rtol=RTOL,
         atol=RTOL * 1e-3,
         samples=101,
         progress=progress,
-        rest_speed=model.simulation.rest_speed,
+        rest_speed=wanted.rest_speed,
         powers=None if model.leave_out else as_powers(full),  # else energy is not kept
     )
     if run.outcome.kind == "interrupted":

@@ -14,6 +14,7 @@ from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Problem
 from eomgen.run.progress import Progress
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.schema import Simulation
 from eomgen.study.accuracy.reference import ROWS, Reference, TooLongError, paced, reference
 
 PARTED = 0.01
@@ -54,6 +55,7 @@ class Horizon:
 
 def horizon(
     model: Model,
+    wanted: Simulation,
     module: GeneratedModule,
     parameters: Any = None,
     inputs: Any = None,
@@ -63,12 +65,13 @@ def horizon(
 ) -> Horizon:
     """Compare the scene's own run, held as tight as doubles go, with the motion in long numbers.
 
+    wanted   how the scene is to be run
     seconds  of processor time that the long numbers may take, and each run in doubles
 
     Raises `RunError` where contacts strike or where that time does not suffice, which leaves
     nothing to compare with, and where a run does not get to its end.
     """
-    t_end = model.simulation.t_end
+    t_end = wanted.t_end
     problem = as_problem(module, parameters, inputs, model)
     if problem.contacts is not None:
         raise RunError("horizon: rigid contacts strike, and there is no run in long numbers then")
@@ -80,6 +83,7 @@ def horizon(
             inputs,
             t_end,
             seconds=seconds,
+            rest_speed=wanted.rest_speed,
             progress=lambda part: progress(0.9 * part),
             doubles=False,
         )

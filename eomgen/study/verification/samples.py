@@ -11,6 +11,7 @@ from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
 from eomgen.scalars.extended import DIGITS
+from eomgen.scene.schema import Simulation
 from eomgen.study.verification.states import random_state
 from eomgen.study.verification.truth import Exact, Truth
 from eomgen.study.verification.visited import visited
@@ -38,17 +39,22 @@ class Sample:
 
 
 def judging_states(
-    truth: Truth, module: GeneratedModule, count: int, seed: int, progress: Progress
+    truth: Truth,
+    wanted: Simulation,
+    module: GeneratedModule,
+    count: int,
+    seed: int,
+    progress: Progress,
 ) -> tuple[list[Sample], list[Exact]]:
-    """`count` seeded states, about as many of the scene's own run, and the truth at each; those
-    left out that have none.
+    """`count` seeded states, about as many of the scene's own run, which is the one `wanted`, and
+    the truth at each; those left out that have none.
 
     Raises `RunError` if the scene cannot start, or if no state has any.
     """
-    rng, t_end = np.random.default_rng(seed), truth.model.simulation.t_end
+    rng, t_end = np.random.default_rng(seed), wanted.t_end
     y = np.array([random_state(module, rng) for _ in range(count)])
     seeded = Sample(SEEDED, rng.uniform(0.0, t_end, count), y)
-    run = visited(truth.model, module, count, lambda part: progress(0.3 * part))
+    run = visited(truth.model, wanted, module, count, lambda part: progress(0.3 * part))
     samples, truths = [], []
     for k, sample in enumerate((seeded, Sample(OWN, run.t, run.y, until=run.until))):
         true = truth(sample.t, sample.y)

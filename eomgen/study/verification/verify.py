@@ -16,7 +16,7 @@ from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
-from eomgen.scene.schema import Route
+from eomgen.scene.schema import Route, Simulation
 from eomgen.store import generated_code
 from eomgen.study.verification.bounds import (
     OWN,
@@ -91,6 +91,7 @@ class Verified:
 
 def verify(
     model: Model,
+    wanted: Simulation,
     *,
     states: int | None = None,
     seed: int = 0,
@@ -100,6 +101,7 @@ def verify(
 ) -> Verified:
     """Verify the module that a model is compiled to by its route.
 
+    wanted  how the scene is to be run: some states are those of such a run
     states  how many seeded states of each kind (8, 2 if there are many velocities)
     bound   what the forward error may be at most, ulps, whatever the data do
     module  another one to verify in its place
@@ -116,8 +118,8 @@ def verify(
     module = modules[taken]
     bare = replace(model, outputs=())
     truth, count = Truth(bare), states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
-    asked = hard_states(module, len(model.velocities), count, seed, model.simulation.t_end)
-    run = visited(model, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
+    asked = hard_states(module, len(model.velocities), count, seed, wanted.t_end)
+    run = visited(model, wanted, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
     asked += _states(run, module)
     found = []
     for k, state in enumerate(asked):
@@ -132,7 +134,7 @@ def verify(
     # What acts for a while only, as a contact does, is met by the run alone.
     telling = [one.state for one in firsts if one.state.kind in ("random", "still")]
     telling += [one.state for one in there if one.state.kind == OWN]
-    ran = drift(model, module, full, telling, lambda part: progress(0.88 + 0.12 * part))
+    ran = drift(model, wanted, module, full, telling, lambda part: progress(0.88 + 0.12 * part))
     ulps = {route: forward_ulps(there, route, bare) for route in modules}
     data = in_ulps(np.array([one.data for one in there]), there, bare)
     checks = (

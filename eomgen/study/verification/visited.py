@@ -10,6 +10,7 @@ from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
+from eomgen.scene.schema import Simulation
 
 MOST_OPERATIONS = 20_000_000
 """Of all derivatives of a run together: seconds at most, and the same on every machine."""
@@ -26,9 +27,14 @@ class Visited:
 
 
 def visited(
-    model: Model, module: GeneratedModule, count: int, progress: Progress = lambda _: None
+    model: Model,
+    wanted: Simulation,
+    module: GeneratedModule,
+    count: int,
+    progress: Progress = lambda _: None,
 ) -> Visited:
-    """About `count` states at which the scene's own integrator asks for the derivative.
+    """About `count` states at which the scene's own integrator, the one `wanted`, asks for the
+    derivative.
 
     They lie evenly among its calls, so that where it has to take many small steps there are many;
     those of an adaptive method are closer to the motion than anyone looks. A run that takes too
@@ -36,7 +42,7 @@ def visited(
 
     Raises `RunError` if the module has no derivative to start from.
     """
-    problem, wanted = as_problem(module, model=model), model.simulation
+    problem = as_problem(module, model=model)
     keep = _Keep(count, most=1 + MOST_OPERATIONS // max(1, module.COST["derivative"]["total"]))
 
     def derivative(t: float, y: Floats) -> Floats:

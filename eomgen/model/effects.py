@@ -1,15 +1,15 @@
 """From what a scene says of effects to effects that act: what they name is there and fits them."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from eomgen.errors import SceneError
-from eomgen.language.conditions import Condition, require
+from eomgen.errors import SceneError, check_known
+from eomgen.language.conditions import require
 from eomgen.language.formula import ZERO
-from eomgen.language.quantity import Parameter, about_slides, of_joint, with_components
+from eomgen.language.quantity import about_slides, of_joint, with_components
 from eomgen.model.model import Body, ways_of
-from eomgen.model.names import check_known, check_names, named
+from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import check_drive
 from eomgen.scene.effects import Driven, Effect, Gravity
 from eomgen.scene.effects.base import ExtraState, Input
@@ -20,16 +20,27 @@ from eomgen.scene.schema import Scene
 Given = TypeVar("Given", Input, ExtraState)
 
 
-def sliding_in(bodies: Sequence[Body], dimensions: int) -> set[str]:
+def sliding_in(bodies: Sequence[Body], dimensions: int) -> frozenset[str]:
     """Joints and coordinates that slide."""
     found = {body.joint.name for body in bodies if isinstance(body.joint, Prismatic)}
     for body in bodies:
         pairs = zip(body.positions, body.joint.moves(dimensions), strict=False)
         found |= {c.name for c, move in pairs if move.kind == "slide"}
-    return found
+    return frozenset(found)
 
 
-def at_joint(given: Given, effect: Effect, sliding: Collection[str]) -> Given:
+def inputs_and_states(
+    effects: Iterable[Effect], scope: Scope, dimensions: int
+) -> tuple[tuple[Input, ...], tuple[ExtraState, ...]]:
+    """What effects take from outside and what they remember, in the units of their joints."""
+    inputs, states = [], []
+    for effect in effects:
+        inputs += [_at_joint(x, effect, scope.sliding) for x in effect.inputs(dimensions)]
+        states += [_at_joint(x, effect, scope.sliding) for x in effect.states(dimensions)]
+    return tuple(inputs), tuple(states)
+
+
+def _at_joint(given: Given, effect: Effect, sliding: Collection[str]) -> Given:
     """An input or state of an effect, in the unit and words for its joint if it has one."""
     here = about_slides(effect, sliding)
     if here is None:
@@ -38,21 +49,13 @@ def at_joint(given: Given, effect: Effect, sliding: Collection[str]) -> Given:
     return replace(given, unit=unit, about=about)
 
 
-def acting_effects(
-    scene: Scene,
-    bodies: Sequence[Body],
-    sliding: Collection[str],
-    known: dict[str, float],
-    parameters: list[Parameter],
-    conditions: list[Condition],
-    motion: Sequence[str],
-) -> list[Effect]:
-    """Effects with bodies, points and joints that there are, and vectors of the right length.
+def effects_in_force(
+    scene: Scene, bodies: Sequence[Body], scope: Scope
+) -> tuple[tuple[Effect, ...], Bindings]:
+    """Effects with bodies, points and joints that there are, and vectors of the right length; and
+    what their quantities bring.
 
-    `sliding` are the joints and coordinates that slide; `known` holds the values of the scene's
-    own parameters, `motion` names what changes as it moves; `parameters` grows by those of bare
-    numbers, `conditions` by what values are to keep. Raises `SceneError`, naming the place, for an
-    effect that cannot act.
+    Raises `SceneError`, naming the place, for an effect that cannot act.
     """
     check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
     ways = ways_of(bodies, scene.dimensions)
@@ -60,19 +63,12 @@ def acting_effects(
     there = _there(scene, bodies, ways)
     types = {b.joint.name: b.joint.type for b in bodies}
     effects: list[Effect] = []
+    found: list[Bindings] = []
     for i, effect in enumerate(scene.effects):
         place = f"effects[{i}]"
         if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
             raise SceneError(f"{place}.type: a second 'gravity'; give one")
-        for fields, (what, names) in there.items():
-            for name, spot in _names_in(effect, getattr(effect, fields), place):
-                if "joint" in what and name in types and name not in names:
-                    one = what if fields == "joint_fields" else f"{what} and is not free"
-                    raise SceneError(
-                        f"{spot}: '{name}' is a {types[name]} joint, which '{effect.type}' does "
-                        f"not act on; name a {one}"
-                    )
-                check_known(name, spot, names, what)
+        _check_names_in(effect, place, there, types)
         effect.check_ways(ways, names_of_ways, place)
         vectors = {
             field: with_components(value, ZERO, scene.dimensions, f"{place}.{field}")
@@ -81,13 +77,13 @@ def acting_effects(
         }
         effect = effect.replaced(**vectors).checked(scene.dimensions, place)
         if isinstance(effect, Driven):
-            check_drive(effect, place, bodies, effects, known, motion)
-        effect = named(effect, effect.name, place, known, parameters, conditions, motion, sliding)
-        together = list(effect.conditions(place))
-        require(together, {**known, **{p.name: p.default for p in parameters}})
-        conditions += together
+            check_drive(effect, place, bodies, effects, scope)
+        effect, bindings = bind(effect, effect.name, place, scope)
+        together = tuple(effect.conditions(place))
+        require(together, bindings.values(scope))
+        found += [bindings, Bindings(conditions=together)]
         effects.append(effect)
-    return effects
+    return tuple(effects), joined(found)
 
 
 def check_contacts(effects: Sequence[Effect], bodies: Sequence[str]) -> None:
@@ -116,6 +112,26 @@ def _there(
         "joint_fields": ("revolute or prismatic joint", dict.fromkeys(own)),
         "way_fields": ("joint that moves", ways),
     }
+
+
+def _check_names_in(
+    effect: Effect,
+    place: str,
+    there: Mapping[str, tuple[str, Collection[str]]],
+    types: Mapping[str, str],
+) -> None:
+    """Raise `SceneError` for a name in an effect that is not `there`, or a joint of another type
+    than it acts on; `types` are those of the joints.
+    """
+    for fields, (what, names) in there.items():
+        for name, spot in _names_in(effect, getattr(effect, fields), place):
+            if "joint" in what and name in types and name not in names:
+                one = what if fields == "joint_fields" else f"{what} and is not free"
+                raise SceneError(
+                    f"{spot}: '{name}' is a {types[name]} joint, which '{effect.type}' does "
+                    f"not act on; name a {one}"
+                )
+            check_known(name, spot, names, what)
 
 
 def _names_in(effect: Effect, fields: Sequence[str], place: str) -> Iterator[tuple[str, str]]:
