@@ -22,12 +22,13 @@ from eomgen.model.elaborate import elaborate, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
 from eomgen.results import Derivation, Module, Run
-from eomgen.run.module import GeneratedModule, as_powers, as_problem, load_module
+from eomgen.run.module import GeneratedModule, as_powers, load_module
 from eomgen.run.problem import Floats
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.reader import parse_scene, read_scene, read_tables
 from eomgen.scene.schema import SHOWN, Form, Route, Scene, Simulation
 from eomgen.store import Code, generated_code
+from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
     from eomgen.linear.linearise import Linearisation
@@ -178,7 +179,7 @@ def simulate(
     functions = load(module)
     values = (given or None, pushes or None)
     case = Case(
-        as_problem(functions, *values, model),
+        problem_of(functions, *values, model),
         wanted.t_end if t_end is None else t_end,
         functions.UNITS,
         {"samples": samples, "max_step": max_step, "rest_speed": wanted.rest_speed},
@@ -231,7 +232,7 @@ def linearise(
     given = named(parameters, model.defaults, "parameters", "parameter")
     pushes = named(inputs, [i.name for i in model.inputs], "inputs", "input")
     functions = load(module_of(generated_code(model), model))
-    y = as_problem(functions, given or None, pushes or None, model).initial.copy()
+    y = problem_of(functions, given or None, pushes or None, model).initial.copy()
     for name, value in named(state, functions.STATES, "state", "state").items():
         y[functions.STATES.index(name)] = value
     for indices in map(list, functions.QUATERNIONS):

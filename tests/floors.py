@@ -33,6 +33,7 @@ FLOORS = (
     "run",
     "precision",
     "linear",
+    "study.diagnosis",
     "study.timing",
     "study.accuracy",
     "study.verification",

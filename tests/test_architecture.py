@@ -47,6 +47,13 @@ def test_the_drawing_is_fresh() -> None:
     assert DRAWING.read_text("utf-8") == drawing()
 
 
+def test_what_runs_knows_no_mechanics() -> None:
+    """It is handed a module, and whatever explains a failure: no model, dynamics or derivation."""
+    for name in modules():
+        for other in imports(name) if name and room(name) == "run" else ():
+            assert room(other) in ("run", "text", "errors", "files"), f"{name} imports {other}"
+
+
 def test_the_running_half_does_without_sympy() -> None:
     """Loading, integrating, drawing: SymPy is neither needed nor imported."""
     code = (

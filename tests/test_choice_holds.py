@@ -33,6 +33,7 @@ from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.moved import moved, moved_problem
 from eomgen.study.accuracy.reference import reference
 from eomgen.study.accuracy.trial import Case, Setting, Tried
+from eomgen.study.diagnosis import problem_of
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 
@@ -48,7 +49,7 @@ def case_of(scene: str, t_end: float | None = None, **kept: Any) -> Case:
     """A scene's run, as the command makes it."""
     model, module, wanted = made(scene)
     kept = {"samples": 1001, "rest_speed": wanted.rest_speed, **kept}
-    problem, twin = as_problem(module, model=model), moved_problem(module, model=model)
+    problem, twin = problem_of(module, model=model), moved_problem(module, model=model)
     return Case(problem, t_end or wanted.t_end, module.UNITS, kept, moved=twin)
 
 

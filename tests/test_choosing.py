@@ -13,7 +13,7 @@ from campaign import some
 from eomgen.cli import main
 from eomgen.model.elaborate import elaborate
 from eomgen.run.checks import SMALLEST_RTOL
-from eomgen.run.module import as_problem, load_module
+from eomgen.run.module import load_module
 from eomgen.run.problem import Contacts, Floats, Problem
 from eomgen.run.trajectory import COUNTS, Trajectory
 from eomgen.scene.reader import parse_scene, read_scene
@@ -26,6 +26,7 @@ from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.moved import moved_problem
 from eomgen.study.accuracy.reference import Reference, reference
 from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
+from eomgen.study.diagnosis import problem_of
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 
@@ -70,7 +71,7 @@ def case_of(scene: str) -> Case:
     model, wanted = elaborate(tables), tables.simulation
     module = load_module(generated_code(model).module, model.name)
     kept = {"samples": 1001, "rest_speed": wanted.rest_speed}
-    problem = as_problem(module, model=model)
+    problem = problem_of(module, model=model)
     moved = moved_problem(module, model=model)
     return Case(problem, wanted.t_end, module.UNITS, kept, moved=moved)
 
@@ -82,9 +83,10 @@ def truth(case: Case, integrator: str = "DOP853", rtol: float = SMALLEST_RTOL) -
 
 def in_long_numbers(scene: str, t_end: float | None = None) -> Reference:
     """The motion of a built-in scene to more digits than doubles have."""
-    model = elaborate(read_scene(scene))
+    tables = read_scene(scene)
+    model = elaborate(tables)
     module = load_module(generated_code(model).module, model.name)
-    return reference(model, module, t_end=t_end or model.simulation.t_end)
+    return reference(model, module, t_end=t_end or tables.simulation.t_end)
 
 
 def motion(t: Floats, y: Floats) -> Trajectory:

@@ -17,9 +17,10 @@ from eomgen.language.formula import Constant, Formula, evaluate, parse
 from eomgen.model.elaborate import elaborate
 from eomgen.program.tape import Tape
 from eomgen.run.integrate import integrate
-from eomgen.run.module import as_problem, load_module
+from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import parse_scene
+from eomgen.study.diagnosis import problem_of
 
 TURNED = """
 name = "turned"
@@ -385,6 +386,6 @@ def test_a_step_far_too_long_is_tried_again() -> None:
 
     module.derivative = noted
     for p in (None, {"a": 1.0}):
-        run = integrate(as_problem(module, p, model=made.model), "RK45", 0.005, rtol=1e-3)
+        run = integrate(problem_of(module, p, model=made.model), "RK45", 0.005, rtol=1e-3)
         assert run.finished and refused, run.message
         refused.clear()

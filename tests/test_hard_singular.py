@@ -16,9 +16,9 @@ from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
-from eomgen.run.limits import locks
-from eomgen.run.module import as_problem, load_module
+from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
+from eomgen.study.diagnosis import locks, problem_of
 from eomgen.study.verification.truth import Truth
 
 WORSE = 30
@@ -133,14 +133,14 @@ def test_a_universal_joint_crosses_gimbal_lock(method: str) -> None:
     model = cardan("q = { j_angle_2 = 1.0 }, v = { j_angle_2_dot = 9.0 }")
     module = load_module(python_module(routed(model, jacobian=False).system), "cardan")
     step = {"dt": 1e-3} if method == "rk4" else {}
-    run = integrate(as_problem(module, model=model), method, 1.0, samples=1001, **step)
+    run = integrate(problem_of(module, model=model), method, 1.0, samples=1001, **step)
     assert run.finished and np.isfinite(run.y).all()
     assert (np.abs(np.cos(run.y[:, 1])) < 0.01).any()
     energy = run.y[:, 3] ** 2 / 2 - 9.81 * np.cos(run.y[:, 1])
     assert np.ptp(energy) < 1e-6
     (line,) = locks(model, run)
     assert LOCK in line
-    away = integrate(as_problem(module, model=model), method, 0.01, **step)
+    away = integrate(problem_of(module, model=model), method, 0.01, **step)
     assert locks(model, away) == []
 
 
@@ -148,6 +148,6 @@ def test_a_start_in_gimbal_lock_stops_with_the_reason() -> None:
     """There a turn about the first axis has no acceleration."""
     model = cardan("q = { j_angle_2_deg = 90.0 }, v = { j_angle_1_dot = 1.0 }")
     module = load_module(python_module(routed(model, jacobian=False).system), "locked")
-    run = integrate(as_problem(module, model=model), "DOP853", 1.0)
+    run = integrate(problem_of(module, model=model), "DOP853", 1.0)
     assert not run.finished and math.isfinite(run.y[-1].sum())
     assert LOCK in run.message and "take a joint of type 'ball'" in run.message

@@ -16,6 +16,7 @@ from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.module import as_problem
 from eomgen.run.trajectory import Trajectory
+from eomgen.study.diagnosis import problem_of
 
 BEAD = """\
 name = "bead"
@@ -58,7 +59,7 @@ def scene(effect: str, x: float, v: float = 0.0, dimensions: int = 2) -> str:
 def run(text: str, integrator: str, t_end: float = 3.0) -> Trajectory:
     """The run, whose rows are finite however it ends."""
     made = engine(text)
-    problem = as_problem(made.module, model=made.model)
+    problem = problem_of(made.module, model=made.model)
     dt = 0.01 if isinstance(INTEGRATORS[integrator], FixedStep) else None
     found = integrate(problem, integrator, t_end, dt=dt, samples=40)
     assert np.isfinite(found.y).all()
@@ -162,7 +163,7 @@ def test_a_state_s_rate_counts() -> None:
     text = scene(states, 0.0)
     made = engine(text)
     with pytest.raises(RunError, match=r"^at the initial state effect 'pull' has no finite value"):
-        as_problem(made.module, model=made.model)
+        problem_of(made.module, model=made.model)
 
 
 def test_what_is_singular_is_told_from_what_is_infinite() -> None:
@@ -204,15 +205,15 @@ def test_parameters_of_the_run_count() -> None:
     )
     made = engine(text)
     assert (
-        as_problem(made.module, model=made.model).explain(
+        problem_of(made.module, model=made.model).explain(
             0.0, np.array([1.0, 0.0]), np.array([1.0, 0.0])
         )
         == ""
     )
     with pytest.raises(RunError, match=r"^at the initial state effect 'pull' has no finite value"):
-        as_problem(made.module, {"a": 1.0}, None, made.model)
+        problem_of(made.module, {"a": 1.0}, None, made.model)
     with pytest.raises(RunError, match=r"^at the initial state effect 'pull' has no finite value"):
-        as_problem(
+        problem_of(
             made.module,
             np.array([*{**made.module.PARAMETERS, "a": 1.0}.values()]),
             None,

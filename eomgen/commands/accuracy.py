@@ -16,10 +16,11 @@ from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
-from eomgen.run.module import GeneratedModule, as_powers, as_problem
+from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.run.progress import terminal_line, terminal_notice, terminal_progress
 from eomgen.scene.schema import SHOWN, Simulation
 from eomgen.store import folder
+from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
     from eomgen.run.problem import Floats
@@ -159,7 +160,7 @@ def _bench(
     scale = float(np.max(kinetic(t, y)) + np.ptp(potential)) or 1.0
     keeps = keeps_energy(own, inputs)
     return Bench(
-        problem=as_problem(module, *values, own),
+        problem=problem_of(module, *values, own),
         reference=truth,
         rest_speed=rest_speed,
         kinetic=kinetic,

@@ -24,9 +24,10 @@ from eomgen.linear.linearise import Linearisation, is_steady, rate_unit, save
 from eomgen.linear.linearise import linearise as linearised
 from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.model.model import Model
-from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import find_scene
+from eomgen.study.diagnosis import problem_of
 
 WIDEST = 12
 """States up to which A and B are printed."""
@@ -48,7 +49,7 @@ def linearise(given: Arguments) -> int:
             raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
     _, module = code_of(given.scene, model, given)
     with located(given.scene):
-        problem = as_problem(module, parameters or None, inputs or None, model)
+        problem = problem_of(module, parameters or None, inputs or None, model)
         y = start = _state(given, model, problem.initial)
         u: Mapping[str, float] | Floats = inputs
         if given.at != "initial":

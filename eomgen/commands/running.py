@@ -29,8 +29,8 @@ from eomgen.errors import InterruptedRunError, RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model, ways_of
-from eomgen.run.limits import excursions, locks
-from eomgen.run.module import GeneratedModule, as_powers, as_problem
+from eomgen.run.limits import excursions
+from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Trajectory, is_own_table
 from eomgen.scene.appearance import appearance_of
@@ -38,6 +38,7 @@ from eomgen.scene.effects import JointStop
 from eomgen.scene.joints.base import Geared
 from eomgen.scene.schema import SHOWN
 from eomgen.store import Code
+from eomgen.study.diagnosis import locks, problem_of
 
 if TYPE_CHECKING:
     from eomgen.run.guard import Guard
@@ -85,7 +86,7 @@ def simulate(given: Arguments) -> int:
         "guard": _guard(given, module, values),
         "unstable": given.unstable,
     }
-    problem, start = as_problem(module, *values, model), None
+    problem, start = problem_of(module, *values, model), None
     if given.resume is not None:
         assert setting is not None
         limits = {name: kept[name] for name in ("max_step", "rest_speed")}

@@ -14,12 +14,13 @@ from eomgen.errors import EomgenError, RunError, SceneError, nearest
 from eomgen.model.elaborate import elaborate, outputs_for
 from eomgen.model.model import Model, ways_of
 from eomgen.outputs import OUTPUTS
-from eomgen.run.module import GeneratedModule, as_problem, load_module
+from eomgen.run.module import GeneratedModule, load_module
 from eomgen.run.progress import terminal_notice
 from eomgen.scene.effects import JointStop
 from eomgen.scene.reader import find_scene, read_scene
 from eomgen.scene.schema import Scene
 from eomgen.store import Code, generated_code
+from eomgen.study.diagnosis import problem_of
 from eomgen.text import one_line
 
 Arguments = argparse.Namespace
@@ -89,7 +90,7 @@ def code_of(
         for notice in code.notices:
             note(given, f"{find_scene(scene).name}: {notice}")
         module = load_module(code.module, model.name)
-        as_problem(module, model=model)
+        problem_of(module, model=model)
         if getattr(given, "outputs", None) not in (None, "all"):
             for name in model.outputs:
                 if not hasattr(module, name):

@@ -1,18 +1,11 @@
-"""Which coordinates of a run left the limits of their joints, or came near a lock, and when."""
+"""Which coordinates of a run left the limits of their joints, and when."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from eomgen.dynamics.regular import resistances, why_unresisted
-from eomgen.model.model import Model
 from eomgen.run.trajectory import Trajectory
-
-NEAR = 1e-4
-"""Part of the inertia felt elsewhere below which a joint is near a lock: its axes stand within a
-hundredth of a radian of it, and every digit of that part is lost.
-"""
 
 
 @dataclass(frozen=True)
@@ -50,19 +43,3 @@ def excursions(
             since, at = float(trajectory.t[first]), float(trajectory.t[worst])
             found.append(Excursion(state, low, high, since, float(values[worst]), at))
     return found
-
-
-def locks(model: Model, trajectory: Trajectory) -> list[str]:
-    """Where the rows of a spatial mechanism come near gimbal lock: a line for each velocity that
-    next to nothing resists there.
-    """
-    known = model.form == "velocity" and not (model.driven or model.locked)
-    if not known or model.dimensions != 3:
-        return []
-    felt = resistances(model, trajectory.y[:, : len(model.coordinates)])
-    lines = []
-    for i in sorted(felt):
-        row = int(np.argmin(felt[i]))
-        if felt[i][row] < NEAR:
-            lines.append(f"at t = {trajectory.t[row]:.4g} s {why_unresisted(model, i)}")
-    return lines

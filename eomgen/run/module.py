@@ -10,12 +10,10 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.model.model import Model
-from eomgen.run.explain import explain_by
 from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise
-from eomgen.run.origin import origin_of
-from eomgen.run.problem import Contacts, Floats, Problem, Switching
+from eomgen.run.origin import Origin
+from eomgen.run.problem import Contacts, Explain, Floats, Problem, Switching, unexplained
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
 
@@ -94,12 +92,14 @@ def as_problem(
     module: GeneratedModule,
     parameters: Any = None,
     inputs: Any = None,
-    model: Model | None = None,
+    *,
+    explain: Explain = unexplained,
+    origin: Origin | None = None,
 ) -> Problem:
     """The initial-value problem of a module, at given parameters and constant inputs.
 
-    `model`, what the module was made of, lets messages name what has no finite value. A module that
-    was made without its Jacobian has one by differences: enough to iterate with.
+    `explain` and `origin` are kept in the problem. A module that was made without its Jacobian has
+    one by differences: enough to iterate with.
 
     Raises `RunError` if the module refuses them, or has no derivative to start from.
     """
@@ -120,8 +120,6 @@ def as_problem(
         except FloatingPointError:  # y is so large that a method had better not have tried it
             return np.full(len(y), np.nan)
 
-    given = _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
-    explain = explain_by(model, *given)
     try:
         initial = module.initial_state(parameters)
     except (ValueError, ArithmeticError) as error:
@@ -131,7 +129,7 @@ def as_problem(
     except (ValueError, ArithmeticError) as error:
         why = explain(0.0, initial, initial)
         raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None
-    values = {**module.PARAMETERS, **given[0]}
+    values = {**module.PARAMETERS, **given_values(module, parameters)[0]}
     start = dict(zip(module.STATES, initial.tolist(), strict=True))
     size = mechanism_size(module.UNITS, values, start)
     switching = _switching(module, parameters, inputs)
@@ -148,7 +146,7 @@ def as_problem(
         corners=switching is not None,
         switching=switching,
         sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
-        origin=origin_of(model, *given) if model else None,
+        origin=origin,
         noise=cache(partial(step_noise, derivative, jacobian, 0.0, initial)),
         operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
         columns=hasattr(module, "_along"),
@@ -219,6 +217,13 @@ def _contacts(module: Any, parameters: Any, inputs: Any, size: float) -> Contact
         ),
         sizes=tuple(size if module.UNITS[name] == "m" else 1.0 for name in names),
     )
+
+
+def given_values(
+    module: GeneratedModule, parameters: Any = None, inputs: Any = None
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Values that are given to a module in one way or another, by name."""
+    return _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
 
 
 def _by_name(names: Iterable[str], values: Any) -> dict[str, float]:

@@ -17,6 +17,12 @@ Explain = Callable[[float, Floats, Floats], str]
 """Of t, y and the initial y: what keeps the derivative at t, y from being finite or tame, and what
 to change, in words; "" if nothing is known of that."""
 
+
+def unexplained(t: float, y: Floats, initial: Floats) -> str:
+    """The `Explain` of those who know nothing but numbers."""
+    return ""
+
+
 SHORTEST = 1e-150
 """A quaternion shorter than this says no orientation: its square is no number."""
 
@@ -102,7 +108,7 @@ class Problem:
     initial: Floats
     quaternions: tuple[tuple[int, int, int, int], ...] = ()
     contacts: Contacts | None = None
-    explain: Explain = lambda _t, _y, _initial: ""
+    explain: Explain = unexplained
     corners: bool = False
     switching: Switching | None = None
     sizes: tuple[float, ...] = ()

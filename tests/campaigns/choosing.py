@@ -29,7 +29,7 @@ from accuracy_scenes import SCENES, closed_end, text
 
 from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate
-from eomgen.run.module import as_problem, load_module
+from eomgen.run.module import load_module
 from eomgen.run.problem import Floats
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene, read_scene
 from eomgen.store import generated_code
@@ -38,6 +38,7 @@ from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.moved import moved_problem
 from eomgen.study.accuracy.reference import reference
 from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
+from eomgen.study.diagnosis import problem_of
 
 TARGETS = (1e-3, 1e-6, 1e-9)
 METHODS = "DOP853,LSODA,Radau,gragg_bulirsch_stoer,RK45,rk4,gauss_6"
@@ -66,7 +67,7 @@ def prepared(scene: str, own: bool, folder: Path, seconds: float) -> tuple[Case,
     module = load_module(generated_code(model).module, model.name)
     t_end = wanted.t_end
     kept = {"rest_speed": wanted.rest_speed, "samples": 1001}
-    problem, moved = as_problem(module, model=model), moved_problem(module, model=model)
+    problem, moved = problem_of(module, model=model), moved_problem(module, model=model)
     case = Case(problem, t_end, module.UNITS, kept, moved=moved)
     end = closed_end(scene) if own else None
     if end is not None:

@@ -15,8 +15,9 @@ import numpy as np
 
 from eomgen.model.model import Model
 from eomgen.precision.precise import constants_of, digits
-from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Problem
+from eomgen.study.diagnosis import problem_of
 
 TIMES = 2.0
 """Constants that are rounded are moved by so many times that, or a unit in the last place."""
@@ -38,9 +39,9 @@ def moved_problem(
 def _made(
     module: GeneratedModule, parameters: Any, inputs: Any, model: Model | None, way: int
 ) -> Problem:
-    true = as_problem(module, parameters, inputs, model)
+    true = problem_of(module, parameters, inputs, model)
     twin = moved(module, parameters, way)
-    return replace(as_problem(twin, parameters, inputs, model), initial=true.initial)
+    return replace(problem_of(twin, parameters, inputs, model), initial=true.initial)
 
 
 def moved(module: GeneratedModule, parameters: Any = None, way: int = 0) -> GeneratedModule:

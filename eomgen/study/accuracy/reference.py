@@ -25,12 +25,13 @@ from eomgen.precision.precise import BITS, digits, precise
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS
-from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.tally import Tally
 from eomgen.study.accuracy import measure
 from eomgen.study.accuracy.collocation import Longs, Row, rows
+from eomgen.study.diagnosis import problem_of
 
 ROWS = 201
 SECONDS = 300.0
@@ -126,7 +127,7 @@ def reference(
     Raises `RunError` if the module refuses parameters or inputs, if the motion does not get to
     `t_end`, or if doubles would stand in that may not.
     """
-    problem = as_problem(module, parameters, inputs, model)
+    problem = problem_of(module, parameters, inputs, model)
     told = progress or _ignore
     key = _key(module, problem, parameters, inputs, t_end, seconds, rest_speed)
     entries = folder and Entries(folder)

@@ -9,11 +9,12 @@ import numpy as np
 from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError
-from eomgen.run.module import GeneratedModule, as_powers, as_problem
+from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import Simulation
+from eomgen.study.diagnosis import problem_of
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.laws import AXES, Kept, kept
 from eomgen.study.verification.visited import ENOUGH
@@ -64,7 +65,7 @@ def drift(
     What was lost is counted in parts: of energy, of the greatest that was kinetic, or went to and
     fro; of momentum, of the sum over bodies.
     """
-    problem = as_problem(module, model=model)
+    problem = problem_of(module, model=model)
     most = 1 + MOST_OPERATIONS // max(MOST_OPERATIONS // MOST_CALLS, _operations(module))
     calls = 0
 

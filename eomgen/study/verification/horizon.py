@@ -10,12 +10,13 @@ from eomgen.model.model import Model
 from eomgen.precision.precise import BITS
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
-from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Problem
 from eomgen.run.progress import Progress
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import Simulation
 from eomgen.study.accuracy.reference import ROWS, Reference, TooLongError, paced, reference
+from eomgen.study.diagnosis import problem_of
 
 PARTED = 0.01
 """Of the motion's scale (see `measure`): doubles that are this far off mean nothing any more."""
@@ -72,7 +73,7 @@ def horizon(
     nothing to compare with, and where a run does not get to its end.
     """
     t_end = wanted.t_end
-    problem = as_problem(module, parameters, inputs, model)
+    problem = problem_of(module, parameters, inputs, model)
     if problem.contacts is not None:
         raise RunError("horizon: rigid contacts strike, and there is no run in long numbers then")
     try:

@@ -7,10 +7,11 @@ import numpy as np
 from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
-from eomgen.run.module import GeneratedModule, as_problem
+from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Simulation
+from eomgen.study.diagnosis import problem_of
 
 MOST_OPERATIONS = 20_000_000
 """Of all derivatives of a run together: seconds at most, and the same on every machine."""
@@ -42,7 +43,7 @@ def visited(
 
     Raises `RunError` if the module has no derivative to start from.
     """
-    problem = as_problem(module, model=model)
+    problem = problem_of(module, model=model)
     keep = _Keep(count, most=1 + MOST_OPERATIONS // max(1, module.COST["derivative"]["total"]))
 
     def derivative(t: float, y: Floats) -> Floats:

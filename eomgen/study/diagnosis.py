@@ -1,0 +1,127 @@
+"""What a model tells of a run: why it cannot start or go on, where it came near a lock, and what
+its motion comes of. What runs has the module alone, and is handed these.
+"""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from eomgen.dynamics.finite import effect_sizes, is_singular, values_at
+from eomgen.dynamics.regular import resistances, why_unresisted
+from eomgen.model.model import Model
+from eomgen.run.module import GeneratedModule, as_problem, given_values
+from eomgen.run.origin import START, UNITS, Origin
+from eomgen.run.problem import Explain, Floats, Problem, unexplained
+from eomgen.run.trajectory import Trajectory
+
+GROWN = 1e9
+"""How many times its size at the start an effect has grown where it is worth saying."""
+GONE = 1e-9
+"""Part of the inertia that a velocity feels elsewhere that is as good as none."""
+NEAR = 1e-4
+"""Part of the inertia felt elsewhere below which a joint is near a lock: its axes stand within a
+hundredth of a radian of it, and every digit of that part is lost.
+"""
+REMEDY = "soften it, keep its formula finite there, or keep away"
+
+
+def problem_of(
+    module: GeneratedModule,
+    parameters: Any = None,
+    inputs: Any = None,
+    model: Model | None = None,
+) -> Problem:
+    """The initial-value problem of a module, as `as_problem`, whose messages name what of the
+    `model` that it was made of has no finite value; without one they say less.
+
+    Raises `RunError` if the module refuses them, or has no derivative to start from.
+    """
+    if model is None:
+        return as_problem(module, parameters, inputs)
+    given = given_values(module, parameters, inputs)
+    return as_problem(
+        module,
+        parameters,
+        inputs,
+        explain=explained(model, *given),
+        origin=origin_of(model, *given),
+    )
+
+
+def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str, float]) -> Origin:
+    """Where the motion of a model comes from, with values in place of some of its own."""
+    parts: dict[str, object] = {
+        "dimensions": model.dimensions,
+        "form": model.form,
+        "locked coordinates": model.locked,
+        "effects left out": model.leave_out,
+        UNITS: tuple((p.name, p.unit) for p in model.parameters),
+        START: (model.initial_q, model.initial_v, model.states),
+    }
+    for body in model.bodies:
+        parts[f"body '{body.name}'"] = body
+    for point in model.points:
+        parts[f"point '{point.name}'"] = point
+    for effect in model.effects:
+        parts[f"effect '{effect.name}'"] = effect
+    return Origin(
+        {name: hashlib.sha256(repr(part).encode()).hexdigest() for name, part in parts.items()},
+        {**model.defaults, **parameters},
+        {**dict.fromkeys([i.name for i in model.inputs], 0.0), **inputs},
+    )
+
+
+def locks(model: Model, trajectory: Trajectory) -> list[str]:
+    """Where the rows of a spatial mechanism come near gimbal lock: a line for each velocity that
+    next to nothing resists there.
+    """
+    known = model.form == "velocity" and not (model.driven or model.locked)
+    if not known or model.dimensions != 3:
+        return []
+    felt = resistances(model, trajectory.y[:, : len(model.coordinates)])
+    lines = []
+    for i in sorted(felt):
+        row = int(np.argmin(felt[i]))
+        if felt[i][row] < NEAR:
+            lines.append(f"at t = {trajectory.t[row]:.4g} s {why_unresisted(model, i)}")
+    return lines
+
+
+def explained(
+    model: Model, parameters: Mapping[str, float], inputs: Mapping[str, float]
+) -> Explain:
+    """What `Problem.explain` is for a model, of form 'velocity'; it says nothing for others."""
+    if model.form != "velocity":
+        return unexplained
+
+    def explain(t: float, y: Floats, initial: Floats) -> str:
+        if not np.isfinite(y).all():
+            return ""
+        values = values_at(model, t, y.tolist(), parameters, inputs)
+        sizes = effect_sizes(model, values)
+        endless = [name for name, size in sizes.items() if size == float("inf")]
+        if endless:
+            return f"{_effects(endless)} no finite value; {REMEDY}"
+        if not (model.driven or model.locked):
+            felt = resistances(model.with_parameters(parameters), np.array([values.q]))
+            for i in sorted(felt):
+                if felt[i][0] < GONE:
+                    return why_unresisted(model, i)
+        if is_singular(model, values):
+            return "the mass matrix is singular; change lengths, masses or inertias, or keep away"
+        first = effect_sizes(model, values_at(model, 0.0, initial.tolist(), parameters, inputs))
+        grown = [name for name, size in sizes.items() if size > GROWN * max(first[name], 1e-9)]
+        if grown:
+            worst = max(grown, key=lambda name: sizes[name])
+            growth = f"from {first[worst]:.3g} to {sizes[worst]:.3g}"
+            return f"effect '{worst}' has grown {growth}; {REMEDY}"
+        return ""
+
+    return explain
+
+
+def _effects(names: Sequence[str]) -> str:
+    listed = ", ".join(f"'{name}'" for name in names)
+    return f"effects {listed} have" if len(names) > 1 else f"effect {listed} has"
