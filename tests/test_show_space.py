@@ -20,6 +20,7 @@ from eomgen.codegen.backends.javascript import javascript_poses
 from eomgen.errors import SceneError
 from eomgen.program.program import Output, finish
 from eomgen.program.tape import Stage, Tape
+from eomgen.scene.joints.base import Move
 from eomgen.scene.look import Box, Camera, Cylinder, Ellipsoid, Rod, Shape, Sphere, check_look
 from eomgen.show.figure import draw_motion, save_figure
 from eomgen.show.motion import Motion, thinned
@@ -447,8 +448,19 @@ def test_motions_are_thinned_and_checked() -> None:
 # ---- Gaps ----
 
 
+KINDS: dict[str, tuple[Any, ...]] = {
+    "free": ("slide", "slide", "slide", "spin"),
+    "ball": ("spin",),
+    "planar": ("slide", "slide", "turn"),
+    "prismatic": ("slide",),
+    "revolute": ("turn",),
+    "weld": (),
+}
+
+
 def joint(kind: str, parent: str, r_parent: Any = (), r_child: Any = ()) -> Any:
-    held = SimpleNamespace(type=kind, name=kind, parent=parent)
+    moves = tuple(Move(move) for move in KINDS[kind])
+    held = SimpleNamespace(name=kind, parent=parent, moves=lambda _: moves)
     if kind != "free":
         held.r_parent, held.r_child = r_parent, r_child
     return SimpleNamespace(name=f"{kind}_body", joint=held)
@@ -461,7 +473,7 @@ def test_gaps_of_joints_that_hold_a_point() -> None:
         joint("prismatic", "ball_body"),
         joint("weld", "world", (0.0, 0.0, 1.0)),
     )
-    model: Any = SimpleNamespace(bodies=bodies, value=float)
+    model: Any = SimpleNamespace(bodies=bodies, value=float, dimensions=3)
     poses = np.zeros((5, 4, 3, 4))
     poses[..., :3] = rotation((0, 0, 90))  # x of each body is the world's y
     poses[:, 1, :, 3] = [2.0, 1.0, 0.0]  # its point at y = 2 of its own: where the ball is
@@ -475,6 +487,7 @@ def test_gaps_of_joints_that_hold_a_point() -> None:
     planar: Any = SimpleNamespace(
         bodies=(joint("revolute", "world", (1.0, 2.0), (0.0, 1.0)), joint("planar", "world")),
         value=float,
+        dimensions=2,
     )
     flat = np.zeros((3, 2, 3))
     flat[:, 0] = [2.0, 2.0, np.pi / 2]

@@ -70,6 +70,11 @@ def value_of(formula: Formula, known: Mapping[str, float]) -> float:
         return math.nan
 
 
+def are_zero(known: Mapping[str, float], *formulas: Formula) -> bool:
+    """Whether some formulas are all 0 at these parameters."""
+    return all(value_of(formula, known) == 0 for formula in formulas)
+
+
 def of_quantity(place: str, formula: Formula, bound: str, unit: str) -> Iterator[Condition]:
     """A quantity is finite, has a square, and keeps its bound."""
     words = f"{{:g}} is larger than {LARGEST:g}; choose other units"

@@ -21,11 +21,13 @@ Given = TypeVar("Given", Input, ExtraState)
 
 
 def sliding_in(bodies: Sequence[Body], dimensions: int) -> frozenset[str]:
-    """Joints and coordinates that slide."""
-    found = {body.joint.name for body in bodies if isinstance(body.joint, Prismatic)}
+    """Joints that do nothing but slide, and coordinates that slide."""
+    found: list[str] = []
     for body in bodies:
-        pairs = zip(body.positions, body.joint.moves(dimensions), strict=False)
-        found |= {c.name for c, move in pairs if move.kind == "slide"}
+        kinds = [move.kind for move in body.joint.moves(dimensions)]
+        found += [body.joint.name] * (set(kinds) == {"slide"})
+        pairs = zip(body.positions, kinds, strict=False)
+        found += [coordinate.name for coordinate, kind in pairs if kind == "slide"]
     return frozenset(found)
 
 

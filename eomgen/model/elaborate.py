@@ -44,7 +44,7 @@ def elaborate(scene: Scene) -> Model:
     _check_symbols(n, found.parameters, links, bodies, effects)
     check_contacts(effects, [body.name for body in bodies])
     locked = locked_values(scene.locked, bodies, effects)
-    appearance_of(scene)  # a scene is taken whole or not at all
+    appearance_of(scene)  # raises for what cannot be drawn
     prescribed = prescribed_of(bodies, effects, locked)
     if not velocities_of(bodies, prescribed):
         raise SceneError(

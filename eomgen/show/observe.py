@@ -1,6 +1,6 @@
 """From a trajectory to a motion: poses, energies and joint gaps, by the generated code."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, cast
 
 import numpy as np
@@ -11,7 +11,7 @@ from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.appearance import Appearance
-from eomgen.scene.joints.base import WORLD
+from eomgen.scene.joints.base import WORLD, Move
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.motion import Anchor, Motion
 from eomgen.show.skeleton import shapes_of
@@ -19,15 +19,9 @@ from eomgen.show.surroundings import balls_of, planes_of
 
 Floats = NDArray[np.float64]
 
-HOLDING = frozenset({"ball", "revolute", "universal", "weld"})
-"""Joints whose point on the parent is one with that on the child; the others let them part."""
-
-MARKED = frozenset({"ball", "cylindrical", "prismatic", "revolute", "universal"})
-"""Joints that are marked in a picture, at their point on the child."""
-
 
 class _Joint(Protocol):
-    """What every joint but the free one has; none of the sets above names that one."""
+    """What every joint but the free one has."""
 
     name: str
     parent: str
@@ -67,7 +61,7 @@ def observe(
         positions=module.POSITIONS,
         bodies=module.BODIES,
         shapes=shapes_of(model, appearance),
-        joints=tuple(joint.name for _, joint in _joints(model, HOLDING)),
+        joints=tuple(joint.name for _, joint in _joints(model, _holds_a_point)),
         poses=poses,
         kinetic_energy=kinetic,
         potential_energy=potential,
@@ -89,14 +83,14 @@ def observe(
 def joint_drift(model: Model, poses: Floats) -> Floats:
     """Distance of each joint's point on its parent from that on its child, (n, nj), m.
 
-    Of the joints of the types `HOLDING`, in the order of the bodies they hold. `poses` (n, nb, 3)
+    Of the joints that hold a point, in the order of the bodies they hold. `poses` (n, nb, 3)
     or (n, nb, 3, 4) as `body_poses` gives them. Measured from the poses alone, whatever the state
     form: a form that keeps each body's place for itself can pull its joints apart.
     """
     names = {body.name: k for k, body in enumerate(model.bodies)}
     dimensions = poses.ndim - 1
     gaps = []
-    for k, joint in _joints(model, HOLDING):
+    for k, joint in _joints(model, _holds_a_point):
         on_parent = _values(model, joint.r_parent, dimensions)
         if joint.parent != WORLD:
             on_parent = _point(poses[:, names[joint.parent]], on_parent)
@@ -106,18 +100,28 @@ def joint_drift(model: Model, poses: Floats) -> Floats:
     return np.array(gaps).reshape(len(gaps), len(poses)).T
 
 
-def _joints(model: Model, types: frozenset[str]) -> list[tuple[int, _Joint]]:
-    """Joints of some types, each with the index of the body that it holds."""
-    found: list[tuple[int, _Joint]] = []
-    for k, body in enumerate(model.bodies):
-        if body.joint.type in types:
-            found.append((k, cast(_Joint, body.joint)))
-    return found
+def _joints(model: Model, chosen: Callable[[Sequence[Move]], bool]) -> list[tuple[int, _Joint]]:
+    """Joints `chosen` by their moves, which no free joint is, each with the index of its body."""
+    return [
+        (k, cast(_Joint, body.joint))
+        for k, body in enumerate(model.bodies)
+        if chosen(body.joint.moves(model.dimensions))
+    ]
+
+
+def _holds_a_point(moves: Sequence[Move]) -> bool:
+    """Whether a joint's point on the parent stays one with that on the child."""
+    return all(move.kind != "slide" for move in moves)
+
+
+def _is_marked(moves: Sequence[Move]) -> bool:
+    """Whether a picture marks a joint: it moves, about a point or along a line."""
+    return bool(moves) and sum(move.kind == "slide" for move in moves) < 2
 
 
 def _anchors(model: Model, dimensions: int) -> tuple[Anchor, ...]:
     anchors: list[Anchor] = []
-    for k, joint in _joints(model, MARKED):
+    for k, joint in _joints(model, _is_marked):
         x, y, *z = _values(model, joint.r_child, dimensions).tolist()
         anchors.append((k, x, y, z[0]) if z else (k, x, y))
     return tuple(anchors)

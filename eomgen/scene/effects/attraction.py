@@ -1,6 +1,6 @@
 """Gravity toward a point: of a planet or a star that does not move."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Literal
 
 from pydantic import Field
@@ -47,6 +47,12 @@ class PointGravity(EffectTable):
             _, squared = self._from_point(mechanism, body)
             total = total - mu * mechanism.mass(body) / mechanism.call("sqrt", squared)
         return total
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """It always does."""
+        return True
 
     def _attracted(self, mechanism: Mechanism) -> list[str]:
         return [body for body in mechanism.bodies if body not in self.except_bodies]

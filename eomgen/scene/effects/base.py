@@ -293,6 +293,22 @@ class EffectTable(Table):
         """J; 0 for an effect that brings energy in or takes it out."""
         return mechanism.value(ZERO)
 
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """Whether exact motion keeps the sum of kinetic and potential energy in spite of it: it has
+        a potential energy for all that it does, or does no work.
+
+        At these `values` of the parameters and of `inputs`, of which those not named are 0. What is
+        not known to keep it counts as if it did not.
+        """
+        return False
+
+    def idle(self, inputs: Mapping[str, float], dimensions: int) -> bool:
+        """Whether it takes inputs, and all of them are 0."""
+        wanted = self.inputs(dimensions)
+        return bool(wanted) and not any(inputs.get(given.name) for given in wanted)
+
     def is_plain(self, parameters: Collection[str]) -> bool:
         """Whether its loads depend on parameters, inputs and its bodies' poses alone, so that the
         closed form takes them.

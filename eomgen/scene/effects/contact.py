@@ -1,6 +1,6 @@
 """Contact: bodies that do not go through a plane or each other, soft or rigid."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import ClassVar, Literal, Self
 
@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
-from eomgen.language.conditions import Condition, a_part, can_meet, not_negative
+from eomgen.language.conditions import Condition, a_part, are_zero, can_meet, not_negative
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity, with_components
 from eomgen.scalars.exact import direction
@@ -225,6 +225,13 @@ class BodyContact(OnBodies):
                 part = part + force * touch.meeting
             total = total + part
         return total
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """It does if it is soft and neither damps nor rubs."""
+        lost = (self.damping, self.dissipation, self.friction)
+        return self.law != "impact" and are_zero(values, *lost)
 
     def overlap(self, mechanism: Mechanism) -> Scalar:
         """The greatest depth d of a soft law, m."""

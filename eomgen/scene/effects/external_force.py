@@ -1,6 +1,6 @@
 """A force from outside at a point of a body."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from typing import Literal
 
 from pydantic import Field
@@ -50,6 +50,12 @@ class ExternalForce(EffectTable):
             yield Load(self.body, outside, at, "applied", in_body=(force, ()))
         else:
             yield Load(self.body, force, at, "applied")
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """It does while its inputs are 0."""
+        return self.idle(inputs, dimensions)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
         """In world axes, unless its formula uses the motion or the time."""

@@ -1,6 +1,6 @@
 """A torque from outside on a body."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Literal, Self
 
 from pydantic import Field
@@ -63,3 +63,9 @@ class ExternalTorque(EffectTable):
             yield Load(self.body, zeros, zeros, "applied", outside, in_body=(zeros, torque))
         else:
             yield Load(self.body, zeros, zeros, "applied", torque)
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """It does while its inputs are 0."""
+        return self.idle(inputs, dimensions)

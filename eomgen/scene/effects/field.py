@@ -1,6 +1,6 @@
 """Force fields: formulas of place, velocity and time, and some that are ready."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -113,6 +113,12 @@ class ForceField(OnBodies):
             total = total + part
         total = total * self._value(mechanism, self.strength)
         return total if self.kind == "attract" else -total
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """Central fields do."""
+        return self.kind in ("attract", "repel", "avoid")
 
     def _way(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
         """From the centre to the point."""

@@ -1,6 +1,6 @@
 """Uniform gravity, downwards or in any other direction."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from typing import Literal
 
 from pydantic import Field, field_validator
@@ -69,6 +69,12 @@ class Gravity(EffectTable):
             for part, place in zip(fall, mechanism.place(body, zeros), strict=True):
                 total = total - mechanism.mass(body) * part * place
         return total
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """It always does."""
+        return True
 
     def _falling(self, mechanism: Mechanism) -> list[str]:
         return [body for body in mechanism.bodies if body not in self.except_bodies]

@@ -6,6 +6,7 @@ from typing import Literal, Self
 from pydantic import Field
 
 from eomgen.errors import SceneError
+from eomgen.language.conditions import are_zero
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import JointLoad, Mechanism, Scalar
@@ -69,6 +70,12 @@ class JointSpring(OnJoints):
             damping = mechanism.value(self.damping)
             pairs = zip(way.along(back), way.rates, strict=True)
             yield from way.loads([-(force + damping * rate) for force, rate in pairs])
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """It does without damping, if its law is that of a spring."""
+        return self.law is None and are_zero(values, self.damping)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k s², J."""

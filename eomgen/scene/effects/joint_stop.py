@@ -6,7 +6,7 @@ from typing import Literal, Self
 from pydantic import Field
 
 from eomgen.errors import SceneError
-from eomgen.language.conditions import Condition, a_part, in_order
+from eomgen.language.conditions import Condition, a_part, are_zero, in_order
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import Contact, JointLoad, Mechanism, Scalar
@@ -114,6 +114,12 @@ class JointStop(OnJoints):
             half = mechanism.number(0.5) * mechanism.value(self.stiffness)
             total = total + half * (beyond * beyond)
         return total
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """It does if it is soft and has no damping."""
+        return self.restitution is None and are_zero(values, self.damping)
 
     def overlap(self, mechanism: Mechanism) -> Scalar:
         """How far the farthest coordinate is beyond a soft stop, rad or m."""

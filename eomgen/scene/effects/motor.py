@@ -1,6 +1,6 @@
 """A motor at a joint."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from typing import Literal
 
 from eomgen.language.formula import names_in
@@ -34,6 +34,12 @@ class Motor(OnCoordinate):
         else:
             torque = mechanism.value(self.torque)
         yield JointLoad(self.joint, torque, self.place(mechanism))
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """It does while its inputs are 0."""
+        return self.idle(inputs, dimensions)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
         """Unless its formula uses the motion or the time, or it is on one coordinate of several."""

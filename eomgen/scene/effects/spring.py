@@ -1,6 +1,6 @@
 """A spring and damper between two points, or a rope."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, Self
 
@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
-from eomgen.language.conditions import Condition, not_negative
+from eomgen.language.conditions import Condition, are_zero, not_negative
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Quantity, Vector, quantity
 from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar
@@ -98,6 +98,12 @@ class Spring(EffectTable):
         taut = mechanism.call("min", stretch, tension + damping * rate)
         nothing = mechanism.number(0.0)
         return tuple(mechanism.call("select", taut, part, nothing) for part in pull)
+
+    def keeps_energy(
+        self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
+    ) -> bool:
+        """It does without damping, if its law is that of a spring."""
+        return self.law is None and are_zero(values, self.damping)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k s², J, of a rope only where it is taut."""
