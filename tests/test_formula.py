@@ -3,10 +3,13 @@
 import math
 import random
 import time
+import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 import pytest
+from campaign import some
 from engine import engine
 
 from eomgen.codegen.backends.javascript import DIALECT
@@ -266,6 +269,38 @@ def test_any_text_is_a_formula_or_refused() -> None:
             accepted += 1
     assert accepted > 300, accepted
     assert time.process_time() - start < 60.0
+
+
+def test_reading_never_warns() -> None:
+    """Python warns of a number that a keyword follows at once, `1if x < 2 else 0`, of `0777` and of
+    other texts that are no formulas; none of these reaches its parser.
+    """
+    rng = random.Random(7)
+    words = (
+        *("x", "e", "j", "if", "else", "and", "or", "in", "is", "not", "max", "(", ")", ",", " "),
+        *("+", "-", "*", "/", "**", "<", ">=", "0", "1", "77", "2.", ".5", "1e3", "1e", "0x", "1_"),
+    )
+    read = refused = 0
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        for text in (
+            "1if x < 2 else 0",
+            "1.if x < 2 else 0",
+            "0777",
+            "1(2)",
+            "x if 1<x else 1or 2",
+        ):
+            with suppress(FormulaError):
+                parse(text)
+        for _ in range(some(20_000, 1_000_000)):
+            text = "".join(rng.choices(words, k=rng.randrange(1, 9)))
+            try:
+                parse(text)
+                read += 1
+            except FormulaError:
+                refused += 1
+    assert not warned, warned[0].message
+    assert min(read, refused) > 500
 
 
 SCENE = """\

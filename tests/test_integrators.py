@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -527,32 +528,65 @@ def test_a_derivative_that_turns_nan_ends_the_run(name):
     assert 0.7 < trajectory.t[-1] < 0.83
 
 
-def test_what_lsoda_only_warns_of_is_in_the_message():
-    def jacobian(t, y):
-        return -1e9 * np.array([[0, 1], [-2000 * y[0] * y[1] - 1, 1000 * (1 - y[0] ** 2)]])
-
-    misled = Problem(
+def _misled(slope):
+    """Van der Pol's oscillator, with a Jacobian that is not its own."""
+    return Problem(
         name="van der Pol",
         states=("x", "v"),
         positions=(0,),
         derivative=lambda t, y: np.array([y[1], 1000 * (1 - y[0] ** 2) * y[1] - y[0]]),
-        jacobian=jacobian,
+        jacobian=slope,
         initial=np.array([2.0, 0.0]),
     )
-    trajectory = integrate(misled, "LSODA", 200.0)
+
+
+def _opposite(t, y):
+    return -1e9 * np.array([[0, 1], [-2000 * y[0] * y[1] - 1, 1000 * (1 - y[0] ** 2)]])
+
+
+def _singular(t, y):
+    return np.full((2, 2), 1e200)
+
+
+def test_what_lsoda_only_warns_of_is_in_the_message():
+    trajectory = integrate(_misled(_opposite), "LSODA", 200.0)
     assert not trajectory.finished
     assert "; try another --integrator" in trajectory.message
     assert "lsoda: Repeated convergence failures" in trajectory.message
 
 
-def test_a_finished_run_passes_warnings_on():
+@pytest.mark.parametrize("method", ["Radau", "BDF"])
+def test_a_singular_matrix_is_in_the_message(method):
+    trajectory = integrate(_misled(_singular), method, 200.0, max_steps=30)
+    assert trajectory.message.endswith("; Diagonal number 2 is exactly zero. Singular matrix.")
+
+
+def test_runs_in_threads_keep_their_remarks_apart():
+    """Each has its own, however they take turns, and Python's filters are left alone."""
+    filters = list(warnings.filters)
+    asked = [(_opposite, "LSODA", {}), (_singular, "Radau", {"max_steps": 300})] * 2
+    asked += [(_singular, "BDF", {"max_steps": 300}), (_opposite, "Radau", {"max_steps": 100})]
+
+    def message(slope, method, options):
+        return integrate(_misled(slope), method, 200.0, **options).message
+
+    alone = [message(slope, method, options) for slope, method, options in asked]
+    with ThreadPoolExecutor(len(asked)) as pool:
+        together = list(pool.map(lambda one: message(*one[:2], one[2]), asked))
+    assert together == alone and len(set(alone)) == 4
+    assert warnings.filters == filters
+
+
+def test_what_a_derivative_warns_of_is_the_callers():
+    """A run that finishes says nothing of it; Python does, as it is told to."""
+
     def derivative(t, y):
-        warnings.warn("close to\nthe edge", stacklevel=1)
+        warnings.warn("close to the edge", stacklevel=1)
         return -y
 
-    trajectory = run(replace(BLOW_UP, derivative=derivative), "rk4", 1.0)
-    assert trajectory.finished
-    assert trajectory.message == "close to the edge"
+    with pytest.warns(UserWarning, match="close to the edge"):
+        trajectory = run(replace(BLOW_UP, derivative=derivative), "rk4", 1.0)
+    assert trajectory.finished and trajectory.message == ""
 
 
 def test_adaptive_run_stops_after_max_steps():

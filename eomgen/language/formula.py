@@ -8,7 +8,6 @@ import ast
 import keyword
 import math
 import re
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -109,9 +108,7 @@ def parse(text: str) -> Formula:
     if not plain:
         raise FormulaError(f"is no formula; {_EXAMPLE}")
     try:
-        with warnings.catch_warnings():  # of Python about what is no Python of ours
-            warnings.simplefilter("ignore")
-            tree = ast.parse(plain, mode="eval")
+        tree = ast.parse(plain, mode="eval")
     except SyntaxError as error:
         column = start - 1 + (error.offset or len(plain) + 1)  # 0 stands for the end
         raise FormulaError(f"is no formula at column {column}; {_EXAMPLE}") from None

@@ -1,6 +1,5 @@
 """From a problem to its trajectory: check what is asked, step, and keep what was computed."""
 
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -107,6 +106,7 @@ def integrate(
     )
     if tally:
         counted = tally.counting(counted)
+    remarks: list[str] = []
     if isinstance(method, FixedStep):
         # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
@@ -114,7 +114,7 @@ def integrate(
         looked_at = None if unseen else problem
         begin, remembered = equal_steps(asked, method, counted, looked_at)
     else:
-        begin, remembered = adaptive_steps(asked, method, problem)
+        begin, remembered = adaptive_steps(asked, method, problem, remarks.append)
 
     looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
     stepper = events.Stepper(begin, looks, derivatives.of)
@@ -126,13 +126,9 @@ def integrate(
     if tally:
         tally.begin(problem.initial)
     counts, told = (derivatives, jacobians), progress or _ignore
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("default")
-        outcome, trouble = _follow(run, advances, counts, problem, method, asked.t_end, told, tally)
-        kept = _kept(run, problem, {**remembered, **numbers(rest_speed=rest_speed)})
-    # LSODA says why it failed in a warning only.
-    remarks = "; ".join(dict.fromkeys(str(warning.message) for warning in caught))
-    said = (trouble, watch.words() if watch else "", remarks)
+    outcome, trouble = _follow(run, advances, counts, problem, method, asked.t_end, told, tally)
+    kept = _kept(run, problem, {**remembered, **numbers(rest_speed=rest_speed)})
+    said = (trouble, watch.words() if watch else "", *dict.fromkeys(remarks))
     return Trajectory(
         name=problem.name,
         states=problem.states,

@@ -18,6 +18,7 @@ from eomgen.run.checks import (
 )
 from eomgen.run.integrators import FixedStep, adaptive, fixed_step
 from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Resume
+from eomgen.run.integrators.unwarned import Remark
 from eomgen.run.problem import Problem
 
 ADAPTIVE_SAMPLES = 1001
@@ -89,8 +90,12 @@ def equal_steps(
     return begin, _remembered(asked, dt)
 
 
-def adaptive_steps(asked: Asked, method: Adaptive, problem: Problem) -> tuple[Begin, Resume]:
+def adaptive_steps(
+    asked: Asked, method: Adaptive, problem: Problem, remark: Remark
+) -> tuple[Begin, Resume]:
     """Steps that a method chooses itself, and what a run from their end needs.
+
+    remark  told what the method has to say of its steps
 
     Raises `RunError` for a step given, or a longest one that is none.
     """
@@ -113,6 +118,7 @@ def adaptive_steps(asked: Asked, method: Adaptive, problem: Problem) -> tuple[Be
             bounds=bounds,
             times=times,
             made=made,
+            remark=remark,
             resume=resume,
         )
 

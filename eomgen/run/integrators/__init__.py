@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from scipy.integrate import BDF, DOP853, LSODA, RK45, OdeSolver, Radau
+from scipy.integrate import DOP853, RK45, OdeSolver
 
 from eomgen.errors import RunError, nearest
 from eomgen.run.integrators import (
@@ -26,6 +26,7 @@ from eomgen.run.integrators.interface import (
     Stability,
     StepFailure,
 )
+from eomgen.run.integrators.unwarned import BDF, LSODA, Radau
 
 __all__ = [
     "INTEGRATORS",

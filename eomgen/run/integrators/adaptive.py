@@ -16,6 +16,7 @@ import numpy as np
 from eomgen.run.branches import Again, Lookout, Made
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume, StepFailure
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
+from eomgen.run.integrators.unwarned import UNWARNED, Remark
 from eomgen.run.problem import Floats, Problem
 
 _STALLED = 100
@@ -55,6 +56,7 @@ def advances(
     bounds: Bounds,
     times: Floats,
     made: int,
+    remark: Remark,
     resume: Resume | None = None,
 ) -> Iterator[Advance]:
     """Yield the steps of `method`, with a sample at those of `times` (ascending) that each spans.
@@ -62,11 +64,11 @@ def advances(
     Between steps the method's own dense output is used, which is of its accuracy. The sample at
     `t_start` is the caller's. Quaternions are scaled to unit length in every state that is yielded;
     one-step methods go on from there, multistep ones from their own history. `made` steps went
-    before, which `bounds.most` counts, too. A step that passed over a branch of the derivative is
-    made again, up to there: see `eomgen.run.branches`.
+    before, which `bounds.most` counts, too; `remark` is told what SciPy would warn of. A step that
+    passed over a branch of the derivative is made again, up to there: see `eomgen.run.branches`.
     Raises `StepFailure` if the method gives up, or after `bounds.most` steps.
     """
-    course = _Course(method, problem, t_end, bounds)
+    course = _Course(method, problem, t_end, bounds, remark)
     course.begin(t_start, resume)
     sampled, stalled, cut = int(np.searchsorted(times, t_start, side="right")), 0, 0
     left, factored = bounds.most - made, 0
@@ -111,8 +113,11 @@ def advances(
 class _Course:
     """The solver of a run, as it stands."""
 
-    def __init__(self, method: Adaptive, problem: Problem, t_end: float, bounds: Bounds) -> None:
+    def __init__(
+        self, method: Adaptive, problem: Problem, t_end: float, bounds: Bounds, remark: Remark
+    ) -> None:
         self.method, self.t_end, self._problem, self._bounds = method, t_end, problem, bounds
+        self._remark = remark
         self._longest, self._lookout = bounds.longest, None
         if problem.switching:
             self._lookout = Lookout(
@@ -140,6 +145,8 @@ class _Course:
         self.solver: Any = self.method.solver(
             self._problem.derivative, t, y.copy(), bound, max_step=self._longest, **options
         )
+        if isinstance(self.solver, UNWARNED):
+            self.solver.remark = self._remark
         self.solver.t_bound = until
         self._until = until
         for name in self.method.memory if memory else ():

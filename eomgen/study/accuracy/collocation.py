@@ -22,6 +22,7 @@ from gmpy2 import mpfr
 from numpy.typing import NDArray
 
 from eomgen.precision.precise import BITS, Long, Precise, Watch, digits
+from eomgen.run.integrators.unwarned import factors
 from eomgen.run.problem import Floats, Problem
 from eomgen.study.accuracy import corners
 from eomgen.study.accuracy.corners import Turn
@@ -220,10 +221,10 @@ def _solver(
         matrix = -h * np.einsum("ij,jab->iajb", method.a.astype(float), jacobians)
         matrix = matrix.reshape(stages * ny, stages * ny)
         matrix.flat[:: stages * ny + 1] += 1.0
-        factors = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
+        both = factors(matrix)
 
         def solve_all(residual: Floats) -> Floats:
-            found = scipy.linalg.lu_solve(factors, residual.ravel(), check_finite=False)
+            found = scipy.linalg.lu_solve(both, residual.ravel(), check_finite=False)
             return np.asarray(found).reshape(stages, ny)
 
         return solve_all

@@ -5,13 +5,12 @@ derivative is more than its tolerance, its steps shrink to nothing; Radau's then
 tolerance being looser and more than what rounding makes.
 """
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.integrate import LSODA, Radau
 
+from eomgen.run.integrators.unwarned import LSODA, Radau
 from eomgen.run.noise import step_noise
 from eomgen.run.problem import Floats, Problem
 
@@ -88,9 +87,7 @@ class Forecast:
     def _go_on(self) -> None:
         self._check()
         before = self._solver.t
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # LSODA says in one what it then fails with
-            complaint = self._solver.step()
+        complaint = self._solver.step()
         if self._solver.status == "failed" or not np.isfinite(self._solver.y).all():
             raise NoStep(complaint or "the forecast failed")
         if self._solver.t > before:
