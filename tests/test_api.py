@@ -66,6 +66,28 @@ def test_a_mistake_is_a_line(source: Any, said: str) -> None:
     assert caught.value.lines[0] == said
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"bodeis": []},
+        {"name": 7},
+        {"bodies": [{"name": "ball", "mass": "1 kg", "colour": 0}]},
+        {"joints": [{"name": "pin", "type": "revolt", "child": "ball"}]},
+        {"initial": {"q": [1, "2"]}, "form": "speed"},
+    ],
+)
+def test_a_scene_built_in_python_is_refused_as_a_file_is(change: dict[str, Any]) -> None:
+    """The same lines: place, value, remedy."""
+    tables: dict[str, Any] = {**DROP, **change}
+    lines = []
+    for build in (lambda: eomgen.Scene(**tables), lambda: eomgen.read(tables)):
+        with pytest.raises(eomgen.SceneError) as caught:
+            build()
+        lines.append(caught.value.lines)
+    assert lines[0] == lines[1] and all(line.startswith("scene: ") for line in lines[0])
+    assert eomgen.Scene(**eomgen.read(DROP).__dict__) == eomgen.read(DROP)
+
+
 @pytest.mark.parametrize("scene", ["two_body_forced", "cart_pole", "furuta_pendulum"])
 def test_the_matrices_are_the_equations(scene: str) -> None:
     """M v̇ + V + G = F, with v̇ of the generated module, and of the solution written out."""

@@ -3,7 +3,7 @@
 import sys
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, Strict
+from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
 
 from eomgen.language.base import Identifier, Number, Positive, Table, Text
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
@@ -11,6 +11,7 @@ from eomgen.outputs import OUTPUTS
 from eomgen.scene.effects import Effect
 from eomgen.scene.joints import Joint
 from eomgen.scene.look import Camera, Shape
+from eomgen.scene.mistakes import mistakes
 
 MOST = 1000
 """Most bodies, joints, effects or parameters a scene may list."""
@@ -196,3 +197,12 @@ class Scene(Table):
     initial: Initial = Field(default=Initial(), description="state at the start")
     simulation: Simulation = Field(default=Simulation(), description="how to run it")
     camera: Camera = Field(default=Camera(), description="how to look at it")
+
+    def __init__(self, **tables: Any) -> None:
+        try:
+            super().__init__(**tables)
+        except ValidationError as error:
+            raise mistakes(error, "scene") from None
+
+    # So that pydantic does not call this for what it validates itself, whose errors it returns.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
