@@ -1,8 +1,11 @@
 """The public functions: what they take, what they return, and that nothing else is public."""
 
+import copy
 import pickle
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +14,7 @@ import pytest
 
 import eomgen
 from eomgen.cli import main
+from eomgen.codegen.route import routed
 from eomgen.run.trajectory import Outcome, load_npz
 from eomgen.scene.reader import BUILT_IN
 
@@ -245,3 +249,19 @@ def test_a_linearisation() -> None:
 
 def test_a_verification() -> None:
     assert eomgen.verify("pendulum", states=1).missed == ()
+
+
+def test_values_are_sent_to_another_process() -> None:
+    """There and back, to one that was started anew; what is refused there is raised here."""
+    model, module = eomgen.check("cart_pole"), eomgen.generate("cart_pole")
+    run = eomgen.simulate("cart_pole", t_end=0.1)
+    values = [eomgen.read("cart_pole"), model, module, routed(model).system.program]
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        assert list(pool.map(copy.copy, values)) == values
+        again = pool.submit(copy.copy, run).result()
+        theirs = pool.submit(eomgen.simulate, model.name, t_end=0.1).result()
+        refusal = pool.submit(eomgen.check, {"name": 7}).exception()
+    assert np.array_equal(again.y, run.y) and np.array_equal(theirs.y, run.y)
+    assert again.outcome == run.outcome and again.module == module
+    assert isinstance(refusal, eomgen.SceneError)
+    assert refusal.lines == ("scene: name: 7 is not a text; give one",)
