@@ -394,7 +394,7 @@ def test_a_module_that_gives_no_number_misses_its_bound() -> None:
     module.derivative = lambda *_: np.full(2, np.nan)
     found = judged(model, Truth(model), "aba", {"aba": module}, full, state)
     assert found is not None and np.isnan(found.off["aba"]).all()
-    assert found.losses["residual of aba"].error == np.inf
+    assert found.residuals["aba"].error == np.inf
 
 
 # How long doubles mean anything.

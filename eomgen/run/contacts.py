@@ -146,7 +146,8 @@ class Holding:
             names = ", ".join(self.contacts.names[k] for k in self.held)
             raise StepFailure(
                 f"no contact forces at t = {t:.6g} keep {names} from closing (much friction may do "
-                f"that); take less friction, or another law of contact"
+                "that)",
+                "take less friction, or another law of contact",
             )
         result = columns[:, 0] + (columns[:, 1:] - columns[:, :1]) @ forces
         left = matrix @ forces + offset
@@ -233,7 +234,7 @@ def strikes(
         yield where[first], speed, y
     names = ", ".join(contacts.names[k] for k in where)
     raise StepFailure(
-        f"the impacts among {names} at t = {t:.6g} come to no end; take less restitution"
+        f"the impacts among {names} at t = {t:.6g} come to no end", "take less restitution"
     )
 
 
@@ -263,6 +264,6 @@ def check_depth(contacts: Contacts, t: float, y: Floats) -> None:
     if gaps[deepest] < -TOLERANCE:
         depth = -gaps[deepest] * (contacts.sizes[deepest] if contacts.sizes else 1.0)
         raise StepFailure(
-            f"contact {contacts.names[deepest]} starts {depth:.3g} deep; "
-            "move its bodies apart in the initial state"
+            f"contact {contacts.names[deepest]} starts {depth:.3g} deep",
+            "move its bodies apart in the initial state",
         )

@@ -89,8 +89,8 @@ class _Guard:
             self.since, self.count = t, 0
         if self.count > MOST_EVENTS:
             raise StepFailure(
-                f"contacts struck or opened {MOST_EVENTS} times within {self.least:.2g} s; "
-                "take a larger rest_speed"
+                f"contacts struck or opened {MOST_EVENTS} times within {self.least:.2g} s",
+                "take a larger rest_speed",
             )
 
 
@@ -146,7 +146,7 @@ def advances(
         for advance in steps:
             made += 1
             if made > max_steps:
-                raise StepFailure(f"{max_steps} steps did not suffice; take a shorter --t-end")
+                raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
             step = replace(advance, contact_powers=powers)
             closing, closed = _closing(contacts, now, step, stepper.looks)
             opening, opened = _opening(holding, now, step)

@@ -78,14 +78,15 @@ class Watch:
             if abs(off) > UNIT:
                 state = self.problem.states[indices[0]]
                 raise StepFailure(
-                    f"the quaternion from {state} on is off unit length by {off:.2g}; "
-                    "take a smaller step or tighter tolerances"
+                    f"the quaternion from {state} on is off unit length by {off:.2g}",
+                    "take a smaller step or tighter tolerances",
                 )
         true = self.guard.exact(t, y)
         if not np.isfinite(true).all():
             raise StepFailure(
                 "the step has left the domain: the equations have no finite value there, in long "
-                "numbers either; take a smaller step, or keep away"
+                "numbers either",
+                "take a smaller step, or keep away",
             )
         try:
             found = self.problem.derivative(t, y)
@@ -108,8 +109,8 @@ class Watch:
         left = max(0.0, -math.log10(loss)) if loss < 1 else 0.0
         return StepFailure(
             f"digits lost: accelerations there are right to {left:.0f} of {FULL:.0f} digits only "
-            f"(relative error {loss:.2g}, allowed {self.bound:.2g}); "
-            "take --route orthogonal, or --guard repair"
+            f"(relative error {loss:.2g}, allowed {self.bound:.2g})",
+            "take --route orthogonal, or --guard repair",
         )
 
     def words(self) -> str:
@@ -164,7 +165,7 @@ def repaired(
             t, y = advance.t, advance.y
             made += advance.is_step
             if made > max_steps:
-                raise StepFailure(f"{max_steps} steps did not suffice; take a shorter --t-end")
+                raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
             yield advance
 
 

@@ -291,7 +291,7 @@ def _follow(
             _check_start(problem, run)
             for advance in advances:
                 if not _is_finite(advance):
-                    raise StepFailure(f"the state left the finite numbers; {method.remedy}")
+                    raise StepFailure("the state left the finite numbers", method.remedy)
                 run.take(advance)
                 if tally:
                     tally.take(advance, counts[0].calls, counts[1].calls)
@@ -302,18 +302,26 @@ def _follow(
         return Outcome("interrupted", "interrupted"), f"interrupted at t = {run.t:.6g}"
     except EndedRunError as end:
         run.end()
-        return Outcome("ended", str(end)), f"stopped at {_place(problem, run)}: {end}"
+        return Outcome("ended", end.reason), f"stopped at {_place(problem, run)}: {end}"
     except StepFailure as failure:
         why = problem.explain(run.t, run.y, problem.initial)
-        cause = f"{str(failure).partition(';')[0]}: {why}" if why else str(failure)
+        outcome = Outcome("stopped", failure.reason, failure.remedy)
+        if why:
+            outcome = _stopped(f"{failure.reason}: {why}")
     # Plain Python arithmetic raises where NumPy would give inf or nan: math.exp(1000), 1 / 0.0,
     # math.sqrt(-1); a ValueError is also how SciPy's factorizations refuse a nan.
     except (ArithmeticError, ValueError) as error:
         plain = f"{type(error).__name__}: {error}; {method.remedy}"
-        cause = _why(counts, problem, run, plain)
+        outcome = _stopped(_why(counts, problem, run, plain))
     run.end()
+    cause = "; ".join(filter(None, (outcome.reason, outcome.remedy)))
+    return outcome, f"stopped at {_place(problem, run)}: {cause}"
+
+
+def _stopped(cause: str) -> Outcome:
+    """Of an explanation, whose remedy follows the first semicolon."""
     reason, _, remedy = (part.strip() for part in cause.partition(";"))
-    return Outcome("stopped", reason, remedy), f"stopped at {_place(problem, run)}: {cause}"
+    return Outcome("stopped", reason, remedy)
 
 
 def _why(counts: tuple[_Count, _Count], problem: Problem, run: _Run, error: str) -> str:
@@ -341,7 +349,7 @@ def _check_start(problem: Problem, run: _Run) -> None:
     slope = problem.derivative(run.t, run.y)
     assert slope.shape == run.y.shape, f"derivative has shape {slope.shape}"
     if not np.isfinite(slope).all():
-        raise StepFailure("the derivative there is not finite; change the initial state")
+        raise StepFailure("the derivative there is not finite", "change the initial state")
 
 
 def _is_finite(advance: Advance) -> bool:

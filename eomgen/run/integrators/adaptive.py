@@ -80,7 +80,7 @@ def advances(
         # zero its first few steps may do so and still grow.
         stalled = 0 if t > taken.start else stalled + 1
         if stalled == _STALLED:
-            raise StepFailure(f"the steps have shrunk to nothing; {method.remedy}")
+            raise StepFailure("the steps have shrunk to nothing", method.remedy)
         again = course.passed_over(taken)
         if again:
             cut += again.seen
@@ -107,7 +107,7 @@ def advances(
         if course.ended:
             return
         course.go_on(taken)
-    raise StepFailure(f"{bounds.most} steps did not suffice; {method.remedy}")
+    raise StepFailure(f"{bounds.most} steps did not suffice", method.remedy)
 
 
 class _Course:
@@ -165,7 +165,7 @@ class _Course:
         self.factorisations += int(solver.nlu) - factored
         if solver.status == "failed":
             cause = (complaint or "the method gave up").rstrip(".")
-            raise StepFailure(f"{cause}; {self.method.remedy}")
+            raise StepFailure(cause, self.method.remedy)
         if not self.method.sees_end and solver.status == "finished" and not self.ended:
             solver.turn()
         dense = cache(solver.dense_output)
@@ -230,7 +230,8 @@ def _check_pace(problem: Problem, course: _Course, t_start: float, here: int, le
     if here == _ENOUGH_TO_JUDGE and (solver.t - t_start) * left < (t_end - t_start) * here:
         raise StepFailure(
             f"{here} steps came to {solver.t:g} s only, at which pace the end is more than "
-            f"{left} steps away; take a shorter --t-end, or {method.remedy}"
+            f"{left} steps away",
+            f"take a shorter --t-end, or {method.remedy}",
         )
     if here == _ENOUGH_TO_LOOK and not method.uses_jacobian and method.one_step:
         _check_stiff(problem, solver, (t_start, t_end), here)
@@ -243,7 +244,8 @@ def _check_stiff(problem: Problem, solver: Any, span: tuple[float, float], made:
     if (t_end - t_start) > _MANY_MORE * made * pace:
         why = stiffness(problem, float(solver.t), solver.y, float(solver.t - solver.t_old))
         if why:
-            raise UnstableStepError(f"{made} steps came to {solver.t:g} s only: {why}")
+            reason = f"{made} steps came to {solver.t:g} s only: {why}"
+            raise UnstableStepError(reason, "take --integrator Radau, or BDF")
 
 
 def _stands(t: float, y: Floats, memory: dict[str, Any]) -> Resume:

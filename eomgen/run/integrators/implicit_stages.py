@@ -86,16 +86,16 @@ class ImplicitMethod:
             missing = lengths[:, None] * slopes - changes
             *_, solution, singular = dgesv(square, missing.ravel())
             if singular:
-                raise StepFailure(f"Newton's matrix is singular; {REMEDY}")
+                raise StepFailure("Newton's matrix is singular", REMEDY)
             update = solution.reshape(stages, states)
             changes += update
             size = float(np.abs(update).max())
             if not isfinite(size):
-                raise StepFailure(f"Newton left the finite numbers; {REMEDY}")
+                raise StepFailure("Newton left the finite numbers", REMEDY)
             if size == 0 or (previous and _is_solved(y, changes, update, size, previous)):
                 return np.asarray(changes.sum(axis=0))
             previous = size
-        raise StepFailure(f"Newton did not converge in {MAX_ITERATIONS} iterations; {REMEDY}")
+        raise StepFailure(f"Newton did not converge in {MAX_ITERATIONS} iterations", REMEDY)
 
 
 def _is_solved(y: Floats, changes: Floats, update: Floats, size: float, previous: float) -> bool:

@@ -54,6 +54,7 @@ class Check:
 
     words  what else there is to say
     at     label of the state it comes from
+    taken  whether it is how exact the route taken is
     """
 
     what: str
@@ -63,6 +64,7 @@ class Check:
     words: str = ""
     at: str = ""
     above: bool = False
+    taken: bool = False
 
     @property
     def missed(self) -> bool:
@@ -118,8 +120,17 @@ def forward_checks(
         if route != taken and np.any(errors > asked):
             words += "; loses digits"
         what = f"forward error of v̇, {route}" + (" (taken)" if route == taken else "")
+        label = there[k].state.label
         checks.append(
-            Check(what, float(errors[k]), float(allowed[k]), "ulp", words, there[k].state.label)
+            Check(
+                what,
+                float(errors[k]),
+                float(allowed[k]),
+                "ulp",
+                words,
+                label,
+                taken=route == taken,
+            )
         )
     if len(ulps) > 1:
         spread = np.max(list(ulps.values()), axis=0)
@@ -181,17 +192,16 @@ def matrix_checks(there: Sequence[Judged]) -> list[Check]:
 def loss_checks(there: Sequence[Judged], taken: str) -> list[Check]:
     """Whatever else the module of the route taken computes."""
     checks = []
-    for what in there[0].losses:
-        if what.startswith("residual of ") and what != f"residual of {taken}":
-            continue
-        errors = np.array([one.losses[what].error for one in there])
-        data = np.array([one.losses[what].data for one in there])
+    losses = {"residual M v̇ + h - F": [one.residuals[taken] for one in there]}
+    losses |= {what: [one.losses[what] for one in there] for what in there[0].losses}
+    for what, lost in losses.items():
+        errors = np.array([loss.error for loss in lost])
+        data = np.array([loss.data for loss in lost])
         allowed = np.maximum(BOUND, AMPLIFIED * data)
         k = _worst(errors, allowed)
-        name = "residual M v̇ + h - F" if what.startswith("residual") else what
         words = f"median {np.median(errors):.1f}"
         checks.append(
-            Check(name, float(errors[k]), float(allowed[k]), "ulp", words, there[k].state.label)
+            Check(what, float(errors[k]), float(allowed[k]), "ulp", words, there[k].state.label)
         )
     return checks
 

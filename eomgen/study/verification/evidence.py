@@ -90,7 +90,7 @@ def _numbers(state: State, found: Verified) -> str:
 
 
 def _remedy(check: Check, found: Verified) -> str:
-    if not check.what.startswith("forward error") or "(taken)" not in check.what:
+    if not check.taken:
         return ""
     good = [other for other in found.better if other != found.taken]
     return f"; take --route {good[0]}, which keeps them" if good else ""
@@ -137,7 +137,10 @@ def evidence(found: Verified, horizon: Horizon | None, module: str) -> dict[str,
                 "digits_agreed": _plain(one.agreed),
                 "losses_ulps": {
                     what: [_plain(loss.error), _plain(loss.data)]
-                    for what, loss in one.losses.items()
+                    for what, loss in (
+                        *((f"residual of {route}", loss) for route, loss in one.residuals.items()),
+                        *one.losses.items(),
+                    )
                 },
             }
             for k, one in enumerate(found.judged)

@@ -50,6 +50,7 @@ class Judged:
     agreed     digits to which articulated bodies and virtual work agree, in 60 digits
     condition  number of the mass matrix scaled to a diagonal of ones, 2-norm
     pivot      smallest pivot of that matrix, eliminated from its last row on as LᵀDL does
+    residuals  of M v̇ + h - F at the v̇ of each route
     losses     of everything else that the module computes
     """
 
@@ -60,6 +61,7 @@ class Judged:
     agreed: float
     condition: float
     pivot: float
+    residuals: Mapping[str, Loss]
     losses: Mapping[str, Loss]
 
 
@@ -100,10 +102,18 @@ def judged(
         nq, nv = len(model.coordinates), len(model.velocities)
         vd = {route: ydot[nq : nq + nv] for route, ydot in found.items()}
         off = {route: doubles(long(x) - exact) for route, x in vd.items()}
-        losses = _residuals(free, near, vd, model)
-        losses |= _outputs(free, near, (modules[taken], full), found[taken], state)
-        condition, pivot = _condition(free.mass_matrix)
-        return Judged(state, doubles(exact), off, doubles(data), agreed, condition, pivot, losses)
+        residuals = _residuals(free, near, vd, model)
+        losses = _outputs(free, near, (modules[taken], full), found[taken], state)
+        return Judged(
+            state,
+            doubles(exact),
+            off,
+            doubles(data),
+            agreed,
+            *_condition(free.mass_matrix),
+            residuals,
+            losses,
+        )
 
 
 def _vd(truth: Truth, state: State, parameters: Mapping[str, Any]) -> Array:
@@ -144,12 +154,12 @@ def _derivative(module: Any, state: State) -> Floats:
 def _residuals(
     free: FreeBodies, near: Sequence[FreeBodies], vd: Mapping[str, Floats], model: Model
 ) -> dict[str, Loss]:
-    """Of M v̇ + h - F at the v̇ of each route, in 60 digits."""
+    """Of M v̇ + h - F at the v̇ of each route, by route, in 60 digits."""
     found = {}
     units = [c.unit for c in model.velocities]
     for route, given in vd.items():
         if not np.isfinite(given).all():
-            found[f"residual of {route}"] = Loss(np.inf, 0.0)
+            found[route] = Loss(np.inf, 0.0)
             continue
         largest = {
             u: max(abs(x) for x, w in zip(given, units, strict=True) if w == u) for u in units
@@ -158,7 +168,7 @@ def _residuals(
         v = long(given)
         scale = abs(free.mass_matrix) @ sizes + free.bias_sizes + free.applied_sizes
         true, *changed = (_needed(f, v) for f in (free, *near))
-        found[f"residual of {route}"] = _loss(0.0 * given, true, changed, scale)
+        found[route] = _loss(0.0 * given, true, changed, scale)
     return found
 
 
