@@ -8,16 +8,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from eomgen.api import (
-        check,
-        derive,
-        generate,
-        linearise,
-        load,
-        read,
-        simulate,
-        verify,
-    )
+    from eomgen.api.accuracy import accuracy, arithmetic
+    from eomgen.api.deriving import derive
+    from eomgen.api.effects import effects
+    from eomgen.api.generating import generate, load
+    from eomgen.api.given import check, read
+    from eomgen.api.linearising import linearise
+    from eomgen.api.simulating import simulate
+    from eomgen.api.verifying import horizon, verify
     from eomgen.errors import EomgenError, RunError, SceneError
     from eomgen.results import Derivation, Module, Run
     from eomgen.scene.reader import built_in_names
@@ -31,10 +29,14 @@ __all__ = [
     "RunError",
     "Scene",
     "SceneError",
+    "accuracy",
+    "arithmetic",
     "built_in_names",
     "check",
     "derive",
+    "effects",
     "generate",
+    "horizon",
     "linearise",
     "load",
     "read",
@@ -43,9 +45,14 @@ __all__ = [
 ]
 
 _PLACES = {
-    **dict.fromkeys(
-        ("check", "derive", "generate", "linearise", "load", "read", "simulate", "verify"), "api"
-    ),
+    **dict.fromkeys(("check", "read"), "api.given"),
+    **dict.fromkeys(("generate", "load"), "api.generating"),
+    "derive": "api.deriving",
+    "linearise": "api.linearising",
+    "simulate": "api.simulating",
+    **dict.fromkeys(("horizon", "verify"), "api.verifying"),
+    **dict.fromkeys(("accuracy", "arithmetic"), "api.accuracy"),
+    "effects": "api.effects",
     **dict.fromkeys(("Derivation", "Module", "Run"), "results"),
     **dict.fromkeys(("EomgenError", "RunError", "SceneError"), "errors"),
     "Scene": "scene.schema",

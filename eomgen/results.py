@@ -2,14 +2,16 @@
 
 import html
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from eomgen.files import write_whole
 from eomgen.model.model import Model
+from eomgen.run.limits import Excursion, excursions
 from eomgen.run.problem import Floats
 from eomgen.run.trajectory import Outcome, Trajectory, save_csv, save_npz
+from eomgen.study.diagnosis import joint_limits, locks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,7 +19,11 @@ if TYPE_CHECKING:
     from eomgen.derivation.matrices import Matrices
     from eomgen.derivation.steps import Step
     from eomgen.derivation.symbols import Expr
+    from eomgen.program.passes import PassReport
+    from eomgen.show.balance import Imbalance
     from eomgen.show.motion import Motion
+    from eomgen.study.accuracy.estimate import Estimate
+    from eomgen.study.accuracy.search import Choice
 
 
 @dataclass(frozen=True)
@@ -100,6 +106,8 @@ class Module:
     poses        the page's `bodyPoses`, JavaScript; "" without `body_poses`
     explanation  a line for each route, and which was taken
     notices      what its user must know of it
+    reports      what each pass over the program left of it: steps and operations
+    derived      whether it was derived now; else it was in the store
     """
 
     name: str
@@ -107,6 +115,8 @@ class Module:
     poses: str
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
+    reports: "tuple[PassReport, ...]" = ()
+    derived: bool = field(default=True, compare=False)
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
         """Write the file, whole or not at all. Raises `RunError` where another's is there."""
@@ -128,6 +138,9 @@ class Run:
     options     what on the command line makes the same run
     error       estimated, of the last state, in parts of the motion's scale; nan if not asked for
     warnings    what its user must know
+    choice      of its method and tolerances, where `accuracy` or `budget` made it
+    estimate    of its error by a second run, where that was asked for
+    begun       how it goes on from an earlier run; "" if it does not
     """
 
     model: Model
@@ -137,6 +150,9 @@ class Run:
     options: str
     error: float
     warnings: tuple[str, ...]
+    choice: "Choice | None" = None
+    estimate: "Estimate | None" = None
+    begun: str = ""
 
     @property
     def t(self) -> Floats:
@@ -172,6 +188,28 @@ class Run:
     def energy(self) -> Floats:
         """Kinetic and potential energy together, (n,), J."""
         return self.motion.kinetic_energy + self.motion.potential_energy
+
+    @property
+    def imbalance(self) -> "Imbalance | None":
+        """How far the energy is from what it must be; None where that is not known."""
+        from eomgen.show.balance import imbalance
+
+        return imbalance(self.motion)
+
+    @property
+    def limits(self) -> Mapping[str, tuple[float, float]]:
+        """Of joints, by coordinate, where no stop enforces them."""
+        return joint_limits(self.model)
+
+    @property
+    def excursions(self) -> tuple[Excursion, ...]:
+        """Which coordinates left these limits, and when."""
+        return tuple(excursions(self.trajectory, self.limits))
+
+    @property
+    def locks(self) -> tuple[str, ...]:
+        """Where a spatial mechanism came near gimbal lock, a line for each velocity."""
+        return tuple(locks(self.model, self.trajectory))
 
     def __getitem__(self, state: str) -> Floats:
         """One state over time, (n,). Raises `KeyError` for a name that is none."""

@@ -23,7 +23,7 @@ from eomgen.templating import PACKAGE, templates_folder
 
 AFTER = (
     *("store.py", "entries.py", "run", "precision", "linear", "study", "show", "results.py"),
-    *("api.py", "commands", "cli.py", "__main__.py", "__init__.py"),
+    *("api", "commands", "cli.py", "__main__.py", "__init__.py"),
 )
 """Files and folders of this program that have no say in the code; all others have."""
 LIBRARIES = (

@@ -3,32 +3,15 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 
+from eomgen.api.accuracy import Measured
 from eomgen.commands.shared import print_wrapped
-from eomgen.study.accuracy.ladder import Ladder, Work, order
+from eomgen.study.accuracy.ladder import Work, order
 from eomgen.study.accuracy.reading import TARGETS, cheapest, observed_order, saved_by_jacobian
 from eomgen.study.accuracy.work_precision import Bench
 
 WORDS = {"wrong": "wrong", "failed": "failed", "over": "over", "refused": "not possible"}
 RUNNERS_UP = 2
 """Methods that are named beside the cheapest."""
-
-
-def about(
-    bench: Bench,
-    costs: tuple[float, float],
-    t_end: float,
-    parameters: Mapping[str, float],
-    inputs: Mapping[str, float],
-) -> dict[str, object]:
-    """Columns of the CSV that are the same in every row: what its runs were measured by."""
-    given = {**parameters, **inputs}
-    return {
-        "t_end_s": t_end,
-        "given": " ".join(f"{name}={value!r}" for name, value in given.items()),
-        "reference_error": bench.reference.error,
-        "derivative_s": costs[0],
-        "jacobian_s": costs[1],
-    }
 
 
 def _energy(bench: Bench) -> str:
@@ -51,17 +34,10 @@ def _quaternions(bench: Bench) -> str:
     )
 
 
-def print_table(
-    name: str,
-    bench: Bench,
-    ladder: Ladder,
-    methods: Sequence[str],
-    works: Sequence[Work],
-    costs: tuple[float, float],
-    generation: float,
-    t_end: float,
-) -> None:
+def print_table(name: str, made: Measured) -> None:
     """Print what was measured: a line a run, a word on each method's order, and a reading."""
+    found, bench, methods = made.found, made.bench, made.methods
+    works, costs, t_end, generation = found.works, found.costs, found.t_end, found.generation
     truth = bench.reference
     print(
         f"{name}: {t_end:g} s; one derivative takes {1e6 * costs[0]:.1f} µs, one Jacobian "

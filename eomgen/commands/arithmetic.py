@@ -1,36 +1,30 @@
 """How exact the arithmetic of each route is: the half of `accuracy` that needs no run."""
 
-from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.commands.shared import Arguments, assignments, located, print_wrapped
-from eomgen.errors import RunError
+from eomgen.api.accuracy import arithmetic_of, check_arithmetic
+from eomgen.commands.shared import Arguments, assignments, manner_of, print_wrapped
 from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
-from eomgen.run.progress import terminal_progress
 from eomgen.scene.schema import Simulation
 
 if TYPE_CHECKING:
     from eomgen.study.cost.arithmetic import Arithmetic, Way
 
-MOST_STATES = 100_000
 HEADS = {
     "float64": "float64",
     "float32": "float32, ulp of its own, 2^29 of those above; at the states rounded to it",
 }
 
 
-def check_arithmetic(given: Arguments, name: str) -> None:
+def check_files(given: Arguments, name: str) -> None:
     """Raise `RunError` if this half cannot be done as asked, or not be written."""
     from eomgen.show.style import check_figure
 
-    if given.states is not None and not 1 <= given.states <= MOST_STATES:
-        raise RunError(f"--states: {given.states} is not a number from 1 to {MOST_STATES}")
-    if given.seed < 0:
-        raise RunError(f"--seed: {given.seed} is negative; give 0, 1, 2, …")
+    check_arithmetic(given.states, given.seed, manner_of(given, given.scene))
     check_folder(given.output)
     check_figure(given.output / f"{name}_arithmetic.png", force=given.force)
     check_writable(given.output / f"{name}_arithmetic.csv", force=given.force)
@@ -40,21 +34,18 @@ def print_arithmetic(given: Arguments, model: Model, wanted: Simulation, name: s
     """Judge, print and draw the arithmetic of every route of a scene's model."""
     # Imported here: nothing else needs Matplotlib, or that many digits.
     from eomgen.show.arithmetic import save_figure, save_table
-    from eomgen.study.cost.arithmetic import arithmetic
 
-    check_arithmetic(given, name)
+    check_files(given, name)
     model = model.with_parameters(assignments(given.set, model.defaults, "--set"))
-    label = f"arithmetic of {name}"
-    with located(given.scene), terminal_progress(label) as progress:
-        found = arithmetic(
-            model,
-            wanted,
-            states=given.states,
-            seed=given.seed,
-            single=given.float32,
-            progress=progress,
-        )
-    found = replace(found, name=name)
+    found = arithmetic_of(
+        model,
+        wanted,
+        states=given.states,
+        seed=given.seed,
+        single=given.float32,
+        name=name,
+        manner=manner_of(given, given.scene),
+    )
     print(
         f"{name}: error of v̇ in units in the last place (ulp), by every route; taken: {found.taken}"
     )

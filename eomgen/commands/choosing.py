@@ -5,32 +5,19 @@ import re
 import sys
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from eomgen.commands.shared import Arguments
 from eomgen.errors import RunError
+from eomgen.results import Run
 
 if TYPE_CHECKING:
-    from eomgen.show.motion import Motion
+    from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
-    from eomgen.study.accuracy.trial import Case, Tried
 
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0}
 DRIFTED = 2e-3
 """Of the greatest kinetic energy: where a run gains or loses more than it may, speeds are off by
 half that part, which over a few swings makes another motion."""
 BETTER = "take tighter tolerances or a shorter step, or let --accuracy 1e-3 choose"
-
-
-def check_choice(given: Arguments) -> None:
-    """Raise `RunError` where a run is asked for in two ways at once."""
-    asked = [name for name in ("accuracy", "budget") if getattr(given, name) is not None]
-    if len(asked) > 1:
-        raise RunError("--accuracy, --budget: a run has one aim; give one of them")
-    for aim in asked:
-        for name in ("rtol", "atol", "dt"):
-            if getattr(given, name) is not None:
-                raise RunError(f"--{aim}, --{name}: --{aim} chooses {name} itself; leave one out")
 
 
 def seconds_of(text: str) -> float:
@@ -43,17 +30,6 @@ def seconds_of(text: str) -> float:
     if not 0 < value < math.inf:
         raise RunError(f"--budget {text}: is no time to compute in; give e.g. 2s, 500ms or 1.5min")
     return value
-
-
-def choose(case: "Case", given: Arguments) -> "Choice":
-    """The run that is asked for by its error or its time; each run tried for it is told."""
-    from eomgen.study.accuracy.aimed import aimed
-
-    def say(text: str) -> None:
-        print(f"    trying {text}", flush=True)
-
-    budget = None if given.budget is None else seconds_of(given.budget)
-    return aimed(case, accuracy=given.accuracy, budget=budget, integrator=given.integrator, say=say)
 
 
 def print_choice(choice: "Choice", given: Arguments) -> str:
@@ -75,12 +51,10 @@ def print_choice(choice: "Choice", given: Arguments) -> str:
     return ""
 
 
-def print_estimate(case: "Case", tried: "Tried") -> None:
-    """Say a run's error by a second run, which is made here."""
-    from eomgen.study.accuracy.estimate import by_second_run
+def print_estimate(found: "Estimate") -> None:
+    """Say a run's error, and by which second run it is known."""
     from eomgen.study.accuracy.measure import WRONG
 
-    found = by_second_run(case, tried)
     second = found.second
     if not math.isfinite(found.last):
         print(f"    no error estimate: {second.setting.options} {second.trajectory.message}")
@@ -97,23 +71,18 @@ def print_estimate(case: "Case", tried: "Tried") -> None:
         )
 
 
-def warn_of_energy(motion: "Motion") -> None:
+def warn_of_energy(run: Run) -> None:
     """Warn of a run whose energy is not what it must be: conserved, or accounted for by works."""
-    size = float(np.max(motion.kinetic_energy))
-    if motion.keeps_energy:
-        total = motion.kinetic_energy + motion.potential_energy
-        lost, what = float(np.max(np.abs(total - total[0]))), "exact motion keeps its energy"
-    elif motion.works is not None:
-        change = motion.kinetic_energy - motion.kinetic_energy[0]
-        lost = float(np.max(np.abs(change - motion.works.sum(axis=1))))
-        what = "works and kinetic energy balance in exact motion"
-    else:
+    found = run.imbalance
+    if found is None or not found.lost > DRIFTED * found.size:
         return
-    if lost > DRIFTED * size:
-        _warn(
-            f"{what}, but this run is off by {lost:.2g} J, {lost / size:.1%} of the greatest "
-            f"kinetic energy; {BETTER}"
-        )
+    what = "works and kinetic energy balance in exact motion"
+    if found.conserved:
+        what = "exact motion keeps its energy"
+    _warn(
+        f"{what}, but this run is off by {found.lost:.2g} J, {found.lost / found.size:.1%} of the "
+        f"greatest kinetic energy; {BETTER}"
+    )
 
 
 def _error(value: float) -> str:

@@ -3,10 +3,10 @@
 import math
 from typing import TYPE_CHECKING
 
-from eomgen.commands.shared import Arguments, located, print_wrapped, read_model
-from eomgen.errors import RunError
+from eomgen.api.effects import bill_of, check_motion
+from eomgen.api.manner import Manner
+from eomgen.commands.shared import OPTIONS, Arguments, manner_of, print_wrapped, read_model
 from eomgen.files import check_folder
-from eomgen.run.progress import terminal_progress
 from eomgen.scene.reader import read_scene
 
 if TYPE_CHECKING:
@@ -20,23 +20,20 @@ def effects(given: Arguments) -> int:
     # Imported here: nothing else needs Matplotlib for costs.
     from eomgen.show.bill import save_bill
     from eomgen.show.style import check_figure
-    from eomgen.study.cost.bill import bill
-    from eomgen.study.cost.variants import variants
 
-    if not 0 < given.motion_time < math.inf:
-        raise RunError(f"--motion-time: {given.motion_time:g} is no positive time; give one in s")
+    check_motion(given.motion_time, Manner(option=OPTIONS.__getitem__))
     model, name = read_model(given.scene, given)
     path = given.output / f"{name}_effects.png"
     check_folder(path.parent)
     check_figure(path, force=given.force)
     scene = read_scene(given.scene).replaced(route=model.route)
-    with located(given.scene), terminal_progress(f"costing {name}") as progress:
-        found = bill(
-            scene,
-            variants(scene, each=given.each),
-            motion=0.0 if given.no_motion else given.motion_time,
-            progress=progress,
-        )
+    found = bill_of(
+        scene,
+        each=given.each,
+        motion=None if given.no_motion else given.motion_time,
+        name=name,
+        manner=manner_of(given, given.scene),
+    )
     print(
         f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs "
         f"(±{_us(found.spread)})"

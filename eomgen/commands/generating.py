@@ -3,14 +3,12 @@
 import shlex
 from pathlib import Path
 
-from eomgen.commands.shared import Arguments, code_of, read_model
+from eomgen.api.generating import LARGEST, compiled
+from eomgen.commands.shared import Arguments, manner_of, read_model, required
 from eomgen.errors import EomgenError, RunError, tell_refusal
-from eomgen.files import check_folder, check_writable, read_plain, write_whole
+from eomgen.files import check_folder, check_writable, read_plain
+from eomgen.results import Module
 from eomgen.scene.reader import built_in_names
-from eomgen.store import Code
-
-LARGEST = 2**30
-"""Bytes of a module beyond which it is none of ours."""
 
 
 def generate(given: Arguments) -> int:
@@ -53,20 +51,22 @@ def _generate(scene: str, given: Arguments, paths: dict[Path, str]) -> bool:
         check_folder(given.output)
         check_writable(path, force=given.force)
     # What is checked is what would be derived now, whatever the store holds.
-    code, _ = code_of(scene, model, given, anew=given.check)
+    module, _ = compiled(
+        model, asked=required(given, model), anew=given.check, manner=manner_of(given, scene)
+    )
     current = _text(path)
-    fresh = current == code.module
+    fresh = current == module.source
     if fresh:
         print(f"{path}: fresh")
     elif given.check:
         print(f"{path}: {'missing' if current is None else 'stale'}")
     else:
-        write_whole(path, code.module, force=given.force)
-        print(f"{path}: written{'' if code.derived else ', not derived again'}")
+        module.save(path, force=given.force)
+        print(f"{path}: written{'' if module.derived else ', not derived again'}")
     if given.explain:
-        _print_explanation(code)
+        _print_explanation(module)
     if given.report:
-        _print_report(code)
+        _print_report(module)
     return fresh or not given.check
 
 
@@ -77,13 +77,13 @@ def _text(path: Path) -> str | None:
     return read_plain(path, LARGEST).decode("utf-8", "replace")
 
 
-def _print_explanation(code: Code) -> None:
+def _print_explanation(module: Module) -> None:
     print(f"    {'route':<10}{'cost':>6}  (operations of derivative)")
-    for line in code.explanation:
+    for line in module.explanation:
         print(f"    {line}")
 
 
-def _print_report(code: Code) -> None:
+def _print_report(module: Module) -> None:
     print(f"    {'pass':<20}{'steps':>8}{'derivative':>12}{'jacobian':>10}  (operations)")
-    for line in code.reports:
+    for line in module.reports:
         print(f"    {line.name:<20}{line.steps:>8}{line.derivative:>12}{line.jacobian:>10}")

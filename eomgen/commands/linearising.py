@@ -1,17 +1,16 @@
 """A mechanism linearised, with what control engineers ask of it: `linearise`."""
 
 import math
-import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
+from eomgen.api.linearising import linearisable, linearised_about, state_names
 from eomgen.commands.shared import (
     Arguments,
     assignments,
-    code_of,
     located,
+    manner_of,
     print_listed,
     print_wrapped,
     read_model,
@@ -19,15 +18,11 @@ from eomgen.commands.shared import (
 )
 from eomgen.errors import RunError
 from eomgen.files import check_writable
-from eomgen.linear.equilibrium import equilibrium
-from eomgen.linear.linearise import Linearisation, is_steady, rate_unit, save
-from eomgen.linear.linearise import linearise as linearised
-from eomgen.linear.modes import Mode, controllable_rank, modes, stability
+from eomgen.linear.linearise import Linearisation, rate_unit, save
+from eomgen.linear.modes import Mode
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
-from eomgen.scene.reader import find_scene
-from eomgen.study.diagnosis import problem_of
 
 WIDEST = 12
 """States up to which A and B are printed."""
@@ -38,40 +33,31 @@ STILL = 1e-9
 def linearise(given: Arguments) -> int:
     """Print A and B about an equilibrium or a state, modes, and what the inputs can do."""
     model, _ = read_model(given.scene, given)
-    # Forms other than [q, v] have states that move with the parameters.
-    wanted = ("input_jacobian",) if model.inputs else ()
-    model = replace(model, form="velocity", outputs=wanted)
+    model = linearisable(model)
     parameters = assignments(given.set, model.defaults, "--set")
     inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
     if given.output is not None:
         check_writable(given.output, force=given.force)
         if given.output.suffix not in (".npz", ".csv"):
             raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
-    _, module = code_of(given.scene, model, given)
     with located(given.scene):
-        problem = problem_of(module, parameters or None, inputs or None, model)
-        y = start = _state(given, model, problem.initial)
-        u: Mapping[str, float] | Floats = inputs
-        if given.at != "initial":
-            y, u = equilibrium(
-                module,
-                y,
-                inputs,
-                parameters,
-                hold=given.hold,
-                trim=given.trim,
-                settle=given.at == "rest",
-            )
-        elif given.hold or given.trim:
-            raise RunError("--hold, --trim: are for finding an equilibrium; leave out --at initial")
-        whole = linearised(module, y, u, parameters)
-        steady = given.at == "initial" and is_steady(module, whole, parameters)
-    least = whole.reduced()
-    found = modes(least.A)
+        state = assignments(given.state, state_names(model), "--state")
+    about = linearised_about(
+        model,
+        at=given.at,
+        state=state,
+        parameters=parameters,
+        inputs=inputs,
+        hold=given.hold,
+        trim=given.trim,
+        manner=manner_of(given, given.scene),
+    )
+    module, whole = about.module, about.whole
+    least, found = whole.reduced(), whole.modes
     _print_place(module, whole, given.at, given.trim)
     if given.at != "initial":
-        _print_stopped(model, start)
-    elif steady:
+        _print_stopped(model, about.start)
+    elif about.steady:
         print_wrapped(
             "note        ",
             "a steady motion: no velocity changes, and A and B stay as they are along it",
@@ -83,42 +69,14 @@ def linearise(given: Arguments) -> int:
         "stable": "stable: every small deviation dies out",
         "marginal": "marginal: to first order some small deviation neither dies out nor grows fast",
     }
-    print(f"stability   {verdict[stability(found)]}")
+    print(f"stability   {verdict[whole.stability]}")
     if least.input_names:
-        rank, n = controllable_rank(least.A, least.B), len(least.A)
+        rank, n = whole.controllable_rank, len(least.A)
         print(f"control     rank {rank} of {n}: {'' if rank == n else 'not '}controllable")
     if given.output is not None:
         save(whole, model.name, given.output, force=given.force)
         print(f"wrote {given.output}")
     return 0
-
-
-def _state(given: Arguments, model: Model, initial: Floats) -> Floats:
-    """The scene's initial state with what `--state` changes, quaternions scaled with a notice."""
-    known = (*model.coordinates, *model.velocities)
-    names = [*(c.name for c in known), *(state.name for state in model.states)]
-    degrees = {f"{c.name}_deg": c.name for c in known if "rad" in c.unit}
-    y = initial.copy()
-    for name, value in assignments(given.state, [*names, *degrees], "--state").items():
-        index = names.index(degrees.get(name, name))
-        if given.at != "initial" and len(model.coordinates) <= index < len(known):
-            raise RunError(
-                f"--state {name}: an equilibrium is at rest; leave it out, or give --at initial"
-            )
-        y[index] = math.radians(value) if name in degrees else value
-    for quaternion in model.quaternions:
-        indices = list(quaternion)
-        length = float(np.linalg.norm(y[indices]))
-        if not length:
-            raise RunError(f"--state: the quaternion from {names[indices[0]]} on has no length")
-        if abs(length - 1) > STILL:
-            print(
-                f"eomgen: note: {find_scene(given.scene).name}: --state: the quaternion from "
-                f"{names[indices[0]]} on has length {length:g}; scaled to 1",
-                file=sys.stderr,
-            )
-        y[indices] /= length
-    return y
 
 
 def _print_place(

@@ -4,27 +4,30 @@ import argparse
 import math
 import sys
 import textwrap
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
-from typing import Literal
+from collections.abc import Collection, Sequence
+from contextlib import AbstractContextManager
 
+from eomgen.api.given import Outputs, check_outputs, overridden
+from eomgen.api.manner import Manner
 from eomgen.dynamics.finite import initial_overlaps
-from eomgen.errors import EomgenError, RunError, SceneError, nearest
-from eomgen.model.elaborate import elaborate, outputs_for
+from eomgen.errors import RunError, nearest
+from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model, ways_of
-from eomgen.outputs import OUTPUTS
-from eomgen.run.module import GeneratedModule, load_module
-from eomgen.run.progress import terminal_notice
+from eomgen.run.progress import terminal_notice, terminal_progress
 from eomgen.scene.effects import JointStop
 from eomgen.scene.reader import find_scene, read_scene
 from eomgen.scene.schema import Scene
-from eomgen.store import Code, generated_code
-from eomgen.study.diagnosis import problem_of
 from eomgen.text import one_line
 
 Arguments = argparse.Namespace
 
+OPTIONS = {
+    "inputs": "--input",
+    "motion": "--motion-time",
+    "parameters": "--set",
+    "resume": "--from",
+}
+"""What arguments are called on the command line, where that is not their name."""
 FEW = 40
 """Lines or names of one kind up to which all are shown."""
 
@@ -40,62 +43,46 @@ def read_whole(scene: str, given: Arguments) -> tuple[Scene, Model, str]:
     Files of another form or route than the scene's own are named after these, too. What was put
     right while reading is said on standard error.
     """
-    asked = getattr(given, "outputs", None)
-    names = () if asked is None else _output_names(asked)
+    asked = named_outputs(given)
+    if asked is not None:
+        check_outputs(asked, "--outputs")
     tables = read_scene(scene)
     with located(scene):
         model = elaborate(tables)
         name = model.name
         for notice in model.notices:
             print(f"eomgen: note: {find_scene(scene).name}: {notice}", file=sys.stderr)
-        for option in ("form", "route"):
-            wanted = getattr(given, option, None)
-            if wanted not in (None, getattr(model, option)):
-                model = replace(model, **{option: wanted})
-                name = f"{name}_{wanted}"
-        if asked is not None:
-            chosen = outputs_for(
-                names, "--outputs", model.points, model.inputs, model.parameters, model.driven
-            )
-            model = replace(model, outputs=chosen)
+        wanted = {option: getattr(given, option, None) for option in ("form", "route")}
+        for option, value in wanted.items():
+            if value not in (None, getattr(model, option)):
+                name = f"{name}_{value}"
+        model = overridden(model, **wanted, outputs=asked, place="--outputs")
     return tables, model, name
 
 
-def _output_names(text: str) -> Literal["all"] | Sequence[str]:
-    """The names in `--outputs a,b,c`. Raises `RunError` for one that is none."""
-    if text == "all":
-        return "all"
-    names = [name.strip() for name in text.split(",")]
-    for name in names:
-        if name in ("derivative", "jacobian"):
-            raise RunError(f"--outputs: '{name}' is always there; leave it out")
-        if name not in OUTPUTS:
-            hint = nearest(name, OUTPUTS) or f"; known: all, {', '.join(OUTPUTS)}"
-            raise RunError(f"--outputs: no output '{name}'{hint}")
-    return names
+def named_outputs(given: Arguments) -> Outputs | None:
+    """What `--outputs a,b,c` or `--outputs all` names; None without it."""
+    text: str | None = getattr(given, "outputs", None)
+    if text is None or text == "all":
+        return "all" if text else None
+    return [name.strip() for name in text.split(",")]
 
 
-def code_of(
-    scene: str, model: Model, given: Arguments, *, anew: bool = False
-) -> tuple[Code, GeneratedModule]:
-    """A model's code, derived now or, unless `anew`, before, and its module, loaded and tried.
+def required(given: Arguments, model: Model) -> Sequence[str]:
+    """Outputs that the command line names one by one, and what these take."""
+    return () if named_outputs(given) in (None, "all") else model.outputs
 
-    Why the store was not used is said on standard error, once. Raises `SceneError` if it cannot be
-    evaluated as the scene is, or has no output that the command line names.
-    """
-    with located(scene):
-        with terminal_notice(f"deriving {model.name} …"):
-            code = generated_code(model, anew=anew)
-        note(given, code.notice)
-        for notice in code.notices:
-            note(given, f"{find_scene(scene).name}: {notice}")
-        module = load_module(code.module, model.name)
-        problem_of(module, model=model)
-        if getattr(given, "outputs", None) not in (None, "all"):
-            for name in model.outputs:
-                if not hasattr(module, name):
-                    raise RunError(f"--outputs: '{name}' is made for form = 'velocity' only")
-    return code, module
+
+def manner_of(given: Arguments, scene: str) -> Manner:
+    """How the command line speaks of a scene."""
+    return Manner(
+        place=find_scene(scene).name,
+        option=lambda name: OPTIONS.get(name, f"--{name.replace('_', '-')}"),
+        note=lambda notice: note(given, notice),
+        trying=lambda text: print(f"    trying {text}", flush=True),
+        waiting=terminal_notice,
+        watch=terminal_progress,
+    )
 
 
 def note(given: Arguments, notice: str) -> None:
@@ -105,13 +92,9 @@ def note(given: Arguments, notice: str) -> None:
         given.noted.append(notice)
 
 
-@contextmanager
-def located(scene: str) -> Iterator[None]:
+def located(scene: str) -> AbstractContextManager[None]:
     """Name the scene's file in front of what is said of the scene."""
-    try:
-        yield
-    except EomgenError as error:
-        raise SceneError(*(f"{find_scene(scene).name}: {line}" for line in error.lines)) from None
+    return Manner(place=find_scene(scene).name).located()
 
 
 def assignments(texts: list[str], known: Collection[str], option: str) -> dict[str, float]:

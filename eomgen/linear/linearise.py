@@ -10,6 +10,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.files import write_whole
+from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
 
@@ -65,6 +66,22 @@ class Linearisation:
             rates=self.rates,
             quaternions=(),
         )
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """Of what `reduced` has, the fastest growing first."""
+        return tuple(modes(self.reduced().A))
+
+    @property
+    def stability(self) -> str:
+        """In a word: "unstable", "stable" (asymptotically), or "marginal" between the two."""
+        return stability(list(self.modes))
+
+    @property
+    def controllable_rank(self) -> int:
+        """How many of the numbers that `reduced` has the inputs can reach."""
+        least = self.reduced()
+        return controllable_rank(least.A, least.B)
 
 
 def linearise(module: GeneratedModule, y: Floats, u: Any = None, p: Any = None) -> Linearisation:

@@ -128,6 +128,17 @@ class Trajectory:
         object.__setattr__(self, "y", y)
         object.__setattr__(self, "counts", {key: int(self.counts[key]) for key in COUNTS})
 
+    @property
+    def held(self) -> dict[str, float]:
+        """The contacts that are at rest at the end, and since when, s."""
+        held: dict[str, float] = {}
+        for event in self.events:
+            if event.kind == "rest":
+                held[event.contact] = event.t
+            elif event.kind == "lift":
+                held.pop(event.contact, None)
+        return held
+
 
 def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
     """Write `trajectory` as NumPy's .npz, the same bytes for the same trajectory.

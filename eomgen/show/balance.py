@@ -1,11 +1,12 @@
 """Where energy goes: whether it should stay what it is, and works by the type of effects."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from eomgen.model.model import Model
-from eomgen.show.motion import Array
+from eomgen.show.motion import Array, Motion
 
 MOST_WORKS = 6
 """Works that are told apart one by one; of more, those of a type are summed."""
@@ -26,6 +27,33 @@ def works_by_type(
         slots.setdefault(types[name], []).append(slot)
     called = tuple(f"{t} ({len(k)})" if len(k) > 1 else names[k[0]] for t, k in slots.items())
     return called, np.stack([works[:, k].sum(axis=1) for k in slots.values()], axis=1)
+
+
+@dataclass(frozen=True)
+class Imbalance:
+    """How far a run's energy is from what it must be.
+
+    lost       at most, J
+    size       the greatest kinetic energy, J
+    conserved  whether exact motion keeps its energy; else works account for its change
+    """
+
+    lost: float
+    size: float
+    conserved: bool
+
+
+def imbalance(motion: Motion) -> Imbalance | None:
+    """How far the energy of a motion is from what it must be; None where that is not known."""
+    kinetic = motion.kinetic_energy
+    size = float(np.max(kinetic))
+    if motion.keeps_energy:
+        total = kinetic + motion.potential_energy
+        return Imbalance(float(np.max(np.abs(total - total[0]))), size, True)
+    if motion.works is None:
+        return None
+    left = kinetic - kinetic[0] - motion.works.sum(axis=1)
+    return Imbalance(float(np.max(np.abs(left))), size, False)
 
 
 def keeps_energy(model: Model, inputs: Mapping[str, float]) -> bool:

@@ -10,11 +10,13 @@ import numpy as np
 
 from eomgen.dynamics.finite import effect_sizes, is_singular, values_at
 from eomgen.dynamics.regular import resistances, why_unresisted
-from eomgen.model.model import Model
+from eomgen.model.model import Model, ways_of
 from eomgen.run.module import GeneratedModule, as_problem, given_values
 from eomgen.run.origin import START, UNITS, Origin
 from eomgen.run.problem import Explain, Floats, Problem, unexplained
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.effects import JointStop
+from eomgen.scene.joints.base import Geared
 
 GROWN = 1e9
 """How many times its size at the start an effect has grown where it is worth saying."""
@@ -71,6 +73,20 @@ def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str
         {**model.defaults, **parameters},
         {**dict.fromkeys([i.name for i in model.inputs], 0.0), **inputs},
     )
+
+
+def joint_limits(model: Model) -> dict[str, tuple[float, float]]:
+    """The limits of each coordinate that has some which no stop enforces, by name."""
+    joints = ways_of(model.bodies, model.dimensions)
+    stops = [effect for effect in model.effects if isinstance(effect, JointStop)]
+    stopped = {joint for stop in stops for joint in stop.acted_on(joints)}
+    return {
+        body.positions[0].name: body.joint.limits
+        for body in model.bodies
+        if body.joint.name not in stopped
+        and isinstance(body.joint, Geared)
+        and body.joint.limits is not None
+    }
 
 
 def locks(model: Model, trajectory: Trajectory) -> list[str]:
