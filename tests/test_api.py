@@ -265,3 +265,42 @@ def test_values_are_sent_to_another_process() -> None:
     assert again.outcome == run.outcome and again.module == module
     assert isinstance(refusal, eomgen.SceneError)
     assert refusal.lines == ("scene: name: 7 is not a text; give one",)
+
+
+def test_a_run_goes_on_from_another_or_its_archive(tmp_path: Path) -> None:
+    """To the same bits as if it had not ended, guarded and with its error estimated."""
+    whole = eomgen.simulate("pendulum", t_end=1.0)
+    half = eomgen.simulate("pendulum", t_end=0.5, guard="stop", estimate=True)
+    assert half.estimate is not None and 0 < half.error == half.estimate.last < 1e-6
+    half.save(tmp_path)
+    for earlier in (half, tmp_path / "pendulum.npz"):
+        rest = eomgen.simulate("pendulum", t_end=1.0, resume=earlier)
+        assert rest.begun.endswith("as if the run had not ended")
+        assert np.array_equal(rest.y[-1], whole.y[-1])
+    assert whole.begun == "" and whole.imbalance is not None and whole.imbalance.lost < 1e-6
+    with pytest.raises(eomgen.RunError, match="resume: goes on with a method that is named"):
+        eomgen.simulate("pendulum", resume=half, accuracy=1e-3)
+    with pytest.raises(eomgen.RunError, match="guard: 'watch' is none of stop, repair"):
+        eomgen.simulate("pendulum", guard="watch")  # type: ignore[arg-type]
+
+
+def test_studies_are_values(tmp_path: Path) -> None:
+    """What runs cost, kept in a table and taken from it; what effects cost; how exact it all is."""
+    table = tmp_path / "runs.csv"
+    asked: dict[str, Any] = {"methods": ["rk4"], "quick": True, "t_end": 1.0, "run_time": 0.05}
+    first, again = (eomgen.accuracy("pendulum", **asked, table=table) for _ in range(2))
+    assert first.made == len(first.works) > 1 and again.made == 0
+    assert [w.error for w in again.works] == [w.error for w in first.works]
+    assert len(pickle.loads(pickle.dumps(first)).works) == len(first.works)
+    bill = eomgen.effects("pendulum", motion=None)
+    assert "gravity" in [item.label for item in bill.items]
+    assert eomgen.arithmetic("pendulum", states=1).taken in ("closed", "ldl", "aba")
+    for call, said in (
+        (lambda: eomgen.accuracy("pendulum", t_end=0.0), "t_end: 0 is no positive time"),
+        (lambda: eomgen.effects("pendulum", motion=0.0), "motion: 0 is no positive time"),
+        (lambda: eomgen.arithmetic("pendulum", states=0), "states: 0 is not a number from 1"),
+        (lambda: eomgen.verify("pendulum", seed=-1), "seed: -1 is negative"),
+        (lambda: eomgen.horizon("pendulum", seconds=0.0), "horizon: 0 is no positive time"),
+    ):
+        with pytest.raises(eomgen.RunError, match=said):
+            call()
