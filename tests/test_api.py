@@ -289,7 +289,7 @@ def test_studies_are_values(tmp_path: Path) -> None:
     table = tmp_path / "runs.csv"
     asked: dict[str, Any] = {"methods": ["rk4"], "quick": True, "t_end": 1.0, "run_time": 0.05}
     first, again = (eomgen.accuracy("pendulum", **asked, table=table) for _ in range(2))
-    assert first.made == len(first.works) > 1 and again.made == 0
+    assert first.made == len(first.works) > 0 and again.made == 0
     assert [w.error for w in again.works] == [w.error for w in first.works]
     assert len(pickle.loads(pickle.dumps(first)).works) == len(first.works)
     bill = eomgen.effects("pendulum", motion=None)
