@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from eomgen.errors import EomgenError, InterruptedRunError, tell_refusal
+from eomgen.routes import ROUTES
 from eomgen.streams import steady_streams
 from eomgen.text import breaks_lines, one_line
 
@@ -144,7 +145,7 @@ def _form(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 def _route(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument(
         "--route",
-        choices=("auto", "closed", "ldl", "aba", "orthogonal"),
+        choices=("auto", *ROUTES),
         help="way to the equations (the scene's; auto is the one of the fewest operations that "
         "keeps its digits)",
     )

@@ -21,6 +21,7 @@ FLOORS = (
     "scene.joints",
     "scene.effects",
     "outputs",
+    "routes",
     "scene",
     "model",
     "derivation",

@@ -5,7 +5,7 @@ import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import gmpy2
 import mpmath
@@ -22,9 +22,10 @@ from eomgen.model.model import Model
 from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, Program, finish, interpret
 from eomgen.program.tape import TIME, ExactTape, Stage, Tape
+from eomgen.routes import ROUTES
 from eomgen.run.module import load_module
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.scene.schema import Route, Simulation
+from eomgen.scene.schema import Simulation
 from eomgen.study import timing
 from eomgen.study.cost.arithmetic import (
     BASELINE,
@@ -406,7 +407,7 @@ def test_every_route_is_exact_where_masses_are_even(scene: str) -> None:
     """A few ulps at most states, some hundred at the worst; and every route is there."""
     found = judged(scene, single=scene == "two_body")
     assert found.agreed > 55
-    assert {w.name for w in found.ways} == {*get_args(Route), BASELINE} - {"auto"}
+    assert {w.name for w in found.ways} == {*ROUTES, BASELINE}
     for w in found.ways:
         assert not w.words and w.seconds and w.batch_seconds
         for errors, sample in zip(w.errors, found.samples, strict=True):

@@ -21,7 +21,6 @@ from eomgen.codegen.from_recursion import Recording, from_recursion
 from eomgen.codegen.route import recorded, routed
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.dynamics.impulses import response
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -493,9 +492,9 @@ def test_answers_impulses(dimensions: int) -> None:
     model = elaborate(parse_scene(scene(dimensions, 5, 2, free=True)))
     d = dynamics(model, *state(model, "random", 2), FloatScalars())
     impulse = [random.Random(3).uniform(-1, 1) for _ in model.velocities]
-    expected = response(d, impulse, "aba")
-    assert apart(response(d, impulse, "orthogonal"), expected) < 1e-13
-    assert apart(response(d, impulse, "ldl"), expected) < 1e-13
+    expected = d.response("aba")(impulse)
+    assert apart(d.response("orthogonal")(impulse), expected) < 1e-13
+    assert apart(d.response("ldl")(impulse), expected) < 1e-13
 
 
 def test_mass_of_zero_at_run_time() -> None:

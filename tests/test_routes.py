@@ -6,6 +6,7 @@ are run in plain floats, some as generated modules, some in 60 digits.
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 from importlib.util import find_spec
 from itertools import product
@@ -25,8 +26,11 @@ from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.reactions import reactions
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.pipeline import generate
+from eomgen.routes import ROUTES, RouteSpec
 from eomgen.scalars.floats import FloatScalars
-from eomgen.scene.reader import parse_scene
+from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.study.verification.routes import compiled as all_routes
 
 SEEDS = range(some(75, 150))
 MOST = (6, 14, 30)
@@ -382,3 +386,17 @@ def test_accelerations_are_those_of_the_velocities() -> None:
     places = tree.places(e.module.STATES)
     motion = solve(tree, *np.split(y[places], [len(tree.coordinates)]), u)
     assert apart(flow.astype(float), motion.body_accelerations[tree.rows(e.module.BODIES)]) < 1e-11
+
+
+def test_a_route_is_one_entry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A route of another name, by a recursion that is there, is an entry in the table."""
+    monkeypatch.setitem(ROUTES, "twin", RouteSpec("as aba", "articulated"))
+    model = elaborate(read_scene("bouncing_two_body"))
+    texts = [
+        re.sub(r"\b(aba|twin)\b", "", generate(replace(model, route=route)).module)
+        for route in ("aba", "twin")
+    ]
+    assert texts[0] == texts[1]
+    made, missing = all_routes(replace(model, route="twin"), "twin")
+    assert {"aba", "ldl", "orthogonal"} <= {*made} and "twin" not in missing
+    assert "twin" in all_routes(model, "aba")[0]

@@ -1,17 +1,14 @@
 """What a module knows of rigid contacts: gaps, impacts, and motion under forces that hold."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import chain
 
 from eomgen.codegen.system import ContactLabel, Made
-from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.dynamics import Dynamics, Forward
 from eomgen.dynamics.impulses import generalised, pressed, rough, scaled, struck
 from eomgen.program.differentiate import tangent
 from eomgen.program.tape import Node, Stage, Tape, total
 from eomgen.scene.effects.base import Contact, JointLoad
-
-Forward = Callable[[Sequence[Node] | None], list[Node]]
-"""v̇ under the effects and, if given, forces beside them, one a velocity."""
 
 
 def contact_labels(d: Dynamics) -> tuple[ContactLabel, ...]:

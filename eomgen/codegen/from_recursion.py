@@ -2,12 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from eomgen.codegen.contacts import Forward, contact_labels, contact_outputs
+from eomgen.codegen.contacts import contact_labels, contact_outputs
 from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, make_system, output_shape
 from eomgen.dynamics import observe
 from eomgen.dynamics.composite import Entries, full, solved
-from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.dynamics.impulses import response
+from eomgen.dynamics.dynamics import Dynamics, Forward, Values
 from eomgen.dynamics.instant import Axes
 from eomgen.dynamics.reactions import reactions
 from eomgen.dynamics.sensitivity import sensitivity
@@ -19,9 +18,7 @@ from eomgen.program.differentiate import jacobian, substituted, tangent
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import TIME, Node, Stage, Tape
-
-DIFFERENTIATED = ("closed", "orthogonal")
-"""Routes whose own steps are differentiated: the factors of M have lost what `orthogonal` keeps."""
+from eomgen.routes import ROUTES
 
 
 class Recording:
@@ -52,14 +49,10 @@ class Recording:
         extra = {x.name: node for x, node in zip(model.states, self.x, strict=True)}
         time = self.given(TIME, Stage.INPUTS)
         values = Values(self.parameters, self.inputs, self.q, self.v, extra, time)
-        own: Axes | None = "own" if route == "orthogonal" else axes
+        own: Axes | None = "own" if ROUTES[route].frame_axes else axes
         self.dynamics = Dynamics(model, values, self.scalars, own)
-        recursions = {
-            "aba": self.dynamics.articulated_forward,
-            "ldl": self.dynamics.factored_forward,
-            "orthogonal": self.dynamics.orthogonal_forward,
-        }
-        self.forward: Forward = forward(self) if forward is not None else recursions[route]
+        self.forward: Forward
+        self.forward = self.dynamics.forward(route) if forward is None else forward(self)
         self.vd = self.dynamics.vd = self.forward(None)
         self.position_rates = position_rates(model, self.q, self.v, self.tape)
         self.rates = [*self.position_rates, *self.vd, *self.dynamics.state_rates]
@@ -109,7 +102,7 @@ def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
         by = variables(record, name)
         before, rows = len(tape.steps), _matrix(record, name) if _is_small(record, name) else None
         written = len(tape.steps) - before
-        if rows is None or (record.route in DIFFERENTIATED and written > LARGEST_JACOBIAN):
+        if rows is None or (ROUTES[record.route].differentiated and written > LARGEST_JACOBIAN):
             rows, extra[name] = along_directions(record, by)
             tangents.add(name)
         made[name] = ((ny, len(by)), [node for row in rows for node in row])
@@ -281,14 +274,14 @@ def along_directions(
     directions = [record.given(f"d__{node.step.value}", Stage.INPUTS) for node in by]
     names = tuple(str(d.step.value) for d in directions)
     seeds = {x.index: d for x, d in zip(by, directions, strict=True)}
-    if record.route in DIFFERENTIATED:
+    if ROUTES[record.route].differentiated:
         return [[node] for node in tangent(record.rates, seeds)], names
     d, inputs = record.dynamics, record.beside("vd")
     found = {x.index: vd for x, vd in zip(inputs, record.vd, strict=True)}
     moved, needed = (tangent(f, seeds) for f in (d.applied_force, d.inverse(inputs)))
     left = [a - b for a, b in zip(moved, substituted(needed, found), strict=True)]
     above, beside = (tangent(f, seeds) for f in (record.position_rates, d.state_rates))
-    return [[node] for node in (*above, *response(d, left, record.route), *beside)], names
+    return [[node] for node in (*above, *d.response(record.route)(left), *beside)], names
 
 
 def variables(record: Recording, name: str) -> list[Node]:
@@ -317,7 +310,7 @@ def _matrix(record: Recording, name: str) -> list[list[Node]]:
     d, tape = record.dynamics, record.tape
     zero = tape.constant(0.0)
     by = variables(record, name)
-    if record.route in DIFFERENTIATED:
+    if ROUTES[record.route].differentiated:
         return jacobian(record.rates, by)
     factors = d.factors
     moved = jacobian(d.applied_force, by)

@@ -116,12 +116,7 @@ def _recursion(name: str, model: Model, axes: Axes) -> Accelerations:
     def found(values: Values) -> Sequence[Any]:
         # All states at once: what is 0 at some of them only, is none of a program's zeros.
         d = Dynamics(model, values, ArrayScalars(), axes)
-        forward: dict[str, Callable[[], Sequence[Any]]] = {
-            "aba": d.articulated_forward,
-            "ldl": d.factored_forward,
-            "orthogonal": d.orthogonal_forward,
-        }
-        return forward[name]()
+        return d.forward(name)(None)
 
     return found
 

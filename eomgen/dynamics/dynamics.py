@@ -11,7 +11,7 @@ nothing else, gyroscopic torques are gone, and joints transmit what the remainin
 effects, energies and everything that moves still have them. Energy is then not kept.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 
 from eomgen.dynamics import forces as fc
@@ -36,6 +36,7 @@ from eomgen.dynamics.moving import Moving, Values
 from eomgen.dynamics.orthogonal import Elimination
 from eomgen.dynamics.solids import Solid, centres, ranked, solids
 from eomgen.dynamics.vectors import Vec, no_matrix, sub, turning_in_space, zeros
+from eomgen.routes import ROUTES
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.effects import Driven, Effect, Gravity
@@ -43,7 +44,10 @@ from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
 
-__all__ = ["Dynamics", "Values"]
+__all__ = ["Dynamics", "Forward", "Values"]
+
+Forward = Callable[[Sequence[Scalar] | None], list[Scalar]]
+"""v̇ under the effects and, if given, forces beside them, one a velocity."""
 
 
 class Dynamics(Moving):
@@ -192,6 +196,17 @@ class Dynamics(Moving):
         """The pivots of the articulated-body algorithm."""
         return articulate(self.instant, self.scalars)
 
+    def forward(self, route: str) -> Forward:
+        """What gives v̇ under the effects and forces beside them by the recursion of a route."""
+        found: Forward = getattr(self, f"{ROUTES[route].recursion}_forward")
+        return found
+
+    def response(self, route: str) -> Callable[[Sequence[Scalar]], list[Scalar]]:
+        """What gives M⁻¹ of impulses, or forces, on the velocities by the recursion of a route."""
+        found: Callable[[Sequence[Scalar]], list[Scalar]]
+        found = getattr(self, f"{ROUTES[route].recursion}_response")
+        return found
+
     def articulated_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """v̇ under the effects and forces `tau` beside them, by articulated bodies."""
         pushed = self._pushed(tau)
@@ -211,6 +226,15 @@ class Dynamics(Moving):
         wrenches = fc.wrenches(self.linkage, self.instant, self.loads[0], self.scalars, about)
         found = self._eliminated.respond(self._falling, wrenches, self._pushed(tau))
         return self._fallen(found)
+
+    def articulated_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
+        """M⁻¹ of impulses on the velocities by articulated bodies."""
+        still = [fc.no_force(self.scalars)] * len(self.instant.links)
+        return respond(self.instant, self.articulated, still, impulse, self.scalars)
+
+    def factored_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
+        """The same by LᵀDL factors of the mass matrix."""
+        return solved(self.factors, impulse)
 
     def orthogonal_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """M⁻¹ of impulses on the velocities by orthogonal elimination."""

@@ -18,8 +18,6 @@ and leaves the slip -e u_n A_tn / A_nn.
 from collections.abc import Iterable, Sequence
 
 from eomgen.dynamics import forces as fc
-from eomgen.dynamics.articulated import respond
-from eomgen.dynamics.composite import solved
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.observe import arm
 from eomgen.dynamics.vectors import Vec, add, cross, in_space, turning_in_space, zeros
@@ -118,7 +116,8 @@ def struck(
     """
     scalars = d.scalars
     jacobian = [generalised(d, loads) for loads in directions]
-    responses = [response(d, row[: d.nv], route) for row in jacobian]
+    respond = d.response(route)
+    responses = [respond(row[: d.nv]) for row in jacobian]
     n = len(directions)
     inverse_mass: list[list[Scalar]] = [[None] * n for _ in range(n)]
     for i in range(n):
@@ -133,16 +132,6 @@ def struck(
     ):
         found = [v + p * change for v, change in zip(found, along, strict=True)]
     return found
-
-
-def response(d: Dynamics, impulse: Sequence[Scalar], route: str) -> list[Scalar]:
-    """M⁻¹ of impulses, or forces, on the velocities, by the recursion of a route."""
-    if route == "ldl":
-        return solved(d.factors, impulse)
-    if route == "orthogonal":
-        return d.orthogonal_response(impulse)
-    still = [fc.no_force(d.scalars)] * len(d.instant.links)
-    return respond(d.instant, d.articulated, still, impulse, d.scalars)
 
 
 def impulses(

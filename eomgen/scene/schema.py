@@ -8,6 +8,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationE
 from eomgen.language.base import Identifier, Number, Positive, Table, Text
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.outputs import OUTPUTS
+from eomgen.routes import ROUTES
 from eomgen.scene.effects import Effect
 from eomgen.scene.joints import Joint
 from eomgen.scene.look import Camera, Shape
@@ -18,8 +19,10 @@ MOST = 1000
 
 if TYPE_CHECKING:
     Output = str
-else:  # one of the names
+    Route = str
+else:  # one of the names; `auto` is the route of the fewest operations that keeps its digits
     Output = Literal[tuple(OUTPUTS)]
+    Route = Literal["auto", *ROUTES]
 
 SHOWN = ("kinetic_energy", "potential_energy", "body_poses")
 """The outputs that figures and pages are drawn from."""
@@ -52,7 +55,6 @@ Integrator = Literal[
     "LSODA",
 ]
 Form = Literal["velocity", "momentum", "redundant"]
-Route = Literal["auto", "closed", "ldl", "aba", "orthogonal"]
 LeftOut = Literal["velocity_forces"]
 """What a scene may leave out of the equations on purpose."""
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,11 @@ from eomgen.codegen.route import routed
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import RunError
 from eomgen.model.model import Model
+from eomgen.routes import ROUTES
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
 from eomgen.scalars.extended import DIGITS
-from eomgen.scene.schema import Route, Simulation
+from eomgen.scene.schema import Simulation
 from eomgen.study.cost.single import in_single, kernel_in_single
 from eomgen.study.timing import least_seconds
 from eomgen.study.verification.routes import Made, compiled, loaded, velocities
@@ -132,7 +133,7 @@ def arithmetic(
     taken = routed(model, jacobian=False).system
     others, missing = compiled(model, but=taken.route)
     there = {taken.route: loaded(taken), **others}
-    ways = {route: there[route] for route in get_args(Route) if route in there}
+    ways = {route: there[route] for route in ROUTES if route in there}
     terms = loaded(routed(replace(model, route="aba", outputs=TERMS), jacobian=False).system)
     progress(0.2)
     truth = Truth(model)

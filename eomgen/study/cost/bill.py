@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
-from typing import get_args
 
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed, why_not_compared
 from eomgen.dynamics.regular import check_regular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.routes import ROUTES
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route, Scene, Simulation
@@ -127,7 +127,7 @@ def bill(
     Raises `SceneError` or `RunError` if the whole cannot be compiled or evaluated at its start.
     """
     whole = _compiled(elaborate(counted(scene)))
-    tries = {route: _try(whole, route) for route in get_args(Route) if route != "auto"}
+    tries = {route: _try(whole, route) for route in ROUTES}
     models = [bare(scene), *(part.model for part in parts), *(m for m, _ in tries.values())]
     made: list[_Made | None] = [whole]
     for model in models:

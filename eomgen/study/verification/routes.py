@@ -1,15 +1,14 @@
 """The routes of a model, each compiled and loaded."""
 
 from dataclasses import dataclass, replace
-from typing import get_args
 
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.route import routed, why_not_compared
 from eomgen.codegen.system import System
 from eomgen.errors import EomgenError
 from eomgen.model.model import Model
+from eomgen.routes import ROUTES
 from eomgen.run.module import GeneratedModule, load_module
-from eomgen.scene.schema import Route
 
 
 @dataclass(frozen=True)
@@ -24,8 +23,8 @@ def compiled(model: Model, but: str) -> tuple[dict[str, Made], dict[str, str]]:
     """Every route there is but one, and why not for those that are not."""
     made: dict[str, Made] = {}
     missing: dict[str, str] = {}
-    for route in get_args(Route):
-        if route in ("auto", but):
+    for route in ROUTES:
+        if route == but:
             continue
         words = why_not_compared(model, route)
         try:

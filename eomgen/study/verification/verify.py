@@ -5,7 +5,6 @@ What is asked of it is in `study.bounds`.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import get_args
 
 import numpy as np
 
@@ -13,10 +12,11 @@ from eomgen.dynamics.regular import check_regular
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
+from eomgen.routes import ROUTES
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
-from eomgen.scene.schema import Route, Simulation
+from eomgen.scene.schema import Simulation
 from eomgen.store import generated_code
 from eomgen.study.verification.bounds import (
     OWN,
@@ -181,7 +181,7 @@ def _modules(
     others, missing = compiled(replace(model, outputs=()), but=taken)
     modules = {taken: module, **{route: made.module for route, made in others.items()}}
     progress(0.2)
-    return taken, {r: modules[r] for r in get_args(Route) if r in modules}, full, missing
+    return taken, {r: modules[r] for r in ROUTES if r in modules}, full, missing
 
 
 def _states(run: Visited, module: GeneratedModule) -> list[State]:
