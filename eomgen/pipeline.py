@@ -1,14 +1,23 @@
-"""The whole way from a scene to generated code; each line of `generate` is one stage."""
+"""The whole way from a model to generated code; each line is one stage.
 
-from dataclasses import dataclass
+    Model ─choose▶ Choice ─record▶ System ─optimise▶ System ─render▶ Generated
+
+A scene is read by `scene.reader` and elaborated by `model.elaborate`; `store` keeps what is
+generated, `run` loads and integrates it.
+"""
+
+from dataclasses import dataclass, replace
 
 from eomgen.codegen.backends.javascript import javascript_poses
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
+from eomgen.codegen.choice import Candidate, Choice, choose
+from eomgen.codegen.derive import record
+from eomgen.codegen.system import System, optimised
 from eomgen.dynamics.regular import check_regular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
+from eomgen.program.program import cost
 from eomgen.scene.schema import Scene
 
 
@@ -25,6 +34,36 @@ class Generated:
     notices: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Compiled:
+    """A model's program, optimised, and the choice of its route."""
+
+    system: System
+    choice: Choice
+
+    @property
+    def operations(self) -> int:
+        """Of one call of `derivative`."""
+        return cost(self.system.program, "derivative")["total"]
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The routes it was chosen from; the one taken with the operations of this program."""
+        return tuple(
+            replace(c, operations=self.operations) if c.route == self.system.route else c
+            for c in self.choice.candidates
+        )
+
+    def explanation(self) -> list[str]:
+        """Lines for a reader: each route, its operations, and why the one taken was taken."""
+        lines = []
+        for candidate in self.candidates:
+            count = "-" if candidate.operations is None else str(candidate.operations)
+            taken = " <- taken" if candidate.route == self.system.route else ""
+            lines.append(f"{candidate.route:<10}{count:>6}  {candidate.words}{taken}".rstrip())
+        return lines
+
+
 def generate(model: Model, *, jacobian: bool = True) -> Generated:
     """Derive a model's equations and write them as code. Same model, same bytes.
 
@@ -34,12 +73,29 @@ def generate(model: Model, *, jacobian: bool = True) -> Generated:
     Raises `SceneError` if the mass matrix is singular or the route is not for the model.
     """
     check_regular(model)
-    choice = routed(model, jacobian=jacobian)
+    made = compile_program(model, jacobian=jacobian)
+    return render(made)
+
+
+def compile_program(model: Model, *, jacobian: bool = True, closed: bool = True) -> Compiled:
+    """A model's program by the route it names, or by the one that `choose` takes for it.
+
+    jacobian  whether the derivative's Jacobian is among the outputs
+    closed    whether symbolic routes are tried, if none is named
+    """
+    choice = choose(model, closed=closed)
+    recorded = record(choice.derived, jacobian=jacobian)
+    return Compiled(optimised(recorded), choice)
+
+
+def render(made: Compiled) -> Generated:
+    """The files of a program."""
+    system, choice = made.system, made.choice
     return Generated(
-        python_module(choice.system),
-        javascript_poses(choice.system) if "body_poses" in model.outputs else "",
-        choice.system.reports,
-        tuple(choice.explanation()),
+        python_module(system),
+        javascript_poses(system) if "body_poses" in system.model.outputs else "",
+        system.reports,
+        tuple(made.explanation()),
         tuple(choice.notices()),
     )
 

@@ -7,9 +7,9 @@ import numpy as np
 from engine import MP, STEP, Engine, along, exact, read
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.elaborate import elaborate
+from eomgen.pipeline import compile_program
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.schema import Scene
@@ -30,7 +30,7 @@ def compiled_light(scene: Scene) -> Engine:
     model = elaborate(scene.replaced(outputs=ENERGIES))
     plain = model.route == "auto" and model.form == "velocity"
     route = "aba" if plain else model.route  # without judging the others
-    system = routed(replace(model, route=route), jacobian=False).system
+    system = compile_program(replace(model, route=route), jacobian=False).system
     source = python_module(system)
     return Engine(model, system, source, load_module(source, model.name))
 

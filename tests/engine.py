@@ -10,11 +10,11 @@ import pytest
 
 from eomgen.codegen import from_recursion as recording
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.codegen.system import System
 from eomgen.language.formula import names_in
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.pipeline import compile_program
 from eomgen.program.extended import evaluator
 from eomgen.program.tape import TIME
 from eomgen.run.module import load_module
@@ -133,7 +133,7 @@ def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) 
     with pytest.MonkeyPatch.context() as patch:
         if tangents:
             patch.setattr(recording, "LARGEST_JACOBIAN", -1)
-        system = routed(model, jacobian="jacobian" not in leave_out).system
+        system = compile_program(model, jacobian="jacobian" not in leave_out).system
     source = python_module(system)
     return Engine(model, system, source, load_module(source, f"tested_{model.name}"))
 

@@ -10,7 +10,6 @@ import numpy as np
 from engine import MP
 from spatial_trees import random_spatial_tree
 
-from eomgen.codegen.route import Routed, routed
 from eomgen.codegen.system import System
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.regular import check_regular
@@ -18,6 +17,7 @@ from eomgen.errors import SceneError
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.pipeline import Compiled, compile_program
 from eomgen.program.program import interpret
 from eomgen.program.tape import TIME
 from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
@@ -102,12 +102,12 @@ def dynamics(model: Model, p: Any, q: Any, v: Any, u: Any, scalars: Any) -> Dyna
     return Dynamics(model, values, scalars, "own")
 
 
-def taken(model: Model) -> Routed:
+def taken(model: Model) -> Compiled:
     """The steps of the route that `auto` takes, `closed` left out, and what it tells of its digits.
 
     Raises `SceneError` where it refuses the scene.
     """
-    return routed(model, jacobian=False, closed=False)
+    return compile_program(model, jacobian=False, closed=False)
 
 
 def found(

@@ -11,9 +11,9 @@ import numpy as np
 from engine import Engine, read
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.language.formula import parse
 from eomgen.model.elaborate import elaborate
+from eomgen.pipeline import compile_program
 from eomgen.run.module import load_module
 from eomgen.scene.effects.base import (
     Contact,
@@ -165,7 +165,7 @@ def striking(scene: str, *effects: EffectTable, route: str = "auto") -> Engine:
     model = elaborate(read(scene).replaced(outputs=OUTPUTS))
     every: Any = (*model.effects, *effects)
     model = replace(model, effects=every, route=route)  # type: ignore[arg-type]
-    system = routed(model).system
+    system = compile_program(model).system
     source = python_module(system)
     return Engine(model, system, source, load_module(source, f"striking_{model.name}"))
 

@@ -15,13 +15,13 @@ import pytest
 from aligned_trees import Case, case, exactly, names, nearby, scene
 from campaign import some
 
-from eomgen.codegen.route import ENOUGH, FEWEST, routed
+from eomgen.codegen.choice import ENOUGH, FEWEST
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import generate
+from eomgen.pipeline import compile_program, generate
 from eomgen.precision.longs import doubles, long_digits
 from eomgen.program.program import interpreter
 from eomgen.program.tape import TIME
@@ -49,7 +49,7 @@ def tried(given: Case, *, closed: bool = False, **more: object) -> str:
     try:
         model = elaborate(parse_scene(scene(given, **more)))
         check_regular(model)
-        made = routed(model, jacobian=False, closed=closed)
+        made = compile_program(model, jacobian=False, closed=closed)
     except SceneError:
         return "refused"
     try:
@@ -75,7 +75,7 @@ def tried(given: Case, *, closed: bool = False, **more: object) -> str:
     if size < aligned_trees.NOTHING:
         return "right" if error <= BOUND else f"off by {error:.1e}, where all is 0"
     error, allowed = error / size, BOUND + TIMES * max(map(off, near)) / size
-    if made.digits is not None and allowed < error <= allowed + 10.0**-made.digits:
+    if made.choice.digits is not None and allowed < error <= allowed + 10.0**-made.choice.digits:
         return "told"
     return "right" if error <= allowed else f"off by {error:.1e}, allowed {allowed:.1e}"
 
@@ -272,7 +272,7 @@ def test_routes_are_judged_by_the_steps_that_are_written() -> None:
     """Two slides 1.4e-4 from parallel: articulated bodies lose seven digits in the world's axes,
     which are those that they are written in here, and none in the frames' own.
     """
-    made = routed(elaborate(parse_scene(OBLIQUE)))
+    made = compile_program(elaborate(parse_scene(OBLIQUE)))
     assert made.system.route == "orthogonal"
     lost = {line.split()[0]: line for line in made.explanation()}
     assert lost["aba"].endswith("would lose 7 digits") and lost["orthogonal"].endswith("<- taken")
@@ -333,11 +333,11 @@ def test_what_digits_are_right_is_told() -> None:
     """A moment of inertia of 1e-14 beside masses on arms: run, and told what it costs; one of 1e-6:
     run, and nothing said.
     """
-    few = routed(elaborate(parse_scene(UNEVEN.replace("MOMENT", "1e-14"))), jacobian=False)
-    assert few.digits is not None and FEWEST <= few.digits < ENOUGH
-    assert f"{few.digits} of 16 digits of accelerations are right" in few.notices()[0]
-    many = routed(elaborate(parse_scene(UNEVEN.replace("MOMENT", "1e-6"))), jacobian=False)
-    assert many.system.route == "orthogonal" and not many.notices()
+    few = compile_program(elaborate(parse_scene(UNEVEN.replace("MOMENT", "1e-14"))), jacobian=False)
+    assert few.choice.digits is not None and FEWEST <= few.choice.digits < ENOUGH
+    assert f"{few.choice.digits} of 16 digits of accelerations are right" in few.choice.notices()[0]
+    many = compile_program(elaborate(parse_scene(UNEVEN.replace("MOMENT", "1e-6"))), jacobian=False)
+    assert many.system.route == "orthogonal" and not many.choice.notices()
 
 
 NEEDLE = """
@@ -362,7 +362,7 @@ def test_slight_moments_of_inertia() -> None:
     """A needle on a base that turns faster and faster about the needle's own axis, which resists by
     1e-13 of what the others do: 0.3 rad/s² less 0.7 rad/s².
     """
-    assert routed(elaborate(parse_scene(NEEDLE))).digits is None
+    assert compile_program(elaborate(parse_scene(NEEDLE))).digits is None
     for route, module in modules(NEEDLE, "aba", "ldl", "orthogonal").items():
         found = module.derivative(0.0, [0.2, 0.4])[1]
         assert found == pytest.approx(-0.4, rel=1e-14), route
@@ -377,5 +377,5 @@ def test_nearly_parallel_axes_are_two() -> None:
             with pytest.raises(SceneError, match="are parallel"):
                 elaborate(parse_scene(text))
             continue
-        system = routed(elaborate(parse_scene(text)), jacobian=False, closed=False).system
+        system = compile_program(elaborate(parse_scene(text)), jacobian=False, closed=False).system
         assert system.route

@@ -15,10 +15,10 @@ from engine import MP, Digits, apart, exact, read
 
 from eomgen.cli import main
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.codegen.system import System
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.pipeline import compile_program
 from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, Program, finish, interpret
 from eomgen.program.tape import TIME, ExactTape, Stage, Tape
@@ -133,7 +133,7 @@ def way(found: Arithmetic, name: str, precision: str = "float64") -> Way:
 def bare(scene: str, route: str = "auto") -> System:
     """A scene's derivative by a route, and nothing else."""
     model = replace(model_of(scene), outputs=(), route=route, form="velocity")
-    return routed(model, jacobian=False).system
+    return compile_program(model, jacobian=False).system
 
 
 def states_of(system: System, count: int = 5) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,6 @@ import eomgen.derivation.general
 from eomgen.cli import main
 from eomgen.codegen.from_general import from_general
 from eomgen.codegen.from_recursion import Recording, from_recursion
-from eomgen.codegen.route import routed
 from eomgen.codegen.system import System
 from eomgen.derivation.general.constraints import about, hat, of_quaternion, state_joints
 from eomgen.derivation.general.derive import GeneralEquations, derive_general
@@ -30,7 +29,7 @@ from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_model
+from eomgen.pipeline import compile_model, compile_program
 from eomgen.program.extended import evaluator
 from eomgen.run.module import load_module
 from eomgen.scene.joints import Free
@@ -399,11 +398,11 @@ def test_independent_of_the_recursions() -> None:
 def test_route_closed_and_auto() -> None:
     """`closed` takes any small tree; `auto` tries it on few velocities and takes what is least."""
     for name in TOLD:
-        choice = routed(elaborate(read_scene(name)))
+        choice = compile_program(elaborate(read_scene(name)))
         assert choice.system.route == "closed", name
     puma = elaborate(read_scene("puma560"))
     assert why_not_closed(puma) == "" and "velocities" not in why_not_tried(puma)
-    assert routed(puma).system.route == "aba"
+    assert compile_program(puma).system.route == "aba"
     figure = elaborate(read_scene("quadruped"))
     assert why_not_closed(figure).startswith(f"it is for {MOST_GENERAL_BODIES} bodies at most")
     floating = tree(1, SPACE, 4)
@@ -411,9 +410,9 @@ def test_route_closed_and_auto() -> None:
     assert len(floating.velocities) == 15 and why_not_closed(floating) == ""
     assert why_not_closed(many).startswith("it is for 15 velocities at most")
     with pytest.raises(SceneError, match="needs the closed form"):
-        routed(replace(figure, route="closed"))
+        compile_program(replace(figure, route="closed"))
     with pytest.raises(SceneError, match="form: 'momentum' needs the closed form"):
-        routed(replace(elaborate(read_scene("cart_pole")), form="momentum"))
+        compile_program(replace(elaborate(read_scene("cart_pole")), form="momentum"))
 
 
 def test_a_module_observes_what_the_recursions_do() -> None:

@@ -22,11 +22,11 @@ from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random
 
 from eomgen.cli import main
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
+from eomgen.pipeline import compile_program
 from eomgen.scalars.exact import Real
 from eomgen.scene.effects.base import Contact, JointLoad, Load
 from eomgen.scene.effects.vectors import NEAREST
@@ -631,7 +631,7 @@ def test_absence_is_free() -> None:
     text = scene("spheres", PLANE, *HUNT, *RUB)
     model = replace(elaborate(parse_scene(text).replaced(effects=[], outputs="all")), route="aba")
     kept = tuple(name for name in model.outputs if name in KEPT)
-    assert python_module(routed(replace(model, outputs=kept)).system) == plain
+    assert python_module(compile_program(replace(model, outputs=kept)).system) == plain
     assert made(text, tangents=False).source != plain
     smooth = made(free("b") + contact('body = "b"', "radius = 0.1", *SPRING)).module
     assert smooth.COST["derivative"].get("sqrt", 0) == 0

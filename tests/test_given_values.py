@@ -12,9 +12,9 @@ import pytest
 from engine import MP, engine, quick
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.language.formula import Constant, Formula, evaluate, parse
 from eomgen.model.elaborate import elaborate
+from eomgen.pipeline import compile_program
 from eomgen.program.tape import Tape
 from eomgen.run.integrate import integrate
 from eomgen.run.module import load_module
@@ -67,7 +67,7 @@ def test_zeros_of_a_scene_have_no_sign(route: str) -> None:
         scene = parse_scene(TURNED.format(a=-0.0, torque=" + ".join(torques)))
         model = elaborate(scene.replaced(route=route))
         assert math.copysign(1.0, model.defaults["a"]) == 1.0
-        module = load_module(python_module(routed(model, jacobian=False).system))
+        module = load_module(python_module(compile_program(model, jacobian=False).system))
         assert module.derivative(0.0, STILL)[1] == 0.0
     assert evaluate(parse("atan2(b, -0.0)"), {"b": 0.0}, FloatScalars()) == 0.0
 

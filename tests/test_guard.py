@@ -10,9 +10,9 @@ import pytest
 
 from eomgen.cli import main
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate
+from eomgen.pipeline import compile_program
 from eomgen.precision.guarding import guard_of
 from eomgen.run.guard import LOST, Guard, Watch
 from eomgen.run.integrate import integrate
@@ -52,7 +52,7 @@ r_child = [-0.5, 0]
 def heavy(route: str) -> Any:
     """Its module by a route."""
     model = replace(elaborate(parse_scene(HEAVY)), route=route)
-    return load_module(python_module(routed(model, jacobian=False).system))
+    return load_module(python_module(compile_program(model, jacobian=False).system))
 
 
 def run(module: Any, guard: Guard | None) -> Any:
@@ -102,7 +102,7 @@ def test_a_repaired_run_is_right() -> None:
 def test_a_healthy_run_is_the_same_with_and_without(integrator: str) -> None:
     """Byte for byte, counts included, whether the guard would stop or repair."""
     model = elaborate(read_scene("babyboot"))
-    module = load_module(python_module(routed(replace(model, outputs=())).system))
+    module = load_module(python_module(compile_program(replace(model, outputs=())).system))
     problem = as_problem(module)
     options: dict[str, Any] = {"dt": 0.01} if integrator == "rk4" else {}
     plain = integrate(problem, integrator, 0.3, samples=11, **options)
@@ -183,7 +183,8 @@ def test_what_doubles_cannot_evaluate_counts_as_lost() -> None:
 def test_contacts_cannot_be_repaired() -> None:
     """A line says so, and what can be done."""
     model = elaborate(read_scene("bouncing_two_body"))
-    module = load_module(python_module(routed(replace(model, outputs=()), jacobian=False).system))
+    system = compile_program(replace(model, outputs=()), jacobian=False).system
+    module = load_module(python_module(system))
     with pytest.raises(RunError, match="cannot be repaired; let it stop instead"):
         integrate(as_problem(module), "DOP853", 1.0, guard=guard_of(module, repairs=True))
     assert integrate(as_problem(module), "DOP853", 0.7, guard=guard_of(module)).finished

@@ -7,11 +7,11 @@ import pytest
 from campaign import some
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.finite import values_at
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.pipeline import compile_program
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import BUILT_IN, parse_scene
@@ -57,7 +57,7 @@ def test_long_chains_keep_their_digits(count: int) -> None:
     where the condition number is a thousandth, and far less than that would let expect.
     """
     model, y = chain(count), states(count)
-    made = routed(model, jacobian=False).system
+    made = compile_program(model, jacobian=False).system
     module = load_module(python_module(made), f"chain_{count}")
     true = Truth(model)(np.zeros(len(y)), y)
     for k, state in enumerate(y):

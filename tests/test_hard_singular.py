@@ -10,11 +10,11 @@ import pytest
 from campaign import some
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.dynamics.regular import check_regular, resistances
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.pipeline import compile_program
 from eomgen.run.integrate import integrate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
@@ -95,7 +95,7 @@ NEARLY = {
 def test_nearly_singular_models_are_solved_to_their_condition(scene: str, small: float) -> None:
     """Against 60 digits, at random poses, straight and all but straight ones."""
     model = replace(elaborate(parse_scene(NEARLY[scene](small))), outputs=("mass_matrix",))
-    module = load_module(python_module(routed(model, jacobian=False).system), "nearly")
+    module = load_module(python_module(compile_program(model, jacobian=False).system), "nearly")
     noise, count = np.random.default_rng(7), len(model.coordinates)
     q = [noise.uniform(-3, 3, count) for _ in range(3)]
     q += [np.zeros(count), np.full(count, 1e-7)]
@@ -131,7 +131,7 @@ LOCK = "next to nothing resists 'j_angle_1_dot' of joint 'j', gimbal lock: a tur
 def test_a_universal_joint_crosses_gimbal_lock(method: str) -> None:
     """Swung right through it: energy is kept, nothing is nan, and the crossing is named."""
     model = cardan("q = { j_angle_2 = 1.0 }, v = { j_angle_2_dot = 9.0 }")
-    module = load_module(python_module(routed(model, jacobian=False).system), "cardan")
+    module = load_module(python_module(compile_program(model, jacobian=False).system), "cardan")
     step = {"dt": 1e-3} if method == "rk4" else {}
     run = integrate(problem_of(module, model=model), method, 1.0, samples=1001, **step)
     assert run.finished and np.isfinite(run.y).all()
@@ -147,7 +147,7 @@ def test_a_universal_joint_crosses_gimbal_lock(method: str) -> None:
 def test_a_start_in_gimbal_lock_stops_with_the_reason() -> None:
     """There a turn about the first axis has no acceleration."""
     model = cardan("q = { j_angle_2_deg = 90.0 }, v = { j_angle_1_dot = 1.0 }")
-    module = load_module(python_module(routed(model, jacobian=False).system), "locked")
+    module = load_module(python_module(compile_program(model, jacobian=False).system), "locked")
     run = integrate(problem_of(module, model=model), "DOP853", 1.0)
     assert not run.finished and math.isfinite(run.y[-1].sum())
     assert LOCK in run.message and "take a joint of type 'ball'" in run.message

@@ -19,10 +19,10 @@ from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
 from eomgen.codegen.from_recursion import Recording
-from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.elaborate import elaborate
+from eomgen.pipeline import compile_program
 from eomgen.program.program import Output, Program, cost, finish, live_steps
 from eomgen.program.tape import TIME, Stage
 from eomgen.scalars.floats import FloatScalars
@@ -619,7 +619,7 @@ def test_jacobian_of_large_scenes(name: str) -> None:
 def operations(text: str, route: str) -> int:
     """Of one call of `derivative` of a scene that has no output but those that all have."""
     model = elaborate(read(text).replaced(outputs=()))
-    system = routed(replace(model, route=route)).system
+    system = compile_program(replace(model, route=route)).system
     return cost(system.program, "derivative")["total"]
 
 

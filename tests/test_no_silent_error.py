@@ -13,9 +13,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scaled_trees import apart, drawn, dynamics, found, size_of, state, truth
 
-from eomgen.codegen.route import Routed, routed
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
+from eomgen.pipeline import Compiled, compile_program
 from eomgen.scalars.extended import Bits, sixty_digits
 
 BOUND, TIMES = 1e-10, 1e3
@@ -41,7 +41,7 @@ def tried(seed: int, dimensions: int, decades: Sequence[float], special: bool) -
     except ZeroDivisionError:
         return "refused"
     bound = BOUND + TIMES * allowed
-    if made.digits is not None and bound < off <= bound + 10.0**-made.digits:
+    if made.choice.digits is not None and bound < off <= bound + 10.0**-made.choice.digits:
         return "told"
     return "right" if off <= bound else f"off by {off:.1e}, allowed {bound:.1e}"
 
@@ -153,8 +153,8 @@ def test_most_are_right() -> None:
 def test_it_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     """Articulated bodies alone are silently wrong."""
 
-    def by_one(model: Model) -> Routed:
-        return routed(replace(model, route="aba"), jacobian=False)
+    def by_one(model: Model) -> Compiled:
+        return compile_program(replace(model, route="aba"), jacobian=False)
 
     monkeypatch.setattr(scaled_trees, "taken", by_one)
     r = np.random.default_rng(1)

@@ -18,12 +18,12 @@ from campaign import some
 from engine import MP, Digits, apart, engine
 
 from eomgen.codegen.from_recursion import Recording, from_recursion
-from eomgen.codegen.route import recorded, routed
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.pipeline import compile_program
 from eomgen.program.program import Output, cost, finish, interpret
 from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
 from eomgen.scalars.floats import ArrayScalars, FloatScalars
@@ -322,7 +322,7 @@ def test_a_route_that_gives_no_number_loses_all_digits_and_hides_nobody_elses() 
     model = elaborate(parse_scene("\n".join(lines)))
     lost = lost_by_recursions(model, closely=True)
     assert lost["ldl"] > 15 and lost["aba"] > 8 and lost["orthogonal"] < 1
-    assert routed(model, jacobian=False).system.route == "orthogonal"
+    assert compile_program(model, jacobian=False).system.route == "orthogonal"
 
 
 def test_free_pair() -> None:
@@ -393,7 +393,8 @@ def test_rows_that_hold_next_to_nothing_of_an_axis(angle: float, rate: float) ->
 
 def operations(text: str, route: str) -> int:
     """Of `derivative`."""
-    record = recorded(elaborate(parse_scene(text)), route)
+    model = elaborate(parse_scene(text))
+    record = Recording(model, route, axes=derive(model, route).axes)
     outputs = {"v": Output((len(record.rates),), tuple(x.index for x in record.rates))}
     return cost(finish(record.tape, outputs, ()), "v")["total"]
 
@@ -430,13 +431,13 @@ def tip(mass: float, n: int = 3) -> str:
 
 def test_taken_where_masses_call_for_it() -> None:
     """`auto` takes it for a heavy tip and says why; else another route, and says nothing of it."""
-    heavy_tip = routed(elaborate(parse_scene(tip(1e12))))
+    heavy_tip = compile_program(elaborate(parse_scene(tip(1e12))))
     assert heavy_tip.system.route == "orthogonal"
     lines = heavy_tip.explanation()
     assert all("would lose" in line for line in lines if " operations a call" in line)
     assert lines[-1].startswith("orthogonal") and lines[-1].endswith("<- taken")
     assert "keeps digits that bodies and joints take from others" in lines[-1]
-    ordinary = routed(elaborate(parse_scene(tip(2.0, 2))))
+    ordinary = compile_program(elaborate(parse_scene(tip(2.0, 2))))
     assert ordinary.system.route != "orthogonal"
     assert not any("digits" in line or "orthogonal" in line for line in ordinary.explanation())
 
@@ -567,7 +568,7 @@ def test_every_output() -> None:
     text = find_scene("bouncing_two_body").read_text()
     text = text.replace("outputs = []", 'outputs = "all"') + EVERYTHING
     ours, theirs = (
-        routed(replace(elaborate(parse_scene(text)), route=route)).system
+        compile_program(replace(elaborate(parse_scene(text)), route=route)).system
         for route in ("orthogonal", "aba")
     )
     assert {"impact", "jacobian", "parameter_jacobian", "input_jacobian"} <= {*ours.program.outputs}

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from eomgen.cli import main
-from eomgen.codegen.route import routed
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
+from eomgen.pipeline import compile_program
 from eomgen.program.program import cost
 from eomgen.run.integrators import find_integrator
 from eomgen.scene.reader import parse_scene, read_scene
@@ -61,7 +61,7 @@ def test_refusals_say_what_is_wrong(old: str, new: str, message: str) -> None:
             "9.81 }", '9.81 }, { type = "motor", name = "drive", joint = "pivot", torque = 1 }'
         )
     with pytest.raises(SceneError) as error:
-        routed(elaborate(parse_scene(text)))
+        compile_program(elaborate(parse_scene(text)))
     assert str(error.value) == message
 
 
@@ -77,9 +77,9 @@ def test_times_within_their_spread_are_no_times() -> None:
 def test_routes_are_counted_alike(name: str) -> None:
     """What is told of a route's operations is what its module takes, where closed is tried."""
     model = replace(elaborate(read_scene(name)), route="auto")
-    told = {c.route: c.operations for c in routed(model, jacobian=False).candidates}
+    told = {c.route: c.operations for c in compile_program(model, jacobian=False).candidates}
     for route in (route for route, count in told.items() if count is not None):
-        system = routed(replace(model, route=route), jacobian=False).system
+        system = compile_program(replace(model, route=route), jacobian=False).system
         assert told[route] == cost(system.program, "derivative")["total"], route
     assert told["closed"] and told["aba"]
 

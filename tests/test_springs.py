@@ -18,11 +18,11 @@ from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
+from eomgen.pipeline import compile_program
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.vectors import NEAREST
 from eomgen.scene.reader import parse_scene
@@ -563,7 +563,7 @@ def test_absence_is_free(kind: str) -> None:
     without = scene.replaced(effects=[e for e in scene.effects if e.name != "e"])
     model = replace(elaborate(without), route="aba")
     kept = tuple(name for name in model.outputs if name in KEPT)
-    assert python_module(routed(replace(model, outputs=kept)).system) == plain
+    assert python_module(compile_program(replace(model, outputs=kept)).system) == plain
     assert made(linked(table)).source != plain
 
 

@@ -15,10 +15,10 @@ from gmpy2 import mpfr
 
 from eomgen.cli import main
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
+from eomgen.pipeline import compile_program
 from eomgen.precision.longs import doubles, long, long_digits
 from eomgen.run.module import load_module
 from eomgen.scene.reader import find_scene
@@ -231,7 +231,7 @@ def test_kinetic_energy_of_free_bodies_has_their_mass_matrix() -> None:
 def test_hard_states_are_what_their_kinds_say() -> None:
     """The same for the same seed, others for another; each of its kind."""
     model = replace(model_of("human_figure"), form="velocity", outputs=())
-    module: Any = load_module(python_module(routed(model, jacobian=False).system))
+    module: Any = load_module(python_module(compile_program(model, jacobian=False).system))
     nv, nq = len(model.velocities), len(model.coordinates)
     states = hard_states(module, nv, 2, 0, 1.0)
     assert [s.kind for s in states] == [k for k in KINDS for _ in range(1 if k == "zero" else 2)]
@@ -278,7 +278,7 @@ def test_a_floating_tree_keeps_what_it_should() -> None:
 def test_what_takes_energy_is_named() -> None:
     """Damping does, gravity, the spring without and a motor at rest do not."""
     model = replace(model_of(SCREW), outputs=())
-    module: Any = load_module(python_module(routed(model, jacobian=False).system))
+    module: Any = load_module(python_module(compile_program(model, jacobian=False).system))
     states = [s for s in hard_states(module, len(model.velocities), 1, 0, 1.0) if s.number == 0]
     keeps = kept(model, states[-2:])
     assert not keeps.energy and keeps.takers == ("drive", "cord") and keeps.momentum == ()
@@ -370,7 +370,7 @@ def good() -> tuple[tuple[Model, Simulation], str]:
     """A model and how it is run, and the source of its module in which nothing is found."""
     model, wanted = scene_of("acrobot")
     model = replace(model, outputs=in_order(OUTPUTS), route="aba")
-    source = python_module(routed(model).system)
+    source = python_module(compile_program(model).system)
     assert not verify(model, wanted, states=1, module=load_module(source)).missed
     return (model, wanted), source
 
@@ -387,9 +387,9 @@ def test_a_fault_in_a_module_is_caught(fault: str) -> None:
 def test_a_module_that_gives_no_number_misses_its_bound() -> None:
     """Errors are infinite then, and nothing is raised."""
     model = replace(model_of("pendulum"), outputs=())
-    module: Any = load_module(python_module(routed(model).system))
+    module: Any = load_module(python_module(compile_program(model).system))
     bare = replace(model, outputs=in_order(OUTPUTS))
-    full: Any = load_module(python_module(routed(bare).system))
+    full: Any = load_module(python_module(compile_program(bare).system))
     state = hard_states(module, 1, 1, 0, 1.0)[1]
     module.derivative = lambda *_: np.full(2, np.nan)
     found = judged(model, Truth(model), "aba", {"aba": module}, full, state)
@@ -416,7 +416,7 @@ effects = [
 def test_a_horizon_that_chatters_keeps_to_its_time_and_tells_how_far_it_is() -> None:
     """Dry friction that sticks turns at every step, in doubles too, which had all the time."""
     scene = scene_of(DRY)
-    module = load_module(python_module(routed(scene[0]).system))
+    module = load_module(python_module(compile_program(scene[0]).system))
     told: list[float] = []
     with pytest.raises(RunError, match=r"^horizon: no run of 10 s.*: more than 1 s in .*; give a"):
         horizon_of(*scene, module, seconds=0.5, progress=told.append)
@@ -427,7 +427,7 @@ def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.Mon
     """A short run means something all along; asked for more digits, it has them for a while."""
     model, wanted = scene_of("double_pendulum")
     model, wanted = replace(model, outputs=()), wanted.replaced(t_end=1.5)
-    module = load_module(python_module(routed(model).system))
+    module = load_module(python_module(compile_program(model).system))
     whole = horizon_of(model, wanted, module)
     assert whole.time is None and 1e-16 < whole.worst < 1e-10 and whole.sure < 1e-15
     assert whole.words.startswith("doubles are meaningful for the whole run, 1.5 s: off by")
@@ -441,7 +441,7 @@ def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.Mon
         horizon_of(model, wanted, module, seconds=1e-6)
     with pytest.raises(RunError, match="rigid contacts strike"):
         bouncing = replace(model_of("bouncing_two_body"), outputs=())
-        horizon_of(bouncing, wanted, load_module(python_module(routed(bouncing).system)))
+        horizon_of(bouncing, wanted, load_module(python_module(compile_program(bouncing).system)))
 
 
 # The command.

@@ -5,7 +5,7 @@ from typing import Any
 
 import sympy as sp
 
-from eomgen.codegen.system import Made, System, make_system, output_shape
+from eomgen.codegen.system import Made, System, output_shape, recorded
 from eomgen.derivation.closed import Equations, written_out_forces
 from eomgen.derivation.forms import state_form
 from eomgen.derivation.free_bodies import SymbolicMechanism
@@ -22,7 +22,7 @@ from eomgen.scene.effects.base import JointLoad
 
 
 def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
-    """Lower the equations, differentiate the derivative unless told not to, run the passes."""
+    """Lower the equations, and differentiate the derivative unless told not to."""
     model, symbols, form = equations.model, equations.symbols, state_form(equations)
     tape = Tape()
     named = {name: tape.input(name, Stage.PARAMETERS) for name in symbols.parameters}
@@ -88,7 +88,7 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
         "inverse_dynamics": tuple(str(node.step.value) for node in vd.values()),
     }
     checks = _checks(equations, starting)
-    return make_system(model, "closed", form.states, tape, made, checks, extra, frozenset())
+    return recorded(model, "closed", form.states, tape, made, checks, extra, frozenset())
 
 
 def _recipes(equations: Equations) -> dict[str, list[Any]]:

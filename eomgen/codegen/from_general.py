@@ -15,7 +15,7 @@ from eomgen.codegen.from_recursion import (
     output,
     variables,
 )
-from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, make_system, output_shape
+from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, output_shape, recorded
 from eomgen.derivation.general.derive import GeneralEquations
 from eomgen.language.formula import evaluate
 from eomgen.model.states import velocity_states
@@ -95,7 +95,7 @@ def from_general(equations: GeneralEquations, *, jacobian: bool = True) -> Syste
         Check(f"inertia_com of {body}", lowered.rows([moment])[0].index, may_vanish=False)
         for body, moment in equations.solution.divisors
     ]
-    return make_system(
+    return recorded(
         model,
         "closed",
         velocity_states(model),

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from eomgen.codegen.contacts import contact_labels, contact_outputs
-from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, make_system, output_shape
+from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, output_shape, recorded
 from eomgen.dynamics import observe
 from eomgen.dynamics.composite import Entries, full, solved
 from eomgen.dynamics.dynamics import Dynamics, Forward, Values
@@ -114,7 +114,7 @@ def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
             record.dynamics, tape, record.route, record.forward, record.position_rates
         )
         made, extra = made | more, extra | taken
-    return make_system(
+    return recorded(
         model,
         record.route,
         velocity_states(model),

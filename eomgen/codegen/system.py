@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from eomgen.model.model import Model
 from eomgen.model.states import State
@@ -35,7 +35,7 @@ class System:
     `extra` names what some outputs take besides state, parameters and inputs: generalised forces or
     accelerations, one a velocity; or directions, for those of `tangents`, which compute how
     something changes along a direction in place of a matrix of derivatives. `contacts` are the
-    rigid ones.
+    rigid ones, `reports` tell what each pass saved, once they have run.
     """
 
     model: Model
@@ -44,8 +44,8 @@ class System:
     program: Program
     extra: Mapping[str, tuple[str, ...]]
     tangents: frozenset[str]
-    reports: tuple[PassReport, ...]
     contacts: tuple[ContactLabel, ...] = ()
+    reports: tuple[PassReport, ...] = ()
 
 
 def output_shape(name: str, model: Model) -> tuple[int, ...]:
@@ -62,7 +62,7 @@ def output_shape(name: str, model: Model) -> tuple[int, ...]:
     return shape_of(name, model.dimensions, sizes)
 
 
-def make_system(
+def recorded(
     model: Model,
     route: str,
     states: Sequence[State],
@@ -73,7 +73,7 @@ def make_system(
     tangents: frozenset[str],
     contacts: tuple[ContactLabel, ...] = (),
 ) -> System:
-    """Finish a tape's program, run the passes over it, and add its switching functions."""
+    """A tape with its outputs as a system, no pass run over it yet."""
     for name, (shape, nodes) in made.items():
         entries = shape[0] if name in tangents else math.prod(shape)
         assert entries == len(nodes), f"{name}: {len(nodes)} nodes for {shape}"
@@ -81,6 +81,12 @@ def make_system(
         name: Output(shape, tuple(node.index for node in nodes))
         for name, (shape, nodes) in made.items()
     }
-    program, reports = optimise_and_report(finish(tape, outputs, checks))
-    program = with_switching_functions(program, [state.name for state in states])
-    return System(model, route, tuple(states), program, extra, tangents, reports, contacts)
+    program = finish(tape, outputs, checks)
+    return System(model, route, tuple(states), program, extra, tangents, contacts)
+
+
+def optimised(system: System) -> System:
+    """The same values in fewer operations, with switching functions and a report of the passes."""
+    program, reports = optimise_and_report(system.program)
+    program = with_switching_functions(program, [state.name for state in system.states])
+    return replace(system, program=program, reports=reports)

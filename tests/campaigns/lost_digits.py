@@ -25,8 +25,8 @@ from matplotlib.figure import Figure
 from spatial_trees import ORIGIN, PLANE, SPACE, SpatialTree, TreeBody, TreeJoint
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed
 from eomgen.model.elaborate import elaborate
+from eomgen.pipeline import compile_program
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
 from eomgen.show.style import FAINT, INK, style
@@ -173,11 +173,11 @@ def errors(case: Case, states: int) -> dict[str, list[float]]:
     for route in WAYS[:4]:
         if route == "closed" and len(case.tree.bodies) > FEW:
             continue
-        made = routed(replace(model, route=route), jacobian=False).system
+        made = compile_program(replace(model, route=route), jacobian=False).system
         module: Any = load_module(python_module(made), model.name)
         found[route] = judged(lambda q, v, m=module: m.derivative(0.0, [*q, *v])[n:])
     terms = ("mass_matrix", "bias_force", "applied_force")
-    made = routed(replace(model, route="aba", outputs=terms), jacobian=False).system
+    made = compile_program(replace(model, route="aba", outputs=terms), jacobian=False).system
     module = load_module(python_module(made), model.name)
 
     def solved(q: Any, v: Any) -> Any:

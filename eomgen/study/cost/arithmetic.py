@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.codegen.route import routed
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import RunError
 from eomgen.model.model import Model
+from eomgen.pipeline import compile_program
 from eomgen.routes import ROUTES
 from eomgen.run.problem import Floats
 from eomgen.run.progress import Progress
@@ -130,11 +130,13 @@ def arithmetic(
     """
     model = replace(model, form="velocity", outputs=())
     check_regular(model)
-    taken = routed(model, jacobian=False).system
+    taken = compile_program(model, jacobian=False).system
     others, missing = compiled(model, but=taken.route)
     there = {taken.route: loaded(taken), **others}
     ways = {route: there[route] for route in ROUTES if route in there}
-    terms = loaded(routed(replace(model, route="aba", outputs=TERMS), jacobian=False).system)
+    terms = loaded(
+        compile_program(replace(model, route="aba", outputs=TERMS), jacobian=False).system
+    )
     progress(0.2)
     truth = Truth(model)
     count = states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)

@@ -10,10 +10,11 @@ from functools import partial
 from math import inf
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed, why_not_compared
+from eomgen.codegen.choice import why_not_compared
 from eomgen.dynamics.regular import check_regular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.pipeline import compile_program
 from eomgen.routes import ROUTES
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
@@ -177,7 +178,7 @@ def _there(made: _Made | None) -> _Made:
 def _compiled(model: Model) -> _Made:
     """Raises `SceneError` or `RunError` if that cannot be, or not be evaluated at its start."""
     check_regular(model)
-    system = routed(model, jacobian=False).system
+    system = compile_program(model, jacobian=False).system
     module = load_module(python_module(system), model.name)
     as_problem(module)
     return _Made(model, module, system.route, module.COST["derivative"]["total"])

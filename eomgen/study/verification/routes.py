@@ -3,10 +3,11 @@
 from dataclasses import dataclass, replace
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.codegen.route import routed, why_not_compared
+from eomgen.codegen.choice import why_not_compared
 from eomgen.codegen.system import System
 from eomgen.errors import EomgenError
 from eomgen.model.model import Model
+from eomgen.pipeline import compile_program
 from eomgen.routes import ROUTES
 from eomgen.run.module import GeneratedModule, load_module
 
@@ -29,7 +30,9 @@ def compiled(model: Model, but: str) -> tuple[dict[str, Made], dict[str, str]]:
         words = why_not_compared(model, route)
         try:
             if not words:
-                made[route] = loaded(routed(replace(model, route=route), jacobian=False).system)
+                made[route] = loaded(
+                    compile_program(replace(model, route=route), jacobian=False).system
+                )
         except EomgenError as error:
             words = str(error)
         if words:
