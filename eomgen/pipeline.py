@@ -17,18 +17,19 @@ from eomgen.dynamics.regular import check_regular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
-from eomgen.program.program import cost
+from eomgen.program.program import Program, cost
 from eomgen.scene.schema import Scene
 
 
 @dataclass(frozen=True)
 class Generated:
-    """What a model is compiled to: a Python module, the page's `bodyPoses`, what passes saved, why
-    its route was taken, and what a user must be told of it.
+    """What a model is compiled to: a Python module, the page's `bodyPoses`, the program of both,
+    what passes saved, why its route was taken, and what a user must be told of it.
     """
 
     module: str
     poses: str
+    program: Program
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
@@ -94,6 +95,7 @@ def render(made: Compiled) -> Generated:
     return Generated(
         python_module(system),
         javascript_poses(system) if "body_poses" in system.model.outputs else "",
+        system.program,
         system.reports,
         tuple(made.explanation()),
         tuple(choice.notices()),

@@ -1,5 +1,8 @@
 """Generated code kept, so that a scene whose module is fresh is not derived again.
 
+Beside the code lies the program that it was written from, in an entry of its own, which is read
+only where the program is run: in many digits, by studies.
+
 The key is a digest of what enters the code: the model without its notices, every file of this
 program that has a say, and the libraries it is made with. What is found under it is taken only as
 this program wrote it, see `eomgen.entries`.
@@ -10,6 +13,7 @@ import importlib.metadata
 import json
 import os
 import platform
+from contextlib import suppress
 from dataclasses import astuple, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
@@ -19,6 +23,8 @@ import platformdirs
 from eomgen.entries import Entries
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
+from eomgen.program.program import Program
+from eomgen.program.saving import ProgramError, restored, saved
 from eomgen.templating import PACKAGE, templates_folder
 
 AFTER = (
@@ -74,16 +80,38 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     from eomgen.pipeline import generate
 
     made = generate(model)
-    code = Code(**vars(made), derived=True)
+    code = Code(made.module, made.poses, made.reports, made.explanation, made.notices, derived=True)
     if place is None:
         return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
-    trouble = Entries(place).put(key, _content(code))
+    entries = Entries(place)
+    trouble = entries.put(key, _content(code))
+    trouble = trouble or entries.put(_beside(key), saved(made.program).encode())
     if trouble:
         return replace(code, notice=f"the store {place} is not used: {trouble}")
     if kept and (kept.module, kept.poses) != (code.module, code.poses):
         notice = f"the store {place} held other code for this scene, which was put right"
         return replace(code, notice=notice)
     return code
+
+
+def program_of(model: Model) -> Program:
+    """The program of a model's code, from the store beside it or recorded now."""
+    place, key = folder(), _beside(_key(model))
+    if place and (kept := Entries(place).get(key)):
+        with suppress(ProgramError, UnicodeDecodeError):
+            return restored(kept.decode())
+    # Imported here because it brings what derives, which takes long to load.
+    from eomgen.pipeline import compile_program
+
+    program = compile_program(model).system.program
+    if place:
+        Entries(place).put(key, saved(program).encode())
+    return program
+
+
+def _beside(key: str) -> str:
+    """The key of the program beside that of its code."""
+    return hashlib.sha256(f"program of {key}".encode()).hexdigest()[:32]
 
 
 def _content(code: Code) -> bytes:

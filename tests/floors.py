@@ -15,6 +15,7 @@ FLOORS = (
     "errors",
     "streams",
     "files",
+    "loading",
     "entries",
     "scalars",
     "language",

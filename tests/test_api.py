@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from eomgen.codegen.route import routed
 
 import eomgen
 from eomgen.cli import main
-from eomgen.codegen.route import routed
 from eomgen.run.trajectory import Outcome, load_npz
 from eomgen.scene.reader import BUILT_IN
 

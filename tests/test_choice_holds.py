@@ -23,7 +23,7 @@ from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import Floats, Problem
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Simulation
-from eomgen.store import generated_code
+from eomgen.store import generated_code, program_of
 from eomgen.study.accuracy import search, trial
 from eomgen.study.accuracy.budgeting import within
 from eomgen.study.accuracy.choosing import meet
@@ -49,7 +49,7 @@ def case_of(scene: str, t_end: float | None = None, **kept: Any) -> Case:
     """A scene's run, as the command makes it."""
     model, module, wanted = made(scene)
     kept = {"samples": 1001, "rest_speed": wanted.rest_speed, **kept}
-    problem, twin = problem_of(module, model=model), moved_problem(module, model=model)
+    problem, twin = problem_of(module, model=model), moved_problem(module, model)
     return Case(problem, t_end or wanted.t_end, module.UNITS, kept, moved=twin)
 
 
@@ -100,8 +100,8 @@ def test_near_a_separatrix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 def test_constants_are_moved_by_what_rounding_did_to_them() -> None:
     """1/3 is rounded and moves by a unit in the last place; 2 and 1/2 are not, and stay."""
-    _, module, _ = made("separatrix_1")
-    twin = moved(module)
+    model, module, _ = made("separatrix_1")
+    twin = moved(module, program_of(model))
     own, other = (m._DEFAULT["derivative"] for m in (module, twin))  # type: ignore[attr-defined]
     assert own != other
     for a, b in zip(own, other, strict=True):

@@ -72,7 +72,7 @@ def case_of(scene: str) -> Case:
     module = load_module(generated_code(model).module, model.name)
     kept = {"samples": 1001, "rest_speed": wanted.rest_speed}
     problem = problem_of(module, model=model)
-    moved = moved_problem(module, model=model)
+    moved = moved_problem(module, model)
     return Case(problem, wanted.t_end, module.UNITS, kept, moved=moved)
 
 

@@ -14,6 +14,7 @@ from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program
 from eomgen.precision.guarding import guard_of
+from eomgen.program.program import Program
 from eomgen.run.guard import LOST, Guard, Watch
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import StepFailure
@@ -49,10 +50,11 @@ r_child = [-0.5, 0]
 
 
 @cache
-def heavy(route: str) -> Any:
-    """Its module by a route."""
+def heavy(route: str) -> tuple[Any, Program]:
+    """Its module by a route, and the program of it."""
     model = replace(elaborate(parse_scene(HEAVY)), route=route)
-    return load_module(python_module(compile_program(model, jacobian=False).system))
+    system = compile_program(model, jacobian=False).system
+    return load_module(python_module(system)), system.program
 
 
 def run(module: Any, guard: Guard | None) -> Any:
@@ -68,8 +70,8 @@ def unlooked(module: Any) -> Problem:
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 def test_a_run_that_loses_digits_is_stopped_and_says_what_to_do(route: str) -> None:
     """Before a step is taken from there: no row is wrong."""
-    module = heavy(route)
-    guard = guard_of(module)
+    module, program = heavy(route)
+    guard = guard_of(module, program)
     y = module.initial_state()
     exact, found = guard.exact(0.0, y)[6:], module.derivative(0.0, y)[6:]
     lost = float(np.max(np.abs(found - exact)) / np.max(np.abs(exact)))
@@ -83,8 +85,8 @@ def test_a_run_that_loses_digits_is_stopped_and_says_what_to_do(route: str) -> N
 
 def test_a_repaired_run_is_right() -> None:
     """Against the same method all in long numbers, and against the route that loses nothing."""
-    module = heavy("aba")
-    guard = guard_of(module, repairs=True)
+    module, program = heavy("aba")
+    guard = guard_of(module, program, repairs=True)
     repaired, plain = run(module, guard), run(module, None)
     problem = replace(unlooked(module), derivative=guard.exact)
     true = integrate(problem, "rk4", 0.1, dt=0.01).y
@@ -92,8 +94,8 @@ def test_a_repaired_run_is_right() -> None:
     assert repaired.finished and "were repaired by long numbers" in repaired.message
     assert np.max(np.abs(repaired.y - true) / scale) < 1e-13
     assert np.max(np.abs(plain.y - true) / scale) > 1e-8
-    sound = heavy("orthogonal")
-    healthy = run(sound, guard_of(sound))
+    sound, program = heavy("orthogonal")
+    healthy = run(sound, guard_of(sound, program))
     assert healthy.finished and not healthy.message
     assert np.max(np.abs(healthy.y - true) / scale) < 1e-11
 
@@ -102,12 +104,13 @@ def test_a_repaired_run_is_right() -> None:
 def test_a_healthy_run_is_the_same_with_and_without(integrator: str) -> None:
     """Byte for byte, counts included, whether the guard would stop or repair."""
     model = elaborate(read_scene("babyboot"))
-    module = load_module(python_module(compile_program(replace(model, outputs=())).system))
+    system = compile_program(replace(model, outputs=())).system
+    module = load_module(python_module(system))
     problem = as_problem(module)
     options: dict[str, Any] = {"dt": 0.01} if integrator == "rk4" else {}
     plain = integrate(problem, integrator, 0.3, samples=11, **options)
     for repairs in (False, True):
-        guard = guard_of(module, repairs=repairs)
+        guard = guard_of(module, system.program, repairs=repairs)
         same = integrate(problem, integrator, 0.3, samples=11, guard=guard, **options)
         assert same.y.tobytes() == plain.y.tobytes() and same.t.tobytes() == plain.t.tobytes()
         assert same.counts == plain.counts and same.message == plain.message == ""
@@ -185,9 +188,12 @@ def test_contacts_cannot_be_repaired() -> None:
     model = elaborate(read_scene("bouncing_two_body"))
     system = compile_program(replace(model, outputs=()), jacobian=False).system
     module = load_module(python_module(system))
+    careful = guard_of(module, system.program, repairs=True)
     with pytest.raises(RunError, match="cannot be repaired; let it stop instead"):
-        integrate(as_problem(module), "DOP853", 1.0, guard=guard_of(module, repairs=True))
-    assert integrate(as_problem(module), "DOP853", 0.7, guard=guard_of(module)).finished
+        integrate(as_problem(module), "DOP853", 1.0, guard=careful)
+    assert integrate(
+        as_problem(module), "DOP853", 0.7, guard=guard_of(module, system.program)
+    ).finished
 
 
 def test_simulate_guarded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

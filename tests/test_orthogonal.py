@@ -17,6 +17,7 @@ import pytest
 from campaign import some
 from engine import MP, Digits, apart, engine
 
+from eomgen.codegen.derive import derive
 from eomgen.codegen.from_recursion import Recording, from_recursion
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values

@@ -20,7 +20,7 @@ from eomgen.model.model import Model
 from eomgen.precision.precise import BITS, Precise, digits, precise
 from eomgen.run.module import as_problem, load_module
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
-from eomgen.store import generated_code
+from eomgen.store import generated_code, program_of
 from eomgen.study.accuracy import measure
 from eomgen.study.accuracy.collocation import gauss, rows
 from eomgen.study.accuracy.reference import LOOSE, TIGHT, reference
@@ -90,10 +90,12 @@ def long_rows(
     exactly: Precise | None = None,
 ) -> np.ndarray:
     """The motion at some times in long numbers, in parts of the scale where they are compared."""
-    module = made[1]
+    model, module = made
     problem = as_problem(module)
     scale = measure.scales(module.STATES, module.UNITS, np.array([problem.initial + 1.0] * 2))
-    exactly = exactly or precise(module, None, None, problem.initial, watched=True)
+    exactly = exactly or precise(
+        program_of(model), module, None, None, problem.initial, watched=True
+    )
     with digits():
         return np.array([row.y for row in rows(how[0], exactly, problem, scale, times, how[1])])
 
@@ -123,7 +125,7 @@ def test_the_derivative_is_the_program_in_long_numbers(scene: str) -> None:
         p = varied(made.model, rng, 0.99, 1.01)
         exactly = made.exactly("derivative", y, u, p, t=0.7)
         module.derivative(0.7, y, p, u)  # keeps what it computed of these parameters, in doubles
-        found = precise(module, p, u, y, watched=watched)
+        found = precise(made.system.program, module, p, u, y, watched=watched)
         with digits():
             got = to_mp(np.array(found.derivative(mpfr(0.7), found.initial)))
         terms = np.maximum(np.abs(exactly), np.max(np.abs(exactly)))
@@ -134,7 +136,7 @@ def test_numbers_that_meet_stay_long() -> None:
     """Two plain numbers of a formula that meet behind a corner are not rounded to a double."""
     made = engine(FORCED)
     with digits():
-        found = precise(made.module, None, None, np.array([1.0, 1.0]))
+        found = precise(made.system.program, made.module, None, None, np.array([1.0, 1.0]))
         slope = found.derivative(mpfr(0), found.initial)[1]
         assert slope == mpfr(0.7) * mpfr(0.3) - mpfr(0.1) / 3
 
@@ -208,7 +210,8 @@ def test_babyboot_as_others_recomputed_it() -> None:
         decimal = {name: mpfr(repr(value)) for name, value in module.PARAMETERS.items()}
         problem = as_problem(module)
         start = (gmpy2.const_pi() / 2, gmpy2.const_pi() / 180, mpfr(0), mpfr(0))
-        exactly = replace(precise(module, decimal, None, problem.initial), initial=start)
+        found = precise(program_of(model), module, decimal, None, problem.initial)
+        exactly = replace(found, initial=start)
         y = long_rows((model, module), np.linspace(0.0, 10.0, 101), TIGHT, exactly)[-1]
         degrees = [
             y[0] * 180 / gmpy2.const_pi() - mpfr("-61.312983517501685533557430"),

@@ -195,7 +195,7 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
     if start is not None:
         problem = start.problem
         kept |= start.options
-    moved = moved_problem(functions, *values, model)
+    moved = moved_problem(functions, model, *values)
     case = Case(problem, plan.t_end, functions.UNITS, kept, manner.watch, moved)
     powers = as_powers(functions, *values) if plan.works else None
     warnings, error = [*model.notices, *module.notices], math.nan
@@ -277,8 +277,9 @@ def _guard(
     if plan.guard is None:
         return None
     from eomgen.precision.guarding import guard_of
+    from eomgen.store import program_of
 
-    return guard_of(module, *values, repairs=plan.guard == "repair")
+    return guard_of(module, program_of(plan.model), *values, repairs=plan.guard == "repair")
 
 
 def _start(plan: Plan, problem: Problem) -> "Start | None":

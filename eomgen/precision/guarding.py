@@ -7,6 +7,7 @@ from gmpy2 import mpfr
 
 from eomgen.precision.longs import BITS
 from eomgen.precision.precise import digits, precise
+from eomgen.program.program import Program
 from eomgen.run.guard import LOST, Guard
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
@@ -14,16 +15,18 @@ from eomgen.run.problem import Floats
 
 def guard_of(
     module: GeneratedModule,
+    program: Program,
     parameters: Any = None,
     inputs: Any = None,
     *,
     bound: float = LOST,
     repairs: bool = False,
 ) -> Guard:
-    """A guard for runs of a module at given parameters and constant inputs, which must be valid
-    there.
+    """A guard for runs of a module, and of the program that it was generated of, at given
+    parameters and constant inputs, which must be valid there.
     """
-    exactly = precise(module, parameters, inputs, module.initial_state(parameters), bits=BITS)
+    initial = module.initial_state(parameters)
+    exactly = precise(program, module, parameters, inputs, initial, bits=BITS)
 
     def exact(t: float, y: Floats) -> Floats:
         with digits(BITS):

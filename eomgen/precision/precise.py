@@ -1,21 +1,22 @@
-"""A module's derivative in more digits than a double has: the same steps over longer numbers.
+"""A program's derivative in more digits than a double has: the same steps over longer numbers.
 
 The numbers are MPFR's, correctly rounded, of as many bits as IEEE 754's quadruple precision: 34
 decimal digits. Parameters, inputs and the initial state enter as the doubles they are; all that is
 computed from them, what depends on parameters alone included, is computed in long numbers.
 """
 
-import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import FunctionType
-from typing import Any, cast
+from typing import Any
 
 import gmpy2
 from gmpy2 import mpfr
 
+from eomgen.program.kernel import kernel
+from eomgen.program.program import Program
+from eomgen.program.tape import TIME
 from eomgen.run.problem import Floats
-from eomgen.scalars.extended import BY_MPFR
+from eomgen.scalars.extended import BY_MPFR, Bits
 from eomgen.scalars.functions import CORNERS
 
 BITS = 113
@@ -78,6 +79,7 @@ class Precise:
 
 
 def precise(
+    program: Program,
     module: Any,
     parameters: Any,
     inputs: Any,
@@ -86,62 +88,59 @@ def precise(
     watched: bool = False,
     bits: int = BITS,
 ) -> Precise:
-    """A generated module's derivative over long numbers, at given parameters and inputs.
+    """A program's derivative over long numbers, at given parameters and inputs.
 
+    module              what was generated of the program; it tells names, order and defaults
     parameters, inputs  as `module.derivative` takes them; they must be valid there
     initial             the initial state of doubles, (ny,)
     watched             hold the ways that corners go, if there are any
     bits                of what depends on parameters alone
     """
-    names = inspect.signature(module._derivative).parameters
-    watch = Watch() if watched and any(name in names for name in CORNERS) else None
+    found = kernel(program, "derivative")
+    corners = any(name in found.functions for name in CORNERS)
+    watch = Watch() if watched and corners else None
+    functions = {**BY_MPFR, **(watch.functions() if watch else {})}
+    called = [functions[name] for name in found.functions]
     with digits(bits):
-        functions = {**BY_MPFR, **(watch.functions() if watch else {})}
-        constants = constants_of(module, parameters)["derivative"]
-        u = _long(inputs, module.INPUTS)
+        known = found.known_values(_long(parameters, module.PARAMETERS), Bits())
+        fixed = _long(inputs, module.INPUTS)
         start = tuple(map(mpfr, initial.tolist()))
-        kernel = _over(module._derivative, functions)
-    called = {name: functions[name] for name in names if name in functions}
-    timed = "t" in names
+    places = {name: i for i, name in enumerate(module.STATES)}
 
     def derivative(t: Long, y: Sequence[Long]) -> Sequence[Long]:
         if watch:
             watch.margins = []
-        time = {"t": t} if timed else {}
-        return cast(Sequence[Long], kernel(y, constants, u, **time, **called))
+        return found.moving(known, [take(t, y) for take in taken], called)
 
+    taken = [_taken(name, places, fixed) for name in found.inputs]
     return Precise(derivative, start, watch)
 
 
-def constants_of(module: Any, parameters: Any) -> Mapping[str, tuple[Long, ...]]:
-    """What each function of a module takes that depends on parameters alone, in long numbers; to be
-    used within `digits()`.
-    """
-    given = _long(parameters, module.PARAMETERS)
-    return cast(Mapping[str, tuple[Long, ...]], _over(module._fixed, BY_MPFR)(*given))
+def _taken(
+    name: str, places: Mapping[str, int], fixed: Mapping[str, Long]
+) -> Callable[[Long, Sequence[Long]], Long]:
+    """What finds an input of the program at a time and a state."""
+    if name in places:
+        place = places[name]
+        return lambda t, y: y[place]
+    if name in fixed:
+        value = fixed[name]
+        return lambda t, y: value
+    assert name == TIME, name
+    return lambda t, y: t
 
 
-def _over(function: Any, functions: Mapping[str, Callable[..., Long]]) -> Any:
-    """A function of a generated module over long numbers: its steps, with its numbers as long ones
-    and other functions in the place of `math`'s.
-
-    Where numbers remained doubles, two of them that meet would be rounded to a double.
-    """
-    code = function.__code__
-    numbers = tuple(mpfr(c) if isinstance(c, float) else c for c in code.co_consts)
-    return FunctionType(
-        code.replace(co_consts=numbers),
-        {**function.__globals__, **functions},
-        argdefs=function.__defaults__,
-    )
+def exact_parameters(module: Any, parameters: Any) -> dict[str, Long]:
+    """Parameters as a module takes them, by name, as long numbers; to be used within `digits()`."""
+    return _long(parameters, module.PARAMETERS)
 
 
-def _long(given: Any, defaults: Mapping[str, float]) -> tuple[Long, ...]:
-    """Values by name, in order, or None for the defaults, as long numbers."""
+def _long(given: Any, defaults: Mapping[str, float]) -> dict[str, Long]:
+    """Values by name, in order, or None for the defaults, as long numbers by name."""
     if given is None:
-        values = list(defaults.values())
+        values = dict(defaults)
     elif hasattr(given, "keys"):
-        values = [given.get(name, default) for name, default in defaults.items()]
+        values = {name: given.get(name, default) for name, default in defaults.items()}
     else:
-        values = list(given)
-    return tuple(mpfr(value) for value in values)
+        values = dict(zip(defaults, given, strict=True))
+    return {name: mpfr(value) for name, value in values.items()}

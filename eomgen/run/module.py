@@ -1,7 +1,5 @@
 """A generated module as a loaded Python module."""
 
-import importlib.abc
-import importlib.util
 import inspect
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache, partial
@@ -10,6 +8,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from eomgen.errors import RunError
+from eomgen.loading import load_source
 from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise
 from eomgen.run.origin import Origin
@@ -44,26 +43,13 @@ class GeneratedModule(Protocol):
     body_poses: Callable[..., Floats]
 
 
-class _FromSource(importlib.abc.InspectLoader):
-    """Loads a module from source that is at hand."""
-
-    def __init__(self, source: str) -> None:
-        self._source = source
-
-    def get_source(self, fullname: str) -> str:
-        return self._source
-
-
 def load_module(source: str, name: str = "generated") -> GeneratedModule:
     """Load a generated module from its source, which this program wrote itself.
 
     Raises `RunError` if the scene's own parameters leave its equations without a solution.
     """
-    spec = importlib.util.spec_from_loader(name, _FromSource(source))
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
+        module = load_source(source, name)
     except (ValueError, ArithmeticError) as error:
         raise RunError(_unsolvable(error)) from None
     return cast(GeneratedModule, module)

@@ -67,7 +67,7 @@ def prepared(scene: str, own: bool, folder: Path, seconds: float) -> tuple[Case,
     module = load_module(generated_code(model).module, model.name)
     t_end = wanted.t_end
     kept = {"rest_speed": wanted.rest_speed, "samples": 1001}
-    problem, moved = problem_of(module, model=model), moved_problem(module, model=model)
+    problem, moved = problem_of(module, model=model), moved_problem(module, model)
     case = Case(problem, t_end, module.UNITS, kept, moved=moved)
     end = closed_end(scene) if own else None
     if end is not None:

@@ -22,6 +22,7 @@ from eomgen.errors import RunError
 from eomgen.files import write_whole
 from eomgen.model.model import Model
 from eomgen.precision.precise import BITS, digits, precise
+from eomgen.program.program import Program
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS
@@ -29,6 +30,7 @@ from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.tally import Tally
+from eomgen.store import program_of
 from eomgen.study.accuracy import measure
 from eomgen.study.accuracy.collocation import Longs, Row, rows
 from eomgen.study.diagnosis import problem_of
@@ -116,7 +118,7 @@ def reference(
 ) -> Reference:
     """The motion of a module from 0 to `t_end`, s, at given parameters and constant inputs.
 
-    model     what the module was made of, for messages; or None
+    model     what the module was made of; without it there are no long numbers
     progress  told the fraction done
     seconds   of processor time that long numbers may take; 0 for doubles at once
     folder    where references are kept, so that none is computed twice; or None. One that cannot
@@ -144,10 +146,10 @@ def reference(
         raise RunError(f"no run of {t_end:g} s: {reason} already") from None
     scale = measure.scales(module.STATES, module.UNITS, rough)
     found = None
-    if problem.contacts is None and seconds > 0:
+    if problem.contacts is None and seconds > 0 and model is not None:
         try:
             found = _in_long_numbers(
-                module, problem, parameters, inputs, times, scale, seconds, told
+                module, program_of(model), problem, parameters, inputs, times, scale, seconds, told
             )
         except (TooLongError, ArithmeticError, ValueError) as reason:
             why = str(reason)
@@ -167,6 +169,7 @@ def reference(
 
 def _in_long_numbers(
     module: GeneratedModule,
+    program: Program,
     problem: Problem,
     parameters: Any,
     inputs: Any,
@@ -191,7 +194,7 @@ def _in_long_numbers(
             progress(done)
             _check_pace(time.process_time() - began, done, seconds, "long numbers")
 
-        exactly = precise(module, parameters, inputs, problem.initial, watched=True)
+        exactly = precise(program, module, parameters, inputs, problem.initial, watched=True)
         with digits():
             for row in rows(stages, exactly, problem, scale, times, tolerance, told):
                 found.append(row.y)
