@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from eomgen.codegen.route import routed
 
 import eomgen
 from eomgen.cli import main
+from eomgen.pipeline import compile_program
 from eomgen.run.trajectory import Outcome, load_npz
 from eomgen.scene.reader import BUILT_IN
 
@@ -255,7 +255,7 @@ def test_values_are_sent_to_another_process() -> None:
     """There and back, to one that was started anew; what is refused there is raised here."""
     model, module = eomgen.check("cart_pole"), eomgen.generate("cart_pole")
     run = eomgen.simulate("cart_pole", t_end=0.1)
-    values = [eomgen.read("cart_pole"), model, module, routed(model).system.program]
+    values = [eomgen.read("cart_pole"), model, module, compile_program(model).system.program]
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         assert list(pool.map(copy.copy, values)) == values
         again = pool.submit(copy.copy, run).result()
