@@ -1,1 +1,1 @@
-"""What a scene's numbers are worth: accuracy, verification, cost."""
+"""Studies of a scene: accuracy, verification, cost."""

@@ -1,23 +1,23 @@
-"""How long calls take."""
+"""Measuring how long calls take."""
 
 import time
 from collections.abc import Callable, Sequence
 
 TIMING = 1.0
-"""About how long all calls that are timed take together, s."""
+"""About how long all rounds of all calls take together, s."""
 CHUNK = 5e-4
-"""About how long those of one function in one round take, s: too short to be interrupted often."""
+"""About how long one function is called in one round, s: too short to be interrupted often."""
 LEAST_ROUNDS = 7
 
 
 def least_seconds(calls: Sequence[Callable[[], object]]) -> list[float]:
-    """The least time of a call of each, s, all in turn: a busy machine is busy for all."""
+    """The least time of a call of each function, s; they take turns, so that load affects all."""
     return [least for least, _ in least_and_spread(calls)]
 
 
 def least_and_spread(calls: Sequence[Callable[[], object]]) -> list[tuple[float, float]]:
-    """The same, and how far above it, s, a quarter of the rounds stay: what is to be thought of a
-    difference that is no larger.
+    """The same, and the lower quartile of the rounds less the least time, s: a smaller difference
+    between two functions means nothing.
     """
     counts = [1 + int(CHUNK / min(_seconds(call, 1) for _ in range(5))) for call in calls]
     times: list[list[float]] = [[] for _ in calls]

@@ -1,1 +1,1 @@
-"""How exact a run is and what that costs: references, estimates, the choice of a method."""
+"""The accuracy of a run and its cost: references, error estimates, the choice of a method."""

@@ -1,4 +1,4 @@
-"""Runs that are asked for by their error or by their time."""
+"""Runs chosen for a required accuracy or for a time budget."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,9 +12,9 @@ from eomgen.study.accuracy.search import Choice
 from eomgen.study.accuracy.trial import Case, Tried
 
 FEWEST = 201
-"""Rows by which runs are compared."""
-UNKNOWN = "rounding or chaos stands in the way"
-"""Why an accuracy is not reached, where nothing more is known."""
+"""Least number of rows by which runs are compared."""
+UNKNOWN = "rounding errors or chaotic motion limit the accuracy"
+"""The reason given for a missed accuracy if no other is known."""
 
 
 def aimed(
@@ -25,10 +25,11 @@ def aimed(
     integrator: str | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Choice:
-    """The run whose error is below `accuracy`, in parts of the motion's scale, or the most exact
-    one that takes about `budget`, s; by one method if it is named. `say` is told each run tried.
+    """The run whose error is below `accuracy`, relative to the motion's scale, or the most accurate
+    run that takes about `budget`, s. With `integrator`, only that method is tried. `say` is called
+    with a line of text for each run tried.
 
-    Raises `RunError` where neither or both are given.
+    Raises `RunError` unless exactly one of `accuracy` and `budget` is given.
     """
     case = replace(case, kept={**case.kept, "samples": max(case.rows, FEWEST)})
     if budget is not None and accuracy is None:
@@ -41,8 +42,8 @@ def aimed(
 def made_again(
     case: Case, choice: Choice, powers: Powers | None, follow: Follow | None = None
 ) -> Tried:
-    """The chosen run, made again only where it has no works, not the rows that are asked for, or is
-    to be followed.
+    """The chosen run. It is repeated only if the works of effects are asked for, if more rows than
+    it has are asked for, or if it is to be followed.
     """
     if powers is None and follow is None and case.rows >= FEWEST:
         return choice.tried

@@ -1,8 +1,8 @@
-"""Which method and tolerance make the most of a time, on the very scene.
+"""The method and tolerance that give the smallest error within a time budget.
 
-Methods are tried as for an accuracy (`choosing`), but as tight as the time allows: what a run will
-take is counted beforehand, and what a unit of that takes here comes from the runs made so far. That
-and the end of the time are all that a clock says.
+Methods are tried as for an accuracy (`choosing`), but with tolerances as tight as the time allows.
+The work of a run is predicted by counting; the time per unit of work is measured on the runs made
+so far. The clock is used for that and for the end of the budget only.
 """
 
 import math
@@ -14,26 +14,25 @@ from eomgen.study.accuracy.search import Choice, Plan, Say, Search
 from eomgen.study.accuracy.trial import Case, Method, Tried, method_of
 
 FULL = 0.85
-"""Of the time that is left: what a run is planned for, with the one that tells its error."""
+"""A run and the one that estimates its error are planned for this share of the time left."""
 SECOND = 0.8
-"""Of a run's work: what the one that tells its error takes."""
+"""Work of the run that estimates an error, relative to the work of the run itself."""
 WORTH = 0.5
-"""Of the best error so far: where no less is expected of any method, the budget is spent no
-further."""
+"""The search ends when no method is expected to reduce the best error by this factor."""
 FIRST = 1e-4
 """Tolerance of the first runs."""
 RUNG = 100.0
-"""So many times less an error is aimed at at once, where little is known of how it falls."""
+"""Factor by which a next run is to reduce the error while its convergence is not known."""
 
 
 def within(
     case: Case, budget: float, asked: str | None = None, say: Say = lambda _: None
 ) -> Choice:
-    """The most accurate run that, with all that is tried for it, takes up to `budget` s.
+    """The most accurate run found within `budget`, s, which all runs of the search share.
 
-    asked, say  as of `choosing.meet`
+    asked, say  as for `choosing.meet`
 
-    Raises `RunError` for a time that is none, and if no run comes to its end in it.
+    Raises `RunError` if the budget is not positive and finite, or if no run reaches the end in it.
     """
     if not 0 < budget < math.inf:
         raise RunError(f"--budget: {budget:g} s is no time to compute in; give e.g. 2s")
@@ -66,15 +65,16 @@ def within(
 
 @dataclass(frozen=True)
 class _Aim:
-    """A method's next run, and the error that it may get to in the time that is left."""
+    """A method's next run, and the error that the method may reach in the time left."""
 
     plan: Plan
     reach: float
 
 
 def _tightest(search: Search, method: Method, judged: dict[int, float], left: float) -> _Aim | None:
-    """A method's tightest run for `left` units of work, with the one that tells its error; where
-    little is known of its errors, one on the way to that; None if it can be held no tighter.
+    """A method's tightest run that, with the run that estimates its error, takes `left` units of
+    work. If its convergence is not known yet, an intermediate run. None if no tighter run is
+    possible.
     """
     own = search.of(method.name)
     if not own or method.name in search.left_out or left <= 0:
@@ -95,5 +95,5 @@ def _tightest(search: Search, method: Method, judged: dict[int, float], left: fl
 
 
 def _falls(own: list[Tried], judged: dict[int, float]) -> bool:
-    """Whether the tightest of a method's runs has another beside it that tells its error."""
+    """Whether the tightest of a method's runs has a smaller error than the next looser one."""
     return len(own) > 1 and judged[id(own[-1])] < judged[id(own[-2])]

@@ -1,14 +1,15 @@
-"""Which method and tolerance meet an accuracy on the very scene.
+"""The method and tolerance that meet a required accuracy for the given scene.
 
-Methods are first tried at a loose tolerance, where a run is cheap, over the whole span: a part of
-it would say nothing of a spike, a contact or of chaos farther on. Differences of runs tell their
-errors and how these fall with the tolerance (`estimate`), their counted work how that grows. Then
-the method that promises to be the cheapest is tried where its error should be a tenth of what is
-asked, some decades tighter at once at most. A run that will do by that is the result once a second
-one, looser and with constants moved by rounding, says so, too; it is not made again.
+Each method first runs at a loose tolerance, which is cheap, over the whole time span; a part of it
+would miss a later spike, contact or onset of chaos. Differences between runs give their errors and
+how these fall with the tolerance (`estimate`); the counted work gives how the cost grows. Then the
+method that is predicted to be the cheapest runs with a tolerance that should give a tenth of the
+required error, tightened by a few decades at a time. A run that seems accurate enough is checked by
+a second run with a looser tolerance and constants perturbed by rounding errors. If that confirms
+it, the run is the result and is not repeated.
 
-No clock has a say in it: the same scene gives the same choice on every machine, as far as its
-arithmetic is the same.
+The choice does not depend on the clock: it is the same on every machine whose arithmetic is the
+same.
 """
 
 import math
@@ -21,60 +22,63 @@ from eomgen.study.accuracy.search import Choice, Plan, Say, Search
 from eomgen.study.accuracy.trial import Case, Method, Tried, done, method_of
 
 GOAL = 0.1
-"""Of the error asked for: what a tolerance is chosen for."""
+"""Tolerances are chosen for this part of the required error."""
 HOPE = 0.3
-"""Of the error asked for: where other runs put a run's error up to here, a second one is made."""
+"""A run is checked by a second one if other runs put its error below this part of the required
+error."""
 ENOUGH = 0.5
-"""Of the error asked for: an estimate by a second run up to here will do."""
+"""A run is accepted if the second one puts its error below this part of the required error."""
 CLEAR = 0.3 * WRONG
-"""Runs of greater errors tell nothing of how errors fall: those of chaotic motions stay large."""
+"""Runs with larger errors show no convergence: errors of chaotic motion stay large."""
 RUNG, RUNGS = 100.0, 1000.0
-"""So many times less an error is aimed at at once, where nothing or something is known of it; where
-steps are bounded otherwise, too, errors do not yet fall as they will."""
+"""Factors by which a next run is to reduce the error: while the convergence is not known or steps
+are bounded otherwise, and when it is known."""
 BESIDE = 10.0
-"""So many times more an error is that of a run made to tell that of the next one."""
+"""Factor between the error of a run and that of a looser one made to estimate it."""
 TIGHTER = 3.0
-"""So many times less an error makes another run worth while."""
+"""Another run is made only if it is to reduce the error at least by this factor."""
 SLACK = 1.5
-"""Of the cheapest so far: what another method may take at first."""
+"""A method's first run may take so many times the work of the cheapest so far."""
 BETTER = 1.5
-"""Among the runs that will do the most accurate counts, up to so many times the least work."""
+"""Of the accepted runs, the most accurate is chosen that takes at most so many times the least
+work."""
 OVERRUN = 3.0
-"""Of the work expected of a run: after that others are tried."""
+"""A run is stopped after so many times its expected work, and other methods are tried."""
 LOOSE = 1e-5
-"""Errors asked for down to here may be met by few equal steps."""
+"""Equal steps are tried for required errors down to this."""
 FEW_ROWS = 257
-"""With more, equal steps lose what they save."""
+"""With more rows, equal steps do not pay: each row ends a step."""
 STIFF = "Radau"
 """Tried first where the motion is stiff."""
 PATIENT = "gauss_6"
-"""Tried where others at their tightest are not exact enough: in equal steps that are summed with
-compensation, rounding disturbs a run a thousand times less."""
+"""Tried if the other methods at their tightest tolerances are not accurate enough. It takes equal
+steps with compensated summation, which reduces rounding errors a thousandfold."""
 PATIENCE = 10.0
-"""Of the work of the best run so far: what the first run of `PATIENT` may take."""
+"""The first run of `PATIENT` may take so many times the work of the best run so far."""
 LIMIT = 30.0
-"""Of the work of the tightest run of others: what any run of `PATIENT` may be expected to take. It
-gains three digits in less; where it would need more, the motion is lost in rounding.
+"""Any run of `PATIENT` may be expected to take at most so many times the work of DOP853 at its
+tightest. It gains three digits in less; if it needs more, rounding errors dominate.
 """
 AGAIN = 8
-"""Times that a method's first run is made at most, ever tighter."""
+"""A method's first run is repeated with tighter tolerances at most so often."""
 SLIGHT = 0.02
-"""Of the error asked for: where rounding makes less, one sample of it is enough."""
+"""If rounding causes less than this part of the required error, one perturbed run is enough."""
 NO_WAY = 1e-9
-"""Share of a run's work that any beginning is taken to be at least."""
+"""The least share of its work that a stopped run is taken to have done."""
 NEAR = 100.0
-"""Times what rounding the last state makes: what is aimed at where no run can do."""
+"""If the error asked for is less than doubles can represent, so many times their spacing in the
+last state is aimed at instead."""
 FIRST_STEPS = 64
-"""Of equal steps, in the first run of a method."""
+"""Least number of equal steps in a method's first run."""
 
 
 def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda _: None) -> Choice:
-    """A run whose error in the last state is below `target`, in parts of the motion's scale.
+    """A run whose error in the last state is below `target`, relative to the motion's scale.
 
     asked  the only method to try
-    say    told of each run after the first ones, and of what is expected of it
+    say    called with a line for each run after the first ones, with its expected error and time
 
-    Raises `RunError` for a target that is none.
+    Raises `RunError` if the target is not between 0 and `WRONG`.
     """
     if not 0 < target < WRONG:
         raise RunError(f"--accuracy: {target:g} is not between 0 and {WRONG:g}; give e.g. 1e-6")
@@ -88,7 +92,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         aim, why = target, ""
         if floor > ENOUGH * target:
             aim = NEAR * floor
-            why = f"{state} as a double is known to {floor:.1g} of what it moves by"
+            why = f"a double resolves {state} only to {floor:.1g} of its range of motion"
         sure = [run for run in search.runs if id(run) in search.second]
         enough = [run for run in sure if judged[id(run)] <= ENOUGH * aim]
         if enough:
@@ -125,7 +129,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
 
 
 def _best(runs: Sequence[Tried], judged: dict[int, float]) -> Tried:
-    """The most accurate of those that take hardly more work than the cheapest."""
+    """The most accurate run of those that take hardly more work than the cheapest."""
     most = BETTER * min(run.work for run in runs)
     near = [run for run in runs if run.work <= most]
     return min(near, key=lambda run: (judged[id(run)], run.work))
@@ -134,32 +138,30 @@ def _best(runs: Sequence[Tried], judged: dict[int, float]) -> Tried:
 def _missed(
     search: Search, best: Tried, judged: dict[int, float], target: float, why: str
 ) -> Choice:
-    """The best run where none will do, and `why`, if that is not rounding of all steps."""
+    """The best run, none being accurate enough, and `why`; by default rounding if it is large."""
     moved = search.rounded(best)
     if not why and moved > ENOUGH * target:
-        why = f"rounding alone, of constants and of each step, moves its end by {moved:.1g}"
+        why = f"rounding errors alone, in constants and in each step, move the end by {moved:.1g}"
     return search.chosen(best, judged, False, why)
 
 
 def _candidates(search: Search) -> list[str]:
-    """Methods that are tried, in this order: those that have been found to be the cheapest on one
-    scene or another.
+    """The methods to try, in this order; each was the cheapest for some scene.
 
-    A multistep method begins anew at each impact, which others do more lightly. Where the motion is
-    stiff, explicit ones would take thousands of steps that accuracy does not ask for.
+    With contacts, a multistep method restarts at each impact, so one-step methods replace it. For
+    stiff motion an implicit method comes first: stability would force explicit ones to take
+    thousands of steps.
     """
     others = ["LSODA", "DOP853"] if search.case.problem.contacts is None else ["RK45", "DOP853"]
     return [STIFF, *others] if search.fast.stiff else others
 
 
 def race(search: Search, asked: str | None, loose: bool) -> list[str]:
-    """Try each method once, but those that take much more work than another not to the end; return
-    the names of all that were.
+    """Run each method once; stop runs that take much more work than another. Return the names of
+    all methods that were run.
 
-    Where a method had to be implicit, a more accurate one that is is tried, too; where it had not,
-    the motion is smooth, and a `loose` error is asked for, one that spends no time on its steps.
-
-    asked  the only method to try
+    If a method needed Jacobians, `STIFF` is run, too. If none did, the motion is smooth, and the
+    required error is `loose`, rk4 is run, too: it spends no time on step control.
     """
     names = [method_of(asked).name] if asked is not None else _candidates(search)
     for name in names:
@@ -178,8 +180,10 @@ def race(search: Search, asked: str | None, loose: bool) -> list[str]:
 
 
 def patience(search: Search, names: list[str], plans: Sequence[object], most: float) -> bool:
-    """Try `PATIENT`, too, for `most` units of work, if it is for this motion, is not among the
-    `names`, and none of the `plans` for these, by name, is one for an explicit method.
+    """Whether `PATIENT` was run now, for at most `most` units of work.
+
+    It is run if the motion is smooth, DOP853 has been run at its tightest tolerance, and there is
+    no plan left for an explicit method. `plans` belong to `names`; `PATIENT` is added to `names`.
     """
     explicit = [plan for name, plan in zip(names, plans, strict=True) if name != STIFF]
     if PATIENT in names or any(explicit) or not (_spent(search) and _smooth(search.case)):
@@ -190,20 +194,20 @@ def patience(search: Search, names: list[str], plans: Sequence[object], most: fl
 
 
 def _few_steps_do(case: Case) -> bool:
-    """Whether equal steps may be few: the motion is smooth, and not many rows are asked for, of
-    which each is the end of a step.
+    """Whether few equal steps may be enough: the motion is smooth and has few rows, each of which
+    ends a step.
     """
     return _smooth(case) and case.rows <= FEW_ROWS
 
 
 def _smooth(case: Case) -> bool:
-    """Whether a method's order holds all along the motion."""
+    """Whether methods keep their order: the motion has neither corners nor rigid contacts."""
     return not case.problem.corners and case.problem.contacts is None
 
 
 def _first(search: Search, method: Method, most: float | None = None) -> None:
-    """A method's first run, for `most` units of work or not much more than the cheapest; where it
-    fails, a tighter one: too long a step may not be stable.
+    """Make a method's first run, with at most `most` units of work or little more than the cheapest
+    run so far. If it fails, tighten the tolerance and try again: a long step may be unstable.
     """
     steps = max(FIRST_STEPS, search.case.rows - 1)
     tolerance = search.case.t_end / steps if method.equal_steps else search.first
@@ -222,17 +226,17 @@ def _first(search: Search, method: Method, most: float | None = None) -> None:
 
 
 def rung(method: Method, errors: float) -> float:
-    """How many times tighter makes an error so many times less; at most ten times the steps.
+    """Factor by which to tighten the tolerance so that the error falls `errors` times.
 
-    Equal steps are halved at least.
+    It makes at most ten times as many steps; equal steps are at least halved.
     """
     least = 2.0 if method.equal_steps else 1.0
     return float(min(max(least, errors ** (1 / method.exponent)), 10 ** (1 / method.growth)))
 
 
 def _towards(search: Search, method: Method, judged: dict[int, float], goal: float) -> Plan | None:
-    """A method's next run on the way to an error; none if it can be held no tighter, or rounding
-    is all that is left.
+    """A method's next run on the way to the error `goal`; None if no tighter run is possible, or if
+    only rounding errors are left.
     """
     own = search.of(method.name)
     if not own or method.name in search.left_out or judged[id(own[-1])] <= ROUNDING:
@@ -254,21 +258,23 @@ def _towards(search: Search, method: Method, judged: dict[int, float], goal: flo
 
 
 def _lost(search: Search, judged: dict[int, float]) -> bool:
-    """Whether a run as tight as doubles go is wrong: the motion makes its rounding that large, and
-    other methods' no smaller.
+    """Whether DOP853 at its tightest tolerance is wrong: then the motion amplifies rounding errors
+    so much that other methods are no better.
     """
     spent = _spent(search)
     return spent is not None and judged[id(spent)] >= CLEAR
 
 
 def _spent(search: Search) -> Tried | None:
-    """DOP853 as tight as it goes, if it has been run so."""
+    """The run of DOP853 at its tightest tolerance; None if there is none."""
     own = search.of("DOP853")
     return own[-1] if own and own[-1].tolerance <= search.tightest(method_of("DOP853")) else None
 
 
 def _beside(search: Search, best: Tried) -> Plan | None:
-    """A run a little looser than the best, where that has none near it to tell its error by."""
+    """A run a little looser than the best, if no other of its method is near enough to estimate its
+    error.
+    """
     method = method_of(best.setting.integrator)
     others = [run.tolerance for run in search.of(method.name) if run is not best]
     near = min(others, default=math.inf) <= best.tolerance * rung(method, RUNG)
@@ -281,8 +287,8 @@ def _beside(search: Search, best: Tried) -> Plan | None:
 
 
 def _again(search: Search, names: Sequence[str]) -> Plan | None:
-    """A run of a method that was put aside for taking more than others, or than was expected of
-    it, now to its end; of several, of the one that has the least to go.
+    """A repeated run of a method whose last run was stopped for its work; this one may finish. Of
+    several, the one that is expected to take the least work.
     """
     plans = []
     for name in names:
@@ -299,10 +305,11 @@ def _again(search: Search, names: Sequence[str]) -> Plan | None:
 
 
 def error_law(search: Search, method: Method, judged: dict[int, float]) -> tuple[Law, bool]:
-    """How a method's error falls, and whether that is known.
+    """How a method's error falls with its tolerance, and whether that is known.
 
-    Of a method whose runs were all too wrong to tell, it is that of the method held tightest: what
-    makes small errors large is the motion. Where nothing is known, it is taken to begin to fall.
+    If all runs of a method are too inaccurate, the law of the method with the tightest run is
+    taken: the motion is what amplifies errors. If nothing is known, the error is taken to start
+    from `CLEAR` with the method's theoretical order.
     """
 
     def clear(name: str) -> list[Tried]:
@@ -321,5 +328,5 @@ def error_law(search: Search, method: Method, judged: dict[int, float]) -> tuple
 
 
 def growth(method: Method, runs: Sequence[Tried]) -> Law:
-    """How the work of a method grows."""
+    """How a method's work grows with its tolerance."""
     return fit([run.tolerance for run in runs], [run.work for run in runs], -method.growth)

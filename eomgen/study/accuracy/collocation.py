@@ -1,13 +1,13 @@
-"""Gauss collocation of high order in long numbers: y' = f(t, y) to twenty and more digits.
+"""Gauss collocation of high order in extended precision: y' = f(t, y) to twenty and more digits.
 
-A step sets up the polynomial of degree s that satisfies the equation at the s Gauss points. It is
-of order 2s at its end, keeps quadratic invariants, is symmetric, and A-stable, so that stiff motion
-is no trouble. Hairer, Nørsett, Wanner, Solving ODEs I, section II.7; Hairer, Wanner, Solving ODEs
-II, sections IV.5 and IV.8.
+A step finds the polynomial of degree s that satisfies the equation at the s Gauss points. The
+method has order 2s, conserves quadratic invariants, is symmetric and A-stable, and so handles stiff
+motion. Hairer, Nørsett, Wanner, Solving ODEs I, section II.7; Hairer, Wanner, Solving ODEs II,
+sections IV.5 and IV.8.
 
-What takes part in getting there need not be as exact as where one gets: the stages are forecast by
-LSODA, and corrected by Newton's method with a matrix and its factors in doubles. Only what is
-corrected, and how far off it is, is in long numbers.
+Only the stages and their residuals are in extended precision. The rest need not be as exact: LSODA
+predicts the stages, and Newton's method corrects them with a matrix that is formed and factored in
+doubles.
 """
 
 import math
@@ -29,30 +29,31 @@ from eomgen.study.accuracy.corners import Turn
 from eomgen.study.accuracy.forecast import Forecast, NoStep
 
 Longs = NDArray[np.object_]
-"""An array of long numbers."""
+"""An array of extended-precision numbers."""
 MANY = 40
-"""States from which on one Jacobian serves all stages of a step."""
+"""From so many states on, one Jacobian serves all stages of a step."""
 MOST_CORRECTIONS = 12
 NEAR = 1e-12
-"""Corrections this small, in parts of the scale, are the last that doubles are worth."""
+"""Corrections in doubles end when they are this small, relative to the scale."""
 ENOUGH = 0.001
-"""Part of the tolerance that stages are corrected to."""
+"""Stages are corrected to this part of the tolerance."""
 TURNINGS = 40
 SLOW = 6
-"""Steps made again for the sake of one turn before that is given up, and before it is slow."""
+"""Times that a step may be repeated to locate one branch change: before the run fails, and before
+a smoother margin is looked for."""
 SHRINK, GROW, SAFETY = 0.2, 3.0, 0.9
-"""Bounds of how the step changes."""
+"""Bounds of the factor by which a step's length changes, and a safety factor."""
 
 
 @dataclass(frozen=True, eq=False)
 class Gauss:
-    """The method of s stages on [0, 1].
+    """The collocation method with s stages on [0, 1].
 
     c     nodes (s,)
-    a     weights of the stages (s, s)
-    d     (s,): the end of a polynomial that is 0 at 0, from its values at the nodes
-    fall  (4, s): from those values, of the polynomial's slope the two middle and the two last
-          coefficients in Legendre polynomials
+    a     weights of the stages (s, s), Butcher's matrix
+    d     (s,): applied to the values at the nodes of a polynomial that is 0 at 0, its value at 1
+    fall  (4, s): applied to the same values, the two middle and the two last coefficients of the
+          polynomial's derivative in normalised Legendre polynomials
     """
 
     c: Longs
@@ -63,14 +64,15 @@ class Gauss:
 
 @cache
 def gauss(stages: int) -> Gauss:
-    """Gauss-Legendre collocation: nodes by Newton's method on the Legendre polynomial, weights by
-    integrating the Lagrange polynomials, expanded in Legendre polynomials, exactly.
+    """Gauss-Legendre collocation with that many stages. The nodes come from Newton's method on the
+    Legendre polynomial. The weights are exact integrals of the Lagrange polynomials, expanded in
+    Legendre polynomials.
     """
     with digits(2 * BITS):
         nodes, weights = [], []
         for i in range(stages):
             x = mpfr(-math.cos(math.pi * (i + 0.75) / (stages + 0.5)))
-            for _ in range(8):  # from 3 digits on, each doubles them
+            for _ in range(8):  # starts with 3 digits, and each iteration doubles them
                 values = _legendre(stages, x)
                 slope = stages * (x * values[stages] - values[stages - 1]) / (x * x - 1)
                 x -= values[stages] / slope
@@ -96,7 +98,7 @@ def gauss(stages: int) -> Gauss:
 
 
 def _slope(nodes: list[Long], i: int, j: int) -> Long:
-    """At node j, the slope of the polynomial that is 1 at node i, 0 at the others and at 0."""
+    """The derivative at node j of the polynomial that is 1 at node i and 0 at 0 and other nodes."""
     x = nodes[j]
     others = [mpfr(0), *(c for c in nodes if c is not nodes[i])]
     if i == j:
@@ -106,7 +108,7 @@ def _slope(nodes: list[Long], i: int, j: int) -> Long:
 
 
 def _legendre(degree: int, x: Long) -> list[Long]:
-    """P_0(x) … P_degree(x), by their recurrence."""
+    """P_0(x) … P_degree(x), by the three-term recurrence."""
     values = [mpfr(1), x]
     for k in range(1, degree):
         values.append(((2 * k + 1) * x * values[k] - k * values[k - 1]) / (k + 1))
@@ -115,9 +117,12 @@ def _legendre(degree: int, x: Long) -> list[Long]:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """The state `y` (ny, long) at the end of a step, about how far off it is, in parts of the
-    scale, the margins of corners (n, corners) at its start, at its stages, and at its end, and its
-    `extent` (2, ny), between which its stages and its end lie.
+    """A step's result.
+
+    y        the state (ny,) at its end, in extended precision
+    error    the estimated error of y, relative to the scale
+    margins  (n, corners): the corners' margins at its start, its stages and its end
+    extent   (2, ny): least and greatest value of each state at its stages and its end
     """
 
     y: Longs
@@ -137,19 +142,19 @@ def advance(
     h: Long,
     tolerance: float,
 ) -> Step:
-    """One step of length h from t, y, its stages corrected to a part of the tolerance.
+    """One step of length h, s, from y at t; its stages are corrected to a part of the tolerance.
 
-    Raises `NoStep` if the corrections do not shrink, `ArithmeticError` or `ValueError` where f has
-    no value.
+    Raises `NoStep` if the corrections do not converge, `ArithmeticError` or `ValueError` where f is
+    not defined.
     """
     times = [t + c * h for c in method.c]
     near = y.astype(float)
     moments = np.array(times, dtype=float)
     guessed = forecast(float(t), near, moments)
     correct = _solver(method, problem, float(h), moments, guessed)
-    if precise.watch is None:  # else the motion in doubles would turn where this one does not
+    if precise.watch is None:  # with corners, doubles might take another branch than this step
         guessed = _in_doubles(method, problem, float(h), moments, near, guessed, correct, scale)
-    moves = guessed.astype(object) - y  # long: doubles would add up to doubles
+    moves = guessed.astype(object) - y  # in extended precision: sums of doubles would be doubles
     last = math.inf
     for _ in range(MOST_CORRECTIONS):
         states, slopes, margins = y + moves, [], []
@@ -187,7 +192,7 @@ def _in_doubles(
     correct: Callable[[Floats], Floats],
     scale: Floats,
 ) -> Floats:
-    """The stages as well as doubles make them: cheaper corrections first."""
+    """The stages corrected as far as doubles allow: these corrections are cheaper."""
     a, last = method.a.astype(float), math.inf
     for _ in range(MOST_CORRECTIONS):
         slopes = np.array([problem.derivative(t, y) for t, y in zip(times, states, strict=True)])
@@ -210,10 +215,11 @@ def _margins(precise: Precise, t: Long, y: Longs) -> list[Long]:
 def _solver(
     method: Gauss, problem: Problem, h: float, times: Floats, states: Floats
 ) -> Callable[[Floats], Floats]:
-    """What solves Δ - h A J Δ = r (stages, ny) for Δ in doubles, well enough to correct with.
+    """A function that solves (I - h A ⊗ J) Δ = r for Δ (stages, ny) in doubles.
 
-    Small systems take the Jacobian of every stage. Large ones take one for all: A's eigenvectors
-    then part the system into one of ny equations for each eigenvalue. Solving ODEs II, IV.8.
+    Small systems use the Jacobian of every stage. Large ones use one for all stages; then the
+    eigenvectors of A split the system into one of ny equations for each eigenvalue. Solving ODEs
+    II, IV.8.
     """
     stages, ny = states.shape
     if ny < MANY:
@@ -243,12 +249,14 @@ def _solver(
 
 
 def _error(method: Gauss, moves: Longs, scale: Floats) -> float:
-    """What the end is off, in parts of the scale, by how Legendre coefficients of the slope fall.
+    """Estimated error at the end of a step, relative to the scale, from the decay of the Legendre
+    coefficients of the derivative.
 
-    The end has to do with coefficients from number s on, and, as the method integrates
-    polynomials of degree 2s - 1 exactly, with no less than two of them that add up to 2s. So the
-    fall from the middle to the last is carried on as far again, twice: where coefficients fall as
-    powers of q, that makes q^(2s); where as powers of their number, after a kink, it is modest.
+    The error at the end comes from coefficients s and higher. As the quadrature is exact up to
+    degree 2s - 1, it comes from products of two coefficients whose indices add up to 2s or more. So
+    the decay from the middle to the last coefficients is extrapolated twice as far again. If
+    coefficients decay like q^k that gives q^(2s); if they decay algebraically, as after a kink, the
+    estimate stays modest.
     """
     fall = np.abs(method.fall @ moves).astype(float) / scale
     middle, last = np.max(fall[:2], axis=0), np.max(fall[2:], axis=0)
@@ -257,7 +265,7 @@ def _error(method: Gauss, moves: Longs, scale: Floats) -> float:
 
 
 class _Way:
-    """How far rows have come, and what the next step is to be."""
+    """The current state of the integration, and the length and stages of the next step."""
 
     def __init__(self, ladder: Sequence[int], t: Long, y: Longs, length: Long) -> None:
         self.t, self.y, self.length, self.made = t, y, length, 0
@@ -265,7 +273,7 @@ class _Way:
         self.ladder, self.stages = ladder, ladder[-1]
 
     def take(self, h: Long, step: Step, tolerance: float, *, spare: bool) -> None:
-        """Go on to the end of a step; where it was short only because of a row, with `spare`."""
+        """Go on to the end of a step. `spare`: the next row, not its error, limited its length."""
         self.t, self.y, self.made = self.t + h, step.y, self.made + 1
         self.extent[0] = np.minimum(self.extent[0], step.extent[0])
         self.extent[1] = np.maximum(self.extent[1], step.extent[1])
@@ -279,9 +287,9 @@ class _Way:
             self.stages = fewer
 
     def again(self, h: Long, error: float, tolerance: float) -> None:
-        """Try once more, with more stages or else a shorter step.
+        """Prepare to repeat a step: with the most stages, or with a shorter step.
 
-        Raises `NoStep` if steps shrink to nothing.
+        Raises `NoStep` if the step becomes too short.
         """
         if self.stages == self.ladder[-1]:
             self.length = h * min(_factor(error, tolerance, self.stages), SAFETY)
@@ -297,8 +305,11 @@ def _factor(error: float, tolerance: float, stages: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """The state `y` (ny, long) at a time, how many `steps` were made up to then, and the `extent`
-    (2, ny) between which all states were.
+    """The motion at one of the requested times.
+
+    y       the state (ny,), in extended precision
+    steps   the number of steps made so far
+    extent  (2, ny): least and greatest value of each state so far
     """
 
     y: Longs
@@ -313,27 +324,27 @@ def rows(
     scale: Floats,
     times: Floats,
     tolerance: float,
-    told: Callable[[float], None] = lambda t: None,
+    report: Callable[[float], None] = lambda t: None,
 ) -> Iterator[Row]:
-    """The motion at each of `times`, ascending; the first is the start.
+    """The motion at each of `times`, s, ascending; the first is the start.
 
-    ladder     numbers of stages, ascending; a step takes the least that serve
-    tolerance  what each step's error is held to, in parts of the scale
-    told       where each step begins, s, whether it is taken or not; may raise to end it
+    ladder     numbers of stages, ascending; a step uses the fewest that are accurate enough
+    tolerance  of each step's error, relative to the scale
+    report     called with the time, s, at which each attempted step begins; may raise to end it
 
-    Every row ends a step, so that rows are as accurate as the end; so does every turn of a corner.
-    Long numbers must be on (`digits`) wherever this is resumed. Raises `NoStep` if steps shrink to
-    nothing, or corners turn again and again.
+    Every row and every branch change ends a step, so that rows are as accurate as the end. The
+    precision must be set (`digits`) whenever this generator is resumed. Raises `NoStep` if a step
+    becomes too short, or if locating a branch change fails.
     """
     start = np.array(precise.initial, dtype=object)
     way = _Way(ladder, mpfr(float(times[0])), start, mpfr(float(times[1] - times[0])))
-    forecast = Forecast(problem, scale, float(times[-1]), lambda: told(float(way.t)))
+    forecast = Forecast(problem, scale, float(times[-1]), lambda: report(float(way.t)))
     yield Row(start, 0, way.extent)
     for end in times[1:]:
         target = mpfr(float(end))
         turn, tried, h = None, 0, mpfr(0)
         while way.t < target:
-            told(float(way.t))
+            report(float(way.t))
             left = target - way.t
             count = max(1, math.ceil(left / way.length * 0.999))
             h = left / count if turn is None else h + h * turn.beyond
@@ -343,7 +354,7 @@ def rows(
                     method, precise, problem, forecast, scale, way.t, way.y, h, tolerance
                 )
                 error = step.error
-            except (ArithmeticError, ValueError):  # of floats, of factors, of a step
+            except (ArithmeticError, ValueError):  # raised by f, by LU factors, or as `NoStep`
                 error = math.inf
             if not error <= tolerance:
                 way.again(h, error, tolerance)
@@ -367,8 +378,9 @@ def rows(
 def _turned(
     watch: Watch, method: Gauss, margins: Floats, turn: Turn | None, *, slow: bool
 ) -> tuple[bool, Turn | None]:
-    """Whether a step is to be made again because of corners, and up to which turn; turns those that
-    are there at its start, or at its end, if it is taken.
+    """Whether a step must be repeated because a corner changes its branch in it, and where the
+    step must end then. Branches that change at its start, or at its end if it is accepted, are
+    switched here.
     """
     places = np.array([0.0, *method.c.tolist(), 1.0], dtype=float)
     if turn is not None:

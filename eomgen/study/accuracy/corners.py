@@ -1,8 +1,9 @@
-"""Where a derivative with corners turns: found as exactly as the motion itself.
+"""Where a derivative with corners changes its branch, located as exactly as the motion itself.
 
-Held on one side of its corners (`precise.Watch`), a derivative is smooth, and so is a step through
-a corner. What each corner's margin does along the step tells where the first of them turns; the
-step is made again up to there, its ways are turned, and the next one begins on the other side.
+With its branches fixed (`precise.Watch`) a derivative is smooth, even across a corner. The sign of
+each corner's margin along the step shows which corner changes first, and where. The step is then
+repeated so that it ends there, the corner's branch is switched, and the next step starts on the
+other side.
 """
 
 from collections.abc import Sequence
@@ -14,13 +15,13 @@ from numpy.polynomial import Legendre
 from eomgen.run.problem import Floats
 
 NOTHING = 1e-22
-"""A margin this small, in parts of the greatest of its step, is 0."""
+"""A margin this small, relative to its greatest value in the step, counts as 0."""
 
 
 @dataclass(frozen=True)
 class Turn:
-    """Corner number `corner` turns at 1 + `beyond` times the step, if only just before its end to
-    more digits than 1 + `beyond` has in doubles.
+    """Corner number `corner` changes its branch at 1 + `beyond` times the step. `beyond` is kept
+    apart because 1 + `beyond` as a double would lose digits close to the end of the step.
     """
 
     corner: int
@@ -28,15 +29,15 @@ class Turn:
 
 
 def wrong(ways: Sequence[bool], margins: Floats) -> Floats:
-    """Where margins (n, corners) contradict the ways; (n, corners) of booleans."""
+    """Where margins (n, corners) contradict the current branches; booleans (n, corners)."""
     return np.where(np.array(ways), margins < 0, margins > 0)
 
 
 def wrong_from_the_start(ways: Sequence[bool], margins: Floats) -> list[int]:
-    """Corners that were about to turn at the start of a step and go the wrong way all along it.
+    """Corners that were at their zero at the start of a step and contradict their branch all along.
 
-    A margin that is 0 throughout is not > 0: as that of a stop, which is what a coordinate is
-    beyond its limits, has been turned with others, and then stays 0.
+    If a margin is 0 all along the step, the branch for margins > 0 is wrong. That happens to a
+    stop, whose margin is how far a coordinate exceeds its limits, when it was switched with others.
 
     margins (n, corners) at the start, the stages and the end
     """
@@ -48,10 +49,10 @@ def wrong_from_the_start(ways: Sequence[bool], margins: Floats) -> list[int]:
 
 
 def first_turn(ways: Sequence[bool], places: Floats, margins: Floats) -> Turn | None:
-    """The first corner to turn within a step; None if none does.
+    """The first branch change within a step; None if there is none.
 
-    places   (n,): 0, the nodes, 1
-    margins  (n, corners) there
+    places   (n,): 0, the nodes, 1, as parts of the step
+    margins  (n, corners) at these places
     """
     against = wrong(ways, margins)[1:].any(axis=0)
     turns = [
@@ -62,7 +63,7 @@ def first_turn(ways: Sequence[bool], places: Floats, margins: Floats) -> Turn | 
 
 
 def nearer(turn: Turn, places: Floats, margins: Floats) -> Turn:
-    """The turn again, from a step that ends about there, as exactly as its margins tell."""
+    """The branch change located again, from the margins of a step that ends close to it."""
     values = margins[:, turn.corner]
     slope = float(_through(places, values).deriv()(1.0))
     size = float(np.max(np.abs(values)))
@@ -70,10 +71,10 @@ def nearer(turn: Turn, places: Floats, margins: Floats) -> Turn:
 
 
 def simpler(turn: Turn, places: Floats, margins: Floats) -> Turn:
-    """The corner whose margin goes through 0 most steeply where a turn is, which it may be itself.
+    """Of the corners whose margins vanish at a branch change, the one whose margin is steepest.
 
-    The force of a contact of the power 3/2 vanishes with its depth, where it is no polynomial; the
-    depth is one. So its zero is found in a few steps, that of the force in very many.
+    The force of a contact with exponent 3/2 is not a polynomial of time where it vanishes; its
+    depth nearly is. So a few steps locate the zero of the depth, where the force would take many.
     """
     sizes = np.max(np.abs(margins), axis=0)
     near = [
@@ -88,7 +89,7 @@ def simpler(turn: Turn, places: Floats, margins: Floats) -> Turn:
 
 
 def turned_at_the_end(turn: Turn, margins: Floats) -> list[int]:
-    """The corners that are 0 at the end of a step that a turn ends."""
+    """The corners whose margins are 0 at the end of a step that ends at a branch change."""
     sizes = np.max(np.abs(margins), axis=0)
     there = (np.abs(margins[-1]) <= NOTHING * sizes) & (sizes > 0)
     there[turn.corner] = True
@@ -96,19 +97,19 @@ def turned_at_the_end(turn: Turn, margins: Floats) -> list[int]:
 
 
 def is_there(turn: Turn, margins: Floats) -> bool:
-    """Whether a step ends where its turn is."""
+    """Whether a step ends at its branch change."""
     values = np.abs(margins[:, turn.corner])
     return bool(values[-1] <= NOTHING * np.max(values))
 
 
 def _through(places: Floats, values: Floats) -> Legendre:
-    """The polynomial through margins, in parts of the greatest."""
+    """The polynomial through margins, relative to the greatest of them."""
     size = float(np.max(np.abs(values)))
     return Legendre.fit(places, values / size, len(places) - 1, domain=[0.0, 1.0])
 
 
 def _root(way: bool, places: Floats, values: Floats) -> float:
-    """The first share of the step where a margin passes to the wrong side of a way."""
+    """The first part of the step at which a margin gets the sign that contradicts its branch."""
     polynomial = _through(places, values)
     slope = polynomial.deriv()
     found = polynomial.roots()
@@ -116,6 +117,6 @@ def _root(way: bool, places: Floats, values: Floats) -> float:
     passing = [c for c in real if 0.0 < c <= 1.0 and (slope(c) < 0) == way]
     if passing:
         return float(min(passing))
-    # No root to see: it lies between the last place that is right and the first that is wrong.
+    # No root was found: take the middle between the last right sign and the first wrong one.
     first = int(np.flatnonzero(values[1:] < 0 if way else values[1:] > 0)[0]) + 1
     return float((places[first - 1] + places[first]) / 2)

@@ -1,11 +1,11 @@
-"""What a run costs, by counting: the same on every machine and at every hour.
+"""The cost of a run by counting operations: the same on every machine at all times.
 
-Methods are ranked by this, never by the clock: evaluations of the derivative and the Jacobian, LU
-factors by their size, steps, rows, looks at contacts and at branches, each times a cost that is
-known before. A unit is about a microsecond of one core of 2 GHz; what one unit takes here is for
-those to measure who have to keep within a time.
+Methods are ranked by this cost and not by measured time. It adds up derivatives, Jacobians, LU
+factorisations, steps, rows, and checks of contacts and branches, each times a known cost. One unit
+is about a microsecond on one core at 2 GHz. Only a search with a time budget measures how long a
+unit takes on the given machine.
 
-`METHODS` was fitted to runs of six built-in scenes of 2 to 90 states (mean deviation a fifth).
+`METHODS` was fitted to runs of six built-in scenes with 2 to 90 states (mean deviation 20 %).
 """
 
 from collections.abc import Callable, Mapping
@@ -15,31 +15,32 @@ from eomgen.run.problem import Problem
 from eomgen.run.tally import Tally
 
 CALL, STATE, OPERATION = 0.9, 0.05, 0.025
-"""Of a generated function: a call, each state passed, and each operation, in scalar code."""
+"""Of a generated function: a call, each state, and each operation in scalar code."""
 COLUMNS, COLUMN = 0.3, 0.0015
-"""Of a Jacobian that is computed along all directions at once: an operation, and of each
+"""Of a Jacobian computed along all directions at once: an operation, and that for each
 direction."""
 ENTRY = 0.01
 """Of a Jacobian: each of its entries."""
 FACTORS, FLOP = 25.0, 5e-4
-"""LU factors: a call, and each multiplication of them."""
+"""Of an LU factorisation: a call, and each multiplication."""
 HELD, LOOK = 110.0, 20.0
-"""Contacts: forces of those that are held by a complementarity problem, a look at the gaps."""
+"""Of contacts: solving the complementarity problem for their forces, and a check of the gaps."""
 SWITCH = 70.0
-"""Branches that a step may pass over: a call of what tells of them, and what is done with it."""
+"""Of a check whether a step crossed a branch: the call, and the evaluation of its result."""
 UNKNOWN = 50
-"""Operations of a function that does not tell them."""
+"""Operations of a function that does not report their number."""
 
 
 @dataclass(frozen=True)
 class Overhead:
-    """What a method spends around the derivative, in units.
+    """What a method spends besides evaluating the derivative, in units.
 
-    step        a step
-    evaluation  an evaluation of the derivative
-    state       of that, each state
-    row         a row between steps
-    stages      of implicit equal steps: how many are solved for at once, each with a Jacobian
+    step        for each step
+    evaluation  for each derivative
+    state       for each derivative, and each state of it
+    row         for each row interpolated between steps
+    stages      of implicit methods with equal steps: stages solved for together, each with a
+                Jacobian
     """
 
     step: float
@@ -67,11 +68,11 @@ METHODS: Mapping[str, Overhead] = {
     "LSODA": Overhead(28.0, 1.0, 0.5, 17.0),
 }
 OTHER = Overhead(50.0, 10.0, 0.5, 15.0)
-"""Of a method that is not listed."""
+"""Of a method that is not in the table."""
 
 
 def function(problem: Problem, name: str) -> float:
-    """One call of a function of a problem: "derivative" or "jacobian"."""
+    """Cost of a call of a problem's function, "derivative" or "jacobian", in units."""
     states = len(problem.states)
     operations = problem.operations.get(name, UNKNOWN)
     if name == "jacobian" and problem.columns:
@@ -81,7 +82,7 @@ def function(problem: Problem, name: str) -> float:
 
 
 def meter(problem: Problem, method: str) -> Callable[[Tally], float]:
-    """What tells of a run of a problem by a method how many units it has taken so far."""
+    """A function that gives the cost, in units, of a run by a method so far."""
     own, states = METHODS.get(method, OTHER), len(problem.states)
     derivative = function(problem, "derivative") + own.evaluation + own.state * states
     jacobian, factors = function(problem, "jacobian"), FACTORS + FLOP * states**3

@@ -1,11 +1,11 @@
-"""What a run's own error is, as far as other runs of the same scene and its energy tell.
+"""The error of a run, estimated from other runs of the same scene.
 
-A method makes an error C τ^a at the tolerance τ, a near 1; of order p at an equal step h, C h^p.
-Two runs that differ in τ alone are apart by the error of the looser one, but for the share that the
-tighter one has itself; three tell the exponent. Runs of two methods are apart by the error of the
-worse one. Differences are taken over the last part of the run, not at its last moment alone: a
-motion swings, and so does what two runs differ by, which may pass through 0 just there; nor where
-it is greatest, which a spike or an impact makes large for a moment.
+A method's error is about C τ^a at tolerance τ, with a near 1; with equal steps h of a method of
+order p it is C h^p. Two runs that differ only in τ differ by the error of the looser one, less that
+of the tighter one; three runs give the exponent. Runs of two methods differ by about the larger of
+their errors. Differences are taken over the last part of a run. The last moment alone would not do:
+in an oscillation the difference may pass through 0 just then. Nor would the greatest difference: a
+spike or an impact makes it large for a moment.
 """
 
 import math
@@ -22,56 +22,59 @@ from eomgen.study.accuracy.measure import WRONG
 from eomgen.study.accuracy.trial import TIGHTEST_OF_ALL, Case, Setting, Tried, method_of
 
 LAST = 0.1
-"""Part of a run's time over whose rows differences are taken."""
+"""Part of a run's time, at its end, over which differences are taken."""
 CAUTION = 0.8
-"""Of the exponent that a method has in theory: taken where one difference alone is known."""
+"""If only one difference is known, the theoretical exponent is reduced by this factor."""
 MORE = 1.5
-"""Times the steps: other steps."""
+"""Two runs count as different in their steps if one has so many times the steps of the other."""
 ROUNDING, FEW = 2.0**-52, 8.0
-"""No state of doubles is known to less; and by a second run no run is known to less than a few
-times that."""
+"""An error is never stated below machine epsilon, nor, from a second run, below a few times
+it."""
 STRIKES = 1e-13
-"""Moments of strikes are found to 1e-14 of a step: nor is a run among rigid contacts known to less
-than some times that."""
+"""Impacts are located to 1e-14 of a step; with rigid contacts no error is stated below some times
+that."""
 SMALL = 1e-3
-"""Once differences are less than this, errors of equal steps fall as theory has it."""
+"""With equal steps, the error follows theory once differences are less than this."""
 APART = 30.0
-"""By so much must an error have become less by theory for its fall to be seen: errors scatter."""
+"""Errors scatter: their observed decay counts only if theory predicts a decrease by this factor."""
 SCATTER = 3.0
-"""Those of multistep methods, whose orders change, too, scatter more: what remains of theirs is
-taken so many times."""
+"""The errors of multistep methods, whose orders vary, scatter more; the estimate of their remaining
+error is multiplied by this."""
 ALIKE = 2.0
-"""Runs of two methods are taken to be off by so many times what they differ by, for they may be off
-alike; and it is the nearest of several that is asked."""
+"""The error of a run is taken as so many times its difference from a run of another method: both
+may be off in the same direction, and the closest of several others is used."""
 WIDER = 10.0
-"""Times a run's tolerances: those of the run that tells its error."""
+"""Factor between a run's tolerances and those of the run that estimates its error."""
 MOSTLY = 0.3
-"""Share of a run's steps: with so many as long as any may be, its tolerance does not make them."""
+"""If more than this share of a run's steps is at the greatest length allowed, the tolerance does
+not determine its steps."""
 CHANCE = 1.5
-"""Times what a run and another sample of rounding differ by: the error is taken to be no less."""
+"""The error is taken to be at least so many times the difference between a run and one with other
+rounding errors."""
 SLOPES = (0.6, 1.2)
-"""Of the exponent in theory: what a fitted one is kept to."""
+"""Bounds of a fitted exponent, relative to the theoretical one."""
 
 
 @dataclass(frozen=True)
 class Law:
-    """quantity = factor · τ^exponent."""
+    """A power law: quantity = factor · τ^exponent."""
 
     factor: float
     exponent: float
 
     def at(self, tolerance: float) -> float:
-        """The quantity at a tolerance."""
+        """The quantity at the given tolerance."""
         return self.factor * math.pow(tolerance, self.exponent)
 
     def tolerance(self, quantity: float) -> float:
-        """The tolerance for a quantity."""
+        """The tolerance at which the law gives the quantity."""
         return math.exp(math.log(quantity / self.factor) / self.exponent)
 
 
 def fit(tolerances: Sequence[float], quantities: Sequence[float], expected: float) -> Law:
-    """The power law through a ladder's last point, its exponent by least squares of the logarithms
-    of the others, kept within `SLOPES` of the `expected` one; of one point alone it is that.
+    """The power law through the last of a series of points. Its exponent is fitted to the others by
+    least squares of the logarithms and kept within `SLOPES` times the `expected` one. A single
+    point takes the expected exponent.
     """
     tau, e = np.log(np.asarray(tolerances)), np.log(np.asarray(quantities))
     slope = expected
@@ -83,8 +86,8 @@ def fit(tolerances: Sequence[float], quantities: Sequence[float], expected: floa
 
 
 def difference(one: Trajectory, other: Trajectory, scale: Floats) -> float:
-    """How far two runs over the same time are apart, in parts of the scale: at the end, or, where
-    that is more, at half the moments of the last part of the run.
+    """The difference of two runs over the same time, relative to the scale: at the end or, if that
+    is more, the median over the last part of the run.
     """
     start, end = float(one.t[0]), float(one.t[-1])
     since = end - LAST * (end - start)
@@ -95,7 +98,7 @@ def difference(one: Trajectory, other: Trajectory, scale: Floats) -> float:
 
 
 def _rows(run: Trajectory, since: float) -> tuple[Floats, Floats]:
-    """Rows from a time on, backwards: of those at one moment, an impact, the last comes first."""
+    """Rows from a time on, in reverse. Of two rows at an impact, the later one comes first."""
     late = run.t >= since
     return run.t[late][::-1], run.y[late][::-1]
 
@@ -103,14 +106,13 @@ def _rows(run: Trajectory, since: float) -> tuple[Floats, Floats]:
 def remaining(
     gaps: Sequence[float], tolerances: Sequence[float], expected: float, caution: float = CAUTION
 ) -> float:
-    """Error of the tightest of k >= 2 runs of one method, whose `tolerances` (k,) fall, from the
-    differences (k - 1,) of each from the next.
+    """The error of the tightest of k >= 2 runs of one method, estimated from the differences
+    `gaps` (k - 1,) between successive runs, whose `tolerances` (k,) decrease.
 
-    Where one difference alone is known, `caution` times the exponent is taken.
-
-    That of a wrong run says nothing of the next one's error, and is returned as it is. From two on
-    they tell how fast the error falls now, if they are far enough apart: near rounding it does no
-    longer.
+    With one difference, the theoretical exponent times `caution` is used. With more, the decay of
+    the differences gives the exponent, if the tolerances are far enough apart: near rounding the
+    error stops falling. The difference of a wrong run says nothing of the next run's error and is
+    returned unchanged.
     """
     last = gaps[-1]
     if last >= WRONG or last == 0:
@@ -125,14 +127,13 @@ def remaining(
 
 
 def errors(runs: Sequence[Tried], scale: Floats, case: Case) -> list[float]:
-    """Estimated error of each run, in parts of the scale; infinite where nothing is known.
+    """Estimated error of each run, relative to the scale; infinite if nothing is known.
 
-    Of a method's looser runs their difference from its tightest, of that one what remains by the
-    law; or the difference from some run of another method, where that is less. Where steps are
-    bounded otherwise, two runs may be the same steps but for a few: they tell of each other only if
-    one took `MORE` times as many, and how errors fall is not seen from fewer than three. Rigid
-    contacts close within a fixed tolerance of their own, which no law of the method's knows: there
-    nothing is taken to remain less than two runs differ by.
+    The error of a method's looser run is its difference from the tightest one; that of the tightest
+    run is what remains by its power law. A smaller difference from a run of another method is used
+    instead. If steps are bounded otherwise, two runs may share most of their steps: they are
+    compared only if one took `MORE` times as many. Impacts at rigid contacts have a fixed tolerance
+    of their own; there the tightest run's error is its full difference from the next one.
     """
     found = []
     for run in runs:
@@ -160,7 +161,7 @@ def errors(runs: Sequence[Tried], scale: Floats, case: Case) -> list[float]:
 
 
 def _telling(own: Sequence[Tried], case: Case) -> list[Tried]:
-    """Of a method's runs, the tightest first, those that tell of each other, the tightest last."""
+    """Of a method's runs, given tightest first, those that can be compared, tightest last."""
     ladder = [own[0]]
     for run in own[1:]:
         if not case.bounded or _more(ladder[-1], run):
@@ -169,17 +170,17 @@ def _telling(own: Sequence[Tried], case: Case) -> list[Tried]:
 
 
 def _more(one: Tried, other: Tried) -> bool:
-    """Whether one run took clearly more steps than the other."""
+    """Whether `other` took clearly fewer steps than `one`."""
     return one.trajectory.counts["steps"] >= MORE * other.trajectory.counts["steps"]
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A run's error in parts of the motion's scale, by a `second` run, infinite if that breaks off.
+    """A run's error relative to the motion's scale, from a `second` run; infinite if that failed.
 
     last  of the last state
-    most  of any row, that at the time `at`, s; with contacts, where a row may lie before an impact
-          in one run and after it in the other, of the last state, too
+    most  of any row, which is at time `at`, s; with contacts, a row may be before an impact in one
+          run and after it in the other: then the same as `last`
     """
 
     last: float
@@ -189,8 +190,8 @@ class Estimate:
 
 
 def representable(run: Tried, scale: Floats) -> tuple[float, int]:
-    """What rounding of the last state to doubles may make its error, and of which state: half a
-    unit in the last place, in parts of the scale.
+    """The error from rounding the last state to doubles, half a unit in the last place relative to
+    the scale: the largest of all states, and the index of that state.
     """
     floors = np.spacing(np.abs(run.trajectory.y[-1])) / 2 / scale
     worst = int(np.argmax(floors))
@@ -198,10 +199,11 @@ def representable(run: Tried, scale: Floats) -> tuple[float, int]:
 
 
 def looser(case: Case, run: Tried) -> tuple[Setting, Case]:
-    """What tells a run's error: ten times its tolerances, or twice its step.
+    """The setting and case of a run that estimates another's error: ten times its tolerances, or
+    twice its step.
 
-    Where most steps are kept short for other reasons, that makes no other steps: they are to be
-    twice as long where the user bounds them, and half as long where nothing else can be had.
+    If other bounds determine most steps, the tolerance would not change them. Then the bound that
+    the user gave is doubled; without one, steps are bounded to half their greatest length.
     """
     given = run.setting
     if given.dt is not None:
@@ -226,16 +228,16 @@ def by_looser_run(
     samples: Sequence[Tried],
     scale: Floats,
 ) -> Estimate:
-    """A run's error by a second one as `looser` has it, whose constants were moved by rounding.
+    """A run's error from a second one (`looser`), whose constants were perturbed by rounding.
 
     others   looser runs of the same method
-    samples  of the same setting, with constants moved in other ways
+    samples  runs with the same setting and other perturbations of the constants
 
-    What the two differ by is the error of the second, mostly; so it is more than that of the run,
-    but not by much where errors do not fall with the tolerance, as those of LSODA near rounding, or
-    where rounding makes them. Those of equal steps fall as theory has it, but for rounding, which
-    samples tell of. Two runs may be near each other by accident: no less is stated than
-    what the others' differences make, carried on by theory, nor than what samples tell of rounding.
+    The difference is mostly the error of the second run and so an upper bound of the run's own. It
+    is not much larger if errors do not fall with the tolerance, as with LSODA near rounding, or if
+    rounding causes them. Errors of equal steps fall as theory predicts, except for rounding, which
+    the samples show. As two runs may agree by accident, the estimate is at least what the other
+    runs' differences give when extrapolated by theory, and at least what the samples differ by.
     """
     if not all(other.trajectory.finished for other in (second, *samples)):
         return Estimate(math.inf, math.inf, math.nan, second)
@@ -260,7 +262,7 @@ def by_looser_run(
 
 
 def _greatest(one: Trajectory, two: Trajectory, scale: Floats) -> tuple[float, float]:
-    """The greatest difference of rows at the same times, in parts of the scale, and when."""
+    """The greatest difference of rows at equal times, relative to the scale, and its time, s."""
     t, i, j = np.intersect1d(one.t, two.t, return_indices=True)
     apart = np.max(np.abs(one.y[i] - two.y[j]) / scale, axis=1)
     worst = int(np.argmax(apart))
@@ -268,10 +270,10 @@ def _greatest(one: Trajectory, two: Trajectory, scale: Floats) -> tuple[float, f
 
 
 def by_second_run(case: Case, first: Tried) -> Estimate:
-    """A run's error by another run, which is made here, with constants moved by rounding.
+    """A run's error from a second run with perturbed constants, which is made here.
 
-    The other has a tenth of its tolerances, or half its step; where they are near the tightest, ten
-    times them.
+    The second run has a tenth of the tolerances, or half the step; near the tightest tolerance it
+    has ten times the tolerances.
     """
     given, tightest = first.setting, TIGHTEST_OF_ALL
     if given.dt is not None:
@@ -288,7 +290,7 @@ def by_second_run(case: Case, first: Tried) -> Estimate:
     if not (one.finished and two.finished):
         return Estimate(math.inf, math.inf, math.nan, second)
     exponent = method_of(given.integrator).exponent * (CAUTION if given.dt is None else 1)
-    # What they are apart by is one error less the other; near rounding that is all there is.
+    # The difference of the two is one error less the other.
     share = min(abs(1 - math.pow(second.tolerance / first.tolerance, exponent)), 1.0)
     scale = case.scale(second.extent)
     last = difference(one, two, scale) / share

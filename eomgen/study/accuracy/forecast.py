@@ -1,8 +1,7 @@
-"""The motion ahead, roughly: LSODA's, or Radau's where LSODA takes too many steps.
+"""A prediction of the motion by LSODA, or by Radau if LSODA takes too many steps.
 
-LSODA is the cheaper one of the two by far, stiff motion or not. But where rounding of a stiff
-derivative is more than its tolerance, its steps shrink to nothing; Radau's then do not, its
-tolerance being looser and more than what rounding makes.
+LSODA is much cheaper, for stiff motion too. But if rounding errors of a stiff derivative exceed its
+tolerance, its steps become very short. Radau then has a looser tolerance, above those errors.
 """
 
 from collections.abc import Callable
@@ -15,24 +14,24 @@ from eomgen.run.noise import step_noise
 from eomgen.run.problem import Floats, Problem
 
 FORECAST, ROUGHLY = 1e-10, 1e-5
-"""Relative tolerance of the forecast by LSODA, and by Radau; what it is off makes the first
-correction."""
+"""Relative tolerances of the prediction by LSODA and by Radau; its error is the first correction
+of the collocation."""
 OF_NOISE = 10.0
-"""Times what rounding makes of a state: no tolerance is less."""
+"""Tolerances are at least so many times the rounding error of a state."""
 ASTRAY = 1e-6
-"""A forecast this far off, in parts of the scale, begins anew."""
+"""The prediction restarts when it is this far off, relative to the scale."""
 MANY = 500
-"""Steps of LSODA that one call may take: a step of the method that is forecast has a few dozen."""
+"""Steps of LSODA in one call before Radau replaces it; usually there are a few dozen."""
 
 
 class NoStep(ArithmeticError):
-    """A step that cannot be made; the text says why."""
+    """A step cannot be made; the text says why."""
 
 
 class Forecast:
-    """The motion ahead, roughly: what one double-precision run yields, begun anew as it strays.
+    """A prediction of the motion by one run in doubles, which restarts when it drifts off.
 
-    `check` is called at every step; what it raises ends this.
+    `check` is called at every step; what it raises ends the prediction.
     """
 
     def __init__(
@@ -46,9 +45,10 @@ class Forecast:
         self._solver: Any = None
 
     def __call__(self, t: float, y: Floats, times: Floats) -> Floats:
-        """States (len(times), ny) at `times`, ascending and not before t, of the motion through y.
+        """States (len(times), ny) at `times`, ascending and not before t, of the solution through
+        y at t.
 
-        Raises `NoStep` if it does not get there.
+        Raises `NoStep` if the integration fails before the last of them.
         """
         if self._solver is None or not self._reaches(t, t):
             self._begin(t, y)

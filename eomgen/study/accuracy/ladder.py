@@ -1,8 +1,8 @@
-"""What is run to see what accuracy costs: each method's steps or tolerances, from coarse to fine.
+"""The runs of a work-precision diagram: each method's steps or tolerances, from coarse to fine.
 
 Equal steps are t_end / (25 · 2^k), so that they meet the 201 rows of a reference, or every 2nd, 4th
-or 8th of them. Tolerances are whole powers of ten, with one scalar atol, so that each run can be
-repeated by `eomgen simulate --rtol --atol`.
+or 8th of them. Tolerances are powers of ten, with one scalar atol, so that `eomgen simulate --rtol
+--atol` can repeat each run.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,8 +17,8 @@ from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import Floats, Problem
 
 Status = Literal["ok", "wrong", "failed", "over", "refused"]
-"""How a run went: "ok"; "wrong": it reported success and is not right; "failed": it stopped before
-the end; "over": it was stopped, having run too long; "refused": the method is not for the scene."""
+"""How a run went: "ok"; "wrong": it reported success but is wrong; "failed": it stopped before the
+end; "over": it was stopped for its time; "refused": the method cannot run the scene."""
 Kind = Literal["explicit", "implicit", "symplectic"]
 
 SYMPLECTIC = frozenset(
@@ -27,21 +27,22 @@ SYMPLECTIC = frozenset(
 IMPLICIT = frozenset({"Radau", "Radau_differences", "BDF", "BDF_differences", "LSODA"})
 
 COARSEST = 25
-"""Fewest equal steps."""
+"""Least number of equal steps."""
 MOST_STEPS = COARSEST * 2**18
 LOOSEST, TIGHTEST = 2, 13
-"""Powers of ten of rtol, 1e-2 to 1e-13."""
+"""Negated powers of ten of rtol: from 1e-2 to 1e-13."""
 ATOL_SHARE = 1e-3
-"""atol in parts of rtol times the smallest scale of what moves: it then rules only near zero."""
+"""atol relative to rtol times the smallest scale of a state that moves: so rtol dominates except
+near zero."""
 GAIN = 0.7
-"""A finer run whose error is not below this times the best before gains nothing …"""
+"""A finer run gains nothing if its error is not below this times the best one before …"""
 ROUNDING = 1e-6
-"""… which is rounding where errors are as small as this."""
+"""… and errors as small as this then consist of rounding."""
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One run to make: a method with equal steps `dt`, s, or with tolerances `rtol` and `atol`."""
+    """The setting of one run: a method with equal steps `dt`, s, or with `rtol` and `atol`."""
 
     method: str
     dt: float | None = None
@@ -50,24 +51,24 @@ class Rung:
 
     @property
     def setting(self) -> str:
-        """The step or tolerance in words."""
+        """The step or tolerance as text."""
         return f"dt {self.dt:.4g}" if self.rtol is None else f"rtol {self.rtol:.0e}"
 
 
 @dataclass(frozen=True)
 class Work:
-    """What one run took and gave; what was not measured is nan.
+    """The result of one run; what was not measured is nan.
 
-    error              greatest over the rows, in parts of the motion's scale (see `measure`)
+    error              greatest over the rows, relative to the motion's scale (see `measure`)
     final_error        the same at the end
-    at_most            whether these two are no more than bounds, the reference not telling more
-    energy_drift       greatest change of an energy that exact motion keeps, or what the works of
-                       effects leave unaccounted for at the end, in parts of the motion's energy
+    at_most            whether these two are only bounds, because the reference is not more accurate
+    energy_drift       greatest change of a conserved energy, or the energy at the end that the work
+                       of effects does not explain, relative to the motion's energy
     joint_gap          greatest gap in a joint, m
-    quaternion_defect  how far the length of a quaternion was from 1 before it was scaled back
-    seconds            least wall time of `repeats` runs; of a run that stopped, until then
-    spread             how far above that the lower half of them stay, s
-    units              counted work (see `study.cost`): the same on every machine
+    quaternion_defect  greatest difference of a quaternion's length from 1 before normalisation
+    seconds            least wall time of `repeats` runs; of a stopped run, the time until then
+    spread             median wall time less the least, s
+    units              counted work (see `study.accuracy.cost`): the same on every machine
     steps, derivatives, jacobians   counts of one run
     reason             why it is not "ok", or an integrator's remark
     """
@@ -92,16 +93,16 @@ class Work:
 
 @dataclass(frozen=True)
 class Ladder:
-    """How ladders are climbed.
+    """The rules by which each method's steps or tolerances are chosen.
 
     t_end       end of the motion, s
-    first       how many equal steps the coarsest run makes
-    atol_scale  atol in parts of rtol
-    quick       every second rung alone
-    run_time    a run that takes longer, s, ends its ladder
-    most_steps  equal steps of the finest run at most
-    noise       the most that rounding moves a state in a step, where the motion is fast: atol is
-                no less than what a method can then meet
+    first       number of equal steps in the coarsest run
+    atol_scale  atol relative to rtol
+    quick       whether to make only every second run
+    run_time    a run that takes longer, s, is stopped, and its method gets no finer one
+    most_steps  greatest number of equal steps
+    noise       greatest rounding error of a state in a step where the motion is fast: atol is at
+                least what a method can then meet
     """
 
     t_end: float
@@ -114,22 +115,22 @@ class Ladder:
 
 
 def kind(method: str) -> Kind:
-    """What sort of method it is; what is new counts as explicit."""
+    """The kind of a method; one that is not listed counts as explicit."""
     if method in SYMPLECTIC:
         return "symplectic"
     return "implicit" if method in IMPLICIT else "explicit"
 
 
 def order(method: str) -> int | None:
-    """The order that a method with equal steps has by its making; None for any other."""
+    """The theoretical order of a method with equal steps; None for other methods."""
     found = INTEGRATORS[method]
     return found.order if isinstance(found, FixedStep) else None
 
 
 def first_steps(problem: Problem, t: Floats, y: Floats, scale: Floats) -> int:
-    """How many equal steps the coarsest run makes for a motion y (n, ny) at times t (n,).
+    """The number of equal steps in the coarsest run of a motion y (n, ny) at times t (n,).
 
-    A step is then no longer than the motion needs, at its fastest, to cross the range of a state.
+    Its step is at most the time in which a state would cross its range at its greatest rate.
     """
     rates = np.array([problem.derivative(*row) for row in zip(t.tolist(), y, strict=True)])
     fastest = float(np.max(np.abs(rates) / scale))
@@ -140,13 +141,15 @@ def first_steps(problem: Problem, t: Floats, y: Floats, scale: Floats) -> int:
 
 
 def atol_scale(y: Floats, scale: Floats) -> float:
-    """atol in parts of rtol for a motion y (n, ny): from the smallest scale of what moves."""
+    """atol relative to rtol for a motion y (n, ny), from the smallest scale of a state that
+    moves.
+    """
     moving = scale[np.ptp(y, axis=0) > 1e-9 * scale]
     return ATOL_SHARE * float(np.min(moving, initial=np.max(scale)))
 
 
 def next_rung(ladder: Ladder, method: str, done: Mapping[Rung, Work]) -> Rung | None:
-    """The next run of a method, given those that were made; None at the top of its ladder."""
+    """The next run of a method, given those made; None if its finest run was made."""
     fixed = isinstance(INTEGRATORS[method], FixedStep)
     climbed: list[Work] = []
     for rung in _fixed(ladder, method) if fixed else _adaptive(ladder, method):
@@ -176,13 +179,13 @@ def _adaptive(ladder: Ladder, method: str) -> list[Rung]:
     rungs = []
     for rtol in (float(f"1e-{power}") for power in powers):
         atol = max(rtol * ladder.atol_scale, least_tolerance(method, rtol) * ladder.noise)
-        # Four digits: what a user can repeat by hand.
+        # With four digits a user can repeat it by hand.
         rungs.append(Rung(method, rtol=rtol, atol=float(f"{atol:.3e}")))
     return rungs
 
 
 def _ends(ladder: Ladder, climbed: Sequence[Work], fixed: bool) -> bool:
-    """Whether a finer run would take too long, or tell nothing more."""
+    """Whether a finer run would take too long or show nothing more."""
     last = climbed[-1]
     if last.status in ("over", "refused"):
         return True
@@ -202,7 +205,7 @@ def _ends(ladder: Ladder, climbed: Sequence[Work], fixed: bool) -> bool:
 def methods_named(text: str | None) -> Sequence[str]:
     """The methods in `--methods A,B`, in the order of `INTEGRATORS`; all of them if None.
 
-    Raises `RunError` for a name that is none.
+    Raises `RunError` for an unknown name, or if there is none.
     """
     if text is None:
         return tuple(INTEGRATORS)

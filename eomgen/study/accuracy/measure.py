@@ -1,9 +1,9 @@
-"""How far a run is from the truth, in parts of the motion's own scale.
+"""The error of a run, relative to the motion's own scale.
 
-States of one unit form a group (all angles, all speeds …), and its scale is the greatest range that
-any of its states goes through during the run: a radian of a motion that turns by two is half of
-it, whatever else moves. An error is the greatest difference of any state, in parts of the scale of
-its group; so it does not change with units, nor with where the origin lies.
+States with the same unit form a group (all angles, all angular velocities …). The group's scale is
+the greatest range of any of its states during the run: an angle that moves through two radians
+gives a scale of 2 rad. The error is the greatest difference of any state relative to the scale of
+its group. It depends neither on units nor on the origin.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,17 +13,16 @@ import numpy as np
 from eomgen.run.problem import Floats
 
 WRONG = 0.1
-"""A run that is this far off says nothing of the motion any more, whatever it reported."""
+"""A run with this error says nothing about the motion, even if it reported success."""
 
 
 def scales(states: Sequence[str], units: Mapping[str, str], y: Floats) -> Floats:
-    """The scale of each state (ny,) of a motion y (n, ny), in the state's unit; positive.
+    """The scale (ny,) of each state of a motion y (n, ny), in the state's unit; positive.
 
-    y may hold no more than the least and the greatest value of each state. Rows at equal times are
-    not enough: those of an orbit, a period apart, do not move at all.
+    y may consist of just the least and the greatest value of each state. Samples at equal times are
+    not enough: those of an orbit, a period apart, do not differ.
 
-    A group that does not move at all has the greatest value in it as its scale, and 1 if all its
-    values are 0.
+    The scale of a group that does not move is its greatest absolute value, or 1 if that is 0.
     """
     ranges, sizes = np.ptp(y, axis=0), np.max(np.abs(y), axis=0)
     found = np.ones(len(states))
@@ -37,5 +36,5 @@ def scales(states: Sequence[str], units: Mapping[str, str], y: Floats) -> Floats
 
 
 def error(y: Floats, true: Floats, scale: Floats) -> float:
-    """The greatest difference in parts of the scale, of one state (ny,) or of many (n, ny)."""
+    """The greatest difference relative to the scale, of one state (ny,) or of several (n, ny)."""
     return float(np.max(np.abs(y - true) / scale))

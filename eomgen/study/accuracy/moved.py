@@ -1,8 +1,8 @@
-"""A generated module whose constants are moved by what rounding may have moved them.
+"""A generated module whose constants are perturbed by rounding errors.
 
-What a module computes once from its parameters is rounded, and every run of it shares that. The
-motion of the parameters' own values differs by it, and near a separatrix or in chaos by much more
-than any run's own error; two runs of one module can never tell. A run of the moved module can.
+A module computes constants from its parameters and rounds them. All runs of the module share these
+errors, so comparing them cannot show their effect. Near a separatrix or in chaotic motion it
+exceeds a run's own error by far. A run of the perturbed module shows it.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,15 +26,16 @@ from eomgen.store import program_of
 from eomgen.study.diagnosis import problem_of
 
 TIMES = 2.0
-"""Constants that are rounded are moved by so many times that, or a unit in the last place."""
+"""Rounded constants are moved by so many times their rounding error, or by a unit in the last
+place."""
 UNIT = float(np.finfo(float).eps)
 
 
 def moved_problem(
     module: GeneratedModule, model: Model, parameters: Any = None, inputs: Any = None
 ) -> Callable[[int], Problem]:
-    """Gives the problem of a model's module moved in one way or another, by number, from the same
-    initial state; each is made once, when it is first asked for.
+    """A function that gives, by number, the problem of a model's module with constants perturbed in one of
+    several ways, from the same initial state. Each problem is made once.
     """
     program = cache(partial(program_of, model))
     return cache(partial(_made, module, program, model, parameters, inputs))
@@ -56,11 +57,11 @@ def _made(
 def moved(
     module: GeneratedModule, program: Program, parameters: Any = None, way: int = 0
 ) -> GeneratedModule:
-    """The module of a program with the constants that belong to some parameters moved.
+    """The module of a program with the constants that belong to some parameters perturbed.
 
-    Each goes `TIMES` as far as rounding took it from its exact value, or a unit in its last place,
-    whatever is more, one way or the other by chance, of which `way` is the number. Those that are
-    exact stay: what steps round is not shared by runs of other steps.
+    Each constant is moved by `TIMES` its rounding error or by a unit in its last place, whichever
+    is more. The signs are random, with `way` as the seed. Exact constants stay. Rounding errors of
+    the steps need no perturbation: runs with other steps do not share them.
     """
     given = cast(Any, module)
     own = given._parameters(parameters) if parameters is not None else given._DEFAULT
@@ -94,7 +95,7 @@ def _roundings(program: Program, module: GeneratedModule, parameters: Any) -> di
 
 
 def _over(module: GeneratedModule, constants: Mapping[str, Any]) -> GeneratedModule:
-    """A module's functions over other constants, whatever the parameters."""
+    """The module's functions with other constants, which no longer depend on the parameters."""
     original = cast(ModuleType, module)
     twin = ModuleType(original.__name__)
     names = twin.__dict__

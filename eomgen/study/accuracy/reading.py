@@ -1,4 +1,4 @@
-"""What measured ladders say: observed orders, cheapest runs, what the exact Jacobian saves."""
+"""Results of a work-precision study: observed orders, cheapest runs, savings by the Jacobian."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,18 +10,17 @@ from eomgen.study.accuracy.ladder import Work
 
 TARGETS = (1e-3, 1e-6, 1e-9)
 AGREE = 0.05
-"""Slopes of the error from step to step are nearly equal while none is farther from their median
-than this, in parts of it."""
+"""Slopes count as equal if each differs from their median by at most this part of it."""
 LEAST_SLOPES = 2
 LEAST = 0.5
-"""Slopes below are those of rounding."""
+"""Slopes below this come from rounding."""
 DIFFERENCES = "_differences"
-"""What a method's name ends in that has its Jacobian by finite differences."""
+"""Suffix of methods that compute their Jacobian by finite differences."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """The order seen: the slope of log error over log step, from step `coarse` to `fine`, s."""
+    """The observed order: the slope of log error over log step, from step `coarse` to `fine`, s."""
 
     value: float
     coarse: float
@@ -29,12 +28,12 @@ class Order:
 
 
 def observed_order(works: Sequence[Work]) -> Order | None:
-    """The order that equal steps show, from one method's runs; None if they show none.
+    """The order that runs of one method with equal steps show; None if they show none.
 
-    The asymptotic range is sought without knowing the order: of all stretches of steps on which the
-    slopes from one step to the next are nearly equal the finest, as far as it goes. Only measured
-    errors of right runs count, and no slopes below `LEAST`. The order is the slope of the straight
-    line there.
+    The asymptotic range is found without knowing the order: of all ranges of steps over which the
+    slopes from one step to the next are nearly equal, the one with the finest steps and, among
+    those, the longest. Only measured errors of "ok" runs count, and only slopes above `LEAST`. The
+    order is the slope of a straight line fitted to the range.
     """
     usable = [
         work for work in works if work.status == "ok" and not work.at_most[0] and work.error > 0
@@ -59,8 +58,8 @@ def observed_order(works: Sequence[Work]) -> Order | None:
 
 
 def cheapest(works: Iterable[Work], target: float) -> list[Work]:
-    """Of each method the right run of least counted work whose error is within the target; the
-    least first. Wall time would rank them otherwise from hour to hour.
+    """Of each method the "ok" run with the least counted work whose error is within the target,
+    cheapest first. Wall time would rank them differently from hour to hour.
     """
     best: dict[str, Work] = {}
     for work in works:
@@ -74,7 +73,7 @@ def cheapest(works: Iterable[Work], target: float) -> list[Work]:
 def saved_by_jacobian(works: Iterable[Work]) -> dict[str, float]:
     """By method: median ratio of the time with finite differences to that with the Jacobian.
 
-    Of runs with the same tolerances that both came to their end right.
+    It is taken over runs with the same tolerances that are both "ok".
     """
     times = {
         (work.rung.method, work.rung.rtol, work.rung.atol): work.seconds

@@ -1,9 +1,9 @@
-"""Measured runs kept in a table, so that what was begun goes on from there.
+"""A table of measured runs, from which an unfinished study continues.
 
-The table is the CSV that a user reads, without lines that a reader of CSV would stumble over: what
-is the same for all runs is a column, too. One names what was measured by a digest: of the module,
-the parameters and inputs, the end, the integrators, and this machine. Where any of them is another,
-the records are of no use and are begun anew.
+The table is the CSV file that a user reads. It has no comment lines, as CSV readers would fail on
+them; values that are the same for all runs have columns, too. One column holds a digest of what was
+measured: the module, the parameters and inputs, the end time, the integrators, and the machine. If
+the digest differs, the table is not used and the study starts anew.
 """
 
 import csv
@@ -49,18 +49,18 @@ COLUMNS = (
     "jacobians",
     "reason",
 )
-"""Errors and drifts are numbers without a unit: parts of the motion's own scale, or its energy."""
+"""Errors and drifts have no unit: they are relative to the motion's own scale, or its energy."""
 GENERATION, KEY = "generation_s", "eomgen_key"
-"""Columns after these and those that the caller gives."""
+"""Columns after these and those that the caller adds."""
 LARGEST = 100_000_000
-"""Bytes of a table beyond which it is none of ours."""
+"""Bytes; a longer table is not one of ours."""
 TIMES = ("time_s", "time_spread_s", "repeats")
-"""Columns that depend on the machine."""
+"""Columns that depend on how fast the machine is."""
 AT_MOST, MEASURED = "at most", "measured"
 
 
 def key(*what: object) -> str:
-    """A digest of what runs depend on, this machine and its libraries among it."""
+    """A digest of what the runs depend on, including this machine and its libraries."""
     here = Path(__file__).parent
     digest = hashlib.sha256()
     own = [here / f"{name}.py" for name in ("measure", "reference", "work_precision")]
@@ -81,11 +81,11 @@ def save(
     same: Mapping[str, object] = MappingProxyType({}),
     force: bool = False,
 ) -> None:
-    """Write the table: a line of names, and a row for each run. In all rows are the `same` values,
-    by their columns' names, the time that generating the module took, s, and the key.
+    """Write the table: a header, and a row for each run. All rows hold the values of `same`, by
+    column name, the time that generating the module took, s, and the key.
 
-    Rows are in the order of the methods and from coarse to fine, whatever order they were made in.
-    Raises `RunError` if it cannot be written.
+    Rows are sorted by method and from coarse to fine. Raises `RunError` if the file cannot be
+    written.
     """
     buffer = io.StringIO()
     table = csv.writer(buffer, lineterminator="\n")
@@ -96,15 +96,14 @@ def save(
 
 
 def ordered(works: Iterable[Work]) -> list[Work]:
-    """By method, each from coarse to fine."""
+    """The runs sorted by method, each method's from coarse to fine."""
     place = {method: k for k, method in enumerate(INTEGRATORS)}
     return sorted(works, key=lambda w: (place[w.rung.method], -(w.rung.dt or w.rung.rtol or 0.0)))
 
 
 def load(path: Path, key: str) -> tuple[Mapping[Rung, Work], float | None]:
-    """The runs kept under this key, and the generation time, s; none if there are none.
-
-    A table of another key, or one that is damaged, counts as none.
+    """The runs in the table and the generation time, s; empty and None if there is no table, if its
+    key differs, or if it is damaged.
     """
     try:
         data = read_plain(path, LARGEST)
@@ -148,12 +147,12 @@ def _row(work: Work) -> list[object]:
 
 
 def _cell(value: float | None) -> str:
-    """The shortest text that reads back exactly; empty for what is not there."""
+    """The shortest text that reads back exactly; empty for None and nan."""
     return "" if value is None or math.isnan(value) else repr(value)
 
 
 def _work(row: Mapping[str, str]) -> Work:
-    """Raises `ValueError` or `KeyError` for a row that is none of ours."""
+    """The run in a row. Raises `ValueError` or `KeyError` if the row is malformed."""
 
     def number(column: str) -> float:
         return float(row[column]) if row[column] else math.nan
@@ -164,7 +163,7 @@ def _work(row: Mapping[str, str]) -> Work:
     if row["method"] not in INTEGRATORS or row["status"] not in STATUSES:
         raise ValueError("no such method or status")
     if None in row.values():
-        raise ValueError("a row breaks off")
+        raise ValueError("a row is incomplete")
     return Work(
         Rung(row["method"], optional("dt_s"), optional("rtol"), optional("atol")),
         next(status for status in STATUSES if status == row["status"]),

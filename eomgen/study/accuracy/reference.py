@@ -1,10 +1,10 @@
-"""What a run is compared with: the motion to more digits than any run has, and how sure that is.
+"""The reference that runs are compared with: the motion to more digits, with an error bound.
 
-The motion is found twice by Gauss collocation in long numbers (`collocation`), once with fewer
-stages and a looser tolerance; the looser one's difference from the tighter, which is what is kept,
-is the stated error, with what rounding to doubles adds. Where contacts strike, or where that would
-take too long, two methods in doubles at their tightest tolerance stand in: twice their difference
-is the stated error, and the origin says so.
+Gauss collocation in extended precision (`collocation`) computes the motion twice, once with fewer
+stages and a looser tolerance. The tighter result is kept. The stated error is the difference of the
+two plus rounding to doubles. With rigid contacts, or if collocation would take too long, two
+methods in doubles at their tightest tolerance are used instead; the stated error is twice their
+difference, and the origin says so.
 """
 
 import hashlib
@@ -37,30 +37,31 @@ from eomgen.study.diagnosis import problem_of
 
 ROWS = 201
 SECONDS = 300.0
-"""Of processor time that a reference in long numbers may take; one in doubles comes on top."""
+"""Processor time that a reference in extended precision may take, s; one in doubles is extra."""
 TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
-"""Stages, and what a step may be off in parts of the scale: of the run kept, and of the other."""
+"""Numbers of stages, and the tolerance of a step relative to the scale: of the result that is kept,
+and of the other."""
 FORMAT = "reference 4"
-"""Changes whenever a reference would come out otherwise."""
+"""Must change whenever references would come out differently."""
 _SOON = 1.0
-"""A run in doubles may always take so long, s."""
+"""Processor time that a run in doubles may always take, s."""
 _LOOKS = 64
-"""Derivatives after which a run in doubles looks at the clock."""
+"""Derivatives between two checks of the time in a run in doubles."""
 SELDOM = 50
-"""Of so many steps in long numbers, one looks at the clock."""
+"""Steps between two checks of the time in extended precision."""
 _JUDGED = 0.1
-"""Share of the time after which the pace tells whether it will suffice."""
+"""Part of the time allowed after which a run's speed is judged."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The motion as exactly as it was found.
+    """A reference motion.
 
     t            times (n,), s, equally spaced, both ends included
     y            states (n, ny), rounded to doubles
     scale        of each state (ny,): `measure.scales`
-    error        what y may be off, the most of all rows, in parts of the scale
-    final_error  the same of the last row
+    error        bound of the error of y over all rows, relative to the scale
+    final_error  the same for the last row
     origin       method, digits, and how the error was found, in one line
     seconds      how long it took
     """
@@ -75,18 +76,18 @@ class Reference:
 
 
 _Found = tuple[Floats, Floats, Floats, str]
-"""The motion (n, ny), the same plus what it may be off, between which states lie (2, ny), and how
-all that was found."""
+"""The motion (n, ny), the motion plus its error (n, ny), the least and greatest states (2, ny), and
+the origin."""
 
 
 class TooLongError(Exception):
-    """It would take longer than allowed."""
+    """The computation would take longer than allowed."""
 
 
 def paced(problem: Problem, t_end: float, seconds: float, progress: Progress) -> Problem:
-    """The same problem, of which a run up to `t_end`, s, tells how far it is and ends where it
-    clearly takes more than `seconds` of processor time, or a second: by `TooLongError` from its
-    derivative, since a step may be tried again and again.
+    """The same problem with a time limit. A run up to `t_end`, s, reports its progress and ends
+    when it clearly takes more than `seconds` of processor time, and more than one second. The
+    derivative then raises `TooLongError`: a failing step may be repeated without end.
     """
     began, calls, told = time.process_time(), 0, throttled(progress)
     allowed = max(seconds, _SOON)
@@ -118,16 +119,16 @@ def reference(
 ) -> Reference:
     """The motion of a module from 0 to `t_end`, s, at given parameters and constant inputs.
 
-    model     what the module was made of; without it there are no long numbers
-    progress  told the fraction done
-    seconds   of processor time that long numbers may take; 0 for doubles at once
-    folder    where references are kept, so that none is computed twice; or None. One that cannot
-              be trusted, read or written (`eomgen.entries`) is done without
-    doubles   whether they may stand in where there is no run in long numbers
-    rest_speed  below which rigid contacts do not bounce; None for what `integrate` takes
+    model     what the module was made of, or None: then extended precision cannot be used
+    progress  called with the fraction done
+    seconds   processor time allowed in extended precision; 0 to use doubles at once
+    folder    where references are stored, so that none is computed twice; or None. One that is
+              not trusted or cannot be read or written (`eomgen.entries`) is ignored
+    doubles   whether doubles may be used if extended precision cannot
+    rest_speed  speed below which rigid contacts do not bounce; None: see `integrate`
 
-    Raises `RunError` if the module refuses parameters or inputs, if the motion does not get to
-    `t_end`, or if doubles would stand in that may not.
+    Raises `RunError` if the module refuses parameters or inputs, if the motion does not reach
+    `t_end`, or if doubles would be needed but are not allowed.
     """
     problem = problem_of(module, parameters, inputs, model)
     told = progress or _ignore
@@ -178,7 +179,7 @@ def _in_long_numbers(
     seconds: float,
     progress: Progress,
 ) -> _Found:
-    """The motion by Gauss collocation. Raises `TooLongError` where that takes longer."""
+    """The motion by Gauss collocation. Raises `TooLongError` if it exceeds the time allowed."""
     began = time.process_time()
 
     def run(
@@ -188,7 +189,7 @@ def _in_long_numbers(
         calls = count()
 
         def told(t: float) -> None:
-            if next(calls) % SELDOM:  # to look at the clock takes as long as a step
+            if next(calls) % SELDOM:  # checking the time takes as long as a step
                 return
             done = before + share * t / float(times[-1])
             progress(done)
@@ -201,7 +202,7 @@ def _in_long_numbers(
         progress(before + share)
         return np.array(found), row
 
-    # The looser one goes first: it is the cheaper one to give up.
+    # The looser run goes first: if the time does not suffice, less of it is lost.
     loose, _ = run(*LOOSE, 0.0, 0.4)
     tight, last = run(*TIGHT, 0.4, 0.6)
     with digits():
@@ -215,15 +216,15 @@ def _in_long_numbers(
 
 
 def _check_pace(spent: float, done: float, seconds: float, numbers: str) -> None:
-    """Raise `TooLongError` if the time is over, or clearly will be."""
+    """Raise `TooLongError` if the time is used up, or clearly will be."""
     if spent > seconds or (spent > _JUDGED * seconds and spent > 1.5 * done * seconds):
         raise TooLongError(f"more than {seconds:g} s in {numbers}")
 
 
 def _roughly(problem: Problem, t_end: float, rest_speed: float | None) -> Floats:
-    """Between which states lie in a quick run, (2, ny).
+    """The least and greatest value of each state in a quick run, (2, ny).
 
-    Raises `RunError` if that does not get to the end.
+    Raises `RunError` if the run does not reach the end.
     """
     tally = Tally()
     run = integrate(
@@ -242,7 +243,7 @@ def _in_doubles(
     why: str,
     progress: Progress,
 ) -> _Found:
-    """The motion by two methods."""
+    """The motion by two methods in doubles."""
     other = "gragg_bulirsch_stoer" if "gragg_bulirsch_stoer" in INTEGRATORS else "Radau"
     found = []
     for i, (method, rtol) in enumerate((("DOP853", SMALLEST_RTOL), (other, 1e-12))):
@@ -267,7 +268,7 @@ def _in_doubles(
         found.append(np.array([run.y[np.searchsorted(run.t, t)] for t in times]))
     return (
         found[0],
-        2 * found[1] - found[0],  # which of the two is better is not known
+        2 * found[1] - found[0],  # which of the two is more accurate is not known
         np.array([tally.low, tally.high]),
         f"DOP853 in doubles at rtol {SMALLEST_RTOL:g} ({why}); error: twice the difference from "
         f"{other} at rtol 1e-12",
@@ -283,7 +284,7 @@ def _key(
     seconds: float,
     rest_speed: float | None,
 ) -> str:
-    """A digest of all that makes a reference what it is."""
+    """A digest of everything that the reference depends on."""
     source = module.__spec__.loader.get_source(module.__spec__.name) or ""
     given = [module.PARAMETERS if parameters is None else parameters]
     given += [module.INPUTS if inputs is None else inputs]
@@ -294,14 +295,14 @@ def _key(
 
 
 def save(made: Reference, path: Path) -> None:
-    """Write a reference as NumPy's .npz, whole. Raises `RunError` if that cannot be."""
+    """Write a reference as NumPy's .npz, atomically. Raises `RunError` if that fails."""
     write_whole(path, _content(made))
 
 
 def _content(made: Reference) -> bytes:
     """A reference as NumPy's .npz."""
     buffer = io.BytesIO()
-    np.savez(  # `eomgen` comes first, where it marks the file as ours
+    np.savez(  # `eomgen` comes first: it marks the file as ours
         buffer,
         eomgen=np.array(FORMAT),
         t=made.t,
@@ -314,7 +315,7 @@ def _content(made: Reference) -> bytes:
 
 
 def _kept(content: bytes | None) -> Reference | None:
-    """The reference that was kept as these bytes; None if there are none."""
+    """The reference stored as these bytes; None if there are none."""
     if content is None:
         return None
     with np.load(io.BytesIO(content), allow_pickle=False) as members:
@@ -324,4 +325,4 @@ def _kept(content: bytes | None) -> Reference | None:
 
 
 def _ignore(fraction: float) -> None:
-    """Take no notice of progress."""
+    """Ignore progress."""

@@ -1,4 +1,4 @@
-"""A search for a run that will do: the runs made so far, the next one's plan, and the choice."""
+"""The state of a search for a run: the runs made so far, the plan of the next, and the choice."""
 
 import math
 import time
@@ -20,21 +20,21 @@ from eomgen.study.accuracy.estimate import (
 from eomgen.study.accuracy.trial import Case, Method, Setting, Tried, method_of
 
 MOST_STEPS = 2**20
-"""Of equal steps, in any run."""
+"""Greatest number of equal steps in a run."""
 LOOKS = 5
-"""States of a motion, from its start to its end, at which it is asked what is fast."""
+"""Number of states, from start to end of a motion, at which its fast components are determined."""
 FITS = 0.2
-"""Of the absolute tolerance of a run: where it should have been less, it is made again."""
+"""A run is made again if its absolute tolerance should have been below this part of what it was."""
 SAMPLES = 2
-"""More samples of rounding, where it counts."""
+"""Number of further runs that show the effect of rounding, where it matters."""
 UNIT = 1e-6
-"""s that a unit of work is taken to be before any run was made."""
+"""Time that a unit of work is assumed to take before the first run, s."""
 
 Say = Callable[[str], None]
 
 
 def _now() -> float:
-    """What the clock shows, s."""
+    """The current time, s."""
     return time.perf_counter()
 
 
@@ -42,8 +42,8 @@ def _now() -> float:
 class Plan:
     """A method's next run.
 
-    error, cost  expected of it, the error only where it is `known`; the cost in units of work
-    work         that its run at the accuracy asked for should take
+    error, cost  expected for it; the error only if it is `known`; the cost in units of work
+    work         expected of the method's run at the required accuracy, in units of work
     """
 
     method: Method
@@ -56,14 +56,14 @@ class Plan:
 
 @dataclass(frozen=True)
 class Choice:
-    """The run chosen.
+    """The chosen run.
 
-    error     its estimated error in the last state, in parts of the motion's scale; infinite if
+    error     its estimated error in the last state, relative to the motion's scale; infinite if
               there is no estimate
-    most, at  the same of all rows, and the time of the worst, s; infinite and nan likewise
+    most, at  greatest estimated error of any row, and its time, s; infinite and nan if unknown
     met       whether that is what was asked for
-    reason    why not, as far as it is known; else ""
-    runs      how many were made in all, which took `seconds` together, with this one
+    reason    why not, if it is known; else ""
+    runs      number of runs made in all, this one included, which took `seconds` together
     """
 
     tried: Tried
@@ -78,17 +78,17 @@ class Choice:
 
 @dataclass
 class Search:
-    """Runs of a case made so far, and by what rules more are made.
+    """The runs of a case made so far, and the rules for making more.
 
-    say       told of each planned run before it is made
+    say       called with a line of text before each planned run
     first     tolerance of the first runs
-    budget    s from the start on after which runs are ended
-    runs      those that came to the end
-    broken    those that did not
-    pilots    those that only told how others are to be made
-    second    those that were made to tell another's error, by the identity of that
-    samples   likewise, more samples of rounding
-    left_out  methods that are gone on with no further, for now
+    budget    s after the start at which runs are ended
+    runs      finished runs
+    broken    runs that did not reach the end
+    pilots    finished runs that only helped to set up others
+    second    runs that estimate another's error, by the `id` of that run
+    samples   by the same key, runs with other perturbations of the constants
+    left_out  methods that are not continued for now
     """
 
     case: Case
@@ -107,7 +107,7 @@ class Search:
 
     @property
     def spent(self) -> float:
-        """s by the clock since the search began."""
+        """Wall time since the search began, s."""
         return _now() - self.started
 
     @property
@@ -118,19 +118,19 @@ class Search:
 
     @property
     def unit(self) -> float:
-        """What a unit of work takes here, s, by all runs made so far."""
+        """Time that a unit of work takes on this machine, s, measured on all runs so far."""
         work = sum(run.work for run in self.made)
         return sum(run.seconds for run in self.made) / work if work else UNIT
 
     @property
     def tightest_run(self) -> Tried | None:
-        """The run held tightest so far."""
+        """The run with the tightest tolerance so far; None if there is none."""
         known = self.runs or [run for run in self.pilots if run.trajectory.finished]
         return min(known, key=lambda run: (run.setting.dt is not None, run.tolerance), default=None)
 
     @property
     def extent(self) -> Floats:
-        """Between which states the motion lies, (2, ny), as the run held tightest so far has it."""
+        """Least and greatest value of each state, (2, ny), in the tightest run so far."""
         tightest = self.tightest_run
         return np.array([self.case.problem.initial] * 2) if tightest is None else tightest.extent
 
@@ -141,7 +141,7 @@ class Search:
 
     @property
     def fast(self) -> Fast:
-        """What is fast in the motion, as the run held tightest has it, or where it starts."""
+        """The fast components of the motion, from the tightest run or else from the start."""
         tightest = self.tightest_run
         if id(tightest) not in self._fast:
             states = [(0.0, self.case.problem.initial)]
@@ -158,29 +158,29 @@ class Search:
         return sorted(own, key=lambda run: -run.tolerance)
 
     def tightest(self, method: Method) -> float:
-        """The tightest tolerance, or shortest step, s, that a method is taken to."""
+        """The tightest tolerance, or shortest step, s, at which a method is run."""
         return method.tightest or self.case.t_end / MOST_STEPS
 
     def deepest(self, method: Method) -> float:
-        """The tightest tolerance so far, or shortest step, of methods of its kind; infinite if none
-        came to its end.
+        """The tightest tolerance so far of methods with adaptive steps, or the shortest step, s, of
+        methods with equal steps; infinite if none finished.
         """
         alike = (run for run in self.runs if (run.setting.dt is not None) == method.equal_steps)
         return min((run.tolerance for run in alike), default=math.inf)
 
     def setting(self, method: Method, tolerance: float) -> Setting:
-        """A method at about a tolerance or a step, s, for the motion as far as it is known."""
+        """A method's setting at about a tolerance or step, s, for the motion as known so far."""
         noise = float(np.max(self.fast.noise))
         return self.case.setting(method, tolerance, self.extent, noise)
 
     def repeats(self, method: Method, tolerance: float) -> bool:
-        """Whether a run at about a tolerance would be one that was made: equal steps end at rows,
-        which bounds them.
+        """Whether a run at about a tolerance would have the setting of a run already made: equal
+        steps must end at rows, so there are few of them.
         """
         return self.setting(method, tolerance) in [run.setting for run in self.runs]
 
     def attempt(self, method: Method, tolerance: float, most: float = math.inf) -> bool:
-        """Make a run; where it comes to no end, the method is gone on with no further.
+        """Make a run, and return whether it finished. If not, its method is not continued.
 
         most  units of work that it may take
         """
@@ -195,8 +195,8 @@ class Search:
         return finished
 
     def misfits(self, method: Method) -> bool:
-        """Whether the last run, by this method, was held to another part of the motion than it
-        should have been, for how far that goes was not known before; it counts no more then.
+        """Whether the absolute tolerance of the last run, by this method, was too loose, because
+        the scale of the motion was not known before. Then the run becomes a pilot.
         """
         run = self.runs[-1]
         if run.setting.atol is None:
@@ -209,29 +209,29 @@ class Search:
         return True
 
     def make(self, plan: Plan, most: float = math.inf) -> bool:
-        """Make the run of a plan, and say what is expected of it; whether it came to its end."""
+        """Make a planned run after saying what is expected of it; whether it finished."""
         setting = self.setting(plan.method, plan.tolerance)
         error = f"an error of {plan.error:.1g} in " if plan.known else ""
         self.say(f"{setting.options}: expecting {error}{plan.cost * self.unit:.2g} s")
         return self.attempt(plan.method, plan.tolerance, most)
 
     def verify(self, run: Tried) -> None:
-        """Make a second run that tells a run's error (`estimate.looser`)."""
+        """Make a second run that estimates a run's error (`estimate.looser`)."""
         setting, case = looser(self.case, run)
-        self.say(f"{setting.options}, constants moved by rounding: to tell the error")
+        self.say(f"{setting.options}, with perturbed constants, to estimate the error")
         self.second[id(run)] = self._moved(case, setting, 0)
 
     def sample(self, run: Tried) -> None:
-        """Make more samples of what rounding makes of a run."""
+        """Make further runs that show the effect of rounding on a run."""
         ways = range(1, 1 + SAMPLES) if self.case.moved is not None else ()
         self.samples[id(run)] = [self._moved(self.case, run.setting, way) for way in ways]
 
     @property
     def disturbed(self) -> float:
-        """About how far rounding moves the end of the motion, in parts of the scale: what the
-        cheapest run is off from one with constants moved by rounding; 0 where that is not known.
+        """About how far rounding moves the end of the motion, relative to the scale; 0 if unknown.
 
-        Of multistep methods any disturbance makes other steps: others' runs go first.
+        It is the difference of the cheapest run from one with perturbed constants. One-step methods
+        come first: a perturbation changes the steps and orders of a multistep method.
         """
         if self._disturbed is None:
             run = min(
@@ -248,7 +248,7 @@ class Search:
         return self._disturbed
 
     def _moved(self, case: Case, setting: Setting, way: int) -> Tried:
-        """A run with constants moved by rounding."""
+        """A run with constants perturbed by rounding errors."""
         made = case.run(setting, due=self.started + self.budget, moved=way)
         if made.interrupted:
             raise KeyboardInterrupt
@@ -262,13 +262,13 @@ class Search:
         return by_looser_run(self.case, run, self.second[id(run)], others, samples, self.scale)
 
     def rounded(self, run: Tried) -> float:
-        """How far rounding moves a run's end, in parts of the scale, as far as samples tell."""
+        """How far rounding moves a run's end, relative to the scale, as its samples show."""
         found = [s.trajectory for s in self.samples.get(id(run), []) if s.trajectory.finished]
         return max((difference(run.trajectory, one, self.scale) for one in found), default=0.0)
 
     def judged(self) -> dict[int, float]:
-        """Estimated error of each run, by the run's identity: by a second one where it was made,
-        by the other runs where not.
+        """Estimated error of each run, by the run's `id`: from its second run if there is one, else
+        from the other runs.
         """
         found = errors(self.runs, self.scale, self.case)
         judged = {id(run): error for run, error in zip(self.runs, found, strict=True)}
@@ -278,12 +278,12 @@ class Search:
         return judged
 
     def representable(self, run: Tried) -> tuple[float, str]:
-        """What rounding a run's last state alone makes its error, and of which state."""
+        """The error from rounding a run's last state to doubles, and the state with the largest."""
         floor, worst = representable(run, self.scale)
         return floor, self.case.problem.states[worst]
 
     def chosen(self, run: Tried, judged: dict[int, float], met: bool, reason: str = "") -> Choice:
-        """A run as the choice, its error as `judged` has it."""
+        """A run as the choice, with its error from `judged`."""
         most, at = math.inf, math.nan
         if id(run) in self.second:
             found = self.estimate(run)
@@ -292,6 +292,6 @@ class Search:
         return Choice(run, judged[id(run)], most, at, met, reason, count, self.spent)
 
     def nothing(self) -> Choice:
-        """Of runs that all break off, the one that comes farthest."""
+        """If no run finishes: the run that got farthest, as a choice without an estimate."""
         farthest = max(self.broken, key=lambda tried: float(tried.trajectory.t[-1]))
         return self.chosen(farthest, {id(farthest): math.inf}, False)

@@ -1,4 +1,4 @@
-"""One run of a scene under a method's tolerance or step, and what it took."""
+"""One run of a scene with a given tolerance or step, and what it took."""
 
 import math
 import time
@@ -22,38 +22,38 @@ from eomgen.study.accuracy.cost import meter
 from eomgen.study.accuracy.measure import scales
 
 TIGHTEST = {"LSODA": 1e-12}
-"""Relative tolerances beyond which a method gives up on many scenes."""
+"""Relative tolerances below which a method fails for many scenes."""
 TIGHTEST_OF_ALL = 1e-13
 ORDERS = {"RK45": 5, "DOP853": 8, "LSODA": 10, "Radau": 5, "BDF": 4, "gragg_bulirsch_stoer": 12}
-"""Of adaptive methods: the time for an error e grows as e^(-1/order). That of LSODA goes up to 12,
-and that of extrapolation as far as it finds worth it."""
+"""Orders of adaptive methods: the time for an error e grows like e^(-1/order). LSODA has orders up
+to 12; extrapolation chooses its own."""
 LEAST = 1e-9
-"""Less than this, s, no clock tells apart."""
+"""Shortest time that is measured, s."""
 OVER = "no time for more"
 SOON = 0.2
-"""Part of the work allowed after which a run's pace is judged."""
+"""Part of the work allowed after which a run's speed is judged."""
 HARDLY = 0.3
-"""Power of 2 by which equal steps may be longer than asked: twice the steps are twice the time."""
+"""Equal steps may exceed the requested length by 2 to this power: halving them doubles the time."""
 MARKS = 500
-"""Times at which a run's pace is noted, about."""
+"""About how many times a run's progress is recorded."""
 SLOW = 2.5
-"""So many times the work allowed, at the pace so far, end a run early."""
+"""A run is stopped early if its speed so far predicts so many times the work allowed."""
 
 Watch = Callable[[str], AbstractContextManager[Progress]]
-"""Shows what is being tried, and how far it is."""
+"""Shows which run is being made, and its progress."""
 
 
 def unseen(label: str) -> AbstractContextManager[Progress]:
-    """Watch nothing."""
+    """Show nothing."""
     return nullcontext(lambda fraction: None)
 
 
 @dataclass(frozen=True)
 class Method:
-    """What theory says of a method: error ∝ τ^exponent, time ∝ τ^-growth (of an equal step, τ = h).
+    """A method in theory: error ∝ τ^exponent, time ∝ τ^-growth (with equal steps, τ = h).
 
-    tightest   relative tolerance that it is taken to; of an equal step 0
-    multistep  whether it steps on from several states
+    tightest   its least relative tolerance; 0 for equal steps
+    multistep  whether a step uses several previous states
     """
 
     name: str
@@ -69,7 +69,7 @@ class Method:
 
 
 def method_of(name: str) -> Method:
-    """A method by its name. Raises `RunError` if there is none."""
+    """The properties of a method, by its name. Raises `RunError` for an unknown name."""
     found = find_integrator(name)
     if isinstance(found, FixedStep):
         return Method(name, float(found.order), 1.0, 0.0)
@@ -79,7 +79,7 @@ def method_of(name: str) -> Method:
 
 @dataclass(frozen=True)
 class Setting:
-    """A method and how it is bounded: by tolerances, or by a step, s."""
+    """A method with its tolerances, or with its step `dt`, s."""
 
     integrator: str
     rtol: float | None = None
@@ -88,13 +88,13 @@ class Setting:
 
     @property
     def tolerances(self) -> dict[str, Any]:
-        """Those that are given, by name."""
+        """The tolerances that are given, by name."""
         pairs = {"rtol": self.rtol, "atol": self.atol}
         return {name: value for name, value in pairs.items() if value is not None}
 
     @property
     def options(self) -> str:
-        """What on the command line makes the same run."""
+        """The options of `eomgen simulate` that make the same run."""
         steps = {} if self.dt is None else {"dt": self.dt}
         given = [f"--{name} {value!r}" for name, value in {**self.tolerances, **steps}.items()]
         return " ".join([f"--integrator {self.integrator}", *given])
@@ -104,10 +104,10 @@ class Setting:
 class Tried:
     """A run, and what it took.
 
-    seconds  by the clock on the wall
-    work     counted, in units of `cost`: what methods are compared by
+    seconds  wall time
+    work     counted, in units of `cost`, by which methods are compared
     extent   (2, ny), the least and the greatest value of each state at the ends of steps
-    pace     (2, n), times, s, and the work done up to then
+    pace     (2, n): times, s, and the work done up to then
     """
 
     setting: Setting
@@ -119,29 +119,29 @@ class Tried:
 
     @property
     def tolerance(self) -> float:
-        """Relative tolerance; of equal steps their length, s."""
+        """The relative tolerance or, with equal steps, the step, s."""
         return self.setting.rtol or self.setting.dt or math.nan
 
     @property
     def interrupted(self) -> bool:
-        """Whether the user ended it."""
+        """Whether the user stopped it."""
         return self.trajectory.outcome.kind == "interrupted"
 
     @property
     def cut(self) -> bool:
-        """Whether it was ended for taking too long."""
+        """Whether it was stopped for taking too long."""
         return self.trajectory.outcome.kind == "ended"
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What is run: a problem from 0 to `t_end`, s.
+    """What is simulated: a problem from 0 to `t_end`, s.
 
     units    of the states, by name
-    kept     what else `integrate` is told, the same for all runs
+    kept     further arguments of `integrate`, the same for all runs
     watch    shows each run
-    moved    gives the problem with its constants moved by rounding in one way or another, by
-             number (see `moved`); None where that is not known
+    moved    gives, by number, the problem with constants perturbed in one of several ways (see
+             `moved`); None if that is not possible
     """
 
     problem: Problem
@@ -153,12 +153,12 @@ class Case:
 
     @property
     def rows(self) -> int:
-        """How many are to be kept."""
+        """Number of rows to be kept."""
         return self.kept.get("samples") or ADAPTIVE_SAMPLES
 
     @property
     def bounded(self) -> bool:
-        """Whether steps are kept short for other reasons than their error."""
+        """Whether steps are bounded by something else than their error."""
         return self.problem.corners or self.kept.get("max_step") is not None
 
     def scale(self, y: Floats) -> Floats:
@@ -168,13 +168,13 @@ class Case:
     def setting(
         self, method: Method, tolerance: float, extent: Floats, noise: float = 0.0
     ) -> Setting:
-        """A method at about a tolerance of few digits, or in equal steps, s, of about a length.
+        """The setting of a method at about a relative tolerance, or about a step, s.
 
-        Equal steps are the distance of the rows, halved so often that they are hardly longer than
-        asked: all runs then have rows at the very same moments. The absolute tolerance is that part
-        of the smallest scale in the motion of this `extent` (2, ny): no kind of state is then held
-        to less than the relative tolerance of its own scale. It is no less than what the method
-        can meet where rounding moves a state by `noise` in a step.
+        Equal steps are the distance of the rows, halved until they hardly exceed the requested
+        step: so all runs have rows at the same times. The absolute tolerance is rtol times the
+        smallest scale, down to a power of ten, of a motion with this `extent` (2, ny): so no group
+        of states has a tolerance below rtol of its own scale. It is at least what the method can
+        meet if rounding moves a state by `noise` in a step.
         """
         if method.equal_steps:
             dt = self.t_end / (self.rows - 1)
@@ -197,13 +197,13 @@ class Case:
         moved: int | None = None,
         follow: Follow | None = None,
     ) -> Tried:
-        """Make a run. It ends early when it takes `most` units of work, or is sure to, and when
-        `time.perf_counter` is at `due`.
+        """Make a run. It stops early if it takes `most` units of work or clearly will, and when
+        `time.perf_counter` reaches `due`.
 
-        like    a run whose pace this one's is judged by; else it is taken to be even
-        powers  asks for the works of effects
-        moved   the way in which constants are moved by rounding, where that is known
-        follow  is told time and state after each step, and may end the run
+        like    a run whose progress predicts this one's; without it, work is proportional to time
+        powers  given to record the works of effects
+        moved   number of the perturbation of constants, if those are possible
+        follow  called with time and state after each step; may end the run
         """
         problem = self.problem if moved is None or not self.moved else self.moved(moved)
         spent = meter(problem, setting.integrator)
@@ -230,10 +230,10 @@ class Case:
 
 @dataclass
 class _Pace:
-    """How a run gets on; it is ended when its work or its time is over, or is sure to be.
+    """The progress of a run, which is stopped when its work or time is used up or clearly will be.
 
-    spent  its work so far
-    like   a run whose pace is what is to be expected
+    spent  gives its work so far
+    like   a run whose progress is expected of this one
     marks  times, s, and the work done up to then
     """
 
@@ -245,7 +245,7 @@ class _Pace:
     marks: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
 
     def check(self, tally: Tally, t: float) -> None:
-        """Take note of a step that ends at t. Raises `EndedRunError` to end the run."""
+        """Record a step that ends at t. Raises `EndedRunError` to stop the run."""
         marked = t >= self.marks[-1][0] + self.t_end / MARKS
         bounded = t < self.t_end and math.isfinite(self.most)
         if marked or bounded:
@@ -260,7 +260,7 @@ class _Pace:
             raise EndedRunError(OVER)
 
     def made(self, work: float) -> Floats:
-        """The pace of the whole run, which took some `work`."""
+        """The progress of the whole run, which took the given `work`; see `Tried.pace`."""
         return np.array([*self.marks, (self.t_end, work)]).T
 
     def _share(self, t: float) -> float:
@@ -268,14 +268,14 @@ class _Pace:
 
 
 def done(run: Tried | None, t: float, t_end: float) -> float:
-    """Which share of a run's work was done up to a time, s; of none, the share of the time."""
+    """The share of a run's work done up to a time, s; without a run, the share of the time."""
     if run is None:
         return t / t_end
     return float(np.interp(t, run.pace[0], run.pace[1])) / run.work
 
 
 def _plain(value: float) -> float:
-    """The next of 1, 2, 5, 10 … at or below a positive value."""
+    """The greatest of …, 1, 2, 5, 10, … at or below a positive value."""
     power = math.floor(math.log10(value) + 1e-9)
     first = next(digit for digit in (5, 2, 1) if value * (1 + 1e-9) >= digit * 10.0**power)
     return float(f"{first}e{power}")

@@ -1,8 +1,8 @@
 """Runs made and measured: error against a reference, drift, time, and counts.
 
-The first run keeps the rows that the error is taken from; it warms up. Then the same run is made
-again without rows, and the least time counts. A run that takes long is made once. Methods are
-ranked by counted work, which is the same on a busy machine.
+The first run keeps the rows from which the error is taken, and warms up. It is then repeated
+without rows, and the least time counts. A long run is made once. Methods are ranked by counted
+work, which does not depend on the load of the machine.
 """
 
 import math
@@ -27,35 +27,35 @@ from eomgen.study.accuracy.reference import Reference
 from eomgen.study.timing import least_seconds
 
 TELLS_APART = 100
-"""Errors below so many times the reference's own are not told apart."""
+"""Errors below so many times the reference's own are not resolved."""
 ONCE = 0.25
-"""A run that takes more than this share of the longest is made once."""
+"""A run that takes more than this part of the time allowed is made once."""
 REPEATS = 0.3
-"""About how long the repeated runs of one rung take, s …"""
+"""About how long the repeated runs of one setting take together, s …"""
 LEAST_REPEATS, MOST_REPEATS = 2, 20
 """… and how many there are."""
 WORKS_COST = 8
-"""A run that books works takes at most about so many times longer."""
+"""A run that integrates the works of effects takes at most about so many times longer."""
 SAME_TIME = 1e-6
-"""Rows this close, in parts of the time between two, are at one time."""
+"""Rows count as simultaneous if they are this close, relative to the time between two rows."""
 OVER = "it took too long"
 
 Rows = Callable[[Floats, Floats], Floats]
-"""Of times (n,) and states (n, ny): a number for each, (n,)."""
+"""A function of times (n,) and states (n, ny) that gives a number for each, (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """What runs are measured by.
+    """What runs are measured against.
 
-    problem       whose motion it is
-    reference     that motion, and how well it is known
-    rest_speed    below which contacts do not bounce, m/s or rad/s; None: see `integrate`
+    problem       the problem to integrate
+    reference     its motion, and the error bound of that
+    rest_speed    speed below which contacts do not bounce, m/s or rad/s; None: see `integrate`
     kinetic       kinetic energy, J
-    energy        an energy that exact motion keeps, J; None where there is none
-    energy_scale  of the motion, J
-    powers        of effects, where energy is not kept but their works are known
-    gap           greatest gap in a joint, m; None where there cannot be one
+    energy        a conserved energy, J; None if there is none
+    energy_scale  scale of the motion's energy, J
+    powers        of effects, if energy is not conserved but their works are known
+    gap           greatest gap in a joint, m; None if there cannot be one
     """
 
     problem: Problem
@@ -69,21 +69,21 @@ class Bench:
 
     @property
     def floors(self) -> tuple[float, float]:
-        """Errors below which nothing is told apart: over all rows, and at the end."""
+        """Errors below which nothing is resolved: over all rows, and at the end."""
         reference = self.reference
         return TELLS_APART * reference.error, TELLS_APART * reference.final_error
 
 
 @dataclass
 class _Defect:
-    """How far from 1 the length of a quaternion was, at most."""
+    """Greatest difference of a quaternion's length from 1."""
 
     largest: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Watched(Problem):
-    """A problem that notes how long quaternions are before they are scaled to unit length."""
+    """A problem that records the length of quaternions before they are normalised."""
 
     defect: _Defect = field(default_factory=_Defect)
 
@@ -96,7 +96,7 @@ class _Watched(Problem):
 
 @dataclass(frozen=True)
 class _Run:
-    """A run made: its trajectory (None if it was refused), how long it took, the work counted, why
+    """A run: its trajectory (None if it was refused), its wall time, s, its counted work, and how
     it ended.
     """
 
@@ -115,10 +115,9 @@ def sweep(
     until: float = math.inf,
     notice: Callable[[Rung], None] = lambda rung: None,
 ) -> Iterator[Work]:
-    """Make the runs that are not yet `done`, all methods' coarse ones first, and yield each.
+    """Make the runs that are not yet `done`, the coarse ones of all methods first; yield each.
 
-    No run is begun when `time.perf_counter()` is past `until`. `notice` is told each before it is
-    begun.
+    No run starts after `time.perf_counter()` has passed `until`. `notice` is called before each.
     """
     known, climbing = dict(done), list(methods)
     while climbing:
@@ -136,12 +135,12 @@ def sweep(
 
 
 def left_out(ladder: Ladder, methods: Sequence[str], done: Mapping[Rung, Work]) -> list[str]:
-    """Methods whose ladders are not climbed to their top."""
+    """The methods whose finest run has not been made."""
     return [method for method in methods if next_rung(ladder, method, done) is not None]
 
 
 def measure(bench: Bench, rung: Rung, run_time: float) -> Work:
-    """Make a run, again for its time, and once more for its works; none takes more than `run_time`.
+    """Make a run, repeat it for its time, and once more for its works; each within `run_time`, s.
 
     Raises `KeyboardInterrupt` if a run was interrupted.
     """
@@ -163,7 +162,7 @@ def measure(bench: Bench, rung: Rung, run_time: float) -> Work:
         while len(times) < LEAST_REPEATS or (
             len(times) < MOST_REPEATS and sum(times) + times[-1] < REPEATS
         ):
-            # Rows between steps have defects of their own; only the steps' are looked for here.
+            # Interpolated rows have defects of their own; only those of the steps count here.
             defect.largest = 0.0
             last = _run(bench, problem, rung, math.inf, 2)
             times.append(last.seconds)
@@ -220,7 +219,7 @@ def _run(
             over = True
             raise EndedRunError(OVER)
 
-    # Fewer steps than rows: all are kept.
+    # If there are fewer steps than rows, all steps are kept.
     few = rung.dt is not None and (t[-1] - t[0]) / rung.dt < rows
     try:
         trajectory = integrate(
@@ -234,7 +233,7 @@ def _run(
             progress=told,
             powers=powers,
             tally=tally,
-            rtol=rung.rtol or 1.0,  # which equal steps do not look at
+            rtol=rung.rtol or 1.0,  # equal steps ignore it
             atol=rung.atol or 1.0,
         )
     except StepFailure:
@@ -249,10 +248,9 @@ def _run(
 
 
 def errors(trajectory: Trajectory, reference: Reference) -> tuple[float, float]:
-    """A finished run's error, in parts of the motion's scale: greatest of all rows, and the last.
+    """A finished run's error, relative to the motion's scale: of all rows, and of the last.
 
-    Compared are the times that both have. Two rows of one time are those before and after an
-    impact: the later one counts.
+    The times that both have are compared. Of two rows at an impact, the later one counts.
     """
     t, close = reference.t, SAME_TIME * (reference.t[1] - reference.t[0])
     rows = np.searchsorted(trajectory.t, t + close, side="right") - 1
@@ -267,7 +265,7 @@ def _greatest(rows: Rows | None, trajectory: Trajectory) -> float:
 
 
 def _energy_drift(bench: Bench, rung: Rung, first: _Run, run_time: float) -> float:
-    """See `Work`; nan where it is not known, or would take too long to find."""
+    """See `Work`; nan if it is unknown, or would take too long to find."""
     trajectory = first.trajectory
     assert trajectory is not None
     with np.errstate(all="ignore"):
@@ -284,7 +282,7 @@ def _energy_drift(bench: Bench, rung: Rung, first: _Run, run_time: float) -> flo
 
 
 def call_times(problem: Problem, reference: Reference) -> tuple[float, float]:
-    """Least time of a derivative and of a Jacobian halfway through the motion, s."""
+    """Least time of a derivative and of a Jacobian at half the motion's time, s."""
     middle = len(reference.t) // 2
     t, y = float(reference.t[middle]), reference.y[middle]
     derivative, jacobian = least_seconds(
