@@ -1,1 +1,1 @@
-"""What each effect and each kind of arithmetic costs."""
+"""The cost of each effect and of each way to compute the accelerations."""

@@ -1,8 +1,9 @@
-"""How exact the accelerations are that each route computes, against 60 digits.
+"""The forward error of the accelerations from each route, against a solution in 60 digits.
 
-Every route that a model can go by, and plain `numpy.linalg.solve(M, F - V - G)` on the module's own
-terms, at seeded random states and at states of the scene's own run: operations, time, and forward
-error of v̇ in units in the last place (see `ulps`). Inputs are 0, and no rigid contact is held.
+It compares every route that the model admits and `numpy.linalg.solve(M, F - V - G)` with the
+module's own terms, at seeded random states and at states of the scene's own run: operations, time,
+and forward error of v̇ in units in the last place (see `ulps`). Inputs are 0, and rigid contacts
+exert no force.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -32,20 +33,20 @@ from eomgen.study.verification.ulps import BITS, component_errors, vector_errors
 BASELINE = "linalg.solve"
 TERMS = ("mass_matrix", "bias_force", "applied_force")
 STATES, FEW_STATES = 100, 20
-"""How many of each kind, unless told; few where there are more velocities than `LARGE`."""
+"""Default number of states of each kind; the smaller one for more than `LARGE` velocities."""
 LARGE = 12
 AGREED = 40
-"""Digits to which both ways must agree there."""
+"""Digits to which the two solutions in 60 digits must agree."""
 BATCH = 1000
-"""States at once, where many are timed."""
+"""Number of states in one call when timing arrays of states."""
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Of one way at the states of a sample, each in ulps of the way's own precision.
+    """The errors of one route at the states of a sample, in ulps of its own precision.
 
-    ulps        (n,) of v̇ as a whole, nan where it gave no finite number
-    components  of all its components, each in its own ulps
+    ulps        (n,) of v̇ as a whole, nan where the result is not finite
+    components  of all components of v̇ together, each in its own ulps
     """
 
     ulps: Floats
@@ -53,39 +54,39 @@ class Errors:
 
     @property
     def failed(self) -> int:
-        """At how many states there was no finite number."""
+        """Number of states without a finite result."""
         return int(np.sum(np.isnan(self.ulps)))
 
     @property
     def median(self) -> float:
-        """Of the states that have one; nan if none has."""
+        """The median over the states with a result; nan if there is none."""
         return float(np.nanmedian(self.ulps)) if self.failed < len(self.ulps) else np.nan
 
     @property
     def worst(self) -> float:
-        """Of the same."""
+        """The greatest over the states with a result; nan if there is none."""
         return float(np.nanmax(self.ulps)) if self.failed < len(self.ulps) else np.nan
 
     @property
     def at(self) -> int | None:
-        """Which state of the sample was the worst, None if none has a number."""
+        """The index of the state with the greatest error; None if there is no result."""
         return int(np.nanargmax(self.ulps)) if self.failed < len(self.ulps) else None
 
     @property
     def component(self) -> float:
-        """Median of the components."""
+        """The median over the components; nan if there is none."""
         return float(np.median(self.components)) if self.components.size else np.nan
 
 
 @dataclass(frozen=True)
 class Way:
-    """A way to v̇: a route of the program, or `BASELINE`.
+    """A way to compute v̇: a route of the program, or `BASELINE`.
 
-    operations     of a call; None if there is no such way, and `words` say why
+    operations     of a call; None if the model does not admit it: `words` say why
     seconds        of a call for one state
     batch_seconds  for one of `BATCH` states that are computed at once
     errors         for each sample
-    words          why it is not there, or what went wrong
+    words          why it is not admitted, or what went wrong
     """
 
     name: str
@@ -99,8 +100,8 @@ class Way:
 
 @dataclass(frozen=True)
 class Arithmetic:
-    """What was found; `taken` is the route that the model takes, `agreed` the number of digits to
-    which the two ways to the truth agree at least.
+    """The results. `taken` is the route of the model; `agreed` is the least number of digits to
+    which the two solutions in 60 digits agree.
     """
 
     name: str
@@ -120,13 +121,14 @@ def arithmetic(
     single: bool = False,
     progress: Progress = lambda fraction: None,
 ) -> Arithmetic:
-    """Judge all ways to v̇ at `states` seeded states and as many of the scene's own run, the one
-    `wanted`; with `single` in float32, too, at the same states rounded to that.
+    """Compare all ways to v̇ at `states` seeded states and as many states of the scene's own run,
+    which is made as `wanted`. With `single`, compare them in float32, too, at the same states
+    rounded to float32.
 
-    A model of momentum form is judged in its velocity form.
+    A model in momentum form is replaced by its velocity form.
 
-    Raises `SceneError` or `RunError` if no route gives an acceleration at its initial state, or if
-    60 digits are too few to tell the truth.
+    Raises `SceneError` or `RunError` if no route gives an acceleration at the initial state, or if
+    60 digits are not enough for a reference.
     """
     model = replace(model, form="velocity", outputs=())
     check_regular(model)
@@ -151,8 +153,8 @@ def arithmetic(
     agreed = min(agreement(truth, *pair) for pair in zip(samples, truths, strict=True))
     if agreed < AGREED:
         raise RunError(
-            f"the mass matrix is so close to singular that two ways in {DIGITS} digits agree to "
-            f"{agreed:.0f} only, nothing to judge by; make masses and lengths less uneven"
+            f"the mass matrix is so close to singular that two solutions in {DIGITS} digits agree "
+            f"to {agreed:.0f} only, too few to judge by; make masses and lengths less uneven"
         )
     samples = [replace(s, condition=condition_numbers(terms.module, s)) for s in samples]
     found = [Way(route, "float64", None, None, None, (), words) for route, words in missing.items()]
@@ -178,8 +180,8 @@ def arithmetic(
 
 
 def solve_operations(n: int) -> int:
-    """Of a dense solution with one right-hand side by elimination with row exchanges, as LAPACK's
-    gesv does it: each product, sum and division counted one, comparisons not. About ⅔ n³.
+    """Operations of a dense solve with one right-hand side by Gaussian elimination with partial
+    pivoting, as in LAPACK's gesv: products, sums and divisions, but no comparisons. About ⅔ n³.
     """
     factor = n * (n - 1) // 2 + n * (n - 1) * (2 * n - 1) // 3
     return factor + 2 * n * (n - 1) + n
@@ -190,7 +192,7 @@ def _rounded(values: Floats) -> Floats:
 
 
 def _judged(name: str, made: Made, precision: str, pairs: Sequence[tuple[Sample, Exact]]) -> Way:
-    """A way with its errors, not timed yet."""
+    """A way to v̇ with its errors, not timed yet."""
     model, bits = made.system.model, BITS[precision]
     units = [c.unit for c in model.velocities]
     compute = _doubles if precision == "float64" else _singles
@@ -218,7 +220,7 @@ def _operations(name: str, made: Made) -> int:
 
 
 def _doubles(name: str, made: Made, sample: Sample) -> tuple[Floats, list[str]]:
-    """v̇ (nv, n) by the generated code, nan where it has none, and why."""
+    """v̇ (nv, n) from the generated code, nan where it fails, and the reasons."""
     at, module = velocities(made), made.module
     found = np.full((at.stop - at.start, len(sample.y)), np.nan)
     whys = []
@@ -234,7 +236,7 @@ def _doubles(name: str, made: Made, sample: Sample) -> tuple[Floats, list[str]]:
 
 
 def _solved(module: Any, t: float, y: Floats) -> Any:
-    """M v̇ = F - V - G, of one state or of columns of states, as anyone would write it."""
+    """v̇ from M v̇ = F - V - G by `numpy.linalg.solve`, for one state or for columns of states."""
     matrix = module.mass_matrix(t, y)
     right = module.applied_force(t, y) - module.bias_force(t, y)
     return _dense(matrix, right)
@@ -247,7 +249,7 @@ def _dense(matrix: Any, right: Any) -> Any:
 
 
 def _singles(name: str, made: Made, sample: Sample) -> tuple[Any, list[str]]:
-    """The same in float32, step by step as the generated code goes."""
+    """The same in float32, rounding each operation of the generated code."""
     if name != BASELINE:
         return in_single(made.system, "derivative", sample.t, sample.y)[velocities(made)], []
     matrix, bias, applied = (in_single(made.system, term, sample.t, sample.y) for term in TERMS)
@@ -262,7 +264,7 @@ def _singles(name: str, made: Made, sample: Sample) -> tuple[Any, list[str]]:
 
 
 def _timed(found: Sequence[Way], made: Mapping[str, Made], states: Floats) -> list[Way]:
-    """With the least times of calls, all in turn."""
+    """The same with the least times of calls, which take turns."""
     many = np.resize(states, (BATCH, states.shape[1])).T.copy()
     timed, calls, places = list(found), [], []
     with np.errstate(all="ignore"):
@@ -284,7 +286,7 @@ def _timed(found: Sequence[Way], made: Mapping[str, Made], states: Floats) -> li
 
 
 def _call(way: Way, made: Made) -> Callable[[Any], Any]:
-    """A way's computation of one state, or of columns of states, at t = 0."""
+    """A function that computes v̇ of one state, or of columns of states, at t = 0."""
     module = made.module
     if way.precision == "float64":
         if way.name == BASELINE:

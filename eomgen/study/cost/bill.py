@@ -1,6 +1,6 @@
-"""What each effect of a scene costs: operations, time, states, inputs; and what it does for that.
+"""The cost of each effect of a scene: operations, time, states, inputs; and its effect on motion.
 
-Operations are those of `derivative`, counted in modules that hold it and the bodies' places alone.
+Operations are those of `derivative`, counted in modules with no output but the bodies' poses.
 """
 
 import time
@@ -30,14 +30,14 @@ AT_CONTACTS = ("gaps", "gap_rates", "impact", "held")
 
 @dataclass(frozen=True)
 class Item:
-    """One thing that the scene has, or that it leaves out on purpose: see `Kind`.
+    """The cost of one part of the scene, or of one that it omits on purpose: see `Kind`.
 
-    operations, seconds  of a call of `derivative` that it adds, or would add
-    spread               of the times that `seconds` is the difference of, s: see `Bill.spread`
-    states, inputs       that it brings; below 0 for what takes states away, a driven joint
-    route                of the equations without it, or of those with what is left out
-    needed_by            effects that cannot be without it: then nothing is known of it alone
-    change               what leaving it out does to the motion; None if that was not asked for
+    operations, seconds  that it adds, or would add, to a call of `derivative`
+    spread               of the times whose difference `seconds` is, s: see `Bill.spread`
+    states, inputs       that it adds; negative if it removes states, as a driven joint does
+    route                of the equations without it, or with it if it is omitted
+    needed_by            effects that depend on it: its own cost is then unknown
+    change               how omitting it changes the motion; None if that was not asked for
     """
 
     label: str
@@ -54,7 +54,7 @@ class Item:
 
 @dataclass(frozen=True)
 class RouteCost:
-    """A route: operations and time, s, of a call of `derivative`, or None and why not."""
+    """A route: operations and time, s, of a call of `derivative`; or None, and why not."""
 
     route: str
     operations: int | None
@@ -64,12 +64,12 @@ class RouteCost:
 
 @dataclass(frozen=True)
 class Bill:
-    """The whole and its items; `bare` is the mechanism without any effect.
+    """The cost of the whole scene and of its parts; `bare` is the mechanism without any effect.
 
     `route` and `bare_route` are those of their equations. `extent` is that of the scene's motion,
-    m, or None if no motion was asked for. `spread` is how far apart times of the same call are on
-    this machine now, s: a difference within it is none that was measured. `at_contacts` are the
-    operations of what rigid contacts bring besides `derivative`, by name: they are no part of it.
+    m, or None if no motion was asked for. `spread` is how much times of the same call vary on this
+    machine, s: a smaller difference means nothing. `at_contacts` are the operations of functions
+    for rigid contacts, by name; they are not part of `derivative`.
     """
 
     name: str
@@ -88,11 +88,11 @@ class Bill:
 
     @property
     def shared(self) -> tuple[int, float, float]:
-        """Operations and time, s, that go with no item alone, and the spread of that time.
+        """Operations and time, s, that belong to no single effect, and the spread of that time.
 
-        Effects share work: two that ask for the velocity of one point pay for it once, and it stays
-        when one of them goes. So does what another route costs that only the bare mechanism lets
-        in. Below 0 where one costs more beside another than without it.
+        Effects share work: if two need the velocity of one point it is computed once, and stays
+        when one of them is removed. The same holds for the cost of another route that only the bare
+        mechanism admits. Negative if one effect costs more beside another than alone.
         """
         items = [item for item in self.items if item.kind == "effect"]
         return (
@@ -121,11 +121,11 @@ def bill(
     motion: float = MOTION,
     progress: Progress = lambda fraction: None,
 ) -> Bill:
-    """Compile a scene whole, in each of its variants, and bare; count, time and run them all, for
-    `motion` seconds of wall time together at most, 0 for not at all. `parts` are `variants(scene)`
-    or some of them.
+    """Compile a scene whole, in each of its variants, and bare. Count their operations, time them,
+    and simulate them within `motion` seconds of wall time together; 0 for no simulation. `parts`
+    are `variants(scene)` or some of them.
 
-    Raises `SceneError` or `RunError` if the whole cannot be compiled or evaluated at its start.
+    Raises `SceneError` or `RunError` if the scene cannot be compiled or evaluated at its start.
     """
     whole = _compiled(elaborate(counted(scene)))
     tries = {route: _try(whole, route) for route in ROUTES}
@@ -165,7 +165,7 @@ def bill(
 
 
 def difference(seconds: float, spread: float) -> str:
-    """A difference of times in µs; of one within the spread of times no more than that it is."""
+    """A difference of times in µs as text; an upper bound if it is within the spread."""
     text = f"{1e6 * seconds:.1f}"
     return text if abs(seconds) > spread and float(text) else f"< {max(1e6 * spread, 0.1):.1f}"
 
@@ -176,7 +176,7 @@ def _there(made: _Made | None) -> _Made:
 
 
 def _compiled(model: Model) -> _Made:
-    """Raises `SceneError` or `RunError` if that cannot be, or not be evaluated at its start."""
+    """Raises `SceneError` or `RunError` if it cannot be compiled or evaluated at its start."""
     check_regular(model)
     system = compile_program(model, jacobian=False).system
     module = load_module(python_module(system), model.name)
@@ -185,7 +185,7 @@ def _compiled(model: Model) -> _Made:
 
 
 def _try(whole: _Made, route: Route) -> tuple[Model | None, str]:
-    """The model by another route, or None and why not."""
+    """The model with another route, or None and why not."""
     if route == whole.route:
         return None, "taken"
     why_not = why_not_compared(whole.model, route)
@@ -199,7 +199,7 @@ def _route_cost(route: str, words: str, made: _Made | None) -> RouteCost:
 
 
 def _item(whole: _Made, part: Variant, other: _Made | None, change: Change | None) -> Item:
-    """The difference between two modules: what one has more than the other."""
+    """The difference between two modules: what the fuller one has more than the other."""
     if other is None:
         return Item(part.label, part.kind, needed_by=part.needed_by)
     more, less = (other, whole) if part.kind == "left out" else (whole, other)
@@ -217,7 +217,7 @@ def _item(whole: _Made, part: Variant, other: _Made | None, change: Change | Non
 
 
 def _timed(made: Sequence[_Made | None]) -> list[_Made | None]:
-    """With the least time of a call in s, and its spread."""
+    """The same with the least time of a call, s, and its spread."""
     found = iter(least_and_spread([_call(one.module) for one in made if one is not None]))
     timed = []
     for one in made:
@@ -241,9 +241,9 @@ def _changes(
     seconds: float,
     progress: Progress,
 ) -> tuple[float, list[Change | None]]:
-    """The extent of the scene's motion, m, and how each variant's comes apart from it.
+    """The extent of the scene's motion, m, and how far each variant's motion departs from it.
 
-    The runs share the time there is; none goes on where that of the scene ended.
+    The runs share the time allowed; none goes beyond the end of the scene's own run.
     """
     count = 1 + sum(made is not None for made in changed)
     shares = _shares(seconds, count)
@@ -263,7 +263,7 @@ def _changes(
             found.append(None)
             continue
         other = ran(made, float(base.t[-1]))
-        # What is left out on purpose is measured in parts of the complete motion.
+        # The change by an omission on purpose is relative to the complete motion.
         complete = extent(made.model, other) if part.kind == "left out" else size
         found.append(change(whole.model, base, other, complete))
     return size, found
@@ -274,7 +274,7 @@ def _part_of(progress: Progress, done: float, count: float, fraction: float) -> 
 
 
 def _shares(total: float, count: int) -> Iterator[float]:
-    """An equal share of the time, s, for each; what one leaves is for those after it."""
+    """An equal share of the time, s, for each; what one does not use goes to those after it."""
     due = time.perf_counter() + total
     for left in range(count, 0, -1):
         yield max(0.0, due - time.perf_counter()) / left

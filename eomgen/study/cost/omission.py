@@ -1,11 +1,10 @@
-"""What leaving something out does to a motion: two runs, and how far they come apart.
+"""How leaving something out changes a motion: two runs, and the distance between them.
 
-The measure is the distance between the two mechanisms, each body's every piece of mass against the
-same piece in the other run: d² = Σ ∫ |Δx|² dm / Σ m, a root mean square in m that knows both places
-and angles (of a rigid body ∫ |Δx|² dm = m |Δx_com|² + tr(ΔR J ΔRᵀ), J = ∫ r rᵀ dm). It is given in
-parts of the motion's extent: the same measure between the start of the whole scene's run and where
-it is farthest from there. Chaotic motions part until d is as large as the motion itself; about
-100 % and more then say: another motion altogether.
+The distance d between the two mechanisms is the root mean square, in m, of the displacement of all
+mass: d² = Σ ∫ |Δx|² dm / Σ m. It covers positions and angles: for a rigid body ∫ |Δx|² dm =
+m |Δx_com|² + tr(ΔR J ΔRᵀ), J = ∫ r rᵀ dm. It is given relative to the extent of the motion: the
+greatest distance of the whole scene's run from its own start. Chaotic motions diverge until d is as
+large as the motion itself: about 100 % or more means that the motions have nothing in common.
 """
 
 import math
@@ -24,20 +23,20 @@ from eomgen.run.progress import Progress
 from eomgen.scene.schema import Simulation
 
 SMALL = 0.01
-"""Part of the extent beyond which a motion counts as changed."""
+"""A motion counts as changed beyond this part of the extent."""
 STILL = 1e-9
-"""Extent, m, of a motion that is none."""
+"""With a smaller extent, m, nothing moves."""
 FINEST = (1e-6, 1e-9)
-"""Relative and absolute tolerance of the runs that are compared."""
+"""Tightest relative and absolute tolerance of the runs that are compared."""
 MOST_ROWS = 2001
-"""Most instants that two motions are compared at."""
+"""Greatest number of times at which two motions are compared."""
 OVER = "no time to compute more"
 FAR_ENOUGH = "the other run ends here"
 
 
 @dataclass(frozen=True)
 class Run:
-    """A motion: times (n,), poses (n, nb, …) as `body_poses` has them, and why it ended early."""
+    """A motion: times (n,), poses (n, nb, …) as from `body_poses`, and why it ended early."""
 
     t: Floats
     poses: Floats
@@ -46,14 +45,14 @@ class Run:
 
 @dataclass(frozen=True)
 class Change:
-    """How far apart two motions come.
+    """How far two motions diverge.
 
-    relative  greatest d in parts of the extent, nan if nothing moves
-    since     first time at which d is more than `SMALL` of the extent, s; None if it never is
-    distance  greatest distance between the two places of one centre of mass, m, that of `body`
-    angle     greatest angle between the two attitudes of one body, rad
-    until     how far they were compared, s
-    ended     why no farther; "" if that is the end
+    relative  greatest d relative to the extent; nan if nothing moves
+    since     first time at which d exceeds `SMALL` of the extent, s; None if it never does
+    distance  greatest distance between the two positions of a centre of mass, m, that of `body`
+    angle     greatest angle between the two orientations of a body, rad
+    until     the time up to which they were compared, s
+    ended     why not further; "" if that is the end
     """
 
     relative: float
@@ -66,7 +65,7 @@ class Change:
 
     @property
     def percent(self) -> str:
-        """`relative` to two digits, and all of a whole number; "-" if nothing moves."""
+        """`relative` in percent with at least two digits; "-" if nothing moves."""
         if math.isnan(self.relative):
             return "-"
         value = 100 * self.relative
@@ -76,10 +75,11 @@ class Change:
 def run(
     wanted: Simulation, module: GeneratedModule, seconds: float, until: float, progress: Progress
 ) -> Run:
-    """A scene's own run, its inputs at 0, for `seconds` of wall time or up to `until` of its own.
+    """A scene's own run, with its inputs at 0, limited to `seconds` of wall time and to time
+    `until`.
 
-    The integrator and step `wanted` are used, its tolerances down to `FINEST`, which will do for
-    fractions of a percent. The module needs its derivative and `body_poses` only.
+    It uses the `wanted` integrator, step and tolerances, but none below `FINEST`, which is enough
+    for fractions of a percent. The module needs only its derivative and `body_poses`.
     """
     fixed = isinstance(find_integrator(wanted.integrator), FixedStep)
     trajectory = integrate(
@@ -100,13 +100,13 @@ def run(
         ended = outcome.reason if outcome.kind == "ended" else breaks_off
     few = slice(None, None, math.ceil(len(trajectory.t) / MOST_ROWS))
     t = trajectory.t[few]
-    with np.errstate(all="ignore"):  # driven joints are where the time has them
+    with np.errstate(all="ignore"):  # a driving formula may not be finite at all times
         poses = np.moveaxis(module.body_poses(t, trajectory.y[few].T), -1, 0)
     return Run(t, poses, ended)
 
 
 def _timed(module: GeneratedModule, due: float, until: float) -> Problem:
-    """The initial-value problem of a module, which ends when the time for it is over."""
+    """The initial-value problem of a module; its derivative ends the run when time is up."""
     problem = as_problem(module)
 
     def derivative(t: float, y: Floats) -> Floats:
@@ -120,12 +120,12 @@ def _timed(module: GeneratedModule, due: float, until: float) -> Problem:
 
 
 def extent(model: Model, motion: Run) -> float:
-    """How far a motion gets from its start, m, by the measure of this page."""
+    """The greatest distance of a motion from its start, m, by the measure of this module."""
     return float(np.max(distances(model, motion.poses, motion.poses[:1])))
 
 
 def change(model: Model, whole: Run, other: Run, size: float) -> Change:
-    """How far another run comes from that of the whole; `size` is the extent, m."""
+    """How far another run departs from that of the whole scene; `size` is the extent, m."""
     _, i, j = np.intersect1d(whole.t, other.t, return_indices=True)
     t, one, two = whole.t[i], whole.poses[i], other.poses[j]
     apart = distances(model, one, two)
@@ -147,7 +147,7 @@ def change(model: Model, whole: Run, other: Run, size: float) -> Change:
 
 
 def distances(model: Model, one: Floats, two: Floats) -> Floats:
-    """d of each row of two motions, (n,), m: root mean square over all mass."""
+    """The distance d between each row of two motions, (n,), m: root mean square over all mass."""
     total: Floats = np.zeros(len(one))
     moved = np.sum((_places(one) - _places(two)) ** 2, axis=-1)
     turned = _attitudes(one) - _attitudes(two)
@@ -160,7 +160,7 @@ def distances(model: Model, one: Floats, two: Floats) -> Floats:
 
 
 def _second_moment(inertia: Sequence[float]) -> Floats:
-    """J = ∫ r rᵀ dm from the moments of inertia: ½ tr(I) 1 - I; in the plane any J of that I."""
+    """J = ∫ r rᵀ dm from the moments of inertia: ½ tr(I) 1 - I. In the plane, one of several J."""
     if len(inertia) == 1:
         return np.asarray(np.eye(2) * inertia[0] / 2)
     xx, yy, zz, xy, xz, yz = (*inertia, 0.0, 0.0, 0.0)[:6]
@@ -174,7 +174,7 @@ def _places(poses: Floats) -> Floats:
 
 
 def _attitudes(poses: Floats) -> Floats:
-    """World_R_body of each body, (n, nb, 2, 2) or (n, nb, 3, 3)."""
+    """Rotation matrices from body to world, (n, nb, 2, 2) or (n, nb, 3, 3)."""
     if poses.ndim == 4:
         return poses[..., :3]
     c, s = np.cos(poses[..., 2]), np.sin(poses[..., 2])
@@ -182,9 +182,9 @@ def _attitudes(poses: Floats) -> Floats:
 
 
 def _angles(one: Floats, two: Floats) -> Floats:
-    """Angle between two attitudes of each body, 0 to π, (n, nb).
+    """Angle between the two orientations of each body, 0 to π, (n, nb).
 
-    From |ΔR|² = 4 (1 - cos) in the plane, 8 sin²(½ angle) = 4 (1 - cos) in space alike.
+    In the plane and in space, |ΔR|² is 4 (1 - cos) or, what is the same, 8 sin²(½ angle).
     """
     turned = _attitudes(one) - _attitudes(two)
     half = np.sqrt(np.sum(turned * turned, axis=(-2, -1)) / 8)

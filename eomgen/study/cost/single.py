@@ -1,4 +1,4 @@
-"""A program in float32, and how fast a generated module is in it."""
+"""A program in float32, and the speed of a generated module in float32."""
 
 import math
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from eomgen.scalars.protocol import Scalars
 
 Singles = NDArray[np.float32]
 LEAST: np.float32 = np.finfo(np.float32).smallest_normal
-"""For a weight that is there so that nothing is divided by 0, as a double may be."""
+"""Replaces values that underflow, such as small weights that keep a divisor from being 0."""
 
 _NUMPY: dict[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)},
@@ -29,21 +29,21 @@ _NUMPY: dict[str, Callable[..., Any]] = {
 
 
 class Single(Scalars):
-    """float32 numbers, or arrays of them, as scalars of a program."""
+    """Scalars of a program: float32 numbers or arrays."""
 
     def number(self, value: float) -> np.float32:
-        """The float32 nearest to a double; the least one for what is not 0."""
+        """The float32 nearest to a double; the smallest normal one if that would underflow to 0."""
         nearest = np.float32(value)
         return LEAST * np.float32(math.copysign(1.0, value)) if value and not nearest else nearest
 
     def call(self, function: str, *arguments: Any) -> Any:
-        """Any function of formulas."""
+        """The value of a function of formulas."""
         return _NUMPY[function](*arguments)
 
 
 def in_single(system: System, output: str, t: Floats, y: Floats) -> Singles:
-    """An output of a system at times t (n,) and states y (n, ny), its inputs at 0, in its shape and
-    a last axis of n: every number that it takes, and every step, rounded to float32.
+    """An output of a system at times t (n,) and states y (n, ny), with inputs 0: in its own shape
+    plus a last axis of n. Every input and every operation is rounded to float32.
     """
     model, columns = system.model, y.astype(np.float32).T
     given: dict[str, Any] = dict(zip((s.name for s in system.states), columns, strict=True))
@@ -59,9 +59,8 @@ def in_single(system: System, output: str, t: Floats, y: Floats) -> Singles:
 
 
 def kernel_in_single(module: Any, output: str) -> Callable[[Singles], Singles]:
-    """The code that computes an output, for one state (ny,) or for columns (ny, k) in float32.
-
-    To be timed: its constants are the module's own, rounded.
+    """The generated function of an output for one state (ny,) or columns of states (ny, k) in
+    float32, to be timed. Its constants are the module's own, rounded.
     """
     kernel = getattr(module, f"_{output}")
     taken = kernel.__code__.co_varnames[: kernel.__code__.co_argcount]

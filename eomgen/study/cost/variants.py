@@ -1,4 +1,4 @@
-"""What a scene may be without, and the scene without it."""
+"""Variants of a scene: without some effects, or with what it omits on purpose."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,17 +14,17 @@ from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.schema import Scene
 
 Kind = Literal["effect", "mechanism", "left out"]
-"""An effect in force; what belongs to the mechanism itself; what the scene leaves out on purpose,
-and the variant has."""
+"""What the variant changes: an effect that acts, a part of the mechanism itself, or something that
+the scene omits on purpose and the variant has."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A scene changed in one thing, which leaves its bodies as they are.
+    """A scene with one change, which leaves its bodies as they are.
 
-    label      what is changed, for a reader
-    model      the changed one; None if the rest would not stand without: then see `needed_by`
-    needed_by  names of effects whose formulas name an input or a state of what is left out
+    label      the change, as text
+    model      the changed model; None if other effects depend on what is removed
+    needed_by  names of effects whose formulas use an input or a state of what is removed
     """
 
     label: str
@@ -34,12 +34,12 @@ class Variant:
 
 
 def variants(scene: Scene, *, each: bool = False) -> tuple[Variant, ...]:
-    """Everything that the scene may be without, and all that it leaves out on purpose."""
+    """The scene without each of its parts, and with each of its deliberate omissions."""
     return (*without_effects(scene, each=each), *without_velocity_forces(scene), *complete(scene))
 
 
 def without_velocity_forces(scene: Scene) -> tuple[Variant, ...]:
-    """The scene without V of M v̇ + V + G = F, where it has V and can be without."""
+    """The scene without V of M v̇ + V + G = F, if it has V and that can be left out."""
     if scene.leave_out or scene.form != "velocity" or scene.route == "closed":
         return ()
     changed = scene.replaced(leave_out=("velocity_forces",))
@@ -47,8 +47,8 @@ def without_velocity_forces(scene: Scene) -> tuple[Variant, ...]:
 
 
 def complete(scene: Scene) -> tuple[Variant, ...]:
-    """The scene with what it leaves out: velocity forces, and the motion of locked coordinates,
-    which then start as they are locked.
+    """The scene with what it omits: velocity forces, and the motion of locked coordinates, which
+    then start at their locked values.
     """
     found = []
     if scene.leave_out:
@@ -61,7 +61,7 @@ def complete(scene: Scene) -> tuple[Variant, ...]:
 
 
 def _started(scene: Scene, by: Collection[str | None]) -> Scene:
-    """The scene with the start of coordinates driven by some effects, or locked (None), too."""
+    """The scene with initial values for coordinates driven by some effects, or locked (None)."""
     model = elaborate(counted(scene))
     q = dict(zip((c.name for c in model.coordinates), model.initial_q, strict=True))
     v = dict(zip((c.name for c in model.velocities), model.initial_v, strict=True))
@@ -72,14 +72,14 @@ def _started(scene: Scene, by: Collection[str | None]) -> Scene:
 
 
 def counted(scene: Scene) -> Scene:
-    """The scene with no outputs but places, which are needed to compare motions."""
+    """The scene with no output but the poses, which are needed to compare motions."""
     return scene.replaced(outputs=("body_poses",))
 
 
 def without_effects(scene: Scene, *, each: bool = False) -> tuple[Variant, ...]:
-    """The scene without each type of effect, or with `each` without each single one, in order.
+    """The scene without each type of effect, or with `each` without each single effect, in order.
 
-    Built anew from the scene, so that parameters, inputs and states go with their effect.
+    Each model is built anew, so that parameters, inputs and states of the effect go with it.
     """
     groups: dict[str, list[Effect]] = {}
     for effect in scene.effects:
@@ -93,7 +93,7 @@ def bare(scene: Scene) -> Model:
 
 
 def removed(scene: Scene, effects: Sequence[Effect]) -> Scene:
-    """The scene without some effects; joints that were driven start as they were driven."""
+    """The scene without some effects; joints that they drove keep their initial values."""
     drives = [effect.name for effect in effects if isinstance(effect, Driven)]
     if drives:
         scene = _started(scene, drives)
@@ -118,7 +118,7 @@ def _label(group: Sequence[Effect]) -> str:
 
 
 def _names(value: Any) -> Iterator[str]:
-    """Every name in the formulas of a table and of those inside it."""
+    """Every name in the formulas of a table and its nested tables."""
     if isinstance(value, Constant | Name | Apply):
         yield from names_in(value)
     elif isinstance(value, Table):

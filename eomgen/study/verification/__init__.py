@@ -1,1 +1,1 @@
-"""Whether a module is right: other routes, many digits, laws of mechanics."""
+"""Whether a module is right: other algorithms, extended precision, laws of mechanics."""

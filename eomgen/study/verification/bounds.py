@@ -1,22 +1,22 @@
-"""What a generated module is held to, and why the bounds are what they are.
+"""The bounds of the verification, and the reasons for them.
 
-- Forward error of v̇, of the route taken: at most `BOUND` ulps, 1e-13, at states where bodies are
-  anywhere, and `IN_LINE`, 1e-10, where they are in line or nearly so, and lengths cancel; or
-  `AMPLIFIED` times what one ulp in the data does to v̇, whichever is more. An algorithm that is
-  stable gives the answer to data that are a few ulps off; where even that changes the answer,
-  nothing that works in doubles can do better. What it may not do is to lose digits that the data
-  have. `--bound` asks for a number of ulps outright.
-- The other routes are compared, and are not what is generated: they may in addition lose what any
+- Forward error of v̇, of the route taken: at most `BOUND` ulps, 1e-13, at general states, and
+  `IN_LINE`, 1e-10, at states where bodies are in line or nearly so and lengths cancel; or, if that
+  is more, `AMPLIFIED` times the change of v̇ when the data change by one ulp. A backward stable
+  algorithm gives the exact result for data that are a few ulps off; no algorithm in doubles can do
+  better. It must not lose digits that the data have. `--bound` sets a number of ulps instead.
+- The other routes are compared, though they are not generated. In addition they may lose what any
   solution with the mass matrix may lose, a few ulps times its condition number (Higham, Accuracy
-  and Stability of Numerical Algorithms, theorem 10.3 and section 9). What they lose is told.
+  and Stability of Numerical Algorithms, theorem 10.3 and section 9). The report says so.
 - Residual M v̇ + h - F, all outputs, inverse dynamics at the true v̇: the same bounds as the forward
   error, in ulps of the sum of the sizes of their terms.
-- The mass matrix is positive definite: every pivot of it, scaled to a diagonal of ones, is > 0.
-- Laws: kinetic energy changes by the power of all loads, momentum by those from outside, and the
-  Jacobian is the slope of the independent solver, which may be off by the square root of 1/ulp.
-- Articulated bodies and virtual work, both in 60 digits, agree to `AGREED` digits at least. Fixed
-  rotations and axes that are no quarter turns are rounded to doubles in one and not in the other.
-- A short run keeps what exact motion keeps, to `RUN` times its tolerance for every step.
+- The mass matrix is positive definite: all its pivots, scaled to a diagonal of ones, are > 0.
+- Laws: kinetic energy changes by the power of all loads, and momentum by the external loads. The
+  Jacobian is compared with differences of the independent solver, with a bound of the square root
+  of the precision.
+- Articulated bodies and virtual work, both in 60 digits, agree to at least `AGREED` digits. One of
+  them rounds fixed rotations and oblique axes to doubles, the other does not.
+- A short run conserves what exact motion conserves, to `RUN` times its tolerance for each step.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -32,29 +32,30 @@ from eomgen.study.verification.laws import Broken
 from eomgen.study.verification.ulps import group_scales
 
 BOUND, IN_LINE, AMPLIFIED = 450.0, 450e3, 10.0
-"""Ulps: 1e-13 and 1e-10; and times what one ulp in the data does."""
+"""Ulps: 1e-13 and 1e-10; and a factor of the change by one ulp in the data."""
 OWN = "own run"
-"""The kind of states that the scene's own run visits."""
+"""The kind of states sampled from the scene's own run."""
 ANYWHERE = ("fast", "still", "random", OWN)
-"""Kinds of states where bodies are in line by chance alone."""
+"""Kinds of states where bodies are in line only by chance."""
 SOLVING = 10.0
-"""Ulps times the condition number and the number of velocities, of a solution with M."""
+"""Ulps, times condition number and number of velocities, allowed in a solution with M."""
 SLOPES = 1e-8 * 2.0**52
-"""Ulps that the Jacobian may be off."""
+"""Error allowed in the Jacobian, ulps."""
 AGREED = 14.0
-"""Digits."""
+"""Digits to which the two solutions in 60 digits must agree."""
 RUN, BOOKS = 100.0, 1e-6
 UNIT = 1e-12
-"""What a quaternion may be off unit length."""
+"""Difference allowed between a quaternion's length and 1."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """A line of the report: `value` is to be at most `bound`, if there is one, or `above` it.
+    """A line of the report: `value` must be at most `bound`, or above it if `above`.
 
-    words  what else there is to say
-    at     label of the state it comes from
-    taken  whether it is how exact the route taken is
+    bound  None if nothing is required
+    words  further remarks
+    at     label of the state with this value
+    taken  whether it is an error of the route taken
     """
 
     what: str
@@ -68,19 +69,19 @@ class Check:
 
     @property
     def missed(self) -> bool:
-        """Whether the bound is missed; what is not a number misses it."""
+        """Whether the bound is missed; nan misses any bound."""
         if self.bound is None:
             return False
         return not (self.value > self.bound if self.above else self.value <= self.bound)
 
 
 def forward_ulps(there: Sequence[Judged], route: str, model: Model) -> Floats:
-    """Forward error of v̇ of a route at each state (n,), ulps; infinite where not finite."""
+    """Forward error of v̇ of a route at each state, (n,), ulps; infinite if v̇ is not finite."""
     return in_ulps(np.array([one.off[route] for one in there]), there, model)
 
 
 def in_ulps(off: Floats, there: Sequence[Judged], model: Model) -> Floats:
-    """Differences (n, nv) from v̇ in ulps (see `ulps`), (n,); infinite where not finite."""
+    """Errors (n, nv) of v̇ in ulps (see `ulps`), (n,); infinite where they are not finite."""
     true = np.array([one.vd for one in there]).T
     errors = np.zeros(len(there))
     for group, scale in group_scales(true, [c.unit for c in model.velocities]):
@@ -99,12 +100,12 @@ def forward_checks(
     nv: int,
     bound: float | None,
 ) -> list[Check]:
-    """Forward error of v̇ of each route, what they are apart, and what one ulp in the data does.
+    """Forward error of v̇ of each route, the greatest of all, and the change by one ulp in the data.
 
-    ulps   errors by route, and
-    data   what one ulp in the data does, at each state (n,)
-    nv     how many velocities there are
-    bound  for the route taken, in the place of what the data allow
+    ulps   errors by route
+    data   change of v̇ by one ulp in the data at each state, (n,), ulps
+    nv     number of velocities
+    bound  for the route taken, instead of the one that the data give
     """
     checks = []
     for route, errors in ulps.items():
@@ -151,20 +152,20 @@ def forward_checks(
 
 
 def allowed_ulps(there: Sequence[Judged], data: Floats) -> Floats:
-    """What the forward error of the route taken may be at each state (n,), ulps."""
+    """Forward error allowed for the route taken at each state, (n,), ulps."""
     least = np.array([BOUND if one.state.kind in ANYWHERE else IN_LINE for one in there])
     return np.asarray(np.maximum(least, AMPLIFIED * data))
 
 
 def _worst(errors: Floats, allowed: Floats) -> int:
-    """The state that misses by most, or if none misses the one with the greatest error."""
+    """The state that exceeds its bound by most or, if none does, has the greatest error."""
     with np.errstate(all="ignore"):
         share = np.where(errors == 0.0, 0.0, errors / allowed)
     return int(np.argmax(share if np.max(share) > 1 else errors))
 
 
 def matrix_checks(there: Sequence[Judged]) -> list[Check]:
-    """Condition and pivots of M, and the agreement of two ways to v̇ in 60 digits."""
+    """Condition and pivots of M, and the agreement of the two solutions in 60 digits."""
     k = int(np.argmax([one.condition for one in there]))
     least = int(np.argmin([one.pivot for one in there]))
     agreed = int(np.argmin([one.agreed for one in there]))
@@ -190,7 +191,7 @@ def matrix_checks(there: Sequence[Judged]) -> list[Check]:
 
 
 def loss_checks(there: Sequence[Judged], taken: str) -> list[Check]:
-    """Whatever else the module of the route taken computes."""
+    """The errors of everything else that the module of the route taken computes."""
     checks = []
     losses = {"residual M v̇ + h - F": [one.residuals[taken] for one in there]}
     losses |= {what: [one.losses[what] for one in there] for what in there[0].losses}
@@ -207,7 +208,7 @@ def loss_checks(there: Sequence[Judged], taken: str) -> list[Check]:
 
 
 def law_checks(model: Model, laws: Sequence[Broken]) -> list[Check]:
-    """Laws of motion and the Jacobian, at the states where they were asked."""
+    """Laws of motion and the Jacobian, at the states where they were checked."""
     checks = []
     pick: dict[str, tuple[Callable[[Broken], float | None], float]] = {
         "energy law: rate = power of loads": (lambda law: law.energy, BOUND),
@@ -217,14 +218,14 @@ def law_checks(model: Model, laws: Sequence[Broken]) -> list[Check]:
     for what, (of, bound) in pick.items():
         values = [(value, law) for law in laws if (value := of(law)) is not None]
         if values:
-            # What is not a number is the worst.
+            # nan counts as the worst.
             value, law = max(values, key=lambda pair: (pair[0] != pair[0], pair[0]))
             checks.append(Check(what, value, bound, "ulp", at=law.state.label))
     return checks
 
 
 def drift_checks(ran: Drift) -> list[Check]:
-    """What the short run did not keep."""
+    """The drift of conserved quantities in the short run."""
     bound = RUN * RTOL * max(1, ran.steps)
     checks = [
         Check(f"drift of {name}", lost, bound, "", f"{ran.steps} steps, {ran.until:g} s")

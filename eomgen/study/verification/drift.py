@@ -1,4 +1,4 @@
-"""A short run, and what it loses of what exact motion keeps."""
+"""A short run, and the drift of what exact motion conserves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,24 +21,23 @@ from eomgen.study.verification.visited import ENOUGH
 
 METHOD, RTOL = "DOP853", 1e-11
 MOST_OPERATIONS = 10_000_000
-"""Of all derivatives of the run together: seconds at most, and the same on every machine."""
+"""Operations of all derivatives of the run: takes seconds, and ends the same on every machine."""
 MOST_CALLS = 25_000
 MOST_TIME = 10.0
-"""s of motion."""
+"""Greatest duration of the motion, s."""
 
 
 @dataclass(frozen=True)
 class Drift:
-    """What a run loses, in parts of what there was of it at most.
+    """The drift of a run, relative to the greatest amount of each quantity.
 
-    until    how far it went, s
-    steps    how many it took
-    stopped  why it ended before its time, if not for its length
-    keeps    what exact motion keeps, as far as its states tell
-    lost     by name, energy and components of momentum that it keeps
-    books    what of the change of kinetic energy the works of effects do not account for; None if
-             there are no effects
-    unit     the most that a quaternion is off unit length
+    until    its end time, s
+    steps    number of steps
+    stopped  why it failed; "" if it finished or was long enough
+    keeps    what exact motion conserves, as its states show
+    lost     by name, the drift of energy and of components of momentum that are conserved
+    books    kinetic energy that the works of effects do not explain; None if there are no effects
+    unit     greatest difference of a quaternion's length from 1
     """
 
     until: float
@@ -58,12 +57,13 @@ def drift(
     states: Sequence[State],
     progress: Progress = lambda _: None,
 ) -> Drift:
-    """Run a module from its initial state, at most `MOST_TIME` and no further than is `wanted`;
-    `full` is one that has energies, momentum and powers. What exact motion keeps is asked at some
-    `states`, and where the run's energy changes the most: there something may act for a while only.
+    """Run a module from its initial state for `MOST_TIME` or to the end of the `wanted` run, if that
+    is earlier. `full` is a module that has energies, momentum and powers. What exact motion
+    conserves is determined at `states` and where the energy of the run changes most: some effects
+    act only for a short time.
 
-    What was lost is counted in parts: of energy, of the greatest that was kinetic, or went to and
-    fro; of momentum, of the sum over bodies.
+    The drift of energy is relative to the greatest kinetic energy or exchange of energy, that of
+    momentum to the greatest sum over bodies.
     """
     problem = problem_of(module, model=model)
     most = 1 + MOST_OPERATIONS // max(MOST_OPERATIONS // MOST_CALLS, _operations(module))
@@ -85,7 +85,7 @@ def drift(
         samples=101,
         progress=progress,
         rest_speed=wanted.rest_speed,
-        powers=None if model.leave_out else as_powers(full),  # else energy is not kept
+        powers=None if model.leave_out else as_powers(full),  # energy needs the velocity forces
     )
     if run.outcome.kind == "interrupted":
         raise KeyboardInterrupt
@@ -113,7 +113,7 @@ def drift(
 
 
 def _beside_change(run: Trajectory, total: Floats) -> list[State]:
-    """The rows before and after energy changes the most."""
+    """The rows before and after the greatest change of energy."""
     if len(run.t) < 2:
         return []
     k = int(np.argmax(np.abs(np.diff(total))))
@@ -125,7 +125,7 @@ def _operations(module: GeneratedModule) -> int:
 
 
 def _along(output: Any, t: Floats, y: Floats) -> Floats:
-    """An output at every row, the rows last."""
+    """An output at every row, with rows as the last axis."""
     return np.stack([np.asarray(output(*row)) for row in zip(t, y, strict=True)], axis=-1)
 
 
@@ -135,7 +135,7 @@ def _lost(values: Floats, size: Any) -> float:
 
 
 def _components(dimensions: int, momenta: Floats) -> list[tuple[str, int, float]]:
-    """Names of the components of momentum, their rows, and the size of what they are part of."""
+    """Name, row and reference size of each component of momentum."""
     names = [*AXES[:dimensions], *(f"about {x}" for x in (AXES if dimensions == 3 else "z"))]
     linear, angular = momenta[:dimensions], momenta[dimensions:]
     sizes = [float(np.max(np.abs(part))) for part in (linear, angular)]

@@ -1,4 +1,4 @@
-"""What `verify` found, for a reader and as data; the same bytes for the same scene."""
+"""The results of `verify` as text and as data; the same bytes for the same scene."""
 
 import json
 import textwrap
@@ -14,7 +14,7 @@ from eomgen.study.verification.horizon import Horizon
 from eomgen.study.verification.verify import Verified
 
 SHOWN = 12
-"""States of more numbers are not written out in messages."""
+"""Messages do not list states with more numbers than this."""
 
 
 def report(found: Verified, horizon: Horizon | None = None) -> list[str]:
@@ -60,14 +60,14 @@ def _wrapped(label: str, text: str) -> list[str]:
 
 
 def number(value: float) -> str:
-    """A number for a reader."""
+    """A number as text with few digits."""
     if not isfinite(value):
         return "none" if value != value else "infinite"
     return f"{value:.1f}" if 0.05 <= abs(value) < 9999.5 else f"{value:.2g}"
 
 
 def missed(found: Verified) -> list[str]:
-    """A line for each bound that was missed, naming it, with the state and what to change."""
+    """For each missed bound a line with its name, the state, and a remedy if there is one."""
     states = {one.state.label: one.state for one in found.judged}
     lines = []
     for check in found.missed:
@@ -97,7 +97,7 @@ def _remedy(check: Check, found: Verified) -> str:
 
 
 def evidence(found: Verified, horizon: Horizon | None, module: str) -> dict[str, Any]:
-    """Everything as data; `module` is a digest of the module's source."""
+    """All results as data for JSON; `module` is a digest of the module's source."""
     return {
         "eomgen": f"verification of {found.name}",
         "scene": found.name,
@@ -149,12 +149,12 @@ def evidence(found: Verified, horizon: Horizon | None, module: str) -> dict[str,
 
 
 def _plain(value: float) -> float | str:
-    """A number that JSON has, or its name."""
+    """A number, or its name if JSON has none for it."""
     return float(value) if isfinite(value) else str(float(value))
 
 
 def paths(folder: Path, name: str, *, force: bool = False) -> tuple[Path, Path]:
-    """Where text and data are written; raises `RunError` now for what could not be."""
+    """The files for text and data. Raises `RunError` if they cannot be written."""
     check_folder(folder)
     text, data = folder / f"{name}_verified.txt", folder / f"{name}_verified.json"
     for path in (text, data):
@@ -165,7 +165,7 @@ def paths(folder: Path, name: str, *, force: bool = False) -> tuple[Path, Path]:
 def save(
     folder: Path, name: str, lines: Sequence[str], found: dict[str, Any], *, force: bool = False
 ) -> tuple[Path, Path]:
-    """Write both, each whole or not at all. Raises `RunError` as `paths` does."""
+    """Write both files, each atomically. Raises `RunError` as `paths` does."""
     text, data = paths(folder, name, force=force)
     write_whole(data, json.dumps(found, indent=1, ensure_ascii=False) + "\n", force=force)
     head = f"# eomgen verification of {name}\n"

@@ -1,4 +1,4 @@
-"""States that are hard on arithmetic, the same for the same seed; see `KINDS`."""
+"""States that are numerically hard, the same for the same seed; see `KINDS`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ KINDS = {
     "still": "anywhere, at rest",
     "random": "anywhere, in motion",
 }
-"""Kinds of states and what they are. `anywhere`: angles over two turns, slides within 0.6 m, any
-attitude; `in motion`: 3 rad/s, 1 m/s (see `states.random_state`). Slides are 0 where angles are
-special; inputs and extra states are anywhere but in `zero`.
+"""Kinds of states. `anywhere`: angles over two turns, displacements within 0.6 m, any orientation;
+`in motion`: up to 3 rad/s, 1 m/s (see `states.random_state`). Displacements are 0 in kinds with
+special angles. Inputs and extra states are random, except in `zero`.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A state to judge at: number `number` of its kind; `u` are the inputs by name."""
+    """State number `number` of its kind; `u` are the inputs by name."""
 
     kind: str
     number: int
@@ -41,15 +41,15 @@ class State:
 
     @property
     def label(self) -> str:
-        """What it is called."""
+        """The kind and the number."""
         return f"{self.kind} {self.number}"
 
 
 def hard_states(
     module: GeneratedModule, nv: int, count: int, seed: int, t_end: float
 ) -> list[State]:
-    """`count` states [q, v, x] of each kind, one of `zero`, at times of the scene's run; `nv` of
-    them are velocities.
+    """`count` states [q, v, x] of each kind, but one of `zero`, at times within the scene's run.
+    `nv` is the number of velocities.
     """
     found = []
     for index, kind in enumerate(KINDS):
@@ -65,7 +65,7 @@ def hard_states(
 
 
 def _made(kind: str, module: GeneratedModule, nv: int, y: Floats, rng: Random) -> Floats:
-    """A random state made one of a kind."""
+    """A random state changed into one of the given kind."""
     nq = len(module.POSITIONS)
     turning = [i for q in module.QUATERNIONS for i in q]
     plain = [i for i in module.POSITIONS if i not in turning]
@@ -98,7 +98,7 @@ _ANGLES: dict[str, Angle] = {
 
 
 def _attitude(kind: str, rng: Random) -> Floats:
-    """A unit quaternion."""
+    """A unit quaternion for a kind of states."""
     axis = np.eye(3)[rng.integers(3)]
     half = 0.0
     if kind == "nearly straight":

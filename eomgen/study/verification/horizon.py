@@ -1,4 +1,4 @@
-"""How long a run in doubles means anything: until it parts from one in long numbers."""
+"""The time up to which a run in doubles agrees with one in extended precision."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -19,19 +19,19 @@ from eomgen.study.accuracy.reference import ROWS, Reference, TooLongError, paced
 from eomgen.study.diagnosis import problem_of
 
 PARTED = 0.01
-"""Of the motion's scale (see `measure`): doubles that are this far off mean nothing any more."""
+"""Relative to the motion's scale (see `measure`): a run with a larger error is meaningless."""
 METHOD = "DOP853"
 
 
 @dataclass(frozen=True)
 class Horizon:
-    """The first time at which a run in doubles has parted from one in long numbers.
+    """The first time at which a run in doubles differs from one in extended precision.
 
-    time   s; None where it has not by the end
+    time   s; None if it agrees to the end
     t_end  s
-    worst  the most that it was off up to the end, in parts of the scale
-    sure   what the run in long numbers may be off itself, in the same parts
-    origin how that was found
+    worst  the greatest difference up to the end, relative to the scale
+    sure   the error bound of the run in extended precision, relative to the scale
+    origin how that run was made
     """
 
     time: float | None
@@ -42,7 +42,7 @@ class Horizon:
 
     @property
     def words(self) -> str:
-        """In a line."""
+        """The result in one line."""
         if self.time is None:
             means = f"doubles are meaningful for the whole run, {self.t_end:g} s"
         else:
@@ -50,7 +50,7 @@ class Horizon:
         return (
             f"{means}: off by {self.worst:.2g} of the motion's scale at most "
             f"({METHOD} at rtol {SMALLEST_RTOL:g}, against {self.origin}, "
-            f"itself sure to {self.sure:.1g})"
+            f"itself accurate to {self.sure:.1g})"
         )
 
 
@@ -64,13 +64,13 @@ def horizon(
     seconds: float = 60.0,
     progress: Progress = lambda _: None,
 ) -> Horizon:
-    """Compare the scene's own run, held as tight as doubles go, with the motion in long numbers.
+    """Compare the scene's own run, at the tightest tolerance, with extended precision.
 
     wanted   how the scene is to be run
-    seconds  of processor time that the long numbers may take, and each run in doubles
+    seconds  processor time for the run in extended precision, and for each run in doubles
 
-    Raises `RunError` where contacts strike or where that time does not suffice, which leaves
-    nothing to compare with, and where a run does not get to its end.
+    Raises `RunError` if there are rigid contacts or if that time is not enough, so that there is no
+    reference, and if a run does not reach its end.
     """
     t_end = wanted.t_end
     problem = problem_of(module, parameters, inputs, model)

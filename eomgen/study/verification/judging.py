@@ -1,10 +1,10 @@
-"""A generated module judged at one state, against free bodies and virtual work in 60 digits.
+"""The errors of a generated module at one state, against virtual work in 60 digits.
 
-Everything is counted in ulps of its own terms: the distance of doubles at the sum of the sizes of
-what is added up. Beside each error stands what one ulp in the data does to the same quantity:
-every number of the state, of the parameters and of the inputs is changed by one ulp up or down,
-at random, and the quantity is computed anew in 60 digits. No algorithm can be asked for much less
-than that, since the data are rounded themselves; one that loses much more loses digits of its own.
+Errors are counted in ulps of the sum of the sizes of their terms. Beside each error stands the
+change of the same quantity by one ulp in the data: every number of the state, parameters and inputs
+is changed by up to one ulp, up or down at random, and the quantity is computed anew in 60 digits.
+As the data are rounded themselves, no algorithm can be expected to do much better; one that does
+much worse loses digits of its own.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,15 +25,15 @@ from eomgen.study.verification.ulps import HARDLY
 from eomgen.study.verification.virtual_work import FreeBodies
 
 ULP = 2.0**-52
-"""Of 1."""
+"""The ulp of 1 in doubles."""
 NEAR = 4
-"""How many times the data are changed."""
+"""Number of random changes of the data."""
 
 
 @dataclass(frozen=True)
 class Loss:
-    """The error of a quantity, and what one ulp in the data does to it, both in ulps of its terms;
-    the error is infinite where the module gave no finite number.
+    """The error of a quantity, and its change by one ulp in the data, both in ulps of its terms.
+    The error is infinite if the module gave no finite number.
     """
 
     error: float
@@ -42,16 +42,16 @@ class Loss:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What was found at a state.
+    """The results at a state.
 
-    vd         v̇ (nv,), as exactly as doubles hold it
-    off        for each route what its v̇ is off (nv,), nan where it gave no finite number
-    data       what one ulp in the data does to v̇ (nv,)
+    vd         v̇ (nv,), exact but for rounding to doubles
+    off        by route, the error of its v̇ (nv,), nan where it is not finite
+    data       change of v̇ (nv,) by one ulp in the data
     agreed     digits to which articulated bodies and virtual work agree, in 60 digits
-    condition  number of the mass matrix scaled to a diagonal of ones, 2-norm
-    pivot      smallest pivot of that matrix, eliminated from its last row on as LᵀDL does
-    residuals  of M v̇ + h - F at the v̇ of each route
-    losses     of everything else that the module computes
+    condition  2-norm condition number of the mass matrix scaled to a diagonal of ones
+    pivot      smallest pivot of that matrix, eliminated from the last row up as in LᵀDL
+    residuals  the errors of M v̇ + h - F at the v̇ of each route
+    losses     errors of everything else that the module computes
     """
 
     state: State
@@ -73,8 +73,8 @@ def judged(
     full: GeneratedModule,
     state: State,
 ) -> Judged | None:
-    """Judge the modules of all routes at a state, all outputs of that of the route `taken`; those
-    that it lacks of one that has them all, `full`.
+    """The errors of the modules of all routes at a state, and of all outputs of the route `taken`.
+    Outputs that its module lacks are taken from `full`, which has them all.
 
     None if there is no finite acceleration in 60 digits.
     """
@@ -83,7 +83,7 @@ def judged(
         exact = _vd(truth, state, {})
         whole = long(state.y)
         for indices in map(list, model.quaternions):
-            # Off unit length, by rounding, a quaternion means this in one form and that in another.
+            # Two formulas of a rotation differ for a quaternion that rounding made off unit length.
             whole[indices] = whole[indices] / _root(whole[indices] @ whole[indices])
         free = FreeBodies(model, state.t, whole, state.u)
         numbers = whole, state.u, dict(model.defaults)
@@ -121,19 +121,19 @@ def _vd(truth: Truth, state: State, parameters: Mapping[str, Any]) -> Array:
 
 
 def _changed(values: Any, rng: np.random.Generator) -> Any:
-    """Numbers, in order or by name, each changed by up to one ulp, up or down."""
+    """Numbers, in a sequence or by name, each changed by up to one ulp, up or down."""
     if isinstance(values, dict):
         made = _changed(long(list(values.values())), rng)
         return dict(zip(values, made, strict=True))
     signs = rng.choice((-ULP, ULP), size=len(values))
-    # Of different sizes, lest two numbers that nearly cancel change alike.
+    # The sizes differ, so that two numbers that nearly cancel do not change by the same amount.
     return values * (1 + long(signs * rng.uniform(0.25, 1.0, size=len(values))))
 
 
 def _agreed(free: FreeBodies, vd: Array) -> float:
-    """Digits to which v̇ of another solver, in 60 digits, solves M v̇ + h - F = 0, of the terms of
-    each row: where these cancel, v̇ itself is but what rounding leaves. A row in which nothing acts
-    is measured by a part of the greatest, in units of its own inertia.
+    """Digits to which v̇ of another solver solves M v̇ + h - F = 0 in 60 digits, relative to the terms
+    of each row: if these cancel, v̇ is only a rounding error. A row with tiny terms is compared with
+    a part of the greatest row, in units of its own inertia.
     """
     root = long([_root(x) for x in np.diag(free.mass_matrix)])
     off = abs(_needed(free, vd)) / root
@@ -144,7 +144,7 @@ def _agreed(free: FreeBodies, vd: Array) -> float:
 
 
 def _derivative(module: Any, state: State) -> Floats:
-    """ẏ of generated code, nan where it has none."""
+    """ẏ of generated code, nan if it fails."""
     try:
         return np.asarray(module.derivative(state.t, state.y, None, state.u or None))
     except (ArithmeticError, ValueError):
@@ -154,7 +154,7 @@ def _derivative(module: Any, state: State) -> Floats:
 def _residuals(
     free: FreeBodies, near: Sequence[FreeBodies], vd: Mapping[str, Floats], model: Model
 ) -> dict[str, Loss]:
-    """Of M v̇ + h - F at the v̇ of each route, by route, in 60 digits."""
+    """The errors of M v̇ + h - F at the v̇ of each route, in 60 digits."""
     found = {}
     units = [c.unit for c in model.velocities]
     for route, given in vd.items():
@@ -180,7 +180,7 @@ def _needed(free: FreeBodies, vd: Array) -> Array:
 def _outputs(
     free: FreeBodies, near: Sequence[FreeBodies], modules: Sequence[Any], ydot: Floats, state: State
 ) -> dict[str, Loss]:
-    """Of all that the module computes beside v̇."""
+    """The errors of everything that the module computes besides v̇."""
     nq, nv = len(free.model.coordinates), free.nv
     q, v, x = np.split(state.y, [nq, nq + nv])
     more = {"x": x} if len(x) else {}
@@ -213,7 +213,7 @@ def _outputs(
 def _quantities(
     free: FreeBodies, near: Sequence[FreeBodies]
 ) -> dict[str, tuple[Array, list[Array], Array]]:
-    """Outputs: what they are, what they are where the data are changed, and the scale of each."""
+    """Of each output: its value, its values for the changed data, and its scale."""
     root = long([_root(x) for x in np.diag(free.mass_matrix)])
     mass = sum((free.mass(name) for name in free.bodies), mpfr(0))
     potential = np.sum(abs(free.potential_energies), initial=mpfr(0))
@@ -251,7 +251,7 @@ def _quantities(
 
 
 def _matrices(poses: Any, dimensions: int) -> Any:
-    """Poses as the plane has them, x, y and angle, as (nb, 3, 4)."""
+    """Planar poses, x, y and angle, as matrices (nb, 3, 4)."""
     if dimensions == 3 or np.ndim(poses) < 2:
         return poses
     made = np.zeros((len(poses), 3, 4))
@@ -270,8 +270,9 @@ def _loss(given: Any, true: Array, changes: Sequence[Array], scale: Array) -> Lo
 
 
 def ulps(off: Array, scale: Array) -> float:
-    """The greatest of differences, each in ulps of its scale, but of a thousandth of the greatest
-    scale at least (see `ulps`); where all are 0 it must be exact. nan if any of them is.
+    """The greatest of differences, each in ulps of its scale, which counts at least a thousandth of
+    the greatest scale (see `ulps`). Where all scales are 0, any difference is infinite. nan if any
+    difference is nan.
     """
     off, scale = np.broadcast_arrays(off, np.maximum(scale, HARDLY * np.max(scale)))
     parts = [
@@ -279,7 +280,7 @@ def ulps(off: Array, scale: Array) -> float:
         for x, s in zip(off.flat, scale.flat, strict=True)
         if x
     ]
-    return float(np.max(parts, initial=0.0))  # unlike Python's own, no nan is lost
+    return float(np.max(parts, initial=0.0))  # Python's own max could lose a nan
 
 
 def _condition(matrix: Array) -> tuple[float, float]:
@@ -288,7 +289,7 @@ def _condition(matrix: Array) -> tuple[float, float]:
     scaled = matrix / np.outer(root, root)
     n = len(scaled)
     inverse = solved(scaled, long(np.eye(n)))
-    # Each from the largest eigenvalue of a matrix, which doubles tell well; the smallest they lose.
+    # Doubles give the largest eigenvalue of a matrix accurately, but not the smallest.
     condition = np.linalg.eigvalsh(doubles(scaled))[-1] * np.linalg.eigvalsh(doubles(inverse))[-1]
     rest, pivots = scaled.copy(), []
     for k in reversed(range(n)):

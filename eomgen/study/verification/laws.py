@@ -1,8 +1,8 @@
-"""Laws of mechanics that a module's accelerations must obey, and what exact motion keeps.
+"""Laws of mechanics that a module's accelerations must obey, and what exact motion conserves.
 
-All of it in 60 digits, from free bodies alone: kinetic energy and momentum are differenced along
-the motion that the module says, and what they change by must be the power of all loads and drives,
-and the forces from outside. Its Jacobian is compared with differences of the independent solver.
+All is computed in 60 digits from free bodies. Kinetic energy and momentum are differenced along the
+motion that the module gives; their rates must be the power of all loads and drives, and the
+external forces. The module's Jacobian is compared with differences of the independent solver.
 """
 
 from collections.abc import Sequence
@@ -24,21 +24,21 @@ from eomgen.study.verification.judging import ulps
 from eomgen.study.verification.virtual_work import FreeBodies
 
 _STEP = mpfr(2) ** -66
-"""Of central differences, in parts of the way in a second; off by their square, some 40 digits."""
+"""Step of central differences relative to the rates; its square is the error, some 40 digits."""
 _LEFT = 1e-45
-"""Part of what is differenced that rounding leaves of a difference that is 0."""
+"""Rounding error of a difference that should be 0, relative to what is differenced."""
 SMOOTH = 1e-9
-"""Part of a difference that the difference of two of them may be where there is no corner."""
+"""Greatest second difference, relative to the first difference, if there is no corner."""
 AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
 class Broken:
-    """By how much laws are broken at a state, in ulps of their terms; None where one says nothing.
+    """The errors of laws at a state, in ulps of their terms; None where a law does not apply.
 
     energy    kinetic energy changes by the power of loads and drives
-    momentum  momentum, linear and angular, changes by the loads from outside
-    slopes    the Jacobian, along a direction
+    momentum  linear and angular momentum change by the external loads
+    slopes    the Jacobian, along a random direction
     """
 
     state: State
@@ -48,12 +48,12 @@ class Broken:
 
 
 def why_no_energy_law(model: Model) -> str:
-    """Why the energy law says nothing of a model; "" if it does."""
+    """Why the energy law does not apply to a model; "" if it does."""
     return "velocity forces are left out on purpose" if model.leave_out else ""
 
 
 def why_no_momentum_law(model: Model) -> str:
-    """Why the momentum law says nothing of a model; "" if it does."""
+    """Why the momentum law does not apply to a model; "" if it does."""
     if model.leave_out:
         return "velocity forces are left out on purpose"
     held = [b.joint.name for b in model.bodies if b.parent < 0 and not isinstance(b.joint, Free)]
@@ -67,14 +67,14 @@ def why_no_momentum_law(model: Model) -> str:
 
 
 def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
-    """Ask the laws that there are at a state where the module has a derivative."""
+    """The errors of all laws that apply, at a state where the module has a derivative."""
     ydot = module.derivative(state.t, state.y, None, state.u or None)
     nq, nv = len(model.coordinates), len(model.velocities)
     with long_digits():
         y = _unit(model, long(state.y))
         free = FreeBodies(model, state.t, y, state.u)
         vd = long(ydot[nq : nq + nv])
-        # Coordinates go on at exactly the velocities: rounding of their rates is judged elsewhere.
+        # Coordinates follow the velocities exactly: rounding of their rates is checked elsewhere.
         way = np.concatenate([free.state_rates[:nq], vd, free.state_rates[nq + nv :]])
         ahead, behind, step = _beside(model, state, y, way)
         energy = momentum = None
@@ -83,7 +83,7 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
             powers, sizes = free.powers
             power = np.sum(powers, initial=mpfr(0))
             needed = abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes
-            # At both ends of the difference what rests here has come to move.
+            # At both ends of the difference, bodies that are at rest here move.
             scale = (abs(free.rates[:nv]) + step * abs(vd)) @ needed
             scale += np.sum(sizes, initial=mpfr(0))
             scale += _LEFT * free.kinetic_energy / step
@@ -95,7 +95,7 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
             change = (ahead.momentum - behind.momentum) / step
             outside, sizes = _outside(free)
             sizes = sizes + free.inertial_sizes(vd) + _LEFT * free.momentum_sizes / step
-            # Of force and of moment each by itself: they have no common unit.
+            # Force and moment separately: they have different units.
             momentum = max(
                 ulps((change - outside)[part], sizes[part]) for part in (slice(3), slice(3, 6))
             )
@@ -103,15 +103,15 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
 
 
 def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -> float | None:
-    """What the Jacobian is off along a direction, in ulps of its terms; None at a corner, where
-    there are two slopes.
+    """The error of the Jacobian along a direction, in ulps of its terms; None at a corner, where
+    there are two derivatives.
     """
     model = free.model
     if not hasattr(module, "jacobian"):
         return None
     rng = np.random.default_rng(1)
     way = long(rng.uniform(0.5, 1.0, len(y)) * rng.choice((-1.0, 1.0), len(y)))
-    for indices in map(list, model.quaternions):  # along the sphere of unit quaternions
+    for indices in map(list, model.quaternions):  # tangent to the sphere of unit quaternions
         way[indices] = way[indices] - y[indices] * (way[indices] @ y[indices])
     ahead, behind, step = _beside(model, state, y, way, still=True)
     bend = ahead.state_rates - 2 * free.state_rates + behind.state_rates
@@ -136,9 +136,9 @@ def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -
 def _beside(
     model: Model, state: State, y: Array, way: Array, *, still: bool = False
 ) -> tuple[FreeBodies, FreeBodies, Long]:
-    """The model a little further along a way, and a little behind; and how far they are apart.
+    """The model a small step ahead along the rates `way` and one behind, and the time between, s.
 
-    Time goes along, at one second a second, unless it stands `still`.
+    Time advances by the same step unless `still`.
     """
     step = _STEP / (1 + max(map(abs, way)))
     time = mpfr(0) if still else step
@@ -148,9 +148,9 @@ def _beside(
 
 
 def _outside(free: FreeBodies) -> tuple[Array, Array]:
-    """Force and moment about the world's origin of all loads, (6,), and sizes of their terms.
+    """Force and moment about the world's origin of all external loads, (6,), and sizes of terms.
 
-    Forces between bodies cancel; torques in joints act on both sides.
+    Forces between bodies and torques in joints cancel.
     """
     total, sizes = zeros(6), zeros(6)
     for effect in free.model.effects:
@@ -172,11 +172,11 @@ def _outside(free: FreeBodies) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Kept:
-    """What exact motion keeps, inputs 0, as its rates at some states tell.
+    """What exact motion conserves, with inputs 0, as its rates at some states show.
 
-    energy    whether kinetic and potential energy together
-    takers    effects that give or take energy
-    momentum  which components, "x", …, "about z"
+    energy    whether the sum of kinetic and potential energy is conserved
+    takers    effects that supply or dissipate energy
+    momentum  the conserved components, "x", …, "about z"
     """
 
     energy: bool
@@ -185,7 +185,7 @@ class Kept:
 
 
 def kept(model: Model, states: Sequence[State]) -> Kept:
-    """What is kept at all of some states; of none, nothing."""
+    """What is conserved at all of the given states; nothing if there are none."""
     lost_energy = not states
     takers: dict[str, None] = {}
     names = [*AXES, *(f"about {axis}" for axis in AXES)]
@@ -226,7 +226,7 @@ def _is_nothing(rate: Long, scale: Long) -> bool:
 
 
 def _unit(model: Model, y: Array) -> Array:
-    """A state with quaternions of unit length in 60 digits."""
+    """The state with its quaternions normalised in 60 digits."""
     for indices in map(list, model.quaternions):
         y[indices] = y[indices] / (y[indices] @ y[indices]) ** mpfr(0.5)
     return y

@@ -1,6 +1,6 @@
-"""A model at a state in long numbers: what effects may ask of it (`effects.base.Mechanism`).
+"""A model evaluated at a state in extended precision (see `effects.base.Mechanism`).
 
-Joints enter by the moves that their types state; drives are differentiated by central differences.
+Joints are composed of their primitives. Driving formulas are differentiated by central differences.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,20 +21,21 @@ from eomgen.scene.joints.base import WORLD, Move
 from eomgen.study.verification.poses import Pose, about, orientation, spun, turned_about, world_pose
 
 _INSTANT, _BITS = mpfr(2) ** -600, 4096
-"""s, of differences, and the bits of the numbers that they are taken of."""
+"""Step of the differences, s, and the precision, in bits, in which they are computed."""
 _LEAST = mpfr(2) ** -500
-"""A rate smaller than this is 0, and what is left of it is of the differences."""
+"""A smaller rate counts as 0: it is an error of the differences."""
 _JUMP = 1e-30
-"""Part of an acceleration, or of 1, by which it is not the same on both sides of a jump."""
+"""Where one-sided second derivatives differ by more than this, relative to 1 plus their size,
+there is a jump."""
 
 
 class Placed:
-    """A model at a time and a state y = [q, v, x] of form 'velocity'. Each thing is computed when
-    asked for; all of it belongs within `long_digits()`.
+    """A model at a time and a state y = [q, v, x] of form 'velocity'. Quantities are computed on
+    demand, and only within `long_digits()`.
 
-    y           (ny,), doubles or long numbers
-    inputs      by name, 0 where not given
-    parameters  by name, the scene's where not given
+    y           (ny,), doubles or extended-precision numbers
+    inputs      by name; 0 if not given
+    parameters  by name; the scene's if not given
     """
 
     def __init__(
@@ -68,16 +69,16 @@ class Placed:
         self.index = {name: k for k, name in enumerate(self.bodies)}
         self.seats = {seat.body.joint.name: seat for seat in model.seats}
 
-    # What effects may ask.
+    # What effects may ask for.
 
     @property
     def magnitude(self) -> float:
-        """The order of its lengths, m."""
+        """The order of magnitude of its lengths, m."""
         return self.model.magnitude
 
     @property
     def joints(self) -> Mapping[str, tuple[str, ...]]:
-        """The joints that move but the free ones, each with the kinds of its ways."""
+        """The joints that move, except free ones, each with the kinds of its degrees of freedom."""
         return ways_of(self.model.bodies, self.dimensions)
 
     def mass(self, body: str) -> Long:
@@ -85,18 +86,18 @@ class Placed:
         return self.value(self.model.bodies[self.index[body]].mass)
 
     def height(self, body: str) -> Long:
-        """World y of a centre of mass in the plane, z in space, m."""
+        """Height of a body's centre of mass, m: world y in the plane, world z in space."""
         return self.poses[self.index[body]].place[self.dimensions - 1]
 
     def place(self, body: str, at: Vector) -> Vector:
-        """World place of a point of a body, m."""
+        """World position of a point of a body, m."""
         if body == WORLD:
             return at
         pose = self.poses[self.index[body]]
         return self._cut(pose.place + pose.turn @ self.in_space(at))
 
     def point(self, name: str) -> tuple[str, Vector]:
-        """A named point: its body, and where on it, m."""
+        """A named point: its body, and its position in body axes, m."""
         point = next(point for point in self.model.points if point.name == name)
         return self.bodies[point.body], tuple(self.value(part) for part in point.at)
 
@@ -114,7 +115,7 @@ class Placed:
         return tuple(w if self.dimensions == 3 else w[2:])
 
     def outward(self, body: str, vector: Vector) -> Vector:
-        """A vector of body axes in world axes."""
+        """A vector given in body axes, in world axes."""
         if body == WORLD:
             return vector
         return self._cut(self.poses[self.index[body]].turn @ self.in_space(vector))
@@ -124,7 +125,7 @@ class Placed:
         return self.q[self.seats[joint].q[index]]
 
     def coordinate_name(self, joint: str, index: int = 0) -> str:
-        """Its name."""
+        """The name of a coordinate of a joint."""
         return self.seats[joint].body.positions[index].name
 
     def rate(self, joint: str, index: int = 0) -> Long:
@@ -132,23 +133,23 @@ class Placed:
         return self.v[self.seats[joint].v[index]]
 
     def value(self, formula: Formula, **names: Long) -> Long:
-        """A quantity."""
+        """The value of a formula."""
         return evaluate(formula, {**self._names, **names} if names else self._names, self.scalars)
 
     def input(self, name: str) -> Long:
-        """An input."""
+        """The value of an input."""
         return self._inputs[name]
 
     def state(self, name: str) -> Long:
-        """An extra state."""
+        """The value of an extra state."""
         return self._states[name]
 
     def number(self, value: Any) -> Long:
-        """A number."""
+        """A number in extended precision."""
         return self.scalars.number(value)
 
     def call(self, function: str, *arguments: Long) -> Long:
-        """A function of formulas."""
+        """The value of a function of formulas."""
         return self.scalars.call(function, *arguments)
 
     @cached_property
@@ -166,7 +167,7 @@ class Placed:
         }
 
     def _prescribed(self, formula: Formula) -> tuple[Long, Long, Long]:
-        """Value, rate and acceleration of a formula of time; nan at a corner, which has none."""
+        """Value, rate and acceleration of a formula of time; the last two are nan at a corner."""
         h = _INSTANT
         with gmpy2.context(precision=_BITS):
             x = [
@@ -181,11 +182,11 @@ class Placed:
             rates = [y if abs(y) > _LEAST else mpfr(0) for y in (rate, here)]
         if not smooth:
             return mpfr(x[2]), mpfr("nan"), mpfr("nan")
-        value, rate, acceleration = map(mpfr, (x[2], *rates))  # of the bits that hold outside
+        value, rate, acceleration = map(mpfr, (x[2], *rates))  # rounded to the outer precision
         return value, rate, acceleration
 
     def in_space(self, vector: Sequence[Any]) -> Array:
-        """A vector of the plane or of space as one of space."""
+        """A vector in the plane or in space as one in space, (3,)."""
         return long([*vector, *(0.0,) * (3 - len(vector))])
 
     def _cut(self, vector: Array) -> Vector:
@@ -195,18 +196,18 @@ class Placed:
 
     @cached_property
     def rates(self) -> Array:
-        """The velocities that move: those of the state, then the driven ones."""
+        """The velocities of the state, then the driven ones, (m,)."""
         return long(self.v[: self.moved])
 
     @cached_property
     def felt(self) -> Array:
-        """Those of them that inertia feels."""
+        """The same velocities as they enter velocity forces: 0 if these are left out."""
         left_out = "velocity_forces" in self.model.leave_out
         return zeros(self.moved) if left_out else self.rates
 
     @cached_property
     def poses(self) -> tuple[Pose, ...]:
-        """Of every body."""
+        """The poses of all bodies."""
         world, found = world_pose(self.moved), list[Pose]()
         for seat in self.model.seats:
             parent = seat.body.parent
@@ -215,7 +216,7 @@ class Placed:
 
     @cached_property
     def carrying(self) -> list[list[int]]:
-        """Of every body the velocities that move it."""
+        """For each body, the indices of the velocities that move it."""
         found: list[list[int]] = []
         for seat in self.model.seats:
             base = found[seat.body.parent] if seat.body.parent >= 0 else []
@@ -234,7 +235,7 @@ class Placed:
         return pose
 
     def _made(self, pose: Pose, move: Move, seat: Seat, i: int) -> Pose:
-        """A pose after a move."""
+        """The pose after one primitive of a joint."""
         if move.kind == "spin":
             quaternion = long([self.q[j] for j in seat.quaternion])
             turn, turn_v, turn_b = spun(quaternion, seat.spin, self.felt)
@@ -249,7 +250,7 @@ class Placed:
         return pose.turned(*turned_about(axis, x, column, self.felt), self.felt)
 
     def spin(self, body: int) -> Array:
-        """Angular velocity (3,), world axes, rad/s."""
+        """Angular velocity of a body, (3,), world axes, rad/s."""
         return along(self.rates, self.poses[body].spin_v)
 
 

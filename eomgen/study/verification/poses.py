@@ -1,5 +1,5 @@
-"""Poses of bodies as power series in time: each rotation and place with its slope along every
-velocity, and its second derivative while no velocity changes. Long numbers (`longs`).
+"""Poses of bodies with their derivatives: each rotation and position with its partial derivatives
+along every velocity, and its second time derivative at constant velocities. Extended precision.
 """
 
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ from eomgen.precision.precise import Long
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Of a body: world_R_body and the place of its centre of mass, in world axes, as series.
+    """A body's world_R_body and the position of its centre of mass, world axes, with derivatives.
 
     turn, place      (3, 3), (3,)
-    turn_v, place_v  (m, 3, 3), (m, 3): slopes along each of the m velocities
-    turn_b, place_b  second derivatives by time while no velocity changes
+    turn_v, place_v  (m, 3, 3), (m, 3): partial derivatives along each of the m velocities
+    turn_b, place_b  second time derivatives at constant velocities
     """
 
     turn: Array
@@ -31,8 +31,8 @@ class Pose:
     place_b: Array
 
     def turned(self, turn: Array, turn_v: Array, turn_b: Array, rate: Array) -> "Pose":
-        """Axes turned further, by a matrix that is a series itself. `rate` (m,) are the velocities
-        that second derivatives feel.
+        """The pose with its axes rotated further by a matrix with derivatives. `rate` (m,) are the
+        velocities in second derivatives.
         """
         here, more = along(rate, self.turn_v), along(rate, turn_v)
         return Pose(
@@ -45,7 +45,7 @@ class Pose:
         )
 
     def fixed(self, turn: Array) -> "Pose":
-        """Axes turned by a matrix that stays as it is."""
+        """The pose with its axes rotated by a constant matrix."""
         return Pose(
             self.turn @ turn,
             self.place,
@@ -56,7 +56,7 @@ class Pose:
         )
 
     def moved(self, arm: Array) -> "Pose":
-        """The place moved by a vector that is fixed in these axes."""
+        """The pose moved by a vector that is constant in its axes."""
         return Pose(
             self.turn,
             self.place + self.turn @ arm,
@@ -67,7 +67,7 @@ class Pose:
         )
 
     def slid(self, axis: Array, way: Long, column: int | None, rate: Array) -> "Pose":
-        """The place moved by `way` along an axis of these axes, which velocity `column` changes."""
+        """The pose moved by `way`, m, along an axis in its axes; its velocity is `column`."""
         there = self.moved(axis * way)
         if column is None:
             return there
@@ -79,23 +79,23 @@ class Pose:
 
     @cached_property
     def spin_v(self) -> Array:
-        """J_w (m, 3), world axes: of Ṙ Rᵀ along each velocity."""
+        """J_w (m, 3), world axes: partial angular velocities, from the derivatives of R."""
         return _axial(self.turn_v @ self.turn.T)
 
     @cached_property
     def spin_b(self) -> Array:
-        """Angular acceleration while no velocity changes: what is skew of R̈ Rᵀ."""
+        """Angular acceleration at constant velocities, from the skew part of R̈ Rᵀ."""
         return _axial(self.turn_b @ self.turn.T)
 
 
 def _axial(m: Array) -> Array:
-    """The vectors w (…, 3) of what is skew of matrices (…, 3, 3), [w]x."""
+    """The vectors w (…, 3) of the skew parts [w]x of matrices (…, 3, 3)."""
     pairs = ((2, 1), (0, 2), (1, 0))
     return np.stack([m[..., i, j] - m[..., j, i] for i, j in pairs], axis=-1) / mpfr(2)
 
 
 def about(axis: Array, c: Long, s: Long) -> Array:
-    """Rotation about a unit vector, of cosine c and sine s (Rodrigues)."""
+    """Rotation about a unit vector by the angle with cosine c and sine s (Rodrigues' formula)."""
     x, y, z = axis
     cross = long([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     along = np.outer(axis, axis)
@@ -113,14 +113,14 @@ def orientation(degrees: float | tuple[float, float, float]) -> Array:
 
 
 def composed(quaternion: Array, spin: Array) -> Array:
-    """quaternion ∘ (0, spin)."""
+    """The quaternion product quaternion ∘ (0, spin)."""
     w, axis = quaternion[0], quaternion[1:]
     return np.concatenate([[-(axis @ spin)], w * spin + np.cross(axis, spin)])
 
 
 def _bilinear(a: Array, b: Array) -> Array:
-    """The symmetric form whose value at a = b is the rotation of the quaternion a, less what only
-    its length adds: (w² - x·x) 1 + 2 x xᵀ + 2 w [x]x of unit length.
+    """The symmetric bilinear form whose value at a = b = (w, x), a unit quaternion, is its rotation:
+    (w² - x·x) 1 + 2 x xᵀ + 2 w [x]x.
     """
     (v, x), (w, y) = (a[0], a[1:]), (b[0], b[1:])
     s = v * y + w * x
@@ -129,7 +129,7 @@ def _bilinear(a: Array, b: Array) -> Array:
 
 
 def spun(quaternion: Array, columns: Sequence[int], rate: Array) -> tuple[Array, Array, Array]:
-    """The rotation of a quaternion as a series; `columns` are its three velocities."""
+    """The rotation of a quaternion with derivatives; `columns` are its three velocities."""
     units = [composed(quaternion, axis) / 2 for axis in eye()]
     spin = long([rate[j] for j in columns])
     change = composed(quaternion, spin) / 2
@@ -142,9 +142,9 @@ def spun(quaternion: Array, columns: Sequence[int], rate: Array) -> tuple[Array,
 
 
 def turned_about(axis: Array, angle: Long, column: int, rate: Array) -> tuple[Array, Array, Array]:
-    """The rotation about a unit vector by an angle that velocity `column` changes, as a series."""
+    """The rotation about a unit vector by an angle with velocity `column`, with derivatives."""
     c, s, velocity = gmpy2.cos(angle), gmpy2.sin(angle), rate[column]
-    # Derivatives of c and s along the angle; the rest of the rotation stays as it is.
+    # The derivatives of c and s by the angle; the rest of the matrix is constant.
     still = about(axis, mpfr(0), mpfr(0))
     turn_v = zeros(len(rate), 3, 3)
     turn_v[column] = about(axis, -s, c) - still
@@ -153,5 +153,5 @@ def turned_about(axis: Array, angle: Long, column: int, rate: Array) -> tuple[Ar
 
 
 def world_pose(m: int) -> Pose:
-    """That of the world, which none of m velocities moves."""
+    """The pose of the world, which none of the m velocities moves."""
     return Pose(eye(), zeros(3), zeros(m, 3, 3), zeros(m, 3), zeros(3, 3), zeros(3))

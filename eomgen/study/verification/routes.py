@@ -1,4 +1,4 @@
-"""The routes of a model, each compiled and loaded."""
+"""The other routes of a model, each compiled and loaded."""
 
 from dataclasses import dataclass, replace
 
@@ -14,14 +14,14 @@ from eomgen.run.module import GeneratedModule, load_module
 
 @dataclass(frozen=True)
 class Made:
-    """A compiled system."""
+    """A system, and the module compiled from it."""
 
     system: System
     module: GeneratedModule
 
 
 def compiled(model: Model, but: str) -> tuple[dict[str, Made], dict[str, str]]:
-    """Every route there is but one, and why not for those that are not."""
+    """Every route that the model admits except `but`, and the reasons why others are missing."""
     made: dict[str, Made] = {}
     missing: dict[str, str] = {}
     for route in ROUTES:
@@ -41,11 +41,11 @@ def compiled(model: Model, but: str) -> tuple[dict[str, Made], dict[str, str]]:
 
 
 def loaded(system: System) -> Made:
-    """A system written as a module and loaded."""
+    """A system, rendered as a module and loaded."""
     return Made(system, load_module(python_module(system), system.model.name))
 
 
 def velocities(made: Made) -> slice:
-    """Where v̇ stands in the derivative."""
+    """The slice of v̇ in the derivative."""
     first = len(made.system.model.coordinates)
     return slice(first, first + len(made.system.model.velocities))

@@ -1,4 +1,4 @@
-"""States to judge arithmetic at, with the truth there in 60 digits."""
+"""Sample states, and the accelerations there in 60 digits."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -18,16 +18,17 @@ from eomgen.study.verification.visited import visited
 
 SEEDED, OWN = "seeded", "own run"
 CHECKED = 3
-"""States of each kind at which the truth is computed in another way, too."""
+"""Number of states of each kind at which a second algorithm checks the 60 digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """States that all ways are judged at: times t (n,), y (n, ny).
+    """States at which all routes are compared: times t (n,), y (n, ny).
 
-    `condition` (n,) is that of the mass matrix scaled to a diagonal of ones: about how many times
-    a rounding error in it may grow. `left_out` states had no finite acceleration in 60 digits.
-    `until` is how far the run that they come from went, s; None if they come from none.
+    condition  (n,), of the mass matrix scaled to a diagonal of ones: about how much it amplifies a
+               rounding error
+    left_out   number of states without a finite acceleration in 60 digits
+    until      end time, s, of the run that the states come from; None if they are random
     """
 
     kind: str
@@ -46,10 +47,10 @@ def judging_states(
     seed: int,
     progress: Progress,
 ) -> tuple[list[Sample], list[Exact]]:
-    """`count` seeded states, about as many of the scene's own run, which is the one `wanted`, and
-    the truth at each; those left out that have none.
+    """`count` seeded states, about as many of the scene's own run, which is made as `wanted`, and v̇
+    in 60 digits at each. States without a finite v̇ are left out.
 
-    Raises `RunError` if the scene cannot start, or if no state has any.
+    Raises `RunError` if the scene cannot start, or if no state of a kind has a finite v̇.
     """
     rng, t_end = np.random.default_rng(seed), wanted.t_end
     y = np.array([random_state(module, rng) for _ in range(count)])
@@ -69,8 +70,8 @@ def judging_states(
 
 
 def agreement(truth: Truth, sample: Sample, true: Exact) -> float:
-    """Digits to which the truth agrees with what LᵀDL gives, at the first states and the state
-    whose acceleration is greatest, relative to the greatest acceleration.
+    """Digits to which articulated bodies and LᵀDL agree, relative to the greatest acceleration, at
+    the first states and the state with the greatest acceleration.
     """
     sizes = np.max(np.abs(true), axis=0)
     worst = 0.0
@@ -82,7 +83,7 @@ def agreement(truth: Truth, sample: Sample, true: Exact) -> float:
 
 
 def condition_numbers(module: Any, sample: Sample) -> Floats:
-    """Condition number (n,) of the mass matrix scaled to a diagonal of ones."""
+    """2-norm condition number (n,) of the mass matrix scaled to a diagonal of ones."""
     found = []
     for t, y in zip(sample.t, sample.y, strict=True):
         matrix = module.mass_matrix(t, y)

@@ -1,4 +1,4 @@
-"""States at random, the same for the same seed."""
+"""Random states, the same for the same seed."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
 
 REACH = {"rad": 2 * np.pi, "m": 0.6, "rad/s": 3.0, "m/s": 1.0}
-"""How far from 0 a state of each unit may be; of any other unit 1."""
+"""Greatest absolute value of a state of each unit; 1 for other units."""
 
 
 def random_state(module: GeneratedModule, rng: np.random.Generator) -> Floats:
-    """A state (ny,) of a module: angles over two turns, slides within 0.6 m, unit quaternions of
-    any attitude; 3 rad/s, 1 m/s.
+    """A state (ny,) of a module: angles over two turns, displacements within 0.6 m, quaternions of
+    any orientation, velocities up to 3 rad/s and 1 m/s.
     """
     reaches = [REACH.get(module.UNITS[state], 1.0) for state in module.STATES]
     y = np.array([reach * rng.uniform(-1.0, 1.0) for reach in reaches])

@@ -1,4 +1,4 @@
-"""Accelerations in 60 digits, at exactly the numbers of scene, state and parameters."""
+"""Accelerations in 60 digits, for the exact values of the numbers in scene and state."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,14 +19,14 @@ from eomgen.run.problem import Floats
 from eomgen.scalars.extended import MP, Bits, Digits, exact
 
 Exact = NDArray[np.object_]
-"""60-digit numbers."""
+"""An array of 60-digit numbers."""
 
 
 class Truth:
-    """v̇ of a model of form 'velocity', its inputs at 0 and no contact held.
+    """v̇ of a model of form 'velocity', with inputs 0 and no contact forces.
 
-    It is computed by articulated bodies from a recording of its own, in which nothing was rounded
-    nor rearranged; `factored` is the same by another way, LᵀDL factors, from no recording at all.
+    The articulated-body algorithm computes it from a recording of its own, in which nothing was
+    rounded or rearranged. `factored` computes the same by LᵀDL factors, without a recording.
     """
 
     def __init__(self, model: Model) -> None:
@@ -39,7 +39,7 @@ class Truth:
         self._long = interpreter(program, "vd", Bits())
 
     def __call__(self, t: Floats, y: Floats) -> Exact:
-        """v̇ (nv, n) at times t (n,) and states y (n, ny); None all over where there is none."""
+        """v̇ (nv, n) at times t (n,) and states y (n, ny); a column of None if it fails there."""
         return np.array(list(map(self._at, t.tolist(), y.tolist())), dtype=object).T
 
     def _at(self, t: float, y: list[float]) -> list[Any]:
@@ -53,8 +53,8 @@ class Truth:
     def long(
         self, t: Any, y: Any, inputs: Mapping[str, Any], parameters: Mapping[str, Any]
     ) -> Array:
-        """v̇ (nv,) at one state, of the same recording, at numbers of which none need be a double;
-        nan where there is none. To be called within `long_digits()`.
+        """v̇ (nv,) at one state, from the same recording, for extended-precision numbers; nan if it
+        fails. To be called within `long_digits()`.
         """
         given = dict(zip(self._states, long(y), strict=True))
         values = {**self.model.defaults, **parameters}
@@ -63,7 +63,7 @@ class Truth:
         return long(self._long(given))
 
     def factored(self, t: float, y: Floats) -> Exact:
-        """v̇ (nv,) at one state."""
+        """v̇ (nv,) at one state, by LᵀDL factors."""
         values = values_at(
             self.model,
             MP.mpf(t),

@@ -1,14 +1,13 @@
 """Errors counted in units in the last place (ulp) of a floating-point format.
 
-The ulp of x is the distance of neighbouring numbers of the format about x: 2^(e - p) for
-2^(e-1) <= |x| < 2^e and p bits, p = 53 for float64 and 24 for float32. A result that is rounded
-once, and correctly, is off by half a ulp at most.
+The ulp of x is the spacing of numbers of the format near x: 2^(e - p) for 2^(e-1) <= |x| < 2^e and
+p bits, p = 53 for float64 and 24 for float32. A correctly rounded result is off by at most half an
+ulp.
 
-Of a vector the components of one unit are a group, and an error is counted in ulps of the group's
-greatest component: by itself a component that happens to be near 0 might be off by any number of
-its own. For the same reason a group that is all but nothing, as that of a motion that dies down,
-counts in ulps of a thousandth of what it is at half of all states. The vector's error is that of
-its worst component.
+The components of a vector with the same unit form a group. Their errors are counted in ulps of the
+group's greatest component: a component near 0 might be off by any number of its own ulps. For the
+same reason a group that nearly vanishes, as in a motion that decays, counts in ulps of at least a
+thousandth of its median size over all states. A vector's error is that of its worst component.
 """
 
 from collections.abc import Sequence
@@ -21,22 +20,22 @@ from eomgen.scalars.extended import MP
 from eomgen.study.verification.truth import Exact
 
 HARDLY = 1e-3
-"""Part of its middle size below which a group is all but nothing."""
+"""Least scale of a group, relative to its median size."""
 BITS = {"float64": 53, "float32": 24}
-"""Of the significand of each format, the leading one included."""
+"""Of the significand of each format, including the leading bit."""
 
 
 def ulp(x: Any, bits: int) -> Any:
-    """The ulp of a 60-digit number that is not 0, as one."""
+    """The ulp of a 60-digit number that is not 0, as a 60-digit number."""
     return MP.ldexp(1, MP.frexp(x)[1] - bits)
 
 
 def vector_errors(found: Floats, true: Exact, units: Sequence[str], bits: int) -> Floats:
-    """Errors (n,) of vectors (n of length m, in columns: (m, n)) in ulps, as this page counts them.
+    """Errors (n,) in ulps of vectors in columns (m, n), as this module counts them.
 
-    `units` are those of the components. Where a group is 0 at most states, its greatest size at any
-    of them counts for the others; where that is 0, too, any error is infinite. What was found and
-    is not finite has nan as its error.
+    `units` are those of the components. If a group is 0 at most states, its greatest size at any
+    state is used instead of the median; if that is 0, too, any error is infinite. Where `found` is
+    not finite, the error is nan.
     """
     finite = np.all(np.isfinite(found), axis=0)
     errors = np.where(finite, 0.0, np.nan)
@@ -48,8 +47,8 @@ def vector_errors(found: Floats, true: Exact, units: Sequence[str], bits: int) -
 
 
 def group_scales(true: Any, units: Sequence[str]) -> list[tuple[list[int], Any]]:
-    """Of each group of vectors in columns (m, n): its components, and what its errors are counted
-    in ulps of, (n,).
+    """For each group of vectors in columns (m, n): its components, and the scales (n,) in whose
+    ulps its errors are counted.
     """
     found = []
     for unit in dict.fromkeys(units):
@@ -61,7 +60,7 @@ def group_scales(true: Any, units: Sequence[str]) -> list[tuple[list[int], Any]]
 
 
 def component_errors(found: Floats, true: Exact, bits: int) -> Floats:
-    """Errors of all components, each in its own ulps, those left out that are 0 or not finite."""
+    """Errors of all components, each in its own ulps, except those that are 0 or not finite."""
     pairs = zip(found.ravel().tolist(), true.ravel(), strict=True)
     return np.array(
         [_in_ulps(abs(MP.mpf(x) - z), z, bits) for x, z in pairs if z and np.isfinite(x)]

@@ -1,6 +1,6 @@
-"""A generated module verified: against an independent solver and against 60 digits.
+"""Verification of a generated module against an independent solver and 60 digits.
 
-What is asked of it is in `study.bounds`.
+The bounds are in `study.verification.bounds`.
 """
 
 from collections.abc import Mapping
@@ -49,19 +49,19 @@ OUTPUTS = (
     "momentum",
     "body_poses",
 )
-"""What is generated and verified beside derivative and Jacobian."""
+"""What is generated and verified besides derivative and Jacobian."""
 STATES, FEW_STATES, LARGE = 8, 2, 12
-"""How many of a kind, unless told; few where there are more velocities than `LARGE`."""
+"""Default number of states of each kind; the smaller one for more than `LARGE` velocities."""
 
 
 @dataclass(frozen=True)
 class Verified:
-    """What was found of a module.
+    """The results of the verification of a module.
 
-    left_out  how many states had no finite acceleration in 60 digits
-    until     how far the scene's own run was followed, s
-    ulps      forward error of v̇ of each route at each state, and
-    data      what one ulp in the data does to v̇ there
+    left_out  number of states without a finite acceleration in 60 digits
+    until     time up to which the scene's own run was followed, s
+    ulps      forward error of v̇ of each route at each state
+    data      change of v̇ there by one ulp in the data, ulps
     """
 
     name: str
@@ -79,7 +79,7 @@ class Verified:
 
     @property
     def better(self) -> list[str]:
-        """The routes whose forward error is within what is asked of the one taken."""
+        """The routes whose forward error is within the bound of the route taken."""
         allowed = allowed_ulps(self.judged, self.data)
         return [route for route, errors in self.ulps.items() if np.all(errors <= allowed)]
 
@@ -101,16 +101,16 @@ def verify(
 ) -> Verified:
     """Verify the module that a model is compiled to by its route.
 
-    wanted  how the scene is to be run: some states are those of such a run
-    states  how many seeded states of each kind (8, 2 if there are many velocities)
-    bound   what the forward error may be at most, ulps, whatever the data do
-    module  another one to verify in its place
+    wanted  how the scene is to be run, for states of its own run
+    states  number of seeded states of each kind (8, or 2 for many velocities)
+    bound   of the forward error, ulps, whatever the data allow
+    module  another module to verify instead
 
-    What of `OUTPUTS` the scene does not ask for is verified of a second module that has them.
-    A model of momentum form is verified in its velocity form. Inputs are random at seeded states,
-    0 in runs; no rigid contact is held.
+    Outputs of `OUTPUTS` that the scene does not ask for are verified with a second module that has
+    them. A model in momentum form is verified in its velocity form. Inputs are random at seeded
+    states and 0 in runs; rigid contacts exert no force.
 
-    Raises `SceneError` or `RunError` if there is none, or no state has an acceleration.
+    Raises `SceneError` or `RunError` if there is no module, or no state has an acceleration.
     """
     form, model = model.form, replace(model, form="velocity")
     check_regular(model)
@@ -131,7 +131,7 @@ def verify(
     firsts = [one for one in there if one.state.number == 0]
     laws = [broken(bare, module, one.state) for one in firsts if _has(one, taken)]
     progress(0.85)
-    # What acts for a while only, as a contact does, is met by the run alone.
+    # Effects that act only for a time, as contacts do, are found by the run alone.
     telling = [one.state for one in firsts if one.state.kind in ("random", "still")]
     telling += [one.state for one in there if one.state.kind == OWN]
     ran = drift(model, wanted, module, full, telling, lambda part: progress(0.88 + 0.12 * part))
@@ -144,7 +144,7 @@ def verify(
         *law_checks(bare, laws),
         *drift_checks(ran),
     )
-    notes = [f"route {route} is not there: {why}" for route, why in missing.items()]
+    notes = [f"route {route} is not available: {why}" for route, why in missing.items()]
     if form != "velocity":
         notes.append(f"form '{form}' is verified as 'velocity'")
     return Verified(
@@ -166,8 +166,8 @@ def verify(
 def _modules(
     model: Model, module: GeneratedModule | None, progress: Progress
 ) -> tuple[str, dict[str, GeneratedModule], GeneratedModule, dict[str, str]]:
-    """The route taken; the modules by route, `module` in its place if there is one; one of that
-    route that has all of `OUTPUTS`; and why routes are missing.
+    """The route taken; the modules by route, with `module` for the route taken if given; a module
+    of that route with all of `OUTPUTS`; and why routes are missing.
     """
     code = generated_code(model)
     taken = next(line.split()[0] for line in code.explanation if "<- taken" in line)
@@ -185,8 +185,8 @@ def _modules(
 
 
 def _states(run: Visited, module: GeneratedModule) -> list[State]:
-    """The states that the scene's own run visits."""
-    unit = as_problem(module).unit  # within steps methods leave the sphere of unit quaternions
+    """The states sampled from the scene's own run."""
+    unit = as_problem(module).unit  # within a step, quaternions are not of unit length
     inputs = dict.fromkeys(module.INPUTS, 0.0)
     return [
         State(OWN, k, float(t), unit(y), inputs)
@@ -202,15 +202,15 @@ def _has(one: Judged, route: str) -> bool:
 def _notes(ran: Drift, model: Model) -> list[str]:
     notes, keeps = [], ran.keeps
     if keeps.takers:
-        notes.append(f"energy is not kept: {', '.join(keeps.takers)} give or take it")
+        notes.append(f"energy is not conserved: {', '.join(keeps.takers)} supply or dissipate it")
     if why := why_no_energy_law(model):
         notes.append(f"no energy law: {why}")
     if why := why_no_momentum_law(model):
         notes.append(f"no momentum law: {why}")
     parts = ", ".join(keeps.momentum) or "no component"
-    notes.append(f"exact motion keeps of momentum: {parts}")
+    notes.append(f"momentum that exact motion conserves: {parts}")
     if any(getattr(effect, "law", "") == "impact" for effect in model.effects):
-        notes.append("no rigid contact is held, and what they take is not asked for")
+        notes.append("rigid contacts exert no force here, and their impulses are not checked")
     if ran.stopped:
         notes.append(f"the short run {ran.stopped}")
     return notes

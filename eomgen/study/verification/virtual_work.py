@@ -1,18 +1,18 @@
 """A numeric solver that shares nothing with the recursions: free bodies and virtual work.
 
-Poses alone are written down, joint by joint from the world outwards, as rotation matrices and
-places. Velocities and accelerations are what power series in time give of them: of every rotation
-and place its value, its slope along each velocity, and its second derivative while the velocities
-do not change. Each body is then free, by Newton and Euler, m a = f and I α + ω x I ω = n, and the
-principle of d'Alembert puts them together: reactions of joints do no virtual work, so that
+It writes down only poses, joint by joint from the world outwards, as rotation matrices and
+positions. Velocities and accelerations come from their derivatives: each rotation and position has
+its value, its partial derivatives along each velocity, and its second time derivative at constant
+velocities. Each body is then free, by Newton and Euler, m a = f and I α + ω x I ω = n. By
+d'Alembert's principle, joint reactions do no virtual work, so that
 
     Σ J_pᵀ (m a - f) + J_wᵀ (I α + ω x I ω - n) = 0,    J_p = ∂ place'/∂v,  J_w = ∂ω/∂v.
 
-No velocity is handed on from body to body, no inertia is moved to another point, no force is
-carried inwards, and the matrix is solved by dense elimination with row exchanges. Joints enter by
-the moves that their types state, effects by the loads and energies that they state.
+Unlike the recursions, it passes no velocity from body to body, shifts no inertia to another point,
+and carries no force inwards. Dense elimination with partial pivoting solves for v̇. Joints are
+composed of their primitives; effects state loads and energies.
 
-Numbers are MPFR's, of 60 digits. Drives are differentiated by central differences.
+Numbers are MPFR's, with 60 digits. Driving formulas are differentiated by central differences.
 """
 
 from collections.abc import Sequence
@@ -32,11 +32,11 @@ from eomgen.study.verification.poses import composed
 class FreeBodies(Placed):
     """M v̇ + V + G = F of a model at a time and a state, its energy, momentum and powers."""
 
-    # Free bodies put together.
+    # Equations of motion.
 
     @cached_property
     def inertias(self) -> list[Array]:
-        """Of every body about its centre of mass, world axes, (3, 3)."""
+        """The inertia of each body about its centre of mass, world axes, (3, 3), kg m²."""
         found = []
         for body, pose in zip(self.model.bodies, self.poses, strict=True):
             entries = [self.value(entry) for entry in body.inertia_com]
@@ -51,7 +51,7 @@ class FreeBodies(Placed):
 
     @cached_property
     def _whole_matrix(self) -> Array:
-        """M of all that moves, the driven velocities too, (m, m)."""
+        """M of all velocities that move, including the driven ones, (m, m)."""
         matrix = zeros(self.moved, self.moved)
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
             moving = self.carrying[k]
@@ -65,7 +65,7 @@ class FreeBodies(Placed):
 
     @cached_property
     def _rotors(self) -> dict[int, Long]:
-        """What rotors add to the inertia of the velocities that turn them, kg m² or kg."""
+        """Reflected inertia of rotors, by velocity, kg m² or kg."""
         found = {}
         for seat in self.model.seats:
             joint = seat.body.joint
@@ -76,11 +76,11 @@ class FreeBodies(Placed):
 
     @cached_property
     def _resisting(self) -> tuple[Array, Array]:
-        """What inertia takes while no velocity changes (m,), and the sizes of its terms."""
+        """Generalised inertial forces at constant velocities (m,), and the sizes of their terms."""
         total, sizes = zeros(self.moved), zeros(self.moved)
         left_out = "velocity_forces" in self.model.leave_out
         pace = np.max(abs(self.felt), initial=mpfr(0))
-        # Where all of it cancels, as in a free body that turns evenly, no term is left to count by.
+        # If all terms cancel, as in a free body that rotates evenly, none is left to compare with.
         least = NOTHING * pace * pace
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
             force = self.mass(name) * pose.place_b
@@ -95,7 +95,7 @@ class FreeBodies(Placed):
         return total, sizes
 
     def pushed(self, loads: Sequence[Load | JointLoad]) -> tuple[Array, Array]:
-        """What loads put on each velocity (m,), and the sizes of its terms."""
+        """Generalised forces of loads (m,), and the sizes of their terms."""
         total, sizes = zeros(self.moved), zeros(self.moved)
         for load in loads:
             if isinstance(load, JointLoad):
@@ -112,12 +112,12 @@ class FreeBodies(Placed):
         return total, sizes
 
     def torque(self, load: Load) -> Array:
-        """Of a load, world axes, (3,), N m."""
+        """The torque of a load, world axes, (3,), N m."""
         return long([*(0.0,) * (3 - len(load.torque)), *load.torque] if load.torque else [0.0] * 3)
 
     @cached_property
     def _loads(self) -> dict[str, tuple[Array, Array]]:
-        """`pushed` by gravity, and by all else."""
+        """The generalised forces of gravity, and of all other loads."""
         kinds: dict[str, list[Load | JointLoad]] = {"gravity": [], "applied": []}
         for effect in self.model.effects:
             for load in effect.loads(self):
@@ -131,7 +131,7 @@ class FreeBodies(Placed):
 
     @cached_property
     def velocity_force(self) -> Array:
-        """V (nv,), with what driven accelerations take."""
+        """V (nv,), including the inertial forces of driven accelerations."""
         resisting = self._resisting[0][: self.nv]
         if not self.model.driven:
             return resisting
@@ -154,7 +154,7 @@ class FreeBodies(Placed):
 
     @cached_property
     def bias_sizes(self) -> Array:
-        """Sum of the sizes of all terms of V and G (nv,)."""
+        """Sum of the sizes of all terms of V and G, (nv,)."""
         found = self._resisting[1] + self._loads["gravity"][1]
         if self.model.driven:
             found = found + abs(self._whole_matrix[:, self.nv :]) @ abs(self.driven_rates)
@@ -162,7 +162,7 @@ class FreeBodies(Placed):
 
     @cached_property
     def applied_sizes(self) -> Array:
-        """The same of F (nv,)."""
+        """Sum of the sizes of all terms of F, (nv,)."""
         return self._loads["applied"][1][: self.nv]
 
     @cached_property
@@ -172,7 +172,7 @@ class FreeBodies(Placed):
 
     @cached_property
     def state_rates(self) -> Array:
-        """ẏ (ny,): of coordinates, velocities and extra states."""
+        """ẏ (ny,): the rates of coordinates, velocities and extra states."""
         found: list[Long] = []
         for seat in self.model.seats:
             found += [self.v[j] for _, j in seat.plain if j < self.nv]
@@ -186,7 +186,7 @@ class FreeBodies(Placed):
 
     @cached_property
     def kinetic_energy(self) -> Long:
-        """Of all bodies and rotors, J."""
+        """The kinetic energy of all bodies and rotors, J."""
         energy = mpfr(0)
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
             u, w = along(self.rates, pose.place_v), self.spin(k)
@@ -197,17 +197,17 @@ class FreeBodies(Placed):
 
     @cached_property
     def potential_energy(self) -> Long:
-        """Of all effects, J."""
+        """The potential energy of all effects, J."""
         return np.sum(self.potential_energies, initial=mpfr(0))
 
     @cached_property
     def potential_energies(self) -> Array:
-        """Of each effect, J."""
+        """The potential energy of each effect, J."""
         return long([effect.potential_energy(self) for effect in self.model.effects])
 
     @cached_property
     def reach(self) -> Long:
-        """Sum of the distances of all bodies from those that carry them, m: no place is farther."""
+        """Sum of the distances of all bodies from their parents, m: a bound of any position."""
         total = mpfr(0)
         for body, pose in zip(self.model.bodies, self.poses, strict=True):
             base = self.poses[body.parent].place if body.parent >= 0 else zeros(3)
@@ -216,12 +216,12 @@ class FreeBodies(Placed):
 
     @cached_property
     def momentum(self) -> Array:
-        """Linear, then angular about the world's origin, of the bodies, world axes, (6,)."""
+        """Linear momentum, then angular momentum about the world's origin, world axes, (6,)."""
         return self._momentum[0]
 
     @cached_property
     def momentum_sizes(self) -> Array:
-        """Sum of the sizes of its terms (6,)."""
+        """Sum of the sizes of the terms of momentum, (6,)."""
         return self._momentum[1]
 
     @cached_property
@@ -237,7 +237,7 @@ class FreeBodies(Placed):
         return total, sizes
 
     def inertial_sizes(self, vd: Array) -> Array:
-        """Sum of the sizes of all that momentum changes by at v̇, body for body, (6,)."""
+        """Sum of the sizes of all terms of the rate of momentum at v̇, (6,)."""
         whole, sizes = np.concatenate([vd, self.driven_rates]), zeros(6)
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
             w, inertia = self.spin(k), self.inertias[k]
@@ -251,7 +251,7 @@ class FreeBodies(Placed):
 
     @cached_property
     def powers(self) -> tuple[Array, Array]:
-        """Of each effect's loads, W, and the sizes of its terms; drives have none here."""
+        """The power of each effect's loads, W, and the sizes of its terms; 0 for drives."""
         pushes = [self.pushed(list(effect.loads(self))) for effect in self.model.effects]
         speeds = abs(self.rates)
         return (
@@ -261,7 +261,7 @@ class FreeBodies(Placed):
 
     @cached_property
     def effect_powers(self) -> tuple[Array, Array]:
-        """The same with those of drives, at v̇ under the effects."""
+        """The same including the power of drives, at the v̇ that the effects cause."""
         powers, sizes = (x.copy() for x in self.powers)
         if self.model.driven:
             taken = dict(zip(self.model.driven, self.driving_forces(self.vd), strict=True))
@@ -275,18 +275,18 @@ class FreeBodies(Placed):
         return powers, sizes
 
     def driving_forces(self, vd: Array) -> Array:
-        """What each driven velocity takes at v̇ of the others, N m or N."""
+        """Force or torque on each driven velocity at the v̇ of the others, N or N m."""
         whole = np.concatenate([vd, self.driven_rates])
         needed = self._whole_matrix @ whole + self._resisting[0]
         return (needed - self._loads["gravity"][0] - self._loads["applied"][0])[self.nv :]
 
     def driving_sizes(self, vd: Array) -> Array:
-        """Sum of the sizes of its terms."""
+        """Sum of the sizes of the terms of these forces."""
         whole = abs(np.concatenate([vd, self.driven_rates]))
         sizes = abs(self._whole_matrix) @ whole + self._resisting[1]
         return (sizes + self._loads["gravity"][1] + self._loads["applied"][1])[self.nv :]
 
 
 def _reach(slopes: Array, force: Array | Long) -> Array:
-    """The most that a force does along motions (m, 3), whatever its direction, (m,)."""
+    """Greatest power of a force, of any direction, along partial velocities (m, 3), (m,)."""
     return np.sum(abs(slopes), axis=1) * np.sum(abs(force))

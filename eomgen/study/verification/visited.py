@@ -1,4 +1,4 @@
-"""The states that a scene's own run passes through."""
+"""States sampled from a scene's own run."""
 
 from dataclasses import dataclass, replace
 
@@ -14,13 +14,13 @@ from eomgen.scene.schema import Simulation
 from eomgen.study.diagnosis import problem_of
 
 MOST_OPERATIONS = 20_000_000
-"""Of all derivatives of a run together: seconds at most, and the same on every machine."""
+"""Operations of all derivatives of the run: takes seconds, and ends the same on every machine."""
 ENOUGH = "enough states"
 
 
 @dataclass(frozen=True, eq=False)
 class Visited:
-    """Times t (n,) and states y (n, ny) of a run, and how far it went, s."""
+    """Times t (n,) and states y (n, ny) of a run, and its end time, s."""
 
     t: Floats
     y: Floats
@@ -34,14 +34,12 @@ def visited(
     count: int,
     progress: Progress = lambda _: None,
 ) -> Visited:
-    """About `count` states at which the scene's own integrator, the one `wanted`, asks for the
-    derivative.
+    """About `count` states at which the integrator of the `wanted` run calls the derivative.
 
-    They lie evenly among its calls, so that where it has to take many small steps there are many;
-    those of an adaptive method are closer to the motion than anyone looks. A run that takes too
-    long, or fails, gives those up to there.
+    They are evenly spaced among its calls, and so are denser where it takes small steps. A run that
+    takes too long, or fails, gives the states up to there.
 
-    Raises `RunError` if the module has no derivative to start from.
+    Raises `RunError` if the module has no derivative at its initial state.
     """
     problem = problem_of(module, model=model)
     keep = _Keep(count, most=1 + MOST_OPERATIONS // max(1, module.COST["derivative"]["total"]))
@@ -68,7 +66,7 @@ def visited(
 
 
 class _Keep:
-    """Every k-th state seen, k doubled whenever there are too many."""
+    """Records every k-th state; k doubles whenever there are too many."""
 
     def __init__(self, count: int, most: int) -> None:
         self.rows: list[tuple[float, Floats]] = []
@@ -77,7 +75,7 @@ class _Keep:
         self._every, self._seen = 1, 0
 
     def see(self, t: float, y: Floats) -> None:
-        """Take note of a state. Raises `EndedRunError` when there have been enough."""
+        """Record a state. Raises `EndedRunError` when there have been enough."""
         if self._seen >= self._most:
             raise EndedRunError(ENOUGH)
         if self._seen % self._every == 0 and np.all(np.isfinite(y)):
