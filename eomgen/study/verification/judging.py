@@ -131,9 +131,9 @@ def _changed(values: Any, rng: np.random.Generator) -> Any:
 
 
 def _agreed(free: FreeBodies, vd: Array) -> float:
-    """Digits to which v̇ of another solver solves M v̇ + h - F = 0 in 60 digits, relative to the terms
-    of each row: if these cancel, v̇ is only a rounding error. A row with tiny terms is compared with
-    a part of the greatest row, in units of its own inertia.
+    """Digits to which v̇ of another solver solves M v̇ + h - F = 0 in 60 digits, relative to the
+    terms of each row: if these cancel, v̇ is only a rounding error. A row with tiny terms is
+    compared with a part of the greatest row, in units of its own inertia.
     """
     root = long([_root(x) for x in np.diag(free.mass_matrix)])
     off = abs(_needed(free, vd)) / root

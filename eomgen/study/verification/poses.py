@@ -119,7 +119,7 @@ def composed(quaternion: Array, spin: Array) -> Array:
 
 
 def _bilinear(a: Array, b: Array) -> Array:
-    """The symmetric bilinear form whose value at a = b = (w, x), a unit quaternion, is its rotation:
+    """The symmetric bilinear form that gives the rotation of a unit quaternion a = b = (w, x):
     (w² - x·x) 1 + 2 x xᵀ + 2 w [x]x.
     """
     (v, x), (w, y) = (a[0], a[1:]), (b[0], b[1:])
