@@ -1,6 +1,4 @@
-"""Where a mechanism can stay at rest: positions, states of controllers and inputs at which nothing
-changes.
-"""
+"""Equilibria of a mechanism: positions, controller states and inputs at which it stays at rest."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -21,25 +19,26 @@ from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Floats
 
 MOST_STEPS = 60
-"""Steps to the nearest equilibrium: from near they are few, and what takes more is far."""
+"""Greatest number of steps to the nearest equilibrium; a near one takes few."""
 MOST_FALLS = 500
-"""Steps of the fall through treacle."""
+"""Greatest number of steps of the overdamped motion."""
 LONGEST = 1.0
-"""Most that one step may turn anything, rad: a longer one would pass over nearer equilibria."""
+"""Greatest rotation in one step, rad: a longer one could miss nearer equilibria."""
 CLOSE = 1e-10
-"""Accelerations below this share of what a radian or a metre away makes are rounding."""
+"""Smaller accelerations, relative to those caused by a displacement of 1 rad or 1 m, count as
+rounding."""
 LONGEST_FALL = 0.3
-"""The same for a step of the fall through treacle."""
+"""Greatest rotation in one step of the overdamped motion, rad."""
 FALLING = 1e-6
-"""Growth rates, 1/s², above this share of the fastest are those of an unstable equilibrium."""
+"""Greater growth rates, 1/s², relative to the fastest, make an equilibrium unstable."""
 NUDGE = 1e-3
-"""Displacement that sends it off an unstable equilibrium, rad or m."""
+"""Displacement that starts the motion from an unstable equilibrium, rad or m."""
 LOST = 1e6
-"""A displacement in one step, m, of something that falls and falls."""
+"""Displacement in one step, m, that shows that something falls without end."""
 
 
 class Equilibrium(NamedTuple):
-    """A state `y` (ny,) at rest that stays as it is under the inputs `u` (nu,)."""
+    """A state `y` (ny,) at rest that does not change under the inputs `u` (nu,), SI units."""
 
     y: Floats
     u: Floats
@@ -55,16 +54,16 @@ def equilibrium(
     trim: Sequence[str] = (),
     settle: bool = False,
 ) -> Equilibrium:
-    """Find an equilibrium near the positions and states of controllers of `guess` (ny,), stable or
-    not. Its velocities are 0, whatever those of the guess.
+    """Find a stable or unstable equilibrium near the positions and controller states of `guess`
+    (ny,), whose velocities are ignored: those of an equilibrium are 0.
 
     hold    coordinates that stay as guessed; one component of a quaternion stands for all four
-    trim    inputs to be found too, near their values in `u`
-    settle  go where it comes to rest in treacle, which is a stable equilibrium, rather than to the
-            nearest; that is also where it goes if there is none near. Without `trim`
+    trim    inputs to be found as well, near their values in `u`
+    settle  follow the overdamped motion to a stable equilibrium, instead of going to the nearest
+            one. That is also done if no equilibrium is near. Not with `trim`
 
-    Coordinates that do not matter, such as the place of what floats, stay as guessed. Raises
-    `RunError`, naming the fastest change that is left, if there is none or none is found.
+    Coordinates that have no effect, such as the position of a floating body, stay as guessed.
+    Raises `RunError`, naming the fastest change that is left, if no equilibrium is found.
     """
     if settle and trim:
         raise RunError("equilibrium: inputs are trimmed for the nearest equilibrium only")
@@ -81,8 +80,8 @@ def equilibrium(
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """The mechanism at rest at the positions of `y` under `u`, and its `changes` (nv + nx,): the
-    rates of velocities and of states of controllers.
+    """The mechanism at rest at the positions of `y` under `u`, with its `changes` (nv + nx,): the
+    rates of velocities and of controller states.
     """
 
     y: Floats
@@ -96,16 +95,16 @@ class _Place:
 
     @property
     def size(self) -> float:
-        """That of all changes together; not a number if they are none."""
+        """The norm of all changes; it may overflow or be nan."""
         return float(np.sqrt(np.sum(self.changes**2)))
 
 
 class _Search:
-    """Places of one module, and the steps between them.
+    """Evaluates a module at places, and steps between them.
 
-    The unknowns are small displacements, three rotations for a quaternion, then the states of
-    controllers, then the inputs; `free` are those among them that may change, `moving` those of
-    them that are no inputs.
+    The unknowns are small displacements, three rotations for a quaternion, then the controller
+    states, then the inputs. `free` are the indices of those that may change; `moving` are those of
+    the free ones that are not inputs.
     """
 
     def __init__(
@@ -120,7 +119,7 @@ class _Search:
         self.moving = np.flatnonzero(~held)
 
     def look(self, y: Floats, u: Floats) -> _Place:
-        """The place at the positions of `y`, brought to rest."""
+        """The place at the positions of `y`, with velocities 0 and quaternions normalised."""
         if not np.isfinite(y).all():
             raise RunError("equilibrium: the positions are not finite; start elsewhere")
         y = y.copy()
@@ -130,7 +129,7 @@ class _Search:
         return _Place(y, u, self._asked(self._module.derivative, y, u)[self._nq :])
 
     def slopes(self, place: _Place) -> Floats:
-        """Derivatives of the changes by the free unknowns, (nv + nx, nf)."""
+        """Derivatives of the changes with respect to the free unknowns, (nv + nx, nf)."""
         by_state = self._asked(self._module.jacobian, place.y, place.u)[self._nq :]
         by_position = by_state[:, : self._nq] @ self._tangents(place)
         by_place = np.hstack([by_position, by_state[:, self._nq + self._nv :]])
@@ -140,16 +139,16 @@ class _Search:
         return np.hstack([by_place, by_input])[:, self.free]
 
     def at_rest(self, place: _Place, slopes: Floats | None = None) -> bool:
-        """Whether the changes that are left are rounding."""
+        """Whether the changes that are left are rounding errors."""
         slopes = self.slopes(place) if slopes is None else slopes
         return place.largest <= CLOSE * max(1.0, float(np.max(np.abs(slopes), initial=0.0)))
 
     def turn(self, step: Floats) -> float:
-        """The most by which a step of what may move turns anything, rad."""
+        """The greatest rotation in a step of the moving unknowns, rad."""
         return float(np.max(np.abs(step[self._turns[self.moving]]), initial=0.0))
 
     def moved(self, place: _Place, step: Floats) -> _Place:
-        """The place a step of the free unknowns away, shortened if it turns anything too far."""
+        """The place after a step of the free unknowns, shortened if a rotation is too large."""
         nv, inputs = self._nv, self._nv + self._nx
         whole = np.zeros(inputs + len(place.u))
         whole[self.free] = step
@@ -168,16 +167,16 @@ class _Search:
 
 
 def _nearest(search: _Search, place: _Place) -> _Place:
-    """Follow Levenberg and Marquardt's method down to where no step makes the changes less.
+    """Minimise the changes by Levenberg and Marquardt's method until no step reduces them.
 
-    Nocedal, Wright, Numerical Optimization, section 10.3; a damped step leaves alone what does not
-    matter.
+    Nocedal, Wright, Numerical Optimization, section 10.3. The damping leaves unknowns without
+    effect as they are.
     """
     damping, scale = 1e-3, np.zeros(len(search.free))
     slopes = search.slopes(place)
     for _ in range(MOST_STEPS if len(search.free) else 0):
         scale = np.maximum(scale, np.linalg.norm(slopes, axis=0))
-        # What matters by rounding only must not be scaled up to matter.
+        # Unknowns whose effect is rounding must not be scaled up to have one.
         scales = np.maximum(scale, 1e-8 * np.max(scale)) if np.any(scale) else np.ones(len(scale))
         matrix = np.vstack([slopes / scales, np.sqrt(damping) * np.eye(len(scale))])
         right = np.concatenate([-place.changes, np.zeros(len(scale))])
@@ -195,12 +194,12 @@ def _nearest(search: _Search, place: _Place) -> _Place:
 
 
 def _fallen(search: _Search, place: _Place) -> _Place:
-    """Follow q' = v̇(q), the fall through treacle, by implicit steps that grow as it slows down;
-    states of controllers follow their own rates.
+    """Follow the overdamped motion q' = v̇(q) by implicit steps that grow as it slows down.
+    Controller states follow their own rates.
 
     Pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35 (1998), 508.
-    A step is kept shorter than the time in which it falls off what is unstable; a longer one would
-    climb back. What rests on an unstable equilibrium is nudged.
+    A step is shorter than the growth time of an unstable mode: a longer one would go back to the
+    unstable equilibrium. A small displacement starts the motion from an unstable equilibrium.
     """
     duration = 0.0
     for _ in range(MOST_FALLS if len(search.moving) else 0):
@@ -232,7 +231,7 @@ def _fallen(search: _Search, place: _Place) -> _Place:
 def _implicit_step(
     search: _Search, place: _Place, square: Floats, duration: float
 ) -> tuple[Floats, float]:
-    """A step of the fall, and its duration: less than what was asked for if it turns much."""
+    """A step of the overdamped motion, and its duration, reduced if a rotation is too large."""
     while True:
         matrix = np.eye(len(square)) / duration - square
         step: Floats = np.linalg.lstsq(matrix, place.changes[search.moving])[0].astype(float)
@@ -243,7 +242,7 @@ def _implicit_step(
 
 
 def _turns(module: GeneratedModule) -> NDArray[np.bool_]:
-    """Which small displacements are rotations, rad."""
+    """Which of the small displacements are rotations, rad; (nv,) of booleans."""
     firsts = {indices[0] for indices in module.QUATERNIONS}
     rest = {i for indices in module.QUATERNIONS for i in indices}
     found: list[bool] = []
@@ -286,7 +285,7 @@ def _not_found(module: GeneratedModule, place: _Place, slopes: Floats) -> str:
     downhill = np.linalg.norm(slopes.T @ place.changes)
     if downhill <= 1e-6 * np.linalg.norm(slopes) * place.size:
         return (
-            f"no equilibrium: {left}, and nothing that may move changes that; "
+            f"no equilibrium: {left}, and no free coordinate or input affects that; "
             "start elsewhere, trim an input, or change what acts"
         )
     return f"no equilibrium found: {left}; start elsewhere, trim an input, or change what acts"

@@ -1,4 +1,4 @@
-"""A module linearised about a state: δẏ = A δy + B δu, exactly, from its generated Jacobians."""
+"""Linearisation of a module about a state: δẏ = A δy + B δu, from its generated Jacobians."""
 
 import io
 from collections.abc import Callable, Mapping
@@ -16,21 +16,21 @@ from eomgen.run.problem import Floats
 
 FORMAT = "linearisation 1"
 BOUND = 1e100
-"""Numbers from here on are taken for infinite: their squares nearly are."""
+"""Greater numbers count as infinite: their squares nearly overflow."""
 _STEADY = 1e-9
-"""Of the largest of A: less is rounding."""
+"""Smaller values, relative to the greatest entry of A, count as rounding."""
 _UNIT = 1e-9
-"""How far from 1 a quaternion's length may be."""
+"""Greatest difference of a quaternion's length from 1."""
 
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
     """δẏ = A δy + B δu for small deviations from the motion through `y` under `u`.
 
-    A (n, n), B (n, nu)  derivatives of the rates by the states and by the inputs
+    A (n, n), B (n, nu)  derivatives of the rates with respect to states and inputs
     state_names          of the n deviations: the states themselves, or see `reduced`
     input_names          of the nu inputs
-    y (ny,), u (nu,)     where: a state and constant inputs, SI units
+    y (ny,), u (nu,)     the state and the constant inputs, SI units
     rates (ny,)          ẏ there, zero at an equilibrium
     quaternions          indices into the deviations of each unit quaternion among them
     """
@@ -45,11 +45,12 @@ class Linearisation:
     quaternions: tuple[tuple[int, int, int, int], ...]
 
     def reduced(self) -> "Linearisation":
-        """The same in as few numbers as there are degrees of freedom, twice.
+        """The same system with as many states as twice the degrees of freedom.
 
-        Four deviations of a quaternion are three of rotation, rad, about the body's own axes, named
-        `<prefix>_rx`, … : q + δq = q (1, δr/2). With δy = T δx it is ẋ = T⁺ (A T - Ṫ) x + T⁺ B u,
-        where Ṫ follows the motion and is zero at rest. Without quaternions nothing changes.
+        Four deviations of a quaternion become three rotations, rad, about the body's own axes,
+        named `<prefix>_rx`, …: q + δq = q (1, δr/2). With δy = T δx the system is
+        ẋ = T⁺ (A T - Ṫ) x + T⁺ B u, where Ṫ follows the motion and is zero at rest. Without
+        quaternions nothing changes.
         """
         if not self.quaternions:
             return self
@@ -85,11 +86,11 @@ class Linearisation:
 
 
 def linearise(module: GeneratedModule, y: Floats, u: Any = None, p: Any = None) -> Linearisation:
-    """Linearise a module in the form [q, v] about the state `y` (ny,).
+    """Linearise a module of form [q, v] about the state `y` (ny,), SI units.
 
     `u` and `p` are inputs and parameters as the module takes them: None, by name, or in order.
-    Raises `RunError` if the module is of another form, lacks `input_jacobian`, or refuses them, or
-    if a quaternion is not of unit length.
+    Raises `RunError` if the module has another form, lacks `input_jacobian`, or refuses `u` or `p`,
+    or if a quaternion is not of unit length.
     """
     if module.FORM != "velocity":
         raise RunError(f"linearise: needs the form 'velocity', not '{module.FORM}'")
@@ -121,9 +122,9 @@ def linearise(module: GeneratedModule, y: Floats, u: Any = None, p: Any = None) 
 
 
 def is_steady(module: GeneratedModule, made: Linearisation, p: Any = None) -> bool:
-    """Whether `made` is about a steady motion: its velocities are not all 0 and, with the states of
-    controllers, do not change, and half a radian or metre on, A and B are the same but for
-    rounding.
+    """Whether `made` is about a steady motion. Its velocities are not all 0; they and the
+    controller states are constant; and A and B are the same after the motion has moved on by half a
+    radian or metre, except for rounding.
     """
     nq = len(module.POSITIONS)
     fastest = float(np.max(np.abs(made.rates[:nq]), initial=0.0))
@@ -145,14 +146,14 @@ def is_steady(module: GeneratedModule, made: Linearisation, p: Any = None) -> bo
 
 
 def evaluated(function: Callable[..., Floats], y: Floats, p: Any, u: Floats, what: str) -> Floats:
-    """A function of a module at a state. Raises `RunError` if it refuses or knows no bounds."""
+    """A function of a module at a state. Raises `RunError` if it fails or is not finite."""
     try:
         with np.errstate(all="ignore"):
             result = function(0.0, y, p, u)
     except (ValueError, ArithmeticError) as error:
         raise RunError(f"{what}: {error}") from None
     if not np.all(np.abs(result) < BOUND):
-        raise RunError(f"{what}: the numbers grow past all bounds here; change state or parameters")
+        raise RunError(f"{what}: the result overflows at this state; change state or parameters")
     return result
 
 
@@ -169,7 +170,7 @@ def input_jacobian(module: GeneratedModule) -> Callable[..., Floats]:
 
 
 def rate_unit(unit: str) -> str:
-    """The unit of the rate of what has a unit: m/s^2 for m/s, rad for rad s, N m/s for N m."""
+    """The unit of a rate, from the unit: m/s^2 for m/s, rad for rad s, N m/s for N m."""
     if unit.endswith("/s"):
         return f"{unit}^2"
     return unit.removesuffix(" s") if unit.endswith(" s") else f"{unit or '1'}/s"
@@ -194,7 +195,7 @@ def input_values(module: GeneratedModule, u: Any) -> Floats:
 def tangents(
     y: Floats, quaternions: tuple[tuple[int, int, int, int], ...], plain: float = 1.0
 ) -> Floats:
-    """T (ny, n) of δy = T δx: `plain` for each plain state, and q (0, δr)/2 for each quaternion."""
+    """T (ny, n) of δy = T δx: `plain` for each scalar state, q (0, δr)/2 for each quaternion."""
     firsts = {indices[0]: indices for indices in quaternions}
     rest = {i for indices in quaternions for i in indices}
     result = np.zeros((len(y), len(y) - len(quaternions)))
@@ -229,12 +230,13 @@ def _deviations(
 def save(linearisation: Linearisation, name: str, path: Path, force: bool = False) -> None:
     """Write A and B with their names as NumPy's .npz, or as a table if `path` ends in .csv.
 
-    Both hold the `reduced` ones; the .npz also `A_states` and `B_states` by the states themselves,
-    `y` and `u`. Raises `RunError` if `path` cannot be written or holds a foreign file.
+    Both hold the `reduced` matrices; the .npz also has `A_states` and `B_states` in terms of the
+    states themselves, `y` and `u`. Raises `RunError` if `path` cannot be written or holds a file
+    that is not ours.
     """
     least = linearisation.reduced()
     if path.suffix == ".csv":
-        # The corner says whose file it is: a comment would be none to readers of CSV.
+        # The corner marks the file as ours: CSV readers would not skip a comment.
         corner = f"eomgen linearisation of {name}"
         lines = [",".join([corner, *least.state_names, *least.input_names])]
         for row, numbers in zip(least.state_names, np.hstack([least.A, least.B]), strict=True):
@@ -242,7 +244,7 @@ def save(linearisation: Linearisation, name: str, path: Path, force: bool = Fals
         write_whole(path, "\n".join(lines) + "\n", force=force)
         return
     buffer = io.BytesIO()
-    # Members keep this order: `eomgen` comes first, where it marks the file as ours.
+    # `eomgen` must come first: it marks the file as ours.
     np.savez(
         buffer,
         eomgen=np.array(FORMAT),

@@ -1,4 +1,4 @@
-"""What a linear system does by itself and what its inputs can do: modes, stability, control."""
+"""Modes, stability and controllability of a linear system."""
 
 import math
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ import numpy as np
 from eomgen.run.problem import Floats
 
 SLOW = 1e-7
-"""Rates below this, 1/s, are no motion but rounding: a mode without a force has a double 0, which
-rounding pulls apart by the square root of the machine epsilon."""
+"""Smaller rates, 1/s, count as 0: rounding splits the double eigenvalue 0 of a motion without force
+by about the square root of the machine epsilon."""
 FINE = 1e-6
-"""The same for rates below this share of the fastest."""
+"""Rates below this part of the fastest count as 0, too."""
 INDEPENDENT = 1e-10
-"""Directions of the state are independent if what is new in them is more than this share."""
+"""Directions of the state are independent if their new component exceeds this part."""
 
 
 @dataclass(frozen=True)
@@ -25,18 +25,18 @@ class Mode:
 
     @property
     def frequency(self) -> float:
-        """Of the oscillation, Hz."""
+        """Frequency of the oscillation, Hz."""
         return self.turn / (2 * math.pi)
 
     @property
     def damping(self) -> float:
-        """Ratio -Re λ / |λ|: 0 undamped, 1 where it no longer swings, negative where it grows."""
+        """Ratio -Re λ / |λ|: 0 undamped, 1 without oscillation, negative if it grows."""
         size = math.hypot(self.rate, self.turn)
         return -self.rate / size if size else 0.0
 
 
 def modes(a: Floats) -> list[Mode]:
-    """The modes of ẋ = a x, the fastest growing first, then the slowest oscillation."""
+    """The modes of ẋ = a x, sorted by falling growth rate, then by rising frequency."""
     values = np.linalg.eigvals(a) if a.size else np.zeros(0, complex)
     small = max(SLOW, FINE * float(np.max(np.abs(values), initial=0.0)))
     found = []
@@ -49,23 +49,23 @@ def modes(a: Floats) -> list[Mode]:
 
 
 def stability(found: list[Mode]) -> str:
-    """In a word: 'unstable', 'stable' (asymptotically), or 'marginal' between the two."""
+    """One word: 'unstable', 'stable' (asymptotically), or 'marginal'."""
     if any(mode.rate > 0 for mode in found):
         return "unstable"
     return "stable" if all(mode.rate < 0 for mode in found) else "marginal"
 
 
 def controllable_rank(a: Floats, b: Floats) -> int:
-    """Dimensions of the state that inputs can reach: the rank of [b, a b, a² b, …].
+    """Dimension of the controllable subspace: the rank of [b, a b, a² b, …].
 
-    Taken from an orthonormal basis that grows by what `a` makes of its newest part, since the
-    powers themselves lose their digits within a few.
+    It is the size of an orthonormal basis that is extended by `a` times its newest part: the powers
+    themselves would soon lose their digits.
     """
     size = float(np.linalg.norm(a, 2)) if a.size else 0.0
     new = b / np.maximum(np.linalg.norm(b, axis=0), np.finfo(np.float64).tiny)
     basis, least = np.zeros((len(a), 0)), INDEPENDENT
     while basis.shape[1] < len(a):
-        for _ in range(2):  # once is not enough, twice is: Gram and Schmidt lose orthogonality
+        for _ in range(2):  # repeated, because one Gram-Schmidt pass loses orthogonality
             new = new - basis @ (basis.T @ new)
         left, values, _ = np.linalg.svd(new, full_matrices=False)
         fresh = left[:, values > least]
