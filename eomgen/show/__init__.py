@@ -1,1 +1,1 @@
-"""Figures, the page, the derivation as a document."""
+"""Figures, the HTML page, the derivation as a document."""

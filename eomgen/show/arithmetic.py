@@ -1,4 +1,4 @@
-"""Errors of the arithmetic as bars, a line a way; and as a table of all states."""
+"""Errors of the accelerations: a figure with a bar for each route, and a table of all states."""
 
 import csv
 import io
@@ -15,12 +15,12 @@ from eomgen.show.style import FAINT, INK, PALETTE, plain, style, write_figure
 from eomgen.study.cost.arithmetic import Arithmetic, Way
 
 LEAST = 0.05
-"""What is less stands at the edge: a logarithmic axis has no 0."""
+"""Smaller errors are drawn here: a logarithmic axis has no 0."""
 COLOURS = {"float64": PALETTE[0], "float32": PALETTE[1]}
 
 
 def save_figure(found: Arithmetic, path: Path, *, force: bool = False) -> None:
-    """Write the figure: for each way all states, the middle half of them, median and worst.
+    """Write the figure: for each route the range over all states, the quartiles, median and worst.
 
     Raises `RunError` as `write_figure` does.
     """
@@ -56,7 +56,7 @@ def _label(way: Way) -> str:
 
 
 def _farthest(ways: list[Way]) -> float:
-    """The right edge, with room for what is written beside the bars."""
+    """The right limit of the axis, with room for the numbers beside the bars."""
     all_ulps = np.concatenate([errors.ulps for way in ways for errors in way.errors])
     finite = all_ulps[np.isfinite(all_ulps)]
     most = max(float(np.max(finite, initial=1.0)), 10.0)
@@ -85,12 +85,11 @@ def _bar(axes: Axes, row: int, ulps: Floats, colour: str) -> None:
 
 
 def save_table(found: Arithmetic, path: Path, *, force: bool = False) -> None:
-    """Write a row a state: its kind, time, condition, what accelerations are off by each way, in
-    ulp, and the state itself.
+    """Write a row for each state: its kind, time, condition number, the error of the accelerations
+    by each route, ulp, and the state itself.
 
-    The numbers of the states are exact, so that the worst of them can be looked at again; those in
-    float32 were computed at the same states rounded to that. Raises `RunError` as `write_whole`
-    does.
+    The states are written exactly, so that the worst can be examined again. Errors in float32 are
+    at the same states rounded to float32. Raises `RunError` as `write_whole` does.
     """
     ways = [way for way in found.ways if way.operations is not None]
     text = io.StringIO()

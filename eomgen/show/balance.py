@@ -1,4 +1,4 @@
-"""Where energy goes: whether it should stay what it is, and works by the type of effects."""
+"""Whether energy is conserved, and the works of effects summed by type."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,15 +9,17 @@ from eomgen.model.model import Model
 from eomgen.show.motion import Array, Motion
 
 MOST_WORKS = 6
-"""Works that are told apart one by one; of more, those of a type are summed."""
+"""Up to so many works are shown one by one; more are summed by type."""
 
 
 def works_by_type(
     model: Model, names: Sequence[str], works: Array
 ) -> tuple[tuple[str, ...], Array]:
-    """Names of effects and their works (n, m), J; of more than `MOST_WORKS` by type, (n, k).
+    """Names of effects and their works (n, m), J; if there are more than `MOST_WORKS`, the sums of
+    each type (n, k).
 
-    The sum of twelve effects is called `pd (12)`; what is alone of its type keeps its name.
+    The sum of twelve effects is named `pd (12)`. An effect that is alone of its type keeps its
+    name.
     """
     if len(names) <= MOST_WORKS:
         return tuple(names), works
@@ -57,8 +59,8 @@ def imbalance(motion: Motion) -> Imbalance | None:
 
 
 def keeps_energy(model: Model, inputs: Mapping[str, float]) -> bool:
-    """Whether exact motion keeps the sum of kinetic and potential energy, at the values of the
-    parameters; `inputs` that are not named are 0. See `EffectTable.keeps_energy`.
+    """Whether exact motion conserves the sum of kinetic and potential energy, at the values of the
+    parameters. Inputs that are not in `inputs` are 0. See `EffectTable.keeps_energy`.
     """
     return not model.leave_out and all(
         effect.keeps_energy(model.defaults, inputs, model.dimensions) for effect in model.effects

@@ -1,4 +1,4 @@
-"""A bill of effects as bars: operations, time, and what leaving each out does to the motion."""
+"""The costs of effects as bars: operations, time, and how leaving each out changes the motion."""
 
 import math
 from collections.abc import Sequence
@@ -15,11 +15,11 @@ from eomgen.study.cost.variants import Kind
 MOST_BARS = 40
 OWN = FAINT
 COLOURS: dict[Kind, str] = {"effect": PALETTE[0], "mechanism": "#bbbbbb", "left out": PALETTE[1]}
-"""Of the bars of each kind of item."""
+"""The colour of the bars of each kind of item."""
 
 
 def save_bill(bill: Bill, path: Path, *, force: bool = False) -> None:
-    """Write the figure, the longest bar of operations first, of very many items the first ones.
+    """Write the figure, sorted by operations; of more than `MOST_BARS` items the most expensive.
 
     Raises `RunError` as `write_figure` does.
     """

@@ -1,4 +1,4 @@
-"""A motion as one still picture: mechanism, coordinates, energy, and how exact they are."""
+"""A motion as one still figure: mechanism, coordinates, energy, and their errors."""
 
 import textwrap
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ from eomgen.show.style import (
 KINETIC, POTENTIAL, TOTAL = "#ee6677", "#4477aa", INK
 
 MOST_KINDS = 4
-"""A position has three components, an orientation four."""
+"""Greatest number of components that are grouped: an orientation has four."""
 
 DASHES = ("-", "--", ":")
 QUATERNIONS = "Orientations, as unit quaternions"
@@ -37,11 +37,11 @@ TITLES = {"m": "Lengths", "rad": "Angles"}
 
 
 def draw_motion(motion: Motion) -> Figure:
-    """Draw the mechanism at a few instants, its coordinates, its energy, and measures of error.
+    """Draw the mechanism at a few times, its coordinates, its energy, and measures of error.
 
-    That of energy is its change where exact motion keeps it; elsewhere it is what the works of
-    effects leave over, if they are known. The figure belongs to no window and no global state.
-    Raises `RunError` if no sample is finite.
+    The error of energy is its change if exact motion conserves it, else the change of kinetic
+    energy that the works of effects do not explain, if they are known. The figure uses no window
+    and no global state. Raises `RunError` if no sample is finite.
     """
     shown = thinned(motion)
     with style():
@@ -73,7 +73,7 @@ def save_figure(motion: Motion, path: Path, force: bool = False) -> None:
 
 
 def _draw_heading(figure: Figure, motion: Motion) -> None:
-    """Write title, integrator and, of an unfinished run, its end; lay the panels out below them."""
+    """Write title, integrator and, for an unfinished run, its end; lay out the panels below."""
     write = partial(figure.text, 0.01, va="top", parse_math=False)
     heading = textwrap.shorten(motion.heading, 80, placeholder=" …")
     write(0.988, heading, size=15, weight="bold")
@@ -107,11 +107,11 @@ def _draw_coordinates(axes: Axes, motion: Motion, title: str, indices: list[int]
     if many:
         draw_map(axes, motion.t, values, labels, unit)
     else:
-        # Few coordinates have each a colour of their own in the whole figure.
+        # If there are few coordinates, each has the same colour in the whole figure.
         coloured = motion.positions if len(motion.positions) <= len(PALETTE) else indices
         own = dict(zip(coloured, colours(len(coloured)), strict=True))
         ramp, dashes = [own[k] for k in indices], ["-"] * len(indices)
-        if title == QUATERNIONS:  # a colour for each component, a line for each orientation
+        if title == QUATERNIONS:  # a colour for each component, a dash pattern for each orientation
             ramp = [PALETTE[k % 4] for k in range(len(indices))]
             dashes = [DASHES[k // 4] for k in range(len(indices))]
             axes.set_ylim(-1.08, 1.08)
@@ -131,7 +131,7 @@ def _draw_energy(axes: Axes, motion: Motion) -> None:
     axes.set_ylabel("J")
     if motion.works is None:
         axes.set_xlabel("t, s")
-    else:  # the next panel below says it
+    else:  # the panel below has the label
         axes.tick_params(labelbottom=False)
 
 
@@ -150,7 +150,7 @@ def _draw_balance(axes: Axes, motion: Motion) -> None:
     else:
         assert motion.works is not None
         title, off = r"Energy unaccounted for,  $|T-T_0-W|", kinetic - motion.works.sum(axis=1)
-    # Where potential energy is zero is a matter of taste, so it must not enter the scale.
+    # The zero of potential energy is arbitrary, so it must not affect the scale.
     scale = float(kinetic.max() + np.ptp(potential)) or 1.0
     draw_small(axes, motion.t, np.abs(off - off[:1])[:, None] / scale, [""], [TOTAL])
     axes.set_title(title + r"\,/\,(\max\,T + \mathrm{range}\,V)$")
@@ -167,16 +167,16 @@ def _draw_drift(axes: Axes, motion: Motion) -> None:
 
 
 def _alike_together(indices: list[int], states: Sequence[str]) -> list[int]:
-    """States of many bodies with all x before all y: what is alike makes one field of a map."""
+    """States sorted with all x before all y, so that a map shows similar states together."""
     endings = {k: states[k].rpartition("_")[2] for k in indices}
     kinds = list(dict.fromkeys(endings.values()))
-    if len(kinds) > MOST_KINDS:  # the names end in numbers
+    if len(kinds) > MOST_KINDS:  # the names end in numbers, not in components
         return indices
     return sorted(indices, key=lambda k: kinds.index(endings[k]))
 
 
 def _positions_by_title(motion: Motion) -> dict[str, list[int]]:
-    """Indices of the coordinates by the title of the panel they share."""
+    """Indices of the coordinates, grouped by the title of their panel."""
     in_quaternions = {index for four in motion.quaternions for index in four}
     groups: dict[str, list[int]] = {}
     for index in motion.positions:

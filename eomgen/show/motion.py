@@ -1,4 +1,4 @@
-"""What a figure or a page shows: one run of one mechanism, as plain values."""
+"""What a figure or page shows: one run of one mechanism, as plain values."""
 
 from dataclasses import dataclass, replace
 
@@ -11,30 +11,28 @@ from eomgen.scene.look import Camera, Shape
 Array = NDArray[np.float64]
 
 Anchor = tuple[int, float, float] | tuple[int, float, float, float]
-"""A point to mark as a joint: the body's index, then x, y (in space z) in body axes, m."""
+"""A joint's mark: the body's index, then x, y (in space also z) in body axes, m."""
 
 MOST_ROWS = 3000
-"""Samples beyond this many add bytes to a picture and nothing to see."""
+"""More samples than these only make a picture larger."""
 
 INSTANTS = 8
-"""Instants that a still picture shows."""
+"""Number of times at which a still figure shows the mechanism."""
 
 BARE = "#4477aa"
 """The colour of a body without shapes."""
 
 MOST_TRACES = 12
-"""Bodies whose way is drawn: of more bodies than this only some, or nothing else is seen."""
+"""Greatest number of bodies whose paths are drawn: more paths would hide everything else."""
 
 
 MOST_MARKS = 30
-"""Joints that a still picture marks: more marks than these hide what they mark."""
+"""Greatest number of joints marked in a still figure: more marks would hide the bodies."""
 
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane that stands still: n·x = `offset`, m, with n its `normal`, of length 1, to the free
-    side; world axes.
-    """
+    """A fixed plane n·x = `offset`, m, with unit `normal` n towards the free side; world axes."""
 
     normal: tuple[float, ...]
     offset: float
@@ -42,8 +40,8 @@ class Plane:
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball that stands still, or, with a `reach` beyond its surface, an obstacle of a field; m,
-    world axes.
+    """A fixed ball or, with a `reach` beyond its surface, an obstacle of a force field; m, world
+    axes.
     """
 
     center: tuple[float, ...]
@@ -55,13 +53,15 @@ class Ball:
 class Motion:
     """A run of a mechanism: n samples, ny states, nb bodies, nj joints that hold a common point.
 
-    `positions` are the indices of those states that say where the bodies are, `quaternions` of
-    those among them that make a unit quaternion. `poses` holds in the plane world x, y of each
-    body's centre of mass and its angle, in space [world_R_body | world x, y, z of the centre of
-    mass]. `joint_drift` is the distance between a joint's point on parent and on child. `anchors`
-    are points to mark as joints. `works` are what each effect, or all of a type, have done since
-    the start, None where that was not asked for. `planes` and `balls` are what stands still in the
-    world and bodies touch or avoid. `keeps_energy` says whether exact motion would.
+    positions     indices of the states that are coordinates
+    quaternions   indices of those that form a unit quaternion
+    poses         in the plane, world x, y of each body's centre of mass and its angle; in space,
+                  [world_R_body | world x, y, z of the centre of mass]
+    joint_drift   distance between a joint's points on parent and child
+    anchors       points to mark as joints
+    works         done since the start by each effect, or by all of a type; None if not asked for
+    planes, balls fixed obstacles that bodies touch or avoid
+    keeps_energy  whether exact motion conserves energy
     """
 
     name: str
@@ -113,25 +113,25 @@ class Motion:
 
     @property
     def traced(self) -> tuple[int, ...]:
-        """Indices of the bodies whose way is drawn, the first and the last among them."""
+        """Indices of the bodies whose paths are drawn, including the first and the last."""
         count = len(self.bodies)
         kept = np.linspace(0, count - 1, min(count, MOST_TRACES)).round().astype(int)
         return tuple(map(int, kept))
 
     @property
     def colours(self) -> tuple[str, ...]:
-        """A colour for each body: that of its first shape."""
+        """A colour for each body, that of its first shape."""
         return tuple(shapes[0].color if shapes else BARE for shapes in self.shapes)
 
     @property
     def center(self) -> Array:
-        """Where the camera looks when it follows nothing, world axes, m."""
+        """The point that a camera without a body to follow looks at, world axes, m."""
         center = self.camera.center
         return np.zeros(self.dimensions) if center is None else np.array(center, dtype=float)
 
     @property
     def heading(self) -> str:
-        """The title on one line, or the name where there is no title."""
+        """The title on one line; the name if there is no title."""
         return one_line(self.title) or self.name
 
     @property
@@ -142,21 +142,21 @@ class Motion:
 
     @property
     def stopped(self) -> str:
-        """One sentence about why the run is unfinished, or "" for a finished one."""
+        """One sentence on why the run is unfinished; "" for a finished one."""
         if self.finished:
             return ""
         return f"The run stopped at t = {self.t[-1]:.6g} s: {one_line(self.message)}"
 
 
 def one_line(text: str) -> str:
-    """`text` without line breaks and characters that no font shows."""
+    """`text` without line breaks and unprintable characters."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def instants(motion: Motion) -> list[tuple[int, float]]:
-    """Samples that a still picture shows, and how strongly: the last full, those before lighter.
+    """The samples that a still figure shows, and their strength: 1 for the last, less before.
 
-    A part of the ink rather than a transparency, so that parts that overlap stay clear.
+    The strength is a share of ink and not a transparency, so that overlapping parts stay clear.
     """
     last = len(motion.t) - 1
     rows = np.unique(np.linspace(0, last, INSTANTS).round().astype(int)).tolist()
@@ -164,7 +164,7 @@ def instants(motion: Motion) -> list[tuple[int, float]]:
 
 
 def thinned(motion: Motion, most: int = MOST_ROWS) -> Motion:
-    """The finite samples of `motion`, at most `most` (>= 2) of them, the first and last among them.
+    """The finite samples of `motion`, at most `most` (>= 2), including the first and the last.
 
     Raises `RunError` if no sample is finite.
     """

@@ -1,4 +1,4 @@
-"""From a trajectory to a motion: poses, energies and joint gaps, by the generated code."""
+"""From a trajectory to a motion: poses, energies and joint gaps, from the generated code."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, cast
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 class _Joint(Protocol):
-    """What every joint but the free one has."""
+    """What all joints except the free one have."""
 
     name: str
     parent: str
@@ -36,8 +36,8 @@ def observe(
     appearance: Appearance,
     inputs: Mapping[str, float] | None = None,
 ) -> Motion:
-    """What a figure or a page shows of a run, at the values of the model's parameters and those of
-    the `inputs` that are not 0; `appearance` is that of the model's scene.
+    """The motion of a run, to be shown in a figure or page. It uses the default values of the
+    model's parameters. `inputs` that are not given are 0. `appearance` is that of the scene.
     """
     columns = trajectory.y.T
     p = {parameter.name: parameter.default for parameter in model.parameters}
@@ -81,11 +81,11 @@ def observe(
 
 
 def joint_drift(model: Model, poses: Floats) -> Floats:
-    """Distance of each joint's point on its parent from that on its child, (n, nj), m.
+    """Distance between each joint's points on its parent and child, (n, nj), m.
 
-    Of the joints that hold a point, in the order of the bodies they hold. `poses` (n, nb, 3)
-    or (n, nb, 3, 4) as `body_poses` gives them. Measured from the poses alone, whatever the state
-    form: a form that keeps each body's place for itself can pull its joints apart.
+    It covers joints that hold a point, in the order of their bodies. `poses` (n, nb, 3) or
+    (n, nb, 3, 4) are as from `body_poses`. Only poses are used, so that it also shows joints that
+    come apart in forms that integrate each body's position.
     """
     names = {body.name: k for k, body in enumerate(model.bodies)}
     dimensions = poses.ndim - 1
@@ -101,7 +101,7 @@ def joint_drift(model: Model, poses: Floats) -> Floats:
 
 
 def _joints(model: Model, chosen: Callable[[Sequence[Move]], bool]) -> list[tuple[int, _Joint]]:
-    """Joints `chosen` by their moves, which no free joint is, each with the index of its body."""
+    """Joints `chosen` by their moves, except free ones, each with the index of its child body."""
     return [
         (k, cast(_Joint, body.joint))
         for k, body in enumerate(model.bodies)
@@ -110,12 +110,12 @@ def _joints(model: Model, chosen: Callable[[Sequence[Move]], bool]) -> list[tupl
 
 
 def _holds_a_point(moves: Sequence[Move]) -> bool:
-    """Whether a joint's point on the parent stays one with that on the child."""
+    """Whether a joint keeps a point of the parent and one of the child together."""
     return all(move.kind != "slide" for move in moves)
 
 
 def _is_marked(moves: Sequence[Move]) -> bool:
-    """Whether a picture marks a joint: it moves, about a point or along a line."""
+    """Whether a picture marks a joint: it allows rotation about a point, or motion along a line."""
     return bool(moves) and sum(move.kind == "slide" for move in moves) < 2
 
 
@@ -128,12 +128,12 @@ def _anchors(model: Model, dimensions: int) -> tuple[Anchor, ...]:
 
 
 def _values(model: Model, r: Sequence[Formula], dimensions: int) -> Floats:
-    """A vector of the scene as numbers; zero where the scene leaves it out."""
+    """A vector of the scene as numbers; zero if the scene omits it."""
     return np.array([model.value(part) for part in r] if r else [0.0] * dimensions)
 
 
 def _point(poses: Floats, r: Floats) -> Floats:
-    """World place (n, 2) or (n, 3) of a point `r` of a body, body axes."""
+    """World position (n, 2) or (n, 3) of a point `r` of a body, given in body axes, m."""
     if poses.ndim == 3:
         return np.asarray(poses[..., :3] @ r + poses[..., 3])
     x, y, angle = poses.T

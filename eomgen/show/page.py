@@ -1,4 +1,4 @@
-"""A motion as one HTML page that plays it: no network, no second file, opens from disk."""
+"""A motion as one HTML page that plays it, from disk and without a network or other files."""
 
 import base64
 import re
@@ -16,17 +16,18 @@ from eomgen.show.view import AMBIENT, GLOSS, LIGHT, cast_of, floor_under, patche
 from eomgen.templating import render
 
 BUDGET = 4000
-"""Faces of all bodies in space, about: what a browser paints many times a second."""
+"""About how many faces all bodies in space have: as many as a browser can draw many times a
+second."""
 
 
 def render_page(motion: Motion, poses_source: str, parameters: tuple[float, ...]) -> str:
     """Return the page that plays `motion` from its state vector.
 
-    `poses_source` is the JavaScript text of `function bodyPoses(y, p, t)`, which returns the poses
-    of the bodies from the state `y` (ny,), `parameters` `p` and the time: in the plane
+    `poses_source` is the JavaScript text of `function bodyPoses(y, p, t)`. It returns the poses of
+    the bodies from the state `y` (ny,), the `parameters` `p` and the time: in the plane
     `[[x, y, angle], …]` (m, m, rad), in space `[[[r11, r12, r13, x], […], […]], …]`, rows of
-    [world_R_body | position] (1, m). The page calls it for every picture it draws. Arrays lie in
-    the page as float64, bit for bit. Raises `RunError` if no sample is finite.
+    [world_R_body | position] (1, m). The page calls it for each picture. Arrays are embedded as
+    exact float64. Raises `RunError` if no sample is finite.
     """
     assert not re.search(r"</script|<!--", poses_source, re.IGNORECASE), "would end its script"
     shown = thinned(motion)
@@ -76,12 +77,12 @@ def save_page(
     path: Path,
     force: bool = False,
 ) -> None:
-    """Write the page of `render_page` to `path`; raises `RunError` as `write_whole` does."""
+    """Write the page of `render_page` to `path`. Raises `RunError` as both functions do."""
     write_whole(path, render_page(motion, poses_source, parameters), force=force)
 
 
 def _in_plane(shape: Shape) -> dict[str, Any]:
-    """A shape with the center that it has where the scene gives none."""
+    """A shape with its centre, which is the origin if the scene gives none."""
     table = shape.model_dump(exclude={"orientation_deg"})
     if "center" in table:
         table["center"] = table["center"] or (0.0, 0.0)
@@ -89,7 +90,7 @@ def _in_plane(shape: Shape) -> dict[str, Any]:
 
 
 def _in_space(motion: Motion) -> dict[str, Any]:
-    """Faces of the bodies, floor, light: worked out here, as for the figure."""
+    """Faces of the bodies, floor and light, computed as for the figure."""
     parts = solids(motion.shapes, motion.camera.height, BUDGET)
     floor = floor_under(motion, cast_of(parts))
     squares = patches(motion, floor).tolist()
@@ -116,18 +117,18 @@ def _in_space(motion: Motion) -> dict[str, Any]:
 
 
 def _packed(values: Array) -> str:
-    """Base64 of the float64 values, row after row, least byte first."""
+    """Base64 of the float64 values in row-major order, little-endian."""
     return base64.b64encode(values.astype("<f8").tobytes()).decode("ascii")
 
 
 def _packed_single(values: Array) -> str:
-    """Base64 of the values as float32, finer than any screen."""
+    """Base64 of the values as float32, precise enough for any screen."""
     most = float(np.finfo(np.float32).max)
     single = np.clip(values, -most, most).astype("<f4")
     return base64.b64encode(single.tobytes()).decode("ascii")
 
 
 def _packed_indices(values: Indices) -> str:
-    """Base64 of the indices as int16; no mesh has as many faces as that."""
+    """Base64 of the indices as int16; no mesh has more faces than that."""
     assert np.abs(values).max(initial=0) < 2**15
     return base64.b64encode(values.astype("<i2").tobytes()).decode("ascii")

@@ -1,4 +1,4 @@
-"""Panels of numbers against time: as curves, of many as a map, of errors on a logarithmic axis."""
+"""Panels of values against time: as curves, as a map, or as errors on a logarithmic axis."""
 
 from collections.abc import Sequence
 
@@ -12,17 +12,17 @@ from eomgen.show.style import FAINT
 EPSILON = float(np.finfo(float).eps)
 
 MOST_CURVES = 12
-"""More than these are not told apart as curves."""
+"""Greatest number of curves that can be distinguished."""
 
 FEW_NAMES = 6
-"""Names that fit into one column beside a panel."""
+"""Number of names that fit into one column beside a panel."""
 
 MAP_TIMES = 600
-"""Times at which a map is coloured, at most: a panel has no more pixels."""
+"""Greatest number of times in a map: a panel has no more pixels."""
 
 
 USUAL, BEYOND = 98, 3
-"""The percentile that a map's colours end at, where the largest is so many times that or more."""
+"""A map's colours end at this percentile if the greatest value is at least so many times it."""
 
 
 def draw_curves(
@@ -33,7 +33,7 @@ def draw_curves(
     colours: Sequence[str],
     dashes: Sequence[str] = (),
 ) -> None:
-    """Draw curves (n, k) with their names beside the panel; solid ones where no `dashes` are."""
+    """Draw curves (n, k) with their names beside the panel; solid unless `dashes` are given."""
     marker = "o" if len(t) == 1 else ""
     kinds = dashes or ["-"] * len(labels)
     for curve, label, colour, kind in zip(values.T, labels, colours, kinds, strict=True):
@@ -51,7 +51,7 @@ def draw_curves(
 
 def draw_map(axes: Axes, t: Array, values: Array, labels: Sequence[str], unit: str) -> None:
     """Draw many quantities (n, k) of one unit as a map: a row each, time from left to right."""
-    # On equal times, as an image has; a trajectory's own may lie anywhere.
+    # An image needs equally spaced times; those of a trajectory may be anywhere.
     times = np.linspace(t[0], t[-1], min(MAP_TIMES, max(2, len(t))))
     after = np.clip(np.searchsorted(t, times, side="right"), 1, max(1, len(t) - 1))
     before = after - 1
@@ -59,7 +59,7 @@ def draw_map(axes: Axes, t: Array, values: Array, labels: Sequence[str], unit: s
     span = np.where(t[after] > t[before], t[after] - t[before], 1.0)
     part = np.clip((times - t[before]) / span, 0.0, 1.0)[:, np.newaxis]
     shown = (1 - part) * values[before] + part * values[after]
-    # One row far beyond the others takes no colour from them: its own ends where the scale does.
+    # One row with very large values must not fade the others: its own colours are cut off.
     most, usual = float(np.abs(shown).max()), float(np.percentile(np.abs(shown), USUAL))
     size = (usual if 0 < usual < most / BEYOND else most) or 1.0
     start, end = (t[0], t[-1]) if t[-1] > t[0] else (t[0] - 0.5, t[0] + 0.5)
@@ -87,7 +87,7 @@ def draw_map(axes: Axes, t: Array, values: Array, labels: Sequence[str], unit: s
 def draw_small(
     axes: Axes, t: Array, values: Array, labels: Sequence[str], colours: Sequence[str]
 ) -> None:
-    """Draw errors (n, k) on a logarithmic axis, those below rounding, zeros too, at rounding."""
+    """Draw errors (n, k) on a logarithmic axis; those below machine epsilon are drawn there."""
     axes.set_xlabel("t, s")
     if not values.any():
         note = "exactly 0 at every sample" if values.size else "no joints that hold a point"

@@ -1,4 +1,4 @@
-"""The mechanism in the plane, as the figure shows it."""
+"""The mechanism in the plane, as drawn in the figure."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,14 +11,14 @@ from eomgen.show.motion import BARE, MOST_MARKS, Array, Ball, Motion, instants
 from eomgen.show.style import ink_on, mixed
 
 SPREAD = 20
-"""Planes are drawn so many times as far as the motion goes: the view's shape shows more of them."""
+"""Planes extend so many times the size of the motion: a wide view shows more than the motion."""
 
 FILL, SURFACE, REACH = 0.08, 0.4, 0.25
-"""How strong the ink is of what stands still: its inside, its surface, a field's reach."""
+"""Strength of the ink of fixed objects: their inside, their surface, the reach of a field."""
 
 
 def draw_plane(axes: Axes, motion: Motion) -> None:
-    """Draw the bodies at a few instants, each fuller than the one before, and their ways."""
+    """Draw the bodies at a few times, with increasing strength, and their paths."""
     paper = motion.camera.background
     axes.grid(color=mixed(paper, ink_on(paper), 0.1))
     for body in motion.traced:
@@ -41,9 +41,9 @@ def draw_plane(axes: Axes, motion: Motion) -> None:
 
 
 def draw_ball(axes: Axes, ball: Ball, center: Array, camera: Camera) -> None:
-    """Draw a ball that stands still about its `center` in the picture, below the bodies.
+    """Draw a fixed ball at its `center` in the picture, behind the bodies.
 
-    The view takes in those that are smaller than the camera's; of others it shows a part.
+    The view is extended to show balls that are smaller than the camera's height.
     """
     paper = camera.background
     ink = ink_on(paper)
@@ -70,7 +70,7 @@ def draw_ball(axes: Axes, ball: Ball, center: Array, camera: Camera) -> None:
 
 
 def _draw_planes(axes: Axes, motion: Motion) -> None:
-    """Draw what lies behind each plane grey, as far as the view goes; the view does not follow."""
+    """Shade the region behind each plane within the view, without extending the view."""
     paper = motion.camera.background
     ink = ink_on(paper)
     low, high = axes.dataLim.get_points()
@@ -89,7 +89,7 @@ def _draw_planes(axes: Axes, motion: Motion) -> None:
 
 
 def outline(shape: Shape) -> Array:
-    """Corners (k, 2) of a polygon that looks like a `shape` of the plane, m, body axes."""
+    """Corners (k, 2) of a polygon that approximates a planar `shape`, m, body axes."""
     match shape:
         case Polygon():
             return np.array(shape.points, dtype=float)

@@ -1,4 +1,4 @@
-"""Hidden surfaces by a depth for each pixel: solids may touch and pierce one another."""
+"""Hidden-surface removal with a depth buffer: solids may touch and intersect."""
 
 from dataclasses import dataclass
 
@@ -12,18 +12,18 @@ EDGE_WIDTH = 2.2
 """Width of an edge, pixels."""
 
 THICK = 6.0
-"""Solids thinner than this many pixels have edges of their own colour, to be seen at all."""
+"""Solids thinner than this, pixels, have edges of their own colour: dark ones would hide them."""
 
 BEFORE = 1.5
-"""Edges are this much nearer than their faces, pixels."""
+"""Edges are drawn this much nearer than their faces, pixels."""
 
 SLACK = 1e-7
-"""Pixels so little beyond a face's side belong to it, so that neighbours leave no gap."""
+"""Pixels up to this far outside a face belong to it, so that neighbours leave no gap."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A part of the picture, in its metres: `width` by `height` pixels from the upper left."""
+    """A part of the picture: `width` by `height` pixels from its upper left corner, m."""
 
     left: float
     top: float
@@ -33,18 +33,18 @@ class Frame:
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top, m."""
+        """Left, right, bottom and top, m, as Matplotlib takes them."""
         right = self.left + self.width / self.pixels_per_metre
         return self.left, right, self.top - self.height / self.pixels_per_metre, self.top
 
     def pixels(self, points: Array) -> Array:
-        """Points right, up, near (m) as pixels right, down, near."""
+        """Points (right, up, near), m, as pixels (right, down, near)."""
         moved = points - np.array([self.left, self.top, 0.0])
         return np.asarray(moved * np.array([1.0, -1.0, 1.0]) * self.pixels_per_metre)
 
 
 def frame_around(points: Array, most: int) -> Frame:
-    """The frame of all `points` (n, 2), its longer side `most` pixels."""
+    """The frame around `points` (n, 2), with `most` pixels on its longer side."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max()) or 1.0
     margin = 0.01 * size
@@ -64,7 +64,7 @@ def render_solids(
 ) -> tuple[NDArray[np.int32], Array]:
     """Draw faces and edges: for each pixel (height, width) an index into colours (k, 3), or -1.
 
-    An edge's colour is `share` of `ink` (3,) and the rest the solid's own.
+    An edge's colour is a mixture of `share` parts `ink` (3,) and the solid's own colour.
     """
     canvas = _Canvas(frame)
     faces = frame.pixels(sight.faces)
@@ -93,7 +93,7 @@ def render_solids(
 
 
 class _Canvas:
-    """Which face is shown, pixel by pixel, in the order in which they come; -1 where none is."""
+    """The index of the face shown at each pixel, counted in the order of drawing; -1 for none."""
 
     def __init__(self, frame: Frame) -> None:
         self.shown = np.full((frame.height, frame.width), -1, dtype=np.int32)
@@ -101,9 +101,9 @@ class _Canvas:
         self._face = -1
 
     def fill(self, corners: Array, slope: Array) -> None:
-        """Show the next face where it is nearest: convex and flat, corners (4, 3), clockwise.
+        """Draw the next face where it is nearest; it is convex and flat, corners (4, 3), clockwise.
 
-        `slope` is the change of nearness with a pixel to the right and one down.
+        `slope` is the change of nearness per pixel to the right and per pixel down.
         """
         self._face += 1
         height, width = self.shown.shape
@@ -117,7 +117,7 @@ class _Canvas:
         y = (np.arange(top, bottom) + 0.5)[:, np.newaxis]
         (xa, ya, za), *_ = rows = corners.tolist()
         near = (za + slope[0] * (x - xa)) + slope[1] * (y - ya)
-        np.clip(near, low[2], high[2], out=near)  # of a face seen nearly from its side
+        np.clip(near, low[2], high[2], out=near)  # a face seen edge-on has huge slopes
         spot = slice(top, bottom), slice(left, right)
         inside = near > self._nearness[spot]
         for (x0, y0, _), (x1, y1, _) in zip(rows, [*rows[1:], rows[0]], strict=True):

@@ -1,4 +1,4 @@
-"""What stands for bodies that a scene gives no shapes: a box, and rods from it to their joints."""
+"""Shapes for bodies to which the scene gives none: a box, and rods from it to their joints."""
 
 import math
 from statistics import median
@@ -11,13 +11,13 @@ from eomgen.scene.joints.base import WORLD
 from eomgen.scene.look import Box, Rod, Shape
 
 BOX, ROD = 0.25, 0.07
-"""Side of a box and width of a rod, over the length of a rod."""
+"""Side of a box and width of a rod, relative to the length of a rod."""
 DRAWN = (1e-90, 1e90)
-"""Lengths between these, m, are drawn; of what is beyond, a dot is left."""
+"""Only lengths between these, m, are drawn; other bodies appear as dots."""
 
 
 def shapes_of(model: Model, appearance: Appearance) -> tuple[tuple[Shape, ...], ...]:
-    """The shapes of every body, its own or those that stand for it, at the scene's parameters."""
+    """The shapes of every body, its own or a skeleton, at the scene's parameters."""
     arms = _arms(model)
     own = _size(model, arms)
     size = appearance.camera.height / 10 if own is None else own
@@ -28,7 +28,7 @@ def shapes_of(model: Model, appearance: Appearance) -> tuple[tuple[Shape, ...], 
 
 
 def _arms(model: Model) -> dict[str, list[tuple[float, ...]]]:
-    """For each body the points of its joints away from its centre of mass, body axes, m."""
+    """For each body the points of its joints outside its centre of mass, body axes, m."""
     arms: dict[str, list[tuple[float, ...]]] = {body.name: [] for body in model.bodies}
 
     def add(body: str, r: tuple[Formula, ...]) -> None:
@@ -44,7 +44,7 @@ def _arms(model: Model) -> dict[str, list[tuple[float, ...]]]:
 
 
 def _size(model: Model, arms: dict[str, list[tuple[float, ...]]]) -> float | None:
-    """A length of the mechanism, m: of its arms, or of what turns; None where it has none."""
+    """A typical length, m: of the arms, else twice the radius of gyration; None without either."""
     lengths = [math.hypot(*point) for points in arms.values() for point in points]
     if lengths:
         return median(lengths)

@@ -1,4 +1,4 @@
-"""Shapes of space as faces: what the figure and the page both paint.
+"""Shapes in space as meshes of faces, for the figure and the page.
 
 All faces have four corners, counter-clockwise seen from outside; a triangle repeats one of them.
 """
@@ -16,13 +16,13 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FEWEST, MOST = 8, 32
-"""Sides of what is round: fewer would show creases, more would show nothing."""
+"""Least and greatest number of sides of round shapes."""
 
 SHARP = np.cos(np.radians(50))
-"""Faces that meet at a larger angle than this (45 degrees lie within an octagon) have an edge."""
+"""An edge is drawn between faces that meet at more than this angle; an octagon's meet at 45°."""
 
 FINEST = 200
-"""Faces across a picture, at most; each try after the first has fewer by `COARSER`."""
+"""Greatest number of faces across a picture; each further try makes them larger by `COARSER`."""
 
 COARSER = 1.25
 TRIES = 24
@@ -32,8 +32,8 @@ TRIES = 24
 class Mesh:
     """A solid's surface in body axes, m.
 
-    `across` names for each side of each face, from corner k to k + 1, the face beyond it, or -1
-    where the surface bends so sharply that the side is always drawn as an edge.
+    `across` gives for each side of each face, from corner k to k + 1, the index of the neighbouring
+    face, or -1 if the side is a sharp edge, which is always drawn.
     """
 
     vertices: Array  # (k, 3)
@@ -42,7 +42,7 @@ class Mesh:
 
     @cached_property
     def thickness(self) -> float:
-        """How thin the surface is where it is thinnest, about, m."""
+        """About the least thickness of the solid, m."""
         about = self.vertices - self.vertices.mean(axis=0)
         _, _, own_axes = np.linalg.svd(about, full_matrices=False)
         return float(np.ptp(about @ own_axes.T, axis=0).min())
@@ -55,7 +55,7 @@ class Mesh:
 
     @cached_property
     def across(self) -> Indices:
-        """Faces beyond each side (f, 4); the face itself for the empty side of a triangle."""
+        """Neighbours of each face's sides (f, 4); the face itself at a triangle's empty side."""
         count = len(self.vertices)
         start, end = self.faces, np.roll(self.faces, -1, axis=1)
         own = np.repeat(np.arange(len(self.faces)), 4)
@@ -69,7 +69,7 @@ class Mesh:
 
 
 def mesh(shape: Shape, grain: float) -> Mesh:
-    """The surface of a shape of space, with faces about `grain` m long where it can be."""
+    """The surface of a shape in space, with faces about `grain` m long if possible."""
     match shape:
         case Box():
             return _box(shape)
@@ -91,7 +91,7 @@ def mesh(shape: Shape, grain: float) -> Mesh:
 
 @dataclass(frozen=True)
 class Solids:
-    """All shapes of all bodies; shapes that are alike share one mesh."""
+    """All shapes of all bodies; equal shapes share one mesh."""
 
     meshes: tuple[Mesh, ...]
     bodies: tuple[tuple[tuple[int, str], ...], ...]
@@ -99,9 +99,9 @@ class Solids:
 
 
 def solids(shapes: Sequence[Sequence[Shape]], height: float, budget: int) -> Solids:
-    """Meshes as fine as a picture `height` m high shows, coarser where they would be many.
+    """Meshes as fine as a picture `height` m high can show, but coarser if they have many faces.
 
-    `budget` is the number of faces in all that should not be passed; many shapes pass it still.
+    `budget` is the total number of faces aimed at; very many shapes exceed it.
     """
     alike: dict[str, list[Shape]] = {}
     for group in shapes:
@@ -123,7 +123,7 @@ def solids(shapes: Sequence[Sequence[Shape]], height: float, budget: int) -> Sol
 
 
 def rotation(turns_deg: Sequence[float]) -> Array:
-    """R = Rz Ry Rx of three angles about x, then y, then z of fixed axes."""
+    """R = Rz Ry Rx for rotations by three angles, degrees, about the fixed x, then y, then z."""
     cx, cy, cz = np.cos(np.radians(turns_deg))
     sx, sy, sz = np.sin(np.radians(turns_deg))
     about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
@@ -134,7 +134,7 @@ def rotation(turns_deg: Sequence[float]) -> Array:
 
 def unit(vectors: Array) -> Array:
     """Vectors along the last axis with length 1; zero stays zero."""
-    # Divided by the largest component first, for squares of tiny numbers are no numbers.
+    # Divided by the largest component first, because squares of tiny numbers underflow.
     largest = np.abs(vectors).max(axis=-1, keepdims=True)
     scaled = vectors / np.where(largest > 0, largest, 1.0)
     length = np.linalg.norm(scaled, axis=-1, keepdims=True)
@@ -146,7 +146,7 @@ def _center(center: tuple[float, ...] | None) -> Array:
 
 
 def _sides(radius: float, grain: float) -> int:
-    """Sides of a circle, a multiple of four."""
+    """Number of sides of a circle, a multiple of four."""
     return 4 * int(np.clip(np.ceil(2 * np.pi * radius / grain / 4), FEWEST // 4, MOST // 4))
 
 
@@ -154,7 +154,7 @@ def _box(box: Box) -> Mesh:
     half = np.array(box.size) / 2
     sheets = []
     for axis in range(3):
-        # The two axes after this one, in turn, make a right-handed system with it.
+        # The next two axes in cyclic order make a right-handed system with this one.
         first, second = (axis + 1) % 3, (axis + 2) % 3
         sheet = np.zeros((2, 2, 3))
         sheet[..., first] = half[first] * np.array([[-1], [1]])
@@ -166,7 +166,7 @@ def _box(box: Box) -> Mesh:
 
 
 def _rod(rod: Rod, grain: float) -> Mesh:
-    """A straight round side between two half balls."""
+    """A cylinder between two hemispheres."""
     length, radius = float(np.linalg.norm(np.subtract(rod.end, rod.start))), rod.width / 2
     ball = _arc(_sides(radius, grain) // 2) * radius
     half = len(ball) // 2
@@ -184,7 +184,7 @@ def _arc(parts: int) -> Array:
 
 
 def _revolved(profile: Array, sides: int) -> Array:
-    """A profile of radii and heights, upwards, turned about z: points (sides + 1, rows, 3)."""
+    """A profile of radii and heights, upwards, rotated about z: points (sides + 1, rows, 3)."""
     angles = np.linspace(0.0, 2 * np.pi, sides + 1)[:, np.newaxis]
     radius, height = profile.T
     ones = np.ones_like(angles)
@@ -192,7 +192,7 @@ def _revolved(profile: Array, sides: int) -> Array:
 
 
 def _around(shape: Cylinder | Rod, profile: ArrayLike, radius: float, grain: float) -> Mesh:
-    """A profile of radii (m) and heights (parts of the length) turned about start to end."""
+    """A profile of radii (m) and heights (parts of the length), rotated about the shape's axis."""
     along = np.subtract(shape.end, shape.start)
     axis = unit(along) if along.any() else np.array([0.0, 0.0, 1.0])
     scale = float(np.linalg.norm(along)) or 1.0
@@ -203,9 +203,9 @@ def _around(shape: Cylinder | Rod, profile: ArrayLike, radius: float, grain: flo
 
 
 def _joined(sheets: Sequence[Array], *, smooth: bool = False) -> Mesh:
-    """One mesh of sheets (a, b, 3) of points whose borders meet, faces counter-clockwise.
+    """One mesh from sheets (a, b, 3) of points whose borders meet, with counter-clockwise faces.
 
-    A sheet's normal is along its first index's direction crossed with its second's.
+    A sheet's normal is the cross product of the directions of its first and second index.
     """
     points, faces = [], []
     first = 0

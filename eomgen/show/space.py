@@ -1,6 +1,6 @@
-"""The mechanism in space, as the figure shows it: our own projection on flat axes.
+"""The mechanism in space, as drawn in the figure, by an orthographic projection on 2D axes.
 
-Bodies are an image, which an SVG holds too; floor, ways and marks are lines.
+Bodies are a raster image, in an SVG as well; floor, paths and marks are lines.
 """
 
 import numpy as np
@@ -16,19 +16,19 @@ from eomgen.show.style import FAINT, ink_on, mixed
 from eomgen.show.view import Cast, Floor, cast_of, eye_axes, floor_under, look, patches
 
 BUDGET = 2500
-"""Faces of all bodies at one instant, about."""
+"""About how many faces all bodies have at one time."""
 
 PIXELS = 1400
-"""Of the longer side of the bodies' image: about two for each that a PNG shows."""
+"""Longer side of the bodies' image, pixels: about twice what a PNG shows."""
 
 AXIS_COLOURS = ("#cc3311", "#228833", "#3366cc")
 
 EDGE = 0.6
-"""How dark edges are between the body's colour and ink."""
+"""Strength of edges, between the body's colour and ink."""
 
 
 def draw_space(axes: Axes, motion: Motion) -> None:
-    """Draw the bodies at a few instants, each fuller than the one before, and their ways."""
+    """Draw the bodies at a few times, with increasing strength, and their paths."""
     paper, camera = motion.camera.background, motion.camera
     cast = cast_of(solids(motion.shapes, camera.height, BUDGET))
     eye = eye_axes(camera.azimuth_deg, camera.elevation_deg)
@@ -38,7 +38,7 @@ def draw_space(axes: Axes, motion: Motion) -> None:
     for ball in motion.balls:
         draw_ball(axes, ball, eye @ ball.center, camera)
     _draw_patches(axes, patches(motion, floor), eye, paper)
-    if eye[2, 2] > 0:  # from below the floor its shadows are not seen
+    if eye[2, 2] > 0:  # seen from below, the floor hides its shadows
         _draw_shadow(
             axes, look(cast, motion.poses[rows[-1][0]], np.eye(3)).faces, floor, eye, paper
         )
@@ -63,15 +63,15 @@ def draw_space(axes: Axes, motion: Motion) -> None:
 
 
 def _draw_bodies(axes: Axes, motion: Motion, cast: Cast, eye: Array) -> None:
-    """Draw each instant over the ones before, mixed with the paper to be as strong as it is."""
+    """Draw the bodies at each time over those before, mixed with the paper by their strength."""
     paper = motion.camera.background
     ink, below = np.array(to_rgb(ink_on(paper))), np.array(to_rgb(paper))
     sights = [(look(cast, motion.poses[row], eye), share) for row, share in instants(motion)]
     points = np.concatenate([sight.faces.reshape(-1, 3)[:, :2] for sight, _ in sights])
-    if not len(points):  # smaller than rounding, or so far off
+    if not len(points):  # smaller than rounding errors, or that far away
         return
     frame = frame_around(points, PIXELS)
-    # What is clear has the paper's colour, for a picture made smaller mixes it in.
+    # Transparent pixels have the paper's colour, because scaling the image mixes it in.
     image = np.empty((frame.height, frame.width, 4))
     image[:] = (*below, 0.0)
     for sight, strength in sights:
@@ -85,7 +85,7 @@ def _draw_bodies(axes: Axes, motion: Motion, cast: Cast, eye: Array) -> None:
 def _draw_points(
     axes: Axes, motion: Motion, pose: Array, eye: Array, strength: float, zorder: int
 ) -> None:
-    """Mark bodies without shapes, and joints, which are seen through whatever hides them."""
+    """Mark bodies without shapes, and joints, in front of everything."""
     paper = motion.camera.background
     edge = mixed(paper, ink_on(paper), strength)
     bare = [k for k, shapes in enumerate(motion.shapes) if not shapes]
@@ -109,7 +109,7 @@ def _draw_floor(axes: Axes, floor: Floor, eye: Array, paper: str) -> None:
 
 
 def _draw_patches(axes: Axes, squares: Array, eye: Array, paper: str) -> None:
-    """Draw planes other than the floor, which hide nothing."""
+    """Draw planes other than the floor; they are transparent."""
     axes.add_collection(
         PolyCollection(
             list((squares @ eye.T)[..., :2]),
@@ -122,7 +122,9 @@ def _draw_patches(axes: Axes, squares: Array, eye: Array, paper: str) -> None:
 
 
 def _draw_shadow(axes: Axes, above: Array, floor: Floor, eye: Array, paper: str) -> None:
-    """Draw where the bodies are over the floor: faces `above` (f, 4, 3) that look up, laid flat."""
+    """Draw the bodies' shadow on the floor: their faces `above` (f, 4, 3) that look up, projected
+    along z.
+    """
     laid = above.reshape(-1, 3).copy()
     laid[:, 2] = floor.z
     points = laid @ eye.T
@@ -139,11 +141,11 @@ def _draw_shadow(axes: Axes, above: Array, floor: Floor, eye: Array, paper: str)
 
 
 def _draw_axes_cross(axes: Axes, eye: Array) -> None:
-    """Show in a corner how x, y and z lie in the picture."""
+    """Show the directions of x, y and z in a corner."""
     cross = axes.inset_axes((0.0, 0.0, 0.13, 0.13))
     cross.set_axis_off()
     cross.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")
-    for k in np.argsort(eye[2]):  # the one that points at the eye comes last
+    for k in np.argsort(eye[2]):  # the nearest axis comes last
         x, y = eye[:2, k]
         cross.plot([0, x], [0, y], color=AXIS_COLOURS[k], linewidth=1.6, solid_capstyle="round")
         cross.text(

@@ -1,4 +1,4 @@
-"""How every figure looks and is written: the same letters, colours and bytes on every machine."""
+"""The style of all figures, and how they are written: with the same bytes on every machine."""
 
 import io
 import re
@@ -16,12 +16,12 @@ from matplotlib.transforms import Bbox
 from eomgen.errors import RunError
 from eomgen.files import check_writable, write_whole
 
-# Paul Tol's bright scheme: told apart by colour-blind eyes too, and in grey by most.
+# Paul Tol's bright scheme: distinguishable by colour-blind people, and mostly in grey.
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee")
 INK, FAINT, ALARM = "#222222", "#666666", "#a02c1c"
 
 STYLE = {
-    "font.family": ["DejaVu Sans"],  # comes with Matplotlib: the same letters on every machine
+    "font.family": ["DejaVu Sans"],  # comes with Matplotlib: the same font on every machine
     "font.size": 9.5,
     "mathtext.fontset": "dejavusans",
     "text.color": INK,
@@ -45,32 +45,32 @@ STYLE = {
     "legend.frameon": False,
     "legend.handlelength": 1.2,
     "savefig.dpi": 150,
-    "svg.hashsalt": "eomgen",  # without a salt, ids within an SVG are random
+    "svg.hashsalt": "eomgen",  # without a salt, the ids in an SVG are random
 }
 
-# No PDF: Matplotlib writes its metadata last, too late for the mark that `files` looks for.
+# No PDF: Matplotlib writes its metadata too late in the file for the mark that `files` looks for.
 METADATA = {".png": {"Software": "eomgen"}, ".svg": {"Creator": "eomgen", "Date": None}}
 
 
 def style() -> AbstractContextManager[None]:
-    """Our looks over Matplotlib's own defaults, whatever the user's settings; undone on leaving."""
+    """A context with our style over Matplotlib's defaults, whatever the user's settings."""
     return matplotlib.style.context(["default", STYLE])
 
 
 def check_figure(path: Path, *, force: bool = False) -> None:
-    """Raise `RunError` if `path` has no suffix we draw, or may not be written."""
+    """Raise `RunError` if `path` has no suffix of a figure, or may not be written."""
     if path.suffix.lower() not in METADATA:
         raise RunError(f"{path}: a figure is written as .png or .svg; '{path.suffix}' is neither")
     check_writable(path, force=force)
 
 
 def write_figure(figure: Figure, path: Path, *, force: bool = False) -> None:
-    """Write `figure` whole to `path`; raises `RunError` as `check_figure` and `write_whole` do."""
+    """Write `figure` to `path`. Raises `RunError` as `check_figure` and `write_whole` do."""
     check_figure(path, force=force)
     suffix = path.suffix.lower()
     buffer = io.BytesIO()
     with style(), warnings.catch_warnings():
-        # A title in a script that the font lacks shows boxes; the figure is worth having still.
+        # A title in a script that the font lacks shows boxes, but the figure is still useful.
         warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from font")
         _settle(figure)
         figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
@@ -78,10 +78,10 @@ def write_figure(figure: Figure, path: Path, *, force: bool = False) -> None:
 
 
 def _settle(figure: Figure) -> None:
-    """Lay the panels out and keep them there.
+    """Lay the panels out and fix their positions.
 
-    The solver of the constrained layout ends in one of several last digits, depending on addresses
-    in memory; rounding far above that, and far below a pixel, makes files the same every time.
+    The last digits of the constrained layout depend on addresses in memory. Positions are rounded
+    far above those digits and far below a pixel, so that files are the same every time.
     """
     engine = figure.get_layout_engine()
     if engine is None:
@@ -93,21 +93,21 @@ def _settle(figure: Figure) -> None:
 
 
 def colours(count: int) -> list[str]:
-    """Return `count` colours: of the palette if it has as many, else a ramp in their order."""
+    """Return `count` colours: from the palette if it has enough, else from a colour map."""
     if count <= len(PALETTE):
         return list(PALETTE[:count])
     return [to_hex(colour) for colour in colormaps["viridis"](np.linspace(0.0, 0.92, count))]
 
 
 def mixed(paper: str, colour: str, share: float) -> str:
-    """A colour of which `share` is `colour` and the rest `paper`."""
+    """A mixture of `share` parts `colour` and the rest `paper`."""
     pairs = zip(to_rgb(paper), to_rgb(colour), strict=True)
     red, green, blue = ((1 - share) * below + share * above for below, above in pairs)
     return to_hex((red, green, blue))
 
 
 def ink_on(paper: str) -> str:
-    """What is read well on `paper`."""
+    """A colour that contrasts with `paper`."""
     return INK if np.dot(to_rgb(paper), (0.2126, 0.7152, 0.0722)) > 0.4 else "#eeeeee"
 
 
@@ -120,7 +120,7 @@ GREEK = re.compile(
 def symbol(name: str) -> str:
     r"""Return `name` as mathtext: `phi_dot` as $\dot{\phi}$, `x_A` as $x_{A}$, `q1` as $q_{1}$.
 
-    What is no identifier comes back as plain text with its dollar signs escaped.
+    A text that is not an identifier is returned as plain text with its dollar signs escaped.
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         return plain(name)
@@ -145,5 +145,5 @@ def _letters(word: str) -> str:
 
 
 def plain(text: str) -> str:
-    """`text` for Matplotlib to show as it is, never as mathtext."""
+    """`text` escaped so that Matplotlib shows it unchanged, not as mathtext."""
     return text.replace("$", r"\$")

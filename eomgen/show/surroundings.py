@@ -1,4 +1,4 @@
-"""What of a model stands still in the world: planes and balls that bodies touch, and obstacles."""
+"""Fixed objects in the world: planes and balls that bodies touch, and obstacles of fields."""
 
 from collections.abc import Iterator
 
@@ -11,7 +11,7 @@ from eomgen.show.motion import Ball, Plane
 
 
 def planes_of(model: Model) -> tuple[Plane, ...]:
-    """The planes of contacts with the world, at the values of the parameters, each once."""
+    """The planes of contacts with the world, at the values of the parameters, without repeats."""
     found = (
         Plane(tuple(map(float, direction(c.normal))), model.value(c.offset))
         for c in _with_world(model, "plane")
@@ -20,7 +20,7 @@ def planes_of(model: Model) -> tuple[Plane, ...]:
 
 
 def balls_of(model: Model) -> tuple[Ball, ...]:
-    """The balls of contacts with the world and the obstacles of fields, in the same way."""
+    """The balls of contacts with the world and the obstacles of fields, likewise."""
     found = [
         Ball(tuple(map(model.value, c.other_at)), model.value(c.other_radius))
         for c in _with_world(model, "ball")

@@ -1,6 +1,6 @@
-"""How space is seen: the eye's axes, light, the floor, and which faces look at the eye.
+"""The view of a space: the eye's axes, light, the floor, and the faces that look at the eye.
 
-The eye stands infinitely far off (an orthographic view): equal lengths look equal everywhere, a
+The view is orthographic, with the eye infinitely far away: equal lengths look equal everywhere, a
 ball is a circle, and the scale bar holds for the whole picture.
 """
 
@@ -13,27 +13,28 @@ from eomgen.show.motion import Array, Motion, Plane
 from eomgen.show.solid import Indices, Solids, unit
 
 LIGHT = unit(np.array([-0.45, 0.75, 0.65]))
-"""Towards the light, in the eye's axes: it comes over the left shoulder wherever the eye stands."""
+"""Direction to the light, in the eye's axes: it always comes over the eye's left shoulder."""
 
 AMBIENT, GLOSS = 0.56, 0.1
-"""The part of a colour that shadow leaves, and the part of white that full light adds."""
+"""The part of a colour left in shadow, and the part of white that full light adds."""
 
 UP = (0.0, 0.0, 1.0)
 
 LINES = 40
-"""Lines of the floor's grid in each direction, at most."""
+"""Greatest number of the floor's grid lines in each direction."""
 
 NEAR_ZERO, NEAR_FLOOR = 0.02, 0.5
-"""What floats so little below z = 0, or above it, in heights of the picture, stands on z = 0."""
+"""The floor is at z = 0 if the lowest point is at most so far below or above it, relative to the
+height of the picture."""
 
 
 SOUNDINGS = 300
-"""Samples at which the lowest point of all is looked for, at most."""
+"""Greatest number of samples at which the lowest point is searched."""
 
 
 @dataclass(frozen=True)
 class Floor:
-    """A grid at height `z`, m, `step` m apart, over x from low to high and y from low to high."""
+    """A grid at height `z`, m, with spacing `step`, m, over the ranges `x` and `y`, m."""
 
     z: float
     step: float
@@ -41,7 +42,7 @@ class Floor:
     y: tuple[float, float]
 
     def lines(self) -> Array:
-        """Ends (lines, 2, 3) of the grid's lines."""
+        """End points (lines, 2, 3) of the grid's lines, m."""
         ends = []
         for axis, (low, high) in enumerate((self.x, self.y)):
             first, last = round(low / self.step), round(high / self.step)
@@ -53,7 +54,7 @@ class Floor:
         return np.array(ends)
 
     def through_origin(self) -> NDArray[np.bool_]:
-        """Which of the lines is at x = 0 or at y = 0."""
+        """Which of the lines are at x = 0 or y = 0."""
         flat = self.lines()[..., :2]
         return np.asarray((flat == 0.0).all(axis=1).any(axis=1))
 
@@ -70,14 +71,14 @@ class Cast:
     thickness: Array  # (f,) of the solid a face belongs to, m
 
     def placed(self, pose: Array) -> Array:
-        """World places (k, 3) of the vertices at a pose (nb, 3, 4)."""
+        """World positions (k, 3), m, of the vertices at a pose (nb, 3, 4)."""
         of = pose[self.bodies]
         return np.asarray(np.einsum("kij,kj->ki", of[..., :3], self.vertices) + of[..., 3])
 
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """Faces and edges that look at the eye, along its axes: right, up, and near, m."""
+    """Faces and edges that look at the eye, in its axes: right, up, and near, m."""
 
     faces: Array  # (f, 4, 3) convex and flat, counter-clockwise
     colours: Array  # (f, 3) as the light falls
@@ -87,10 +88,10 @@ class Sight:
 
 
 def eye_axes(azimuth_deg: float, elevation_deg: float) -> Array:
-    """The picture's right and up and the way to the eye, as rows in world axes.
+    """The picture's right and up and the direction to the eye, as rows in world axes.
 
-    The eye stands where `azimuth_deg` turns from x towards y and `elevation_deg` lifts towards z.
-    A world point times the transpose is its place in the picture and its nearness, m.
+    The azimuth is from x towards y, the elevation towards z. A world point times the transpose is
+    its position in the picture and its nearness, m.
     """
     azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
     ca, sa, ce, se = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
@@ -98,7 +99,7 @@ def eye_axes(azimuth_deg: float, elevation_deg: float) -> Array:
 
 
 def cast_of(solids: Solids) -> Cast:
-    """All bodies' faces in one table."""
+    """The faces of all bodies in one table."""
     none = np.zeros((0, 4), dtype=np.int64)
     tables = [(np.zeros((0, 3)), none[:, 0], none, none, np.zeros((0, 3)), np.zeros(0))]
     corners = sides = 0
@@ -121,11 +122,11 @@ def cast_of(solids: Solids) -> Cast:
 
 
 def look(cast: Cast, pose: Array, axes: Array) -> Sight:
-    """What of the bodies at a pose looks at the eye with these `axes`, hidden or not."""
+    """The faces and edges of the bodies at a pose that look at the eye, hidden or not."""
     corners = (cast.placed(pose) @ axes.T)[cast.faces]  # (f, 4, 3)
     normals = unit(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
     front = normals[:, 2] > 0
-    # An edge is where the surface bends sharply, or where it turns away from the eye.
+    # An edge is drawn at sharp bends and along the silhouette.
     drawn = front[:, np.newaxis] & ((cast.across < 0) | ~front[cast.across])
     face, side = np.nonzero(drawn)
     return Sight(
@@ -138,16 +139,16 @@ def look(cast: Cast, pose: Array, axes: Array) -> Sight:
 
 
 def lit(colours: Array, toward_light: Array) -> Array:
-    """Colours (f, 3) as light falls on them, by the cosine of its angle to each normal."""
+    """Colours (f, 3) under the light, from the cosine of its angle to each normal."""
     light = np.maximum(toward_light, 0.0)[:, np.newaxis]
     return np.asarray(np.minimum(colours * (AMBIENT + (1 - AMBIENT) * light) + GLOSS * light**4, 1))
 
 
 def floor_under(motion: Motion, cast: Cast) -> Floor:
-    """The floor that a motion happens above: a level plane of contact that it comes near to, z = 0,
-    or where its lowest point comes.
+    """The floor below a motion: a level contact plane near it, else z = 0 if that is near, else the
+    height of its lowest point.
 
-    A body that falls for ever takes no floor with it: the floor stays in the first picture.
+    It is within the first picture, even if a body falls without end.
     """
     low, high = _bounds(motion, cast)
     height = motion.camera.height
@@ -164,7 +165,7 @@ def floor_under(motion: Motion, cast: Cast) -> Floor:
     widest = float(max(high[:2] - low[:2]))
     if widest > LINES * step:
         step = round_length(2 * widest / LINES)
-    # Not too narrow beside its length, for a strip says little of depth.
+    # A narrow strip would show no depth.
     spare = np.maximum(0.6 * widest - (high - low)[:2], 0.0) / 2
     x_low, y_low = np.floor((low[:2] - spare) / step - 0.2) * step
     x_high, y_high = np.ceil((high[:2] + spare) / step + 0.2) * step
@@ -172,9 +173,9 @@ def floor_under(motion: Motion, cast: Cast) -> Floor:
 
 
 def patches(motion: Motion, floor: Floor) -> Array:
-    """Squares (k, 4, 3), as wide as the floor, of the other planes that the motion comes near to.
+    """Squares (k, 4, 3), m, as wide as the floor, on the other planes that the motion comes near.
 
-    Each lies where the middle of the motion is nearest to it, two of its sides level.
+    Each is centred at the foot of the motion's middle, with two sides level.
     """
     places = motion.places.reshape(-1, 3)
     middle = (places.min(axis=0) + places.max(axis=0)) / 2
@@ -193,7 +194,7 @@ def patches(motion: Motion, floor: Floor) -> Array:
 
 
 def _near(motion: Motion) -> list[Plane]:
-    """The planes that a centre of mass comes nearer to than the picture is high."""
+    """The planes closer to a centre of mass, at some time, than the picture is high."""
     places = motion.places.reshape(-1, 3)
     return [
         plane
@@ -203,7 +204,7 @@ def _near(motion: Motion) -> list[Plane]:
 
 
 def _bounds(motion: Motion, cast: Cast) -> tuple[Array, Array]:
-    """The lowest and the highest x, y, z that anything reaches."""
+    """The least and the greatest x, y, z that any body reaches, m."""
     rows = np.linspace(0, len(motion.t) - 1, min(len(motion.t), SOUNDINGS)).round().astype(int)
     poses = motion.poses[rows]
     places = poses[..., 3].reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The work–precision diagram: error against time on logarithmic axes, a line a method."""
+"""The work-precision diagram: error against time on logarithmic axes, one line per method."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -34,7 +34,7 @@ COLOURS = {
     "BDF_differences": "#ee7733",
     "LSODA": "#009988",
 }
-"""Each method has its colour in every figure, by differences that of the same with the Jacobian."""
+"""Each method's colour in all figures; one with finite differences has that of its exact twin."""
 MARKERS: dict[Kind, str] = {"explicit": "o", "implicit": "s", "symplectic": "D"}
 TITLES: dict[Kind, str] = {
     "explicit": "Explicit",
@@ -46,28 +46,28 @@ TROUBLES = {
     "failed": ("P", "failed"),
     "over": (">", "stopped: took too long"),
 }
-"""Statuses that are drawn at the top, each with its marker and words."""
+"""Statuses of runs that are marked, with marker and label."""
 AT_MOST = "v"
 TOP = 3.0
-"""Errors above, those of runs that failed among them, are drawn here."""
+"""Greater errors, and failed runs, are drawn here."""
 BESIDE = 0.85
-"""Where the legend begins, in parts of the figure's width."""
+"""Left side of the legend, relative to the figure's width."""
 SMALLEST = 1e-17
 MOST = 10.0
-"""Drifts below and above are drawn here."""
+"""Smaller and greater drifts are drawn at these."""
 
 Value = Callable[[Work], float]
 
 
 @dataclass(frozen=True)
 class Diagram:
-    """What a figure says beside its runs.
+    """The texts of a figure, and what it shows besides its runs.
 
     name    of the scene
     about   lines below the title
-    floor   error below which nothing is told apart
-    energy  what the drift of energy means here; "" if it is not known
-    joints  whether joints can come apart, so that their gaps are worth a panel
+    floor   error below which nothing is resolved
+    energy  meaning of the energy drift; "" if it is not known
+    joints  whether joints can come apart, so that their gaps have a panel
     """
 
     name: str
@@ -78,10 +78,10 @@ class Diagram:
 
 
 def draw(diagram: Diagram, works: Sequence[Work]) -> Figure:
-    """Draw error against time and against derivatives, and what drifts, one line a method.
+    """Draw error against time and against derivatives, and drifts, with one line per method.
 
-    What failed or is wrong is drawn at its time, no higher than the top. The figure belongs to no
-    window and no global state.
+    Failed and wrong runs are drawn at their time, no higher than the top. The figure uses no window
+    and no global state.
     """
     panels: list[Callable[[Axes], None]] = [partial(_draw_evaluations, diagram, works)]
     if diagram.energy:
@@ -122,14 +122,14 @@ def save(diagram: Diagram, works: Sequence[Work], path: Path, *, force: bool = F
 
 
 def colour(method: str) -> str:
-    """A method's colour; one that is new takes one by its place."""
+    """A method's colour; a method that is not in the table gets one by its index."""
     if method in COLOURS:
         return COLOURS[method]
     return colours(len(INTEGRATORS))[list(INTEGRATORS).index(method)]
 
 
 def _line(method: str) -> dict[str, object]:
-    """How a method's line looks: dashes for equal steps, hollow where it takes differences."""
+    """The style of a method's line: dashed for equal steps, hollow for finite differences."""
     hollow = method.endswith("_differences")
     dashes = ":" if hollow else "-" if order(method) is None else "--"
     return {
@@ -158,8 +158,8 @@ def _draw_errors(
     words: bool = True,
     spread: bool = False,
 ) -> None:
-    """One line a method through its right runs, with the spread of their times or without; the
-    others as marks, where their errors are.
+    """Draw one line per method through its "ok" runs, with the spread of their times if `spread`;
+    other runs as marks at their errors.
     """
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -223,7 +223,7 @@ def _draw_evaluations(diagram: Diagram, works: Sequence[Work], axes: Axes) -> No
 
 
 def _draw_drift(works: Sequence[Work], title: str, value: Value, axes: Axes) -> None:
-    """Something that should stay 0, against time; right and wrong runs, those that finished."""
+    """Draw a quantity that should stay 0 against time, for all finished runs."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     for method, own in _by_method(works).items():
@@ -242,14 +242,14 @@ def _draw_drift(works: Sequence[Work], title: str, value: Value, axes: Axes) -> 
 
 
 def _ticks(axes: Axes) -> None:
-    """A label at every few decades, none between."""
+    """Label every few decades, and nothing between."""
     axes.yaxis.set_major_locator(LogLocator(numticks=12))
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_legend(figure: Figure, works: Sequence[Work], top: float) -> None:
-    """Methods by kind, and what the marks mean, in a column of its own."""
+    """Methods by kind, and the meaning of the marks, in their own column."""
     present = _by_method([work for work in works if work.status != "refused"])
     handles: list[Line2D] = []
 
