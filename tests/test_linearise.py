@@ -420,7 +420,7 @@ def test_states_of_controllers_come_to_rest_too(controller: str, settle: bool) -
 
 def test_what_of_a_controller_never_rests_is_named() -> None:
     module = module_of("never", CONTROLLED["never"])
-    with pytest.raises(RunError, match=r"no equilibrium: z still changes by 1 1/s, and nothing"):
+    with pytest.raises(RunError, match=r"no equilibrium: z still changes by 1 1/s, and no free"):
         equilibrium(module, np.array([0.3, 0.0, 0.0]))
 
 
