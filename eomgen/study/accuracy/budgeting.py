@@ -18,7 +18,7 @@ FULL = 0.85
 SECOND = 0.8
 """Work of the run that estimates an error, relative to the work of the run itself."""
 WORTH = 0.5
-"""The search ends when no method is expected to reduce the best error by this factor."""
+"""The search ends when no method is expected to reduce the best error to this part of it."""
 FIRST = 1e-4
 """Tolerance of the first runs."""
 RUNG = 100.0

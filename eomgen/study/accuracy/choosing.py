@@ -160,8 +160,8 @@ def race(search: Search, asked: str | None, loose: bool) -> list[str]:
     """Run each method once; stop runs that take much more work than another. Return the names of
     all methods that were run.
 
-    If a method needed Jacobians, `STIFF` is run, too. If none did, the motion is smooth, and the
-    required error is `loose`, rk4 is run, too: it spends no time on step control.
+    If a run needed Jacobians, or none finished, `STIFF` is run, too. Else, if the motion is smooth
+    and the required error is `loose`, rk4 is run, too: it spends no time on step control.
     """
     names = [method_of(asked).name] if asked is not None else _candidates(search)
     for name in names:

@@ -24,7 +24,7 @@ from eomgen.study.cost.variants import Kind, Variant, bare, counted
 from eomgen.study.timing import least_and_spread
 
 MOTION = 10.0
-"""Most wall time of all motions together, s, unless told."""
+"""Default wall time of all motions together, s."""
 AT_CONTACTS = ("gaps", "gap_rates", "impact", "held")
 
 

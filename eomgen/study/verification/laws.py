@@ -24,7 +24,7 @@ from eomgen.study.verification.judging import ulps
 from eomgen.study.verification.virtual_work import FreeBodies
 
 _STEP = mpfr(2) ** -66
-"""Step of central differences relative to the rates; its square is the error, some 40 digits."""
+"""Step of central differences, s, for rates of order 1; their error is its square, about 1e-40."""
 _LEFT = 1e-45
 """Rounding error of a difference that should be 0, relative to what is differenced."""
 SMOOTH = 1e-9
