@@ -1,5 +1,5 @@
-"""What a model tells of a run: why it cannot start or go on, where it came near a lock, and what
-its motion comes of. What runs has the module alone, and is handed these.
+"""Explanations of a run from its model: why it cannot start or continue, where it came near gimbal
+lock, and what its motion depends on. `run` knows only the module and receives these as functions.
 """
 
 import hashlib
@@ -19,12 +19,12 @@ from eomgen.scene.effects import JointStop
 from eomgen.scene.joints.base import Geared
 
 GROWN = 1e9
-"""How many times its size at the start an effect has grown where it is worth saying."""
+"""Growth of an effect, relative to its size at the start, that is reported."""
 GONE = 1e-9
-"""Part of the inertia that a velocity feels elsewhere that is as good as none."""
+"""Inertia of a velocity, relative to that at other states, below which it counts as none."""
 NEAR = 1e-4
-"""Part of the inertia felt elsewhere below which a joint is near a lock: its axes stand within a
-hundredth of a radian of it, and every digit of that part is lost.
+"""Inertia, relative to that at other states, below which a joint is near gimbal lock: its axes are
+within a hundredth of a radian of it, and rounding errors grow by the inverse.
 """
 REMEDY = "soften it, keep its formula finite there, or keep away"
 
@@ -35,10 +35,11 @@ def problem_of(
     inputs: Any = None,
     model: Model | None = None,
 ) -> Problem:
-    """The initial-value problem of a module, as `as_problem`, whose messages name what of the
-    `model` that it was made of has no finite value; without one they say less.
+    """The initial-value problem of a module, as from `as_problem`. With the `model` of the module,
+    its messages name the part of the model that has no finite value.
 
-    Raises `RunError` if the module refuses them, or has no derivative to start from.
+    Raises `RunError` if the module refuses parameters or inputs, or has no derivative at its
+    initial state.
     """
     if model is None:
         return as_problem(module, parameters, inputs)
@@ -53,7 +54,7 @@ def problem_of(
 
 
 def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str, float]) -> Origin:
-    """Where the motion of a model comes from, with values in place of some of its own."""
+    """What the motion of a model depends on, with the given values instead of its defaults."""
     parts: dict[str, object] = {
         "dimensions": model.dimensions,
         "form": model.form,
@@ -91,7 +92,7 @@ def joint_limits(model: Model) -> dict[str, tuple[float, float]]:
 
 def locks(model: Model, trajectory: Trajectory) -> list[str]:
     """Where the rows of a spatial mechanism come near gimbal lock: a line for each velocity that
-    next to nothing resists there.
+    has almost no inertia there.
     """
     known = model.form == "velocity" and not (model.driven or model.locked)
     if not known or model.dimensions != 3:
@@ -108,7 +109,7 @@ def locks(model: Model, trajectory: Trajectory) -> list[str]:
 def explained(
     model: Model, parameters: Mapping[str, float], inputs: Mapping[str, float]
 ) -> Explain:
-    """What `Problem.explain` is for a model, of form 'velocity'; it says nothing for others."""
+    """`Problem.explain` for a model of form 'velocity'; for other forms it explains nothing."""
     if model.form != "velocity":
         return unexplained
 

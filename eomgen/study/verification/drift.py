@@ -57,8 +57,8 @@ def drift(
     states: Sequence[State],
     progress: Progress = lambda _: None,
 ) -> Drift:
-    """Run a module from its initial state for `MOST_TIME` or to the end of the `wanted` run, if that
-    is earlier. `full` is a module that has energies, momentum and powers. What exact motion
+    """Run a module from its initial state for `MOST_TIME`, or to the end of the `wanted` run if
+    that is earlier. `full` is a module that has energies, momentum and powers. What exact motion
     conserves is determined at `states` and where the energy of the run changes most: some effects
     act only for a short time.
 
