@@ -116,7 +116,7 @@ def test_a_damaged_store_is_done_without(
     out = tmp_path / "out"
     assert main(["generate", "pendulum", "-o", str(out)]) == 0
     good = (out / "pendulum.py").read_bytes()
-    (kept,) = store.iterdir()
+    (kept,) = (path for path in store.iterdir() if b"def derivative" in path.read_bytes())
     whole = kept.read_bytes()
     for damaged in (whole[:900], b"", whole.replace(b"9.81", b"9.80"), b"[" * 100_000, b"null"):
         kept.write_bytes(damaged)

@@ -34,8 +34,8 @@ UNIT = float(np.finfo(float).eps)
 def moved_problem(
     module: GeneratedModule, model: Model, parameters: Any = None, inputs: Any = None
 ) -> Callable[[int], Problem]:
-    """A function that gives, by number, the problem of a model's module with constants perturbed in one of
-    several ways, from the same initial state. Each problem is made once.
+    """A function that gives, by number, the problem of a model's module with constants perturbed in
+    one of several ways, from the same initial state. Each problem is made once.
     """
     program = cache(partial(program_of, model))
     return cache(partial(_made, module, program, model, parameters, inputs))
