@@ -73,7 +73,7 @@ class Balance:
     F: Expr
 
 
-class Mechanism(Unmoved):
+class SymbolicTreeMechanism(Unmoved):
     """The model as effects see it while they put their loads on it."""
 
     def __init__(self, model: Model, symbols: Symbols) -> None:
@@ -114,7 +114,7 @@ def inertias(model: Model, symbols: Symbols) -> tuple[Inertia, ...]:
 
 def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...]) -> Loads:
     """What the effects put on bodies and joints."""
-    mechanism = Mechanism(model, symbols)
+    mechanism = SymbolicTreeMechanism(model, symbols)
     given = [load for effect in model.effects for load in effect.loads(mechanism)]
     first = {body.joint.name: j for body, j in zip(model.bodies, model.first_velocity, strict=True)}
     motors: dict[int, Expr] = {}
