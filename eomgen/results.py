@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from eomgen.files import write_whole
 from eomgen.model.model import Model
 from eomgen.run.limits import Excursion, excursions
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Outcome, Trajectory, save_csv, save_npz
 from eomgen.study.diagnosis import joint_limits, locks
 
@@ -155,12 +155,12 @@ class Run:
     begun: str = ""
 
     @property
-    def t(self) -> Floats:
+    def t(self) -> FloatArray:
         """Times, (n,), s."""
         return self.trajectory.t
 
     @property
-    def y(self) -> Floats:
+    def y(self) -> FloatArray:
         """States, (n, ny), SI units, in the order of `states`."""
         return self.trajectory.y
 
@@ -185,7 +185,7 @@ class Run:
         return self.trajectory.message
 
     @property
-    def energy(self) -> Floats:
+    def energy(self) -> FloatArray:
         """Kinetic and potential energy together, (n,), J."""
         return self.motion.kinetic_energy + self.motion.potential_energy
 
@@ -211,7 +211,7 @@ class Run:
         """Where a spatial mechanism came near gimbal lock, a line for each velocity."""
         return tuple(locks(self.model, self.trajectory))
 
-    def __getitem__(self, state: str) -> Floats:
+    def __getitem__(self, state: str) -> FloatArray:
         """One state over time, (n,). Raises `KeyError` for a name that is none."""
         if state not in self.states:
             raise KeyError(f"no state '{state}'; known: {', '.join(self.states)}")

@@ -15,7 +15,7 @@ from matplotlib.colors import same_color
 
 from eomgen.cli import main
 from eomgen.run.integrators import INTEGRATORS, FixedStep
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import COUNTS, Trajectory
 from eomgen.show.work_precision import COLOURS, TOP, Diagram, draw
 from eomgen.study.accuracy import records, work_precision
@@ -40,15 +40,15 @@ SPAN = np.linspace(0.0, 2.0, 201)
 
 
 def bench(
-    rate: float = 0.0, error: float = 1e-16, motion: Floats | None = None, t: Floats = SPAN
+    rate: float = 0.0, error: float = 1e-16, motion: FloatArray | None = None, t: FloatArray = SPAN
 ) -> Bench:
     """An oscillator, x = cos 3t, and z' = -rate (z - x) + x' beside it, z = x + w e^(-rate t)."""
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         x, v, z = y
         return np.array([v, -(FAST**2) * x, -rate * (z - x) + v])
 
-    def jacobian(t: float, y: Floats) -> Floats:
+    def jacobian(t: float, y: FloatArray) -> FloatArray:
         return np.array([[0, 1, 0], [-(FAST**2), 0, 0], [rate, 1, -rate]])
 
     x, v = np.cos(FAST * t), -FAST * np.sin(FAST * t)
@@ -60,10 +60,10 @@ def bench(
     )
     scale = scales(states, {"x": "m", "v": "m/s", "z": "m"}, y)
 
-    def kinetic(t: Floats, y: Floats) -> Floats:
+    def kinetic(t: FloatArray, y: FloatArray) -> FloatArray:
         return np.asarray(y[:, 1] ** 2 / 2)
 
-    def energy(t: Floats, y: Floats) -> Floats:
+    def energy(t: FloatArray, y: FloatArray) -> FloatArray:
         return np.asarray(y[:, 1] ** 2 / 2 + (FAST * y[:, 0]) ** 2 / 2)
 
     truth = Reference(t, y, scale, error, error, "closed form", 0.0)
@@ -230,10 +230,10 @@ def test_rows_are_compared_at_their_own_times() -> None:
 def test_quaternions_are_measured_before_they_are_scaled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Euler's step leaves the sphere by (h w / 2)² / 2, every time."""
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         return np.array([-y[1], y[0], 0.0, 0.0]) * 3.0
 
-    def jacobian(t: float, y: Floats) -> Floats:
+    def jacobian(t: float, y: FloatArray) -> FloatArray:
         found = np.zeros((4, 4))
         found[0, 1], found[1, 0] = -3.0, 3.0
         return found

@@ -20,7 +20,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.run.checks import allowed_errors
 from eomgen.run.module import GeneratedModule, as_problem, load_module
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.scene.schema import Simulation
 from eomgen.store import generated_code, program_of
@@ -53,7 +53,7 @@ def case_of(scene: str, t_end: float | None = None, **kept: Any) -> Case:
     return Case(problem, t_end or wanted.t_end, module.UNITS, kept, moved=twin)
 
 
-def end_of(scene: str, t_end: float | None = None) -> Floats:
+def end_of(scene: str, t_end: float | None = None) -> FloatArray:
     """A scene's last state in long numbers, rounded."""
     known = closed_end(scene) if t_end is None else None
     if known is not None:
@@ -62,12 +62,12 @@ def end_of(scene: str, t_end: float | None = None) -> Floats:
     return reference(model, module, t_end=t_end or wanted.t_end, doubles=False).y[-1]
 
 
-def off(case: Case, run: Tried, true: Floats) -> float:
+def off(case: Case, run: Tried, true: FloatArray) -> float:
     """A run's true error at the end, in parts of the motion's scale."""
     return error(run.trajectory.y[-1], true, case.scale(run.extent))
 
 
-def spin_after(inertia: Sequence[float], spin: Sequence[float], t_end: float) -> Floats:
+def spin_after(inertia: Sequence[float], spin: Sequence[float], t_end: float) -> FloatArray:
     """The angular velocity of a free body by Euler's equations, Taylor series in 50 digits."""
     with mp.workdps(50):
         i, w = [mpf(x) for x in inertia], [mpf(x) for x in spin]
@@ -168,8 +168,8 @@ class Clock:
     def counting(self, problem: Problem) -> Problem:
         """The problem, whose evaluations take time by this clock."""
 
-        def ticking(function: Callable[[float, Floats], Floats]) -> Any:
-            def value(t: float, y: Floats) -> Floats:
+        def ticking(function: Callable[[float, FloatArray], FloatArray]) -> Any:
+            def value(t: float, y: FloatArray) -> FloatArray:
                 self.now += self._tick
                 return function(t, y)
 

@@ -14,7 +14,7 @@ from eomgen.cli import main
 from eomgen.model.elaborate import elaborate
 from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.module import load_module
-from eomgen.run.problem import Contacts, Floats, Problem
+from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import COUNTS, Trajectory
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.store import generated_code
@@ -76,7 +76,7 @@ def case_of(scene: str) -> Case:
     return Case(problem, wanted.t_end, module.UNITS, kept, moved=moved)
 
 
-def truth(case: Case, integrator: str = "DOP853", rtol: float = SMALLEST_RTOL) -> Floats:
+def truth(case: Case, integrator: str = "DOP853", rtol: float = SMALLEST_RTOL) -> FloatArray:
     """The motion (n, ny) as tightly as doubles have it."""
     return case.run(Setting(integrator, rtol, 1e-2 * rtol)).trajectory.y
 
@@ -89,7 +89,7 @@ def in_long_numbers(scene: str, t_end: float | None = None) -> Reference:
     return reference(model, module, t_end=t_end or tables.simulation.t_end)
 
 
-def motion(t: Floats, y: Floats) -> Trajectory:
+def motion(t: FloatArray, y: FloatArray) -> Trajectory:
     """A run of one state, finished."""
     counts = dict.fromkeys(COUNTS, 0)
     return Trajectory("made up", ("q",), t, y[:, None], "RK45", True, "", counts)
@@ -222,11 +222,11 @@ def test_a_motion_that_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     tight as it goes is wrong, no other method is asked; gauss_6 for so long that it tells, no more.
     """
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         a, b, c = y.tolist()
         return np.array([10 * (b - a), a * (28 - c) - b, a * b - 8 / 3 * c])
 
-    def jacobian(t: float, y: Floats) -> Floats:
+    def jacobian(t: float, y: FloatArray) -> FloatArray:
         a, b, c = y.tolist()
         return np.array([[-10, 10, 0], [28 - c, -1, -a], [b, a, -8 / 3]])
 
@@ -321,7 +321,7 @@ def test_a_second_run_tells_the_error() -> None:
     assert found.second.tolerance > SMALLEST_RTOL and 1e-16 < found.last < 1e-11
 
 
-def rows(folder: Path) -> Floats:
+def rows(folder: Path) -> FloatArray:
     """The states that a run of two_body has kept."""
     with np.load(folder / "two_body.npz") as kept:
         return np.asarray(kept["y"])
@@ -333,7 +333,7 @@ def test_the_same_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     Which they are is the same each time.
     """
 
-    def made(name: str, *options: str) -> Floats:
+    def made(name: str, *options: str) -> FloatArray:
         assert main(["simulate", "two_body", *options, "-o", str(tmp_path / name)]) == 0
         return rows(tmp_path / name)
 
@@ -440,7 +440,7 @@ def test_an_interrupt_ends_it_all() -> None:
     case = case_of("pendulum")
     calls = 0
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         nonlocal calls
         calls += 1
         if calls == 500:

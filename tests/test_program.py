@@ -28,7 +28,7 @@ from eomgen.scene.reader import parse_scene
 TREES = some((4, 9, 22, 37), (4, 9, 22, 38))
 
 
-class Floats:
+class DoubleScalars:
     """Doubles as scalars of a program."""
 
     def number(self, value: float) -> float:
@@ -255,8 +255,8 @@ def test_factored_sums() -> None:
     assert reports[0].jacobian == 6
     assert reports[-1].jacobian == 4  # (x - y)·b, (a + b)·b
     inputs = {"a": 3.0, "b": 2.0, "x": 5.0, "y": 7.0}
-    assert interpret(better, "derivative", inputs, Floats()) == [36.0, 15.0, 21.0]
-    assert interpret(better, "jacobian", inputs, Floats()) == [-4.0, 10.0]
+    assert interpret(better, "derivative", inputs, DoubleScalars()) == [36.0, 15.0, 21.0]
+    assert interpret(better, "jacobian", inputs, DoubleScalars()) == [-4.0, 10.0]
 
 
 # The Jacobian transform.
@@ -293,7 +293,7 @@ def test_jacobian_of_each_operation(build: Callable, slopes: Callable) -> None:
     [row] = jacobian([build(x, y)], [x, y])
     program = finish(tape, {"row": Output((2,), tuple(node.index for node in row))}, ())
     for a, b in ((0.6, 1.7), (1.1, 0.4)):
-        values = interpret(program, "row", {"x": a, "y": b, "z": 0.25}, Floats())
+        values = interpret(program, "row", {"x": a, "y": b, "z": 0.25}, DoubleScalars())
         assert values == pytest.approx([float(s) for s in slopes(a, b)], rel=1e-14, abs=1e-14)
 
 
@@ -319,7 +319,9 @@ def test_printed_code_is_the_program(case: str | int) -> None:
         inputs = {**c.module.PARAMETERS, **dict(zip(c.module.STATES, y.tolist(), strict=True)), **u}
         for output in ("derivative", "jacobian", "joint_forces", "momentum", "mass_matrix"):
             ours = getattr(c.module, output)(0.0, y, u=u)
-            assert ours.ravel().tolist() == interpret(c.system.program, output, inputs, Floats())
+            assert ours.ravel().tolist() == interpret(
+                c.system.program, output, inputs, DoubleScalars()
+            )
 
 
 def test_columns_are_the_same_code() -> None:

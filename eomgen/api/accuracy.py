@@ -23,7 +23,7 @@ from eomgen.store import folder
 from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
-    from eomgen.run.problem import Floats
+    from eomgen.run.problem import FloatArray
     from eomgen.study.accuracy.ladder import Ladder, Rung, Work
     from eomgen.study.accuracy.reference import Reference
     from eomgen.study.accuracy.work_precision import Bench
@@ -257,13 +257,13 @@ def _bench(
     p = own.defaults
     values = (parameters or None, inputs or None)
 
-    def kinetic(t: "Floats", y: "Floats") -> "Floats":
+    def kinetic(t: "FloatArray", y: "FloatArray") -> "FloatArray":
         return np.asarray(module.kinetic_energy(t, y.T, p))
 
-    def energy(t: "Floats", y: "Floats") -> "Floats":
+    def energy(t: "FloatArray", y: "FloatArray") -> "FloatArray":
         return np.asarray(kinetic(t, y) + module.potential_energy(t, y.T, p))
 
-    def gap(t: "Floats", y: "Floats") -> "Floats":
+    def gap(t: "FloatArray", y: "FloatArray") -> "FloatArray":
         poses = np.moveaxis(module.body_poses(t, y.T, p), -1, 0)
         return np.asarray(np.max(joint_drift(own, poses), axis=1, initial=0.0))
 

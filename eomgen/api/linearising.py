@@ -13,7 +13,7 @@ from eomgen.api.manner import SILENT, Manner
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class About:
     """
 
     module: GeneratedModule
-    start: Floats
+    start: FloatArray
     whole: "Linearisation"
     steady: bool
 
@@ -104,7 +104,7 @@ def linearised_about(
     with manner.located():
         problem = problem_of(module, given or None, pushes or None, model)
         y = start = _state(model, problem.initial, state, at, manner)
-        u: Mapping[str, float] | Floats = pushes
+        u: Mapping[str, float] | FloatArray = pushes
         if at != "initial":
             settle = at == "rest"
             y, u = equilibrium(module, y, pushes, given, hold=hold, trim=trim, settle=settle)
@@ -127,8 +127,8 @@ def state_names(model: Model) -> tuple[str, ...]:
 
 
 def _state(
-    model: Model, initial: Floats, state: Values | None, at: Place, manner: Manner
-) -> Floats:
+    model: Model, initial: FloatArray, state: Values | None, at: Place, manner: Manner
+) -> FloatArray:
     """The initial state with what is to be another, quaternions scaled with a notice."""
     option, names = manner.option("state"), state_names(model)
     nq, nv = len(model.coordinates), len(model.velocities)

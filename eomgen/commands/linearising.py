@@ -22,7 +22,7 @@ from eomgen.linear.linearise import Linearisation, rate_unit, save
 from eomgen.linear.modes import Mode
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 WIDEST = 12
 """States up to which A and B are printed."""
@@ -118,7 +118,7 @@ def _print_place(
         )
 
 
-def _print_stopped(model: Model, start: Floats) -> None:
+def _print_stopped(model: Model, start: FloatArray) -> None:
     """Say which velocities of the state given an equilibrium does not have."""
     rates = start[len(model.coordinates) :].tolist()
     moving = [
@@ -143,7 +143,9 @@ def _print_matrices(least: Linearisation) -> None:
         _print_matrix("B", least.B, names, least.input_names)
 
 
-def _print_matrix(label: str, matrix: Floats, rows: Sequence[str], columns: Sequence[str]) -> None:
+def _print_matrix(
+    label: str, matrix: FloatArray, rows: Sequence[str], columns: Sequence[str]
+) -> None:
     rounding = 1e-14 * float(np.max(np.abs(matrix), initial=0.0))
     cells = [[_number(x if abs(x) > rounding else 0.0) for x in row] for row in matrix.tolist()]
     widths = [max(map(len, (name, *texts))) for name, *texts in zip(columns, *cells, strict=True)]

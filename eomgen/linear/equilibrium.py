@@ -16,7 +16,7 @@ from eomgen.linear.linearise import (
     tangents,
 )
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 MOST_STEPS = 60
 """Greatest number of steps to the nearest equilibrium; a near one takes few."""
@@ -40,13 +40,13 @@ LOST = 1e6
 class Equilibrium(NamedTuple):
     """A state `y` (ny,) at rest that does not change under the inputs `u` (nu,), SI units."""
 
-    y: Floats
-    u: Floats
+    y: FloatArray
+    u: FloatArray
 
 
 def equilibrium(
     module: GeneratedModule,
-    guess: Floats,
+    guess: FloatArray,
     u: Any = None,
     p: Any = None,
     *,
@@ -84,9 +84,9 @@ class _Place:
     rates of velocities and of controller states.
     """
 
-    y: Floats
-    u: Floats
-    changes: Floats
+    y: FloatArray
+    u: FloatArray
+    changes: FloatArray
 
     @property
     def largest(self) -> float:
@@ -118,7 +118,7 @@ class _Search:
         self.free = np.flatnonzero(np.concatenate([~held, trimmed]))
         self.moving = np.flatnonzero(~held)
 
-    def look(self, y: Floats, u: Floats) -> _Place:
+    def look(self, y: FloatArray, u: FloatArray) -> _Place:
         """The place at the positions of `y`, with velocities 0 and quaternions normalised."""
         if not np.isfinite(y).all():
             raise RunError("equilibrium: the positions are not finite; start elsewhere")
@@ -128,7 +128,7 @@ class _Search:
             y[list(indices)] /= np.linalg.norm(y[list(indices)])
         return _Place(y, u, self._asked(self._module.derivative, y, u)[self._nq :])
 
-    def slopes(self, place: _Place) -> Floats:
+    def slopes(self, place: _Place) -> FloatArray:
         """Derivatives of the changes with respect to the free unknowns, (nv + nx, nf)."""
         by_state = self._asked(self._module.jacobian, place.y, place.u)[self._nq :]
         by_position = by_state[:, : self._nq] @ self._tangents(place)
@@ -138,16 +138,16 @@ class _Search:
         by_input = self._asked(input_jacobian(self._module), place.y, place.u)[self._nq :]
         return np.hstack([by_place, by_input])[:, self.free]
 
-    def at_rest(self, place: _Place, slopes: Floats | None = None) -> bool:
+    def at_rest(self, place: _Place, slopes: FloatArray | None = None) -> bool:
         """Whether the changes that are left are rounding errors."""
         slopes = self.slopes(place) if slopes is None else slopes
         return place.largest <= CLOSE * max(1.0, float(np.max(np.abs(slopes), initial=0.0)))
 
-    def turn(self, step: Floats) -> float:
+    def turn(self, step: FloatArray) -> float:
         """The greatest rotation in a step of the moving unknowns, rad."""
         return float(np.max(np.abs(step[self._turns[self.moving]]), initial=0.0))
 
-    def moved(self, place: _Place, step: Floats) -> _Place:
+    def moved(self, place: _Place, step: FloatArray) -> _Place:
         """The place after a step of the free unknowns, shortened if a rotation is too large."""
         nv, inputs = self._nv, self._nv + self._nx
         whole = np.zeros(inputs + len(place.u))
@@ -159,10 +159,12 @@ class _Search:
         y[self._nq + nv :] += whole[nv:inputs]
         return self.look(y, place.u + whole[inputs:])
 
-    def _tangents(self, place: _Place) -> Floats:
+    def _tangents(self, place: _Place) -> FloatArray:
         return tangents(place.y[: self._nq], self._module.QUATERNIONS)
 
-    def _asked(self, function: Callable[..., Floats], y: Floats, u: Floats) -> Floats:
+    def _asked(
+        self, function: Callable[..., FloatArray], y: FloatArray, u: FloatArray
+    ) -> FloatArray:
         return evaluated(function, y, self._p, u, "equilibrium")
 
 
@@ -229,12 +231,12 @@ def _fallen(search: _Search, place: _Place) -> _Place:
 
 
 def _implicit_step(
-    search: _Search, place: _Place, square: Floats, duration: float
-) -> tuple[Floats, float]:
+    search: _Search, place: _Place, square: FloatArray, duration: float
+) -> tuple[FloatArray, float]:
     """A step of the overdamped motion, and its duration, reduced if a rotation is too large."""
     while True:
         matrix = np.eye(len(square)) / duration - square
-        step: Floats = np.linalg.lstsq(matrix, place.changes[search.moving])[0].astype(float)
+        step: FloatArray = np.linalg.lstsq(matrix, place.changes[search.moving])[0].astype(float)
         turn = search.turn(step)
         if not turn > LONGEST_FALL:
             return step, duration
@@ -278,7 +280,7 @@ def _trimmed(module: GeneratedModule, names: Iterable[str]) -> NDArray[np.bool_]
     return np.array([name in set(names) for name in module.INPUTS], dtype=np.bool_)
 
 
-def _not_found(module: GeneratedModule, place: _Place, slopes: Floats) -> str:
+def _not_found(module: GeneratedModule, place: _Place, slopes: FloatArray) -> str:
     worst = int(np.argmax(np.abs(place.changes)))
     name = module.STATES[len(module.POSITIONS) + worst]
     left = f"{name} still changes by {place.changes[worst]:.4g} {rate_unit(module.UNITS[name])}"

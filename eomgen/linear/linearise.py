@@ -12,7 +12,7 @@ from eomgen.errors import RunError
 from eomgen.files import write_whole
 from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 FORMAT = "linearisation 1"
 BOUND = 1e100
@@ -35,13 +35,13 @@ class Linearisation:
     quaternions          indices into the deviations of each unit quaternion among them
     """
 
-    A: Floats
-    B: Floats
+    A: FloatArray
+    B: FloatArray
     state_names: tuple[str, ...]
     input_names: tuple[str, ...]
-    y: Floats
-    u: Floats
-    rates: Floats
+    y: FloatArray
+    u: FloatArray
+    rates: FloatArray
     quaternions: tuple[tuple[int, int, int, int], ...]
 
     def reduced(self) -> "Linearisation":
@@ -85,7 +85,9 @@ class Linearisation:
         return controllable_rank(least.A, least.B)
 
 
-def linearise(module: GeneratedModule, y: Floats, u: Any = None, p: Any = None) -> Linearisation:
+def linearise(
+    module: GeneratedModule, y: FloatArray, u: Any = None, p: Any = None
+) -> Linearisation:
     """Linearise a module of form [q, v] about the state `y` (ny,), SI units.
 
     `u` and `p` are inputs and parameters as the module takes them: None, by name, or in order.
@@ -145,7 +147,9 @@ def is_steady(module: GeneratedModule, made: Linearisation, p: Any = None) -> bo
     return all(float(np.max(np.abs(part), initial=0.0)) <= _STEADY * size for part in left)
 
 
-def evaluated(function: Callable[..., Floats], y: Floats, p: Any, u: Floats, what: str) -> Floats:
+def evaluated(
+    function: Callable[..., FloatArray], y: FloatArray, p: Any, u: FloatArray, what: str
+) -> FloatArray:
     """A function of a module at a state. Raises `RunError` if it fails or is not finite."""
     try:
         with np.errstate(all="ignore"):
@@ -157,11 +161,11 @@ def evaluated(function: Callable[..., Floats], y: Floats, p: Any, u: Floats, wha
     return result
 
 
-def input_jacobian(module: GeneratedModule) -> Callable[..., Floats]:
+def input_jacobian(module: GeneratedModule) -> Callable[..., FloatArray]:
     """∂ẏ/∂u of a module as a function of t, y, p, u. Raises `RunError` if it has none."""
     if not module.INPUTS:
         return lambda t, y, p, u: np.zeros((len(y), 0))
-    function: Callable[..., Floats] | None = getattr(module, "input_jacobian", None)
+    function: Callable[..., FloatArray] | None = getattr(module, "input_jacobian", None)
     if function is None:
         raise RunError(
             "linearise: the module has no input_jacobian; generate it with --outputs input_jacobian"
@@ -176,7 +180,7 @@ def rate_unit(unit: str) -> str:
     return unit.removesuffix(" s") if unit.endswith(" s") else f"{unit or '1'}/s"
 
 
-def input_values(module: GeneratedModule, u: Any) -> Floats:
+def input_values(module: GeneratedModule, u: Any) -> FloatArray:
     """Inputs as an array (nu,) in the module's order: from None (all 0), a mapping, or an array."""
     if u is None:
         u = {}
@@ -193,8 +197,8 @@ def input_values(module: GeneratedModule, u: Any) -> Floats:
 
 
 def tangents(
-    y: Floats, quaternions: tuple[tuple[int, int, int, int], ...], plain: float = 1.0
-) -> Floats:
+    y: FloatArray, quaternions: tuple[tuple[int, int, int, int], ...], plain: float = 1.0
+) -> FloatArray:
     """T (ny, n) of δy = T δx: `plain` for each scalar state, q (0, δr)/2 for each quaternion."""
     firsts = {indices[0]: indices for indices in quaternions}
     rest = {i for indices in quaternions for i in indices}

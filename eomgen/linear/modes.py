@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 SLOW = 1e-7
 """Smaller rates, 1/s, count as 0: rounding splits the double eigenvalue 0 of a motion without force
@@ -35,7 +35,7 @@ class Mode:
         return -self.rate / size if size else 0.0
 
 
-def modes(a: Floats) -> list[Mode]:
+def modes(a: FloatArray) -> list[Mode]:
     """The modes of ẋ = a x, sorted by falling growth rate, then by rising frequency."""
     values = np.linalg.eigvals(a) if a.size else np.zeros(0, complex)
     small = max(SLOW, FINE * float(np.max(np.abs(values), initial=0.0)))
@@ -55,7 +55,7 @@ def stability(found: list[Mode]) -> str:
     return "stable" if all(mode.rate < 0 for mode in found) else "marginal"
 
 
-def controllable_rank(a: Floats, b: Floats) -> int:
+def controllable_rank(a: FloatArray, b: FloatArray) -> int:
     """Dimension of the controllable subspace: the rank of [b, a b, a² b, …].
 
     It is the size of an orthonormal basis that is extended by `a` times its newest part: the powers

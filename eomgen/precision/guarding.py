@@ -10,7 +10,7 @@ from eomgen.precision.precise import digits, precise
 from eomgen.program.program import Program
 from eomgen.run.guard import LOST, Guard
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 
 def guard_of(
@@ -28,7 +28,7 @@ def guard_of(
     initial = module.initial_state(parameters)
     exactly = precise(program, module, parameters, inputs, initial, bits=BITS)
 
-    def exact(t: float, y: Floats) -> Floats:
+    def exact(t: float, y: FloatArray) -> FloatArray:
         with digits(BITS):
             rates = exactly.derivative(mpfr(t), [mpfr(x) for x in y.tolist()])
             return np.array([float(rate) for rate in rates])

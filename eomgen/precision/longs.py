@@ -8,7 +8,7 @@ import gmpy2
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.scalars.extended import MP
 
 BITS = MP.prec
@@ -73,6 +73,6 @@ def solved(matrix: Array, right: Array) -> Array:
     return b
 
 
-def doubles(values: Any) -> Floats:
+def doubles(values: Any) -> FloatArray:
     """Long numbers rounded to doubles."""
     return np.asarray(values).astype(float)

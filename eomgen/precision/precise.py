@@ -15,7 +15,7 @@ from gmpy2 import mpfr
 from eomgen.program.kernel import kernel
 from eomgen.program.program import Program
 from eomgen.program.tape import TIME
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.scalars.extended import BY_MPFR, Bits
 from eomgen.scalars.functions import CORNERS
 
@@ -83,7 +83,7 @@ def precise(
     module: Any,
     parameters: Any,
     inputs: Any,
-    initial: Floats,
+    initial: FloatArray,
     *,
     watched: bool = False,
     bits: int = BITS,

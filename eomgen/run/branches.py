@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from eomgen.run.problem import Floats, Problem, Switching
+from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.schedule import Schedule
 
 MOST_EVALUATIONS = 200
@@ -54,11 +54,11 @@ _TO_BERNSTEIN = np.linalg.inv(
 )
 _TO_CHEBYSHEV = np.linalg.inv(np.polynomial.chebyshev.chebvander(2 * _AT - 1, _LAST))
 
-States = Callable[[Any], Floats]
+States = Callable[[Any], FloatArray]
 """The states (n, ny) at times (n,) within a step, or that (ny,) at a single one."""
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
-_Part = tuple[float, float, Floats, Indices]
+_Part = tuple[float, float, FloatArray, Indices]
 """From which share of a step to which; values (5, n) of functions there, and their numbers (n,)."""
 
 
@@ -68,8 +68,8 @@ class Made:
 
     start: float
     end: float
-    first: Floats
-    last: Floats
+    first: FloatArray
+    last: FloatArray
     states: States
 
     @property
@@ -103,11 +103,11 @@ class Lookout:
 
     problem: Problem
     switching: Switching
-    allowed: Callable[[Floats], Floats]
+    allowed: Callable[[FloatArray], FloatArray]
     unseen: float
     sees_end: bool = True
     turned: float = -math.inf
-    _ends: list[tuple[float, Floats]] = field(default_factory=list, repr=False)
+    _ends: list[tuple[float, FloatArray]] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:
         of_time = self.switching.of_time
@@ -226,7 +226,9 @@ class _Search:
     ends  the last steps' ends and the functions there, the one that this step starts at the last
     """
 
-    def __init__(self, switching: Switching, made: Made, ends: list[tuple[float, Floats]]) -> None:
+    def __init__(
+        self, switching: Switching, made: Made, ends: list[tuple[float, FloatArray]]
+    ) -> None:
         assert switching.of_state is not None
         self.made, self._function, self._left = made, switching.of_state, MOST_EVALUATIONS
         known = bool(ends) and ends[-1][0] == made.start
@@ -248,7 +250,7 @@ class _Search:
             return False
         return not self._timed or self._is_quiet(a)
 
-    def _is_quiet(self, a: Floats) -> bool:
+    def _is_quiet(self, a: FloatArray) -> bool:
         """Whether time alone does not move the functions much within the step: what is periodic
         may be the same at all ends of steps.
         """
@@ -296,7 +298,9 @@ class _Search:
             parts.append((a, b, self._part(a, b, at_marks[i], at_marks[i + 1], asked), asked))
         return parts
 
-    def _part(self, a: float, b: float, start: Floats, end: Floats, asked: Indices) -> Floats:
+    def _part(
+        self, a: float, b: float, start: FloatArray, end: FloatArray, asked: Indices
+    ) -> FloatArray:
         """Values (5, n) of some functions over a part, from those at its ends."""
         within = self._at(a + (b - a) * _AT[1:-1])
         return np.vstack((start, within[:, asked], end))
@@ -313,7 +317,7 @@ class _Search:
             return bracket.start if first == 0 else bracket.end
         return float(brentq(value, bracket.start, bracket.end, xtol=1e-12 * made.length))
 
-    def _at(self, shares: Floats) -> Floats:
+    def _at(self, shares: FloatArray) -> FloatArray:
         """Values (n, ns) at shares (n,) of the step."""
         if not shares.size:
             return np.empty((0, len(self.end[1])))
@@ -321,7 +325,7 @@ class _Search:
         pairs = zip(times.tolist(), self.made.states(times), strict=True)
         return np.array([self._value(t, y) for t, y in pairs])
 
-    def _value(self, t: float, y: Floats) -> Floats:
+    def _value(self, t: float, y: FloatArray) -> FloatArray:
         """Values (ns,) at a time; nan where they have none."""
         self._left -= 1
         try:
@@ -330,7 +334,7 @@ class _Search:
             return np.full(len(self.start[1]), np.nan)
 
 
-def _judged(values: Floats) -> tuple[Flags, Flags]:
+def _judged(values: FloatArray) -> tuple[Flags, Flags]:
     """Of functions with `values` (5, n) in a part: those (n,) that are monotone there and pass 0,
     and those that are neither monotone nor free of zeros, as far as can be told.
 
@@ -346,6 +350,6 @@ def _judged(values: Floats) -> tuple[Flags, Flags]:
     return passing, ~(free | monotone)
 
 
-def _changes(values: Floats) -> Flags:
+def _changes(values: FloatArray) -> Flags:
     """Whether functions have another sign at the end of a part; 0 counts as negative."""
     return np.asarray((values[0] > 0) != (values[-1] > 0))

@@ -7,7 +7,7 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.run.integrators import INTEGRATORS, FixedStep, fixed_step
 from eomgen.run.noise import least_tolerance
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 SMALLEST_RTOL = 2.3e-14
 """SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
@@ -40,14 +40,14 @@ def check_times(t_start: float, t_end: float) -> None:
         raise RunError(f"t_end: {t_end:g} is not after t_start = {t_start:g}")
 
 
-def numbers(**values: float | None) -> dict[str, Floats]:
+def numbers(**values: float | None) -> dict[str, FloatArray]:
     """Numbers as arrays, nan for none."""
     return {name: np.array(math.nan if x is None else x) for name, x in values.items()}
 
 
 def allowed_errors(
     problem: Problem, method: str, rtol: float, atol: float | None, span: float
-) -> float | Floats:
+) -> float | FloatArray:
     """The absolute tolerance, of each state where none was given and they have sizes."""
     if atol is not None:
         return atol

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 ROUNDING = 1e-10
 """What counts as zero, beside the largest offset or force."""
@@ -11,7 +11,7 @@ CONSISTENT = 1e-6
 """What a redundant set of contacts may leave of its accelerations, beside the largest offset."""
 
 
-def complementary(matrix: Floats, offset: Floats) -> Floats | None:
+def complementary(matrix: FloatArray, offset: FloatArray) -> FloatArray | None:
     """Return f (n,) with 0 <= f, 0 <= a = matrix f + offset, f_i a_i = 0; None if none is found.
 
     Murty's least-index principal pivoting, then, where that turns in circles, Lemke's method:
@@ -40,14 +40,14 @@ def complementary(matrix: Floats, offset: Floats) -> Floats | None:
     return _lemke(matrix, offset, scale)
 
 
-def _least(matrix: Floats, wanted: Floats) -> Floats:
+def _least(matrix: FloatArray, wanted: FloatArray) -> FloatArray:
     """The least solution of matrix x = wanted, nearest where there is none."""
     if len(wanted) == 1 and matrix[0, 0]:
         return np.asarray(wanted / matrix[0])
     return np.asarray(np.linalg.lstsq(matrix, wanted, rcond=ROUNDING)[0])
 
 
-def _lemke(matrix: Floats, offset: Floats, scale: float) -> Floats | None:
+def _lemke(matrix: FloatArray, offset: FloatArray, scale: float) -> FloatArray | None:
     """Lemke's method: an artificial variable makes everything feasible, then is driven out."""
     n = len(offset)
     # Columns: a (0 … n-1), f (n … 2n-1), the artificial one, the right-hand side.

@@ -14,7 +14,7 @@ import numpy as np
 
 from eomgen.run.complementarity import complementary
 from eomgen.run.integrators.interface import StepFailure
-from eomgen.run.problem import Contacts, Floats, Problem
+from eomgen.run.problem import Contacts, FloatArray, Problem
 
 TOLERANCE = 1e-9
 """In sizes: contacts this close touch, and may start this deep."""
@@ -44,7 +44,7 @@ BOUNCES, STRIKES = 100, 5000
 _CUBE_ROOT = np.finfo(float).eps ** (1 / 3)
 
 
-Rate = Callable[[float, Floats], Floats]
+Rate = Callable[[float, FloatArray], FloatArray]
 """A function of time and state, such as the derivative."""
 
 
@@ -54,7 +54,7 @@ def in_sizes(contacts: Contacts) -> Contacts:
     if (sizes == 1).all():
         return contacts
 
-    def held(t: float, y: Floats, forces: Floats) -> Floats:
+    def held(t: float, y: FloatArray, forces: FloatArray) -> FloatArray:
         found = contacts.held(t, y, forces)
         shape = (len(sizes), *([1] * (found.ndim - 1)))
         found[len(y) : len(y) + len(sizes)] /= sizes.reshape(shape)
@@ -68,7 +68,7 @@ def in_sizes(contacts: Contacts) -> Contacts:
     )
 
 
-def recovery(contacts: Contacts, t: float, y: Floats, span: float) -> float:
+def recovery(contacts: Contacts, t: float, y: FloatArray, span: float) -> float:
     """The rate at which contacts recover from drift, 1/s, in a run of `span` s: `ALPHA` times that
     of the motion at its start, √(a/size) of what accelerates the gaps, or v/size.
     """
@@ -76,18 +76,18 @@ def recovery(contacts: Contacts, t: float, y: Floats, span: float) -> float:
     return ALPHA * max(math.sqrt(pressed(contacts, t, y)), fastest, 1 / span)
 
 
-def pressed(contacts: Contacts, t: float, y: Floats) -> float:
+def pressed(contacts: Contacts, t: float, y: FloatArray) -> float:
     """The greatest acceleration of any gap, either way, without contact forces: sizes/s²."""
     return float(np.abs(accelerations(contacts, t, y)).max())
 
 
-def accelerations(contacts: Contacts, t: float, y: Floats) -> Floats:
+def accelerations(contacts: Contacts, t: float, y: FloatArray) -> FloatArray:
     """Those of the gaps (nc,), without contact forces: sizes/s²."""
     count = len(contacts.names)
     return contacts.held(t, y, np.zeros(count))[len(y) : len(y) + count]
 
 
-def slowest_bounces(free: Floats, rest_speed: Floats | None) -> Floats:
+def slowest_bounces(free: FloatArray, rest_speed: FloatArray | None) -> FloatArray:
     """With what speed each contact must close to bounce (nc,), sizes/s: `rest_speed` if given, or
     that from which the bounce rises by `RISE` under the accelerations `free` of the gaps.
 
@@ -110,7 +110,7 @@ class Holding:
 
     contacts: Contacts
     held: tuple[int, ...]
-    start: tuple[float, Floats]
+    start: tuple[float, FloatArray]
     alpha: float
 
     @cached_property
@@ -126,7 +126,7 @@ class Holding:
         return (self.alpha / ALPHA) ** 2
 
     @cached_property
-    def units(self) -> Floats:
+    def units(self) -> FloatArray:
         """Forces (nh,) that accelerate each gap about as all else does: differences keep their
         digits.
         """
@@ -134,7 +134,7 @@ class Holding:
         own = np.abs(np.diagonal(matrix)) / STRONG
         return self.pressed / np.where(own > 0, own, self.pressed)
 
-    def solve(self, t: float, y: Floats) -> tuple[Floats, Floats, Floats]:
+    def solve(self, t: float, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return what `Contacts.held` gives (ny + 2 nc + nd,), and (nh,) each: forces times what
         they do to their own gaps, and a, or 0 where that is nothing beside what else accelerates.
 
@@ -155,11 +155,11 @@ class Holding:
         left[np.abs(left) <= PARTING * usual] = 0.0
         return result, forces * np.diagonal(matrix), left
 
-    def derivative(self, t: float, y: Floats) -> Floats:
+    def derivative(self, t: float, y: FloatArray) -> FloatArray:
         """The state's derivative (ny,) under the contacts' forces."""
         return self.solve(t, y)[0][: len(y)]
 
-    def powers(self, t: float, y: Floats) -> Floats:
+    def powers(self, t: float, y: FloatArray) -> FloatArray:
         """What the contacts' forces and the drives do (nc + nd,), W."""
         return self.solve(t, y)[0][len(y) + len(self.contacts.names) :]
 
@@ -169,7 +169,9 @@ class Holding:
         states = len(self.start[1])
         return slice(states, states + len(self.contacts.names))
 
-    def _system(self, t: float, y: Floats, units: Floats) -> tuple[Floats, Floats, Floats]:
+    def _system(
+        self, t: float, y: FloatArray, units: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Matrix and offset of a, and the columns that `Contacts.held` gives: under no force, and
         under the unit of each.
         """
@@ -200,7 +202,7 @@ def restrained(
     )
 
 
-def _differences(derivative: Rate, sizes: Floats, t: float, y: Floats) -> Floats:
+def _differences(derivative: Rate, sizes: FloatArray, t: float, y: FloatArray) -> FloatArray:
     """Derivatives (ny, ny) of a derivative by a state of such sizes, by central differences."""
     steps = _CUBE_ROOT * np.maximum(sizes, np.abs(y))
     columns = [derivative(t, y + change) - derivative(t, y - change) for change in np.diag(steps)]
@@ -210,11 +212,11 @@ def _differences(derivative: Rate, sizes: Floats, t: float, y: Floats) -> Floats
 def strikes(
     contacts: Contacts,
     t: float,
-    y: Floats,
+    y: FloatArray,
     touching: Sequence[int],
-    least: Floats,
+    least: FloatArray,
     nothing: float,
-) -> Iterator[tuple[int, float, Floats]]:
+) -> Iterator[tuple[int, float, FloatArray]]:
     """Yield what strikes at one moment: contact, speed with which it closed, state after it.
 
     Of those in `touching` the one that closes fastest strikes, again and again, until none closes
@@ -241,7 +243,7 @@ def strikes(
 def still(
     contacts: Contacts,
     t: float,
-    y: Floats,
+    y: FloatArray,
     touching: Sequence[int],
     nothing: float,
     alpha: float,
@@ -257,7 +259,7 @@ def still(
     return [k for k, push, part in zip(slow, pushes, parts, strict=True) if push > 0 or part <= 0]
 
 
-def check_depth(contacts: Contacts, t: float, y: Floats) -> None:
+def check_depth(contacts: Contacts, t: float, y: FloatArray) -> None:
     """Raise `StepFailure` if a contact is deeper than `TOLERANCE`."""
     gaps = contacts.gaps(t, y)
     deepest = int(np.argmin(gaps))

@@ -34,7 +34,7 @@ from eomgen.run.contacts import (
     strikes,
 )
 from eomgen.run.integrators.interface import Advance, Begin, Resume, StepFailure
-from eomgen.run.problem import Contacts, Floats, Problem
+from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import Event
 
 MOST_EVENTS = 10_000
@@ -68,9 +68,9 @@ class _Moment:
     """
 
     t: float
-    y: Floats
+    y: FloatArray
     held: tuple[int, ...]
-    slack: Floats
+    slack: FloatArray
     fastest: float
 
 
@@ -167,7 +167,7 @@ def advances(
 
 
 def _resume(
-    step: Advance, now: _Moment, begun: tuple[float, Floats], alpha: float
+    step: Advance, now: _Moment, begun: tuple[float, FloatArray], alpha: float
 ) -> Callable[[], Resume] | None:
     """What a step goes on from, with what contacts do."""
     if step.resume is None:
@@ -245,7 +245,7 @@ def _open(contacts: Contacts, problem: Problem, now: _Moment, opened: Sequence[i
     return Advance(now.t, y, [], problem, lambda _: y, is_step=False, events=events)
 
 
-def _slack(contacts: Contacts, t: float, y: Floats, contact: int) -> float:
+def _slack(contacts: Contacts, t: float, y: FloatArray, contact: int) -> float:
     """How far below 0 a contact that opens may be: `TOLERANCE`, or hardly more than it is now."""
     return max(TOLERANCE, 0.01 * TOLERANCE - float(contacts.gaps(t, y)[contact]))
 
@@ -270,7 +270,7 @@ def _closing(
         return np.inf, []
     length, slack = step.t - now.t, now.slack.copy()
 
-    def state(s: float) -> Floats:
+    def state(s: float) -> FloatArray:
         return now.y if s <= 0 else step.y if s >= length else step.within(now.t + s)
 
     def gap(k: int, s: float) -> float:
@@ -279,7 +279,7 @@ def _closing(
     def rate(k: int, s: float) -> float:
         return float(contacts.rates(now.t + s, state(s))[k])
 
-    def look(s: float) -> tuple[float, Floats, Floats]:
+    def look(s: float) -> tuple[float, FloatArray, FloatArray]:
         y = state(s)
         return s, contacts.gaps(now.t + s, y), contacts.rates(now.t + s, y)
 

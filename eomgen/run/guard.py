@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from eomgen.run.integrators.interface import Advance, Begin, StepFailure
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 LOST = 1e-8
 """Relative error of a derivative at which digits count as lost, unless the run is held tighter."""
@@ -42,7 +42,7 @@ class Guard:
     repairs  go on by `exact` where digits are lost, instead of stopping
     """
 
-    exact: Callable[[float, Floats], Floats]
+    exact: Callable[[float, FloatArray], FloatArray]
     groups: tuple[tuple[int, ...], ...]
     bound: float = LOST
     repairs: bool = False
@@ -63,11 +63,11 @@ class Watch:
     stretches: list[tuple[float, float, float]] = field(default_factory=list)
     _sizes: list[float] = field(default_factory=list)
 
-    def derivative(self, t: float, y: Floats) -> Floats:
+    def derivative(self, t: float, y: FloatArray) -> FloatArray:
         """f(t, y) as the run takes it now."""
         return self.guard.exact(t, y) if self.repairing else self.problem.derivative(t, y)
 
-    def loss(self, t: float, y: Floats) -> float:
+    def loss(self, t: float, y: FloatArray) -> float:
         """Relative error of the problem's own derivative; infinite where it is not finite.
 
         Raises `StepFailure` where there is no value in long numbers either, and for a quaternion
@@ -126,7 +126,9 @@ class Watch:
         )
 
 
-def watched(watch: Watch, advances: Iterator[Advance], t: float, y: Floats) -> Iterator[Advance]:
+def watched(
+    watch: Watch, advances: Iterator[Advance], t: float, y: FloatArray
+) -> Iterator[Advance]:
     """The same steps. Raises `StepFailure` before the first whose end has lost digits."""
     _check(watch, watch.loss(t, y))
     for advance in advances:

@@ -12,7 +12,7 @@ from eomgen.run.checks import check_repairs, check_rest_speed, numbers
 from eomgen.run.guard import OF_TOLERANCE, Guard, Watch, repaired, watched
 from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.stepping import ANEW, Asked, adaptive_steps, begun, can_go_on, equal_steps
 from eomgen.run.tally import Tally
@@ -189,12 +189,14 @@ class _Count:
 
     axes: int
     calls: int = 0
-    failed: tuple[float, Floats] | None = None
+    failed: tuple[float, FloatArray] | None = None
 
-    def of(self, function: Callable[[float, Floats], Floats]) -> Callable[[float, Floats], Floats]:
+    def of(
+        self, function: Callable[[float, FloatArray], FloatArray]
+    ) -> Callable[[float, FloatArray], FloatArray]:
         """The same function, its calls counted here."""
 
-        def counted(t: float, y: Floats) -> Floats:
+        def counted(t: float, y: FloatArray) -> FloatArray:
             self.calls += 1
             try:
                 return function(t, y)
@@ -212,10 +214,10 @@ class _Run:
     """How far a run has come: time and state, rows kept and works there, steps made, events met."""
 
     t: float
-    y: Floats
+    y: FloatArray
     account: Account | None
-    rows: list[tuple[float, Floats]] = field(default_factory=list)
-    works: list[Floats] = field(default_factory=list)
+    rows: list[tuple[float, FloatArray]] = field(default_factory=list)
+    works: list[FloatArray] = field(default_factory=list)
     steps: int = 0
     capped: int = 0
     cut: int = 0

@@ -12,7 +12,7 @@ from eomgen.loading import load_source
 from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise
 from eomgen.run.origin import Origin
-from eomgen.run.problem import Contacts, Explain, Floats, Problem, Switching, unexplained
+from eomgen.run.problem import Contacts, Explain, FloatArray, Problem, Switching, unexplained
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
 
@@ -35,12 +35,12 @@ class GeneratedModule(Protocol):
     BODIES: tuple[str, ...]
     JOINTS: tuple[str, ...]
     COST: dict[str, dict[str, int]]
-    initial_state: Callable[..., Floats]
-    derivative: Callable[..., Floats]
-    jacobian: Callable[..., Floats]
-    kinetic_energy: Callable[..., Floats]
-    potential_energy: Callable[..., Floats]
-    body_poses: Callable[..., Floats]
+    initial_state: Callable[..., FloatArray]
+    derivative: Callable[..., FloatArray]
+    jacobian: Callable[..., FloatArray]
+    kinetic_energy: Callable[..., FloatArray]
+    potential_energy: Callable[..., FloatArray]
+    body_poses: Callable[..., FloatArray]
 
 
 def load_module(source: str, name: str = "generated") -> GeneratedModule:
@@ -55,8 +55,8 @@ def load_module(source: str, name: str = "generated") -> GeneratedModule:
     return cast(GeneratedModule, module)
 
 
-def _by_differences(module: GeneratedModule) -> Callable[[float, Floats], Floats]:
-    def jacobian(t: float, y: Floats) -> Floats:
+def _by_differences(module: GeneratedModule) -> Callable[[float, FloatArray], FloatArray]:
+    def jacobian(t: float, y: FloatArray) -> FloatArray:
         steps = 1e-7 * np.maximum(1.0, np.abs(y))
         ahead = module.derivative(t, y[:, None] + np.diag(steps))
         return np.asarray((ahead - module.derivative(t, y)[:, None]) / steps)
@@ -94,13 +94,13 @@ def as_problem(
         jacobian = getattr(module, "jacobian", _by_differences(module))
     else:
 
-        def exactly(t: float, y: Floats) -> Floats:
+        def exactly(t: float, y: FloatArray) -> FloatArray:
             return module.derivative(t, y, parameters, inputs)
 
-        def jacobian(t: float, y: Floats) -> Floats:
+        def jacobian(t: float, y: FloatArray) -> FloatArray:
             return module.jacobian(t, y, parameters, inputs)
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         try:
             return exactly(t, y)
         except FloatingPointError:  # y is so large that a method had better not have tried it

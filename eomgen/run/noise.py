@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 PROBES = 8
 """States about one, each a unit in the last place away, that the derivative is evaluated at."""
@@ -41,10 +41,10 @@ class Fast:
     """
 
     stiff: bool
-    noise: Floats
+    noise: FloatArray
 
 
-def fast(problem: Problem, states: Iterable[tuple[float, Floats]], span: float) -> Fast:
+def fast(problem: Problem, states: Iterable[tuple[float, FloatArray]], span: float) -> Fast:
     """What is fast at some times and states of a run of `span` s.
 
     Nothing is at a state where derivative or Jacobian have no finite value.
@@ -59,12 +59,12 @@ def fast(problem: Problem, states: Iterable[tuple[float, Floats]], span: float) 
 
 
 def step_noise(
-    derivative: Callable[[float, Floats], Floats],
-    jacobian: Callable[[float, Floats], Floats],
+    derivative: Callable[[float, FloatArray], FloatArray],
+    jacobian: Callable[[float, FloatArray], FloatArray],
     t: float,
-    y: Floats,
+    y: FloatArray,
     span: float,
-) -> Floats:
+) -> FloatArray:
     """The most that rounding of the derivative moves each state (ny,) in a step from `y` at `t`, as
     far as the motion is fast in a run of `span` s; else 0.
     """
@@ -82,12 +82,12 @@ def least_tolerance(method: str, rtol: float) -> float:
 
 
 def _looked_at(
-    derivative: Callable[[float, Floats], Floats],
-    jacobian: Callable[[float, Floats], Floats],
+    derivative: Callable[[float, FloatArray], FloatArray],
+    jacobian: Callable[[float, FloatArray], FloatArray],
     t: float,
-    y: Floats,
+    y: FloatArray,
     span: float,
-) -> tuple[NDArray[np.complex128], Floats]:
+) -> tuple[NDArray[np.complex128], FloatArray]:
     """The modes at a state, 1/s, and the noise of a step; none where there is no finite value."""
     random, nothing = np.random.default_rng(0), np.zeros_like(y)
     none = np.zeros(0, dtype=np.complex128), nothing

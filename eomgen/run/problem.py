@@ -11,14 +11,14 @@ from eomgen.errors import RunError
 from eomgen.run.intervals import Interval
 from eomgen.run.origin import Origin
 
-Floats = NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 """An array of 64-bit floats; every state vector is one."""
-Explain = Callable[[float, Floats, Floats], str]
+Explain = Callable[[float, FloatArray, FloatArray], str]
 """Of t, y and the initial y: what keeps the derivative at t, y from being finite or tame, and what
 to change, in words; "" if nothing is known of that."""
 
 
-def unexplained(t: float, y: Floats, initial: Floats) -> str:
+def unexplained(t: float, y: FloatArray, initial: FloatArray) -> str:
     """The `Explain` of those who know nothing but numbers."""
     return ""
 
@@ -47,10 +47,10 @@ class Contacts:
 
     names: tuple[str, ...]
     effects: tuple[str, ...]
-    gaps: Callable[[float, Floats], Floats]
-    rates: Callable[[float, Floats], Floats]
-    impact: Callable[[float, Floats, int, float], Floats]
-    held: Callable[[float, Floats, Floats], Floats]
+    gaps: Callable[[float, FloatArray], FloatArray]
+    rates: Callable[[float, FloatArray], FloatArray]
+    impact: Callable[[float, FloatArray, int, float], FloatArray]
+    held: Callable[[float, FloatArray, FloatArray], FloatArray]
     drives: tuple[str, ...] = ()
     sizes: tuple[float, ...] = ()
 
@@ -65,7 +65,7 @@ class Switching:
     of_time   those that depend on time alone, over an interval of it; None if there are none
     """
 
-    of_state: Callable[[float, Floats], Floats] | None = None
+    of_state: Callable[[float, FloatArray], FloatArray] | None = None
     timed: bool = False
     angles: tuple[int, ...] = ()
     of_time: Callable[[Interval], Sequence[Interval]] | None = None
@@ -103,9 +103,9 @@ class Problem:
     name: str
     states: tuple[str, ...]
     positions: tuple[int, ...]
-    derivative: Callable[[float, Floats], Floats]
-    jacobian: Callable[[float, Floats], Floats]
-    initial: Floats
+    derivative: Callable[[float, FloatArray], FloatArray]
+    jacobian: Callable[[float, FloatArray], FloatArray]
+    initial: FloatArray
     quaternions: tuple[tuple[int, int, int, int], ...] = ()
     contacts: Contacts | None = None
     explain: Explain = unexplained
@@ -113,7 +113,7 @@ class Problem:
     switching: Switching | None = None
     sizes: tuple[float, ...] = ()
     origin: Origin | None = None
-    noise: Callable[[float], Floats] | None = None
+    noise: Callable[[float], FloatArray] | None = None
     operations: Mapping[str, int] = field(default_factory=dict)
     columns: bool = False
 
@@ -138,7 +138,7 @@ class Problem:
         initial.flags.writeable = False
         object.__setattr__(self, "initial", initial)
 
-    def unit(self, y: Floats) -> Floats:
+    def unit(self, y: FloatArray) -> FloatArray:
         """Return the state `y` (ny,) with its quaternions scaled to unit length.
 
         The exact motion stays on that sphere; a step leaves it by its own error, and scaling, which

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 FAR = 64 * np.finfo(float).eps / 1e-9
 """Part of the farthest length that a size is at least: 1e-9 of it is then more than rounding."""
@@ -33,7 +33,7 @@ def mechanism_size(
 
 
 def state_sizes(
-    states: Sequence[str], units: Mapping[str, str], y: Floats, slope: Floats, size: float
+    states: Sequence[str], units: Mapping[str, str], y: FloatArray, slope: FloatArray, size: float
 ) -> tuple[float, ...]:
     """The size of each state (ny,): of a length that of the mechanism, m, of an angle 1, of
     velocities these times the rate of the motion, and of what else there is what it starts with.

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from eomgen.run.integrators.interface import Advance, EndedRunError
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
-Follow = Callable[[float, Floats], object]
+Follow = Callable[[float, FloatArray], object]
 """Told time, s, and state (ny,) after each step; what it returns ends the run if it is true."""
 
 
@@ -42,10 +42,10 @@ class Tally:
     held: int = 0
     looks: int = 0
     switches: int = 0
-    low: Floats | None = field(default=None, repr=False)
-    high: Floats | None = field(default=None, repr=False)
+    low: FloatArray | None = field(default=None, repr=False)
+    high: FloatArray | None = field(default=None, repr=False)
 
-    def begin(self, y: Floats) -> None:
+    def begin(self, y: FloatArray) -> None:
         """Take note of the initial state."""
         self.low = self.high = y
 
@@ -79,8 +79,8 @@ class Tally:
             switching = replace(switching, of_state=self._counted("switches", switching.of_state))
         return replace(problem, contacts=contacts, switching=switching)
 
-    def _counted(self, name: str, function: Callable[..., Floats]) -> Callable[..., Floats]:
-        def counted(*given: Any) -> Floats:
+    def _counted(self, name: str, function: Callable[..., FloatArray]) -> Callable[..., FloatArray]:
+        def counted(*given: Any) -> FloatArray:
             setattr(self, name, getattr(self, name) + 1)
             return function(*given)
 

@@ -13,7 +13,7 @@ from eomgen.errors import RunError
 from eomgen.files import is_ours, read_plain, write_whole
 from eomgen.run.archive import Array, checked, packed, unpacked
 from eomgen.run.origin import Origin
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 FORMAT = "trajectory 4"
 LARGEST = 2**32
@@ -83,16 +83,16 @@ class Trajectory:
 
     name: str
     states: tuple[str, ...]
-    t: Floats
-    y: Floats
+    t: FloatArray
+    y: FloatArray
     integrator: str
     finished: bool
     message: str
     counts: Mapping[str, int]
     events: tuple[Event, ...] = ()
-    works: Floats | None = None
+    works: FloatArray | None = None
     work_names: tuple[str, ...] = ()
-    resume: Mapping[str, Floats] = field(default_factory=dict)
+    resume: Mapping[str, FloatArray] = field(default_factory=dict)
     origin: Origin | None = None
     outcome: Outcome = Outcome()
 
@@ -260,7 +260,7 @@ def _origin(rest: dict[str, Array]) -> Origin:
     return Origin(dict(_strings(rest.pop("scene"), 2)), *values)
 
 
-def _floats(array: Array, dimensions: int | None = None) -> Floats:
+def _floats(array: Array, dimensions: int | None = None) -> FloatArray:
     """An array of doubles. Raises `ValueError` for any other."""
     if array.dtype != np.float64 or dimensions not in (None, array.ndim):
         raise ValueError("no doubles, or not in that shape")

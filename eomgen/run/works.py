@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.run.problem import Contacts, Floats, Problem
+from eomgen.run.problem import Contacts, FloatArray, Problem
 
 if TYPE_CHECKING:  # it loads SciPy, which a module that is generated alone does not need
     from eomgen.run.integrators.interface import Advance
@@ -36,11 +36,11 @@ class Powers:
     """
 
     names: tuple[str, ...]
-    powers: Callable[[float, Floats], Floats]
-    kinetic_energy: Callable[[float, Floats], float]
+    powers: Callable[[float, FloatArray], FloatArray]
+    kinetic_energy: Callable[[float, FloatArray], float]
 
 
-def _gauss() -> tuple[Floats, Floats]:
+def _gauss() -> tuple[FloatArray, FloatArray]:
     """Nodes (5,) on 0 to 1, and the matrix whose product with values there gives the coefficients,
     from the first power on, of the integral from 0 of the polynomial through them.
     """
@@ -75,9 +75,9 @@ class Account:
         self._dense = dense
         self._slots = [self.names.index(effect) for effect in booked]
         self._drives = [self.names.index(effect) for effect in contacts.drives] if contacts else []
-        self._last: tuple[Problem, Floats, Floats] | None = None
+        self._last: tuple[Problem, FloatArray, FloatArray] | None = None
 
-    def book(self, t: float, y: Floats, advance: "Advance") -> list[Floats]:
+    def book(self, t: float, y: FloatArray, advance: "Advance") -> list[FloatArray]:
         """Take up the step or strike from state `y` at `t`; return the works at its samples."""
         if advance.struck is not None:
             energy = self._powers.kinetic_energy
@@ -89,9 +89,9 @@ class Account:
             return [self.total for _ in advance.samples]
         state = advance.within if self._dense else self._cubic(t, y, advance)
         times = [time for time, _ in advance.samples]
-        works: list[Floats] = []
+        works: list[FloatArray] = []
 
-        def powers(time: float) -> Floats:
+        def powers(time: float) -> FloatArray:
             return self._at(time, state(time), advance)
 
         slight = SLIGHT * self._largest
@@ -103,7 +103,7 @@ class Account:
         self._largest = max(self._largest, float(np.abs(self.total).max(initial=0.0)))
         return works
 
-    def _at(self, t: float, y: Floats, advance: "Advance") -> Floats:
+    def _at(self, t: float, y: FloatArray, advance: "Advance") -> FloatArray:
         """All powers at one time, (m,)."""
         powers = np.zeros(len(self.names))
         powers[: len(self._powers.names)] = self._powers.powers(t, y)
@@ -114,7 +114,7 @@ class Account:
             powers[self._drives] = found[count:]
         return powers
 
-    def _cubic(self, t: float, y: Floats, advance: "Advance") -> Callable[[float], Floats]:
+    def _cubic(self, t: float, y: FloatArray, advance: "Advance") -> Callable[[float], FloatArray]:
         """Hermite's cubic through both ends of a step, with the slopes there."""
         problem, length = advance.problem, advance.t - t
         if self._last is not None and self._last[0] is problem and self._last[1] is y:
@@ -125,7 +125,7 @@ class Account:
         self._last = (problem, advance.y, end)
         change = (advance.y - y) / length
 
-        def state(time: float) -> Floats:
+        def state(time: float) -> FloatArray:
             s = (time - t) / length
             bend = (s - 1) * ((1 - 2 * s) * change + (s - 1) * slope + s * end)
             return problem.unit(y + (time - t) * (change + bend))
@@ -134,8 +134,8 @@ class Account:
 
 
 def _parts(
-    powers: Callable[[float], Floats], start: float, end: float, slight: float
-) -> Iterator[tuple[float, float, Floats]]:
+    powers: Callable[[float], FloatArray], start: float, end: float, slight: float
+) -> Iterator[tuple[float, float, FloatArray]]:
     """Yield parts of the time from `start` to `end`, each with the coefficients (NODES, m) of the
     works done in it, from the first power on of the share of it that is over. What is off by less
     than `slight`, J, is let be.

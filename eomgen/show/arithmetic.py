@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from eomgen.files import write_whole
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.show.style import FAINT, INK, PALETTE, plain, style, write_figure
 from eomgen.study.cost.arithmetic import Arithmetic, Way
 
@@ -63,7 +63,7 @@ def _farthest(ways: list[Way]) -> float:
     return float(most * (most / LEAST) ** 0.2)
 
 
-def _bar(axes: Axes, row: int, ulps: Floats, colour: str) -> None:
+def _bar(axes: Axes, row: int, ulps: FloatArray, colour: str) -> None:
     known = np.maximum(ulps[np.isfinite(ulps)], LEAST)
     if not known.size:
         axes.text(LEAST, row, "no finite number", color=FAINT, va="center", fontsize=8.5)

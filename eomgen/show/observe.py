@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eomgen.language.formula import Formula
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.appearance import Appearance
 from eomgen.scene.joints.base import WORLD, Move
@@ -16,8 +16,6 @@ from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.motion import Anchor, Motion
 from eomgen.show.skeleton import shapes_of
 from eomgen.show.surroundings import balls_of, planes_of
-
-Floats = NDArray[np.float64]
 
 
 class _Joint(Protocol):
@@ -80,7 +78,7 @@ def observe(
     )
 
 
-def joint_drift(model: Model, poses: Floats) -> Floats:
+def joint_drift(model: Model, poses: FloatArray) -> FloatArray:
     """Distance between each joint's points on its parent and child, (n, nj), m.
 
     It covers joints that hold a point, in the order of their bodies. `poses` (n, nb, 3) or
@@ -127,12 +125,12 @@ def _anchors(model: Model, dimensions: int) -> tuple[Anchor, ...]:
     return tuple(anchors)
 
 
-def _values(model: Model, r: Sequence[Formula], dimensions: int) -> Floats:
+def _values(model: Model, r: Sequence[Formula], dimensions: int) -> FloatArray:
     """A vector of the scene as numbers; zero if the scene omits it."""
     return np.array([model.value(part) for part in r] if r else [0.0] * dimensions)
 
 
-def _point(poses: Floats, r: Floats) -> Floats:
+def _point(poses: FloatArray, r: FloatArray) -> FloatArray:
     """World position (n, 2) or (n, 3) of a point `r` of a body, given in body axes, m."""
     if poses.ndim == 3:
         return np.asarray(poses[..., :3] @ r + poses[..., 3])

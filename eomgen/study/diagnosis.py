@@ -13,7 +13,7 @@ from eomgen.dynamics.regular import resistances, why_unresisted
 from eomgen.model.model import Model, ways_of
 from eomgen.run.module import GeneratedModule, as_problem, given_values
 from eomgen.run.origin import START, UNITS, Origin
-from eomgen.run.problem import Explain, Floats, Problem, unexplained
+from eomgen.run.problem import Explain, FloatArray, Problem, unexplained
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.effects import JointStop
 from eomgen.scene.joints.base import Geared
@@ -113,7 +113,7 @@ def explained(
     if model.form != "velocity":
         return unexplained
 
-    def explain(t: float, y: Floats, initial: Floats) -> str:
+    def explain(t: float, y: FloatArray, initial: FloatArray) -> str:
         if not np.isfinite(y).all():
             return ""
         values = values_at(model, t, y.tolist(), parameters, inputs)

@@ -30,7 +30,7 @@ from accuracy_scenes import SCENES, closed_end, text
 from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate
 from eomgen.run.module import load_module
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene, read_scene
 from eomgen.store import generated_code
 from eomgen.study.accuracy.choosing import meet
@@ -54,10 +54,10 @@ class Truth:
     the `scale` is that of the run where it is None.
     """
 
-    y: Floats
+    y: FloatArray
     off: float
     origin: str
-    scale: Floats | None = None
+    scale: FloatArray | None = None
 
 
 def prepared(scene: str, own: bool, folder: Path, seconds: float) -> tuple[Case, Truth]:
@@ -90,7 +90,7 @@ def true_error(case: Case, true: Truth, run: Tried) -> float:
     return error(run.trajectory.y[-1], true.y, scale)
 
 
-def ladder(case: Case, extent: Floats, names: Iterable[str]) -> Iterator[Setting]:
+def ladder(case: Case, extent: FloatArray, names: Iterable[str]) -> Iterator[Setting]:
     """Settings of the methods, the loosest of each first; equal steps give the rows asked for."""
     for name in names:
         method = method_of(name)

@@ -30,7 +30,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import terminal_progress
 from eomgen.scene.reader import BUILT_IN, read_scene
 from eomgen.show.style import PALETTE, style, write_figure
@@ -53,7 +53,7 @@ class Motion:
     """A problem, and the energy (n,), J, of states (n, ny)."""
 
     problem: Problem
-    energy: Callable[[Floats], Floats]
+    energy: Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -103,12 +103,12 @@ def canonical() -> Motion:
     b = p["I_B"] + reduced * p["l_B"] ** 2
     c = reduced * p["l_A"] * p["l_B"]
 
-    def rates(y: Floats) -> Floats:
+    def rates(y: FloatArray) -> FloatArray:
         """α̇ and β̇ (2, n) of states in columns (4, n)."""
         k = c * np.cos(y[1] - y[0])
         return np.array([b * y[2] - k * y[3], a * y[3] - k * y[2]]) / (a * b - k * k)
 
-    def at(y: Floats) -> tuple[float, float, float, float, float]:
+    def at(y: FloatArray) -> tuple[float, float, float, float, float]:
         """α̇, β̇, c sin(β - α), k and det M of one state."""
         alpha, beta, p_alpha, p_beta = y.tolist()
         k = c * math.cos(beta - alpha)
@@ -116,11 +116,11 @@ def canonical() -> Motion:
         u, v = (b * p_alpha - k * p_beta) / det, (a * p_beta - k * p_alpha) / det
         return u, v, c * math.sin(beta - alpha), k, det
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         u, v, s, _, _ = at(y)
         return np.array([u, v, s * u * v, -s * u * v])
 
-    def jacobian(t: float, y: Floats) -> Floats:
+    def jacobian(t: float, y: FloatArray) -> FloatArray:
         u, v, s, k, det = at(y)
         # By β - α at constant momenta, and by the momenta: the inverse of M.
         u_turn, v_turn = s * (b * v - k * u) / det, s * (a * u - k * v) / det
@@ -146,7 +146,7 @@ def canonical() -> Motion:
 
 def run(
     motion: Motion, method: str, periods: float, dt: float, label: str = ""
-) -> tuple[Floats, Floats]:
+) -> tuple[FloatArray, FloatArray]:
     """Periods gone by, and the energy's change in parts of itself, both (n,)."""
     with terminal_progress(label or method) as progress:
         found = integrate(
@@ -163,7 +163,7 @@ def run(
     return found.t / PERIOD, energy / energy[0] - 1
 
 
-def drift(periods: Floats, change: Floats) -> Drift:
+def drift(periods: FloatArray, change: FloatArray) -> Drift:
     """Band and trend of a run."""
     at = np.array([block.mean() for block in np.array_split(periods, BLOCKS)])
     means = np.array([block.mean() for block in np.array_split(change, BLOCKS)])
@@ -171,7 +171,9 @@ def drift(periods: Floats, change: Floats) -> Drift:
     return Drift(float(np.abs(change).max()), float(slope), float(np.sqrt(covariance[0, 0])))
 
 
-def draw(kept: dict[tuple[str, str], tuple[Floats, Floats]], stretch: float, path: Path) -> None:
+def draw(
+    kept: dict[tuple[str, str], tuple[FloatArray, FloatArray]], stretch: float, path: Path
+) -> None:
     """The greatest change of energy so far, over periods, both logarithmic."""
     with style():
         figure = Figure(figsize=(8.0, 4.2), layout="constrained")

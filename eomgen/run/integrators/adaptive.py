@@ -17,7 +17,7 @@ from eomgen.run.branches import Again, Lookout, Made
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume, StepFailure
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.integrators.unwarned import UNWARNED, Remark
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 _STALLED = 100
 _ENOUGH_TO_LOOK, _MANY_MORE = 10_000, 20
@@ -37,12 +37,12 @@ class Bounds:
     """
 
     rtol: float
-    atol: float | Floats
+    atol: float | FloatArray
     longest: float
     unseen: float
     most: int
 
-    def allowed(self, y: Floats) -> Floats:
+    def allowed(self, y: FloatArray) -> FloatArray:
         """What a step that ends in the state y (ny,) may be off, (ny,)."""
         return self.atol + self.rtol * np.abs(y)
 
@@ -54,7 +54,7 @@ def advances(
     t_end: float,
     *,
     bounds: Bounds,
-    times: Floats,
+    times: FloatArray,
     made: int,
     remark: Remark,
     resume: Resume | None = None,
@@ -135,7 +135,7 @@ class _Course:
             self._lookout.restore(resume)
         self._start(t, self._problem.initial, until, resume or {})
 
-    def _start(self, t: float, y: Floats, until: float, memory: Mapping[str, Any]) -> None:
+    def _start(self, t: float, y: FloatArray, until: float, memory: Mapping[str, Any]) -> None:
         options: dict[str, Any] = {"rtol": self._bounds.rtol, "atol": self._bounds.atol}
         if self.method.uses_jacobian:
             options["jac"] = self._problem.jacobian
@@ -248,7 +248,7 @@ def _check_stiff(problem: Problem, solver: Any, span: tuple[float, float], made:
             raise UnstableStepError(reason, "take --integrator Radau, or BDF")
 
 
-def _stands(t: float, y: Floats, memory: dict[str, Any]) -> Resume:
+def _stands(t: float, y: FloatArray, memory: dict[str, Any]) -> Resume:
     arrays = {name: np.array(value, dtype=np.float64) for name, value in memory.items()}
     return {"t": np.array(t), "y": y, **arrays}
 
@@ -258,6 +258,6 @@ def _restored(value: Any, kind: type) -> Any:
     return np.array(value) if np.ndim(value) else kind(value)
 
 
-def _between(problem: Problem, taken: Made, t: float) -> Floats:
+def _between(problem: Problem, taken: Made, t: float) -> FloatArray:
     """The state at a time within a step, by its dense output, which is made when first asked."""
     return problem.unit(taken.states(t))

@@ -6,12 +6,12 @@ Here as the yardstick: it feeds energy into every oscillation, at a rate proport
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 ORDER = 1
 
 
-def change(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     """Return y(t + h) - y(t), (ny,). Hairer, Norsett, Wanner, Solving ODEs I, section I.7."""
     return h * problem.derivative(t, y)
 

@@ -6,9 +6,9 @@ from math import sqrt
 
 import numpy as np
 
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
-Slope = Callable[[float, Floats], Floats]
+Slope = Callable[[float, FloatArray], FloatArray]
 MOST_ROWS = 10
 SUBSTEPS = tuple(2 * row + 2 for row in range(MOST_ROWS))
 """Of each row of the table of a step."""
@@ -20,12 +20,14 @@ class Row:
     and the slopes after each substep but the last, (substeps, ny).
     """
 
-    middle: Floats
-    change: Floats
-    slopes: Floats
+    middle: FloatArray
+    change: FloatArray
+    slopes: FloatArray
 
 
-def midpoint(fun: Slope, t: float, y: Floats, step: float, substeps: int, slope: Floats) -> Row:
+def midpoint(
+    fun: Slope, t: float, y: FloatArray, step: float, substeps: int, slope: FloatArray
+) -> Row:
     """Hairer, Norsett, Wanner I, (II.9.13), for the change of y; `slope` is that at the start."""
     h = step / substeps
     slopes = np.empty((substeps, len(y)))
@@ -39,7 +41,9 @@ def midpoint(fun: Slope, t: float, y: Floats, step: float, substeps: int, slope:
     return Row(middle, change, slopes)
 
 
-def next_row(above: list[Floats], value: Floats, substeps: Sequence[int]) -> list[Floats]:
+def next_row(
+    above: list[FloatArray], value: FloatArray, substeps: Sequence[int]
+) -> list[FloatArray]:
     """A row of Aitken and Neville's table in the squares of the substeps, from the one above."""
     columns = [value]
     for i, left in enumerate(above):
@@ -48,14 +52,14 @@ def next_row(above: list[Floats], value: Floats, substeps: Sequence[int]) -> lis
     return columns
 
 
-def extrapolated(values: Sequence[Floats], substeps: Sequence[int]) -> Floats:
+def extrapolated(values: Sequence[FloatArray], substeps: Sequence[int]) -> FloatArray:
     """What values at these numbers of substeps tend to."""
-    columns: list[Floats] = []
+    columns: list[FloatArray] = []
     for row, value in enumerate(values, 1):
         columns = next_row(columns, value, substeps[:row])
     return columns[-1]
 
 
-def norm(x: Floats) -> float:
+def norm(x: FloatArray) -> float:
     """The root mean square."""
     return sqrt(float(x @ x) / len(x))

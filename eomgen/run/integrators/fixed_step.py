@@ -8,7 +8,7 @@ import numpy as np
 
 from eomgen.run.integrators.interface import Advance, Change, Resume, Stability
 from eomgen.run.integrators.stability import Watch
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 
 def count_steps(span: float, dt: float) -> float:
@@ -69,16 +69,16 @@ def advances(
         yield Advance(t, y, samples, problem, within, resume=stands)
 
 
-def _stands(t: float, y: Floats, lost: Floats) -> Resume:
+def _stands(t: float, y: FloatArray, lost: FloatArray) -> Resume:
     return {"t": np.array(t), "y": y, "lost": lost}
 
 
-def _shorter(change: Change, problem: Problem, t: float, y: Floats, end: float) -> Floats:
+def _shorter(change: Change, problem: Problem, t: float, y: FloatArray, end: float) -> FloatArray:
     """The state at `end` after one step from `t`."""
     return problem.unit(y + change(problem, t, y, end - t)) if end > t else y
 
 
-def _sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+def _sum(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The rounded sum and exactly what rounding cut off it (Knuth's two-sum)."""
     total = a + b
     rest = total - a

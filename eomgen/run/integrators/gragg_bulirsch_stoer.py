@@ -24,7 +24,7 @@ from eomgen.run.integrators.extrapolation import (
     norm,
 )
 from eomgen.run.integrators.gragg_dense import Interpolant, Span
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 if TYPE_CHECKING:
     Solver = OdeSolver[Any]
@@ -51,7 +51,7 @@ class _Table:
     lengths  of step that would have met the tolerance with each row
     """
 
-    change: Floats
+    change: FloatArray
     error: float = inf
     lengths: list[float] = field(default_factory=list)
 
@@ -72,16 +72,16 @@ class GraggBulirschStoer(Solver):
         self,
         fun: Slope,
         t0: float,
-        y0: Floats,
+        y0: FloatArray,
         t_bound: float,
         *,
         rtol: float,
-        atol: float | Floats,
+        atol: float | FloatArray,
         max_step: float = inf,
     ) -> None:
         super().__init__(fun, t0, y0, t_bound, vectorized=False)
         self.rtol, self.atol, self.max_step = rtol, atol, max_step
-        self.slope: Floats = self.fun(self.t, self.y)
+        self.slope: FloatArray = self.fun(self.t, self.y)
         allowed = atol + rtol * np.abs(self.y)
         size, speed = norm(self.y / allowed), norm(self.slope / allowed)
         unknown = size < 1e-5 or not 1e-5 < speed < inf
@@ -119,9 +119,9 @@ class GraggBulirschStoer(Solver):
         self.t, self.y, self.slope, self.fresh = end, y + table.change, slope, False
         return True, None
 
-    def _tabulate(self, t: float, y: Floats, step: float, watch: bool, refused: bool) -> _Table:
+    def _tabulate(self, t: float, y: FloatArray, step: float, watch: bool, refused: bool) -> _Table:
         """Add rows until the error is met or seen not to be; `watch` is to look at every row."""
-        table, columns = _Table(y), list[Floats]()
+        table, columns = _Table(y), list[FloatArray]()
         k, worst = self.target, inf
         for row in range(k + 2):
             found = midpoint(self.fun, t, y, step, SUBSTEPS[row], self.slope)
@@ -200,7 +200,7 @@ class GraggBulirschStoer(Solver):
         self.taken = replace(self.taken, after=self._slope_beside(-step))
         self.slope = self._slope_beside(step)
 
-    def _slope_beside(self, step: float) -> Floats:
+    def _slope_beside(self, step: float) -> FloatArray:
         """The slope here, extrapolated from two moments, one and two small steps away."""
         near, far = (self.fun(self.t + h, self.y + h * self.slope) for h in (step, 2 * step))
         return np.asarray(2 * near - far)

@@ -19,7 +19,7 @@ from eomgen.run.integrators.extrapolation import (
     next_row,
     norm,
 )
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 DENSE_SUBSTEPS = tuple(4 * row + 2 for row in range(MOST_ROWS))
 """Of each row of the table of the dense output; half of them is odd."""
@@ -34,11 +34,11 @@ class Span:
     """A step, or half of it: from `start` at `t`, the change over it and the slopes at its ends."""
 
     t: float
-    start: Floats
+    start: FloatArray
     step: float
-    change: Floats
-    before: Floats
-    after: Floats
+    change: FloatArray
+    before: FloatArray
+    after: FloatArray
 
 
 class Interpolant(DenseOutput):
@@ -52,13 +52,13 @@ class Interpolant(DenseOutput):
     there instead: one that goes beyond an event may bend behind it, and its polynomial all along.
     """
 
-    def __init__(self, taken: Span, fun: Slope, rtol: float, atol: float | Floats) -> None:
+    def __init__(self, taken: Span, fun: Slope, rtol: float, atol: float | FloatArray) -> None:
         super().__init__(taken.t, taken.t + taken.step)
         self._fun, self._taken = fun, taken
         start, step = taken.start, taken.step / 2
         allowed = atol + rtol * np.maximum(np.abs(start), np.abs(start + taken.change))
         self._allowed = allowed
-        rows, columns = list[Row](), list[Floats]()
+        rows, columns = list[Row](), list[FloatArray]()
         for count in range(1, MOST_ROWS + 1):
             substeps = DENSE_SUBSTEPS[count - 1]
             rows.append(midpoint(fun, taken.t, start, step, substeps, taken.before))
@@ -88,9 +88,9 @@ class Interpolant(DenseOutput):
         late = (times - self._halves[1].t) * self._halves[1].step > 0
         return np.where(late[..., None], second, first).T
 
-    def _stepped(self, t: float) -> Floats | None:
+    def _stepped(self, t: float) -> FloatArray | None:
         """The state at t by a step from the start; None if its rows do not agree."""
-        taken, columns = self._taken, list[Floats]()
+        taken, columns = self._taken, list[FloatArray]()
         if t == taken.t:
             return taken.start
         for count in range(1, MOST_ROWS + 1):
@@ -102,10 +102,10 @@ class Interpolant(DenseOutput):
         return None
 
 
-def _settled(fun: Slope, half: Span, rows: list[Row], allowed: Floats) -> Floats:
+def _settled(fun: Slope, half: Span, rows: list[Row], allowed: FloatArray) -> FloatArray:
     """The polynomial of so many rows that one more would change nothing, or bring rounding only."""
     rows, shrunk = list(rows), inf
-    settled: Floats | None = None
+    settled: FloatArray | None = None
     for count in range(max(1, len(rows) - 1), MOST_ROWS + 1):
         if count > len(rows):
             substeps = DENSE_SUBSTEPS[count - 1]
@@ -124,7 +124,7 @@ def _settled(fun: Slope, half: Span, rows: list[Row], allowed: Floats) -> Floats
     return settled
 
 
-def _values(coefficients: Floats, z: Floats) -> Floats:
+def _values(coefficients: FloatArray, z: FloatArray) -> FloatArray:
     """Of a polynomial with coefficients (n, ny), the lowest first, at z (…); (…, ny)."""
     found = np.zeros((*z.shape, coefficients.shape[1]))
     for coefficient in coefficients[::-1]:
@@ -132,7 +132,7 @@ def _values(coefficients: Floats, z: Floats) -> Floats:
     return found
 
 
-def _polynomial(span: Span, rows: Sequence[Row]) -> Floats:
+def _polynomial(span: Span, rows: Sequence[Row]) -> FloatArray:
     """Coefficients (n, ny), the lowest first, of the change of y over z, from -1 to 1."""
     half = span.step / 2
     middle = _middle(rows, half)
@@ -151,7 +151,7 @@ def _polynomial(span: Span, rows: Sequence[Row]) -> Floats:
     return np.vstack((middle, _ends(count) @ missing))
 
 
-def _middle(rows: Sequence[Row], half: float) -> Floats:
+def _middle(rows: Sequence[Row], half: float) -> FloatArray:
     """Value and derivatives by z in the middle, divided by factorials, one after another.
 
     That of order κ by one row: its slopes' central difference of order κ - 1, two substeps apart.
@@ -165,7 +165,7 @@ def _middle(rows: Sequence[Row], half: float) -> Floats:
     return np.array(found)
 
 
-def _difference(slopes: Floats, order: int) -> Floats:
+def _difference(slopes: FloatArray, order: int) -> FloatArray:
     """The derivative by z of this order in the middle."""
     middle = len(slopes) // 2
     weights = [(-1.0) ** (order - i) * comb(order, i) for i in range(order + 1)]
@@ -175,7 +175,7 @@ def _difference(slopes: Floats, order: int) -> Floats:
 
 
 @cache
-def _ends(count: int) -> Floats:
+def _ends(count: int) -> FloatArray:
     """From values and slopes at z = -1 and 1 to the coefficients of the next four powers."""
     power = np.arange(count, count + 4)
     sign = (-1.0) ** power

@@ -15,7 +15,7 @@ from scipy.linalg.lapack import dgesv
 
 from eomgen.run.integrators.interface import StepFailure
 from eomgen.run.integrators.tableau import ButcherTableau
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 MAX_ITERATIONS = 20
 REMEDY = "take a smaller --dt or an adaptive method (--integrator Radau)"
@@ -55,10 +55,10 @@ class ImplicitMethod:
         ButcherTableau(a=a, b=self.b, c=self.c, order=self.order)
 
     @cached_property
-    def _arrays(self) -> tuple[Floats, Floats]:
+    def _arrays(self) -> tuple[FloatArray, FloatArray]:
         return np.array(self.shares, dtype=np.float64), np.array(self.b, dtype=np.float64)
 
-    def change(self, problem: Problem, t: float, y: Floats, h: float) -> Floats:
+    def change(self, problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
         """Return y(t + h) - y(t), shape (ny,): the sum of d_i = h b_i f(t + c_i h, Y_i) with
         Y_i = y + Σ share_ij d_j.
 
@@ -98,7 +98,9 @@ class ImplicitMethod:
         raise StepFailure(f"Newton did not converge in {MAX_ITERATIONS} iterations", REMEDY)
 
 
-def _is_solved(y: Floats, changes: Floats, update: Floats, size: float, previous: float) -> bool:
+def _is_solved(
+    y: FloatArray, changes: FloatArray, update: FloatArray, size: float, previous: float
+) -> bool:
     """Whether another iteration would gain nothing, after updates of these sizes."""
     scale = np.abs(y) + np.abs(changes).sum(axis=0)
     largest = float(scale.max())

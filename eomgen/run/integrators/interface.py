@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 from scipy.integrate import OdeSolver
 
 from eomgen.errors import RunError
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Event
 
-Change = Callable[[Problem, float, Floats, float], Floats]
+Change = Callable[[Problem, float, FloatArray, float], FloatArray]
 """`change(problem, t, y, h) -> d`: one step of size h leads to y + d; leaves `y` (ny,) as it is."""
 
 Stability = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
 """The stability function R of a method: of hλ (n,), what a step multiplies modes exp(λt) by, (n,).
 """
 
-Resume = Mapping[str, Floats]
+Resume = Mapping[str, FloatArray]
 """Where a run stands, by name: `t` (), `y` (ny,), and what else its method and contacts go on from.
 """
 
@@ -100,14 +100,14 @@ class Advance:
     """
 
     t: float
-    y: Floats
-    samples: Sequence[tuple[float, Floats]]
+    y: FloatArray
+    samples: Sequence[tuple[float, FloatArray]]
     problem: Problem
-    within: Callable[[float], Floats]
+    within: Callable[[float], FloatArray]
     is_step: bool = True
     struck: int | None = None
     events: tuple[Event, ...] = ()
-    contact_powers: Callable[[float, Floats], Floats] | None = None
+    contact_powers: Callable[[float, FloatArray], FloatArray] | None = None
     factorisations: int = 0
     resume: Callable[[], Resume] | None = None
     capped: bool = False

@@ -13,7 +13,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run.integrators.interface import Change
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 ORDER = 2
 
@@ -38,7 +38,7 @@ def prepare(problem: Problem) -> Change:
         start[state] = 1.0
         rates[:, column] = problem.derivative(0.0, start)[positions]
 
-    def change(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+    def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
         velocities = y[others]
         middle = y.copy()
         middle[positions] += h / 2 * (rates @ velocities)
@@ -57,7 +57,7 @@ def _check(problem: Problem, positions: list[int], others: list[int]) -> None:
         raise _refusal("no state is a position")
     if problem.contacts is not None:
         raise _refusal("those of rigid contacts that are held depend on velocities")
-    first: Floats | None = None
+    first: FloatArray | None = None
     for jacobian in _jacobians(problem):
         for group in (others, positions):
             found = np.argwhere(jacobian[np.ix_(group, group)])
@@ -73,7 +73,7 @@ def _check(problem: Problem, positions: list[int], others: list[int]) -> None:
             raise _refusal(f"the rate of {of} is not the velocities times constants")
 
 
-def _jacobians(problem: Problem) -> Iterator[Floats]:
+def _jacobians(problem: Problem) -> Iterator[FloatArray]:
     """Jacobians, the initial state's first, where there are any."""
     seeded = np.random.default_rng(1)
     size = 0.1 * np.maximum(1.0, np.abs(problem.initial))

@@ -1,7 +1,7 @@
 """The classical Runge-Kutta method: explicit, four stages, order 4."""
 
 from eomgen.run.integrators.tableau import ButcherTableau
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 # Hairer, Norsett, Wanner, Solving ODEs I, table II.1.2.
 TABLEAU = ButcherTableau(
@@ -18,6 +18,6 @@ TABLEAU = ButcherTableau(
 ORDER = TABLEAU.order
 
 
-def change(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     """Return y(t + h) - y(t), shape (ny,)."""
     return TABLEAU.change(problem.derivative, t, y, h)

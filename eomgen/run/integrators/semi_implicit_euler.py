@@ -4,12 +4,12 @@ Symplectic, hence without energy drift, where the energy separates into T(v) + V
 mass matrix that depends on q it is an explicit first-order method and promises nothing more.
 """
 
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 ORDER = 1
 
 
-def change(problem: Problem, t: float, y: Floats, h: float) -> Floats:
+def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     """Return y(t + h) - y(t), shape (ny,). Hairer, Lubich, Wanner, Geometric Numerical Integration,
     section VI.3, written with the derivative alone so that it serves every form of the state:
     the drift is the position part of f at (old positions, new velocities).

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.run.integrators.interface import Change, Stability, StepFailure
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 GROWS = 1.25
 """So many times a step, and more than the motion itself: no more than a few steps of it do harm."""
@@ -66,27 +66,27 @@ class Watch:
 
     change: Change
     stability: Stability | None
-    _seen: list[tuple[Floats, Floats]] = field(default_factory=list)
-    _last: Floats | None = None
-    _largest: Floats | float = 0.0
-    _allowed: Floats | float = 0.0
+    _seen: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+    _last: FloatArray | None = None
+    _largest: FloatArray | float = 0.0
+    _allowed: FloatArray | float = 0.0
     _worked: float = 0.0
     _spent: float = 0.0
     _level: float = 0.0
-    _passed: tuple[float, tuple[float, Floats, Floats, float] | None] = (0.0, None)
+    _passed: tuple[float, tuple[float, FloatArray, FloatArray, float] | None] = (0.0, None)
 
     def seeing(self, problem: Problem) -> Problem:
         """The problem, the derivatives evaluated of which are kept for `see`."""
         derivative, seen = problem.derivative, self._seen
 
-        def kept(t: float, y: Floats) -> Floats:
+        def kept(t: float, y: FloatArray) -> FloatArray:
             slope = derivative(t, y)
             seen.append((y, slope))
             return slope
 
         return replace(problem, derivative=kept)
 
-    def see(self, problem: Problem, t: float, y: Floats, step: Floats, h: float) -> None:
+    def see(self, problem: Problem, t: float, y: FloatArray, step: FloatArray, h: float) -> None:
         """Take note of a step of h from `y` at `t` to y + `step`, (ny,) each.
 
         Raises `UnstableStepError` if it is too long.
@@ -129,7 +129,11 @@ class Watch:
             self._look(problem, _reached(problem, *passed), passed[3])
 
     def _is_worth_it(
-        self, problem: Problem, rate: Floats, seen: Sequence[tuple[Floats, Floats]], h: float
+        self,
+        problem: Problem,
+        rate: FloatArray,
+        seen: Sequence[tuple[FloatArray, FloatArray]],
+        h: float,
     ) -> bool:
         """Whether a jump is to be looked into: not where that would take much of the run's time."""
         level = float(np.max(np.abs(rate) / np.array(problem.sizes or (1.0,))))
@@ -141,19 +145,19 @@ class Watch:
             return True
         return False
 
-    def _note(self, rate: Floats) -> None:
+    def _note(self, rate: FloatArray) -> None:
         """Take a rate among the largest so far."""
         self._largest = np.maximum(self._largest, np.abs(rate))
         self._allowed = np.maximum(JUMP * self._largest, NOISE * np.max(self._largest))
 
-    def _look(self, problem: Problem, places: Sequence[tuple[float, Floats]], h: float) -> None:
+    def _look(self, problem: Problem, places: Sequence[tuple[float, FloatArray]], h: float) -> None:
         for time, state in places:
             self._spent += len(state) / 2 + 60 / len(state)
             jacobian = _jacobian(problem, time, state)
             if jacobian is not None:
                 self._judge(problem, jacobian, h)
 
-    def _judge(self, problem: Problem, jacobian: Floats, h: float) -> None:
+    def _judge(self, problem: Problem, jacobian: FloatArray, h: float) -> None:
         grown = growth(self.change, self.stability, problem, jacobian)
         if not grown(h) > math.log(GROWS):
             return
@@ -170,14 +174,14 @@ class Watch:
 
 
 def _reached(
-    problem: Problem, t: float, y: Floats, step: Floats, h: float
-) -> list[tuple[float, Floats]]:
+    problem: Problem, t: float, y: FloatArray, step: FloatArray, h: float
+) -> list[tuple[float, FloatArray]]:
     """Where a step of h from y at t to y + `step` looks, or might: times and states."""
     ahead = problem.derivative(t, y)
     return [(t, y), (t + h / 2, y + h / 2 * ahead), (t + h, y + h * ahead), (t + h, y + step)]
 
 
-def fastest(problem: Problem, seen: Sequence[tuple[Floats, Floats]]) -> float:
+def fastest(problem: Problem, seen: Sequence[tuple[FloatArray, FloatArray]]) -> float:
     """About the fastest rate, 1/s, at which states change that lie as far apart as those at which
     derivatives were `seen`: pairs of states and derivatives, (ny,) each.
 
@@ -204,7 +208,7 @@ def fastest(problem: Problem, seen: Sequence[tuple[Floats, Floats]]) -> float:
 
 
 def growth(
-    change: Change, stability: Stability | None, problem: Problem, jacobian: Floats
+    change: Change, stability: Stability | None, problem: Problem, jacobian: FloatArray
 ) -> Callable[[float], float]:
     """A function of a step h, s: log |R| of the mode that grows most in it, less that of the motion
     itself.
@@ -226,7 +230,7 @@ def growth(
 
 
 def _factors(
-    change: Change, problem: Problem, jacobian: Floats, h: float
+    change: Change, problem: Problem, jacobian: FloatArray, h: float
 ) -> NDArray[np.complex128]:
     """What a step of a method multiplies the modes of y' = J y by; nan where it overflows."""
     linear = replace(
@@ -258,7 +262,7 @@ def longest(grown: Callable[[float], float], h: float) -> float:
     return math.floor(low * 10.0**digits) / 10.0**digits if abs(digits) < 300 else low
 
 
-def stiffness(problem: Problem, t: float, y: Floats, h: float) -> str:
+def stiffness(problem: Problem, t: float, y: FloatArray, h: float) -> str:
     """What keeps steps of an explicit method as short as h, s, in words; "" if not stability.
 
     It is where the motion damps something faster than the step can show: h|λ| > 1 for a mode that
@@ -277,7 +281,7 @@ def stiffness(problem: Problem, t: float, y: Floats, h: float) -> str:
     return ""
 
 
-def _jacobian(problem: Problem, t: float, y: Floats) -> Floats | None:
+def _jacobian(problem: Problem, t: float, y: FloatArray) -> FloatArray | None:
     """The Jacobian, where there is a finite one."""
     try:
         found = problem.jacobian(t, y)

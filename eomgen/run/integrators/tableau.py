@@ -14,7 +14,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 Tree = tuple["Tree", ...]
 """A rooted tree: the subtrees that hang from its root, in a fixed order; a lone node is ()."""
@@ -50,7 +50,7 @@ class ButcherTableau:
             raise ValueError("tableau: the rows of a do not sum to c")
         # The same with all signs positive: how large the terms are whose rounding is let pass.
         matrices, weights = np.stack((a, np.abs(a))), np.stack((b, np.abs(b)))
-        grown: dict[Tree, Floats] = {}
+        grown: dict[Tree, FloatArray] = {}
         for order in range(1, self.order + 1):
             for tree in trees(order):
                 at_stages = np.ones_like(weights)
@@ -65,14 +65,18 @@ class ButcherTableau:
                 grown[tree] = (matrices @ at_stages[:, :, None])[:, :, 0]
 
     @cached_property
-    def arrays(self) -> tuple[Floats, Floats, Floats]:
+    def arrays(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """a (s, s), b (s,) and c (s,)."""
         a, b, c = (np.array(part, dtype=np.float64) for part in (self.a, self.b, self.c))
         return a, b, c
 
     def change(
-        self, derivative: Callable[[float, Floats], Floats], t: float, y: Floats, h: float
-    ) -> Floats:
+        self,
+        derivative: Callable[[float, FloatArray], FloatArray],
+        t: float,
+        y: FloatArray,
+        h: float,
+    ) -> FloatArray:
         """Return y(t + h) - y(t), shape (ny,), of an explicit method, stage after stage."""
         a, b, _ = self.arrays
         slopes = np.empty((len(b), len(y)))

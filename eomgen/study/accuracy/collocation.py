@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from eomgen.precision.precise import BITS, Long, Precise, Watch, digits
 from eomgen.run.integrators.unwarned import factors
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.study.accuracy import corners
 from eomgen.study.accuracy.corners import Turn
 from eomgen.study.accuracy.forecast import Forecast, NoStep
@@ -127,8 +127,8 @@ class Step:
 
     y: Longs
     error: float
-    margins: Floats
-    extent: Floats
+    margins: FloatArray
+    extent: FloatArray
 
 
 def advance(
@@ -136,7 +136,7 @@ def advance(
     precise: Precise,
     problem: Problem,
     forecast: Forecast,
-    scale: Floats,
+    scale: FloatArray,
     t: Long,
     y: Longs,
     h: Long,
@@ -186,12 +186,12 @@ def _in_doubles(
     method: Gauss,
     problem: Problem,
     h: float,
-    times: Floats,
-    near: Floats,
-    states: Floats,
-    correct: Callable[[Floats], Floats],
-    scale: Floats,
-) -> Floats:
+    times: FloatArray,
+    near: FloatArray,
+    states: FloatArray,
+    correct: Callable[[FloatArray], FloatArray],
+    scale: FloatArray,
+) -> FloatArray:
     """The stages corrected as far as doubles allow: these corrections are cheaper."""
     a, last = method.a.astype(float), math.inf
     for _ in range(MOST_CORRECTIONS):
@@ -213,8 +213,8 @@ def _margins(precise: Precise, t: Long, y: Longs) -> list[Long]:
 
 
 def _solver(
-    method: Gauss, problem: Problem, h: float, times: Floats, states: Floats
-) -> Callable[[Floats], Floats]:
+    method: Gauss, problem: Problem, h: float, times: FloatArray, states: FloatArray
+) -> Callable[[FloatArray], FloatArray]:
     """A function that solves (I - h A ⊗ J) Δ = r for Δ (stages, ny) in doubles.
 
     Small systems use the Jacobian of every stage. Large ones use one for all stages; then the
@@ -229,7 +229,7 @@ def _solver(
         matrix.flat[:: stages * ny + 1] += 1.0
         both = factors(matrix)
 
-        def solve_all(residual: Floats) -> Floats:
+        def solve_all(residual: FloatArray) -> FloatArray:
             found = scipy.linalg.lu_solve(both, residual.ravel(), check_finite=False)
             return np.asarray(found).reshape(stages, ny)
 
@@ -241,14 +241,14 @@ def _solver(
     back = np.linalg.inv(vectors)
     inverses = np.linalg.inv(np.eye(ny) - h * values[:, None, None] * jacobian)
 
-    def solve_each(residual: Floats) -> Floats:
+    def solve_each(residual: FloatArray) -> FloatArray:
         parts = np.matmul(inverses, (back @ residual)[:, :, None])[:, :, 0]
         return np.asarray((vectors @ parts).real)
 
     return solve_each
 
 
-def _error(method: Gauss, moves: Longs, scale: Floats) -> float:
+def _error(method: Gauss, moves: Longs, scale: FloatArray) -> float:
     """Estimated error at the end of a step, relative to the scale, from the decay of the Legendre
     coefficients of the derivative.
 
@@ -314,15 +314,15 @@ class Row:
 
     y: Longs
     steps: int
-    extent: Floats
+    extent: FloatArray
 
 
 def rows(
     ladder: Sequence[int],
     precise: Precise,
     problem: Problem,
-    scale: Floats,
-    times: Floats,
+    scale: FloatArray,
+    times: FloatArray,
     tolerance: float,
     report: Callable[[float], None] = lambda t: None,
 ) -> Iterator[Row]:
@@ -376,7 +376,7 @@ def rows(
 
 
 def _turned(
-    watch: Watch, method: Gauss, margins: Floats, turn: Turn | None, *, slow: bool
+    watch: Watch, method: Gauss, margins: FloatArray, turn: Turn | None, *, slow: bool
 ) -> tuple[bool, Turn | None]:
     """Whether a step must be repeated because a corner changes its branch in it, and where the
     step must end then. Branches that change at its start, or at its end if it is accepted, are

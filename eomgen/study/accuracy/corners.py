@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Legendre
 
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 NOTHING = 1e-22
 """A margin this small, relative to its greatest value in the step, counts as 0."""
@@ -28,12 +28,12 @@ class Turn:
     beyond: float
 
 
-def wrong(ways: Sequence[bool], margins: Floats) -> Floats:
+def wrong(ways: Sequence[bool], margins: FloatArray) -> FloatArray:
     """Where margins (n, corners) contradict the current branches; booleans (n, corners)."""
     return np.where(np.array(ways), margins < 0, margins > 0)
 
 
-def wrong_from_the_start(ways: Sequence[bool], margins: Floats) -> list[int]:
+def wrong_from_the_start(ways: Sequence[bool], margins: FloatArray) -> list[int]:
     """Corners that were at their zero at the start of a step and contradict their branch all along.
 
     If a margin is 0 all along the step, the branch for margins > 0 is wrong. That happens to a
@@ -48,7 +48,7 @@ def wrong_from_the_start(ways: Sequence[bool], margins: Floats) -> list[int]:
     return np.flatnonzero(late | idle).tolist()
 
 
-def first_turn(ways: Sequence[bool], places: Floats, margins: Floats) -> Turn | None:
+def first_turn(ways: Sequence[bool], places: FloatArray, margins: FloatArray) -> Turn | None:
     """The first branch change within a step; None if there is none.
 
     places   (n,): 0, the nodes, 1, as parts of the step
@@ -62,7 +62,7 @@ def first_turn(ways: Sequence[bool], places: Floats, margins: Floats) -> Turn | 
     return min(turns, key=lambda turn: turn.beyond, default=None)
 
 
-def nearer(turn: Turn, places: Floats, margins: Floats) -> Turn:
+def nearer(turn: Turn, places: FloatArray, margins: FloatArray) -> Turn:
     """The branch change located again, from the margins of a step that ends close to it."""
     values = margins[:, turn.corner]
     slope = float(_through(places, values).deriv()(1.0))
@@ -70,7 +70,7 @@ def nearer(turn: Turn, places: Floats, margins: Floats) -> Turn:
     return Turn(turn.corner, -float(values[-1]) / size / slope if slope else 0.0)
 
 
-def simpler(turn: Turn, places: Floats, margins: Floats) -> Turn:
+def simpler(turn: Turn, places: FloatArray, margins: FloatArray) -> Turn:
     """Of the corners whose margins vanish at a branch change, the one whose margin is steepest.
 
     The force of a contact with exponent 3/2 is not a polynomial of time where it vanishes; its
@@ -88,7 +88,7 @@ def simpler(turn: Turn, places: Floats, margins: Floats) -> Turn:
     )
 
 
-def turned_at_the_end(turn: Turn, margins: Floats) -> list[int]:
+def turned_at_the_end(turn: Turn, margins: FloatArray) -> list[int]:
     """The corners whose margins are 0 at the end of a step that ends at a branch change."""
     sizes = np.max(np.abs(margins), axis=0)
     there = (np.abs(margins[-1]) <= NOTHING * sizes) & (sizes > 0)
@@ -96,19 +96,19 @@ def turned_at_the_end(turn: Turn, margins: Floats) -> list[int]:
     return np.flatnonzero(there).tolist()
 
 
-def is_there(turn: Turn, margins: Floats) -> bool:
+def is_there(turn: Turn, margins: FloatArray) -> bool:
     """Whether a step ends at its branch change."""
     values = np.abs(margins[:, turn.corner])
     return bool(values[-1] <= NOTHING * np.max(values))
 
 
-def _through(places: Floats, values: Floats) -> Legendre:
+def _through(places: FloatArray, values: FloatArray) -> Legendre:
     """The polynomial through margins, relative to the greatest of them."""
     size = float(np.max(np.abs(values)))
     return Legendre.fit(places, values / size, len(places) - 1, domain=[0.0, 1.0])
 
 
-def _root(way: bool, places: Floats, values: Floats) -> float:
+def _root(way: bool, places: FloatArray, values: FloatArray) -> float:
     """The first part of the step at which a margin gets the sign that contradicts its branch."""
     polynomial = _through(places, values)
     slope = polynomial.deriv()

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from eomgen.run.checks import longest_steps
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.study.accuracy.measure import WRONG
 from eomgen.study.accuracy.trial import TIGHTEST_OF_ALL, Case, Setting, Tried, method_of
@@ -85,7 +85,7 @@ def fit(tolerances: Sequence[float], quantities: Sequence[float], expected: floa
     return Law(math.exp(e[-1] - slope * tau[-1]), slope)
 
 
-def difference(one: Trajectory, other: Trajectory, scale: Floats) -> float:
+def difference(one: Trajectory, other: Trajectory, scale: FloatArray) -> float:
     """The difference of two runs over the same time, relative to the scale: at the end or, if that
     is more, the median over the last part of the run.
     """
@@ -97,7 +97,7 @@ def difference(one: Trajectory, other: Trajectory, scale: Floats) -> float:
     return max(float(apart[-1]), float(np.median(apart)))
 
 
-def _rows(run: Trajectory, since: float) -> tuple[Floats, Floats]:
+def _rows(run: Trajectory, since: float) -> tuple[FloatArray, FloatArray]:
     """Rows from a time on, in reverse. Of two rows at an impact, the later one comes first."""
     late = run.t >= since
     return run.t[late][::-1], run.y[late][::-1]
@@ -126,7 +126,7 @@ def remaining(
     return last * math.pow(tolerances[-1] / tolerances[-2], slope)
 
 
-def errors(runs: Sequence[Tried], scale: Floats, case: Case) -> list[float]:
+def errors(runs: Sequence[Tried], scale: FloatArray, case: Case) -> list[float]:
     """Estimated error of each run, relative to the scale; infinite if nothing is known.
 
     The error of a method's looser run is its difference from the tightest one; that of the tightest
@@ -189,7 +189,7 @@ class Estimate:
     second: Tried
 
 
-def representable(run: Tried, scale: Floats) -> tuple[float, int]:
+def representable(run: Tried, scale: FloatArray) -> tuple[float, int]:
     """The error from rounding the last state to doubles, half a unit in the last place relative to
     the scale: the largest of all states, and the index of that state.
     """
@@ -226,7 +226,7 @@ def by_looser_run(
     second: Tried,
     others: Sequence[Tried],
     samples: Sequence[Tried],
-    scale: Floats,
+    scale: FloatArray,
 ) -> Estimate:
     """A run's error from a second one (`looser`), whose constants were perturbed by rounding.
 
@@ -261,7 +261,7 @@ def by_looser_run(
     return Estimate(last, max(last, most), at, second)
 
 
-def _greatest(one: Trajectory, two: Trajectory, scale: Floats) -> tuple[float, float]:
+def _greatest(one: Trajectory, two: Trajectory, scale: FloatArray) -> tuple[float, float]:
     """The greatest difference of rows at equal times, relative to the scale, and its time, s."""
     t, i, j = np.intersect1d(one.t, two.t, return_indices=True)
     apart = np.max(np.abs(one.y[i] - two.y[j]) / scale, axis=1)

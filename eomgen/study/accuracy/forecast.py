@@ -11,7 +11,7 @@ import numpy as np
 
 from eomgen.run.integrators.unwarned import LSODA, Radau
 from eomgen.run.noise import step_noise
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 FORECAST, ROUGHLY = 1e-10, 1e-5
 """Relative tolerances of the prediction by LSODA and by Radau; its error is the first correction
@@ -35,7 +35,7 @@ class Forecast:
     """
 
     def __init__(
-        self, problem: Problem, scale: Floats, t_end: float, check: Callable[[], None]
+        self, problem: Problem, scale: FloatArray, t_end: float, check: Callable[[], None]
     ) -> None:
         self._check = check
         self._problem, self._scale, self._t_end = problem, scale, t_end
@@ -44,7 +44,7 @@ class Forecast:
         self._pieces: list[Any] = []
         self._solver: Any = None
 
-    def __call__(self, t: float, y: Floats, times: Floats) -> Floats:
+    def __call__(self, t: float, y: FloatArray, times: FloatArray) -> FloatArray:
         """States (len(times), ny) at `times`, ascending and not before t, of the solution through
         y at t.
 
@@ -67,7 +67,7 @@ class Forecast:
         self._pieces = [piece for piece in self._pieces if piece.t >= t]
         return np.array([self._at(float(time)) + shift for time in times])
 
-    def _begin(self, t: float, y: Floats) -> None:
+    def _begin(self, t: float, y: FloatArray) -> None:
         self._pieces = []
         noise = step_noise(self._problem.derivative, self._problem.jacobian, t, y, self._t_end)
         atol = np.maximum(self._tolerance * self._scale, OF_NOISE * noise)
@@ -97,6 +97,6 @@ class Forecast:
         pieces = self._pieces
         return bool(pieces) and pieces[0].t_old <= t and pieces[-1].t >= end
 
-    def _at(self, t: float) -> Floats:
+    def _at(self, t: float) -> FloatArray:
         piece = next(piece for piece in self._pieces if piece.t >= t)
         return np.asarray(piece(t))

@@ -14,7 +14,7 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.run.integrators import INTEGRATORS, FixedStep, find_integrator
 from eomgen.run.noise import least_tolerance
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 
 Status = Literal["ok", "wrong", "failed", "over", "refused"]
 """How a run went: "ok"; "wrong": it reported success but is wrong; "failed": it stopped before the
@@ -127,7 +127,7 @@ def order(method: str) -> int | None:
     return found.order if isinstance(found, FixedStep) else None
 
 
-def first_steps(problem: Problem, t: Floats, y: Floats, scale: Floats) -> int:
+def first_steps(problem: Problem, t: FloatArray, y: FloatArray, scale: FloatArray) -> int:
     """The number of equal steps in the coarsest run of a motion y (n, ny) at times t (n,).
 
     Its step is at most the time in which a state would cross its range at its greatest rate.
@@ -140,7 +140,7 @@ def first_steps(problem: Problem, t: Floats, y: Floats, scale: Floats) -> int:
     return steps
 
 
-def atol_scale(y: Floats, scale: Floats) -> float:
+def atol_scale(y: FloatArray, scale: FloatArray) -> float:
     """atol relative to rtol for a motion y (n, ny), from the smallest scale of a state that
     moves.
     """

@@ -10,13 +10,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 WRONG = 0.1
 """A run with this error says nothing about the motion, even if it reported success."""
 
 
-def scales(states: Sequence[str], units: Mapping[str, str], y: Floats) -> Floats:
+def scales(states: Sequence[str], units: Mapping[str, str], y: FloatArray) -> FloatArray:
     """The scale (ny,) of each state of a motion y (n, ny), in the state's unit; positive.
 
     y may consist of just the least and the greatest value of each state. Samples at equal times are
@@ -35,6 +35,6 @@ def scales(states: Sequence[str], units: Mapping[str, str], y: Floats) -> Floats
     return found
 
 
-def error(y: Floats, true: Floats, scale: Floats) -> float:
+def error(y: FloatArray, true: FloatArray, scale: FloatArray) -> float:
     """The greatest difference relative to the scale, of one state (ny,) or of several (n, ny)."""
     return float(np.max(np.abs(y - true) / scale))

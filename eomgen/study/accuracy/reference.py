@@ -27,7 +27,7 @@ from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.tally import Tally
 from eomgen.store import program_of
@@ -66,16 +66,16 @@ class Reference:
     seconds      how long it took
     """
 
-    t: Floats
-    y: Floats
-    scale: Floats
+    t: FloatArray
+    y: FloatArray
+    scale: FloatArray
     error: float
     final_error: float
     origin: str
     seconds: float
 
 
-_Found = tuple[Floats, Floats, Floats, str]
+_Found = tuple[FloatArray, FloatArray, FloatArray, str]
 """The motion (n, ny), the motion plus its error (n, ny), the least and greatest states (2, ny), and
 the origin."""
 
@@ -92,7 +92,7 @@ def paced(problem: Problem, t_end: float, seconds: float, progress: Progress) ->
     began, calls, told = time.process_time(), 0, throttled(progress)
     allowed = max(seconds, _SOON)
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         nonlocal calls
         calls += 1
         if not calls % _LOOKS:
@@ -174,8 +174,8 @@ def _in_long_numbers(
     problem: Problem,
     parameters: Any,
     inputs: Any,
-    times: Floats,
-    scale: Floats,
+    times: FloatArray,
+    scale: FloatArray,
     seconds: float,
     progress: Progress,
 ) -> _Found:
@@ -221,7 +221,7 @@ def _check_pace(spent: float, done: float, seconds: float, numbers: str) -> None
         raise TooLongError(f"more than {seconds:g} s in {numbers}")
 
 
-def _roughly(problem: Problem, t_end: float, rest_speed: float | None) -> Floats:
+def _roughly(problem: Problem, t_end: float, rest_speed: float | None) -> FloatArray:
     """The least and greatest value of each state in a quick run, (2, ny).
 
     Raises `RunError` if the run does not reach the end.
@@ -237,8 +237,8 @@ def _roughly(problem: Problem, t_end: float, rest_speed: float | None) -> Floats
 
 def _in_doubles(
     problem: Problem,
-    times: Floats,
-    scale: Floats,
+    times: FloatArray,
+    scale: FloatArray,
     rest_speed: float | None,
     why: str,
     progress: Progress,

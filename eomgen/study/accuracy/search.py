@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from eomgen.run.noise import Fast, fast
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.study.accuracy.estimate import (
     Estimate,
     by_looser_run,
@@ -129,13 +129,13 @@ class Search:
         return min(known, key=lambda run: (run.setting.dt is not None, run.tolerance), default=None)
 
     @property
-    def extent(self) -> Floats:
+    def extent(self) -> FloatArray:
         """Least and greatest value of each state, (2, ny), in the tightest run so far."""
         tightest = self.tightest_run
         return np.array([self.case.problem.initial] * 2) if tightest is None else tightest.extent
 
     @property
-    def scale(self) -> Floats:
+    def scale(self) -> FloatArray:
         """The scale of each state, (ny,)."""
         return self.case.scale(self.extent)
 

@@ -12,7 +12,7 @@ import numpy as np
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.noise import least_tolerance
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress
 from eomgen.run.stepping import ADAPTIVE_SAMPLES
 from eomgen.run.tally import Follow, Tally
@@ -114,8 +114,8 @@ class Tried:
     trajectory: Trajectory
     seconds: float
     work: float
-    extent: Floats
-    pace: Floats
+    extent: FloatArray
+    pace: FloatArray
 
     @property
     def tolerance(self) -> float:
@@ -161,12 +161,12 @@ class Case:
         """Whether steps are bounded by something else than their error."""
         return self.problem.corners or self.kept.get("max_step") is not None
 
-    def scale(self, y: Floats) -> Floats:
+    def scale(self, y: FloatArray) -> FloatArray:
         """The scale of each state (ny,) of a motion y (n, ny), or of its extent (2, ny)."""
         return scales(self.problem.states, self.units, y)
 
     def setting(
-        self, method: Method, tolerance: float, extent: Floats, noise: float = 0.0
+        self, method: Method, tolerance: float, extent: FloatArray, noise: float = 0.0
     ) -> Setting:
         """The setting of a method at about a relative tolerance, or about a step, s.
 
@@ -259,7 +259,7 @@ class _Pace:
         if t < self.t_end and math.isfinite(self.due) and time.perf_counter() > self.due:
             raise EndedRunError(OVER)
 
-    def made(self, work: float) -> Floats:
+    def made(self, work: float) -> FloatArray:
         """The progress of the whole run, which took the given `work`; see `Tried.pace`."""
         return np.array([*self.marks, (self.t_end, work)]).T
 

@@ -16,7 +16,7 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError, StepFailure
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Trajectory
 from eomgen.run.works import Powers
@@ -40,7 +40,7 @@ SAME_TIME = 1e-6
 """Rows count as simultaneous if they are this close, relative to the time between two rows."""
 OVER = "it took too long"
 
-Rows = Callable[[Floats, Floats], Floats]
+Rows = Callable[[FloatArray, FloatArray], FloatArray]
 """A function of times (n,) and states (n, ny) that gives a number for each, (n,)."""
 
 
@@ -87,7 +87,7 @@ class _Watched(Problem):
 
     defect: _Defect = field(default_factory=_Defect)
 
-    def unit(self, y: Floats) -> Floats:
+    def unit(self, y: FloatArray) -> FloatArray:
         for indices in self.quaternions:
             off = abs(math.hypot(*(float(y[i]) for i in indices)) - 1)
             self.defect.largest = max(self.defect.largest, off)

@@ -19,7 +19,7 @@ from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program
 from eomgen.routes import ROUTES
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
 from eomgen.scalars.extended import DIGITS
 from eomgen.scene.schema import Simulation
@@ -49,8 +49,8 @@ class Errors:
     components  of all components of v̇ together, each in its own ulps
     """
 
-    ulps: Floats
-    components: Floats
+    ulps: FloatArray
+    components: FloatArray
 
     @property
     def failed(self) -> int:
@@ -187,7 +187,7 @@ def solve_operations(n: int) -> int:
     return factor + 2 * n * (n - 1) + n
 
 
-def _rounded(values: Floats) -> Floats:
+def _rounded(values: FloatArray) -> FloatArray:
     return values.astype(np.float32).astype(np.float64)
 
 
@@ -219,7 +219,7 @@ def _operations(name: str, made: Made) -> int:
     return sum(cost[term]["total"] for term in TERMS) + n + solve_operations(n)
 
 
-def _doubles(name: str, made: Made, sample: Sample) -> tuple[Floats, list[str]]:
+def _doubles(name: str, made: Made, sample: Sample) -> tuple[FloatArray, list[str]]:
     """v̇ (nv, n) from the generated code, nan where it fails, and the reasons."""
     at, module = velocities(made), made.module
     found = np.full((at.stop - at.start, len(sample.y)), np.nan)
@@ -235,7 +235,7 @@ def _doubles(name: str, made: Made, sample: Sample) -> tuple[Floats, list[str]]:
     return found, whys
 
 
-def _solved(module: Any, t: float, y: Floats) -> Any:
+def _solved(module: Any, t: float, y: FloatArray) -> Any:
     """v̇ from M v̇ = F - V - G by `numpy.linalg.solve`, for one state or for columns of states."""
     matrix = module.mass_matrix(t, y)
     right = module.applied_force(t, y) - module.bias_force(t, y)
@@ -263,7 +263,7 @@ def _singles(name: str, made: Made, sample: Sample) -> tuple[Any, list[str]]:
     return found, whys
 
 
-def _timed(found: Sequence[Way], made: Mapping[str, Made], states: Floats) -> list[Way]:
+def _timed(found: Sequence[Way], made: Mapping[str, Made], states: FloatArray) -> list[Way]:
     """The same with the least times of calls, which take turns."""
     many = np.resize(states, (BATCH, states.shape[1])).T.copy()
     timed, calls, places = list(found), [], []

@@ -18,7 +18,7 @@ from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule, as_problem
-from eomgen.run.problem import Floats, Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Simulation
 
@@ -38,8 +38,8 @@ FAR_ENOUGH = "the other run ends here"
 class Run:
     """A motion: times (n,), poses (n, nb, …) as from `body_poses`, and why it ended early."""
 
-    t: Floats
-    poses: Floats
+    t: FloatArray
+    poses: FloatArray
     ended: str
 
 
@@ -109,7 +109,7 @@ def _timed(module: GeneratedModule, due: float, until: float) -> Problem:
     """The initial-value problem of a module; its derivative ends the run when time is up."""
     problem = as_problem(module)
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         if time.perf_counter() > due:
             raise EndedRunError(OVER)
         if t > until:
@@ -146,9 +146,9 @@ def change(model: Model, whole: Run, other: Run, size: float) -> Change:
     )
 
 
-def distances(model: Model, one: Floats, two: Floats) -> Floats:
+def distances(model: Model, one: FloatArray, two: FloatArray) -> FloatArray:
     """The distance d between each row of two motions, (n,), m: root mean square over all mass."""
-    total: Floats = np.zeros(len(one))
+    total: FloatArray = np.zeros(len(one))
     moved = np.sum((_places(one) - _places(two)) ** 2, axis=-1)
     turned = _attitudes(one) - _attitudes(two)
     masses = [model.value(body.mass) for body in model.bodies]
@@ -159,7 +159,7 @@ def distances(model: Model, one: Floats, two: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(total, 0.0) / sum(masses)))
 
 
-def _second_moment(inertia: Sequence[float]) -> Floats:
+def _second_moment(inertia: Sequence[float]) -> FloatArray:
     """J = ∫ r rᵀ dm from the moments of inertia: ½ tr(I) 1 - I. In the plane, one of several J."""
     if len(inertia) == 1:
         return np.asarray(np.eye(2) * inertia[0] / 2)
@@ -168,12 +168,12 @@ def _second_moment(inertia: Sequence[float]) -> Floats:
     return np.asarray(np.trace(matrix) / 2 * np.eye(3) - matrix)
 
 
-def _places(poses: Floats) -> Floats:
+def _places(poses: FloatArray) -> FloatArray:
     """Centres of mass, (n, nb, 2) or (n, nb, 3)."""
     return poses[..., :2] if poses.ndim == 3 else poses[..., 3]
 
 
-def _attitudes(poses: Floats) -> Floats:
+def _attitudes(poses: FloatArray) -> FloatArray:
     """Rotation matrices from body to world, (n, nb, 2, 2) or (n, nb, 3, 3)."""
     if poses.ndim == 4:
         return poses[..., :3]
@@ -181,7 +181,7 @@ def _attitudes(poses: Floats) -> Floats:
     return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
 
 
-def _angles(one: Floats, two: Floats) -> Floats:
+def _angles(one: FloatArray, two: FloatArray) -> FloatArray:
     """Angle between the two orientations of each body, 0 to π, (n, nb).
 
     In the plane and in space, |ΔR|² is 4 (1 - cos) or, what is the same, 8 sin²(½ angle).

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from eomgen.codegen.system import System
 from eomgen.program.program import interpret
 from eomgen.program.tape import TIME
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scalars.protocol import Scalars
 
@@ -41,7 +41,7 @@ class Single(Scalars):
         return _NUMPY[function](*arguments)
 
 
-def in_single(system: System, output: str, t: Floats, y: Floats) -> Singles:
+def in_single(system: System, output: str, t: FloatArray, y: FloatArray) -> Singles:
     """An output of a system at times t (n,) and states y (n, ny), with inputs 0: in its own shape
     plus a last axis of n. Every input and every operation is rounded to float32.
     """

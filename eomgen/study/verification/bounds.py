@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eomgen.model.model import Model
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.study.verification.drift import RTOL, Drift
 from eomgen.study.verification.judging import Judged
 from eomgen.study.verification.laws import Broken
@@ -75,12 +75,12 @@ class Check:
         return not (self.value > self.bound if self.above else self.value <= self.bound)
 
 
-def forward_ulps(there: Sequence[Judged], route: str, model: Model) -> Floats:
+def forward_ulps(there: Sequence[Judged], route: str, model: Model) -> FloatArray:
     """Forward error of v̇ of a route at each state, (n,), ulps; infinite if v̇ is not finite."""
     return in_ulps(np.array([one.off[route] for one in there]), there, model)
 
 
-def in_ulps(off: Floats, there: Sequence[Judged], model: Model) -> Floats:
+def in_ulps(off: FloatArray, there: Sequence[Judged], model: Model) -> FloatArray:
     """Errors (n, nv) of v̇ in ulps (see `ulps`), (n,); infinite where they are not finite."""
     true = np.array([one.vd for one in there]).T
     errors = np.zeros(len(there))
@@ -94,8 +94,8 @@ def in_ulps(off: Floats, there: Sequence[Judged], model: Model) -> Floats:
 
 def forward_checks(
     there: Sequence[Judged],
-    ulps: Mapping[str, Floats],
-    data: Floats,
+    ulps: Mapping[str, FloatArray],
+    data: FloatArray,
     taken: str,
     nv: int,
     bound: float | None,
@@ -151,13 +151,13 @@ def forward_checks(
     return checks
 
 
-def allowed_ulps(there: Sequence[Judged], data: Floats) -> Floats:
+def allowed_ulps(there: Sequence[Judged], data: FloatArray) -> FloatArray:
     """Forward error allowed for the route taken at each state, (n,), ulps."""
     least = np.array([BOUND if one.state.kind in ANYWHERE else IN_LINE for one in there])
     return np.asarray(np.maximum(least, AMPLIFIED * data))
 
 
-def _worst(errors: Floats, allowed: Floats) -> int:
+def _worst(errors: FloatArray, allowed: FloatArray) -> int:
     """The state that exceeds its bound by most or, if none does, has the greatest error."""
     with np.errstate(all="ignore"):
         share = np.where(errors == 0.0, 0.0, errors / allowed)

@@ -10,7 +10,7 @@ from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError
 from eomgen.run.module import GeneratedModule, as_powers
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import Simulation
@@ -69,7 +69,7 @@ def drift(
     most = 1 + MOST_OPERATIONS // max(MOST_OPERATIONS // MOST_CALLS, _operations(module))
     calls = 0
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         nonlocal calls
         calls += 1
         if calls > most:
@@ -112,7 +112,7 @@ def drift(
     return Drift(float(run.t[-1]), run.counts["steps"], stopped, keeps, lost, books, unit)
 
 
-def _beside_change(run: Trajectory, total: Floats) -> list[State]:
+def _beside_change(run: Trajectory, total: FloatArray) -> list[State]:
     """The rows before and after the greatest change of energy."""
     if len(run.t) < 2:
         return []
@@ -124,17 +124,17 @@ def _operations(module: GeneratedModule) -> int:
     return module.COST["derivative"]["total"]
 
 
-def _along(output: Any, t: Floats, y: Floats) -> Floats:
+def _along(output: Any, t: FloatArray, y: FloatArray) -> FloatArray:
     """An output at every row, with rows as the last axis."""
     return np.stack([np.asarray(output(*row)) for row in zip(t, y, strict=True)], axis=-1)
 
 
-def _lost(values: Floats, size: Any) -> float:
+def _lost(values: FloatArray, size: Any) -> float:
     off = float(np.max(np.abs(values - values[0])))
     return off / float(size) if size else off
 
 
-def _components(dimensions: int, momenta: Floats) -> list[tuple[str, int, float]]:
+def _components(dimensions: int, momenta: FloatArray) -> list[tuple[str, int, float]]:
     """Name, row and reference size of each component of momentum."""
     names = [*AXES[:dimensions], *(f"about {x}" for x in (AXES if dimensions == 3 else "z"))]
     linear, angular = momenta[:dimensions], momenta[dimensions:]

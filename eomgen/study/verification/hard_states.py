@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.study.verification.states import random_state
 
 Random = np.random.Generator
@@ -36,7 +36,7 @@ class State:
     kind: str
     number: int
     t: float
-    y: Floats
+    y: FloatArray
     u: dict[str, float]
 
     @property
@@ -64,7 +64,7 @@ def hard_states(
     return found
 
 
-def _made(kind: str, module: GeneratedModule, nv: int, y: Floats, rng: Random) -> Floats:
+def _made(kind: str, module: GeneratedModule, nv: int, y: FloatArray, rng: Random) -> FloatArray:
     """A random state changed into one of the given kind."""
     nq = len(module.POSITIONS)
     turning = [i for q in module.QUATERNIONS for i in q]
@@ -97,7 +97,7 @@ _ANGLES: dict[str, Angle] = {
 }
 
 
-def _attitude(kind: str, rng: Random) -> Floats:
+def _attitude(kind: str, rng: Random) -> FloatArray:
     """A unit quaternion for a kind of states."""
     axis = np.eye(3)[rng.integers(3)]
     half = 0.0

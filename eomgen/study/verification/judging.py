@@ -17,7 +17,7 @@ from gmpy2 import mpfr
 from eomgen.model.model import Model
 from eomgen.precision.longs import Array, doubles, long, long_digits, solved
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.scene.effects import Gravity
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.truth import Truth
@@ -55,9 +55,9 @@ class Judged:
     """
 
     state: State
-    vd: Floats
-    off: Mapping[str, Floats]
-    data: Floats
+    vd: FloatArray
+    off: Mapping[str, FloatArray]
+    data: FloatArray
     agreed: float
     condition: float
     pivot: float
@@ -143,7 +143,7 @@ def _agreed(free: FreeBodies, vd: Array) -> float:
     return -_log10(worst) if worst else 60.0
 
 
-def _derivative(module: Any, state: State) -> Floats:
+def _derivative(module: Any, state: State) -> FloatArray:
     """ẏ of generated code, nan if it fails."""
     try:
         return np.asarray(module.derivative(state.t, state.y, None, state.u or None))
@@ -152,7 +152,7 @@ def _derivative(module: Any, state: State) -> Floats:
 
 
 def _residuals(
-    free: FreeBodies, near: Sequence[FreeBodies], vd: Mapping[str, Floats], model: Model
+    free: FreeBodies, near: Sequence[FreeBodies], vd: Mapping[str, FloatArray], model: Model
 ) -> dict[str, Loss]:
     """The errors of M v̇ + h - F at the v̇ of each route, in 60 digits."""
     found = {}
@@ -178,7 +178,11 @@ def _needed(free: FreeBodies, vd: Array) -> Array:
 
 
 def _outputs(
-    free: FreeBodies, near: Sequence[FreeBodies], modules: Sequence[Any], ydot: Floats, state: State
+    free: FreeBodies,
+    near: Sequence[FreeBodies],
+    modules: Sequence[Any],
+    ydot: FloatArray,
+    state: State,
 ) -> dict[str, Loss]:
     """The errors of everything that the module computes besides v̇."""
     nq, nv = len(free.model.coordinates), free.nv

@@ -8,7 +8,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
 from eomgen.scalars.extended import DIGITS
 from eomgen.scene.schema import Simulation
@@ -32,9 +32,9 @@ class Sample:
     """
 
     kind: str
-    t: Floats
-    y: Floats
-    condition: Floats = field(default_factory=lambda: np.empty(0))
+    t: FloatArray
+    y: FloatArray
+    condition: FloatArray = field(default_factory=lambda: np.empty(0))
     left_out: int = 0
     until: float | None = None
 
@@ -82,7 +82,7 @@ def agreement(truth: Truth, sample: Sample, true: Exact) -> float:
     return -math.log10(worst) if worst else float(DIGITS)
 
 
-def condition_numbers(module: Any, sample: Sample) -> Floats:
+def condition_numbers(module: Any, sample: Sample) -> FloatArray:
     """2-norm condition number (n,) of the mass matrix scaled to a diagonal of ones."""
     found = []
     for t, y in zip(sample.t, sample.y, strict=True):

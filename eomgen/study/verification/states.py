@@ -3,13 +3,13 @@
 import numpy as np
 
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 
 REACH = {"rad": 2 * np.pi, "m": 0.6, "rad/s": 3.0, "m/s": 1.0}
 """Greatest absolute value of a state of each unit; 1 for other units."""
 
 
-def random_state(module: GeneratedModule, rng: np.random.Generator) -> Floats:
+def random_state(module: GeneratedModule, rng: np.random.Generator) -> FloatArray:
     """A state (ny,) of a module: angles over two turns, displacements within 0.6 m, quaternions of
     any orientation, velocities up to 3 rad/s and 1 m/s.
     """

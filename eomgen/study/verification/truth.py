@@ -15,7 +15,7 @@ from eomgen.precision.longs import Array, long
 from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, finish, interpreter
 from eomgen.program.tape import TIME, ExactTape
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.scalars.extended import MP, Bits, Digits, exact
 
 Exact = NDArray[np.object_]
@@ -38,7 +38,7 @@ class Truth:
         self._accelerations = evaluator(program, "vd")
         self._long = interpreter(program, "vd", Bits())
 
-    def __call__(self, t: Floats, y: Floats) -> Exact:
+    def __call__(self, t: FloatArray, y: FloatArray) -> Exact:
         """v̇ (nv, n) at times t (n,) and states y (n, ny); a column of None if it fails there."""
         return np.array(list(map(self._at, t.tolist(), y.tolist())), dtype=object).T
 
@@ -62,7 +62,7 @@ class Truth:
         given |= dict(zip(values, long(list(values.values())), strict=True))
         return long(self._long(given))
 
-    def factored(self, t: float, y: Floats) -> Exact:
+    def factored(self, t: float, y: FloatArray) -> Exact:
         """v̇ (nv,) at one state, by LᵀDL factors."""
         values = values_at(
             self.model,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.scalars.extended import MP
 from eomgen.study.verification.truth import Exact
 
@@ -30,7 +30,7 @@ def ulp(x: Any, bits: int) -> Any:
     return MP.ldexp(1, MP.frexp(x)[1] - bits)
 
 
-def vector_errors(found: Floats, true: Exact, units: Sequence[str], bits: int) -> Floats:
+def vector_errors(found: FloatArray, true: Exact, units: Sequence[str], bits: int) -> FloatArray:
     """Errors (n,) in ulps of vectors in columns (m, n), as this module counts them.
 
     `units` are those of the components. If a group is 0 at most states, its greatest size at any
@@ -59,7 +59,7 @@ def group_scales(true: Any, units: Sequence[str]) -> list[tuple[list[int], Any]]
     return found
 
 
-def component_errors(found: Floats, true: Exact, bits: int) -> Floats:
+def component_errors(found: FloatArray, true: Exact, bits: int) -> FloatArray:
     """Errors of all components, each in its own ulps, except those that are 0 or not finite."""
     pairs = zip(found.ravel().tolist(), true.ravel(), strict=True)
     return np.array(

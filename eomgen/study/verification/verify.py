@@ -14,7 +14,7 @@ from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.routes import ROUTES
 from eomgen.run.module import GeneratedModule, as_problem, load_module
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Simulation
 from eomgen.store import generated_code
@@ -74,8 +74,8 @@ class Verified:
     notes: tuple[str, ...]
     left_out: int
     until: float
-    ulps: Mapping[str, Floats]
-    data: Floats
+    ulps: Mapping[str, FloatArray]
+    data: FloatArray
 
     @property
     def better(self) -> list[str]:

@@ -8,7 +8,7 @@ from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Floats
+from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Simulation
 from eomgen.study.diagnosis import problem_of
@@ -22,8 +22,8 @@ ENOUGH = "enough states"
 class Visited:
     """Times t (n,) and states y (n, ny) of a run, and its end time, s."""
 
-    t: Floats
-    y: Floats
+    t: FloatArray
+    y: FloatArray
     until: float
 
 
@@ -44,7 +44,7 @@ def visited(
     problem = problem_of(module, model=model)
     keep = _Keep(count, most=1 + MOST_OPERATIONS // max(1, module.COST["derivative"]["total"]))
 
-    def derivative(t: float, y: Floats) -> Floats:
+    def derivative(t: float, y: FloatArray) -> FloatArray:
         keep.see(t, y)
         return problem.derivative(t, y)
 
@@ -69,12 +69,12 @@ class _Keep:
     """Records every k-th state; k doubles whenever there are too many."""
 
     def __init__(self, count: int, most: int) -> None:
-        self.rows: list[tuple[float, Floats]] = []
+        self.rows: list[tuple[float, FloatArray]] = []
         self.last = 0.0
         self._limit, self._most = 20 * count, most
         self._every, self._seen = 1, 0
 
-    def see(self, t: float, y: Floats) -> None:
+    def see(self, t: float, y: FloatArray) -> None:
         """Record a state. Raises `EndedRunError` when there have been enough."""
         if self._seen >= self._most:
             raise EndedRunError(ENOUGH)
