@@ -15,7 +15,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program
 from eomgen.precision.guarding import guard_of
 from eomgen.program.program import Program
-from eomgen.run.guard import LOST, Guard, Watch
+from eomgen.run.guard import LOST, Guard, RoundingMonitor
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import StepFailure
 from eomgen.run.module import as_problem, load_module
@@ -169,18 +169,18 @@ def test_a_domain_that_is_left_and_a_quaternion_that_drifts_are_told() -> None:
         np.array([1.0, 0.0, 0.0, 0.0]),
         quaternions=((0, 1, 2, 3),),
     )
-    watch = Watch(Guard(lambda t, y: np.zeros(4), ((0, 1, 2, 3),)), spun, LOST)
-    assert watch.loss(0.0, spun.initial) == 0.0
+    monitor = RoundingMonitor(Guard(lambda t, y: np.zeros(4), ((0, 1, 2, 3),)), spun, LOST)
+    assert monitor.loss(0.0, spun.initial) == 0.0
     with pytest.raises(StepFailure, match="from w on is off unit length by 1e-06"):
-        watch.loss(0.0, np.array([1.000001, 0.0, 0.0, 0.0]))
+        monitor.loss(0.0, np.array([1.000001, 0.0, 0.0, 0.0]))
 
 
 def test_what_doubles_cannot_evaluate_counts_as_lost() -> None:
     """Not a number, or an error, is no answer."""
     problem, guard = spiky((2.0, 3.0))
     for wrong in (lambda t, y: np.array([np.nan]), lambda t, y: np.array([1.0 / 0.0])):
-        watch = Watch(guard, replace(problem, derivative=wrong), LOST)
-        assert watch.loss(0.0, np.zeros(1)) == np.inf
+        monitor = RoundingMonitor(guard, replace(problem, derivative=wrong), LOST)
+        assert monitor.loss(0.0, np.zeros(1)) == np.inf
 
 
 def test_contacts_cannot_be_repaired() -> None:

@@ -30,35 +30,36 @@ def digits(bits: int = BITS) -> Any:
     return gmpy2.context(precision=bits)
 
 
-class Watch:
-    """Which way each corner of a derivative goes, in the order of its steps.
+class CornerBranches:
+    """The branch that each corner of a derivative takes, in the order of its steps.
 
-    On one side of its corners a derivative is smooth, and goes on smoothly beyond them while its
-    ways are held. So `ways` stay as they are until someone turns them; what is not there yet is
-    decided by the next evaluation. `margins` tells how far each was from turning in the last
-    evaluation: a way is right where it is True and its margin > 0, or False and < 0.
+    A derivative is smooth on one side of its corners. It goes on smoothly beyond them while its
+    branches are held. So `branches` stay as they are until someone changes them. The next
+    evaluation decides those that are not there yet. `margins` says how far each corner was from
+    changing its branch in the last evaluation. A branch agrees with its margin if it is True and
+    the margin is > 0, or False and < 0.
     """
 
     def __init__(self) -> None:
-        self.ways: list[bool] = []
+        self.branches: list[bool] = []
         self.margins: list[Long] = []
 
-    def _goes(self, margin: Long) -> bool:
-        if len(self.margins) == len(self.ways):
-            self.ways.append(bool(margin > 0))
+    def _branch(self, margin: Long) -> bool:
+        if len(self.margins) == len(self.branches):
+            self.branches.append(bool(margin > 0))
         self.margins.append(margin)
-        return self.ways[len(self.margins) - 1]
+        return self.branches[len(self.margins) - 1]
 
     def functions(self) -> dict[str, Callable[..., Long]]:
-        """The functions that have corners, going the ways that are held."""
-        goes = self._goes
+        """The functions that have corners, on the branches that are held."""
+        branch = self._branch
         one, zero = mpfr(1), mpfr(0)
         return {
-            "abs": lambda x: x if goes(x) else -x,
-            "step": lambda x: one if goes(x) else zero,
-            "min": lambda a, b: b if goes(a - b) else a,
-            "max": lambda a, b: a if goes(a - b) else b,
-            "select": lambda c, a, b: a if goes(c) else b,
+            "abs": lambda x: x if branch(x) else -x,
+            "step": lambda x: one if branch(x) else zero,
+            "min": lambda a, b: b if branch(a - b) else a,
+            "max": lambda a, b: a if branch(a - b) else b,
+            "select": lambda c, a, b: a if branch(c) else b,
             # max(x, 0) held beyond 0 is negative: its root is to have a value there.
             "sqrt": lambda x: gmpy2.sqrt(abs(x)),
         }
@@ -70,12 +71,13 @@ class Precise:
 
     derivative  f(t, y), ny long numbers; t and y long
     initial     (ny,), the initial state of doubles
-    watch       holds the ways that corners go; None where there are none
+    corner_branches
+                the branch that each corner takes; None where there are none
     """
 
     derivative: Callable[[Long, Sequence[Long]], Sequence[Long]]
     initial: tuple[Long, ...]
-    watch: Watch | None
+    corner_branches: CornerBranches | None
 
 
 def precise(
@@ -98,8 +100,8 @@ def precise(
     """
     found = kernel(program, "derivative")
     corners = any(name in found.functions for name in CORNERS)
-    watch = Watch() if watched and corners else None
-    functions = {**BY_MPFR, **(watch.functions() if watch else {})}
+    corner_branches = CornerBranches() if watched and corners else None
+    functions = {**BY_MPFR, **(corner_branches.functions() if corner_branches else {})}
     called = [functions[name] for name in found.functions]
     with digits(bits):
         known = found.known_values(_long(parameters, module.PARAMETERS), Bits())
@@ -108,12 +110,12 @@ def precise(
     places = {name: i for i, name in enumerate(module.STATES)}
 
     def derivative(t: Long, y: Sequence[Long]) -> Sequence[Long]:
-        if watch:
-            watch.margins = []
+        if corner_branches:
+            corner_branches.margins = []
         return found.moving(known, [take(t, y) for take in taken], called)
 
     taken = [_taken(name, places, fixed) for name in found.inputs]
-    return Precise(derivative, start, watch)
+    return Precise(derivative, start, corner_branches)
 
 
 def _taken(

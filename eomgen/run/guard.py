@@ -49,7 +49,7 @@ class Guard:
 
 
 @dataclass(eq=False)
-class Watch:
+class RoundingMonitor:
     """A guard at its work on one run, which holds it to `bound`.
 
     derivative  what the run is to integrate: the problem's own, and `exact` while `repairing`
@@ -126,19 +126,19 @@ class Watch:
         )
 
 
-def watched(
-    watch: Watch, advances: Iterator[Advance], t: float, y: FloatArray
+def monitored(
+    monitor: RoundingMonitor, advances: Iterator[Advance], t: float, y: FloatArray
 ) -> Iterator[Advance]:
     """The same steps. Raises `StepFailure` before the first whose end has lost digits."""
-    _check(watch, watch.loss(t, y))
+    _check(monitor, monitor.loss(t, y))
     for advance in advances:
         if np.isfinite(advance.y).all():
-            _check(watch, watch.loss(advance.t, advance.y))
+            _check(monitor, monitor.loss(advance.t, advance.y))
         yield advance
 
 
 def repaired(
-    watch: Watch, begin: Begin, problem: Problem, t: float, max_steps: int
+    monitor: RoundingMonitor, begin: Begin, problem: Problem, t: float, max_steps: int
 ) -> Iterator[Advance]:
     """Steps of a problem from time t on, in doubles where they hold, in long numbers elsewhere.
 
@@ -146,24 +146,24 @@ def repaired(
     those after it up to where doubles are good again.
     """
     y, made = problem.initial, 0
-    watch.repairing = False
-    loss = watch.loss(t, y)
-    if loss > watch.bound:
-        _repair(watch, t, loss)
+    monitor.repairing = False
+    loss = monitor.loss(t, y)
+    if loss > monitor.bound:
+        _repair(monitor, t, loss)
     again = True
     while again:
         again = False
         for advance in begin(replace(problem, initial=y), t, made):
             if np.isfinite(advance.y).all():
-                loss = watch.loss(advance.t, advance.y)
-                if loss > watch.bound and not watch.repairing:
-                    _repair(watch, t, loss)
+                loss = monitor.loss(advance.t, advance.y)
+                if loss > monitor.bound and not monitor.repairing:
+                    _repair(monitor, t, loss)
                     again = True
                     break
-                if watch.repairing:
-                    since, _, worst = watch.stretches[-1]
-                    watch.stretches[-1] = since, advance.t, max(worst, loss)
-                    watch.repairing = loss > REGAINED * watch.bound
+                if monitor.repairing:
+                    since, _, worst = monitor.stretches[-1]
+                    monitor.stretches[-1] = since, advance.t, max(worst, loss)
+                    monitor.repairing = loss > REGAINED * monitor.bound
             t, y = advance.t, advance.y
             made += advance.is_step
             if made > max_steps:
@@ -171,11 +171,11 @@ def repaired(
             yield advance
 
 
-def _check(watch: Watch, loss: float) -> None:
-    if loss > watch.bound:
-        raise watch.lost(loss)
+def _check(monitor: RoundingMonitor, loss: float) -> None:
+    if loss > monitor.bound:
+        raise monitor.lost(loss)
 
 
-def _repair(watch: Watch, t: float, loss: float) -> None:
-    watch.repairing = True
-    watch.stretches.append((t, t, loss))
+def _repair(monitor: RoundingMonitor, t: float, loss: float) -> None:
+    monitor.repairing = True
+    monitor.stretches.append((t, t, loss))

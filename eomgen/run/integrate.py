@@ -9,7 +9,7 @@ import numpy as np
 
 from eomgen.run import events
 from eomgen.run.checks import check_repairs, check_rest_speed, numbers
-from eomgen.run.guard import OF_TOLERANCE, Guard, Watch, repaired, watched
+from eomgen.run.guard import OF_TOLERANCE, Guard, RoundingMonitor, monitored, repaired
 from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import FloatArray, Problem
@@ -97,11 +97,11 @@ def integrate(
         resume=resume,
     )
     check_rest_speed(rest_speed)
-    watch = _watch(guard, problem, method, asked) if guard else None
+    monitor = _monitor(guard, problem, method, asked) if guard else None
     derivatives, jacobians = _Count(1), _Count(2)
     counted = replace(
         problem,
-        derivative=derivatives.of(watch.derivative if watch else problem.derivative),
+        derivative=derivatives.of(monitor.derivative if monitor else problem.derivative),
         jacobian=jacobians.of(problem.jacobian),
     )
     if tally:
@@ -110,7 +110,7 @@ def integrate(
     if isinstance(method, FixedStep):
         # What is looked at on the way does not count.
         # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
-        unseen = unstable or not method.explicit or (watch and watch.guard.repairs)
+        unseen = unstable or not method.explicit or (monitor and monitor.guard.repairs)
         looked_at = None if unseen else problem
         begin, remembered = equal_steps(asked, method, counted, looked_at)
     else:
@@ -118,17 +118,17 @@ def integrate(
 
     looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
     stepper = events.Stepper(begin, looks, derivatives.of)
-    advances = _advances(stepper, counted, asked, watch, rest_speed)
+    advances = _advances(stepper, counted, asked, monitor, rest_speed)
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
     run = _Run(asked.t_start, problem.initial, account)
-    if can_go_on(method) and not (watch and watch.guard.repairs):
+    if can_go_on(method) and not (monitor and monitor.guard.repairs):
         run.resume = partial(begun, asked, problem)
     if tally:
         tally.begin(problem.initial)
     counts, told = (derivatives, jacobians), progress or _ignore
     outcome, trouble = _follow(run, advances, counts, problem, method, asked.t_end, told, tally)
     kept = _kept(run, problem, {**remembered, **numbers(rest_speed=rest_speed)})
-    said = (trouble, watch.words() if watch else "", *dict.fromkeys(remarks))
+    said = (trouble, monitor.words() if monitor else "", *dict.fromkeys(remarks))
     return Trajectory(
         name=problem.name,
         states=problem.states,
@@ -168,7 +168,9 @@ def _kept(run: "_Run", problem: Problem, remembered: Resume) -> Resume:
     return {**stands, **remembered, "derivative": rate}
 
 
-def _watch(guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: Asked) -> Watch:
+def _monitor(
+    guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: Asked
+) -> RoundingMonitor:
     """A guard at its work on a run, held to what the run's tolerance asks for, too.
 
     Raises `RunError` for repairs that cannot be made.
@@ -176,7 +178,7 @@ def _watch(guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: 
     if guard.repairs:
         check_repairs(problem, asked.resume is not None)
     tight = OF_TOLERANCE * asked.rtol if isinstance(method, Adaptive) else guard.bound
-    return Watch(guard, problem, min(guard.bound, tight))
+    return RoundingMonitor(guard, problem, min(guard.bound, tight))
 
 
 @dataclass
@@ -254,13 +256,13 @@ def _advances(
     stepper: events.Stepper,
     problem: Problem,
     asked: Asked,
-    watch: Watch | None,
+    monitor: RoundingMonitor | None,
     rest_speed: float | None,
 ) -> Iterator[Advance]:
     """The steps of a run, from strike to strike if it has contacts, and under its guard."""
     t_start, resume = asked.t_start, asked.resume
-    if watch and watch.guard.repairs:
-        return repaired(watch, stepper.begin, problem, t_start, asked.max_steps)
+    if monitor and monitor.guard.repairs:
+        return repaired(monitor, stepper.begin, problem, t_start, asked.max_steps)
     if problem.contacts is None:
         advances = stepper.begin(problem, t_start, 0, resume)
     else:
@@ -273,7 +275,7 @@ def _advances(
             max_steps=asked.max_steps,
             resume=resume,
         )
-    return watched(watch, advances, t_start, problem.initial) if watch else advances
+    return monitored(monitor, advances, t_start, problem.initial) if monitor else advances
 
 
 def _follow(

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from eomgen.run.integrators.interface import Advance, Change, Resume, Stability
-from eomgen.run.integrators.stability import Watch
+from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.problem import FloatArray, Problem
 
 
@@ -47,8 +47,8 @@ def advances(
     first = min(math.floor((t - t_start) / dt + 1e-9) + 1, steps)
     regular, y = t == t_start or resume is not None, problem.initial
     lost = np.zeros_like(y) if resume is None else resume["lost"]
-    watch = Watch(change, stability)
-    seen = watch.seeing(problem) if watched else problem
+    monitor = StabilityMonitor(change, stability)
+    seen = monitor.seeing(problem) if watched else problem
     for i in range(first, steps + 1):
         # From the start each time: adding up dt would gather rounding.
         mark = t_start + i * dt
@@ -58,9 +58,9 @@ def advances(
         length = dt if regular and whole else end - t
         step = change(seen, t, y, length)
         if watched:
-            watch.see(watched, t, y, step, length)
+            monitor.see(watched, t, y, step, length)
             if i == steps:
-                watch.settle(watched)
+                monitor.settle(watched)
         y, lost = _sum(y, step + lost)
         y = problem.unit(y)
         t, regular = end, True

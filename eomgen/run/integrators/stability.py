@@ -39,8 +39,9 @@ REACH = 0.5
 
 SHARE = 0.1
 """Of the time of a run that looks into jumps may take: the motion of a large mechanism may jump at
-every step. Times are reckoned in derivatives, see `Watch`, not taken by a clock: a run is the same
-on every machine."""
+every step. Times are reckoned in derivatives, see `StabilityMonitor`, not taken by a clock: a run
+is the same on every machine.
+"""
 
 BRIEF = 8000.0
 """Over the number of states: derivatives that take no time worth sparing."""
@@ -55,7 +56,7 @@ class UnstableStepError(StepFailure):
 
 
 @dataclass
-class Watch:
+class StabilityMonitor:
     """Looks into steps where rates jump.
 
     What takes as long as a derivative of n states counts 1: a step its derivatives and 25/n, a look

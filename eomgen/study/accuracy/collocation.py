@@ -21,7 +21,7 @@ import scipy.linalg
 from gmpy2 import mpfr
 from numpy.typing import NDArray
 
-from eomgen.precision.precise import BITS, Long, Precise, Watch, digits
+from eomgen.precision.precise import BITS, CornerBranches, Long, Precise, digits
 from eomgen.run.integrators.unwarned import factors
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.study.accuracy import corners
@@ -152,7 +152,9 @@ def advance(
     moments = np.array(times, dtype=float)
     guessed = forecast(float(t), near, moments)
     correct = _solver(method, problem, float(h), moments, guessed)
-    if precise.watch is None:  # with corners, doubles might take another branch than this step
+    if (
+        precise.corner_branches is None
+    ):  # with corners, doubles might take another branch than this step
         guessed = _in_doubles(method, problem, float(h), moments, near, guessed, correct, scale)
     moves = guessed.astype(object) - y  # in extended precision: sums of doubles would be doubles
     last = math.inf
@@ -160,7 +162,7 @@ def advance(
         states, slopes, margins = y + moves, [], []
         for time, state in zip(times, states.tolist(), strict=True):
             slopes.append(precise.derivative(time, state))
-            margins.append(precise.watch.margins if precise.watch else [])
+            margins.append(precise.corner_branches.margins if precise.corner_branches else [])
         residual = moves - h * (method.a @ np.array(slopes, dtype=object))
         change = correct(residual.astype(float))
         size = float(np.max(np.abs(change) / scale))
@@ -170,7 +172,7 @@ def advance(
         rate = size / last
         if size == 0 or (size * rate <= ENOUGH * tolerance and last < math.inf):
             end = y + method.d @ moves
-            if precise.watch:
+            if precise.corner_branches:
                 margins = [_margins(precise, t, y), *margins, _margins(precise, t + h, end)]
             passed = np.vstack([(y + moves).astype(float), end.astype(float)])
             extent = np.array([passed.min(axis=0), passed.max(axis=0)])
@@ -207,9 +209,9 @@ def _in_doubles(
 
 
 def _margins(precise: Precise, t: Long, y: Longs) -> list[Long]:
-    assert precise.watch is not None
+    assert precise.corner_branches is not None
     precise.derivative(t, y.tolist())
-    return precise.watch.margins
+    return precise.corner_branches.margins
 
 
 def _solver(
@@ -360,9 +362,11 @@ def rows(
                 way.again(h, error, tolerance)
                 turn = None
                 continue
-            if precise.watch:
+            if precise.corner_branches:
                 slow = tried > SLOW
-                again, turn = _turned(precise.watch, method, step.margins, turn, slow=slow)
+                again, turn = _turned(
+                    precise.corner_branches, method, step.margins, turn, slow=slow
+                )
                 tried += again
                 if tried > TURNINGS:
                     raise NoStep(f"corners turn again and again at t = {float(way.t):.6g}")
@@ -376,7 +380,12 @@ def rows(
 
 
 def _turned(
-    watch: Watch, method: Gauss, margins: FloatArray, turn: Turn | None, *, slow: bool
+    corner_branches: CornerBranches,
+    method: Gauss,
+    margins: FloatArray,
+    turn: Turn | None,
+    *,
+    slow: bool,
 ) -> tuple[bool, Turn | None]:
     """Whether a step must be repeated because a corner changes its branch in it, and where the
     step must end then. Branches that change at its start, or at its end if it is accepted, are
@@ -388,12 +397,12 @@ def _turned(
             turn = corners.nearer(turn, places, margins)
             return True, corners.simpler(turn, places, margins) if slow else turn
         for corner in corners.turned_at_the_end(turn, margins):
-            watch.ways[corner] = not watch.ways[corner]
+            corner_branches.branches[corner] = not corner_branches.branches[corner]
         return False, None
-    late = corners.wrong_from_the_start(watch.ways, margins)
+    late = corners.wrong_from_the_start(corner_branches.branches, margins)
     for corner in late:
-        watch.ways[corner] = not watch.ways[corner]
+        corner_branches.branches[corner] = not corner_branches.branches[corner]
     if late:
         return True, None
-    found = corners.first_turn(watch.ways, places, margins)
+    found = corners.first_turn(corner_branches.branches, places, margins)
     return found is not None, found

@@ -1,9 +1,9 @@
 """Where a derivative with corners changes its branch, located as exactly as the motion itself.
 
-With its branches fixed (`precise.Watch`) a derivative is smooth, even across a corner. The sign of
-each corner's margin along the step shows which corner changes first, and where. The step is then
-repeated so that it ends there, the corner's branch is switched, and the next step starts on the
-other side.
+With its branches fixed (`precise.CornerBranches`) a derivative is smooth, even across a corner. The
+sign of each corner's margin along the step shows which corner changes first, and where. The step is
+then repeated so that it ends there, the corner's branch is switched, and the next step starts on
+the other side.
 """
 
 from collections.abc import Sequence
@@ -28,12 +28,12 @@ class Turn:
     beyond: float
 
 
-def wrong(ways: Sequence[bool], margins: FloatArray) -> FloatArray:
+def wrong(branches: Sequence[bool], margins: FloatArray) -> FloatArray:
     """Where margins (n, corners) contradict the current branches; booleans (n, corners)."""
-    return np.where(np.array(ways), margins < 0, margins > 0)
+    return np.where(np.array(branches), margins < 0, margins > 0)
 
 
-def wrong_from_the_start(ways: Sequence[bool], margins: FloatArray) -> list[int]:
+def wrong_from_the_start(branches: Sequence[bool], margins: FloatArray) -> list[int]:
     """Corners that were at their zero at the start of a step and contradict their branch all along.
 
     If a margin is 0 all along the step, the branch for margins > 0 is wrong. That happens to a
@@ -41,22 +41,22 @@ def wrong_from_the_start(ways: Sequence[bool], margins: FloatArray) -> list[int]
 
     margins (n, corners) at the start, the stages and the end
     """
-    against = wrong(ways, margins)
+    against = wrong(branches, margins)
     sizes = np.max(np.abs(margins), axis=0)
     late = against[1:].all(axis=0) & (np.abs(margins[0]) <= NOTHING * sizes)
-    idle = np.array(ways) & (margins[1:] == 0).all(axis=0)
+    idle = np.array(branches) & (margins[1:] == 0).all(axis=0)
     return np.flatnonzero(late | idle).tolist()
 
 
-def first_turn(ways: Sequence[bool], places: FloatArray, margins: FloatArray) -> Turn | None:
+def first_turn(branches: Sequence[bool], places: FloatArray, margins: FloatArray) -> Turn | None:
     """The first branch change within a step; None if there is none.
 
     places   (n,): 0, the nodes, 1, as parts of the step
     margins  (n, corners) at these places
     """
-    against = wrong(ways, margins)[1:].any(axis=0)
+    against = wrong(branches, margins)[1:].any(axis=0)
     turns = [
-        Turn(corner, _root(bool(ways[corner]), places, margins[:, corner]) - 1.0)
+        Turn(corner, _root(bool(branches[corner]), places, margins[:, corner]) - 1.0)
         for corner in np.flatnonzero(against).tolist()
     ]
     return min(turns, key=lambda turn: turn.beyond, default=None)
@@ -108,15 +108,15 @@ def _through(places: FloatArray, values: FloatArray) -> Legendre:
     return Legendre.fit(places, values / size, len(places) - 1, domain=[0.0, 1.0])
 
 
-def _root(way: bool, places: FloatArray, values: FloatArray) -> float:
+def _root(branch: bool, places: FloatArray, values: FloatArray) -> float:
     """The first part of the step at which a margin gets the sign that contradicts its branch."""
     polynomial = _through(places, values)
     slope = polynomial.deriv()
     found = polynomial.roots()
     real = found[np.abs(found.imag) < 1e-6].real
-    passing = [c for c in real if 0.0 < c <= 1.0 and (slope(c) < 0) == way]
+    passing = [c for c in real if 0.0 < c <= 1.0 and (slope(c) < 0) == branch]
     if passing:
         return float(min(passing))
     # No root was found: take the middle between the last right sign and the first wrong one.
-    first = int(np.flatnonzero(values[1:] < 0 if way else values[1:] > 0)[0]) + 1
+    first = int(np.flatnonzero(values[1:] < 0 if branch else values[1:] > 0)[0]) + 1
     return float((places[first - 1] + places[first]) / 2)

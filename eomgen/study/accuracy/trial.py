@@ -39,7 +39,7 @@ MARKS = 500
 SLOW = 2.5
 """A run is stopped early if its speed so far predicts so many times the work allowed."""
 
-Watch = Callable[[str], AbstractContextManager[Progress]]
+ShowProgress = Callable[[str], AbstractContextManager[Progress]]
 """Shows which run is being made, and its progress."""
 
 
@@ -139,7 +139,8 @@ class Case:
 
     units    of the states, by name
     kept     further arguments of `integrate`, the same for all runs
-    watch    shows each run
+    show_progress
+             shows each run
     moved    gives, by number, the problem with constants perturbed in one of several ways (see
              `moved`); None if that is not possible
     """
@@ -148,7 +149,7 @@ class Case:
     t_end: float
     units: Mapping[str, str]
     kept: Mapping[str, Any] = field(default_factory=dict)
-    watch: Watch = unseen
+    show_progress: ShowProgress = unseen
     moved: Callable[[int], Problem] | None = None
 
     @property
@@ -209,7 +210,7 @@ class Case:
         spent = meter(problem, setting.integrator)
         pace = _Pace(spent, most, due, self.t_end, like)
         tally = Tally(pace.check, follow)
-        with self.watch(f"simulating {problem.name}") as progress:
+        with self.show_progress(f"simulating {problem.name}") as progress:
             started = time.perf_counter()
             trajectory = integrate(
                 problem,
