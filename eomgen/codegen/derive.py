@@ -7,7 +7,7 @@ from functools import partial
 from eomgen.codegen.from_recursion import Recording, from_recursion
 from eomgen.codegen.system import System
 from eomgen.derivation.supported import why_not_closed, why_not_pins
-from eomgen.dynamics.instant import Axes
+from eomgen.dynamics.kinematics import Axes
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.program.passes import optimise

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.dynamics.forces import Force
-from eomgen.dynamics.instant import Link
+from eomgen.dynamics.kinematics import Link
 from eomgen.dynamics.rotations import AxisTurn, Both, Rotation, Unturned
 from eomgen.dynamics.solids import Ranks, Solid
 from eomgen.dynamics.vectors import AXES, Vec, add, sub, zeros

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from eomgen.dynamics.forces import Force, at_parent, total
-from eomgen.dynamics.instant import Axis, Instant, Link
+from eomgen.dynamics.kinematics import Axis, Link, TreeKinematics
 from eomgen.dynamics.vectors import (
     AXES,
     ENTRIES,
@@ -65,9 +65,9 @@ Pivots = tuple[tuple[Pivot, ...], ...]
 """Of every link, in the order of its axes."""
 
 
-def articulate(instant: Instant, scalars: Scalars) -> Pivots:
+def articulate(kinematics: TreeKinematics, scalars: Scalars) -> Pivots:
     """Eliminate every axis of motion that is free, leaves first."""
-    links = instant.links
+    links = kinematics.links
     sums = [resistance_of(link, scalars.number(0.0)) for link in links]
     pivots: list[tuple[Pivot, ...]] = [()] * len(links)
     for k in reversed(range(len(links))):
@@ -83,22 +83,22 @@ def articulate(instant: Instant, scalars: Scalars) -> Pivots:
 
 
 def respond(
-    instant: Instant,
+    kinematics: TreeKinematics,
     pivots: Pivots,
     forces: Sequence[Force],
     tau: Sequence[Scalar],
     scalars: Scalars,
 ) -> list[Scalar]:
     """The v̇ that `tau` on the velocities and the wrenches -`forces` on the frames give."""
-    shares = _inwards(instant, pivots, forces, tau)
-    return _outwards(instant, pivots, shares, scalars)
+    shares = _inwards(kinematics, pivots, forces, tau)
+    return _outwards(kinematics, pivots, shares, scalars)
 
 
 def _inwards(
-    instant: Instant, pivots: Pivots, forces: Sequence[Force], tau: Sequence[Scalar]
+    kinematics: TreeKinematics, pivots: Pivots, forces: Sequence[Force], tau: Sequence[Scalar]
 ) -> list[Scalar]:
     """For each velocity what the forces on what it carries do to it, over its pivot."""
-    links, sums = instant.links, list(forces)
+    links, sums = kinematics.links, list(forces)
     shares = list(tau)
     for k in reversed(range(len(links))):
         link, p = links[k], sums[k]
@@ -115,14 +115,14 @@ def _inwards(
 
 
 def _outwards(
-    instant: Instant, pivots: Pivots, shares: Sequence[Scalar], scalars: Scalars
+    kinematics: TreeKinematics, pivots: Pivots, shares: Sequence[Scalar], scalars: Scalars
 ) -> list[Scalar]:
     """Accelerations of the velocities, each from that of the frame that carries it."""
     zero = scalars.number(0.0)
     nothing = (zero, zero, zero)
     result = list(shares)
     reached: list[tuple[Vec, Vec]] = []
-    for k, link in enumerate(instant.links):
+    for k, link in enumerate(kinematics.links):
         angular, linear = nothing, nothing
         if link.parent >= 0:
             base_angular, base_linear = reached[link.parent]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from eomgen.dynamics.forces import Force, at_parent
 from eomgen.dynamics.frames import Rigid, joined
-from eomgen.dynamics.instant import Instant, Link
+from eomgen.dynamics.kinematics import Link, TreeKinematics
 from eomgen.dynamics.vectors import (
     ENTRIES,
     Vec,
@@ -22,11 +22,11 @@ Entries = Mapping[tuple[int, int], Scalar]
 """Entries (i, j) of a symmetric matrix over the tree of velocities: j carries i, or is i."""
 
 
-def composite_bodies(instant: Instant, scalars: Scalars) -> tuple[Rigid, ...]:
+def composite_bodies(kinematics: TreeKinematics, scalars: Scalars) -> tuple[Rigid, ...]:
     """Each frame's rigid body with all that it carries frozen to it (Featherstone 2008, 6.2)."""
-    sums = [link.rigid for link in instant.links]
+    sums = [link.rigid for link in kinematics.links]
     for k in reversed(range(len(sums))):
-        link = instant.links[k]
+        link = kinematics.links[k]
         if link.parent >= 0:
             sums[link.parent] = joined(sums[link.parent], _at_parent(link, sums[k], scalars))
     return tuple(sums)
@@ -57,15 +57,15 @@ def force_to_move(body: Rigid, angular: Vec, linear: Vec) -> Force:
     return Force(add(times(body.inertia, angular), cross(body.first, linear)), momentum)
 
 
-def mass_entries(instant: Instant, scalars: Scalars) -> Entries:
+def mass_entries(kinematics: TreeKinematics, scalars: Scalars) -> Entries:
     """The entries of M at and below the diagonal that are not zero by the tree's shape, rows and
     columns of driven motions left out.
     """
-    bodies = composite_bodies(instant, scalars)
+    bodies = composite_bodies(kinematics, scalars)
     zero = scalars.number(0.0)
     nothing = (zero, zero, zero)
     entries: dict[tuple[int, int], Scalar] = {}
-    for k, link in enumerate(instant.links):
+    for k, link in enumerate(kinematics.links):
         for n, (axis, i) in enumerate(link.free):
             angular, linear = (
                 (axis.direction, nothing) if axis.angular else (nothing, axis.direction)
@@ -75,10 +75,10 @@ def mass_entries(instant: Instant, scalars: Scalars) -> Entries:
                 entries[i, j] = dot(other.direction, force.moment if other.angular else force.force)
             entries[i, i] = entries[i, i] + link.armature
             above, inner = k, force
-            while instant.links[above].parent >= 0:
-                inner = at_parent(instant.links[above], inner)
-                above = instant.links[above].parent
-                outer = instant.links[above]
+            while kinematics.links[above].parent >= 0:
+                inner = at_parent(kinematics.links[above], inner)
+                above = kinematics.links[above].parent
+                outer = kinematics.links[above]
                 for other, j in outer.free:
                     part = inner.moment if other.angular else inner.force
                     entries[i, j] = dot(other.direction, part)
@@ -95,11 +95,11 @@ def full(entries: Entries, nv: int, scalars: Scalars) -> list[Scalar]:
     ]
 
 
-def ancestors(instant: Instant) -> tuple[tuple[int, ...], ...]:
+def ancestors(kinematics: TreeKinematics) -> tuple[tuple[int, ...], ...]:
     """For each free velocity those that carry it, nearest first; itself left out."""
     found: dict[int, tuple[int, ...]] = {}
     reached: list[tuple[int, ...]] = []  # of each link, its own with those above
-    for link in instant.links:
+    for link in kinematics.links:
         above = reached[link.parent] if link.parent >= 0 else ()
         for _, i in link.free:
             found[i] = above

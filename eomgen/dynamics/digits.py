@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from eomgen.dynamics.askew import askew
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.frames import Linkage
-from eomgen.dynamics.instant import Axes
+from eomgen.dynamics.kinematics import Axes
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.model.model import Model
 from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits

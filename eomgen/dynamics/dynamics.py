@@ -61,7 +61,7 @@ class Dynamics(Moving):
         nothing = zeros(self.scalars)
         base = nothing if weightless else sub(nothing, self.down)
         vd = vd if still else self.with_driven(vd)
-        return accelerations(self.instant, moving, v, vd, base, self.scalars)
+        return accelerations(self.kinematics, moving, v, vd, base, self.scalars)
 
     @cached_property
     def felt(self) -> tuple[Sequence[Scalar], tuple[Twist, ...]]:
@@ -73,7 +73,7 @@ class Dynamics(Moving):
     @cached_property
     def _stopped(self) -> tuple[Sequence[Scalar], tuple[Twist, ...]]:
         v = [self.scalars.number(0.0)] * self.moved
-        return v, velocities(self.instant, v, self.scalars)
+        return v, velocities(self.kinematics, v, self.scalars)
 
     def with_driven(self, vd: Sequence[Scalar] | None) -> Sequence[Scalar] | None:
         """v̇ (None: nothing) with the accelerations of driven velocities."""
@@ -116,7 +116,7 @@ class Dynamics(Moving):
     @cached_property
     def wrenches(self) -> tuple[fc.Force, ...]:
         """The loads on each frame."""
-        return fc.wrenches(self.linkage, self.instant, self.loads[0], self.scalars)
+        return fc.wrenches(self.linkage, self.kinematics, self.loads[0], self.scalars)
 
     @cached_property
     def motors(self) -> list[Scalar]:
@@ -130,8 +130,8 @@ class Dynamics(Moving):
 
     @cached_property
     def _applied(self) -> list[Scalar]:
-        carried = fc.carried(self.instant, self.wrenches)
-        parts = fc.generalised(self.instant, carried, self.moved)
+        carried = fc.carried(self.kinematics, self.wrenches)
+        parts = fc.generalised(self.kinematics, carried, self.moved)
         return [a + b for a, b in zip(parts, self.motors, strict=True)]
 
     @cached_property
@@ -154,13 +154,13 @@ class Dynamics(Moving):
     ) -> list[Scalar]:
         """The same with the rows of driven velocities."""
         moving = self.accelerating(vd, still=still, weightless=weightless)
-        inertial = fc.inertial(self.instant, moving, self.scalars)
-        parts = fc.generalised(self.instant, fc.carried(self.instant, inertial), self.moved)
+        inertial = fc.inertial(self.kinematics, moving, self.scalars)
+        parts = fc.generalised(self.kinematics, fc.carried(self.kinematics, inertial), self.moved)
         if vd is None:
             return parts
         whole = self.with_driven(vd)
         assert whole is not None
-        rotors = fc.rotor_forces(self.instant, whole, self.moved, self.scalars)
+        rotors = fc.rotor_forces(self.kinematics, whole, self.moved, self.scalars)
         return [a + b for a, b in zip(parts, rotors, strict=True)]
 
     @cached_property
@@ -194,7 +194,7 @@ class Dynamics(Moving):
     @cached_property
     def articulated(self) -> Pivots:
         """The pivots of the articulated-body algorithm."""
-        return articulate(self.instant, self.scalars)
+        return articulate(self.kinematics, self.scalars)
 
     def forward(self, route: str) -> Forward:
         """What gives v̇ under the effects and forces beside them by the recursion of a route."""
@@ -210,27 +210,27 @@ class Dynamics(Moving):
     def articulated_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """v̇ under the effects and forces `tau` beside them, by articulated bodies."""
         pushed = self._pushed(tau)
-        found = respond(self.instant, self.articulated, self._at_rest, pushed, self.scalars)
+        found = respond(self.kinematics, self.articulated, self._at_rest, pushed, self.scalars)
         return self._fallen(found)
 
     def factored_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by LᵀDL factors of the mass matrix."""
-        carried = fc.carried(self.instant, self._at_rest)
-        bias = fc.generalised(self.instant, carried, self.moved)[: self.nv]
+        carried = fc.carried(self.kinematics, self._at_rest)
+        bias = fc.generalised(self.kinematics, carried, self.moved)[: self.nv]
         right = [a - b for a, b in zip(self._pushed(tau), bias, strict=True)]
         return self._fallen(solved(self.factors, right))
 
     def orthogonal_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by orthogonal elimination, in the frames' own axes."""
         about = centres(self._solids, self.scalars)
-        wrenches = fc.wrenches(self.linkage, self.instant, self.loads[0], self.scalars, about)
+        wrenches = fc.wrenches(self.linkage, self.kinematics, self.loads[0], self.scalars, about)
         found = self._eliminated.respond(self._falling, wrenches, self._pushed(tau))
         return self._fallen(found)
 
     def articulated_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """M⁻¹ of impulses on the velocities by articulated bodies."""
-        still = [fc.no_force(self.scalars)] * len(self.instant.links)
-        return respond(self.instant, self.articulated, still, impulse, self.scalars)
+        still = [fc.no_force(self.scalars)] * len(self.kinematics.links)
+        return respond(self.kinematics, self.articulated, still, impulse, self.scalars)
 
     def factored_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """The same by LᵀDL factors of the mass matrix."""
@@ -240,7 +240,7 @@ class Dynamics(Moving):
         """M⁻¹ of impulses on the velocities by orthogonal elimination."""
         nothing, matrix = zeros(self.scalars), no_matrix(self.scalars)
         frame = Acceleration(nothing, nothing, matrix, nothing, nothing)
-        still = [frame] * len(self.instant.links)
+        still = [frame] * len(self.kinematics.links)
         wrenches = [fc.no_force(self.scalars)] * len(still)
         return self._eliminated.respond(still, wrenches, impulse)
 
@@ -251,7 +251,7 @@ class Dynamics(Moving):
     @cached_property
     def _eliminated(self) -> Elimination:
         ranks = ranked(make_linkage(self.model, self.model.defaults, FloatScalars()))
-        return Elimination(self.instant, self._solids, ranks, self.scalars)
+        return Elimination(self.kinematics, self._solids, ranks, self.scalars)
 
     @cached_property
     def _free_roots(self) -> list[int]:
@@ -267,16 +267,18 @@ class Dynamics(Moving):
         """Accelerations of the frames if the free velocities do not change, but for the fall of
         trees that nothing holds: their weight changes nothing else, and is put in at the end.
         """
-        falling = [k for k, link in enumerate(self.instant.links) if link.v[0] in self._free_roots]
+        falling = [
+            k for k, link in enumerate(self.kinematics.links) if link.v[0] in self._free_roots
+        ]
         base = sub(zeros(self.scalars), self.down)
         v, twists = self.felt
         vd = self.with_driven(None)
-        return accelerations(self.instant, twists, v, vd, base, self.scalars, falling)
+        return accelerations(self.kinematics, twists, v, vd, base, self.scalars, falling)
 
     @cached_property
     def _at_rest(self) -> list[fc.Force]:
         """The wrenches that would keep the free velocities as they are."""
-        inertial = fc.inertial(self.instant, self._falling, self.scalars)
+        inertial = fc.inertial(self.kinematics, self._falling, self.scalars)
         return [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
 
     def _fallen(self, vd: Sequence[Scalar]) -> list[Scalar]:
@@ -301,14 +303,14 @@ class Dynamics(Moving):
     def factors(self) -> Factors:
         """M = Lᵀ D L."""
         names = [c.name for c in self.model.velocities]
-        return factorised(self.mass_entries, ancestors(self.instant), names, self.scalars)
+        return factorised(self.mass_entries, ancestors(self.kinematics), names, self.scalars)
 
     # Energy.
 
     @cached_property
     def kinetic_energy(self) -> Scalar:
         """Of all bodies and rotors, J."""
-        return kinetic_energy(self.instant, self._solids, self.moving, self.v, self.scalars)
+        return kinetic_energy(self.kinematics, self._solids, self.moving, self.v, self.scalars)
 
     @cached_property
     def potential_energy(self) -> Scalar:

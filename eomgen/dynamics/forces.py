@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from eomgen.dynamics.frames import Linkage
-from eomgen.dynamics.instant import Instant, Link
+from eomgen.dynamics.kinematics import Link, TreeKinematics
 from eomgen.dynamics.motion import Acceleration, inertial_force
 from eomgen.dynamics.vectors import (
     Vec,
@@ -69,13 +69,13 @@ def moved_to(point: Vec, f: Force) -> Force:
 
 def wrenches(
     linkage: Linkage,
-    instant: Instant,
+    kinematics: TreeKinematics,
     loads: Sequence[PointForce],
     scalars: Scalars,
     about: Sequence[Vec] | None = None,
 ) -> tuple[Force, ...]:
     """The loads as a wrench on each frame, about points of frames' own axes if they are given."""
-    found = [no_force(scalars)] * len(instant.links)
+    found = [no_force(scalars)] * len(kinematics.links)
     for load in loads:
         mount = linkage.mounts[load.body]
         if mount.frame >= 0:
@@ -84,12 +84,12 @@ def wrenches(
             at = add(at, times(axes, load.at))
             if load.in_body is not None:
                 force, torque = (times(axes, part) for part in load.in_body)
-                moment = instant.of_frame(mount.frame, add(torque, cross(at, force)))
-                wrench = Force(moment, instant.of_frame(mount.frame, force))
+                moment = kinematics.of_frame(mount.frame, add(torque, cross(at, force)))
+                wrench = Force(moment, kinematics.of_frame(mount.frame, force))
             else:
-                force = instant.from_world(mount.frame, load.force)
-                arm = instant.of_frame(mount.frame, at)
-                torque = instant.from_world(mount.frame, load.torque)
+                force = kinematics.from_world(mount.frame, load.force)
+                arm = kinematics.of_frame(mount.frame, at)
+                torque = kinematics.from_world(mount.frame, load.torque)
                 wrench = Force(add(torque, cross(arm, force)), force)
             found[mount.frame] = total(found[mount.frame], wrench)
     return tuple(found)
@@ -114,38 +114,40 @@ def on_frames(
 
 
 def inertial(
-    instant: Instant, moving: Sequence[Acceleration], scalars: Scalars
+    kinematics: TreeKinematics, moving: Sequence[Acceleration], scalars: Scalars
 ) -> tuple[Force, ...]:
     """The wrench that each frame's own mass takes."""
     return tuple(
         Force(*inertial_force(link, a, scalars))
-        for link, a in zip(instant.links, moving, strict=True)
+        for link, a in zip(kinematics.links, moving, strict=True)
     )
 
 
-def carried(instant: Instant, forces: Sequence[Force]) -> tuple[Force, ...]:
+def carried(kinematics: TreeKinematics, forces: Sequence[Force]) -> tuple[Force, ...]:
     """Each frame's wrench together with those of all frames it carries."""
     sums = list(forces)
     for k in reversed(range(len(sums))):
-        link = instant.links[k]
+        link = kinematics.links[k]
         if link.parent >= 0:
             sums[link.parent] = total(sums[link.parent], at_parent(link, sums[k]))
     return tuple(sums)
 
 
-def generalised(instant: Instant, sums: Sequence[Force], nv: int) -> list[Scalar]:
+def generalised(kinematics: TreeKinematics, sums: Sequence[Force], nv: int) -> list[Scalar]:
     """The parts of carried wrenches that do work on the velocities, in the order of `v`."""
     parts: list[Scalar] = [None] * nv
-    for link, f in zip(instant.links, sums, strict=True):
+    for link, f in zip(kinematics.links, sums, strict=True):
         for axis, i in zip(link.axes, link.v, strict=True):
             parts[i] = dot(axis.direction, f.moment if axis.angular else f.force)
     return parts
 
 
-def rotor_forces(instant: Instant, vd: Sequence[Scalar], nv: int, scalars: Scalars) -> list[Scalar]:
+def rotor_forces(
+    kinematics: TreeKinematics, vd: Sequence[Scalar], nv: int, scalars: Scalars
+) -> list[Scalar]:
     """What it takes to accelerate the motors' rotors."""
     parts = [scalars.number(0.0)] * nv
-    for link in instant.links:
+    for link in kinematics.links:
         for i in link.v:
             parts[i] = link.armature * vd[i]
     return parts

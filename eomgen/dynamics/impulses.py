@@ -49,7 +49,7 @@ def generalised(d: Dynamics, loads: Iterable[AnyLoad]) -> list[Scalar]:
     """Jᵀ f of loads: the forces on the velocities, driven ones too, that do the same work."""
     loads = list(loads)
     wrenches = _wrenches(d, [load for load in loads if isinstance(load, Load)])
-    parts = fc.generalised(d.instant, fc.carried(d.instant, wrenches), d.moved)
+    parts = fc.generalised(d.kinematics, fc.carried(d.kinematics, wrenches), d.moved)
     for load in loads:
         if isinstance(load, JointLoad):
             i = d.seats[load.joint].v[load.coordinate]
@@ -71,12 +71,12 @@ def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Force]:
         frame = -1 if body == WORLD else d.linkage.mounts[d.index[body]].frame
         if frame >= 0:
             own = in_space(at, d.scalars)
-            reach = arm(d.linkage, d.instant, d.index[body], own, d.scalars)
+            reach = arm(d.linkage, d.kinematics, d.index[body], own, d.scalars)
             wrench = fc.Force(add(torque, cross(reach, force)), force)
             sums[frame] = fc.total(sums[frame], wrench) if frame in sums else wrench
-    wrenches = [fc.Force(nothing, nothing)] * len(d.instant.links)
+    wrenches = [fc.Force(nothing, nothing)] * len(d.kinematics.links)
     for frame, f in sums.items():
-        turned = (d.instant.from_world(frame, part) for part in (f.moment, f.force))
+        turned = (d.kinematics.from_world(frame, part) for part in (f.moment, f.force))
         wrenches[frame] = fc.Force(*turned)
     return wrenches
 

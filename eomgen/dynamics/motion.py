@@ -3,7 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from eomgen.dynamics.instant import Instant, Link
+from eomgen.dynamics.kinematics import Link, TreeKinematics
 from eomgen.dynamics.solids import Solid
 from eomgen.dynamics.vectors import (
     Mat,
@@ -43,10 +43,12 @@ class Acceleration:
     mixed: Vec
 
 
-def velocities(instant: Instant, v: Sequence[Scalar], scalars: Scalars) -> tuple[Twist, ...]:
+def velocities(
+    kinematics: TreeKinematics, v: Sequence[Scalar], scalars: Scalars
+) -> tuple[Twist, ...]:
     """The velocity of every frame."""
     found: list[Twist] = []
-    for link in instant.links:
+    for link in kinematics.links:
         angular, linear = zeros(scalars), zeros(scalars)
         if link.parent >= 0:
             parent = found[link.parent]
@@ -72,7 +74,7 @@ def own_motion(link: Link, rates: Sequence[Scalar], scalars: Scalars) -> tuple[V
 
 
 def accelerations(
-    instant: Instant,
+    kinematics: TreeKinematics,
     moving: Sequence[Twist],
     v: Sequence[Scalar],
     vd: Sequence[Scalar] | None,
@@ -87,7 +89,7 @@ def accelerations(
     """
     found: list[Acceleration] = []
     two = scalars.number(2.0)
-    for k, link in enumerate(instant.links):
+    for k, link in enumerate(kinematics.links):
         if link.parent >= 0:
             parent = found[link.parent]
             angular = link.turn.into(parent.angular)
@@ -153,7 +155,7 @@ def moment_about_centre(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
 
 
 def kinetic_energy(
-    instant: Instant,
+    kinematics: TreeKinematics,
     carried: Sequence[Solid | None],
     moving: Sequence[Twist],
     v: Sequence[Scalar],
@@ -164,10 +166,10 @@ def kinetic_energy(
     centre, on next to nothing, would lose digits.
     """
     twice = scalars.number(0.0)
-    for k, (link, solid, motion) in enumerate(zip(instant.links, carried, moving, strict=True)):
+    for k, (link, solid, motion) in enumerate(zip(kinematics.links, carried, moving, strict=True)):
         if solid is not None:
-            u = add(motion.linear, cross(motion.angular, instant.of_frame(k, solid.centre)))
-            w = instant.in_frame(k, motion.angular)
+            u = add(motion.linear, cross(motion.angular, kinematics.of_frame(k, solid.centre)))
+            w = kinematics.in_frame(k, motion.angular)
             twice = twice + solid.mass * dot(u, u) + dot(w, times(solid.inertia, w))
         for i in link.v:
             twice = twice + link.armature * (v[i] * v[i])

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from eomgen.dynamics.frames import Linkage
-from eomgen.dynamics.instant import Axes, Instant, at_instant
+from eomgen.dynamics.kinematics import Axes, TreeKinematics, tree_kinematics
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.motion import Twist, velocities
 from eomgen.dynamics.observe import (
@@ -115,7 +115,7 @@ class Moving:
         if body == WORLD:
             return vector
         turned = times(
-            orientation(self.linkage, self.instant, self.index[body], self.scalars),
+            orientation(self.linkage, self.kinematics, self.index[body], self.scalars),
             self._in_space(vector),
         )
         return self._cut(turned)
@@ -214,21 +214,21 @@ class Moving:
         return self._linkage or make_linkage(self.model, self.values.parameters, self.scalars)
 
     @cached_property
-    def instant(self) -> Instant:
-        """The frames at q, in the axes of the recursions."""
-        return at_instant(self.linkage, self.q, self.axes, self.scalars)
+    def kinematics(self) -> TreeKinematics:
+        """Tree kinematics at q, in the axes of the recursions."""
+        return tree_kinematics(self.linkage, self.q, self.axes, self.scalars)
 
     @cached_property
-    def in_world(self) -> Instant:
-        """The frames at q, in world axes."""
+    def in_world(self) -> TreeKinematics:
+        """Tree kinematics at q, in world axes."""
         if self.axes == "world":
-            return self.instant
-        return at_instant(self.linkage, self.q, "world", self.scalars)
+            return self.kinematics
+        return tree_kinematics(self.linkage, self.q, "world", self.scalars)
 
     @cached_property
     def places(self) -> Places:
         """Origins of the frames, in the world."""
-        return places(self.instant, self.scalars)
+        return places(self.kinematics, self.scalars)
 
     def centre(self, body: int) -> Vec:
         """Centre of mass of a body, in the world."""
@@ -236,23 +236,23 @@ class Moving:
 
     def position(self, body: int, at: Vec) -> Vec:
         """A point of a body, in the world."""
-        return position(self.linkage, self.instant, self.places, body, at, self.scalars)
+        return position(self.linkage, self.kinematics, self.places, body, at, self.scalars)
 
     def angle(self, body: int) -> Scalar:
         """The angle of a planar body from the world's x axis."""
         mount = self.linkage.mounts[body]
         if mount.frame < 0:
             return self.scalars.number(mount.angle)
-        return self.instant.angles[mount.frame].and_more(mount.angle, self.scalars)
+        return self.kinematics.angles[mount.frame].and_more(mount.angle, self.scalars)
 
     @cached_property
     def moving(self) -> tuple[Twist, ...]:
         """Velocities of the frames."""
-        return velocities(self.instant, self.v, self.scalars)
+        return velocities(self.kinematics, self.v, self.scalars)
 
     def point_velocity(self, body: int, at: Vec) -> tuple[Vec, Vec]:
         """Velocity of a point of a body, and the body's angular velocity, in the world."""
-        return velocity(self.linkage, self.instant, self.moving, body, at, self.scalars)
+        return velocity(self.linkage, self.kinematics, self.moving, body, at, self.scalars)
 
     @cached_property
     def down(self) -> Vec:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from eomgen.dynamics.frames import Linkage
-from eomgen.dynamics.instant import Instant
+from eomgen.dynamics.kinematics import TreeKinematics
 from eomgen.dynamics.motion import Twist, momentum_of
 from eomgen.dynamics.vectors import (
     Mat,
@@ -23,43 +23,48 @@ Places = tuple[Vec, ...]
 """The origin of every frame in the world."""
 
 
-def places(instant: Instant, scalars: Scalars) -> Places:
+def places(kinematics: TreeKinematics, scalars: Scalars) -> Places:
     """Where the frames' origins are."""
     origins: list[Vec] = []
-    for link in instant.links:
+    for link in kinematics.links:
         base = origins[link.parent] if link.parent >= 0 else zeros(scalars)
-        origins.append(add(base, instant.to_world(link.parent, link.arm)))
+        origins.append(add(base, kinematics.to_world(link.parent, link.arm)))
     return tuple(origins)
 
 
-def orientation(linkage: Linkage, instant: Instant, body: int, scalars: Scalars) -> Mat:
+def orientation(linkage: Linkage, kinematics: TreeKinematics, body: int, scalars: Scalars) -> Mat:
     """world_R_body."""
     mount = linkage.mounts[body]
     axes = constant(mount.axes, scalars)
-    return product(instant.world[mount.frame], axes) if mount.frame >= 0 else axes
+    return product(kinematics.world[mount.frame], axes) if mount.frame >= 0 else axes
 
 
-def arm(linkage: Linkage, instant: Instant, body: int, at: Vec, scalars: Scalars) -> Vec:
+def arm(linkage: Linkage, kinematics: TreeKinematics, body: int, at: Vec, scalars: Scalars) -> Vec:
     """A point of a body, given from its centre of mass in body axes, from its frame's origin; in
     world axes.
     """
     mount = linkage.mounts[body]
     own = add(mount.at, times(constant(mount.axes, scalars), at))
-    return times(instant.world[mount.frame], own) if mount.frame >= 0 else own
+    return times(kinematics.world[mount.frame], own) if mount.frame >= 0 else own
 
 
 def position(
-    linkage: Linkage, instant: Instant, where: Places, body: int, at: Vec, scalars: Scalars
+    linkage: Linkage,
+    kinematics: TreeKinematics,
+    where: Places,
+    body: int,
+    at: Vec,
+    scalars: Scalars,
 ) -> Vec:
     """The place of a point of a body in the world."""
     frame = linkage.mounts[body].frame
-    reach = arm(linkage, instant, body, at, scalars)
+    reach = arm(linkage, kinematics, body, at, scalars)
     return add(where[frame], reach) if frame >= 0 else reach
 
 
 def velocity(
     linkage: Linkage,
-    instant: Instant,
+    kinematics: TreeKinematics,
     moving: Sequence[Twist],
     body: int,
     at: Vec,
@@ -69,37 +74,39 @@ def velocity(
     frame = linkage.mounts[body].frame
     if frame < 0:
         return zeros(scalars), zeros(scalars)
-    angular = instant.to_world(frame, moving[frame].angular)
-    linear = instant.to_world(frame, moving[frame].linear)
-    reach = arm(linkage, instant, body, at, scalars)
+    angular = kinematics.to_world(frame, moving[frame].angular)
+    linear = kinematics.to_world(frame, moving[frame].linear)
+    reach = arm(linkage, kinematics, body, at, scalars)
     return add(linear, cross(angular, reach)), angular
 
 
-def centre_of_mass(linkage: Linkage, instant: Instant, where: Places, scalars: Scalars) -> Vec:
+def centre_of_mass(
+    linkage: Linkage, kinematics: TreeKinematics, where: Places, scalars: Scalars
+) -> Vec:
     """Of all bodies together; a body that is part of the world counts like any other."""
     moment, mass = zeros(scalars), scalars.number(0.0)
     for k, mount in enumerate(linkage.mounts):
-        place = position(linkage, instant, where, k, zeros(scalars), scalars)
+        place = position(linkage, kinematics, where, k, zeros(scalars), scalars)
         moment, mass = add(moment, scale(mount.mass, place)), mass + mount.mass
     return (moment[0] / mass, moment[1] / mass, moment[2] / mass)
 
 
 def momentum(
-    instant: Instant, where: Places, moving: Sequence[Twist], scalars: Scalars
+    kinematics: TreeKinematics, where: Places, moving: Sequence[Twist], scalars: Scalars
 ) -> tuple[Vec, Vec]:
     """Momentum, and angular momentum about the world's origin, in world axes."""
     linear, angular = zeros(scalars), zeros(scalars)
-    for k, link in enumerate(instant.links):
+    for k, link in enumerate(kinematics.links):
         about, p = momentum_of(link, moving[k])
-        p = instant.to_world(k, p)
+        p = kinematics.to_world(k, p)
         linear = add(linear, p)
-        angular = add(angular, add(instant.to_world(k, about), cross(where[k], p)))
+        angular = add(angular, add(kinematics.to_world(k, about), cross(where[k], p)))
     return linear, angular
 
 
 def point_jacobian(
     linkage: Linkage,
-    instant: Instant,
+    kinematics: TreeKinematics,
     where: Places,
     body: int,
     at: Vec,
@@ -109,11 +116,11 @@ def point_jacobian(
     """For each free velocity what it adds to the velocity of a point, in world axes."""
     columns = [zeros(scalars)] * nv
     frame = linkage.mounts[body].frame
-    place = position(linkage, instant, where, body, at, scalars)
+    place = position(linkage, kinematics, where, body, at, scalars)
     while frame >= 0:
-        link = instant.links[frame]
+        link = kinematics.links[frame]
         for axis, i in link.free:
-            direction = instant.to_world(frame, axis.direction)
+            direction = kinematics.to_world(frame, axis.direction)
             reach = sub(place, where[frame])
             columns[i] = cross(direction, reach) if axis.angular else direction
         frame = link.parent

@@ -37,7 +37,7 @@ from eomgen.dynamics.forces import (
     on_frames,
     total,
 )
-from eomgen.dynamics.instant import Axis, Instant, Link
+from eomgen.dynamics.kinematics import Axis, Link, TreeKinematics
 from eomgen.dynamics.motion import Acceleration, moment_about_centre
 from eomgen.dynamics.possible import column_of, moved, possible, slides_of, turns_of
 from eomgen.dynamics.rows import (
@@ -82,16 +82,16 @@ class Elimination:
 
     def __init__(
         self,
-        instant: Instant,
+        kinematics: TreeKinematics,
         carried: Sequence[Solid | None],
         ranks: Ranks,
         scalars: Scalars,
     ) -> None:
-        self._aligned = aligned(instant.links, carried, ranks, scalars)
+        self._aligned = aligned(kinematics.links, carried, ranks, scalars)
         self._links, self._solids = self._aligned.links, self._aligned.carried
         self._carried, self._ranks = carried, ranks
         self._scalars = scalars
-        self._planar = bool(instant.angles)
+        self._planar = bool(kinematics.angles)
         self._rows = Rows(scalars)
         self._columns = possible(self._links, scalars)
 

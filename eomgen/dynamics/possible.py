@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from eomgen.dynamics.instant import Axis, Link
+from eomgen.dynamics.kinematics import Axis, Link
 from eomgen.dynamics.rows import Column, Row
 from eomgen.dynamics.vectors import AXES, Vec, cross, unit
 from eomgen.scalars.protocol import Scalars

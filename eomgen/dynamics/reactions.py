@@ -27,7 +27,7 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
     that hangs on it need beyond weight and loads. A motor acts between the two bodies of its joint,
     and its rotor belongs to the joint: both are in what the joint transmits.
     """
-    model, linkage, instant = dynamics.model, dynamics.linkage, dynamics.instant
+    model, linkage, kinematics = dynamics.model, dynamics.linkage, dynamics.kinematics
     scalars = dynamics.scalars
     moving = dynamics.felt[1]
     accelerating = dynamics.accelerating(vd)
@@ -44,12 +44,12 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
             sums[-1] = Force(cross(arm, sums[-1].force), sums[-1].force)
             continue
         frame = mount.frame
-        world_R_body = observe.orientation(linkage, instant, k, scalars)
-        w = instant.to_world(frame, moving[frame].angular)
+        world_R_body = observe.orientation(linkage, kinematics, k, scalars)
+        w = kinematics.to_world(frame, moving[frame].angular)
         a = accelerating[frame]
-        reach = instant.of_frame(frame, mount.at)
-        there = instant.to_world(frame, add(a.linear, times(a.field, reach)))
-        alpha = instant.to_world(frame, a.angular)
+        reach = kinematics.of_frame(frame, mount.at)
+        there = kinematics.to_world(frame, add(a.linear, times(a.field, reach)))
+        alpha = kinematics.to_world(frame, a.angular)
         inertia = product(product(world_R_body, mount.inertia), transposed(world_R_body))
         force = scale(mount.mass, there)
         moment = add(times(inertia, alpha), cross(w, times(inertia, w)))

@@ -18,7 +18,7 @@ from eomgen.dynamics.articulated import (
     resistance_of,
 )
 from eomgen.dynamics.composite import composite_bodies
-from eomgen.dynamics.instant import Axes, at_instant
+from eomgen.dynamics.kinematics import Axes, tree_kinematics
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.vectors import Mat
 from eomgen.errors import SceneError
@@ -148,12 +148,12 @@ def _pivots(
     linkage = make_linkage(model, model.defaults, scalars)
     axes: Axes = "world" if model.dimensions == 2 else "own"
     places = [x if len(x) > 1 else x[0] for x in poses.T]
-    instant = at_instant(linkage, places, axes, scalars)
-    bodies = composite_bodies(instant, scalars)
-    sums = [resistance_of(link, 0.0) for link in instant.links]
+    kinematics = tree_kinematics(linkage, places, axes, scalars)
+    bodies = composite_bodies(kinematics, scalars)
+    sums = [resistance_of(link, 0.0) for link in kinematics.links]
     pivots: dict[int, tuple[Array, Array]] = {}
     for k in reversed(range(len(sums))):
-        link, left = instant.links[k], sums[k]
+        link, left = kinematics.links[k], sums[k]
         whole = resistance_of(replace(link, rigid=bodies[k]), 0.0)
         for axis, i in link.free:
             pivot, entry = (

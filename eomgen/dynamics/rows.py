@@ -14,7 +14,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
-from eomgen.dynamics.instant import Axis, Link
+from eomgen.dynamics.kinematics import Axis, Link
 from eomgen.dynamics.vectors import AXES, Vec, add, cross, unit, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 

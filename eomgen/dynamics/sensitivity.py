@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from eomgen.dynamics.composite import Entries, composite_bodies, force_to_move
 from eomgen.dynamics.forces import Force, at_parent, carried, inertial, total
 from eomgen.dynamics.frames import Rigid
-from eomgen.dynamics.instant import Instant, Link
+from eomgen.dynamics.kinematics import Link, TreeKinematics
 from eomgen.dynamics.motion import Acceleration, Twist, momentum_of
 from eomgen.dynamics.vectors import (
     AXES,
@@ -69,22 +69,24 @@ class _Column:
 
 
 def sensitivity(
-    instant: Instant,
+    kinematics: TreeKinematics,
     moving: Sequence[Twist],
     accelerating: Sequence[Acceleration],
     base: Vec,
     scalars: Scalars,
 ) -> Sensitivity:
-    """Of M v̇ + V + G at the given motion; `instant` and the motion are in world axes.
+    """Of M v̇ + V + G at the given motion; `kinematics` and the motion are in world axes.
 
     `base` is the acceleration of the world.
     """
-    assert instant.axes == "world"
-    links = instant.links
-    bodies = composite_bodies(instant, scalars)
-    forces = carried(instant, inertial(instant, accelerating, scalars))
-    drags = _composite_drags(instant, moving, scalars)
-    columns = [_columns(instant, k, moving, accelerating, base, scalars) for k in range(len(links))]
+    assert kinematics.axes == "world"
+    links = kinematics.links
+    bodies = composite_bodies(kinematics, scalars)
+    forces = carried(kinematics, inertial(kinematics, accelerating, scalars))
+    drags = _composite_drags(kinematics, moving, scalars)
+    columns = [
+        _columns(kinematics, k, moving, accelerating, base, scalars) for k in range(len(links))
+    ]
     by_q: dict[tuple[int, int], Scalar] = {}
     by_v: dict[tuple[int, int], Scalar] = {}
     for k, link in enumerate(links):
@@ -112,14 +114,14 @@ def sensitivity(
 
 
 def _columns(
-    instant: Instant,
+    kinematics: TreeKinematics,
     k: int,
     moving: Sequence[Twist],
     accelerating: Sequence[Acceleration],
     base: Vec,
     scalars: Scalars,
 ) -> list[_Column]:
-    link = instant.links[k]
+    link = kinematics.links[k]
     nothing = zeros(scalars)
     carrier, pushed = Twist(nothing, nothing), Twist(nothing, base)
     if link.parent >= 0:
@@ -160,16 +162,18 @@ class _Drag:
         return add(times(transposed(self.matrix), w), cross(self.momentum, u))
 
 
-def _composite_drags(instant: Instant, moving: Sequence[Twist], scalars: Scalars) -> list[_Drag]:
+def _composite_drags(
+    kinematics: TreeKinematics, moving: Sequence[Twist], scalars: Scalars
+) -> list[_Drag]:
     two = scalars.number(2.0)
     found = []
-    for link, motion in zip(instant.links, moving, strict=True):
+    for link, motion in zip(kinematics.links, moving, strict=True):
         _, p = momentum_of(link, motion)
         field = product(skew(motion.angular, scalars.number(0.0)), _second_moment(link, scalars))
         matrix = plus(_outer(link.rigid.first, motion.linear), _negated(field))
         found.append(_Drag(p, matrix, two))
     for k in reversed(range(len(found))):
-        link = instant.links[k]
+        link = kinematics.links[k]
         if link.parent >= 0:
             outer, inner = found[link.parent], found[k]
             moved = plus(inner.matrix, _outer(link.arm, inner.momentum))

@@ -1,4 +1,4 @@
-"""The frames at an instant: where each is in its parent, in its own axes or in the world's.
+"""Kinematics of a tree at coordinates q: the pose of every frame, in its own axes or the world's.
 
 In its own axes a frame moves about a coordinate axis, which makes a third of every matrix zero, but
 matrices must be turned from frame to frame. In the world's axes nothing is turned, but axes point
@@ -63,7 +63,7 @@ class Angle:
 class Axis:
     """A direction of motion that one velocity stands for.
 
-    `unit` is k where `direction` is the k-th coordinate direction at every instant; else None.
+    `unit` is k where `direction` is the k-th coordinate direction for every q; else None.
     """
 
     angular: bool
@@ -73,7 +73,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Link:
-    """A frame at an instant.
+    """A frame at coordinates q.
 
     `turn` leads from its axes to the parent's; `arm` is its origin from the parent's, in the
     parent's axes; `axes` are its motions in its own axes, the velocity v[i] times each. A `driven`
@@ -97,7 +97,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Instant:
+class TreeKinematics:
     """All links, and for each the matrix from its frame's own axes to the world's.
 
     `axes` says in which the links are written. In the plane `angles` are the frames' own from the
@@ -126,7 +126,9 @@ class Instant:
         return times(transposed(self.world[k]), a) if k >= 0 and self.axes == "world" else a
 
 
-def at_instant(linkage: Linkage, q: Sequence[Scalar], axes: Axes, scalars: Scalars) -> Instant:
+def tree_kinematics(
+    linkage: Linkage, q: Sequence[Scalar], axes: Axes, scalars: Scalars
+) -> TreeKinematics:
     """The links of a linkage at coordinates `q`."""
     eye = (unit(0, scalars), unit(1, scalars), unit(2, scalars))
     links: list[Link] = []
@@ -170,7 +172,7 @@ def at_instant(linkage: Linkage, q: Sequence[Scalar], axes: Axes, scalars: Scala
                 frame.driven,
             )
         )
-    return Instant(tuple(links), tuple(world), tuple(angles), axes)
+    return TreeKinematics(tuple(links), tuple(world), tuple(angles), axes)
 
 
 def _angle(frame: Frame, angles: Sequence[Angle], q: Sequence[Scalar], scalars: Scalars) -> Angle:
