@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from eomgen.dynamics.forces import Force, at_parent, total
-from eomgen.dynamics.kinematics import Axis, Link, TreeKinematics
+from eomgen.dynamics.kinematics import Link, MotionAxis, TreeKinematics
 from eomgen.dynamics.vectors import (
     AXES,
     ENTRIES,
@@ -143,13 +143,13 @@ def _outwards(
     return result
 
 
-def along(axis: Axis, angular: Vec, linear: Vec) -> Scalar:
+def along(axis: MotionAxis, angular: Vec, linear: Vec) -> Scalar:
     """The component of a motion or force along an axis of motion."""
     part = angular if axis.angular else linear
     return dot(axis.direction, part) if axis.unit is None else part[axis.unit]
 
 
-def with_component(axis: Axis, angular: Vec, linear: Vec, value: Scalar) -> tuple[Vec, Vec]:
+def with_component(axis: MotionAxis, angular: Vec, linear: Vec, value: Scalar) -> tuple[Vec, Vec]:
     """The same with another component along a coordinate axis."""
     assert axis.unit is not None
     if axis.angular:
@@ -188,13 +188,15 @@ def moved_to_parent(link: Link, p: Resistance, scalars: Scalars) -> Resistance:
     return Resistance(symmetric([entry(i, j) for i, j in ENTRIES]), moved, H)
 
 
-def inertia_along(p: Resistance, axis: Axis) -> Scalar:
+def inertia_along(p: Resistance, axis: MotionAxis) -> Scalar:
     """What resists an acceleration along an axis of motion."""
     z = axis.direction
     return dot(z, times(p.J if axis.angular else p.H, z))
 
 
-def eliminated(p: Resistance, axis: Axis, link: Link, scalars: Scalars) -> tuple[Pivot, Resistance]:
+def eliminated(
+    p: Resistance, axis: MotionAxis, link: Link, scalars: Scalars
+) -> tuple[Pivot, Resistance]:
     """Take one axis of motion out of a resistance."""
     k = axis.unit
     if k is not None:
@@ -228,7 +230,7 @@ def _less_outer(g: Mat, u: Vec, f: Vec) -> Mat:
 
 
 def _without(
-    J: Symmetric, G: Mat, H: Symmetric, axis: Axis, zero: Scalar
+    J: Symmetric, G: Mat, H: Symmetric, axis: MotionAxis, zero: Scalar
 ) -> tuple[Symmetric, Mat, Symmetric]:
     """Row and column of an eliminated coordinate axis, which are zero by construction."""
     k = axis.unit

@@ -60,7 +60,7 @@ class Angle:
 
 
 @dataclass(frozen=True)
-class Axis:
+class MotionAxis:
     """A direction of motion that one velocity stands for.
 
     `unit` is k where `direction` is the k-th coordinate direction for every q; else None.
@@ -84,14 +84,14 @@ class Link:
     parent: int
     turn: Rotation
     arm: Vec
-    axes: tuple[Axis, ...]
+    axes: tuple[MotionAxis, ...]
     v: tuple[int, ...]
     armature: Scalar
     rigid: Rigid
     driven: bool
 
     @property
-    def free(self) -> tuple[tuple[Axis, int], ...]:
+    def free(self) -> tuple[tuple[MotionAxis, int], ...]:
         """The axes whose velocities are states, each with the index of that."""
         return () if self.driven else tuple(zip(self.axes, self.v, strict=True))
 
@@ -137,10 +137,12 @@ def tree_kinematics(
     for frame in linkage.frames:
         fixed = fixed_rotation(frame.fixed, scalars)
         turn, arm = fixed, frame.offset
-        directions: tuple[Axis, ...] = (Axis(frame.kind == "turn", eye[frame.axis], frame.axis),)
+        directions: tuple[MotionAxis, ...] = (
+            MotionAxis(frame.kind == "turn", eye[frame.axis], frame.axis),
+        )
         if frame.kind == "spin":
             turn = both(fixed, from_quaternion([q[i] for i in frame.q], scalars))
-            directions = tuple(Axis(True, eye[k], k) for k in AXES)
+            directions = tuple(MotionAxis(True, eye[k], k) for k in AXES)
         elif frame.kind == "turn":
             count, lead = quarters(frame.lead)
             angle = q[frame.q[0]] + scalars.number(lead)
@@ -184,10 +186,10 @@ def _angle(frame: Frame, angles: Sequence[Angle], q: Sequence[Scalar], scalars: 
     return Angle(scalars.named(base.moving + q[frame.q[0]], f"angle_{frame.name}"), fixed)
 
 
-def _turned(axis: Axis, world: Mat, planar: bool) -> Axis:
+def _turned(axis: MotionAxis, world: Mat, planar: bool) -> MotionAxis:
     """A frame's own axis in world axes: in the plane z stays z."""
     if planar and axis.unit == 2:
         return axis
     assert axis.unit is not None
     column = (world[0][axis.unit], world[1][axis.unit], world[2][axis.unit])
-    return Axis(axis.angular, column, None)
+    return MotionAxis(axis.angular, column, None)

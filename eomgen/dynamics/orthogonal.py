@@ -37,7 +37,7 @@ from eomgen.dynamics.forces import (
     on_frames,
     total,
 )
-from eomgen.dynamics.kinematics import Axis, Link, TreeKinematics
+from eomgen.dynamics.kinematics import Link, MotionAxis, TreeKinematics
 from eomgen.dynamics.motion import Acceleration, moment_about_centre
 from eomgen.dynamics.possible import column_of, moved, possible, slides_of, turns_of
 from eomgen.dynamics.rows import (
@@ -245,7 +245,7 @@ class Elimination:
     def _early(
         self,
         link: Link,
-        axis: tuple[Axis, int],
+        axis: tuple[MotionAxis, int],
         kept: dict[Column, Row],
         loose: list[Row],
         at: Vec,
@@ -268,7 +268,7 @@ class Elimination:
         return sub(self._links[k].arm, at) if between is None else between
 
     def _first(
-        self, way: Axis, held: bool, kept: dict[Column, Row], free: list[Row]
+        self, way: MotionAxis, held: bool, kept: dict[Column, Row], free: list[Row]
     ) -> tuple[Row, tuple[Row, ...], dict[Column, Row], list[Row], tuple[Turn | Sum, ...]]:
         """The row that takes an axis: one that holds it alone, as there is where a link has inertia
         against it; else what can be gathered of it from all. And the rows that it is found from.
@@ -298,7 +298,7 @@ class Elimination:
     def _taken(
         self,
         link: Link,
-        axis: tuple[Axis, int],
+        axis: tuple[MotionAxis, int],
         first: Row,
         kept: dict[Column, Row],
         free: Sequence[Row],

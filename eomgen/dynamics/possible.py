@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from eomgen.dynamics.kinematics import Axis, Link
+from eomgen.dynamics.kinematics import Link, MotionAxis
 from eomgen.dynamics.rows import Column, Row
 from eomgen.dynamics.vectors import AXES, Vec, cross, unit
 from eomgen.scalars.protocol import Scalars
@@ -63,7 +63,7 @@ def slides_of(
     return tuple(sorted((j for j in turn if not planar or j < 2), key=late))
 
 
-def column_of(axis: Axis) -> Column:
+def column_of(axis: MotionAxis) -> Column:
     """The acceleration along a coordinate axis of motion."""
     assert axis.unit is not None  # as all are in the frames' own axes
     return axis.angular, axis.unit

@@ -14,7 +14,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
-from eomgen.dynamics.kinematics import Axis, Link
+from eomgen.dynamics.kinematics import Link, MotionAxis
 from eomgen.dynamics.vectors import AXES, Vec, add, cross, unit, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 
@@ -82,7 +82,7 @@ class Taken:
     rotor   the index of its motor's row, -1 if it has none
     """
 
-    axis: Axis
+    axis: MotionAxis
     velocity: int
     rows: tuple[Row, ...]
     pivot: int
