@@ -10,7 +10,7 @@ import pytest
 from campaign import some
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.dynamics.regular import check_regular, resistances
+from eomgen.dynamics.regular import check_regular, relative_pivots
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -77,7 +77,7 @@ joints = [
     model = elaborate(parse_scene(in_space + "dimensions = 3\n"))
     check_regular(model)
     poses = np.random.default_rng(1).uniform(-3, 3, (50, len(model.coordinates)))
-    assert (resistances(model, poses)[0] == 1).all()  # rounding is no lock
+    assert (relative_pivots(model, poses)[0] == 1).all()  # rounding is no lock
 
 
 SMALL = some([1e-12], [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14])

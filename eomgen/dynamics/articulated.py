@@ -40,7 +40,7 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 
 @dataclass(frozen=True)
-class Resistance:
+class ArticulatedInertia:
     """J, G and H of a subtree."""
 
     J: Symmetric
@@ -68,7 +68,7 @@ Pivots = tuple[tuple[Pivot, ...], ...]
 def articulate(kinematics: TreeKinematics, scalars: Scalars) -> Pivots:
     """Eliminate every axis of motion that is free, leaves first."""
     links = kinematics.links
-    sums = [resistance_of(link, scalars.number(0.0)) for link in links]
+    sums = [rigid_body_inertia(link, scalars.number(0.0)) for link in links]
     pivots: list[tuple[Pivot, ...]] = [()] * len(links)
     for k in reversed(range(len(links))):
         link, p = links[k], sums[k]
@@ -157,20 +157,20 @@ def with_component(axis: MotionAxis, angular: Vec, linear: Vec, value: Scalar) -
     return angular, replaced(linear, axis.unit, value)
 
 
-def resistance_of(link: Link, zero: Scalar) -> Resistance:
-    """What a link's own mass resists with."""
+def rigid_body_inertia(link: Link, zero: Scalar) -> ArticulatedInertia:
+    """The spatial inertia of a link's own mass, at the frame's origin."""
     m = link.rigid.mass
     mass = ((m, zero, zero), (zero, m, zero), (zero, zero, m))
-    return Resistance(link.rigid.inertia, skew(link.rigid.first, zero), mass)
+    return ArticulatedInertia(link.rigid.inertia, skew(link.rigid.first, zero), mass)
 
 
-def joined(a: Resistance, b: Resistance) -> Resistance:
+def joined(a: ArticulatedInertia, b: ArticulatedInertia) -> ArticulatedInertia:
     """Both together."""
-    return Resistance(plus(a.J, b.J), plus(a.G, b.G), plus(a.H, b.H))
+    return ArticulatedInertia(plus(a.J, b.J), plus(a.G, b.G), plus(a.H, b.H))
 
 
-def moved_to_parent(link: Link, p: Resistance, scalars: Scalars) -> Resistance:
-    """The same resistance at the parent's origin, in its axes: G' = G + [r]x H and
+def moved_to_parent(link: Link, p: ArticulatedInertia, scalars: Scalars) -> ArticulatedInertia:
+    """The same inertia at the parent's origin, in its axes: G' = G + [r]x H and
     J' = J - G [r]x + [r]x G'ᵀ, six entries of it.
     """
     r = link.arm
@@ -185,19 +185,19 @@ def moved_to_parent(link: Link, p: Resistance, scalars: Scalars) -> Resistance:
             i, j = j, i
         return J[i][j] + (old[i][j] + new[j][i])
 
-    return Resistance(symmetric([entry(i, j) for i, j in ENTRIES]), moved, H)
+    return ArticulatedInertia(symmetric([entry(i, j) for i, j in ENTRIES]), moved, H)
 
 
-def inertia_along(p: Resistance, axis: MotionAxis) -> Scalar:
-    """What resists an acceleration along an axis of motion."""
+def inertia_along(p: ArticulatedInertia, axis: MotionAxis) -> Scalar:
+    """The inertia along a motion axis: sᵀ I s."""
     z = axis.direction
     return dot(z, times(p.J if axis.angular else p.H, z))
 
 
 def eliminated(
-    p: Resistance, axis: MotionAxis, link: Link, scalars: Scalars
-) -> tuple[Pivot, Resistance]:
-    """Take one axis of motion out of a resistance."""
+    p: ArticulatedInertia, axis: MotionAxis, link: Link, scalars: Scalars
+) -> tuple[Pivot, ArticulatedInertia]:
+    """Eliminate one motion axis from an articulated-body inertia."""
     k = axis.unit
     if k is not None:
         moment = p.J[k] if axis.angular else (p.G[0][k], p.G[1][k], p.G[2][k])
@@ -220,7 +220,7 @@ def eliminated(
     G = _less_outer(p.G, u, force)
     if absolute:
         J, G, H = _without(J, G, H, axis, zero)
-    return Pivot(d, u, w, absolute), Resistance(J, G, H)
+    return Pivot(d, u, w, absolute), ArticulatedInertia(J, G, H)
 
 
 def _less_outer(g: Mat, u: Vec, f: Vec) -> Mat:

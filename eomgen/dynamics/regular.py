@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from eomgen.dynamics.articulated import (
-    Resistance,
+    ArticulatedInertia,
     eliminated,
     inertia_along,
     joined,
     moved_to_parent,
-    resistance_of,
+    rigid_body_inertia,
 )
 from eomgen.dynamics.composite import composite_bodies
 from eomgen.dynamics.kinematics import Axes, tree_kinematics
@@ -74,7 +74,7 @@ def _vanishing(pivots: Mapping[int, tuple[Array, Array]], share: float) -> list[
     ]
 
 
-def resistances(model: Model, poses: Array) -> dict[int, Array]:
+def relative_pivots(model: Model, poses: Array) -> dict[int, Array]:
     """For each velocity the inertia that it feels when all that it carries is free, at each of n
     poses (n, nq), in parts of the greatest that it feels at any of these and a few seeded ones:
     (n,). They are 1 where all of that is rounding, as beside arms of 1e9 m.
@@ -150,11 +150,11 @@ def _pivots(
     places = [x if len(x) > 1 else x[0] for x in poses.T]
     kinematics = tree_kinematics(linkage, places, axes, scalars)
     bodies = composite_bodies(kinematics, scalars)
-    sums = [resistance_of(link, 0.0) for link in kinematics.links]
+    sums = [rigid_body_inertia(link, 0.0) for link in kinematics.links]
     pivots: dict[int, tuple[Array, Array]] = {}
     for k in reversed(range(len(sums))):
         link, left = kinematics.links[k], sums[k]
-        whole = resistance_of(replace(link, rigid=bodies[k]), 0.0)
+        whole = rigid_body_inertia(replace(link, rigid=bodies[k]), 0.0)
         for axis, i in link.free:
             pivot, entry = (
                 np.broadcast_to(inertia_along(p, axis) + link.armature, len(poses))
@@ -171,8 +171,10 @@ def _pivots(
     return pivots
 
 
-def _where(here: npt.NDArray[np.bool_], a: Resistance, b: Resistance) -> Resistance:
-    """One resistance at some of the poses, another at the rest."""
+def _where(
+    here: npt.NDArray[np.bool_], a: ArticulatedInertia, b: ArticulatedInertia
+) -> ArticulatedInertia:
+    """One inertia at some of the poses, another at the rest."""
     if here.all():
         return a
 
@@ -180,7 +182,7 @@ def _where(here: npt.NDArray[np.bool_], a: Resistance, b: Resistance) -> Resista
         rows = zip(x, y, strict=True)
         return tuple(tuple(np.where(here, *ab) for ab in zip(*row, strict=True)) for row in rows)
 
-    return Resistance(chosen(a.J, b.J), chosen(a.G, b.G), chosen(a.H, b.H))
+    return ArticulatedInertia(chosen(a.J, b.J), chosen(a.G, b.G), chosen(a.H, b.H))
 
 
 def _singular(model: Model, i: int) -> str:

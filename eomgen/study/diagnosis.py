@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.dynamics.finite import effect_sizes, is_singular, values_at
-from eomgen.dynamics.regular import resistances, why_unresisted
+from eomgen.dynamics.regular import relative_pivots, why_unresisted
 from eomgen.model.model import Model, ways_of
 from eomgen.run.module import GeneratedModule, as_problem, given_values
 from eomgen.run.origin import START, UNITS, Origin
@@ -97,7 +97,7 @@ def locks(model: Model, trajectory: Trajectory) -> list[str]:
     known = model.form == "velocity" and not (model.driven or model.locked)
     if not known or model.dimensions != 3:
         return []
-    felt = resistances(model, trajectory.y[:, : len(model.coordinates)])
+    felt = relative_pivots(model, trajectory.y[:, : len(model.coordinates)])
     lines = []
     for i in sorted(felt):
         row = int(np.argmin(felt[i]))
@@ -122,7 +122,7 @@ def explained(
         if endless:
             return f"{_effects(endless)} no finite value; {REMEDY}"
         if not (model.driven or model.locked):
-            felt = resistances(model.with_parameters(parameters), np.array([values.q]))
+            felt = relative_pivots(model.with_parameters(parameters), np.array([values.q]))
             for i in sorted(felt):
                 if felt[i][0] < GONE:
                     return why_unresisted(model, i)
