@@ -161,7 +161,7 @@ def rigid_body_inertia(link: Link, zero: Scalar) -> ArticulatedInertia:
     """The spatial inertia of a link's own mass, at the frame's origin."""
     m = link.rigid.mass
     mass = ((m, zero, zero), (zero, m, zero), (zero, zero, m))
-    return ArticulatedInertia(link.rigid.inertia, skew(link.rigid.first, zero), mass)
+    return ArticulatedInertia(link.rigid.inertia, skew(link.rigid.first_moment, zero), mass)
 
 
 def joined(a: ArticulatedInertia, b: ArticulatedInertia) -> ArticulatedInertia:

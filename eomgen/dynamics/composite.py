@@ -36,7 +36,7 @@ def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:
     """A rigid body at the parent's origin: with first moments h before and h' = h + m r after,
     J' = J + (r·h + r·h') 1 - r h'ᵀ - h rᵀ.
     """
-    r, h = link.arm, link.turn.out(body.first)
+    r, h = link.arm, link.turn.out(body.first_moment)
     J = link.turn.out_symmetric(body.inertia)
     moved = add(h, scale(body.mass, r))
     both = [r[i] * (h[i] + moved[i]) for i in range(3)]
@@ -53,8 +53,8 @@ def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:
 
 def force_to_move(body: Rigid, angular: Vec, linear: Vec) -> Force:
     """The wrench that accelerates a rigid body so, from rest."""
-    momentum = add(scale(body.mass, linear), cross(angular, body.first))
-    return Force(add(times(body.inertia, angular), cross(body.first, linear)), momentum)
+    momentum = add(scale(body.mass, linear), cross(angular, body.first_moment))
+    return Force(add(times(body.inertia, angular), cross(body.first_moment, linear)), momentum)
 
 
 def mass_entries(kinematics: TreeKinematics, scalars: Scalars) -> Entries:

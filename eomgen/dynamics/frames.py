@@ -13,13 +13,13 @@ class Rigid:
     """Mass, first moment m c and inertia about the frame's origin, in the frame's axes."""
 
     mass: Scalar
-    first: Vec
+    first_moment: Vec
     inertia: Symmetric
 
 
 def joined(a: Rigid, b: Rigid) -> Rigid:
     """Two bodies about the same origin as one."""
-    return Rigid(a.mass + b.mass, add(a.first, b.first), plus(a.inertia, b.inertia))
+    return Rigid(a.mass + b.mass, add(a.first_moment, b.first_moment), plus(a.inertia, b.inertia))
 
 
 @dataclass(frozen=True)

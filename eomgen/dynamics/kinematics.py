@@ -159,7 +159,7 @@ def tree_kinematics(
         if axes == "world":
             turn, arm = Unturned(), times(base, arm)
             directions = tuple(_turned(axis, world[-1], linkage.planar) for axis in directions)
-            first = times(world[-1], rigid.first)
+            first = times(world[-1], rigid.first_moment)
             rigid = Rigid(rigid.mass, first, congruent(world[-1], rigid.inertia))
         links.append(
             Link(

@@ -190,7 +190,7 @@ def _named(rigid: Rigid, name: str, scalars: Scalars) -> Rigid:
     m = scalars.named(rigid.mass, f"mass_{name}")
     first = [
         scalars.named(h, f"moment_{name}_{axis}")
-        for h, axis in zip(rigid.first, "xyz", strict=True)
+        for h, axis in zip(rigid.first_moment, "xyz", strict=True)
     ]
     entries = [
         scalars.named(rigid.inertia[i][j], f"inertia_{name}_{'xyz'[i]}{'xyz'[j]}")

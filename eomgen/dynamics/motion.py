@@ -128,7 +128,7 @@ def inertial_force(link: Link, a: Acceleration, scalars: Scalars) -> tuple[Vec, 
 
     f = m a + W h with the first moment h; n = h x a + Σ m r x (W r), see `moment_about_centre`.
     """
-    m, h, inertia = link.rigid.mass, link.rigid.first, link.rigid.inertia
+    m, h, inertia = link.rigid.mass, link.rigid.first_moment, link.rigid.inertia
     force = add(scale(m, a.linear), times(a.field, h))
     moment = add(cross(h, a.linear), moment_about_centre(inertia, a, scalars))
     return moment, force
@@ -179,5 +179,7 @@ def kinetic_energy(
 def momentum_of(link: Link, motion: Twist) -> tuple[Vec, Vec]:
     """Angular momentum about the link's origin, and momentum."""
     rigid = link.rigid
-    momentum = add(scale(rigid.mass, motion.linear), cross(motion.angular, rigid.first))
-    return add(times(rigid.inertia, motion.angular), cross(rigid.first, motion.linear)), momentum
+    momentum = add(scale(rigid.mass, motion.linear), cross(motion.angular, rigid.first_moment))
+    return add(
+        times(rigid.inertia, motion.angular), cross(rigid.first_moment, motion.linear)
+    ), momentum

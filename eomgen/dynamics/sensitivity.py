@@ -170,7 +170,7 @@ def _composite_drags(
     for link, motion in zip(kinematics.links, moving, strict=True):
         _, p = momentum_of(link, motion)
         field = product(skew(motion.angular, scalars.number(0.0)), _second_moment(link, scalars))
-        matrix = plus(_outer(link.rigid.first, motion.linear), _negated(field))
+        matrix = plus(_outer(link.rigid.first_moment, motion.linear), _negated(field))
         found.append(_Drag(p, matrix, two))
     for k in reversed(range(len(found))):
         link = kinematics.links[k]
