@@ -9,7 +9,7 @@ along one line only, and are along that whose turn is the lighter beside what tu
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from eomgen.dynamics.forces import Force
+from eomgen.dynamics.forces import Wrench
 from eomgen.dynamics.kinematics import Link
 from eomgen.dynamics.rotations import AxisTurn, Both, Rotation, Unturned
 from eomgen.dynamics.solids import Ranks, Solid
@@ -31,11 +31,11 @@ class Aligned:
     along: tuple[int | None, ...]
 
     def into(
-        self, wrenches: Sequence[Force], tau: Sequence[Scalar]
-    ) -> tuple[list[Force], list[Scalar]]:
+        self, wrenches: Sequence[Wrench], tau: Sequence[Scalar]
+    ) -> tuple[list[Wrench], list[Scalar]]:
         """Wrenches on the frames, and what acts on the velocities."""
         pairs = zip(self.turns, wrenches, strict=True)
-        turned = [Force(turn.into(f.moment), turn.into(f.force)) for turn, f in pairs]
+        turned = [Wrench(turn.into(f.moment), turn.into(f.force)) for turn, f in pairs]
         found = list(tau)
         for turn, link in zip(self.turns, self.links, strict=True):
             if not isinstance(turn, Unturned):

@@ -16,7 +16,7 @@ resistance passes on to the parent.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eomgen.dynamics.forces import Force, at_parent, total
+from eomgen.dynamics.forces import Wrench, at_parent, total
 from eomgen.dynamics.kinematics import Link, MotionAxis, TreeKinematics
 from eomgen.dynamics.vectors import (
     AXES,
@@ -85,7 +85,7 @@ def articulate(kinematics: TreeKinematics, scalars: Scalars) -> Pivots:
 def respond(
     kinematics: TreeKinematics,
     pivots: Pivots,
-    forces: Sequence[Force],
+    forces: Sequence[Wrench],
     tau: Sequence[Scalar],
     scalars: Scalars,
 ) -> list[Scalar]:
@@ -95,7 +95,7 @@ def respond(
 
 
 def _inwards(
-    kinematics: TreeKinematics, pivots: Pivots, forces: Sequence[Force], tau: Sequence[Scalar]
+    kinematics: TreeKinematics, pivots: Pivots, forces: Sequence[Wrench], tau: Sequence[Scalar]
 ) -> list[Scalar]:
     """For each velocity what the forces on what it carries do to it, over its pivot."""
     links, sums = kinematics.links, list(forces)
@@ -105,10 +105,10 @@ def _inwards(
         for (axis, i), pivot in zip(link.free, pivots[k], strict=True):
             left = tau[i] - along(axis, p.moment, p.force)
             shares[i] = left / pivot.d
-            p = Force(add(p.moment, scale(left, pivot.u)), add(p.force, scale(left, pivot.w)))
+            p = Wrench(add(p.moment, scale(left, pivot.u)), add(p.force, scale(left, pivot.w)))
             if pivot.absolute:
                 # A free axis transmits the force put on it, and nothing else.
-                p = Force(*with_component(axis, p.moment, p.force, tau[i]))
+                p = Wrench(*with_component(axis, p.moment, p.force, tau[i]))
         if link.parent >= 0:
             sums[link.parent] = total(sums[link.parent], at_parent(link, p))
     return shares

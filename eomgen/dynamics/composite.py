@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from eomgen.dynamics.forces import Force, at_parent
+from eomgen.dynamics.forces import Wrench, at_parent
 from eomgen.dynamics.frames import Rigid, joined
 from eomgen.dynamics.kinematics import Link, TreeKinematics
 from eomgen.dynamics.vectors import (
@@ -51,10 +51,10 @@ def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:
     return Rigid(body.mass, moved, symmetric(entries))
 
 
-def force_to_move(body: Rigid, angular: Vec, linear: Vec) -> Force:
+def force_to_move(body: Rigid, angular: Vec, linear: Vec) -> Wrench:
     """The wrench that accelerates a rigid body so, from rest."""
     momentum = add(scale(body.mass, linear), cross(angular, body.first_moment))
-    return Force(add(times(body.inertia, angular), cross(body.first_moment, linear)), momentum)
+    return Wrench(add(times(body.inertia, angular), cross(body.first_moment, linear)), momentum)
 
 
 def mass_entries(kinematics: TreeKinematics, scalars: Scalars) -> Entries:

@@ -114,7 +114,7 @@ class Dynamics(Moving):
         return fc.PointForce(self.index[load.body], at, *in_space(load.force, load.torque), own)
 
     @cached_property
-    def wrenches(self) -> tuple[fc.Force, ...]:
+    def wrenches(self) -> tuple[fc.Wrench, ...]:
         """The loads on each frame."""
         return fc.wrenches(self.linkage, self.kinematics, self.loads[0], self.scalars)
 
@@ -229,7 +229,7 @@ class Dynamics(Moving):
 
     def articulated_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """M⁻¹ of impulses on the velocities by articulated bodies."""
-        still = [fc.no_force(self.scalars)] * len(self.kinematics.links)
+        still = [fc.no_wrench(self.scalars)] * len(self.kinematics.links)
         return respond(self.kinematics, self.articulated, still, impulse, self.scalars)
 
     def factored_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
@@ -241,7 +241,7 @@ class Dynamics(Moving):
         nothing, matrix = zeros(self.scalars), no_matrix(self.scalars)
         frame = Acceleration(nothing, nothing, matrix, nothing, nothing)
         still = [frame] * len(self.kinematics.links)
-        wrenches = [fc.no_force(self.scalars)] * len(still)
+        wrenches = [fc.no_wrench(self.scalars)] * len(still)
         return self._eliminated.respond(still, wrenches, impulse)
 
     @cached_property
@@ -276,7 +276,7 @@ class Dynamics(Moving):
         return accelerations(self.kinematics, twists, v, vd, base, self.scalars, falling)
 
     @cached_property
-    def _at_rest(self) -> list[fc.Force]:
+    def _at_rest(self) -> list[fc.Wrench]:
         """The wrenches that would keep the free velocities as they are."""
         inertial = fc.inertial(self.kinematics, self._falling, self.scalars)
         return [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]

@@ -21,7 +21,7 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 
 @dataclass(frozen=True)
-class Force:
+class Wrench:
     """A wrench on a frame, in its link's axes: moment about the origin, and force."""
 
     moment: Vec
@@ -41,30 +41,30 @@ class PointForce:
     in_body: tuple[Vec, Vec] | None = None
 
 
-def no_force(scalars: Scalars) -> Force:
+def no_wrench(scalars: Scalars) -> Wrench:
     """Nothing."""
-    return Force(zeros(scalars), zeros(scalars))
+    return Wrench(zeros(scalars), zeros(scalars))
 
 
-def total(a: Force, b: Force) -> Force:
+def total(a: Wrench, b: Wrench) -> Wrench:
     """a + b."""
-    return Force(add(a.moment, b.moment), add(a.force, b.force))
+    return Wrench(add(a.moment, b.moment), add(a.force, b.force))
 
 
-def less(a: Force, b: Force) -> Force:
+def less(a: Wrench, b: Wrench) -> Wrench:
     """a - b."""
-    return Force(sub(a.moment, b.moment), sub(a.force, b.force))
+    return Wrench(sub(a.moment, b.moment), sub(a.force, b.force))
 
 
-def at_parent(link: Link, f: Force) -> Force:
+def at_parent(link: Link, f: Wrench) -> Wrench:
     """A wrench on a link as one on its parent."""
     force = link.turn.out(f.force)
-    return Force(add(link.turn.out(f.moment), cross(link.arm, force)), force)
+    return Wrench(add(link.turn.out(f.moment), cross(link.arm, force)), force)
 
 
-def moved_to(point: Vec, f: Force) -> Force:
+def moved_to(point: Vec, f: Wrench) -> Wrench:
     """A wrench about the origin as one about a point."""
-    return Force(sub(f.moment, cross(point, f.force)), f.force)
+    return Wrench(sub(f.moment, cross(point, f.force)), f.force)
 
 
 def wrenches(
@@ -73,9 +73,9 @@ def wrenches(
     loads: Sequence[PointForce],
     scalars: Scalars,
     about: Sequence[Vec] | None = None,
-) -> tuple[Force, ...]:
+) -> tuple[Wrench, ...]:
     """The loads as a wrench on each frame, about points of frames' own axes if they are given."""
-    found = [no_force(scalars)] * len(kinematics.links)
+    found = [no_wrench(scalars)] * len(kinematics.links)
     for load in loads:
         mount = linkage.mounts[load.body]
         if mount.frame >= 0:
@@ -85,19 +85,19 @@ def wrenches(
             if load.in_body is not None:
                 force, torque = (times(axes, part) for part in load.in_body)
                 moment = kinematics.of_frame(mount.frame, add(torque, cross(at, force)))
-                wrench = Force(moment, kinematics.of_frame(mount.frame, force))
+                wrench = Wrench(moment, kinematics.of_frame(mount.frame, force))
             else:
                 force = kinematics.from_world(mount.frame, load.force)
                 arm = kinematics.of_frame(mount.frame, at)
                 torque = kinematics.from_world(mount.frame, load.torque)
-                wrench = Force(add(torque, cross(arm, force)), force)
+                wrench = Wrench(add(torque, cross(arm, force)), force)
             found[mount.frame] = total(found[mount.frame], wrench)
     return tuple(found)
 
 
 def on_frames(
-    links: Sequence[Link], found: Sequence[Force], tau: Sequence[Scalar], scalars: Scalars
-) -> tuple[list[Force], list[Scalar]]:
+    links: Sequence[Link], found: Sequence[Wrench], tau: Sequence[Scalar], scalars: Scalars
+) -> tuple[list[Wrench], list[Scalar]]:
     """Wrenches with the torques of joints as moments on both frames, and what is left of `tau`."""
     wrenches, left = list(found), list(tau)
     for k, link in enumerate(links):
@@ -105,9 +105,9 @@ def on_frames(
             if not axis.angular or scalars.is_zero(tau[i]):
                 continue
             moment = scale(tau[i], axis.direction)
-            wrenches[k] = total(wrenches[k], Force(moment, zeros(scalars)))
+            wrenches[k] = total(wrenches[k], Wrench(moment, zeros(scalars)))
             if link.parent >= 0:
-                back = Force(link.turn.out(moment), zeros(scalars))
+                back = Wrench(link.turn.out(moment), zeros(scalars))
                 wrenches[link.parent] = less(wrenches[link.parent], back)
             left[i] = scalars.number(0.0)
     return wrenches, left
@@ -115,15 +115,15 @@ def on_frames(
 
 def inertial(
     kinematics: TreeKinematics, moving: Sequence[Acceleration], scalars: Scalars
-) -> tuple[Force, ...]:
+) -> tuple[Wrench, ...]:
     """The wrench that each frame's own mass takes."""
     return tuple(
-        Force(*inertial_force(link, a, scalars))
+        Wrench(*inertial_force(link, a, scalars))
         for link, a in zip(kinematics.links, moving, strict=True)
     )
 
 
-def carried(kinematics: TreeKinematics, forces: Sequence[Force]) -> tuple[Force, ...]:
+def carried(kinematics: TreeKinematics, forces: Sequence[Wrench]) -> tuple[Wrench, ...]:
     """Each frame's wrench together with those of all frames it carries."""
     sums = list(forces)
     for k in reversed(range(len(sums))):
@@ -133,7 +133,7 @@ def carried(kinematics: TreeKinematics, forces: Sequence[Force]) -> tuple[Force,
     return tuple(sums)
 
 
-def generalised(kinematics: TreeKinematics, sums: Sequence[Force], nv: int) -> list[Scalar]:
+def generalised(kinematics: TreeKinematics, sums: Sequence[Wrench], nv: int) -> list[Scalar]:
     """The parts of carried wrenches that do work on the velocities, in the order of `v`."""
     parts: list[Scalar] = [None] * nv
     for link, f in zip(kinematics.links, sums, strict=True):

@@ -58,7 +58,7 @@ def generalised(d: Dynamics, loads: Iterable[AnyLoad]) -> list[Scalar]:
     return parts
 
 
-def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Force]:
+def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Wrench]:
     """Loads as a wrench on each frame. They are summed in world axes, and turned once a frame."""
     nothing = zeros(d.scalars)
     points: dict[tuple[str, Vector], tuple[Vec, Vec]] = {}
@@ -66,18 +66,18 @@ def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Force]:
         force, torque = points.get((load.body, load.at), (nothing, nothing))
         more = turning_in_space(load.torque, d.scalars)
         points[load.body, load.at] = add(force, in_space(load.force, d.scalars)), add(torque, more)
-    sums: dict[int, fc.Force] = {}
+    sums: dict[int, fc.Wrench] = {}
     for (body, at), (force, torque) in points.items():
         frame = -1 if body == WORLD else d.linkage.mounts[d.index[body]].frame
         if frame >= 0:
             own = in_space(at, d.scalars)
             reach = arm(d.linkage, d.kinematics, d.index[body], own, d.scalars)
-            wrench = fc.Force(add(torque, cross(reach, force)), force)
+            wrench = fc.Wrench(add(torque, cross(reach, force)), force)
             sums[frame] = fc.total(sums[frame], wrench) if frame in sums else wrench
-    wrenches = [fc.Force(nothing, nothing)] * len(d.kinematics.links)
+    wrenches = [fc.Wrench(nothing, nothing)] * len(d.kinematics.links)
     for frame, f in sums.items():
         turned = (d.kinematics.from_world(frame, part) for part in (f.moment, f.force))
-        wrenches[frame] = fc.Force(*turned)
+        wrenches[frame] = fc.Wrench(*turned)
     return wrenches
 
 

@@ -30,10 +30,10 @@ from dataclasses import replace
 from eomgen.dynamics.aligned import aligned
 from eomgen.dynamics.articulated import along, with_component
 from eomgen.dynamics.forces import (
-    Force,
+    Wrench,
     at_parent,
     moved_to,
-    no_force,
+    no_wrench,
     on_frames,
     total,
 )
@@ -96,7 +96,7 @@ class Elimination:
         self._columns = possible(self._links, scalars)
 
     def respond(
-        self, moving: Sequence[Acceleration], wrenches: Sequence[Force], tau: Sequence[Scalar]
+        self, moving: Sequence[Acceleration], wrenches: Sequence[Wrench], tau: Sequence[Scalar]
     ) -> list[Scalar]:
         """The v̇ under wrenches about the centres and `tau` on the velocities, where `moving` are
         the accelerations at v̇ = 0.
@@ -123,8 +123,8 @@ class Elimination:
         return zeros(self._scalars) if solid is None else solid.centre
 
     def _own_rows(
-        self, k: int, a: Acceleration, wrench: Force
-    ) -> tuple[tuple[dict[int, Row], dict[int, Row]], Force]:
+        self, k: int, a: Acceleration, wrench: Wrench
+    ) -> tuple[tuple[dict[int, Row], dict[int, Row]], Wrench]:
         """Rows of a link's own mass, by axis: linear about its centre, and angular; and the part of
         a wrench about the centre that no inertia takes, about the origin.
         """
@@ -177,9 +177,9 @@ class Elimination:
         k: int,
         own: tuple[dict[int, Row], dict[int, Row]],
         rows: Sequence[tuple[Row, int]],
-        term: Force,
+        term: Wrench,
         tau: Sequence[Scalar],
-    ) -> tuple[Eliminated, Force]:
+    ) -> tuple[Eliminated, Wrench]:
         """Take a link's free axes out of the rows of all that it carries, each of a link, and of a
         wrench that nothing takes; what is left of that.
         """
@@ -255,7 +255,7 @@ class Elimination:
         The heaviest rows know nothing of it; but they would once those of other arms, rotated
         against them, had got into them, and rounding would not take it out again.
         """
-        first, nothing = kept.pop(column_of(axis[0])), no_force(self._scalars)
+        first, nothing = kept.pop(column_of(axis[0])), no_wrench(self._scalars)
         # All that pushes it is on its own row.
         one, kept, loose, _ = self._taken(
             link, axis, first, kept, loose, nothing, self._rows.zero, early=True
@@ -302,11 +302,11 @@ class Elimination:
         first: Row,
         kept: dict[Column, Row],
         free: Sequence[Row],
-        term: Force,
+        term: Wrench,
         tau: Scalar,
         *,
         early: bool = False,
-    ) -> tuple[Taken, dict[Column, Row], list[Row], Force]:
+    ) -> tuple[Taken, dict[Column, Row], list[Row], Wrench]:
         """Rotate one row until it alone holds an axis of motion; where it is early, first against
         the kept ones, which so stay a triangle.
         """
@@ -339,7 +339,7 @@ class Elimination:
             free.append(replace(row, angular=minus[0], linear=minus[1]))
         pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
         share = pivot.force / pivot.weight
-        left = Force(*with_component(way, moment, push, back))
+        left = Wrench(*with_component(way, moment, push, back))
         one = Taken(way, i, (first,), first.index, share, tuple(turns), rotor)
         return one, kept, free, left
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from eomgen.dynamics import observe
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.forces import Force
+from eomgen.dynamics.forces import Wrench
 from eomgen.dynamics.vectors import (
     Vec,
     add,
@@ -19,7 +19,7 @@ from eomgen.dynamics.vectors import (
 from eomgen.scalars.protocol import Scalar
 
 
-def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
+def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Wrench]:
     """The wrench of each joint that holds something on its parent, at the joint's point on the
     child, in world axes.
 
@@ -32,16 +32,16 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
     moving = dynamics.felt[1]
     accelerating = dynamics.accelerating(vd)
     nothing = zeros(scalars)
-    sums: list[Force] = []  # about each body's joint point, in world axes
+    sums: list[Wrench] = []  # about each body's joint point, in world axes
     joints: list[Vec] = []
     for k, mount in enumerate(linkage.mounts):
         centre = dynamics.centre(k)
         point = dynamics.position(k, mount.joint)
         joints.append(point)
         if mount.frame < 0:
-            sums.append(Force(nothing, scale(mount.mass, sub(nothing, dynamics.down))))
+            sums.append(Wrench(nothing, scale(mount.mass, sub(nothing, dynamics.down))))
             arm = sub(centre, point)
-            sums[-1] = Force(cross(arm, sums[-1].force), sums[-1].force)
+            sums[-1] = Wrench(cross(arm, sums[-1].force), sums[-1].force)
             continue
         frame = mount.frame
         world_R_body = observe.orientation(linkage, kinematics, k, scalars)
@@ -53,23 +53,23 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Force]:
         inertia = product(product(world_R_body, mount.inertia), transposed(world_R_body))
         force = scale(mount.mass, there)
         moment = add(times(inertia, alpha), cross(w, times(inertia, w)))
-        sums.append(Force(add(moment, cross(sub(centre, point), force)), force))
+        sums.append(Wrench(add(moment, cross(sub(centre, point), force)), force))
     for load in dynamics.loads[0]:
         k = load.body
         arm = sub(dynamics.position(k, load.at), joints[k])
         f = sums[k]
         moment = add(load.torque, cross(arm, load.force))
-        sums[k] = Force(sub(f.moment, moment), sub(f.force, load.force))
+        sums[k] = Wrench(sub(f.moment, moment), sub(f.force, load.force))
     for k in reversed(range(len(sums))):
         parent = model.bodies[k].parent
         if parent >= 0:
             arm = sub(joints[k], joints[parent])
             f, g = sums[parent], sums[k]
             moment = add(f.moment, add(g.moment, cross(arm, g.force)))
-            sums[parent] = Force(moment, add(f.force, g.force))
+            sums[parent] = Wrench(moment, add(f.force, g.force))
     holding = {body.name for body in model.holding}
     return [
-        Force(sub(nothing, f.moment), sub(nothing, f.force))
+        Wrench(sub(nothing, f.moment), sub(nothing, f.force))
         for body, f in zip(model.bodies, sums, strict=True)
         if body.name in holding
     ]

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from eomgen.dynamics.composite import Entries, composite_bodies, force_to_move
-from eomgen.dynamics.forces import Force, at_parent, carried, inertial, total
+from eomgen.dynamics.forces import Wrench, at_parent, carried, inertial, total
 from eomgen.dynamics.frames import Rigid
 from eomgen.dynamics.kinematics import Link, TreeKinematics
 from eomgen.dynamics.motion import Acceleration, Twist, momentum_of
@@ -151,10 +151,10 @@ class _Drag:
     matrix: Mat
     two: Scalar
 
-    def times(self, x: Twist) -> Force:
+    def times(self, x: Twist) -> Wrench:
         """B x."""
         w = scale(self.two, x.angular)
-        return Force(times(self.matrix, w), cross(w, self.momentum))
+        return Wrench(times(self.matrix, w), cross(w, self.momentum))
 
     def transposed_times(self, s: Twist) -> Vec:
         """The angular part of Bᵀ s; the linear part is zero."""
@@ -217,16 +217,16 @@ def _crossed(a: Twist, b: Twist) -> Twist:
     )
 
 
-def _turned(s: Twist, f: Force) -> Force:
+def _turned(s: Twist, f: Wrench) -> Wrench:
     """s x* f of a motion and a force."""
-    return Force(
+    return Wrench(
         add(cross(s.angular, f.moment), cross(s.linear, f.force)), cross(s.angular, f.force)
     )
 
 
-def _moved(body: Rigid, x: Twist) -> Force:
+def _moved(body: Rigid, x: Twist) -> Wrench:
     return force_to_move(body, x.angular, x.linear)
 
 
-def _work(x: Twist, f: Force) -> Scalar:
+def _work(x: Twist, f: Wrench) -> Scalar:
     return dot(x.angular, f.moment) + dot(x.linear, f.force)
