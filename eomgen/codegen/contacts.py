@@ -18,7 +18,7 @@ def contact_labels(d: Dynamics) -> tuple[ContactLabel, ...]:
 
 def _unit(d: Dynamics, contact: Contact) -> str:
     units = [
-        d.seats[load.joint].body.velocities[load.coordinate].unit.removesuffix("/s")
+        d.joint_indices[load.joint].body.velocities[load.coordinate].unit.removesuffix("/s")
         for load in contact.normal
         if isinstance(load, JointLoad)
     ]

@@ -71,11 +71,11 @@ def position_rates(model: Model, q: Sequence[Node], v: Sequence[Node], tape: Tap
     """q̇ of every coordinate: its own velocity, or ½ q ∘ ω of a quaternion (ω in its own axes)."""
     rates: list[Node] = []
     half = tape.constant(0.5)
-    for seat in model.seats:
-        rates += [v[j] for _, j in seat.plain if j < len(v)]
-        if seat.quaternion:
-            w, x, y, z = (q[i] for i in seat.quaternion)
-            a, b, c = (half * v[j] for j in seat.spin)
+    for index in model.joint_indices:
+        rates += [v[j] for _, j in index.plain if j < len(v)]
+        if index.quaternion:
+            w, x, y, z = (q[i] for i in index.quaternion)
+            a, b, c = (half * v[j] for j in index.spin)
             rates += [
                 -(x * a + y * b + z * c),
                 w * a + y * c - z * b,
@@ -347,13 +347,13 @@ def _state_columns(record: Recording) -> list[list[Node]]:
         return [entries.get((i, j), zero) for i in range(nv)]
 
     columns: list[list[Node]] = []
-    for seat in model.seats:
-        columns += [column(slopes.by_position, j) for _, j in seat.plain if j < nv]
-        if not seat.quaternion:
+    for index in model.joint_indices:
+        columns += [column(slopes.by_position, j) for _, j in index.plain if j < nv]
+        if not index.quaternion:
             continue
-        w, x, y, z = (record.q[i] for i in seat.quaternion)
+        w, x, y, z = (record.q[i] for i in index.quaternion)
         k = two / (w * w + x * x + y * y + z * z)
-        turns = [column(slopes.by_position, j) for j in seat.spin]
+        turns = [column(slopes.by_position, j) for j in index.spin]
         # δ = (2/|q|²) Im(q* dq): the small angle in own axes that a change of q is.
         for signs in ((-x, -y, -z), (w, -z, y), (z, w, -x), (-y, x, w)):
             weights = [k * sign for sign in signs]

@@ -123,7 +123,7 @@ class Dynamics(Moving):
         """The loads on each velocity's own joint, driven ones too; a locked joint holds its own."""
         forces = [self.scalars.number(0.0)] * self.moved
         for load in self.loads[1]:
-            i = self.seats[load.joint].v[load.coordinate]
+            i = self.joint_indices[load.joint].v[load.coordinate]
             if i < self.moved:
                 forces[i] = forces[i] + load.force
         return forces
@@ -257,9 +257,9 @@ class Dynamics(Moving):
     def _free_roots(self) -> list[int]:
         """Of each body that nothing holds the index of its first velocity."""
         return [
-            seat.v[0]
-            for seat in self.model.seats
-            if isinstance(seat.body.joint, Free) and max(seat.v[: self.dimensions]) < self.nv
+            index.v[0]
+            for index in self.model.joint_indices
+            if isinstance(index.body.joint, Free) and max(index.v[: self.dimensions]) < self.nv
         ]
 
     @cached_property

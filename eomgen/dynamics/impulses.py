@@ -52,7 +52,7 @@ def generalised(d: Dynamics, loads: Iterable[AnyLoad]) -> list[Scalar]:
     parts = fc.generalised(d.kinematics, fc.carried(d.kinematics, wrenches), d.moved)
     for load in loads:
         if isinstance(load, JointLoad):
-            i = d.seats[load.joint].v[load.coordinate]
+            i = d.joint_indices[load.joint].v[load.coordinate]
             if i < d.moved:
                 parts[i] = parts[i] + load.force
     return parts

@@ -84,8 +84,8 @@ def _drafted(
     mounts: list[Mount] = []
     locked = dict(model.locked)
     nv = len(model.velocities)
-    for seat in model.seats:
-        body = seat.body
+    for index in model.joint_indices:
+        body = index.body
         frame, axes, angle, at = -1, EYE, ZERO, zeros(scalars)
         if body.parent >= 0:
             parent = mounts[body.parent]
@@ -118,7 +118,7 @@ def _drafted(
                 continue
             tilt = exact.angle_of(to_axis[0][0], to_axis[1][0])
             spins = move.kind == "spin"
-            v = seat.spin if spins else seat.v[i : i + 1]
+            v = index.spin if spins else index.v[i : i + 1]
             drafts.append(
                 Frame(
                     name=body.name if i == len(moves) - 1 else f"{body.name}_{i + 1}",
@@ -129,7 +129,7 @@ def _drafted(
                     axis=k,
                     angle=exact.total(angle, tilt),
                     lead=ZERO,
-                    q=seat.quaternion if spins else seat.q[i : i + 1],
+                    q=index.quaternion if spins else index.q[i : i + 1],
                     v=v,
                     armature=armature,
                     rigid=_nothing(scalars),

@@ -18,7 +18,7 @@ from eomgen.dynamics.observe import (
 from eomgen.dynamics.vectors import Vec, in_space, times, zeros
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.rates import with_rates
-from eomgen.model.model import Model, Seat, ways_of
+from eomgen.model.model import JointIndex, Model, ways_of
 from eomgen.scalars.exact import Real
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects import Gravity
@@ -122,15 +122,15 @@ class Moving:
 
     def coordinate(self, joint: str, index: int = 0) -> Scalar:
         """A coordinate of a joint."""
-        return self.q[self.seats[joint].q[index]]
+        return self.q[self.joint_indices[joint].q[index]]
 
     def coordinate_name(self, joint: str, index: int = 0) -> str:
         """Its name."""
-        return self.seats[joint].body.positions[index].name
+        return self.joint_indices[joint].body.positions[index].name
 
     def rate(self, joint: str, index: int = 0) -> Scalar:
         """A velocity of a joint."""
-        return self.v[self.seats[joint].v[index]]
+        return self.v[self.joint_indices[joint].v[index]]
 
     def value(self, formula: Formula, **names: Scalar) -> Scalar:
         """A quantity."""
@@ -173,9 +173,9 @@ class Moving:
         return {name: k for k, name in enumerate(self.bodies)}
 
     @cached_property
-    def seats(self) -> dict[str, Seat]:
+    def joint_indices(self) -> dict[str, JointIndex]:
         """Where the coordinates and velocities of each joint stand."""
-        return {seat.body.joint.name: seat for seat in self.model.seats}
+        return {index.body.joint.name: index for index in self.model.joint_indices}
 
     @cached_property
     def given(self) -> list[tuple[Scalar, Scalar, Scalar]]:

@@ -100,7 +100,7 @@ def relative_pivots(model: Model, poses: Array) -> dict[int, Array]:
 
 def why_unresisted(model: Model, i: int) -> str:
     """What it means that next to nothing resists velocity `i`, and what to change."""
-    body = next(seat.body for seat in model.seats if i in seat.v)
+    body = next(index.body for index in model.joint_indices if i in index.v)
     where = f"'{model.velocities[i].name}' of joint '{body.joint.name}'"
     if model.dimensions == 3:
         return (
@@ -187,7 +187,7 @@ def _where(
 
 def _singular(model: Model, i: int) -> str:
     name = model.velocities[i].name
-    body = next(seat.body for seat in model.seats if i in seat.v)
+    body = next(index.body for index in model.joint_indices if i in index.v)
     return (
         f"body '{body.name}': nothing resists '{name}', neither its mass or inertia nor what it "
         "carries; give it some, or a joint that does not move so"

@@ -25,7 +25,7 @@ class Body:
 
     `inertia_com` about the centre of mass in body axes: one moment in the plane; in space xx, yy,
     zz, xy, xz, yz. `positions` and `velocities` are all the joint's, whether states or not; see
-    `Model.seats`.
+    `Model.joint_indices`.
     """
 
     name: str
@@ -121,7 +121,7 @@ def ways_of(bodies: Iterable[Body], dimensions: int) -> dict[str, tuple[str, ...
 
 
 @dataclass(frozen=True)
-class Seat:
+class JointIndex:
     """Where a body's joint stands among all coordinates and all velocities, which are those of the
     state, then the driven ones, then the locked ones, each in the order of the bodies.
     """
@@ -203,7 +203,7 @@ class Model:
         return tuple(c for c in self.prescribed if not c.locked)
 
     @cached_property
-    def seats(self) -> tuple[Seat, ...]:
+    def joint_indices(self) -> tuple[JointIndex, ...]:
         """Where each body's joint stands among the coordinates and velocities."""
         given = self.prescribed
         positions = (*self.coordinates, *(c.position for c in given))
@@ -211,7 +211,9 @@ class Model:
         q = {c.name: i for i, c in enumerate(positions)}
         v = {c.name: i for i, c in enumerate(velocities)}
         return tuple(
-            Seat(b, tuple(q[c.name] for c in b.positions), tuple(v[c.name] for c in b.velocities))
+            JointIndex(
+                b, tuple(q[c.name] for c in b.positions), tuple(v[c.name] for c in b.velocities)
+            )
             for b in self.bodies
         )
 
@@ -236,9 +238,9 @@ class Model:
     def quaternions(self) -> tuple[tuple[int, int, int, int], ...]:
         """Indices in `q` of each unit quaternion."""
         found = []
-        for seat in self.seats:
-            if seat.quaternion:
-                w, x, y, z = seat.quaternion
+        for index in self.joint_indices:
+            if index.quaternion:
+                w, x, y, z = index.quaternion
                 found.append((w, x, y, z))
         return tuple(found)
 
@@ -247,9 +249,9 @@ class Model:
         """For each velocity of the state how many others carry it; pairs that M couples."""
         nv, depth = len(self.velocities), list[int]()
         found = [0] * nv
-        for seat in self.seats:
-            above = depth[seat.body.parent] if seat.body.parent >= 0 else 0
-            for i in seat.v:
+        for index in self.joint_indices:
+            above = depth[index.body.parent] if index.body.parent >= 0 else 0
+            for i in index.v:
                 if i < nv:
                     found[i] = above
                     above += 1

@@ -11,7 +11,7 @@ import gmpy2
 from gmpy2 import mpfr
 
 from eomgen.language.formula import Formula, evaluate
-from eomgen.model.model import Model, Seat, ways_of
+from eomgen.model.model import JointIndex, Model, ways_of
 from eomgen.precision.longs import Array, along, long, zeros
 from eomgen.precision.precise import Long
 from eomgen.scalars.extended import Bits
@@ -67,7 +67,7 @@ class Placed:
         names = (x.name for x in model.states)
         self._states = dict(zip(names, y[nq + self.nv :], strict=True))
         self.index = {name: k for k, name in enumerate(self.bodies)}
-        self.seats = {seat.body.joint.name: seat for seat in model.seats}
+        self.joint_indices = {index.body.joint.name: index for index in model.joint_indices}
 
     # What effects may ask for.
 
@@ -122,15 +122,15 @@ class Placed:
 
     def coordinate(self, joint: str, index: int = 0) -> Long:
         """A coordinate of a joint."""
-        return self.q[self.seats[joint].q[index]]
+        return self.q[self.joint_indices[joint].q[index]]
 
     def coordinate_name(self, joint: str, index: int = 0) -> str:
         """The name of a coordinate of a joint."""
-        return self.seats[joint].body.positions[index].name
+        return self.joint_indices[joint].body.positions[index].name
 
     def rate(self, joint: str, index: int = 0) -> Long:
         """A velocity of a joint."""
-        return self.v[self.seats[joint].v[index]]
+        return self.v[self.joint_indices[joint].v[index]]
 
     def value(self, formula: Formula, **names: Long) -> Long:
         """The value of a formula."""
@@ -209,40 +209,40 @@ class Placed:
     def poses(self) -> tuple[Pose, ...]:
         """The poses of all bodies."""
         world, found = world_pose(self.moved), list[Pose]()
-        for seat in self.model.seats:
-            parent = seat.body.parent
-            found.append(self._child(world if parent < 0 else found[parent], seat))
+        for index in self.model.joint_indices:
+            parent = index.body.parent
+            found.append(self._child(world if parent < 0 else found[parent], index))
         return tuple(found)
 
     @cached_property
     def carrying(self) -> list[list[int]]:
         """For each body, the indices of the velocities that move it."""
         found: list[list[int]] = []
-        for seat in self.model.seats:
-            base = found[seat.body.parent] if seat.body.parent >= 0 else []
-            found.append([*base, *(i for i in seat.v if i < self.moved)])
+        for index in self.model.joint_indices:
+            base = found[index.body.parent] if index.body.parent >= 0 else []
+            found.append([*base, *(i for i in index.v if i < self.moved)])
         return found
 
-    def _child(self, pose: Pose, seat: Seat) -> Pose:
-        joint = seat.body.joint
+    def _child(self, pose: Pose, index: JointIndex) -> Pose:
+        joint = index.body.joint
         if not isinstance(joint, Free):
             pose = pose.moved(self.in_space([self.value(r) for r in joint.r_parent]))
             pose = pose.fixed(orientation(joint.orientation_deg))
         for i, move in enumerate(joint.moves(self.dimensions)):
-            pose = self._made(pose, move, seat, i)
+            pose = self._made(pose, move, index, i)
         if not isinstance(joint, Free):
             pose = pose.moved(-self.in_space([self.value(r) for r in joint.r_child]))
         return pose
 
-    def _made(self, pose: Pose, move: Move, seat: Seat, i: int) -> Pose:
+    def _made(self, pose: Pose, move: Move, index: JointIndex, i: int) -> Pose:
         """The pose after one primitive of a joint."""
         if move.kind == "spin":
-            quaternion = long([self.q[j] for j in seat.quaternion])
-            turn, turn_v, turn_b = spun(quaternion, seat.spin, self.felt)
+            quaternion = long([self.q[j] for j in index.quaternion])
+            turn, turn_v, turn_b = spun(quaternion, index.spin, self.felt)
             return pose.turned(turn, turn_v, turn_b, self.felt)
         axis = long(move.axis)
         axis = axis / gmpy2.sqrt(axis @ axis)
-        x, column = self.q[seat.q[i]], seat.v[i] if seat.v[i] < self.moved else None
+        x, column = self.q[index.q[i]], index.v[i] if index.v[i] < self.moved else None
         if move.kind == "slide":
             return pose.slid(axis, x, column, self.felt)
         if column is None:

@@ -67,11 +67,11 @@ class FreeBodies(Placed):
     def _rotors(self) -> dict[int, Long]:
         """Reflected inertia of rotors, by velocity, kg m² or kg."""
         found = {}
-        for seat in self.model.seats:
-            joint = seat.body.joint
-            if isinstance(joint, Geared) and seat.v[0] < self.moved:
+        for index in self.model.joint_indices:
+            joint = index.body.joint
+            if isinstance(joint, Geared) and index.v[0] < self.moved:
                 ratio = mpfr(1) if joint.gear_ratio is None else self.value(joint.gear_ratio)
-                found[seat.v[0]] = ratio * ratio * self.value(joint.motor_inertia)
+                found[index.v[0]] = ratio * ratio * self.value(joint.motor_inertia)
         return found
 
     @cached_property
@@ -99,7 +99,7 @@ class FreeBodies(Placed):
         total, sizes = zeros(self.moved), zeros(self.moved)
         for load in loads:
             if isinstance(load, JointLoad):
-                i = self.seats[load.joint].v[load.coordinate]
+                i = self.joint_indices[load.joint].v[load.coordinate]
                 if i < self.moved:
                     total[i] = total[i] + load.force
                     sizes[i] = sizes[i] + abs(load.force)
@@ -174,11 +174,11 @@ class FreeBodies(Placed):
     def state_rates(self) -> Array:
         """ẏ (ny,): the rates of coordinates, velocities and extra states."""
         found: list[Long] = []
-        for seat in self.model.seats:
-            found += [self.v[j] for _, j in seat.plain if j < self.nv]
-            if seat.quaternion:
-                spin = long([self.v[j] for j in seat.spin])
-                found += list(composed(long([self.q[i] for i in seat.quaternion]), spin) / 2)
+        for index in self.model.joint_indices:
+            found += [self.v[j] for _, j in index.plain if j < self.nv]
+            if index.quaternion:
+                spin = long([self.v[j] for j in index.spin])
+                found += list(composed(long([self.q[i] for i in index.quaternion]), spin) / 2)
         extra = [rate for effect in self.model.effects for rate in effect.rates(self)]
         return long([*found, *self.vd, *extra])
 
