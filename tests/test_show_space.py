@@ -20,7 +20,7 @@ from eomgen.codegen.backends.javascript import javascript_poses
 from eomgen.errors import SceneError
 from eomgen.program.program import Output, finish
 from eomgen.program.tape import Stage, Tape
-from eomgen.scene.joints.base import Move
+from eomgen.scene.joints.base import Primitive
 from eomgen.scene.look import Box, Camera, Cylinder, Ellipsoid, Rod, Shape, Sphere, check_look
 from eomgen.show.figure import draw_motion, save_figure
 from eomgen.show.motion import Motion, thinned
@@ -459,7 +459,7 @@ KINDS: dict[str, tuple[Any, ...]] = {
 
 
 def joint(kind: str, parent: str, r_parent: Any = (), r_child: Any = ()) -> Any:
-    moves = tuple(Move(move) for move in KINDS[kind])
+    moves = tuple(Primitive(move) for move in KINDS[kind])
     held = SimpleNamespace(name=kind, parent=parent, moves=lambda _: moves)
     if kind != "free":
         held.r_parent, held.r_child = r_parent, r_child

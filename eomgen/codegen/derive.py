@@ -80,10 +80,10 @@ def _symbolic(model: Model) -> Derived:
 
 def _axes(model: Model, route: str) -> list[Axes | None]:
     slides = (
-        move.kind == "slide"
+        primitive.kind == "prismatic"
         for body in model.bodies
         if body.parent >= 0
-        for move in body.joint.moves(2)
+        for primitive in body.joint.primitives(2)
     )
     both = not ROUTES[route].frame_axes and model.dimensions == 2 and any(slides)
     return [None, "own"] if both else [None]

@@ -127,7 +127,9 @@ def overlap_lines(model: Model) -> list[str]:
     for overlap in initial_overlaps(model):
         effect, kind, unit = effects[overlap.effect], "contact", "m"
         if isinstance(effect, JointStop):
-            slides = {way == "slide" for joint in effect.acted_on(joints) for way in joints[joint]}
+            slides = {
+                way == "prismatic" for joint in effect.acted_on(joints) for way in joints[joint]
+            }
             kind = "stop"
             unit = "rad or m" if len(slides) == 2 else "m" if True in slides else "rad"
         lines.append(

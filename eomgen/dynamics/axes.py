@@ -59,7 +59,7 @@ def with_simple_origins(
     frames, mounts = list(frames), list(mounts)
     for k, (children, riders) in enumerate(_carried(frames, mounts)):
         frame = frames[k]
-        if frame.kind == "spin" or (graded and not is_straight(frame.fixed)):
+        if frame.kind == "spherical" or (graded and not is_straight(frame.fixed)):
             continue
         offset, shift = _better_origin(frame, scalars)
         offsets = [frames[n].offset for n in children]
@@ -94,7 +94,7 @@ def _carried(frames: Sequence[Frame], mounts: Sequence[Mount]) -> tuple[Carried,
 def _better_origin(frame: Frame, scalars: Scalars) -> tuple[Vec, Vec]:
     """Another offset of a frame, and how far its origin moves for it, in its own axes."""
     back = constant(exact.transposed(frame.fixed), scalars)
-    if frame.kind == "slide":
+    if frame.kind == "prismatic":
         x, y, z = ((-a, -b, -c) for a, b, c in back)
         return zeros(scalars), times((x, y, z), frame.offset)
     image = [row[frame.axis] for row in frame.fixed]
@@ -125,10 +125,10 @@ def with_simple_axes(
     fitted: set[int] = set()
     for k in range(len(frames)):
         frame = frames[k]
-        if frame.kind != "turn" or is_straight(frame.fixed):
+        if frame.kind != "revolute" or is_straight(frame.fixed):
             continue
         above = frames[frame.parent] if frame.parent >= 0 else None
-        fits = not graded and above is not None and above.kind == "turn"
+        fits = not graded and above is not None and above.kind == "revolute"
         fits = fits and frame.parent not in fitted
         i = above.axis if above is not None and fits else _across(frame)
         a, m, b, c = exact.turns_to(frame.fixed, i, frame.axis)

@@ -1,4 +1,4 @@
-"""What a linkage is made of: frames with their moves, and the bodies mounted on them."""
+"""What a linkage is made of: frames with their joint primitives, and the bodies mounted on them."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -24,7 +24,7 @@ def joined(a: Rigid, b: Rigid) -> Rigid:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame and its move against frame `parent` (-1 the world).
+    """A frame and its joint primitive against frame `parent` (-1 the world).
 
     `offset` is its origin at zero from the parent's, in the parent's axes; the columns of `fixed`
     are its axes at zero in the parent's; the move goes about or along coordinate axis `axis` of
@@ -37,7 +37,7 @@ class Frame:
     parent: int
     offset: Vec
     fixed: Matrix
-    kind: Literal["turn", "slide", "spin"]
+    kind: Literal["revolute", "prismatic", "spherical"]
     axis: int
     angle: Real
     lead: Real

@@ -138,12 +138,12 @@ def tree_kinematics(
         fixed = fixed_rotation(frame.fixed, scalars)
         turn, arm = fixed, frame.offset
         directions: tuple[MotionAxis, ...] = (
-            MotionAxis(frame.kind == "turn", eye[frame.axis], frame.axis),
+            MotionAxis(frame.kind == "revolute", eye[frame.axis], frame.axis),
         )
-        if frame.kind == "spin":
+        if frame.kind == "spherical":
             turn = both(fixed, from_quaternion([q[i] for i in frame.q], scalars))
             directions = tuple(MotionAxis(True, eye[k], k) for k in AXES)
-        elif frame.kind == "turn":
+        elif frame.kind == "revolute":
             count, lead = quarters(frame.lead)
             angle = q[frame.q[0]] + scalars.number(lead)
             turn = both(fixed, axis_turn(frame.axis, angle, count, scalars))
@@ -181,7 +181,7 @@ def _angle(frame: Frame, angles: Sequence[Angle], q: Sequence[Scalar], scalars: 
     """A planar frame's angle, by that of its parent."""
     base = angles[frame.parent] if frame.parent >= 0 else Angle(scalars.number(0.0), ZERO)
     fixed = total(base.fixed, frame.angle)
-    if frame.kind != "turn":
+    if frame.kind != "revolute":
         return Angle(base.moving, fixed)
     return Angle(scalars.named(base.moving + q[frame.q[0]], f"angle_{frame.name}"), fixed)
 

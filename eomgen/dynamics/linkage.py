@@ -1,4 +1,4 @@
-"""A model as a tree of frames, each of which makes one elementary move against its parent.
+"""A model as a tree of frames, each of which makes one joint primitive against its parent.
 
 A joint of several coordinates is a row of frames, all but the last without mass. A weld adds no
 frame: its body is carried by the frame of its parent; nor does a locked coordinate. The axes of a
@@ -40,7 +40,7 @@ from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects import Gravity
 from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import Geared, Move
+from eomgen.scene.joints.base import Geared, Primitive
 
 
 def make_linkage(model: Model, parameters: Mapping[str, Scalar], scalars: Scalars) -> Linkage:
@@ -102,11 +102,11 @@ def _drafted(
                 armature = value(joint.motor_inertia)
                 if joint.gear_ratio is not None:
                     armature = value(joint.gear_ratio) * value(joint.gear_ratio) * armature
-        moves = joint.moves(model.dimensions)
-        for i, move in enumerate(moves):
-            to_axis, k = _to_coordinate_axis(move)
+        primitives = joint.primitives(model.dimensions)
+        for i, primitive in enumerate(primitives):
+            to_axis, k = _to_coordinate_axis(primitive)
             name = body.positions[i].name
-            if name in locked and move.kind == "slide":
+            if name in locked and primitive.kind == "prismatic":
                 way = exact.turned(exact.product(axes, to_axis), k, locked[name])
                 at = add(at, _numbers(way, scalars))
                 continue
@@ -114,18 +114,18 @@ def _drafted(
                 held = model.locked_angle(name)
                 back = exact.product(exact.turn(k, held), exact.transposed(to_axis))
                 axes = exact.product(axes, exact.product(to_axis, back))
-                angle = exact.total(angle, held if move.axis[2] > 0 else exact.opposite(held))
+                angle = exact.total(angle, held if primitive.axis[2] > 0 else exact.opposite(held))
                 continue
             tilt = exact.angle_of(to_axis[0][0], to_axis[1][0])
-            spins = move.kind == "spin"
+            spins = primitive.kind == "spherical"
             v = index.spin if spins else index.v[i : i + 1]
             drafts.append(
                 Frame(
-                    name=body.name if i == len(moves) - 1 else f"{body.name}_{i + 1}",
+                    name=body.name if i == len(primitives) - 1 else f"{body.name}_{i + 1}",
                     parent=frame,
                     offset=at,
                     fixed=exact.product(axes, to_axis),
-                    kind=move.kind,
+                    kind=primitive.kind,
                     axis=k,
                     angle=exact.total(angle, tilt),
                     lead=ZERO,
@@ -199,6 +199,6 @@ def _named(rigid: Rigid, name: str, scalars: Scalars) -> Rigid:
     return Rigid(m, (first[0], first[1], first[2]), symmetric(entries))
 
 
-def _to_coordinate_axis(move: Move) -> tuple[Matrix, int]:
+def _to_coordinate_axis(primitive: Primitive) -> tuple[Matrix, int]:
     """A rotation R and a coordinate axis k with R e_k = the axis of the move."""
-    return (EYE, 2) if move.kind == "spin" else exact.to_axis(move.axis)
+    return (EYE, 2) if primitive.kind == "spherical" else exact.to_axis(primitive.axis)

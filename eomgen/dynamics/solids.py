@@ -102,9 +102,9 @@ def ranked(linkage: Linkage) -> Ranks:
         whole[k] += sum(whole[n] for n in children if not free[n])
         single[k] = max([own[k], *(single[n] for n in children if not free[n])])
         fixed = sorted((*(least[n] for n in children), 0.0, 0.0, 0.0), reverse=True)
-        spins = frames[k].kind == "spin"
+        spins = frames[k].kind == "spherical"
         # What is left of so many points when all turns are free.
-        least[k] = 0.0 if frames[k].kind == "slide" else max(own[k], fixed[2 if spins else 1])
+        least[k] = 0.0 if frames[k].kind == "prismatic" else max(own[k], fixed[2 if spins else 1])
         weights = least if spins else [0.0 if free[n] else w for n, w in enumerate(whole)]
         order = sorted(children, key=lambda n: -weights[n])
         if order and weights[order[0]] > own[k]:
@@ -123,7 +123,7 @@ def _sliding_all_ways(linkage: Linkage, carried: Sequence[Sequence[int]]) -> lis
     frames, ways = linkage.frames, 2 if linkage.planar else 3
     run = [0] * len(frames)
     for k in reversed(range(len(frames))):
-        if frames[k].kind == "slide":
+        if frames[k].kind == "prismatic":
             alone = frames[k].rigid.mass == 0.0 and len(carried[k]) == 1
             run[k] = 1 + (run[carried[k][0]] if alone else 0)
     return [n >= ways for n in run]
@@ -147,5 +147,5 @@ def _firm(
             arm = frames[n].offset
             turning += [single[n] * dot(arm, arm), max(moments[n])]
         for joint in (frame, *(frames[n] for n in carried[k])):
-            (moving if joint.kind == "slide" else turning).append(joint.armature)
+            (moving if joint.kind == "prismatic" else turning).append(joint.armature)
         yield solid.mass >= FIRM * max(moving) and min(moments[k]) >= FIRM * max(turning)

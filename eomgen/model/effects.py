@@ -24,10 +24,10 @@ def sliding_in(bodies: Sequence[Body], dimensions: int) -> frozenset[str]:
     """Joints that do nothing but slide, and coordinates that slide."""
     found: list[str] = []
     for body in bodies:
-        kinds = [move.kind for move in body.joint.moves(dimensions)]
-        found += [body.joint.name] * (set(kinds) == {"slide"})
+        kinds = [primitive.kind for primitive in body.joint.primitives(dimensions)]
+        found += [body.joint.name] * (set(kinds) == {"prismatic"})
         pairs = zip(body.positions, kinds, strict=False)
-        found += [coordinate.name for coordinate, kind in pairs if kind == "slide"]
+        found += [coordinate.name for coordinate, kind in pairs if kind == "prismatic"]
     return frozenset(found)
 
 

@@ -112,9 +112,9 @@ def velocities_of(
 
 
 def ways_of(bodies: Iterable[Body], dimensions: int) -> dict[str, tuple[str, ...]]:
-    """The joints that move but the free ones, each with the kinds of its moves."""
+    """The joints that move but the free ones, each with the kinds of its primitives."""
     return {
-        body.joint.name: tuple(move.kind for move in body.joint.moves(dimensions))
+        body.joint.name: tuple(primitive.kind for primitive in body.joint.primitives(dimensions))
         for body in bodies
         if body.positions and not isinstance(body.joint, Free)
     }

@@ -11,7 +11,7 @@ from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.appearance import Appearance
-from eomgen.scene.joints.base import WORLD, Move
+from eomgen.scene.joints.base import WORLD, Primitive
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.motion import Anchor, Motion
 from eomgen.show.skeleton import shapes_of
@@ -98,23 +98,25 @@ def joint_drift(model: Model, poses: FloatArray) -> FloatArray:
     return np.array(gaps).reshape(len(gaps), len(poses)).T
 
 
-def _joints(model: Model, chosen: Callable[[Sequence[Move]], bool]) -> list[tuple[int, _Joint]]:
+def _joints(
+    model: Model, chosen: Callable[[Sequence[Primitive]], bool]
+) -> list[tuple[int, _Joint]]:
     """Joints `chosen` by their moves, except free ones, each with the index of its child body."""
     return [
         (k, cast(_Joint, body.joint))
         for k, body in enumerate(model.bodies)
-        if chosen(body.joint.moves(model.dimensions))
+        if chosen(body.joint.primitives(model.dimensions))
     ]
 
 
-def _holds_a_point(moves: Sequence[Move]) -> bool:
+def _holds_a_point(primitives: Sequence[Primitive]) -> bool:
     """Whether a joint keeps a point of the parent and one of the child together."""
-    return all(move.kind != "slide" for move in moves)
+    return all(primitive.kind != "prismatic" for primitive in primitives)
 
 
-def _is_marked(moves: Sequence[Move]) -> bool:
+def _is_marked(primitives: Sequence[Primitive]) -> bool:
     """Whether a picture marks a joint: it allows rotation about a point, or motion along a line."""
-    return bool(moves) and sum(move.kind == "slide" for move in moves) < 2
+    return bool(primitives) and sum(primitive.kind == "prismatic" for primitive in primitives) < 2
 
 
 def _anchors(model: Model, dimensions: int) -> tuple[Anchor, ...]:

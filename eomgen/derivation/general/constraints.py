@@ -18,7 +18,7 @@ from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Body, Model
 from eomgen.scalars.exact import direction, orientation, quarters, radians
 from eomgen.scene.joints import Free, Joint
-from eomgen.scene.joints.base import Move
+from eomgen.scene.joints.base import Primitive
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,9 @@ def _differentiated(
         fixed = orientation(joint.orientation_deg)
         axes = sp.Matrix([[symbols.number(entry) for entry in row] for row in fixed])
         r_parent, arm = symbols.vector(joint.r_parent), symbols.vector(joint.r_child)
-    moves = joint.moves(model.dimensions)
-    rotation, turning, slide = _moved(body.name, moves, q, v, symbols, ledger)
-    if moves and not all(_simple(move) for move in moves):
+    primitives = joint.primitives(model.dimensions)
+    rotation, turning, slide = _moved(body.name, primitives, q, v, symbols, ledger)
+    if primitives and not all(_simple(primitive) for primitive in primitives):
         rotation = _entries(body.name, rotation, turning, ledger)
     inward, back = axes.T, rotation.T
     reach = inward * r_parent + slide
@@ -116,7 +116,7 @@ def _differentiated(
         reach=reach,
         arm=arm,
         turning=turning,
-        turn=_turn_of(joint, moves, q, symbols, model.dimensions),
+        turn=_turn_of(joint, primitives, q, symbols, model.dimensions),
         parent=parent,
         own=own,
         omega=omega,
@@ -129,17 +129,19 @@ def _differentiated(
 
 def _moved(
     name: str,
-    moves: Sequence[Move],
+    primitives: Sequence[Primitive],
     q: Sequence[Expr],
     v: Sequence[Expr],
     symbols: Symbols,
     ledger: Ledger,
 ) -> tuple[Expr, Expr, Expr]:
-    """Rotation, angular velocity in the turned axes, and slide of a row of moves; q' by the way."""
+    """Rotation, angular velocity in the turned axes, and displacement of a row of primitives; also
+    q'.
+    """
     rotation, turning, slide = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
     q, v = list(q), list(v)
-    for move in moves:
-        if move.kind == "spin":
+    for primitive in primitives:
+        if primitive.kind == "spherical":
             w, x, y, z = q[:4]
             a, b, c = v[:3]
             half = sp.Rational(1, 2)
@@ -154,8 +156,8 @@ def _moved(
             q, v = q[4:], v[3:]
             continue
         ledger.rates[q[0]] = v[0]
-        axis = sp.Matrix([symbols.number(part) for part in direction(move.axis)])
-        if move.kind == "slide":
+        axis = sp.Matrix([symbols.number(part) for part in direction(primitive.axis)])
+        if primitive.kind == "prismatic":
             slide += rotation * axis * q[0]
         else:
             turn = about(axis, q[0])
@@ -165,7 +167,11 @@ def _moved(
 
 
 def _turn_of(
-    joint: Joint, moves: Sequence[Move], q: Sequence[Expr], symbols: Symbols, dimensions: int
+    joint: Joint,
+    primitives: Sequence[Primitive],
+    q: Sequence[Expr],
+    symbols: Symbols,
+    dimensions: int,
 ) -> tuple[Expr, Expr] | None:
     """Coordinate axis and angle of a joint whose turns are all about one; the angle is 0 of none.
 
@@ -178,21 +184,23 @@ def _turn_of(
         axis, angle = sp.Matrix([0, 0, 1]), count * sp.pi / 2 + symbols.number(rest)
     elif degrees not in (0.0, (0.0, 0.0, 0.0)):
         return None
-    for move, coordinate in zip(moves, q, strict=False):  # a spin has four
-        if move.kind == "slide":
+    for primitive, coordinate in zip(primitives, q, strict=False):  # a spin has four
+        if primitive.kind == "prismatic":
             continue
-        along = sp.Matrix([int(part != 0) for part in move.axis])
-        if not _simple(move) or (any(axis) and along != axis):
+        along = sp.Matrix([int(part != 0) for part in primitive.axis])
+        if not _simple(primitive) or (any(axis) and along != axis):
             return None
-        way = sum(symbols.number(part) for part in direction(move.axis))
+        way = sum(symbols.number(part) for part in direction(primitive.axis))
         axis, angle = along, angle + way * coordinate
     return axis, angle
 
 
-def _simple(move: Move) -> bool:
-    """Whether a move's rotation has one sine or cosine in an entry: slides, and coordinate axes."""
-    along = sum(part != 0.0 for part in move.axis) == 1
-    return move.kind == "slide" or (move.kind == "turn" and along)
+def _simple(primitive: Primitive) -> bool:
+    """Whether a primitive's rotation has one sine or cosine in an entry: slides, and coordinate
+    axes.
+    """
+    along = sum(part != 0.0 for part in primitive.axis) == 1
+    return primitive.kind == "prismatic" or (primitive.kind == "revolute" and along)
 
 
 def _entries(name: str, rotation: Expr, turning: Expr, ledger: Ledger) -> Expr:

@@ -101,9 +101,9 @@ def _sizes(model: Model) -> dict[Real, None]:
             parts += [x for row in orientation(joint.orientation_deg) for x in row]
             if not isinstance(joint.orientation_deg, tuple):
                 parts.append(quarters(radians(joint.orientation_deg))[1])
-        for move in joint.moves(model.dimensions):
-            if move.kind != "spin":
-                parts += direction(move.axis)
+        for primitive in joint.primitives(model.dimensions):
+            if primitive.kind != "spherical":
+                parts += direction(primitive.axis)
         sizes = (opposite(x) if x < 0 else x for x in parts)
         found |= dict.fromkeys(x for x in sizes if x not in (0, 1))
     return found

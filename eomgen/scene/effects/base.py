@@ -110,8 +110,8 @@ class Mechanism(Protocol):
 
     @property
     def joints(self) -> Mapping[str, tuple[str, ...]]:
-        """All joints that move but the free ones, each with its ways in order: "turn" or "slide"
-        for a coordinate of its own, "spin" for a quaternion.
+        """All joints that move but the free ones, each with its ways in order: "revolute" or
+        "prismatic" for a coordinate of its own, "spherical" for a quaternion.
         """
 
     def mass(self, body: str) -> Scalar:

@@ -56,7 +56,7 @@ class JointSpring(OnJoints):
         """A ball rests in one place only."""
         super().check_ways(joints, names, place)
         for joint in self.acted_on(joints):
-            if "spin" in joints[joint] and self.rest != ZERO:
+            if "spherical" in joints[joint] and self.rest != ZERO:
                 raise SceneError(f"{place}.rest: at a ball joint ('{joint}') it is 0; leave it out")
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:

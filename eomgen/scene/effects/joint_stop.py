@@ -68,7 +68,7 @@ class JointStop(OnJoints):
         super().check_ways(joints, names, place)
         acted_on = self.acted_on(joints)
         for joint in acted_on:
-            if "spin" in joints[joint] and self.low is not None:
+            if "spherical" in joints[joint] and self.low is not None:
                 raise SceneError(
                     f"{place}.low: the turn of a ball joint ('{joint}') is never below 0; give high"
                 )

@@ -48,7 +48,7 @@ class Way:
 
 def way(mechanism: Mechanism, joint: str, kind: str, place: int) -> Way:
     """The way of a joint whose coordinate, or quaternion, is number `place` of the joint's."""
-    if kind != "spin":
+    if kind != "spherical":
         value, rate = mechanism.coordinate(joint, place), mechanism.rate(joint, place)
         return Way(joint, place, value, (mechanism.number(1.0),), (rate,))
     w, *vector = (mechanism.coordinate(joint, place + i) for i in range(4))
@@ -157,7 +157,7 @@ def _plain(
     joints: Mapping[str, tuple[str, ...]], names: Mapping[str, Sequence[str]], joint: str
 ) -> Sequence[str]:
     """The coordinates of a joint that are angles or slides."""
-    return names[joint][: sum(kind != "spin" for kind in joints[joint])]
+    return names[joint][: sum(kind != "spherical" for kind in joints[joint])]
 
 
 def _check_coordinate(name: str | None, joint: str, known: Sequence[str], place: str) -> None:

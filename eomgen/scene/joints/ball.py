@@ -2,7 +2,7 @@
 
 from typing import ClassVar, Literal
 
-from eomgen.scene.joints.base import Coordinate, JointTable, Move
+from eomgen.scene.joints.base import Coordinate, JointTable, Primitive
 
 
 class Ball(JointTable):
@@ -22,9 +22,9 @@ class Ball(JointTable):
         """Three components of the angular velocity."""
         return angular_velocity(self.name, self.child, self.parent)
 
-    def moves(self, dimensions: int) -> tuple[Move, ...]:
-        """One spin."""
-        return (Move("spin"),)
+    def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
+        """One spherical primitive."""
+        return (Primitive("spherical"),)
 
 
 def quaternion(prefix: str, child: str, parent: str) -> tuple[Coordinate, ...]:

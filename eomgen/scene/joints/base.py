@@ -1,4 +1,4 @@
-"""What joint types share: their table, their coordinates, and the elementary moves they are of."""
+"""What joint types share: their table, their coordinates, and their primitives."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -34,14 +34,16 @@ class Coordinate:
 
 
 @dataclass(frozen=True)
-class Move:
-    """An elementary motion of the child against the parent, in the axes the moves before it left.
+class Primitive:
+    """A joint primitive: a motion of the child against the parent, in the axes after the ones
+    before.
 
-    `turn` and `slide` go about or along `axis`, of any length, by one coordinate. `spin` turns by a
-    unit quaternion w, x, y, z; its velocities are the angular velocity in the turned axes.
+    `revolute` and `prismatic` have one coordinate, about or along `axis` (of any length).
+    `spherical` is a rotation by a unit quaternion w, x, y, z; its velocities are the angular
+    velocity in the rotated axes.
     """
 
-    kind: Literal["turn", "slide", "spin"]
+    kind: Literal["revolute", "prismatic", "spherical"]
     axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from eomgen.language.base import Identifier
 from eomgen.language.quantity import Numbers
-from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Move, spatial
+from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Primitive, spatial
 
 
 class Cylindrical(JointTable):
@@ -31,7 +31,7 @@ class Cylindrical(JointTable):
         """Their rates."""
         return tuple(c.rate for c in self.positions(dimensions))
 
-    def moves(self, dimensions: int) -> tuple[Move, ...]:
-        """A slide, then a turn, on one axis."""
+    def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
+        """A prismatic, then a revolute primitive, on one axis."""
         axis = spatial(self.axis)
-        return (Move("slide", axis), Move("turn", axis))
+        return (Primitive("prismatic", axis), Primitive("revolute", axis))

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from eomgen.language.base import Identifier, Table
 from eomgen.scene.joints.ball import angular_velocity, quaternion
-from eomgen.scene.joints.base import WORLD, Z_AXIS, Coordinate, Move
+from eomgen.scene.joints.base import WORLD, Z_AXIS, Coordinate, Primitive
 
 PLANE, SPACE = 2, 3
 
@@ -51,8 +51,11 @@ class Free(Table):
         rates = tuple(c.rate for c in positions[:SPACE])
         return (*rates, *angular_velocity(self.child, self.child, WORLD))
 
-    def moves(self, dimensions: int) -> tuple[Move, ...]:
-        """Slides along the world's axes, then a turn or a spin."""
+    def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
+        """Prismatic ones along the world's axes, then a revolute or a spherical one."""
         axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), Z_AXIS)
-        slides = tuple(Move("slide", axis) for axis in axes[:dimensions])
-        return (*slides, Move("turn", Z_AXIS) if dimensions == PLANE else Move("spin"))
+        slides = tuple(Primitive("prismatic", axis) for axis in axes[:dimensions])
+        return (
+            *slides,
+            Primitive("revolute", Z_AXIS) if dimensions == PLANE else Primitive("spherical"),
+        )

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from eomgen.language.base import Identifier
-from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Move
+from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Primitive
 
 
 class Planar(JointTable):
@@ -34,10 +34,10 @@ class Planar(JointTable):
         """Their rates."""
         return tuple(c.rate for c in self.positions(dimensions))
 
-    def moves(self, dimensions: int) -> tuple[Move, ...]:
-        """Two slides, then a turn."""
+    def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
+        """Two prismatic primitives, then a revolute one."""
         return (
-            Move("slide", (1.0, 0.0, 0.0)),
-            Move("slide", (0.0, 1.0, 0.0)),
-            Move("turn", Z_AXIS),
+            Primitive("prismatic", (1.0, 0.0, 0.0)),
+            Primitive("prismatic", (0.0, 1.0, 0.0)),
+            Primitive("revolute", Z_AXIS),
         )

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from eomgen.language.quantity import Numbers
-from eomgen.scene.joints.base import WORLD, Coordinate, Geared, Move, spatial
+from eomgen.scene.joints.base import WORLD, Coordinate, Geared, Primitive, spatial
 
 
 class Prismatic(Geared):
@@ -24,6 +24,6 @@ class Prismatic(Geared):
         """Its rate."""
         return tuple(c.rate for c in self.positions(dimensions))
 
-    def moves(self, dimensions: int) -> tuple[Move, ...]:
-        """One slide."""
-        return (Move("slide", spatial(self.axis)),)
+    def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
+        """One prismatic primitive."""
+        return (Primitive("prismatic", spatial(self.axis)),)

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from eomgen.language.quantity import Numbers
-from eomgen.scene.joints.base import WORLD, Z_AXIS, Coordinate, Geared, Move, spatial
+from eomgen.scene.joints.base import WORLD, Z_AXIS, Coordinate, Geared, Primitive, spatial
 
 
 class Revolute(Geared):
@@ -31,6 +31,6 @@ class Revolute(Geared):
         """Its rate."""
         return tuple(c.rate for c in self.positions(dimensions))
 
-    def moves(self, dimensions: int) -> tuple[Move, ...]:
-        """One turn."""
-        return (Move("turn", spatial(self.axis or Z_AXIS)),)
+    def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
+        """One revolute primitive."""
+        return (Primitive("revolute", spatial(self.axis or Z_AXIS)),)

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from eomgen.language.base import Identifier
 from eomgen.language.quantity import Numbers
-from eomgen.scene.joints.base import Coordinate, JointTable, Move, spatial
+from eomgen.scene.joints.base import Coordinate, JointTable, Primitive, spatial
 
 
 class Universal(JointTable):
@@ -34,6 +34,6 @@ class Universal(JointTable):
         """Their rates."""
         return tuple(c.rate for c in self.positions(dimensions))
 
-    def moves(self, dimensions: int) -> tuple[Move, ...]:
-        """Two turns."""
-        return tuple(Move("turn", spatial(axis)) for axis in self.axes)
+    def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
+        """Two revolute primitives."""
+        return tuple(Primitive("revolute", spatial(axis)) for axis in self.axes)

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from eomgen.scene.joints.base import Coordinate, JointTable, Move
+from eomgen.scene.joints.base import Coordinate, JointTable, Primitive
 
 
 class Weld(JointTable):
@@ -18,6 +18,6 @@ class Weld(JointTable):
         """Nor a velocity."""
         return ()
 
-    def moves(self, dimensions: int) -> tuple[Move, ...]:
+    def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
         """Nor a move."""
         return ()

@@ -17,7 +17,7 @@ from eomgen.precision.precise import Long
 from eomgen.scalars.extended import Bits
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import WORLD, Move
+from eomgen.scene.joints.base import WORLD, Primitive
 from eomgen.study.verification.poses import Pose, about, orientation, spun, turned_about, world_pose
 
 _INSTANT, _BITS = mpfr(2) ** -600, 4096
@@ -228,22 +228,22 @@ class Placed:
         if not isinstance(joint, Free):
             pose = pose.moved(self.in_space([self.value(r) for r in joint.r_parent]))
             pose = pose.fixed(orientation(joint.orientation_deg))
-        for i, move in enumerate(joint.moves(self.dimensions)):
-            pose = self._made(pose, move, index, i)
+        for i, primitive in enumerate(joint.primitives(self.dimensions)):
+            pose = self._made(pose, primitive, index, i)
         if not isinstance(joint, Free):
             pose = pose.moved(-self.in_space([self.value(r) for r in joint.r_child]))
         return pose
 
-    def _made(self, pose: Pose, move: Move, index: JointIndex, i: int) -> Pose:
+    def _made(self, pose: Pose, primitive: Primitive, index: JointIndex, i: int) -> Pose:
         """The pose after one primitive of a joint."""
-        if move.kind == "spin":
+        if primitive.kind == "spherical":
             quaternion = long([self.q[j] for j in index.quaternion])
             turn, turn_v, turn_b = spun(quaternion, index.spin, self.felt)
             return pose.turned(turn, turn_v, turn_b, self.felt)
-        axis = long(move.axis)
+        axis = long(primitive.axis)
         axis = axis / gmpy2.sqrt(axis @ axis)
         x, column = self.q[index.q[i]], index.v[i] if index.v[i] < self.moved else None
-        if move.kind == "slide":
+        if primitive.kind == "prismatic":
             return pose.slid(axis, x, column, self.felt)
         if column is None:
             return pose.fixed(about(axis, gmpy2.cos(x), gmpy2.sin(x)))
