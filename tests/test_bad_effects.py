@@ -277,12 +277,12 @@ def test_joints(kind: str) -> None:
     member = MEMBERS[kind.split()[0]]
     what = "revolute or prismatic joint" if member.joint_fields else "joint that moves"
     places = {"joint": '"{}"', "joints": '["{}"]'}
-    for field in (*member.joint_fields, *member.way_fields):
+    for field in (*member.joint_fields, *member.dof_fields):
         place = f"effects[0].{field}" + "[0]" * (field == "joints")
         for name, hint in (("hing", " (did you mean 'hinge'?)"), ("boom", "; known: hinge, rail")):
             wrong = {"joint": None, field: places[field].format(name)}
             assert refusal(crane(kind, **wrong)) == f"{place}: no {what} is named '{name}'{hint}"
-    several = "joints" in member.way_fields
+    several = "joints" in member.dof_fields
     assert refusal(crane(kind, joint=None)) == "effects[0].joint: " + (
         "is missing; give one of joint, joints" if several else "missing; every such table needs it"
     )
@@ -293,7 +293,7 @@ def test_joints(kind: str) -> None:
         assert refusal(crane(kind, joint=None, joints='["rail", "rail"]')) == (
             "effects[0].joints[1]: 'rail' is listed twice; leave one out"
         )
-    if member.way_fields:
+    if member.dof_fields:
         joint = TABLES[kind]["joint"].strip('"')
         own, other = ("swing", "run") if joint == "hinge" else ("run", "swing")
         elaborate(parse_scene(crane(kind, coordinate=f'"{own}"')))

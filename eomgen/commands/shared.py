@@ -12,7 +12,7 @@ from eomgen.api.manner import Manner
 from eomgen.dynamics.finite import initial_overlaps
 from eomgen.errors import RunError, nearest
 from eomgen.model.elaborate import elaborate
-from eomgen.model.model import Model, ways_of
+from eomgen.model.model import Model, dofs_of
 from eomgen.run.progress import terminal_notice, terminal_progress
 from eomgen.scene.effects import JointStop
 from eomgen.scene.reader import find_scene, read_scene
@@ -123,12 +123,12 @@ def overlap_lines(model: Model) -> list[str]:
     """
     lines = []
     effects = {effect.name: effect for effect in model.effects}
-    joints = ways_of(model.bodies, model.dimensions)
+    joints = dofs_of(model.bodies, model.dimensions)
     for overlap in initial_overlaps(model):
         effect, kind, unit = effects[overlap.effect], "contact", "m"
         if isinstance(effect, JointStop):
             slides = {
-                way == "prismatic" for joint in effect.acted_on(joints) for way in joints[joint]
+                dof == "prismatic" for joint in effect.acted_on(joints) for dof in joints[joint]
             }
             kind = "stop"
             unit = "rad or m" if len(slides) == 2 else "m" if True in slides else "rad"

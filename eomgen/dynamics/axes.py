@@ -99,11 +99,11 @@ def _better_origin(frame: Frame, scalars: Scalars) -> tuple[Vec, Vec]:
         return zeros(scalars), times((x, y, z), frame.offset)
     image = [row[frame.axis] for row in frame.fixed]
     j = max(AXES, key=lambda i: abs(image[i]))
-    way = frame.offset[j] / scalars.number(exact.opposite(image[j]))
-    moved = add(frame.offset, scale(way, back[frame.axis]))
+    distance = frame.offset[j] / scalars.number(exact.opposite(image[j]))
+    moved = add(frame.offset, scale(distance, back[frame.axis]))
     # Zero by choice; a program that computed it would see rounding.
     offset = replaced(moved, j, scalars.number(0.0))
-    return offset, scale(way, unit(frame.axis, scalars))
+    return offset, scale(distance, unit(frame.axis, scalars))
 
 
 def _parts(offsets: Sequence[Vec], centres: Sequence[Vec], scalars: Scalars) -> int:

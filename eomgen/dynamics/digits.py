@@ -97,13 +97,13 @@ def digits_lost(
     worst = dict.fromkeys((*routes, "orthogonal"), 0.0)
     for acting, inputs in parts:
         at = [Values(model.defaults, *rest, states) for rest in zip(inputs, q, v, strict=True)]
-        ways = {name: _way(name, route, model, acting) for name, route in routes.items()}
-        for name, off in _off(acting, at, ways, closely).items():
+        solvers = {name: _solver(name, route, model, acting) for name, route in routes.items()}
+        for name, off in _off(acting, at, solvers, closely).items():
             worst[name] = max(worst[name], off)
     return {route: _digits(off) for route, off in worst.items()}
 
 
-def _way(name: str, route: Route, model: Model, acting: Model) -> Accelerations:
+def _solver(name: str, route: Route, model: Model, acting: Model) -> Accelerations:
     """v̇ by a route, of a model on which other effects may be `acting`."""
     if acting is model or route.axes is None:
         return route.accelerations
@@ -149,7 +149,7 @@ def _slight(rng: random.Random) -> float:
 
 
 def _off(
-    model: Model, at: Sequence[Values], ways: Mapping[str, Accelerations], closely: bool
+    model: Model, at: Sequence[Values], solvers: Mapping[str, Accelerations], closely: bool
 ) -> dict[str, float]:
     """What the v̇ of each route is off, in parts of its size and of what must be allowed, at the
     worst of some states; infinite where it gives no number.
@@ -157,7 +157,7 @@ def _off(
     together, shape = _together(at), (len(model.velocities), len(at))
     sure = _recursion("orthogonal", model, "own")
     true = _numbers(sure, together, shape)
-    named = {name: _numbers(way, together, shape) for name, way in ways.items()}
+    named = {name: _numbers(solver, together, shape) for name, solver in solvers.items()}
     found = {"orthogonal": true, **named}
     least = _least(model, true, at)
     change = np.zeros(len(at))
@@ -229,11 +229,11 @@ def _nudged(values: Values, count: int) -> Values:
     return Values(fixed, inputs, [*map(near, values.q)], [*map(near, values.v)], states)
 
 
-def _numbers(way: Accelerations, values: Values, shape: tuple[int, ...]) -> Array:
+def _numbers(solver: Accelerations, values: Values, shape: tuple[int, ...]) -> Array:
     """v̇ at several states (nv, count); nan where there is no number."""
     try:
         with np.errstate(all="ignore"):
-            rows = [np.broadcast_to(np.asarray(x, dtype=float), shape[1:]) for x in way(values)]
+            rows = [np.broadcast_to(np.asarray(x, dtype=float), shape[1:]) for x in solver(values)]
     except (ArithmeticError, ValueError):
         return np.full(shape, np.nan)
     return np.reshape(rows, shape)

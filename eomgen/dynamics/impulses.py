@@ -30,7 +30,7 @@ AnyLoad = Load | JointLoad
 LEAST = 1e-300
 """Stands in for what would divide by 0; there what is divided is 0, too, or is not used."""
 IMMOVABLE = 1e-12
-"""A way along which nothing moves: its share of A is no more than this, which is rounding."""
+"""A direction along which nothing moves: its share of A is no more than this, which is rounding."""
 
 
 def scaled(loads: Iterable[AnyLoad], k: Scalar) -> list[AnyLoad]:
@@ -143,7 +143,7 @@ def impulses(
 ) -> list[Scalar]:
     """The impulses p of A, u, e and μ; normal first, with none, one or two tangents.
 
-    Ways across the normal along which the mechanism cannot move take no impulse. Never NaN.
+    Directions across the normal along which the mechanism cannot move take no impulse. Never NaN.
     """
     A, u = inverse_mass, speeds
     across = range(1, len(u))

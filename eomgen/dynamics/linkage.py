@@ -65,8 +65,8 @@ def _is_graded(model: Model) -> bool:
     """Whether anything of a model's geometry, or a direction of gravity, is slight (see `axes`)."""
     floats = FloatScalars()
     frames, mounts = _drafted(model, model.defaults, floats)
-    ways = (e.direction for e in model.effects if isinstance(e, Gravity) and e.direction)
-    return is_graded(frames, mounts, [in_space(way, floats) for way in ways])
+    directions = (e.direction for e in model.effects if isinstance(e, Gravity) and e.direction)
+    return is_graded(frames, mounts, [in_space(direction, floats) for direction in directions])
 
 
 def _drafted(
@@ -107,8 +107,8 @@ def _drafted(
             to_axis, k = _to_coordinate_axis(primitive)
             name = body.positions[i].name
             if name in locked and primitive.kind == "prismatic":
-                way = exact.turned(exact.product(axes, to_axis), k, locked[name])
-                at = add(at, _numbers(way, scalars))
+                offset = exact.turned(exact.product(axes, to_axis), k, locked[name])
+                at = add(at, _numbers(offset, scalars))
                 continue
             if name in locked:
                 held = model.locked_angle(name)

@@ -18,7 +18,7 @@ from eomgen.dynamics.observe import (
 from eomgen.dynamics.vectors import Vec, in_space, times, zeros
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.rates import with_rates
-from eomgen.model.model import JointIndex, Model, ways_of
+from eomgen.model.model import JointIndex, Model, dofs_of
 from eomgen.scalars.exact import Real
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects import Gravity
@@ -69,8 +69,8 @@ class Moving:
 
     @cached_property
     def joints(self) -> dict[str, tuple[str, ...]]:
-        """The joints that move but the free ones, each with the kinds of its ways."""
-        return ways_of(self.model.bodies, self.dimensions)
+        """The joints that move but the free ones, each with the kinds of its primitives."""
+        return dofs_of(self.model.bodies, self.dimensions)
 
     def mass(self, body: str) -> Scalar:
         """Mass of a body, kg."""

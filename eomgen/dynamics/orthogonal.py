@@ -140,11 +140,11 @@ class Elimination:
 
         if solid is not None and own is not None:
             into = self._aligned.turns[k].into
-            way = into(add(a.linear, times(a.field, own.centre)))
+            centre = into(add(a.linear, times(a.field, own.centre)))
             if not s.is_zero(solid.mass):
                 m = s.call("max", solid.mass, self._rows.tiny)
                 for j in AXES[: 2 if self._planar else 3]:
-                    linear[j] = row(m, zero, unit(j, s), -way[j], wrench.force[j])
+                    linear[j] = row(m, zero, unit(j, s), -centre[j], wrench.force[j])
             y = [-x for x in into(moment_about_centre(own.inertia, a, s))]
             work = [list(row) for row in solid.inertia]
             order = turns_of(self._links[k], self._planar, self._aligned.along[k])
@@ -199,12 +199,12 @@ class Elimination:
         loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
         along = self._aligned.along[k]
         slides = slides_of(link, at, loose, self._planar, s)
-        ways = turns_of(link, self._planar, along)
+        order = turns_of(link, self._planar, along)
         axes, turns, taken = list(reversed(link.free)), Steps(), []
         if along is not None and along in angular:
-            axes.sort(key=lambda axis: -ways.index(column_of(axis[0])[1]))
+            axes.sort(key=lambda axis: -order.index(column_of(axis[0])[1]))
             kept = {(False, j): linear[j] for j in slides if j in linear}
-            kept |= {(True, j): angular[j] for j in ways if j in angular}
+            kept |= {(True, j): angular[j] for j in order if j in angular}
             one, kept, loose = self._early(link, axes.pop(0), kept, loose, at)
             taken.append(one)
             linear = {j: row for (spins, j), row in kept.items() if not spins}
@@ -212,7 +212,7 @@ class Elimination:
             about = about - {(True, along)}
         orders = (
             [j for j in slides if (False, j) in about],
-            [j for j in ways if (True, j) in about],
+            [j for j in order if (True, j) in about],
         )
         loose += [linear.pop(j) for j in [*linear] if j not in orders[0]]
         loose += [angular.pop(j) for j in [*angular] if j not in orders[1]]
@@ -268,12 +268,12 @@ class Elimination:
         return sub(self._links[k].arm, at) if between is None else between
 
     def _first(
-        self, way: MotionAxis, held: bool, kept: dict[Column, Row], free: list[Row]
+        self, motion: MotionAxis, held: bool, kept: dict[Column, Row], free: list[Row]
     ) -> tuple[Row, tuple[Row, ...], dict[Column, Row], list[Row], tuple[Turn | Sum, ...]]:
         """The row that takes an axis: one that holds it alone, as there is where a link has inertia
         against it; else what can be gathered of it from all. And the rows that it is found from.
         """
-        column = column_of(way)
+        column = column_of(motion)
         kept, turns = dict(kept), Steps()
         if held:
             first = kept.pop(column)
@@ -310,8 +310,8 @@ class Elimination:
         """Rotate one row until it alone holds an axis of motion; where it is early, first against
         the kept ones, which so stay a triangle.
         """
-        s, (way, i) = self._scalars, axis
-        column = column_of(way)
+        s, (motion, i) = self._scalars, axis
+        column = column_of(motion)
         kept, free, turns = dict(kept), list(free), Steps()
 
         def with_free(pivot: Row) -> Row:
@@ -323,7 +323,7 @@ class Elimination:
         for key in reversed(kept):
             pivot, kept[key] = self._rows.rotated(pivot, kept[key], column, turns)
         pivot = with_free(pivot) if early else pivot
-        rotor, pushed, back = -1, along(way, term.moment, term.force), self._rows.zero
+        rotor, pushed, back = -1, along(motion, term.moment, term.force), self._rows.zero
         if s.is_zero(link.armature):
             pushed, back = pushed + tau, -tau
         pivot = replace(pivot, force=pivot.force + pushed)
@@ -335,12 +335,12 @@ class Elimination:
             row = self._rows.make(link.armature, empty.angular, empty.linear, back, tau)
             rotor = row.index
             pivot, row = self._rows.rotated(pivot, row, column, turns)
-            minus = with_component(way, row.angular, row.linear, -self._rows.one)
+            minus = with_component(motion, row.angular, row.linear, -self._rows.one)
             free.append(replace(row, angular=minus[0], linear=minus[1]))
         pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
         share = pivot.force / pivot.weight
-        left = Wrench(*with_component(way, moment, push, back))
-        one = Taken(way, i, (first,), first.index, share, tuple(turns), rotor)
+        left = Wrench(*with_component(motion, moment, push, back))
+        one = Taken(motion, i, (first,), first.index, share, tuple(turns), rotor)
         return one, kept, free, left
 
     # Outwards.
@@ -361,17 +361,17 @@ class Elimination:
                 residuals[row.index] = -row.right
             turned_back(eliminated.turns, residuals)
             for taken in reversed(eliminated.axes):
-                way = taken.axis
+                motion = taken.axis
                 residuals[taken.pivot] = taken.left
                 turned_back((*taken.gathered, *taken.turns), residuals)
-                before = along(way, angular, linear)
+                before = along(motion, angular, linear)
                 if taken.rotor >= 0:
                     result[taken.velocity] = residuals[taken.rotor]
                     value = before + residuals[taken.rotor]
                 else:
                     value = self._value(taken, residuals, angular, linear)
                     result[taken.velocity] = value - before
-                angular, linear = with_component(way, angular, linear, value)
+                angular, linear = with_component(motion, angular, linear, value)
                 turned_back(taken.before, residuals)
             angular = named(angular, f"alpha_{link.name}", scalars)
             reached.append((angular, named(linear, f"delta_{link.name}", scalars)))

@@ -49,14 +49,15 @@ def slides_of(
     """The axes to move along, that of the link last. Before it those that rows of few axes hold,
     which so stay what they are, and that of an arm.
     """
-    ways = [
-        [j for j in AXES if not scalars.is_zero(way[j])] for way in (arm, *(r.linear for r in rows))
+    present = [
+        [j for j in AXES if not scalars.is_zero(vector[j])]
+        for vector in (arm, *(r.linear for r in rows))
     ]
     own = next((axis.unit for axis, _ in link.free if not axis.angular), None)
-    last = ways[0][0] if len(ways[0]) == 1 else 2
+    last = present[0][0] if len(present[0]) == 1 else 2
 
     def late(j: int) -> tuple[bool, int, int]:
-        held = [len(way) for way in ways[1:] if j in way]
+        held = [len(vector) for vector in present[1:] if j in vector]
         return j == own, -min(held, default=4), len(held)
 
     turn = ((last + 1) % 3, (last + 2) % 3, last)
@@ -69,5 +70,5 @@ def column_of(axis: MotionAxis) -> Column:
     return axis.angular, axis.unit
 
 
-def _parts(angular: bool, way: Vec, scalars: Scalars) -> set[Column]:
-    return {(angular, j) for j in AXES if not scalars.is_zero(way[j])}
+def _parts(angular: bool, vector: Vec, scalars: Scalars) -> set[Column]:
+    return {(angular, j) for j in AXES if not scalars.is_zero(vector[j])}

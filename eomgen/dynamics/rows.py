@@ -122,8 +122,8 @@ class Rows:
         """One that holds one acceleration, and of which nothing is asked."""
         angular, axis = column
         one, zero = unit(axis, self._scalars), zeros(self._scalars)
-        ways = (one, zero) if angular else (zero, one)
-        return replace(self.make(self.tiny, *ways, self.zero, self.zero), noise=self.unknown)
+        units = (one, zero) if angular else (zero, one)
+        return replace(self.make(self.tiny, *units, self.zero, self.zero), noise=self.unknown)
 
     def of(self, columns: Collection[Column], row: Row) -> Row:
         """A row where only some accelerations can be other than nothing."""
@@ -251,9 +251,9 @@ def turned_back(turns: Sequence[Turn | Sum], residuals: dict[int, Scalar]) -> No
         residuals[turn.row] = turn.x * a + turn.c * b
 
 
-def shifted(row: Row, way: Vec) -> Row:
-    """A row about a point as one about the origin that the point lies `way` from."""
-    return replace(row, angular=add(row.angular, cross(way, row.linear)))
+def shifted(row: Row, offset: Vec) -> Row:
+    """A row about a point as one about the origin that the point lies `offset` from."""
+    return replace(row, angular=add(row.angular, cross(offset, row.linear)))
 
 
 def turned(link: Link, row: Row) -> Row:

@@ -55,13 +55,13 @@ def _welded(a: Solid, b: Solid, scalars: Scalars) -> Solid:
         return replace(heavy, inertia=plus(a.inertia, b.inertia))
     mass = a.mass + b.mass
     share = b.mass / mass
-    x, y, z = way = sub(b.centre, a.centre)
+    x, y, z = offset = sub(b.centre, a.centre)
     k = a.mass * share
     xx, yy, zz = k * x * x, k * y * y, k * z * z
     off = (-(k * x * y), -(k * x * z), -(k * y * z))
     more = symmetric([yy + zz, xx + zz, xx + yy, *off])
     inertia = plus(plus(a.inertia, b.inertia), more)
-    return Solid(mass, add(a.centre, scale(share, way)), inertia)
+    return Solid(mass, add(a.centre, scale(share, offset)), inertia)
 
 
 def centres(carried: Sequence[Solid | None], scalars: Scalars) -> list[Vec]:
@@ -74,7 +74,7 @@ class Ranks:
     """Which bodies are heavier than others, by frame.
 
     heaviest  the child that carries more mass than the frame itself and any other child, -1 if
-              none; of a ball joint the child that is heaviest whatever way it is moved
+              none; of a ball joint the child that is heaviest wherever it is moved
     beside    of a ball joint the next such child, where axes are to be along the line between these
               two; -1 elsewhere
     firm      whether a frame's own mass and inertia are not slight beside what else may resist its
@@ -96,7 +96,7 @@ def ranked(linkage: Linkage) -> Ranks:
     for n, frame in enumerate(frames):
         if frame.parent >= 0:
             carried[frame.parent].append(n)
-    free = _sliding_all_ways(linkage, carried)
+    free = _translates_freely(linkage, carried)
     for k in reversed(range(len(own))):
         children = carried[k]
         whole[k] += sum(whole[n] for n in children if not free[n])
@@ -118,15 +118,15 @@ def ranked(linkage: Linkage) -> Ranks:
     return Ranks(tuple(heaviest), tuple(beside), tuple(firm))
 
 
-def _sliding_all_ways(linkage: Linkage, carried: Sequence[Sequence[int]]) -> list[bool]:
+def _translates_freely(linkage: Linkage, carried: Sequence[Sequence[int]]) -> list[bool]:
     """Of each frame whether it begins slides along all axes, through which no force gets."""
-    frames, ways = linkage.frames, 2 if linkage.planar else 3
+    frames, needed = linkage.frames, 2 if linkage.planar else 3
     run = [0] * len(frames)
     for k in reversed(range(len(frames))):
         if frames[k].kind == "prismatic":
             alone = frames[k].rigid.mass == 0.0 and len(carried[k]) == 1
             run[k] = 1 + (run[carried[k][0]] if alone else 0)
-    return [n >= ways for n in run]
+    return [n >= needed for n in run]
 
 
 def _firm(

@@ -8,7 +8,7 @@ from eomgen.errors import SceneError, check_known
 from eomgen.language.conditions import require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import about_slides, of_joint, with_components
-from eomgen.model.model import Body, ways_of
+from eomgen.model.model import Body, dofs_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import check_drive
 from eomgen.scene.effects import Driven, Effect, Gravity
@@ -60,9 +60,9 @@ def effects_in_force(
     Raises `SceneError`, naming the place, for an effect that cannot act.
     """
     check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
-    ways = ways_of(bodies, scene.dimensions)
-    names_of_ways = {b.joint.name: [c.name for c in b.positions] for b in bodies}
-    there = _there(scene, bodies, ways)
+    dofs = dofs_of(bodies, scene.dimensions)
+    names_of_dofs = {b.joint.name: [c.name for c in b.positions] for b in bodies}
+    there = _there(scene, bodies, dofs)
     types = {b.joint.name: b.joint.type for b in bodies}
     effects: list[Effect] = []
     found: list[Bindings] = []
@@ -71,7 +71,7 @@ def effects_in_force(
         if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
             raise SceneError(f"{place}.type: a second 'gravity'; give one")
         _check_names_in(effect, place, there, types)
-        effect.check_ways(ways, names_of_ways, place)
+        effect.check_dofs(dofs, names_of_dofs, place)
         vectors = {
             field: with_components(value, ZERO, scene.dimensions, f"{place}.{field}")
             for field in effect.vector_fields
@@ -102,7 +102,7 @@ def check_contacts(effects: Sequence[Effect], bodies: Sequence[str]) -> None:
 
 
 def _there(
-    scene: Scene, bodies: Sequence[Body], ways: Mapping[str, object]
+    scene: Scene, bodies: Sequence[Body], dofs: Mapping[str, object]
 ) -> dict[str, tuple[str, Collection[str]]]:
     """Of each kind of `EffectTable.…_fields`: what its fields name, and all that there are."""
     own = [b.joint.name for b in bodies if isinstance(b.joint, Revolute | Prismatic)]
@@ -112,7 +112,7 @@ def _there(
         "anchor_fields": ("body", dict.fromkeys([WORLD, *names])),
         "point_fields": ("point", dict.fromkeys(point.name for point in scene.points)),
         "joint_fields": ("revolute or prismatic joint", dict.fromkeys(own)),
-        "way_fields": ("joint that moves", ways),
+        "dof_fields": ("joint that moves", dofs),
     }
 
 

@@ -111,7 +111,7 @@ def velocities_of(
     return tuple(c for body in bodies for c in body.velocities if c.name not in given)
 
 
-def ways_of(bodies: Iterable[Body], dimensions: int) -> dict[str, tuple[str, ...]]:
+def dofs_of(bodies: Iterable[Body], dimensions: int) -> dict[str, tuple[str, ...]]:
     """The joints that move but the free ones, each with the kinds of its primitives."""
     return {
         body.joint.name: tuple(primitive.kind for primitive in body.joint.primitives(dimensions))

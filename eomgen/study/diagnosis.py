@@ -10,7 +10,7 @@ import numpy as np
 
 from eomgen.dynamics.finite import effect_sizes, is_singular, values_at
 from eomgen.dynamics.regular import relative_pivots, why_unresisted
-from eomgen.model.model import Model, ways_of
+from eomgen.model.model import Model, dofs_of
 from eomgen.run.module import GeneratedModule, as_problem, given_values
 from eomgen.run.origin import START, UNITS, Origin
 from eomgen.run.problem import Explain, FloatArray, Problem, unexplained
@@ -78,7 +78,7 @@ def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str
 
 def joint_limits(model: Model) -> dict[str, tuple[float, float]]:
     """The limits of each coordinate that has some which no stop enforces, by name."""
-    joints = ways_of(model.bodies, model.dimensions)
+    joints = dofs_of(model.bodies, model.dimensions)
     stops = [effect for effect in model.effects if isinstance(effect, JointStop)]
     stopped = {joint for stop in stops for joint in stop.acted_on(joints)}
     return {

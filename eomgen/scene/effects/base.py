@@ -110,7 +110,7 @@ class Mechanism(Protocol):
 
     @property
     def joints(self) -> Mapping[str, tuple[str, ...]]:
-        """All joints that move but the free ones, each with its ways in order: "revolute" or
+        """All joints that move but the free ones, each with its primitives in order: "revolute" or
         "prismatic" for a coordinate of its own, "spherical" for a quaternion.
         """
 
@@ -232,7 +232,7 @@ class EffectTable(Table):
     """Fields that list named points of the scene."""
     joint_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that name a revolute or prismatic joint, or hold a table by such names."""
-    way_fields: ClassVar[tuple[str, ...]] = ()
+    dof_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that name a joint that moves and is not free, list some, or are "all"."""
     vector_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that hold a vector: as many components as there are dimensions, or left out."""
@@ -246,15 +246,16 @@ class EffectTable(Table):
         """
         return self
 
-    def check_ways(
+    def check_dofs(
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
         place: str,
     ) -> None:
-        """Raise `SceneError` for a joint that moves in a way which it cannot act on.
+        """Raise `SceneError` for a joint with a degree of freedom that it cannot act on.
 
-        `joints` has the kinds of ways of all that move but the free ones, `names` the coordinates.
+        `joints` has the kinds of the primitives of all that move but the free ones, `names` the
+        coordinates.
         """
 
     def conditions(self, place: str) -> Iterable[Condition]:

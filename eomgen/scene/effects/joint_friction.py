@@ -9,8 +9,8 @@ from eomgen.errors import SceneError
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import JointLoad, Mechanism, Vector
+from eomgen.scene.effects.dofs import OnJoints
 from eomgen.scene.effects.vectors import add, length, negative, scale
-from eomgen.scene.effects.ways import OnJoints
 
 
 class JointFriction(OnJoints):
@@ -54,11 +54,11 @@ class JointFriction(OnJoints):
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Equal and opposite on the joint's two bodies; the world takes its own."""
         viscous = mechanism.value(self.viscous)
-        for way in self.ways(mechanism):
-            against = scale(viscous, way.rates)
+        for dof in self.dofs(mechanism):
+            against = scale(viscous, dof.rates)
             if self.speed is not None:
-                against = add(against, self._dry(mechanism, way.rates))
-            yield from way.loads(negative(against))
+                against = add(against, self._dry(mechanism, dof.rates))
+            yield from dof.loads(negative(against))
 
     def _dry(self, mechanism: Mechanism, rates: Vector) -> Vector:
         """C tanh(|v|/speed) v/|v|."""

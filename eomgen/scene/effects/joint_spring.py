@@ -10,8 +10,8 @@ from eomgen.language.conditions import are_zero
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import JointLoad, Mechanism, Scalar
+from eomgen.scene.effects.dofs import Dof, OnJoints
 from eomgen.scene.effects.spring import check_law
-from eomgen.scene.effects.ways import OnJoints, Way
 
 
 class JointSpring(OnJoints):
@@ -47,29 +47,29 @@ class JointSpring(OnJoints):
         check_law(self, self.law, place)
         return self
 
-    def check_ways(
+    def check_dofs(
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
         place: str,
     ) -> None:
         """A ball rests in one place only."""
-        super().check_ways(joints, names, place)
+        super().check_dofs(joints, names, place)
         for joint in self.acted_on(joints):
             if "spherical" in joints[joint] and self.rest != ZERO:
                 raise SceneError(f"{place}.rest: at a ball joint ('{joint}') it is 0; leave it out")
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Equal and opposite on the joint's two bodies; the world takes its own."""
-        for way in self.ways(mechanism):
-            stretch = self._stretch(mechanism, way)
+        for dof in self.dofs(mechanism):
+            stretch = self._stretch(mechanism, dof)
             if self.law is not None:
-                back = mechanism.value(self.law, stretch=stretch, rate=way.rate)
+                back = mechanism.value(self.law, stretch=stretch, rate=dof.rate)
             else:
                 back = mechanism.value(self.stiffness) * stretch
             damping = mechanism.value(self.damping)
-            pairs = zip(way.along(back), way.rates, strict=True)
-            yield from way.loads([-(force + damping * rate) for force, rate in pairs])
+            pairs = zip(dof.along(back), dof.rates, strict=True)
+            yield from dof.loads([-(force + damping * rate) for force, rate in pairs])
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
@@ -82,11 +82,11 @@ class JointSpring(OnJoints):
         total = mechanism.number(0.0)
         if self.law is not None:
             return total
-        for way in self.ways(mechanism):
-            stretch = self._stretch(mechanism, way)
+        for dof in self.dofs(mechanism):
+            stretch = self._stretch(mechanism, dof)
             half = mechanism.number(0.5) * mechanism.value(self.stiffness)
             total = total + half * (stretch * stretch)
         return total
 
-    def _stretch(self, mechanism: Mechanism, way: Way) -> Scalar:
-        return way.value - mechanism.value(self.rest)
+    def _stretch(self, mechanism: Mechanism, dof: Dof) -> Scalar:
+        return dof.value - mechanism.value(self.rest)

@@ -10,8 +10,8 @@ from eomgen.language.conditions import Condition, a_part, are_zero, in_order
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import Contact, JointLoad, Mechanism, Scalar
+from eomgen.scene.effects.dofs import Dof, OnJoints
 from eomgen.scene.effects.vectors import negative
-from eomgen.scene.effects.ways import OnJoints, Way
 
 
 class JointStop(OnJoints):
@@ -58,14 +58,14 @@ class JointStop(OnJoints):
         if self.low is not None and self.high is not None:
             yield in_order(f"{place}.low", self.low, self.high)
 
-    def check_ways(
+    def check_dofs(
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
         place: str,
     ) -> None:
-        """The turn of a ball is at least 0; a rigid stop is of one way."""
-        super().check_ways(joints, names, place)
+        """The turn of a ball is at least 0; a rigid stop has one degree of freedom."""
+        super().check_dofs(joints, names, place)
         acted_on = self.acted_on(joints)
         for joint in acted_on:
             if "spherical" in joints[joint] and self.low is not None:
@@ -85,16 +85,16 @@ class JointStop(OnJoints):
         """Equal and opposite on the joint's two bodies; the world takes its own."""
         if self.restitution is not None:
             return
-        for way in self.ways(mechanism):
-            yield from way.loads(negative(way.along(self._back(mechanism, way))))
+        for dof in self.dofs(mechanism):
+            yield from dof.loads(negative(dof.along(self._back(mechanism, dof))))
 
-    def _back(self, mechanism: Mechanism, way: Way) -> Scalar:
+    def _back(self, mechanism: Mechanism, dof: Dof) -> Scalar:
         """k x + c dq/dt, as far as it pushes back."""
-        beyond, nothing = self._beyond(mechanism, way), mechanism.number(0.0)
+        beyond, nothing = self._beyond(mechanism, dof), mechanism.number(0.0)
         back = mechanism.value(self.stiffness) * beyond
         if self.damping == ZERO:
             return back
-        back = back + mechanism.value(self.damping) * way.rate
+        back = back + mechanism.value(self.damping) * dof.rate
         above = mechanism.call("max", back, nothing)
         below = mechanism.call("min", back, nothing)
         if self.low is None:
@@ -109,8 +109,8 @@ class JointStop(OnJoints):
         total = mechanism.number(0.0)
         if self.restitution is not None:
             return total
-        for way in self.ways(mechanism):
-            beyond = self._beyond(mechanism, way)
+        for dof in self.dofs(mechanism):
+            beyond = self._beyond(mechanism, dof)
             half = mechanism.number(0.5) * mechanism.value(self.stiffness)
             total = total + half * (beyond * beyond)
         return total
@@ -126,8 +126,8 @@ class JointStop(OnJoints):
         farthest = mechanism.number(0.0)
         if self.restitution is not None:
             return farthest
-        for way in self.ways(mechanism):
-            beyond = mechanism.call("abs", self._beyond(mechanism, way))
+        for dof in self.dofs(mechanism):
+            beyond = mechanism.call("abs", self._beyond(mechanism, dof))
             farthest = mechanism.call("max", farthest, beyond)
         return farthest
 
@@ -141,19 +141,19 @@ class JointStop(OnJoints):
         """Of a rigid stop: the gaps q - low and high - q; no friction."""
         if self.restitution is None:
             return ()
-        (way,), one = self.ways(mechanism), mechanism.number(1.0)
+        (dof,), one = self.dofs(mechanism), mechanism.number(1.0)
         ends = []
         if self.low is not None:
-            ends.append((way.value - mechanism.value(self.low), one))
+            ends.append((dof.value - mechanism.value(self.low), one))
         if self.high is not None:
-            ends.append((mechanism.value(self.high) - way.value, -one))
+            ends.append((mechanism.value(self.high) - dof.value, -one))
         restitution, none = mechanism.value(self.restitution), mechanism.number(0.0)
         return tuple(
             Contact(
                 name,
                 self.name,
                 gap,
-                tuple(way.loads(way.along(sign))),
+                tuple(dof.loads(dof.along(sign))),
                 (),
                 restitution,
                 none,
@@ -162,9 +162,9 @@ class JointStop(OnJoints):
             for name, (gap, sign) in zip(self.contact_names(()), ends, strict=True)
         )
 
-    def _beyond(self, mechanism: Mechanism, way: Way) -> Scalar:
+    def _beyond(self, mechanism: Mechanism, dof: Dof) -> Scalar:
         """How far q is beyond its limits, negative below: 0 within."""
-        q = within = way.value
+        q = within = dof.value
         if self.high is not None:
             within = mechanism.call("min", within, mechanism.value(self.high))
         if self.low is not None:

@@ -6,7 +6,7 @@ from typing import Literal
 from eomgen.language.formula import names_in
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import Input, JointLoad, Mechanism
-from eomgen.scene.effects.ways import OnCoordinate
+from eomgen.scene.effects.dofs import OnCoordinate
 
 
 class Motor(OnCoordinate):

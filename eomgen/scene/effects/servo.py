@@ -8,7 +8,7 @@ from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import ExtraState, JointLoad, Mechanism, Scalar
-from eomgen.scene.effects.ways import OnCoordinate
+from eomgen.scene.effects.dofs import OnCoordinate
 
 
 class Servo(OnCoordinate):

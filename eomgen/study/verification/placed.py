@@ -11,7 +11,7 @@ import gmpy2
 from gmpy2 import mpfr
 
 from eomgen.language.formula import Formula, evaluate
-from eomgen.model.model import JointIndex, Model, ways_of
+from eomgen.model.model import JointIndex, Model, dofs_of
 from eomgen.precision.longs import Array, along, long, zeros
 from eomgen.precision.precise import Long
 from eomgen.scalars.extended import Bits
@@ -79,7 +79,7 @@ class Placed:
     @property
     def joints(self) -> Mapping[str, tuple[str, ...]]:
         """The joints that move, except free ones, each with the kinds of its degrees of freedom."""
-        return ways_of(self.model.bodies, self.dimensions)
+        return dofs_of(self.model.bodies, self.dimensions)
 
     def mass(self, body: str) -> Long:
         """Mass of a body, kg."""

@@ -1,4 +1,4 @@
-"""Effects at joints that move in several ways: balls, universal joints, several joints at once."""
+"""Effects at joints with several degrees of freedom: balls, universal joints, several at once."""
 
 import math
 

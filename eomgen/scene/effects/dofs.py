@@ -1,4 +1,4 @@
-"""What effects share that act on the ways in which joints move: one, several, or all."""
+"""What effects at joints share: they act on one degree of freedom, on several, or on all."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,13 +14,14 @@ from eomgen.scene.effects.vectors import dot, length, scale
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way in which a joint moves: a turn or slide by one coordinate, or all turns of a ball.
+class Dof:
+    """A degree of freedom of a joint with one coordinate, or the three of a ball joint together.
 
-    `value` is how far it has gone from 0, rad or m; of a ball the angle of the whole turn, 0 to π,
-    about the unit vector n. `rates` are its velocities from number `first` of the joint's on, rad/s
-    or m/s; of a ball the angular velocity ω in the child's axes, in which n is the same as in the
-    parent's. `direction` is 1, or n; so that dvalue/dt = direction · rates.
+    `value` is the coordinate, rad or m; of a ball joint the angle of the whole rotation, 0 to π,
+    about the unit vector n. `rates` are its velocities, rad/s or m/s; of a ball joint the angular
+    velocity ω in the child's axes. n has the same components there as in the parent's axes.
+    `first` is the index of the first of them among the joint's velocities. `direction` is 1, or
+    n, so that dvalue/dt = direction · rates.
     """
 
     joint: str
@@ -46,28 +47,28 @@ class Way:
         return scale(force, self.direction)
 
 
-def way(mechanism: Mechanism, joint: str, kind: str, place: int) -> Way:
-    """The way of a joint whose coordinate, or quaternion, is number `place` of the joint's."""
+def joint_dof(mechanism: Mechanism, joint: str, kind: str, place: int) -> Dof:
+    """The degree of freedom whose coordinate, or quaternion, has index `place` in its joint."""
     if kind != "spherical":
         value, rate = mechanism.coordinate(joint, place), mechanism.rate(joint, place)
-        return Way(joint, place, value, (mechanism.number(1.0),), (rate,))
+        return Dof(joint, place, value, (mechanism.number(1.0),), (rate,))
     w, *vector = (mechanism.coordinate(joint, place + i) for i in range(4))
     rates = tuple(mechanism.rate(joint, place + i) for i in range(3))
-    # Quaternions w, r and -w, -r are one turn; the shorter way has w >= 0.
+    # Quaternions w, r and -w, -r are the same rotation; the angle is at most π with w >= 0.
     sine = length(mechanism, tuple(vector))
     half = mechanism.call("atan2", sine, mechanism.call("abs", w))
     per_sine = mechanism.number(1.0) / sine
     per_sine = mechanism.call("select", -w, -per_sine, per_sine)
     direction = scale(per_sine, vector)
-    return Way(joint, place, half + half, direction, rates)
+    return Dof(joint, place, half + half, direction, rates)
 
 
 class OnJoints(EffectTable):
-    """An effect on the ways in which `joint` moves, or each of `joints`, which may be "all"; or on
-    one `coordinate` of a joint that has several.
+    """An effect on the degrees of freedom of `joint`, or of each of `joints`, which may be "all";
+    or on one `coordinate` of a joint that has several.
     """
 
-    way_fields: ClassVar[tuple[str, ...]] = ("joint", "joints")
+    dof_fields: ClassVar[tuple[str, ...]] = ("joint", "joints")
 
     joint: Identifier | None = Field(default=None, description="joint it acts on")
     joints: Literal["all"] | Annotated[tuple[Identifier, ...], Field(min_length=1)] | None = Field(
@@ -97,7 +98,7 @@ class OnJoints(EffectTable):
             return (self.joint,)
         return self.joints if isinstance(self.joints, tuple) else tuple(joints)
 
-    def check_ways(
+    def check_dofs(
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
@@ -109,26 +110,26 @@ class OnJoints(EffectTable):
             known = _plain(joints, names, self.joint)
             _check_coordinate(self.coordinate, self.joint, known, place)
 
-    def ways(self, mechanism: Mechanism) -> Iterator[Way]:
-        """Every way it acts on."""
+    def dofs(self, mechanism: Mechanism) -> Iterator[Dof]:
+        """Every degree of freedom that it acts on."""
         for joint in self.acted_on(mechanism.joints):
             for place, kind in enumerate(mechanism.joints[joint]):
                 name = mechanism.coordinate_name(joint, place)
                 if self.coordinate in (None, name):
-                    yield way(mechanism, joint, kind, place)
+                    yield joint_dof(mechanism, joint, kind, place)
 
 
 class OnCoordinate(EffectTable):
     """An effect on the coordinate of `joint`, or on that `coordinate` of one that has several."""
 
-    way_fields: ClassVar[tuple[str, ...]] = ("joint",)
+    dof_fields: ClassVar[tuple[str, ...]] = ("joint",)
 
     joint: Identifier = Field(description="joint it acts on")
     coordinate: Identifier | None = Field(
         default=None, description="the one it acts on, of a joint that has several"
     )
 
-    def check_ways(
+    def check_dofs(
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
