@@ -121,7 +121,7 @@ def test_the_matrices_are_the_equations(scene: str) -> None:
 
 
 def test_what_is_too_large_to_read_is_said() -> None:
-    with pytest.raises(eomgen.SceneError, match="derive: tells mechanisms of up to"):
+    with pytest.raises(eomgen.SceneError, match="derive: shows mechanisms of up to"):
         eomgen.derive("human_figure")
 
 

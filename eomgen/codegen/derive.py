@@ -68,10 +68,10 @@ def why_not_derived(model: Model, route: str) -> str:
 def _symbolic(model: Model) -> Derived:
     # Imported here because SymPy takes longer to load than everything else together.
     if why_not_pins(model):
-        from eomgen.codegen.from_general import from_general
-        from eomgen.derivation.general.derive import derive_general
+        from eomgen.codegen.from_projected import from_projected
+        from eomgen.derivation.projected.derive import derive_projected
 
-        return Derived("closed", partial(from_general, derive_general(model)))
+        return Derived("closed", partial(from_projected, derive_projected(model)))
     from eomgen.codegen.from_equations import from_equations
     from eomgen.derivation import closed
 

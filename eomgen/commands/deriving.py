@@ -1,4 +1,4 @@
-"""The derivation told: `derive`."""
+"""The derivation on the terminal: `derive`."""
 
 import sys
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.closed import Equations, derive
-from eomgen.derivation.general.derive import GeneralEquations, derive_general
-from eomgen.derivation.general.tell import tell_general
+from eomgen.derivation.projected.derive import ProjectedEquations, derive_projected
+from eomgen.derivation.projected.steps import projected_steps
 from eomgen.derivation.solution import Definition
-from eomgen.derivation.steps import Step, tell
-from eomgen.derivation.supported import MOST_TOLD, why_not_pins
+from eomgen.derivation.steps import Step, handout_steps
+from eomgen.derivation.supported import MOST_REPORTED, why_not_pins
 from eomgen.derivation.symbols import Expr
 from eomgen.errors import SceneError
 from eomgen.language.formula import Formula, written
@@ -41,17 +41,17 @@ class Matrices:
 
 
 def matrices(model: Model) -> Matrices:
-    """Derive by the handout's way where it is for the model, by the general one elsewhere.
+    """Derive by the handout's steps where they cover the model, by projected constraints elsewhere.
 
     Raises `SceneError` for a model that is too large to be read, or not for a closed form.
     """
-    if len(model.bodies) > MOST_TOLD:
+    if len(model.bodies) > MOST_REPORTED:
         raise SceneError(
-            f"derive: tells mechanisms of up to {MOST_TOLD} bodies, and this has "
+            f"derive: shows mechanisms of up to {MOST_REPORTED} bodies, and this has "
             f"{len(model.bodies)}; generate writes the module of any"
         )
     if why_not_pins(model):
-        return _general(derive_general(model))
+        return _projected(derive_projected(model))
     return _of_pins(derive(model))
 
 
@@ -72,7 +72,7 @@ def _of_pins(equations: Equations) -> Matrices:
         *(s.q, s.v, s.a, M, V, G, F),
         (*poses, *solved),
         _formulas(s.formulas),
-        tell(equations),
+        handout_steps(equations),
     )
 
 
@@ -90,7 +90,7 @@ def _poses(equations: Equations) -> list[Definition]:
     return [(symbol, value) for symbol, value in pairs if symbol != value]
 
 
-def _general(equations: GeneralEquations) -> Matrices:
+def _projected(equations: ProjectedEquations) -> Matrices:
     s, found = equations.symbols, equations.balance
     numbers = {symbol: sp.Float(float(x)) for x, symbol in s.numbers.items()}
     given = {**numbers, **dict.fromkeys(s.tau, sp.S.Zero)}
@@ -105,7 +105,7 @@ def _general(equations: GeneralEquations) -> Matrices:
         *(s.q, s.v, s.a, M, V, G, F),
         tuple(definitions),
         _formulas(s.formulas),
-        tell_general(equations),
+        projected_steps(equations),
     )
 
 

@@ -1,4 +1,4 @@
-"""The derivation told step by step, numbered like the handout."""
+"""The derivation step by step, numbered like the handout."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Step:
     equations: tuple[Equation, ...]
 
 
-def tell(equations: Equations) -> tuple[Step, ...]:
+def handout_steps(equations: Equations) -> tuple[Step, ...]:
     """Every step from the state to the closed form, in symbols meant for reading."""
     shown = _readable(equations)
     return tuple(

@@ -8,8 +8,8 @@ MOST_BODIES = 12
 """Bodies of one tree of pins in the plane; twelve take about a minute, one more a third more."""
 MOST_GENERAL_BODIES, MOST_GENERAL_VELOCITIES = 6, 15
 """Of any other model: six pins in space take two seconds, five ball joints some twenty."""
-MOST_TOLD = 6
-"""Bodies of a derivation that anyone would read; it takes half a minute to tell."""
+MOST_REPORTED = 6
+"""The most bodies of a derivation that anyone would read; writing it takes half a minute."""
 FEW_BODIES, FEW_VELOCITIES = 3, 3
 """Up to so many the closed form takes about a second, and is worth a try."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
-from eomgen.derivation.general.simplify import gathered
+from eomgen.derivation.projected.simplify import gathered
 from eomgen.derivation.symbols import Expr, SympyScalars
 from eomgen.language.formula import Formula, Name, calls_function, evaluate
 from eomgen.model.model import Model

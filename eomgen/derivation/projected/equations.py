@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.general.constraints import Constraint, Moving, about
-from eomgen.derivation.general.simplify import gathered
-from eomgen.derivation.general.symbols import Ledger, Symbols
+from eomgen.derivation.projected.constraints import Constraint, Moving, about
+from eomgen.derivation.projected.simplify import gathered
+from eomgen.derivation.projected.symbols import Ledger, Symbols
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Formula
 from eomgen.model.model import Model

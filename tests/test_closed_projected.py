@@ -14,16 +14,16 @@ from campaign import FULL, some
 from engine import MP
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
-import eomgen.derivation.general
+import eomgen.derivation.projected
 from eomgen.cli import main
-from eomgen.codegen.from_general import from_general
+from eomgen.codegen.from_projected import from_projected
 from eomgen.codegen.from_recursion import Recording, from_recursion
 from eomgen.codegen.system import System
-from eomgen.derivation.general.constraints import about, hat, of_quaternion, state_joints
-from eomgen.derivation.general.derive import GeneralEquations, derive_general
-from eomgen.derivation.general.simplify import gathered, sum_of_squares
-from eomgen.derivation.general.symbols import Ledger, make_symbols, rate
-from eomgen.derivation.general.tell import tell_general
+from eomgen.derivation.projected.constraints import about, hat, of_quaternion, state_joints
+from eomgen.derivation.projected.derive import ProjectedEquations, derive_projected
+from eomgen.derivation.projected.simplify import gathered, sum_of_squares
+from eomgen.derivation.projected.steps import projected_steps
+from eomgen.derivation.projected.symbols import Ledger, make_symbols, rate
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
 from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
@@ -111,7 +111,7 @@ def tree(seed: int, dimensions: int, most: int) -> Model:
 
 def agree(model: Model, seed: int, error: float) -> None:
     """Closed form and articulated bodies: every output of the dynamics."""
-    closed = from_general(derive_general(model))
+    closed = from_projected(derive_projected(model))
     aba = from_recursion(Recording(model, "aba"))
     given = values(model, np.random.default_rng(seed))
     for output in ("derivative", *DYNAMICS):
@@ -167,16 +167,16 @@ def test_the_trees_are_of_every_kind() -> None:
 
 
 @cache
-def scene(name: str) -> GeneralEquations:
+def scene(name: str) -> ProjectedEquations:
     """A built-in scene's equations."""
-    return derive_general(replace(elaborate(read_scene(name)), route="auto"))
+    return derive_projected(replace(elaborate(read_scene(name)), route="auto"))
 
 
 @pytest.mark.parametrize("name", TOLD)
 def test_built_in_scenes(name: str) -> None:
     """They too, exactly; and their Jacobian."""
     equations = scene(name)
-    closed = from_general(equations)
+    closed = from_projected(equations)
     aba = from_recursion(Recording(equations.model, "aba"))
     given = values(equations.model, np.random.default_rng(1))
     for output in ("derivative", "jacobian", *DYNAMICS):
@@ -186,7 +186,7 @@ def test_built_in_scenes(name: str) -> None:
 # What is published.
 
 
-def accelerations(equations: GeneralEquations) -> list[sp.Expr]:
+def accelerations(equations: ProjectedEquations) -> list[sp.Expr]:
     """v̇ with all definitions put in, without forces beside the effects."""
     s, definitions = equations.symbols, equations.solution.definitions
     found = []
@@ -198,7 +198,7 @@ def accelerations(equations: GeneralEquations) -> list[sp.Expr]:
     return found
 
 
-def named(equations: GeneralEquations, names: str) -> list[sp.Expr]:
+def named(equations: ProjectedEquations, names: str) -> list[sp.Expr]:
     """Symbols by name."""
     s = equations.symbols
     known = {x.name: x for x in (*s.parameters.values(), *s.inputs.values(), *s.q, *s.v)}
@@ -295,7 +295,7 @@ def is_positive(expression: sp.Expr, given: dict[sp.Expr, sp.Expr], masses: set[
 @pytest.mark.parametrize("case", [*TOLD, *SMALL[:12:2], *SMALL[11:16:2]], ids=str)
 def test_pivots_are_sums_of_weighted_squares(case: str | tuple[int, int, int]) -> None:
     """No pivot is a difference; weights of rotation are those of LᵀDL of a body's inertia."""
-    equations = scene(case) if isinstance(case, str) else derive_general(tree(*case))
+    equations = scene(case) if isinstance(case, str) else derive_projected(tree(*case))
     model, definitions = equations.model, dict(equations.solution.definitions)
     masses = {p.name for p in model.parameters if "mass" in p.name or "inertia" in p.name}
     masses |= {symbol.name for symbol in definitions if symbol.name.startswith("weight__")}
@@ -385,7 +385,7 @@ def test_gathering() -> None:
 
 def test_independent_of_the_recursions() -> None:
     """Nothing of the derivation comes from the routes that it is to prove."""
-    for path in sorted(Path(eomgen.derivation.general.__file__).parent.glob("*.py")):
+    for path in sorted(Path(eomgen.derivation.projected.__file__).parent.glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.ImportFrom):
                 assert "dynamics" not in str(node.module), path
@@ -449,7 +449,7 @@ def test_every_symbol_is_told(name: str) -> None:
     equations = scene(name)
     s = equations.symbols
     known = {x.name for x in (*s.parameters.values(), *s.inputs.values(), *s.q)}
-    steps = tell_general(equations)
+    steps = projected_steps(equations)
     assert steps[-1].title == "Closed form"
     for step in steps:
         for equation in step.equations:
@@ -472,7 +472,7 @@ def test_what_is_told_is_true(name: str) -> None:
     found = {name: float(x) for name, x in given.items()}
     recording = from_recursion(Recording(replace(model, outputs=("body_poses",)), "aba"))
     rates, poses = (evaluator(recording.program, x)(given) for x in ("derivative", "body_poses"))
-    state, *steps = tell_general(equations)
+    state, *steps = projected_steps(equations)
     moving = (*model.coordinates, *model.velocities)
     numbers = [*(given[c.name] for c in moving), *rates[-len(model.velocities) :]]
     symbols = [x for line in state.equations for x in line.right]

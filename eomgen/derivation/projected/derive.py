@@ -1,9 +1,11 @@
-"""The general closed route from a model to its equations of motion."""
+"""The closed route for any small tree: constraints projected onto the velocities (Kane's
+method).
+"""
 
 from dataclasses import dataclass
 
-from eomgen.derivation.general.constraints import Constraint, state_joints
-from eomgen.derivation.general.equations import (
+from eomgen.derivation.projected.constraints import Constraint, state_joints
+from eomgen.derivation.projected.equations import (
     Balance,
     Inertia,
     Loads,
@@ -14,8 +16,8 @@ from eomgen.derivation.general.equations import (
     loads,
     set_in_motion,
 )
-from eomgen.derivation.general.solution import Solution, solve
-from eomgen.derivation.general.symbols import Ledger, Symbols, make_symbols
+from eomgen.derivation.projected.solution import Solution, solve
+from eomgen.derivation.projected.symbols import Ledger, Symbols, make_symbols
 from eomgen.derivation.supported import FEW_VELOCITIES, why_not_closed
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
@@ -25,7 +27,7 @@ WRITTEN, NAMED = (20, 160), (6, 40)
 
 
 @dataclass(frozen=True)
-class GeneralEquations:
+class ProjectedEquations:
     """A model's equations of motion: constraints, motions, M v̇ + V + G = F, and v̇.
 
     `balance` is written over the first `motion_definitions` of `solution`.
@@ -42,7 +44,7 @@ class GeneralEquations:
     solution: Solution
 
 
-def derive_general(model: Model) -> GeneralEquations:
+def derive_projected(model: Model) -> ProjectedEquations:
     """Derive and solve; see the modules of this package for each step.
 
     Raises `SceneError` for a model that is too large to be read or derived.
@@ -60,6 +62,6 @@ def derive_general(model: Model) -> GeneralEquations:
     equations = balance(model, symbols, bodies, motions, acting, world, ledger)
     before = len(ledger.definitions)
     solution = solve(model, symbols, bodies, motions, acting, world, ledger)
-    return GeneralEquations(
+    return ProjectedEquations(
         model, symbols, bodies, constraints, motions, acting, equations, before, solution
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.general.symbols import Ledger, Symbols, rate, real, triple
+from eomgen.derivation.projected.symbols import Ledger, Symbols, rate, real, triple
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Body, Model
 from eomgen.scalars.exact import direction, orientation, quarters, radians

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
-from eomgen.derivation.general.equations import (
+from eomgen.derivation.projected.equations import (
     Inertia,
     Loads,
     Motion,
@@ -28,8 +28,8 @@ from eomgen.derivation.general.equations import (
     armatures,
     generalised,
 )
-from eomgen.derivation.general.simplify import nested, sum_of_squares
-from eomgen.derivation.general.symbols import Ledger, Symbols
+from eomgen.derivation.projected.simplify import nested, sum_of_squares
+from eomgen.derivation.projected.symbols import Ledger, Symbols
 from eomgen.derivation.solution import is_sum_of_positive_terms
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model

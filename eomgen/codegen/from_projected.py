@@ -16,7 +16,7 @@ from eomgen.codegen.from_recursion import (
     variables,
 )
 from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, output_shape, recorded
-from eomgen.derivation.general.derive import GeneralEquations
+from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.language.formula import evaluate
 from eomgen.model.states import velocity_states
 from eomgen.outputs import DERIVATIVES
@@ -29,7 +29,7 @@ from eomgen.program.tape import Node
 class Lowered:
     """The equations over the nodes of a recording."""
 
-    def __init__(self, equations: GeneralEquations, record: Recording) -> None:
+    def __init__(self, equations: ProjectedEquations, record: Recording) -> None:
         self.equations = equations
         s = equations.symbols
         self._tape, self._record = record.tape, record
@@ -69,7 +69,7 @@ class Lowered:
         return [symbol for symbol in definitions if symbol in needed]
 
 
-def from_general(equations: GeneralEquations, *, jacobian: bool = True) -> System:
+def from_projected(equations: ProjectedEquations, *, jacobian: bool = True) -> System:
     """The whole system of a model by route `closed`; with the derivative's Jacobian or without."""
     model = equations.model
     record = Recording(model, "closed", lambda record: Lowered(equations, record).forward)

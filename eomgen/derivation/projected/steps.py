@@ -1,12 +1,12 @@
-"""The general derivation told step by step, like the handout's by `derivation.steps`."""
+"""The projected-constraints derivation, step by step, like the handout's by `derivation.steps`."""
 
 from collections.abc import Iterator
 
 import sympy as sp
 
-from eomgen.derivation.general.constraints import Constraint
-from eomgen.derivation.general.derive import GeneralEquations
-from eomgen.derivation.general.simplify import gathered
+from eomgen.derivation.projected.constraints import Constraint
+from eomgen.derivation.projected.derive import ProjectedEquations
+from eomgen.derivation.projected.simplify import gathered
 from eomgen.derivation.steps import Equation, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
@@ -19,10 +19,10 @@ LONGEST = 160
 SLACK = 2.5
 """How much longer than its shortest form a sum may be whose terms are to be seen."""
 ROTATIONS = ("R__", "k__")
-"""How names of entries of rotations begin, which are told with their joint."""
+"""How names of entries of rotations begin, which are shown with their joint."""
 
 
-def tell_general(equations: GeneralEquations) -> tuple[Step, ...]:
+def projected_steps(equations: ProjectedEquations) -> tuple[Step, ...]:
     """Every step from the state to the closed form, in symbols meant for reading."""
     shown = _readable(equations)
     given = equations.symbols.numbers.items()
@@ -40,7 +40,7 @@ def tell_general(equations: GeneralEquations) -> tuple[Step, ...]:
     return tuple(steps)
 
 
-def _joints(equations: GeneralEquations) -> Iterator[tuple[str, str, Pairs]]:
+def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
     """The state, and each joint as a constraint with its derivatives."""
     s, model = equations.symbols, equations.model
     plane = model.dimensions == 2
@@ -99,7 +99,7 @@ def _differentiated(c: Constraint, still: dict[Expr, Expr]) -> Pairs:
     return pairs
 
 
-def _zeros(equations: GeneralEquations) -> dict[Expr, Expr]:
+def _zeros(equations: ProjectedEquations) -> dict[Expr, Expr]:
     """Components of motion that are always 0, such as those out of the plane."""
     zero = sp.Integer(0)
     found: dict[Expr, Expr] = {}
@@ -131,7 +131,7 @@ def _short(expression: Expr) -> Expr:
     return gathered(expression, frozenset())
 
 
-def _balance(equations: GeneralEquations) -> Iterator[tuple[str, str, Pairs]]:
+def _balance(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
     """M, V, G, F."""
     terms, model = equations.balance, equations.model
     definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
@@ -163,7 +163,7 @@ def _balance(equations: GeneralEquations) -> Iterator[tuple[str, str, Pairs]]:
     yield "Applied forces", "", [(sp.Symbol("F"), terms.F)]
 
 
-def _solution(equations: GeneralEquations) -> Iterator[tuple[str, str, Pairs]]:
+def _solution(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
     """The closed form without the generalised forces, which only `forward_dynamics` has."""
     s, definitions = equations.symbols, equations.solution.definitions
     still = dict.fromkeys(s.tau, sp.Integer(0))
@@ -187,7 +187,7 @@ def _solution(equations: GeneralEquations) -> Iterator[tuple[str, str, Pairs]]:
 
 
 def _needed(
-    equations: GeneralEquations,
+    equations: ProjectedEquations,
     expressions: list[Expr] | tuple[Expr, ...],
     still: dict[Expr, Expr] | None = None,
 ) -> set[Expr]:
@@ -211,7 +211,7 @@ KINDS = {
 """What the kinds of derived symbols are written with."""
 
 
-def _readable(equations: GeneralEquations) -> dict[Expr, Expr]:
+def _readable(equations: ProjectedEquations) -> dict[Expr, Expr]:
     """Symbols by ones whose names SymPy's printers know how to write: `thetadot` is θ̇."""
     s, model = equations.symbols, equations.model
     taken = {*s.parameters, *s.inputs}
