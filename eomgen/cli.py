@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from eomgen.errors import EomgenError, InterruptedRunError, tell_refusal
+from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
 from eomgen.routes import ROUTES
 from eomgen.streams import steady_streams
 from eomgen.text import breaks_lines, one_line
@@ -45,7 +45,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             parser.error("generate: no scene; name one, or give --all for the built-in ones")
         code: int = given.run(given)
     except EomgenError as error:
-        tell_refusal(error)
+        report_refusal(error)
         return INTERRUPTED if isinstance(error, InterruptedRunError) else 1
     except (OSError, MemoryError) as error:
         why = "out of memory" if isinstance(error, MemoryError) else one_line(str(error))

@@ -33,7 +33,7 @@ class InterruptedRunError(RunError):
     """A run that an interrupt ended; what it had computed is kept."""
 
 
-def tell_refusal(error: EomgenError) -> None:
+def report_refusal(error: EomgenError) -> None:
     """Say on standard error what is wrong, each line as one of this program."""
     for line in error.lines:
         print(f"eomgen: {line}", file=sys.stderr)

@@ -24,7 +24,7 @@ from eomgen.scene.schema import Scene
 @dataclass(frozen=True)
 class Generated:
     """What a model is compiled to: a Python module, the page's `bodyPoses`, the program of both,
-    what passes saved, why its route was taken, and what a user must be told of it.
+    what passes saved, why its route was taken, and what the report must say of it.
     """
 
     module: str

@@ -204,7 +204,7 @@ def _archive(members: dict[str, Any], r: random.Random) -> bytes:
 def _base() -> bytes:
     """The archive of a run."""
     with tempfile.TemporaryDirectory() as folder:
-        code, said = _told(["simulate", "pendulum", "--t-end", "0.1", "-o", folder])
+        code, said = _reported(["simulate", "pendulum", "--t-end", "0.1", "-o", folder])
         if code:
             raise Failure(said)
         return (Path(folder) / "pendulum.npz").read_bytes()
@@ -215,7 +215,7 @@ def outcome(kind: str, number: int, folder: Path) -> str:
     path = folder / f"hostile.{'toml' if kind == SCENES else 'npz'}"
     path.write_bytes(scene_file(number) if kind == SCENES else archive_file(number, _base()))
     before = _peak(anew=True)
-    code = _told(["check", str(path)])[0] if kind == SCENES else _loaded(path)
+    code = _reported(["check", str(path)])[0] if kind == SCENES else _loaded(path)
     grown = _peak() - before
     if grown > MOST_MEMORY:
         raise Failure(f"takes {grown} kB")
@@ -269,7 +269,7 @@ def _watched() -> Iterator[None]:
         signal.signal(signal.SIGPROF, before)
 
 
-def _told(command: list[str]) -> tuple[int, str]:
+def _reported(command: list[str]) -> tuple[int, str]:
     """The exit code of a command and its messages. Raises `Failure` for what it must not print."""
     # Of an encoding that has every letter: others are spelled, which may take more room.
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", newline="\n") for _ in range(2))

@@ -98,7 +98,7 @@ class Compiled(Engine):
 
 def compiled(scene: "Scene | str", form: str = "velocity") -> Compiled:
     """Compile a scene, or a built-in one by name, once; all outputs on; by the route `closed`."""
-    return _compiled(TOLD[scene] if isinstance(scene, str) else scene, form)
+    return _compiled(REPORTED[scene] if isinstance(scene, str) else scene, form)
 
 
 @cache
@@ -184,7 +184,7 @@ _TWO_BODIES = Scene(
     positive=frozenset({"m_A", "m_B", "I_A", "I_B"}),
     numbers=_two_body,
 )
-TOLD = {
+REPORTED = {
     "two_body": _TWO_BODIES,
     "two_body_forced": replace(
         _TWO_BODIES,

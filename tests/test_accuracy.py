@@ -162,7 +162,7 @@ def test_tighter_tolerances_give_smaller_errors() -> None:
         assert (tightest.jacobians > 0) == (method in ("Radau", "BDF")) or method == "LSODA"
 
 
-def test_runs_that_are_wrong_or_fail_are_told_and_stay() -> None:
+def test_runs_that_are_wrong_or_fail_are_reported_and_stay() -> None:
     """A stiff state that explicit steps cannot take; implicit ones do."""
     stiff = bench(rate=4e4)
     works = climbed(stiff, ["rk4", "implicit_midpoint"], most_steps=400)

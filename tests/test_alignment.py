@@ -104,7 +104,7 @@ def test_not_silent_again(number: int) -> None:
     assert tried(case(number)) == "right", ONCE_SILENT[number]
 
 
-def test_digits_told_are_those_of_accelerations() -> None:
+def test_digits_reported_are_those_of_accelerations() -> None:
     """Two slides 9e-15 from each other: 5e-7 off, over a thousand times what half a unit in the
     last place of the data does. It was told 8 digits.
     """
@@ -329,7 +329,7 @@ r_child = [-1, 0]
 """
 
 
-def test_what_digits_are_right_is_told() -> None:
+def test_what_digits_are_right_is_reported() -> None:
     """A moment of inertia of 1e-14 beside masses on arms: run, and told what it costs; one of 1e-6:
     run, and nothing said.
     """

@@ -504,7 +504,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*asked, "-o", str(tmp_path)]) == 1
 
 
-def test_command_tells_what_is_not_there(
+def test_command_reports_what_is_not_there(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Another form, contacts, routes; and what cannot be asked for."""

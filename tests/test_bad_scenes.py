@@ -900,7 +900,7 @@ def test_a_refusal_stops_no_other_scene(scene: Path, capsys: pytest.CaptureFixtu
     )
 
 
-def test_all_unknown_keys_are_told(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_unknown_keys_are_reported(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of one table and of another, each with its hint; of thousands the first, and soon."""
     text = GOOD.replace("mass = 0.5", "mass = 0.5\nmas = 1\ncolour = 2\ninertia = 3")
     scene.write_text(text.replace('type = "gravity"', 'type = "gravity"\ngg = 1'))

@@ -346,7 +346,7 @@ def test_command_of_a_scene_without_effects(
     assert "the mechanism itself" in capsys.readouterr().out
 
 
-def test_rigid_contacts_are_told_beside_the_derivative() -> None:
+def test_rigid_contacts_are_reported_beside_the_derivative() -> None:
     """What is computed when they strike or hold is no part of it; without contacts nothing is."""
     floor = '[[effects]]\ntype = "contact"\nname = "floor"\nlaw = "impact"\nbody = "a"\n'
     found = costed(STONE + floor + "radius = 0.1\nrestitution = 0.5\n", motion=0.0)

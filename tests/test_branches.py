@@ -242,7 +242,7 @@ def test_what_turns_fast_is_looked_at_in_every_turn() -> None:
 
 
 @pytest.mark.usefixtures("blank_figures")
-def test_a_step_that_cannot_be_followed_is_held_and_told(capsys, tmp_path) -> None:
+def test_a_step_that_cannot_be_followed_is_held_and_reported(capsys, tmp_path) -> None:
     """A cam that turns a million times: no steps can see it all, and the run says so."""
     scene = tmp_path / "wheel.toml"
     cam = WHEEL.format(torque="-1e-9*step(cos(q) - cos(pi/90))")

@@ -297,7 +297,7 @@ def test_a_budget() -> None:
     assert off < 1e-9 and off < 10 * choice.error
 
 
-def test_a_second_run_tells_the_error() -> None:
+def test_a_second_run_reports_the_error() -> None:
     """Adaptive and equal steps: the estimate is near the true error."""
     case = case_of("pendulum")
     true = truth(case)
@@ -362,7 +362,7 @@ def test_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
 @pytest.mark.parametrize(
     "integrator", some(["DOP853", "BDF"], ["RK45", "DOP853", "LSODA", "BDF", "Radau"])
 )
-def test_a_wrong_run_is_told(
+def test_a_wrong_run_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], integrator: str
 ) -> None:
     """At SciPy's default tolerances every method reports success on the light cart-pole and is

@@ -35,7 +35,7 @@ from eomgen.run.module import load_module
 from eomgen.scene.joints import Free
 from eomgen.scene.reader import parse_scene, read_scene
 
-TOLD = ("cart_pole", "furuta_pendulum", "spinning_top", "babyboot", "tumbling_body")
+REPORTED = ("cart_pole", "furuta_pendulum", "spinning_top", "babyboot", "tumbling_body")
 DYNAMICS = (
     "forward_dynamics",
     "inverse_dynamics",
@@ -172,7 +172,7 @@ def scene(name: str) -> ProjectedEquations:
     return derive_projected(replace(elaborate(read_scene(name)), route="auto"))
 
 
-@pytest.mark.parametrize("name", TOLD)
+@pytest.mark.parametrize("name", REPORTED)
 def test_built_in_scenes(name: str) -> None:
     """They too, exactly; and their Jacobian."""
     equations = scene(name)
@@ -292,7 +292,7 @@ def is_positive(expression: sp.Expr, given: dict[sp.Expr, sp.Expr], masses: set[
     return False
 
 
-@pytest.mark.parametrize("case", [*TOLD, *SMALL[:12:2], *SMALL[11:16:2]], ids=str)
+@pytest.mark.parametrize("case", [*REPORTED, *SMALL[:12:2], *SMALL[11:16:2]], ids=str)
 def test_pivots_are_sums_of_weighted_squares(case: str | tuple[int, int, int]) -> None:
     """No pivot is a difference; weights of rotation are those of LᵀDL of a body's inertia."""
     equations = scene(case) if isinstance(case, str) else derive_projected(tree(*case))
@@ -397,7 +397,7 @@ def test_independent_of_the_recursions() -> None:
 
 def test_route_closed_and_auto() -> None:
     """`closed` takes any small tree; `auto` tries it on few velocities and takes what is least."""
-    for name in TOLD:
+    for name in REPORTED:
         choice = compile_program(elaborate(read_scene(name)))
         assert choice.system.route == "closed", name
     puma = elaborate(read_scene("puma560"))
@@ -443,8 +443,8 @@ def test_a_module_observes_what_the_recursions_do() -> None:
     )
 
 
-@pytest.mark.parametrize("name", TOLD)
-def test_every_symbol_is_told(name: str) -> None:
+@pytest.mark.parametrize("name", REPORTED)
+def test_every_symbol_is_reported(name: str) -> None:
     """What stands on the right of an equation is given, or stands on the left of one before."""
     equations = scene(name)
     s = equations.symbols
@@ -461,8 +461,8 @@ def test_every_symbol_is_told(name: str) -> None:
             known.add(equation.left.name)
 
 
-@pytest.mark.parametrize("name", TOLD)
-def test_what_is_told_is_true(name: str) -> None:
+@pytest.mark.parametrize("name", REPORTED)
+def test_what_is_reported_is_true(name: str) -> None:
     """In numbers every equation gives what the recursions do, to the digits that are shown: places
     of the bodies along the tree, and accelerations at the end.
     """

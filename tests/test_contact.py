@@ -773,7 +773,9 @@ def test_what_feeds_energy_in_must_be_asked_for() -> None:
     elaborate(parse_scene(free("a") + table))
 
 
-def test_what_starts_pressed_in_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_starts_pressed_in_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A soft contact or stop that overlaps at the start holds energy: ½ k d² and 2/5 k d^2.5."""
     lines = [
         free("a") + WEIGHT,

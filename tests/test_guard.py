@@ -153,7 +153,7 @@ def test_tight_tolerances_ask_for_more_digits() -> None:
     assert not tight.finished and "allowed 1e-11" in tight.message
 
 
-def test_a_domain_that_is_left_and_a_quaternion_that_drifts_are_told() -> None:
+def test_a_domain_that_is_left_and_a_quaternion_that_drifts_are_reported() -> None:
     """Each as what it is."""
     problem, guard = spiky((2.0, 3.0))
     gone = replace(guard, exact=lambda t, y: np.array([np.nan if y[0] > 0.5 else 1.0]))

@@ -289,7 +289,7 @@ damping = 0
 
 
 @pytest.mark.usefixtures("blank_figures")
-def test_what_differs_from_the_run_that_goes_on_is_told(
+def test_what_differs_from_the_run_that_goes_on_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene = tmp_path / "swing.toml"

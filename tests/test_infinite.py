@@ -166,7 +166,7 @@ def test_a_state_s_rate_counts() -> None:
         problem_of(made.module, model=made.model)
 
 
-def test_what_is_singular_is_told_from_what_is_infinite() -> None:
+def test_what_is_singular_is_reported_from_what_is_infinite() -> None:
     """The mass matrix is tried without the effects, and effects without it."""
     text = scene(ATTRACT, 0.0)
     model = engine(scene(ATTRACT, 1.0)).model

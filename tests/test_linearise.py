@@ -331,7 +331,7 @@ def test_the_command_on_quaternions_and_states(capsys: pytest.CaptureFixture[str
     assert "inputs      tau = -5.0277" in capsys.readouterr().out
 
 
-def test_a_figure_is_told_in_short(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_figure_is_reported_in_short(capsys: pytest.CaptureFixture[str]) -> None:
     """76 states: no matrix on the screen, lines of at most 100 columns, modes counted."""
     assert main(["linearise", "hanging_figure", "--at", "rest"]) == 0
     out = capsys.readouterr().out
@@ -441,7 +441,9 @@ def test_states_of_controllers_on_the_command_line(
     assert "c_torque changes by -240 N m/s" in capsys.readouterr().out
 
 
-def test_a_steady_motion_is_told_from_one_that_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_steady_motion_is_reported_from_one_that_is_not(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """A top that sleeps goes on as it is; one that leans does not, nor what only passes through."""
     top = ["linearise", "spinning_top", "--at", "initial", "--state", "tip_wz=70"]
     assert main([*top, "--state", "tip_qw=1", "--state", "tip_qx=0"]) == 0

@@ -76,7 +76,7 @@ def test_right_or_refused(seed: int, dimensions: int, decades: list[float], spec
     assert outcome in WELL, outcome
 
 
-REFUSED, TOLD = (100309, 100755, 103937, 5315), (5867,)
+REFUSED, REPORTED = (100309, 100755, 103937, 5315), (5867,)
 ONCE_SILENT = {
     33: "forces on a body whose inertia is nothing beside m r²",
     145: "the same",
@@ -101,7 +101,7 @@ ONCE_SILENT = {
 @pytest.mark.parametrize("number", ONCE_SILENT)
 def test_not_silent_again(number: int) -> None:
     """What the campaign found. No route keeps its digits for those that are refused, or told."""
-    outcome = "refused" if number in REFUSED else "told" if number in TOLD else "right"
+    outcome = "refused" if number in REFUSED else "told" if number in REPORTED else "right"
     assert tried(*case(number)) == outcome, ONCE_SILENT[number]
 
 

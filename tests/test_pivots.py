@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from campaign import some
-from mechanisms import BUILT_IN, SEEDS, TOLD, Scene, compiled, random_tree
+from mechanisms import BUILT_IN, REPORTED, SEEDS, Scene, compiled, random_tree
 from newton_euler import Mechanism, solve
 
 from eomgen.derivation.closed import Equations, derive
@@ -18,7 +18,7 @@ from eomgen.scene.reader import parse_scene
 POSITIVE, NONNEGATIVE = "positive", "nonnegative"
 FIVE_BODIES = some((26,), (11, 13, 20, 26))
 SCENES = [
-    *(TOLD[name] for name in BUILT_IN),
+    *(REPORTED[name] for name in BUILT_IN),
     *(random_tree(seed) for seed in SEEDS),
     *(random_tree(seed, 5) for seed in FIVE_BODIES),
 ]
@@ -106,7 +106,7 @@ def test_denominators_are_sums_of_positive_terms(scene: Scene) -> None:
 
 def test_the_checker_refuses_what_can_vanish() -> None:
     """Differences, odd powers and waves that can be 0 together with all else are seen."""
-    scene = TOLD["two_body"]
+    scene = REPORTED["two_body"]
     equations = derived(scene)
     signs = Signs(equations, scene)
     parameters = equations.symbols.parameters

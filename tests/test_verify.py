@@ -413,7 +413,7 @@ effects = [
 """
 
 
-def test_a_horizon_that_chatters_keeps_to_its_time_and_tells_how_far_it_is() -> None:
+def test_a_horizon_that_chatters_keeps_to_its_time_and_reports_how_far_it_is() -> None:
     """Dry friction that sticks turns at every step, in doubles too, which had all the time."""
     scene = scene_of(DRY)
     module = load_module(python_module(compile_program(scene[0]).system))

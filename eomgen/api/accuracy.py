@@ -321,10 +321,10 @@ def _climb(
 
     begin, made = clock.perf_counter(), 0
 
-    def told(rung: "Rung") -> None:
+    def reported(rung: "Rung") -> None:
         notice(len(works), clock.perf_counter() - begin, rung)
 
-    for work in sweep(bench, ladder, plan.methods, works, begin + plan.time, told):
+    for work in sweep(bench, ladder, plan.methods, works, begin + plan.time, reported):
         works[work.rung] = work
         made += 1
         keep(works)

@@ -224,7 +224,7 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
         tuple(warnings),
         choice=choice,
         estimate=estimate,
-        begun=start.told(trajectory) if start else "",
+        begun=start.reported(trajectory) if start else "",
     )
 
 

@@ -47,7 +47,7 @@ class Candidate:
 @dataclass(frozen=True)
 class Choice:
     """The equations of the route that was chosen, and the routes it was chosen from. So many
-    `digits` of accelerations are right, if fewer than `ENOUGH`; then its user must be told.
+    `digits` of accelerations are right, if fewer than `ENOUGH`; then the report must say so.
     """
 
     derived: Derived
@@ -55,7 +55,7 @@ class Choice:
     digits: int | None = None
 
     def notices(self) -> list[str]:
-        """What its user must be told."""
+        """What the report must say of it."""
         if self.digits is None:
             return []
         return [

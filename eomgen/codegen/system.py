@@ -21,7 +21,7 @@ Made = dict[str, tuple[tuple[int, ...], list[Node]]]
 
 @dataclass(frozen=True)
 class ContactLabel:
-    """What a module tells of a rigid contact; `unit` is that of its gap."""
+    """What a module says of a rigid contact; `unit` is that of its gap."""
 
     name: str
     effect: str

@@ -101,7 +101,9 @@ def _time(seconds: float) -> str:
 
 
 def _share(bench: Bench, work: Work, costs: tuple[float, float]) -> str:
-    """Share of the time that the generated code takes; not told where contacts add their own."""
+    """Share of the time that the generated code takes; not reported where contacts add their
+    own.
+    """
     if bench.problem.contacts is not None or not work.derivatives:
         return "-"
     spent = work.derivatives * costs[0] + work.jacobians * costs[1]

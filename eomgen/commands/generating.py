@@ -5,7 +5,7 @@ from pathlib import Path
 
 from eomgen.api.generating import LARGEST, compiled
 from eomgen.commands.shared import Arguments, manner_of, read_model, required
-from eomgen.errors import EomgenError, RunError, tell_refusal
+from eomgen.errors import EomgenError, RunError, report_refusal
 from eomgen.files import check_folder, check_writable, read_plain
 from eomgen.results import Module
 from eomgen.scene.reader import built_in_names
@@ -14,7 +14,7 @@ from eomgen.scene.reader import built_in_names
 def generate(given: Arguments) -> int:
     """Write modules, or with --check say which are stale.
 
-    A scene or a file that is refused is told, and the others go on; then the exit code is 1.
+    A scene or a file that is refused is reported, and the others go on; then the exit code is 1.
     """
     scenes = list(dict.fromkeys([*given.scenes, *(built_in_names() if given.all else ())]))
     paths: dict[Path, str] = {}
@@ -25,7 +25,7 @@ def generate(given: Arguments) -> int:
             stale += [scene] if not _generate(scene, given, paths) else []
         except EomgenError as error:
             new = [line for line in error.lines if line not in refused]  # of a folder, say it once
-            tell_refusal(EomgenError(*new))
+            report_refusal(EomgenError(*new))
             refused |= dict.fromkeys(new)
     if stale:
         raise RunError(

@@ -117,7 +117,7 @@ def _bounded(given: Arguments, trajectory: Trajectory) -> list[str]:
     elif capped:
         lines.append(
             f"{capped} of {steps} steps held to 1/{LEAST_STEPS} of the run: what longer ones would "
-            "pass over cannot be told; --max-step sets another length"
+            "pass over cannot be known; --max-step sets another length"
         )
     return lines
 

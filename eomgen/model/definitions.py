@@ -65,8 +65,10 @@ def _meanings(definitions: Mapping[str, Formula]) -> dict[str, Formula]:
                 _check_size(found[name], name)
             elif missing in path:
                 circle = [*path[path.index(missing) :], missing]
-                told = ", ".join(f"{a} needs {b}" for a, b in pairwise(circle))
-                raise SceneError(f"definitions.{missing}: is defined by itself: {told}; break it")
+                reported = ", ".join(f"{a} needs {b}" for a, b in pairwise(circle))
+                raise SceneError(
+                    f"definitions.{missing}: is defined by itself: {reported}; break it"
+                )
             else:
                 path.append(missing)
     return found

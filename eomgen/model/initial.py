@@ -38,20 +38,20 @@ def initial_state(
         if names := [c.name for c in body.positions[body.plain :]]:
             parts = [values[name] for name in names]
             notices += _length_noticed(parts, names[0])
-            told = not isinstance(given.q, dict) or any(name in given.q for name in names)
-            values |= zip(names, _unit(parts, names[0], told), strict=True)
+            reported = not isinstance(given.q, dict) or any(name in given.q for name in names)
+            values |= zip(names, _unit(parts, names[0], reported), strict=True)
     return Start(tuple(values.values()), v, tuple(notices))
 
 
-def _unit(parts: Sequence[float], first: str, told: bool) -> list[float]:
-    """A quaternion scaled to length 1; 1, 0, 0, 0 where the scene has not `told` it.
+def _unit(parts: Sequence[float], first: str, reported: bool) -> list[float]:
+    """A quaternion scaled to length 1; 1, 0, 0, 0 where the scene has not `reported` it.
 
     `first` is the name of its first part. Raises `SceneError` for one of no length.
     """
     length = math.hypot(*parts)
     if length != 0.0:
         return [part / length for part in parts]
-    if told:
+    if reported:
         raise SceneError(
             f"initial.q: the quaternion from {first} on has no length; give 1, 0, 0, 0 for no turn"
         )

@@ -125,8 +125,8 @@ def integrate(
         run.resume = partial(begun, asked, problem)
     if tally:
         tally.begin(problem.initial)
-    counts, told = (derivatives, jacobians), progress or _ignore
-    outcome, trouble = _follow(run, advances, counts, problem, method, asked.t_end, told, tally)
+    counts, report = (derivatives, jacobians), progress or _ignore
+    outcome, trouble = _follow(run, advances, counts, problem, method, asked.t_end, report, tally)
     kept = _kept(run, problem, {**remembered, **numbers(rest_speed=rest_speed)})
     said = (trouble, monitor.words() if monitor else "", *dict.fromkeys(remarks))
     return Trajectory(
@@ -289,7 +289,7 @@ def _follow(
     tally: Tally | None,
 ) -> tuple[Outcome, str]:
     """Carry `run` on to `t_end`; return how that ended and, if before, the trouble in one line."""
-    t_start, told = run.t, throttled(progress)
+    t_start, report = run.t, throttled(progress)
     try:
         with np.errstate(all="ignore"):
             _check_start(problem, run)
@@ -299,7 +299,7 @@ def _follow(
                 run.take(advance)
                 if tally:
                     tally.take(advance, counts[0].calls, counts[1].calls)
-                told((run.t - t_start) / (t_end - t_start))
+                report((run.t - t_start) / (t_end - t_start))
         return Outcome(), ""
     except KeyboardInterrupt:
         run.end()

@@ -50,7 +50,7 @@ class Start:
     words: str
     capped: bool | None = None
 
-    def told(self, run: Trajectory) -> str:
+    def reported(self, run: Trajectory) -> str:
         """What there is to say once it has run."""
         capped = self.capped is not None and (self.capped or run.counts["capped"])
         if capped and np.isnan(run.resume.get("max_step", np.nan)):

@@ -49,16 +49,16 @@ def reference(kind: str | None = None) -> str:
         if kind not in known:
             hint = nearest(kind, known) or f"; known: {', '.join(known)}"
             raise SceneError(f"no joint or effect is of type '{kind}'{hint}")
-        return "\n".join(_told(kind, known[kind]))
+        return "\n".join(_reported(kind, known[kind]))
     functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
     constants = ", ".join(f"`{name}`" for name in CONSTANTS)
     lines = [HEAD.format(functions=functions, constants=constants), "## Tables", ""]
     for title, table in TABLES.items():
-        lines += _told(title, table, "### ")
+        lines += _reported(title, table, "### ")
     for title, tables in groups.items():
         lines += [f"## {title}", ""]
         for name, table in tables.items():
-            lines += _told(name, table, "### ")
+            lines += _reported(name, table, "### ")
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -72,7 +72,7 @@ def _word(table: type[Table]) -> str:
     return str(get_args(table.model_fields["type"].annotation)[0])
 
 
-def _told(name: str, table: type[Table], heading: str = "# ") -> Iterator[str]:
+def _reported(name: str, table: type[Table], heading: str = "# ") -> Iterator[str]:
     yield f"{heading}{name}"
     yield ""
     yield inspect.cleandoc(table.__doc__ or "")
@@ -88,8 +88,8 @@ def _told(name: str, table: type[Table], heading: str = "# ") -> Iterator[str]:
 def _row(key: str, field: FieldInfo) -> tuple[str, str, str, str]:
     marks = field.json_schema_extra
     extra: Mapping[str, Any] = marks if isinstance(marks, Mapping) else {}
-    told = "its own name" if key == "name" else field.description or ""
-    about = re.sub(r"(<\w+>\w*)", r"`\1`", told)
+    reported = "its own name" if key == "name" else field.description or ""
+    about = re.sub(r"(<\w+>\w*)", r"`\1`", reported)
     words = _words(field.annotation)
     if words:
         about += (": " if about else "") + ", ".join(f"`{word}`" for word in words)

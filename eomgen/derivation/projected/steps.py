@@ -168,11 +168,11 @@ def _solution(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]
     s, definitions = equations.symbols, equations.solution.definitions
     still = dict.fromkeys(s.tau, sp.Integer(0))
     needed = _needed(equations, s.a, still)
-    told = {*[*definitions][: equations.motion_definitions]}
+    reported = {*[*definitions][: equations.motion_definitions]}
     known = _needed(equations, [e for m in (equations.balance.M, equations.balance.V) for e in m])
     pairs = []
     for symbol, e in definitions.items():
-        before = symbol.name.startswith(ROTATIONS) or (symbol in told and symbol in known)
+        before = symbol.name.startswith(ROTATIONS) or (symbol in reported and symbol in known)
         if symbol in needed and not before:
             pairs.append((symbol, _flat(e.xreplace(still), s.fixed)))
     yield (

@@ -315,16 +315,16 @@ def error_law(search: Search, method: Method, judged: dict[int, float]) -> tuple
     def clear(name: str) -> list[Tried]:
         return [run for run in search.of(name) if 0 < judged[id(run)] < CLEAR]
 
-    told = clear(method.name)
-    if not told:
+    reported = clear(method.name)
+    if not reported:
         alike = [r for r in search.runs if (r.setting.dt is not None) == method.equal_steps]
         others = sorted({run.setting.integrator for run in alike})
         ladders = [runs for name in others if (runs := clear(name))]
-        told = min(ladders, key=lambda runs: runs[-1].tolerance, default=[])
-    if not told:
+        reported = min(ladders, key=lambda runs: runs[-1].tolerance, default=[])
+    if not reported:
         return fit([search.deepest(method)], [CLEAR], method.exponent), False
-    errors = [judged[id(run)] for run in told]
-    return fit([run.tolerance for run in told], errors, method.exponent), True
+    errors = [judged[id(run)] for run in reported]
+    return fit([run.tolerance for run in reported], errors, method.exponent), True
 
 
 def growth(method: Method, runs: Sequence[Tried]) -> Law:

@@ -140,7 +140,7 @@ def errors(runs: Sequence[Tried], scale: FloatArray, case: Case) -> list[float]:
         name = run.setting.integrator
         others = [r for r in runs if r.setting.integrator != name]
         apart = [ALIKE * difference(run.trajectory, r.trajectory, scale) for r in others]
-        own = _telling(
+        own = _reporting(
             sorted((r for r in runs if r.setting.integrator == name), key=lambda r: r.tolerance),
             case,
         )
@@ -160,7 +160,7 @@ def errors(runs: Sequence[Tried], scale: FloatArray, case: Case) -> list[float]:
     return found
 
 
-def _telling(own: Sequence[Tried], case: Case) -> list[Tried]:
+def _reporting(own: Sequence[Tried], case: Case) -> list[Tried]:
     """Of a method's runs, given tightest first, those that can be compared, tightest last."""
     ladder = [own[0]]
     for run in own[1:]:

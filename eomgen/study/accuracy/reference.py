@@ -89,7 +89,7 @@ def paced(problem: Problem, t_end: float, seconds: float, progress: Progress) ->
     when it clearly takes more than `seconds` of processor time, and more than one second. The
     derivative then raises `TooLongError`: a failing step may be repeated without end.
     """
-    began, calls, told = time.process_time(), 0, throttled(progress)
+    began, calls, report = time.process_time(), 0, throttled(progress)
     allowed = max(seconds, _SOON)
 
     def derivative(t: float, y: FloatArray) -> FloatArray:
@@ -97,7 +97,7 @@ def paced(problem: Problem, t_end: float, seconds: float, progress: Progress) ->
         calls += 1
         if not calls % _LOOKS:
             done = min(max(float(t) / t_end, 0.0), 1.0)
-            told(done)
+            report(done)
             _check_pace(time.process_time() - began, done, allowed, "doubles")
         return problem.derivative(t, y)
 
@@ -131,16 +131,16 @@ def reference(
     `t_end`, or if doubles would be needed but are not allowed.
     """
     problem = problem_of(module, parameters, inputs, model)
-    told = progress or _ignore
+    report = progress or _ignore
     key = _key(module, problem, parameters, inputs, t_end, seconds, rest_speed)
     entries = folder and Entries(folder)
     kept = entries and _kept(entries.get(key))
     if kept:
-        told(1.0)
+        report(1.0)
         return kept
     began = time.monotonic()
     times = np.linspace(0.0, t_end, ROWS)
-    watched = problem if doubles else paced(problem, t_end, seconds, lambda _: told(0.0))
+    watched = problem if doubles else paced(problem, t_end, seconds, lambda _: report(0.0))
     try:
         rough = _roughly(watched, t_end, rest_speed)
     except TooLongError as reason:
@@ -150,7 +150,15 @@ def reference(
     if problem.contacts is None and seconds > 0 and model is not None:
         try:
             found = _in_long_numbers(
-                module, program_of(model), problem, parameters, inputs, times, scale, seconds, told
+                module,
+                program_of(model),
+                problem,
+                parameters,
+                inputs,
+                times,
+                scale,
+                seconds,
+                report,
             )
         except (TooLongError, ArithmeticError, ValueError) as reason:
             why = str(reason)
@@ -158,7 +166,7 @@ def reference(
         why = "rigid contacts" if problem.contacts else "as asked"
     if not (found or doubles):
         raise RunError(f"no run of {t_end:g} s in long numbers: {why}")
-    y, other, extent, origin = found or _in_doubles(problem, times, scale, rest_speed, why, told)
+    y, other, extent, origin = found or _in_doubles(problem, times, scale, rest_speed, why, report)
     scale = measure.scales(module.STATES, module.UNITS, extent)
     apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)
     spent = time.monotonic() - began
@@ -188,7 +196,7 @@ def _in_long_numbers(
         found: list[Longs] = []
         calls = count()
 
-        def told(t: float) -> None:
+        def report(t: float) -> None:
             if next(calls) % SELDOM:  # checking the time takes as long as a step
                 return
             done = before + share * t / float(times[-1])
@@ -197,7 +205,7 @@ def _in_long_numbers(
 
         exactly = precise(program, module, parameters, inputs, problem.initial, watched=True)
         with digits():
-            for row in rows(stages, exactly, problem, scale, times, tolerance, told):
+            for row in rows(stages, exactly, problem, scale, times, tolerance, report):
                 found.append(row.y)
         progress(before + share)
         return np.array(found), row
@@ -249,7 +257,7 @@ def _in_doubles(
     for i, (method, rtol) in enumerate((("DOP853", SMALLEST_RTOL), (other, 1e-12))):
         tally = Tally()
 
-        def told(done: float, i: int = i) -> None:
+        def report(done: float, i: int = i) -> None:
             progress((i + done) / 2)
 
         run = integrate(
@@ -259,7 +267,7 @@ def _in_doubles(
             rtol=rtol,
             atol=0.1 * rtol * float(np.min(scale)),
             samples=len(times),
-            progress=told,
+            progress=report,
             rest_speed=rest_speed,
             tally=tally,
         )

@@ -213,7 +213,7 @@ def _run(
     over, tally = False, Tally()
     begin = time.perf_counter()
 
-    def told(fraction: float) -> None:
+    def reported(fraction: float) -> None:
         nonlocal over
         if time.perf_counter() - begin > limit:
             over = True
@@ -230,7 +230,7 @@ def _run(
             dt=rung.dt,
             samples=None if few and rows > 2 else rows,
             rest_speed=bench.rest_speed,
-            progress=told,
+            progress=reported,
             powers=powers,
             tally=tally,
             rtol=rung.rtol or 1.0,  # equal steps ignore it

@@ -142,8 +142,8 @@ def bill(
     size: float | None = None
     changes: list[Change | None] = [None] * len(parts)
     if motion:
-        told = partial(_part_of, progress, 1.5, 2.5)
-        size, changes = _changes(whole, parts, changed, scene.simulation, motion, told)
+        reported = partial(_part_of, progress, 1.5, 2.5)
+        size, changes = _changes(whole, parts, changed, scene.simulation, motion, reported)
     return Bill(
         name=whole.model.name,
         route=whole.route,
@@ -252,8 +252,8 @@ def _changes(
     def ran(made: _Made, until: float) -> Run:
         nonlocal done
         before, done = done, done + 1
-        told = partial(_part_of, progress, before, count)
-        return run(wanted, made.module, next(shares), until, told)
+        reported = partial(_part_of, progress, before, count)
+        return run(wanted, made.module, next(shares), until, reported)
 
     base = ran(whole, inf)
     size = extent(whole.model, base)

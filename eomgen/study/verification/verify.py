@@ -132,9 +132,9 @@ def verify(
     laws = [broken(bare, module, one.state) for one in firsts if _has(one, taken)]
     progress(0.85)
     # Effects that act only for a time, as contacts do, are found by the run alone.
-    telling = [one.state for one in firsts if one.state.kind in ("random", "still")]
-    telling += [one.state for one in there if one.state.kind == OWN]
-    ran = drift(model, wanted, module, full, telling, lambda part: progress(0.88 + 0.12 * part))
+    reported = [one.state for one in firsts if one.state.kind in ("random", "still")]
+    reported += [one.state for one in there if one.state.kind == OWN]
+    ran = drift(model, wanted, module, full, reported, lambda part: progress(0.88 + 0.12 * part))
     ulps = {route: forward_ulps(there, route, bare) for route in modules}
     data = in_ulps(np.array([one.data for one in there]), there, bare)
     checks = (
