@@ -258,7 +258,7 @@ def _verification(parser: argparse.ArgumentParser) -> None:
         type=float,
         nargs="?",
         const=60.0,
-        help="say how long doubles mean anything, by a run in long numbers of at most S s (60)",
+        help="say how long doubles hold, by a run in extended precision of at most S s (60)",
     )
     parser.add_argument(
         "--save",

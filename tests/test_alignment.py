@@ -22,7 +22,7 @@ from eomgen.dynamics.regular import check_regular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program, generate
-from eomgen.precision.longs import doubles, long_digits
+from eomgen.precision.extended import doubles, extended_digits
 from eomgen.program.program import interpreter
 from eomgen.program.tape import TIME
 from eomgen.run.module import GeneratedModule, load_module
@@ -230,7 +230,7 @@ def test_fixed_rotations_are_rounded_once(seed: int) -> None:
 
 
 def about(k: int, angle: Any) -> Any:
-    """The rotation about a coordinate axis, in long numbers."""
+    """The rotation about a coordinate axis, in extended precision."""
     turned, (i, j) = mpmath.eye(3), ((k + 1) % 3, (k + 2) % 3)
     turned[i, i] = turned[j, j] = mpmath.cos(angle)
     turned[j, i] = mpmath.sin(angle)
@@ -247,9 +247,9 @@ def test_two_solvers_of_60_digits_tell_on_each_other(monkeypatch: pytest.MonkeyP
 
     def apart() -> float:
         model = elaborate(parse_scene(text))
-        with long_digits():
+        with extended_digits():
             one = FreeBodies(model, 0.0, y).vd
-            other = Truth(model).long(0.0, y, {}, {})
+            other = Truth(model).extended(0.0, y, {}, {})
             return float(np.max(doubles(abs(one - other)) / np.max(doubles(abs(one)))))
 
     assert apart() < 1e-50

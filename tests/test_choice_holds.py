@@ -54,7 +54,7 @@ def case_of(scene: str, t_end: float | None = None, **kept: Any) -> Case:
 
 
 def end_of(scene: str, t_end: float | None = None) -> FloatArray:
-    """A scene's last state in long numbers, rounded."""
+    """A scene's last state in extended precision, rounded."""
     known = closed_end(scene) if t_end is None else None
     if known is not None:
         return np.array([float(x) for x in known])
@@ -113,7 +113,9 @@ def test_constants_are_moved_by_what_rounding_did_to_them() -> None:
 
 
 def test_stiff_springs() -> None:
-    """The reference has its long numbers, and Radau is offered before explicit methods step on."""
+    """The reference has its extended precision, and Radau is offered before explicit methods step
+    on.
+    """
     case, true = case_of("slide_1e8", 0.5), end_of("slide_1e8", 0.5)
     choice = meet(case, 1e-3)
     assert choice.met and off(case, choice.tried, true) < 1e-3

@@ -84,14 +84,16 @@ def test_a_run_that_loses_digits_is_stopped_and_says_what_to_do(route: str) -> N
 
 
 def test_a_repaired_run_is_right() -> None:
-    """Against the same method all in long numbers, and against the route that loses nothing."""
+    """Against the same method all in extended precision, and against the route that loses
+    nothing.
+    """
     module, program = heavy("aba")
     guard = guard_of(module, program, repairs=True)
     repaired, plain = run(module, guard), run(module, None)
     problem = replace(unlooked(module), derivative=guard.exact)
     true = integrate(problem, "rk4", 0.1, dt=0.01).y
     scale = np.max(np.abs(true), axis=0)
-    assert repaired.finished and "were repaired by long numbers" in repaired.message
+    assert repaired.finished and "were repaired in extended precision" in repaired.message
     assert np.max(np.abs(repaired.y - true) / scale) < 1e-13
     assert np.max(np.abs(plain.y - true) / scale) > 1e-8
     sound, program = heavy("orthogonal")

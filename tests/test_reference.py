@@ -1,4 +1,4 @@
-"""References: long numbers against 60 digits, the motion against exact and published ones, and
+"""References: extended numbers against 60 digits, the motion against exact and published ones, and
 whether what is stated of its error is true.
 """
 
@@ -89,7 +89,9 @@ def long_rows(
     how: tuple[tuple[int, ...], float],
     exactly: Precise | None = None,
 ) -> np.ndarray:
-    """The motion at some times in long numbers, in parts of the scale where they are compared."""
+    """The motion at some times in extended precision, in parts of the scale where they are
+    compared.
+    """
     model, module = made
     problem = as_problem(module)
     scale = measure.scales(module.STATES, module.UNITS, np.array([problem.initial + 1.0] * 2))
@@ -101,7 +103,7 @@ def long_rows(
 
 
 def to_mp(values: np.ndarray) -> np.ndarray:
-    """Long numbers as those of mpmath, exactly."""
+    """Extended numbers as those of mpmath, exactly."""
 
     def one(x: Any) -> Any:
         mantissa, exponent = x.as_mantissa_exp()
@@ -348,10 +350,10 @@ def test_rigid_contacts_are_followed_in_doubles() -> None:
 
 
 def test_doubles_stand_in() -> None:
-    """Where there is no time for long numbers, and what is stated then is true, too."""
+    """Where there is no time for extended precision, and what is stated then is true, too."""
     made = compiled("pendulum")
     made_of = reference(*made, t_end=1.0, seconds=1e-6)
-    assert "doubles" in made_of.origin and "s in long numbers" in made_of.origin
+    assert "doubles" in made_of.origin and "s in extended precision" in made_of.origin
     rounded = np.abs(made_of.y[::10] - exact_pendulum(made_of.t[::10])) / made_of.scale
     assert float(np.max(rounded)) < made_of.error < 1e-10
 

@@ -19,7 +19,7 @@ from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program
-from eomgen.precision.longs import doubles, long, long_digits
+from eomgen.precision.extended import doubles, extended, extended_digits
 from eomgen.run.module import load_module
 from eomgen.scene.reader import find_scene
 from eomgen.scene.schema import Simulation
@@ -163,7 +163,7 @@ def test_virtual_work_agrees_with_articulated_bodies_to_55_digits(scene: str) ->
     for indices in map(list, model.quaternions):
         y[indices] /= MP.sqrt(sum(y[indices] ** 2))
     articulated = truth(np.array([0.3]), y[None])[:, 0]
-    with long_digits():
+    with extended_digits():
         vd = FreeBodies(model, 0.3, [as_long(x) for x in y]).vd
         off = abs(vd - [as_long(x) for x in articulated])
         assert max(off) <= 1e-55 * float(max(abs(vd)))
@@ -176,13 +176,13 @@ def test_virtual_work_on_all_joints_with_drive_rotor_and_spring() -> None:
     y = rng.uniform(-1, 1, len(model.coordinates) + len(model.velocities))
     for indices in map(list, model.quaternions):
         y[indices] /= np.linalg.norm(y[indices])
-    with long_digits():
-        whole = long(y)
+    with extended_digits():
+        whole = extended(y)
         for indices in map(list, model.quaternions):
             whole[indices] = whole[indices] / (whole[indices] @ whole[indices]) ** mpfr(0.5)
         vd = FreeBodies(model, 0.7, whole).vd
         # The axis 0.6, 0, 0.8 is rounded to doubles in one and made of unit length in the other.
-        off = doubles(vd - truth.long(mpfr(0.7), whole, {}, {}))
+        off = doubles(vd - truth.extended(mpfr(0.7), whole, {}, {}))
     assert np.max(np.abs(off)) <= 1e-14 * np.max(np.abs(doubles(vd)))
 
 
@@ -202,7 +202,7 @@ def test_drives_have_exact_rates_and_none_at_a_corner(
     """What is 0 is 0, not what is left of a difference; nan where the two sides differ."""
     model = model_of(SCREW.replace("0.1*sin(3*t)", formula))
     y = np.zeros(len(model.coordinates) + len(model.velocities))
-    with long_digits():
+    with extended_digits():
         free = FreeBodies(model, t, y)
         rates = (float(free.v[-1]), float(free.driven_rates[0]))
     if expected is None:
@@ -216,7 +216,7 @@ def test_kinetic_energy_of_free_bodies_has_their_mass_matrix() -> None:
     model = replace(model_of("quadruped"), outputs=())
     rng = np.random.default_rng(5)
     y = rng.uniform(-1, 1, len(model.coordinates) + len(model.velocities) + len(model.states))
-    with long_digits():
+    with extended_digits():
         free = FreeBodies(model, 0.0, y)
         twice = free.rates @ free.mass_matrix @ free.rates
         # Off the sphere of unit quaternions angular velocity is defined by its skew part alone.
@@ -436,7 +436,7 @@ def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.Mon
     assert part.time is not None and 0.1 < part.time <= 1.5
     assert part.words.startswith(f"doubles are meaningful to t = {part.time:.4g} s of 1.5 s")
     with pytest.raises(
-        RunError, match=r"^horizon: no run of 1\.5 s in .* more than 1e-06 s in long"
+        RunError, match=r"^horizon: no run of 1\.5 s in .* more than 1e-06 s in extended precision"
     ):
         horizon_of(model, wanted, module, seconds=1e-6)
     with pytest.raises(RunError, match="rigid contacts strike"):

@@ -37,7 +37,7 @@ def verify(
 
 
 def horizon(source: Source, *, seconds: float = 60.0) -> "Horizon":
-    """How long doubles mean anything, by a run in long numbers of at most so many `seconds`.
+    """How long doubles mean anything, by a run in extended precision of at most so many `seconds`.
 
     Raises `RunError` for an argument that cannot be served.
     """

@@ -1,11 +1,11 @@
-"""The guard of a module's runs: its own steps over long numbers; see `run.guard`."""
+"""The guard of a module's runs: its own steps in extended precision; see `run.guard`."""
 
 from typing import Any
 
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.precision.longs import BITS
+from eomgen.precision.extended import BITS
 from eomgen.precision.precise import digits, precise
 from eomgen.program.program import Program
 from eomgen.run.guard import LOST, Guard

@@ -2,7 +2,7 @@
 
 The numbers are MPFR's, correctly rounded, of as many bits as IEEE 754's quadruple precision: 34
 decimal digits. Parameters, inputs and the initial state enter as the doubles they are; all that is
-computed from them, what depends on parameters alone included, is computed in long numbers.
+computed from them, what depends on parameters alone included, is computed in extended precision.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,12 +21,14 @@ from eomgen.scalars.functions import CORNERS
 
 BITS = 113
 """Of the significand: unit roundoff 2^-113 = 1e-34."""
-Long = Any
+Extended = Any
 """A number of `BITS` bits, an `mpfr`, which has no type of its own for type checkers."""
 
 
 def digits(bits: int = BITS) -> Any:
-    """A `with` block in which long numbers have this many bits; what has no value is nan there."""
+    """A `with` block in which extended numbers have this many bits; what has no value is nan
+    there.
+    """
     return gmpy2.context(precision=bits)
 
 
@@ -42,15 +44,15 @@ class CornerBranches:
 
     def __init__(self) -> None:
         self.branches: list[bool] = []
-        self.margins: list[Long] = []
+        self.margins: list[Extended] = []
 
-    def _branch(self, margin: Long) -> bool:
+    def _branch(self, margin: Extended) -> bool:
         if len(self.margins) == len(self.branches):
             self.branches.append(bool(margin > 0))
         self.margins.append(margin)
         return self.branches[len(self.margins) - 1]
 
-    def functions(self) -> dict[str, Callable[..., Long]]:
+    def functions(self) -> dict[str, Callable[..., Extended]]:
         """The functions that have corners, on the branches that are held."""
         branch = self._branch
         one, zero = mpfr(1), mpfr(0)
@@ -67,16 +69,16 @@ class CornerBranches:
 
 @dataclass(frozen=True, eq=False)
 class Precise:
-    """y' = f(t, y) in long numbers, to be used within `digits()`.
+    """y' = f(t, y) in extended precision, to be used within `digits()`.
 
-    derivative  f(t, y), ny long numbers; t and y long
+    derivative  f(t, y), ny extended numbers; t and y extended
     initial     (ny,), the initial state of doubles
     corner_branches
                 the branch that each corner takes; None where there are none
     """
 
-    derivative: Callable[[Long, Sequence[Long]], Sequence[Long]]
-    initial: tuple[Long, ...]
+    derivative: Callable[[Extended, Sequence[Extended]], Sequence[Extended]]
+    initial: tuple[Extended, ...]
     corner_branches: CornerBranches | None
 
 
@@ -90,7 +92,7 @@ def precise(
     watched: bool = False,
     bits: int = BITS,
 ) -> Precise:
-    """A program's derivative over long numbers, at given parameters and inputs.
+    """A program's derivative in extended precision, at given parameters and inputs.
 
     module              what was generated of the program; it tells names, order and defaults
     parameters, inputs  as `module.derivative` takes them; they must be valid there
@@ -104,12 +106,12 @@ def precise(
     functions = {**BY_MPFR, **(corner_branches.functions() if corner_branches else {})}
     called = [functions[name] for name in found.functions]
     with digits(bits):
-        known = found.known_values(_long(parameters, module.PARAMETERS), Bits())
-        fixed = _long(inputs, module.INPUTS)
+        known = found.known_values(_extended(parameters, module.PARAMETERS), Bits())
+        fixed = _extended(inputs, module.INPUTS)
         start = tuple(map(mpfr, initial.tolist()))
     places = {name: i for i, name in enumerate(module.STATES)}
 
-    def derivative(t: Long, y: Sequence[Long]) -> Sequence[Long]:
+    def derivative(t: Extended, y: Sequence[Extended]) -> Sequence[Extended]:
         if corner_branches:
             corner_branches.margins = []
         return found.moving(known, [take(t, y) for take in taken], called)
@@ -119,8 +121,8 @@ def precise(
 
 
 def _taken(
-    name: str, places: Mapping[str, int], fixed: Mapping[str, Long]
-) -> Callable[[Long, Sequence[Long]], Long]:
+    name: str, places: Mapping[str, int], fixed: Mapping[str, Extended]
+) -> Callable[[Extended, Sequence[Extended]], Extended]:
     """What finds an input of the program at a time and a state."""
     if name in places:
         place = places[name]
@@ -132,13 +134,15 @@ def _taken(
     return lambda t, y: t
 
 
-def exact_parameters(module: Any, parameters: Any) -> dict[str, Long]:
-    """Parameters as a module takes them, by name, as long numbers; to be used within `digits()`."""
-    return _long(parameters, module.PARAMETERS)
+def exact_parameters(module: Any, parameters: Any) -> dict[str, Extended]:
+    """Parameters as a module takes them, by name, as extended numbers; to be used within
+    `digits()`.
+    """
+    return _extended(parameters, module.PARAMETERS)
 
 
-def _long(given: Any, defaults: Mapping[str, float]) -> dict[str, Long]:
-    """Values by name, in order, or None for the defaults, as long numbers by name."""
+def _extended(given: Any, defaults: Mapping[str, float]) -> dict[str, Extended]:
+    """Values by name, in order, or None for the defaults, as extended numbers by name."""
     if given is None:
         values = dict(defaults)
     elif hasattr(given, "keys"):

@@ -87,7 +87,7 @@ def check_rest_speed(rest_speed: float | None) -> None:
 
 
 def check_repairs(problem: Problem, resumed: bool) -> None:
-    """Raise `RunError` for a run that long numbers cannot repair."""
+    """Raise `RunError` for a run that extended numbers cannot repair."""
     if problem.contacts is not None:
         raise RunError("guard: what contacts do cannot be repaired; let it stop instead (--guard)")
     if resumed:

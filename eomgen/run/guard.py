@@ -5,8 +5,8 @@ a digit for each decade of their masses, and its residual none. So the residual 
 that of the derivative itself, ẏ - f(t, y), with f the same equations in numbers that are long
 enough; it is the forward error of v̇ and of all else that goes into the step. It is asked for at
 every state that a step ends in, so that no row is kept that was not looked at. One evaluation in
-long numbers takes as long as 8 to 17 of doubles, a step of DOP853 12: a guarded run takes half as
-long again by DOP853, and three to five times as long by rk4, whose steps are short.
+extended numbers takes as long as 8 to 17 of doubles, a step of DOP853 12: a guarded run takes half
+as long again by DOP853, and three to five times as long by rk4, whose steps are short.
 """
 
 import math
@@ -36,7 +36,7 @@ FULL = 16.0
 class Guard:
     """What watches a run.
 
-    exact    f(t, y) -> (ny,), the derivative by long numbers, nan where it has no value there
+    exact    f(t, y) -> (ny,), the derivative in extended precision, nan where it has no value there
     groups   of states that share a unit, whose rates are measured by the greatest of them
     bound    relative error of the derivative beyond which digits are lost
     repairs  go on by `exact` where digits are lost, instead of stopping
@@ -70,8 +70,8 @@ class RoundingMonitor:
     def loss(self, t: float, y: FloatArray) -> float:
         """Relative error of the problem's own derivative; infinite where it is not finite.
 
-        Raises `StepFailure` where there is no value in long numbers either, and for a quaternion
-        that has left unit length.
+        Raises `StepFailure` where there is no value in extended precision either, and for a
+        quaternion that has left unit length.
         """
         for indices in self.problem.quaternions:
             off = math.hypot(*(float(y[i]) for i in indices)) - 1.0
@@ -122,7 +122,7 @@ class RoundingMonitor:
         times = f", {len(self.stretches)} times" if len(self.stretches) > 1 else ""
         return (
             f"digits lost between t = {begin:.6g} and {end:.6g} s{times} (relative error up to "
-            f"{worst:.2g}) were repaired by long numbers"
+            f"{worst:.2g}) were repaired in extended precision"
         )
 
 
@@ -140,10 +140,11 @@ def monitored(
 def repaired(
     monitor: RoundingMonitor, begin: Begin, problem: Problem, t: float, max_steps: int
 ) -> Iterator[Advance]:
-    """Steps of a problem from time t on, in doubles where they hold, in long numbers elsewhere.
+    """Steps of a problem from time t on, in doubles where they hold, in extended precision
+    elsewhere.
 
-    A step whose end has lost digits is made again from where it began, in long numbers, and so are
-    those after it up to where doubles are good again.
+    A step whose end has lost digits is made again from where it began, in extended precision, and
+    so are those after it up to where doubles are good again.
     """
     y, made = problem.initial, 0
     monitor.repairing = False

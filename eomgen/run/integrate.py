@@ -109,7 +109,7 @@ def integrate(
     remarks: list[str] = []
     if isinstance(method, FixedStep):
         # What is looked at on the way does not count.
-        # Where long numbers repair what doubles lose, their Jacobian has lost its digits, too.
+        # Where extended numbers repair what doubles lose, their Jacobian has lost its digits, too.
         unseen = unstable or not method.explicit or (monitor and monitor.guard.repairs)
         looked_at = None if unseen else problem
         begin, remembered = equal_steps(asked, method, counted, looked_at)

@@ -1,4 +1,4 @@
-"""What equations are computed over: floats, arrays, long numbers, tape nodes, symbols, duals.
+"""What equations are computed over: floats, arrays, extended numbers, tape nodes, symbols, duals.
 
 Formulas, recursions and programs are written once over an abstract scalar. They add, subtract,
 multiply, divide and negate scalars with the operators of Python; all else they ask of `Scalars`.

@@ -196,7 +196,7 @@ def main() -> None:
     parser.add_argument("scenes", nargs="*")
     parser.add_argument("--own", action="store_true", help="scenes that are not built in")
     parser.add_argument("--keep", type=Path, default=Path("out/choosing"))
-    parser.add_argument("--reference", type=float, default=120.0, help="s for long numbers")
+    parser.add_argument("--reference", type=float, default=120.0, help="s for extended precision")
     parser.add_argument("--methods", default=METHODS, help="for the quickest run")
     given = parser.parse_args()
     given.keep.mkdir(parents=True, exist_ok=True)

@@ -21,14 +21,14 @@ import scipy.linalg
 from gmpy2 import mpfr
 from numpy.typing import NDArray
 
-from eomgen.precision.precise import BITS, CornerBranches, Long, Precise, digits
+from eomgen.precision.precise import BITS, CornerBranches, Extended, Precise, digits
 from eomgen.run.integrators.unwarned import factors
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.study.accuracy import corners
 from eomgen.study.accuracy.corners import Turn
 from eomgen.study.accuracy.forecast import Forecast, NoStep
 
-Longs = NDArray[np.object_]
+ExtendedArray = NDArray[np.object_]
 """An array of extended-precision numbers."""
 MANY = 40
 """From so many states on, one Jacobian serves all stages of a step."""
@@ -56,10 +56,10 @@ class Gauss:
           polynomial's derivative in normalised Legendre polynomials
     """
 
-    c: Longs
-    a: Longs
-    d: Longs
-    fall: Longs
+    c: ExtendedArray
+    a: ExtendedArray
+    d: ExtendedArray
+    fall: ExtendedArray
 
 
 @cache
@@ -97,7 +97,7 @@ def gauss(stages: int) -> Gauss:
         return Gauss(*(x * mpfr(1) for x in exact))
 
 
-def _slope(nodes: list[Long], i: int, j: int) -> Long:
+def _slope(nodes: list[Extended], i: int, j: int) -> Extended:
     """The derivative at node j of the polynomial that is 1 at node i and 0 at 0 and other nodes."""
     x = nodes[j]
     others = [mpfr(0), *(c for c in nodes if c is not nodes[i])]
@@ -107,7 +107,7 @@ def _slope(nodes: list[Long], i: int, j: int) -> Long:
     return math.prod((x - c) / (nodes[i] - c) for c in rest) / (nodes[i] - x)
 
 
-def _legendre(degree: int, x: Long) -> list[Long]:
+def _legendre(degree: int, x: Extended) -> list[Extended]:
     """P_0(x) … P_degree(x), by the three-term recurrence."""
     values = [mpfr(1), x]
     for k in range(1, degree):
@@ -125,7 +125,7 @@ class Step:
     extent   (2, ny): least and greatest value of each state at its stages and its end
     """
 
-    y: Longs
+    y: ExtendedArray
     error: float
     margins: FloatArray
     extent: FloatArray
@@ -137,9 +137,9 @@ def advance(
     problem: Problem,
     forecast: Forecast,
     scale: FloatArray,
-    t: Long,
-    y: Longs,
-    h: Long,
+    t: Extended,
+    y: ExtendedArray,
+    h: Extended,
     tolerance: float,
 ) -> Step:
     """One step of length h, s, from y at t; its stages are corrected to a part of the tolerance.
@@ -208,7 +208,7 @@ def _in_doubles(
     return states
 
 
-def _margins(precise: Precise, t: Long, y: Longs) -> list[Long]:
+def _margins(precise: Precise, t: Extended, y: ExtendedArray) -> list[Extended]:
     assert precise.corner_branches is not None
     precise.derivative(t, y.tolist())
     return precise.corner_branches.margins
@@ -250,7 +250,7 @@ def _solver(
     return solve_each
 
 
-def _error(method: Gauss, moves: Longs, scale: FloatArray) -> float:
+def _error(method: Gauss, moves: ExtendedArray, scale: FloatArray) -> float:
     """Estimated error at the end of a step, relative to the scale, from the decay of the Legendre
     coefficients of the derivative.
 
@@ -269,12 +269,14 @@ def _error(method: Gauss, moves: Longs, scale: FloatArray) -> float:
 class _Way:
     """The current state of the integration, and the length and stages of the next step."""
 
-    def __init__(self, ladder: Sequence[int], t: Long, y: Longs, length: Long) -> None:
+    def __init__(
+        self, ladder: Sequence[int], t: Extended, y: ExtendedArray, length: Extended
+    ) -> None:
         self.t, self.y, self.length, self.made = t, y, length, 0
         self.extent = np.array([y.astype(float)] * 2)
         self.ladder, self.stages = ladder, ladder[-1]
 
-    def take(self, h: Long, step: Step, tolerance: float, *, spare: bool) -> None:
+    def take(self, h: Extended, step: Step, tolerance: float, *, spare: bool) -> None:
         """Go on to the end of a step. `spare`: the next row, not its error, limited its length."""
         self.t, self.y, self.made = self.t + h, step.y, self.made + 1
         self.extent[0] = np.minimum(self.extent[0], step.extent[0])
@@ -288,7 +290,7 @@ class _Way:
         elif serve:
             self.stages = fewer
 
-    def again(self, h: Long, error: float, tolerance: float) -> None:
+    def again(self, h: Extended, error: float, tolerance: float) -> None:
         """Prepare to repeat a step: with the most stages, or with a shorter step.
 
         Raises `NoStep` if the step becomes too short.
@@ -314,7 +316,7 @@ class Row:
     extent  (2, ny): least and greatest value of each state so far
     """
 
-    y: Longs
+    y: ExtendedArray
     steps: int
     extent: FloatArray
 

@@ -32,7 +32,7 @@ from eomgen.run.progress import Progress, throttled
 from eomgen.run.tally import Tally
 from eomgen.store import program_of
 from eomgen.study.accuracy import measure
-from eomgen.study.accuracy.collocation import Longs, Row, rows
+from eomgen.study.accuracy.collocation import ExtendedArray, Row, rows
 from eomgen.study.diagnosis import problem_of
 
 ROWS = 201
@@ -165,7 +165,7 @@ def reference(
     else:
         why = "rigid contacts" if problem.contacts else "as asked"
     if not (found or doubles):
-        raise RunError(f"no run of {t_end:g} s in long numbers: {why}")
+        raise RunError(f"no run of {t_end:g} s in extended precision: {why}")
     y, other, extent, origin = found or _in_doubles(problem, times, scale, rest_speed, why, report)
     scale = measure.scales(module.STATES, module.UNITS, extent)
     apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)
@@ -192,8 +192,8 @@ def _in_long_numbers(
 
     def run(
         stages: tuple[int, ...], tolerance: float, before: float, share: float
-    ) -> tuple[Longs, Row]:
-        found: list[Longs] = []
+    ) -> tuple[ExtendedArray, Row]:
+        found: list[ExtendedArray] = []
         calls = count()
 
         def report(t: float) -> None:
@@ -201,7 +201,7 @@ def _in_long_numbers(
                 return
             done = before + share * t / float(times[-1])
             progress(done)
-            _check_pace(time.process_time() - began, done, seconds, "long numbers")
+            _check_pace(time.process_time() - began, done, seconds, "extended precision")
 
         exactly = precise(program, module, parameters, inputs, problem.initial, watched=True)
         with digits():

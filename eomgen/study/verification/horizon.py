@@ -75,7 +75,9 @@ def horizon(
     t_end = wanted.t_end
     problem = problem_of(module, parameters, inputs, model)
     if problem.contacts is not None:
-        raise RunError("horizon: rigid contacts strike, and there is no run in long numbers then")
+        raise RunError(
+            "horizon: rigid contacts strike, and there is no run in extended precision then"
+        )
     try:
         true = reference(
             model,

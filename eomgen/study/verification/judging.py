@@ -15,7 +15,7 @@ import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.longs import Array, doubles, long, long_digits, solved
+from eomgen.precision.extended import Array, doubles, extended, extended_digits, solved
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.scene.effects import Gravity
@@ -79,9 +79,9 @@ def judged(
     None if there is no finite acceleration in 60 digits.
     """
     rng = np.random.default_rng(len(state.label))
-    with long_digits():
+    with extended_digits():
         exact = _vd(truth, state, {})
-        whole = long(state.y)
+        whole = extended(state.y)
         for indices in map(list, model.quaternions):
             # Two formulas of a rotation differ for a quaternion that rounding made off unit length.
             whole[indices] = whole[indices] / _root(whole[indices] @ whole[indices])
@@ -95,13 +95,13 @@ def judged(
             return None
         if not all(_finite(vd) for vd in (exact, other, *moved)):
             return None
-        recorded = truth.long(mpfr(state.t), whole, state.u, {})
+        recorded = truth.extended(mpfr(state.t), whole, state.u, {})
         agreed = _agreed(free, recorded)
         data = np.max([abs(vd - other) for vd in moved], axis=0)
         found = {route: _derivative(module, state) for route, module in modules.items()}
         nq, nv = len(model.coordinates), len(model.velocities)
         vd = {route: ydot[nq : nq + nv] for route, ydot in found.items()}
-        off = {route: doubles(long(x) - exact) for route, x in vd.items()}
+        off = {route: doubles(extended(x) - exact) for route, x in vd.items()}
         residuals = _residuals(free, near, vd, model)
         losses = _outputs(free, near, (modules[taken], full), found[taken], state)
         return Judged(
@@ -117,17 +117,17 @@ def judged(
 
 
 def _vd(truth: Truth, state: State, parameters: Mapping[str, Any]) -> Array:
-    return truth.long(mpfr(state.t), state.y, state.u, parameters)
+    return truth.extended(mpfr(state.t), state.y, state.u, parameters)
 
 
 def _changed(values: Any, rng: np.random.Generator) -> Any:
     """Numbers, in a sequence or by name, each changed by up to one ulp, up or down."""
     if isinstance(values, dict):
-        made = _changed(long(list(values.values())), rng)
+        made = _changed(extended(list(values.values())), rng)
         return dict(zip(values, made, strict=True))
     signs = rng.choice((-ULP, ULP), size=len(values))
     # The sizes differ, so that two numbers that nearly cancel do not change by the same amount.
-    return values * (1 + long(signs * rng.uniform(0.25, 1.0, size=len(values))))
+    return values * (1 + extended(signs * rng.uniform(0.25, 1.0, size=len(values))))
 
 
 def _agreed(free: FreeBodies, vd: Array) -> float:
@@ -135,7 +135,7 @@ def _agreed(free: FreeBodies, vd: Array) -> float:
     terms of each row: if these cancel, v̇ is only a rounding error. A row with tiny terms is
     compared with a part of the greatest row, in units of its own inertia.
     """
-    root = long([_root(x) for x in np.diag(free.mass_matrix)])
+    root = extended([_root(x) for x in np.diag(free.mass_matrix)])
     off = abs(_needed(free, vd)) / root
     terms = (abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes) / root
     terms = np.maximum(terms, HARDLY * np.max(terms))
@@ -164,8 +164,8 @@ def _residuals(
         largest = {
             u: max(abs(x) for x, w in zip(given, units, strict=True) if w == u) for u in units
         }
-        sizes = long([largest[u] for u in units])
-        v = long(given)
+        sizes = extended([largest[u] for u in units])
+        v = extended(given)
         scale = abs(free.mass_matrix) @ sizes + free.bias_sizes + free.applied_sizes
         true, *changed = (_needed(f, v) for f in (free, *near))
         found[route] = _loss(0.0 * given, true, changed, scale)
@@ -204,8 +204,8 @@ def _outputs(
         given = asked(name) if name != "body_poses" else _matrices(asked(name), free.dimensions)
         found[name] = _loss(given, true, changes, scale)
     at = doubles(free.vd)
-    true, *changes = (_needed(f, long(at)) for f in (free, *near))
-    scale = abs(free.mass_matrix) @ abs(long(at)) + free.bias_sizes + free.applied_sizes
+    true, *changes = (_needed(f, extended(at)) for f in (free, *near))
+    scale = abs(free.mass_matrix) @ abs(extended(at)) + free.bias_sizes + free.applied_sizes
     found["inverse_dynamics"] = _loss(asked("inverse_dynamics", at), true, changes, scale)
     rest = [*range(nq), *range(nq + nv, len(state.y))]
     true, *changes = (f.state_rates[rest] for f in (free, *near))
@@ -218,7 +218,7 @@ def _quantities(
     free: FreeBodies, near: Sequence[FreeBodies]
 ) -> dict[str, tuple[Array, list[Array], Array]]:
     """Of each output: its value, its values for the changed data, and its scale."""
-    root = long([_root(x) for x in np.diag(free.mass_matrix)])
+    root = extended([_root(x) for x in np.diag(free.mass_matrix)])
     mass = sum((free.mass(name) for name in free.bodies), mpfr(0))
     potential = np.sum(abs(free.potential_energies), initial=mpfr(0))
     for effect in free.model.effects:
@@ -234,7 +234,7 @@ def _quantities(
         "potential_energy": potential,
         "momentum": free.momentum_sizes,
         "effect_powers": free.effect_powers[1],
-        "body_poses": np.concatenate([long(one), free.reach * long(one[:, :, :1])], axis=2),
+        "body_poses": np.concatenate([extended(one), free.reach * extended(one[:, :, :1])], axis=2),
     }
     if not free.model.effects:
         del scales["effect_powers"]
@@ -247,10 +247,10 @@ def _quantities(
                 values.append(np.array(places).reshape(-1, 3, 4))
             else:
                 value = getattr(f, name)
-                values.append(long(value[0] if name == "effect_powers" else value))
+                values.append(extended(value[0] if name == "effect_powers" else value))
         if name == "momentum" and free.dimensions == 2:
             values, scale = [x[[0, 1, 5]] for x in values], scale[[0, 1, 5]]
-        found[name] = (values[0], values[1:], long(scale))
+        found[name] = (values[0], values[1:], extended(scale))
     return found
 
 
@@ -270,7 +270,7 @@ def _loss(given: Any, true: Array, changes: Sequence[Array], scale: Array) -> Lo
     if not np.isfinite(given).all():
         return Loss(np.inf, 0.0)
     data = max(ulps(changed - true, scale) for changed in changes)
-    return Loss(ulps(long(given) - true, scale), data)
+    return Loss(ulps(extended(given) - true, scale), data)
 
 
 def ulps(off: Array, scale: Array) -> float:
@@ -289,10 +289,10 @@ def ulps(off: Array, scale: Array) -> float:
 
 def _condition(matrix: Array) -> tuple[float, float]:
     """Condition number and smallest pivot of a matrix scaled to a diagonal of ones."""
-    root = long([_root(x) for x in np.diag(matrix)])
+    root = extended([_root(x) for x in np.diag(matrix)])
     scaled = matrix / np.outer(root, root)
     n = len(scaled)
-    inverse = solved(scaled, long(np.eye(n)))
+    inverse = solved(scaled, extended(np.eye(n)))
     # Doubles give the largest eigenvalue of a matrix accurately, but not the smallest.
     condition = np.linalg.eigvalsh(doubles(scaled))[-1] * np.linalg.eigvalsh(doubles(inverse))[-1]
     rest, pivots = scaled.copy(), []

@@ -12,8 +12,8 @@ import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.longs import NOTHING, Array, long, long_digits, zeros
-from eomgen.precision.precise import Long
+from eomgen.precision.extended import NOTHING, Array, extended, extended_digits, zeros
+from eomgen.precision.precise import Extended
 from eomgen.run.module import GeneratedModule
 from eomgen.scene.effects import Driven
 from eomgen.scene.effects.base import JointLoad
@@ -70,10 +70,10 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
     """The errors of all laws that apply, at a state where the module has a derivative."""
     ydot = module.derivative(state.t, state.y, None, state.u or None)
     nq, nv = len(model.coordinates), len(model.velocities)
-    with long_digits():
-        y = _unit(model, long(state.y))
+    with extended_digits():
+        y = _unit(model, extended(state.y))
         free = FreeBodies(model, state.t, y, state.u)
-        vd = long(ydot[nq : nq + nv])
+        vd = extended(ydot[nq : nq + nv])
         # Coordinates follow the velocities exactly: rounding of their rates is checked elsewhere.
         way = np.concatenate([free.state_rates[:nq], vd, free.state_rates[nq + nv :]])
         ahead, behind, step = _beside(model, state, y, way)
@@ -90,7 +90,7 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
             if model.driven:
                 power += free.driving_forces(vd) @ free.rates[nv:]
                 scale += free.driving_sizes(vd) @ abs(free.rates[nv:])
-            energy = ulps(long([change - power]), long([scale]))
+            energy = ulps(extended([change - power]), extended([scale]))
         if not why_no_momentum_law(model):
             change = (ahead.momentum - behind.momentum) / step
             outside, sizes = _outside(free)
@@ -110,7 +110,7 @@ def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -
     if not hasattr(module, "jacobian"):
         return None
     rng = np.random.default_rng(1)
-    way = long(rng.uniform(0.5, 1.0, len(y)) * rng.choice((-1.0, 1.0), len(y)))
+    way = extended(rng.uniform(0.5, 1.0, len(y)) * rng.choice((-1.0, 1.0), len(y)))
     for indices in map(list, model.quaternions):  # tangent to the sphere of unit quaternions
         way[indices] = way[indices] - y[indices] * (way[indices] @ y[indices])
     ahead, behind, step = _beside(model, state, y, way, still=True)
@@ -122,7 +122,7 @@ def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -
     given = module.jacobian(state.t, state.y, None, state.u or None)
     if not np.isfinite(given).all():
         return float("inf")
-    slopes = long(given)
+    slopes = extended(given)
     nq, nv = len(model.coordinates), len(model.velocities)
     scale = abs(slopes) @ abs(way) + abs(change)
     rows = [c.unit for c in model.velocities]
@@ -135,7 +135,7 @@ def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -
 
 def _beside(
     model: Model, state: State, y: Array, way: Array, *, still: bool = False
-) -> tuple[FreeBodies, FreeBodies, Long]:
+) -> tuple[FreeBodies, FreeBodies, Extended]:
     """The model a small step ahead along the rates `way` and one behind, and the time between, s.
 
     Time advances by the same step unless `still`.
@@ -192,9 +192,9 @@ def kept(model: Model, states: Sequence[State]) -> Kept:
     if model.dimensions == 2:
         names = ["x", "y", "", "", "", "about z"]
     lost = [not (name and states) for name in names]
-    with long_digits():
+    with extended_digits():
         for state in states:
-            y = _unit(model, long(state.y))
+            y = _unit(model, extended(state.y))
             free = FreeBodies(model, state.t, y, {})
             still = replace(state, u={})
             ahead, behind, step = _beside(model, still, y, free.state_rates)
@@ -221,7 +221,7 @@ def kept(model: Model, states: Sequence[State]) -> Kept:
     )
 
 
-def _is_nothing(rate: Long, scale: Long) -> bool:
+def _is_nothing(rate: Extended, scale: Extended) -> bool:
     return bool(abs(rate) <= NOTHING * scale)
 
 

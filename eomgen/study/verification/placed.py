@@ -12,8 +12,8 @@ from gmpy2 import mpfr
 
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import JointIndex, Model, dofs_of
-from eomgen.precision.longs import Array, along, long, zeros
-from eomgen.precision.precise import Long
+from eomgen.precision.extended import Array, along, extended, zeros
+from eomgen.precision.precise import Extended
 from eomgen.scalars.extended import Bits
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints import Free
@@ -31,7 +31,7 @@ there is a jump."""
 
 class Placed:
     """A model at a time and a state y = [q, v, x] of form 'velocity'. Quantities are computed on
-    demand, and only within `long_digits()`.
+    demand, and only within `extended_digits()`.
 
     y           (ny,), doubles or extended-precision numbers
     inputs      by name; 0 if not given
@@ -52,18 +52,18 @@ class Placed:
         self.bodies = tuple(body.name for body in model.bodies)
         self.nv = len(model.velocities)
         self.moved = self.nv + len(model.driven)
-        self._parameters = _longs({**model.defaults, **(parameters or {})})
+        self._parameters = _all_extended({**model.defaults, **(parameters or {})})
         nothing = dict.fromkeys((i.name for i in model.inputs), 0.0)
-        self._inputs = _longs({**nothing, **(inputs or {})})
+        self._inputs = _all_extended({**nothing, **(inputs or {})})
         self._time = mpfr(t)
-        y, nq = long(y), len(model.coordinates)
+        y, nq = extended(y), len(model.coordinates)
         given = [self._prescribed(c.value) for c in model.prescribed]
         for n, c in enumerate(model.prescribed):
             if (degrees := dict(model.locked_deg).get(c.position.name)) is not None:
                 given[n] = (mpfr(degrees) * gmpy2.const_pi() / 180, *given[n][1:])
-        self.q: list[Long] = [*y[:nq], *(x for x, _, _ in given)]
-        self.v: list[Long] = [*y[nq : nq + self.nv], *(v for _, v, _ in given)]
-        self.driven_rates = long([a for _, _, a in given[: len(model.driven)]])
+        self.q: list[Extended] = [*y[:nq], *(x for x, _, _ in given)]
+        self.v: list[Extended] = [*y[nq : nq + self.nv], *(v for _, v, _ in given)]
+        self.driven_rates = extended([a for _, _, a in given[: len(model.driven)]])
         names = (x.name for x in model.states)
         self._states = dict(zip(names, y[nq + self.nv :], strict=True))
         self.index = {name: k for k, name in enumerate(self.bodies)}
@@ -81,11 +81,11 @@ class Placed:
         """The joints that move, except free ones, each with the kinds of its degrees of freedom."""
         return dofs_of(self.model.bodies, self.dimensions)
 
-    def mass(self, body: str) -> Long:
+    def mass(self, body: str) -> Extended:
         """Mass of a body, kg."""
         return self.value(self.model.bodies[self.index[body]].mass)
 
-    def height(self, body: str) -> Long:
+    def height(self, body: str) -> Extended:
         """Height of a body's centre of mass, m: world y in the plane, world z in space."""
         return self.poses[self.index[body]].place[self.dimensions - 1]
 
@@ -120,7 +120,7 @@ class Placed:
             return vector
         return self._cut(self.poses[self.index[body]].turn @ self.in_space(vector))
 
-    def coordinate(self, joint: str, index: int = 0) -> Long:
+    def coordinate(self, joint: str, index: int = 0) -> Extended:
         """A coordinate of a joint."""
         return self.q[self.joint_indices[joint].q[index]]
 
@@ -128,32 +128,32 @@ class Placed:
         """The name of a coordinate of a joint."""
         return self.joint_indices[joint].body.positions[index].name
 
-    def rate(self, joint: str, index: int = 0) -> Long:
+    def rate(self, joint: str, index: int = 0) -> Extended:
         """A velocity of a joint."""
         return self.v[self.joint_indices[joint].v[index]]
 
-    def value(self, formula: Formula, **names: Long) -> Long:
+    def value(self, formula: Formula, **names: Extended) -> Extended:
         """The value of a formula."""
         return evaluate(formula, {**self._names, **names} if names else self._names, self.scalars)
 
-    def input(self, name: str) -> Long:
+    def input(self, name: str) -> Extended:
         """The value of an input."""
         return self._inputs[name]
 
-    def state(self, name: str) -> Long:
+    def state(self, name: str) -> Extended:
         """The value of an extra state."""
         return self._states[name]
 
-    def number(self, value: Any) -> Long:
+    def number(self, value: Any) -> Extended:
         """A number in extended precision."""
         return self.scalars.number(value)
 
-    def call(self, function: str, *arguments: Long) -> Long:
+    def call(self, function: str, *arguments: Extended) -> Extended:
         """The value of a function of formulas."""
         return self.scalars.call(function, *arguments)
 
     @cached_property
-    def _names(self) -> dict[str, Long]:
+    def _names(self) -> dict[str, Extended]:
         model = self.model
         positions = (*model.coordinates, *(c.position for c in model.prescribed))
         velocities = (*model.velocities, *(c.velocity for c in model.prescribed))
@@ -166,7 +166,7 @@ class Placed:
             **self._parameters,
         }
 
-    def _prescribed(self, formula: Formula) -> tuple[Long, Long, Long]:
+    def _prescribed(self, formula: Formula) -> tuple[Extended, Extended, Extended]:
         """Value, rate and acceleration of a formula of time; the last two are nan at a corner."""
         h = _INSTANT
         with gmpy2.context(precision=_BITS):
@@ -187,7 +187,7 @@ class Placed:
 
     def in_space(self, vector: Sequence[Any]) -> Array:
         """A vector in the plane or in space as one in space, (3,)."""
-        return long([*vector, *(0.0,) * (3 - len(vector))])
+        return extended([*vector, *(0.0,) * (3 - len(vector))])
 
     def _cut(self, vector: Array) -> Vector:
         return tuple(vector[: self.dimensions])
@@ -197,7 +197,7 @@ class Placed:
     @cached_property
     def rates(self) -> Array:
         """The velocities of the state, then the driven ones, (m,)."""
-        return long(self.v[: self.moved])
+        return extended(self.v[: self.moved])
 
     @cached_property
     def felt(self) -> Array:
@@ -237,10 +237,10 @@ class Placed:
     def _made(self, pose: Pose, primitive: Primitive, index: JointIndex, i: int) -> Pose:
         """The pose after one primitive of a joint."""
         if primitive.kind == "spherical":
-            quaternion = long([self.q[j] for j in index.quaternion])
+            quaternion = extended([self.q[j] for j in index.quaternion])
             turn, turn_v, turn_b = spun(quaternion, index.spin, self.felt)
             return pose.turned(turn, turn_v, turn_b, self.felt)
-        axis = long(primitive.axis)
+        axis = extended(primitive.axis)
         axis = axis / gmpy2.sqrt(axis @ axis)
         x, column = self.q[index.q[i]], index.v[i] if index.v[i] < self.moved else None
         if primitive.kind == "prismatic":
@@ -254,5 +254,5 @@ class Placed:
         return along(self.rates, self.poses[body].spin_v)
 
 
-def _longs(values: Mapping[str, Any]) -> dict[str, Long]:
+def _all_extended(values: Mapping[str, Any]) -> dict[str, Extended]:
     return {name: mpfr(value) for name, value in values.items()}

@@ -10,8 +10,8 @@ import gmpy2
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.precision.longs import Array, along, eye, long, zeros
-from eomgen.precision.precise import Long
+from eomgen.precision.extended import Array, along, extended, eye, zeros
+from eomgen.precision.precise import Extended
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Pose:
             self.place_b + self.turn_b @ arm,
         )
 
-    def slid(self, axis: Array, way: Long, column: int | None, rate: Array) -> "Pose":
+    def slid(self, axis: Array, way: Extended, column: int | None, rate: Array) -> "Pose":
         """The pose moved by `way`, m, along an axis in its axes; its velocity is `column`."""
         there = self.moved(axis * way)
         if column is None:
@@ -94,10 +94,10 @@ def _axial(m: Array) -> Array:
     return np.stack([m[..., i, j] - m[..., j, i] for i, j in pairs], axis=-1) / mpfr(2)
 
 
-def about(axis: Array, c: Long, s: Long) -> Array:
+def about(axis: Array, c: Extended, s: Extended) -> Array:
     """Rotation about a unit vector by the angle with cosine c and sine s (Rodrigues' formula)."""
     x, y, z = axis
-    cross = long([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = extended([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     along = np.outer(axis, axis)
     return (eye() - along) * c + cross * s + along
 
@@ -108,7 +108,7 @@ def orientation(degrees: float | tuple[float, float, float]) -> Array:
     turn = eye()
     for axis, angle in zip(np.eye(3), angles, strict=True):
         radians = mpfr(angle) * gmpy2.const_pi() / 180
-        turn = about(long(axis), gmpy2.cos(radians), gmpy2.sin(radians)) @ turn
+        turn = about(extended(axis), gmpy2.cos(radians), gmpy2.sin(radians)) @ turn
     return turn
 
 
@@ -124,14 +124,14 @@ def _bilinear(a: Array, b: Array) -> Array:
     """
     (v, x), (w, y) = (a[0], a[1:]), (b[0], b[1:])
     s = v * y + w * x
-    cross = long([[0.0, -s[2], s[1]], [s[2], 0.0, -s[0]], [-s[1], s[0], 0.0]])
+    cross = extended([[0.0, -s[2], s[1]], [s[2], 0.0, -s[0]], [-s[1], s[0], 0.0]])
     return eye() * (v * w - x @ y) + np.outer(x, y) + np.outer(y, x) + cross
 
 
 def spun(quaternion: Array, columns: Sequence[int], rate: Array) -> tuple[Array, Array, Array]:
     """The rotation of a quaternion with derivatives; `columns` are its three velocities."""
     units = [composed(quaternion, axis) / 2 for axis in eye()]
-    spin = long([rate[j] for j in columns])
+    spin = extended([rate[j] for j in columns])
     change = composed(quaternion, spin) / 2
     second = composed(change, spin) / 2
     turn_v = zeros(len(rate), 3, 3)
@@ -141,7 +141,9 @@ def spun(quaternion: Array, columns: Sequence[int], rate: Array) -> tuple[Array,
     return _bilinear(quaternion, quaternion), turn_v, turn_b
 
 
-def turned_about(axis: Array, angle: Long, column: int, rate: Array) -> tuple[Array, Array, Array]:
+def turned_about(
+    axis: Array, angle: Extended, column: int, rate: Array
+) -> tuple[Array, Array, Array]:
     """The rotation about a unit vector by an angle with velocity `column`, with derivatives."""
     c, s, velocity = gmpy2.cos(angle), gmpy2.sin(angle), rate[column]
     # The derivatives of c and s by the angle; the rest of the matrix is constant.

@@ -11,7 +11,7 @@ from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.finite import values_at
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
-from eomgen.precision.longs import Array, long
+from eomgen.precision.extended import Array, extended
 from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, finish, interpreter
 from eomgen.program.tape import TIME, ExactTape
@@ -36,7 +36,7 @@ class Truth:
         nodes = tuple(node.index for node in record.vd)
         program = finish(record.tape, {"vd": Output((len(nodes),), nodes)}, ())
         self._accelerations = evaluator(program, "vd")
-        self._long = interpreter(program, "vd", Bits())
+        self._extended = interpreter(program, "vd", Bits())
 
     def __call__(self, t: FloatArray, y: FloatArray) -> Exact:
         """v̇ (nv, n) at times t (n,) and states y (n, ny); a column of None if it fails there."""
@@ -50,17 +50,17 @@ class Truth:
         except (ArithmeticError, ValueError):
             return [None] * len(self.model.velocities)
 
-    def long(
+    def extended(
         self, t: Any, y: Any, inputs: Mapping[str, Any], parameters: Mapping[str, Any]
     ) -> Array:
         """v̇ (nv,) at one state, from the same recording, for extended-precision numbers; nan if it
-        fails. To be called within `long_digits()`.
+        fails. To be called within `extended_digits()`.
         """
-        given = dict(zip(self._states, long(y), strict=True))
+        given = dict(zip(self._states, extended(y), strict=True))
         values = {**self.model.defaults, **parameters}
         values |= {i.name: inputs.get(i.name, 0.0) for i in self.model.inputs} | {TIME: t}
-        given |= dict(zip(values, long(list(values.values())), strict=True))
-        return long(self._long(given))
+        given |= dict(zip(values, extended(list(values.values())), strict=True))
+        return extended(self._extended(given))
 
     def factored(self, t: float, y: FloatArray) -> Exact:
         """v̇ (nv,) at one state, by LᵀDL factors."""

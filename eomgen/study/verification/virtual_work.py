@@ -21,8 +21,8 @@ from functools import cached_property
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.precision.longs import NOTHING, Array, along, long, solved, zeros
-from eomgen.precision.precise import Long
+from eomgen.precision.extended import NOTHING, Array, along, extended, solved, zeros
+from eomgen.precision.precise import Extended
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WORLD, Geared
 from eomgen.study.verification.placed import Placed
@@ -45,7 +45,7 @@ class FreeBodies(Placed):
                 matrix[2, 2] = entries[0]
             else:
                 xx, yy, zz, xy, xz, yz = entries
-                matrix = long([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+                matrix = extended([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             found.append(pose.turn @ matrix @ pose.turn.T)
         return found
 
@@ -64,7 +64,7 @@ class FreeBodies(Placed):
         return matrix
 
     @cached_property
-    def _rotors(self) -> dict[int, Long]:
+    def _rotors(self) -> dict[int, Extended]:
         """Reflected inertia of rotors, by velocity, kg m² or kg."""
         found = {}
         for index in self.model.joint_indices:
@@ -113,7 +113,9 @@ class FreeBodies(Placed):
 
     def torque(self, load: Load) -> Array:
         """The torque of a load, world axes, (3,), N m."""
-        return long([*(0.0,) * (3 - len(load.torque)), *load.torque] if load.torque else [0.0] * 3)
+        return extended(
+            [*(0.0,) * (3 - len(load.torque)), *load.torque] if load.torque else [0.0] * 3
+        )
 
     @cached_property
     def _loads(self) -> dict[str, tuple[Array, Array]]:
@@ -173,19 +175,19 @@ class FreeBodies(Placed):
     @cached_property
     def state_rates(self) -> Array:
         """ẏ (ny,): the rates of coordinates, velocities and extra states."""
-        found: list[Long] = []
+        found: list[Extended] = []
         for index in self.model.joint_indices:
             found += [self.v[j] for _, j in index.plain if j < self.nv]
             if index.quaternion:
-                spin = long([self.v[j] for j in index.spin])
-                found += list(composed(long([self.q[i] for i in index.quaternion]), spin) / 2)
+                spin = extended([self.v[j] for j in index.spin])
+                found += list(composed(extended([self.q[i] for i in index.quaternion]), spin) / 2)
         extra = [rate for effect in self.model.effects for rate in effect.rates(self)]
-        return long([*found, *self.vd, *extra])
+        return extended([*found, *self.vd, *extra])
 
     # Energy and momentum.
 
     @cached_property
-    def kinetic_energy(self) -> Long:
+    def kinetic_energy(self) -> Extended:
         """The kinetic energy of all bodies and rotors, J."""
         energy = mpfr(0)
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
@@ -196,17 +198,17 @@ class FreeBodies(Placed):
         return energy
 
     @cached_property
-    def potential_energy(self) -> Long:
+    def potential_energy(self) -> Extended:
         """The potential energy of all effects, J."""
         return np.sum(self.potential_energies, initial=mpfr(0))
 
     @cached_property
     def potential_energies(self) -> Array:
         """The potential energy of each effect, J."""
-        return long([effect.potential_energy(self) for effect in self.model.effects])
+        return extended([effect.potential_energy(self) for effect in self.model.effects])
 
     @cached_property
-    def reach(self) -> Long:
+    def reach(self) -> Extended:
         """Sum of the distances of all bodies from their parents, m: a bound of any position."""
         total = mpfr(0)
         for body, pose in zip(self.model.bodies, self.poses, strict=True):
@@ -255,8 +257,8 @@ class FreeBodies(Placed):
         pushes = [self.pushed(list(effect.loads(self))) for effect in self.model.effects]
         speeds = abs(self.rates)
         return (
-            long([push @ self.rates for push, _ in pushes]),
-            long([sizes @ speeds for _, sizes in pushes]),
+            extended([push @ self.rates for push, _ in pushes]),
+            extended([sizes @ speeds for _, sizes in pushes]),
         )
 
     @cached_property
@@ -287,6 +289,6 @@ class FreeBodies(Placed):
         return (sizes + self._loads["gravity"][1] + self._loads["applied"][1])[self.nv :]
 
 
-def _reach(slopes: Array, force: Array | Long) -> Array:
+def _reach(slopes: Array, force: Array | Extended) -> Array:
     """Greatest power of a force, of any direction, along partial velocities (m, 3), (m,)."""
     return np.sum(abs(slopes), axis=1) * np.sum(abs(force))

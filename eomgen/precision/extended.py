@@ -1,4 +1,4 @@
-"""Long numbers for what doubles are judged by: MPFR's, of 60 digits, one or in arrays."""
+"""Extended numbers for what doubles are judged by: MPFR's, of 60 digits, one or in arrays."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,20 +14,20 @@ from eomgen.scalars.extended import MP
 BITS = MP.prec
 """Of the significand: 60 digits."""
 NOTHING = 1e-25
-"""Part of its terms below which a sum of long numbers is what rounding left of them."""
+"""Part of its terms below which a sum of extended numbers is what rounding left of them."""
 Array = Any
 """An array of such numbers."""
 
 
 @contextmanager
-def long_digits() -> Iterator[None]:
+def extended_digits() -> Iterator[None]:
     """A block in which numbers are of `BITS` bits; what has no value is nan there."""
     with gmpy2.context(precision=BITS), np.errstate(all="ignore"):
         yield
 
 
-def long(values: Any) -> Array:
-    """Doubles or long numbers, one or an array, as long ones, exactly."""
+def extended(values: Any) -> Array:
+    """Doubles or extended numbers, one or an array, as extended ones, exactly."""
     array = np.asarray(values, dtype=object)
     return np.asarray(_LONG(array), dtype=object) if array.size else array
 
@@ -42,7 +42,7 @@ def zeros(*shape: int) -> Array:
 
 def eye() -> Array:
     """The unit matrix of space."""
-    return long(np.eye(3))
+    return extended(np.eye(3))
 
 
 def along(rate: Array, slopes: Array) -> Array:
@@ -74,5 +74,5 @@ def solved(matrix: Array, right: Array) -> Array:
 
 
 def doubles(values: Any) -> FloatArray:
-    """Long numbers rounded to doubles."""
+    """Extended numbers rounded to doubles."""
     return np.asarray(values).astype(float)
