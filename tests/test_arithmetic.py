@@ -35,11 +35,11 @@ from eomgen.study.cost.arithmetic import (
     solve_operations,
 )
 from eomgen.study.cost.single import Single, in_single, kernel_in_single
-from eomgen.study.verification import visited as visiting
+from eomgen.study.verification import sampled as sampling
+from eomgen.study.verification.sampled import sampled
 from eomgen.study.verification.states import random_state
 from eomgen.study.verification.truth import Truth
 from eomgen.study.verification.ulps import component_errors, ulp, vector_errors
-from eomgen.study.verification.visited import visited
 
 ROD = """
 name = "rod"
@@ -106,7 +106,7 @@ FORMULA = (
 def in_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Times are not looked at here, and few states will do."""
     monkeypatch.setattr(timing, "TIMING", 0.0)
-    monkeypatch.setattr(visiting, "MOST_OPERATIONS", 200_000)
+    monkeypatch.setattr(sampling, "MOST_OPERATIONS", 200_000)
 
 
 def model_of(scene: str) -> Model:
@@ -464,14 +464,14 @@ def test_states_of_its_own_run() -> None:
         return derivative(t, y)
 
     module.derivative = noted
-    run = visited(system.model, wanted, module, 9)
+    run = sampled(system.model, wanted, module, 9)
     assert len(run.t) == 9 and run.t[0] == 0 and run.until > 9
     at = [calls.index(row) for row in zip(run.t, *run.y.T, strict=True)]
     assert min(np.diff(at)) > 0.9 * max(np.diff(at)) > 20  # among hundreds of calls
     np.testing.assert_array_equal(run.y[0], module.initial_state())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(visiting, "MOST_OPERATIONS", 60 * 18)
-        assert visited(system.model, wanted, module, 40).until < 0.5
+        patch.setattr(sampling, "MOST_OPERATIONS", 60 * 18)
+        assert sampled(system.model, wanted, module, 40).until < 0.5
 
 
 # The command.

@@ -25,7 +25,7 @@ from eomgen.scene.reader import find_scene
 from eomgen.scene.schema import Simulation
 from eomgen.study.verification import drift as drifting
 from eomgen.study.verification import horizon as horizons
-from eomgen.study.verification import visited as visiting
+from eomgen.study.verification import sampled as sampling
 from eomgen.study.verification.hard_states import KINDS, hard_states
 from eomgen.study.verification.horizon import horizon as horizon_of
 from eomgen.study.verification.judging import judged
@@ -123,7 +123,7 @@ PENDULUM_ROUTES = ("closed", "ldl", "aba", "orthogonal")
 @pytest.fixture(autouse=True)
 def in_little_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Short runs will do; nothing is left in the user's cache."""
-    monkeypatch.setattr(visiting, "MOST_OPERATIONS", 20_000)
+    monkeypatch.setattr(sampling, "MOST_OPERATIONS", 20_000)
     monkeypatch.setattr(drifting, "MOST_CALLS", 2_000)
     monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path / "store"))
 

@@ -116,13 +116,13 @@ class Lookout:
     @property
     def memory(self) -> dict[str, Any]:
         """What the looks at the next steps go on from: numbers and arrays by name."""
-        looked = [[t, *values] for t, values in self._ends] or np.empty((0, 0))
-        return {"turned": self.turned, "looked": np.array(looked)}
+        checked = [[t, *values] for t, values in self._ends] or np.empty((0, 0))
+        return {"turned": self.turned, "checked": np.array(checked)}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
         """Go on from what `memory` gave."""
         self.turned = float(memory["turned"])
-        self._ends = [(float(row[0]), np.array(row[1:])) for row in memory["looked"]]
+        self._ends = [(float(row[0]), np.array(row[1:])) for row in memory["checked"]]
 
     def look(self, made: Made) -> Again | None:
         """Whether a step is to be made again; None if it is good.

@@ -215,7 +215,7 @@ def _needed(
         for name in method.memory:
             yield name, (ny,) if name in method.vectors else ()
         if problem.switching:
-            yield from (("until", ()), ("turned", ()), ("looked", None))
+            yield from (("until", ()), ("turned", ()), ("checked", None))
     if problem.contacts:
         yield from dict.fromkeys(("alpha", "fastest", "begun_t"), ()).items()
         yield from (("slack", (len(problem.contacts.names),)), ("begun_y", (ny,)), ("held", None))
@@ -224,7 +224,7 @@ def _needed(
 def _is_sane(kept: Mapping[str, Any], problem: Problem) -> bool:
     """Whether numbers are such as a run leaves."""
     free = {"dt", "rtol", "atol", "max_step", "rest_speed"}
-    endless = {"longest", "until", "turned", "looked"}
+    endless = {"longest", "until", "turned", "checked"}
     for name, value in kept.items():
         if name == "derivative":
             continue
@@ -242,7 +242,7 @@ def _is_sane(kept: Mapping[str, Any], problem: Problem) -> bool:
         and 0 <= kept.get("target", 0) < MOST_ROWS - 1
         and held.ndim == 1
         and bool(np.isin(held, np.arange(count)).all())
-        and kept.get("looked", np.empty((0, 0))).ndim == 2
+        and kept.get("checked", np.empty((0, 0))).ndim == 2
     )
 
 

@@ -17,7 +17,7 @@ from eomgen.scene.schema import Simulation
 from eomgen.study.diagnosis import problem_of
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.laws import AXES, Kept, kept
-from eomgen.study.verification.visited import ENOUGH
+from eomgen.study.verification.sampled import ENOUGH
 
 METHOD, RTOL = "DOP853", 1e-11
 MOST_OPERATIONS = 10_000_000

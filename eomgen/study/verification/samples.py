@@ -12,9 +12,9 @@ from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
 from eomgen.scalars.extended import DIGITS
 from eomgen.scene.schema import Simulation
+from eomgen.study.verification.sampled import sampled
 from eomgen.study.verification.states import random_state
 from eomgen.study.verification.truth import Exact, Truth
-from eomgen.study.verification.visited import visited
 
 SEEDED, OWN = "seeded", "own run"
 CHECKED = 3
@@ -55,7 +55,7 @@ def judging_states(
     rng, t_end = np.random.default_rng(seed), wanted.t_end
     y = np.array([random_state(module, rng) for _ in range(count)])
     seeded = Sample(SEEDED, rng.uniform(0.0, t_end, count), y)
-    run = visited(truth.model, wanted, module, count, lambda part: progress(0.3 * part))
+    run = sampled(truth.model, wanted, module, count, lambda part: progress(0.3 * part))
     samples, truths = [], []
     for k, sample in enumerate((seeded, Sample(OWN, run.t, run.y, until=run.until))):
         true = truth(sample.t, sample.y)

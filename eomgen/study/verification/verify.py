@@ -35,8 +35,8 @@ from eomgen.study.verification.hard_states import State, hard_states
 from eomgen.study.verification.judging import Judged, judged
 from eomgen.study.verification.laws import broken, why_no_energy_law, why_no_momentum_law
 from eomgen.study.verification.routes import compiled
+from eomgen.study.verification.sampled import SampledRun, sampled
 from eomgen.study.verification.truth import Truth
-from eomgen.study.verification.visited import Visited, visited
 
 OUTPUTS = (
     "inverse_dynamics",
@@ -119,7 +119,7 @@ def verify(
     bare = replace(model, outputs=())
     truth, count = Truth(bare), states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
     asked = hard_states(module, len(model.velocities), count, seed, wanted.t_end)
-    run = visited(model, wanted, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
+    run = sampled(model, wanted, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
     asked += _states(run, module)
     found = []
     for k, state in enumerate(asked):
@@ -184,7 +184,7 @@ def _modules(
     return taken, {r: modules[r] for r in ROUTES if r in modules}, full, missing
 
 
-def _states(run: Visited, module: GeneratedModule) -> list[State]:
+def _states(run: SampledRun, module: GeneratedModule) -> list[State]:
     """The states sampled from the scene's own run."""
     unit = as_problem(module).unit  # within a step, quaternions are not of unit length
     inputs = dict.fromkeys(module.INPUTS, 0.0)

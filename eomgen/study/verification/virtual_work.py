@@ -25,11 +25,11 @@ from eomgen.precision.extended import NOTHING, Array, along, extended, solved, z
 from eomgen.precision.precise import Extended
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WORLD, Geared
-from eomgen.study.verification.placed import Placed
+from eomgen.study.verification.evaluated import EvaluatedModel
 from eomgen.study.verification.poses import composed
 
 
-class FreeBodies(Placed):
+class FreeBodies(EvaluatedModel):
     """M v̇ + V + G = F of a model at a time and a state, its energy, momentum and powers."""
 
     # Equations of motion.

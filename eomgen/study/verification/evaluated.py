@@ -29,7 +29,7 @@ _JUMP = 1e-30
 there is a jump."""
 
 
-class Placed:
+class EvaluatedModel:
     """A model at a time and a state y = [q, v, x] of form 'velocity'. Quantities are computed on
     demand, and only within `extended_digits()`.
 

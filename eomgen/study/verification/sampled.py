@@ -19,7 +19,7 @@ ENOUGH = "enough states"
 
 
 @dataclass(frozen=True, eq=False)
-class Visited:
+class SampledRun:
     """Times t (n,) and states y (n, ny) of a run, and its end time, s."""
 
     t: FloatArray
@@ -27,13 +27,13 @@ class Visited:
     until: float
 
 
-def visited(
+def sampled(
     model: Model,
     wanted: Simulation,
     module: GeneratedModule,
     count: int,
     progress: Progress = lambda _: None,
-) -> Visited:
+) -> SampledRun:
     """About `count` states at which the integrator of the `wanted` run calls the derivative.
 
     They are evenly spaced among its calls, and so are denser where it takes small steps. A run that
@@ -62,7 +62,7 @@ def visited(
         raise KeyboardInterrupt
     chosen = np.unique(np.linspace(0, len(keep.rows) - 1, count).round().astype(int))
     rows = [keep.rows[i] for i in chosen]
-    return Visited(np.array([t for t, _ in rows]), np.array([y for _, y in rows]), keep.last)
+    return SampledRun(np.array([t for t, _ in rows]), np.array([y for _, y in rows]), keep.last)
 
 
 class _Keep:
