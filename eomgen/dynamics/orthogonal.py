@@ -133,8 +133,8 @@ class Elimination:
         moment = list(wrench.moment)
 
         def row(weight: Scalar, angular: Vec, linear: Vec, right: Scalar, force: Scalar) -> Row:
-            # Forces on a firm body are shorter as a part of its acceleration.
-            if self._ranks.firm[k]:
+            # Forces on a dominant body take fewer operations as a part of its acceleration.
+            if self._ranks.dominant[k]:
                 right, force = right + force / weight, self._rows.zero
             return self._rows.make(weight, angular, linear, right, force)
 

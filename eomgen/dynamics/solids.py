@@ -21,8 +21,8 @@ from eomgen.dynamics.vectors import (
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar, Scalars
 
-FIRM = 0.01
-"""The part of what may hold a body that its own mass and inertia must be for it to be firm."""
+DOMINANT = 0.01
+"""A body is dominant if its own mass and inertia are at least this part of its neighbours'."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +77,13 @@ class Ranks:
               none; of a ball joint the child that is heaviest wherever it is moved
     beside    of a ball joint the next such child, where axes are to be along the line between these
               two; -1 elsewhere
-    firm      whether a frame's own mass and inertia are not slight beside what else may resist its
-              motion: forces on it move it about as they would if it were alone
+    dominant  whether a frame's own mass and inertia dominate its neighbours', or are at least of
+              their order (`DOMINANT`): forces move it about as if it were alone
     """
 
     heaviest: tuple[int, ...]
     beside: tuple[int, ...]
-    firm: tuple[bool, ...]
+    dominant: tuple[bool, ...]
 
 
 def ranked(linkage: Linkage) -> Ranks:
@@ -114,8 +114,8 @@ def ranked(linkage: Linkage) -> Ranks:
             loose = frames[k].parent >= 0 and own[frames[k].parent] == 0.0
             if spins and fixed[1] > third and (loose or fixed[1] ** 2 > fixed[0] * third):
                 beside[k] = order[1]
-    firm = _firm(linkage, carried, single)
-    return Ranks(tuple(heaviest), tuple(beside), tuple(firm))
+    dominant = _dominant(linkage, carried, single)
+    return Ranks(tuple(heaviest), tuple(beside), tuple(dominant))
 
 
 def _translates_freely(linkage: Linkage, carried: Sequence[Sequence[int]]) -> list[bool]:
@@ -129,11 +129,11 @@ def _translates_freely(linkage: Linkage, carried: Sequence[Sequence[int]]) -> li
     return [n >= needed for n in run]
 
 
-def _firm(
+def _dominant(
     linkage: Linkage, carried: Sequence[Sequence[int]], single: Sequence[float]
 ) -> Iterator[bool]:
-    """Of each frame whether nothing resists more than its own mass and inertia by far: the heaviest
-    thing it carries, masses on arms, rotors.
+    """Of each frame whether its own mass and inertia are at least `DOMINANT` times those of its
+    neighbours: the heaviest body it carries, masses on arms, rotors.
     """
     frames, axes = linkage.frames, AXES[2 * linkage.planar :]
     found = solids(linkage, FloatScalars())
@@ -148,4 +148,4 @@ def _firm(
             turning += [single[n] * dot(arm, arm), max(moments[n])]
         for joint in (frame, *(frames[n] for n in carried[k])):
             (moving if joint.kind == "prismatic" else turning).append(joint.armature)
-        yield solid.mass >= FIRM * max(moving) and min(moments[k]) >= FIRM * max(turning)
+        yield solid.mass >= DOMINANT * max(moving) and min(moments[k]) >= DOMINANT * max(turning)
