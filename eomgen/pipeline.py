@@ -13,7 +13,7 @@ from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.choice import Candidate, Choice, choose
 from eomgen.codegen.derive import record
 from eomgen.codegen.system import System, optimised
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
@@ -73,7 +73,7 @@ def generate(model: Model, *, jacobian: bool = True) -> Generated:
 
     Raises `SceneError` if the mass matrix is singular or the route is not for the model.
     """
-    check_regular(model)
+    check_nonsingular(model)
     made = compile_program(model, jacobian=jacobian)
     return render(made)
 

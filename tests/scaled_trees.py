@@ -12,7 +12,7 @@ from spatial_trees import random_spatial_tree
 
 from eomgen.codegen.system import System
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import elaborate
@@ -45,7 +45,7 @@ def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Model:
             if "principal moments" not in str(error):
                 raise
             seed += 1  # an inertia of several parameters may be that of no body
-    check_regular(model)
+    check_nonsingular(model)
     # Doubles are what is given of a body, not formulas of them: I + m l² may be m l² to all digits.
     bodies = (
         replace(

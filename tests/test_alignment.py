@@ -18,7 +18,7 @@ from campaign import some
 from eomgen.codegen.choice import ENOUGH, FEWEST
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program, generate
@@ -48,7 +48,7 @@ def tried(given: Case, *, closed: bool = False, **more: object) -> str:
     """
     try:
         model = elaborate(parse_scene(scene(given, **more)))
-        check_regular(model)
+        check_nonsingular(model)
         made = compile_program(model, jacobian=False, closed=closed)
     except SceneError:
         return "refused"

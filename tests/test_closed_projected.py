@@ -25,7 +25,7 @@ from eomgen.derivation.projected.simplify import gathered, sum_of_squares
 from eomgen.derivation.projected.steps import projected_steps
 from eomgen.derivation.projected.symbols import Ledger, make_symbols, rate
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -130,7 +130,7 @@ FIVE = [(2, SPACE, 5), (6, PLANE, 5), (11, SPACE, 5)]
 def is_regular(model: Model) -> bool:
     """Moved onto one axis, a massless body may have nothing left to resist it."""
     try:
-        check_regular(model)
+        check_nonsingular(model)
     except SceneError:
         return False
     return True

@@ -7,8 +7,8 @@ import pytest
 from campaign import some
 
 from eomgen.codegen.backends.python import python_module
+from eomgen.dynamics.diagnostics import values_at
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.finite import values_at
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program

@@ -10,7 +10,7 @@ import pytest
 from campaign import some
 
 from eomgen.codegen.backends.python import python_module
-from eomgen.dynamics.regular import check_regular, relative_pivots
+from eomgen.dynamics.singularity import check_nonsingular, relative_pivots
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -54,7 +54,7 @@ def pins(*links: tuple[float, float, float], far: float = 1.0) -> str:
 def test_singular_models_are_refused(text: str, body: str, velocity: str) -> None:
     """In one line, with the body, the motion and what to change."""
     with pytest.raises(SceneError) as caught:
-        check_regular(elaborate(parse_scene(text)))
+        check_nonsingular(elaborate(parse_scene(text)))
     assert str(caught.value) == (
         f"body '{body}': nothing resists '{velocity}', neither its mass or inertia nor what it "
         "carries; give it some, or a joint that does not move so"
@@ -70,12 +70,12 @@ joints = [
     { name = "j", type = "planar", parent = "world", child = "b", r_child = [1e9, 0] },
 ]
 """
-    check_regular(elaborate(parse_scene(text.replace("INERTIA", "1.0"))))
+    check_nonsingular(elaborate(parse_scene(text.replace("INERTIA", "1.0"))))
     with pytest.raises(SceneError, match="nothing resists"):
-        check_regular(elaborate(parse_scene(text.replace("INERTIA", "0.0"))))
+        check_nonsingular(elaborate(parse_scene(text.replace("INERTIA", "0.0"))))
     in_space = text.replace("INERTIA", "[1.0, 1.0, 1.0]").replace("[1e9, 0]", "[1e9, 1e9, 0]")
     model = elaborate(parse_scene(in_space + "dimensions = 3\n"))
-    check_regular(model)
+    check_nonsingular(model)
     poses = np.random.default_rng(1).uniform(-3, 3, (50, len(model.coordinates)))
     assert (relative_pivots(model, poses)[0] == 1).all()  # rounding is no lock
 

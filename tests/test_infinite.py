@@ -10,7 +10,7 @@ import pytest
 from engine import engine
 
 from eomgen.cli import main
-from eomgen.dynamics.finite import effect_sizes, is_singular, values_at
+from eomgen.dynamics.diagnostics import effect_sizes, is_singular, values_at
 from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep

@@ -15,7 +15,7 @@ from test_show_space import page_parts
 
 from eomgen.cli import main
 from eomgen.codegen.backends.javascript import javascript_poses
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
 from eomgen.linear.equilibrium import equilibrium
 from eomgen.model.elaborate import elaborate
@@ -507,9 +507,9 @@ def test_bad_scenes_in_space(tail: str, head: str, message: str) -> None:
 def test_a_singular_drive_is_no_fault() -> None:
     """A massless body may be driven; one that hangs free on it may not."""
     light = CART.replace("mass = 1.5", "mass = 0")
-    check_regular(elaborate(parse_scene(light)))
+    check_nonsingular(elaborate(parse_scene(light)))
     with pytest.raises(SceneError, match="body 'two': nothing resists 'second_angle_dot'"):
-        check_regular(elaborate(parse_scene(light.replace("mass = 0.8", "mass = 0"))))
+        check_nonsingular(elaborate(parse_scene(light.replace("mass = 0.8", "mass = 0"))))
 
 
 @pytest.mark.usefixtures("blank_figures")

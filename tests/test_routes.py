@@ -21,7 +21,7 @@ from mechanisms import compiled, random_tree
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
-from eomgen.dynamics import observe
+from eomgen.dynamics import observables
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.reactions import reactions
 from eomgen.model.elaborate import elaborate
@@ -122,7 +122,7 @@ def assert_observed(
     assert apart(needed, np.zeros(len(needed)), d.bias(), d.applied_force) < ROUNDING
     assert apart(d.kinetic_energy, motion.kinetic_energy) < ROUNDING
     assert apart(d.potential_energy, motion.potential_energy) < ROUNDING
-    momentum = observe.momentum(d.kinematics, d.places, d.moving, d.scalars)
+    momentum = observables.momentum(d.kinematics, d.places, d.twists, d.scalars)
     assert apart(np.concatenate(momentum)[KEPT[tree.dimensions]], motion.momentum) < ROUNDING
     poses = motion.body_poses[tree.rows([body.name for body in model.bodies])]
     expected = poses[:, :2] if tree.dimensions == PLANE else poses[:, :, 3]

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.model.elaborate import elaborate, outputs_for
 from eomgen.model.model import Model
@@ -50,7 +50,7 @@ def check(source: Source) -> Model:
     Raises `SceneError` where it makes no mechanism, or where its mass matrix is singular.
     """
     model = elaborate(read(source))
-    check_regular(model)
+    check_nonsingular(model)
     return model
 
 

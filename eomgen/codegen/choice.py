@@ -8,7 +8,7 @@ from eomgen.codegen.derive import Derived, derive, record
 from eomgen.codegen.system import optimised
 from eomgen.derivation.supported import why_not_closed, why_not_tried
 from eomgen.dynamics.digits import ALL, Route, digits_lost
-from eomgen.dynamics.moving import Values
+from eomgen.dynamics.mechanism_state import Values
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.program.passes import optimise

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from eomgen.codegen.contacts import contact_labels, contact_outputs
 from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, output_shape, recorded
-from eomgen.dynamics import observe
+from eomgen.dynamics import observables
 from eomgen.dynamics.composite import Entries, full, solved
 from eomgen.dynamics.dynamics import Dynamics, Forward, Values
 from eomgen.dynamics.kinematics import Axes
@@ -164,13 +164,13 @@ def _powers(record: Recording) -> list[Node]:
 
 def _momentum(record: Recording) -> list[Node]:
     d = record.dynamics
-    p, about = observe.momentum(d.kinematics, d.places, d.moving, record.scalars)
+    p, about = observables.momentum(d.kinematics, d.places, d.twists, record.scalars)
     return [p[0], p[1], about[2]] if record.model.dimensions == 2 else [*p, *about]
 
 
 def _centre_of_mass(record: Recording) -> list[Node]:
     d = record.dynamics
-    place = observe.centre_of_mass(d.linkage, d.kinematics, d.places, record.scalars)
+    place = observables.centre_of_mass(d.linkage, d.kinematics, d.places, record.scalars)
     return list(place[: record.model.dimensions])
 
 
@@ -192,7 +192,7 @@ def _poses(record: Recording) -> list[Node]:
         if record.model.dimensions == 2:
             nodes += [place[0], place[1], d.angle(k)]
         else:
-            matrix = observe.orientation(d.linkage, d.kinematics, k, scalars)
+            matrix = observables.orientation(d.linkage, d.kinematics, k, scalars)
             nodes += [x for row, y in zip(matrix, place, strict=True) for x in (*row, y)]
     return nodes
 
@@ -207,7 +207,7 @@ def _velocities(record: Recording) -> list[Node]:
 
 def _velocity(record: Recording, body: int, at: Vec) -> tuple[Vec, Vec]:
     d = record.dynamics
-    return observe.velocity(d.linkage, d.kinematics, d.moving, body, at, record.scalars)
+    return observables.velocity(d.linkage, d.kinematics, d.twists, body, at, record.scalars)
 
 
 def _points(record: Recording, of: Callable[[Recording, int, Vec], Sequence[Node]]) -> list[Node]:
@@ -229,7 +229,7 @@ def _point_velocity(record: Recording, body: int, at: Vec) -> Sequence[Node]:
 
 def _point_jacobian(record: Recording, body: int, at: Vec) -> Sequence[Node]:
     d, nv = record.dynamics, len(record.v)
-    columns = observe.point_jacobian(
+    columns = observables.point_jacobian(
         d.linkage, d.kinematics, d.places, body, at, nv, record.scalars
     )
     return [column[i] for i in range(record.model.dimensions) for column in columns]
@@ -339,8 +339,8 @@ def _state_columns(record: Recording) -> list[list[Node]]:
     """∂τ/∂q and ∂τ/∂v as columns; small angles of a spin as changes of its quaternion."""
     d, model, tape = record.dynamics, record.model, record.tape
     base = sub(zeros(record.scalars), d.down)
-    moving, accelerating = d.motion_in_world(record.vd)
-    slopes = sensitivity(d.in_world, moving, accelerating, base, record.scalars)
+    twists, accelerating = d.motion_in_world(record.vd)
+    slopes = sensitivity(d.in_world, twists, accelerating, base, record.scalars)
     nv, zero, two = len(record.v), tape.constant(0.0), tape.constant(2.0)
 
     def column(entries: Entries, j: int) -> list[Node]:

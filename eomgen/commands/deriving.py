@@ -3,7 +3,7 @@
 import sys
 
 from eomgen.commands.shared import Arguments, located, read_model
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.files import check_writable, write_whole
 from eomgen.run.progress import terminal_notice
 
@@ -17,7 +17,7 @@ def derive(given: Arguments) -> int:
     from eomgen.show.derivation import as_html, as_latex, as_text
 
     with located(given.scene), terminal_notice(f"deriving {model.name} …"):
-        check_regular(model)
+        check_nonsingular(model)
         steps = matrices(model).steps
     if given.format == "text":
         encoding = "utf-8" if given.output else sys.stdout.encoding

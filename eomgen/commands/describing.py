@@ -13,7 +13,7 @@ from eomgen.commands.shared import (
     read_model,
     shortened,
 )
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.language.formula import written
 from eomgen.model.model import Body, Model
 from eomgen.scene.joints.base import WORLD, Geared
@@ -48,7 +48,7 @@ def check(given: Arguments) -> int:
     """Validate; bodies, joints, degrees of freedom, limits, effects in force."""
     model, _ = read_model(given.scene, given)
     with located(given.scene):
-        check_regular(model)
+        check_nonsingular(model)
     most = sys.maxsize if given.long else FEW
     nq, nv = len(model.coordinates), len(model.velocities)
     freedom = f"{nv} degree{'s' if nv != 1 else ''} of freedom"

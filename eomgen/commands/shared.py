@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 
 from eomgen.api.given import Outputs, check_outputs, overridden
 from eomgen.api.manner import Manner
-from eomgen.dynamics.finite import initial_overlaps
+from eomgen.dynamics.diagnostics import initial_overlaps
 from eomgen.errors import RunError, nearest
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model, dofs_of

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.dynamics.askew import askew
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.frames import Linkage
 from eomgen.dynamics.kinematics import Axes
 from eomgen.dynamics.linkage import make_linkage
+from eomgen.dynamics.perturbed import perturbed
 from eomgen.model.model import Model
 from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
 from eomgen.scalars.floats import ArrayScalars
@@ -163,7 +163,7 @@ def _off(
     change = np.zeros(len(at))
     doubts = [_shares(found["aba"], true, least)] if "aba" in found else []
     if closely:
-        nudged = _recursion("orthogonal", askew(model), "own")
+        nudged = _recursion("orthogonal", perturbed(model), "own")
         change = _shares(_numbers(nudged, _nudged(together, len(at)), shape), true, least)
         doubts.append(change)
     worst = dict.fromkeys(found, 0.0)
@@ -291,7 +291,7 @@ def _in_many_digits(model: Model, *, nudge: bool) -> Callable[[Values], tuple[li
     where all numbers are by half a unit in the last place, if it is asked for.
     """
     scalars = Bits()
-    own = {0.0: model, EPSILON / 2: askew(model)}
+    own = {0.0: model, EPSILON / 2: perturbed(model)}
 
     def near(x: float, nudge: float, rng: random.Random) -> Any:
         return scalars.number(x) * (1 + scalars.number(nudge * rng.uniform(-1, 1)))

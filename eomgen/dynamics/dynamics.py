@@ -25,6 +25,7 @@ from eomgen.dynamics.composite import (
     solved,
 )
 from eomgen.dynamics.linkage import make_linkage
+from eomgen.dynamics.mechanism_state import MechanismState, Values
 from eomgen.dynamics.motion import (
     Acceleration,
     Twist,
@@ -32,7 +33,6 @@ from eomgen.dynamics.motion import (
     kinetic_energy,
     velocities,
 )
-from eomgen.dynamics.moving import Moving, Values
 from eomgen.dynamics.orthogonal import Elimination
 from eomgen.dynamics.solids import Solid, centres, ranked, solids
 from eomgen.dynamics.vectors import Vec, no_matrix, sub, turning_in_space, zeros
@@ -50,25 +50,25 @@ Forward = Callable[[Sequence[Scalar] | None], list[Scalar]]
 """v̇ under the effects and, if given, forces beside them, one a velocity."""
 
 
-class Dynamics(Moving):
+class Dynamics(MechanismState):
     """A model at given values. What is asked for is computed once; nothing else is."""
 
     def accelerating(
         self, vd: Sequence[Scalar] | None, *, still: bool = False, weightless: bool = False
     ) -> tuple[Acceleration, ...]:
         """Accelerations of the frames at v̇, counted from free fall; `still` leaves v out."""
-        v, moving = self._stopped if still else self.felt
+        v, twists = self._stopped if still else self.felt
         nothing = zeros(self.scalars)
         base = nothing if weightless else sub(nothing, self.down)
         vd = vd if still else self.with_driven(vd)
-        return accelerations(self.kinematics, moving, v, vd, base, self.scalars)
+        return accelerations(self.kinematics, twists, v, vd, base, self.scalars)
 
     @cached_property
     def felt(self) -> tuple[Sequence[Scalar], tuple[Twist, ...]]:
         """All velocities and those of the frames, as inertia feels them."""
         if "velocity_forces" in self.model.leave_out:
             return self._stopped
-        return self.v, self.moving
+        return self.v, self.twists
 
     @cached_property
     def _stopped(self) -> tuple[Sequence[Scalar], tuple[Twist, ...]]:
@@ -87,9 +87,9 @@ class Dynamics(Moving):
     ) -> tuple[tuple[Twist, ...], tuple[Acceleration, ...]]:
         """Velocities and accelerations of the frames at v̇, in world axes."""
         v, base = self.felt[0], sub(zeros(self.scalars), self.down)
-        moving = velocities(self.in_world, v, self.scalars)
+        twists = velocities(self.in_world, v, self.scalars)
         whole = self.with_driven(vd)
-        return moving, accelerations(self.in_world, moving, v, whole, base, self.scalars)
+        return twists, accelerations(self.in_world, twists, v, whole, base, self.scalars)
 
     # Forces.
 
@@ -153,8 +153,8 @@ class Dynamics(Moving):
         self, vd: Sequence[Scalar] | None, *, still: bool = False, weightless: bool = False
     ) -> list[Scalar]:
         """The same with the rows of driven velocities."""
-        moving = self.accelerating(vd, still=still, weightless=weightless)
-        inertial = fc.inertial(self.kinematics, moving, self.scalars)
+        frame_accelerations = self.accelerating(vd, still=still, weightless=weightless)
+        inertial = fc.inertial(self.kinematics, frame_accelerations, self.scalars)
         parts = fc.generalised(self.kinematics, fc.carried(self.kinematics, inertial), self.moved)
         if vd is None:
             return parts
@@ -310,7 +310,7 @@ class Dynamics(Moving):
     @cached_property
     def kinetic_energy(self) -> Scalar:
         """Of all bodies and rotors, J."""
-        return kinetic_energy(self.kinematics, self._solids, self.moving, self.v, self.scalars)
+        return kinetic_energy(self.kinematics, self._solids, self.twists, self.v, self.scalars)
 
     @cached_property
     def potential_energy(self) -> Scalar:

@@ -114,12 +114,12 @@ def on_frames(
 
 
 def inertial(
-    kinematics: TreeKinematics, moving: Sequence[Acceleration], scalars: Scalars
+    kinematics: TreeKinematics, frame_accelerations: Sequence[Acceleration], scalars: Scalars
 ) -> tuple[Wrench, ...]:
     """The wrench that each frame's own mass takes."""
     return tuple(
         Wrench(*inertial_force(link, a, scalars))
-        for link, a in zip(kinematics.links, moving, strict=True)
+        for link, a in zip(kinematics.links, frame_accelerations, strict=True)
     )
 
 

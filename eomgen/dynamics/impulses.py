@@ -19,7 +19,7 @@ from collections.abc import Iterable, Sequence
 
 from eomgen.dynamics import forces as fc
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.observe import arm
+from eomgen.dynamics.observables import arm
 from eomgen.dynamics.vectors import Vec, add, cross, in_space, turning_in_space, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector

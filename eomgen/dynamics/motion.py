@@ -75,7 +75,7 @@ def own_motion(link: Link, rates: Sequence[Scalar], scalars: Scalars) -> tuple[V
 
 def accelerations(
     kinematics: TreeKinematics,
-    moving: Sequence[Twist],
+    twists: Sequence[Twist],
     v: Sequence[Scalar],
     vd: Sequence[Scalar] | None,
     base: Vec,
@@ -94,7 +94,7 @@ def accelerations(
             parent = found[link.parent]
             angular = link.turn.into(parent.angular)
             linear = link.turn.into(add(parent.linear, times(parent.field, link.arm)))
-            spin = link.turn.into(moving[link.parent].angular)
+            spin = link.turn.into(twists[link.parent].angular)
         else:
             angular, linear, spin = zeros(scalars), zeros(scalars), zeros(scalars)
             if k not in falling:
@@ -107,7 +107,7 @@ def accelerations(
             more_angular, more_linear = own_motion(link, vd, scalars)
             angular, linear = add(angular, more_angular), add(linear, more_linear)
         linear = named(linear, f"bias_{link.name}" if vd is None else f"a_{link.name}", scalars)
-        found.append(Acceleration(angular, linear, *_field(moving[k].angular, angular)))
+        found.append(Acceleration(angular, linear, *_field(twists[k].angular, angular)))
     return tuple(found)
 
 
@@ -157,7 +157,7 @@ def moment_about_centre(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
 def kinetic_energy(
     kinematics: TreeKinematics,
     carried: Sequence[Solid | None],
-    moving: Sequence[Twist],
+    twists: Sequence[Twist],
     v: Sequence[Scalar],
     scalars: Scalars,
 ) -> Scalar:
@@ -166,7 +166,7 @@ def kinetic_energy(
     centre, on next to nothing, would lose digits.
     """
     twice = scalars.number(0.0)
-    for k, (link, solid, motion) in enumerate(zip(kinematics.links, carried, moving, strict=True)):
+    for k, (link, solid, motion) in enumerate(zip(kinematics.links, carried, twists, strict=True)):
         if solid is not None:
             u = add(motion.linear, cross(motion.angular, kinematics.of_frame(k, solid.centre)))
             w = kinematics.in_frame(k, motion.angular)

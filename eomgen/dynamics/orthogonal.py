@@ -27,8 +27,15 @@ tip hangs in line with all joints, of which rounding of sines and cosines knows 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from eomgen.dynamics.aligned import aligned
+from eomgen.dynamics.aligned_axes import align_axes
 from eomgen.dynamics.articulated import along, with_component
+from eomgen.dynamics.elimination_order import (
+    column_of,
+    nonzero_columns,
+    point_columns,
+    rotation_order,
+    translation_order,
+)
 from eomgen.dynamics.forces import (
     Wrench,
     at_parent,
@@ -39,7 +46,6 @@ from eomgen.dynamics.forces import (
 )
 from eomgen.dynamics.kinematics import Link, MotionAxis, TreeKinematics
 from eomgen.dynamics.motion import Acceleration, moment_about_centre
-from eomgen.dynamics.possible import column_of, moved, possible, slides_of, turns_of
 from eomgen.dynamics.rows import (
     Column,
     Eliminated,
@@ -87,26 +93,29 @@ class Elimination:
         ranks: Ranks,
         scalars: Scalars,
     ) -> None:
-        self._aligned = aligned(kinematics.links, carried, ranks, scalars)
+        self._aligned = align_axes(kinematics.links, carried, ranks, scalars)
         self._links, self._solids = self._aligned.links, self._aligned.carried
         self._carried, self._ranks = carried, ranks
         self._scalars = scalars
         self._planar = bool(kinematics.angles)
         self._rows = Rows(scalars)
-        self._columns = possible(self._links, scalars)
+        self._columns = nonzero_columns(self._links, scalars)
 
     def respond(
-        self, moving: Sequence[Acceleration], wrenches: Sequence[Wrench], tau: Sequence[Scalar]
+        self,
+        frame_accelerations: Sequence[Acceleration],
+        wrenches: Sequence[Wrench],
+        tau: Sequence[Scalar],
     ) -> list[Scalar]:
-        """The v̇ under wrenches about the centres and `tau` on the velocities, where `moving` are
-        the accelerations at v̇ = 0.
+        """The v̇ under wrenches about the centres and `tau` on the velocities, where
+        `frame_accelerations` are the accelerations at v̇ = 0.
         """
         wrenches, tau = on_frames(self._links, *self._aligned.into(wrenches, tau), self._scalars)
         rows: list[list[tuple[Row, int]]] = [[] for _ in self._links]
         found: list[Eliminated] = []
         for k in reversed(range(len(self._links))):
             link = self._links[k]
-            own, left = self._own_rows(k, moving[k], wrenches[k])
+            own, left = self._own_rows(k, frame_accelerations[k], wrenches[k])
             eliminated, passed = self._eliminated(k, own, rows[k], left, tau)
             found.append(eliminated)
             if link.parent >= 0:
@@ -147,7 +156,7 @@ class Elimination:
                     linear[j] = row(m, zero, unit(j, s), -centre[j], wrench.force[j])
             y = [-x for x in into(moment_about_centre(own.inertia, a, s))]
             work = [list(row) for row in solid.inertia]
-            order = turns_of(self._links[k], self._planar, self._aligned.along[k])
+            order = rotation_order(self._links[k], self._planar, self._aligned.along[k])
             for n, i in enumerate(order):
                 if s.is_zero(solid.inertia[i][i]):
                     continue
@@ -188,7 +197,7 @@ class Elimination:
         heaviest = self._ranks.heaviest[k]
         at = self._links[heaviest].arm if heaviest >= 0 else self._centre(k)
         columns = self._columns[k]
-        about = columns | moved(columns, at, s)
+        about = columns | point_columns(columns, at, s)
         centre = self._centre(k)
         linear = {
             j: self._rows.of(about, shifted(row, sub(centre, at))) for j, row in own[0].items()
@@ -198,8 +207,8 @@ class Elimination:
         # Those without an arm first, which so stay without it, be there more of them than columns.
         loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
         along = self._aligned.along[k]
-        slides = slides_of(link, at, loose, self._planar, s)
-        order = turns_of(link, self._planar, along)
+        slides = translation_order(link, at, loose, self._planar, s)
+        order = rotation_order(link, self._planar, along)
         axes, turns, taken = list(reversed(link.free)), Steps(), []
         if along is not None and along in angular:
             axes.sort(key=lambda axis: -order.index(column_of(axis[0])[1]))

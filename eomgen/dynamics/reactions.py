@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from eomgen.dynamics import observe
+from eomgen.dynamics import observables
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.forces import Wrench
 from eomgen.dynamics.vectors import (
@@ -29,7 +29,7 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Wrench]:
     """
     model, linkage, kinematics = dynamics.model, dynamics.linkage, dynamics.kinematics
     scalars = dynamics.scalars
-    moving = dynamics.felt[1]
+    twists = dynamics.felt[1]
     accelerating = dynamics.accelerating(vd)
     nothing = zeros(scalars)
     sums: list[Wrench] = []  # about each body's joint point, in world axes
@@ -44,8 +44,8 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Wrench]:
             sums[-1] = Wrench(cross(arm, sums[-1].force), sums[-1].force)
             continue
         frame = mount.frame
-        world_R_body = observe.orientation(linkage, kinematics, k, scalars)
-        w = kinematics.to_world(frame, moving[frame].angular)
+        world_R_body = observables.orientation(linkage, kinematics, k, scalars)
+        w = kinematics.to_world(frame, twists[frame].angular)
         a = accelerating[frame]
         reach = kinematics.of_frame(frame, mount.at)
         there = kinematics.to_world(frame, add(a.linear, times(a.field, reach)))

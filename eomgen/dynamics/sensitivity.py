@@ -70,7 +70,7 @@ class _Column:
 
 def sensitivity(
     kinematics: TreeKinematics,
-    moving: Sequence[Twist],
+    twists: Sequence[Twist],
     accelerating: Sequence[Acceleration],
     base: Vec,
     scalars: Scalars,
@@ -83,9 +83,9 @@ def sensitivity(
     links = kinematics.links
     bodies = composite_bodies(kinematics, scalars)
     forces = carried(kinematics, inertial(kinematics, accelerating, scalars))
-    drags = _composite_drags(kinematics, moving, scalars)
+    drags = _composite_drags(kinematics, twists, scalars)
     columns = [
-        _columns(kinematics, k, moving, accelerating, base, scalars) for k in range(len(links))
+        _columns(kinematics, k, twists, accelerating, base, scalars) for k in range(len(links))
     ]
     by_q: dict[tuple[int, int], Scalar] = {}
     by_v: dict[tuple[int, int], Scalar] = {}
@@ -116,7 +116,7 @@ def sensitivity(
 def _columns(
     kinematics: TreeKinematics,
     k: int,
-    moving: Sequence[Twist],
+    twists: Sequence[Twist],
     accelerating: Sequence[Acceleration],
     base: Vec,
     scalars: Scalars,
@@ -125,13 +125,13 @@ def _columns(
     nothing = zeros(scalars)
     carrier, pushed = Twist(nothing, nothing), Twist(nothing, base)
     if link.parent >= 0:
-        v, a = moving[link.parent], accelerating[link.parent]
+        v, a = twists[link.parent], accelerating[link.parent]
         linear = add(v.linear, cross(v.angular, link.arm))
         carrier = Twist(v.angular, linear)
         # Of a point fixed in space, not of one that moves along (Featherstone 2008, 2.11).
         reached = add(a.linear, times(a.field, link.arm))
         pushed = Twist(a.angular, sub(reached, cross(v.angular, linear)))
-    own = Twist(moving[k].angular, moving[k].linear)
+    own = Twist(twists[k].angular, twists[k].linear)
     columns = []
     for axis, _ in link.free:
         s = Twist(axis.direction, nothing) if axis.angular else Twist(nothing, axis.direction)
@@ -163,11 +163,11 @@ class _Drag:
 
 
 def _composite_drags(
-    kinematics: TreeKinematics, moving: Sequence[Twist], scalars: Scalars
+    kinematics: TreeKinematics, twists: Sequence[Twist], scalars: Scalars
 ) -> list[_Drag]:
     two = scalars.number(2.0)
     found = []
-    for link, motion in zip(kinematics.links, moving, strict=True):
+    for link, motion in zip(kinematics.links, twists, strict=True):
         _, p = momentum_of(link, motion)
         field = product(skew(motion.angular, scalars.number(0.0)), _second_moment(link, scalars))
         matrix = plus(_outer(link.rigid.first_moment, motion.linear), _negated(field))

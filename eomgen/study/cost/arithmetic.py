@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program
@@ -131,7 +131,7 @@ def arithmetic(
     60 digits are not enough for a reference.
     """
     model = replace(model, form="velocity", outputs=())
-    check_regular(model)
+    check_nonsingular(model)
     taken = compile_program(model, jacobian=False).system
     others, missing = compiled(model, but=taken.route)
     there = {taken.route: loaded(taken), **others}

@@ -11,7 +11,7 @@ from math import inf
 
 from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.choice import why_not_compared
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program
@@ -177,7 +177,7 @@ def _there(made: _Made | None) -> _Made:
 
 def _compiled(model: Model) -> _Made:
     """Raises `SceneError` or `RunError` if it cannot be compiled or evaluated at its start."""
-    check_regular(model)
+    check_nonsingular(model)
     system = compile_program(model, jacobian=False).system
     module = load_module(python_module(system), model.name)
     as_problem(module)

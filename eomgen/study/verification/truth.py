@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.codegen.from_recursion import Recording
+from eomgen.dynamics.diagnostics import values_at
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.finite import values_at
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
 from eomgen.precision.extended import Array, extended

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eomgen.dynamics.regular import check_regular
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
@@ -113,7 +113,7 @@ def verify(
     Raises `SceneError` or `RunError` if there is no module, or no state has an acceleration.
     """
     form, model = model.form, replace(model, form="velocity")
-    check_regular(model)
+    check_nonsingular(model)
     taken, modules, full, missing = _modules(model, module, progress)
     module = modules[taken]
     bare = replace(model, outputs=())

@@ -12,7 +12,7 @@ from eomgen.scene.effects import Effect, Gravity
 from eomgen.scene.joints import Free, Joint
 
 
-def askew(model: Model, seed: int = 9) -> Model:
+def perturbed(model: Model, seed: int = 9) -> Model:
     """The model with each of these numbers changed to a double beside it, up or down."""
     rng = random.Random(seed)
 

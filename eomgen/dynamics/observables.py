@@ -65,7 +65,7 @@ def position(
 def velocity(
     linkage: Linkage,
     kinematics: TreeKinematics,
-    moving: Sequence[Twist],
+    twists: Sequence[Twist],
     body: int,
     at: Vec,
     scalars: Scalars,
@@ -74,8 +74,8 @@ def velocity(
     frame = linkage.mounts[body].frame
     if frame < 0:
         return zeros(scalars), zeros(scalars)
-    angular = kinematics.to_world(frame, moving[frame].angular)
-    linear = kinematics.to_world(frame, moving[frame].linear)
+    angular = kinematics.to_world(frame, twists[frame].angular)
+    linear = kinematics.to_world(frame, twists[frame].linear)
     reach = arm(linkage, kinematics, body, at, scalars)
     return add(linear, cross(angular, reach)), angular
 
@@ -92,12 +92,12 @@ def centre_of_mass(
 
 
 def momentum(
-    kinematics: TreeKinematics, where: Places, moving: Sequence[Twist], scalars: Scalars
+    kinematics: TreeKinematics, where: Places, twists: Sequence[Twist], scalars: Scalars
 ) -> tuple[Vec, Vec]:
     """Momentum, and angular momentum about the world's origin, in world axes."""
     linear, angular = zeros(scalars), zeros(scalars)
     for k, link in enumerate(kinematics.links):
-        about, p = momentum_of(link, moving[k])
+        about, p = momentum_of(link, twists[k])
         p = kinematics.to_world(k, p)
         linear = add(linear, p)
         angular = add(angular, add(kinematics.to_world(k, about), cross(where[k], p)))

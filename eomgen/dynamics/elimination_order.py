@@ -8,7 +8,7 @@ from eomgen.dynamics.vectors import AXES, Vec, cross, unit
 from eomgen.scalars.protocol import Scalars
 
 
-def possible(links: Sequence[Link], scalars: Scalars) -> list[set[Column]]:
+def nonzero_columns(links: Sequence[Link], scalars: Scalars) -> list[set[Column]]:
     """For each link its angular accelerations, and those of its origin, that are not 0 whatever the
     velocities do: what nothing on the way from the world can give is not there.
     """
@@ -17,13 +17,13 @@ def possible(links: Sequence[Link], scalars: Scalars) -> list[set[Column]]:
         columns = {column_of(axis) for axis, _ in link.free}
         if link.parent >= 0:
             base = found[link.parent]
-            for angular, j in base | moved(base, link.arm, scalars):
+            for angular, j in base | point_columns(base, link.arm, scalars):
                 columns |= _parts(angular, link.turn.into(unit(j, scalars)), scalars)
         found.append(columns)
     return found
 
 
-def moved(columns: set[Column], at: Vec, scalars: Scalars) -> set[Column]:
+def point_columns(columns: set[Column], at: Vec, scalars: Scalars) -> set[Column]:
     """The accelerations that turning gives a point."""
     found: set[Column] = set()
     for angular, j in columns:
@@ -32,7 +32,7 @@ def moved(columns: set[Column], at: Vec, scalars: Scalars) -> set[Column]:
     return found
 
 
-def turns_of(link: Link, planar: bool, along: int | None) -> tuple[int, ...]:
+def rotation_order(link: Link, planar: bool, along: int | None) -> tuple[int, ...]:
     """The axes to turn about, in the order to eliminate them in, that of the link last, or that
     `along` the arm of what it carries.
     """
@@ -43,7 +43,7 @@ def turns_of(link: Link, planar: bool, along: int | None) -> tuple[int, ...]:
     return ((last + 1) % 3, (last + 2) % 3, last)
 
 
-def slides_of(
+def translation_order(
     link: Link, arm: Vec, rows: Sequence[Row], planar: bool, scalars: Scalars
 ) -> tuple[int, ...]:
     """The axes to move along, that of the link last. Before it those that rows of few axes hold,

@@ -18,7 +18,7 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 
 @dataclass(frozen=True)
-class Aligned:
+class AlignedTree:
     """Links and what they carry in such axes; `turns` lead from these to the frames' own. `between`
     has the arms of links from the heaviest on the same frame, where axes are along those; `along`
     the axis of each frame that is along the arm of the heaviest, if one is.
@@ -53,12 +53,12 @@ class Aligned:
         return found
 
 
-def aligned(
+def align_axes(
     links: Sequence[Link],
     carried: Sequence[Solid | None],
     ranks: Ranks,
     scalars: Scalars,
-) -> Aligned:
+) -> AlignedTree:
     """Links, and what they carry, where `ranks` tell which links each has to look at. Frames on
     other joints keep their axes.
     """
@@ -94,7 +94,7 @@ def aligned(
                 body = replace(body, centre=turns[k].into(body.centre), inertia=inertia)
         found.append(replace(link, turn=turn, arm=arms[k]))
         bodies.append(body)
-    return Aligned(tuple(found), tuple(bodies), tuple(turns), between, tuple(ways))
+    return AlignedTree(tuple(found), tuple(bodies), tuple(turns), between, tuple(ways))
 
 
 def _along(arm: Vec, scalars: Scalars) -> tuple[Rotation, Vec]:

@@ -8,7 +8,7 @@ from eomgen.dynamics.frames import Linkage
 from eomgen.dynamics.kinematics import Axes, TreeKinematics, tree_kinematics
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.motion import Twist, velocities
-from eomgen.dynamics.observe import (
+from eomgen.dynamics.observables import (
     Places,
     orientation,
     places,
@@ -40,7 +40,7 @@ class Values:
     time: Scalar = 0.0
 
 
-class Moving:
+class MechanismState:
     """A model at given values: where everything is and how it moves, for effects and recursions.
 
     What is asked for is computed once; nothing else is. `nv` counts the velocities of the state,
@@ -246,13 +246,13 @@ class Moving:
         return self.kinematics.angles[mount.frame].and_more(mount.angle, self.scalars)
 
     @cached_property
-    def moving(self) -> tuple[Twist, ...]:
+    def twists(self) -> tuple[Twist, ...]:
         """Velocities of the frames."""
         return velocities(self.kinematics, self.v, self.scalars)
 
     def point_velocity(self, body: int, at: Vec) -> tuple[Vec, Vec]:
         """Velocity of a point of a body, and the body's angular velocity, in the world."""
-        return velocity(self.linkage, self.kinematics, self.moving, body, at, self.scalars)
+        return velocity(self.linkage, self.kinematics, self.twists, body, at, self.scalars)
 
     @cached_property
     def down(self) -> Vec:

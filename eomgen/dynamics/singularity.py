@@ -42,7 +42,7 @@ UNDERFLOW = 1e-290
 """A pivot below this is nothing in doubles."""
 
 
-def check_regular(model: Model) -> None:
+def check_nonsingular(model: Model) -> None:
     """Raise `SceneError`, naming the body and what to change, if the mass matrix is singular.
 
     M is singular where some motion moves no mass, however large the masses are; so all of them are
@@ -79,9 +79,9 @@ def relative_pivots(model: Model, poses: Array) -> dict[int, Array]:
     poses (n, nq), in parts of the greatest that it feels at any of these and a few seeded ones:
     (n,). They are 1 where all of that is rounding, as beside arms of 1e9 m.
 
-    As in `check_regular` all masses are taken as 1: heavy on light is no lock. Where the axes of a
-    joint come into line with what they carry, as those of a gimbal do, some motion moves no mass:
-    it feels none there, and the mass matrix tells no acceleration.
+    As in `check_nonsingular` all masses are taken as 1: heavy on light is no lock. Where the axes
+    of a joint come into line with what they carry, as those of a gimbal do, some motion moves no
+    mass: it feels none there, and the mass matrix tells no acceleration.
     """
     some = _seeded(random.Random(20), len(model.coordinates))
     even, asked = _evened(model), np.concatenate([poses, some])
