@@ -129,7 +129,7 @@ OUTPUTS: Mapping[str, OutputSpec] = {
 """In the order in which they stand in a module."""
 
 JACOBIAN = OutputSpec(("ny", "ny"), "Exact Jacobian of `derivative` by the state.", by="state")
-"""What is there by itself, as is `derivative`."""
+"""What every module has, as it has `derivative`."""
 DERIVATIVES = ("jacobian", *(name for name, spec in OUTPUTS.items() if spec.by))
 """Names of the matrices of derivatives."""
 

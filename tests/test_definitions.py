@@ -149,11 +149,11 @@ MISTAKES = [
      "definitions.z: is the name of something of the motion too; rename one of them"),
     (defined('pi = "3"'), "definitions.pi: is the name of a number too; rename one of them"),
     (defined('x = "p"', force='["x", "1"]'),
-     "effects[2].force[0]: 'x' of definition 'x' is known here by itself; "
+     "effects[2].force[0]: 'x' of definition 'x' is predefined here; "
      "rename it where it comes from"),
     (defined('far = "2*x"', force='["far", "1"]').replace('coordinate = "p"', 'coordinate = "x"')
      .replace(" - p", " - x").replace("p_dot", "x_dot"),
-     "effects[2].force[0]: 'x' of definition 'far' is known here by itself; "
+     "effects[2].force[0]: 'x' of definition 'far' is predefined here; "
      "rename it where it comes from"),
     (defined('far = "2*p"', mass='"far"'),
      "bodies[0].mass: 'p' changes with the motion, which this value must not; use parameters"),

@@ -327,7 +327,7 @@ def test_a_parameter_may_not_hide_a_place() -> None:
     """`x` is the point's own place in a wind."""
     scene = DROP.format(PLANE, 0.03) + f"[parameters]\nx = 3.0\n{BODY}linear = 1\n"
     elaborate(parse_scene(scene))
-    with pytest.raises(SceneError, match=r"wind\[0\]: 'x' is known here by itself; rename"):
+    with pytest.raises(SceneError, match=r"wind\[0\]: 'x' is predefined here; rename"):
         elaborate(parse_scene(scene + 'wind = ["x", 0]\n'))
 
 

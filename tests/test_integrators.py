@@ -401,7 +401,7 @@ def test_singular_newton_matrix_says_what_to_change():
 
 def test_newton_does_not_iterate_on_nan():
     lost = replace(BLOW_UP, derivative=lambda t, y: y * np.nan)
-    with pytest.raises(StepFailure, match=r"Newton left the finite numbers; take a smaller --dt"):
+    with pytest.raises(StepFailure, match=r"Newton's iteration diverges; take a smaller --dt"):
         implicit_midpoint.METHOD.change(lost, 0.0, np.array([1.0]), 0.1)
 
 

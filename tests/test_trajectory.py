@@ -31,7 +31,7 @@ RUN = Trajectory(
     y=AWKWARD,
     integrator="rk4",
     finished=False,
-    message="stopped at t = 0.43, crank=0.3: the state left the finite numbers",
+    message="stopped at t = 0.43, crank=0.3: the state overflows or is not a number",
     counts={"steps": 2, "derivatives": 8, "jacobians": 0, "impacts": 1, "capped": 0, "cut": 2},
     events=(
         Event(0.1, "floor_crank", "impact", 1 / 3),

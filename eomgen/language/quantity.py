@@ -235,7 +235,7 @@ def _check_names(
     for name in names_in(formula):
         moving = moving or name in seen
         if name in known and name in seen:
-            raise SceneError(f"{where}: '{name}' is known here by itself; rename the parameter")
+            raise SceneError(f"{where}: '{name}' is predefined here; rename the parameter")
         if name not in known and name not in seen:
             words = [*known, *seen, *FUNCTIONS, *CONSTANTS]
             hint = nearest(name, words) or "; give it a value in [parameters]"

@@ -124,7 +124,7 @@ def _replaced(
                 hidden = [n for n in (name, *names_in(meanings.get(name, value))) if n in local]
                 if name in meanings and hidden:
                     raise SceneError(
-                        f"{spot}: '{hidden[0]}' of definition '{name}' is known here by itself; "
+                        f"{spot}: '{hidden[0]}' of definition '{name}' is predefined here; "
                         "rename it where it comes from"
                     )
             return _put_in(value, meanings)

@@ -295,7 +295,7 @@ def _follow(
             _check_start(problem, run)
             for advance in advances:
                 if not _is_finite(advance):
-                    raise StepFailure("the state left the finite numbers", method.remedy)
+                    raise StepFailure("the state overflows or is not a number", method.remedy)
                 run.take(advance)
                 if tally:
                     tally.take(advance, counts[0].calls, counts[1].calls)

@@ -56,7 +56,7 @@ ABOUT = {
     "switching_functions": "`derivative` has another branch where one of these passes 0.",
     "switching_functions_of_time": "As `switching_functions`; these depend on time alone.",
 }
-"""What is there by itself; the other outputs are in the table."""
+"""What every module has; the other outputs are in the table."""
 
 
 @dataclass(frozen=True)
