@@ -72,8 +72,8 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     A store that cannot be trusted, read or written is done without, with a notice; what is damaged
     in it is made again. With `anew` nothing that it holds is believed.
     """
-    place, key = folder(), _key(model)
-    kept = _code(Entries(place).get(key)) if place else None
+    directory, key = folder(), _key(model)
+    kept = _code(Entries(directory).get(key)) if directory else None
     if kept and not anew:
         return kept
     # Imported here because it brings what derives, which takes long to load.
@@ -81,31 +81,31 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
 
     made = generate(model)
     code = Code(made.module, made.poses, made.reports, made.explanation, made.notices, derived=True)
-    if place is None:
+    if directory is None:
         return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
-    entries = Entries(place)
+    entries = Entries(directory)
     trouble = entries.put(key, _content(code))
     trouble = trouble or entries.put(_beside(key), saved(made.program).encode())
     if trouble:
-        return replace(code, notice=f"the store {place} is not used: {trouble}")
+        return replace(code, notice=f"the store {directory} is not used: {trouble}")
     if kept and (kept.module, kept.poses) != (code.module, code.poses):
-        notice = f"the store {place} held other code for this scene, which was put right"
+        notice = f"the store {directory} held other code for this scene, which was put right"
         return replace(code, notice=notice)
     return code
 
 
 def program_of(model: Model) -> Program:
     """The program of a model's code, from the store beside it or recorded now."""
-    place, key = folder(), _beside(_key(model))
-    if place and (kept := Entries(place).get(key)):
+    directory, key = folder(), _beside(_key(model))
+    if directory and (kept := Entries(directory).get(key)):
         with suppress(ProgramError, UnicodeDecodeError):
             return restored(kept.decode())
     # Imported here because it brings what derives, which takes long to load.
     from eomgen.pipeline import compile_program
 
     program = compile_program(model).system.program
-    if place:
-        Entries(place).put(key, saved(program).encode())
+    if directory:
+        Entries(directory).put(key, saved(program).encode())
     return program
 
 

@@ -64,12 +64,12 @@ class Balls(EffectTable):
         for i, (body, at, radius) in enumerate(self.on_plane):
             point = tuple(mechanism.number(x) for x in at)
             side = (body, point, tuple(mechanism.number(-radius * x) for x in self.normal))
-            gap = _dot(normal, mechanism.place(body, point)) - mechanism.number(radius)
+            gap = _dot(normal, mechanism.position(body, point)) - mechanism.number(radius)
             ways = [tuple(map(mechanism.number, t)) for t in self.tangents_of_plane()]
             found.append(self._contact(mechanism, f"{i}_{body}", gap, normal, ways, [side]))
         zero = (mechanism.number(0.0),) * mechanism.dimensions
         for one, other, r, s in self.on_each_other:
-            places = [mechanism.place(body, zero) for body in (one, other)]
+            places = [mechanism.position(body, zero) for body in (one, other)]
             d = tuple(a - b for a, b in zip(*places, strict=True))
             length = mechanism.call("sqrt", _dot(d, d))
             n = tuple(x / length for x in d)

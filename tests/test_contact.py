@@ -401,7 +401,7 @@ def wrench(dynamics: Dynamics, loads: tuple[Load | JointLoad, ...]) -> np.ndarra
     pad = [MP.mpf(0)] * 3
     for load in loads:
         assert isinstance(load, Load)
-        force, place = ([*x, *pad][:3] for x in (load.force, dynamics.place(load.body, load.at)))
+        force, place = ([*x, *pad][:3] for x in (load.force, dynamics.position(load.body, load.at)))
         torque = [*pad, *load.torque][-3:] if load.torque else pad
         total += np.array([*force, *(np.cross(place, force) + torque)])
     return total

@@ -269,7 +269,7 @@ def test_absence_is_free() -> None:
         ),
         (
             'points = ["tip"]\nat = [0, 1]\nlinear = 0.1',
-            "effects[0].at: named points have their own places; leave it out",
+            "effects[0].at: named points have their own positions; leave it out",
         ),
         (
             'bodies = ["drop", "drop"]\nlinear = 0.1',

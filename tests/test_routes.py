@@ -122,7 +122,7 @@ def assert_observed(
     assert apart(needed, np.zeros(len(needed)), d.bias(), d.applied_force) < ROUNDING
     assert apart(d.kinetic_energy, motion.kinetic_energy) < ROUNDING
     assert apart(d.potential_energy, motion.potential_energy) < ROUNDING
-    momentum = observables.momentum(d.kinematics, d.places, d.twists, d.scalars)
+    momentum = observables.momentum(d.kinematics, d.origins, d.twists, d.scalars)
     assert apart(np.concatenate(momentum)[KEPT[tree.dimensions]], motion.momentum) < ROUNDING
     poses = motion.body_poses[tree.rows([body.name for body in model.bodies])]
     expected = poses[:, :2] if tree.dimensions == PLANE else poses[:, :, 3]

@@ -1,6 +1,6 @@
 """SymPy's equations of any small tree lowered to the tape.
 
-v̇ and the terms of M v̇ + V + G = F are SymPy's; what only observes the motion, energies, places,
+v̇ and the terms of M v̇ + V + G = F are SymPy's; what only observes the motion, energies, positions,
 forces in the joints, comes from the recursions over the same tape.
 """
 

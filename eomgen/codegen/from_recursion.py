@@ -164,14 +164,14 @@ def _powers(record: Recording) -> list[Node]:
 
 def _momentum(record: Recording) -> list[Node]:
     d = record.dynamics
-    p, about = observables.momentum(d.kinematics, d.places, d.twists, record.scalars)
+    p, about = observables.momentum(d.kinematics, d.origins, d.twists, record.scalars)
     return [p[0], p[1], about[2]] if record.model.dimensions == 2 else [*p, *about]
 
 
 def _centre_of_mass(record: Recording) -> list[Node]:
     d = record.dynamics
-    place = observables.centre_of_mass(d.linkage, d.kinematics, d.places, record.scalars)
-    return list(place[: record.model.dimensions])
+    centre = observables.centre_of_mass(d.linkage, d.kinematics, d.origins, record.scalars)
+    return list(centre[: record.model.dimensions])
 
 
 def _joint_forces(record: Recording) -> list[Node]:
@@ -188,12 +188,12 @@ def _poses(record: Recording) -> list[Node]:
     d, scalars = record.dynamics, record.scalars
     nodes: list[Node] = []
     for k in range(len(record.model.bodies)):
-        place = d.centre(k)
+        centre = d.centre(k)
         if record.model.dimensions == 2:
-            nodes += [place[0], place[1], d.angle(k)]
+            nodes += [centre[0], centre[1], d.angle(k)]
         else:
             matrix = observables.orientation(d.linkage, d.kinematics, k, scalars)
-            nodes += [x for row, y in zip(matrix, place, strict=True) for x in (*row, y)]
+            nodes += [x for row, y in zip(matrix, centre, strict=True) for x in (*row, y)]
     return nodes
 
 
@@ -211,7 +211,7 @@ def _velocity(record: Recording, body: int, at: Vec) -> tuple[Vec, Vec]:
 
 
 def _points(record: Recording, of: Callable[[Recording, int, Vec], Sequence[Node]]) -> list[Node]:
-    """What is asked of each named point, by its body and its place in the body's axes."""
+    """What is asked of each named point, by its body and its position in the body's axes."""
     nodes: list[Node] = []
     for point in record.model.points:
         at = in_space([record.dynamics.value(part) for part in point.at], record.scalars)
@@ -220,7 +220,7 @@ def _points(record: Recording, of: Callable[[Recording, int, Vec], Sequence[Node
 
 
 def _point_position(record: Recording, body: int, at: Vec) -> Sequence[Node]:
-    return record.dynamics.position(body, at)[: record.model.dimensions]
+    return record.dynamics.point_position(body, at)[: record.model.dimensions]
 
 
 def _point_velocity(record: Recording, body: int, at: Vec) -> Sequence[Node]:
@@ -230,7 +230,7 @@ def _point_velocity(record: Recording, body: int, at: Vec) -> Sequence[Node]:
 def _point_jacobian(record: Recording, body: int, at: Vec) -> Sequence[Node]:
     d, nv = record.dynamics, len(record.v)
     columns = observables.point_jacobian(
-        d.linkage, d.kinematics, d.places, body, at, nv, record.scalars
+        d.linkage, d.kinematics, d.origins, body, at, nv, record.scalars
     )
     return [column[i] for i in range(record.model.dimensions) for column in columns]
 

@@ -50,7 +50,7 @@ def _velocity_form(equations: Equations) -> StateForm:
         symbols=(*symbols.q, *symbols.v),
         replaced={angle: turned[angle] for angle in symbols.angle},
         defined={
-            **_places(equations),
+            **_positions(equations),
             **{omega: turned[omega] for omega in symbols.omega},
         },
         rates=(*symbols.v, *symbols.a),
@@ -58,7 +58,7 @@ def _velocity_form(equations: Equations) -> StateForm:
     )
 
 
-def _places(equations: Equations) -> dict[Expr, Expr]:
+def _positions(equations: Equations) -> dict[Expr, Expr]:
     """Position and velocity of every body by those of its parent: (21) and its derivative."""
     symbols, kinematics = equations.symbols, equations.kinematics
     inward = over_bodies(equations.model, symbols)
@@ -83,7 +83,7 @@ def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
     rates: list[Expr] = []
     initial: list[Expr] = []
     replaced: dict[Expr, Expr] = {}
-    defined = _places(equations)
+    defined = _positions(equations)
     for k, body in enumerate(model.bodies):
         if model.value(body.moment) == 0.0:
             raise SceneError(
@@ -131,11 +131,11 @@ def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
 def _over_q(equations: Equations, expressions: list[Expr]) -> tuple[Expr, ...]:
     """Expressions of body symbols over `q` and `v` alone."""
     outward = over_coordinates(equations.model, equations.symbols)
-    places = _places(equations)
+    positions = _positions(equations)
     result = []
     for expression in expressions:
         for _ in equations.model.bodies:  # one substitution climbs one joint
-            expression = expression.xreplace(places)
+            expression = expression.xreplace(positions)
         result.append(expression.xreplace(outward))
     return tuple(result)
 

@@ -9,9 +9,9 @@ from eomgen.dynamics.kinematics import Axes, TreeKinematics, tree_kinematics
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.motion import Twist, velocities
 from eomgen.dynamics.observables import (
-    Places,
+    Origins,
+    frame_origins,
     orientation,
-    places,
     position,
     velocity,
 )
@@ -80,10 +80,10 @@ class MechanismState:
         """World y of a centre of mass in the plane, z in space, m."""
         return self.centre(self.index[body])[self.dimensions - 1]
 
-    def place(self, body: str, at: Vector) -> Vector:
-        """World place of a point of a body, m."""
+    def position(self, body: str, at: Vector) -> Vector:
+        """World position of a point of a body, m."""
         return self._cut(
-            at if body == WORLD else self.position(self.index[body], self._in_space(at))
+            at if body == WORLD else self.point_position(self.index[body], self._in_space(at))
         )
 
     @property
@@ -226,17 +226,17 @@ class MechanismState:
         return tree_kinematics(self.linkage, self.q, "world", self.scalars)
 
     @cached_property
-    def places(self) -> Places:
+    def origins(self) -> Origins:
         """Origins of the frames, in the world."""
-        return places(self.kinematics, self.scalars)
+        return frame_origins(self.kinematics, self.scalars)
 
     def centre(self, body: int) -> Vec:
         """Centre of mass of a body, in the world."""
-        return self.position(body, zeros(self.scalars))
+        return self.point_position(body, zeros(self.scalars))
 
-    def position(self, body: int, at: Vec) -> Vec:
+    def point_position(self, body: int, at: Vec) -> Vec:
         """A point of a body, in the world."""
-        return position(self.linkage, self.kinematics, self.places, body, at, self.scalars)
+        return position(self.linkage, self.kinematics, self.origins, body, at, self.scalars)
 
     def angle(self, body: int) -> Scalar:
         """The angle of a planar body from the world's x axis."""

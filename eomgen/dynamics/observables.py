@@ -1,4 +1,4 @@
-"""What one may ask of a mechanism besides its motion: places, velocities, momentum, energy."""
+"""What one may ask of a mechanism besides its motion: positions, velocities, momentum, energy."""
 
 from collections.abc import Sequence
 
@@ -19,11 +19,11 @@ from eomgen.dynamics.vectors import (
 )
 from eomgen.scalars.protocol import Scalars
 
-Places = tuple[Vec, ...]
+Origins = tuple[Vec, ...]
 """The origin of every frame in the world."""
 
 
-def places(kinematics: TreeKinematics, scalars: Scalars) -> Places:
+def frame_origins(kinematics: TreeKinematics, scalars: Scalars) -> Origins:
     """Where the frames' origins are."""
     origins: list[Vec] = []
     for link in kinematics.links:
@@ -51,12 +51,12 @@ def arm(linkage: Linkage, kinematics: TreeKinematics, body: int, at: Vec, scalar
 def position(
     linkage: Linkage,
     kinematics: TreeKinematics,
-    where: Places,
+    where: Origins,
     body: int,
     at: Vec,
     scalars: Scalars,
 ) -> Vec:
-    """The place of a point of a body in the world."""
+    """The world position of a point of a body, m."""
     frame = linkage.mounts[body].frame
     reach = arm(linkage, kinematics, body, at, scalars)
     return add(where[frame], reach) if frame >= 0 else reach
@@ -81,18 +81,18 @@ def velocity(
 
 
 def centre_of_mass(
-    linkage: Linkage, kinematics: TreeKinematics, where: Places, scalars: Scalars
+    linkage: Linkage, kinematics: TreeKinematics, where: Origins, scalars: Scalars
 ) -> Vec:
     """Of all bodies together; a body that is part of the world counts like any other."""
     moment, mass = zeros(scalars), scalars.number(0.0)
     for k, mount in enumerate(linkage.mounts):
-        place = position(linkage, kinematics, where, k, zeros(scalars), scalars)
-        moment, mass = add(moment, scale(mount.mass, place)), mass + mount.mass
+        point = position(linkage, kinematics, where, k, zeros(scalars), scalars)
+        moment, mass = add(moment, scale(mount.mass, point)), mass + mount.mass
     return (moment[0] / mass, moment[1] / mass, moment[2] / mass)
 
 
 def momentum(
-    kinematics: TreeKinematics, where: Places, twists: Sequence[Twist], scalars: Scalars
+    kinematics: TreeKinematics, where: Origins, twists: Sequence[Twist], scalars: Scalars
 ) -> tuple[Vec, Vec]:
     """Momentum, and angular momentum about the world's origin, in world axes."""
     linear, angular = zeros(scalars), zeros(scalars)
@@ -107,7 +107,7 @@ def momentum(
 def point_jacobian(
     linkage: Linkage,
     kinematics: TreeKinematics,
-    where: Places,
+    where: Origins,
     body: int,
     at: Vec,
     nv: int,
@@ -116,12 +116,12 @@ def point_jacobian(
     """For each free velocity what it adds to the velocity of a point, in world axes."""
     columns = [zeros(scalars)] * nv
     frame = linkage.mounts[body].frame
-    place = position(linkage, kinematics, where, body, at, scalars)
+    point = position(linkage, kinematics, where, body, at, scalars)
     while frame >= 0:
         link = kinematics.links[frame]
         for axis, i in link.free:
             direction = kinematics.to_world(frame, axis.direction)
-            reach = sub(place, where[frame])
+            reach = sub(point, where[frame])
             columns[i] = cross(direction, reach) if axis.angular else direction
         frame = link.parent
     return columns

@@ -36,7 +36,7 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Wrench]:
     joints: list[Vec] = []
     for k, mount in enumerate(linkage.mounts):
         centre = dynamics.centre(k)
-        point = dynamics.position(k, mount.joint)
+        point = dynamics.point_position(k, mount.joint)
         joints.append(point)
         if mount.frame < 0:
             sums.append(Wrench(nothing, scale(mount.mass, sub(nothing, dynamics.down))))
@@ -56,7 +56,7 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Wrench]:
         sums.append(Wrench(add(moment, cross(sub(centre, point), force)), force))
     for load in dynamics.loads[0]:
         k = load.body
-        arm = sub(dynamics.position(k, load.at), joints[k])
+        arm = sub(dynamics.point_position(k, load.at), joints[k])
         f = sums[k]
         moment = add(load.torque, cross(arm, load.force))
         sums[k] = Wrench(sub(f.moment, moment), sub(f.force, load.force))

@@ -147,8 +147,8 @@ def _pivots(
     """
     linkage = make_linkage(model, model.defaults, scalars)
     axes: Axes = "world" if model.dimensions == 2 else "own"
-    places = [x if len(x) > 1 else x[0] for x in poses.T]
-    kinematics = tree_kinematics(linkage, places, axes, scalars)
+    coordinates = [x if len(x) > 1 else x[0] for x in poses.T]
+    kinematics = tree_kinematics(linkage, coordinates, axes, scalars)
     bodies = composite_bodies(kinematics, scalars)
     sums = [rigid_body_inertia(link, 0.0) for link in kinematics.links]
     pivots: dict[int, tuple[Array, Array]] = {}

@@ -31,7 +31,7 @@ class Condition:
     words   what is wrong where it is not kept, with braces for the values of the formulas `shown`
     """
 
-    place: str
+    location: str
     value: Formula
     words: str
     shown: tuple[Formula, ...]
@@ -43,11 +43,11 @@ class Condition:
         """What is wrong at these parameters, or ""."""
         value = value_of(self.value, known)
         if self.shown and not math.isfinite(value):
-            return f"{self.place}: its value is not a finite number; change its parameters"
+            return f"{self.location}: its value is not a finite number; change its parameters"
         if value <= self.high and (value > self.low or (value == self.low and not self.strict)):
             return ""
         shown = (value_of(formula, known) for formula in self.shown)
-        return f"{self.place}: {self.words.format(*shown)}"
+        return f"{self.location}: {self.words.format(*shown)}"
 
     @property
     def depends(self) -> bool:
@@ -75,25 +75,25 @@ def are_zero(known: Mapping[str, float], *formulas: Formula) -> bool:
     return all(value_of(formula, known) == 0 for formula in formulas)
 
 
-def of_quantity(place: str, formula: Formula, bound: str, unit: str) -> Iterator[Condition]:
+def of_quantity(location: str, formula: Formula, bound: str, unit: str) -> Iterator[Condition]:
     """A quantity is finite, has a square, and keeps its bound."""
     words = f"{{:g}} is larger than {LARGEST:g}; choose other units"
-    yield Condition(place, formula, words, (formula,), low=-LARGEST, high=LARGEST)
+    yield Condition(location, formula, words, (formula,), low=-LARGEST, high=LARGEST)
     if bound == "positive":
         words = f"{{:g}} is not positive; give a number > 0 in {unit}"
-        yield Condition(place, formula, words, (formula,), strict=True)
+        yield Condition(location, formula, words, (formula,), strict=True)
     if bound == "nonnegative":
-        yield not_negative(place, formula, unit)
+        yield not_negative(location, formula, unit)
 
 
-def of_moving(place: str, formula: Formula, known: Mapping[str, float]) -> Iterator[Condition]:
+def of_moving(location: str, formula: Formula, known: Mapping[str, float]) -> Iterator[Condition]:
     """What changes with the motion has no value before it, but its still parts have."""
     for part in _still(formula, known):
         text = written(part).replace("{", "{{").replace("}", "}}")
         shown = text if len(text) <= 60 else f"{text[:57]}..."
         words = f"its part '{shown}' is not a finite number; change it or its parameters"
         most = sys.float_info.max
-        yield Condition(place, part, words, (), low=-most, high=most)
+        yield Condition(location, part, words, (), low=-most, high=most)
 
 
 def _still(formula: Formula, known: Mapping[str, float]) -> Iterator[Apply]:
@@ -106,33 +106,33 @@ def _still(formula: Formula, known: Mapping[str, float]) -> Iterator[Apply]:
                 yield from _still(operand, known)
 
 
-def not_negative(place: str, formula: Formula, unit: str) -> Condition:
+def not_negative(location: str, formula: Formula, unit: str) -> Condition:
     """A number >= 0."""
     words = f"{{:g}} is negative; give a number >= 0 in {unit}"
-    return Condition(place, formula, words, (formula,))
+    return Condition(location, formula, words, (formula,))
 
 
-def a_part(place: str, formula: Formula) -> Condition:
+def a_part(location: str, formula: Formula) -> Condition:
     """A number from 0 to 1."""
     words = "{:g} is not from 0 to 1; give one that is"
-    return Condition(place, formula, words, (formula,), high=1.0)
+    return Condition(location, formula, words, (formula,), high=1.0)
 
 
-def in_order(place: str, low: Formula, high: Formula) -> Condition:
+def in_order(location: str, low: Formula, high: Formula) -> Condition:
     """Two numbers, the first below the second."""
     words = "{:g} is not below high, {:g}; make low < high"
-    return Condition(place, _difference(high, low), words, (low, high), strict=True)
+    return Condition(location, _difference(high, low), words, (low, high), strict=True)
 
 
-def can_meet(place: str, radii: Sequence[Formula]) -> Condition:
+def can_meet(location: str, radii: Sequence[Formula]) -> Condition:
     """Of spheres, with radii >= 0 in m, no two are points: at most one radius is 0."""
     spheres = _sum(*(Apply("step", (radius,)) for radius in radii))
     words = "two points never meet; give a radius > 0"
-    return Condition(place, spheres, words, (), low=len(radii) - 1.0)
+    return Condition(location, spheres, words, (), low=len(radii) - 1.0)
 
 
 def of_inertia(
-    place: str, body: str, mass: Formula, entries: Sequence[Formula], known: Mapping[str, float]
+    location: str, body: str, mass: Formula, entries: Sequence[Formula], known: Mapping[str, float]
 ) -> Iterator[Condition]:
     """That there is a body of such an inertia about its centre of mass: one moment in the plane, or
     xx, yy, zz, xy, xz, yz, of which moments are not negative; and none if it has no mass. A body
@@ -146,7 +146,7 @@ def of_inertia(
     trace = _sum(*entries[:3])
     words = f"body '{body}' has inertia but no mass; give it a mass, or inertia_com = 0"
     if value_of(mass, known) == 0.0:
-        yield Condition(place, Apply("select", (mass, Constant(1.0), _minus(trace))), words, ())
+        yield Condition(location, Apply("select", (mass, Constant(1.0), _minus(trace))), words, ())
     if len(entries) == 1:
         return
     xx, yy, zz, *products = entries
@@ -160,7 +160,7 @@ def of_inertia(
             _difference(_sum(b, c, allowed), a)
             for a, b, c in ((xx, yy, zz), (yy, zz, xx), (zz, xx, yy))
         )
-        yield Condition(place, _least(*excesses), words, (xx, yy, zz))
+        yield Condition(location, _least(*excesses), words, (xx, yy, zz))
         return
     words = (
         f"body '{body}' has moments {{:.6g}}, {{:.6g}}, {{:.6g}} and products {{:.6g}}, {{:.6g}}, "
@@ -168,7 +168,7 @@ def of_inertia(
         "together: make the products smaller, or change xx, yy or zz"
     )
     least = _least(*_leading_minors(entries))
-    yield Condition(place, least, words, tuple(entries), strict=True)
+    yield Condition(location, least, words, tuple(entries), strict=True)
 
 
 def _leading_minors(entries: Sequence[Formula]) -> tuple[Formula, ...]:

@@ -105,17 +105,19 @@ def about_slides(table: Table, sliding: Collection[str]) -> bool | None:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A named number of the generated module; `place` is where the scene gives it, for messages."""
+    """A named number of the generated module; `location` is where the scene gives it, for
+    messages.
+    """
 
     name: str
     default: float
     unit: str
     about: str
-    place: str = data_field(default="", repr=False, compare=False)
+    location: str = data_field(default="", repr=False, compare=False)
 
 
 def with_components(
-    value: tuple[Any, ...], zero: Any, dimensions: int, place: str
+    value: tuple[Any, ...], zero: Any, dimensions: int, location: str
 ) -> tuple[Any, ...]:
     """A vector of a scene, or zeros where it is left out (an empty tuple).
 
@@ -125,14 +127,14 @@ def with_components(
         return (zero,) * dimensions
     if len(value) != dimensions:
         space = "the plane" if dimensions == 2 else "space"
-        raise SceneError(f"{place}: has {len(value)} components; {space} takes {dimensions}")
+        raise SceneError(f"{location}: has {len(value)} components; {space} takes {dimensions}")
     return value
 
 
 def name_quantities(
     table: Table,
     prefix: str,
-    place: str,
+    location: str,
     known: Mapping[str, float],
     motion: Sequence[str] = (),
     sliding: Collection[str] = (),
@@ -153,7 +155,7 @@ def name_quantities(
         if isinstance(value, dict) and any(isinstance(x, Table) for x in value.values()):
             tables = {}
             for key, inner in value.items():
-                at = f"{place}.{info.alias or field}.{key}"
+                at = f"{location}.{info.alias or field}.{key}"
                 inside, new, kept = name_quantities(
                     inner, f"{prefix}_{key}", at, known, motion, sliding
                 )
@@ -166,7 +168,7 @@ def name_quantities(
         sees = [str(word) for word in _listed(extra.get("sees"))]
         named: list[Formula] = []
         for formula, suffix, spot, off_diagonal in _parts(value, field):
-            where = f"{place}.{spot}"
+            where = f"{location}.{spot}"
             bound = "any" if off_diagonal else str(extra["bound"])
             if bound == "nonnegative" and getattr(table, "allow_active", False):
                 bound = "any"

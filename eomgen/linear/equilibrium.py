@@ -74,12 +74,12 @@ def equilibrium(
         found = _nearest(search, attempt(search, start))
         if search.at_rest(found):
             return Equilibrium(found.y, found.u)
-        best = min(best, found, key=lambda place: place.largest)
+        best = min(best, found, key=lambda point: point.largest)
     raise RunError(_not_found(module, best, search.slopes(best)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class _Point:
     """The mechanism at rest at the positions of `y` under `u`, with its `changes` (nv + nx,): the
     rates of velocities and of controller states.
     """
@@ -118,7 +118,7 @@ class _Search:
         self.free = np.flatnonzero(np.concatenate([~held, trimmed]))
         self.moving = np.flatnonzero(~held)
 
-    def look(self, y: FloatArray, u: FloatArray) -> _Place:
+    def look(self, y: FloatArray, u: FloatArray) -> _Point:
         """The place at the positions of `y`, with velocities 0 and quaternions normalised."""
         if not np.isfinite(y).all():
             raise RunError("equilibrium: the positions are not finite; start elsewhere")
@@ -126,41 +126,41 @@ class _Search:
         y[self._nq : self._nq + self._nv] = 0.0
         for indices in self._module.QUATERNIONS:
             y[list(indices)] /= np.linalg.norm(y[list(indices)])
-        return _Place(y, u, self._asked(self._module.derivative, y, u)[self._nq :])
+        return _Point(y, u, self._asked(self._module.derivative, y, u)[self._nq :])
 
-    def slopes(self, place: _Place) -> FloatArray:
+    def slopes(self, point: _Point) -> FloatArray:
         """Derivatives of the changes with respect to the free unknowns, (nv + nx, nf)."""
-        by_state = self._asked(self._module.jacobian, place.y, place.u)[self._nq :]
-        by_position = by_state[:, : self._nq] @ self._tangents(place)
+        by_state = self._asked(self._module.jacobian, point.y, point.u)[self._nq :]
+        by_position = by_state[:, : self._nq] @ self._tangents(point)
         by_place = np.hstack([by_position, by_state[:, self._nq + self._nv :]])
         if np.max(self.free, initial=0) < self._nv + self._nx:
             return np.asarray(by_place[:, self.free])
-        by_input = self._asked(input_jacobian(self._module), place.y, place.u)[self._nq :]
+        by_input = self._asked(input_jacobian(self._module), point.y, point.u)[self._nq :]
         return np.hstack([by_place, by_input])[:, self.free]
 
-    def at_rest(self, place: _Place, slopes: FloatArray | None = None) -> bool:
+    def at_rest(self, point: _Point, slopes: FloatArray | None = None) -> bool:
         """Whether the changes that are left are rounding errors."""
-        slopes = self.slopes(place) if slopes is None else slopes
-        return place.largest <= CLOSE * max(1.0, float(np.max(np.abs(slopes), initial=0.0)))
+        slopes = self.slopes(point) if slopes is None else slopes
+        return point.largest <= CLOSE * max(1.0, float(np.max(np.abs(slopes), initial=0.0)))
 
     def turn(self, step: FloatArray) -> float:
         """The greatest rotation in a step of the moving unknowns, rad."""
         return float(np.max(np.abs(step[self._turns[self.moving]]), initial=0.0))
 
-    def moved(self, place: _Place, step: FloatArray) -> _Place:
+    def moved(self, point: _Point, step: FloatArray) -> _Point:
         """The place after a step of the free unknowns, shortened if a rotation is too large."""
         nv, inputs = self._nv, self._nv + self._nx
-        whole = np.zeros(inputs + len(place.u))
+        whole = np.zeros(inputs + len(point.u))
         whole[self.free] = step
         turn = float(np.max(np.abs(whole[:inputs][self._turns]), initial=0.0))
         whole *= min(1.0, LONGEST / turn) if turn else 1.0
-        y = place.y.copy()
-        y[: self._nq] += self._tangents(place) @ whole[:nv]
+        y = point.y.copy()
+        y[: self._nq] += self._tangents(point) @ whole[:nv]
         y[self._nq + nv :] += whole[nv:inputs]
-        return self.look(y, place.u + whole[inputs:])
+        return self.look(y, point.u + whole[inputs:])
 
-    def _tangents(self, place: _Place) -> FloatArray:
-        return tangents(place.y[: self._nq], self._module.QUATERNIONS)
+    def _tangents(self, point: _Point) -> FloatArray:
+        return tangents(point.y[: self._nq], self._module.QUATERNIONS)
 
     def _asked(
         self, function: Callable[..., FloatArray], y: FloatArray, u: FloatArray
@@ -168,34 +168,34 @@ class _Search:
         return evaluated(function, y, self._p, u, "equilibrium")
 
 
-def _nearest(search: _Search, place: _Place) -> _Place:
+def _nearest(search: _Search, point: _Point) -> _Point:
     """Minimise the changes by Levenberg and Marquardt's method until no step reduces them.
 
     Nocedal, Wright, Numerical Optimization, section 10.3. The damping leaves unknowns without
     effect as they are.
     """
     damping, scale = 1e-3, np.zeros(len(search.free))
-    slopes = search.slopes(place)
+    slopes = search.slopes(point)
     for _ in range(MOST_STEPS if len(search.free) else 0):
         scale = np.maximum(scale, np.linalg.norm(slopes, axis=0))
         # Unknowns whose effect is rounding must not be scaled up to have one.
         scales = np.maximum(scale, 1e-8 * np.max(scale)) if np.any(scale) else np.ones(len(scale))
         matrix = np.vstack([slopes / scales, np.sqrt(damping) * np.eye(len(scale))])
-        right = np.concatenate([-place.changes, np.zeros(len(scale))])
-        new = search.moved(place, np.linalg.lstsq(matrix, right)[0] / scales)
-        better = new.size < place.size
-        done = search.at_rest(place, slopes) and not new.size < place.size / 2
+        right = np.concatenate([-point.changes, np.zeros(len(scale))])
+        new = search.moved(point, np.linalg.lstsq(matrix, right)[0] / scales)
+        better = new.size < point.size
+        done = search.at_rest(point, slopes) and not new.size < point.size / 2
         if better:
-            place, damping = new, max(damping / 10, 1e-14)
-            slopes = search.slopes(place)
+            point, damping = new, max(damping / 10, 1e-14)
+            slopes = search.slopes(point)
         else:
             damping *= 10
         if done or damping > 1e8:
             break
-    return place
+    return point
 
 
-def _fallen(search: _Search, place: _Place) -> _Place:
+def _fallen(search: _Search, point: _Point) -> _Point:
     """Follow the overdamped motion q' = v̇(q) by implicit steps that grow as it slows down.
     Controller states follow their own rates.
 
@@ -205,13 +205,13 @@ def _fallen(search: _Search, place: _Place) -> _Place:
     """
     duration = 0.0
     for _ in range(MOST_FALLS if len(search.moving) else 0):
-        slopes = search.slopes(place)
+        slopes = search.slopes(point)
         square = slopes[search.moving]
         rates, ways = np.linalg.eig(square)
         fastest = float(np.max(np.abs(square)))
         falls = int(np.argmax(rates.real))
         rate = float(rates.real[falls])
-        if search.at_rest(place, slopes):
+        if search.at_rest(point, slopes):
             if rate <= FALLING * fastest:
                 break
             way = ways[:, falls].real
@@ -219,24 +219,24 @@ def _fallen(search: _Search, place: _Place) -> _Place:
         else:
             duration = duration or 1.0 / max(1.0, fastest)
             duration = min(duration, 0.5 / rate) if rate > 0 else duration
-            step, duration = _implicit_step(search, place, square, duration)
+            step, duration = _implicit_step(search, point, square, duration)
             if not np.max(np.abs(step)) < LOST:
                 break
-        new = search.moved(place, step)
+        new = search.moved(point, step)
         if not np.isfinite(new.size):
             break
-        duration *= float(np.clip(2 * place.size / max(new.size, 1e-300), 0.5, 4.0))
-        place = new
-    return place
+        duration *= float(np.clip(2 * point.size / max(new.size, 1e-300), 0.5, 4.0))
+        point = new
+    return point
 
 
 def _implicit_step(
-    search: _Search, place: _Place, square: FloatArray, duration: float
+    search: _Search, point: _Point, square: FloatArray, duration: float
 ) -> tuple[FloatArray, float]:
     """A step of the overdamped motion, and its duration, reduced if a rotation is too large."""
     while True:
         matrix = np.eye(len(square)) / duration - square
-        step: FloatArray = np.linalg.lstsq(matrix, place.changes[search.moving])[0].astype(float)
+        step: FloatArray = np.linalg.lstsq(matrix, point.changes[search.moving])[0].astype(float)
         turn = search.turn(step)
         if not turn > LONGEST_FALL:
             return step, duration
@@ -280,12 +280,12 @@ def _trimmed(module: GeneratedModule, names: Iterable[str]) -> NDArray[np.bool_]
     return np.array([name in set(names) for name in module.INPUTS], dtype=np.bool_)
 
 
-def _not_found(module: GeneratedModule, place: _Place, slopes: FloatArray) -> str:
-    worst = int(np.argmax(np.abs(place.changes)))
+def _not_found(module: GeneratedModule, point: _Point, slopes: FloatArray) -> str:
+    worst = int(np.argmax(np.abs(point.changes)))
     name = module.STATES[len(module.POSITIONS) + worst]
-    left = f"{name} still changes by {place.changes[worst]:.4g} {rate_unit(module.UNITS[name])}"
-    downhill = np.linalg.norm(slopes.T @ place.changes)
-    if downhill <= 1e-6 * np.linalg.norm(slopes) * place.size:
+    left = f"{name} still changes by {point.changes[worst]:.4g} {rate_unit(module.UNITS[name])}"
+    downhill = np.linalg.norm(slopes.T @ point.changes)
+    if downhill <= 1e-6 * np.linalg.norm(slopes) * point.size:
         return (
             f"no equilibrium: {left}, and no free coordinate or input affects that; "
             "start elsewhere, trim an input, or change what acts"

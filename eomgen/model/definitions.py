@@ -43,11 +43,11 @@ def with_definitions(scene: Scene, motion: Sequence[str]) -> Scene:
     return scene.replaced(definitions={}, **tables)
 
 
-def _check_names(formula: Formula, known: Collection[str], place: str) -> None:
+def _check_names(formula: Formula, known: Collection[str], location: str) -> None:
     for name in names_in(formula):
         if name not in known:
             hint = nearest(name, (*known, *FUNCTIONS)) or "; give it a value in [parameters]"
-            raise SceneError(f"{place}: unknown parameter '{name}'{hint}")
+            raise SceneError(f"{location}: unknown parameter '{name}'{hint}")
 
 
 def _meanings(definitions: Mapping[str, Formula]) -> dict[str, Formula]:
@@ -101,7 +101,7 @@ def _depths(formula: Formula, depth: int) -> Iterator[int]:
 
 
 def _replaced(
-    table: Table, meanings: Mapping[str, Formula], known: Sequence[str], place: str
+    table: Table, meanings: Mapping[str, Formula], known: Sequence[str], location: str
 ) -> Any:
     """A table with its formulas put in."""
     fields: dict[str, Any] = {}
@@ -129,5 +129,5 @@ def _replaced(
                     )
             return _put_in(value, meanings)
 
-        fields[field] = put_in(getattr(table, field), f"{place}.{info.alias or field}")
+        fields[field] = put_in(getattr(table, field), f"{location}.{info.alias or field}")
     return table.replaced(**fields)

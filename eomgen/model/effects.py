@@ -67,21 +67,21 @@ def effects_in_force(
     effects: list[Effect] = []
     found: list[Bindings] = []
     for i, effect in enumerate(scene.effects):
-        place = f"effects[{i}]"
+        location = f"effects[{i}]"
         if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
-            raise SceneError(f"{place}.type: a second 'gravity'; give one")
-        _check_names_in(effect, place, there, types)
-        effect.check_dofs(dofs, names_of_dofs, place)
+            raise SceneError(f"{location}.type: a second 'gravity'; give one")
+        _check_names_in(effect, location, there, types)
+        effect.check_dofs(dofs, names_of_dofs, location)
         vectors = {
-            field: with_components(value, ZERO, scene.dimensions, f"{place}.{field}")
+            field: with_components(value, ZERO, scene.dimensions, f"{location}.{field}")
             for field in effect.vector_fields
             if isinstance(value := getattr(effect, field), tuple)
         }
-        effect = effect.replaced(**vectors).checked(scene.dimensions, place)
+        effect = effect.replaced(**vectors).checked(scene.dimensions, location)
         if isinstance(effect, Driven):
-            check_drive(effect, place, bodies, effects, scope)
-        effect, bindings = bind(effect, effect.name, place, scope)
-        together = tuple(effect.conditions(place))
+            check_drive(effect, location, bodies, effects, scope)
+        effect, bindings = bind(effect, effect.name, location, scope)
+        together = tuple(effect.conditions(location))
         require(together, bindings.values(scope))
         found += [bindings, Bindings(conditions=together)]
         effects.append(effect)
@@ -118,7 +118,7 @@ def _there(
 
 def _check_names_in(
     effect: Effect,
-    place: str,
+    location: str,
     there: Mapping[str, tuple[str, Collection[str]]],
     types: Mapping[str, str],
 ) -> None:
@@ -126,7 +126,7 @@ def _check_names_in(
     than it acts on; `types` are those of the joints.
     """
     for fields, (what, names) in there.items():
-        for name, spot in _names_in(effect, getattr(effect, fields), place):
+        for name, spot in _names_in(effect, getattr(effect, fields), location):
             if "joint" in what and name in types and name not in names:
                 one = what if fields == "joint_fields" else f"{what} and is not free"
                 raise SceneError(
@@ -136,14 +136,14 @@ def _check_names_in(
             check_known(name, spot, names, what)
 
 
-def _names_in(effect: Effect, fields: Sequence[str], place: str) -> Iterator[tuple[str, str]]:
+def _names_in(effect: Effect, fields: Sequence[str], location: str) -> Iterator[tuple[str, str]]:
     """Each name in some fields, of which some list names or hold tables by them, and its place."""
     for field in fields:
         value = getattr(effect, field)
         if isinstance(value, str):
             if (field, value) not in (("bodies", "all"), ("joints", "all")):
-                yield value, f"{place}.{field}"
+                yield value, f"{location}.{field}"
         elif isinstance(value, dict):
-            yield from ((name, f"{place}.{field}.{name}") for name in value)
+            yield from ((name, f"{location}.{field}.{name}") for name in value)
         elif value is not None:
-            yield from ((name, f"{place}.{field}[{i}]") for i, name in enumerate(value))
+            yield from ((name, f"{location}.{field}[{i}]") for i, name in enumerate(value))

@@ -82,7 +82,7 @@ def elaborate(scene: Scene) -> Model:
 
 def outputs_for(
     wanted: Literal["all"] | Sequence[str],
-    place: str,
+    location: str,
     points: Collection[object],
     inputs: Collection[object],
     parameters: Collection[object],
@@ -90,7 +90,7 @@ def outputs_for(
 ) -> tuple[str, ...]:
     """What is to be generated, in the order of `OUTPUTS`; "all" is all that there can be.
 
-    `wanted` holds names in `OUTPUTS`; `place` says where the one of number `{}` was asked for.
+    `wanted` holds names in `OUTPUTS`; `location` says where the one of number `{}` was asked for.
     """
     needs = {name: spec.needs for name, spec in OUTPUTS.items() if spec.needs}
     there = {
@@ -104,7 +104,7 @@ def outputs_for(
     for i, name in enumerate(wanted):
         if name in needs and not there[needs[name]]:
             raise SceneError(
-                f"{place.format(i)}: '{name}' is about {needs[name]}, and there are none"
+                f"{location.format(i)}: '{name}' is about {needs[name]}, and there are none"
             )
     return in_order(wanted)
 
@@ -117,11 +117,13 @@ def in_order(outputs: Collection[str]) -> tuple[str, ...]:
 def _scene_parameters(scene: Scene) -> tuple[Parameter, ...]:
     parameters = []
     for name, entry in scene.parameters.items():
-        place = f"parameters.{name}"
+        location = f"parameters.{name}"
         if isinstance(entry, float | int):
-            parameters.append(Parameter(name, float(entry), "", "", place))
+            parameters.append(Parameter(name, float(entry), "", "", location))
         else:
-            parameters.append(Parameter(name, float(entry.value), entry.unit, entry.about, place))
+            parameters.append(
+                Parameter(name, float(entry.value), entry.unit, entry.about, location)
+            )
     return tuple(parameters)
 
 
@@ -147,10 +149,10 @@ def _bodies(
 
 def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
     joint = normalised_joint(link.joint, link.joint_place, dimensions)
-    table, of_body = bind(link.body, link.body.name, link.place, scope)
-    inertia_com = entries_of_inertia(table, link.place, dimensions)
+    table, of_body = bind(link.body, link.body.name, link.location, scope)
+    inertia_com = entries_of_inertia(table, link.location, dimensions)
     values = of_body.values(scope)
-    at = f"{link.place}.inertia_com"
+    at = f"{link.location}.inertia_com"
     sound = tuple(of_inertia(at, table.name, table.mass, inertia_com, values))
     require(sound, values)
     joint, of_joint = bind(joint, joint.name, link.joint_place, scope)
@@ -174,10 +176,10 @@ def _points(
     index = {body.name: k for k, body in enumerate(bodies)}
     points, found = [], []
     for i, point in enumerate(scene.points):
-        place = f"points[{i}]"
-        check_known(point.body, f"{place}.body", index, "body")
-        at = with_components(point.at, ZERO, scene.dimensions, f"{place}.at")
-        point, bindings = bind(point.replaced(at=at), point.name, place, scope)
+        location = f"points[{i}]"
+        check_known(point.body, f"{location}.body", index, "body")
+        at = with_components(point.at, ZERO, scene.dimensions, f"{location}.at")
+        point, bindings = bind(point.replaced(at=at), point.name, location, scope)
         points.append(Point(point.name, index[point.body], point.at))
         found.append(bindings)
     return tuple(points), joined(found)
@@ -195,19 +197,19 @@ def _check_symbols(
     """
     moving = [(body, link.joint_place) for body, link in zip(bodies, links, strict=True)]
     acting = [(effect, f"effects[{i}]") for i, effect in enumerate(effects)]
-    uses = [(p.name, "a parameter", p.place) for p in parameters]
+    uses = [(p.name, "a parameter", p.location) for p in parameters]
     uses += [(c.name, "a coordinate", at) for body, at in moving for c in body.positions]
     uses += [(c.name, "a velocity", at) for body, at in moving for c in body.velocities]
     uses += [(c.acceleration, "an acceleration", at) for b, at in moving for c in b.velocities]
     uses += [(i.name, "an input", at) for effect, at in acting for i in effect.inputs(n)]
     uses += [(x.name, "a state", at) for effect, at in acting for x in effect.states(n)]
     taken = {"t": ("time", ""), "pi": ("the number π", "")}
-    for name, use, place in uses:
+    for name, use, location in uses:
         if name in taken:
             other, at = taken[name]
             other = "another" if use == other else other
             raise SceneError(
-                f"{place}: '{name}' would be the name of {use} and of {other}"
+                f"{location}: '{name}' would be the name of {use} and of {other}"
                 f"{f' ({at})' if at else ''}; rename one of them"
             )
-        taken[name] = use, place
+        taken[name] = use, location

@@ -16,7 +16,7 @@ PARALLEL = 1e-15
 """Sine of the angle below which two axes are as good as parallel: their last digits say which."""
 
 
-def normalised_joint(joint: Joint, place: str, dimensions: int) -> Joint:
+def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
     """A joint with vectors of the right length and axes that have a direction.
 
     Raises `SceneError` for a joint that there is not in this space, an axis of no length, parallel
@@ -24,52 +24,58 @@ def normalised_joint(joint: Joint, place: str, dimensions: int) -> Joint:
     """
     if dimensions not in joint.spaces:
         raise SceneError(
-            f"{place}.type: a '{joint.type}' joint is one of space; give dimensions = 3"
+            f"{location}.type: a '{joint.type}' joint is one of space; give dimensions = 3"
         )
     if isinstance(joint, Free):
         return joint
     fields: dict[str, object] = {
-        name: with_components(getattr(joint, name), ZERO, dimensions, f"{place}.{name}")
+        name: with_components(getattr(joint, name), ZERO, dimensions, f"{location}.{name}")
         for name in ("r_parent", "r_child")
     }
     turned = isinstance(joint.orientation_deg, tuple)
     if turned and dimensions == 2:
-        raise SceneError(f"{place}.orientation_deg: has 3 components; the plane takes one angle")
+        raise SceneError(f"{location}.orientation_deg: has 3 components; the plane takes one angle")
     if not turned and dimensions == 3 and joint.orientation_deg != 0.0:
-        raise SceneError(f"{place}.orientation_deg: is one angle; space takes 3, about x, y and z")
+        raise SceneError(
+            f"{location}.orientation_deg: is one angle; space takes 3, about x, y and z"
+        )
     axis = getattr(joint, "axis", None)
     if axis is not None:
         if joint.type == "revolute" and dimensions == 2:
-            raise SceneError(f"{place}.axis: in the plane a pin turns about z; leave it out")
-        fields["axis"] = _direction(axis, f"{place}.axis", dimensions)
+            raise SceneError(f"{location}.axis: in the plane a pin turns about z; leave it out")
+        fields["axis"] = _direction(axis, f"{location}.axis", dimensions)
     axes = getattr(joint, "axes", None)
     if axes is not None:
         first, second = (
-            _direction(a, f"{place}.axes[{i}]", dimensions) for i, a in enumerate(axes)
+            _direction(a, f"{location}.axes[{i}]", dimensions) for i, a in enumerate(axes)
         )
         if sine_between(first, second) < PARALLEL:
-            raise SceneError(f"{place}.axes: are parallel; give two that cross, or a revolute")
+            raise SceneError(f"{location}.axes: are parallel; give two that cross, or a revolute")
         fields["axes"] = (first, second)
     if isinstance(joint, Geared):
         if joint.limits is not None and joint.limits[0] >= joint.limits[1]:
             low, high = joint.limits
-            raise SceneError(f"{place}.limits: {low:g} is not below {high:g}; give [low, high]")
+            raise SceneError(f"{location}.limits: {low:g} is not below {high:g}; give [low, high]")
         if joint.gear_ratio is not None and joint.motor_inertia == ZERO:
-            raise SceneError(f"{place}.gear_ratio: does nothing without a motor_inertia; give one")
+            raise SceneError(
+                f"{location}.gear_ratio: does nothing without a motor_inertia; give one"
+            )
         if joint.gear_ratio == ZERO:
-            raise SceneError(f"{place}.gear_ratio: is 0, so that no rotor turns; give another")
+            raise SceneError(f"{location}.gear_ratio: is 0, so that no rotor turns; give another")
     return joint.replaced(**fields)
 
 
-def _direction(axis: tuple[float, ...], place: str, dimensions: int) -> tuple[float, ...]:
+def _direction(axis: tuple[float, ...], location: str, dimensions: int) -> tuple[float, ...]:
     """The axis itself: rounded to length 1 it would no longer be what the scene says."""
-    axis = with_components(axis, 0.0, dimensions, place)
+    axis = with_components(axis, 0.0, dimensions, location)
     if not any(axis):
-        raise SceneError(f"{place}: has no length; give a direction, for example {_example(axis)}")
+        raise SceneError(
+            f"{location}: has no length; give a direction, for example {_example(axis)}"
+        )
     return axis
 
 
-def lengths_noticed(joint: Joint, place: str) -> Iterator[str]:
+def lengths_noticed(joint: Joint, location: str) -> Iterator[str]:
     """A line for every axis of a joint that is not of length 1."""
     one = getattr(joint, "axis", None)
     axes = {} if one is None else {"axis": one}
@@ -77,20 +83,20 @@ def lengths_noticed(joint: Joint, place: str) -> Iterator[str]:
     for key, axis in axes.items():
         length = math.hypot(*axis)
         if abs(length - 1.0) > ROUNDING:
-            yield f"{place}.{key}: has length {length:g}; taken as a direction of length 1"
+            yield f"{location}.{key}: has length {length:g}; taken as a direction of length 1"
 
 
 def _example(axis: Sequence[float]) -> str:
     return str([1.0, *([0.0] * (len(axis) - 1))])
 
 
-def entries_of_inertia(body: BodyTable, place: str, dimensions: int) -> tuple[Formula, ...]:
+def entries_of_inertia(body: BodyTable, location: str, dimensions: int) -> tuple[Formula, ...]:
     """The entries of a body's inertia: one in the plane, six in space.
 
     Raises `SceneError`, naming the body, if there are not as many as there should be.
     """
     given = body.inertia_com
-    where = f"{place}.inertia_com: body '{body.name}'"
+    where = f"{location}.inertia_com: body '{body.name}'"
     if dimensions == 2:
         if isinstance(given, tuple):
             raise SceneError(f"{where} has {len(given)} entries; the plane takes one number")

@@ -68,7 +68,7 @@ def _length_noticed(parts: Sequence[float], first: str) -> list[str]:
 def _values(
     given: Sequence[float] | dict[str, float],
     coordinates: Sequence[Coordinate],
-    place: str,
+    location: str,
     prescribed: Sequence[Prescribed],
 ) -> tuple[float, ...]:
     """The values of coordinates or velocities, in order: 0 for what a table does not name."""
@@ -76,15 +76,17 @@ def _values(
     if not isinstance(given, dict):
         if len(given) != len(names):
             raise SceneError(
-                f"{place}: has {len(given)} numbers for {len(names)} coordinates; "
+                f"{location}: has {len(given)} numbers for {len(names)} coordinates; "
                 f"give one each for {listed(names)}"
             )
         return tuple(float(x) for x in given)
     reasons = _reasons(prescribed)
     for key in given:
         if why := reasons.get(key) or reasons.get(key.removesuffix("_deg")):
-            raise SceneError(f"{place}.{key}: {why}; leave it out")
-    return tuple((dict.fromkeys(names, 0.0) | values_by_name(given, coordinates, place)).values())
+            raise SceneError(f"{location}.{key}: {why}; leave it out")
+    return tuple(
+        (dict.fromkeys(names, 0.0) | values_by_name(given, coordinates, location)).values()
+    )
 
 
 def _reasons(prescribed: Sequence[Prescribed]) -> dict[str, str]:

@@ -51,14 +51,14 @@ def joined(parts: Iterable[Bindings]) -> Bindings:
     )
 
 
-def bind(table: AnyTable, prefix: str, place: str, scope: Scope) -> tuple[AnyTable, Bindings]:
+def bind(table: AnyTable, prefix: str, location: str, scope: Scope) -> tuple[AnyTable, Bindings]:
     """A table with each bare number as a parameter, named after `prefix`, and what that brings.
 
-    Raises `SceneError`, naming the `place`, for a name that is not in scope, and for a value that
-    does not keep its conditions.
+    Raises `SceneError`, naming the `location`, for a name that is not in scope, and for a value
+    that does not keep its conditions.
     """
     fields, parameters, conditions = name_quantities(
-        table, prefix, place, scope.values, scope.moving, scope.sliding
+        table, prefix, location, scope.values, scope.moving, scope.sliding
     )
     bindings = Bindings(tuple(parameters), tuple(conditions))
     require(conditions, bindings.values(scope))
@@ -68,11 +68,11 @@ def bind(table: AnyTable, prefix: str, place: str, scope: Scope) -> tuple[AnyTab
 def check_names(tables: Sequence[tuple[str, str]]) -> None:
     """Raise `SceneError` unless names, each with its place, are given once; none is the world's."""
     seen: dict[str, str] = {}
-    for name, place in tables:
+    for name, location in tables:
         if name in seen:
             raise SceneError(
-                f"{place}.name: '{name}' is the name of {seen[name]} too; give each its own"
+                f"{location}.name: '{name}' is the name of {seen[name]} too; give each its own"
             )
-        seen[name] = place
-        if name == WORLD and place.startswith("bodies"):
-            raise SceneError(f"{place}.name: '{WORLD}' is the ground; choose another name")
+        seen[name] = location
+        if name == WORLD and location.startswith("bodies"):
+            raise SceneError(f"{location}.name: '{WORLD}' is the ground; choose another name")

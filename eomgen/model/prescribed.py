@@ -14,11 +14,12 @@ from eomgen.scene.joints.base import Coordinate
 
 
 def values_by_name(
-    given: dict[str, float], coordinates: Sequence[Coordinate], place: str
+    given: dict[str, float], coordinates: Sequence[Coordinate], location: str
 ) -> dict[str, float]:
     """The values of a table by the names of coordinates, some of them in degrees.
 
-    Raises `SceneError`, naming the `place`, for a name that is not there, or that is given twice.
+    Raises `SceneError`, naming the `location`, for a name that is not there, or that is given
+    twice.
     """
     names = [c.name for c in coordinates]
     degrees = {f"{c.name}_deg": c.name for c in coordinates if c.unit in ("rad", "rad/s")}
@@ -28,11 +29,11 @@ def values_by_name(
             values[key] = float(value)
         elif key in degrees:
             if degrees[key] in given:
-                raise SceneError(f"{place}.{key}: {degrees[key]} is given too; give one of them")
+                raise SceneError(f"{location}.{key}: {degrees[key]} is given too; give one of them")
             values[degrees[key]] = math.radians(value)
         else:
             hint = nearest(key, names) or f"; known: {listed(names)}"
-            raise SceneError(f"{place}.{key}: no coordinate has this name{hint}")
+            raise SceneError(f"{location}.{key}: no coordinate has this name{hint}")
     return values
 
 
@@ -62,7 +63,7 @@ def locked_values(
 
 def check_drive(
     drive: Driven,
-    place: str,
+    location: str,
     bodies: Sequence[Body],
     before: Sequence[Effect],
     scope: Scope,
@@ -74,18 +75,19 @@ def check_drive(
     for other in before:
         if isinstance(other, Driven) and other.joint == drive.joint:
             raise SceneError(
-                f"{place}.joint: '{drive.joint}' is driven by '{other.name}' too; give one of them"
+                f"{location}.joint: '{drive.joint}' is driven by '{other.name}' too; give one of "
+                "them"
             )
     own = next(b.positions[0].name for b in bodies if b.joint.name == drive.joint)
     for name in names_in(drive.coordinate):
         if name in (own, f"{own}_dot"):
             raise SceneError(
-                f"{place}.coordinate: '{name}' is the motion that it gives, which is circular; "
+                f"{location}.coordinate: '{name}' is the motion that it gives, which is circular; "
                 "use t and parameters"
             )
         if name in scope.moving and name not in scope.values and name != "t":
             raise SceneError(
-                f"{place}.coordinate: '{name}' is found only as it moves, and a drive is fixed "
+                f"{location}.coordinate: '{name}' is found only as it moves, and a drive is fixed "
                 "beforehand; use t and parameters"
             )
         if name not in scope.values and name != "t":
@@ -96,6 +98,6 @@ def check_drive(
         start = (math.nan, math.nan, math.nan)
     if not all(map(math.isfinite, start)):
         raise SceneError(
-            f"{place}.coordinate: it, its rate or its acceleration is not finite at t = 0; "
+            f"{location}.coordinate: it, its rate or its acceleration is not finite at t = 0; "
             "change the formula"
         )

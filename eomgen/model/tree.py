@@ -18,7 +18,7 @@ class Link:
     """
 
     body: BodyTable
-    place: str
+    location: str
     joint: Joint
     joint_place: str
     parent: int
@@ -31,16 +31,16 @@ def links_of(scene: Scene) -> tuple[Link, ...]:
     the world by one joint after another.
     """
     bodies, joints = written_out(scene)
-    check_names([(body.name, place) for body, place in bodies])
-    check_names([(joint.name, place) for joint, place in joints])
-    places = {body.name: place for body, place in bodies}
-    holding = _holding(places, joints)
+    check_names([(body.name, location) for body, location in bodies])
+    check_names([(joint.name, location) for joint, location in joints])
+    locations = {body.name: location for body, location in bodies}
+    holding = _holding(locations, joints)
     depth = _depths(holding)
     order = sorted(bodies, key=lambda body: depth[body[0].name])
     index = {WORLD: -1, **{body.name: k for k, (body, _) in enumerate(order)}}
     return tuple(
-        Link(body, place, *holding[body.name], index[holding[body.name][0].parent])
-        for body, place in order
+        Link(body, location, *holding[body.name], index[holding[body.name][0].parent])
+        for body, location in order
     )
 
 
@@ -50,25 +50,26 @@ def _holding(
     """The joint that holds each body, with its place; `bodies` have theirs by name."""
     holding: dict[str, tuple[Joint, str]] = {}
     anchors: Collection[str] = dict.fromkeys([WORLD, *bodies])
-    for joint, place in joints:
+    for joint, location in joints:
         if joint.child == WORLD:
             raise SceneError(
-                f"{place}.child: '{WORLD}' is the ground, which hangs on nothing; name it as the "
+                f"{location}.child: '{WORLD}' is the ground, which hangs on nothing; name it as "
+                "the "
                 "parent, and give no body a second joint: loops are not closed"
             )
-        check_known(joint.child, f"{place}.child", bodies, "body")
+        check_known(joint.child, f"{location}.child", bodies, "body")
         if joint.parent != WORLD:
-            check_known(joint.parent, f"{place}.parent", anchors, "body")
+            check_known(joint.parent, f"{location}.parent", anchors, "body")
         if joint.child in holding:
             raise SceneError(
-                f"{place}.child: '{joint.child}' is the child of {holding[joint.child][1]} too; "
+                f"{location}.child: '{joint.child}' is the child of {holding[joint.child][1]} too; "
                 "in a tree each body has one joint to its parent"
             )
-        holding[joint.child] = (joint, place)
-    for name, place in bodies.items():
+        holding[joint.child] = (joint, location)
+    for name, location in bodies.items():
         if name not in holding:
             raise SceneError(
-                f"{place}.name: '{name}' is attached to nothing; "
+                f"{location}.name: '{name}' is attached to nothing; "
                 "give it a joint, of type 'free' if nothing holds it"
             )
     return holding
@@ -82,9 +83,9 @@ def _depths(holding: Mapping[str, tuple[Joint, str]]) -> dict[str, int]:
         name = start
         while name not in depth:
             if name in path:
-                joint, place = holding[name]
+                joint, location = holding[name]
                 raise SceneError(
-                    f"{place}.parent: '{joint.parent}' hangs on its own child '{name}': "
+                    f"{location}.parent: '{joint.parent}' hangs on its own child '{name}': "
                     "the joints make a cycle; let one tree start at the world"
                 )
             path[name] = None

@@ -104,13 +104,13 @@ def interpreter(
 ) -> Callable[[Mapping[str, Any]], list[Any]]:
     """`interpret` for many inputs: which steps to run, and how, is found once."""
     live = live_steps(program, program.outputs[output].nodes)
-    place = {i: k for k, i in enumerate(live)}
+    index = {i: k for k, i in enumerate(live)}
     start: list[Any] = [None] * len(live)
     given: list[tuple[int, str]] = []
     todo: list[tuple[int, Callable[..., Any], tuple[int, ...]]] = []
     for k, i in enumerate(live):
         step = program.steps[i]
-        operands = tuple(place[o] for o in step.operands)
+        operands = tuple(index[o] for o in step.operands)
         if step.operation == "constant":
             start[k] = scalars.number(float(step.value or 0.0))
         elif step.operation == "input":
@@ -121,7 +121,7 @@ def interpreter(
             todo.append((k, partial(scalars.call, step.operation), operands))
         else:
             todo.append((k, ARITHMETIC[step.operation], operands))
-    results = [place[n] for n in program.outputs[output].nodes]
+    results = [index[n] for n in program.outputs[output].nodes]
 
     def run(inputs: Mapping[str, Any]) -> list[Any]:
         values = start.copy()

@@ -24,7 +24,7 @@ def with_switching_functions(program: Program, states: Collection[str]) -> Progr
     if "derivative" not in program.outputs:
         return program
     steps = list(program.steps)
-    places = {step: i for i, step in enumerate(steps)}
+    index_of = {step: i for i, step in enumerate(steps)}
     nodes: dict[int, None] = {}
     for pair in _compared(program):
         if len(pair) == 1:
@@ -32,13 +32,13 @@ def with_switching_functions(program: Program, states: Collection[str]) -> Progr
             continue
         stage = max(steps[i].stage for i in pair)
         found = [
-            places[difference]
+            index_of[difference]
             for operands in (pair, pair[::-1])
-            if (difference := Step("sub", operands, stage)) in places
+            if (difference := Step("sub", operands, stage)) in index_of
         ]
         if not found:
             difference = Step("sub", pair, stage)
-            places[difference] = len(steps)
+            index_of[difference] = len(steps)
             found = [len(steps)]
             steps.append(difference)
         nodes[found[0]] = None

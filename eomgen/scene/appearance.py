@@ -24,8 +24,8 @@ def appearance_of(scene: Scene) -> Appearance:
     camera is to follow and that is not there.
     """
     bodies, _ = written_out(scene)
-    for body, place in bodies:
-        check_look(body.shapes, None, scene.dimensions, place)
+    for body, location in bodies:
+        check_look(body.shapes, None, scene.dimensions, location)
     shapes = {body.name: body.shapes for body, _ in bodies}
     check_look((), scene.camera, scene.dimensions, "camera")
     if scene.camera.follow is not None:

@@ -27,16 +27,16 @@ def written_out(scene: Scene) -> tuple[list[tuple[BodyTable, str]], list[tuple[J
     return bodies, joints
 
 
-def _links(chain: ChainTable, place: str, dimensions: int) -> list[tuple[BodyTable, Joint]]:
+def _links(chain: ChainTable, location: str, dimensions: int) -> list[tuple[BodyTable, Joint]]:
     longest = f"{chain.name}_joint_{chain.count}"
     if len(longest) > LONGEST_NAME:
         raise SceneError(
-            f"{place}.name: makes the name '{longest}', which is longer than {LONGEST_NAME} "
+            f"{location}.name: makes the name '{longest}', which is longer than {LONGEST_NAME} "
             "characters; choose a shorter name"
         )
     # Checked here, where what is wrong still has the name that the scene gives it.
     start, r_parent, r_child = (
-        with_components(getattr(chain, field), ZERO, dimensions, f"{place}.{field}")
+        with_components(getattr(chain, field), ZERO, dimensions, f"{location}.{field}")
         for field in ("start", "r_parent", "r_child")
     )
     links: list[tuple[BodyTable, Joint]] = []

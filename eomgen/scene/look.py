@@ -131,38 +131,40 @@ class Camera(Table):
     )
 
 
-def check_look(shapes: Sequence[Shape], camera: Camera | None, dimensions: int, place: str) -> None:
+def check_look(
+    shapes: Sequence[Shape], camera: Camera | None, dimensions: int, location: str
+) -> None:
     """Check that `shapes` and `camera` are of the plane (`dimensions` 2) or of space (3).
 
-    `place` is where the scene gives them, for messages: `bodies[0]` for the shapes of a body,
+    `location` is where the scene gives them, for messages: `bodies[0]` for the shapes of a body,
     `camera` for the camera. Raises `SceneError` with place, value and remedy.
     """
     for i, shape in enumerate(shapes):
-        _check_shape(shape, dimensions, f"{place}.shapes[{i}]")
+        _check_shape(shape, dimensions, f"{location}.shapes[{i}]")
     if camera is not None:
-        _check_point(camera.center, dimensions, f"{place}.center")
+        _check_point(camera.center, dimensions, f"{location}.center")
         if dimensions == 2:
             for key in ("azimuth_deg", "elevation_deg"):
                 if key in camera.model_fields_set:
                     raise SceneError(
-                        f"{place}.{key}: {getattr(camera, key):g}: the camera of the plane does "
+                        f"{location}.{key}: {getattr(camera, key):g}: the camera of the plane does "
                         "not turn; leave it out, or set dimensions = 3"
                     )
 
 
-def _check_shape(shape: Shape, dimensions: int, place: str) -> None:
+def _check_shape(shape: Shape, dimensions: int, location: str) -> None:
     here, there = ("the plane", "space") if dimensions == 2 else ("space", "the plane")
     instead = INSTEAD[dimensions].get(shape.type)
     if instead:
-        raise SceneError(f"{place}.type: '{shape.type}' is a shape of {there}; use '{instead}'")
+        raise SceneError(f"{location}.type: '{shape.type}' is a shape of {there}; use '{instead}'")
     for key, point in _points(shape):
-        _check_point(point, dimensions, f"{place}.{key}")
+        _check_point(point, dimensions, f"{location}.{key}")
     if isinstance(shape, Box):
         right, wrong = ("angle", "orientation_deg")[:: 1 if dimensions == 2 else -1]
         if wrong in shape.model_fields_set:
-            raise SceneError(f"{place}.{wrong}: turns a box of {there}; in {here} use '{right}'")
+            raise SceneError(f"{location}.{wrong}: turns a box of {there}; in {here} use '{right}'")
     if isinstance(shape, Cylinder) and shape.start == shape.end:
-        raise SceneError(f"{place}.end: {list(shape.end)} is the start too; give it a length")
+        raise SceneError(f"{location}.end: {list(shape.end)} is the start too; give it a length")
 
 
 def _points(shape: Shape) -> Iterator[tuple[str, tuple[float, ...] | None]]:
@@ -180,9 +182,9 @@ def _points(shape: Shape) -> Iterator[tuple[str, tuple[float, ...] | None]]:
             yield from (("start", shape.start), ("end", shape.end))
 
 
-def _check_point(point: tuple[float, ...] | None, dimensions: int, place: str) -> None:
+def _check_point(point: tuple[float, ...] | None, dimensions: int, location: str) -> None:
     if point is not None and len(point) != dimensions:
         where = "the plane" if dimensions == 2 else "space"
         raise SceneError(
-            f"{place}: {list(point)} has {len(point)} components; in {where} give {dimensions}"
+            f"{location}: {list(point)} has {len(point)} components; in {where} give {dimensions}"
         )

@@ -25,13 +25,13 @@ def _lines(details: list[ErrorDetails]) -> list[str]:
     outer: set[str] = set()
     for single in (single for detail in details for single in _singles(detail)):
         detail = _of_the_whole_list(single)
-        place, weight = _place(detail["loc"]), _weight(detail)
+        location, weight = _location(detail["loc"]), _weight(detail)
         if detail["type"] in ("unknown_key", "keys"):
-            place = f"{place}.{brief(detail['ctx']['key'])}"
-        outer |= {place[:i] for i, character in enumerate(place) if character in ".["}
-        if place not in lines or weight >= lines[place][0]:
-            lines[place] = weight, _line(detail)
-    return [line for place, (_, line) in lines.items() if place not in outer]
+            location = f"{location}.{brief(detail['ctx']['key'])}"
+        outer |= {location[:i] for i, character in enumerate(location) if character in ".["}
+        if location not in lines or weight >= lines[location][0]:
+            lines[location] = weight, _line(detail)
+    return [line for location, (_, line) in lines.items() if location not in outer]
 
 
 def _singles(detail: ErrorDetails) -> list[ErrorDetails]:
@@ -79,59 +79,59 @@ def _expected(detail: ErrorDetails) -> list[str]:
 
 
 def _line(detail: ErrorDetails) -> str:
-    """One pydantic error as `place: value problem; remedy`."""
+    """One pydantic error as `location: value problem; remedy`."""
     kind, context = detail["type"], detail.get("ctx", {})
-    value, place = shown(detail["input"]), _place(detail["loc"])
+    value, location = shown(detail["input"]), _location(detail["loc"])
     match kind:
         case "unknown_key":
             key = brief(context["key"])
-            place = f"{place}.{key}" if place else key
-            return f"{place}: unknown key{context['hint']}"
+            location = f"{location}.{key}" if location else key
+            return f"{location}: unknown key{context['hint']}"
         case "keys":
-            return f"{place}.{context['key']}: {detail['msg']}"
+            return f"{location}.{context['key']}: {detail['msg']}"
         case "missing":
-            if place.endswith("]"):
-                return f"{place}: missing; the list is too short"
-            return f"{place}: missing; every such table needs it"
+            if location.endswith("]"):
+                return f"{location}: missing; the list is too short"
+            return f"{location}: missing; every such table needs it"
         case "quantity":
-            return f"{place}: {value} {detail['msg']}"
+            return f"{location}: {value} {detail['msg']}"
         case "union_tag_invalid":
             known = [tag.strip().strip("'") for tag in context["expected_tags"].split(",")]
             tag = str(context["tag"])
             hint = nearest(tag, known) or f"; known: {', '.join(known)}"
-            return f"{place}.type: unknown value '{brief(tag)}'{hint}"
+            return f"{location}.type: unknown value '{brief(tag)}'{hint}"
         case "union_tag_not_found":
-            return f"{place}.type: missing; it says what kind this is"
+            return f"{location}.type: missing; it says what kind this is"
         case "literal_error":
             hint = _hint(detail) or f"; known: {', '.join(_expected(detail))}"
-            return f"{place}: unknown value {value}{hint}"
+            return f"{location}: unknown value {value}{hint}"
         case "value_error":
-            return f"{place}: {value} {context['error']}"
+            return f"{location}: {value} {context['error']}"
         case "finite_number":
-            return f"{place}: {value} is not a finite number; give one that is"
+            return f"{location}: {value} is not a finite number; give one that is"
         case "float_type":
-            return f"{place}: {value} is not a number; give one"
+            return f"{location}: {value} is not a number; give one"
         case "greater_than":
-            return f"{place}: {value} is not positive; give a number > 0"
+            return f"{location}: {value} is not positive; give a number > 0"
         case "greater_than_equal":
-            return f"{place}: {value} is too small; give at least {context['ge']}"
+            return f"{location}: {value} is too small; give at least {context['ge']}"
         case "less_than_equal":
-            return f"{place}: {value} is too large; give at most {context['le']}"
+            return f"{location}: {value} is too large; give at most {context['le']}"
         case "bool_type":
-            return f"{place}: {value} is neither true nor false; give one"
+            return f"{location}: {value} is neither true nor false; give one"
         case "int_type" | "int_from_float" | "int_parsing":
-            return f"{place}: {value} is not a whole number; give one"
+            return f"{location}: {value} is not a whole number; give one"
         case "too_long" | "too_short":
-            return f"{place}: has {_entries(detail)}; give {_wanted_entries(place, context)}"
+            return f"{location}: has {_entries(detail)}; give {_wanted_entries(location, context)}"
         case "list_of_lists":
-            return f"{place}: has lists in it; give everything in one list"
+            return f"{location}: has lists in it; give everything in one list"
         case "list_of_no_lists":
-            return f"{place}: has entries that are no lists; give a list of lists"
+            return f"{location}: has entries that are no lists; give a list of lists"
         case "string_type" | "tuple_type" | "dict_type" | "model_type" | "model_attributes_type":
             wanted = {"string_type": "a text", "tuple_type": "a list"}.get(kind, "a table")
-            return f"{place}: {value} is not {wanted}; give one"
+            return f"{location}: {value} is not {wanted}; give one"
         case _:
-            return f"{place}: {value}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
+            return f"{location}: {value}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
 
 
 def _entries(detail: ErrorDetails) -> str:
@@ -139,8 +139,8 @@ def _entries(detail: ErrorDetails) -> str:
     return "1 entry" if count == 1 else f"{count} entries"
 
 
-def _wanted_entries(place: str, context: dict[str, Any]) -> str:
-    if place.endswith("inertia_com"):
+def _wanted_entries(location: str, context: dict[str, Any]) -> str:
+    if location.endswith("inertia_com"):
         return "one number in the plane, in space [xx, yy, zz] or those and xy, xz, yz"
     if "min_length" in context:
         return f"at least {context['min_length']}"
@@ -160,20 +160,20 @@ _UNION_MEMBERS = (
 _TAGGED = {"joints", "effects", "shapes"}
 
 
-def _place(location: tuple[int | str, ...]) -> str:
+def _location(parts: tuple[int | str, ...]) -> str:
     """`joints[1].parent` from pydantic's location, without the union members it names."""
-    place, after_index_of = "", ""
-    for i, part in enumerate(location):
+    location, after_index_of = "", ""
+    for i, part in enumerate(parts):
         if isinstance(part, int):
-            place += f"[{part}]"
-            after_index_of = str(location[i - 1])
+            location += f"[{part}]"
+            after_index_of = str(parts[i - 1])
         elif after_index_of in _TAGGED:
             after_index_of = ""  # the tag of a union: type = "revolute"
         elif part == "[key]" or part.startswith(_UNION_MEMBERS):
             continue
         else:
-            place += f".{brief(part)}" if place else brief(part)
-    return place
+            location += f".{brief(part)}" if location else brief(part)
+    return location
 
 
 def shown(value: Any) -> str:

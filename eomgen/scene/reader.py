@@ -122,13 +122,15 @@ def _check_sizes(table: dict[str, Any], source: str) -> None:
     """
     rest: list[tuple[str, Any]] = [("", table)]
     while rest:
-        place, value = rest.pop()
-        most = MOST if place in Scene.model_fields else LONGEST_LIST
-        if isinstance(value, list | dict) and place and len(value) > most:
-            raise SceneError(f"{source}: {place}: has {len(value)} entries; give at most {most}")
+        location, value = rest.pop()
+        most = MOST if location in Scene.model_fields else LONGEST_LIST
+        if isinstance(value, list | dict) and location and len(value) > most:
+            raise SceneError(f"{source}: {location}: has {len(value)} entries; give at most {most}")
         if isinstance(value, dict):
-            rest += [(f"{place}.{brief(key)}".lstrip("."), entry) for key, entry in value.items()]
+            rest += [
+                (f"{location}.{brief(key)}".lstrip("."), entry) for key, entry in value.items()
+            ]
         elif isinstance(value, list):
-            rest += [(f"{place}[{i}]", entry) for i, entry in enumerate(value)]
+            rest += [(f"{location}[{i}]", entry) for i, entry in enumerate(value)]
         elif isinstance(value, int) and abs(value) > LARGEST_WHOLE:
-            raise SceneError(f"{source}: {place}: is a number of hundreds of digits; {REMEDY}")
+            raise SceneError(f"{source}: {location}: is a number of hundreds of digits; {REMEDY}")

@@ -68,7 +68,7 @@ def _test(condition: Condition, value: str) -> str:
 def _words(condition: Condition, shown: list[str]) -> str:
     """The source of a text."""
     names = listed(dict.fromkeys(names_in(condition.value)))
-    text = f"parameters {names}: {condition.place}: {condition.words}"
+    text = f"parameters {names}: {condition.location}: {condition.words}"
     if shown:
         return f"{text!r}.format({', '.join(shown)})"
     return repr(text.replace("{{", "{").replace("}}", "}"))

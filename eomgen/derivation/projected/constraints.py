@@ -206,7 +206,9 @@ def _simple(primitive: Primitive) -> bool:
 def _entries(name: str, rotation: Expr, turning: Expr, ledger: Ledger) -> Expr:
     """A rotation by symbols for its entries, whose rates are those of Q' = Q [ω]x."""
     symbols = sp.Matrix(3, 3, lambda i, j: real(f"R__{name}__{'xyz'[i]}{'xyz'[j]}"))
-    symbols = symbols.applyfunc(lambda s: rotation[_place(s)] if rotation[_place(s)].is_Atom else s)
+    symbols = symbols.applyfunc(
+        lambda s: rotation[_position(s)] if rotation[_position(s)].is_Atom else s
+    )
     for i in range(3):
         for j in range(3):
             if symbols[i, j] != rotation[i, j]:
@@ -219,7 +221,7 @@ def _entries(name: str, rotation: Expr, turning: Expr, ledger: Ledger) -> Expr:
     return symbols
 
 
-def _place(symbol: Expr) -> tuple[int, int]:
+def _position(symbol: Expr) -> tuple[int, int]:
     row, column = symbol.name[-2:]
     return "xyz".index(row), "xyz".index(column)
 

@@ -60,12 +60,12 @@ def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
         parent = WORLD if body.parent < 0 else model.bodies[body.parent].name
         own = [(symbol, e) for symbol, e in definitions if symbol.name.split("__")[1] == body.name]
         whole = c.axes * c.rotation
-        place = c.axes * c.reach - whole * c.arm
+        position = c.axes * c.reach - whole * c.arm
         pairs: Pairs = [(symbol, e) for symbol, e in own if symbol.name.startswith(ROTATIONS)]
         size = 2 if plane else 3
         if whole != sp.eye(3):
             pairs.append((sp.Symbol(f"R_{body.name}"), whole[:size, :size]))
-        pairs.append((sp.Symbol(f"r_{body.name}"), place[:size, :].applyfunc(_short)))
+        pairs.append((sp.Symbol(f"r_{body.name}"), position[:size, :].applyfunc(_short)))
         yield (
             f"Joint {body.joint.name}: {body.joint.type}, {parent} to {body.name}",
             f"R_{body.name} turns axes of {body.name} into those of {parent}, and r_{body.name} "

@@ -61,5 +61,5 @@ class PointGravity(EffectTable):
         """r, and its square."""
         zeros = (mechanism.value(ZERO),) * mechanism.dimensions
         centre = tuple(mechanism.value(part) for part in self.at)
-        arm = sub(mechanism.place(body, zeros), centre)
+        arm = sub(mechanism.position(body, zeros), centre)
         return arm, dot(arm, arm)

@@ -120,8 +120,8 @@ class Mechanism(Protocol):
     def height(self, body: str) -> Scalar:
         """World y of a body's centre of mass in the plane, z in space, m."""
 
-    def place(self, body: str, at: Vector) -> Vector:
-        """World place of a point of a body, given from its centre of mass in body axes, m. The
+    def position(self, body: str, at: Vector) -> Vector:
+        """World position of a point of a body, given from its centre of mass in body axes, m. The
         world is a body, too, with its origin for a centre of mass.
         """
 
@@ -172,7 +172,7 @@ class Unmoved:
         """Never asked for."""
         raise AssertionError
 
-    def place(self, body: str, at: Vector) -> Vector:
+    def position(self, body: str, at: Vector) -> Vector:
         """Never asked for."""
         raise AssertionError(body)
 
@@ -239,10 +239,10 @@ class EffectTable(Table):
 
     name: Identifier
 
-    def checked(self, dimensions: int, place: str) -> Self:
+    def checked(self, dimensions: int, location: str) -> Self:
         """The effect itself, or put right where `dimensions` ask for it.
 
-        Raises `SceneError`, naming the field after `place`, for what the schema cannot know.
+        Raises `SceneError`, naming the field after `location`, for what the schema cannot know.
         """
         return self
 
@@ -250,7 +250,7 @@ class EffectTable(Table):
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
-        place: str,
+        location: str,
     ) -> None:
         """Raise `SceneError` for a joint with a degree of freedom that it cannot act on.
 
@@ -258,8 +258,8 @@ class EffectTable(Table):
         coordinates.
         """
 
-    def conditions(self, place: str) -> Iterable[Condition]:
-        """What its quantities are to keep beside their own bounds; `place` is the effect's."""
+    def conditions(self, location: str) -> Iterable[Condition]:
+        """What its quantities are to keep beside their own bounds; `location` is the effect's."""
         return ()
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:

@@ -41,7 +41,7 @@ class OnBodies(EffectTable):
             key = given[0] if given else "body"
             raise wrong(key, f"{what}; give one of body, bodies, points")
         if given == ["points"] and self.at:
-            raise wrong("at", "named points have their own places; leave it out")
+            raise wrong("at", "named points have their own positions; leave it out")
         listed = getattr(self, given[0])
         for i, name in enumerate(listed if isinstance(listed, tuple) else ()):
             if name in listed[:i]:
@@ -54,7 +54,7 @@ class OnBodies(EffectTable):
             return (self.body,)
         return self.bodies if isinstance(self.bodies, tuple) else mechanism.bodies
 
-    def places(self, mechanism: Mechanism) -> Iterator[tuple[str, Vector]]:
+    def loaded_points(self, mechanism: Mechanism) -> Iterator[tuple[str, Vector]]:
         """Each body with the point on it, body axes, m."""
         if self.points is not None:
             yield from (mechanism.point(name) for name in self.points)
@@ -77,7 +77,7 @@ def local_names(
     """
     used = {name for part in parts for name in names_in(part)}
     found: dict[str, Scalar] = {}
-    for prefix, vector in (("", mechanism.place), ("v", mechanism.velocity)):
+    for prefix, vector in (("", mechanism.position), ("v", mechanism.velocity)):
         names = [f"{prefix}{axis}" for axis in "xyz"]
         if used.intersection(names):
             values = (*vector(body, at), mechanism.number(0.0))

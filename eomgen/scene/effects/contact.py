@@ -90,7 +90,7 @@ class BodyContact(OnBodies):
         default=(), validate_default=False, description="direction out of the plane"
     )
     offset: Quantity = quantity(
-        "m", "place of the plane along its normal", default=ZERO, validate_default=False
+        "m", "position of the plane along its normal", default=ZERO, validate_default=False
     )
     other: Identifier = Field(
         default=WORLD, description="body of the plane or the ball, or 'world'"
@@ -166,31 +166,31 @@ class BodyContact(OnBodies):
                 raise wrong(f"radii.{name}", "is none of the bodies in contact; leave it out")
         return self
 
-    def checked(self, dimensions: int, place: str) -> Self:
+    def checked(self, dimensions: int, location: str) -> Self:
         """Its normal has a direction."""
         up = (0.0,) * (dimensions - 1) + (1.0,)
-        normal = with_components(self.normal or up, 0.0, dimensions, f"{place}.normal")
+        normal = with_components(self.normal or up, 0.0, dimensions, f"{location}.normal")
         if not any(normal):
-            raise SceneError(f"{place}.normal: has no direction; give one that is not zero")
+            raise SceneError(f"{location}.normal: has no direction; give one that is not zero")
         return self.replaced(normal=normal)
 
-    def conditions(self, place: str) -> Iterator[Condition]:
+    def conditions(self, location: str) -> Iterator[Condition]:
         """No radius is negative, spheres have one, restitution is from 0 to 1."""
         radii = {f"radii.{name}": radius for name, radius in self.radii.items()}
         radii |= {"radius": self.radius, "other_radius": self.other_radius}
         for key, radius in radii.items():
-            yield not_negative(f"{place}.{key}", radius, "m")
-        yield a_part(f"{place}.restitution", self.restitution)
+            yield not_negative(f"{location}.{key}", radius, "m")
+        yield a_part(f"{location}.restitution", self.restitution)
         listed = self.points or (self.bodies if isinstance(self.bodies, tuple) else (self.body,))
         if self.bodies == "all" and self.radii:
             return  # which bodies are left to be points is not known here
         own = [radii.get(f"radii.{name}", self.radius) for name in listed]
         if self.against == "ball":
             for radius in dict.fromkeys(own):
-                yield can_meet(f"{place}.other_radius", (radius, self.other_radius))
+                yield can_meet(f"{location}.other_radius", (radius, self.other_radius))
         if self.against == "each_other":
             both = (*own, self.radius) if self.bodies == "all" else own
-            yield can_meet(f"{place}.radius", both)
+            yield can_meet(f"{location}.radius", both)
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """One load a body and touching point of it, for the corners of a box in one."""
@@ -314,7 +314,7 @@ class BodyContact(OnBodies):
     def _touches(self, mechanism: Mechanism) -> Iterator[Touch]:
         balls = [
             Ball(body, at, mechanism.value(self.radii.get(body, self.radius)))
-            for body, at in self.places(mechanism)
+            for body, at in self.loaded_points(mechanism)
             if body != self.other
         ]
         if self.against == "each_other":

@@ -47,20 +47,20 @@ class Dof:
         return scale(force, self.direction)
 
 
-def joint_dof(mechanism: Mechanism, joint: str, kind: str, place: int) -> Dof:
-    """The degree of freedom whose coordinate, or quaternion, has index `place` in its joint."""
+def joint_dof(mechanism: Mechanism, joint: str, kind: str, index: int) -> Dof:
+    """The degree of freedom whose coordinate, or quaternion, has this index in its joint."""
     if kind != "spherical":
-        value, rate = mechanism.coordinate(joint, place), mechanism.rate(joint, place)
-        return Dof(joint, place, value, (mechanism.number(1.0),), (rate,))
-    w, *vector = (mechanism.coordinate(joint, place + i) for i in range(4))
-    rates = tuple(mechanism.rate(joint, place + i) for i in range(3))
+        value, rate = mechanism.coordinate(joint, index), mechanism.rate(joint, index)
+        return Dof(joint, index, value, (mechanism.number(1.0),), (rate,))
+    w, *vector = (mechanism.coordinate(joint, index + i) for i in range(4))
+    rates = tuple(mechanism.rate(joint, index + i) for i in range(3))
     # Quaternions w, r and -w, -r are the same rotation; the angle is at most π with w >= 0.
     sine = length(mechanism, tuple(vector))
     half = mechanism.call("atan2", sine, mechanism.call("abs", w))
     per_sine = mechanism.number(1.0) / sine
     per_sine = mechanism.call("select", -w, -per_sine, per_sine)
     direction = scale(per_sine, vector)
-    return Dof(joint, place, half + half, direction, rates)
+    return Dof(joint, index, half + half, direction, rates)
 
 
 class OnJoints(EffectTable):
@@ -102,21 +102,21 @@ class OnJoints(EffectTable):
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
-        place: str,
+        location: str,
     ) -> None:
         """There is such a coordinate."""
         if self.coordinate is not None:
             assert self.joint is not None
             known = _plain(joints, names, self.joint)
-            _check_coordinate(self.coordinate, self.joint, known, place)
+            _check_coordinate(self.coordinate, self.joint, known, location)
 
     def dofs(self, mechanism: Mechanism) -> Iterator[Dof]:
         """Every degree of freedom that it acts on."""
         for joint in self.acted_on(mechanism.joints):
-            for place, kind in enumerate(mechanism.joints[joint]):
-                name = mechanism.coordinate_name(joint, place)
+            for index, kind in enumerate(mechanism.joints[joint]):
+                name = mechanism.coordinate_name(joint, index)
                 if self.coordinate in (None, name):
-                    yield joint_dof(mechanism, joint, kind, place)
+                    yield joint_dof(mechanism, joint, kind, index)
 
 
 class OnCoordinate(EffectTable):
@@ -133,19 +133,19 @@ class OnCoordinate(EffectTable):
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
-        place: str,
+        location: str,
     ) -> None:
         """There is one such coordinate."""
         known = _plain(joints, names, self.joint)
         if not known:
-            raise SceneError(f"{place}.joint: '{self.joint}' is a ball joint and has no angle")
+            raise SceneError(f"{location}.joint: '{self.joint}' is a ball joint and has no angle")
         if self.coordinate is None and len(known) > 1:
             raise SceneError(
-                f"{place}.coordinate: missing; '{self.joint}' has {', '.join(known)}: give one"
+                f"{location}.coordinate: missing; '{self.joint}' has {', '.join(known)}: give one"
             )
-        _check_coordinate(self.coordinate, self.joint, known, place)
+        _check_coordinate(self.coordinate, self.joint, known, location)
 
-    def place(self, mechanism: Mechanism) -> int:
+    def coordinate_index(self, mechanism: Mechanism) -> int:
         """Which of the joint's coordinates."""
         if self.coordinate is None:
             return 0
@@ -161,7 +161,7 @@ def _plain(
     return names[joint][: sum(kind != "spherical" for kind in joints[joint])]
 
 
-def _check_coordinate(name: str | None, joint: str, known: Sequence[str], place: str) -> None:
+def _check_coordinate(name: str | None, joint: str, known: Sequence[str], location: str) -> None:
     if name is not None and name not in known:
         hint = nearest(name, known) or f"; known: {', '.join(known) or 'none'}"
-        raise SceneError(f"{place}.coordinate: '{joint}' has no angle or slide '{name}'{hint}")
+        raise SceneError(f"{location}.coordinate: '{joint}' has no angle or slide '{name}'{hint}")

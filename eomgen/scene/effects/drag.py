@@ -79,7 +79,7 @@ class Drag(OnBodies):
         blows = any(part != ZERO for part in self.wind)
         pushes = self.linear != ZERO or quadratic is not None
         turns = self.turning_linear != ZERO or self.turning_quadratic != ZERO
-        for body, at in self.places(mechanism):
+        for body, at in self.loaded_points(mechanism):
             force: Vector = (mechanism.number(0.0),) * mechanism.dimensions
             if pushes:
                 speed = mechanism.velocity(body, at)

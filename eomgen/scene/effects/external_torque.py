@@ -28,15 +28,15 @@ class ExternalTorque(EffectTable):
         "N m", "torque", sees=("motion",), union_mode="left_to_right"
     )
 
-    def checked(self, dimensions: int, place: str) -> Self:
+    def checked(self, dimensions: int, location: str) -> Self:
         """Refuse a number in space, and a vector in the plane."""
         if dimensions == 2 and isinstance(self.torque, tuple):
-            raise SceneError(f"{place}.torque: is a list; in the plane give one number, about z")
+            raise SceneError(f"{location}.torque: is a list; in the plane give one number, about z")
         if dimensions == 3 and self.torque != "input":
             parts = len(self.torque) if isinstance(self.torque, tuple) else 1
             if parts != 3:
                 count = f"{parts} component" + "s" * (parts > 1)
-                raise SceneError(f"{place}.torque: has {count}; space takes 3")
+                raise SceneError(f"{location}.torque: has {count}; space takes 3")
         return self
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:

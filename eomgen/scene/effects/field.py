@@ -1,4 +1,4 @@
-"""Force fields: formulas of place, velocity and time, and some that are ready."""
+"""Force fields: formulas of position, velocity and time, and some that are ready."""
 
 from collections.abc import Iterator, Mapping
 from typing import Literal, Self
@@ -88,7 +88,7 @@ class ForceField(OnBodies):
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """The force on each body."""
-        for body, at in self.places(mechanism):
+        for body, at in self.loaded_points(mechanism):
             if self.kind == "formula":
                 names = local_names(mechanism, self.force, body, at)
                 force: Vector = tuple(mechanism.value(part, **names) for part in self.force)
@@ -103,7 +103,7 @@ class ForceField(OnBodies):
         total = mechanism.number(0.0)
         if self.kind not in ("attract", "repel"):
             return total
-        for body, at in self.places(mechanism):
+        for body, at in self.loaded_points(mechanism):
             square = self._square(mechanism, self._way(mechanism, body, at))
             if self.power == 1:
                 part = mechanism.number(0.5) * mechanism.call("log", square)
@@ -123,7 +123,7 @@ class ForceField(OnBodies):
     def _way(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
         """From the centre to the point."""
         centre = tuple(mechanism.value(part) for part in self.center)
-        return sub(mechanism.place(body, at), centre)
+        return sub(mechanism.position(body, at), centre)
 
     def _square(self, mechanism: Mechanism, way: Vector) -> Scalar:
         softening = mechanism.value(self.softening)

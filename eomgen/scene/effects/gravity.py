@@ -66,8 +66,8 @@ class Gravity(EffectTable):
             return total
         fall, zeros = self.acceleration(mechanism), (total,) * mechanism.dimensions
         for body in self._falling(mechanism):
-            for part, place in zip(fall, mechanism.place(body, zeros), strict=True):
-                total = total - mechanism.mass(body) * part * place
+            for part, x in zip(fall, mechanism.position(body, zeros), strict=True):
+                total = total - mechanism.mass(body) * part * x
         return total
 
     def keeps_energy(

@@ -39,16 +39,17 @@ class JointFriction(OnJoints):
         default=False, strict=True, description="whether friction may be negative"
     )
 
-    def checked(self, dimensions: int, place: str) -> Self:
+    def checked(self, dimensions: int, location: str) -> Self:
         """There is friction, and a speed where one is of use."""
         if not self.model_fields_set & {"viscous", "coulomb"}:
-            raise SceneError(f"{place}.viscous: missing; give it, or coulomb and speed")
+            raise SceneError(f"{location}.viscous: missing; give it, or coulomb and speed")
         if "coulomb" in self.model_fields_set and self.speed is None:
             raise SceneError(
-                f"{place}.speed: missing; coulomb is smoothed as tanh(rate/speed), give a small one"
+                f"{location}.speed: missing; coulomb is smoothed as tanh(rate/speed), give a small "
+                "one"
             )
         if "coulomb" not in self.model_fields_set and self.speed is not None:
-            raise SceneError(f"{place}.speed: it smooths coulomb, which is missing; give both")
+            raise SceneError(f"{location}.speed: it smooths coulomb, which is missing; give both")
         return self
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:

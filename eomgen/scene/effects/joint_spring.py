@@ -42,22 +42,24 @@ class JointSpring(OnJoints):
         default=False, strict=True, description="whether stiffness and damping may be negative"
     )
 
-    def checked(self, dimensions: int, place: str) -> Self:
+    def checked(self, dimensions: int, location: str) -> Self:
         """Something must pull, and a law stands alone."""
-        check_law(self, self.law, place)
+        check_law(self, self.law, location)
         return self
 
     def check_dofs(
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
-        place: str,
+        location: str,
     ) -> None:
-        """A ball rests in one place only."""
-        super().check_dofs(joints, names, place)
+        """A ball joint has one rest position."""
+        super().check_dofs(joints, names, location)
         for joint in self.acted_on(joints):
             if "spherical" in joints[joint] and self.rest != ZERO:
-                raise SceneError(f"{place}.rest: at a ball joint ('{joint}') it is 0; leave it out")
+                raise SceneError(
+                    f"{location}.rest: at a ball joint ('{joint}') it is 0; leave it out"
+                )
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Equal and opposite on the joint's two bodies; the world takes its own."""

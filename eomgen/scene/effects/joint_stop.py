@@ -39,45 +39,48 @@ class JointStop(OnJoints):
         default=False, strict=True, description="whether stiffness and damping may be negative"
     )
 
-    def checked(self, dimensions: int, place: str) -> Self:
+    def checked(self, dimensions: int, location: str) -> Self:
         """There is a limit, and one law."""
         if self.low is None and self.high is None:
-            raise SceneError(f"{place}.low: missing, and high too; give one of them or both")
+            raise SceneError(f"{location}.low: missing, and high too; give one of them or both")
         given = self.model_fields_set
         if self.restitution is None and "stiffness" not in given:
-            raise SceneError(f"{place}.stiffness: missing; give it or a restitution")
+            raise SceneError(f"{location}.stiffness: missing; give it or a restitution")
         for key in ("stiffness", "damping", "allow_active"):
             if self.restitution is not None and key in given:
-                raise SceneError(f"{place}.{key}: a restitution stands in its place; give one")
+                raise SceneError(f"{location}.{key}: a restitution stands in its place; give one")
         return self
 
-    def conditions(self, place: str) -> Iterator[Condition]:
+    def conditions(self, location: str) -> Iterator[Condition]:
         """There is room between two limits, and restitution is from 0 to 1."""
         if self.restitution is not None:
-            yield a_part(f"{place}.restitution", self.restitution)
+            yield a_part(f"{location}.restitution", self.restitution)
         if self.low is not None and self.high is not None:
-            yield in_order(f"{place}.low", self.low, self.high)
+            yield in_order(f"{location}.low", self.low, self.high)
 
     def check_dofs(
         self,
         joints: Mapping[str, tuple[str, ...]],
         names: Mapping[str, Sequence[str]],
-        place: str,
+        location: str,
     ) -> None:
         """The turn of a ball is at least 0; a rigid stop has one degree of freedom."""
-        super().check_dofs(joints, names, place)
+        super().check_dofs(joints, names, location)
         acted_on = self.acted_on(joints)
         for joint in acted_on:
             if "spherical" in joints[joint] and self.low is not None:
                 raise SceneError(
-                    f"{place}.low: the turn of a ball joint ('{joint}') is never below 0; give high"
+                    f"{location}.low: the turn of a ball joint ('{joint}') is never below 0; give "
+                    "high"
                 )
         if self.restitution is not None:
             if self.joints is not None:
-                raise SceneError(f"{place}.joints: a rigid stop is of one joint; name it as joint")
+                raise SceneError(
+                    f"{location}.joints: a rigid stop is of one joint; name it as joint"
+                )
             if self.coordinate is None and len(joints[acted_on[0]]) > 1:
                 raise SceneError(
-                    f"{place}.coordinate: missing; a rigid stop is of one coordinate, and "
+                    f"{location}.coordinate: missing; a rigid stop is of one coordinate, and "
                     f"'{self.joint}' has {', '.join(names[acted_on[0]])}"
                 )
 

@@ -33,7 +33,7 @@ class Motor(OnCoordinate):
             torque = mechanism.input(self.name)
         else:
             torque = mechanism.value(self.torque)
-        yield JointLoad(self.joint, torque, self.place(mechanism))
+        yield JointLoad(self.joint, torque, self.coordinate_index(mechanism))
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

@@ -39,12 +39,14 @@ class Servo(OnCoordinate):
     def deviation(self, mechanism: Mechanism) -> Scalar:
         """Target less coordinate, rad or m."""
         return mechanism.value(self.target) - mechanism.coordinate(
-            self.joint, self.place(mechanism)
+            self.joint, self.coordinate_index(mechanism)
         )
 
     def wanted(self, mechanism: Mechanism) -> Scalar:
         """The command before it is cut off, N m or N."""
-        late = mechanism.value(self.target_rate) - mechanism.rate(self.joint, self.place(mechanism))
+        late = mechanism.value(self.target_rate) - mechanism.rate(
+            self.joint, self.coordinate_index(mechanism)
+        )
         stiffness, damping = mechanism.value(self.stiffness), mechanism.value(self.damping)
         return stiffness * self.deviation(mechanism) + damping * late
 
@@ -73,8 +75,8 @@ class Servo(OnCoordinate):
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """The command, or what the actuator makes of it."""
         if self.lag is None:
-            yield JointLoad(self.joint, self.command(mechanism), self.place(mechanism))
+            yield JointLoad(self.joint, self.command(mechanism), self.coordinate_index(mechanism))
         else:
             yield JointLoad(
-                self.joint, mechanism.state(f"{self.name}_torque"), self.place(mechanism)
+                self.joint, mechanism.state(f"{self.name}_torque"), self.coordinate_index(mechanism)
             )

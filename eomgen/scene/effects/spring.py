@@ -64,14 +64,14 @@ class Spring(EffectTable):
             raise ValueError("is body_1 too, whose points keep their distance; name another body")
         return name
 
-    def checked(self, dimensions: int, place: str) -> Self:
+    def checked(self, dimensions: int, location: str) -> Self:
         """Something must pull, and a law stands alone."""
-        check_law(self, self.law, place)
+        check_law(self, self.law, location)
         return self
 
-    def conditions(self, place: str) -> Iterator[Condition]:
+    def conditions(self, location: str) -> Iterator[Condition]:
         """A length is not negative, whatever else may be."""
-        yield not_negative(f"{place}.rest_length", self.rest_length, "m")
+        yield not_negative(f"{location}.rest_length", self.rest_length, "m")
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """Equal and opposite on the two bodies; the world takes its own."""
@@ -155,7 +155,7 @@ class _Line:
 def _line(spring: Spring, mechanism: Mechanism) -> _Line:
     at_1 = tuple(mechanism.value(part) for part in spring.at_1)
     at_2 = tuple(mechanism.value(part) for part in spring.at_2)
-    d = sub(mechanism.place(spring.body_2, at_2), mechanism.place(spring.body_1, at_1))
+    d = sub(mechanism.position(spring.body_2, at_2), mechanism.position(spring.body_1, at_1))
     d_dot = sub(mechanism.velocity(spring.body_2, at_2), mechanism.velocity(spring.body_1, at_1))
     square = dot(d, d)
     larger = mechanism.call("max", square, nearest_square(mechanism))
@@ -164,10 +164,10 @@ def _line(spring: Spring, mechanism: Mechanism) -> _Line:
     return _Line(at_1, at_2, d, d_dot, square, larger, length, stretch)
 
 
-def check_law(table: EffectTable, law: Formula | None, place: str) -> None:
+def check_law(table: EffectTable, law: Formula | None, location: str) -> None:
     """Raise `SceneError` unless a spring has stiffness, damping or a law, and no law too many."""
     given = table.model_fields_set
     if law is None and not given & {"stiffness", "damping"}:
-        raise SceneError(f"{place}.stiffness: missing; give it, or damping or a law")
+        raise SceneError(f"{location}.stiffness: missing; give it, or damping or a law")
     if law is not None and "stiffness" in given:
-        raise SceneError(f"{place}.stiffness: a law stands in its place; give one of them")
+        raise SceneError(f"{location}.stiffness: a law stands in its place; give one of them")

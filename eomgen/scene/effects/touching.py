@@ -67,9 +67,9 @@ def on_plane(
     Corners count the signs of x, y, z up, x first: (-, -, -), (+, -, -), (-, +, -), …
     """
     normal = mechanism.outward(plane.body, plane.normal)
-    centre = mechanism.place(ball.body, ball.at)
+    centre = mechanism.position(ball.body, ball.at)
     if plane.body != WORLD:
-        centre = sub(centre, mechanism.place(plane.body, plane.at))
+        centre = sub(centre, mechanism.position(plane.body, plane.at))
     height = dot(normal, centre) - (plane.offset + ball.radius)
     arms: list[Vector] = [()]
     lifts = [mechanism.number(0.0)]
@@ -92,7 +92,7 @@ def on_ball(mechanism: Mechanism, first: Ball, second: Ball) -> Touch:
     overlap, so that they change no angular momentum. Centres within ε = `NEAREST` of each other
     have no sure normal: there n is d/ε, d the way from the second to the first, and 0 at last.
     """
-    d = sub(mechanism.place(first.body, first.at), mechanism.place(second.body, second.at))
+    d = sub(mechanism.position(first.body, first.at), mechanism.position(second.body, second.at))
     square = dot(d, d)
     larger = mechanism.call("max", square, nearest_square(mechanism))
     length = mechanism.call("sqrt", larger)

@@ -34,14 +34,14 @@ class Free(Table):
         last = "angle" if dimensions == PLANE else "z"
         names = self.coordinates or (f"{self.child}_x", f"{self.child}_y", f"{self.child}_{last}")
         axes = "xyz"[:dimensions]
-        place = tuple(
+        translation = tuple(
             Coordinate(name, "m", f"{axis} of the centre of mass of {self.child}")
             for name, axis in zip(names, axes, strict=False)
         )
         if dimensions == PLANE:
             about = f"angle of {self.child} from the {WORLD}'s x axis"
-            return (*place, Coordinate(names[2], "rad", about))
-        return (*place, *quaternion(self.child, self.child, WORLD))
+            return (*translation, Coordinate(names[2], "rad", about))
+        return (*translation, *quaternion(self.child, self.child, WORLD))
 
     def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
         """Rates of the coordinates; of a quaternion, the angular velocity."""

@@ -393,11 +393,11 @@ def _turned(
     step must end then. Branches that change at its start, or at its end if it is accepted, are
     switched here.
     """
-    places = np.array([0.0, *method.c.tolist(), 1.0], dtype=float)
+    abscissas = np.array([0.0, *method.c.tolist(), 1.0], dtype=float)
     if turn is not None:
         if not corners.is_there(turn, margins):
-            turn = corners.nearer(turn, places, margins)
-            return True, corners.simpler(turn, places, margins) if slow else turn
+            turn = corners.nearer(turn, abscissas, margins)
+            return True, corners.simpler(turn, abscissas, margins) if slow else turn
         for corner in corners.turned_at_the_end(turn, margins):
             corner_branches.branches[corner] = not corner_branches.branches[corner]
         return False, None
@@ -406,5 +406,5 @@ def _turned(
         corner_branches.branches[corner] = not corner_branches.branches[corner]
     if late:
         return True, None
-    found = corners.first_turn(corner_branches.branches, places, margins)
+    found = corners.first_turn(corner_branches.branches, abscissas, margins)
     return found is not None, found

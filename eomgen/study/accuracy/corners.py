@@ -48,29 +48,29 @@ def wrong_from_the_start(branches: Sequence[bool], margins: FloatArray) -> list[
     return np.flatnonzero(late | idle).tolist()
 
 
-def first_turn(branches: Sequence[bool], places: FloatArray, margins: FloatArray) -> Turn | None:
+def first_turn(branches: Sequence[bool], abscissas: FloatArray, margins: FloatArray) -> Turn | None:
     """The first branch change within a step; None if there is none.
 
-    places   (n,): 0, the nodes, 1, as parts of the step
+    abscissas  (n,): 0, the nodes, 1, as parts of the step
     margins  (n, corners) at these places
     """
     against = wrong(branches, margins)[1:].any(axis=0)
     turns = [
-        Turn(corner, _root(bool(branches[corner]), places, margins[:, corner]) - 1.0)
+        Turn(corner, _root(bool(branches[corner]), abscissas, margins[:, corner]) - 1.0)
         for corner in np.flatnonzero(against).tolist()
     ]
     return min(turns, key=lambda turn: turn.beyond, default=None)
 
 
-def nearer(turn: Turn, places: FloatArray, margins: FloatArray) -> Turn:
+def nearer(turn: Turn, abscissas: FloatArray, margins: FloatArray) -> Turn:
     """The branch change located again, from the margins of a step that ends close to it."""
     values = margins[:, turn.corner]
-    slope = float(_through(places, values).deriv()(1.0))
+    slope = float(_through(abscissas, values).deriv()(1.0))
     size = float(np.max(np.abs(values)))
     return Turn(turn.corner, -float(values[-1]) / size / slope if slope else 0.0)
 
 
-def simpler(turn: Turn, places: FloatArray, margins: FloatArray) -> Turn:
+def simpler(turn: Turn, abscissas: FloatArray, margins: FloatArray) -> Turn:
     """Of the corners whose margins vanish at a branch change, the one whose margin is steepest.
 
     The force of a contact with exponent 3/2 is not a polynomial of time where it vanishes; its
@@ -80,7 +80,7 @@ def simpler(turn: Turn, places: FloatArray, margins: FloatArray) -> Turn:
     near = [
         other
         for corner in np.flatnonzero(sizes > 0).tolist()
-        if abs((other := nearer(Turn(corner, 0.0), places, margins)).beyond)
+        if abs((other := nearer(Turn(corner, 0.0), abscissas, margins)).beyond)
         <= 10 * abs(turn.beyond)
     ]
     return max(
@@ -102,15 +102,15 @@ def is_there(turn: Turn, margins: FloatArray) -> bool:
     return bool(values[-1] <= NOTHING * np.max(values))
 
 
-def _through(places: FloatArray, values: FloatArray) -> Legendre:
+def _through(abscissas: FloatArray, values: FloatArray) -> Legendre:
     """The polynomial through margins, relative to the greatest of them."""
     size = float(np.max(np.abs(values)))
-    return Legendre.fit(places, values / size, len(places) - 1, domain=[0.0, 1.0])
+    return Legendre.fit(abscissas, values / size, len(abscissas) - 1, domain=[0.0, 1.0])
 
 
-def _root(branch: bool, places: FloatArray, values: FloatArray) -> float:
+def _root(branch: bool, abscissas: FloatArray, values: FloatArray) -> float:
     """The first part of the step at which a margin gets the sign that contradicts its branch."""
-    polynomial = _through(places, values)
+    polynomial = _through(abscissas, values)
     slope = polynomial.deriv()
     found = polynomial.roots()
     real = found[np.abs(found.imag) < 1e-6].real
@@ -119,4 +119,4 @@ def _root(branch: bool, places: FloatArray, values: FloatArray) -> float:
         return float(min(passing))
     # No root was found: take the middle between the last right sign and the first wrong one.
     first = int(np.flatnonzero(values[1:] < 0 if branch else values[1:] > 0)[0]) + 1
-    return float((places[first - 1] + places[first]) / 2)
+    return float((abscissas[first - 1] + abscissas[first]) / 2)

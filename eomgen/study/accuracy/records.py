@@ -97,8 +97,8 @@ def save(
 
 def ordered(works: Iterable[Work]) -> list[Work]:
     """The runs sorted by method, each method's from coarse to fine."""
-    place = {method: k for k, method in enumerate(INTEGRATORS)}
-    return sorted(works, key=lambda w: (place[w.rung.method], -(w.rung.dt or w.rung.rtol or 0.0)))
+    rank = {method: k for k, method in enumerate(INTEGRATORS)}
+    return sorted(works, key=lambda w: (rank[w.rung.method], -(w.rung.dt or w.rung.rtol or 0.0)))
 
 
 def load(path: Path, key: str) -> tuple[Mapping[Rung, Work], float | None]:

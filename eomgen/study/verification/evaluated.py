@@ -87,14 +87,14 @@ class EvaluatedModel:
 
     def height(self, body: str) -> Extended:
         """Height of a body's centre of mass, m: world y in the plane, world z in space."""
-        return self.poses[self.index[body]].place[self.dimensions - 1]
+        return self.poses[self.index[body]].position[self.dimensions - 1]
 
-    def place(self, body: str, at: Vector) -> Vector:
+    def position(self, body: str, at: Vector) -> Vector:
         """World position of a point of a body, m."""
         if body == WORLD:
             return at
         pose = self.poses[self.index[body]]
-        return self._cut(pose.place + pose.turn @ self.in_space(at))
+        return self._cut(pose.position + pose.turn @ self.in_space(at))
 
     def point(self, name: str) -> tuple[str, Vector]:
         """A named point: its body, and its position in body axes, m."""
@@ -107,7 +107,7 @@ class EvaluatedModel:
             return self._cut(zeros(3))
         pose = self.poses[self.index[body]]
         arm = self.in_space(at)
-        return self._cut(along(self.rates, pose.place_v + pose.turn_v @ arm))
+        return self._cut(along(self.rates, pose.position_v + pose.turn_v @ arm))
 
     def turning(self, body: str) -> Vector:
         """Angular velocity of a body, world axes, rad/s."""

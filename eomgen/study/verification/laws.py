@@ -160,9 +160,9 @@ def _outside(free: FreeBodies) -> tuple[Array, Array]:
             if isinstance(load, JointLoad) or load.body == WORLD:
                 continue
             force = free.in_space(load.force)
-            place = free.in_space(free.place(load.body, load.at))
-            wrench = np.concatenate([force, np.cross(place, force) + free.torque(load)])
-            reach, size = np.sum(abs(place)), np.sum(abs(force))
+            position = free.in_space(free.position(load.body, load.at))
+            wrench = np.concatenate([force, np.cross(position, force) + free.torque(load)])
+            reach, size = np.sum(abs(position)), np.sum(abs(force))
             total = total + wrench
             sizes = sizes + np.concatenate(
                 [zeros(3) + size, zeros(3) + reach * size + np.sum(abs(free.torque(load)))]

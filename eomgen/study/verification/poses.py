@@ -18,17 +18,17 @@ from eomgen.precision.precise import Extended
 class Pose:
     """A body's world_R_body and the position of its centre of mass, world axes, with derivatives.
 
-    turn, place      (3, 3), (3,)
+    turn, position   (3, 3), (3,)
     turn_v, place_v  (m, 3, 3), (m, 3): partial derivatives along each of the m velocities
     turn_b, place_b  second time derivatives at constant velocities
     """
 
     turn: Array
-    place: Array
+    position: Array
     turn_v: Array
-    place_v: Array
+    position_v: Array
     turn_b: Array
-    place_b: Array
+    position_b: Array
 
     def turned(self, turn: Array, turn_v: Array, turn_b: Array, rate: Array) -> "Pose":
         """The pose with its axes rotated further by a matrix with derivatives. `rate` (m,) are the
@@ -37,33 +37,33 @@ class Pose:
         here, more = along(rate, self.turn_v), along(rate, turn_v)
         return Pose(
             self.turn @ turn,
-            self.place,
+            self.position,
             self.turn_v @ turn + self.turn @ turn_v,
-            self.place_v,
+            self.position_v,
             self.turn_b @ turn + 2 * (here @ more) + self.turn @ turn_b,
-            self.place_b,
+            self.position_b,
         )
 
     def fixed(self, turn: Array) -> "Pose":
         """The pose with its axes rotated by a constant matrix."""
         return Pose(
             self.turn @ turn,
-            self.place,
+            self.position,
             self.turn_v @ turn,
-            self.place_v,
+            self.position_v,
             self.turn_b @ turn,
-            self.place_b,
+            self.position_b,
         )
 
     def moved(self, arm: Array) -> "Pose":
         """The pose moved by a vector that is constant in its axes."""
         return Pose(
             self.turn,
-            self.place + self.turn @ arm,
+            self.position + self.turn @ arm,
             self.turn_v,
-            self.place_v + self.turn_v @ arm,
+            self.position_v + self.turn_v @ arm,
             self.turn_b,
-            self.place_b + self.turn_b @ arm,
+            self.position_b + self.turn_b @ arm,
         )
 
     def slid(self, axis: Array, way: Extended, column: int | None, rate: Array) -> "Pose":
@@ -71,11 +71,11 @@ class Pose:
         there = self.moved(axis * way)
         if column is None:
             return there
-        place_v = there.place_v.copy()
-        place_v[column] = place_v[column] + self.turn @ axis
+        position_v = there.position_v.copy()
+        position_v[column] = position_v[column] + self.turn @ axis
         here = along(rate, self.turn_v)
-        place_b = there.place_b + 2 * rate[column] * (here @ axis)
-        return Pose(there.turn, there.place, there.turn_v, place_v, there.turn_b, place_b)
+        position_b = there.position_b + 2 * rate[column] * (here @ axis)
+        return Pose(there.turn, there.position, there.turn_v, position_v, there.turn_b, position_b)
 
     @cached_property
     def spin_v(self) -> Array:

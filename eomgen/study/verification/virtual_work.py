@@ -6,7 +6,7 @@ its value, its partial derivatives along each velocity, and its second time deri
 velocities. Each body is then free, by Newton and Euler, m a = f and I α + ω x I ω = n. By
 d'Alembert's principle, joint reactions do no virtual work, so that
 
-    Σ J_pᵀ (m a - f) + J_wᵀ (I α + ω x I ω - n) = 0,    J_p = ∂ place'/∂v,  J_w = ∂ω/∂v.
+    Σ J_pᵀ (m a - f) + J_wᵀ (I α + ω x I ω - n) = 0,    J_p = ∂ position'/∂v,  J_w = ∂ω/∂v.
 
 Unlike the recursions, it passes no velocity from body to body, shifts no inertia to another point,
 and carries no force inwards. Dense elimination with partial pivoting solves for v̇. Joints are
@@ -55,8 +55,10 @@ class FreeBodies(EvaluatedModel):
         matrix = zeros(self.moved, self.moved)
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
             moving = self.carrying[k]
-            place_v, spin_v = pose.place_v[moving], pose.spin_v[moving]
-            part = place_v @ (self.mass(name) * place_v.T) + spin_v @ self.inertias[k] @ spin_v.T
+            position_v, spin_v = pose.position_v[moving], pose.spin_v[moving]
+            part = (
+                position_v @ (self.mass(name) * position_v.T) + spin_v @ self.inertias[k] @ spin_v.T
+            )
             at = np.ix_(moving, moving)
             matrix[at] = matrix[at] + part
         for i, armature in self._rotors.items():
@@ -83,14 +85,14 @@ class FreeBodies(EvaluatedModel):
         # If all terms cancel, as in a free body that rotates evenly, none is left to compare with.
         least = NOTHING * pace * pace
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
-            force = self.mass(name) * pose.place_b
+            force = self.mass(name) * pose.position_b
             torque = self.inertias[k] @ pose.spin_b
             if not left_out:
                 w = self.spin(k)
                 torque = torque + np.cross(w, self.inertias[k] @ w)
-            total = total + pose.place_v @ force + pose.spin_v @ torque
-            sizes = sizes + _reach(pose.place_v, force) + _reach(pose.spin_v, torque)
-            sizes = sizes + _reach(pose.place_v, least * self.mass(name) * self.reach)
+            total = total + pose.position_v @ force + pose.spin_v @ torque
+            sizes = sizes + _reach(pose.position_v, force) + _reach(pose.spin_v, torque)
+            sizes = sizes + _reach(pose.position_v, least * self.mass(name) * self.reach)
             sizes = sizes + _reach(pose.spin_v, least * self.inertias[k])
         return total, sizes
 
@@ -106,7 +108,7 @@ class FreeBodies(EvaluatedModel):
             elif load.body != WORLD:
                 pose = self.poses[self.index[load.body]]
                 force, torque = self.in_space(load.force), self.torque(load)
-                at = pose.place_v + pose.turn_v @ self.in_space(load.at)
+                at = pose.position_v + pose.turn_v @ self.in_space(load.at)
                 total = total + at @ force + pose.spin_v @ torque
                 sizes = sizes + _reach(at, force) + _reach(pose.spin_v, torque)
         return total, sizes
@@ -191,7 +193,7 @@ class FreeBodies(EvaluatedModel):
         """The kinetic energy of all bodies and rotors, J."""
         energy = mpfr(0)
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
-            u, w = along(self.rates, pose.place_v), self.spin(k)
+            u, w = along(self.rates, pose.position_v), self.spin(k)
             energy += (self.mass(name) * (u @ u) + w @ self.inertias[k] @ w) / 2
         for i, armature in self._rotors.items():
             energy += armature * self.rates[i] ** 2 / 2
@@ -212,8 +214,8 @@ class FreeBodies(EvaluatedModel):
         """Sum of the distances of all bodies from their parents, m: a bound of any position."""
         total = mpfr(0)
         for body, pose in zip(self.model.bodies, self.poses, strict=True):
-            base = self.poses[body.parent].place if body.parent >= 0 else zeros(3)
-            total += np.sum(abs(pose.place - base))
+            base = self.poses[body.parent].position if body.parent >= 0 else zeros(3)
+            total += np.sum(abs(pose.position - base))
         return total
 
     @cached_property
@@ -230,10 +232,10 @@ class FreeBodies(EvaluatedModel):
     def _momentum(self) -> tuple[Array, Array]:
         total, sizes = zeros(6), zeros(6)
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
-            p = self.mass(name) * along(self.rates, pose.place_v)
+            p = self.mass(name) * along(self.rates, pose.position_v)
             spin = self.inertias[k] @ self.spin(k)
-            total = total + np.concatenate([p, np.cross(pose.place, p) + spin])
-            arm, force = abs(pose.place), abs(p)
+            total = total + np.concatenate([p, np.cross(pose.position, p) + spin])
+            arm, force = abs(pose.position), abs(p)
             turning = np.sum(arm) * np.sum(force) + np.sum(abs(spin))
             sizes = sizes + np.concatenate([zeros(3) + np.sum(force), zeros(3) + turning])
         return total, sizes
@@ -243,11 +245,11 @@ class FreeBodies(EvaluatedModel):
         whole, sizes = np.concatenate([vd, self.driven_rates]), zeros(6)
         for k, (name, pose) in enumerate(zip(self.bodies, self.poses, strict=True)):
             w, inertia = self.spin(k), self.inertias[k]
-            force = self.mass(name) * (abs(pose.place_b) + abs(along(whole, pose.place_v)))
+            force = self.mass(name) * (abs(pose.position_b) + abs(along(whole, pose.position_v)))
             spin = abs(inertia) @ (abs(pose.spin_b) + abs(along(whole, pose.spin_v)))
             spin = spin + abs(np.cross(w, inertia @ w))
             linear, turning = np.sum(force), np.sum(spin)
-            turning = turning + np.sum(abs(pose.place)) * linear
+            turning = turning + np.sum(abs(pose.position)) * linear
             sizes = sizes + np.concatenate([zeros(3) + linear, zeros(3) + turning])
         return sizes
 
