@@ -114,10 +114,10 @@ def test_digits_reported_are_those_of_accelerations() -> None:
 def test_it_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     """Entries of rotations that are less than 1e-8 taken for nothing, as rounding did."""
     monkeypatch.setattr(exact, "SMALLEST", exact.mpfr(1e-8))
-    for function in (exact.orientation, exact.to_axis, exact.turns_in):
+    for function in (exact.orientation, exact.to_axis, exact.axis_rotations):
         function.cache_clear()
     assert any(tried(case(number)) not in WELL for number in (32, 89, 554, 559))
-    for function in (exact.orientation, exact.to_axis, exact.turns_in):
+    for function in (exact.orientation, exact.to_axis, exact.axis_rotations):
         function.cache_clear()
 
 
@@ -226,7 +226,7 @@ def test_fixed_rotations_are_rounded_once(seed: int) -> None:
                     assert x == 0.0
                 else:
                     assert abs(x - exactly) <= np.spacing(abs(x)) * (0.5 + 1e-9)
-    assert len(exact.turns_in(found) or ()) == (abs(true[(k + 2) % 3, (k + 1) % 3]) > 1e-100)
+    assert len(exact.axis_rotations(found) or ()) == (abs(true[(k + 2) % 3, (k + 1) % 3]) > 1e-100)
 
 
 def about(k: int, angle: Any) -> Any:

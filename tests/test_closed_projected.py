@@ -351,7 +351,7 @@ def test_rotations_turn_as_they_are_said_to(seed: int) -> None:
             written = written.xreplace(ledger.definitions)
         rates = {s: r for s, r in ledger.rates.items() if s in coordinates}
         moved = (written.T * rate(written, rates)).xreplace(numbers)
-        turning = hat(c.turning).xreplace(numbers)
+        turning = hat(c.relative_omega).xreplace(numbers)
         np.testing.assert_allclose(np.array(moved, float), np.array(turning, float), atol=1e-14)
 
 

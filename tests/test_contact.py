@@ -391,7 +391,9 @@ def power(dynamics: Dynamics, loads: tuple[Load | JointLoad, ...]) -> Any:
             continue
         parts = zip(load.force, dynamics.velocity(load.body, load.at), strict=True)
         total += sum(f * v for f, v in parts)
-        total += sum(m * w for m, w in zip(load.torque, dynamics.turning(load.body), strict=False))
+        total += sum(
+            m * w for m, w in zip(load.torque, dynamics.angular_velocity(load.body), strict=False)
+        )
     return total
 
 

@@ -74,7 +74,7 @@ def test_normal_modes_of_a_double_pendulum() -> None:
     resting = equilibrium(module, module.initial_state(), settle=True)
     found = modes(linearise(module, resting.y).A)
     assert stability(found) == "marginal"
-    assert [mode.turn for mode in found] == pytest.approx(np.sqrt(squares), rel=1e-10)
+    assert [mode.angular_frequency for mode in found] == pytest.approx(np.sqrt(squares), rel=1e-10)
     assert [mode.damping for mode in found] == [0.0, 0.0]
     assert found[0].frequency == pytest.approx(math.sqrt(squares[0]) / (2 * math.pi))
 
@@ -98,7 +98,7 @@ def test_a_hanging_chain_has_the_roots_of_laguerre() -> None:
     np.testing.assert_allclose(resting.y[0], -math.pi / 2, atol=1e-9)
     np.testing.assert_allclose(resting.y[1:], 0.0, atol=1e-9)
     roots = np.polynomial.laguerre.lagroots([0.0] * 10 + [1.0])
-    turns = [mode.turn for mode in modes(linearise(module, resting.y).A)]
+    turns = [mode.angular_frequency for mode in modes(linearise(module, resting.y).A)]
     np.testing.assert_allclose(turns, np.sqrt(9.81 / 0.2 * roots), rtol=1e-8)
 
 
@@ -249,12 +249,12 @@ def test_modes_and_control_of_plain_matrices() -> None:
     assert modes(np.zeros((0, 0))) == [] and stability([]) == "stable"
     (mode,) = modes(np.array([[0.0, 1.0], [-4.0, -0.4]]))
     assert (mode.rate, mode.damping) == pytest.approx((-0.2, 0.1))
-    assert mode.turn == pytest.approx(2 * math.sqrt(1 - 0.01))
+    assert mode.angular_frequency == pytest.approx(2 * math.sqrt(1 - 0.01))
     assert stability([mode]) == "stable"
     rates = [mode.rate for mode in modes(np.diag([-3.0, 0.0, 2.0]))]
     assert rates == [2.0, 0.0, -3.0]
     double = modes(np.array([[0.0, 1.0], [0.0, 0.0]]))
-    assert [(mode.rate, mode.turn) for mode in double] == [(0.0, 0.0)] * 2
+    assert [(mode.rate, mode.angular_frequency) for mode in double] == [(0.0, 0.0)] * 2
     chain = np.diag([1.0] * 5, k=1)  # six integrators in a row, driven at the end or the start
     assert controllable_rank(chain, np.eye(6)[:, 5:]) == 6
     assert controllable_rank(chain, np.eye(6)[:, :1]) == 1

@@ -353,14 +353,14 @@ def _state_columns(record: Recording) -> list[list[Node]]:
             continue
         w, x, y, z = (record.q[i] for i in index.quaternion)
         k = two / (w * w + x * x + y * y + z * z)
-        turns = [column(slopes.by_position, j) for j in index.spin]
+        rotations = [column(slopes.by_position, j) for j in index.spin]
         # δ = (2/|q|²) Im(q* dq): the small angle in own axes that a change of q is.
         for signs in ((-x, -y, -z), (w, -z, y), (z, w, -x), (-y, x, w)):
             weights = [k * sign for sign in signs]
             columns.append(
                 [
                     weights[0] * a + weights[1] * b + weights[2] * c
-                    for a, b, c in zip(*turns, strict=True)
+                    for a, b, c in zip(*rotations, strict=True)
                 ]
             )
     columns += [column(slopes.by_velocity, j) for j in range(nv)]

@@ -172,8 +172,8 @@ def _print_modes(found: Sequence[Mode]) -> None:
 
 def _mode(mode: Mode) -> tuple[str, str]:
     """An eigenvalue or a pair as a number, and what it means."""
-    if mode.turn:
-        value = f"{_number(mode.rate)} ± {_number(mode.turn)}i"
+    if mode.angular_frequency:
+        value = f"{_number(mode.rate)} ± {_number(mode.angular_frequency)}i"
         return value, f"{mode.frequency:.4g} Hz, damping {_number(mode.damping)}"
     if mode.rate:
         time = math.log(2) / abs(mode.rate)

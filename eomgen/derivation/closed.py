@@ -73,9 +73,9 @@ def derive(model: Model) -> Equations:
 def _generalised_forces(model: Model, symbols: Symbols) -> Expr:
     """Forces τ on the coordinates as rows of the bodies: τ turns the child, -τ the parent."""
     rows = list(symbols.tau)
-    for body, last in zip(model.bodies, model.turning, strict=True):
+    for body, last in zip(model.bodies, model.angle_index, strict=True):
         if body.parent >= 0:
-            rows[model.turning[body.parent]] -= symbols.tau[last]
+            rows[model.angle_index[body.parent]] -= symbols.tau[last]
     return sp.Matrix(rows)
 
 

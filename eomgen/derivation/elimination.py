@@ -160,7 +160,7 @@ def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
     for tree in trees(model):
         if not tree.floating:
             continue
-        y = model.turning[tree.root] - 1
+        y = model.angle_index[tree.root] - 1
         x = y - 1
         for k in tree.bodies:
             arm: Vec = (sp.Integer(0), sp.Integer(0))
@@ -169,9 +169,9 @@ def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
             for c, child in enumerate(model.bodies):
                 if child.parent == k:
                     arm = add(arm, kinematics.arm_parent[c])
-            turn = model.turning[k]
+            angle_row = model.angle_index[k]
             for j in range(result.cols):
-                result[turn, j] += cross(arm, (result[x, j], result[y, j]))
+                result[angle_row, j] += cross(arm, (result[x, j], result[y, j]))
     return result
 
 
@@ -183,7 +183,7 @@ def symmetric(model: Model, symbols: Symbols, kinematics: Kinematics, rows: Expr
     inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
     work = body_rows(model, kinematics, rows).applyfunc(lambda e: tidy(e.xreplace(inward)))
     result = sp.Matrix(work)
-    for k, i in enumerate(model.turning):
+    for k, i in enumerate(model.angle_index):
         for j in range(work.cols):
-            result[i, j] = sum(work[model.turning[b], j] for b in subtree(model, k))
+            result[i, j] = sum(work[model.angle_index[b], j] for b in subtree(model, k))
     return result.xreplace(outward)

@@ -64,7 +64,7 @@ def _positions(equations: Equations) -> dict[Expr, Expr]:
     inward = over_bodies(equations.model, symbols)
     defined: dict[Expr, Expr] = {}
     model = equations.model
-    for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
+    for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):
         if isinstance(body.joint, Free):
             defined |= {symbols.x[k]: symbols.q[last - 2], symbols.y[k]: symbols.q[last - 1]}
             defined |= {symbols.xd[k]: symbols.v[last - 2], symbols.yd[k]: symbols.v[last - 1]}

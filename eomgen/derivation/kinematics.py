@@ -53,7 +53,7 @@ def differentiate_joints(model: Model, symbols: Symbols) -> Kinematics:
     arms_child: list[Vec] = []
     positions: list[Vec] = []
     zero = sp.Integer(0)
-    for body, last in zip(model.bodies, model.turning, strict=True):
+    for body, last in zip(model.bodies, model.angle_index, strict=True):
         q = [functions[s] for s in symbols.q[last + 1 - len(body.positions) : last + 1]]
         base = angles[body.parent] if body.parent >= 0 else zero
         angle = base + q[-1]

@@ -55,7 +55,7 @@ class _Pair:
     weight: Expr
     entries: dict[int, Vec]
 
-    def turned(self, angle: Expr) -> list[_Row]:
+    def rotated(self, angle: Expr) -> list[_Row]:
         """The two rows in axes turned by `angle`."""
         c, s = sp.cos(angle), sp.sin(angle)
         along = {k: tidy(c * x + s * y) for k, (x, y) in self.entries.items()}
@@ -94,7 +94,7 @@ def solve(model: Model, symbols: Symbols, kinematics: Kinematics, right_side: Ex
     absolute = over_bodies(model, symbols)
     for tree in trees(model):
         _solve_tree(model, symbols, kinematics, tree, right_side, absolute, notes)
-    for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
+    for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):
         if len(body.positions) > 1:
             notes.define(symbols.a[last - 2], symbols.xdd[k])
             notes.define(symbols.a[last - 1], symbols.ydd[k])
@@ -130,10 +130,10 @@ def _solve_tree(
                     entries[i] = (old[0] + slope[0], old[1] + slope[1])
         carried[k] = {i: e for i, e in entries.items() if e != (0, 0)}
     pairs = [_Pair(symbols.mass[k], carried[k]) for k in tree.bodies]
-    load = {k: tidy(right_side[model.turning[k]].xreplace(absolute)) for k in tree.bodies}
+    load = {k: tidy(right_side[model.angle_index[k]].xreplace(absolute)) for k in tree.bodies}
     root = model.bodies[tree.root].name
     if tree.floating:
-        x = model.turning[tree.root] - 2
+        x = model.angle_index[tree.root] - 2
         push = tuple(tidy(right_side[x + i].xreplace(absolute)) for i in (0, 1))
         total, moment, pairs = _eliminate_translation(pairs)
         tree_mass = notes.fresh(f"mass__{root}", total, positive=True)
@@ -148,9 +148,9 @@ def _solve_tree(
         notes.define(symbols.alpha[k], (load[k] - known) / pivots[k])
     if tree.floating:
         for axis, result in ((0, symbols.xdd[tree.root]), (1, symbols.ydd[tree.root])):
-            turning = sum((j[axis] * symbols.alpha[k] for k, j in mean.items()), sp.Integer(0))
+            rotational = sum((j[axis] * symbols.alpha[k] for k, j in mean.items()), sp.Integer(0))
             mean_force = push[axis] / tree_mass
-            notes.define(result, gathered(mean_force - turning, symbols, {tree_mass: total}))
+            notes.define(result, gathered(mean_force - rotational, symbols, {tree_mass: total}))
 
 
 def _eliminate_translation(
@@ -195,7 +195,7 @@ def _eliminate_angles(
     for k in reversed(tree.bodies):
         name = model.bodies[k].name
         inertia = [_Row(symbols.inertia[k], {k: sp.Integer(1)})] if symbols.inertia[k] != 0 else []
-        own = [row for pair in pairs if k in pair.entries for row in pair.turned(symbols.angle[k])]
+        own = [row for pair in pairs if k in pair.entries for row in pair.rotated(symbols.angle[k])]
         pairs = [pair for pair in pairs if k not in pair.entries]
         here = [row for row in (*inertia, *own, *rows) if k in row.entries]
         rows = [row for row in (*own, *rows) if k not in row.entries]

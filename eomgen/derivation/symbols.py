@@ -204,7 +204,7 @@ def over_bodies(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
     """
     result: dict[Expr, Expr] = {}
     for coordinates, x, y, angle in _orders(symbols):
-        for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
+        for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):
             base = angle[body.parent] if body.parent >= 0 else sp.Integer(0)
             result[coordinates[last]] = angle[k] - base
             if len(body.positions) > 1:
@@ -216,7 +216,7 @@ def over_coordinates(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
     """The way back: the bodies' angles and angular rates as sums of coordinates."""
     result: dict[Expr, Expr] = {}
     for coordinates, x, y, angle in _orders(symbols):
-        for k, (body, last) in enumerate(zip(model.bodies, model.turning, strict=True)):
+        for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):
             base = result[angle[body.parent]] if body.parent >= 0 else sp.Integer(0)
             result[angle[k]] = base + coordinates[last]
             if len(body.positions) > 1:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from eomgen.dynamics.forces import Wrench
 from eomgen.dynamics.kinematics import Link
-from eomgen.dynamics.rotations import AxisTurn, Both, Rotation, Unturned
+from eomgen.dynamics.rotations import AxisRotation, ComposedRotation, IdentityRotation, Rotation
 from eomgen.dynamics.solids import Ranks, Solid
 from eomgen.dynamics.vectors import AXES, Vec, add, sub, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
@@ -19,14 +19,14 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 @dataclass(frozen=True)
 class AlignedTree:
-    """Links and what they carry in such axes; `turns` lead from these to the frames' own. `between`
-    has the arms of links from the heaviest on the same frame, where axes are along those; `along`
-    the axis of each frame that is along the arm of the heaviest, if one is.
+    """Links and what they carry in such axes; `rotations` lead from these to the frames' own.
+    `between` has the arms of links from the heaviest on the same frame, where axes are along those;
+    `along` the axis of each frame that is along the arm of the heaviest, if one is.
     """
 
     links: tuple[Link, ...]
     carried: tuple[Solid | None, ...]
-    turns: tuple[Rotation, ...]
+    rotations: tuple[Rotation, ...]
     between: Mapping[int, Vec]
     along: tuple[int | None, ...]
 
@@ -34,22 +34,22 @@ class AlignedTree:
         self, wrenches: Sequence[Wrench], tau: Sequence[Scalar]
     ) -> tuple[list[Wrench], list[Scalar]]:
         """Wrenches on the frames, and what acts on the velocities."""
-        pairs = zip(self.turns, wrenches, strict=True)
-        turned = [Wrench(turn.into(f.moment), turn.into(f.force)) for turn, f in pairs]
+        pairs = zip(self.rotations, wrenches, strict=True)
+        rotated = [Wrench(rotation.into(f.moment), rotation.into(f.force)) for rotation, f in pairs]
         found = list(tau)
-        for turn, link in zip(self.turns, self.links, strict=True):
-            if not isinstance(turn, Unturned):
+        for rotation, link in zip(self.rotations, self.links, strict=True):
+            if not isinstance(rotation, IdentityRotation):
                 x, y, z = link.v
-                found[x], found[y], found[z] = turn.into((tau[x], tau[y], tau[z]))
-        return turned, found
+                found[x], found[y], found[z] = rotation.into((tau[x], tau[y], tau[z]))
+        return rotated, found
 
     def out(self, rates: Sequence[Scalar]) -> list[Scalar]:
         """Rates of the velocities as they are asked for."""
         found = list(rates)
-        for turn, link in zip(self.turns, self.links, strict=True):
-            if not isinstance(turn, Unturned):
+        for rotation, link in zip(self.rotations, self.links, strict=True):
+            if not isinstance(rotation, IdentityRotation):
                 x, y, z = link.v
-                found[x], found[y], found[z] = turn.out((rates[x], rates[y], rates[z]))
+                found[x], found[y], found[z] = rotation.out((rates[x], rates[y], rates[z]))
         return found
 
 
@@ -62,7 +62,7 @@ def align_axes(
     """Links, and what they carry, where `ranks` tell which links each has to look at. Frames on
     other joints keep their axes.
     """
-    turns: list[Rotation] = [Unturned() for _ in links]
+    rotations: list[Rotation] = [IdentityRotation() for _ in links]
     heaviest, between = ranks.heaviest, dict[int, Vec]()
     ways: list[int | None] = [None] * len(links)
     arms = {k: link.arm for k, link in enumerate(links)}
@@ -72,41 +72,41 @@ def align_axes(
         loose = link.parent >= 0 and carried[link.parent] is None
         other = ranks.beside[k]
         if child >= 0 and spins and other >= 0:
-            turns[k], between[other] = _along(sub(links[other].arm, links[child].arm), scalars)
-            arms[child] = turns[k].into(links[child].arm)
+            rotations[k], between[other] = _along(sub(links[other].arm, links[child].arm), scalars)
+            arms[child] = rotations[k].into(links[child].arm)
             arms[other] = add(arms[child], between[other])
         elif child >= 0 and spins and not loose:
-            turns[k], arms[child] = _along(links[child].arm, scalars)
+            rotations[k], arms[child] = _along(links[child].arm, scalars)
             ways[k] = next((j for j in AXES if not scalars.is_zero(arms[child][j])), None)
     found, bodies = [], []
     for k, link in enumerate(links):
-        base = turns[link.parent] if link.parent >= 0 else Unturned()
-        turn = link.turn
-        if not isinstance(base, Unturned):
-            turn = Both(_back(base), turn)
+        base = rotations[link.parent] if link.parent >= 0 else IdentityRotation()
+        rotation = link.rotation
+        if not isinstance(base, IdentityRotation):
+            rotation = ComposedRotation(_back(base), rotation)
             if k not in (heaviest[link.parent], ranks.beside[link.parent]):
                 arms[k] = base.into(link.arm)
         body = carried[k]
-        if not isinstance(turns[k], Unturned):
-            turn = Both(turn, turns[k])
+        if not isinstance(rotations[k], IdentityRotation):
+            rotation = ComposedRotation(rotation, rotations[k])
             if body is not None:
-                inertia = _back(turns[k]).out_symmetric(body.inertia)
-                body = replace(body, centre=turns[k].into(body.centre), inertia=inertia)
-        found.append(replace(link, turn=turn, arm=arms[k]))
+                inertia = _back(rotations[k]).out_symmetric(body.inertia)
+                body = replace(body, centre=rotations[k].into(body.centre), inertia=inertia)
+        found.append(replace(link, rotation=rotation, arm=arms[k]))
         bodies.append(body)
-    return AlignedTree(tuple(found), tuple(bodies), tuple(turns), between, tuple(ways))
+    return AlignedTree(tuple(found), tuple(bodies), tuple(rotations), between, tuple(ways))
 
 
 def _along(arm: Vec, scalars: Scalars) -> tuple[Rotation, Vec]:
     """A rotation that brings a coordinate axis to an arm, and the arm on that axis."""
     ways = [j for j in AXES if not scalars.is_zero(arm[j])]
     if len(ways) < 2:
-        return Unturned(), arm
+        return IdentityRotation(), arm
     zero = scalars.number(0.0)
     if len(ways) == 3:
         first, flat = _along((arm[0], arm[1], zero), scalars)
         second, left = _along((flat[0], zero, arm[2]), scalars)
-        return Both(first, second), left
+        return ComposedRotation(first, second), left
     # A turn about the third axis brings axis i, the next after it, to the arm.
     (k,) = (j for j in AXES if j not in ways)
     i, j = (k + 1) % 3, (k + 2) % 3
@@ -116,10 +116,10 @@ def _along(arm: Vec, scalars: Scalars) -> tuple[Rotation, Vec]:
     c, s = (arm[i] + none) / (length + none), arm[j] / (length + none)
     along = list(zeros(scalars))
     along[i] = length
-    return AxisTurn(k, c, s, scalars.number(2.0) * c), (along[0], along[1], along[2])
+    return AxisRotation(k, c, s, scalars.number(2.0) * c), (along[0], along[1], along[2])
 
 
-def _back(turn: Rotation) -> Rotation:
-    if isinstance(turn, Both):
-        return Both(_back(turn.inner), _back(turn.outer))
-    return replace(turn, s=-turn.s) if isinstance(turn, AxisTurn) else turn
+def _back(rotation: Rotation) -> Rotation:
+    if isinstance(rotation, ComposedRotation):
+        return ComposedRotation(_back(rotation.inner), _back(rotation.outer))
+    return replace(rotation, s=-rotation.s) if isinstance(rotation, AxisRotation) else rotation

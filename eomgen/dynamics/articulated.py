@@ -126,8 +126,8 @@ def _outwards(
         angular, linear = nothing, nothing
         if link.parent >= 0:
             base_angular, base_linear = reached[link.parent]
-            angular = link.turn.into(base_angular)
-            linear = link.turn.into(add(base_linear, cross(base_angular, link.arm)))
+            angular = link.rotation.into(base_angular)
+            linear = link.rotation.into(add(base_linear, cross(base_angular, link.arm)))
         for (axis, i), pivot in reversed(list(zip(link.free, pivots[k], strict=True))):
             value = shares[i] - (dot(pivot.u, angular) + dot(pivot.w, linear))
             if pivot.absolute:
@@ -174,7 +174,11 @@ def moved_to_parent(link: Link, p: ArticulatedInertia, scalars: Scalars) -> Arti
     J' = J - G [r]x + [r]x G'ᵀ, six entries of it.
     """
     r = link.arm
-    J, G, H = link.turn.out_symmetric(p.J), link.turn.out_matrix(p.G), link.turn.out_symmetric(p.H)
+    J, G, H = (
+        link.rotation.out_symmetric(p.J),
+        link.rotation.out_matrix(p.G),
+        link.rotation.out_symmetric(p.H),
+    )
     columns = [cross(r, (H[0][j], H[1][j], H[2][j])) for j in AXES]
     moved = plus(G, transposed((columns[0], columns[1], columns[2])))
     old, new = [cross(r, row) for row in G], [cross(r, row) for row in moved]

@@ -131,15 +131,15 @@ def with_simple_axes(
         fits = not graded and above is not None and above.kind == "revolute"
         fits = fits and frame.parent not in fitted
         i = above.axis if above is not None and fits else _across(frame)
-        a, m, b, c = exact.turns_to(frame.fixed, i, frame.axis)
-        rest = exact.turn(m, b)
+        a, m, b, c = exact.three_rotations(frame.fixed, i, frame.axis)
+        rest = exact.rotation_about(m, b)
         if above is not None and fits:
             fitted.add(frame.parent)
-            back = exact.turn(i, exact.opposite(a))
-            _turn_axes(frames, mounts, carried[frame.parent], back, scalars)
+            back = exact.rotation_about(i, exact.opposite(a))
+            _rotate_axes(frames, mounts, carried[frame.parent], back, scalars)
             frames[frame.parent] = replace(above, lead=exact.total(above.lead, a))
         else:
-            rest = exact.product(exact.turn(i, a), rest)
+            rest = exact.product(exact.rotation_about(i, a), rest)
         frames[k] = replace(frames[k], fixed=rest, lead=exact.total(frames[k].lead, c))
     return frames, mounts
 
@@ -152,17 +152,17 @@ def _across(frame: Frame) -> int:
     return min(others, key=lambda i: abs(frame.fixed[i][frame.axis]))
 
 
-def _turn_axes(
-    frames: list[Frame], mounts: list[Mount], carried: Carried, turned: Matrix, scalars: Scalars
+def _rotate_axes(
+    frames: list[Frame], mounts: list[Mount], carried: Carried, rotated: Matrix, scalars: Scalars
 ) -> None:
-    """Write what a frame carries in other axes of its own; `turned` takes vectors into them."""
+    """Write what a frame carries in other axes of its own; `rotated` takes vectors into them."""
     children, riders = carried
-    node = constant(turned, scalars)
+    node = constant(rotated, scalars)
     for n in children:
-        fixed, offset = exact.product(turned, frames[n].fixed), times(node, frames[n].offset)
+        fixed, offset = exact.product(rotated, frames[n].fixed), times(node, frames[n].offset)
         frames[n] = replace(frames[n], fixed=fixed, offset=offset)
     for n in riders:
-        axes, at = exact.product(turned, mounts[n].axes), times(node, mounts[n].at)
+        axes, at = exact.product(rotated, mounts[n].axes), times(node, mounts[n].at)
         mounts[n] = replace(mounts[n], axes=axes, at=at)
 
 

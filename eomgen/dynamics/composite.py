@@ -36,8 +36,8 @@ def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:
     """A rigid body at the parent's origin: with first moments h before and h' = h + m r after,
     J' = J + (r·h + r·h') 1 - r h'ᵀ - h rᵀ.
     """
-    r, h = link.arm, link.turn.out(body.first_moment)
-    J = link.turn.out_symmetric(body.inertia)
+    r, h = link.arm, link.rotation.out(body.first_moment)
+    J = link.rotation.out_symmetric(body.inertia)
     moved = add(h, scale(body.mass, r))
     both = [r[i] * (h[i] + moved[i]) for i in range(3)]
     if scalars.is_zero(J[0][0]) and scalars.is_zero(J[1][1]):  # a planar body

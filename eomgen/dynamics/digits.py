@@ -274,8 +274,8 @@ def _least(model: Model, rates: Array, at: Sequence[Values]) -> Array:
         middle = float(own[len(own) // 2])
         least[first::2] = middle if 0.0 < middle < 1.0 else 1.0
     v = np.abs([values.v for values in at])
-    turning = [i for i, c in enumerate(model.velocities) if c.unit == "rad/s"]
-    made: Array = np.maximum(least, v[:, turning].max(axis=1, initial=0.0) * v.max(axis=1))
+    angular = [i for i, c in enumerate(model.velocities) if c.unit == "rad/s"]
+    made: Array = np.maximum(least, v[:, angular].max(axis=1, initial=0.0) * v.max(axis=1))
     return made
 
 

@@ -35,7 +35,7 @@ from eomgen.dynamics.motion import (
 )
 from eomgen.dynamics.orthogonal import Elimination
 from eomgen.dynamics.solids import Solid, centres, ranked, solids
-from eomgen.dynamics.vectors import Vec, no_matrix, sub, turning_in_space, zeros
+from eomgen.dynamics.vectors import Vec, no_matrix, sub, torque_in_space, zeros
 from eomgen.routes import ROUTES
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar
@@ -108,7 +108,7 @@ class Dynamics(MechanismState):
 
     def _point_force(self, load: Load) -> fc.PointForce:
         def in_space(force: Vector, torque: Vector) -> tuple[Vec, Vec]:
-            return self._in_space(force), turning_in_space(torque, self.scalars)
+            return self._in_space(force), torque_in_space(torque, self.scalars)
 
         at, own = self._in_space(load.at), load.in_body and in_space(*load.in_body)
         return fc.PointForce(self.index[load.body], at, *in_space(load.force, load.torque), own)
@@ -336,7 +336,7 @@ class Dynamics(MechanismState):
                 continue
             for force, speed in zip(load.force, self.velocity(load.body, load.at), strict=True):
                 power = power + force * speed
-            for torque, rate in zip(load.torque, self.turning(load.body), strict=False):
+            for torque, rate in zip(load.torque, self.angular_velocity(load.body), strict=False):
                 power = power + torque * rate
         return power
 

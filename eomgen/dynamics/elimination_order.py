@@ -18,7 +18,7 @@ def nonzero_columns(links: Sequence[Link], scalars: Scalars) -> list[set[Column]
         if link.parent >= 0:
             base = found[link.parent]
             for angular, j in base | point_columns(base, link.arm, scalars):
-                columns |= _parts(angular, link.turn.into(unit(j, scalars)), scalars)
+                columns |= _parts(angular, link.rotation.into(unit(j, scalars)), scalars)
         found.append(columns)
     return found
 
@@ -60,8 +60,8 @@ def translation_order(
         held = [len(vector) for vector in present[1:] if j in vector]
         return j == own, -min(held, default=4), len(held)
 
-    turn = ((last + 1) % 3, (last + 2) % 3, last)
-    return tuple(sorted((j for j in turn if not planar or j < 2), key=late))
+    order = ((last + 1) % 3, (last + 2) % 3, last)
+    return tuple(sorted((j for j in order if not planar or j < 2), key=late))
 
 
 def column_of(axis: MotionAxis) -> Column:

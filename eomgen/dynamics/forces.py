@@ -58,8 +58,8 @@ def less(a: Wrench, b: Wrench) -> Wrench:
 
 def at_parent(link: Link, f: Wrench) -> Wrench:
     """A wrench on a link as one on its parent."""
-    force = link.turn.out(f.force)
-    return Wrench(add(link.turn.out(f.moment), cross(link.arm, force)), force)
+    force = link.rotation.out(f.force)
+    return Wrench(add(link.rotation.out(f.moment), cross(link.arm, force)), force)
 
 
 def moved_to(point: Vec, f: Wrench) -> Wrench:
@@ -107,7 +107,7 @@ def on_frames(
             moment = scale(tau[i], axis.direction)
             wrenches[k] = total(wrenches[k], Wrench(moment, zeros(scalars)))
             if link.parent >= 0:
-                back = Wrench(link.turn.out(moment), zeros(scalars))
+                back = Wrench(link.rotation.out(moment), zeros(scalars))
                 wrenches[link.parent] = less(wrenches[link.parent], back)
             left[i] = scalars.number(0.0)
     return wrenches, left

@@ -20,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from eomgen.dynamics import forces as fc
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.observables import arm
-from eomgen.dynamics.vectors import Vec, add, cross, in_space, turning_in_space, zeros
+from eomgen.dynamics.vectors import Vec, add, cross, in_space, torque_in_space, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
 from eomgen.scene.joints.base import WORLD
@@ -64,7 +64,7 @@ def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Wrench]:
     points: dict[tuple[str, Vector], tuple[Vec, Vec]] = {}
     for load in loads:
         force, torque = points.get((load.body, load.at), (nothing, nothing))
-        more = turning_in_space(load.torque, d.scalars)
+        more = torque_in_space(load.torque, d.scalars)
         points[load.body, load.at] = add(force, in_space(load.force, d.scalars)), add(torque, more)
     sums: dict[int, fc.Wrench] = {}
     for (body, at), (force, torque) in points.items():
@@ -76,8 +76,8 @@ def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Wrench]:
             sums[frame] = fc.total(sums[frame], wrench) if frame in sums else wrench
     wrenches = [fc.Wrench(nothing, nothing)] * len(d.kinematics.links)
     for frame, f in sums.items():
-        turned = (d.kinematics.from_world(frame, part) for part in (f.moment, f.force))
-        wrenches[frame] = fc.Wrench(*turned)
+        rotated = (d.kinematics.from_world(frame, part) for part in (f.moment, f.force))
+        wrenches[frame] = fc.Wrench(*rotated)
     return wrenches
 
 

@@ -11,9 +11,9 @@ from typing import Literal
 
 from eomgen.dynamics.frames import Frame, Linkage, Rigid
 from eomgen.dynamics.rotations import (
+    IdentityRotation,
     Rotation,
-    Unturned,
-    axis_turn,
+    axis_rotation,
     both,
     cosine_and_sine,
     fixed_rotation,
@@ -75,14 +75,14 @@ class MotionAxis:
 class Link:
     """A frame at coordinates q.
 
-    `turn` leads from its axes to the parent's; `arm` is its origin from the parent's, in the
+    `rotation` leads from its axes to the parent's; `arm` is its origin from the parent's, in the
     parent's axes; `axes` are its motions in its own axes, the velocity v[i] times each. A `driven`
     motion is given and not solved for.
     """
 
     name: str
     parent: int
-    turn: Rotation
+    rotation: Rotation
     arm: Vec
     axes: tuple[MotionAxis, ...]
     v: tuple[int, ...]
@@ -136,17 +136,17 @@ def tree_kinematics(
     angles: list[Angle] = []
     for frame in linkage.frames:
         fixed = fixed_rotation(frame.fixed, scalars)
-        turn, arm = fixed, frame.offset
+        rotation, arm = fixed, frame.offset
         directions: tuple[MotionAxis, ...] = (
             MotionAxis(frame.kind == "revolute", eye[frame.axis], frame.axis),
         )
         if frame.kind == "spherical":
-            turn = both(fixed, from_quaternion([q[i] for i in frame.q], scalars))
+            rotation = both(fixed, from_quaternion([q[i] for i in frame.q], scalars))
             directions = tuple(MotionAxis(True, eye[k], k) for k in AXES)
         elif frame.kind == "revolute":
             count, lead = quarters(frame.lead)
             angle = q[frame.q[0]] + scalars.number(lead)
-            turn = both(fixed, axis_turn(frame.axis, angle, count, scalars))
+            rotation = both(fixed, axis_rotation(frame.axis, angle, count, scalars))
         else:
             arm = add(arm, fixed.out(scale(q[frame.q[0]], eye[frame.axis])))
         base = world[frame.parent] if frame.parent >= 0 else eye
@@ -154,18 +154,18 @@ def tree_kinematics(
             angles.append(_angle(frame, angles, q, scalars))
             world.append(angles[-1].matrix(scalars))
         else:
-            world.append(turn.after(base))
+            world.append(rotation.after(base))
         rigid = frame.rigid
         if axes == "world":
-            turn, arm = Unturned(), times(base, arm)
-            directions = tuple(_turned(axis, world[-1], linkage.planar) for axis in directions)
+            rotation, arm = IdentityRotation(), times(base, arm)
+            directions = tuple(_rotated(axis, world[-1], linkage.planar) for axis in directions)
             first = times(world[-1], rigid.first_moment)
             rigid = Rigid(rigid.mass, first, congruent(world[-1], rigid.inertia))
         links.append(
             Link(
                 frame.name,
                 frame.parent,
-                turn,
+                rotation,
                 arm,
                 directions,
                 frame.v,
@@ -186,7 +186,7 @@ def _angle(frame: Frame, angles: Sequence[Angle], q: Sequence[Scalar], scalars: 
     return Angle(scalars.named(base.moving + q[frame.q[0]], f"angle_{frame.name}"), fixed)
 
 
-def _turned(axis: MotionAxis, world: Mat, planar: bool) -> MotionAxis:
+def _rotated(axis: MotionAxis, world: Mat, planar: bool) -> MotionAxis:
     """A frame's own axis in world axes: in the plane z stays z."""
     if planar and axis.unit == 2:
         return axis

@@ -107,12 +107,12 @@ def _drafted(
             to_axis, k = _to_coordinate_axis(primitive)
             name = body.positions[i].name
             if name in locked and primitive.kind == "prismatic":
-                offset = exact.turned(exact.product(axes, to_axis), k, locked[name])
+                offset = exact.image_of_axis(exact.product(axes, to_axis), k, locked[name])
                 at = add(at, _numbers(offset, scalars))
                 continue
             if name in locked:
                 held = model.locked_angle(name)
-                back = exact.product(exact.turn(k, held), exact.transposed(to_axis))
+                back = exact.product(exact.rotation_about(k, held), exact.transposed(to_axis))
                 axes = exact.product(axes, exact.product(to_axis, back))
                 angle = exact.total(angle, held if primitive.axis[2] > 0 else exact.opposite(held))
                 continue
@@ -181,8 +181,8 @@ def _about_origin(mount: Mount, model: Model, scalars: Scalars) -> Rigid:
     moved = symmetric(
         [yy + zz, xx + zz, xx + yy, -(first[0] * y), -(first[0] * z), -(first[1] * z)]
     )
-    turned = congruent(constant(mount.axes, scalars), mount.inertia)
-    return Rigid(m, first, plus(turned, moved))
+    rotated = congruent(constant(mount.axes, scalars), mount.inertia)
+    return Rigid(m, first, plus(rotated, moved))
 
 
 def _named(rigid: Rigid, name: str, scalars: Scalars) -> Rigid:

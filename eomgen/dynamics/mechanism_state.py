@@ -102,7 +102,7 @@ class MechanismState:
             return self._cut(zeros(self.scalars))
         return self._cut(self.point_velocity(self.index[body], self._in_space(at))[0])
 
-    def turning(self, body: str) -> Vector:
+    def angular_velocity(self, body: str) -> Vector:
         """Angular velocity of a body, world axes, rad/s."""
         if body == WORLD:
             w = zeros(self.scalars)
@@ -114,11 +114,11 @@ class MechanismState:
         """A vector of body axes in world axes."""
         if body == WORLD:
             return vector
-        turned = times(
+        rotated = times(
             orientation(self.linkage, self.kinematics, self.index[body], self.scalars),
             self._in_space(vector),
         )
-        return self._cut(turned)
+        return self._cut(rotated)
 
     def coordinate(self, joint: str, index: int = 0) -> Scalar:
         """A coordinate of a joint."""

@@ -52,8 +52,8 @@ def velocities(
         angular, linear = zeros(scalars), zeros(scalars)
         if link.parent >= 0:
             parent = found[link.parent]
-            angular = link.turn.into(parent.angular)
-            linear = link.turn.into(add(parent.linear, cross(parent.angular, link.arm)))
+            angular = link.rotation.into(parent.angular)
+            linear = link.rotation.into(add(parent.linear, cross(parent.angular, link.arm)))
         own_angular, own_linear = own_motion(link, v, scalars)
         angular = named(add(angular, own_angular), f"omega_{link.name}", scalars)
         linear = named(add(linear, own_linear), f"velocity_{link.name}", scalars)
@@ -92,13 +92,13 @@ def accelerations(
     for k, link in enumerate(kinematics.links):
         if link.parent >= 0:
             parent = found[link.parent]
-            angular = link.turn.into(parent.angular)
-            linear = link.turn.into(add(parent.linear, times(parent.field, link.arm)))
-            spin = link.turn.into(twists[link.parent].angular)
+            angular = link.rotation.into(parent.angular)
+            linear = link.rotation.into(add(parent.linear, times(parent.field, link.arm)))
+            spin = link.rotation.into(twists[link.parent].angular)
         else:
             angular, linear, spin = zeros(scalars), zeros(scalars), zeros(scalars)
             if k not in falling:
-                linear = link.turn.into(base)
+                linear = link.rotation.into(base)
         own_angular, own_linear = own_motion(link, v, scalars)
         # The axes of motion turn with the parent; a slide feels twice that (Coriolis).
         angular = add(angular, cross(spin, own_angular))

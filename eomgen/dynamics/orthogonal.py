@@ -49,15 +49,15 @@ from eomgen.dynamics.motion import Acceleration, moment_about_centre
 from eomgen.dynamics.rows import (
     Column,
     Eliminated,
+    GivensRotation,
     Row,
     Rows,
     Steps,
     Sum,
     Taken,
-    Turn,
+    in_parent_axes,
     shifted,
-    turned,
-    turned_back,
+    undo_rotations,
 )
 from eomgen.dynamics.solids import Ranks, Solid
 from eomgen.dynamics.vectors import (
@@ -119,7 +119,7 @@ class Elimination:
             eliminated, passed = self._eliminated(k, own, rows[k], left, tau)
             found.append(eliminated)
             if link.parent >= 0:
-                rows[link.parent] += [(turned(link, row), k) for row in eliminated.rows]
+                rows[link.parent] += [(in_parent_axes(link, row), k) for row in eliminated.rows]
                 more = moved_to(self._centre(link.parent), at_parent(link, passed))
                 wrenches[link.parent] = total(wrenches[link.parent], more)
         return self._aligned.out(self._outwards(found[::-1], len(tau)))
@@ -148,7 +148,7 @@ class Elimination:
             return self._rows.make(weight, angular, linear, right, force)
 
         if solid is not None and own is not None:
-            into = self._aligned.turns[k].into
+            into = self._aligned.rotations[k].into
             centre = into(add(a.linear, times(a.field, own.centre)))
             if not s.is_zero(solid.mass):
                 m = s.call("max", solid.mass, self._rows.tiny)
@@ -209,7 +209,7 @@ class Elimination:
         along = self._aligned.along[k]
         slides = translation_order(link, at, loose, self._planar, s)
         order = rotation_order(link, self._planar, along)
-        axes, turns, taken = list(reversed(link.free)), Steps(), []
+        axes, rotations, taken = list(reversed(link.free)), Steps(), []
         if along is not None and along in angular:
             axes.sort(key=lambda axis: -order.index(column_of(axis[0])[1]))
             kept = {(False, j): linear[j] for j in slides if j in linear}
@@ -228,10 +228,12 @@ class Elimination:
         room = len(orders[0]) + len(orders[1])
         folded = bool(linear) or len(loose) + len(angular) > room
         if folded:
-            linear, loose = self._rows.folded(linear, loose, orders[0], turns, angular=False)
+            linear, loose = self._rows.folded(linear, loose, orders[0], rotations, angular=False)
             holding = sum(not self._rows.is_empty(row) for row in loose)
             if angular or holding > len(orders[1]):
-                angular, loose = self._rows.folded(angular, loose, orders[1], turns, angular=True)
+                angular, loose = self._rows.folded(
+                    angular, loose, orders[1], rotations, angular=True
+                )
         kept = {(False, j): shifted(linear[j], at) for j in orders[0] if j in linear}
         kept |= {(True, j): angular[j] for j in orders[1] if j in angular}
         kept = {column: self._rows.of(columns, row) for column, row in kept.items()}
@@ -244,12 +246,12 @@ class Elimination:
             held = axis[0].unit in own[axis[0].angular]
             first, sources, kept, free, gathered = self._first(axis[0], held, kept, free)
             one, kept, free, term = self._taken(link, axis, first, kept, free, term, tau[axis[1]])
-            taken.append(replace(one, rows=sources, gathered=gathered, before=tuple(turns)))
-            turns.clear()
+            taken.append(replace(one, rows=sources, gathered=gathered, before=tuple(rotations)))
+            rotations.clear()
         rest = [*kept.values(), *free]
         holding_rows = [row for row in rest if not self._rows.is_empty(row)]
         empty += [row for row in rest if self._rows.is_empty(row)]
-        return Eliminated(tuple(taken), tuple(turns), tuple(holding_rows), tuple(empty)), term
+        return Eliminated(tuple(taken), tuple(rotations), tuple(holding_rows), tuple(empty)), term
 
     def _early(
         self,
@@ -278,12 +280,14 @@ class Elimination:
 
     def _first(
         self, motion: MotionAxis, held: bool, kept: dict[Column, Row], free: list[Row]
-    ) -> tuple[Row, tuple[Row, ...], dict[Column, Row], list[Row], tuple[Turn | Sum, ...]]:
+    ) -> tuple[
+        Row, tuple[Row, ...], dict[Column, Row], list[Row], tuple[GivensRotation | Sum, ...]
+    ]:
         """The row that takes an axis: one that holds it alone, as there is where a link has inertia
         against it; else what can be gathered of it from all. And the rows that it is found from.
         """
         column = column_of(motion)
-        kept, turns = dict(kept), Steps()
+        kept, rotations = dict(kept), Steps()
         if held:
             first = kept.pop(column)
             return first, (first,), kept, free, ()
@@ -299,10 +303,10 @@ class Elimination:
             if not self._scalars.is_zero((row.angular if angular else row.linear)[column[1]])
         )
         for n, row in enumerate(free):
-            single, free[n] = self._rows.rotated(single, row, column, turns)
+            single, free[n] = self._rows.rotated(single, row, column, rotations)
         for key in reversed(kept):
-            single, kept[key] = self._rows.rotated(single, kept[key], column, turns)
-        return single, sources or (single,), kept, free, tuple(turns)
+            single, kept[key] = self._rows.rotated(single, kept[key], column, rotations)
+        return single, sources or (single,), kept, free, tuple(rotations)
 
     def _taken(
         self,
@@ -321,16 +325,16 @@ class Elimination:
         """
         s, (motion, i) = self._scalars, axis
         column = column_of(motion)
-        kept, free, turns = dict(kept), list(free), Steps()
+        kept, free, rotations = dict(kept), list(free), Steps()
 
         def with_free(pivot: Row) -> Row:
             for n, row in enumerate(free):
-                pivot, free[n] = self._rows.rotated(pivot, row, column, turns)
+                pivot, free[n] = self._rows.rotated(pivot, row, column, rotations)
             return pivot
 
         pivot = first if early else with_free(first)
         for key in reversed(kept):
-            pivot, kept[key] = self._rows.rotated(pivot, kept[key], column, turns)
+            pivot, kept[key] = self._rows.rotated(pivot, kept[key], column, rotations)
         pivot = with_free(pivot) if early else pivot
         rotor, pushed, back = -1, along(motion, term.moment, term.force), self._rows.zero
         if s.is_zero(link.armature):
@@ -343,13 +347,13 @@ class Elimination:
             empty = self._rows.empty(column)
             row = self._rows.make(link.armature, empty.angular, empty.linear, back, tau)
             rotor = row.index
-            pivot, row = self._rows.rotated(pivot, row, column, turns)
+            pivot, row = self._rows.rotated(pivot, row, column, rotations)
             minus = with_component(motion, row.angular, row.linear, -self._rows.one)
             free.append(replace(row, angular=minus[0], linear=minus[1]))
         pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
         share = pivot.force / pivot.weight
         left = Wrench(*with_component(motion, moment, push, back))
-        one = Taken(motion, i, (first,), first.index, share, tuple(turns), rotor)
+        one = Taken(motion, i, (first,), first.index, share, tuple(rotations), rotor)
         return one, kept, free, left
 
     # Outwards.
@@ -364,15 +368,15 @@ class Elimination:
             angular, linear = zeros(scalars), zeros(scalars)
             if link.parent >= 0:
                 base_angular, base_linear = reached[link.parent]
-                angular = link.turn.into(base_angular)
-                linear = link.turn.into(add(base_linear, cross(base_angular, link.arm)))
+                angular = link.rotation.into(base_angular)
+                linear = link.rotation.into(add(base_linear, cross(base_angular, link.arm)))
             for row in (*eliminated.empty, *(eliminated.rows if link.parent < 0 else ())):
                 residuals[row.index] = -row.right
-            turned_back(eliminated.turns, residuals)
+            undo_rotations(eliminated.rotations, residuals)
             for taken in reversed(eliminated.axes):
                 motion = taken.axis
                 residuals[taken.pivot] = taken.left
-                turned_back((*taken.gathered, *taken.turns), residuals)
+                undo_rotations((*taken.gathered, *taken.rotations), residuals)
                 before = along(motion, angular, linear)
                 if taken.rotor >= 0:
                     result[taken.velocity] = residuals[taken.rotor]
@@ -381,7 +385,7 @@ class Elimination:
                     value = self._value(taken, residuals, angular, linear)
                     result[taken.velocity] = value - before
                 angular, linear = with_component(motion, angular, linear, value)
-                turned_back(taken.before, residuals)
+                undo_rotations(taken.before, residuals)
             angular = named(angular, f"alpha_{link.name}", scalars)
             reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
         return result

@@ -19,7 +19,7 @@ def perturbed(model: Model, seed: int = 9) -> Model:
     def near(x: float) -> float:
         return math.nextafter(x, rng.choice((-math.inf, math.inf))) if x else x
 
-    def turned(degrees: float) -> float:
+    def nudged(degrees: float) -> float:
         return near(degrees) if math.fmod(degrees, 90.0) else degrees
 
     def joint(given: Joint) -> Joint:
@@ -27,9 +27,9 @@ def perturbed(model: Model, seed: int = 9) -> Model:
             return given
         angles = given.orientation_deg
         fields: dict[str, object] = {
-            "orientation_deg": tuple(map(turned, angles))
+            "orientation_deg": tuple(map(nudged, angles))
             if isinstance(angles, tuple)
-            else turned(angles)
+            else nudged(angles)
         }
         if (axis := getattr(given, "axis", None)) is not None:
             fields["axis"] = tuple(map(near, axis))
@@ -46,5 +46,5 @@ def perturbed(model: Model, seed: int = 9) -> Model:
         model,
         bodies=tuple(replace(body, joint=joint(body.joint)) for body in model.bodies),
         effects=tuple(map(effect, model.effects)),
-        locked_deg=tuple((name, turned(degrees)) for name, degrees in model.locked_deg),
+        locked_deg=tuple((name, nudged(degrees)) for name, degrees in model.locked_deg),
     )

@@ -14,7 +14,7 @@ from eomgen.dynamics.vectors import (
     times,
     transposed,
 )
-from eomgen.scalars.exact import Matrix, turns_in
+from eomgen.scalars.exact import Matrix, axis_rotations
 from eomgen.scalars.protocol import Scalar, Scalars
 
 
@@ -37,7 +37,7 @@ class Rotation(Protocol):
         """world R: own axes in the world's, given the parent's."""
 
 
-class Unturned:
+class IdentityRotation:
     """No rotation."""
 
     def out(self, a: Vec) -> Vec:
@@ -62,8 +62,8 @@ class Unturned:
 
 
 @dataclass(frozen=True)
-class AxisTurn:
-    """A turn about coordinate axis k by an angle of cosine c and sine s."""
+class AxisRotation:
+    """A rotation about coordinate axis k by an angle of cosine c and sine s."""
 
     k: int
     c: Scalar
@@ -126,11 +126,11 @@ class QuarterTurns:
 
     def out(self, a: Vec) -> Vec:
         """Two components change places, or signs."""
-        return self._turned(a, self.count)
+        return self._rotated(a, self.count)
 
     def into(self, a: Vec) -> Vec:
         """So they do back."""
-        return self._turned(a, 4 - self.count)
+        return self._rotated(a, 4 - self.count)
 
     def out_symmetric(self, a: Symmetric) -> Symmetric:
         """Rows and columns change places, and signs."""
@@ -145,7 +145,7 @@ class QuarterTurns:
         """Two columns change places, or signs."""
         return (self.into(world[0]), self.into(world[1]), self.into(world[2]))
 
-    def _turned(self, a: Vec, count: int) -> Vec:
+    def _rotated(self, a: Vec, count: int) -> Vec:
         i, j = (self.k + 1) % 3, (self.k + 2) % 3
         x, y = _by_quarters(a[i], a[j], count)
         result = list(a)
@@ -154,7 +154,7 @@ class QuarterTurns:
 
 
 @dataclass(frozen=True)
-class Turned:
+class MatrixRotation:
     """Any rotation, by its matrix: own axes as columns."""
 
     matrix: Mat
@@ -181,7 +181,7 @@ class Turned:
 
 
 @dataclass(frozen=True)
-class Both:
+class ComposedRotation:
     """A fixed rotation, then one that moves: R = outer inner."""
 
     outer: Rotation
@@ -208,10 +208,10 @@ class Both:
         return self.inner.after(self.outer.after(world))
 
 
-def axis_turn(k: int, angle: Scalar, quarters: int, scalars: Scalars) -> AxisTurn:
-    """A turn about coordinate axis k by quarter turns and an angle."""
+def axis_rotation(k: int, angle: Scalar, quarters: int, scalars: Scalars) -> AxisRotation:
+    """A rotation about coordinate axis k by quarter turns and an angle."""
     c, s = cosine_and_sine(angle, quarters, scalars)
-    return AxisTurn(k, c, s, scalars.number(2.0) * c)
+    return AxisRotation(k, c, s, scalars.number(2.0) * c)
 
 
 def cosine_and_sine(angle: Scalar, quarters: int, scalars: Scalars) -> tuple[Scalar, Scalar]:
@@ -220,23 +220,23 @@ def cosine_and_sine(angle: Scalar, quarters: int, scalars: Scalars) -> tuple[Sca
 
 
 def fixed_rotation(rotation: Matrix, scalars: Scalars) -> Rotation:
-    """A rotation that a scene fixes, by turns about coordinate axes where it is one or two."""
-    turns = turns_in(rotation)
-    if turns is None:
-        return Turned(constant(rotation, scalars))
-    found: Rotation = Unturned()
-    for turn in turns:
-        if turn.quarters:
-            found = both(found, QuarterTurns(turn.k, turn.quarters))
-        if turn.s:
-            c, s = scalars.number(turn.c), scalars.number(turn.s)
-            found = both(found, AxisTurn(turn.k, c, s, scalars.number(2.0) * c))
+    """A rotation that a scene fixes, by rotations about coordinate axes where it is one or two."""
+    parts = axis_rotations(rotation)
+    if parts is None:
+        return MatrixRotation(constant(rotation, scalars))
+    found: Rotation = IdentityRotation()
+    for part in parts:
+        if part.quarters:
+            found = both(found, QuarterTurns(part.k, part.quarters))
+        if part.s:
+            c, s = scalars.number(part.c), scalars.number(part.s)
+            found = both(found, AxisRotation(part.k, c, s, scalars.number(2.0) * c))
     return found
 
 
 def both(outer: Rotation, inner: Rotation) -> Rotation:
     """outer inner."""
-    return inner if isinstance(outer, Unturned) else Both(outer, inner)
+    return inner if isinstance(outer, IdentityRotation) else ComposedRotation(outer, inner)
 
 
 def _by_quarters(x: Scalar, y: Scalar, count: int) -> tuple[Scalar, Scalar]:
@@ -244,7 +244,7 @@ def _by_quarters(x: Scalar, y: Scalar, count: int) -> tuple[Scalar, Scalar]:
     return ((x, y), (-y, x), (-x, -y), (y, -x))[count % 4]
 
 
-def from_quaternion(q: Sequence[Scalar], scalars: Scalars) -> Turned:
+def from_quaternion(q: Sequence[Scalar], scalars: Scalars) -> MatrixRotation:
     """The rotation of w, x, y, z, whatever the quaternion's length.
 
     R = 1 + (2/|q|²) (w [v]x + [v]x²), so that rounding in the length turns nothing.
@@ -256,7 +256,7 @@ def from_quaternion(q: Sequence[Scalar], scalars: Scalars) -> Turned:
     wx, wy, wz = kx * w, ky * w, kz * w
     xx, yy, zz = kx * x, ky * y, kz * z
     xy, xz, yz = kx * y, kx * z, ky * z
-    return Turned(
+    return MatrixRotation(
         (
             (one - (yy + zz), xy - wz, xz + wy),
             (xy + wz, one - (xx + zz), yz - wx),

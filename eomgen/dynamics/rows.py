@@ -47,7 +47,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Turn:
+class GivensRotation:
     """A rotation of a row against a pivot row that has 1 where it has x."""
 
     pivot: int
@@ -68,7 +68,7 @@ class Sum:
     rows: tuple[tuple[int, Scalar, Scalar], ...]
 
 
-Steps = list[Turn | Sum]
+Steps = list[GivensRotation | Sum]
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,8 @@ class Taken:
 
     rows    what it is found from: the one row that held it, or all before they were gathered
     pivot   the index of that which held it at last, and its residual at the end, `left`
-    turns   the rotations that cleared it; before those the ones that `gathered` the rows, and
+    rotations
+            the rotations that cleared it; before those the ones that `gathered` the rows, and
             before those the ones since the last axis
     rotor   the index of its motor's row, -1 if it has none
     """
@@ -87,10 +88,10 @@ class Taken:
     rows: tuple[Row, ...]
     pivot: int
     left: Scalar
-    turns: tuple[Turn | Sum, ...]
+    rotations: tuple[GivensRotation | Sum, ...]
     rotor: int
-    gathered: tuple[Turn | Sum, ...] = ()
-    before: tuple[Turn | Sum, ...] = ()
+    gathered: tuple[GivensRotation | Sum, ...] = ()
+    before: tuple[GivensRotation | Sum, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class Eliminated:
     """
 
     axes: tuple[Taken, ...]
-    turns: tuple[Turn | Sum, ...]
+    rotations: tuple[GivensRotation | Sum, ...]
     rows: tuple[Row, ...]
     empty: tuple[Row, ...]
 
@@ -141,7 +142,7 @@ class Rows:
         own: dict[int, Row],
         rows: Sequence[Row],
         order: Sequence[int],
-        turns: Steps,
+        rotations: Steps,
         *,
         angular: bool,
     ) -> tuple[dict[int, Row], list[Row]]:
@@ -152,14 +153,16 @@ class Rows:
         for j in order:
             first = pivot = own.get(j) or self.empty((angular, j))
             if angular and j == order[-1] and j in own:
-                pivot, rows = self._summed(pivot, rows, j, turns)
+                pivot, rows = self._summed(pivot, rows, j, rotations)
             for n, row in enumerate(rows):
-                pivot, rows[n] = self.rotated(pivot, row, (angular, j), turns, own=pivot is first)
+                pivot, rows[n] = self.rotated(
+                    pivot, row, (angular, j), rotations, own=pivot is first
+                )
             own[j] = pivot
         return own, rows
 
     def _summed(
-        self, pivot: Row, rows: Sequence[Row], j: int, turns: Steps
+        self, pivot: Row, rows: Sequence[Row], j: int, rotations: Steps
     ) -> tuple[Row, list[Row]]:
         """A pivot row about one angular acceleration with all rows about that, and the others."""
         is_zero = self._scalars.is_zero
@@ -177,7 +180,7 @@ class Rows:
         if not found:
             return pivot, list(rows)
         summed = replace(pivot, weight=weight, right=right / weight, force=force)
-        turns.append(Sum(summed, pivot.right, tuple(found)))
+        rotations.append(Sum(summed, pivot.right, tuple(found)))
         return summed, others
 
     def rotated(
@@ -185,7 +188,7 @@ class Rows:
         pivot: Row,
         row: Row,
         column: Column,
-        turns: Steps,
+        rotations: Steps,
         *,
         own: bool = False,
     ) -> tuple[Row, Row]:
@@ -199,7 +202,7 @@ class Rows:
         q = row.weight * x
         d = pivot.weight + q * x
         s, c = q / d, pivot.weight / d
-        turns.append(Turn(pivot.index, row.index, x, s, c))
+        rotations.append(GivensRotation(pivot.index, row.index, x, s, c))
 
         def mixed(a: Scalar, b: Scalar) -> tuple[Scalar, Scalar]:
             # c a + s b is a + s (b - x a), too, and shorter, but not as good if a is large: in a
@@ -215,8 +218,8 @@ class Rows:
             (p, f), (q, g), (r, h) = pairs
             return (p, q, r), (f, g, h)
 
-        turn, left_turn = both(pivot.angular, row.angular, angular)
-        move, left_move = both(pivot.linear, row.linear, not angular)
+        alpha, left_alpha = both(pivot.angular, row.angular, angular)
+        a, left_a = both(pivot.linear, row.linear, not angular)
         right, left_right = mixed(pivot.right, row.right)
         force, left_force = pivot.force + x * row.force, c * row.force - s * pivot.force
         noise, left_noise = pivot.noise, row.noise
@@ -224,12 +227,12 @@ class Rows:
             left_noise = left_noise + x * x * noise
             noise = c * c * noise + s * s * row.noise
         return (
-            Row(pivot.index, d, turn, move, right, force, noise),
+            Row(pivot.index, d, alpha, a, right, force, noise),
             Row(
                 row.index,
                 row.weight * c,
-                left_turn,
-                left_move,
+                left_alpha,
+                left_a,
                 left_right,
                 left_force,
                 left_noise,
@@ -237,18 +240,18 @@ class Rows:
         )
 
 
-def turned_back(turns: Sequence[Turn | Sum], residuals: dict[int, Scalar]) -> None:
+def undo_rotations(rotations: Sequence[GivensRotation | Sum], residuals: dict[int, Scalar]) -> None:
     """What rows leave before rotations, from what they leave after them."""
-    for turn in reversed(turns):
-        if isinstance(turn, Sum):
-            value = turn.pivot.right + residuals[turn.pivot.index]
-            for index, x, right in turn.rows:
+    for rotation in reversed(rotations):
+        if isinstance(rotation, Sum):
+            value = rotation.pivot.right + residuals[rotation.pivot.index]
+            for index, x, right in rotation.rows:
                 residuals[index] = x * value - right
-            residuals[turn.pivot.index] = value - turn.before
+            residuals[rotation.pivot.index] = value - rotation.before
             continue
-        a, b = residuals[turn.pivot], residuals[turn.row]
-        residuals[turn.pivot] = a - turn.s * b
-        residuals[turn.row] = turn.x * a + turn.c * b
+        a, b = residuals[rotation.pivot], residuals[rotation.row]
+        residuals[rotation.pivot] = a - rotation.s * b
+        residuals[rotation.row] = rotation.x * a + rotation.c * b
 
 
 def shifted(row: Row, offset: Vec) -> Row:
@@ -256,6 +259,8 @@ def shifted(row: Row, offset: Vec) -> Row:
     return replace(row, angular=add(row.angular, cross(offset, row.linear)))
 
 
-def turned(link: Link, row: Row) -> Row:
+def in_parent_axes(link: Link, row: Row) -> Row:
     """A row of a link in its parent's axes."""
-    return replace(row, angular=link.turn.out(row.angular), linear=link.turn.out(row.linear))
+    return replace(
+        row, angular=link.rotation.out(row.angular), linear=link.rotation.out(row.linear)
+    )

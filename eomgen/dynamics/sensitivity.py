@@ -94,8 +94,8 @@ def sensitivity(
         for own, (_, i) in zip(columns[k], link.free, strict=True):
             reach = force_to_move(bodies[k], own.axis.angular, own.axis.linear)
             pull = drag.transposed_times(own.axis)
-            turned = total(
-                _turned(own.axis, forces[k]),
+            rotated = total(
+                _rotated(own.axis, forces[k]),
                 total(_moved(bodies[k], own.second), drag.times(own.first)),
             )
             sped = total(_moved(bodies[k], own.both), drag.times(own.axis))
@@ -105,10 +105,10 @@ def sensitivity(
                     by_q[i, j] = _work(other.second, reach) + dot(pull, other.first.angular)
                     by_v[i, j] = _work(other.both, reach) + dot(pull, other.axis.angular)
                     if above != k:
-                        by_q[j, i] = _work(other.axis, turned)
+                        by_q[j, i] = _work(other.axis, rotated)
                         by_v[j, i] = _work(other.axis, sped)
                 outer = links[above]
-                reach, turned, sped = (at_parent(outer, f) for f in (reach, turned, sped))
+                reach, rotated, sped = (at_parent(outer, f) for f in (reach, rotated, sped))
                 above = outer.parent
     return Sensitivity(by_q, by_v)
 
@@ -217,7 +217,7 @@ def _crossed(a: Twist, b: Twist) -> Twist:
     )
 
 
-def _turned(s: Twist, f: Wrench) -> Wrench:
+def _rotated(s: Twist, f: Wrench) -> Wrench:
     """s x* f of a motion and a force."""
     return Wrench(
         add(cross(s.angular, f.moment), cross(s.linear, f.force)), cross(s.angular, f.force)

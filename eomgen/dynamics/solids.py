@@ -142,10 +142,10 @@ def _dominant(
         if solid is None:
             yield False
             continue
-        moving, turning = [single[k]], [solid.mass * dot(solid.centre, solid.centre)]
+        masses, inertias = [single[k]], [solid.mass * dot(solid.centre, solid.centre)]
         for n in carried[k]:
             arm = frames[n].offset
-            turning += [single[n] * dot(arm, arm), max(moments[n])]
+            inertias += [single[n] * dot(arm, arm), max(moments[n])]
         for joint in (frame, *(frames[n] for n in carried[k])):
-            (moving if joint.kind == "prismatic" else turning).append(joint.armature)
-        yield solid.mass >= DOMINANT * max(moving) and min(moments[k]) >= DOMINANT * max(turning)
+            (masses if joint.kind == "prismatic" else inertias).append(joint.armature)
+        yield solid.mass >= DOMINANT * max(masses) and min(moments[k]) >= DOMINANT * max(inertias)

@@ -115,7 +115,7 @@ def in_space(vector: Sequence[Scalar], scalars: Scalars) -> Vec:
     return (x, y, z[0] if z else scalars.number(0.0))
 
 
-def turning_in_space(torque: Sequence[Scalar], scalars: Scalars) -> Vec:
+def torque_in_space(torque: Sequence[Scalar], scalars: Scalars) -> Vec:
     """A torque of one component, about z, of three, or of none."""
     if len(torque) == 1:
         return (scalars.number(0.0), scalars.number(0.0), torque[0])

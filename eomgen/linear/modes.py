@@ -18,20 +18,22 @@ INDEPENDENT = 1e-10
 
 @dataclass(frozen=True)
 class Mode:
-    """An eigenvalue, or with `turn` > 0 a conjugate pair: `rate` ± i `turn`, 1/s."""
+    """An eigenvalue, or with `angular_frequency` > 0 a conjugate pair: `rate` ± i
+    `angular_frequency`, 1/s.
+    """
 
     rate: float
-    turn: float
+    angular_frequency: float
 
     @property
     def frequency(self) -> float:
         """Frequency of the oscillation, Hz."""
-        return self.turn / (2 * math.pi)
+        return self.angular_frequency / (2 * math.pi)
 
     @property
     def damping(self) -> float:
         """Ratio -Re λ / |λ|: 0 undamped, 1 without oscillation, negative if it grows."""
-        size = math.hypot(self.rate, self.turn)
+        size = math.hypot(self.rate, self.angular_frequency)
         return -self.rate / size if size else 0.0
 
 
@@ -45,7 +47,7 @@ def modes(a: FloatArray) -> list[Mode]:
         turn = value.imag if abs(value.imag) > small else 0.0
         if turn >= 0.0:
             found.append(Mode(rate, turn))
-    return sorted(found, key=lambda mode: (-mode.rate, mode.turn))
+    return sorted(found, key=lambda mode: (-mode.rate, mode.angular_frequency))
 
 
 def stability(found: list[Mode]) -> str:

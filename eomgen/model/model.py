@@ -228,7 +228,7 @@ class Model:
         return tuple(accumulate((len(b.velocities) for b in self.bodies), initial=0))[:-1]
 
     @property
-    def turning(self) -> tuple[int, ...]:
+    def angle_index(self) -> tuple[int, ...]:
         """For each planar body the index of the coordinate that turns it: its joint's last; where
         nothing is prescribed.
         """

@@ -123,13 +123,13 @@ def quarter_turns(n: int, angle: Real) -> Real:
 # Rotations.
 
 
-def turn(k: int, angle: Real) -> Matrix:
+def rotation_about(k: int, angle: Real) -> Matrix:
     """The rotation by `angle` rad about coordinate axis k."""
     with exactly():
-        return turn_of(k, gmpy2.cos(angle), gmpy2.sin(angle))
+        return rotation_by(k, gmpy2.cos(angle), gmpy2.sin(angle))
 
 
-def turn_of(k: int, c: Real, s: Real) -> Matrix:
+def rotation_by(k: int, c: Real, s: Real) -> Matrix:
     """The rotation about coordinate axis k by the angle of cosine c and sine s."""
     i, j = (k + 1) % 3, (k + 2) % 3
     rows = [list(row) for row in EYE]
@@ -139,7 +139,7 @@ def turn_of(k: int, c: Real, s: Real) -> Matrix:
     return matrix(rows)
 
 
-HALF_ABOUT_X, HALF_ABOUT_Z = turn_of(0, -ONE, ZERO), turn_of(2, -ONE, ZERO)
+HALF_ABOUT_X, HALF_ABOUT_Z = rotation_by(0, -ONE, ZERO), rotation_by(2, -ONE, ZERO)
 
 
 @lru_cache(maxsize=4096)
@@ -147,7 +147,9 @@ def orientation(degrees: float | tuple[float, float, float]) -> Matrix:
     """The fixed rotation of a joint, Rz Ry Rx of angles about x, y and z; of one, about z."""
     x, y, z = degrees if isinstance(degrees, tuple) else (0.0, 0.0, degrees)
     # Whole turns are left out, which is exact: of 1e100 degrees too few digits would be left.
-    first, second, third = (turn(k, radians(math.fmod(a, 360.0))) for k, a in enumerate((x, y, z)))
+    first, second, third = (
+        rotation_about(k, radians(math.fmod(a, 360.0))) for k, a in enumerate((x, y, z))
+    )
     return product(third, product(second, first))
 
 
@@ -162,7 +164,7 @@ def to_axis(axis: tuple[float, float, float]) -> tuple[Matrix, int]:
             return (EYE if axis[k] > 0.0 else back), k
     x, y, z = direction(axis)
     if axis[2] == 0.0:
-        return turn_of(2, x, y), 0
+        return rotation_by(2, x, y), 0
     # The shortest turn from z to the axis (Rodrigues), or from -z if that is nearer.
     with exactly():
         if z < 0:
@@ -183,7 +185,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
         )
 
 
-def turned(a: Matrix, k: int, length: Real) -> tuple[Real, ...]:
+def image_of_axis(a: Matrix, k: int, length: Real) -> tuple[Real, ...]:
     """Where a rotation brings a vector of some length along coordinate axis k."""
     with exactly():
         return tuple(whole(row[k] * mpfr(length)) for row in a)
@@ -198,7 +200,7 @@ def transposed(a: Matrix) -> Matrix:
 
 
 @dataclass(frozen=True)
-class Turn:
+class AxisRotation:
     """A rotation about coordinate axis k: quarter turns, and another of at most 45 degrees, of
     cosine c and sine s.
     """
@@ -210,15 +212,15 @@ class Turn:
 
 
 @lru_cache(maxsize=4096)
-def turns_in(rotation: Matrix) -> tuple[Turn, ...] | None:
-    """The turns about coordinate axes that a rotation is the product of: none, one, or two, as of
+def axis_rotations(rotation: Matrix) -> tuple[AxisRotation, ...] | None:
+    """The rotations about coordinate axes whose product a rotation is: none, one, or two, as of
     every rotation with an entry that is 0; None of any other.
     """
     for k in AXES:
         beside = [i for i in AXES if i != k]
         if rotation[k][k] > 0 and not any(rotation[i][k] or rotation[k][i] for i in beside):
             i, j = (k + 1) % 3, (k + 2) % 3
-            return _turn(k, rotation[i][i], rotation[j][i])
+            return _axis_rotation(k, rotation[i][i], rotation[j][i])
     for i in AXES:
         for m in AXES:
             # Column m is in the plane that turns about i keep, and what is left a turn about m.
@@ -227,22 +229,22 @@ def turns_in(rotation: Matrix) -> tuple[Turn, ...] | None:
                 with exactly():
                     c, s = rotation[u][m], rotation[v][m]
                     c, s = (c, s) if m == u else (s, -c)
-                    rest = product(turn_of(i, c, -s), rotation)
+                    rest = product(rotation_by(i, c, -s), rotation)
                 p, q = (m + 1) % 3, (m + 2) % 3
-                return (*_turn(i, c, s), *_turn(m, rest[p][p], rest[q][p]))
+                return (*_axis_rotation(i, c, s), *_axis_rotation(m, rest[p][p], rest[q][p]))
     return None
 
 
-def _turn(k: int, c: Real, s: Real) -> tuple[Turn, ...]:
-    """One turn, or none."""
+def _axis_rotation(k: int, c: Real, s: Real) -> tuple[AxisRotation, ...]:
+    """One rotation, or none."""
     with exactly():
         n = 0
         while abs(s) > abs(c) or c < 0:
             c, s, n = s, -c, n + 1
-    return (Turn(k, n, c, s),) if n or s else ()
+    return (AxisRotation(k, n, c, s),) if n or s else ()
 
 
-def turns_to(rotation: Matrix, i: int, k: int) -> tuple[Real, int, Real, Real]:
+def three_rotations(rotation: Matrix, i: int, k: int) -> tuple[Real, int, Real, Real]:
     """Angles a, b, c, rad, and an axis m with rotation = R_i(a) R_m(b) R_k(c); |a| is at most a
     quarter turn.
     """
@@ -254,10 +256,10 @@ def turns_to(rotation: Matrix, i: int, k: int) -> tuple[Real, int, Real, Real]:
         a = gmpy2.atan2(-image[p], image[q]) if m == p else gmpy2.atan2(image[q], image[p])
         half = gmpy2.const_pi()
         a = whole(a - gmpy2.copy_sign(half, a)) if 2 * abs(a) > half else a
-        rest = product(turn(i, -a), rotation)
+        rest = product(rotation_about(i, -a), rotation)
         u, v = (m + 1) % 3, (m + 2) % 3
         x, y = rest[u][k], rest[v][k]
         b = gmpy2.atan2(y, x) if k == u else gmpy2.atan2(-x, y)
-        last = product(turn(m, -b), rest)
+        last = product(rotation_about(m, -b), rest)
         y, z = (k + 1) % 3, (k + 2) % 3
         return a, m, b, gmpy2.atan2(last[z][y], last[y][y])

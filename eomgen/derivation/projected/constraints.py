@@ -40,18 +40,18 @@ class Constraint:
     """One body's joint, and its motion by that of its parent.
 
     `axes` is E and `rotation` Q; `reach` runs from the parent's centre of mass to the joint's point
-    on the child in the joint's axes, `arm` from the child's to it in the child's. `turning` is the
-    angular velocity relative to the parent. `turn` is the coordinate axis and the angle of the
-    whole rotation E Q, if it has one. The last four fields are the components of `own` over
-    the symbols of `parent`, of `own` before them, of coordinates, and of v and v̇.
+    on the child in the joint's axes, `arm` from the child's to it in the child's. `relative_omega`
+    is the angular velocity relative to the parent. `axis_angle` is the coordinate axis and the
+    angle of the whole rotation E Q, if it has one. The last four fields are the components of `own`
+    over the symbols of `parent`, of `own` before them, of coordinates, and of v and v̇.
     """
 
     axes: Expr
     rotation: Expr
     reach: Expr
     arm: Expr
-    turning: Expr
-    turn: tuple[Expr, Expr] | None
+    relative_omega: Expr
+    axis_angle: tuple[Expr, Expr] | None
     parent: Moving
     own: Moving
     omega: Expr
@@ -95,9 +95,9 @@ def _differentiated(
         axes = sp.Matrix([[symbols.number(entry) for entry in row] for row in fixed])
         r_parent, arm = symbols.vector(joint.r_parent), symbols.vector(joint.r_child)
     primitives = joint.primitives(model.dimensions)
-    rotation, turning, slide = _moved(body.name, primitives, q, v, symbols, ledger)
+    rotation, relative_omega, slide = _moved(body.name, primitives, q, v, symbols, ledger)
     if primitives and not all(_simple(primitive) for primitive in primitives):
-        rotation = _entries(body.name, rotation, turning, ledger)
+        rotation = _entries(body.name, rotation, relative_omega, ledger)
     inward, back = axes.T, rotation.T
     reach = inward * r_parent + slide
     base = inward * parent.omega
@@ -109,14 +109,14 @@ def _differentiated(
         return rate(vector, ledger.rates) + own.omega.cross(vector)
 
     moved = in_joint(reach)
-    omega = back * base + turning
+    omega = back * base + relative_omega
     return Constraint(
         axes=axes,
         rotation=rotation,
         reach=reach,
         arm=arm,
-        turning=turning,
-        turn=_turn_of(joint, primitives, q, symbols, model.dimensions),
+        relative_omega=relative_omega,
+        axis_angle=_axis_angle_of(joint, primitives, q, symbols, model.dimensions),
         parent=parent,
         own=own,
         omega=omega,
@@ -138,7 +138,7 @@ def _moved(
     """Rotation, angular velocity in the turned axes, and displacement of a row of primitives; also
     q'.
     """
-    rotation, turning, slide = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
+    rotation, relative_omega, slide = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
     q, v = list(q), list(v)
     for primitive in primitives:
         if primitive.kind == "spherical":
@@ -151,8 +151,8 @@ def _moved(
             ledger.rates[z] = half * (w * c + x * b - y * a)
             # |q|² stays as it is, so that this needs no rate.
             k = ledger.define(real(f"k__{name}"), 2 / (w**2 + x**2 + y**2 + z**2))
-            turn, spin = of_quaternion(q[:4], k), sp.Matrix(v[:3])
-            rotation, turning = rotation * turn, turn.T * turning + spin
+            rotated_by, spin = of_quaternion(q[:4], k), sp.Matrix(v[:3])
+            rotation, relative_omega = rotation * rotated_by, rotated_by.T * relative_omega + spin
             q, v = q[4:], v[3:]
             continue
         ledger.rates[q[0]] = v[0]
@@ -160,13 +160,16 @@ def _moved(
         if primitive.kind == "prismatic":
             slide += rotation * axis * q[0]
         else:
-            turn = about(axis, q[0])
-            rotation, turning = rotation * turn, turn.T * turning + axis * v[0]
+            rotated_by = about(axis, q[0])
+            rotation, relative_omega = (
+                rotation * rotated_by,
+                rotated_by.T * relative_omega + axis * v[0],
+            )
         q, v = q[1:], v[1:]
-    return rotation, turning, slide
+    return rotation, relative_omega, slide
 
 
-def _turn_of(
+def _axis_angle_of(
     joint: Joint,
     primitives: Sequence[Primitive],
     q: Sequence[Expr],
@@ -203,7 +206,7 @@ def _simple(primitive: Primitive) -> bool:
     return primitive.kind == "prismatic" or (primitive.kind == "revolute" and along)
 
 
-def _entries(name: str, rotation: Expr, turning: Expr, ledger: Ledger) -> Expr:
+def _entries(name: str, rotation: Expr, relative_omega: Expr, ledger: Ledger) -> Expr:
     """A rotation by symbols for its entries, whose rates are those of Q' = Q [ω]x."""
     symbols = sp.Matrix(3, 3, lambda i, j: real(f"R__{name}__{'xyz'[i]}{'xyz'[j]}"))
     symbols = symbols.applyfunc(
@@ -213,7 +216,7 @@ def _entries(name: str, rotation: Expr, turning: Expr, ledger: Ledger) -> Expr:
         for j in range(3):
             if symbols[i, j] != rotation[i, j]:
                 ledger.define(symbols[i, j], rotation[i, j])
-    rates = symbols * hat(turning)
+    rates = symbols * hat(relative_omega)
     for i in range(3):
         for j in range(3):
             if symbols[i, j] != rotation[i, j]:

@@ -28,13 +28,13 @@ SLACK = 1.5
 class Motion:
     """One body's motion in its own axes, over coordinates and velocities and what is defined.
 
-    `turns` and `moves` are the partial velocities by index in v: of rotation and of the centre of
-    mass. `omega` is the angular velocity, `alpha` and `acceleration` what v alone makes of the
-    accelerations, at v̇ = 0; `gravity` is the acceleration of gravity.
+    `partial_omegas` and `partial_velocities` are Kane's partial velocities by index in v: of
+    rotation and of the centre of mass. `omega` is the angular velocity, `alpha` and `acceleration`
+    what v alone makes of the accelerations, at v̇ = 0; `gravity` is the acceleration of gravity.
     """
 
-    turns: Mapping[int, Expr]
-    moves: Mapping[int, Expr]
+    partial_omegas: Mapping[int, Expr]
+    partial_velocities: Mapping[int, Expr]
     omega: Expr
     alpha: Expr
     acceleration: Expr
@@ -171,21 +171,27 @@ def set_in_motion(
     for k, (body, first, c) in enumerate(starts):
         name = body.name
         parent = found[body.parent] if body.parent >= 0 else ground
-        turns: dict[int, Expr] = {}
-        moves: dict[int, Expr] = {}
+        partial_omegas: dict[int, Expr] = {}
+        partial_velocities: dict[int, Expr] = {}
         own = range(first, first + len(body.velocities))
-        for j in dict.fromkeys((*parent.turns, *parent.moves, *own)):
+        for j in dict.fromkeys((*parent.partial_omegas, *parent.partial_velocities, *own)):
             none = sp.zeros(3, 1)
             unit = {v: sp.Integer(int(i == j)) for i, v in enumerate(symbols.v)}
-            given = unit | _by(c.parent, parent.turns.get(j, none), parent.moves.get(j, none))
+            given = unit | _by(
+                c.parent, parent.partial_omegas.get(j, none), parent.partial_velocities.get(j, none)
+            )
             of = symbols.v[j].name
-            turn = ledger.vector(f"turn__{of}", name, ledger.short(c.omega.xreplace(given)))
-            given |= dict(zip(c.own.omega, turn, strict=True))
-            move = ledger.vector(f"move__{of}", name, ledger.short(c.velocity.xreplace(given)))
-            if any(turn):
-                turns[j] = turn
-            if any(move):
-                moves[j] = move
+            partial_omega = ledger.vector(
+                f"turn__{of}", name, ledger.short(c.omega.xreplace(given))
+            )
+            given |= dict(zip(c.own.omega, partial_omega, strict=True))
+            partial_velocity = ledger.vector(
+                f"move__{of}", name, ledger.short(c.velocity.xreplace(given))
+            )
+            if any(partial_omega):
+                partial_omegas[j] = partial_omega
+            if any(partial_velocity):
+                partial_velocities[j] = partial_velocity
         given = still | dict(zip(c.parent.omega, parent.omega, strict=True))
         given |= dict(zip(c.parent.alpha, parent.alpha, strict=True))
         given |= dict(zip(c.parent.acceleration, parent.acceleration, strict=True))
@@ -194,14 +200,14 @@ def set_in_motion(
         given |= dict(zip(c.own.omega, omega, strict=True))
         given |= dict(zip(c.own.alpha, alpha, strict=True))
         acceleration = ledger.short(c.acceleration.xreplace(given))
-        if world.turn(k) is None:
+        if world.axis_angle(k) is None:
             gravity = ledger.short(c.rotation.T * (c.axes.T * parent.gravity))
         else:
             gravity = world.rotation(k).T * uniform
         found.append(
             Motion(
-                turns,
-                moves,
+                partial_omegas,
+                partial_velocities,
                 omega,
                 alpha,
                 ledger.vector("a", name, acceleration),
@@ -211,8 +217,11 @@ def set_in_motion(
     return tuple(found)
 
 
-def _by(moving: Moving, turn: Expr, move: Expr) -> dict[Expr, Expr]:
-    pairs = (*zip(moving.omega, turn, strict=True), *zip(moving.velocity, move, strict=True))
+def _by(moving: Moving, partial_omega: Expr, partial_velocity: Expr) -> dict[Expr, Expr]:
+    pairs = (
+        *zip(moving.omega, partial_omega, strict=True),
+        *zip(moving.velocity, partial_velocity, strict=True),
+    )
     return {symbol: e for symbol, e in pairs if symbol != 0}
 
 
@@ -231,21 +240,21 @@ class World:
             self._known[body, base] = self._rotation(body, base)
         return self._known[body, base]
 
-    def turn(self, body: int, base: int = -1) -> tuple[Expr, Expr] | None:
+    def axis_angle(self, body: int, base: int = -1) -> tuple[Expr, Expr] | None:
         """Coordinate axis and angle between two bodies, if all joints between turn about one."""
         axis, angle = sp.zeros(3, 1), sp.Integer(0)
         while body != base:
-            turn = self._constraints[body].turn
-            if turn is None or (any(axis) and any(turn[0]) and turn[0] != axis):
+            axis_angle = self._constraints[body].axis_angle
+            if axis_angle is None or (any(axis) and any(axis_angle[0]) and axis_angle[0] != axis):
                 return None
-            axis, angle = (turn[0] if any(turn[0]) else axis), turn[1] + angle
+            axis, angle = (axis_angle[0] if any(axis_angle[0]) else axis), axis_angle[1] + angle
             body = self._model.bodies[body].parent
         return axis, angle
 
     def _rotation(self, body: int, base: int) -> Expr:
-        turn = self.turn(body, base)
-        if turn is not None:
-            return about(*turn) if any(turn[0]) else sp.eye(3)
+        axis_angle = self.axis_angle(body, base)
+        if axis_angle is not None:
+            return about(*axis_angle) if any(axis_angle[0]) else sp.eye(3)
         c, parent = self._constraints[body], self._model.bodies[body].parent
         whole = self.rotation(parent, base) * (c.axes * c.rotation)
         if parent == base and c.axes == sp.eye(3):
@@ -279,18 +288,22 @@ def balance(
         torque = body.moments * motion.alpha
         torque += motion.omega.cross(body.moments * motion.omega)
         weight = body.mass * motion.gravity
-        for i, move in motion.moves.items():
-            V[i] += move.dot(inertial)
+        for i, partial_velocity in motion.partial_velocities.items():
+            V[i] += partial_velocity.dot(inertial)
             # Right angles and length 1: directions of the world, that carry a floating tree.
-            fall = body.mass * acting.uniform[floating[i]] if i in floating else move.dot(weight)
+            fall = (
+                body.mass * acting.uniform[floating[i]]
+                if i in floating
+                else partial_velocity.dot(weight)
+            )
             G[i] -= fall
-            for j, other in motion.moves.items():
+            for j, other in motion.partial_velocities.items():
                 straight = i in floating and j in floating
-                M[i, j] += body.mass * (int(i == j) if straight else move.dot(other))
-        for i, turn in motion.turns.items():
-            V[i] += turn.dot(torque)
-            for j, other in motion.turns.items():
-                M[i, j] += turn.dot(body.moments * other)
+                M[i, j] += body.mass * (int(i == j) if straight else partial_velocity.dot(other))
+        for i, partial_omega in motion.partial_omegas.items():
+            V[i] += partial_omega.dot(torque)
+            for j, other in motion.partial_omegas.items():
+                M[i, j] += partial_omega.dot(body.moments * other)
     for j, armature in armatures(model, symbols).items():
         M[j, j] += armature
     for load in acting.gravity:
@@ -337,10 +350,10 @@ def generalised(
     force = world.rotation(k).T * outside
     torque = at.cross(force)
     found: dict[int, Expr] = {}
-    for i, move in motion.moves.items():
-        found[i] = outside[floating[i]] if i in floating else move.dot(force)
-    for i, turn in motion.turns.items():
-        found[i] = found.get(i, sp.Integer(0)) + turn.dot(torque)
+    for i, partial_velocity in motion.partial_velocities.items():
+        found[i] = outside[floating[i]] if i in floating else partial_velocity.dot(force)
+    for i, partial_omega in motion.partial_omegas.items():
+        found[i] = found.get(i, sp.Integer(0)) + partial_omega.dot(torque)
     return found
 
 

@@ -121,7 +121,7 @@ def solve(
     drifts = []
     for k, (body, motion) in enumerate(zip(bodies, motions, strict=True)):
         floats = isinstance(model.bodies[roots[k]].joint, Free)
-        work.rows += _turning_rows(model, k, body, motion, work)
+        work.rows += _angular_rows(model, k, body, motion, work)
         if not floats:
             work.rows += _moving_rows(body, motion, work)
         elif roots[k] == k:
@@ -178,12 +178,12 @@ def _set_forces(
             forces[j] += part
     for body, motion in zip(bodies, motions, strict=True):
         torque = motion.omega.cross(body.moments * motion.omega)
-        for j, turn in motion.turns.items():
-            forces[j] -= work.short(turn.dot(torque))
+        for j, partial_omega in motion.partial_omegas.items():
+            forces[j] -= work.short(partial_omega.dot(torque))
     work.forces = forces
 
 
-def _turning_rows(
+def _angular_rows(
     model: Model, k: int, body: Inertia, motion: Motion, work: Elimination
 ) -> list[Row]:
     """Three squares of a body's rotation: I = Lᵀ D L, weights D, entries L times the turns."""
@@ -212,8 +212,8 @@ def _turning_rows(
             for g in others:
                 left[h, g] -= mixed[h] * left[i, g]
         entries = {
-            j: work.short(sum(part * turn[h] for h, part in mixed.items()))
-            for j, turn in motion.turns.items()
+            j: work.short(sum(part * partial_omega[h] for h, part in mixed.items()))
+            for j, partial_omega in motion.partial_omegas.items()
         }
         bias = work.short(sum(part * motion.alpha[h] for h, part in mixed.items()))
         rows.append(Row(weight, {j: e for j, e in entries.items() if e != 0}, bias))
@@ -226,7 +226,11 @@ def _moving_rows(body: Inertia, motion: Motion, work: Elimination) -> list[Row]:
         return []
     rows = []
     for i in range(3):
-        entries = {j: move[i] for j, move in motion.moves.items() if move[i] != 0}
+        entries = {
+            j: partial_velocity[i]
+            for j, partial_velocity in motion.partial_velocities.items()
+            if partial_velocity[i] != 0
+        }
         if entries:
             bias = work.short(motion.acceleration[i] - motion.gravity[i])
             rows.append(Row(body.mass, entries, bias))
@@ -249,7 +253,9 @@ def _drift(
     mass = work.pivot(f"mass__{name}", total)
     whole = {mass: total} if mass != total else {}
     work.sums |= whole
-    columns = dict.fromkeys(j for k in tree for j in motions[k].moves if j not in carried)
+    columns = dict.fromkeys(
+        j for k in tree for j in motions[k].partial_velocities if j not in carried
+    )
     none = sp.zeros(3, 1)
 
     def mean(word: str, vectors: dict[int, Expr]) -> Expr:
@@ -259,7 +265,10 @@ def _drift(
         return ledger.vector(word, name, joined.applyfunc(work.short))
 
     means = {
-        j: mean(f"mean__{work.symbols.v[j].name}", {k: motions[k].moves.get(j, none) for k in tree})
+        j: mean(
+            f"mean__{work.symbols.v[j].name}",
+            {k: motions[k].partial_velocities.get(j, none) for k in tree},
+        )
         for j in columns
     }
     bias = mean("bias", {k: motions[k].acceleration for k in tree})
@@ -274,7 +283,9 @@ def _drift(
             j: ledger.vector(
                 f"apart__{work.symbols.v[j].name}",
                 body,
-                (motions[k].moves.get(j, none) - back * means[j]).applyfunc(work.short),
+                (motions[k].partial_velocities.get(j, none) - back * means[j]).applyfunc(
+                    work.short
+                ),
             )
             for j in columns
         }

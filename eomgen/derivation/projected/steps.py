@@ -105,9 +105,9 @@ def _zeros(equations: ProjectedEquations) -> dict[Expr, Expr]:
     found: dict[Expr, Expr] = {}
     for c, motion in zip(equations.constraints, equations.motions, strict=True):
         for i in range(3):
-            turns = any(vector[i] != 0 for vector in motion.turns.values())
-            moves = any(vector[i] != 0 for vector in motion.moves.values())
-            if not turns:
+            rotates = any(vector[i] != 0 for vector in motion.partial_omegas.values())
+            moves = any(vector[i] != 0 for vector in motion.partial_velocities.values())
+            if not rotates:
                 found[c.own.omega[i]] = zero
                 if motion.alpha[i] == 0:
                     found[c.own.alpha[i]] = zero

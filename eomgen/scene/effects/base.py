@@ -131,7 +131,7 @@ class Mechanism(Protocol):
     def velocity(self, body: str, at: Vector) -> Vector:
         """World velocity of such a point, m/s."""
 
-    def turning(self, body: str) -> Vector:
+    def angular_velocity(self, body: str) -> Vector:
         """Angular velocity of a body, rad/s: one component in the plane, three in space."""
 
     def outward(self, body: str, vector: Vector) -> Vector:
@@ -184,7 +184,7 @@ class Unmoved:
         """Never asked for."""
         raise AssertionError(body)
 
-    def turning(self, body: str) -> Vector:
+    def angular_velocity(self, body: str) -> Vector:
         """Never asked for."""
         raise AssertionError(body)
 

@@ -91,7 +91,7 @@ class Drag(OnBodies):
             torque: Vector = ()
             if turns:
                 square = turning[1] if self.turning_quadratic != ZERO else None
-                torque = _drag(mechanism, turning[0], square, mechanism.turning(body))
+                torque = _drag(mechanism, turning[0], square, mechanism.angular_velocity(body))
             yield Load(body, force, at, "applied", torque)
 
     def _quadratic(self, mechanism: Mechanism) -> Scalar | None:

@@ -181,7 +181,7 @@ def _speed(mechanism: Mechanism, side: Side, lever: Vector) -> Vector:
     speed = mechanism.velocity(side.body, side.at)
     if not lever:
         return speed
-    w = mechanism.turning(side.body)
+    w = mechanism.angular_velocity(side.body)
     if len(lever) == 2:
         x, y = lever
         return (speed[0] - w[0] * y, speed[1] + w[0] * x)

@@ -25,7 +25,7 @@ from eomgen.precision.precise import BITS, CornerBranches, Extended, Precise, di
 from eomgen.run.integrators.unwarned import factors
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.study.accuracy import corners
-from eomgen.study.accuracy.corners import Turn
+from eomgen.study.accuracy.corners import BranchChange
 from eomgen.study.accuracy.forecast import Forecast, NoStep
 
 ExtendedArray = NDArray[np.object_]
@@ -346,12 +346,12 @@ def rows(
     yield Row(start, 0, way.extent)
     for end in times[1:]:
         target = mpfr(float(end))
-        turn, tried, h = None, 0, mpfr(0)
+        change, tried, h = None, 0, mpfr(0)
         while way.t < target:
             report(float(way.t))
             left = target - way.t
             count = max(1, math.ceil(left / way.length * 0.999))
-            h = left / count if turn is None else h + h * turn.beyond
+            h = left / count if change is None else h + h * change.beyond
             method = gauss(way.stages)
             try:
                 step = advance(
@@ -362,12 +362,12 @@ def rows(
                 error = math.inf
             if not error <= tolerance:
                 way.again(h, error, tolerance)
-                turn = None
+                change = None
                 continue
             if precise.corner_branches:
                 slow = tried > SLOW
-                again, turn = _turned(
-                    precise.corner_branches, method, step.margins, turn, slow=slow
+                again, change = _changed(
+                    precise.corner_branches, method, step.margins, change, slow=slow
                 )
                 tried += again
                 if tried > TURNINGS:
@@ -381,24 +381,24 @@ def rows(
         yield Row(way.y, way.made, way.extent)
 
 
-def _turned(
+def _changed(
     corner_branches: CornerBranches,
     method: Gauss,
     margins: FloatArray,
-    turn: Turn | None,
+    change: BranchChange | None,
     *,
     slow: bool,
-) -> tuple[bool, Turn | None]:
+) -> tuple[bool, BranchChange | None]:
     """Whether a step must be repeated because a corner changes its branch in it, and where the
     step must end then. Branches that change at its start, or at its end if it is accepted, are
     switched here.
     """
     abscissas = np.array([0.0, *method.c.tolist(), 1.0], dtype=float)
-    if turn is not None:
-        if not corners.is_there(turn, margins):
-            turn = corners.nearer(turn, abscissas, margins)
-            return True, corners.simpler(turn, abscissas, margins) if slow else turn
-        for corner in corners.turned_at_the_end(turn, margins):
+    if change is not None:
+        if not corners.is_there(change, margins):
+            change = corners.nearer(change, abscissas, margins)
+            return True, corners.simpler(change, abscissas, margins) if slow else change
+        for corner in corners.changed_at_the_end(change, margins):
             corner_branches.branches[corner] = not corner_branches.branches[corner]
         return False, None
     late = corners.wrong_from_the_start(corner_branches.branches, margins)
@@ -406,5 +406,5 @@ def _turned(
         corner_branches.branches[corner] = not corner_branches.branches[corner]
     if late:
         return True, None
-    found = corners.first_turn(corner_branches.branches, abscissas, margins)
+    found = corners.first_change(corner_branches.branches, abscissas, margins)
     return found is not None, found

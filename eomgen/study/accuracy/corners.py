@@ -19,7 +19,7 @@ NOTHING = 1e-22
 
 
 @dataclass(frozen=True)
-class Turn:
+class BranchChange:
     """Corner number `corner` changes its branch at 1 + `beyond` times the step. `beyond` is kept
     apart because 1 + `beyond` as a double would lose digits close to the end of the step.
     """
@@ -48,7 +48,9 @@ def wrong_from_the_start(branches: Sequence[bool], margins: FloatArray) -> list[
     return np.flatnonzero(late | idle).tolist()
 
 
-def first_turn(branches: Sequence[bool], abscissas: FloatArray, margins: FloatArray) -> Turn | None:
+def first_change(
+    branches: Sequence[bool], abscissas: FloatArray, margins: FloatArray
+) -> BranchChange | None:
     """The first branch change within a step; None if there is none.
 
     abscissas  (n,): 0, the nodes, 1, as parts of the step
@@ -56,21 +58,21 @@ def first_turn(branches: Sequence[bool], abscissas: FloatArray, margins: FloatAr
     """
     against = wrong(branches, margins)[1:].any(axis=0)
     turns = [
-        Turn(corner, _root(bool(branches[corner]), abscissas, margins[:, corner]) - 1.0)
+        BranchChange(corner, _root(bool(branches[corner]), abscissas, margins[:, corner]) - 1.0)
         for corner in np.flatnonzero(against).tolist()
     ]
-    return min(turns, key=lambda turn: turn.beyond, default=None)
+    return min(turns, key=lambda change: change.beyond, default=None)
 
 
-def nearer(turn: Turn, abscissas: FloatArray, margins: FloatArray) -> Turn:
+def nearer(change: BranchChange, abscissas: FloatArray, margins: FloatArray) -> BranchChange:
     """The branch change located again, from the margins of a step that ends close to it."""
-    values = margins[:, turn.corner]
+    values = margins[:, change.corner]
     slope = float(_through(abscissas, values).deriv()(1.0))
     size = float(np.max(np.abs(values)))
-    return Turn(turn.corner, -float(values[-1]) / size / slope if slope else 0.0)
+    return BranchChange(change.corner, -float(values[-1]) / size / slope if slope else 0.0)
 
 
-def simpler(turn: Turn, abscissas: FloatArray, margins: FloatArray) -> Turn:
+def simpler(change: BranchChange, abscissas: FloatArray, margins: FloatArray) -> BranchChange:
     """Of the corners whose margins vanish at a branch change, the one whose margin is steepest.
 
     The force of a contact with exponent 3/2 is not a polynomial of time where it vanishes; its
@@ -80,25 +82,25 @@ def simpler(turn: Turn, abscissas: FloatArray, margins: FloatArray) -> Turn:
     near = [
         other
         for corner in np.flatnonzero(sizes > 0).tolist()
-        if abs((other := nearer(Turn(corner, 0.0), abscissas, margins)).beyond)
-        <= 10 * abs(turn.beyond)
+        if abs((other := nearer(BranchChange(corner, 0.0), abscissas, margins)).beyond)
+        <= 10 * abs(change.beyond)
     ]
     return max(
-        near, key=lambda other: abs(margins[-1, other.corner]) / sizes[other.corner], default=turn
+        near, key=lambda other: abs(margins[-1, other.corner]) / sizes[other.corner], default=change
     )
 
 
-def turned_at_the_end(turn: Turn, margins: FloatArray) -> list[int]:
+def changed_at_the_end(change: BranchChange, margins: FloatArray) -> list[int]:
     """The corners whose margins are 0 at the end of a step that ends at a branch change."""
     sizes = np.max(np.abs(margins), axis=0)
     there = (np.abs(margins[-1]) <= NOTHING * sizes) & (sizes > 0)
-    there[turn.corner] = True
+    there[change.corner] = True
     return np.flatnonzero(there).tolist()
 
 
-def is_there(turn: Turn, margins: FloatArray) -> bool:
+def is_there(change: BranchChange, margins: FloatArray) -> bool:
     """Whether a step ends at its branch change."""
-    values = np.abs(margins[:, turn.corner])
+    values = np.abs(margins[:, change.corner])
     return bool(values[-1] <= NOTHING * np.max(values))
 
 

@@ -18,7 +18,14 @@ from eomgen.scalars.extended import Bits
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD, Primitive
-from eomgen.study.verification.poses import Pose, about, orientation, spun, turned_about, world_pose
+from eomgen.study.verification.poses import (
+    Pose,
+    about,
+    orientation,
+    rotation_about,
+    spun,
+    world_pose,
+)
 
 _INSTANT, _BITS = mpfr(2) ** -600, 4096
 """Step of the differences, s, and the precision, in bits, in which they are computed."""
@@ -94,7 +101,7 @@ class EvaluatedModel:
         if body == WORLD:
             return at
         pose = self.poses[self.index[body]]
-        return self._cut(pose.position + pose.turn @ self.in_space(at))
+        return self._cut(pose.position + pose.rotation @ self.in_space(at))
 
     def point(self, name: str) -> tuple[str, Vector]:
         """A named point: its body, and its position in body axes, m."""
@@ -107,9 +114,9 @@ class EvaluatedModel:
             return self._cut(zeros(3))
         pose = self.poses[self.index[body]]
         arm = self.in_space(at)
-        return self._cut(along(self.rates, pose.position_v + pose.turn_v @ arm))
+        return self._cut(along(self.rates, pose.position_v + pose.rotation_v @ arm))
 
-    def turning(self, body: str) -> Vector:
+    def angular_velocity(self, body: str) -> Vector:
         """Angular velocity of a body, world axes, rad/s."""
         w = zeros(3) if body == WORLD else self.spin(self.index[body])
         return tuple(w if self.dimensions == 3 else w[2:])
@@ -118,7 +125,7 @@ class EvaluatedModel:
         """A vector given in body axes, in world axes."""
         if body == WORLD:
             return vector
-        return self._cut(self.poses[self.index[body]].turn @ self.in_space(vector))
+        return self._cut(self.poses[self.index[body]].rotation @ self.in_space(vector))
 
     def coordinate(self, joint: str, index: int = 0) -> Extended:
         """A coordinate of a joint."""
@@ -238,8 +245,8 @@ class EvaluatedModel:
         """The pose after one primitive of a joint."""
         if primitive.kind == "spherical":
             quaternion = extended([self.q[j] for j in index.quaternion])
-            turn, turn_v, turn_b = spun(quaternion, index.spin, self.felt)
-            return pose.turned(turn, turn_v, turn_b, self.felt)
+            rotation, rotation_v, rotation_b = spun(quaternion, index.spin, self.felt)
+            return pose.rotated(rotation, rotation_v, rotation_b, self.felt)
         axis = extended(primitive.axis)
         axis = axis / gmpy2.sqrt(axis @ axis)
         x, column = self.q[index.q[i]], index.v[i] if index.v[i] < self.moved else None
@@ -247,7 +254,7 @@ class EvaluatedModel:
             return pose.slid(axis, x, column, self.felt)
         if column is None:
             return pose.fixed(about(axis, gmpy2.cos(x), gmpy2.sin(x)))
-        return pose.turned(*turned_about(axis, x, column, self.felt), self.felt)
+        return pose.rotated(*rotation_about(axis, x, column, self.felt), self.felt)
 
     def spin(self, body: int) -> Array:
         """Angular velocity of a body, (3,), world axes, rad/s."""

@@ -243,7 +243,7 @@ def _quantities(
         values = []
         for f in (free, *near):
             if name == "body_poses":
-                places = [np.column_stack([pose.turn, pose.position]) for pose in f.poses]
+                places = [np.column_stack([pose.rotation, pose.position]) for pose in f.poses]
                 values.append(np.array(places).reshape(-1, 3, 4))
             else:
                 value = getattr(f, name)

@@ -18,52 +18,53 @@ from eomgen.precision.precise import Extended
 class Pose:
     """A body's world_R_body and the position of its centre of mass, world axes, with derivatives.
 
-    turn, position   (3, 3), (3,)
+    rotation, position
+                     (3, 3), (3,)
     turn_v, place_v  (m, 3, 3), (m, 3): partial derivatives along each of the m velocities
     turn_b, place_b  second time derivatives at constant velocities
     """
 
-    turn: Array
+    rotation: Array
     position: Array
-    turn_v: Array
+    rotation_v: Array
     position_v: Array
-    turn_b: Array
+    rotation_b: Array
     position_b: Array
 
-    def turned(self, turn: Array, turn_v: Array, turn_b: Array, rate: Array) -> "Pose":
+    def rotated(self, rotation: Array, rotation_v: Array, rotation_b: Array, rate: Array) -> "Pose":
         """The pose with its axes rotated further by a matrix with derivatives. `rate` (m,) are the
         velocities in second derivatives.
         """
-        here, more = along(rate, self.turn_v), along(rate, turn_v)
+        here, more = along(rate, self.rotation_v), along(rate, rotation_v)
         return Pose(
-            self.turn @ turn,
+            self.rotation @ rotation,
             self.position,
-            self.turn_v @ turn + self.turn @ turn_v,
+            self.rotation_v @ rotation + self.rotation @ rotation_v,
             self.position_v,
-            self.turn_b @ turn + 2 * (here @ more) + self.turn @ turn_b,
+            self.rotation_b @ rotation + 2 * (here @ more) + self.rotation @ rotation_b,
             self.position_b,
         )
 
-    def fixed(self, turn: Array) -> "Pose":
+    def fixed(self, rotation: Array) -> "Pose":
         """The pose with its axes rotated by a constant matrix."""
         return Pose(
-            self.turn @ turn,
+            self.rotation @ rotation,
             self.position,
-            self.turn_v @ turn,
+            self.rotation_v @ rotation,
             self.position_v,
-            self.turn_b @ turn,
+            self.rotation_b @ rotation,
             self.position_b,
         )
 
     def moved(self, arm: Array) -> "Pose":
         """The pose moved by a vector that is constant in its axes."""
         return Pose(
-            self.turn,
-            self.position + self.turn @ arm,
-            self.turn_v,
-            self.position_v + self.turn_v @ arm,
-            self.turn_b,
-            self.position_b + self.turn_b @ arm,
+            self.rotation,
+            self.position + self.rotation @ arm,
+            self.rotation_v,
+            self.position_v + self.rotation_v @ arm,
+            self.rotation_b,
+            self.position_b + self.rotation_b @ arm,
         )
 
     def slid(self, axis: Array, way: Extended, column: int | None, rate: Array) -> "Pose":
@@ -72,20 +73,27 @@ class Pose:
         if column is None:
             return there
         position_v = there.position_v.copy()
-        position_v[column] = position_v[column] + self.turn @ axis
-        here = along(rate, self.turn_v)
+        position_v[column] = position_v[column] + self.rotation @ axis
+        here = along(rate, self.rotation_v)
         position_b = there.position_b + 2 * rate[column] * (here @ axis)
-        return Pose(there.turn, there.position, there.turn_v, position_v, there.turn_b, position_b)
+        return Pose(
+            there.rotation,
+            there.position,
+            there.rotation_v,
+            position_v,
+            there.rotation_b,
+            position_b,
+        )
 
     @cached_property
     def spin_v(self) -> Array:
         """J_w (m, 3), world axes: partial angular velocities, from the derivatives of R."""
-        return _axial(self.turn_v @ self.turn.T)
+        return _axial(self.rotation_v @ self.rotation.T)
 
     @cached_property
     def spin_b(self) -> Array:
         """Angular acceleration at constant velocities, from the skew part of R̈ Rᵀ."""
-        return _axial(self.turn_b @ self.turn.T)
+        return _axial(self.rotation_b @ self.rotation.T)
 
 
 def _axial(m: Array) -> Array:
@@ -105,11 +113,11 @@ def about(axis: Array, c: Extended, s: Extended) -> Array:
 def orientation(degrees: float | tuple[float, float, float]) -> Array:
     """The fixed rotation of a joint: Rz Ry Rx."""
     angles = degrees if isinstance(degrees, tuple) else (0.0, 0.0, degrees)
-    turn = eye()
+    rotation = eye()
     for axis, angle in zip(np.eye(3), angles, strict=True):
         radians = mpfr(angle) * gmpy2.const_pi() / 180
-        turn = about(extended(axis), gmpy2.cos(radians), gmpy2.sin(radians)) @ turn
-    return turn
+        rotation = about(extended(axis), gmpy2.cos(radians), gmpy2.sin(radians)) @ rotation
+    return rotation
 
 
 def composed(quaternion: Array, spin: Array) -> Array:
@@ -134,24 +142,24 @@ def spun(quaternion: Array, columns: Sequence[int], rate: Array) -> tuple[Array,
     spin = extended([rate[j] for j in columns])
     change = composed(quaternion, spin) / 2
     second = composed(change, spin) / 2
-    turn_v = zeros(len(rate), 3, 3)
+    rotation_v = zeros(len(rate), 3, 3)
     for j, unit in zip(columns, units, strict=True):
-        turn_v[j] = 2 * _bilinear(quaternion, unit)
-    turn_b = 2 * _bilinear(change, change) + 2 * _bilinear(quaternion, second)
-    return _bilinear(quaternion, quaternion), turn_v, turn_b
+        rotation_v[j] = 2 * _bilinear(quaternion, unit)
+    rotation_b = 2 * _bilinear(change, change) + 2 * _bilinear(quaternion, second)
+    return _bilinear(quaternion, quaternion), rotation_v, rotation_b
 
 
-def turned_about(
+def rotation_about(
     axis: Array, angle: Extended, column: int, rate: Array
 ) -> tuple[Array, Array, Array]:
     """The rotation about a unit vector by an angle with velocity `column`, with derivatives."""
     c, s, velocity = gmpy2.cos(angle), gmpy2.sin(angle), rate[column]
     # The derivatives of c and s by the angle; the rest of the matrix is constant.
     still = about(axis, mpfr(0), mpfr(0))
-    turn_v = zeros(len(rate), 3, 3)
-    turn_v[column] = about(axis, -s, c) - still
-    turn_b = (about(axis, -c, -s) - still) * (velocity * velocity)
-    return about(axis, c, s), turn_v, turn_b
+    rotation_v = zeros(len(rate), 3, 3)
+    rotation_v[column] = about(axis, -s, c) - still
+    rotation_b = (about(axis, -c, -s) - still) * (velocity * velocity)
+    return about(axis, c, s), rotation_v, rotation_b
 
 
 def world_pose(m: int) -> Pose:

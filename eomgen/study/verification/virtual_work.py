@@ -46,7 +46,7 @@ class FreeBodies(EvaluatedModel):
             else:
                 xx, yy, zz, xy, xz, yz = entries
                 matrix = extended([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            found.append(pose.turn @ matrix @ pose.turn.T)
+            found.append(pose.rotation @ matrix @ pose.rotation.T)
         return found
 
     @cached_property
@@ -108,7 +108,7 @@ class FreeBodies(EvaluatedModel):
             elif load.body != WORLD:
                 pose = self.poses[self.index[load.body]]
                 force, torque = self.in_space(load.force), self.torque(load)
-                at = pose.position_v + pose.turn_v @ self.in_space(load.at)
+                at = pose.position_v + pose.rotation_v @ self.in_space(load.at)
                 total = total + at @ force + pose.spin_v @ torque
                 sizes = sizes + _reach(at, force) + _reach(pose.spin_v, torque)
         return total, sizes
@@ -236,8 +236,8 @@ class FreeBodies(EvaluatedModel):
             spin = self.inertias[k] @ self.spin(k)
             total = total + np.concatenate([p, np.cross(pose.position, p) + spin])
             arm, force = abs(pose.position), abs(p)
-            turning = np.sum(arm) * np.sum(force) + np.sum(abs(spin))
-            sizes = sizes + np.concatenate([zeros(3) + np.sum(force), zeros(3) + turning])
+            moment = np.sum(arm) * np.sum(force) + np.sum(abs(spin))
+            sizes = sizes + np.concatenate([zeros(3) + np.sum(force), zeros(3) + moment])
         return total, sizes
 
     def inertial_sizes(self, vd: Array) -> Array:
@@ -248,9 +248,9 @@ class FreeBodies(EvaluatedModel):
             force = self.mass(name) * (abs(pose.position_b) + abs(along(whole, pose.position_v)))
             spin = abs(inertia) @ (abs(pose.spin_b) + abs(along(whole, pose.spin_v)))
             spin = spin + abs(np.cross(w, inertia @ w))
-            linear, turning = np.sum(force), np.sum(spin)
-            turning = turning + np.sum(abs(pose.position)) * linear
-            sizes = sizes + np.concatenate([zeros(3) + linear, zeros(3) + turning])
+            linear, moment = np.sum(force), np.sum(spin)
+            moment = moment + np.sum(abs(pose.position)) * linear
+            sizes = sizes + np.concatenate([zeros(3) + linear, zeros(3) + moment])
         return sizes
 
     @cached_property
