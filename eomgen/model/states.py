@@ -7,7 +7,9 @@ from eomgen.model.model import Model
 
 @dataclass(frozen=True)
 class State:
-    """One number of the state vector; `position` tells positions and angles from their rates."""
+    """One number of the state vector; `position` separates positions and angles from their
+    rates.
+    """
 
     name: str
     unit: str

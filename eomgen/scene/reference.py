@@ -24,7 +24,7 @@ default may be left out. A quantity is a number, which becomes a parameter of th
 or a formula in quotes: `+ - * /`, `**` with a whole number, brackets, comparisons,
 `a if x < y else b`, {functions}
 and {constants}. Formulas may name parameters, and where a key says so more: *motion* is the time
-`t` and all coordinates, velocities, inputs and states of effects; other words are told there.
+`t` and all coordinates, velocities, inputs and states of effects; other names are given there.
 """
 
 TABLES: Mapping[str, type[Table]] = {

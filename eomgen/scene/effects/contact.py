@@ -19,11 +19,11 @@ from eomgen.scene.effects.touching import (
     Ball,
     Plane,
     Touch,
-    acting,
     merged,
     on_ball,
     on_plane,
     parting,
+    point_loads,
     pressing,
     sliding,
     tangents,
@@ -208,7 +208,7 @@ class BodyContact(OnBodies):
             size = mechanism.call("sqrt", dot(slip, slip) + speed * speed)
             drag = mechanism.value(self.friction) * force / size
             pairs = zip(touch.normal, slip, strict=True)
-            found += acting(touch, tuple(force * n - drag * u for n, u in pairs))
+            found += point_loads(touch, tuple(force * n - drag * u for n, u in pairs))
         yield from merged(found)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
@@ -268,7 +268,7 @@ class BodyContact(OnBodies):
                 self.name,
                 touch.gap,
                 pressing(touch, mechanism.number(1.0)),
-                tuple(acting(touch, tangent) for tangent in tangents(mechanism, touch)),
+                tuple(point_loads(touch, tangent) for tangent in tangents(mechanism, touch)),
                 mechanism.value(self.restitution),
                 mechanism.value(self.friction),
                 self._slip_speed(mechanism),

@@ -118,7 +118,7 @@ def sliding(mechanism: Mechanism, touch: Touch) -> tuple[Scalar, Vector]:
     return apart, sub(u, scale(apart, touch.normal))
 
 
-def acting(touch: Touch, force: Vector) -> tuple[Load, ...]:
+def point_loads(touch: Touch, force: Vector) -> tuple[Load, ...]:
     """A force at P on the first side, N, world axes, and its opposite on the second."""
     return _on_both(touch, force, [_lever(touch, side) for side in touch.sides])
 
