@@ -1,9 +1,10 @@
-"""Axes of frames on ball joints along the line to the heaviest thing that they carry.
+"""Axes of frames on ball joints, with one axis along the arm to the heaviest child.
 
-A heavy point pulls along that line and turns the frame about it by nothing at all, which sums of
-products would hide in their rounding: along a coordinate axis the lever is no number, but absent.
-So it is with two such points: neither turns the frame about the line between them. Axes can be
-along one line only, and are along that whose turn is the lighter beside what turns it otherwise.
+The force of a heavy child acts at its joint. It has no moment about the arm to that joint. In any
+other axes this zero would be a difference of products, and their rounding would exceed the light
+inertia about the arm. Along a coordinate axis the zero is exact. Two heavy children have no moment
+about the line between their joints. An axis can lie along one of these lines only: the one about
+which the inertia is smaller beside the other moments.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,9 +20,11 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 @dataclass(frozen=True)
 class AlignedTree:
-    """Links and what they carry in such axes; `rotations` lead from these to the frames' own.
-    `between` has the arms of links from the heaviest on the same frame, where axes are along those;
-    `along` the axis of each frame that is along the arm of the heaviest, if one is.
+    """Links and their bodies in such axes.
+
+    rotations  from these axes to the frames' own
+    between    arms of links from the heaviest link on the same frame, where an axis is along them
+    along      for each frame the axis that is along the heaviest child's arm, None if none is
     """
 
     links: tuple[Link, ...]
@@ -33,7 +36,7 @@ class AlignedTree:
     def into(
         self, wrenches: Sequence[Wrench], tau: Sequence[Scalar]
     ) -> tuple[list[Wrench], list[Scalar]]:
-        """Wrenches on the frames, and what acts on the velocities."""
+        """Wrenches and generalised forces of the frames' own axes in the aligned axes."""
         pairs = zip(self.rotations, wrenches, strict=True)
         rotated = [Wrench(rotation.into(f.moment), rotation.into(f.force)) for rotation, f in pairs]
         found = list(tau)
@@ -44,7 +47,7 @@ class AlignedTree:
         return rotated, found
 
     def out(self, rates: Sequence[Scalar]) -> list[Scalar]:
-        """Rates of the velocities as they are asked for."""
+        """v̇ of the aligned axes as that of the frames' own axes."""
         found = list(rates)
         for rotation, link in zip(self.rotations, self.links, strict=True):
             if not isinstance(rotation, IdentityRotation):
@@ -59,8 +62,8 @@ def align_axes(
     ranks: Ranks,
     scalars: Scalars,
 ) -> AlignedTree:
-    """Links, and what they carry, where `ranks` tell which links each has to look at. Frames on
-    other joints keep their axes.
+    """Align the axes of frames on ball joints with the arms that `ranks` names. Frames on other
+    joints keep their axes.
     """
     rotations: list[Rotation] = [IdentityRotation() for _ in links]
     heaviest, between = ranks.heaviest, dict[int, Vec]()
@@ -68,7 +71,7 @@ def align_axes(
     arms = {k: link.arm for k, link in enumerate(links)}
     for k, link in enumerate(links):
         child, spins = heaviest[k], [axis.angular for axis, _ in link.free] == [True] * 3
-        # What is free to move in all ways, by frames of no mass before, resists along that line.
+        # After massless frames the joint may be free in all directions: inertia acts along the arm.
         loose = link.parent >= 0 and carried[link.parent] is None
         other = ranks.beside[k]
         if child >= 0 and spins and other >= 0:
@@ -107,11 +110,11 @@ def _along(arm: Vec, scalars: Scalars) -> tuple[Rotation, Vec]:
         first, flat = _along((arm[0], arm[1], zero), scalars)
         second, left = _along((flat[0], zero, arm[2]), scalars)
         return ComposedRotation(first, second), left
-    # A turn about the third axis brings axis i, the next after it, to the arm.
+    # A rotation about the third axis brings axis i, the next after it, to the arm.
     (k,) = (j for j in AXES if j not in ways)
     i, j = (k + 1) % 3, (k + 2) % 3
     length = scalars.call("sqrt", arm[i] * arm[i] + arm[j] * arm[j])
-    # An arm that a user makes 0 keeps its axes.
+    # If a parameter makes the arm 0, the axes stay.
     none = scalars.number(1.0) - scalars.call("step", length)
     c, s = (arm[i] + none) / (length + none), arm[j] / (length + none)
     along = list(zeros(scalars))

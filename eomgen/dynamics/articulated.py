@@ -1,16 +1,18 @@
-"""The articulated-body algorithm: accelerations in one sweep inwards and one outwards.
+"""The articulated-body algorithm (Featherstone 2008, chapter 7): one sweep inwards, one outwards.
 
-What a subtree resists with at its frame's origin is, for an angular acceleration α and an
-acceleration a of the origin,
+The wrench that accelerates a subtree at its frame's origin, by α and a, is
 
-    n = J α + G a + p_n,    f = Gᵀ α + H a + p_f          (Featherstone 2008, 7.1-7.4),
+    n = J α + G a + p_n,    f = Gᵀ α + H a + p_f,
 
-where accelerations are counted from those that the mechanism would have if its velocities did not
-change, so that p is made of forces alone. Eliminating the acceleration along an axis of motion
-leaves a form of the same kind; along a coordinate axis it also leaves that row zero, and then the
-acceleration found is the absolute one, from which the parent's is taken off. A driven axis is not
-eliminated: its acceleration is given and part of what is counted from, so that all of the
-resistance passes on to the parent.
+with the articulated-body inertia [J G; Gᵀ H] and the bias force p. Here accelerations are relative
+to those of the mechanism with v̇ = 0, so that p contains forces only. Eliminating the acceleration
+along one motion axis s (a column of S) leaves the same form, with
+
+    I' = I - I s (sᵀ I s)⁻¹ sᵀ I.
+
+If s is a coordinate axis, row and column of I' are zero there. The acceleration that is then solved
+for is the frame's own, and the parent's is subtracted. A driven axis is not eliminated: its
+acceleration is part of the reference, and the whole inertia is passed to the parent.
 """
 
 from collections.abc import Sequence
@@ -41,7 +43,7 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 @dataclass(frozen=True)
 class ArticulatedInertia:
-    """J, G and H of a subtree."""
+    """J (kg m²), G (kg m) and H (kg) of a subtree, at its frame's origin."""
 
     J: Symmetric
     G: Mat
@@ -50,9 +52,9 @@ class ArticulatedInertia:
 
 @dataclass(frozen=True)
 class Pivot:
-    """One elimination: the pivot d and, over d, the column it stood in (moment u, force w).
+    """One elimination: the pivot d = sᵀ I s, and the column I s / d (moment u, force w).
 
-    `absolute` if the acceleration that it solves for is that of the frame, not of the joint.
+    `absolute` if the acceleration that it solves for is the frame's, not the joint's.
     """
 
     d: Scalar
@@ -62,11 +64,11 @@ class Pivot:
 
 
 Pivots = tuple[tuple[Pivot, ...], ...]
-"""Of every link, in the order of its axes."""
+"""The pivots of every link, in the order of its motion axes."""
 
 
 def articulate(kinematics: TreeKinematics, scalars: Scalars) -> Pivots:
-    """Eliminate every axis of motion that is free, leaves first."""
+    """The inward sweep over inertias: eliminate every free motion axis, leaves first."""
     links = kinematics.links
     sums = [rigid_body_inertia(link, scalars.number(0.0)) for link in links]
     pivots: list[tuple[Pivot, ...]] = [()] * len(links)
@@ -89,7 +91,7 @@ def respond(
     tau: Sequence[Scalar],
     scalars: Scalars,
 ) -> list[Scalar]:
-    """The v̇ that `tau` on the velocities and the wrenches -`forces` on the frames give."""
+    """v̇ (nv,) under generalised forces `tau` (nv,) and the wrenches -`forces` on the frames."""
     shares = _inwards(kinematics, pivots, forces, tau)
     return _outwards(kinematics, pivots, shares, scalars)
 
@@ -97,7 +99,7 @@ def respond(
 def _inwards(
     kinematics: TreeKinematics, pivots: Pivots, forces: Sequence[Wrench], tau: Sequence[Scalar]
 ) -> list[Scalar]:
-    """For each velocity what the forces on what it carries do to it, over its pivot."""
+    """The inward sweep over forces: (tau - sᵀ p) / d for each velocity."""
     links, sums = kinematics.links, list(forces)
     shares = list(tau)
     for k in reversed(range(len(links))):
@@ -107,7 +109,7 @@ def _inwards(
             shares[i] = left / pivot.d
             p = Wrench(add(p.moment, scale(left, pivot.u)), add(p.force, scale(left, pivot.w)))
             if pivot.absolute:
-                # A free axis transmits the force put on it, and nothing else.
+                # Along a free axis the joint transmits tau only.
                 p = Wrench(*with_component(axis, p.moment, p.force, tau[i]))
         if link.parent >= 0:
             sums[link.parent] = total(sums[link.parent], at_parent(link, p))
@@ -117,7 +119,7 @@ def _inwards(
 def _outwards(
     kinematics: TreeKinematics, pivots: Pivots, shares: Sequence[Scalar], scalars: Scalars
 ) -> list[Scalar]:
-    """Accelerations of the velocities, each from that of the frame that carries it."""
+    """The outward sweep: v̇, each from the acceleration of the parent's frame."""
     zero = scalars.number(0.0)
     nothing = (zero, zero, zero)
     result = list(shares)
@@ -144,13 +146,13 @@ def _outwards(
 
 
 def along(axis: MotionAxis, angular: Vec, linear: Vec) -> Scalar:
-    """The component of a motion or force along an axis of motion."""
+    """The component of a motion or a wrench along a motion axis."""
     part = angular if axis.angular else linear
     return dot(axis.direction, part) if axis.unit is None else part[axis.unit]
 
 
 def with_component(axis: MotionAxis, angular: Vec, linear: Vec, value: Scalar) -> tuple[Vec, Vec]:
-    """The same with another component along a coordinate axis."""
+    """A motion or a wrench with another component along a coordinate axis."""
     assert axis.unit is not None
     if axis.angular:
         return replaced(angular, axis.unit, value), linear
@@ -165,7 +167,7 @@ def rigid_body_inertia(link: Link, zero: Scalar) -> ArticulatedInertia:
 
 
 def joined(a: ArticulatedInertia, b: ArticulatedInertia) -> ArticulatedInertia:
-    """Both together."""
+    """a + b."""
     return ArticulatedInertia(plus(a.J, b.J), plus(a.G, b.G), plus(a.H, b.H))
 
 

@@ -1,4 +1,8 @@
-"""Which accelerations the frames of a tree can have at all, and the order to eliminate them in."""
+"""Columns that can be other than 0 in the rows of a link, and the order of their elimination.
+
+A column is a component of x = (α, a), see `orthogonal`. Columns that are 0 at every state are left
+out. The order keeps rows with few entries as they are, which saves operations.
+"""
 
 from collections.abc import Sequence
 
@@ -9,8 +13,8 @@ from eomgen.scalars.protocol import Scalars
 
 
 def nonzero_columns(links: Sequence[Link], scalars: Scalars) -> list[set[Column]]:
-    """For each link its angular accelerations, and those of its origin, that are not 0 whatever the
-    velocities do: what nothing on the way from the world can give is not there.
+    """For each link the components of its angular acceleration and of its origin's acceleration
+    that some joint between the world and it can cause.
     """
     found: list[set[Column]] = []
     for link in links:
@@ -24,7 +28,7 @@ def nonzero_columns(links: Sequence[Link], scalars: Scalars) -> list[set[Column]
 
 
 def point_columns(columns: set[Column], at: Vec, scalars: Scalars) -> set[Column]:
-    """The accelerations that turning gives a point."""
+    """The linear accelerations of a point `at` that angular ones cause, α x at."""
     found: set[Column] = set()
     for angular, j in columns:
         if angular:
@@ -33,8 +37,8 @@ def point_columns(columns: set[Column], at: Vec, scalars: Scalars) -> set[Column
 
 
 def rotation_order(link: Link, planar: bool, along: int | None) -> tuple[int, ...]:
-    """The axes to turn about, in the order to eliminate them in, that of the link last, or that
-    `along` the arm of what it carries.
+    """Angular columns in the order of elimination. Last comes the link's own axis, or the one
+    `along` the arm of the heaviest child.
     """
     if planar:
         return (2,)
@@ -46,8 +50,8 @@ def rotation_order(link: Link, planar: bool, along: int | None) -> tuple[int, ..
 def translation_order(
     link: Link, arm: Vec, rows: Sequence[Row], planar: bool, scalars: Scalars
 ) -> tuple[int, ...]:
-    """The axes to move along, that of the link last. Before it those that rows of few axes hold,
-    which so stay what they are, and that of an arm.
+    """Linear columns in the order of elimination. Last comes the link's own axis; before it those
+    of rows with few linear entries, and that of the arm.
     """
     present = [
         [j for j in AXES if not scalars.is_zero(vector[j])]
@@ -65,7 +69,7 @@ def translation_order(
 
 
 def column_of(axis: MotionAxis) -> Column:
-    """The acceleration along a coordinate axis of motion."""
+    """The column of a motion axis; it is a coordinate axis in the frame's own axes."""
     assert axis.unit is not None  # as all are in the frames' own axes
     return axis.angular, axis.unit
 

@@ -10,7 +10,9 @@ from eomgen.scalars.protocol import Scalar
 
 @dataclass(frozen=True)
 class Rigid:
-    """Mass, first moment m c and inertia about the frame's origin, in the frame's axes."""
+    """Mass (kg), first moment m c (kg m) and inertia (kg m²) about the frame's origin, in the
+    frame's axes: the ten numbers of a rigid-body inertia (Featherstone 2008, 2.13).
+    """
 
     mass: Scalar
     first_moment: Vec
@@ -18,19 +20,23 @@ class Rigid:
 
 
 def joined(a: Rigid, b: Rigid) -> Rigid:
-    """Two bodies about the same origin as one."""
+    """The sum of two rigid-body inertias about the same origin."""
     return Rigid(a.mass + b.mass, add(a.first_moment, b.first_moment), plus(a.inertia, b.inertia))
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame and its joint primitive against frame `parent` (-1 the world).
+    """A frame, and the joint primitive between it and frame `parent` (-1 is the world).
 
-    `offset` is its origin at zero from the parent's, in the parent's axes; the columns of `fixed`
-    are its axes at zero in the parent's; the move goes about or along coordinate axis `axis` of
-    its own, a turn by `lead` more than its coordinate. In the plane `angle` is that of its axes at
-    zero in the parent's. All three are exact. `q` and `v` index its coordinates and velocities.
-    `armature` is the inertia of a motor's rotor on the coordinate. A `driven` move is given.
+    offset    its origin at q = 0 from the parent's origin, in the parent's axes, m
+    fixed     rotation at q = 0: the columns are its axes in the parent's axes, exact
+    kind      of the primitive, and `axis` the coordinate axis that it is about or along
+    angle     in the plane: the angle of `fixed`, rad, exact
+    lead      the angle of a revolute primitive at q = 0, rad, exact
+    q, v      indices of its coordinates and velocities
+    armature  reflected inertia of a motor's rotor, kg m² or kg
+    rigid     inertia of the bodies on it
+    driven    whether its motion is prescribed
     """
 
     name: str
@@ -50,11 +56,11 @@ class Frame:
 
 @dataclass(frozen=True)
 class Mount:
-    """Where a body sits: its frame (-1 the world), its axes and centre of mass in that frame.
+    """A body on its frame (-1 is the world): its axes and its centre of mass `at`, in that frame.
 
-    In the plane `angle` is that of its axes, whole turns included.
-
-    `joint` is the joint's point on the body from the body's centre of mass, in body axes.
+    angle    in the plane: the angle of its axes, rad, whole turns included
+    joint    its joint's point from the centre of mass, in body axes, m
+    inertia  about the centre of mass, in body axes, kg m²
     """
 
     frame: int
@@ -68,7 +74,7 @@ class Mount:
 
 @dataclass(frozen=True)
 class Linkage:
-    """Frames, parents first, and the mount of every body of the model."""
+    """The frames of a model, parents before children, and the mount of every body."""
 
     frames: tuple[Frame, ...]
     mounts: tuple[Mount, ...]

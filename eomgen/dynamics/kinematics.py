@@ -1,8 +1,8 @@
 """Kinematics of a tree at coordinates q: the pose of every frame, in its own axes or the world's.
 
-In its own axes a frame moves about a coordinate axis, which makes a third of every matrix zero, but
-matrices must be turned from frame to frame. In the world's axes nothing is turned, but axes point
-anywhere; in the plane they still point along z. All algorithms take either.
+In its own axes a frame moves about a coordinate axis. A third of every matrix is then zero, but
+matrices must be rotated from frame to frame. In the world's axes nothing is rotated, but motion
+axes point anywhere; in the plane they still point along z. All algorithms take either.
 """
 
 from collections.abc import Sequence
@@ -38,17 +38,17 @@ Axes = Literal["own", "world"]
 
 @dataclass(frozen=True)
 class Angle:
-    """Of a planar frame's axes from the world's: what of it moves, and what is fixed, exactly.
+    """The angle of a planar frame's axes from the world's, rad: a moving part and a fixed one.
 
-    Angles add up: one sine and cosine of a sum, and no product of matrices. Quarter turns stay out
-    of that, for no double is a right angle.
+    Angles add, which needs one sine and cosine and no product of matrices. The fixed part is exact,
+    so that quarter turns can be taken out of it: no double is a right angle.
     """
 
     moving: Scalar
     fixed: Real
 
     def and_more(self, angle: Real, scalars: Scalars) -> Scalar:
-        """The whole angle, and a fixed one more, rad."""
+        """The whole angle plus a fixed one, rad."""
         return self.moving + scalars.number(total(self.fixed, angle))
 
     def matrix(self, scalars: Scalars) -> Mat:
@@ -61,7 +61,7 @@ class Angle:
 
 @dataclass(frozen=True)
 class MotionAxis:
-    """A direction of motion that one velocity stands for.
+    """One column of a joint motion subspace S (see `scene.joints.base`): angular or linear.
 
     `unit` is k where `direction` is the k-th coordinate direction for every q; else None.
     """
@@ -75,9 +75,11 @@ class MotionAxis:
 class Link:
     """A frame at coordinates q.
 
-    `rotation` leads from its axes to the parent's; `arm` is its origin from the parent's, in the
-    parent's axes; `axes` are its motions in its own axes, the velocity v[i] times each. A `driven`
-    motion is given and not solved for.
+    rotation  from its axes to the parent's
+    arm       its origin from the parent's origin, in the parent's axes, m
+    axes, v   columns of S in its own axes, and the index in v of the velocity of each
+    armature  reflected inertia of a motor's rotor, kg m² or kg
+    driven    whether its motion is prescribed and not solved for
     """
 
     name: str
@@ -92,16 +94,17 @@ class Link:
 
     @property
     def free(self) -> tuple[tuple[MotionAxis, int], ...]:
-        """The axes whose velocities are states, each with the index of that."""
+        """The motion axes whose velocities are states, each with its index in v."""
         return () if self.driven else tuple(zip(self.axes, self.v, strict=True))
 
 
 @dataclass(frozen=True)
 class TreeKinematics:
-    """All links, and for each the matrix from its frame's own axes to the world's.
+    """All links at coordinates q, parents before children.
 
-    `axes` says in which the links are written. In the plane `angles` are the frames' own from the
-    world's x axis.
+    world   for each link the rotation matrix from its frame's own axes to the world's
+    angles  in the plane: the frames' angles from the world's x axis
+    axes    the axes that the links are written in: their own, or the world's
     """
 
     links: tuple[Link, ...]

@@ -1,27 +1,49 @@
-"""Forward dynamics by orthogonal elimination: no digit is lost where heavy bodies hang on light.
+"""Forward dynamics by orthogonal elimination: O(n), without loss of digits at any ratio of masses.
 
-By Gauss's principle of least constraint the accelerations are those with the least
+By Gauss's principle of least constraint (1829) the true accelerations z = v̇ minimise
 
-    ½ Σ w (c · x - f)² - t · x,                  x = (α, a) of the frames,
+    ½ Σ ρ² (c · x - s)² - t · x                                                            (1)
 
-with a row c · x = f of weight w for each component of each body's Newton's and Euler's equations:
-the mass, a_centre = force / mass; the pivots of the inertia, α = moment / inertia. The mass matrix
-and articulated inertias are this sum's normal equations. They square its condition, and a light
-body vanishes beside a heavy one; rows of their own weight do not. So rows are rotated against each
-other until one alone holds the acceleration along a free axis, from the leaves to the root: the QR
-factors of least squares over the tree of frames (Golub & Van Loan, Matrix Computations, 5.3). Each
-row is good to rounding of its own size, and a lever that is zero stays so: a link's rows are put
-together about the joint of what is heaviest on it.
+over all z. Here x = (α, a) are the angular and linear accelerations of the frames, linear in z.
+Each component of each body's Newton-Euler equations is a row (c | s) with a weight ρ²: three with
+the mass, a_centre = s, and three with the pivots of the inertia matrix. t holds the applied forces.
 
-Forces act on rows, t = Σ φ c, and are rotated with them. Handed inwards as a sum, t would push, by
-its rounding, at light bodies beside that whose row takes all of it.
+The mass matrix and the articulated-body inertias are the normal equations of (1). They square its
+condition number: beside a heavy body a light one is lost in rounding. So the rows are never
+multiplied out. They are eliminated by Givens rotations (`rows`) from the leaves to the root: the QR
+factorisation of a least-squares problem whose sparsity is the tree (Golub & Van Loan, Matrix
+Computations, 5.2 and 5.3). The square-root information filter is the same elimination (Bierman,
+Factorization Methods for Discrete Sequential Estimation, 1977; Rodriguez 1987 for multibody trees).
 
-Outwards no acceleration is substituted, which could cancel, but what the rows leave is rotated
-back. Those of a body times their weights are the forces that joints put on it, small where it is
-light. What has no inertia of its own along an axis is found from its neighbours' rows after all.
+Leaf to root, for each link:
 
-Digits are lost still where inertia is a small part of mass times arms squared, and where a heavy
-tip hangs in line with all joints, of which rounding of sines and cosines knows no more.
+1. Collect its own rows (`_own_rows`) and the rows that its children left, in the link's axes
+   (`in_parent_axes`).
+2. Rotate them to triangular form about one point (`Rows.folded`): first the columns of a, then
+   those of α. The point is the joint of the heaviest child. An arm that is zero there stays zero.
+3. For each free motion axis, rotate the rows against each other until only one contains the
+   acceleration along that axis (`_taken`): the pivot row (ρ, u | s). Keep it.
+4. Pass the other rows on to the parent: at most five for one degree of freedom in space, two in
+   the plane.
+
+Each row carries a force φ, with t = Σ φ c, and the forces rotate with the rows. A sum t passed
+inwards would act, by its rounding error, on light bodies beside the heavy one that takes it.
+
+Root to leaf (`_outwards`), with u and s in parts of ρ and x the other accelerations:
+
+    α = s + r - u · x,    r = φ / ρ²                                                       (2)
+
+The sum in (2) could cancel where rotations have made u large. So the residuals r = c · x - s are
+rotated back (`undo_rotations`), and (2) is applied to the rows that contained α before they were
+rotated (`_value`). The residuals of a body's own rows, times their weights, are the forces of its
+joints on it: small where the body is light. An axis along which a body has no inertia of its own is
+found from its neighbours' rows.
+
+The order of elimination is fixed when the program is recorded, from the scene's masses
+(`solids.ranked`) and the tree's shape (`elimination_order`).
+
+Two losses remain. One is where an inertia is a small part of mass times arm squared. The other is
+where a heavy tip is in line with all joints, to less than the rounding of sines and cosines.
 """
 
 from collections.abc import Mapping, Sequence
@@ -77,13 +99,13 @@ from eomgen.dynamics.vectors import (
 from eomgen.scalars.protocol import Scalar, Scalars
 
 SLIGHT = 1e-16
-"""The least share of a diagonal entry that a pivot of an inertia matrix keeps."""
+"""A pivot of an inertia matrix is at least this part of its diagonal entry."""
 
 
 class Elimination:
-    """One sweep over the frames of an instant in its own axes.
+    """The elimination of (1) over the links of a tree, in their own axes.
 
-    `carried` is what the frames carry, about whose centres wrenches act.
+    `carried` are the bodies on the frames; wrenches act about their centres of mass.
     """
 
     def __init__(
@@ -107,8 +129,8 @@ class Elimination:
         wrenches: Sequence[Wrench],
         tau: Sequence[Scalar],
     ) -> list[Scalar]:
-        """The v̇ under wrenches about the centres and `tau` on the velocities, where
-        `frame_accelerations` are the accelerations at v̇ = 0.
+        """v̇ (nv,) under wrenches about the centres, in the frames' axes, and generalised forces
+        `tau` (nv,). `frame_accelerations` are the accelerations of the frames at v̇ = 0.
         """
         wrenches, tau = on_frames(self._links, *self._aligned.into(wrenches, tau), self._scalars)
         rows: list[list[tuple[Row, int]]] = [[] for _ in self._links]
@@ -127,15 +149,19 @@ class Elimination:
     # Inwards.
 
     def _centre(self, k: int) -> Vec:
-        """The centre of what a link carries itself, its origin if that is nothing."""
+        """The centre of mass of the link's own bodies; its origin if it has none."""
         solid = self._solids[k]
         return zeros(self._scalars) if solid is None else solid.centre
 
     def _own_rows(
         self, k: int, a: Acceleration, wrench: Wrench
     ) -> tuple[tuple[dict[int, Row], dict[int, Row]], Wrench]:
-        """Rows of a link's own mass, by axis: linear about its centre, and angular; and the part of
-        a wrench about the centre that no inertia takes, about the origin.
+        """The Newton-Euler rows of a link's own mass, by coordinate axis: linear ones about its
+        centre, and angular ones. Also the part of the wrench along axes without inertia, about the
+        link's origin.
+
+        The inertia about the centre is I = Σ d u uᵀ with triangular u (Cholesky's factors without
+        roots). Each u is a row of weight d.
         """
         s, zero, solid, own = self._scalars, zeros(self._scalars), self._solids[k], self._carried[k]
         linear, angular = dict[int, Row](), dict[int, Row]()
@@ -169,7 +195,7 @@ class Elimination:
                     for h in order[n + 1 :]:
                         work[j][h] = work[j][h] - part * work[i][h]
                 angular[i] = row(d, entries, zero, y[i] / d, moment[i])
-        # What has rows of its own is pushed there.
+        # Where there is a row, its φ takes the force.
         for j in linear:
             wrench = replace(wrench, force=replaced(wrench.force, j, self._rows.zero))
         for j in angular:
@@ -189,11 +215,14 @@ class Elimination:
         term: Wrench,
         tau: Sequence[Scalar],
     ) -> tuple[Eliminated, Wrench]:
-        """Take a link's free axes out of the rows of all that it carries, each of a link, and of a
-        wrench that nothing takes; what is left of that.
+        """Eliminate a link's free motion axes from its own rows and those of its children.
+
+        own   linear and angular rows of the link, by coordinate axis
+        rows  rows left by the children, each with the child's index
+        term  the wrench that no row takes, about the origin; returned with what is left of it
         """
         s, link = self._scalars, self._links[k]
-        # Where the heaviest rows have no arm, light ones keep theirs.
+        # About the heaviest child's joint, where its rows have no arm to be rounded.
         heaviest = self._ranks.heaviest[k]
         at = self._links[heaviest].arm if heaviest >= 0 else self._centre(k)
         columns = self._columns[k]
@@ -204,7 +233,7 @@ class Elimination:
         }
         angular = {j: self._rows.of(about, row) for j, row in own[1].items()}
         loose = [self._rows.of(about, shifted(row, self._arm(n, at))) for row, n in rows]
-        # Those without an arm first, which so stay without it, be there more of them than columns.
+        # Rows without an arm come first. They keep no arm, even if there are more than columns.
         loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
         along = self._aligned.along[k]
         slides = translation_order(link, at, loose, self._planar, s)
@@ -239,7 +268,7 @@ class Elimination:
         kept = {column: self._rows.of(columns, row) for column, row in kept.items()}
         free = [shifted(row, at) for row in loose if not self._rows.is_empty(row)]
         free = [self._rows.of(columns, row) for row in free]
-        # Rows of angular accelerations alone first, which so stay what they are.
+        # Rows of angular accelerations alone come first, and stay free of linear ones.
         free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
         empty = [row for row in loose if self._rows.is_empty(row)]
         for axis in axes:
@@ -261,20 +290,20 @@ class Elimination:
         loose: list[Row],
         at: Vec,
     ) -> tuple[Taken, dict[Column, Row], list[Row]]:
-        """Take the turn along an arm out of rows about its end `at`.
+        """Eliminate the rotation about the arm from the rows about the arm's end `at`.
 
-        The heaviest rows know nothing of it; but they would once those of other arms, rotated
-        against them, had got into them, and rounding would not take it out again.
+        The heaviest rows do not contain it. Rows with other arms, rotated against them first, would
+        bring it in, and rounding would not remove it.
         """
         first, nothing = kept.pop(column_of(axis[0])), no_wrench(self._scalars)
-        # All that pushes it is on its own row.
+        # The forces along this axis are all on its own row.
         one, kept, loose, _ = self._taken(
             link, axis, first, kept, loose, nothing, self._rows.zero, early=True
         )
         return replace(one, rows=(shifted(first, at),)), kept, loose
 
     def _arm(self, k: int, at: Vec) -> Vec:
-        """The arm of a link from a point, that of the heaviest beside it."""
+        """The arm of link k from the point `at`, the joint of the heaviest child."""
         between = self._aligned.between.get(k)
         return sub(self._links[k].arm, at) if between is None else between
 
@@ -283,8 +312,10 @@ class Elimination:
     ) -> tuple[
         Row, tuple[Row, ...], dict[Column, Row], list[Row], tuple[GivensRotation | Sum, ...]
     ]:
-        """The row that takes an axis: one that holds it alone, as there is where a link has inertia
-        against it; else what can be gathered of it from all. And the rows that it is found from.
+        """The pivot row of a motion axis, and the rows from which its acceleration is found.
+
+        If the link has inertia along the axis (`held`), the pivot is the triangle's own row; else a
+        row that contains the axis alone, or one gathered from all rows that contain it.
         """
         column = column_of(motion)
         kept, rotations = dict(kept), Steps()
@@ -320,8 +351,10 @@ class Elimination:
         *,
         early: bool = False,
     ) -> tuple[Taken, dict[Column, Row], list[Row], Wrench]:
-        """Rotate one row until it alone holds an axis of motion; where it is early, first against
-        the kept ones, which so stay a triangle.
+        """Rotate the pivot row `first` against all others until it alone contains a motion axis.
+
+        It is rotated against the free rows first, or if `early` against the kept ones, which then
+        stay a triangle. A rotor is one more row, with weight `armature`: the joint's acceleration.
         """
         s, (motion, i) = self._scalars, axis
         column = column_of(motion)
@@ -343,7 +376,7 @@ class Elimination:
         moment = sub(term.moment, scale(pushed, pivot.angular))
         push = sub(term.force, scale(pushed, pivot.linear))
         if not s.is_zero(link.armature):
-            # Its row is that of the joint's acceleration, the frame's less the parent's.
+            # The joint's acceleration is the frame's less the parent's.
             empty = self._rows.empty(column)
             row = self._rows.make(link.armature, empty.angular, empty.linear, back, tau)
             rotor = row.index
@@ -359,7 +392,7 @@ class Elimination:
     # Outwards.
 
     def _outwards(self, found: Sequence[Eliminated], nv: int) -> list[Scalar]:
-        """Residuals from the world outwards, and from them the accelerations."""
+        """v̇ (nv,), root to leaf: rotate the residuals back, then solve (2) for each axis."""
         scalars = self._scalars
         result = [self._rows.zero] * nv
         residuals: dict[int, Scalar] = {}
@@ -393,9 +426,9 @@ class Elimination:
     def _value(
         self, taken: Taken, residuals: Mapping[int, Scalar], angular: Vec, linear: Vec
     ) -> Scalar:
-        """The acceleration along an axis from rows that hold it, where the others are known. Each
-        of several tells it, and better the more of it is in the row beside noise, however light
-        that is.
+        """Equation (2): the acceleration along an axis from rows that contain it, if the others are
+        known. Several rows are averaged with weights x² / noise: a row counts by how much of the
+        axis it contains beside its rounding error, not by its mass.
         """
         above, below = self._rows.zero, self._rows.zero
         for row in taken.rows:

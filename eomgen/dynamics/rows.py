@@ -1,13 +1,16 @@
-"""Weighted rows about a frame's accelerations, and their rotations against each other.
+"""Weighted rows of least squares over a frame's accelerations, and their Givens rotations.
 
-A row of weight w and one of weight v with 1 and x in a column become, with d = w + v x²,
-c = w / d and s = v x / d,
+Take a row a of weight w with 1 in a column, and a row b of weight v with x there. With
+d = w + v x², c = w / d and s = v x / d they become
 
-    p = c a + s b  of weight d,    r = b - x a  of weight v c        (Gentleman 1973),
+    p = c a + s b  of weight d,    r = b - x a  of weight v c,                             (1)
 
-of which r has nothing there: a Givens rotation without its square root. Backwards, from what the
-new rows leave at some accelerations follows what the old ones leave, a = p - s r, b = x p + c r.
-So do forces f and g on them: f a + g b = (f + x g) p + (c g - s f) r.
+and r has 0 in that column: a Givens rotation without its square root (Gentleman 1973; a "fast
+Givens" rotation). The inverse takes the new rows' residuals to the old ones',
+
+    a = p - s r,    b = x p + c r,                                                         (2)
+
+and forces f on a and g on b transform as f a + g b = (f + x g) p + (c g - s f) r.
 """
 
 from collections.abc import Collection, Sequence
@@ -19,22 +22,21 @@ from eomgen.dynamics.vectors import AXES, Vec, add, cross, unit, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 
 TINY = 1e-200
-"""The weight of an empty row, and the least of any: so small that it never counts."""
+"""The weight of an empty row, and the least of any. It never counts beside another weight."""
 UNKNOWN = 1e100
-"""The noise of an empty row, which says nothing."""
+"""The noise of an empty row: it carries no information."""
 
 Column = tuple[bool, int]
-"""Whether an acceleration is angular, and its axis."""
+"""A component of x = (α, a): whether it is angular, and its coordinate axis."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """angular · α + linear · a = right, times weight, and a force on that sum; `index` names its
-    residual.
+    """The row angular · α + linear · a = right, with its weight ρ² and its force φ.
 
-    `noise` is what rounding leaves of it, squared, in parts of what it leaves of a body's own row.
-    A row that began as an empty one is that of others over what little they may hold of its axis,
-    and has their rounding over that, too. Of all others it counts as 1.
+    `index` identifies its residual. `noise` is the squared rounding error of the row, relative to
+    that of a body's own row. It is 1 but for rows that began empty: these are other rows divided by
+    what may be a small entry, and so is their rounding error.
     """
 
     index: int
@@ -48,7 +50,7 @@ class Row:
 
 @dataclass(frozen=True)
 class GivensRotation:
-    """A rotation of a row against a pivot row that has 1 where it has x."""
+    """The rotation (1) of a row with entry x against a pivot row with entry 1."""
 
     pivot: int
     row: int
@@ -59,8 +61,9 @@ class GivensRotation:
 
 @dataclass(frozen=True)
 class Sum:
-    """Rows x · unknown = right put together at once with a row of that unknown alone, whose right
-    side was `before`, to `pivot`.
+    """Several rows x · unknown = right and a row of that unknown alone, added to one row, `pivot`.
+
+    `before` is the right-hand side of that row before. `rows` are (index, x, right) of the others.
     """
 
     pivot: Row
@@ -73,14 +76,15 @@ Steps = list[GivensRotation | Sum]
 
 @dataclass(frozen=True)
 class Taken:
-    """An axis of motion that was eliminated.
+    """A motion axis that was eliminated.
 
-    rows    what it is found from: the one row that held it, or all before they were gathered
-    pivot   the index of that which held it at last, and its residual at the end, `left`
-    rotations
-            the rotations that cleared it; before those the ones that `gathered` the rows, and
-            before those the ones since the last axis
-    rotor   the index of its motor's row, -1 if it has none
+    velocity   its index in v
+    rows       the rows from which its acceleration is found: the one that contained it, or all that
+               were gathered
+    pivot      index of the pivot row, and its final residual φ / ρ², `left`
+    rotor      index of the row of the motor's rotor, -1 if there is none
+    rotations  those that cleared the axis from the other rows. Before them came those that
+               `gathered` the pivot row, and `before` those the ones since the last axis
     """
 
     axis: MotionAxis
@@ -96,8 +100,8 @@ class Taken:
 
 @dataclass(frozen=True)
 class Eliminated:
-    """A link after its axes are: these in the order taken, rotations after them, rows that remain
-    for the parent, and those that hold nothing more.
+    """A link after its elimination: its axes in order, the rotations after the last, the rows that
+    are passed to the parent, and the rows that are empty now.
     """
 
     axes: tuple[Taken, ...]
@@ -107,7 +111,7 @@ class Eliminated:
 
 
 class Rows:
-    """Makes and rotates rows; each has an index of its own."""
+    """Makes rows, each with an index of its own, and rotates them."""
 
     def __init__(self, scalars: Scalars) -> None:
         self._scalars = scalars
@@ -116,25 +120,25 @@ class Rows:
         self.zero, self.one, self.tiny, self.unknown = map(scalars.number, numbers)
 
     def make(self, weight: Scalar, angular: Vec, linear: Vec, right: Scalar, force: Scalar) -> Row:
-        """A row."""
+        """A row of a body or a rotor."""
         return Row(next(self._indices), weight, angular, linear, right, force, self.one)
 
     def empty(self, column: Column) -> Row:
-        """One that holds one acceleration, and of which nothing is asked."""
+        """A row of negligible weight with 1 in one column and right-hand side 0."""
         angular, axis = column
         one, zero = unit(axis, self._scalars), zeros(self._scalars)
         units = (one, zero) if angular else (zero, one)
         return replace(self.make(self.tiny, *units, self.zero, self.zero), noise=self.unknown)
 
     def of(self, columns: Collection[Column], row: Row) -> Row:
-        """A row where only some accelerations can be other than nothing."""
+        """A row with the entries outside `columns` set to 0: those accelerations are always 0."""
         a, b = row.angular, row.linear
         x, y, z = (a[j] if (True, j) in columns else self.zero for j in AXES)
         p, q, r = (b[j] if (False, j) in columns else self.zero for j in AXES)
         return replace(row, angular=(x, y, z), linear=(p, q, r))
 
     def is_empty(self, row: Row) -> bool:
-        """Whether a row holds nothing any more."""
+        """Whether all entries of a row are 0."""
         return all(self._scalars.is_zero(x) for x in (*row.angular, *row.linear))
 
     def folded(
@@ -146,8 +150,8 @@ class Rows:
         *,
         angular: bool,
     ) -> tuple[dict[int, Row], list[Row]]:
-        """Rotate rows against the link's own until those alone hold the linear, or else the angular
-        accelerations, as a triangle in their order.
+        """Rotate `rows` against the link's own rows until only those contain the accelerations of
+        `order`, as a triangle: the `angular` ones, or else the linear ones.
         """
         own, rows = dict(own), list(rows)
         for j in order:
@@ -164,7 +168,7 @@ class Rows:
     def _summed(
         self, pivot: Row, rows: Sequence[Row], j: int, rotations: Steps
     ) -> tuple[Row, list[Row]]:
-        """A pivot row about one angular acceleration with all rows about that, and the others."""
+        """Add all rows of one angular acceleration to the pivot row of it; and the other rows."""
         is_zero = self._scalars.is_zero
         weight, right, force = pivot.weight, pivot.weight * pivot.right, pivot.force
         found, others = [], []
@@ -192,8 +196,8 @@ class Rows:
         *,
         own: bool = False,
     ) -> tuple[Row, Row]:
-        """A pivot row, 1 in a column, and a row that has x there and then nothing; `own` if the
-        pivot row is a body's own yet.
+        """The rotation (1): `pivot` has 1 in a column, `row` has x there, and then 0. `own` says
+        that the pivot row is still a body's own.
         """
         angular, j = column
         x = (row.angular if angular else row.linear)[j]
@@ -205,8 +209,8 @@ class Rows:
         rotations.append(GivensRotation(pivot.index, row.index, x, s, c))
 
         def mixed(a: Scalar, b: Scalar) -> tuple[Scalar, Scalar]:
-            # c a + s b is a + s (b - x a), too, and shorter, but not as good if a is large: in a
-            # link's own rows it is not, nor longer if a or b is nothing.
+            # c a + s b = a + s (b - x a). The second form is shorter, but less accurate for a
+            # large a. In a link's own rows a is not large. If a or b is 0 it saves nothing.
             rest = b - x * a
             short = own and not self._scalars.is_zero(a) and not self._scalars.is_zero(b)
             return (a + s * rest if short else c * a + s * b), rest
@@ -241,7 +245,7 @@ class Rows:
 
 
 def undo_rotations(rotations: Sequence[GivensRotation | Sum], residuals: dict[int, Scalar]) -> None:
-    """What rows leave before rotations, from what they leave after them."""
+    """Equation (2): change residuals after the rotations into those before them, in place."""
     for rotation in reversed(rotations):
         if isinstance(rotation, Sum):
             value = rotation.pivot.right + residuals[rotation.pivot.index]
@@ -255,12 +259,12 @@ def undo_rotations(rotations: Sequence[GivensRotation | Sum], residuals: dict[in
 
 
 def shifted(row: Row, offset: Vec) -> Row:
-    """A row about a point as one about the origin that the point lies `offset` from."""
+    """A row about a point, as a row about the origin; the point is at `offset` from that."""
     return replace(row, angular=add(row.angular, cross(offset, row.linear)))
 
 
 def in_parent_axes(link: Link, row: Row) -> Row:
-    """A row of a link in its parent's axes."""
+    """A row in a link's axes, in its parent's axes."""
     return replace(
         row, angular=link.rotation.out(row.angular), linear=link.rotation.out(row.linear)
     )

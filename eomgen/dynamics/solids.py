@@ -1,4 +1,7 @@
-"""What the frames carry, about its own centre: masses and inertias put together by sums alone."""
+"""Bodies on each frame as one solid: mass, centre and inertia about that, by sums alone.
+
+Sums of positive terms do not cancel, so that every digit is kept at any ratio of masses.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +30,9 @@ DOMINANT = 0.01
 
 @dataclass(frozen=True)
 class Solid:
-    """What a frame carries as one body: mass, centre and inertia about it, in the frame's axes."""
+    """The bodies of a frame as one: mass (kg), centre (m) and inertia about it (kg m²), in the
+    frame's axes.
+    """
 
     mass: Scalar
     centre: Vec
@@ -35,7 +40,7 @@ class Solid:
 
 
 def solids(linkage: Linkage, scalars: Scalars) -> tuple[Solid | None, ...]:
-    """What each frame carries, if anything; bodies welded together as one, without cancellation."""
+    """The solid of each frame, None without mass; bodies welded together are one."""
     found: list[Solid | None] = [None] * len(linkage.frames)
     for mount in linkage.mounts:
         inertia = mount.inertia
@@ -49,7 +54,9 @@ def solids(linkage: Linkage, scalars: Scalars) -> tuple[Solid | None, ...]:
 
 
 def _welded(a: Solid, b: Solid, scalars: Scalars) -> Solid:
-    """Two as one: I = I_a + I_b + (m_a m_b / m) (r² 1 - r rᵀ) with r between the centres."""
+    """Two solids as one: I = I_a + I_b + (m_a m_b / m) (r² 1 - r rᵀ), the parallel-axis theorem
+    with r between the centres.
+    """
     if scalars.is_zero(b.mass) or scalars.is_zero(a.mass):
         heavy = a if scalars.is_zero(b.mass) else b
         return replace(heavy, inertia=plus(a.inertia, b.inertia))
@@ -65,18 +72,18 @@ def _welded(a: Solid, b: Solid, scalars: Scalars) -> Solid:
 
 
 def centres(carried: Sequence[Solid | None], scalars: Scalars) -> list[Vec]:
-    """The centre of what each frame carries; its origin where that is nothing."""
+    """The centre of mass of each frame's solid; the origin of a frame without one."""
     return [zeros(scalars) if solid is None else solid.centre for solid in carried]
 
 
 @dataclass(frozen=True)
 class Ranks:
-    """Which bodies are heavier than others, by frame.
+    """The order of masses that the elimination follows, by frame.
 
-    heaviest  the child that carries more mass than the frame itself and any other child, -1 if
-              none; of a ball joint the child that is heaviest wherever it is moved
-    beside    of a ball joint the next such child, where axes are to be along the line between these
-              two; -1 elsewhere
+    heaviest  the child that carries more mass than the frame itself and than any other child, -1 if
+              there is none; on a ball joint it is the heaviest in every pose
+    beside    on a ball joint the second such child, where an axis is to lie along the line between
+              the two; -1 elsewhere
     dominant  whether a frame's own mass and inertia dominate its neighbours', or are at least of
               their order (`DOMINANT`): forces move it about as if it were alone
     """
@@ -103,14 +110,14 @@ def ranked(linkage: Linkage) -> Ranks:
         single[k] = max([own[k], *(single[n] for n in children if not free[n])])
         fixed = sorted((*(least[n] for n in children), 0.0, 0.0, 0.0), reverse=True)
         spins = frames[k].kind == "spherical"
-        # What is left of so many points when all turns are free.
+        # The mass that still resists when all rotations are free.
         least[k] = 0.0 if frames[k].kind == "prismatic" else max(own[k], fixed[2 if spins else 1])
         weights = least if spins else [0.0 if free[n] else w for n, w in enumerate(whole)]
         order = sorted(children, key=lambda n: -weights[n])
         if order and weights[order[0]] > own[k]:
             heaviest[k] = order[0]
             third = max(own[k], fixed[2])
-            # Nothing holds the frame of a free body: there no other line asks for the axes.
+            # A free body has no joint above it that would need the axes along another line.
             loose = frames[k].parent >= 0 and own[frames[k].parent] == 0.0
             if spins and fixed[1] > third and (loose or fixed[1] ** 2 > fixed[0] * third):
                 beside[k] = order[1]
@@ -119,7 +126,7 @@ def ranked(linkage: Linkage) -> Ranks:
 
 
 def _translates_freely(linkage: Linkage, carried: Sequence[Sequence[int]]) -> list[bool]:
-    """Of each frame whether it begins slides along all axes, through which no force gets."""
+    """For each frame whether it begins prismatic joints along all axes. No force passes these."""
     frames, needed = linkage.frames, 2 if linkage.planar else 3
     run = [0] * len(frames)
     for k in reversed(range(len(frames))):
@@ -132,7 +139,7 @@ def _translates_freely(linkage: Linkage, carried: Sequence[Sequence[int]]) -> li
 def _dominant(
     linkage: Linkage, carried: Sequence[Sequence[int]], single: Sequence[float]
 ) -> Iterator[bool]:
-    """Of each frame whether its own mass and inertia are at least `DOMINANT` times those of its
+    """For each frame whether its own mass and inertia are at least `DOMINANT` times those of its
     neighbours: the heaviest body it carries, masses on arms, rotors.
     """
     frames, axes = linkage.frames, AXES[2 * linkage.planar :]

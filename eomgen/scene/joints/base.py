@@ -1,4 +1,11 @@
-"""What joint types share: their table, their coordinates, and their primitives."""
+"""What joint types share: their table, their coordinates, and their primitives.
+
+A joint is a sequence of primitives: revolute, prismatic or spherical. The velocity of the child
+relative to the parent is S v for the joint's velocities v. The columns of S, the joint motion
+subspace (Featherstone 2008, 3.5 and 4.4), are the axes of the primitives: an angular axis for a
+revolute primitive, a linear one for a prismatic, three angular ones for a spherical. In a frame's
+own axes every column is constant; `dynamics.kinematics.MotionAxis` is one column.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -15,7 +22,7 @@ WORLD = "world"
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One coordinate or one velocity of a joint."""
+    """One coordinate or one velocity of a joint: name, unit, and a description."""
 
     name: str
     unit: str
@@ -23,20 +30,20 @@ class Coordinate:
 
     @property
     def rate(self) -> "Coordinate":
-        """The velocity of a coordinate that has one of its own."""
+        """The velocity that is the time derivative of this coordinate."""
         return Coordinate(f"{self.name}_dot", f"{self.unit}/s", f"rate of {self.name}")
 
     @property
     def acceleration(self) -> str:
-        """What the rate of a velocity is called: theta_ddot of theta_dot, hip_wx_dot of hip_wx."""
+        """Name of a velocity's time derivative: theta_ddot of theta_dot, hip_wx_dot of hip_wx."""
         stem = self.name.removesuffix("_dot")
         return f"{self.name}_dot" if stem == self.name else f"{stem}_ddot"
 
 
 @dataclass(frozen=True)
 class Primitive:
-    """A joint primitive: a motion of the child against the parent, in the axes after the ones
-    before.
+    """A joint primitive: one motion of the child relative to the parent, in the axes that the
+    primitives before it leave.
 
     `revolute` and `prismatic` have one coordinate, about or along `axis` (of any length).
     `spherical` is a rotation by a unit quaternion w, x, y, z; its velocities are the angular
@@ -51,10 +58,10 @@ Z_AXIS = (0.0, 0.0, 1.0)
 
 
 class JointTable(Table):
-    """What every joint but the free one has: two bodies, a point on each, a fixed rotation."""
+    """The keys of every joint but the free one: two bodies, a point on each, a fixed rotation."""
 
     spaces: ClassVar[tuple[int, ...]] = (2, 3)
-    """The dimensions in which there is such a joint."""
+    """Dimensions of scenes that this joint type exists in."""
 
     name: Identifier
     parent: Identifier = Field(description="body on the inner side, or 'world'")
@@ -73,7 +80,7 @@ class JointTable(Table):
 
 
 class Geared(JointTable):
-    """A joint of one coordinate that a motor's rotor may turn along with."""
+    """A joint with one coordinate, which a motor's rotor may be geared to."""
 
     coordinate: Identifier | None = Field(default=None, description="name of the coordinate")
     motor_inertia: Quantity = quantity(
