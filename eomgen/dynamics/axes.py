@@ -1,15 +1,14 @@
-"""Axes and origins of frames chosen so that what is fixed between them is as simple as can be.
+"""Axes and origins of frames, chosen so that the fixed transforms have as many zeros as possible.
 
-A fixed rotation before a turn is R_i(a) R_m(b) R_k(c) with k the axis of the turn: the turn may
-start from another angle, c, and nothing else changes. A parent that turns about i may have its own
-axes turned about i by a, and start from another angle: R_m(b) is left, Denavit's and Hartenberg's
-choice. A parent can make it for one of its children; the others keep R_i(a). Likewise the origin
-may lie anywhere on the axis of a turn, which takes one component off its offset, and of a slide
-anywhere at all.
+The fixed rotation before a revolute primitive about axis k is R_i(a) R_m(b) R_k(c). R_k(c) can be
+added to the joint's angle. If the parent is revolute about i, R_i(a) can be added to its angle, and
+R_m(b) is left: the choice of Denavit and Hartenberg. A parent can do so for one child; the others
+keep R_i(a). The origin of a revolute frame may lie anywhere on its axis, which removes one
+component of its offset. That of a prismatic frame may lie anywhere.
 
-What is carried is then written in other axes, and rounded, so that what was small beside the rest
-of it no longer is. In a scene that has such things (`is_graded`) nothing is written in other axes
-but those that quarter turns lead to.
+The bodies on a frame are then written in other axes, and rounded. Components that were small beside
+others lose digits in that. In a scene with such components (`is_graded`) axes are changed by
+quarter turns only.
 """
 
 from collections.abc import Sequence
@@ -34,14 +33,13 @@ from eomgen.scalars.exact import Matrix
 from eomgen.scalars.protocol import Scalars
 
 SLIGHT = 2.0**-20
-"""What is less than this part of what it stands beside is slight: rounding in the rest of it costs
-it more digits than six."""
+"""A component smaller than this part of another one is slight: the rounding of the other would cost
+it more than six digits."""
 
 
 def is_graded(frames: Sequence[Frame], mounts: Sequence[Mount], beside: Sequence[Vec]) -> bool:
-    """Whether any rotation, arm or inertia over floats, or vector `beside` them, has components
-    that are slight beside others but not 0: axes that all but coincide, a rod that is all but a
-    needle.
+    """Whether any rotation, offset or inertia over floats, or any vector of `beside`, has slight
+    components that are not 0: axes that almost coincide, a rod that is almost a needle.
     """
     rotations = (*(frame.fixed for frame in frames), *(mount.axes for mount in mounts))
     vectors: list[Sequence[float]] = [[float(x) for row in r for x in row] for r in rotations]
@@ -55,7 +53,7 @@ def is_graded(frames: Sequence[Frame], mounts: Sequence[Mount], beside: Sequence
 def with_simple_origins(
     frames: Sequence[Frame], mounts: Sequence[Mount], scalars: Scalars, *, graded: bool
 ) -> tuple[list[Frame], list[Mount]]:
-    """The same mechanism with offsets of as few components as can be."""
+    """The same mechanism with as few nonzero components of offsets as possible."""
     frames, mounts = list(frames), list(mounts)
     for k, (children, riders) in enumerate(_carried(frames, mounts)):
         frame = frames[k]
@@ -77,7 +75,7 @@ def with_simple_origins(
 
 
 Carried = tuple[list[int], list[int]]
-"""Indices of what a frame carries: frames and mounts."""
+"""Indices of a frame's child frames and of the mounts on it."""
 
 
 def _carried(frames: Sequence[Frame], mounts: Sequence[Mount]) -> tuple[Carried, ...]:
@@ -92,7 +90,7 @@ def _carried(frames: Sequence[Frame], mounts: Sequence[Mount]) -> tuple[Carried,
 
 
 def _better_origin(frame: Frame, scalars: Scalars) -> tuple[Vec, Vec]:
-    """Another offset of a frame, and how far its origin moves for it, in its own axes."""
+    """Another offset of a frame, and the displacement of its origin, in its own axes."""
     back = constant(exact.transposed(frame.fixed), scalars)
     if frame.kind == "prismatic":
         x, y, z = ((-a, -b, -c) for a, b, c in back)
@@ -101,13 +99,13 @@ def _better_origin(frame: Frame, scalars: Scalars) -> tuple[Vec, Vec]:
     j = max(AXES, key=lambda i: abs(image[i]))
     distance = frame.offset[j] / scalars.number(exact.opposite(image[j]))
     moved = add(frame.offset, scale(distance, back[frame.axis]))
-    # Zero by choice; a program that computed it would see rounding.
+    # Exactly zero, where computing it would leave rounding.
     offset = replaced(moved, j, scalars.number(0.0))
     return offset, scale(distance, unit(frame.axis, scalars))
 
 
 def _parts(offsets: Sequence[Vec], centres: Sequence[Vec], scalars: Scalars) -> int:
-    """Components that are not zero; those of an offset, which moves a whole subtree, twice."""
+    """The number of nonzero components. Those of offsets count twice: they move a subtree."""
     return sum(
         weight * (not scalars.is_zero(x))
         for weight, vectors in ((2, offsets), (1, centres))
@@ -119,7 +117,7 @@ def _parts(offsets: Sequence[Vec], centres: Sequence[Vec], scalars: Scalars) -> 
 def with_simple_axes(
     frames: Sequence[Frame], mounts: Sequence[Mount], scalars: Scalars, *, graded: bool
 ) -> tuple[list[Frame], list[Mount]]:
-    """The same mechanism with fixed rotations as simple as they can be."""
+    """The same mechanism with fixed rotations as simple as possible."""
     frames, mounts = list(frames), list(mounts)
     carried = _carried(frames, mounts)
     fitted: set[int] = set()
@@ -145,8 +143,8 @@ def with_simple_axes(
 
 
 def _across(frame: Frame) -> int:
-    """The axis, of the parent's, that a frame's own is farthest from: then R_m(b) is no quarter
-    turn, in which a and c would be about one axis, and neither of them sure.
+    """The parent's axis from which the frame's own is farthest. R_m(b) is then no quarter turn, for
+    which a and c would be about one axis, and not unique.
     """
     others = [(frame.axis + 1) % 3, (frame.axis + 2) % 3]
     return min(others, key=lambda i: abs(frame.fixed[i][frame.axis]))
@@ -155,7 +153,7 @@ def _across(frame: Frame) -> int:
 def _rotate_axes(
     frames: list[Frame], mounts: list[Mount], carried: Carried, rotated: Matrix, scalars: Scalars
 ) -> None:
-    """Write what a frame carries in other axes of its own; `rotated` takes vectors into them."""
+    """Change a frame's own axes for all that is on it; `rotated` takes vectors into them."""
     children, riders = carried
     node = constant(rotated, scalars)
     for n in children:

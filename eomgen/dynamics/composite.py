@@ -1,4 +1,8 @@
-"""The mass matrix by composite bodies, and its LᵀDL factors over the tree's own sparsity."""
+"""The mass matrix by the composite-rigid-body algorithm, and its LᵀDL factors.
+
+Both use the sparsity of the tree (Featherstone 2008, chapter 6): entry (i, j) is 0 unless one of
+the velocities i and j carries the other.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,11 +23,11 @@ from eomgen.dynamics.vectors import (
 from eomgen.scalars.protocol import Scalar, Scalars
 
 Entries = Mapping[tuple[int, int], Scalar]
-"""Entries (i, j) of a symmetric matrix over the tree of velocities: j carries i, or is i."""
+"""Entries (i, j) of a symmetric matrix over the tree of velocities, where j carries i or j = i."""
 
 
 def composite_bodies(kinematics: TreeKinematics, scalars: Scalars) -> tuple[Rigid, ...]:
-    """Each frame's rigid body with all that it carries frozen to it (Featherstone 2008, 6.2)."""
+    """The composite-rigid-body inertia of each frame's subtree (Featherstone 2008, 6.2)."""
     sums = [link.rigid for link in kinematics.links]
     for k in reversed(range(len(sums))):
         link = kinematics.links[k]
@@ -33,8 +37,8 @@ def composite_bodies(kinematics: TreeKinematics, scalars: Scalars) -> tuple[Rigi
 
 
 def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:
-    """A rigid body at the parent's origin: with first moments h before and h' = h + m r after,
-    J' = J + (r·h + r·h') 1 - r h'ᵀ - h rᵀ.
+    """A rigid-body inertia at the parent's origin, in the parent's axes: h' = h + m r and
+    J' = J + (r·h + r·h') 1 - r h'ᵀ - h rᵀ (parallel-axis theorem, without squares of r).
     """
     r, h = link.arm, link.rotation.out(body.first_moment)
     J = link.rotation.out_symmetric(body.inertia)
@@ -52,14 +56,14 @@ def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:
 
 
 def force_to_move(body: Rigid, angular: Vec, linear: Vec) -> Wrench:
-    """The wrench that accelerates a rigid body so, from rest."""
+    """I a: the wrench that gives a rigid body an acceleration, from rest."""
     momentum = add(scale(body.mass, linear), cross(angular, body.first_moment))
     return Wrench(add(times(body.inertia, angular), cross(body.first_moment, linear)), momentum)
 
 
 def mass_entries(kinematics: TreeKinematics, scalars: Scalars) -> Entries:
-    """The entries of M at and below the diagonal that are not zero by the tree's shape, rows and
-    columns of driven motions left out.
+    """M_ij = s_jᵀ I s_i at and below the diagonal, where the tree's shape allows it not to be 0.
+    Rows and columns of driven velocities are left out. kg m², kg m or kg.
     """
     bodies = composite_bodies(kinematics, scalars)
     zero = scalars.number(0.0)
@@ -86,7 +90,7 @@ def mass_entries(kinematics: TreeKinematics, scalars: Scalars) -> Entries:
 
 
 def full(entries: Entries, nv: int, scalars: Scalars) -> list[Scalar]:
-    """M row by row."""
+    """The full matrix (nv, nv), row by row."""
     zero = scalars.number(0.0)
     return [
         entries.get((max(i, j), min(i, j)), entries.get((min(i, j), max(i, j)), zero))
@@ -96,7 +100,7 @@ def full(entries: Entries, nv: int, scalars: Scalars) -> list[Scalar]:
 
 
 def ancestors(kinematics: TreeKinematics) -> tuple[tuple[int, ...], ...]:
-    """For each free velocity those that carry it, nearest first; itself left out."""
+    """For each free velocity the free velocities that carry it, nearest first, without itself."""
     found: dict[int, tuple[int, ...]] = {}
     reached: list[tuple[int, ...]] = []  # of each link, its own with those above
     for link in kinematics.links:
@@ -110,7 +114,12 @@ def ancestors(kinematics: TreeKinematics) -> tuple[tuple[int, ...], ...]:
 
 @dataclass(frozen=True)
 class Factors:
-    """M = Lᵀ D L with L unit lower triangular and as sparse as M (Featherstone 2008, 6.5)."""
+    """M = Lᵀ D L with unit lower triangular L, as sparse as M (Featherstone 2008, 6.5).
+
+    d      the diagonal of D, (nv,)
+    lower  the entries of L below the diagonal
+    above  the ancestors of each velocity
+    """
 
     d: tuple[Scalar, ...]
     lower: Entries
@@ -120,7 +129,9 @@ class Factors:
 def factorised(
     entries: Entries, above: tuple[tuple[int, ...], ...], names: Sequence[str], scalars: Scalars
 ) -> Factors:
-    """Factor M from the leaves to the root: no fill-in, no pivoting, since M is positive."""
+    """Factor M from the leaves to the root. There is no fill-in, and M needs no pivoting, since it
+    is positive definite.
+    """
     work = dict(entries)
     lower: dict[tuple[int, int], Scalar] = {}
     order = sorted(range(len(above)), key=lambda i: len(above[i]), reverse=True)
@@ -135,7 +146,7 @@ def factorised(
 
 
 def solved(factors: Factors, right: Sequence[Scalar]) -> list[Scalar]:
-    """The x with M x = right."""
+    """Solve M x = right, (nv,), by Lᵀ D L."""
     x = list(right)
     order = sorted(range(len(x)), key=lambda i: len(factors.above[i]), reverse=True)
     for k in order:

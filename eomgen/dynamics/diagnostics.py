@@ -1,4 +1,7 @@
-"""What has no finite value at a time and state, in numbers: asked when a run cannot go on."""
+"""What fails at a time and state: effects without finite values, a singular mass matrix, overlaps.
+
+Computed in numbers when a run cannot go on, and for warnings at the initial state.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,9 +21,9 @@ def values_at(
     parameters: Mapping[str, float],
     inputs: Mapping[str, float],
 ) -> Values:
-    """Everything a model leaves open, at time t (s) and state y = [q, v, x] of form 'velocity'.
+    """The values of a model at time t (s) and state y = [q, v, x] (ny,) of form 'velocity'.
 
-    Parameters and inputs that are not given have their defaults.
+    Parameters that are not given have their defaults, inputs are 0.
     """
     nq, nv = len(model.coordinates), len(model.velocities)
     states = {x.name: value for x, value in zip(model.states, y[nq + nv :], strict=True)}
@@ -35,8 +38,8 @@ def values_at(
 
 
 def effect_sizes(model: Model, values: Values) -> dict[str, float]:
-    """The largest component, by size, of what each effect does: forces (N), torques (N m), rates of
-    its states; infinite where one has no finite value.
+    """For each effect the largest absolute component of its forces (N), torques (N m) and rates of
+    states; infinite where one is not finite.
     """
     dynamics = Dynamics(model, values, FloatScalars())
     return {effect.name: _size(effect, dynamics) for effect in model.effects}
@@ -44,7 +47,7 @@ def effect_sizes(model: Model, values: Values) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Overlap:
-    """A soft contact or stop that is pressed in: how deep at most, m or rad, and its energy, J."""
+    """A soft contact or stop that overlaps: its greatest depth, m or rad, and its energy, J."""
 
     effect: str
     depth: float
@@ -52,9 +55,9 @@ class Overlap:
 
 
 def initial_overlaps(model: Model) -> list[Overlap]:
-    """The soft contacts and stops of a model that are pressed in at its initial state.
+    """The soft contacts and stops of a model that overlap at its initial state.
 
-    None where an effect has no finite value there, which is an error of its own.
+    Empty if an effect has no finite value there; that is an error of its own.
     """
     start = [*model.initial_q, *model.initial_v, *(x.initial for x in model.states)]
     dynamics = Dynamics(model, values_at(model, 0.0, start, {}, {}), FloatScalars())
@@ -84,9 +87,9 @@ def _size(effect: Effect, dynamics: Dynamics) -> float:
 
 
 def is_singular(model: Model, values: Values) -> bool:
-    """Whether the mass matrix is: then there are no accelerations from rest without effects."""
+    """Whether the mass matrix is singular: v̇ from rest without effects is not finite then."""
     still = replace(values, v=[0.0] * len(values.v))
-    # Drives are no loads: without them their coordinates would be states.
+    # Drives stay: without them their coordinates would be states.
     bare = replace(model, effects=tuple(e for e in model.effects if isinstance(e, Driven)))
     try:
         found = Dynamics(bare, still, FloatScalars()).articulated_forward()

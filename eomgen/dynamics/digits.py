@@ -1,5 +1,6 @@
-"""How many digits a route loses on a model, measured in numbers before code is written: by the
-very steps that are to be written.
+"""The decimal digits that a route loses on a model, measured before code is written.
+
+The route's own steps are run in numbers, and compared with extended precision.
 """
 
 import math
@@ -26,26 +27,25 @@ from eomgen.scene.effects import Driven, Gravity
 Array = NDArray[np.float64]
 
 KINDS = ("anywhere", "aligned", "in line", "nearly")
-"""Of states: at random; with angles of multiples of 45 degrees, where levers vanish and axes meet;
-with some angles of 0, the only one of these that is a double, where they do so to the last digit;
-and with some that are off 0 or a quarter turn by 1e-17 to 1, where what is left of levers and of
-axes that meet is all that there is.
+"""Kinds of states: random; angles that are multiples of 45 degrees, where arms vanish and axes
+meet; some angles 0, the only multiple that is a double, where they do so exactly; and some angles
+1e-17 to 1 from 0 or a quarter turn, where arms and angles between axes are small.
 """
 EACH, CLOSELY, ROUGHLY = 120, 3, 1
-"""States of a kind; and at how many of these the routes are judged by many digits: those where two
-of them disagree most, and closely those, too, where it does most to change all numbers in their
-last place.
+"""States of each kind; and at how many of them routes are compared with extended precision. These
+are the states where two routes disagree most; and, closely, where a change of all numbers in their
+last place has the greatest effect.
 """
 SURE = 100.0
-"""A change of v̇ by half a unit in the last place of all numbers counts as nothing in this part."""
+"""This many times the change of v̇ by half a unit in the last place of all numbers is no loss."""
 UNEXPLAINED = 1000.0
-"""An error of more than so many times that change is none of its kind, and counts in full."""
+"""An error of more than so many times that change has another cause, and counts in full."""
 TRUSTED = 100.0
-"""How far off in parts of what is allowed `orthogonal` may be there, to judge the others at all
-states.
+"""`orthogonal` is the reference at all states if its error in extended precision is at most one
+part in so many of what is allowed.
 """
 PUSH = 10.0
-"""The size of inputs, at most."""
+"""The greatest size of inputs."""
 EPSILON = sys.float_info.epsilon
 ALL = -math.log10(EPSILON)
 """The digits of a double."""
@@ -56,8 +56,8 @@ Accelerations = Callable[[Values], Sequence[Any]]
 
 @dataclass(frozen=True)
 class Route:
-    """How a route computes v̇, by the steps that are to be written; and in which axes its recursion
-    works, None if it is none.
+    """How a route computes v̇, by the steps that will be written; and the axes that its recursion
+    works in, None if it is no recursion.
     """
 
     accelerations: Accelerations
@@ -67,19 +67,21 @@ class Route:
 def digits_lost(
     model: Model, routes: Mapping[str, Route], *, closely: bool = False
 ) -> Mapping[str, float]:
-    """The decimal digits that each route, and `orthogonal`, loses on v̇, at the worst of some seeded
-    states, half of them at rest; 0 to `ALL`. They count from its largest component, or from ω v,
-    which turning makes of rates and of which terms may cancel; but at a state where that is less
-    than usual from the usual one, of at most 1: v̇ may vanish at a state.
+    """The decimal digits of v̇ that each route, and `orthogonal`, loses at the worst of some seeded
+    states, half of them at rest; 0 to `ALL`.
 
-    closely  whether routes are judged by many digits at all states that are in doubt, and what half
-             a unit in the last place of all numbers given would change counts as nothing. Else they
-             are compared with `orthogonal`, and by many digits at a state of a kind, which takes a
+    Errors are relative to the largest component of v̇, or to ω v, the size of velocity-dependent
+    terms, which may cancel. At a state where this is smaller than usual they are relative to the
+    usual size, at most 1, since v̇ may vanish at a state.
+
+    closely  compare routes with extended precision at all states in doubt, and allow for the effect
+             of half a unit in the last place of all given numbers. Otherwise compare them with
+             `orthogonal`, and with extended precision at one state of each kind, which takes a
              tenth of the time.
 
-    Uniform gravity and drives act alone (with a closed form all effects, without inputs), and then
-    all effects under inputs of up to `PUSH`; the scene's own parameters hold. A route that gives no
-    number at a state loses all digits; a state where there is none at all says nothing.
+    First only uniform gravity and drives act (with a closed form all effects, without inputs); then
+    all effects, with inputs of up to `PUSH`. The parameters are the scene's. A route that gives no
+    finite number at a state loses all digits; a state where none does is left out.
     """
     rng = random.Random(6)
     q = [_position(model, kind, rng) for kind in KINDS for _ in range(EACH)]
@@ -122,7 +124,7 @@ def _recursion(name: str, model: Model, axes: Axes) -> Accelerations:
 
 
 def _position(model: Model, kind: str, rng: random.Random) -> list[float]:
-    """Coordinates of a state of a kind; quaternions of length 1, of no turn but anywhere."""
+    """Coordinates of a state of a kind; quaternions are unit, and 1 except `anywhere`."""
     q = []
     for c in model.coordinates:
         anywhere = rng.uniform(-1.5, 1.5)

@@ -1,14 +1,14 @@
-"""A mechanism at a state: everything the recursions find, over any scalars, each thing when asked.
+"""Forward and inverse dynamics of a mechanism at a state, over any scalars.
 
-This is the one place that knows in which axes each algorithm is cheapest: forces and the
-articulated-body recursion in the frames' own axes in space, in the world's in the plane, where
-angles add up; composite bodies in the world's, where nothing is turned again and again.
+Each algorithm works in the axes in which it is cheapest. Forces and the articulated-body recursion
+use the frames' own axes in space, and the world's in the plane, where angles add. Composite bodies
+use the world's axes, where nothing is rotated repeatedly.
 
-All frames move, the driven ones as they are told, and M v̇ + V + G = F is that of the free
-velocities alone: V holds what the driven accelerations take, too. Where a scene leaves the velocity
-forces out, inertia feels no velocities (`felt`), so that V is what driven accelerations take and
-nothing else, gyroscopic torques are gone, and joints transmit what the remaining equations ask for;
-effects, energies and everything that moves still have them. Energy is then not kept.
+Driven frames move as prescribed. M v̇ + V + G = F has the rows of the free velocities only; V
+includes the inertial forces of driven accelerations. If a scene leaves the velocity forces out, all
+velocities are 0 in the inertial forces (`felt`). V then consists of the forces of driven
+accelerations, without gyroscopic torques, and joint forces follow from the same equations. Effects,
+energies and poses still use the velocities. Energy is not conserved then.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -51,12 +51,14 @@ Forward = Callable[[Sequence[Scalar] | None], list[Scalar]]
 
 
 class Dynamics(MechanismState):
-    """A model at given values. What is asked for is computed once; nothing else is."""
+    """A model at given values. What is asked for is computed, once."""
 
     def accelerating(
         self, vd: Sequence[Scalar] | None, *, still: bool = False, weightless: bool = False
     ) -> tuple[Acceleration, ...]:
-        """Accelerations of the frames at v̇, counted from free fall; `still` leaves v out."""
+        """Accelerations of the frames at v̇ minus gravity's; `still` sets v to 0, `weightless`
+        gravity.
+        """
         v, twists = self._stopped if still else self.felt
         nothing = zeros(self.scalars)
         base = nothing if weightless else sub(nothing, self.down)
@@ -65,7 +67,7 @@ class Dynamics(MechanismState):
 
     @cached_property
     def felt(self) -> tuple[Sequence[Scalar], tuple[Twist, ...]]:
-        """All velocities and those of the frames, as inertia feels them."""
+        """The velocities v and the frames' twists that inertial forces are computed from."""
         if "velocity_forces" in self.model.leave_out:
             return self._stopped
         return self.v, self.twists
@@ -76,7 +78,7 @@ class Dynamics(MechanismState):
         return v, velocities(self.kinematics, v, self.scalars)
 
     def with_driven(self, vd: Sequence[Scalar] | None) -> Sequence[Scalar] | None:
-        """v̇ (None: nothing) with the accelerations of driven velocities."""
+        """v̇ (None is 0) followed by the accelerations of driven velocities."""
         if self.moved == self.nv:
             return vd
         driven = [a for _, _, a in self.given[: self.moved - self.nv]]
@@ -95,7 +97,9 @@ class Dynamics(MechanismState):
 
     @cached_property
     def loads(self) -> tuple[tuple[fc.PointForce, ...], tuple[JointLoad, ...]]:
-        """What the effects put on bodies and joints; uniform gravity is an acceleration instead."""
+        """The loads of all effects on bodies and on joints. Uniform gravity is not among them: it
+        is an acceleration of the world.
+        """
         points, joints = [], []
         for effect in self.model.effects:
             if not isinstance(effect, Gravity) or effect.except_bodies:
@@ -115,12 +119,14 @@ class Dynamics(MechanismState):
 
     @cached_property
     def wrenches(self) -> tuple[fc.Wrench, ...]:
-        """The loads on each frame."""
+        """The sum of the loads on each frame, about its origin."""
         return fc.wrenches(self.linkage, self.kinematics, self.loads[0], self.scalars)
 
     @cached_property
     def motors(self) -> list[Scalar]:
-        """The loads on each velocity's own joint, driven ones too; a locked joint holds its own."""
+        """The sum of the joint loads on each velocity, driven ones too. Loads on a locked joint do
+        no work.
+        """
         forces = [self.scalars.number(0.0)] * self.moved
         for load in self.loads[1]:
             i = self.joint_indices[load.joint].v[load.coordinate]
@@ -140,7 +146,7 @@ class Dynamics(MechanismState):
         return self._applied[: self.nv]
 
     def bias(self, *, still: bool = False, weightless: bool = False) -> list[Scalar]:
-        """h = V + G; without velocities G, without weight V."""
+        """h = V + G, (nv,): G if `still`, V if `weightless`."""
         return self.inverse(None, still=still, weightless=weightless)
 
     def inverse(
@@ -152,7 +158,7 @@ class Dynamics(MechanismState):
     def _needed(
         self, vd: Sequence[Scalar] | None, *, still: bool = False, weightless: bool = False
     ) -> list[Scalar]:
-        """The same with the rows of driven velocities."""
+        """`inverse` with the rows of driven velocities."""
         frame_accelerations = self.accelerating(vd, still=still, weightless=weightless)
         inertial = fc.inertial(self.kinematics, frame_accelerations, self.scalars)
         parts = fc.generalised(self.kinematics, fc.carried(self.kinematics, inertial), self.moved)
@@ -165,22 +171,22 @@ class Dynamics(MechanismState):
 
     @cached_property
     def vd(self) -> list[Scalar]:
-        """v̇ under the effects."""
+        """v̇ (nv,) under the effects."""
         return self.articulated_forward()
 
     @cached_property
     def driving_forces(self) -> list[Scalar]:
-        """What each driven coordinate takes, N m or N: inverse dynamics at v̇, less the loads."""
+        """The driving force of each driven coordinate, N m or N: inverse dynamics minus loads."""
         return self._driving(self.vd)
 
     def _driving(self, vd: Sequence[Scalar]) -> list[Scalar]:
-        """The same at other v̇."""
+        """`driving_forces` at other v̇."""
         pairs = zip(self._needed(vd)[self.nv :], self._applied[self.nv :], strict=True)
         return [needed - applied for needed, applied in pairs]
 
     def driving_powers(self, vd: Sequence[Scalar], beside: Sequence[Scalar]) -> list[Scalar]:
-        """What each driven effect, in order, does to the motion at v̇, W, where forces `beside` the
-        effects, one a velocity, driven ones too, act.
+        """The power of each driven effect at v̇, W, in the order of the effects. `beside` are
+        generalised forces besides the effects, with the rows of driven velocities.
         """
         taken = zip(self._driving(vd), beside[self.nv :], self.v[self.nv : self.moved], strict=True)
         powers = {
@@ -208,13 +214,13 @@ class Dynamics(MechanismState):
         return found
 
     def articulated_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
-        """v̇ under the effects and forces `tau` beside them, by articulated bodies."""
+        """v̇ (nv,) under the effects and generalised forces `tau`, by articulated bodies."""
         pushed = self._pushed(tau)
         found = respond(self.kinematics, self.articulated, self._at_rest, pushed, self.scalars)
         return self._fallen(found)
 
     def factored_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
-        """The same by LᵀDL factors of the mass matrix."""
+        """The same by the LᵀDL factors of the mass matrix."""
         carried = fc.carried(self.kinematics, self._at_rest)
         bias = fc.generalised(self.kinematics, carried, self.moved)[: self.nv]
         right = [a - b for a, b in zip(self._pushed(tau), bias, strict=True)]
@@ -237,7 +243,7 @@ class Dynamics(MechanismState):
         return solved(self.factors, impulse)
 
     def orthogonal_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
-        """M⁻¹ of impulses on the velocities by orthogonal elimination."""
+        """M⁻¹ times generalised impulses, by orthogonal elimination."""
         nothing, matrix = zeros(self.scalars), no_matrix(self.scalars)
         frame = Acceleration(nothing, nothing, matrix, nothing, nothing)
         still = [frame] * len(self.kinematics.links)
@@ -255,7 +261,7 @@ class Dynamics(MechanismState):
 
     @cached_property
     def _free_roots(self) -> list[int]:
-        """Of each body that nothing holds the index of its first velocity."""
+        """The index of the first velocity of each body on a free joint."""
         return [
             index.v[0]
             for index in self.model.joint_indices
@@ -264,8 +270,8 @@ class Dynamics(MechanismState):
 
     @cached_property
     def _falling(self) -> tuple[Acceleration, ...]:
-        """Accelerations of the frames if the free velocities do not change, but for the fall of
-        trees that nothing holds: their weight changes nothing else, and is put in at the end.
+        """Accelerations of the frames at v̇ = 0, without gravity in trees on a free joint. Gravity
+        accelerates such a tree as a whole; `_fallen` adds that.
         """
         falling = [
             k for k, link in enumerate(self.kinematics.links) if link.v[0] in self._free_roots
@@ -277,12 +283,12 @@ class Dynamics(MechanismState):
 
     @cached_property
     def _at_rest(self) -> list[fc.Wrench]:
-        """The wrenches that would keep the free velocities as they are."""
+        """The wrenches that would make v̇ = 0."""
         inertial = fc.inertial(self.kinematics, self._falling, self.scalars)
         return [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
 
     def _fallen(self, vd: Sequence[Scalar]) -> list[Scalar]:
-        """v̇ with the fall of free trees, and with its names."""
+        """v̇ plus the gravity of trees on a free joint, with the names of its components."""
         found = list(vd)
         for i in self._free_roots:
             for axis in range(self.dimensions):
@@ -296,12 +302,12 @@ class Dynamics(MechanismState):
 
     @cached_property
     def mass_entries(self) -> Entries:
-        """The entries of M that are not zero by the tree's shape."""
+        """The entries of M that the tree's shape allows not to be 0."""
         return mass_entries(self.in_world, self.scalars)
 
     @cached_property
     def factors(self) -> Factors:
-        """M = Lᵀ D L."""
+        """The factors of M = Lᵀ D L."""
         names = [c.name for c in self.model.velocities]
         return factorised(self.mass_entries, ancestors(self.kinematics), names, self.scalars)
 
@@ -309,26 +315,26 @@ class Dynamics(MechanismState):
 
     @cached_property
     def kinetic_energy(self) -> Scalar:
-        """Of all bodies and rotors, J."""
+        """Kinetic energy of all bodies and rotors, J."""
         return kinetic_energy(self.kinematics, self._solids, self.twists, self.v, self.scalars)
 
     @cached_property
     def potential_energy(self) -> Scalar:
-        """Of all effects, J."""
+        """Potential energy of all effects, J."""
         energy = self.scalars.number(0.0)
         for effect in self.model.effects:
             energy = energy + effect.potential_energy(self)
         return energy
 
     def power(self, effect: Effect) -> Scalar:
-        """What an effect's loads do to the motion, W; of gravity and springs, too."""
+        """The power of an effect's loads, W, of gravity and springs too."""
         if isinstance(effect, Driven):
             i = [c.by for c in self.model.driven].index(effect.name)
             return self.driving_forces[i] * self.rate(effect.joint)
         return self.power_of(effect.loads(self))
 
     def power_of(self, loads: Iterable[Load | JointLoad]) -> Scalar:
-        """The power of loads, W; of unit loads their speed, m/s or rad/s."""
+        """The power of loads, W; for unit loads it is their speed, m/s or rad/s."""
         power = self.scalars.number(0.0)
         for load in loads:
             if isinstance(load, JointLoad):

@@ -1,4 +1,7 @@
-"""Forces from the leaves inwards: loads on bodies, inverse dynamics, what joints transmit."""
+"""Wrenches, from the leaves to the root: loads on bodies, and inverse dynamics.
+
+The sums are the inward sweep of the recursive Newton-Euler algorithm (Featherstone 2008, 5.3).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +25,7 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 @dataclass(frozen=True)
 class Wrench:
-    """A wrench on a frame, in its link's axes: moment about the origin, and force."""
+    """A force with its moment: moment about a frame's origin (N m) and force (N), link's axes."""
 
     moment: Vec
     force: Vec
@@ -30,8 +33,10 @@ class Wrench:
 
 @dataclass(frozen=True)
 class PointForce:
-    """A force and a torque on a body, in world axes, and `in_body` axes if they are given in those.
-    The force acts at a point, given from the centre of mass in body axes.
+    """A force (N) at a point of a body and a torque (N m), in world axes.
+
+    `at` is the point from the centre of mass, in body axes, m. `in_body` has force and torque in
+    body axes, if the scene gives them in those.
     """
 
     body: int
@@ -42,7 +47,7 @@ class PointForce:
 
 
 def no_wrench(scalars: Scalars) -> Wrench:
-    """Nothing."""
+    """The zero wrench."""
     return Wrench(zeros(scalars), zeros(scalars))
 
 
@@ -57,13 +62,13 @@ def less(a: Wrench, b: Wrench) -> Wrench:
 
 
 def at_parent(link: Link, f: Wrench) -> Wrench:
-    """A wrench on a link as one on its parent."""
+    """A wrench at a link's origin, as one at its parent's origin, in the parent's axes."""
     force = link.rotation.out(f.force)
     return Wrench(add(link.rotation.out(f.moment), cross(link.arm, force)), force)
 
 
 def moved_to(point: Vec, f: Wrench) -> Wrench:
-    """A wrench about the origin as one about a point."""
+    """A wrench at the origin, as one at a point."""
     return Wrench(sub(f.moment, cross(point, f.force)), f.force)
 
 
@@ -74,7 +79,9 @@ def wrenches(
     scalars: Scalars,
     about: Sequence[Vec] | None = None,
 ) -> tuple[Wrench, ...]:
-    """The loads as a wrench on each frame, about points of frames' own axes if they are given."""
+    """The sum of the loads on each frame, in the link's axes. Moments are about the frames'
+    origins, or about the points `about`, given in the frames' own axes.
+    """
     found = [no_wrench(scalars)] * len(kinematics.links)
     for load in loads:
         mount = linkage.mounts[load.body]
@@ -98,7 +105,9 @@ def wrenches(
 def on_frames(
     links: Sequence[Link], found: Sequence[Wrench], tau: Sequence[Scalar], scalars: Scalars
 ) -> tuple[list[Wrench], list[Scalar]]:
-    """Wrenches with the torques of joints as moments on both frames, and what is left of `tau`."""
+    """The wrenches together with the torques of revolute axes, as moments on child and parent; and
+    what is left of `tau`.
+    """
     wrenches, left = list(found), list(tau)
     for k, link in enumerate(links):
         for axis, i in link.free:
@@ -116,7 +125,7 @@ def on_frames(
 def inertial(
     kinematics: TreeKinematics, frame_accelerations: Sequence[Acceleration], scalars: Scalars
 ) -> tuple[Wrench, ...]:
-    """The wrench that each frame's own mass takes."""
+    """The wrench that accelerates each frame's own mass (Newton and Euler)."""
     return tuple(
         Wrench(*inertial_force(link, a, scalars))
         for link, a in zip(kinematics.links, frame_accelerations, strict=True)
@@ -124,7 +133,7 @@ def inertial(
 
 
 def carried(kinematics: TreeKinematics, forces: Sequence[Wrench]) -> tuple[Wrench, ...]:
-    """Each frame's wrench together with those of all frames it carries."""
+    """For each frame the sum of the wrenches on its subtree, at its origin."""
     sums = list(forces)
     for k in reversed(range(len(sums))):
         link = kinematics.links[k]
@@ -134,7 +143,7 @@ def carried(kinematics: TreeKinematics, forces: Sequence[Wrench]) -> tuple[Wrenc
 
 
 def generalised(kinematics: TreeKinematics, sums: Sequence[Wrench], nv: int) -> list[Scalar]:
-    """The parts of carried wrenches that do work on the velocities, in the order of `v`."""
+    """Sᵀ f: the generalised forces (nv,) of the subtrees' wrenches, in the order of v."""
     parts: list[Scalar] = [None] * nv
     for link, f in zip(kinematics.links, sums, strict=True):
         for axis, i in zip(link.axes, link.v, strict=True):
@@ -145,7 +154,7 @@ def generalised(kinematics: TreeKinematics, sums: Sequence[Wrench], nv: int) -> 
 def rotor_forces(
     kinematics: TreeKinematics, vd: Sequence[Scalar], nv: int, scalars: Scalars
 ) -> list[Scalar]:
-    """What it takes to accelerate the motors' rotors."""
+    """Generalised forces (nv,) that accelerate the motors' rotors."""
     parts = [scalars.number(0.0)] * nv
     for link in kinematics.links:
         for i in link.v:

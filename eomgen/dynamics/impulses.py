@@ -1,18 +1,18 @@
-"""What contacts do to a mechanism: forces while two things touch, impulses when they strike.
+"""Contact forces, and the impulses of an impact.
 
-An impact takes no time: coordinates stay, and the impulses p along the contact's normal n and
-tangents t change the velocities by M⁻¹ Jᵀ p, where u = J v are its normal velocity, positive apart,
-and its slip velocities. With A = J M⁻¹ Jᵀ and a restitution e the law is that of A. Chatterjee and
+An impact takes no time: the coordinates stay, and impulses p along the contact's normal n and
+tangents t change the velocities by M⁻¹ Jᵀ p. Here u = J v are the normal velocity, positive apart,
+and the slip velocities. With A = J M⁻¹ Jᵀ and restitution e the law is that of A. Chatterjee and
 A. Ruina, "A new algebraic rigid-body collision law based on impulse space considerations", J. Appl.
 Mech. 65 (1998) 939-951, without tangential restitution:
 
     p = (1 + e) p_I + κ (p_II - p_I),    p_I = -(u_n / A_nn) n,    p_II = -A⁻¹ u,
 
-where p_I ends the approach without friction, p_II the slip, too, and κ is 1, or as much less as
-|p_t| = μ p_n asks for: p_I has no tangential part, so that κ = μ (1 + e) p_I,n / (|d_t| - μ d_n)
-with d = p_II - p_I. The normal velocity becomes -e u_n whatever the friction; kinetic energy never
-grows for 0 <= e <= 1. What sticks has no slip before it rebounds; the rebound is without friction,
-and leaves the slip -e u_n A_tn / A_nn.
+where p_I ends the approach without friction, and p_II ends the slip too. κ is 1, or less if |p_t|
+<= μ p_n requires it: p_I has no tangential part, so that κ = μ (1 + e) p_I,n / (|d_t| - μ d_n) with
+d = p_II - p_I. The normal velocity becomes -e u_n whatever the friction, and for 0 <= e <= 1
+kinetic energy never grows. A contact that sticks has no slip before it rebounds. The rebound has no
+friction, and leaves the slip -e u_n A_tn / A_nn.
 """
 
 from collections.abc import Iterable, Sequence
@@ -28,13 +28,13 @@ from eomgen.scene.joints.base import WORLD
 AnyLoad = Load | JointLoad
 
 LEAST = 1e-300
-"""Stands in for what would divide by 0; there what is divided is 0, too, or is not used."""
+"""The least denominator: where it is used the numerator is 0, or the quotient is not used."""
 IMMOVABLE = 1e-12
-"""A direction along which nothing moves: its share of A is no more than this, which is rounding."""
+"""Along a direction whose part of A is at most this, the mechanism cannot move: it is rounding."""
 
 
 def scaled(loads: Iterable[AnyLoad], k: Scalar) -> list[AnyLoad]:
-    """k times as much."""
+    """The loads times k."""
     found: list[AnyLoad] = []
     for load in loads:
         if isinstance(load, JointLoad):
@@ -59,7 +59,7 @@ def generalised(d: Dynamics, loads: Iterable[AnyLoad]) -> list[Scalar]:
 
 
 def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Wrench]:
-    """Loads as a wrench on each frame. They are summed in world axes, and turned once a frame."""
+    """Loads as a wrench on each frame: summed in world axes, then rotated once for each frame."""
     nothing = zeros(d.scalars)
     points: dict[tuple[str, Vector], tuple[Vec, Vec]] = {}
     for load in loads:
@@ -82,7 +82,7 @@ def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Wrench]:
 
 
 def rough(d: Dynamics, contact: Contact) -> tuple[tuple[Load, ...], ...]:
-    """The tangents that friction acts along: none without friction."""
+    """The tangents along which friction acts; none without friction."""
     return () if d.scalars.is_zero(contact.friction) else contact.tangents
 
 
@@ -110,7 +110,7 @@ def struck(
     friction: Scalar,
     route: str,
 ) -> list[Scalar]:
-    """The velocities after an impact along a normal and the tangents across it.
+    """The velocities (nv,) after an impact along a normal and its tangents.
 
     `directions` are the loads of a unit impulse along each, the normal first.
     """
@@ -141,7 +141,7 @@ def impulses(
     friction: Scalar,
     scalars: Scalars,
 ) -> list[Scalar]:
-    """The impulses p of A, u, e and μ; normal first, with none, one or two tangents.
+    """The impulses p for A, u, e and μ: the normal, then none, one or two tangents.
 
     Directions across the normal along which the mechanism cannot move take no impulse. Never NaN.
     """
@@ -154,7 +154,7 @@ def impulses(
     if not across:
         return [bounced]
     lean = [A[0][i] / against for i in across]
-    # What is left after p_I: the slip, and what resists it while the normal velocity stays 0.
+    # After p_I: the slip, and the inverse mass along the tangents at normal velocity 0.
     slip = [u[i] + A[0][i] * plastic for i in across]
     rest = [[A[i][j] - lean[i - 1] * A[0][j] for j in across] for i in across]
     floor = scalars.number(IMMOVABLE) * _sum([A[i][i] for i in across], scalars)
@@ -169,9 +169,8 @@ def impulses(
 def _least_solution(
     matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar], floor: Scalar, scalars: Scalars
 ) -> list[Scalar]:
-    """The shortest x with S x = b for S of one or two rows, symmetric and not negative.
-
-    Eigenvalues up to `floor` count as 0. The choice of the two axes does not matter.
+    """The shortest least-squares solution of S x = b, for S of one or two rows, symmetric and
+    positive semidefinite. Eigenvalues up to `floor` count as 0.
     """
     zero, least = scalars.number(0.0), scalars.number(LEAST)
     if len(right) == 1:
@@ -188,7 +187,7 @@ def _least_solution(
 
 
 def _root(parts: Sequence[Scalar], scalars: Scalars) -> Scalar:
-    """|a|; 1e-150 at least, where there is a choice of direction to divide by it."""
+    """|a|, at least 1e-150, so that it can be divided by."""
     square = _dot(parts, parts, scalars)
     return scalars.call("sqrt", scalars.call("max", square, scalars.number(LEAST)))
 

@@ -1,9 +1,8 @@
-"""A model as a tree of frames, each of which makes one joint primitive against its parent.
+"""A model as a tree of frames, with one joint primitive between each frame and its parent.
 
-A joint of several coordinates is a row of frames, all but the last without mass. A weld adds no
-frame: its body is carried by the frame of its parent; nor does a locked coordinate. The axes of a
-frame are those of the body it carries, turned by a fixed rotation where that makes the axis of the
-move a coordinate axis.
+A joint with several primitives is a chain of frames, all but the last massless. A weld adds no
+frame, and neither does a locked coordinate: the body is on its parent's frame. The axes of a frame
+are those of its body, rotated so that the axis of the primitive is a coordinate axis.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,7 +43,7 @@ from eomgen.scene.joints.base import Geared, Primitive
 
 
 def make_linkage(model: Model, parameters: Mapping[str, Scalar], scalars: Scalars) -> Linkage:
-    """The frames of a model, its quantities over given values of its parameters."""
+    """The frames and mounts of a model, over given values of its parameters."""
     frames, mounts = _drafted(model, parameters, scalars)
     graded = not all(is_straight(frame.fixed) for frame in frames) and _is_graded(model)
     if model.dimensions == 3:
@@ -62,7 +61,7 @@ def make_linkage(model: Model, parameters: Mapping[str, Scalar], scalars: Scalar
 
 
 def _is_graded(model: Model) -> bool:
-    """Whether anything of a model's geometry, or a direction of gravity, is slight (see `axes`)."""
+    """Whether the geometry, or a direction of gravity, has slight components (see `axes`)."""
     floats = FloatScalars()
     frames, mounts = _drafted(model, model.defaults, floats)
     directions = (e.direction for e in model.effects if isinstance(e, Gravity) and e.direction)
@@ -160,7 +159,7 @@ def _numbers(vector: Sequence[Real], scalars: Scalars) -> Vec:
 
 def _inertia(body: Body, entries: list[Scalar], scalars: Scalars) -> Symmetric:
     zero = scalars.number(0.0)
-    if len(entries) == 1:  # in the plane only the moment about z is ever asked for
+    if len(entries) == 1:  # in the plane only the moment about z is used
         entries = [zero, zero, entries[0], zero, zero, zero]
     return symmetric(entries)
 
@@ -186,7 +185,7 @@ def _about_origin(mount: Mount, model: Model, scalars: Scalars) -> Rigid:
 
 
 def _named(rigid: Rigid, name: str, scalars: Scalars) -> Rigid:
-    """The same, with names for the numbers that a program computes once."""
+    """The same, with names for its numbers in a program."""
     m = scalars.named(rigid.mass, f"mass_{name}")
     first = [
         scalars.named(h, f"moment_{name}_{axis}")
@@ -200,5 +199,5 @@ def _named(rigid: Rigid, name: str, scalars: Scalars) -> Rigid:
 
 
 def _to_coordinate_axis(primitive: Primitive) -> tuple[Matrix, int]:
-    """A rotation R and a coordinate axis k with R e_k = the axis of the move."""
+    """A rotation R and a coordinate axis k, with R e_k along the primitive's axis."""
     return (EYE, 2) if primitive.kind == "spherical" else exact.to_axis(primitive.axis)

@@ -28,8 +28,8 @@ from eomgen.scene.joints.base import WORLD
 
 @dataclass(frozen=True)
 class Values:
-    """Values of everything a model leaves open: parameters, inputs and extra states by name, q and
-    v of the state in order, and the time.
+    """Values of all that a model leaves open: parameters, inputs and extra states by name, q and v
+    of the state in order, and the time, s.
     """
 
     parameters: Mapping[str, Scalar]
@@ -41,10 +41,10 @@ class Values:
 
 
 class MechanismState:
-    """A model at given values: where everything is and how it moves, for effects and recursions.
+    """The kinematics of a model at given values, for effects and recursions.
 
-    What is asked for is computed once; nothing else is. `nv` counts the velocities of the state,
-    `moved` those and the driven ones. A `linkage` over the same parameters need not be made again.
+    What is asked for is computed, once. `nv` is the number of velocities of the state, `moved` that
+    of those and the driven ones. A `linkage` over the same parameters may be passed to be reused.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class MechanismState:
         return self.linkage.mounts[self.index[body]].mass
 
     def height(self, body: str) -> Scalar:
-        """World y of a centre of mass in the plane, z in space, m."""
+        """World y of a body's centre of mass in the plane, z in space, m."""
         return self.centre(self.index[body])[self.dimensions - 1]
 
     def position(self, body: str, at: Vector) -> Vector:
@@ -88,7 +88,7 @@ class MechanismState:
 
     @property
     def magnitude(self) -> float:
-        """The order of its lengths, m."""
+        """The order of magnitude of its lengths, m."""
         return self.model.magnitude
 
     def point(self, name: str) -> tuple[str, Vector]:
@@ -154,7 +154,7 @@ class MechanismState:
 
     @cached_property
     def names(self) -> dict[str, Scalar]:
-        """Everything that formulas may name."""
+        """The values of all names that formulas may use."""
         model, values = self.model, self.values
         positions = (*model.coordinates, *(c.position for c in model.prescribed))
         velocities = (*model.velocities, *(c.velocity for c in model.prescribed))
@@ -174,12 +174,12 @@ class MechanismState:
 
     @cached_property
     def joint_indices(self) -> dict[str, JointIndex]:
-        """Where the coordinates and velocities of each joint stand."""
+        """Indices of each joint's coordinates and velocities, by its name."""
         return {index.body.joint.name: index for index in self.model.joint_indices}
 
     @cached_property
     def given(self) -> list[tuple[Scalar, Scalar, Scalar]]:
-        """Value, rate and acceleration of each coordinate that is prescribed."""
+        """Value, rate and acceleration of each prescribed coordinate."""
         found = []
         for c in self.model.prescribed:
             used = (name for name in names_in(c.value) if name != "t")
@@ -227,19 +227,19 @@ class MechanismState:
 
     @cached_property
     def origins(self) -> Origins:
-        """Origins of the frames, in the world."""
+        """Origins of the frames in the world, m."""
         return frame_origins(self.kinematics, self.scalars)
 
     def centre(self, body: int) -> Vec:
-        """Centre of mass of a body, in the world."""
+        """Centre of mass of a body in the world, m."""
         return self.point_position(body, zeros(self.scalars))
 
     def point_position(self, body: int, at: Vec) -> Vec:
-        """A point of a body, in the world."""
+        """A point of a body in the world, m; `at` from the centre of mass, in body axes."""
         return position(self.linkage, self.kinematics, self.origins, body, at, self.scalars)
 
     def angle(self, body: int) -> Scalar:
-        """The angle of a planar body from the world's x axis."""
+        """The angle of a planar body from the world's x axis, rad."""
         mount = self.linkage.mounts[body]
         if mount.frame < 0:
             return self.scalars.number(mount.angle)
@@ -247,16 +247,16 @@ class MechanismState:
 
     @cached_property
     def twists(self) -> tuple[Twist, ...]:
-        """Velocities of the frames."""
+        """Velocities of the frames, in the links' axes."""
         return velocities(self.kinematics, self.v, self.scalars)
 
     def point_velocity(self, body: int, at: Vec) -> tuple[Vec, Vec]:
-        """Velocity of a point of a body, and the body's angular velocity, in the world."""
+        """Velocity of a point of a body (m/s) and the body's angular velocity, in world axes."""
         return velocity(self.linkage, self.kinematics, self.twists, body, at, self.scalars)
 
     @cached_property
     def down(self) -> Vec:
-        """The uniform gravity that acts, in world axes."""
+        """The acceleration of uniform gravity, in world axes, m/s²."""
         g = list(zeros(self.scalars))
         for effect in self.model.effects:
             if isinstance(effect, Gravity) and not effect.except_bodies:

@@ -1,4 +1,8 @@
-"""Velocities and accelerations from the world outwards (Featherstone 2008, table 5.1)."""
+"""Velocities and accelerations from the root to the leaves, energy and momentum.
+
+The outward sweep of the recursive Newton-Euler algorithm (Featherstone 2008, table 5.1). It uses
+classical accelerations of points, not spatial accelerations.
+"""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -21,7 +25,7 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 @dataclass(frozen=True)
 class Twist:
-    """A motion in a link's axes: angular part, and linear part at the link's origin."""
+    """A velocity in a link's axes: angular (rad/s), and linear at the link's origin (m/s)."""
 
     angular: Vec
     linear: Vec
@@ -29,11 +33,13 @@ class Twist:
 
 @dataclass(frozen=True)
 class Acceleration:
-    """Of a frame: angular acceleration, acceleration of its origin, and the matrix W with
-    a_p = a + W (p - origin) for every point p fixed in the frame: W = [α]x + [ω]x².
+    """The acceleration of a frame, in its link's axes.
 
-    `spread` is W_zz - W_yy, W_xx - W_zz, W_yy - W_xx, where squares cancel, and `mixed` what W has
-    of [ω]x² off its diagonal: ω_y ω_z, ω_x ω_z, ω_x ω_y.
+    angular  α, rad/s²
+    linear   a, of the frame's origin, m/s²
+    field    W = [α]x + [ω]x², with a_p = a + W (p - origin) for every point p fixed in the frame
+    spread   W_zz - W_yy, W_xx - W_zz, W_yy - W_xx, from which squares cancel
+    mixed    the entries of [ω]x² off the diagonal: ω_y ω_z, ω_x ω_z, ω_x ω_y
     """
 
     angular: Vec
@@ -46,7 +52,7 @@ class Acceleration:
 def velocities(
     kinematics: TreeKinematics, v: Sequence[Scalar], scalars: Scalars
 ) -> tuple[Twist, ...]:
-    """The velocity of every frame."""
+    """The velocity of every frame: v_k = v_parent + S_k v."""
     found: list[Twist] = []
     for link in kinematics.links:
         angular, linear = zeros(scalars), zeros(scalars)
@@ -62,7 +68,7 @@ def velocities(
 
 
 def own_motion(link: Link, rates: Sequence[Scalar], scalars: Scalars) -> tuple[Vec, Vec]:
-    """What the link's own velocities, or accelerations, add to its motion: angular, linear."""
+    """S v of the link's own velocities, or S v̇ of its accelerations: angular, linear."""
     angular, linear = zeros(scalars), zeros(scalars)
     for axis, i in zip(link.axes, link.v, strict=True):
         part = scale(rates[i], axis.direction)
@@ -82,10 +88,10 @@ def accelerations(
     scalars: Scalars,
     falling: Collection[int] = (),
 ) -> tuple[Acceleration, ...]:
-    """The acceleration of every frame if the velocities change at `vd` (None: not at all).
+    """The acceleration of every frame at v̇ = `vd` (None is 0).
 
-    `base` is the world's acceleration, in world axes: uniform gravity g acts like a world that
-    accelerates by -g. The frames `falling`, which the world carries, do not feel it.
+    `base` is the world's acceleration in world axes: uniform gravity g acts like a world that
+    accelerates by -g. It is left out for the frames `falling`, which are children of the world.
     """
     found: list[Acceleration] = []
     two = scalars.number(2.0)
@@ -112,7 +118,7 @@ def accelerations(
 
 
 def _field(w: Vec, a: Vec) -> tuple[Mat, Vec, Vec]:
-    """W, its spread, and what is mixed in it."""
+    """`field`, `spread` and `mixed` of an `Acceleration`, from ω and α."""
     xx, yy, zz = w[0] * w[0], w[1] * w[1], w[2] * w[2]
     xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
     field = (
@@ -124,7 +130,7 @@ def _field(w: Vec, a: Vec) -> tuple[Mat, Vec, Vec]:
 
 
 def inertial_force(link: Link, a: Acceleration, scalars: Scalars) -> tuple[Vec, Vec]:
-    """Moment about the origin and force that give the link's mass its acceleration.
+    """Newton and Euler: the moment about the origin and the force for a link's acceleration.
 
     f = m a + W h with the first moment h; n = h x a + Σ m r x (W r), see `moment_about_centre`.
     """
@@ -137,10 +143,9 @@ def inertial_force(link: Link, a: Acceleration, scalars: Scalars) -> tuple[Vec, 
 def moment_about_centre(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
     """Σ m r x (W r) = J α + ω x J ω from the inertia matrix.
 
-    With E = Σ m r rᵀ = ½ tr(J) 1 - J its entries are those of W E less those of its transpose,
-    n_x = (W E)_zy - (W E)_yz and so on in turn, where W_zz - W_yy, … stand in `spread`. What E has
-    on its diagonal makes J_xx α_x + (J_zz - J_yy) ω_y ω_z of it: a slight moment beside others
-    would be nothing but rounding in E.
+    With E = Σ m r rᵀ = ½ tr(J) 1 - J it is n_x = (W E)_zy - (W E)_yz, and so on cyclically, where
+    W_zz - W_yy, … are `spread`. The diagonal of E contributes J_xx α_x + (J_zz - J_yy) ω_y ω_z.
+    That is computed from J, since a small moment of inertia would be lost in the rounding of E.
     """
     w, (ax, ay, az), (wyz, wxz, wxy) = a.field, a.angular, a.mixed
     zero = scalars.number(0.0)
@@ -161,9 +166,8 @@ def kinetic_energy(
     v: Sequence[Scalar],
     scalars: Scalars,
 ) -> Scalar:
-    """Σ ½ m |v|² + ½ ω · I ω about the centres of what the frames carry, and ½ A q̇² of the motors'
-    rotors. About other points there were terms of both signs: a pole that swings about its own
-    centre, on next to nothing, would lose digits.
+    """Σ ½ m |v|² + ½ ω · I ω about the centres of mass of the frames' bodies, plus ½ A q̇² of the
+    motors' rotors, J. About other points there are terms of both signs, which may cancel.
     """
     twice = scalars.number(0.0)
     for k, (link, solid, motion) in enumerate(zip(kinematics.links, carried, twists, strict=True)):
@@ -177,7 +181,7 @@ def kinetic_energy(
 
 
 def momentum_of(link: Link, motion: Twist) -> tuple[Vec, Vec]:
-    """Angular momentum about the link's origin, and momentum."""
+    """Angular momentum about the link's origin (kg m²/s) and momentum (kg m/s), link's axes."""
     rigid = link.rigid
     momentum = add(scale(rigid.mass, motion.linear), cross(motion.angular, rigid.first_moment))
     return add(

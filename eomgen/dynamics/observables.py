@@ -1,4 +1,4 @@
-"""What one may ask of a mechanism besides its motion: positions, velocities, momentum, energy."""
+"""Positions, velocities, momentum and Jacobians of points of a mechanism, in the world."""
 
 from collections.abc import Sequence
 
@@ -20,11 +20,11 @@ from eomgen.dynamics.vectors import (
 from eomgen.scalars.protocol import Scalars
 
 Origins = tuple[Vec, ...]
-"""The origin of every frame in the world."""
+"""The origin of every frame in the world, m."""
 
 
 def frame_origins(kinematics: TreeKinematics, scalars: Scalars) -> Origins:
-    """Where the frames' origins are."""
+    """The origins of all frames in the world, m."""
     origins: list[Vec] = []
     for link in kinematics.links:
         base = origins[link.parent] if link.parent >= 0 else zeros(scalars)
@@ -40,8 +40,8 @@ def orientation(linkage: Linkage, kinematics: TreeKinematics, body: int, scalars
 
 
 def arm(linkage: Linkage, kinematics: TreeKinematics, body: int, at: Vec, scalars: Scalars) -> Vec:
-    """A point of a body, given from its centre of mass in body axes, from its frame's origin; in
-    world axes.
+    """The vector from the frame's origin to a point of a body, in world axes, m; `at` is the point
+    from the centre of mass, in body axes.
     """
     mount = linkage.mounts[body]
     own = add(mount.at, times(constant(mount.axes, scalars), at))
@@ -83,7 +83,7 @@ def velocity(
 def centre_of_mass(
     linkage: Linkage, kinematics: TreeKinematics, where: Origins, scalars: Scalars
 ) -> Vec:
-    """Of all bodies together; a body that is part of the world counts like any other."""
+    """The centre of mass of all bodies, in the world, m. Bodies welded to the world count too."""
     moment, mass = zeros(scalars), scalars.number(0.0)
     for k, mount in enumerate(linkage.mounts):
         point = position(linkage, kinematics, where, k, zeros(scalars), scalars)
@@ -94,7 +94,7 @@ def centre_of_mass(
 def momentum(
     kinematics: TreeKinematics, where: Origins, twists: Sequence[Twist], scalars: Scalars
 ) -> tuple[Vec, Vec]:
-    """Momentum, and angular momentum about the world's origin, in world axes."""
+    """Momentum (kg m/s) and angular momentum about the world's origin (kg m²/s), world axes."""
     linear, angular = zeros(scalars), zeros(scalars)
     for k, link in enumerate(kinematics.links):
         about, p = momentum_of(link, twists[k])
@@ -113,7 +113,7 @@ def point_jacobian(
     nv: int,
     scalars: Scalars,
 ) -> list[Vec]:
-    """For each free velocity what it adds to the velocity of a point, in world axes."""
+    """The Jacobian of a point's velocity, in world axes: one column for each free velocity."""
     columns = [zeros(scalars)] * nv
     frame = linkage.mounts[body].frame
     point = position(linkage, kinematics, where, body, at, scalars)

@@ -1,6 +1,6 @@
-"""A model whose fixed directions and angles are changed in their last place, as they might be.
+"""A model whose fixed directions and angles are changed by one unit in the last place.
 
-What is 0 stays 0, and a multiple of 90 degrees stays one: these mean themselves.
+0 stays 0, and a multiple of 90 degrees stays one: these are meant exactly.
 """
 
 import math
@@ -13,7 +13,7 @@ from eomgen.scene.joints import Free, Joint
 
 
 def perturbed(model: Model, seed: int = 9) -> Model:
-    """The model with each of these numbers changed to a double beside it, up or down."""
+    """The model with each of these numbers changed to a neighbouring double, up or down."""
     rng = random.Random(seed)
 
     def near(x: float) -> float:

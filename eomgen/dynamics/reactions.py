@@ -1,4 +1,4 @@
-"""What joints transmit: all six components, from the motion of everything they carry."""
+"""Joint forces and moments, all six components, by Newton and Euler for each body."""
 
 from collections.abc import Sequence
 
@@ -20,12 +20,11 @@ from eomgen.scalars.protocol import Scalar
 
 
 def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Wrench]:
-    """The wrench of each joint that holds something on its parent, at the joint's point on the
-    child, in world axes.
+    """The wrench of each joint on its parent, at the joint's point on the child, in world axes.
 
-    By Newton and Euler for each body, leaves first: a joint gives its child what the child and all
-    that hangs on it need beyond weight and loads. A motor acts between the two bodies of its joint,
-    and its rotor belongs to the joint: both are in what the joint transmits.
+    Leaves first: the joint's wrench on its child is what the child's subtree needs for its
+    acceleration, beyond weight and loads. It includes the motor, which acts between the joint's two
+    bodies, and its rotor.
     """
     model, linkage, kinematics = dynamics.model, dynamics.linkage, dynamics.kinematics
     scalars = dynamics.scalars

@@ -1,4 +1,4 @@
-"""Rotations between the axes of a frame and those of its parent, each as cheap as it can be."""
+"""Rotations between the axes of a frame and its parent's, in as few operations as possible."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 
 class Rotation(Protocol):
-    """Own axes to the parent's (`out`) and back (`into`)."""
+    """A rotation R from own axes to the parent's (`out`) and back (`into`)."""
 
     def out(self, a: Vec) -> Vec:
-        """A vector of own axes in the parent's."""
+        """R a: a vector of own axes in the parent's."""
 
     def into(self, a: Vec) -> Vec:
-        """A vector of the parent's axes in own."""
+        """Rᵀ a: a vector of the parent's axes in own axes."""
 
     def out_symmetric(self, a: Symmetric) -> Symmetric:
         """R a Rᵀ for a symmetric matrix of own axes."""
@@ -71,21 +71,21 @@ class AxisRotation:
     two_c: Scalar
 
     def out(self, a: Vec) -> Vec:
-        """Two components turn."""
+        """Two components rotate."""
         i, j = (self.k + 1) % 3, (self.k + 2) % 3
         result = list(a)
         result[i], result[j] = self.c * a[i] - self.s * a[j], self.s * a[i] + self.c * a[j]
         return (result[0], result[1], result[2])
 
     def into(self, a: Vec) -> Vec:
-        """Two components turn back."""
+        """Two components rotate back."""
         i, j = (self.k + 1) % 3, (self.k + 2) % 3
         result = list(a)
         result[i], result[j] = self.c * a[i] + self.s * a[j], self.c * a[j] - self.s * a[i]
         return (result[0], result[1], result[2])
 
     def out_symmetric(self, a: Symmetric) -> Symmetric:
-        """Nine operations for the block that turns: with w = s (a - c) + 2 c b,
+        """Nine operations for the block that rotates: with w = s (a - c) + 2 c b,
         [a b; b c] becomes [a - s w, c w - b; c w - b, c + s w].
         """
         i, j, k = (self.k + 1) % 3, (self.k + 2) % 3, self.k
@@ -113,7 +113,7 @@ class AxisRotation:
         return _matrix(m)
 
     def after(self, world: Mat) -> Mat:
-        """Two columns turn: each row of `world` as a row vector times R."""
+        """Two columns rotate: each row of `world` times R."""
         return (self.into(world[0]), self.into(world[1]), self.into(world[2]))
 
 
@@ -125,11 +125,11 @@ class QuarterTurns:
     count: int
 
     def out(self, a: Vec) -> Vec:
-        """Two components change places, or signs."""
+        """Two components change places or signs."""
         return self._rotated(a, self.count)
 
     def into(self, a: Vec) -> Vec:
-        """So they do back."""
+        """The same, backwards."""
         return self._rotated(a, 4 - self.count)
 
     def out_symmetric(self, a: Symmetric) -> Symmetric:
@@ -137,7 +137,7 @@ class QuarterTurns:
         return self.out_matrix(a)
 
     def out_matrix(self, a: Mat) -> Mat:
-        """Of a R^T first, which turns rows, then of its columns."""
+        """First a Rᵀ, by rows, then R times that, by columns."""
         rows = transposed((self.out(a[0]), self.out(a[1]), self.out(a[2])))
         return transposed((self.out(rows[0]), self.out(rows[1]), self.out(rows[2])))
 
@@ -155,7 +155,7 @@ class QuarterTurns:
 
 @dataclass(frozen=True)
 class MatrixRotation:
-    """Any rotation, by its matrix: own axes as columns."""
+    """Any rotation, by its matrix; the columns are its own axes."""
 
     matrix: Mat
 
@@ -182,7 +182,7 @@ class MatrixRotation:
 
 @dataclass(frozen=True)
 class ComposedRotation:
-    """A fixed rotation, then one that moves: R = outer inner."""
+    """A product of two rotations, R = outer inner: a fixed one, and the joint's."""
 
     outer: Rotation
     inner: Rotation
@@ -215,7 +215,7 @@ def axis_rotation(k: int, angle: Scalar, quarters: int, scalars: Scalars) -> Axi
 
 
 def cosine_and_sine(angle: Scalar, quarters: int, scalars: Scalars) -> tuple[Scalar, Scalar]:
-    """Of an angle and quarter turns, of which no number is one exactly."""
+    """Cosine and sine of an angle (rad) plus quarter turns, which no double is exactly."""
     return _by_quarters(scalars.call("cos", angle), scalars.call("sin", angle), quarters)
 
 
@@ -235,7 +235,7 @@ def fixed_rotation(rotation: Matrix, scalars: Scalars) -> Rotation:
 
 
 def both(outer: Rotation, inner: Rotation) -> Rotation:
-    """outer inner."""
+    """The product outer inner."""
     return inner if isinstance(outer, IdentityRotation) else ComposedRotation(outer, inner)
 
 
@@ -247,7 +247,7 @@ def _by_quarters(x: Scalar, y: Scalar, count: int) -> tuple[Scalar, Scalar]:
 def from_quaternion(q: Sequence[Scalar], scalars: Scalars) -> MatrixRotation:
     """The rotation of w, x, y, z, whatever the quaternion's length.
 
-    R = 1 + (2/|q|²) (w [v]x + [v]x²), so that rounding in the length turns nothing.
+    R = 1 + (2/|q|²) (w [v]x + [v]x²), which is a rotation for any length.
     """
     w, x, y, z = q
     one = scalars.number(1.0)

@@ -1,21 +1,21 @@
-"""How inverse dynamics changes with coordinates and velocities, exactly.
+"""The exact derivatives of inverse dynamics, ∂τ/∂q and ∂τ/∂v.
 
-Differentiating the recursion step by step costs a whole sweep for each column. Instead every pair
-of velocities gets its numbers by a few products, all in world axes at the frames' own origins. To
-turn what hangs on axis j by a small angle is to turn all forces in it rigidly, which does no work
-on the axes below; what remains is due to the motion that j does not carry along (S. Singh,
-R. Russo, P. Wensing, "Efficient analytical derivatives of rigid-body dynamics using spatial vector
-algebra", IEEE RA-L 7, 2022; here with the three axes of a spin, too). With S the axis j, v_p and
-a_p the motion of the frame that carries it, v that of its own,
+Differentiating the recursion costs a whole sweep for each column. Here each pair of velocities
+takes a few products, in world axes at the frames' own origins. A small rotation about axis j
+rotates its subtree and all forces there rigidly, and these do no work on the axes below. The rest
+comes from the motion that does not rotate with j. The algorithm is that of S. Singh, R. Russo and
+P. Wensing, "Efficient analytical derivatives of rigid-body dynamics using spatial vector algebra",
+IEEE RA-L 7 (2022), extended to the three axes of a spherical joint. With S the motion axis j, v_p
+and a_p the motion of its parent frame, v that of its own,
 
     ψ' = v_p x S,   ψ'' = a_p x S + v_p x ψ',   S' = v x S,
 
     ∂τ_i/∂q_j = S_i · (I ψ'' + B ψ'),          ∂τ_i/∂v_j = S_i · (I (ψ' + S') + B S),   j carries i,
     ∂τ_i/∂q_j = S_i · (S x* F + I ψ'' + B ψ'), ∂τ_i/∂v_j as before,                     i carries j,
 
-where I, F and B x = v x* I x - I (v x x) + x x* I v are summed over what the inner one of both
-carries. B takes nothing but the angular part of x: its force is 2 x x p with the momentum p, its
-moment 2 A x with A = (h·v) 1 - v hᵀ - [ω]x E, where h = Σ m r and E = Σ m r rᵀ.
+where I, F and B x = v x* I x - I (v x x) + x x* I v are sums over the subtree of the axis farther
+from the root. B uses only the angular part of x: its force is 2 x x p with the momentum p, its
+moment is 2 A x with A = (h·v) 1 - v hᵀ - [ω]x E, where h = Σ m r and E = Σ m r rᵀ.
 """
 
 from collections.abc import Sequence
@@ -48,10 +48,10 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Matrices of nv x nv over free velocities, entries that are not zero by the tree's shape.
+    """Matrices (nv, nv) over free velocities: the entries that the tree's shape allows not to be 0.
 
-    `by_position` is ∂τ/∂q, where q of a spin is the small angle in its own axes, `by_velocity`
-    ∂τ/∂v.
+    `by_position` is ∂τ/∂q, with a small rotation in its own axes for q of a spherical joint;
+    `by_velocity` is ∂τ/∂v.
     """
 
     by_position: Entries
@@ -128,7 +128,7 @@ def _columns(
         v, a = twists[link.parent], accelerating[link.parent]
         linear = add(v.linear, cross(v.angular, link.arm))
         carrier = Twist(v.angular, linear)
-        # Of a point fixed in space, not of one that moves along (Featherstone 2008, 2.11).
+        # The spatial acceleration, of a point fixed in space (Featherstone 2008, 2.11).
         reached = add(a.linear, times(a.field, link.arm))
         pushed = Twist(a.angular, sub(reached, cross(v.angular, linear)))
     own = Twist(twists[k].angular, twists[k].linear)
@@ -137,7 +137,7 @@ def _columns(
         s = Twist(axis.direction, nothing) if axis.angular else Twist(nothing, axis.direction)
         first = _crossed(carrier, s)
         second = _plus(_crossed(pushed, s), _crossed(carrier, first))
-        # A single axis is carried by its own motion as by its parent's.
+        # v x S = v_p x S for a single axis.
         rate = first if len(link.axes) == 1 else _crossed(own, s)
         columns.append(_Column(s, first, second, _plus(first, rate)))
     return columns

@@ -1,4 +1,4 @@
-"""Is there inertia against every motion? Asked before code is written, in numbers."""
+"""Whether the mass matrix is singular: checked in numbers, before code is written."""
 
 import math
 import random
@@ -33,28 +33,28 @@ Array = npt.NDArray[np.float64]
 
 TRIALS = 3
 TOGETHER = 4096
-"""Poses that are looked at at once: a long run has more than memory for all of them."""
+"""Poses that are evaluated together. This bounds the memory for a long run."""
 VANISHED = 1e-12
-"""A pivot below this share of the diagonal entry it came from may be rounding."""
+"""A pivot below this part of its diagonal entry may be rounding."""
 NOTHING = 1e-300
-"""And is, in the digits of `exact`: axes that are 1e-100 from parallel leave more."""
+"""A pivot below this part is 0 in the digits of `exact`: axes 1e-100 from parallel leave more."""
 UNDERFLOW = 1e-290
-"""A pivot below this is nothing in doubles."""
+"""A pivot below this is 0 in doubles."""
 
 
 def check_nonsingular(model: Model) -> None:
     """Raise `SceneError`, naming the body and what to change, if the mass matrix is singular.
 
-    M is singular where some motion moves no mass, however large the masses are; so all of them are
-    taken as 1, which leaves few questions of rounding. A pivot of the articulated-body algorithm is
-    the inertia that a velocity feels when all that it carries is free; one that vanishes at seeded
-    random poses vanishes at all, or at almost all. One that might is looked at in many digits.
+    M is singular if some motion moves no mass, whatever the masses are. So all masses are set to 1,
+    which avoids rounding. The pivots of the articulated-body algorithm are checked at seeded random
+    poses: one that is 0 there is 0 at almost all poses. A pivot in doubt is computed in extended
+    precision.
     """
     count = len(model.coordinates) + len(model.driven)
     even, poses = _evened(model), _seeded(random.Random(20), count)
     if not _vanishing(_pivots(even, poses, ArrayScalars()), VANISHED):
         return
-    # Imported here because a model that is regular has no need of it, nor has a run.
+    # Imported here, since a regular model does not need it, nor does a run.
     from eomgen.scalars.extended import Bits
 
     with exactly():
@@ -66,7 +66,7 @@ def check_nonsingular(model: Model) -> None:
 
 
 def _vanishing(pivots: Mapping[int, tuple[Array, Array]], share: float) -> list[int]:
-    """The velocities, last first, whose pivots are below a share of their entries at all poses."""
+    """The velocities, last first, whose pivots are below a part of their entries at all poses."""
     return [
         i
         for i, (pivot, entry) in sorted(pivots.items(), reverse=True)
@@ -75,13 +75,11 @@ def _vanishing(pivots: Mapping[int, tuple[Array, Array]], share: float) -> list[
 
 
 def relative_pivots(model: Model, poses: Array) -> dict[int, Array]:
-    """For each velocity the inertia that it feels when all that it carries is free, at each of n
-    poses (n, nq), in parts of the greatest that it feels at any of these and a few seeded ones:
-    (n,). They are 1 where all of that is rounding, as beside arms of 1e9 m.
+    """For each velocity its articulated-body pivot at n poses (n, nq), relative to the greatest at
+    any of these and a few seeded poses: (n,). 1 where all of it is rounding, as with arms of 1e9 m.
 
-    As in `check_nonsingular` all masses are taken as 1: heavy on light is no lock. Where the axes
-    of a joint come into line with what they carry, as those of a gimbal do, some motion moves no
-    mass: it feels none there, and the mass matrix tells no acceleration.
+    As in `check_nonsingular` all masses are 1: a heavy body on a light one is no gimbal lock. In
+    gimbal lock, axes are in line, some motion moves no mass, and its pivot is 0: M is singular.
     """
     some = _seeded(random.Random(20), len(model.coordinates))
     even, asked = _evened(model), np.concatenate([poses, some])
@@ -91,7 +89,7 @@ def relative_pivots(model: Model, poses: Array) -> dict[int, Array]:
     for i in found[0]:
         pivot, entry = (np.concatenate([pivots[i][n] for pivots in found]) for n in (0, 1))
         largest = pivot.max()
-        if largest < VANISHED * entry.max():  # rounding, which tells of no pose anything
+        if largest < VANISHED * entry.max():  # rounding at every pose
             shares[i] = np.ones(len(poses))
         else:
             shares[i] = pivot[: len(poses)] / largest if largest > 0 else np.zeros(len(poses))
@@ -99,7 +97,7 @@ def relative_pivots(model: Model, poses: Array) -> dict[int, Array]:
 
 
 def why_unresisted(model: Model, i: int) -> str:
-    """What it means that next to nothing resists velocity `i`, and what to change."""
+    """A message for a run: velocity `i` has next to no inertia, and what to change."""
     body = next(index.body for index in model.joint_indices if i in index.v)
     where = f"'{model.velocities[i].name}' of joint '{body.joint.name}'"
     if model.dimensions == 3:
@@ -115,12 +113,12 @@ def _seeded(rng: random.Random, count: int) -> Array:
 
 
 def _evened(model: Model) -> Model:
-    """The model with bodies that all weigh the same."""
+    """The model with masses of 1."""
     return replace(model, bodies=tuple(_evened_body(body, model) for body in model.bodies))
 
 
 def _evened_body(body: Body, model: Model) -> Body:
-    """A body with mass 1 for any, inertia of size 1 for any, a rotor of 1 for any."""
+    """A body with mass, inertia and rotor inertia of size 1 where they are not 0."""
 
     def size(formula: Formula, unit: float = 1.0) -> Constant:
         return Constant(model.value(formula) / unit if unit else 0.0)
@@ -142,8 +140,8 @@ def _evened_body(body: Body, model: Model) -> Body:
 def _pivots(
     model: Model, poses: Array, scalars: Scalars, vanished: float = VANISHED
 ) -> dict[int, tuple[Array, Array]]:
-    """For each velocity its pivots and its entries of M at n poses (n, nq), (n,) each; where a
-    pivot is nothing, it frees nothing more. Scalars that are no arrays do at one pose.
+    """For each velocity its pivots and its diagonal entries of M at n poses (n, nq), (n,) each. An
+    axis with a pivot of 0 is not eliminated. With scalars that are no arrays, n is 1.
     """
     linkage = make_linkage(model, model.defaults, scalars)
     axes: Axes = "world" if model.dimensions == 2 else "own"

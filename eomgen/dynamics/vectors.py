@@ -13,7 +13,7 @@ Symmetric = Mat
 
 AXES = (0, 1, 2)
 ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-"""What of a symmetric matrix is computed, and its order: xx, yy, zz, xy, xz, yz."""
+"""The entries of a symmetric matrix that are computed: xx, yy, zz, xy, xz, yz."""
 
 
 def add(a: Vec, b: Vec) -> Vec:
