@@ -41,8 +41,8 @@ SURE = 100.0
 UNEXPLAINED = 1000.0
 """An error of more than so many times that change has another cause, and counts in full."""
 TRUSTED = 100.0
-"""`orthogonal` is the reference at all states if its error in extended precision is at most one
-part in so many of what is allowed.
+"""`orthogonal` is the reference at all states if its error against extended precision is at most so
+many times what is allowed.
 """
 PUSH = 10.0
 """The greatest size of inputs."""

@@ -1,4 +1,4 @@
-"""What every table of a scene shares: no unknown keys, no text for numbers, frozen once read."""
+"""The base of every table of a scene: no unknown keys, no text for numbers, frozen values."""
 
 import keyword
 import re
@@ -12,11 +12,11 @@ from eomgen.errors import nearest
 
 LONGEST_NAME = 40
 MOST_HINTS = 10
-"""Unknown keys of a table with a hint each; a table may have thousands."""
+"""The most unknown keys that get a hint; a table may have thousands."""
 
 
 class Table(BaseModel):
-    """A table of the scene: unknown keys are errors, values are frozen once read."""
+    """A table of the scene. Unknown keys are errors; values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 
@@ -26,7 +26,7 @@ class Table(BaseModel):
         if isinstance(data, dict):
             known = [field.alias or name for name, field in cls.model_fields.items()]
             unknown = [str(key) for key in data if key not in known]
-            # Only as many are shown, and to look for what is nearest takes time.
+            # No more are shown, and finding the nearest known key takes time.
             near = [nearest(key, known) for key in unknown[:MOST_HINTS]]
             hints = [hint or f"; known here: {', '.join(known)}" for hint in near]
             if unknown:
@@ -35,7 +35,7 @@ class Table(BaseModel):
         return data
 
     def replaced(self, **values: Any) -> Self:
-        """A copy with some fields replaced by values that are already of the right type."""
+        """A copy with some fields replaced by values of the right type, which are not checked."""
         return self.model_copy(update=values)
 
 
@@ -52,10 +52,10 @@ def _identifier(name: str) -> str:
 
 
 Identifier = Annotated[str, AfterValidator(_identifier)]
-"""A name that may stand in Python, JavaScript and LaTeX alike."""
+"""A name that is valid in Python, JavaScript and LaTeX."""
 
 LARGEST = 1e100
-"""Largest size of any number in a scene: its square is still a number."""
+"""Largest absolute value of a number in a scene: its square does not overflow."""
 
 
 def _size(value: float) -> float:
@@ -72,7 +72,7 @@ def _line(text: str) -> str:
 
 
 Number = Annotated[float, Strict(), Field(allow_inf_nan=False), AfterValidator(_size)]
-"""A finite number; whole numbers are taken too, text and booleans are not. Zero has no sign."""
+"""A finite number. Integers are accepted; text and booleans are not. Zero has no sign."""
 
 Positive = Annotated[Number, Field(gt=0)]
 Text = Annotated[str, Field(max_length=400), AfterValidator(_line)]

@@ -1,4 +1,4 @@
-"""What values of parameters must keep: one rule for a scene, for --set, and for a module's p."""
+"""Conditions on values of parameters: the same for a scene, for --set, and for a module's p."""
 
 import math
 import sys
@@ -20,15 +20,15 @@ from eomgen.language.formula import (
 from eomgen.scalars.floats import FloatScalars
 
 ROUNDING = 1e-9
-"""How far numbers of a scene may be from what they should be, for having been rounded."""
+"""The relative error by which numbers of a scene may be rounded."""
 
 
 @dataclass(frozen=True)
 class Condition:
     """A formula of parameters that must be >= low, or > low if it is `strict`, and <= high.
 
-    place   where the scene gives it
-    words   what is wrong where it is not kept, with braces for the values of the formulas `shown`
+    location  where the scene gives it
+    words     what is wrong if it does not hold, with braces for the values of the formulas `shown`
     """
 
     location: str
@@ -40,7 +40,7 @@ class Condition:
     high: float = math.inf
 
     def problem(self, known: Mapping[str, float]) -> str:
-        """What is wrong at these parameters, or ""."""
+        """What is wrong at these parameters, as a message; "" if nothing is."""
         value = value_of(self.value, known)
         if self.shown and not math.isfinite(value):
             return f"{self.location}: its value is not a finite number; change its parameters"
@@ -51,19 +51,19 @@ class Condition:
 
     @property
     def depends(self) -> bool:
-        """Whether there are parameters in it: then it may hold with some values and not others."""
+        """Whether it depends on parameters, so that it may hold for some values only."""
         return next(names_in(self.value), None) is not None
 
 
 def require(conditions: Iterable[Condition], known: Mapping[str, float]) -> None:
-    """Raise `SceneError`, saying what is wrong, unless all hold at these parameters."""
+    """Raise `SceneError`, saying what is wrong, unless all conditions hold at these parameters."""
     for condition in conditions:
         if problem := condition.problem(known):
             raise SceneError(problem)
 
 
 def value_of(formula: Formula, known: Mapping[str, float]) -> float:
-    """The value of a formula, nan where it has none."""
+    """The value of a formula; nan if it is undefined."""
     try:
         return float(evaluate(formula, known, FloatScalars()))
     except (ArithmeticError, ValueError):
@@ -76,7 +76,7 @@ def are_zero(known: Mapping[str, float], *formulas: Formula) -> bool:
 
 
 def of_quantity(location: str, formula: Formula, bound: str, unit: str) -> Iterator[Condition]:
-    """A quantity is finite, has a square, and keeps its bound."""
+    """Conditions of a quantity: its size is at most `LARGEST`, and it keeps its bound."""
     words = f"{{:g}} is larger than {LARGEST:g}; choose other units"
     yield Condition(location, formula, words, (formula,), low=-LARGEST, high=LARGEST)
     if bound == "positive":
@@ -87,7 +87,7 @@ def of_quantity(location: str, formula: Formula, bound: str, unit: str) -> Itera
 
 
 def of_moving(location: str, formula: Formula, known: Mapping[str, float]) -> Iterator[Condition]:
-    """What changes with the motion has no value before it, but its still parts have."""
+    """Conditions of a formula that changes with the motion: its constant parts are finite."""
     for part in _still(formula, known):
         text = written(part).replace("{", "{{").replace("}", "}}")
         shown = text if len(text) <= 60 else f"{text[:57]}..."
@@ -97,7 +97,7 @@ def of_moving(location: str, formula: Formula, known: Mapping[str, float]) -> It
 
 
 def _still(formula: Formula, known: Mapping[str, float]) -> Iterator[Apply]:
-    """The largest parts of a formula that depend on nothing but parameters."""
+    """The largest parts of a formula that depend on parameters only."""
     if isinstance(formula, Apply):
         if all(name in known for name in names_in(formula)):
             yield formula
@@ -125,7 +125,7 @@ def in_order(location: str, low: Formula, high: Formula) -> Condition:
 
 
 def can_meet(location: str, radii: Sequence[Formula]) -> Condition:
-    """Of spheres, with radii >= 0 in m, no two are points: at most one radius is 0."""
+    """Of spheres with radii >= 0, m, at most one is a point of radius 0."""
     spheres = _sum(*(Apply("step", (radius,)) for radius in radii))
     words = "two points never meet; give a radius > 0"
     return Condition(location, spheres, words, (), low=len(radii) - 1.0)
@@ -134,7 +134,7 @@ def can_meet(location: str, radii: Sequence[Formula]) -> Condition:
 def of_inertia(
     location: str, body: str, mass: Formula, entries: Sequence[Formula], known: Mapping[str, float]
 ) -> Iterator[Condition]:
-    """That there is a body of such an inertia about its centre of mass: one moment in the plane, or
+    """That a body with this inertia exists about its centre of mass: one moment in the plane, or
     xx, yy, zz, xy, xz, yz, of which moments are not negative; and none if it has no mass. A body
     that has some at the `known` parameters is to keep some, which its equations ask for themselves.
 

@@ -1,7 +1,7 @@
-"""The safe expression reader: a formula of a scene becomes a small tree, and nothing is executed.
+"""The reader of formulas: a text becomes a small tree, and nothing in it is executed.
 
-Python's own parser splits the text; only the nodes, functions and names listed here pass. The tree
-is evaluated over any scalars: floats, SymPy expressions, the nodes of a program.
+Python's parser parses the text. Only the nodes, functions and names listed here are accepted. The
+tree is evaluated over any scalars: floats, SymPy expressions, nodes of a program.
 """
 
 import ast
@@ -38,7 +38,7 @@ _COMPARISONS: dict[type[ast.cmpop], str] = {
 
 
 class FormulaError(ValueError):
-    """A text that is no formula; says what is wrong and at which column."""
+    """A text is no formula; the message says what is wrong and at which column."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Constant:
     value: float
 
     def __post_init__(self) -> None:
-        # They compare as equal, and so share one entry in a table, but atan2 tells them apart.
+        # They are equal and share one entry in a table, but atan2 gives different results.
         object.__setattr__(self, "value", float(self.value) + 0.0)
 
 
@@ -77,9 +77,9 @@ _TOKEN = re.compile(
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
     r"|(?P<sign>\*\*(?!\*)|[<>]=?(?![<>=])|/(?!/)|[-+*(),])"
 )
-"""All that a formula is made of."""
+"""The tokens of formulas."""
 _WRONG = re.compile(r"[A-Za-z0-9_.]{1,20}|[-=!<>:/&|*%@^~]{1,3}|.", re.DOTALL)
-"""What stands where nothing of that does, as messages show it."""
+"""Text that is no token, as messages show it."""
 _REMEDIES = {
     "and": "write min(a, b)",
     "or": "write max(a, b)",
@@ -118,7 +118,7 @@ def parse(text: str) -> Formula:
 
 
 def _check_tokens(text: str) -> None:
-    """Only words and signs of formulas reach the parser: then no other syntax can."""
+    """Refuse all but the tokens of formulas, so that the parser sees no other syntax."""
     at = depth = 0
     while at < len(text):
         found = _TOKEN.match(text, at)
@@ -205,7 +205,7 @@ _FUNCTION_LIST = ", ".join(FUNCTIONS)
 
 
 def _compared(operation: str, left: Formula, right: Formula) -> Formula:
-    """1 where the comparison holds, else 0."""
+    """A formula that is 1 if the comparison holds, else 0."""
     if operation in (">", "<="):
         left, right = right, left
     below = Apply("step", (Apply("-", (right, left)),))  # left < right
@@ -231,7 +231,7 @@ def names_in(formula: Formula) -> Iterator[str]:
 
 
 def calls_function(formula: Formula) -> bool:
-    """Whether a formula has a function in it."""
+    """Whether a formula contains a function."""
     match formula:
         case Apply(operation, operands):
             return operation in FUNCTIONS or any(calls_function(part) for part in operands)
@@ -239,7 +239,7 @@ def calls_function(formula: Formula) -> bool:
 
 
 def written(formula: Formula) -> str:
-    """A formula as one may write it, every operation in brackets."""
+    """The text of a formula, with brackets around every operation."""
     match formula:
         case Constant(value):
             return repr(value) if math.copysign(1.0, value) > 0 else f"({value!r})"

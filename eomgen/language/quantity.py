@@ -1,7 +1,7 @@
 """Quantities: numbers of a scene that stay symbolic in the generated module.
 
-A bare number is the default of a parameter that is named after its place; a text is a formula over
-the scene's `[parameters]`; a bare 0 is structure: it is folded away and is no parameter.
+A bare number is the default of a parameter, which is named after its location. A text is a formula
+over the scene's `[parameters]`. A bare 0 is structure: it is no parameter, and is folded away.
 """
 
 import math
@@ -57,18 +57,18 @@ Quantity = Annotated[
 Vector = Annotated[tuple[Quantity, ...], Field(min_length=2, max_length=3)]
 """Two components in the plane, three in space; see `with_components`."""
 Numbers = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
-"""The same of plain numbers: structure, never a parameter."""
+"""The same of plain numbers, which are structure and never parameters."""
 Bound = Literal["any", "positive", "nonnegative"]
 
 
 def quantity(
     unit: str, about: str, bound: Bound = "any", sees: Sequence[str] = (), **options: Any
 ) -> Any:
-    """A field that holds a quantity: its unit, what it is, and the bound its value keeps.
+    """A field for a quantity, with its unit, its description and the bound that its value keeps.
 
-    Unit and words may be alternatives for a quantity of a joint: see `of_joint`.
-    `sees` are names that its formula may use besides parameters: `motion` stands for `t`, all
-    coordinates, velocities, inputs and extra states; any other word for itself.
+    Unit and description of a quantity at a joint may be alternatives: see `of_joint`. `sees` are
+    names that its formula may use besides parameters. `motion` stands for `t` and all coordinates,
+    velocities, inputs and extra states; any other name stands for itself.
     """
     extra: dict[str, Any] = {"unit": unit, "bound": bound}
     if sees:
@@ -77,22 +77,23 @@ def quantity(
 
 
 def of_joint(text: str, slides: bool) -> str:
-    """What holds at the joint at hand of "N m | N": the first where it turns, else the second.
+    """One of two alternatives, "N m | N": the first for a revolute joint, the second if it
+    `slides`.
 
-    A text without " | " holds at any joint.
+    A text without " | " is the same for any joint.
     """
     turning, _, sliding = text.partition(" | ")
     return sliding if slides and sliding else turning
 
 
 def of_any_joint(text: str) -> str:
-    """Such a text where no joint is at hand: "N m or N"."""
+    """Both alternatives of such a text, for any joint: "N m or N"."""
     return text.replace(" | ", " or ")
 
 
 def about_slides(table: Table, sliding: Collection[str]) -> bool | None:
-    """Whether a table is about what slides: its coordinate, or its joint, or all its joints; None
-    if it is about no joint.
+    """Whether a table's coordinate, joint, or all joints are prismatic; None if it names no
+    joint.
     """
     for key in ("coordinate", "joint", "joints"):
         at = getattr(table, key, None)
@@ -119,9 +120,9 @@ class Parameter:
 def with_components(
     value: tuple[Any, ...], zero: Any, dimensions: int, location: str
 ) -> tuple[Any, ...]:
-    """A vector of a scene, or zeros where it is left out (an empty tuple).
+    """A vector of a scene, or zeros if it is left out (an empty tuple).
 
-    Raises `SceneError` if it has not one component for each dimension.
+    Raises `SceneError` unless it has one component for each dimension.
     """
     if not value:
         return (zero,) * dimensions

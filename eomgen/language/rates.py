@@ -1,4 +1,4 @@
-"""First and second derivatives of formulas by time, over any scalars."""
+"""First and second time derivatives of formulas, over any scalars, by dual numbers."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,8 +11,8 @@ from eomgen.scalars.protocol import Scalars
 def with_rates(
     formula: Formula, names: Mapping[str, Any], time: Any, scalars: Scalars
 ) -> tuple[Any, Any, Any]:
-    """A formula of `t` and of `names`, which do not change, with its first and second derivative
-    by t, exactly; where it has corners (step, select, abs, min, max), those of its pieces.
+    """A formula of `t` and of constant `names`: its value and its exact first and second derivative
+    by t. At corners (step, select, abs, min, max) they are those of the branch taken.
     """
     once = Duals(scalars)
     twice = Duals(once)

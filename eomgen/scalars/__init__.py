@@ -1,1 +1,1 @@
-"""What equations are computed over: floats, arrays, duals, numbers of many digits."""
+"""The scalars that equations are computed over: floats, arrays, duals, extended precision."""

@@ -1,4 +1,4 @@
-"""Dual numbers: scalars with their rate of change, by which formulas are differentiated."""
+"""Dual numbers: forward-mode differentiation of formulas."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +9,7 @@ from eomgen.scalars.protocol import Scalars
 
 @dataclass(frozen=True)
 class Dual:
-    """A scalar and how fast it changes: a + b ε, ε² = 0."""
+    """A scalar and its derivative: a + b ε with ε² = 0."""
 
     value: Any
     rate: Any
@@ -39,11 +39,11 @@ class Duals(Scalars):
         self._scalars = scalars
 
     def number(self, value: float) -> Dual:
-        """What does not change."""
+        """A constant."""
         return self.still(self._scalars.number(value))
 
     def still(self, value: Any) -> Dual:
-        """A scalar that does not change."""
+        """A scalar with derivative 0."""
         return Dual(value, self._scalars.number(0.0))
 
     def call(self, function: str, *arguments: Dual) -> Dual:

@@ -1,10 +1,10 @@
 """Directions and rotations that a scene fixes, computed from its own numbers and rounded once.
 
-What is 0 in a fixed rotation is folded away as structure. So whether it is 0 must follow from the
-numbers of the scene, not from what rounding left of them: the cosine of 1e-9 is 1 in doubles, its
-sine is not 0. Here everything is computed in `BITS` bits. No double is smaller than 2^-1074. What
-rounding leaves of a sum that is exactly 0 is smaller than that, and counts as 0; everything else is
-right to more than a hundred bits, however much cancels.
+A 0 in a fixed rotation is folded away as structure. So whether an entry is 0 must follow from the
+scene's numbers and not from rounding: in doubles the cosine of 1e-9 is 1, and its sine is not 0.
+Everything here is computed in `BITS` bits. No double is smaller than 2^-1074. A sum that is exactly
+0 is smaller than that after rounding, and counts as 0. Everything else is accurate to more than a
+hundred bits, however much cancels.
 """
 
 import math
@@ -19,26 +19,26 @@ from gmpy2 import mpfr
 
 BITS = 1280
 Real = Any
-"""A number of so many bits, an `mpfr`, which has no type of its own for type checkers."""
+"""An `mpfr` of `BITS` bits, which has no type for type checkers."""
 Matrix = tuple[tuple[Real, Real, Real], ...]
 """A rotation: three rows."""
 SMALLEST = mpfr(2) ** -1074
-"""The smallest double; what is less counts as 0."""
+"""The smallest double; smaller numbers count as 0."""
 ZERO, ONE = mpfr(0), mpfr(1)
 EYE: Matrix = ((ONE, ZERO, ZERO), (ZERO, ONE, ZERO), (ZERO, ZERO, ONE))
 AXES = (0, 1, 2)
 PARTS = 5
-"""Doubles that hold 60 digits of a number, each 53 bits of it."""
+"""The number of doubles, of 53 bits each, whose sum holds 60 digits of a number."""
 
 
 def exactly() -> AbstractContextManager[Any]:
-    """A block in which numbers are of `BITS` bits."""
+    """A context in which numbers have `BITS` bits."""
     block: AbstractContextManager[Any] = gmpy2.context(precision=BITS)
     return block
 
 
 def whole(x: Real) -> Real:
-    """A number, 0 where it is less than any double."""
+    """A number, or 0 if it is smaller than any double."""
     return x if abs(x) >= SMALLEST else ZERO
 
 
@@ -95,7 +95,7 @@ def total(*angles: Real) -> Real:
 
 
 def opposite(angle: Real) -> Real:
-    """The angle back, rad. Minus alone would round to whatever digits are in use."""
+    """Minus an angle, rad. A plain minus would round to the precision of the current context."""
     with exactly():
         return -angle
 
@@ -107,7 +107,7 @@ def angle_of(c: Real, s: Real) -> Real:
 
 
 def quarters(angle: Real) -> tuple[int, Real]:
-    """How many quarter turns are nearest to an angle, and what is left of it, rad."""
+    """The nearest number of quarter turns to an angle, and the rest of the angle, rad."""
     with exactly():
         quarter = gmpy2.const_pi() / 2
         n = int(gmpy2.rint(angle / quarter))
@@ -115,7 +115,7 @@ def quarters(angle: Real) -> tuple[int, Real]:
 
 
 def quarter_turns(n: int, angle: Real) -> Real:
-    """So many quarter turns, and an angle more, rad."""
+    """The angle of n quarter turns plus `angle`, rad."""
     with exactly():
         return whole(n * gmpy2.const_pi() / 2 + angle)
 
@@ -146,7 +146,7 @@ HALF_ABOUT_X, HALF_ABOUT_Z = rotation_by(0, -ONE, ZERO), rotation_by(2, -ONE, ZE
 def orientation(degrees: float | tuple[float, float, float]) -> Matrix:
     """The fixed rotation of a joint, Rz Ry Rx of angles about x, y and z; of one, about z."""
     x, y, z = degrees if isinstance(degrees, tuple) else (0.0, 0.0, degrees)
-    # Whole turns are left out, which is exact: of 1e100 degrees too few digits would be left.
+    # Whole turns are removed, which is exact: 1e100 degrees would have too few digits.
     first, second, third = (
         rotation_about(k, radians(math.fmod(a, 360.0))) for k, a in enumerate((x, y, z))
     )
@@ -165,7 +165,7 @@ def to_axis(axis: tuple[float, float, float]) -> tuple[Matrix, int]:
     x, y, z = direction(axis)
     if axis[2] == 0.0:
         return rotation_by(2, x, y), 0
-    # The shortest turn from z to the axis (Rodrigues), or from -z if that is nearer.
+    # The shortest rotation from z to the axis (Rodrigues), or from -z if that is nearer.
     with exactly():
         if z < 0:
             x, y, z = -x, -y, -z
@@ -186,7 +186,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 
 def image_of_axis(a: Matrix, k: int, length: Real) -> tuple[Real, ...]:
-    """Where a rotation brings a vector of some length along coordinate axis k."""
+    """The image under a rotation of a vector of some length along coordinate axis k."""
     with exactly():
         return tuple(whole(row[k] * mpfr(length)) for row in a)
 
@@ -196,7 +196,7 @@ def transposed(a: Matrix) -> Matrix:
     return matrix([[a[j][i] for j in AXES] for i in AXES])
 
 
-# What rotations are made of.
+# Rotations as products of rotations about coordinate axes.
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def axis_rotations(rotation: Matrix) -> tuple[AxisRotation, ...] | None:
             return _axis_rotation(k, rotation[i][i], rotation[j][i])
     for i in AXES:
         for m in AXES:
-            # Column m is in the plane that turns about i keep, and what is left a turn about m.
+            # Column m is in the plane normal to i, and the rest is a rotation about m.
             if i != m and not rotation[i][m]:
                 u, v = (i + 1) % 3, (i + 2) % 3
                 with exactly():
@@ -249,7 +249,7 @@ def three_rotations(rotation: Matrix, i: int, k: int) -> tuple[Real, int, Real, 
     quarter turn.
     """
     m = (k + 1) % 3 if i == k else 3 - i - k
-    # R_i(-a) brings the image of axis k into the plane that turns about m leave alone.
+    # R_i(-a) brings the image of axis k into the plane normal to m.
     image = [row[k] for row in rotation]
     p, q = (i + 1) % 3, (i + 2) % 3
     with exactly():

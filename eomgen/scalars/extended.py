@@ -1,4 +1,6 @@
-"""Numbers of many digits as scalars of formulas, recursions and programs."""
+"""Extended precision as scalars of formulas, recursions and programs: mpmath's and MPFR's
+numbers.
+"""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -15,7 +17,7 @@ from eomgen.scalars.protocol import Scalars
 
 DIGITS = 60
 MP = mpmath.MPContext()
-"""Numbers of this context work in `DIGITS` digits, wherever they are."""
+"""The context of mpmath's numbers: they have `DIGITS` digits everywhere."""
 MP.dps = DIGITS
 
 
@@ -32,14 +34,14 @@ def _functions(library: Any, number: Callable[[bool], Any]) -> dict[str, Callabl
 
 _BY_MPMATH = _functions(MP, MP.mpf)
 BY_MPFR = _functions(gmpy2, mpfr)
-"""The functions of formulas, of MPFR's numbers; as exact as gmpy2's context then is."""
+"""The functions of formulas for MPFR's numbers, in the precision of gmpy2's context."""
 
 
 class Digits(Scalars):
     """60-digit numbers as scalars."""
 
     def number(self, value: Real) -> Any:
-        """The double itself, exactly; the number next to one of more digits."""
+        """A double exactly; the nearest number to one of more digits."""
         if isinstance(value, float | int):
             return MP.mpf(value)
         with sixty_digits():
@@ -51,18 +53,18 @@ class Digits(Scalars):
 
 
 def exact(values: Any) -> Any:
-    """Doubles, one or an array of them, as 60-digit numbers: exactly the same."""
+    """Doubles, one or an array of them, exactly as 60-digit numbers."""
     array = np.asarray(values)
     return np.array([MP.mpf(x) for x in array.ravel()], dtype=object).reshape(array.shape)
 
 
 class Bits(Scalars):
-    """MPFR's numbers as scalars, as exact as gmpy2's context: they add and multiply ten times as
-    fast as mpmath's.
+    """MPFR's numbers as scalars, in the precision of gmpy2's context. They add and multiply ten
+    times as fast as mpmath's.
     """
 
     def number(self, value: Real) -> Any:
-        """The double itself, exactly, in any context; the number next to one of more digits."""
+        """A double exactly, in any context; the nearest number to one of more digits."""
         return mpfr(value, 53) if isinstance(value, float) else mpfr(value)
 
     def call(self, function: str, *arguments: Any) -> Any:
@@ -72,7 +74,7 @@ class Bits(Scalars):
 
 @contextmanager
 def sixty_digits() -> Iterator[None]:
-    """A block in which MPFR's numbers are of `DIGITS` digits, and what has no value raises
+    """A context in which MPFR's numbers have `DIGITS` digits, and undefined values raise
     `ArithmeticError`.
     """
     with gmpy2.context(precision=MP.prec, trap_divzero=True, trap_invalid=True):
@@ -80,5 +82,5 @@ def sixty_digits() -> Iterator[None]:
 
 
 def out_of_bits(numbers: Iterable[Any]) -> list[Any]:
-    """MPFR's numbers as mpmath's, exactly."""
+    """MPFR's numbers exactly as mpmath's."""
     return [MP.mpf(tuple(map(int, x.as_mantissa_exp()))) for x in numbers]

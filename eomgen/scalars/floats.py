@@ -1,4 +1,4 @@
-"""Floats as scalars, and arrays of them: many states at once."""
+"""Floats as scalars, and NumPy arrays of them for many states at once."""
 
 from collections.abc import Callable
 from typing import Any
@@ -23,7 +23,7 @@ class FloatScalars(Scalars):
     """Plain floats, by `math`."""
 
     def number(self, value: Real) -> float:
-        """The value itself, or the double next to a number of more digits."""
+        """The nearest double."""
         return float(value)
 
     def call(self, function: str, *arguments: float) -> float:
@@ -35,7 +35,7 @@ class ArrayScalars(Scalars):
     """Floats or arrays (n,) of them, of one length n, by NumPy."""
 
     def number(self, value: Real) -> float:
-        """The value itself, or the double next to it, the same in all of them."""
+        """The nearest double, the same in all entries."""
         return float(value)
 
     def call(self, function: str, *arguments: Scalar) -> Scalar:
@@ -43,5 +43,5 @@ class ArrayScalars(Scalars):
         return BY_NUMPY[function](*arguments)
 
     def is_zero(self, value: Scalar) -> bool:
-        """Whether it is 0 in all of them; then the shorter of two ways that agree is taken."""
+        """Whether all entries are 0."""
         return value == 0.0 if isinstance(value, float) else not np.any(value)

@@ -19,7 +19,7 @@ what comparisons and `a if x < y else b` become. Both a and b are computed, so b
 value: write sqrt(max(x, 0)), not sqrt(x) if x > 0 else 0.
 """
 CORNERS = ("abs", "max", "min", "select", "step")
-"""Functions that have a corner or a jump: they go on by another branch where one is reached."""
+"""Functions with a corner or a jump, where they change to another branch."""
 BY_MATH: dict[str, Callable[..., float]] = {
     **{name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)},
     "abs": math.fabs,
@@ -34,9 +34,9 @@ BY_MATH: dict[str, Callable[..., float]] = {
 def slope(
     function: str, value: Any, arguments: Sequence[Any], slopes: Sequence[Any], scalars: Scalars
 ) -> Any:
-    """How a function of formulas changes where its arguments change by `slopes`.
+    """The directional derivative of a function, for the derivatives `slopes` of its arguments.
 
-    `value` is the function's own. Where it has a corner or a step, that of the piece it is on.
+    `value` is the function's value. At a corner or a jump it is the derivative of the branch taken.
     """
     one, two = scalars.number(1.0), scalars.number(2.0)
     x, d = arguments, slopes

@@ -1,30 +1,28 @@
-"""What equations are computed over: floats, arrays, extended numbers, tape nodes, symbols, duals.
+"""The protocol of scalars: floats, arrays, extended precision, tape nodes, symbols, dual numbers.
 
-Formulas, recursions and programs are written once over an abstract scalar. They add, subtract,
-multiply, divide and negate scalars with the operators of Python; all else they ask of `Scalars`.
+Formulas, recursions and programs are written once, over an abstract scalar. They add, subtract,
+multiply, divide and negate scalars with Python's operators. `Scalars` provides everything else.
 """
 
 from typing import Any, Protocol
 
 Scalar = Any
-"""A float, an array, a number of more digits, a node of a tape, a SymPy expression, a dual."""
+"""A float, an array, an extended-precision number, a tape node, a SymPy expression, a dual."""
 
 
 class Scalars(Protocol):
-    """What computations need of scalars besides + - * / and unary minus."""
+    """What computations need besides + - * / and unary minus."""
 
     def number(self, value: Any) -> Scalar:
-        """The scalar that stands for a double, or is next to a number of more digits."""
+        """The scalar of a double; of a number with more digits, the nearest scalar."""
 
     def call(self, function: str, *arguments: Scalar) -> Scalar:
         """A function of formulas (`scalars.functions.FUNCTIONS`)."""
 
     def is_zero(self, value: Scalar) -> bool:
-        """Whether a scalar is known to be 0 whatever its inputs; of two ways that then agree the
-        shorter one is taken.
-        """
+        """Whether a scalar is known to be 0 for all inputs. Computations then omit its terms."""
         return bool(value == 0)
 
     def named(self, value: Scalar, name: str) -> Scalar:
-        """The same scalar; programs remember the name."""
+        """The same scalar; a program records the name."""
         return value

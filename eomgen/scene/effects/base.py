@@ -1,4 +1,4 @@
-"""What effects share: what they may ask of a mechanism, and the loads they put on it."""
+"""What effects share: the `Mechanism` that they see, and the loads that they return."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Input:
 
 @dataclass(frozen=True)
 class ExtraState:
-    """A state that an effect brings along, of a controller or an actuator for example.
+    """A state that an effect adds, of a controller or an actuator for example.
 
     Its `unit` and `about` are like those of an `Input`.
     """
@@ -44,11 +44,11 @@ class ExtraState:
 class Load:
     """A force on one free body, and a torque.
 
-    `force` in world axes (N) acts at `at`, measured from the centre of mass in body axes (m);
-    `torque` in world axes (N m) has one component in the plane, about z, and three in space; ()
-    is none. `kind` says on which side of M v̇ + V + G = F it stands. `in_body` has the same force
-    and torque in body axes, if it is these that are given: to the world's and back they would be
-    rounded, and a force that goes all but through the centre of mass would turn the body otherwise.
+    `force` in world axes (N) acts at `at`, from the centre of mass in body axes (m). `torque` in
+    world axes (N m) has one component in the plane, about z, and three in space; () is none. `kind`
+    says on which side of M v̇ + V + G = F it is. `in_body` has force and torque in body axes, if
+    they are given so. Rotated to world axes and back they would be rounded, which would change the
+    small moment of a force that almost passes through the centre of mass.
     """
 
     body: str
@@ -70,10 +70,10 @@ class JointLoad:
 
 @dataclass(frozen=True)
 class Contact:
-    """Two things that must not pass through each other: they touch where `gap` is 0.
+    """A rigid contact of two things, which touch where `gap` is 0.
 
-    `normal`: the loads of a unit force that drives them apart; `tangents`: the loads of a unit
-    friction force along each tangent, on the same pair: none, one in the plane, two in space.
+    `normal` are the loads of a unit force that drives them apart. `tangents` are the loads of a
+    unit friction force along each tangent, on the same pair: none, one in the plane, two in space.
     By virtual work the gap's rate and the slip velocities are the powers of these loads.
     """
 
@@ -94,7 +94,7 @@ class Contact:
 
 
 class Mechanism(Protocol):
-    """What an effect may ask of the mechanism it acts on. Vectors are in world axes."""
+    """The mechanism as an effect sees it. Vectors are in world axes unless stated otherwise."""
 
     @property
     def dimensions(self) -> int:
@@ -102,7 +102,7 @@ class Mechanism(Protocol):
 
     @property
     def magnitude(self) -> float:
-        """The order of its lengths, m: see `Model.magnitude`."""
+        """The order of magnitude of its lengths, m: see `Model.magnitude`."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -165,7 +165,7 @@ class Mechanism(Protocol):
 
 
 class Unmoved:
-    """A mechanism for those effects alone whose loads depend on no motion: see `is_plain`."""
+    """A mechanism for effects whose loads do not depend on the motion: see `is_plain`."""
 
     @property
     def magnitude(self) -> float:
@@ -223,7 +223,7 @@ class Unmoved:
 
 
 class EffectTable(Table):
-    """An effect's table: what it brings along and what it does. Most bring little."""
+    """The base of effects' tables: keys, inputs, states, loads and energy. Defaults are empty."""
 
     body_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that name a body, or list some; `anchor_fields` may name the world, too."""
@@ -240,9 +240,9 @@ class EffectTable(Table):
     name: Identifier
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """The effect itself, or put right where `dimensions` ask for it.
+        """The effect itself, or one adapted to `dimensions`.
 
-        Raises `SceneError`, naming the field after `location`, for what the schema cannot know.
+        Raises `SceneError`, naming the field after `location`, for errors beyond the schema.
         """
         return self
 
@@ -259,15 +259,15 @@ class EffectTable(Table):
         """
 
     def conditions(self, location: str) -> Iterable[Condition]:
-        """What its quantities are to keep beside their own bounds; `location` is the effect's."""
+        """Conditions on its quantities besides their own bounds; `location` is the effect's."""
         return ()
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
-        """Inputs that it takes."""
+        """The inputs that it adds."""
         return ()
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:
-        """States that it brings along."""
+        """The states that it adds."""
         return ()
 
     def rates(self, mechanism: Mechanism) -> tuple[Scalar, ...]:
@@ -275,11 +275,11 @@ class EffectTable(Table):
         return ()
 
     def loads(self, mechanism: Mechanism) -> Iterable[Load | JointLoad]:
-        """What it puts on bodies and joints."""
+        """Its loads on bodies and joints."""
         return ()
 
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
-        """Names of its rigid contacts where there are these bodies."""
+        """Names of its rigid contacts in a mechanism with these bodies."""
         return ()
 
     def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
@@ -287,11 +287,11 @@ class EffectTable(Table):
         return ()
 
     def overlap(self, mechanism: Mechanism) -> Scalar:
-        """How deep its soft contacts or stops are pressed in, the deepest of them, m or rad."""
+        """The greatest depth of its soft contacts or stops, m or rad; 0 if none is pressed in."""
         return mechanism.number(0.0)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """J; 0 for an effect that brings energy in or takes it out."""
+        """Potential energy, J; 0 for an effect without one."""
         return mechanism.value(ZERO)
 
     def keeps_energy(
@@ -311,11 +311,11 @@ class EffectTable(Table):
         return bool(wanted) and not any(inputs.get(given.name) for given in wanted)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
-        """Whether its loads depend on parameters, inputs and its bodies' poses alone, so that the
-        closed form takes them.
+        """Whether its loads depend only on parameters, inputs and its bodies' poses, as the closed
+        form requires.
         """
         return False
 
     def why_not_plain(self) -> str:
-        """What keeps one that is not from the closed form, in a few words."""
+        """Why it is not plain, in a few words."""
         return "that depends on the motion"
