@@ -1,1 +1,1 @@
-"""What people read: the equations by SymPy, step by step."""
+"""The equations of motion by SymPy, step by step, for people to read."""

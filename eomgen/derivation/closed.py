@@ -24,7 +24,7 @@ from eomgen.scene.joints import Free
 
 @dataclass(frozen=True)
 class Equations:
-    """A model's equations of motion, derived as the handout derives them.
+    """A model's equations of motion, by the handout's derivation.
 
     `collected` is (24) in the handout's rows; `symmetric` the same equations in generalised forces,
     with M = Mᵀ; `solution` the closed form; `joint_force` the recovered force f_j of every joint,
@@ -44,7 +44,7 @@ class Equations:
 def derive(model: Model) -> Equations:
     """Derive, eliminate and solve; see the modules of this package for each step.
 
-    Raises `SceneError` for a model that the closed form is not for.
+    Raises `SceneError` for a model without a closed form.
     """
     if why_not := why_not_pins(model):
         raise SceneError(f"route: no closed form of this scene: {why_not}")
@@ -99,10 +99,10 @@ def _recovered_forces(
 
 
 def written_out_forces(equations: Equations) -> tuple[Definition, ...]:
-    """The joint forces over the bodies' angular motion alone.
+    """The joint forces over the bodies' angular motion only.
 
-    As recovered, m ẍ + m g takes the weight off again that ẍ holds, and with it the digits of a
-    small force on a heavy body. Written out and gathered, what is the same cancels symbolically.
+    In m ẍ + m g the weight that ẍ contains cancels in numbers, which loses digits of a small force
+    on a heavy body. Written out and collected it cancels symbolically.
     """
     model, symbols, kinematics = equations.model, equations.symbols, equations.kinematics
     inward = over_bodies(model, symbols)

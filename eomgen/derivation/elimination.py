@@ -71,9 +71,9 @@ def subtree(model: Model, k: int) -> tuple[int, ...]:
 def joint_forces(model: Model, residuals: Sequence[Vec]) -> dict[int, Vec]:
     """Force f_j of each revolute joint on its parent, from m ẍ - f of the bodies on one side of it.
 
-    A floating tree takes the inner side, as the handout takes f_j from body A (14), (15): all
-    bodies inside the joint accelerate by the forces on them and f_j. A tree that hangs on the world
-    takes the outer side, where no unknown force of the ground enters.
+    For a floating tree it is the inner side, as in (14), (15), where f_j follows from body A: all
+    bodies inside the joint accelerate by the forces on them and f_j. For a tree on the world it is
+    the outer side, which the unknown force of the ground does not act on.
     """
     forces: dict[int, Vec] = {}
     for tree in trees(model):
@@ -101,8 +101,8 @@ def collect(
          symbols.inertia[k] * kinematics.alpha[k])
         for k in range(len(model.bodies))
     )  # fmt: skip
-    # In the bodies' own angles and rates nothing like (θ̇ + φ̇)² is torn apart when terms are
-    # expanded; (22) and (23) are put in from the leaves inwards.
+    # In the bodies' own angles and rates, expanding does not break up terms such as (θ̇ + φ̇)².
+    # (22) and (23) are substituted from the leaves to the root.
     inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
     rows = [row.xreplace(inward) for row in _rows(model, kinematics, inertial)]
     for k in reversed(range(len(model.bodies))):
@@ -126,7 +126,7 @@ def collect(
 
 
 def _rows(model: Model, kinematics: Kinematics, wrenches: Sequence[Wrench]) -> list[Expr]:
-    """What the elimination makes of one wrench on each body: a row for every coordinate.
+    """The rows that the elimination gives for one wrench on each body, one for each coordinate.
 
     The elimination is linear, so inertia, gravity and applied forces pass through it one by one.
     """
@@ -150,11 +150,12 @@ def _rows(model: Model, kinematics: Kinematics, wrenches: Sequence[Wrench]) -> l
 
 
 def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
-    """The rows of (24) turned into the equations of virtual work, per body.
+    """The rows of (24) as equations of virtual work, one for each body.
 
-    To each torque row of a floating tree the total force is added at the arm from the body's centre
-    of mass to where the rest of the tree hangs; then the row is the work done when this body alone
-    turns and everything outside it is carried along. For trees on the world nothing is to be added.
+    To each torque row of a floating tree the moment of the total force is added, with the arm from
+    the body's centre of mass to the joint of the rest of the tree. The row is then the virtual work
+    of a rotation of this body, which carries everything outside it along. Rows of trees on the
+    world are this already.
     """
     result = sp.Matrix(rows)
     for tree in trees(model):
@@ -178,7 +179,7 @@ def body_rows(model: Model, kinematics: Kinematics, rows: Expr) -> Expr:
 def symmetric(model: Model, symbols: Symbols, kinematics: Kinematics, rows: Expr) -> Expr:
     """The rows of (24) as generalised forces: ½ q̇ᵀ M q̇ is the kinetic energy.
 
-    The coordinate of a joint turns its whole subtree, so its row is the sum of the subtree's.
+    The coordinate of a joint rotates its whole subtree, so its row is the sum of the subtree's.
     """
     inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
     work = body_rows(model, kinematics, rows).applyfunc(lambda e: tidy(e.xreplace(inward)))

@@ -1,8 +1,8 @@
-"""State forms: which numbers a state vector holds.
+"""State forms: the numbers that a state vector consists of.
 
 `velocity` is [q, v]. `momentum` and `redundant` are the handout's: position, momentum, angle and
-angular momentum of the bodies, for all of them (1), or for the roots of floating trees, with angle
-and angular momentum alone for the rest, since (21) gives what is left out.
+angular momentum of all bodies (1), or of the roots of floating trees, with angle and angular
+momentum only for the other bodies, since (21) gives the rest.
 """
 
 from dataclasses import dataclass
@@ -119,7 +119,7 @@ def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
         defined[symbols.omega[k]] = spin / inertia
         rates += [symbols.omega[k], inertia * symbols.alpha[k]]
     _check_names(equations, states)
-    # A root's own coordinate is its state by the same symbol; the others follow from the bodies.
+    # A root's coordinate and its state are the same symbol; other coordinates follow from bodies.
     known = set(own)
     defined |= {s: e for s, e in inward.items() if s not in known}
     defined = {s: e for s, e in defined.items() if s not in known}

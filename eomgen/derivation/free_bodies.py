@@ -1,4 +1,4 @@
-"""Each body drawn free: Newton and Euler with unknown joint forces (handout (12)-(17))."""
+"""Free-body diagrams: Newton and Euler with unknown joint forces (handout (12)-(17))."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class SymbolicMechanism(Unmoved):
 
 @dataclass(frozen=True)
 class FreeBodies:
-    """What acts on each body besides its joints, and the free-body equations as (left, right).
+    """The wrenches on each body besides its joints', and the free-body equations (left, right).
 
     `gravity` and `applied` are the wrenches of the effects; `equations` are three a body: x, y and
     torque about the centre of mass, with the joint forces f_j as unknowns. `motor` is the torque at

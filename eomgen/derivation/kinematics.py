@@ -1,4 +1,4 @@
-"""Where the bodies are: the joint constraint, differentiated twice (handout (18)-(23))."""
+"""Kinematics of the bodies: the joint constraint, differentiated twice (handout (18)-(23))."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from eomgen.scene.joints import Revolute
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Motion of every body in terms of its parent's.
+    """The motion of every body in terms of its parent's.
 
     `angle`, `omega`, `alpha` are sums of coordinates, velocities and accelerations along the path
     to the world. `position` is (21), x_B = x_A + r_A - r_B, with x_A the parent's own symbol;

@@ -1,4 +1,4 @@
-"""The derived equations as matrices of SymPy, with nothing in them but what a scene names."""
+"""The derived equations as SymPy matrices over the names of a scene."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ def matrices(model: Model) -> Matrices:
 
 
 def written_out(expression: Expr, definitions: Iterable[Definition]) -> Expr:
-    """An expression without the symbols that are defined. Of a long solution it is very long."""
+    """An expression with all definitions substituted. For a long solution it is very long."""
     for symbol, value in reversed(tuple(definitions)):
         expression = expression.xreplace({symbol: value})
     return expression

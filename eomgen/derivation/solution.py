@@ -8,9 +8,8 @@ and weights w₁, w₂ leaves
     the pivot      w₁ a² + w₂ b²
     and one row    a · row₂ - b · row₁   of weight   w₁ w₂ / (w₁ a² + w₂ b²)
 
-(a Givens rotation without its square root: Gentleman 1973, Golub & Van Loan §5.3), so nothing is
-ever subtracted: every pivot is a sum of positive terms, none of which vanishes for positive
-masses.
+(a Givens rotation without its square root: Gentleman 1973, Golub & Van Loan §5.3). Weights are
+never subtracted: every pivot is a sum of positive terms, and is positive for positive masses.
 """
 
 from collections.abc import Sequence
@@ -24,7 +23,7 @@ from eomgen.derivation.symbols import Expr, Symbols, Vec, add, over_bodies, scal
 from eomgen.model.model import Model
 
 Definition = tuple[Expr, Expr]
-"""A symbol and what it stands for, in terms of symbols defined before it."""
+"""A symbol and its definition over symbols that are defined before it."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class _Row:
 
 @dataclass(frozen=True)
 class _Pair:
-    """Two squares of equal weight, the x and y of one vector: it may be turned at no cost."""
+    """Two squares of equal weight, x and y of one vector, which can be rotated without cost."""
 
     weight: Expr
     entries: dict[int, Vec]
@@ -66,7 +65,7 @@ class _Pair:
 
 @dataclass
 class _Notes:
-    """Definitions as they are made; the one thing here that grows."""
+    """The definitions made so far, the only mutable object of this module."""
 
     definitions: list[Definition] = field(default_factory=list)
     pivots: list[Expr] = field(default_factory=list)
@@ -185,7 +184,7 @@ def _eliminate_angles(
     load: dict[int, Expr],
     notes: _Notes,
 ) -> tuple[dict[int, Expr], dict[int, dict[int, Expr]]]:
-    """Eliminate the angular accelerations from the leaves inwards; changes `load` on the way.
+    """Eliminate the angular accelerations from the leaves to the root; changes `load` in place.
 
     Returns for each body its pivot and the couplings of its pivot row to those eliminated later.
     """
@@ -217,7 +216,7 @@ def _eliminate_angles(
 
 
 def _eliminate(k: int, rows: Sequence[_Row]) -> tuple[Expr, dict[int, Expr], list[_Row]]:
-    """Eliminate unknown `k` from rows that all hold it: pivot, Σ w a j of the rest, rows left."""
+    """Eliminate unknown `k` from rows that contain it: pivot, Σ w a j of the rest, other rows."""
     zero = sp.Integer(0)
     first, *others = rows
     weight, a = first.weight, first.entries[k]
@@ -240,7 +239,7 @@ def _eliminate(k: int, rows: Sequence[_Row]) -> tuple[Expr, dict[int, Expr], lis
 
 
 def _named_rows(rows: Sequence[_Row], name: str, notes: _Notes) -> list[_Row]:
-    """Give what is long a name, so that expressions stay small however large the tree."""
+    """Name long entries, so that expressions stay small for any size of tree."""
     named = []
     for n, row in enumerate(rows):
         weight, entries = row.weight, row.entries
@@ -261,7 +260,7 @@ def gathered(expression: Expr, symbols: Symbols, sums: dict[Expr, Expr]) -> Expr
     `sums` are symbols that stand for sums of parameters: coefficients are factored with the sums
     written out, and then written with the symbols again.
 
-    What gravity and inertia share cancels here, as it does on paper: in a floating tree the weight
+    Common terms of gravity and inertia cancel here, as on paper: in a floating tree the weight
     drops out of every angular acceleration.
     """
     fixed = {*symbols.parameters.values(), *symbols.formulas.values(), *sums}
@@ -286,7 +285,7 @@ def _factored(coefficient: Expr) -> Expr:
 
 
 MOST_FACTORED = 24
-"""Terms of a numerator beyond which factoring it would cost more than it saves."""
+"""The most terms of a numerator that is factored; beyond, factoring costs more than it saves."""
 LONGEST_REWRITTEN = 80
 """Operations of a pivot beyond which rewriting it would cost more than it saves."""
 
@@ -294,8 +293,8 @@ LONGEST_REWRITTEN = 80
 def positive_form(pivot: Expr, notes: _Notes) -> Expr:
     """A short pivot A cos² + B sin² + C as (A + C) + (B - A) sin², if B - A is positive at sight.
 
-    Pivots before it that depend on parameters alone are written out first, so that what they hide
-    can cancel: m - I m / (I + m l²) is m² l² / (I + m l²).
+    Earlier pivots that depend on parameters only are written out first, so that terms can cancel:
+    m - I m / (I + m l²) is m² l² / (I + m l²).
     """
     constant = {s: e for s, e in notes.definitions if s.is_positive and not e.has(sp.sin, sp.cos)}
     written = pivot.xreplace(constant)

@@ -22,7 +22,7 @@ class Equation:
 
 @dataclass(frozen=True)
 class Step:
-    """A step: the handout's equation numbers, a title, what is done and the equations it gives."""
+    """One step: the handout's equation numbers, a title, an explanation, and its equations."""
 
     number: str
     title: str
@@ -109,7 +109,7 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
 
 
 def _redundant_state(equations: Equations) -> Expr:
-    """All numbers of all bodies in a row (1): x, P, orientation, L."""
+    """The redundant state of all bodies (1): x, P, orientation, L."""
     s, row = equations.symbols, []
     for k, body in enumerate(equations.model.bodies):
         momentum = [sp.Symbol(f"P_{body.name},{axis}") for axis in "xy"]
@@ -144,7 +144,7 @@ def _equations_of_motion(equations: Equations) -> Iterator[tuple[str, str, str, 
 
 
 def _solution(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
-    """The closed form, which goes on where the handout's numbers end."""
+    """The closed form; its numbers continue the handout's."""
     yield (
         "(37)",
         "Closed form",

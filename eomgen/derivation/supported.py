@@ -1,4 +1,4 @@
-"""Which models the closed form is for, and which of its two derivations."""
+"""Which models have a closed form, and by which of the two derivations."""
 
 from eomgen.language.formula import ZERO
 from eomgen.model.model import Model, off_centre
@@ -15,7 +15,7 @@ FEW_BODIES, FEW_VELOCITIES = 3, 3
 
 
 def why_not_closed(model: Model) -> str:
-    """What keeps a model from route `closed`, in a few words; "" if nothing does."""
+    """Why a model has no route `closed`, in a few words; "" if it has."""
     if why_not_plain(model) or not why_not_pins(model):
         return why_not_plain(model)
     if len(model.bodies) > MOST_GENERAL_BODIES:
@@ -30,7 +30,7 @@ def why_not_closed(model: Model) -> str:
 
 
 def why_not_tried(model: Model) -> str:
-    """What makes a closed form, where there is one, too long a try; "" if nothing does."""
+    """Why deriving a closed form, if there is one, would take too long; "" if it would not."""
     if len(model.bodies) > FEW_BODIES:
         return f"not tried on more than {FEW_BODIES} bodies; --route closed does"
     if not why_not_pins(model) or len(model.bodies) == 1:
@@ -41,8 +41,8 @@ def why_not_tried(model: Model) -> str:
 
 
 def why_not_plain(model: Model) -> str:
-    """What keeps a model from any closed form: motion that is given, something left out, or an
-    effect of more than poses and inputs.
+    """Why a model has no closed form: prescribed motion, something left out, or an effect that
+    depends on more than poses and inputs.
     """
     for c in model.prescribed:
         return f"it takes no {'locked' if c.locked else 'driven'} coordinate ('{c.position.name}')"
@@ -55,9 +55,10 @@ def why_not_plain(model: Model) -> str:
 
 
 def why_not_pins(model: Model) -> str:
-    """What keeps a model from the handout's own derivation, for pins and free bodies in the plane.
+    """Why a model is not covered by the handout's derivation, for pins and free bodies in the
+    plane.
 
-    The state forms of momenta are of that one alone.
+    Only that derivation has the state forms with momenta.
     """
     if why_not_plain(model):
         return why_not_plain(model)

@@ -30,8 +30,8 @@ class SympyScalars(Scalars):
 def _quantity(formula: Formula, parameters: dict[str, Expr], formulas: dict[Formula, Expr]) -> Expr:
     """A quantity over the parameters' symbols.
 
-    A formula with a function in it becomes a symbol of its own: SymPy must not meet a sine that is
-    none of a pose's, nor a root, and none of them matters to the mechanics.
+    A formula with a function in it becomes a symbol of its own: the trigonometry here is for sines
+    and cosines of poses only, and the mechanics does not depend on what such a formula is.
     """
     if formula in formulas:
         return formulas[formula]
@@ -109,7 +109,7 @@ def make_symbols(model: Model) -> Symbols:
         v=each(coordinates, "{}_dot"),
         a=each(coordinates, "{}_ddot"),
         tau=each(coordinates, "tau__{}"),
-        # Two underscores: no name of a scene may hold them, so these meet none of its symbols.
+        # Names of scenes contain no two underscores, so these are different from all of them.
         x=each(bodies, "x__{}"),
         y=each(bodies, "y__{}"),
         angle=each(bodies, "angle__{}"),
@@ -152,10 +152,10 @@ def scale(k: Expr, v: Vec) -> Vec:
 
 
 def tidy(expression: Expr) -> Expr:
-    """Expand, with products of sines and cosines as functions of sums of angles.
+    """Expand, and write products of sines and cosines as functions of sums of angles.
 
-    In this form terms that differ only by an identity of trigonometry are the same term, so what
-    cancels does cancel: no simplifier that searches is needed.
+    In this normal form terms that are equal by a trigonometric identity are the same term, so that
+    they cancel without a search for simplifications.
     """
     expanded = sp.expand(expression)
     return sp.Add(*(_linear(term) for term in sp.Add.make_args(expanded)))
@@ -199,8 +199,8 @@ def _product(part: Expr, wave: Expr) -> Expr:
 def over_bodies(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
     """Coordinates, velocities and accelerations by those of the bodies: φ = ψ_B - ψ_A.
 
-    Put into an expression (`xreplace`), sums along the tree such as θ + φ become the one symbol of
-    a body, which keeps the algebra as small as the mechanism is.
+    Substituted into an expression (`xreplace`), sums along the tree such as θ + φ become one symbol
+    of a body, which keeps expressions short.
     """
     result: dict[Expr, Expr] = {}
     for coordinates, x, y, angle in _orders(symbols):
@@ -213,7 +213,7 @@ def over_bodies(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
 
 
 def over_coordinates(model: Model, symbols: Symbols) -> dict[Expr, Expr]:
-    """The way back: the bodies' angles and angular rates as sums of coordinates."""
+    """The inverse: the bodies' angles and angular rates as sums of coordinates."""
     result: dict[Expr, Expr] = {}
     for coordinates, x, y, angle in _orders(symbols):
         for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):

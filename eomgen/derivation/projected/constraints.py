@@ -61,7 +61,7 @@ class Constraint:
 
 
 def state_joints(model: Model, symbols: Symbols, ledger: Ledger) -> tuple[Constraint, ...]:
-    """State every joint and differentiate it; rotations that are long get definitions."""
+    """State every joint's constraint and differentiate it; long rotations get definitions."""
     found: list[Constraint] = []
     nothing = Moving(*(sp.zeros(3, 1) for _ in range(4)))
     starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
@@ -135,8 +135,8 @@ def _moved(
     symbols: Symbols,
     ledger: Ledger,
 ) -> tuple[Expr, Expr, Expr]:
-    """Rotation, angular velocity in the turned axes, and displacement of a row of primitives; also
-    q'.
+    """Rotation, angular velocity in the rotated axes, and displacement of a sequence of primitives;
+    also registers q'.
     """
     rotation, relative_omega, slide = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
     q, v = list(q), list(v)
@@ -176,9 +176,9 @@ def _axis_angle_of(
     symbols: Symbols,
     dimensions: int,
 ) -> tuple[Expr, Expr] | None:
-    """Coordinate axis and angle of a joint whose turns are all about one; the angle is 0 of none.
+    """Coordinate axis and angle of a joint whose rotations are all about one axis; angle 0 if none.
 
-    Angles about one axis add up, however many joints are between.
+    Angles about one axis add, also over several joints.
     """
     axis, angle = sp.zeros(3, 1), sp.Integer(0)
     degrees = 0.0 if isinstance(joint, Free) else joint.orientation_deg

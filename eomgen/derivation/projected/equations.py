@@ -1,7 +1,8 @@
 """D'Alembert's principle over the partial velocities: M v̇ + V + G = F.
 
-The partial velocity of a body in v_j is its velocity while v_j = 1 and all others are 0. Forces of
-constraint do no work in them, so that each row is what all bodies' inertia and loads do in one.
+The partial velocity of a body for v_j is its velocity for v_j = 1 and all other velocities 0
+(Kane). Constraint forces do no work in partial velocities. Row j is the power of all bodies'
+inertial forces and loads in them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -51,10 +52,10 @@ class Inertia:
 
 @dataclass(frozen=True)
 class Loads:
-    """What acts: forces in world axes with their points, and forces on joints' coordinates by v.
+    """The loads: forces in world axes with their points, and generalised forces by index in v.
 
-    `uniform` is the acceleration of gravity in world axes, if all gravity is one; then `gravity`
-    holds no forces.
+    `uniform` is the acceleration of gravity in world axes, if it is the same for all bodies. Then
+    `gravity` is empty.
     """
 
     uniform: Expr
@@ -74,7 +75,7 @@ class Balance:
 
 
 class SymbolicTreeMechanism(Unmoved):
-    """The model as effects see it while they put their loads on it."""
+    """The model as effects see it: masses, parameters and inputs as symbols."""
 
     def __init__(self, model: Model, symbols: Symbols) -> None:
         self._symbols = symbols
@@ -113,7 +114,7 @@ def inertias(model: Model, symbols: Symbols) -> tuple[Inertia, ...]:
 
 
 def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...]) -> Loads:
-    """What the effects put on bodies and joints."""
+    """The loads of all effects on bodies and joints."""
     mechanism = SymbolicTreeMechanism(model, symbols)
     given = [load for effect in model.effects for load in effect.loads(mechanism)]
     first = {body.joint.name: j for body, j in zip(model.bodies, model.first_velocity, strict=True)}
@@ -140,7 +141,7 @@ def _spatial(vector: tuple[Expr, ...]) -> Expr:
 
 
 def _uniform(forces: tuple[tuple[int, Expr, Expr], ...], bodies: tuple[Inertia, ...]) -> Expr:
-    """The one acceleration that forces at centres of mass give all bodies, or 0."""
+    """The acceleration that gravity gives all bodies, if it is the same for all; else 0."""
     none = sp.zeros(3, 1)
     if len(forces) != sum(body.mass != 0 for body in bodies) or not forces:
         return none
@@ -161,7 +162,7 @@ def set_in_motion(
     ledger: Ledger,
     symbols: Symbols,
 ) -> tuple[Motion, ...]:
-    """Every body's motion by its parent's, joint after joint; what is long gets a name."""
+    """Every body's motion from its parent's, joint by joint; long expressions get names."""
     still = dict.fromkeys(symbols.a, sp.Integer(0))
     rest = sp.zeros(3, 1)
     ground = Motion({}, {}, omega=rest, alpha=rest, acceleration=rest, gravity=uniform)
@@ -226,7 +227,7 @@ def _by(moving: Moving, partial_omega: Expr, partial_velocity: Expr) -> dict[Exp
 
 
 class World:
-    """Rotations from a body's axes to the world's, or to those of a body further in."""
+    """Rotations from a body's axes to the world's, or to those of an ancestor."""
 
     def __init__(self, model: Model, constraints: tuple[Constraint, ...], ledger: Ledger) -> None:
         self._model, self._constraints, self._ledger = model, constraints, ledger
@@ -241,7 +242,9 @@ class World:
         return self._known[body, base]
 
     def axis_angle(self, body: int, base: int = -1) -> tuple[Expr, Expr] | None:
-        """Coordinate axis and angle between two bodies, if all joints between turn about one."""
+        """Coordinate axis and angle between two bodies, if all joints between rotate about one
+        axis.
+        """
         axis, angle = sp.zeros(3, 1), sp.Integer(0)
         while body != base:
             axis_angle = self._constraints[body].axis_angle
@@ -344,7 +347,7 @@ def _written_out(entry: Expr, ledger: Ledger) -> Expr:
 def generalised(
     model: Model, motions: Sequence[Motion], world: World, load: tuple[int, Expr, Expr]
 ) -> dict[int, Expr]:
-    """What a force in world axes at a point of a body does in each velocity."""
+    """The generalised forces of a force (world axes) at a point of a body, by index in v."""
     k, at, outside = load
     motion, floating = motions[k], carried_along(model)
     force = world.rotation(k).T * outside
@@ -372,7 +375,7 @@ def armatures(model: Model, symbols: Symbols) -> dict[int, Expr]:
 
 
 def carried_along(model: Model) -> dict[int, int]:
-    """The velocities that carry floating trees along the world's axes, and the axis of each."""
+    """The translational velocities of floating trees, with the world axis of each."""
     return {
         first + i: i
         for body, first in zip(model.bodies, model.first_velocity, strict=True)

@@ -2,17 +2,17 @@
 
 By Gauss's principle the accelerations v̇ minimise Σ w (j v̇ + b)²: three squares a body for its
 centre of mass, with its mass as weight, three for its rotation, with its moments of inertia, and
-one for each rotor. b is what the velocities and gravity make of the acceleration; all other forces
-Q stand beside the sum. Eliminating an unknown k, of entry a in each row, takes
+one for each rotor. b is the acceleration at v̇ = 0, from velocities and gravity. All other forces Q
+are a linear term beside the sum. Eliminating an unknown k with entry a in each row takes
 
     pivot       d = Σ w a²
     coupling    c_j = Σ w a j / d       and   β = Σ w a b / d
     rows        j - a c_j,   b - a β    forces   Q_j - c_j Q_k
     leaving     v̇_k = Q_k / d - β - Σ c_j v̇_j, or f / d - Σ c_j v̇_j with f = Q_k - d β
 
-(weighted Gram-Schmidt, Golub & Van Loan §5.2), so that no pivot is ever a difference of large
-numbers. A floating tree's translation goes first, in the axes of its root; then all other
-velocities from the leaves inwards.
+(weighted Gram-Schmidt, Golub & Van Loan §5.2). No pivot is a difference of large numbers. A
+floating tree's translation is eliminated first, in the axes of its root; then all other velocities,
+from the leaves to the root.
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ from eomgen.scene.joints import Free
 
 @dataclass
 class Row:
-    """One weighted square: entries by index of velocity, and what the acceleration is without."""
+    """One weighted square: entries by index of velocity, and the acceleration b at v̇ = 0."""
 
     weight: Expr
     entries: dict[int, Expr]
@@ -144,7 +144,7 @@ def solve(
 
 
 def _inwards(model: Model) -> list[int]:
-    """The velocities from the leaves inwards; of one joint the slides first, which are cheaper."""
+    """The velocities from the leaves to the root; prismatic ones of a joint first, as cheaper."""
     order: list[int] = []
     for body, first in reversed([*zip(model.bodies, model.first_velocity, strict=True)]):
         units = [c.unit for c in body.velocities]
@@ -169,7 +169,7 @@ def _set_forces(
     world: World,
     work: Elimination,
 ) -> None:
-    """All forces but uniform gravity, and less the gyroscopic torques ω x I ω."""
+    """All forces but uniform gravity, minus the gyroscopic torques ω x I ω."""
     forces = dict(enumerate(symbols.tau))
     for j, force in acting.motors.items():
         forces[j] += force
@@ -186,7 +186,7 @@ def _set_forces(
 def _angular_rows(
     model: Model, k: int, body: Inertia, motion: Motion, work: Elimination
 ) -> list[Row]:
-    """Three squares of a body's rotation: I = Lᵀ D L, weights D, entries L times the turns."""
+    """Three squares of a body's rotation: I = Lᵀ D L, weights D, entries L times partial ω."""
     name = model.bodies[k].name
     values = [model.value(entry) for entry in model.bodies[k].inertia_com[:3]]
     # From the largest moment down: it is not 0 unless all are.
@@ -300,7 +300,7 @@ def _drift(
 def _fall(
     model: Model, symbols: Symbols, drift: Drift, uniform: Expr, world: World, ledger: Ledger
 ) -> None:
-    """The acceleration of a floating tree's root: that of the whole, less what the rest does."""
+    """The acceleration of a floating tree's root: the whole tree's, minus that from other v̇."""
     inside = -drift.bias
     for j, part in drift.mean.items():
         inside -= part * symbols.a[j]

@@ -60,7 +60,7 @@ class Symbols:
 
 
 def real(name: str) -> Expr:
-    """A real symbol. No name of a scene holds two underscores: names with them meet none."""
+    """A real symbol. Names of scenes contain no two underscores, so these never clash."""
     return sp.Symbol(name, real=True)
 
 
@@ -111,7 +111,7 @@ def _sizes(model: Model) -> dict[Real, None]:
 
 @dataclass
 class Ledger:
-    """Definitions in the order they are made; the one thing of a derivation that grows.
+    """The definitions of a derivation, in order: its only mutable object.
 
     `fixed` are symbols of parameters. `inline` is the number of operations up to which an
     expression stands where it is used and gets no name of its own, `longest` that up to which it is
