@@ -1,1 +1,1 @@
-"""Scenes: tables, joints, effects; read and checked, each fault with its place and remedy."""
+"""Scenes: tables, joints and effects, read and checked. An error says its location and remedy."""

@@ -1,4 +1,4 @@
-"""The looks of a scene: shapes on bodies, and the camera. Nothing here enters an equation."""
+"""The appearance of a scene: shapes on bodies, and the camera. No equation depends on it."""
 
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal, TypeAlias

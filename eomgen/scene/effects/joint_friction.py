@@ -53,7 +53,7 @@ class JointFriction(OnJoints):
         return self
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """Equal and opposite on the joint's two bodies; the world takes its own."""
+        """Equal and opposite loads on the joint's two bodies."""
         viscous = mechanism.value(self.viscous)
         for dof in self.dofs(mechanism):
             against = scale(viscous, dof.rates)

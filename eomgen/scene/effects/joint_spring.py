@@ -62,7 +62,7 @@ class JointSpring(OnJoints):
                 )
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """Equal and opposite on the joint's two bodies; the world takes its own."""
+        """Equal and opposite loads on the joint's two bodies."""
         for dof in self.dofs(mechanism):
             stretch = self._stretch(mechanism, dof)
             if self.law is not None:

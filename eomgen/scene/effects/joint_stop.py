@@ -85,14 +85,14 @@ class JointStop(OnJoints):
                 )
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """Equal and opposite on the joint's two bodies; the world takes its own."""
+        """Equal and opposite loads on the joint's two bodies."""
         if self.restitution is not None:
             return
         for dof in self.dofs(mechanism):
             yield from dof.loads(negative(dof.along(self._back(mechanism, dof))))
 
     def _back(self, mechanism: Mechanism, dof: Dof) -> Scalar:
-        """k x + c dq/dt, as far as it pushes back."""
+        """k x + c dq/dt where it pushes back, else 0."""
         beyond, nothing = self._beyond(mechanism, dof), mechanism.number(0.0)
         back = mechanism.value(self.stiffness) * beyond
         if self.damping == ZERO:
@@ -135,13 +135,13 @@ class JointStop(OnJoints):
         return farthest
 
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
-        """Of a rigid stop: one for each limit."""
+        """One name for each limit of a rigid stop."""
         ends = (("low", self.low), ("high", self.high))
         rigid = self.restitution is not None
         return tuple(f"{self.name}_{end}" for end, limit in ends if rigid and limit is not None)
 
     def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
-        """Of a rigid stop: the gaps q - low and high - q; no friction."""
+        """For a rigid stop the gaps q - low and high - q, without friction."""
         if self.restitution is None:
             return ()
         (dof,), one = self.dofs(mechanism), mechanism.number(1.0)
@@ -166,7 +166,7 @@ class JointStop(OnJoints):
         )
 
     def _beyond(self, mechanism: Mechanism, dof: Dof) -> Scalar:
-        """How far q is beyond its limits, negative below: 0 within."""
+        """How far q is beyond its limits, rad or m: negative below, 0 within."""
         q = within = dof.value
         if self.high is not None:
             within = mechanism.call("min", within, mechanism.value(self.high))

@@ -28,7 +28,7 @@ class Motor(OnCoordinate):
         return (Input(self.name, "N m | N", about),)
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """Equal and opposite on the joint's two bodies; the world takes its own."""
+        """Equal and opposite loads on the joint's two bodies."""
         if self.torque == "input":
             torque = mechanism.input(self.name)
         else:

@@ -1,4 +1,4 @@
-"""What controllers of a joint share: target, gains, saturation, a lagging actuator."""
+"""What controllers of a joint share: target, gains, saturation, and an actuator with lag."""
 
 from collections.abc import Iterator
 
@@ -37,13 +37,13 @@ class Servo(OnCoordinate):
     )
 
     def deviation(self, mechanism: Mechanism) -> Scalar:
-        """Target less coordinate, rad or m."""
+        """Target minus coordinate, rad or m."""
         return mechanism.value(self.target) - mechanism.coordinate(
             self.joint, self.coordinate_index(mechanism)
         )
 
     def wanted(self, mechanism: Mechanism) -> Scalar:
-        """The command before it is cut off, N m or N."""
+        """The command before saturation, N m or N."""
         late = mechanism.value(self.target_rate) - mechanism.rate(
             self.joint, self.coordinate_index(mechanism)
         )
@@ -59,7 +59,7 @@ class Servo(OnCoordinate):
         return mechanism.call("max", -limit, mechanism.call("min", limit, wanted))
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:
-        """The torque of an actuator that lags."""
+        """The torque of an actuator with lag."""
         if self.lag is None:
             return ()
         about = f"torque of {self.name} | force of {self.name}"

@@ -74,7 +74,7 @@ class Spring(EffectTable):
         yield not_negative(f"{location}.rest_length", self.rest_length, "m")
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
-        """Equal and opposite on the two bodies; the world takes its own."""
+        """Equal and opposite forces on the two bodies."""
         line = _line(self, mechanism)
         pull = self._pull(mechanism, line)
         yield Load(self.body_1, pull, line.at_1, "applied")
@@ -145,8 +145,8 @@ class _Line:
         return dot(self.d, self.d_dot) / self.length
 
     def resisted(self, one: Scalar) -> Components:
-        """What damping acts against, m/s: (u·ḋ) u + (1 - u·u) ḋ, whose last term is 0 but for
-        points that meet.
+        """The velocity that damping acts against, m/s: (u·ḋ) u + (1 - u·u) ḋ, whose last term is 0
+        but for points that meet.
         """
         along, across = dot(self.d, self.d_dot) / self.larger, one - self.square / self.larger
         return tuple(along * x + across * y for x, y in zip(self.d, self.d_dot, strict=True))

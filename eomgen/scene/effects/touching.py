@@ -1,4 +1,4 @@
-"""Where two things touch: points, spheres and corners on a plane, spheres on each other."""
+"""The geometry of contact: points, spheres and corners on a plane, spheres on each other."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from eomgen.scene.joints.base import WORLD
 
 @dataclass(frozen=True)
 class Side:
-    """The touching point P of one of two bodies: the body's point `at`, further by a lever.
+    """The contact point P on one of two bodies: the body's point `at` plus a lever.
 
     `at` from the centre of mass in body axes; the lever is `arm` + `reach` n, m, world axes.
     () and None are none of either.
@@ -24,7 +24,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Touch:
-    """Two things that may touch, in a state: the same point P of both where they do.
+    """Two things that may touch, at a state; where they touch, P is the same point of both.
 
     `normal` n, world axes, has unit length and drives the first away from the second; `gap` is
     their distance, m, negative where they overlap. The second side is left out if the world's.
@@ -105,12 +105,12 @@ def on_ball(mechanism: Mechanism, first: Ball, second: Ball) -> Touch:
 
 
 def parting(mechanism: Mechanism, touch: Touch) -> Scalar:
-    """How fast the gap grows, m/s."""
+    """The rate of the gap, m/s."""
     return dot(touch.normal, _between([_speed(mechanism, side, side.arm) for side in touch.sides]))
 
 
 def sliding(mechanism: Mechanism, touch: Touch) -> tuple[Scalar, Vector]:
-    """How fast the gap grows, and the slip of the first on the second, world axes; m/s."""
+    """The rate of the gap, and the slip velocity of the first on the second, world axes, m/s."""
     levers = (_lever(touch, side) for side in touch.sides)
     speeds = [_speed(mechanism, s, lever) for s, lever in zip(touch.sides, levers, strict=True)]
     u = _between(speeds)
@@ -124,12 +124,12 @@ def point_loads(touch: Touch, force: Vector) -> tuple[Load, ...]:
 
 
 def pressing(touch: Touch, force: Scalar) -> tuple[Load, ...]:
-    """The same of a force along the normal, which no reach along it turns."""
+    """The same for a force along the normal, whose lever along the normal has no moment."""
     return _on_both(touch, scale(force, touch.normal), [side.arm for side in touch.sides])
 
 
 def tangents(mechanism: Mechanism, touch: Touch) -> tuple[Vector, ...]:
-    """Unit vectors across the normal and each other, world axes: one in the plane, two in space.
+    """Unit tangents, normal to each other, in world axes: one in the plane, two in space.
 
     n, t1, t2 are right-handed, by Duff et al., "Building an orthonormal basis, revisited",
     J. Computer Graphics Techniques 6 (2017) 1-8.
@@ -146,7 +146,7 @@ def tangents(mechanism: Mechanism, touch: Touch) -> tuple[Vector, ...]:
 
 
 def merged(loads: Sequence[Load]) -> Iterator[Load]:
-    """One load where several act on the same point of a body."""
+    """The loads, with those on the same point of a body added."""
     found: dict[tuple[str, Vector], Load] = {}
     for load in loads:
         key = load.body, load.at
@@ -169,7 +169,7 @@ def _on_both(touch: Touch, force: Vector, levers: Sequence[Vector]) -> tuple[Loa
 
 
 def _lever(touch: Touch, side: Side) -> Vector:
-    """From the side's own point to P, world axes."""
+    """The vector from the side's own point to P, world axes, m."""
     if side.reach is None:
         return side.arm
     reach = scale(side.reach, touch.normal)
@@ -177,7 +177,7 @@ def _lever(touch: Touch, side: Side) -> Vector:
 
 
 def _speed(mechanism: Mechanism, side: Side, lever: Vector) -> Vector:
-    """World velocity of the body's point, further by a lever."""
+    """World velocity of the body's point plus a lever, m/s."""
     speed = mechanism.velocity(side.body, side.at)
     if not lever:
         return speed
@@ -189,7 +189,7 @@ def _speed(mechanism: Mechanism, side: Side, lever: Vector) -> Vector:
 
 
 def _between(speeds: Sequence[Vector]) -> Vector:
-    """The first, against the second if there is one."""
+    """The first velocity, relative to the second if there is one."""
     return sub(*speeds) if len(speeds) == 2 else speeds[0]
 
 

@@ -1,4 +1,4 @@
-"""The ball joint, with a unit quaternion for its three angles."""
+"""The ball (spherical) joint, with a unit quaternion for its orientation."""
 
 from typing import ClassVar, Literal
 

@@ -1,4 +1,4 @@
-"""The free joint: a body that nothing holds."""
+"""The free joint: a body with all degrees of freedom."""
 
 from typing import ClassVar, Literal
 

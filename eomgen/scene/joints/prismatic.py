@@ -1,4 +1,4 @@
-"""The sliding joint."""
+"""The prismatic (sliding) joint."""
 
 from typing import Literal
 
@@ -15,7 +15,7 @@ class Prismatic(Geared):
     axis: Numbers = Field(description="direction in the child's axes")
 
     def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
-        """The way from the joint's point on the parent to that on the child."""
+        """The displacement of the joint's point on the child from that on the parent, m."""
         base = "the world" if self.parent == WORLD else self.parent
         name = self.coordinate or f"{self.name}_slide"
         return (Coordinate(name, "m", f"way of {self.child} along {base}"),)

@@ -1,4 +1,4 @@
-"""The rotational joint: a pin that two bodies share, or a body and the world."""
+"""The revolute joint: a pin between two bodies, or between a body and the world."""
 
 from typing import Literal
 

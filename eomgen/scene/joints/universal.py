@@ -1,4 +1,4 @@
-"""The universal joint: two pins that cross."""
+"""The universal joint: two revolute axes in series."""
 
 from typing import ClassVar, Literal
 
