@@ -107,6 +107,9 @@ def _parser() -> argparse.ArgumentParser:
     _force(derive)
     generate = command("generate", commands.generate, "write the module of a scene", "scenes")
     _code(_form(generate))
+    generate.add_argument(
+        "--backend", metavar="NAME", default="numpy", help="language: numpy (default), javascript"
+    )
     generate.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("generated"))
     generate.add_argument("--all", action="store_true", help="all built-in scenes")
     generate.add_argument("--check", action="store_true", help="say which is stale, write nothing")

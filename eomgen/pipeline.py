@@ -6,12 +6,14 @@ A scene is read by `scene.reader` and elaborated by `model.elaborate`; `store` k
 generated, `run` loads and integrates it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from eomgen.codegen.backends.javascript import javascript_poses
-from eomgen.codegen.backends.python import python_module
+from eomgen.codegen.backends import find_backend, python
+from eomgen.codegen.backends.javascript import body_poses
 from eomgen.codegen.choice import Candidate, Choice, choose
 from eomgen.codegen.derive import record
+from eomgen.codegen.interface import interface_of
 from eomgen.codegen.system import System, optimised
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
@@ -90,16 +92,26 @@ def compile_program(model: Model, *, jacobian: bool = True, closed: bool = True)
 
 
 def render(made: Compiled) -> Generated:
-    """The files of a program."""
-    system, choice = made.system, made.choice
+    """The NumPy module of a program, and what belongs to it."""
+    program, interface = made.system.program, interface_of(made.system)
     return Generated(
-        python_module(system),
-        javascript_poses(system) if "body_poses" in system.model.outputs else "",
-        system.program,
-        system.reports,
+        python.module(program, interface),
+        body_poses(program, interface),
+        program,
+        made.system.reports,
         tuple(made.explanation()),
-        tuple(choice.notices()),
+        tuple(made.choice.notices()),
     )
+
+
+def files(made: Compiled, backend: str) -> Mapping[str, str]:
+    """The files of a program in a language, by name. Raises `RunError` if there is no such one."""
+    return find_backend(backend).files(made.system.program, interface_of(made.system))
+
+
+def python_module(system: System) -> str:
+    """The NumPy module of a system."""
+    return python.module(system.program, interface_of(system))
 
 
 def compile_model(model: Model) -> str:

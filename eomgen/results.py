@@ -108,6 +108,8 @@ class Module:
     notices      what its user must know of it
     reports      what each pass over the program left of it: steps and operations
     derived      whether it was derived now; else it was in the store
+    backend      the language it is in
+    others       further files of that language, by name
     """
 
     name: str
@@ -117,10 +119,16 @@ class Module:
     notices: tuple[str, ...]
     reports: "tuple[PassReport, ...]" = ()
     derived: bool = field(default=True, compare=False)
+    backend: str = "numpy"
+    others: Mapping[str, str] = field(default_factory=dict)
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
-        """Write the file, whole or not at all. Raises `RunError` where another's is there."""
+        """Write the file, whole or not at all, and further files beside it. Raises `RunError` where
+        another's is there.
+        """
         write_whole(Path(path), self.source, force=force)
+        for name, text in self.others.items():
+            write_whole(Path(path).with_name(name), text, force=force)
 
     def _repr_html_(self) -> str:
         lines = "\n".join(self.explanation)

@@ -6,10 +6,9 @@ from functools import cache
 import numpy as np
 from engine import MP, STEP, Engine, along, exact, read
 
-from eomgen.codegen.backends.python import python_module
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.schema import Scene

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from eomgen.codegen import from_recursion as recording
-from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.system import System
 from eomgen.language.formula import names_in
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.program.extended import evaluator
 from eomgen.program.tape import TIME
 from eomgen.run.module import load_module

@@ -11,10 +11,11 @@ from campaign import some
 from engine import Engine
 from newton_euler import Mechanism, Motion, solve
 
-from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.from_equations import from_equations
+from eomgen.codegen.system import optimised
 from eomgen.derivation.closed import Equations, derive
 from eomgen.model.elaborate import elaborate
+from eomgen.pipeline import python_module
 from eomgen.scene.reader import parse_scene, read_scene
 
 BUILT_IN = ("double_pendulum", "pendulum", "two_body", "two_body_forced")
@@ -109,7 +110,7 @@ def _compiled(scene: Scene, form: str) -> Compiled:
         equations = derive(model)
     else:  # the same equations, to be written in other states
         equations = replace(compiled(scene).equations, model=model)
-    system = from_equations(equations)
+    system = optimised(from_equations(equations))
     assert system.route == "closed"
     source = python_module(system)
     return Compiled(model, system, source, load(source), scene, equations)

@@ -10,10 +10,9 @@ from typing import Any, Literal
 import numpy as np
 from engine import Engine, read
 
-from eomgen.codegen.backends.python import python_module
 from eomgen.language.formula import parse
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.run.module import load_module
 from eomgen.scene.effects.base import (
     Contact,

@@ -362,7 +362,7 @@ def test_slight_moments_of_inertia() -> None:
     """A needle on a base that turns faster and faster about the needle's own axis, which resists by
     1e-13 of what the others do: 0.3 rad/s² less 0.7 rad/s².
     """
-    assert compile_program(elaborate(parse_scene(NEEDLE))).digits is None
+    assert compile_program(elaborate(parse_scene(NEEDLE))).choice.digits is None
     for route, module in modules(NEEDLE, "aba", "ldl", "orthogonal").items():
         found = module.derivative(0.0, [0.2, 0.4])[1]
         assert found == pytest.approx(-0.4, rel=1e-14), route

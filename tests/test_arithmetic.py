@@ -14,11 +14,10 @@ import pytest
 from engine import MP, Digits, apart, exact, read
 
 from eomgen.cli import main
-from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.system import System
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, Program, finish, interpret
 from eomgen.program.tape import TIME, ExactTape, Stage, Tape

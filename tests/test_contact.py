@@ -21,12 +21,11 @@ from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
 from eomgen.cli import main
-from eomgen.codegen.backends.python import python_module
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.scalars.exact import Real
 from eomgen.scene.effects.base import Contact, JointLoad, Load
 from eomgen.scene.effects.vectors import NEAREST

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from engine import MP, engine, quick
 
-from eomgen.codegen.backends.python import python_module
 from eomgen.language.formula import Constant, Formula, evaluate, parse
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.program.tape import Tape
 from eomgen.run.integrate import integrate
 from eomgen.run.module import load_module

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from eomgen.cli import main
-from eomgen.codegen.backends.python import python_module
 from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.precision.guarding import guard_of
 from eomgen.program.program import Program
 from eomgen.run.guard import LOST, Guard, RoundingMonitor

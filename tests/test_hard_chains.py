@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.codegen.backends.python import python_module
 from eomgen.dynamics.diagnostics import values_at
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import BUILT_IN, parse_scene

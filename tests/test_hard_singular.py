@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.codegen.backends.python import python_module
 from eomgen.dynamics.singularity import check_nonsingular, relative_pivots
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.run.integrate import integrate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene

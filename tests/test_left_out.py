@@ -14,7 +14,8 @@ from spatial_trees import PLANE, SPACE, random_spatial_tree
 from test_show_space import page_parts
 
 from eomgen.cli import main
-from eomgen.codegen.backends.javascript import javascript_poses
+from eomgen.codegen.backends.javascript import body_poses
+from eomgen.codegen.interface import interface_of
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
 from eomgen.linear.equilibrium import equilibrium
@@ -344,7 +345,7 @@ def test_poses_of_every_function_in_javascript() -> None:
     y, times = np.array([0.4, -1.0]), [0.0, 0.4, 1.1, 1.3, 1.9, 2.7]
     p = list(e.module.PARAMETERS.values())
     call = f"bodyPoses({json.dumps(y.tolist())}, {json.dumps(p)}, t)"
-    script = f"{javascript_poses(e.system)}\n"
+    script = f"{body_poses(e.system.program, interface_of(e.system))}\n"
     script += f"console.log(JSON.stringify({json.dumps(times)}.map((t) => {call})));"
     answer = subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True)
     expected = [e.module.body_poses(t, y) for t in times]

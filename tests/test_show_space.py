@@ -16,7 +16,7 @@ import pytest
 from matplotlib.text import Text
 from pydantic import TypeAdapter
 
-from eomgen.codegen.backends.javascript import javascript_poses
+from eomgen.codegen.backends.javascript import body_poses
 from eomgen.errors import SceneError
 from eomgen.program.program import Output, finish
 from eomgen.program.tape import Stage, Tape
@@ -449,18 +449,18 @@ def test_motions_are_thinned_and_checked() -> None:
 
 
 KINDS: dict[str, tuple[Any, ...]] = {
-    "free": ("slide", "slide", "slide", "spin"),
-    "ball": ("spin",),
-    "planar": ("slide", "slide", "turn"),
-    "prismatic": ("slide",),
-    "revolute": ("turn",),
+    "free": ("prismatic", "prismatic", "prismatic", "spherical"),
+    "ball": ("spherical",),
+    "planar": ("prismatic", "prismatic", "revolute"),
+    "prismatic": ("prismatic",),
+    "revolute": ("revolute",),
     "weld": (),
 }
 
 
 def joint(kind: str, parent: str, r_parent: Any = (), r_child: Any = ()) -> Any:
-    moves = tuple(Primitive(move) for move in KINDS[kind])
-    held = SimpleNamespace(name=kind, parent=parent, moves=lambda _: moves)
+    primitives = tuple(Primitive(primitive) for primitive in KINDS[kind])
+    held = SimpleNamespace(name=kind, parent=parent, primitives=lambda _: primitives)
     if kind != "free":
         held.r_parent, held.r_child = r_parent, r_child
     return SimpleNamespace(name=f"{kind}_body", joint=held)
@@ -608,12 +608,11 @@ def test_poses_in_space_as_javascript() -> None:
     cos, sin = tape.apply("cos", angle), tape.apply("sin", angle)
     rows = [cos, zero, sin, x, zero, one, zero, zero, -sin, zero, cos, zero]
     output = Output((1, 3, 4), tuple(node.index for node in rows))
-    system: Any = SimpleNamespace(
-        program=finish(tape, {"body_poses": output}, ()),
-        states=(SimpleNamespace(name="angle"), SimpleNamespace(name="x")),
-        model=SimpleNamespace(parameters=()),
+    interface: Any = SimpleNamespace(
+        states=(SimpleNamespace(name="angle"), SimpleNamespace(name="x")), parameters=()
     )
-    assert javascript_poses(system).split("return ")[1].split() == (
+    program = finish(tape, {"body_poses": output}, ())
+    assert body_poses(program, interface).split("return ")[1].split() == (
         "[ [[cos_angle, 0.0, sin_angle, x], [0.0, 1.0, 0.0, 0.0], "
         "[-sin_angle, 0.0, cos_angle, 0.0]], ]; }".split()
     )

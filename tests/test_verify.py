@@ -14,11 +14,10 @@ from engine import MP, read
 from gmpy2 import mpfr
 
 from eomgen.cli import main
-from eomgen.codegen.backends.python import python_module
 from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.precision.extended import doubles, extended, extended_digits
 from eomgen.run.module import load_module
 from eomgen.scene.reader import find_scene

@@ -1,6 +1,7 @@
 """The generated module of a scene: `generate`, `load`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -25,18 +26,22 @@ def generate(
     form: Form | None = None,
     route: Route | None = None,
     outputs: Outputs | None = None,
+    backend: str = "numpy",
 ) -> Module:
     """The generated module of a scene: its text, and why its route was taken.
 
     form, route  of the state and to the equations; None: the scene's own
+    backend      the language: a name in `codegen.backends.BACKENDS`
     outputs      what it computes beside `derivative` and `jacobian`: names, or "all"; None: the
                  scene's own
 
-    Raises `SceneError` where they are not for the scene.
+    Raises `SceneError` where they are not for the scene, `RunError` for an unknown backend.
     """
+    check_backend(backend)
     model = overridden(check(source), form=form, route=route, outputs=outputs)
     asked = () if outputs in (None, "all") else model.outputs
-    return compiled(model, asked=asked)[0]
+    module, _ = compiled(model, asked=asked)
+    return module if backend == "numpy" else translated(module, model, backend)
 
 
 def load(module: Module | str | PathLike[str]) -> GeneratedModule:
@@ -46,6 +51,8 @@ def load(module: Module | str | PathLike[str]) -> GeneratedModule:
     Raises `RunError` where the file cannot be read, or was not generated.
     """
     if isinstance(module, Module):
+        if module.backend != "numpy":
+            raise RunError(f"backend: Python loads modules of 'numpy', not of '{module.backend}'")
         return load_module(module.source, module.name)
     path = Path(module)
     source = read_plain(path, LARGEST).decode("utf-8", "replace")
@@ -65,6 +72,25 @@ def module_of(code: Code, model: Model) -> Module:
         code.reports,
         code.derived,
     )
+
+
+def check_backend(backend: str) -> str:
+    """The suffix of the main file of a language. Raises `RunError` if there is no such language."""
+    if backend == "numpy":
+        return ".py"
+    # Imported here because it brings the templates, which a run does without.
+    from eomgen.codegen.backends import find_backend
+
+    return find_backend(backend).SUFFIXES[0]
+
+
+def translated(module: Module, model: Model, backend: str) -> Module:
+    """A model's module in another language. Raises `RunError` for an unknown one."""
+    # Imported here because it brings what derives, which takes long to load.
+    from eomgen.pipeline import compile_program, files
+
+    source, *others = files(compile_program(model), backend).items()
+    return replace(module, source=source[1], backend=backend, others=dict(others))
 
 
 def compiled(

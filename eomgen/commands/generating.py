@@ -3,7 +3,7 @@
 import shlex
 from pathlib import Path
 
-from eomgen.api.generating import LARGEST, compiled
+from eomgen.api.generating import LARGEST, check_backend, compiled, translated
 from eomgen.commands.shared import Arguments, manner_of, read_model, required
 from eomgen.errors import EomgenError, RunError, report_refusal
 from eomgen.files import check_folder, check_writable, read_plain
@@ -33,8 +33,8 @@ def generate(given: Arguments) -> int:
             f"-o {shlex.quote(str(given.output))}"
             + "".join(
                 f" --{option} {shlex.quote(value)}"
-                for option in ("form", "route", "outputs")
-                if (value := getattr(given, option)) is not None
+                for option in ("form", "route", "outputs", "backend")
+                if (value := getattr(given, option)) not in (None, "numpy")
             )
         )
     return 1 if refused else 0
@@ -43,7 +43,7 @@ def generate(given: Arguments) -> int:
 def _generate(scene: str, given: Arguments, paths: dict[Path, str]) -> bool:
     """Write or check a scene's module, whose file joins `paths`; whether it is fresh then."""
     model, name = read_model(scene, given)
-    path = given.output / f"{name}.py"
+    path = given.output / f"{name}{check_backend(given.backend)}"
     if path in paths:
         raise RunError(f"{path}: would be written for {paths[path]} and for {scene}; rename one")
     paths[path] = scene
@@ -54,6 +54,8 @@ def _generate(scene: str, given: Arguments, paths: dict[Path, str]) -> bool:
     module, _ = compiled(
         model, asked=required(given, model), anew=given.check, manner=manner_of(given, scene)
     )
+    if given.backend != "numpy":
+        module = translated(module, model, given.backend)
     current = _text(path)
     fresh = current == module.source
     if fresh:

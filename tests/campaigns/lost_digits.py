@@ -24,9 +24,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from spatial_trees import ORIGIN, PLANE, SPACE, SpatialTree, TreeBody, TreeJoint
 
-from eomgen.codegen.backends.python import python_module
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
 from eomgen.show.style import FAINT, INK, style

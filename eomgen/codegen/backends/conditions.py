@@ -1,13 +1,12 @@
 """What a module asks of its parameters, as lines of source."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
+from eomgen.codegen.interface import Interface
 from eomgen.errors import listed
-from eomgen.language.conditions import Condition, is_of_size
+from eomgen.language.conditions import Condition
 from eomgen.language.formula import evaluate, names_in
-from eomgen.model.model import Model
 from eomgen.program.printing import Dialect, Names, print_block
 from eomgen.program.program import finish
 from eomgen.program.scalars import TapeScalars
@@ -25,12 +24,12 @@ class Refusals:
     functions: tuple[str, ...]
 
 
-def refusals(model: Model, dialect: Dialect) -> Refusals:
-    """The conditions on a model's parameters, each once."""
-    conditions = list(dict.fromkeys(_asked(model)))
+def refusals(interface: Interface, dialect: Dialect) -> Refusals:
+    """The conditions on a program's parameters, each once."""
+    conditions = interface.conditions
     tape = Tape()
     scalars = TapeScalars(tape)
-    given = {p.name: tape.input(p.name, Stage.PARAMETERS) for p in model.parameters}
+    given = {p.name: tape.input(p.name, Stage.PARAMETERS) for p in interface.parameters}
     parts = {
         c: [evaluate(f, given, scalars).index for f in (c.value, *c.shown)] for c in conditions
     }
@@ -44,17 +43,6 @@ def refusals(model: Model, dialect: Dialect) -> Refusals:
         for c in conditions
     )
     return Refusals(block.lines, tests, block.functions)
-
-
-def _asked(model: Model) -> Iterator[Condition]:
-    """The conditions that depend on parameters, but for those that a module asks in other ways:
-    sizes of single parameters, and masses and moments of which its equations ask more.
-    """
-    moments = {entry for body in model.bodies for entry in (body.mass, *body.inertia_com[:3])}
-    for c in model.conditions:
-        bound = c.low == 0.0 and c.high == math.inf and not c.strict
-        if c.depends and not is_of_size(c) and not (bound and c.value in moments):
-            yield c
 
 
 def _test(condition: Condition, value: str) -> str:

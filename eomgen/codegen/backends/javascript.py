@@ -1,20 +1,26 @@
-"""The JavaScript backend: poses of the bodies from the state, for the page that plays a motion."""
+"""The JavaScript backend: an ES module of all outputs, and the poses that the page plays."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from eomgen.codegen.system import System
+from eomgen.codegen.interface import Interface
+from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.program.printing import Dialect, Names, print_block
+from eomgen.program.program import Program
 from eomgen.program.tape import TIME
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.templating import render
 
+SUFFIXES: tuple[str, ...] = (".js",)
+TEMPLATES = "javascript"
+ABOUT = "an ES module that needs nothing"
 RESERVED = frozenset(
-    "y p select step Math break case catch class const continue debugger default delete do "
-    "else enum eval export extends false finally for function if implements import in "
-    "instanceof interface let new null package private protected public return static super "
-    "switch this throw true try typeof var void while with yield await async of get set "
-    "arguments undefined NaN".split()
-)
+    "y p u k t extra step select Math Number Array Map Error JSON break case catch class const "
+    "continue debugger default delete do else enum eval export extends false finally for function "
+    "if implements import in instanceof interface let new null package private protected public "
+    "return static super switch this throw true try typeof var void while with yield await async "
+    "of get set arguments undefined NaN".split()
+) - {TIME}
 OWN = {
     "step": "(x) => (x > 0 ? 1 : 0)",
     "select": "(c, a, b) => (c > 0 ? a : b)",
@@ -23,19 +29,71 @@ OWN = {
 DIALECT = Dialect({name: name if name in OWN else f"Math.{name}" for name in FUNCTIONS}, RESERVED)
 
 
-def javascript_poses(system: System) -> str:
+def files(program: Program, interface: Interface) -> Mapping[str, str]:
+    """The module, in one file: `derivative(t, y, p, u)` and all other outputs.
+
+    States, parameters and inputs are arrays in the order of `STATES`, `PARAMETERS`, `INPUTS`. An
+    output is an array of its entries, row by row. Arithmetic is that of doubles, in the program's
+    order; the functions of `Math` may differ from Python's in their last digit.
+    """
+    kernels, constants = kernels_of(program, interface, DIALECT)
+    called = {f for kernel in kernels for f in kernel.block.functions} | {*constants.functions}
+    context: dict[str, Any] = {
+        "scene": interface.name,
+        "title": " ".join(interface.title.split()).replace("*/", "* /"),
+        "form": interface.form,
+        "states": [(s.name, s.unit) for s in interface.states],
+        "inputs": [(i.name, i.unit) for i in interface.inputs],
+        "parameters": [(p.name, repr(p.default), p.unit) for p in interface.parameters],
+        "shapes": [(k.function.name, list(k.function.shape)) for k in kernels],
+        "own_functions": [(name, OWN[name]) for name in OWN if name in called],
+        "parameter_names": ", ".join(constants.parameters),
+        "checked": constants.checked,
+        "checks": [
+            (check.about.replace('"', "'"), source, ">=" if check.may_vanish else ">")
+            for check, source in constants.checks
+        ],
+        "fixed": constants.lines,
+        "kernels": [_written(kernel) for kernel in kernels],
+    }
+    return {f"{interface.name}.js": render(TEMPLATES, "module.js.jinja", context)}
+
+
+def _written(kernel: Kernel) -> dict[str, Any]:
+    """A kernel as the template writes it."""
+    function = kernel.function
+    return {
+        "name": function.name,
+        "about": function.about.replace("*/", "* /"),
+        "constants": ", ".join(kernel.constants),
+        "state": _given(kernel.state, "y"),
+        "inputs": _given(kernel.inputs, "u"),
+        "extra": _given(kernel.extra, "extra"),
+        "takes_extra": bool(function.extra),
+        "lines": kernel.block.lines,
+        "results": kernel.block.results,
+    }
+
+
+def _given(names: Sequence[str], array: str) -> list[tuple[str, str]]:
+    """The variables that are used, each with where it stands."""
+    return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
+
+
+def body_poses(program: Program, interface: Interface) -> str:
     """`function bodyPoses(y, p)`: the poses of all bodies from state and parameters; with driven
-    joints `bodyPoses(y, p, t)`, from the time in s, too.
+    joints `bodyPoses(y, p, t)`, from the time in s, too. "" for a program without poses.
 
     For each body [x, y, angle] in the plane, m and rad; in space the three rows, four numbers each,
     of [world_R_body | position], 1 and m.
     """
-    program = system.program
+    if "body_poses" not in program.outputs:
+        return ""
     names = Names(program, DIALECT)
     poses = program.outputs["body_poses"]
     block = print_block(program, poses.nodes, names, DIALECT, fixed=True)
-    states = [s.name for s in system.states]
-    parameters = [p.name for p in system.model.parameters]
+    states = [s.name for s in interface.states]
+    parameters = [p.name for p in interface.parameters]
     used = {names[i] for i in block.constants}
     given = [
         *((names.safe(n), f"p[{i}]") for i, n in enumerate(parameters) if names.safe(n) in used),
@@ -51,7 +109,7 @@ def javascript_poses(system: System) -> str:
         "lines": block.lines,
         "rows": rows,
     }
-    return render("javascript", "poses.js.jinja", context)
+    return render(TEMPLATES, "poses.js.jinja", context)
 
 
 def _bracketed(parts: Sequence[str], width: int, between: str) -> list[str]:

@@ -91,7 +91,7 @@ class ImplicitMethod:
             changes += update
             size = float(np.abs(update).max())
             if not isfinite(size):
-                raise StepFailure("Newton the state overflows", REMEDY)
+                raise StepFailure("Newton's iteration diverges", REMEDY)
             if size == 0 or (previous and _is_solved(y, changes, update, size, previous)):
                 return np.asarray(changes.sum(axis=0))
             previous = size

@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 
-from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.choice import why_not_compared
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.routes import ROUTES
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress

@@ -2,12 +2,11 @@
 
 from dataclasses import dataclass, replace
 
-from eomgen.codegen.backends.python import python_module
 from eomgen.codegen.choice import why_not_compared
 from eomgen.codegen.system import System
 from eomgen.errors import EomgenError
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.routes import ROUTES
 from eomgen.run.module import GeneratedModule, load_module
 
