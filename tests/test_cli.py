@@ -1,5 +1,6 @@
 """The command line as a user meets it."""
 
+import hashlib
 import os
 import pty
 import re
@@ -11,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from campaign import some
+from digests import SUMS, known
 
 from eomgen.cli import main
 from eomgen.files import remove_ours
@@ -25,8 +27,9 @@ pytestmark = pytest.mark.usefixtures("blank_figures")
 
 @pytest.mark.parametrize("seed", some(("1",), ("0", "1", "2")))
 def test_committed_modules_are_what_is_generated(tmp_path: Path, seed: str) -> None:
-    """Built-in scenes derived anew give the committed bytes, whatever the seed of Python's hashes;
-    nothing else is there. The large ones take longest; `.ci/run` has them all.
+    """Built-in scenes derived anew give the committed bytes, or the committed digest, whatever the
+    seed of Python's hashes; nothing else is there. The large ones take longest; `.ci/run` has them
+    all.
     """
     names = [name for name in built_in_names() if name not in some(LARGE, ())]
     committed = ROOT / "generated"
@@ -40,7 +43,19 @@ def test_committed_modules_are_what_is_generated(tmp_path: Path, seed: str) -> N
     lines = done.stdout.splitlines()
     assert [line for line in lines if not line.endswith(": fresh")] == []
     assert done.returncode == 0 and len(lines) == len(names)
-    assert sorted(path.stem for path in committed.glob("*.py")) == sorted(built_in_names())
+    kept = [path.name for path in committed.glob("*.py")]
+    assert sorted([*kept, *known()]) == [f"{name}.py" for name in sorted(built_in_names())]
+    assert {path.name for path in committed.iterdir()} == {*kept, SUMS.name}
+
+
+def test_a_digest_stands_for_a_module(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a module that is not kept: fresh by its digest, stale by another."""
+    sums, out = tmp_path / SUMS.name, str(tmp_path)
+    right = hashlib.sha256((ROOT / "generated" / "pendulum.py").read_bytes()).hexdigest()
+    for digest, word, code in ((right, "fresh", 0), ("0" * 64, "stale", 1)):
+        sums.write_text(f"{digest}  pendulum.py\n")
+        assert main(["generate", "pendulum", "--check", "-o", out]) == code
+        assert capsys.readouterr().out == f"{tmp_path}/pendulum.py: {word}\n"
 
 
 def test_check_says_which_module_is_stale(
