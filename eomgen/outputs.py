@@ -2,7 +2,7 @@
 
 The schema takes the names from it, the check of a scene what an output is about, the stages that
 record equations its shape, and backends what to say of it. To add an output, add its entry here and
-what computes it in `program.from_recursion`.
+what computes it in `codegen.from_recursion`.
 """
 
 from collections.abc import Mapping
