@@ -22,7 +22,8 @@ from eomgen.run.module import as_problem, load_module
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.store import generated_code, program_of
 from eomgen.study.accuracy import measure
-from eomgen.study.accuracy.collocation import gauss, rows
+from eomgen.study.accuracy.collocation import rows
+from eomgen.study.accuracy.gauss import gauss
 from eomgen.study.accuracy.reference import LOOSE, TIGHT, reference
 
 ONE_SIDED = """

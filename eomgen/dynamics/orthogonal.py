@@ -29,13 +29,13 @@ Leaf to root, for each link:
 Each row carries a force φ, with t = Σ φ c, and the forces rotate with the rows. A sum t passed
 inwards would act, by its rounding error, on light bodies beside the heavy one that takes it.
 
-Root to leaf (`_outwards`), with u and s in parts of ρ and x the other accelerations:
+Root to leaf (`back_substitution`), with u and s in parts of ρ and x the other accelerations:
 
     α = s + r - u · x,    r = φ / ρ²                                                       (2)
 
 The sum in (2) could cancel where rotations have made u large. So the residuals r = c · x - s are
 rotated back (`undo_rotations`), and (2) is applied to the rows that contained α before they were
-rotated (`_value`). The residuals of a body's own rows, times their weights, are the forces of its
+rotated. The residuals of a body's own rows, times their weights, are the forces of its
 joints on it: small where the body is light. An axis along which a body has no inertia of its own is
 found from its neighbours' rows.
 
@@ -46,11 +46,12 @@ Two losses remain. One is where an inertia is a small part of mass times arm squ
 where a heavy tip is in line with all joints, to less than the rounding of sines and cosines.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from eomgen.dynamics.aligned_axes import align_axes
 from eomgen.dynamics.articulated import along, with_component
+from eomgen.dynamics.back_substitution import outwards
 from eomgen.dynamics.elimination_order import (
     column_of,
     nonzero_columns,
@@ -79,16 +80,12 @@ from eomgen.dynamics.rows import (
     Taken,
     in_parent_axes,
     shifted,
-    undo_rotations,
 )
 from eomgen.dynamics.solids import Ranks, Solid
 from eomgen.dynamics.vectors import (
     AXES,
     Vec,
     add,
-    cross,
-    dot,
-    named,
     replaced,
     scale,
     sub,
@@ -144,7 +141,7 @@ class Elimination:
                 rows[link.parent] += [(in_parent_axes(link, row), k) for row in eliminated.rows]
                 more = moved_to(self._centre(link.parent), at_parent(link, passed))
                 wrenches[link.parent] = total(wrenches[link.parent], more)
-        return self._aligned.out(self._outwards(found[::-1], len(tau)))
+        return self._aligned.out(outwards(self._links, found[::-1], len(tau), self._scalars))
 
     # Inwards.
 
@@ -388,56 +385,3 @@ class Elimination:
         left = Wrench(*with_component(motion, moment, push, back))
         one = Taken(motion, i, (first,), first.index, share, tuple(rotations), rotor)
         return one, kept, free, left
-
-    # Outwards.
-
-    def _outwards(self, found: Sequence[Eliminated], nv: int) -> list[Scalar]:
-        """v̇ (nv,), root to leaf: rotate the residuals back, then solve (2) for each axis."""
-        scalars = self._scalars
-        result = [self._rows.zero] * nv
-        residuals: dict[int, Scalar] = {}
-        reached: list[tuple[Vec, Vec]] = []
-        for link, eliminated in zip(self._links, found, strict=True):
-            angular, linear = zeros(scalars), zeros(scalars)
-            if link.parent >= 0:
-                base_angular, base_linear = reached[link.parent]
-                angular = link.rotation.into(base_angular)
-                linear = link.rotation.into(add(base_linear, cross(base_angular, link.arm)))
-            for row in (*eliminated.empty, *(eliminated.rows if link.parent < 0 else ())):
-                residuals[row.index] = -row.right
-            undo_rotations(eliminated.rotations, residuals)
-            for taken in reversed(eliminated.axes):
-                motion = taken.axis
-                residuals[taken.pivot] = taken.left
-                undo_rotations((*taken.gathered, *taken.rotations), residuals)
-                before = along(motion, angular, linear)
-                if taken.rotor >= 0:
-                    result[taken.velocity] = residuals[taken.rotor]
-                    value = before + residuals[taken.rotor]
-                else:
-                    value = self._value(taken, residuals, angular, linear)
-                    result[taken.velocity] = value - before
-                angular, linear = with_component(motion, angular, linear, value)
-                undo_rotations(taken.before, residuals)
-            angular = named(angular, f"alpha_{link.name}", scalars)
-            reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
-        return result
-
-    def _value(
-        self, taken: Taken, residuals: Mapping[int, Scalar], angular: Vec, linear: Vec
-    ) -> Scalar:
-        """Equation (2): the acceleration along an axis from rows that contain it, if the others are
-        known. Several rows are averaged with weights x² / noise: a row counts by how much of the
-        axis it contains beside its rounding error, not by its mass.
-        """
-        above, below = self._rows.zero, self._rows.zero
-        for row in taken.rows:
-            x, zero = along(taken.axis, row.angular, row.linear), self._rows.zero
-            clear = with_component(taken.axis, row.angular, row.linear, zero)
-            known = dot(clear[0], angular) + dot(clear[1], linear)
-            held = row.right + residuals[row.index] - known
-            if len(taken.rows) == 1:
-                return held / x
-            share = x / row.noise
-            above, below = above + share * held, below + share * x
-        return above / below

@@ -32,7 +32,8 @@ from eomgen.run.progress import Progress, throttled
 from eomgen.run.tally import Tally
 from eomgen.store import program_of
 from eomgen.study.accuracy import measure
-from eomgen.study.accuracy.collocation import ExtendedArray, Row, rows
+from eomgen.study.accuracy.collocation import Row, rows
+from eomgen.study.accuracy.gauss import ExtendedArray
 from eomgen.study.diagnosis import problem_of
 
 ROWS = 201
