@@ -23,15 +23,23 @@ def blocks(language: str, text: str = README) -> list[str]:
 
 @pytest.mark.parametrize("text", [README, API], ids=["README", "api"])
 def test_python_examples_run_and_print_what_they_say(text: str) -> None:
-    """Each Python block runs from the checkout; a `# prints` comment holds its output."""
+    """The Python blocks run from the checkout, one after another; a `# prints` comment holds what
+    each prints. One process runs them all: to load what they import takes longer than most of them.
+    """
     examples = blocks("python", text)
     assert examples
-    for source in examples:
-        run = subprocess.run(
-            [sys.executable, "-c", source], cwd=ROOT, capture_output=True, text=True, check=True
-        )
-        expected = re.findall(r"# prints (.*)", source)
-        assert run.stdout.splitlines() == expected
+    apart = "\nprint('----')\n"
+    run = subprocess.run(
+        [sys.executable, "-c", apart.join(examples)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    printed = run.stdout.removesuffix("\n").split("\n----\n")
+    assert [part.splitlines() for part in printed] == [
+        re.findall(r"# prints (.*)", source) for source in examples
+    ]
 
 
 @pytest.mark.usefixtures("blank_figures")
