@@ -1,12 +1,17 @@
 """A program's outputs as straight lines of a language: what all backends have in common."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from eomgen.codegen.interface import Function, Interface
 from eomgen.program.printing import Block, Dialect, Names, print_block
-from eomgen.program.program import Check, Program, cost
-from eomgen.program.tape import TIME
+from eomgen.program.program import Check, Program, cost, live_steps
+from eomgen.program.tape import COUNTED, TIME, Stage
+
+LARGE = 500
+"""Operations shared with `derivative` from which on an output goes on from there."""
+MORE = 0.05
+"""Part of an output's operations that it may do in vain for that."""
 
 
 @dataclass(frozen=True)
@@ -19,6 +24,9 @@ class Kernel:
     constants  variables that depend on parameters alone, taken from what `Constants` computes
     time       whether it depends on time
     counts     operations by kind
+    passed     variables that it passes on to kernels that go on from it
+    base       the kernel that it goes on from, or None: it takes these of its variables, `taken`,
+               "_" for each that it does not use
     """
 
     function: Function
@@ -29,6 +37,9 @@ class Kernel:
     constants: tuple[str, ...]
     time: bool
     counts: Mapping[str, int]
+    passed: tuple[str, ...] = ()
+    base: "Kernel | None" = None
+    taken: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -49,14 +60,19 @@ class Constants:
 
 
 def kernels_of(
-    program: Program, interface: Interface, dialect: Dialect
+    program: Program, interface: Interface, dialect: Dialect, *, sharing: bool = False
 ) -> tuple[list[Kernel], Constants]:
-    """The kernels of a program in a language, in order, and their constants."""
+    """The kernels of a program in a language, in order, and their constants.
+
+    sharing  whether kernels go on from that of `derivative` where `shares` says so, instead of
+             repeating its lines
+    """
     names = Names(program, dialect)
-    blocks = {
-        name: print_block(program, output.nodes, names, dialect)
-        for name, output in program.outputs.items()
-    }
+    blocks: dict[str, Block] = {}
+    for name, output in program.outputs.items():
+        shared = blocks["derivative"].nodes if sharing and shares(program, name) else ()
+        known = frozenset(shared)
+        blocks[name] = print_block(program, output.nodes, names, dialect, known=known)
 
     def used(wanted: tuple[str, ...], block: Block) -> tuple[str, ...]:
         return tuple(names.safe(name) if name in block.inputs else "" for name in wanted)
@@ -76,8 +92,42 @@ def kernels_of(
         )
         for function in interface.functions
     ]
+    base = next((k for k in kernels if k.function.name == "derivative"), None)
+    if base and (wanted := {i for k in kernels for i in k.block.taken}):
+        given = [i for i in base.block.nodes if i in wanted]
+        passed = replace(base, passed=tuple(names[i] for i in given))
+        kernels = [
+            passed
+            if k is base
+            else replace(
+                k,
+                base=passed,
+                taken=tuple(names[i] if i in k.block.taken else "_" for i in given),
+            )
+            if k.block.taken
+            else k
+            for k in kernels
+        ]
     parameters = tuple(names.safe(p.name) for p in interface.parameters)
     return kernels, _constants(program, blocks, names, parameters, dialect)
+
+
+def shares(program: Program, name: str) -> bool:
+    """Whether an output of a large program takes nearly all steps of `derivative`, so that it may
+    go on from there: at most `MORE` of its own operations would be done in vain.
+    """
+    if name == "derivative" or "derivative" not in program.outputs:
+        return False
+    own, base = (_operations(program, each) for each in (name, "derivative"))
+    return len(own & base) >= LARGE and len(base - own) <= MORE * len(own)
+
+
+def _operations(program: Program, name: str) -> set[int]:
+    """The steps of an output that cost something at every call."""
+    steps = program.steps
+    live = live_steps(program, program.outputs[name].nodes)
+    moving = (i for i in live if steps[i].stage > Stage.PARAMETERS)
+    return {i for i in moving if steps[i].operation in COUNTED}
 
 
 def _constants(

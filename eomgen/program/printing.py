@@ -1,6 +1,6 @@
 """Outputs of a program as lines of source code: names, inlining, brackets."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 
@@ -25,8 +25,9 @@ class Dialect:
 class Block:
     """Source of some results: assignments in order, then one expression a result.
 
-    `constants` are the nodes taken from the block of constants, `inputs` the names of the other
-    inputs used, `functions` the functions called; all in order of first appearance in the program.
+    `constants` are the nodes taken from the block of constants, `taken` those taken from another
+    block, `inputs` the names of the other inputs used, `functions` the functions called; all in
+    order of first appearance in the program. `nodes` are those that the lines compute.
     """
 
     lines: tuple[tuple[str, str], ...]
@@ -34,6 +35,8 @@ class Block:
     constants: tuple[int, ...]
     inputs: tuple[str, ...]
     functions: tuple[str, ...]
+    nodes: tuple[int, ...]
+    taken: tuple[int, ...]
 
 
 class Names:
@@ -111,17 +114,21 @@ def print_block(
     *,
     fixed: bool = False,
     keep: Sequence[int] = (),
+    known: Collection[int] = (),
 ) -> Block:
     """Source that computes `nodes`.
 
     What depends on parameters alone is taken from constants by name, unless `fixed` asks for the
-    block that computes those. Nodes in `keep` get a name even if they are used once.
+    block that computes those. Nodes in `keep` get a name even if they are used once. Nodes that are
+    `known` from another block are taken from there by name.
     """
     steps = program.steps
 
     def outside(i: int) -> bool:
         if steps[i].operation == "constant":
             return False
+        if i in known:
+            return True
         return steps[i].operation == "input" or (not fixed and steps[i].stage <= Stage.PARAMETERS)
 
     live = live_steps(program, nodes, outside)
@@ -137,6 +144,7 @@ def print_block(
     results, kept = frozenset(nodes), frozenset(keep)
     text: dict[int, tuple[str, int]] = {}
     lines: list[tuple[str, str]] = []
+    named: list[int] = []
     functions: dict[str, None] = {}
     for i in live:
         step = steps[i]
@@ -152,6 +160,7 @@ def print_block(
         long = len(source) > LONGEST_INLINE and i not in results
         if i in kept or uses[i] > 1 or long:
             lines.append((names[i], source))
+            named.append(i)
             text[i] = (names[i], _ATOM)
         else:
             text[i] = (source, level)
@@ -165,6 +174,8 @@ def print_block(
             if steps[i].operation == "input" and steps[i].stage > Stage.PARAMETERS
         ),
         functions=tuple(functions),
+        nodes=tuple(named),
+        taken=tuple(i for i in live if i in known),
     )
 
 

@@ -64,6 +64,11 @@ class Written:
     operations: str
     tangent: bool
     time: bool
+    held: str
+    passed: tuple[str, ...]
+    base: "Written | None"
+    known: int
+    taken: tuple[str, ...]
 
 
 def files(program: Program, interface: Interface) -> Mapping[str, str]:
@@ -73,7 +78,7 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
 
 def module(program: Program, interface: Interface) -> str:
     """The module's source."""
-    kernels, constants = kernels_of(program, interface, DIALECT)
+    kernels, constants = kernels_of(program, interface, DIALECT, sharing=True)
     written = {kernel.function.name: _written(kernel) for kernel in kernels}
     costs = {kernel.function.name: kernel.counts for kernel in kernels}
     moving = {f for kernel in kernels for f in kernel.block.functions}
@@ -135,7 +140,8 @@ def module(program: Program, interface: Interface) -> str:
 
 
 def _written(kernel: Kernel) -> Written:
-    function = kernel.function
+    function, base = kernel.function, kernel.base
+    wanted = {*kernel.block.functions, *(base.block.functions if base else ())}
     return Written(
         name=function.name,
         about=function.about,
@@ -145,11 +151,21 @@ def _written(kernel: Kernel) -> Written:
         inputs=_unpacking(kernel.inputs),
         extra=_unpacking(kernel.extra),
         constants=_joined(kernel.constants),
-        functions=kernel.block.functions,
+        functions=tuple(f for f in FUNCTIONS if f in wanted) if base else kernel.block.functions,
         operations=_operations(kernel.counts),
         tangent=function.tangent,
-        time=kernel.time,
+        time=kernel.time or (base is not None and base.time),
+        held=_joined((*(base.constants if base else ()), *kernel.constants)),
+        passed=_wrapped(kernel.passed),
+        base=_written(base) if base else None,
+        known=len(base.constants) if base else 0,
+        taken=_wrapped(kernel.taken),
     )
+
+
+def _wrapped(names: Sequence[str]) -> tuple[str, ...]:
+    """Names on lines, each ending in a comma."""
+    return tuple(textwrap.wrap(" ".join(f"{name}," for name in names), WIDTH - 8))
 
 
 def watched(program: Program, states: Sequence[str]) -> str:
