@@ -70,8 +70,8 @@ def kernels_of(
     names = Names(program, dialect)
     blocks: dict[str, Block] = {}
     for name, output in program.outputs.items():
-        shared = blocks["derivative"].nodes if sharing and shares(program, name) else ()
-        known = frozenset(shared)
+        start = blocks.get("derivative") if sharing else None
+        known = frozenset(start.nodes) if start and shares(program, name, start) else frozenset()
         blocks[name] = print_block(program, output.nodes, names, dialect, known=known)
 
     def used(wanted: tuple[str, ...], block: Block) -> tuple[str, ...]:
@@ -112,22 +112,25 @@ def kernels_of(
     return kernels, _constants(program, blocks, names, parameters, dialect)
 
 
-def shares(program: Program, name: str) -> bool:
+def shares(program: Program, name: str, base: Block) -> bool:
     """Whether an output of a large program takes nearly all steps of `derivative`, so that it may
-    go on from there: at most `MORE` of its own operations would be done in vain.
+    go on from there: at most `MORE` of its own operations would be done in vain, or twice, because
+    `derivative` has no variable for them.
     """
-    if name == "derivative" or "derivative" not in program.outputs:
-        return False
-    own, base = (_operations(program, each) for each in (name, "derivative"))
-    return len(own & base) >= LARGE and len(base - own) <= MORE * len(own)
+    own, derivative = (_operations(program, each) for each in (name, "derivative"))
+    twice = _operations(program, name, frozenset(base.nodes)) & derivative
+    return len(own & derivative) >= LARGE and len(derivative - own) + len(twice) <= MORE * len(own)
 
 
-def _operations(program: Program, name: str) -> set[int]:
-    """The steps of an output that cost something at every call."""
+def _operations(program: Program, name: str, known: frozenset[int] = frozenset()) -> set[int]:
+    """The steps of an output that cost something at every call, if some are `known`."""
     steps = program.steps
-    live = live_steps(program, program.outputs[name].nodes)
-    moving = (i for i in live if steps[i].stage > Stage.PARAMETERS)
-    return {i for i in moving if steps[i].operation in COUNTED}
+
+    def outside(i: int) -> bool:
+        return i in known or steps[i].stage <= Stage.PARAMETERS
+
+    live = live_steps(program, program.outputs[name].nodes, outside)
+    return {i for i in live if not outside(i) and steps[i].operation in COUNTED}
 
 
 def _constants(

@@ -33,7 +33,7 @@ ROOMS = (
 """What is changed, below the package."""
 TESTS = (
     *("test_handout", "test_orthogonal", "test_verify", "test_joints", "test_judges"),
-    *("test_springs", "test_contact", "test_impact", "test_closed_general", "test_identities"),
+    *("test_springs", "test_contact", "test_impact", "test_closed_projected", "test_identities"),
     *("test_routes", "test_ways", "test_laws", "test_drag", "test_controllers", "test_driven"),
     *("test_field", "test_gravity_variants", "test_effects_published", "test_sensitivity"),
     *("test_linearise", "test_quaternions", "test_pivots", "test_bad_scenes"),
