@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from eomgen.api.verifying import horizon, verify
     from eomgen.errors import EomgenError, RunError, SceneError
     from eomgen.results import Derivation, Module, Run
-    from eomgen.scene.reader import built_in_names
+    from eomgen.scene.built_in import built_in_names
     from eomgen.scene.schema import Scene
 
 __all__ = [
@@ -56,7 +56,7 @@ _PLACES = {
     **dict.fromkeys(("Derivation", "Module", "Run"), "results"),
     **dict.fromkeys(("EomgenError", "RunError", "SceneError"), "errors"),
     "Scene": "scene.schema",
-    "built_in_names": "scene.reader",
+    "built_in_names": "scene.built_in",
 }
 
 

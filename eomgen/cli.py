@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from eomgen import commands
 from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
 from eomgen.routes import ROUTES
 from eomgen.streams import steady_streams
@@ -63,6 +64,19 @@ def _path(text: str) -> Path:
     return Path(text)
 
 
+class _Version(argparse.Action):
+    """Prints this program's version. It is looked up only when asked for."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, help: str) -> None:
+        super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help=help)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from importlib.metadata import version
+
+        print(f"eomgen {version('eomgen')}")
+        parser.exit()
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser that repeats what it does not understand as one line, not as it is."""
 
@@ -71,14 +85,12 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser() -> argparse.ArgumentParser:
-    from eomgen import commands  # here, where an interrupt during its imports is caught
-
     parser = _Parser(
         prog="eomgen",
         description="Equations of motion from a scene: derived, solved once, written as code.",
         epilog="SCENE is a file or the name of a built-in scene (eomgen list).",
     )
-    parser.add_argument("--version", action="version", version=f"eomgen {commands.version()}")
+    parser.add_argument("--version", action=_Version, help="print the version and end")
     sub = parser.add_subparsers(metavar="COMMAND", required=True)
 
     def command(

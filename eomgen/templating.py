@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, meta
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 PACKAGE = Path(__file__).resolve().parent
 
@@ -16,8 +18,11 @@ def templates_folder() -> Path:
 
 
 @cache
-def environment(folder: str, *, html: bool = False) -> Environment:
+def environment(folder: str, *, html: bool = False) -> "Environment":
     """The Jinja2 environment of the templates in `folder`; `html` escapes every value put in."""
+    # Imported here: the folder is asked for where nothing is rendered.
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
     return Environment(
         loader=FileSystemLoader(templates_folder() / folder),
         undefined=StrictUndefined,
@@ -47,8 +52,10 @@ def render(folder: str, template: str, context: Mapping[str, object], *, html: b
 
 
 @cache
-def _names_read(surroundings: Environment, template: str) -> frozenset[str]:
+def _names_read(surroundings: "Environment", template: str) -> frozenset[str]:
     """Names that `template` and whatever it includes read from the context."""
+    from jinja2 import meta
+
     assert surroundings.loader is not None
     source, _, _ = surroundings.loader.get_source(surroundings, template)
     tree = surroundings.parse(source)

@@ -8,6 +8,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
 from drawing import DRAWING, drawing
 from floors import FLOORS, PACKAGE, imports, modules, nodes, room
 
@@ -59,12 +60,26 @@ def test_what_runs_knows_no_mechanics() -> None:
 def test_the_running_half_does_without_sympy() -> None:
     """Loading, integrating, drawing: SymPy is neither needed nor imported."""
     code = (
-        "import sys, eomgen.store, eomgen.run.integrate, eomgen.run.module, eomgen.commands, "
-        "eomgen.linear.linearise, eomgen.linear.equilibrium, eomgen.linear.modes, "
+        "import sys, eomgen.store, eomgen.run.integrate, eomgen.run.module, "
+        + "".join(f"eomgen.{name}, " for name in modules() if name.startswith("commands"))
+        + "eomgen.linear.linearise, eomgen.linear.equilibrium, eomgen.linear.modes, "
         "eomgen.show.observe, eomgen.show.figure, eomgen.show.page; "
         "sys.exit('sympy' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("command", ["list", "--help", "simulate --help", "nonsense"])
+def test_what_needs_no_scene_loads_little(command: str) -> None:
+    """Names and help come at once: what reads scenes and computes takes ten times as long."""
+    code = (
+        "import sys; from eomgen.cli import main\n"
+        "try: main(sys.argv[1:])\n"
+        "except SystemExit: pass\n"
+        "sys.exit(10 * bool(sys.modules.keys() & {'numpy', 'pydantic', 'sympy', 'jinja2'}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *command.split()], capture_output=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_generating_does_without_scipy(tmp_path: Path) -> None:

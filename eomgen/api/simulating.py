@@ -175,9 +175,6 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
     """The run of a plan. Raises `RunError` where it cannot begin."""
     # Imported here: to check and to generate needs no SciPy.
     from eomgen.show.observe import observe
-    from eomgen.study.accuracy.aimed import UNKNOWN, made_again
-    from eomgen.study.accuracy.estimate import by_second_run
-    from eomgen.study.accuracy.moved import moved_problem
     from eomgen.study.accuracy.trial import Case
 
     model = plan.model
@@ -195,12 +192,18 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
     if start is not None:
         problem = start.problem
         kept |= start.options
-    moved = moved_problem(functions, model, *values)
+    moved = None
+    if plan.setting is None or plan.estimate:
+        from eomgen.study.accuracy.moved import moved_problem
+
+        moved = moved_problem(functions, model, *values)
     case = Case(problem, plan.t_end, functions.UNITS, kept, manner.watch, moved)
     powers = as_powers(functions, *values) if plan.works else None
     warnings, error = [*model.notices, *module.notices], math.nan
     choice: Choice | None = None
     if plan.setting is None:
+        from eomgen.study.accuracy.aimed import UNKNOWN, made_again
+
         choice = _chosen(plan, case, manner)
         error = choice.error
         if not choice.met:
@@ -211,6 +214,8 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
         tried = case.run(plan.setting, powers=powers, follow=follow)
     trajectory, estimate = tried.trajectory, None
     if plan.estimate and choice is None and trajectory.finished:
+        from eomgen.study.accuracy.estimate import by_second_run
+
         estimate = by_second_run(case, tried)
         error = estimate.last
     own = model.with_parameters(plan.parameters)

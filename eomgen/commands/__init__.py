@@ -1,33 +1,89 @@
-"""What each command does; what is heavy is imported by the command that needs it."""
+"""The commands. What one needs is imported when it is called: all together take long to load."""
 
-import importlib.metadata
+import argparse
 
-from eomgen.commands.accuracy import accuracy
-from eomgen.commands.costing import effects
-from eomgen.commands.deriving import derive
-from eomgen.commands.describing import check, list_scenes, print_reference, print_schema
-from eomgen.commands.generating import generate
-from eomgen.commands.linearising import linearise
-from eomgen.commands.running import simulate, view
-from eomgen.commands.verifying import verify
-
-__all__ = [
-    "accuracy",
-    "check",
-    "derive",
-    "effects",
-    "generate",
-    "linearise",
-    "list_scenes",
-    "print_reference",
-    "print_schema",
-    "simulate",
-    "verify",
-    "version",
-    "view",
-]
+Arguments = argparse.Namespace
 
 
-def version() -> str:
-    """This program's version."""
-    return importlib.metadata.version("eomgen")
+def list_scenes(given: Arguments) -> int:
+    """Name the built-in scenes."""
+    from eomgen.commands import listing
+
+    return listing.list_scenes(given)
+
+
+def print_schema(given: Arguments) -> int:
+    """Print the JSON Schema of scenes."""
+    from eomgen.commands import describing
+
+    return describing.print_schema(given)
+
+
+def print_reference(given: Arguments) -> int:
+    """Print joints and effects with their keys."""
+    from eomgen.commands import describing
+
+    return describing.print_reference(given)
+
+
+def check(given: Arguments) -> int:
+    """Validate a scene and say what it is made of."""
+    from eomgen.commands import describing
+
+    return describing.check(given)
+
+
+def derive(given: Arguments) -> int:
+    """Print the derivation."""
+    from eomgen.commands import deriving
+
+    return deriving.derive(given)
+
+
+def generate(given: Arguments) -> int:
+    """Write the modules of scenes."""
+    from eomgen.commands import generating
+
+    return generating.generate(given)
+
+
+def simulate(given: Arguments) -> int:
+    """Integrate, and write what happened."""
+    from eomgen.commands import running
+
+    return running.simulate(given)
+
+
+def view(given: Arguments) -> int:
+    """Integrate, and open the page."""
+    from eomgen.commands import running
+
+    return running.view(given)
+
+
+def verify(given: Arguments) -> int:
+    """Compare the module with an independent solver and 60 digits."""
+    from eomgen.commands import verifying
+
+    return verifying.verify(given)
+
+
+def accuracy(given: Arguments) -> int:
+    """Say what accuracy costs in time."""
+    from eomgen.commands import measuring
+
+    return measuring.accuracy(given)
+
+
+def effects(given: Arguments) -> int:
+    """Say what each effect costs and does."""
+    from eomgen.commands import costing
+
+    return costing.effects(given)
+
+
+def linearise(given: Arguments) -> int:
+    """Linearise about an equilibrium."""
+    from eomgen.commands import linearising
+
+    return linearising.linearise(given)

@@ -1,4 +1,4 @@
-"""What there is and what a scene is made of: `list`, `schema`, `reference`, `check`."""
+"""What there is and what a scene is made of: `schema`, `reference`, `check`."""
 
 import shlex
 import sys
@@ -17,15 +17,6 @@ from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.language.formula import written
 from eomgen.model.model import Body, Model
 from eomgen.scene.joints.base import WORLD, Geared
-from eomgen.scene.reader import built_in_names, read_scene
-
-
-def list_scenes(given: Arguments) -> int:
-    """Names and titles of the built-in scenes."""
-    names = built_in_names()
-    for name in names:
-        print(f"{name:<{max(map(len, names))}}  {read_scene(name).title}")
-    return 0
 
 
 def print_schema(given: Arguments) -> int:

@@ -9,7 +9,7 @@ from eomgen.commands.shared import Arguments, manner_of, read_model, required
 from eomgen.errors import EomgenError, RunError, report_refusal
 from eomgen.files import check_folder, check_writable, read_plain
 from eomgen.results import Module
-from eomgen.scene.reader import built_in_names
+from eomgen.scene.built_in import built_in_names
 
 
 def generate(given: Arguments) -> int:

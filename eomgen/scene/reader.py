@@ -11,11 +11,11 @@ from pydantic import ValidationError
 from eomgen.errors import SceneError, nearest
 from eomgen.files import read_plain
 from eomgen.language.base import LARGEST
+from eomgen.scene.built_in import BUILT_IN, built_in_names
 from eomgen.scene.mistakes import mistakes, shown
 from eomgen.scene.schema import MOST, Scene
 from eomgen.text import breaks_lines, brief
 
-BUILT_IN = Path(__file__).parent.parent / "scenes"
 LARGEST_FILE = 2_000_000
 LONGEST_LIST = 10 * MOST
 """The state of as many free bodies as there may be is shorter."""
@@ -26,11 +26,6 @@ REMEDY = f"give at most {LARGEST:g}, or choose other units"
 _DEEP_KEY = re.compile(
     rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}"""
 )
-
-
-def built_in_names() -> tuple[str, ...]:
-    """Names of the scenes that come with the program."""
-    return tuple(sorted(path.stem for path in BUILT_IN.glob("*.toml")))
 
 
 def find_scene(scene: str) -> Path:
