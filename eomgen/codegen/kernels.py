@@ -117,9 +117,14 @@ def shares(program: Program, name: str, base: Block) -> bool:
     go on from there: at most `MORE` of its own operations would be done in vain, or twice, because
     `derivative` has no variable for them.
     """
-    own, derivative = (_operations(program, each) for each in (name, "derivative"))
+    derivative = _operations(program, "derivative")
+    if len(derivative) < LARGE:
+        return False
+    own = _operations(program, name)
+    if len(own & derivative) < LARGE or len(derivative - own) > MORE * len(own):
+        return False
     twice = _operations(program, name, frozenset(base.nodes)) & derivative
-    return len(own & derivative) >= LARGE and len(derivative - own) + len(twice) <= MORE * len(own)
+    return len(derivative - own) + len(twice) <= MORE * len(own)
 
 
 def _operations(program: Program, name: str, known: frozenset[int] = frozenset()) -> set[int]:

@@ -147,7 +147,7 @@ class Tape:
                 return self.number(number)
         elif (operation == "add" or operation == "mul") and operands[0] > operands[1]:
             operands = operands[::-1]
-        key = (operation, *operands)
+        key = (operation, operands)
         index = self._known.get(key)
         if index is None:
             steps = self.steps
