@@ -74,6 +74,15 @@ def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def _short_timing() -> Iterator[None]:
+    """Calls and runs are timed as seldom as may be: no test asks how long something took."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("eomgen.study.timing.TIMING", 0.0)
+        patch.setattr("eomgen.study.accuracy.work_precision.REPEATS", 0.0)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def _own_store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Generated code of the tests is kept apart from the user's."""
     with pytest.MonkeyPatch.context() as patch:

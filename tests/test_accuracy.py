@@ -377,6 +377,7 @@ def test_what_was_interrupted_goes_on(
     assert len(again) == len(cells(table))
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_the_table_says_what_it_must(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Cost of a call, generation, reference, orders, cheapest runs; a wrong run as such."""
     arguments = "--no-arithmetic --t-end 2 --run-time 0.2 --methods euler,rk4,DOP853".split()
@@ -390,6 +391,7 @@ def test_the_table_says_what_it_must(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert max(map(len, text.splitlines())) <= 130
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_scenes_by_form(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
