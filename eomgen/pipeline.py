@@ -6,14 +6,13 @@ A scene is read by `scene.reader` and elaborated by `model.elaborate`; `store` k
 generated, `run` loads and integrates it.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from eomgen.codegen.backends import find_backend, python
+from eomgen.codegen.backends import python
 from eomgen.codegen.backends.javascript import body_poses
 from eomgen.codegen.choice import Candidate, Choice, choose
 from eomgen.codegen.derive import record
-from eomgen.codegen.interface import interface_of
+from eomgen.codegen.interface import Interface, interface_of
 from eomgen.codegen.system import System, optimised
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
@@ -25,13 +24,15 @@ from eomgen.scene.schema import Scene
 
 @dataclass(frozen=True)
 class Generated:
-    """What a model is compiled to: a Python module, the page's `bodyPoses`, the program of both,
-    what passes saved, why its route was taken, and what the report must say of it.
+    """What a model is compiled to: a Python module, the page's `bodyPoses`, the program of both
+    with its interface, what passes saved, why its route was taken, and what the report must say of
+    it.
     """
 
     module: str
     poses: str
     program: Program
+    interface: Interface
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
@@ -98,15 +99,11 @@ def render(made: Compiled) -> Generated:
         python.module(program, interface),
         body_poses(program, interface),
         program,
+        interface,
         made.system.reports,
         tuple(made.explanation()),
         tuple(made.choice.notices()),
     )
-
-
-def files(made: Compiled, backend: str) -> Mapping[str, str]:
-    """The files of a program in a language, by name. Raises `RunError` if there is no such one."""
-    return find_backend(backend).files(made.system.program, interface_of(made.system))
 
 
 def python_module(system: System) -> str:

@@ -110,6 +110,8 @@ class Module:
     derived      whether it was derived now; else it was in the store
     backend      the language it is in
     others       further files of that language, by name
+    library      the sources of its shared library, by name, if it is to be compiled and loaded
+    reference    the text of the Python module that a compiled one falls back on; "" without one
     """
 
     name: str
@@ -121,6 +123,8 @@ class Module:
     derived: bool = field(default=True, compare=False)
     backend: str = "numpy"
     others: Mapping[str, str] = field(default_factory=dict)
+    library: Mapping[str, str] = field(default_factory=dict, compare=False)
+    reference: str = field(default="", compare=False)
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
         """Write the file, whole or not at all, and further files beside it. Raises `RunError` where

@@ -12,11 +12,13 @@ import hashlib
 import importlib.metadata
 import json
 import os
+import pickle
 import platform
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import platformdirs
 
@@ -27,8 +29,21 @@ from eomgen.program.program import Program
 from eomgen.program.saving import ProgramError, restored, saved
 from eomgen.templating import PACKAGE, templates_folder
 
+if TYPE_CHECKING:
+    from eomgen.codegen.interface import Interface
+
 AFTER = (
-    *("store.py", "entries.py", "run", "precision", "linear", "study", "show", "results.py"),
+    *(
+        "store.py",
+        "entries.py",
+        "native",
+        "run",
+        "precision",
+        "linear",
+        "study",
+        "show",
+        "results.py",
+    ),
     *("api", "commands", "cli.py", "__main__.py", "__init__.py"),
 )
 """Files and folders of this program that have no say in the code; all others have."""
@@ -85,7 +100,7 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
         return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
     entries = Entries(directory)
     trouble = entries.put(key, _content(code))
-    trouble = trouble or entries.put(_beside(key), saved(made.program).encode())
+    trouble = trouble or _keep_program(entries, key, made.program, made.interface)
     if trouble:
         return replace(code, notice=f"the store {directory} is not used: {trouble}")
     if kept and (kept.module, kept.poses) != (code.module, code.poses):
@@ -96,17 +111,39 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
 
 def program_of(model: Model) -> Program:
     """The program of a model's code, from the store beside it or recorded now."""
-    directory, key = folder(), _beside(_key(model))
-    if directory and (kept := Entries(directory).get(key)):
-        with suppress(ProgramError, UnicodeDecodeError):
-            return restored(kept.decode())
+    return interfaced_program_of(model)[0]
+
+
+def interfaced_program_of(model: Model) -> tuple[Program, "Interface"]:
+    """The same with its interface: what a backend writes code of."""
+    directory, key = folder(), _key(model)
+    if directory and (kept := _kept_program(Entries(directory), key)):
+        return kept
     # Imported here because it brings what derives, which takes long to load.
+    from eomgen.codegen.interface import interface_of
     from eomgen.pipeline import compile_program
 
-    program = compile_program(model).system.program
+    system = compile_program(model).system
+    made = system.program, interface_of(system)
     if directory:
-        Entries(directory).put(key, saved(program).encode())
-    return program
+        _keep_program(Entries(directory), key, *made)
+    return made
+
+
+def _keep_program(entries: Entries, key: str, program: Program, interface: "Interface") -> str:
+    """Keep a program and its interface beside code of this key; why not, or ""."""
+    return entries.put(_beside(key), pickle.dumps((saved(program), interface)))
+
+
+def _kept_program(entries: Entries, key: str) -> tuple[Program, "Interface"] | None:
+    content = entries.get(_beside(key))
+    if content is None:
+        return None
+    with suppress(ProgramError, pickle.UnpicklingError, ValueError, TypeError):
+        # To be trusted as the module is that lies beside it, and is executed: see `entries`.
+        text, interface = pickle.loads(content)
+        return restored(text), interface
+    return None
 
 
 def _beside(key: str) -> str:
@@ -168,6 +205,6 @@ def _sources() -> list[Path]:
 def _templates() -> list[Path]:
     return [
         path
-        for name in ("python", "javascript")
+        for name in ("python", "javascript", "c")
         for path in (templates_folder() / name).rglob("*.jinja")
     ]

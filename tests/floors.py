@@ -33,6 +33,7 @@ FLOORS = (
     "pipeline",
     "store",
     "run",
+    "native",
     "precision",
     "linear",
     "study.diagnosis",

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import cast
 
 from eomgen.api.given import Outputs, Source, check, overridden
 from eomgen.api.manner import SILENT, Manner
@@ -13,7 +14,7 @@ from eomgen.model.model import Model
 from eomgen.results import Module
 from eomgen.run.module import GeneratedModule, load_module
 from eomgen.scene.schema import Form, Route
-from eomgen.store import Code, generated_code
+from eomgen.store import Code, generated_code, interfaced_program_of
 from eomgen.study.diagnosis import problem_of
 
 LARGEST = 2**30
@@ -47,12 +48,23 @@ def generate(
 def load(module: Module | str | PathLike[str]) -> GeneratedModule:
     """A generated module as a Python module: `derivative(t, y, p, u)`, `jacobian`, its outputs.
 
-    A file is run as any Python module that is imported: load none from those you do not trust.
-    Raises `RunError` where the file cannot be read, or was not generated.
+    A module of the backend "c" is compiled first, or taken from the store: the same functions with
+    the same results. A file is run as any Python module that is imported: load none from those you
+    do not trust.
+
+    Raises `RunError` where the file cannot be read, or was not generated, or there is no compiler.
     """
     if isinstance(module, Module):
+        if module.backend == "c":
+            from eomgen.native.library import built
+            from eomgen.native.module import compiled_module
+
+            reference = load_module(module.reference, module.name)
+            return cast(GeneratedModule, compiled_module(reference, built(module.library)))
         if module.backend != "numpy":
-            raise RunError(f"backend: Python loads modules of 'numpy', not of '{module.backend}'")
+            raise RunError(
+                f"backend: Python loads modules of 'numpy' and 'c', not of '{module.backend}'"
+            )
         return load_module(module.source, module.name)
     path = Path(module)
     source = read_plain(path, LARGEST).decode("utf-8", "replace")
@@ -86,11 +98,15 @@ def check_backend(backend: str) -> str:
 
 def translated(module: Module, model: Model, backend: str) -> Module:
     """A model's module in another language. Raises `RunError` for an unknown one."""
-    # Imported here because it brings what derives, which takes long to load.
-    from eomgen.pipeline import compile_program, files
+    # Imported here because it brings the templates, which a run does without.
+    from eomgen.codegen.backends import c, find_backend
 
-    source, *others = files(compile_program(model), backend).items()
-    return replace(module, source=source[1], backend=backend, others=dict(others))
+    program, interface = interfaced_program_of(model)
+    source, *others = find_backend(backend).files(program, interface).items()
+    made = replace(module, source=source[1], backend=backend, others=dict(others))
+    if backend == "c":
+        return replace(made, library=c.library(program, interface), reference=module.source)
+    return made
 
 
 def compiled(

@@ -15,10 +15,13 @@ _SUM, _PRODUCT, _ATOM = 1, 2, 3
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a language writes numbers' functions, and the words that may not name a variable."""
+    """How a language writes functions, the words that may not name a variable, and the format of a
+    number.
+    """
 
     functions: Mapping[str, str]
     reserved: frozenset[str]
+    number: str = "{}"
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,7 @@ def print_block(
     for i in live:
         step = steps[i]
         if step.operation == "constant":
-            text[i] = (repr(float(step.value or 0.0)), _ATOM)
+            text[i] = (dialect.number.format(repr(float(step.value or 0.0))), _ATOM)
             continue
         if i in given:
             text[i] = (names[i], _ATOM)

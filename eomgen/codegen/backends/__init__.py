@@ -6,7 +6,7 @@ To add one, write its module, which is a `Backend`, and its templates, and name 
 from collections.abc import Mapping
 from typing import Protocol
 
-from eomgen.codegen.backends import javascript, python
+from eomgen.codegen.backends import c, javascript, python
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError, nearest
 from eomgen.program.program import Program
@@ -30,7 +30,7 @@ class Backend(Protocol):
         """The files of a program, by name."""
 
 
-BACKENDS: dict[str, Backend] = {"numpy": python, "javascript": javascript}
+BACKENDS: dict[str, Backend] = {"numpy": python, "c": c, "javascript": javascript}
 
 
 def find_backend(name: str) -> Backend:

@@ -8,10 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from eomgen.codegen.backends.conditions import refusals
+from eomgen.codegen.backends.conditions import Test, refusals
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.kernels import Kernel, kernels_of
+from eomgen.errors import listed
 from eomgen.language.base import LARGEST
+from eomgen.language.formula import names_in
 from eomgen.program.printing import Block, Dialect
 from eomgen.program.program import Program, live_steps
 from eomgen.scalars.functions import FUNCTIONS
@@ -104,7 +106,8 @@ def module(program: Program, interface: Interface) -> str:
         "quaternions": repr(interface.quaternions),
         "parameters": interface.parameters,
         "parameter_names": ", ".join(constants.parameters),
-        "refused": refused,
+        "refused": refused.lines,
+        "tests": [(_test(test), _words(test)) for test in refused.tests],
         "inputs": interface.inputs,
         "units": _units(interface),
         "effects": repr(tuple(kind for _, kind in interface.effects)),
@@ -197,6 +200,25 @@ def watched(program: Program, states: Sequence[str]) -> str:
     if unseen:
         sums.append(" + ".join(f"state[{k}]" for k in unseen))
     return " and ".join(f"-reach < {part} < reach" for part in sums)
+
+
+def _test(test: Test) -> str:
+    """A comparison that no nan passes."""
+    condition, value = test.condition, test.value
+    low, high = f"{condition.low + 0.0!r}", f"{condition.high!r}"
+    if condition.high == math.inf:
+        return f"{value} {'>' if condition.strict else '>='} {low}"
+    return f"{low} {'<' if condition.strict else '<='} {value} <= {high}"
+
+
+def _words(test: Test) -> str:
+    """The source of what is said where a condition is not met."""
+    condition = test.condition
+    names = listed(dict.fromkeys(names_in(condition.value)))
+    text = f"parameters {names}: {condition.location}: {condition.words}"
+    if test.shown:
+        return f"{text!r}.format({', '.join(test.shown)})"
+    return repr(text.replace("{{", "{").replace("}}", "}"))
 
 
 _BOUNDS = {False: (">", "not positive"), True: (">=", "negative")}

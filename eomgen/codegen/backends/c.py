@@ -1,0 +1,221 @@
+"""The C backend: C99 and a header that stand alone, fit for firmware."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from eomgen.codegen.backends.conditions import Test, refusals
+from eomgen.codegen.interface import Interface, Variable
+from eomgen.codegen.kernels import Constants, Kernel, kernels_of
+from eomgen.language.formula import names_in
+from eomgen.program.printing import Dialect
+from eomgen.program.program import Program
+from eomgen.scalars.functions import FUNCTIONS
+from eomgen.templating import render
+
+SUFFIXES: tuple[str, ...] = (".c", ".h")
+TEMPLATES = "c"
+ABOUT = "C99 and a header: no allocation, no global state, double or float"
+MAIN = "checked.c"
+"""The source of a shared library that is compiled; it includes the others."""
+KEYWORDS = (
+    "auto break case char const continue default do double else enum extern float for goto if "
+    "inline int long register restrict return short signed sizeof static struct switch typedef "
+    "union unsigned void volatile while _Bool _Complex _Imaginary asm typeof bool true false "
+    "nullptr constexpr alignas alignof thread_local static_assert"
+)
+"""Of C99 and of later standards."""
+MACROS = (
+    "NAN INFINITY HUGE_VAL HUGE_VALF HUGE_VALL FP_NAN FP_INFINITE FP_ZERO FP_SUBNORMAL FP_NORMAL "
+    "FP_ILOGB0 FP_ILOGBNAN MATH_ERRNO MATH_ERREXCEPT math_errhandling linux unix i386 "
+    "DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE MAXFLOAT"
+)
+"""Words that <math.h> or a compiler may replace."""
+OURS = "y p u k out extra real R failed"
+C_NAMES = {"abs": "fabs", "min": "fmin", "max": "fmax"}
+"""What the functions of formulas are called in C, where that is another name."""
+OWN = {
+    "min": ("real a, real b", "b < a ? b : a"),
+    "max": ("real a, real b", "b > a ? b : a"),
+    "step": ("real x", "x > 0 ? R(1.0) : R(0.0)"),
+    "select": ("real c, real a, real b", "c > 0 ? a : b"),
+}
+"""Functions that C has not, or with other results: `fmin` ignores a nan, and may return -0.0."""
+CONSTANTS = (
+    "M_E M_LOG2E M_LOG10E M_LN2 M_LN10 M_PI M_PI_2 M_PI_4 M_1_PI M_2_PI M_2_SQRTPI M_SQRT2 "
+    "M_SQRT1_2"
+)
+"""Macros of <math.h> on many systems."""
+RESERVED = frozenset(
+    [*f"{KEYWORDS} {MACROS} {OURS} {CONSTANTS}".split(), *FUNCTIONS, *(f"{f}_" for f in FUNCTIONS)]
+)
+DIALECT = Dialect({name: f"{name}_" for name in FUNCTIONS}, RESERVED, number="R({})")
+
+
+def files(program: Program, interface: Interface) -> Mapping[str, str]:
+    """The source and its header.
+
+    Compiled without contraction of products and sums (`-ffp-contract=off`, the default of
+    `-std=c99` in GCC) each function returns the same bits as the Python module's, with the same
+    library of mathematical functions.
+    """
+    kernels, constants = kernels_of(program, interface, DIALECT)
+    name = interface.name
+    context = _context(kernels, constants, interface)
+    shared = {key: context[key] for key in _SHARED}
+    return {
+        f"{name}.c": render(TEMPLATES, "module.c.jinja", context),
+        f"{name}.h": render(
+            TEMPLATES,
+            "module.h.jinja",
+            {
+                **shared,
+                "guard": f"{name.upper()}_H",
+                "title": _plain(interface.title),
+                "form": interface.form,
+                "states": _table(interface.states),
+                "inputs": _table(interface.inputs),
+                "parameters": _table(interface.parameters),
+                "held": len(context["held"]),
+                "left_out": interface.left_out,
+            },
+        ),
+    }
+
+
+def library(program: Program, interface: Interface) -> Mapping[str, str]:
+    """The sources of a shared library: those of `files`, and `MAIN`, which includes them and has
+    for each output `checked_NAME` and `columns_NAME`, which say where a result has no value.
+    """
+    kernels, _ = kernels_of(program, interface, DIALECT)
+    place = _places_of(kernels)
+    context = {
+        "prefix": interface.name,
+        "states": len(interface.states),
+        "inputs": len(interface.inputs),
+        "parameters": len(interface.parameters),
+        "held": len(place),
+        "kernels": [_written(kernel, place) for kernel in kernels],
+    }
+    return {**files(program, interface), MAIN: render(TEMPLATES, "checked.c.jinja", context)}
+
+
+_SHARED = ("scene", "prefix", "kernels")
+
+
+def _places_of(kernels: Sequence[Kernel]) -> dict[str, int]:
+    """The constants that kernels take, each with its place in `k`."""
+    names = dict.fromkeys(name for kernel in kernels for name in kernel.constants)
+    return {name: i for i, name in enumerate(names)}
+
+
+def _context(
+    kernels: Sequence[Kernel], constants: Constants, interface: Interface
+) -> dict[str, Any]:
+    refused = refusals(interface, DIALECT)
+    called = {f for kernel in kernels for f in kernel.block.functions}
+    called |= {*constants.functions, *refused.functions}
+    place = _places_of(kernels)
+    checks = [
+        (f"{source} {'>=' if check.may_vanish else '>'} 0", _quoted(_check_words(check)))
+        for check, source in constants.checks
+    ]
+    tests = [(_test(test), _quoted(_test_words(test))) for test in refused.tests]
+    return {
+        "scene": interface.name,
+        "prefix": interface.name,
+        "functions": [(f, C_NAMES.get(f, f)) for f in FUNCTIONS if f in called and f not in OWN],
+        "own_functions": [(f, *OWN[f]) for f in OWN if f in called],
+        "parameters": [
+            (name, parameter.name, repr(parameter.default))
+            for name, parameter in zip(constants.parameters, interface.parameters, strict=True)
+        ],
+        "refused": refused.lines,
+        "tests": tests,
+        "checked": constants.checked,
+        "checks": checks,
+        "fixed": constants.lines,
+        "held": list(place.items()),
+        "kernels": [_written(kernel, place) for kernel in kernels],
+    }
+
+
+def _written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
+    """A kernel as the templates write it."""
+    function, block = kernel.function, kernel.block
+    size = math.prod(function.shape)
+    along = len(function.extra) if function.tangent else 0
+    return {
+        "name": f"{function.name}_along" if along else function.name,
+        "whole": function.name if along else "",
+        "about": _plain(function.about),
+        "shape": " x ".join(map(str, function.shape)) or "1",
+        "rows": size // along if along else size,
+        "size": size,
+        "lengths": function.shape,
+        "along": along,
+        "takes_extra": bool(function.extra),
+        "beside": len(function.extra),
+        "given": [
+            *((name, f"k[{place[name]}]") for name in kernel.constants),
+            *_places(kernel.state, "y"),
+            *_places(kernel.inputs, "u"),
+            *_places(kernel.extra, "extra"),
+        ],
+        "unused": [
+            word
+            for word, used in (
+                ("t", kernel.time),
+                ("y", any(kernel.state)),
+                ("k", bool(kernel.constants)),
+                ("u", any(kernel.inputs)),
+                ("extra", not function.extra or any(kernel.extra)),
+                ("out", bool(block.results)),
+            )
+            if not used
+        ],
+        "lines": block.lines,
+        "results": block.results,
+        "operations": kernel.counts["total"],
+    }
+
+
+def _places(names: Sequence[str], array: str) -> list[tuple[str, str]]:
+    """The variables that are used, each with its place in an array."""
+    return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
+
+
+def _table(variables: Sequence[Variable]) -> list[tuple[int, str, str, str, str]]:
+    return [
+        (i, v.name, _plain(v.unit), _plain(v.about), repr(v.default))
+        for i, v in enumerate(variables)
+    ]
+
+
+def _test(test: Test) -> str:
+    """A comparison that no nan passes."""
+    over = "<" if test.condition.strict else "<="
+    parts = [f"R({test.condition.low!r}) {over} {test.value}"]
+    if test.condition.high != math.inf:
+        parts.append(f"{test.value} <= R({test.condition.high!r})")
+    return " && ".join(parts)
+
+
+def _test_words(test: Test) -> str:
+    names = ", ".join(dict.fromkeys(names_in(test.condition.value)))
+    return f"parameters {names}: {test.condition.location} is out of bounds"
+
+
+def _check_words(check: Any) -> str:
+    return f"{check.about} is {'negative' if check.may_vanish else 'not positive'}"
+
+
+def _plain(text: str) -> str:
+    """Text of a scene as it may stand in a comment: of ASCII, in one line, not ending it."""
+    kept = "".join(c if c.isprintable() and c.isascii() else " " for c in text)
+    return " ".join(kept.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").split())
+
+
+def _quoted(text: str) -> str:
+    """A string of C; `??` would begin a trigraph."""
+    return '"' + _plain(text).replace('"', "'").replace("??", "? ?") + '"'

@@ -1,0 +1,1 @@
+"""Generated C, compiled on this machine and loaded."""

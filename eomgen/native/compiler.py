@@ -1,0 +1,105 @@
+"""A C compiler: found, asked what it is, and run."""
+
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from eomgen.errors import RunError
+
+FLAGS = ("-std=c99", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-w")
+"""The order of every operation is the program's: no fast mathematics, nothing contracted."""
+KNOWN = ("cc", "gcc", "clang")
+ABSENT = (
+    "no C compiler is found; install gcc or clang, name one in CC, or run: "
+    "pip install 'eomgen[compiled]'"
+)
+LONGEST = 600.0
+"""Seconds after which a compiler is stopped."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A command that compiles C, and its own words on its version and target."""
+
+    command: tuple[str, ...]
+    version: str
+
+    def shared_library(self, sources: Mapping[str, str], main: str, *flags: str) -> bytes:
+        """The bytes of a shared library of `sources`, by name, of which `main` is compiled.
+
+        Raises `RunError` with the compiler's first error, or where there is no place for files.
+        """
+        try:
+            with tempfile.TemporaryDirectory(prefix="eomgen-") as folder:
+                for name, text in sources.items():
+                    (Path(folder) / name).write_text(text, "utf-8")
+                made = Path(folder) / f"made{suffix()}"
+                self._run([*FLAGS, *flags, main, "-o", made.name, "-lm"], folder)
+                return made.read_bytes()
+        except OSError as error:
+            raise RunError(f"the compiled module cannot be made: {error.strerror}") from None
+
+    def _run(self, arguments: list[str], folder: str) -> None:
+        try:
+            done = subprocess.run(
+                [*self.command, *arguments],
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=LONGEST,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise RunError(f"{self.command[0]}: not done after {LONGEST:g} s") from None
+        if done.returncode:
+            lines = [line for line in done.stderr.splitlines() if "error" in line]
+            why = (lines or done.stderr.splitlines() or ["it failed without a word"])[0]
+            raise RunError(f"{shlex.join(self.command)}: {why}")
+
+
+def find_compiler() -> Compiler:
+    """The first of `$CC`, cc, gcc, clang and the wheel `ziglang` that there is.
+
+    Raises `RunError` if there is none, or if that in `$CC` does not run.
+    """
+    return _found(os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+@cache
+def _found(chosen: str, path: str) -> Compiler:
+    if chosen.strip():
+        try:
+            return _asked(tuple(shlex.split(chosen)))
+        except (OSError, ValueError, subprocess.SubprocessError):
+            raise RunError(f"CC: '{chosen}' does not run; name a C compiler or unset it") from None
+    for name in KNOWN:
+        if found := shutil.which(name, path=path):
+            try:
+                return _asked((found,))
+            except (OSError, subprocess.SubprocessError):
+                continue
+    if importlib.util.find_spec("ziglang"):
+        return _asked((sys.executable, "-m", "ziglang", "cc"))
+    raise RunError(ABSENT)
+
+
+def _asked(command: tuple[str, ...]) -> Compiler:
+    done = subprocess.run(
+        [*command, "--version"], capture_output=True, text=True, timeout=60, check=True
+    )
+    return Compiler(command, f"{done.stdout.strip()} {platform.machine()} {sys.platform}")
+
+
+def suffix() -> str:
+    """Of a shared library here."""
+    return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")

@@ -1,0 +1,156 @@
+"""A compiled module: what a generated Python module does, computed by its C kernels.
+
+Where those say that nothing was lost, a result is theirs, and has the bits that Python would give.
+All else is left to the Python module: parameters never given before, which it checks; states and
+columns that have no result; outputs that take more than time, state, parameters and inputs.
+"""
+
+import ctypes
+import math
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from eomgen.run.problem import FloatArray
+
+MOST_KNOWN = 64
+"""Sets of parameters whose constants are kept."""
+USUAL = 1e60
+"""Parameters whose sizes are within it and its inverse …"""
+USUAL_CONSTANT = 1e100
+"""… and constants within this, or as small as what is never to count, leave products in range."""
+OTHERS = ("initial_state", "forward_dynamics", "inverse_dynamics", "impact", "held")
+"""Outputs that take other arguments, which the Python module computes."""
+_FLOAT, _POINTER, _LONG, _REAL = np.dtype(float), ctypes.c_void_p, ctypes.c_long, ctypes.c_double
+
+
+def compiled_module(module: Any, library: ctypes.CDLL) -> Any:
+    """A module with the contract of `module`, whose outputs are computed by a library of its
+    kernels (see `native.library`).
+    """
+    made = ModuleType(f"{module.NAME}_compiled", module.__doc__)
+    made.__dict__.update({k: v for k, v in vars(module).items() if not k.startswith("__")})
+    kernels = _Kernels(module, library)
+    for name, shape in _outputs(library).items():
+        if name not in OTHERS:
+            setattr(made, name, kernels.output(name, shape))
+    return made
+
+
+def _outputs(library: ctypes.CDLL) -> dict[str, tuple[int, ...]]:
+    """The outputs of a library with their shapes."""
+    text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, "outputs"))).decode()
+    lines = (line.split() for line in text.splitlines())
+    return {name: tuple(map(int, shape)) for name, *shape in lines}
+
+
+class _Kernels:
+    """The kernels of a library, with the constants of parameters that were given before."""
+
+    def __init__(self, module: Any, library: ctypes.CDLL) -> None:
+        self.module, self.library = module, library
+        self.states, self.inputs, _, self.constants = (_LONG * 4).in_dll(library, "sizes")
+        self.own = tuple(map(float, module.PARAMETERS.values()))
+        self._known: dict[bytes, Any] = {}
+
+    def held(self, p: Any) -> Any:
+        """The constants of parameters, an array of C; None where only the Python module will do."""
+        values = _ordered(self.own if p is None else p, self.module.PARAMETERS)
+        if values is None or values.shape != (len(self.own),):
+            return None
+        key = values.tobytes()
+        if key not in self._known:
+            if len(self._known) >= MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = self._made(values)
+        return self._known[key]
+
+    def _made(self, values: FloatArray) -> Any:
+        self.module.initial_state(values)  # which refuses what the scene would refuse
+        k = (_REAL * max(1, self.constants))()
+        call = self.library.constants_of
+        call.argtypes = [_POINTER, _POINTER]
+        wrong = call(values.tobytes(), k)
+        sizes = [abs(x) for x in k if x and not 1e-240 < abs(x) < 1e-160]
+        usual = all(1 / USUAL < abs(x) < USUAL for x in values.tolist() if x)
+        usual = usual and all(1 / USUAL_CONSTANT < size < USUAL_CONSTANT for size in sizes)
+        return k if usual and not wrong else None
+
+    def given(self, u: Any, *columns: int) -> FloatArray | None:
+        """Inputs as an array; None where only the Python module will do."""
+        if u is None:
+            return np.zeros(self.inputs)
+        values = _ordered(u, self.module.INPUTS)
+        if values is None or values.shape not in ((self.inputs,), (self.inputs, *columns)):
+            return None
+        return values
+
+    def output(self, name: str, shape: tuple[int, ...]) -> Callable[..., Any]:
+        """An output's function of time, state or columns of states, parameters and inputs."""
+        python, states = getattr(self.module, name), self.states
+        own, none = self.held(None), bytes(8 * self.inputs)
+        buffer = _REAL * math.prod(shape)
+        one = self.library[f"checked_{name}"]
+        one.argtypes = [_REAL, *[_POINTER] * 5]
+        columns = self._columns(name, shape)
+
+        def function(t: float, y: Any, p: Any = None, u: Any = None) -> Any:
+            if y.__class__ is np.ndarray and y.dtype is _FLOAT and len(y) == states:
+                if y.ndim == 2 and y.shape[1]:
+                    return columns(t, y, p, u)
+                k = own if p is None else self.held(p)
+                given = None if u is None else self.given(u)
+                if y.ndim == 1 and k is not None and (u is None or given is not None):
+                    out = buffer()
+                    pushes = none if given is None else given.tobytes()
+                    if one(t, y.tobytes(), k, pushes, None, out):
+                        return (
+                            np.frombuffer(memoryview(out)).reshape(shape)
+                            if shape
+                            else np.float64(out[0])
+                        )
+            return python(t, y, p, u)
+
+        function.__name__, function.__doc__ = name, python.__doc__
+        return function
+
+    def _columns(self, name: str, shape: tuple[int, ...]) -> Callable[..., FloatArray]:
+        """An output of many states at once."""
+        python, size = getattr(self.module, name), math.prod(shape)
+        many = self.library[f"columns_{name}"]
+        many.argtypes = [_LONG, _REAL, *[_POINTER] * 3, ctypes.c_int, *[_POINTER] * 2]
+
+        def columns(t: float, y: FloatArray, p: Any, u: Any) -> FloatArray:
+            count = y.shape[1]
+            k, given = self.held(p), self.given(u, count)
+            if k is None or given is None:
+                return np.asarray(python(t, y, p, u))
+            y, given = np.ascontiguousarray(y), np.ascontiguousarray(given)
+            result, sound = np.empty((size, count)), np.empty(count, dtype=np.int8)
+            into = (result.ctypes.data, sound.ctypes.data)
+            each = given.ndim == 2
+            many(count, t, y.ctypes.data, k, given.ctypes.data, each, *into)
+            if not sound.all():
+                left = np.flatnonzero(sound == 0)
+                pushes = given[:, left] if each else u
+                result[:, left] = python(t, y[:, left], p, pushes).reshape(size, len(left))
+            return result.reshape(*shape, count)
+
+        return columns
+
+
+def _ordered(values: Any, defaults: dict[str, float]) -> FloatArray | None:
+    """Values by name or in order as an array of floats; None where they are no such thing."""
+    if hasattr(values, "keys"):
+        if set(values) - set(defaults):
+            return None
+        values = [values.get(name, default) for name, default in defaults.items()]
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        return None
+    if array.dtype is not _FLOAT or np.ma.is_masked(values):
+        return None
+    return array

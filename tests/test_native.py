@@ -1,0 +1,337 @@
+"""The C backend: C99 that stands alone, and the Python module's results to the last bit."""
+
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from campaign import some
+
+import eomgen
+from eomgen.api.given import check, read
+from eomgen.cli import main
+from eomgen.codegen.backends import c
+from eomgen.codegen.interface import interface_of
+from eomgen.errors import RunError
+from eomgen.native import compiler, library
+from eomgen.native.module import compiled_module
+from eomgen.pipeline import compile_program
+from eomgen.run.module import load_module
+from eomgen.scene.built_in import BUILT_IN, built_in_names
+from eomgen.study.verification.states import random_state
+
+CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+pytestmark = pytest.mark.skipif(CC is None, reason="there is no C compiler")
+FEW = ("tumbling_body", "bouncing_two_body", "cart_pole")
+LARGE = "hanging_figure human_figure puma560 quadruped ragdoll stiff_beam walker_motors".split()
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off")
+OUTPUTS = (
+    *("derivative", "jacobian", "mass_matrix", "velocity_force", "kinetic_energy", "body_poses"),
+    *("joint_forces", "effect_powers", "gaps", "switching_functions", "input_jacobian"),
+)
+
+
+@cache
+def pair(scene: str) -> tuple[Any, Any]:
+    """A scene's compiled module, without optimisation, which takes long, and its Python module. Of
+    a large scene an ordinary run compiles the derivative alone.
+    """
+    made = eomgen.generate(scene, backend="c")
+    python = load_module(made.reference, made.name)
+    sources = made.library
+    if scene in some(LARGE, ()):
+        system = compile_program(check(read(scene)), jacobian=False).system
+        outputs = {"derivative": system.program.outputs["derivative"]}
+        program = replace(system.program, outputs=outputs)
+        sources = c.library(program, interface_of(replace(system, program=program)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(library, "LEVELS", ("-O0", "-O0"))
+        return compiled_module(python, library.built(sources)), python
+
+
+def result(call: Callable[[], Any]) -> Any:
+    """What a call returns, or its error in words."""
+    try:
+        return call()
+    except (ValueError, ArithmeticError) as error:
+        return f"{type(error).__name__}: {error}"
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two results are the same to the bit, nan and signs of zero too, or the same words."""
+    if isinstance(one, str) or isinstance(other, str):
+        return isinstance(one, str) and isinstance(other, str) and one == other
+    a, b = np.asarray(one), np.asarray(other)
+    return a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes()
+
+
+@pytest.mark.parametrize("scene", built_in_names())
+def test_the_bits_are_those_of_the_python_module(scene: str) -> None:
+    """Of every output that takes time and state alone; of single states and of columns."""
+    compiled, python = pair(scene)
+    rng = np.random.default_rng(7)
+    y = np.array([random_state(python, rng) for _ in range(3)])
+    u = rng.uniform(-2.0, 2.0, len(python.INPUTS))
+    p = np.array([*python.PARAMETERS.values()]) * rng.uniform(0.99, 1.0)
+    names = [n for n in OUTPUTS if getattr(compiled, n, None) is not getattr(python, n, None)]
+    assert "derivative" in names and ("jacobian" in names or scene in LARGE)
+    for name in names:
+        ours, theirs = getattr(compiled, name), getattr(python, name)
+        for state in y:
+            for given in ({}, {"u": u}, {"p": p, "u": u}):
+                assert same(ours(0.7, state, **given), theirs(0.7, state, **given)), name
+        together = ours(0.7, y.T)
+        for k, state in enumerate(y):
+            assert same(together[..., k], theirs(0.7, state)), name
+
+
+@pytest.mark.parametrize("level", ["-O1", "-O2", "-O3"])
+def test_no_optimisation_changes_a_bit(level: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is contracted and no order is changed."""
+    monkeypatch.setattr(library, "LEVELS", (level, level))
+    compiled = eomgen.load(eomgen.generate("two_body", backend="c"))
+    _, python = pair("two_body")
+    for seed in range(200):
+        y = random_state(python, np.random.default_rng(seed))
+        assert same(compiled.derivative(0.0, y), python.derivative(0.0, y))
+        assert same(compiled.jacobian(0.0, y), python.jacobian(0.0, y))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"y": [0.0] * 8},
+        {"y": np.zeros(7)},
+        {"y": np.full(8, np.nan)},
+        {"y": np.full(8, 1e200)},
+        {"y": np.full(8, 1e19)},
+        {"y": np.zeros(8, dtype=np.float32)},
+        {"y": np.ma.masked_equal(np.arange(8.0), 3)},
+        {"y": np.zeros((8, 0))},
+        {"y": np.array([np.zeros(8), np.full(8, np.inf), np.ones(8), np.full(8, 1e200)]).T},
+        {"y": np.ones(8)[::-1], "p": {"m_A": 2.0}},
+        {"y": np.ones(8), "p": {"m_A": -1.0}},
+        {"y": np.ones(8), "p": {"m_X": 1.0}},
+        {"y": np.ones(8), "p": {"m_A": 1e80}},
+        {"y": np.ones(8), "p": {"m_A": np.nan}},
+        {"y": np.ones(8), "p": {"m_A": "1"}},
+        {"y": np.ones(8), "p": [1, 1, 1, 1, 1, 1, 9]},
+        {"y": np.ones(8), "p": np.ones(3)},
+        {"y": np.ones(8), "p": "text"},
+        {"y": np.ones(8), "u": {"push": 1.0}},
+        {"y": np.ones(8), "u": np.zeros(0)},
+        {"y": "text"},
+    ],
+    ids=range(21),
+)
+def test_what_is_wrong_gets_the_same_answer(given: dict[str, Any]) -> None:
+    """A state without a result, columns among others, arguments of a wrong kind."""
+    compiled, python = pair("two_body")
+    y, rest = given["y"], {k: v for k, v in given.items() if k != "y"}
+    for name in ("derivative", "jacobian", "kinetic_energy"):
+        one = result(lambda name=name: getattr(compiled, name)(0.0, y, **rest))
+        other = result(lambda name=name: getattr(python, name)(0.0, y, **rest))
+        assert same(one, other), (one, other)
+
+
+def test_inputs_of_columns_and_those_that_are_wrong() -> None:
+    """One set for all columns, or one for each; none that are not finite."""
+    compiled, python = pair("cart_pole")
+    y = np.linspace(-1.0, 1.0, 12).reshape(4, 3)
+    for u in (np.array([2.0]), np.array([[1.0, 2.0, 3.0]]), {"push": 4.0}, np.array([np.nan])):
+        for state in (y, y[:, 0]):
+            one = result(lambda u=u, y=state: compiled.derivative(0.0, y, None, u))
+            assert same(one, result(lambda u=u, y=state: python.derivative(0.0, y, None, u)))
+    assert same(compiled.forward_dynamics(y[:2], y[2:]), python.forward_dynamics(y[:2], y[2:]))
+
+
+PROGRAM = """
+#include <stdio.h>
+#include "NAME.h"
+int main(void) {
+    NAME_real p[NPARAMETERS], k[NCONSTANTS + 1], y[NSTATES], u[NINPUTS + 1] = {0}, out[NSTATES];
+    NAME_defaults(p);
+    if (NAME_constants(p, k)) return 1;
+    NAME_initial_state(0, y, k, u, y);
+    NAME_derivative(0, y, k, u, out);
+    for (int i = 0; i < NSTATES; i++) printf("%.17g\\n", (double)out[i]);
+    p[0] = -1;
+    printf("%s\\n", NAME_refusal(NAME_constants(p, k)));
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("scene", some(FEW, built_in_names()))
+@pytest.mark.parametrize("real", ["double", "float"])
+def test_it_stands_alone(scene: str, real: str, tmp_path: Path) -> None:
+    """Source, header and a program of ten lines: no warning, and the derivative at the start."""
+    assert main(["generate", scene, "--backend", "c", "-o", str(tmp_path)]) == 0
+    text = PROGRAM.replace("NAME", scene)
+    for word in ("STATES", "INPUTS", "PARAMETERS", "CONSTANTS"):
+        text = text.replace(f"N{word}", f"{scene.upper()}_{word}")
+    (tmp_path / "main.c").write_text(text, "utf-8")
+    flags = [*STRICT, "-Wdouble-promotion", "-DEOMGEN_FLOAT"] if real == "float" else [*STRICT]
+    kernels = [str(CC), *flags, "-c", f"{scene}.c"]
+    program = [str(CC), "-std=c99", *flags[-1:], "main.c", f"{scene}.o", "-o", "run", "-lm"]
+    for command in (kernels, program):
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+    done = subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=True)
+    *numbers, refusal = done.stdout.split("\n")[:-1]
+    _, python = pair(scene)
+    wanted = python.derivative(0.0, python.initial_state())
+    found = np.array([float(x) for x in numbers])
+    if real == "double":
+        assert same(found, wanted)
+    else:
+        assert found == pytest.approx(wanted, rel=1e-4, abs=1e-4 * np.max(np.abs(wanted)))
+    first = next(iter(python.PARAMETERS))
+    told = result(lambda: python.derivative(0.0, python.initial_state(), {first: -1.0}))
+    assert bool(refusal) == isinstance(told, str)
+
+
+def test_names_of_c_are_no_names_here(tmp_path: Path) -> None:
+    """Parameters and bodies that go by its keywords, functions and macros."""
+    words = "double M_PI NAN INFINITY linux y0 restrict fabs sin_cos R real HUGE_VAL unix k".split()
+    text = (BUILT_IN / "pendulum.toml").read_text("utf-8").replace('"closed"', '"aba"')
+    text += "[parameters]\n" + "".join(f"{word} = {1 + i}.0\n" for i, word in enumerate(words))
+    text += "".join(
+        f'[[effects]]\ntype = "external_torque"\nname = "e{i}"\nbody = "bob"\ntorque = "{word}"\n'
+        for i, word in enumerate(words)
+    )
+    scene = tmp_path / "named.toml"
+    scene.write_text(text, "utf-8")
+    compiled, python = pair(scene)
+    y = np.array([0.3, -0.2])
+    assert same(compiled.derivative(0.0, y), python.derivative(0.0, y))
+
+
+# The compiler.
+
+
+@pytest.fixture
+def fresh(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """An empty store, and no compiler that was found before."""
+    compiler._found.cache_clear()
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path / "store"))
+    monkeypatch.delenv("CC", raising=False)
+    yield tmp_path
+    compiler._found.cache_clear()
+
+
+def script(path: Path, text: str) -> str:
+    """An executable file of the shell."""
+    path.write_text(f"#!/bin/sh\n{text}\n", "utf-8")
+    path.chmod(0o700)
+    return str(path)
+
+
+def test_which_compiler_is_taken(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """That in CC, with its arguments; else cc, gcc, clang on the path; zig; or one line."""
+    monkeypatch.setenv("CC", f"{CC} -O0")
+    assert compiler.find_compiler().command == (str(CC), "-O0")
+    for chosen in ("/nowhere/cc", "false", "'"):
+        monkeypatch.setenv("CC", chosen)
+        with pytest.raises(
+            RunError, match=r"^CC: '.*' does not run; name a C compiler or unset it$"
+        ):
+            compiler.find_compiler()
+    monkeypatch.delenv("CC")
+    folder = fresh / "bin"
+    folder.mkdir()
+    monkeypatch.setenv("PATH", str(folder))
+    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(
+        RunError, match=r"^no C compiler is found; .* pip install 'eomgen\[compiled"
+    ):
+        compiler.find_compiler()
+    for name in ("clang", "gcc", "cc"):  # each comes before those before it
+        compiler._found.cache_clear()
+        made = script(folder / name, "echo a compiler")
+        assert compiler.find_compiler().command == (made,)
+
+
+def test_a_compiler_that_fails(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its first error in one line; the next call, with a good one, goes on."""
+    says = 'case "$1" in --version) echo mine;; *) echo "x.c:1: error: no room" >&2; exit 1;; esac'
+    monkeypatch.setenv("CC", script(fresh / "bad", says))
+    made = eomgen.generate("pendulum", backend="c")
+    with pytest.raises(RunError, match=r"^/.*/bad: x\.c:1: error: no room$"):
+        eomgen.load(made)
+    monkeypatch.delenv("CC")
+    assert eomgen.load(made).derivative(0.0, np.zeros(2)).shape == (2,)
+
+
+def test_a_library_is_compiled_once(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is kept under its source, compiler and flags; one that was damaged is made again."""
+    calls = fresh / "calls"
+    monkeypatch.setenv("CC", script(fresh / "cc", f'echo "$@" >> {calls}\nexec {CC} "$@"'))
+
+    def compiled() -> int:
+        return sum("checked.c" in line for line in calls.read_text().splitlines())
+
+    made = eomgen.generate("pendulum", backend="c")
+    wanted = eomgen.load(made).derivative(0.0, np.ones(2))
+    assert compiled() == 1
+    eomgen.load(eomgen.generate("pendulum", backend="c"))
+    assert compiled() == 1
+    (entry,) = (fresh / "store" / "native").glob("*.entry")
+    content = bytearray(entry.read_bytes())
+    content[len(content) // 2] ^= 1
+    entry.write_bytes(content)
+    assert same(eomgen.load(made).derivative(0.0, np.ones(2)), wanted)
+    assert compiled() == 2
+    monkeypatch.setattr(library, "LEVELS", ("-O0", "-O0"))
+    eomgen.load(made)
+    assert compiled() == 3
+
+
+@pytest.mark.parametrize("place", ["store", "temporary"])
+def test_where_nothing_can_be_written(
+    place: str, fresh: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A store without room is done without; no place for files at all is one line."""
+    made = eomgen.generate("pendulum", backend="c")
+    if place == "store":
+        monkeypatch.setenv("EOMGEN_CACHE", "/dev/null/store")
+        assert eomgen.load(made).derivative(0.0, np.zeros(2)).shape == (2,)
+        return
+    monkeypatch.setattr(compiler.tempfile, "tempdir", "/nowhere")
+    with pytest.raises(RunError, match=r"^the compiled module cannot be made: No such file"):
+        eomgen.load(made)
+
+
+def test_several_at_once_and_one_killed(fresh: Path) -> None:
+    """Processes that compile the same scene, one of them stopped midway, leave a sound store."""
+    code = "import eomgen, numpy; m = eomgen.load(eomgen.generate('pendulum', backend='c')); "
+    code += "print(m.derivative(0.0, numpy.ones(2)).tobytes().hex())"
+    command = [sys.executable, "-c", code]
+    slow = script(fresh / "slow", f'case "$1" in --version) ;; *) sleep 60;; esac; exec {CC} "$@"')
+    killed = subprocess.Popen(command, env={**os.environ, "CC": slow}, stdout=subprocess.DEVNULL)
+    others = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    said = {process.communicate()[0] for process in others}
+    killed.kill()
+    killed.wait()
+    _, python = pair("pendulum")
+    assert said == {python.derivative(0.0, np.ones(2)).tobytes().hex() + "\n"}
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert again.stdout in said
+
+
+def test_a_library_says_what_it_holds() -> None:
+    """Sizes, and outputs with their shapes, as the module has them."""
+    made = eomgen.generate("cart_pole", backend="c")
+    held = library.built(made.library)
+    assert tuple((ctypes.c_long * 4).in_dll(held, "sizes"))[:3] == (4, 1, 5)
+    compiled = eomgen.load(made)
+    assert compiled.jacobian.__doc__ == "Exact Jacobian of `derivative` by the state."
+    assert compiled.STATES == pair("cart_pole")[1].STATES
