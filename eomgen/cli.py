@@ -120,7 +120,7 @@ def _parser() -> argparse.ArgumentParser:
     generate = command("generate", commands.generate, "write the module of a scene", "scenes")
     _code(_form(generate))
     generate.add_argument(
-        "--backend", metavar="NAME", default="numpy", help="language: numpy (default), javascript"
+        "--backend", metavar="NAME", default="numpy", help="numpy (default), c, javascript"
     )
     generate.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("generated"))
     generate.add_argument("--all", action="store_true", help="all built-in scenes")

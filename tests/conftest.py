@@ -1,6 +1,7 @@
 """What the tests share: fixtures, and which of them run in one process."""
 
 import gc
+import os
 import signal
 from collections.abc import Iterator
 from typing import Any
@@ -84,7 +85,9 @@ def _short_timing() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _own_store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Generated code of the tests is kept apart from the user's."""
+    """Generated code of the tests is kept apart from the user's, in one store for all processes."""
+    own = tmp_path_factory.getbasetemp()
+    store = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "store"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("EOMGEN_CACHE", str(tmp_path_factory.mktemp("store")))
+        patch.setenv("EOMGEN_CACHE", str(store))
         yield

@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -335,3 +336,18 @@ def test_a_library_says_what_it_holds() -> None:
     compiled = eomgen.load(made)
     assert compiled.jacobian.__doc__ == "Exact Jacobian of `derivative` by the state."
     assert compiled.STATES == pair("cart_pole")[1].STATES
+
+
+def test_the_page_on_c_is_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its program is compiled by its command and prints what it says."""
+    page = (Path(__file__).parent.parent / "docs" / "c.md").read_text("utf-8")
+    (text,) = re.findall(r"^```c\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    command, wanted = re.findall(r"^```sh\n(.*)\n# prints (.*)\n```", page, re.MULTILINE)[0]
+    (tmp_path / "main.c").write_text(text, "utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main("generate two_body --backend c -o .".split()) == 0
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
+    assert done.stdout == f"{wanted}\n"
+    (text,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == re.findall(r"# prints (.*)", text)
