@@ -656,15 +656,16 @@ def _strict(reach):
     return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
 
 
-def _alone(call, y, name, reach):
+def _alone(call, y, name, reach, closely=False):
     """What `call` computes of a state, a list of numbers; or an error that says why there is none.
 
-    Beyond `reach` it is computed again with NumPy's numbers, which tell of any overflow on the way.
+    Beyond `reach`, or where asked to look `closely`, it is computed again with NumPy's numbers, which
+    tell of any overflow on the way.
     """
     state = y.tolist()
     try:
         values = call(state)
-        if not (reach and hypot(*values, *state) < reach):
+        if closely or not (reach and hypot(*values, *state) < reach):
             with _strict(reach):
                 call(list(y))
             if not all(np.isfinite(part).all() for part in (y, *values)):

@@ -333,3 +333,14 @@ g = 9.81
         way = exact(np.eye(len(y))[i])
         column = along(lambda x: e.exactly("derivative", x), exact(y), way)
         assert apart(J[:, i], column) < ROUNDING
+
+
+def test_weights_that_vanish_refuse_nothing() -> None:
+    """`orthogonal` weighs some rows by 1e-200: their products may vanish, and no derivative is
+    refused for that.
+    """
+    text = random_spatial_tree(2, 3, 5)[1]
+    one, other = (engine(text, route, tangents=True).module for route in ("orthogonal", "aba"))
+    y = engine(text, "orthogonal", tangents=True).random_state(np.random.default_rng(2))
+    for name in DERIVATIVES:
+        assert apart(getattr(one, name)(0.4, y), getattr(other, name)(0.4, y)) < 1e-9
