@@ -39,12 +39,20 @@ def report_refusal(error: EomgenError) -> None:
         print(f"eomgen: {line}", file=sys.stderr)
 
 
+ALIKE = 0.6
+"""Least similarity of a hint: twice the number of common letters by that of all letters."""
+LONGER = 2 / ALIKE - 1
+"""A word this many times as long as a known one cannot be so similar. To compare takes long."""
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return ``" (did you mean 'x'?)"`` for the known word nearest to `word`, or ``""``."""
     # Small and capital letters are the least of differences: rk45 is RK45 rather than rk4.
     names = list(known)
+    if len(word) > LONGER * max(map(len, names), default=0):
+        return ""
     close = [name for name in names if name.casefold() == word.casefold()]
-    close = close or difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    close = close or difflib.get_close_matches(word, names, n=1, cutoff=ALIKE)
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 

@@ -28,10 +28,11 @@ pytestmark = pytest.mark.usefixtures("blank_figures")
 @pytest.mark.parametrize("seed", some(("1",), ("0", "1", "2")))
 def test_committed_modules_are_what_is_generated(tmp_path: Path, seed: str) -> None:
     """Built-in scenes derived anew give the committed bytes, or the committed digest, whatever the
-    seed of Python's hashes; nothing else is there. The large ones take longest; `.ci/run` has them
-    all.
+    seed of Python's hashes; nothing else is there. An ordinary run derives half of the small ones;
+    `.ci/run` has them all.
     """
     names = [name for name in built_in_names() if name not in some(LARGE, ())]
+    names = some(names[::2], names)
     committed = ROOT / "generated"
     done = subprocess.run(
         [sys.executable, "-m", "eomgen", "generate", *names, "--check", "-o", str(committed)],
@@ -45,7 +46,8 @@ def test_committed_modules_are_what_is_generated(tmp_path: Path, seed: str) -> N
     assert done.returncode == 0 and len(lines) == len(names)
     kept = [path.name for path in committed.glob("*.py")]
     assert sorted([*kept, *known()]) == [f"{name}.py" for name in sorted(built_in_names())]
-    assert {path.name for path in committed.iterdir()} == {*kept, SUMS.name}
+    found = {path.name for path in committed.iterdir()} - {"__pycache__"}  # if any was imported
+    assert found == {*kept, SUMS.name}
 
 
 def test_a_digest_stands_for_a_module(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -423,7 +425,7 @@ def test_progress_is_shown_on_a_terminal_and_not_in_a_pipe(
 ) -> None:
     """A bar on standard error if that is a terminal; a clean end; silence in a pipe."""
     asked = ["simulate", "double_pendulum", "-o", str(tmp_path), "--integrator", "rk4"]
-    asked += ["--dt", "0.0005", "--t-end", "2"]
+    asked += ["--dt", "0.0005", "--t-end", "1"]
     command = [sys.executable, "-m", "eomgen", *asked]
     ours, theirs = pty.openpty()
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs) as process:

@@ -24,7 +24,7 @@ from eomgen.codegen.interface import interface_of
 from eomgen.errors import RunError
 from eomgen.native import compiler, library
 from eomgen.native.module import compiled_module
-from eomgen.pipeline import compile_program
+from eomgen.pipeline import compile_program, python_module
 from eomgen.run.module import load_module
 from eomgen.scene.built_in import BUILT_IN, built_in_names
 from eomgen.study.verification.states import random_state
@@ -45,14 +45,15 @@ def pair(scene: str) -> tuple[Any, Any]:
     """A scene's compiled module, without optimisation, which takes long, and its Python module. Of
     a large scene an ordinary run compiles the derivative alone.
     """
-    made = eomgen.generate(scene, backend="c")
-    python = load_module(made.reference, made.name)
-    sources = made.library
     if scene in some(LARGE, ()):
         system = compile_program(check(read(scene)), jacobian=False).system
+        python = load_module(python_module(system), scene)
         outputs = {"derivative": system.program.outputs["derivative"]}
         program = replace(system.program, outputs=outputs)
         sources = c.library(program, interface_of(replace(system, program=program)))
+    else:
+        made = eomgen.generate(scene, backend="c")
+        python, sources = load_module(made.reference, made.name), made.library
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(library, "LEVELS", ("-O0", "-O0"))
         return compiled_module(python, library.built(sources)), python

@@ -173,9 +173,9 @@ def test_text_of_a_scene_is_never_shown_as_it_is(
     """
     scene = tmp_path / "scene.toml"
     text = (BUILT_IN / "cart_pole.toml").read_text("utf-8")
-    refused = 0
+    refused, put = 0, quoted(hostile)
     for begin, end in places(text):
-        scene.write_text(text[:begin] + quoted(hostile) + text[end:], "utf-8")
+        scene.write_text(text[:begin] + put + text[end:], "utf-8")
         refused += main(["check", str(scene)])
         said = capsys.readouterr()
         lines = [*said.out.splitlines(), *said.err.splitlines()]
