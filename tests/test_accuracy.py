@@ -412,9 +412,9 @@ def test_scenes_by_form(
     [
         ("--methods rk5", "unknown name 'rk5' (did you mean 'rk4'?)"),
         ("--methods ,", "--methods: names no integrator"),
-        ("--run-time 0", "--run-time: 0 is no positive time"),
-        ("--time nan", "--time: nan is no positive time"),
-        ("--t-end -1", "--t-end: -1 is no positive time"),
+        ("--run-time 0", "--run-time: 0 is not a positive time"),
+        ("--time nan", "--time: nan is not a positive time"),
+        ("--t-end -1", "--t-end: -1 is not a positive time"),
         ("--set nothing=1", "--set: no parameter 'nothing'"),
         ("--input tau=1", "--input: no input 'tau'"),
     ],

@@ -296,11 +296,11 @@ def test_studies_are_values(tmp_path: Path) -> None:
     assert "gravity" in [item.label for item in bill.items]
     assert eomgen.arithmetic("pendulum", states=1).taken in ("closed", "ldl", "aba")
     for call, said in (
-        (lambda: eomgen.accuracy("pendulum", t_end=0.0), "t_end: 0 is no positive time"),
-        (lambda: eomgen.effects("pendulum", motion=0.0), "motion: 0 is no positive time"),
+        (lambda: eomgen.accuracy("pendulum", t_end=0.0), "t_end: 0 is not a positive time"),
+        (lambda: eomgen.effects("pendulum", motion=0.0), "motion: 0 is not a positive time"),
         (lambda: eomgen.arithmetic("pendulum", states=0), "states: 0 is not a number from 1"),
         (lambda: eomgen.verify("pendulum", seed=-1), "seed: -1 is negative"),
-        (lambda: eomgen.horizon("pendulum", seconds=0.0), "horizon: 0 is no positive time"),
+        (lambda: eomgen.horizon("pendulum", seconds=0.0), "horizon: 0 is not a positive time"),
     ):
         with pytest.raises(eomgen.RunError, match=said):
             call()

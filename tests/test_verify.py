@@ -483,7 +483,7 @@ def test_a_missed_bound_is_named_and_exits_1(capsys: pytest.CaptureFixture[str])
         ("--seed -1", "--seed: -1 is negative"),
         ("--bound 0.1", "--bound: 0.1 is no number of ulps"),
         ("--bound nan", "--bound: nan is no number of ulps"),
-        ("--horizon 0", "--horizon: 0 is no positive time"),
+        ("--horizon 0", "--horizon: 0 is not a positive time"),
     ],
 )
 def test_wrong_options_get_a_line(

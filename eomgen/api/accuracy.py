@@ -1,6 +1,5 @@
 """What accuracy costs in time, and how exact the arithmetic is: `accuracy`, `arithmetic`."""
 
-import math
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, named, overridden, read
-from eomgen.api.manner import SILENT, Manner
+from eomgen.api.given import Source, Values, check, check_time, named, overridden, read
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.entries import Entries
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
@@ -135,25 +134,20 @@ def to_measure(
     time: float = ALL_TIME,
     parameters: Values | None = None,
     inputs: Values | None = None,
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> Measuring:
     """What is to be measured of a model. Raises `RunError` for what cannot be served."""
     from eomgen.study.accuracy.ladder import methods_named
 
     for name, value in (("run_time", run_time), ("time", time)):
-        _check_time(value, manner.option(name))
+        check_time(value, reporter.argument(name))
     chosen = methods_named(methods)
-    given = named(parameters, model.defaults, manner.option("parameters"), "parameter")
-    pushes = named(inputs, [i.name for i in model.inputs], manner.option("inputs"), "input")
+    given = named(parameters, model.defaults, reporter.argument("parameters"), "parameter")
+    pushes = named(inputs, [i.name for i in model.inputs], reporter.argument("inputs"), "input")
     end = wanted.t_end if t_end is None else t_end
-    _check_time(end, manner.option("t_end"))
+    check_time(end, reporter.argument("t_end"))
     model = replace(model, outputs=in_order((*SHOWN, "effect_powers")))
     return Measuring(model, wanted, chosen, given, pushes, end, quick, run_time, time)
-
-
-def _check_time(value: float, asked: str) -> None:
-    if not 0 < value < math.inf:
-        raise RunError(f"{asked}: {value:g} is no positive time; give one in s")
 
 
 def measured(
@@ -164,7 +158,7 @@ def measured(
     force: bool = False,
     name: str = "",
     notice: Notice = lambda count, spent, rung: None,
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> Measured:
     """What `accuracy` returns, and by what it was measured; `name` is what the scene is called."""
     from eomgen import pipeline  # here, so that loading SymPy is not counted as deriving
@@ -175,7 +169,7 @@ def measured(
     model, t_end, called = plan.model, plan.t_end, name or plan.model.name
     values = (plan.parameters or None, plan.inputs or None)
     begin = clock.perf_counter()
-    module, functions = compiled(model, manner=manner)
+    module, functions = compiled(model, reporter=reporter)
     generation = clock.perf_counter() - begin if module.derived else None
     key = records.key(module.source, *_named(plan), t_end, plan.wanted.rest_speed)
     done: Mapping[Rung, Work] = {}
@@ -183,12 +177,12 @@ def measured(
         done, earlier = records.load(table, key)
         generation = earlier if generation is None else generation
     if generation is None:
-        with manner.waiting(f"timing the generation of {called} …"):
+        with reporter.waiting(f"timing the generation of {called} …"):
             begin = clock.perf_counter()
             pipeline.generate(model)
             generation = clock.perf_counter() - begin
-    with manner.located(), manner.watch(f"reference of {called}") as progress:
-        kept = _references(manner)
+    with reporter.located(), reporter.progress(f"reference of {called}") as progress:
+        kept = _references(reporter)
         truth = reference(
             model,
             functions,
@@ -234,11 +228,11 @@ def _columns(bench: "Bench", costs: tuple[float, float], plan: Measuring) -> dic
     }
 
 
-def _references(manner: Manner) -> Path | None:
+def _references(reporter: Reporter) -> Path | None:
     """Where references are kept; what is wrong with it is said."""
     kept = folder("references")
     if kept and (trouble := Entries(kept).trouble()):
-        manner.note(f"the store {kept} is not used: {trouble}")
+        reporter.note(f"the store {kept} is not used: {trouble}")
     return kept
 
 
@@ -355,13 +349,13 @@ def arithmetic(
     return arithmetic_of(own, scene.simulation, states=states, seed=seed, single=single)
 
 
-def check_arithmetic(states: int | None, seed: int, manner: Manner = SILENT) -> None:
+def check_arithmetic(states: int | None, seed: int, reporter: Reporter = SILENT) -> None:
     """Raise `RunError` for what cannot be served."""
     if states is not None and not 1 <= states <= MOST_STATES:
-        asked = manner.option("states")
+        asked = reporter.argument("states")
         raise RunError(f"{asked}: {states} is not a number from 1 to {MOST_STATES}")
     if seed < 0:
-        raise RunError(f"{manner.option('seed')}: {seed} is negative; give 0, 1, 2, …")
+        raise RunError(f"{reporter.argument('seed')}: {seed} is negative; give 0, 1, 2, …")
 
 
 def arithmetic_of(
@@ -372,12 +366,12 @@ def arithmetic_of(
     seed: int = 0,
     single: bool = False,
     name: str = "",
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> "Arithmetic":
     """What `arithmetic` returns of a model; `name` is what it is called there."""
     from eomgen.study.cost.arithmetic import arithmetic as judged
 
     called = name or model.name
-    with manner.located(), manner.watch(f"arithmetic of {called}") as progress:
+    with reporter.located(), reporter.progress(f"arithmetic of {called}") as progress:
         found = judged(model, wanted, states=states, seed=seed, single=single, progress=progress)
     return replace(found, name=called)

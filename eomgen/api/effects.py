@@ -1,11 +1,9 @@
 """What each effect of a scene costs, and what leaving it out does: `effects`."""
 
-import math
 from typing import TYPE_CHECKING
 
-from eomgen.api.given import Source, check, read
-from eomgen.api.manner import SILENT, Manner
-from eomgen.errors import RunError
+from eomgen.api.given import Source, check, check_time, read
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.scene.schema import Route, Scene
 
 if TYPE_CHECKING:
@@ -37,10 +35,10 @@ def effects(
     return bill_of(scene.replaced(route=route or scene.route), each=each, motion=motion)
 
 
-def check_motion(motion: float | None, manner: Manner = SILENT) -> None:
+def check_motion(motion: float | None, reporter: Reporter = SILENT) -> None:
     """Raise `RunError` for a time that is none."""
-    if motion is not None and not 0 < motion < math.inf:
-        raise RunError(f"{manner.option('motion')}: {motion:g} is no positive time; give one in s")
+    if motion is not None:
+        check_time(motion, reporter.argument("motion"))
 
 
 def bill_of(
@@ -49,12 +47,12 @@ def bill_of(
     each: bool = False,
     motion: float | None = MOTION,
     name: str = "",
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> "Bill":
     """What `effects` returns of a scene; `name` is what it is called."""
     from eomgen.study.cost.bill import bill
     from eomgen.study.cost.variants import variants
 
-    with manner.located(), manner.watch(f"costing {name or scene.name}") as progress:
+    with reporter.located(), reporter.progress(f"costing {name or scene.name}") as progress:
         changed = variants(scene, each=each)
         return bill(scene, changed, motion=motion or 0.0, progress=progress)

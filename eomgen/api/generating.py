@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 from eomgen.api.given import Outputs, Source, check, overridden
-from eomgen.api.manner import SILENT, Manner
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError, SceneError
 from eomgen.files import read_plain
 from eomgen.model.model import Model
@@ -94,7 +94,7 @@ def translated(module: Module, model: Model, backend: str) -> Module:
 
 
 def compiled(
-    model: Model, *, asked: Sequence[str] = (), anew: bool = False, manner: Manner = SILENT
+    model: Model, *, asked: Sequence[str] = (), anew: bool = False, reporter: Reporter = SILENT
 ) -> tuple[Module, GeneratedModule]:
     """A model's module, derived now or, unless `anew`, before, and loaded and tried.
 
@@ -102,16 +102,16 @@ def compiled(
 
     Raises `SceneError` if it cannot be evaluated as the scene is, or lacks one of these.
     """
-    with manner.located():
-        with manner.waiting(f"deriving {model.name} …"):
+    with reporter.located():
+        with reporter.waiting(f"deriving {model.name} …"):
             code = generated_code(model, anew=anew)
-        manner.note(code.notice)
+        reporter.note(code.notice)
         for notice in code.notices:
-            manner.noted(notice)
+            reporter.note_scene(notice)
         functions = load_module(code.module, model.name)
         problem_of(functions, model=model)
         for name in asked:
             if not hasattr(functions, name):
-                option = manner.option("outputs")
+                option = reporter.argument("outputs")
                 raise SceneError(f"{option}: '{name}' is made for form = 'velocity' only")
     return module_of(code, model), functions

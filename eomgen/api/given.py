@@ -100,3 +100,9 @@ def named(
             raise RunError(f"{place}: {name} is no finite number")
         found[name] = number + 0.0  # -0.0 becomes 0.0, as in a scene
     return found
+
+
+def check_time(value: float, argument: str) -> None:
+    """Raise `RunError` unless a time, s, is positive and finite."""
+    if not 0 < value < math.inf:
+        raise RunError(f"{argument}: {value:g} is not a positive time; give one in s")

@@ -9,7 +9,7 @@ import numpy as np
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, named
-from eomgen.api.manner import SILENT, Manner
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
@@ -88,7 +88,7 @@ def linearised_about(
     inputs: Values | None = None,
     hold: Sequence[str] = (),
     trim: Sequence[str] = (),
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> About:
     """A model that is `linearisable`, linearised as `linearise` describes it."""
     # Imported here: who does not linearise needs no SciPy.
@@ -97,21 +97,21 @@ def linearised_about(
     from eomgen.linear.linearise import linearise as linearised
 
     if at not in ("equilibrium", "rest", "initial"):
-        raise RunError(f"{manner.option('at')}: '{at}' is none of equilibrium, rest, initial")
-    given = named(parameters, model.defaults, manner.option("parameters"), "parameter")
-    pushes = named(inputs, [i.name for i in model.inputs], manner.option("inputs"), "input")
-    _, module = compiled(model, manner=manner)
-    with manner.located():
+        raise RunError(f"{reporter.argument('at')}: '{at}' is none of equilibrium, rest, initial")
+    given = named(parameters, model.defaults, reporter.argument("parameters"), "parameter")
+    pushes = named(inputs, [i.name for i in model.inputs], reporter.argument("inputs"), "input")
+    _, module = compiled(model, reporter=reporter)
+    with reporter.located():
         problem = problem_of(module, given or None, pushes or None, model)
-        y = start = _state(model, problem.initial, state, at, manner)
+        y = start = _state(model, problem.initial, state, at, reporter)
         u: Mapping[str, float] | FloatArray = pushes
         if at != "initial":
             settle = at == "rest"
             y, u = equilibrium(module, y, pushes, given, hold=hold, trim=trim, settle=settle)
         elif hold or trim:
-            options = f"{manner.option('hold')}, {manner.option('trim')}"
+            options = f"{reporter.argument('hold')}, {reporter.argument('trim')}"
             raise RunError(
-                f"{options}: are for finding an equilibrium; leave out {manner.option('at')} "
+                f"{options}: are for finding an equilibrium; leave out {reporter.argument('at')} "
                 "initial"
             )
         whole = linearised(module, y, u, given)
@@ -127,10 +127,10 @@ def state_names(model: Model) -> tuple[str, ...]:
 
 
 def _state(
-    model: Model, initial: FloatArray, state: Values | None, at: Place, manner: Manner
+    model: Model, initial: FloatArray, state: Values | None, at: Place, reporter: Reporter
 ) -> FloatArray:
     """The initial state with what is to be another, quaternions scaled with a notice."""
-    option, names = manner.option("state"), state_names(model)
+    option, names = reporter.argument("state"), state_names(model)
     nq, nv = len(model.coordinates), len(model.velocities)
     y = initial.copy()
     for name, value in named(state, names, option, "state").items():
@@ -140,7 +140,7 @@ def _state(
         if at != "initial" and nq <= index < nq + nv:
             raise RunError(
                 f"{option} {name}: an equilibrium is at rest; leave it out, or give "
-                f"{manner.option('at')} initial"
+                f"{reporter.argument('at')} initial"
             )
         y[index] = value
     for indices in map(list, model.quaternions):
@@ -148,7 +148,7 @@ def _state(
         if not length:
             raise RunError(f"{option}: the quaternion from {names[indices[0]]} on has no length")
         if abs(length - 1) > LENGTH:
-            manner.noted(
+            reporter.note_scene(
                 f"{option}: the quaternion from {names[indices[0]]} on has length {length:g}; "
                 "scaled to 1"
             )

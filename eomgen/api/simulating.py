@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, named, overridden, read
-from eomgen.api.manner import SILENT, Manner
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
@@ -141,7 +141,7 @@ def planned(
     parameters: Values | None = None,
     inputs: Values | None = None,
     unstable: bool = False,
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
     **others: Any,
 ) -> Plan:
     """A run of a scene's model, as `simulate` describes it.
@@ -150,28 +150,30 @@ def planned(
     """
     bounds = {"rtol": rtol, "atol": atol, "dt": dt}
     aims = [name for name in ("accuracy", "budget") if others.get(name) is not None]
-    _check_aims(aims, bounds, manner)
+    _check_aims(aims, bounds, reporter)
     asked = (*model.outputs, *SHOWN, *(("effect_powers",) if others.get("works") else ()))
     model = replace(model, outputs=in_order(asked))
-    given = named(parameters, model.defaults, manner.option("parameters"), "parameter")
-    pushes = named(inputs, [i.name for i in model.inputs], manner.option("inputs"), "input")
+    given = named(parameters, model.defaults, reporter.argument("parameters"), "parameter")
+    pushes = named(inputs, [i.name for i in model.inputs], reporter.argument("inputs"), "input")
     if aims and others.get("resume") is not None:
         raise RunError(
-            f"{manner.option('resume')}: goes on with a method that is named; leave "
-            f"{manner.option('accuracy')}, {manner.option('budget')} out"
+            f"{reporter.argument('resume')}: goes on with a method that is named; leave "
+            f"{reporter.argument('accuracy')}, {reporter.argument('budget')} out"
         )
     guard = others.get("guard")
     if guard not in (None, "stop", "repair"):
-        raise RunError(f"{manner.option('guard')}: '{guard}' is none of stop, repair")
-    setting = None if aims else setting_of(scene.simulation, integrator, **bounds, manner=manner)
+        raise RunError(f"{reporter.argument('guard')}: '{guard}' is none of stop, repair")
+    setting = (
+        None if aims else setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
+    )
     if unstable:
-        _check_unstable(setting, manner)
+        _check_unstable(setting, reporter)
     end = scene.simulation.t_end if t_end is None else t_end
     others |= {"integrator": integrator, "unstable": unstable}
     return Plan(scene, model, setting, end, given, pushes, **others)
 
 
-def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = SILENT) -> Run:
+def carried_out(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
     """The run of a plan. Raises `RunError` where it cannot begin."""
     # Imported here: to check and to generate needs no SciPy.
     from eomgen.show.observe import observe
@@ -181,7 +183,7 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
     from eomgen.study.accuracy.trial import Case
 
     model = plan.model
-    module, functions = compiled(model, asked=plan.outputs, manner=manner)
+    module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     values = (plan.parameters or None, plan.inputs or None)
     kept: dict[str, Any] = {
         "samples": plan.samples,
@@ -196,12 +198,12 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
         problem = start.problem
         kept |= start.options
     moved = moved_problem(functions, model, *values)
-    case = Case(problem, plan.t_end, functions.UNITS, kept, manner.watch, moved)
+    case = Case(problem, plan.t_end, functions.UNITS, kept, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
     warnings, error = [*model.notices, *module.notices], math.nan
     choice: Choice | None = None
     if plan.setting is None:
-        choice = _chosen(plan, case, manner)
+        choice = _chosen(plan, case, reporter)
         error = choice.error
         if not choice.met:
             why = choice.reason or UNKNOWN
@@ -228,7 +230,7 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
     )
 
 
-def _chosen(plan: Plan, case: Any, manner: Manner) -> "Choice":
+def _chosen(plan: Plan, case: Any, reporter: Reporter) -> "Choice":
     from eomgen.study.accuracy.aimed import aimed
 
     return aimed(
@@ -236,37 +238,39 @@ def _chosen(plan: Plan, case: Any, manner: Manner) -> "Choice":
         accuracy=plan.accuracy,
         budget=plan.budget,
         integrator=plan.integrator,
-        say=manner.trying,
+        say=reporter.trial,
     )
 
 
-def _check_aims(aims: Sequence[str], bounds: Mapping[str, float | None], manner: Manner) -> None:
+def _check_aims(
+    aims: Sequence[str], bounds: Mapping[str, float | None], reporter: Reporter
+) -> None:
     """Raise `RunError` where a run is asked for in two ways at once."""
     if len(aims) > 1:
-        both = ", ".join(map(manner.option, aims))
+        both = ", ".join(map(reporter.argument, aims))
         raise RunError(f"{both}: a run has one aim; give one of them")
-    for aim in map(manner.option, aims):
+    for aim in map(reporter.argument, aims):
         for name, value in bounds.items():
             if value is not None:
-                option = manner.option(name)
+                option = reporter.argument(name)
                 raise RunError(f"{aim}, {option}: {aim} chooses {name} itself; leave one out")
 
 
-def _check_unstable(setting: "Setting | None", manner: Manner) -> None:
+def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
     """Raise `RunError` for `unstable` where no step can be too long."""
     from eomgen.run.integrators import FixedStep, find_integrator
 
-    asked = manner.option("unstable")
+    asked = reporter.argument("unstable")
     if setting is None:
         raise RunError(
-            f"{asked}: is for a step that is given; leave {manner.option('accuracy')}, "
-            f"{manner.option('budget')} out"
+            f"{asked}: is for a step that is given; leave {reporter.argument('accuracy')}, "
+            f"{reporter.argument('budget')} out"
         )
     method = find_integrator(setting.integrator)
     if not (isinstance(method, FixedStep) and method.explicit):
         raise RunError(
-            f"{asked}: steps of {setting.integrator} are stable however long, or its own "
-            f"choice; leave it out, or take {manner.option('integrator')} euler, leapfrog or rk4"
+            f"{asked}: {setting.integrator} is stable at any step or chooses its own; leave "
+            f"it out, or take {reporter.argument('integrator')} euler, leapfrog or rk4"
         )
 
 
@@ -307,7 +311,7 @@ def setting_of(
     dt: float | None = None,
     rtol: float | None = None,
     atol: float | None = None,
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> "Setting":
     """The method asked for, or the scene's, `wanted`, with tolerances or a step.
 
@@ -325,8 +329,8 @@ def setting_of(
             dt,
         )
     if rtol is not None or atol is not None:
+        rtol_name, atol_name, dt_name = map(reporter.argument, ("rtol", "atol", "dt"))
         raise RunError(
-            f"{manner.option('rtol')}, {manner.option('atol')}: {name} takes equal steps; give "
-            f"{manner.option('dt')} instead"
+            f"{rtol_name}, {atol_name}: {name} takes equal steps; give {dt_name} instead"
         )
     return Setting(name, dt=wanted.dt if dt is None else dt)

@@ -5,8 +5,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from eomgen.api.given import Source, check, read
-from eomgen.api.manner import SILENT, Manner
+from eomgen.api.given import Source, check, check_time, read
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.module import load_module
@@ -51,20 +51,19 @@ def check_verification(
     seed: int = 0,
     bound: float | None = None,
     horizon: float | None = None,
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> None:
     """Raise `RunError` for what cannot be served."""
     if states is not None and not 1 <= states <= MOST_STATES:
-        asked = manner.option("states")
+        asked = reporter.argument("states")
         raise RunError(f"{asked}: {states} is not a number from 1 to {MOST_STATES}")
     if seed < 0:
-        raise RunError(f"{manner.option('seed')}: {seed} is negative; give 0, 1, 2, …")
+        raise RunError(f"{reporter.argument('seed')}: {seed} is negative; give 0, 1, 2, …")
     if bound is not None and not 0.5 <= bound < math.inf:
-        asked = manner.option("bound")
+        asked = reporter.argument("bound")
         raise RunError(f"{asked}: {bound:g} is no number of ulps from 0.5 on")
-    if horizon is not None and not 0 < horizon < math.inf:
-        asked = manner.option("horizon")
-        raise RunError(f"{asked}: {horizon:g} is no positive time; give one in s")
+    if horizon is not None:
+        check_time(horizon, reporter.argument("horizon"))
 
 
 def verified_model(
@@ -75,27 +74,27 @@ def verified_model(
     seed: int = 0,
     bound: float | None = None,
     name: str = "",
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> "Verified":
     """A model verified as `verify` describes it; `name` is what it is called there."""
     from eomgen.study.verification.verify import verify as verified  # brings many digits
 
-    check_verification(states=states, seed=seed, bound=bound, manner=manner)
+    check_verification(states=states, seed=seed, bound=bound, reporter=reporter)
     called = name or model.name
-    with manner.located(), manner.watch(f"verifying {called}") as progress:
+    with reporter.located(), reporter.progress(f"verifying {called}") as progress:
         found = verified(model, wanted, states=states, seed=seed, bound=bound, progress=progress)
     return replace(found, name=called)
 
 
 def horizon_of(
-    model: Model, wanted: Simulation, *, seconds: float, name: str = "", manner: Manner = SILENT
+    model: Model, wanted: Simulation, *, seconds: float, name: str = "", reporter: Reporter = SILENT
 ) -> "Horizon":
     """What `horizon` says of a model, which `name` is what it is called."""
     from eomgen.study.verification.horizon import horizon as found
 
-    check_verification(horizon=seconds, manner=manner)
+    check_verification(horizon=seconds, reporter=reporter)
     model = replace(model, form="velocity")
-    with manner.located(), manner.watch(f"horizon of {name or model.name}") as progress:
+    with reporter.located(), reporter.progress(f"horizon of {name or model.name}") as progress:
         module = load_module(generated_code(model).module, model.name)
         return found(model, wanted, module, seconds=seconds, progress=progress)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from eomgen.api.accuracy import Accuracy, measured, to_measure
 from eomgen.commands.arithmetic import check_files, print_arithmetic
-from eomgen.commands.shared import Arguments, assignments, manner_of, print_listed, read_whole
+from eomgen.commands.shared import Arguments, assignments, print_listed, read_whole, reporter_of
 from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_line
@@ -35,7 +35,7 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
     from eomgen.show.style import check_figure
     from eomgen.study.accuracy.reference import save as save_reference
 
-    manner = manner_of(given, given.scene)
+    reporter = reporter_of(given, given.scene)
     plan = to_measure(
         model,
         wanted,
@@ -46,7 +46,7 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
         time=given.time,
         parameters=assignments(given.set, model.defaults, "--set"),
         inputs=assignments(given.input, [i.name for i in model.inputs], "--input"),
-        manner=manner,
+        reporter=reporter,
     )
     paths = {kind: given.output / f"{name}_accuracy.{kind}" for kind in ("csv", "png")}
     paths["npz"] = given.output / f"{name}_reference.npz"
@@ -69,7 +69,7 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
             force=given.force,
             name=name,
             notice=notice,
-            manner=manner,
+            reporter=reporter,
         )
     found = made.found
     print_table(name, made)

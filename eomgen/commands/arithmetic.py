@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eomgen.api.accuracy import arithmetic_of, check_arithmetic
-from eomgen.commands.shared import Arguments, assignments, manner_of, print_wrapped
+from eomgen.commands.shared import Arguments, assignments, print_wrapped, reporter_of
 from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.scene.schema import Simulation
@@ -24,7 +24,7 @@ def check_files(given: Arguments, name: str) -> None:
     """Raise `RunError` if this half cannot be done as asked, or not be written."""
     from eomgen.show.style import check_figure
 
-    check_arithmetic(given.states, given.seed, manner_of(given, given.scene))
+    check_arithmetic(given.states, given.seed, reporter_of(given, given.scene))
     check_folder(given.output)
     check_figure(given.output / f"{name}_arithmetic.png", force=given.force)
     check_writable(given.output / f"{name}_arithmetic.csv", force=given.force)
@@ -44,7 +44,7 @@ def print_arithmetic(given: Arguments, model: Model, wanted: Simulation, name: s
         seed=given.seed,
         single=given.float32,
         name=name,
-        manner=manner_of(given, given.scene),
+        reporter=reporter_of(given, given.scene),
     )
     print(
         f"{name}: error of v̇ in units in the last place (ulp), by every route; taken: {found.taken}"

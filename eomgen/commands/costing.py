@@ -4,8 +4,8 @@ import math
 from typing import TYPE_CHECKING
 
 from eomgen.api.effects import bill_of, check_motion
-from eomgen.api.manner import Manner
-from eomgen.commands.shared import OPTIONS, Arguments, manner_of, print_wrapped, read_model
+from eomgen.api.reporter import Reporter
+from eomgen.commands.shared import OPTIONS, Arguments, print_wrapped, read_model, reporter_of
 from eomgen.files import check_folder
 from eomgen.scene.reader import read_scene
 
@@ -21,7 +21,7 @@ def effects(given: Arguments) -> int:
     from eomgen.show.bill import save_bill
     from eomgen.show.style import check_figure
 
-    check_motion(given.motion_time, Manner(option=OPTIONS.__getitem__))
+    check_motion(given.motion_time, Reporter(argument=OPTIONS.__getitem__))
     model, name = read_model(given.scene, given)
     path = given.output / f"{name}_effects.png"
     check_folder(path.parent)
@@ -32,7 +32,7 @@ def effects(given: Arguments) -> int:
         each=given.each,
         motion=None if given.no_motion else given.motion_time,
         name=name,
-        manner=manner_of(given, given.scene),
+        reporter=reporter_of(given, given.scene),
     )
     print(
         f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs "

@@ -5,7 +5,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from eomgen.api.generating import LARGEST, check_backend, compiled, translated
-from eomgen.commands.shared import Arguments, manner_of, read_model, required
+from eomgen.commands.shared import Arguments, read_model, reporter_of, required
 from eomgen.errors import EomgenError, RunError, report_refusal
 from eomgen.files import check_folder, check_writable, read_plain
 from eomgen.results import Module
@@ -53,7 +53,7 @@ def _generate(scene: str, given: Arguments, paths: dict[Path, str]) -> bool:
         check_writable(path, force=given.force)
     # What is checked is what would be derived now, whatever the store holds.
     module, _ = compiled(
-        model, asked=required(given, model), anew=given.check, manner=manner_of(given, scene)
+        model, asked=required(given, model), anew=given.check, reporter=reporter_of(given, scene)
     )
     if given.backend != "numpy":
         module = translated(module, model, given.backend)

@@ -10,10 +10,10 @@ from eomgen.commands.shared import (
     Arguments,
     assignments,
     located,
-    manner_of,
     print_listed,
     print_wrapped,
     read_model,
+    reporter_of,
     shortened,
 )
 from eomgen.errors import RunError
@@ -50,7 +50,7 @@ def linearise(given: Arguments) -> int:
         inputs=inputs,
         hold=given.hold,
         trim=given.trim,
-        manner=manner_of(given, given.scene),
+        reporter=reporter_of(given, given.scene),
     )
     module, whole = about.module, about.whole
     least, found = whole.reduced(), whole.modes

@@ -11,11 +11,11 @@ from eomgen.commands.choosing import print_choice, print_estimate, seconds_of, w
 from eomgen.commands.shared import (
     Arguments,
     assignments,
-    manner_of,
     overlap_lines,
     print_listed,
     print_wrapped,
     read_whole,
+    reporter_of,
     required,
     shortened,
 )
@@ -27,7 +27,7 @@ from eomgen.run.trajectory import Trajectory
 def simulate(given: Arguments) -> int:
     """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
     scene, model, name = read_whole(given.scene, given)
-    manner = manner_of(given, given.scene)
+    reporter = reporter_of(given, given.scene)
     plan = planned(
         scene,
         model,
@@ -48,12 +48,12 @@ def simulate(given: Arguments) -> int:
         unstable=given.unstable,
         estimate=given.estimate,
         resume=given.resume,
-        manner=manner,
+        reporter=reporter,
     )
     paths = output_paths(given.output, name, figure=given.plot, force=given.force)
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
-    run = carried_out(plan, manner=manner)
+    run = carried_out(plan, reporter=reporter)
     drawing = save_run(run, paths, force=given.force)
     missed = _report(given, run)
     for path in paths.values():

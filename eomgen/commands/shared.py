@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from contextlib import AbstractContextManager
 
 from eomgen.api.given import Outputs, check_outputs, overridden
-from eomgen.api.manner import Manner
+from eomgen.api.reporter import Reporter
 from eomgen.dynamics.diagnostics import initial_overlaps
 from eomgen.errors import RunError, nearest
 from eomgen.model.elaborate import elaborate
@@ -73,20 +73,20 @@ def required(given: Arguments, model: Model) -> Sequence[str]:
     return () if named_outputs(given) in (None, "all") else model.outputs
 
 
-def manner_of(given: Arguments, scene: str) -> Manner:
-    """How the command line speaks of a scene."""
-    return Manner(
-        place=find_scene(scene).name,
-        option=lambda name: OPTIONS.get(name, f"--{name.replace('_', '-')}"),
+def reporter_of(given: Arguments, scene: str) -> Reporter:
+    """The reporter of the command line for a scene."""
+    return Reporter(
+        scene=find_scene(scene).name,
+        argument=lambda name: OPTIONS.get(name, f"--{name.replace('_', '-')}"),
         note=lambda notice: note(given, notice),
-        trying=lambda text: print(f"    trying {text}", flush=True),
+        trial=lambda text: print(f"    trying {text}", flush=True),
         waiting=terminal_notice,
-        watch=terminal_progress,
+        progress=terminal_progress,
     )
 
 
 def note(given: Arguments, notice: str) -> None:
-    """Say on standard error what a command did without, if anything, once."""
+    """Print a note on standard error, once for each text; "" prints nothing."""
     if notice and notice not in vars(given).setdefault("noted", []):
         print(f"eomgen: note: {one_line(notice)}", file=sys.stderr)
         given.noted.append(notice)
@@ -94,7 +94,7 @@ def note(given: Arguments, notice: str) -> None:
 
 def located(scene: str) -> AbstractContextManager[None]:
     """Name the scene's file in front of what is said of the scene."""
-    return Manner(place=find_scene(scene).name).located()
+    return Reporter(scene=find_scene(scene).name).located()
 
 
 def assignments(texts: list[str], known: Collection[str], option: str) -> dict[str, float]:

@@ -1,8 +1,8 @@
 """A generated module against an independent solver and 60 digits: `verify`."""
 
-from eomgen.api.manner import Manner
+from eomgen.api.reporter import Reporter
 from eomgen.api.verifying import check_verification, digest, horizon_of, verified_model
-from eomgen.commands.shared import Arguments, manner_of, read_whole
+from eomgen.commands.shared import Arguments, read_whole, reporter_of
 from eomgen.errors import RunError
 
 
@@ -12,17 +12,17 @@ def verify(given: Arguments) -> int:
     from eomgen.study.verification import evidence
 
     asked = {"states": given.states, "seed": given.seed, "bound": given.bound}
-    manner = Manner(option=lambda name: f"--{name}")
-    check_verification(**asked, horizon=given.horizon, manner=manner)
+    reporter = Reporter(argument=lambda name: f"--{name}")
+    check_verification(**asked, horizon=given.horizon, reporter=reporter)
     scene, model, name = read_whole(given.scene, given)
     if given.save is not None:
         evidence.paths(given.save, name, force=given.force)
-    manner = manner_of(given, given.scene)
-    found = verified_model(model, scene.simulation, **asked, name=name, manner=manner)
+    reporter = reporter_of(given, given.scene)
+    found = verified_model(model, scene.simulation, **asked, name=name, reporter=reporter)
     horizon = None
     if given.horizon is not None:
         wanted = scene.simulation
-        horizon = horizon_of(model, wanted, seconds=given.horizon, name=name, manner=manner)
+        horizon = horizon_of(model, wanted, seconds=given.horizon, name=name, reporter=reporter)
     lines = evidence.report(found, horizon)
     print("\n".join(lines))
     if given.save is not None:
