@@ -70,11 +70,11 @@ class Derivation:
         """The derivation step by step: number, title, words, equations."""
         return self.matrices.steps
 
-    def text(self) -> str:
-        """All steps as plain text."""
+    def text(self, *, encoding: str = "utf-8") -> str:
+        """All steps as plain text, in ASCII if the encoding lacks Greek letters."""
         from eomgen.show.derivation import as_text
 
-        return as_text(self.name, self.title, self.steps)
+        return as_text(self.name, self.title, self.steps, encoding=encoding)
 
     def latex(self) -> str:
         """All steps as one LaTeX document."""

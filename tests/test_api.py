@@ -59,7 +59,7 @@ def test_a_scene_in_every_way(tmp_path: Path) -> None:
         ({**DROP, "bodeis": {1, 2}}, "scene: bodeis: unknown key (did you mean 'bodies'?)"),
         ({**DROP, "name": 7}, "scene: name: 7 is not a text; give one"),
         ({**DROP, "points": np.zeros(2)}, "scene: points[0]: 0.0 is not a table; give one"),
-        (7, "a scene is no int; give a path, a name, a text, a mapping or a Scene"),
+        (7, "a scene cannot be read from int; give a path, a name, a text, a mapping or a Scene"),
         ("pendulam", "pendulam: no such file, nor a built-in scene (did you mean 'pendulum'?)"),
     ],
 )
@@ -219,7 +219,7 @@ def test_a_run_by_its_error() -> None:
     ("asked", "said"),
     [
         ({"parameters": {"lenght": 1.0}}, "parameters: no parameter 'lenght'"),
-        ({"parameters": {"bob_mass": "1 kg"}}, "parameters: bob_mass is no finite number"),
+        ({"parameters": {"bob_mass": "1 kg"}}, "parameters: bob_mass is not a finite number"),
         ({"inputs": {"push": 1.0}}, "inputs: no input 'push'; known: none"),
         ({"integrator": "rk5"}, "rk5"),
         ({"integrator": "rk4", "rtol": 1e-3}, "rtol, atol: rk4 takes equal steps; give dt instead"),
