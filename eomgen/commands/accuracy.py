@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from eomgen.api.accuracy import Accuracy, measured, to_measure
 from eomgen.commands.arithmetic import check_files, print_arithmetic
-from eomgen.commands.shared import Arguments, assignments, print_listed, read_whole, reporter_of
+from eomgen.commands.shared import Arguments, given_values, print_listed, read_whole, reporter_of
 from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_line
@@ -36,6 +36,7 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
     from eomgen.study.accuracy.reference import save as save_reference
 
     reporter = reporter_of(given, given.scene)
+    parameters, inputs = given_values(given, model)
     plan = to_measure(
         model,
         wanted,
@@ -44,8 +45,8 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
         t_end=given.t_end,
         run_time=given.run_time,
         time=given.time,
-        parameters=assignments(given.set, model.defaults, "--set"),
-        inputs=assignments(given.input, [i.name for i in model.inputs], "--input"),
+        parameters=parameters,
+        inputs=inputs,
         reporter=reporter,
     )
     paths = {kind: given.output / f"{name}_accuracy.{kind}" for kind in ("csv", "png")}

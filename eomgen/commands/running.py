@@ -10,7 +10,7 @@ from eomgen.api.simulating import carried_out, planned
 from eomgen.commands.choosing import print_choice, print_estimate, seconds_of, warn_of_energy
 from eomgen.commands.shared import (
     Arguments,
-    assignments,
+    given_values,
     overlap_lines,
     print_listed,
     print_wrapped,
@@ -28,6 +28,7 @@ def simulate(given: Arguments) -> int:
     """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
     scene, model, name = read_whole(given.scene, given)
     reporter = reporter_of(given, given.scene)
+    parameters, inputs = given_values(given, model)
     plan = planned(
         scene,
         model,
@@ -39,8 +40,8 @@ def simulate(given: Arguments) -> int:
         atol=given.atol,
         accuracy=given.accuracy,
         budget=None if given.budget is None else seconds_of(given.budget),
-        parameters=assignments(given.set, model.defaults, "--set"),
-        inputs=assignments(given.input, [i.name for i in model.inputs], "--input"),
+        parameters=parameters,
+        inputs=inputs,
         samples=given.samples,
         max_step=given.max_step,
         works=given.works,

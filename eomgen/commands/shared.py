@@ -114,6 +114,12 @@ def assignments(
     return values
 
 
+def given_values(given: Arguments, model: Model) -> tuple[dict[str, float], dict[str, float]]:
+    """The values of `--set` and of `--input`. Raises `RunError` as `assignments` does."""
+    parameters = assignments(given.set, model.defaults, "--set")
+    return parameters, assignments(given.input, [i.name for i in model.inputs], "--input")
+
+
 def overlap_lines(model: Model) -> list[str]:
     """A line for each soft contact or stop that overlaps at the initial state."""
     return [
