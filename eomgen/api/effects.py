@@ -1,4 +1,4 @@
-"""What each effect of a scene costs, and what leaving it out does: `effects`."""
+"""The cost of each effect of a scene, and the change of its motion without it: `effects`."""
 
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from eomgen.study.cost.bill import Bill
 
 MOTION = 10.0
-"""Time that motions are compared for, s."""
+"""Default length of the motions that are compared, s."""
 
 
 def effects(
@@ -20,14 +20,14 @@ def effects(
     each: bool = False,
     motion: float | None = MOTION,
 ) -> "Bill":
-    """What each effect adds to the operations and the time of a derivative, and what leaving it
-    out does to the motion.
+    """Measure what each effect adds to the operations and the time of a derivative, and how the
+    motion changes without it.
 
     route   to the equations; None: the scene's own
-    each    each effect for itself, not all of a type together
-    motion  time that motions are compared for, s; None: they are not
+    each    each effect separately, not all of a type together
+    motion  length of the motions that are compared, s; None: motions are not compared
 
-    Raises `SceneError` for a scene that makes no mechanism, `RunError` for a time that is none.
+    Raises `SceneError`, or `RunError` unless `motion` is positive.
     """
     check_motion(motion)
     scene = read(source)
@@ -36,7 +36,7 @@ def effects(
 
 
 def check_motion(motion: float | None, reporter: Reporter = SILENT) -> None:
-    """Raise `RunError` for a time that is none."""
+    """Raise `RunError` unless the length of the motions, s, is positive."""
     if motion is not None:
         check_time(motion, reporter.argument("motion"))
 
@@ -49,7 +49,7 @@ def bill_of(
     name: str = "",
     reporter: Reporter = SILENT,
 ) -> "Bill":
-    """What `effects` returns of a scene; `name` is what it is called."""
+    """The result of `effects` for a scene; `name` is the name of the scene in messages."""
     from eomgen.study.cost.bill import bill
     from eomgen.study.cost.variants import variants
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eomgen.api.accuracy import Accuracy, measured, to_measure
+from eomgen.api.accuracy import Accuracy, measure, plan_measurement
 from eomgen.commands.arithmetic import check_files, print_arithmetic
 from eomgen.commands.shared import Arguments, given_values, print_listed, read_whole, reporter_of
 from eomgen.files import check_folder, check_writable
@@ -37,7 +37,7 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
 
     reporter = reporter_of(given, given.scene)
     parameters, inputs = given_values(given, model)
-    plan = to_measure(
+    plan = plan_measurement(
         model,
         wanted,
         methods=given.methods,
@@ -63,7 +63,7 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
         )
 
     with terminal_line() as say:
-        made = measured(
+        made = measure(
             plan,
             table=paths["csv"],
             fresh=given.fresh,

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from eomgen.api.accuracy import Measured
+from eomgen.api.accuracy import Measurement
 from eomgen.commands.shared import print_wrapped
 from eomgen.study.accuracy.ladder import Work, order
 from eomgen.study.accuracy.reading import TARGETS, cheapest, observed_order, saved_by_jacobian
@@ -34,7 +34,7 @@ def _quaternions(bench: Bench) -> str:
     )
 
 
-def print_table(name: str, made: Measured) -> None:
+def print_table(name: str, made: Measurement) -> None:
     """Print what was measured: a line a run, a word on each method's order, and a reading."""
     found, bench, methods = made.found, made.bench, made.methods
     works, costs, t_end, generation = found.works, found.costs, found.t_end, found.generation
