@@ -278,7 +278,7 @@ def test_a_run_goes_on_from_another_or_its_archive(tmp_path: Path) -> None:
         assert rest.begun.endswith("as if the run had not ended")
         assert np.array_equal(rest.y[-1], whole.y[-1])
     assert whole.begun == "" and whole.imbalance is not None and whole.imbalance.lost < 1e-6
-    with pytest.raises(eomgen.RunError, match="resume: goes on with a method that is named"):
+    with pytest.raises(eomgen.RunError, match="resume: continues with a given method"):
         eomgen.simulate("pendulum", resume=half, accuracy=1e-3)
     with pytest.raises(eomgen.RunError, match="guard: 'watch' is none of stop, repair"):
         eomgen.simulate("pendulum", guard="watch")  # type: ignore[arg-type]

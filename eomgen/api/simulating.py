@@ -1,4 +1,4 @@
-"""The motion of a scene: `simulate`, and its two halves, `planned` and `carried_out`."""
+"""Simulation of a scene: `simulate`, which calls `plan_run` and `run_plan`."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, named, overridden, read
+from eomgen.api.given import Source, Values, check, overridden, read, values_of
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
@@ -27,19 +27,20 @@ if TYPE_CHECKING:
     from eomgen.study.accuracy.search import Choice
     from eomgen.study.accuracy.trial import Setting
 
-Guarding = Literal["stop", "repair"]
-Earlier = str | PathLike[str] | Run
+GuardMode = Literal["stop", "repair"]
+EarlierRun = str | PathLike[str] | Run
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A run that is asked for, and what of it could be checked at once.
+    """Checked arguments of a run.
 
-    scene    what is simulated, for its settings and its looks
-    model    with the outputs that the run and its pictures take
-    setting  method and tolerances or step; None where `accuracy` or `budget` choose it
-    outputs  those that were asked for by name
-    others   as `simulate` has them
+    scene    its settings and appearance are used
+    model    with the outputs that the run and its pictures need
+    setting  method and tolerances or step; None if `accuracy` or `budget` choose them
+    outputs  those that the caller named
+
+    The other fields are arguments of `simulate`.
     """
 
     scene: Scene
@@ -55,10 +56,10 @@ class Plan:
     samples: int = 1001
     max_step: float | None = None
     works: bool = False
-    guard: Guarding | None = None
+    guard: GuardMode | None = None
     unstable: bool = False
     estimate: bool = False
-    resume: Earlier | None = None
+    resume: EarlierRun | None = None
 
 
 def simulate(
@@ -78,35 +79,39 @@ def simulate(
     samples: int = 1001,
     max_step: float | None = None,
     works: bool = False,
-    guard: Guarding | None = None,
+    guard: GuardMode | None = None,
     unstable: bool = False,
     estimate: bool = False,
-    resume: Earlier | None = None,
+    resume: EarlierRun | None = None,
     follow: "Follow | None" = None,
 ) -> Run:
-    """The motion of a scene from its initial state.
+    """Simulate a scene from its initial state.
 
-    t_end, integrator, dt, rtol, atol  None: the scene's own; `dt` for equal steps, s, `rtol` and
-                        `atol` for adaptive methods
-    accuracy            asks for a method and tolerances whose error in the last state is below this
-                        part of the motion's scale, by runs of this very scene
-    budget              asks for the most exact run that takes about so long, s
-    parameters, inputs  other values by name; inputs are constant
-    samples             rows that are kept, about
-    max_step            longest step of adaptive methods, s
-    works               asks for what each effect has done, J
-    guard               watches rounding at every step: "stop" where digits are lost, or "repair"
-    unstable            lets equal steps of an explicit method be too long for stability
-    estimate            estimates the error by a second run
-    resume              goes on where an earlier run ended: its archive `.npz`, or itself
-    follow              told time and state after each step; a true result stops the run
+    t_end       end time, s; None: the scene's own
+    integrator  name of the method; None: the scene's own
+    dt          step of a fixed-step method, s; None: the scene's own
+    rtol, atol  relative and absolute tolerance of an adaptive method; None: the scene's own
+    accuracy    choose method and tolerances so that the error of the last state, relative to the
+                scale of the motion, is below this; they are found by trial runs of this scene
+    budget      choose the most accurate run that takes about this time, s
+    parameters  values that replace those of the scene, by name
+    inputs      constant values, by name; others are 0
+    form        state form; None: the scene's own
+    route       to the equations; None: the scene's own
+    samples     number of rows that are kept, about
+    max_step    longest step of an adaptive method, s
+    works       also compute the work of each effect, J
+    guard       check rounding errors at each step, and "stop" where digits are lost, or "repair"
+    unstable    allow steps of an explicit fixed-step method that are too long for stability
+    estimate    estimate the error by a second run
+    resume      continue an earlier run: a `Run`, or its archive `.npz`
+    follow      called with time and state after each step; a true result stops the run
 
-    A run that cannot go on is returned with the rows up to there: it is not `finished`, and its
-    `outcome` says why and what to change. Raises `SceneError`, or `RunError` for an argument that
-    cannot be served.
+    A run that cannot continue is returned with its rows so far: `finished` is false, and `outcome`
+    says why and what to change. Raises `SceneError`, or `RunError` for an invalid argument.
     """
     scene = read(source)
-    plan = planned(
+    plan = plan_run(
         scene,
         overridden(check(scene), form=form, route=route),
         t_end=t_end,
@@ -126,10 +131,10 @@ def simulate(
         estimate=estimate,
         resume=resume,
     )
-    return carried_out(plan, follow=follow)
+    return run_plan(plan, follow=follow)
 
 
-def planned(
+def plan_run(
     scene: Scene,
     model: Model,
     *,
@@ -144,20 +149,19 @@ def planned(
     reporter: Reporter = SILENT,
     **others: Any,
 ) -> Plan:
-    """A run of a scene's model, as `simulate` describes it.
+    """Check the arguments of `simulate`, which describes them, for a scene's model.
 
-    Raises `RunError` for what cannot be served.
+    Raises `RunError` for an invalid argument.
     """
     bounds = {"rtol": rtol, "atol": atol, "dt": dt}
     aims = [name for name in ("accuracy", "budget") if others.get(name) is not None]
     _check_aims(aims, bounds, reporter)
     asked = (*model.outputs, *SHOWN, *(("effect_powers",) if others.get("works") else ()))
     model = replace(model, outputs=in_order(asked))
-    given = named(parameters, model.defaults, reporter.argument("parameters"), "parameter")
-    pushes = named(inputs, [i.name for i in model.inputs], reporter.argument("inputs"), "input")
+    parameters, inputs = values_of(model, parameters, inputs, reporter)
     if aims and others.get("resume") is not None:
         raise RunError(
-            f"{reporter.argument('resume')}: goes on with a method that is named; leave "
+            f"{reporter.argument('resume')}: continues with a given method; leave "
             f"{reporter.argument('accuracy')}, {reporter.argument('budget')} out"
         )
     guard = others.get("guard")
@@ -170,12 +174,12 @@ def planned(
         _check_unstable(setting, reporter)
     end = scene.simulation.t_end if t_end is None else t_end
     others |= {"integrator": integrator, "unstable": unstable}
-    return Plan(scene, model, setting, end, given, pushes, **others)
+    return Plan(scene, model, setting, end, parameters, inputs, **others)
 
 
-def carried_out(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
-    """The run of a plan. Raises `RunError` where it cannot begin."""
-    # Imported here: to check and to generate needs no SciPy.
+def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
+    """Run a plan. Raises `RunError` if the run cannot start."""
+    # Imported here: plans are checked without SciPy.
     from eomgen.show.observe import observe
     from eomgen.study.accuracy.aimed import UNKNOWN, made_again
     from eomgen.study.accuracy.estimate import by_second_run
@@ -185,7 +189,7 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporte
     model = plan.model
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     values = (plan.parameters or None, plan.inputs or None)
-    kept: dict[str, Any] = {
+    options: dict[str, Any] = {
         "samples": plan.samples,
         "max_step": plan.max_step,
         "rest_speed": plan.scene.simulation.rest_speed,
@@ -196,9 +200,9 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporte
     start = _start(plan, problem)
     if start is not None:
         problem = start.problem
-        kept |= start.options
+        options |= start.options
     moved = moved_problem(functions, model, *values)
-    case = Case(problem, plan.t_end, functions.UNITS, kept, reporter.progress, moved)
+    case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
     warnings, error = [*model.notices, *module.notices], math.nan
     choice: Choice | None = None
@@ -208,20 +212,20 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporte
         if not choice.met:
             why = choice.reason or UNKNOWN
             warnings.append(f"accuracy: not reached, the estimate is {error:.1g}: {why}")
-        tried = made_again(case, choice, powers, follow)
+        trial = made_again(case, choice, powers, follow)
     else:
-        tried = case.run(plan.setting, powers=powers, follow=follow)
-    trajectory, estimate = tried.trajectory, None
+        trial = case.run(plan.setting, powers=powers, follow=follow)
+    trajectory, estimate = trial.trajectory, None
     if plan.estimate and choice is None and trajectory.finished:
-        estimate = by_second_run(case, tried)
+        estimate = by_second_run(case, trial)
         error = estimate.last
-    own = model.with_parameters(plan.parameters)
+    model = model.with_parameters(plan.parameters)
     return Run(
-        own,
+        model,
         module,
         trajectory,
-        observe(own, functions, trajectory, appearance_of(plan.scene), plan.inputs),
-        tried.setting.options,
+        observe(model, functions, trajectory, appearance_of(plan.scene), plan.inputs),
+        trial.setting.options,
         error,
         tuple(warnings),
         choice=choice,
@@ -245,7 +249,7 @@ def _chosen(plan: Plan, case: Any, reporter: Reporter) -> "Choice":
 def _check_aims(
     aims: Sequence[str], bounds: Mapping[str, float | None], reporter: Reporter
 ) -> None:
-    """Raise `RunError` where a run is asked for in two ways at once."""
+    """Raise `RunError` for two aims, or for an aim together with a tolerance or step."""
     if len(aims) > 1:
         both = ", ".join(map(reporter.argument, aims))
         raise RunError(f"{both}: a run has one aim; give one of them")
@@ -257,13 +261,13 @@ def _check_aims(
 
 
 def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
-    """Raise `RunError` for `unstable` where no step can be too long."""
+    """Raise `RunError` for `unstable` unless the method is explicit with a given step."""
     from eomgen.run.integrators import FixedStep, find_integrator
 
     asked = reporter.argument("unstable")
     if setting is None:
         raise RunError(
-            f"{asked}: is for a step that is given; leave {reporter.argument('accuracy')}, "
+            f"{asked}: is for a given step; leave {reporter.argument('accuracy')}, "
             f"{reporter.argument('budget')} out"
         )
     method = find_integrator(setting.integrator)
@@ -277,7 +281,7 @@ def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
 def _guard(
     plan: Plan, module: GeneratedModule, values: tuple[Mapping[str, float] | None, ...]
 ) -> "Guard | None":
-    """What watches the run, if that is asked for."""
+    """The guard against rounding errors, if the plan has one."""
     if plan.guard is None:
         return None
     from eomgen.precision.guarding import guard_of
@@ -287,7 +291,7 @@ def _guard(
 
 
 def _start(plan: Plan, problem: Problem) -> "Start | None":
-    """How the run goes on from an earlier one, if that is asked for."""
+    """Where the run continues an earlier one, if the plan names one."""
     if plan.resume is None:
         return None
     from eomgen.run.resume import going_on
@@ -313,9 +317,9 @@ def setting_of(
     atol: float | None = None,
     reporter: Reporter = SILENT,
 ) -> "Setting":
-    """The method asked for, or the scene's, `wanted`, with tolerances or a step.
+    """The method with its tolerances or step; None stands for those of the scene, `wanted`.
 
-    Raises `RunError` for tolerances of a method that takes equal steps.
+    Raises `RunError` for tolerances of a fixed-step method.
     """
     from eomgen.run.integrators import FixedStep, find_integrator
     from eomgen.study.accuracy.trial import Setting
