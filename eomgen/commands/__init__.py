@@ -1,4 +1,4 @@
-"""What each command does; what is heavy is imported by the command that needs it."""
+"""The commands, one function each. A command imports slow packages itself, when it runs."""
 
 import importlib.metadata
 
@@ -29,5 +29,5 @@ __all__ = [
 
 
 def version() -> str:
-    """This program's version."""
+    """The version of eomgen."""
     return importlib.metadata.version("eomgen")

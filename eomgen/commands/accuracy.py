@@ -1,4 +1,4 @@
-"""What accuracy costs in time: `accuracy`."""
+"""The command `accuracy`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def accuracy(given: Arguments) -> int:
-    """Print, write and draw what runs cost by every method, and how exact the arithmetic is."""
+    """Print, write and draw time and error of runs by each method, and rounding errors of v̇."""
     scene, model, name = read_whole(given.scene, given)
     if not given.no_arithmetic:
         check_files(given, name)
@@ -30,7 +30,7 @@ def accuracy(given: Arguments) -> int:
 
 
 def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None:
-    """Run every method over its ladder; print the table, write it and draw it."""
+    """Run each method at its tolerances or steps; print, write and draw the results."""
     from eomgen.commands.accuracy_table import print_table
     from eomgen.show.style import check_figure
     from eomgen.study.accuracy.reference import save as save_reference
@@ -58,12 +58,12 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
 
     def notice(count: int, spent: float, rung: "Rung") -> None:
         say(
-            f"accuracy of {name}: {count} runs, {spent:.0f} s of {given.time:g} s at most; "
+            f"accuracy of {name}: {count} runs, {spent:.0f} s of at most {given.time:g} s; "
             f"now {rung.method}, {rung.setting}"
         )
 
     with terminal_line() as say:
-        made = measure(
+        measurement = measure(
             plan,
             table=paths["csv"],
             fresh=given.fresh,
@@ -72,25 +72,25 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
             notice=notice,
             reporter=reporter,
         )
-    found = made.found
-    print_table(name, made)
+    found = measurement.found
+    print_table(name, measurement)
     _print_origin(found, given.time)
     save_reference(found.reference, paths["npz"])
-    _draw(name, model, made.bench, found.t_end, found.works, paths["png"], given.force)
+    _draw(name, model, measurement.bench, found.t_end, found.works, paths["png"], given.force)
     for path in paths.values():
         print(f"    wrote {path}")
 
 
 def _print_origin(found: Accuracy, seconds: float) -> None:
-    """Say which runs were made now, and which not at all."""
+    """Print how many runs were made now, and which were not made."""
     shown = len(found.works)
     if shown > found.made:
         print(
-            f"    {found.made} runs made now, {shown - found.made} taken from earlier (--fresh "
-            "begins anew)"
+            f"    {found.made} runs made now, {shown - found.made} taken from the table (--fresh "
+            "repeats them)"
         )
     if found.left_out:
-        print(f"    {seconds:g} s were over before finer runs of these; the same command goes on:")
+        print(f"    {seconds:g} s passed before finer runs of these; the same command continues:")
         print_listed("        ", found.left_out)
 
 

@@ -1,4 +1,4 @@
-"""A generated module against an independent solver and 60 digits: `verify`."""
+"""The command `verify`."""
 
 from eomgen.api.reporter import Reporter
 from eomgen.api.verifying import check_verification, digest, horizon_of, verified_model
@@ -7,18 +7,18 @@ from eomgen.errors import RunError
 
 
 def verify(given: Arguments) -> int:
-    """Verify, print, write the evidence if asked; raise `RunError` when a bound is missed."""
-    # Imported here: nothing else needs that many digits.
+    """Verify, print the report, write it if asked. Raises `RunError` if a bound is exceeded."""
+    # Imported here: it imports extended precision.
     from eomgen.study.verification import evidence
 
-    asked = {"states": given.states, "seed": given.seed, "bound": given.bound}
+    options = {"states": given.states, "seed": given.seed, "bound": given.bound}
     reporter = Reporter(argument=lambda name: f"--{name}")
-    check_verification(**asked, horizon=given.horizon, reporter=reporter)
+    check_verification(**options, horizon=given.horizon, reporter=reporter)
     scene, model, name = read_whole(given.scene, given)
     if given.save is not None:
         evidence.paths(given.save, name, force=given.force)
     reporter = reporter_of(given, given.scene)
-    found = verified_model(model, scene.simulation, **asked, name=name, reporter=reporter)
+    found = verified_model(model, scene.simulation, **options, name=name, reporter=reporter)
     horizon = None
     if given.horizon is not None:
         wanted = scene.simulation
