@@ -263,10 +263,10 @@ MISTAKES = [
     ("r_child = [-0.1, 0]", "r_child = [-0.1]", "joints[1].r_child: has 1 entry; "
      "give at least 2"),
     ("mass = 0.5", f"mass = {'9' * 400}",
-     "bodies[1].mass: is a number of hundreds of digits; give at most 1e+100, or choose other "
+     "bodies[1].mass: has hundreds of digits; give at most 1e+100, or choose other "
      "units"),
     ("mass = 0.5", f"mass = 0x{'f' * 100_000}",
-     "bodies[1].mass: is a number of hundreds of digits; give at most 1e+100, or choose other "
+     "bodies[1].mass: has hundreds of digits; give at most 1e+100, or choose other "
      "units"),
     ("mass = 0.5", f"mass = {'9' * 4301}",
      "has a whole number of thousands of digits; give at most 1e+100, or choose other units"),
@@ -424,9 +424,9 @@ MISTAKES = [
     (GOOD, 'name = "swing"\na = ' + 5000 * "{ a = " + "1" + 5000 * "}",
      "is not TOML: nested too deep"),
     (GOOD, 'name = "swing"\n' + 10**5 * "a." + "a = 1",
-     "is not read: a key has more than 20 parts"),
+     "a key has more than 20 parts"),
     (GOOD, 'name = "swing"\n[' + 10**5 * "'a b' . \"c\"." + "d]",
-     "is not read: a key has more than 20 parts"),
+     "a key has more than 20 parts"),
     ("mass = 0.5", f"mass = {300 * '['}{300 * ']'}",
      f"bodies[1].mass: {40 * '['}…{19 * ']'} is neither a number nor a formula; give one"),
     ("mass = 0.5", f'mass = "{151 * "-"}m"', f"bodies[1].mass: '{39 * '-'}…{17 * '-'}m' "
