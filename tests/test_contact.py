@@ -735,7 +735,7 @@ BAD_STOPS = {
         "effects[0].restitution: 1.1 is not from 0 to 1; give one that is"
     ),
     ("low = 0", "restitution = 0.5", "stiffness = 9"): (
-        "effects[0].stiffness: a restitution stands in its place; give one"
+        "effects[0].stiffness: a restitution replaces it; give one"
     ),
     ("low = 0",): "effects[0].stiffness: missing; give it or a restitution",
     ("restitution = 0.5",): "effects[0].low: missing, and high too; give one of them or both",
