@@ -138,43 +138,60 @@ def plan_run(
     scene: Scene,
     model: Model,
     *,
+    outputs: Sequence[str] = (),
     t_end: float | None = None,
     integrator: str | None = None,
     dt: float | None = None,
     rtol: float | None = None,
     atol: float | None = None,
+    accuracy: float | None = None,
+    budget: float | None = None,
     parameters: Values | None = None,
     inputs: Values | None = None,
+    samples: int = 1001,
+    max_step: float | None = None,
+    works: bool = False,
+    guard: GuardMode | None = None,
     unstable: bool = False,
+    estimate: bool = False,
+    resume: EarlierRun | None = None,
     reporter: Reporter = SILENT,
-    **others: Any,
 ) -> Plan:
     """Check the arguments of `simulate`, which describes them, for a scene's model.
 
-    Raises `RunError` for an invalid argument.
+    `outputs` must be in the module. Raises `RunError` for an invalid argument.
     """
     bounds = {"rtol": rtol, "atol": atol, "dt": dt}
-    aims = [name for name in ("accuracy", "budget") if others.get(name) is not None]
-    _check_aims(aims, bounds, reporter)
-    asked = (*model.outputs, *SHOWN, *(("effect_powers",) if others.get("works") else ()))
-    model = replace(model, outputs=in_order(asked))
+    aims = [n for n, x in (("accuracy", accuracy), ("budget", budget)) if x is not None]
+    _check_aims(aims, bounds, resume, reporter)
     parameters, inputs = values_of(model, parameters, inputs, reporter)
-    if aims and others.get("resume") is not None:
-        raise RunError(
-            f"{reporter.argument('resume')}: continues with a given method; leave "
-            f"{reporter.argument('accuracy')}, {reporter.argument('budget')} out"
-        )
-    guard = others.get("guard")
     if guard not in (None, "stop", "repair"):
         raise RunError(f"{reporter.argument('guard')}: '{guard}' is none of stop, repair")
-    setting = (
-        None if aims else setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
-    )
+    setting = None
+    if not aims:
+        setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
     if unstable:
         _check_unstable(setting, reporter)
-    end = scene.simulation.t_end if t_end is None else t_end
-    others |= {"integrator": integrator, "unstable": unstable}
-    return Plan(scene, model, setting, end, parameters, inputs, **others)
+    needed = (*model.outputs, *SHOWN, *(("effect_powers",) if works else ()))
+    return Plan(
+        scene,
+        replace(model, outputs=in_order(needed)),
+        setting,
+        scene.simulation.t_end if t_end is None else t_end,
+        parameters,
+        inputs,
+        outputs,
+        accuracy=accuracy,
+        budget=budget,
+        integrator=integrator,
+        samples=samples,
+        max_step=max_step,
+        works=works,
+        guard=guard,
+        unstable=unstable,
+        estimate=estimate,
+        resume=resume,
+    )
 
 
 def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
@@ -247,9 +264,12 @@ def _chosen(plan: Plan, case: Any, reporter: Reporter) -> "Choice":
 
 
 def _check_aims(
-    aims: Sequence[str], bounds: Mapping[str, float | None], reporter: Reporter
+    aims: Sequence[str],
+    bounds: Mapping[str, float | None],
+    resume: EarlierRun | None,
+    reporter: Reporter,
 ) -> None:
-    """Raise `RunError` for two aims, or for an aim together with a tolerance or step."""
+    """Raise `RunError` for two aims, or for an aim with a tolerance, a step or an earlier run."""
     if len(aims) > 1:
         both = ", ".join(map(reporter.argument, aims))
         raise RunError(f"{both}: a run has one aim; give one of them")
@@ -258,6 +278,11 @@ def _check_aims(
             if value is not None:
                 option = reporter.argument(name)
                 raise RunError(f"{aim}, {option}: {aim} chooses {name} itself; leave one out")
+    if aims and resume is not None:
+        raise RunError(
+            f"{reporter.argument('resume')}: continues with a given method; leave "
+            f"{reporter.argument('accuracy')}, {reporter.argument('budget')} out"
+        )
 
 
 def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
