@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from eomgen.run.guard import Guard
     from eomgen.run.resume import Start
     from eomgen.run.tally import Follow
+    from eomgen.run.works import Powers
     from eomgen.study.accuracy.search import Choice
-    from eomgen.study.accuracy.trial import Setting
+    from eomgen.study.accuracy.trial import Case, Setting, Tried
 
 GuardMode = Literal["stop", "repair"]
 EarlierRun = str | PathLike[str] | Run
@@ -198,7 +199,7 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     """Run a plan. Raises `RunError` if the run cannot start."""
     # Imported here: plans are checked without SciPy.
     from eomgen.show.observe import observe
-    from eomgen.study.accuracy.aimed import UNKNOWN, made_again
+    from eomgen.study.accuracy.aimed import UNKNOWN
     from eomgen.study.accuracy.estimate import by_second_run
     from eomgen.study.accuracy.moved import moved_problem
     from eomgen.study.accuracy.trial import Case
@@ -222,18 +223,14 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
     warnings, error = [*model.notices, *module.notices], math.nan
-    choice: Choice | None = None
-    if plan.setting is None:
-        choice = _chosen(plan, case, reporter)
+    trial, choice = _run_case(plan, case, powers, follow, reporter)
+    trajectory, estimate = trial.trajectory, None
+    if choice is not None:
         error = choice.error
         if not choice.met:
             why = choice.reason or UNKNOWN
             warnings.append(f"accuracy: not reached, the estimate is {error:.1g}: {why}")
-        trial = made_again(case, choice, powers, follow)
-    else:
-        trial = case.run(plan.setting, powers=powers, follow=follow)
-    trajectory, estimate = trial.trajectory, None
-    if plan.estimate and choice is None and trajectory.finished:
+    elif plan.estimate and trajectory.finished:
         estimate = by_second_run(case, trial)
         error = estimate.last
     model = model.with_parameters(plan.parameters)
@@ -251,16 +248,22 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     )
 
 
-def _chosen(plan: Plan, case: Any, reporter: Reporter) -> "Choice":
-    from eomgen.study.accuracy.aimed import aimed
+def _run_case(
+    plan: Plan, case: "Case", powers: "Powers | None", follow: "Follow | None", reporter: Reporter
+) -> "tuple[Tried, Choice | None]":
+    """The run of a plan, and the choice of its method if the plan has an aim."""
+    from eomgen.study.accuracy.aimed import aimed, made_again
 
-    return aimed(
+    if plan.setting is not None:
+        return case.run(plan.setting, powers=powers, follow=follow), None
+    choice = aimed(
         case,
         accuracy=plan.accuracy,
         budget=plan.budget,
         integrator=plan.integrator,
         say=reporter.trial,
     )
+    return made_again(case, choice, powers, follow), choice
 
 
 def _check_aims(
