@@ -82,7 +82,7 @@ class MeasurementPlan:
     """Checked arguments of `accuracy`, which describes them."""
 
     model: Model
-    wanted: Simulation
+    simulation: Simulation
     methods: Sequence[str]
     parameters: Mapping[str, float]
     inputs: Mapping[str, float]
@@ -141,7 +141,7 @@ def accuracy(
 
 def plan_measurement(
     model: Model,
-    wanted: Simulation,
+    simulation: Simulation,
     *,
     methods: str | None = None,
     quick: bool = False,
@@ -159,10 +159,12 @@ def plan_measurement(
         check_time(value, reporter.argument(name))
     chosen = methods_named(methods)
     parameters, inputs = values_of(model, parameters, inputs, reporter)
-    end = wanted.t_end if t_end is None else t_end
+    end = simulation.t_end if t_end is None else t_end
     check_time(end, reporter.argument("t_end"))
     model = replace(model, outputs=in_order((*SHOWN, "effect_powers")))
-    return MeasurementPlan(model, wanted, chosen, parameters, inputs, end, quick, run_time, time)
+    return MeasurementPlan(
+        model, simulation, chosen, parameters, inputs, end, quick, run_time, time
+    )
 
 
 def measure(
@@ -188,7 +190,7 @@ def measure(
     module, functions = compiled(model, reporter=reporter)
     generation = clock.perf_counter() - begin if module.derived else None
     given = (dict(plan.parameters), dict(plan.inputs))
-    key = records.key(module.source, *given, t_end, plan.wanted.rest_speed)
+    key = records.key(module.source, *given, t_end, plan.simulation.rest_speed)
     done: Mapping[Rung, Work] = {}
     if table is not None and not fresh:
         done, earlier = records.load(table, key)
@@ -207,7 +209,7 @@ def measure(
             t_end,
             progress=progress,
             folder=folder,
-            rest_speed=plan.wanted.rest_speed,
+            rest_speed=plan.simulation.rest_speed,
         )
         bench = _bench(plan, functions, truth)
         _check_reference(bench)
@@ -283,7 +285,7 @@ def _bench(
     return Bench(
         problem=problem_of(module, *values, own),
         reference=truth,
-        rest_speed=plan.wanted.rest_speed,
+        rest_speed=plan.simulation.rest_speed,
         kinetic=kinetic,
         energy=energy if keeps else None,
         energy_scale=scale,
@@ -371,7 +373,7 @@ def check_arithmetic(states: int | None, seed: int, reporter: Reporter = SILENT)
 
 def arithmetic_of(
     model: Model,
-    wanted: Simulation,
+    simulation: Simulation,
     *,
     states: int | None = None,
     seed: int = 0,
@@ -384,5 +386,7 @@ def arithmetic_of(
 
     name = name or model.name
     with reporter.located(), reporter.progress(f"arithmetic of {name}") as progress:
-        found = measured(model, wanted, states=states, seed=seed, single=single, progress=progress)
+        found = measured(
+            model, simulation, states=states, seed=seed, single=single, progress=progress
+        )
     return replace(found, name=name)

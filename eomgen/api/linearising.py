@@ -84,8 +84,8 @@ def linearisable(model: Model) -> Model:
 
     In the other forms the initial state depends on the parameters.
     """
-    wanted = ("input_jacobian",) if model.inputs else ()
-    return replace(model, form="velocity", outputs=wanted)
+    needed = ("input_jacobian",) if model.inputs else ()
+    return replace(model, form="velocity", outputs=needed)
 
 
 def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Linearised:

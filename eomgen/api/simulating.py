@@ -337,7 +337,7 @@ def _start(plan: Plan, problem: Problem) -> "Start | None":
 
 
 def setting_of(
-    wanted: Simulation,
+    simulation: Simulation,
     integrator: str | None = None,
     *,
     dt: float | None = None,
@@ -345,19 +345,19 @@ def setting_of(
     atol: float | None = None,
     reporter: Reporter = SILENT,
 ) -> "Setting":
-    """The method with its tolerances or step; None stands for those of the scene, `wanted`.
+    """The method with its tolerances or step; None stands for those of the scene, `simulation`.
 
     Raises `RunError` for tolerances of a fixed-step method.
     """
     from eomgen.run.integrators import FixedStep, find_integrator
     from eomgen.study.accuracy.trial import Setting
 
-    name = wanted.integrator if integrator is None else integrator
+    name = simulation.integrator if integrator is None else integrator
     if not isinstance(find_integrator(name), FixedStep):
         return Setting(
             name,
-            wanted.rtol if rtol is None else rtol,
-            wanted.atol if atol is None else atol,
+            simulation.rtol if rtol is None else rtol,
+            simulation.atol if atol is None else atol,
             dt,
         )
     if rtol is not None or atol is not None:
@@ -365,4 +365,4 @@ def setting_of(
         raise RunError(
             f"{rtol_name}, {atol_name}: {name} takes equal steps; give {dt_name} instead"
         )
-    return Setting(name, dt=wanted.dt if dt is None else dt)
+    return Setting(name, dt=simulation.dt if dt is None else dt)

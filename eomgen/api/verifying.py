@@ -67,7 +67,7 @@ def check_verification(
 
 def verified_model(
     model: Model,
-    wanted: Simulation,
+    simulation: Simulation,
     *,
     states: int | None = None,
     seed: int = 0,
@@ -81,12 +81,19 @@ def verified_model(
     check_verification(states=states, seed=seed, bound=bound, reporter=reporter)
     name = name or model.name
     with reporter.located(), reporter.progress(f"verifying {name}") as progress:
-        found = verified(model, wanted, states=states, seed=seed, bound=bound, progress=progress)
+        found = verified(
+            model, simulation, states=states, seed=seed, bound=bound, progress=progress
+        )
     return replace(found, name=name)
 
 
 def horizon_of(
-    model: Model, wanted: Simulation, *, seconds: float, name: str = "", reporter: Reporter = SILENT
+    model: Model,
+    simulation: Simulation,
+    *,
+    seconds: float,
+    name: str = "",
+    reporter: Reporter = SILENT,
 ) -> "Horizon":
     """The result of `horizon` for a model; `name` is the name of the scene in messages."""
     from eomgen.study.verification.horizon import horizon as found
@@ -95,7 +102,7 @@ def horizon_of(
     model = replace(model, form="velocity")
     with reporter.located(), reporter.progress(f"horizon of {name or model.name}") as progress:
         module = load_module(generated_code(model).module, model.name)
-        return found(model, wanted, module, seconds=seconds, progress=progress)
+        return found(model, simulation, module, seconds=seconds, progress=progress)
 
 
 def digest(model: Model) -> str:

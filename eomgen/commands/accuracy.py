@@ -29,7 +29,7 @@ def accuracy(given: Arguments) -> int:
     return 0
 
 
-def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None:
+def _runs(given: Arguments, model: Model, simulation: Simulation, name: str) -> None:
     """Run each method at its tolerances or steps; print, write and draw the results."""
     from eomgen.commands.accuracy_table import print_table
     from eomgen.show.style import check_figure
@@ -39,7 +39,7 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
     parameters, inputs = given_values(given, model)
     plan = plan_measurement(
         model,
-        wanted,
+        simulation,
         methods=given.methods,
         quick=given.quick,
         t_end=given.t_end,

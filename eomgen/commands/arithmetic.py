@@ -30,7 +30,7 @@ def check_files(given: Arguments, name: str) -> None:
     check_writable(given.output / f"{name}_arithmetic.csv", force=given.force)
 
 
-def print_arithmetic(given: Arguments, model: Model, wanted: Simulation, name: str) -> None:
+def print_arithmetic(given: Arguments, model: Model, simulation: Simulation, name: str) -> None:
     """Measure, print and draw the rounding errors of each route."""
     # Imported here: it imports Matplotlib.
     from eomgen.show.arithmetic import save_figure, save_table
@@ -39,7 +39,7 @@ def print_arithmetic(given: Arguments, model: Model, wanted: Simulation, name: s
     model = model.with_parameters(assignments(given.set, model.defaults, "--set"))
     found = arithmetic_of(
         model,
-        wanted,
+        simulation,
         states=given.states,
         seed=given.seed,
         single=given.float32,

@@ -82,7 +82,7 @@ def _report(given: Arguments, run: Run) -> str:
     else:
         for line in shortened(overlap_lines(run.model)):
             print(f"    {line}")
-    for line in _bounded(given, trajectory):
+    for line in _step_limit_lines(given, trajectory):
         print(f"    {line}")
     missed = print_choice(run.choice, given) if run.choice else ""
     if run.estimate:
@@ -99,7 +99,7 @@ def _report(given: Arguments, run: Run) -> str:
     return missed
 
 
-def _bounded(given: Arguments, trajectory: Trajectory) -> list[str]:
+def _step_limit_lines(given: Arguments, trajectory: Trajectory) -> list[str]:
     """Lines on steps that were shortened, and how often, for reasons other than their error."""
     from eomgen.run.checks import LEAST_STEPS
 

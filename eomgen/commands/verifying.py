@@ -21,8 +21,8 @@ def verify(given: Arguments) -> int:
     found = verified_model(model, scene.simulation, **options, name=name, reporter=reporter)
     horizon = None
     if given.horizon is not None:
-        wanted = scene.simulation
-        horizon = horizon_of(model, wanted, seconds=given.horizon, name=name, reporter=reporter)
+        settings = scene.simulation
+        horizon = horizon_of(model, settings, seconds=given.horizon, name=name, reporter=reporter)
     lines = evidence.report(found, horizon)
     print("\n".join(lines))
     if given.save is not None:

@@ -18,7 +18,7 @@ def works_by_type(
     """Names of effects and their works (n, m), J; if there are more than `MOST_WORKS`, the sums of
     each type (n, k).
 
-    The sum of twelve effects is named `pd (12)`. An effect that is alone of its type keeps its
+    The sum of twelve effects is named `pd (12)`. The only effect of a type keeps its
     name.
     """
     if len(names) <= MOST_WORKS:

@@ -310,8 +310,8 @@ class EffectTable(Table):
 
     def idle(self, inputs: Mapping[str, float], dimensions: int) -> bool:
         """Whether it has inputs and all of them are 0."""
-        wanted = self.inputs(dimensions)
-        return bool(wanted) and not any(inputs.get(given.name) for given in wanted)
+        own = self.inputs(dimensions)
+        return bool(own) and not any(inputs.get(i.name) for i in own)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
         """Whether its loads depend only on parameters, inputs and poses of bodies.
