@@ -1,7 +1,7 @@
 """Generates equations of motion: from a scene to a NumPy module of straight-line arithmetic.
 
-The functions of `eomgen.api` and what they return are here by name. They are loaded when they are
-first asked for, so that what a program does not use takes no time.
+It exports the functions of `eomgen.api` and the types that they return. Each is imported on first
+access, so that unused ones cost no start-up time.
 """
 
 from importlib import import_module

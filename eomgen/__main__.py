@@ -1,4 +1,4 @@
-"""The process: what it does when it is told to stop. The console script and `python -m eomgen`."""
+"""The process: entry point of the console script and `python -m eomgen`, and its signals."""
 
 import gc
 import signal
@@ -12,30 +12,30 @@ if TYPE_CHECKING:
 
 STOPS = ("SIGINT", "SIGTERM", "SIGHUP")
 AGAIN = 0.02
-"""Seconds after which a stop that got lost comes again."""
+"""Delay after which a lost interrupt is raised again, s."""
 
 _stopped_by: list[int] = []
 
 
 def main() -> int:
-    """Run one command. The exit code is that of `eomgen.cli.main`; once the process was told to
-    stop it is 128 and the signal's number, 130 for Ctrl-C, whatever the moment.
+    """Run one command. The exit code is that of `eomgen.cli.main`, or after a signal of `STOPS`
+    128 plus its number, for example 130 for Ctrl-C.
 
-    Each of these signals is an interrupt, so that nothing half is left behind and `simulate` writes
-    what it has computed.
+    Each of these signals raises `KeyboardInterrupt`, so that no partial files remain and `simulate`
+    writes what it has computed.
     """
     code = 128 + signal.SIGINT
-    # A program is a hundred thousand objects that are kept. The process is this program's own, so
-    # that it may keep the collector from scanning them again and again, a fifth of the time.
+    # Deriving creates many objects that stay alive. Scanning them on each collection would take a
+    # fifth of the time. The threshold is global, which is fine since this process is only ours.
     gc.set_threshold(100_000, 20, 20)
     try:
         _listen()
-        from eomgen.cli import main as run  # here, where a stop during its imports is caught
+        from eomgen.cli import main as run  # here, so that an interrupt during the import is caught
 
         code = run()
     except SystemExit as stop:
         code = int(stop.code or 0)
-    except BaseException as error:  # an import that is stopped half way may raise anything
+    except BaseException as error:  # an interrupted import may raise anything
         if not (_stopped_by or isinstance(error, KeyboardInterrupt)):
             raise
         with suppress(OSError):
@@ -48,7 +48,7 @@ def main() -> int:
 def _listen() -> None:
     for name in STOPS:
         number = getattr(signal, name, None)
-        # A job in the background ignores Ctrl-C, and one under nohup the end of the terminal.
+        # A background job ignores SIGINT, and a job under nohup ignores SIGHUP: keep that.
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _stop)
     if hasattr(signal, "setitimer"):
@@ -57,7 +57,7 @@ def _listen() -> None:
 
 
 def _listen_no_more() -> None:
-    """Nothing is left to be stopped, and the exit code is known."""
+    """Ignore further signals, because the command is done and the exit code is known."""
     for name in STOPS:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
@@ -75,7 +75,7 @@ def _stop_again(number: int, frame: FrameType | None) -> None:
 
 
 def _lost(about: "UnraisableHookArgs") -> None:
-    """A stop that came where nothing can be raised, as while something is deleted, comes again."""
+    """Raise an interrupt again that was lost where exceptions are ignored, such as in `__del__`."""
     if issubclass(about.exc_type, KeyboardInterrupt):
         signal.setitimer(signal.ITIMER_REAL, AGAIN)
     else:

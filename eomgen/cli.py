@@ -1,4 +1,4 @@
-"""The command line: parse, call, say what was done.
+"""The command line: parses arguments, runs a command, returns its exit code.
 
 Exit codes: 0 done, 1 the scene or the run is at fault, 2 wrong usage, 130 interrupted.
 """
@@ -20,9 +20,9 @@ INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code. Raises `SystemExit` for wrong usage and for help.
+    """Run one command and return its exit code. Raises `SystemExit` for wrong usage and for help.
 
-    Streams that fail end no command: it does what it is to do, and what was lost is said then.
+    A standard stream that fails does not stop the command; the failure is reported at the end.
     """
     with steady_streams() as output:
         stopped = False
@@ -78,7 +78,7 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that repeats what it does not understand as one line, not as it is."""
+    """A parser whose error messages stay on one line, whatever the arguments contain."""
 
     def error(self, message: str) -> NoReturn:
         super().error(one_line(message))
@@ -104,14 +104,16 @@ def _parser() -> argparse.ArgumentParser:
             added.add_argument("scenes", metavar="SCENE", nargs="*", help="file or built-in name")
         return added
 
-    command("list", commands.list_scenes, "name the built-in scenes", None)
+    command("list", commands.list_scenes, "list the built-in scenes", None)
     command("schema", commands.print_schema, "print the JSON Schema of scenes, for editors", None)
     reference = command(
-        "reference", commands.print_reference, "tell joints and effects with their keys", None
+        "reference", commands.print_reference, "print the keys of joints and effects", None
     )
-    reference.add_argument("type", metavar="TYPE", nargs="?", help="one of them, drag for example")
-    check = command("check", commands.check, "validate a scene and say what it is made of")
-    check.add_argument("--long", action="store_true", help="list everything, however much")
+    reference.add_argument(
+        "type", metavar="TYPE", nargs="?", help="one joint or effect, drag for example"
+    )
+    check = command("check", commands.check, "validate a scene and print its parts")
+    check.add_argument("--long", action="store_true", help="do not shorten long lists")
     _form(check)
     derive = command("derive", commands.derive, "print the derivation, step by step")
     derive.add_argument("--format", choices=("text", "latex", "html"), default="text")
@@ -124,29 +126,39 @@ def _parser() -> argparse.ArgumentParser:
     )
     generate.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("generated"))
     generate.add_argument("--all", action="store_true", help="all built-in scenes")
-    generate.add_argument("--check", action="store_true", help="say which is stale, write nothing")
-    generate.add_argument("--explain", action="store_true", help="say why its route was taken")
+    generate.add_argument(
+        "--check", action="store_true", help="report which are stale, write nothing"
+    )
+    generate.add_argument("--explain", action="store_true", help="say why its route was chosen")
     generate.add_argument("--report", action="store_true", help="say what each pass saved")
     _force(generate)
     for name, run, about in (
-        ("simulate", commands.simulate, "integrate, and write what happened"),
-        ("view", commands.view, "integrate, and open the moving picture"),
+        ("simulate", commands.simulate, "integrate, and write trajectory, figure and page"),
+        ("view", commands.view, "integrate, and open the animated page"),
     ):
         _simulation(_code(_form(command(name, run, about))))
-    about = "the module against an independent solver and 60 digits, at hard states, too"
+    about = "compare the module with an independent solver and 60 digits"
     _verification(_route(command("verify", commands.verify, about)))
-    about = "say what accuracy costs in time, and how exact the arithmetic is"
+    about = "measure time against error of all methods, and rounding errors of all routes"
     _accuracy(_route(_form(command("accuracy", commands.accuracy, about))))
-    about = "say what each effect costs, and what leaving it out does to the motion"
+    about = "measure the cost of each effect, and the change of the motion without it"
     costing = _route(command("effects", commands.effects, about))
-    costing.add_argument("--each", action="store_true", help="a line an effect, not one a type")
-    costing.add_argument("--no-motion", action="store_true", help="say what it costs alone")
     costing.add_argument(
-        "--motion-time", metavar="S", type=float, default=10.0, help="time to compare motions, 10 s"
+        "--each", action="store_true", help="a line for each effect instead of each type"
+    )
+    costing.add_argument("--no-motion", action="store_true", help="do not compare motions")
+    costing.add_argument(
+        "--motion-time",
+        metavar="S",
+        type=float,
+        default=10.0,
+        help="length of the motions that are compared, 10 s",
     )
     costing.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     _force(costing)
-    _linearisation(command("linearise", commands.linearise, "A, B and modes about an equilibrium"))
+    _linearisation(
+        command("linearise", commands.linearise, "compute A, B and modes about an equilibrium")
+    )
     return parser
 
 
@@ -161,8 +173,8 @@ def _route(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument(
         "--route",
         choices=("auto", *ROUTES),
-        help="way to the equations (the scene's; auto is the one of the fewest operations that "
-        "keeps its digits)",
+        help="route to the equations (the scene's; auto is the one with the fewest operations that "
+        "is accurate enough)",
     )
     return parser
 
@@ -170,7 +182,7 @@ def _route(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 def _code(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     _route(parser)
     parser.add_argument(
-        "--outputs", metavar="A,B,…", help="what the module computes, or all (the scene's)"
+        "--outputs", metavar="A,B,…", help="functions of the module, or all (the scene's)"
     )
     return parser
 
@@ -185,7 +197,9 @@ def _values(parser: argparse.ArgumentParser) -> None:
 
 
 def _force(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--force", action="store_true", help="overwrite files of others, too")
+    parser.add_argument(
+        "--force", action="store_true", help="also overwrite files that eomgen did not write"
+    )
 
 
 def _simulation(parser: argparse.ArgumentParser) -> None:
@@ -194,7 +208,7 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--unstable",
         action="store_true",
-        help="let steps of an explicit method be too long, to see the motion blow up",
+        help="allow steps of an explicit method that are too long for stability",
     )
     parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
     parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
@@ -203,20 +217,22 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
         "--accuracy",
         metavar="X",
         type=float,
-        help="choose method and tolerances for an error at the end of X of the motion's scale",
+        help="choose method and tolerances for an error of X at the end, relative to the motion",
     )
     parser.add_argument(
-        "--budget", metavar="TIME", help="the most accurate run found in this time, 2s for example"
+        "--budget",
+        metavar="TIME",
+        help="choose the most accurate run of about this time, 2s for example",
     )
     parser.add_argument(
-        "--estimate", action="store_true", help="estimate the error of the run by a second one"
+        "--estimate", action="store_true", help="estimate the error by a second run"
     )
     parser.add_argument(
         "--guard",
         choices=("stop", "repair"),
         nargs="?",
         const="stop",
-        help="watch rounding at every step, and stop where digits are lost, or repair it",
+        help="check rounding at each step; stop (default) or repair where digits are lost",
     )
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument(
@@ -224,10 +240,10 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.npz",
         dest="resume",
         type=_path,
-        help="go on where an earlier run ended, as if it had not",
+        help="continue an earlier run as if it had not ended",
     )
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
-    parser.add_argument("--works", action="store_true", help="book the work of each effect")
+    parser.add_argument("--works", action="store_true", help="compute the work of each effect")
     _values(parser)
     parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     parser.add_argument("--plot", metavar="FILE", type=_path, help="figure (DIR/NAME.png)")
@@ -236,25 +252,30 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
 
 
 def _accuracy(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--methods", metavar="A,B,…", help="these integrators alone (all)")
-    parser.add_argument("--quick", action="store_true", help="every second rung alone")
+    parser.add_argument("--methods", metavar="A,B,…", help="only these integrators (all)")
+    parser.add_argument("--quick", action="store_true", help="only every second tolerance or step")
     parser.add_argument("--t-end", metavar="S", type=float, help="end time (the scene's)")
     parser.add_argument(
         "--run-time", metavar="S", type=float, default=3.0, help="longest time of one run, 3 s"
     )
     parser.add_argument(
-        "--time", metavar="S", type=float, default=300.0, help="begin no run after this, 300 s"
+        "--time", metavar="S", type=float, default=300.0, help="start no run after this, 300 s"
     )
-    parser.add_argument("--fresh", action="store_true", help="take nothing from an earlier call")
+    parser.add_argument("--fresh", action="store_true", help="use no runs of an earlier call")
     _values(parser)
     half = parser.add_mutually_exclusive_group()
-    half.add_argument("--arithmetic", action="store_true", help="the arithmetic alone, no runs")
-    half.add_argument("--no-arithmetic", action="store_true", help="the runs alone")
-    parser.add_argument("--float32", action="store_true", help="the arithmetic in float32, too")
+    half.add_argument("--arithmetic", action="store_true", help="only rounding errors, no runs")
+    half.add_argument("--no-arithmetic", action="store_true", help="only runs, no rounding errors")
+    parser.add_argument("--float32", action="store_true", help="also rounding errors of float32")
     parser.add_argument(
-        "--states", metavar="N", type=int, help="states of each kind for it (100, 20 if large)"
+        "--states",
+        metavar="N",
+        type=int,
+        help="states of each kind for rounding errors (100, 20 if large)",
     )
-    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of its random states")
+    parser.add_argument(
+        "--seed", metavar="N", type=int, default=0, help="seed of the random states"
+    )
     parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     _force(parser)
 
@@ -263,9 +284,11 @@ def _verification(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--states", metavar="N", type=int, help="states of each kind (8, 2 if there are many)"
     )
-    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of the random states")
     parser.add_argument(
-        "--bound", metavar="ULPS", type=float, help="most that v̇ may be off (what the data allow)"
+        "--seed", metavar="N", type=int, default=0, help="seed of the random states"
+    )
+    parser.add_argument(
+        "--bound", metavar="ULPS", type=float, help="greatest error of v̇ (what the data allow)"
     )
     parser.add_argument(
         "--horizon",
@@ -273,7 +296,7 @@ def _verification(parser: argparse.ArgumentParser) -> None:
         type=float,
         nargs="?",
         const=60.0,
-        help="say how long doubles hold, by a run in extended precision of at most S s (60)",
+        help="how long doubles are meaningful, by an extended-precision run of at most S s (60)",
     )
     parser.add_argument(
         "--save",
@@ -281,7 +304,7 @@ def _verification(parser: argparse.ArgumentParser) -> None:
         type=_path,
         nargs="?",
         const=Path("generated"),
-        help="write the evidence beside the module, in DIR (generated)",
+        help="write the report beside the module, in DIR (generated)",
     )
     _force(parser)
 
@@ -291,7 +314,7 @@ def _linearisation(parser: argparse.ArgumentParser) -> None:
         "--at",
         choices=("equilibrium", "rest", "initial"),
         default="equilibrium",
-        help="the nearest equilibrium, where it comes to rest, or the state itself",
+        help="about the nearest equilibrium, the state where it comes to rest, or the given state",
     )
     parser.add_argument(
         "--state",
@@ -305,14 +328,14 @@ def _linearisation(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         action="append",
         default=[],
-        help="a coordinate that stays as it is while an equilibrium is sought",
+        help="a coordinate that keeps its value while an equilibrium is searched",
     )
     parser.add_argument(
         "--trim",
         metavar="INPUT",
         action="append",
         default=[],
-        help="an input whose value is sought, too",
+        help="an input whose value is searched as well",
     )
     _values(parser)
     _route(parser)

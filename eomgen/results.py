@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eomgen.files import write_whole
+from eomgen.files import check_writable, write_whole
 from eomgen.model.model import Model
 from eomgen.run.limits import Excursion, excursions
 from eomgen.run.problem import FloatArray
@@ -70,11 +70,11 @@ class Derivation:
         """The derivation step by step: number, title, words, equations."""
         return self.matrices.steps
 
-    def text(self) -> str:
-        """All steps as plain text."""
+    def text(self, *, encoding: str = "utf-8") -> str:
+        """All steps as plain text, in ASCII if the encoding lacks Greek letters."""
         from eomgen.show.derivation import as_text
 
-        return as_text(self.name, self.title, self.steps)
+        return as_text(self.name, self.title, self.steps, encoding=encoding)
 
     def latex(self) -> str:
         """All steps as one LaTeX document."""
@@ -130,6 +130,8 @@ class Module:
         """Write the file, whole or not at all, and further files beside it. Raises `RunError` where
         another's is there.
         """
+        for name in self.others:
+            check_writable(Path(path).with_name(name), force=force)
         write_whole(Path(path), self.source, force=force)
         for name, text in self.others.items():
             write_whole(Path(path).with_name(name), text, force=force)

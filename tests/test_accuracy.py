@@ -337,7 +337,7 @@ def test_what_was_interrupted_goes_on(
     """After an interrupt only what is missing is run, and the table is the same but for times."""
     whole, parted = tmp_path / "whole", tmp_path / "parted"
     assert main(["accuracy", "pendulum", *QUICK, "-o", str(whole)]) == 0
-    assert "taken from earlier" not in capsys.readouterr().out
+    assert "taken from the table" not in capsys.readouterr().out
     made = []
 
     def interrupted(found: Bench, rung: Rung, run_time: float) -> Work:
@@ -361,7 +361,7 @@ def test_what_was_interrupted_goes_on(
     assert main(["accuracy", "pendulum", *QUICK, "-o", str(parted)]) == 0
     text = capsys.readouterr().out
     assert not set(again) & set(made)
-    assert f"{len(again)} runs made now, 5 taken from earlier" in text
+    assert f"{len(again)} runs made now, 5 taken from the table" in text
     assert cells(table) == cells(whole / "pendulum_accuracy.csv")
     for row in cells(table, times=True):
         assert row == kept.get(row["method"] + row["dt_s"] + row["rtol"], row)
@@ -406,7 +406,7 @@ def test_scenes_by_form(
     rows = cells(tmp_path / "cart_pole_accuracy.csv")
     drifts = [float(row["energy_drift"]) for row in rows if row["energy_drift"]]
     assert min(drifts) < 1e-8 and {row["joint_gap_m"] for row in rows} == {""}
-    assert "leave unaccounted for" in " ".join(capsys.readouterr().out.split())
+    assert "do not explain" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
@@ -414,9 +414,9 @@ def test_scenes_by_form(
     [
         ("--methods rk5", "unknown name 'rk5' (did you mean 'rk4'?)"),
         ("--methods ,", "--methods: names no integrator"),
-        ("--run-time 0", "--run-time: 0 is no positive time"),
-        ("--time nan", "--time: nan is no positive time"),
-        ("--t-end -1", "--t-end: -1 is no positive time"),
+        ("--run-time 0", "--run-time: 0 is not a positive time"),
+        ("--time nan", "--time: nan is not a positive time"),
+        ("--t-end -1", "--t-end: -1 is not a positive time"),
         ("--set nothing=1", "--set: no parameter 'nothing'"),
         ("--input tau=1", "--input: no input 'tau'"),
     ],

@@ -187,7 +187,7 @@ def test_quantities(kind: str) -> None:
             f"{place}: unknown parameter 'unheard'; give it a value in [parameters]"
         )
         assert refusal(put('"stiff.real"')) == (
-            f"{place}: 'stiff.real' has '.real' at column 6, which no formula may hold"
+            f"{place}: 'stiff.real' has '.real' at column 6, which is not allowed"
         )
         assert refusal(put('"1/(stiff + 4)"')) == f"{place}: " + (
             "it, its rate or its acceleration is not finite at t = 0; change the formula"
@@ -240,7 +240,8 @@ def test_names_and_vectors(kind: str) -> None:
         )
         assert refusal(crane(kind, **{field: "3"})) == f"{place}: 3 is not a text; give one"
         assert refusal(crane(kind, **{field: '"my boom"'})) == (
-            f"{place}: 'my boom' is no identifier; use letters a-z, digits and _, a letter first"
+            f"{place}: 'my boom' is not an identifier; use letters a-z, digits and _, "
+            "a letter first"
         )
         if member.model_fields[field].default == "world":
             elaborate(parse_scene(crane(kind, **{field: None})))

@@ -249,10 +249,12 @@ def test_a_step_that_cannot_be_followed_is_held_and_reported(capsys, tmp_path) -
     scene.write_text(cam + "[initial]\nv = { q_dot = 1e6 }\n[simulation]\nt_end = 5\n")
     command = ["simulate", str(scene), "-o", str(tmp_path / "out"), "--rtol", "1e-6"]
     assert main(command) == 0
-    held = re.search(r"(\d+) of (\d+) steps held to 1/1000 of the run", capsys.readouterr().out)
+    held = re.search(
+        r"(\d+) of (\d+) steps were limited to 1/1000 of the run", capsys.readouterr().out
+    )
     assert held and 990 <= int(held[1]) <= int(held[2])
     assert main([*command, "--max-step", "0.1"]) == 0
-    held = re.search(r"(\d+) of (\d+) steps as long as --max-step", capsys.readouterr().out)
+    held = re.search(r"(\d+) of (\d+) steps were limited by --max-step", capsys.readouterr().out)
     assert held and 40 <= int(held[1]) <= int(held[2]) <= 80
 
 

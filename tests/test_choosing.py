@@ -375,8 +375,8 @@ def test_a_wrong_run_is_reported(
     assert main(["simulate", str(scene), *bounds, "--estimate", "-o", str(tmp_path)]) == 0
     said = capsys.readouterr()
     assert re.search(r"error estimate \S+ of the motion's scale at the end, at most", said.out)
-    assert "warning: by its own estimate this run is wrong by" in said.err
-    assert "warning: exact motion keeps its energy, but this run is off by" in said.err
+    assert "warning: by its error estimate this run is wrong by" in said.err
+    assert "warning: exact motion conserves its energy, but this run is off by" in said.err
 
 
 def test_no_false_alarm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -411,9 +411,9 @@ def test_no_false_alarm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         ("--accuracy 1e-3 --t-end nan --integrator rk4", "t_end: nan is not a finite time"),
         ("--accuracy 1e-3 --max-step 0", "max_step: 0 is not a positive step"),
         ("--accuracy 1e-3 --samples 1", "samples: 1 is too few"),
-        ("--budget 2h", "--budget 2h: is no time to compute in; give e.g. 2s, 500ms or 1.5min"),
-        ("--budget=-1s", "--budget -1s: is no time to compute in"),
-        ("--budget 1..2", "--budget 1..2: is no time to compute in"),
+        ("--budget 2h", "--budget 2h: is not a computing time; give e.g. 2s, 500ms or 1.5min"),
+        ("--budget=-1s", "--budget -1s: is not a computing time"),
+        ("--budget 1..2", "--budget 1..2: is not a computing time"),
         ("--budget 1e-9", "no run of pendulum to t = 10 s fits into 1e-09 s; give more, or a sho"),
     ],
 )

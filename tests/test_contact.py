@@ -666,11 +666,11 @@ BAD = {
     ),
     ('law = "impact"',): "effects[0].restitution: is missing; law 'impact' needs it",
     (*SOFT, "dissipation = 0.1"): (
-        "effects[0].dissipation: is nothing that law 'spring_damper' takes; it takes stiffness, "
+        "effects[0].dissipation: does not belong to law 'spring_damper'; it takes stiffness, "
         "damping, allow_active"
     ),
     ('law = "impact"', "restitution = 0.5", "damping = 0.1"): (
-        "effects[0].damping: is nothing that law 'impact' takes; it takes restitution"
+        "effects[0].damping: does not belong to law 'impact'; it takes restitution"
     ),
     ('law = "impact"', "restitution = 1.5"): (
         "effects[0].restitution: 1.5 is not from 0 to 1; give one that is"
@@ -716,10 +716,10 @@ BAD = {
         "effects[0].body: one body has no other to touch; give two or more in bodies"
     ),
     (*SOFT, EACH, "normal = [0, 1]"): (
-        "effects[0].normal: is nothing that against 'each_other' takes; leave it out"
+        "effects[0].normal: does not belong to against 'each_other'; leave it out"
     ),
     (*SOFT, 'against = "ball"', "corners = [0.1, 0.1]"): (
-        "effects[0].corners: is nothing that against 'ball' takes; it takes other_radius, "
+        "effects[0].corners: does not belong to against 'ball'; it takes other_radius, "
         "other_at, other"
     ),
     (*SOFT, 'against = "ball"'): f"effects[0].other_radius: {MEET}",
@@ -735,7 +735,7 @@ BAD_STOPS = {
         "effects[0].restitution: 1.1 is not from 0 to 1; give one that is"
     ),
     ("low = 0", "restitution = 0.5", "stiffness = 9"): (
-        "effects[0].stiffness: a restitution stands in its place; give one"
+        "effects[0].stiffness: a restitution replaces it; give one"
     ),
     ("low = 0",): "effects[0].stiffness: missing; give it or a restitution",
     ("restitution = 0.5",): "effects[0].low: missing, and high too; give one of them or both",

@@ -158,10 +158,10 @@ MISTAKES = [
     (defined('far = "2*p"', mass='"far"'),
      "bodies[0].mass: 'p' changes with the motion, which this value must not; use parameters"),
     (defined('u = "p.real"'),
-     "definitions.u: 'p.real' has '.real' at column 2, which no formula may hold"),
+     "definitions.u: 'p.real' has '.real' at column 2, which is not allowed"),
     (defined('u = true'), "definitions.u: True is neither a number nor a formula; give one"),
-    (defined('_u = "p"'), "definitions._u: '_u' is no identifier; use letters a-z, digits and _, a "
-     "letter first"),
+    (defined('_u = "p"'), "definitions._u: '_u' is not an identifier; use letters a-z, digits "
+     "and _, a letter first"),
     (defined('u = "1/(a - 2)"', torque='"p*u"'),
      "effects[0].torque: its part '(1.0 / (a - 2.0))' is not a finite number; change it or its "
      "parameters"),

@@ -226,7 +226,7 @@ def test_powers_add_up() -> None:
         ),
         (
             STOP + 'joint = "ball"\nlow = -1\nhigh = 1\nstiffness = 1\n',
-            "effects[0].low: the turn of a ball joint ('ball') is never below 0; give high",
+            "effects[0].low: the angle of a ball joint ('ball') is never below 0; give high",
         ),
         (
             STOP + 'joints = "all"\nhigh = 1\nrestitution = 1\n',

@@ -225,7 +225,7 @@ def test_the_particles_pass_every_obstacle() -> None:
         ),
         (
             'kind = "repel"\nstrength = 1\nradius = 1',
-            "effects[0].radius: is nothing that kind 'repel' takes; it takes center, strength, "
+            "effects[0].radius: does not belong to kind 'repel'; it takes center, strength, "
             "power, softening",
         ),
         (

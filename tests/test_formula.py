@@ -31,7 +31,7 @@ from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.functions import BY_MATH, FUNCTIONS
 from eomgen.scene.reader import parse_scene
 
-NO = "has {!r} at column {}, which no formula may hold"
+NO = "has {!r} at column {}, which is not allowed"
 NUMBERS = "; write numbers as 1000.0 or 1e3, and * to multiply"
 NAMES = "; a name starts with a letter, does not end in _, and contains no __"
 POWER = (
@@ -107,21 +107,21 @@ REFUSED = [
         )
     ),
     # Calls.
-    ("sine(x)", "calls 'sine' at column 1, which is no function (did you mean 'sin'?)"),
-    ("1 + Sqrt(x)", "calls 'Sqrt' at column 5, which is no function (did you mean 'sqrt'?)"),
+    ("sine(x)", "calls 'sine' at column 1, which is not a function (did you mean 'sin'?)"),
+    ("1 + Sqrt(x)", "calls 'Sqrt' at column 5, which is not a function (did you mean 'sqrt'?)"),
     (
         "eval(x)",
-        "calls 'eval' at column 1, which is no function; * multiplies, functions are "
+        "calls 'eval' at column 1, which is not a function; * multiplies, functions are "
         + ", ".join(FUNCTIONS),
     ),
-    ("2(x)", "has something at column 1 that no formula may hold"),
-    ("sin(x)(y)", "has something at column 1 that no formula may hold"),
-    ("1 + max(*x, y)", "has something at column 9 that no formula may hold"),
-    ("max(x, **y)", "has something at column 8 that no formula may hold"),
+    ("2(x)", "has something at column 1 that is not allowed"),
+    ("sin(x)(y)", "has something at column 1 that is not allowed"),
+    ("1 + max(*x, y)", "has something at column 9 that is not allowed"),
+    ("max(x, **y)", "has something at column 8 that is not allowed"),
     ("sin()", "gives sin at column 1 0 arguments; it takes 1"),
     ("x*atan2(y)", "gives atan2 at column 3 1 arguments; it takes 2"),
-    ("x, y", "has something at column 1 that no formula may hold"),
-    ("3*()", "has something at column 3 that no formula may hold"),
+    ("x, y", "has something at column 1 that is not allowed"),
+    ("3*()", "has something at column 3 that is not allowed"),
     # Comparisons and powers.
     ("2*(a < b < c)", "compares more than two at column 4; write min(a < b, b < c)"),
     *(
@@ -152,7 +152,7 @@ REFUSED = [
     ),
     # No formula, or too much of one.
     *(
-        (text, f"is no formula{where}; write for example '2*m_A' or 'l_A/2'")
+        (text, f"is not a formula{where}; write for example '2*m_A' or 'l_A/2'")
         for text, where in (
             ("", ""),
             ("  ", ""),

@@ -201,6 +201,22 @@ def test_it_stands_alone(scene: str, real: str, tmp_path: Path) -> None:
     assert bool(refusal) == isinstance(told, str)
 
 
+def test_the_header_is_checked_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A file whose header is another is stale, and written again; a header of others is not."""
+    generate = ["generate", "pendulum", "--backend", "c", "-o", str(tmp_path)]
+    source, header = tmp_path / "pendulum.c", tmp_path / "pendulum.h"
+    assert main(generate) == 0 and main([*generate, "--check"]) == 0
+    right = header.read_text("utf-8")
+    header.write_text(right + "int more;\n", "utf-8")
+    assert main([*generate, "--check"]) == 1
+    assert capsys.readouterr().out.endswith("pendulum.c, pendulum.h: stale\n")
+    assert main(generate) == 0 and header.read_text("utf-8") == right
+    source.unlink()
+    header.write_text("mine", "utf-8")
+    assert main(generate) == 1 and header.read_text("utf-8") == "mine" and not source.exists()
+    assert "pendulum.h: exists and was not written by eomgen" in capsys.readouterr().err
+
+
 def test_names_of_c_are_no_names_here(tmp_path: Path) -> None:
     """Parameters and bodies that go by its keywords, functions and macros."""
     words = "double M_PI NAN INFINITY linux y0 restrict fabs sin_cos R real HUGE_VAL unix k".split()

@@ -162,17 +162,17 @@ CUBOID = {"type": "box", "size": [1.0, 2.0, 3.0]}
         (
             3,
             {**CUBOID, "angle": 1.0},
-            "shapes[1].angle: turns a box of the plane; in space use 'orientation_deg'",
+            "shapes[1].angle: rotates a box in the plane; in space use 'orientation_deg'",
         ),
         (
             2,
             {**BOX, "orientation_deg": [0, 0, 90]},
-            "shapes[1].orientation_deg: turns a box of space; in the plane use 'angle'",
+            "shapes[1].orientation_deg: rotates a box in space; in the plane use 'angle'",
         ),
         (
             3,
             {"type": "cylinder", "start": [0.0] * 3, "end": [0.0] * 3, "radius": 1.0},
-            "shapes[1].end: [0.0, 0.0, 0.0] is the start too; give it a length",
+            "shapes[1].end: [0.0, 0.0, 0.0] is also the start; give it a length",
         ),
     ],
 )
@@ -197,7 +197,7 @@ def test_shapes_fit_the_dimensions(
         (2, Camera(center=(1.0, 2.0, 3.0)), "center: [1.0, 2.0, 3.0] has 3 components; in the "
          "plane give 2"),
         (3, Camera(center=(1.0, 2.0)), "center: [1.0, 2.0] has 2 components; in space give 3"),
-        (2, Camera(azimuth_deg=10.0), "azimuth_deg: 10: the camera of the plane does not turn; "
+        (2, Camera(azimuth_deg=10.0), "azimuth_deg: 10: the camera cannot be rotated in the plane; "
          "leave it out, or set dimensions = 3"),
     ],
 )  # fmt: skip

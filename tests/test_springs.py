@@ -591,11 +591,11 @@ BAD = {
         "effects[0].body_2: no body is named 'bb' (did you mean 'b'?)"
     ),
     between("b", "b", "stiffness = 1"): (
-        "effects[0].body_2: 'b' is body_1 too, whose points keep their distance; name another body"
+        "effects[0].body_2: 'b' is also body_1, whose points keep their distance; name another body"
     ),
     between("world", "b"): "effects[0].stiffness: missing; give it, or damping or a law",
     between("world", "b", "stiffness = 1", 'law = "stretch"'): (
-        "effects[0].stiffness: a law stands in its place; give one of them"
+        "effects[0].stiffness: a law replaces it; give one of them"
     ),
     between("world", "b", 'law = "3*strech"'): (
         "effects[0].law: unknown parameter 'strech' (did you mean 'stretch'?)"

@@ -481,9 +481,9 @@ def test_a_missed_bound_is_named_and_exits_1(capsys: pytest.CaptureFixture[str])
     [
         ("--states 0", "--states: 0 is not a number from 1"),
         ("--seed -1", "--seed: -1 is negative"),
-        ("--bound 0.1", "--bound: 0.1 is no number of ulps"),
-        ("--bound nan", "--bound: nan is no number of ulps"),
-        ("--horizon 0", "--horizon: 0 is no positive time"),
+        ("--bound 0.1", "--bound: 0.1 ulps is not a bound"),
+        ("--bound nan", "--bound: nan ulps is not a bound"),
+        ("--horizon 0", "--horizon: 0 is not a positive time"),
     ],
 )
 def test_wrong_options_get_a_line(

@@ -1,6 +1,5 @@
-"""What accuracy costs in time, and how exact the arithmetic is: `accuracy`, `arithmetic`."""
+"""Work-precision measurements and rounding errors: `accuracy`, `arithmetic`."""
 
-import math
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,16 +9,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from eomgen import store
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, named, overridden, read
-from eomgen.api.manner import SILENT, Manner
+from eomgen.api.given import (
+    Source,
+    Values,
+    check,
+    check_states,
+    check_time,
+    named,
+    overridden,
+    read,
+    values_of,
+)
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.entries import Entries
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.scene.schema import SHOWN, Form, Route, Simulation
-from eomgen.store import folder
 from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
@@ -31,23 +40,23 @@ if TYPE_CHECKING:
 
 MOST_STATES = 100_000
 RUN_TIME, ALL_TIME = 3.0, 300.0
-"""Longest time of one run, and time after which none is begun, s."""
+"""Longest time of one run, and time after which no run is started, s."""
 
 Notice = Callable[[int, float, "Rung"], None]
-"""Told before each run: how many there are, how long all took, s, and which is next."""
+"""Called before each run: number of runs so far, the time they took, s, and the next run."""
 
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """What runs of a motion cost by every method, and how exact they are.
+    """Time and error of runs of one motion by several methods.
 
     works       the runs, by method and from coarse to fine: setting, error, time, counts
-    reference   what their errors are told by, with its own error
-    costs       of one derivative and one Jacobian, s
-    generation  how long it took to generate the module, s
-    t_end       of the motion, s
-    made        how many of the runs were made now
-    left_out    methods whose finer runs there was no time for
+    reference   the solution that errors are measured against, with its own error
+    costs       time of one derivative and of one Jacobian, s
+    generation  time to generate the module, s
+    t_end       end time, s
+    made        number of runs made now; the others are from the table
+    left_out    methods whose finer runs were not made, for lack of time
     """
 
     works: "tuple[Work, ...]"
@@ -60,8 +69,8 @@ class Accuracy:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
-    """What was measured, by what, and by which methods."""
+class Measurement:
+    """A result with the bench that measured it, and the methods."""
 
     found: Accuracy
     bench: "Bench"
@@ -69,11 +78,11 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Measuring:
-    """What is to be measured, checked: see `accuracy`."""
+class MeasurementPlan:
+    """Checked arguments of `accuracy`, which describes them."""
 
     model: Model
-    wanted: Simulation
+    simulation: Simulation
     methods: Sequence[str]
     parameters: Mapping[str, float]
     inputs: Mapping[str, float]
@@ -98,19 +107,25 @@ def accuracy(
     table: str | PathLike[str] | None = None,
     fresh: bool = False,
 ) -> Accuracy:
-    """What runs of a scene cost by every method at every tolerance or step, and their errors.
+    """Measure time and error of runs of a scene, by each method at each tolerance or step.
 
-    methods         these integrators alone; None: all
-    quick           every second tolerance or step alone
-    t_end           end time, s; None: the scene's own
-    run_time, time  the longest time of one run, and time after which none is begun, s
-    table           a CSV file that runs are kept in and, unless `fresh`, taken from
+    methods     names of integrators; None: all
+    quick       only every second tolerance or step
+    t_end       end time, s; None: the scene's own
+    run_time    longest time of one run, s
+    time        time after which no run is started, s
+    parameters  values that replace those of the scene, by name
+    inputs      constant values, by name; others are 0
+    form        state form; None: the scene's own
+    route       to the equations; None: the scene's own
+    table       a CSV file to which runs are written and, unless `fresh`, from which earlier runs
+                are taken
 
-    Raises `SceneError`, or `RunError` for an argument that cannot be served, and where the motion
-    is known too little to compare methods by.
+    Raises `SceneError`, or `RunError` for an invalid argument, or if the error of the reference is
+    too large to compare methods.
     """
     scene = read(source)
-    plan = to_measure(
+    plan = plan_measurement(
         overridden(check(scene), form=form, route=route),
         scene.simulation,
         methods=None if methods is None else ",".join(methods),
@@ -121,12 +136,12 @@ def accuracy(
         parameters=parameters,
         inputs=inputs,
     )
-    return measured(plan, table=None if table is None else Path(table), fresh=fresh).found
+    return measure(plan, table=None if table is None else Path(table), fresh=fresh).found
 
 
-def to_measure(
+def plan_measurement(
     model: Model,
-    wanted: Simulation,
+    simulation: Simulation,
     *,
     methods: str | None = None,
     quick: bool = False,
@@ -135,68 +150,66 @@ def to_measure(
     time: float = ALL_TIME,
     parameters: Values | None = None,
     inputs: Values | None = None,
-    manner: Manner = SILENT,
-) -> Measuring:
-    """What is to be measured of a model. Raises `RunError` for what cannot be served."""
+    reporter: Reporter = SILENT,
+) -> MeasurementPlan:
+    """Check the arguments of `accuracy`. Raises `RunError` for an invalid one."""
     from eomgen.study.accuracy.ladder import methods_named
 
     for name, value in (("run_time", run_time), ("time", time)):
-        _check_time(value, manner.option(name))
+        check_time(value, reporter.argument(name))
     chosen = methods_named(methods)
-    given = named(parameters, model.defaults, manner.option("parameters"), "parameter")
-    pushes = named(inputs, [i.name for i in model.inputs], manner.option("inputs"), "input")
-    end = wanted.t_end if t_end is None else t_end
-    _check_time(end, manner.option("t_end"))
+    parameters, inputs = values_of(model, parameters, inputs, reporter)
+    end = simulation.t_end if t_end is None else t_end
+    check_time(end, reporter.argument("t_end"))
     model = replace(model, outputs=in_order((*SHOWN, "effect_powers")))
-    return Measuring(model, wanted, chosen, given, pushes, end, quick, run_time, time)
+    return MeasurementPlan(
+        model, simulation, chosen, parameters, inputs, end, quick, run_time, time
+    )
 
 
-def _check_time(value: float, asked: str) -> None:
-    if not 0 < value < math.inf:
-        raise RunError(f"{asked}: {value:g} is no positive time; give one in s")
-
-
-def measured(
-    plan: Measuring,
+def measure(
+    plan: MeasurementPlan,
     *,
     table: Path | None = None,
     fresh: bool = False,
     force: bool = False,
     name: str = "",
     notice: Notice = lambda count, spent, rung: None,
-    manner: Manner = SILENT,
-) -> Measured:
-    """What `accuracy` returns, and by what it was measured; `name` is what the scene is called."""
-    from eomgen import pipeline  # here, so that loading SymPy is not counted as deriving
+    reporter: Reporter = SILENT,
+) -> Measurement:
+    """Measure as planned; `name` is the name of the scene in messages."""
+    from eomgen import pipeline  # imported now, so that its import does not count as generation
     from eomgen.study.accuracy import records
     from eomgen.study.accuracy.reference import reference
     from eomgen.study.accuracy.work_precision import call_times, left_out
 
-    model, t_end, called = plan.model, plan.t_end, name or plan.model.name
+    model, t_end = plan.model, plan.t_end
+    name = name or model.name
     values = (plan.parameters or None, plan.inputs or None)
     begin = clock.perf_counter()
-    module, functions = compiled(model, manner=manner)
+    module, functions = compiled(model, reporter=reporter)
     generation = clock.perf_counter() - begin if module.derived else None
-    key = records.key(module.source, *_named(plan), t_end, plan.wanted.rest_speed)
+    given = (dict(plan.parameters), dict(plan.inputs))
+    key = records.key(module.source, *given, t_end, plan.simulation.rest_speed)
     done: Mapping[Rung, Work] = {}
     if table is not None and not fresh:
         done, earlier = records.load(table, key)
         generation = earlier if generation is None else generation
     if generation is None:
-        with manner.waiting(f"timing the generation of {called} …"):
+        with reporter.waiting(f"timing the generation of {name} …"):
             begin = clock.perf_counter()
             pipeline.generate(model)
             generation = clock.perf_counter() - begin
-    with manner.located(), manner.watch(f"reference of {called}") as progress:
-        kept = _references(manner)
+    with reporter.located(), reporter.progress(f"reference of {name}") as progress:
+        folder = _reference_folder(reporter)
         truth = reference(
             model,
             functions,
             *values,
             t_end,
             progress=progress,
-            folder=kept,
-            rest_speed=plan.wanted.rest_speed,
+            folder=folder,
+            rest_speed=plan.simulation.rest_speed,
         )
         bench = _bench(plan, functions, truth)
         _check_reference(bench)
@@ -215,15 +228,13 @@ def measured(
     shown = records.ordered(work for work in works.values() if work.rung.method in plan.methods)
     missing = tuple(left_out(ladder, plan.methods, works))
     found = Accuracy(tuple(shown), truth, costs, generation, t_end, made, missing)
-    return Measured(found, bench, plan.methods)
+    return Measurement(found, bench, plan.methods)
 
 
-def _named(plan: Measuring) -> tuple[dict[str, float], dict[str, float]]:
-    return dict(plan.parameters), dict(plan.inputs)
-
-
-def _columns(bench: "Bench", costs: tuple[float, float], plan: Measuring) -> dict[str, object]:
-    """Columns of the table that are the same in every row: what its runs were measured by."""
+def _columns(
+    bench: "Bench", costs: tuple[float, float], plan: MeasurementPlan
+) -> dict[str, object]:
+    """The columns of the table that are the same in each row."""
     given = {**plan.parameters, **plan.inputs}
     return {
         "t_end_s": plan.t_end,
@@ -234,20 +245,20 @@ def _columns(bench: "Bench", costs: tuple[float, float], plan: Measuring) -> dic
     }
 
 
-def _references(manner: Manner) -> Path | None:
-    """Where references are kept; what is wrong with it is said."""
-    kept = folder("references")
-    if kept and (trouble := Entries(kept).trouble()):
-        manner.note(f"the store {kept} is not used: {trouble}")
-    return kept
+def _reference_folder(reporter: Reporter) -> Path | None:
+    """The folder of stored references; notes why it cannot be used."""
+    folder = store.folder("references")
+    if folder and (trouble := Entries(folder).trouble()):
+        reporter.note(f"the store {folder} is not used: {trouble}")
+    return folder
 
 
 def _bench(
-    plan: Measuring,
+    plan: MeasurementPlan,
     module: GeneratedModule,
     truth: "Reference",
 ) -> "Bench":
-    """What runs of a model are measured by."""
+    """The bench that measures runs of the plan's model against the reference."""
     from eomgen.show.balance import keeps_energy
     from eomgen.show.observe import joint_drift
     from eomgen.study.accuracy.work_precision import Bench
@@ -274,7 +285,7 @@ def _bench(
     return Bench(
         problem=problem_of(module, *values, own),
         reference=truth,
-        rest_speed=plan.wanted.rest_speed,
+        rest_speed=plan.simulation.rest_speed,
         kinetic=kinetic,
         energy=energy if keeps else None,
         energy_scale=scale,
@@ -284,17 +295,17 @@ def _bench(
 
 
 def _check_reference(bench: "Bench") -> None:
-    """Raise `RunError` where the reference does not even tell right from wrong."""
+    """Raise `RunError` if the error of the reference exceeds that of a wrong run."""
     from eomgen.study.accuracy.measure import WRONG
 
     if not bench.floors[0] < WRONG:
         raise RunError(
-            f"its motion is known to {bench.reference.error:.1g} of its own scale only, too little "
-            "to compare methods by (a chaotic motion, or many impacts); take a shorter --t-end"
+            f"its motion is known only to {bench.reference.error:.1g} of its scale, which is too "
+            "little to compare methods (a chaotic motion, or many impacts); take a shorter --t-end"
         )
 
 
-def _ladder(bench: "Bench", plan: Measuring) -> "Ladder":
+def _ladder(bench: "Bench", plan: MeasurementPlan) -> "Ladder":
     from eomgen.study.accuracy.ladder import Ladder, atol_scale, first_steps
 
     truth, noise = bench.reference, bench.problem.noise
@@ -311,12 +322,12 @@ def _ladder(bench: "Bench", plan: Measuring) -> "Ladder":
 def _climb(
     bench: "Bench",
     ladder: "Ladder",
-    plan: Measuring,
+    plan: MeasurementPlan,
     works: "dict[Rung, Work]",
     keep: "Callable[[Mapping[Rung, Work]], None]",
     notice: Notice,
 ) -> int:
-    """Make the runs that are missing, each kept as soon as it is made; return how many."""
+    """Make the missing runs, write each to the table at once, and return their number."""
     from eomgen.study.accuracy.work_precision import sweep
 
     begin, made = clock.perf_counter(), 0
@@ -339,45 +350,43 @@ def arithmetic(
     single: bool = False,
     parameters: Values | None = None,
 ) -> "Arithmetic":
-    """How exact v̇ is by every route, in units in the last place, against 60 digits.
+    """Measure the error of v̇ by each route against 60 digits, in units in the last place.
 
-    states  how many of each kind; None: as many as are quick
-    seed    of the random ones
-    single  in float32, too
+    states      number of states of each kind; None: as many as are quick
+    seed        of the random states
+    single      also in float32
+    parameters  values that replace those of the scene, by name
 
-    Raises `RunError` for an argument that cannot be served.
+    Raises `SceneError`, or `RunError` for an invalid argument.
     """
     scene = read(source)
     model = check(scene)
     check_arithmetic(states, seed)
-    given = named(parameters, model.defaults, "parameters", "parameter")
-    own = model.with_parameters(given)
-    return arithmetic_of(own, scene.simulation, states=states, seed=seed, single=single)
+    model = model.with_parameters(named(parameters, model.defaults, "parameters", "parameter"))
+    return arithmetic_of(model, scene.simulation, states=states, seed=seed, single=single)
 
 
-def check_arithmetic(states: int | None, seed: int, manner: Manner = SILENT) -> None:
-    """Raise `RunError` for what cannot be served."""
-    if states is not None and not 1 <= states <= MOST_STATES:
-        asked = manner.option("states")
-        raise RunError(f"{asked}: {states} is not a number from 1 to {MOST_STATES}")
-    if seed < 0:
-        raise RunError(f"{manner.option('seed')}: {seed} is negative; give 0, 1, 2, …")
+def check_arithmetic(states: int | None, seed: int, reporter: Reporter = SILENT) -> None:
+    """Raise `RunError` for an invalid argument of `arithmetic`."""
+    check_states(states, seed, MOST_STATES, reporter)
 
 
 def arithmetic_of(
     model: Model,
-    wanted: Simulation,
+    simulation: Simulation,
     *,
     states: int | None = None,
     seed: int = 0,
     single: bool = False,
     name: str = "",
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> "Arithmetic":
-    """What `arithmetic` returns of a model; `name` is what it is called there."""
-    from eomgen.study.cost.arithmetic import arithmetic as judged
+    """The result of `arithmetic` for a model; `name` is the name of the scene in it."""
+    from eomgen.study.cost.arithmetic import arithmetic as measured
 
-    called = name or model.name
-    with manner.located(), manner.watch(f"arithmetic of {called}") as progress:
-        found = judged(model, wanted, states=states, seed=seed, single=single, progress=progress)
-    return replace(found, name=called)
+    name = name or model.name
+    with reporter.located(), reporter.progress(f"arithmetic of {name}") as progress:
+        found = measured(
+            model, simulation, states=states, seed=seed, single=single, progress=progress
+        )
+    return replace(found, name=name)

@@ -1,18 +1,16 @@
-"""What each effect of a scene costs, and what leaving it out does: `effects`."""
+"""The cost of each effect of a scene, and the change of its motion without it: `effects`."""
 
-import math
 from typing import TYPE_CHECKING
 
-from eomgen.api.given import Source, check, read
-from eomgen.api.manner import SILENT, Manner
-from eomgen.errors import RunError
+from eomgen.api.given import Source, check, check_time, read
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.scene.schema import Route, Scene
 
 if TYPE_CHECKING:
     from eomgen.study.cost.bill import Bill
 
 MOTION = 10.0
-"""Time that motions are compared for, s."""
+"""Default length of the motions that are compared, s."""
 
 
 def effects(
@@ -22,14 +20,14 @@ def effects(
     each: bool = False,
     motion: float | None = MOTION,
 ) -> "Bill":
-    """What each effect adds to the operations and the time of a derivative, and what leaving it
-    out does to the motion.
+    """Measure what each effect adds to the operations and the time of a derivative, and how the
+    motion changes without it.
 
     route   to the equations; None: the scene's own
-    each    each effect for itself, not all of a type together
-    motion  time that motions are compared for, s; None: they are not
+    each    each effect separately, not all of a type together
+    motion  length of the motions that are compared, s; None: motions are not compared
 
-    Raises `SceneError` for a scene that makes no mechanism, `RunError` for a time that is none.
+    Raises `SceneError`, or `RunError` unless `motion` is positive.
     """
     check_motion(motion)
     scene = read(source)
@@ -37,10 +35,10 @@ def effects(
     return bill_of(scene.replaced(route=route or scene.route), each=each, motion=motion)
 
 
-def check_motion(motion: float | None, manner: Manner = SILENT) -> None:
-    """Raise `RunError` for a time that is none."""
-    if motion is not None and not 0 < motion < math.inf:
-        raise RunError(f"{manner.option('motion')}: {motion:g} is no positive time; give one in s")
+def check_motion(motion: float | None, reporter: Reporter = SILENT) -> None:
+    """Raise `RunError` unless the length of the motions, s, is positive."""
+    if motion is not None:
+        check_time(motion, reporter.argument("motion"))
 
 
 def bill_of(
@@ -49,12 +47,12 @@ def bill_of(
     each: bool = False,
     motion: float | None = MOTION,
     name: str = "",
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> "Bill":
-    """What `effects` returns of a scene; `name` is what it is called."""
+    """The result of `effects` for a scene; `name` is the name of the scene in messages."""
     from eomgen.study.cost.bill import bill
     from eomgen.study.cost.variants import variants
 
-    with manner.located(), manner.watch(f"costing {name or scene.name}") as progress:
+    with reporter.located(), reporter.progress(f"costing {name or scene.name}") as progress:
         changed = variants(scene, each=each)
         return bill(scene, changed, motion=motion or 0.0, progress=progress)

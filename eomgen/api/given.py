@@ -1,4 +1,4 @@
-"""What callers give: a scene, and what is to be other than it says."""
+"""The arguments of public functions: a scene, and values that replace the scene's own."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.model.elaborate import elaborate, outputs_for
@@ -23,12 +24,12 @@ Outputs = Literal["all"] | Sequence[str]
 
 
 def read(source: Source) -> Scene:
-    """A scene, its tables and keys checked one by one.
+    """Read a scene and check each table and key.
 
-    source  a path, or the name of a built-in scene; TOML text, which has several lines; a mapping
-            of what a file would hold, in which NumPy's numbers and arrays may stand; or a `Scene`
+    source  a path; the name of a built-in scene; TOML text of several lines; a mapping with the
+            content of a file, where numbers and arrays may be NumPy's; or a `Scene`
 
-    Raises `SceneError` with one line for each mistake: place, value, remedy.
+    Raises `SceneError` with a line for each mistake: location, value, remedy.
     """
     if isinstance(source, Scene):
         return source
@@ -39,19 +40,44 @@ def read(source: Source) -> Scene:
     if isinstance(source, Mapping):
         return read_tables(source)
     raise SceneError(
-        f"a scene is no {type(source).__name__}; give a path, a name, a text, a mapping or a Scene"
+        f"a scene cannot be read from {type(source).__name__}; give a path, a name, a text, a "
+        "mapping or a Scene"
     )
 
 
 def check(source: Source) -> Model:
-    """The mechanism that a scene describes: bodies in a tree, `coordinates`, `velocities`,
-    `states`, `inputs` and `parameters`, with `notices` of what was put right.
+    """Build the model of a scene: bodies in a tree, `coordinates`, `velocities`, `states`,
+    `inputs`, `parameters`, and `notices` of corrected values.
 
-    Raises `SceneError` where it makes no mechanism, or where its mass matrix is singular.
+    Raises `SceneError` if the scene describes no mechanism or its mass matrix is singular.
     """
-    model = elaborate(read(source))
-    check_nonsingular(model)
+    return checked(elaborate(read(source)))
+
+
+def checked(model: Model, reporter: Reporter = SILENT) -> Model:
+    """The model itself. Raises `SceneError` if its mass matrix is singular."""
+    with reporter.located():
+        check_nonsingular(model)
     return model
+
+
+def modelled(
+    scene: Scene,
+    *,
+    form: Form | None = None,
+    route: Route | None = None,
+    outputs: Outputs | None = None,
+    reporter: Reporter = SILENT,
+) -> Model:
+    """Build the model of a scene, report its notices, then apply `overridden`.
+
+    The mass matrix is not checked. Raises `SceneError`.
+    """
+    with reporter.located():
+        model = elaborate(scene)
+        for notice in model.notices:
+            reporter.note_scene(notice)
+        return overridden(model, form=form, route=route, outputs=outputs, reporter=reporter)
 
 
 def overridden(
@@ -60,43 +86,86 @@ def overridden(
     form: Form | None = None,
     route: Route | None = None,
     outputs: Outputs | None = None,
-    place: str = "outputs",
+    reporter: Reporter = SILENT,
 ) -> Model:
-    """A model of another state form, route or outputs than its scene's; `place` is what messages
-    call these. Raises `SceneError`.
+    """A model with another state form, route or set of outputs; None keeps the scene's.
+
+    Raises `SceneError` for outputs that do not exist or do not fit the model.
     """
     model = replace(model, form=form or model.form, route=route or model.route)
     if outputs is None:
         return model
-    check_outputs(outputs, place)
-    chosen = outputs_for(outputs, place, model.points, model.inputs, model.parameters, model.driven)
+    check_outputs(outputs, reporter)
+    argument = reporter.argument("outputs")
+    chosen = outputs_for(
+        outputs, argument, model.points, model.inputs, model.parameters, model.driven
+    )
     return replace(model, outputs=chosen)
 
 
-def check_outputs(outputs: Outputs, place: str = "outputs") -> None:
-    """Raise `SceneError` for an output that is none, or that every module has."""
+def check_outputs(outputs: Outputs, reporter: Reporter = SILENT) -> None:
+    """Raise `SceneError` for an unknown output, or one that every module has."""
+    argument = reporter.argument("outputs")
     for name in () if outputs == "all" else outputs:
         if name in ("derivative", "jacobian"):
-            raise SceneError(f"{place}: '{name}' is always there; leave it out")
+            raise SceneError(f"{argument}: '{name}' is always there; leave it out")
         if name not in OUTPUTS:
             hint = nearest(name, OUTPUTS) or f"; known: all, {', '.join(OUTPUTS)}"
-            raise SceneError(f"{place}: no output '{name}'{hint}")
+            raise SceneError(f"{argument}: no output '{name}'{hint}")
 
 
 def named(
-    values: Values | None, known: Sequence[str] | Mapping[str, float], place: str, what: str
+    values: Values | None, known: Sequence[str] | Mapping[str, float], argument: str, what: str
 ) -> dict[str, float]:
-    """Finite numbers by names that are known. Raises `RunError` for others."""
+    """The values as floats, by name.
+
+    Raises `RunError`, which calls a value `what`, for an unknown name or a number that is not
+    finite.
+    """
     found = {}
     for name, value in (values or {}).items():
-        if name not in known:
-            hint = nearest(name, known) or f"; known: {', '.join(known) or 'none'}"
-            raise RunError(f"{place}: no {what} '{name}'{hint}")
+        check_name(name, known, argument, what)
         try:
             number = float(value)
         except (TypeError, ValueError):
             number = math.nan
         if not np.isfinite(number):
-            raise RunError(f"{place}: {name} is no finite number")
+            raise RunError(f"{argument}: {name} is not a finite number")
         found[name] = number + 0.0  # -0.0 becomes 0.0, as in a scene
     return found
+
+
+def check_name(
+    name: str, known: Sequence[str] | Mapping[str, float], argument: str, what: str
+) -> None:
+    """Raise `RunError` unless a name is among those `known`."""
+    if name not in known:
+        hint = nearest(name, known) or f"; known: {', '.join(known) or 'none'}"
+        raise RunError(f"{argument}: no {what} '{name}'{hint}")
+
+
+def values_of(
+    model: Model, parameters: Values | None, inputs: Values | None, reporter: Reporter = SILENT
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Values of a model's parameters and constant values of its inputs, by name.
+
+    Raises `RunError` as `named` does.
+    """
+    return (
+        named(parameters, model.defaults, reporter.argument("parameters"), "parameter"),
+        named(inputs, [i.name for i in model.inputs], reporter.argument("inputs"), "input"),
+    )
+
+
+def check_time(value: float, argument: str) -> None:
+    """Raise `RunError` unless a time, s, is positive and finite."""
+    if not 0 < value < math.inf:
+        raise RunError(f"{argument}: {value:g} is not a positive time; give one in s")
+
+
+def check_states(states: int | None, seed: int, most: int, reporter: Reporter = SILENT) -> None:
+    """Raise `RunError` unless there are 1 to `most` random states and the seed is not negative."""
+    if states is not None and not 1 <= states <= most:
+        raise RunError(f"{reporter.argument('states')}: {states} is not a number from 1 to {most}")
+    if seed < 0:
+        raise RunError(f"{reporter.argument('seed')}: {seed} is negative; give 0, 1, 2, …")

@@ -1,4 +1,4 @@
-"""The files of a run: what `eomgen simulate` leaves in a folder."""
+"""The files that `eomgen simulate` writes into a folder."""
 
 from pathlib import Path
 
@@ -13,9 +13,9 @@ KINDS = ("py", "npz", "csv", "png", "html")
 def output_paths(
     folder: Path, name: str, *, figure: Path | None = None, force: bool = False
 ) -> dict[str, Path]:
-    """Where the files of a run go, by kind; `figure` is where the figure goes instead.
+    """The paths of the files of a run, by kind; `figure` replaces the path of the figure.
 
-    Raises `RunError` now for what could not be written then. Folders are made.
+    Makes the folders. Raises `RunError` for a path that cannot be written, before the run begins.
     """
     from eomgen.show.style import check_figure
 
@@ -31,18 +31,18 @@ def output_paths(
 
 
 def save_run(run: Run, paths: dict[str, Path], *, force: bool = False) -> str:
-    """Write all files; return "" or, if pictures cannot be drawn, why not: their paths are then
-    taken out of `paths`.
+    """Write all files. If figure and page cannot be drawn, remove their paths from `paths` and
+    return why; otherwise return "".
     """
     run.module.save(paths["py"], force=force)
-    # The table first: the archive of an earlier run is what tells whose table it overwrites.
+    # The table first: the archive of the earlier run shows whether its table is ours to overwrite.
     save_csv(run.trajectory, paths["csv"], force=force)
     save_npz(run.trajectory, paths["npz"], force=force)
     return _save_pictures(run, paths, force)
 
 
 def _save_pictures(run: Run, paths: dict[str, Path], force: bool) -> str:
-    """Write figure and page; return "" or, if they cannot be drawn, why not."""
+    """Write figure and page; return why they cannot be drawn, or ""."""
     from eomgen.show.figure import save_figure
     from eomgen.show.page import save_page
 
@@ -51,7 +51,7 @@ def _save_pictures(run: Run, paths: dict[str, Path], force: bool) -> str:
         save_figure(run.motion, paths["png"], force=force)
         save_page(run.motion, run.module.poses, parameters, paths["html"], force=force)
     except (RunError, KeyboardInterrupt) as error:
-        # Pictures of an earlier run must not stand beside the numbers of this one.
+        # Figure and page of an earlier run do not belong to the new numbers.
         for kind in ("png", "html"):
             remove_ours(paths.pop(kind))
         if isinstance(error, KeyboardInterrupt):

@@ -1,4 +1,4 @@
-"""The motion of a scene: `simulate`, and its two halves, `planned` and `carried_out`."""
+"""Simulation of a scene: `simulate`, which calls `plan_run` and `run_plan`."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, named, overridden, read
-from eomgen.api.manner import SILENT, Manner
+from eomgen.api.given import Source, Values, check, overridden, read, values_of
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
@@ -24,22 +24,24 @@ if TYPE_CHECKING:
     from eomgen.run.guard import Guard
     from eomgen.run.resume import Start
     from eomgen.run.tally import Follow
+    from eomgen.run.works import Powers
     from eomgen.study.accuracy.search import Choice
-    from eomgen.study.accuracy.trial import Setting
+    from eomgen.study.accuracy.trial import Case, Setting, Tried
 
-Guarding = Literal["stop", "repair"]
-Earlier = str | PathLike[str] | Run
+GuardMode = Literal["stop", "repair"]
+EarlierRun = str | PathLike[str] | Run
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A run that is asked for, and what of it could be checked at once.
+    """Checked arguments of a run.
 
-    scene    what is simulated, for its settings and its looks
-    model    with the outputs that the run and its pictures take
-    setting  method and tolerances or step; None where `accuracy` or `budget` choose it
-    outputs  those that were asked for by name
-    others   as `simulate` has them
+    scene    its settings and appearance are used
+    model    with the outputs that the run and its pictures need
+    setting  method and tolerances or step; None if `accuracy` or `budget` choose them
+    outputs  those that the caller named
+
+    The other fields are arguments of `simulate`.
     """
 
     scene: Scene
@@ -55,10 +57,10 @@ class Plan:
     samples: int = 1001
     max_step: float | None = None
     works: bool = False
-    guard: Guarding | None = None
+    guard: GuardMode | None = None
     unstable: bool = False
     estimate: bool = False
-    resume: Earlier | None = None
+    resume: EarlierRun | None = None
 
 
 def simulate(
@@ -78,35 +80,39 @@ def simulate(
     samples: int = 1001,
     max_step: float | None = None,
     works: bool = False,
-    guard: Guarding | None = None,
+    guard: GuardMode | None = None,
     unstable: bool = False,
     estimate: bool = False,
-    resume: Earlier | None = None,
+    resume: EarlierRun | None = None,
     follow: "Follow | None" = None,
 ) -> Run:
-    """The motion of a scene from its initial state.
+    """Simulate a scene from its initial state.
 
-    t_end, integrator, dt, rtol, atol  None: the scene's own; `dt` for equal steps, s, `rtol` and
-                        `atol` for adaptive methods
-    accuracy            asks for a method and tolerances whose error in the last state is below this
-                        part of the motion's scale, by runs of this very scene
-    budget              asks for the most exact run that takes about so long, s
-    parameters, inputs  other values by name; inputs are constant
-    samples             rows that are kept, about
-    max_step            longest step of adaptive methods, s
-    works               asks for what each effect has done, J
-    guard               watches rounding at every step: "stop" where digits are lost, or "repair"
-    unstable            lets equal steps of an explicit method be too long for stability
-    estimate            estimates the error by a second run
-    resume              goes on where an earlier run ended: its archive `.npz`, or itself
-    follow              told time and state after each step; a true result stops the run
+    t_end       end time, s; None: the scene's own
+    integrator  name of the method; None: the scene's own
+    dt          step of a fixed-step method, s; None: the scene's own
+    rtol, atol  relative and absolute tolerance of an adaptive method; None: the scene's own
+    accuracy    choose method and tolerances so that the error of the last state, relative to the
+                scale of the motion, is below this; they are found by trial runs of this scene
+    budget      choose the most accurate run that takes about this time, s
+    parameters  values that replace those of the scene, by name
+    inputs      constant values, by name; others are 0
+    form        state form; None: the scene's own
+    route       to the equations; None: the scene's own
+    samples     number of rows that are kept, about
+    max_step    longest step of an adaptive method, s
+    works       also compute the work of each effect, J
+    guard       check rounding errors at each step, and "stop" where digits are lost, or "repair"
+    unstable    allow steps of an explicit fixed-step method that are too long for stability
+    estimate    estimate the error by a second run
+    resume      continue an earlier run: a `Run`, or its archive `.npz`
+    follow      called with time and state after each step; a true result stops the run
 
-    A run that cannot go on is returned with the rows up to there: it is not `finished`, and its
-    `outcome` says why and what to change. Raises `SceneError`, or `RunError` for an argument that
-    cannot be served.
+    A run that cannot continue is returned with its rows so far: `finished` is false, and `outcome`
+    says why and what to change. Raises `SceneError`, or `RunError` for an invalid argument.
     """
     scene = read(source)
-    plan = planned(
+    plan = plan_run(
         scene,
         overridden(check(scene), form=form, route=route),
         t_end=t_end,
@@ -126,61 +132,79 @@ def simulate(
         estimate=estimate,
         resume=resume,
     )
-    return carried_out(plan, follow=follow)
+    return run_plan(plan, follow=follow)
 
 
-def planned(
+def plan_run(
     scene: Scene,
     model: Model,
     *,
+    outputs: Sequence[str] = (),
     t_end: float | None = None,
     integrator: str | None = None,
     dt: float | None = None,
     rtol: float | None = None,
     atol: float | None = None,
+    accuracy: float | None = None,
+    budget: float | None = None,
     parameters: Values | None = None,
     inputs: Values | None = None,
+    samples: int = 1001,
+    max_step: float | None = None,
+    works: bool = False,
+    guard: GuardMode | None = None,
     unstable: bool = False,
-    manner: Manner = SILENT,
-    **others: Any,
+    estimate: bool = False,
+    resume: EarlierRun | None = None,
+    reporter: Reporter = SILENT,
 ) -> Plan:
-    """A run of a scene's model, as `simulate` describes it.
+    """Check the arguments of `simulate`, which describes them, for a scene's model.
 
-    Raises `RunError` for what cannot be served.
+    `outputs` must be in the module. Raises `RunError` for an invalid argument.
     """
     bounds = {"rtol": rtol, "atol": atol, "dt": dt}
-    aims = [name for name in ("accuracy", "budget") if others.get(name) is not None]
-    _check_aims(aims, bounds, manner)
-    asked = (*model.outputs, *SHOWN, *(("effect_powers",) if others.get("works") else ()))
-    model = replace(model, outputs=in_order(asked))
-    given = named(parameters, model.defaults, manner.option("parameters"), "parameter")
-    pushes = named(inputs, [i.name for i in model.inputs], manner.option("inputs"), "input")
-    if aims and others.get("resume") is not None:
-        raise RunError(
-            f"{manner.option('resume')}: goes on with a method that is named; leave "
-            f"{manner.option('accuracy')}, {manner.option('budget')} out"
-        )
-    guard = others.get("guard")
+    aims = [n for n, x in (("accuracy", accuracy), ("budget", budget)) if x is not None]
+    _check_aims(aims, bounds, resume, reporter)
+    parameters, inputs = values_of(model, parameters, inputs, reporter)
     if guard not in (None, "stop", "repair"):
-        raise RunError(f"{manner.option('guard')}: '{guard}' is none of stop, repair")
-    setting = None if aims else setting_of(scene.simulation, integrator, **bounds, manner=manner)
+        raise RunError(f"{reporter.argument('guard')}: '{guard}' is none of stop, repair")
+    setting = None
+    if not aims:
+        setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
     if unstable:
-        _check_unstable(setting, manner)
-    end = scene.simulation.t_end if t_end is None else t_end
-    others |= {"integrator": integrator, "unstable": unstable}
-    return Plan(scene, model, setting, end, given, pushes, **others)
+        _check_unstable(setting, reporter)
+    needed = (*model.outputs, *SHOWN, *(("effect_powers",) if works else ()))
+    return Plan(
+        scene,
+        replace(model, outputs=in_order(needed)),
+        setting,
+        scene.simulation.t_end if t_end is None else t_end,
+        parameters,
+        inputs,
+        outputs,
+        accuracy=accuracy,
+        budget=budget,
+        integrator=integrator,
+        samples=samples,
+        max_step=max_step,
+        works=works,
+        guard=guard,
+        unstable=unstable,
+        estimate=estimate,
+        resume=resume,
+    )
 
 
-def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = SILENT) -> Run:
-    """The run of a plan. Raises `RunError` where it cannot begin."""
-    # Imported here: to check and to generate needs no SciPy.
+def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
+    """Run a plan. Raises `RunError` if the run cannot start."""
+    # Imported here: plans are checked without SciPy.
     from eomgen.show.observe import observe
     from eomgen.study.accuracy.trial import Case
 
     model = plan.model
-    module, functions = compiled(model, asked=plan.outputs, manner=manner)
+    module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     values = (plan.parameters or None, plan.inputs or None)
-    kept: dict[str, Any] = {
+    options: dict[str, Any] = {
         "samples": plan.samples,
         "max_step": plan.max_step,
         "rest_speed": plan.scene.simulation.rest_speed,
@@ -191,40 +215,36 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
     start = _start(plan, problem)
     if start is not None:
         problem = start.problem
-        kept |= start.options
+        options |= start.options
     moved = None
     if plan.setting is None or plan.estimate:
         from eomgen.study.accuracy.moved import moved_problem
 
         moved = moved_problem(functions, model, *values)
-    case = Case(problem, plan.t_end, functions.UNITS, kept, manner.watch, moved)
+    case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
     warnings, error = [*model.notices, *module.notices], math.nan
-    choice: Choice | None = None
-    if plan.setting is None:
-        from eomgen.study.accuracy.aimed import UNKNOWN, made_again
+    trial, choice = _run_case(plan, case, powers, follow, reporter)
+    trajectory, estimate = trial.trajectory, None
+    if choice is not None:
+        from eomgen.study.accuracy.aimed import UNKNOWN
 
-        choice = _chosen(plan, case, manner)
         error = choice.error
         if not choice.met:
             why = choice.reason or UNKNOWN
             warnings.append(f"accuracy: not reached, the estimate is {error:.1g}: {why}")
-        tried = made_again(case, choice, powers, follow)
-    else:
-        tried = case.run(plan.setting, powers=powers, follow=follow)
-    trajectory, estimate = tried.trajectory, None
-    if plan.estimate and choice is None and trajectory.finished:
+    elif plan.estimate and trajectory.finished:
         from eomgen.study.accuracy.estimate import by_second_run
 
-        estimate = by_second_run(case, tried)
+        estimate = by_second_run(case, trial)
         error = estimate.last
-    own = model.with_parameters(plan.parameters)
+    model = model.with_parameters(plan.parameters)
     return Run(
-        own,
+        model,
         module,
         trajectory,
-        observe(own, functions, trajectory, appearance_of(plan.scene), plan.inputs),
-        tried.setting.options,
+        observe(model, functions, trajectory, appearance_of(plan.scene), plan.inputs),
+        trial.setting.options,
         error,
         tuple(warnings),
         choice=choice,
@@ -233,52 +253,68 @@ def carried_out(plan: Plan, *, follow: "Follow | None" = None, manner: Manner = 
     )
 
 
-def _chosen(plan: Plan, case: Any, manner: Manner) -> "Choice":
-    from eomgen.study.accuracy.aimed import aimed
+def _run_case(
+    plan: Plan, case: "Case", powers: "Powers | None", follow: "Follow | None", reporter: Reporter
+) -> "tuple[Tried, Choice | None]":
+    """The run of a plan, and the choice of its method if the plan has an aim."""
+    if plan.setting is not None:
+        return case.run(plan.setting, powers=powers, follow=follow), None
+    from eomgen.study.accuracy.aimed import aimed, made_again
 
-    return aimed(
+    choice = aimed(
         case,
         accuracy=plan.accuracy,
         budget=plan.budget,
         integrator=plan.integrator,
-        say=manner.trying,
+        say=reporter.trial,
     )
+    return made_again(case, choice, powers, follow), choice
 
 
-def _check_aims(aims: Sequence[str], bounds: Mapping[str, float | None], manner: Manner) -> None:
-    """Raise `RunError` where a run is asked for in two ways at once."""
+def _check_aims(
+    aims: Sequence[str],
+    bounds: Mapping[str, float | None],
+    resume: EarlierRun | None,
+    reporter: Reporter,
+) -> None:
+    """Raise `RunError` for two aims, or for an aim with a tolerance, a step or an earlier run."""
     if len(aims) > 1:
-        both = ", ".join(map(manner.option, aims))
+        both = ", ".join(map(reporter.argument, aims))
         raise RunError(f"{both}: a run has one aim; give one of them")
-    for aim in map(manner.option, aims):
+    for aim in map(reporter.argument, aims):
         for name, value in bounds.items():
             if value is not None:
-                option = manner.option(name)
+                option = reporter.argument(name)
                 raise RunError(f"{aim}, {option}: {aim} chooses {name} itself; leave one out")
+    if aims and resume is not None:
+        raise RunError(
+            f"{reporter.argument('resume')}: continues with a given method; leave "
+            f"{reporter.argument('accuracy')}, {reporter.argument('budget')} out"
+        )
 
 
-def _check_unstable(setting: "Setting | None", manner: Manner) -> None:
-    """Raise `RunError` for `unstable` where no step can be too long."""
+def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
+    """Raise `RunError` for `unstable` unless the method is explicit with a given step."""
     from eomgen.run.integrators import FixedStep, find_integrator
 
-    asked = manner.option("unstable")
+    asked = reporter.argument("unstable")
     if setting is None:
         raise RunError(
-            f"{asked}: is for a step that is given; leave {manner.option('accuracy')}, "
-            f"{manner.option('budget')} out"
+            f"{asked}: is for a given step; leave {reporter.argument('accuracy')}, "
+            f"{reporter.argument('budget')} out"
         )
     method = find_integrator(setting.integrator)
     if not (isinstance(method, FixedStep) and method.explicit):
         raise RunError(
-            f"{asked}: steps of {setting.integrator} are stable however long, or its own "
-            f"choice; leave it out, or take {manner.option('integrator')} euler, leapfrog or rk4"
+            f"{asked}: {setting.integrator} is stable at any step or chooses its own; leave "
+            f"it out, or take {reporter.argument('integrator')} euler, leapfrog or rk4"
         )
 
 
 def _guard(
     plan: Plan, module: GeneratedModule, values: tuple[Mapping[str, float] | None, ...]
 ) -> "Guard | None":
-    """What watches the run, if that is asked for."""
+    """The guard against rounding errors, if the plan has one."""
     if plan.guard is None:
         return None
     from eomgen.precision.guarding import guard_of
@@ -288,7 +324,7 @@ def _guard(
 
 
 def _start(plan: Plan, problem: Problem) -> "Start | None":
-    """How the run goes on from an earlier one, if that is asked for."""
+    """Where the run continues an earlier one, if the plan names one."""
     if plan.resume is None:
         return None
     from eomgen.run.resume import going_on
@@ -306,32 +342,32 @@ def _start(plan: Plan, problem: Problem) -> "Start | None":
 
 
 def setting_of(
-    wanted: Simulation,
+    simulation: Simulation,
     integrator: str | None = None,
     *,
     dt: float | None = None,
     rtol: float | None = None,
     atol: float | None = None,
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> "Setting":
-    """The method asked for, or the scene's, `wanted`, with tolerances or a step.
+    """The method with its tolerances or step; None stands for those of the scene, `simulation`.
 
-    Raises `RunError` for tolerances of a method that takes equal steps.
+    Raises `RunError` for tolerances of a fixed-step method.
     """
     from eomgen.run.integrators import FixedStep, find_integrator
     from eomgen.study.accuracy.trial import Setting
 
-    name = wanted.integrator if integrator is None else integrator
+    name = simulation.integrator if integrator is None else integrator
     if not isinstance(find_integrator(name), FixedStep):
         return Setting(
             name,
-            wanted.rtol if rtol is None else rtol,
-            wanted.atol if atol is None else atol,
+            simulation.rtol if rtol is None else rtol,
+            simulation.atol if atol is None else atol,
             dt,
         )
     if rtol is not None or atol is not None:
+        rtol_name, atol_name, dt_name = map(reporter.argument, ("rtol", "atol", "dt"))
         raise RunError(
-            f"{manner.option('rtol')}, {manner.option('atol')}: {name} takes equal steps; give "
-            f"{manner.option('dt')} instead"
+            f"{rtol_name}, {atol_name}: {name} takes equal steps; give {dt_name} instead"
         )
-    return Setting(name, dt=wanted.dt if dt is None else dt)
+    return Setting(name, dt=simulation.dt if dt is None else dt)

@@ -1,12 +1,12 @@
-"""The generated module against independent solvers: `verify`, `horizon`."""
+"""Comparison of the generated module with independent solvers: `verify`, `horizon`."""
 
 import hashlib
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from eomgen.api.given import Source, check, read
-from eomgen.api.manner import SILENT, Manner
+from eomgen.api.given import Source, check, check_states, check_time, read
+from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.module import load_module
@@ -23,23 +23,26 @@ MOST_STATES = 10_000
 def verify(
     source: Source, *, states: int | None = None, seed: int = 0, bound: float | None = None
 ) -> "Verified":
-    """The generated module against a solver of another make and against 60 digits; what it
-    `missed` is empty where all is well.
+    """Compare the generated module with an independent solver and with 60 digits.
 
-    states  how many of each kind; None: as many as are quick
-    seed    of the random ones
-    bound   units in the last place that v̇ may be off; None: what half a unit in the data allows
+    `missed` of the result lists the bounds that were exceeded.
 
-    Raises `RunError` for an argument that cannot be served.
+    states  number of states of each kind; None: as many as are quick
+    seed    of the random states
+    bound   greatest error of v̇, units in the last place; None: the effect of errors of half a unit
+            in the data
+
+    Raises `SceneError`, or `RunError` for an invalid argument.
     """
     scene = read(source)
     return verified_model(check(scene), scene.simulation, states=states, seed=seed, bound=bound)
 
 
 def horizon(source: Source, *, seconds: float = 60.0) -> "Horizon":
-    """How long doubles mean anything, by a run in extended precision of at most so many `seconds`.
+    """Estimate for how long a run in doubles follows the exact motion of a scene.
 
-    Raises `RunError` for an argument that cannot be served.
+    It is compared with a run in extended precision that takes at most `seconds`. Raises
+    `SceneError`, or `RunError` for an invalid argument.
     """
     scene = read(source)
     return horizon_of(check(scene), scene.simulation, seconds=seconds)
@@ -51,56 +54,58 @@ def check_verification(
     seed: int = 0,
     bound: float | None = None,
     horizon: float | None = None,
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> None:
-    """Raise `RunError` for what cannot be served."""
-    if states is not None and not 1 <= states <= MOST_STATES:
-        asked = manner.option("states")
-        raise RunError(f"{asked}: {states} is not a number from 1 to {MOST_STATES}")
-    if seed < 0:
-        raise RunError(f"{manner.option('seed')}: {seed} is negative; give 0, 1, 2, …")
+    """Raise `RunError` for an invalid argument of `verify` or `horizon`."""
+    check_states(states, seed, MOST_STATES, reporter)
     if bound is not None and not 0.5 <= bound < math.inf:
-        asked = manner.option("bound")
-        raise RunError(f"{asked}: {bound:g} is no number of ulps from 0.5 on")
-    if horizon is not None and not 0 < horizon < math.inf:
-        asked = manner.option("horizon")
-        raise RunError(f"{asked}: {horizon:g} is no positive time; give one in s")
+        argument = reporter.argument("bound")
+        raise RunError(f"{argument}: {bound:g} ulps is not a bound; give 0.5 or more")
+    if horizon is not None:
+        check_time(horizon, reporter.argument("horizon"))
 
 
 def verified_model(
     model: Model,
-    wanted: Simulation,
+    simulation: Simulation,
     *,
     states: int | None = None,
     seed: int = 0,
     bound: float | None = None,
     name: str = "",
-    manner: Manner = SILENT,
+    reporter: Reporter = SILENT,
 ) -> "Verified":
-    """A model verified as `verify` describes it; `name` is what it is called there."""
-    from eomgen.study.verification.verify import verify as verified  # brings many digits
+    """The result of `verify` for a model; `name` is the name of the scene in it."""
+    from eomgen.study.verification.verify import verify as verified  # imports extended precision
 
-    check_verification(states=states, seed=seed, bound=bound, manner=manner)
-    called = name or model.name
-    with manner.located(), manner.watch(f"verifying {called}") as progress:
-        found = verified(model, wanted, states=states, seed=seed, bound=bound, progress=progress)
-    return replace(found, name=called)
+    check_verification(states=states, seed=seed, bound=bound, reporter=reporter)
+    name = name or model.name
+    with reporter.located(), reporter.progress(f"verifying {name}") as progress:
+        found = verified(
+            model, simulation, states=states, seed=seed, bound=bound, progress=progress
+        )
+    return replace(found, name=name)
 
 
 def horizon_of(
-    model: Model, wanted: Simulation, *, seconds: float, name: str = "", manner: Manner = SILENT
+    model: Model,
+    simulation: Simulation,
+    *,
+    seconds: float,
+    name: str = "",
+    reporter: Reporter = SILENT,
 ) -> "Horizon":
-    """What `horizon` says of a model, which `name` is what it is called."""
+    """The result of `horizon` for a model; `name` is the name of the scene in messages."""
     from eomgen.study.verification.horizon import horizon as found
 
-    check_verification(horizon=seconds, manner=manner)
+    check_verification(horizon=seconds, reporter=reporter)
     model = replace(model, form="velocity")
-    with manner.located(), manner.watch(f"horizon of {name or model.name}") as progress:
+    with reporter.located(), reporter.progress(f"horizon of {name or model.name}") as progress:
         module = load_module(generated_code(model).module, model.name)
-        return found(model, wanted, module, seconds=seconds, progress=progress)
+        return found(model, simulation, module, seconds=seconds, progress=progress)
 
 
 def digest(model: Model) -> str:
-    """SHA-256 of the source of the module that is verified."""
+    """SHA-256 of the source of the verified module."""
     source = generated_code(replace(model, form="velocity")).module
     return hashlib.sha256(source.encode()).hexdigest()

@@ -1,9 +1,9 @@
-"""The table of `accuracy` in words: every run, the orders seen, and how to read it."""
+"""The printed table of `accuracy`: all runs, observed orders, and the cheapest methods."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from eomgen.api.accuracy import Measured
+from eomgen.api.accuracy import Measurement
 from eomgen.commands.shared import print_wrapped
 from eomgen.study.accuracy.ladder import Work, order
 from eomgen.study.accuracy.reading import TARGETS, cheapest, observed_order, saved_by_jacobian
@@ -11,31 +11,22 @@ from eomgen.study.accuracy.work_precision import Bench
 
 WORDS = {"wrong": "wrong", "failed": "failed", "over": "over", "refused": "not possible"}
 RUNNERS_UP = 2
-"""Methods that are named beside the cheapest."""
+"""Number of methods that are listed after the cheapest."""
 
 
 def _energy(bench: Bench) -> str:
     if bench.energy is not None:
-        return "greatest change of the energy, which exact motion keeps, in parts of the motion's"
+        return "greatest relative change of the energy, which exact motion conserves"
     if bench.powers is not None:
         return (
-            "kinetic energy at the end that the works of effects leave unaccounted for, in parts "
-            "of the motion's energy; empty where booking them would take too long"
+            "change of kinetic energy that the works of effects do not explain, relative to the "
+            "motion's energy; empty if computing the works would take too long"
         )
-    return "not known: energy is not kept, and the works of effects are not known"
+    return "not known: energy is not conserved, and the works of effects are not known"
 
 
-def _quaternions(bench: Bench) -> str:
-    if not bench.problem.quaternions:
-        return "none, the state has no quaternions"
-    return (
-        "how far their length was from 1 at most before it was scaled back to 1, as it is after "
-        "every step"
-    )
-
-
-def print_table(name: str, made: Measured) -> None:
-    """Print what was measured: a line a run, a word on each method's order, and a reading."""
+def print_table(name: str, made: Measurement) -> None:
+    """Print a line for each run, the order of each method, and the cheapest methods."""
     found, bench, methods = made.found, made.bench, made.methods
     works, costs, t_end, generation = found.works, found.costs, found.t_end, found.generation
     truth = bench.reference
@@ -52,7 +43,10 @@ def print_table(name: str, made: Measured) -> None:
     )
     print_wrapped("    energy: ", _energy(bench))
     if bench.problem.quaternions:
-        print_wrapped("    quaternions: ", _quaternions(bench))
+        print_wrapped(
+            "    quaternions: ",
+            "greatest deviation of their length from 1, before each step scales it to 1",
+        )
     extras: list[tuple[str, Callable[[Work], float]]] = [
         ("energy", lambda w: w.energy_drift),
         ("gap, m", lambda w: w.joint_gap),
@@ -101,8 +95,8 @@ def _time(seconds: float) -> str:
 
 
 def _share(bench: Bench, work: Work, costs: tuple[float, float]) -> str:
-    """Share of the time that the generated code takes; not reported where contacts add their
-    own.
+    """The share of the time that is spent in generated code; "-" with rigid contacts, whose own
+    kernels also take time.
     """
     if bench.problem.contacts is not None or not work.derivatives:
         return "-"
@@ -111,21 +105,21 @@ def _share(bench: Bench, work: Work, costs: tuple[float, float]) -> str:
 
 
 def _cause(reason: str) -> str:
-    """Why a run failed, without the time and the state that it stopped at."""
+    """Why a run failed, without the time and state where it stopped."""
     return reason.partition(": ")[2] or reason
 
 
 def _print_troubles(reasons: Mapping[tuple[str, str, str], Sequence[Work]]) -> None:
-    """What went wrong, methods and reasons that are the same together."""
+    """Print why runs failed or are wrong, a line for each method and reason."""
     if reasons:
-        print("    not right:")
+        print("    failed or wrong:")
     for (method, status, cause), works in reasons.items():
         settings = works[0].rung.setting
         if len(works) > 1:
             settings += f" to {works[-1].rung.setting.split()[1]}"
         if status == "wrong":
             worst = max(work.error for work in works)
-            cause = f"reported success, but up to {worst:.2g} of the motion's own scale off"
+            cause = f"reported success, but the error is up to {worst:.2g} of the motion's scale"
         print_wrapped(f"        {method}, {settings}: ", f"{WORDS[status]}: {cause}")
 
 
@@ -138,17 +132,17 @@ def _print_orders(methods: Sequence[str], works: Sequence[Work]) -> None:
             continue
         seen = observed_order(own)
         if seen is None:
-            text = "none to be seen: no two equal slopes of the error in a row"
+            text = "not observed: no two successive slopes of the error agree"
         else:
             text = f"{seen.value:.2f} over dt {seen.coarse:.3g} to {seen.fine:.3g} s"
         lines.append(f"        {method:<20}  {nominal}   {text}")
     if lines:
-        print("    order     by its making, and as seen:")
+        print("    order, nominal and observed:")
         print("\n".join(lines))
 
 
 def _print_reading(works: Sequence[Work]) -> None:
-    """The cheapest runs for a few errors, and what the generated Jacobian saves."""
+    """Print the cheapest runs for a few errors, and what the generated Jacobian saves."""
     print("    cheapest run, by counted work, for an error within")
     for target in TARGETS:
         best = cheapest(works, target)
@@ -167,7 +161,7 @@ def _print_reading(works: Sequence[Work]) -> None:
         print_wrapped(
             "    ",
             f"{len(wrong)} of {len(works)} runs reported success and are wrong: their errors are "
-            "a tenth of the motion's own scale and more",
+            "at least a tenth of the motion's scale",
         )
     for method, ratio in saved_by_jacobian(works).items():
         print_wrapped(

@@ -1,4 +1,4 @@
-"""How exact the arithmetic of each route is: the half of `accuracy` that needs no run."""
+"""The part of the command `accuracy` on rounding errors, which needs no runs."""
 
 from math import isfinite
 from typing import TYPE_CHECKING
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eomgen.api.accuracy import arithmetic_of, check_arithmetic
-from eomgen.commands.shared import Arguments, assignments, manner_of, print_wrapped
+from eomgen.commands.shared import Arguments, assignments, print_wrapped, reporter_of
 from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.scene.schema import Simulation
@@ -16,38 +16,38 @@ if TYPE_CHECKING:
 
 HEADS = {
     "float64": "float64",
-    "float32": "float32, ulp of its own, 2^29 of those above; at the states rounded to it",
+    "float32": "float32, in its own ulp, 2^29 of those above; at states rounded to float32",
 }
 
 
 def check_files(given: Arguments, name: str) -> None:
-    """Raise `RunError` if this half cannot be done as asked, or not be written."""
+    """Raise `RunError` for invalid options, or files that cannot be written."""
     from eomgen.show.style import check_figure
 
-    check_arithmetic(given.states, given.seed, manner_of(given, given.scene))
+    check_arithmetic(given.states, given.seed, reporter_of(given, given.scene))
     check_folder(given.output)
     check_figure(given.output / f"{name}_arithmetic.png", force=given.force)
     check_writable(given.output / f"{name}_arithmetic.csv", force=given.force)
 
 
-def print_arithmetic(given: Arguments, model: Model, wanted: Simulation, name: str) -> None:
-    """Judge, print and draw the arithmetic of every route of a scene's model."""
-    # Imported here: nothing else needs Matplotlib, or that many digits.
+def print_arithmetic(given: Arguments, model: Model, simulation: Simulation, name: str) -> None:
+    """Measure, print and draw the rounding errors of each route."""
+    # Imported here: it imports Matplotlib.
     from eomgen.show.arithmetic import save_figure, save_table
 
     check_files(given, name)
     model = model.with_parameters(assignments(given.set, model.defaults, "--set"))
     found = arithmetic_of(
         model,
-        wanted,
+        simulation,
         states=given.states,
         seed=given.seed,
         single=given.float32,
         name=name,
-        manner=manner_of(given, given.scene),
+        reporter=reporter_of(given, given.scene),
     )
     print(
-        f"{name}: error of v̇ in units in the last place (ulp), by every route; taken: {found.taken}"
+        f"{name}: error of v̇ in units in the last place (ulp), by each route; chosen: {found.taken}"
     )
     for precision in dict.fromkeys(way.precision for way in found.ways):
         _print_ways(found, precision)
@@ -88,25 +88,25 @@ def _print_notes(found: "Arithmetic", model: Model) -> None:
     print_wrapped("    condition of the mass matrix, its diagonal scaled to 1: ", conditions)
     print_wrapped(
         "    ulp: ",
-        "of the greatest acceleration of the same unit, but of no less than 1/1000 of what that is "
-        "at half of the states; correctly rounded is 0.5. linalg.solve: M v̇ = F - V - G by NumPy "
-        "on the scene's own terms, their operations and those of elimination",
+        "that of the greatest acceleration of the same unit, but at least of 1/1000 of its median "
+        "over the states; a correctly rounded result has 0.5. linalg.solve: M v̇ = F - V - G solved "
+        "by NumPy; its operations are those of the terms and of the elimination",
     )
-    parts = [f"against 60 digits, in which two ways agree to {found.agreed:.0f}; inputs 0"]
+    parts = [f"60 digits, of which two routes agree in {found.agreed:.0f}; inputs 0"]
     for sample in found.samples:
         if sample.until is not None:
             parts.append(f"{sample.kind} to t = {sample.until:.4g} s")
         if sample.left_out:
-            parts.append(f"{sample.left_out} {sample.kind} left out, which have no acceleration")
+            parts.append(f"{sample.left_out} {sample.kind} without a finite acceleration left out")
     if model.form != "velocity":
-        parts.append(f"form '{model.form}' is judged as 'velocity'")
+        parts.append(f"form '{model.form}' is evaluated as 'velocity'")
     if any(getattr(effect, "law", "") == "impact" for effect in model.effects):
-        parts.append("no rigid contact held")
-    print_wrapped("    true: ", "; ".join(parts))
+        parts.append("all rigid contacts open")
+    print_wrapped("    reference: ", "; ".join(parts))
 
 
 def ulps(value: float) -> str:
-    """An error for a reader: a decimal if it is small, a power of ten if it is large."""
+    """An error as text: with one decimal if it is small, with an exponent if it is large."""
     if not isfinite(value):
         return "-" if value != value else "inf"
     return f"{value:.1f}" if value < 9.95 else f"{value:.0f}" if value < 9999.5 else f"{value:.1e}"

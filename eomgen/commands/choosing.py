@@ -1,4 +1,4 @@
-"""`--accuracy`, `--budget`, `--estimate`: a run by its error or time, and what it says of that."""
+"""Output of `simulate` for `--accuracy`, `--budget`, `--estimate`, and on energy errors."""
 
 import math
 import re
@@ -15,31 +15,33 @@ if TYPE_CHECKING:
 
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0}
 DRIFTED = 2e-3
-"""Of the greatest kinetic energy: where a run gains or loses more than it may, speeds are off by
-half that part, which over a few swings makes another motion."""
+"""Energy error that is warned of, relative to the greatest kinetic energy.
+
+The relative error of speeds is half of it, which after a few swings is a different motion.
+"""
 BETTER = "take tighter tolerances or a shorter step, or let --accuracy 1e-3 choose"
 
 
 def seconds_of(text: str) -> float:
-    """A time like 2s, 500ms, 1.5min or 2, in s. Raises `RunError` for any other."""
+    """Read a time such as 2s, 500ms, 1.5min or 2, in s. Raises `RunError` for anything else."""
     found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(s|ms|min|)\s*", text)
     try:
         value = float(found[1]) * SECONDS[found[2]] if found else math.nan
     except ValueError:
         value = math.nan
     if not 0 < value < math.inf:
-        raise RunError(f"--budget {text}: is no time to compute in; give e.g. 2s, 500ms or 1.5min")
+        raise RunError(f"--budget {text}: is not a computing time; give e.g. 2s, 500ms or 1.5min")
     return value
 
 
 def print_choice(choice: "Choice", given: Arguments) -> str:
-    """Say what was chosen and what it cost; return "" or that it is not what was asked for."""
+    """Print what was chosen and its cost; return a message if the accuracy was not reached."""
     run = choice.tried
     if not run.trajectory.finished:
         return ""
     print(f"    chosen: {run.setting.options}")
     print(f"    error estimate {_error(choice.error)} at the end{_most(choice)}")
-    print(f"    it took {run.seconds:.2g} s, all {choice.runs} runs tried {choice.seconds:.2g} s")
+    print(f"    it took {run.seconds:.2g} s, all {choice.runs} trial runs {choice.seconds:.2g} s")
     if not choice.met:
         from eomgen.study.accuracy.aimed import UNKNOWN
 
@@ -52,7 +54,7 @@ def print_choice(choice: "Choice", given: Arguments) -> str:
 
 
 def print_estimate(found: "Estimate") -> None:
-    """Say a run's error, and by which second run it is known."""
+    """Print the estimated error of a run, and the second run that it is estimated from."""
     from eomgen.study.accuracy.measure import WRONG
 
     second = found.second
@@ -63,22 +65,22 @@ def print_estimate(found: "Estimate") -> None:
         f"    error estimate {_error(found.last)} at the end, at most {found.most:.1e} at "
         f"t = {found.at:.4g} s"
     )
-    print(f"    by a second run, {second.setting.options}, which took {second.seconds:.2g} s")
+    print(f"    from a second run, {second.setting.options}, which took {second.seconds:.2g} s")
     if found.most >= WRONG:
         _warn(
-            f"by its own estimate this run is wrong by {found.most:.1g} of the motion's scale at "
+            f"by its error estimate this run is wrong by {found.most:.1g} of the motion's scale at "
             f"t = {found.at:.4g} s; {BETTER}"
         )
 
 
 def warn_of_energy(run: Run) -> None:
-    """Warn of a run whose energy is not what it must be: conserved, or accounted for by works."""
+    """Warn if the energy of a run is neither conserved nor explained by the works of effects."""
     found = run.imbalance
     if found is None or not found.lost > DRIFTED * found.size:
         return
     what = "works and kinetic energy balance in exact motion"
     if found.conserved:
-        what = "exact motion keeps its energy"
+        what = "exact motion conserves its energy"
     _warn(
         f"{what}, but this run is off by {found.lost:.2g} J, {found.lost / found.size:.1%} of the "
         f"greatest kinetic energy; {BETTER}"
@@ -90,7 +92,7 @@ def _error(value: float) -> str:
 
 
 def _most(choice: "Choice") -> str:
-    """What is known of the rows before the end."""
+    """The estimated error before the end, if known."""
     if not math.isfinite(choice.most):
         return ""
     return f", at most {choice.most:.1e} before, at t = {choice.at:.4g} s"

@@ -1,13 +1,12 @@
-"""What each effect of a scene costs, and what leaving it out does: `effects`."""
+"""The command `effects`."""
 
 import math
 from typing import TYPE_CHECKING
 
 from eomgen.api.effects import bill_of, check_motion
-from eomgen.api.manner import Manner
-from eomgen.commands.shared import OPTIONS, Arguments, manner_of, print_wrapped, read_model
+from eomgen.api.reporter import Reporter
+from eomgen.commands.shared import OPTIONS, Arguments, print_wrapped, read_whole, reporter_of
 from eomgen.files import check_folder
-from eomgen.scene.reader import read_scene
 
 if TYPE_CHECKING:
     from eomgen.study.cost.bill import Bill, Item
@@ -16,23 +15,22 @@ OWN, SHARED = "the mechanism itself", "shared by effects"
 
 
 def effects(given: Arguments) -> int:
-    """Print what each effect costs and does, and draw it."""
-    # Imported here: nothing else needs Matplotlib for costs.
+    """Print and draw the cost of each effect and the change of the motion without it."""
+    # Imported here: they import Matplotlib.
     from eomgen.show.bill import save_bill
     from eomgen.show.style import check_figure
 
-    check_motion(given.motion_time, Manner(option=OPTIONS.__getitem__))
-    model, name = read_model(given.scene, given)
+    check_motion(given.motion_time, Reporter(argument=OPTIONS.__getitem__))
+    scene, model, name = read_whole(given.scene, given)
     path = given.output / f"{name}_effects.png"
     check_folder(path.parent)
     check_figure(path, force=given.force)
-    scene = read_scene(given.scene).replaced(route=model.route)
     found = bill_of(
-        scene,
+        scene.replaced(route=model.route),
         each=given.each,
         motion=None if given.no_motion else given.motion_time,
         name=name,
-        manner=manner_of(given, given.scene),
+        reporter=reporter_of(given, given.scene),
     )
     print(
         f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs "
@@ -79,39 +77,37 @@ def _print_items(bill: "Bill") -> None:
     if kinds.count("effect") > 1 or operations:
         line(SHARED, operations, difference(seconds, spread))
     if "mechanism" in kinds:
-        print("    of the mechanism itself, what might be left out:")
+        print("    parts of the mechanism itself that could be left out:")
         lines("mechanism")
     if "left out" in kinds:
-        print("    left out on purpose, what it would add:")
+        print("    left out by the scene, with what it would add:")
         lines("left out")
     if {bill.bare_route, *(item.route for item in bill.items)} - {"", bill.route}:
-        print_wrapped(
-            "    ", f"(route): so its equations come without it, all of them by {bill.route}"
-        )
+        print_wrapped("    ", f"(route): the route without it; with all of them it is {bill.route}")
 
 
 def _needed(item: "Item") -> str:
-    """Why nothing is known of an item alone."""
+    """Why an item cannot be left out alone: the items that need it."""
     more = f" and {len(item.needed_by) - 3} more" if len(item.needed_by) > 3 else ""
     return f"others need it: {', '.join(item.needed_by[:3])}{more}"
 
 
 def _rest(bill: "Bill", item: "Item") -> str:
-    """States, inputs, what it does to the motion, and the route if it makes for another."""
-    other_way = "" if item.route == bill.route else f"  ({item.route})"
+    """States, inputs, change of the motion without it, and the route without it if it differs."""
+    other_route = "" if item.route == bill.route else f"  ({item.route})"
     text = f"{item.states:>6}  {item.inputs:>6}"
     if bill.extent is None:
-        return f"{text}{other_way}"
+        return f"{text}{other_route}"
     if item.change is None:
-        return f"{text}{'':>19}{other_way}"
+        return f"{text}{'':>19}{other_route}"
     since = "-" if item.change.since is None else f"{item.change.since:.3g} s"
-    return f"{text}  {item.change.percent + ' %':>7}  {since:>8}{other_way}"
+    return f"{text}  {item.change.percent + ' %':>7}  {since:>8}{other_route}"
 
 
 def _print_routes(bill: "Bill") -> None:
     if bill.at_contacts:
         counts = ", ".join(f"{name} {count}" for name, count in bill.at_contacts.items())
-        print(f"    rigid contacts beside it, operations each when asked for: {counts}")
+        print(f"    rigid contacts beside it, operations of each kernel: {counts}")
     print("    route     operations        µs")
     for route in bill.routes:
         count = "-" if route.operations is None else str(route.operations)
@@ -124,19 +120,19 @@ def _print_routes(bill: "Bill") -> None:
 
 
 def _print_motion(bill: "Bill", extent: float) -> None:
-    """What the changes of the motion mean, and the largest of them in m and degrees."""
+    """Explain the changes of the motion, and print the largest of them in m and degrees."""
     print_wrapped(
         "    motion: ",
-        "how far all mass is from where it would be without (root mean square, the most over the "
-        f"run, inputs at 0), in parts of how far the scene's own motion takes it, {extent:.3g} m; "
-        "about 100 % and more: another motion altogether",
+        "distance of all mass from its position without the effect (root mean square, greatest "
+        "over the run, inputs 0), relative to the distance that the scene's motion takes it, "
+        f"{extent:.3g} m; about 100 % or more is a different motion",
     )
     changes = [(item.label, item.change) for item in bill.items if item.change is not None]
     for why in dict.fromkeys(change.ended for _, change in changes if change.ended):
         ends = [change.until for _, change in changes if change.ended == why]
         to = " to ".join(dict.fromkeys(f"{t:.3g}" for t in (min(ends), max(ends))))
         some = "" if len(ends) == len(changes) else f"{len(ends)} of {len(changes)} "
-        print_wrapped("        ", f"{some}compared to t = {to} s of {bill.t_end:g} s alone: {why}")
+        print_wrapped("        ", f"{some}compared only to t = {to} s of {bill.t_end:g} s: {why}")
     for label, change in changes:
         if change.since is not None:
             angle = f"{math.degrees(change.angle):.0f}°"

@@ -1,30 +1,22 @@
-"""The derivation on the terminal: `derive`."""
+"""The command `derive`."""
 
 import sys
 
-from eomgen.commands.shared import Arguments, located, read_model
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.api.deriving import derivation_of
+from eomgen.commands.shared import Arguments, read_model, reporter_of
 from eomgen.files import check_writable, write_whole
-from eomgen.run.progress import terminal_notice
 
 
 def derive(given: Arguments) -> int:
-    """The derivation as text, LaTeX or a page."""
+    """Print or write the derivation as text, LaTeX or HTML."""
     model, _ = read_model(given.scene, given)
     if given.output is not None:
         check_writable(given.output, force=given.force)
-    from eomgen.derivation.matrices import matrices
-    from eomgen.show.derivation import as_html, as_latex, as_text
-
-    with located(given.scene), terminal_notice(f"deriving {model.name} …"):
-        check_nonsingular(model)
-        steps = matrices(model).steps
+    found = derivation_of(model, reporter_of(given, given.scene))
     if given.format == "text":
-        encoding = "utf-8" if given.output else sys.stdout.encoding
-        text = as_text(model.name, model.title, steps, encoding=encoding)
+        text = found.text(encoding="utf-8" if given.output else sys.stdout.encoding)
     else:
-        write = {"latex": as_latex, "html": as_html}[given.format]
-        text = write(model.name, model.title, steps)
+        text = found.latex() if given.format == "latex" else found.html()
     if given.output is None:
         print(text)
     else:

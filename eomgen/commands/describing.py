@@ -1,26 +1,26 @@
-"""What there is and what a scene is made of: `schema`, `reference`, `check`."""
+"""The commands `schema`, `reference` and `check`."""
 
 import shlex
 import sys
 
+from eomgen.api.given import checked
 from eomgen.commands.shared import (
     FEW,
     Arguments,
-    located,
     overlap_lines,
     print_listed,
     print_wrapped,
     read_model,
+    reporter_of,
     shortened,
 )
-from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.language.formula import written
 from eomgen.model.model import Body, Model
 from eomgen.scene.joints.base import WORLD, Geared
 
 
 def print_schema(given: Arguments) -> int:
-    """The JSON Schema of the scene language."""
+    """Print the JSON Schema of the scene language."""
     from eomgen.scene.json_schema import json_schema
 
     print(json_schema(), end="")
@@ -28,7 +28,7 @@ def print_schema(given: Arguments) -> int:
 
 
 def print_reference(given: Arguments) -> int:
-    """Joints and effects with their keys, in Markdown."""
+    """Print the keys of joints and effects, in Markdown."""
     from eomgen.scene.reference import reference
 
     print(reference(given.type), end="")
@@ -36,10 +36,9 @@ def print_reference(given: Arguments) -> int:
 
 
 def check(given: Arguments) -> int:
-    """Validate; bodies, joints, degrees of freedom, limits, effects in force."""
+    """Validate a scene; print its bodies, joints, degrees of freedom, limits and effects."""
     model, _ = read_model(given.scene, given)
-    with located(given.scene):
-        check_nonsingular(model)
+    checked(model, reporter_of(given, given.scene))
     most = sys.maxsize if given.long else FEW
     nq, nv = len(model.coordinates), len(model.velocities)
     freedom = f"{nv} degree{'s' if nv != 1 else ''} of freedom"
@@ -75,7 +74,7 @@ def check(given: Arguments) -> int:
 
 
 def _joint(model: Model, body: Body) -> str:
-    """Name, type, bodies, coordinates and limits of the joint that holds a body."""
+    """Name, type, bodies, coordinates and limits of the joint between a body and its parent."""
     joint = body.joint
     parent = WORLD if body.parent < 0 else model.bodies[body.parent].name
     names = ", ".join(c.name for c in body.positions) or "holds fast"

@@ -1,21 +1,20 @@
-"""Modules written and compared: `generate`."""
+"""The command `generate`."""
 
 import shlex
-from hashlib import sha256
 from pathlib import Path
 
-from eomgen.api.generating import LARGEST, check_backend, compiled, translated
-from eomgen.commands.shared import Arguments, manner_of, read_model, required
+from eomgen.api.generating import check_backend, compiled, freshness, translated
+from eomgen.commands.shared import Arguments, read_model, reporter_of, required
 from eomgen.errors import EomgenError, RunError, report_refusal
-from eomgen.files import check_folder, check_writable, read_plain
+from eomgen.files import check_folder, check_writable
 from eomgen.results import Module
 from eomgen.scene.built_in import built_in_names
 
 
 def generate(given: Arguments) -> int:
-    """Write modules, or with --check say which are stale.
+    """Write modules, or with --check report which are stale.
 
-    A scene or a file that is refused is reported, and the others go on; then the exit code is 1.
+    An error of one scene is reported, the other scenes are still done, and the exit code is 1.
     """
     scenes = list(dict.fromkeys([*given.scenes, *(built_in_names() if given.all else ())]))
     paths: dict[Path, str] = {}
@@ -25,7 +24,8 @@ def generate(given: Arguments) -> int:
         try:
             stale += [scene] if not _generate(scene, given, paths) else []
         except EomgenError as error:
-            new = [line for line in error.lines if line not in refused]  # of a folder, say it once
+            # An error of the folder is reported once.
+            new = [line for line in error.lines if line not in refused]
             report_refusal(EomgenError(*new))
             refused |= dict.fromkeys(new)
     if stale:
@@ -42,7 +42,7 @@ def generate(given: Arguments) -> int:
 
 
 def _generate(scene: str, given: Arguments, paths: dict[Path, str]) -> bool:
-    """Write or check a scene's module, whose file joins `paths`; whether it is fresh then."""
+    """Write or check a scene's module and add its file to `paths`; return whether it is fresh."""
     model, name = read_model(scene, given)
     path = given.output / f"{name}{check_backend(given.backend)}"
     if path in paths:
@@ -51,45 +51,27 @@ def _generate(scene: str, given: Arguments, paths: dict[Path, str]) -> bool:
     if not given.check:
         check_folder(given.output)
         check_writable(path, force=given.force)
-    # What is checked is what would be derived now, whatever the store holds.
+    # A check compares with what is derived now, not with the store.
     module, _ = compiled(
-        model, asked=required(given, model), anew=given.check, manner=manner_of(given, scene)
+        model, asked=required(given, model), anew=given.check, reporter=reporter_of(given, scene)
     )
     if given.backend != "numpy":
         module = translated(module, model, given.backend)
-    current = _text(path)
-    known = _digest(path) if current is None and given.check else None
-    fresh = current == module.source or known == sha256(module.source.encode()).hexdigest()
+    status = freshness(module, path)
+    fresh = status == "fresh" or (given.check and status == "listed")
+    files = ", ".join([str(path), *module.others])
     if fresh:
-        print(f"{path}: fresh")
+        print(f"{files}: fresh")
     elif given.check:
-        print(f"{path}: {'missing' if current is known is None else 'stale'}")
+        print(f"{files}: {status}")
     else:
         module.save(path, force=given.force)
-        print(f"{path}: written{'' if module.derived else ', not derived again'}")
+        print(f"{files}: written{'' if module.derived else ', not derived again'}")
     if given.explain:
         _print_explanation(module)
     if given.report:
         _print_report(module)
     return fresh or not given.check
-
-
-def _digest(path: Path) -> str | None:
-    """The SHA-256 of a file that is not kept, as SHA256SUMS in its folder has it; None if it has
-    none.
-    """
-    sums = _text(path.with_name("SHA256SUMS")) or ""
-    digests = {
-        name: digest for digest, _, name in (line.partition("  ") for line in sums.splitlines())
-    }
-    return digests.get(path.name)
-
-
-def _text(path: Path) -> str | None:
-    """What a file holds, of any encoding; None if there is none. Raises `RunError` for others."""
-    if not path.exists():
-        return None
-    return read_plain(path, LARGEST).decode("utf-8", "replace")
 
 
 def _print_explanation(module: Module) -> None:

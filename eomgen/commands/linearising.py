@@ -1,19 +1,20 @@
-"""A mechanism linearised, with what control engineers ask of it: `linearise`."""
+"""The command `linearise`."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from eomgen.api.linearising import linearisable, linearised_about, state_names
+from eomgen.api.linearising import Point, linearisable, linearised_at, state_names
 from eomgen.commands.shared import (
     Arguments,
     assignments,
+    given_values,
     located,
-    manner_of,
     print_listed,
     print_wrapped,
     read_model,
+    reporter_of,
     shortened,
 )
 from eomgen.errors import RunError
@@ -25,62 +26,53 @@ from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 
 WIDEST = 12
-"""States up to which A and B are printed."""
-STILL = 1e-9
-"""Positions, accelerations and inputs found that are below this, in SI units, are rounding."""
+"""A and B are printed for up to this number of states."""
+ROUNDING = 1e-9
+"""Computed positions, accelerations and inputs below this, in SI units, are printed as 0."""
 
 
 def linearise(given: Arguments) -> int:
-    """Print A and B about an equilibrium or a state, modes, and what the inputs can do."""
+    """Print the linearisation, its modes, stability and controllability; write A and B."""
     model, _ = read_model(given.scene, given)
     model = linearisable(model)
-    parameters = assignments(given.set, model.defaults, "--set")
-    inputs = assignments(given.input, [i.name for i in model.inputs], "--input")
+    parameters, inputs = given_values(given, model)
     if given.output is not None:
         check_writable(given.output, force=given.force)
         if given.output.suffix not in (".npz", ".csv"):
             raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
     with located(given.scene):
         state = assignments(given.state, state_names(model), "--state")
-    about = linearised_about(
-        model,
-        at=given.at,
-        state=state,
-        parameters=parameters,
-        inputs=inputs,
-        hold=given.hold,
-        trim=given.trim,
-        manner=manner_of(given, given.scene),
-    )
-    module, whole = about.module, about.whole
-    least, found = whole.reduced(), whole.modes
-    _print_place(module, whole, given.at, given.trim)
+    point = Point(given.at, state, parameters, inputs, given.hold, given.trim)
+    found = linearised_at(model, point, reporter_of(given, given.scene))
+    linearisation = found.linearisation
+    reduced = linearisation.reduced()
+    _print_point(found.module, linearisation, given.at, given.trim)
     if given.at != "initial":
-        _print_stopped(model, about.start)
-    elif about.steady:
+        _print_dropped_velocities(model, found.start)
+    elif found.steady:
         print_wrapped(
             "note        ",
             "a steady motion: no velocity changes, and A and B stay as they are along it",
         )
-    _print_matrices(least)
-    _print_modes(found)
+    _print_matrices(reduced)
+    _print_modes(linearisation.modes)
     verdict = {
         "unstable": "unstable: a small deviation grows",
         "stable": "stable: every small deviation dies out",
         "marginal": "marginal: to first order some small deviation neither dies out nor grows fast",
     }
-    print(f"stability   {verdict[whole.stability]}")
-    if least.input_names:
-        rank, n = whole.controllable_rank, len(least.A)
+    print(f"stability   {verdict[linearisation.stability]}")
+    if reduced.input_names:
+        rank, n = linearisation.controllable_rank, len(reduced.A)
         print(f"control     rank {rank} of {n}: {'' if rank == n else 'not '}controllable")
     if given.output is not None:
-        save(whole, model.name, given.output, force=given.force)
+        save(linearisation, model.name, given.output, force=given.force)
         print(f"wrote {given.output}")
     return 0
 
 
-def _print_place(
-    module: GeneratedModule, whole: Linearisation, at: str, trimmed: Sequence[str]
+def _print_point(
+    module: GeneratedModule, found: Linearisation, at: str, trimmed: Sequence[str]
 ) -> None:
     nq = len(module.POSITIONS)
     kind = {
@@ -91,25 +83,27 @@ def _print_place(
     print(f"{module.NAME}: linearised about {kind[at]}")
     velocities = range(nq, 2 * nq - len(module.QUATERNIONS))
     values = []
-    for i, (name, value) in enumerate(zip(whole.state_names, whole.y.tolist(), strict=True)):
+    for i, (name, value) in enumerate(zip(found.state_names, found.y.tolist(), strict=True)):
         if at != "initial" and i in velocities:
             continue
-        value = value if abs(value) > STILL else 0.0
+        value = value if abs(value) > ROUNDING else 0.0
         unit = module.UNITS[name]
         after = f" ({_number(math.degrees(value))} deg)" if unit == "rad" and value else ""
-        if i >= velocities.stop and unit:  # of a controller: what it is in, no name tells
+        if (
+            i >= velocities.stop and unit
+        ):  # a state of a controller: its name does not tell its unit
             after = f" {unit}"
         values.append(f"{name} = {_number(value)}{after}")
     print_listed("state       ", shortened(values, 80))
     inputs = []
-    for name, value in zip(whole.input_names, whole.u.tolist(), strict=True):
-        rounding = name in trimmed and abs(value) <= STILL
+    for name, value in zip(found.input_names, found.u.tolist(), strict=True):
+        rounding = name in trimmed and abs(value) <= ROUNDING
         inputs.append(f"{name} = {_number(0.0 if rounding else value)}")
     print_listed("inputs      ", inputs)
-    changes = whole.rates[nq:]
-    if at == "initial" and np.max(np.abs(changes), initial=0.0) > STILL:
+    changes = found.rates[nq:]
+    if at == "initial" and np.max(np.abs(changes), initial=0.0) > ROUNDING:
         worst = int(np.argmax(np.abs(changes)))
-        name = whole.state_names[nq + worst]
+        name = found.state_names[nq + worst]
         print_wrapped(
             "note        ",
             f"no equilibrium: {name} changes by {_number(changes[worst])} "
@@ -118,8 +112,8 @@ def _print_place(
         )
 
 
-def _print_stopped(model: Model, start: FloatArray) -> None:
-    """Say which velocities of the state given an equilibrium does not have."""
+def _print_dropped_velocities(model: Model, start: FloatArray) -> None:
+    """Print the velocities of the given state, which an equilibrium lacks."""
     rates = start[len(model.coordinates) :].tolist()
     moving = [
         f"{c.name} = {_number(v)}" for c, v in zip(model.velocities, rates, strict=False) if v
@@ -132,15 +126,15 @@ def _print_stopped(model: Model, start: FloatArray) -> None:
         )
 
 
-def _print_matrices(least: Linearisation) -> None:
-    n, names = len(least.A), least.state_names
+def _print_matrices(reduced: Linearisation) -> None:
+    n, names = len(reduced.A), reduced.state_names
     if n > WIDEST:
-        shape = f"A is {n} x {n}" + (f", B {n} x {least.B.shape[1]}" if least.B.size else "")
+        shape = f"A is {n} x {n}" + (f", B {n} x {reduced.B.shape[1]}" if reduced.B.size else "")
         print(f"matrices    {shape}; -o FILE.npz or -o FILE.csv writes them")
         return
-    _print_matrix("A", least.A, names, names)
-    if least.B.size:
-        _print_matrix("B", least.B, names, least.input_names)
+    _print_matrix("A", reduced.A, names, names)
+    if reduced.B.size:
+        _print_matrix("B", reduced.B, names, reduced.input_names)
 
 
 def _print_matrix(
@@ -157,7 +151,7 @@ def _print_matrix(
 
 
 def _print_modes(found: Sequence[Mode]) -> None:
-    """A line for each mode; modes that read the same are counted."""
+    """Print a line for each mode; equal lines are counted."""
     counts: dict[tuple[str, str], int] = {}
     for mode in found:
         counts[_mode(mode)] = counts.get(_mode(mode), 0) + 1
@@ -171,7 +165,7 @@ def _print_modes(found: Sequence[Mode]) -> None:
 
 
 def _mode(mode: Mode) -> tuple[str, str]:
-    """An eigenvalue or a pair as a number, and what it means."""
+    """An eigenvalue or a conjugate pair as text, and its frequency and damping, or its time."""
     if mode.angular_frequency:
         value = f"{_number(mode.rate)} ± {_number(mode.angular_frequency)}i"
         return value, f"{mode.frequency:.4g} Hz, damping {_number(mode.damping)}"

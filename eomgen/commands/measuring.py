@@ -1,12 +1,12 @@
-"""What accuracy costs in time: `accuracy`."""
+"""The command `accuracy`."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eomgen.api.accuracy import Accuracy, measured, to_measure
+from eomgen.api.accuracy import Accuracy, measure, plan_measurement
 from eomgen.commands.arithmetic import check_files, print_arithmetic
-from eomgen.commands.shared import Arguments, assignments, manner_of, print_listed, read_whole
+from eomgen.commands.shared import Arguments, given_values, print_listed, read_whole, reporter_of
 from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_line
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def accuracy(given: Arguments) -> int:
-    """Print, write and draw what runs cost by every method, and how exact the arithmetic is."""
+    """Print, write and draw time and error of runs by each method, and rounding errors of v̇."""
     scene, model, name = read_whole(given.scene, given)
     if not given.no_arithmetic:
         check_files(given, name)
@@ -29,24 +29,25 @@ def accuracy(given: Arguments) -> int:
     return 0
 
 
-def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None:
-    """Run every method over its ladder; print the table, write it and draw it."""
+def _runs(given: Arguments, model: Model, simulation: Simulation, name: str) -> None:
+    """Run each method at its tolerances or steps; print, write and draw the results."""
     from eomgen.commands.accuracy_table import print_table
     from eomgen.show.style import check_figure
     from eomgen.study.accuracy.reference import save as save_reference
 
-    manner = manner_of(given, given.scene)
-    plan = to_measure(
+    reporter = reporter_of(given, given.scene)
+    parameters, inputs = given_values(given, model)
+    plan = plan_measurement(
         model,
-        wanted,
+        simulation,
         methods=given.methods,
         quick=given.quick,
         t_end=given.t_end,
         run_time=given.run_time,
         time=given.time,
-        parameters=assignments(given.set, model.defaults, "--set"),
-        inputs=assignments(given.input, [i.name for i in model.inputs], "--input"),
-        manner=manner,
+        parameters=parameters,
+        inputs=inputs,
+        reporter=reporter,
     )
     paths = {kind: given.output / f"{name}_accuracy.{kind}" for kind in ("csv", "png")}
     paths["npz"] = given.output / f"{name}_reference.npz"
@@ -57,39 +58,39 @@ def _runs(given: Arguments, model: Model, wanted: Simulation, name: str) -> None
 
     def notice(count: int, spent: float, rung: "Rung") -> None:
         say(
-            f"accuracy of {name}: {count} runs, {spent:.0f} s of {given.time:g} s at most; "
+            f"accuracy of {name}: {count} runs, {spent:.0f} s of at most {given.time:g} s; "
             f"now {rung.method}, {rung.setting}"
         )
 
     with terminal_line() as say:
-        made = measured(
+        measurement = measure(
             plan,
             table=paths["csv"],
             fresh=given.fresh,
             force=given.force,
             name=name,
             notice=notice,
-            manner=manner,
+            reporter=reporter,
         )
-    found = made.found
-    print_table(name, made)
+    found = measurement.found
+    print_table(name, measurement)
     _print_origin(found, given.time)
     save_reference(found.reference, paths["npz"])
-    _draw(name, model, made.bench, found.t_end, found.works, paths["png"], given.force)
+    _draw(name, model, measurement.bench, found.t_end, found.works, paths["png"], given.force)
     for path in paths.values():
         print(f"    wrote {path}")
 
 
 def _print_origin(found: Accuracy, seconds: float) -> None:
-    """Say which runs were made now, and which not at all."""
+    """Print how many runs were made now, and which were not made."""
     shown = len(found.works)
     if shown > found.made:
         print(
-            f"    {found.made} runs made now, {shown - found.made} taken from earlier (--fresh "
-            "begins anew)"
+            f"    {found.made} runs made now, {shown - found.made} taken from the table (--fresh "
+            "repeats them)"
         )
     if found.left_out:
-        print(f"    {seconds:g} s were over before finer runs of these; the same command goes on:")
+        print(f"    {seconds:g} s passed before finer runs of these; the same command continues:")
         print_listed("        ", found.left_out)
 
 

@@ -1,4 +1,4 @@
-"""Motions computed and shown: `simulate`, `view`."""
+"""The commands `simulate` and `view`."""
 
 import os
 import sys
@@ -6,16 +6,16 @@ import webbrowser
 from pathlib import Path
 
 from eomgen.api.saving import output_paths, save_run
-from eomgen.api.simulating import carried_out, planned
+from eomgen.api.simulating import plan_run, run_plan
 from eomgen.commands.choosing import print_choice, print_estimate, seconds_of, warn_of_energy
 from eomgen.commands.shared import (
     Arguments,
-    assignments,
-    manner_of,
+    given_values,
     overlap_lines,
     print_listed,
     print_wrapped,
     read_whole,
+    reporter_of,
     required,
     shortened,
 )
@@ -25,10 +25,11 @@ from eomgen.run.trajectory import Trajectory
 
 
 def simulate(given: Arguments) -> int:
-    """Integrate; write module, trajectory, figure and page; of a run that stops, what it has."""
+    """Simulate; write module, trajectory, figure and page, also those of a run that stopped."""
     scene, model, name = read_whole(given.scene, given)
-    manner = manner_of(given, given.scene)
-    plan = planned(
+    reporter = reporter_of(given, given.scene)
+    parameters, inputs = given_values(given, model)
+    plan = plan_run(
         scene,
         model,
         outputs=required(given, model),
@@ -39,8 +40,8 @@ def simulate(given: Arguments) -> int:
         atol=given.atol,
         accuracy=given.accuracy,
         budget=None if given.budget is None else seconds_of(given.budget),
-        parameters=assignments(given.set, model.defaults, "--set"),
-        inputs=assignments(given.input, [i.name for i in model.inputs], "--input"),
+        parameters=parameters,
+        inputs=inputs,
         samples=given.samples,
         max_step=given.max_step,
         works=given.works,
@@ -48,12 +49,12 @@ def simulate(given: Arguments) -> int:
         unstable=given.unstable,
         estimate=given.estimate,
         resume=given.resume,
-        manner=manner,
+        reporter=reporter,
     )
     paths = output_paths(given.output, name, figure=given.plot, force=given.force)
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
-    run = carried_out(plan, manner=manner)
+    run = run_plan(plan, reporter=reporter)
     drawing = save_run(run, paths, force=given.force)
     missed = _report(given, run)
     for path in paths.values():
@@ -69,7 +70,7 @@ def simulate(given: Arguments) -> int:
 
 
 def _report(given: Arguments, run: Run) -> str:
-    """Say how the run went; return "" or what the choice of a method could not meet."""
+    """Print how the run went; return which accuracy could not be reached, or ""."""
     trajectory = run.trajectory
     print(
         f"{run.model.name}: {trajectory.t[-1]:g} s by {trajectory.integrator}, "
@@ -81,7 +82,7 @@ def _report(given: Arguments, run: Run) -> str:
     else:
         for line in shortened(overlap_lines(run.model)):
             print(f"    {line}")
-    for line in _bounded(given, trajectory):
+    for line in _step_limit_lines(given, trajectory):
         print(f"    {line}")
     missed = print_choice(run.choice, given) if run.choice else ""
     if run.estimate:
@@ -98,33 +99,33 @@ def _report(given: Arguments, run: Run) -> str:
     return missed
 
 
-def _bounded(given: Arguments, trajectory: Trajectory) -> list[str]:
-    """What else than their error kept steps short, and how often; that nothing did, if asked."""
+def _step_limit_lines(given: Arguments, trajectory: Trajectory) -> list[str]:
+    """Lines on steps that were shortened, and how often, for reasons other than their error."""
     from eomgen.run.checks import LEAST_STEPS
 
     steps, capped, cut = (trajectory.counts[name] for name in ("steps", "capped", "cut"))
     lines = []
     if given.unstable:
-        lines.append("steps were let be too long for stability (--unstable)")
+        lines.append("steps could be too long for stability (--unstable)")
     if cut:
         times = "once" if cut == 1 else f"{cut} times"
         lines.append(
-            f"a step was made again, shorter, {times}: it had passed over a contact, a stop, a "
-            "pulse or the like"
+            f"a step was repeated with a shorter length {times}: it had passed over a contact, a "
+            "stop, a pulse or the like"
         )
     if capped and given.max_step is not None:
-        lines.append(f"{capped} of {steps} steps as long as --max-step allows")
+        lines.append(f"{capped} of {steps} steps were limited by --max-step")
     elif capped:
         lines.append(
-            f"{capped} of {steps} steps held to 1/{LEAST_STEPS} of the run: what longer ones would "
-            "pass over cannot be known; --max-step sets another length"
+            f"{capped} of {steps} steps were limited to 1/{LEAST_STEPS} of the run, since a longer "
+            "step may pass over a short event; --max-step sets another length"
         )
     return lines
 
 
 def _print_energy(run: Run) -> None:
-    """Say the energy at both ends; if it is known, what each effect has done, and what of the
-    change of kinetic energy that leaves, J.
+    """Print the energy at start and end; if known, also the work of each effect, and the change
+    of kinetic energy that the works do not explain, J.
     """
     motion, total = run.motion, run.energy
     print(f"    energy {total[0]:.9g} J at the start, {total[-1]:.9g} J at the end")
@@ -139,7 +140,7 @@ def _print_energy(run: Run) -> None:
 
 
 def _print_events(trajectory: Trajectory) -> None:
-    """Say how often rigid contacts struck, and which are held at the end, since when."""
+    """Print the number of impacts, and the contacts that are closed at the end, since when."""
     if not trajectory.events:
         return
     impacts = trajectory.counts["impacts"]
@@ -149,7 +150,7 @@ def _print_events(trajectory: Trajectory) -> None:
 
 
 def _print_excursions(run: Run) -> None:
-    """Say which coordinates left the limits of their joints, which nothing but a stop enforces."""
+    """Print which coordinates left the limits of their joints; only a stop enforces limits."""
     model, units, lines = run.model, {c.name: c.unit for c in run.model.coordinates}, []
     for out in run.excursions:
         unit = units[out.state]
@@ -180,7 +181,7 @@ def view(given: Arguments) -> int:
 
 
 def _open(page: Path) -> None:
-    """Show a page where there is a display; where there is none, say how."""
+    """Open a page in a browser; without a display print how to open it."""
     screen = sys.platform in ("win32", "darwin") or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )

@@ -1,20 +1,18 @@
-"""What commands share: a scene read and overridden, its code, assignments, short lists."""
+"""What commands share: reading a scene, values given as NAME=X, printing lists."""
 
 import argparse
 import math
 import sys
 import textwrap
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 
-from eomgen.api.given import Outputs, check_outputs, overridden
-from eomgen.api.manner import Manner
-from eomgen.dynamics.diagnostics import initial_overlaps
-from eomgen.errors import RunError, nearest
-from eomgen.model.elaborate import elaborate
-from eomgen.model.model import Model, dofs_of
+from eomgen.api.given import Outputs, check_name, check_outputs, modelled
+from eomgen.api.overlaps import overlaps_at_start
+from eomgen.api.reporter import Reporter
+from eomgen.errors import RunError
+from eomgen.model.model import Model
 from eomgen.run.progress import terminal_notice, terminal_progress
-from eomgen.scene.effects import JointStop
 from eomgen.scene.reader import find_scene, read_scene
 from eomgen.scene.schema import Scene
 from eomgen.text import one_line
@@ -27,41 +25,38 @@ OPTIONS = {
     "parameters": "--set",
     "resume": "--from",
 }
-"""What arguments are called on the command line, where that is not their name."""
+"""Options that are not named after the argument of the public function."""
 FEW = 40
-"""Lines or names of one kind up to which all are shown."""
+"""Longer lists are shortened."""
 
 
 def read_model(scene: str, given: Arguments) -> tuple[Model, str]:
-    """A scene's model with what the command line overrides, and the name for files made of it."""
+    """As `read_whole`, without the scene."""
     return read_whole(scene, given)[1:]
 
 
 def read_whole(scene: str, given: Arguments) -> tuple[Scene, Model, str]:
-    """A scene, its model with what the command line overrides, and the name for files made of it.
+    """A scene, its model with the options of the command line, and the name of files made from it.
 
-    Files of another form or route than the scene's own are named after these, too. What was put
-    right while reading is said on standard error.
+    The name ends in the form and the route if these are not the scene's own.
     """
-    asked = named_outputs(given)
-    if asked is not None:
-        check_outputs(asked, "--outputs")
+    reporter = reporter_of(given, scene)
+    outputs = named_outputs(given)
+    if outputs is not None:
+        check_outputs(outputs, reporter)
     tables = read_scene(scene)
-    with located(scene):
-        model = elaborate(tables)
-        name = model.name
-        for notice in model.notices:
-            print(f"eomgen: note: {find_scene(scene).name}: {notice}", file=sys.stderr)
-        wanted = {option: getattr(given, option, None) for option in ("form", "route")}
-        for option, value in wanted.items():
-            if value not in (None, getattr(model, option)):
-                name = f"{name}_{value}"
-        model = overridden(model, **wanted, outputs=asked, place="--outputs")
+    form, route = getattr(given, "form", None), getattr(given, "route", None)
+    model = modelled(tables, form=form, route=route, outputs=outputs, reporter=reporter)
+    name = model.name
+    if model.form != tables.form:
+        name = f"{name}_{model.form}"
+    if model.route != tables.route:
+        name = f"{name}_{model.route}"
     return tables, model, name
 
 
 def named_outputs(given: Arguments) -> Outputs | None:
-    """What `--outputs a,b,c` or `--outputs all` names; None without it."""
+    """The outputs of `--outputs a,b,c` or `--outputs all`; None without the option."""
     text: str | None = getattr(given, "outputs", None)
     if text is None or text == "all":
         return "all" if text else None
@@ -69,43 +64,46 @@ def named_outputs(given: Arguments) -> Outputs | None:
 
 
 def required(given: Arguments, model: Model) -> Sequence[str]:
-    """Outputs that the command line names one by one, and what these take."""
+    """Outputs that the command line lists, with those they need."""
     return () if named_outputs(given) in (None, "all") else model.outputs
 
 
-def manner_of(given: Arguments, scene: str) -> Manner:
-    """How the command line speaks of a scene."""
-    return Manner(
-        place=find_scene(scene).name,
-        option=lambda name: OPTIONS.get(name, f"--{name.replace('_', '-')}"),
+def reporter_of(given: Arguments, scene: str) -> Reporter:
+    """The reporter of the command line for a scene."""
+    return Reporter(
+        scene=find_scene(scene).name,
+        argument=lambda name: OPTIONS.get(name, f"--{name.replace('_', '-')}"),
         note=lambda notice: note(given, notice),
-        trying=lambda text: print(f"    trying {text}", flush=True),
+        trial=lambda text: print(f"    trying {text}", flush=True),
         waiting=terminal_notice,
-        watch=terminal_progress,
+        progress=terminal_progress,
     )
 
 
 def note(given: Arguments, notice: str) -> None:
-    """Say on standard error what a command did without, if anything, once."""
+    """Print a note on standard error, once for each text; "" prints nothing."""
     if notice and notice not in vars(given).setdefault("noted", []):
         print(f"eomgen: note: {one_line(notice)}", file=sys.stderr)
         given.noted.append(notice)
 
 
 def located(scene: str) -> AbstractContextManager[None]:
-    """Name the scene's file in front of what is said of the scene."""
-    return Manner(place=find_scene(scene).name).located()
+    """A context that starts the messages of errors with the name of the scene's file."""
+    return Reporter(scene=find_scene(scene).name).located()
 
 
-def assignments(texts: list[str], known: Collection[str], option: str) -> dict[str, float]:
-    """Numbers by name of an option that is given as NAME=X. Raises `RunError` for any other."""
+def assignments(
+    texts: list[str], known: Sequence[str] | Mapping[str, float], option: str
+) -> dict[str, float]:
+    """The values, by name, of an option that is given as NAME=X.
+
+    Raises `RunError` for an unknown name, or an X that is not a finite number.
+    """
     what = {"--set": "parameter", "--input": "input", "--state": "state"}[option]
     values = {}
     for text in texts:
         name, sign, number = text.partition("=")
-        if name not in known:
-            hint = nearest(name, known) or f"; known: {', '.join(known) or 'none'}"
-            raise RunError(f"{option}: no {what} '{name}'{hint}")
+        check_name(name, known, option, what)
         try:
             value = float(number)
         except ValueError:
@@ -116,31 +114,23 @@ def assignments(texts: list[str], known: Collection[str], option: str) -> dict[s
     return values
 
 
-def overlap_lines(model: Model) -> list[str]:
-    """A line for each soft contact or stop that is pressed in at the initial state.
+def given_values(given: Arguments, model: Model) -> tuple[dict[str, float], dict[str, float]]:
+    """The values of `--set` and of `--input`. Raises `RunError` as `assignments` does."""
+    parameters = assignments(given.set, model.defaults, "--set")
+    return parameters, assignments(given.input, [i.name for i in model.inputs], "--input")
 
-    Such an effect starts with energy in it, and may throw the bodies apart.
-    """
-    lines = []
-    effects = {effect.name: effect for effect in model.effects}
-    joints = dofs_of(model.bodies, model.dimensions)
-    for overlap in initial_overlaps(model):
-        effect, kind, unit = effects[overlap.effect], "contact", "m"
-        if isinstance(effect, JointStop):
-            slides = {
-                dof == "prismatic" for joint in effect.acted_on(joints) for dof in joints[joint]
-            }
-            kind = "stop"
-            unit = "rad or m" if len(slides) == 2 else "m" if True in slides else "rad"
-        lines.append(
-            f"{kind} '{overlap.effect}' starts {overlap.depth:.3g} {unit} deep, "
-            f"with {overlap.energy:.3g} J in it"
-        )
-    return lines
+
+def overlap_lines(model: Model) -> list[str]:
+    """A line for each soft contact or stop that overlaps at the initial state."""
+    return [
+        f"{found.kind} '{found.effect}' starts {found.depth:.3g} {found.unit} deep, "
+        f"with {found.energy:.3g} J in it"
+        for found in overlaps_at_start(model)
+    ]
 
 
 def shortened(words: Sequence[str], most: int = FEW) -> list[str]:
-    """The words, or of many the first, how many there are between, and the last."""
+    """The words; of more than `most` the first ones, how many are omitted, and the last."""
     if len(words) <= most:
         return list(words)
     first = min(most, 10)
@@ -148,14 +138,14 @@ def shortened(words: Sequence[str], most: int = FEW) -> list[str]:
 
 
 def print_listed(label: str, words: Sequence[str]) -> None:
-    """Print words after a label, in lines that break between words only."""
-    # A no-break space within a word keeps it whole.
+    """Print words after a label, separated by commas, and break lines only between words."""
+    # A no-break space keeps a word of several parts on one line.
     text = ", ".join(word.replace(" ", "\u00a0") for word in words) or "none"
     print_wrapped(label, text)
 
 
 def print_wrapped(label: str, text: str) -> None:
-    """Print a text after a label, in lines of at most 100 columns."""
+    """Print a text after a label, wrapped at 100 columns and indented by the label's width."""
     lines = textwrap.wrap(
         text,
         100,

@@ -1,28 +1,28 @@
-"""A generated module against an independent solver and 60 digits: `verify`."""
+"""The command `verify`."""
 
-from eomgen.api.manner import Manner
+from eomgen.api.reporter import Reporter
 from eomgen.api.verifying import check_verification, digest, horizon_of, verified_model
-from eomgen.commands.shared import Arguments, manner_of, read_whole
+from eomgen.commands.shared import Arguments, read_whole, reporter_of
 from eomgen.errors import RunError
 
 
 def verify(given: Arguments) -> int:
-    """Verify, print, write the evidence if asked; raise `RunError` when a bound is missed."""
-    # Imported here: nothing else needs that many digits.
+    """Verify, print the report, write it if asked. Raises `RunError` if a bound is exceeded."""
+    # Imported here: it imports extended precision.
     from eomgen.study.verification import evidence
 
-    asked = {"states": given.states, "seed": given.seed, "bound": given.bound}
-    manner = Manner(option=lambda name: f"--{name}")
-    check_verification(**asked, horizon=given.horizon, manner=manner)
+    options = {"states": given.states, "seed": given.seed, "bound": given.bound}
+    reporter = Reporter(argument=lambda name: f"--{name}")
+    check_verification(**options, horizon=given.horizon, reporter=reporter)
     scene, model, name = read_whole(given.scene, given)
     if given.save is not None:
         evidence.paths(given.save, name, force=given.force)
-    manner = manner_of(given, given.scene)
-    found = verified_model(model, scene.simulation, **asked, name=name, manner=manner)
+    reporter = reporter_of(given, given.scene)
+    found = verified_model(model, scene.simulation, **options, name=name, reporter=reporter)
     horizon = None
     if given.horizon is not None:
-        wanted = scene.simulation
-        horizon = horizon_of(model, wanted, seconds=given.horizon, name=name, manner=manner)
+        settings = scene.simulation
+        horizon = horizon_of(model, settings, seconds=given.horizon, name=name, reporter=reporter)
     lines = evidence.report(found, horizon)
     print("\n".join(lines))
     if given.save is not None:

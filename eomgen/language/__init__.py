@@ -1,1 +1,1 @@
-"""Formulas and quantities of scenes: read, never executed."""
+"""Formulas and quantities of scenes. They are parsed, never executed."""

@@ -1,4 +1,4 @@
-"""The base of every table of a scene: no unknown keys, no text for numbers, frozen values."""
+"""The base of the tables of a scene: no unknown keys, strict types, frozen values."""
 
 import keyword
 import re
@@ -12,7 +12,7 @@ from eomgen.errors import nearest
 
 LONGEST_NAME = 40
 MOST_HINTS = 10
-"""The most unknown keys that get a hint; a table may have thousands."""
+"""Greatest number of unknown keys with a hint; a table may have thousands."""
 
 
 class Table(BaseModel):
@@ -26,7 +26,7 @@ class Table(BaseModel):
         if isinstance(data, dict):
             known = [field.alias or name for name, field in cls.model_fields.items()]
             unknown = [str(key) for key in data if key not in known]
-            # No more are shown, and finding the nearest known key takes time.
+            # Messages show no more, and finding the nearest known key takes time.
             near = [nearest(key, known) for key in unknown[:MOST_HINTS]]
             hints = [hint or f"; known here: {', '.join(known)}" for hint in near]
             if unknown:
@@ -41,7 +41,7 @@ class Table(BaseModel):
 
 def _identifier(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise ValueError("is no identifier; use letters a-z, digits and _, a letter first")
+        raise ValueError("is not an identifier; use letters a-z, digits and _, a letter first")
     if keyword.iskeyword(name) or keyword.issoftkeyword(name):
         raise ValueError("is a Python keyword; choose another name")
     if len(name) > LONGEST_NAME:
@@ -67,7 +67,7 @@ def _size(value: float) -> float:
 def _line(text: str) -> str:
     for i, character in enumerate(text):
         if not character.isprintable():
-            raise ValueError(f"has a character at {i + 1} that cannot be printed; take it out")
+            raise ValueError(f"has a character at {i + 1} that cannot be printed; remove it")
     return text
 
 

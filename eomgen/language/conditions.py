@@ -1,4 +1,4 @@
-"""Conditions on values of parameters: the same for a scene, for --set, and for a module's p."""
+"""Conditions on parameters, for the values of a scene, of `--set` and of a module's `p`."""
 
 import math
 import sys
@@ -20,15 +20,15 @@ from eomgen.language.formula import (
 from eomgen.scalars.floats import FloatScalars
 
 ROUNDING = 1e-9
-"""The relative error by which numbers of a scene may be rounded."""
+"""Relative rounding error that is allowed in the numbers of a scene."""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """A formula of parameters that must be >= low, or > low if it is `strict`, and <= high.
+    """A formula of parameters must be >= low (> low if `strict`) and <= high.
 
-    location  where the scene gives it
-    words     what is wrong if it does not hold, with braces for the values of the formulas `shown`
+    location  of the value in the scene
+    words     message if it does not hold, with braces for the values of the formulas `shown`
     """
 
     location: str
@@ -40,7 +40,7 @@ class Condition:
     high: float = math.inf
 
     def problem(self, known: Mapping[str, float]) -> str:
-        """What is wrong at these parameters, as a message; "" if nothing is."""
+        """The message if the condition does not hold at these parameters, else ""."""
         value = value_of(self.value, known)
         if self.shown and not math.isfinite(value):
             return f"{self.location}: its value is not a finite number; change its parameters"
@@ -51,12 +51,12 @@ class Condition:
 
     @property
     def depends(self) -> bool:
-        """Whether it depends on parameters, so that it may hold for some values only."""
+        """Whether it depends on parameters, so that it may hold for some of their values only."""
         return next(names_in(self.value), None) is not None
 
 
 def require(conditions: Iterable[Condition], known: Mapping[str, float]) -> None:
-    """Raise `SceneError`, saying what is wrong, unless all conditions hold at these parameters."""
+    """Raise `SceneError` unless all conditions hold at these parameters."""
     for condition in conditions:
         if problem := condition.problem(known):
             raise SceneError(problem)
@@ -71,12 +71,12 @@ def value_of(formula: Formula, known: Mapping[str, float]) -> float:
 
 
 def are_zero(known: Mapping[str, float], *formulas: Formula) -> bool:
-    """Whether some formulas are all 0 at these parameters."""
+    """Whether all `formulas` are 0 at these parameters."""
     return all(value_of(formula, known) == 0 for formula in formulas)
 
 
 def of_quantity(location: str, formula: Formula, bound: str, unit: str) -> Iterator[Condition]:
-    """Conditions of a quantity: its size is at most `LARGEST`, and it keeps its bound."""
+    """Conditions of a quantity: its absolute value is at most `LARGEST`; its sign fits `bound`."""
     words = f"{{:g}} is larger than {LARGEST:g}; choose other units"
     yield Condition(location, formula, words, (formula,), low=-LARGEST, high=LARGEST)
     if bound == "positive":
@@ -87,8 +87,8 @@ def of_quantity(location: str, formula: Formula, bound: str, unit: str) -> Itera
 
 
 def of_moving(location: str, formula: Formula, known: Mapping[str, float]) -> Iterator[Condition]:
-    """Conditions of a formula that changes with the motion: its constant parts are finite."""
-    for part in _still(formula, known):
+    """Conditions of a formula that depends on the motion: its constant parts are finite."""
+    for part in _constant_parts(formula, known):
         text = written(part).replace("{", "{{").replace("}", "}}")
         shown = text if len(text) <= 60 else f"{text[:57]}..."
         words = f"its part '{shown}' is not a finite number; change it or its parameters"
@@ -96,36 +96,36 @@ def of_moving(location: str, formula: Formula, known: Mapping[str, float]) -> It
         yield Condition(location, part, words, (), low=-most, high=most)
 
 
-def _still(formula: Formula, known: Mapping[str, float]) -> Iterator[Apply]:
-    """The largest parts of a formula that depend on parameters only."""
+def _constant_parts(formula: Formula, known: Mapping[str, float]) -> Iterator[Apply]:
+    """The largest parts of a formula that depend only on parameters."""
     if isinstance(formula, Apply):
         if all(name in known for name in names_in(formula)):
             yield formula
         else:
             for operand in formula.operands:
-                yield from _still(operand, known)
+                yield from _constant_parts(operand, known)
 
 
 def not_negative(location: str, formula: Formula, unit: str) -> Condition:
-    """A number >= 0."""
+    """The condition formula >= 0."""
     words = f"{{:g}} is negative; give a number >= 0 in {unit}"
     return Condition(location, formula, words, (formula,))
 
 
 def a_part(location: str, formula: Formula) -> Condition:
-    """A number from 0 to 1."""
+    """The condition 0 <= formula <= 1."""
     words = "{:g} is not from 0 to 1; give one that is"
     return Condition(location, formula, words, (formula,), high=1.0)
 
 
 def in_order(location: str, low: Formula, high: Formula) -> Condition:
-    """Two numbers, the first below the second."""
+    """The condition low < high."""
     words = "{:g} is not below high, {:g}; make low < high"
     return Condition(location, _difference(high, low), words, (low, high), strict=True)
 
 
 def can_meet(location: str, radii: Sequence[Formula]) -> Condition:
-    """Of spheres with radii >= 0, m, at most one is a point of radius 0."""
+    """The condition that at most one of these radii, m, is 0, since two points do not touch."""
     spheres = _sum(*(Apply("step", (radius,)) for radius in radii))
     words = "two points never meet; give a radius > 0"
     return Condition(location, spheres, words, (), low=len(radii) - 1.0)
@@ -134,14 +134,16 @@ def can_meet(location: str, radii: Sequence[Formula]) -> Condition:
 def of_inertia(
     location: str, body: str, mass: Formula, entries: Sequence[Formula], known: Mapping[str, float]
 ) -> Iterator[Condition]:
-    """That a body with this inertia exists about its centre of mass: one moment in the plane, or
-    xx, yy, zz, xy, xz, yz, of which moments are not negative; and none if it has no mass. A body
-    that has some at the `known` parameters is to keep some, which its equations ask for themselves.
+    """Conditions that a body can have this inertia about its centre of mass.
 
-    In space its principal moments are not negative, and none is larger than the other two together,
-    which is to say that Σ = ½ tr(I) 1 - I, the integral of r rᵀ dm, is positive semidefinite:
+    `entries` is one moment in the plane, or xx, yy, zz, xy, xz, yz in space; moments have been
+    checked to be not negative. A body without mass has no inertia. This is required of a body that
+    has no mass at the `known` parameters; the equations of others need its mass to stay positive.
+
+    In space the principal moments are not negative and none exceeds the sum of the other two. This
+    holds if and only if Σ = ½ tr(I) 1 - I, the integral of r rᵀ dm, is positive semidefinite:
     P. M. Wensing, S. Kim, J.-J. E. Slotine, IEEE Robotics and Automation Letters 3 (2018) 60-67.
-    A lamina or a rod is on the edge of that, so `ROUNDING` in parts of the trace is allowed for.
+    For a lamina or a rod Σ is singular, so a tolerance of `ROUNDING` of the trace is allowed.
     """
     trace = _sum(*entries[:3])
     words = f"body '{body}' has inertia but no mass; give it a mass, or inertia_com = 0"
@@ -172,12 +174,12 @@ def of_inertia(
 
 
 def _leading_minors(entries: Sequence[Formula]) -> tuple[Formula, ...]:
-    """Three numbers that are > 0 if and only if 2 Σ / s + `ROUNDING`/2 is positive definite, where
-    s is the sum of the sizes of all entries, or 1.
+    """Three numbers that are > 0 if and only if 2 Σ / s + `ROUNDING`/2 is positive definite.
 
-    Sylvester's criterion; the determinant is multiplied by the first minor, so that nothing is
-    divided by it (E. H. Bareiss, Math. Comp. 22 (1968) 565-578). What is added is far larger than
-    the rounding of the minors of a rod in any pose.
+    s is the sum of the absolute values of all entries, or 1 if that is 0. This is Sylvester's
+    criterion; the determinant is multiplied by the first minor, which avoids a division by it
+    (E. H. Bareiss, Math. Comp. 22 (1968) 565-578). The tolerance is far larger than the rounding
+    errors of the minors for a rod in any orientation.
     """
     size = _sum(*(Apply("abs", (entry,)) for entry in entries))
     size = Apply("select", (size, size, Constant(1.0)))
@@ -192,7 +194,7 @@ def _leading_minors(entries: Sequence[Formula]) -> tuple[Formula, ...]:
 
 
 def is_of_size(condition: Condition) -> bool:
-    """Whether it asks no more of a parameter than the size that all keep."""
+    """Whether it only bounds the absolute value of a parameter, as for all parameters."""
     value = condition.value
     if isinstance(value, Apply) and value.operation == "neg":
         (value,) = value.operands

@@ -1,7 +1,7 @@
-"""The reader of formulas: a text becomes a small tree, and nothing in it is executed.
+"""The parser of formulas. A text becomes an expression tree; nothing in it is executed.
 
-Python's parser parses the text. Only the nodes, functions and names listed here are accepted. The
-tree is evaluated over any scalars: floats, SymPy expressions, nodes of a program.
+Python's `ast` parses the text, and only the nodes, functions and names listed here are accepted.
+The tree is evaluated over any scalars: floats, SymPy expressions, nodes of a program.
 """
 
 import ast
@@ -38,23 +38,23 @@ _COMPARISONS: dict[type[ast.cmpop], str] = {
 
 
 class FormulaError(ValueError):
-    """A text is no formula; the message says what is wrong and at which column."""
+    """A text is not a formula; the message says what is wrong and at which column."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A number as it stands in the scene. Its zero has no sign: 0.0 and -0.0 are one number."""
+    """A number of the scene; -0.0 becomes 0.0."""
 
     value: float
 
     def __post_init__(self) -> None:
-        # They are equal and share one entry in a table, but atan2 gives different results.
+        # 0.0 == -0.0, so both would share a dictionary entry, but atan2 distinguishes them.
         object.__setattr__(self, "value", float(self.value) + 0.0)
 
 
 @dataclass(frozen=True)
 class Name:
-    """A named parameter."""
+    """A name: a parameter, a coordinate, `t` or another name that the field allows."""
 
     name: str
 
@@ -79,7 +79,7 @@ _TOKEN = re.compile(
 )
 """The tokens of formulas."""
 _WRONG = re.compile(r"[A-Za-z0-9_.]{1,20}|[-=!<>:/&|*%@^~]{1,3}|.", re.DOTALL)
-"""Text that is no token, as messages show it."""
+"""Text that is not a token, for messages."""
 _REMEDIES = {
     "and": "write min(a, b)",
     "or": "write max(a, b)",
@@ -106,19 +106,19 @@ def parse(text: str) -> Formula:
     plain = text.strip(" ")
     start = len(text) - len(text.lstrip(" ")) + 1
     if not plain:
-        raise FormulaError(f"is no formula; {_EXAMPLE}")
+        raise FormulaError(f"is not a formula; {_EXAMPLE}")
     try:
         tree = ast.parse(plain, mode="eval")
     except SyntaxError as error:
         column = start - 1 + (error.offset or len(plain) + 1)  # 0 stands for the end
-        raise FormulaError(f"is no formula at column {column}; {_EXAMPLE}") from None
+        raise FormulaError(f"is not a formula at column {column}; {_EXAMPLE}") from None
     except (RecursionError, MemoryError):
         raise FormulaError(f"is nested deeper than {DEEPEST}") from None
-    return _read(tree.body, 0, start)
+    return _formula(tree.body, 0, start)
 
 
 def _check_tokens(text: str) -> None:
-    """Refuse all but the tokens of formulas, so that the parser sees no other syntax."""
+    """Raise `FormulaError` unless all tokens are those of formulas, before Python's parser runs."""
     at = depth = 0
     while at < len(text):
         found = _TOKEN.match(text, at)
@@ -144,17 +144,17 @@ def _refuse(word: str, column: int) -> NoReturn:
     if remedy is None and word[0].isdigit():
         remedy = "write numbers as 1000.0 or 1e3, and * to multiply"
     tail = f"; {remedy}" if remedy else ""
-    raise FormulaError(f"has {word!r} at column {column}, which no formula may hold{tail}")
+    raise FormulaError(f"has {word!r} at column {column}, which is not allowed{tail}")
 
 
-def _read(node: ast.expr, depth: int, start: int) -> Formula:
-    """The formula of a node; `start` is the column at which the parsed text starts."""
+def _formula(node: ast.expr, depth: int, start: int) -> Formula:
+    """The formula of a syntax node; `start` is the column at which the parsed text starts."""
     at = f"at column {node.col_offset + start}"
     if depth > DEEPEST:
         raise FormulaError(f"is nested deeper than {DEEPEST} {at}")
 
-    def read(*parts: ast.expr) -> tuple[Formula, ...]:
-        return tuple(_read(part, depth + 1, start) for part in parts)
+    def operands_of(*parts: ast.expr) -> tuple[Formula, ...]:
+        return tuple(_formula(part, depth + 1, start) for part in parts)
 
     match node:
         case ast.Constant(value=int() | float() as value):
@@ -168,12 +168,12 @@ def _read(node: ast.expr, depth: int, start: int) -> Formula:
         case ast.Name(id=name):
             return Constant(CONSTANTS[name]) if name in CONSTANTS else Name(name)
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            (inner,) = read(operand)
+            (inner,) = operands_of(operand)
             return Constant(-inner.value) if isinstance(inner, Constant) else Apply("neg", (inner,))
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-            return read(operand)[0]
+            return operands_of(operand)[0]
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-            operands = read(left, right)
+            operands = operands_of(left, right)
             if isinstance(op, ast.Pow) and not _small_whole(operands[1]):
                 raise FormulaError(
                     f"has a power at column {right.col_offset + start} that is not a whole number "
@@ -181,7 +181,7 @@ def _read(node: ast.expr, depth: int, start: int) -> Formula:
                 )
             return Apply(_OPERATORS[type(op)], operands)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
-            operands = read(*arguments)
+            operands = operands_of(*arguments)
             if len(arguments) != FUNCTIONS[name]:
                 raise FormulaError(
                     f"gives {name} {at} {len(arguments)} arguments; it takes {FUNCTIONS[name]}"
@@ -189,16 +189,16 @@ def _read(node: ast.expr, depth: int, start: int) -> Formula:
             return Apply(name, operands)
         case ast.Call(func=ast.Name(id=name)) if name not in FUNCTIONS:
             hint = nearest(name, FUNCTIONS) or f"; * multiplies, functions are {_FUNCTION_LIST}"
-            raise FormulaError(f"calls {name!r} {at}, which is no function{hint}")
+            raise FormulaError(f"calls {name!r} {at}, which is not a function{hint}")
         case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARISONS:
-            return _compared(_COMPARISONS[type(op)], *read(left, right))
+            return _compared(_COMPARISONS[type(op)], *operands_of(left, right))
         case ast.Compare():
             raise FormulaError(f"compares more than two {at}; write min(a < b, b < c)")
         case ast.IfExp(test=test, body=body, orelse=orelse):
-            return Apply("select", read(test, body, orelse))
+            return Apply("select", operands_of(test, body, orelse))
         case ast.Call(keywords=[first, *_]):
             at = f"at column {first.col_offset + start}"
-    raise FormulaError(f"has something {at} that no formula may hold")
+    raise FormulaError(f"has something {at} that is not allowed")
 
 
 _FUNCTION_LIST = ", ".join(FUNCTIONS)
@@ -221,7 +221,7 @@ def _small_whole(power: Formula) -> bool:
 
 
 def names_in(formula: Formula) -> Iterator[str]:
-    """The names a formula uses, in order of appearance, repeats included."""
+    """The names in a formula, in order of appearance, with repetitions."""
     match formula:
         case Name(name):
             yield name
@@ -239,7 +239,7 @@ def calls_function(formula: Formula) -> bool:
 
 
 def written(formula: Formula) -> str:
-    """The text of a formula, with brackets around every operation."""
+    """The text of a formula, with brackets around each operation."""
     match formula:
         case Constant(value):
             return repr(value) if math.copysign(1.0, value) > 0 else f"({value!r})"
@@ -262,8 +262,8 @@ def evaluate(formula: Formula, names: Mapping[str, Any], scalars: Scalars) -> An
 def _evaluated(
     formula: Formula, names: Mapping[str, Any], scalars: Scalars, known: dict[int, Any]
 ) -> Any:
-    """`evaluate`, in which an object that is a part of a formula at several places, as of a
-    determinant, is evaluated once: it is `known` by its id.
+    """`evaluate` with a cache `known` of operations by their id: a subexpression that a formula
+    shares between several places, such as a determinant, is evaluated once.
     """
     match formula:
         case Constant(value):

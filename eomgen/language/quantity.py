@@ -1,7 +1,7 @@
 """Quantities: numbers of a scene that stay symbolic in the generated module.
 
-A bare number is the default of a parameter, which is named after its location. A text is a formula
-over the scene's `[parameters]`. A bare 0 is structure: it is no parameter, and is folded away.
+A number is the default of a parameter that is named after its location. A text is a formula of the
+scene's `[parameters]`. The number 0 is no parameter: it is structural and is folded away.
 """
 
 import math
@@ -57,18 +57,18 @@ Quantity = Annotated[
 Vector = Annotated[tuple[Quantity, ...], Field(min_length=2, max_length=3)]
 """Two components in the plane, three in space; see `with_components`."""
 Numbers = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
-"""The same of plain numbers, which are structure and never parameters."""
+"""A vector of plain numbers, which are structural and never parameters."""
 Bound = Literal["any", "positive", "nonnegative"]
 
 
 def quantity(
     unit: str, about: str, bound: Bound = "any", sees: Sequence[str] = (), **options: Any
 ) -> Any:
-    """A field for a quantity, with its unit, its description and the bound that its value keeps.
+    """A field for a quantity with a unit, a description and a bound of its value.
 
-    Unit and description of a quantity at a joint may be alternatives: see `of_joint`. `sees` are
-    names that its formula may use besides parameters. `motion` stands for `t` and all coordinates,
-    velocities, inputs and extra states; any other name stands for itself.
+    Unit and description of a quantity at a joint may have alternatives: see `of_joint`. `sees` are
+    the names that its formula may use besides parameters; "motion" stands for `t` and all
+    coordinates, velocities, inputs and extra states.
     """
     extra: dict[str, Any] = {"unit": unit, "bound": bound}
     if sees:
@@ -77,36 +77,34 @@ def quantity(
 
 
 def of_joint(text: str, slides: bool) -> str:
-    """One of two alternatives, "N m | N": the first for a revolute joint, the second if it
-    `slides`.
-
-    A text without " | " is the same for any joint.
+    """One of the alternatives in "N m | N": the second for a prismatic joint (`slides`), else the
+    first. A text without " | " is for any joint.
     """
     turning, _, sliding = text.partition(" | ")
     return sliding if slides and sliding else turning
 
 
 def of_any_joint(text: str) -> str:
-    """Both alternatives of such a text, for any joint: "N m or N"."""
+    """Both alternatives of such a text: "N m or N"."""
     return text.replace(" | ", " or ")
 
 
 def about_slides(table: Table, sliding: Collection[str]) -> bool | None:
-    """Whether a table's coordinate, joint, or all joints are prismatic; None if it names no
-    joint.
+    """Whether the coordinate, joint, or all joints that a table names are prismatic; None if it
+    names none.
     """
     for key in ("coordinate", "joint", "joints"):
-        at = getattr(table, key, None)
-        if isinstance(at, str):
-            return at in sliding
-        if isinstance(at, tuple):
-            return all(joint in sliding for joint in at)
+        named = getattr(table, key, None)
+        if isinstance(named, str):
+            return named in sliding
+        if isinstance(named, tuple):
+            return all(joint in sliding for joint in named)
     return None
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A named number of the generated module; `location` is where the scene gives it, for
+    """A parameter of the generated module. `location` is that of its value in the scene, for
     messages.
     """
 
@@ -120,7 +118,7 @@ class Parameter:
 def with_components(
     value: tuple[Any, ...], zero: Any, dimensions: int, location: str
 ) -> tuple[Any, ...]:
-    """A vector of a scene, or zeros if it is left out (an empty tuple).
+    """A vector of a scene, or zeros if it is absent (an empty tuple).
 
     Raises `SceneError` unless it has one component for each dimension.
     """
@@ -140,13 +138,18 @@ def name_quantities(
     motion: Sequence[str] = (),
     sliding: Collection[str] = (),
 ) -> tuple[dict[str, Any], list[Parameter], list[Condition]]:
-    """Give every bare nonzero number among a table's quantities a name.
+    """Make a parameter of each nonzero number among a table's quantities.
 
-    Returns the replaced fields (for `Table.replaced`), the new parameters, and the conditions that
-    values are to keep. `known` holds the values of the scene's own parameters, `motion` names what
-    else a field may see. `sliding` are joints and coordinates that slide; which one a quantity is
-    of says its key in a field that is a table by joints, or else the table. Raises `SceneError` for
-    a name that is not there.
+    prefix    start of the names of the parameters
+    location  of the table in the scene
+    known     values of the scene's own parameters
+    motion    names that formulas of fields with `sees` "motion" may use
+    sliding   prismatic joints and their coordinates, which select the alternative of units and
+              descriptions. The joint of a quantity is its key in a table by joints, else that of
+              the whole table
+
+    Returns the replaced fields (for `Table.replaced`), the new parameters, and the conditions on
+    the values. Raises `SceneError` for an unknown name.
     """
     fields: dict[str, Any] = {}
     parameters: list[Parameter] = []
@@ -168,27 +171,27 @@ def name_quantities(
             continue
         sees = [str(word) for word in _listed(extra.get("sees"))]
         named: list[Formula] = []
-        for formula, suffix, spot, off_diagonal in _parts(value, field):
-            where = f"{location}.{spot}"
+        for formula, suffix, key_path, off_diagonal in _parts(value, field):
+            where = f"{location}.{key_path}"
             bound = "any" if off_diagonal else str(extra["bound"])
             if bound == "nonnegative" and getattr(table, "allow_active", False):
                 bound = "any"
-            seen = [
+            allowed = [
                 *(motion if "motion" in sees else ()),
                 *(word for word in sees if word != "motion"),
             ]
-            keyed = isinstance(value, dict)
-            here = suffix[1:] in sliding if keyed else bool(about_slides(table, sliding))
-            unit = of_joint(str(extra["unit"]), here)
+            by_joint = isinstance(value, dict)
+            slides = suffix[1:] in sliding if by_joint else bool(about_slides(table, sliding))
+            unit = of_joint(str(extra["unit"]), slides)
             for name in names_in(formula):
-                if name in motion and name not in seen and name not in known:
+                if name in motion and name not in allowed and name not in known:
                     raise SceneError(
                         f"{where}: '{name}' changes with the motion, which this value must not; "
                         "use parameters"
                     )
-            moving = _check_names(formula, where, known, seen)
+            moving = _check_names(formula, where, known, allowed)
             if isinstance(formula, Constant) and formula.value != 0.0:
-                what = of_joint(str(info.description), here)
+                what = of_joint(str(info.description), slides)
                 about = f"{what} of {prefix}{suffix.replace('_', ', ', 1)}"
                 name = f"{prefix}_{field}{suffix}"
                 parameters.append(Parameter(name, formula.value, unit, about, where))
@@ -213,7 +216,9 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 def _parts(value: Any, field: str) -> Iterator[tuple[Formula, str, str, bool]]:
-    """Each quantity of a field with the end of its name, its place, and if it is off a diagonal."""
+    """Each quantity of a field, the suffix of its name, its location in the table, and whether it
+    is an off-diagonal entry of a matrix.
+    """
     if isinstance(value, Formula):
         yield value, "", field, False
     elif isinstance(value, dict):
@@ -231,16 +236,16 @@ def _listed(value: Any) -> list[Any]:
 
 
 def _check_names(
-    formula: Formula, where: str, known: Mapping[str, float], seen: Sequence[str]
+    formula: Formula, where: str, known: Mapping[str, float], allowed: Sequence[str]
 ) -> bool:
-    """Whether a formula changes with the motion; its names are there, or that is an error."""
+    """Whether a formula depends on the motion. Raises `SceneError` for an unknown name."""
     moving = False
     for name in names_in(formula):
-        moving = moving or name in seen
-        if name in known and name in seen:
+        moving = moving or name in allowed
+        if name in known and name in allowed:
             raise SceneError(f"{where}: '{name}' is predefined here; rename the parameter")
-        if name not in known and name not in seen:
-            words = [*known, *seen, *FUNCTIONS, *CONSTANTS]
+        if name not in known and name not in allowed:
+            words = [*known, *allowed, *FUNCTIONS, *CONSTANTS]
             hint = nearest(name, words) or "; give it a value in [parameters]"
             if name in FUNCTIONS:
                 hint = f"; the function is written {name}({', '.join('xyz'[: FUNCTIONS[name]])})"

@@ -11,12 +11,13 @@ from eomgen.scalars.protocol import Scalars
 def with_rates(
     formula: Formula, names: Mapping[str, Any], time: Any, scalars: Scalars
 ) -> tuple[Any, Any, Any]:
-    """A formula of `t` and of constant `names`: its value and its exact first and second derivative
-    by t. At corners (step, select, abs, min, max) they are those of the branch taken.
+    """Value, first and second time derivative of a formula of `t` and `names`, which are constant.
+
+    For step, select, abs, min and max the derivatives are those of the branch taken.
     """
     once = Duals(scalars)
     twice = Duals(once)
     t = Dual(Dual(time, scalars.number(1.0)), once.number(1.0))
-    still = {name: twice.still(once.still(value)) for name, value in names.items()}
-    found = evaluate(formula, {**still, "t": t}, twice)
+    constants = {name: twice.still(once.still(value)) for name, value in names.items()}
+    found = evaluate(formula, {**constants, "t": t}, twice)
     return found.value.value, found.value.rate, found.rate.rate

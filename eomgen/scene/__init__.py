@@ -1,1 +1,1 @@
-"""Scenes: tables, joints and effects, read and checked. An error says its location and remedy."""
+"""Scenes: their tables, joints and effects. Each error states its location and a remedy."""

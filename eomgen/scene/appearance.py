@@ -1,4 +1,4 @@
-"""What a picture needs of a scene and no equation does: the shapes of bodies, and the camera."""
+"""What pictures need of a scene: the shapes of bodies and the camera. No equation uses it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,17 +11,17 @@ from eomgen.scene.schema import Scene
 
 @dataclass(frozen=True)
 class Appearance:
-    """The shapes of each body, by its name, in body axes; a body may have none."""
+    """The camera, and the shapes of each body by its name, in body axes."""
 
     camera: Camera = field(default_factory=Camera)
     shapes: Mapping[str, tuple[Shape, ...]] = field(default_factory=dict)
 
 
 def appearance_of(scene: Scene) -> Appearance:
-    """The looks of a scene, those of its chains among them.
+    """The appearance of a scene, including its chains.
 
-    Raises `SceneError` for shapes and a camera that are not of this space, and for a body that the
-    camera is to follow and that is not there.
+    Raises `SceneError` for shapes or a camera of the wrong number of dimensions, and if the camera
+    follows an unknown body.
     """
     bodies, _ = written_out(scene)
     for body, location in bodies:

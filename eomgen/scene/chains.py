@@ -1,4 +1,4 @@
-"""Chains written out: one line of a scene becomes its links and pins."""
+"""Expansion of chains: one table of a scene becomes links and revolute joints."""
 
 from eomgen.errors import SceneError
 from eomgen.language.base import LONGEST_NAME
@@ -9,9 +9,10 @@ from eomgen.scene.schema import MOST, BodyTable, ChainTable, Scene
 
 
 def written_out(scene: Scene) -> tuple[list[tuple[BodyTable, str]], list[tuple[Joint, str]]]:
-    """Bodies and joints of a scene with those of its chains, each with its place.
+    """Bodies and joints of a scene and its chains, each with its location in the scene.
 
-    Raises `SceneError` if there is no body, or more than `MOST`, or a chain cannot be written out.
+    Raises `SceneError` if there is no body, if there are more than `MOST`, or if a chain has a
+    vector of the wrong length or a name that becomes too long.
     """
     count = len(scene.bodies) + sum(chain.count for chain in scene.chains)
     if count > MOST:
@@ -34,7 +35,7 @@ def _links(chain: ChainTable, location: str, dimensions: int) -> list[tuple[Body
             f"{location}.name: makes the name '{longest}', which is longer than {LONGEST_NAME} "
             "characters; choose a shorter name"
         )
-    # Checked here, where what is wrong still has the name that the scene gives it.
+    # Checked here, so that messages have the chain's keys and not those of its links.
     start, r_parent, r_child = (
         with_components(getattr(chain, field), ZERO, dimensions, f"{location}.{field}")
         for field in ("start", "r_parent", "r_child")

@@ -7,7 +7,7 @@ from eomgen.scene.schema import Scene
 
 
 def json_schema() -> str:
-    """The schema as JSON text, the same bytes each time."""
+    """The schema as JSON text, with the same bytes on each call."""
     schema = Scene.model_json_schema()
     _without_internals(schema)
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
@@ -15,9 +15,9 @@ def json_schema() -> str:
 
 
 def _without_internals(node: object) -> None:
-    """Drop what only this program reads; keep the unit, in words, where an editor shows it."""
+    """Remove entries that only this program reads; move the unit into the description."""
     if isinstance(node, dict):
-        if isinstance(node.get("unit"), str):  # a mark of ours, not a property of that name
+        if isinstance(node.get("unit"), str):  # our entry, not a property of that name
             words = f"{node.get('description', '')} ({node.pop('unit')})"
             node["description"] = of_any_joint(words)
         for internal, kind in (("bound", str), ("sees", list)):

@@ -22,26 +22,26 @@ def _colour(text: str) -> str:
 
 Colour = Annotated[str, AfterValidator(_colour)]
 
-# How many components a scene wants is known only with its dimensions: `check_look` counts them.
+# The number of components depends on the scene's dimensions; `check_look` checks it.
 Point = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
 Lengths = Annotated[tuple[Positive, ...], Field(min_length=2, max_length=3)]
-Turns = tuple[Number, Number, Number]
+Angles = tuple[Number, Number, Number]
 
 NOTHING = "the body's centre of mass if absent"
 
 
 class Box(Table):
-    """A rectangle or a cuboid, `size` m along its own axes, in body axes.
+    """A rectangle or a cuboid with edges of `size` m, centred at `center` in body axes.
 
-    In the plane it is turned by `angle` rad; in space by `orientation_deg` about x, then y, then z
-    of the body's axes.
+    It is rotated relative to the body: in the plane by `angle` rad, in space by `orientation_deg`
+    about the body's x, then y, then z axis.
     """
 
     type: Literal["box"]
     size: Lengths
     center: Point | None = Field(default=None, description=NOTHING)
     angle: Number = Field(default=0.0, description="rad, in the plane")
-    orientation_deg: Turns = Field(
+    orientation_deg: Angles = Field(
         default=(0.0, 0.0, 0.0), description="about x, then y, then z, in space"
     )
     color: Colour = "#4477aa"
@@ -94,12 +94,12 @@ class Cylinder(Table):
 
 
 class Ellipsoid(Table):
-    """An ellipsoid with half-axes `radii` m, turned like a box, in body axes; in space."""
+    """An ellipsoid with half-axes `radii` m, in body axes, rotated like a box; in space."""
 
     type: Literal["ellipsoid"]
     radii: Lengths
     center: Point | None = Field(default=None, description=NOTHING)
-    orientation_deg: Turns = Field(default=(0.0, 0.0, 0.0), description="about x, then y, then z")
+    orientation_deg: Angles = Field(default=(0.0, 0.0, 0.0), description="about x, then y, then z")
     color: Colour = "#4477aa"
 
 
@@ -111,14 +111,15 @@ INSTEAD = {
     2: {"sphere": "disc", "cylinder": "box", "ellipsoid": "disc"},
     3: {"disc": "sphere", "polygon": "box"},
 }
-"""Shapes that there are not in so many dimensions, and what to use for each."""
+"""Shapes that do not exist in 2 or 3 dimensions, with the one to use instead."""
 
 
 class Camera(Table):
-    """Where the picture looks: at `center` (m, world axes), or at the body it follows.
+    """The camera. It looks at `center` (m, world axes), or at the body that it follows.
 
-    `height` is what the picture shows from bottom to top, m. In space the eye stands far off, in
-    the direction that `azimuth_deg` turns from x towards y and `elevation_deg` lifts towards z.
+    `height` is the distance from the bottom to the top of the picture, m. In space the picture is a
+    parallel projection, seen from a direction that is rotated by `azimuth_deg` from x towards y and
+    by `elevation_deg` towards z.
     """
 
     center: Point | None = Field(default=None, description="the world's origin if absent")
@@ -134,10 +135,10 @@ class Camera(Table):
 def check_look(
     shapes: Sequence[Shape], camera: Camera | None, dimensions: int, location: str
 ) -> None:
-    """Check that `shapes` and `camera` are of the plane (`dimensions` 2) or of space (3).
+    """Check that `shapes` and `camera` fit the plane (`dimensions` 2) or space (3).
 
-    `location` is where the scene gives them, for messages: `bodies[0]` for the shapes of a body,
-    `camera` for the camera. Raises `SceneError` with place, value and remedy.
+    `location` is that of the body or the camera in the scene, such as `bodies[0]`. Raises
+    `SceneError` with location, value and remedy.
     """
     for i, shape in enumerate(shapes):
         _check_shape(shape, dimensions, f"{location}.shapes[{i}]")
@@ -147,8 +148,8 @@ def check_look(
             for key in ("azimuth_deg", "elevation_deg"):
                 if key in camera.model_fields_set:
                     raise SceneError(
-                        f"{location}.{key}: {getattr(camera, key):g}: the camera of the plane does "
-                        "not turn; leave it out, or set dimensions = 3"
+                        f"{location}.{key}: {getattr(camera, key):g}: the camera cannot be "
+                        "rotated in the plane; leave it out, or set dimensions = 3"
                     )
 
 
@@ -162,13 +163,15 @@ def _check_shape(shape: Shape, dimensions: int, location: str) -> None:
     if isinstance(shape, Box):
         right, wrong = ("angle", "orientation_deg")[:: 1 if dimensions == 2 else -1]
         if wrong in shape.model_fields_set:
-            raise SceneError(f"{location}.{wrong}: turns a box of {there}; in {here} use '{right}'")
+            raise SceneError(
+                f"{location}.{wrong}: rotates a box in {there}; in {here} use '{right}'"
+            )
     if isinstance(shape, Cylinder) and shape.start == shape.end:
-        raise SceneError(f"{location}.end: {list(shape.end)} is the start too; give it a length")
+        raise SceneError(f"{location}.end: {list(shape.end)} is also the start; give it a length")
 
 
 def _points(shape: Shape) -> Iterator[tuple[str, tuple[float, ...] | None]]:
-    """What a shape has one component of for each dimension, with its key."""
+    """The vectors of a shape that have one component for each dimension, with their keys."""
     match shape:
         case Box():
             yield from (("size", shape.size), ("center", shape.center))

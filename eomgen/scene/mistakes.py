@@ -1,4 +1,4 @@
-"""What is wrong in the tables of a scene, in lines that say what to mend and where."""
+"""Validation errors of a scene as messages with location, problem and remedy."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ MOST_MESSAGES = 10
 
 
 def mistakes(error: ValidationError, source: str) -> SceneError:
-    """What pydantic found wrong as an error with a line for each mistake; `source` begins each."""
+    """Errors of pydantic as a `SceneError`: a line for each, which starts with `source`."""
     lines = _lines(error.errors())
     more = len(lines) - MOST_MESSAGES
     tail = [f"{source}: and {more} more"] if more > 0 else []
@@ -20,11 +20,13 @@ def mistakes(error: ValidationError, source: str) -> SceneError:
 
 
 def _lines(details: list[ErrorDetails]) -> list[str]:
-    """One line for each place: a mistake fails every member of a union, the deepest says most."""
+    """One line for each location. A mistake in a union has an error for each member of the union,
+    of which the most specific is kept.
+    """
     lines: dict[str, tuple[int, str]] = {}
     outer: set[str] = set()
-    for single in (single for detail in details for single in _singles(detail)):
-        detail = _of_the_whole_list(single)
+    for single in (single for detail in details for single in _split(detail)):
+        detail = _for_whole_list(single)
         location, weight = _location(detail["loc"]), _weight(detail)
         if detail["type"] in ("unknown_key", "keys"):
             location = f"{location}.{brief(detail['ctx']['key'])}"
@@ -34,16 +36,16 @@ def _lines(details: list[ErrorDetails]) -> list[str]:
     return [line for location, (_, line) in lines.items() if location not in outer]
 
 
-def _singles(detail: ErrorDetails) -> list[ErrorDetails]:
-    """An error for each of the unknown keys of a table; any other error as it is."""
+def _split(detail: ErrorDetails) -> list[ErrorDetails]:
+    """An error for each unknown key of a table; any other error unchanged."""
     if detail["type"] != "unknown_keys":
         return [detail]
     single: ErrorDetails = {**detail, "type": "unknown_key", "input": None}  # which may be long
     return [{**single, "ctx": {"key": key, "hint": hint}} for key, hint in detail["ctx"]["keys"]]
 
 
-def _of_the_whole_list(detail: ErrorDetails) -> ErrorDetails:
-    """One error of the list, not one of each entry, where lists stand for numbers or reversely."""
+def _for_whole_list(detail: ErrorDetails) -> ErrorDetails:
+    """An error of a list instead of its entry, if that is a list and not a number or vice versa."""
     location = detail["loc"]
     nested = detail["type"] in ("quantity", "float_type") and isinstance(detail["input"], list)
     flat = detail["type"] == "tuple_type"
@@ -57,9 +59,8 @@ _SHAPES = ("tuple_type", "dict_type", "model_type", "model_attributes_type")
 
 
 def _weight(detail: ErrorDetails) -> int:
-    """How much an error says: least that a value is none of a few words, or is no list or table.
-
-    A word that is nearly one of the few was meant to be it.
+    """How specific an error is: least for a value that is none of the words of a `Literal`, or is
+    not a list or table; more if it is similar to such a word.
     """
     if detail["type"] == "literal_error":
         return 1 + isinstance(detail["input"], str) * bool(_hint(detail))
@@ -67,13 +68,13 @@ def _weight(detail: ErrorDetails) -> int:
 
 
 def _hint(detail: ErrorDetails) -> str:
-    """The word that was nearly given, if one was; the text of a number is not nearly the number."""
+    """A hint at a similar word. A number given as text is no typing error of the number."""
     given, known = str(detail["input"]), _expected(detail)
     return "" if given in known else nearest(given, known)
 
 
 def _expected(detail: ErrorDetails) -> list[str]:
-    """The words that a literal may be."""
+    """The words of a `Literal`."""
     text = str(detail.get("ctx", {})["expected"])
     return [word.strip("'") for word in text.replace(" or ", ", ").split(", ")]
 
@@ -161,7 +162,7 @@ _TAGGED = {"joints", "effects", "shapes"}
 
 
 def _location(parts: tuple[int | str, ...]) -> str:
-    """`joints[1].parent` from pydantic's location, without the union members it names."""
+    """Pydantic's location as text, `joints[1].parent`, without names of union members."""
     location, after_index_of = "", ""
     for i, part in enumerate(parts):
         if isinstance(part, int):
@@ -177,9 +178,9 @@ def _location(parts: tuple[int | str, ...]) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as messages have it, short."""
+    """A value as short text for messages."""
     try:
         text = repr(value)
     except RecursionError:
-        text = "what is nested so deep"
+        text = "a value that is nested too deep"
     return brief(text)

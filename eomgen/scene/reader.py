@@ -1,4 +1,4 @@
-"""From a file or a built-in name to a `Scene`, or to messages that say what to mend and where."""
+"""Reading a scene from a file, a built-in name, text or tables. Errors are `SceneError`s."""
 
 import re
 import tomllib
@@ -18,10 +18,10 @@ from eomgen.text import breaks_lines, brief
 
 LARGEST_FILE = 2_000_000
 LONGEST_LIST = 10 * MOST
-"""The state of as many free bodies as there may be is shorter."""
+"""More than the number of states of `MOST` free bodies."""
 DEEPEST_KEY = 20
 LARGEST_WHOLE = 2**1023
-"""Whole numbers beyond it are no doubles: they are refused before anything makes one of them."""
+"""Larger whole numbers overflow a double, so they are refused before any conversion."""
 REMEDY = f"give at most {LARGEST:g}, or choose other units"
 _DEEP_KEY = re.compile(
     rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}"""
@@ -52,7 +52,7 @@ def find_scene(scene: str) -> Path:
 def read_scene(scene: str | Path) -> Scene:
     """Read a scene from a path or by its built-in name.
 
-    Raises `SceneError` with one line for each mistake: place, value, remedy.
+    Raises `SceneError` with a line for each mistake: location, value, remedy.
     """
     path = find_scene(scene) if isinstance(scene, str) else scene
     data = read_plain(path, LARGEST_FILE, name=path.name, error=SceneError)
@@ -65,23 +65,23 @@ def read_scene(scene: str | Path) -> Scene:
 
 def parse_scene(text: str, source: str = "scene") -> Scene:
     """Read a scene from TOML text; `source` names it in messages. Raises `SceneError`."""
-    # The time that `tomllib` takes for a dotted key grows with the square of its length and more.
+    # `tomllib` takes time for a dotted key that grows at least with the square of its length.
     if _DEEP_KEY.search(text):
-        raise SceneError(f"{source}: is not read: a key has more than {DEEPEST_KEY} parts")
+        raise SceneError(f"{source}: a key has more than {DEEPEST_KEY} parts")
     try:
         table = tomllib.loads(text)
     except RecursionError:
         raise SceneError(f"{source}: is not TOML: nested too deep") from None
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{source}: is not TOML: {error}") from None
-    except ValueError:  # what Python says of it is advice to programmers
+    except ValueError:  # Python's message is advice to programmers
         raise SceneError(f"{source}: has a whole number of thousands of digits; {REMEDY}") from None
     return _scene(table, source)
 
 
 def read_tables(tables: Mapping[Any, Any], source: str = "scene") -> Scene:
-    """Read a scene from tables as a file would hold them; NumPy's numbers and arrays may stand for
-    numbers and lists. Raises `SceneError`.
+    """Read a scene from tables with the content of a file; numbers and lists may be NumPy's numbers
+    and arrays. Raises `SceneError`.
     """
     try:
         table = _plain(tables)
@@ -91,10 +91,10 @@ def read_tables(tables: Mapping[Any, Any], source: str = "scene") -> Scene:
 
 
 def _plain(value: Any) -> Any:
-    """A value in the types that TOML is read to; others as they are, for the schema to refuse."""
+    """A value in the types of `tomllib`. The schema refuses values of other types."""
     if isinstance(value, Mapping):
         return {key if isinstance(key, str) else str(key): _plain(x) for key, x in value.items()}
-    if hasattr(value, "tolist"):  # of NumPy
+    if hasattr(value, "tolist"):  # a NumPy number or array
         value = value.tolist()
     if isinstance(value, list | tuple):
         return [_plain(x) for x in value]
@@ -111,21 +111,21 @@ def _scene(table: dict[str, Any], source: str) -> Scene:
 
 
 def _check_sizes(table: dict[str, Any], source: str) -> None:
-    """Refuse lists that are too long and numbers that are too large before each entry is looked at.
+    """Raise `SceneError` for a list that is too long or a whole number that is too large.
 
-    Raises `SceneError` that names the place.
+    This bounds the time of the validation that follows.
     """
-    rest: list[tuple[str, Any]] = [("", table)]
-    while rest:
-        location, value = rest.pop()
+    pending: list[tuple[str, Any]] = [("", table)]
+    while pending:
+        location, value = pending.pop()
         most = MOST if location in Scene.model_fields else LONGEST_LIST
         if isinstance(value, list | dict) and location and len(value) > most:
             raise SceneError(f"{source}: {location}: has {len(value)} entries; give at most {most}")
         if isinstance(value, dict):
-            rest += [
+            pending += [
                 (f"{location}.{brief(key)}".lstrip("."), entry) for key, entry in value.items()
             ]
         elif isinstance(value, list):
-            rest += [(f"{location}[{i}]", entry) for i, entry in enumerate(value)]
+            pending += [(f"{location}[{i}]", entry) for i, entry in enumerate(value)]
         elif isinstance(value, int) and abs(value) > LARGEST_WHOLE:
-            raise SceneError(f"{source}: {location}: is a number of hundreds of digits; {REMEDY}")
+            raise SceneError(f"{source}: {location}: has hundreds of digits; {REMEDY}")

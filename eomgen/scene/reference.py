@@ -1,4 +1,4 @@
-"""The scene language in words: every table with its keys, taken from the tables themselves."""
+"""The reference of the scene language: each table with its keys, made from the table classes."""
 
 import inspect
 import re
@@ -19,12 +19,12 @@ from eomgen.scene.schema import BodyTable, ChainTable, Initial, PointTable, Scen
 HEAD = """\
 # Scenes: their tables, joints and effects
 
-What `eomgen reference` prints. Each key is named with its unit and its default; keys without a
-default may be left out. A quantity is a number, which becomes a parameter of the generated module,
-or a formula in quotes: `+ - * /`, `**` with a whole number, brackets, comparisons,
-`a if x < y else b`, {functions}
-and {constants}. Formulas may name parameters, and where a key says so more: *motion* is the time
-`t` and all coordinates, velocities, inputs and states of effects; other names are given there.
+`eomgen reference` prints this page. It lists each key with its unit and its default; a key that is
+not marked as needed may be left out. A quantity is a number, which becomes a parameter of the
+generated module, or a formula in quotes: `+ - * /`, `**` with a whole number, brackets,
+comparisons, `a if x < y else b`, {functions}
+and {constants}. Formulas may use parameters, and further names where a key lists them: *motion*
+stands for the time `t` and all coordinates, velocities, inputs and states of effects.
 """
 
 TABLES: Mapping[str, type[Table]] = {
@@ -35,7 +35,7 @@ TABLES: Mapping[str, type[Table]] = {
     "initial": Initial,
     "simulation": Simulation,
 }
-"""What is neither a joint nor an effect."""
+"""Tables other than joints and effects."""
 
 
 def reference(kind: str | None = None) -> str:
@@ -49,16 +49,16 @@ def reference(kind: str | None = None) -> str:
         if kind not in known:
             hint = nearest(kind, known) or f"; known: {', '.join(known)}"
             raise SceneError(f"no joint or effect is of type '{kind}'{hint}")
-        return "\n".join(_reported(kind, known[kind]))
+        return "\n".join(_section(kind, known[kind]))
     functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
     constants = ", ".join(f"`{name}`" for name in CONSTANTS)
     lines = [HEAD.format(functions=functions, constants=constants), "## Tables", ""]
     for title, table in TABLES.items():
-        lines += _reported(title, table, "### ")
+        lines += _section(title, table, "### ")
     for title, tables in groups.items():
         lines += [f"## {title}", ""]
         for name, table in tables.items():
-            lines += _reported(name, table, "### ")
+            lines += _section(name, table, "### ")
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -72,7 +72,7 @@ def _word(table: type[Table]) -> str:
     return str(get_args(table.model_fields["type"].annotation)[0])
 
 
-def _reported(name: str, table: type[Table], heading: str = "# ") -> Iterator[str]:
+def _section(name: str, table: type[Table], heading: str = "# ") -> Iterator[str]:
     yield f"{heading}{name}"
     yield ""
     yield inspect.cleandoc(table.__doc__ or "")
@@ -88,8 +88,8 @@ def _reported(name: str, table: type[Table], heading: str = "# ") -> Iterator[st
 def _row(key: str, field: FieldInfo) -> tuple[str, str, str, str]:
     marks = field.json_schema_extra
     extra: Mapping[str, Any] = marks if isinstance(marks, Mapping) else {}
-    reported = "its own name" if key == "name" else field.description or ""
-    about = re.sub(r"(<\w+>\w*)", r"`\1`", reported)
+    description = "its own name" if key == "name" else field.description or ""
+    about = re.sub(r"(<\w+>\w*)", r"`\1`", description)
     words = _words(field.annotation)
     if words:
         about += (": " if about else "") + ", ".join(f"`{word}`" for word in words)
@@ -105,7 +105,7 @@ def _row(key: str, field: FieldInfo) -> tuple[str, str, str, str]:
 
 
 def _words(annotation: Any) -> list[str]:
-    """The words that a field may hold, however deep they stand in its type."""
+    """The words of all `Literal`s in the type of a field."""
     found: list[str] = []
     for part in get_args(annotation):
         found += [part] if isinstance(part, str) else _words(part)
@@ -127,7 +127,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def _written(value: Any) -> str:
-    """As a scene has it."""
+    """A value in the notation of a scene."""
     if isinstance(value, tuple):
         return f"[{', '.join(map(_written, value))}]"
     return f"{value:g}" if isinstance(value, float) else str(value)

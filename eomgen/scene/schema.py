@@ -1,4 +1,4 @@
-"""The scene: every table and key of the language, as data."""
+"""The scene: all tables and keys of the language."""
 
 import sys
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -15,27 +15,27 @@ from eomgen.scene.look import Camera, Shape
 from eomgen.scene.mistakes import mistakes
 
 MOST = 1000
-"""Most bodies, joints, effects or parameters a scene may list."""
+"""Greatest number of bodies, joints, effects or parameters of a scene."""
 
 if TYPE_CHECKING:
     Output = str
     Route = str
-else:  # one of the names; `auto` is the route of the fewest operations that keeps its digits
+else:  # `auto` is the route with the fewest operations that is accurate enough
     Output = Literal[tuple(OUTPUTS)]
     Route = Literal["auto", *ROUTES]
 
 SHOWN = ("kinetic_energy", "potential_energy", "body_poses")
-"""The outputs that figures and pages are drawn from."""
+"""The outputs that figures and pages need."""
 
 
 def _no_module(name: str) -> str:
     if name in sys.stdlib_module_names or name == "numpy":
-        raise ValueError("is a module that generated code would hide; choose another name")
+        raise ValueError("is a Python module that generated code would hide; choose another name")
     return name
 
 
 ModuleName = Annotated[Identifier, AfterValidator(_no_module)]
-"""A scene's name is that of its module, which must not stand in the way of another."""
+"""The name of a scene and its module, which must not hide another module."""
 
 Integrator = Literal[
     "euler",
@@ -56,7 +56,7 @@ Integrator = Literal[
 ]
 Form = Literal["velocity", "momentum", "redundant"]
 LeftOut = Literal["velocity_forces"]
-"""What a scene may leave out of the equations on purpose."""
+"""Terms of the equations that a scene may leave out."""
 
 
 class ParameterTable(Table):
@@ -68,11 +68,11 @@ class ParameterTable(Table):
 
 
 Inertia = Quantity | Annotated[tuple[Quantity, ...], Field(min_length=3, max_length=6)]
-"""A number in the plane, 3 or 6 entries of a matrix in space."""
+"""A number in the plane, 3 or 6 entries of a symmetric matrix in space."""
 
 
 def inertia() -> Any:
-    """A field that holds the inertia of a body."""
+    """A field for the inertia of a body."""
     about = "moment of inertia about the centre of mass"
     return quantity("kg m^2", about, "nonnegative", union_mode="left_to_right")
 
@@ -87,26 +87,26 @@ class BodyTable(Table):
     name: Identifier
     mass: Quantity = quantity("kg", "mass", "nonnegative")
     inertia_com: Inertia = inertia()
-    shapes: tuple[Shape, ...] = Field(default=(), description="what it looks like")
+    shapes: tuple[Shape, ...] = Field(default=(), description="shapes in pictures")
 
 
 class ChainTable(Table):
-    """A chain of equal links in one line: bodies `<name>_1`, …, on pins `<name>_joint_1`, …
+    """A chain of equal links: bodies `<name>_1`, … at revolute joints `<name>_joint_1`, …
 
-    `r_parent` is the pin on the link before, `r_child` that on the link itself, each from the
-    link's centre of mass; `start` is the first pin on `parent`.
+    `r_parent` is the pin on the previous link and `r_child` the pin on the link itself, each from
+    the centre of mass of its link; `start` is the first pin on `parent`.
     """
 
     name: Identifier
     count: Annotated[int, Strict(), Field(ge=1, le=MOST, description="number of links")]
-    parent: Identifier = Field(default="world", description="what the first link hangs on")
+    parent: Identifier = Field(default="world", description="parent of the first link")
     mass: Quantity = quantity("kg", "mass", "nonnegative")
     inertia_com: Inertia = inertia()
     start: Vector = quantity("m", "first pin on the parent", default=(), validate_default=False)
     r_parent: Vector = quantity("m", "pin on the link before")
     r_child: Vector = quantity("m", "pin on the link itself")
     axis: Numbers | None = Field(default=None, description="of the pins, in space; z if absent")
-    shapes: tuple[Shape, ...] = Field(default=(), description="what each link looks like")
+    shapes: tuple[Shape, ...] = Field(default=(), description="shapes of each link in pictures")
 
 
 class PointTable(Table):
@@ -118,9 +118,10 @@ class PointTable(Table):
 
 
 class Initial(Table):
-    """State at the start: lists in the order that `eomgen check` shows, or tables by name.
+    """The initial state: lists in the order of `eomgen check`, or tables by name.
 
-    In a table what is not named is 0, and an angle may be given in degrees as `<name>_deg`.
+    In a table, values that are not named are 0, and an angle may be given in degrees as
+    `<name>_deg`.
     """
 
     q: tuple[Number, ...] | dict[str, Number] = Field(
@@ -132,15 +133,16 @@ class Initial(Table):
 
 
 class Simulation(Table):
-    """How to run it unless the command line says otherwise.
+    """Settings of a run, which options of the command line override.
 
-    Rigid contacts that close more slowly than `rest_speed`, in m/s or rad/s, do not bounce; without
-    it, those that would not rise by 5e-8 of the mechanism's size. Without `atol` each state is held
-    to 1e-12 of its own size, which comes of the scene's lengths and first motion, and where
-    `rtol` is below 1e-9 to a thousandth of `rtol` of it, as far as rounding allows.
+    Rigid contacts that close more slowly than `rest_speed`, m/s or rad/s, do not bounce; without
+    it, those that would rise by less than 5e-8 of the mechanism's size. Without `atol`, the
+    absolute tolerance of each state is 1e-12 of its size, which is estimated from the scene's
+    lengths and initial motion; or a thousandth of `rtol` of it if `rtol` is below 1e-9; but not
+    less than its rounding error.
     """
 
-    t_end: Positive = Field(default=10.0, description="end, s")
+    t_end: Positive = Field(default=10.0, description="end time, s")
     integrator: Integrator = Field(default="DOP853", description="method")
     dt: Positive = Field(default=0.001, description="step of a fixed-step method, s")
     rtol: Positive = Field(default=1e-9, description="relative tolerance of an adaptive method")
@@ -148,12 +150,12 @@ class Simulation(Table):
         default=None, description="absolute tolerance of an adaptive method"
     )
     rest_speed: Positive | None = Field(
-        default=None, description="slower than this nothing bounces"
+        default=None, description="speed below which contacts do not bounce"
     )
 
 
 def _all(value: Any) -> Any:
-    """["all"] is "all"."""
+    """Read ["all"] as "all"."""
     return "all" if value == ["all"] else value
 
 
@@ -161,11 +163,13 @@ class Scene(Table):
     """A whole scene."""
 
     name: ModuleName
-    title: Text = Field(default="", description="a line for people")
+    title: Text = Field(default="", description="one line of text")
     outputs: Annotated[Literal["all"] | tuple[Output, ...], BeforeValidator(_all)] = Field(
-        default=(), union_mode="left_to_right", description="what the module computes"
+        default=(),
+        union_mode="left_to_right",
+        description="functions of the module beside derivative and jacobian",
     )
-    form: Form = Field(default="velocity", description="what the state is made of")
+    form: Form = Field(default="velocity", description="state form")
     parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
         Field(default={}, description="named numbers, or tables of value, unit and about")
     )
@@ -173,7 +177,7 @@ class Scene(Table):
         default={}, description="names for formulas of parameters, the motion and one another"
     )
     dimensions: Literal[2, 3] = Field(default=2, description="2 in the plane, 3 in space")
-    route: Route = Field(default="auto", description="way to the equations")
+    route: Route = Field(default="auto", description="route to the equations")
     bodies: Annotated[tuple[BodyTable, ...], Field(max_length=MOST)] = Field(
         default=(), description="bodies"
     )
@@ -181,24 +185,24 @@ class Scene(Table):
         default=(), description="joints, one for each body"
     )
     chains: Annotated[tuple[ChainTable, ...], Field(max_length=MOST)] = Field(
-        default=(), description="whole chains in a line each"
+        default=(), description="chains of equal links"
     )
     points: Annotated[tuple[PointTable, ...], Field(max_length=MOST)] = Field(
         default=(), description="named points of bodies"
     )
     effects: Annotated[tuple[Effect, ...], Field(max_length=MOST)] = Field(
-        default=(), description="what acts"
+        default=(), description="effects: forces, contacts, controllers, drives"
     )
     locked: Annotated[dict[Identifier, Number], Field(max_length=MOST)] = Field(
-        default={}, description="coordinates held fast, by name (<name>_deg for an angle)"
+        default={}, description="coordinates held constant, by name (<name>_deg for an angle)"
     )
     leave_out: Annotated[tuple[LeftOut, ...], Field(max_length=1)] = Field(
         default=(),
-        description="what the equations are to be without: velocity_forces, for slow motion",
+        description="terms to leave out: velocity_forces, for slow motion",
     )
-    initial: Initial = Field(default=Initial(), description="state at the start")
-    simulation: Simulation = Field(default=Simulation(), description="how to run it")
-    camera: Camera = Field(default=Camera(), description="how to look at it")
+    initial: Initial = Field(default=Initial(), description="initial state")
+    simulation: Simulation = Field(default=Simulation(), description="settings of a run")
+    camera: Camera = Field(default=Camera(), description="camera of pictures")
 
     def __init__(self, **tables: Any) -> None:
         try:
@@ -206,5 +210,5 @@ class Scene(Table):
         except ValidationError as error:
             raise mistakes(error, "scene") from None
 
-    # So that pydantic does not call this for what it validates itself, whose errors it returns.
+    # Pydantic then does not call this method in `model_validate`, whose errors it returns itself.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]

@@ -9,7 +9,7 @@ from eomgen.model.model import Model
 from eomgen.show.motion import Array, Motion
 
 MOST_WORKS = 6
-"""Up to so many works are shown one by one; more are summed by type."""
+"""Greatest number of works that are shown one by one; more are summed by type."""
 
 
 def works_by_type(
@@ -18,7 +18,7 @@ def works_by_type(
     """Names of effects and their works (n, m), J; if there are more than `MOST_WORKS`, the sums of
     each type (n, k).
 
-    The sum of twelve effects is named `pd (12)`. An effect that is alone of its type keeps its
+    The sum of twelve effects is named `pd (12)`. The only effect of a type keeps its
     name.
     """
     if len(names) <= MOST_WORKS:
@@ -33,11 +33,12 @@ def works_by_type(
 
 @dataclass(frozen=True)
 class Imbalance:
-    """How far a run's energy is from what it must be.
+    """The energy error of a run.
 
-    lost       at most, J
+    lost       its greatest absolute value, J
     size       the greatest kinetic energy, J
-    conserved  whether exact motion keeps its energy; else works account for its change
+    conserved  whether exact motion conserves energy; if not, the error is the change of kinetic
+               energy that the works of effects do not explain
     """
 
     lost: float
@@ -46,7 +47,7 @@ class Imbalance:
 
 
 def imbalance(motion: Motion) -> Imbalance | None:
-    """How far the energy of a motion is from what it must be; None where that is not known."""
+    """The energy error of a motion; None if energy is not conserved and works are not known."""
     kinetic = motion.kinetic_energy
     size = float(np.max(kinetic))
     if motion.keeps_energy:

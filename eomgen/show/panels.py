@@ -22,7 +22,7 @@ MAP_TIMES = 600
 
 
 USUAL, BEYOND = 98, 3
-"""A map's colours end at this percentile if the greatest value is at least so many times it."""
+"""A map's colours end at percentile `USUAL` if the greatest value exceeds `BEYOND` times it."""
 
 
 def draw_curves(

@@ -11,7 +11,7 @@ from eomgen.show.motion import BARE, MOST_MARKS, Array, Ball, Motion, instants
 from eomgen.show.style import ink_on, mixed
 
 SPREAD = 20
-"""Planes extend so many times the size of the motion: a wide view shows more than the motion."""
+"""Size of planes relative to that of the motion, since a wide view shows more than the motion."""
 
 FILL, SURFACE, REACH = 0.08, 0.4, 0.25
 """Strength of the ink of fixed objects: their inside, their surface, the reach of a field."""

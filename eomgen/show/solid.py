@@ -59,13 +59,13 @@ class Mesh:
         count = len(self.vertices)
         start, end = self.faces, np.roll(self.faces, -1, axis=1)
         own = np.repeat(np.arange(len(self.faces)), 4)
-        keys, wanted = (start * count + end).ravel(), (end * count + start).ravel()
+        keys, opposite = (start * count + end).ravel(), (end * count + start).ravel()
         order = np.argsort(keys, kind="stable")
-        spot = order[np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)]
-        beyond = np.where((keys[spot] == wanted) & (keys != wanted), own[spot], own)
-        bend = np.einsum("fi,fi->f", self.normals[own], self.normals[beyond])
+        found = order[np.minimum(np.searchsorted(keys[order], opposite), len(keys) - 1)]
+        neighbour = np.where((keys[found] == opposite) & (keys != opposite), own[found], own)
+        bend = np.einsum("fi,fi->f", self.normals[own], self.normals[neighbour])
         edge = (bend < SHARP) & (not self.smooth)
-        return np.where(edge, -1, beyond).reshape(-1, 4)
+        return np.where(edge, -1, neighbour).reshape(-1, 4)
 
 
 def mesh(shape: Shape, grain: float) -> Mesh:
@@ -103,23 +103,23 @@ def solids(shapes: Sequence[Sequence[Shape]], height: float, budget: int) -> Sol
 
     `budget` is the total number of faces aimed at; very many shapes exceed it.
     """
-    alike: dict[str, list[Shape]] = {}
+    by_shape: dict[str, list[Shape]] = {}
     for group in shapes:
         for shape in group:
             key = shape.model_dump_json(exclude={"color"})
-            alike.setdefault(key, []).append(shape)
+            by_shape.setdefault(key, []).append(shape)
     grain = height / FINEST
     for _ in range(TRIES):
-        meshes = [mesh(group[0], grain) for group in alike.values()]
-        sizes = (len(m.faces) * len(g) for m, g in zip(meshes, alike.values(), strict=True))
+        meshes = [mesh(group[0], grain) for group in by_shape.values()]
+        sizes = (len(m.faces) * len(g) for m, g in zip(meshes, by_shape.values(), strict=True))
         if sum(sizes) <= budget:
             break
         grain *= COARSER
-    number = {key: k for k, key in enumerate(alike)}
-    placed = (
+    number = {key: k for k, key in enumerate(by_shape)}
+    of_bodies = (
         tuple((number[s.model_dump_json(exclude={"color"})], s.color) for s in g) for g in shapes
     )
-    return Solids(tuple(meshes) if alike else (), tuple(placed))
+    return Solids(tuple(meshes) if by_shape else (), tuple(of_bodies))
 
 
 def rotation(turns_deg: Sequence[float]) -> Array:

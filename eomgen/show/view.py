@@ -70,7 +70,7 @@ class Cast:
     colours: Array  # (f, 3) red, green, blue from 0 to 1
     thickness: Array  # (f,) of the solid a face belongs to, m
 
-    def placed(self, pose: Array) -> Array:
+    def world_vertices(self, pose: Array) -> Array:
         """World positions (k, 3), m, of the vertices at a pose (nb, 3, 4)."""
         of = pose[self.bodies]
         return np.asarray(np.einsum("kij,kj->ki", of[..., :3], self.vertices) + of[..., 3])
@@ -123,7 +123,7 @@ def cast_of(solids: Solids) -> Cast:
 
 def look(cast: Cast, pose: Array, axes: Array) -> Sight:
     """The faces and edges of the bodies at a pose that look at the eye, hidden or not."""
-    corners = (cast.placed(pose) @ axes.T)[cast.faces]  # (f, 4, 3)
+    corners = (cast.world_vertices(pose) @ axes.T)[cast.faces]  # (f, 4, 3)
     normals = unit(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
     front = normals[:, 2] > 0
     # An edge is drawn at sharp bends and along the silhouette.

@@ -209,8 +209,8 @@ def _draw_errors(
     if diagram.floor > low:
         axes.axhspan(low, diagram.floor, color=FAINT, alpha=0.16, linewidth=0)
     if diagram.floor > low and words:
-        told = "not told apart: below 100 × the reference's error"
-        text = beside(0.01, math.sqrt(low * diagram.floor), told, color=FAINT)
+        note = "not told apart: below 100 × the reference's error"
+        text = beside(0.01, math.sqrt(low * diagram.floor), note, color=FAINT)
         text.set_in_layout(False)
     axes.set_ylim(low, TOP)
     _ticks(axes)

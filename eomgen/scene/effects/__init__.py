@@ -1,4 +1,4 @@
-"""Effects, one file each: schema, loads, energy. To add one, write its file and name it here."""
+"""Effects, one file each: table, loads, energy. To add one, write its file and list it here."""
 
 from typing import Annotated
 
@@ -40,7 +40,7 @@ Effect = Annotated[
     | Spring,
     Field(discriminator="type"),
 ]
-"""Any effect of a scene, told apart by its `type`."""
+"""Any effect of a scene; its `type` selects the class."""
 
 __all__ = [
     "BodyContact",

@@ -1,4 +1,4 @@
-"""Gravity toward a point: of a planet or a star that does not move."""
+"""Gravity towards a fixed point, such as a planet or a star."""
 
 from collections.abc import Iterator, Mapping
 from typing import Literal
@@ -14,10 +14,10 @@ from eomgen.scene.effects.vectors import dot, negative, scale, sub
 
 
 class PointGravity(EffectTable):
-    """Newton's attraction f = -μ m r/|r|³ of every body, at its centre of mass, by a mass that
-    stays at `at` of the world: r runs from there, μ = G M.
+    """Newton's attraction f = -μ m r/|r|³ of each body by a mass M that is fixed in the world.
 
-    A body's own extent is left out (no gravity gradient). The force is infinite at the point.
+    r is the vector from the point `at` to the body's centre of mass, where the force acts; μ = G M.
+    There is no gravity gradient torque. The force is infinite at the point itself.
     """
 
     body_fields = ("except_bodies",)
@@ -29,7 +29,9 @@ class PointGravity(EffectTable):
     at: VectorField = quantity(
         "m", "point it pulls toward, world axes", default=(), validate_default=False
     )
-    except_bodies: tuple[Identifier, ...] = Field(default=(), description="bodies it leaves alone")
+    except_bodies: tuple[Identifier, ...] = Field(
+        default=(), description="bodies it does not act on"
+    )
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """The attraction of each body, at its centre of mass."""
@@ -41,7 +43,7 @@ class PointGravity(EffectTable):
             yield Load(body, negative(scale(pull, arm)), zeros, "applied")
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """-Σ μ m/|r|, J, zero far away."""
+        """-Σ μ m/|r|, J; zero at infinity."""
         total, mu = mechanism.value(ZERO), mechanism.value(self.mu)
         for body in self._attracted(mechanism):
             _, squared = self._from_point(mechanism, body)
@@ -51,14 +53,14 @@ class PointGravity(EffectTable):
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """It always does."""
+        """Always true."""
         return True
 
     def _attracted(self, mechanism: Mechanism) -> list[str]:
         return [body for body in mechanism.bodies if body not in self.except_bodies]
 
     def _from_point(self, mechanism: Mechanism, body: str) -> tuple[Vector, Scalar]:
-        """r, and its square."""
+        """The vector r, m, and r·r."""
         zeros = (mechanism.value(ZERO),) * mechanism.dimensions
         centre = tuple(mechanism.value(part) for part in self.at)
         arm = sub(mechanism.position(body, zeros), centre)

@@ -1,4 +1,4 @@
-"""What effects share: the `Mechanism` that they see, and the loads that they return."""
+"""The interface of effects: the `Mechanism` that they read and the loads that they return."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from eomgen.language.formula import ZERO, Formula
 from eomgen.scalars.exact import Real
 
 Scalar = Any
-"""SymPy expressions, program nodes or floats; effects add, subtract, multiply, divide, and call."""
+"""SymPy expressions, program nodes or floats. Effects use only + - * / and `Mechanism.call`."""
 Vector = tuple[Scalar, ...]
 """Two components in the plane, three in space."""
 
 
 @dataclass(frozen=True)
 class Input:
-    """A commanded input `u` of the generated module; it is 0 unless given.
+    """An input `u` of the generated module; it is 0 unless given.
 
     At a joint `unit` and `about` may have alternatives: see `language.quantity.of_joint`.
     """
@@ -29,9 +29,9 @@ class Input:
 
 @dataclass(frozen=True)
 class ExtraState:
-    """A state that an effect adds, of a controller or an actuator for example.
+    """A state that an effect adds, for example that of a controller or an actuator.
 
-    Its `unit` and `about` are like those of an `Input`.
+    `unit` and `about` are as for an `Input`.
     """
 
     name: str
@@ -42,13 +42,15 @@ class ExtraState:
 
 @dataclass(frozen=True)
 class Load:
-    """A force on one free body, and a torque.
+    """A force and a torque on a body.
 
-    `force` in world axes (N) acts at `at`, from the centre of mass in body axes (m). `torque` in
-    world axes (N m) has one component in the plane, about z, and three in space; () is none. `kind`
-    says on which side of M v̇ + V + G = F it is. `in_body` has force and torque in body axes, if
-    they are given so. Rotated to world axes and back they would be rounded, which would change the
-    small moment of a force that almost passes through the centre of mass.
+    force    world axes, N
+    at       point of application, from the centre of mass in body axes, m
+    kind     the term of M v̇ + V + G = F to which it belongs: G or F
+    torque   world axes, N m: one component in the plane, about z, three in space; () for none
+    in_body  force and torque in body axes, if the scene gives them so. Rotating them to world axes
+             and back would round them, and change the small moment of a force that almost passes
+             through the centre of mass
     """
 
     body: str
@@ -61,7 +63,9 @@ class Load:
 
 @dataclass(frozen=True)
 class JointLoad:
-    """A force on one coordinate of a joint (N m or N): on the child, and back on the parent."""
+    """A generalised force along one coordinate of a joint, N m or N. It acts on the child, its
+    reaction on the parent.
+    """
 
     joint: str
     force: Scalar
@@ -70,11 +74,11 @@ class JointLoad:
 
 @dataclass(frozen=True)
 class Contact:
-    """A rigid contact of two things, which touch where `gap` is 0.
+    """A rigid contact of two bodies, which touch where `gap` is 0.
 
-    `normal` are the loads of a unit force that drives them apart. `tangents` are the loads of a
-    unit friction force along each tangent, on the same pair: none, one in the plane, two in space.
-    By virtual work the gap's rate and the slip velocities are the powers of these loads.
+    `normal` are the loads of a unit force that separates them. `tangents` are the loads of a unit
+    friction force along each tangent: none, one in the plane, two in space. By virtual work the
+    rate of the gap and the slip velocities are the powers of these loads.
     """
 
     name: str
@@ -82,19 +86,19 @@ class Contact:
     effect: str
     """The effect's name."""
     gap: Scalar
-    """m or rad, > 0 apart."""
+    """Distance, m or rad; > 0 if they are apart."""
     normal: tuple[Load | JointLoad, ...]
     tangents: tuple[tuple[Load, ...], ...]
     restitution: Scalar
-    """0 to 1."""
+    """Coefficient of restitution, 0 to 1."""
     friction: Scalar
-    """>= 0."""
+    """Coefficient of friction, >= 0."""
     slip_speed: Scalar
-    """m/s: smoothing of friction while they stay in touch."""
+    """Slip below which friction is smoothed while the contact stays closed, m/s."""
 
 
 class Mechanism(Protocol):
-    """The mechanism as an effect sees it. Vectors are in world axes unless stated otherwise."""
+    """What effects can read of a mechanism. Vectors are in world axes unless stated otherwise."""
 
     @property
     def dimensions(self) -> int:
@@ -102,7 +106,7 @@ class Mechanism(Protocol):
 
     @property
     def magnitude(self) -> float:
-        """The order of magnitude of its lengths, m: see `Model.magnitude`."""
+        """The order of magnitude of lengths, m: see `Model.magnitude`."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -110,8 +114,8 @@ class Mechanism(Protocol):
 
     @property
     def joints(self) -> Mapping[str, tuple[str, ...]]:
-        """All joints that move but the free ones, each with its primitives in order: "revolute" or
-        "prismatic" for a coordinate of its own, "spherical" for a quaternion.
+        """The primitives, in order, of each joint that is neither free nor a weld: "revolute" or
+        "prismatic" for a coordinate, "spherical" for a quaternion.
         """
 
     def mass(self, body: str) -> Scalar:
@@ -121,34 +125,34 @@ class Mechanism(Protocol):
         """World y of a body's centre of mass in the plane, z in space, m."""
 
     def position(self, body: str, at: Vector) -> Vector:
-        """World position of a point of a body, given from its centre of mass in body axes, m. The
-        world is a body, too, with its origin for a centre of mass.
+        """World position of a point of a body, m; `at` is from the centre of mass in body axes. For
+        the body "world" it is from the origin.
         """
 
     def point(self, name: str) -> tuple[str, Vector]:
-        """A named point: its body, and where on it, from the centre of mass in body axes, m."""
+        """The body of a named point, and its position from the centre of mass in body axes, m."""
 
     def velocity(self, body: str, at: Vector) -> Vector:
-        """World velocity of such a point, m/s."""
+        """World velocity of a point as in `position`, m/s."""
 
     def angular_velocity(self, body: str) -> Vector:
         """Angular velocity of a body, rad/s: one component in the plane, three in space."""
 
     def outward(self, body: str, vector: Vector) -> Vector:
-        """A vector of body axes in world axes."""
+        """A vector that is given in body axes, in world axes."""
 
     def coordinate(self, joint: str, index: int = 0) -> Scalar:
-        """A coordinate of a joint."""
+        """Value of a coordinate of a joint, rad or m, or a component of its quaternion."""
 
     def coordinate_name(self, joint: str, index: int = 0) -> str:
-        """Its name."""
+        """Name of a coordinate of a joint."""
 
     def rate(self, joint: str, index: int = 0) -> Scalar:
-        """A velocity of a joint."""
+        """Value of a velocity of a joint, rad/s or m/s."""
 
     def value(self, formula: Formula, **names: Scalar) -> Scalar:
-        """Value of a quantity; in its formula may stand parameters, `t`, coordinates, velocities,
-        inputs and extra states where the field lets them, and `names` besides.
+        """Value of a quantity. Its formula may use parameters, `names`, and where the field allows
+        it `t`, coordinates, velocities, inputs and extra states.
         """
 
     def input(self, name: str) -> Scalar:
@@ -158,91 +162,92 @@ class Mechanism(Protocol):
         """Value of an extra state."""
 
     def number(self, value: Real) -> Scalar:
-        """A number as a scalar, a double or one of more digits (`language.exact`)."""
+        """A number as a scalar."""
 
     def call(self, function: str, *arguments: Scalar) -> Scalar:
-        """A function of formulas (`language.formula.FUNCTIONS`)."""
+        """Value of a function of `scalars.functions.FUNCTIONS`."""
 
 
 class Unmoved:
-    """A mechanism for effects whose loads do not depend on the motion: see `is_plain`."""
+    """A base for mechanisms whose effects all satisfy `is_plain`: they need few members."""
 
     @property
     def magnitude(self) -> float:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError
 
     def position(self, body: str, at: Vector) -> Vector:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(body)
 
     def point(self, name: str) -> tuple[str, Vector]:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(name)
 
     def velocity(self, body: str, at: Vector) -> Vector:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(body)
 
     def angular_velocity(self, body: str) -> Vector:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(body)
 
     def outward(self, body: str, vector: Vector) -> Vector:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(body)
 
     @property
     def joints(self) -> Mapping[str, tuple[str, ...]]:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError
 
     def coordinate(self, joint: str, index: int = 0) -> Scalar:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(joint)
 
     def coordinate_name(self, joint: str, index: int = 0) -> str:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(joint)
 
     def rate(self, joint: str, index: int = 0) -> Scalar:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(joint)
 
     def state(self, name: str) -> Scalar:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(name)
 
     def number(self, value: Real) -> Scalar:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(value)
 
     def call(self, function: str, *arguments: Scalar) -> Scalar:
-        """Never asked for."""
+        """Unused."""
         raise AssertionError(function)
 
 
 class EffectTable(Table):
-    """The base of effects' tables: keys, inputs, states, loads and energy. Defaults are empty."""
+    """The base of effects: keys, inputs, states, loads and energy. By default there are none."""
 
     body_fields: ClassVar[tuple[str, ...]] = ()
-    """Fields that name a body, or list some; `anchor_fields` may name the world, too."""
+    """Fields that name one body or several; those of `anchor_fields` may also name the world."""
     anchor_fields: ClassVar[tuple[str, ...]] = ()
     point_fields: ClassVar[tuple[str, ...]] = ()
     """Fields that list named points of the scene."""
     joint_fields: ClassVar[tuple[str, ...]] = ()
-    """Fields that name a revolute or prismatic joint, or hold a table by such names."""
+    """Fields that name a revolute or prismatic joint, or are tables with such names as keys."""
     dof_fields: ClassVar[tuple[str, ...]] = ()
-    """Fields that name a joint that moves and is not free, list some, or are "all"."""
+    """Fields that name one joint or several, neither free nor weld, or are "all"."""
     vector_fields: ClassVar[tuple[str, ...]] = ()
-    """Fields that hold a vector: as many components as there are dimensions, or left out."""
+    """Fields with a vector that has one component for each dimension, or is absent."""
 
     name: Identifier
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """The effect itself, or one adapted to `dimensions`.
+        """The effect itself, or a copy with fields adapted to `dimensions`.
 
-        Raises `SceneError`, naming the field after `location`, for errors beyond the schema.
+        Raises `SceneError` for errors that the schema cannot express; its message starts with
+        `location` and the field.
         """
         return self
 
@@ -254,12 +259,11 @@ class EffectTable(Table):
     ) -> None:
         """Raise `SceneError` for a joint with a degree of freedom that it cannot act on.
 
-        `joints` has the kinds of the primitives of all that move but the free ones, `names` the
-        coordinates.
+        `joints` are those of `Mechanism.joints`; `names` are the names of their coordinates.
         """
 
     def conditions(self, location: str) -> Iterable[Condition]:
-        """Conditions on its quantities besides their own bounds; `location` is the effect's."""
+        """Conditions on quantities beyond the bounds of each; `location` is that of the effect."""
         return ()
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
@@ -283,11 +287,11 @@ class EffectTable(Table):
         return ()
 
     def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
-        """Its rigid contacts, which are events of a run instead of loads."""
+        """Its rigid contacts. They exert no loads; a run handles them as events."""
         return ()
 
     def overlap(self, mechanism: Mechanism) -> Scalar:
-        """The greatest depth of its soft contacts or stops, m or rad; 0 if none is pressed in."""
+        """The greatest depth of its soft contacts or stops, m or rad; 0 if none overlaps."""
         return mechanism.number(0.0)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
@@ -297,25 +301,25 @@ class EffectTable(Table):
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """Whether exact motion keeps the sum of kinetic and potential energy in spite of it: it has
-        a potential energy for all that it does, or does no work.
+        """Whether its loads conserve energy: they have a potential, or do no work.
 
-        At these `values` of the parameters and of `inputs`, of which those not named are 0. What is
-        not known to keep it counts as if it did not.
+        `values` are those of the parameters; `inputs` that are not named are 0. False if this is
+        not known.
         """
         return False
 
     def idle(self, inputs: Mapping[str, float], dimensions: int) -> bool:
-        """Whether it takes inputs, and all of them are 0."""
-        wanted = self.inputs(dimensions)
-        return bool(wanted) and not any(inputs.get(given.name) for given in wanted)
+        """Whether it has inputs and all of them are 0."""
+        own = self.inputs(dimensions)
+        return bool(own) and not any(inputs.get(i.name) for i in own)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
-        """Whether its loads depend only on parameters, inputs and its bodies' poses, as the closed
-        form requires.
+        """Whether its loads depend only on parameters, inputs and poses of bodies.
+
+        Route `closed` requires it.
         """
         return False
 
     def why_not_plain(self) -> str:
-        """Why it is not plain, in a few words."""
+        """Why `is_plain` is false, as words that follow the type of the effect."""
         return "that depends on the motion"

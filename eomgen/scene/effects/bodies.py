@@ -1,4 +1,4 @@
-"""What effects share that act on a point of one body, of several, or of all."""
+"""The base of effects that act on a point of one body, of several bodies, or of all."""
 
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal, Self
@@ -14,8 +14,8 @@ from eomgen.scene.effects.base import EffectTable, Mechanism, Scalar, Vector
 
 
 class OnBodies(EffectTable):
-    """An effect on the point `at` of `body`, or of each of `bodies`, which may be "all"; or on each
-    of the scene's own `points`, by their names.
+    """An effect at the point `at` of `body`, or of each of `bodies`, which may be "all"; or at each
+    of the named `points` of the scene.
     """
 
     body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies")
@@ -49,13 +49,13 @@ class OnBodies(EffectTable):
         return self
 
     def acted_on(self, mechanism: Mechanism) -> tuple[str, ...]:
-        """The bodies."""
+        """Names of the bodies that it acts on."""
         if self.body is not None:
             return (self.body,)
         return self.bodies if isinstance(self.bodies, tuple) else mechanism.bodies
 
     def loaded_points(self, mechanism: Mechanism) -> Iterator[tuple[str, Vector]]:
-        """Each body with the point on it, body axes, m."""
+        """Each body with its point, from the centre of mass in body axes, m."""
         if self.points is not None:
             yield from (mechanism.point(name) for name in self.points)
             return
@@ -65,15 +65,15 @@ class OnBodies(EffectTable):
 
 
 def wrong(key: str, message: str) -> PydanticCustomError:
-    """An error of a table that is a matter of several keys; `key` is where it shows."""
+    """A validation error that involves several keys of a table; it is reported at `key`."""
     return PydanticCustomError("keys", "{why}", {"why": message, "key": key})
 
 
 def local_names(
     mechanism: Mechanism, parts: tuple[Formula, ...], body: str, at: Vector
 ) -> dict[str, Scalar]:
-    """Place x, y, z (m) and velocity vx, vy, vz (m/s) of a point, world axes, where formulas
-    name them. In the plane z and vz are 0.
+    """Position x, y, z (m) and velocity vx, vy, vz (m/s) of a point in world axes, if the formulas
+    `parts` use them. In the plane z and vz are 0.
     """
     used = {name for part in parts for name in names_in(part)}
     found: dict[str, Scalar] = {}

@@ -1,4 +1,4 @@
-"""Contact: bodies that do not go through a plane or each other, soft or rigid."""
+"""Soft and rigid contact of bodies with a plane, with a sphere or with each other."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
@@ -19,13 +19,13 @@ from eomgen.scene.effects.touching import (
     Ball,
     Plane,
     Touch,
+    gap_rate_and_slip,
+    gap_rate_of,
     merged,
+    normal_loads,
     on_ball,
     on_plane,
-    parting,
     point_loads,
-    pressing,
-    sliding,
     tangents,
 )
 from eomgen.scene.effects.vectors import LEAST_SQUARE, dot
@@ -36,42 +36,42 @@ LAWS = {
     "hunt_crossley": ("stiffness", "dissipation", "allow_active"),
     "impact": ("restitution",),
 }
-"""What each law takes beside what all take; the first it needs."""
+"""The keys of each law in addition to the common ones; the first is required."""
 AGAINST = {
     "plane": ("normal", "offset", "corners", "other"),
     "ball": ("other_radius", "other_at", "other"),
     "each_other": (),
 }
-"""What contact with each takes beside what all take."""
+"""The keys of contact with each of these, in addition to the common ones."""
 
 
 class BodyContact(OnBodies):
-    """Spheres (circles in the plane), points, and corners of boxes, which do not go through things.
+    """Contact of spheres (circles in the plane), points, and corners of boxes.
 
-    Of `body`, or of each of `bodies`, the sphere of `radius` about `at`, or one about each of the
-    named `points`; `radii` gives some bodies radii of their own; of radius 0 it is a point. With
-    `corners`, half sizes along the body's axes, it is the corners of the box about `at` instead,
-    rounded by a radius if there is one. They are
+    Each body of `body` or `bodies` has a sphere of `radius` at `at`, or each of the named `points`
+    is the centre of one. `radii` gives single bodies another radius; a sphere of radius 0 is a
+    point. With `corners`, half sizes along the body's axes, the corners of a box at `at` are used
+    instead, rounded by the radius. They touch
 
-    - `against = "plane"`: n·x >= `offset`, with the direction `normal` n, up if left out;
-    - `against = "ball"`: the sphere of `other_radius` about `other_at`;
-    - `against = "each_other"`: every two of `bodies`.
+    - `against = "plane"`: the half-space n·x <= `offset`, with n along `normal`, by default up;
+    - `against = "ball"`: the sphere of `other_radius` at `other_at`;
+    - `against = "each_other"`: each other, every pair of `bodies`.
 
-    Plane and ball stand still in the world, or are fixed to the body `other` and counted from its
-    centre of mass in its axes. An offset is no formula of time: a floor that moves is a body.
+    Plane and ball are fixed in the world, or to the body `other` and then given from its centre of
+    mass in its axes. An offset cannot depend on time: a moving floor is a body.
 
-    With the gap g, d = -g where they overlap and else 0, and ḋ = -dg/dt the normal force is
+    With the gap g, the depth d = max(0, -g) and ḋ = -dg/dt, the normal force is
 
     - `law = "spring_damper"`: max(0, k d + c ḋ) where d > 0; energy ½ k d²;
     - `law = "hunt_crossley"`: max(0, k d^1.5 (1 + 1.5 a ḋ)); energy 2/5 k d^2.5. Hunt & Crossley,
       "Coefficient of restitution interpreted as damping in vibroimpact", J. Appl. Mech. 42 (1975)
       440-445, with λ = 1.5 a k;
-    - `law = "impact"`: none; they are rigid, and contact is an event (`Contact`).
+    - `law = "impact"`: none; the bodies are rigid, and contacts are events of a run.
 
-    `friction` μ adds -μ F u/sqrt(|u|² + s²) for the slip u (m/s) at the touching point, with
-    `slip_speed` s: 71 % of μ F at |u| = s, 99.5 % at 10 s. So nothing quite sticks: under a load of
-    the fraction ρ < 1 of μ F it creeps at s ρ/sqrt(1 - ρ²); from a speed v >> s a block slides
-    v²/(2 μ g) (1 + (s/v)² (½ + ln(2 v/s))).
+    `friction` μ adds -μ F u/sqrt(|u|² + s²) for the slip velocity u (m/s) at the contact point,
+    with `slip_speed` s: 71 % of μ F at |u| = s, 99.5 % at 10 s. There is no exact sticking: under a
+    tangential load of a fraction ρ < 1 of μ F a body creeps at s ρ/sqrt(1 - ρ²); from a speed
+    v >> s a block slides v²/(2 μ g) (1 + (s/v)² (½ + ln(2 v/s))).
     """
 
     body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies", "radii")
@@ -87,7 +87,9 @@ class BodyContact(OnBodies):
     )
     corners: Vector | None = quantity("m", "half sizes of the box", "positive", default=None)
     normal: Numbers = Field(
-        default=(), validate_default=False, description="direction out of the plane"
+        default=(),
+        validate_default=False,
+        description="direction of the outward normal of the plane",
     )
     offset: Quantity = quantity(
         "m", "position of the plane along its normal", default=ZERO, validate_default=False
@@ -131,7 +133,7 @@ class BodyContact(OnBodies):
     )
 
     @model_validator(mode="after")
-    def _keys_that_belong(self) -> Self:
+    def _keys_fit(self) -> Self:
         given = self.model_fields_set
         choices = (("law", self.law, LAWS), ("against", self.against, AGAINST))
         for choice, chosen, all_keys in choices:
@@ -139,7 +141,7 @@ class BodyContact(OnBodies):
             for key in dict.fromkeys(key for keys in all_keys.values() for key in keys):
                 if key in given and key not in takes:
                     known = f"it takes {', '.join(takes)}" if takes else "leave it out"
-                    raise wrong(key, f"is nothing that {choice} '{chosen}' takes; {known}")
+                    raise wrong(key, f"does not belong to {choice} '{chosen}'; {known}")
         needed = LAWS[self.law][0]
         if needed not in given:
             raise wrong(needed, f"is missing; law '{self.law}' needs it")
@@ -150,10 +152,10 @@ class BodyContact(OnBodies):
         return self
 
     @model_validator(mode="after")
-    def _bodies_that_fit(self) -> Self:
+    def _bodies_fit(self) -> Self:
         listed = self.bodies if isinstance(self.bodies, tuple) else (self.body,)
         if self.points is not None and self.against == "each_other":
-            raise wrong("points", "may lie on one body; give bodies instead")
+            raise wrong("points", "may be on one body; give bodies instead")
         if self.points is not None and self.radii:
             raise wrong("radii", "named points have one radius; give each effect its own points")
         if self.against == "each_other" and len(listed) < 2 and self.bodies != "all":
@@ -167,7 +169,7 @@ class BodyContact(OnBodies):
         return self
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """Its normal has a direction."""
+        """Set the default normal; check that it is not zero."""
         up = (0.0,) * (dimensions - 1) + (1.0,)
         normal = with_components(self.normal or up, 0.0, dimensions, f"{location}.normal")
         if not any(normal):
@@ -175,7 +177,7 @@ class BodyContact(OnBodies):
         return self.replaced(normal=normal)
 
     def conditions(self, location: str) -> Iterator[Condition]:
-        """No radius is negative, spheres have one, restitution is from 0 to 1."""
+        """Radii are not negative, two points do not touch, restitution is from 0 to 1."""
         radii = {f"radii.{name}": radius for name, radius in self.radii.items()}
         radii |= {"radius": self.radius, "other_radius": self.other_radius}
         for key, radius in radii.items():
@@ -183,7 +185,7 @@ class BodyContact(OnBodies):
         yield a_part(f"{location}.restitution", self.restitution)
         listed = self.points or (self.bodies if isinstance(self.bodies, tuple) else (self.body,))
         if self.bodies == "all" and self.radii:
-            return  # which bodies are left to be points is not known here
+            return  # the bodies without a radius of their own are not known here
         own = [radii.get(f"radii.{name}", self.radius) for name in listed]
         if self.against == "ball":
             for radius in dict.fromkeys(own):
@@ -193,17 +195,17 @@ class BodyContact(OnBodies):
             yield can_meet(f"{location}.radius", both)
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
-        """One load a body and touching point of it, for the corners of a box in one."""
+        """Normal and friction forces: a load for each body and contact, one for all corners."""
         if self.law == "impact":
             return
         found: list[Load] = []
         for touch in self._touches(mechanism):
             if self.friction == ZERO:
-                force = self._force(mechanism, touch, parting(mechanism, touch))
-                found += pressing(touch, force)
+                force = self._force(mechanism, touch, gap_rate_of(mechanism, touch))
+                found += normal_loads(touch, force)
                 continue
-            apart, slip = sliding(mechanism, touch)
-            force = self._force(mechanism, touch, apart)
+            gap_rate, slip = gap_rate_and_slip(mechanism, touch)
+            force = self._force(mechanism, touch, gap_rate)
             speed = self._slip_speed(mechanism)
             size = mechanism.call("sqrt", dot(slip, slip) + speed * speed)
             drag = mechanism.value(self.friction) * force / size
@@ -212,7 +214,7 @@ class BodyContact(OnBodies):
         yield from merged(found)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """½ k d² or 2/5 k d^2.5 of every contact, J."""
+        """½ k d² or 2/5 k d^2.5, summed over contacts, J."""
         total = mechanism.number(0.0)
         if self.law == "impact":
             return total
@@ -221,15 +223,15 @@ class BodyContact(OnBodies):
             force = self._elastic(mechanism, touch)
             d = mechanism.call("max", -touch.gap, mechanism.number(0.0))
             part = force * d / power
-            if touch.meeting is not None:
-                part = part + force * touch.meeting
+            if touch.energy_term is not None:
+                part = part + force * touch.energy_term
             total = total + part
         return total
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """It does if it is soft and neither damps nor rubs."""
+        """True for a soft law without damping and friction."""
         lost = (self.damping, self.dissipation, self.friction)
         return self.law != "impact" and are_zero(values, *lost)
 
@@ -243,8 +245,8 @@ class BodyContact(OnBodies):
         return deepest
 
     def contact_names(self, bodies: Sequence[str]) -> tuple[str, ...]:
-        """Of rigid contacts: `<effect>_<body>`, or `<effect>_<point>`, with the corner's number or
-        the other body's name behind it if there is one.
+        """Names of rigid contacts: `<effect>_<body>` or `<effect>_<point>`, then the number of the
+        corner or the name of the other body if there is one.
         """
         if self.law != "impact":
             return ()
@@ -258,7 +260,7 @@ class BodyContact(OnBodies):
         return tuple(f"{name}_{number}" for name in names for number in numbers)
 
     def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
-        """Of law "impact": one for each point, sphere, corner or pair of spheres."""
+        """For law "impact" a contact for each point, sphere, corner or pair of spheres."""
         if self.law != "impact":
             return ()
         names = self.contact_names(mechanism.bodies)
@@ -267,7 +269,7 @@ class BodyContact(OnBodies):
                 name,
                 self.name,
                 touch.gap,
-                pressing(touch, mechanism.number(1.0)),
+                normal_loads(touch, mechanism.number(1.0)),
                 tuple(point_loads(touch, tangent) for tangent in tangents(mechanism, touch)),
                 mechanism.value(self.restitution),
                 mechanism.value(self.friction),
@@ -277,7 +279,7 @@ class BodyContact(OnBodies):
         )
 
     def _elastic(self, mechanism: Mechanism, touch: Touch) -> Scalar:
-        """k d or k d^1.5, N. d^1.5 has the slope 0 at d = 0, as `vectors.length` has it."""
+        """k d or k d^1.5, N. As in `vectors.length`, max keeps the derivative finite at d = 0."""
         d = mechanism.call("max", -touch.gap, mechanism.number(0.0))
         force = mechanism.value(self.stiffness) * d
         if self.law == "spring_damper":
@@ -285,27 +287,27 @@ class BodyContact(OnBodies):
         least = mechanism.number(LEAST_SQUARE)
         return force * mechanism.call("sqrt", mechanism.call("max", d, least))
 
-    def _force(self, mechanism: Mechanism, touch: Touch, apart: Scalar) -> Scalar:
-        """The normal force, N, where the gap grows by `apart`, m/s."""
+    def _force(self, mechanism: Mechanism, touch: Touch, gap_rate: Scalar) -> Scalar:
+        """The normal force, N, at a rate of the gap, m/s."""
         force, nothing = self._elastic(mechanism, touch), mechanism.number(0.0)
         if self.law == "spring_damper" and self.damping != ZERO:
-            force = force - mechanism.value(self.damping) * apart
+            force = force - mechanism.value(self.damping) * gap_rate
             force = mechanism.call("max", force, nothing)
             return mechanism.call("select", -touch.gap, force, nothing)
         if self.law == "hunt_crossley" and self.dissipation != ZERO:
-            faster = mechanism.number(1.5) * mechanism.value(self.dissipation)
-            force = force * (mechanism.number(1.0) - faster * apart)
+            factor = mechanism.number(1.5) * mechanism.value(self.dissipation)
+            force = force * (mechanism.number(1.0) - factor * gap_rate)
             return mechanism.call("max", force, nothing)
         return force
 
     def _slip_speed(self, mechanism: Mechanism) -> Scalar:
-        """m/s; without friction any does."""
+        """The slip speed, m/s; without friction, where it has no effect, 1."""
         return (
             mechanism.number(1.0) if self.slip_speed is None else mechanism.value(self.slip_speed)
         )
 
     def _in_contact(self, bodies: Sequence[str]) -> list[str]:
-        """Those of all bodies that are in contact with something."""
+        """Names of the bodies whose spheres or corners may touch."""
         if self.body is not None:
             return [self.body]
         listed = self.bodies if isinstance(self.bodies, tuple) else bodies

@@ -1,4 +1,4 @@
-"""A controller that a scene writes itself: its states and torques as formulas."""
+"""A controller whose states and torques are formulas of the scene."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -10,11 +10,11 @@ from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import EffectTable, ExtraState, JointLoad, Mechanism, Scalar
 
 MOST = 100
-"""Most states or torques of one controller."""
+"""Greatest number of states or of torques of one controller."""
 
 
 class StateTable(Table):
-    """A state z of a controller: dz/dt = `rate`, z = `initial` at the start."""
+    """A state z of a controller: dz/dt = `rate`, z(0) = `initial`."""
 
     initial: Number = 0.0
     rate: Quantity = quantity("1/s", "time derivative", sees=("motion",))
@@ -25,10 +25,10 @@ class StateTable(Table):
 class Controller(EffectTable):
     """dz/dt = f and τ = g, formulas of t, coordinates, velocities, inputs and states.
 
-    `states = { z = { initial = 0.0, rate = "q - z" } }` names the states as formulas call them;
-    `torques = { joint = "-k*z" }` gives each joint its torque, on its child and back on its parent,
-    at a sliding joint a force. No formula can hang on itself: rates depend on states, never on
-    rates or torques.
+    `states = { z = { initial = 0.0, rate = "q - z" } }` defines the states by the names that
+    formulas use. `torques = { joint = "-k*z" }` defines the torque of each joint, or the force if
+    it is prismatic, on its child, with the reaction on its parent. Formulas cannot use rates or
+    torques, so none depends on itself.
     """
 
     joint_fields = ("torques",)
@@ -43,17 +43,17 @@ class Controller(EffectTable):
     )
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:
-        """As the scene has them."""
+        """The states of the scene's table."""
         return tuple(
             ExtraState(name, state.unit, state.about or f"state of {self.name}", state.initial)
             for name, state in self.own_states.items()
         )
 
     def rates(self, mechanism: Mechanism) -> tuple[Scalar, ...]:
-        """The formulas of the states."""
+        """Values of the states' formulas."""
         return tuple(mechanism.value(state.rate) for state in self.own_states.values())
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """The formulas of the torques."""
+        """Values of the torques' formulas."""
         for joint, torque in self.torques.items():
             yield JointLoad(joint, mechanism.value(torque))

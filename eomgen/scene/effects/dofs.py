@@ -1,4 +1,4 @@
-"""What effects at joints share: they act on one degree of freedom, on several, or on all."""
+"""The bases of effects on degrees of freedom of one joint, of several, or of all."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,13 +15,14 @@ from eomgen.scene.effects.vectors import dot, length, scale
 
 @dataclass(frozen=True)
 class Dof:
-    """A degree of freedom of a joint with one coordinate, or the three of a ball joint together.
+    """One degree of freedom with a coordinate of its own, or the three of a ball joint together.
 
-    `value` is the coordinate, rad or m; of a ball joint the angle of the whole rotation, 0 to π,
-    about the unit vector n. `rates` are its velocities, rad/s or m/s; of a ball joint the angular
-    velocity ω in the child's axes. n has the same components there as in the parent's axes.
-    `first` is the index of the first of them among the joint's velocities. `direction` is 1, or
-    n, so that dvalue/dt = direction · rates.
+    first      index of its first velocity among those of the joint
+    value      the coordinate, rad or m; for a ball joint the angle of rotation, 0 to π, about the
+               unit vector n
+    direction  1, or n, which has the same components in the child's and the parent's axes
+    rates      the velocities, rad/s or m/s; for a ball joint the angular velocity in the child's
+               axes, so that dvalue/dt = direction · rates
     """
 
     joint: str
@@ -36,25 +37,25 @@ class Dof:
         return self.rates[0] if len(self.rates) == 1 else dot(self.direction, self.rates)
 
     def loads(self, forces: Sequence[Scalar]) -> Iterator[JointLoad]:
-        """Forces on its velocities, on the child and back on the parent."""
+        """Loads on the child of generalised forces along its velocities."""
         for i, force in enumerate(forces):
             yield JointLoad(self.joint, force, self.first + i)
 
     def along(self, force: Scalar) -> tuple[Scalar, ...]:
-        """A force in its direction."""
+        """The generalised forces along its velocities of a force along `direction`."""
         if len(self.rates) == 1:
             return (force,)
         return scale(force, self.direction)
 
 
 def joint_dof(mechanism: Mechanism, joint: str, kind: str, index: int) -> Dof:
-    """The degree of freedom whose coordinate, or quaternion, has this index in its joint."""
+    """The degree of freedom whose first coordinate and velocity have this index in the joint."""
     if kind != "spherical":
         value, rate = mechanism.coordinate(joint, index), mechanism.rate(joint, index)
         return Dof(joint, index, value, (mechanism.number(1.0),), (rate,))
     w, *vector = (mechanism.coordinate(joint, index + i) for i in range(4))
     rates = tuple(mechanism.rate(joint, index + i) for i in range(3))
-    # Quaternions w, r and -w, -r are the same rotation; the angle is at most π with w >= 0.
+    # Quaternions (w, r) and (-w, -r) are the same rotation; with w >= 0 its angle is at most π.
     sine = length(mechanism, tuple(vector))
     half = mechanism.call("atan2", sine, mechanism.call("abs", w))
     per_sine = mechanism.number(1.0) / sine
@@ -76,7 +77,7 @@ class OnJoints(EffectTable):
         description="joints it acts on, if several; 'all' are all but the free ones",
     )
     coordinate: Identifier | None = Field(
-        default=None, description="the one it acts on, of a joint that has several"
+        default=None, description="coordinate it acts on, if the joint has several"
     )
 
     @model_validator(mode="after")
@@ -93,7 +94,7 @@ class OnJoints(EffectTable):
         return self
 
     def acted_on(self, joints: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-        """Names of its joints, of all `joints` that move."""
+        """Names of the joints it acts on, among `joints` as in `Mechanism.joints`."""
         if self.joint is not None:
             return (self.joint,)
         return self.joints if isinstance(self.joints, tuple) else tuple(joints)
@@ -104,14 +105,14 @@ class OnJoints(EffectTable):
         names: Mapping[str, Sequence[str]],
         location: str,
     ) -> None:
-        """There is such a coordinate."""
+        """Check that the joint has the coordinate."""
         if self.coordinate is not None:
             assert self.joint is not None
-            known = _plain(joints, names, self.joint)
+            known = _scalar_coordinates(joints, names, self.joint)
             _check_coordinate(self.coordinate, self.joint, known, location)
 
     def dofs(self, mechanism: Mechanism) -> Iterator[Dof]:
-        """Every degree of freedom that it acts on."""
+        """The degrees of freedom that it acts on."""
         for joint in self.acted_on(mechanism.joints):
             for index, kind in enumerate(mechanism.joints[joint]):
                 name = mechanism.coordinate_name(joint, index)
@@ -126,7 +127,7 @@ class OnCoordinate(EffectTable):
 
     joint: Identifier = Field(description="joint it acts on")
     coordinate: Identifier | None = Field(
-        default=None, description="the one it acts on, of a joint that has several"
+        default=None, description="coordinate it acts on, if the joint has several"
     )
 
     def check_dofs(
@@ -135,8 +136,8 @@ class OnCoordinate(EffectTable):
         names: Mapping[str, Sequence[str]],
         location: str,
     ) -> None:
-        """There is one such coordinate."""
-        known = _plain(joints, names, self.joint)
+        """Check that the joint has the coordinate, or only one."""
+        known = _scalar_coordinates(joints, names, self.joint)
         if not known:
             raise SceneError(f"{location}.joint: '{self.joint}' is a ball joint and has no angle")
         if self.coordinate is None and len(known) > 1:
@@ -146,7 +147,7 @@ class OnCoordinate(EffectTable):
         _check_coordinate(self.coordinate, self.joint, known, location)
 
     def coordinate_index(self, mechanism: Mechanism) -> int:
-        """Which of the joint's coordinates."""
+        """Index of the coordinate in its joint."""
         if self.coordinate is None:
             return 0
         count = len(mechanism.joints[self.joint])
@@ -154,10 +155,10 @@ class OnCoordinate(EffectTable):
         return names.index(self.coordinate)
 
 
-def _plain(
+def _scalar_coordinates(
     joints: Mapping[str, tuple[str, ...]], names: Mapping[str, Sequence[str]], joint: str
 ) -> Sequence[str]:
-    """The coordinates of a joint that are angles or slides."""
+    """The coordinates of revolute and prismatic primitives of a joint."""
     return names[joint][: sum(kind != "spherical" for kind in joints[joint])]
 
 

@@ -1,4 +1,4 @@
-"""Drag of a fluid that may move: linear and quadratic, of the motion and of the turning."""
+"""Linear and quadratic drag in a fluid, of translation and of rotation."""
 
 from collections.abc import Iterator
 from typing import Literal, Self
@@ -16,11 +16,11 @@ MADE_OF = ("density", "area", "coefficient")
 
 
 class Drag(OnBodies):
-    """Drag f = -(linear + quadratic |w|) w at a point that moves at w = v - wind.
+    """Drag f = -(linear + quadratic |w|) w at a point of velocity w = v - wind in the fluid.
 
-    Also on the turning at ω: torque = -(turning_linear + turning_quadratic |ω|) ω. Instead of
-    `quadratic` there may be the ½ density area coefficient of Rayleigh's drag equation. All vectors
-    in world axes; all coefficients are those of each body. Defined and differentiable at rest.
+    Drag on rotation: torque = -(turning_linear + turning_quadratic |ω|) ω. Instead of `quadratic`,
+    density, area and coefficient give ½ ρ A c_d of the drag equation. All vectors are in world
+    axes; each body has these coefficients. The drag is differentiable at rest.
     """
 
     vector_fields = ("at", "wind")
@@ -59,7 +59,7 @@ class Drag(OnBodies):
     )
 
     @model_validator(mode="after")
-    def _one_quadratic(self) -> Self:
+    def _coefficients_fit(self) -> Self:
         given = [key for key in MADE_OF if getattr(self, key) is not None]
         if given and self.quadratic != ZERO:
             raise wrong("quadratic", f"is given beside '{given[0]}'; leave one of them out")
@@ -73,23 +73,23 @@ class Drag(OnBodies):
         return self
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
-        """Force at the point, and torque, on each body."""
+        """Force at the point and torque on each body."""
         linear, quadratic = mechanism.value(self.linear), self._quadratic(mechanism)
         turning = tuple(mechanism.value(x) for x in (self.turning_linear, self.turning_quadratic))
-        blows = any(part != ZERO for part in self.wind)
-        pushes = self.linear != ZERO or quadratic is not None
-        turns = self.turning_linear != ZERO or self.turning_quadratic != ZERO
+        has_wind = any(part != ZERO for part in self.wind)
+        has_force = self.linear != ZERO or quadratic is not None
+        has_torque = self.turning_linear != ZERO or self.turning_quadratic != ZERO
         for body, at in self.loaded_points(mechanism):
             force: Vector = (mechanism.number(0.0),) * mechanism.dimensions
-            if pushes:
+            if has_force:
                 speed = mechanism.velocity(body, at)
-                if blows:
+                if has_wind:
                     names = local_names(mechanism, self.wind, body, at)
                     wind = tuple(mechanism.value(part, **names) for part in self.wind)
                     speed = sub(speed, wind)
                 force = _drag(mechanism, linear, quadratic, speed)
             torque: Vector = ()
-            if turns:
+            if has_torque:
                 square = turning[1] if self.turning_quadratic != ZERO else None
                 torque = _drag(mechanism, turning[0], square, mechanism.angular_velocity(body))
             yield Load(body, force, at, "applied", torque)

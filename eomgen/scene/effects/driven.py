@@ -10,14 +10,14 @@ from eomgen.scene.effects.base import EffectTable
 
 
 class Driven(EffectTable):
-    """The joint's coordinate is `coordinate`, a formula of `t` and parameters; it is no state.
+    """Prescribes the coordinate of a joint by `coordinate`, a formula of `t` and parameters.
 
-    Rate and acceleration are the formula's exact derivatives; where it has a corner (step, select,
-    abs, min, max) those of the pieces, so that a jump gives no impulse. What the drive takes for it
-    is the output `driving_forces`: a torque (N m) at a hinge, a force (N) at a slide, on the child
-    along the coordinate and back on the parent, but for the forces of rigid contacts, which only a
-    run knows. It is a constraint rather than a load, and so the
-    derivation itself carries it out.
+    The coordinate is no state. Its rate and acceleration are the exact derivatives of the formula;
+    for step, select, abs, min and max they are those of the branch, so a jump gives no impulse. The
+    output `driving_forces` is the generalised force of the drive along the coordinate, N m for a
+    revolute and N for a prismatic joint, on the child, with its reaction on the parent. It lacks
+    the forces of rigid contacts, which are known only in a run. The drive is a constraint, not a
+    load.
     """
 
     joint_fields = ("joint",)

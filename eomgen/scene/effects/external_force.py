@@ -1,4 +1,4 @@
-"""A force from outside at a point of a body."""
+"""An external force at a point of a body."""
 
 from collections.abc import Collection, Iterator, Mapping
 from typing import Literal
@@ -12,9 +12,9 @@ from eomgen.scene.effects.base import EffectTable, Input, Load, Mechanism
 
 
 class ExternalForce(EffectTable):
-    """A force f_e at r_e of a body (handout (29)-(34)), in world axes or in those of the body.
+    """A force f_e at the point r_e of a body (handout (29)-(34)), in world or body axes.
 
-    `force = "input"` makes its components the inputs `<name>_x`, `<name>_y` and, in space,
+    With `force = "input"` its components are the inputs `<name>_x`, `<name>_y` and, in space,
     `<name>_z`.
     """
 
@@ -30,7 +30,7 @@ class ExternalForce(EffectTable):
     )
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
-        """One input a component if the force is one."""
+        """An input for each component with `force = "input"`."""
         if self.force != "input":
             return ()
         about = f"force {self.name} on {self.body}" + ", body axes" * (self.axes == "body")
@@ -54,11 +54,11 @@ class ExternalForce(EffectTable):
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """It does while its inputs are 0."""
+        """True if its inputs are 0."""
         return self.idle(inputs, dimensions)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
-        """In world axes, unless its formula uses the motion or the time."""
+        """True in world axes, unless its formula depends on the motion or on time."""
         if self.axes == "body":
             return False
         if not isinstance(self.force, tuple):

@@ -1,4 +1,4 @@
-"""A torque from outside on a body."""
+"""An external torque on a body."""
 
 from collections.abc import Iterator, Mapping
 from typing import Literal, Self
@@ -13,9 +13,9 @@ from eomgen.scene.effects.base import EffectTable, Input, Load, Mechanism
 
 
 class ExternalTorque(EffectTable):
-    """A torque on a body: in the plane a number, about z; in space three, in world or body axes.
+    """A torque on a body: one component about z in the plane, three in world or body axes in space.
 
-    `torque = "input"` makes it the input `<name>`, in space `<name>_x`, `<name>_y`, `<name>_z`.
+    With `torque = "input"` it is the input `<name>`, in space `<name>_x`, `<name>_y`, `<name>_z`.
     """
 
     body_fields = ("body",)
@@ -29,7 +29,7 @@ class ExternalTorque(EffectTable):
     )
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """Refuse a number in space, and a vector in the plane."""
+        """Check that the torque is a number in the plane, and has three components in space."""
         if dimensions == 2 and isinstance(self.torque, tuple):
             raise SceneError(f"{location}.torque: is a list; in the plane give one number, about z")
         if dimensions == 3 and self.torque != "input":
@@ -40,7 +40,7 @@ class ExternalTorque(EffectTable):
         return self
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
-        """One input a component if the torque is one."""
+        """An input for each component with `torque = "input"`."""
         if self.torque != "input":
             return ()
         about = f"torque {self.name} on {self.body}"
@@ -67,5 +67,5 @@ class ExternalTorque(EffectTable):
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """It does while its inputs are 0."""
+        """True if its inputs are 0."""
         return self.idle(inputs, dimensions)

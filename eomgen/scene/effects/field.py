@@ -1,4 +1,4 @@
-"""Force fields: formulas of position, velocity and time, and some that are ready."""
+"""Force fields: formulas of position, velocity and time, and some predefined ones."""
 
 from collections.abc import Iterator, Mapping
 from typing import Literal, Self
@@ -22,31 +22,32 @@ KEYS: dict[str, tuple[str, ...]] = {
     "vortex": CENTRAL,
     "avoid": ("center", "steering", "radius", "reach"),
 }
-"""What each kind takes beside what all take."""
+"""The keys of each kind in addition to the common ones."""
 NEEDED = {"formula": ("force",), "avoid": ("steering", "radius", "reach")}
 MOST_POWER = 12
 HEAD_ON = 1e-18
-"""Square of the sine up to which a heading counts as straight at the obstacle."""
+"""Square of the sine of the angle to the obstacle below which a point moves straight towards it."""
 
 
 class ForceField(OnBodies):
-    """A force at a point of a body that depends on where that is, how it moves, and the time.
+    """A force at a point of a body that depends on its position and velocity and on time.
 
-    With r the way from `center` to the point, s² = r·r + softening², in world axes:
+    With the vector r from `center` to the point and s² = r·r + softening², in world axes:
 
-    - "formula": `force`, of x, y, z and vx, vy, vz of the point and of t and the motion;
+    - "formula": `force`, a formula of x, y, z and vx, vy, vz of the point, of t and the motion;
     - "attract", "repel": ∓strength r / s^(power+1), which has a potential energy;
     - "vortex": strength ẑ × r / s^(power+1), anticlockwise about the z axis through `center`; r and
-      s are then those in the x-y plane;
-    - "avoid": the field that steers away from an obstacle (handout, section 1), here a ball of
-      `radius`, within `reach` of its surface. It pushes sideways alone, and so does no work:
-      steering h² c² |v| v × n, n the unit vector along v × d for the way d to the centre; h falls
-      from 1 at the surface to 0 at `reach`, c is the cosine between v and d, or 0 on the way off.
-      The way taken past an obstacle is the same at any speed. Straight at the centre n is ẑ: to
-      the right. It is no wall: too weak, it lets a body through, and a heading is all it changes.
+      s are those in the x-y plane;
+    - "avoid": steers away from an obstacle (handout, section 1), a ball of `radius`, within `reach`
+      of its surface. The force is perpendicular to the velocity v, so it does no work:
+      steering h² c² |v| v × n with the unit vector n along v × d and the vector d to the centre. h
+      falls from 1 at the surface to 0 at `reach`; c is the cosine between v and d, or 0 if the
+      point moves away. The path past an obstacle does not depend on the speed. If v points to the
+      centre, n is ẑ and the path turns right. The field only changes the direction of motion; if
+      it is too weak, a body passes through the obstacle.
 
-    Without softening the central fields are infinite at the centre. A run with adaptive steps ends
-    there; equal steps may leap over it and go on, far off.
+    Without softening the central fields are infinite at the centre. A run with adaptive steps stops
+    there; a run with fixed steps may jump across the centre and continue with a large error.
     """
 
     vector_fields = ("at", "center", "force")
@@ -78,7 +79,7 @@ class ForceField(OnBodies):
         for key in every:
             if key in self.model_fields_set and key not in KEYS[self.kind]:
                 known = ", ".join(KEYS[self.kind])
-                raise wrong(key, f"is nothing that kind '{self.kind}' takes; it takes {known}")
+                raise wrong(key, f"does not belong to kind '{self.kind}'; it takes {known}")
         for key in NEEDED.get(self.kind, ("strength",)):
             if key not in self.model_fields_set:
                 raise wrong(key, f"is missing; kind '{self.kind}' needs it")
@@ -99,12 +100,14 @@ class ForceField(OnBodies):
             yield Load(body, force, at, "applied")
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """Of "attract" and "repel", J: 0 at infinity for powers above 1, else at s = 0 or 1 m."""
+        """That of "attract" and "repel", J: 0 at infinity if power > 1, at s = 1 m if power = 1, at
+        s = 0 if power < 1.
+        """
         total = mechanism.number(0.0)
         if self.kind not in ("attract", "repel"):
             return total
         for body, at in self.loaded_points(mechanism):
-            square = self._square(mechanism, self._way(mechanism, body, at))
+            square = self._square(mechanism, self._from_center(mechanism, body, at))
             if self.power == 1:
                 part = mechanism.number(0.5) * mechanism.call("log", square)
             else:
@@ -117,56 +120,58 @@ class ForceField(OnBodies):
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """Central fields do."""
+        """True for fields with a potential, and for "avoid", which does no work."""
         return self.kind in ("attract", "repel", "avoid")
 
-    def _way(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
-        """From the centre to the point."""
+    def _from_center(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
+        """The vector r from the centre to the point, m."""
         centre = tuple(mechanism.value(part) for part in self.center)
         return sub(mechanism.position(body, at), centre)
 
-    def _square(self, mechanism: Mechanism, way: Vector) -> Scalar:
+    def _square(self, mechanism: Mechanism, r: Vector) -> Scalar:
         softening = mechanism.value(self.softening)
-        return dot(way, way) + softening * softening
+        return dot(r, r) + softening * softening
 
     def _value(self, mechanism: Mechanism, given: Quantity | None) -> Scalar:
-        assert given is not None  # by the kind
+        assert given is not None  # checked in `_keys_of_kind`
         return mechanism.value(given)
 
     def _central(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
-        way, zero = self._way(mechanism, body, at), mechanism.number(0.0)
+        r, zero = self._from_center(mechanism, body, at), mechanism.number(0.0)
         if self.kind == "vortex":
-            way = way[:2]
-        square = self._square(mechanism, way)
+            r = r[:2]
+        square = self._square(mechanism, r)
         factor = self._value(mechanism, self.strength)
         factor = factor / _raised(mechanism, square, self.power + 1)
         if self.kind == "vortex":
-            return (-(factor * way[1]), factor * way[0], zero)[: mechanism.dimensions]
+            return (-(factor * r[1]), factor * r[0], zero)[: mechanism.dimensions]
         if self.kind == "attract":
             factor = -factor
-        return scale(factor, way)
+        return scale(factor, r)
 
     def _sideways(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
         call, zero, one = mechanism.call, mechanism.number(0.0), mechanism.number(1.0)
-        ahead = negative(self._way(mechanism, body, at))
+        ahead = negative(self._from_center(mechanism, body, at))
         v = mechanism.velocity(body, at)
         distance, speed = length(mechanism, ahead), length(mechanism, v)
         gap = distance - self._value(mechanism, self.radius)
         near = call("max", zero, one - gap / self._value(mechanism, self.reach))
         near = call("min", near, one)
         towards = call("max", zero, dot(v, ahead))
-        # Twice the cosine and |v| in one: nothing is divided by a speed that may be 0.
+        # c² |v|, where `length` keeps the speed above 0.
         cosine = towards / (distance * speed)
         factor = self._value(mechanism, self.steering) * near * near * cosine * cosine * speed
         if mechanism.dimensions == 2:
-            left = v[0] * ahead[1] - v[1] * ahead[0]  # where the obstacle is
+            left = v[0] * ahead[1] - v[1] * ahead[0]  # its sign says on which side the obstacle is
             factor = call("select", -left, -factor, factor)
             return (factor * v[1], -(factor * v[0]))
-        n = self._turn(mechanism, v, ahead, (distance * speed) * (distance * speed))
+        n = self._turning_axis(mechanism, v, ahead, (distance * speed) * (distance * speed))
         return scale(factor, cross(v, n))
 
-    def _turn(self, mechanism: Mechanism, v: Vector, ahead: Vector, scale: Scalar) -> Vector:
-        """The axis of the turn away, in space: a unit vector."""
+    def _turning_axis(
+        self, mechanism: Mechanism, v: Vector, ahead: Vector, scale: Scalar
+    ) -> Vector:
+        """The unit vector n along v × d in space; ẑ if they are parallel."""
         call, zero, one = mechanism.call, mechanism.number(0.0), mechanism.number(1.0)
         about = cross(v, ahead)
         beside = dot(about, about) - mechanism.number(HEAD_ON) * scale

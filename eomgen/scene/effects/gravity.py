@@ -1,4 +1,4 @@
-"""Uniform gravity, downwards or in any other direction."""
+"""Uniform gravity, downwards or in a given direction."""
 
 from collections.abc import Collection, Iterator, Mapping
 from typing import Literal
@@ -13,11 +13,11 @@ from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar, Vect
 
 
 class Gravity(EffectTable):
-    """Weight m g of every body, along -y in the plane (handout (5), (9)), along -z in space.
+    """Weight m g of each body, along -y in the plane (handout (5), (9)), along -z in space.
 
-    `direction` (world axes, of any length but 0) turns it elsewhere. It does not act on the bodies
-    in `except_bodies`; where there are any, the weights of the others are applied forces, in F of
-    M v̇ + V + G = F, and not in G.
+    `direction` (world axes, not 0, need not have unit length) replaces these axes. Gravity does not
+    act on the bodies in `except_bodies`; with any of these, the weights of the other bodies are
+    applied forces, in F of M v̇ + V + G = F instead of G.
     """
 
     body_fields = ("except_bodies",)
@@ -26,8 +26,12 @@ class Gravity(EffectTable):
     type: Literal["gravity"]
     name: Identifier = "gravity"
     g: Quantity = quantity("m/s^2", "gravitational acceleration, downwards")
-    direction: Numbers | None = Field(default=None, description="where it pulls, world axes")
-    except_bodies: tuple[Identifier, ...] = Field(default=(), description="bodies it leaves alone")
+    direction: Numbers | None = Field(
+        default=None, description="direction of the weight, world axes"
+    )
+    except_bodies: tuple[Identifier, ...] = Field(
+        default=(), description="bodies it does not act on"
+    )
 
     @field_validator("direction")
     @classmethod
@@ -37,7 +41,7 @@ class Gravity(EffectTable):
         return direction
 
     def acceleration(self, mechanism: Mechanism) -> Vector:
-        """Of a body that falls freely, world axes, m/s^2."""
+        """Acceleration of free fall, world axes, m/s²."""
         g = mechanism.value(self.g)
         if self.direction is None:
             return (*(mechanism.value(ZERO),) * (mechanism.dimensions - 1), -g)
@@ -57,7 +61,7 @@ class Gravity(EffectTable):
             yield Load(body, force, zeros, "applied" if self.except_bodies else "gravity")
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """Σ m g times height, J, zero at the world's origin."""
+        """Σ m g times height, J; zero at the world's origin."""
         total = mechanism.value(ZERO)
         if self.direction is None:
             g = mechanism.value(self.g)
@@ -73,16 +77,16 @@ class Gravity(EffectTable):
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """It always does."""
+        """Always true."""
         return True
 
     def _falling(self, mechanism: Mechanism) -> list[str]:
         return [body for body in mechanism.bodies if body not in self.except_bodies]
 
     def is_plain(self, parameters: Collection[str]) -> bool:
-        """Downwards, on all bodies."""
+        """True if it acts downwards on all bodies."""
         return self.direction is None and not self.except_bodies
 
     def why_not_plain(self) -> str:
-        """It has a direction of its own, or leaves bodies alone."""
+        """It has a direction of its own, or does not act on all bodies."""
         return "with except_bodies" if self.except_bodies else "with a direction of its own"

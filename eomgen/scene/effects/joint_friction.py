@@ -14,11 +14,11 @@ from eomgen.scene.effects.vectors import add, length, negative, scale
 
 
 class JointFriction(OnJoints):
-    """Acts against the rate v of a joint's coordinate: -(b v + C tanh(v/speed)).
+    """Friction -(b v + C tanh(v/speed)) against the rate v of a joint's coordinate.
 
-    A torque (N m) at a hinge, a force (N) at a slide, on the child and back on the parent. Coulomb
-    friction C is smoothed: at |v| = `speed` it is 76 % of C, at 3 `speed` 99.5 %. So nothing quite
-    sticks: under a load F < C the joint creeps at speed · artanh(F/C), under a larger one it slips.
+    A torque (N m) or a force (N) on the child, with its reaction on the parent. Coulomb friction C
+    is smoothed: at |v| = `speed` it is 76 % of C, at 3 `speed` 99.5 %. There is no exact sticking:
+    under a load F < C the joint creeps at speed · artanh(F/C).
     """
 
     type: Literal["joint_friction"]
@@ -40,7 +40,7 @@ class JointFriction(OnJoints):
     )
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """There is friction, and a speed where one is of use."""
+        """Check that there is friction, and a speed if and only if there is Coulomb friction."""
         if not self.model_fields_set & {"viscous", "coulomb"}:
             raise SceneError(f"{location}.viscous: missing; give it, or coulomb and speed")
         if "coulomb" in self.model_fields_set and self.speed is None:
@@ -53,16 +53,16 @@ class JointFriction(OnJoints):
         return self
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """Equal and opposite loads on the joint's two bodies."""
+        """Loads on the child, with reactions on the parent."""
         viscous = mechanism.value(self.viscous)
         for dof in self.dofs(mechanism):
-            against = scale(viscous, dof.rates)
+            friction = scale(viscous, dof.rates)
             if self.speed is not None:
-                against = add(against, self._dry(mechanism, dof.rates))
-            yield from dof.loads(negative(against))
+                friction = add(friction, self._coulomb(mechanism, dof.rates))
+            yield from dof.loads(negative(friction))
 
-    def _dry(self, mechanism: Mechanism, rates: Vector) -> Vector:
-        """C tanh(|v|/speed) v/|v|."""
+    def _coulomb(self, mechanism: Mechanism, rates: Vector) -> Vector:
+        """C tanh(|v|/speed) v/|v|, N m or N."""
         assert self.speed is not None
         coulomb, speed = mechanism.value(self.coulomb), mechanism.value(self.speed)
         if len(rates) == 1:

@@ -15,13 +15,13 @@ from eomgen.scene.effects.spring import check_law
 
 
 class JointSpring(OnJoints):
-    """Pulls a joint's coordinate q back to `rest`: -(k s + c ds/dt) with s = q - rest.
+    """A torque or force -(k s + c ds/dt) on a joint's coordinate q, with s = q - rest.
 
-    A torque (N m, s in rad) where it turns, a force (N, s in m) where it slides, on the child and
-    back on the parent. A `law` over `stretch` s and `rate` ds/dt stands for k s; positive pulls
-    back. Potential energy is ½ k s²; a law has none, what it gives and takes is power. At a ball
-    joint s is the angle of the whole turn, the shorter way round, and the torque -k s n - c ω, n
-    the axis of that turn; it has no `rest` but 0, and turns over at half a turn.
+    A torque (N m, s in rad) at a revolute joint, a force (N, s in m) at a prismatic one, on the
+    child, with the reaction on the parent. A `law` of `stretch` s and `rate` ds/dt replaces k s; it
+    is positive towards `rest`. The potential energy is ½ k s²; a law has none, so its work counts
+    as that of an applied force. At a ball joint s is the angle of rotation, 0 to π, about the axis
+    n, and the torque is -k s n - c ω; its `rest` is 0, and the torque reverses at s = π.
     """
 
     type: Literal["joint_spring"]
@@ -43,7 +43,7 @@ class JointSpring(OnJoints):
     )
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """Something must pull, and a law stands alone."""
+        """Check that there is stiffness, damping or a law, but not stiffness and a law."""
         check_law(self, self.law, location)
         return self
 
@@ -53,7 +53,7 @@ class JointSpring(OnJoints):
         names: Mapping[str, Sequence[str]],
         location: str,
     ) -> None:
-        """A ball joint has one rest position."""
+        """Check that `rest` is 0 at ball joints."""
         super().check_dofs(joints, names, location)
         for joint in self.acted_on(joints):
             if "spherical" in joints[joint] and self.rest != ZERO:
@@ -62,7 +62,7 @@ class JointSpring(OnJoints):
                 )
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """Equal and opposite loads on the joint's two bodies."""
+        """Loads on the child, with reactions on the parent."""
         for dof in self.dofs(mechanism):
             stretch = self._stretch(mechanism, dof)
             if self.law is not None:
@@ -76,11 +76,11 @@ class JointSpring(OnJoints):
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """It does without damping, if its law is that of a spring."""
+        """True without damping and without a law."""
         return self.law is None and are_zero(values, self.damping)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """½ k s², J."""
+        """½ k s², summed over degrees of freedom, J."""
         total = mechanism.number(0.0)
         if self.law is not None:
             return total

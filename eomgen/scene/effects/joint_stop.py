@@ -1,4 +1,4 @@
-"""Stops at the ends of a joint's range, as springs and dampers or rigid."""
+"""Soft or rigid stops at the limits of a joint's coordinate."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, Self
@@ -15,14 +15,14 @@ from eomgen.scene.effects.vectors import negative
 
 
 class JointStop(OnJoints):
-    """Pushes a joint's coordinate q back into `low` to `high`, and does nothing within.
+    """Keeps a joint's coordinate q between `low` and `high`; either limit may be absent.
 
-    Beyond a limit by x (q - high > 0 or q - low < 0) it puts -(k x + c dq/dt) on the child and back
-    on the parent, a torque (N m) where it turns, a force (N) where it slides; it never pulls
-    towards the limit, however fast q comes back. Damping sets in with a jump. Potential energy is
-    ½ k x². Either limit may be left out. Of a ball joint q is the angle of the whole turn, which
-    has no `low`. With `restitution` instead of stiffness it is rigid, of one joint that moves in
-    one way: no load, and each limit is a contact, `<effect>_low` and `<effect>_high`.
+    Beyond a limit by x (q - high > 0 or q - low < 0) a torque (N m) or force (N) -(k x + c dq/dt)
+    acts on the child, with its reaction on the parent. It never pulls towards the limit, however
+    fast q returns, and damping starts with a jump. The potential energy is ½ k x². At a ball joint
+    q is the angle of rotation, which has no `low`. With `restitution` instead of stiffness the stop
+    is rigid and of a single coordinate: it exerts no load, and each limit is a contact,
+    `<effect>_low` and `<effect>_high`.
     """
 
     type: Literal["joint_stop"]
@@ -40,7 +40,7 @@ class JointStop(OnJoints):
     )
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """There is a limit, and one law."""
+        """Check that there is a limit, and either stiffness or restitution."""
         if self.low is None and self.high is None:
             raise SceneError(f"{location}.low: missing, and high too; give one of them or both")
         given = self.model_fields_set
@@ -48,11 +48,11 @@ class JointStop(OnJoints):
             raise SceneError(f"{location}.stiffness: missing; give it or a restitution")
         for key in ("stiffness", "damping", "allow_active"):
             if self.restitution is not None and key in given:
-                raise SceneError(f"{location}.{key}: a restitution stands in its place; give one")
+                raise SceneError(f"{location}.{key}: a restitution replaces it; give one")
         return self
 
     def conditions(self, location: str) -> Iterator[Condition]:
-        """There is room between two limits, and restitution is from 0 to 1."""
+        """low < high, and restitution is from 0 to 1."""
         if self.restitution is not None:
             yield a_part(f"{location}.restitution", self.restitution)
         if self.low is not None and self.high is not None:
@@ -64,13 +64,13 @@ class JointStop(OnJoints):
         names: Mapping[str, Sequence[str]],
         location: str,
     ) -> None:
-        """The turn of a ball is at least 0; a rigid stop has one degree of freedom."""
+        """Check that ball joints have no `low`, and that a rigid stop has one coordinate."""
         super().check_dofs(joints, names, location)
         acted_on = self.acted_on(joints)
         for joint in acted_on:
             if "spherical" in joints[joint] and self.low is not None:
                 raise SceneError(
-                    f"{location}.low: the turn of a ball joint ('{joint}') is never below 0; give "
+                    f"{location}.low: the angle of a ball joint ('{joint}') is never below 0; give "
                     "high"
                 )
         if self.restitution is not None:
@@ -85,14 +85,14 @@ class JointStop(OnJoints):
                 )
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """Equal and opposite loads on the joint's two bodies."""
+        """Loads on the child, with reactions on the parent."""
         if self.restitution is not None:
             return
         for dof in self.dofs(mechanism):
             yield from dof.loads(negative(dof.along(self._back(mechanism, dof))))
 
     def _back(self, mechanism: Mechanism, dof: Dof) -> Scalar:
-        """k x + c dq/dt where it pushes back, else 0."""
+        """k x + c dq/dt, N m or N, if it pushes back from the limit, else 0."""
         beyond, nothing = self._beyond(mechanism, dof), mechanism.number(0.0)
         back = mechanism.value(self.stiffness) * beyond
         if self.damping == ZERO:
@@ -104,8 +104,8 @@ class JointStop(OnJoints):
             below = nothing
         if self.high is None:
             above = nothing
-        under = mechanism.call("select", -beyond, below, nothing)
-        return mechanism.call("select", beyond, above, under)
+        or_below = mechanism.call("select", -beyond, below, nothing)
+        return mechanism.call("select", beyond, above, or_below)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k x², J; of a rigid stop 0."""

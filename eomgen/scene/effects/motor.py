@@ -10,9 +10,9 @@ from eomgen.scene.effects.dofs import OnCoordinate
 
 
 class Motor(OnCoordinate):
-    """A torque τ, +τ on the joint's child and -τ on its parent (handout (35), (36)).
+    """A torque τ on the joint's child and -τ on its parent (handout (35), (36)).
 
-    At a sliding joint it is a force. `torque = "input"` makes it the input `<name>`.
+    At a prismatic joint it is a force. With `torque = "input"` it is the input `<name>`.
     """
 
     type: Literal["motor"]
@@ -21,14 +21,14 @@ class Motor(OnCoordinate):
     )
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
-        """One input if the torque is one."""
+        """The input with `torque = "input"`."""
         if self.torque != "input":
             return ()
         about = f"motor torque at {self.joint} | motor force at {self.joint}"
         return (Input(self.name, "N m | N", about),)
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """Equal and opposite loads on the joint's two bodies."""
+        """A load on the child, with its reaction on the parent."""
         if self.torque == "input":
             torque = mechanism.input(self.name)
         else:
@@ -38,11 +38,11 @@ class Motor(OnCoordinate):
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """It does while its inputs are 0."""
+        """True if its input is 0."""
         return self.idle(inputs, dimensions)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
-        """Unless its formula uses the motion or the time, or it is on one coordinate of several."""
+        """True unless its formula depends on the motion or on time, or it names a coordinate."""
         if self.coordinate is not None:
             return False
         return self.torque == "input" or all(n in parameters for n in names_in(self.torque))

@@ -1,4 +1,4 @@
-"""A controller of a joint by deviation and rate."""
+"""A proportional-derivative controller of a joint."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""A controller of a joint that leaves no deviation behind."""
+"""A proportional-integral-derivative controller of a joint."""
 
 from typing import Literal
 
@@ -10,10 +10,9 @@ from eomgen.scene.effects.servo import Servo
 class Pid(Servo):
     """c = k_p e + k_d (target_rate - v) + k_i z, dz/dt = e, e = target - q; see `Servo`.
 
-    z is the state `<name>_integral`. Where the command is cut off, it does not wind up: by back
-    calculation dz/dt = e + (c_cut - c)/(k_i T), continuous at the limit, which pulls z back
-    within the tracking time T, `tracking`, k_p/k_i unless given (Åström, Murray, Feedback
-    Systems, section on integrator windup).
+    z is the state `<name>_integral`. While the command is limited, back-calculation prevents
+    windup: dz/dt = e + (c_limited - c)/(k_i T), with the tracking time T, `tracking`, by default
+    k_p/k_i (Åström, Murray, Feedback Systems, section on integrator windup).
     """
 
     type: Literal["pid"]
@@ -26,22 +25,22 @@ class Pid(Servo):
     )
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:
-        """The integral, and what an actuator brings along."""
+        """The integral, and the state of an actuator with lag."""
         about = f"integral of the deviation of {self.name}"
         integral = ExtraState(f"{self.name}_integral", "rad s | m s", about, 0.0)
         return (integral, *super().states(dimensions))
 
-    def wanted(self, mechanism: Mechanism) -> Scalar:
-        """The command before it is cut off, N m or N."""
+    def unlimited_command(self, mechanism: Mechanism) -> Scalar:
+        """The command before saturation, N m or N."""
         integral = mechanism.state(f"{self.name}_integral")
-        return super().wanted(mechanism) + mechanism.value(self.integral_gain) * integral
+        return super().unlimited_command(mechanism) + mechanism.value(self.integral_gain) * integral
 
     def rates(self, mechanism: Mechanism) -> tuple[Scalar, ...]:
-        """The deviation, less what winds up, and how an actuator follows."""
+        """Rate of the integral, with back-calculation, and of an actuator with lag."""
         rate = self.deviation(mechanism)
         if self.limit is not None:
             gain = mechanism.value(self.stiffness)
             if self.tracking is not None:
                 gain = mechanism.value(self.integral_gain) * mechanism.value(self.tracking)
-            rate = rate + (self.command(mechanism) - self.wanted(mechanism)) / gain
+            rate = rate + (self.command(mechanism) - self.unlimited_command(mechanism)) / gain
         return (rate, *super().rates(mechanism))

@@ -1,4 +1,4 @@
-"""What controllers of a joint share: target, gains, saturation, and an actuator with lag."""
+"""The base of joint controllers: target, gains, saturation, and an actuator with lag."""
 
 from collections.abc import Iterator
 
@@ -12,11 +12,10 @@ from eomgen.scene.effects.dofs import OnCoordinate
 
 
 class Servo(OnCoordinate):
-    """A command to a joint, on its child and back on its parent.
+    """A commanded torque c on the joint's child, with its reaction on the parent.
 
-    At a sliding joint it is a force. The command is cut off at ±`limit`, if there is one. With
-    `lag` T the actuator's torque τ follows it by T dτ/dt = c - τ; τ is the state `<name>_torque`
-    and starts at 0.
+    At a prismatic joint it is a force. It is limited to ±`limit`, if given. With `lag` T the
+    actuator's torque τ follows it by T dτ/dt = c - τ; τ is the state `<name>_torque`, initially 0.
     """
 
     name: Identifier
@@ -42,38 +41,38 @@ class Servo(OnCoordinate):
             self.joint, self.coordinate_index(mechanism)
         )
 
-    def wanted(self, mechanism: Mechanism) -> Scalar:
+    def unlimited_command(self, mechanism: Mechanism) -> Scalar:
         """The command before saturation, N m or N."""
-        late = mechanism.value(self.target_rate) - mechanism.rate(
+        rate_deviation = mechanism.value(self.target_rate) - mechanism.rate(
             self.joint, self.coordinate_index(mechanism)
         )
         stiffness, damping = mechanism.value(self.stiffness), mechanism.value(self.damping)
-        return stiffness * self.deviation(mechanism) + damping * late
+        return stiffness * self.deviation(mechanism) + damping * rate_deviation
 
     def command(self, mechanism: Mechanism) -> Scalar:
-        """The command, N m or N."""
-        wanted = self.wanted(mechanism)
+        """The command after saturation, N m or N."""
+        command = self.unlimited_command(mechanism)
         if self.limit is None:
-            return wanted
+            return command
         limit = mechanism.value(self.limit)
-        return mechanism.call("max", -limit, mechanism.call("min", limit, wanted))
+        return mechanism.call("max", -limit, mechanism.call("min", limit, command))
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:
-        """The torque of an actuator with lag."""
+        """The torque of an actuator with lag, if there is one."""
         if self.lag is None:
             return ()
         about = f"torque of {self.name} | force of {self.name}"
         return (ExtraState(f"{self.name}_torque", "N m | N", about, 0.0),)
 
     def rates(self, mechanism: Mechanism) -> tuple[Scalar, ...]:
-        """How it follows the command."""
+        """Rate of the actuator's torque."""
         if self.lag is None:
             return ()
-        short = self.command(mechanism) - mechanism.state(f"{self.name}_torque")
-        return (short / mechanism.value(self.lag),)
+        difference = self.command(mechanism) - mechanism.state(f"{self.name}_torque")
+        return (difference / mechanism.value(self.lag),)
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
-        """The command, or what the actuator makes of it."""
+        """The command, or the torque of an actuator with lag."""
         if self.lag is None:
             yield JointLoad(self.joint, self.command(mechanism), self.coordinate_index(mechanism))
         else:

@@ -1,4 +1,4 @@
-"""A spring and damper between two points, or a rope."""
+"""A spring and damper, or a rope, between two points."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,17 +17,17 @@ from eomgen.scene.effects.vectors import dot, nearest_square, negative, sub
 
 
 class Spring(EffectTable):
-    """Pulls two points together with k s + c ds/dt along the line between them (N).
+    """A tension k s + c ds/dt (N) along the line between two points.
 
-    d runs from point 1 to point 2, s = |d| - rest length. A `law` over `stretch` s (m) and `rate`
-    ds/dt (m/s) stands for k s; positive pulls. With `tension_only` it is a rope: nothing where
-    s <= 0, and damping never makes it push. Potential energy is ½ k s²; a law has none, what it
-    gives and takes is power.
+    d is the vector from point 1 to point 2, s = |d| - rest length. A `law` of `stretch` s (m) and
+    `rate` ds/dt (m/s) replaces k s; it is positive in tension. With `tension_only` it is a rope:
+    the force is 0 if s <= 0, and never compressive. The potential energy is ½ k s²; a law has none,
+    so its work counts as that of an applied force.
 
-    Points nearer than ε = 1e-9 m have no sure line between them. There |d| counts as ε and the
-    force falls with d to nothing, T(ε) d/ε; damping becomes that of the whole relative velocity,
-    c ((u·ḋ) u + (1 - u·u) ḋ) with u = d/ε. Everything is continuous and finite, the energy that
-    of the force; without rest length the spring is k d anywhere.
+    The direction of d is undefined at d = 0, so it is smoothed below ε = 1e-9 m: there |d| is
+    replaced by ε and the force is T(ε) d/ε, which falls to 0; damping acts on the whole relative
+    velocity, c ((u·ḋ) u + (1 - u·u) ḋ) with u = d/ε. Force and energy are continuous and
+    consistent; with rest length 0 the force is k d everywhere.
     """
 
     anchor_fields = ("body_1", "body_2")
@@ -61,16 +61,16 @@ class Spring(EffectTable):
     @classmethod
     def _another_body(cls, name: str, info: ValidationInfo) -> str:
         if name == info.data.get("body_1"):
-            raise ValueError("is body_1 too, whose points keep their distance; name another body")
+            raise ValueError("is also body_1, whose points keep their distance; name another body")
         return name
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """Something must pull, and a law stands alone."""
+        """Check that there is stiffness, damping or a law, but not stiffness and a law."""
         check_law(self, self.law, location)
         return self
 
     def conditions(self, location: str) -> Iterator[Condition]:
-        """A length is not negative, whatever else may be."""
+        """The rest length is not negative, even with `allow_active`."""
         yield not_negative(f"{location}.rest_length", self.rest_length, "m")
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
@@ -91,8 +91,8 @@ class Spring(EffectTable):
             tension = per_length * stretch
             if self.rest_length != ZERO:
                 per_length = tension / line.length
-        against = line.resisted(mechanism.number(1.0))
-        pull = tuple(per_length * d + damping * w for d, w in zip(line.d, against, strict=True))
+        opposed = line.damped_velocity(mechanism.number(1.0))
+        pull = tuple(per_length * d + damping * w for d, w in zip(line.d, opposed, strict=True))
         if not self.tension_only:
             return pull
         taut = mechanism.call("min", stretch, tension + damping * rate)
@@ -102,22 +102,22 @@ class Spring(EffectTable):
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
     ) -> bool:
-        """It does without damping, if its law is that of a spring."""
+        """True without damping and without a law."""
         return self.law is None and are_zero(values, self.damping)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """½ k s², J, of a rope only where it is taut."""
+        """½ k s², J; 0 while a rope is slack."""
         half, nothing = mechanism.number(0.5), mechanism.number(0.0)
         if self.law is not None:
             return nothing
         line = _line(self, mechanism)
-        if self.rest_length == ZERO:  # no rope is slack then
+        if self.rest_length == ZERO:  # a rope is then never slack
             return half * mechanism.value(self.stiffness) * line.square
-        # The second term is 0 but for points that nearly meet, where it has the force for a slope.
+        # The second term is 0 unless |d| < ε; there its derivative is that of the smoothed force.
         one, stretch = mechanism.number(1.0), line.stretch
         rest = mechanism.value(self.rest_length)
-        meeting = (line.square - line.larger) * (one - rest / line.length)
-        energy = half * mechanism.value(self.stiffness) * (stretch * stretch + meeting)
+        smoothing = (line.square - line.larger) * (one - rest / line.length)
+        energy = half * mechanism.value(self.stiffness) * (stretch * stretch + smoothing)
         if self.tension_only:
             return mechanism.call("select", stretch, energy, nothing)
         return energy
@@ -125,7 +125,7 @@ class Spring(EffectTable):
 
 @dataclass(frozen=True)
 class _Line:
-    """The line between the ends of a spring: m and m/s, vectors in world axes."""
+    """The line between the ends of a spring; vectors in world axes, m and m/s."""
 
     at_1: Components
     at_2: Components
@@ -134,19 +134,19 @@ class _Line:
     square: Scalar
     """|d|²"""
     larger: Scalar
-    """|d|², at least ε²"""
+    """max(|d|², ε²)"""
     length: Scalar
-    """Its root."""
+    """Square root of `larger`."""
     stretch: Scalar
 
     @property
     def rate(self) -> Scalar:
-        """ds/dt, m/s; it falls to 0 where points meet."""
+        """ds/dt, m/s; below ε it falls to 0 with d."""
         return dot(self.d, self.d_dot) / self.length
 
-    def resisted(self, one: Scalar) -> Components:
-        """The velocity that damping acts against, m/s: (u·ḋ) u + (1 - u·u) ḋ, whose last term is 0
-        but for points that meet.
+    def damped_velocity(self, one: Scalar) -> Components:
+        """The velocity that damping opposes, m/s: (u·ḋ) u + (1 - u·u) ḋ. The last term is 0 unless
+        |d| < ε.
         """
         along, across = dot(self.d, self.d_dot) / self.larger, one - self.square / self.larger
         return tuple(along * x + across * y for x, y in zip(self.d, self.d_dot, strict=True))
@@ -165,9 +165,9 @@ def _line(spring: Spring, mechanism: Mechanism) -> _Line:
 
 
 def check_law(table: EffectTable, law: Formula | None, location: str) -> None:
-    """Raise `SceneError` unless a spring has stiffness, damping or a law, and no law too many."""
+    """Raise `SceneError` without stiffness, damping and law, or with both stiffness and law."""
     given = table.model_fields_set
     if law is None and not given & {"stiffness", "damping"}:
         raise SceneError(f"{location}.stiffness: missing; give it, or damping or a law")
     if law is not None and "stiffness" in given:
-        raise SceneError(f"{location}.stiffness: a law stands in its place; give one of them")
+        raise SceneError(f"{location}.stiffness: a law replaces it; give one of them")

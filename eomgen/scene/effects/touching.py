@@ -1,4 +1,4 @@
-"""The geometry of contact: points, spheres and corners on a plane, spheres on each other."""
+"""Contact geometry: points, spheres and corners on a plane, spheres on spheres."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,10 +10,10 @@ from eomgen.scene.joints.base import WORLD
 
 @dataclass(frozen=True)
 class Side:
-    """The contact point P on one of two bodies: the body's point `at` plus a lever.
+    """The contact point P as a point of one of the two bodies: its point `at` plus a lever.
 
-    `at` from the centre of mass in body axes; the lever is `arm` + `reach` n, m, world axes.
-    () and None are none of either.
+    `at` is from the centre of mass in body axes, m. The lever is `arm` + `reach` n in world axes,
+    m, with the normal n; () and None stand for 0.
     """
 
     body: str
@@ -24,24 +24,26 @@ class Side:
 
 @dataclass(frozen=True)
 class Touch:
-    """Two things that may touch, at a state; where they touch, P is the same point of both.
+    """A possible contact at a state. If the gap is 0, P is the same point on both sides.
 
-    `normal` n, world axes, has unit length and drives the first away from the second; `gap` is
-    their distance, m, negative where they overlap. The second side is left out if the world's.
-    `meeting` is 0, m, but for centres within ε = `NEAREST` of each other: (ε² - d²)/(2 ε).
+    normal       unit vector n, world axes, from the second body to the first
+    gap          distance, m; negative if they overlap
+    sides        the first body and, unless it is the world, the second
+    energy_term  times the elastic force it is added to the potential energy, m; None for 0. It is
+                 not 0 only if centres are within ε = `NEAREST` of each other: (ε² - d²)/(2 ε)
     """
 
     normal: Vector
     gap: Scalar
     sides: tuple[Side, ...]
-    meeting: Scalar | None = None
+    energy_term: Scalar | None = None
 
 
 @dataclass(frozen=True)
 class Plane:
-    """Of the points x with n·x = offset, from the point `at` of a body or of the world.
+    """The points x with n·x = offset, where x is from the point `at` of a body or of the world.
 
-    `normal` n is in the body's axes, as `at` is.
+    `normal` n and `at` are in the body's axes.
     """
 
     body: str
@@ -52,7 +54,7 @@ class Plane:
 
 @dataclass(frozen=True)
 class Ball:
-    """A sphere, in the plane a circle, about the point `at` of a body or of the world."""
+    """A sphere, or a circle in the plane, with centre `at` on a body or in the world."""
 
     body: str
     at: Vector
@@ -62,9 +64,10 @@ class Ball:
 def on_plane(
     mechanism: Mechanism, plane: Plane, ball: Ball, corners: Vector | None = None
 ) -> Iterator[Touch]:
-    """A ball on a plane; or one about each corner of a box, of these half sizes, about its `at`.
+    """The contact of a ball with a plane; with `corners`, half sizes of a box centred at the ball's
+    `at`, those of a ball at each corner.
 
-    Corners count the signs of x, y, z up, x first: (-, -, -), (+, -, -), (-, +, -), …
+    The signs of the corners' x, y, z are in the order (-, -, -), (+, -, -), (-, +, -), …
     """
     normal = mechanism.outward(plane.body, plane.normal)
     centre = mechanism.position(ball.body, ball.at)
@@ -86,11 +89,11 @@ def on_plane(
 
 
 def on_ball(mechanism: Mechanism, first: Ball, second: Ball) -> Touch:
-    """Two balls, of which at least one has a radius.
+    """The contact of two balls, at least one with a radius > 0.
 
-    P divides the way between the centres as the radii do: one point of both, however deep they
-    overlap, so that they change no angular momentum. Centres within ε = `NEAREST` of each other
-    have no sure normal: there n is d/ε, d the way from the second to the first, and 0 at last.
+    P divides the line between the centres in the ratio of the radii. It is one point of both bodies
+    at any depth, so the forces conserve angular momentum. If the centres are within ε = `NEAREST`
+    of each other, n is d/ε with the vector d from the second centre to the first, so it falls to 0.
     """
     d = sub(mechanism.position(first.body, first.at), mechanism.position(second.body, second.at))
     square = dot(d, d)
@@ -104,34 +107,34 @@ def on_ball(mechanism: Mechanism, first: Ball, second: Ball) -> Touch:
     return Touch(normal, length - both, tuple(sides), (larger - square) / (length + length))
 
 
-def parting(mechanism: Mechanism, touch: Touch) -> Scalar:
+def gap_rate_of(mechanism: Mechanism, touch: Touch) -> Scalar:
     """The rate of the gap, m/s."""
-    return dot(touch.normal, _between([_speed(mechanism, side, side.arm) for side in touch.sides]))
+    return dot(touch.normal, _relative([_speed(mechanism, side, side.arm) for side in touch.sides]))
 
 
-def sliding(mechanism: Mechanism, touch: Touch) -> tuple[Scalar, Vector]:
-    """The rate of the gap, and the slip velocity of the first on the second, world axes, m/s."""
+def gap_rate_and_slip(mechanism: Mechanism, touch: Touch) -> tuple[Scalar, Vector]:
+    """The rate of the gap, and the slip velocity of the first body on the second, m/s."""
     levers = (_lever(touch, side) for side in touch.sides)
     speeds = [_speed(mechanism, s, lever) for s, lever in zip(touch.sides, levers, strict=True)]
-    u = _between(speeds)
-    apart = dot(touch.normal, u)
-    return apart, sub(u, scale(apart, touch.normal))
+    u = _relative(speeds)
+    gap_rate = dot(touch.normal, u)
+    return gap_rate, sub(u, scale(gap_rate, touch.normal))
 
 
 def point_loads(touch: Touch, force: Vector) -> tuple[Load, ...]:
-    """A force at P on the first side, N, world axes, and its opposite on the second."""
+    """The loads of a force (N, world axes) at P on the first body, and of its reaction."""
     return _on_both(touch, force, [_lever(touch, side) for side in touch.sides])
 
 
-def pressing(touch: Touch, force: Scalar) -> tuple[Load, ...]:
-    """The same for a force along the normal, whose lever along the normal has no moment."""
+def normal_loads(touch: Touch, force: Scalar) -> tuple[Load, ...]:
+    """As `point_loads` for a force along the normal. The lever's part along n has no moment."""
     return _on_both(touch, scale(force, touch.normal), [side.arm for side in touch.sides])
 
 
 def tangents(mechanism: Mechanism, touch: Touch) -> tuple[Vector, ...]:
-    """Unit tangents, normal to each other, in world axes: one in the plane, two in space.
+    """Orthonormal tangents in world axes: one in the plane, two in space.
 
-    n, t1, t2 are right-handed, by Duff et al., "Building an orthonormal basis, revisited",
+    n, t1, t2 are right-handed: Duff et al., "Building an orthonormal basis, revisited",
     J. Computer Graphics Techniques 6 (2017) 1-8.
     """
     if len(touch.normal) == 2:
@@ -146,7 +149,7 @@ def tangents(mechanism: Mechanism, touch: Touch) -> tuple[Vector, ...]:
 
 
 def merged(loads: Sequence[Load]) -> Iterator[Load]:
-    """The loads, with those on the same point of a body added."""
+    """The loads, with the sum of those at the same point of a body."""
     found: dict[tuple[str, Vector], Load] = {}
     for load in loads:
         key = load.body, load.at
@@ -169,7 +172,7 @@ def _on_both(touch: Touch, force: Vector, levers: Sequence[Vector]) -> tuple[Loa
 
 
 def _lever(touch: Touch, side: Side) -> Vector:
-    """The vector from the side's own point to P, world axes, m."""
+    """The vector from the point `at` of a side to P, world axes, m."""
     if side.reach is None:
         return side.arm
     reach = scale(side.reach, touch.normal)
@@ -177,7 +180,7 @@ def _lever(touch: Touch, side: Side) -> Vector:
 
 
 def _speed(mechanism: Mechanism, side: Side, lever: Vector) -> Vector:
-    """World velocity of the body's point plus a lever, m/s."""
+    """World velocity of the point `at` plus a lever, fixed to the body, m/s."""
     speed = mechanism.velocity(side.body, side.at)
     if not lever:
         return speed
@@ -188,20 +191,20 @@ def _speed(mechanism: Mechanism, side: Side, lever: Vector) -> Vector:
     return add(speed, cross(w, lever))
 
 
-def _between(speeds: Sequence[Vector]) -> Vector:
-    """The first velocity, relative to the second if there is one."""
+def _relative(speeds: Sequence[Vector]) -> Vector:
+    """The velocity of the first side relative to the second, if there is one."""
     return sub(*speeds) if len(speeds) == 2 else speeds[0]
 
 
 def _edge(mechanism: Mechanism, body: str, size: Scalar, axis: int) -> Vector:
-    """Half an edge of a box along an axis of its body, world axes."""
+    """Half an edge of a box along an axis of its body, in world axes, m."""
     zero = mechanism.number(0.0)
     parts = [size if i == axis else zero for i in range(mechanism.dimensions)]
     return mechanism.outward(body, tuple(parts))
 
 
 def _signed_sums(parts: Sequence[Vector]) -> list[Vector]:
-    """±a ±b …, every choice of signs, those of the first changing fastest."""
+    """All sums ±a ±b …; the sign of the first changes fastest."""
     first, *others = parts
     sums = [negative(first), first]
     for other in others:

@@ -1,6 +1,6 @@
 """Vectors of effects: two components in the plane, three in space, over any scalars.
 
-`LEAST_SQUARE` and `NEAREST` are what keeps lengths and directions finite where points meet.
+`LEAST_SQUARE` and `NEAREST` keep lengths and directions finite where points coincide.
 """
 
 from collections.abc import Iterable
@@ -8,16 +8,17 @@ from collections.abc import Iterable
 from eomgen.scene.effects.base import Mechanism, Scalar, Vector
 
 LEAST_SQUARE = 1e-300
-"""Of a length under a root: less counts as this."""
+"""Lower bound of the square of a length under a root."""
 
 NEAREST = 1e-9
-"""Distance, m, within which the line between two points has no sure direction: see `Spring`. So it
-is in a scene of ordinary size; in one of molecules or planets it is as small beside them.
+"""Distance below which the direction from one point to another is smoothed: see `Spring`.
+
+Relative to `Mechanism.magnitude`, so it is in m for a scene of ordinary size.
 """
 
 
 def nearest_square(mechanism: Mechanism) -> Scalar:
-    """The square of that distance, m²."""
+    """The square of `NEAREST` at the scale of the mechanism, m²."""
     return mechanism.number((NEAREST * mechanism.magnitude) ** 2)
 
 
@@ -50,7 +51,7 @@ def dot(a: Vector, b: Vector) -> Scalar:
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a × b; in the plane its one component, along z."""
+    """a × b; in the plane its z component."""
     if len(a) == 2:
         return (a[0] * b[1] - a[1] * b[0],)
     return (
@@ -61,11 +62,11 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 def length(mechanism: Mechanism, vector: Vector) -> Scalar:
-    """|a|, with a Jacobian that is finite and exact everywhere, 0 at a = 0.
+    """|a|, with an exact and finite derivative everywhere, which is 0 at a = 0.
 
-    Of several components it is sqrt(max(a·a, 1e-300)): the greater of two has the slope of the one
-    it takes, so that no root of 0 is ever differentiated. It is 1e-150 at a = 0, and right to
-    the last bit from there upwards; |a| a is exactly 0 at a = 0.
+    For several components it is sqrt(max(a·a, 1e-300)). The derivative of max is that of the
+    greater argument, so the root of 0 is never differentiated. At a = 0 the result is 1e-150, so
+    |a| a is exactly 0 there; above 1e-150 it is exact.
     """
     if len(vector) == 1:
         return mechanism.call("abs", vector[0])

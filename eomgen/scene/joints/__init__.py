@@ -1,4 +1,4 @@
-"""Joint types, one file each. To add one, write its file and name it here."""
+"""Joint types, one file each. To add one, write its file and list it here."""
 
 from typing import Annotated
 
@@ -17,7 +17,7 @@ Joint = Annotated[
     Ball | Cylindrical | Free | Planar | Prismatic | Revolute | Universal | Weld,
     Field(discriminator="type"),
 ]
-"""Any joint of a scene, told apart by its `type`."""
+"""Any joint of a scene; its `type` selects the class."""
 
 __all__ = [
     "Ball",

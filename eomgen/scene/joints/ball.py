@@ -6,9 +6,10 @@ from eomgen.scene.joints.base import Coordinate, JointTable, Primitive
 
 
 class Ball(JointTable):
-    """The child turns freely about a point: world_R_child = world_R_parent E R(quaternion).
+    """The child rotates about a point: world_R_child = world_R_parent E R(quaternion).
 
-    Its velocities are the child's angular velocity relative to the parent, in the child's axes.
+    E is the fixed rotation `orientation_deg`. The velocities are the angular velocity of the child
+    relative to the parent, in the child's axes.
     """
 
     spaces: ClassVar[tuple[int, ...]] = (3,)
@@ -28,12 +29,12 @@ class Ball(JointTable):
 
 
 def quaternion(prefix: str, child: str, parent: str) -> tuple[Coordinate, ...]:
-    """The four coordinates of an orientation."""
+    """The coordinates of an orientation: a unit quaternion w, x, y, z."""
     about = f"of the unit quaternion of {child} in {parent}"
     return tuple(Coordinate(f"{prefix}_q{part}", "", f"{part} {about}") for part in "wxyz")
 
 
 def angular_velocity(prefix: str, child: str, parent: str) -> tuple[Coordinate, ...]:
-    """The three velocities that belong to an orientation."""
+    """The velocities of an orientation: the angular velocity in the child's axes."""
     about = f"of the angular velocity of {child} against {parent}, axes of {child}"
     return tuple(Coordinate(f"{prefix}_w{part}", "rad/s", f"{part} {about}") for part in "xyz")

@@ -1,4 +1,4 @@
-"""What joint types share: their table, their coordinates, and their primitives.
+"""The base of joint types: their table, coordinates and primitives.
 
 A joint is a sequence of primitives: revolute, prismatic or spherical. The velocity of the child
 relative to the parent is S v for the joint's velocities v. The columns of S, the joint motion
@@ -17,7 +17,7 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, Vector, quantity
 
 WORLD = "world"
-"""The name of the ground: the parent of every tree's first joint."""
+"""The name of the ground, the root of each tree."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ Z_AXIS = (0.0, 0.0, 1.0)
 
 
 class JointTable(Table):
-    """The keys of every joint but the free one: two bodies, a point on each, a fixed rotation."""
+    """The keys of all joints except the free one: two bodies, a point on each, a fixed rotation."""
 
     spaces: ClassVar[tuple[int, ...]] = (2, 3)
     """Dimensions of scenes that this joint type exists in."""
@@ -80,7 +80,7 @@ class JointTable(Table):
 
 
 class Geared(JointTable):
-    """A joint with one coordinate, which a motor's rotor may be geared to."""
+    """A joint with one coordinate, and optionally the geared rotor of a motor."""
 
     coordinate: Identifier | None = Field(default=None, description="name of the coordinate")
     motor_inertia: Quantity = quantity(

@@ -1,4 +1,4 @@
-"""The cylindrical joint: a bolt in a sleeve."""
+"""The cylindrical joint: translation along an axis and rotation about it."""
 
 from typing import ClassVar, Literal
 
@@ -10,7 +10,7 @@ from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Primitive, 
 
 
 class Cylindrical(JointTable):
-    """The child slides along `axis` and turns about it."""
+    """The child translates along `axis` and rotates about it."""
 
     spaces: ClassVar[tuple[int, ...]] = (3,)
     type: Literal["cylindrical"]
@@ -20,7 +20,7 @@ class Cylindrical(JointTable):
     )
 
     def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
-        """Slide and angle."""
+        """Displacement and angle."""
         slide, angle = self.coordinates or (f"{self.name}_slide", f"{self.name}_angle")
         return (
             Coordinate(slide, "m", f"way of {self.child} along {self.parent}"),

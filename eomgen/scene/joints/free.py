@@ -12,11 +12,11 @@ PLANE, SPACE = 2, 3
 
 
 class Free(Table):
-    """A body free in the plane or in space.
+    """A body that moves freely in the plane or in space.
 
-    In the plane x, y of its centre of mass and its angle, in world axes. In space x, y, z of its
-    centre of mass and the unit quaternion of world_R_body; its velocities are those of the centre
-    of mass in world axes, and its angular velocity in its own axes.
+    In the plane its coordinates are x, y of the centre of mass in world axes, and its angle. In
+    space they are x, y, z of the centre of mass and the unit quaternion of world_R_body; its
+    velocities are that of the centre of mass in world axes and the angular velocity in body axes.
     """
 
     spaces: ClassVar[tuple[int, ...]] = (PLANE, SPACE)
@@ -30,7 +30,7 @@ class Free(Table):
     )
 
     def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
-        """The joint's coordinates, in the order they take in `q`."""
+        """The coordinates, in the order of `q`."""
         last = "angle" if dimensions == PLANE else "z"
         names = self.coordinates or (f"{self.child}_x", f"{self.child}_y", f"{self.child}_{last}")
         axes = "xyz"[:dimensions]
@@ -44,7 +44,7 @@ class Free(Table):
         return (*translation, *quaternion(self.child, self.child, WORLD))
 
     def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
-        """Rates of the coordinates; of a quaternion, the angular velocity."""
+        """Rates of the coordinates, but the angular velocity for the quaternion."""
         positions = self.positions(dimensions)
         if dimensions == PLANE:
             return tuple(c.rate for c in positions)
@@ -52,7 +52,7 @@ class Free(Table):
         return (*rates, *angular_velocity(self.child, self.child, WORLD))
 
     def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
-        """Prismatic ones along the world's axes, then a revolute or a spherical one."""
+        """Prismatic primitives along the world's axes, then a revolute or a spherical one."""
         axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), Z_AXIS)
         slides = tuple(Primitive("prismatic", axis) for axis in axes[:dimensions])
         return (

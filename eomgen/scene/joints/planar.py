@@ -1,4 +1,4 @@
-"""The planar joint: a body that slides and turns on a plane of its parent."""
+"""The planar joint: translation in a plane of the parent and rotation about its normal."""
 
 from typing import Literal
 
@@ -9,7 +9,7 @@ from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Primitive
 
 
 class Planar(JointTable):
-    """The child slides along x and y of the joint's axes, and turns about their z."""
+    """The child translates along x and y of the joint's axes, and rotates about z."""
 
     type: Literal["planar"]
     coordinates: tuple[Identifier, Identifier, Identifier] | None = Field(
@@ -18,7 +18,7 @@ class Planar(JointTable):
     )
 
     def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
-        """Two slides and an angle."""
+        """Two displacements and an angle."""
         x, y, angle = self.coordinates or (
             f"{self.name}_x",
             f"{self.name}_y",

@@ -1,4 +1,4 @@
-"""The prismatic (sliding) joint."""
+"""The prismatic joint."""
 
 from typing import Literal
 
@@ -9,7 +9,7 @@ from eomgen.scene.joints.base import WORLD, Coordinate, Geared, Primitive, spati
 
 
 class Prismatic(Geared):
-    """The child slides along `axis`, a direction of both bodies, and does not turn."""
+    """The child translates along `axis` and does not rotate relative to the parent."""
 
     type: Literal["prismatic"]
     axis: Numbers = Field(description="direction in the child's axes")

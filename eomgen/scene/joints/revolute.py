@@ -1,4 +1,4 @@
-"""The revolute joint: a pin between two bodies, or between a body and the world."""
+"""The revolute joint between two bodies, or between a body and the world."""
 
 from typing import Literal
 
@@ -11,9 +11,9 @@ from eomgen.scene.joints.base import WORLD, Z_AXIS, Coordinate, Geared, Primitiv
 class Revolute(Geared):
     """A pin: x_child = x_parent + r_parent - r_child (handout (21)).
 
-    `r_parent` runs from the parent's centre of mass (or the world's origin) to the pin in the
-    parent's axes, `r_child` from the child's centre of mass to the pin in the child's axes. In the
-    plane it turns about z.
+    `r_parent` is the pin's position from the parent's centre of mass (or the world's origin) in the
+    parent's axes, `r_child` that from the child's centre of mass in the child's axes. In the plane
+    the axis is z.
     """
 
     type: Literal["revolute"]

@@ -10,13 +10,13 @@ from eomgen.scene.joints.base import Coordinate, JointTable, Primitive, spatial
 
 
 class Universal(JointTable):
-    """The child turns about the first axis, and then about the second, which the first carries."""
+    """The child rotates about the first axis, and about the second, which moves with the first."""
 
     spaces: ClassVar[tuple[int, ...]] = (3,)
     type: Literal["universal"]
     axes: tuple[Numbers, Numbers] = Field(
         default=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-        description="two directions; in the joint's axes, and in those that the first turn leaves",
+        description="two directions: in the joint's axes, and in these after the first rotation",
     )
     coordinates: tuple[Identifier, Identifier] | None = Field(
         default=None, description="names of the angles; <name>_angle_1, <name>_angle_2 if absent"

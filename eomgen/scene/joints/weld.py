@@ -1,4 +1,4 @@
-"""The weld: two bodies that move as one."""
+"""The weld: a rigid connection of two bodies."""
 
 from typing import Literal
 
@@ -6,18 +6,18 @@ from eomgen.scene.joints.base import Coordinate, JointTable, Primitive
 
 
 class Weld(JointTable):
-    """No motion at all; the child keeps its place in the parent."""
+    """The child is fixed to the parent."""
 
     type: Literal["weld"]
 
     def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
-        """A weld has no coordinate."""
+        """None."""
         return ()
 
     def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
-        """Nor a velocity."""
+        """None."""
         return ()
 
     def primitives(self, dimensions: int) -> tuple[Primitive, ...]:
-        """Nor a move."""
+        """None."""
         return ()

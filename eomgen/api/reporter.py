@@ -1,0 +1,58 @@
+"""How a computation reports to its caller: notes, trial runs, progress. By default it is silent."""
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+
+from eomgen.errors import EomgenError, SceneError
+from eomgen.run.progress import Progress
+
+
+def _ignore(text: str) -> None:
+    pass
+
+
+def _no_progress(label: str) -> AbstractContextManager[Progress]:
+    return nullcontext(lambda fraction: None)
+
+
+def _no_notice(label: str) -> AbstractContextManager[None]:
+    return nullcontext()
+
+
+@dataclass(frozen=True)
+class Reporter:
+    """Callbacks of a caller, and the names that its messages use.
+
+    scene     name of the scene, which starts messages about it; "" for none
+    argument  name of an argument in messages: `t_end` is `--t-end` on the command line
+    note      receives notes, for example that the store cannot be used
+    trial     receives a line for each trial run
+    waiting   a context that shows a notice while it is open
+    progress  a context that shows how much of a computation is done
+    """
+
+    scene: str = ""
+    argument: Callable[[str], str] = str
+    note: Callable[[str], None] = _ignore
+    trial: Callable[[str], None] = _ignore
+    waiting: Callable[[str], AbstractContextManager[None]] = _no_notice
+    progress: Callable[[str], AbstractContextManager[Progress]] = _no_progress
+
+    @contextmanager
+    def located(self) -> Iterator[None]:
+        """A context whose errors are raised as `SceneError`, each line after the scene's name."""
+        try:
+            yield
+        except EomgenError as error:
+            if not self.scene:
+                raise
+            raise SceneError(*(f"{self.scene}: {line}" for line in error.lines)) from None
+
+    def note_scene(self, text: str) -> None:
+        """Note something about the scene."""
+        self.note(f"{self.scene}: {text}" if self.scene else text)
+
+
+SILENT = Reporter()
+"""Reports nothing."""
