@@ -296,8 +296,11 @@ def test_check_refuses_a_singular_mass_matrix(
     assert not list(tmp_path.glob("*.py"))
 
 
-def test_routes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_routes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A file of each, named after it where it is not the scene's own; why one was taken."""
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path / "store"))
     out = str(tmp_path)
     base = ["generate", "cart_pole", "-o", out]
     for route, name in (("auto", "cart_pole"), ("ldl", "cart_pole_ldl"), ("aba", "cart_pole_aba")):
