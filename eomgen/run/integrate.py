@@ -12,7 +12,7 @@ from eomgen.run.checks import check_repairs, check_rest_speed, numbers
 from eomgen.run.guard import OF_TOLERANCE, Guard, RoundingMonitor, monitored, repaired
 from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
-from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.stepping import ANEW, Asked, adaptive_steps, begun, can_go_on, equal_steps
 from eomgen.run.tally import Tally
@@ -309,40 +309,43 @@ def _follow(
         return Outcome("ended", end.reason), f"stopped at {_place(problem, run)}: {end}"
     except StepFailure as failure:
         why = problem.explain(run.t, run.y, problem.initial)
-        outcome = Outcome("stopped", failure.reason, failure.remedy)
-        if why:
-            outcome = _stopped(f"{failure.reason}: {why}")
+        outcome = (
+            Outcome("stopped", f"{failure.reason}: {why.reason}", why.remedy)
+            if why
+            else Outcome("stopped", failure.reason, failure.remedy)
+        )
     # Plain Python arithmetic raises where NumPy would give inf or nan: math.exp(1000), 1 / 0.0,
     # math.sqrt(-1); a ValueError is also how SciPy's factorizations refuse a nan.
     except (ArithmeticError, ValueError) as error:
-        plain = f"{type(error).__name__}: {error}; {method.remedy}"
-        outcome = _stopped(_why(counts, problem, run, plain))
+        plain = Explanation(f"{type(error).__name__}: {error}", method.remedy)
+        outcome = Outcome("stopped", *_explained(counts, problem, run, plain))
     run.end()
     cause = "; ".join(filter(None, (outcome.reason, outcome.remedy)))
     return outcome, f"stopped at {_place(problem, run)}: {cause}"
 
 
-def _stopped(cause: str) -> Outcome:
-    """Of an explanation, whose remedy follows the first semicolon."""
-    reason, _, remedy = (part.strip() for part in cause.partition(";"))
-    return Outcome("stopped", reason, remedy)
+def _explained(
+    counts: tuple[_Count, _Count], problem: Problem, run: _Run, error: Explanation
+) -> Explanation:
+    """The model's explanation of an error in the step after (run.t, run.y), else the error itself.
 
+    The state at which the derivative or the Jacobian raised the error is explained first, then the
+    one that the step started from.
+    """
 
-def _why(counts: tuple[_Count, _Count], problem: Problem, run: _Run, error: str) -> str:
-    """What had no value in the step from where a run has come to, or else the bare error."""
-    for count in counts:
-        if count.failed is not None:
-            t, y = count.failed
-            here = t == run.t and np.array_equal(y, run.y)
-            why = problem.explain(t, y, problem.initial)
-            if why:
-                return f"{'there' if here else 'in the next step'} {why}"
-            why = "" if here else problem.explain(run.t, run.y, problem.initial)
-            if why:
-                return f"there {why}"
-            return f"the Jacobian: {error}" if count is counts[1] else error
-    why = problem.explain(run.t, run.y, problem.initial)
-    return f"there {why}" if why else error
+    def explain(t: float, y: FloatArray, where: str) -> Explanation | None:
+        why = problem.explain(t, y, problem.initial)
+        return why and Explanation(f"{where} {why.reason}", why.remedy)
+
+    failed = next((count for count in counts if count.failed is not None), None)
+    why = None
+    if failed is not None and failed.failed is not None:
+        t, y = failed.failed
+        if not (t == run.t and np.array_equal(y, run.y)):
+            why = explain(t, y, "in the next step")
+    if failed is counts[1]:
+        error = Explanation(f"the Jacobian: {error.reason}", error.remedy)
+    return why or explain(run.t, run.y, "there") or error
 
 
 def _check_start(problem: Problem, run: _Run) -> None:
