@@ -16,7 +16,7 @@ import numpy as np
 from eomgen.run.branches import Again, Lookout, Made
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume, StepFailure
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
-from eomgen.run.integrators.unwarned import UNWARNED, Remark
+from eomgen.run.integrators.unwarned import BDF, Radau, Remark
 from eomgen.run.problem import FloatArray, Problem
 
 _STALLED = 100
@@ -145,7 +145,7 @@ class _Course:
         self.solver: Any = self.method.solver(
             self._problem.derivative, t, y.copy(), bound, max_step=self._longest, **options
         )
-        if isinstance(self.solver, UNWARNED):
+        if isinstance(self.solver, Radau | BDF):
             self.solver.remark = self._remark
         self.solver.t_bound = until
         self._until = until
