@@ -320,8 +320,7 @@ def _follow(
         plain = Explanation(f"{type(error).__name__}: {error}", method.remedy)
         outcome = Outcome("stopped", *_explained(counts, problem, run, plain))
     run.end()
-    cause = "; ".join(filter(None, (outcome.reason, outcome.remedy)))
-    return outcome, f"stopped at {_place(problem, run)}: {cause}"
+    return outcome, f"stopped at {_place(problem, run)}: {outcome}"
 
 
 def _explained(

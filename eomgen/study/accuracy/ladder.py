@@ -70,7 +70,8 @@ class Work:
     spread             median wall time less the least, s
     units              counted work (see `study.accuracy.cost`): the same on every machine
     steps, derivatives, jacobians   counts of one run
-    reason             why it is not "ok", or an integrator's remark
+    reason             why it is not "ok", and what to change; or an integrator's remark
+    stopped_at         the time at which a failed run stopped, s
     """
 
     rung: Rung
@@ -87,6 +88,7 @@ class Work:
     derivatives: int = 0
     jacobians: int = 0
     reason: str = ""
+    stopped_at: float = np.nan
     spread: float = np.nan
     units: float = np.nan
 

@@ -48,6 +48,7 @@ COLUMNS = (
     "derivatives",
     "jacobians",
     "reason",
+    "stopped_at_s",
 )
 """Errors and drifts have no unit: they are relative to the motion's own scale, or its energy."""
 GENERATION, KEY = "generation_s", "eomgen_key"
@@ -143,6 +144,7 @@ def _row(work: Work) -> list[object]:
         work.derivatives,
         work.jacobians,
         " ".join(work.reason.split()),
+        _cell(work.stopped_at),
     ]
 
 
@@ -179,6 +181,7 @@ def _work(row: Mapping[str, str]) -> Work:
         derivatives=int(row["derivatives"]),
         jacobians=int(row["jacobians"]),
         reason=row["reason"],
+        stopped_at=number("stopped_at_s"),
         spread=number("time_spread_s"),
         units=number("work_units"),
     )
