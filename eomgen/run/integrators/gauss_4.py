@@ -19,3 +19,4 @@ METHOD = ImplicitMethod(
     c=(1 / 2 - sqrt(3) / 6, 1 / 2 + sqrt(3) / 6),
     order=4,
 )
+INTEGRATOR = METHOD.integrator

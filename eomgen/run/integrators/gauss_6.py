@@ -21,3 +21,4 @@ METHOD = ImplicitMethod(
     c=(1 / 2 - sqrt(15) / 10, 1 / 2, 1 / 2 + sqrt(15) / 10),
     order=6,
 )
+INTEGRATOR = METHOD.integrator

@@ -7,3 +7,4 @@ theorem IV.2.1. Gauss's method of one stage.
 from eomgen.run.integrators.implicit_stages import ImplicitMethod
 
 METHOD = ImplicitMethod(shares=((1 / 2,),), b=(1.0,), c=(1 / 2,), order=2)
+INTEGRATOR = METHOD.integrator

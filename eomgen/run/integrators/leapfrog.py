@@ -12,10 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.run.integrators.interface import Change
+from eomgen.run.integrators.interface import Change, FixedStep
 from eomgen.run.problem import FloatArray, Problem
-
-ORDER = 2
 
 _LOOKS = 5
 # Of a Jacobian by differences; of an exact one the parts that must not vary do not.
@@ -49,6 +47,9 @@ def prepare(problem: Problem) -> Change:
         return found
 
     return change
+
+
+INTEGRATOR = FixedStep(prepare, order=2)
 
 
 def _check(problem: Problem, positions: list[int], others: list[int]) -> None:

@@ -19,12 +19,7 @@ from eomgen.run.problem import FloatArray, Problem
 Status = Literal["ok", "wrong", "failed", "over", "refused"]
 """How a run went: "ok"; "wrong": it reported success but is wrong; "failed": it stopped before the
 end; "over": it was stopped for its time; "refused": the method cannot run the scene."""
-Kind = Literal["explicit", "implicit", "symplectic"]
 
-SYMPLECTIC = frozenset(
-    {"semi_implicit_euler", "leapfrog", "implicit_midpoint", "gauss_4", "gauss_6"}
-)
-IMPLICIT = frozenset({"Radau", "Radau_differences", "BDF", "BDF_differences", "LSODA"})
 
 COARSEST = 25
 """Least number of equal steps."""
@@ -114,13 +109,6 @@ class Ladder:
     run_time: float
     most_steps: int = MOST_STEPS
     noise: float = 0.0
-
-
-def kind(method: str) -> Kind:
-    """The kind of a method; one that is not listed counts as explicit."""
-    if method in SYMPLECTIC:
-        return "symplectic"
-    return "implicit" if method in IMPLICIT else "explicit"
 
 
 def order(method: str) -> int | None:

@@ -21,8 +21,8 @@ import scipy
 
 from eomgen.errors import RunError
 from eomgen.files import is_ours, read_plain, write_whole
-from eomgen.run.integrators import INTEGRATORS
-from eomgen.study.accuracy.ladder import Rung, Status, Work, kind, order
+from eomgen.integrators import INTEGRATORS
+from eomgen.study.accuracy.ladder import Rung, Status, Work, order
 
 STATUSES: tuple[Status, ...] = ("ok", "wrong", "failed", "over", "refused")
 COLUMNS = (
@@ -64,8 +64,9 @@ def key(*what: object) -> str:
     """A digest of what the runs depend on, including this machine and its libraries."""
     here = Path(__file__).parent
     digest = hashlib.sha256()
+    package = here.parent.parent
     own = [here / f"{name}.py" for name in ("measure", "reference", "work_precision")]
-    for path in sorted((here.parent.parent / "run").rglob("*.py")) + own:
+    for path in [*sorted((package / "run").rglob("*.py")), package / "integrators.py", *own]:
         digest.update(path.read_bytes())
     machine = (platform.node(), platform.machine(), platform.python_version())
     text = json.dumps([*what, *machine, np.__version__, scipy.__version__], sort_keys=True)
@@ -123,7 +124,7 @@ def _row(work: Work) -> list[object]:
     at_most = [AT_MOST if flag else MEASURED for flag in work.at_most]
     return [
         rung.method,
-        kind(rung.method),
+        INTEGRATORS[rung.method].kind,
         _cell(order(rung.method)),
         _cell(rung.dt),
         _cell(rung.rtol),
