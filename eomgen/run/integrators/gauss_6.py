@@ -1,4 +1,4 @@
-"""Gauss's collocation at three points: order 6, A-stable, symplectic, time-reversible.
+"""Gauss collocation with three stages: order 6, A-stable, symplectic, time-reversible.
 
 It conserves every quadratic invariant: Hairer, Lubich, Wanner, Geometric Numerical Integration,
 theorem IV.2.1. Coefficients: Hairer, Norsett, Wanner, Solving ODEs I, table II.7.4.
