@@ -23,6 +23,7 @@ FLOORS = (
     "scene.effects",
     "outputs",
     "routes",
+    "integrators",
     "scene",
     "model",
     "derivation",

@@ -169,6 +169,7 @@ def test_runs_that_are_wrong_or_fail_are_reported_and_stay() -> None:
     assert {work.status for work in works["rk4"]} <= {"failed", "wrong"}
     failed = [work for work in works["rk4"] if work.status == "failed"]
     assert failed and all(work.reason and math.isnan(work.error) for work in failed)
+    assert all(0 <= work.stopped_at < 2 and "t = " not in work.reason for work in failed)
     assert works["implicit_midpoint"][-1].status == "ok"
     coarse = climbed(bench(), ["euler"], most_steps=50)["euler"]
     assert [work.status for work in coarse] == ["wrong"] * len(coarse)

@@ -582,7 +582,7 @@ def test_no_forces():
     odd = replace(problem, contacts=replace(problem.contacts, held=held))
     assert message(odd) == (
         "stopped at t = 0, q0=0, v0=0: no contact forces at t = 0 keep ground_ball from closing "
-        "(much friction may do that); take less friction, or another law of contact"
+        "(strong friction can cause this); take less friction, or another contact law"
     )
 
 
@@ -590,7 +590,7 @@ def test_impacts_without_end():
     problem = ball(0.0, 0.5, v=-1.0)
     odd = replace(problem.contacts, impact=lambda t, y, k, bounce: y)
     assert message(replace(problem, contacts=odd)) == (
-        "stopped at t = 0, q0=0, v0=-1: the impacts among ground_ball at t = 0 come to no end; "
+        "stopped at t = 0, q0=0, v0=-1: the impacts among ground_ball at t = 0 do not end; "
         "take less restitution"
     )
 

@@ -32,6 +32,7 @@ from eomgen.run.integrators.runge_kutta_4 import TABLEAU
 from eomgen.run.integrators.tableau import ButcherTableau, density, size, trees
 from eomgen.run.problem import Problem
 from eomgen.run.progress import terminal_progress
+from eomgen.run.trajectory import Outcome
 
 FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
 ADAPTIVE = [name for name in INTEGRATORS if name not in FIXED]
@@ -548,11 +549,16 @@ def _singular(t, y):
     return np.full((2, 2), 1e200)
 
 
-def test_what_lsoda_only_warns_of_is_in_the_message():
+def test_lsoda_stops_with_scipys_reason():
+    """SciPy itself only warns of it."""
     trajectory = integrate(_misled(_opposite), "LSODA", 200.0)
-    assert not trajectory.finished
-    assert "; try another --integrator" in trajectory.message
+    assert trajectory.outcome == Outcome(
+        "stopped",
+        "lsoda: Repeated convergence failures (perhaps bad Jacobian or tolerances)",
+        "try another --integrator, or a looser --rtol and --atol",
+    )
     assert "lsoda: Repeated convergence failures" in trajectory.message
+    assert trajectory.message.count("lsoda") == 1
 
 
 @pytest.mark.parametrize("method", ["Radau", "BDF"])

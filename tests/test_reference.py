@@ -97,7 +97,7 @@ def long_rows(
     problem = as_problem(module)
     scale = measure.scales(module.STATES, module.UNITS, np.array([problem.initial + 1.0] * 2))
     exactly = exactly or precise(
-        program_of(model), module, None, None, problem.initial, watched=True
+        program_of(model), module, None, None, problem.initial, fix_branches=True
     )
     with digits():
         return np.array([row.y for row in rows(how[0], exactly, problem, scale, times, how[1])])
@@ -128,7 +128,7 @@ def test_the_derivative_is_the_program_in_long_numbers(scene: str) -> None:
         p = varied(made.model, rng, 0.99, 1.01)
         exactly = made.exactly("derivative", y, u, p, t=0.7)
         module.derivative(0.7, y, p, u)  # keeps what it computed of these parameters, in doubles
-        found = precise(made.system.program, module, p, u, y, watched=watched)
+        found = precise(made.system.program, module, p, u, y, fix_branches=watched)
         with digits():
             got = to_mp(np.array(found.derivative(mpfr(0.7), found.initial)))
         terms = np.maximum(np.abs(exactly), np.max(np.abs(exactly)))

@@ -69,8 +69,8 @@ def print_table(name: str, made: Measurement) -> None:
                 f"{work.jacobians:>9}  {_share(bench, work, costs):>7}"
             )
             if work.status != "ok":
-                cause = "" if work.status == "wrong" else _cause(work.reason)
-                reasons.setdefault((method, work.status, cause), []).append(work)
+                reason = "" if work.status == "wrong" else work.reason
+                reasons.setdefault((method, work.status, reason), []).append(work)
     _print_troubles(reasons)
     _print_orders(methods, works)
     _print_reading(works)
@@ -102,11 +102,6 @@ def _share(bench: Bench, work: Work, costs: tuple[float, float]) -> str:
         return "-"
     spent = work.derivatives * costs[0] + work.jacobians * costs[1]
     return f"{min(1.0, spent / work.seconds):.0%}"
-
-
-def _cause(reason: str) -> str:
-    """Why a run failed, without the time and state where it stopped."""
-    return reason.partition(": ")[2] or reason
 
 
 def _print_troubles(reasons: Mapping[tuple[str, str, str], Sequence[Work]]) -> None:

@@ -96,16 +96,16 @@ def relative_pivots(model: Model, poses: Array) -> dict[int, Array]:
     return shares
 
 
-def why_unresisted(model: Model, i: int) -> str:
-    """A message for a run: velocity `i` has next to no inertia, and what to change."""
+def why_unresisted(model: Model, i: int) -> tuple[str, str]:
+    """A message that velocity `i` has almost no inertia: the reason, and what to change."""
     body = next(index.body for index in model.joint_indices if i in index.v)
     where = f"'{model.velocities[i].name}' of joint '{body.joint.name}'"
     if model.dimensions == 3:
         return (
-            f"next to nothing resists {where}, gimbal lock: a turn about its axis moves no mass; "
-            "give it inertia, or take a joint of type 'ball'"
+            f"next to nothing resists {where}, gimbal lock: a turn about its axis moves no mass",
+            "give it inertia, or take a joint of type 'ball'",
         )
-    return f"next to nothing resists {where}: it moves no mass; give it some, or keep away"
+    return f"next to nothing resists {where}: it moves no mass", "give it some, or keep away"
 
 
 def _seeded(rng: random.Random, count: int) -> Array:

@@ -20,16 +20,16 @@ from eomgen.run.problem import FloatArray
 
 MOST_STEPS = 60
 """Greatest number of steps to the nearest equilibrium; a near one takes few."""
-MOST_FALLS = 500
+MOST_SETTLING = 500
 """Greatest number of steps of the overdamped motion."""
 LONGEST = 1.0
 """Greatest rotation in one step, rad: a longer one could miss nearer equilibria."""
 CLOSE = 1e-10
 """Smaller accelerations, relative to those caused by a displacement of 1 rad or 1 m, count as
 rounding."""
-LONGEST_FALL = 0.3
+LONGEST_SETTLING = 0.3
 """Greatest rotation in one step of the overdamped motion, rad."""
-FALLING = 1e-6
+GROWING = 1e-6
 """Greater growth rates, 1/s², relative to the fastest, make an equilibrium unstable."""
 NUDGE = 1e-3
 """Displacement that starts the motion from an unstable equilibrium, rad or m."""
@@ -68,9 +68,9 @@ def equilibrium(
     if settle and trim:
         raise RunError("equilibrium: inputs are trimmed for the nearest equilibrium only")
     search = _Search(module, p, _held(module, hold), _trimmed(module, trim))
-    start = search.look(np.array(guess, dtype=np.float64), input_values(module, u))
+    start = search.point(np.array(guess, dtype=np.float64), input_values(module, u))
     best = start
-    for attempt in (_fallen,) if settle else (_nearest,) if trim else (_nearest, _fallen):
+    for attempt in (_settled,) if settle else (_nearest,) if trim else (_nearest, _settled):
         found = _nearest(search, attempt(search, start))
         if search.at_rest(found):
             return Equilibrium(found.y, found.u)
@@ -100,7 +100,7 @@ class _Point:
 
 
 class _Search:
-    """Evaluates a module at places, and steps between them.
+    """Evaluates a module at points, and steps between them.
 
     The unknowns are small displacements, three rotations for a quaternion, then the controller
     states, then the inputs. `free` are the indices of those that may change; `moving` are those of
@@ -113,56 +113,56 @@ class _Search:
         self._module, self._p = module, p
         self._nq, self._nv = len(module.POSITIONS), len(held)
         self._nx = len(module.STATES) - self._nq - self._nv
-        self._turns = np.append(_turns(module), np.zeros(self._nx, dtype=np.bool_))
+        self._rotations = np.append(_rotations(module), np.zeros(self._nx, dtype=np.bool_))
         held = np.append(held, np.zeros(self._nx, dtype=np.bool_))
         self.free = np.flatnonzero(np.concatenate([~held, trimmed]))
         self.moving = np.flatnonzero(~held)
 
-    def look(self, y: FloatArray, u: FloatArray) -> _Point:
-        """The place at the positions of `y`, with velocities 0 and quaternions normalised."""
+    def point(self, y: FloatArray, u: FloatArray) -> _Point:
+        """The point at the positions of `y`, with velocities 0 and quaternions normalised."""
         if not np.isfinite(y).all():
             raise RunError("equilibrium: the positions are not finite; start elsewhere")
         y = y.copy()
         y[self._nq : self._nq + self._nv] = 0.0
         for indices in self._module.QUATERNIONS:
             y[list(indices)] /= np.linalg.norm(y[list(indices)])
-        return _Point(y, u, self._asked(self._module.derivative, y, u)[self._nq :])
+        return _Point(y, u, self._evaluated(self._module.derivative, y, u)[self._nq :])
 
     def slopes(self, point: _Point) -> FloatArray:
         """Derivatives of the changes with respect to the free unknowns, (nv + nx, nf)."""
-        by_state = self._asked(self._module.jacobian, point.y, point.u)[self._nq :]
+        by_state = self._evaluated(self._module.jacobian, point.y, point.u)[self._nq :]
         by_position = by_state[:, : self._nq] @ self._tangents(point)
-        by_place = np.hstack([by_position, by_state[:, self._nq + self._nv :]])
+        by_displacement = np.hstack([by_position, by_state[:, self._nq + self._nv :]])
         if np.max(self.free, initial=0) < self._nv + self._nx:
-            return np.asarray(by_place[:, self.free])
-        by_input = self._asked(input_jacobian(self._module), point.y, point.u)[self._nq :]
-        return np.hstack([by_place, by_input])[:, self.free]
+            return np.asarray(by_displacement[:, self.free])
+        by_input = self._evaluated(input_jacobian(self._module), point.y, point.u)[self._nq :]
+        return np.hstack([by_displacement, by_input])[:, self.free]
 
     def at_rest(self, point: _Point, slopes: FloatArray | None = None) -> bool:
         """Whether the changes that are left are rounding errors."""
         slopes = self.slopes(point) if slopes is None else slopes
         return point.largest <= CLOSE * max(1.0, float(np.max(np.abs(slopes), initial=0.0)))
 
-    def turn(self, step: FloatArray) -> float:
+    def rotation(self, step: FloatArray) -> float:
         """The greatest rotation in a step of the moving unknowns, rad."""
-        return float(np.max(np.abs(step[self._turns[self.moving]]), initial=0.0))
+        return float(np.max(np.abs(step[self._rotations[self.moving]]), initial=0.0))
 
     def moved(self, point: _Point, step: FloatArray) -> _Point:
-        """The place after a step of the free unknowns, shortened if a rotation is too large."""
+        """The point after a step of the free unknowns, shortened if a rotation is too large."""
         nv, inputs = self._nv, self._nv + self._nx
         whole = np.zeros(inputs + len(point.u))
         whole[self.free] = step
-        turn = float(np.max(np.abs(whole[:inputs][self._turns]), initial=0.0))
-        whole *= min(1.0, LONGEST / turn) if turn else 1.0
+        rotation = float(np.max(np.abs(whole[:inputs][self._rotations]), initial=0.0))
+        whole *= min(1.0, LONGEST / rotation) if rotation else 1.0
         y = point.y.copy()
         y[: self._nq] += self._tangents(point) @ whole[:nv]
         y[self._nq + nv :] += whole[nv:inputs]
-        return self.look(y, point.u + whole[inputs:])
+        return self.point(y, point.u + whole[inputs:])
 
     def _tangents(self, point: _Point) -> FloatArray:
         return tangents(point.y[: self._nq], self._module.QUATERNIONS)
 
-    def _asked(
+    def _evaluated(
         self, function: Callable[..., FloatArray], y: FloatArray, u: FloatArray
     ) -> FloatArray:
         return evaluated(function, y, self._p, u, "equilibrium")
@@ -195,7 +195,7 @@ def _nearest(search: _Search, point: _Point) -> _Point:
     return point
 
 
-def _fallen(search: _Search, point: _Point) -> _Point:
+def _settled(search: _Search, point: _Point) -> _Point:
     """Follow the overdamped motion q' = v̇(q) by implicit steps that grow as it slows down.
     Controller states follow their own rates.
 
@@ -204,18 +204,18 @@ def _fallen(search: _Search, point: _Point) -> _Point:
     unstable equilibrium. A small displacement starts the motion from an unstable equilibrium.
     """
     duration = 0.0
-    for _ in range(MOST_FALLS if len(search.moving) else 0):
+    for _ in range(MOST_SETTLING if len(search.moving) else 0):
         slopes = search.slopes(point)
         square = slopes[search.moving]
-        rates, ways = np.linalg.eig(square)
+        rates, vectors = np.linalg.eig(square)
         fastest = float(np.max(np.abs(square)))
-        falls = int(np.argmax(rates.real))
-        rate = float(rates.real[falls])
+        growing = int(np.argmax(rates.real))
+        rate = float(rates.real[growing])
         if search.at_rest(point, slopes):
-            if rate <= FALLING * fastest:
+            if rate <= GROWING * fastest:
                 break
-            way = ways[:, falls].real
-            step = NUDGE * way / np.max(np.abs(way))
+            direction = vectors[:, growing].real
+            step = NUDGE * direction / np.max(np.abs(direction))
         else:
             duration = duration or 1.0 / max(1.0, fastest)
             duration = min(duration, 0.5 / rate) if rate > 0 else duration
@@ -237,13 +237,13 @@ def _implicit_step(
     while True:
         matrix = np.eye(len(square)) / duration - square
         step: FloatArray = np.linalg.lstsq(matrix, point.changes[search.moving])[0].astype(float)
-        turn = search.turn(step)
-        if not turn > LONGEST_FALL:
+        rotation = search.rotation(step)
+        if not rotation > LONGEST_SETTLING:
             return step, duration
-        duration *= 0.7 * LONGEST_FALL / turn
+        duration *= 0.7 * LONGEST_SETTLING / rotation
 
 
-def _turns(module: GeneratedModule) -> NDArray[np.bool_]:
+def _rotations(module: GeneratedModule) -> NDArray[np.bool_]:
     """Which of the small displacements are rotations, rad; (nv,) of booleans."""
     firsts = {indices[0] for indices in module.QUATERNIONS}
     rest = {i for indices in module.QUATERNIONS for i in indices}

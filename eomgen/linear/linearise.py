@@ -55,10 +55,10 @@ class Linearisation:
         if not self.quaternions:
             return self
         basis = tangents(self.y, self.quaternions)
-        turning = tangents(self.rates, self.quaternions, plain=0.0)
+        basis_rate = tangents(self.rates, self.quaternions, plain=0.0)
         inverse = basis.T / np.sum(basis**2, axis=0)[:, np.newaxis]  # its columns are orthogonal
         return Linearisation(
-            A=inverse @ (self.A @ basis - turning),
+            A=inverse @ (self.A @ basis - basis_rate),
             B=inverse @ self.B,
             state_names=_deviations(self.state_names, self.quaternions),
             input_names=self.input_names,
@@ -70,17 +70,17 @@ class Linearisation:
 
     @property
     def modes(self) -> tuple[Mode, ...]:
-        """Of what `reduced` has, the fastest growing first."""
+        """The modes of the `reduced` system, the fastest growing first."""
         return tuple(modes(self.reduced().A))
 
     @property
     def stability(self) -> str:
-        """In a word: "unstable", "stable" (asymptotically), or "marginal" between the two."""
+        """One of "unstable", "stable" (asymptotically), or "marginal"."""
         return stability(list(self.modes))
 
     @property
     def controllable_rank(self) -> int:
-        """How many of the numbers that `reduced` has the inputs can reach."""
+        """The dimension of the controllable subspace of the `reduced` system."""
         least = self.reduced()
         return controllable_rank(least.A, least.B)
 

@@ -11,9 +11,9 @@ SLOW = 1e-7
 """Smaller rates, 1/s, count as 0: rounding splits the double eigenvalue 0 of a motion without force
 by about the square root of the machine epsilon."""
 FINE = 1e-6
-"""Rates below this part of the fastest count as 0, too."""
+"""Rates below this fraction of the fastest also count as 0."""
 INDEPENDENT = 1e-10
-"""Directions of the state are independent if their new component exceeds this part."""
+"""A direction is independent of others if its component normal to them exceeds this fraction."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ def modes(a: FloatArray) -> list[Mode]:
     found = []
     for value in values.tolist():
         rate = value.real if abs(value.real) > small else 0.0
-        turn = value.imag if abs(value.imag) > small else 0.0
-        if turn >= 0.0:
-            found.append(Mode(rate, turn))
+        frequency = value.imag if abs(value.imag) > small else 0.0
+        if frequency >= 0.0:
+            found.append(Mode(rate, frequency))
     return sorted(found, key=lambda mode: (-mode.rate, mode.angular_frequency))
 
 

@@ -1,1 +1,1 @@
-"""Runs in more digits than a double has."""
+"""Derivatives and runs in extended precision, with more digits than doubles."""

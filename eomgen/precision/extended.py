@@ -1,4 +1,4 @@
-"""Extended numbers for what doubles are judged by: MPFR's, of 60 digits, one or in arrays."""
+"""Numbers of 60 digits, by MPFR, and arrays of them: the reference for doubles."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,22 +12,22 @@ from eomgen.run.problem import FloatArray
 from eomgen.scalars.extended import MP
 
 BITS = MP.prec
-"""Of the significand: 60 digits."""
+"""Bits of the significand: 60 digits."""
 NOTHING = 1e-25
-"""Part of its terms below which a sum of extended numbers is what rounding left of them."""
+"""A sum of extended numbers below this fraction of its terms counts as a rounding error."""
 Array = Any
-"""An array of such numbers."""
+"""An array of extended numbers."""
 
 
 @contextmanager
 def extended_digits() -> Iterator[None]:
-    """A block in which numbers are of `BITS` bits; what has no value is nan there."""
+    """A block in which extended numbers have `BITS` bits, and undefined values are nan."""
     with gmpy2.context(precision=BITS), np.errstate(all="ignore"):
         yield
 
 
 def extended(values: Any) -> Array:
-    """Doubles or extended numbers, one or an array, as extended ones, exactly."""
+    """A double or an extended number, or an array of them, converted exactly to extended."""
     array = np.asarray(values, dtype=object)
     return np.asarray(_LONG(array), dtype=object) if array.size else array
 
@@ -41,19 +41,19 @@ def zeros(*shape: int) -> Array:
 
 
 def eye() -> Array:
-    """The unit matrix of space."""
+    """The identity matrix (3, 3)."""
     return extended(np.eye(3))
 
 
 def along(rate: Array, slopes: Array) -> Array:
-    """Time derivative of what has these slopes along the velocities."""
+    """The time derivative Σ rate_i slopes_i of a quantity with derivatives `slopes` (nv, …)."""
     if not len(rate):
         return zeros(*slopes.shape[1:])
     return np.tensordot(rate, slopes, axes=(0, 0))
 
 
 def solved(matrix: Array, right: Array) -> Array:
-    """x of matrix x = right, by elimination with row exchanges; `right` a vector or columns.
+    """The x of matrix x = right, by elimination with pivoting; `right` is a vector or columns.
 
     Raises `ZeroDivisionError` if the matrix is singular.
     """

@@ -1,4 +1,4 @@
-"""The guard of a module's runs: its own steps in extended precision; see `run.guard`."""
+"""The guard of a module's runs: its derivative in extended precision; see `run.guard`."""
 
 from typing import Any
 
@@ -22,8 +22,8 @@ def guard_of(
     bound: float = LOST,
     repairs: bool = False,
 ) -> Guard:
-    """A guard for runs of a module, and of the program that it was generated of, at given
-    parameters and constant inputs, which must be valid there.
+    """A guard for runs of a module, generated from `program`, at given parameters and constant
+    inputs, which must be valid.
     """
     initial = module.initial_state(parameters)
     exactly = precise(program, module, parameters, inputs, initial, bits=BITS)

@@ -1,8 +1,8 @@
-"""A program's derivative in more digits than a double has: the same steps over longer numbers.
+"""A program's derivative in extended precision: the same operations on longer numbers.
 
-The numbers are MPFR's, correctly rounded, of as many bits as IEEE 754's quadruple precision: 34
-decimal digits. Parameters, inputs and the initial state enter as the doubles they are; all that is
-computed from them, what depends on parameters alone included, is computed in extended precision.
+The numbers are MPFR's, correctly rounded, with the significand of IEEE 754 quadruple precision: 34
+decimal digits. Parameters, inputs and the initial state are doubles; all that is computed from them
+is extended, including the constants that depend on parameters alone.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,26 +20,23 @@ from eomgen.scalars.extended import BY_MPFR, Bits
 from eomgen.scalars.functions import CORNERS
 
 BITS = 113
-"""Of the significand: unit roundoff 2^-113 = 1e-34."""
+"""Bits of the significand: unit roundoff 2^-113 = 1e-34."""
 Extended = Any
-"""A number of `BITS` bits, an `mpfr`, which has no type of its own for type checkers."""
+"""A number of `BITS` bits, an `mpfr`, for which there are no type stubs."""
 
 
 def digits(bits: int = BITS) -> Any:
-    """A `with` block in which extended numbers have this many bits; what has no value is nan
-    there.
-    """
+    """A `with` block in which extended numbers have this many bits, and undefined values are nan."""
     return gmpy2.context(precision=bits)
 
 
 class CornerBranches:
-    """The branch that each corner of a derivative takes, in the order of its steps.
+    """The branch that a derivative takes at each of its corners, in the order of its operations.
 
-    A derivative is smooth on one side of its corners. It goes on smoothly beyond them while its
-    branches are held. So `branches` stay as they are until someone changes them. The next
-    evaluation decides those that are not there yet. `margins` says how far each corner was from
-    changing its branch in the last evaluation. A branch agrees with its margin if it is True and
-    the margin is > 0, or False and < 0.
+    With fixed branches a derivative is smooth beyond its corners, too. So `branches` change only if
+    the user changes them; the next evaluation adds those that are missing. `margins` are the
+    arguments of the corners in the last evaluation: a branch agrees with its margin if it is True
+    and the margin is > 0, or False and < 0.
     """
 
     def __init__(self) -> None:
@@ -53,7 +50,7 @@ class CornerBranches:
         return self.branches[len(self.margins) - 1]
 
     def functions(self) -> dict[str, Callable[..., Extended]]:
-        """The functions that have corners, on the branches that are held."""
+        """The functions that have corners, on the fixed branches."""
         branch = self._branch
         one, zero = mpfr(1), mpfr(0)
         return {
@@ -62,7 +59,7 @@ class CornerBranches:
             "min": lambda a, b: b if branch(a - b) else a,
             "max": lambda a, b: a if branch(a - b) else b,
             "select": lambda c, a, b: a if branch(c) else b,
-            # max(x, 0) held beyond 0 is negative: its root is to have a value there.
+            # On a fixed branch max(x, 0) may be negative; its root must still have a value.
             "sqrt": lambda x: gmpy2.sqrt(abs(x)),
         }
 
@@ -74,7 +71,7 @@ class Precise:
     derivative  f(t, y), ny extended numbers; t and y extended
     initial     (ny,), the initial state of doubles
     corner_branches
-                the branch that each corner takes; None where there are none
+                the branch at each corner; None if there are no corners or they are not fixed
     """
 
     derivative: Callable[[Extended, Sequence[Extended]], Sequence[Extended]]
@@ -89,44 +86,44 @@ def precise(
     inputs: Any,
     initial: FloatArray,
     *,
-    watched: bool = False,
+    fix_branches: bool = False,
     bits: int = BITS,
 ) -> Precise:
     """A program's derivative in extended precision, at given parameters and inputs.
 
-    module              what was generated of the program; it tells names, order and defaults
-    parameters, inputs  as `module.derivative` takes them; they must be valid there
-    initial             the initial state of doubles, (ny,)
-    watched             hold the ways that corners go, if there are any
-    bits                of what depends on parameters alone
+    module              the module generated from the program; gives names, order and defaults
+    parameters, inputs  as `module.derivative` takes them; they must be valid
+    initial             the initial state in doubles, (ny,)
+    fix_branches        whether to fix the branches at corners, if there are any
+    bits                bits of the constants that depend on parameters alone
     """
     found = kernel(program, "derivative")
     corners = any(name in found.functions for name in CORNERS)
-    corner_branches = CornerBranches() if watched and corners else None
+    corner_branches = CornerBranches() if fix_branches and corners else None
     functions = {**BY_MPFR, **(corner_branches.functions() if corner_branches else {})}
     called = [functions[name] for name in found.functions]
     with digits(bits):
         known = found.known_values(_extended(parameters, module.PARAMETERS), Bits())
         fixed = _extended(inputs, module.INPUTS)
         start = tuple(map(mpfr, initial.tolist()))
-    places = {name: i for i, name in enumerate(module.STATES)}
+    indices = {name: i for i, name in enumerate(module.STATES)}
 
     def derivative(t: Extended, y: Sequence[Extended]) -> Sequence[Extended]:
         if corner_branches:
             corner_branches.margins = []
-        return found.moving(known, [take(t, y) for take in taken], called)
+        return found.moving(known, [value(t, y) for value in values], called)
 
-    taken = [_taken(name, places, fixed) for name in found.inputs]
+    values = [_input(name, indices, fixed) for name in found.inputs]
     return Precise(derivative, start, corner_branches)
 
 
-def _taken(
-    name: str, places: Mapping[str, int], fixed: Mapping[str, Extended]
+def _input(
+    name: str, indices: Mapping[str, int], fixed: Mapping[str, Extended]
 ) -> Callable[[Extended, Sequence[Extended]], Extended]:
-    """What finds an input of the program at a time and a state."""
-    if name in places:
-        place = places[name]
-        return lambda t, y: y[place]
+    """The function of t and y that gives the value of an input of the program."""
+    if name in indices:
+        index = indices[name]
+        return lambda t, y: y[index]
     if name in fixed:
         value = fixed[name]
         return lambda t, y: value
@@ -135,9 +132,7 @@ def _taken(
 
 
 def exact_parameters(module: Any, parameters: Any) -> dict[str, Extended]:
-    """Parameters as a module takes them, by name, as extended numbers; to be used within
-    `digits()`.
-    """
+    """A module's parameters as extended numbers, by name; to be called within `digits()`."""
     return _extended(parameters, module.PARAMETERS)
 
 

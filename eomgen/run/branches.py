@@ -1,18 +1,19 @@
-"""Whether a step of an adaptive method has passed over a branch of the derivative.
+"""Detection of steps of an adaptive method that pass over a branch of the derivative.
 
-A method sees the derivative at a few moments of a step. A contact that is touched and left between
-them, a stop, or a pulse in time leaves no trace in its error estimate, however long the step. The
-switching functions g(t, y) of a problem tell: the derivative is smooth as long as none of them
-passes 0. Along a step they are functions of time, known from the method's dense output. On parts of
-the step they are interpolated by polynomials of degree 4, whose Bernstein coefficients enclose
-them (Farouki, The Bernstein polynomial basis, Computer Aided Geometric Design 29 (2012), 379). A
-part is halved until each function is free of zeros there, or monotone. Those of time alone are
-enclosed by interval arithmetic instead.
+A method evaluates the derivative at a few points of a step. A contact, a stop or a pulse in time
+that begins and ends between them does not show in the error estimate, however long the step. The
+derivative is smooth as long as no switching function g(t, y) of the problem crosses 0. Along a step
+these are functions of time, known from the method's dense output. On parts of the step they are
+interpolated by polynomials of degree 4, whose Bernstein coefficients enclose them (Farouki, The
+Bernstein polynomial basis, Computer Aided Geometric Design 29 (2012), 379). A part is halved until
+each function is monotone or has no zero there. Functions of time alone are enclosed by interval
+arithmetic instead.
 
-A step passes over a branch if two changes of branch lie in it, and the derivative between them is
-another than before and after by more than the tolerance allows. Such a step is made again, up to
-the middle between the two, where the method then sees that branch. A method that does not see what
-lies near the ends of a step is made to end its steps at the changes themselves.
+A step passes over a branch if two switches lie in it, and the derivative between them differs from
+that before and after by more than the tolerance allows. Such a step is repeated up to the middle
+between the two, so that the method evaluates the derivative on that branch. If a method's error
+estimate does not depend on the derivative near the ends of a step, its steps are made to end at the
+switches.
 """
 
 import math
@@ -28,43 +29,45 @@ from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.schedule import Schedule
 
 MOST_EVALUATIONS = 200
-"""Of the switching functions in one step; a step that takes more is held to the longest that may be
-taken unseen."""
+"""Most evaluations of the switching functions in a step. A step that needs more is limited to the
+length for steps that cannot be checked."""
 SHORTEST_PART = 2.0**-20
-"""Of a step: parts are not halved further."""
-TURN = 1.0
-"""Most that an angle may change in a part, rad: what turns fast is seen at every turn."""
+"""Fraction of a step below which parts are not halved."""
+LARGEST_ANGLE = 1.0
+"""Greatest change of an angle in a part, rad, so that every revolution is resolved."""
 FAR = 4.0
-"""A function so many times farther from 0 than it has moved in the last two steps does not pass it
-within them."""
-ODD = (0.3819660112501051, 0.7548776662466927)
-"""Shares of a step of which no small multiples are whole numbers."""
+"""A function has no zero in a step if it is this many times farther from 0 than it has changed in
+the last two steps."""
+IRREGULAR = (0.3819660112501051, 0.7548776662466927)
+"""Fractions of a step far from simple ratios: a function with the period of the step, or a simple
+fraction of it, has other values there than at the ends."""
 TOGETHER = 1e-9
-"""Of a step: changes of branch that are no farther apart count as one."""
+"""Fraction of a step within which switches count as one."""
 INSIDE = 1 / 8
-"""Of the time between two changes of branch: a step that ends later than that after the first has
-seen the branch between them."""
+"""A step that ends at least this fraction of the time between two switches after the first one has
+evaluated the branch between them."""
 
 _LAST = 4
 """Degree of the polynomials."""
 _AT = (1 - np.cos(np.pi * np.arange(_LAST + 1) / _LAST)) / 2
-"""Where in a part the functions are evaluated, 0 to 1: Chebyshev's points, both ends among them."""
+"""Chebyshev points of a part, 0 to 1, with both ends: where the functions are evaluated."""
 _TO_BERNSTEIN = np.linalg.inv(
     np.array([[math.comb(_LAST, i) * x**i * (1 - x) ** (_LAST - i) for i in range(5)] for x in _AT])
 )
 _TO_CHEBYSHEV = np.linalg.inv(np.polynomial.chebyshev.chebvander(2 * _AT - 1, _LAST))
 
 States = Callable[[Any], FloatArray]
-"""The states (n, ny) at times (n,) within a step, or that (ny,) at a single one."""
+"""The states (n, ny) at times (n,) within a step, or the state (ny,) at a single time."""
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 _Part = tuple[float, float, FloatArray, Indices]
-"""From which share of a step to which; values (5, n) of functions there, and their numbers (n,)."""
+"""A part of a step: start and end as fractions of the step, values (5, n) of functions there, and
+the numbers (n,) of these functions."""
 
 
 @dataclass(frozen=True)
-class Made:
-    """A step that was made: from `start` to `end`, s, the states there, and those between."""
+class Step:
+    """A step of a method: from `start` to `end`, s, the states there, and those between."""
 
     start: float
     end: float
@@ -74,16 +77,16 @@ class Made:
 
     @property
     def length(self) -> float:
-        """In s."""
+        """Its length, s."""
         return self.end - self.start
 
 
 @dataclass(frozen=True)
-class Again:
-    """A step is to be made again, up to the time `until` only, s.
+class Retry:
+    """A step must be repeated up to the time `until`, s, only.
 
-    seen  whether it is for a branch that was passed over; else the switching functions could not
-          be followed along so long a step
+    seen  whether it passed over a branch; else the switching functions could not be followed along
+          so long a step
     """
 
     until: float
@@ -91,14 +94,13 @@ class Again:
 
 
 @dataclass
-class Lookout:
-    """Looks at the steps of a run, one after another.
+class BranchMonitor:
+    """Checks the steps of a run, one after another.
 
-    switching  of the problem
-    allowed    of a state (ny,): what a step may be off, (ny,)
-    unseen     the longest step, s, that may be taken where the functions cannot be followed
-    sees_end   whether the method's error estimate sees the derivative at the end of a step
-    turned     when the last change of branch was, s
+    allowed    y (ny,) -> (ny,), the error allowed in a step that ends at y
+    unseen     the longest step, s, if the functions cannot be followed
+    sees_end   whether the method's error estimate depends on the derivative at the end of a step
+    switched   the time of the last switch, s
     """
 
     problem: Problem
@@ -106,7 +108,7 @@ class Lookout:
     allowed: Callable[[FloatArray], FloatArray]
     unseen: float
     sees_end: bool = True
-    turned: float = -math.inf
+    switched: float = -math.inf
     _ends: list[tuple[float, FloatArray]] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:
@@ -115,85 +117,85 @@ class Lookout:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """What the looks at the next steps go on from: numbers and arrays by name."""
+        """What the checks of the next steps depend on: numbers and arrays by name."""
         checked = [[t, *values] for t, values in self._ends] or np.empty((0, 0))
-        return {"turned": self.turned, "checked": np.array(checked)}
+        return {"turned": self.switched, "checked": np.array(checked)}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from what `memory` gave."""
-        self.turned = float(memory["turned"])
+        """Continue from what `memory` gave."""
+        self.switched = float(memory["turned"])
         self._ends = [(float(row[0]), np.array(row[1:])) for row in memory["checked"]]
 
-    def look(self, made: Made) -> Again | None:
-        """Whether a step is to be made again; None if it is good.
+    def check(self, step: Step) -> Retry | None:
+        """How a step must be repeated; None if it is accepted.
 
-        Steps are to be given in order; one that is to be made again counts as not given.
+        Steps must be given in order; a step that must be repeated is forgotten.
         """
-        search = _Search(self.switching, made, self._ends) if self.switching.of_state else None
-        times, whole = self._times(search, made)
-        turned = self.turned
+        search = _Search(self.switching, step, self._ends) if self.switching.of_state else None
+        times, whole = self._times(search, step)
+        switched = self.switched
         for i, after in enumerate(times):
             if self.sees_end:
-                until = self._cut(made, turned, after)
+                until = self._cut(step, switched, after)
             else:
-                until = self._end(made, turned, after, [*times, made.end][i + 1])
+                until = self._end(step, switched, after, [*times, step.end][i + 1])
             if until is not None:
-                return Again(until, seen=True)
-            turned = max(turned, after)
-        if not whole and made.length > self.unseen * (1 + TOGETHER):
-            return Again(made.start + self.unseen, seen=False)
-        self.turned = turned
+                return Retry(until, seen=True)
+            switched = max(switched, after)
+        if not whole and step.length > self.unseen * (1 + TOGETHER):
+            return Retry(step.start + self.unseen, seen=False)
+        self.switched = switched
         if search:
             self._ends = [search.start, search.end]
         return None
 
-    def _times(self, search: "_Search | None", made: Made) -> tuple[list[float], bool]:
-        """When branches change in a step, in order, and whether these are all: exactly, if more
-        than one has to be known.
+    def _times(self, search: "_Search | None", step: Step) -> tuple[list[float], bool]:
+        """The times of the switches in a step, in order, and whether these are all. A single one is
+        not located exactly if that does not matter.
         """
         times, whole = list[float](), True
         if self._schedule:
-            times, whole = self._schedule.changes(made.start, made.end)
+            times, whole = self._schedule.changes(step.start, step.end)
         if search is None or search.is_far():
             return times, whole
         brackets, followed = search.brackets()
         if brackets:
             last = max(bracket.end for bracket in brackets)
-            alone = len(brackets) + len(times) == 1 and _is_seen(self.turned, made.start, last)
+            alone = len(brackets) + len(times) == 1 and _is_seen(self.switched, step.start, last)
             times = sorted([*times, *(b.middle if alone else search.root(b) for b in brackets)])
         return times, whole and followed
 
-    def _cut(self, made: Made, before: float, after: float) -> float | None:
-        """Where a step is to end that has two changes of branch in a row; None if it may pass."""
+    def _cut(self, step: Step, before: float, after: float) -> float | None:
+        """The time at which a step must end because of two consecutive switches; None if it need
+        not.
+        """
         gap = after - before
-        if not TOGETHER * made.length < gap < math.inf:
+        if not TOGETHER * step.length < gap < math.inf:
             return None
-        if before < made.start and _is_seen(before, made.start, after):
+        if before < step.start and _is_seen(before, step.start, after):
             return None
         middle = before + gap / 2
-        if not made.start + TOGETHER * made.length < middle < made.end:
+        if not step.start + TOGETHER * step.length < middle < step.end:
             return None
         aside = gap / 8
-        times = (max(made.start, before - aside), middle, min(made.end, after + aside))
-        return middle if self._matters(made, times, gap) else None
+        times = (max(step.start, before - aside), middle, min(step.end, after + aside))
+        return middle if self._matters(step, times, gap) else None
 
-    def _end(self, made: Made, before: float, change: float, after: float) -> float | None:
-        """The time of a change of branch between others, if a step is to end there; None if it
-        need not.
-        """
-        whole = min(change - made.start, made.end - change)
-        # Others may lie so near that it is one change, or bound a pulse that is over soon.
+    def _end(self, step: Step, before: float, change: float, after: float) -> float | None:
+        """The time of a switch between two others, if a step must end there; else None."""
+        whole = min(change - step.start, step.end - change)
+        # The others may be so near that they count as one with it, or bound a short pulse.
         for reach in (whole / 2, min(change - before, after - change, whole) / 2):
             times = (change - reach, change, change + reach)
-            if reach > TOGETHER * made.length and self._matters(made, times, reach):
+            if reach > TOGETHER * step.length and self._matters(step, times, reach):
                 return change
         return None
 
-    def _matters(self, made: Made, times: tuple[float, float, float], length: float) -> bool:
-        """Whether the derivative at the second of three times, times a length, s, is another than
-        half way between those at the others by more than is allowed.
+    def _matters(self, step: Step, times: tuple[float, float, float], length: float) -> bool:
+        """Whether the derivative at the second of three times differs from the mean of those at the
+        others by more than is allowed in a step of the given length, s.
         """
-        states = made.states(np.array(times))
+        states = step.states(np.array(times))
         try:
             slopes = [self.problem.derivative(t, y) for t, y in zip(times, states, strict=True)]
         except (ArithmeticError, ValueError):
@@ -203,13 +205,13 @@ class Lookout:
 
 
 def _is_seen(before: float, between: float, after: float) -> bool:
-    """Whether a step that ends `between` two changes of branch has seen what lies there."""
+    """Whether a step that ends `between` two switches has evaluated the branch between them."""
     return before == -math.inf or between >= before + INSIDE * (after - before)
 
 
 @dataclass(frozen=True)
 class _Bracket:
-    """Function number `which` passes 0 between two times, s."""
+    """Function number `which` crosses 0 between two times, s."""
 
     which: int
     start: float
@@ -223,54 +225,54 @@ class _Bracket:
 class _Search:
     """The switching functions of the state along one step.
 
-    ends  the last steps' ends and the functions there, the one that this step starts at the last
+    ends  the ends of the last two steps and the functions there; this step starts at the last
     """
 
     def __init__(
-        self, switching: Switching, made: Made, ends: list[tuple[float, FloatArray]]
+        self, switching: Switching, step: Step, ends: list[tuple[float, FloatArray]]
     ) -> None:
         assert switching.of_state is not None
-        self.made, self._function, self._left = made, switching.of_state, MOST_EVALUATIONS
-        known = bool(ends) and ends[-1][0] == made.start
+        self.step, self._function, self._left = step, switching.of_state, MOST_EVALUATIONS
+        known = bool(ends) and ends[-1][0] == step.start
         self._earlier = ends[0] if known and len(ends) > 1 else None
         self._timed = switching.timed
-        self.start = ends[-1] if known else (made.start, self._value(made.start, made.first))
-        self.end = made.end, self._value(made.end, made.last)
+        self.start = ends[-1] if known else (step.start, self._value(step.start, step.first))
+        self.end = step.end, self._value(step.end, step.last)
         angles = list(switching.angles)
-        turned = float(np.abs(made.last - made.first)[angles].max(initial=0.0))
-        self._turns = turned / TURN if math.isfinite(turned) else 1.0
+        change = float(np.abs(step.last - step.first)[angles].max(initial=0.0))
+        self._least_parts = change / LARGEST_ANGLE if math.isfinite(change) else 1.0
 
     def is_far(self) -> bool:
-        """Whether all functions are that far from 0, so that none passes it in this step."""
-        if self._earlier is None or self._turns > 1:
+        """Whether all functions are so far from 0 that none crosses it in this step."""
+        if self._earlier is None or self._least_parts > 1:
             return False
         (before, g), (start, a), (_, b) = self._earlier, self.start, self.end
-        moved = np.abs(b - a) + np.abs(a - g) * (self.made.length / (start - before))
+        moved = np.abs(b - a) + np.abs(a - g) * (self.step.length / (start - before))
         if not (np.minimum(np.abs(a), np.abs(b)) >= FAR * moved).all():
             return False
-        return not self._timed or self._is_quiet(a)
+        return not self._timed or self._is_slow(a)
 
-    def _is_quiet(self, a: FloatArray) -> bool:
-        """Whether time alone does not move the functions much within the step: what is periodic
-        may be the same at all ends of steps.
+    def _is_slow(self, a: FloatArray) -> bool:
+        """Whether the functions change little within the step, too: a function that is periodic in
+        time may have the same value at the ends of all steps.
         """
-        made = self.made
-        for share in ODD:
-            t, y = made.start + share * made.length, made.first + share * (made.last - made.first)
+        step = self.step
+        for share in IRREGULAR:
+            t, y = step.start + share * step.length, step.first + share * (step.last - step.first)
             if not (np.abs(a) >= FAR * np.abs(self._value(t, y) - a)).all():
                 return False
         return True
 
     def brackets(self) -> tuple[list[_Bracket], bool]:
-        """Where functions pass 0, from early to late, and whether the whole step was looked at."""
-        made, found = self.made, list[_Bracket]()
-        if self._turns > MOST_EVALUATIONS / _LAST:
+        """Brackets of the zeros in the order of time, and whether the whole step was searched."""
+        step, found = self.step, list[_Bracket]()
+        if self._least_parts > MOST_EVALUATIONS / _LAST:
             return found, False
         waiting = self._first_parts()
         while waiting:
             a, b, values, asked = waiting.pop()
-            passing, unclear = _judged(values)
-            ends = made.start + a * made.length, made.start + b * made.length
+            passing, unclear = _classified(values)
+            ends = step.start + a * step.length, step.start + b * step.length
             if b - a <= SHORTEST_PART:
                 passing, unclear = passing | (unclear & _changes(values)), np.zeros_like(unclear)
             if not unclear.any():
@@ -278,7 +280,7 @@ class _Search:
                 continue
             if self._left < 2 * (_LAST - 1):
                 return found, False
-            # A function that passes 0 is asked for again in the halves, to be in order with others.
+            # A function that crosses 0 is bracketed again in the halves, in order with the others.
             again, middle = unclear | passing, (a + b) / 2
             asked, values = asked[again], values[:, again]
             late = self._part(middle, b, values[2], values[4], asked)
@@ -287,8 +289,8 @@ class _Search:
         return found, True
 
     def _first_parts(self) -> list[_Part]:
-        """The parts that a step is looked at in first, the earliest last."""
-        count = math.ceil(max(self._turns, 1.0))
+        """The parts with which the search begins, the earliest last."""
+        count = math.ceil(max(self._least_parts, 1.0))
         marks = np.linspace(0.0, 1.0, count + 1)
         at_marks = [self.start[1], *self._at(marks[1:-1]), self.end[1]]
         asked = np.arange(len(self.start[1]))
@@ -306,27 +308,27 @@ class _Search:
         return np.vstack((start, within[:, asked], end))
 
     def root(self, bracket: _Bracket) -> float:
-        """When a function passes 0 in a bracket, s."""
-        made = self.made
+        """The time at which a function crosses 0 in a bracket, s."""
+        step = self.step
 
         def value(t: float) -> float:
-            return float(self._at(np.array([(t - made.start) / made.length]))[0][bracket.which])
+            return float(self._at(np.array([(t - step.start) / step.length]))[0][bracket.which])
 
         first, last = value(bracket.start), value(bracket.end)
         if not first * last < 0:  # 0 at an end, or not finite
             return bracket.start if first == 0 else bracket.end
-        return float(brentq(value, bracket.start, bracket.end, xtol=1e-12 * made.length))
+        return float(brentq(value, bracket.start, bracket.end, xtol=1e-12 * step.length))
 
     def _at(self, shares: FloatArray) -> FloatArray:
-        """Values (n, ns) at shares (n,) of the step."""
+        """Values (n, ns) of the functions at fractions (n,) of the step."""
         if not shares.size:
             return np.empty((0, len(self.end[1])))
-        times = self.made.start + self.made.length * shares
-        pairs = zip(times.tolist(), self.made.states(times), strict=True)
+        times = self.step.start + self.step.length * shares
+        pairs = zip(times.tolist(), self.step.states(times), strict=True)
         return np.array([self._value(t, y) for t, y in pairs])
 
     def _value(self, t: float, y: FloatArray) -> FloatArray:
-        """Values (ns,) at a time; nan where they have none."""
+        """Values (ns,) of the functions at a time; nan if they cannot be evaluated."""
         self._left -= 1
         try:
             return self._function(t, y)
@@ -334,12 +336,12 @@ class _Search:
             return np.full(len(self.start[1]), np.nan)
 
 
-def _judged(values: FloatArray) -> tuple[Flags, Flags]:
-    """Of functions with `values` (5, n) in a part: those (n,) that are monotone there and pass 0,
-    and those that are neither monotone nor free of zeros, as far as can be told.
+def _classified(values: FloatArray) -> tuple[Flags, Flags]:
+    """Which functions with `values` (5, n) in a part are monotone there and cross 0, and which may
+    be neither monotone nor free of zeros, (n,) each.
 
-    What the polynomial through the values may be off is taken to be less than `rest`, twice the
-    size of its last two coefficients.
+    The error of the interpolating polynomial is taken to be less than `rest`, twice the magnitude
+    of its last two Chebyshev coefficients.
     """
     inner = _TO_BERNSTEIN @ values
     rest = 2 * np.abs((_TO_CHEBYSHEV @ values)[-2:]).sum(axis=0)
@@ -351,5 +353,5 @@ def _judged(values: FloatArray) -> tuple[Flags, Flags]:
 
 
 def _changes(values: FloatArray) -> Flags:
-    """Whether functions have another sign at the end of a part; 0 counts as negative."""
+    """Whether the signs of functions differ at the ends of a part; 0 counts as negative."""
     return np.asarray((values[0] > 0) != (values[-1] > 0))

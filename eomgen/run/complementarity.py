@@ -1,23 +1,23 @@
-"""Linear complementarity: forces that push and never pull."""
+"""The linear complementarity problem of contact forces, which push and never pull."""
 
 import numpy as np
 
 from eomgen.run.problem import FloatArray
 
 ROUNDING = 1e-10
-"""What counts as zero, beside the largest offset or force."""
+"""Values below this, relative to the largest offset or force, count as zero."""
 
 CONSISTENT = 1e-6
-"""What a redundant set of contacts may leave of its accelerations, beside the largest offset."""
+"""Largest acceleration left by a redundant set of contacts, relative to the largest offset."""
 
 
 def complementary(matrix: FloatArray, offset: FloatArray) -> FloatArray | None:
     """Return f (n,) with 0 <= f, 0 <= a = matrix f + offset, f_i a_i = 0; None if none is found.
 
-    Murty's least-index principal pivoting, then, where that turns in circles, Lemke's method:
-    Cottle, Pang, Stone, The Linear Complementarity Problem, sections 4.2 and 4.4. The systems of
-    the former are solved by least squares of least norm, so that contacts of which fewer would do,
-    a box's four corners on the ground, share the load evenly.
+    Murty's least-index principal pivoting or, if that cycles, Lemke's method: Cottle, Pang, Stone,
+    The Linear Complementarity Problem, sections 4.2 and 4.4. The systems of the former are solved
+    by least squares of least norm, so that redundant contacts, such as the four corners of a box on
+    the ground, share the load evenly.
     """
     scale = np.abs(offset).max(initial=0.0)
     if not (offset < 0).any():
@@ -41,14 +41,14 @@ def complementary(matrix: FloatArray, offset: FloatArray) -> FloatArray | None:
 
 
 def _least(matrix: FloatArray, wanted: FloatArray) -> FloatArray:
-    """The least solution of matrix x = wanted, nearest where there is none."""
+    """The solution of matrix x = wanted of least norm, by least squares if there is none."""
     if len(wanted) == 1 and matrix[0, 0]:
         return np.asarray(wanted / matrix[0])
     return np.asarray(np.linalg.lstsq(matrix, wanted, rcond=ROUNDING)[0])
 
 
 def _lemke(matrix: FloatArray, offset: FloatArray, scale: float) -> FloatArray | None:
-    """Lemke's method: an artificial variable makes everything feasible, then is driven out."""
+    """Lemke's method: an artificial variable gives a feasible basis and is then eliminated."""
     n = len(offset)
     # Columns: a (0 … n-1), f (n … 2n-1), the artificial one, the right-hand side.
     table = np.column_stack([np.eye(n), -matrix, -np.ones(n), offset])
@@ -69,9 +69,9 @@ def _lemke(matrix: FloatArray, offset: FloatArray, scale: float) -> FloatArray |
         column = table[:, entering]
         rows = np.flatnonzero(column > ROUNDING * np.abs(column).max())
         if not rows.size:
-            return None  # a ray: no forces do it
+            return None  # a ray: there is no solution
         ratios = table[rows, -1] / column[rows]
         least = rows[ratios <= ratios.min() + ROUNDING * scale]
-        # The artificial variable first, or degenerate corners are gone around for ever.
+        # The artificial variable first, or the method cycles at degenerate vertices.
         row = next((int(i) for i in least if basis[i] == 2 * n), int(least[0]))
     return None

@@ -1,8 +1,8 @@
-"""Rigid contacts: forces of those that are held, and impacts of those that close.
+"""Rigid contacts: forces of contacts that are held, and impacts of contacts that close.
 
-Nothing here has a unit of its own: gaps are counted in the size of the mechanism, `Contacts.sizes`,
-speeds and accelerations in those of its motion. So a scene in other units, of molecules or of
-planets, runs as it does in metres and seconds; `in_sizes` is what makes it so.
+All tolerances are dimensionless: gaps are relative to the size of the mechanism, `Contacts.sizes`,
+speeds and accelerations to those of its motion. So a scene in other units, or of another scale,
+runs alike. `in_sizes` scales the gaps.
 """
 
 import math
@@ -17,29 +17,32 @@ from eomgen.run.integrators.interface import StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
 
 TOLERANCE = 1e-9
-"""In sizes: contacts this close touch, and may start this deep."""
+"""Contacts with gaps below this touch, and may penetrate by this at the start; in sizes."""
 
 STILL = 3e-11
-"""In speeds of the motion: contacts that close more slowly do not close."""
+"""Contacts that close more slowly than this do not strike; in speeds of the motion."""
 
 PARTING = 1e-10
-"""In accelerations of the motion: contacts without a force that part with less stay as they are."""
+"""A contact without force whose gap accelerates less than this does not open; in accelerations of
+the motion."""
 
 ALPHA = 10 / math.sqrt(9.81)
-"""In rates of the motion: what a held contact is off by, it leaves behind at this rate. It is 10/s
-for a mechanism of one metre under gravity."""
+"""The rate at which the drift of held contacts decays, in rates of the motion: 10/s for a mechanism
+of one metre under gravity."""
 
 RISE = 5e-8
-"""In sizes: a bounce that will not rise higher than this is none, unless `rest_speed` says so."""
+"""A contact that would rise less than this does not bounce, unless `rest_speed` is given; in sizes.
+"""
 
 AWAY = 1e-6
-"""In accelerations of the motion: a gap that grows at more than this does so of itself."""
+"""A gap that accelerates by more than this without contact forces opens by itself; in accelerations
+of the motion."""
 
 STRONG = 2.0**400
-"""N or N m: a force beside which all others are nothing, whatever it moves."""
+"""A force beside which all others are negligible, N or N m."""
 
 BOUNCES, STRIKES = 100, 5000
-"""Strikes at one moment, per contact: with restitution, and in all."""
+"""Greatest number of strikes at one time, per contact: with restitution, and in all."""
 
 _CUBE_ROOT = np.finfo(float).eps ** (1 / 3)
 
@@ -49,7 +52,7 @@ Rate = Callable[[float, FloatArray], FloatArray]
 
 
 def in_sizes(contacts: Contacts) -> Contacts:
-    """The same contacts, their gaps and what these do counted in sizes."""
+    """The same contacts with gaps, their rates and accelerations relative to `Contacts.sizes`."""
     sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
     if (sizes == 1).all():
         return contacts
@@ -69,43 +72,44 @@ def in_sizes(contacts: Contacts) -> Contacts:
 
 
 def recovery(contacts: Contacts, t: float, y: FloatArray, span: float) -> float:
-    """The rate at which contacts recover from drift, 1/s, in a run of `span` s: `ALPHA` times that
-    of the motion at its start, √(a/size) of what accelerates the gaps, or v/size.
+    """The rate at which the drift of contacts decays in a run of `span` s, 1/s: `ALPHA` times the
+    rate of the motion at its start, the greater of √a and v of the gaps in sizes.
     """
     fastest = float(np.abs(contacts.rates(t, y)).max())
-    return ALPHA * max(math.sqrt(pressed(contacts, t, y)), fastest, 1 / span)
+    return ALPHA * max(math.sqrt(largest_acceleration(contacts, t, y)), fastest, 1 / span)
 
 
-def pressed(contacts: Contacts, t: float, y: FloatArray) -> float:
-    """The greatest acceleration of any gap, either way, without contact forces: sizes/s²."""
+def largest_acceleration(contacts: Contacts, t: float, y: FloatArray) -> float:
+    """The greatest magnitude of `accelerations`, sizes/s²."""
     return float(np.abs(accelerations(contacts, t, y)).max())
 
 
 def accelerations(contacts: Contacts, t: float, y: FloatArray) -> FloatArray:
-    """Those of the gaps (nc,), without contact forces: sizes/s²."""
+    """The accelerations of the gaps without contact forces, (nc,), sizes/s²."""
     count = len(contacts.names)
     return contacts.held(t, y, np.zeros(count))[len(y) : len(y) + count]
 
 
 def slowest_bounces(free: FloatArray, rest_speed: FloatArray | None) -> FloatArray:
-    """With what speed each contact must close to bounce (nc,), sizes/s: `rest_speed` if given, or
-    that from which the bounce rises by `RISE` under the accelerations `free` of the gaps.
+    """The least closing speed with which each contact bounces (nc,), sizes/s: `rest_speed` if
+    given, else that from which it would rise by `RISE` against the accelerations `free` of the
+    gaps.
 
-    One that parts of itself, as what grazes along a curve does, bounces at any: its bounces come to
-    an end without, and to stop them would stop what slides by.
+    A contact that opens by itself, as in grazing a curved surface, bounces at any speed: its
+    bounces end anyway, and without them it would stick.
     """
-    force = float(np.abs(free).max())
-    # What strikes at v under the acceleration a rises by v²/2a.
-    rising = np.full(len(free), math.sqrt(2 * RISE * force))
-    return np.where(free > AWAY * force, 0.0, rising if rest_speed is None else rest_speed)
+    largest = float(np.abs(free).max())
+    # A contact that leaves at v against the acceleration a rises by v²/2a.
+    rising = np.full(len(free), math.sqrt(2 * RISE * largest))
+    return np.where(free > AWAY * largest, 0.0, rising if rest_speed is None else rest_speed)
 
 
 @dataclass(frozen=True, eq=False)
 class Holding:
-    """Some contacts of a mechanism, held: they may part, but not close.
+    """The forces of contacts that are held: they may open, but not close.
 
-    Their forces f solve 0 <= f, 0 <= a, f a = 0 with a = gap'' + 2 α gap' + α² gap, which is affine
-    in the forces; α = `alpha` (Baumgarte's stabilisation with both roots at -α) takes drift back.
+    The forces f solve 0 <= f, 0 <= a, f a = 0 with a = gap'' + 2 α gap' + α² gap, which is affine
+    in f. With α = `alpha` drift decays (Baumgarte stabilisation with both roots at -α).
     """
 
     contacts: Contacts
@@ -114,29 +118,31 @@ class Holding:
     alpha: float
 
     @cached_property
-    def pressed(self) -> float:
-        """The greatest acceleration of any gap under no contact force at the start, or that of the
-        motion, if it is more: bodies that move alike do not accelerate their gaps.
+    def _largest_acceleration(self) -> float:
+        """The greatest acceleration of any gap without contact forces at the start, but at least
+        that of the motion: bodies that move together do not accelerate their gaps.
         """
-        return max(pressed(self.contacts, *self.start), self._usual)
+        return max(largest_acceleration(self.contacts, *self.start), self._motion_acceleration)
 
     @property
-    def _usual(self) -> float:
-        """An acceleration of the motion, sizes/s²: see `recovery`."""
+    def _motion_acceleration(self) -> float:
+        """The acceleration of the motion, sizes/s²: see `recovery`."""
         return (self.alpha / ALPHA) ** 2
 
     @cached_property
     def units(self) -> FloatArray:
-        """Forces (nh,) that accelerate each gap about as all else does: differences keep their
-        digits.
+        """For each contact a force (nh,) that accelerates its gap about as much as the other forces
+        do, so that differences do not lose digits.
         """
         matrix, _, _ = self._system(*self.start, np.full(len(self.held), STRONG))
         own = np.abs(np.diagonal(matrix)) / STRONG
-        return self.pressed / np.where(own > 0, own, self.pressed)
+        largest = self._largest_acceleration
+        return largest / np.where(own > 0, own, largest)
 
     def solve(self, t: float, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return what `Contacts.held` gives (ny + 2 nc + nd,), and (nh,) each: forces times what
-        they do to their own gaps, and a, or 0 where that is nothing beside what else accelerates.
+        """Return what `Contacts.held` gives under the forces, (ny + 2 nc + nd,), and for each held
+        contact, (nh,), the acceleration of its gap by its own force, and a, or 0 if a is
+        negligible.
 
         Raises `StepFailure` if no forces keep the contacts from closing.
         """
@@ -145,14 +151,14 @@ class Holding:
         if forces is None:
             names = ", ".join(self.contacts.names[k] for k in self.held)
             raise StepFailure(
-                f"no contact forces at t = {t:.6g} keep {names} from closing (much friction may do "
-                "that)",
-                "take less friction, or another law of contact",
+                f"no contact forces at t = {t:.6g} keep {names} from closing (strong friction can "
+                "cause this)",
+                "take less friction, or another contact law",
             )
         result = columns[:, 0] + (columns[:, 1:] - columns[:, :1]) @ forces
         left = matrix @ forces + offset
-        usual = max(float(np.abs(columns[self._gaps, 0]).max()), self._usual)
-        left[np.abs(left) <= PARTING * usual] = 0.0
+        scale = max(float(np.abs(columns[self._gaps, 0]).max()), self._motion_acceleration)
+        left[np.abs(left) <= PARTING * scale] = 0.0
         return result, forces * np.diagonal(matrix), left
 
     def derivative(self, t: float, y: FloatArray) -> FloatArray:
@@ -160,25 +166,25 @@ class Holding:
         return self.solve(t, y)[0][: len(y)]
 
     def powers(self, t: float, y: FloatArray) -> FloatArray:
-        """What the contacts' forces and the drives do (nc + nd,), W."""
+        """Powers of the contacts' forces and of the drives (nc + nd,), W."""
         return self.solve(t, y)[0][len(y) + len(self.contacts.names) :]
 
     @property
     def _gaps(self) -> slice:
-        """Where `Contacts.held` has the gaps' accelerations."""
+        """The part of `Contacts.held` with the accelerations of the gaps."""
         states = len(self.start[1])
         return slice(states, states + len(self.contacts.names))
 
     def _system(
         self, t: float, y: FloatArray, units: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Matrix and offset of a, and the columns that `Contacts.held` gives: under no force, and
-        under the unit of each.
+        """Matrix and offset of a, and the columns that `Contacts.held` gives without forces and
+        under the unit force of each held contact.
         """
         held = list(self.held)
         forces = np.zeros((len(held) + 1, len(self.contacts.names)))
         forces[range(1, len(held) + 1), held] = units
-        # One at a time: scalar code, ten times as fast as columns where there are few.
+        # One at a time: for few columns, scalar code is ten times as fast as arrays.
         columns = np.column_stack([self.contacts.held(t, y, each) for each in forces])
         gaps, rates = self.contacts.gaps(t, y)[held], self.contacts.rates(t, y)[held]
         free = columns[self._gaps][held]
@@ -189,9 +195,9 @@ class Holding:
 def restrained(
     problem: Problem, holding: Holding | None, counted: Callable[[Rate], Rate]
 ) -> Problem:
-    """The problem while contacts are held; its Jacobian is then one by differences.
+    """The problem while contacts are held; its Jacobian is then computed by differences.
 
-    `counted` makes a function count among the derivatives evaluated.
+    `counted` wraps a function so that its calls count as derivatives.
     """
     if holding is None:
         return problem
@@ -203,7 +209,7 @@ def restrained(
 
 
 def _differences(derivative: Rate, sizes: FloatArray, t: float, y: FloatArray) -> FloatArray:
-    """Derivatives (ny, ny) of a derivative by a state of such sizes, by central differences."""
+    """The Jacobian (ny, ny) of a derivative by central differences; `sizes` of the states."""
     steps = _CUBE_ROOT * np.maximum(sizes, np.abs(y))
     columns = [derivative(t, y + change) - derivative(t, y - change) for change in np.diag(steps)]
     return np.column_stack(columns) / (2 * steps)
@@ -217,26 +223,25 @@ def strikes(
     least: FloatArray,
     nothing: float,
 ) -> Iterator[tuple[int, float, FloatArray]]:
-    """Yield what strikes at one moment: contact, speed with which it closed, state after it.
+    """Yield the strikes at time t: contact, closing speed, state after it.
 
-    Of those in `touching` the one that closes fastest strikes, again and again, until none closes
-    faster than `nothing`. One that closes more slowly than its `least` (nc,) strikes without
-    bouncing, and so does each after `BOUNCES` strikes per contact. Raises `StepFailure` if
-    `STRIKES` per contact do not end it.
+    The contact in `touching` that closes fastest strikes, repeatedly, until none closes faster than
+    `nothing`. A contact that closes more slowly than its `least` (nc,) does not bounce, and after
+    `BOUNCES` strikes per contact none does. Raises `StepFailure` after `STRIKES` per contact.
     """
-    where = list(touching)
-    for count in range(STRIKES * len(where)):
-        rates = contacts.rates(t, y)[where]
-        first = int(np.argmin(rates))
-        speed = -float(rates[first])
+    candidates = list(touching)
+    for count in range(STRIKES * len(candidates)):
+        rates = contacts.rates(t, y)[candidates]
+        fastest = int(np.argmin(rates))
+        contact, speed = candidates[fastest], -float(rates[fastest])
         if not speed > nothing:
             return
-        bounces = speed >= least[where[first]] and count < BOUNCES * len(where)
-        y = contacts.impact(t, y, where[first], 1.0 if bounces else 0.0)
-        yield where[first], speed, y
-    names = ", ".join(contacts.names[k] for k in where)
+        bounces = speed >= least[contact] and count < BOUNCES * len(candidates)
+        y = contacts.impact(t, y, contact, 1.0 if bounces else 0.0)
+        yield contact, speed, y
+    names = ", ".join(contacts.names[k] for k in candidates)
     raise StepFailure(
-        f"the impacts among {names} at t = {t:.6g} come to no end", "take less restitution"
+        f"the impacts among {names} at t = {t:.6g} do not end", "take less restitution"
     )
 
 
@@ -248,8 +253,8 @@ def still(
     nothing: float,
     alpha: float,
 ) -> list[int]:
-    """Those in `touching` that are to be held: they neither part, faster than `nothing`, nor would
-    without a force.
+    """The contacts in `touching` that are to be held: those that do not open faster than `nothing`
+    and would not open without a force.
     """
     rates = contacts.rates(t, y)
     slow = [k for k in touching if rates[k] <= nothing]
@@ -260,7 +265,7 @@ def still(
 
 
 def check_depth(contacts: Contacts, t: float, y: FloatArray) -> None:
-    """Raise `StepFailure` if a contact is deeper than `TOLERANCE`."""
+    """Raise `StepFailure` if a contact penetrates by more than `TOLERANCE`."""
     gaps = contacts.gaps(t, y)
     deepest = int(np.argmin(gaps))
     if gaps[deepest] < -TOLERANCE:

@@ -1,14 +1,14 @@
-"""Runs with rigid contacts: where they close, strike, stay closed and open again.
+"""Event location for rigid contacts: when they close, strike, rest and open.
 
-A run is cut into pieces at whose ends a contact strikes or opens; within a piece the motion is
-smooth, and a method's steps are its own. Contacts that are apart are watched by their gaps, those
-that are held by their forces.
+A run is divided where a contact strikes or opens. Between these events the motion is smooth, and
+the method makes its own steps. The gaps of open contacts and the forces of held contacts are
+checked in every step.
 
-What is promised: no contact is ever deeper than `contacts.TOLERANCE` of the mechanism's size, 1e-9,
-and what the method's own error adds between the looks at a step. An impact at which a contact
-closes so slowly that it would not rise by 5e-8 of that size, or more slowly than `rest_speed`, does
-not bounce, which ends the bounces that would go on for ever in a finite time; one whose gap grows
-of itself, as of what grazes along a curve, always bounces.
+No contact penetrates by more than `contacts.TOLERANCE`, 1e-9 of the mechanism's size, plus the
+method's error between the points of a step at which gaps are checked. A contact that closes more
+slowly than `rest_speed`, or so slowly that it would not rise by 5e-8 of that size, does not bounce;
+so infinitely many bounces in a finite time come to an end. A contact whose gap opens by itself, as
+in grazing a curved surface, always bounces.
 """
 
 import math
@@ -38,7 +38,7 @@ from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import Event
 
 MOST_EVENTS = 10_000
-"""At so many moments something may happen before time has moved on."""
+"""Greatest number of events within 1e-9 of a run's length."""
 
 TOGETHER = 1e-9
 """Contacts that open within this fraction of a step open together."""
@@ -46,25 +46,25 @@ TOGETHER = 1e-9
 
 @dataclass(frozen=True)
 class Stepper:
-    """Steps of a method that can be begun anywhere.
+    """How a run makes steps.
 
-    begin    steps of a problem from a time on, with how many were made before
-    looks    fractions of a step at whose ends gaps are looked at, 0 to 1
-    counted  makes a function count among the derivatives evaluated
+    begin    begins steps of a problem at any time
+    checked  the points of a step at which gaps are checked, as fractions from 0 to 1
+    counted  wraps a function so that its calls count as derivatives
     """
 
     begin: Begin
-    looks: Sequence[float]
+    checked: Sequence[float]
     counted: Callable[[Rate], Rate]
 
 
 @dataclass
-class _Moment:
-    """How a run stands: time, state, contacts held, and contacts that have just opened.
+class _Status:
+    """The current status of a run: time, state, and contacts held.
 
-    The latter lie within rounding of closed; their gaps are counted from `slack` below 0 until they
-    are clear of `TOLERANCE`. `fastest` is the greatest rate of any gap at any strike so far,
-    sizes/s.
+    slack    added to each gap, (nc,): positive for contacts that have just opened, whose gaps are 0
+             but for rounding, until they exceed `TOLERANCE`
+    fastest  the greatest rate of any gap at any strike so far, sizes/s
     """
 
     t: float
@@ -75,15 +75,15 @@ class _Moment:
 
 
 @dataclass
-class _Guard:
-    """Counts moments at which time does not move on, and stops a run that does not."""
+class _EventLimit:
+    """Counts the events within `least` s, and stops a run with too many."""
 
     least: float
     since: float
     count: int = 0
 
-    def notice(self, t: float) -> None:
-        """Something happened at `t`."""
+    def count_event(self, t: float) -> None:
+        """Count an event at `t`. Raises `StepFailure` if there are too many."""
         self.count += 1
         if t - self.since > self.least:
             self.since, self.count = t, 0
@@ -106,8 +106,9 @@ def advances(
 ) -> Iterator[Advance]:
     """Yield the steps of a run with contacts, cut where one strikes or opens, and the strikes.
 
-    `rest_speed`, m/s or rad/s, and `resume`: see `integrate`. Raises `StepFailure` for a start too
-    deep, for contacts that admit no forces, for impacts without end, and after `max_steps`.
+    `rest_speed`, m/s or rad/s, and `resume`: see `integrate`. Raises `StepFailure` if a contact
+    penetrates at the start, if no forces keep contacts from closing, if impacts do not end, and
+    after `max_steps`.
     """
     assert problem.contacts is not None
     problem = replace(problem, contacts=in_sizes(problem.contacts))
@@ -115,7 +116,7 @@ def advances(
     assert contacts is not None
     count = len(contacts.names)
     fastest = float(np.abs(contacts.rates(t_start, problem.initial)).max())
-    now = _Moment(t_start, problem.initial, (), np.zeros(count), fastest)
+    now = _Status(t_start, problem.initial, (), np.zeros(count), fastest)
     closed: list[int] = []
     begun = (now.t, now.y)
     if resume and "alpha" in resume:
@@ -127,11 +128,11 @@ def advances(
         alpha = recovery(contacts, t_start, now.y, t_end - t_start)
         check_depth(contacts, now.t, now.y)
         closed = np.flatnonzero(contacts.gaps(now.t, now.y) <= TOLERANCE).tolist()
-    guard = _Guard(1e-9 * (t_end - t_start), t_start)
+    limit = _EventLimit(1e-9 * (t_end - t_start), t_start)
     made = 0
     while True:
         if closed:
-            guard.notice(now.t)
+            limit.count_event(now.t)
             yield from _strike(problem, now, closed, rest_speed, alpha)
         closed = []
         if now.t >= t_end:
@@ -139,16 +140,16 @@ def advances(
         if resume is None:
             begun = (now.t, now.y)
         holding = Holding(contacts, now.held, begun, alpha) if now.held else None
-        piece = restrained(replace(problem, initial=now.y), holding, stepper.counted)
+        smooth = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
-        steps = stepper.begin(piece, now.t, made, resume)
+        steps = stepper.begin(smooth, now.t, made, resume)
         resume = None
         for advance in steps:
             made += 1
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
             step = replace(advance, contact_powers=powers)
-            closing, closed = _closing(contacts, now, step, stepper.looks)
+            closing, closed = _closing(contacts, now, step, stepper.checked)
             opening, opened = _opening(holding, now, step)
             if closing <= opening and closed:
                 now.slack = np.zeros(len(contacts.names))
@@ -156,9 +157,9 @@ def advances(
                 break
             closed = []
             if opened:
-                guard.notice(opening)
+                limit.count_event(opening)
                 yield from _cut(now, step, opening, keep=False)
-                yield _open(contacts, piece, now, opened)
+                yield _open(contacts, smooth, now, opened)
                 break
             now.t, now.y = step.t, step.y
             if now.slack.any():
@@ -167,9 +168,9 @@ def advances(
 
 
 def _resume(
-    step: Advance, now: _Moment, begun: tuple[float, FloatArray], alpha: float
+    step: Advance, now: _Status, begun: tuple[float, FloatArray], alpha: float
 ) -> Callable[[], Resume] | None:
-    """What a step goes on from, with what contacts do."""
+    """What a later run needs to continue after a step: that of the method, and the contacts."""
     if step.resume is None:
         return None
     held, slack, fastest, own = now.held, now.slack.copy(), now.fastest, step.resume
@@ -190,12 +191,12 @@ def _resume(
 
 def _strike(
     problem: Problem,
-    now: _Moment,
+    now: _Status,
     closed: Sequence[int],
     rest_speed: float | None,
     alpha: float,
 ) -> Iterator[Advance]:
-    """Yield each strike at one moment; `now` then tells what is held."""
+    """Yield the strikes at time `now.t`, and update `now` with the contacts that are then held."""
     contacts, t = problem.contacts, now.t
     assert contacts is not None
     near = np.flatnonzero(contacts.gaps(t, now.y) <= TOLERANCE).tolist()
@@ -235,8 +236,8 @@ def _strike(
     yield replace(instant(), samples=rows, events=tuple(events))
 
 
-def _open(contacts: Contacts, problem: Problem, now: _Moment, opened: Sequence[int]) -> Advance:
-    """Let contacts go."""
+def _open(contacts: Contacts, problem: Problem, now: _Status, opened: Sequence[int]) -> Advance:
+    """Release contacts that were held."""
     now.held = tuple(k for k in now.held if k not in opened)
     for k in opened:
         now.slack[k] = _slack(contacts, now.t, now.y, k)
@@ -246,12 +247,14 @@ def _open(contacts: Contacts, problem: Problem, now: _Moment, opened: Sequence[i
 
 
 def _slack(contacts: Contacts, t: float, y: FloatArray, contact: int) -> float:
-    """How far below 0 a contact that opens may be: `TOLERANCE`, or hardly more than it is now."""
+    """The `slack` of a contact that opens: `TOLERANCE`, or a little more than its penetration."""
     return max(TOLERANCE, 0.01 * TOLERANCE - float(contacts.gaps(t, y)[contact]))
 
 
-def _cut(now: _Moment, step: Advance, t: float, keep: bool) -> Iterator[Advance]:
-    """Yield the part of a step up to `t`, if it has any length, and go there."""
+def _cut(now: _Status, step: Advance, t: float, keep: bool) -> Iterator[Advance]:
+    """Yield the part of a step up to `t`, if it has any length, and update `now`. With `keep` the
+    state at `t` is a sample.
+    """
     if t <= now.t:
         return
     y = step.y if t == step.t else step.within(t)
@@ -262,9 +265,9 @@ def _cut(now: _Moment, step: Advance, t: float, keep: bool) -> Iterator[Advance]
 
 
 def _closing(
-    contacts: Contacts, now: _Moment, step: Advance, looks: Sequence[float]
+    contacts: Contacts, now: _Status, step: Advance, checked: Sequence[float]
 ) -> tuple[float, list[int]]:
-    """When contacts first close in a step, and which; infinity and none if they stay apart."""
+    """The time at which contacts first close in a step, and which; infinity and none if none do."""
     apart = [k for k in range(len(contacts.names)) if k not in now.held]
     if not apart:
         return np.inf, []
@@ -279,25 +282,25 @@ def _closing(
     def rate(k: int, s: float) -> float:
         return float(contacts.rates(now.t + s, state(s))[k])
 
-    def look(s: float) -> tuple[float, FloatArray, FloatArray]:
+    def at(s: float) -> tuple[float, FloatArray, FloatArray]:
         y = state(s)
         return s, contacts.gaps(now.t + s, y), contacts.rates(now.t + s, y)
 
-    a, gaps_a, rates_a = look(0.0)
-    for fraction in looks[1:]:
-        b, gaps_b, rates_b = look(fraction * length)
+    a, gaps_a, rates_a = at(0.0)
+    for fraction in checked[1:]:
+        b, gaps_b, rates_b = at(fraction * length)
         found = []
         for k in apart:
             low = gaps_b[k] + slack[k] < 0
             dips = rates_a[k] < 0 < rates_b[k]
             if low or dips:
                 ends = (gaps_a[k] + slack[k], gaps_b[k] + slack[k])
-                at = _first_zero(partial(gap, k), partial(rate, k), a, b, ends)
-                if at is not None:
-                    found.append((at, k))
+                zero = _first_zero(partial(gap, k), partial(rate, k), a, b, ends)
+                if zero is not None:
+                    found.append((zero, k))
         if found:
             first = min(found)[0]
-            return now.t + first, [k for at, k in found if at <= first + 1e-12 * length]
+            return now.t + first, [k for zero, k in found if zero <= first + 1e-12 * length]
         slack[gaps_b > TOLERANCE] = 0.0
         a, gaps_a, rates_a = b, gaps_b, rates_b
     return np.inf, []
@@ -310,10 +313,12 @@ def _first_zero(
     b: float,
     ends: tuple[float, float],
 ) -> float | None:
-    """Where a gap that turns at most once between `a` and `b` first falls to 0, if it does."""
+    """The first point at which a gap falls to 0, if it does; its rate changes sign at most once
+    between `a` and `b`. `ends` are its values there.
+    """
     at_a, at_b = ends
     before, after = rate(a), rate(b)
-    # One that rises first falls to 0 only after its turn: at `a` it may be 0 but for rounding.
+    # A gap that rises first reaches 0 only after its maximum: at `a` it may be 0 but for rounding.
     if at_a > 0 and at_b < 0 and not before > 0 > after:
         return _root(gap, a, b)
     turns = before * after < 0
@@ -331,10 +336,9 @@ def _root(function: Callable[[float], float], a: float, b: float) -> float:
     return float(brentq(function, a, b, xtol=max(1e-14 * (b - a), 1e-300), rtol=1e-15))
 
 
-def _opening(holding: Holding | None, now: _Moment, step: Advance) -> tuple[float, list[int]]:
-    """When held contacts first open in a step, and which; infinity and none if they stay held.
-
-    A contact opens where its force has fallen to 0 and its gap begins to grow.
+def _opening(holding: Holding | None, now: _Status, step: Advance) -> tuple[float, list[int]]:
+    """The time at which held contacts first open in a step, and which; infinity and none if none
+    do. A contact opens when its force has fallen to 0 and its gap begins to grow.
     """
     if holding is None:
         return np.inf, []

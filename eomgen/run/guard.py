@@ -1,12 +1,11 @@
-"""A run guarded against lost digits: what rounding does to its derivative, watched at every step.
+"""A guard against lost digits: the rounding error of the derivative is checked at every step.
 
-A small residual M v̇ + h - F does not mean that v̇ is right: with a heavy body on light ones v̇ loses
-a digit for each decade of their masses, and its residual none. So the residual that is watched is
-that of the derivative itself, ẏ - f(t, y), with f the same equations in numbers that are long
-enough; it is the forward error of v̇ and of all else that goes into the step. It is asked for at
-every state that a step ends in, so that no row is kept that was not looked at. One evaluation in
-extended numbers takes as long as 8 to 17 of doubles, a step of DOP853 12: a guarded run takes half
-as long again by DOP853, and three to five times as long by rk4, whose steps are short.
+A small residual M v̇ + h - F does not imply a small error of v̇: with a heavy body on light ones v̇
+loses a digit for each decade of the mass ratio, and the residual does not show it. So the guard
+computes the error of the derivative itself, ẏ - f(t, y), with f evaluated in extended precision. It
+does so at the end of every step, so that every row is checked. An evaluation in extended precision
+costs as much as 8 to 17 in doubles: a guarded run takes 1.5 times as long with DOP853, whose steps
+take 12 evaluations, and 3 to 5 times as long with rk4.
 """
 
 import math
@@ -19,27 +18,28 @@ from eomgen.run.integrators.interface import Advance, Begin, StepFailure
 from eomgen.run.problem import FloatArray, Problem
 
 LOST = 1e-8
-"""Relative error of a derivative at which digits count as lost, unless the run is held tighter."""
+"""Relative error of a derivative beyond which digits count as lost, unless the tolerance of the run
+is tighter."""
 OF_TOLERANCE = 10.0
-"""Times the relative tolerance of a run that its derivative may be off."""
-HARDLY = 1e-3
-"""Part of the greatest that a rate was in the run, of which less counts as no more."""
+"""Allowed relative error of the derivative, in relative tolerances of the run."""
+LEAST_SCALE = 1e-3
+"""Errors are relative to the present rate, but at least to this fraction of its maximum so far."""
 REGAINED = 0.1
-"""Part of the bound below which doubles are trusted again."""
+"""Fraction of the bound below which a repaired run returns to doubles."""
 UNIT = 1e-12
-"""What a quaternion may be off unit length."""
+"""Allowed deviation of a quaternion from unit length."""
 FULL = 16.0
 """Digits of doubles."""
 
 
 @dataclass(frozen=True, eq=False)
 class Guard:
-    """What watches a run.
+    """The settings of a guard.
 
-    exact    f(t, y) -> (ny,), the derivative in extended precision, nan where it has no value there
-    groups   of states that share a unit, whose rates are measured by the greatest of them
+    exact    f(t, y) -> (ny,), the derivative in extended precision, nan where it has no value
+    groups   groups of states with the same unit; errors are relative to the greatest rate in each
     bound    relative error of the derivative beyond which digits are lost
-    repairs  go on by `exact` where digits are lost, instead of stopping
+    repairs  whether to continue with `exact` where digits are lost, instead of stopping
     """
 
     exact: Callable[[float, FloatArray], FloatArray]
@@ -50,10 +50,11 @@ class Guard:
 
 @dataclass(eq=False)
 class RoundingMonitor:
-    """A guard at its work on one run, which holds it to `bound`.
+    """A guard during a run.
 
-    derivative  what the run is to integrate: the problem's own, and `exact` while `repairing`
-    stretches   begin, end (s) and worst loss of what was repaired
+    bound      relative error of the derivative that is allowed in this run
+    repairing  whether the derivative is now computed in extended precision
+    stretches  begin, end (s) and greatest error of each repaired part of the run
     """
 
     guard: Guard
@@ -64,28 +65,28 @@ class RoundingMonitor:
     _sizes: list[float] = field(default_factory=list)
 
     def derivative(self, t: float, y: FloatArray) -> FloatArray:
-        """f(t, y) as the run takes it now."""
+        """f(t, y) for the method: the problem's own, or `exact` while `repairing`."""
         return self.guard.exact(t, y) if self.repairing else self.problem.derivative(t, y)
 
     def loss(self, t: float, y: FloatArray) -> float:
-        """Relative error of the problem's own derivative; infinite where it is not finite.
+        """Relative error of the problem's own derivative; infinite if that is not finite.
 
-        Raises `StepFailure` where there is no value in extended precision either, and for a
-        quaternion that has left unit length.
+        Raises `StepFailure` if the derivative is not finite in extended precision either, or if a
+        quaternion does not have unit length.
         """
         for indices in self.problem.quaternions:
-            off = math.hypot(*(float(y[i]) for i in indices)) - 1.0
-            if abs(off) > UNIT:
+            defect = math.hypot(*(float(y[i]) for i in indices)) - 1.0
+            if abs(defect) > UNIT:
                 state = self.problem.states[indices[0]]
                 raise StepFailure(
-                    f"the quaternion from {state} on is off unit length by {off:.2g}",
+                    f"the length of the quaternion from {state} on differs from 1 by {defect:.2g}",
                     "take a smaller step or tighter tolerances",
                 )
         true = self.guard.exact(t, y)
         if not np.isfinite(true).all():
             raise StepFailure(
-                "the step has left the domain: the equations have no finite value there, in long "
-                "numbers either",
+                "the step has left the domain: the equations have no finite value there, in "
+                "extended precision either",
                 "take a smaller step, or keep away",
             )
         try:
@@ -99,22 +100,22 @@ class RoundingMonitor:
         for k, group in enumerate(map(list, self.guard.groups)):
             size = float(np.max(np.abs(true[group])))
             self._sizes[k] = max(self._sizes[k], size)
-            off = float(np.max(np.abs(found[group] - true[group])))
-            if off:
-                worst = max(worst, off / max(size, HARDLY * self._sizes[k]))
+            error = float(np.max(np.abs(found[group] - true[group])))
+            if error:
+                worst = max(worst, error / max(size, LEAST_SCALE * self._sizes[k]))
         return worst
 
-    def lost(self, loss: float) -> StepFailure:
-        """What a run stops with where too much is lost."""
+    def failure(self, loss: float) -> StepFailure:
+        """The error with which a run stops for lost digits."""
         left = max(0.0, -math.log10(loss)) if loss < 1 else 0.0
         return StepFailure(
-            f"digits lost: accelerations there are right to {left:.0f} of {FULL:.0f} digits only "
+            f"digits lost: accelerations there have only {left:.0f} of {FULL:.0f} correct digits "
             f"(relative error {loss:.2g}, allowed {self.bound:.2g})",
             "take --route orthogonal, or --guard repair",
         )
 
     def words(self) -> str:
-        """What was repaired, in a line; "" if nothing."""
+        """A line that says what was repaired; "" if nothing was."""
         if not self.stretches:
             return ""
         begin, end = self.stretches[0][0], self.stretches[-1][1]
@@ -140,11 +141,10 @@ def monitored(
 def repaired(
     monitor: RoundingMonitor, begin: Begin, problem: Problem, t: float, max_steps: int
 ) -> Iterator[Advance]:
-    """Steps of a problem from time t on, in doubles where they hold, in extended precision
-    elsewhere.
+    """The steps of a problem from time t on, in extended precision where doubles lose digits.
 
-    A step whose end has lost digits is made again from where it began, in extended precision, and
-    so are those after it up to where doubles are good again.
+    A step whose end has lost digits is repeated in extended precision, and so are the steps after
+    it until the error in doubles is below `REGAINED` of the bound.
     """
     y, made = problem.initial, 0
     monitor.repairing = False
@@ -174,7 +174,7 @@ def repaired(
 
 def _check(monitor: RoundingMonitor, loss: float) -> None:
     if loss > monitor.bound:
-        raise monitor.lost(loss)
+        raise monitor.failure(loss)
 
 
 def _repair(monitor: RoundingMonitor, t: float, loss: float) -> None:

@@ -1,4 +1,4 @@
-"""From a problem to its trajectory: check what is asked, step, and keep what was computed."""
+"""Integration of a problem: checks of the arguments, the steps, and the trajectory."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -12,15 +12,16 @@ from eomgen.run.checks import check_repairs, check_rest_speed, numbers
 from eomgen.run.guard import OF_TOLERANCE, Guard, RoundingMonitor, monitored, repaired
 from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
-from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.stepping import ANEW, Asked, adaptive_steps, begun, can_go_on, equal_steps
 from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Event, Outcome, Trajectory
 from eomgen.run.works import Account, Powers
 
-LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Where in a long step the gaps of contacts are looked at; in an equal step at its ends."""
+GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Points of an adaptive step at which the gaps of contacts are checked; for equal steps, the ends.
+"""
 
 
 def integrate(
@@ -45,35 +46,35 @@ def integrate(
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
-    integrator  a name in `eomgen.run.integrators.INTEGRATORS`
+    integrator  a name in `eomgen.integrators.INTEGRATORS`
     dt          step in s of the fixed-step methods, which need it; the last one is shortened
-    rtol, atol  what the adaptive methods hold the error of each step to; without `atol`, each state
-                has 1e-12 of its size in `problem.sizes`, less where rtol is below 1e-9
-    samples     how many rows to keep: for fixed steps every k-th one such that there are about
+    rtol, atol  tolerances for the error of each step of the adaptive methods. The default of atol
+                is 1e-12 of each state's size in `problem.sizes`, less if rtol is below 1e-9
+    samples     number of rows to keep: for fixed steps every k-th one such that there are about
                 this many (default: all), for adaptive methods this many equally spaced times
                 (default: 1001); the first and the last are always kept
-    progress    told the fraction done, at most about ten times a second
-    max_step    longest step in s of the adaptive methods; without it, they may go as far as their
-                error allows. Where the derivative has corners, a step that has passed over a
-                contact or a pulse is made again (`run.branches`); where that cannot be told, steps
-                take no more than 1/1000 of the run
+    progress    called with the fraction done, at most about ten times a second
+    max_step    longest step in s of the adaptive methods; by default only the error bounds it. If
+                the derivative has corners, a step that has passed over a contact or a pulse is
+                repeated (`run.branches`); if that cannot be detected, steps are at most 1/1000 of
+                the run
     rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
-                that then neither part nor close are held, so that bouncing comes to an end;
-                without it, it is √(1e-7 a size), of contacts that bounce by less than 5e-8 of the
-                mechanism's size under what accelerates them, a
-    powers      asks for the works of effects
-    resume      what an earlier run left in `Trajectory.resume`: this one goes on from there,
-                whatever `t_start` and `problem.initial` say, to the same bytes as if that one had
-                not ended, if problem, method and step or tolerances are the same
-    guard       watches the derivative's rounding at every step, and stops the run where digits are
-                lost, or repairs it (`run.guard`); what it lets pass is what it is without
-    unstable    lets equal steps of an explicit method be too long for stability, to show what they
-                then do; else the run stops there and says how long they may be
-    tally       kept up to date at every step, at which it may end the run
+                that then neither open nor close are held, so that bouncing comes to an end. By
+                default it is √(1e-7 a size), with a the acceleration of the gaps without contact
+                forces: slower contacts would rise by less than 5e-8 of the mechanism's size
+    powers      given to compute the works of effects
+    resume      `Trajectory.resume` of an earlier run, from which this one continues; `t_start` and
+                `problem.initial` are ignored. The result has the same bytes as if that run had not
+                ended, if problem, method and step or tolerances are the same
+    guard       checks the rounding errors of the derivative at every step, and stops the run where
+                digits are lost, or repairs it (`run.guard`); it does not change other steps
+    unstable    whether an explicit method with equal steps may run with steps too long for
+                stability; else the run stops there and says how long they may be
+    tally       updated at every step; may end the run
 
-    Raises `RunError` for an argument that cannot be served. Whatever goes wrong once the run
-    has begun, Ctrl-C included, ends it early instead: the trajectory then holds the finite rows
-    up to there, is not `finished`, and its `message` says where, why, and what to change.
+    Raises `RunError` for an invalid argument. An error after the run has begun, Ctrl-C included,
+    ends it early instead: the trajectory then holds the finite rows up to there, is not `finished`,
+    and its `message` says where it stopped, why, and what to change.
     """
     method = find_integrator(integrator)
     grid = float(t_start)
@@ -81,7 +82,7 @@ def integrate(
         t_start = float(resume["t"])
         problem = replace(problem, initial=resume["y"])
         grid = float(resume.get("grid", t_start))
-        if ANEW in resume:  # no step of that run was whole
+        if ANEW in resume:  # that run made no whole step
             resume = None
     asked = Asked(
         integrator=integrator,
@@ -98,37 +99,52 @@ def integrate(
     )
     check_rest_speed(rest_speed)
     monitor = _monitor(guard, problem, method, asked) if guard else None
-    derivatives, jacobians = _Count(1), _Count(2)
+    repairs = monitor is not None and monitor.guard.repairs
+    calls = _Calls(_Count(1), _Count(2))
     counted = replace(
         problem,
-        derivative=derivatives.of(monitor.derivative if monitor else problem.derivative),
-        jacobian=jacobians.of(problem.jacobian),
+        derivative=calls.derivatives.of(monitor.derivative if monitor else problem.derivative),
+        jacobian=calls.jacobians.of(problem.jacobian),
     )
     if tally:
         counted = tally.counting(counted)
     remarks: list[str] = []
     if isinstance(method, FixedStep):
-        # What is looked at on the way does not count.
-        # Where extended numbers repair what doubles lose, their Jacobian has lost its digits, too.
-        unseen = unstable or not method.explicit or (monitor and monitor.guard.repairs)
-        looked_at = None if unseen else problem
-        begin, remembered = equal_steps(asked, method, counted, looked_at)
+        # Evaluations to check stability do not count. They need a Jacobian with all digits, which
+        # doubles do not give where the derivative is repaired.
+        checked = None if unstable or not method.explicit or repairs else problem
+        begin, remembered = equal_steps(asked, method, counted, checked)
     else:
         begin, remembered = adaptive_steps(asked, method, problem, remarks.append)
 
-    looks = (0.0, 1.0) if isinstance(method, FixedStep) else LOOKS
-    stepper = events.Stepper(begin, looks, derivatives.of)
+    gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else GAP_CHECKS
+    stepper = events.Stepper(begin, gap_checks, calls.derivatives.of)
     advances = _advances(stepper, counted, asked, monitor, rest_speed)
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
     run = _Run(asked.t_start, problem.initial, account)
-    if can_go_on(method) and not (monitor and monitor.guard.repairs):
+    if can_go_on(method) and not repairs:
         run.resume = partial(begun, asked, problem)
     if tally:
         tally.begin(problem.initial)
-    counts, report = (derivatives, jacobians), progress or _ignore
-    outcome, trouble = _follow(run, advances, counts, problem, method, asked.t_end, report, tally)
+    report = progress or _ignore
+    outcome, trouble = _follow(run, advances, calls, problem, method, asked.t_end, report, tally)
     kept = _kept(run, problem, {**remembered, **numbers(rest_speed=rest_speed)})
-    said = (trouble, monitor.words() if monitor else "", *dict.fromkeys(remarks))
+    notes = (trouble, monitor.words() if monitor else "", *dict.fromkeys(remarks))
+    message = " ".join("; ".join(filter(None, notes)).split())
+    return _trajectory(run, problem, integrator, calls, outcome, message, kept)
+
+
+def _trajectory(
+    run: "_Run",
+    problem: Problem,
+    integrator: str,
+    calls: "_Calls",
+    outcome: Outcome,
+    message: str,
+    resume: Resume,
+) -> Trajectory:
+    """The trajectory of a run that has ended."""
+    account = run.account
     return Trajectory(
         name=problem.name,
         states=problem.states,
@@ -136,11 +152,11 @@ def integrate(
         y=np.array([y for _, y in run.rows]),
         integrator=integrator,
         finished=outcome.kind == "finished",
-        message=" ".join("; ".join(filter(None, said)).split()),
+        message=message,
         counts={
             "steps": run.steps,
-            "derivatives": derivatives.calls,
-            "jacobians": jacobians.calls,
+            "derivatives": calls.derivatives.calls,
+            "jacobians": calls.jacobians.calls,
             "impacts": sum(event.kind == "impact" for event in run.events),
             "capped": run.capped,
             "cut": run.cut,
@@ -148,32 +164,32 @@ def integrate(
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
         work_names=account.names if account else (),
-        resume=kept,
+        resume=resume,
         origin=problem.origin,
         outcome=outcome,
     )
 
 
 def _kept(run: "_Run", problem: Problem, remembered: Resume) -> Resume:
-    """What a later run needs to go on, and to tell whether it is the same motion; none where it
-    cannot.
+    """What a later run needs to continue, and to check that it is the same motion; empty if it
+    cannot continue.
     """
-    stands = run.resume() if run.resume else {}
-    if not stands:
+    kept = run.resume() if run.resume else {}
+    if not kept:
         return {}
-    rate = np.full(len(problem.states), np.nan)  # not known, if it is interrupted
+    rate = np.full(len(problem.states), np.nan)  # unknown if it is interrupted
     stops = (ArithmeticError, ValueError, StepFailure, KeyboardInterrupt)
     with np.errstate(all="ignore"), suppress(*stops):
-        rate = np.array(problem.derivative(float(stands["t"]), stands["y"]))
-    return {**stands, **remembered, "derivative": rate}
+        rate = np.array(problem.derivative(float(kept["t"]), kept["y"]))
+    return {**kept, **remembered, "derivative": rate}
 
 
 def _monitor(
     guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: Asked
 ) -> RoundingMonitor:
-    """A guard at its work on a run, held to what the run's tolerance asks for, too.
+    """The monitor of a guarded run; its bound is at most that of the run's tolerance.
 
-    Raises `RunError` for repairs that cannot be made.
+    Raises `RunError` if the run cannot be repaired.
     """
     if guard.repairs:
         check_repairs(problem, asked.resume is not None)
@@ -183,10 +199,10 @@ def _monitor(
 
 @dataclass
 class _Count:
-    """How often functions of t and y are called, and where one last raised an error.
+    """The number of calls of functions of t and y, and where one last raised an error.
 
-    `axes` is the number of axes of their values, which are nan at a state that is not finite: then
-    a method rejects the step that led there.
+    `axes` is the number of axes of their values. If a function raises an error at a state that is
+    not finite, its value is nan instead, so that the method rejects the step.
     """
 
     axes: int
@@ -196,7 +212,7 @@ class _Count:
     def of(
         self, function: Callable[[float, FloatArray], FloatArray]
     ) -> Callable[[float, FloatArray], FloatArray]:
-        """The same function, its calls counted here."""
+        """The same function, but its calls are counted."""
 
         def counted(t: float, y: FloatArray) -> FloatArray:
             self.calls += 1
@@ -211,9 +227,17 @@ class _Count:
         return counted
 
 
+@dataclass(frozen=True)
+class _Calls:
+    """The calls of the derivative and of the Jacobian in a run."""
+
+    derivatives: _Count
+    jacobians: _Count
+
+
 @dataclass
 class _Run:
-    """How far a run has come: time and state, rows kept and works there, steps made, events met."""
+    """A run so far: time and state, rows kept and works there, steps made, events."""
 
     t: float
     y: FloatArray
@@ -230,7 +254,7 @@ class _Run:
         self._keep()
 
     def take(self, advance: Advance) -> None:
-        """Go on to the end of a step, or through a strike."""
+        """Record a step or an impact."""
         if self.account:
             self.works.extend(self.account.book(self.t, self.y, advance))
         self.t, self.y = advance.t, advance.y
@@ -242,7 +266,7 @@ class _Run:
         self.resume = advance.resume or self.resume
 
     def end(self) -> None:
-        """Keep the last state, too, where no row has its time."""
+        """Keep the last state if no row has its time."""
         if self.t > self.rows[-1][0]:
             self._keep()
 
@@ -259,7 +283,7 @@ def _advances(
     monitor: RoundingMonitor | None,
     rest_speed: float | None,
 ) -> Iterator[Advance]:
-    """The steps of a run, from strike to strike if it has contacts, and under its guard."""
+    """The steps of a run, with event location if it has contacts, checked by its guard."""
     t_start, resume = asked.t_start, asked.resume
     if monitor and monitor.guard.repairs:
         return repaired(monitor, stepper.begin, problem, t_start, asked.max_steps)
@@ -281,14 +305,14 @@ def _advances(
 def _follow(
     run: _Run,
     advances: Iterator[Advance],
-    counts: tuple[_Count, _Count],
+    calls: _Calls,
     problem: Problem,
     method: FixedStep | Adaptive,
     t_end: float,
     progress: Progress,
     tally: Tally | None,
 ) -> tuple[Outcome, str]:
-    """Carry `run` on to `t_end`; return how that ended and, if before, the trouble in one line."""
+    """Make the steps up to `t_end`; return the outcome and, if it did not finish, a message."""
     t_start, report = run.t, throttled(progress)
     try:
         with np.errstate(all="ignore"):
@@ -298,7 +322,7 @@ def _follow(
                     raise StepFailure("the state overflows or is not a number", method.remedy)
                 run.take(advance)
                 if tally:
-                    tally.take(advance, counts[0].calls, counts[1].calls)
+                    tally.take(advance, calls.derivatives.calls, calls.jacobians.calls)
                 report((run.t - t_start) / (t_end - t_start))
         return Outcome(), ""
     except KeyboardInterrupt:
@@ -309,46 +333,44 @@ def _follow(
         return Outcome("ended", end.reason), f"stopped at {_place(problem, run)}: {end}"
     except StepFailure as failure:
         why = problem.explain(run.t, run.y, problem.initial)
-        outcome = Outcome("stopped", failure.reason, failure.remedy)
-        if why:
-            outcome = _stopped(f"{failure.reason}: {why}")
-    # Plain Python arithmetic raises where NumPy would give inf or nan: math.exp(1000), 1 / 0.0,
-    # math.sqrt(-1); a ValueError is also how SciPy's factorizations refuse a nan.
+        outcome = (
+            Outcome("stopped", f"{failure.reason}: {why.reason}", why.remedy)
+            if why
+            else Outcome("stopped", failure.reason, failure.remedy)
+        )
+    # Python's floats raise where NumPy would give inf or nan: math.exp(1000), 1 / 0.0,
+    # math.sqrt(-1). SciPy's factorisations raise a ValueError for a nan.
     except (ArithmeticError, ValueError) as error:
-        plain = f"{type(error).__name__}: {error}; {method.remedy}"
-        outcome = _stopped(_why(counts, problem, run, plain))
+        plain = Explanation(f"{type(error).__name__}: {error}", method.remedy)
+        outcome = Outcome("stopped", *_explained(calls, problem, run, plain))
     run.end()
-    cause = "; ".join(filter(None, (outcome.reason, outcome.remedy)))
-    return outcome, f"stopped at {_place(problem, run)}: {cause}"
+    return outcome, f"stopped at {_place(problem, run)}: {outcome}"
 
 
-def _stopped(cause: str) -> Outcome:
-    """Of an explanation, whose remedy follows the first semicolon."""
-    reason, _, remedy = (part.strip() for part in cause.partition(";"))
-    return Outcome("stopped", reason, remedy)
+def _explained(calls: _Calls, problem: Problem, run: _Run, error: Explanation) -> Explanation:
+    """The model's explanation of an error in the step after (run.t, run.y), else the error itself.
 
+    The state at which the derivative or the Jacobian raised the error is explained first, then the
+    one that the step started from.
+    """
 
-def _why(counts: tuple[_Count, _Count], problem: Problem, run: _Run, error: str) -> str:
-    """What had no value in the step from where a run has come to, or else the bare error."""
-    for count in counts:
-        if count.failed is not None:
-            t, y = count.failed
-            here = t == run.t and np.array_equal(y, run.y)
-            why = problem.explain(t, y, problem.initial)
-            if why:
-                return f"{'there' if here else 'in the next step'} {why}"
-            why = "" if here else problem.explain(run.t, run.y, problem.initial)
-            if why:
-                return f"there {why}"
-            return f"the Jacobian: {error}" if count is counts[1] else error
-    why = problem.explain(run.t, run.y, problem.initial)
-    return f"there {why}" if why else error
+    def explain(t: float, y: FloatArray, where: str) -> Explanation | None:
+        why = problem.explain(t, y, problem.initial)
+        return why and Explanation(f"{where} {why.reason}", why.remedy)
+
+    failed = calls.derivatives.failed or calls.jacobians.failed
+    why = None
+    if failed and not (failed[0] == run.t and np.array_equal(failed[1], run.y)):
+        why = explain(*failed, "in the next step")
+    if calls.jacobians.failed and not calls.derivatives.failed:
+        error = Explanation(f"the Jacobian: {error.reason}", error.remedy)
+    return why or explain(run.t, run.y, "there") or error
 
 
 def _check_start(problem: Problem, run: _Run) -> None:
-    """Raise `StepFailure` if there is no finite derivative to start from.
+    """Raise `StepFailure` if the derivative at the start is not finite.
 
-    SciPy's choice of a first step would take a nan and never come back.
+    With a nan, SciPy's choice of the first step would not end.
     """
     slope = problem.derivative(run.t, run.y)
     assert slope.shape == run.y.shape, f"derivative has shape {slope.shape}"
@@ -368,4 +390,4 @@ def _place(problem: Problem, run: _Run) -> str:
 
 
 def _ignore(fraction: float) -> None:
-    """Take no notice of progress."""
+    """Do nothing with the progress."""

@@ -1,9 +1,9 @@
-"""What is fast in a motion, and what rounding alone makes of it.
+"""Stiffness of a motion, and the effect of rounding errors on its steps.
 
-A derivative in doubles is that of a state a few units in the last place away: of a spring of k N/m
-on m kg, k ε s/m off. An implicit step of h solves y = h f(y), so that rounding of f moves its end
-by (I - h J)^-1 h δf, which is greatest where h is about 1/|λ| of what is fast, and never as much as
-h δf. A tolerance below that makes steps shrink to nothing.
+A derivative in doubles is that of a state a few units in the last place away: for a spring of k N/m
+and a mass of m kg at s m, its error is k ε s/m. An implicit step of h solves y = h f(y), so that an
+error δf moves its end by (I - h J)^-1 h δf, which is greatest for h about 1/|λ| of the fast modes,
+and less than h δf. If the tolerance is below that, steps shrink until the run stops.
 """
 
 import math
@@ -16,28 +16,29 @@ from numpy.typing import NDArray
 from eomgen.run.problem import FloatArray, Problem
 
 PROBES = 8
-"""States about one, each a unit in the last place away, that the derivative is evaluated at."""
+"""Number of neighbours of a state, each a unit in the last place away, at which the derivative is
+evaluated."""
 STEPS = (0.1, 0.3, 1.0, 3.0, 10.0)
-"""Steps that are looked at, in times of the fastest mode, 1/|λ|."""
-TURN = np.exp(0.25j * np.pi)
-"""Steps are turned by this in the complex plane, where I - h J is singular neither for growing nor
-for swinging modes: steps of a method that keeps its error are never near that."""
+"""Lengths of the steps considered, in time constants 1/|λ| of the fastest mode."""
+ROTATION = np.exp(0.25j * np.pi)
+"""Steps are rotated by this factor in the complex plane, so that I - h J is not singular for
+growing or oscillating modes; with error control, steps are never near that."""
 MANY, DAMPED = 1e4, 100.0
-"""A motion is stiff where its fastest mode has more than `MANY` times its own time in the run, and
-dies away `DAMPED` times over: explicit steps must follow it, and accuracy does not ask for that."""
+"""A motion is stiff if the run is longer than `MANY` time constants 1/|λ| of its fastest modes, and
+than `DAMPED` of their decay: explicit steps must then be shorter than accuracy requires."""
 SOLVED = ("Radau", "BDF")
-"""Methods that solve their equations to a part of the tolerance."""
+"""Methods that solve their equations to a fraction of the tolerance."""
 NOISY = 10.0
-"""Times the noise of a step that a tolerance of the others is at least."""
+"""Least tolerance of the other methods, in units of the noise of a step."""
 EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
 class Fast:
-    """What is fast in a motion.
+    """Properties of the fast modes of a motion.
 
-    stiff  whether explicit steps would be many times shorter than accuracy needs
-    noise  (ny,), the most that rounding of the derivative moves each state in a step
+    stiff  whether explicit steps would be many times shorter than accuracy requires
+    noise  (ny,), greatest change of each state in a step by rounding errors of the derivative
     """
 
     stiff: bool
@@ -45,13 +46,13 @@ class Fast:
 
 
 def fast(problem: Problem, states: Iterable[tuple[float, FloatArray]], span: float) -> Fast:
-    """What is fast at some times and states of a run of `span` s.
+    """The fast modes at some times and states of a run of `span` s.
 
-    Nothing is at a state where derivative or Jacobian have no finite value.
+    States at which the derivative or the Jacobian is not finite are ignored.
     """
     stiff, most = False, np.zeros(len(problem.states))
     for t, y in states:
-        modes, noise = _looked_at(problem.derivative, problem.jacobian, t, y, span)
+        modes, noise = _modes_and_noise(problem.derivative, problem.jacobian, t, y, span)
         quick = np.abs(modes) * span > MANY
         stiff = stiff or bool((-modes[quick].real * span > DAMPED).any())
         most = np.maximum(most, noise)
@@ -65,30 +66,30 @@ def step_noise(
     y: FloatArray,
     span: float,
 ) -> FloatArray:
-    """The most that rounding of the derivative moves each state (ny,) in a step from `y` at `t`, as
-    far as the motion is fast in a run of `span` s; else 0.
+    """The greatest change of each state (ny,) in a step from `y` at `t` by rounding errors of the
+    derivative; 0 if no mode is fast compared with a run of `span` s.
     """
-    return _looked_at(derivative, jacobian, t, y, span)[1]
+    return _modes_and_noise(derivative, jacobian, t, y, span)[1]
 
 
 def least_tolerance(method: str, rtol: float) -> float:
-    """Times the noise of a step: what a method's absolute tolerance is to be at least.
+    """The least absolute tolerance that a method can meet, in units of the noise of a step.
 
-    Radau and BDF solve their equations to a part of the tolerance, √rtol, as SciPy has it.
+    Radau and BDF solve their equations to a fraction of the tolerance, √rtol, as in SciPy.
     """
     if method.startswith(SOLVED):
         return 1 / max(10 * EPS / rtol, min(0.03, math.sqrt(rtol)))
     return NOISY
 
 
-def _looked_at(
+def _modes_and_noise(
     derivative: Callable[[float, FloatArray], FloatArray],
     jacobian: Callable[[float, FloatArray], FloatArray],
     t: float,
     y: FloatArray,
     span: float,
 ) -> tuple[NDArray[np.complex128], FloatArray]:
-    """The modes at a state, 1/s, and the noise of a step; none where there is no finite value."""
+    """The modes at a state, 1/s, and the noise of a step; none if a value is not finite."""
     random, nothing = np.random.default_rng(0), np.zeros_like(y)
     none = np.zeros(0, dtype=np.complex128), nothing
     try:
@@ -105,6 +106,6 @@ def _looked_at(
     if rate * span <= MANY:
         return modes, nothing
     for h in np.array(STEPS) / rate:
-        inverse = np.linalg.inv(np.eye(len(y)) - h * TURN * matrix)
+        inverse = np.linalg.inv(np.eye(len(y)) - h * ROTATION * matrix)
         most = np.maximum(most, h * np.abs(inverse) @ rounded)
     return modes, most

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +14,25 @@ from eomgen.run.origin import Origin
 
 FloatArray = NDArray[np.float64]
 """An array of 64-bit floats; every state vector is one."""
-Explain = Callable[[float, FloatArray, FloatArray], str]
-"""Of t, y and the initial y: what keeps the derivative at t, y from being finite or tame, and what
-to change, in words; "" if nothing is known of that."""
 
 
-def unexplained(t: float, y: FloatArray, initial: FloatArray) -> str:
-    """The `Explain` of those who know nothing but numbers."""
-    return ""
+class Explanation(NamedTuple):
+    """Why a run cannot start or go on at a state, and what to change."""
+
+    reason: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.reason}; {self.remedy}"
+
+
+Explain = Callable[[float, FloatArray, FloatArray], Explanation | None]
+"""`explain(t, y, initial)`: why the derivative at t, y is not finite, or has grown very large since
+the initial state; None if that is not known."""
+
+
+def unexplained(t: float, y: FloatArray, initial: FloatArray) -> None:
+    """An `Explain` without a model: it knows no reason."""
 
 
 SHORTEST = 1e-150

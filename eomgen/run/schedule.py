@@ -1,6 +1,7 @@
-"""When switching functions of time alone change sign, found by interval arithmetic: none is missed.
+"""The times at which switching functions of time alone change sign, all found by interval
+arithmetic.
 
-An interval of time over which each function keeps one sign holds no change; any other is halved
+An interval of time in which each function has one sign contains no change; any other is bisected
 (Moore, Kearfott, Cloud, Introduction to Interval Analysis, section 8.1).
 """
 
@@ -11,30 +12,30 @@ from eomgen.run.intervals import Interval
 Functions = Callable[[Interval], Sequence[Interval]]
 
 MOST_PARTS = 4000
-"""Of a step."""
+"""Greatest number of intervals in a step."""
 SHORTEST = 1e-12
-"""Of a step: what changes back within less than that is nothing."""
+"""Fraction of a step below which intervals are not bisected; shorter pulses are ignored."""
 AHEAD = 16.0
-"""Steps ahead that are looked at together."""
+"""Number of steps ahead that are first checked together."""
 
 
 class Schedule:
-    """The changes of some functions of time, asked for step by step."""
+    """The sign changes of functions of time, step by step."""
 
     def __init__(self, functions: Functions) -> None:
         self._functions = functions
-        self._quiet = (0.0, 0.0)
+        self._no_change = (0.0, 0.0)
 
     def changes(self, start: float, end: float) -> tuple[list[float], bool]:
         """The times in a step at which functions change sign, in order, and whether these are all.
 
-        Where a function is 0 at the start itself and not after, it counts as changing there.
+        A function that is 0 at the start and not after it changes sign there.
         """
-        if self._quiet[0] <= start and end <= self._quiet[1]:
+        if self._no_change[0] <= start and end <= self._no_change[1]:
             return [], True
         far = end + AHEAD * (end - start)
         if None not in self._signs(start, far):
-            self._quiet = (start, far)
+            self._no_change = (start, far)
             return [], True
         found, signs, since = list[float](), None, start
         for low, high, those in self._parts(start, end):
@@ -50,8 +51,8 @@ class Schedule:
     def _parts(
         self, start: float, end: float
     ) -> Iterator[tuple[float, float, list[bool | None] | None]]:
-        """Parts of a step in order, each with the signs of the functions there, and at last a part
-        without them if there are too many.
+        """Intervals of a step in order, each with the signs of the functions there; None for signs
+        in the last one if there are too many intervals.
         """
         shortest = SHORTEST * (end - start)
         waiting = [(start, end)]
@@ -69,6 +70,6 @@ class Schedule:
             yield *waiting[-1], None
 
     def _signs(self, low: float, high: float) -> list[bool | None]:
-        """Whether each function is > 0 all along a time; None where it may be either."""
+        """Whether each function is > 0 in an interval; None if it may have both signs."""
         values = self._functions(Interval(low, high))
         return [True if v.low > 0 else False if v.high <= 0 else None for v in values]

@@ -1,7 +1,7 @@
-"""How large a mechanism and its motion are, where something has to count as small beside them.
+"""Sizes of a mechanism and its states, to which tolerances are relative.
 
-All sizes scale with the units of a scene: in units by powers of two it runs exactly alike, in units
-by powers of ten but for rounding.
+All sizes scale with the units of a scene: if units change by powers of two, runs are identical; by
+powers of ten, identical but for rounding.
 """
 
 import math
@@ -12,31 +12,32 @@ import numpy as np
 from eomgen.run.problem import FloatArray
 
 FAR = 64 * np.finfo(float).eps / 1e-9
-"""Part of the farthest length that a size is at least: 1e-9 of it is then more than rounding."""
+"""Least size, relative to the greatest distance: 1e-9 of the size then exceeds rounding errors."""
 
 
 def mechanism_size(
     units: Mapping[str, str], parameters: Mapping[str, float], start: Mapping[str, float]
 ) -> float:
-    """The size of a mechanism, m: its greatest length, but for how far from the origin its ground
-    lies and it starts; 1 if it has none.
+    """The size of a mechanism, m: its greatest length, without the distances of the ground and of
+    the initial state from the origin; 1 if it has none.
 
-    units       of parameters and states, by name
-    parameters  values
-    start       the initial state
+    units       units of parameters and states, by name
+    parameters  values of parameters, by name
+    start       the initial state, by name
     """
     own = _lengths((name, value) for name, value in parameters.items() if units.get(name) == "m")
-    placed = _lengths((name, value) for name, value in start.items() if units.get(name) == "m")
+    initial = _lengths((name, value) for name, value in start.items() if units.get(name) == "m")
     near = max((value for name, value in own if not name.endswith("_offset")), default=0.0)
-    far = max((value for _, value in own + placed), default=0.0)
+    far = max((value for _, value in own + initial), default=0.0)
     return _or_one(max(near, FAR * far) if near else far)
 
 
 def state_sizes(
     states: Sequence[str], units: Mapping[str, str], y: FloatArray, slope: FloatArray, size: float
 ) -> tuple[float, ...]:
-    """The size of each state (ny,): of a length that of the mechanism, m, of an angle 1, of
-    velocities these times the rate of the motion, and of what else there is what it starts with.
+    """The size of each state, (ny,), in its unit: for lengths the size of the mechanism, m; for
+    angles 1; for velocities these times the rate of the motion; for other states, such as those of
+    controllers, the greatest initial value of the same unit.
 
     y, slope  (ny,), the initial state and its derivative
     """

@@ -82,7 +82,7 @@ def equal_steps(
             t_end=asked.t_end,
             dt=dt,
             every=every,
-            watched=problem if looked_at and problem.contacts else looked_at,
+            checked=problem if looked_at and problem.contacts else looked_at,
             stability=method.stability,
             resume=resume,
         )

@@ -40,6 +40,9 @@ class Outcome:
     reason: str = ""
     remedy: str = ""
 
+    def __str__(self) -> str:
+        return "; ".join(filter(None, (self.reason, self.remedy)))
+
 
 @dataclass(frozen=True)
 class Event:

@@ -1,4 +1,4 @@
-"""Where energy goes: the work that each effect does along a run."""
+"""The work of each effect along a run."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -8,31 +8,31 @@ import numpy as np
 
 from eomgen.run.problem import Contacts, FloatArray, Problem
 
-if TYPE_CHECKING:  # it loads SciPy, which a module that is generated alone does not need
+if TYPE_CHECKING:  # it loads SciPy, which generating a module does not need
     from eomgen.run.integrators.interface import Advance
 
 NODES = 5
 """Gauss–Legendre nodes on each step: exact for powers that are polynomials of degree 9."""
 
 ROUGH = 1e-6
-"""Of the power times the step: where every other node alone gives a work that is off by more, the
-step is halved. That rule is of order 4, the whole one of order 6 within the step and 10 at its end,
-so that works are then off by some 1e-7 of it there, and by 1e-12 at its end."""
+"""A step is halved if the rule with every other node differs from the full one by more than this,
+relative to power times step. That rule has order 4; the full one has order 6 within the step and 10
+at its end. Errors of works are then about 1e-7 within the step, and 1e-12 at its end."""
 
 SLIGHT = 1e-10
-"""Of the largest work so far: less is not looked into, being rounding at rest."""
+"""Smaller differences, relative to the largest work so far, are ignored as rounding errors."""
 
 HALVINGS = 8
-"""As often at most, for powers that jump."""
+"""Greatest number of halvings, for powers that jump."""
 
 
 @dataclass(frozen=True, eq=False)
 class Powers:
-    """What is asked of a mechanism to know the work of its effects.
+    """What a mechanism must give to compute the work of its effects.
 
-    names           of its effects
-    powers          (t, y) -> one for each, W, but for those of rigid contacts
-    kinetic_energy  (t, y) -> J, whose jump at an impact is the work of what struck
+    names           names of the effects
+    powers          (t, y) -> their powers, W, without those of rigid contacts
+    kinetic_energy  (t, y) -> J; its jump at an impact is the work of the contact
     """
 
     names: tuple[str, ...]
@@ -41,8 +41,8 @@ class Powers:
 
 
 def _gauss() -> tuple[FloatArray, FloatArray]:
-    """Nodes (5,) on 0 to 1, and the matrix whose product with values there gives the coefficients,
-    from the first power on, of the integral from 0 of the polynomial through them.
+    """Nodes (5,) in 0 to 1, and the matrix (5, 5) from values there to the coefficients, from the
+    first power on, of the integral from 0 of the interpolating polynomial.
     """
     nodes = (np.polynomial.legendre.leggauss(NODES)[0] + 1) / 2
     orders = np.arange(NODES)
@@ -52,18 +52,17 @@ def _gauss() -> tuple[FloatArray, FloatArray]:
 _AT, _INTEGRAL = _gauss()
 _FEWER = np.zeros(NODES)
 _FEWER[::2] = np.linalg.inv(_AT[::2][:, None] ** np.arange(3)).T @ (1 / np.arange(1, 4))
-_DOUBT = _FEWER - _INTEGRAL.sum(axis=0)
-"""Weights of the difference between the rule of every other node and the whole one."""
+_ERROR = _FEWER - _INTEGRAL.sum(axis=0)
+"""Weights of the difference between the rule with every other node and the full rule."""
 
 
 class Account:
-    """Books the works of effects, step after step; `total` (m,) stands at the last one's end, J.
+    """The works of effects, accumulated step by step; `total` (m,) is at the end of the last, J.
 
-    The powers are integrated over each step by Gauss's rule, over parts of it where they change
-    faster than the state: a method's step knows nothing of a drive, for example, that moves a body
-    to and fro and nothing else. The states there are those of the method where it is `dense`; else
-    they are the cubic's that has the step's ends and slopes, of order 4 as the best of the methods
-    that need it.
+    The powers are integrated over each step by Gaussian quadrature, or over parts of the step where
+    they vary faster than the state: the method's step does not resolve a drive, for example, that
+    moves a body without changing the state. States within the step come from the method's dense
+    output if it is `dense`, else from the cubic Hermite interpolant, of order 4.
     """
 
     def __init__(self, powers: Powers, contacts: Contacts | None, dense: bool) -> None:
@@ -78,7 +77,7 @@ class Account:
         self._last: tuple[Problem, FloatArray, FloatArray] | None = None
 
     def book(self, t: float, y: FloatArray, advance: "Advance") -> list[FloatArray]:
-        """Take up the step or strike from state `y` at `t`; return the works at its samples."""
+        """Add a step or an impact from state `y` at `t`; return the works at its samples."""
         if advance.struck is not None:
             energy = self._powers.kinetic_energy
             slot = self._slots[advance.struck]
@@ -104,7 +103,7 @@ class Account:
         return works
 
     def _at(self, t: float, y: FloatArray, advance: "Advance") -> FloatArray:
-        """All powers at one time, (m,)."""
+        """All powers at a time, (m,), W."""
         powers = np.zeros(len(self.names))
         powers[: len(self._powers.names)] = self._powers.powers(t, y)
         if advance.contact_powers is not None:
@@ -115,7 +114,7 @@ class Account:
         return powers
 
     def _cubic(self, t: float, y: FloatArray, advance: "Advance") -> Callable[[float], FloatArray]:
-        """Hermite's cubic through both ends of a step, with the slopes there."""
+        """The cubic Hermite interpolant of a step, from the states and slopes at its ends."""
         problem, length = advance.problem, advance.t - t
         if self._last is not None and self._last[0] is problem and self._last[1] is y:
             slope = self._last[2]
@@ -137,8 +136,8 @@ def _parts(
     powers: Callable[[float], FloatArray], start: float, end: float, slight: float
 ) -> Iterator[tuple[float, float, FloatArray]]:
     """Yield parts of the time from `start` to `end`, each with the coefficients (NODES, m) of the
-    works done in it, from the first power on of the share of it that is over. What is off by less
-    than `slight`, J, is let be.
+    works done in it, as polynomials in the fraction of its time, from the first power on. A part
+    with an error below `slight`, J, is not divided.
     """
     size = 0.0
     waiting = [(start, end, HALVINGS)]
@@ -146,9 +145,9 @@ def _parts(
         a, b, halvings = waiting.pop()
         values = np.array([powers(time) for time in (a + (b - a) * _AT).tolist()])
         size = max(size, float(np.abs(values).max(initial=0.0)) * (end - start))
-        off = np.abs((b - a) * (_DOUBT @ values)).max(initial=0.0)
+        error = np.abs((b - a) * (_ERROR @ values)).max(initial=0.0)
         middle = (a + b) / 2
-        if off > max(ROUGH * size, slight) and halvings and a < middle < b:
+        if error > max(ROUGH * size, slight) and halvings and a < middle < b:
             waiting += [(middle, b, halvings - 1), (a, middle, halvings - 1)]
         else:
             yield a, b, (b - a) * (_INTEGRAL @ values)

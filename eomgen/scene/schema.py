@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
 
+from eomgen.integrators import INTEGRATORS
 from eomgen.language.base import Identifier, Number, Positive, Table, Text
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.outputs import OUTPUTS
@@ -20,9 +21,11 @@ MOST = 1000
 if TYPE_CHECKING:
     Output = str
     Route = str
-else:  # `auto` is the route with the fewest operations that is accurate enough
+    Integrator = str
+else:  # one of the names; `auto` is the route with the fewest operations that is accurate enough
     Output = Literal[tuple(OUTPUTS)]
     Route = Literal["auto", *ROUTES]
+    Integrator = Literal[tuple(INTEGRATORS)]
 
 SHOWN = ("kinetic_energy", "potential_energy", "body_poses")
 """The outputs that figures and pages need."""
@@ -37,23 +40,7 @@ def _no_module(name: str) -> str:
 ModuleName = Annotated[Identifier, AfterValidator(_no_module)]
 """The name of a scene and its module, which must not hide another module."""
 
-Integrator = Literal[
-    "euler",
-    "semi_implicit_euler",
-    "leapfrog",
-    "rk4",
-    "implicit_midpoint",
-    "gauss_4",
-    "gauss_6",
-    "RK45",
-    "DOP853",
-    "gragg_bulirsch_stoer",
-    "Radau",
-    "Radau_differences",
-    "BDF",
-    "BDF_differences",
-    "LSODA",
-]
+
 Form = Literal["velocity", "momentum", "redundant"]
 LeftOut = Literal["velocity_forces"]
 """Terms of the equations that a scene may leave out."""

@@ -12,9 +12,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from eomgen.run.integrators import INTEGRATORS
+from eomgen.integrators import INTEGRATORS, Kind
 from eomgen.show.style import ALARM, FAINT, INK, colours, plain, style, write_figure
-from eomgen.study.accuracy.ladder import Kind, Work, kind, order
+from eomgen.study.accuracy.ladder import Work, order
 from eomgen.study.accuracy.measure import WRONG
 
 COLOURS = {
@@ -135,7 +135,7 @@ def _line(method: str) -> dict[str, object]:
     return {
         "color": colour(method),
         "linestyle": dashes,
-        "marker": MARKERS[kind(method)],
+        "marker": MARKERS[INTEGRATORS[method].kind],
         "markerfacecolor": "white" if hollow else colour(method),
         "markersize": 5,
         "linewidth": 1.3,
@@ -259,7 +259,7 @@ def _draw_legend(figure: Figure, works: Sequence[Work], top: float) -> None:
         handles.append(Line2D([], [], linestyle="", label=text, gid="heading"))
 
     for sort, title in TITLES.items():
-        own = [method for method in present if kind(method) == sort]
+        own = [method for method in present if INTEGRATORS[method].kind == sort]
         if own:
             heading(title)
             handles += [

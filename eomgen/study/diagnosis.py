@@ -13,7 +13,7 @@ from eomgen.dynamics.singularity import relative_pivots, why_unresisted
 from eomgen.model.model import Model, dofs_of
 from eomgen.run.module import GeneratedModule, as_problem, given_values
 from eomgen.run.origin import START, UNITS, Origin
-from eomgen.run.problem import Explain, FloatArray, Problem, unexplained
+from eomgen.run.problem import Explain, Explanation, FloatArray, Problem, unexplained
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.effects import JointStop
 from eomgen.scene.joints.base import Geared
@@ -102,7 +102,8 @@ def locks(model: Model, trajectory: Trajectory) -> list[str]:
     for i in sorted(felt):
         row = int(np.argmin(felt[i]))
         if felt[i][row] < NEAR:
-            lines.append(f"at t = {trajectory.t[row]:.4g} s {why_unresisted(model, i)}")
+            why = Explanation(*why_unresisted(model, i))
+            lines.append(f"at t = {trajectory.t[row]:.4g} s {why}")
     return lines
 
 
@@ -113,28 +114,30 @@ def explained(
     if model.form != "velocity":
         return unexplained
 
-    def explain(t: float, y: FloatArray, initial: FloatArray) -> str:
+    def explain(t: float, y: FloatArray, initial: FloatArray) -> Explanation | None:
         if not np.isfinite(y).all():
-            return ""
+            return None
         values = values_at(model, t, y.tolist(), parameters, inputs)
         sizes = effect_sizes(model, values)
         endless = [name for name, size in sizes.items() if size == float("inf")]
         if endless:
-            return f"{_effects(endless)} no finite value; {REMEDY}"
+            return Explanation(f"{_effects(endless)} no finite value", REMEDY)
         if not (model.driven or model.locked):
             felt = relative_pivots(model.with_parameters(parameters), np.array([values.q]))
             for i in sorted(felt):
                 if felt[i][0] < GONE:
-                    return why_unresisted(model, i)
+                    return Explanation(*why_unresisted(model, i))
         if is_singular(model, values):
-            return "the mass matrix is singular; change lengths, masses or inertias, or keep away"
+            return Explanation(
+                "the mass matrix is singular", "change lengths, masses or inertias, or keep away"
+            )
         first = effect_sizes(model, values_at(model, 0.0, initial.tolist(), parameters, inputs))
         grown = [name for name, size in sizes.items() if size > GROWN * max(first[name], 1e-9)]
         if grown:
             worst = max(grown, key=lambda name: sizes[name])
             growth = f"from {first[worst]:.3g} to {sizes[worst]:.3g}"
-            return f"effect '{worst}' has grown {growth}; {REMEDY}"
-        return ""
+            return Explanation(f"effect '{worst}' has grown {growth}", REMEDY)
+        return None
 
     return explain
 

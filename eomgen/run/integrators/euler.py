@@ -1,14 +1,13 @@
 """Euler's method: y_new = y + h f(t, y), explicit, order 1.
 
-Here as the yardstick: it feeds energy into every oscillation, at a rate proportional to h.
+For comparison only: it adds energy to every oscillation, at a rate proportional to h.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.run.integrators.interface import FixedStep
 from eomgen.run.problem import FloatArray, Problem
-
-ORDER = 1
 
 
 def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
@@ -17,5 +16,8 @@ def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
 
 
 def stability(z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """R(z) at z = hλ, (n,): what a step multiplies exp(λt) by."""
+    """R(z) at z = hλ, (n,): the factors by which a step multiplies the solutions of y' = λ y."""
     return 1 + z
+
+
+INTEGRATOR = FixedStep(lambda _: change, order=1, stability=stability)

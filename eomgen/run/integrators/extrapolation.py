@@ -1,4 +1,4 @@
-"""The explicit midpoint rule, extrapolated: Hairer, Norsett, Wanner, Solving ODEs I, II.9."""
+"""Extrapolation of the explicit midpoint rule: Hairer, Norsett, Wanner, Solving ODEs I, II.9."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from eomgen.run.problem import FloatArray
 Slope = Callable[[float, FloatArray], FloatArray]
 MOST_ROWS = 10
 SUBSTEPS = tuple(2 * row + 2 for row in range(MOST_ROWS))
-"""Of each row of the table of a step."""
+"""Number of substeps for each row of the extrapolation table."""
 
 
 @dataclass(frozen=True, eq=False)
 class Row:
     """The explicit midpoint rule over a step: the change of y (ny,) up to the middle and the end,
-    and the slopes after each substep but the last, (substeps, ny).
+    and the slopes at the start of each substep, (substeps, ny).
     """
 
     middle: FloatArray
@@ -28,7 +28,7 @@ class Row:
 def midpoint(
     fun: Slope, t: float, y: FloatArray, step: float, substeps: int, slope: FloatArray
 ) -> Row:
-    """Hairer, Norsett, Wanner I, (II.9.13), for the change of y; `slope` is that at the start."""
+    """Hairer, Norsett, Wanner I, (II.9.13), for the change of y; `slope` is y' at the start."""
     h = step / substeps
     slopes = np.empty((substeps, len(y)))
     slopes[0] = slope
@@ -44,7 +44,7 @@ def midpoint(
 def next_row(
     above: list[FloatArray], value: FloatArray, substeps: Sequence[int]
 ) -> list[FloatArray]:
-    """A row of Aitken and Neville's table in the squares of the substeps, from the one above."""
+    """A row of the Aitken-Neville table in the squares of the substeps, from the row above."""
     columns = [value]
     for i, left in enumerate(above):
         ratio = substeps[-1] / substeps[-2 - i]
@@ -53,7 +53,7 @@ def next_row(
 
 
 def extrapolated(values: Sequence[FloatArray], substeps: Sequence[int]) -> FloatArray:
-    """What values at these numbers of substeps tend to."""
+    """The extrapolation of values with the given numbers of substeps to infinitely many."""
     columns: list[FloatArray] = []
     for row, value in enumerate(values, 1):
         columns = next_row(columns, value, substeps[:row])

@@ -1,4 +1,4 @@
-"""Gauss's collocation at two points: order 4, A-stable, symplectic, time-reversible.
+"""Gauss collocation with two stages: order 4, A-stable, symplectic, time-reversible.
 
 It conserves every quadratic invariant: Hairer, Lubich, Wanner, Geometric Numerical Integration,
 theorem IV.2.1. Coefficients: Hairer, Norsett, Wanner, Solving ODEs I, table II.7.3.
@@ -19,3 +19,4 @@ METHOD = ImplicitMethod(
     c=(1 / 2 - sqrt(3) / 6, 1 / 2 + sqrt(3) / 6),
     order=4,
 )
+INTEGRATOR = METHOD.integrator

@@ -1,4 +1,4 @@
-"""Gauss's collocation at three points: order 6, A-stable, symplectic, time-reversible.
+"""Gauss collocation with three stages: order 6, A-stable, symplectic, time-reversible.
 
 It conserves every quadratic invariant: Hairer, Lubich, Wanner, Geometric Numerical Integration,
 theorem IV.2.1. Coefficients: Hairer, Norsett, Wanner, Solving ODEs I, table II.7.4.
@@ -21,3 +21,4 @@ METHOD = ImplicitMethod(
     c=(1 / 2 - sqrt(15) / 10, 1 / 2, 1 / 2 + sqrt(15) / 10),
     order=6,
 )
+INTEGRATOR = METHOD.integrator

@@ -1,11 +1,11 @@
-"""Gragg, Bulirsch and Stoer's method: the explicit midpoint rule, extrapolated.
+"""The method of Gragg, Bulirsch and Stoer: extrapolation of the explicit midpoint rule.
 
-Order and step are those of the least work per second of motion. For tight tolerances, where DOP853
-takes ever shorter steps and this method a higher order.
+It chooses the order and the step with the least work per second of motion. For tight tolerances it
+raises the order, where DOP853 must shorten its steps.
 
-Hairer, Norsett, Wanner, Solving ODEs I, section II.9, and their program ODEX, whose control of
-order and step this is. Unlike there, rows of the table are not smoothed. The table holds changes
-since the step's start, which suffer less from rounding than states.
+Hairer, Norsett, Wanner, Solving ODEs I, section II.9; order and step are controlled as in their
+program ODEX. Unlike there, the rows of the table are not smoothed, and the table holds changes
+since the start of the step, which have smaller rounding errors than states.
 """
 
 from dataclasses import dataclass, field, replace
@@ -24,6 +24,7 @@ from eomgen.run.integrators.extrapolation import (
     norm,
 )
 from eomgen.run.integrators.gragg_dense import Interpolant, Span
+from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.problem import FloatArray
 
 if TYPE_CHECKING:
@@ -32,23 +33,23 @@ else:
     Solver = OdeSolver  # which is generic from SciPy 1.17 on
 
 WORK = tuple(1 + sum(SUBSTEPS[: row + 1]) - (row + 1) for row in range(MOST_ROWS))
-"""Derivatives of a step that ends with this row."""
+"""Number of derivatives in a step that ends with this row."""
 
 _HIGHEST = MOST_ROWS - 2
 # ODEX's SAFE1, SAFE2, FAC1, FAC2, FAC3, FAC4 and SAFE3.
 _ERROR, _STEP, _LEAST, _MOST, _LOWER, _HIGHER, _REFUSED = 0.65, 0.94, 0.02, 4.0, 0.8, 0.9, 0.5
 
 _ASIDE = 1e-6
-"""Of a step: so far from a corner the derivative is that of one side of it."""
+"""Fraction of a step, beside a corner, at which the derivative is evaluated on one side of it."""
 
 
 @dataclass
 class _Table:
-    """The extrapolation of one step, as far as it has come.
+    """The extrapolation table of a step.
 
-    change   of y over the step by the last row, (ny,)
-    error    of the last row, in parts of what is allowed; the first has none
-    lengths  of step that would have met the tolerance with each row
+    change   change of y over the step by the last row, (ny,)
+    error    error of the last row relative to the tolerance; infinite after the first row
+    lengths  for each row, the length of a step that would meet the tolerance
     """
 
     change: FloatArray
@@ -61,12 +62,12 @@ class _Table:
         return len(self.lengths) - 1
 
     def price(self, row: int) -> float:
-        """Derivatives per second of motion."""
+        """Number of derivatives per second of motion with this row."""
         return WORK[row] / self.lengths[row]
 
 
 class GraggBulirschStoer(Solver):
-    """A method as SciPy's own are, for `y' = fun(t, y)` from `t0` to `t_bound`."""
+    """A SciPy solver of `y' = fun(t, y)` from `t0` to `t_bound`."""
 
     def __init__(
         self,
@@ -102,7 +103,7 @@ class GraggBulirschStoer(Solver):
                     raise failure
                 return False, self.TOO_SMALL_STEP
             end = self.t_bound if length == left else t + self.direction * length
-            # Steps may lead out of where there is a derivative, and shorter ones not yet.
+            # A step may leave the domain of the derivative; then a shorter one is tried.
             try:
                 table = self._tabulate(t, y, end - t, self.fresh or length == left, refused)
                 accepted = table.error <= 1
@@ -120,7 +121,9 @@ class GraggBulirschStoer(Solver):
         return True, None
 
     def _tabulate(self, t: float, y: FloatArray, step: float, watch: bool, refused: bool) -> _Table:
-        """Add rows until the error is met or seen not to be; `watch` is to look at every row."""
+        """Add rows until the error is small enough, or clearly will not be. With `watch` every row
+        may be accepted, else only those from the one before the target.
+        """
         table, columns = _Table(y), list[FloatArray]()
         k, worst = self.target, inf
         for row in range(k + 2):
@@ -140,7 +143,7 @@ class GraggBulirschStoer(Solver):
             window = row == k - 1 and not refused
             if error <= 1 and (watch or window or row >= k):
                 return table
-            # What the rows ahead can hope to gain.
+            # The greatest reduction of the error that the next rows can be expected to give.
             if window and not watch and error > (SUBSTEPS[k] * SUBSTEPS[k + 1] / 4) ** 2:
                 return table
             if row == k and error > (SUBSTEPS[k + 1] / 2) ** 2:
@@ -148,14 +151,14 @@ class GraggBulirschStoer(Solver):
         return table
 
     def _length(self, row: int, error: float, length: float) -> float:
-        """Of a step whose error by this row is what is allowed, less a margin."""
+        """The length of a step that meets the tolerance with this row, less a safety factor."""
         root = 1 / (2 * row + 1)
         least = _LEAST**root
         shrink = min(_MOST / least, max(least, (error / _ERROR) ** root / _STEP))
         return float(min(length / shrink, self.max_step))
 
     def _shorter(self, table: _Table, length: float) -> float:
-        """The length of the step to try after one that was refused, which sets the order, too."""
+        """The length of the next attempt after a rejected step; also sets the order."""
         k = min(self.target, table.last, _HIGHEST)
         if k > 1 and table.price(k - 1) < _LOWER * table.price(k):
             k -= 1
@@ -163,7 +166,7 @@ class GraggBulirschStoer(Solver):
         return min(table.lengths[k], length)
 
     def _choose(self, table: _Table, refused: bool, length: float) -> None:
-        """Order and length of the next step: those of the least work a second of motion."""
+        """Set order and length of the next step: those with the least work per second of motion."""
         price, lengths = table.price, table.lengths
         row, k = table.last, self.target
         if row == 1:
@@ -192,8 +195,8 @@ class GraggBulirschStoer(Solver):
             self.length = lengths[row] * WORK[min(best + ahead, MOST_ROWS - 1)] / WORK[row]
 
     def turn(self) -> None:
-        """Take note that the derivative has a corner at the end of the step just made: the slope
-        that its dense output ends with, and that of the next step's start, are taken just aside.
+        """Account for a corner of the derivative at the end of the last step: take the slope at the
+        end of its dense output from before the corner, that of the next step from after it.
         """
         assert self.taken is not None
         step = _ASIDE * self.taken.step
@@ -201,10 +204,15 @@ class GraggBulirschStoer(Solver):
         self.slope = self._slope_beside(step)
 
     def _slope_beside(self, step: float) -> FloatArray:
-        """The slope here, extrapolated from two moments, one and two small steps away."""
+        """The slope here, extrapolated from the slopes one and two small steps away."""
         near, far = (self.fun(self.t + h, self.y + h * self.slope) for h in (step, 2 * step))
         return np.asarray(2 * near - far)
 
     def _dense_output_impl(self) -> DenseOutput:
         assert self.taken is not None
         return Interpolant(self.taken, self.fun, self.rtol, self.atol)
+
+
+INTEGRATOR = Adaptive(
+    GraggBulirschStoer, memory=("length", "slope", "target", "fresh"), sees_end=False
+)

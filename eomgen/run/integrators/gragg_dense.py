@@ -1,4 +1,4 @@
-"""Dense output of Gragg, Bulirsch and Stoer's method (Hairer, Norsett, Wanner I, II.9)."""
+"""Dense output of the method of Gragg, Bulirsch and Stoer (Hairer, Norsett, Wanner I, II.9)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,16 +22,17 @@ from eomgen.run.integrators.extrapolation import (
 from eomgen.run.problem import FloatArray
 
 DENSE_SUBSTEPS = tuple(4 * row + 2 for row in range(MOST_ROWS))
-"""Of each row of the table of the dense output; half of them is odd."""
-_LOOKS = np.array([-0.75, -0.5, 0.5, 0.75])
-"""Where in a step, from -1 to 1, dense outputs of more and of fewer rows are compared."""
-_SETTLED = 10.0
-"""Such a difference, in parts of what is allowed, is the error of the one of fewer."""
+"""Number of substeps for each row of the table of the dense output; half of each is odd."""
+_COMPARED_AT = np.array([-0.75, -0.5, 0.5, 0.75])
+"""Points of a step, from -1 to 1, at which polynomials of different numbers of rows are compared.
+"""
+_CONVERGED = 10.0
+"""The polynomials have converged if they differ by less than this times the tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Span:
-    """A step, or half of it: from `start` at `t`, the change over it and the slopes at its ends."""
+    """A step or half a step from `start` at `t`: the change of y and the slopes at both ends."""
 
     t: float
     start: FloatArray
@@ -42,14 +43,14 @@ class Span:
 
 
 class Interpolant(DenseOutput):
-    """The state within a step, as accurate as the step's end: a polynomial for each half of it.
+    """The state within a step, as accurate as at its end: a polynomial for each half of the step.
 
-    Each has the values and slopes of both ends and, in the middle, the value and derivatives that
-    come of differences of the rows' slopes, extrapolated (Hairer, Norsett, Wanner I, II.9, dense
-    output). The rows are made for it, which costs about as many derivatives as the step did.
+    Each polynomial matches the values and slopes at both ends of its half and, in the middle, the
+    value and derivatives extrapolated from differences of the slopes (Hairer, Norsett, Wanner I,
+    II.9, dense output). This takes about as many derivatives as the step itself.
 
-    At a single time, which is asked where an event is looked for, a step is made from the start to
-    there instead: one that goes beyond an event may bend behind it, and its polynomial all along.
+    For a single time, as in a search for an event, a step from the start to that time is made
+    instead: the derivative may change at the event, which would distort the whole polynomial.
     """
 
     def __init__(self, taken: Span, fun: Slope, rtol: float, atol: float | FloatArray) -> None:
@@ -72,8 +73,8 @@ class Interpolant(DenseOutput):
             Span(middle, start + change, step, taken.change - change, slope, taken.after),
         )
         self._coefficients = (
-            _settled(fun, self._halves[0], rows, allowed),
-            _settled(fun, self._halves[1], [], allowed),
+            _converged(fun, self._halves[0], rows, allowed),
+            _converged(fun, self._halves[1], [], allowed),
         )
 
     def _call_impl(self, t: Any) -> Any:
@@ -89,7 +90,7 @@ class Interpolant(DenseOutput):
         return np.where(late[..., None], second, first).T
 
     def _stepped(self, t: float) -> FloatArray | None:
-        """The state at t by a step from the start; None if its rows do not agree."""
+        """The state at t by a step from the start; None if the extrapolation does not converge."""
         taken, columns = self._taken, list[FloatArray]()
         if t == taken.t:
             return taken.start
@@ -102,30 +103,32 @@ class Interpolant(DenseOutput):
         return None
 
 
-def _settled(fun: Slope, half: Span, rows: list[Row], allowed: FloatArray) -> FloatArray:
-    """The polynomial of so many rows that one more would change nothing, or bring rounding only."""
-    rows, shrunk = list(rows), inf
-    settled: FloatArray | None = None
+def _converged(fun: Slope, half: Span, rows: list[Row], allowed: FloatArray) -> FloatArray:
+    """Coefficients of the polynomial, with rows added until it converges or its change no longer
+    falls.
+    """
+    rows, smallest = list(rows), inf
+    accepted: FloatArray | None = None
     for count in range(max(1, len(rows) - 1), MOST_ROWS + 1):
         if count > len(rows):
             substeps = DENSE_SUBSTEPS[count - 1]
             rows.append(midpoint(fun, half.t, half.start, half.step, substeps, half.before))
         coefficients = _polynomial(half, rows[:count])
-        if settled is not None:
-            difference = _values(coefficients, _LOOKS) - _values(settled, _LOOKS)
+        if accepted is not None:
+            difference = _values(coefficients, _COMPARED_AT) - _values(accepted, _COMPARED_AT)
             change = max(map(norm, difference / allowed))
-            if not change < shrunk:
+            if not change < smallest:
                 break
-            shrunk = change
-        settled = coefficients
-        if shrunk <= _SETTLED:
+            smallest = change
+        accepted = coefficients
+        if smallest <= _CONVERGED:
             break
-    assert settled is not None
-    return settled
+    assert accepted is not None
+    return accepted
 
 
 def _values(coefficients: FloatArray, z: FloatArray) -> FloatArray:
-    """Of a polynomial with coefficients (n, ny), the lowest first, at z (…); (…, ny)."""
+    """The values (…, ny) at z (…) of a polynomial with coefficients (n, ny), the lowest first."""
     found = np.zeros((*z.shape, coefficients.shape[1]))
     for coefficient in coefficients[::-1]:
         found = found * z[..., None] + coefficient
@@ -139,7 +142,7 @@ def _polynomial(span: Span, rows: Sequence[Row]) -> FloatArray:
     count = len(middle)
     power = np.arange(count)[:, None]
     sign = (-1.0) ** power
-    # What the Taylor polynomial about the middle misses of values and slopes at both ends.
+    # The residuals of the Taylor polynomial about the middle in values and slopes at both ends.
     missing = np.array(
         [
             -(sign * middle).sum(axis=0),
@@ -152,9 +155,10 @@ def _polynomial(span: Span, rows: Sequence[Row]) -> FloatArray:
 
 
 def _middle(rows: Sequence[Row], half: float) -> FloatArray:
-    """Value and derivatives by z in the middle, divided by factorials, one after another.
+    """Taylor coefficients in z at the middle of the step, (n, ny).
 
-    That of order κ by one row: its slopes' central difference of order κ - 1, two substeps apart.
+    Each row estimates the derivative of order κ by the central difference of order κ - 1 of its
+    slopes, two substeps apart; the estimates are extrapolated.
     """
     substeps = [len(row.slopes) for row in rows]
     found = [extrapolated([row.middle for row in rows], substeps)]
@@ -166,7 +170,7 @@ def _middle(rows: Sequence[Row], half: float) -> FloatArray:
 
 
 def _difference(slopes: FloatArray, order: int) -> FloatArray:
-    """The derivative by z of this order in the middle."""
+    """The derivative of the slopes with respect to z, of the given order, in the middle."""
     middle = len(slopes) // 2
     weights = [(-1.0) ** (order - i) * comb(order, i) for i in range(order + 1)]
     return np.asarray(
@@ -176,7 +180,9 @@ def _difference(slopes: FloatArray, order: int) -> FloatArray:
 
 @cache
 def _ends(count: int) -> FloatArray:
-    """From values and slopes at z = -1 and 1 to the coefficients of the next four powers."""
+    """The matrix (4, 4) from values and slopes at z = -1 and 1 to the coefficients of the next four
+    powers.
+    """
     power = np.arange(count, count + 4)
     sign = (-1.0) ** power
     return np.linalg.inv(np.array([sign, np.ones(4), -sign * power, power]))

@@ -1,9 +1,10 @@
-"""The stages of implicit Runge-Kutta methods, by Newton's method on the exact Jacobian.
+"""Implicit Runge-Kutta methods, whose stages are solved by Newton's method with the exact Jacobian.
 
-Solved down to roundoff: what these methods conserve, they conserve as well as their equations are
-solved. Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge-Kutta methods
-(BIT 48, 2008) say what else lets rounding drift: coefficients that are rounded, and sums of small
-changes to large states. The former is met here, the latter by `fixed_step`.
+The stages are solved to roundoff, because the methods conserve invariants only as well as their
+equations are solved. Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit
+Runge-Kutta methods (BIT 48, 2008) give two more causes of drift by rounding: rounded coefficients,
+which `ImplicitMethod.shares` avoids, and sums of small changes to large states, which `fixed_step`
+compensates.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from math import isfinite
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-from eomgen.run.integrators.interface import StepFailure
+from eomgen.run.integrators.interface import FixedStep, StepFailure
 from eomgen.run.integrators.tableau import ButcherTableau
 from eomgen.run.problem import FloatArray, Problem
 
@@ -21,27 +22,27 @@ MAX_ITERATIONS = 20
 REMEDY = "take a smaller --dt or an adaptive method (--integrator Radau)"
 
 _ROUNDOFF = 4 * np.finfo(np.float64).eps
-# Updates that stop shrinking below this fraction of the state are the derivative's own rounding
-# noise: nothing is gained by iterating on. Above it, they are a method that does not converge.
+# If updates stop shrinking below this fraction of the state, they are rounding errors of the
+# derivative, and the iteration ends. Above it, the iteration has not converged.
 _NOISE = 1e-10
-# The same where the whole state is as good as zero, as of a body at rest on the ground.
+# The same bound, absolute, for a state that is almost zero, as of a body at rest on the ground.
 _NOTHING = 1e-13
-# A component smaller than this fraction of the largest is solved to its roundoff, not to its own:
-# one that should be 0 has no size of its own.
+# A component below this fraction of the largest one is solved to roundoff of that fraction, not of
+# itself: it may be 0 in exact arithmetic.
 _SMALL = 1e-9
 
 
 @dataclass(frozen=True)
 class ImplicitMethod:
-    """A method of s stages whose every weight b (s,) is positive, with nodes c (s,).
+    """An implicit Runge-Kutta method of s stages with positive weights b (s,) and nodes c (s,).
 
-    `shares` (s, s) are a_ij / b_j, each correct to the last digit or so. A method conserves
-    quadratic invariants, and is symplectic, if share_ij + share_ji = 1 (Hairer, Lubich, Wanner,
-    Geometric Numerical Integration, theorem IV.2.2); kept so, this holds exactly in spite of
-    rounding: Antonana, Makazaga, Murua, Reducing and monitoring round-off error propagation for
-    symplectic implicit Runge-Kutta schemes (Numerical Algorithms 76, 2017).
+    `shares` (s, s) are the a_ij / b_j. A method conserves quadratic invariants, and is symplectic,
+    if share_ij + share_ji = 1 (Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem
+    IV.2.2). In this form the condition holds exactly in floating point: Antonana, Makazaga, Murua,
+    Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta schemes
+    (Numerical Algorithms 76, 2017).
 
-    Raises `ValueError` if the method is not of its order.
+    Raises `ValueError` if the method does not have the given order.
     """
 
     shares: tuple[tuple[float, ...], ...]
@@ -54,16 +55,21 @@ class ImplicitMethod:
         a = tuple(map(tuple, (shares * b).tolist()))
         ButcherTableau(a=a, b=self.b, c=self.c, order=self.order)
 
+    @property
+    def integrator(self) -> FixedStep:
+        """The method as an integrator with equal steps."""
+        return FixedStep(lambda _: self.change, self.order, REMEDY, explicit=False)
+
     @cached_property
     def _arrays(self) -> tuple[FloatArray, FloatArray]:
         return np.array(self.shares, dtype=np.float64), np.array(self.b, dtype=np.float64)
 
     def change(self, problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
-        """Return y(t + h) - y(t), shape (ny,): the sum of d_i = h b_i f(t + c_i h, Y_i) with
+        """Return y(t + h) - y(t), (ny,): the sum of d_i = h b_i f(t + c_i h, Y_i) with
         Y_i = y + Σ share_ij d_j.
 
-        Newton's method starts at d = 0, which, unlike an explicit predictor, does no harm on stiff
-        problems. Raises `StepFailure` if it does not converge.
+        Newton's method starts at d = 0; an explicit predictor would be far off on stiff problems.
+        Raises `StepFailure` if the iteration does not converge.
         """
         shares, b = self._arrays
         stages, states = len(b), len(y)
@@ -101,10 +107,10 @@ class ImplicitMethod:
 def _is_solved(
     y: FloatArray, changes: FloatArray, update: FloatArray, size: float, previous: float
 ) -> bool:
-    """Whether another iteration would gain nothing, after updates of these sizes."""
+    """Whether the iteration has converged to roundoff, by the sizes of the last two updates."""
     scale = np.abs(y) + np.abs(changes).sum(axis=0)
     largest = float(scale.max())
-    # What is still missing is about the next update: this one times the last contraction.
+    # The remaining error is about the next update: this one times the last contraction factor.
     # Hairer, Wanner, Solving ODEs II, section IV.8.
     missing = np.abs(update) * (size / previous)
     if (missing <= _ROUNDOFF * np.maximum(scale, _SMALL * largest)).all():

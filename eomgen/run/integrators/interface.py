@@ -1,4 +1,4 @@
-"""What every integrator looks like from outside."""
+"""The interface of integrators: methods, the steps that they make, and their failures."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,15 +13,20 @@ from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Event
 
 Change = Callable[[Problem, float, FloatArray, float], FloatArray]
-"""`change(problem, t, y, h) -> d`: one step of size h leads to y + d; leaves `y` (ny,) as it is."""
+"""`change(problem, t, y, h) -> d`: a step of size h leads to y + d; does not modify `y` (ny,)."""
 
 Stability = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
-"""The stability function R of a method: of hλ (n,), what a step multiplies modes exp(λt) by, (n,).
-"""
+"""The stability function R(z) of a method at z = hλ (n,): the factors (n,) by which a step
+multiplies the solutions of y' = λ y."""
 
 Resume = Mapping[str, FloatArray]
-"""Where a run stands, by name: `t` (), `y` (ny,), and what else its method and contacts go on from.
+"""What a run continues from, by name: `t` (), `y` (ny,), and the state of its method and contacts.
 """
+
+
+SHORTER = "take a smaller --dt, or an implicit or adaptive method (--integrator Radau)"
+LOOSER = "try another --integrator, or a looser --rtol and --atol"
+"""Remedies for runs that fail."""
 
 
 class StepFailure(RunError):
@@ -36,45 +41,47 @@ class StepFailure(RunError):
 
 
 class EndedRunError(StepFailure):
-    """Raised by who watches or follows a run, to end it; the text says why."""
+    """Raised by a callback of a run to end it; the text says why."""
 
 
 @dataclass(frozen=True)
 class FixedStep:
-    """A method whose steps the user chooses.
+    """A method whose step the user chooses.
 
-    prepare  gives the method's `Change` for a problem, once a run; raises `RunError` if the method
-             cannot serve it
-    order    global error O(h^order)
-    remedy   what to change when a run goes astray
-    explicit whether steps may be too long for stability
+    prepare    makes the method's `Change` for a problem, once per run; raises `RunError` if the
+               method cannot integrate it
+    order      global error O(h^order)
+    remedy     what to change when a run fails
+    explicit   whether a step may be too long for stability
     stability  its stability function, if that is a function of hλ alone
     """
 
     prepare: Callable[[Problem], Change]
     order: int
-    remedy: str
+    remedy: str = SHORTER
     explicit: bool = True
     stability: Stability | None = None
 
 
 @dataclass(frozen=True)
 class Adaptive:
-    """A method, SciPy's or one like it, that chooses its own steps to meet rtol and atol.
+    """A method, SciPy's or one with the same interface, that chooses its steps to meet rtol and
+    atol.
 
     uses_jacobian  whether it is given the problem's Jacobian
-    one_step       whether it steps on from a state alone, which then may be put right between steps
-    remedy         what to change when a run goes astray
-    memory         attributes of the solver, numbers or arrays, that with time and state are all
-                   that the next step goes on from, the first its length; none where there is more
-    vectors        those of memory that have a number for each state
-    sees_end       whether its error estimate sees the derivative at the end of a step
+    one_step       whether a step depends on the state alone, not on earlier steps; then the state
+                   may be corrected between steps
+    remedy         what to change when a run fails
+    memory         attributes of the solver, numbers or arrays, that together with time and state
+                   determine the next step; the first is its length. Empty if these do not suffice
+    vectors        those of `memory` that have a number for each state
+    sees_end       whether its error estimate depends on the derivative at the end of a step
     """
 
     solver: "Callable[..., OdeSolver[Any]]"
-    uses_jacobian: bool
-    one_step: bool
-    remedy: str
+    uses_jacobian: bool = False
+    one_step: bool = True
+    remedy: str = LOOSER
     memory: tuple[str, ...] = ()
     vectors: tuple[str, ...] = ("f", "slope")
     sees_end: bool = True
@@ -82,21 +89,21 @@ class Adaptive:
 
 @dataclass(frozen=True)
 class Advance:
-    """One step made, from where the last one ended: the state `y` (ny,) reached at time `t`.
+    """A step from the end of the one before: the state `y` (ny,) at its end, time `t`.
 
-    samples  the rows to keep of it
+    samples  the rows to keep: times and states in the step
     problem  whose derivative was integrated
-    within   the state at any time within the step; asked for before the next step is made
-    is_step  False for what takes no time, an impact or a mere note of `events`
-    struck   the number of the contact that struck
-    events   what happened at its end
-    contact_powers  (t, y) -> (nc + nd,), powers of the contacts, of which some were held during the
-                    step, and of the drives, W
-    factorisations  LU factors that the step took, as far as its method says
-    resume   gives what a later run needs to go on from here as this one does; None where this one
-             would not have stopped here, or its method cannot
-    capped   whether the step is as long as any may be
-    cut      how often it was made again, shorter, for what it would have passed over
+    within   gives the state at any time in the step; valid until the next step is made
+    is_step  False if no time passes: an impact, or `events` only
+    struck   number of the contact of an impact
+    events   changes of contacts at its end
+    contact_powers  (t, y) -> (nc + nd,), powers of the contacts and of the drives during the step,
+                    W, if contacts were held
+    factorisations  LU factorisations in the step, as far as the method counts them
+    resume   returns what a later run needs to continue from here exactly as this one does; None if
+             this run would not have ended a step here, or if the method cannot continue so
+    capped   whether the step has the greatest length allowed
+    cut      number of longer attempts that passed over a branch of the derivative
     """
 
     t: float
@@ -115,7 +122,7 @@ class Advance:
 
 
 class Begin(Protocol):
-    """Steps of a problem from a time on; with how many were made before, what they go on from."""
+    """Begin steps of a problem at time t, after `made` earlier ones; `resume` continues a run."""
 
     def __call__(
         self, problem: Problem, t: float, made: int, resume: Resume | None = None

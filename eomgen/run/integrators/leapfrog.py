@@ -1,10 +1,9 @@
-"""Leapfrog, or Störmer-Verlet: drift half a step, kick, drift: order 2, explicit, symplectic.
+"""Leapfrog, or Störmer-Verlet: half a drift, kick, half a drift. Order 2, explicit, symplectic.
 
-Hairer, Lubich, Wanner, Geometric Numerical Integration, section I.1.4, variant B. One derivative a
-step. For mechanisms whose velocities change at rates that depend on positions and time alone, and
-whose positions change at rates that are the velocities times a constant matrix: particles, one
-pendulum, a chain of masses on springs; neither a mass matrix that depends on the positions nor
-resistance.
+Hairer, Lubich, Wanner, Geometric Numerical Integration, section I.1.4, variant B. It evaluates one
+derivative per step. It requires v' to depend on positions and time only, and q' to be v times a
+constant matrix: particles, a single pendulum, a chain of masses and springs, but no mass matrix
+that depends on positions and no damping.
 """
 
 from collections.abc import Iterator
@@ -12,21 +11,20 @@ from collections.abc import Iterator
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.run.integrators.interface import Change
+from eomgen.run.integrators.interface import Change, FixedStep
 from eomgen.run.problem import FloatArray, Problem
 
-ORDER = 2
-
-_LOOKS = 5
-# Of a Jacobian by differences; of an exact one the parts that must not vary do not.
+_CHECKS = 5
+"""Number of states at which the Jacobian is checked."""
 _SAME = 1e-6
+"""Relative difference of entries that count as equal; a Jacobian by differences is not exact."""
 
 
 def prepare(problem: Problem) -> Change:
-    """Return `change(problem, t, y, h) -> y(t + h) - y(t)`, shape (ny,), for this problem.
+    """Return `change(problem, t, y, h) -> y(t + h) - y(t)`, (ny,), for this problem.
 
-    Raises `RunError` if the Jacobian, looked at in the initial state and a few seeded ones, is not
-    zero where it must be for the method to be what it is.
+    Raises `RunError` if the Jacobian at the initial state, or at a few seeded random states, shows
+    that the problem does not separate into drift and kick.
     """
     positions = list(problem.positions)
     others = [i for i in range(len(problem.states)) if i not in problem.positions]
@@ -51,8 +49,11 @@ def prepare(problem: Problem) -> Change:
     return change
 
 
+INTEGRATOR = FixedStep(prepare, order=2)
+
+
 def _check(problem: Problem, positions: list[int], others: list[int]) -> None:
-    """Raise `RunError` if the problem does not fall into drift and kick."""
+    """Raise `RunError` if the problem does not separate into drift and kick."""
     if not positions:
         raise _refusal("no state is a position")
     if problem.contacts is not None:
@@ -74,14 +75,14 @@ def _check(problem: Problem, positions: list[int], others: list[int]) -> None:
 
 
 def _jacobians(problem: Problem) -> Iterator[FloatArray]:
-    """Jacobians, the initial state's first, where there are any."""
+    """The finite ones among the Jacobians at the initial state and at seeded random states."""
     seeded = np.random.default_rng(1)
     size = 0.1 * np.maximum(1.0, np.abs(problem.initial))
-    for look in range(_LOOKS):
-        y = problem.unit(problem.initial + (look > 0) * size * seeded.normal(size=len(size)))
+    for i in range(_CHECKS):
+        y = problem.unit(problem.initial + (i > 0) * size * seeded.normal(size=len(size)))
         try:
             with np.errstate(all="ignore"):
-                jacobian = problem.jacobian(float(look), y)
+                jacobian = problem.jacobian(float(i), y)
         except (ArithmeticError, ValueError):
             continue
         if np.isfinite(jacobian).all():

@@ -1,5 +1,6 @@
 """The classical Runge-Kutta method: explicit, four stages, order 4."""
 
+from eomgen.run.integrators.interface import FixedStep
 from eomgen.run.integrators.tableau import ButcherTableau
 from eomgen.run.problem import FloatArray, Problem
 
@@ -15,9 +16,11 @@ TABLEAU = ButcherTableau(
     c=(0, 1 / 2, 1 / 2, 1),
     order=4,
 )
-ORDER = TABLEAU.order
 
 
 def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     """Return y(t + h) - y(t), shape (ny,)."""
     return TABLEAU.change(problem.derivative, t, y, h)
+
+
+INTEGRATOR = FixedStep(lambda _: change, TABLEAU.order, stability=TABLEAU.stability)

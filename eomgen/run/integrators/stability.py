@@ -1,13 +1,13 @@
-"""Whether an explicit method can hold a step: what it makes of the motion's own fast modes.
+"""Whether the step of an explicit method is stable for the fast modes of the motion.
 
-A step of h multiplies a mode exp(λt) of y' = J y by R(hλ) instead of exp(hλ); where |R| is larger
-than that and than 1, what is not there grows from step to step (Hairer, Wanner, Solving ODEs II,
-section IV.2). Of a Runge-Kutta method R is a polynomial; of others the factors are found by making
-the method's own step on the linear problem.
+A step of h multiplies a mode exp(λt) of y' = J y by R(hλ) instead of exp(hλ). Where |R| is larger
+than |exp(hλ)| and than 1, errors grow from step to step (Hairer, Wanner, Solving ODEs II, section
+IV.2). For a Runge-Kutta method R is a polynomial; for other methods the factors are found by making
+a step on the linear problem.
 
-A Jacobian takes as long as many steps, so it is asked for only where rates jump, as they do at once
-where a method cannot hold them, and where the derivatives that the step has evaluated anyway show
-a rate that is large beside 1/h (the same, section IV.2, on detecting stiffness).
+A Jacobian costs as much as many steps. It is evaluated only where the rates y' jump, which they do
+soon after a step becomes unstable, and where the derivatives that the step has evaluated anyway
+show a rate that is large compared with 1/h (ibid., section IV.2, on the detection of stiffness).
 """
 
 import math
@@ -20,190 +20,199 @@ from numpy.typing import NDArray
 from eomgen.run.integrators.interface import Change, Stability, StepFailure
 from eomgen.run.problem import FloatArray, Problem
 
-GROWS = 1.25
-"""So many times a step, and more than the motion itself: no more than a few steps of it do harm."""
+UNSTABLE = 1.25
+"""A step is too long if it multiplies a mode by more than this, relative to the growth of the
+motion itself: then a few steps do harm."""
 
-HOLDS = 1.001
-"""The same of a step that is said to be short enough."""
+STABLE = 1.001
+"""The same factor for the step that a message recommends."""
 
 LEAST = 1e-9
-"""Of a step: what must be shorter than that blows up by itself, and no step can hold it."""
+"""If a stable step would be shorter than this fraction of the step, the solution itself blows up,
+and no message is given."""
 
 JUMP, NOISE = 0.5, 1e-9
-"""A rate that changes from one step to the next by so much of its largest so far is a jump, unless
-it is nothing beside the largest of all.
-"""
+"""A rate jumps if it changes from one step to the next by more than `JUMP` of its largest value so
+far, and by more than `NOISE` of the largest of all rates."""
 
-REACH = 0.5
-"""Rates of the motion below this share of 1/h are held by every method: Euler's loses at 0.75."""
+FAST = 0.5
+"""Every method is stable for rates below this fraction of 1/h: Euler's fails from 0.75 on."""
 
 SHARE = 0.1
-"""Of the time of a run that looks into jumps may take: the motion of a large mechanism may jump at
-every step. Times are reckoned in derivatives, see `StabilityMonitor`, not taken by a clock: a run
-is the same on every machine.
-"""
+"""Largest share of a run's time for checks of jumps: large mechanisms may jump at every step. Times
+are counted in derivatives, see `StabilityMonitor`, not by a clock, so that a run is the same on
+every machine."""
 
 BRIEF = 8000.0
-"""Over the number of states: derivatives that take no time worth sparing."""
+"""This many derivatives, over the number of states, may be spent on checks in any case."""
 
 GREATER = 4.0
-"""Rates so many times those at the last look are looked into, whatever it costs: what a step does
-not hold grows on and on, what is only wild does not."""
+"""A rate that is this many times the largest one checked so far is checked, whatever the cost: in
+an unstable run rates keep growing, in a merely irregular motion they do not."""
 
 
 class UnstableStepError(StepFailure):
-    """A step that is too long for an explicit method; the text says how long one may be."""
+    """The step is too long for an explicit method; the remedy says how long it may be."""
 
 
 @dataclass
 class StabilityMonitor:
-    """Looks into steps where rates jump.
+    """Checks the stability of steps where rates jump.
 
-    What takes as long as a derivative of n states counts 1: a step its derivatives and 25/n, a look
-    n/2 and 60/n, as measured on mechanisms of 2 to 90 states.
+    Costs are counted in derivatives of n states: a step costs its derivatives and 25/n, a check
+    n/2 + 60/n, as measured on mechanisms with 2 to 90 states.
 
-    stability  R of the method; None if its step on the linear problem is to tell
+    stability  R of the method; None to find the factors from a step on the linear problem
     """
 
     change: Change
     stability: Stability | None
-    _seen: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+    _evaluated: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
     _last: FloatArray | None = None
     _largest: FloatArray | float = 0.0
     _allowed: FloatArray | float = 0.0
     _worked: float = 0.0
     _spent: float = 0.0
-    _level: float = 0.0
-    _passed: tuple[float, tuple[float, FloatArray, FloatArray, float] | None] = (0.0, None)
+    _highest: float = 0.0
+    _skipped: tuple[float, tuple[float, FloatArray, FloatArray, float] | None] = (0.0, None)
 
-    def seeing(self, problem: Problem) -> Problem:
-        """The problem, the derivatives evaluated of which are kept for `see`."""
-        derivative, seen = problem.derivative, self._seen
+    def recording(self, problem: Problem) -> Problem:
+        """The same problem, but its derivatives are recorded for `check`."""
+        derivative, evaluated = problem.derivative, self._evaluated
 
-        def kept(t: float, y: FloatArray) -> FloatArray:
+        def recorded(t: float, y: FloatArray) -> FloatArray:
             slope = derivative(t, y)
-            seen.append((y, slope))
+            evaluated.append((y, slope))
             return slope
 
-        return replace(problem, derivative=kept)
+        return replace(problem, derivative=recorded)
 
-    def see(self, problem: Problem, t: float, y: FloatArray, step: FloatArray, h: float) -> None:
-        """Take note of a step of h from `y` at `t` to y + `step`, (ny,) each.
+    def check(self, problem: Problem, t: float, y: FloatArray, step: FloatArray, h: float) -> None:
+        """Check a step of h from `y` at `t` to y + `step`, (ny,) each, if rates jump in it.
 
         Raises `UnstableStepError` if it is too long.
         """
-        seen = self._seen
-        self._worked += len(seen) + 25 / len(y)
+        evaluated = self._evaluated
+        self._worked += len(evaluated) + 25 / len(y)
         rate, last = step / h, self._last
         self._last = rate
-        # Nothing more is done at most steps: the largest rates are brought up to date by a jump.
+        # Most steps end here: the largest rates are only updated at a jump.
         if last is not None and (np.abs(rate - last) <= self._allowed).all():
-            del seen[:-1]
+            del evaluated[:-1]
             return
-        seen = seen.copy()
-        del self._seen[:-1]
+        evaluated = evaluated.copy()
+        del self._evaluated[:-1]
         first = last is None
         earlier = rate if last is None else last
-        self._note(earlier)
+        self._update(earlier)
         jumps = first or not (np.abs(rate - earlier) <= self._allowed).all()
-        self._note(rate)
+        self._update(rate)
         if not jumps:
             return
         if not np.isfinite(step).all():
-            self._look(problem, [(t, y)], h)
+            self._check_at(problem, [(t, y)], h)
         elif first:
-            self._look(problem, [(t, y), (t + h, y + step)], h)
-        elif self._is_worth_it(problem, rate, seen, h):
-            self._look(problem, _reached(problem, t, y, step, h), h)
+            self._check_at(problem, [(t, y), (t + h, y + step)], h)
+        elif self._is_affordable(problem, rate, evaluated, h):
+            self._check_at(problem, _states_in(problem, t, y, step, h), h)
         else:
             size = float(np.max(np.abs(rate - earlier)))
-            if size > self._passed[0]:
-                self._passed = size, (t, y, step, h)
+            if size > self._skipped[0]:
+                self._skipped = size, (t, y, step, h)
 
-    def settle(self, problem: Problem) -> None:
-        """At the end of a run, look into the largest of the jumps that were let pass.
+    def finish(self, problem: Problem) -> None:
+        """At the end of a run, check the step with the largest jump that was not checked.
 
-        Raises `UnstableStepError` as `see` does.
+        Raises `UnstableStepError` if it is too long.
         """
-        _, passed = self._passed
-        if passed:
-            self._look(problem, _reached(problem, *passed), passed[3])
+        _, skipped = self._skipped
+        if skipped:
+            self._check_at(problem, _states_in(problem, *skipped), skipped[3])
 
-    def _is_worth_it(
+    def _is_affordable(
         self,
         problem: Problem,
         rate: FloatArray,
-        seen: Sequence[tuple[FloatArray, FloatArray]],
+        evaluated: Sequence[tuple[FloatArray, FloatArray]],
         h: float,
     ) -> bool:
-        """Whether a jump is to be looked into: not where that would take much of the run's time."""
-        level = float(np.max(np.abs(rate) / np.array(problem.sizes or (1.0,))))
+        """Whether a jump is checked: if time is left for it, or if rates keep growing."""
+        size = float(np.max(np.abs(rate) / np.array(problem.sizes or (1.0,))))
         if self._spent <= SHARE * self._worked + BRIEF / len(rate):
-            self._level = max(self._level, level)
+            self._highest = max(self._highest, size)
             return True
-        if level > GREATER * self._level and not h * fastest(problem, seen) < REACH:
-            self._level = level
+        if size > GREATER * self._highest and not h * fastest(problem, evaluated) < FAST:
+            self._highest = size
             return True
         return False
 
-    def _note(self, rate: FloatArray) -> None:
-        """Take a rate among the largest so far."""
+    def _update(self, rate: FloatArray) -> None:
+        """Update the largest rates so far, and the changes that are not jumps."""
         self._largest = np.maximum(self._largest, np.abs(rate))
         self._allowed = np.maximum(JUMP * self._largest, NOISE * np.max(self._largest))
 
-    def _look(self, problem: Problem, places: Sequence[tuple[float, FloatArray]], h: float) -> None:
-        for time, state in places:
+    def _check_at(
+        self, problem: Problem, points: Sequence[tuple[float, FloatArray]], h: float
+    ) -> None:
+        """Check a step of h with the Jacobians at times and states."""
+        for time, state in points:
             self._spent += len(state) / 2 + 60 / len(state)
             jacobian = _jacobian(problem, time, state)
             if jacobian is not None:
-                self._judge(problem, jacobian, h)
+                self._check_modes(problem, jacobian, h)
 
-    def _judge(self, problem: Problem, jacobian: FloatArray, h: float) -> None:
-        grown = growth(self.change, self.stability, problem, jacobian)
-        if not grown(h) > math.log(GROWS):
+    def _check_modes(self, problem: Problem, jacobian: FloatArray, h: float) -> None:
+        log_growth = growth(self.change, self.stability, problem, jacobian)
+        if not log_growth(h) > math.log(UNSTABLE):
             return
         rates = np.abs(np.linalg.eigvals(jacobian))
-        dt = longest(grown, h)
+        dt = stable_step(log_growth, h)
         if dt < LEAST * h:
             return
         raise UnstableStepError(
-            f"the step of {h:g} s is too long for an explicit method, which makes what changes at "
-            f"a rate of {rates.max():.2g}/s grow without bound",
+            f"the step of {h:g} s is too long for an explicit method: modes at a rate of up to "
+            f"{rates.max():.2g}/s grow without bound",
             f"take --dt {dt:g} or less, or an implicit method (--integrator implicit_midpoint, or "
             "Radau, which chooses its steps)",
         )
 
 
-def _reached(
+def _states_in(
     problem: Problem, t: float, y: FloatArray, step: FloatArray, h: float
 ) -> list[tuple[float, FloatArray]]:
-    """Where a step of h from y at t to y + `step` looks, or might: times and states."""
-    ahead = problem.derivative(t, y)
-    return [(t, y), (t + h / 2, y + h / 2 * ahead), (t + h, y + h * ahead), (t + h, y + step)]
+    """Times and states that a step of h from y at t to y + `step` evaluates, or might."""
+    slope = problem.derivative(t, y)
+    return [(t, y), (t + h / 2, y + h / 2 * slope), (t + h, y + h * slope), (t + h, y + step)]
 
 
-def fastest(problem: Problem, seen: Sequence[tuple[FloatArray, FloatArray]]) -> float:
-    """About the fastest rate, 1/s, at which states change that lie as far apart as those at which
-    derivatives were `seen`: pairs of states and derivatives, (ny,) each.
+def fastest(problem: Problem, evaluated: Sequence[tuple[FloatArray, FloatArray]]) -> float:
+    """An estimate of the fastest rate of the problem, 1/s, from differences between pairs of states
+    and derivatives, (ny,) each.
 
-    Of an oscillation positions and velocities are exchanged: the product of what both change by,
-    over that of how far both are apart, is ω². What is damped changes its velocities by themselves.
+    In an oscillation positions change with velocities and velocities with positions: the product of
+    the differences of both derivatives, over that of the differences of both states, is ω². In a
+    damped motion velocities change with velocities.
     """
     sizes = np.array(problem.sizes) if problem.sizes else np.ones(len(problem.states))
-    states, slopes = (np.array(part) / sizes for part in zip(*seen, strict=True))
-    one, other = np.triu_indices(len(seen), 1)
-    apart, change = np.abs(states[one] - states[other]), np.abs(slopes[one] - slopes[other])
-    place = np.zeros(len(sizes), dtype=bool)
-    place[list(problem.positions)] = True
-    far, moved = (
-        [part[:, kind].max(axis=1, initial=0.0) for kind in (place, ~place)]
-        for part in (apart, change)
-    )
+    states, slopes = (np.array(part) / sizes for part in zip(*evaluated, strict=True))
+    one, other = np.triu_indices(len(evaluated), 1)
+    positions = np.zeros(len(sizes), dtype=bool)
+    positions[list(problem.positions)] = True
+
+    def differences(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Greatest differences of each pair, (pairs,), in positions and in the other states."""
+        change = np.abs(x[one] - x[other])
+        return (
+            change[:, positions].max(axis=1, initial=0.0),
+            change[:, ~positions].max(axis=1, initial=0.0),
+        )
+
+    (q, v), (q_dot, v_dot) = differences(states), differences(slopes)
     with np.errstate(all="ignore"):
-        kinds = [moved[1] / far[1], np.sqrt(moved[0] * moved[1] / (far[0] * far[1]))]
-        if place.all():
-            kinds = [moved[0] / far[0]]
-    rates = np.concatenate(kinds)
+        estimates = [v_dot / v, np.sqrt(q_dot * v_dot / (q * v))]
+        if positions.all():
+            estimates = [q_dot / q]
+    rates = np.concatenate(estimates)
     known = rates[np.isfinite(rates)]
     return float(known.max()) if known.size else math.inf
 
@@ -211,15 +220,13 @@ def fastest(problem: Problem, seen: Sequence[tuple[FloatArray, FloatArray]]) -> 
 def growth(
     change: Change, stability: Stability | None, problem: Problem, jacobian: FloatArray
 ) -> Callable[[float], float]:
-    """A function of a step h, s: log |R| of the mode that grows most in it, less that of the motion
-    itself.
-
-    `jacobian` (ny, ny) is that of y' = J y.
+    """A function of the step h, s: log of the largest |R| of all modes of y' = J y, less the growth
+    of the motion itself, h max(0, Re λ). `jacobian` is J, (ny, ny).
     """
     modes: NDArray[np.complex128] = np.linalg.eigvals(jacobian).astype(complex)
     own = max(0.0, float(modes.real.max()))
 
-    def grown(h: float) -> float:
+    def log_growth(h: float) -> float:
         with np.errstate(all="ignore"):
             factors = stability(h * modes) if stability else _factors(change, problem, jacobian, h)
         largest = float(np.abs(factors).max())
@@ -227,13 +234,15 @@ def growth(
             return math.inf
         return math.log(largest) - h * own if largest else 0.0
 
-    return grown
+    return log_growth
 
 
 def _factors(
     change: Change, problem: Problem, jacobian: FloatArray, h: float
 ) -> NDArray[np.complex128]:
-    """What a step of a method multiplies the modes of y' = J y by; nan where it overflows."""
+    """The factors by which a step of a method multiplies the modes of y' = J y; nan if it
+    overflows.
+    """
     linear = replace(
         problem,
         derivative=lambda _, y: jacobian @ y,
@@ -247,43 +256,43 @@ def _factors(
     return np.linalg.eigvals(made).astype(complex)
 
 
-def longest(grown: Callable[[float], float], h: float) -> float:
-    """A step below h that is short enough, s, to two digits, by halving; `grown` as of `growth`."""
+def stable_step(log_growth: Callable[[float], float], h: float) -> float:
+    """A stable step below h, s, to two digits, by bisection; `log_growth` as from `growth`."""
 
-    def holds(step: float) -> bool:
-        return grown(step) <= math.log(HOLDS)
+    def stable(step: float) -> bool:
+        return log_growth(step) <= math.log(STABLE)
 
     low, high = h / 2, h
-    while not holds(low) and low > 1e-30 * h:
+    while not stable(low) and low > 1e-30 * h:
         low, high = low / 2, low
     for _ in range(6):
         middle = (low + high) / 2
-        low, high = (middle, high) if holds(middle) else (low, middle)
+        low, high = (middle, high) if stable(middle) else (low, middle)
     digits = 1 - math.floor(math.log10(low))
     return math.floor(low * 10.0**digits) / 10.0**digits if abs(digits) < 300 else low
 
 
 def stiffness(problem: Problem, t: float, y: FloatArray, h: float) -> str:
-    """What keeps steps of an explicit method as short as h, s, in words; "" if not stability.
+    """A message if stability keeps the steps of an explicit method as short as h, s; else "".
 
-    It is where the motion damps something faster than the step can show: h|λ| > 1 for a mode that
-    damps more than it oscillates.
+    It does if h|λ| > 1 for the most strongly damped mode, and that mode decays faster than it
+    oscillates.
     """
     jacobian = _jacobian(problem, t, y)
     if jacobian is None:
         return ""
     modes = np.linalg.eigvals(jacobian)
-    fastest = modes[np.argmin(modes.real)]
-    if -fastest.real * h > 1 and -fastest.real >= abs(fastest.imag):
+    damped = modes[np.argmin(modes.real)]
+    if -damped.real * h > 1 and -damped.real >= abs(damped.imag):
         return (
-            f"the motion is stiff: it damps at {-fastest.real:.2g}/s, which keeps explicit steps "
-            f"at {h:.2g} s"
+            f"the motion is stiff: a mode decays at {-damped.real:.2g}/s, which keeps explicit "
+            f"steps at {h:.2g} s"
         )
     return ""
 
 
 def _jacobian(problem: Problem, t: float, y: FloatArray) -> FloatArray | None:
-    """The Jacobian, where there is a finite one."""
+    """The Jacobian; None if it is not finite."""
     try:
         found = problem.jacobian(t, y)
     except (ArithmeticError, ValueError):

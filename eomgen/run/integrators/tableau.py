@@ -1,8 +1,8 @@
-"""Runge-Kutta methods as data: a Butcher tableau, explicit or implicit, that proves its own order.
+"""Runge-Kutta methods as data: Butcher tableaus, explicit or implicit, whose order is verified.
 
 The method y_new = y + h Σ b_i f(t + c_i h, Y_i), Y_i = y + h Σ a_ij f(t + c_j h, Y_j) is of order p
 if and only if every rooted tree of up to p nodes has the elementary weight 1/γ: Hairer, Norsett,
-Wanner, Solving ODEs I, theorem II.2.13. Hence no condition is typed here; the trees are grown.
+Wanner, Solving ODEs I, theorem II.2.13. The order conditions are generated from the trees.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,19 +17,19 @@ from numpy.typing import NDArray
 from eomgen.run.problem import FloatArray
 
 Tree = tuple["Tree", ...]
-"""A rooted tree: the subtrees that hang from its root, in a fixed order; a lone node is ()."""
+"""A rooted tree: the subtrees of its root, in a fixed order; a single node is ()."""
 
 ROUNDOFF = 1e-14
-"""Of an order condition, in parts of the sum of the sizes of its terms."""
+"""Allowed error of an order condition, relative to the sum of the magnitudes of its terms."""
 
 
 @dataclass(frozen=True)
 class ButcherTableau:
     """Coefficients of a method of s stages: a (s, s), weights b (s,), nodes c (s,).
 
-    Made only if every row of a sums to its node and the condition of each rooted tree of up to
-    `order` nodes holds to roundoff; else `ValueError` names what fails. There are 8 of them for
-    order 4, 37 for order 6 and 200 for order 8.
+    Raises `ValueError` if a row of a does not sum to its node, or if the condition of a rooted tree
+    of up to `order` nodes does not hold to roundoff. There are 8 such trees for order 4, 37 for
+    order 6 and 200 for order 8.
     """
 
     a: tuple[tuple[float, ...], ...]
@@ -48,7 +48,7 @@ class ButcherTableau:
             raise ValueError("tableau: not all coefficients are finite numbers")
         if np.any(np.abs(a.sum(axis=1) - c) > ROUNDOFF * np.maximum(1.0, np.abs(a).sum(axis=1))):
             raise ValueError("tableau: the rows of a do not sum to c")
-        # The same with all signs positive: how large the terms are whose rounding is let pass.
+        # Each condition is also summed with absolute values, as the scale of its rounding error.
         matrices, weights = np.stack((a, np.abs(a))), np.stack((b, np.abs(b)))
         grown: dict[Tree, FloatArray] = {}
         for order in range(1, self.order + 1):
@@ -77,7 +77,7 @@ class ButcherTableau:
         y: FloatArray,
         h: float,
     ) -> FloatArray:
-        """Return y(t + h) - y(t), shape (ny,), of an explicit method, stage after stage."""
+        """Return y(t + h) - y(t), (ny,), for an explicit method."""
         a, b, _ = self.arrays
         slopes = np.empty((len(b), len(y)))
         slopes[0] = derivative(t + self.c[0] * h, y)
@@ -86,9 +86,9 @@ class ButcherTableau:
         return h * (b @ slopes)
 
     def stability(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """R(z) of an explicit method at z = hλ (n,): what a step multiplies exp(λt) by.
+        """The stability function R(z) of an explicit method at z = hλ (n,).
 
-        Hairer, Wanner, Solving ODEs II, (IV.2.9), stage after stage.
+        Hairer, Wanner, Solving ODEs II, (IV.2.9), evaluated stage by stage.
         """
         a, b, _ = self.arrays
         stages = np.ones((len(b), *z.shape), dtype=complex)
@@ -99,7 +99,7 @@ class ButcherTableau:
 
 @cache
 def trees(nodes: int) -> tuple[Tree, ...]:
-    """All rooted trees of so many nodes: 1, 1, 2, 4, 9, 20, 48, 115, …"""
+    """All rooted trees with this number of nodes: 1, 1, 2, 4, 9, 20, 48, 115, …"""
     return tuple(
         tuple(subtree for group in chosen for subtree in group)
         for sizes in _partitions(nodes - 1, nodes - 1)
@@ -123,18 +123,18 @@ def _partitions(total: int, largest: int) -> Iterator[tuple[int, ...]]:
 
 @cache
 def size(tree: Tree) -> int:
-    """How many nodes a tree has."""
+    """Number of nodes of a tree."""
     return 1 + sum(size(subtree) for subtree in tree)
 
 
 @cache
 def density(tree: Tree) -> int:
-    """γ of a tree: the product, over its nodes, of how many nodes hang from each, itself included.
+    """The density γ of a tree: the product of the sizes of the subtrees at all of its nodes.
     Hairer, Norsett, Wanner I, definition II.2.10.
     """
     return size(tree) * prod(density(subtree) for subtree in tree)
 
 
 def written(tree: Tree) -> str:
-    """A tree in Butcher's brackets: τ for a lone node, [τ[τ]] for a root with τ and [τ] on it."""
+    """A tree in Butcher's notation: τ for a single node, [τ[τ]] for a root with subtrees τ, [τ]."""
     return f"[{''.join(map(written, tree))}]" if tree else "τ"

@@ -1,7 +1,7 @@
-"""SciPy's implicit methods, which hand their remarks to the run and not to Python's warnings.
+"""SciPy's implicit methods, without their Python warnings: the run reports them instead.
 
-`warnings.catch_warnings` would change the filters of the whole process, so that of two runs in two
-threads one would take the other's remarks. These methods make no warning in the first place.
+`warnings.catch_warnings` changes the filters of the whole process: one of two runs in two threads
+would catch the other's warnings. These methods do not warn in the first place.
 """
 
 from collections.abc import Callable
@@ -17,25 +17,25 @@ from scipy.integrate._ode import IntegratorConcurrencyError
 from scipy.linalg import get_lapack_funcs
 
 Remark = Callable[[str], None]
-"""Told what a method has to say of a step that it makes or gives up."""
+"""Called with a method's remark on a step, as text."""
 
 Matrix = NDArray[np.float64] | NDArray[np.complex128]
 Factors = tuple[Matrix, NDArray[np.int32]]
 """L and U in one matrix (n, n), and pivots (n,), as `scipy.linalg.lu_solve` takes them."""
 
 
-_AT_WORK = RLock()
-"""Held during a step of LSODA: old versions of SciPy keep what it works on once for all runs."""
+_ONE_STEP = RLock()
+"""Held during a step of LSODA: in old versions of SciPy all runs share its work arrays."""
 
 
-def unheard(text: str) -> None:
-    """Let a remark pass."""
+def ignored(text: str) -> None:
+    """A `Remark` that does nothing."""
 
 
 class Radau(ScipyRadau):
-    """Radau IIA of order 5; `remark` is told of singular matrices."""
+    """Radau IIA of order 5; calls `remark` for a singular matrix."""
 
-    remark: Remark = staticmethod(unheard)
+    remark: Remark = staticmethod(ignored)
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -43,9 +43,9 @@ class Radau(ScipyRadau):
 
 
 class BDF(ScipyBDF):
-    """Backward differentiation of orders 1 to 5; `remark` is told of singular matrices."""
+    """Backward differentiation of orders 1 to 5; calls `remark` for a singular matrix."""
 
-    remark: Remark = staticmethod(unheard)
+    remark: Remark = staticmethod(ignored)
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -53,36 +53,30 @@ class BDF(ScipyBDF):
 
 
 class LSODA(ScipyLSODA):
-    """Adams' methods or backward differentiation, by stiffness; `remark` is told why it gives up.
+    """Adams' methods or backward differentiation, by stiffness. A failed step returns the reason.
 
-    SciPy looks the reason up by its number, to warn of it, and then says only that the number is
-    unexpected. Here the look-up raises the reason, before any warning.
+    SciPy looks up the reason by its number to warn of it, but `_step_impl` returns only that the
+    number is unexpected. Here the look-up raises the reason, before any warning.
     """
-
-    remark: Remark = staticmethod(unheard)
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         own: Any = self
         integrator = own._lsoda_solver._integrator
-        integrator.messages = _Reasons(integrator.messages)
+        integrator.messages = _RaisedMessages(integrator.messages)
 
     def _step_impl(self) -> Any:
         try:
-            with _AT_WORK:
-                return super()._step_impl()  # type: ignore[misc]  # which the stubs leave out
-        except _GaveUp as reason:
-            self.remark(f"lsoda: {reason}")
-            return False, "Unexpected istate in LSODA."
+            with _ONE_STEP:
+                return super()._step_impl()  # type: ignore[misc]  # missing in the stubs
+        except _LsodaError as error:
+            return False, f"lsoda: {error}"
         except IntegratorConcurrencyError:
             return False, "LSODA of this version of SciPy makes one run at a time"
 
 
-UNWARNED = (Radau, BDF, LSODA)
-
-
-def factors(matrix: Matrix, remark: Remark = unheard) -> Factors:
-    """LU factors of a matrix (n, n), which is overwritten. A singular one is told to `remark`."""
+def factors(matrix: Matrix, remark: Remark = ignored) -> Factors:
+    """LU factors of a matrix (n, n), which is overwritten; calls `remark` if it is singular."""
     if not matrix.size:
         return matrix, np.arange(0, dtype=np.int32)
     getrf: Any = get_lapack_funcs("getrf", (matrix,))
@@ -93,9 +87,9 @@ def factors(matrix: Matrix, remark: Remark = unheard) -> Factors:
 
 
 def _counted_factors(solver: Radau | BDF) -> Callable[[Matrix], Factors]:
-    """Factors of dense matrices, counted as the solver counts its own.
+    """A function that factors dense matrices and counts in `solver.nlu`, as SciPy's does.
 
-    They raise `ValueError` for a matrix that is not finite, as SciPy's do.
+    It raises `ValueError` for a matrix that is not finite, as SciPy's does.
     """
 
     def counted(matrix: Matrix) -> Factors:
@@ -105,12 +99,12 @@ def _counted_factors(solver: Radau | BDF) -> Callable[[Matrix], Factors]:
     return counted
 
 
-class _GaveUp(Exception):
-    """Why LSODA gives up."""
+class _LsodaError(Exception):
+    """The reason for which LSODA failed."""
 
 
-class _Reasons(dict[int, str]):
-    """The reasons for which LSODA gives up, by number; looked up to be raised."""
+class _RaisedMessages(dict[int, str]):
+    """LSODA's messages by number; `get` raises the message as `_LsodaError`."""
 
     def get(self, number: int, default: str | None = None) -> str:  # type: ignore[override]
-        raise _GaveUp(super().get(number, default))
+        raise _LsodaError(super().get(number, default))

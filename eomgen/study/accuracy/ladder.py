@@ -19,12 +19,7 @@ from eomgen.run.problem import FloatArray, Problem
 Status = Literal["ok", "wrong", "failed", "over", "refused"]
 """How a run went: "ok"; "wrong": it reported success but is wrong; "failed": it stopped before the
 end; "over": it was stopped for its time; "refused": the method cannot run the scene."""
-Kind = Literal["explicit", "implicit", "symplectic"]
 
-SYMPLECTIC = frozenset(
-    {"semi_implicit_euler", "leapfrog", "implicit_midpoint", "gauss_4", "gauss_6"}
-)
-IMPLICIT = frozenset({"Radau", "Radau_differences", "BDF", "BDF_differences", "LSODA"})
 
 COARSEST = 25
 """Least number of equal steps."""
@@ -70,7 +65,8 @@ class Work:
     spread             median wall time less the least, s
     units              counted work (see `study.accuracy.cost`): the same on every machine
     steps, derivatives, jacobians   counts of one run
-    reason             why it is not "ok", or an integrator's remark
+    reason             why it is not "ok", and what to change; or an integrator's remark
+    stopped_at         the time at which a failed run stopped, s
     """
 
     rung: Rung
@@ -87,6 +83,7 @@ class Work:
     derivatives: int = 0
     jacobians: int = 0
     reason: str = ""
+    stopped_at: float = np.nan
     spread: float = np.nan
     units: float = np.nan
 
@@ -112,13 +109,6 @@ class Ladder:
     run_time: float
     most_steps: int = MOST_STEPS
     noise: float = 0.0
-
-
-def kind(method: str) -> Kind:
-    """The kind of a method; one that is not listed counts as explicit."""
-    if method in SYMPLECTIC:
-        return "symplectic"
-    return "implicit" if method in IMPLICIT else "explicit"
 
 
 def order(method: str) -> int | None:

@@ -21,8 +21,8 @@ import scipy
 
 from eomgen.errors import RunError
 from eomgen.files import is_ours, read_plain, write_whole
-from eomgen.run.integrators import INTEGRATORS
-from eomgen.study.accuracy.ladder import Rung, Status, Work, kind, order
+from eomgen.integrators import INTEGRATORS
+from eomgen.study.accuracy.ladder import Rung, Status, Work, order
 
 STATUSES: tuple[Status, ...] = ("ok", "wrong", "failed", "over", "refused")
 COLUMNS = (
@@ -48,6 +48,7 @@ COLUMNS = (
     "derivatives",
     "jacobians",
     "reason",
+    "stopped_at_s",
 )
 """Errors and drifts have no unit: they are relative to the motion's own scale, or its energy."""
 GENERATION, KEY = "generation_s", "eomgen_key"
@@ -63,8 +64,9 @@ def key(*what: object) -> str:
     """A digest of what the runs depend on, including this machine and its libraries."""
     here = Path(__file__).parent
     digest = hashlib.sha256()
+    package = here.parent.parent
     own = [here / f"{name}.py" for name in ("measure", "reference", "work_precision")]
-    for path in sorted((here.parent.parent / "run").rglob("*.py")) + own:
+    for path in [*sorted((package / "run").rglob("*.py")), package / "integrators.py", *own]:
         digest.update(path.read_bytes())
     machine = (platform.node(), platform.machine(), platform.python_version())
     text = json.dumps([*what, *machine, np.__version__, scipy.__version__], sort_keys=True)
@@ -122,7 +124,7 @@ def _row(work: Work) -> list[object]:
     at_most = [AT_MOST if flag else MEASURED for flag in work.at_most]
     return [
         rung.method,
-        kind(rung.method),
+        INTEGRATORS[rung.method].kind,
         _cell(order(rung.method)),
         _cell(rung.dt),
         _cell(rung.rtol),
@@ -143,6 +145,7 @@ def _row(work: Work) -> list[object]:
         work.derivatives,
         work.jacobians,
         " ".join(work.reason.split()),
+        _cell(work.stopped_at),
     ]
 
 
@@ -179,6 +182,7 @@ def _work(row: Mapping[str, str]) -> Work:
         derivatives=int(row["derivatives"]),
         jacobians=int(row["jacobians"]),
         reason=row["reason"],
+        stopped_at=number("stopped_at_s"),
         spread=number("time_spread_s"),
         units=number("work_units"),
     )

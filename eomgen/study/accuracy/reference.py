@@ -204,7 +204,7 @@ def _in_long_numbers(
             progress(done)
             _check_pace(time.process_time() - began, done, seconds, "extended precision")
 
-        exactly = precise(program, module, parameters, inputs, problem.initial, watched=True)
+        exactly = precise(program, module, parameters, inputs, problem.initial, fix_branches=True)
         with digits():
             for row in rows(stages, exactly, problem, scale, times, tolerance, report):
                 found.append(row.y)

@@ -154,7 +154,8 @@ def measure(bench: Bench, rung: Rung, run_time: float) -> Work:
     if first.over:
         return _worked(Work(rung, "over", first.seconds, 1, reason=OVER), first)
     if not first.trajectory.finished:
-        failed = Work(rung, "failed", first.seconds, 1, reason=first.trajectory.message)
+        outcome, stopped_at = first.trajectory.outcome, float(first.trajectory.t[-1])
+        failed = Work(rung, "failed", first.seconds, 1, reason=str(outcome), stopped_at=stopped_at)
         return _worked(failed, first)
     last = first
     times: list[float] = []

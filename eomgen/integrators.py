@@ -1,0 +1,64 @@
+"""The integrators: one table.
+
+The schema takes the names from it, `run.integrators` the methods, the accuracy study the kinds. To
+add an integrator, add its entry here and the module of `run.integrators` that the entry names.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal["explicit", "implicit", "symplectic"]
+
+
+@dataclass(frozen=True)
+class IntegratorSpec:
+    """One integrator.
+
+    about   what it is
+    kind    by which tables and figures group it
+    method  "module:attribute" in `eomgen.run.integrators`: its `FixedStep` or `Adaptive`
+    """
+
+    about: str
+    kind: Kind
+    method: str
+
+
+INTEGRATORS: Mapping[str, IntegratorSpec] = {
+    "euler": IntegratorSpec("explicit Euler, order 1", "explicit", "euler:INTEGRATOR"),
+    "semi_implicit_euler": IntegratorSpec(
+        "symplectic Euler, order 1", "symplectic", "semi_implicit_euler:INTEGRATOR"
+    ),
+    "leapfrog": IntegratorSpec("Störmer-Verlet, order 2", "symplectic", "leapfrog:INTEGRATOR"),
+    "rk4": IntegratorSpec(
+        "classical Runge-Kutta method, order 4", "explicit", "runge_kutta_4:INTEGRATOR"
+    ),
+    "implicit_midpoint": IntegratorSpec(
+        "implicit midpoint rule, order 2", "symplectic", "implicit_midpoint:INTEGRATOR"
+    ),
+    "gauss_4": IntegratorSpec("Gauss collocation, order 4", "symplectic", "gauss_4:INTEGRATOR"),
+    "gauss_6": IntegratorSpec("Gauss collocation, order 6", "symplectic", "gauss_6:INTEGRATOR"),
+    "RK45": IntegratorSpec("Dormand-Prince 5(4), by SciPy", "explicit", "from_scipy:RK45"),
+    "DOP853": IntegratorSpec("Dormand-Prince 8(5,3), by SciPy", "explicit", "from_scipy:DOP853"),
+    "gragg_bulirsch_stoer": IntegratorSpec(
+        "extrapolated modified midpoint rule, variable order",
+        "explicit",
+        "gragg_bulirsch_stoer:INTEGRATOR",
+    ),
+    "Radau": IntegratorSpec("Radau IIA, order 5, by SciPy", "implicit", "from_scipy:RADAU"),
+    "Radau_differences": IntegratorSpec(
+        "Radau with a Jacobian by differences", "implicit", "from_scipy:RADAU_DIFFERENCES"
+    ),
+    "BDF": IntegratorSpec(
+        "backward differentiation, orders 1 to 5, by SciPy", "implicit", "from_scipy:BDF"
+    ),
+    "BDF_differences": IntegratorSpec(
+        "BDF with a Jacobian by differences", "implicit", "from_scipy:BDF_DIFFERENCES"
+    ),
+    "LSODA": IntegratorSpec(
+        "Adams or backward differentiation, chosen by stiffness, by SciPy",
+        "implicit",
+        "from_scipy:LSODA",
+    ),
+}
