@@ -65,7 +65,7 @@ def _path(text: str) -> Path:
 
 
 class _Version(argparse.Action):
-    """Prints this program's version. It is looked up only when asked for."""
+    """Prints the version, which is looked up only if the option is given."""
 
     def __init__(self, option_strings: Sequence[str], dest: str, help: str) -> None:
         super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help=help)

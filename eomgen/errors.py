@@ -40,9 +40,9 @@ def report_refusal(error: EomgenError) -> None:
 
 
 ALIKE = 0.6
-"""Least similarity of a hint: twice the number of common letters by that of all letters."""
+"""Least similarity of a hint: twice the number of common letters, divided by all letters."""
 LONGER = 2 / ALIKE - 1
-"""A word this many times as long as a known one cannot be so similar. To compare takes long."""
+"""A word more than this many times as long as a known one is never that similar."""
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

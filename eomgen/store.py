@@ -132,7 +132,7 @@ def interfaced_program_of(model: Model) -> tuple[Program, "Interface"]:
 
 
 def _keep_program(entries: Entries, key: str, program: Program, interface: "Interface") -> str:
-    """Keep a program and its interface beside code of this key; why not, or ""."""
+    """Store a program and its interface; return why that failed, or ""."""
     return entries.put(_program_key(key), pickle.dumps((saved(program), interface)))
 
 
@@ -141,7 +141,7 @@ def _kept_program(entries: Entries, key: str) -> tuple[Program, "Interface"] | N
     if content is None:
         return None
     with suppress(ProgramError, pickle.UnpicklingError, ValueError, TypeError):
-        # To be trusted as the module is that lies beside it, and is executed: see `entries`.
+        # Pickle is as safe here as the stored module, which is executed: see `entries`.
         text, interface = pickle.loads(content)
         return restored(text), interface
     return None

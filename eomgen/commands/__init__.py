@@ -1,4 +1,4 @@
-"""The commands. What one needs is imported when it is called: all together take long to load."""
+"""The commands, one function each. A command imports its module when it is called."""
 
 import argparse
 

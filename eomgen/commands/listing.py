@@ -1,4 +1,4 @@
-"""The command `list`, alone in its module: it needs nothing of what other commands load."""
+"""The command `list`. It is in its own module because it needs none of the slow imports."""
 
 import argparse
 

@@ -1,4 +1,4 @@
-"""A C compiler: found, asked what it is, and run."""
+"""Finding and running a C compiler."""
 
 import importlib.util
 import os
@@ -16,27 +16,28 @@ from pathlib import Path
 from eomgen.errors import RunError
 
 FLAGS = ("-std=c99", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-w")
-"""The order of every operation is the program's: no fast mathematics, nothing contracted."""
+"""No fast mathematics and no contraction: they would change the last bits of results."""
 KNOWN = ("cc", "gcc", "clang")
 ABSENT = (
     "no C compiler is found; install gcc or clang, name one in CC, or run: "
     "pip install 'eomgen[compiled]'"
 )
 LONGEST = 600.0
-"""Seconds after which a compiler is stopped."""
+"""Longest time of a compilation, s."""
 
 
 @dataclass(frozen=True)
 class Compiler:
-    """A command that compiles C, and its own words on its version and target."""
+    """A C compiler: its command, and what it prints as its version and target."""
 
     command: tuple[str, ...]
     version: str
 
     def shared_library(self, sources: Mapping[str, str], main: str, *flags: str) -> bytes:
-        """The bytes of a shared library of `sources`, by name, of which `main` is compiled.
+        """Compile the file `main` of `sources` (name to text) into a shared library; return its
+        bytes.
 
-        Raises `RunError` with the compiler's first error, or where there is no place for files.
+        Raises `RunError` with the compiler's first error, or if no temporary file can be written.
         """
         try:
             with tempfile.TemporaryDirectory(prefix="eomgen-") as folder:
@@ -63,14 +64,14 @@ class Compiler:
             raise RunError(f"{self.command[0]}: not done after {LONGEST:g} s") from None
         if done.returncode:
             lines = [line for line in done.stderr.splitlines() if "error" in line]
-            why = (lines or done.stderr.splitlines() or ["it failed without a word"])[0]
+            why = (lines or done.stderr.splitlines() or ["it failed without a message"])[0]
             raise RunError(f"{shlex.join(self.command)}: {why}")
 
 
 def find_compiler() -> Compiler:
-    """The first of `$CC`, cc, gcc, clang and the wheel `ziglang` that there is.
+    """The first compiler found of `$CC`, cc, gcc, clang and the package `ziglang`.
 
-    Raises `RunError` if there is none, or if that in `$CC` does not run.
+    Raises `RunError` if there is none, or if the one in `$CC` does not run.
     """
     return _found(os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
@@ -101,5 +102,5 @@ def _asked(command: tuple[str, ...]) -> Compiler:
 
 
 def suffix() -> str:
-    """Of a shared library here."""
+    """File suffix of a shared library on this system."""
     return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")

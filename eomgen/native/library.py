@@ -1,4 +1,4 @@
-"""A program's C kernels as a shared library, from the store or compiled now."""
+"""The shared library of a program's C kernels, from the store or compiled now."""
 
 import ctypes
 import hashlib
@@ -13,15 +13,17 @@ from eomgen.native.compiler import FLAGS, find_compiler, suffix
 from eomgen.store import folder
 
 LEVELS = ("-O2", "-O1")
-"""How much a compiler optimises: usually, and what is large."""
+"""Optimisation level, and that for large sources."""
 LARGE = 300_000
-"""Characters of source from which on a compiler optimises less: it takes long, and gains little."""
+"""Characters of source above which the lower level is used: compilation takes long, and the
+higher one gains little.
+"""
 
 
 def built(sources: Mapping[str, str]) -> ctypes.CDLL:
-    """The library of C sources, by name, loaded. It is kept under what it is made of: sources,
-    compiler with its version, and flags.
+    """Compile and load the library of C sources (name to text).
 
+    The library is stored under a digest of the sources, the compiler's version and the flags.
     Raises `RunError` if there is no compiler, or if it fails.
     """
     compiler = find_compiler()
@@ -38,8 +40,8 @@ def built(sources: Mapping[str, str]) -> ctypes.CDLL:
 
 
 def _loaded(content: bytes) -> ctypes.CDLL:
-    """A library from its bytes. Its file is in a folder of this process alone, which is removed
-    once it is loaded, where files in use can be.
+    """Load a library from its bytes, by a temporary file that is removed at once where the system
+    allows that.
     """
     try:
         with tempfile.TemporaryDirectory(prefix="eomgen-", ignore_cleanup_errors=True) as place:

@@ -1,8 +1,9 @@
-"""A compiled module: what a generated Python module does, computed by its C kernels.
+"""A compiled module: the functions of a generated Python module, computed by C kernels.
 
-Where those say that nothing was lost, a result is theirs, and has the bits that Python would give.
-All else is left to the Python module: parameters never given before, which it checks; states and
-columns that have no result; outputs that take more than time, state, parameters and inputs.
+A kernel reports whether the floating-point unit raised an overflow, a division by zero or an
+invalid operation. If not, its result has the bits that the Python module would return. In all other
+cases the Python module computes the result or raises its error. It also checks parameters that are
+new, and computes the outputs that take further arguments.
 """
 
 import ctypes
@@ -16,19 +17,22 @@ import numpy as np
 from eomgen.run.problem import FloatArray
 
 MOST_KNOWN = 64
-"""Sets of parameters whose constants are kept."""
+"""Largest number of parameter sets whose constants are kept."""
 USUAL = 1e60
-"""Parameters whose sizes are within it and its inverse …"""
+"""Kernels are used for parameters with sizes from 1 / USUAL to USUAL …"""
 USUAL_CONSTANT = 1e100
-"""… and constants within this, or as small as what is never to count, leave products in range."""
+"""… and constants from its inverse up to it, apart from weights of about 1e-200. Products of
+these do not underflow by accident.
+"""
 OTHERS = ("initial_state", "forward_dynamics", "inverse_dynamics", "impact", "held")
-"""Outputs that take other arguments, which the Python module computes."""
+"""Outputs with other arguments, which the Python module computes."""
 _FLOAT, _POINTER, _LONG, _REAL = np.dtype(float), ctypes.c_void_p, ctypes.c_long, ctypes.c_double
 
 
 def compiled_module(module: Any, library: ctypes.CDLL) -> Any:
-    """A module with the contract of `module`, whose outputs are computed by a library of its
-    kernels (see `native.library`).
+    """A module with the functions of `module`, computed by the library of its kernels.
+
+    See `native.library.built`.
     """
     made = ModuleType(f"{module.NAME}_compiled", module.__doc__)
     made.__dict__.update({k: v for k, v in vars(module).items() if not k.startswith("__")})
@@ -47,7 +51,7 @@ def _outputs(library: ctypes.CDLL) -> dict[str, tuple[int, ...]]:
 
 
 class _Kernels:
-    """The kernels of a library, with the constants of parameters that were given before."""
+    """The kernels of a library, and the constants of the parameter sets used so far."""
 
     def __init__(self, module: Any, library: ctypes.CDLL) -> None:
         self.module, self.library = module, library
@@ -56,7 +60,7 @@ class _Kernels:
         self._known: dict[bytes, Any] = {}
 
     def held(self, p: Any) -> Any:
-        """The constants of parameters, an array of C; None where only the Python module will do."""
+        """The constants of parameters, a C array; None if the Python module must be used."""
         values = _ordered(self.own if p is None else p, self.module.PARAMETERS)
         if values is None or values.shape != (len(self.own),):
             return None
@@ -68,7 +72,7 @@ class _Kernels:
         return self._known[key]
 
     def _made(self, values: FloatArray) -> Any:
-        self.module.initial_state(values)  # which refuses what the scene would refuse
+        self.module.initial_state(values)  # raises the error of parameters that are refused
         k = (_REAL * max(1, self.constants))()
         call = self.library.constants_of
         call.argtypes = [_POINTER, _POINTER]
@@ -79,7 +83,7 @@ class _Kernels:
         return k if usual and not wrong else None
 
     def given(self, u: Any, *columns: int) -> FloatArray | None:
-        """Inputs as an array; None where only the Python module will do."""
+        """Inputs as an array; None if the Python module must be used."""
         if u is None:
             return np.zeros(self.inputs)
         values = _ordered(u, self.module.INPUTS)
@@ -88,7 +92,7 @@ class _Kernels:
         return values
 
     def output(self, name: str, shape: tuple[int, ...]) -> Callable[..., Any]:
-        """An output's function of time, state or columns of states, parameters and inputs."""
+        """The function of an output: (t, y, p=None, u=None), where y may have columns."""
         python, states = getattr(self.module, name), self.states
         own, none = self.held(None), bytes(8 * self.inputs)
         buffer = _REAL * math.prod(shape)
@@ -117,7 +121,7 @@ class _Kernels:
         return function
 
     def _columns(self, name: str, shape: tuple[int, ...]) -> Callable[..., FloatArray]:
-        """An output of many states at once."""
+        """The function of an output for columns of states."""
         python, size = getattr(self.module, name), math.prod(shape)
         many = self.library[f"columns_{name}"]
         many.argtypes = [_LONG, _REAL, *[_POINTER] * 3, ctypes.c_int, *[_POINTER] * 2]
@@ -142,7 +146,7 @@ class _Kernels:
 
 
 def _ordered(values: Any, defaults: dict[str, float]) -> FloatArray | None:
-    """Values by name or in order as an array of floats; None where they are no such thing."""
+    """Values by name or in order as an array of floats; None if they are anything else."""
     if hasattr(values, "keys"):
         if set(values) - set(defaults):
             return None

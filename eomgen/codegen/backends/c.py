@@ -17,7 +17,7 @@ SUFFIXES: tuple[str, ...] = (".c", ".h")
 TEMPLATES = "c"
 ABOUT = "C99 and a header: no allocation, no global state, double or float"
 MAIN = "checked.c"
-"""The source of a shared library that is compiled; it includes the others."""
+"""The source of a shared library to compile; it includes the others."""
 KEYWORDS = (
     "auto break case char const continue default do double else enum extern float for goto if "
     "inline int long register restrict return short signed sizeof static struct switch typedef "
@@ -30,17 +30,17 @@ MACROS = (
     "FP_ILOGB0 FP_ILOGBNAN MATH_ERRNO MATH_ERREXCEPT math_errhandling linux unix i386 "
     "DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE MAXFLOAT"
 )
-"""Words that <math.h> or a compiler may replace."""
+"""Macros that <math.h> or a compiler may define."""
 OURS = "y p u k out extra real R failed"
 C_NAMES = {"abs": "fabs", "min": "fmin", "max": "fmax"}
-"""What the functions of formulas are called in C, where that is another name."""
+"""C names of the functions of formulas, where they differ."""
 OWN = {
     "min": ("real a, real b", "b < a ? b : a"),
     "max": ("real a, real b", "b > a ? b : a"),
     "step": ("real x", "x > 0 ? R(1.0) : R(0.0)"),
     "select": ("real c, real a, real b", "c > 0 ? a : b"),
 }
-"""Functions that C has not, or with other results: `fmin` ignores a nan, and may return -0.0."""
+"""Functions that C lacks or defines otherwise: `fmin` ignores a nan and may return -0.0."""
 CONSTANTS = (
     "M_E M_LOG2E M_LOG10E M_LN2 M_LN10 M_PI M_PI_2 M_PI_4 M_1_PI M_2_PI M_2_SQRTPI M_SQRT2 "
     "M_SQRT1_2"
@@ -56,8 +56,8 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
     """The source and its header.
 
     Compiled without contraction of products and sums (`-ffp-contract=off`, the default of
-    `-std=c99` in GCC) each function returns the same bits as the Python module's, with the same
-    library of mathematical functions.
+    `-std=c99` in GCC) and with the same mathematical library, each function returns the same bits
+    as that of the Python module.
     """
     kernels, constants = kernels_of(program, interface, DIALECT)
     name = interface.name
@@ -84,8 +84,10 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
 
 
 def library(program: Program, interface: Interface) -> Mapping[str, str]:
-    """The sources of a shared library: those of `files`, and `MAIN`, which includes them and has
-    for each output `checked_NAME` and `columns_NAME`, which say where a result has no value.
+    """The sources of a shared library: those of `files`, and `MAIN`, which includes them.
+
+    `MAIN` defines `checked_NAME` and `columns_NAME` for each output. They also report whether the
+    result is valid.
     """
     kernels, _ = kernels_of(program, interface, DIALECT)
     place = _places_of(kernels)
@@ -104,7 +106,7 @@ _SHARED = ("scene", "prefix", "kernels")
 
 
 def _places_of(kernels: Sequence[Kernel]) -> dict[str, int]:
-    """The constants that kernels take, each with its place in `k`."""
+    """The constants that kernels use, each with its index in `k`."""
     names = dict.fromkeys(name for kernel in kernels for name in kernel.constants)
     return {name: i for i, name in enumerate(names)}
 
@@ -181,7 +183,7 @@ def _written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
 
 
 def _places(names: Sequence[str], array: str) -> list[tuple[str, str]]:
-    """The variables that are used, each with its place in an array."""
+    """The variables that are used, each with its element of an array."""
     return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
 
 
@@ -193,7 +195,7 @@ def _table(variables: Sequence[Variable]) -> list[tuple[int, str, str, str, str]
 
 
 def _test(test: Test) -> str:
-    """A comparison that no nan passes."""
+    """A comparison that is false for nan."""
     over = "<" if test.condition.strict else "<="
     parts = [f"R({test.condition.low!r}) {over} {test.value}"]
     if test.condition.high != math.inf:
@@ -211,11 +213,11 @@ def _check_words(check: Any) -> str:
 
 
 def _plain(text: str) -> str:
-    """Text of a scene as it may stand in a comment: of ASCII, in one line, not ending it."""
+    """Text of a scene made fit for a C comment: ASCII, one line, without comment marks."""
     kept = "".join(c if c.isprintable() and c.isascii() else " " for c in text)
     return " ".join(kept.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").split())
 
 
 def _quoted(text: str) -> str:
-    """A string of C; `??` would begin a trigraph."""
+    """A C string literal; `??` would begin a trigraph."""
     return '"' + _plain(text).replace('"', "'").replace("??", "? ?") + '"'
