@@ -258,12 +258,12 @@ def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
         assert main(["simulate", str(scene), *given]) == 0
         ends[folder] = load_npz(tmp_path / folder / "swing.npz")
     assert ends["second"].y[-1].tobytes() == ends["whole"].y[-1].tobytes()
-    assert "goes on from t = 0.999 s as if the run had not ended" in capsys.readouterr().out
+    assert "continues from t = 0.999 s as if the run had not ended" in capsys.readouterr().out
     again = ["simulate", str(scene), "--from", str(tmp_path / "first/swing.npz")]
     assert main([*again, "--t-end", "2", "-o", str(tmp_path / "first")]) == 1
     assert "would be overwritten; give another folder with -o" in capsys.readouterr().err
     assert main([*again, "--t-end", "2", "-o", str(tmp_path / "other")]) == 0
-    assert "begins anew from the state at t = 1 s: that run was by rk4" in capsys.readouterr().out
+    assert "starts anew from the state at t = 1 s: that run used rk4" in capsys.readouterr().out
     assert main([*again, "--t-end", "0.5", "-o", str(tmp_path / "other")]) == 1
     assert "t_end: 0.5 is not after t_start = 1" in capsys.readouterr().err
     wrong = ["simulate", "pendulum", "--from", str(tmp_path / "first/swing.npz")]
@@ -308,7 +308,7 @@ def test_what_differs_from_the_run_that_goes_on_is_reported(
         return said.out + said.err
 
     assert "as if the run had not ended" in told(*base)
-    anew = "begins anew from the state at t = 1 s: that run had "
+    anew = "starts anew from the state at t = 1 s: that run had "
     assert f"{anew}b_mass = 2.0, not 50.0" in told(*base, "--set", "b_mass=50")
     assert f"{anew}drive = 0.5, not 0.0" in told(*base[:2], *base[4:])
     assert f"{anew}--rtol 1e-08, not 1e-06" in told(*base, "--rtol", "1e-6")
@@ -352,5 +352,5 @@ def test_what_a_run_cannot_have_left_is_refused(
     capsys.readouterr()
     assert main([*given, "--t-end", "2", "-o", str(tmp_path / "b"), "--from", str(saved)]) == 1
     assert capsys.readouterr().err == (
-        f"eomgen: {saved}: what it holds to go on from does not fit rk4; simulate again\n"
+        f"eomgen: {saved}: its data for continuing do not fit rk4; simulate again\n"
     )

@@ -26,7 +26,7 @@ Extended = Any
 
 
 def digits(bits: int = BITS) -> Any:
-    """A `with` block in which extended numbers have this many bits, and undefined values are nan."""
+    """A context in which extended numbers have this many bits, and undefined values are nan."""
     return gmpy2.context(precision=bits)
 
 
